@@ -1,4 +1,6 @@
-/* See flexspline_table.h. Each function has the name of what it follows in the Rust core (core/src/table, core/src/play.rs, core/src/drive.rs),
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
+/** @file
+ * See flexspline_table.h. Each function has the name of what it follows in the Rust core (core/src/table, core/src/play.rs, core/src/drive.rs),
  * where the reasons are told; the order of every sum and product is the core's, so that all bits are. */
 #include "flexspline_table.h"
 
@@ -63,8 +65,11 @@ enum {
     AT_TEMPERATURE_NODES = 128,
     AT_CURVES = 136
 };
+#define PAGE_BYTES ((uint32_t)FXT_PAGE_BYTES)
 /* 2^-24 cells in one. */
 #define CELL INT32_C(0x1000000)
+/* Counts in a quarter turn. */
+#define QUARTER_TURN INT32_C(0x40000000)
 /* The largest half-width of a play, and the largest error that is kept, counts. */
 #define MOST_PLAY INT32_C(0x8000000)
 #define MOST_KEPT (34178720u + (34178720u >> 8) + 2u * 33554431u + 0x8000000u)
@@ -96,10 +101,22 @@ static inline int32_t saturate(int64_t value)
     return value > INT32_MAX ? INT32_MAX : value < INT32_MIN ? INT32_MIN : (int32_t)value;
 }
 
+/* Divided by a power of two, rounded down. The shifts keep the sign, as asserted above: deviations from MISRA C:2012 rule 10.1. */
+static inline int32_t shifted(int32_t value, uint32_t by)
+{
+    return value >> by;
+}
+
+static inline int64_t whole_turns(int64_t counts)
+{
+    return counts >> 32;
+}
+
 /* a*b/2^32, rounded down. */
 static inline int32_t mul_high(int32_t a, int32_t b)
 {
-    return i32((uint32_t)((uint64_t)((int64_t)a * b) >> 32));
+    const int64_t product = (int64_t)a * b;
+    return i32((uint32_t)((uint64_t)product >> 32));
 }
 
 static inline uint32_t bits_of(float value)
@@ -135,9 +152,14 @@ static inline bool is_finite(float value)
 /* Towards zero; the end of the range beyond it; 0 of NaN. */
 static inline int32_t to_i32(float value)
 {
-    if (value >= -2147483648.0f && value < 2147483648.0f)
-        return (int32_t)value;
-    return value > 0.0f ? INT32_MAX : value < 0.0f ? INT32_MIN : 0;
+    if (value >= 2147483648.0f) {
+        return INT32_MAX;
+    }
+    if (value <= -2147483648.0f) {
+        return INT32_MIN;
+    }
+    /* Only NaN differs from itself. */
+    return value == value ? (int32_t)value : 0;
 }
 
 /* The larger; the second if the first is NaN. */
@@ -153,6 +175,12 @@ static inline float within(float value, float least, float most)
     return above < most ? above : most;
 }
 
+/* The same for a conversion that follows. Written so that a prover sees that the result is a number. */
+static float number_within(float value, float least, float most)
+{
+    return value == value ? within(value, least, most) : least;
+}
+
 /* Square root, to 3e-7 of it. */
 static inline float root_of(float value)
 {
@@ -160,14 +188,21 @@ static inline float root_of(float value)
     const float x = float_of(bits);
     const float half = 0.5f * x;
     float inverse = float_of(0x5f3759dfu - (bits >> 1));
-    for (int i = 0; i < 3; i++)
+    for (int i = 0; i < 3; i++) {
         inverse = inverse * (1.5f - half * inverse * inverse);
+    }
     return x * inverse;
 }
 
 static double counts_of_rad(double rad)
 {
     return rad * (TURN / TAU);
+}
+
+/* Of a number within [0, 2^32). */
+static uint32_t to_u32(double counts)
+{
+    return (uint32_t)counts;
 }
 
 static float rad_of(float counts)
@@ -185,9 +220,10 @@ static inline uint32_t word_from(const uint8_t *at)
 /* `count` words from a byte on: all of them or zeros. */
 static inline void words_from(const uint8_t *image, uint32_t bytes, uint32_t at, uint32_t count, uint32_t *words)
 {
-    const bool there = at <= bytes && bytes - at >= 4u * count;
-    for (uint32_t i = 0; i < count; i++)
+    const bool there = bytes >= 4u * count && at <= bytes - 4u * count;
+    for (uint32_t i = 0u; i < count; i++) {
         words[i] = there ? word_from(image + at + 4u * i) : 0u;
+    }
 }
 
 /* Words of the body. */
@@ -210,12 +246,14 @@ static inline float number_at(const fxt_table *table, uint32_t at)
 
 static inline int32_t low(uint32_t word)
 {
-    return (int16_t)(word & 0xffffu);
+    const uint32_t bits = word & 0xffffu;
+    return (int16_t)bits;
 }
 
 static inline int32_t high(uint32_t word)
 {
-    return (int16_t)(word >> 16);
+    const uint32_t bits = word >> 16;
+    return (int16_t)bits;
 }
 
 /* CRC-32 of ISO-HDLC, four bits at a time; before the last inversion. */
@@ -224,7 +262,7 @@ static uint32_t crc_bytes(uint32_t crc, const uint8_t *bytes, uint32_t count)
     static const uint32_t of_nibble[16] = {0x00000000u, 0x1db71064u, 0x3b6e20c8u, 0x26d930acu, 0x76dc4190u, 0x6b6b51f4u,
                                            0x4db26158u, 0x5005713cu, 0xedb88320u, 0xf00f9344u, 0xd6d6a3e8u, 0xcb61b38cu,
                                            0x9b64c2b0u, 0x86d3d2d4u, 0xa00ae278u, 0xbdbdf21cu};
-    for (uint32_t i = 0; i < count; i++) {
+    for (uint32_t i = 0u; i < count; i++) {
         crc ^= bytes[i];
         crc = crc >> 4 ^ of_nibble[crc & 15u];
         crc = crc >> 4 ^ of_nibble[crc & 15u];
@@ -254,13 +292,14 @@ static fxt_factor factor_new(uint32_t times, uint32_t over)
 
 static inline int64_t factor_of(const fxt_factor *factor, int64_t counts)
 {
-    const uint64_t above = (uint64_t)(counts >> 32), below = (uint32_t)counts;
+    const uint64_t above = (uint64_t)whole_turns(counts), below = (uint32_t)counts;
     const uint64_t fraction_high = factor->fraction >> 32, fraction_low = (uint32_t)factor->fraction;
     const uint64_t lowest = below * fraction_low >> 32;
     const uint64_t middle = below * fraction_high + lowest;
     const uint64_t other = above * fraction_low + (uint32_t)middle + ((uint64_t)1 << 31);
-    const uint64_t scaled = above * fraction_high + (middle >> 32) + (uint64_t)((int64_t)other >> 32);
-    return (int64_t)((uint64_t)counts * factor->whole + scaled);
+    const uint64_t scaled = above * fraction_high + (middle >> 32) + (uint64_t)whole_turns((int64_t)other);
+    const uint64_t product = (uint64_t)counts * factor->whole + scaled;
+    return (int64_t)product;
 }
 
 static fxt_rate rate_new(const fxt_factor *factor, uint32_t times, bool reversed)
@@ -277,19 +316,21 @@ static fxt_rate rate_new(const fxt_factor *factor, uint32_t times, bool reversed
 
 static inline uint32_t rate_phase(const fxt_rate *rate, int64_t counts)
 {
-    const uint64_t turns = (uint64_t)(counts >> 32);
+    const uint64_t turns = (uint64_t)whole_turns(counts);
     const uint32_t late = (uint32_t)(turns * rate->rest >> 32);
     return (uint32_t)((uint64_t)counts * rate->periods >> 32) + late;
 }
 
 static inline int64_t minus(int64_t angle, int64_t counts)
 {
-    return (int64_t)((uint64_t)angle - (uint64_t)counts);
+    const uint64_t difference = (uint64_t)angle - (uint64_t)counts;
+    return (int64_t)difference;
 }
 
 static inline int64_t plus(int64_t angle, int64_t counts)
 {
-    return (int64_t)((uint64_t)angle + (uint64_t)counts);
+    const uint64_t sum = (uint64_t)angle + (uint64_t)counts;
+    return (int64_t)sum;
 }
 
 static int64_t nominal_output(const fxt_table *table, int64_t generator)
@@ -308,9 +349,10 @@ static int64_t nominal_generator(const fxt_table *table, int64_t output)
 static inline int32_t minus_near(int64_t a, int64_t b)
 {
     const int64_t counts = minus(a, b);
-    if (counts >= INT32_MIN && counts <= INT32_MAX)
+    if (counts >= INT32_MIN && counts <= INT32_MAX) {
         return (int32_t)counts;
-    return counts < 0 ? ~(INT32_MAX >> 1) : INT32_MAX >> 1;
+    }
+    return counts < 0 ? -QUARTER_TURN : QUARTER_TURN - 1;
 }
 
 typedef struct {
@@ -343,9 +385,11 @@ typedef struct {
 static inline uint32_t search(const fxt_table *table, uint32_t first, uint32_t step, float value)
 {
     uint32_t found = 0;
-    for (; step > 0; step >>= 1)
-        if (number_at(table, first + (found | step)) <= value)
+    for (; step > 0u; step >>= 1) {
+        if (number_at(table, first + (found | step)) <= value) {
             found |= step;
+        }
+    }
     return found;
 }
 
@@ -387,10 +431,11 @@ static point locate(const fxt_table *table, float torque_n_m, float temperature_
     float bend = weight * rest * (rest * (width * here[1] - rise) + weight * (rise - width * here[4]));
     bend = jump ? 0.0f : bend;
     const int32_t t = to_i32(weight * 16384.0f), w = to_i32(warm * 16384.0f);
-    const int32_t both = mul(t, w) >> 14;
+    const int32_t both = shifted(mul(t, w), 14u);
     const int32_t shares[4] = {add(sub(sub(16384, t), w), both), sub(t, both), sub(w, both), both};
-    for (int i = 0; i < 4; i++)
+    for (int i = 0; i < 4; i++) {
         at.shares[i] = i32((uint32_t)shares[i] << 16);
+    }
     const bool inside = (uint32_t)t - 1u < 16383u;
     at.jump = jump && inside ? to_i32(magnitude(rise) + magnitude(widening)) : 0;
     at.mean = to_i32(here[0] + weight * rise + bend);
@@ -407,10 +452,12 @@ static point locate(const fxt_table *table, float torque_n_m, float temperature_
 
 static fxt_quality quality_of(const point *at, bool sane, bool known)
 {
-    if (!sane)
+    if (!sane) {
         return FXT_DISABLED;
-    if (!at->in_range)
+    }
+    if (!at->in_range) {
         return FXT_EXTRAPOLATED;
+    }
     return known && at->jump == 0 ? FXT_IN_RANGE : FXT_UNCERTAIN;
 }
 
@@ -474,17 +521,19 @@ static int32_t curves_at(const fxt_table *table, const phases *where)
 {
     const uint32_t phase[3] = {where->generator, where->material, where->output};
     int32_t sum = 0;
-    for (uint32_t curve = 0; curve < 3; curve++) {
+    for (uint32_t curve = 0u; curve < 3u; curve++) {
         const uint32_t nodes = table->curves[curve] >> 16, first = table->curves[curve] & 0xffffu;
-        if (nodes == 0u)
+        if (nodes == 0u) {
             continue;
+        }
         const cell at = cell_at(nodes, phase[curve]);
         uint32_t words[3];
         int32_t weights[3];
         words_at(table, first + at.node, 3, words);
         weights_q15(at, weights);
-        for (int i = 0; i < 3; i++)
+        for (int i = 0; i < 3; i++) {
             sum = add(sum, mul_high(i32(words[i]), i32((uint32_t)weights[i] << 16)));
+        }
     }
     return sum;
 }
@@ -502,11 +551,12 @@ static void ripple_at(const fxt_table *table, const point *at, uint32_t tooth, i
     const uint32_t backward_row = ripple_row(table->ripple_nodes), rows = rows_of(at);
     int32_t weights[3];
     weights_q15(where, weights);
-    for (int i = 0; i < 3; i++)
+    for (int i = 0; i < 3; i++) {
         weights[i] = (int16_t)weights[i];
+    }
     ripple[0] = ripple[1] = 0;
-    for (uint32_t row = 0; row < rows; row++) {
-        for (uint32_t side = 0; side < 2; side++) {
+    for (uint32_t row = 0u; row < rows; row++) {
+        for (uint32_t side = 0u; side < 2u; side++) {
             uint32_t words[2];
             halves_at(table, row_at(at, row) + where.node + (side != 0u ? backward_row : 0u), 2, words);
             int32_t own = add(mul(low(words[0]), weights[0]), mul(high(words[0]), weights[1]));
@@ -514,8 +564,9 @@ static void ripple_at(const fxt_table *table, const point *at, uint32_t tooth, i
             ripple[side] = add(ripple[side], mul_high(own, at->shares[row]));
         }
     }
-    for (int side = 0; side < 2; side++)
+    for (int side = 0; side < 2; side++) {
         ripple[side] = mul_high(ripple[side], i32(table->ripple_unit));
+    }
 }
 
 /* Centre and half-width of the play, counts; false where they are not what an accepted table can give. */
@@ -526,11 +577,12 @@ static bool play_at(const fxt_table *table, const point *at, const phases *where
     if (table->ripple_nodes > 0u) {
         int32_t ripple[2];
         ripple_at(table, at, where->tooth, ripple);
-        *centre = add(*centre, add(ripple[0], ripple[1]) >> 1);
-        *half = add(*half, sub(ripple[1], ripple[0]) >> 1);
+        *centre = add(*centre, shifted(add(ripple[0], ripple[1]), 1u));
+        *half = add(*half, shifted(sub(ripple[1], ripple[0]), 1u));
     }
-    if (has_curves(table))
+    if (has_curves(table)) {
         *centre = add(*centre, curves_at(table, where));
+    }
     *half = *half < 0 ? 0 : *half;
     return allows(table, *centre, *half);
 }
@@ -542,9 +594,9 @@ static int32_t to_solution(const fxt_table *table, const point *at, uint32_t too
     const uint32_t node = guess.node == 0u ? table->ripple_nodes : guess.node;
     const uint32_t first = node - 1u + (backward ? ripple_row(table->ripple_nodes) : 0u), rows = rows_of(at);
     int32_t sums[5] = {0, 0, 0, 0, 0};
-    for (uint32_t row = 0; row < rows; row++) {
+    for (uint32_t row = 0u; row < rows; row++) {
         uint32_t words[3];
-        const int32_t share = at->shares[row] >> 16;
+        const int32_t share = shifted(at->shares[row], 16u);
         halves_at(table, row_at(at, row) + first, 3, words);
         sums[0] = add(sums[0], mul(low(words[0]), share));
         sums[1] = add(sums[1], mul(high(words[0]), share));
@@ -552,17 +604,18 @@ static int32_t to_solution(const fxt_table *table, const point *at, uint32_t too
         sums[3] = add(sums[3], mul(high(words[1]), share));
         sums[4] = add(sums[4], mul(low(words[2]), share));
     }
-    for (int i = 0; i < 5; i++)
+    for (int i = 0; i < 5; i++) {
         sums[i] = mul_high(sums[i], table->ripple_cells);
-    const int32_t place = sub(i32(guess.fraction ^ 0x80000000u) >> 8, ahead);
+    }
+    const int32_t place = sub(shifted(i32(guess.fraction ^ 0x80000000u), 8u), ahead);
     /* What is missing at either end of the node's cell tells whether the solution is in it, before or after. */
-    int which = sub(add(sums[1], sums[2]) >> 1, place) <= CELL / 2 ? 1 : 0;
-    which += sub(add(sums[2], sums[3]) >> 1, place) <= -CELL / 2 ? 1 : 0;
+    int which = sub(shifted(add(sums[1], sums[2]), 1u), place) <= CELL / 2 ? 1 : 0;
+    which += sub(shifted(add(sums[2], sums[3]), 1u), place) <= -CELL / 2 ? 1 : 0;
     const int32_t a = sums[which], b = sums[which + 1], c = sums[which + 2];
     const int32_t start = sub(which * CELL - CELL / 2 * 3, place);
     const float linear = (float)add(CELL, sub(b, a));
     const float bend = (float)add(sub(a, b), sub(c, b));
-    const float missing = (float)add(add(a, b) >> 1, start);
+    const float missing = (float)add(shifted(add(a, b), 1u), start);
     const float twice = missing + missing;
     const float root = twice / (linear + root_of(linear * linear - bend * twice));
     int32_t along = to_i32(root * -(float)CELL);
@@ -584,7 +637,7 @@ static bool solve(const fxt_table *table, const point *at, int64_t target, bool 
     int32_t curves = 0, ahead = 0;
     *error = base;
     const uint32_t iterations = table->iterations < MOST_ITERATIONS ? table->iterations : MOST_ITERATIONS;
-    for (uint32_t i = 0; i < iterations; i++) {
+    for (uint32_t i = 0u; i < iterations; i++) {
         int32_t guess = *error;
         if (has_curves(table)) {
             const phases where = phases_at_output(table, minus(target, *error));
@@ -616,8 +669,9 @@ static const play_state unknown_state = {0, 0, INT32_MIN, INT32_MAX, -1};
 static inline play_state state_of(const fxt_play *play)
 {
     play_state is = unknown_state;
-    if (play == NULL)
+    if (play == NULL) {
         return is;
+    }
     is.nominal = play->nominal;
     is.error = play->error;
     is.lower = i32(play->lower ^ 0x80000000u);
@@ -639,13 +693,13 @@ static inline int32_t clamped(int32_t offset, int32_t half)
 
 static inline int32_t play_offset(const play_state *play)
 {
-    return add(play->lower, play->upper) >> 1;
+    return shifted(add(play->lower, play->upper), 1u);
 }
 
 static inline int32_t play_uncertainty(const play_state *play)
 {
     const int32_t width = saturate((int64_t)play->upper - play->lower);
-    return add(width >> 1, width & 1);
+    return add(shifted(width, 1u), i32((uint32_t)width & 1u));
 }
 
 /* Moves the play to `nominal` with the centre and half-width there; those of the last update if they are not sane. */
@@ -711,15 +765,16 @@ static fxt_command aim_from(const fxt_table *table, const point *at, int64_t tar
         int32_t back;
         const bool forward_sane = solve(table, at, target, false, &error);
         const bool sane = solve(table, at, target, true, &back) && forward_sane;
-        const int32_t middle = add(error, back) >> 1;
+        const int32_t middle = shifted(add(error, back), 1u);
         return commanded(table, at, target, sane, minus(target, middle), middle, at->half_width);
     }
     const int32_t ahead = minus_near(target, plus(play->nominal, play->error));
     const int32_t away = ahead == INT32_MIN ? INT32_MAX : ahead < 0 ? -ahead : ahead;
     const int32_t unknown = play_uncertainty(play);
     const bool sane = solve(table, at, target, ahead <= 0, &error);
-    if (away <= table->hold)
+    if (away <= table->hold) {
         return commanded(table, at, target, sane, play->nominal, play->error, unknown);
+    }
     /* A target inside the interval may lie on the other side of the output: then the whole play is in doubt. */
     const int32_t guess = away <= unknown && unknown > 0 ? mul(at->half_width, 2) : 0;
     return commanded(table, at, target, sane, minus(target, error), error, guess);
@@ -752,8 +807,9 @@ static bool finite_is(check *is, fxt_field field, uint32_t index, float value)
 
 static bool in_range(check *is, fxt_field field, uint32_t index, float value, float least, float most)
 {
-    if (!finite_is(is, field, index, value))
+    if (!finite_is(is, field, index, value)) {
         return false;
+    }
     return (value >= least && value <= most) || refuse(is, FXT_OUT_OF_RANGE, field, 0, 0);
 }
 
@@ -770,44 +826,55 @@ static uint32_t u16_at(const uint8_t *image, uint32_t at)
 static bool check_envelope(check *is, const uint8_t *image, size_t bytes)
 {
     static const uint8_t magic[8] = {0x89, 'F', 'X', 'T', 0x0d, 0x0a, 0x1a, 0x0a};
-    if (image == NULL || bytes < LEAST_BYTES)
+    if (image == NULL || bytes < LEAST_BYTES) {
         return refuse(is, FXT_TOO_SHORT, FXT_NO_FIELD, 0, 0);
-    for (int i = 0; i < 8; i++)
-        if (image[i] != magic[i])
+    }
+    for (int i = 0; i < 8; i++) {
+        if (image[i] != magic[i]) {
             return refuse(is, FXT_MAGIC, FXT_NO_FIELD, 0, 0);
-    if (u16_at(image, 10) != 0xfeffu)
+        }
+    }
+    if (u16_at(image, 10) != 0xfeffu) {
         return refuse(is, FXT_BYTE_ORDER, FXT_NO_FIELD, u16_at(image, 10), 0);
-    if (u16_at(image, 8) != FXT_FORMAT_VERSION)
+    }
+    if (u16_at(image, 8) != FXT_FORMAT_VERSION) {
         return refuse(is, FXT_VERSION, FXT_NO_FIELD, u16_at(image, 8), 0);
+    }
     const uint32_t stated = word_from(image + 12);
-    if (stated != bytes)
+    if (stated != bytes) {
         return refuse(is, FXT_LENGTH, FXT_NO_FIELD, stated, 0);
+    }
     const uint32_t computed = crc32_of(image, stated - 4u);
-    if (computed != word_from(image + stated - 4u))
+    if (computed != word_from(image + stated - 4u)) {
         return refuse(is, FXT_CRC, FXT_NO_FIELD, computed, 0);
+    }
     return true;
 }
 
 static bool check_text(check *is, const uint8_t *text, fxt_field field)
 {
     uint32_t length = 0;
-    while (length < TEXT_BYTES && text[length] >= 0x20 && text[length] < 0x7f)
+    while (length < (uint32_t)TEXT_BYTES && text[length] >= 0x20u && text[length] < 0x7fu) {
         length++;
-    while (length < TEXT_BYTES && text[length] == 0)
+    }
+    while (length < (uint32_t)TEXT_BYTES && text[length] == 0u) {
         length++;
-    return length == TEXT_BYTES || refuse(is, FXT_TEXT, field, 0, 0);
+    }
+    return length == (uint32_t)TEXT_BYTES || refuse(is, FXT_TEXT, field, 0, 0);
 }
 
 static bool check_drive(check *is, const uint8_t *image)
 {
     fxt_table *table = is->table;
     const uint32_t flexspline = u16_at(image, 106), circular = u16_at(image, 108);
-    if (image[105] > 1)
+    if (image[105] > 1u) {
         return refuse(is, FXT_FIXED_MEMBER, FXT_NO_FIELD, image[105], 0);
+    }
     const uint32_t waves = circular > flexspline ? circular - flexspline : 0u;
-    if (flexspline == 0u || waves == 0u || waves > flexspline)
+    if (flexspline == 0u || waves == 0u || waves > flexspline) {
         return refuse(is, FXT_TEETH, FXT_NO_FIELD, flexspline, 0);
-    table->reversed = image[105] == 1;
+    }
+    table->reversed = image[105] == 1u;
     const uint32_t teeth = table->reversed ? flexspline : circular;
     table->ripple_order = table->reversed ? circular : flexspline;
     table->to_output = factor_new(waves, teeth);
@@ -821,10 +888,10 @@ static bool check_drive(check *is, const uint8_t *image)
     return true;
 }
 
-static bool count_is(check *is, fxt_field field, uint32_t found, uint32_t least, uint32_t most)
+static fxt_field curve_field(uint32_t curve)
 {
-    const bool absent = least == LEAST_PERIODIC_NODES && found == 0u;
-    return absent || (found >= least && found <= most) || refuse(is, FXT_COUNT, field, found, 0);
+    static const fxt_field fields[3] = {FXT_GENERATOR_CURVE, FXT_MATERIAL_CURVE, FXT_OUTPUT_CURVE};
+    return fields[curve];
 }
 
 static uint32_t stored(uint32_t nodes)
@@ -835,25 +902,36 @@ static uint32_t stored(uint32_t nodes)
 /* What an image is for, and its sizes. */
 static bool check_identity(check *is, const uint8_t *image)
 {
-    for (uint32_t at = 200; at < HEADER_BYTES; at++)
-        if (image[at] != 0)
+    for (uint32_t at = 200; at < (uint32_t)HEADER_BYTES; at++) {
+        if (image[at] != 0u) {
             return refuse(is, FXT_RESERVED, FXT_NO_FIELD, at, 0);
-    if (!check_text(is, image + 56, FXT_TOOL_VERSION) || !check_text(is, image + 80, FXT_MESH_LEVEL) || !check_drive(is, image))
+        }
+    }
+    if (!check_text(is, image + 56, FXT_TOOL_VERSION) || !check_text(is, image + 80, FXT_MESH_LEVEL) || !check_drive(is, image)) {
         return false;
-    if (image[104] > 4)
+    }
+    if (image[104] > 4u) {
         return refuse(is, FXT_GENERATOR_KIND, FXT_NO_FIELD, image[104], 0);
+    }
     is->torques = image[110];
     is->temperatures = image[111];
     is->ripple_nodes = image[112];
-    if (!count_is(is, FXT_TORQUE_NODES, is->torques, 1, TORQUE_SLOTS) ||
-        !count_is(is, FXT_TEMPERATURE_NODES, is->temperatures, 1, TEMPERATURE_SLOTS) ||
-        !count_is(is, FXT_RIPPLE_NODES, is->ripple_nodes, LEAST_PERIODIC_NODES, MOST_RIPPLE_NODES))
-        return false;
+    if (is->torques < 1u || is->torques > (uint32_t)TORQUE_SLOTS) {
+        return refuse(is, FXT_COUNT, FXT_TORQUE_NODES, is->torques, 0);
+    }
+    if (is->temperatures < 1u || is->temperatures > (uint32_t)TEMPERATURE_SLOTS) {
+        return refuse(is, FXT_COUNT, FXT_TEMPERATURE_NODES, is->temperatures, 0);
+    }
+    if (is->ripple_nodes != 0u && (is->ripple_nodes < (uint32_t)LEAST_PERIODIC_NODES || is->ripple_nodes > (uint32_t)MOST_RIPPLE_NODES)) {
+        return refuse(is, FXT_COUNT, FXT_RIPPLE_NODES, is->ripple_nodes, 0);
+    }
     uint32_t next = AT_CURVES;
-    for (uint32_t i = 0; i < 3; i++) {
+    for (uint32_t i = 0u; i < 3u; i++) {
         is->curve_nodes[i] = image[113u + i];
-        if (!count_is(is, (fxt_field)((uint32_t)FXT_GENERATOR_CURVE + i), is->curve_nodes[i], LEAST_PERIODIC_NODES, MOST_PERIODIC_NODES))
-            return false;
+        if (is->curve_nodes[i] != 0u &&
+            (is->curve_nodes[i] < (uint32_t)LEAST_PERIODIC_NODES || is->curve_nodes[i] > (uint32_t)MOST_PERIODIC_NODES)) {
+            return refuse(is, FXT_COUNT, curve_field(i), is->curve_nodes[i], 0);
+        }
         is->curves[i] = next;
         next += stored(is->curve_nodes[i]);
     }
@@ -863,7 +941,7 @@ static bool check_identity(check *is, const uint8_t *image)
     is->record = ripple_row(is->ripple_nodes);
     is->end = is->records + is->record * is->torques * is->temperatures;
     is->table->body_bytes = 4u * is->end;
-    const uint32_t pages = (is->table->body_bytes + FXT_PAGE_BYTES - 1u) / FXT_PAGE_BYTES;
+    const uint32_t pages = (is->table->body_bytes + PAGE_BYTES - 1u) / PAGE_BYTES;
     const uint32_t needed = is->table->body_bytes + 4u * (pages + 1u);
     return needed == is->table->bytes || refuse(is, FXT_SIZE, FXT_NO_FIELD, needed, 0);
 }
@@ -894,30 +972,36 @@ static bool check_places(check *is)
         pair(is->curves[1], is->curve_nodes[1]),
         pair(is->curves[2], is->curve_nodes[2]),
     };
-    if (!derived_is(is, AT_BODY, is->end) || !derived_is(is, AT_CELL_WIDTH, bits_of(cell_width)))
+    if (!derived_is(is, AT_BODY, is->end) || !derived_is(is, AT_CELL_WIDTH, bits_of(cell_width))) {
         return false;
-    for (uint32_t i = 0; i < 7; i++)
-        if (!derived_is(is, AT_LAST + i, plan[i]))
+    }
+    for (uint32_t i = 0u; i < 7u; i++) {
+        if (!derived_is(is, AT_LAST + i, plan[i])) {
             return false;
+        }
+    }
     is->table->cell_width = cell_width;
     const float limit = number_at(is->table, 38);
-    return in_range(is, FXT_ERROR_LIMIT, 0, limit, FLT_MIN, 0.05f) &&
-           derived_is(is, AT_LIMIT, (uint32_t)(counts_of_rad((double)limit) * 1.001 + 16.0));
+    const double limit_counts = counts_of_rad((double)number_within(limit, FLT_MIN, 0.05f)) * 1.001 + 16.0;
+    return in_range(is, FXT_ERROR_LIMIT, 0, limit, FLT_MIN, 0.05f) && derived_is(is, AT_LIMIT, to_u32(limit_counts));
 }
 
 static bool check_axis(check *is, fxt_field field, uint32_t first, uint32_t nodes, uint32_t slots)
 {
-    for (uint32_t i = 0; i < slots; i++) {
+    for (uint32_t i = 0u; i < slots; i++) {
         const float node = number_at(is->table, first + i);
         if (i >= nodes) {
-            if (!derived_is(is, first + i, bits_of(FLT_MAX)))
+            if (!derived_is(is, first + i, bits_of(FLT_MAX))) {
                 return false;
+            }
             continue;
         }
-        if (!in_range(is, field, i, node, -1e6f, 1e6f))
+        if (!in_range(is, field, i, node, -1e6f, 1e6f)) {
             return false;
-        if (i > 0u && node <= number_at(is->table, first + i - 1u))
+        }
+        if (i > 0u && node <= number_at(is->table, first + i - 1u)) {
             return refuse(is, FXT_NOT_INCREASING, field, i, 0);
+        }
     }
     return true;
 }
@@ -938,8 +1022,9 @@ static bool check_header_numbers(check *is)
     if (!check_range(is, FXT_TORQUE_RANGE, AT_TORQUE_RANGE, AT_TORQUE_NODES, is->torques) ||
         !check_range(is, FXT_TEMPERATURE_RANGE, AT_TEMPERATURE_RANGE, AT_TEMPERATURE_NODES, is->temperatures) ||
         !in_range(is, FXT_SOLVER_RESIDUAL, 0, residual, 0.0f, FLT_MAX) || !in_range(is, FXT_PROJECTION_WORST, 0, worst, 0.0f, 0.05f) ||
-        !in_range(is, FXT_PROJECTION_RMS, 0, rms, 0.0f, worst))
+        !in_range(is, FXT_PROJECTION_RMS, 0, rms, 0.0f, worst)) {
         return false;
+    }
     /* So that the ripple in cells, and in counts, fits the integers of a step. */
     const float widest = magnitude(table->cell_width) * 255.0f;
     const float most = is->ripple_nodes == 0u || widest > 2147483648.0f ? 2147483648.0f : widest;
@@ -955,8 +1040,9 @@ static float torque_at(const check *is, uint32_t node)
 static bool jump_at(const check *is, uint32_t node)
 {
     const uint32_t intervals = is->torques - 1u;
-    if (node >= intervals || intervals <= 1u)
+    if (node >= intervals || intervals <= 1u) {
         return false;
+    }
     const float own = (torque_at(is, node + 1u) - torque_at(is, node)) * 8.0f;
     return (node == 0u || torque_at(is, node) - torque_at(is, node - 1u) >= own) &&
            (node + 1u == intervals || torque_at(is, node + 2u) - torque_at(is, node + 1u) >= own);
@@ -976,21 +1062,26 @@ static uint32_t node_at(const check *is, uint32_t index)
 static bool check_nodes(check *is)
 {
     const float most = (float)counts_of_rad((double)0.05f);
-    float torque_below = 0, mean_below = 0, slope_below = 0, half_below = 0;
-    for (uint32_t index = 0; index < is->torques * is->temperatures; index++) {
+    float torque_below = 0.0f, mean_below = 0.0f, slope_below = 0.0f, half_below = 0.0f;
+    for (uint32_t index = 0u; index < is->torques * is->temperatures; index++) {
         const uint32_t node = index % is->torques, at = node_at(is, index);
         const float mean = number_at(is->table, at), slope = number_at(is->table, at + 1u), half = number_at(is->table, at + 2u);
         if (!in_range(is, FXT_MEAN, index, mean, -most, most) || !finite_is(is, FXT_MEAN_SLOPE, index, slope) ||
-            !in_range(is, FXT_HALF_WIDTH, index, half, 0.0f, most))
+            !in_range(is, FXT_HALF_WIDTH, index, half, 0.0f, most)) {
             return false;
-        if (((bits_of(half) & 1u) != 0u) != is_jump(is, node))
+        }
+        if (((bits_of(half) & 1u) != 0u) != is_jump(is, node)) {
             return refuse(is, FXT_DERIVED, FXT_NO_FIELD, 4u * (at + 2u), 0);
+        }
         if (is->torques == 1u) {
-            for (uint32_t i = 0; i < NODE_WORDS; i++)
-                if (!derived_is(is, at + NODE_WORDS + i, word_at(is->table, at + i)))
+            for (uint32_t i = 0u; i < (uint32_t)NODE_WORDS; i++) {
+                if (!derived_is(is, at + NODE_WORDS + i, word_at(is->table, at + i))) {
                     return false;
-            if (!in_range(is, FXT_MEAN_SLOPE, index, slope, 0.0f, 0.0f))
+                }
+            }
+            if (!in_range(is, FXT_MEAN_SLOPE, index, slope, 0.0f, 0.0f)) {
                 return false;
+            }
         }
         const float torque = torque_at(is, node);
         is->error_rad = larger(is->error_rad, rad_of(magnitude(mean) + half));
@@ -1011,16 +1102,18 @@ static bool check_nodes(check *is)
 static uint32_t leading_zeros(uint64_t bits)
 {
     uint32_t zeros = 0;
-    while (zeros < 64u && (bits >> (63u - zeros) & 1u) == 0u)
+    while (zeros < 64u && (bits >> (63u - zeros) & 1u) == 0u) {
         zeros++;
+    }
     return zeros;
 }
 
 static uint32_t trailing_zeros(uint64_t bits)
 {
     uint32_t zeros = 0;
-    while (zeros < 64u && (bits >> zeros & 1u) == 0u)
+    while (zeros < 64u && (bits >> zeros & 1u) == 0u) {
         zeros++;
+    }
     return zeros;
 }
 
@@ -1031,7 +1124,7 @@ static bool check_rise(check *is)
     const uint32_t first = trailing_zeros(is->jumps), zeros = leading_zeros(is->jumps), last = zeros > 63u ? 0u : 63u - zeros;
     const float endless = float_of(0xff800000u);
     float highest[2] = {endless, endless};
-    for (uint32_t index = 0; index < is->torques * is->temperatures; index++) {
+    for (uint32_t index = 0u; index < is->torques * is->temperatures; index++) {
         const uint32_t torque = index % is->torques, temperature = index / is->torques;
         if (torque == 0u) {
             highest[0] = highest[1] = endless;
@@ -1058,10 +1151,12 @@ static bool check_rise(check *is)
             least = change < least ? change : least;
         }
         const bool lets_go = first < below && below < last && !jump;
-        if (least < -(lets_go ? 0.5f * pitch_rad : 5.0e-5f))
+        if (least < -(lets_go ? 0.5f * pitch_rad : 5.0e-5f)) {
             return refuse(is, FXT_FALLS, FXT_NO_FIELD, torque, temperature);
-        if (most > allowed + 5.0e-5f)
+        }
+        if (most > allowed + 5.0e-5f) {
             return refuse(is, FXT_STEEP, FXT_NO_FIELD, torque, temperature);
+        }
     }
     return true;
 }
@@ -1082,8 +1177,9 @@ static int32_t half_at(const fxt_table *table, uint32_t words, uint32_t half)
 
 static float curve_rad(const curve *of, uint32_t i)
 {
-    if (of->is_ripple)
+    if (of->is_ripple) {
         return rad_of((float)half_at(of->table, of->words, of->halves + i) * of->unit);
+    }
     return rad_of((float)i32(word_at(of->table, of->words + i)) * 0.5f);
 }
 
@@ -1091,7 +1187,7 @@ static float curve_rad(const curve *of, uint32_t i)
 static void extremes(const curve *of, uint32_t count, float most[3])
 {
     most[0] = most[1] = most[2] = 0.0f;
-    for (uint32_t i = 0; i + 2u < count; i++) {
+    for (uint32_t i = 0u; i + 2u < count; i++) {
         const float a = curve_rad(of, i), b = curve_rad(of, i + 1u), c = curve_rad(of, i + 2u);
         const float turn = (a - b) / (a - 2.0f * b + c);
         const float there = 0.5f * (a + b) + 0.5f * turn * (b - a);
@@ -1110,23 +1206,25 @@ static bool check_record(check *is, uint32_t index)
     const fxt_table *table = is->table;
     const uint32_t words = is->records + index * is->record, nodes = is->ripple_nodes;
     const float unit = (float)word_at(table, AT_RIPPLE_UNIT) * (1.0f / 524288.0f);
-    for (uint32_t i = 0; i < 2u * is->record; i++) {
+    for (uint32_t i = 0u; i < 2u * is->record; i++) {
         const uint32_t first = i < is->record ? 0u : is->record;
         const uint32_t node = (i - first + nodes - 1u) % nodes + 1u;
-        if (half_at(table, words, i) != half_at(table, words, first + node))
+        if (half_at(table, words, i) != half_at(table, words, first + node)) {
             return refuse(is, FXT_NOT_CLOSED, FXT_MEAN_RIPPLE, i, 0);
+        }
     }
     const float half = number_at(table, node_at(is, index) + 2u);
     float least = half;
-    for (uint32_t i = 0; i < stored(nodes); i++) {
+    for (uint32_t i = 0u; i < stored(nodes); i++) {
         const float forward = (float)half_at(table, words, i), backward = (float)half_at(table, words, i + is->record);
         const float play = half + 0.5f * (backward * unit - forward * unit);
         least = play < least ? play : least;
     }
-    if (least < -(3.0f + unit))
+    if (least < -(3.0f + unit)) {
         return refuse(is, FXT_NEGATIVE_HALF_WIDTH, FXT_NO_FIELD, index % is->torques, index / is->torques);
+    }
     const float cells_per_rad = (float)nodes * magnitude(is->tooth_periods) / tau_f32;
-    for (uint32_t side = 0; side < 2; side++) {
+    for (uint32_t side = 0u; side < 2u; side++) {
         const curve of = {table, words, side * is->record, true, unit};
         float most[3];
         extremes(&of, stored(nodes), most);
@@ -1140,23 +1238,28 @@ static bool check_record(check *is, uint32_t index)
 
 static bool check_curve(check *is, uint32_t index)
 {
-    const fxt_field field = (fxt_field)((uint32_t)FXT_GENERATOR_CURVE + index);
+    const fxt_field field = curve_field(index);
     const uint32_t nodes = is->curve_nodes[index], count = stored(nodes), at = is->curves[index];
     const curve of = {is->table, at, 0, false, 0.0f};
-    for (uint32_t i = 0; i < count; i++)
-        if (!in_range(is, field, i, curve_rad(&of, i), -0.05f, 0.05f))
+    for (uint32_t i = 0u; i < count; i++) {
+        if (!in_range(is, field, i, curve_rad(&of, i), -0.05f, 0.05f)) {
             return false;
+        }
+    }
     if (count > 0u) {
         const uint32_t repeats[3] = {0, nodes + 1u, nodes + 2u}, own[3] = {nodes, 1, 2};
-        for (int i = 0; i < 3; i++)
-            if (word_at(is->table, at + repeats[i]) != word_at(is->table, at + own[i]))
+        for (int i = 0; i < 3; i++) {
+            if (word_at(is->table, at + repeats[i]) != word_at(is->table, at + own[i])) {
                 return refuse(is, FXT_NOT_CLOSED, field, repeats[i], 0);
+            }
+        }
     }
     float most[3];
     extremes(&of, count, most);
     const float periods = index == 0u ? is->ratio : index == 1u ? is->ratio - 1.0f : 1.0f;
-    if (index == 0u)
+    if (index == 0u) {
         is->error_rad = is->error_rad + is->periodic_rad;
+    }
     const float slope = most[1] * (float)nodes * magnitude(periods) / tau_f32;
     is->rounding_rad = is->rounding_rad + 2.0f * weight_rounding * most[1];
     is->error_rad = is->error_rad + most[0];
@@ -1174,44 +1277,57 @@ static bool check_inverse(check *is)
     const float rate = is->curve_slope / (1.0f - is->slope);
     float left = is->periodic_rad, away = is->cells * cell_rad + is->periodic_rad * rate;
     uint32_t iterations = 0;
-    while (iterations < MOST_ITERATIONS) {
+    while (iterations < (uint32_t)MOST_ITERATIONS) {
         const float beyond = larger(away - cell_rad, 0.0f);
         left = left * rate + beyond;
         away = left * (1.0f + rate);
         iterations++;
-        if (left <= 1.0e-7f)
+        if (left <= 1.0e-7f) {
             break;
+        }
     }
     const float place = is_finite(cell_rad) ? 4.0f * FLT_EPSILON * cell_rad : 0.0f;
     left = left + (is->rounding_rad + place) / (1.0f - is->slope);
-    if (!(left <= 1.0e-6f))
+    if (!(left <= 1.0e-6f)) {
         return refuse(is, FXT_INVERSE, FXT_NO_FIELD, 0, 0);
+    }
     table->inverse_error_rad = left;
-    const int32_t hold = add((int32_t)counts_of_rad((double)left), HOLD_COUNTS);
-    return derived_is(is, AT_ITERATIONS, iterations) && derived_is(is, AT_HOLD, (uint32_t)hold);
+    const double left_counts = counts_of_rad((double)number_within(left, 0.0f, 1.0e-6f));
+    const uint32_t hold = to_u32(left_counts) + (uint32_t)HOLD_COUNTS;
+    return derived_is(is, AT_ITERATIONS, iterations) && derived_is(is, AT_HOLD, hold);
 }
 
 static bool check_numbers(check *is)
 {
     if (!check_places(is) || !check_axis(is, FXT_TORQUE_NODES, AT_TORQUE_NODES, is->torques, TORQUE_SLOTS) ||
         !check_axis(is, FXT_TEMPERATURE_NODES, AT_TEMPERATURE_NODES, is->temperatures, TEMPERATURE_SLOTS) ||
-        !check_header_numbers(is))
+        !check_header_numbers(is)) {
         return false;
-    for (uint32_t i = 0; i < is->torques; i++)
+    }
+    for (uint32_t i = 0u; i < is->torques; i++) {
         is->jumps |= (uint64_t)(jump_at(is, i) ? 1u : 0u) << i;
-    if (!check_nodes(is))
+    }
+    if (!check_nodes(is)) {
         return false;
-    if (is->ripple_nodes > 0u)
-        for (uint32_t i = 0; i < is->torques * is->temperatures; i++)
-            if (!check_record(is, i))
+    }
+    if (is->ripple_nodes > 0u) {
+        for (uint32_t i = 0u; i < is->torques * is->temperatures; i++) {
+            if (!check_record(is, i)) {
                 return false;
-    for (uint32_t i = 0; i < 3; i++)
-        if (!check_curve(is, i))
+            }
+        }
+    }
+    for (uint32_t i = 0u; i < 3u; i++) {
+        if (!check_curve(is, i)) {
             return false;
-    if (!(is->error_rad <= number_at(is->table, 38)))
+        }
+    }
+    if (!(is->error_rad <= number_at(is->table, 38))) {
         return refuse(is, FXT_ERROR_BOUND, FXT_NO_FIELD, 0, 0);
-    if (!(is->slope < 1.0f))
+    }
+    if (!(is->slope < 1.0f)) {
         return refuse(is, FXT_SLOPE, FXT_NO_FIELD, 0, 0);
+    }
     return check_rise(is) && check_inverse(is);
 }
 
@@ -1232,6 +1348,41 @@ static inline const fxt_table *given(const fxt_table *table)
     return table != NULL ? table : &no_table;
 }
 
+/* All checks in their order. */
+static bool check_image(check *is, const uint8_t *image, uint32_t bytes)
+{
+    fxt_table *table = is->table;
+    table->image = image;
+    table->bytes = bytes;
+    if (!check_identity(is, image)) {
+        return false;
+    }
+    for (uint32_t page = 0u; page < fxt_page_count(table); page++) {
+        if (!fxt_page_intact(table, page)) {
+            return refuse(is, FXT_PAGE_CRC, FXT_NO_FIELD, page, 0);
+        }
+    }
+    return check_numbers(is);
+}
+
+/* What a step needs of an image that was checked: as the core's plan. */
+static void fill_in(fxt_table *table, const check *is)
+{
+    const float bounds[6] = {is->error_rad, is->periodic_rad, is->slope, is->curve_slope, is->cells, is->rounding_rad};
+    table->ripple_nodes = word_at(table, AT_RECORD_STEP) >> 16;
+    table->ripple_unit = word_at(table, AT_RIPPLE_UNIT);
+    table->ripple_cells = to_i32((float)table->ripple_unit * (8388608.0f / table->cell_width));
+    for (uint32_t i = 0u; i < 3u; i++) {
+        table->curves[i] = word_at(table, AT_CURVE_WORDS + i);
+    }
+    table->limit = i32(word_at(table, AT_LIMIT));
+    table->iterations = word_at(table, AT_ITERATIONS);
+    table->hold = i32(word_at(table, AT_HOLD));
+    for (uint32_t i = 0u; i < 6u; i++) {
+        table->bounds[i] = bounds[i];
+    }
+}
+
 fxt_verdict fxt_open(fxt_table *table, const void *image, size_t bytes)
 {
     const check start = {0};
@@ -1245,31 +1396,11 @@ fxt_verdict fxt_open(fxt_table *table, const void *image, size_t bytes)
     is.table = table;
     if (!arithmetic_is_exact()) {
         (void)refuse(&is, FXT_ARITHMETIC, FXT_NO_FIELD, 0, 0);
-        return is.verdict;
+    } else if (check_envelope(&is, at, bytes) && check_image(&is, at, (uint32_t)bytes)) {
+        fill_in(table, &is);
+    } else {
+        *table = no_table;
     }
-    if (check_envelope(&is, at, bytes)) {
-        table->image = at;
-        table->bytes = (uint32_t)bytes;
-        bool whole = check_identity(&is, at);
-        for (uint32_t page = 0; whole && page < fxt_page_count(table); page++)
-            whole = fxt_page_intact(table, page) || refuse(&is, FXT_PAGE_CRC, FXT_NO_FIELD, page, 0);
-        if (whole && check_numbers(&is)) {
-            /* What a step needs of it: as the core's plan. */
-            table->ripple_nodes = word_at(table, AT_RECORD_STEP) >> 16;
-            table->ripple_unit = word_at(table, AT_RIPPLE_UNIT);
-            table->ripple_cells = to_i32((float)table->ripple_unit * (8388608.0f / table->cell_width));
-            for (uint32_t i = 0; i < 3; i++)
-                table->curves[i] = word_at(table, AT_CURVE_WORDS + i);
-            table->limit = i32(word_at(table, AT_LIMIT));
-            table->iterations = word_at(table, AT_ITERATIONS);
-            table->hold = i32(word_at(table, AT_HOLD));
-            const float bounds[6] = {is.error_rad, is.periodic_rad, is.slope, is.curve_slope, is.cells, is.rounding_rad};
-            for (int i = 0; i < 6; i++)
-                table->bounds[i] = bounds[i];
-            return is.verdict;
-        }
-    }
-    *table = no_table;
     return is.verdict;
 }
 
@@ -1297,13 +1428,16 @@ fxt_info fxt_tell(const fxt_table *table)
     static const fxt_info none;
     fxt_info info = none;
     const uint8_t *image = given(table)->image;
-    if (image == NULL)
+    if (image == NULL) {
         return info;
-    for (uint32_t i = 0; i < 8; i++)
+    }
+    for (uint32_t i = 0u; i < 8u; i++) {
         info.table_id[i] = image[48u + i];
-    for (uint32_t i = 0; i < 32; i++)
+    }
+    for (uint32_t i = 0u; i < 32u; i++) {
         info.drive_hash[i] = image[16u + i];
-    for (uint32_t i = 0; i < TEXT_BYTES; i++) {
+    }
+    for (uint32_t i = 0u; i < (uint32_t)TEXT_BYTES; i++) {
         info.tool_version[i] = (char)image[56u + i];
         info.mesh_level[i] = (char)image[80u + i];
     }
@@ -1314,9 +1448,10 @@ fxt_info fxt_tell(const fxt_table *table)
     info.torque_nodes = image[110];
     info.temperature_nodes = image[111];
     info.ripple_nodes = image[112];
-    for (uint32_t i = 0; i < 3; i++)
+    for (uint32_t i = 0u; i < 3u; i++) {
         info.curve_nodes[i] = image[113u + i];
-    for (uint32_t i = 0; i < 2; i++) {
+    }
+    for (uint32_t i = 0u; i < 2u; i++) {
         info.torque_range_n_m[i] = number_at(table, AT_TORQUE_RANGE + i);
         info.temperature_range_c[i] = number_at(table, AT_TEMPERATURE_RANGE + i);
     }
@@ -1335,17 +1470,18 @@ fxt_info fxt_tell(const fxt_table *table)
 
 uint32_t fxt_page_count(const fxt_table *table)
 {
-    return (given(table)->body_bytes + FXT_PAGE_BYTES - 1u) / FXT_PAGE_BYTES;
+    return (given(table)->body_bytes + PAGE_BYTES - 1u) / PAGE_BYTES;
 }
 
 bool fxt_page_intact(const fxt_table *table, uint32_t page)
 {
-    if (page >= fxt_page_count(table))
+    if (page >= fxt_page_count(table)) {
         return false;
-    const uint32_t at = page * FXT_PAGE_BYTES, left = table->body_bytes - at;
+    }
+    const uint32_t at = page * PAGE_BYTES, left = table->body_bytes - at;
     uint32_t sum;
     words_from(table->image, table->bytes, table->body_bytes + 4u * page, 1, &sum);
-    return crc32_of(table->image + at, left < FXT_PAGE_BYTES ? left : FXT_PAGE_BYTES) == sum;
+    return crc32_of(table->image + at, left < PAGE_BYTES ? left : PAGE_BYTES) == sum;
 }
 
 fxt_play fxt_play_unknown(void)
@@ -1369,8 +1505,9 @@ bool fxt_play_known(const fxt_play *play)
 bool fxt_play_output(const fxt_play *play, int64_t *output)
 {
     const play_state is = state_of(play);
-    if (output == NULL)
+    if (output == NULL) {
         return false;
+    }
     *output = plus(is.nominal, is.error);
     return is.half >= 0;
 }
@@ -1389,15 +1526,17 @@ float fxt_play_uncertainty_rad(const fxt_play *play)
 
 static void put_word(uint8_t *to, uint32_t word)
 {
-    for (uint32_t i = 0; i < 4; i++)
+    for (uint32_t i = 0u; i < 4u; i++) {
         to[i] = (uint8_t)(word >> 8u * i & 0xffu);
+    }
 }
 
 void fxt_play_save(const fxt_play *play, uint8_t saved[FXT_SAVED_PLAY_BYTES])
 {
     const play_state is = state_of(play);
-    if (saved == NULL)
+    if (saved == NULL) {
         return;
+    }
     put_word(saved, (uint32_t)is.nominal);
     put_word(saved + 4, (uint32_t)((uint64_t)is.nominal >> 32));
     put_word(saved + 8, (uint32_t)is.error);
@@ -1409,8 +1548,9 @@ void fxt_play_save(const fxt_play *play, uint8_t saved[FXT_SAVED_PLAY_BYTES])
 
 bool fxt_play_restore(fxt_play *play, const uint8_t saved[FXT_SAVED_PLAY_BYTES])
 {
-    if (play == NULL || saved == NULL)
+    if (play == NULL || saved == NULL) {
         return false;
+    }
     const uint64_t nominal = (uint64_t)word_from(saved + 4) << 32 | word_from(saved);
     const play_state found = {(int64_t)nominal, i32(word_from(saved + 8)), i32(word_from(saved + 12)), i32(word_from(saved + 16)),
                               i32(word_from(saved + 20))};
@@ -1419,8 +1559,9 @@ bool fxt_play_restore(fxt_play *play, const uint8_t saved[FXT_SAVED_PLAY_BYTES])
         found.half >= 0 && found.half <= MOST_PLAY && found.lower >= -found.half && found.upper <= found.half;
     const bool fresh = found.half == -1 && (found.lower == INT32_MIN || found.lower == INT32_MAX);
     const bool possible = found.lower <= found.upper && size <= MOST_KEPT && (started || fresh);
-    if (!possible || word_from(saved + 24) != crc32_of(saved, 24))
+    if (!possible || word_from(saved + 24) != crc32_of(saved, 24)) {
         return false;
+    }
     *play = kept(&found);
     return true;
 }
@@ -1438,8 +1579,9 @@ fxt_prediction fxt_forward(const fxt_table *table, fxt_play *play, int64_t gener
     const point at = locate_with(given(table), torque_n_m, temperature_c, play);
     play_state is = state_of(play);
     const fxt_prediction now = follow(given(table), &at, &is, generator);
-    if (play != NULL)
+    if (play != NULL) {
         *play = kept(&is);
+    }
     return now;
 }
 
@@ -1462,19 +1604,23 @@ void fxt_step(const fxt_table *table, fxt_play *play, int64_t measured, int64_t 
     const point at = locate_with(given(table), torque_n_m, temperature_c, play);
     play_state is = state_of(play);
     const fxt_prediction now = follow(given(table), &at, &is, measured);
-    if (play != NULL)
+    if (play != NULL) {
         *play = kept(&is);
-    if (prediction != NULL)
+    }
+    if (prediction != NULL) {
         *prediction = now;
-    if (command != NULL)
+    }
+    if (command != NULL) {
         *command = aim_from(given(table), &at, target, &is);
+    }
 }
 
 bool fxt_steady_error(const fxt_table *table, int64_t generator, float torque_n_m, float temperature_c, fxt_direction direction,
                       float *error_rad)
 {
-    if (given(table)->image == NULL || error_rad == NULL)
+    if (given(table)->image == NULL || error_rad == NULL) {
         return false;
+    }
     const point at = locate(table, torque_n_m, temperature_c);
     const phases where = phases_at(table, generator, nominal_output(table, generator));
     int32_t centre, half;
@@ -1486,11 +1632,13 @@ bool fxt_steady_error(const fxt_table *table, int64_t generator, float torque_n_
 bool fxt_from_rad(double rad, int64_t *counts)
 {
     const double exact = rad / TAU * TURN;
-    if (counts == NULL)
+    if (counts == NULL) {
         return false;
+    }
     *counts = 0;
-    if (!(exact > -9.223372e18 && exact < 9.223372e18))
+    if (!(exact > -9.223372e18 && exact < 9.223372e18)) {
         return false;
+    }
     *counts = (int64_t)(exact + (exact < 0.0 ? -0.5 : 0.5));
     return true;
 }

@@ -16,8 +16,6 @@
 //! taken again; it must then be equal. So a value with one sum survives what a value with two copies survives, as long as one word was hit,
 //! for 8 bytes instead of its own size. Anything else is reported and not used.
 
-use core::num::NonZeroU64;
-
 /// The sums of words: so that a constant can be made of them, and nothing is a loop.
 macro_rules! sums {
     ($start:expr; $($word:expr),* $(,)?) => {{
@@ -164,8 +162,11 @@ const fn is_burst(changed: u64) -> bool {
     changed.wrapping_shr(changed.trailing_zeros()) >> BURST_BITS == 0
 }
 
+/// The factor in as many bits as the sum has.
+const WIDE_FACTOR: u64 = FACTOR as u64;
+
 /// `2³²·f − 1`, a prime.
-const PRIME: u64 = ((FACTOR as u64) << 32).wrapping_sub(1);
+const PRIME: u64 = (WIDE_FACTOR << 32).wrapping_sub(1);
 
 /// `s·2⁻³²` modulo the prime.
 const fn shorter(s: u64) -> u64 {
@@ -173,12 +174,8 @@ const fn shorter(s: u64) -> u64 {
 }
 
 /// `s·2³²` modulo the prime: a step back.
-fn longer(s: u64) -> u64 {
-    const BY: NonZeroU64 = match NonZeroU64::new(FACTOR as u64) {
-        Some(by) => by,
-        None => NonZeroU64::MIN,
-    };
-    (s / BY) | (s % BY) << 32
+const fn longer(s: u64) -> u64 {
+    (s / WIDE_FACTOR) | (s % WIDE_FACTOR) << 32
 }
 
 const fn reduced(s: u64) -> u64 {

@@ -233,18 +233,28 @@ impl<'p> Motion<'p> {
     /// # Errors
     /// No equilibrium; or the drive does not settle.
     pub fn settle_on(&mut self, step_rad: f64) -> Result<bool, SolveError> {
-        let Travel { sense, travelled_rad, rate, .. } = self.travel;
+        let Travel { sense, travelled_rad, .. } = self.travel;
         if sense == step_rad.signum() {
             if self.settled() {
                 return Ok(false);
             }
             let pitches = travelled_rad / self.pitch();
             if pitches > MOST_PITCHES {
-                let State { generator_rad, torque_n_m, .. } = self.state;
-                return Err(SolveError::NotSettled { generator_rad, torque_n_m, pitches, rate });
+                return Err(self.not_settled(pitches));
             }
         }
-        self.turn(step_rad).map(|()| true)
+        let before = self.state.generator_rad;
+        self.turn(step_rad)?;
+        // A step that round-off swallows leads nowhere, however many there are.
+        if self.state.generator_rad == before {
+            return Err(self.not_settled(0.0));
+        }
+        Ok(true)
+    }
+
+    fn not_settled(&self, pitches: f64) -> SolveError {
+        let State { generator_rad, torque_n_m, .. } = self.state;
+        SolveError::NotSettled { generator_rad, torque_n_m, pitches, rate: self.travel.rate }
     }
 
     /// Moves on by increments of `step_rad` until the drive has settled.

@@ -73,6 +73,8 @@ const INTERVALS: usize = 512;
 const PHASES: usize = 16;
 /// Halvings in which a torque or a twist is found: to 2⁻⁴⁰ of the range.
 const HALVINGS: usize = 40;
+/// Doublings that take a twist from a millionth of a radian to a radian.
+const DOUBLINGS: usize = 20;
 
 /// One interval of a curve: the energy at its beginning, and the torque as a cubic of the place in it, from 0 to 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -479,7 +481,10 @@ impl Gear {
         let side = if mesh_n_m == 0.0 { sign } else { mesh_n_m };
         let torque = |twist: f64| self.sprung(generator_rad, libm::copysign(twist, side)).torque_n_m.abs();
         let (mut low, mut high) = (0.0, 1e-6);
-        while torque(high) <= mesh_n_m.abs() && high < 1.0 {
+        for _ in 0..DOUBLINGS {
+            if !(torque(high) <= mesh_n_m.abs() && high < 1.0) {
+                break;
+            }
             high *= 2.0;
         }
         for _ in 0..HALVINGS {

@@ -585,6 +585,7 @@ fn fit(rows: Rows, prior: &Prior<'_>, recorded: &Recorded) -> Result<Fitted, Cal
     let mut open: Vec<PartName> = PartName::ALL.into_iter().filter(may).collect();
     let own_zero = rows.folds == FoldKind::Files;
     let mut backwards = false;
+    // Once more where the play has to go: without it the flanks are sound.
     loop {
         let folds = Folds::new(&rows.rows, &open, &recorded.scales, rows.means_arcsec.len(), own_zero);
         let all = folds.all();
@@ -596,7 +597,7 @@ fn fit(rows: Rows, prior: &Prior<'_>, recorded: &Recorded) -> Result<Fitted, Cal
         let zeros = if own_zero { 0 } else { rows.means_arcsec.len() };
         let coefficients = folds.fit(&all, &chosen).unwrap_or_default().split_off(zeros);
         let mut model = Model { chosen, coefficients, scales: recorded.scales };
-        if !model.has_sound_flanks(0.5 * prior.nominal.backlash_arcsec) {
+        if !model.has_sound_flanks(0.5 * prior.nominal.backlash_arcsec) && !backwards {
             open.retain(|part| *part != PartName::Play);
             backwards = true;
             continue;

@@ -35,6 +35,8 @@ const SLOWER: f64 = 0.7;
 const SLOWEST_TO_SPREAD: f64 = 0.9;
 const SPEEDS: usize = 101;
 const PLACES_OF_A_TURN: u32 = 24;
+/// Passes of a plan that nobody would drive by hand. *Guess*.
+const MOST_PASSES: usize = 5000;
 /// Nodes of a first log that are said to be widest.
 const WIDEST: usize = 8;
 /// Half widths beyond this, arcsec, are those of what was not recorded at all.
@@ -254,7 +256,7 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&First<'_>>) -> Resu
     let mut now = of(&known)?;
     let at_first = now.clone();
     let (mut left_s, mut taken) = (60.0 * bench.minutes, Vec::new());
-    loop {
+    while taken.len() < MOST_PASSES {
         let uncertain = asked.mean_variance(&now);
         let mut best: Option<(f64, usize, Mat)> = None;
         // Each load once before one is repeated: the parts do not know all that a load does.
@@ -277,6 +279,13 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&First<'_>>) -> Resu
         left_s -= candidates[k].pass.duration_s;
         taken.push((candidates[k].warmth, Pass { tells, ..candidates[k].pass }));
         now = then;
+    }
+    if taken.len() == MOST_PASSES {
+        let hours = bench.minutes / 60.0;
+        return Err(format!(
+            "--minutes: found {}: in {hours:.0} hours there is time for {MOST_PASSES} passes and more; allowed: less time",
+            bench.minutes
+        ));
     }
     if taken.is_empty() {
         let shortest = candidates.iter().map(|c| c.pass.duration_s).fold(f64::INFINITY, f64::min) / 60.0;

@@ -121,7 +121,7 @@ impl Default for Settings {
 }
 
 /// Rows needed at least.
-const LEAST_ROWS: usize = 200;
+pub(crate) const LEAST_ROWS: usize = 200;
 /// Orders per generator turn up to which lines are looked for.
 const HIGHEST_ORDER: f64 = 150.0;
 /// Times that causes are chosen again, at most.
@@ -186,8 +186,9 @@ pub fn diagnose_extended(
     let sample = thinned.as_ref().map(|thinned| Sample::new(&on, thinned, &problem.uncertain, stride));
     let on_sample = sample.as_ref().map(|sample| sample.problem(noise, problem.worth));
     let on_sample = on_sample.as_ref().zip(thinned.as_ref().map(|thinned| thinned.share));
-    let diagnosis =
+    let mut diagnosis =
         verdict::conclude(&problem, on_sample, &laws, selected, &bests, left, &hidden_lines, noise, settings, trace);
+    diagnosis.set_aside = prepare::too_few_left(&problem, diagnosis.finding);
     let found = Found::of(&problem, &laws, &start).ok_or(DiagnosisError::NotFinite)?;
     drop((problem, sample));
     Ok((diagnosis, found.extended(laws, &base, &scales, fineness)))
@@ -248,7 +249,7 @@ impl<'a> Search<'a> {
         let mut bests = Bests::default();
         let mut thinned = Thinned::of(on, stride);
         // Again where a line was found that no law has, or where what was taken for noise turned out to be a cause.
-        for round in 0.. {
+        for round in 0..=MOST_ROUNDS {
             fast.clear();
             let mut scope = Scope::Everything;
             if let Some(thinned) = &thinned {

@@ -6,12 +6,14 @@ use std::sync::Arc;
 use flexspline::Table;
 use rayon::prelude::*;
 
+use super::LEAST_ROWS;
 use super::averaged::{Averaged, Grain};
 use super::base::{Base, Floating, NEAR_FRICTION, few};
 use super::candidate::{Column, Excitation, Law, Tolerance};
 use super::linear::{Gram, Prior, solve};
-use super::model::Term;
+use super::model::{Problem, Term};
 use super::noise::{Noise, Whitener, white_level};
+use super::report::Finding;
 use super::rows::{Rows, quantile, rms, robust_std};
 use crate::nominal::Nominal;
 use crate::units::ARCSEC_PER_TURN;
@@ -178,6 +180,32 @@ pub fn uncertain(on: &Excitation<'_>, terms: &[Term<'_>], hung: &[bool]) -> Vec<
         }
     }
     if few(&uncertain) { uncertain } else { without }
+}
+
+/// Where a drive is found sound, no more than this share of its rows may have been set aside. *Guess*: by definition most of them must count.
+const MOST_SET_ASIDE: f64 = 0.5;
+
+/// Why the rows that count say nothing of the unit, if too few of them do. What was found in spite of that is the trouble itself, and stands as long
+/// as there are rows to judge it by.
+#[must_use]
+pub fn too_few_left(problem: &Problem<'_>, finding: Finding) -> Option<String> {
+    let rows = problem.on.rows;
+    let used = rows.count_used();
+    let left = rows.sessions_used().flatten().filter(|k| !problem.uncertain[*k]).count();
+    let none_left = left < LEAST_ROWS || !problem.certain.contains(&true);
+    let most_gone = left as f64 <= (1.0 - MOST_SET_ASIDE) * used as f64 && finding == Finding::NothingFound;
+    if !none_left && !most_gone {
+        return None;
+    }
+    let jumps = &problem.on.scales.jumps;
+    let why = match jumps.iter().map(|jump| jump.height_arcsec.abs()).reduce(f64::max) {
+        Some(largest) => {
+            let often = if jumps.len() == 1 { "once".to_owned() } else { format!("{} times", jumps.len()) };
+            format!("the error leaps {often}, by {largest:.0} arcsec at most, and rows about a leap do not count")
+        }
+        None => "nobody knows on which flank the drive stands in the others".to_owned(),
+    };
+    Some(format!("{left} of {used} rows are left to judge by: {why}"))
 }
 
 /// A jump is over after this time, s, and after so many rows.

@@ -164,6 +164,9 @@ pub struct Diagnosis {
     /// Where the bench sets its zero anew in each session: that of every session less that of the first. Told as a fault of the data.
     #[serde(skip)]
     pub zeros: Vec<Parameter>,
+    /// Why the rows that are left to judge by say nothing of the unit, where too many had to be set aside.
+    #[serde(skip)]
+    pub set_aside: Option<String>,
     /// Every decision: why these causes, and not others.
     pub trace: Trace,
 }

@@ -289,5 +289,6 @@ pub(crate) fn robust_std(values: impl Iterator<Item = f64>) -> f64 {
 
 /// Root mean square.
 pub(crate) fn rms(values: &[f64]) -> f64 {
-    (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
+    // The sum of nothing is -0.
+    ((0.0 + values.iter().map(|v| v * v).sum::<f64>()) / values.len().max(1) as f64).sqrt()
 }

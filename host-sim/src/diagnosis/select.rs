@@ -573,7 +573,8 @@ pub fn select<'l>(
 #[must_use]
 pub fn fixed<'l>(problem: &Problem<'_>, laws: &'l [Law], causes: &[CauseName]) -> Vec<Term<'l>> {
     let mut terms: Vec<Term<'l>> = Vec::new();
-    loop {
+    // Each round takes one law.
+    for _ in 0..laws.len() {
         let open: Vec<&Law> = laws
             .iter()
             .filter(|law| {

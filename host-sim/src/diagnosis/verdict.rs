@@ -206,6 +206,7 @@ pub(super) fn conclude(
         next_experiment,
         experiment_for_asked,
         zeros,
+        set_aside: None,
         trace,
     }
 }

@@ -73,7 +73,8 @@ impl KernelPlan {
             sizes.truncate(enough + 1);
             return sizes;
         }
-        while let Some(last) = sizes.last().copied().filter(|last| *last < reach_um) {
+        for _ in 0..MOST_SIZES {
+            let Some(last) = sizes.last().copied().filter(|last| *last < reach_um) else { break };
             // What is left of a step of more than half the usual one is one step.
             sizes.push(if GROWS * GROWS.sqrt() * last < reach_um { GROWS * last } else { reach_um });
         }
@@ -127,6 +128,8 @@ const DRAG_N_M: f64 = 0.02;
 const NEAR_MM: f64 = 0.01;
 /// Growth of displacements beyond the usual ones: as the last two of them.
 const GROWS: f64 = 1.8;
+/// Displacements beyond the usual ones at most: 40 of them reach 10¹⁰ times as far.
+const MOST_SIZES: usize = 40;
 /// Halvings of a growing displacement on the way to one that is not found from nothing.
 const DISPLACEMENT_HALVINGS: usize = 4;
 
@@ -431,7 +434,8 @@ impl<P: Fn(f64) -> Result<Problem, SolveError>> Displaced<'_, P> {
     ) -> Result<Motion<'p>, SolveError> {
         let (mut at_um, mut state) = (*from_um, from.clone());
         let (mut part, mut halvings) = (size_um - from_um, 0);
-        loop {
+        // Each part is at least so small a share of the way, and each halving takes one more.
+        for _ in 0..(1 << DISPLACEMENT_HALVINGS) + DISPLACEMENT_HALVINGS {
             let last = at_um + part > size_um - 1e-9;
             let to_um = if last { size_um } else { at_um + part };
             let between;
@@ -451,6 +455,7 @@ impl<P: Fn(f64) -> Result<Problem, SolveError>> Displaced<'_, P> {
                 Err(reason) => return Err(reason),
             }
         }
+        unreachable!("the parts add up to the way")
     }
 }
 

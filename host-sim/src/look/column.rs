@@ -1,12 +1,12 @@
 //! What the numbers of a column show by themselves.
 
+use std::f64::consts::TAU;
+
 use crate::measurement::raw::RawColumn;
-use crate::measurement::{least_and_most, median_of, sampled};
+use crate::measurement::{Anew, Unit, begins_anew, continued, least_and_most, median_of, registers, sampled};
 
 /// Values that are looked at for steps and resolution, at most.
 const LOOKED_AT: usize = 50_000;
-/// A column that begins anew covers this share of its turn, and steps by more than half of it.
-const COVERED: f64 = 0.75;
 
 /// What a column shows.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,7 +17,7 @@ pub(super) struct Facts {
     pub most: f64,
     /// Smallest change from row to row that is not zero.
     pub step: f64,
-    /// Whether all numbers are whole.
+    /// Whether all numbers are whole, and written without decimals.
     pub whole: bool,
     /// Whether it never falls.
     pub rises: bool,
@@ -28,7 +28,7 @@ pub(super) struct Facts {
     /// One value in so many rows, where most are empty.
     pub every: usize,
     /// The number after which it begins anew, if it does.
-    pub wraps_at: Option<f64>,
+    pub anew: Option<Anew>,
 }
 
 impl Facts {
@@ -40,12 +40,13 @@ impl Facts {
         let range = most - least;
         let moved: Vec<f64> = steps.iter().map(|step| step.abs()).filter(|step| *step > 0.0).collect();
         let count = steps.len().max(1) as f64;
+        let whole = !column.decimals && !values.is_empty() && values.iter().all(|value| value.fract() == 0.0);
         Facts {
             finite: values.len(),
             least,
             most,
             step: moved.iter().copied().fold(f64::INFINITY, f64::min),
-            whole: !values.is_empty() && values.iter().all(|value| value.fract() == 0.0),
+            whole,
             rises: steps.iter().all(|step| *step >= 0.0),
             repeats: 1.0 - moved.len() as f64 / count,
             roughness: if range > 0.0 && !moved.is_empty() { median_of(&mut sampled(&moved)) / range } else { 0.0 },
@@ -54,7 +55,7 @@ impl Facts {
             } else {
                 (column.values.len() as f64 / values.len() as f64).round() as usize
             },
-            wraps_at: wraps_at(&steps, range, least),
+            anew: begins_anew(&column.values, &turns().collect::<Vec<_>>(), whole, None),
         }
     }
 
@@ -64,35 +65,18 @@ impl Facts {
     }
 }
 
-/// Turns that a column may begin anew after: those of the units of angle, and powers of two of counts.
+/// Spans that a column may begin anew after: the turn in each unit of angle, and registers of counts.
 fn turns() -> impl Iterator<Item = f64> {
-    let units = [1.0, std::f64::consts::TAU, 360.0, 21_600.0, 1_296_000.0];
-    units.into_iter().chain((8..=32).map(|bits| 2f64.powi(bits)))
+    Unit::ANGLES.into_iter().map(|unit| TAU / unit.factor()).chain(registers())
 }
 
-fn wraps_at(steps: &[f64], range: f64, least: f64) -> Option<f64> {
-    let turn = turns().find(|turn| range <= turn * (1.0 + 1e-6) && range >= COVERED * turn)?;
-    // Anew at zero, or from plus to minus one half.
-    let placed = least >= -1e-6 * turn || least >= -0.5 * turn * (1.0 + 1e-6);
-    let anew = steps.iter().filter(|step| step.abs() > 0.5 * turn).count();
-    (placed && anew > 0).then_some(turn)
-}
-
-/// Values made continuous where they begin anew after `turn`; what is missing stays so.
-pub(super) fn unwrapped(values: &[f64], turn: Option<f64>) -> Vec<f64> {
-    let Some(turn) = turn else { return values.to_vec() };
-    let mut last = f64::NAN;
+/// Values made continuous where they begin anew; what is missing stays so.
+pub(super) fn unwrapped(values: &[f64], anew: Option<Anew>) -> Vec<f64> {
+    let mut values = values.to_vec();
+    if let Some(anew) = anew {
+        continued(&mut values, anew.span);
+    }
     values
-        .iter()
-        .map(|value| {
-            if !value.is_finite() {
-                return *value;
-            }
-            let near = if last.is_finite() { value - turn * ((value - last) / turn).round() } else { *value };
-            last = near;
-            near
-        })
-        .collect()
 }
 
 #[cfg(test)]
@@ -107,11 +91,12 @@ mod tests {
     fn wraps_are_seen_and_undone() {
         for turn in [360.0, std::f64::consts::TAU, 1.0, 4096.0] {
             let wrapped: Vec<f64> = (0..500).map(|k| (0.031 * turn * f64::from(k)).rem_euclid(turn)).collect();
-            assert_eq!(facts(wrapped.clone()).wraps_at, Some(turn));
-            let whole = unwrapped(&wrapped, Some(turn));
+            let anew = facts(wrapped.clone()).anew;
+            assert!((anew.unwrap().span / turn - 1.0).abs() < 1e-12, "{anew:?}");
+            let whole = unwrapped(&wrapped, anew);
             assert!((whole[499] - 0.031 * turn * 499.0).abs() < 1e-6 * turn);
         }
-        assert_eq!(facts((0..500).map(f64::from)).wraps_at, None);
+        assert_eq!(facts((0..500).map(f64::from)).anew, None);
     }
 
     #[test]

@@ -6,8 +6,10 @@
 
 mod column;
 mod coverage;
+mod pair;
 mod picture;
 mod relation;
+mod turns;
 mod words;
 
 use std::f64::consts::TAU;
@@ -15,14 +17,16 @@ use std::f64::consts::TAU;
 use serde::Serialize;
 
 use crate::measurement::raw::RawFile;
+use crate::measurement::stamps;
 use crate::measurement::{SESSION_GAP_PERIODS, Unit, median_of, sampled};
 use column::{Facts, unwrapped};
 pub use coverage::Coverage;
+use pair::pair;
 pub use picture::text;
-use relation::{RATIOS, counts_of_a_turn, slope, torque_says};
+use relation::torque_says;
+use turns::{proposed_ratio, units_of_counts};
+use words::Said;
 
-/// A ratio this close to a half is taken for one: a guess.
-const CLOSE_TO_HALF: f64 = 0.1;
 /// Share of the error that a column without a name must explain to be offered as the torque: a guess.
 const NAMELESS: f64 = 0.3;
 
@@ -130,6 +134,8 @@ pub struct Looked {
     pub header_line: Option<u64>,
     /// The columns.
     pub columns: Vec<Column>,
+    /// Other columns that may be generator and output as well, or the same ones with other counts of a turn, the likeliest first.
+    pub rivals: Vec<Rival>,
     /// Turns of the generator for one of the output as the rows have it, signed.
     pub ratio_found: Option<f64>,
     /// The whole number next to it.
@@ -148,9 +154,26 @@ pub struct Looked {
     pub notes: Vec<String>,
 }
 
+/// Generator and output as they may be, too.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Rival {
+    /// The column of the generator.
+    pub generator: String,
+    /// The column of the output.
+    pub output: String,
+    /// Turns of the generator for one of the output, signed.
+    pub ratio: f64,
+    /// What to pass on with `--columns` if these are meant; `None` where a unit is open.
+    pub columns_option: Option<String>,
+    /// Why the pair proposed goes before it.
+    pub why: String,
+}
+
 /// A column at work.
+#[derive(Clone)]
 struct Guess {
     facts: Facts,
+    said: Said,
     role: Role,
     unit: Option<Unit>,
     /// Counts of a turn of counts.
@@ -177,8 +200,22 @@ impl Guess {
         }
     }
 
+    /// Whether a time is in days as spreadsheets count them: a date from 1954 to 2119, and rows at most a quarter of an hour apart.
+    fn is_in_days(&self) -> bool {
+        (20_000.0..=80_000.0).contains(&self.facts.least)
+            && self.facts.most <= 80_000.0
+            && self.facts.most - self.facts.least < 1000.0
+            && !self.facts.whole
+            && self.facts.step < 0.01
+    }
+
     fn moves(&self) -> bool {
         self.facts.finite >= 16 && !self.facts.constant()
+    }
+
+    /// Whether it may be of one of these joints: no number says against it.
+    fn of_joints(&self, joints: &[u32]) -> bool {
+        joints.is_empty() || self.said.joint.is_none_or(|joint| joints.contains(&joint))
     }
 
     /// The unit as a mapping takes it.
@@ -212,11 +249,13 @@ pub fn look(files: &[RawFile]) -> Result<Looked, String> {
             ));
         }
     }
-    let mut notes = Vec::new();
+    let mut notes = reading_notes(files);
     let mut guesses: Vec<Guess> = first.columns.iter().enumerate().map(|(place, _)| guess(files, place)).collect();
     time(&mut guesses, files);
+    in_order(&mut guesses, files, &mut notes);
     units_of_counts(&mut guesses);
-    let ratio = pair(&mut guesses, &mut notes);
+    let names: Vec<String> = (0..guesses.len()).map(|place| name_in_mapping(first, place)).collect();
+    let (ratio, rivals) = pair(&mut guesses, &names, &mut notes);
     settle(&mut guesses, &mut notes);
     let proposed = ratio.map(proposed_ratio);
     let error = error_rad(&guesses, proposed);
@@ -227,7 +266,8 @@ pub fn look(files: &[RawFile]) -> Result<Looked, String> {
         ));
     }
     let (kind, period_s, starts) = clock(&guesses, files);
-    let columns_option = option(&guesses, first, &mut notes);
+    let columns_option =
+        option(&guesses, &names, &mut notes).filter(|columns| is_accepted(files, &guesses, columns, &mut notes));
     let coverage = coverage::of(&guesses, ratio, &starts);
     let columns = guesses
         .into_iter()
@@ -254,6 +294,7 @@ pub fn look(files: &[RawFile]) -> Result<Looked, String> {
         decimal_comma: first.decimal_comma,
         header_line: first.has_names.then_some(first.header_line),
         columns,
+        rivals,
         ratio_found: ratio,
         ratio_proposed: proposed,
         sessions: starts.len(),
@@ -265,10 +306,62 @@ pub fn look(files: &[RawFile]) -> Result<Looked, String> {
     })
 }
 
-/// The ratio that wheels can have: a whole number, or a half that the rows are close to.
-fn proposed_ratio(found: f64) -> f64 {
-    let half = found.floor() + 0.5;
-    if (found - half).abs() < CLOSE_TO_HALF { half } else { found.round() }
+/// What the reader says of the files, each sentence once; of several files with the name of the file.
+fn reading_notes(files: &[RawFile]) -> Vec<String> {
+    let named =
+        |file: &RawFile, note: &String| if files.len() > 1 { format!("{}: {note}", file.file) } else { note.clone() };
+    files.iter().flat_map(|file| file.notes.iter().map(move |note| named(file, note))).collect()
+}
+
+/// Rows in the order of their time, file by file.
+fn in_order(guesses: &mut [Guess], files: &[RawFile], notes: &mut Vec<String>) {
+    let Some(time) = guesses.iter().find(|guess| guess.used && guess.role == Role::Time) else { return };
+    let mut order: Vec<usize> = Vec::with_capacity(time.values.len());
+    let mut begins = 0;
+    let before = notes.len();
+    for file in files {
+        let rows = begins..begins + file.rows;
+        match stamps::order(&time.values[rows.clone()]) {
+            Some((sorted, note)) => {
+                order.extend(sorted.iter().map(|row| begins + row));
+                notes.push(note);
+            }
+            None => order.extend(rows),
+        }
+        begins += file.rows;
+    }
+    // A row without a time has no place among sorted rows.
+    if notes.len() > before && order.len() == begins {
+        for guess in guesses {
+            guess.values = order.iter().map(|row| guess.values[*row]).collect();
+        }
+    }
+}
+
+/// Whether the reader takes the files by this mapping: a cell in use that is no number, or a row of another width, is for people to mend.
+fn is_accepted(files: &[RawFile], guesses: &[Guess], columns: &str, notes: &mut Vec<String>) -> bool {
+    let mut refused = Vec::new();
+    for file in files {
+        for (guess, raw) in guesses.iter().zip(&file.columns).filter(|(guess, _)| guess.used) {
+            let times = raw.first_time.as_ref().filter(|_| guess.role != Role::Time);
+            if let Some(cell) = raw.first_word.iter().chain(times).min_by_key(|cell| cell.line) {
+                let others = (raw.words + times.map_or(0, |_| raw.times)).saturating_sub(1);
+                refused.push(format!(
+                    "{}:{}: {}: found \"{}\"{}, which is no number",
+                    file.file,
+                    cell.line,
+                    raw.name,
+                    cell.text,
+                    if others == 0 { String::new() } else { format!(" ({others} more in this column)") }
+                ));
+            }
+        }
+        refused.extend(file.refused.iter().map(|row| format!("{}:{}: {}", file.file, row.line, row.text)));
+    }
+    for what in &refused {
+        notes.push(format!("{what}: mend it or take it out; then --columns {columns}"));
+    }
+    refused.is_empty()
 }
 
 /// What a column says by its name and by its numbers alone.
@@ -276,10 +369,11 @@ fn guess(files: &[RawFile], place: usize) -> Guess {
     let mut raw = files[0].columns[place].clone();
     files[1..].iter().for_each(|file| raw.values.extend_from_slice(&file.columns[place].values));
     let facts = Facts::of(&raw);
-    let said = words::said(&raw.name);
-    let values = unwrapped(&raw.values, facts.wraps_at);
+    let said = if files[0].has_names { words::said(&raw.name, raw.unit.as_deref()) } else { Said::default() };
+    let values = unwrapped(&raw.values, facts.anew);
     let mut guess = Guess {
         facts,
+        said,
         role: Role::Unknown,
         unit: None,
         counts: None,
@@ -298,9 +392,18 @@ fn guess(files: &[RawFile], place: usize) -> Guess {
         guess.because(if raw.words > 0 { "words" } else { "empty" }, 0.9);
         return guess;
     }
-    if let Some(role) = said.role {
-        guess.role = if said.commanded && role != Role::Torque { Role::Command } else { role };
+    if said.commanded && said.role != Some(Role::Torque) {
+        guess.role = Role::Command;
+        guess.because("its name: what was wanted, not measured", 0.6);
+    } else if let Some(role) = said.role {
+        guess.role = role;
         guess.because("its name", if said.commanded { 0.6 } else { 0.8 });
+    } else if said.angle {
+        guess.because("its name: an angle", 0.5);
+    }
+    if let Some(cell) = &raw.first_word {
+        let what = if raw.words == 1 { "1 cell is".to_owned() } else { format!("{} cells are", raw.words) };
+        guess.why.push(format!("{what} no number: line {}, \"{}\"", cell.line, cell.text));
     }
     if guess.facts.constant() {
         guess.because(format!("keeps the value {}", guess.facts.least), 0.3);
@@ -313,11 +416,11 @@ fn guess(files: &[RawFile], place: usize) -> Guess {
             100.0 * guess.facts.repeats
         ));
     }
-    if let Some(turn) = guess.facts.wraps_at {
-        guess.why.push(format!("begins anew after {turn:.6}"));
+    if let Some(anew) = guess.facts.anew {
+        guess.why.push(anew.text(""));
     }
-    let said = raw.unit.as_deref().and_then(Unit::in_brackets).or_else(|| Unit::in_name(&raw.name));
-    if let Some(unit) = said.filter(|unit| fits(guess.role, *unit)) {
+    let unit = raw.unit.as_deref().and_then(Unit::in_brackets).or_else(|| Unit::in_name(&raw.name));
+    if let Some(unit) = unit.filter(|unit| fits(guess.role, *unit)) {
         guess.unit = Some(unit);
         guess.why.push(format!("{unit} by its {}", if raw.unit.is_some() { "line of units" } else { "name" }));
     } else if guess.role.is_angle() || matches!(guess.role, Role::Unknown | Role::Command) {
@@ -350,17 +453,14 @@ fn fits(role: Role, unit: Unit) -> bool {
 
 /// The unit of an angle by the turn after which it begins anew, or by whole numbers.
 fn unit_of_numbers(guess: &mut Guess, name: &str) {
-    let by_turn = guess
-        .facts
-        .wraps_at
-        .and_then(|turn| Unit::ANGLES.into_iter().find(|unit| (turn * unit.factor() / TAU - 1.0).abs() < 1e-9));
+    let is_turn = |span: f64, unit: Unit| (span * unit.factor() / TAU - 1.0).abs() < 1e-9;
+    let by_turn = guess.facts.anew.and_then(|anew| Unit::ANGLES.into_iter().find(|unit| is_turn(anew.span, *unit)));
     let counted = ["inc", "count", "tick", "cnt"].iter().any(|word| name.to_lowercase().contains(word));
     if let Some(unit) = by_turn {
         guess.unit = Some(unit);
         guess.why.push(format!("{unit} by the turn"));
     } else if guess.facts.whole && (counted || guess.facts.most - guess.facts.least > 1000.0) {
         guess.unit = Some(Unit::Count);
-        guess.counts = guess.facts.wraps_at;
         guess.why.push("whole numbers: counts".to_owned());
     }
 }
@@ -378,7 +478,8 @@ fn time(guesses: &mut [Guess], files: &[RawFile]) {
             guess.facts.rises && usual > 0.0 && 10 * odd < steps.len()
         };
         // Where more than one does, the first: loggers begin with the time.
-        let found = guesses.iter_mut().find(|guess| guess.role == Role::Unknown && guess.moves() && evenly(guess));
+        let nameless = |guess: &Guess| guess.role == Role::Unknown && !guess.said.angle;
+        let found = guesses.iter_mut().find(|guess| nameless(guess) && guess.moves() && evenly(guess));
         if let Some(guess) = found {
             guess.role = Role::Time;
             guess.unit = None;
@@ -398,6 +499,7 @@ fn time(guesses: &mut [Guess], files: &[RawFile]) {
                 s if s > 1e14 => (Unit::Microsecond, "microseconds since 1970"),
                 s if s > 1e11 => (Unit::Millisecond, "milliseconds since 1970"),
                 s if s > 1e9 => (Unit::Second, "seconds since 1970"),
+                _ if guess.is_in_days() => (Unit::Day, "days since 1900, as spreadsheets count"),
                 _ => (Unit::Second, "s, for want of a unit"),
             };
             guess.unit = Some(unit);
@@ -407,155 +509,15 @@ fn time(guesses: &mut [Guess], files: &[RawFile]) {
     }
 }
 
-/// Counts of a turn, where another column shows the same shaft in a unit of angle.
-fn units_of_counts(guesses: &mut [Guess]) {
-    let counts: Vec<usize> = (0..guesses.len())
-        .filter(|k| guesses[*k].unit == Some(Unit::Count) && guesses[*k].counts.is_none() && guesses[*k].moves())
-        .collect();
-    for k in counts {
-        let others: Vec<usize> = (0..guesses.len())
-            .filter(|j| {
-                *j != k && guesses[*j].moves() && guesses[*j].unit != Some(Unit::Count) && !guesses[*j].facts.whole
-            })
-            .filter(|j| !matches!(guesses[*j].role, Role::Time | Role::Speed | Role::Torque | Role::Current))
-            .collect();
-        let mut best: Option<(bool, f64, usize, Unit, f64)> = None;
-        for j in others {
-            let together = slope(&guesses[k].values, &guesses[j].values).filter(|line| line.left < 1e-4);
-            let Some(line) = together else { continue };
-            let units = guesses[j].unit.map_or(vec![Unit::Radian, Unit::Degree, Unit::Turn], |unit| vec![unit]);
-            for (unit, round) in units.into_iter().flat_map(|unit| [(unit, false), (unit, true)]) {
-                let Some((counts, off)) = counts_of_a_turn(line.slope / unit.factor(), round) else { continue };
-                // A power of two before a round number, then what fits better.
-                if best.is_none_or(|(other, before, ..)| (round, off) < (other, before)) {
-                    best = Some((round, off, j, unit, counts));
-                }
-            }
-        }
-        if let Some((_, _, j, unit, counts)) = best {
-            guesses[k].counts = Some(counts);
-            guesses[k]
-                .why
-                .push(format!("{counts} counts a turn by column {}, which shows the same shaft in {unit}", j + 1));
-            guesses[j].unit = Some(unit);
-            guesses[j].why.push(format!("{unit} by column {}: then a turn has {counts} counts", k + 1));
-        }
-    }
-}
-
-/// Generator and output: by name, else the two that turn together; and the ratio between them.
-fn pair(guesses: &mut [Guess], notes: &mut Vec<String>) -> Option<f64> {
-    let angles: Vec<usize> = (0..guesses.len())
-        .filter(|k| guesses[*k].moves() && guesses[*k].facts.every <= 1)
-        .filter(|k| matches!(guesses[*k].role, Role::Generator | Role::Output | Role::Unknown))
-        .collect();
-    let mut best: Option<(f64, usize, usize, f64)> = None;
-    for &g in &angles {
-        for &o in &angles {
-            let named = |k: usize, role: Role| guesses[k].role == role;
-            let against = named(g, Role::Output) || named(o, Role::Generator);
-            let Some(line) = (g != o && !against)
-                .then(|| slope(&guesses[o].values, &guesses[g].values))
-                .flatten()
-                .filter(relation::Slope::holds)
-            else {
-                continue;
-            };
-            let Some(ratio) = in_range(&guesses[g], &guesses[o], 1.0 / line.slope) else { continue };
-            // Names count most, then how well the two turn together; counts are what an encoder gives.
-            let score = 2.0 * f64::from(named(g, Role::Generator))
-                + 2.0 * f64::from(named(o, Role::Output))
-                + 0.5 * f64::from(guesses[g].unit == guesses[o].unit)
-                - line.left;
-            if best.is_none_or(|(before, ..)| score > before) {
-                best = Some((score, g, o, ratio));
-            }
-        }
-    }
-    let (_, g, o, _) = best?;
-    // What follows the generator by the ratio in the units that were found.
-    let slope = slope(&guesses[o].values, &guesses[g].values)?.slope;
-    let units = units_of_pair(guesses, g, o, 1.0 / slope, notes)?;
-    for (k, role) in [(g, Role::Generator), (o, Role::Output)] {
-        let by_name = guesses[k].role == role;
-        guesses[k].role = role;
-        guesses[k].used = true;
-        let sure = if by_name { 0.9 } else { 0.6 };
-        guesses[k].because(format!("turns with column {}, {units:.3} to 1", if k == g { o } else { g } + 1), sure);
-    }
-    Some(units)
-}
-
-/// The ratio in the units known so far, if it is one of a strain wave gear or may be.
-fn in_range(generator: &Guess, output: &Guess, ratio: f64) -> Option<f64> {
-    let within = |ratio: f64| (RATIOS[0]..=RATIOS[1]).contains(&ratio.abs());
-    match (generator.rad(), output.rad()) {
-        (Some(g), Some(o)) => Some(ratio * g / o).filter(|ratio| within(*ratio)),
-        // One of the units is open.
-        (Some(_), None) | (None, Some(_)) => Some(ratio),
-        (None, None) => Some(ratio).filter(|ratio| within(*ratio)),
-    }
-}
-
-/// Settles the units of generator and output that are open so that the ratio is one of a strain wave gear; gives it.
-fn units_of_pair(guesses: &mut [Guess], g: usize, o: usize, raw: f64, notes: &mut Vec<String>) -> Option<f64> {
-    let within = |ratio: f64| (RATIOS[0]..=RATIOS[1]).contains(&ratio.abs());
-    match (guesses[g].rad(), guesses[o].rad()) {
-        (Some(a), Some(b)) => Some(raw * a / b),
-        (None, None) => {
-            // The same unit, as far as can be told.
-            for k in [g, o] {
-                if guesses[k].unit.is_none() {
-                    guesses[k].unit = Some(Unit::Radian);
-                    guesses[k].why.push("rad, for want of a unit".to_owned());
-                } else {
-                    notes.push(format!("how many counts make a turn of column {} is not in the file", k + 1));
-                }
-            }
-            Some(raw)
-        }
-        (known, _) => {
-            let open = if known.is_some() { o } else { g };
-            let both = (guesses[g].rad(), guesses[o].rad());
-            let of = |unit_rad: f64| match both {
-                (Some(a), _) => raw * a / unit_rad,
-                (_, Some(b)) => raw * unit_rad / b,
-                _ => raw,
-            };
-            if guesses[open].unit == Some(Unit::Count) {
-                // The other encoder's counts, or the power of two that gives a ratio near a whole number.
-                let other = if open == g { guesses[o].counts } else { guesses[g].counts };
-                let powers = (6..=28).map(|bits| 2f64.powi(bits));
-                let near = |counts: &f64| {
-                    let ratio = of(TAU / counts);
-                    within(ratio) && (ratio - ratio.round()).abs() < 0.005 * ratio.abs()
-                };
-                let counts = other.into_iter().chain(powers).find(near)?;
-                guesses[open].counts = Some(counts);
-                let why = if other == Some(counts) {
-                    "as the other encoder has"
-                } else {
-                    "which makes the ratio nearly whole"
-                };
-                guesses[open].why.push(format!("{counts} counts a turn, {why}"));
-                notes.push(format!("column {}: {counts} counts a turn, {why}: check it", open + 1));
-                return Some(of(TAU / counts));
-            }
-            let unit = Unit::ANGLES.into_iter().find(|unit| within(of(unit.factor())))?;
-            guesses[open].unit = Some(unit);
-            guesses[open].why.push(format!("{unit} makes the ratio {:.2}", of(unit.factor())));
-            Some(of(unit.factor()))
-        }
-    }
-}
-
 /// Roles that only one column may have: the first that moves, and what is left is none.
 fn settle(guesses: &mut [Guess], notes: &mut Vec<String>) {
     let paired = guesses.iter().any(|guess| guess.used && guess.role == Role::Output);
+    let joints = pair::joints(guesses);
     for role in [Role::Generator, Role::Output, Role::Error, Role::Temperature, Role::Orientation] {
         let used = guesses.iter().any(|guess| guess.used && guess.role == role);
         let may = |guess: &Guess| guess.role == role && guess.moves();
-        let place = guesses.iter().position(may).filter(|_| !used);
+        let of_these = |guess: &Guess| may(guess) && guess.of_joints(&joints);
+        let place = guesses.iter().position(of_these).or_else(|| guesses.iter().position(may)).filter(|_| !used);
         // An output that does not follow a generator is none, and an error is not needed beside an output.
         let wanted = match role {
             Role::Output => false,
@@ -603,6 +565,11 @@ fn nameless_torque(guesses: &[Guess], error: &[f64], output: &[f64], notes: &mut
     }
 }
 
+/// Numbers, with commas.
+fn listed<T: ToString>(numbers: &[T]) -> String {
+    numbers.iter().map(T::to_string).collect::<Vec<_>>().join(", ")
+}
+
 /// Which column may be the torque, and which way it counts.
 fn torque(guesses: &mut [Guess], error: Option<&[f64]>, notes: &mut Vec<String>) {
     let output: Option<Vec<f64>> =
@@ -611,7 +578,13 @@ fn torque(guesses: &mut [Guess], error: Option<&[f64]>, notes: &mut Vec<String>)
             Some(guess.values.iter().map(|value| rad * value).collect())
         });
     let of_role = |guess: &Guess| matches!(guess.role, Role::Torque | Role::Current);
-    let candidates: Vec<usize> = (0..guesses.len()).filter(|k| of_role(&guesses[*k]) && guesses[*k].moves()).collect();
+    let all: Vec<usize> = (0..guesses.len()).filter(|k| of_role(&guesses[*k]) && guesses[*k].moves()).collect();
+    let joints = pair::joints(guesses);
+    let candidates: Vec<usize> = all.iter().copied().filter(|k| guesses[*k].of_joints(&joints)).collect();
+    if !all.is_empty() && candidates.is_empty() {
+        notes.push(format!("the columns of torque are of other joints than {}: none is proposed", listed(&joints)));
+        return;
+    }
     if candidates.is_empty() {
         // A load that does not change is a load: without it the table would be one for none.
         if let Some(constant) = guesses.iter_mut().find(|guess| guess.role == Role::Torque && guess.facts.finite > 0) {
@@ -660,8 +633,8 @@ fn torque(guesses: &mut [Guess], error: Option<&[f64]>, notes: &mut Vec<String>)
         ));
     }
     if candidates.len() > 1 {
-        let all: Vec<String> = candidates.iter().map(|k| (k + 1).to_string()).collect();
-        notes.push(format!("columns {} may be the torque: column {} is proposed", all.join(", "), best + 1));
+        let all: Vec<usize> = candidates.iter().map(|k| k + 1).collect();
+        notes.push(format!("columns {} may be the torque: column {} is proposed", listed(&all), best + 1));
     }
     if guesses[best].negative {
         notes.push(format!("column {} counts the torque the other way round: it is proposed with a minus", best + 1));
@@ -703,9 +676,21 @@ fn clock(guesses: &[Guess], files: &[RawFile]) -> (TimeKind, Option<f64>, Vec<us
 }
 
 /// The mapping, if generator and output or an error are told.
-fn option(guesses: &[Guess], file: &RawFile, notes: &mut Vec<String>) -> Option<String> {
+fn option(guesses: &[Guess], names: &[String], notes: &mut Vec<String>) -> Option<String> {
     let used = |role: Role| guesses.iter().any(|guess| guess.used && guess.role == role && guess.written().is_some());
     if !(used(Role::Generator) && (used(Role::Output) || used(Role::Error))) {
+        let open = |guess: &&Guess| guess.used && guess.written().is_none() && guess.role.is_angle();
+        if let Some(count) = guesses.iter().filter(open).count().checked_sub(1) {
+            let angles = guesses.iter().zip(names).filter(|(guess, _)| guess.used && guess.role.is_angle());
+            let entries = angles.filter_map(|(guess, name)| {
+                let unit = guess.written().unwrap_or_else(|| "count/COUNTS".to_owned());
+                Some(format!("{}={name}:{unit}", guess.role.in_mapping()?))
+            });
+            let entries = entries.collect::<Vec<_>>().join(",");
+            let which = if count == 0 { "that column" } else { "these columns" };
+            notes.push(format!("give the counts of a turn of {which} in place of COUNTS: --columns {entries}"));
+            return None;
+        }
         let what = match (used(Role::Generator), used(Role::Output) || used(Role::Error)) {
             (true, false) => "which column is the output (or the error)",
             (false, true) => "which column is the generator",
@@ -714,16 +699,18 @@ fn option(guesses: &[Guess], file: &RawFile, notes: &mut Vec<String>) -> Option<
         notes.push(format!("{what} cannot be told: name them, --columns generator=#1:UNIT,output=#2:UNIT"));
         return None;
     }
-    let entries = guesses.iter().enumerate().filter(|(_, guess)| guess.used).filter_map(|(place, guess)| {
-        let (role, unit) = (guess.role.in_mapping()?, guess.written()?);
-        let name = &file.columns[place].name;
-        // Names with signs of the mapping in them, and names that are there twice, go by number.
-        let twice = file.columns.iter().filter(|column| column.name == *name).count() > 1;
-        let plain = !twice && !name.is_empty() && !name.contains([',', ':', '=', '"', '\'']);
-        let column = if plain { name.clone() } else { format!("#{}", place + 1) };
-        Some(format!("{role}={column}:{unit}"))
-    });
+    let used = guesses.iter().zip(names).filter(|(guess, _)| guess.used);
+    let entries =
+        used.filter_map(|(guess, name)| Some(format!("{}={name}:{}", guess.role.in_mapping()?, guess.written()?)));
     Some(entries.collect::<Vec<_>>().join(","))
+}
+
+/// A column as a mapping names it: names with signs of the mapping in them, and names that are there twice, go by number.
+fn name_in_mapping(file: &RawFile, place: usize) -> String {
+    let name = &file.columns[place].name;
+    let twice = file.columns.iter().filter(|column| column.name == *name).count() > 1;
+    let plain = !twice && !name.is_empty() && !name.contains([',', ':', '=', '"', '\'']);
+    if plain { name.clone() } else { format!("#{}", place + 1) }
 }
 
 #[cfg(test)]

@@ -84,6 +84,14 @@ fn encoder_counts(t: &Truth, k: usize) -> Vec<String> {
     fields
 }
 
+/// The motor in counts, 4096 a turn, as a counter shows them.
+fn counter(shown: impl Fn(f64) -> f64) -> String {
+    file("time,motor,load,torque\n", ",", |t, k| {
+        let count = (t.generator_rad[k] / TAU * 4096.0).round();
+        with(plain(t, k), 1, format!("{:.0}", shown(count)))
+    })
+}
+
 fn commas(fields: Vec<String>) -> Vec<String> {
     fields.into_iter().map(|field| field.replace('.', ",")).collect()
 }
@@ -166,12 +174,18 @@ fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
         ),
         (
             "a counter of 16 bits",
-            gear(file("time,motor,load,torque\n", ",", |t, k| {
-                let count = (t.generator_rad[k] / TAU * 4096.0).round() as i64;
-                with(plain(t, k), 1, (count.rem_euclid(65_536) - 32_768).to_string())
-            })),
+            gear(counter(|count| (count as i64).rem_euclid(65_536) as f64 - 32_768.0)),
             By("time=time:s,generator=motor:count/4096,output=load:rad,torque=torque:N.m"),
         ),
+        ("a counter of 16 bits, without a word", gear(counter(|count| count.rem_euclid(65_536.0))), Proposed),
+        ("a counter that begins anew at 32767", gear(counter(|count| count.rem_euclid(32_767.0))), Proposed),
+        ("a counter that begins anew at 32766", gear(counter(|count| count.rem_euclid(32_766.0))), Proposed),
+        (
+            "a counter set to zero at 32767 and at -32767",
+            gear(counter(|count| (count - 200_000.0) % 32_767.0)),
+            Proposed,
+        ),
+        ("a counter of 10000", gear(counter(|count| count.rem_euclid(10_000.0))), Proposed),
         (
             "angles within one turn",
             gear(file("time,motor_deg,load_deg,torque\n", ",", |t, k| {
@@ -294,7 +308,17 @@ fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
         ("nothing", Vec::new(), NoTable(&["log.txt:1: ", "no rows of numbers"])),
         ("prose", b"Measured on Tuesday.\nAll went well.\n".to_vec(), NoTable(&["no rows of numbers"])),
         ("a workbook", b"PK\x03\x04\x14\0".to_vec(), NoTable(&["workbook", "save it as CSV"])),
-        ("UTF-16", vec![0xFF, 0xFE, b'a', 0], NoTable(&["UTF-16"])),
+        (
+            "UTF-16",
+            gear(file("Zeit;Motor;Abtrieb;Drehmoment\n", ";", |t, k| commas(plain(t, k)))).iter().fold(
+                vec![0xFF, 0xFE],
+                |mut bytes, byte| {
+                    bytes.extend([*byte, 0]);
+                    bytes
+                },
+            ),
+            Proposed,
+        ),
         ("binary", (0..=255_u8).cycle().take(5000).collect(), NoTable(&["binary"])),
         (
             "ten rows",
@@ -516,4 +540,171 @@ fn what_is_found_is_said() {
     assert_eq!((two.sessions, two.time, two.rows), (2, TimeKind::Counted, 2 * ROWS));
     let other = raw::parse("c.csv", file("time,motor,load,x\n", ",", plain).as_bytes()).unwrap();
     assert!(look(&[raw, other]).unwrap_err().contains("logs of one form"));
+}
+
+/// A file of columns that are called so, each a function of the bench and the row.
+type Columns<'a> = [(&'a str, &'a dyn Fn(&Truth, usize) -> String)];
+
+fn columns_of(columns: &Columns<'_>, names: bool) -> String {
+    let header = columns.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(",") + "\n";
+    file(if names { &header } else { "" }, ",", |t, k| columns.iter().map(|(_, of)| of(t, k)).collect())
+}
+
+/// Names of generator, output and torque that are proposed.
+fn proposed(looked: &Looked) -> [Option<&str>; 3] {
+    [Role::Generator, Role::Output, Role::Torque].map(|role| {
+        looked.columns.iter().find(|column| column.used && column.role == role).map(|column| column.name.as_str())
+    })
+}
+
+/// A motor torque that a robot computes from that of the joint makes a straighter line than two encoders; it is a torque by its name and
+/// its unit, and without either it swings about zero where a motor turns on.
+#[test]
+fn names_and_units_go_before_the_straightest_line() {
+    let time = |t: &Truth, k: usize| format!("{:.4}", t.time_s[k]);
+    let motor = |t: &Truth, k: usize| format!("{:.7}", t.generator_rad[k]);
+    let output = |t: &Truth, k: usize| format!("{:.9}", t.output_rad[k]);
+    let wanted = |t: &Truth, k: usize| format!("{:.9}", t.generator_rad[k] / RATIO);
+    let load = |t: &Truth, k: usize| format!("{:.4}", t.torque_n_m[k]);
+    let of_motor = |t: &Truth, k: usize| format!("{:.6}", t.torque_n_m[k] / 100.0);
+    let (motor_deg, output_deg) = (
+        |t: &Truth, k: usize| format!("{:.5}", t.generator_rad[k].to_degrees()),
+        |t: &Truth, k: usize| format!("{:.7}", t.output_rad[k].to_degrees()),
+    );
+    let cases: [(&str, &Columns<'_>, bool, [Option<&str>; 3]); 5] = [
+        (
+            "an array of positions and efforts",
+            &[
+                ("%time", &time),
+                ("field.position0", &motor),
+                ("field.position1", &output),
+                ("field.effort0", &of_motor),
+                ("field.effort1", &load),
+            ],
+            true,
+            [Some("field.position0"), Some("field.position1"), Some("field.effort1")],
+        ),
+        (
+            "no names",
+            &[("", &time), ("", &of_motor), ("", &load), ("", &motor), ("", &output)],
+            false,
+            [Some("#4"), Some("#5"), None],
+        ),
+        (
+            "axes of a controller",
+            &[
+                ("Axis1.Torque", &of_motor),
+                ("Axis2.Torque", &load),
+                ("Axis2.SetPos", &wanted),
+                ("Axis1.ActPos", &motor),
+                ("Axis2.ActPos", &output),
+                ("Time", &time),
+            ],
+            true,
+            [Some("Axis1.ActPos"), Some("Axis2.ActPos"), Some("Axis2.Torque")],
+        ),
+        (
+            "units alone",
+            &[
+                ("Kanal A [s]", &time),
+                ("Kanal B [Nm]", &of_motor),
+                ("Kanal C [Nm]", &load),
+                ("Kanal D [deg]", &motor_deg),
+                ("Kanal E [deg]", &output_deg),
+            ],
+            true,
+            [Some("Kanal D [deg]"), Some("Kanal E [deg]"), Some("Kanal C [Nm]")],
+        ),
+        (
+            "a motor that is driven by steps, of which the command alone is known",
+            &[("t", &time), ("motor_setpoint", &motor), ("joint_pos", &output), ("effort", &load)],
+            true,
+            [Some("motor_setpoint"), Some("joint_pos"), Some("effort")],
+        ),
+    ];
+    for (name, columns, names, due) in cases {
+        let looked = looked_at(columns_of(columns, names).as_bytes()).unwrap();
+        assert_eq!(proposed(&looked), due, "{name}: {}", text(&looked));
+        assert_eq!(looked.ratio_proposed, Some(101.0), "{name}: {}", text(&looked));
+        if !names {
+            // Both are printed.
+            let rival = &looked.rivals[0];
+            assert_eq!((rival.generator.as_str(), rival.output.as_str()), ("#3", "#2"), "{:?}", looked.rivals);
+            assert_eq!(rival.columns_option.as_deref(), Some("generator=#3:rad,output=#2:rad"));
+            assert!(
+                text(&looked).contains("columns #3 and #2 may be generator and output as well"),
+                "{}",
+                text(&looked)
+            );
+            let sure = |place: usize| looked.columns[place].confidence;
+            assert!(sure(3) <= 0.5 && sure(4) <= 0.5, "a guess with a rival is not sure");
+        }
+    }
+}
+
+/// A robot logs all its joints: what is proposed is of one joint, the others are named.
+#[test]
+fn the_columns_of_one_joint_are_proposed_together() {
+    // Each joint follows the same way with its own travel, as a planner makes them; the torque of the first is the straightest of all lines.
+    let reach = |joint: usize| [1.0, 0.7, 0.4][joint - 1];
+    for motor in ["encoder_motorinc", "motor_position"] {
+        let mut header = "Timestamp".to_owned();
+        for joint in 1..=3 {
+            let _ = write!(
+                header,
+                ",target_joint_torque_{joint},joint_torque_current_{joint},{motor}_{joint},encoder_loadinc_{joint},target_joint_angles_{joint}"
+            );
+        }
+        let text_of = file(&(header + "\n"), ",", |t, k| {
+            let mut fields = vec![format!("{:.4}", t.time_s[k])];
+            for joint in 1..=3 {
+                let (psi, way) = (reach(joint) * t.generator_rad[k], reach(joint) * t.output_rad[k]);
+                let own = way + 40.0 * ARCSEC * (37.0 * way + joint as f64).sin();
+                fields.push(format!("{:.5}", psi / 50.0));
+                fields.push(format!("{:.4}", t.torque_n_m[k] * joint as f64));
+                fields.push(counts(psi, 16_777_216.0));
+                fields.push(counts(own, 16_777_216.0));
+                fields.push(format!("{:.7}", psi / RATIO));
+            }
+            fields
+        });
+        let looked = looked_at(text_of.as_bytes()).unwrap();
+        let [generator, output, torque] = proposed(&looked).map(|name| name.unwrap_or_default().to_owned());
+        assert!(generator.starts_with(motor) && output.starts_with("encoder_loadinc"), "{}", text(&looked));
+        let joint = |name: &str| name.rsplit_once('_').unwrap().1.to_owned();
+        assert!(joint(&generator) == joint(&output) && joint(&output) == joint(&torque), "{}", text(&looked));
+        assert!((looked.ratio_found.unwrap() - 101.0).abs() < 0.5, "{}", text(&looked));
+        // What is missing is said, not that nothing is known.
+        let due = format!("--columns generator={generator}:count/COUNTS,output={output}:count/COUNTS");
+        assert!(
+            looked.columns_option.is_none() && looked.notes.iter().any(|note| note.ends_with(&due)),
+            "{}",
+            text(&looked)
+        );
+        // The other two joints, and no pair of two joints.
+        assert_eq!(looked.rivals.len(), 2, "{:?}", looked.rivals);
+        assert!(
+            looked.rivals.iter().all(|rival| joint(&rival.generator) == joint(&rival.output)),
+            "{:?}",
+            looked.rivals
+        );
+    }
+}
+
+/// Counts of a turn that the file does not say: those of a ratio of catalogues, and the others are named.
+#[test]
+fn counts_that_the_file_does_not_say_have_rivals() {
+    let looked = looked_at(counter(|count| count.rem_euclid(32_767.0)).as_bytes()).unwrap();
+    assert_eq!((looked.columns[1].counts_per_turn, looked.ratio_proposed), (Some(4096.0), Some(101.0)));
+    assert!(
+        looked.columns[1].why.iter().any(|why| why.contains("begins anew after 32767 (")),
+        "{:?}",
+        looked.columns[1]
+    );
+    assert!(looked.columns[1].confidence <= 0.6);
+    let other = &looked.rivals[0];
+    assert!(
+        (other.ratio - 202.0).abs() < 1.0 && other.columns_option.as_ref().unwrap().contains("count/2048"),
+        "{other:?}"
+    );
 }

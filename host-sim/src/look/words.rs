@@ -1,13 +1,37 @@
-//! What the name of a column says of what it holds.
+//! What the name of a column and its unit say of what it holds.
 
 use super::Role;
+use crate::measurement::Unit;
 
 /// Words of names, in the order in which the first that fits decides: a joint's velocity is a velocity, a motor's temperature a
-/// temperature. English and German, as loggers and robots have them; the list is made by hand from the logs at hand.
+/// temperature. English and German, as loggers, robots and controllers have them; the list is made by hand from the logs at hand.
 const WORDS: [(Role, &[&str]); 9] = [
-    (Role::Speed, &["vel", "velocity", "speed", "rpm", "omega", "dq", "drehzahl", "geschwindigkeit", "acc", "jerk"]),
+    (
+        Role::Speed,
+        &[
+            "vel",
+            "velo",
+            "velocity",
+            "speed",
+            "spd",
+            "rpm",
+            "omega",
+            "dq",
+            "qd",
+            "qdot",
+            "dtheta",
+            "drehzahl",
+            "geschwindigkeit",
+            "acc",
+            "accel",
+            "jerk",
+        ],
+    ),
     (Role::Temperature, &["temp", "temperature", "temperatur", "thermo", "degc"]),
-    (Role::Torque, &["torque", "trq", "tau", "moment", "drehmoment", "mom", "tq", "load_cell", "nm", "lastmoment"]),
+    (
+        Role::Torque,
+        &["torque", "trq", "tau", "effort", "moment", "drehmoment", "mom", "tq", "load_cell", "nm", "lastmoment"],
+    ),
     (Role::Current, &["current", "curr", "cur", "amp", "amps", "iq", "strom"]),
     (Role::Error, &["error", "err", "deviation", "abweichung", "fehler", "te"]),
     (Role::Time, &["time", "timestamp", "zeit", "t", "date", "datetime", "clock", "epoch", "uhrzeit", "stamp"]),
@@ -30,41 +54,182 @@ const WORDS: [(Role, &[&str]); 9] = [
             "psi",
         ],
     ),
-    (
-        Role::Output,
-        &["output", "out", "load", "loadinc", "link", "joint", "abtrieb", "arm", "axis", "achse", "last", "delta"],
-    ),
+    (Role::Output, &["output", "out", "load", "loadinc", "link", "joint", "abtrieb", "arm", "last", "delta"]),
 ];
 
+/// Words of an angle, of whatever shaft.
+const ANGLES: [&str; 13] = [
+    "position",
+    "pos",
+    "actpos",
+    "angle",
+    "winkel",
+    "theta",
+    "phi",
+    "q",
+    "encoder",
+    "enc",
+    "inc",
+    "rotation",
+    "drehwinkel",
+];
 /// Words of what was wanted, not measured.
-const COMMANDED: [&str; 8] = ["cmd", "target", "command", "setpoint", "soll", "ref", "desired", "commanded"];
-/// Words of what is a scatter or a quality of something else.
-const ASIDE: [&str; 6] = ["sd", "std", "sigma", "quality", "status", "flag"];
+const COMMANDED: [&str; 18] = [
+    "cmd",
+    "target",
+    "command",
+    "setpoint",
+    "soll",
+    "sollwert",
+    "ref",
+    "desired",
+    "commanded",
+    "demand",
+    "goal",
+    "set",
+    "setpos",
+    "des",
+    "d",
+    "planned",
+    "request",
+    "requested",
+];
+/// Words of what is a scatter or a quality of something else, or what a controller has not reached yet.
+const ASIDE: [&str; 12] = [
+    "sd",
+    "std",
+    "sigma",
+    "quality",
+    "status",
+    "flag",
+    "seq",
+    "sequence",
+    "crc",
+    "following",
+    "tracking",
+    "schleppfehler",
+];
 
-/// What a name says: the role, and whether it is that of a command.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// What the name of a column and its unit say.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Said {
+    /// What it holds.
     pub role: Option<Role>,
+    /// Whether it is that of a command.
     pub commanded: bool,
+    /// Whether it is an angle, of whatever shaft.
+    pub angle: bool,
+    /// Whether it is of something else altogether: a scatter, a counter of messages.
+    pub aside: bool,
+    /// The number of the joint in a robot.
+    pub joint: Option<u32>,
 }
 
-/// What the name of a column says.
-pub(super) fn said(name: &str) -> Said {
-    let name = name.to_lowercase();
-    let plain = name.split(['[', '(']).next().unwrap_or_default();
-    let words: Vec<&str> = plain
-        .split(|c: char| !c.is_alphanumeric())
-        .map(|word| word.trim_end_matches(|c: char| c.is_ascii_digit()))
-        .filter(|word| !word.is_empty())
-        .collect();
-    if words.iter().any(|word| ASIDE.contains(word)) {
-        return Said { role: None, commanded: false };
-    }
-    let commanded = words.iter().any(|word| COMMANDED.contains(word));
+/// What a name says, and the unit that stands in a line of its own if there is one. Units count before words: a load in N·m is a torque,
+/// whatever it is called.
+pub(super) fn said(name: &str, unit: Option<&str>) -> Said {
+    let words = words(name);
+    let is = |known: &str| words.iter().any(|word| word == known);
     // A long word also counts inside of another: motorposition, Abtriebswinkel.
-    let holds = |known: &&str| words.iter().any(|word| word == known || (known.len() >= 4 && word.contains(*known)));
-    let role = WORDS.iter().find(|(_, known)| known.iter().any(&holds)).map(|(role, _)| *role);
-    Said { role, commanded }
+    let holds = |known: &str| is(known) || words.iter().any(|word| known.len() >= 4 && word.contains(known));
+    let any = |known: &[&str]| known.iter().any(|known| holds(known));
+    let joint = joint(name);
+    if ASIDE.iter().any(|known| is(known)) {
+        return Said { aside: true, joint, ..Said::default() };
+    }
+    let by_unit = kind_of_unit(name, unit);
+    let angle = by_unit.map_or_else(|| any(&ANGLES), |kind| kind == Kind::Angle);
+    let fits = |role: Role| match by_unit {
+        Some(Kind::Angle) => matches!(role, Role::Error | Role::Orientation | Role::Generator | Role::Output),
+        // A drive's "current position" is not one in amperes.
+        None => !(role == Role::Current && angle),
+        _ => true,
+    };
+    let by_words = WORDS.iter().find(|(role, known)| fits(*role) && any(known)).map(|(role, _)| *role);
+    let role = match by_unit {
+        Some(Kind::Speed) => Some(Role::Speed),
+        Some(Kind::Temperature) => Some(Role::Temperature),
+        Some(Kind::Torque) => Some(Role::Torque),
+        Some(Kind::Current) => by_words.filter(|role| *role == Role::Torque).or(Some(Role::Current)),
+        Some(Kind::Time) => by_words.or(Some(Role::Time)),
+        Some(Kind::Angle) | None => by_words,
+    };
+    let angle = angle && role.is_none_or(|role| role.is_angle());
+    Said { role, commanded: any(&COMMANDED), angle, aside: false, joint }
+}
+
+/// What a unit is one of, as far as a role follows from it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Angle,
+    Torque,
+    Current,
+    Speed,
+    Temperature,
+    Time,
+}
+
+/// What the unit of a line of its own, in brackets, or at the end of a name is one of.
+fn kind_of_unit(name: &str, line: Option<&str>) -> Option<Kind> {
+    let bracketed = [('[', ']'), ('(', ')')].into_iter().find_map(|(open, close)| {
+        name.trim_end().strip_suffix(close).and_then(|rest| rest.rsplit_once(open)).map(|(_, unit)| unit)
+    });
+    let Some(text) = line.or(bracketed) else {
+        // A single letter at the end of a name is a letter more often than a unit: phase_A, sensor_C.
+        let unit = Unit::in_name(name).filter(|unit| unit.is_of_angles() || unit.is_of_torque());
+        return unit.and_then(kind).filter(|kind| *kind != Kind::Current || name.ends_with("_mA"));
+    };
+    let text = text.trim().trim_matches(['[', ']', '(', ')']).trim();
+    let lower = text.to_lowercase();
+    let per_time = ["/s", "/min", "/sec", "/h", "s^-1", "s-1"].iter().any(|end| lower.contains(end));
+    if per_time || ["rpm", "1/min", "u/min", "min-1"].contains(&lower.as_str()) {
+        return Some(Kind::Speed);
+    }
+    Unit::in_brackets(text).and_then(kind)
+}
+
+fn kind(unit: Unit) -> Option<Kind> {
+    match unit {
+        Unit::Ampere | Unit::Milliampere => Some(Kind::Current),
+        // A transducer of anything.
+        Unit::Volt => None,
+        unit if unit.is_of_angles() => Some(Kind::Angle),
+        unit if unit.is_of_torque() => Some(Kind::Torque),
+        unit if unit.is_of_temperature() => Some(Kind::Temperature),
+        unit if unit.is_of_time() => Some(Kind::Time),
+        _ => None,
+    }
+}
+
+/// The words of a name, lower case, whole and parted where a capital follows a small letter: `ActPos` is `actpos`, `act` and `pos`.
+fn words(name: &str) -> Vec<String> {
+    let plain = name.split(['[', '(']).next().unwrap_or_default();
+    let mut words = Vec::new();
+    for whole in plain.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()) {
+        words.push(whole.to_lowercase());
+        let letters: Vec<char> = whole.chars().collect();
+        let borders = (1..letters.len()).filter(|k| letters[*k].is_uppercase() && letters[k - 1].is_lowercase());
+        let borders: Vec<usize> = [0].into_iter().chain(borders).chain([letters.len()]).collect();
+        if borders.len() > 2 {
+            let parts =
+                borders.windows(2).map(|ends| letters[ends[0]..ends[1]].iter().collect::<String>().to_lowercase());
+            // A letter alone is none of the words: TMotor.
+            words.extend(parts.filter(|part| part.chars().count() > 1));
+        }
+    }
+    let without_numbers = words.iter().map(|word| word.trim_end_matches(|c: char| c.is_ascii_digit()).to_owned());
+    without_numbers.filter(|word| !word.is_empty()).collect()
+}
+
+/// The number of a joint or an axis in a name: the last number, if it is a small one. `#3` is a place in the file, and no name.
+fn joint(name: &str) -> Option<u32> {
+    if name.starts_with('#') || !name.contains(char::is_alphabetic) {
+        return None;
+    }
+    let bytes = name.as_bytes();
+    let end = 1 + bytes.iter().rposition(u8::is_ascii_digit)?;
+    let start = bytes[..end].iter().rposition(|byte| !byte.is_ascii_digit()).map_or(0, |before| before + 1);
+    name[start..end].parse().ok().filter(|number| *number < 100)
 }
 
 #[cfg(test)]
@@ -90,9 +255,51 @@ mod tests {
             ("Drehmoment [Nm]", Some(Role::Torque)),
             ("q3", None),
             ("#4", None),
+            ("field.effort0", Some(Role::Torque)),
+            ("/joint_states/motor_3/effort", Some(Role::Torque)),
+            ("Axis2.Torque", Some(Role::Torque)),
+            ("Axis1.ActPos", None),
+            ("Axis1.ActVelo", Some(Role::Speed)),
+            ("motor [rpm]", Some(Role::Speed)),
+            ("joint (rad/s)", Some(Role::Speed)),
+            ("load (Nm)", Some(Role::Torque)),
+            ("load (deg)", Some(Role::Output)),
+            ("TMotor [°C]", Some(Role::Temperature)),
+            ("current_position", None),
+            ("motor_current", Some(Role::Current)),
+            ("phase_A", None),
         ] {
-            assert_eq!(said(name).role, role, "{name}");
+            assert_eq!(said(name, None).role, role, "{name}");
         }
-        assert!(said("target_joint_angles_3").commanded && !said("joint_angles_3").commanded);
+        // A line of units decides as brackets do.
+        assert_eq!(said("load", Some("Nm")).role, Some(Role::Torque));
+        assert_eq!(said("Kanal 3", Some("[rad/s]")).role, Some(Role::Speed));
+    }
+
+    #[test]
+    fn names_tell_angles_and_commands_and_joints() {
+        for name in ["field.position0", "Axis1.ActPos", "q3", "theta_2", "Kanal [deg]", "current_position", "motor_enc"]
+        {
+            assert!(said(name, None).angle && !said(name, None).commanded, "{name}");
+        }
+        for name in ["effort0", "dq3", "temp_2", "x", "position_sd", "torque_angle_Nm"] {
+            assert!(!said(name, None).angle, "{name}");
+        }
+        for name in ["target_joint_angles_3", "Axis1.SetPos", "q_d", "Sollposition", "motor_setpoint", "pos_ref"] {
+            assert!(said(name, None).commanded, "{name}");
+        }
+        for (name, joint) in [
+            ("joint_angles_3", Some(3)),
+            ("Axis1.ActPos", Some(1)),
+            ("field.position0", Some(0)),
+            ("position[2]", Some(2)),
+            ("J4 torque [Nm]", Some(4)),
+            ("#6", None),
+            ("12.5", None),
+            ("motor", None),
+            ("channel_20231", None),
+        ] {
+            assert_eq!(said(name, None).joint, joint, "{name}");
+        }
     }
 }

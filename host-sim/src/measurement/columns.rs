@@ -5,7 +5,7 @@ use std::fmt;
 use thiserror::Error;
 
 use super::csv_rows::TableProblem;
-use super::layout::{Layout, unit_word};
+use super::reader::{Layout, unit_word};
 use super::unit::Wrong;
 pub use super::unit::{Reading, Unit};
 use crate::suggest::{did_you_mean, likeliest, question};

@@ -1,12 +1,10 @@
-//! Rows of a CSV file with a header: the one reader of this project.
+//! Rows of a CSV file that this project defines (samples, paths): read strictly, so that what does not fit is refused. Other people's files
+//! are read by [`super::reader`].
 //!
 //! Commas between fields, a point in numbers, fields quoted where needed, `#` lines comments, blank lines nothing, lines ended by
-//! LF or CRLF, a byte order mark passed over; or as a [`Layout`] says. What a field must hold is for the caller to say; here stands
-//! where it was found.
+//! LF or CRLF, a byte order mark passed over. What a field must hold is for the caller to say; here stands where it was found.
 
 use std::io::{BufRead, BufReader, Read};
-
-use super::layout::{Layout, Separator, with_comma};
 
 use crate::suggest::{likeliest, question};
 
@@ -30,12 +28,9 @@ pub enum NotANumber {
 
 /// Rows of a CSV file, one at a time.
 pub struct CsvRows<R: Read> {
-    reader: csv::Reader<Prepared<BufReader<R>>>,
+    reader: csv::Reader<Ended<BufReader<R>>>,
     header: Vec<String>,
     header_line: u64,
-    /// Lines before the first that the parser sees.
-    passed: u64,
-    decimal_comma: bool,
     record: csv::ByteRecord,
 }
 
@@ -45,74 +40,25 @@ pub struct Row<'a> {
     record: &'a csv::ByteRecord,
     /// Line, from 1; the last one of a row that a quoted field spreads over several.
     pub line: u64,
-    decimal_comma: bool,
 }
 
-/// A source whose last line is ended, and in which any number of blanks are one tab if they separate fields.
-struct Prepared<R> {
+/// A source whose last line is ended.
+struct Ended<R> {
     source: R,
-    blanks: bool,
     /// The last byte handed on.
     last: u8,
-    /// Whether blanks were seen that are not yet handed on.
-    pending: bool,
 }
 
-impl<R: Read> Prepared<R> {
-    /// Makes blanks between fields one tab and drops those at the ends of a line; gives the bytes left. A tab takes the place of the
-    /// blanks before it, so there are never more bytes than before, but for one blank that an earlier piece ended with.
-    fn squeezed(&mut self, bytes: &[u8], to: &mut [u8]) -> usize {
-        let mut end = 0;
-        let mut put = |byte: u8, last: &mut u8| {
-            to[end] = byte;
-            end += 1;
-            *last = byte;
-        };
-        for byte in bytes {
-            match byte {
-                b' ' | b'\t' => self.pending = self.last != b'\n',
-                b'\r' | b'\n' => {
-                    self.pending = false;
-                    put(*byte, &mut self.last);
-                }
-                _ => {
-                    if std::mem::take(&mut self.pending) {
-                        put(b'\t', &mut self.last);
-                    }
-                    put(*byte, &mut self.last);
-                }
-            }
-        }
-        end
-    }
-}
-
-impl<R: Read> Read for Prepared<R> {
+impl<R: Read> Read for Ended<R> {
     fn read(&mut self, to: &mut [u8]) -> std::io::Result<usize> {
-        if to.len() < 2 {
-            return Err(std::io::Error::other("a buffer of one byte"));
+        let n = self.source.read(to)?;
+        if n > 0 {
+            self.last = to[n - 1];
+        } else if self.last != b'\n' && !to.is_empty() {
+            (to[0], self.last) = (b'\n', b'\n');
+            return Ok(1);
         }
-        loop {
-            let n = if self.blanks {
-                let mut bytes = vec![0; to.len() - 1];
-                let n = self.source.read(&mut bytes)?;
-                let left = self.squeezed(&bytes[..n], to);
-                if n > 0 && left == 0 {
-                    continue;
-                }
-                left
-            } else {
-                self.source.read(to)?
-            };
-            if n > 0 {
-                self.last = to[n - 1];
-            } else if self.last != b'\n' {
-                to[0] = b'\n';
-                self.last = b'\n';
-                return Ok(1);
-            }
-            return Ok(n);
-        }
+        Ok(n)
     }
 }
 
@@ -128,9 +74,9 @@ impl<R: Read> CsvRows<R> {
         if start.starts_with(b"\xEF\xBB\xBF") {
             source.consume(3);
         }
-        let reader = parser(source, Separator::Comma);
+        let reader = parser(source);
         let record = csv::ByteRecord::new();
-        let mut rows = CsvRows { reader, header: Vec::new(), header_line: 1, passed: 0, decimal_comma: false, record };
+        let mut rows = CsvRows { reader, header: Vec::new(), header_line: 1, record };
         let mut header = Vec::new();
         let mut header_line = 1;
         if let Some(row) = rows.next_row()? {
@@ -146,25 +92,6 @@ impl<R: Read> CsvRows<R> {
         }
         (rows.header, rows.header_line) = (header, header_line);
         Ok(rows)
-    }
-
-    /// Reads a file that is laid out otherwise, up to its first row.
-    pub(super) fn by_layout(source: R, layout: &Layout) -> Result<Self, TableProblem> {
-        let mut source = BufReader::with_capacity(1 << 16, source);
-        let mut line = Vec::new();
-        for number in 1..layout.first_row_line {
-            let unreadable = |error: std::io::Error| TableProblem { line: number, what: error.to_string() };
-            line.clear();
-            source.read_until(b'\n', &mut line).map_err(unreadable)?;
-        }
-        Ok(CsvRows {
-            reader: parser(source, layout.separator),
-            header: layout.names.clone(),
-            header_line: layout.header_line,
-            passed: layout.first_row_line - 1,
-            decimal_comma: layout.decimal_comma,
-            record: csv::ByteRecord::new(),
-        })
     }
 
     /// Names of the columns.
@@ -208,15 +135,14 @@ impl<R: Read> CsvRows<R> {
     /// The next row that is not blank.
     pub fn next_row(&mut self) -> Result<Option<Row<'_>>, TableProblem> {
         loop {
-            let passed = self.passed;
-            let line = |reader: &csv::Reader<_>| passed + reader.position().line().saturating_sub(1).max(1);
+            let line = |reader: &csv::Reader<_>| reader.position().line().saturating_sub(1).max(1);
             match self.reader.read_byte_record(&mut self.record) {
                 Ok(false) => return Ok(None),
                 Ok(true) => {
                     let blank = self.record.len() == 1 && self.record[0].trim_ascii().is_empty();
                     if !blank {
                         let line = line(&self.reader);
-                        return Ok(Some(Row { record: &self.record, line, decimal_comma: self.decimal_comma }));
+                        return Ok(Some(Row { record: &self.record, line }));
                     }
                 }
                 Err(error) => return Err(TableProblem { line: line(&self.reader), what: error.to_string() }),
@@ -237,58 +163,30 @@ impl Row<'_> {
         self.record.get(place).map(|field| String::from_utf8_lossy(field.trim_ascii()))
     }
 
-    /// Whether all fields from `place` on are blank.
-    pub fn blank_from(&self, place: usize) -> bool {
-        self.record.iter().skip(place).all(|field| field.trim_ascii().is_empty())
-    }
-
-    /// Whether it holds the names of the columns once more, as loggers write them that are started anew.
-    pub fn repeats(&self, names: &[String]) -> bool {
-        self.record.len() == names.len()
-            && names
-                .iter()
-                .zip(self.record)
-                .all(|(name, field)| !name.is_empty() && name.as_bytes() == field.trim_ascii())
-    }
-
     /// A field as a number, which may be infinite or NaN if the text says so.
     pub fn number(&self, place: usize) -> Result<f64, NotANumber> {
         let field = self.record.get(place).ok_or(NotANumber::Absent(self.record.len()))?.trim_ascii();
-        let number =
-            |text: &str| text.parse().ok().or_else(|| if self.decimal_comma { with_comma(text) } else { None });
         std::str::from_utf8(field)
             .ok()
-            .and_then(number)
+            .and_then(|text| text.parse().ok())
             .ok_or_else(|| NotANumber::Text(String::from_utf8_lossy(field).into_owned()))
     }
 }
 
 /// Lines are ended here by LF, and CR is trimmed: the line of a row is then the lines counted so far.
-fn parser<R: Read>(source: BufReader<R>, separator: Separator) -> csv::Reader<Prepared<BufReader<R>>> {
-    let blanks = separator == Separator::Blanks;
+fn parser<R: Read>(source: BufReader<R>) -> csv::Reader<Ended<BufReader<R>>> {
     csv::ReaderBuilder::new()
-        .delimiter(separator.byte())
         .comment(Some(b'#'))
         .flexible(true)
         .has_headers(false)
         .terminator(csv::Terminator::Any(b'\n'))
-        .from_reader(Prepared { source, blanks, last: b'\n', pending: false })
+        .from_reader(Ended { source, last: b'\n' })
 }
 
-/// What a file is that begins so, if it is no CSV text.
+/// What a file is that begins so, if it is no CSV text in UTF-8.
 fn not_csv(start: &[u8]) -> Option<&'static str> {
-    let kinds: [(&[u8], &str); 9] = [
-        (b"\x1F\x8B", "a gzip archive; unpack it first"),
-        (b"PK\x03\x04", "a ZIP archive or a workbook (.xlsx); save it as CSV"),
-        (b"\xD0\xCF\x11\xE0", "an Office file (.xls); save it as CSV"),
-        (b"\x89HDF", "an HDF5 or MATLAB file; write it as CSV, as examples/to_csv.py does"),
-        (b"MATLAB 5.0", "a MATLAB file; write it as CSV, as examples/to_csv.py does"),
-        (b"PAR1", "a Parquet file; write it as CSV, as examples/to_csv.py does"),
-        (b"TDSm", "a TDMS file; write it as CSV"),
-        (b"\xFF\xFE", "text in UTF-16; save it as UTF-8"),
-        (b"\xFE\xFF", "text in UTF-16; save it as UTF-8"),
-    ];
-    let kind = kinds.iter().find(|(magic, _)| start.starts_with(magic)).map(|(_, kind)| *kind);
+    let utf_16 = start.starts_with(b"\xFF\xFE") || start.starts_with(b"\xFE\xFF");
+    let kind = super::reader::known_format(start).or(utf_16.then_some("text in UTF-16; save it as UTF-8"));
     kind.or_else(|| start.iter().take(4096).any(|byte| *byte == 0).then_some("a binary file; allowed: CSV text"))
 }
 

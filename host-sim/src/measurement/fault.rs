@@ -78,7 +78,7 @@ impl FaultName {
             FaultName::ClockError => "stamp each row with the clock of the controller when the angles are read",
             FaultName::Outliers => "check the cable and the interface of the encoder; latch both angles together",
             FaultName::UnitMismatch => {
-                "map the columns with their units: --columns generator=NAME:UNIT,output=NAME:UNIT"
+                "map the columns with their units: --columns generator=NAME:UNIT,output=NAME:UNIT,torque=NAME:UNIT"
             }
             FaultName::Quantisation => "log the full resolution of the encoder and of the torque",
             FaultName::Drift => {

@@ -8,19 +8,16 @@
 //! drive.
 
 mod averages;
-mod clock_text;
 mod columns;
 mod csv_rows;
 mod fault;
 mod faults;
 mod gear;
-mod layout;
 mod log;
 mod phd2;
-pub mod raw;
+pub mod reader;
 pub(crate) mod robust;
 mod rollover;
-mod slower;
 mod unit;
 
 use std::fs::File;
@@ -32,14 +29,19 @@ pub use csv_rows::{CsvRows, NotANumber, Row, TableProblem};
 pub use fault::{Fault, FaultName, Measures, ToothStep, Treatment};
 pub use faults::clock::SESSION_GAP_PERIODS;
 pub use gear::Gear;
-pub use layout::{Layout, Separator};
 pub use log::{FEWEST_ROWS, MeasuredError};
+pub(crate) use reader::stamps;
+pub use reader::{Layout, Separator, Sheet, raw};
 pub use robust::{MAD_TO_STD, least_and_most, median_and_std, median_of, quantile_of, sampled, white_noise};
+pub(crate) use rollover::{Anew, begins_anew, continued, registers};
 
 use faults::Findings;
 use faults::drift::Stretches;
 use faults::steps::Untold;
 use log::Log;
+
+/// More sessions than a person makes. *Guess*.
+const MANY_SESSIONS: usize = 50;
 
 /// Rows without a gap, in order of time.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -208,7 +210,7 @@ fn parse_as(
     if gear.ratio == 0.0 || !gear.ratio.is_finite() {
         return Err(refuse(format!("ratio: found {}, allowed: a finite number other than zero", gear.ratio)));
     }
-    let (mut log, found) = log::read(file, source, columns, gear.ratio)?;
+    let (mut log, found) = log::read(file, source, columns, gear.ratio, FEWEST_ROWS)?;
     let rows = log.len();
     let mut findings = Findings { notes: found.notes, ..Findings::default() };
     if let Some(line) = found.broken_off {
@@ -232,8 +234,9 @@ fn parse_as(
     }
     faults::missing::fill(&mut log, &mut findings);
     faults::clock::check(&mut log, &mut findings);
+    let recorded = recorded(&log);
     faults::missing::leave_out(&mut log, &mut findings);
-    enough(&log).map_err(refuse)?;
+    enough(&log, &recorded).map_err(refuse)?;
     faults::wrap::unwrap(&mut log, &found.columns, gear.ratio, &mut findings);
     faults::leaps::check(&mut log, gear, &mut findings);
     faults::units::check(&mut log, &found.columns, gear, &mut findings).map_err(refuse)?;
@@ -243,6 +246,7 @@ fn parse_as(
     let other_zeros = if drifts { Vec::new() } else { faults::leaps::between_sessions(&mut log, gear, &mut findings) };
     faults::stalls::check(&mut log, gear, &mut findings);
     let mut sessions = into_sessions(log, gear.ratio);
+    findings.notes.extend(many_sessions(&sessions));
     for (session, off_rad) in other_zeros.iter().copied() {
         sessions[session].own_zero = true;
         sessions[session..].iter_mut().for_each(|later| later.zero_off_rad = off_rad);
@@ -267,10 +271,62 @@ fn parse_as(
     Ok(Recording { file: file.to_owned(), rows, sessions, faults, tooth_steps, notes, unusable: None })
 }
 
+/// Rows as they stand in a file of this project's own columns, nothing corrected: for those who play a table over them.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct PlainRows {
+    pub generator_rad: Vec<f64>,
+    pub error_rad: Vec<f64>,
+    pub torque_n_m: Option<Vec<f64>>,
+    pub temperature_c: Option<Vec<f64>>,
+}
+
+/// Reads the rows of a file as they stand, by this project's own names.
+///
+/// # Errors
+/// It cannot be read, a column is missing or misspelt, or a row lacks a value.
+pub(crate) fn plain_rows(file: &str, source: impl Read, ratio: f64) -> Result<PlainRows, MeasuredError> {
+    let (mut log, found) = log::read(file, source, &ColumnMap::default(), ratio, 1)?;
+    let refuse = |line: u64, what: String| MeasuredError { file: file.to_owned(), line: Some(line), what };
+    for column in &found.columns {
+        let values = log.get(column.quantity).unwrap_or_default();
+        if let Some(row) = values.iter().position(|value| !value.is_finite()) {
+            let what = format!("{}: nothing is recorded, allowed: a finite number below 1e9", column.name);
+            return Err(refuse(log.line[row], what));
+        }
+    }
+    let generator_rad = log.take(Quantity::Generator).unwrap_or_default();
+    let error_rad = match log.take(Quantity::Output) {
+        Some(output) => {
+            output.iter().zip(&generator_rad).map(|(output, generator)| output - generator / ratio).collect()
+        }
+        None => log.take(Quantity::Error).unwrap_or_default(),
+    };
+    Ok(PlainRows {
+        generator_rad,
+        error_rad,
+        torque_n_m: log.take(Quantity::Torque),
+        temperature_c: log.take(Quantity::Temperature),
+    })
+}
+
+/// How many rows have the angles, for whoever finds none that has both.
+fn recorded(log: &Log) -> String {
+    let follower = log.output_or_error();
+    let has = |channel: Quantity, row: usize| log.get(channel).is_some_and(|values| values[row].is_finite());
+    let count = |of: &dyn Fn(usize) -> bool| (0..log.len()).filter(|row| of(*row)).count();
+    format!(
+        "of {} rows {} have the generator, {} the {follower}, {} both",
+        log.len(),
+        count(&|row| has(Quantity::Generator, row)),
+        count(&|row| has(follower, row)),
+        count(&|row| has(Quantity::Generator, row) && has(follower, row))
+    )
+}
+
 /// Whether enough rows are left, and anything moves in them.
-fn enough(log: &Log) -> Result<(), String> {
+fn enough(log: &Log, recorded: &str) -> Result<(), String> {
     if log.len() < FEWEST_ROWS {
-        return Err(format!("{} rows have all that is needed; at least {FEWEST_ROWS} must", log.len()));
+        return Err(format!("{} rows have all that is needed; at least {FEWEST_ROWS} must ({recorded})", log.len()));
     }
     let constant = |channel| log.get(channel).is_some_and(|values| values.iter().all(|value| *value == values[0]));
     let follower = log.output_or_error();
@@ -278,6 +334,19 @@ fn enough(log: &Log) -> Result<(), String> {
         return Err(format!("generator and {follower} keep one value throughout; at least one of them must change"));
     }
     Ok(())
+}
+
+/// What to say where the stamps part the rows into so many sessions that these are hardly any.
+fn many_sessions(sessions: &[Session]) -> Option<String> {
+    let rows: usize = sessions.iter().map(Session::len).sum();
+    (sessions.len() > MANY_SESSIONS && rows < FEWEST_ROWS * sessions.len()).then(|| {
+        format!(
+            "{} sessions of {} rows on the mean: time that steps by more than {SESSION_GAP_PERIODS} of its usual steps, or back, begins one; are the \
+             stamps those of the rows?",
+            sessions.len(),
+            rows / sessions.len()
+        )
+    })
 }
 
 /// The sessions of a log.

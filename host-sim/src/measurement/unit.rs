@@ -31,6 +31,8 @@ pub enum Unit {
     Minute,
     /// h
     Hour,
+    /// d: days, as spreadsheets count time.
+    Day,
     /// Date and time, or time of day, as text.
     Iso,
     /// N.m
@@ -75,8 +77,16 @@ impl Unit {
     pub(super) const OF_ANGLES: [Unit; 7] =
         [Unit::Radian, Unit::Degree, Unit::Turn, Unit::Arcminute, Unit::Arcsecond, Unit::Milliradian, Unit::Count];
     /// Units of time.
-    pub(super) const OF_TIME: [Unit; 7] =
-        [Unit::Second, Unit::Millisecond, Unit::Microsecond, Unit::Nanosecond, Unit::Minute, Unit::Hour, Unit::Iso];
+    pub(super) const OF_TIME: [Unit; 8] = [
+        Unit::Second,
+        Unit::Millisecond,
+        Unit::Microsecond,
+        Unit::Nanosecond,
+        Unit::Minute,
+        Unit::Hour,
+        Unit::Day,
+        Unit::Iso,
+    ];
     /// Units of torque, and of what is proportional to it.
     pub(super) const OF_TORQUE: [Unit; 9] = [
         Unit::NewtonMetre,
@@ -108,6 +118,7 @@ impl Unit {
             Unit::Nanosecond => "ns",
             Unit::Minute => "min",
             Unit::Hour => "h",
+            Unit::Day => "d",
             Unit::Iso => "iso",
             Unit::NewtonMetre => "N.m",
             Unit::NewtonCentimetre => "N.cm",
@@ -137,6 +148,7 @@ impl Unit {
             Unit::Nanosecond => 1e-9,
             Unit::Minute => 60.0,
             Unit::Hour => 3600.0,
+            Unit::Day => 86_400.0,
             Unit::NewtonCentimetre => 1e-2,
             Unit::KilonewtonMetre => 1e3,
             Unit::PoundInch => POUND_FORCE_N * 0.0254,
@@ -166,7 +178,13 @@ impl Unit {
     /// A unit as it stands in a line of units, with or without brackets.
     #[must_use]
     pub fn in_brackets(field: &str) -> Option<Unit> {
-        Unit::written(super::layout::unit_word(field))
+        Unit::written(super::reader::unit_word(field))
+    }
+
+    /// What it is a unit of, as a number that units of the same quantity share.
+    pub(super) fn family(self) -> usize {
+        let families: [&[Unit]; 3] = [&Self::OF_ANGLES, &Self::OF_TIME, &Self::OF_TEMPERATURE];
+        families.iter().position(|units| units.contains(&self)).unwrap_or(families.len())
     }
 
     /// Whether it is one of angle.
@@ -215,7 +233,8 @@ impl Unit {
             "°" => Unit::Degree,
             "turns" | "rev" | "revs" => Unit::Turn,
             "counts" | "cnt" | "inc" | "incs" | "tick" | "ticks" => Unit::Count,
-            "sec" => Unit::Second,
+            "sec" | "seconds" => Unit::Second,
+            "days" | "day" => Unit::Day,
             "µs" | "μs" => Unit::Microsecond,
             "Nm" | "N·m" | "N*m" | "N-m" | "N m" => Unit::NewtonMetre,
             "Ncm" | "N·cm" => Unit::NewtonCentimetre,

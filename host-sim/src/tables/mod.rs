@@ -16,6 +16,7 @@ mod source_files;
 pub(crate) mod sweep;
 pub(crate) mod torque_nodes;
 pub(crate) mod turns;
+mod turns_off;
 pub(crate) mod validate;
 
 pub use info::{MadeTable, Source, TableInfo, TurnsAtTorque, TurnsInfo};
@@ -31,6 +32,7 @@ pub use source_files::{c_header, rust_source};
 pub use sweep::{SweepError, SweepPlan, SweepProgress, symmetric_nodes};
 pub use torque_nodes::NodeChoice;
 pub(crate) use torque_nodes::{accepted, refined};
+pub use turns_off::TurnsOff;
 pub use validate::{ValidateError, Validation, ValidationSettings, validate};
 
 use flexspline::Table;

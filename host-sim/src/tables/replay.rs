@@ -10,9 +10,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use thiserror::Error;
 
+use super::turns_off::{TurnsOff, about_mean, turns_off};
 use super::validate::generator_of;
-use crate::measurement::{CsvRows, NotANumber, TableProblem};
-use crate::suggest::question;
+use crate::measurement::{MeasuredError, plain_rows};
 use crate::units::ARCSEC_PER_RAD;
 
 /// A measured row.
@@ -70,6 +70,8 @@ pub struct ReplaySummary {
     pub mean_residual_arcsec: f64,
     /// Rows by quality: in range, uncertain, extrapolated, disabled.
     pub rows_by_quality: [usize; 4],
+    /// Whole turns of the motor by which the generator zero of the rows is off the table's, where the rows show that.
+    pub generator_zero_off: Option<TurnsOff>,
     /// Whose rows they are, where that is known.
     pub rows_of: Option<RowsOf>,
     /// What has to be known of them: that they are another drive's, or nobody's.
@@ -136,7 +138,22 @@ impl ReplaySummary {
             None => vec![OF_NOBODY.to_owned()],
             Some(rows) => rows.check(table).err().iter().map(ToString::to_string).collect(),
         };
+        self.remarks.extend(self.of_gain());
         self.rows_of = rows_of;
+    }
+
+    /// What has to be said where the table gains less than it could, or nothing.
+    fn of_gain(&self) -> Option<String> {
+        let (measured, left) = (self.rms_measured_arcsec, self.rms_residual_arcsec);
+        if let Some(off) = &self.generator_zero_off {
+            return Some(off.text(left));
+        }
+        (left > measured).then(|| {
+            format!(
+                "the table leaves {left:.1} arcsec rms where the rows have {measured:.1} without it: it gains nothing here, and no whole turns of the \
+                 motor change that; is it the table of this unit, and its generator zero that of the rows?"
+            )
+        })
     }
 }
 
@@ -167,58 +184,21 @@ pub struct MeasurementError {
 
 /// Reads measured rows; `temperature_c` stands where the file has no such column.
 pub fn parse(file: &str, bytes: &[u8], ratio: f64, temperature_c: f64) -> Result<Vec<MeasuredRow>, MeasurementError> {
-    let refuse = |TableProblem { line, what }| MeasurementError { file: file.to_owned(), line, what };
-    let mut rows = CsvRows::new(bytes).map_err(refuse)?;
-    let column = |name: &str| rows.find(name).map_err(refuse);
-    let generator = rows.need("generator_rad").map_err(refuse)?;
-    let output = column("output_rad")?;
-    let error = column("error_arcsec")?;
-    if output.or(error).is_none() {
-        let like = rows.like("output_rad").or_else(|| rows.like("error_arcsec"));
-        let hint = like.map_or_else(String::new, |name| format!("; {}", question(name)));
-        let what = format!("neither column output_rad nor error_arcsec is there; one is needed{hint}");
-        return Err(refuse(rows.header_problem(what)));
-    }
-    // One that was meant but misspelt would silently not act.
-    for wanted in ["torque_n_m", "temperature_c"] {
-        if let (None, Some(like)) = (column(wanted)?, rows.like(wanted)) {
-            let what = format!("column {like} is not read; {} Rename it, or take it out", question(wanted));
-            return Err(refuse(rows.header_problem(what)));
-        }
-    }
-    let (torque, temperature) = (column("torque_n_m")?, column("temperature_c")?);
-    let header = rows.header().to_vec();
-    let mut measured = Vec::new();
-    while let Some(row) = rows.next_row().map_err(refuse)? {
-        let number = |place: usize| -> Result<f64, MeasurementError> {
-            let name = &header[place];
-            let what = match row.number(place) {
-                Ok(value) if value.is_finite() && value.abs() < 1e9 => return Ok(value),
-                Err(NotANumber::Absent(fields)) => format!("{name} is missing: {fields} fields"),
-                _ => {
-                    let text = row.text(place).unwrap_or_default();
-                    format!("{name}: found \"{text}\", allowed: a finite number below 1e9")
-                }
-            };
-            Err(refuse(TableProblem { line: row.line, what }))
-        };
-        let generator_rad = number(generator)?;
-        let error_arcsec = match (output, error) {
-            (Some(output), _) => (number(output)? - generator_rad / ratio) * ARCSEC_PER_RAD,
-            (None, Some(error)) => number(error)?,
-            (None, None) => 0.0,
-        };
-        measured.push(MeasuredRow {
-            generator_rad,
-            error_arcsec,
-            torque_n_m: torque.map_or(Ok(0.0), number)?,
-            temperature_c: temperature.map_or(Ok(temperature_c), number)?,
-        });
-    }
-    if measured.is_empty() {
-        return Err(refuse(rows.header_problem("no rows after the header".to_owned())));
-    }
-    Ok(measured)
+    let refuse = |error: MeasuredError| MeasurementError {
+        file: file.to_owned(),
+        line: error.line.unwrap_or(1),
+        what: error.what,
+    };
+    let rows = plain_rows(file, bytes, ratio).map_err(refuse)?;
+    let at = |values: &Option<Vec<f64>>, row: usize, usual: f64| values.as_ref().map_or(usual, |values| values[row]);
+    Ok((0..rows.generator_rad.len())
+        .map(|row| MeasuredRow {
+            generator_rad: rows.generator_rad[row],
+            error_arcsec: rows.error_rad[row] * ARCSEC_PER_RAD,
+            torque_n_m: at(&rows.torque_n_m, row, 0.0),
+            temperature_c: at(&rows.temperature_c, row, temperature_c),
+        })
+        .collect())
 }
 
 /// Runs the core over the rows, from a state it does not know.
@@ -250,14 +230,10 @@ pub fn replay(table: &Table<'_>, rows: &[MeasuredRow]) -> (Vec<ReplayedRow>, Rep
             }
         })
         .collect();
+    let about = |value: fn(&ReplayedRow) -> f64| about_mean(&replayed.iter().map(value).collect::<Vec<_>>());
     let count = replayed.len().max(1) as f64;
-    let mean = |value: fn(&ReplayedRow) -> f64| replayed.iter().map(value).sum::<f64>() / count;
-    let about = |value: fn(&ReplayedRow) -> f64| {
-        let mean = mean(value);
-        (replayed.iter().map(|row| (value(row) - mean).powi(2)).sum::<f64>() / count).sqrt()
-    };
-    let mean_residual = mean(|row| row.residual_arcsec);
-    let summary = ReplaySummary {
+    let mean_residual = replayed.iter().map(|row| row.residual_arcsec).sum::<f64>() / count;
+    let mut summary = ReplaySummary {
         schema_version: 1,
         status: if by_quality[2] + by_quality[3] == 0 { "in range" } else { "extrapolated" },
         table_id: table.id().to_string(),
@@ -269,10 +245,12 @@ pub fn replay(table: &Table<'_>, rows: &[MeasuredRow]) -> (Vec<ReplayedRow>, Rep
             .fold(0.0, |m, row| f64::max(m, (row.residual_arcsec - mean_residual).abs())),
         mean_residual_arcsec: mean_residual,
         rows_by_quality: by_quality,
+        generator_zero_off: turns_off(table, rows),
         rows_of: None,
-        remarks: vec![OF_NOBODY.to_owned()],
+        remarks: Vec::new(),
         command: String::new(),
     };
+    summary.of_rows(None, table);
     (replayed, summary)
 }
 
@@ -315,9 +293,9 @@ mod tests {
             ("generator_rad,torque_n_m\n1,2\n", "neither column output_rad nor error_arcsec"),
             ("generator_rad,generator_rad,output_rad\n1,1,1\n", "generator_rad is there twice"),
             ("generator_rad,output_rad\n", "no rows"),
-            ("generator_rad,output_rad\n1\n", "output_rad is missing: 1 fields"),
+            ("generator_rad,output_rad\n1\n", "no rows after the header"),
             ("generator_rad,output_rad\n1,abc\n", "output_rad: found \"abc\""),
-            ("generator_rad,output_rad\n1,nan\n", "output_rad: found \"nan\""),
+            ("generator_rad,output_rad\n1,nan\n", "output_rad: nothing is recorded"),
             ("generator_rad,output_rad\n1e12,0\n", "generator_rad: found \"1e12\""),
         ] {
             let error = parse("m.csv", text.as_bytes(), 95.0, 20.0).unwrap_err().to_string();

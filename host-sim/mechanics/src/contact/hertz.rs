@@ -18,6 +18,8 @@
 const FOUNDATION: f64 = 8.0 / (3.0 * std::f64::consts::PI);
 /// Halvings of the interval of a level: to round-off.
 const HALVINGS: usize = 60;
+/// Doublings of the first guess of a level, which is that of a flat gap, a factor of four from that of a wedge.
+const MOST_DOUBLINGS: usize = 64;
 
 /// Gap of two flanks at a place along them, mm, and the force that they bear with there, N/mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,7 +86,10 @@ fn peak_of_one(places: &[Place], force: f64, modulus_mpa: f64) -> f64 {
     };
     // A flat gap bears with 2 c E* L, a parabola with two thirds of that, a wedge with half.
     let (mut low, mut high) = (0.0, 2.0 * force / (FOUNDATION * modulus_mpa));
-    while borne(high) < force && high.is_finite() && high > 0.0 {
+    for _ in 0..MOST_DOUBLINGS {
+        if !(borne(high) < force && high.is_finite() && high > 0.0) {
+            break;
+        }
         high *= 2.0;
     }
     for _ in 0..HALVINGS {

@@ -81,6 +81,10 @@ const RECALL_GAIN: f64 = 0.3;
 const KEEP_BELOW: f64 = 0.1;
 /// Layouts of the contact in one increment.
 const MOST_LAYOUTS: usize = 3;
+/// Halvings of a step along which forces turn round: it is taken then as it is.
+const MOST_TRIALS: usize = 10;
+/// Parts of one increment at most. *Guess*: a load of 100 kN m that comes on without a single easy part has 1000.
+const MOST_PARTS: usize = 10_000;
 /// Stiffness (N mm/mm per rad) of an output that nothing holds and nothing turns, so that the wheels have a step. Of any size: no torque acts on it.
 const HOLDS_A_FREE_OUTPUT: f64 = 1.0;
 /// Why Newton finds no place for an output that nothing holds.
@@ -285,7 +289,7 @@ impl<'p> Solver<'p> {
         // A load that comes on from nothing is best brought on in a few steps.
         let first = if load.abs() > LARGEST_LOAD_STEP { LARGEST_LOAD_STEP / load.abs() } else { 1.0 };
         let (mut done, mut part, mut halvings) = (0.0_f64, first, 0_usize);
-        loop {
+        for _ in 0..MOST_PARTS {
             let to = (done + part).min(1.0);
             match self.solve_part(&state, from.generator_rad + turn * to, from.torque_n_m + load * to) {
                 Ok((next, mut increment)) => {
@@ -313,6 +317,14 @@ impl<'p> Solver<'p> {
                 Err(error) => return Err(beyond(error, &state)),
             }
         }
+        let reason = "the increment falls into too many parts";
+        Err(SolveError::NotConverged {
+            generator_rad,
+            torque_n_m,
+            reached_n_m: state.torque_n_m,
+            reason,
+            history: Vec::new(),
+        })
     }
 
     /// Turns the generator on, by whole flexspline pitches and under the same load, to a place where an imperfect drive stands
@@ -499,7 +511,7 @@ impl<'p> Solver<'p> {
             let motion = self.motion(&step);
             near.advance(length * motion);
             let mut mistaken = false;
-            for trial in 0.. {
+            for trial in 0..=MOST_TRIALS {
                 // Teeth that come near from here on need their flanks in this state, too: the next candidate starts from it.
                 if near.must_search() {
                     self.wheels.complete(&mut state);
@@ -509,7 +521,7 @@ impl<'p> Solver<'p> {
                 residual = self.assemble(&mut candidate, from, torque_n_m, &mut near);
                 let may_return = if history.len() > GOES_ROUND_AFTER { RETURNS_LITTLE } else { RETURNS };
                 let overshoot = before > 0.0 && step.work(&residual) < -may_return * before;
-                if !overshoot || relative < ROUND_OFF || trial == 10 {
+                if !overshoot || relative < ROUND_OFF || trial == MOST_TRIALS {
                     state = candidate;
                     break;
                 }

@@ -30,6 +30,8 @@ const BETWEEN_LINES: usize = 1;
 const FIRST: f64 = 0.4;
 const GROWTH: f64 = 1.6;
 const LONGEST: f64 = 0.25;
+/// Elements along half a tube: a tube of 250 radii has 1000.
+const MOST_ELEMENTS: usize = 1000;
 /// Lines under the generator.
 const LINES: usize = 5;
 
@@ -299,7 +301,10 @@ fn even(from: f64, to: f64, parts: usize) -> Vec<f64> {
 fn graded(from: f64, to: f64, decay: f64, radius: f64) -> Vec<f64> {
     let length = to - from;
     let (mut steps, mut covered, mut step) = (Vec::new(), 0.0, FIRST * decay);
-    while covered + step < 0.5 * length {
+    for _ in 0..MOST_ELEMENTS {
+        if covered + step >= 0.5 * length {
+            break;
+        }
         steps.push(step);
         covered += step;
         step = (step * GROWTH).min(LONGEST * radius);

@@ -23,6 +23,8 @@ const DAY_S: f64 = 86_164.090_5;
 const CIRCLE: f64 = 1_296_000.0;
 /// Default of `MAX_RATEADJUST`, arcsec/s.
 const MOST_RATE: f64 = 3.0;
+/// Ticks of an output turn at most: at the lowest rate there are 107 634.
+const MOST_TICKS: u32 = 110_000;
 /// Worm periods that are taken, s: VB integers hold the upper one, and below the lower nothing is resolved (a guess).
 const PERIODS: std::ops::RangeInclusive<u32> = 30..=32_000;
 /// Where in its second the first tick of a playback lies.
@@ -187,7 +189,7 @@ impl Playback {
         let mut index = self.place(0, motor(led));
         let mut since = 0;
         let mut knots = vec![[led, 0.0]];
-        for tick in 1.. {
+        for tick in 1..=MOST_TICKS {
             let rate = self.rates[index].clamp(SIDEREAL - MOST_RATE, SIDEREAL + MOST_RATE);
             led += rate;
             knots.push([led, led - start - SIDEREAL * f64::from(tick)]);

@@ -125,6 +125,10 @@ impl OnStepX {
     }
 }
 
+/// Knots of a playback at most: it has one for each of the 86 164 sidereal seconds of an output turn, and one for each turn of the generator, which
+/// takes 61 s or more. The entries of a turn add up to nothing, so that the mean rate is the sidereal one.
+const MOST_KNOTS: usize = 200_000;
+
 /// Plays the buffer for an output turn of tracking: where the motor is and what was added, rad, at each change.
 fn play(timing: &Timing, buffer: &[i8], steps_a_rad: f64) -> Vec<[f64; 2]> {
     let most = timing.rate.round() as i32;
@@ -137,7 +141,10 @@ fn play(timing: &Timing, buffer: &[i8], steps_a_rad: f64) -> Vec<[f64; 2]> {
     let mut index = 0;
     let mut rate = rate_of(index);
     let mut knots = vec![[0.0, 0.0]];
-    while motor < end {
+    for _ in 0..MOST_KNOTS {
+        if motor >= end {
+            break;
+        }
         let speed = timing.rate + rate;
         let wrap = time + (f64::from(wraps) * f64::from(timing.worm_steps) - motor) / speed;
         let second = began + 1.0;

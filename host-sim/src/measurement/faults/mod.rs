@@ -12,7 +12,8 @@
 //! | rows out of order or repeated | rows left out |
 //! | clock set back | new session |
 //! | clock too coarse, stamps that jitter while the motion does not | rows spaced evenly |
-//! | a unit, sign or exchange of columns that the ratio, a wrap or a limit gives away | converted |
+//! | a unit, sign or exchange of the angles that the ratio or a turn proves | converted |
+//! | a torque or a temperature that cannot be in the unit given | left out, with the units that it may be in |
 //! | output or generator frozen | rows left out |
 //! | torque frozen | rows left out, or channel |
 //! | torque repeated, one value in so many rows | a straight line between the new ones |

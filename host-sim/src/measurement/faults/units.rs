@@ -1,7 +1,11 @@
 //! Units, signs and columns taken for others.
+//!
+//! An angle is converted where something proves its unit: the ratio, which is the user's word, or the turn after which a column begins anew.
+//! A torque or a temperature that cannot be in the unit given is in another one, but its size does not say in which: it is left out, with the
+//! units that it may have and how to say them.
 
 use super::{Findings, span};
-use crate::measurement::columns::{Column, Quantity, Unit};
+use crate::measurement::columns::{Column, Quantity, Reading, Unit};
 use crate::measurement::fault::{Fault, FaultName, Treatment};
 use crate::measurement::gear::Gear;
 use crate::measurement::log::Log;
@@ -21,7 +25,7 @@ const TELLS_WHEELS_APART_RAD: f64 = 0.2;
 const OTHER_WHEEL: f64 = 1e-3;
 /// Errors that spread by more (robust, 10°) or less (a thousandth of an arc-second) are not errors of a drive in the unit given.
 const SPREADS_RAD: [f64; 2] = [0.174_5, 1e-3 / 206_265.0];
-/// Temperatures at which a drive exists, °C; kelvins taken for them lie beyond.
+/// Temperatures at which a drive exists, °C.
 const TEMPERATURES_C: [f64; 2] = [-180.0, 180.0];
 
 /// Finds and repairs units; an error says what cannot be told.
@@ -31,8 +35,8 @@ pub(in crate::measurement) fn check(
     gear: &Gear,
     findings: &mut Findings,
 ) -> Result<(), String> {
-    torque(log, gear, findings)?;
-    temperature(log, findings);
+    torque(log, columns, gear, findings)?;
+    temperature(log, columns, findings);
     if log.output_or_error() == Quantity::Output {
         ratio(log, columns, gear, findings)
     } else {
@@ -61,43 +65,65 @@ fn unit(columns: &[Column], quantity: Quantity) -> Unit {
     columns.iter().find(|column| column.quantity == quantity).map_or(quantity.default_column().1, |column| column.unit)
 }
 
-fn torque(log: &mut Log, gear: &Gear, findings: &mut Findings) -> Result<(), String> {
+/// Units that have no gain to be said, in which a value of `unit` lies within `allowed`, with the value there.
+fn may_be(value: f64, unit: Unit, units: &[Unit], allowed: impl Fn(f64) -> bool) -> Vec<(Unit, f64)> {
+    let number = (value - unit.zero()) / unit.factor();
+    let plain = units.iter().filter(|other| !matches!(other, Unit::Ampere | Unit::Milliampere | Unit::Volt));
+    plain.map(|other| (*other, Reading::of(*other).value(number))).filter(|(_, value)| allowed(*value)).collect()
+}
+
+/// How to say a unit that a column may have.
+fn say_it(quantity: Quantity, column: &str, may_be: &[(Unit, f64)], inside: &str) -> String {
+    let read: Vec<String> = may_be.iter().map(|(unit, value)| format!("{unit} ({value:.4} {inside})")).collect();
+    let first = may_be.first().map_or("UNIT", |(unit, _)| unit.name());
+    format!("its size does not say in which; it may be in {}: --columns {quantity}={column}:{first}", read.join(" or "))
+}
+
+/// A torque beyond what a drive bears is in another unit, and is not used.
+fn torque(log: &mut Log, columns: &[Column], gear: &Gear, findings: &mut Findings) -> Result<(), String> {
     let limit = gear.largest_torque_n_m;
-    let Some(values) = log.get_mut(Quantity::Torque) else { return Ok(()) };
+    let Some(values) = log.get(Quantity::Torque) else { return Ok(()) };
     let mut sizes: Vec<f64> = sampled(values).into_iter().filter(|t| t.is_finite()).map(f64::abs).collect();
     let size = quantile_of(&mut sizes, 0.95);
     if size <= limit {
         return Ok(());
     }
-    if size * 1e-3 > limit {
+    let units = may_be(size, unit(columns, Quantity::Torque), Quantity::Torque.units(), |torque| torque <= limit);
+    if units.is_empty() {
         return Err(format!("torque: found {size:e} N.m in a twentieth of the rows, allowed: at most {limit:e} N.m"));
     }
-    values.iter_mut().for_each(|t| *t *= 1e-3);
-    let mut fault = span(log, FaultName::UnitMismatch, 0, log.len() - 1);
-    (fault.channel, fault.treatment) = (Some(Quantity::Torque), Treatment::Repaired);
-    fault.what = format!("torque of {size:.0} N.m, where {limit:.0} N.m is the most: it is read in mN.m");
-    findings.faults.push(fault);
+    let say_it = say_it(Quantity::Torque, name(columns, Quantity::Torque), &units, "N.m");
+    let what = format!(
+        "torque of {size:.0} N.m, where {limit:.0} N.m is the most: it is in another unit, and is not used; {say_it}"
+    );
+    leave_out(log, Quantity::Torque, what, findings);
     Ok(())
 }
 
-fn temperature(log: &mut Log, findings: &mut Findings) {
-    let Some(values) = log.get_mut(Quantity::Temperature) else { return };
+/// A temperature at which no drive exists is in another unit, and is not used.
+fn temperature(log: &mut Log, columns: &[Column], findings: &mut Findings) {
+    let Some(values) = log.get(Quantity::Temperature) else { return };
     let mut some: Vec<f64> = sampled(values).into_iter().filter(|t| t.is_finite()).collect();
     let median = median_of(&mut some);
-    if (TEMPERATURES_C[0]..=TEMPERATURES_C[1]).contains(&median) {
+    let exists = |celsius: f64| (TEMPERATURES_C[0]..=TEMPERATURES_C[1]).contains(&celsius);
+    if exists(median) {
         return;
     }
-    let kelvin = (TEMPERATURES_C[0] + 273.15..=TEMPERATURES_C[1] + 273.15).contains(&median);
-    if kelvin {
-        values.iter_mut().for_each(|t| *t -= 273.15);
+    let units = may_be(median, unit(columns, Quantity::Temperature), Quantity::Temperature.units(), exists);
+    let say_it = if units.is_empty() {
+        String::new()
     } else {
-        log.take(Quantity::Temperature);
-    }
+        format!("; {}", say_it(Quantity::Temperature, name(columns, Quantity::Temperature), &units, "C"))
+    };
+    let what = format!("a temperature of {median:.1} degrees C is not plausible: it is not used{say_it}");
+    leave_out(log, Quantity::Temperature, what, findings);
+}
+
+/// Leaves out a column that is in another unit than the one given.
+fn leave_out(log: &mut Log, quantity: Quantity, what: String, findings: &mut Findings) {
+    log.take(quantity);
     let mut fault = span(log, FaultName::UnitMismatch, 0, log.len() - 1);
-    fault.channel = Some(Quantity::Temperature);
-    fault.treatment = if kelvin { Treatment::Repaired } else { Treatment::Masked };
-    let done = if kelvin { "it is read in kelvin" } else { "it is not used" };
-    fault.what = format!("a temperature of {median:.1} degrees C is not plausible: {done}");
+    (fault.channel, fault.treatment, fault.what) = (Some(quantity), Treatment::Masked, what);
     findings.faults.push(fault);
 }
 
@@ -196,23 +222,36 @@ fn ratio(log: &mut Log, columns: &[Column], gear: &Gear, findings: &mut Findings
         }
         return Ok(());
     }
-    // One column in a unit other than the one given.
+    // One column in a unit other than the one given: proved by the ratio if one reading alone gives it.
+    let mut fits: Vec<(Quantity, Unit, f64)> = Vec::new();
     for channel in [Quantity::Generator, Quantity::Output] {
         let given = unit(columns, channel);
         for candidate in Unit::ANGLES.into_iter().filter(|candidate| *candidate != given) {
             let scale = candidate.factor() / given.factor();
-            let gives = if channel == Quantity::Generator { scale } else { scale.recip() };
-            if near(gives) {
-                fault.channel = Some(channel);
-                let column = name(columns, channel);
-                fault.what = format!("{seen}: {column} is in {candidate}, not in {given}, and was converted");
-                findings.faults.push(fault);
-                if let Some(values) = log.get_mut(channel) {
-                    values.iter_mut().for_each(|angle| *angle *= scale);
-                }
-                return Ok(());
+            if near(if channel == Quantity::Generator { scale } else { scale.recip() }) {
+                fits.push((channel, candidate, scale));
             }
         }
+    }
+    match fits[..] {
+        [(channel, candidate, scale)] => {
+            fault.channel = Some(channel);
+            let (column, given) = (name(columns, channel), unit(columns, channel));
+            fault.what = format!("{seen}: {column} is in {candidate}, not in {given}, and was converted");
+            findings.faults.push(fault);
+            if let Some(values) = log.get_mut(channel) {
+                values.iter_mut().for_each(|angle| *angle *= scale);
+            }
+            return Ok(());
+        }
+        [_, _, ..] => {
+            let say = fits.iter().map(|(channel, unit, _)| format!("{channel}={}:{unit}", name(columns, *channel)));
+            let say = say.collect::<Vec<_>>().join(", or ");
+            return Err(format!(
+                "{seen}: one of the two is in another unit, and the ratio does not say which; allowed: --columns {say}"
+            ));
+        }
+        [] => {}
     }
     // Clearance and wind-up of a small motion change the ratio by more than units are apart; none of them is what was found.
     if (RATIO_ERROR[0]..=RATIO_ERROR[1]).contains(&exchanged) {
@@ -276,6 +315,81 @@ fn error_size(log: &Log, columns: &[Column]) -> Result<(), String> {
 #[cfg(test)]
 mod tests {
     use super::typical_slope;
+    use crate::measurement::{ColumnMap, FaultName, Gear, Quantity, Recording, Treatment, parse};
+
+    /// A drive of ratio 50 to and fro under a load in N·m at a temperature in °C, each times and plus something; angles in radians times some number.
+    fn read(columns: &str, torque: f64, celsius: f64, angles: [f64; 2]) -> Result<Recording, String> {
+        let mut text = "time_s,generator_rad,output_rad,torque_n_m,temperature_c\n".to_owned();
+        for k in 0..1200 {
+            let x = f64::from(k);
+            let psi = 40.0 * (0.01 * x).sin();
+            let load = 30.0 * (0.004 * x).sin();
+            let output = psi / 50.0 + load / 3e4 + 2e-5 * (2.0 * psi).sin();
+            let fields =
+                [0.01 * x, angles[0] * psi, angles[1] * output, torque * load, 21.0 + 0.3 * (0.01 * x).sin() + celsius];
+            text += &(fields.map(|field| format!("{field:.9}")).join(",") + "\n");
+        }
+        let map = if columns.is_empty() { ColumnMap::default() } else { ColumnMap::parse(columns).unwrap() };
+        parse("m.csv", text.as_bytes(), &map, &Gear::of_ratio(50.0)).map_err(|error| error.to_string())
+    }
+
+    /// The channel of the unit fault, what was done, and what is said.
+    fn unit_fault(recording: &Recording) -> Option<(Option<Quantity>, Treatment, &str)> {
+        let fault = recording.faults.iter().find(|fault| fault.name == FaultName::UnitMismatch)?;
+        Some((fault.channel, fault.treatment, fault.what.as_str()))
+    }
+
+    #[test]
+    fn a_torque_is_converted_on_the_word_of_the_user_alone() {
+        // 30 N·m in mN·m and in N·cm of a very large drive: beyond what any drive bears, and not used.
+        for (scale, units) in [(1e3, "mN.m (30.0000 N.m)"), (2e3, "N.cm (600.0000 N.m)")] {
+            let found = read("", scale, 0.0, [1.0; 2]).unwrap();
+            let (channel, treatment, what) = unit_fault(&found).unwrap();
+            assert_eq!((channel, treatment), (Some(Quantity::Torque), Treatment::Masked));
+            assert!(found.sessions[0].torque_n_m.is_none());
+            assert!(what.contains("--columns torque=torque_n_m:N.cm"), "{what}");
+            assert!(what.contains(units.split_once(' ').unwrap().0), "{what}");
+        }
+        let said = read("torque=torque_n_m:mN.m", 1e3, 0.0, [1.0; 2]).unwrap();
+        assert_eq!(unit_fault(&said), None);
+        let torque = said.sessions[0].torque_n_m.as_ref().unwrap();
+        assert!((torque[392] - 30.0).abs() < 0.01, "{}", torque[392]);
+        // One that a drive may bear stays as it is, however soft the drive then looks.
+        let soft = read("", 0.112_985, 0.0, [1.0; 2]).unwrap();
+        assert_eq!(unit_fault(&soft), None);
+        assert!((soft.sessions[0].torque_n_m.as_ref().unwrap()[392] - 3.389_55).abs() < 1e-3);
+        assert!(read("", 1e7, 0.0, [1.0; 2]).unwrap_err().contains("at most 1e4"));
+    }
+
+    #[test]
+    fn a_temperature_is_converted_on_the_word_of_the_user_alone() {
+        for (off, unit) in [(273.15, ":K"), (600.0, "")] {
+            let found = read("", 1.0, off, [1.0; 2]).unwrap();
+            let (channel, treatment, what) = unit_fault(&found).unwrap();
+            assert_eq!((channel, treatment), (Some(Quantity::Temperature), Treatment::Masked));
+            assert!(found.sessions[0].temperature_c.is_none());
+            assert!(what.contains("is not used") && what.contains("temperature_c:K") == (unit == ":K"), "{what}");
+        }
+        let said = read("temperature=temperature_c:K", 1.0, 273.15, [1.0; 2]).unwrap();
+        assert_eq!(unit_fault(&said), None);
+        assert!((said.sessions[0].temperature_c.as_ref().unwrap()[0] - 21.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn an_angle_is_converted_where_the_ratio_proves_its_unit_alone() {
+        let deg = 1f64.to_degrees();
+        let found = read("", 1.0, 0.0, [deg, 1.0]).unwrap();
+        assert!(matches!(unit_fault(&found), Some((Some(Quantity::Generator), Treatment::Repaired, _))));
+        // Both are in degrees, one is said to be in radians; or both are in radians, and one is said to be in degrees: no ratio tells.
+        for (angles, columns) in [
+            ([deg; 2], "generator=generator_rad:rad,output=output_rad:deg"),
+            ([1.0; 2], "generator=generator_rad:deg,output=output_rad:rad"),
+        ] {
+            let said = read(columns, 1.0, 0.0, angles).unwrap_err();
+            assert!(said.contains("does not say which") && said.contains("generator=generator_rad:"), "{said}");
+            assert!(said.contains("or output=output_rad:"), "{said}");
+        }
+    }
 
     #[test]
     fn one_leap_of_a_generator_that_froze_does_not_change_the_ratio() {

@@ -7,15 +7,14 @@ use crate::measurement::columns::{Column, Quantity, Unit};
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::log::Log;
 use crate::measurement::robust::{least_and_most, quantile_of};
+use crate::measurement::rollover::{COVERED, LEAPS, UNAMBIGUOUS, stays_within};
 
-/// A column that stays within one turn, and begins anew, covers at least this share of the turn.
-const COVERED: f64 = 0.75;
 /// Share of what an exchange of the two columns gives that tells one.
 const EXCHANGED: f64 = 0.75;
 /// Times it must begin anew before a unit other than the one given is believed.
 const OFTEN: usize = 3;
-/// Steps up to this share of a turn are told from a wrap without help.
-const UNAMBIGUOUS: f64 = 0.4;
+/// A unit other than the one given is believed of a column that covers this share of its turn.
+const COVERED_BY_ANOTHER: f64 = 0.98;
 /// A step that differs from the one before by less than this share of a turn goes on as it did; where files are joined without a time
 /// between them, it does not.
 const GOES_ON: f64 = 0.25;
@@ -77,23 +76,17 @@ fn span_of(values: &[f64]) -> f64 {
 fn wrapped_at(values: &[f64], unit: Unit, travel_rad: f64, log: &Log) -> Option<Unit> {
     let range = span_of(values);
     let again = |turn: f64| {
-        (1..values.len())
-            .filter(|row| log.continues(*row))
-            .filter(|row| (values[*row] - values[*row - 1]).abs() > 0.6 * turn)
-            .take(OFTEN)
-            .count()
+        let leaps = (1..values.len()).filter(|row| (values[*row] - values[*row - 1]).abs() > LEAPS * turn);
+        leaps.filter(|row| log.continues(*row)).take(OFTEN).count()
     };
-    let fits = |candidate: &Unit, covered: f64| {
-        let turn = TAU / candidate.factor() * unit.factor();
-        range <= turn * (1.0 + 1e-6) && range >= covered * turn
-    };
-    if fits(&unit, COVERED) && (again(TAU) > 0 || travel_rad > 1.5 * TAU) {
+    let turn_of = |candidate: Unit| TAU / candidate.factor() * unit.factor();
+    if stays_within(range, turn_of(unit), COVERED) && (again(TAU) > 0 || travel_rad > 1.5 * TAU) {
         return Some(unit);
     }
     let others = Unit::ANGLES.into_iter().filter(|candidate| *candidate != unit);
     others
         .into_iter()
-        .find(|candidate| fits(candidate, 0.98) && again(TAU / candidate.factor() * unit.factor()) >= OFTEN)
+        .find(|other| stays_within(range, turn_of(*other), COVERED_BY_ANOTHER) && again(turn_of(*other)) >= OFTEN)
 }
 
 /// Makes `values` continuous. `output`, if given, is continuous and turns `ratio` times slower; it counts turns where one row is

@@ -858,6 +858,7 @@ mod tests {
             ratio_proposed: None,
             experiment_for_asked: None,
             zeros: Vec::new(),
+            set_aside: None,
             trace: Trace::default(),
         }
     }

@@ -1,7 +1,7 @@
 //! Channels that were recorded more slowly than the angles: one value in so many rows, nothing between.
 
-use super::columns::Quantity;
-use super::log::Log;
+use super::super::columns::Quantity;
+use super::super::log::Log;
 
 /// Share of the distances between values that are the usual one (one row more or less), at least: a slower clock, not holes.
 const REGULAR: f64 = 0.9;
@@ -9,7 +9,7 @@ const REGULAR: f64 = 0.9;
 const FEWEST: usize = 8;
 
 /// Fills the rows between the values of slower channels by straight lines.
-pub(super) fn fill(log: &mut Log, notes: &mut Vec<String>) {
+pub fn fill(log: &mut Log, notes: &mut Vec<String>) {
     for channel in [Quantity::Torque, Quantity::Temperature, Quantity::Orientation] {
         let Some(values) = log.get_mut(channel) else { continue };
         let Some(every) = rhythm(values) else { continue };

@@ -1,0 +1,244 @@
+//! Units of angles that a file does not say: counts of a turn by another column, and by the ratio that wheels can have.
+
+use std::f64::consts::TAU;
+
+use super::relation::{RATIOS, counts_of_a_turn, slope};
+use super::{Guess, Role};
+use crate::measurement::{Unit, registers};
+
+/// A ratio this close to a half is taken for one: a guess.
+const CLOSE_TO_HALF: f64 = 0.1;
+/// A ratio is whole to this: clearance and the error of the ratio that few turns leave. *Guess*.
+const WHOLE: f64 = 0.005;
+/// Ratios of catalogues with the flexspline's wheel fixed; with the other wheel fixed they are one larger. *Source*: the series CSF, CSG and
+/// SHF of Harmonic Drive.
+const CATALOGUE: [f64; 6] = [30.0, 50.0, 80.0, 100.0, 120.0, 160.0];
+/// Counts of a turn that are tried, powers of two.
+const POWERS: std::ops::RangeInclusive<i32> = 6..=28;
+
+/// The ratio that wheels can have: a whole number, or a half that the rows are close to.
+pub(super) fn proposed_ratio(found: f64) -> f64 {
+    let half = found.floor() + 0.5;
+    if (found - half).abs() < CLOSE_TO_HALF { half } else { found.round() }
+}
+
+/// Counts of a turn, where another column shows the same shaft in a unit of angle.
+pub(super) fn units_of_counts(guesses: &mut [Guess]) {
+    let counts: Vec<usize> = (0..guesses.len())
+        .filter(|k| guesses[*k].unit == Some(Unit::Count) && guesses[*k].counts.is_none() && guesses[*k].moves())
+        .collect();
+    for k in counts {
+        let others: Vec<usize> = (0..guesses.len())
+            .filter(|j| {
+                *j != k && guesses[*j].moves() && guesses[*j].unit != Some(Unit::Count) && !guesses[*j].facts.whole
+            })
+            .filter(|j| !matches!(guesses[*j].role, Role::Time | Role::Speed | Role::Torque | Role::Current))
+            .filter(|j| may_be_one_shaft(&guesses[k], &guesses[*j]))
+            .collect();
+        let mut best: Option<(bool, f64, usize, Unit, f64)> = None;
+        for j in others {
+            let Some(line) = slope(&guesses[k].values, &guesses[j].values).filter(|line| line.left < SAME_SHAFT) else {
+                continue;
+            };
+            let units = guesses[j].unit.map_or(vec![Unit::Radian, Unit::Degree, Unit::Turn], |unit| vec![unit]);
+            for (unit, round) in units.into_iter().flat_map(|unit| [(unit, false), (unit, true)]) {
+                let Some((counts, off)) = counts_of_a_turn(line.slope / unit.factor(), round) else { continue };
+                // A power of two before a round number, then what fits better.
+                if best.is_none_or(|(other, before, ..)| (round, off) < (other, before)) {
+                    best = Some((round, off, j, unit, counts));
+                }
+            }
+        }
+        if let Some((_, _, j, unit, counts)) = best {
+            guesses[k].counts = Some(counts);
+            guesses[k]
+                .why
+                .push(format!("{counts} counts a turn by column {}, which shows the same shaft in {unit}", j + 1));
+            guesses[j].unit = Some(unit);
+            guesses[j].why.push(format!("{unit} by column {}: then a turn has {counts} counts", k + 1));
+        }
+    }
+}
+
+/// Two columns show one shaft if a straight line leaves less than this share of the range.
+const SAME_SHAFT: f64 = 1e-4;
+
+/// Whether names let two columns show one shaft: not those of motor and output, or of two joints.
+fn may_be_one_shaft(a: &Guess, b: &Guess) -> bool {
+    let shafts = [a.role, b.role];
+    let two_shafts = shafts.contains(&Role::Generator) && shafts.contains(&Role::Output);
+    let two_joints = a.said.joint.zip(b.said.joint).is_some_and(|(a, b)| a != b);
+    !two_shafts && !two_joints
+}
+
+/// Whether two columns show one shaft.
+pub(super) fn one_shaft(a: &Guess, b: &Guess) -> bool {
+    may_be_one_shaft(a, b) && slope(&a.values, &b.values).is_some_and(|line| line.left < SAME_SHAFT)
+}
+
+/// The unit of an angle as it may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Reading {
+    /// Unit.
+    pub unit: Unit,
+    /// Counts of a turn, where it is counts and that can be told.
+    pub counts: Option<f64>,
+    /// Where it comes from.
+    pub by: By,
+}
+
+/// Where a unit comes from, the surest first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum By {
+    /// It was known before.
+    Known,
+    /// The number after which the column begins anew.
+    Anew,
+    /// The other encoder has these counts.
+    Other,
+    /// It makes the ratio one of a strain wave gear, and for counts nearly whole.
+    Ratio,
+    /// Nothing: radians, or counts that nobody says.
+    Nothing,
+}
+
+impl Reading {
+    fn rad(&self) -> f64 {
+        match self.unit {
+            Unit::Count => TAU / self.counts.unwrap_or(1.0),
+            unit => unit.factor(),
+        }
+    }
+
+    /// As a mapping takes it.
+    pub fn written(&self) -> Option<String> {
+        match self.unit {
+            Unit::Count => self.counts.map(|counts| format!("count/{counts}")),
+            unit => Some(unit.to_string()),
+        }
+    }
+}
+
+/// Units of generator and output, and the ratio that they give.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Units {
+    pub generator: Reading,
+    pub output: Reading,
+    pub ratio: f64,
+}
+
+impl Units {
+    /// How sure the less sure of the two units is, how usual they are, and how sure the other one is.
+    fn level(&self) -> (By, usize, By) {
+        let by = [self.generator.by, self.output.by];
+        let usual = |unit: Unit| Unit::ANGLES.iter().position(|usual| *usual == unit).unwrap_or(0);
+        (by[0].max(by[1]), usual(self.generator.unit) + usual(self.output.unit), by[0].min(by[1]))
+    }
+
+    /// The surest first; then ratios of catalogues, usual units, and ratios that are nearest to a whole number.
+    fn rank(&self) -> (By, bool, usize, By, f64) {
+        let whole = self.ratio.abs().round();
+        let off = (self.ratio.abs() / whole - 1.0).abs();
+        let listed = CATALOGUE.iter().any(|ratio| whole == *ratio || whole == ratio + 1.0);
+        let (surest, usual, other) = self.level();
+        (surest, !listed, usual, other, off)
+    }
+
+    /// Whether it is as likely as another reading, for all that the file says.
+    pub fn rivals(&self, other: &Units) -> bool {
+        self.level() == other.level() && [self.generator, self.output].iter().any(|reading| reading.by == By::Ratio)
+    }
+}
+
+/// The units that two columns may have as generator and output, the likeliest first; `raw` is the change of the generator's number for one
+/// of the output's. None if no unit makes it the ratio of a strain wave gear.
+pub(super) fn units_of_pair(generator: &Guess, output: &Guess, raw: f64) -> Vec<Units> {
+    let within = |ratio: f64| (RATIOS[0]..=RATIOS[1]).contains(&ratio.abs());
+    let nameless = |guess: &Guess| guess.rad().is_none();
+    if nameless(generator) && nameless(output) && generator.unit == output.unit {
+        // The same unit on both sides, as far as can be told; two counters may each begin anew after its turn.
+        let by_turns = (anew(generator), anew(output));
+        let units = match by_turns {
+            (Some(g), Some(o)) => Units { generator: g, output: o, ratio: raw * g.rad() / o.rad() },
+            _ => {
+                let unit = generator.unit.unwrap_or(Unit::Radian);
+                let open = Reading { unit, counts: None, by: By::Nothing };
+                Units { generator: open, output: open, ratio: raw }
+            }
+        };
+        return Some(units).filter(|units| within(units.ratio)).into_iter().collect();
+    }
+    let mut all = Vec::new();
+    for g in readings(generator, output) {
+        for o in readings(output, generator) {
+            let ratio = raw * g.rad() / o.rad();
+            let whole = (ratio - ratio.round()).abs() < WHOLE * ratio.abs();
+            let by_ratio =
+                |reading: &Reading| reading.unit == Unit::Count && matches!(reading.by, By::Ratio | By::Other);
+            if within(ratio) && (whole || !(by_ratio(&g) || by_ratio(&o))) {
+                all.push(Units { generator: g, output: o, ratio });
+            }
+        }
+    }
+    // Of units of angle the first that fits, of counts what is likeliest.
+    all.sort_by(|a, b| a.rank().partial_cmp(&b.rank()).unwrap_or(std::cmp::Ordering::Equal));
+    let mut seen: Vec<Units> = Vec::new();
+    for units in all {
+        if seen.iter().all(|other| other.ratio != units.ratio) {
+            seen.push(units);
+        }
+    }
+    seen
+}
+
+/// Counts of a turn as those after which a register begins anew.
+fn anew(guess: &Guess) -> Option<Reading> {
+    let span = guess.facts.anew.map(|anew| anew.span).filter(|_| guess.unit == Some(Unit::Count))?;
+    registers().any(|register| register == span).then_some(Reading {
+        unit: Unit::Count,
+        counts: Some(span),
+        by: By::Anew,
+    })
+}
+
+/// The units that a column may have beside another one.
+fn readings(guess: &Guess, other: &Guess) -> Vec<Reading> {
+    match (guess.unit, guess.counts) {
+        (Some(Unit::Count), None) => {
+            let beside = other.counts.or_else(|| anew(other).and_then(|reading| reading.counts));
+            let beside = beside.map(|counts| Reading { unit: Unit::Count, counts: Some(counts), by: By::Other });
+            let powers = POWERS.map(|bits| Reading { unit: Unit::Count, counts: Some(2f64.powi(bits)), by: By::Ratio });
+            anew(guess).into_iter().chain(beside).chain(powers).collect()
+        }
+        (Some(unit), counts) => vec![Reading { unit, counts, by: By::Known }],
+        (None, _) => Unit::ANGLES.map(|unit| Reading { unit, counts: None, by: By::Ratio }).to_vec(),
+    }
+}
+
+/// Gives a column of a pair its unit, with why; `place` is its place in the file, from 0.
+pub(super) fn settle(guess: &mut Guess, place: usize, units: &Units, generator: bool, notes: &mut Vec<String>) {
+    let reading = if generator { units.generator } else { units.output };
+    let open = guess.rad().is_none();
+    (guess.unit, guess.counts) = (Some(reading.unit), reading.counts);
+    if !open {
+        return;
+    }
+    let why = match (reading.unit, reading.counts, reading.by) {
+        (Unit::Count, Some(counts), by) => {
+            let why = match by {
+                By::Anew => "after which it begins anew",
+                By::Other => "as the other encoder has",
+                _ => "which makes the ratio nearly whole",
+            };
+            notes.push(format!("column {}: {counts} counts a turn, {why}: check it", place + 1));
+            format!("{counts} counts a turn, {why}")
+        }
+        (Unit::Count, None, _) => {
+            notes.push(format!("how many counts make a turn of column {} is not in the file", place + 1));
+            return;
+        }
+        (unit, _, By::Nothing) => format!("{unit}, for want of a unit"),
+        (unit, ..) => format!("{unit} makes the ratio {:.2}", units.ratio),
+    };
+    guess.why.push(why);
+}

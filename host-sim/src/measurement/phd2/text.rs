@@ -1,0 +1,158 @@
+//! The text of a guide log: what a line says of a section, and the fields of its rows.
+//!
+//! PHD2 writes a point in its numbers, but has written the comma of the system's locale (its issue 453: unquoted, between fields that commas part),
+//! and a spreadsheet that saves a log again writes semicolons or quotes.
+
+/// Columns whose numbers have decimals.
+const DECIMAL: [&str; 8] =
+    ["Time", "dx", "dy", "RARawDistance", "DECRawDistance", "RAGuideDistance", "DECGuideDistance", "SNR"];
+/// What parts the fields of a row.
+const SEPARATORS: [char; 3] = [',', ';', '\t'];
+
+/// A number, with how many decimals it is written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Written {
+    pub value: f64,
+    pub decimals: i32,
+}
+
+/// The number behind `word`, which begins a line or stands behind a comma or a semicolon: `Dec = ` is none in `Cal Dec = 5.0`. Nothing where another
+/// unit than one of `units` follows (`Dec = 6.8"/s` is a rate); no units are any.
+pub(super) fn said(line: &str, word: &str, units: &[&str]) -> Option<Written> {
+    let begins = |at: &usize| {
+        let before = line[..*at].trim_end().chars().next_back();
+        before.is_none_or(|c| SEPARATORS.contains(&c) || c == '"')
+    };
+    let at = line.match_indices(word).map(|(at, _)| at).find(begins)?;
+    let rest = &line[at + word.len()..];
+    let bytes = rest.as_bytes();
+    let digit = |at: usize| bytes.get(at).is_some_and(u8::is_ascii_digit);
+    // A comma with a digit behind it is one of decimals: what parts fields has a blank.
+    let belongs = |at: usize, c: char| {
+        c.is_ascii_digit() || c == '.' || at == 0 && matches!(c, '-' | '+') || c == ',' && digit(at + 1)
+    };
+    let end = rest.char_indices().find(|(at, c)| !belongs(*at, *c)).map_or(rest.len(), |(at, _)| at);
+    let unit = rest[end..].trim_start();
+    if !units.is_empty() && !units.iter().any(|known| unit.starts_with(known)) {
+        return None;
+    }
+    let decimals = rest[..end].find(['.', ',']).map_or(0, |point| end - point - 1);
+    Some(Written { value: number(&rest[..end])?, decimals: decimals as i32 })
+}
+
+/// The word behind `word`.
+pub(super) fn word_of<'l>(line: &'l str, word: &str) -> Option<&'l str> {
+    let rest = &line[line.find(word)? + word.len()..];
+    rest.split([',', ';', '"']).next().map(str::trim)
+}
+
+/// A finite number with a point or a comma before its decimals.
+pub(super) fn number(text: &str) -> Option<f64> {
+    let text = text.trim();
+    let parsed = text.parse::<f64>().or_else(|_| text.replacen(',', ".", 1).parse());
+    parsed.ok().filter(|value| value.is_finite())
+}
+
+/// The names of a table's columns, and what parts its fields.
+#[derive(Clone, Debug)]
+pub(super) struct Header {
+    separator: char,
+    names: Vec<String>,
+}
+
+impl Header {
+    /// Of a line that begins with the column `Frame`.
+    pub fn of(line: &str) -> Option<Header> {
+        let rest = line.trim_start_matches('"').strip_prefix("Frame")?.trim_start_matches('"');
+        let separator = rest.chars().next().filter(|c| SEPARATORS.contains(c))?;
+        Some(Header { separator, names: split(line, separator) })
+    }
+
+    /// Where a column stands.
+    pub fn place(&self, name: &str) -> Option<usize> {
+        self.names.iter().position(|known| known == name)
+    }
+
+    /// The fields of a row, each under its name.
+    pub fn fields(&self, line: &str) -> Vec<String> {
+        let fields = split(line, self.separator);
+        // One more than names says why a star was lost.
+        if self.separator != ',' || fields.len() <= self.names.len() + 1 {
+            return fields;
+        }
+        // Numbers with a comma of their own stand in two fields.
+        let mut joined: Vec<String> = Vec::new();
+        let mut parts = fields.into_iter().peekable();
+        while let Some(part) = parts.next() {
+            let decimal = self.names.get(joined.len()).is_some_and(|name| DECIMAL.contains(&name.as_str()));
+            let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+            let whole = digits(part.trim_start_matches(['-', '+']));
+            match parts.next_if(|next| decimal && whole && digits(next)) {
+                Some(decimals) => joined.push(format!("{part}.{decimals}")),
+                None => joined.push(part),
+            }
+        }
+        joined
+    }
+}
+
+/// The fields of a line, without quotes; what parts them may stand within quotes.
+fn split(line: &str, separator: char) -> Vec<String> {
+    let mut fields = vec![String::new()];
+    let mut quoted = false;
+    for c in line.chars() {
+        if c == '"' {
+            quoted = !quoted;
+        } else if c == separator && !quoted {
+            fields.push(String::new());
+        } else if let Some(field) = fields.last_mut() {
+            field.push(c);
+        }
+    }
+    fields.iter().map(|field| field.trim().to_owned()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_found_behind_the_words_that_mean_them() {
+        let deg = |line: &str| said(line, "Dec = ", &["deg"]).map(|written| written.value);
+        assert_eq!(deg("RA = 5.00 hr, Dec = 69.0 deg, Hour angle = 1.00 hr"), Some(69.0));
+        assert_eq!(deg("Dec = -12.5 deg, Hour angle = -3.84 hr"), Some(-12.5));
+        assert_eq!(deg("RA = 5,00 hr, Dec = 35,25 deg"), Some(35.25));
+        assert_eq!(deg("\"RA = 5.00 hr\";\"Dec = 35.5 deg\""), Some(35.5));
+        for none in [
+            "RA Guide Speed = 7.5 a-s/s, Dec Guide Speed = 7.5 a-s/s, Cal Dec = 20.0 deg, Last Cal Issue = None",
+            "Norm rates RA = 7.0\"/s @ dec 0, Dec = 6.8\"/s; ortho.err. = 11.8 deg",
+            "Mount = mount, Dec = Unknown, Hour angle = Unknown",
+            "Last Cal Dec = 5.0 deg",
+            "",
+        ] {
+            assert_eq!(deg(none), None, "{none}");
+        }
+        let hours = said("Dec = 69,0 deg, Hour angle = -3,84 hr", "Hour angle = ", &["hr"]);
+        assert_eq!(hours, Some(Written { value: -3.84, decimals: 2 }));
+        assert_eq!(said("Hour angle = N/A hr", "Hour angle = ", &["hr"]), None);
+        assert_eq!(said("Pixel scale = 1.50 arc-sec/px, Binning = 1", "Pixel scale = ", &[]).unwrap().value, 1.5);
+        assert_eq!(word_of("Hour angle = 1 hr, Pier side = West, Alt", "Pier side = "), Some("West"));
+    }
+
+    #[test]
+    fn fields_are_parted_whatever_decimals_are_written_with() {
+        let names = "Frame,Time,mount,dx,RARawDistance,RADuration,RADirection,StarMass,SNR,ErrorCode";
+        let plain = ["7", "2.093", "Mount", "-0.5", "0.15", "108", "W", "1702", "28.36", "0"];
+        let header = Header::of(names).unwrap();
+        assert_eq!(header.fields("7,2.093,\"Mount\",-0.5,0.15,108,W,1702,28.36,0"), plain);
+        assert_eq!(header.fields("7,2,093,\"Mount\",-0,5,0,15,108,W,1702,28,36,0"), plain);
+        let quoted = header.fields("7,\"2,093\",Mount,\"-0,5\",\"0,15\",108,W,1702,\"28,36\",0");
+        assert_eq!(quoted.iter().filter_map(|field| number(field)).nth(1), Some(2.093));
+        let lost = header.fields("8,3,1,\"DROP\",,,,,0,0,00,3,\"Star lost, low mass\"");
+        assert_eq!(lost[1..3], ["3.1", "DROP"]);
+        assert_eq!(lost[9..], ["3", "Star lost, low mass"]);
+        let header = Header::of(&names.replace(',', ";")).unwrap();
+        assert_eq!(number(&header.fields("7;2,093;Mount;-0,5;0,15;108;W;1702;28,36;0")[4]), Some(0.15));
+        assert!(Header::of("Frames lost").is_none());
+    }
+}
