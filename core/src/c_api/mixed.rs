@@ -686,6 +686,8 @@ fn what_is_not_allowed_is_refused() {
     let mut predictor = room!(FlexsplinePredictor);
     let wrong = FlexsplineInertias { load_kg_m2: 0.0, ..INERTIAS };
     assert_eq!(flexspline_predictor_of(&mut predictor, &wrong, &NOISE, 1e-3), Argument);
+    // A store without a table.
+    assert_eq!(flexspline_store_init(&mut *o.store), Done);
     let mut rate = 0.0f32;
     let ask = |ahead_s, rate| flexspline_rate_ahead(&o.joint, &*o.store, 0, 0.01, 1.0, ahead_s, rate);
     assert_eq!((ask(0.0, &mut rate), ask(f32::NAN, &mut rate)), (Argument, Argument));

@@ -64,8 +64,8 @@ impl<const N: usize> Adapter<N> {
     /// One tick: follows the play, learns from the measurement if there is one, and tells what to add in the next tick.
     ///
     /// Call it every tick, in order, also without a measurement. Nothing that comes in can make the adjustment exceed the limits
-    /// or be undefined. No search, no loop that depends on data: on a Cortex-M4F a tick with a measurement that is used takes
-    /// the same number of instructions whatever the values (counted by `tests/firmware`).
+    /// or be undefined. No search, no loop that depends on data: on a Cortex-M4F a tick with a measurement that is used takes 2303
+    /// instructions for five coefficients, whatever the values, and one without at most 921 (counted by `tests/firmware`).
     pub fn update(&self, state: &mut AdaptState<N>, seen: &Seen<'_>) -> Adapted {
         let nothing = Adapted { adjustment: Adjustment::default(), uncertainty_rad: 0.0, verdict: Verdict::Untrusted };
         self.on(state, |adapter, learnt| adapter.update(learnt, seen)).unwrap_or(nothing)

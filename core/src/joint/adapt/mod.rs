@@ -97,7 +97,8 @@ pub struct Adapted {
 /// Estimates `N` coefficients: all that does not change while it runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Adapter<const N: usize> {
-    terms: [Term; N],
+    /// Codes of the [`Term`]s: every pattern of bits is a number.
+    terms: [u32; N],
     /// Limits, rad or rad/(N·m): the units of the coefficients inside.
     limits: [f32; N],
     /// First variances in those units, and the row of a measurement in units of noise and limit.
@@ -203,7 +204,7 @@ impl<const N: usize> Adapter<N> {
             sum = sum.rotate_left(7) ^ crc32(&bytes);
         }
         Ok(Self {
-            terms: coefficients.map(|c| c.term),
+            terms: coefficients.map(|c| c.term.code()),
             limits: coefficients.map(|c| c.limit),
             first: coefficients.map(|c| square(c.initial_std / c.limit)),
             per_noise: coefficients.map(|c| c.limit / noise_rad),
@@ -242,7 +243,7 @@ impl<const N: usize> Adapter<N> {
             x: [0.0; N],
             d: self.first,
             u: [[0.0; N]; N],
-            learning: Learning::Off,
+            learning: Learning::Off.code(),
             counters: AdaptCounters {
                 used: 0,
                 quiet: 0,
@@ -255,7 +256,8 @@ impl<const N: usize> Adapter<N> {
                 restarts: 0,
             },
             generator: GeneratorAngle::ZERO,
-            contact: None,
+            contact: OutputAngle::ZERO,
+            has_contact: 0,
             touched: OutputAngle::ZERO,
             side: 0,
             run: 0,
@@ -279,7 +281,7 @@ impl<const N: usize> Adapter<N> {
         let generator = seen.input.generator.unwrap_or(state.generator);
         let moved = generator.minus_counts(state.generator);
         state.generator = generator;
-        let verdict = match (state.learning, seen.measured) {
+        let verdict = match (state.learning(), seen.measured) {
             (Learning::On, Some(measured)) => self.learn(state, seen, measured, generator, contact),
             _ => Verdict::Idle,
         };
@@ -292,12 +294,12 @@ impl<const N: usize> Adapter<N> {
     /// Where the play is, from how it moved.
     fn follow(&self, state: &mut AdaptState<N>, play: &PlayState) -> Contact {
         let (Some(nominal), true) = (play.nominal(), play.is_known()) else {
-            (state.contact, state.run) = (None, 0);
+            (state.has_contact, state.run) = (0, 0);
             return Contact::Unknown;
         };
         let at = nominal.offset_counts(play.offset_counts() as i64);
-        let moved = state.contact.map_or(0, |last| at.minus_small_counts(last));
-        state.contact = Some(at);
+        let moved = if state.has_contact == 0 { 0 } else { at.minus_small_counts(state.contact) };
+        (state.contact, state.has_contact) = (at, 1);
         let way = moved.saturating_abs();
         if way > 0 {
             let side = moved.signum();
@@ -320,7 +322,7 @@ impl<const N: usize> Adapter<N> {
         let turned = |order: u8| generator.fraction().wrapping_mul(order as u32);
         let mut row = self.per_noise;
         for (row, term) in row.iter_mut().zip(self.terms) {
-            *row *= match term {
+            *row *= match Term::of_code(term) {
                 Term::Mean => 1.0,
                 Term::WindUp => torque,
                 Term::HalfWidth => side.wrapping_neg() as f32,
@@ -438,13 +440,13 @@ impl<const N: usize> Adapter<N> {
     }
 
     fn adapted(&self, state: &AdaptState<N>, row: &[f32; N], verdict: Verdict) -> Adapted {
-        if state.learning == Learning::Off || !state.x.iter().all(|x| x.abs() <= 1.0) {
+        if state.learning() == Learning::Off || !state.x.iter().all(|x| x.abs() <= 1.0) {
             return Adapted { adjustment: Adjustment::default(), uncertainty_rad: 0.0, verdict };
         }
         let (mut mean, mut half) = (0.0, 0.0);
         let parts = self.terms.iter().zip(state.x).zip(row.iter().zip(self.per_noise));
         for ((term, x), (h, per_noise)) in parts {
-            match term {
+            match Term::of_code(*term) {
                 Term::HalfWidth => half += x * per_noise,
                 _ => mean += x * h,
             }

@@ -67,10 +67,13 @@ pub struct AdaptState<const N: usize> {
     pub(super) d: [f32; N],
     /// Columns above the diagonal, which is 1.
     pub(super) u: [[f32; N]; N],
-    pub(super) learning: Learning,
+    /// The code of [`Learning`]: every pattern of bits is a number.
+    pub(super) learning: u32,
     pub(super) counters: AdaptCounters,
     pub(super) generator: GeneratorAngle,
-    pub(super) contact: Option<OutputAngle>,
+    /// Where contact was last, if `has_contact` is not 0.
+    pub(super) contact: OutputAngle,
+    pub(super) has_contact: u32,
     /// Nominal output where the play last moved, the side in contact there, and the way it moved to that side.
     pub(super) touched: OutputAngle,
     pub(super) side: i32,
@@ -82,12 +85,12 @@ impl<const N: usize> AdaptState<N> {
     /// Whether measurements are used.
     #[must_use]
     pub const fn learning(&self) -> Learning {
-        self.learning
+        Learning::of_code(self.learning)
     }
 
     /// Switches it, from the next update on.
     pub const fn set_learning(&mut self, learning: Learning) {
-        self.learning = learning;
+        self.learning = learning.code();
     }
 
     /// What became of the measurements.
