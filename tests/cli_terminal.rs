@@ -164,6 +164,9 @@ fn a_full_disk_is_one_clear_error() {
     assert_eq!(names(&desk.path(".")), [""; 0], "the folder that was made for it is gone too");
 }
 
+/// Generous, as other programs may have the machine: the work of these commands takes ten times as long, but that of the diagnosis.
+const AT_ONCE: Duration = Duration::from_secs(6);
+
 #[test]
 fn a_folder_that_cannot_be_written_is_found_out_before_the_work() {
     let desk = Desk::new();
@@ -187,11 +190,11 @@ fn a_folder_that_cannot_be_written_is_found_out_before_the_work() {
             shortest = shortest.min(clock.elapsed());
             assert_eq!(run.code, 2, "{line}: {}", run.stderr);
             assert!(run.stderr.starts_with("error: --out: cannot write /proc/flexspline: "), "{line}: {}", run.stderr);
-            if shortest < Duration::from_secs(2) {
+            if shortest < AT_ONCE {
                 break;
             }
         }
-        assert!(shortest < Duration::from_secs(2), "{line} worked {shortest:?} before it said so");
+        assert!(shortest < AT_ONCE, "{line} worked {shortest:?} before it said so");
     }
     assert!(before == contents(&desk.path(".")));
 }

@@ -85,10 +85,13 @@ const BOUNDED: &[(&str, &str, usize, Bound)] = &[
     ("src/diagnosis/select.rs", "backward", 1, Shrinks("terms: one is dropped")),
     ("src/diagnosis/verdict.rs", "told_apart", 1, Shrinks("named terms: one is set aside")),
     ("src/measurement/csv_rows.rs", "next_row", 1, Shrinks("lines of a file")),
-    ("src/measurement/csv_rows.rs", "read", 1, Shrinks("bytes of a file")),
     ("src/measurement/faults/clock.rs", "standing", 1, Shrinks("rows, from one time to the next")),
     ("src/measurement/faults/steps.rs", "find", 1, Shrinks("places of steps: the weakest is dropped")),
     ("src/measurement/faults/steps.rs", "lasting", 2, Shrinks("steps: those that are taken back go")),
+    ("src/measurement/reader/layout.rs", "split", 1, Shrinks("bytes of a line")),
+    ("src/measurement/reader/mod.rs", "chunk", 1, Shrinks("changes of the order of columns in a file")),
+    ("src/measurement/reader/mod.rs", "find_rows", 2, Shrinks("bytes of a file, and lines with zero bytes")),
+    ("src/measurement/reader/text.rs", "of", 1, Shrinks("bytes of a file")),
     ("src/measurement/unit.rs", "leading_number", 1, Shrinks("bytes that are left")),
     ("src/report/diagnosis_report/thin.rs", "stretches", 1, Shrinks("rows of a session, one or more at a time")),
     (
@@ -110,6 +113,7 @@ const BOUNDED: &[(&str, &str, usize, Bound)] = &[
     ("src/synthesize/data_fault.rs", "average", 1, Shrinks("rows before the one that is made")),
     ("src/tables/positions.rs", "places_that_tell_apart", 1, Shrinks("divisors up to the root of a number")),
     ("src/tables/sweep.rs", "sample", 1, Shrinks("pitches until MOST_PITCHES, where `settle_on` ends with an error")),
+    ("src/tables/turns_off.rs", "turns_off", 1, Shrinks("turns that were tried")),
     ("src/tables/torque_nodes.rs", "refined", 1, Shrinks("torque nodes up to `most`: each round adds one or ends")),
     (
         "src/tables/validate.rs",

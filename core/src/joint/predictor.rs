@@ -391,7 +391,7 @@ impl Predictor {
 
     /// One tick: what the last estimate leads to, corrected by what was measured. The same work for all values.
     ///
-    /// False, and the estimate stays, if a number that is used is not finite or beyond any drive ([`MOST`]), or the estimate would come to be; and if model or
+    /// False, and the estimate stays, if a number that is used is not finite or beyond any drive (`MOST`), or the estimate would come to be; and if model or
     /// estimate are lost: make them anew.
     #[inline]
     pub fn step(&self, state: &mut PredictorState, measured: &Measured) -> bool {

@@ -103,6 +103,8 @@ pub(super) struct Found {
     pub columns: Vec<Column>,
     /// The last line, if it broke off.
     pub broken_off: Option<u64>,
+    /// What is wrong with the order of the rows, which was mended.
+    pub order: Vec<String>,
     /// What was read otherwise than it stands, or not at all though it may have been meant.
     pub notes: Vec<String>,
     /// Whether each session has a zero of its own.
@@ -163,10 +165,11 @@ pub(super) fn read(
     if let Some(time) = log.get_mut(Quantity::Time).filter(|_| local_time) {
         stamps::daylight_saving(time, &mut notes);
     }
-    in_order(&mut log, &mut notes);
+    let mut order = Vec::new();
+    in_order(&mut log, &mut order);
     rollover::undo(&mut log, &columns, &mut notes);
     slower::fill(&mut log, &mut notes);
-    Ok((log, Found { columns, broken_off, notes, own_zeros: false }))
+    Ok((log, Found { columns, broken_off, order, notes, own_zeros: false }))
 }
 
 fn guide_log(file: &str, bytes: Vec<u8>, map: &ColumnMap, ratio: f64) -> Result<(Log, Found), MeasuredError> {
@@ -182,7 +185,7 @@ fn guide_log(file: &str, bytes: Vec<u8>, map: &ColumnMap, ratio: f64) -> Result<
         let what = format!("{} guided frames with a star; at least {FEWEST_ROWS} are needed", log.len());
         return Err(refuse(TableProblem { line: 1, what }));
     }
-    Ok((log, Found { columns: phd2::columns(), broken_off: None, notes, own_zeros: true }))
+    Ok((log, Found { columns: phd2::columns(), broken_off: None, order: Vec::new(), notes, own_zeros: true }))
 }
 
 /// The line that breaks off, if it is the last one, whose row is then left out. A row of another width anywhere else is an error.
@@ -318,13 +321,13 @@ fn align_pairs(sheet: &Sheet, columns: &[Column], log: &mut Log, notes: &mut Vec
 }
 
 /// Rows in the order of their time, each once.
-fn in_order(log: &mut Log, notes: &mut Vec<String>) {
+fn in_order(log: &mut Log, said: &mut Vec<String>) {
     if let Some((order, note)) = log.get(Quantity::Time).and_then(stamps::order) {
         log.line = order.iter().map(|row| log.line[*row]).collect();
         for values in log.columns.iter_mut().flatten() {
             *values = order.iter().map(|row| values[*row]).collect();
         }
-        notes.push(note);
+        said.push(note);
     }
     if log.get(Quantity::Time).is_none() {
         return;
@@ -332,7 +335,7 @@ fn in_order(log: &mut Log, notes: &mut Vec<String>) {
     let columns: Vec<&[f64]> = log.columns.iter().flatten().map(Vec::as_slice).collect();
     if let Some((drop, note)) = stamps::twice(&columns) {
         log.leave_out(&drop);
-        notes.push(note);
+        said.push(note);
     }
 }
 

@@ -229,6 +229,22 @@ fn parse_as(
             measures: Measures::default(),
         });
     }
+    for what in found.order {
+        findings.faults.push(Fault {
+            name: FaultName::ClockError,
+            channel: Some(Quantity::Time),
+            time_s: None,
+            until_s: None,
+            first_line: log.line.iter().copied().min().unwrap_or(1),
+            last_line: log.line.iter().copied().max().unwrap_or(1),
+            rows: rows as u64,
+            size_arcsec: None,
+            treatment: Treatment::Repaired,
+            what,
+            advice: FaultName::ClockError.advice(),
+            measures: Measures::default(),
+        });
+    }
     if angle_scale != 1.0 {
         faults::units::both_in_degrees(&mut log, angle_scale, &mut findings);
     }

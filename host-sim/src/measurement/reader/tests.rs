@@ -593,7 +593,8 @@ fn files_of_strangers_are_read_right_or_refused_in_the_same_words() {
                 let columns = columns.replace(":rad", ":deg");
                 let recording = read(bytes, &columns).map_err(|what| format!("by {columns}: {what}"))?;
                 right(&recording, *rows).map_err(|what| format!("by {columns}: {what}\n{}", text(&looked)))?;
-                let notes = [looked.notes, recording.notes].concat().join("\n");
+                let faults = recording.faults.iter().map(|fault| fault.what.clone()).collect();
+                let notes = [looked.notes, recording.notes, faults].concat().join("\n");
                 if notes.contains(said) { Ok(()) } else { Err(format!("without {said:?}: {notes}")) }
             }),
             Blocked(said) => looked_at(bytes).and_then(|looked| {
