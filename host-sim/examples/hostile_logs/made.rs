@@ -115,7 +115,7 @@ fn generator(random: &mut Rng, rows: usize) -> Vec<f64> {
         1 | 2 => (0..rows).map(|k| pace * k as f64).collect(),
         _ => (0..rows)
             .map(|k| {
-                psi += if k / turn % 2 == 0 { pace } else { -pace };
+                psi += if (k / turn).is_multiple_of(2) { pace } else { -pace };
                 psi
             })
             .collect(),

@@ -330,6 +330,8 @@ pub(super) fn check(recording: &mut Recording, nominal: &Nominal, table: Option<
     } else {
         find(&recording.sessions, nominal, table)
     };
+    // A zero that moves the error by no more than round-off was found in round-off.
+    let found = found.filter(|zero| zero.size_arcsec > ROUND_OFF_ARCSEC);
     let Some(Zero { n_m, std, size_arcsec, may_be_unbalance }) = found else { return };
     let torques = recording.sessions.iter_mut().flat_map(|session| &mut session.torque_n_m).flatten();
     torques.for_each(|torque| *torque -= n_m);

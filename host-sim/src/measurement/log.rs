@@ -280,7 +280,7 @@ fn align_channels(sheet: &Sheet, columns: &[Column], log: &mut Log, notes: &mut 
     let mut farthest: f64 = 0.0;
     for channel in Quantity::ALL.into_iter().filter(|channel| *channel != base && *channel != Quantity::Time) {
         let Some(values) = log.get(channel) else { continue };
-        let (values, far) = align::at(&at, &instants, values);
+        let (values, far) = align::at(&at, &instants, values, is_angle(channel));
         farthest = farthest.max(far);
         aligned.push((channel, values));
     }
@@ -293,6 +293,10 @@ fn align_channels(sheet: &Sheet, columns: &[Column], log: &mut Log, notes: &mut 
          by cubics through their own values",
         at.len()
     ));
+}
+
+fn is_angle(channel: Quantity) -> bool {
+    matches!(channel, Quantity::Generator | Quantity::Output | Quantity::Error)
 }
 
 fn align_pairs(sheet: &Sheet, columns: &[Column], log: &mut Log, notes: &mut Vec<String>) {
@@ -308,7 +312,7 @@ fn align_pairs(sheet: &Sheet, columns: &[Column], log: &mut Log, notes: &mut Vec
         }
         let Some(values) = log.get_mut(column.quantity) else { continue };
         let rows = values.len();
-        let (aligned, far) = align::at(&base[..rows], &own[..rows], values);
+        let (aligned, far) = align::at(&base[..rows], &own[..rows], values, is_angle(column.quantity));
         *values = aligned;
         (moved, farthest) = (moved + 1, farthest.max(far));
     }

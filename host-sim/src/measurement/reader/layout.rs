@@ -325,12 +325,11 @@ impl Layout {
         let (Some(first), Some(last)) = (others.first(), others.last()) else { return };
         let words: Vec<&str> =
             others.iter().filter_map(|k| fields[*k].iter().find(|f| !f.is_empty())).map(String::as_str).collect();
-        self.notes.push(format!(
-            "lines {} to {} above the rows are neither names nor units ({}): they are left out",
-            lines[*first].number,
-            lines[*last].number,
-            shortened(&words.join(", "))
-        ));
+        let which = match (lines[*first].number, lines[*last].number) {
+            (first, last) if first == last => format!("line {first} above the rows is"),
+            (first, last) => format!("lines {first} to {last} above the rows are"),
+        };
+        self.notes.push(format!("{which} neither names nor units ({}): left out", shortened(&words.join(", "))));
     }
 
     /// Headers that say `Name, motor, Name, joint` and `SampleTime[ms], 50, SampleTime[ms], 50`: a time and a value for each channel.
@@ -353,7 +352,7 @@ impl Layout {
         self.names = fields[names].clone();
         self.units = vec![String::new(); width];
         for time in (0..width).step_by(2) {
-            self.names[time] = if time == 0 { "time".to_owned() } else { format!("time of {}", self.names[time + 1]) };
+            self.names[time] = if time == 0 { "time".to_owned() } else { format!("time {}", time / 2 + 1) };
             if let Some(unit) = time_unit {
                 self.units[time] = unit.name().to_owned();
             }

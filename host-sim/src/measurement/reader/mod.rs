@@ -46,6 +46,8 @@ pub struct Sheet {
     segments: Vec<(usize, Vec<Option<usize>>)>,
     /// Names of the channels of a file with one value in a line.
     channels: Vec<String>,
+    /// Fields that a row may have.
+    width: usize,
 }
 
 /// Where a row stands.
@@ -127,6 +129,7 @@ impl Sheet {
         let layout = Layout::of(&text.bytes, known);
         let mut sheet = Sheet {
             notes: text.notes,
+            width: layout.names.len(),
             layout,
             text: text.bytes,
             rows: Vec::new(),
@@ -405,7 +408,7 @@ impl Sheet {
 
     /// Reads some rows, the first of which is row `from` of the file.
     fn chunk(&self, places: &[usize], from: usize, rows: &[RowAt]) -> Columns {
-        let width = self.layout.names.len();
+        let width = self.width;
         let mut read = Columns { cells: vec![Cells::default(); places.len()], ..Columns::default() };
         read.cells.iter_mut().for_each(|cells| cells.values.reserve_exact(rows.len()));
         let as_they_stand: Vec<Option<usize>> = places.iter().map(|place| Some(*place)).collect();

@@ -179,7 +179,7 @@ impl RawFile {
         let at: Vec<f64> = keep.iter().map(|row| instants[*row]).collect();
         for (k, column) in self.columns.iter_mut().enumerate() {
             column.values = if sparse.contains(&k) && k != base {
-                align::at(&at, &instants, &column.values).0
+                align::at(&at, &instants, &column.values, false).0
             } else {
                 keep.iter().map(|row| column.values[*row]).collect()
             };
@@ -218,7 +218,7 @@ pub(in crate::measurement) fn align_pairs<'a>(
             values.clone_from(first);
             continue;
         }
-        let (aligned, far) = align::at(first, of, values);
+        let (aligned, far) = align::at(first, of, values, false);
         *values = aligned;
         (moved, farthest) = (moved + 1, farthest.max(far));
     }

@@ -216,7 +216,7 @@ fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
             Read(ROWS, "Scale"),
         ),
         ("a scope, one clock", scope(0.0).into(), Read(ROWS, "SampleTime")),
-        ("a scope, a clock for each channel", scope(0.011).into(), Read(ROWS - 2, "stamps of its own")),
+        ("a scope, a clock for each channel", scope(0.011).into(), Read(ROWS - 6, "stamps of its own")),
         (
             "a time before each channel",
             file("time1,motor_deg,time2,joint_deg\n", ",", |k| {
@@ -229,7 +229,7 @@ fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
                 ]
             })
             .into(),
-            Read(ROWS - 2, "stamps of its own"),
+            Read(ROWS - 6, "stamps of its own"),
         ),
         // Lines that are no rows.
         (
@@ -522,16 +522,16 @@ fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
             Read(ROWS, "zero bytes stand in 1 line"),
         ),
         // Rows.
-        ("each channel at its own instants", own_stamps.into(), Read(ROWS - 12, "same rows")),
+        ("each channel at its own instants", own_stamps.into(), Read(ROWS - 16, "same rows")),
         (
             "one value a line",
             one_value(" ", ["BENCH:MOTOR-PosAct", "BENCH:JOINT-PosAct", "BENCH:JOINT-Torque"]).into(),
-            Read(ROWS - 2, "value of one channel"),
+            Read(ROWS - 6, "value of one channel"),
         ),
         (
             "one value a line, semicolons",
             one_value(";", ["motor_pos", "joint_pos", "joint_torque"]).into(),
-            Read(ROWS - 2, "value of one channel"),
+            Read(ROWS - 6, "value of one channel"),
         ),
     ]
 }
