@@ -312,6 +312,11 @@ impl Layout {
         } else if let Some((line, names)) = comment_with_names(comments, begins, separator, width) {
             (layout.has_names, layout.header_line, layout.names) = (true, line, names);
         }
+        // A header may have more names than rows have fields.
+        let columns = layout.names.len().max(width);
+        layout.kinds.resize(columns, Field::Nothing);
+        layout.commas.resize(columns, false);
+        layout.cell_units.resize(columns, None);
         layout.look_into_cells(&fields[rows_from..]);
         layout.find_pairs();
         layout.one_value_a_line(&fields[rows_from..]);
