@@ -207,14 +207,24 @@ fn share_beside(of: &[f64], column: &[f64], other: &[f64]) -> f64 {
     (product(of, column) - share * product(of, other)) / rest.max(1e-12)
 }
 
-/// Factors by which a torque may be wrong: the motor's side, by this ratio or by the hundred of a neighbour, milli and kilo, kilogram-force and pound-force inch.
+/// Factors by which a torque may be wrong: the other shaft, by this ratio, or another unit; and turned round.
 fn factors(ratio: f64) -> Vec<f64> {
-    let plain =
-        [ratio.abs(), 1.0 / ratio.abs(), 100.0, 0.01, 1e3, 1e-3, 9.806_65, 1.0 / 9.806_65, 0.112_985, 1.0 / 0.112_985];
-    plain.into_iter().flat_map(|factor| [factor, -factor]).collect()
+    let shafts = [ratio.abs(), 1.0 / ratio.abs()];
+    shafts.into_iter().chain(UNITS.map(|(_, factor)| factor)).flat_map(|factor| [factor, -factor]).collect()
 }
 
-/// Holds the torque against what it should do; turned round or converted where that explains it, left out where it does nothing. Gives
+/// Units that a torque may be in though N·m was said, as a mapping names them, in N·m.
+const UNITS: [(&str, f64); 5] =
+    [("N.cm", 1e-2), ("mN.m", 1e-3), ("kN.m", 1e3), ("lbf.in", 0.112_985), ("N.m*9.80665", 9.806_65)];
+
+/// The unit of a factor, and which way it counts.
+fn unit_of(factor: f64) -> Option<String> {
+    let sign = if factor < 0.0 { "-" } else { "" };
+    UNITS.iter().find(|(_, of)| *of == factor.abs()).map(|(name, _)| format!("{sign}{name}"))
+}
+
+/// Holds the torque against what it should do; turned round, or taken to the other shaft, where that explains it; left out where it does nothing, or
+/// where it looks like another unit. Gives
 /// why the data are unusable, where they are.
 pub(super) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: Option<&Table<'_>>) -> Option<String> {
     let rows = Rows::new(&recording.sessions, nominal);
@@ -255,6 +265,23 @@ pub(super) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: 
         .filter(|(_, told)| !too_soft || (OF_THIS_DRIVE[0]..=OF_THIS_DRIVE[1]).contains(&told.wind_up))
         .filter(|(_, told)| seen(told) && of_this_drive(told) && told.left < EXPLAINS * recorded.left.min(none))
         .min_by(|a, b| a.1.left.total_cmp(&b.1.left));
+    if let Some((unit, (_, told))) = best.as_ref().and_then(|best| Some((unit_of(best.0)?, best))) {
+        // A stiffness that looks like another unit is a look, no word: a soft drive does the same.
+        let what = format!(
+            "the torque leaves {:.0} arcsec as it stands, and {:.0} if it is in {unit}: nothing says so, and it is not converted; if it is, say \
+             --columns torque=NAME:{unit}, else the drive is not as stiff as its model says; what the load does cannot be told from what the drive does",
+            recorded.left, told.left
+        );
+        recording.sessions.iter_mut().for_each(|session| session.torque_n_m = None);
+        recording.faults.push(fault_throughout(
+            recording,
+            FaultName::UnitMismatch,
+            Treatment::Masked,
+            recorded.size,
+            what.clone(),
+        ));
+        return Some(what);
+    }
     if let Some((factor, told)) = best {
         scale(recording, factor);
         recording.faults.push(fault_throughout(
@@ -503,6 +530,11 @@ mod tests {
         let ratio = catalogue_drive().ratio;
         let (fault, unusable, torque) = checked(|_, load| load / ratio.abs());
         assert!(fault == Some(FaultName::TorqueScale) && !unusable && near(torque));
+        // A unit that nothing says is not taken for one, nor is a drive nine times as soft.
+        let (fault, unusable, torque) = checked(|_, load| load / 0.112_985);
+        assert!(fault == Some(FaultName::UnitMismatch) && unusable && torque.is_none());
+        let (_, _, torque) = checked(|_, load| 0.112_985 * load);
+        assert!(torque.is_none_or(|torque| (torque / (0.112_985 * load) - 1.0).abs() < 1e-6), "{torque:?}");
         // That of a neighbour, who swings at his own pace; and one that nothing follows.
         let (fault, unusable, torque) = checked(|t, _| 30.0 * (1.7 * t).sin());
         assert!(fault == Some(FaultName::TorqueScale) && unusable && torque.is_none());
