@@ -1,6 +1,6 @@
 //! Files that nobody means, read by `look`, `calibrate`, `diagnose` and `replay`: `hostile_logs COUNT [FIRST_SEED [PROGRAM RUNS]]`
 //!
-//! File `k` is a pure function of the seed `FIRST_SEED + k` ([`made`]). Each is read in this program by the functions behind the four commands. None may
+//! File `k` is a pure function of the seed `FIRST_SEED + k` (`made.rs`). Each is read in this program by the functions behind the four commands. None may
 //! panic or take ten seconds of a processor, and what is refused says why. RUNS of them go through PROGRAM, the command itself, too: it ends with 0, 1
 //! or 2, with a message on stderr where it is not 0, as the functions did here, and leaves nothing half-written.
 //!
