@@ -26,7 +26,7 @@ const FAST: fn() -> SolverSettings = || SolverSettings { method: Method::Fast, .
 
 /// The plant of a generator, by contact FEM.
 pub(crate) fn map(kind: GeneratorKind) -> DenseMap {
-    let file = format!("{}/../host-sim/plant/{kind}.csv", env!("CARGO_MANIFEST_DIR"));
+    let file = format!("{}/../host-sim/fly/plant/{kind}.csv", env!("CARGO_MANIFEST_DIR"));
     DenseMap::parse(kind, &file, &std::fs::read_to_string(&file).unwrap()).unwrap()
 }
 

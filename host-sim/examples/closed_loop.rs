@@ -1,7 +1,7 @@
 //! The closed loop by hand.
 //!
 //! ```sh
-//! cargo run --release --example closed_loop -- map host-sim/plant [GENERATOR...]    # contact FEM, minutes
+//! cargo run --release --example closed_loop -- map host-sim/fly/plant [GENERATOR...]    # contact FEM, minutes
 //! cargo run --release --example closed_loop -- fly antenna|brief TABLES [OUT]
 //! cargo run --release --example closed_loop -- rover TABLES
 //! ```
@@ -40,7 +40,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             };
             println!("{COLUMNS}");
             for kind in KINDS {
-                let plant = format!("host-sim/plant/{kind}.csv");
+                let plant = format!("host-sim/fly/plant/{kind}.csv");
                 let map = DenseMap::parse(kind, &plant, &std::fs::read_to_string(&plant)?)?;
                 let image = std::fs::read(Path::new(tables).join(format!("{kind}.fxt")))?;
                 let out = out.first().map(Path::new);
@@ -89,7 +89,7 @@ fn run<P: Plant + Clone>(
 fn rover(tables: &Path) -> Result<(), Box<dyn Error>> {
     let [first_c, _] = BRIEF.temperature_c;
     for (number, kind) in KINDS.into_iter().enumerate() {
-        let plant = format!("host-sim/plant/{kind}.csv");
+        let plant = format!("host-sim/fly/plant/{kind}.csv");
         let map = DenseMap::parse(kind, &plant, &std::fs::read_to_string(&plant)?)?;
         let image = std::fs::read(tables.join(format!("{kind}.fxt")))?;
         let twin = image.clone();

@@ -9,8 +9,8 @@
 //!
 //! [`drive::Drive`] says what the drive is, [`stepping::Problem`] makes meshes and contact of it with one wave generator at one
 //! temperature, [`motion::Motion`] deforms, loads and turns it. [`tables::make()`] samples steady motion at the torques and
-//! temperatures that it finds to be needed, and projects the samples onto the table that firmware reads; [`tables::validate`]
-//! compares the table with fresh FEM. [`diagnosis`] says what measured data have beyond all that. The command is [`cli`].
+//! temperatures that it finds to be needed, and projects the samples onto the table that firmware reads; [`tables::validate()`]
+//! compares the table with fresh FEM. [`diagnosis`] says what measured data have beyond all that.
 //!
 //! A drive, a solver, one error:
 //!
@@ -35,35 +35,17 @@
 //! the ratio, positive when the output leads.
 #![forbid(unsafe_code)]
 
-pub use flexspline_mechanics::{
-    bearing, condense, contact, drive, fem, mesh, motion, reference, sleeve, stepping, suggest, toml_file, units,
+pub use flexspline_base::{csv_rows, output, robust, statistics, suggest, toml_file, units};
+pub use flexspline_design::{
+    campaign, catalogue, cautions, data_sheet, kernels, pitch_wave, simulate, stated, study, tables,
 };
-
-pub mod bundle;
-pub mod calibrate;
-pub mod campaign;
-pub mod catalogue;
-pub mod causes;
-pub mod cautions;
-pub mod cli;
-pub mod closed_loop;
-pub mod data_sheet;
-pub mod diagnosis;
-pub mod export;
-pub mod extension;
-pub mod fly;
-pub mod kernels;
-pub mod look;
-pub mod measurement;
-pub mod nominal;
-pub mod output;
-pub mod pitch_wave;
-mod progress;
-pub mod report;
-pub mod reproduce;
-pub mod residual;
-pub mod simulate;
-pub mod stated;
-pub mod study;
-pub mod synthesize;
-pub mod tables;
+pub use flexspline_export as export;
+pub use flexspline_export::bundle;
+pub use flexspline_fly::{closed_loop, fly};
+pub use flexspline_identify::{
+    calibrate, causes, diagnosis, extension, look, measurement, nominal, replay, residual, synthesize,
+};
+pub use flexspline_mechanics::{bearing, condense, contact, drive, fem, mesh, motion, reference, sleeve, stepping};
+pub use flexspline_pacana_2023 as reproduce;
+pub use flexspline_playback as playback;
+pub use flexspline_report as report;

@@ -1,5 +1,10 @@
-//! The command `flexspline`; everything is in [`flexspline_sim::cli`].
+//! The command `flexspline`.
+#![forbid(unsafe_code)]
+// Comments of options are help texts, which no page shows.
+#![allow(rustdoc::broken_intra_doc_links, rustdoc::invalid_html_tags)]
+
+mod cli;
 
 fn main() -> std::process::ExitCode {
-    flexspline_sim::cli::run(std::env::args_os()).into()
+    cli::run(std::env::args_os()).into()
 }

@@ -107,7 +107,7 @@ const settled = (page) => page.waitForTimeout(250);
 // ---- Numbers
 
 await check("packed numbers come back as they were", async () => {
-  const source = readFileSync(new URL("../../host-sim/web/pack.js", import.meta.url), "utf8");
+  const source = readFileSync(new URL("../../host-sim/report/web/pack.js", import.meta.url), "utf8");
   const { unpack } = await import(`data:text/javascript,${encodeURIComponent(source)}`);
   const packs = JSON.parse(readFileSync(path.join(folder, "pack.json"), "utf8"));
   let count = 0;
@@ -128,7 +128,7 @@ await check("packed numbers come back as they were", async () => {
 
 /** The drives of a report as its script has them, without a browser. */
 async function motionsOf(file) {
-  const web = (name) => readFileSync(new URL(`../../host-sim/web/${name}`, import.meta.url), "utf8");
+  const web = (name) => readFileSync(new URL(`../../host-sim/report/web/${name}`, import.meta.url), "utf8");
   const linked = web("motion.js").replace(/^import .*;$/gm, "");
   const { unpack, Motion } = await import(`data:text/javascript,${encodeURIComponent(web("pack.js") + linked)}`);
   const html = readFileSync(path.join(folder, file), "utf8");

@@ -12,7 +12,7 @@ import subprocess
 import sys
 
 # What is of use without the source. Left out are pages for whoever changes the program, and examples that cargo builds.
-SHIPPED = ("docs/", "examples/", "core/include/", "core/c99/", "tests/firmware/samples/", "host-sim/web/report.png", "CHANGELOG.md", "LICENSE")
+SHIPPED = ("docs/", "examples/", "core/include/", "core/c99/", "tests/firmware/samples/", "host-sim/report/web/report.png", "CHANGELOG.md", "LICENSE")
 LEFT_OUT = ("docs/add_a_", "docs/release.md", "examples/antenna_", "examples/learning_c")
 LINK = re.compile(r"(!?)\[([^\]]*)\]\(([^)\s]+)\)")
 FENCE = re.compile(r"^\s*```")

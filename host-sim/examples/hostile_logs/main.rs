@@ -27,7 +27,7 @@ use flexspline_sim::drive::{Drive, GeneratorKind};
 use flexspline_sim::extension::Model;
 use flexspline_sim::look::look;
 use flexspline_sim::measurement::{ColumnMap, parse, raw};
-use flexspline_sim::tables::{parse_measured, replay};
+use flexspline_sim::replay::{parse as parse_measured, replay};
 
 use made::{MODEL, RATIO};
 

@@ -13,13 +13,13 @@
 use std::f64::consts::PI;
 use std::process::ExitCode;
 
+use flexspline_base::units::{ARCMIN_PER_RAD, ARCSEC_PER_RAD};
 use flexspline_mechanics::bearing::{Balls, Lubricant, load_torque_n_mm, lubricant_torque_n_mm};
 use flexspline_mechanics::drive::{Drive, FewNumbers, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_mechanics::motion::Motion;
 use flexspline_mechanics::sleeve::Flexspline3d;
 use flexspline_mechanics::stepping::{Method, Problem, SolveError, SolverSettings};
-use flexspline_mechanics::units::{ARCMIN_PER_RAD, ARCSEC_PER_RAD};
 
 /// What the catalogue has (Harmonic Drive CSF/CSG, i = 100; rated torque CSG over 1.3; starting, no-load torque at 2000 rpm and efficiency
 /// of Schaeffler's RT1, same sizes).

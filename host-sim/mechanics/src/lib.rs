@@ -14,6 +14,5 @@ pub mod motion;
 pub mod reference;
 pub mod sleeve;
 pub mod stepping;
-pub mod suggest;
-pub mod toml_file;
-pub mod units;
+
+use flexspline_base::{suggest, toml_file, units};

@@ -5,7 +5,8 @@ use std::sync::{Mutex, PoisonError};
 use flexspline::{
     Approach, Direction, GeneratorAngle, OutputAngle, PlayState as CoreState, SAVED_STATE_BYTES, Table as CoreTable,
 };
-use flexspline_sim::tables::{MeasuredRow, RowsOf, dead_zone_n_m, parse_measured, replay};
+use flexspline_sim::replay::{MeasuredRow, RowsOf, parse as parse_measured, replay};
+use flexspline_sim::tables::dead_zone_n_m;
 use flexspline_sim::units::ARCSEC_PER_RAD;
 use numpy::{IntoPyArray, PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::prelude::*;
@@ -360,7 +361,7 @@ impl Table {
         let (replayed, mut summary) = py.detach(|| replay(self.table(), rows));
         summary.of_rows(rows_of, self.table());
         let columns = PyDict::new(py);
-        let numbers = |of: fn(&flexspline_sim::tables::ReplayedRow) -> f64| {
+        let numbers = |of: fn(&flexspline_sim::replay::ReplayedRow) -> f64| {
             replayed.iter().map(of).collect::<Vec<f64>>().into_pyarray(py)
         };
         columns.set_item("generator_rad", numbers(|row| row.generator_rad))?;

@@ -10,10 +10,10 @@ use serde::Serialize;
 
 use super::Failure;
 use super::context::{Context, image_file};
-use crate::bundle::libraries::{Library, LibraryError, Places, TARGETS};
-use crate::bundle::{Bundle, MANIFEST, Manifest, Table, TableEntry, tar_gz};
-use crate::output::{Outputs, WholeFolder, prepare_folder};
-use crate::suggest::{likeliest, question};
+use flexspline_base::output::{Outputs, WholeFolder, prepare_folder};
+use flexspline_base::suggest::{likeliest, question};
+use flexspline_export::bundle::libraries::{Library, LibraryError, Places, TARGETS};
+use flexspline_export::bundle::{Bundle, MANIFEST, Manifest, Table, TableEntry, tar_gz};
 
 /// Tables, a reader in C99, the core as static libraries, vectors and build files, in one folder for firmware
 ///

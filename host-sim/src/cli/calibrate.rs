@@ -9,13 +9,15 @@ use flexspline::Table;
 use super::context::{Context, quoted, table_image};
 use super::logs::LogOptions;
 use super::{Failure, names, report, say};
-use crate::calibrate::{Bench, Calibrated, Calibration, CalibrationError, Planned, Prior, calibrate, plan};
-use crate::drive::GeneratorKind;
-use crate::extension::Model;
-use crate::measurement::read;
-use crate::output::Outputs;
-use crate::report::calibration_report;
-use crate::tables::{c_header, rust_source};
+use flexspline_base::output::Outputs;
+use flexspline_design::tables::{c_header, rust_source};
+use flexspline_identify::calibrate::{
+    Bench, Calibrated, Calibration, CalibrationError, Planned, Prior, calibrate, plan,
+};
+use flexspline_identify::extension::Model;
+use flexspline_identify::measurement::read;
+use flexspline_mechanics::drive::GeneratorKind;
+use flexspline_report::calibration_report;
 
 /// Make the table of one unit from its logs, whatever the cause of its error
 ///

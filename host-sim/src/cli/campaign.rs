@@ -12,13 +12,13 @@ use serde::Serialize;
 
 use super::context::quoted;
 use super::{Context, Failure, names, report, say};
-use crate::campaign::{
+use flexspline_base::output::{Outputs, prepare_folder, write_whole};
+use flexspline_design::campaign::{
     Became, Campaign, EXAMPLE, JUDGED, OfGenerator, Plan, PlanError, PlanSettings, Quantile, ReduceError, SHARED,
     ShardError, ShardState, Tolerances, look, plan, reduce, run_shard, worst_path,
 };
-use crate::mesh::MeshLevel;
-use crate::output::{Outputs, prepare_folder, write_whole};
-use crate::report::campaign_report;
+use flexspline_mechanics::mesh::MeshLevel;
+use flexspline_report::campaign_report;
 
 /// Draw thousands of drives from tolerances, on any engine, and say what to tighten first
 ///
@@ -345,7 +345,7 @@ struct Reduced<'a> {
     partial: bool,
     torque_n_m: f64,
     temperature_c: f64,
-    tolerances: &'a [crate::campaign::Tolerance],
+    tolerances: &'a [flexspline_design::campaign::Tolerance],
     #[serde(flatten)]
     campaign: &'a Campaign,
 }

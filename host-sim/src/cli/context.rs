@@ -8,11 +8,11 @@ use serde::Serialize;
 use flexspline::{Identity, IdentityCheck, Table};
 
 use super::{Common, Failure, say};
-use crate::drive::{Drive, GeneratorKind};
-use crate::output::prepare_folder;
-use crate::progress::Progress;
-use crate::stated::Stated;
-use crate::suggest::{likeliest, question};
+use flexspline_base::output::prepare_folder;
+use flexspline_base::progress::Progress;
+use flexspline_base::suggest::{likeliest, question};
+use flexspline_design::stated::Stated;
+use flexspline_mechanics::drive::{Drive, GeneratorKind};
 
 /// Folder for output files where none is given.
 const OUT: &str = "out";

@@ -9,19 +9,19 @@ use super::context::{Context, quoted, table_image};
 use super::logs::LogOptions;
 use super::tables::fresh_table;
 use super::{Failure, names, report, say};
-use crate::causes::CauseName;
-use crate::diagnosis::explain::Explanation;
-use crate::diagnosis::pipeline::{
+use flexspline_base::output::Outputs;
+use flexspline_design::kernels::Kernels;
+use flexspline_design::tables::{c_header, rust_source};
+use flexspline_identify::causes::CauseName;
+use flexspline_identify::diagnosis::explain::Explanation;
+use flexspline_identify::diagnosis::pipeline::{
     Diagnosed, Extension, Made, MakeTable, Options, PipelineError, Subject, diagnose_rows, read_rows,
 };
-use crate::diagnosis::report::Diagnosis;
-use crate::drive::{Drive, GeneratorKind};
-use crate::extension::Model;
-use crate::kernels::Kernels;
-use crate::measurement::Recording;
-use crate::mesh::MeshLevel;
-use crate::output::Outputs;
-use crate::tables::{c_header, rust_source};
+use flexspline_identify::diagnosis::report::Diagnosis;
+use flexspline_identify::extension::Model;
+use flexspline_identify::measurement::Recording;
+use flexspline_mechanics::drive::{Drive, GeneratorKind};
+use flexspline_mechanics::mesh::MeshLevel;
 
 /// Find what the simulation gets wrong in measured data, name the cause, measure what the extension gains
 ///

@@ -7,8 +7,8 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{Context, Failure, say};
-use crate::drive::{Drive, GeneratorKind, MeshReport, RigidMesh};
-use crate::units::{ARCMIN_PER_RAD, ARCSEC_PER_RAD};
+use flexspline_base::units::{ARCMIN_PER_RAD, ARCSEC_PER_RAD};
+use flexspline_mechanics::drive::{Drive, GeneratorKind, MeshReport, RigidMesh};
 
 /// Print the drive as a commented TOML file, or check whether its teeth clear one another
 ///

@@ -12,11 +12,11 @@ use super::export_fmu::FmuOptions;
 use super::export_playback::{PlaybackFormat, PlaybackOptions};
 use super::simulate::{ModelOptions, refused_or_failed, show};
 use super::{Context, Failure, say};
-use crate::drive::Drive;
-use crate::export::{Deck, DeckSettings, SleeveDeck, outlines, write_vtu, write_whole_flexspline};
-use crate::output::{OutputError, write_csv, write_whole};
-use crate::simulate::{Observation, Path, PathPoint, simulate};
-use crate::stepping::Problem;
+use flexspline_base::output::{OutputError, write_csv, write_whole};
+use flexspline_design::simulate::{Observation, Path, PathPoint, simulate};
+use flexspline_export::{Deck, DeckSettings, SleeveDeck, outlines, write_vtu, write_whole_flexspline};
+use flexspline_mechanics::drive::Drive;
+use flexspline_mechanics::stepping::Problem;
 
 /// Intervals to a piece of a tooth outline, of 0.01 to 0.1 mm in all.
 const POINTS_PER_PIECE: usize = 24;

@@ -7,8 +7,8 @@ use serde::Serialize;
 
 use super::context::image_file;
 use super::{Context, Failure, fly};
-use crate::export::fmu::{Fmu, compensation, find_libraries, joint};
-use crate::output::write_whole;
+use flexspline_base::output::write_whole;
+use flexspline_export::fmu::{Fmu, compensation, find_libraries, joint};
 
 /// The scenario of a joint where none is named.
 const USUAL_SCENARIO: &str = "antenna";

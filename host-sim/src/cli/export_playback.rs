@@ -10,13 +10,13 @@ use super::context::{Context, image_file};
 use super::logs::LogOptions;
 use super::replay::measured;
 use super::{Failure, say};
-use crate::export::playback::{
+use flexspline_base::output::Outputs;
+use flexspline_identify::replay::replay;
+use flexspline_playback::{
     BOTH, Cfs, Cnc, CompType, DataFigures, Eqmod, EqmodMount, FEWEST_ROWS, Fprime, LinuxCnc, MAX_TABLE_BYTES,
     MAX_TRIPLETS, ModelFigures, Moteus, Nc, OnStepX, Origin, Player, Refusal, Ros2, Section, Written, core_on_model,
     on_data, on_model, worth_it,
 };
-use crate::output::Outputs;
-use crate::tables::replay::replay;
 
 /// Whose playback.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

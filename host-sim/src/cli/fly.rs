@@ -10,12 +10,12 @@ use serde::Serialize;
 
 use super::context::Context;
 use super::{Failure, report};
-use crate::fly::{
+use flexspline_base::output::Outputs;
+use flexspline_base::suggest::did_you_mean;
+use flexspline_fly::fly::{
     ByController, Flown, Results, SCENARIOS, VariedFlight, Vary, built_in, every, fly_varied, read, results,
 };
-use crate::output::Outputs;
-use crate::report::flight_report;
-use crate::suggest::did_you_mean;
+use flexspline_report::flight_report;
 
 /// Fly a joint with mass in closed loop: motor, servo, drive, friction, load and wind; with and without compensation
 ///

@@ -9,11 +9,11 @@ use serde::Serialize;
 use super::context::{Context, quoted};
 use super::names::{self, Generators};
 use super::{Failure, say};
-use crate::drive::Wheel;
-use crate::kernels::{KernelError, KernelPlan, make};
-use crate::mesh::MeshLevel;
-use crate::output::Outputs;
-use crate::stepping::{Method, SolverSettings};
+use flexspline_base::output::Outputs;
+use flexspline_design::kernels::{KernelError, KernelPlan, make};
+use flexspline_mechanics::drive::Wheel;
+use flexspline_mechanics::mesh::MeshLevel;
+use flexspline_mechanics::stepping::{Method, SolverSettings};
 
 /// Compute influence kernels: what a deviation of a tooth, of the generator or of an axis does to the output
 ///

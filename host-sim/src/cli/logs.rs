@@ -3,7 +3,7 @@
 use clap::Args;
 
 use super::Failure;
-use crate::measurement::ColumnMap;
+use flexspline_identify::measurement::ColumnMap;
 
 /// Columns, rate and torque constant.
 #[derive(Debug, Args)]

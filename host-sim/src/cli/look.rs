@@ -6,8 +6,8 @@ use clap::{Args, ValueHint};
 
 use super::context::{Context, quoted};
 use super::{Failure, say};
-use crate::look::{Looked, look, text};
-use crate::measurement::raw;
+use flexspline_identify::look::{Looked, look, text};
+use flexspline_identify::measurement::raw;
 
 /// Look at log files of a bench: columns, units, ratio, torque, time, coverage; proposes the mapping to read them with
 ///

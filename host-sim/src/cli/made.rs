@@ -7,8 +7,8 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::Failure;
-use crate::bearing::Balls;
-use crate::drive::{Drive, DriveError, GeneratorKind, MadeDrive, RigidMesh};
+use flexspline_mechanics::bearing::Balls;
+use flexspline_mechanics::drive::{Drive, DriveError, GeneratorKind, MadeDrive, RigidMesh};
 
 /// Length of a cup and its wall over the pitch diameter, thickness of its bottom over the wall, hub over the pitch radius: guesses, as in
 /// `catalogue_budget`. A cup is about half as long as wide, its wall about a hundredth.
@@ -186,7 +186,7 @@ fn fields(file: &str) -> impl Iterator<Item = (String, String)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::drive::FewNumbers;
+    use flexspline_mechanics::drive::FewNumbers;
 
     fn made(teeth: u32, module_mm: f64) -> MadeDrive {
         let few = FewNumbers { teeth, module_mm, bore_mm: None, width_mm: None, generator: GeneratorKind::Cam };

@@ -7,8 +7,8 @@ use clap_mangen::Man;
 use serde::Serialize;
 
 use super::{Context, Failure, say};
-use crate::output::Outputs;
-use crate::suggest::did_you_mean;
+use flexspline_base::output::Outputs;
+use flexspline_base::suggest::did_you_mean;
 
 /// Print a manual page, or write all of them
 ///

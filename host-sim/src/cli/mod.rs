@@ -40,8 +40,8 @@ use std::process::ExitCode;
 
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueHint};
 
-use crate::output::{OutputError, remove_empty_folders};
 use context::Context;
+use flexspline_base::output::{OutputError, remove_empty_folders};
 
 /// How a command ended; the number is the exit code of the process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

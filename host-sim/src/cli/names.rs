@@ -6,10 +6,10 @@ use std::str::FromStr;
 
 use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
 
-use crate::drive::GeneratorKind;
-use crate::mesh::MeshLevel;
-use crate::stepping::Method;
-use crate::suggest::did_you_mean;
+use flexspline_base::suggest::did_you_mean;
+use flexspline_mechanics::drive::GeneratorKind;
+use flexspline_mechanics::mesh::MeshLevel;
+use flexspline_mechanics::stepping::Method;
 
 /// Reads one of `names`.
 #[derive(Clone)]

@@ -8,11 +8,11 @@ use serde::Serialize;
 use super::context::quoted;
 use super::made::{Clearance, cup_and_balls, left_out, with_formulas, with_s_teeth};
 use super::{Context, Failure, names, say};
-use crate::catalogue;
-use crate::drive::{Drive, DriveError, FewNumbers, GeneratorKind, Profile};
-use crate::nominal::Nominal;
-use crate::output::write_whole;
-use crate::stated::{Stated, TEMPLATE};
+use flexspline_base::output::write_whole;
+use flexspline_design::catalogue;
+use flexspline_design::stated::{Stated, TEMPLATE};
+use flexspline_identify::nominal::Nominal;
+use flexspline_mechanics::drive::{Drive, DriveError, FewNumbers, GeneratorKind, Profile};
 
 /// Write a commented drive file, or a catalogue model, to edit
 ///

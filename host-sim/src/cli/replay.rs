@@ -8,12 +8,12 @@ use flexspline::Table;
 use super::context::{Context, image_file, quoted};
 use super::logs::LogOptions;
 use super::{Failure, say};
-use crate::drive::GeneratorKind;
-use crate::measurement::{self, ColumnMap};
-use crate::nominal::Nominal;
-use crate::output::Outputs;
-use crate::tables::replay::{MeasuredRow, ReplaySummary, RowsOf, parse, replay};
-use crate::units::ARCSEC_PER_RAD;
+use flexspline_base::output::Outputs;
+use flexspline_base::units::ARCSEC_PER_RAD;
+use flexspline_identify::measurement::{self, ColumnMap};
+use flexspline_identify::nominal::Nominal;
+use flexspline_identify::replay::{MeasuredRow, ReplaySummary, RowsOf, parse, replay};
+use flexspline_mechanics::drive::GeneratorKind;
 
 /// Run the core over measured rows, open loop, and show what it leaves
 ///

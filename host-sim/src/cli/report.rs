@@ -8,17 +8,17 @@ use flexspline::Table;
 use rayon::prelude::*;
 
 use super::{Context, Failure, say};
-use crate::diagnosis::Extended;
-use crate::diagnosis::report::Diagnosis;
-use crate::drive::{Drive, GeneratorKind};
-use crate::measurement::Recording;
-use crate::nominal::Nominal;
-use crate::output::Outputs;
-use crate::report::animation::{Animation, AnimationError, animate};
-use crate::report::diagnosis_report::{self, Sources};
-use crate::report::page::{Page, Written};
-use crate::report::shown_torque_n_m;
-use crate::stepping::{Method, SolverSettings};
+use flexspline_base::output::Outputs;
+use flexspline_identify::diagnosis::Extended;
+use flexspline_identify::diagnosis::report::Diagnosis;
+use flexspline_identify::measurement::Recording;
+use flexspline_identify::nominal::Nominal;
+use flexspline_mechanics::drive::{Drive, GeneratorKind};
+use flexspline_mechanics::stepping::{Method, SolverSettings};
+use flexspline_report::animation::{Animation, AnimationError, animate};
+use flexspline_report::diagnosis_report::{self, Sources};
+use flexspline_report::page::{Page, Written};
+use flexspline_report::shown_torque_n_m;
 
 /// The drives of tables in motion, each at half of what its table spans.
 pub(super) fn animations(

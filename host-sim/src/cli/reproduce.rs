@@ -7,13 +7,13 @@ use clap::Args;
 
 use super::simulate::refused_or_failed;
 use super::{Context, Failure, names, report};
-use crate::drive::GeneratorKind;
-use crate::mesh::MeshLevel;
-use crate::output::Outputs;
-use crate::report::reproduction_report::{Sources, page};
-use crate::reproduce::claim::Verdict;
-use crate::reproduce::{ReproduceSettings, Reproduction, reproduce};
-use crate::stepping::SolverSettings;
+use flexspline_base::output::Outputs;
+use flexspline_mechanics::drive::GeneratorKind;
+use flexspline_mechanics::mesh::MeshLevel;
+use flexspline_mechanics::stepping::SolverSettings;
+use flexspline_pacana_2023::claim::Verdict;
+use flexspline_pacana_2023::page::{Sources, page};
+use flexspline_pacana_2023::{ReproduceSettings, Reproduction, reproduce};
 
 /// Run the protocol of the paper with all four generators, beside the paper's results
 ///

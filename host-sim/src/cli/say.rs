@@ -8,7 +8,7 @@ use std::io::{self, ErrorKind, Write};
 use anstyle::{AnsiColor, Style};
 
 use super::Failure;
-use crate::suggest::MARKS;
+use flexspline_base::suggest::MARKS;
 
 /// As clap has it for what is wrong.
 const ERROR: Style = AnsiColor::Red.on_default().bold();

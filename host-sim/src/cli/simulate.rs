@@ -7,20 +7,20 @@ use std::path::Path as FilePath;
 use clap::{Args, ValueEnum, ValueHint};
 
 use super::{Context, Failure, names, report, say};
-use crate::cautions::add_stress;
-use crate::drive::{Drive, GeneratorKind};
-use crate::export::{Frame, write_pvd, write_vtu};
-use crate::mesh::MeshLevel;
-use crate::output::{OutputError, Outputs, WholeFolder, write_whole};
-use crate::progress::Progress;
-use crate::report::page::Page;
-use crate::report::{Seen, simulation_report};
-use crate::simulate::{
+use flexspline_base::output::{OutputError, Outputs, WholeFolder, write_whole};
+use flexspline_base::progress::Progress;
+use flexspline_design::cautions::add_stress;
+use flexspline_design::simulate::{
     Direction, Observation, Path, PathPoint, Phase, PlaceStress, SimulateError, Simulation, SimulationSettings,
     Summary, Told, read_path, simulate, stress_by_place,
 };
-use crate::stated::{SheetBeside, beside};
-use crate::stepping::{Method, SolveError, SolverSettings};
+use flexspline_design::stated::{SheetBeside, beside};
+use flexspline_export::{Frame, write_pvd, write_vtu};
+use flexspline_mechanics::drive::{Drive, GeneratorKind};
+use flexspline_mechanics::mesh::MeshLevel;
+use flexspline_mechanics::stepping::{Method, SolveError, SolverSettings};
+use flexspline_report::page::Page;
+use flexspline_report::{Seen, simulation_report};
 
 /// The rows of a run that ended on its way.
 const PARTIAL: &str = "results.partial.csv";

@@ -7,8 +7,8 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{Context, Failure};
-use crate::drive::{Drive, Sleeve, SleeveKind};
-use crate::sleeve::{Flexspline3d, Harmonic, Rollers};
+use flexspline_mechanics::drive::{Drive, Sleeve, SleeveKind};
+use flexspline_mechanics::sleeve::{Flexspline3d, Harmonic, Rollers};
 
 /// The even harmonics of two waves that a sleeve of ordinary length still feels.
 const HARMONICS: [u32; 6] = [2, 4, 6, 8, 10, 12];

@@ -1,14 +1,14 @@
 //! Ctrl-C, and a polite request to end: the process clears up and ends at once, wherever it is.
 //!
-//! Results are hidden files until all of them are complete, and all of these are known ([`crate::output`]). So nothing that computes
+//! Results are hidden files until all of them are complete, and all of these are known ([`flexspline_base::output`]). So nothing that computes
 //! has to look whether it should stop: the thread that hears of the signal removes them and ends the process.
 
 use std::sync::{Once, OnceLock};
 use std::time::{Duration, Instant};
 
 use super::{Outcome, say};
-use crate::output::abandon;
-use crate::progress;
+use flexspline_base::output::abandon;
+use flexspline_base::progress;
 
 /// From now on SIGINT, SIGTERM and SIGHUP end the process with exit code 1 and leave no unfinished file. A second one does not wait for
 /// the clearing up. Who started it with SIGHUP ignored, as `nohup` does, means it to go on without a terminal.

@@ -10,18 +10,18 @@ use serde::Serialize;
 
 use super::names::{self, Generators};
 use super::{Context, Failure, report, say};
-use crate::data_sheet::{FIGURES, FigureOf};
-use crate::drive::{Drive, GeneratorKind};
-use crate::mesh::MeshLevel;
-use crate::output::Outputs;
-use crate::report::page::Page;
-use crate::report::study_report;
-use crate::stated::short;
-use crate::stepping::{Method, SolverSettings};
-use crate::study::{
+use flexspline_base::output::Outputs;
+use flexspline_design::data_sheet::{FIGURES, FigureOf};
+use flexspline_design::stated::short;
+use flexspline_design::study::{
     Asked, Basis, Constraint, Effect, LAST_STABLE, Nearest, Run, RunStatus, Sense, Study, StudyError, StudySettings,
     Target, Trust, Vary, asked, effects, errors_of_making, figure, is_error_of_making, is_idle, nearest, study,
 };
+use flexspline_mechanics::drive::{Drive, GeneratorKind};
+use flexspline_mechanics::mesh::MeshLevel;
+use flexspline_mechanics::stepping::{Method, SolverSettings};
+use flexspline_report::page::Page;
+use flexspline_report::study_report;
 
 /// Targets where none are given: an exact drive, a stiff one, one that lasts.
 const USUAL_TARGETS: [(&str, Sense); 3] =
@@ -557,8 +557,8 @@ fn best<'a>(drive: &Drive, settings: &StudySettings, study: &'a Study) -> Option
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data_sheet::DataSheet;
-    use crate::stated::Stated;
+    use flexspline_design::data_sheet::DataSheet;
+    use flexspline_design::stated::Stated;
 
     /// A variant under the cam that meets all that is asked, with this stress in its root fillets.
     pub(super) fn variant(number: usize, values: &[&str], root_fillet_mpa: f64) -> Run {

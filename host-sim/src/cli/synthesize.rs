@@ -10,16 +10,16 @@ use serde::Serialize;
 use super::context::{Context, quoted, table_image};
 use super::tables::fresh_table;
 use super::{Failure, names, say};
-use crate::causes::{Parameter, Usual};
-use crate::drive::{Drive, GeneratorKind};
-use crate::extension::{self, CauseEntry};
-use crate::measurement::{ColumnMap, read};
-use crate::mesh::MeshLevel;
-use crate::nominal::Nominal;
-use crate::output::Outputs;
-use crate::synthesize::{
+use flexspline_base::output::Outputs;
+use flexspline_identify::causes::{Parameter, Usual};
+use flexspline_identify::extension::{self, CauseEntry};
+use flexspline_identify::measurement::{ColumnMap, read};
+use flexspline_identify::nominal::Nominal;
+use flexspline_identify::synthesize::{
     Chosen, Definition, Excitation, Plan, Plant, Richness, Sensors, Sizes, Unit, effects, parse, synthesize, to_csv,
 };
+use flexspline_mechanics::drive::{Drive, GeneratorKind};
+use flexspline_mechanics::mesh::MeshLevel;
 
 /// Make data that look measured: the drive of the simulation, with effects, noise and sensors of your choice
 ///
@@ -220,7 +220,7 @@ impl Synthesize {
             wander_arcsec: self.wander_arcsec,
             encoder_bits: self.encoder_bits,
             sessions: made.sessions.len(),
-            rows: made.sessions.iter().map(crate::measurement::Session::len).sum(),
+            rows: made.sessions.iter().map(flexspline_identify::measurement::Session::len).sum(),
         };
         let out = context.out()?;
         let mut outputs = Outputs::new();

@@ -15,21 +15,21 @@ use super::context::{Context, quoted};
 use super::names::{self, Generators};
 use super::simulate::{refused_or_failed, stress};
 use super::{Failure, report, say};
-use crate::cautions::add_stress;
-use crate::drive::{Drive, GeneratorKind};
-use crate::mesh::MeshLevel;
-use crate::output::Outputs;
-use crate::report::page::Page;
-use crate::report::{Sources, Subject, drive_report};
-use crate::simulate::{Path, PlaceStress, SimulationSettings, simulate};
-use crate::stated::{TWO_SETS_OF_K, beside};
-use crate::stepping::{Method, SolverSettings};
-use crate::tables::sweep::SweepProgress;
-use crate::tables::{
+use flexspline_base::output::Outputs;
+use flexspline_base::units::ARCSEC_PER_RAD;
+use flexspline_design::cautions::add_stress;
+use flexspline_design::simulate::{Path, PlaceStress, SimulationSettings, simulate};
+use flexspline_design::stated::{TWO_SETS_OF_K, beside};
+use flexspline_design::tables::sweep::SweepProgress;
+use flexspline_design::tables::{
     MadeTable, MakeError, SampleOptions, Source, TableInfo, TableProgress, TableSettings, TorqueNodes, c_header,
     from_samples, make, rust_source, samples,
 };
-use crate::units::ARCSEC_PER_RAD;
+use flexspline_mechanics::drive::{Drive, GeneratorKind};
+use flexspline_mechanics::mesh::MeshLevel;
+use flexspline_mechanics::stepping::{Method, SolverSettings};
+use flexspline_report::page::Page;
+use flexspline_report::{Sources, Subject, drive_report};
 
 /// Make compensation tables: from FEM sweeps of the drive, or from samples of another program or a bench
 ///

@@ -12,16 +12,16 @@ use serde::Serialize;
 use super::context::{Context, image_file, quoted};
 use super::names::{self, Generators};
 use super::{Failure, report, say};
-use crate::drive::{Drive, GeneratorKind};
-use crate::mesh::MeshLevel;
-use crate::output::Outputs;
-use crate::report::page::Page;
-use crate::report::{Sources, Subject, drive_report};
-use crate::stepping::{Method, SolverSettings};
-use crate::tables::validate::{
+use flexspline_base::output::Outputs;
+use flexspline_design::tables::validate::{
     MAX_BOUND_ARCSEC, RMS_BOUND_ARCSEC, ValidateError, Validation, ValidationSettings, check_drive, generator_of,
     validate,
 };
+use flexspline_mechanics::drive::{Drive, GeneratorKind};
+use flexspline_mechanics::mesh::MeshLevel;
+use flexspline_mechanics::stepping::{Method, SolverSettings};
+use flexspline_report::page::Page;
+use flexspline_report::{Sources, Subject, drive_report};
 
 /// Compare tables with fresh FEM at points that made none of them
 ///

@@ -3,7 +3,7 @@
 
 pub mod count;
 /// Everything of the closed loop that flies, as the host has it.
-#[path = "../../../host-sim/src/closed_loop/flight/mod.rs"]
+#[path = "../../../host-sim/fly/src/closed_loop/flight/mod.rs"]
 pub mod flight;
 /// A tick of a joint, and what tapes of flights hold, as the host has it.
 #[path = "../../../host-sim/motion/src/on_board.rs"]

@@ -1,13 +1,13 @@
-//! The drives that the programs fly: the files of `host-sim/plant`, read once at the start.
+//! The drives that the programs fly: the files of `host-sim/fly/plant`, read once at the start.
 
 use crate::flight::gear::{GearMap, MOST, parse};
 
 /// Contact FEM of the four generators, in the order of [`crate::TABLES`]: name, largest torque of the table in N·m, file.
 static FILES: [(&str, f64, &str); 4] = [
-    ("cam", 200.0, include_str!("../../../host-sim/plant/cam.csv")),
-    ("double-disc", 200.0, include_str!("../../../host-sim/plant/double-disc.csv")),
-    ("four-roller", 100.0, include_str!("../../../host-sim/plant/four-roller.csv")),
-    ("two-roller", 20.0, include_str!("../../../host-sim/plant/two-roller.csv")),
+    ("cam", 200.0, include_str!("../../../host-sim/fly/plant/cam.csv")),
+    ("double-disc", 200.0, include_str!("../../../host-sim/fly/plant/double-disc.csv")),
+    ("four-roller", 100.0, include_str!("../../../host-sim/fly/plant/four-roller.csv")),
+    ("two-roller", 20.0, include_str!("../../../host-sim/fly/plant/two-roller.csv")),
 ];
 
 /// Room for the numbers of one drive.

@@ -1,0 +1,521 @@
+//! The figures of a drive by kernels: linear in the errors of its teeth, by interpolation in how far its axes stand apart, by parabolas in
+//! what changes it everywhere alike.
+//!
+//! Over a turn of the output, at [`places`](Model::places) evenly apart, with `ψ` the angle of the generator, `α = ψ (1 − 1/ratio)` that on the
+//! circular spline, and `s` the axis of the circular spline beside that of the flexspline, seen from the major axis:
+//!
+//! ```text
+//! e(ψ, T) = wave(ψ, T) + Σ p_k w_F(2πk/z_F − ψ, T) + Σ p_k w_C(2πk/z_C − α, T) + oval(α, T) + d(s(ψ), T)
+//! s(ψ)    = offset at −ψ + eccentricity at −α − runout at −ψ − eccentricity of the generator
+//! ```
+//!
+//! `wave` is settled motion over a tooth pitch of the drive that is alike everywhere; `w`, `oval` and `d` are those of
+//! [`crate::kernels`]. That errors of teeth and displaced axes do not change each other's effect, and that what is alike everywhere does
+//! not change the kernels, is what a campaign assumes, and what its drives by FEM test.
+
+use std::f64::consts::TAU;
+
+use serde::{Deserialize, Serialize};
+
+use super::draw::Drawn;
+use super::tolerance::{Acts, Tolerance};
+use crate::kernels::{EccentricField, Gain, Kernels, PlaceOfLoad};
+use crate::tables::places_that_tell_apart;
+use flexspline_base::units::ARCSEC_PER_RAD;
+use flexspline_mechanics::drive::{AsBuilt, Wheel};
+
+/// The figures of a drive by kernels, as columns of a shard have them.
+pub const FIGURES: [&str; 21] = [
+    "error_pp_arcsec",
+    "error_rms_arcsec",
+    "flexspline_order_2_arcsec",
+    "circular_spline_order_2_arcsec",
+    "flexspline_order_4_arcsec",
+    "circular_spline_order_4_arcsec",
+    "lost_motion_arcsec",
+    "most_lost_motion_arcsec",
+    "no_table_rms_arcsec",
+    "nominal_table_rms_arcsec",
+    "unit_table_rms_arcsec",
+    "backlash_arcsec",
+    "k1_n_m_per_rad",
+    "k2_n_m_per_rad",
+    "k3_n_m_per_rad",
+    "wind_up_arcsec",
+    "max_von_mises_mpa",
+    "axes_apart_um",
+    "places_pp_arcsec",
+    "places_rms_arcsec",
+    CLOSED,
+];
+/// Share of the places, %, where no play is left between the flanks: lost motion there is that of the elastic wind-up alone.
+pub const CLOSED: &str = "play_closed_percent";
+/// Figures of a data sheet that follow what is alike everywhere.
+pub const SHEET: [&str; 6] =
+    ["backlash_arcsec", "k1_n_m_per_rad", "k2_n_m_per_rad", "k3_n_m_per_rad", "wind_up_arcsec", "max_von_mises_mpa"];
+/// Samples of the wave over a tooth pitch.
+pub const WAVE: usize = 8;
+/// Numbers of the state of a drive that is alike everywhere: the wave under the load and under a light one, the sheet.
+pub const STATE: usize = 2 * WAVE + SHEET.len();
+/// Samples of a wheel's error over its pitch. Kernels have a multiple.
+const SAMPLES: usize = 4;
+/// Places over a turn of the output, at least and at most.
+const PLACES: [usize; 2] = [1009, 4001];
+/// Orders of a table's curves: over the turn of the generator, over that against the output, over that of the output.
+const TABLE_ORDERS: [usize; 3] = [8, 8, 6];
+/// How far apart orders stay where places fold them.
+const APART: f64 = 0.9;
+
+/// What the FEM says of drives that are alike everywhere.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Response {
+    /// State of the middle drive: the wave under the load, that under the light load, the sheet; arcsec, N·m/rad, MPa.
+    pub middle: Vec<f64>,
+    /// What each tolerance of something alike everywhere changes.
+    pub parabolas: Vec<Parabola>,
+}
+
+/// A parabola through three drives, for every number of the state.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Parabola {
+    /// Which tolerance.
+    pub tolerance: usize,
+    /// Values of the field: below, of the middle drive, above.
+    pub at: [f64; 3],
+    /// Change of the state at the first.
+    pub below: Vec<f64>,
+    /// Change of the state at the last.
+    pub above: Vec<f64>,
+}
+
+impl Response {
+    /// Whether its sizes are such that evaluation cannot fail.
+    pub fn fits(&self, tolerances: usize) -> bool {
+        let all = self.parabolas.iter().flat_map(|p| [&p.below, &p.above]).chain([&self.middle]);
+        all.into_iter().all(|list| list.len() == STATE) && self.parabolas.iter().all(|p| p.tolerance < tolerances)
+    }
+}
+
+impl Parabola {
+    fn add(&self, value: f64, state: &mut [f64]) {
+        let [a, m, b] = self.at;
+        let below = (value - m) * (value - b) / ((a - m) * (a - b));
+        let above = (value - a) * (value - m) / ((b - a) * (b - m));
+        for ((x, low), high) in state.iter_mut().zip(&self.below).zip(&self.above) {
+            *x += below * low + above * high;
+        }
+    }
+}
+
+/// Kernels of a wheel's teeth, as they are summed: by load, by sample within a pitch, twice around for sums in one piece.
+struct WheelSums {
+    wheel: Wheel,
+    teeth: usize,
+    /// Teeth after which the state repeats.
+    period: usize,
+    weights: Vec<[Vec<f64>; SAMPLES]>,
+}
+
+impl WheelSums {
+    fn new(kernels: &Kernels, wheel: Wheel, torques: &[f64]) -> WheelSums {
+        let teeth = kernels.teeth[usize::from(wheel == Wheel::CircularSpline)] as usize;
+        let period = teeth / kernels.repeats;
+        let place = |k: usize, b: usize| TAU * (k as f64 - b as f64 / SAMPLES as f64) / teeth as f64;
+        let of = |torque: f64| {
+            std::array::from_fn(|b| {
+                (0..2 * period).map(|k| kernels.displaced(wheel, place(k, b), torque)).collect::<Vec<f64>>()
+            })
+        };
+        WheelSums { wheel, teeth, period, weights: torques.iter().map(|torque| of(*torque)).collect() }
+    }
+
+    /// Position errors of the teeth, µm; nothing where there are none.
+    fn positions(&self, built: &AsBuilt) -> Option<Vec<f64>> {
+        let (list, harmonics) = match self.wheel {
+            Wheel::Flexspline => (&built.flexspline_pitch_error_um, &built.flexspline_pitch_harmonics),
+            Wheel::CircularSpline => (&built.circular_spline_pitch_error_um, &built.circular_spline_pitch_harmonics),
+        };
+        if list.is_empty() && harmonics.is_empty() {
+            return None;
+        }
+        let mut all = if list.is_empty() { vec![0.0; self.teeth] } else { list.clone() };
+        for harmonic in harmonics {
+            for (k, error) in all.iter_mut().enumerate() {
+                let angle = TAU * k as f64 / self.teeth as f64 - harmonic.phase_deg.to_radians();
+                *error += harmonic.amplitude_um * libm::cos(f64::from(harmonic.order) * angle);
+            }
+        }
+        // Teeth that bear alike are one to the sum.
+        let (first, rest) = all.split_at_mut(self.period);
+        for other in rest.chunks(self.period) {
+            first.iter_mut().zip(other).for_each(|(sum, error)| *sum += error);
+        }
+        all.truncate(self.period);
+        Some(all)
+    }
+
+    /// Error by the angle of the wave on the wheel, `SAMPLES` to a pitch, over a period.
+    fn field(&self, load: usize, positions: &[f64]) -> Vec<f64> {
+        let n = self.period;
+        (0..n * SAMPLES)
+            .map(|c| {
+                let (a, b) = (c / SAMPLES, c % SAMPLES);
+                let from = (n - a) % n;
+                dot(positions, &self.weights[load][b][from..from + n])
+            })
+            .collect()
+    }
+}
+
+/// Four sums at once, always in the same order.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 4];
+    for (x, y) in a.chunks(4).zip(b.chunks(4)) {
+        for ((sum, x), y) in sums.iter_mut().zip(x).zip(y) {
+            *sum += x * y;
+        }
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3])
+}
+
+/// A periodic curve between its samples; `turns` of its period.
+fn along(samples: &[f64], turns: f64) -> f64 {
+    let n = samples.len();
+    let place = (turns - turns.floor()) * n as f64;
+    let k = (place as usize).min(n - 1);
+    let part = place - k as f64;
+    (1.0 - part) * samples[k] + part * samples[(k + 1) % n]
+}
+
+/// Where the drive stands: angles in turns.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    /// Of the generator, and on the circular spline.
+    generator: f64,
+    on_circular_spline: f64,
+    /// Cosine and sine of both.
+    flexspline_direction: [f64; 2],
+    circular_spline_direction: [f64; 2],
+}
+
+impl Place {
+    fn at(generator: f64, ratio: f64) -> Place {
+        let on_circular_spline = generator * (1.0 - 1.0 / ratio);
+        let direction = |turns: f64| {
+            let angle = TAU * (turns - turns.floor());
+            [libm::cos(angle), libm::sin(angle)]
+        };
+        Place {
+            generator,
+            on_circular_spline,
+            flexspline_direction: direction(generator),
+            circular_spline_direction: direction(on_circular_spline),
+        }
+    }
+}
+
+/// A vector of a part, turned back by the angle of the wave on it.
+fn turned([x, y]: [f64; 2], [c, s]: [f64; 2]) -> [f64; 2] {
+    [c * x + s * y, c * y - s * x]
+}
+
+fn vector(size: f64, phase_deg: f64) -> [f64; 2] {
+    let angle = phase_deg.to_radians();
+    [size * libm::cos(angle), size * libm::sin(angle)]
+}
+
+/// The curves of one drive.
+struct Curves {
+    /// By load: of the flexspline's teeth, of the circular spline's.
+    wheels: [Option<Vec<Vec<f64>>>; 2],
+    oval: Option<Vec<f64>>,
+    /// Displacements: on the flexspline, on the circular spline, on the generator.
+    apart: Option<[[f64; 2]; 3]>,
+    waves: [Vec<f64>; 2],
+}
+
+/// Evaluates drives with one generator.
+pub struct Model {
+    tolerances: Vec<Tolerance>,
+    teeth: [u32; 2],
+    ratio: f64,
+    response: Response,
+    wheels: [WheelSums; 2],
+    ovals: Vec<Gain>,
+    apart: Vec<(f64, EccentricField)>,
+    loads: [PlaceOfLoad; 2],
+    /// The light load, N·m.
+    light_n_m: f64,
+    places: Vec<Place>,
+    fem_places: Vec<Place>,
+    /// Cosine and sine of a turn in as many steps as there are places.
+    circle: Vec<[f64; 2]>,
+    nominal: Vec<[f64; 2]>,
+}
+
+/// Loads of the model: +T, −T, +t, −t.
+const SIGNS: [(usize, bool); 4] = [(0, false), (0, true), (1, false), (1, true)];
+
+impl Model {
+    /// `torques_n_m`: the load, and the light one between which and its opposite lost motion is told.
+    pub fn new(
+        kernels: &Kernels,
+        response: Response,
+        tolerances: &[Tolerance],
+        torques_n_m: [f64; 2],
+        fem_places: usize,
+    ) -> Model {
+        let signed: Vec<f64> = SIGNS
+            .iter()
+            .map(|(load, negative)| if *negative { -torques_n_m[*load] } else { torques_n_m[*load] })
+            .collect();
+        let ratio = kernels.ratio;
+        let of_output = |waves: usize, per: f64| (1..=waves).map(move |k| k as f64 * per);
+        let orders: Vec<f64> = of_output(TABLE_ORDERS[0], ratio)
+            .chain(of_output(TABLE_ORDERS[1], ratio - 1.0))
+            .chain(of_output(TABLE_ORDERS[2], 1.0))
+            .collect();
+        let count = places_that_tell_apart(&orders, PLACES, APART);
+        let even = |n: usize| -> Vec<Place> { (0..n).map(|j| Place::at(ratio * j as f64 / n as f64, ratio)).collect() };
+        let mut model = Model {
+            tolerances: tolerances.to_vec(),
+            teeth: kernels.teeth,
+            ratio,
+            response,
+            wheels: [Wheel::Flexspline, Wheel::CircularSpline].map(|wheel| WheelSums::new(kernels, wheel, &signed)),
+            ovals: signed.iter().map(|torque| kernels.ovality(*torque)).collect(),
+            apart: kernels.eccentric.sizes_um.iter().map(|size| (*size, kernels.eccentric_field(*size))).collect(),
+            loads: torques_n_m.map(|torque| kernels.place_of_load(torque)),
+            light_n_m: torques_n_m[1],
+            places: even(count),
+            fem_places: even(fem_places),
+            circle: (0..count)
+                .map(|j| {
+                    let angle = TAU * j as f64 / count as f64;
+                    [libm::cos(angle), libm::sin(angle)]
+                })
+                .collect(),
+            nominal: Vec::new(),
+        };
+        let middle = model.curves(&Drawn::middle(tolerances));
+        model.nominal = model
+            .places
+            .iter()
+            .map(|place| {
+                let [plus, minus, ..] = model.errors(&middle, place);
+                [plus, minus]
+            })
+            .collect();
+        model
+    }
+
+    /// Places over a turn of the output.
+    pub fn places(&self) -> usize {
+        self.places.len()
+    }
+
+    /// Generator angles of the drives by FEM, rad.
+    pub fn fem_angles_rad(&self) -> impl Iterator<Item = f64> {
+        self.fem_places.iter().map(|place| TAU * place.generator)
+    }
+
+    /// Teeth of flexspline and circular spline.
+    pub fn teeth(&self) -> [u32; 2] {
+        self.teeth
+    }
+
+    fn curves(&self, drawn: &Drawn) -> Curves {
+        let mut built = AsBuilt::default();
+        drawn.deviate(&self.tolerances, &mut built);
+        let wheels = [0, 1].map(|w| {
+            let positions = self.wheels[w].positions(&built)?;
+            Some((0..SIGNS.len()).map(|load| self.wheels[w].field(load, &positions)).collect())
+        });
+        let oval = (built.circular_spline_ovality_um != 0.0)
+            .then(|| vector(built.circular_spline_ovality_um, 2.0 * built.circular_spline_ovality_phase_deg).to_vec());
+        let sum = |a: [f64; 2], b: [f64; 2]| [a[0] + b[0], a[1] + b[1]];
+        let on_flexspline = sum(
+            vector(built.circular_spline_offset_um, built.circular_spline_offset_direction_deg),
+            vector(-built.flexspline_runout_um, built.flexspline_runout_phase_deg),
+        );
+        let on_circular_spline =
+            vector(built.circular_spline_eccentricity_um, built.circular_spline_eccentricity_phase_deg);
+        let on_generator = vector(-built.generator_eccentricity_um, built.generator_eccentricity_phase_deg);
+        let apart = [on_flexspline, on_circular_spline, on_generator];
+        let state = self.state(drawn);
+        Curves {
+            wheels,
+            oval,
+            apart: apart.iter().flatten().any(|x| *x != 0.0).then_some(apart),
+            waves: [state[..WAVE].to_vec(), state[WAVE..2 * WAVE].to_vec()],
+        }
+    }
+
+    /// State of the drive that is alike everywhere.
+    fn state(&self, drawn: &Drawn) -> Vec<f64> {
+        let mut state = self.response.middle.clone();
+        for parabola in &self.response.parabolas {
+            parabola.add(drawn.values[parabola.tolerance], &mut state);
+        }
+        state
+    }
+
+    /// Axis of the circular spline beside that of the flexspline, seen from the major axis, µm.
+    fn apart_at(apart: &[[f64; 2]; 3], place: &Place) -> [f64; 2] {
+        let [x, y] = turned(apart[0], place.flexspline_direction);
+        let [u, v] = turned(apart[1], place.circular_spline_direction);
+        [x + u + apart[2][0], y + v + apart[2][1]]
+    }
+
+    /// Error of what is alike everywhere, arcsec.
+    fn wave_error(&self, curves: &Curves, place: &Place, load: usize) -> f64 {
+        let (size, negative) = SIGNS[load];
+        let in_pitch = place.generator * f64::from(self.teeth[0]);
+        // Mirrored, the drive stands on the other side of its place and errs the other way.
+        if negative { -along(&curves.waves[size], -in_pitch) } else { along(&curves.waves[size], in_pitch) }
+    }
+
+    /// Errors at a place under each of the [`SIGNS`], arcsec.
+    fn errors(&self, curves: &Curves, place: &Place) -> [f64; 4] {
+        let mut errors = std::array::from_fn(|load| self.wave_error(curves, place, load));
+        for (w, turns) in [place.generator, place.on_circular_spline].into_iter().enumerate() {
+            if let Some(fields) = &curves.wheels[w] {
+                let around = (self.wheels[w].teeth / self.wheels[w].period) as f64;
+                for (error, field) in errors.iter_mut().zip(fields) {
+                    *error += along(field, turns * around);
+                }
+            }
+        }
+        if let Some(oval) = &curves.oval {
+            // cos 2(α − crest) and sin 2(α − crest), α the angle of the wave.
+            let [c, s] = place.circular_spline_direction;
+            let (c2, s2) = (c * c - s * s, 2.0 * c * s);
+            for (error, [g, h]) in errors.iter_mut().zip(&self.ovals) {
+                *error += g * (c2 * oval[0] + s2 * oval[1]) - h * (s2 * oval[0] - c2 * oval[1]);
+            }
+        }
+        if let Some(apart) = &curves.apart {
+            let [x, y] = Model::apart_at(apart, place);
+            let (distance, direction) = ((x * x + y * y).sqrt(), libm::atan2(y, x));
+            for (error, (size, negative)) in errors.iter_mut().zip(SIGNS) {
+                *error += self.eccentric(distance, direction, negative, self.loads[size]);
+            }
+        }
+        errors
+    }
+
+    /// Between sizes linear, as [`Kernels::eccentric_field`].
+    fn eccentric(&self, size_um: f64, direction: f64, negative: bool, load: PlaceOfLoad) -> f64 {
+        let above = self.apart.iter().position(|(size, _)| *size >= size_um).unwrap_or(self.apart.len() - 1);
+        let at = |k: usize| self.apart[k].1.at(direction, negative, load);
+        let (low, below) = if above == 0 { (0.0, 0.0) } else { (self.apart[above - 1].0, at(above - 1)) };
+        below + (at(above) - below) * (size_um - low) / (self.apart[above].0 - low)
+    }
+
+    /// The figures of a drive, in the order of [`FIGURES`].
+    pub fn figures(&self, drawn: &Drawn) -> Vec<f64> {
+        let curves = self.curves(drawn);
+        let errors: Vec<[f64; 4]> = self.places.iter().map(|place| self.errors(&curves, place)).collect();
+        let loaded: Vec<f64> = errors.iter().map(|e| e[0]).collect();
+        let state = self.state(drawn);
+        let wind_up = least_wind_up(&state, self.light_n_m);
+        let by_kernels = errors.iter().map(|e| e[2] - e[3]);
+        let closed = by_kernels.clone().filter(|lost| *lost < wind_up).count();
+        let lost: Vec<f64> = by_kernels.map(|lost| lost.max(wind_up)).collect();
+        let (pp, rms) = spread(&loaded);
+        let order = |waves: f64| self.amplitude(&loaded, waves);
+        let most = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let apart = curves.apart.map_or(0.0, |apart| {
+            most(
+                &self
+                    .places
+                    .iter()
+                    .map(|p| {
+                        let [x, y] = Model::apart_at(&apart, p);
+                        (x * x + y * y).sqrt()
+                    })
+                    .collect::<Vec<f64>>(),
+            )
+        });
+        let [no, nominal, unit] = self.left(&curves, &errors);
+        let at_places: Vec<f64> = self.fem_places.iter().map(|place| self.errors(&curves, place)[0]).collect();
+        let (places_pp, places_rms) = spread(&at_places);
+        let (r, c) = (self.ratio, self.ratio - 1.0);
+        let mut all = vec![pp, rms, order(2.0 * r), order(2.0 * c), order(4.0 * r), order(4.0 * c)];
+        all.extend([lost.iter().sum::<f64>() / lost.len() as f64, most(&lost), no, nominal, unit]);
+        all.extend_from_slice(&state[2 * WAVE..]);
+        all.extend([apart, places_pp, places_rms, 100.0 * closed as f64 / lost.len() as f64]);
+        all
+    }
+
+    /// Amplitude of so many waves in a turn of the output, arcsec.
+    fn amplitude(&self, errors: &[f64], waves: f64) -> f64 {
+        let [c, s] = self.projected(errors, waves as usize);
+        2.0 * (c * c + s * s).sqrt()
+    }
+
+    /// Mean of a curve times cosine and sine of so many waves.
+    fn projected(&self, errors: &[f64], waves: usize) -> [f64; 2] {
+        let n = errors.len();
+        let (mut c, mut s, mut at, step) = (0.0, 0.0, 0, waves % n);
+        for error in errors {
+            c += error * self.circle[at][0];
+            s += error * self.circle[at][1];
+            at += step;
+            if at >= n {
+                at -= n;
+            }
+        }
+        [c / n as f64, s / n as f64]
+    }
+
+    /// Root mean square over the turn and both signs of the load, arcsec, that is left without a table, with that of the middle drive, and
+    /// with one of this drive, whose curves have [`TABLE_ORDERS`]. The zero of the output is set once for both signs.
+    fn left(&self, curves: &Curves, errors: &[[f64; 4]]) -> [f64; 3] {
+        let both = |of: &dyn Fn(usize, usize) -> f64| {
+            let all: Vec<f64> = (0..errors.len()).flat_map(|j| [of(j, 0), of(j, 1)]).collect();
+            spread(&all).1
+        };
+        let no = both(&|j, load| errors[j][load]);
+        let nominal = both(&|j, load| errors[j][load] - self.nominal[j][load]);
+        // A table of this drive has its wave and its mean under either load; the curves take what is in their orders.
+        let mut rest = 0.0;
+        for load in [0, 1] {
+            let here = self.places.iter().zip(errors);
+            let beyond: Vec<f64> = here.map(|(place, e)| e[load] - self.wave_error(curves, place, load)).collect();
+            let mut square = spread(&beyond).1.powi(2);
+            for (orders, per) in TABLE_ORDERS.into_iter().zip([self.ratio, self.ratio - 1.0, 1.0]) {
+                for k in 1..=orders {
+                    let [c, s] = self.projected(&beyond, (k as f64 * per) as usize);
+                    square -= 2.0 * (c * c + s * s);
+                }
+            }
+            rest += 0.5 * square.max(0.0);
+        }
+        [no, nominal, rest.sqrt()]
+    }
+}
+
+/// Lost motion where there is no play, arcsec: what a drive as stiff as the stiffest of K1, K2 and K3 winds up between the light loads.
+///
+/// Kernels add what each deviation takes of the play. Once it is used up flanks bear on both sides, and nothing is left to be taken.
+fn least_wind_up(state: &[f64], light_n_m: f64) -> f64 {
+    let sheet = SHEET.iter().zip(&state[2 * WAVE..]);
+    let stiffest = sheet.filter(|(name, _)| name.starts_with('k')).map(|(_, k)| *k).fold(0.0, f64::max);
+    if stiffest > 0.0 { 2.0 * light_n_m / stiffest * ARCSEC_PER_RAD } else { 0.0 }
+}
+
+/// Peak to peak, and root mean square about the mean.
+pub(super) fn spread(values: &[f64]) -> (f64, f64) {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), e| (l.min(*e), h.max(*e)));
+    let square = values.iter().map(|e| (e - mean) * (e - mean)).sum::<f64>() / values.len() as f64;
+    (high - low, square.sqrt())
+}
+
+/// Whether a tolerance needs kernels of displaced axes.
+pub fn displaces(tolerance: &Tolerance) -> bool {
+    tolerance.acts == Acts::Directed && tolerance.field != "as_built.circular_spline_ovality_um"
+}

@@ -1,0 +1,571 @@
+//! The file of tolerances: a drive, its load, and what its drawing allows.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+use toml::Spanned;
+use toml::de::DeValue;
+
+use super::by_fem::FEM_FIGURES;
+use super::draw::Drawn;
+use super::model::FIGURES;
+use super::shard::OWN_COLUMNS;
+use flexspline_base::statistics::{normal_cdf, normal_quantile};
+use flexspline_base::suggest::likeliest_path;
+use flexspline_base::toml_file::{Allowed, Entries, Refused, TomlFile, above, any, each_of, from, one_of, text, whole};
+use flexspline_mechanics::drive::{Drive, GeneratorKind, Wheel};
+
+/// A commented file of tolerances.
+pub const EXAMPLE: &str = include_str!("example.toml");
+
+/// Tolerances of a file, at most: each takes four dimensions of the Sobol sequence, which has 256, where its share is sought.
+const MOST_TOLERANCES: usize = 60;
+/// `plus_minus` of a normal distribution is so many standard deviations: the "natural tolerance" of quality control.
+const SIGMAS: f64 = 3.0;
+/// Limits of a normal or Rayleigh law that is given none, standard deviations: one drive in millions lies outside.
+const FAR: f64 = 5.5;
+
+/// The middle of a tolerance is refused if it is more than so many standard deviations, and more than this share, away from the value of the
+/// drive: guesses beyond what any drawing means.
+const FAR_OFF: (f64, f64) = (10.0, 0.1);
+
+/// What a file of tolerances says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tolerances {
+    /// The drive as drawn.
+    pub drive: Drive,
+    /// The generators.
+    pub generators: Vec<GeneratorKind>,
+    /// Load, N·m.
+    pub torque_n_m: f64,
+    /// Temperature, °C.
+    pub temperature_c: f64,
+    /// Errors (peak to peak, arcsec) whose probability of being exceeded is told.
+    pub exceed_arcsec: Vec<f64>,
+    /// The tolerances.
+    pub list: Vec<Tolerance>,
+}
+
+/// One tolerance.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tolerance {
+    /// What results call it.
+    pub name: String,
+    /// The field of the drive, as `--set` takes it.
+    pub field: String,
+    /// What it does.
+    pub acts: Acts,
+    /// How it scatters.
+    pub distribution: Distribution,
+}
+
+impl Tolerance {
+    /// Its columns in a shard: what was drawn, and the phase.
+    pub fn columns(&self) -> impl Iterator<Item = String> {
+        std::iter::once(self.name.clone()).chain(self.phase_column())
+    }
+
+    /// The column of its phase.
+    pub fn phase_column(&self) -> Option<String> {
+        self.acts.has_phase().then(|| format!("{}, phase_deg", self.name))
+    }
+}
+
+/// How a field acts, and by which kernels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum Acts {
+    /// It changes the drive everywhere alike: FEM of three drives gives a parabola of every figure.
+    Alike,
+    /// It displaces or deforms a part in a direction, which is random.
+    Directed,
+    /// A harmonic of the pitch of a wheel, its phase random.
+    Harmonic {
+        /// Of which wheel.
+        #[serde(with = "wheel_by_name")]
+        wheel: Wheel,
+        /// Waves around it.
+        order: u32,
+    },
+    /// A random error of every tooth of a wheel.
+    Teeth {
+        /// Of which wheel.
+        #[serde(with = "wheel_by_name")]
+        wheel: Wheel,
+        /// What the distribution is of.
+        errors: TeethError,
+    },
+}
+
+/// What a random error of teeth is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TeethError {
+    /// Of the position of each tooth, independently.
+    Position,
+    /// Of each single pitch: positions are their sum around the wheel, closed.
+    Pitch,
+}
+
+/// A distribution within limits.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Distribution {
+    /// Its law.
+    pub law: Law,
+    /// Least and largest value; what lies outside is never drawn (the law is truncated, not clipped).
+    pub limits: [f64; 2],
+}
+
+/// A law of distribution.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Law {
+    /// Gaussian.
+    Normal {
+        /// Mean.
+        mean: f64,
+        /// Standard deviation.
+        std: f64,
+    },
+    /// Even between the limits.
+    Uniform,
+    /// Size of a displacement whose two components are Gaussian.
+    Rayleigh {
+        /// Standard deviation of a component.
+        std: f64,
+    },
+}
+
+impl Distribution {
+    /// Share below `x`, without limits.
+    fn below(&self, x: f64) -> f64 {
+        match self.law {
+            Law::Normal { mean, std } => normal_cdf((x - mean) / std),
+            Law::Uniform => ((x - self.limits[0]) / (self.limits[1] - self.limits[0])).clamp(0.0, 1.0),
+            Law::Rayleigh { std } if x > 0.0 => -libm::expm1(-0.5 * (x / std) * (x / std)),
+            Law::Rayleigh { .. } => 0.0,
+        }
+    }
+
+    /// The value that a share `u`, 0 to 1 and neither, lies below.
+    pub fn quantile(&self, u: f64) -> f64 {
+        let [low, high] = self.limits;
+        let [least, most] = self.limits.map(|end| self.below(end));
+        let share = least + u * (most - least);
+        let value = match self.law {
+            Law::Normal { mean, std } => mean + std * normal_quantile(share),
+            Law::Uniform => low + u * (high - low),
+            Law::Rayleigh { std } => std * (-2.0 * libm::log1p(-share)).sqrt(),
+        };
+        value.clamp(low, high)
+    }
+
+    /// What is wrong with a distribution that scatters about another value than the drive has: nothing within so many standard deviations, or
+    /// so small a share of the value. Of a field that is 0 as drawn, such as a wear, nobody knows.
+    fn beside_drive(&self, nominal: f64) -> Option<String> {
+        let [low, high] = self.limits;
+        let (middle, std) = match self.law {
+            Law::Normal { mean, std } => (mean, std),
+            Law::Uniform => (0.5 * (low + high), (high - low) / 12f64.sqrt()),
+            Law::Rayleigh { .. } => return None,
+        };
+        let off = (middle - nominal).abs();
+        (nominal != 0.0 && off > FAR_OFF.0 * std && off > FAR_OFF.1 * nominal.abs()).then(|| {
+            format!(
+                "the tolerance scatters about {}, {:.0} standard deviations of {} away; allowed: about the value of the drive, which its file or \
+                 --set changes",
+                told(middle),
+                off / std,
+                told(std)
+            )
+        })
+    }
+
+    /// The same tolerance, half as wide: about the middle, and a size about nothing.
+    #[must_use]
+    pub fn halved(&self) -> Distribution {
+        let middle = match self.law {
+            Law::Normal { mean, .. } => mean,
+            Law::Uniform if self.limits[0] == 0.0 => 0.0,
+            Law::Uniform => 0.5 * (self.limits[0] + self.limits[1]),
+            Law::Rayleigh { .. } => 0.0,
+        };
+        let law = match self.law {
+            Law::Normal { mean, std } => Law::Normal { mean, std: 0.5 * std },
+            Law::Uniform => Law::Uniform,
+            Law::Rayleigh { std } => Law::Rayleigh { std: 0.5 * std },
+        };
+        Distribution { law, limits: self.limits.map(|end| middle + 0.5 * (end - middle)) }
+    }
+}
+
+impl fmt::Display for Distribution {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [low, high] = self.limits;
+        match self.law {
+            Law::Normal { mean, std } => write!(f, "normal, mean {}, std {}", told(mean), told(std))?,
+            Law::Uniform => return write!(f, "uniform, {} to {}", told(low), told(high)),
+            Law::Rayleigh { std } => write!(f, "rayleigh, std {}", told(std))?,
+        }
+        write!(f, ", within {} to {}", told(low), told(high))
+    }
+}
+
+/// A number with four digits, in as few characters as these take.
+fn told(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
+}
+
+impl Acts {
+    /// Whether a direction or a phase is drawn beside the size.
+    pub fn has_phase(self) -> bool {
+        matches!(self, Acts::Directed | Acts::Harmonic { .. })
+    }
+
+    /// How a field acts; `order` where one is given.
+    fn of(field: &str, order: Option<u32>, errors: TeethError) -> Result<Acts, String> {
+        let section_key = field.strip_prefix("as_built.");
+        let harmonic = |wheel| match order {
+            Some(order) => Ok(Acts::Harmonic { wheel, order }),
+            None => Err("order: missing; give the waves around the wheel".to_owned()),
+        };
+        let acts = match section_key {
+            Some("flexspline_pitch_harmonics") => return harmonic(Wheel::Flexspline),
+            Some("circular_spline_pitch_harmonics") => return harmonic(Wheel::CircularSpline),
+            Some(
+                "circular_spline_eccentricity_um"
+                | "circular_spline_ovality_um"
+                | "circular_spline_offset_um"
+                | "flexspline_runout_um"
+                | "generator_eccentricity_um",
+            ) => Acts::Directed,
+            Some("flexspline_pitch_error_um") => Acts::Teeth { wheel: Wheel::Flexspline, errors },
+            Some("circular_spline_pitch_error_um") => Acts::Teeth { wheel: Wheel::CircularSpline, errors },
+            Some(
+                "rim_thickness_harmonics" | "cam_form_harmonics" | "damaged_teeth" | "generator_lobe_asymmetry_um",
+            ) => {
+                return Err(format!(
+                    "field: found {field:?}, for which there are no kernels; allowed of [as_built]: eccentricity, ovality and offset of the \
+                     circular spline, runout of the flexspline, eccentricity of the generator, pitch errors and their harmonics, wear, \
+                     differences of temperature"
+                ));
+            }
+            Some(phase) if phase.ends_with("_phase_deg") || phase.ends_with("_direction_deg") => {
+                return Err(format!("field: found {field:?}, which is drawn with its size; leave it out"));
+            }
+            _ => Acts::Alike,
+        };
+        match order {
+            Some(order) => Err(format!("order: found {order} beside {field:?}, allowed: with pitch harmonics alone")),
+            None => Ok(acts),
+        }
+    }
+}
+
+const KEYS: [&str; 6] = ["drive", "generator", "torque_n_m", "temperature_c", "exceed_arcsec", "tolerance"];
+const TOLERANCE_KEYS: [&str; 9] =
+    ["name", "field", "order", "errors", "distribution", "mean", "std", "limits", "plus_minus"];
+const TWO_LIMITS: &str = "two numbers, the least first, then a larger one";
+const ANY_ORDER: Allowed = from(1.0, 1000.0);
+const POSITIVE: Allowed = above(0.0, 1e9);
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum LawName {
+    Normal,
+    Uniform,
+    Rayleigh,
+}
+
+impl Tolerances {
+    /// Reads a file; `drive` finds the drive that it names.
+    ///
+    /// # Errors
+    /// Everything that is wrong with it: file, line, field, the value found and what is allowed.
+    pub fn read(
+        name: &str,
+        file_text: &str,
+        drive: impl FnOnce(&str) -> Result<Drive, String>,
+    ) -> Result<Tolerances, String> {
+        let mut file = TomlFile::new(name, file_text);
+        let told = |file: TomlFile<'_>| file.problems().iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
+        let Some(table) = file.parse() else { return Err(told(file)) };
+        let mut known: Vec<String> = KEYS.iter().map(|key| (*key).to_owned()).collect();
+        known.extend(TOLERANCE_KEYS.iter().map(|key| format!("tolerance.{key}")));
+        file.refuse_unknown_keys(&table, &known.iter().map(String::as_str).collect::<Vec<_>>(), &[]);
+        let value = |key: &str| -> Option<&Spanned<DeValue<'_>>> { table.get(key) };
+        let drive = match value("drive") {
+            None => drive("HHD-95"),
+            Some(value) => match file.take("drive", text(value)) {
+                Some(drive_name) => drive(&drive_name).map_err(|why| format!("{name}: drive: {why}")),
+                None => return Err(told(file)),
+            },
+        }?;
+        if let Some(field) = drive.as_built.first_not_uniform() {
+            file.refuse_whole(
+                "drive",
+                format!(
+                    "{field} is not zero: give the drive as drawn; kernels are of first order about a drive that repeats from tooth to \
+                     tooth, and about one unit there would be as many of them as teeth"
+                ),
+            );
+        }
+        let generators = match value("generator") {
+            None => vec![GeneratorKind::Cam],
+            Some(value) => file.take("generator", generators(value)).unwrap_or_default(),
+        };
+        let rated = generators.iter().map(|kind| drive.rated_torque_n_m(*kind)).fold(f64::INFINITY, f64::min);
+        let rated = if rated.is_finite() { rated } else { 1.0 };
+        let torque_n_m = match value("torque_n_m") {
+            None => RATED_SHARE * rated,
+            Some(value) => {
+                file.take("torque_n_m", flexspline_base::toml_file::real(&above(0.0, rated), value)).unwrap_or(rated)
+            }
+        };
+        let limits = &drive.temperature;
+        let temperature_c = match value("temperature_c") {
+            None => limits.reference_c,
+            Some(value) => file
+                .take(
+                    "temperature_c",
+                    flexspline_base::toml_file::real(&from(limits.minimum_c, limits.maximum_c), value),
+                )
+                .unwrap_or(limits.reference_c),
+        };
+        let exceed_arcsec = match value("exceed_arcsec") {
+            None => Vec::new(),
+            Some(value) => {
+                let each = |one: &Spanned<DeValue<'_>>| flexspline_base::toml_file::real(&POSITIVE, one);
+                file.take("exceed_arcsec", each_of(value, "an array of numbers above 0, arcsec", each))
+                    .unwrap_or_default()
+            }
+        };
+        let mut list = Vec::new();
+        match value("tolerance") {
+            None => file.refuse_whole("tolerance", "missing; give at least one [[tolerance]]".to_owned()),
+            Some(value) => {
+                let read = each_of(value, "tables [[tolerance]]", |entry| tolerance(entry, &drive));
+                list = file.take("tolerance", read).unwrap_or_default();
+                if file.is_sound() && !(1..=MOST_TOLERANCES).contains(&list.len()) {
+                    let what = format!("found {}, allowed: 1 to {MOST_TOLERANCES}", list.len());
+                    file.refuse(value.span(), "tolerance", what);
+                }
+                let twice = |a: &Tolerance, b: &Tolerance| a.name == b.name || (a.field == b.field && a.acts == b.acts);
+                if let Some((k, _)) = list.iter().enumerate().find(|(k, b)| list[..*k].iter().any(|a| twice(a, b))) {
+                    let what = format!("found {:?} twice, allowed: once", list[k].name);
+                    file.refuse(value.span(), &format!("tolerance[{k}]"), what);
+                }
+                if file.is_sound() {
+                    let spans = value.get_ref().as_array().into_iter().flatten().map(Spanned::span);
+                    for (k, span) in spans.enumerate().take(list.len()) {
+                        if let Some(column) = column_taken(&list, k) {
+                            let what = format!("found {column:?}, which another column of the shards has; give a name");
+                            file.refuse(span.clone(), &format!("tolerance[{k}].name"), what);
+                        }
+                        if let Err(what) = every_limit_makes_a_drive(&drive, &list, k) {
+                            file.refuse(span, &format!("tolerance[{k}]"), what);
+                        }
+                    }
+                }
+            }
+        }
+        if file.is_sound() {
+            Ok(Tolerances { drive, generators, torque_n_m, temperature_c, exceed_arcsec, list })
+        } else {
+            Err(told(file))
+        }
+    }
+}
+
+/// A column of tolerance `k` that a shard has already.
+fn column_taken(list: &[Tolerance], k: usize) -> Option<String> {
+    let others = list.iter().enumerate().filter(|(other, _)| *other != k).flat_map(|(_, other)| other.columns());
+    let taken: Vec<String> = others.chain(OWN_COLUMNS.iter().map(|name| (*name).to_owned())).collect();
+    let figure = |name: &String| FIGURES.iter().chain(&FEM_FIGURES).any(|known| known == name);
+    list[k].columns().find(|column| taken.contains(column) || figure(column))
+}
+
+/// A tolerance at either of its limits, the others in their middle.
+fn every_limit_makes_a_drive(drive: &Drive, list: &[Tolerance], k: usize) -> Result<(), String> {
+    let teeth = [drive.flexspline.teeth, drive.circular_spline.teeth];
+    let tolerance = &list[k];
+    for limit in tolerance.distribution.limits {
+        let mut drawn = Drawn::middle(list);
+        drawn.values[k] = limit;
+        if let Acts::Teeth { wheel, .. } = tolerance.acts {
+            drawn.teeth_um[k] = vec![limit; teeth[usize::from(wheel == Wheel::CircularSpline)] as usize];
+        }
+        drawn
+            .drive(drive, list)
+            .map_err(|error| format!("{:?} at its limit {limit} makes no drive: {error}", tolerance.name))?;
+    }
+    Ok(())
+}
+
+/// Load where none is given, of the rated one: a guess at what a joint sees most.
+const RATED_SHARE: f64 = 0.25;
+
+fn generators(value: &Spanned<DeValue<'_>>) -> Result<Vec<GeneratorKind>, Refused> {
+    let known: Vec<(&'static str, GeneratorKind)> =
+        GeneratorKind::ALL.into_iter().map(|kind| (kind.name(), kind)).collect();
+    match value.get_ref() {
+        DeValue::Array(_) => {
+            let all = each_of(value, "generators", |one| one_of(&known, one))?;
+            let twice = all.iter().enumerate().any(|(k, kind)| all[..k].contains(kind));
+            if all.is_empty() || twice {
+                return Err(Refused::because(
+                    value,
+                    "found none or one twice, allowed: different generators".to_owned(),
+                ));
+            }
+            Ok(all)
+        }
+        DeValue::String(word) if word == "all" => Ok(GeneratorKind::ALL.to_vec()),
+        _ => Ok(vec![one_of(&known, value)?]),
+    }
+}
+
+/// One `[[tolerance]]`.
+fn tolerance(entry: &Spanned<DeValue<'_>>, drive: &Drive) -> Result<Tolerance, Refused> {
+    let table = Entries::of(entry, &TOLERANCE_KEYS)?;
+    let field = table.needed("field", text)?;
+    let place = |key: &str| -> &Spanned<DeValue<'_>> { table.table.get(key).unwrap_or(entry) };
+    let order = table.given("order", |value| whole(&ANY_ORDER, value))?;
+    let errors = [("position", TeethError::Position), ("pitch", TeethError::Pitch)];
+    let errors_given = table.given("errors", |value| one_of(&errors, value))?;
+    let acts = Acts::of(&field, order, errors_given.unwrap_or(TeethError::Position))
+        .map_err(|what| Refused::because(place("field"), what))?;
+    if errors_given.is_some() && !matches!(acts, Acts::Teeth { .. }) {
+        let what = format!("errors: found it beside {field:?}, allowed: with errors of every tooth alone");
+        return Err(Refused::because(place("errors"), what));
+    }
+    let nominal = match acts {
+        Acts::Alike => {
+            nominal(drive, &field).map_err(|what| Refused::because(place("field"), what).within(".field"))?
+        }
+        _ => 0.0,
+    };
+    let laws = [("normal", LawName::Normal), ("uniform", LawName::Uniform), ("rayleigh", LawName::Rayleigh)];
+    let law = table.needed("distribution", |value| one_of(&laws, value))?;
+    let number = |key: &'static str| table.given(key, any);
+    let (mean, std, half) = (
+        number("mean")?,
+        table.given("std", |value| flexspline_base::toml_file::real(&POSITIVE, value))?,
+        table.given("plus_minus", |value| flexspline_base::toml_file::real(&POSITIVE, value))?,
+    );
+    let limits = table.given("limits", |value| {
+        let pair = each_of(value, TWO_LIMITS, any)?;
+        match pair[..] {
+            [low, high] if low < high => Ok([low, high]),
+            _ => Err(Refused::found(value, TWO_LIMITS)),
+        }
+    })?;
+    let is_size = !matches!(acts, Acts::Alike | Acts::Teeth { .. });
+    let beside = |key: &str, what: &str| Refused::because(place(key), format!("{key}: {what}"));
+    if mean.is_some() && (law != LawName::Normal || is_size) {
+        return Err(beside(
+            "mean",
+            "allowed: with distribution = \"normal\" of a field that is no size in a direction",
+        ));
+    }
+    if std.is_some() && (half.is_some() || law == LawName::Uniform) {
+        return Err(beside("std", "allowed: with normal or rayleigh, and without plus_minus"));
+    }
+    let middle = mean.unwrap_or(nominal);
+    let missing = |what: &str| Refused::because(entry, format!("found no {what}"));
+    let distribution = match law {
+        LawName::Normal if is_size => {
+            let what = format!(
+                "distribution: found \"normal\" for {field:?}, a size in a random direction; allowed: \"rayleigh\" (both components \
+                 normal), \"uniform\""
+            );
+            return Err(Refused::because(place("distribution"), what));
+        }
+        LawName::Normal => {
+            let std = std.or(half.map(|h| h / SIGMAS)).ok_or_else(|| missing("std, nor plus_minus (3 std)"))?;
+            let within = half.map_or([middle - FAR * std, middle + FAR * std], |h| [middle - h, middle + h]);
+            Distribution { law: Law::Normal { mean: middle, std }, limits: limits.unwrap_or(within) }
+        }
+        LawName::Uniform => {
+            let around = half.map(|h| if is_size { [0.0, h] } else { [middle - h, middle + h] });
+            let limits = limits.or(around).ok_or_else(|| missing("limits, nor plus_minus"))?;
+            Distribution { law: Law::Uniform, limits }
+        }
+        LawName::Rayleigh if !is_size => {
+            let what = format!(
+                "distribution: found \"rayleigh\" for {field:?}, which is no size in a direction; allowed: \"normal\", \"uniform\""
+            );
+            return Err(Refused::because(place("distribution"), what));
+        }
+        LawName::Rayleigh => {
+            let std = std.ok_or_else(|| missing("std (of each component)"))?;
+            Distribution { law: Law::Rayleigh { std }, limits: limits.unwrap_or([0.0, FAR * std]) }
+        }
+    };
+    // A size is never negative, and no law may have all of itself outside its limits.
+    if is_size && distribution.limits[0] < 0.0 {
+        return Err(beside("limits", "found a size below 0, allowed: 0 or more"));
+    }
+    let [least, most] = distribution.limits.map(|end| distribution.below(end));
+    if most - least < LEAST_INSIDE {
+        return Err(beside("limits", "found limits that the distribution hardly ever keeps, allowed: wider ones"));
+    }
+    if let Some(what) = distribution.beside_drive(nominal).filter(|_| matches!(acts, Acts::Alike)) {
+        let key = if mean.is_some() { "mean" } else { "limits" };
+        return Err(beside(key, &format!("{field:?} is {nominal} in the drive, and {what}")));
+    }
+    let name = table.given("name", text)?.unwrap_or_else(|| match acts {
+        Acts::Harmonic { order, .. } => format!("{field}, order {order}"),
+        _ => field.clone(),
+    });
+    Ok(Tolerance { name, field, acts, distribution })
+}
+
+/// Share of a law that must lie within its limits: below it a quantile has no digits left.
+const LEAST_INSIDE: f64 = 1e-6;
+
+/// The number that a field of the drive holds.
+fn nominal(drive: &Drive, field: &str) -> Result<f64, String> {
+    // Every field of a written drive stands on a line of its own, with its section above.
+    let written = drive.to_toml();
+    let table: toml::Table = written.parse().map_err(|error: toml::de::Error| error.to_string())?;
+    let found = field.split_once('.').and_then(|(section, key)| table.get(section)?.get(key));
+    match found {
+        Some(toml::Value::Float(number)) => Ok(*number),
+        Some(toml::Value::Integer(_)) => Err(format!("found {field:?}, a whole number, allowed: fields that scatter")),
+        Some(other) => {
+            Err(format!("found {field:?}, which is {other} in this drive, allowed: a field that is a number"))
+        }
+        None => {
+            let paths: Vec<String> = table
+                .iter()
+                .filter_map(|(section, keys)| Some((section, keys.as_table()?)))
+                .flat_map(|(section, keys)| keys.keys().map(move |key| format!("{section}.{key}")))
+                .collect();
+            let known: Vec<&str> = paths.iter().map(String::as_str).collect();
+            let hint =
+                likeliest_path(field, &known).map_or_else(String::new, |meant| format!("; did you mean `{meant}`?"));
+            Err(format!("found {field:?}, allowed: a field of the drive, as --set takes it{hint}"))
+        }
+    }
+}
+
+/// A wheel by its name.
+mod wheel_by_name {
+    use super::Wheel;
+    use serde::{Deserialize, Deserializer, Serializer, de::Error};
+
+    pub(super) fn serialize<S: Serializer>(wheel: &Wheel, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_str(wheel.name())
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Wheel, D::Error> {
+        let name = String::deserialize(from)?;
+        let known = [Wheel::Flexspline, Wheel::CircularSpline];
+        known
+            .into_iter()
+            .find(|wheel| wheel.name() == name)
+            .ok_or_else(|| D::Error::custom(format!("no wheel {name:?}")))
+    }
+}

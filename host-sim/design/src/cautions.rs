@@ -1,0 +1,228 @@
+//! What has to be said beside figures that converged as well as any: that they are not to be built, or not to be believed.
+//!
+//! The model is elastic and plane and does not mind teeth that interfere on the drawing, steel that yields, or an error so steep that no
+//! command undoes it. Each of these is one [`Caution`], with the value found and its limit.
+
+use serde::Serialize;
+
+use crate::simulate::PlaceStress;
+use flexspline_base::units::ARCSEC_PER_RAD;
+use flexspline_mechanics::drive::{Drive, GeneratorKind, RigidMesh};
+
+/// Von Mises stress above which steel of a flexspline yields, MPa. A guess in the middle: quenched and tempered nickel-chromium-molybdenum
+/// steels (34CrNiMo6, EN 10083-3: 900 to 1000 MPa of yield strength in thin sections; precipitation-hardened ones have more).
+pub const YIELD_MPA: f64 = 1000.0;
+/// Pressure between flanks that no steel bears for long, MPa. A guess below what ISO 76 allows once of rolling bearings (4000 to 4600 MPa).
+pub const MOST_FLANK_PRESSURE_MPA: f64 = 3000.0;
+/// Slope of the error over the generator's motion from which on the inverse is in doubt; at 1 there is none. A guess: half way.
+pub const MOST_SLOPE: f64 = 0.5;
+
+/// Room of rigid teeth as built, arcsec, below which they wedge more than rim and sleeve give way. A guess: three times what `HHD-95-typical`
+/// lacks (94 arcsec), whose teeth bear it at 1150 MPa.
+pub const LEAST_ROOM_ARCSEC: f64 = -300.0;
+
+/// One thing to know before figures are used.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Caution {
+    /// Which figure.
+    pub figure: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// Where caution begins.
+    pub limit: f64,
+    /// What it means, in words.
+    pub words: String,
+}
+
+/// The figures that are looked at, those that are known.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Looked {
+    /// Least gap of the rigid teeth of the drawing, µm.
+    pub rigid_gap_um: Option<f64>,
+    /// What rigid teeth as built leave the output to turn at the tightest place of its turn, arcsec; missing of a drive that is as drawn.
+    pub room_as_built_arcsec: Option<f64>,
+    /// Largest von Mises stress at a node, MPa.
+    pub max_von_mises_mpa: Option<f64>,
+    /// Largest von Mises stress in the root fillets by the strain of their surface, MPa. In a fillet the nodal value of a mesh is too low, by a
+    /// third and more; on bore and flanks it is all there is. So the larger of both is looked at.
+    pub root_fillet_mpa: Option<f64>,
+    /// Largest pressure between flanks, MPa, as Hertz has it and the limit means it.
+    pub peak_flank_pressure_mpa: Option<f64>,
+    /// Bound of the slope of the error over the generator's motion.
+    pub slope_bound: Option<f64>,
+}
+
+impl Looked {
+    /// What has to be said of them; nothing of a sound drive.
+    pub fn cautions(&self) -> Vec<Caution> {
+        let mut cautions = Vec::new();
+        let (stress, place) = self.largest_stress();
+        // `wrong` is the side of the limit that asks for caution: 1 above, -1 below. What is not a number is on either.
+        let mut say = |figure, value: Option<f64>, wrong: f64, limit: f64, words: fn(f64) -> String| {
+            if let Some(value) = value.filter(|value| value.is_nan() || wrong * (value - limit) > 0.0) {
+                cautions.push(Caution { figure, value, limit, words: words(value) });
+            }
+        };
+        say("rigid_gap_um", self.rigid_gap_um, -1.0, -1e3 * RigidMesh::TOUCHES_MM, |gap| {
+            format!(
+                "the teeth of the drawing interfere by {:.1} um when rigid: such a drive binds; drive --check says where",
+                -gap
+            )
+        });
+        say("room_as_built_arcsec", self.room_as_built_arcsec, -1.0, LEAST_ROOM_ARCSEC, |room| {
+            format!(
+                "the teeth as built lack {:.0} arcsec of room at the tightest place of a turn, more than {} arcsec: rim and sleeve have to give way",
+                -room, -LEAST_ROOM_ARCSEC
+            )
+        });
+        if place == ROOT_FILLET {
+            say(place, stress, 1.0, YIELD_MPA, |stress| above_yield(stress, " in a root fillet"));
+        } else {
+            say(place, stress, 1.0, YIELD_MPA, |stress| above_yield(stress, ""));
+        }
+        say("peak_flank_pressure_mpa", self.peak_flank_pressure_mpa, 1.0, MOST_FLANK_PRESSURE_MPA, |pressure| {
+            format!(
+                "a flank pressure of {pressure:.0} MPa is above {MOST_FLANK_PRESSURE_MPA} MPa, which no steel bears for long"
+            )
+        });
+        say("slope_bound", self.slope_bound, 1.0, MOST_SLOPE, |slope| {
+            format!(
+                "the error changes by up to {slope:.2} of the motion; from 1 on no command undoes it, from {MOST_SLOPE} on it is in doubt"
+            )
+        });
+        cautions
+    }
+
+    /// The larger of the two stresses, and the name of its figure. One that is not a number is the larger.
+    fn largest_stress(&self) -> (Option<f64>, &'static str) {
+        match (self.max_von_mises_mpa, self.root_fillet_mpa) {
+            (Some(nodal), Some(fillet)) if nodal.is_nan() || fillet <= nodal => (Some(nodal), NODAL),
+            (nodal, None) => (nodal, NODAL),
+            (_, fillet) => (fillet, ROOT_FILLET),
+        }
+    }
+}
+
+/// The figure of nodal stress.
+const NODAL: &str = "max_von_mises_mpa";
+/// The figure of stress by the strain of a surface.
+const ROOT_FILLET: &str = "root_fillet_mpa";
+/// The figure of stress over three meshes.
+const OVER_MESHES: &str = "stress";
+
+fn above_yield(stress_mpa: f64, place: &str) -> String {
+    format!(
+        "a stress of {stress_mpa:.0} MPa{place} is above {YIELD_MPA} MPa, where steel yields, which the model does not do"
+    )
+}
+
+/// Adds what has to be said of stress over three meshes. It takes the place of what one mesh says, which is worse known.
+pub fn add_stress(cautions: &mut Vec<Caution>, stress: &[PlaceStress]) {
+    let Some(worst) = stress.iter().max_by(|a, b| a.von_mises_mpa.total_cmp(&b.von_mises_mpa)) else { return };
+    let value = worst.von_mises_mpa;
+    if value.is_nan() || value > YIELD_MPA {
+        cautions.retain(|caution| ![NODAL, ROOT_FILLET, OVER_MESHES].contains(&caution.figure));
+        let place = format!(", {}, over three meshes", worst.place.in_words());
+        cautions.push(Caution { figure: OVER_MESHES, value, limit: YIELD_MPA, words: above_yield(value, &place) });
+    }
+}
+
+/// Least gap between the rigid teeth of the drawing over a mesh cycle, µm; negative where they interfere. Missing where they never meet.
+pub fn rigid_gap_um(drive: &Drive, kind: GeneratorKind) -> Option<f64> {
+    let least = RigidMesh::new(drive, kind).ok()?.least()?;
+    Some(1e3 * least.gap_mm)
+}
+
+/// What rigid teeth leave the output of a drive as built to turn at the tightest place of its turn, arcsec; negative where they bind.
+/// Missing of a drive that is as drawn: [`rigid_gap_um`] says all of it.
+pub fn room_as_built_arcsec(drive: &Drive, kind: GeneratorKind) -> Option<f64> {
+    drive.as_built.first_not_uniform()?;
+    let room = RigidMesh::new(drive, kind).ok()?.room_as_built(drive, kind)?;
+    Some(room.least_rad * ARCSEC_PER_RAD)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::Place;
+
+    #[test]
+    fn each_limit_is_said_and_nothing_within_them() {
+        let sound = Looked {
+            rigid_gap_um: Some(0.0),
+            room_as_built_arcsec: Some(LEAST_ROOM_ARCSEC),
+            max_von_mises_mpa: Some(YIELD_MPA),
+            root_fillet_mpa: Some(YIELD_MPA),
+            peak_flank_pressure_mpa: Some(MOST_FLANK_PRESSURE_MPA),
+            slope_bound: Some(MOST_SLOPE),
+        };
+        assert_eq!(sound.cautions(), []);
+        let figures = |looked: Looked| looked.cautions().into_iter().map(|caution| caution.figure).collect::<Vec<_>>();
+        assert_eq!(figures(Looked { rigid_gap_um: Some(-0.11), ..sound }), ["rigid_gap_um"]);
+        assert_eq!(figures(Looked { room_as_built_arcsec: Some(-301.0), ..sound }), ["room_as_built_arcsec"]);
+        assert_eq!(figures(Looked { max_von_mises_mpa: Some(f64::NAN), ..sound }), ["max_von_mises_mpa"]);
+        assert_eq!(figures(Looked { peak_flank_pressure_mpa: Some(3001.0), ..sound }), ["peak_flank_pressure_mpa"]);
+        assert_eq!(figures(Looked { slope_bound: Some(0.6), ..sound }), ["slope_bound"]);
+    }
+
+    /// A nodal value of 664 MPa beside 1204 in a root fillet: the drive is no sounder for it. The larger is told, once, under its name.
+    #[test]
+    fn stress_is_judged_by_the_larger_of_nodal_and_root_fillet() {
+        let told = |nodal, fillet| {
+            let looked = Looked { max_von_mises_mpa: nodal, root_fillet_mpa: fillet, ..Looked::default() };
+            looked.cautions().into_iter().map(|caution| (caution.figure, caution.value)).collect::<Vec<_>>()
+        };
+        assert_eq!(told(Some(664.0), Some(1204.0)), [("root_fillet_mpa", 1204.0)]);
+        assert_eq!(told(Some(1300.0), Some(1204.0)), [("max_von_mises_mpa", 1300.0)]);
+        assert_eq!(told(Some(1300.0), None), [("max_von_mises_mpa", 1300.0)]);
+        assert_eq!(told(None, Some(1204.0)), [("root_fillet_mpa", 1204.0)]);
+        assert_eq!(told(Some(664.0), Some(900.0)), []);
+        assert_eq!(told(Some(664.0), Some(f64::NAN)).len(), 1);
+        assert_eq!(told(Some(f64::NAN), Some(900.0)).len(), 1);
+    }
+
+    /// Three meshes say what one does not, and are told in its place.
+    #[test]
+    fn stress_over_three_meshes_takes_the_place_of_that_of_one() {
+        let at = |place, von_mises_mpa| PlaceStress {
+            place,
+            von_mises_mpa,
+            interval_mpa: [0.97 * von_mises_mpa, 1.03 * von_mises_mpa],
+            by_mesh_mpa: [von_mises_mpa; 3],
+            tooth: 0,
+        };
+        let mut cautions =
+            Looked { root_fillet_mpa: Some(1010.0), slope_bound: Some(0.9), ..Looked::default() }.cautions();
+        let before = cautions.clone();
+        add_stress(&mut cautions, &[at(Place::RootFillet, 990.0), at(Place::Bore, 500.0)]);
+        assert_eq!(cautions, before);
+        add_stress(&mut cautions, &[at(Place::RootFillet, 1205.0), at(Place::Bore, 500.0)]);
+        let figures: Vec<_> = cautions.iter().map(|caution| (caution.figure, caution.value)).collect();
+        assert_eq!(figures, [("slope_bound", 0.9), ("stress", 1205.0)]);
+        assert!(cautions[1].words.contains("root fillet, over three meshes"), "{}", cautions[1].words);
+    }
+
+    #[test]
+    fn built_in_teeth_clear_and_teeth_without_room_do_not() {
+        let mut drive = Drive::hhd_95();
+        assert!(rigid_gap_um(&drive, GeneratorKind::Cam).unwrap() > 0.0);
+        drive.circular_spline.profile_shift -= 0.1;
+        let looked = Looked { rigid_gap_um: rigid_gap_um(&drive, GeneratorKind::Cam), ..Looked::default() };
+        assert_eq!(looked.cautions()[0].figure, "rigid_gap_um");
+    }
+
+    /// The drawing is as sound as ever; the axis of the spline is not where it should be.
+    #[test]
+    fn teeth_that_bind_as_built_alone_are_told() {
+        let sound = Drive::hhd_95();
+        assert_eq!(room_as_built_arcsec(&sound, GeneratorKind::Cam), None);
+        let beside = sound.with_set("as_built.circular_spline_offset_um=60").unwrap();
+        let looked = |drive: &Drive| Looked {
+            rigid_gap_um: rigid_gap_um(drive, GeneratorKind::Cam),
+            room_as_built_arcsec: room_as_built_arcsec(drive, GeneratorKind::Cam),
+            ..Looked::default()
+        };
+        assert_eq!(looked(&beside).cautions()[0].figure, "room_as_built_arcsec");
+        assert_eq!(looked(&sound.with_set("as_built.circular_spline_offset_um=5").unwrap()).cautions(), []);
+    }
+}

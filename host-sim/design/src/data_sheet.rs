@@ -1,0 +1,339 @@
+//! The figures that a catalogue prints of a drive, by contact FEM: backlash, stiffness in three ranges of torque, lost motion,
+//! transmission error, stresses.
+//!
+//! The generator is held at angle 0, without load, and the output is loaded step by step to [`Loads::largest_n_m`]; then the drive
+//! turns on by a tooth pitch under that load. Stiffness is told as catalogues tell it (Harmonic Drive, CSF/CSG, "torsional stiffness"):
+//! K1 from the first contact to T1, K2 from T1 to T2, K3 above T2, secants of the torsion of the output. The clearance of the teeth is
+//! no part of it. An ideal drive is its own mirror image and is loaded one way; any other is loaded both ways where the clearance counts.
+
+use flexspline::{Direction, GeneratorAngle, Table};
+use serde::Serialize;
+
+use crate::cautions::{Looked, rigid_gap_um, room_as_built_arcsec};
+use crate::pitch_wave::peak_to_peak;
+use crate::simulate::peak_stress;
+use flexspline_base::units::ARCSEC_PER_RAD;
+use flexspline_mechanics::drive::{Drive, GeneratorKind};
+use flexspline_mechanics::motion::Motion;
+use flexspline_mechanics::stepping::{Problem, SolveError, SolverSettings};
+
+/// T1 and T2 over the largest load: of a CSF-25-100 they are 14 and 48 of 67 N·m.
+const RANGES: [f64; 2] = [0.21, 0.72];
+/// Share of the largest load, either way, between which lost motion is told (Harmonic Drive AG, glossary, "lost motion").
+const LOST_MOTION_SHARE: f64 = 0.04;
+/// A light touch, over the largest load: it closes the clearance and winds nothing up.
+const TOUCH_SHARE: f64 = 2e-4;
+/// An ideal drive whose output stands further than this (rad) from the middle when deformed has teeth that bind: it went to one side.
+const TO_ONE_SIDE_RAD: f64 = 1e-8;
+/// A touch overcomes the drag of the output so many times.
+const TOUCH_OVER_DRAG: f64 = 2.0;
+
+/// The torques that a sheet is told at, N·m, all positive.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Loads {
+    /// End of the first range of stiffness.
+    pub t1_n_m: f64,
+    /// End of the second.
+    pub t2_n_m: f64,
+    /// End of the third: the rated load.
+    pub largest_n_m: f64,
+}
+
+impl Loads {
+    /// T1 and T2 where a catalogue has them for this rated load.
+    pub fn up_to(largest_n_m: f64) -> Loads {
+        let [t1_n_m, t2_n_m] = RANGES.map(|share| share * largest_n_m);
+        Loads { t1_n_m, t2_n_m, largest_n_m }
+    }
+}
+
+/// Torsional stiffness in the three ranges of torque, N·m/rad: secants of the output's torsion.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Stiffness {
+    /// Where the ranges end.
+    #[serde(flatten)]
+    pub loads: Loads,
+    /// From first contact to T1.
+    pub k1_n_m_per_rad: f64,
+    /// From T1 to T2.
+    pub k2_n_m_per_rad: f64,
+    /// Above T2.
+    pub k3_n_m_per_rad: f64,
+}
+
+impl Stiffness {
+    /// That of a table of `drive`, forward loads up to the table's largest, at reference temperature, in the middle between both
+    /// directions of motion; none where the table does not reach beyond the drag.
+    pub fn of_table(drive: &Drive, table: &Table<'_>) -> Option<Stiffness> {
+        let largest_n_m = f64::from(table.torque_nodes_n_m().last()?);
+        let loads = Loads::up_to(largest_n_m);
+        let touch = touch_n_m(drive, loads);
+        let temperature = drive.temperature.reference_c as f32;
+        let torsion = |torque: f64| -> Option<f64> {
+            let at =
+                |direction| table.steady_error_rad(GeneratorAngle::default(), torque as f32, temperature, direction);
+            let [forward, backward] = [at(Direction::Forward)?, at(Direction::Backward)?];
+            Some(0.5 * (f64::from(forward) + f64::from(backward)))
+        };
+        let secant = |from: f64, to: f64| Some((to - from) / (torsion(to)? - torsion(from)?)).filter(|k| k.is_finite());
+        (touch < loads.t1_n_m).then_some(())?;
+        Some(Stiffness {
+            loads,
+            k1_n_m_per_rad: secant(touch, loads.t1_n_m)?,
+            k2_n_m_per_rad: secant(loads.t1_n_m, loads.t2_n_m)?,
+            k3_n_m_per_rad: secant(loads.t2_n_m, largest_n_m)?,
+        })
+    }
+}
+
+/// A light touch, N·m.
+pub(crate) fn touch_n_m(drive: &Drive, loads: Loads) -> f64 {
+    (TOUCH_SHARE * loads.largest_n_m).max(TOUCH_OVER_DRAG * drive.output.drag_torque_n_m)
+}
+
+/// What a catalogue prints. A figure is missing where the drive was not brought so far.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct DataSheet {
+    /// Least gap between the rigid teeth of the drawing over a mesh cycle, µm; negative where they interfere. Missing where they never meet.
+    pub rigid_gap_um: Option<f64>,
+    /// What rigid teeth as built leave the output to turn at the tightest place of its turn, arcsec; missing of a drive as drawn.
+    pub room_as_built_arcsec: Option<f64>,
+    /// Turn of the output between light touches either way, arcsec.
+    pub backlash_arcsec: Option<f64>,
+    /// Turn of the output between 4 % of the largest load either way, arcsec; the clearance is part of it.
+    pub lost_motion_arcsec: Option<f64>,
+    /// Stiffness from first contact to T1, N·m/rad.
+    pub k1_n_m_per_rad: Option<f64>,
+    /// Stiffness from T1 to T2, N·m/rad.
+    pub k2_n_m_per_rad: Option<f64>,
+    /// Stiffness above T2, N·m/rad.
+    pub k3_n_m_per_rad: Option<f64>,
+    /// Turn of the output from first contact to the largest load, arcsec.
+    pub wind_up_arcsec: Option<f64>,
+    /// Kinematic error over a tooth pitch under the largest load, peak to peak, arcsec: of the wave through the positions, of a drive that repeats
+    /// with the pitch.
+    pub kinematic_error_pp_arcsec: Option<f64>,
+    /// Largest von Mises stress under the largest load, MPa: a nodal value, which grows with the mesh at roots and contacts.
+    pub max_von_mises_mpa: Option<f64>,
+    /// Largest von Mises stress in the root fillets of the flexspline, MPa, by the strain of their surface: `simulate --stress` says what it tends
+    /// to with the mesh.
+    pub root_fillet_mpa: Option<f64>,
+    /// The largest on the bore, MPa, nodal.
+    pub bore_mpa: Option<f64>,
+    /// Largest pressure between flanks, MPa.
+    pub peak_flank_pressure_mpa: Option<f64>,
+    /// Largest pressure between generator and bore, MPa.
+    pub peak_generator_pressure_mpa: Option<f64>,
+    /// Largest force of the generator along its major axis on one half of the rim, outward, N.
+    pub lobe_force_n: Option<f64>,
+    /// Largest tilt of a tooth along its face, outward, mrad: the coning of the rim in its sleeve.
+    pub tilt_mrad: Option<f64>,
+    /// Load along the face of the flank that bears most anywhere: peak over mean.
+    pub load_across_face_peak_over_mean: Option<f64>,
+    /// Teeth of the flexspline that carry the largest load, percent.
+    pub teeth_in_contact_percent: Option<f64>,
+    /// Largest load at which equilibrium was found, N·m.
+    pub last_stable_n_m: Option<f64>,
+}
+
+impl DataSheet {
+    /// A sheet of figures in the order of [`FIGURES`].
+    pub fn of_figures(figures: [Option<f64>; FIGURES.len()]) -> DataSheet {
+        let [
+            rigid_gap_um,
+            room_as_built_arcsec,
+            backlash_arcsec,
+            lost_motion_arcsec,
+            k1_n_m_per_rad,
+            k2_n_m_per_rad,
+            k3_n_m_per_rad,
+            wind_up_arcsec,
+            kinematic_error_pp_arcsec,
+            max_von_mises_mpa,
+            root_fillet_mpa,
+            bore_mpa,
+            peak_flank_pressure_mpa,
+            peak_generator_pressure_mpa,
+            lobe_force_n,
+            tilt_mrad,
+            load_across_face_peak_over_mean,
+            teeth_in_contact_percent,
+            last_stable_n_m,
+        ] = figures;
+        DataSheet {
+            rigid_gap_um,
+            room_as_built_arcsec,
+            backlash_arcsec,
+            lost_motion_arcsec,
+            k1_n_m_per_rad,
+            k2_n_m_per_rad,
+            k3_n_m_per_rad,
+            wind_up_arcsec,
+            kinematic_error_pp_arcsec,
+            max_von_mises_mpa,
+            root_fillet_mpa,
+            bore_mpa,
+            peak_flank_pressure_mpa,
+            peak_generator_pressure_mpa,
+            lobe_force_n,
+            tilt_mrad,
+            load_across_face_peak_over_mean,
+            teeth_in_contact_percent,
+            last_stable_n_m,
+        }
+    }
+
+    /// What cautions look at.
+    pub fn looked(&self) -> Looked {
+        Looked {
+            rigid_gap_um: self.rigid_gap_um,
+            room_as_built_arcsec: self.room_as_built_arcsec,
+            max_von_mises_mpa: self.max_von_mises_mpa,
+            root_fillet_mpa: self.root_fillet_mpa,
+            peak_flank_pressure_mpa: self.peak_flank_pressure_mpa,
+            slope_bound: None,
+        }
+    }
+}
+
+/// A figure by name.
+pub type FigureOf = (&'static str, fn(&DataSheet) -> Option<f64>);
+
+/// The figures that can be asked for by name, as the fields are called.
+pub const FIGURES: [FigureOf; 19] = [
+    ("rigid_gap_um", |s| s.rigid_gap_um),
+    ("room_as_built_arcsec", |s| s.room_as_built_arcsec),
+    ("backlash_arcsec", |s| s.backlash_arcsec),
+    ("lost_motion_arcsec", |s| s.lost_motion_arcsec),
+    ("k1_n_m_per_rad", |s| s.k1_n_m_per_rad),
+    ("k2_n_m_per_rad", |s| s.k2_n_m_per_rad),
+    ("k3_n_m_per_rad", |s| s.k3_n_m_per_rad),
+    ("wind_up_arcsec", |s| s.wind_up_arcsec),
+    ("kinematic_error_pp_arcsec", |s| s.kinematic_error_pp_arcsec),
+    ("max_von_mises_mpa", |s| s.max_von_mises_mpa),
+    ("root_fillet_mpa", |s| s.root_fillet_mpa),
+    ("bore_mpa", |s| s.bore_mpa),
+    ("peak_flank_pressure_mpa", |s| s.peak_flank_pressure_mpa),
+    ("peak_generator_pressure_mpa", |s| s.peak_generator_pressure_mpa),
+    ("lobe_force_n", |s| s.lobe_force_n),
+    ("tilt_mrad", |s| s.tilt_mrad),
+    ("load_across_face_peak_over_mean", |s| s.load_across_face_peak_over_mean),
+    ("teeth_in_contact_percent", |s| s.teeth_in_contact_percent),
+    ("last_stable_n_m", |s| s.last_stable_n_m),
+];
+
+/// The sheet of a drive with one generator at a temperature. `positions` over the tooth pitch, 4 or more.
+///
+/// Where no equilibrium is found the sheet has what was found until then, and the error says where it ended.
+pub fn data_sheet(
+    drive: &Drive,
+    kind: GeneratorKind,
+    temperature_c: f64,
+    loads: Loads,
+    positions: usize,
+    settings: SolverSettings,
+) -> (DataSheet, Result<(), SolveError>) {
+    let mut sheet = DataSheet {
+        rigid_gap_um: rigid_gap_um(drive, kind),
+        room_as_built_arcsec: room_as_built_arcsec(drive, kind),
+        ..DataSheet::default()
+    };
+    let done = Problem::new(drive, kind, temperature_c, settings)
+        .and_then(|problem| fill(&mut sheet, &problem, loads, positions));
+    if let (Err(SolveError::NotConverged { reached_n_m, .. }), Some(last)) = (&done, &mut sheet.last_stable_n_m) {
+        *last = last.max(*reached_n_m);
+    }
+    (sheet, done)
+}
+
+fn fill(sheet: &mut DataSheet, problem: &Problem, loads: Loads, positions: usize) -> Result<(), SolveError> {
+    let drive = &problem.drive;
+    let mut motion = Motion::deformed(problem, 0.0)?;
+    sheet.last_stable_n_m = Some(0.0);
+    let unloaded = motion.state().clone();
+    let touch = touch_n_m(drive, loads);
+    let lightly = (LOST_MOTION_SHARE * loads.largest_n_m).max(touch);
+
+    let mirrored = drive.as_built.first_not_uniform().is_none() && motion.error_rad().abs() < TO_ONE_SIDE_RAD;
+    let backward = if mirrored {
+        None
+    } else {
+        motion.load(-touch)?;
+        let touched = motion.error_rad();
+        motion.load(-lightly)?;
+        let loaded = motion.error_rad();
+        motion.go_back(unloaded);
+        Some([touched, loaded])
+    };
+
+    motion.load(touch)?;
+    let touched = motion.error_rad();
+    motion.load(lightly)?;
+    let loaded = motion.error_rad();
+    let [back_touched, back_loaded] = backward.unwrap_or([-touched, -loaded]);
+    sheet.backlash_arcsec = Some((touched - back_touched) * ARCSEC_PER_RAD);
+    sheet.lost_motion_arcsec = Some((loaded - back_loaded) * ARCSEC_PER_RAD);
+    sheet.last_stable_n_m = Some(lightly);
+
+    let mut from = (touch, touched);
+    let ranges = [
+        (loads.t1_n_m, &mut sheet.k1_n_m_per_rad),
+        (loads.t2_n_m, &mut sheet.k2_n_m_per_rad),
+        (loads.largest_n_m, &mut sheet.k3_n_m_per_rad),
+    ];
+    for (torque, stiffness) in ranges {
+        motion.load(torque)?;
+        let to = (torque, motion.error_rad());
+        *stiffness = Some((to.0 - from.0) / (to.1 - from.1));
+        sheet.last_stable_n_m = Some(torque);
+        from = to;
+    }
+    sheet.wind_up_arcsec = Some((from.1 - touched) * ARCSEC_PER_RAD);
+
+    motion.settle(motion.pitch() / positions as f64)?;
+    let places = motion.turn_in(motion.pitch(), positions)?;
+    let errors: Vec<f64> = places.iter().map(|place| place.error_arcsec).collect();
+    let most = |of: fn(&flexspline_mechanics::stepping::Increment) -> f64| {
+        places.iter().map(|place| of(&place.increment)).fold(0.0, f64::max)
+    };
+    sheet.kinematic_error_pp_arcsec = Some(if drive.as_built.first_not_uniform().is_none() {
+        peak_to_peak(&errors)
+    } else {
+        let (low, high) =
+            errors.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)));
+        high - low
+    });
+    sheet.peak_flank_pressure_mpa = Some(most(|increment| increment.peak_pressure_mpa[0]));
+    sheet.peak_generator_pressure_mpa = Some(most(|increment| increment.peak_pressure_mpa[1]));
+    sheet.lobe_force_n = Some(most(|increment| increment.lobe_force_n));
+    sheet.tilt_mrad = Some(most(|increment| 1e3 * increment.face.tilt_rad));
+    sheet.load_across_face_peak_over_mean = Some(most(|increment| increment.face.peak_over_mean));
+    let in_contact = most(|increment| increment.flank_contacts as f64);
+    sheet.teeth_in_contact_percent = Some(100.0 * in_contact / f64::from(drive.flexspline.teeth));
+    let peak = peak_stress(problem, motion.state());
+    let [root_fillet, bore, _] = peak.by_place_mpa;
+    sheet.max_von_mises_mpa = Some(peak.von_mises_mpa);
+    (sheet.root_fillet_mpa, sheet.bore_mpa) = (Some(root_fillet), Some(bore));
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cautions_look_at_the_stress_in_root_fillets_too() {
+        let sheet = DataSheet { max_von_mises_mpa: Some(664.0), root_fillet_mpa: Some(1204.0), ..DataSheet::default() };
+        assert_eq!(sheet.looked().cautions()[0].figure, "root_fillet_mpa");
+    }
+
+    #[test]
+    fn a_sheet_of_figures_has_each_under_its_name() {
+        let sheet = DataSheet::of_figures(std::array::from_fn(|k| Some(k as f64)));
+        for (k, (name, of)) in FIGURES.iter().enumerate() {
+            assert_eq!(of(&sheet), Some(k as f64), "{name}");
+            let told = serde_json::to_value(sheet).unwrap();
+            assert_eq!(told[name], k as f64, "{name}");
+        }
+    }
+}

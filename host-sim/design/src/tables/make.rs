@@ -1,0 +1,228 @@
+//! A table by FEM: torque nodes chosen, swept, projected. Whoever makes a table of a drive makes it here.
+
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+use thiserror::Error;
+
+use super::info::MadeTable;
+use super::project::{TableError, from_sweep};
+use super::sweep::{SweepError, SweepPlan, SweepProgress, planned_increments};
+use super::torque_nodes::{NodeChoice, choose_torque_nodes};
+use super::turns::{deviation_increments, sweep_turns};
+use crate::cautions::{Looked, rigid_gap_um, room_as_built_arcsec};
+use crate::data_sheet::Stiffness;
+use flexspline_mechanics::drive::{Drive, GeneratorKind};
+use flexspline_mechanics::stepping::{Method, SolveError, SolverSettings};
+
+/// How a table is made.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TableSettings {
+    /// Which torques it holds.
+    pub torque_nodes: TorqueNodes,
+    /// Temperature nodes, ascending, °C.
+    pub temperature_nodes_c: Vec<f32>,
+    /// Samples over one tooth pitch.
+    pub positions: usize,
+    /// Numerical method of the FEM.
+    pub solver: SolverSettings,
+}
+
+/// The torque nodes of a table.
+#[derive(Debug, Clone, PartialEq)]
+pub enum TorqueNodes {
+    /// Chosen by asking the FEM.
+    Chosen(NodeChoice),
+    /// These, ascending, symmetric about zero, N m.
+    Given(Vec<f32>),
+}
+
+/// Torque nodes on each side at most, and the miss (arcsec) at which one is added: for a drive that repeats from tooth to tooth, and
+/// for one whose imperfections are sampled at every node and leave more than nodes do.
+const CHOICES: [(usize, f64); 2] = [(28, 0.6), (12, 2.0)];
+/// The largest torque must be so many times the drag of the output, or there is no wind-up to sample.
+const LEAST_OVER_DRAG: f64 = 20.0;
+/// Largest torque, N m.
+const MOST_TORQUE_N_M: f64 = 1e4;
+/// Tolerances of the choice of nodes, arcsec.
+const TOLERANCES_ARCSEC: [f64; 2] = [0.01, 60.0];
+
+impl TableSettings {
+    /// What a table is made with unless told otherwise: nodes as the FEM asks for them up to the generator's rated torque, the ends
+    /// of the operating temperatures, eight positions, the fast solver on the standard mesh.
+    pub fn for_generator(drive: &Drive, kind: GeneratorKind) -> TableSettings {
+        let plan = SweepPlan::for_generator(drive, kind);
+        let (most, tolerance_arcsec) = CHOICES[usize::from(!repeats(drive))];
+        TableSettings {
+            torque_nodes: TorqueNodes::Chosen(NodeChoice {
+                largest_n_m: drive.rated_torque_n_m(kind),
+                most,
+                tolerance_arcsec,
+            }),
+            temperature_nodes_c: plan.temperature_nodes_c,
+            positions: plan.positions,
+            solver: SolverSettings { method: Method::Fast, ..SolverSettings::default() },
+        }
+    }
+
+    /// Refuses settings that make no table of this drive.
+    ///
+    /// # Errors
+    /// The setting that is out of its range.
+    pub fn check(&self, drive: &Drive) -> Result<(), MakeError> {
+        let refuse = |setting, found: String, allowed: String| Err(MakeError::Setting { setting, found, allowed });
+        if let TorqueNodes::Chosen(choice) = &self.torque_nodes {
+            let least = LEAST_OVER_DRAG * drive.output.drag_torque_n_m;
+            if !(choice.largest_n_m > least && choice.largest_n_m <= MOST_TORQUE_N_M) {
+                let allowed = format!(
+                    "more than {least} ({LEAST_OVER_DRAG} times the drag of the output), at most {MOST_TORQUE_N_M}"
+                );
+                return refuse("torque_n_m", choice.largest_n_m.to_string(), allowed);
+            }
+            let [low, high] = TOLERANCES_ARCSEC;
+            if !(low..=high).contains(&choice.tolerance_arcsec) {
+                return refuse(
+                    "node_tolerance_arcsec",
+                    choice.tolerance_arcsec.to_string(),
+                    format!("{low} to {high}"),
+                );
+            }
+        }
+        let range = &drive.temperature;
+        let within = |t: &f32| (range.minimum_c as f32..=range.maximum_c as f32).contains(t);
+        if let Some(wrong) = self.temperature_nodes_c.iter().find(|t| !within(t)) {
+            let allowed = format!("{} to {} C, the operating range of the drive", range.minimum_c, range.maximum_c);
+            return refuse("temperatures_c", wrong.to_string(), allowed);
+        }
+        if self.temperature_nodes_c.is_empty() {
+            return refuse("temperatures_c", "none".to_owned(), "at least one".to_owned());
+        }
+        Ok(())
+    }
+
+    /// The sweep at the torque nodes that were given; at none where they are still to be chosen.
+    fn plan(&self) -> SweepPlan {
+        SweepPlan {
+            torque_nodes_n_m: match &self.torque_nodes {
+                TorqueNodes::Chosen(_) => Vec::new(),
+                TorqueNodes::Given(nodes) => nodes.clone(),
+            },
+            temperature_nodes_c: self.temperature_nodes_c.clone(),
+            positions: self.positions,
+        }
+    }
+}
+
+/// Why no table was made.
+#[derive(Debug, Error)]
+pub enum MakeError {
+    /// A setting is out of its range.
+    #[error("{setting}: found {found}; allowed: {allowed}")]
+    Setting {
+        /// Which.
+        setting: &'static str,
+        /// Its value.
+        found: String,
+        /// What is allowed.
+        allowed: String,
+    },
+    /// The sweep ended early.
+    #[error(transparent)]
+    Sweep(#[from] SweepError),
+    /// The samples make no table.
+    #[error(transparent)]
+    Table(#[from] TableError),
+}
+
+impl MakeError {
+    /// Whether the observer asked to stop.
+    pub fn is_stopped(&self) -> bool {
+        matches!(self, MakeError::Sweep(SweepError::Stopped))
+    }
+
+    /// Whether the input is to blame, not the run.
+    pub fn is_bad_input(&self) -> bool {
+        matches!(
+            self,
+            MakeError::Setting { .. } | MakeError::Sweep(SweepError::Solve(SolveError::Drive(_) | SolveError::Mesh(_)))
+        )
+    }
+}
+
+/// How far a table is.
+#[derive(Debug, Clone, Copy)]
+pub struct TableProgress {
+    /// Increments solved.
+    pub done: usize,
+    /// Increments that it will take, about; before the torque nodes are chosen as many as with the most nodes.
+    pub expected: usize,
+    /// The last increment.
+    pub last: SweepProgress,
+}
+
+/// Told of every increment, from any thread; may ask to stop.
+pub type TableObserver<'a> = dyn Fn(TableProgress) -> ControlFlow<()> + Sync + 'a;
+
+/// Makes the table of a drive with one generator by contact FEM.
+///
+/// # Errors
+/// A setting out of range, a drive that is impossible, no convergence, or stopped by the observer.
+pub fn make(
+    drive: &Drive,
+    kind: GeneratorKind,
+    settings: &TableSettings,
+    observe: &TableObserver<'_>,
+) -> Result<MadeTable, MakeError> {
+    settings.check(drive)?;
+    let clock = Instant::now();
+    let mut plan = settings.plan();
+    let over_turns = if repeats(drive) { 0 } else { deviation_increments() };
+    let done = AtomicUsize::new(0);
+    let expected = AtomicUsize::new(match &settings.torque_nodes {
+        // The middles of intervals are looked at too, about one for each node that is found.
+        TorqueNodes::Chosen(choice) => over_turns + planned_increments(drive, &plan, choice.most, 0) + choice.most,
+        TorqueNodes::Given(nodes) => over_turns + planned_increments(drive, &plan, nodes.len() / 2, 0),
+    });
+    let tell = |last: SweepProgress| {
+        let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+        let expected = expected.load(Ordering::Relaxed).max(done);
+        observe(TableProgress { done, expected, last })
+    };
+    let chosen = match &settings.torque_nodes {
+        TorqueNodes::Chosen(choice) => {
+            let chosen = choose_torque_nodes(drive, kind, &plan, *choice, settings.solver, &tell)?;
+            plan.torque_nodes_n_m = chosen.torque_nodes_n_m.clone();
+            let nodes = plan.torque_nodes_n_m.len() / 2;
+            let left = over_turns + planned_increments(drive, &plan, nodes, chosen.known.len());
+            expected.store(done.load(Ordering::Relaxed) + left, Ordering::Relaxed);
+            Some(chosen)
+        }
+        TorqueNodes::Given(_) => None,
+    };
+    let known = chosen.as_ref().map_or(&[][..], |chosen| &chosen.known);
+    let mut swept = sweep_turns(drive, kind, &plan, known, settings.solver, &tell)?;
+    if let Some(chosen) = &chosen {
+        swept.work.add(chosen.work);
+    }
+    let peak_flank_pressure_mpa = swept.work.peak_flank_pressure_mpa;
+    let mut made = from_sweep(drive, &plan, swept, settings.solver, clock.elapsed().as_secs_f64())?;
+    made.info.torque_nodes_resolved = chosen.map(|chosen| chosen.resolved);
+    made.info.cautions = Looked {
+        rigid_gap_um: rigid_gap_um(drive, kind),
+        room_as_built_arcsec: room_as_built_arcsec(drive, kind),
+        max_von_mises_mpa: None,
+        root_fillet_mpa: None,
+        peak_flank_pressure_mpa: Some(peak_flank_pressure_mpa),
+        slope_bound: Some(f64::from(made.info.slope_bound)),
+    }
+    .cautions();
+    made.info.stiffness =
+        flexspline::Table::check(&made.image).ok().and_then(|table| Stiffness::of_table(drive, &table));
+    Ok(made)
+}
+
+/// Whether one tooth pitch says all of a drive.
+fn repeats(drive: &Drive) -> bool {
+    drive.as_built.first_not_uniform().is_none()
+}

@@ -1,0 +1,185 @@
+//! Samples of steady motion: what a table is made from, whether computed here, by another program, or measured.
+//!
+//! CSV with the columns `generator_rad, torque_n_m, temperature_c, direction, output_rad` in any order; further columns are
+//! ignored, lines that begin with `#` are comments. `direction` is +1 while the output turns forward, −1 backward.
+
+use std::path::Path;
+
+use flexspline::Direction;
+use flexspline::make::Sample;
+use thiserror::Error;
+
+use flexspline_base::csv_rows::{CsvRows, NotANumber, Row, TableProblem};
+
+/// The columns, in the order in which they are written.
+pub const COLUMNS: [&str; 5] = ["generator_rad", "torque_n_m", "temperature_c", "direction", "output_rad"];
+
+/// Largest sizes that a sample may have: beyond them a unit is wrong, not the drive unusual.
+const LIMITS: [(&str, f64, &str); 4] = [
+    ("generator_rad", 1e6, "rad"),
+    ("torque_n_m", 1e5, "N.m"),
+    ("temperature_c", 1e3, "°C"),
+    ("output_rad", 1e6, "rad"),
+];
+
+/// A sample file that cannot be used.
+#[derive(Debug, Error)]
+pub enum SampleError {
+    /// The file cannot be read.
+    #[error("{file}: {source}")]
+    Unreadable {
+        /// Which file.
+        file: String,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A column is missing or there twice.
+    #[error("{file}: line {line}: {what}; needed are {}", COLUMNS.join(", "))]
+    Header {
+        /// Which file.
+        file: String,
+        /// The line of the header, from 1.
+        line: u64,
+        /// What is wrong.
+        what: String,
+    },
+    /// A row cannot be read.
+    #[error("{file}: line {line}: {what}")]
+    Row {
+        /// Which file.
+        file: String,
+        /// Line, from 1.
+        line: u64,
+        /// Field, value and what is allowed.
+        what: String,
+    },
+    /// No rows.
+    #[error("{file}: no samples after the header")]
+    Empty {
+        /// Which file.
+        file: String,
+    },
+}
+
+/// Reads a sample file.
+pub fn read(path: &Path) -> Result<Vec<Sample>, SampleError> {
+    let file = path.display().to_string();
+    let text = std::fs::read(path).map_err(|source| SampleError::Unreadable { file: file.clone(), source })?;
+    parse(&file, &text)
+}
+
+/// Reads samples from the bytes of a file called `file`.
+pub fn parse(file: &str, text: &[u8]) -> Result<Vec<Sample>, SampleError> {
+    let row = |TableProblem { line, what }| SampleError::Row { file: file.to_owned(), line, what };
+    let header = |TableProblem { line, what }| SampleError::Header { file: file.to_owned(), line, what };
+    let mut rows = CsvRows::new(text).map_err(row)?;
+    let mut places = [0; 5];
+    for (place, name) in places.iter_mut().zip(COLUMNS) {
+        *place = rows.need(name).map_err(header)?;
+    }
+    let mut samples = Vec::new();
+    while let Some(found) = rows.next_row().map_err(row)? {
+        samples.push(sample(&found, places).map_err(|what| row(TableProblem { line: found.line, what }))?);
+    }
+    if samples.is_empty() {
+        return Err(SampleError::Empty { file: file.to_owned() });
+    }
+    Ok(samples)
+}
+
+/// The sample in a row; the error says field, value and what is allowed.
+fn sample(row: &Row<'_>, places: [usize; 5]) -> Result<Sample, String> {
+    let mut numbers = [0.0_f64; 5];
+    for ((number, place), name) in numbers.iter_mut().zip(places).zip(COLUMNS) {
+        *number = row.number(place).map_err(|wrong| match wrong {
+            NotANumber::Absent(fields) => format!("{fields} fields, but {name} is field {}", place + 1),
+            NotANumber::Text(text) => format!("{name} is \"{text}\", not a number"),
+        })?;
+        if !number.is_finite() {
+            return Err(format!("{name} is {number}; a finite number is needed"));
+        }
+    }
+    let [generator_rad, torque_n_m, temperature_c, direction, output_rad] = numbers;
+    let direction = match direction {
+        1.0 => Direction::Forward,
+        -1.0 => Direction::Backward,
+        other => return Err(format!("direction is {other}; allowed are 1 and -1")),
+    };
+    for ((name, limit, unit), value) in LIMITS.iter().zip([generator_rad, torque_n_m, temperature_c, output_rad]) {
+        if value.abs() > *limit {
+            return Err(format!("{name} is {value} {unit}; at most {limit:e} {unit} is plausible"));
+        }
+    }
+    Ok(Sample { generator_rad, torque_n_m, temperature_c, direction, output_rad })
+}
+
+/// The samples as CSV text; reading it back gives the same numbers.
+pub fn to_csv(samples: &[Sample]) -> String {
+    let mut text = COLUMNS.join(",");
+    text.push('\n');
+    for s in samples {
+        let direction = match s.direction {
+            Direction::Forward => 1,
+            Direction::Backward => -1,
+        };
+        text.push_str(&format!(
+            "{},{},{},{direction},{}\n",
+            s.generator_rad, s.torque_n_m, s.temperature_c, s.output_rad
+        ));
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample() -> Sample {
+        Sample {
+            generator_rad: 0.1 + 0.2,
+            torque_n_m: -1.0 / 3.0,
+            temperature_c: 20.0,
+            direction: Direction::Backward,
+            output_rad: 0.003_16,
+        }
+    }
+
+    #[test]
+    fn what_is_written_is_read_back_to_the_bit() {
+        let samples = [sample(), Sample { direction: Direction::Forward, ..sample() }];
+        assert_eq!(parse("s.csv", to_csv(&samples).as_bytes()).unwrap(), samples);
+    }
+
+    #[test]
+    fn columns_may_come_in_any_order_with_others_among_them() {
+        let text =
+            "# from a bench\noutput_rad, note ,direction,temperature_c,torque_n_m,generator_rad\n0.01,x,1,20,5,0.95\n";
+        let read = parse("s.csv", text.as_bytes()).unwrap();
+        assert_eq!(read[0].generator_rad, 0.95);
+        assert_eq!(read[0].output_rad, 0.01);
+    }
+
+    #[test]
+    fn wrong_files_are_refused_each_with_its_own_message() {
+        let header = "generator_rad,torque_n_m,temperature_c,direction,output_rad\n";
+        for (text, message) in [
+            (String::new(), "column generator_rad is missing"),
+            ("generator_rad,torque_n_m,temperature_c,output_rad\n0,0,20,0\n".to_owned(), "column direction is missing"),
+            (format!("output_rad,{header}"), "column output_rad is there twice"),
+            (header.to_owned(), "no samples"),
+            (format!("{header}0,0,20,1\n"), "line 2: 4 fields, but output_rad is field 5"),
+            (format!("{header}0,0,20,1,0\n0,x,20,1,0\n"), "line 3: torque_n_m is \"x\", not a number"),
+            (format!("{header}0,0,20,1,NaN\n"), "line 2: output_rad is NaN; a finite number"),
+            (format!("{header}0,0,inf,1,0\n"), "line 2: temperature_c is inf"),
+            (format!("{header}0,0,20,0,0\n"), "line 2: direction is 0; allowed are 1 and -1"),
+            (format!("{header}0,0,20,1,2e7\n"), "line 2: output_rad is 20000000 rad; at most 1e6 rad"),
+            (format!("{header}0,0,5000,1,0\n"), "line 2: temperature_c is 5000 °C"),
+            (format!("{header}0,0,,1,0\n"), "line 2: temperature_c is \"\", not a number"),
+            (header.replace(',', ";"), "column generator_rad is missing"),
+        ] {
+            let error = parse("s.csv", text.as_bytes()).unwrap_err().to_string();
+            assert!(error.starts_with("s.csv: ") && error.contains(message), "{text:?} gave {error:?}");
+        }
+        assert!(parse("s.csv", b"generator_rad,\xff\n").is_err());
+    }
+}

@@ -1,0 +1,70 @@
+//! A table's image as source to link: a Rust file and a C header.
+
+use std::fmt::Write as _;
+
+use super::info::MadeTable;
+use flexspline_mechanics::drive::GeneratorKind;
+
+/// The image as a Rust source file: a constant to link.
+pub fn rust_source(table: &MadeTable) -> String {
+    let name = constant_name(table.kind);
+    let mut text = header_comment(table, "//!");
+    let _ =
+        writeln!(text, "\n/// Identity of the table.\npub const {name}_TABLE_ID: &str = \"{}\";", table.info.table_id);
+    let _ = writeln!(text, "/// The `.fxt` image, for `flexspline::Table::check`.");
+    let _ = writeln!(text, "pub static {name}_TABLE: [u8; {}] = [", table.image.len());
+    put_bytes(&mut text, &table.image);
+    text.push_str("];\n");
+    text
+}
+
+/// The image as a C header.
+pub fn c_header(table: &MadeTable) -> String {
+    let name = constant_name(table.kind);
+    let lower = name.to_lowercase();
+    let mut text = header_comment(table, "//");
+    let _ = writeln!(
+        text,
+        "\n#ifndef FLEXSPLINE_{name}_TABLE_H\n#define FLEXSPLINE_{name}_TABLE_H\n\n#include <stdint.h>\n"
+    );
+    let _ = writeln!(text, "#define FLEXSPLINE_{name}_TABLE_ID \"{}\"", table.info.table_id);
+    let _ = writeln!(text, "#define FLEXSPLINE_{name}_TABLE_BYTES {}u\n", table.image.len());
+    let _ = writeln!(text, "static const uint8_t flexspline_{lower}_table[FLEXSPLINE_{name}_TABLE_BYTES] = {{");
+    put_bytes(&mut text, &table.image);
+    text.push_str("};\n\n#endif\n");
+    text
+}
+
+fn constant_name(kind: GeneratorKind) -> String {
+    kind.to_string().replace('-', "_").to_uppercase()
+}
+
+fn header_comment(table: &MadeTable, mark: &str) -> String {
+    let info = &table.info;
+    let mut text = String::new();
+    let mut line = |words: String| {
+        let _ = writeln!(text, "{mark} {words}");
+    };
+    line(format!("Compensation table {} of drive {}, {} generator.", info.table_id, info.drive, info.generator));
+    line(format!("Made by {}; drive BLAKE3 {}.", info.tool, info.drive_blake3));
+    line(format!(
+        "Holds for {} to {} N.m, {} to {} degrees C; worst deviation from its samples {:.4} arcsec.",
+        info.torque_nodes_n_m[0],
+        info.torque_nodes_n_m[info.torque_nodes_n_m.len() - 1],
+        info.temperature_nodes_c[0],
+        info.temperature_nodes_c[info.temperature_nodes_c.len() - 1],
+        info.projection_worst_arcsec
+    ));
+    text
+}
+
+/// The bytes of an image, sixteen to a line, for Rust and C.
+pub fn put_bytes(text: &mut String, bytes: &[u8]) {
+    for row in bytes.chunks(16) {
+        text.push_str("   ");
+        for byte in row {
+            let _ = write!(text, " 0x{byte:02x},");
+        }
+        text.push('\n');
+    }
+}

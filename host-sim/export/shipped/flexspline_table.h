@@ -1,0 +1,1 @@
+../../../core/c99/flexspline_table.h

@@ -1,0 +1,165 @@
+//! FMUs for co-simulation with FMI 2.0: description, resources, page and libraries in one zip (section 2.3 of the standard).
+//!
+//! The libraries are those of `flexspline-fmu`, the same in every FMU. What is simulated is in the resources, so nobody needs a compiler.
+
+mod description;
+mod libraries;
+
+use std::io::{self, Cursor, Write};
+
+use flexspline::Table;
+use flexspline_fmu::joint::starts_of;
+use flexspline_fmu::resources::{DESIGNED_FILE, DRIVE_FILE, MODEL_FILE, Resources, TABLE_FILE, drive_file};
+use flexspline_fmu::variables::ModelKind;
+use flexspline_motion::flight::{TABLE_DRAG_N_M, Unit, table_image};
+use flexspline_motion::gear::Gear;
+use flexspline_motion::table::gear_of;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipWriter};
+
+use flexspline_fly::fly::{Flown, unit};
+
+pub use libraries::{Library, Platform, find_libraries};
+
+/// Temperature at which an FMU starts, as far as its table goes, °C.
+const USUAL_C: f64 = 20.0;
+
+/// An FMU but for its libraries.
+#[derive(Debug, Clone)]
+pub struct Fmu {
+    resources: Resources,
+    description: String,
+}
+
+/// The core's joint over a table.
+///
+/// # Errors
+/// What is wrong with the table, in words.
+pub fn compensation(image: Vec<u8>) -> Result<Fmu, String> {
+    let table = Table::check(&image).map_err(|error| error.to_string())?;
+    let [coldest, warmest] = table.temperature_range_c().map(f64::from);
+    Fmu::new(ModelKind::Compensation, &[("temperature", USUAL_C.clamp(coldest, warmest))], image, None)
+}
+
+/// A joint with mass: the drive that a table describes, compensated with that table; without one the scenario's unit and table, as
+/// [`flexspline_fly::fly`] flies them.
+///
+/// # Errors
+/// What is wrong with table or scenario, in words.
+pub fn joint(flown: &Flown, image: Option<Vec<u8>>) -> Result<Fmu, String> {
+    let scenario = &flown.scenario;
+    let Some(image) = image else {
+        let unit = unit(flown.kind, scenario.temperature_c)?;
+        let image = table_image(scenario, &unit, table_id)?;
+        let Unit { built, nominal, .. } = unit;
+        return Fmu::new(ModelKind::Joint, &starts_of(scenario), image, Some([built, nominal]));
+    };
+    let table = Table::check(&image).map_err(|error| error.to_string())?;
+    if table.drive().exact_ratio() < 0.0 {
+        return Err(
+            "found a drive whose circular spline is fixed; allowed for a joint: the flexspline fixed".to_owned()
+        );
+    }
+    let [coldest, warmest] = table.temperature_range_c().map(f64::from);
+    let temperature_c = scenario.temperature_c;
+    if !(temperature_c >= coldest && temperature_c <= warmest) {
+        return Err(format!(
+            "temperature_c of the scenario: found {temperature_c}, allowed with this table: {coldest} to {warmest}"
+        ));
+    }
+    let gear = gear_of(&table, temperature_c, TABLE_DRAG_N_M).ok_or("the table gives nothing")?;
+    Fmu::new(ModelKind::Joint, &starts_of(scenario), image, Some([gear.clone(), gear]))
+}
+
+impl Fmu {
+    fn new(kind: ModelKind, starts: &[(&str, f64)], image: Vec<u8>, gears: Option<[Gear; 2]>) -> Result<Fmu, String> {
+        // Through the reader of the FMU itself: what it would refuse is refused here.
+        let mut model = format!("model = {}\nguid = none\n", kind.name());
+        for (name, start) in starts {
+            model += &format!("{name} = {start}\n");
+        }
+        let drives = gears.as_ref().map(|gears| gears.each_ref().map(drive_file));
+        let [built, designed] = drives.as_ref().map_or([None; 2], |[a, b]| [Some(&a[..]), Some(&b[..])]);
+        let mut resources = Resources::parse(&model, image, [built, designed])?;
+        resources.guid = guid(&resources);
+        let description = description::xml(&resources);
+        Ok(Fmu { resources, description })
+    }
+
+    /// What its libraries read.
+    #[must_use]
+    pub fn resources(&self) -> &Resources {
+        &self.resources
+    }
+
+    /// `modelDescription.xml`.
+    #[must_use]
+    pub fn description(&self) -> &str {
+        &self.description
+    }
+
+    /// Writes it as a zip, the same bytes from the same parts.
+    ///
+    /// # Errors
+    /// Of the writer.
+    pub fn write(&self, out: &mut dyn Write, libraries: &[Library]) -> io::Result<()> {
+        let options = SimpleFileOptions::default()
+            .compression_method(CompressionMethod::Deflated)
+            .last_modified_time(DateTime::default())
+            .unix_permissions(0o644);
+        let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
+        let mut file = |name: &str, bytes: &[u8]| -> io::Result<()> {
+            zip.start_file(name, options)?;
+            zip.write_all(bytes)
+        };
+        file("modelDescription.xml", self.description.as_bytes())?;
+        for (name, bytes) in self.resource_files() {
+            file(&format!("resources/{name}"), &bytes)?;
+        }
+        for library in libraries {
+            let Platform { folder, extension, .. } = library.platform;
+            let name = format!("binaries/{folder}/{}.{extension}", self.resources.kind.identifier());
+            file(&name, &library.bytes)?;
+        }
+        file("documentation/index.html", description::page(&self.resources).as_bytes())?;
+        for (name, text) in description::LICENCES {
+            file(&format!("documentation/licenses/{name}"), text.as_bytes())?;
+        }
+        out.write_all(&zip.finish()?.into_inner())
+    }
+
+    /// The files of its resources, by name.
+    #[must_use]
+    pub fn resource_files(&self) -> Vec<(&'static str, Vec<u8>)> {
+        let Resources { image, gears, .. } = &self.resources;
+        let mut files = vec![(MODEL_FILE, self.resources.model_file().into_bytes()), (TABLE_FILE, image.clone())];
+        if let Some([built, designed]) = gears {
+            files.push((DRIVE_FILE, drive_file(built)));
+            if built != designed {
+                files.push((DESIGNED_FILE, drive_file(designed)));
+            }
+        }
+        files
+    }
+}
+
+/// Of all that the description and the resources say: the same for the same model, table and start values.
+fn guid(resources: &Resources) -> String {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(flexspline_fmu::MARK.as_bytes());
+    hasher.update(description::xml(resources).as_bytes());
+    hasher.update(&resources.image);
+    for gear in resources.gears.iter().flatten() {
+        hasher.update(&drive_file(gear));
+    }
+    let hex = hasher.finalize().to_hex();
+    let parts = [&hex[0..8], &hex[8..12], &hex[12..16], &hex[16..20], &hex[20..32]];
+    format!("{{{}}}", parts.join("-"))
+}
+
+/// The id of a table by what is hashed for it.
+fn table_id(hashed: &[u8]) -> [u8; 8] {
+    let mut id = [0; 8];
+    id.copy_from_slice(&blake3::hash(hashed).as_bytes()[..8]);
+    id
+}

@@ -1,0 +1,17 @@
+//! The same mesh, state, outlines and problem for other programs.
+#![forbid(unsafe_code)]
+
+pub mod bundle;
+pub mod fmu;
+mod inp;
+mod outlines;
+mod vtu;
+mod vtu_whole;
+
+pub use inp::{
+    Deck, DeckError, DeckSettings, Equation, Face, STABILISING_LATERAL, STABILISING_TORSION, SleeveDeck, Term,
+};
+pub use outlines::{OutlinePoint, outlines};
+pub use vtu::base64;
+pub use vtu::{Frame, write_pvd, write_vtu};
+pub use vtu_whole::write_whole_flexspline;

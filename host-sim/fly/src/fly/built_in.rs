@@ -1,0 +1,116 @@
+//! The scenarios that have a name.
+
+use flexspline_motion::scenario::{Leg, Load, Scenario, TableKnown, TorqueKnown};
+use flexspline_motion::servo::ServoSettings;
+
+use super::Flown;
+use flexspline_mechanics::drive::GeneratorKind;
+
+/// Names of scenarios.
+pub const SCENARIOS: [&str; 4] = ["antenna", "rover", "camera", "telescope"];
+
+/// A servo of the size of HHD-95's motor, at 1 kHz, 0.2 ms late: 17 bits, tuned for the motor alone at a speed loop that the load's resonance
+/// leaves a margin.
+const SERVO: ServoSettings = ServoSettings {
+    tick_s: 1e-3,
+    steps: 5,
+    late_steps: 1,
+    inertia_kg_m2: 1.1e-4,
+    largest_n_m: 4.0,
+    position_hz: 6.0,
+    speed_hz: 50.0,
+    integral_hz: 3.0,
+    encoder_bits: 17,
+    jitter_s: 5e-6,
+    current_noise_n_m: 1e-3,
+};
+
+fn legs(legs: &[(f64, f64)]) -> Vec<Leg> {
+    legs.iter().map(|&(seconds, rate_rad_s)| Leg { seconds, rate_rad_s }).collect()
+}
+
+/// The scenario of a name.
+#[must_use]
+pub fn built_in(name: &str) -> Option<Flown> {
+    let none = Load { bias_n_m: 0.0, swing: [0.0, 0.0], gust: [0.0, 0.0], step: [0.0, 0.0], gravity: [0.0, 0.0] };
+    let base = |legs: Vec<Leg>, load: Load| Scenario {
+        name: name.to_owned(),
+        legs,
+        acceleration_rad_s2: 0.05,
+        load,
+        load_kg_m2: 3.0,
+        drag_n_m: 0.5,
+        damping: 0.02,
+        temperature_c: 20.0,
+        warming_k_s: 0.0,
+        servo: SERVO,
+        friction: 1.0,
+        friction_known: 0.8,
+        load_fed_forward: 1.0,
+        torque: TorqueKnown::OnLoad,
+        torque_noise_n_m: 0.05,
+        table: TableKnown::Calibrated,
+        seed: 1,
+    };
+    let flown = |kind, scenario| Some(Flown { kind, scenario });
+    match name {
+        // 0.001 to 1 °/s with reversals, a slow swing of the wind that crosses zero, gusts.
+        "antenna" => {
+            let degree = std::f64::consts::PI / 180.0;
+            let mut way = vec![(2.0, 0.0)];
+            for rate in [1.0, 0.1, 0.01, 0.001] {
+                way.extend([(8.0, rate * degree), (8.0, -rate * degree)]);
+            }
+            let load = Load { bias_n_m: 10.0, swing: [25.0, 0.03], gust: [4.0, 0.3], ..none };
+            flown(GeneratorKind::DoubleDisc, base(legs(&way), load))
+        }
+        // A wheel over stones: steps of its torque while it turns.
+        "rover" => flown(
+            GeneratorKind::FourRoller,
+            Scenario {
+                acceleration_rad_s2: 0.5,
+                load_kg_m2: 0.8,
+                ..base(
+                    legs(&[(2.0, 0.0), (20.0, 0.1), (2.0, 0.0), (16.0, -0.06)]),
+                    Load { bias_n_m: 12.0, step: [15.0, 3.0], gust: [1.0, 1.0], ..none },
+                )
+            },
+        ),
+        // A light camera on a boom: slews, and stands still.
+        "camera" => flown(
+            GeneratorKind::Cam,
+            Scenario {
+                acceleration_rad_s2: 0.3,
+                load_kg_m2: 0.3,
+                ..base(
+                    legs(&[
+                        (2.0, 0.0),
+                        (3.0, 0.15),
+                        (4.0, 0.0),
+                        (3.0, -0.1),
+                        (4.0, 0.0),
+                        (1.0, 0.02),
+                        (4.0, 0.0),
+                        (1.0, -0.02),
+                        (4.0, 0.0),
+                    ]),
+                    Load { gravity: [6.0, 0.4], gust: [0.1, 1.0], ..none },
+                )
+            },
+        ),
+        // The stars, under an unbalanced tube and wind.
+        "telescope" => flown(
+            GeneratorKind::Cam,
+            Scenario {
+                acceleration_rad_s2: 1e-3,
+                load_kg_m2: 6.0,
+                servo: ServoSettings { position_hz: 3.0, speed_hz: 25.0, integral_hz: 1.5, encoder_bits: 20, ..SERVO },
+                ..base(
+                    legs(&[(2.0, 0.0), (60.0, 7.292_115e-5)]),
+                    Load { gravity: [25.0, 0.8], gust: [2.0, 0.1], ..none },
+                )
+            },
+        ),
+        _ => None,
+    }
+}

@@ -1,0 +1,97 @@
+//! Flights of a joint with mass: scenarios with a name or from a file, on units built from the contact FEM of the four generators.
+//!
+//! What moves is in `flexspline-motion`; here scenarios are read, units made, and results put into numbers.
+
+mod built_in;
+mod file;
+mod results;
+mod varied;
+
+use flexspline_motion::flight::{Flight, JOINTS, Unit, fly_told};
+use flexspline_motion::gear::Sampled;
+use flexspline_motion::scenario::Scenario;
+
+use crate::closed_loop::flight::gear::Gear;
+use crate::closed_loop::map::DenseMap;
+use flexspline_design::tables::core_drive;
+use flexspline_mechanics::drive::{Drive, GeneratorKind};
+
+pub use built_in::{SCENARIOS, built_in};
+pub use file::read;
+pub use results::{ByController, Results, Row, results, spectrum};
+pub use varied::{Flight as VariedFlight, Vary, every, fly_varied};
+
+/// A scenario, and what flies it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Flown {
+    /// Which generator the drive has.
+    pub kind: GeneratorKind,
+    /// What is flown.
+    pub scenario: Scenario,
+}
+
+/// The maps of HHD-95 by contact FEM, at points that made no table (`examples/closed_loop.rs map`).
+fn map(kind: GeneratorKind) -> &'static str {
+    match kind {
+        GeneratorKind::TwoRoller => include_str!("../../plant/two-roller.csv"),
+        GeneratorKind::FourRoller => include_str!("../../plant/four-roller.csv"),
+        GeneratorKind::DoubleDisc => include_str!("../../plant/double-disc.csv"),
+        GeneratorKind::Cam => include_str!("../../plant/cam.csv"),
+    }
+}
+
+/// A unit of HHD-95 with this generator at a temperature: wind-up, clearance and ripple of the contact FEM, and what was built otherwise.
+///
+/// # Errors
+/// What is wrong, in words.
+pub fn unit(kind: GeneratorKind, temperature_c: f64) -> Result<Unit, String> {
+    let name = format!("{kind}.csv");
+    let map = DenseMap::parse(kind, &name, map(kind)).map_err(|error| error.to_string())?;
+    let gear = Gear::new(map.view(), temperature_c);
+    let teeth = gear.map().header.teeth;
+    let largest = gear.map().header.largest_n_m;
+    let law = |phase: f64, flank: f64| gear.elastic_error_rad(phase * std::f64::consts::TAU / teeth, flank, 1.0);
+    let drive = core_drive(&Drive::hhd_95()).map_err(|error| error.to_string())?;
+    Ok(Unit::of_spring(drive, Sampled::of_law(teeth, largest, law)))
+}
+
+impl Flown {
+    /// Flies it.
+    ///
+    /// # Errors
+    /// What cannot be flown, in words.
+    pub fn fly(&self) -> Result<Flight, String> {
+        self.fly_told(&|| {})
+    }
+
+    /// Seconds that all its joints fly, together.
+    #[must_use]
+    pub fn seconds_of_all(&self) -> usize {
+        JOINTS * self.scenario.seconds() as usize
+    }
+
+    /// Flies it; `told` is called for each second that one of its joints flew.
+    ///
+    /// # Errors
+    /// What cannot be flown, in words.
+    pub fn fly_told(&self, told: &(dyn Fn() + Sync)) -> Result<Flight, String> {
+        self.carries()?;
+        fly_told(&self.scenario, &unit(self.kind, self.scenario.temperature_c)?, told)
+    }
+
+    /// Whether its generator carries its load.
+    ///
+    /// # Errors
+    /// What was found and what is allowed.
+    pub fn carries(&self) -> Result<(), String> {
+        let most = self.kind.rated_torque_n_m();
+        let largest = self.scenario.largest_n_m();
+        if largest > most {
+            return Err(format!(
+                "load: found up to {largest:.1} N.m, allowed: {most} N.m with a {} generator",
+                self.kind
+            ));
+        }
+        Ok(())
+    }
+}

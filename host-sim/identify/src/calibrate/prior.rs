@@ -1,0 +1,133 @@
+//! What is known of a unit before it is measured: a nominal model, a table, or the ratio alone.
+
+use flexspline::{Direction, GeneratorAngle, Table};
+
+use super::parts::State;
+use crate::nominal::{Nominal, Spread};
+use flexspline_base::units::ARCSEC_PER_RAD;
+use flexspline_mechanics::drive::GeneratorKind;
+
+/// Temperature of a drive that is known by its ratio alone, °C.
+const USUAL_TEMPERATURE_C: f64 = 20.0;
+
+/// What is known before.
+#[derive(Clone)]
+pub struct Prior<'a> {
+    /// The nominal model; beside a table its ratio, teeth and temperature are used.
+    pub nominal: Nominal,
+    /// The table that takes its place.
+    pub table: Option<&'a Table<'a>>,
+    /// Name of the drive.
+    pub drive: String,
+    /// BLAKE3 of what the prior was read from.
+    pub hash: [u8; 32],
+    /// Generator that the table is marked with.
+    pub kind: GeneratorKind,
+    /// What the generator angle of the logs reads where that of `table` is zero, rad.
+    pub zero_rad: f64,
+    /// Least load that is believed to decide the flank, N·m: a smaller one is lost in the noise of the logs' torque.
+    pub least_friction_n_m: f64,
+}
+
+impl<'a> Prior<'a> {
+    /// A drive known by its ratio alone: no wind-up, no play, no waves.
+    #[must_use]
+    pub fn of_ratio(ratio: f64, kind: GeneratorKind) -> Prior<'a> {
+        let none = Spread { stiffness: 0.0, backlash: 0.0, harmonic: 0.0, harmonic_phase_rad: 0.0 };
+        let nominal = Nominal {
+            ratio,
+            teeth: None,
+            // Infinitely stiff.
+            stiffness: vec![[0.0, f64::INFINITY]],
+            backlash_arcsec: 0.0,
+            friction_torque_n_m: 0.0,
+            temperature_c: USUAL_TEMPERATURE_C,
+            harmonics: Vec::new(),
+            spread: none,
+            kernels: None,
+        };
+        let hash = *blake3::hash(format!("ratio {ratio}").as_bytes()).as_bytes();
+        Prior {
+            nominal,
+            table: None,
+            drive: format!("ratio {ratio}"),
+            hash,
+            kind,
+            zero_rad: 0.0,
+            least_friction_n_m: 0.0,
+        }
+    }
+
+    /// A drive known by a table.
+    #[must_use]
+    pub fn of_table(table: &'a Table<'a>, kind: GeneratorKind) -> Prior<'a> {
+        let hash = *blake3::hash(table.image()).as_bytes();
+        let drive = format!("table {}", table.id());
+        Prior {
+            nominal: Nominal::of_table(table),
+            table: Some(table),
+            drive,
+            hash,
+            kind,
+            zero_rad: 0.0,
+            least_friction_n_m: 0.0,
+        }
+    }
+
+    /// Whether nothing but the ratio is known.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        let n = &self.nominal;
+        self.table.is_none()
+            && n.harmonics.is_empty()
+            && n.backlash_arcsec == 0.0
+            && n.stiffness.iter().all(|[_, k]| k.is_infinite())
+    }
+
+    /// The drive as the core knows it.
+    ///
+    /// # Errors
+    /// No pair of wheels has this ratio.
+    pub fn core_drive(&self) -> Result<flexspline::Drive, String> {
+        if let Some(table) = self.table {
+            return Ok(*table.drive());
+        }
+        let drive = self.nominal.teeth_or_of_two_waves().core_drive();
+        let drive = drive.map_err(|error| format!("ratio {}: {error}", self.nominal.ratio))?;
+        if (drive.exact_ratio() / self.nominal.ratio - 1.0).abs() > 1e-9 {
+            return Err(format!(
+                "ratio: found {}, allowed: a ratio that wheels with two teeth of difference have, a whole number or a half; \
+                 or a model with the teeth, --model nominal.toml",
+                self.nominal.ratio
+            ));
+        }
+        Ok(drive)
+    }
+
+    /// Tooth pitches of the fixed wheel in a turn of the generator.
+    pub(super) fn tooth_pitches(&self) -> f64 {
+        self.core_drive().map_or(1.0, |drive| f64::from(drive.ripple_order()))
+    }
+
+    /// Load beyond which it decides the flank, N·m.
+    pub(super) fn friction_n_m(&self) -> f64 {
+        self.nominal.friction_torque_n_m.max(self.least_friction_n_m)
+    }
+
+    /// Error in steady motion, arcsec.
+    pub(super) fn steady_arcsec(&self, at: &State) -> f64 {
+        if let Some(table) = self.table {
+            let direction = if at.way < 0.0 { Direction::Backward } else { Direction::Forward };
+            let generator = GeneratorAngle::from_rad(at.generator_rad - self.zero_rad).unwrap_or(GeneratorAngle::ZERO);
+            // Too small a load leaves the flank to the direction, as none does.
+            let torque = if at.torque_n_m.abs() < self.least_friction_n_m { 0.0 } else { at.torque_n_m };
+            let error = table.steady_error_rad(generator, torque as f32, at.temperature_c as f32, direction);
+            return error.map_or(0.0, |rad| f64::from(rad) * ARCSEC_PER_RAD);
+        }
+        let n = &self.nominal;
+        let loaded = at.torque_n_m != 0.0 && at.torque_n_m.abs() > self.friction_n_m();
+        // In motion without load the output lags.
+        let flank = if loaded { at.torque_n_m.signum() } else { -at.way };
+        n.harmonics_arcsec(at.generator_rad) + n.wind_up_arcsec(at.torque_n_m) + 0.5 * flank * n.backlash_arcsec
+    }
+}

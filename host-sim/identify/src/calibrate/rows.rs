@@ -1,0 +1,311 @@
+//! From sessions to rows that a steady model can be fitted to: direction, settled or not, folds.
+
+use std::f64::consts::TAU;
+
+use super::folds::Row;
+use super::parts::{PartName, Scales, State};
+use super::prior::Prior;
+use crate::measurement::{Recording, Session, least_and_most, quantile_of, sampled, white_noise};
+use flexspline_base::units::ARCSEC_PER_RAD;
+
+/// Folds that one record is cut into: blocks of a tenth of it or so, which say what a table does beyond what it saw.
+const BLOCKS: usize = 8;
+/// With so many files, or sessions, each is a fold.
+const ENOUGH_SESSIONS: usize = 3;
+/// Left-out sessions are folds if none of them holds more than this share of the rows: without a larger one the rest is another record. A guess.
+const LARGEST_SESSION: f64 = 0.4;
+/// Rows that are fitted, at most; of longer records every so many-th.
+pub(super) const MOST_ROWS: usize = 40_000;
+/// A reversal is one if the generator goes back by this share of its usual step.
+const TURNED_ROUND: f64 = 0.5;
+/// The output has settled on a flank when the generator has turned by so many times the play.
+const SETTLED: f64 = 1.5;
+
+/// A load decides the flank if it is so many standard deviations of its noise beyond what decides it.
+const SURE: f64 = 3.0;
+
+/// How the folds were made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum FoldKind {
+    Files,
+    Sessions,
+    Blocks,
+}
+
+/// Rows of all files.
+#[derive(Clone)]
+pub(super) struct Rows {
+    pub rows: Vec<Row>,
+    /// What was measured in each, arcsec, its file's mean taken out.
+    pub measured_arcsec: Vec<f64>,
+    /// What was taken off `measured_arcsec` and off `left_arcsec` of each file, arcsec.
+    measured_means_arcsec: Vec<f64>,
+    pub means_arcsec: Vec<f64>,
+    pub folds: FoldKind,
+    /// Rows of the files, and those not used because the output had not settled.
+    pub of: usize,
+    pub unsettled: usize,
+}
+
+/// What the files have recorded.
+#[derive(Clone)]
+pub(super) struct Recorded {
+    pub scales: Scales,
+    pub has_torque: bool,
+    pub has_temperature: bool,
+    /// Shares of the turns of generator and output with rows in them.
+    pub generator_share: f64,
+    pub output_share: f64,
+    pub generator_turns: f64,
+    /// Of the rows that move.
+    pub backward_share: f64,
+    /// Noise of the torque from row to row, N·m.
+    pub torque_noise_n_m: f64,
+    /// Usual step of the generator, rad.
+    pub step_rad: f64,
+    /// Generator turns in steps that are short beside a tooth pitch.
+    pub fine_turns: f64,
+    pub temperature_c: f64,
+}
+
+impl Recorded {
+    pub fn of(files: &[Recording], prior: &Prior<'_>) -> Recorded {
+        let sessions = || files.iter().flat_map(|file| &file.sessions);
+        let has_torque = sessions().all(|session| session.torque_n_m.is_some());
+        let has_temperature = sessions().all(|session| session.temperature_c.is_some());
+        let torque = least_and_most(sessions().flat_map(|s| s.torque_n_m.iter().flatten().copied()));
+        let temperature = least_and_most(sessions().flat_map(|s| s.temperature_c.iter().flatten().copied()));
+        let usual = prior.nominal.temperature_c;
+        let angles = |scale: f64| sessions().flat_map(move |s| s.generator_rad.iter().map(move |psi| psi * scale));
+        let generator = least_and_most(angles(1.0));
+        let mut steps: Vec<f64> =
+            sessions().flat_map(|s| s.generator_rad.windows(2).map(|p| (p[1] - p[0]).abs())).collect();
+        steps = sampled(&steps);
+        let step_rad = quantile_of(&mut steps, 0.9);
+        let (mut moved, mut backward) = (0.0_f64, 0.0);
+        for pair in sessions().flat_map(|s| s.generator_rad.windows(2)) {
+            let step = (pair[1] - pair[0]) * prior.nominal.ratio.signum();
+            if step.abs() > TURNED_ROUND * step_rad {
+                moved += 1.0;
+                backward += f64::from(step < 0.0);
+            }
+        }
+        let fine_rad = TAU / (super::ROWS_OF_A_PITCH * prior.tooth_pitches());
+        let all_steps = sessions().flat_map(|s| s.generator_rad.windows(2).map(|p| (p[1] - p[0]).abs()));
+        let fine_turns = all_steps.filter(|step| *step <= fine_rad * (1.0 + 1e-3)).sum::<f64>() / TAU;
+        let most = torque.0.abs().max(torque.1.abs());
+        let torque_noise_n_m = white_noise(sessions().filter_map(|session| session.torque_n_m.as_deref()));
+        Recorded {
+            torque_noise_n_m,
+            scales: Scales {
+                torque_n_m: if has_torque { [torque.0, torque.1] } else { [0.0; 2] },
+                friction_n_m: prior.friction_n_m().max(if has_torque { super::LEAST_FRICTION * most } else { 0.0 }),
+                temperature_c: if has_temperature { [temperature.0, temperature.1] } else { [usual; 2] },
+                teeth: prior.tooth_pitches(),
+            },
+            has_torque,
+            has_temperature,
+            generator_share: covered(angles(1.0), 24),
+            output_share: covered(angles(1.0 / prior.nominal.ratio), 36),
+            generator_turns: (generator.1 - generator.0) / TAU,
+            backward_share: backward / moved.max(1.0),
+            step_rad,
+            fine_turns,
+            temperature_c: if has_temperature { f64::midpoint(temperature.0, temperature.1) } else { usual },
+        }
+    }
+
+    /// Why a part cannot be fitted to what was recorded, if it cannot.
+    pub fn lacks(&self, part: PartName, prior: &Prior<'_>) -> Option<String> {
+        let [low, high] = self.scales.torque_n_m;
+        let [cold, warm] = self.scales.temperature_c;
+        let turns_to_tell = super::turns_to_tell_wheels(prior.nominal.ratio);
+        match part {
+            PartName::WindUp if !self.has_torque => Some("no torque was recorded".to_owned()),
+            PartName::WindUp if high - low < super::SAME_TORQUE * low.abs().max(high.abs()) || high <= low => {
+                Some(format!("the torque keeps to {high:.3} N.m"))
+            }
+            PartName::Play if !(super::BOTH_WAYS..=1.0 - super::BOTH_WAYS).contains(&self.backward_share) => {
+                Some(format!(
+                    "{:.0} % of the motion is backward: one direction alone says nothing of the play",
+                    100.0 * self.backward_share
+                ))
+            }
+            PartName::GeneratorAngle if self.generator_share < super::MOST_OF_A_TURN => {
+                Some(format!("{:.0} % of a generator turn was recorded", 100.0 * self.generator_share))
+            }
+            PartName::MaterialAngle if self.generator_turns < turns_to_tell => Some(format!(
+                "{:.1} generator turns; {turns_to_tell} tell it from the generator angle",
+                self.generator_turns
+            )),
+            PartName::ToothPitch if prior.nominal.teeth.is_none() && prior.table.is_none() => {
+                Some("the teeth are not known, the ratio alone is".to_owned())
+            }
+            PartName::ToothPitch if self.fine_turns < super::FINE_TURNS => {
+                Some(format!("rows are {:.2} tooth pitches apart", self.step_rad * self.scales.teeth / TAU))
+            }
+            PartName::OutputAngle if self.output_share < super::HALF_A_TURN => {
+                Some(format!("{:.0} % of an output turn was recorded", 100.0 * self.output_share))
+            }
+            PartName::Temperature if !self.has_temperature => Some("no temperature was recorded".to_owned()),
+            PartName::Temperature if warm - cold < super::ONE_TEMPERATURE_K => {
+                Some(format!("the temperature varies by {:.1} K", warm - cold))
+            }
+            _ => None,
+        }
+    }
+}
+
+/// Share of a turn with angles in it.
+fn covered(angles: impl Iterator<Item = f64>, parts: usize) -> f64 {
+    let mut there = vec![false; parts];
+    angles.for_each(|angle| there[((angle / TAU).rem_euclid(1.0) * parts as f64) as usize % parts] = true);
+    there.iter().filter(|there| **there).count() as f64 / parts as f64
+}
+
+/// The rows on which a steady model can be judged; `play_rad` is the whole play at the output.
+pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorded, play_rad: f64) -> Rows {
+    let total: usize = files.iter().flat_map(|file| &file.sessions).map(Session::len).sum();
+    // Not every so many-th exactly: such rows may all lie at the same few angles.
+    let every = (total as f64 / MOST_ROWS as f64).max(1.0);
+    let every = if every > 1.0 { every + super::GOLDEN } else { 1.0 };
+    let sessions: usize = files.iter().map(|file| file.sessions.len()).sum();
+    let largest = files.iter().flat_map(|file| &file.sessions).map(Session::len).max().unwrap_or(0);
+    let by_sessions = sessions >= ENOUGH_SESSIONS && largest as f64 <= LARGEST_SESSION * total as f64;
+    let folds = match (files.len() >= ENOUGH_SESSIONS, by_sessions) {
+        (true, _) => FoldKind::Files,
+        (_, true) => FoldKind::Sessions,
+        _ => FoldKind::Blocks,
+    };
+    let mut all = Rows {
+        rows: Vec::new(),
+        measured_arcsec: Vec::new(),
+        measured_means_arcsec: Vec::new(),
+        means_arcsec: Vec::new(),
+        folds,
+        of: total,
+        unsettled: 0,
+    };
+    let mut session_number = 0;
+    for (zero, file) in files.iter().enumerate() {
+        let begin = all.rows.len();
+        for session in &file.sessions {
+            let ways = directions(
+                session,
+                prior.nominal.ratio,
+                recorded.step_rad,
+                SETTLED * play_rad * prior.nominal.ratio.abs(),
+            );
+            let thinned = (0..).map(|k| (f64::from(k) * every) as usize).take_while(|k| *k < session.len());
+            for k in thinned {
+                let Some(way) = ways[k] else {
+                    all.unsettled += 1;
+                    continue;
+                };
+                let at = |column: &Option<Vec<f64>>, usual: f64| column.as_ref().map_or(usual, |values| values[k]);
+                let generator_rad = session.generator_rad[k];
+                let at = State {
+                    generator_rad,
+                    output_rad: generator_rad / prior.nominal.ratio,
+                    torque_n_m: if recorded.has_torque { at(&session.torque_n_m, 0.0) } else { 0.0 },
+                    temperature_c: at(&session.temperature_c, recorded.temperature_c),
+                    way,
+                };
+                all.measured_arcsec.push(session.error_rad[k] * ARCSEC_PER_RAD);
+                all.rows.push(Row { at, left_arcsec: 0.0, zero, fold: session_number });
+            }
+            session_number += 1;
+        }
+        let rows = all.rows.len() - begin;
+        let blocks = (BLOCKS / files.len()).max(1);
+        for (k, row) in all.rows[begin..].iter_mut().enumerate() {
+            row.fold = match folds {
+                FoldKind::Files => zero % BLOCKS,
+                FoldKind::Sessions => row.fold % BLOCKS,
+                FoldKind::Blocks => zero * blocks + k * blocks / rows.max(1),
+            };
+        }
+        // Zeros of encoders are large numbers that squares do not like.
+        let measured = &mut all.measured_arcsec[begin..];
+        let mean = measured.iter().sum::<f64>() / rows.max(1) as f64;
+        measured.iter_mut().for_each(|value| *value -= mean);
+        all.measured_means_arcsec.push(mean);
+    }
+    all.less(prior)
+}
+
+impl Rows {
+    /// Whether the load of a row decides the flank or not, for all that its sensor's noise leaves open.
+    fn is_sure(at: &State, friction_n_m: f64, recorded: &Recorded) -> bool {
+        (at.torque_n_m.abs() - friction_n_m).abs() >= SURE * recorded.torque_noise_n_m
+    }
+
+    /// Without the rows of which the noise of the torque leaves open on which flank they lie, where loads from `friction_n_m` on decide it.
+    pub fn sure(mut self, friction_n_m: f64, recorded: &Recorded) -> Rows {
+        let keep: Vec<bool> = self.rows.iter().map(|row| Self::is_sure(&row.at, friction_n_m, recorded)).collect();
+        let mut kept = keep.iter();
+        self.rows.retain(|_| *kept.next().unwrap_or(&true));
+        let mut kept = keep.iter();
+        self.measured_arcsec.retain(|_| *kept.next().unwrap_or(&true));
+        self.unsettled += keep.iter().filter(|keep| !**keep).count();
+        self
+    }
+
+    /// With what a prior says taken off what was measured, and the mean of each file off that.
+    pub fn less(mut self, prior: &Prior<'_>) -> Rows {
+        let mut sums = vec![(0.0, 0.0); self.measured_means_arcsec.len()];
+        for (row, measured) in self.rows.iter_mut().zip(&self.measured_arcsec) {
+            row.left_arcsec = measured - prior.steady_arcsec(&row.at);
+            let (sum, count) = &mut sums[row.zero];
+            (*sum, *count) = (*sum + row.left_arcsec, *count + 1.0);
+        }
+        let means: Vec<f64> = sums.iter().map(|(sum, count)| sum / f64::max(*count, 1.0)).collect();
+        self.rows.iter_mut().for_each(|row| row.left_arcsec -= means[row.zero]);
+        self.means_arcsec = self.measured_means_arcsec.iter().zip(&means).map(|(a, b)| a + b).collect();
+        self
+    }
+}
+
+/// Direction of the output in each row; `None` before the first motion and until the play is through after a reversal.
+fn directions(session: &Session, ratio: f64, step_rad: f64, settle_rad: f64) -> Vec<Option<f64>> {
+    let back = TURNED_ROUND * step_rad;
+    let Some(first) = session.generator_rad.first() else { return Vec::new() };
+    let (mut way, mut extreme, mut turned_at) = (0.0_f64, *first, *first);
+    session
+        .generator_rad
+        .iter()
+        .map(|psi| {
+            let beyond = (psi - extreme) * if way == 0.0 { 1.0 } else { way };
+            if way == 0.0 {
+                if beyond.abs() > back {
+                    way = beyond.signum();
+                    extreme = *psi;
+                }
+            } else if beyond > 0.0 {
+                extreme = *psi;
+            } else if -beyond > back {
+                (way, turned_at, extreme) = (-way, extreme, *psi);
+            }
+            let through = way != 0.0 && (psi - turned_at).abs() >= settle_rad;
+            through.then_some(way * ratio.signum())
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_output_settles_after_a_reversal() {
+        let mut psi: Vec<f64> = vec![0.0; 5];
+        psi.extend((1..=20).map(f64::from));
+        psi.extend((0..15).map(|k| 19.0 - f64::from(k)));
+        let session = Session { generator_rad: psi, error_rad: vec![0.0; 40], ..Session::default() };
+        let ways = directions(&session, 100.0, 1.0, 3.0);
+        assert_eq!(ways[..7], [None; 7]);
+        assert_eq!((ways[7], ways[24], ways[25], ways[26], ways[27]), (Some(1.0), Some(1.0), None, None, Some(-1.0)));
+        // An output that turns against the generator.
+        assert_eq!(directions(&session, -100.0, 1.0, 3.0)[24], Some(-1.0));
+    }
+}

@@ -1,0 +1,309 @@
+//! Units made up here, with parts that are known, by laws of their own.
+
+use flexspline::Table;
+
+use super::folds::Row;
+use super::*;
+use crate::measurement::Session;
+use crate::nominal::Harmonic;
+use flexspline_base::units::ARCSEC_PER_RAD;
+use flexspline_mechanics::drive::GeneratorKind;
+
+const RATIO: f64 = 101.0;
+
+/// Noise of two arc-seconds, normal enough.
+fn noise(random: &mut fastrand::Rng) -> f64 {
+    2.0 * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0)
+}
+
+/// A recording of one session: to and fro through 1.2 output turns under a load that swings, with an error by `law` (arcsec) of generator
+/// angle, output angle, torque and direction.
+fn recording(seed: u64, law: impl Fn(f64, f64, f64, f64) -> f64) -> Recording {
+    let mut random = fastrand::Rng::with_seed(seed);
+    let mut session = Session { torque_n_m: Some(Vec::new()), ..Session::default() };
+    let rows = 4000;
+    for k in 0..rows {
+        let forward = k < rows / 2;
+        let psi = 0.38 * if forward { k as f64 } else { (rows - 1 - k) as f64 };
+        let torque = 30.0 * (k as f64 / 61.0 + seed as f64).sin();
+        let way = if forward { 1.0 } else { -1.0 };
+        let error = law(psi, psi / RATIO, torque, way) + noise(&mut random);
+        session.line.push(k as u64);
+        session.generator_rad.push(psi);
+        session.error_rad.push((error + 5000.0) / ARCSEC_PER_RAD);
+        session.torque_n_m.as_mut().unwrap().push(torque);
+    }
+    Recording {
+        file: format!("{seed}.log"),
+        rows,
+        sessions: vec![session],
+        faults: Vec::new(),
+        tooth_steps: Vec::new(),
+        notes: Vec::new(),
+        unusable: None,
+    }
+}
+
+fn kept(calibration: &Calibration) -> Vec<&'static str> {
+    calibration.parts.iter().filter(|part| part.kept).map(|part| part.name).collect()
+}
+
+#[test]
+fn parts_that_a_unit_has_are_found_and_the_core_takes_them_out() {
+    let law = |psi: f64, out: f64, torque: f64, way: f64| {
+        25.0 * (2.0 * psi + 0.3).sin() + 120.0 * (out - 0.7).cos() + 1.5 * torque + 4e-4 * torque.powi(3) - 12.0 * way
+    };
+    let prior = Prior::of_ratio(RATIO, GeneratorKind::Cam);
+    let made = calibrate(&[recording(1, law)], &prior).unwrap();
+    let c = &made.calibration;
+    assert_eq!(kept(c), ["wind_up", "play", "generator_angle", "output_angle"], "{:#?}", c.parts);
+    // The noise is 2 arcsec.
+    assert!(c.held_out.rms_after_arcsec < 2.2 && c.held_out.rms_before_arcsec > 90.0, "{:?}", c.held_out);
+    assert!(c.core.rms_after_arcsec < 2.6, "{:?}", c.core);
+    assert!(c.projection_rms_arcsec < 0.1, "{}", c.projection_rms_arcsec);
+    // Another log of the same unit, which nobody has fitted, through the image.
+    let other = recording(5, law);
+    let table = Table::check(&made.table.image).unwrap();
+    let left = left_by_core(&table, &other.sessions[0], 20.0);
+    let mean = left.iter().sum::<f64>() / left.len() as f64;
+    let rms = (left.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / left.len() as f64).sqrt();
+    assert!(rms < 2.7, "{rms}");
+    // With what is true known before, little is left to fit.
+    let mut known = Prior::of_ratio(RATIO, GeneratorKind::Cam);
+    known.nominal.harmonics.push(crate::nominal::Harmonic {
+        order_per_generator_turn: 2.0,
+        amplitude_arcsec: 25.0,
+        phase_rad: 0.3,
+    });
+    let made = calibrate(&[recording(1, law)], &known).unwrap();
+    assert_eq!(kept(&made.calibration), ["wind_up", "play", "output_angle"]);
+    assert!(made.calibration.core.rms_after_arcsec < 2.6, "{:?}", made.calibration.core);
+}
+
+#[test]
+fn noise_makes_no_table_and_lone_parts_no_others() {
+    let prior = Prior::of_ratio(RATIO, GeneratorKind::Cam);
+    for seed in 0..6 {
+        let nothing = calibrate(&[recording(seed, |_, _, _, _| 0.0)], &prior);
+        assert!(matches!(nothing, Err(CalibrationError::NothingGained(_))), "seed {seed}");
+        let one = calibrate(&[recording(seed, |psi, _, _, _| 8.0 * (2.0 * psi).sin())], &prior).unwrap();
+        assert_eq!(kept(&one.calibration), ["generator_angle"], "seed {seed}");
+    }
+}
+
+#[test]
+fn files_are_left_out_whole_each_with_its_zero() {
+    let law = |_: f64, out: f64, torque: f64, _: f64| 60.0 * out.cos() + 2.0 * torque;
+    let mut files: Vec<Recording> = (0..4).map(|seed| recording(seed, law)).collect();
+    files[2].sessions[0].error_rad.iter_mut().for_each(|error| *error += 0.3);
+    let made = calibrate(&files, &Prior::of_ratio(RATIO, GeneratorKind::Cam)).unwrap();
+    let c = &made.calibration;
+    assert_eq!((c.left_out, c.folds), ("files", 4));
+    assert!(c.held_out.rms_after_arcsec < 2.2, "{:?}", c.held_out);
+    assert!(c.core.rms_after_arcsec < 2.2, "{:?}", c.core);
+}
+
+/// A model of another drive has a wave that no part can take out: with a part that gains it still leaves more than no table.
+#[test]
+fn a_table_that_loses_to_none_is_not_made() {
+    let files: Vec<Recording> = (0..4).map(|seed| recording(seed, |_, out, _, _| 60.0 * out.cos())).collect();
+    let mut prior = Prior::of_ratio(RATIO, GeneratorKind::Cam);
+    let other = Harmonic { order_per_generator_turn: 13.37, amplitude_arcsec: 300.0, phase_rad: 0.4 };
+    prior.nominal.harmonics.push(other);
+    let refused = calibrate(&files, &prior).err().map(|error| error.to_string()).unwrap_or_default();
+    assert!(refused.starts_with("what was known before is further off"), "{refused}");
+    prior.nominal.harmonics[0].amplitude_arcsec = 10.0;
+    let made = calibrate(&files, &prior).unwrap();
+    assert!(kept(&made.calibration).contains(&"output_angle"), "{:?}", made.calibration.parts);
+}
+
+#[test]
+fn what_was_not_recorded_is_not_fitted() {
+    let mut short = recording(3, |psi, _, _, _| 20.0 * (2.0 * psi).sin());
+    let session = &mut short.sessions[0];
+    session.line.truncate(500);
+    session.generator_rad.truncate(500);
+    session.error_rad.truncate(500);
+    session.torque_n_m = None;
+    let made = calibrate(&[short], &Prior::of_ratio(RATIO, GeneratorKind::Cam)).unwrap();
+    let says = |name: &str| made.calibration.parts.iter().find(|part| part.name == name).unwrap().clone();
+    for (name, why) in [
+        ("wind_up", "no torque"),
+        ("play", "one direction"),
+        ("material_angle", "generator turns"),
+        ("tooth_pitch", "teeth are not known"),
+        ("output_angle", "of an output turn"),
+        ("temperature", "no temperature"),
+    ] {
+        let part = says(name);
+        assert!(!part.kept && part.held_out_gain.is_none() && part.why.contains(why), "{part:?}");
+    }
+    assert!(says("generator_angle").kept);
+    let table = Table::check(&made.table.image).unwrap();
+    assert_eq!(table.torque_range_n_m(), [0.0, 0.0]);
+}
+
+#[test]
+fn a_sum_over_folds_is_the_fit_to_the_rows() {
+    let scales = Scales { torque_n_m: [0.0; 2], friction_n_m: 0.0, temperature_c: [20.0; 2], teeth: 200.0 };
+    let rows: Vec<Row> = (0..200)
+        .map(|k| {
+            let psi = 0.1 * f64::from(k);
+            let at =
+                State { generator_rad: psi, output_rad: psi / 101.0, torque_n_m: 0.0, temperature_c: 20.0, way: 1.0 };
+            Row { at, left_arcsec: 7.0 * psi.sin() + 3.0, zero: 0, fold: k as usize / 50 }
+        })
+        .collect();
+    let folds = Folds::new(&rows, &[PartName::GeneratorAngle], &scales, 1, false);
+    assert_eq!(path(&folds, &folds.all())[1][0].part, PartName::GeneratorAngle);
+    let chosen = [Chosen { part: PartName::GeneratorAngle, penalty: 1e-9 }];
+    let fitted = folds.fit(&folds.all(), &chosen).unwrap();
+    assert!((fitted[0] - 3.0).abs() < 1e-4 && (fitted[1] - 7.0).abs() < 1e-4, "{fitted:?}");
+    assert!(folds.left_out(&folds.all(), &chosen) < 1e-4);
+    // Without the part its sine is left, about a zero that others found.
+    let alone = folds.left_out(&folds.all(), &[]);
+    assert!(alone > 200.0 * 20.0 && alone < 200.0 * 35.0, "{alone}");
+}
+
+/// The rows of a plan, with noise and without, of a unit by `law`.
+fn played(planned: &Planned, seed: u64, law: impl Fn(f64, f64, f64, f64) -> f64) -> Recording {
+    let mut random = fastrand::Rng::with_seed(seed);
+    let mut session = Session { torque_n_m: Some(Vec::new()), time_s: Some(Vec::new()), ..Session::default() };
+    for pass in &planned.passes {
+        let there = 0.5 * pass.duration_s;
+        let count = (pass.duration_s * 5.0) as usize;
+        for k in 0..count {
+            let t = (k as f64 + 0.5) / 5.0;
+            let (share, way) = if t < there { (t / there, 1.0) } else { (2.0 - t / there, -1.0) };
+            let turns = pass.from_generator_turn + (pass.to_generator_turn - pass.from_generator_turn) * share;
+            let psi = std::f64::consts::TAU * turns;
+            let error = law(psi, psi / RATIO, pass.torque_n_m, way) + 0.5 * noise(&mut random);
+            session.line.push(session.line.len() as u64);
+            session.time_s.as_mut().unwrap().push(pass.begin_s + t);
+            session.generator_rad.push(psi);
+            session.error_rad.push(error / ARCSEC_PER_RAD);
+            session.torque_n_m.as_mut().unwrap().push(pass.torque_n_m);
+        }
+    }
+    let rows = session.len();
+    let (faults, tooth_steps, notes) = (Vec::new(), Vec::new(), Vec::new());
+    Recording {
+        file: "planned.log".to_owned(),
+        rows,
+        sessions: vec![session],
+        faults,
+        tooth_steps,
+        notes,
+        unusable: None,
+    }
+}
+
+/// A unit of parts alone, and a bench without wander, so that the information matrix says all there is to say.
+#[test]
+fn a_plan_says_what_noise_leaves_and_its_intervals_hold() {
+    let law = |psi: f64, out: f64, torque: f64, way: f64| {
+        let flank = if torque.abs() > 0.6 { torque.signum() } else { -way };
+        18.0 * (2.0 * psi + 0.3).sin() + 40.0 * (out - 0.7).cos() + 1.2 * torque + 3e-4 * torque.powi(3) - 4.0 * way
+            + 9.0 * flank
+    };
+    let bench =
+        Bench { minutes: 40.0, rate_hz: 5.0, torque_n_m: [-30.0, 30.0], wander_arcsec: 0.0, ..Bench::default() };
+    let prior = Prior::of_ratio(RATIO, GeneratorKind::Cam);
+    let planned = plan(&prior, &bench, None).unwrap();
+    assert!(planned.minutes <= 40.0 && planned.passes.len() >= 8, "{} passes", planned.passes.len());
+    assert!(planned.passes.iter().any(|pass| pass.torque_n_m == 0.0), "no pass without load");
+    let (mut squares, mut expected, mut inside, mut count) = (0.0, 0.0, 0.0, 0.0);
+    for seed in 0..6 {
+        let made = calibrate(&[played(&planned, seed, law)], &prior).unwrap();
+        let states = interval::spread(&made.recorded.scales, RATIO, [0.0, std::f64::consts::TAU], 2000);
+        let states: Vec<State> = states.into_iter().filter(|at| at.torque_n_m.abs() > 1.0).collect();
+        let model = Prior::of_ratio(RATIO, GeneratorKind::Cam);
+        let table = Table::check(&made.table.image).unwrap();
+        let by_table = Prior { table: Some(&table), ..model };
+        let mut left: Vec<f64> = states
+            .iter()
+            .map(|at| {
+                let psi = at.output_rad * RATIO;
+                law(psi, at.output_rad, at.torque_n_m, at.way)
+                    - by_table.steady_arcsec(&State { generator_rad: psi, ..*at })
+            })
+            .collect();
+        let mean = left.iter().sum::<f64>() / left.len() as f64;
+        left.iter_mut().for_each(|left| *left -= mean);
+        squares += left.iter().map(|e| e * e).sum::<f64>();
+        count += left.len() as f64;
+        expected = planned.expected_rms_arcsec;
+        inside += states.iter().zip(&left).filter(|(at, e)| e.abs() <= made.known.half_width_arcsec(at)).count() as f64;
+    }
+    let rms = (squares / count).sqrt();
+    println!("expected {expected:.3}, found {rms:.3} arcsec rms, inside {:.3}", inside / count);
+    // A plan knows the noise alone. The step of this unit's wind-up at no load is no polynomial, and leaves as much again.
+    assert!(rms < 3.0 * expected && rms > 0.5 * expected, "{rms} of {expected}");
+    assert!(inside / count > 0.9, "{}", inside / count);
+}
+
+/// A first log at one load says nothing of the wind-up: the plan for more says so, and asks for other loads.
+#[test]
+fn what_a_first_log_lacks_is_asked_for_next() {
+    let law = |psi: f64, out: f64, torque: f64, _: f64| 18.0 * (2.0 * psi).sin() + 40.0 * out.cos() + 1.2 * torque;
+    let prior = Prior::of_ratio(RATIO, GeneratorKind::Cam);
+    let bench = Bench { minutes: 12.0, rate_hz: 5.0, torque_n_m: [10.0, 10.0], ..Bench::default() };
+    let first = plan(&prior, &bench, None).unwrap();
+    assert!(first.cannot.iter().any(|why| why.starts_with("wind_up")), "{:?}", first.cannot);
+    let made = calibrate(&[played(&first, 1, law)], &prior).unwrap();
+    let further = plan(&prior, &Bench { torque_n_m: [-30.0, 30.0], ..bench }, Some(&made.first())).unwrap();
+    assert!(further.widest.iter().all(|wide| wide.part == "wind_up" || wide.part == "play"), "{:?}", further.widest);
+    assert!(further.passes.iter().all(|pass| (pass.torque_n_m - 10.0).abs() > 1.0), "{:?}", further.passes);
+    let wide = &further.widest[0];
+    assert!(wide.half_width_arcsec.is_none_or(|before| wide.expected_arcsec < 0.5 * before), "{wide:?}");
+}
+
+#[test]
+fn a_ratio_that_the_rows_contradict_is_refused() {
+    let law = |psi: f64, out: f64, torque: f64, _: f64| 20.0 * (2.0 * psi).sin() + 60.0 * out.cos() + 2.0 * torque;
+
+    // The rows are made with a ratio of 101; a drive of 100 sees the output run away.
+    let mut other = recording(0, law);
+    let session = &mut other.sessions[0];
+    for (error, psi) in session.error_rad.iter_mut().zip(&session.generator_rad) {
+        *error += psi / RATIO - psi / 100.0;
+    }
+    let refused = calibrate(&[other], &Prior::of_ratio(100.0, GeneratorKind::Cam));
+    assert!(matches!(&refused, Err(CalibrationError::Ratio(what)) if what.contains("allowed: 101")));
+}
+
+/// A table made of one log is laid against another log of the same unit whose generator reads otherwise.
+#[test]
+fn the_phase_of_a_table_is_found_from_a_log() {
+    let law = |psi: f64, out: f64, torque: f64, _: f64| {
+        25.0 * (2.0 * psi + 0.3).sin() + 12.0 * (psi - 1.0).cos() + 90.0 * (out - 0.7).cos() + 1.5 * torque
+    };
+    let made = calibrate(&[recording(1, law)], &Prior::of_ratio(RATIO, GeneratorKind::Cam)).unwrap();
+    let table = Table::check(&made.table.image).unwrap();
+    let mut log = recording(7, law);
+    let moved = 40.0_f64 * std::f64::consts::TAU + 1.1;
+    log.sessions[0].generator_rad.iter_mut().for_each(|psi| *psi += moved);
+    let again = calibrate(&[log.clone()], &Prior::of_table(&table, GeneratorKind::Cam)).unwrap();
+    let found = again.calibration.alignment.clone().unwrap();
+    let turn = found.repeats_deg;
+    let off = (found.generator_zero_deg - moved.to_degrees() + 0.5 * turn).rem_euclid(turn) - 0.5 * turn;
+    println!("{found:?}: off by {off}");
+    assert!(
+        found.told && off.abs() <= found.generator_half_width_deg && found.generator_half_width_deg < 2.0,
+        "{found:?}"
+    );
+    assert!(found.left_before_arcsec > 10.0 * found.left_after_arcsec, "{found:?}");
+    assert!(again.calibration.core.rms_after_arcsec < 2.6, "{:?}", again.calibration.core);
+    // Noise alone tells no phase.
+    let flat = recording(3, |_, _, torque, _| 1.5 * torque);
+    let cost = again.calibration.zero_cost;
+    assert!(cost.rms_arcsec_per_generator_deg > 0.4 && cost.most_arcsec_per_generator_deg < 2.0, "{cost:?}");
+    let only_load = calibrate(std::slice::from_ref(&flat), &Prior::of_ratio(RATIO, GeneratorKind::Cam)).unwrap();
+    let smooth = Table::check(&only_load.table.image).unwrap();
+    let told = zero::align(
+        &smooth,
+        &settled(&[flat], &Prior::of_table(&smooth, GeneratorKind::Cam), &only_load.recorded, 0.0),
+        0.6,
+    );
+    assert!(!told.told, "{told:?}");
+}

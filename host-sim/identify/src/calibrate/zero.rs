@@ -1,0 +1,292 @@
+//! Where the zeros are: a table says its error from the generator's angle, and only whoever knows where that is zero can use it.
+//!
+//! The phase of a table against a log is the one with which it leaves least of what was measured; load and direction, which no phase changes, are
+//! fitted beside it. Its interval is that of blocks of the log left out in turn.
+
+use std::f64::consts::TAU;
+
+use flexspline::{Direction, GeneratorAngle, Table};
+use serde::Serialize;
+
+use super::GOLDEN;
+use super::parts::State;
+use super::rows::Rows;
+use flexspline_base::units::ARCSEC_PER_RAD;
+
+/// Rows that a phase is looked for with, and found with.
+const LOOKED_AT: usize = 1500;
+const FOUND_WITH: usize = 6000;
+/// Steps over a generator turn, and over a tooth pitch.
+const STEPS_OF_A_TURN: usize = 48;
+const STEPS_OF_A_PITCH: usize = 24;
+/// Best places of the coarse search that are looked at closely.
+const CLOSELY: usize = 4;
+/// A table repeats if its error does to this, arcsec.
+const REPEATS_ARCSEC: f64 = 0.05;
+/// The phase is told if the best leaves so much less than the usual one, and than the best of those elsewhere, of the squares. Guesses.
+const LEAST_GAIN: f64 = 0.02;
+const LEAST_BEFORE_SECOND: f64 = 0.005;
+/// Blocks left out in turn, and the half width of 95 % in standard deviations of their number.
+const BLOCKS: usize = 8;
+const OF_95_OF_BLOCKS: f64 = 2.36;
+
+/// Phase of a table against logs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Alignment {
+    /// What the generator angle of the logs reads where the table's is zero, deg, within half of `repeats_deg` of zero.
+    pub generator_zero_deg: f64,
+    /// Half width of the interval that holds it with 95 %, deg.
+    pub generator_half_width_deg: f64,
+    /// The table's error is the same after so many degrees of the generator: a tooth pitch of an ideal drive, turns of one as built.
+    pub repeats_deg: f64,
+    /// What the table leaves with the zeros of the logs taken for its own, arcsec rms.
+    pub left_before_arcsec: f64,
+    /// With the phase found.
+    pub left_after_arcsec: f64,
+    /// Whether these logs tell it; then it is used.
+    pub told: bool,
+    /// Why, or why not.
+    pub why: String,
+}
+
+/// What an error in the zeros of a table costs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ZeroCost {
+    /// For a degree of the generator, arcsec rms and at most: the slope of the error. The nominal output angle moves by 3600/ratio arcsec besides, which
+    /// an output zero that is found afterwards takes up.
+    pub rms_arcsec_per_generator_deg: f64,
+    /// See above.
+    pub most_arcsec_per_generator_deg: f64,
+    /// For a degree of the output, in whole generator turns, arcsec rms.
+    pub rms_arcsec_per_output_deg: f64,
+}
+
+/// What is read of the output where nothing but its zero is left, of a file.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OutputZero {
+    /// Which file.
+    pub file: String,
+    /// Output less generator over ratio less the table's error, arcsec, mean over the file.
+    pub arcsec: f64,
+    /// Half width of the interval that holds it with 95 %, arcsec.
+    pub half_width_arcsec: f64,
+}
+
+/// Error of the table in steady motion, arcsec.
+fn steady(table: &Table<'_>, at: &State, zero_rad: f64) -> f64 {
+    let direction = if at.way < 0.0 { Direction::Backward } else { Direction::Forward };
+    let generator = GeneratorAngle::from_rad(at.generator_rad - zero_rad).unwrap_or(GeneratorAngle::ZERO);
+    let error = table.steady_error_rad(generator, at.torque_n_m as f32, at.temperature_c as f32, direction);
+    error.map_or(0.0, |rad| f64::from(rad) * ARCSEC_PER_RAD)
+}
+
+/// A state of the table under a load, in the middle of its temperatures.
+fn loaded(table: &Table<'_>, share: f32) -> State {
+    let [low, high] = table.temperature_range_c();
+    let [least, most] = table.torque_range_n_m();
+    let torque = if most.abs() >= least.abs() { most } else { least };
+    State {
+        generator_rad: 0.0,
+        output_rad: 0.0,
+        torque_n_m: f64::from(share * torque),
+        temperature_c: f64::from(f32::midpoint(low, high)),
+        way: 1.0,
+    }
+}
+
+/// What an error in the zeros costs, at half the largest load.
+#[must_use]
+pub fn cost(table: &Table<'_>) -> ZeroCost {
+    const STEP_DEG: f64 = 0.02;
+    const PLACES: usize = 4001;
+    let ratio = table.drive().exact_ratio();
+    let slope = |angle: f64, by: f64| {
+        let at = |psi: f64| steady(table, &State { generator_rad: psi, ..loaded(table, 0.5) }, 0.0);
+        at(angle + by) - at(angle - by)
+    };
+    let (mut squares, mut most, mut by_output) = (0.0, 0.0_f64, 0.0);
+    // A turn of the output either side is alike.
+    for k in 0..PLACES {
+        let angle = TAU * ratio.abs() * (k as f64 * GOLDEN).fract();
+        let by_degree = slope(angle, STEP_DEG.to_radians()) / (2.0 * STEP_DEG);
+        squares += by_degree * by_degree;
+        most = most.max(by_degree.abs());
+        // Turns either way.
+        let turns = (ratio.abs() / 360.0).ceil();
+        by_output += (slope(angle, TAU * turns) / (2.0 * turns * 360.0 / ratio.abs())).powi(2);
+    }
+    let rms = |squares: f64| (squares / PLACES as f64).sqrt();
+    ZeroCost {
+        rms_arcsec_per_generator_deg: rms(squares),
+        most_arcsec_per_generator_deg: most,
+        rms_arcsec_per_output_deg: rms(by_output),
+    }
+}
+
+/// After which angle of the generator a table repeats, rad.
+fn repeats(table: &Table<'_>) -> f64 {
+    let drive = table.drive();
+    let ratio = drive.exact_ratio().abs();
+    let pitch = TAU / f64::from(drive.ripple_order());
+    let differs = |by: f64| {
+        (0..400)
+            .map(|k| {
+                let at = State { generator_rad: TAU * ratio * (f64::from(k) * GOLDEN).fract(), ..loaded(table, 0.5) };
+                let turned = State { generator_rad: at.generator_rad + by, ..at };
+                (steady(table, &turned, 0.0) - steady(table, &at, 0.0)).abs()
+            })
+            .fold(0.0, f64::max)
+    };
+    [pitch, TAU].into_iter().find(|by| differs(*by) < REPEATS_ARCSEC).unwrap_or(TAU * ratio)
+}
+
+/// Rows, with what no phase changes projected out.
+struct Projected<'a> {
+    table: &'a Table<'a>,
+    at: Vec<State>,
+    measured: Vec<f64>,
+    basis: Vec<Vec<f64>>,
+}
+
+impl<'a> Projected<'a> {
+    fn new(table: &'a Table<'a>, rows: &Rows, friction_n_m: f64, most: usize) -> Projected<'a> {
+        let every = rows.rows.len().div_ceil(most).max(1);
+        let places: Vec<usize> = (0..rows.rows.len()).step_by(every).collect();
+        let at: Vec<State> = places.iter().map(|k| rows.rows[*k].at).collect();
+        let measured = places.iter().map(|k| rows.measured_arcsec[*k]).collect();
+        let files = rows.rows.iter().map(|row| row.zero + 1).max().unwrap_or(0);
+        let heaviest = at.iter().map(|at| at.torque_n_m.abs()).fold(1e-9, f64::max);
+        let mut columns: Vec<Vec<f64>> =
+            (0..files).map(|file| places.iter().map(|k| f64::from(rows.rows[*k].zero == file)).collect()).collect();
+        columns.push(at.iter().map(|at| at.torque_n_m / heaviest).collect());
+        columns.push(at.iter().map(|at| (at.torque_n_m / heaviest).powi(3)).collect());
+        columns.push(at.iter().map(|at| at.way).collect());
+        let flank = |at: &State| if at.torque_n_m.abs() > friction_n_m { at.torque_n_m.signum() } else { -at.way };
+        columns.push(at.iter().map(flank).collect());
+        let mut basis: Vec<Vec<f64>> = Vec::new();
+        for mut column in columns {
+            let before = dot(&column, &column);
+            for other in &basis {
+                let along = dot(&column, other);
+                column.iter_mut().zip(other).for_each(|(a, b)| *a -= along * b);
+            }
+            let size = dot(&column, &column);
+            if size > 1e-8 * before && size > 0.0 {
+                column.iter_mut().for_each(|a| *a /= size.sqrt());
+                basis.push(column);
+            }
+        }
+        Projected { table, at, measured, basis }
+    }
+
+    /// What is left with a phase, arcsec.
+    fn left(&self, zero_rad: f64) -> Vec<f64> {
+        let mut left: Vec<f64> = self
+            .at
+            .iter()
+            .zip(&self.measured)
+            .map(|(at, measured)| measured - steady(self.table, at, zero_rad))
+            .collect();
+        for column in &self.basis {
+            let along = dot(&left, column);
+            left.iter_mut().zip(column).for_each(|(a, b)| *a -= along * b);
+        }
+        left
+    }
+
+    fn squares(&self, zero_rad: f64) -> f64 {
+        let left = self.left(zero_rad);
+        dot(&left, &left)
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Where the parabola through three neighbours is least, in steps from the middle.
+fn vertex([before, at, after]: [f64; 3]) -> f64 {
+    let curve = before - 2.0 * at + after;
+    if curve > 0.0 { (0.5 * (before - after) / curve).clamp(-1.0, 1.0) } else { 0.0 }
+}
+
+/// Finds the phase of a table against logs.
+pub(super) fn align(table: &Table<'_>, rows: &Rows, friction_n_m: f64) -> Alignment {
+    let repeats = repeats(table);
+    let pitch = TAU / f64::from(table.drive().ripple_order());
+    let coarse = Projected::new(table, rows, friction_n_m, LOOKED_AT);
+    let fine_step = pitch / STEPS_OF_A_PITCH as f64;
+    let coarse_step = if repeats <= pitch * 1.001 { fine_step } else { TAU / STEPS_OF_A_TURN as f64 };
+    let count = (repeats / coarse_step).round() as usize;
+    let mut tried: Vec<(f64, f64)> =
+        (0..count).map(|k| k as f64 * coarse_step).map(|zero| (coarse.squares(zero), zero)).collect();
+    let mut all: Vec<f64> = tried.iter().map(|(squares, _)| *squares).collect();
+    let usual = crate::measurement::median_of(&mut all);
+    tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // Close by, in steps that a tooth pitch needs.
+    let best_places: Vec<f64> = tried.iter().take(CLOSELY).map(|(_, zero)| *zero).collect();
+    let around = (coarse_step / fine_step).ceil() as i32;
+    let (mut least, mut best) = (f64::INFINITY, 0.0);
+    for place in &best_places {
+        for k in -around..=around {
+            let zero = place + f64::from(k) * fine_step;
+            let squares = coarse.squares(zero);
+            if squares < least {
+                (least, best) = (squares, zero);
+            }
+        }
+    }
+    let apart = |zero: f64| {
+        let away = (zero - best).rem_euclid(repeats);
+        away.min(repeats - away)
+    };
+    let second = tried
+        .iter()
+        .filter(|(_, zero)| apart(*zero) > 2.0 * coarse_step)
+        .map(|(s, _)| *s)
+        .fold(f64::INFINITY, f64::min);
+
+    // With all rows: the least of a parabola, and the same of the blocks that are left.
+    let all = Projected::new(table, rows, friction_n_m, FOUND_WITH);
+    let step = if least < usual * (1.0 - LEAST_GAIN) { fine_step } else { coarse_step };
+    let three = [-1.0, 0.0, 1.0].map(|k| all.left(best + k * step));
+    let whole = vertex(three.each_ref().map(|left| dot(left, left)));
+    let size = three[0].len().div_ceil(BLOCKS).max(1);
+    let without: Vec<f64> = (0..three[0].len())
+        .step_by(size)
+        .map(|begin| {
+            let end = (begin + size).min(three[0].len());
+            vertex(three.each_ref().map(|left| dot(left, left) - dot(&left[begin..end], &left[begin..end])))
+        })
+        .collect();
+    let count = without.len() as f64;
+    let mean = without.iter().sum::<f64>() / count;
+    let spread = ((count - 1.0) / count * without.iter().map(|v| (v - mean).powi(2)).sum::<f64>()).sqrt();
+    let zero = best + whole * step;
+    let half = OF_95_OF_BLOCKS * spread * step;
+    let rms = |zero: f64| (all.squares(zero) / three[0].len() as f64).sqrt();
+    let gain = 1.0 - least / usual.max(f64::MIN_POSITIVE);
+    let flat = gain < LEAST_GAIN;
+    let doubtful = !flat && second < least * (1.0 + LEAST_BEFORE_SECOND);
+    let within = (zero + 0.5 * repeats).rem_euclid(repeats) - 0.5 * repeats;
+    let why = if flat {
+        format!(
+            "the best phase takes {:.1} % of the squares that the usual one leaves; {:.0} % are asked for",
+            100.0 * gain,
+            100.0 * LEAST_GAIN
+        )
+    } else if doubtful {
+        "another phase is as good".to_owned()
+    } else {
+        format!("the best phase takes {:.1} % of the squares that the usual one leaves", 100.0 * gain)
+    };
+    Alignment {
+        generator_zero_deg: within.to_degrees(),
+        generator_half_width_deg: half.to_degrees(),
+        repeats_deg: repeats.to_degrees(),
+        left_before_arcsec: rms(0.0),
+        left_after_arcsec: rms(zero),
+        told: !flat && !doubtful,
+        why,
+    }
+}

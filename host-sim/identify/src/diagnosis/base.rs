@@ -1,0 +1,393 @@
+//! The nominal prediction over the rows, and what of it may float without being a discrepancy.
+//!
+//! # Play
+//! The flank that carries follows the load: `p = +1` where the torque turns the output forward onto one flank, `−1` on the other,
+//! and the error holds `p · backlash / 2`. Inside `|torque| < friction` drives differ, so several laws are tried and the one
+//! that leaves least is taken:
+//! held (p stays where it was), pushed (friction holds the output until the generator has used up the clearance and pushes it:
+//! a play operator in the nominal output), by sign alone, and smooth.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use flexspline::{GeneratorAngle, PlayState, Table};
+
+use super::flank_lag::{behind, flank_lag};
+use super::linear::{Gram, Prior, solve};
+use super::rows::{Rows, combined, rms};
+use crate::nominal::Nominal;
+use flexspline_base::units::ARCSEC_PER_RAD;
+
+/// How the flank changes where the torque is below friction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PlayLaw {
+    /// It stays as it was until the torque exceeds friction.
+    Held,
+    /// Friction holds the output until the generator pushes it.
+    Pushed,
+    /// It follows the sign of the torque.
+    Sign,
+    /// `tanh(torque / friction)`.
+    Smooth,
+}
+
+impl PlayLaw {
+    /// All laws.
+    pub const ALL: [PlayLaw; 4] = [PlayLaw::Held, PlayLaw::Pushed, PlayLaw::Sign, PlayLaw::Smooth];
+
+    /// Which flank carries in each row, −1 to 1, under a torque.
+    #[must_use]
+    pub fn flanks(self, rows: &Rows, torque: &[f64], nominal: &Nominal) -> Vec<f64> {
+        // Before the first load: where the friction of a moving output puts it.
+        let begun = |first: usize| -rows.direction[first] * nominal.ratio.signum();
+        self.flanks_from(begun, 1.0, rows, torque, nominal)
+    }
+
+    /// Flanks with a clearance `wider` than nominal, from where each session has `begun` if no load says (first row).
+    fn flanks_from(
+        self,
+        begun: impl Fn(usize) -> f64,
+        wider: f64,
+        rows: &Rows,
+        torque: &[f64],
+        nominal: &Nominal,
+    ) -> Vec<f64> {
+        let friction = nominal.friction_torque_n_m;
+        let half_rad = (0.5 * wider * nominal.backlash_arcsec / ARCSEC_PER_RAD).max(1e-12);
+        let mut flanks = vec![0.0; rows.len()];
+        for session in &rows.sessions {
+            let first = session.start;
+            let mut p = if torque[first].abs() > friction { torque[first].signum() } else { begun(first) };
+            for k in session.clone() {
+                let load = torque[k];
+                p = match self {
+                    PlayLaw::Smooth => (load / friction.max(1e-9)).tanh(),
+                    _ if load.abs() > friction => load.signum(),
+                    PlayLaw::Held => p,
+                    PlayLaw::Sign if load != 0.0 => load.signum(),
+                    PlayLaw::Sign => p,
+                    PlayLaw::Pushed => {
+                        let turned = if k > first { rows.output[k] - rows.output[k - 1] } else { 0.0 };
+                        (p - turned / half_rad).clamp(-1.0, 1.0)
+                    }
+                };
+                flanks[k] = p;
+            }
+        }
+        flanks
+    }
+}
+
+/// A column that belongs to the nominal model and may float: coefficient 0 is nominal.
+#[derive(Clone, Debug)]
+pub struct Floating {
+    /// What it is.
+    pub name: String,
+    /// Column, arcsec per unit of the coefficient.
+    pub values: Vec<f64>,
+    /// Standard deviation between units; large for the zero of the encoder.
+    pub spread: f64,
+}
+
+type Pair = Arc<[Vec<f64>; 2]>;
+
+/// Cosines and sines of angles that many laws share, made when first asked for.
+#[derive(Clone, Debug, Default)]
+pub struct Waves(Arc<Mutex<HashMap<(i8, u64), Pair>>>);
+
+impl Waves {
+    /// Cosine and sine of `order` times the angle called `which`.
+    pub fn of(&self, which: i8, order: f64, make: impl FnOnce() -> [Vec<f64>; 2]) -> Pair {
+        let key = (which, order.to_bits());
+        let known = |waves: &Waves| waves.0.lock().unwrap_or_else(PoisonError::into_inner).get(&key).cloned();
+        if let Some(pair) = known(self) {
+            return pair;
+        }
+        let pair = Arc::new(make());
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).insert(key, pair.clone());
+        pair
+    }
+}
+
+/// Nominal prediction and tolerances.
+#[derive(Clone, Debug)]
+pub struct Base {
+    /// Prediction of the nominal model, arcsec.
+    pub prediction: Vec<f64>,
+    /// Which flank carries, −1 to 1.
+    pub flank: Vec<f64>,
+    /// Nominal wind-up, arcsec.
+    pub wind_up: Vec<f64>,
+    /// Half the nominal backlash, arcsec.
+    pub half_backlash: f64,
+    /// Law of the play.
+    pub law: PlayLaw,
+    /// What may float.
+    pub floating: Vec<Floating>,
+    /// Cosines and sines of angles that many laws share.
+    pub waves: Waves,
+    /// Rows where the flank is not known well: crossing the clearance, or torque around friction.
+    pub uncertain: Vec<bool>,
+}
+
+/// What floats where angles are read at other instants than is known, s.
+pub const BETWEEN_READINGS: &str = "time between the readings";
+/// What floats as the output takes a time to go to its other flank, s: that of a lag which does as much to the error as this time says. Beside
+/// the lag that the rows tell best ([`flank_lag`]) it is that lag to first order.
+pub const CHANGE_OF_FLANK: &str = "time of a change of flank";
+/// The output goes from one flank to the other in some milliseconds. *Guess*.
+pub(super) const FLANK_S: f64 = 5e-3;
+/// Standard deviation of what no drawing fixes, arcsec: the zero of the output encoder.
+pub(super) const FREE: f64 = 1e4;
+/// Least spread of a phase, over that of the amplitude.
+const LEAST_TURN: f64 = 1e-3;
+/// A play law that leaves this much less (relative) than the first is taken instead.
+const CLEARLY_BETTER: f64 = 0.995;
+/// A play law is taken that leaves less than the first by this factor though it leaves the flank in doubt far beyond friction.
+const FAR_BETTER: f64 = 0.8;
+/// Rows are uncertain where the torque is below this multiple of friction.
+pub(super) const NEAR_FRICTION: f64 = 1.25;
+/// A clearance is crossed within this time, s.
+const CROSSING_S: f64 = 0.08;
+/// A clearance may be this many times as wide as the nominal one before anything else is known.
+pub(super) const WIDER: f64 = 1.6;
+/// If more of the rows than this are uncertain, none is set aside: then they are what the data are about.
+const UNCERTAIN_AT_MOST: f64 = 0.35;
+
+impl Base {
+    /// The nominal model over the rows; `table` takes the place of its parts where it is given.
+    #[must_use]
+    pub fn new(rows: &Rows, nominal: &Nominal, table: Option<&Table<'_>>) -> Base {
+        Base::of_laws(rows, nominal, table, &PlayLaw::ALL)
+    }
+
+    /// The base model with the law of the play known.
+    #[must_use]
+    pub fn with_play(rows: &Rows, nominal: &Nominal, table: Option<&Table<'_>>, law: PlayLaw) -> Base {
+        Base::of_laws(rows, nominal, table, &[law])
+    }
+
+    fn of_laws(rows: &Rows, nominal: &Nominal, table: Option<&Table<'_>>, laws: &[PlayLaw]) -> Base {
+        let wind_up: Vec<f64> = rows.torque.iter().map(|t| nominal.wind_up_arcsec(*t)).collect();
+        let harmonics: Vec<f64> = rows.generator.iter().map(|psi| nominal.harmonics_arcsec(*psi)).collect();
+        let half_backlash = 0.5 * nominal.backlash_arcsec;
+        let mut best: Option<(f64, PlayLaw, Vec<f64>)> = None;
+        for &law in laws {
+            let flank = law.flanks(rows, &rows.torque, nominal);
+            let left: Vec<f64> =
+                (0..rows.len()).map(|k| rows.error[k] - harmonics[k] - wind_up[k] - half_backlash * flank[k]).collect();
+            let spread = middle_spread(rows, &left, nominal.friction_torque_n_m);
+            // A cause not yet known may look like a clearance that is not crossed at once.
+            let needed = if law == PlayLaw::Smooth { FAR_BETTER } else { CLEARLY_BETTER };
+            if best.as_ref().is_none_or(|(least, _, _)| spread < needed * least) {
+                best = Some((spread, law, flank));
+            }
+        }
+        let (law, flank) = best.map_or((PlayLaw::Held, Vec::new()), |(_, law, flank)| (law, flank));
+        let prediction: Vec<f64> = match table {
+            Some(table) => predicted_by_table(rows, &rows.torque, table),
+            None => (0..rows.len()).map(|k| harmonics[k] + wind_up[k] + half_backlash * flank[k]).collect(),
+        };
+        let mut floating = vec![Floating { name: "zero".into(), values: vec![1.0; rows.len()], spread: FREE }];
+        for session in &rows.zeros {
+            let from = rows.sessions[*session].start;
+            let values = (0..rows.len()).map(|k| f64::from(u8::from(k >= from))).collect();
+            floating.push(Floating { name: "zero".into(), values, spread: FREE });
+        }
+        let mut add = |name: &str, values: Vec<f64>, spread: f64| {
+            if spread > 0.0 && values.iter().any(|v| *v != 0.0) {
+                floating.push(Floating { name: name.into(), values, spread });
+            }
+        };
+        // Where angles are read at other instants than is known, their mean may be off, too: that is the logger's.
+        let late = rows.speed.iter().map(|speed| -speed * ARCSEC_PER_RAD / nominal.ratio);
+        add(BETWEEN_READINGS, late.collect(), rows.unsure_s);
+        // No output is on its other flank at once.
+        if rows.recorded.time {
+            let left: Vec<f64> =
+                rows.error.iter().zip(&prediction).map(|(error, predicted)| error - predicted).collect();
+            let lag_s = flank_lag(rows, &left, &flank, half_backlash);
+            let per_s = behind(rows, &flank, half_backlash, lag_s).into_iter().map(|arcsec| arcsec / lag_s);
+            add(CHANGE_OF_FLANK, per_s.collect(), lag_s);
+        }
+        add("stiffness", wind_up.clone(), nominal.spread.stiffness);
+        add("backlash", flank.iter().map(|p| half_backlash * p).collect(), nominal.spread.backlash);
+        for harmonic in &nominal.harmonics {
+            let wave = |shift: f64| -> Vec<f64> {
+                let at = |psi: &f64| harmonic.order_per_generator_turn * psi + harmonic.phase_rad + shift;
+                rows.generator.iter().map(|psi| harmonic.amplitude_arcsec * at(psi).sin()).collect()
+            };
+            add("harmonic", wave(0.0), nominal.spread.harmonic);
+            // A wave a quarter of a period ahead turns the phase. It floats with the amplitude: they are read as a pair.
+            let turns = nominal.spread.harmonic_phase_rad.max(LEAST_TURN * nominal.spread.harmonic);
+            add("harmonic", wave(std::f64::consts::FRAC_PI_2), turns);
+        }
+        let uncertain = uncertain(rows, nominal, law, &flank);
+        Base { prediction, flank, wind_up, half_backlash, law, floating, waves: Waves::default(), uncertain }
+    }
+}
+
+impl Base {
+    /// A copy to be changed, without what floats.
+    pub(super) fn without_floating(&self) -> Base {
+        Base { waves: self.waves.clone(), ..self.each(<[f64]>::to_vec) }
+    }
+
+    /// With each column changed by `of`, without what floats, and without the waves of its rows.
+    pub(super) fn each(&self, of: impl Fn(&[f64]) -> Vec<f64>) -> Base {
+        Base {
+            prediction: of(&self.prediction),
+            flank: of(&self.flank),
+            wind_up: of(&self.wind_up),
+            half_backlash: self.half_backlash,
+            law: self.law,
+            floating: Vec::new(),
+            waves: Waves::default(),
+            uncertain: Vec::new(),
+        }
+    }
+
+    /// Flanks, wind-up and prediction under the torque that `rows` have now.
+    pub(super) fn load_with(&mut self, rows: &Rows, nominal: &Nominal) {
+        let flank = self.law.flanks(rows, &rows.torque, nominal);
+        for k in 0..rows.len() {
+            let wind_up = nominal.wind_up_arcsec(rows.torque[k]);
+            self.prediction[k] += wind_up - self.wind_up[k] + self.half_backlash * (flank[k] - self.flank[k]);
+            self.wind_up[k] = wind_up;
+        }
+        self.flank = flank;
+    }
+}
+
+/// Sum of squares that a law of the play leaves where the torque is around friction. A zero, a late reading and a wrong ratio are taken out before:
+/// any drive may have them, whatever its play does, and they would decide between the laws.
+fn middle_spread(rows: &Rows, left: &[f64], friction: f64) -> f64 {
+    let used: Vec<usize> = rows.sessions_used().flatten().collect();
+    let of = |column: &[f64]| -> Vec<f64> {
+        let values: Vec<f64> = used.iter().map(|k| column[*k]).collect();
+        let size = rms(&values).max(1e-9);
+        values.into_iter().map(|value| value / size).collect()
+    };
+    let columns = [vec![1.0; used.len()], of(&rows.speed), of(&rows.output)];
+    let data: Vec<f64> = used.iter().map(|k| left[*k]).collect();
+    let views: Vec<&[f64]> = columns.iter().chain([&data]).map(Vec::as_slice).collect();
+    let priors = [Prior { mean: 0.0, std: 1e3 * rms(&data).max(1e-9) }; 3];
+    let free =
+        solve(&Gram::of(&views, 0..used.len()), &priors, 1.0).map_or(vec![0.0; 3], |solution| solution.coefficients);
+    let explained = combined(used.len(), columns.iter().map(Vec::as_slice), &free);
+    let inside = (0..used.len()).filter(|j| rows.torque[used[*j]].abs() <= friction);
+    inside.map(|j| (data[j] - explained[j]).powi(2)).sum()
+}
+
+/// What a table predicts over the rows under a torque, arcsec.
+pub(super) fn predicted_by_table(rows: &Rows, torque: &[f64], table: &Table<'_>) -> Vec<f64> {
+    let mut predicted = vec![0.0; rows.len()];
+    for session in &rows.sessions {
+        let mut play = PlayState::unknown();
+        for k in session.clone() {
+            let generator = GeneratorAngle::from_rad(rows.generator[k]).unwrap_or(GeneratorAngle::ZERO);
+            let said = table.forward(&mut play, generator, torque[k] as f32, rows.temperature[k] as f32);
+            predicted[k] = f64::from(said.transmission_error_rad) * ARCSEC_PER_RAD;
+        }
+    }
+    predicted
+}
+
+fn uncertain(rows: &Rows, nominal: &Nominal, law: PlayLaw, flank: &[f64]) -> Vec<bool> {
+    let by_load = uncertain_by_load(rows, nominal, flank);
+    if few(&by_load) {
+        return by_load;
+    }
+    // Where hardly any load says which flank carries, the motion does, …
+    let by_motion = (law == PlayLaw::Pushed).then(|| uncertain_by_motion(rows, nominal));
+    if let Some(by_motion) = by_motion.filter(|uncertain| few(uncertain)) {
+        return by_motion;
+    }
+    // … or nothing says it but at the beginning. Sessions without a load are set aside as a whole, unless too little is left then.
+    [true, false]
+        .into_iter()
+        .map(|unloaded_too| uncertain_at_first(rows, nominal, unloaded_too))
+        .find(|at_first| few(at_first))
+        .unwrap_or_else(|| vec![false; rows.len()])
+}
+
+/// Rows of a session before the first load that says which flank carries: nobody knows where the drive was left. Of a session that nothing loads
+/// these are all, if such sessions count.
+fn uncertain_at_first(rows: &Rows, nominal: &Nominal, unloaded_too: bool) -> Vec<bool> {
+    let mut uncertain = vec![false; rows.len()];
+    for session in &rows.sessions {
+        let loaded = session.clone().find(|k| rows.torque[*k].abs() > nominal.friction_torque_n_m);
+        let never = if unloaded_too { session.end } else { session.start };
+        uncertain[session.start..loaded.unwrap_or(never)].fill(true);
+    }
+    uncertain
+}
+
+/// Whether so few rows are uncertain that they can be set aside.
+pub(super) fn few(uncertain: &[bool]) -> bool {
+    let share = uncertain.iter().filter(|u| **u).count() as f64 / uncertain.len().max(1) as f64;
+    share <= UNCERTAIN_AT_MOST
+}
+
+/// Rows before the generator has pushed the output to a flank, wherever it stood and were the clearance [`WIDER`].
+fn uncertain_by_motion(rows: &Rows, nominal: &Nominal) -> Vec<bool> {
+    let from = |begun: f64, wider: f64| PlayLaw::Pushed.flanks_from(|_| begun, wider, rows, &rows.torque, nominal);
+    let all = [from(1.0, 1.0), from(-1.0, 1.0), from(1.0, WIDER), from(-1.0, WIDER)];
+    let carries = |flank: f64| if flank.abs() < 0.999 { 0.0 } else { flank.signum() };
+    (0..rows.len())
+        .map(|k| {
+            let first = carries(all[0][k]);
+            first == 0.0 || all.iter().any(|flank| carries(flank[k]) != first)
+        })
+        .collect()
+}
+
+/// Rows after which a clearance is crossed.
+pub(super) fn rows_of_crossing(rows: &Rows) -> usize {
+    (CROSSING_S / rows.period).ceil().clamp(2.0, 50.0) as usize
+}
+
+/// Rows with a torque around friction, and those while the clearance is crossed.
+fn uncertain_by_load(rows: &Rows, nominal: &Nominal, flank: &[f64]) -> Vec<bool> {
+    let near = NEAR_FRICTION * nominal.friction_torque_n_m;
+    let mut uncertain: Vec<bool> =
+        (0..rows.len()).map(|k| rows.torque[k].abs() <= near || flank[k].abs() < 0.999).collect();
+    for session in &rows.sessions {
+        for k in session.start + 1..session.end {
+            if flank[k] * flank[k - 1] < 0.0 {
+                let around = k.saturating_sub(2).max(session.start)..(k + 1 + rows_of_crossing(rows)).min(session.end);
+                uncertain[around].fill(true);
+            }
+        }
+    }
+    uncertain
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measurement::Session;
+
+    #[test]
+    fn nobody_knows_the_flank_before_the_first_load_or_without_one() {
+        let nominal = crate::synthesize::catalogue_drive();
+        let rows = 10;
+        let session = |torque: Vec<f64>| Session {
+            line: (0..rows as u64).collect(),
+            generator_rad: (0..rows).map(|k| 0.1 * k as f64).collect(),
+            error_rad: vec![0.0; rows],
+            time_s: Some((0..rows).map(|k| 0.01 * k as f64).collect()),
+            torque_n_m: Some(torque),
+            ..Session::default()
+        };
+        let load = 3.0 * nominal.friction_torque_n_m;
+        let late = (0..rows).map(|k| if k < 4 { 0.0 } else { -load }).collect();
+        let rows = Rows::new(&[session(late), session(vec![0.0; rows]), session(vec![load; rows])], &nominal);
+        let first = |unloaded_too: bool| -> Vec<usize> {
+            let uncertain = uncertain_at_first(&rows, &nominal, unloaded_too);
+            rows.sessions.iter().map(|session| uncertain[session.clone()].iter().filter(|u| **u).count()).collect()
+        };
+        assert_eq!(first(true), [4, 10, 0]);
+        assert_eq!(first(false), [4, 0, 0]);
+    }
+}

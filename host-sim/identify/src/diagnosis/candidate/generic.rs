@@ -1,0 +1,239 @@
+//! Deviations without a cause in the library. They compete with the causes: where one of them tells the data better, no cause is
+//! named for it.
+
+use super::stiffness::follow;
+use super::{Deviation, Excitation, Label, Law, Per, Role, Shape, by_row, lagged, main};
+use crate::causes::ParameterName as Name;
+use flexspline_base::units::ARCSEC_PER_RAD;
+
+/// Lost motion and the coupling, as they are called.
+const LASH_BEFORE_THE_GENERATOR: &str = "lost motion before the generator";
+const COUPLING_BEFORE_THE_GENERATOR: &str = "a coupling before the generator that gives way";
+/// Offsets that go with the speed or the direction alone.
+const WITH_SPEED_MAGNITUDE: &str = "offset with the magnitude of speed";
+const WITH_SPEED_SQUARED: &str = "offset with speed squared";
+const WITH_SPEED_SQUARED_BY_DIRECTION: &str = "offset with speed squared, by direction";
+const BY_DIRECTION: &str = "offset by direction";
+const OF_SPEED: &str = "a function of speed";
+
+/// Whether what has no name, called so, follows how fast the generator turns and which way, and nothing else.
+#[must_use]
+pub fn follows_speed(called: &str) -> bool {
+    const ALL: [&str; 6] = [
+        LASH_BEFORE_THE_GENERATOR,
+        WITH_SPEED_MAGNITUDE,
+        WITH_SPEED_SQUARED,
+        WITH_SPEED_SQUARED_BY_DIRECTION,
+        BY_DIRECTION,
+        OF_SPEED,
+    ];
+    ALL.contains(&called)
+}
+
+fn law(name: &'static str, values: impl Fn(&Excitation<'_>, usize) -> f64 + Send + Sync + 'static) -> Law {
+    Law::new(name, move |on, _| {
+        let column = by_row(on, |k| values(on, k));
+        let size = super::super::rows::rms(&column).max(1e-12);
+        vec![main(column.into_iter().map(|v| v / size).collect(), 20.0)]
+    })
+}
+
+fn wave(label: Deviation, angle: fn(&Excitation<'_>, usize) -> f64, order: f64) -> Law {
+    Law::new(Label::Deviation(label), move |on, _| {
+        vec![
+            main(by_row(on, |k| (order * angle(on, k)).cos()), 15.0),
+            main(by_row(on, |k| (order * angle(on, k)).sin()), 15.0),
+        ]
+    })
+}
+
+/// Lost motion before the generator, as of an Oldham coupling: whatever the load, the output lags by half of it either way.
+fn lash_before_the_generator() -> Law {
+    Law::new(LASH_BEFORE_THE_GENERATOR, |on, shape| {
+        let half_rad = shape.of(Name::HalfLashArcsec) * on.nominal.ratio.abs() / ARCSEC_PER_RAD;
+        let mut held = vec![0.0; on.rows.len()];
+        for session in &on.rows.sessions {
+            follow(&on.rows.generator, session.clone(), half_rad, 0.0, &mut held);
+        }
+        vec![main(by_row(on, |k| -held[k] * on.nominal.ratio.signum()), 20.0).called(Role::SIZE)]
+    })
+    .shapes([Shape::by_factors(Name::HalfLashArcsec, 0.5, 60.0, 5)])
+    .physical_if(|_, c| c.of(Role::SIZE) > 0.0)
+}
+
+/// A coupling between the motor's encoder and the generator that gives way: it is wound up by what the load, friction, oil and inertia of the
+/// generator ask of the motor, a ratio-th of which is seen at the output. Softer under load and late in motion, at once.
+fn coupling_before_the_generator() -> Law {
+    const LOAD: Role = Role("load");
+    const FRICTION: Role = Role("friction");
+    Law::new(COUPLING_BEFORE_THE_GENERATOR, |on, _| {
+        let forward = on.nominal.ratio.signum();
+        let unit = |column: Vec<f64>| -> Vec<f64> {
+            let size = super::super::rows::rms(&column).max(1e-12);
+            column.into_iter().map(|v| v / size).collect()
+        };
+        // Of the generator, it holds back what the output is turned on by.
+        let held_back = |values: &dyn Fn(usize) -> f64| unit(by_row(on, |k| -forward * values(k)));
+        let gathers = super::sensor::rate(on, &on.rows.speed);
+        vec![
+            main(unit(by_row(on, |k| on.rows.torque[k])), 20.0).called(LOAD),
+            main(held_back(&|k| on.rows.direction[k]), 10.0).called(FRICTION),
+            main(held_back(&|k| on.rows.speed[k]), 10.0),
+            main(held_back(&|k| gathers[k]), 5.0),
+        ]
+    })
+    .physical_if(|_, c| c.of(LOAD) > 0.0 && c.of(FRICTION) > 0.0)
+}
+
+/// Wind-up that comes late: what relaxes within about a second, ten, a hundred and a thousand, from rest under the first load.
+fn creep_under_load() -> Law {
+    Law::new("creep under load", |on, _| {
+        let late = |lasts_s: f64| {
+            let reached = lagged(on, &on.base.wind_up, lasts_s);
+            main(by_row(on, |k| reached[k] - on.base.wind_up[k]), 0.3)
+        };
+        [1.0, 10.0, 100.0, 1000.0].into_iter().map(late).collect()
+    })
+}
+
+/// Another zero in each session: a sensor that was taken off and put back. No session tells the next one's.
+fn zero_of_each_session() -> Law {
+    let mut law = Law::new("another zero in each session", |on, _| {
+        let of = |session: &std::ops::Range<usize>| by_row(on, |k| f64::from(u8::from(session.contains(&k))));
+        on.rows.sessions_used().skip(1).map(|session| main(of(&session), 20.0)).collect()
+    });
+    law.wrong.foretells = false;
+    // It is measured, not modelled.
+    law.wrong.misfit = 0.0;
+    law
+}
+
+/// A line at any order of an angle or of time: `per` is what it is counted against.
+#[must_use]
+pub fn line(per: Per, order: f64) -> Law {
+    let angle: fn(&Excitation<'_>, usize) -> f64 = match per {
+        Per::GeneratorTurn => |on, k| on.rows.generator[k],
+        Per::OutputTurn => |on, k| on.rows.output[k],
+        Per::Second => |on, k| 2.0 * std::f64::consts::PI * on.rows.time[k],
+    };
+    let label = Deviation::Line { per, order };
+    if per != Per::Second {
+        return wave(label, angle, order);
+    }
+    // Nothing says that a line in time keeps its phase while nobody records.
+    Law::new(Label::Deviation(label), move |on, _| {
+        let of = |session: &std::ops::Range<usize>, shift: f64| {
+            let inside = |k: usize| if session.contains(&k) { (order * angle(on, k) - shift).cos() } else { 0.0 };
+            main(by_row(on, inside), 15.0)
+        };
+        on.rows.sessions.iter().flat_map(|s| [of(s, 0.0), of(s, std::f64::consts::FRAC_PI_2)]).collect()
+    })
+}
+
+/// Everything without a name that is always tried.
+#[must_use]
+pub fn unnamed(on: &Excitation<'_>) -> Vec<Law> {
+    let rows = on.rows;
+    let mut laws = Vec::new();
+    if rows.recorded.temperature {
+        laws.push(law("offset with temperature", |on, k| on.rows.temperature[k] - on.nominal.temperature_c));
+        laws.push(law("offset with temperature squared", |on, k| {
+            (on.rows.temperature[k] - on.nominal.temperature_c).powi(2)
+        }));
+    }
+    if rows.recorded.time {
+        laws.push(law("offset with time", |on, k| on.rows.time[k] - on.rows.time[0]));
+        laws.push(law("creep since the session began (logarithm)", |on, k| (1.0 + on.rows.since[k]).ln()));
+        laws.push(law("settling since the session began (exponential, 20 s)", |on, k| {
+            (-on.rows.since[k] / 20.0).exp()
+        }));
+        laws.push(law(WITH_SPEED_MAGNITUDE, |on, k| on.rows.speed[k].abs()));
+        laws.push(law(WITH_SPEED_SQUARED, |on, k| on.rows.speed[k].powi(2)));
+        laws.push(law(WITH_SPEED_SQUARED_BY_DIRECTION, |on, k| on.rows.speed[k].powi(2) * on.rows.direction[k]));
+    }
+    if rows.sessions_used().count() > 2 {
+        laws.push(zero_of_each_session());
+    }
+    laws.push(law(BY_DIRECTION, |on, k| on.rows.direction[k]));
+    laws.push(lash_before_the_generator());
+    if on.scales.load > 0.0 {
+        laws.push(law("offset with the magnitude of torque", |on, k| on.rows.torque[k].abs()));
+        laws.push(law("offset with torque squared", |on, k| on.rows.torque[k].powi(2)));
+        laws.push(law("torque by direction", |on, k| on.rows.torque[k].abs() * on.rows.direction[k]));
+        if rows.recorded.time {
+            laws.push(creep_under_load());
+            laws.push(coupling_before_the_generator());
+            laws.push(law("wind-up with time", |on, k| on.base.wind_up[k] * (on.rows.time[k] - on.rows.time[0])));
+        }
+    }
+    for order in [3.0, 5.0, 7.0, 10.0, 12.0] {
+        laws.push(line(Per::GeneratorTurn, order));
+    }
+    laws.push(line(Per::OutputTurn, 3.0));
+    laws
+}
+
+/// A function of one or two quantities, free but for its smoothness: hats on a grid.
+fn map(name: &'static str, grids: Vec<(Vec<f64>, usize)>) -> Law {
+    Law::new(name, move |on, _| {
+        let n = on.rows.len();
+        let mut columns: Vec<Vec<f64>> = vec![vec![1.0; n]];
+        for (values, nodes) in &grids {
+            let low = super::super::rows::quantile(values.iter().copied(), 0.01);
+            let high = super::super::rows::quantile(values.iter().copied(), 0.99);
+            if high <= low {
+                continue;
+            }
+            let hats: Vec<Vec<f64>> = (0..*nodes)
+                .map(|j| {
+                    let hat = |v: &f64| {
+                        let place = ((v - low) / (high - low)).clamp(0.0, 1.0) * (*nodes - 1) as f64;
+                        (1.0 - (place - j as f64).abs()).max(0.0)
+                    };
+                    values.iter().map(hat).collect()
+                })
+                .collect();
+            columns = columns
+                .iter()
+                .flat_map(|c| {
+                    hats.iter().map(|h| c.iter().zip(h).map(|(a, b)| a * b).collect::<Vec<f64>>()).collect::<Vec<_>>()
+                })
+                .collect();
+        }
+        columns.into_iter().map(|values| main(values, 10.0)).collect()
+    })
+}
+
+/// What is left as a free function of what was measured: tried only when the causes are in, to see whether anything is left.
+#[must_use]
+pub fn maps(on: &Excitation<'_>) -> Vec<Law> {
+    let rows = on.rows;
+    let turn = |angle: &[f64], of: f64| -> Vec<f64> { angle.iter().map(|a| a.rem_euclid(of)).collect() };
+    let full = std::f64::consts::TAU;
+    let mut maps = vec![
+        map("a function of the generator angle", vec![(turn(&rows.generator, full), 25)]),
+        map("a function of the angle on the circular spline", vec![(turn(&rows.on_circular_spline, full), 25)]),
+        map("a function of the output angle", vec![(turn(&rows.output, full), 13)]),
+    ];
+    if on.scales.load > 0.0 {
+        maps.push(map(
+            "a function of torque and direction",
+            vec![(rows.torque.clone(), 11), (rows.direction.clone(), 2)],
+        ));
+    }
+    if rows.recorded.temperature {
+        maps.push(map("a function of temperature", vec![(rows.temperature.clone(), 6)]));
+        if on.scales.load > 0.0 {
+            let both = vec![(rows.torque.clone(), 6), (rows.temperature.clone(), 4)];
+            maps.push(map("a function of torque and temperature", both));
+        }
+    }
+    if rows.recorded.time {
+        maps.push(map(OF_SPEED, vec![(rows.speed.clone(), 12)]));
+        if on.scales.load > 0.0 {
+            let both = vec![(rows.torque.clone(), 6), (rows.time.clone(), 4)];
+            maps.push(map("a function of torque and time", both));
+        }
+    }
+    maps
+}

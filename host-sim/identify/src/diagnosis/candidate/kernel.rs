@@ -1,0 +1,175 @@
+//! Signatures of geometric causes from the influence kernels of the contact FEM ([`flexspline_design::kernels`]), where the drive has them: what
+//! each load and each place in the wave makes of an error is then computed, not assumed.
+//!
+//! What the kernels leave open stays a nuisance: they are those of the frictionless drive at one temperature and on one mesh.
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use super::geometry::{Angle, COS_PRESSURE_ANGLE, angle};
+use super::{Column, Excitation, Law, Role, Shape, beside, by_row, main, main_about, nuisance, of_wave};
+use crate::causes::{CauseName, Kin, ParameterName as Name};
+use flexspline_design::kernels::{Gain, Kernels};
+use flexspline_mechanics::drive::Wheel;
+
+/// Share by which a kernel's signature may be wrong: friction, temperature, mesh.
+const KERNEL_MISFIT: f64 = 0.08;
+/// Share by which the scale of a signature may be wrong: the size itself is a parameter, and enters otherwise than as a factor.
+const SCALE_MISFIT: f64 = 0.02;
+/// Plausible size of an error of pitch, of an oval, µm: one standard deviation.
+const USUAL_UM: f64 = 6.0;
+/// Plausible eccentricities, µm.
+const ECCENTRICITY_UM: [f64; 2] = [0.5, 60.0];
+
+/// A value that depends on the load, by which flank carries: between the flanks, part of both.
+fn by_flank(flank: f64, torque: f64, value: impl Fn(f64) -> f64) -> f64 {
+    let load = torque.abs();
+    let forward = if flank > -1.0 { 0.5 * (1.0 + flank) * value(load) } else { 0.0 };
+    let backward = if flank < 1.0 { 0.5 * (1.0 - flank) * value(-load.max(f64::MIN_POSITIVE)) } else { 0.0 };
+    forward + backward
+}
+
+/// The wave that a law is.
+const WAVE: Role = Role("wave");
+
+fn main_um(values: Vec<f64>) -> Column {
+    main(values, USUAL_UM).called(WAVE)
+}
+
+/// Columns of the response to `cos(k α)` and to `sin(k α)` of an error on a wheel.
+fn responses(on: &Excitation<'_>, of: Angle, order: f64, gain: impl Fn(f64) -> Gain) -> [Vec<f64>; 2] {
+    // The gain changes slowly with the load: it is looked up on a grid of its root.
+    const NODES: usize = 64;
+    let most = on.rows.torque.iter().fold(1e-6, |m: f64, t| m.max(t.abs())).sqrt();
+    let node = |k: usize, sign: f64| gain(sign * (most * k as f64 / (NODES - 1) as f64).powi(2).max(1e-9));
+    let nodes: [Vec<Gain>; 2] = [1.0, -1.0].map(|sign| (0..NODES).map(|k| node(k, sign)).collect());
+    let at = |torque: f64| -> Gain {
+        let place = torque.abs().sqrt() / most * (NODES - 1) as f64;
+        let (k, x) = ((place as usize).min(NODES - 2), place - (place as usize).min(NODES - 2) as f64);
+        let of = &nodes[usize::from(torque < 0.0)];
+        [0, 1].map(|i| (1.0 - x) * of[k][i] + x * of[k + 1][i])
+    };
+    let response = |k: usize, of_sine: bool| {
+        let (sin, cos) = (order * angle(on, of, k)).sin_cos();
+        by_flank(on.base.flank[k], on.rows.torque[k], |torque| {
+            let [c, s] = at(torque);
+            if of_sine { c * sin + s * cos } else { c * cos - s * sin }
+        })
+    };
+    [by_row(on, |k| response(k, false)), by_row(on, |k| response(k, true))]
+}
+
+/// Deviations that any law of shape may have from its kernel: the flanks' share and the clearance.
+fn left_open(on: &Excitation<'_>, of: Angle, order: f64) -> Vec<Column> {
+    let flank = |k: usize| on.base.flank[k];
+    let wave = |shift: f64, by_flank: bool| {
+        by_row(on, |k| (order * angle(on, of, k) - shift).cos() * if by_flank { flank(k) } else { 1.0 })
+    };
+    let mut columns: Vec<Column> = [(0.0, false), (0.5 * PI, false), (0.0, true), (0.5 * PI, true)]
+        .map(|(shift, by_flank)| nuisance(wave(shift, by_flank), 0.05))
+        .into();
+    columns.push(beside(by_row(on, flank), 0.1));
+    columns
+}
+
+/// An axis beside that of the generator: size and direction enter as the FEM of such drives has them.
+fn eccentric(cause: CauseName, of: Angle, kernels: Arc<Kernels>) -> Law {
+    Law::new(cause, move |on, shape| {
+        let (size, phase) = (shape.of(Name::SizeUm), shape.of(Name::PhaseRad));
+        let field = kernels.eccentric_field(size);
+        let pattern = by_row(on, |k| {
+            let place = kernels.place_of_load(on.rows.torque[k]);
+            let direction = phase - angle(on, of, k);
+            by_flank(on.base.flank[k], on.rows.torque[k], |torque| field.at(direction, torque < 0.0, place))
+        });
+        let mut columns = vec![main_about(1.0, pattern, SCALE_MISFIT).called(Role::SIZE)];
+        columns.extend(left_open(on, of, 2.0));
+        columns
+    })
+    .shapes([
+        Shape::by_factors(Name::SizeUm, ECCENTRICITY_UM[0], ECCENTRICITY_UM[1], 10),
+        Shape::angle(Name::PhaseRad, PI, 8),
+    ])
+    .parameters_by(|on, shape, c| {
+        let size = shape.of(Name::SizeUm) * c.of(Role::SIZE);
+        vec![
+            (Name::AmplitudeUm, size),
+            (Name::AmplitudeArcsec, size * on.scales.arcsec_per_um / COS_PRESSURE_ANGLE),
+            (Name::PhaseRad, shape.of(Name::PhaseRad)),
+        ]
+    })
+    .physical_if(|_, c| c.of(Role::SIZE) > 0.5)
+}
+
+/// Harmonics of the pitch of a wheel that both lobes see alike; the odd ones cancel.
+fn pitch(cause: CauseName, wheel: Wheel, kernels: Arc<Kernels>) -> Law {
+    const ORDERS: [u32; 8] = [2, 4, 6, 8, 10, 12, 14, 16];
+    let of = match wheel {
+        Wheel::Flexspline => Angle::Flexspline,
+        Wheel::CircularSpline => Angle::CircularSpline,
+    };
+    let mut law = Law::new(cause, move |on, _| {
+        let mut columns: Vec<Column> = Vec::new();
+        for order in ORDERS {
+            let pair = responses(on, of, f64::from(order), |torque| kernels.pitch_error(wheel, order, torque));
+            // Cumulative errors fall with their order (ISO 1328-1: the total is a few times the single pitch error).
+            let share = 1.4 / f64::from(order);
+            columns.extend(pair.map(|v| if order == 2 { main_um(v) } else { nuisance(v, share) }));
+        }
+        columns.extend(left_open(on, of, 2.0));
+        for order in [1.0, 3.0] {
+            let wave = |shift: f64| by_row(on, |k| (order * angle(on, of, k) - shift).cos());
+            columns.extend([0.0, 0.5 * PI].map(|shift| nuisance(wave(shift), 0.1)));
+        }
+        columns
+    })
+    .parameters_by(|on, _, c| {
+        let (amplitude, phase) = of_wave(c, WAVE);
+        vec![
+            (Name::AmplitudeUm, amplitude),
+            (Name::AmplitudeArcsec, amplitude * on.scales.arcsec_per_um),
+            (Name::Harmonic, 2.0),
+            (Name::PhaseRad, 0.5 * phase),
+        ]
+    });
+    law.search.whole_beside_noise = true;
+    law
+}
+
+fn ovality(kernels: Arc<Kernels>) -> Law {
+    let of = Angle::CircularSpline;
+    Law::new(CauseName::CircularSplineOvality, move |on, _| {
+        let mut columns: Vec<Column> = responses(on, of, 2.0, |torque| kernels.ovality(torque)).map(main_um).into();
+        columns.extend(left_open(on, of, 2.0));
+        columns
+    })
+    .parameters_by(|on, _, c| {
+        let (amplitude, phase) = of_wave(c, WAVE);
+        vec![
+            (Name::AmplitudeUm, amplitude),
+            (Name::AmplitudeArcsec, amplitude * 0.67 * on.scales.arcsec_per_um),
+            (Name::PhaseRad, 0.5 * phase),
+        ]
+    })
+}
+
+/// The laws that take the place of those without kernels.
+pub(super) fn laws(on: &Excitation<'_>, kernels: &Arc<Kernels>) -> Vec<Law> {
+    let of = |cause, angle| eccentric(cause, angle, Arc::clone(kernels));
+    let mut laws = vec![
+        of(CauseName::CircularSplineEccentricity, Angle::CircularSpline),
+        of(CauseName::FlexsplineRunout, Angle::Flexspline),
+        of(CauseName::GravitySideLoad, Angle::Gravity(1.0)),
+        ovality(Arc::clone(kernels)),
+        pitch(CauseName::FlexsplinePitchError, Wheel::Flexspline, Arc::clone(kernels)),
+        pitch(CauseName::CircularSplinePitchError, Wheel::CircularSpline, Arc::clone(kernels)),
+    ];
+    if on.is_turned_about() {
+        laws.push(of(CauseName::GravitySideLoad, Angle::Gravity(-1.0)));
+    }
+    for law in &mut laws {
+        law.wrong.misfit = KERNEL_MISFIT;
+        law.wrong.kin = Kin::Unlike;
+    }
+    laws
+}

@@ -1,0 +1,758 @@
+//! Candidate causes: each a law of physics with named parameters, re-simulated on the data's own excitation.
+//!
+//! A [`Law`] turns shape parameters (what enters non-linearly: a slip torque, a time constant, a place) into columns whose
+//! coefficients enter linearly. Laws in the field differ from those here in detail, so each carries *nuisance* columns: the
+//! directions in which its law is likely to be wrong, with coefficients of the order of a share of the main ones. A deviation
+//! of that kind then breeds no second cause. What each follows and why: docs/theory.md, "Signatures of causes".
+
+mod among;
+mod displaced;
+mod dynamic;
+mod generic;
+mod geometry;
+mod kernel;
+mod label;
+mod lobes;
+mod named;
+mod sensor;
+mod stiffness;
+mod thermal;
+
+use std::f64::consts::PI;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use super::base::Base;
+use super::linear::Prior;
+use super::prepare::{Jump, whole_pitches};
+use super::rows::Rows;
+use super::thresholds::selection::AFTER_WHEELS;
+use crate::causes::{CauseName, Kin, Need, ParameterName};
+use crate::nominal::Nominal;
+use flexspline_base::robust::least_and_most;
+
+pub use among::{Acting, Among, Zones, left_by, together};
+pub use generic::{follows_speed, line, maps, unnamed};
+pub use geometry::standing_pitch_error;
+pub use label::{Deviation, Label, Per};
+pub use named::{Coefficients, Role, Shaped};
+
+/// What laws are evaluated on.
+#[derive(Clone, Copy)]
+pub struct Excitation<'a> {
+    /// The rows.
+    pub rows: &'a Rows,
+    /// Nominal model.
+    pub nominal: &'a Nominal,
+    /// Nominal prediction and its parts.
+    pub base: &'a Base,
+    /// What coefficients are counted in.
+    pub scales: &'a Scales,
+    /// What other causes add to half the clearance, row by row, arcsec.
+    pub widened: Option<&'a [f64]>,
+    /// How far other causes bring one zone of teeth ahead of the other.
+    pub zones: Option<&'a Zones>,
+    /// By how much more the drive winds up than the nominal one.
+    pub softer: f64,
+}
+
+/// Generator turns below which a pulse in one place is not told from a wave; as in the picture of a residual.
+const FEWEST_TURNS_OF_PULSES: f64 = 6.0;
+/// At temperatures closer to each other than this, and this close to the nominal one, K, nothing thermal can be told from a changed
+/// constant.
+const LEAST_SPAN_K: f64 = 2.0;
+const LEAST_OFF_NOMINAL_K: f64 = 5.0;
+
+/// Least use in which a drive may have worn: generator turns, and seconds from the first row to the last where time is known. Steel teeth
+/// under oil wear by micrometres in hours: this is where even a dry or a plastic one has hardly begun.
+const USED_TURNS: f64 = 20.0;
+const USED_S: f64 = 60.0;
+
+/// A load that nobody recorded on an unloaded drive may be so many times its friction, or wind it up by so much, arcsec.
+const UNLOADED_FRICTIONS: f64 = 4.0;
+const UNLOADED_ARCSEC: f64 = 20.0;
+
+impl<'a> Excitation<'a> {
+    /// The recorded one.
+    #[must_use]
+    pub fn new(rows: &'a Rows, nominal: &'a Nominal, base: &'a Base, scales: &'a Scales) -> Excitation<'a> {
+        Excitation { rows, nominal, base, scales, widened: None, zones: None, softer: 1.0 }
+    }
+
+    /// Whether the output is not loaded beyond friction, which then says nothing of the flank that carries.
+    #[must_use]
+    pub fn unloaded(&self) -> bool {
+        self.scales.load < self.nominal.friction_torque_n_m
+    }
+
+    /// What these data lack to speak of a cause: the first of its needs that they do not meet.
+    #[must_use]
+    pub fn lacks(&self, cause: CauseName) -> Option<Need> {
+        cause.needs().iter().copied().find(|need| !self.meets(*need))
+    }
+
+    /// Whether these data speak of a cause.
+    fn speaks_of(&self, cause: CauseName) -> bool {
+        self.lacks(cause).is_none()
+    }
+
+    fn meets(&self, need: Need) -> bool {
+        let rows = self.rows;
+        match need {
+            Need::Teeth => self.nominal.teeth.is_some(),
+            Need::Turns => rows.travel.last().is_some_and(|travel| *travel >= FEWEST_TURNS_OF_PULSES * 2.0 * PI),
+            Need::Load => self.scales.load > 0.0,
+            Need::Spring => self.nominal.wind_up_arcsec(1.0) > 0.0,
+            Need::Temperature => rows.recorded.temperature,
+            Need::TemperatureSpan => {
+                let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+                for t in &rows.temperature {
+                    (low, high) = (low.min(*t), high.max(*t));
+                }
+                high - low > LEAST_SPAN_K || (low - self.nominal.temperature_c).abs() > LEAST_OFF_NOMINAL_K
+            }
+            Need::Time => rows.recorded.time,
+            Need::Motion => rows.speed.iter().any(|w| *w != 0.0),
+            Need::Swings => !rows.means && dynamic::makes_a_load_swing(self),
+            Need::HalfOutputTurn => self.output_span_rad() >= PI,
+            Need::Use => {
+                let turned = rows.travel.last().is_some_and(|travel| *travel >= USED_TURNS * 2.0 * PI);
+                let lasts = rows.recorded.time && self.scales.duration_s >= USED_S;
+                if rows.recorded.time { turned && lasts } else { turned }
+            }
+            Need::Jump => {
+                let jumps = &self.scales.jumps;
+                !jumps.is_empty() && jumps.iter().all(|jump| whole_pitches(self.nominal, jump.height_arcsec).is_some())
+            }
+        }
+    }
+
+    /// From the least output angle to the largest, rad.
+    pub fn output_span_rad(&self) -> f64 {
+        let (low, high) = least_and_most(self.rows.output.iter().copied());
+        (high - low).max(0.0)
+    }
+
+    /// Whether the drive is turned against gravity during the data.
+    fn is_turned_about(&self) -> bool {
+        let orientation = &self.rows.orientation;
+        orientation.iter().any(|o| (o - orientation[0]).abs() > 1e-3)
+    }
+
+    /// Nominal wind-up at rest, arcsec/N·m; none for a drive that does not give.
+    fn slope_at_rest(&self) -> Option<f64> {
+        let slope = self.nominal.wind_up_arcsec(1e-3) / 1e-3;
+        (slope > 0.0).then_some(slope)
+    }
+
+    /// Scale of a load that the torque column does not hold, N·m. Without a load on the output that column is noise, and says nothing
+    /// of what its friction and its spring bear.
+    fn plausible_load(&self) -> f64 {
+        let wound_up = self.slope_at_rest().map_or(0.0, |slope| UNLOADED_ARCSEC / slope);
+        self.scales.load.max(UNLOADED_FRICTIONS * self.nominal.friction_torque_n_m).max(wound_up)
+    }
+
+    /// What wind-up (arcsec) a load beside the torque that was recorded adds at row `k`, `torque` (N·m) being both.
+    fn wound_up(&self, k: usize, torque: f64) -> f64 {
+        self.softer * (self.nominal.wind_up_arcsec(torque) - self.base.wind_up[k])
+    }
+}
+
+/// What the coefficients of laws are counted in: taken from the rows that a model is fitted to, kept where it predicts others.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Scales {
+    /// Scale of the load, N·m; 0 without torque.
+    pub load: f64,
+    /// Mean speed of the generator while it moves, rad/s.
+    pub mean_speed: f64,
+    /// Time of the first row, s.
+    pub begin_s: f64,
+    /// From the first row to the last, s.
+    pub duration_s: f64,
+    /// Travel of the generator from the first row to the last, rad.
+    pub travel: f64,
+    /// Travel under load, rad N·m.
+    pub work: f64,
+    /// Arcsec at the output for 1 µm on the pitch circle.
+    pub arcsec_per_um: f64,
+    /// Jumps found in the data.
+    pub jumps: Vec<Jump>,
+}
+
+impl Scales {
+    /// Of these rows.
+    #[must_use]
+    pub fn new(rows: &Rows, pitch_radius_mm: f64, jumps: Vec<Jump>) -> Scales {
+        let (mut moving, mut turned) = (0usize, 0.0);
+        for speed in rows.speed.iter().filter(|speed| **speed != 0.0) {
+            moving += 1;
+            turned += speed.abs();
+        }
+        let work = (1..rows.len()).map(|k| (rows.travel[k] - rows.travel[k - 1]) * rows.torque[k].abs()).sum();
+        let begin_s = rows.time.first().copied().unwrap_or(0.0);
+        Scales {
+            load: rows.load_scale(),
+            mean_speed: turned / moving.max(1) as f64,
+            begin_s,
+            duration_s: rows.time.last().copied().unwrap_or(0.0) - begin_s,
+            travel: rows.travel.last().copied().unwrap_or(0.0),
+            work,
+            arcsec_per_um: flexspline_base::units::ARCSEC_PER_RAD * 1e-3 / pitch_radius_mm,
+            jumps,
+        }
+    }
+}
+
+/// A shape parameter.
+#[derive(Clone, Debug)]
+pub struct Shape {
+    /// Its name.
+    pub name: ParameterName,
+    /// Least plausible value.
+    pub low: f64,
+    /// Largest plausible value.
+    pub high: f64,
+    /// Values tried first, spread over the range: evenly, or by factors if `log`.
+    pub tried: usize,
+    /// By factors.
+    pub log: bool,
+    /// The range closes on itself: an angle.
+    pub cyclic: bool,
+}
+
+impl Shape {
+    fn by_factors(name: ParameterName, low: f64, high: f64, tried: usize) -> Shape {
+        Shape { name, low, high, tried, log: true, cyclic: false }
+    }
+    fn evenly(name: ParameterName, low: f64, high: f64, tried: usize) -> Shape {
+        Shape { name, low, high, tried, log: false, cyclic: false }
+    }
+    fn angle(name: ParameterName, period: f64, tried: usize) -> Shape {
+        Shape { name, low: 0.0, high: period, tried, log: false, cyclic: true }
+    }
+
+    /// The value at a place between 0 and 1.
+    #[must_use]
+    pub fn value(&self, place: f64) -> f64 {
+        let place = if self.cyclic { place.rem_euclid(1.0) } else { place.clamp(0.0, 1.0) };
+        if self.log { self.low * (self.high / self.low).powf(place) } else { self.low + (self.high - self.low) * place }
+    }
+
+    /// The place of a value.
+    #[must_use]
+    pub fn place(&self, value: f64) -> f64 {
+        if self.log {
+            ((value.max(1e-300) / self.low).ln() / (self.high / self.low).ln()).clamp(0.0, 1.0)
+        } else {
+            let place = (value - self.low) / (self.high - self.low);
+            if self.cyclic { place.rem_euclid(1.0) } else { place.clamp(0.0, 1.0) }
+        }
+    }
+
+    /// Places tried first.
+    fn places(&self) -> Vec<f64> {
+        let count = self.tried.max(1) as f64;
+        (0..self.tried.max(1)).map(|k| (k as f64 + if self.cyclic { 0.0 } else { 0.5 }) / count).collect()
+    }
+}
+
+/// What the coefficient of a column may be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Tolerance {
+    /// A parameter of the law.
+    Main(Prior),
+    /// A deviation of the law: its size is of the order of this share of the main coefficients.
+    Nuisance(f64),
+    /// A deviation that comes with the cause by right, and may well be the larger part of it: clearance that a wheel beside its
+    /// place takes.
+    Beside(f64),
+    /// A nuisance of these rows alone: what was before anybody recorded. It predicts nothing.
+    History(f64),
+}
+
+/// A column of a law.
+#[derive(Clone, Debug)]
+pub struct Column {
+    /// What it is, for what asks for its coefficient.
+    pub role: Role,
+    /// Arcsec per unit of the coefficient, row by row.
+    pub values: Vec<f64>,
+    /// What the coefficient may be.
+    pub tolerance: Tolerance,
+}
+
+impl Column {
+    fn new(values: Vec<f64>, tolerance: Tolerance) -> Column {
+        Column { role: Role::PLAIN, values, tolerance }
+    }
+
+    /// The column with a role.
+    #[must_use]
+    fn called(self, role: Role) -> Column {
+        Column { role, ..self }
+    }
+}
+
+/// A main column with a coefficient around zero.
+fn main(values: Vec<f64>, std: f64) -> Column {
+    main_about(0.0, values, std)
+}
+
+/// A main column with a coefficient around `mean`.
+fn main_about(mean: f64, values: Vec<f64>, std: f64) -> Column {
+    Column::new(values, Tolerance::Main(Prior { mean, std }))
+}
+
+/// A nuisance column.
+fn nuisance(values: Vec<f64>, share: f64) -> Column {
+    Column::new(values, Tolerance::Nuisance(share))
+}
+
+/// A column of what comes with a cause.
+fn beside(values: Vec<f64>, share: f64) -> Column {
+    Column::new(values, Tolerance::Beside(share))
+}
+
+/// A column of what was before the first row of a session.
+fn history(values: Vec<f64>, share: f64) -> Column {
+    Column::new(values, Tolerance::History(share))
+}
+
+/// A parameter for the report: name and value.
+pub type Named = (ParameterName, f64);
+
+type MakeColumns = Box<dyn Fn(&Excitation<'_>, Shaped<'_>) -> Vec<Column> + Send + Sync>;
+type MakeParameters = Box<dyn Fn(&Excitation<'_>, Shaped<'_>, Coefficients<'_>) -> Vec<Named> + Send + Sync>;
+type IsPhysical = Box<dyn Fn(Shaped<'_>, Coefficients<'_>) -> bool + Send + Sync>;
+type AddedLoad = Box<dyn Fn(&Excitation<'_>, Shaped<'_>) -> Vec<f64> + Send + Sync>;
+type Apart = Box<dyn Fn(&Excitation<'_>, Shaped<'_>, Coefficients<'_>) -> Zones + Send + Sync>;
+type Beginnings = Box<dyn Fn(Shaped<'_>, Coefficients<'_>) -> Vec<Vec<f64>> + Send + Sync>;
+
+/// A linear law close to a law that is none: its coefficients say where to begin with the shape parameters.
+pub struct Lead {
+    columns: MakeColumns,
+    beginnings: Beginnings,
+    /// Only where the load leaves no doubt about the flank.
+    pub loaded_only: bool,
+}
+
+/// Laws made so far: each has a number of its own.
+static LAWS: AtomicU64 = AtomicU64::new(0);
+
+/// One law of one cause: what it tells of, how it is evaluated, how it may be wrong, how it is looked for, and how it acts on others.
+pub struct Law {
+    id: u64,
+    /// What it tells of.
+    pub label: Label,
+    /// Shape parameters.
+    pub shapes: Vec<Shape>,
+    evaluated: Evaluated,
+    /// How it may be wrong.
+    pub wrong: Wrong,
+    /// How it is looked for.
+    pub search: Search,
+    /// What it does to other causes, and they to it.
+    pub acts: Acts,
+}
+
+/// How a law is evaluated.
+struct Evaluated {
+    /// Columns at given shape parameters.
+    columns: MakeColumns,
+    /// Parameters for the report from shape parameters and coefficients.
+    parameters: MakeParameters,
+    /// Whether shape parameters and coefficients make sense, signs above all.
+    physical: IsPhysical,
+    /// It changes little from one row to the next.
+    smooth: bool,
+}
+
+/// How a law may be wrong.
+#[derive(Clone, Copy, Debug)]
+pub struct Wrong {
+    /// Share of its size by which it may be wrong: what is smaller than that beside it may be its own misfit.
+    pub misfit: f64,
+    /// The same where it may look like a deviation without a name.
+    pub misfit_unnamed: f64,
+    /// What that misfit may be taken for.
+    pub kin: Kin,
+    /// Largest size of all nuisance over that of the main columns.
+    pub most_nuisance: f64,
+    /// Relative uncertainty of its parameters beside that of the data: what the law itself is not sure of.
+    pub doubt: f64,
+    /// It says something about sessions that it was not fitted to.
+    pub foretells: bool,
+}
+
+/// How a law is looked for.
+#[derive(Default)]
+pub struct Search {
+    /// Where to begin.
+    pub lead: Option<Lead>,
+    /// With its nuisance columns, as its main ones mean nothing without them.
+    pub whole: bool,
+    /// Natural logarithm of the odds against it before any data, beside the other laws.
+    pub odds_against: f64,
+    /// All its columns are taken out before the noise is measured, those of its deviations too: a free profile has its finest detail in them, a long
+    /// delay what comes with it.
+    pub whole_beside_noise: bool,
+}
+
+/// What a law does to other causes, and they to it.
+#[derive(Default)]
+pub struct Acts {
+    /// Load (N·m, row by row) that the cause adds beside the torque that was recorded.
+    load: Option<AddedLoad>,
+    /// How far it brings one zone of teeth ahead of the other.
+    zones: Option<Apart>,
+    /// What other causes do to the zones of teeth and to the clearance enters the law.
+    pub meets_zones: bool,
+    /// Much of it shows while the play is crossed, in rows that do not count for the sizes of others.
+    pub in_crossings: bool,
+    /// If set, the law is a base parameter out of tolerance: its name in [`Base::floating`].
+    pub tolerance_of: Option<&'static str>,
+}
+
+/// Share of a law's misfit that may look like a law that is no kin.
+const NO_KIN: f64 = 0.25;
+
+/// Size of all deviations over that of the law, at most: beyond, the law is there for its deviations.
+const MOST_NUISANCE: f64 = 0.9;
+/// Size of all deviations over that of the law, at most, for laws that are well known, and whose deviations are those of another cause.
+const MOST_NUISANCE_OF_KNOWN: f64 = 0.6;
+
+/// Share by which the law of a contact, a friction or a lubricant may be wrong.
+const USUAL_MISFIT: f64 = 0.10;
+/// Share by which a law of pure geometry and counting may be wrong: sensors, ratio, skipped teeth.
+const EXACT_MISFIT: f64 = 0.02;
+/// Relative uncertainty of parameters of such laws, and of exact ones.
+const USUAL_DOUBT: f64 = 0.03;
+const EXACT_DOUBT: f64 = 0.005;
+
+impl Law {
+    fn new(
+        label: impl Into<Label>,
+        columns: impl Fn(&Excitation<'_>, Shaped<'_>) -> Vec<Column> + Send + Sync + 'static,
+    ) -> Law {
+        let label = label.into();
+        Law {
+            id: LAWS.fetch_add(1, Ordering::Relaxed),
+            label,
+            shapes: Vec::new(),
+            evaluated: Evaluated {
+                columns: Box::new(columns),
+                parameters: Box::new(|_, _, _| Vec::new()),
+                physical: Box::new(|_, _| true),
+                smooth: false,
+            },
+            wrong: Wrong {
+                misfit: USUAL_MISFIT,
+                misfit_unnamed: 0.0,
+                kin: label.kin(),
+                most_nuisance: MOST_NUISANCE,
+                doubt: USUAL_DOUBT,
+                foretells: true,
+            },
+            search: Search::default(),
+            acts: Acts::default(),
+        }
+    }
+    /// The cause it tells of; none for a deviation without one.
+    #[must_use]
+    pub const fn cause(&self) -> Option<CauseName> {
+        self.label.cause()
+    }
+    /// Whether it tells of a cause of the library.
+    #[must_use]
+    pub const fn named(&self) -> bool {
+        self.cause().is_some()
+    }
+    /// Whether it is the bench's zero in each session: what nobody can foretell of a session, and what says nothing of the drive.
+    #[must_use]
+    pub const fn is_zero_of_sessions(&self) -> bool {
+        !self.wrong.foretells
+    }
+    /// Whether it tells of this cause.
+    #[must_use]
+    pub fn is(&self, cause: CauseName) -> bool {
+        self.cause() == Some(cause)
+    }
+    /// A number that no other law has.
+    #[must_use]
+    pub fn id(&self) -> u64 {
+        self.id
+    }
+    fn exact(mut self) -> Law {
+        self.wrong.misfit = EXACT_MISFIT;
+        self.wrong.doubt = EXACT_DOUBT;
+        self
+    }
+    fn well_known(mut self) -> Law {
+        self.wrong.most_nuisance = MOST_NUISANCE_OF_KNOWN;
+        self
+    }
+    /// An encoder that reads what a wheel may do as well: odds are on the wheel, and its misfit may look like this law.
+    fn after_wheels(mut self) -> Law {
+        self.search.odds_against = AFTER_WHEELS;
+        self.kin_of_shapes()
+    }
+    /// What a misfit of wheels may look like: of an eccentric spline whose flanks bind, a second order of the output of a sixth of its size.
+    fn kin_of_shapes(mut self) -> Law {
+        self.wrong.kin = Kin::Shape;
+        self
+    }
+    fn evaluated_on_averages(mut self) -> Law {
+        self.evaluated.smooth = true;
+        self
+    }
+    /// Whether it changes little from one row to the next, so that averages of rows tell what it says of their average.
+    #[must_use]
+    pub fn smooth(&self) -> bool {
+        self.evaluated.smooth
+    }
+    fn whole(mut self) -> Law {
+        self.search.whole = true;
+        self
+    }
+    fn shapes(mut self, shapes: impl IntoIterator<Item = Shape>) -> Law {
+        self.shapes = shapes.into_iter().collect();
+        self
+    }
+    fn parameters_by(
+        mut self,
+        parameters: impl Fn(&Excitation<'_>, Shaped<'_>, Coefficients<'_>) -> Vec<Named> + Send + Sync + 'static,
+    ) -> Law {
+        self.evaluated.parameters = Box::new(parameters);
+        self
+    }
+    fn physical_if(mut self, physical: impl Fn(Shaped<'_>, Coefficients<'_>) -> bool + Send + Sync + 'static) -> Law {
+        self.evaluated.physical = Box::new(physical);
+        self
+    }
+    fn adds_load(mut self, load: impl Fn(&Excitation<'_>, Shaped<'_>) -> Vec<f64> + Send + Sync + 'static) -> Law {
+        self.acts.load = Some(Box::new(load));
+        self
+    }
+    fn parts_zones(
+        mut self,
+        apart: impl Fn(&Excitation<'_>, Shaped<'_>, Coefficients<'_>) -> Zones + Send + Sync + 'static,
+    ) -> Law {
+        self.acts.zones = Some(Box::new(apart));
+        self
+    }
+    fn led_by(
+        mut self,
+        columns: impl Fn(&Excitation<'_>, Shaped<'_>) -> Vec<Column> + Send + Sync + 'static,
+        beginnings: impl Fn(Shaped<'_>, Coefficients<'_>) -> Vec<Vec<f64>> + Send + Sync + 'static,
+    ) -> Law {
+        let (columns, beginnings) = (Box::new(columns), Box::new(beginnings));
+        self.search.lead = Some(Lead { columns, beginnings, loaded_only: false });
+        self
+    }
+    fn led_under_load_alone(mut self) -> Law {
+        if let Some(lead) = &mut self.search.lead {
+            lead.loaded_only = true;
+        }
+        self
+    }
+
+    fn shaped<'s>(&'s self, values: &'s [f64]) -> Shaped<'s> {
+        Shaped::new(&self.shapes, values)
+    }
+
+    /// Columns at values of the shape parameters.
+    #[must_use]
+    pub fn columns(&self, on: &Excitation<'_>, values: &[f64]) -> Vec<Column> {
+        (self.evaluated.columns)(on, self.shaped(values))
+    }
+
+    /// Columns of the lead at values of the shape parameters; those of the law where it has no lead.
+    #[must_use]
+    pub fn lead_columns(&self, on: &Excitation<'_>, values: &[f64]) -> Vec<Column> {
+        match &self.search.lead {
+            Some(lead) => (lead.columns)(on, self.shaped(values)),
+            None => self.columns(on, values),
+        }
+    }
+
+    /// Values of the shape parameters to begin with, from those tried and the coefficients of the columns of the lead; nothing without
+    /// a lead.
+    #[must_use]
+    pub fn beginnings(&self, values: &[f64], coefficients: Coefficients<'_>) -> Vec<Vec<f64>> {
+        let lead = self.search.lead.as_ref();
+        lead.map_or_else(Vec::new, |lead| (lead.beginnings)(self.shaped(values), coefficients))
+    }
+
+    /// Parameters for the report.
+    #[must_use]
+    pub fn parameters(&self, on: &Excitation<'_>, values: &[f64], coefficients: Coefficients<'_>) -> Vec<Named> {
+        (self.evaluated.parameters)(on, self.shaped(values), coefficients)
+    }
+
+    /// Whether shape parameters and coefficients make sense, signs above all.
+    #[must_use]
+    pub fn physical(&self, values: &[f64], coefficients: Coefficients<'_>) -> bool {
+        (self.evaluated.physical)(self.shaped(values), coefficients)
+    }
+
+    /// Load (N·m, row by row) that the cause adds beside the torque that was recorded, if it adds any.
+    #[must_use]
+    pub fn load(&self, on: &Excitation<'_>, values: &[f64]) -> Option<Vec<f64>> {
+        self.acts.load.as_ref().map(|load| load(on, self.shaped(values)))
+    }
+
+    /// Whether it adds a load.
+    #[must_use]
+    pub fn is_load(&self) -> bool {
+        self.acts.load.is_some()
+    }
+
+    /// How far it brings one zone of teeth ahead of the other, if it does.
+    #[must_use]
+    pub fn zones(&self, on: &Excitation<'_>, values: &[f64], coefficients: Coefficients<'_>) -> Option<Zones> {
+        self.acts.zones.as_ref().map(|apart| apart(on, self.shaped(values), coefficients))
+    }
+
+    /// Whether it brings one zone of teeth ahead of the other.
+    #[must_use]
+    pub fn is_in_zones(&self) -> bool {
+        self.acts.zones.is_some()
+    }
+
+    /// Which of the shape parameters has this name.
+    #[must_use]
+    pub fn shape_at(&self, name: ParameterName) -> Option<usize> {
+        self.shapes.iter().position(|shape| shape.name == name)
+    }
+
+    /// Which of the shape parameters are the direction and the size of a displacement, if it is one.
+    #[must_use]
+    pub fn displacement_at(&self) -> Option<[usize; 2]> {
+        Some([self.shape_at(ParameterName::PhaseRad)?, self.shape_at(ParameterName::SizeArcsec)?])
+    }
+
+    /// Places of the shape parameters as another law has those of the same name; in the middle where it has none.
+    #[must_use]
+    pub fn places_like(&self, other: &Law, places: &[f64]) -> Vec<f64> {
+        let of = |shape: &Shape| other.shape_at(shape.name).and_then(|at| places.get(at)).copied().unwrap_or(0.5);
+        self.shapes.iter().map(of).collect()
+    }
+
+    /// How much of its size another law may be named for wrongly.
+    #[must_use]
+    pub fn misfit_as(&self, other: &Law) -> f64 {
+        if !other.named() {
+            return self.wrong.misfit.max(self.wrong.misfit_unnamed);
+        }
+        self.wrong.misfit * if self.wrong.kin.like(other.wrong.kin) { 1.0 } else { NO_KIN }
+    }
+
+    /// Values of the shape parameters at places between 0 and 1.
+    #[must_use]
+    pub fn values(&self, places: &[f64]) -> Vec<f64> {
+        self.shapes.iter().zip(places).map(|(shape, place)| shape.value(*place)).collect()
+    }
+
+    /// Places of values of the shape parameters.
+    #[must_use]
+    pub fn places(&self, values: &[f64]) -> Vec<f64> {
+        self.shapes.iter().zip(values).map(|(shape, value)| shape.place(*value)).collect()
+    }
+
+    /// All combinations of places tried first.
+    #[must_use]
+    pub fn tried(&self) -> Vec<Vec<f64>> {
+        let mut tried = vec![Vec::new()];
+        for shape in &self.shapes {
+            tried = tried
+                .iter()
+                .flat_map(|so_far: &Vec<f64>| {
+                    shape.places().into_iter().map(|place| so_far.iter().copied().chain([place]).collect())
+                })
+                .collect();
+        }
+        tried
+    }
+}
+
+/// Every law of every cause that the data can speak about.
+#[must_use]
+pub fn library(on: &Excitation<'_>) -> Vec<Law> {
+    let mut laws = geometry::laws(on);
+    if let Some(kernels) = on.nominal.kernels.as_ref().filter(|_| on.nominal.teeth.is_some()) {
+        let known = kernel::laws(on, kernels);
+        laws.retain(|law| known.iter().all(|k| k.label != law.label));
+        laws.extend(known);
+    }
+    laws.extend(stiffness::laws(on));
+    laws.extend(thermal::laws(on));
+    laws.extend(dynamic::laws(on));
+    laws.extend(sensor::laws(on));
+    laws.retain(|law| law.cause().is_none_or(|cause| on.speaks_of(cause)));
+    laws
+}
+
+/// What follows `values` with a lag of `lag_s`, each session from where it begins.
+fn lagged(on: &Excitation<'_>, values: &[f64], lag_s: f64) -> Vec<f64> {
+    lagged_from(on, values, lag_s, |_, first| first)
+}
+
+/// Values that lag where the lag goes on from one session to the next: between them it nears what the next one begins with.
+fn lagged_through(on: &Excitation<'_>, values: &[f64], lag_s: f64) -> Vec<f64> {
+    lagged_from(on, values, lag_s, |before, first| match before {
+        // Where clocks begin anew nobody knows how long it had.
+        Some((state, gap_s)) if gap_s >= 0.0 => first + (state - first) * (-gap_s / lag_s).exp(),
+        _ => first,
+    })
+}
+
+/// What follows `values` with a lag; `begin` gives the state at the first row of a session, of what it was at the last row of the session
+/// before and how many seconds ago that was, and of the value.
+fn lagged_from(
+    on: &Excitation<'_>,
+    values: &[f64],
+    lag_s: f64,
+    begin: impl Fn(Option<(f64, f64)>, f64) -> f64,
+) -> Vec<f64> {
+    let rows = on.rows;
+    let mut reached = vec![0.0; rows.len()];
+    let mut last: Option<usize> = None;
+    for session in &rows.sessions {
+        let before = last.map(|last| (reached[last], rows.time[session.start] - rows.time[last]));
+        let mut state = begin(before, values[session.start]);
+        for k in session.clone() {
+            if k > session.start {
+                let dt = (rows.time[k] - rows.time[k - 1]).max(0.0);
+                state += (values[k] - state) * (1.0 - (-dt / lag_s).exp());
+            }
+            reached[k] = state;
+        }
+        last = session.clone().last();
+    }
+    reached
+}
+
+/// A column made row by row.
+fn by_row(on: &Excitation<'_>, value: impl Fn(usize) -> f64) -> Vec<f64> {
+    (0..on.rows.len()).map(value).collect()
+}
+
+/// A column made of two others, row by row.
+fn of_both(a: &[f64], b: &[f64], value: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| value(*a, *b)).collect()
+}
+
+/// Products of two columns, row by row.
+fn times(a: &[f64], b: &[f64]) -> Vec<f64> {
+    of_both(a, b, |a, b| a * b)
+}
+
+/// Amplitude and phase of `c cos(x) + s sin(x) = amplitude cos(x − phase)`.
+fn polar(c: f64, s: f64) -> (f64, f64) {
+    (c.hypot(s), s.atan2(c))
+}
+
+/// Amplitude and phase of a wave by its coefficients.
+fn of_wave(c: Coefficients<'_>, role: Role) -> (f64, f64) {
+    let [cos, sin] = c.wave(role);
+    polar(cos, sin)
+}

@@ -1,0 +1,351 @@
+//! What the torque does beyond the nominal wind-up and play.
+
+use std::f64::consts::PI;
+use std::ops::Range;
+
+use super::super::prepare::Jump;
+use super::super::rows::rms;
+use super::geometry::{Angle, angle, pulse, weighted_waves};
+use super::{Coefficients, Excitation, Law, Role, Shape, Shaped, by_row, history, main, nuisance};
+use crate::causes::{CauseName, ParameterName as Name};
+use flexspline_base::units::ARCSEC_PER_TURN;
+
+/// Torque in units of the load scale.
+fn load_share(on: &Excitation<'_>, k: usize) -> f64 {
+    on.rows.torque[k] / on.scales.load.max(1e-9)
+}
+
+/// The spring part of a slip element (stop operator): follows the torque up to ±`slip`, in units of `slip`. Each session begins with
+/// the element at rest before its first load.
+pub(super) fn stop_operator(on: &Excitation<'_>, slip: f64) -> Vec<f64> {
+    let torque = &on.rows.torque;
+    let mut held = vec![0.0; torque.len()];
+    for session in &on.rows.sessions {
+        let first = torque.get(session.start).map_or(0.0, |t| t.clamp(-slip, slip));
+        follow(torque, session.clone(), slip, first, &mut held);
+    }
+    held
+}
+
+/// The element through one session, from what it holds at the first row.
+pub(super) fn follow(torque: &[f64], session: Range<usize>, slip: f64, first: f64, held: &mut [f64]) {
+    let mut z = first;
+    for k in session.clone() {
+        if k > session.start {
+            z = (z + torque[k] - torque[k - 1]).clamp(-slip, slip);
+        }
+        held[k] = z / slip;
+    }
+}
+
+/// Half the difference between the two extremes that the element may have begun a session with: what nobody recorded, until the torque
+/// has swung far enough to wipe it out. One column for each of the sessions that remember longest.
+fn unknown_beginnings(on: &Excitation<'_>, slip: f64) -> Vec<Vec<f64>> {
+    let torque = &on.rows.torque;
+    let mut columns: Vec<Vec<f64>> = on
+        .rows
+        .sessions
+        .iter()
+        .map(|session| {
+            let (mut high, mut low) = (vec![0.0; torque.len()], vec![0.0; torque.len()]);
+            follow(torque, session.clone(), slip, slip, &mut high);
+            follow(torque, session.clone(), slip, -slip, &mut low);
+            high.iter().zip(&low).map(|(h, l)| 0.5 * (h - l)).collect()
+        })
+        .collect();
+    columns.sort_by(|a, b| rms(b).total_cmp(&rms(a)));
+    columns.truncate(MOST_BEGINNINGS);
+    columns
+}
+
+/// Sessions whose beginning is left open, at most.
+const MOST_BEGINNINGS: usize = 10;
+
+/// The spring that a hysteresis is stated by, and those that slip earlier and later: at these shares of its torque.
+const SPRING: Role = Role("spring");
+const EARLIER_SPRING: Role = Role("spring that slips earlier");
+const LATER_SPRING: Role = Role("spring that slips later");
+const EARLIER: f64 = 0.35;
+const LATER: f64 = 2.5;
+/// Share by which a loop may be wider under load of one sign. Guess.
+const WIDER_ONE_WAY: f64 = 0.2;
+/// Wear that grows faster than the law says.
+const FASTER: Role = Role("faster");
+/// A jump by whole teeth.
+const JUMP: Role = Role("jump");
+
+/// Half the opening of a loop at no torque, arcsec: on the way back from the full load an element holds this share of what it can when the torque
+/// passes zero.
+fn half_width(full: f64, shape: Shaped<'_>, c: Coefficients<'_>) -> f64 {
+    let slips = shape.of(Name::SlipTorqueNM);
+    let held = |slip: f64| ((full - slip) / slip).clamp(0.0, 1.0);
+    let springs = [(1.0, SPRING), (EARLIER, EARLIER_SPRING), (LATER, LATER_SPRING)];
+    springs.iter().map(|(factor, role)| c.of(*role) * held(factor * slips)).sum()
+}
+
+/// Springs that slip one after the other (Maxwell slip, Prandtl-Ishlinskii): the output lags the torque by what they hold.
+fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
+    let load = on.scales.load;
+    let mut law = Law::new(CauseName::TorsionalHysteresis, |on, shape| {
+        let slip = shape.of(Name::SlipTorqueNM);
+        let usual = on.nominal.wind_up_arcsec(on.scales.load).mul_add(0.3, 30.0);
+        let negative = |values: Vec<f64>| values.into_iter().map(|z| -z).collect::<Vec<f64>>();
+        let mut columns = vec![
+            // The opening is a share of the wind-up: a plastic gear's is wide, a steel drive's at rated load 0.5 to 2' of 3'.
+            main(negative(stop_operator(on, slip)), usual).called(SPRING),
+            nuisance(negative(stop_operator(on, EARLIER * slip)), 0.35).called(EARLIER_SPRING),
+            nuisance(negative(stop_operator(on, LATER * slip)), 0.5).called(LATER_SPRING),
+            nuisance(by_row(on, |k| load_share(on, k)), 0.25),
+            nuisance(by_row(on, |k| load_share(on, k).powi(3)), 0.15),
+        ];
+        // A loop may be wider one way than the other.
+        let wider = stop_operator(on, slip).into_iter().map(f64::abs).collect();
+        columns.push(nuisance(wider, WIDER_ONE_WAY));
+        columns.push(nuisance(by_row(on, |k| load_share(on, k).abs()), WIDER_ONE_WAY));
+        columns.extend(unknown_beginnings(on, slip).into_iter().map(|held| history(held, 1.0)));
+        columns
+    })
+    .whole()
+    .evaluated_on_averages()
+    .shapes([Shape::by_factors(Name::SlipTorqueNM, 0.03 * load, 1.0 * load, 6)])
+    .parameters_by(move |_, shape, c| {
+        vec![(Name::HalfWidthArcsec, half_width(load, shape, c)), (Name::SlipTorqueNM, shape.of(Name::SlipTorqueNM))]
+    })
+    // All springs together take work; of three that stand for many one may be too much.
+    .physical_if(move |shape, c| half_width(load, shape, c) > 0.0);
+    // Three elements stand for the many of a real drive: where the load passes zero they hold about, not exactly, as much (a fifth to a
+    // quarter less than springs that give way smoothly, hidden in made-up data).
+    law.wrong.doubt = 0.15;
+    law.wrong.misfit_unnamed = LOOKS_LIKE_CREEP;
+    // What springs hold goes with the load; the wind-up beside them takes that back, and the beginnings are nobody's.
+    law.wrong.most_nuisance = 2.0;
+    law
+}
+
+/// Share of a loop by which another curve of it may look like something that lags the load in time: where the load swings with one period the
+/// two are one. *Chosen* on Bouc-Wen loops of 2 to 12 arcsec, none of which were named before.
+const LOOKS_LIKE_CREEP: f64 = 0.5;
+/// Stiffer the higher the load: the wind-up lags behind the nominal line by a power of the torque.
+fn stiffness_hardening() -> Law {
+    Law::new(CauseName::StiffnessHardening, |on, shape| {
+        let power = |n: f64| by_row(on, |k| -load_share(on, k).signum() * load_share(on, k).abs().powf(n));
+        let exponent = shape.of(Name::Exponent);
+        vec![
+            main(power(exponent), 30.0).called(Role::SIZE),
+            nuisance(power(1.0), 0.4),
+            nuisance(power(exponent + 1.5), 0.3),
+        ]
+    })
+    .evaluated_on_averages()
+    .shapes([Shape::evenly(Name::Exponent, 1.6, 4.4, 3)])
+    .parameters_by(|on, shape, c| {
+        vec![
+            (Name::HardeningArcsec, c.of(Role::SIZE)),
+            (Name::HardeningExponent, shape.of(Name::Exponent)),
+            (Name::FullLoadNM, on.scales.load),
+        ]
+    })
+    .physical_if(|_, c| c.of(Role::SIZE) > 0.0)
+}
+
+fn stiffness_error() -> Law {
+    let mut law =
+        Law::new(CauseName::StiffnessError, |on, _| vec![main(on.base.wind_up.clone(), 0.5).called(Role::SIZE)])
+            .parameters_by(|_, _, c| vec![(Name::StiffnessRatio, 1.0 / (1.0 + c.of(Role::SIZE)))]);
+    law.acts.tolerance_of = Some(super::among::STIFFNESS);
+    law
+}
+
+/// Shares by which the law of a cracked root may be wrong: a crack that opens bends more than one that is pressed shut, the two loaded
+/// zones may carry unequally, and the arc in which the tooth carries has another shape. Guesses.
+const OPENING: f64 = 0.3;
+const UNEQUAL_LOBES: f64 = 0.3;
+const OTHER_ARC: f64 = 0.3;
+/// The arc of another shape, over that of the law.
+const BROADER: f64 = 1.7;
+const BROADER_ARC: Role = Role("broader arc");
+
+/// A tooth of the circular spline that is cracked at its root: the drive winds up more, both ways, while a loaded zone is on it, twice in
+/// a turn of the wave on that wheel. Without load it is where it was.
+fn cracked_tooth_root() -> Law {
+    const WHEEL: Angle = Angle::CircularSpline;
+    Law::new(CauseName::CrackedToothRoot, |on, shape| {
+        let (place, width) = (shape.of(Name::AngleRad), shape.of(Name::WidthRad));
+        let softer = |width: f64| by_row(on, |k| load_share(on, k) * pulse(angle(on, WHEEL, k) - place, width));
+        let size = softer(width);
+        let opening = size.iter().map(|v| v.abs()).collect();
+        let lobe = by_row(on, |k| size[k] * (angle(on, WHEEL, k) - place).cos().signum());
+        vec![
+            main(size, 30.0).called(Role::SIZE),
+            nuisance(opening, OPENING),
+            nuisance(lobe, UNEQUAL_LOBES),
+            nuisance(softer(BROADER * width), OTHER_ARC).called(BROADER_ARC),
+        ]
+    })
+    .shapes([Shape::angle(Name::AngleRad, PI, 30), Shape::by_factors(Name::WidthRad, 0.03, 0.4, 2)])
+    .parameters_by(|on, shape, c| {
+        // Both arcs have their top where the tooth is. Together they are as wide as the bell curve of that height and area.
+        let (narrow, broad) = (c.of(Role::SIZE), c.of(BROADER_ARC));
+        let top = narrow + broad;
+        let width = shape.of(Name::WidthRad) * (narrow + BROADER * broad) / top;
+        vec![
+            (Name::AmplitudeArcsec, top),
+            (Name::FullLoadNM, on.scales.load),
+            (Name::AngleRad, shape.of(Name::AngleRad)),
+            (Name::WidthRad, width),
+        ]
+    })
+    .physical_if(|_, c| c.of(Role::SIZE) > 0.0 && c.of(Role::SIZE) + BROADER * c.of(BROADER_ARC) > 0.0)
+    .well_known()
+}
+
+/// Share of a grown clearance by which it may differ around a wheel.
+const UNEVEN_WEAR: f64 = 0.15;
+
+fn backlash_growth() -> Law {
+    let mut law = Law::new(CauseName::BacklashGrowth, |on, _| {
+        let half = on.base.half_backlash.max(1.0);
+        let mut columns = vec![main(by_row(on, |k| half * on.base.flank[k]), 1.0).called(Role::SIZE)];
+        // Teeth that are used most wear most.
+        if on.nominal.teeth.is_some() {
+            for wheel in [Angle::Flexspline, Angle::CircularSpline] {
+                columns.extend(weighted_waves(on, wheel, 2.0, &on.base.flank).map(|v| nuisance(v, UNEVEN_WEAR)));
+            }
+        }
+        columns
+    })
+    .parameters_by(|on, _, c| vec![(Name::GrowthArcsec, 2.0 * c.of(Role::SIZE) * on.base.half_backlash.max(1.0))])
+    .physical_if(|_, c| c.of(Role::SIZE) > 0.0);
+    law.acts.tolerance_of = Some("backlash");
+    law
+}
+
+/// Progress of wear from 0 at the first row to 1 at the last.
+#[derive(Clone, Copy)]
+enum Progress {
+    Time,
+    Travel,
+    Work,
+}
+
+/// A clearance that widens during the data, with time, travel, or travel under load (Archard).
+fn wear(by: Progress) -> Law {
+    Law::new(CauseName::Wear, move |on, shape| {
+        let rows = on.rows;
+        let n = rows.len();
+        let mut done = vec![0.0; n];
+        for k in 0..n {
+            if let Progress::Time = by {
+                done[k] = (rows.time[k] - on.scales.begin_s).max(0.0);
+                continue;
+            }
+            if k == 0 {
+                continue;
+            }
+            let step = match by {
+                Progress::Time => 0.0,
+                Progress::Travel => rows.travel[k] - rows.travel[k - 1],
+                Progress::Work => (rows.travel[k] - rows.travel[k - 1]) * rows.torque[k].abs(),
+            };
+            done[k] = done[k - 1] + step.max(0.0);
+        }
+        let all = match by {
+            Progress::Time => on.scales.duration_s,
+            Progress::Travel => on.scales.travel,
+            Progress::Work => on.scales.work,
+        }
+        .max(1e-12);
+        let exponent = shape.of(Name::Exponent);
+        let widened = |k: usize| (done[k] / all).powf(exponent);
+        vec![
+            main(by_row(on, |k| on.base.flank[k] * widened(k)), 30.0).called(Role::SIZE),
+            nuisance(by_row(on, |k| on.base.flank[k] * widened(k).powi(2)), 0.25).called(FASTER),
+            nuisance(by_row(on, |k| on.base.flank[k]), 0.25),
+        ]
+    })
+    .shapes([Shape::by_factors(Name::Exponent, 0.5, 2.0, 1)])
+    .parameters_by(|_, shape, c| {
+        let growth_arcsec = 2.0 * (c.of(Role::SIZE) + c.of(FASTER));
+        vec![(Name::GrowthArcsec, growth_arcsec), (Name::Exponent, shape.of(Name::Exponent))]
+    })
+    .physical_if(|_, c| c.of(Role::SIZE) > 0.0)
+    .well_known()
+    .evaluated_on_averages()
+}
+
+/// What the clearance has widened by between two sessions.
+const STEP: Role = Role("step between sessions");
+/// A clearance that is narrower in a session than before does not wear; nor does one that is by less than this share of all its growth. *Guess*.
+const NOT_NARROWER: f64 = 0.1;
+/// Fewest sessions and most in which wear may go on between them. Of two any change of the clearance would be a growth, as it has one step and no
+/// order; and each session has a step of its own, so that of many the law follows what it likes. *Guess*.
+const SESSIONS: std::ops::RangeInclusive<usize> = 3..=12;
+
+/// A clearance that widens with travel, and while nobody records: the drive works on between the sessions.
+fn wear_between_sessions(on: &Excitation<'_>) -> Option<Law> {
+    let sessions: Vec<std::ops::Range<usize>> = on.rows.sessions_used().collect();
+    if !SESSIONS.contains(&sessions.len()) {
+        return None;
+    }
+    let law = Law::new(CauseName::Wear, move |on, _| {
+        let travel = on.scales.travel.max(1e-12);
+        let of_path = by_row(on, |k| on.base.flank[k] * on.rows.travel[k] / travel);
+        let from =
+            |session: &std::ops::Range<usize>| by_row(on, |k| if k >= session.start { on.base.flank[k] } else { 0.0 });
+        let mut columns = vec![main(of_path, 30.0).called(STEP)];
+        columns.extend(on.rows.sessions_used().skip(1).map(|session| main(from(&session), 30.0).called(STEP)));
+        columns
+    })
+    .parameters_by(|_, _, c| vec![(Name::GrowthArcsec, 2.0 * c.all(STEP).sum::<f64>())])
+    .physical_if(|_, c| {
+        let growth: f64 = c.all(STEP).sum();
+        growth > 0.0 && c.all(STEP).all(|step| step > -NOT_NARROWER * growth)
+    })
+    .well_known()
+    .evaluated_on_averages();
+    Some(law)
+}
+
+/// Teeth that skipped: the output is off by whole teeth from then on.
+fn ratcheting(on: &Excitation<'_>) -> Option<Law> {
+    let pitch = ARCSEC_PER_TURN / f64::from(on.nominal.teeth?.circular_spline);
+    let jumps = on.scales.jumps.clone();
+    let first_s = jumps.first()?.time_s[1];
+    let columns = jumps.clone();
+    let mut law = Law::new(CauseName::Ratcheting, move |on, _| {
+        let reached = |jump: &Jump| by_row(on, |k| jump.reached(on.rows.time[k]) / pitch);
+        columns.iter().map(|jump| main(reached(jump), 2.0 * pitch).called(JUMP)).collect()
+    })
+    .parameters_by(move |_, _, c| {
+        let slipped: f64 = jumps.iter().zip(c.all(JUMP)).map(|(jump, c)| c * jump.height_arcsec / pitch).sum();
+        vec![(Name::JumpArcsec, slipped), (Name::TimeS, first_s), (Name::Events, jumps.len() as f64)]
+    })
+    .exact();
+    // The jump is measured, not modelled: nothing of its height is left over.
+    law.wrong.misfit = 0.0;
+    law.wrong.doubt = 1e-5;
+    Some(law)
+}
+
+pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
+    let mut laws = Vec::new();
+    if on.speaks_of(CauseName::TorsionalHysteresis) {
+        laws.push(torsional_hysteresis(on));
+    }
+    laws.extend([
+        stiffness_hardening(),
+        stiffness_error(),
+        backlash_growth(),
+        wear(Progress::Travel),
+        cracked_tooth_root(),
+    ]);
+    if on.rows.recorded.time {
+        laws.push(wear(Progress::Time));
+    }
+    if on.scales.load > 0.0 {
+        laws.push(wear(Progress::Work));
+    }
+    laws.extend(wear_between_sessions(on).filter(|_| on.rows.recorded.time));
+    laws.extend(ratcheting(on));
+    laws
+}

@@ -1,0 +1,583 @@
+//! Channels held against the nominal model before any cause is asked: does the torque wind this drive up, with its sign and in its unit;
+//! are both angles in degrees, which no ratio tells?
+//!
+//! What floats freely in every drive is taken out first: zeros, the ratio, first orders, the nominal harmonics, speed and the direction of
+//! motion. What is left of the error is then held against what the nominal model says of the torque, as recorded and otherwise.
+
+use flexspline::Table;
+
+use super::base::{PlayLaw, predicted_by_table};
+use super::linear::{Gram, Prior, solve};
+use super::noise::white_level;
+use super::rows::{Rows, quantile, rms, robust_std};
+use crate::measurement::{Fault, FaultName, Measures, Quantity, Recording, Session, Treatment};
+use crate::nominal::{Harmonic, Nominal};
+
+/// Rows that are looked at, about, spread evenly.
+const SAMPLE: usize = 6000;
+/// Zeros of sessions that float, at most.
+const MOST_ZEROS: usize = 24;
+/// Blocks of rows that are left out one at a time, to know how certain a share is: loads repeat, rows do not count one by one.
+const BLOCKS: usize = 24;
+/// What the torque should do is seen from so many times the white noise on, and from so many arcsec. *Guess*.
+const SEEN_OF_NOISE: f64 = 3.0;
+const SEEN_ARCSEC: f64 = 8.0;
+/// A share of it is certain from so many of its standard deviations on. *Source*: by convention.
+const CERTAIN: f64 = 5.0;
+/// Shares that a drive may show of its nominal wind-up and clearance: springs are softer and harder than catalogues say. *Guess*.
+const OF_THIS_DRIVE: [f64; 2] = [0.4, 2.5];
+/// No drive winds up by so many times what its model says: a torque that asks for that is in another unit. *Guess*.
+const FAR_TOO_SOFT: f64 = 8.0;
+/// A torque in another unit leaves less than this share of what is left as it stands, and without any torque. *Guess*.
+const EXPLAINS: f64 = 0.5;
+/// One of the wrong sign leaves less than this. *Guess*.
+const EXPLAINS_TURNED: f64 = 0.8;
+/// A torque of which the error shows no more than this is none of this output. *Guess*.
+const NO_EFFECT: f64 = 0.3;
+/// Both angles may be in degrees where radians leave so many times the white noise and more. *Guess*.
+const FAR_FROM_NOISE: f64 = 4.0;
+/// They are where degrees leave this at most. *Guess*.
+const TO_THE_NOISE: f64 = 4.0;
+/// And where wind-up and clearance are those of the model within this share, or, where nothing winds up, the harmonics within the factors.
+/// *Guess*: springs of drives of a type differ by some per cent, the factors of torques taken for others from 57 by more than that, except 1/60.
+const AS_NOMINAL: f64 = 0.35;
+const HARMONICS_AS_NOMINAL: [f64; 2] = [0.25, 4.0];
+/// What is left is next to nothing below this share of what the load does. *Guess*.
+const NEXT_TO_NOTHING: f64 = 0.1;
+/// Residuals farther out than so many standard deviations are cut there.
+const CUT: f64 = 5.0;
+/// The deviation is that of the block which this share of all does not exceed. *Guess*: two of [`BLOCKS`] may be full of bad rows.
+const MOST_GOES_ON: f64 = 0.9;
+
+/// Rows that are used, about so many, spread evenly.
+pub(super) fn sample(rows: &Rows, count: usize) -> Vec<usize> {
+    let used: Vec<usize> = rows.sessions_used().flatten().collect();
+    used.iter().copied().step_by(used.len().div_ceil(count).max(1)).collect()
+}
+
+/// Sine and cosine of an angle times an order, at the places.
+pub(super) fn waves(order: f64, angle: &[f64], places: &[usize]) -> [Vec<f64>; 2] {
+    [f64::sin, f64::cos].map(|wave| places.iter().map(|k| wave(order * angle[*k])).collect())
+}
+
+/// What floats freely in every drive, column by column at the places: zeros of the error and of sessions, ratio, speed, direction, nominal
+/// harmonics, and two orders of the output.
+pub(super) fn floating(rows: &Rows, nominal: &Nominal, places: &[usize]) -> Vec<Vec<f64>> {
+    let of = |value: &dyn Fn(usize) -> f64| -> Vec<f64> { places.iter().map(|k| value(*k)).collect() };
+    let mut columns = vec![of(&|_| 1.0), of(&|k| rows.output[k]), of(&|k| rows.speed[k]), of(&|k| rows.direction[k])];
+    for session in rows.sessions.iter().skip(1).take(MOST_ZEROS) {
+        columns.push(of(&|k| f64::from(u8::from(k >= session.start))));
+    }
+    for harmonic in &nominal.harmonics {
+        columns.extend(waves(harmonic.order_per_generator_turn, &rows.generator, places));
+    }
+    for order in [1.0, 2.0] {
+        columns.extend(waves(order, &rows.output, places));
+    }
+    columns
+}
+
+/// A sample of the rows with what floats freely taken out of their error.
+struct Freed {
+    places: Vec<usize>,
+    columns: Vec<Vec<f64>>,
+    error: Vec<f64>,
+}
+
+/// Standard deviation of a residual in the blocks in which most goes on: at a bench that loads the drive in some sessions alone, what the load does
+/// is far out in the others. One block of bad rows lifts it by little.
+fn spread(error: &[f64]) -> f64 {
+    let blocks = error.chunks(error.len().div_ceil(BLOCKS).max(1));
+    quantile(blocks.map(|block| robust_std(block.iter().copied())), MOST_GOES_ON)
+}
+
+impl Freed {
+    fn new(rows: &Rows, nominal: &Nominal) -> Freed {
+        let places = sample(rows, SAMPLE);
+        let mut columns = floating(rows, nominal, &places);
+        columns.extend(waves(1.0, &rows.generator, &places));
+        let mut freed = Freed { error: Vec::new(), columns, places };
+        freed.error = freed.freed(&rows.error);
+        let spread = spread(&freed.error);
+        freed.error.iter_mut().for_each(|error| *error = error.clamp(-CUT * spread, CUT * spread));
+        freed
+    }
+
+    /// What the free columns leave of a column of all rows, at the places.
+    fn freed(&self, column: &[f64]) -> Vec<f64> {
+        self.freed_with(column).0
+    }
+
+    /// The same, and how much of each free column was in it.
+    fn freed_with(&self, column: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let mut left: Vec<f64> = self.places.iter().map(|k| column[*k]).collect();
+        let size = rms(&left).max(1e-9);
+        let priors: Vec<Prior> =
+            self.columns.iter().map(|c| Prior { mean: 0.0, std: 1e4 * size / rms(c).max(1e-9) }).collect();
+        let views: Vec<&[f64]> = self.columns.iter().map(Vec::as_slice).chain([left.as_slice()]).collect();
+        let Some(solution) = solve(&Gram::of(&views, 0..left.len()), &priors, 1.0 / (size * size)) else {
+            return (left, vec![0.0; self.columns.len()]);
+        };
+        for (column, c) in self.columns.iter().zip(&solution.coefficients) {
+            left.iter_mut().zip(column).for_each(|(left, value)| *left -= c * value);
+        }
+        (left, solution.coefficients)
+    }
+}
+
+impl Freed {
+    /// Amplitude of the wave of this order of the generator, which floats freely, in the error less what is `said` of the load, arcsec.
+    fn amplitude(&self, rows: &Rows, said: &[f64], order: f64) -> f64 {
+        let [sine, cosine] = waves(order, &rows.generator, &self.places);
+        let unsaid: Vec<f64> = rows.error.iter().zip(said).map(|(error, said)| error - said).collect();
+        let (_, coefficients) = self.freed_with(&unsaid);
+        let of = |wave: &[f64]| {
+            self.columns.iter().position(|column| column == wave).map_or(0.0, |place| coefficients[place])
+        };
+        of(&sine).hypot(of(&cosine))
+    }
+}
+
+/// How the error stands to what a torque should do.
+#[derive(Clone, Copy, Debug)]
+struct Told {
+    /// What it should do, arcsec rms.
+    size: f64,
+    /// Share of it that the error shows, with its standard deviation.
+    share: f64,
+    std: f64,
+    /// What is left of the error where it does what it should, arcsec.
+    left: f64,
+    /// Share of the wind-up alone, whatever the clearance is: that follows the sign of a torque in any unit.
+    wind_up: f64,
+    /// Half the clearance alone, arcsec.
+    clearance: f64,
+    /// What is left where wind-up and clearance have the shares that suit best, arcsec.
+    left_free: f64,
+}
+
+impl Told {
+    /// By nominal wind-up and clearance under `scale` times the recorded torque.
+    fn by(rows: &Rows, (nominal, table): (&Nominal, Option<&Table<'_>>), freed: &Freed, scale: f64) -> Told {
+        let torque: Vec<f64> = rows.torque.iter().map(|torque| scale * torque).collect();
+        let flank = PlayLaw::Held.flanks(rows, &torque, nominal);
+        let half = 0.5 * nominal.backlash_arcsec;
+        let wound: Vec<f64> = torque.iter().map(|torque| nominal.wind_up_arcsec(*torque)).collect();
+        let should: Vec<f64> = wound.iter().zip(&flank).map(|(wound, flank)| wound + half * flank).collect();
+        let mut error = freed.error.clone();
+        if let Some(table) = table {
+            // What the table says beside them: ripple, which the load shapes.
+            let all = predicted_by_table(rows, &torque, table);
+            let ripple: Vec<f64> = all.iter().zip(&should).map(|(all, should)| all - should).collect();
+            error.iter_mut().zip(freed.freed(&ripple)).for_each(|(error, ripple)| *error -= ripple);
+        }
+        let [wound, flank] = [wound, flank].map(|column| freed.freed(&column));
+        let wind_up = share_beside(&error, &wound, &flank);
+        let clearance = share_beside(&error, &flank, &wound);
+        let of_shares = wound.iter().zip(&flank).map(|(wound, flank)| wind_up * wound + clearance * flank);
+        let left_free = robust_std(error.iter().zip(of_shares).map(|(error, said)| error - said));
+        let should = freed.freed(&should);
+        let products: Vec<[f64; 2]> = should
+            .chunks(should.len().div_ceil(BLOCKS).max(1))
+            .zip(error.chunks(should.len().div_ceil(BLOCKS).max(1)))
+            .map(|(w, e)| [w.iter().map(|w| w * w).sum(), w.iter().zip(e).map(|(w, e)| w * e).sum()])
+            .collect();
+        let all = products.iter().fold([0.0; 2], |sum, of| [sum[0] + of[0], sum[1] + of[1]]);
+        let share = all[1] / all[0].max(1e-12);
+        let without: Vec<f64> = products.iter().map(|of| (all[1] - of[1]) / (all[0] - of[0]).max(1e-12)).collect();
+        // Jackknife.
+        let blocks = products.len() as f64;
+        let mean = without.iter().sum::<f64>() / blocks;
+        let variance = (blocks - 1.0) / blocks * without.iter().map(|share| (share - mean).powi(2)).sum::<f64>();
+        let left = robust_std(error.iter().zip(&should).map(|(error, should)| error - should));
+        Told { size: rms(&should), share, std: variance.sqrt(), left, wind_up, clearance, left_free }
+    }
+
+    fn is_certain(&self) -> bool {
+        self.share.abs() > CERTAIN * self.std
+    }
+}
+
+/// How much of `column` is in `of`, with `other` free.
+fn share_beside(of: &[f64], column: &[f64], other: &[f64]) -> f64 {
+    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let (cc, oo, co) = (product(column, column), product(other, other), product(column, other));
+    // Where the sign never changes there is one flank, which is a zero.
+    let (share, rest) = if oo > 1e-9 { (co / oo, cc - co * co / oo) } else { (0.0, cc) };
+    (product(of, column) - share * product(of, other)) / rest.max(1e-12)
+}
+
+/// Factors by which a torque may be wrong: the other shaft, by this ratio, or another unit; and turned round.
+fn factors(ratio: f64) -> Vec<f64> {
+    let shafts = [ratio.abs(), 1.0 / ratio.abs()];
+    shafts.into_iter().chain(UNITS.map(|(_, factor)| factor)).flat_map(|factor| [factor, -factor]).collect()
+}
+
+/// Units that a torque may be in though N·m was said, as a mapping names them, in N·m.
+const UNITS: [(&str, f64); 5] =
+    [("N.cm", 1e-2), ("mN.m", 1e-3), ("kN.m", 1e3), ("lbf.in", 0.112_985), ("N.m*9.80665", 9.806_65)];
+
+/// The unit of a factor, and which way it counts.
+fn unit_of(factor: f64) -> Option<String> {
+    let sign = if factor < 0.0 { "-" } else { "" };
+    UNITS.iter().find(|(_, of)| *of == factor.abs()).map(|(name, _)| format!("{sign}{name}"))
+}
+
+/// Holds the torque against what it should do; turned round, or taken to the other shaft, where that explains it; left out where it does nothing, or
+/// where it looks like another unit. Gives
+/// why the data are unusable, where they are.
+pub(super) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: Option<&Table<'_>>) -> Option<String> {
+    let rows = Rows::new(&recording.sessions, nominal);
+    if !rows.recorded.torque || rows.torque.iter().all(|torque| *torque == 0.0) || nominal.wind_up_arcsec(1.0) == 0.0 {
+        return None;
+    }
+    let freed = Freed::new(&rows, nominal);
+    let plain: Vec<f64> = (0..rows.len()).map(|k| rows.error[k] - nominal.wind_up_arcsec(rows.torque[k])).collect();
+    let white = white_level(&rows, &rows.error).min(white_level(&rows, &plain));
+    let seen = |told: &Told| told.size > SEEN_ARCSEC.max(SEEN_OF_NOISE * white);
+    let none = robust_std(freed.error.iter().copied());
+    let told = |scale: f64| Told::by(&rows, (nominal, table), &freed, scale);
+    let recorded = told(1.0);
+    let of_this_drive = |told: &Told| (OF_THIS_DRIVE[0]..=OF_THIS_DRIVE[1]).contains(&told.share) && told.is_certain();
+    let too_soft = recorded.wind_up > FAR_TOO_SOFT;
+    if seen(&recorded) && recorded.share > NO_EFFECT && !too_soft {
+        return None;
+    }
+    let turned = told(-1.0);
+    if seen(&turned) && of_this_drive(&turned) && turned.left < EXPLAINS_TURNED * recorded.left.min(none) {
+        scale(recording, -1.0);
+        recording.faults.push(fault_throughout(
+            recording,
+            FaultName::TorqueSign,
+            Treatment::Repaired,
+            none,
+            format!(
+                "the error follows the torque with {:.2} (± {:.2}) of the nominal wind-up and clearance: it counts the other way, and was \
+                 turned round",
+                recorded.share, recorded.std
+            ),
+        ));
+        return None;
+    }
+    let best = factors(nominal.ratio)
+        .into_iter()
+        .map(|factor| (factor, told(factor)))
+        .filter(|(_, told)| !too_soft || (OF_THIS_DRIVE[0]..=OF_THIS_DRIVE[1]).contains(&told.wind_up))
+        .filter(|(_, told)| seen(told) && of_this_drive(told) && told.left < EXPLAINS * recorded.left.min(none))
+        .min_by(|a, b| a.1.left.total_cmp(&b.1.left));
+    if let Some((unit, (_, told))) = best.as_ref().and_then(|best| Some((unit_of(best.0)?, best))) {
+        // A stiffness that looks like another unit is a look, no word: a soft drive does the same.
+        let what = format!(
+            "the torque leaves {:.0} arcsec as it stands, and {:.0} if it is in {unit}: nothing says so, and it is not converted; if it is, say \
+             --columns torque=NAME:{unit}, else the drive is not as stiff as its model says; what the load does cannot be told from what the drive does",
+            recorded.left, told.left
+        );
+        recording.sessions.iter_mut().for_each(|session| session.torque_n_m = None);
+        recording.faults.push(fault_throughout(
+            recording,
+            FaultName::UnitMismatch,
+            Treatment::Masked,
+            recorded.size,
+            what.clone(),
+        ));
+        return Some(what);
+    }
+    if let Some((factor, told)) = best {
+        scale(recording, factor);
+        recording.faults.push(fault_throughout(
+            recording,
+            FaultName::TorqueScale,
+            Treatment::Repaired,
+            none,
+            format!(
+                "the torque times {factor:.4} gives the wind-up and clearance that the error shows ({:.2} ± {:.2} of the nominal ones); as \
+                 it stands it leaves {:.0} arcsec, so {:.0}: it was converted",
+                told.share, told.std, recorded.left, told.left
+            ),
+        ));
+        return None;
+    }
+    let nothing = seen(&recorded) && 1.0 - recorded.share > CERTAIN * recorded.std && recorded.left > none;
+    if !nothing {
+        return None;
+    }
+    recording.sessions.iter_mut().for_each(|session| session.torque_n_m = None);
+    let what = format!(
+        "the torque should move the error by {:.0} arcsec rms, and it shows {:.2} (± {:.2}) of that: it is not the torque at this output, and \
+         is not used; what the load does cannot be told from what the drive does",
+        recorded.size, recorded.share, recorded.std
+    );
+    recording.faults.push(fault_throughout(
+        recording,
+        FaultName::TorqueScale,
+        Treatment::Masked,
+        recorded.size,
+        what.clone(),
+    ));
+    Some(what)
+}
+
+/// Wind-up for 1 N·m, arcsec, on the way to a load.
+pub(super) fn slope_arcsec(nominal: &Nominal, load_n_m: f64) -> f64 {
+    let load = load_n_m.max(1e-3);
+    nominal.wind_up_arcsec(load) / load
+}
+
+/// Multiplies the torque.
+fn scale(recording: &mut Recording, factor: f64) {
+    recording
+        .sessions
+        .iter_mut()
+        .flat_map(|session| &mut session.torque_n_m)
+        .flatten()
+        .for_each(|torque| *torque *= factor);
+}
+
+/// A fault of the torque in all rows.
+pub(super) fn fault_throughout(
+    recording: &Recording,
+    name: FaultName,
+    treatment: Treatment,
+    size_arcsec: f64,
+    what: String,
+) -> Fault {
+    let (first, last) = (recording.sessions.first(), recording.sessions.last());
+    let line = |session: Option<&Session>, last: bool| {
+        session.and_then(|s| if last { s.line.last() } else { s.line.first() }).copied().unwrap_or(0)
+    };
+    let time = |session: Option<&Session>, last: bool| {
+        session.and_then(|s| s.time_s.as_ref()).and_then(|t| if last { t.last() } else { t.first() }).copied()
+    };
+    Fault {
+        name,
+        channel: Some(Quantity::Torque),
+        time_s: time(first, false),
+        until_s: time(last, true),
+        first_line: line(first, false),
+        last_line: line(last, true),
+        rows: recording.sessions.iter().map(|session| session.len() as u64).sum(),
+        size_arcsec: Some(size_arcsec),
+        treatment,
+        what,
+        advice: name.advice(),
+        measures: Measures::default(),
+    }
+}
+
+/// Whether both angles may be in degrees where radians are said: with zeros and ratio free, the nominal model leaves far more than noise, or
+/// winds up far too little. Division by 57 shrinks any misfit; so what is left counts against its own noise, and the ratio is free.
+pub(super) fn may_be_in_degrees(recording: &Recording, nominal: &Nominal, table: Option<&Table<'_>>) -> bool {
+    let predicts = !nominal.harmonics.is_empty() || nominal.wind_up_arcsec(1.0) != 0.0;
+    let rough = predicts.then(|| Rough::of(&recording.sessions, nominal, table));
+    rough.is_some_and(|rough| rough.left > FAR_FROM_NOISE || rough.told.wind_up > FAR_TOO_SOFT)
+}
+
+/// Whether the nominal model explains these rows to the noise, and what it explains has the size that it says.
+pub(super) fn is_explained(recording: &Recording, nominal: &Nominal, table: Option<&Table<'_>>) -> bool {
+    let rough = Rough::of(&recording.sessions, nominal, table);
+    let winds_up = rough.told.size > SEEN_OF_NOISE * rough.white;
+    let like_the_load = !winds_up || (rough.told.share - 1.0).abs() < AS_NOMINAL && rough.told.is_certain();
+    let within = |share: f64| (HARMONICS_AS_NOMINAL[0]..=HARMONICS_AS_NOMINAL[1]).contains(&share);
+    let like_the_harmonics = rough.harmonics.map_or(winds_up, within);
+    // Where a spring and the wheels both have their size, what is left may be a flank that friction holds otherwise than the model says.
+    let near_the_noise = rough.left < TO_THE_NOISE;
+    let next_to_nothing = rough.harmonics.is_some() && rough.left * rough.white < NEXT_TO_NOTHING * rough.told.size;
+    (near_the_noise || next_to_nothing) && like_the_load && like_the_harmonics
+}
+
+/// How the nominal model explains rows with zeros and ratio free.
+struct Rough {
+    told: Told,
+    /// What is left, in standard deviations of the white noise.
+    left: f64,
+    /// White noise, arcsec.
+    white: f64,
+    /// The largest nominal harmonic in the rows, over what it should be, where it should stand out of the noise.
+    harmonics: Option<f64>,
+}
+
+impl Rough {
+    fn of(sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> Rough {
+        let rows = Rows::new(sessions, nominal);
+        let freed = Freed::new(&rows, nominal);
+        let told = Told::by(&rows, (nominal, table), &freed, 1.0);
+        let white = white_level(&rows, &rows.error);
+        let by_size = |a: &&Harmonic, b: &&Harmonic| a.amplitude_arcsec.total_cmp(&b.amplitude_arcsec);
+        let largest = nominal.harmonics.iter().max_by(by_size).filter(|of| of.amplitude_arcsec > white);
+        let harmonics = largest.map(|of| {
+            // A load that is put on in steps while the generator turns a little looks like a wave: it goes first.
+            let flank = PlayLaw::Held.flanks(&rows, &rows.torque, nominal);
+            let said: Vec<f64> = (rows.torque.iter().zip(&flank))
+                .map(|(torque, flank)| told.wind_up * nominal.wind_up_arcsec(*torque) + told.clearance * flank)
+                .collect();
+            freed.amplitude(&rows, &said, of.order_per_generator_turn) / of.amplitude_arcsec
+        });
+        Rough { told, left: told.left_free / white, white, harmonics }
+    }
+}
+
+/// A ratio that the data turn by, and the whole one that it may be meant to be.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct RatioProposal {
+    /// Generator turns for one of the output, as the data have them.
+    pub found: f64,
+    /// The nearest whole ratio.
+    pub proposed: f64,
+}
+
+/// A whole ratio is proposed where the one found is this near…
+const NEAR_WHOLE: f64 = 0.2;
+/// …and the one given is off by at least this share.
+const OFF: f64 = 2e-3;
+
+/// What the ratio may be meant to be, where it is off by `relative_error` (of the nominal output angle).
+#[must_use]
+pub fn proposed_ratio(nominal_ratio: f64, relative_error: f64) -> Option<RatioProposal> {
+    let found = nominal_ratio / (1.0 + relative_error);
+    let proposed = found.round();
+    let other = proposed != nominal_ratio.round() && relative_error.abs() > OFF;
+    (other && (found - proposed).abs() < NEAR_WHOLE).then_some(RatioProposal { found, proposed })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synthesize::catalogue_drive;
+
+    #[test]
+    fn a_block_of_bad_rows_does_not_decide_where_residuals_are_cut() {
+        let rows = |load: std::ops::Range<usize>, bad: std::ops::Range<usize>| -> Vec<f64> {
+            let wave = |k: usize| (1.3 * k as f64).sin();
+            let size = |k: usize| {
+                if bad.contains(&k) {
+                    900.0
+                } else if load.contains(&k) {
+                    20.0
+                } else {
+                    1.0
+                }
+            };
+            (0..2400).map(|k| size(k) * wave(k)).collect()
+        };
+        // Loaded in one session of five.
+        let (with, without) = (spread(&rows(480..960, 100..200)), spread(&rows(480..960, 0..0)));
+        assert!(without > 10.0 && (with / without - 1.0).abs() < 0.1, "{with}, {without}");
+    }
+
+    /// A drive as its catalogue says under a load that swings, 2 arcsec of noise; `told` is what the column of torque says of the load.
+    fn recording(nominal: &Nominal, told: impl Fn(f64, f64) -> f64) -> Recording {
+        recording_under(nominal, |t| 25.0 * (0.9 * t).sin() + 6.0 * (2.3 * t).cos(), 0.05, told)
+    }
+
+    /// The same under a load of time, with a generator that turns by so much from row to row.
+    fn recording_under(
+        nominal: &Nominal,
+        load: impl Fn(f64) -> f64,
+        turned: f64,
+        told: impl Fn(f64, f64) -> f64,
+    ) -> Recording {
+        let mut random = fastrand::Rng::with_seed(3);
+        let mut session = Session { time_s: Some(Vec::new()), torque_n_m: Some(Vec::new()), ..Session::default() };
+        let mut flank = 1.0;
+        for k in 0..12_000 {
+            let t = 0.01 * f64::from(k);
+            let load = load(t);
+            let psi = turned * f64::from(k);
+            if load.abs() > nominal.friction_torque_n_m {
+                flank = load.signum();
+            }
+            let noise = 2.0 * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0);
+            let error = nominal.harmonics_arcsec(psi)
+                + nominal.wind_up_arcsec(load)
+                + 0.5 * nominal.backlash_arcsec * flank
+                + noise;
+            session.line.push(k as u64 + 2);
+            session.generator_rad.push(psi);
+            session.error_rad.push(error / flexspline_base::units::ARCSEC_PER_RAD);
+            session.time_s.as_mut().unwrap().push(t);
+            session.torque_n_m.as_mut().unwrap().push(told(t, load));
+        }
+        Recording {
+            file: "made.csv".into(),
+            rows: session.len(),
+            sessions: vec![session],
+            faults: Vec::new(),
+            tooth_steps: Vec::new(),
+            notes: Vec::new(),
+            unusable: None,
+        }
+    }
+
+    /// Fault found, whether data are unusable, and the torque in a row after that.
+    fn checked(told: impl Fn(f64, f64) -> f64) -> (Option<FaultName>, bool, Option<f64>) {
+        let nominal = catalogue_drive();
+        let mut recording = recording(&nominal, told);
+        let unusable = check_torque(&mut recording, &nominal, None).is_some();
+        let torque = recording.sessions[0].torque_n_m.as_ref().map(|torque| torque[150]);
+        (recording.faults.first().map(|fault| fault.name), unusable, torque)
+    }
+
+    #[test]
+    fn a_torque_is_turned_round_converted_or_left_out_and_a_right_one_left_alone() {
+        let load = 25.0 * (0.9f64 * 1.5).sin() + 6.0 * (2.3f64 * 1.5).cos();
+        let near = |torque: Option<f64>| (torque.unwrap() / load - 1.0).abs() < 1e-6;
+        let (fault, unusable, torque) = checked(|_, load| load);
+        assert!(fault.is_none() && !unusable && near(torque));
+        // A drive twice as stiff as its catalogue is a drive.
+        assert_eq!(checked(|_, load| 2.0 * load).0, None);
+        let (fault, unusable, torque) = checked(|_, load| -load);
+        assert!(fault == Some(FaultName::TorqueSign) && !unusable && near(torque));
+        let ratio = catalogue_drive().ratio;
+        let (fault, unusable, torque) = checked(|_, load| load / ratio.abs());
+        assert!(fault == Some(FaultName::TorqueScale) && !unusable && near(torque));
+        // A unit that nothing says is not taken for one, nor is a drive nine times as soft.
+        let (fault, unusable, torque) = checked(|_, load| load / 0.112_985);
+        assert!(fault == Some(FaultName::UnitMismatch) && unusable && torque.is_none());
+        let (_, _, torque) = checked(|_, load| 0.112_985 * load);
+        assert!(torque.is_none_or(|torque| (torque / (0.112_985 * load) - 1.0).abs() < 1e-6), "{torque:?}");
+        // That of a neighbour, who swings at his own pace; and one that nothing follows.
+        let (fault, unusable, torque) = checked(|t, _| 30.0 * (1.7 * t).sin());
+        assert!(fault == Some(FaultName::TorqueScale) && unusable && torque.is_none());
+        // Nothing recorded is no torque that does nothing.
+        assert_eq!(checked(|_, _| 0.0), (None, false, Some(0.0)));
+    }
+
+    #[test]
+    fn degrees_are_told_from_a_wrong_ratio() {
+        let nominal = catalogue_drive();
+        let mut recording = recording(&nominal, |_, load| load);
+        assert!(!may_be_in_degrees(&recording, &nominal, None) && is_explained(&recording, &nominal, None));
+        let right = recording.clone();
+        for session in &mut recording.sessions {
+            session.generator_rad.iter_mut().for_each(|angle| *angle = angle.to_degrees());
+            session.error_rad.iter_mut().for_each(|angle| *angle = angle.to_degrees());
+        }
+        assert!(may_be_in_degrees(&recording, &nominal, None) && !is_explained(&recording, &nominal, None));
+        let mut other_ratio = right;
+        for session in &mut other_ratio.sessions {
+            let by = 1.0 / (nominal.ratio * 1.05) - 1.0 / nominal.ratio;
+            session.error_rad.iter_mut().zip(&session.generator_rad).for_each(|(error, psi)| *error += by * psi);
+        }
+        assert!(!may_be_in_degrees(&other_ratio, &nominal, None));
+    }
+
+    #[test]
+    fn a_load_in_steps_over_few_turns_is_no_wave_of_the_wheels() {
+        let nominal = catalogue_drive();
+        let levels = [21.0, -14.0, 30.0, 8.0, -25.0, 17.0, -9.0];
+        let steps = recording_under(&nominal, |t| levels[(t / 18.0) as usize % 7], 1e-3, |_, load| load);
+        let rough = Rough::of(&steps.sessions, &nominal, None);
+        assert!((0.8..1.25).contains(&rough.harmonics.unwrap()), "{:?}", rough.harmonics);
+        assert!(is_explained(&steps, &nominal, None));
+    }
+
+    #[test]
+    fn a_whole_ratio_is_proposed_near_the_one_found() {
+        let near = |nominal: f64, data: f64| proposed_ratio(nominal, nominal / data - 1.0).map(|p| p.proposed);
+        assert_eq!(near(100.0, 101.0), Some(101.0));
+        assert_eq!(near(95.0, 100.03), Some(100.0));
+        assert_eq!(near(-100.0, -101.05), Some(-101.0));
+        assert_eq!(near(100.0, 100.02), None);
+        assert_eq!(near(100.0, 100.5), None);
+    }
+}

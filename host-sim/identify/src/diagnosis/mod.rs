@@ -1,0 +1,354 @@
+//! Diagnosis: what the nominal model gets wrong in measured data, which physical cause explains it, and what the extension gains.
+//!
+//! The order of work:
+//! 1. `rows`, `base`: the nominal prediction on the data's own excitation, its parameters floating within the unit-to-unit spread.
+//! 2. `prepare`, `noise`: white noise and wander, found with everything explainable taken out; data and columns made white.
+//! 3. `candidate`: causes as laws, re-simulated; deviations without a name beside them.
+//! 4. `select`: forward, backward, exchange; evidence, size, sessions left out.
+//! 5. `rivals`: every rival refitted; look-alikes.
+//! 6. `remainder`: lines and steps left; abstention.
+//! 7. `verdict`: which causes may be named, with parameters, uncertainty, and the gain on sessions left out (`report`).
+//!
+//! Every decision on the way is in the `trace`; `explain` says from it why a cause was named or not.
+
+mod averaged;
+pub mod base;
+mod blurred;
+pub(crate) mod candidate;
+pub(crate) mod channels;
+mod experiment;
+pub mod explain;
+mod extended;
+mod flank_lag;
+mod hanging;
+mod held_out;
+pub(crate) mod linear;
+pub(crate) mod model;
+pub(crate) mod noise;
+pub mod pipeline;
+pub(crate) mod prepare;
+mod quieted;
+pub(crate) mod remainder;
+pub mod report;
+mod resolution;
+pub(crate) mod rivals;
+pub mod rows;
+pub(crate) mod select;
+#[cfg(test)]
+mod tests;
+mod thinned;
+pub mod thresholds;
+mod torque_zero;
+pub mod trace;
+mod uncertainty;
+mod verdict;
+mod with_speed;
+mod zeros;
+
+use std::sync::Arc;
+
+use flexspline::Table;
+use thiserror::Error;
+
+use crate::causes::CauseName;
+use crate::measurement::Session;
+use crate::nominal::Nominal;
+use averaged::Averaged;
+use candidate::{Deviation, Excitation, Label, Law, Scales, library, line, unnamed};
+pub use explain::Explanation;
+use extended::Found;
+pub use extended::{Extended, FittedCause, Series};
+use model::{Problem, Term, terms_at};
+use noise::{Noise, Whitener};
+pub use pipeline::{
+    Diagnosed, DiagnosisFile, Extension, Made, MakeTable, Options, PipelineError, Subject, diagnose_rows, parse_rows,
+    read_rows,
+};
+use prepare::FreeColumns;
+pub use report::{Cause, Compensation, Diagnosis, HeldOut, Parameter, Residual, Unexplained, Verdict};
+use resolution::{Resolution, resolution};
+use rows::Rows;
+use select::{Bests, Scope, Selected, fit, select};
+use thinned::{Sample, Thinned};
+pub use trace::{Gate, Judged, Stage, Step, Trace};
+
+/// Why data cannot be diagnosed.
+#[derive(Debug, Error, PartialEq, Eq)]
+pub enum DiagnosisError {
+    /// Too few rows.
+    #[error("{found} rows, allowed: at least {needed}")]
+    TooFewRows {
+        /// Rows.
+        found: usize,
+        /// Least number.
+        needed: usize,
+    },
+    /// The numbers do not allow a fit.
+    #[error("the data allow no fit: angles, errors, torques and temperatures have to be finite")]
+    NotFinite,
+}
+
+/// Settings of a diagnosis.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// Radius of the pitch circle of the output, mm: turns arc-seconds into micrometres.
+    pub pitch_radius_mm: f64,
+    /// Averages of rows that fits are made on, about.
+    pub averages: usize,
+    /// Says on stderr what is tried.
+    pub verbose: bool,
+    /// A cause that is asked about: if it is not named, what to record to tell it from those that are is looked for.
+    pub asked: Option<CauseName>,
+    /// How finely rows are looked at, and their noise, where that is known from before.
+    pub fineness: Option<Fineness>,
+}
+
+/// How finely rows are looked at, and the noise in them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fineness {
+    /// Rows to an average.
+    pub stride: usize,
+    /// Noise of a row.
+    pub noise: Noise,
+    /// Worth of the information, at most 1.
+    pub worth: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Settings {
+        Settings { pitch_radius_mm: 48.7, averages: 12_000, verbose: false, asked: None, fineness: None }
+    }
+}
+
+/// Rows needed at least.
+pub(crate) const LEAST_ROWS: usize = 200;
+/// Orders per generator turn up to which lines are looked for.
+const HIGHEST_ORDER: f64 = 150.0;
+/// Times that causes are chosen again, at most.
+const MOST_ROUNDS: usize = 2;
+/// Diagnoses sessions against a nominal model, or against a table of the FEM that takes its place in the prediction.
+///
+/// `progress(done, of, what)` is told how far it is.
+///
+/// # Errors
+/// Too few rows; numbers that are not finite.
+pub fn diagnose(
+    sessions: &[Session],
+    nominal: &Nominal,
+    table: Option<&Table<'_>>,
+    settings: &Settings,
+    progress: impl FnMut(usize, usize, &str),
+) -> Result<Diagnosis, DiagnosisError> {
+    diagnose_extended(sessions, nominal, table, settings, progress).map(|(diagnosis, _)| diagnosis)
+}
+
+/// Diagnoses, and gives the model that was found, to predict other rows with.
+///
+/// # Errors
+/// As [`diagnose`].
+pub fn diagnose_extended(
+    sessions: &[Session],
+    nominal: &Nominal,
+    table: Option<&Table<'_>>,
+    settings: &Settings,
+    mut progress: impl FnMut(usize, usize, &str),
+) -> Result<(Diagnosis, Extended), DiagnosisError> {
+    let rows = Rows::new(sessions, nominal);
+    check(&rows)?;
+    progress(0, 4, "nominal model");
+    let (base, jumps) = prepare::base(&rows, nominal, table);
+    let scales = Scales::new(&rows, settings.pitch_radius_mm, jumps);
+    let on = Excitation::new(&rows, nominal, &base, &scales);
+    progress(1, 4, "causes");
+    let search = Search::new(&on, settings)?;
+    progress(2, 4, "rivals");
+    let Search { laws, problem, noise, stride, thinned, start, bests, fast, mut trace } = search;
+    let terms = terms_at(&problem, &laws, &start);
+    let selected = Selected { fit: fit(&problem, &terms).ok_or(DiagnosisError::NotFinite)?, terms };
+    let (selected, mut unproved) = held_out::proved(&problem, selected, &mut trace);
+    let (selected, hides) = verdict::told_apart(&problem, selected, noise, &mut trace);
+    unproved.extend(hides);
+    let start = remembered(&laws, &selected.terms);
+    let maps = candidate::maps(&on);
+    let mut left = remainder::of_maps(&problem, &selected, &maps, noise.white);
+    let hidden_lines: Vec<Label> = fast.iter().map(|(label, _)| *label).collect();
+    let fast = fast.into_iter().map(|(label, size_arcsec)| Unexplained { looks_like: label.to_string(), size_arcsec });
+    left.extend(fast.filter(|line| line.size_arcsec > select::least_size(noise.white)));
+    left.extend(remainder::beyond_noise(&problem, &selected, noise));
+    for (k, term) in selected.terms.iter().enumerate() {
+        trace.say(&trace::Found::Parts(term.law.label, select::parts(term, selected.fit.of(k))));
+    }
+    for something in &left {
+        trace.say(&trace::Found::Left(&something.looks_like, something.size_arcsec));
+    }
+    left.append(&mut unproved);
+    let fineness = Fineness { stride, noise, worth: problem.worth };
+    let sample = thinned.as_ref().map(|thinned| Sample::new(&on, thinned, &problem.uncertain, stride));
+    let on_sample = sample.as_ref().map(|sample| sample.problem(noise, problem.worth));
+    let on_sample = on_sample.as_ref().zip(thinned.as_ref().map(|thinned| thinned.share));
+    let mut diagnosis =
+        verdict::conclude(&problem, on_sample, &laws, selected, &bests, left, &hidden_lines, noise, settings, trace);
+    diagnosis.set_aside = prepare::too_few_left(&problem, diagnosis.finding);
+    let found = Found::of(&problem, &laws, &start).ok_or(DiagnosisError::NotFinite)?;
+    drop((problem, sample));
+    Ok((diagnosis, found.extended(laws, &base, &scales, fineness)))
+}
+
+/// Whether rows can be diagnosed at all.
+fn check(rows: &Rows) -> Result<(), DiagnosisError> {
+    if rows.count_used() < LEAST_ROWS {
+        return Err(DiagnosisError::TooFewRows { found: rows.count_used(), needed: LEAST_ROWS });
+    }
+    let finite = |column: &[f64]| column.iter().all(|v| v.is_finite());
+    if ![&rows.generator, &rows.error, &rows.torque, &rows.temperature, &rows.time].into_iter().all(|c| finite(c)) {
+        return Err(DiagnosisError::NotFinite);
+    }
+    Ok(())
+}
+
+/// Laws chosen, the noise they leave, and what they were chosen on.
+struct Search<'a> {
+    laws: Vec<Law>,
+    problem: Problem<'a>,
+    noise: Noise,
+    /// Rows to an average.
+    stride: usize,
+    /// A sample of the rows, where they are many.
+    thinned: Option<Thinned>,
+    /// Index and places of each law chosen.
+    start: Vec<(usize, Vec<f64>)>,
+    /// Where each law was at its best.
+    bests: Bests,
+    /// Lines too fast for averages, with their sizes, arcsec.
+    fast: Vec<(Label, f64)>,
+    /// Every decision on the way.
+    trace: Trace,
+}
+
+impl<'a> Search<'a> {
+    fn new(on: &'a Excitation<'a>, settings: &Settings) -> Result<Search<'a>, DiagnosisError> {
+        let mut laws = library(on);
+        laws.extend(unnamed(on));
+        let mut trace = Trace::new(settings.verbose);
+        for cause in CauseName::ALL {
+            if let Some(need) = on.lacks(*cause) {
+                trace.decided(Stage::Data, (*cause).into(), None, vec![Judged::plain(Gate::Needs(need), false)]);
+            }
+        }
+        let mut hung = vec![false; on.rows.len()];
+        let mut uncertain = prepare::uncertain(on, &[], &hung);
+        let Resolution { mut stride, fast: at_first } = resolution(on, &laws, &uncertain, settings.averages, &[]);
+        let whiten = |noise, uncertain: &[bool], stride| Whitener::new(on.rows, uncertain, stride, noise);
+        let mut averaged = Averaged::of(on, stride).map(Arc::new);
+        let mut free = FreeColumns::of(on, &laws, averaged.clone());
+        let (mut noise, mut worth) = prepare::noise(on, &free, &at_first, &uncertain, None);
+        trace.say(&trace::Found::Noise(noise, worth));
+        let mut problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth, averaged.clone());
+        let mut fast: Vec<(Label, f64)> = Vec::new();
+        let mut start: Vec<(usize, Vec<f64>)> = Vec::new();
+        let mut bests = Bests::default();
+        let mut thinned = Thinned::of(on, stride);
+        // Again where a line was found that no law has, or where what was taken for noise turned out to be a cause.
+        for round in 0..=MOST_ROUNDS {
+            fast.clear();
+            let mut scope = Scope::Everything;
+            if let Some(thinned) = &thinned {
+                let sample = Sample::new(on, thinned, &uncertain, stride);
+                let problem = sample.problem(noise, worth);
+                let terms = terms_at(&problem, &laws, &start);
+                let selected = select(&problem, &laws, noise.white, terms, &mut bests, scope, &mut trace);
+                start = remembered(&laws, &selected.ok_or(DiagnosisError::NotFinite)?.terms);
+                scope = Scope::CameClose;
+            }
+            let terms = terms_at(&problem, &laws, &start);
+            let selected = select(&problem, &laws, noise.white, terms, &mut bests, scope, &mut trace)
+                .ok_or(DiagnosisError::NotFinite)?;
+            start = remembered(&laws, &selected.terms);
+            if round == MOST_ROUNDS {
+                break;
+            }
+            let lines = lines_left(&problem, &selected, noise);
+            let (slow, found): (Vec<_>, Vec<_>) =
+                lines.into_iter().partition(|(line, _)| !remainder::averaged_away(&problem, line));
+            for (line, size) in found {
+                let label = Label::Deviation(Deviation::Line { per: line.per, order: line.order });
+                if fast.iter().all(|(known, _)| known.to_string() != label.to_string()) {
+                    trace.say(&trace::Found::FastLine(label, size));
+                    fast.push((label, size));
+                }
+            }
+            let mut explained = remainder::explained(&problem, &selected);
+            // What hung once hung, whatever is taken for it later.
+            for (hung, hangs) in hung.iter_mut().zip(hanging::hanging(on, &explained, noise.white)) {
+                *hung |= hangs;
+            }
+            let doubtful = prepare::uncertain(on, &selected.terms, &hung);
+            let hangs =
+                doubtful.iter().zip(&uncertain).zip(&hung).any(|((after, before), hung)| *hung && *after && !before);
+            drop(selected);
+            let known = laws.len();
+            for (found, size) in slow {
+                let law = line(found.per, found.order);
+                if laws.iter().all(|l| l.label != law.label) {
+                    trace.say(&trace::Found::Line(law.label, size));
+                    laws.push(law);
+                }
+            }
+            let new_line = laws.len() > known;
+            let changed = doubtful.iter().zip(&uncertain).filter(|(a, b)| a != b).count();
+            let other_rows = changed > on.rows.len() / 200 || hangs;
+            uncertain = doubtful;
+            // What was large may have hidden what is fast.
+            let finer = resolution(on, &laws, &uncertain, settings.averages, &explained);
+            let closer_look = finer.stride < stride;
+            stride = stride.min(finer.stride);
+            if closer_look {
+                averaged = Averaged::of(on, stride).map(Arc::new);
+                thinned = Thinned::of(on, stride);
+            }
+            if closer_look || !free.are_of(&laws) {
+                free = FreeColumns::of(on, &laws, averaged.clone());
+            }
+            explained.iter_mut().zip(&finer.fast).for_each(|(sum, fast)| *sum += fast);
+            let (again, worth_again) = {
+                let explained: &[f64] = if new_line { &[] } else { &explained };
+                prepare::noise(on, &free, explained, &uncertain, Some(noise))
+            };
+            let change = again.floor() / noise.floor();
+            if !new_line && !other_rows && !closer_look && (0.85..1.18).contains(&change) {
+                break;
+            }
+            if new_line {
+                start.clear();
+            }
+            (noise, worth) = (again, worth_again);
+            trace.say(&trace::Found::Noise(noise, worth));
+            problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth, averaged.clone());
+        }
+        Ok(Search { laws, problem, noise, stride, thinned, start, bests, fast, trace })
+    }
+}
+
+/// Which laws were selected, and where.
+fn remembered(laws: &[Law], terms: &[Term<'_>]) -> Vec<(usize, Vec<f64>)> {
+    terms
+        .iter()
+        .filter_map(|t| Some((laws.iter().position(|law| std::ptr::eq(law, t.law))?, t.places.clone())))
+        .collect()
+}
+
+/// Lines in every row, as averages would hide the fast ones, with their size in arcsec.
+fn lines_left(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Vec<(remainder::Line, f64)> {
+    let every = remainder::every_row(problem, selected, noise);
+    let rows = every.len();
+    remainder::lines(problem, &every, HIGHEST_ORDER)
+        .into_iter()
+        .filter(|line| line.power > remainder::line_limit(rows))
+        .map(|line| {
+            // In innovations of variance v a line of amplitude a has the power n a² / 4 v.
+            let size = noise.white * rows::rms(&every) * (2.0 * line.power / rows as f64).sqrt();
+            (line, size)
+        })
+        .filter(|(_, size)| *size > 0.25 * select::least_size(noise.white))
+        .collect()
+}

@@ -1,0 +1,577 @@
+//! From a file of measured rows to a verdict, the extended drive and its tables: what the command `diagnose` computes.
+//!
+//! ```text
+//! file -> Recording -> less what the model knows -> diagnose_extended -> Diagnosis, Extended
+//!                                                                            |
+//!         tables worth it? <- evaluate (sessions held out, read by the core) +-> drive-extended.toml
+//! ```
+//!
+//! [`Subject`] is what the rows are held against. [`read_rows`] and [`diagnose_rows`] come to the verdict; [`Diagnosed::extend`] makes the
+//! extended drive and its tables. Nothing is printed or written here.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use blake3::Hash;
+use flexspline::{ImageError, Table};
+use serde::Serialize;
+use thiserror::Error;
+
+use super::report::{Compensation, Diagnosis};
+use super::{DiagnosisError, Extended, Settings, diagnose_extended};
+use super::{blurred, channels, quieted, torque_zero, zeros};
+use crate::causes::CauseName;
+use crate::extension::{
+    Agreement, CauseEntry, Evaluation, EvaluationError, ExtendedTables, FoundGeometry, Model, Remake, TableSubject,
+    causes_to_toml, check_by_fem, evaluate, found_geometry,
+};
+use crate::measurement::{
+    ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Session, Treatment, parse, parse_degrees, read,
+    read_degrees,
+};
+use crate::nominal::Nominal;
+use crate::synthesize::Sizes;
+use flexspline_base::units::ARCSEC_PER_RAD;
+use flexspline_design::kernels::Kernels;
+use flexspline_design::tables::MadeTable;
+use flexspline_mechanics::drive::{Drive, DriveError, GeneratorKind};
+use flexspline_mechanics::mesh::MeshLevel;
+use flexspline_mechanics::stepping::{Method, SolveError, SolverSettings};
+
+/// Rows that are diagnosed at most: 1.5 GB of memory.
+const MOST_ROWS: usize = 1_000_000;
+
+/// What to look at where an error leaps so often that no row counts.
+const IS_IT_THIS_DRIVE: &str = "see that ratio, units and zeros of both angles are right and that the rows are of this drive; record it under a load that keeps one flank";
+
+/// What the FEM of an extended drive may differ by from the causes found, as a share of them, for these to be taken for shapes of it.
+const WORST_AGREEMENT: f64 = 0.5;
+
+/// Why a file was not diagnosed, or what was found not extended.
+#[derive(Debug, Error)]
+pub enum PipelineError {
+    /// The bytes are no table.
+    #[error("{0}")]
+    Image(ImageError),
+    /// The table is of another drive.
+    #[error(
+        "the table was made from the drive with BLAKE3 {of}, and --drive {drive} has {given}; give the drive that made the table, with \
+         every --set"
+    )]
+    OtherDrive {
+        /// Hash in the table.
+        of: String,
+        /// The drive given.
+        drive: String,
+        /// Its hash.
+        given: String,
+    },
+    /// The kernels are of another drive or generator.
+    #[error(
+        "found kernels of the {found} of the drive with BLAKE3 {found_of}, allowed: those of the {kind} of {of}, as the table's"
+    )]
+    OtherKernels {
+        /// Their generator.
+        found: GeneratorKind,
+        /// Their drive.
+        found_of: String,
+        /// The table's generator.
+        kind: GeneratorKind,
+        /// The table's drive.
+        of: String,
+    },
+    /// The rows cannot be read.
+    #[error(transparent)]
+    Read(#[from] MeasuredError),
+    /// What the model knows already does not fit the rows.
+    #[error("{0}")]
+    Known(String),
+    /// The rows cannot be diagnosed.
+    #[error(transparent)]
+    Diagnosis(#[from] DiagnosisError),
+    /// The causes make no drive.
+    #[error("the causes make no drive: {0}")]
+    NoDrive(#[from] DriveError),
+    /// The FEM of the extended drive does not converge.
+    #[error("the FEM of the extended drive: {0}")]
+    Fem(#[from] SolveError),
+    /// No table was made by FEM.
+    #[error("{0}")]
+    Remake(String),
+}
+
+impl PipelineError {
+    /// Whether the input is to blame, and not the run.
+    #[must_use]
+    pub const fn is_bad_input(&self) -> bool {
+        match self {
+            PipelineError::Image(_)
+            | PipelineError::OtherDrive { .. }
+            | PipelineError::OtherKernels { .. }
+            | PipelineError::Read(_)
+            | PipelineError::Known(_)
+            | PipelineError::Diagnosis(_) => true,
+            PipelineError::NoDrive(_) | PipelineError::Fem(_) | PipelineError::Remake(_) => false,
+        }
+    }
+}
+
+/// What measured rows are held against: a catalogue's model, or a table made by FEM; and the drive.
+pub struct Subject<'a> {
+    /// Nominal model.
+    pub nominal: Nominal,
+    /// The table that takes its place in the prediction.
+    pub table: Option<Table<'a>>,
+    /// The model with the causes that it holds already.
+    pub model: Option<Model>,
+    /// The drive.
+    pub drive: Drive,
+    /// Its generator.
+    pub kind: GeneratorKind,
+}
+
+impl<'a> Subject<'a> {
+    /// A drive known from its catalogue, or extended before.
+    #[must_use]
+    pub fn of_model(model: Model, drive: Drive, kind: GeneratorKind) -> Subject<'static> {
+        Subject { nominal: model.nominal.clone(), table: None, model: Some(model), drive, kind }
+    }
+
+    /// A drive with its table.
+    ///
+    /// # Errors
+    /// The bytes are no table, or that of another drive.
+    pub fn of_table(image: &'a [u8], drive: Drive, kind: GeneratorKind) -> Result<Subject<'a>, PipelineError> {
+        let table = Table::check(image).map_err(PipelineError::Image)?;
+        if table.drive_hash() != drive.hash() {
+            let hex = |hash| Hash::from(hash).to_hex().to_string();
+            let (of, given) = (hex(table.drive_hash()), hex(drive.hash()));
+            return Err(PipelineError::OtherDrive { of, drive: drive.name, given });
+        }
+        Ok(Subject { nominal: Nominal::of_table(&table), table: Some(table), model: None, drive, kind })
+    }
+
+    /// With the influence kernels of the drive.
+    ///
+    /// # Errors
+    /// They are those of another drive or generator.
+    pub fn with_kernels(mut self, kernels: Kernels) -> Result<Subject<'a>, PipelineError> {
+        let of = Hash::from(self.drive.hash()).to_hex().to_string();
+        if kernels.drive_blake3 != of || kernels.generator != self.kind {
+            let (found, found_of) = (kernels.generator, kernels.drive_blake3);
+            return Err(PipelineError::OtherKernels { found, found_of, kind: self.kind, of });
+        }
+        self.nominal.kernels = Some(Arc::new(kernels));
+        Ok(self)
+    }
+
+    /// What a table of the extended drive is made for: name of the drive, and hash of what made the nominal model.
+    fn table_subject(&self) -> TableSubject {
+        let model = || self.model.as_ref().map_or_else(String::new, Model::to_toml);
+        let hash = if self.table.is_some() { self.drive.hash() } else { *blake3::hash(model().as_bytes()).as_bytes() };
+        let name = if self.table.is_some() { self.drive.name.as_str() } else { "catalogue drive" };
+        TableSubject { kind: self.kind, drive: format!("{name}-extended"), hash }
+    }
+
+    /// Takes what the model says of causes known before from the errors.
+    fn take_away_known(&self, recording: &mut Recording) -> Result<(), PipelineError> {
+        let Some(model) = self.model.as_ref().filter(|model| !model.causes.is_empty()) else { return Ok(()) };
+        let added = model.added_arcsec(&recording.sessions, self.sizes()).map_err(PipelineError::Known)?;
+        for (session, added) in recording.sessions.iter_mut().zip(added) {
+            session.error_rad.iter_mut().zip(added).for_each(|(e, a)| *e -= a / ARCSEC_PER_RAD);
+        }
+        let names: Vec<&str> = model.causes.iter().map(|cause| cause.name.as_str()).collect();
+        recording.notes.push(format!("the model holds {} already; what is found is beyond that", names.join(", ")));
+        Ok(())
+    }
+
+    fn sizes(&self) -> Sizes {
+        Sizes {
+            pitch_radius_mm: self.drive.circular_spline.pitch_radius_mm(),
+            base_radius_mm: self.drive.circular_spline.base_radius_mm(),
+        }
+    }
+
+    fn against(&self) -> (&Nominal, Option<&Table<'a>>) {
+        (&self.nominal, self.table.as_ref())
+    }
+
+    /// The mesh of FEM runs: the one asked for, or that of the table.
+    fn mesh(&self, asked: Option<MeshLevel>) -> MeshLevel {
+        let of_table = || self.table.as_ref().and_then(|table| table.mesh_level().parse().ok());
+        asked.or_else(of_table).unwrap_or(MeshLevel::Coarse)
+    }
+}
+
+/// Makes a table of a drive by FEM; the caller knows how to show that it goes on.
+pub type MakeTable<'a> = dyn Fn(&Drive, GeneratorKind, MeshLevel) -> Result<MadeTable, String> + 'a;
+
+/// How a file is diagnosed.
+#[derive(Clone, Copy, Default)]
+pub struct Options<'a> {
+    /// Says on stderr what is tried.
+    pub verbose: bool,
+    /// A cause that is asked about.
+    pub asked: Option<CauseName>,
+    /// Makes extended tables by FEM; else they are sampled from the extended model.
+    pub remake: Option<&'a MakeTable<'a>>,
+    /// Mesh of FEM runs; else that of the table.
+    pub mesh: Option<MeshLevel>,
+}
+
+/// Measured rows with all that is said of them.
+pub struct Diagnosed {
+    /// The rows, what the model knew taken away.
+    pub recording: Recording,
+    /// The verdict; its compensation is what the core leaves in sessions held out.
+    pub diagnosis: Diagnosis,
+    /// The extended model.
+    pub extended: Extended,
+    /// Compensation by session held out; or why there is none.
+    pub evaluation: Result<Evaluation, EvaluationError>,
+}
+
+/// Reads the rows of a file, takes away what the model knows already, and averages rows that are too many.
+///
+/// # Errors
+/// The rows cannot be read, or do not fit what the model knows.
+pub fn read_rows(path: &Path, columns: &ColumnMap, subject: &Subject<'_>) -> Result<Recording, PipelineError> {
+    let gear = subject.nominal.gear();
+    rows_of(subject, || read(path, columns, &gear), || read_degrees(path, columns, &gear))
+}
+
+/// The same of rows that stand in memory: `bytes` of a file called `file`.
+///
+/// # Errors
+/// As [`read_rows`].
+pub fn parse_rows(
+    file: &str,
+    bytes: &[u8],
+    columns: &ColumnMap,
+    subject: &Subject<'_>,
+) -> Result<Recording, PipelineError> {
+    let gear = subject.nominal.gear();
+    rows_of(subject, || parse(file, bytes, columns, &gear), || parse_degrees(file, bytes, columns, &gear))
+}
+
+/// Rows in radians, or the same in degrees where that is what they are.
+fn rows_of(
+    subject: &Subject<'_>,
+    in_radians: impl FnOnce() -> Result<Recording, MeasuredError>,
+    in_degrees: impl FnOnce() -> Result<Recording, MeasuredError>,
+) -> Result<Recording, PipelineError> {
+    let mut recording = in_radians()?;
+    subject.take_away_known(&mut recording)?;
+    let (nominal, table) = subject.against();
+    if channels::may_be_in_degrees(&recording, nominal, table) {
+        // What cannot be read in degrees is none.
+        if let Ok(mut converted) = in_degrees()
+            && subject.take_away_known(&mut converted).is_ok()
+            && channels::is_explained(&converted, nominal, table)
+        {
+            recording = converted;
+        }
+    }
+    recording.unusable = channels::check_torque(&mut recording, nominal, table);
+    if recording.unusable.is_none() && nominal.wind_up_arcsec(1.0) != 0.0 {
+        recording.unusable = without_torque(&recording);
+    }
+    recording.notes.extend(quieted::torque(&mut recording.sessions, &subject.nominal));
+    if recording.unusable.is_none() {
+        blurred::check(&mut recording, &subject.nominal, subject.table.as_ref());
+        torque_zero::check(&mut recording, &subject.nominal, subject.table.as_ref());
+    }
+    recording.average_to(MOST_ROWS);
+    Ok(recording)
+}
+
+/// Why nothing can be said of the unit where a torque was recorded and nearly all of it is lost.
+fn without_torque(recording: &Recording) -> Option<String> {
+    let gone = recording.sessions.iter().all(|session| session.torque_n_m.is_none());
+    let lost = |fault: &&Fault| fault.name == FaultName::FrozenChannel && fault.channel == Some(Quantity::Torque);
+    recording.faults.iter().filter(|_| gone).find(lost).map(|fault| fault.what.clone())
+}
+
+/// Diagnoses rows, and says what the core leaves of their error with tables of what was found. `progress(done, of, what)` is told how far
+/// it is.
+///
+/// # Errors
+/// The rows cannot be diagnosed; a table that was to be made by FEM was not.
+pub fn diagnose_rows(
+    mut recording: Recording,
+    subject: &Subject<'_>,
+    options: &Options<'_>,
+    mut progress: impl FnMut(usize, usize, &str),
+) -> Result<Diagnosed, PipelineError> {
+    let settings = Settings {
+        verbose: options.verbose,
+        asked: options.asked,
+        pitch_radius_mm: subject.drive.circular_spline.pitch_radius_mm(),
+        ..Settings::default()
+    };
+    let (nominal, table) = subject.against();
+    let (mut diagnosis, extended) =
+        diagnose_extended(&recording.sessions, nominal, table, &settings, |done, of, what| {
+            progress(done, of + 1, what)
+        })?;
+    zeros::tell(&mut recording, &diagnosis.zeros);
+    if recording.unusable.is_some() {
+        // What makes them unusable is a channel that had to be left out.
+        let masked = |fault: &&Fault| fault.treatment == Treatment::Masked && fault.channel == Some(Quantity::Torque);
+        let advice =
+            recording.faults.iter().rfind(masked).map_or(FaultName::TorqueScale.advice(), |fault| fault.advice);
+        diagnosis.say_nothing_of_the_unit(advice);
+    } else if let Some(why) = diagnosis.set_aside.take() {
+        recording.notes.push(why.clone());
+        recording.unusable = Some(why);
+        diagnosis.say_nothing_of_the_unit(IS_IT_THIS_DRIVE);
+    }
+    progress(4, 5, "compensation by the core");
+    let table_subject = subject.table_subject();
+    let tables = tables_of(subject, &table_subject, &recording.sessions);
+    let causes: Vec<CauseName> = diagnosis.causes.iter().map(|cause| cause.name).collect();
+    let remake = |fitted: &Extended| -> Result<Option<Vec<u8>>, String> {
+        let Some(make) = options.remake else { return Ok(None) };
+        let entries: Vec<CauseEntry> = fitted.causes().iter().map(CauseEntry::of_fitted).collect();
+        let found = found_geometry(&subject.drive, fitted, &entries, (nominal, table), tables.orientation_rad)
+            .map_err(|error| error.to_string())?;
+        Ok(remade(make, subject, &found, options.mesh)?.map(|made| made.image))
+    };
+    let remake: Option<&Remake<'_>> = if options.remake.is_some() { Some(&remake) } else { None };
+    let settings = Settings { fineness: Some(extended.fineness), ..settings };
+    let evaluation = match evaluate(&recording.sessions, &causes, &tables, &settings, remake) {
+        // The FEM failed, or was stopped.
+        Err(EvaluationError::Remake(what)) => return Err(PipelineError::Remake(what)),
+        evaluation => evaluation,
+    };
+    if let Ok(evaluation) = &evaluation {
+        diagnosis.compensation = Compensation {
+            rms_uncompensated_arcsec: evaluation.rms_uncompensated_arcsec,
+            rms_nominal_tables_arcsec: evaluation.rms_nominal_tables_arcsec,
+            rms_extended_tables_arcsec: evaluation.rms_extended_tables_arcsec,
+        };
+    }
+    Ok(Diagnosed { recording, diagnosis, extended, evaluation })
+}
+
+/// What became of the causes, as it stands in `diagnosis.json`.
+#[derive(Default, Serialize)]
+pub struct Extension {
+    /// Files written beside diagnosis.json.
+    pub files: Vec<String>,
+    /// Why extended tables were not written.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tables_not_written: Option<String>,
+    /// Identity of the extended table.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub table_id: Option<String>,
+    /// Whether the extended tables are of the FEM of the extended drive; else they are sampled from the extended model.
+    pub tables_by_fem: bool,
+    /// Fields of the drive that hold causes.
+    pub drive_fields: Vec<String>,
+    /// What the FEM of that drive says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fem_agreement: Option<Agreement>,
+    /// Causes that stand in `[extension]` of drive-extended.toml.
+    pub named_causes: Vec<CauseName>,
+    /// Compensation by session held out, and which causes are in the tables.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub compensation: Option<Evaluation>,
+}
+
+/// The extended drive and its tables, where they are worth it.
+#[derive(Default)]
+pub struct Made {
+    /// What became of the causes; no file is written yet.
+    pub extension: Extension,
+    /// `drive-extended.toml`; none where no cause was found.
+    pub drive_toml: Option<String>,
+    /// The extended table.
+    pub table: Option<MadeTable>,
+}
+
+/// `diagnosis.json`: the diagnosis, the faults of the data and what was written.
+#[derive(Serialize)]
+pub struct DiagnosisFile<'a> {
+    #[serde(flatten)]
+    diagnosis: &'a Diagnosis,
+    extension: &'a Extension,
+    data_faults: &'a [Fault],
+    notes: &'a [String],
+    command: &'a str,
+}
+
+impl Diagnosed {
+    /// What `diagnosis.json` holds, with what became of the causes, and the command that asked.
+    #[must_use]
+    pub fn file<'a>(&'a self, extension: &'a Extension, command: &'a str) -> DiagnosisFile<'a> {
+        let Recording { faults, notes, .. } = &self.recording;
+        DiagnosisFile { diagnosis: &self.diagnosis, extension, data_faults: faults, notes, command }
+    }
+
+    /// Makes the extended drive, and the extended tables if they are worth it; nothing where no cause was found. `by_fem` is told before the
+    /// FEM of the drive begins.
+    ///
+    /// # Errors
+    /// The causes make no drive; the FEM of it does not converge.
+    pub fn extend(
+        &self,
+        subject: &Subject<'_>,
+        options: &Options<'_>,
+        by_fem: impl FnOnce(),
+    ) -> Result<Made, PipelineError> {
+        let mut extension = Extension {
+            tables_not_written: match &self.evaluation {
+                Ok(evaluation) => evaluation.worth_writing().err(),
+                Err(error) => Some(error.to_string()),
+            },
+            compensation: self.evaluation.as_ref().ok().cloned(),
+            ..Extension::default()
+        };
+        if self.diagnosis.causes.is_empty() {
+            return Ok(Made { extension, ..Made::default() });
+        }
+        let table_subject = subject.table_subject();
+        let tables = tables_of(subject, &table_subject, &self.recording.sessions);
+        let mut table: Option<MadeTable> = None;
+        let drive_toml = match &subject.model {
+            Some(known) => {
+                let mut model = Model::of_diagnosis(&subject.nominal, &self.diagnosis);
+                model.causes.splice(0..0, known.causes.iter().cloned());
+                extension.named_causes = model.causes.iter().map(|cause| cause.name).collect();
+                model.to_toml()
+            }
+            None => {
+                let found = self.geometry(subject, &tables, options, by_fem, &mut extension)?;
+                extension.drive_fields = found.mapped.iter().flat_map(|mapped| mapped.fields.clone()).collect();
+                extension.named_causes = found.rest.iter().map(|cause| cause.name).collect();
+                if let (Some(make), None) = (options.remake, &extension.tables_not_written) {
+                    table = remade(make, subject, &found, options.mesh).map_err(PipelineError::Remake)?;
+                    extension.tables_by_fem = table.is_some();
+                }
+                found.drive.to_toml() + &causes_to_toml(&found.rest)
+            }
+        };
+        if extension.tables_not_written.is_none() && table.is_none() {
+            match tables.extended(&self.extended) {
+                Ok(made) => table = Some(made),
+                Err(error) => extension.tables_not_written = Some(error.to_string()),
+            }
+        }
+        extension.table_id = table.as_ref().map(|made| made.info.table_id.clone());
+        Ok(Made { extension, drive_toml: Some(drive_toml), table })
+    }
+
+    /// The drive with the causes that are geometry, as far as the FEM bears them out.
+    fn geometry(
+        &self,
+        subject: &Subject<'_>,
+        tables: &ExtendedTables<'_>,
+        options: &Options<'_>,
+        by_fem: impl FnOnce(),
+        extension: &mut Extension,
+    ) -> Result<FoundGeometry, PipelineError> {
+        let of = subject.against();
+        let causes: Vec<CauseEntry> = self.diagnosis.causes.iter().map(CauseEntry::of).collect();
+        let found = found_geometry(&subject.drive, &self.extended, &causes, of, tables.orientation_rad)?;
+        if !found.mapped.iter().any(|mapped| mapped.by_angle) {
+            return Ok(found);
+        }
+        by_fem();
+        let settings =
+            SolverSettings { method: Method::Fast, mesh: subject.mesh(options.mesh), ..SolverSettings::default() };
+        let drives = (&subject.drive, &found);
+        let agreement = check_by_fem(drives, subject.kind, settings, &self.extended, of, tables.orientation_rad)?;
+        extension.fem_agreement = Some(agreement);
+        if agreement.difference_rms_arcsec < WORST_AGREEMENT * agreement.found_rms_arcsec {
+            return Ok(found);
+        }
+        // The FEM of such a drive does something else: the causes are kept by name, not as a shape that is not theirs.
+        let (shapes, others): (Vec<CauseEntry>, Vec<CauseEntry>) = causes
+            .into_iter()
+            .partition(|cause| found.mapped.iter().any(|mapped| mapped.by_angle && mapped.cause == cause.name));
+        let mut without = found_geometry(&subject.drive, &self.extended, &others, of, tables.orientation_rad)?;
+        without.rest.splice(0..0, shapes);
+        Ok(without)
+    }
+}
+
+/// The table of the extended drive by FEM, if the drive holds all that a table can.
+fn remade(
+    make: &MakeTable<'_>,
+    subject: &Subject<'_>,
+    found: &FoundGeometry,
+    mesh: Option<MeshLevel>,
+) -> Result<Option<MadeTable>, String> {
+    // What is in no field of the drive would be missing in a table by FEM.
+    if found.rest.iter().any(|cause| cause.name.no_place_in_a_table().is_none()) {
+        return Ok(None);
+    }
+    make(&found.drive, subject.kind, subject.mesh(mesh)).map(Some)
+}
+
+/// Tables of the extended model over what the rows hold: their largest torque, their temperatures, the angle against gravity if it stays.
+fn tables_of<'a>(subject: &'a Subject<'_>, of: &'a TableSubject, sessions: &[Session]) -> ExtendedTables<'a> {
+    let all = |column: fn(&Session) -> Option<&Vec<f64>>| {
+        sessions.iter().filter_map(column).flatten().copied().fold(None, |range: Option<[f64; 2]>, value| {
+            Some(range.map_or([value; 2], |[low, high]| [low.min(value), high.max(value)]))
+        })
+    };
+    let torque = all(|s| s.torque_n_m.as_ref()).unwrap_or([0.0; 2]);
+    let temperature = all(|s| s.temperature_c.as_ref()).unwrap_or([subject.nominal.temperature_c; 2]);
+    let orientation = all(|s| s.orientation_rad.as_ref());
+    ExtendedTables {
+        nominal: &subject.nominal,
+        table: subject.table.as_ref(),
+        subject: of,
+        torque_n_m: torque[0].abs().max(torque[1].abs()),
+        temperatures_c: temperature,
+        orientation_rad: match orientation {
+            Some([low, high]) if high - low > 1e-3 => None,
+            Some([low, _]) => Some(low),
+            None => None,
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnosis::report::Finding;
+    use crate::synthesize::catalogue_drive;
+
+    /// The finding, the notes and the diagnosis on terminal of a drive under 12 N·m, one way, with this error beside what its model says, arcsec.
+    fn found(error_arcsec: impl Fn(f64) -> f64) -> (Finding, Vec<String>, String) {
+        let nominal = catalogue_drive();
+        let model = Model { nominal: nominal.clone(), causes: Vec::new() };
+        let subject = Subject::of_model(model, Drive::hhd_95(), GeneratorKind::Cam);
+        let mut text = "time_s,generator_rad,error_arcsec,torque_n_m\n".to_owned();
+        let mut random = fastrand::Rng::with_seed(5);
+        for k in 0..1800 {
+            let psi = 0.06 * f64::from(k);
+            let load = nominal.wind_up_arcsec(12.0) + 0.5 * nominal.backlash_arcsec + nominal.harmonics_arcsec(psi);
+            let error = load + error_arcsec(psi) + 2.0 * (random.f64() - 0.5);
+            text += &format!("{:.2},{psi:.6},{error:.4},12\n", 0.01 * f64::from(k));
+        }
+        let recording = parse_rows("gear.csv", text.as_bytes(), &ColumnMap::default(), &subject).unwrap();
+        let done = diagnose_rows(recording, &subject, &Options::default(), |_, _, _| {}).unwrap();
+        (done.diagnosis.finding, done.recording.notes.clone(), done.diagnosis.text())
+    }
+
+    #[test]
+    fn rows_that_are_all_set_aside_are_no_sound_drive() {
+        let spur =
+            |amplitude: f64, rad: f64| move |psi: f64| amplitude * (psi / rad * std::f64::consts::PI).sin().signum();
+        for (amplitude, rad) in [(1280.0, 6.0), (1280.0, 2.0), (4000.0, 9.0)] {
+            let (finding, notes, text) = found(spur(amplitude, rad));
+            if finding != Finding::NotUnderstood && finding != Finding::FaultFound {
+                assert_eq!(finding, Finding::DataUnusable, "{text}");
+                assert!(notes.iter().any(|note| note.contains("rows are left to judge by")), "{notes:?}");
+                assert!(!text.contains("-0.00"), "{text}");
+            }
+        }
+        let (finding, notes, _) = found(|_| 0.0);
+        assert_eq!(finding, Finding::NothingFound);
+        assert!(!notes.iter().any(|note| note.contains("judge by")), "{notes:?}");
+    }
+}

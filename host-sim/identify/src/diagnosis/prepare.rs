@@ -1,0 +1,450 @@
+//! What has to be known before causes are compared: how noisy the data are, and where they jump.
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use flexspline::Table;
+use rayon::prelude::*;
+
+use super::LEAST_ROWS;
+use super::averaged::{Averaged, Grain};
+use super::base::{Base, Floating, NEAR_FRICTION, few};
+use super::candidate::{Column, Excitation, Law, Tolerance};
+use super::linear::{Gram, Prior, solve};
+use super::model::{Problem, Term};
+use super::noise::{Noise, Whitener, white_level};
+use super::report::Finding;
+use super::rows::{Rows, quantile, rms, robust_std};
+use crate::nominal::Nominal;
+use flexspline_base::units::ARCSEC_PER_TURN;
+
+/// Averages used to find the wander, about.
+const WANDER_AVERAGES: usize = 2500;
+/// Rows before and after a jump whose medians are compared.
+const BESIDE: usize = 12;
+/// Least height of what is taken for a jump before anything else is known, arcsec.
+const LEAST_JUMP: f64 = 1000.0;
+
+/// The nominal model over the rows, and the jumps: these are taken out before the law of the play is chosen.
+#[must_use]
+pub fn base(rows: &Rows, nominal: &Nominal, table: Option<&Table<'_>>) -> (Base, Vec<Jump>) {
+    let base = Base::new(rows, nominal, table);
+    let jumps = jumps(rows, &base, nominal);
+    if jumps.is_empty() {
+        return (base, jumps);
+    }
+    let mut level = rows.clone();
+    for jump in &jumps {
+        for (error, time) in level.error.iter_mut().zip(&rows.time) {
+            *error -= jump.reached(*time);
+        }
+    }
+    let play = Base::new(&level, nominal, table).law;
+    (Base::with_play(rows, nominal, table, play), jumps)
+}
+
+/// A change of the error to another level.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Jump {
+    /// When it begins, has half its height, and is over, s.
+    pub time_s: [f64; 3],
+    /// Height, arcsec.
+    pub height_arcsec: f64,
+}
+
+impl Jump {
+    /// What it has added at a time (s), arcsec: all of it from where it has half its height on.
+    #[must_use]
+    pub fn reached(&self, time_s: f64) -> f64 {
+        if time_s >= self.time_s[1] { self.height_arcsec } else { 0.0 }
+    }
+}
+
+/// Where the error leaves for another level: at once, or, where that shows no whole pitches, while the wave passes (half a turn of the
+/// generator): so long teeth take to climb over each other. Where the load rings after that, the level is what it rings about.
+#[must_use]
+pub fn jumps(rows: &Rows, base: &Base, nominal: &Nominal) -> Vec<Jump> {
+    let left: Vec<f64> = rows.error.iter().zip(&base.prediction).map(|(e, p)| e - p).collect();
+    let whole = |found: &[Jump]| {
+        !found.is_empty() && found.iter().all(|jump| whole_pitches(nominal, jump.height_arcsec).is_some())
+    };
+    let at_once = jumps_within(rows, &left, 0.0, 0.0);
+    if whole(&at_once) {
+        return at_once;
+    }
+    let others = [(PI, 0.0), (0.0, RINGING_S), (PI, RINGING_S)];
+    let mut found = others.iter().map(|(turned_rad, level_s)| jumps_within(rows, &left, *turned_rad, *level_s));
+    found.find(|found| whole(found)).unwrap_or(at_once)
+}
+
+/// How many pitches of either wheel a jump is, if it is a whole number of them.
+#[must_use]
+pub fn whole_pitches(nominal: &Nominal, height_arcsec: f64) -> Option<f64> {
+    let teeth = nominal.teeth?;
+    [teeth.circular_spline, teeth.flexspline].into_iter().find_map(|count| {
+        let pitch = ARCSEC_PER_TURN / f64::from(count);
+        let pitches = (height_arcsec / pitch).round();
+        let near = (height_arcsec - pitches * pitch).abs() < PITCH_SHARE * pitch * pitches.abs() + PITCH_ARCSEC;
+        (pitches != 0.0 && near).then_some(pitches)
+    })
+}
+
+/// Jumps that are over after [`JUMPING_S`] and after the generator has turned by `turned_rad`, to the level of `level_s` from there on.
+fn jumps_within(rows: &Rows, left: &[f64], turned_rad: f64, level_s: f64) -> Vec<Jump> {
+    let last = rows.len().saturating_sub(1);
+    let middle = |range: std::ops::Range<usize>| quantile(range.map(|k| left[k]), 0.5);
+    // First row of the level before, first row after the jump begins, row at rest, height.
+    let mut found: Vec<[usize; 3]> = Vec::new();
+    let mut heights: Vec<f64> = Vec::new();
+    let mut before_gap: Option<usize> = None;
+    for session in rows.sessions_used() {
+        // Teeth slide into the next space, and the output swings out: what counts is where it comes to rest. At the end of a
+        // recording the next one says where.
+        let mut rest = session.start;
+        for k in session.clone() {
+            let from = k.saturating_sub(1).max(session.start);
+            let over = |row: usize| {
+                rows.time[row] - rows.time[from] >= JUMPING_S && rows.travel[row] - rows.travel[from] >= turned_rad
+            };
+            while rest < session.end && rest - from < MOST_ROWS_OF_A_JUMP && !over(rest) {
+                rest += 1;
+            }
+            let begins =
+                if k == session.start { before_gap } else { Some(k.saturating_sub(BESIDE).max(session.start)) };
+            let (Some(begins), at_rest) = (begins, rest.min(last)) else { continue };
+            if (left[at_rest] - left[k - 1]).abs() < 0.5 * LEAST_JUMP {
+                continue;
+            }
+            let level = (at_rest..rows.len()).take_while(|row| {
+                *row < at_rest + BESIDE || *row < session.end && rows.time[*row] < rows.time[at_rest] + level_s
+            });
+            let height = quantile(level.map(|row| left[row]), 0.5) - middle(begins..k);
+            if height.abs() > LEAST_JUMP {
+                found.push([begins, k, at_rest]);
+                heights.push(height);
+            }
+        }
+        before_gap = Some(session.end.saturating_sub(BESIDE).max(session.start));
+    }
+    // Rows one after another that see the same one: the one that sees the most of it; the first where all later ones see it ring.
+    let mut seen: Vec<(usize, usize)> = Vec::new();
+    for k in 0..found.len() {
+        let row = found[k][1];
+        let same =
+            |best: usize, latest: usize| row - latest < BESIDE || rows.time[row] - rows.time[found[best][1]] < level_s;
+        match seen.last_mut() {
+            Some((best, latest)) if same(*best, *latest) => {
+                *latest = row;
+                if level_s == 0.0 && heights[k].abs() > heights[*best].abs() {
+                    *best = k;
+                }
+            }
+            _ => seen.push((k, row)),
+        }
+    }
+    seen.into_iter()
+        .map(|(best, _)| {
+            let ([begins, from, at_rest], height_arcsec) = (found[best], heights[best]);
+            let level = middle(begins..from);
+            let passed = |share: f64| {
+                let beyond = |k: &usize| (left[*k] - level) * height_arcsec.signum() > share * height_arcsec.abs();
+                rows.time[(from..=at_rest).find(beyond).unwrap_or(at_rest)]
+            };
+            Jump { time_s: [passed(0.02), passed(0.5), passed(0.98)], height_arcsec }
+        })
+        .collect()
+}
+
+/// Rows whose flank is not known well, with what the causes chosen add to the load, and those in which the output `hung` in the clearance.
+#[must_use]
+pub fn uncertain(on: &Excitation<'_>, terms: &[Term<'_>], hung: &[bool]) -> Vec<bool> {
+    let mut uncertain = on.base.uncertain.clone();
+    // A jump passes over some rows, and the output swings out.
+    for jump in &on.scales.jumps {
+        let ([begins, _, over], beside) = (jump.time_s, JUMPING_S.max(BESIDE as f64 * on.rows.period));
+        for (doubtful, time) in uncertain.iter_mut().zip(&on.rows.time) {
+            *doubtful |= (begins - beside..over + beside).contains(time);
+        }
+    }
+    let mut with = uncertain.clone();
+    with.iter_mut().zip(hung).for_each(|(doubtful, hung)| *doubtful |= hung);
+    if few(&with) {
+        uncertain = with;
+    }
+    let without = uncertain.clone();
+    for term in terms {
+        let Some(added) = term.law.load(on, &term.values()) else { continue };
+        for (k, doubtful) in uncertain.iter_mut().enumerate() {
+            let near = NEAR_FRICTION * on.nominal.friction_torque_n_m + LOAD_UNKNOWN * added[k].abs();
+            *doubtful |= (on.rows.torque[k] + added[k]).abs() < near;
+        }
+    }
+    if few(&uncertain) { uncertain } else { without }
+}
+
+/// Where a drive is found sound, no more than this share of its rows may have been set aside. *Guess*: by definition most of them must count.
+const MOST_SET_ASIDE: f64 = 0.5;
+
+/// Why the rows that count say nothing of the unit, if too few of them do. What was found in spite of that is the trouble itself, and stands as long
+/// as there are rows to judge it by.
+#[must_use]
+pub fn too_few_left(problem: &Problem<'_>, finding: Finding) -> Option<String> {
+    let rows = problem.on.rows;
+    let used = rows.count_used();
+    let left = rows.sessions_used().flatten().filter(|k| !problem.uncertain[*k]).count();
+    let none_left = left < LEAST_ROWS || !problem.certain.contains(&true);
+    let most_gone = left as f64 <= (1.0 - MOST_SET_ASIDE) * used as f64 && finding == Finding::NothingFound;
+    if !none_left && !most_gone {
+        return None;
+    }
+    let jumps = &problem.on.scales.jumps;
+    let why = match jumps.iter().map(|jump| jump.height_arcsec.abs()).reduce(f64::max) {
+        Some(largest) => {
+            let often = if jumps.len() == 1 { "once".to_owned() } else { format!("{} times", jumps.len()) };
+            format!("the error leaps {often}, by {largest:.0} arcsec at most, and rows about a leap do not count")
+        }
+        None => "nobody knows on which flank the drive stands in the others".to_owned(),
+    };
+    Some(format!("{left} of {used} rows are left to judge by: {why}"))
+}
+
+/// A jump is over after this time, s, and after so many rows.
+const JUMPING_S: f64 = 0.15;
+const MOST_ROWS_OF_A_JUMP: usize = 2000;
+/// A load rings about its new level for so long that its median is that level, s.
+const RINGING_S: f64 = 4.0;
+/// A jump is of whole pitches within this share, and this many arcsec that the rest of the error may move meanwhile.
+const PITCH_SHARE: f64 = 0.004;
+const PITCH_ARCSEC: f64 = 100.0;
+/// A load that a cause adds is known to this share.
+const LOAD_UNKNOWN: f64 = 0.2;
+
+/// Largest wander that is tried, in units of the white noise.
+pub(super) const MOST_WANDER: f64 = 3.0;
+/// Shortest correlation time of a wander that is tried, s.
+const FASTEST_S: f64 = 2.5;
+
+/// Evidence (natural logarithm of the ratio) within which one wander is as likely as another.
+const AS_LIKELY: f64 = 0.5;
+
+/// Innovations beyond so many of their robust standard deviations are no noise, whatever it is…
+const NO_NOISE: f64 = 8.0;
+/// …as long as they are rare: at most this share.
+const RARE: f64 = 0.1;
+
+/// Everything that laws could explain, as free columns; of laws and rows alone, whatever is known of the noise.
+pub struct FreeColumns {
+    /// Averages of so many rows.
+    stride: usize,
+    /// Laws that they are of.
+    laws: usize,
+    columns: Vec<Vec<f64>>,
+    priors: Vec<Prior>,
+}
+
+impl FreeColumns {
+    /// Main columns of laws, at some places of their shape parameters. Smooth laws are evaluated on `averaged`, if there is any.
+    #[must_use]
+    pub fn of(on: &Excitation<'_>, laws: &[Law], averaged: Option<Arc<Averaged>>) -> FreeColumns {
+        let finest = averaged.as_ref().map_or(1, |averaged| averaged.stride());
+        let stride = finest * on.rows.count_used().div_ceil(WANDER_AVERAGES * finest).max(1);
+        let plain = Whitener::plain(on.rows, &vec![false; on.rows.len()], stride, 1.0);
+        let grain = Grain::new(averaged, &plain);
+        let (columns, priors) = free_columns(on, laws, &plain, &grain).into_iter().unzip();
+        FreeColumns { stride, laws: laws.len(), columns, priors }
+    }
+
+    /// Whether they are still those of the laws.
+    #[must_use]
+    pub fn are_of(&self, laws: &[Law]) -> bool {
+        self.laws == laws.len()
+    }
+}
+
+/// White noise and wander, with everything a law could explain taken out: each hypothesis of the wander is judged by its evidence
+/// with the main columns of all laws as free columns. Returns also the worth of the information: below 1 where innovations are
+/// not white. `explained` is what is explained already, row by row; `near` is what was found before.
+#[must_use]
+pub fn noise(
+    on: &Excitation<'_>,
+    columns: &FreeColumns,
+    explained: &[f64],
+    uncertain: &[bool],
+    near: Option<Noise>,
+) -> (Noise, f64) {
+    let rows = on.rows;
+    let left: Vec<f64> =
+        (0..rows.len()).map(|k| rows.error[k] - on.base.prediction[k] - explained.get(k).unwrap_or(&0.0)).collect();
+    let white = white_level(rows, &left);
+    let stride = columns.stride;
+    let plain = Whitener::plain(rows, uncertain, stride, white);
+    let free = Free { columns: &columns.columns, priors: &columns.priors, data: plain.average(&left) };
+    let unit = if rows.recorded.time { 1.0 } else { 100.0 * rows.period };
+    let hypotheses = hypotheses(white, unit);
+    // Rows that a flank turned over too early or a ringing throws out are no noise: they would make a fast wander of it.
+    let uncertain = match free.judge(plain) {
+        Some(judged) => thrown_out(&judged, uncertain),
+        None => uncertain.to_vec(),
+    };
+    let mut judged: Vec<Option<Judged>> = hypotheses.iter().map(|_| None).collect();
+    // Some cannot be judged: each is asked once.
+    let mut asked = vec![false; hypotheses.len()];
+    let mut best = 0;
+    let mut next = match near {
+        Some(near) => beside(nearest(&hypotheses, near)),
+        None => FIRST.to_vec(),
+    };
+    // From a few up the evidence, until all beside the best have been judged.
+    while !next.is_empty() {
+        let judge = |k: &usize| (*k, free.judge(Whitener::new(rows, &uncertain, stride, hypotheses[*k])));
+        for (k, of) in next.par_iter().map(judge).collect::<Vec<_>>() {
+            judged[k] = of;
+            asked[k] = true;
+        }
+        let evidence = |k: usize| judged[k].as_ref().map_or(f64::NEG_INFINITY, |judged| judged.evidence);
+        let likeliest = (0..judged.len()).max_by(|a, b| evidence(*a).total_cmp(&evidence(*b))).unwrap_or(0);
+        // A short recording does not tell a wander from none: then what it could hide is no cause.
+        let power = |k: &usize| hypotheses[*k].wander * hypotheses[*k].correlation_s.sqrt();
+        best = (0..judged.len())
+            .filter(|k| evidence(*k) >= evidence(likeliest) - AS_LIKELY)
+            .max_by(|a, b| power(a).total_cmp(&power(b)))
+            .unwrap_or(0);
+        next = [beside(likeliest), beside(best)].concat();
+        next.sort_unstable();
+        next.dedup();
+        next.retain(|k| !asked[*k]);
+    }
+    // As restless as this no sensor is: what is left is a cause. On a drive without load it is one that turns flanks over, which a wander
+    // that follows everything would hide.
+    let restless = on.unloaded()
+        && hypotheses[best].wander >= MOST_WANDER * white
+        && hypotheses[best].correlation_s <= FASTEST_S * unit;
+    if restless {
+        best = hypotheses.len() - 1;
+        judged[best] = free.judge(Whitener::new(rows, &uncertain, stride, hypotheses[best]));
+    }
+    let worth = judged[best].as_ref().map_or(1.0, |judged| worth_of(&judged.innovations, &judged.whitener));
+    (hypotheses[best], worth)
+}
+
+/// Wanders that are tried, in units of the white noise, and their correlation times, s. A wander is slow: what is faster is a line, or a
+/// cause.
+const WANDERS: [f64; 8] = [0.1, 0.2, 0.3, 0.45, 0.7, 1.0, 1.5, MOST_WANDER];
+const CORRELATIONS_S: [f64; 4] = [FASTEST_S, 8.0, 25.0, 80.0];
+
+/// White noise alone, and with each wander that is tried, wander by wander.
+fn hypotheses(white: f64, unit: f64) -> Vec<Noise> {
+    let with =
+        |wander: f64, correlation: f64| Noise { white, wander: wander * white, correlation_s: correlation * unit };
+    let all = WANDERS.iter().flat_map(|wander| CORRELATIONS_S.map(|correlation| with(*wander, correlation)));
+    [Noise { white, wander: 0.0, correlation_s: 1.0 }].into_iter().chain(all).collect()
+}
+
+/// Hypotheses that are judged first: none, and the fastest and a slow one of three wanders.
+const FIRST: [usize; 7] = [0, 5, 7, 17, 19, 29, 31];
+
+/// A hypothesis and those beside it.
+fn beside(hypothesis: usize) -> Vec<usize> {
+    let width = CORRELATIONS_S.len();
+    let Some(at) = hypothesis.checked_sub(1) else { return (0..=width).collect() };
+    let (row, column) = (at / width, at % width);
+    let around = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
+    let grid =
+        around(row, WANDERS.len()).flat_map(|row| around(column, width).map(move |column| 1 + row * width + column));
+    if row == 0 { [0].into_iter().chain(grid).collect() } else { grid.collect() }
+}
+
+/// The hypothesis that is most like this one.
+fn nearest(hypotheses: &[Noise], noise: Noise) -> usize {
+    if noise.wander == 0.0 {
+        return 0;
+    }
+    let apart = |other: &Noise| {
+        let of = |a: f64, b: f64| (a / b).ln().abs();
+        of(other.wander / other.white, noise.wander / noise.white) + of(other.correlation_s, noise.correlation_s)
+    };
+    (1..hypotheses.len()).min_by(|a, b| apart(&hypotheses[*a]).total_cmp(&apart(&hypotheses[*b]))).unwrap_or(0)
+}
+
+/// Columns of what floats and of all laws at some places, averaged, with wide priors.
+fn free_columns(on: &Excitation<'_>, laws: &[Law], plain: &Whitener, grain: &Grain) -> Vec<(Vec<f64>, Prior)> {
+    let floating = |f: &Floating| (plain.average(&f.values), Prior { mean: 0.0, std: f.spread });
+    let of_law = |law: &Law| -> Vec<(Vec<f64>, Prior)> {
+        let tried = law.tried();
+        let spread = if tried.len() > 8 { tried.len() / 2 } else { (tried.len() / 4).max(1) };
+        let on = grain.excitation(law.smooth(), on);
+        let all = tried.iter().step_by(spread).flat_map(|places| law.lead_columns(&on, &law.values(places)));
+        let counts = |column: &Column| law.search.whole_beside_noise || matches!(column.tolerance, Tolerance::Main(_));
+        all.filter(counts)
+            .map(|column| {
+                let averaged = grain.average(law.smooth(), plain, &column.values);
+                let std = 20.0 / rms(&averaged).max(1e-9);
+                (averaged, Prior { mean: 0.0, std })
+            })
+            .collect()
+    };
+    let mut columns: Vec<(Vec<f64>, Prior)> = on.base.floating.iter().map(floating).collect();
+    columns.extend(laws.par_iter().with_max_len(1).map(of_law).collect::<Vec<_>>().into_iter().flatten());
+    columns
+}
+
+/// Everything a law could explain, and what there is to explain.
+struct Free<'c> {
+    columns: &'c [Vec<f64>],
+    priors: &'c [Prior],
+    data: Vec<f64>,
+}
+
+/// How well a hypothesis of the noise tells what is left.
+struct Judged {
+    evidence: f64,
+    innovations: Vec<f64>,
+    whitener: Whitener,
+}
+
+impl Free<'_> {
+    fn judge(&self, whitener: Whitener) -> Option<Judged> {
+        let mut all = whitener.whiten_each(self.columns);
+        all.push(whitener.whiten_averaged(&self.data));
+        let views: Vec<&[f64]> = all.iter().map(Vec::as_slice).collect();
+        let gram = Gram::of(&views, 0..self.data.len());
+        let solution = solve(&gram, self.priors, 1.0)?;
+        let mut innovations = all[self.columns.len()].clone();
+        for (column, c) in all.iter().zip(&solution.coefficients) {
+            for (i, v) in innovations.iter_mut().zip(column) {
+                *i -= c * v;
+            }
+        }
+        Some(Judged { evidence: solution.evidence - whitener.log_scale(), innovations, whitener })
+    }
+}
+
+/// Rows that were uncertain, and those of averages whose innovations are no noise, if rare.
+fn thrown_out(judged: &Judged, uncertain: &[bool]) -> Vec<bool> {
+    let spread = robust_std(judged.innovations.iter().copied());
+    let beyond: Vec<f64> =
+        judged.innovations.iter().map(|i| f64::from(u8::from(i.abs() > NO_NOISE * spread))).collect();
+    if beyond.iter().sum::<f64>() > RARE * beyond.len() as f64 {
+        return uncertain.to_vec();
+    }
+    let thrown = judged.whitener.in_rows(&beyond, uncertain.len());
+    uncertain.iter().zip(thrown).map(|(doubtful, thrown)| *doubtful || thrown > 0.0).collect()
+}
+
+/// Worth of innovations that should be white with unit variance: the inverse of the variance of their sums over blocks.
+fn worth_of(innovations: &[f64], whitener: &Whitener) -> f64 {
+    let mut worst: f64 = 1.0;
+    for length in [1usize, 5, 20] {
+        let mut sums = Vec::new();
+        for session in &whitener.sessions {
+            for block in innovations[session.clone()].chunks_exact(length) {
+                sums.push(block.iter().sum::<f64>() / (length as f64).sqrt());
+            }
+        }
+        if sums.len() >= 30 {
+            let spread = robust_std(sums.into_iter());
+            worst = worst.max(spread * spread);
+        }
+    }
+    (1.0 / worst).clamp(0.05, 1.0)
+}

@@ -1,0 +1,294 @@
+//! The rows of all sessions in one place, with what follows from them: speed, direction, travel, and angles on each wheel.
+
+use std::ops::Range;
+
+use crate::measurement::{Session, quantile_of};
+use crate::nominal::{Fixed, Nominal};
+use flexspline_base::units::ARCSEC_PER_RAD;
+
+/// Four rows around one say where it was as long as they span no more than so many times what the inner two do.
+const FAR_APART: f64 = 4.0;
+
+/// Which columns were recorded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Recorded {
+    /// Time.
+    pub time: bool,
+    /// Torque.
+    pub torque: bool,
+    /// Temperature.
+    pub temperature: bool,
+    /// Orientation.
+    pub orientation: bool,
+}
+
+/// Rows of all sessions one after another; all vectors have the same length.
+#[derive(Clone, Debug, Default)]
+pub struct Rows {
+    /// Where each session stands; a session without rows is empty.
+    pub sessions: Vec<Range<usize>>,
+    /// Which sessions are learnt from. The others have a history (time, travel, temperature) all the same.
+    pub used: Vec<bool>,
+    /// What was recorded.
+    pub recorded: Recorded,
+    /// Time, s; row numbers where it was not recorded.
+    pub time: Vec<f64>,
+    /// Time since the session began, s.
+    pub since: Vec<f64>,
+    /// Generator angle, rad.
+    pub generator: Vec<f64>,
+    /// Output error, arcsec.
+    pub error: Vec<f64>,
+    /// Load torque, N·m; 0 where it was not recorded.
+    pub torque: Vec<f64>,
+    /// Temperature, °C; nominal where it was not recorded.
+    pub temperature: Vec<f64>,
+    /// Orientation, rad; 0 where it was not recorded.
+    pub orientation: Vec<f64>,
+    /// Generator speed, rad/s (rad per row without time).
+    pub speed: Vec<f64>,
+    /// Direction of the generator, ±1, held while it stands.
+    pub direction: Vec<f64>,
+    /// Generator travel since the first row, rad, sessions joined.
+    pub travel: Vec<f64>,
+    /// Nominal output angle, rad.
+    pub output: Vec<f64>,
+    /// Angle of the wave on the flexspline's material, rad.
+    pub on_flexspline: Vec<f64>,
+    /// Angle of the wave on the circular spline's material, rad.
+    pub on_circular_spline: Vec<f64>,
+    /// Noise of each row against that of a row of mean worth; 1 where all rows are alike.
+    pub loudness: Vec<f64>,
+    /// Whether angles are not read at one instant, so that rows differ in noise.
+    pub jitters: bool,
+    /// Time by which one angle may be read before the other on the mean, for all that is known of how they are read, s.
+    pub unsure_s: f64,
+    /// What rounding to a coarse resolution leaves in a row, one standard deviation, arcsec; 0 where noise blurs it.
+    pub rounding: f64,
+    /// Whether a row is a mean over some time: what swings in that time is not in it.
+    pub means: bool,
+    /// Sessions from which on the zero of the error is another one.
+    pub zeros: Vec<usize>,
+    /// Median sample period, s.
+    pub period: f64,
+}
+
+impl Rows {
+    /// Joins sessions; all are learnt from, but for those of three rows or fewer.
+    #[must_use]
+    pub fn new(sessions: &[Session], nominal: &Nominal) -> Rows {
+        let mut rows = Rows::default();
+        let all = |has: fn(&Session) -> bool| sessions.iter().all(has) && !sessions.is_empty();
+        rows.recorded = Recorded {
+            time: all(|s| s.time_s.is_some()),
+            torque: all(|s| s.torque_n_m.is_some()),
+            temperature: all(|s| s.temperature_c.is_some()),
+            orientation: all(|s| s.orientation_rad.is_some()),
+        };
+        let or = |column: &Option<Vec<f64>>, recorded: bool, len: usize, usual: f64| match column {
+            Some(values) if recorded => values.clone(),
+            _ => vec![usual; len],
+        };
+        for session in sessions {
+            let (from, len) = (rows.generator.len(), session.len());
+            rows.generator.extend(&session.generator_rad);
+            rows.error.extend(session.error_rad.iter().map(|e| e * ARCSEC_PER_RAD));
+            rows.torque.extend(or(&session.torque_n_m, rows.recorded.torque, len, 0.0));
+            rows.temperature.extend(or(&session.temperature_c, rows.recorded.temperature, len, nominal.temperature_c));
+            rows.orientation.extend(or(&session.orientation_rad, rows.recorded.orientation, len, 0.0));
+            match &session.time_s {
+                Some(time) if rows.recorded.time => rows.time.extend(time),
+                _ => rows.time.extend((from..from + len).map(|k| k as f64)),
+            }
+            let begin = rows.time.get(from).copied().unwrap_or(0.0);
+            rows.since.extend(rows.time[from..].iter().map(|time| time - begin).collect::<Vec<f64>>());
+            match &session.loudness {
+                Some(loudness) => {
+                    rows.jitters = true;
+                    rows.loudness.extend(loudness);
+                }
+                None => rows.loudness.resize(from + len, 1.0),
+            }
+            rows.unsure_s = rows.unsure_s.max(session.unsure_s);
+            rows.rounding = rows.rounding.max(session.coarse_rad * ARCSEC_PER_RAD / 12f64.sqrt());
+            rows.means |= session.mean_over_s > 0.0;
+            if session.own_zero {
+                rows.zeros.push(rows.sessions.len());
+            }
+            rows.sessions.push(from..from + len);
+            rows.used.push(len > 3);
+        }
+        if rows.jitters {
+            rows.generator = rows.by_neighbours();
+        }
+        rows.derive(nominal);
+        rows
+    }
+
+    /// The generator angle of each row as those beside it have it: a cubic in time through the two before and the two after. The instant
+    /// at which a row was read is in its error, and whatever follows the angle itself would follow that.
+    fn by_neighbours(&self) -> Vec<f64> {
+        let mut angle = self.generator.clone();
+        for session in &self.sessions {
+            for k in session.start + 2..session.end.saturating_sub(2) {
+                let beside = [k - 2, k - 1, k + 1, k + 2];
+                let t = beside.map(|j| self.time[j] - self.time[k]);
+                if t[3] - t[0] > FAR_APART * (t[2] - t[1]).max(0.0) || t.windows(2).any(|t| t[1] <= t[0]) {
+                    continue;
+                }
+                angle[k] = (0..4)
+                    .map(|j| {
+                        let weight = (0..4).filter(|i| *i != j).map(|i| -t[i] / (t[j] - t[i])).product::<f64>();
+                        weight * self.generator[beside[j]]
+                    })
+                    .sum();
+            }
+        }
+        angle
+    }
+
+    /// Learns from these sessions alone, as far as they have rows enough.
+    #[must_use]
+    pub fn learning_from(mut self, used: &[bool]) -> Rows {
+        for (k, session) in self.used.iter_mut().enumerate() {
+            *session &= used.get(k).copied().unwrap_or(false);
+        }
+        self
+    }
+
+    /// With each column changed by `of`; the sessions are these then.
+    #[must_use]
+    pub fn each(&self, sessions: Vec<Range<usize>>, of: impl Fn(&[f64]) -> Vec<f64>) -> Rows {
+        Rows {
+            sessions,
+            used: self.used.clone(),
+            recorded: self.recorded,
+            time: of(&self.time),
+            since: of(&self.since),
+            generator: of(&self.generator),
+            error: of(&self.error),
+            torque: of(&self.torque),
+            temperature: of(&self.temperature),
+            orientation: of(&self.orientation),
+            speed: of(&self.speed),
+            direction: of(&self.direction),
+            travel: of(&self.travel),
+            output: of(&self.output),
+            on_flexspline: of(&self.on_flexspline),
+            on_circular_spline: of(&self.on_circular_spline),
+            loudness: of(&self.loudness),
+            jitters: self.jitters,
+            means: self.means,
+            zeros: self.zeros.clone(),
+            unsure_s: self.unsure_s,
+            rounding: self.rounding,
+            period: self.period,
+        }
+    }
+
+    /// Sessions that are learnt from.
+    pub fn sessions_used(&self) -> impl Iterator<Item = Range<usize>> + '_ {
+        self.sessions.iter().zip(&self.used).filter(|(_, used)| **used).map(|(session, _)| session.clone())
+    }
+
+    /// Rows that are learnt from.
+    #[must_use]
+    pub fn count_used(&self) -> usize {
+        self.sessions_used().map(|session| session.len()).sum()
+    }
+
+    fn derive(&mut self, nominal: &Nominal) {
+        let n = self.len();
+        let mut periods: Vec<f64> = Vec::with_capacity(n);
+        (self.speed, self.direction, self.travel) = (vec![0.0; n], vec![1.0; n], vec![0.0; n]);
+        let mut travel = 0.0;
+        for session in self.sessions.clone() {
+            let mut direction = 0.0;
+            for k in session.clone() {
+                let (a, b) = (k.max(session.start + 1) - 1, (k + 1).min(session.end - 1));
+                let dt = self.time[b] - self.time[a];
+                let turned = self.generator[b] - self.generator[a];
+                self.speed[k] = if dt > 0.0 { turned / dt } else { 0.0 };
+                if turned != 0.0 {
+                    direction = turned.signum();
+                }
+                self.direction[k] = direction;
+                if k > session.start {
+                    travel += (self.generator[k] - self.generator[k - 1]).abs();
+                    periods.push(self.time[k] - self.time[k - 1]);
+                }
+                self.travel[k] = travel;
+            }
+        }
+        periods.sort_by(f64::total_cmp);
+        self.period = periods.get(periods.len() / 2).copied().filter(|p| *p > 0.0).unwrap_or(1.0);
+        self.output = self.generator.iter().map(|psi| psi / nominal.ratio).collect();
+        let turning = nominal.teeth.map(|teeth| teeth.fixed);
+        let against = |moves: bool| -> Vec<f64> {
+            self.generator.iter().zip(&self.output).map(|(psi, out)| psi - if moves { *out } else { 0.0 }).collect()
+        };
+        self.on_flexspline = against(turning == Some(Fixed::CircularSpline));
+        self.on_circular_spline = against(turning != Some(Fixed::CircularSpline));
+    }
+
+    /// Rows.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.generator.len()
+    }
+
+    /// Whether there are no rows.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.generator.is_empty()
+    }
+
+    /// Noise of all rows together, root mean square, against that of a row of mean worth.
+    #[must_use]
+    pub fn loudness_rms(&self) -> f64 {
+        if self.jitters { rms(&self.loudness) } else { 1.0 }
+    }
+
+    /// A high percentile of the torque's magnitude, N·m: the scale of the load.
+    #[must_use]
+    pub fn load_scale(&self) -> f64 {
+        quantile(self.torque.iter().map(|t| t.abs()), 0.98)
+    }
+}
+
+/// A session in parts of `stride` rows (at least one); the last may be shorter.
+pub(super) fn parts(session: &Range<usize>, stride: usize) -> impl Iterator<Item = Range<usize>> + use<> {
+    let (stride, end) = (stride.max(1), session.end);
+    session.clone().step_by(stride).map(move |from| from..(from + stride).min(end))
+}
+
+/// Mean.
+pub(super) fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// Sum of columns of this length, each times its coefficient.
+pub(super) fn combined<'c>(len: usize, columns: impl IntoIterator<Item = &'c [f64]>, coefficients: &[f64]) -> Vec<f64> {
+    let mut sum = vec![0.0; len];
+    for (column, c) in columns.into_iter().zip(coefficients) {
+        sum.iter_mut().zip(column).for_each(|(s, v)| *s += c * v);
+    }
+    sum
+}
+
+/// Quantile of those numbers that are finite; 0 of none.
+pub(crate) fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
+    let mut values: Vec<f64> = values.filter(|v| v.is_finite()).collect();
+    quantile_of(&mut values, share)
+}
+
+/// Standard deviation about zero that a few outliers do not move: half of normal numbers lie within 0.6745 of it.
+pub(crate) fn robust_std(values: impl Iterator<Item = f64>) -> f64 {
+    quantile(values.map(f64::abs), 0.5) / 0.6745
+}
+
+/// Root mean square.
+pub(crate) fn rms(values: &[f64]) -> f64 {
+    // The sum of nothing is -0.
+    ((0.0 + values.iter().map(|v| v * v).sum::<f64>()) / values.len().max(1) as f64).sqrt()
+}

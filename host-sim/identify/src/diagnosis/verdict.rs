@@ -1,0 +1,777 @@
+//! The verdict: which of the causes found may be named, how sure that is, and what is left.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use super::candidate::{Deviation, Label, Law, Per, follows_speed, line, standing_pitch_error};
+use super::channels::{RatioProposal, proposed_ratio};
+use super::model::{Fit, Problem, Scaffold, Term};
+use super::noise::Noise;
+use super::report::{Cause, Compensation, Diagnosis, Finding, HeldOut, Parameter, Residual, Unexplained, Verdict};
+use super::select::{self, Selected, Standing, fit, predicted, standings};
+use super::thresholds::verdict::*;
+use super::trace::{Gate, Judged, Stage, Trace, passed};
+use super::uncertainty::{self, Known};
+use super::{Settings, experiment, held_out, remainder, rivals, with_speed};
+use crate::causes::{CauseName, ParameterName};
+use crate::nominal::Nominal;
+use flexspline_base::units::ARCSEC_PER_RAD;
+
+/// The verdict, with its causes and what is left.
+#[allow(clippy::too_many_arguments, reason = "all that a search has found")]
+pub(super) fn conclude(
+    problem: &Problem<'_>,
+    sample: rivals::OnSample<'_, '_>,
+    laws: &[Law],
+    selected: Selected<'_>,
+    bests: &select::Bests,
+    mut left_over: Vec<Unexplained>,
+    hidden_lines: &[Label],
+    noise: Noise,
+    settings: &Settings,
+    mut trace: Trace,
+) -> Diagnosis {
+    let standings = standings(problem, &selected);
+    let limits = select::Limits::of(noise.white);
+    for (k, term) in selected.terms.iter().enumerate() {
+        let gates = select::earns(problem, &selected, &standings, k, &limits);
+        trace.judged(Stage::Settled, term.law, &term.values(), gates);
+    }
+    let all: Vec<&Term<'_>> = selected.terms.iter().collect();
+    // A zero that the bench sets in each session is told of the data: it is no discrepancy of the drive, with or without a cause.
+    let zeros = zeros_of_sessions(problem, &selected);
+    let of_the_bench = |term: &Term<'_>| term.law.is_zero_of_sessions() && !zeros.is_empty();
+    let given: Vec<Term<'_>> = selected.terms.iter().filter(|term| of_the_bench(term)).cloned().collect();
+    let none = fit(problem, &given);
+    let left = |terms: &[&Term<'_>], fit: &Fit| -> Vec<f64> {
+        problem.data.iter().zip(predicted(problem, terms, fit)).map(|(d, p)| d - p).collect()
+    };
+    let before = none.as_ref().map_or(Vec::new(), |fit| left(&given.iter().collect::<Vec<_>>(), fit));
+    let after = left(&all, &selected.fit);
+    let floor = floor(problem, noise);
+    let (rms_before, rms_after) = (problem.certain_rms(&before), problem.certain_rms(&after));
+    let explainable = (rms_before * rms_before - floor * floor).max(0.0);
+    let unexplained = (rms_after * rms_after - floor * floor).max(0.0);
+    let as_noise = rms_after <= NOISE_KNOWN_TO * floor;
+
+    let known = known(problem, &selected, noise);
+    let unnamed = Unnamed::beside(&selected, &standings, &left_over, hidden_lines);
+    let left_of_noise = rms_after / floor.max(1e-30);
+    let named = understood(problem, &selected, &standings, &known, &unnamed, [noise.white, left_of_noise], &mut trace);
+    let size = |k: &usize| standings[*k].size.powi(2);
+    let (by_name, without_name) = (
+        named.iter().map(size).sum::<f64>(),
+        (0..selected.terms.len())
+            .filter(|k| !named.contains(k) && !selected.terms[*k].law.is_zero_of_sessions())
+            .map(|k| size(&k))
+            .sum::<f64>(),
+    );
+    // A zero of each session hides nothing of what goes on within one. One that may be teeth that have skipped is not understood with nothing else
+    // found.
+    let zeros_alone = named.is_empty() && all.iter().any(|term| term.law.is_zero_of_sessions() && !of_the_bench(term));
+    let strongest = named.iter().map(|k| standings[*k].size).fold(0.0, f64::max);
+    left_over.retain(|l| l.size_arcsec > LEAST_LEFT_OF_STRONGEST * strongest);
+    let described = without_name;
+    let without_name = without_name + left_over.iter().map(|l| l.size_arcsec.powi(2)).fold(0.0, f64::max);
+    let significant_left = without_name > 0.0 || zeros_alone;
+    let held = held_out::evaluate(problem, &all);
+    let abstained = Abstention { by_name, without_name, described, unexplained, explainable, as_noise };
+    let gates = if named.is_empty() { Vec::new() } else { abstained.gates(significant_left, held.total) };
+    let verdict = match (named.is_empty(), significant_left) {
+        (true, false) => Verdict::None,
+        (true, true) => Verdict::Unknown,
+        (false, _) if !passed(&gates) => Verdict::Unknown,
+        (false, false) => Verdict::Explained,
+        (false, true) => Verdict::PartlyExplained,
+    };
+    for k in &named {
+        trace.decided(Stage::Verdict, selected.terms[*k].law.label, None, gates.clone());
+    }
+    let mut causes = Vec::new();
+    let mut next_experiment = None;
+    let mut told_better = Vec::new();
+    if verdict != Verdict::Unknown {
+        let of_all: Vec<Vec<rivals::Rival>> = named
+            .par_iter()
+            .with_max_len(1)
+            .map(|k| rivals::rivals(problem, sample, laws, &selected, &standings, bests, *k))
+            .collect();
+        for (k, rivals) in named.iter().copied().zip(of_all) {
+            let Some(name) = selected.terms[k].law.cause() else { continue };
+            let size = standings[k].size;
+            let base = selected.terms[k].law.acts.tolerance_of.is_some();
+            for rival in &rivals {
+                let against = |label: CauseName| Some(label.into());
+                trace.decided(Stage::Rival, name.into(), against(rival.cause), rival.judge(size, base));
+                trace.decided(Stage::Rival, rival.cause.into(), against(name), rival.in_its_place(size));
+            }
+            if rivals.iter().any(|r| r.tells_better(size)) {
+                // A rival that no other test lets through tells it better: neither is known.
+                told_better.push(k);
+                continue;
+            }
+            let (alike, misfits): (Vec<CauseName>, Vec<f64>) =
+                rivals.iter().filter(|r| r.looks_alike(size, base)).map(|r| (r.cause, r.misfit)).take(3).unzip();
+            let closest = rivals.first().map_or(50.0, |r| r.misfit);
+            if !alike.is_empty() && next_experiment.is_none() {
+                let named: Vec<&Law> = alike.iter().filter_map(|a| laws.iter().find(|law| law.is(*a))).collect();
+                next_experiment = experiment::next(problem.on, &selected.terms[k], selected.fit.of(k), &named, noise)
+                    .map(|(text, apart)| {
+                        format!("{text}; expected to tell them apart by {apart:.0} standard deviations")
+                    });
+            }
+            causes.push(Cause {
+                name,
+                confidence: confidence(
+                    &misfits,
+                    has_a_double_outside(k, name, &known[k], &selected, problem),
+                    closest,
+                    known[k].size_told,
+                ),
+                parameters: known[k].parameters.clone(),
+                held_out_gain: held.gains.get(k).copied().unwrap_or(0.0),
+                size_arcsec: standings[k].size,
+                look_alikes: alike_with_wheel(name, alike, &known[k], problem.on.nominal),
+            });
+        }
+        causes.sort_by(|a, b| b.size_arcsec.total_cmp(&a.size_arcsec));
+    }
+    // Of a cause that was asked about and not named: what would tell it from the strongest that is.
+    let strongest_named = causes.first().and_then(|first: &Cause| {
+        selected
+            .terms
+            .iter()
+            .position(|term| term.law.is(first.name))
+            .filter(|_| causes.iter().all(|c| Some(c.name) != settings.asked))
+    });
+    let experiment_for_asked = settings.asked.zip(strongest_named).and_then(|(asked, k)| {
+        let laws: Vec<&Law> = laws.iter().filter(|law| law.is(asked)).take(1).collect();
+        if laws.is_empty() {
+            return None;
+        }
+        let (text, _) = experiment::next(problem.on, &selected.terms[k], selected.fit.of(k), &laws, noise)?;
+        Some(text)
+    });
+    let verdict = match verdict {
+        Verdict::Explained | Verdict::PartlyExplained if causes.is_empty() => Verdict::Unknown,
+        Verdict::Explained if !told_better.is_empty() || !is_explained(problem, rms_after, floor, held.total) => {
+            Verdict::PartlyExplained
+        }
+        other => other,
+    };
+    let once_in_a_turn = |cause: &Cause| {
+        let k = (0..known.len()).find(|k| selected.terms[*k].law.is(cause.name))?;
+        waves_per_generator_turn(cause.name, &known[k], problem.on.nominal)
+    };
+    if next_experiment.is_none() {
+        next_experiment = causes.iter().find_map(once_in_a_turn).map(experiment::turn_the_encoder);
+    }
+    if verdict != Verdict::None && next_experiment.is_none() {
+        next_experiment = Some(experiment::anyhow(problem.on, verdict == Verdict::Unknown));
+    }
+    // Nothing named, nothing extended: what has no name helps to see what is there, and predicts nothing for anybody.
+    let mut held_out = held.total;
+    if causes.is_empty() {
+        held_out.rms_after_arcsec = held_out.rms_before_arcsec;
+    }
+    let mut unexplained_list: Vec<Unexplained> = (0..selected.terms.len())
+        .filter(|k| !named.contains(k) || told_better.contains(k) || verdict == Verdict::Unknown)
+        .filter(|k| !of_the_bench(&selected.terms[*k]))
+        .map(|k| Unexplained { looks_like: selected.terms[k].law.label.to_string(), size_arcsec: standings[k].size })
+        .collect();
+    unexplained_list.extend(left_over);
+    for (line, words) in with_speed::words(problem, &selected, &known, hidden_lines) {
+        unexplained_list.iter_mut().filter(|left| left.looks_like == line).for_each(|left| left.looks_like += &words);
+    }
+    Diagnosis {
+        schema_version: 1,
+        verdict,
+        finding: Finding::of(verdict),
+        ratio_proposed: ratio_proposed(&causes, problem.on.nominal.ratio),
+        causes,
+        residual: Residual {
+            rms_before_arcsec: rms_before,
+            rms_after_arcsec: rms_after,
+            // A wander that is looked for before the causes may hold a part of them: noise is no more than what is left.
+            noise_floor_arcsec: floor.min(rms_after),
+            unexplained_fraction: if explainable > 0.0 { (unexplained / explainable).min(1.0) } else { 0.0 },
+        },
+        held_out,
+        compensation: compensation(problem, held_out.rms_after_arcsec),
+        unexplained: unexplained_list,
+        recalibrated: recalibrated(problem, &selected),
+        noise_arcsec: [noise.white, noise.wander],
+        wander_correlation_s: noise.correlation_s,
+        next_experiment,
+        experiment_for_asked,
+        zeros,
+        set_aside: None,
+        trace,
+    }
+}
+
+/// The zero of every session less that of the first, where the bench sets it anew: a law of it was chosen, or sessions are known to have their
+/// own. None where from one session to the next it moves by whole tooth pitches: teeth may have skipped.
+fn zeros_of_sessions(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<Parameter> {
+    let rows = problem.on.rows;
+    let term = selected.terms.iter().position(|term| term.law.is_zero_of_sessions());
+    if term.is_none() && rows.zeros.is_empty() {
+        return Vec::new();
+    }
+    let coefficients = &selected.fit.solution.coefficients;
+    let covariance = selected.fit.solution.covariance();
+    let n = coefficients.len();
+    let at_term = term.map(|k| selected.fit.starts[k]);
+    let pitch_arcsec = problem.on.nominal.gear().tooth_pitch_rad.map_or(0.0, |pitch| pitch * ARCSEC_PER_RAD);
+    let mut zeros: Vec<Parameter> = Vec::new();
+    let (mut place, mut before) = (0, 0.0);
+    for session in 0..rows.sessions.len() {
+        // Those that are known to be own ones count from their session on, and float first among the base, after the one zero of all.
+        let known = (1..=rows.zeros.len()).filter(|j| rows.zeros[j - 1] <= session);
+        let learnt = rows.used.get(session).copied().unwrap_or(false);
+        let of_law = at_term.filter(|_| learnt).and_then(|at| {
+            place += 1;
+            (place > 1).then(|| at + place - 2)
+        });
+        let parts: Vec<usize> = known.chain(of_law).collect();
+        let value = parts.iter().map(|i| coefficients[*i]).sum::<f64>();
+        let of_row = |i: &usize| parts.iter().map(|j| covariance[i * n + j]).sum::<f64>();
+        let variance: f64 = parts.iter().map(of_row).sum();
+        let zero = Parameter { value, std: variance.max(0.0).sqrt() };
+        let jump = of_law.map_or(0.0, |i| coefficients[i]) - before;
+        before = of_law.map_or(before, |i| coefficients[i]);
+        if session > 0 && !rows.zeros.contains(&session) && is_whole_pitches(jump, zero.std, pitch_arcsec) {
+            return Vec::new();
+        }
+        zeros.push(zero);
+    }
+    if is_another_one(&zeros) { zeros } else { Vec::new() }
+}
+
+/// Whether the zero of a session is known to be another one: what the laws leave may pass for one that is hardly there.
+fn is_another_one(zeros: &[Parameter]) -> bool {
+    zeros.iter().any(|zero| zero.value.abs() > SIZE_KNOWN * zero.std)
+}
+
+/// Whether a zero moves by one tooth pitch or several, as well as it is known: then teeth may have skipped while nobody recorded.
+fn is_whole_pitches(jump_arcsec: f64, std_arcsec: f64, pitch_arcsec: f64) -> bool {
+    let pitches = (jump_arcsec / pitch_arcsec.max(f64::MIN_POSITIVE)).round();
+    let off = (jump_arcsec - pitches * pitch_arcsec).abs();
+    pitch_arcsec > 0.0 && pitches != 0.0 && off < (BESIDE_PITCHES * pitch_arcsec).max(INTERVAL * std_arcsec)
+}
+
+/// Whether causes explain the error: what is left is near the noise, and in sessions left out the model with them beats the nominal one and
+/// none at all.
+fn is_explained(problem: &Problem<'_>, rms_after: f64, floor: f64, held_out: HeldOut) -> bool {
+    let compared = compensation(problem, held_out.rms_after_arcsec);
+    let best_without = compared.rms_uncompensated_arcsec.min(held_out.rms_before_arcsec);
+    rms_after <= NEAR_NOISE * floor && compared.rms_extended_tables_arcsec < best_without
+}
+
+/// The ratio that may be meant, where it is wrong.
+fn ratio_proposed(causes: &[Cause], nominal_ratio: f64) -> Option<RatioProposal> {
+    let wrong = causes.iter().find(|cause| cause.name == CauseName::RatioError)?;
+    let error = wrong.parameters.get(ParameterName::RatioRelativeError.as_str())?;
+    proposed_ratio(nominal_ratio, error.value)
+}
+
+/// What there is with a name and without, arcsec².
+struct Abstention {
+    /// Squares of the causes that may be named.
+    by_name: f64,
+    /// Squares of what has no name, described or not.
+    without_name: f64,
+    /// Those of it that are described by a law without a name.
+    described: f64,
+    /// Left unexplained beyond noise.
+    unexplained: f64,
+    /// Beyond noise at all.
+    explainable: f64,
+    /// What is left is noise, as well as that is known.
+    as_noise: bool,
+}
+
+impl Abstention {
+    /// What the causes have to pass together, or none of them is named.
+    fn gates(&self, significant_left: bool, held_out: HeldOut) -> Vec<Judged> {
+        let mut gates = Vec::new();
+        let share = |gate: Gate, all: f64, least: f64| {
+            Judged::number(gate, self.by_name / all, least, self.by_name >= least * all)
+        };
+        if significant_left {
+            // What is left without even a description may be what the cause was named for.
+            let not_described = self.by_name + self.without_name - self.described;
+            gates.push(share(Gate::ShareNamed, not_described, LEAST_NAMED_SHARE));
+            gates.push(share(Gate::ShareDescribed, self.by_name + self.described, LEAST_BESIDE_DESCRIBED));
+        }
+        // Names for a small part of what is there, with the rest in the dark, are no understanding.
+        let dark = !self.as_noise && self.unexplained > MOST_UNEXPLAINED * self.explainable;
+        let in_the_dark = if self.explainable > 0.0 { self.unexplained / self.explainable } else { 0.0 };
+        gates.push(Judged::number(Gate::InTheDark, in_the_dark, MOST_UNEXPLAINED, !dark));
+        // What does not predict sessions it was not fitted to is no explanation.
+        let (after, most) = (held_out.rms_after_arcsec, NO_WORSE * held_out.rms_before_arcsec);
+        let worse = after > most;
+        gates.push(Judged::number(Gate::NoWorse, after, most, !worse));
+        gates
+    }
+}
+
+/// Sizes of what has no name, arcsec: the largest at all, all together, the largest that follows the output angle, the largest that follows how fast the
+/// generator turns and which way, and lines in time with their frequencies, Hz. A zero that the bench sets in each session is none of it.
+struct Unnamed {
+    largest: f64,
+    together: f64,
+    of_output: f64,
+    of_speed: f64,
+    in_time: Vec<(f64, f64)>,
+}
+
+impl Unnamed {
+    fn beside(
+        selected: &Selected<'_>,
+        standings: &[Standing],
+        left_over: &[Unexplained],
+        hidden_lines: &[Label],
+    ) -> Unnamed {
+        let terms = selected
+            .terms
+            .iter()
+            .zip(standings)
+            .filter(|(term, _)| !term.law.named() && !term.law.is_zero_of_sessions())
+            .map(|(term, standing)| (Some(term.law.label), term.law.label.to_string(), standing.size));
+        let left = left_over.iter().map(|left| {
+            let line = hidden_lines.iter().find(|line| line.to_string() == left.looks_like);
+            (line.copied(), left.looks_like.clone(), left.size_arcsec)
+        });
+        let all: Vec<(Option<Label>, String, f64)> = terms.chain(left).collect();
+        let largest = |of: &dyn Fn(&Option<Label>, &str) -> bool| {
+            all.iter().filter(|(label, called, _)| of(label, called)).map(|(.., size)| *size).fold(0.0, f64::max)
+        };
+        let in_time = |label: &Option<Label>| match label {
+            Some(Label::Deviation(Deviation::Line { per: Per::Second, order })) => Some(*order),
+            _ => None,
+        };
+        Unnamed {
+            largest: largest(&|_, _| true),
+            together: all.iter().map(|(.., size)| *size).fold(0.0, f64::hypot),
+            of_output: largest(&|label, called| label.is_some_and(follows_output) || called == OF_OUTPUT_ANGLE),
+            of_speed: largest(&|_, called| follows_speed(called)),
+            in_time: all.iter().filter_map(|(label, _, size)| Some((in_time(label)?, *size))).collect(),
+        }
+    }
+
+    /// The largest line in time near a frequency, arcsec.
+    fn swinging_near(&self, frequency_hz: f64) -> f64 {
+        let near = |line: &&(f64, f64)| (line.0 - frequency_hz).abs() < SWINGS_NEAR * frequency_hz;
+        self.in_time.iter().filter(near).map(|(_, size)| *size).fold(0.0, f64::max)
+    }
+}
+
+/// Which terms are causes that may be named. Of what is left: the white noise, arcsec, and how much of noise it is.
+fn understood(
+    problem: &Problem<'_>,
+    selected: &Selected<'_>,
+    standings: &[Standing],
+    known: &[Known],
+    unnamed: &Unnamed,
+    [white, left_of_noise]: [f64; 2],
+    trace: &mut Trace,
+) -> Vec<usize> {
+    let is_named = |k: &usize| selected.terms[*k].law.named();
+    let mut named = Vec::new();
+    for k in (0..selected.terms.len()).filter(is_named) {
+        let size = standings[k].size;
+        let no_larger = |gate: Gate, unnamed: f64| {
+            Judged::number(gate, unnamed / size, LARGE_BESIDE, unnamed <= LARGE_BESIDE * size)
+        };
+        let beside = |unnamed: f64| no_larger(Gate::BesideUnknown, unnamed);
+        let well_known = Judged::above(Gate::KnownWell, known[k].times_its_doubt, KNOWN_BESIDE);
+        let hidden = beside(unnamed.largest);
+        let mut gates = vec![
+            Judged::above(Gate::Named, size, select::least_named(white)),
+            if hidden.passed { hidden } else { well_known },
+            Judged::above(Gate::ToldFromZero, known[k].told_from_zero, TOLD_FROM_ZERO),
+        ];
+        if of_output_angle(selected.terms[k].law, &known[k]) {
+            // However well it is known, what follows the same angle and has no name may be the whole of which it is a piece.
+            gates.push(beside(unnamed.of_output));
+            gates.extend(
+                rise_without_a_piece(problem, selected, k).map(|rise| Judged::above(Gate::NoPiece, rise, NO_PIECE)),
+            );
+        }
+        if load_makes_it(selected.terms[k].law.cause(), problem) {
+            let left = left_of_noise.hypot(unnamed.together / white);
+            gates.push(Judged::number(Gate::LoadKnown, left, NEAR_NOISE, left <= NEAR_NOISE));
+        }
+        if selected.terms[k].law.is(CauseName::SensorLatency) {
+            // It grows with the speed and does nothing else: so does a piece of whatever goes with the speed.
+            gates.push(beside(unnamed.of_speed));
+        }
+        if let Some(frequency) = known[k].parameters.get(ParameterName::FrequencyHz.as_str()) {
+            // What swings on at its own frequency, whatever the drive does, is driven by something else.
+            gates.push(no_larger(Gate::NoLineBeside, unnamed.swinging_near(frequency.value)));
+        }
+        gates.extend(growth_with_speed(problem, selected, &known[k], k));
+        gates.extend(least_damping(&known[k]).map(|least| Judged::number(Gate::Rings, least, RINGS, least < RINGS)));
+        if passed(&gates) {
+            named.push(k);
+        }
+        trace.decided(Stage::Understood, selected.terms[k].law.label, None, gates);
+    }
+    named
+}
+
+/// Whether a cause that is one line of the generator's angle is no larger in fast motion than in slow: what the motor's torque shakes is. Lines of
+/// an encoder may fade where its reading is averaged, or scatters in time.
+fn growth_with_speed(problem: &Problem<'_>, selected: &Selected<'_>, known: &Known, k: usize) -> Option<Judged> {
+    let order = waves_per_generator_turn(selected.terms[k].law.cause()?, known, problem.on.nominal)?;
+    let growth = with_speed::with_speed(problem, selected, Some(k), order)?.grows_by();
+    Some(Judged::number(Gate::NoGrowthWithSpeed, growth, with_speed::NO_GROWTH, growth <= with_speed::NO_GROWTH))
+}
+
+/// What a free function of the output angle that is left is called.
+const OF_OUTPUT_ANGLE: &str = "a function of the output angle";
+
+/// Whether what has no name follows the output angle: it is counted in turns of it, or in less than one wave to a turn of the generator, where
+/// nothing repeats that the generator does.
+fn follows_output(label: Label) -> bool {
+    match label {
+        Label::Deviation(Deviation::Line { per, order }) => waves_per_output_turn(per, order, 1.0).is_some(),
+        Label::Cause(_) | Label::Deviation(Deviation::Like(_)) => false,
+    }
+}
+
+/// Waves of a line in a turn of the output, if it follows the output angle.
+fn waves_per_output_turn(per: Per, order: f64, ratio: f64) -> Option<f64> {
+    match per {
+        Per::OutputTurn => Some(order),
+        Per::GeneratorTurn if order < 1.0 => Some(order * ratio.abs()),
+        Per::GeneratorTurn | Per::Second => None,
+    }
+}
+
+/// Farthest that the order of a line is looked for from where it was found, waves in a turn of the output: over less than a turn whole orders
+/// stand in for all between. Smallest order of a line, and steps at first; each time finer by this factor, so many times.
+const ORDERS: f64 = 1.0;
+const SLOWEST: f64 = 0.1;
+const ORDER_STEPS: usize = 20;
+const FINER: f64 = 4.0;
+const TIMES_FINER: usize = 5;
+
+/// Rise of the misfit where a cause is left out and a line of the output angle that was found beside it may have any order near its own: what is a
+/// piece of that line is not missed then. The least of all such lines whose order is not whole; nothing where there is none.
+fn rise_without_a_piece(problem: &Problem<'_>, selected: &Selected<'_>, k: usize) -> Option<f64> {
+    let at = |label: Label| match label {
+        Label::Deviation(Deviation::Line { per, order }) => waves_per_output_turn(per, order, problem.on.nominal.ratio),
+        Label::Cause(_) | Label::Deviation(Deviation::Like(_)) => None,
+    };
+    let of_line = |j: usize| -> Option<f64> {
+        let found = at(selected.terms[j].law.label)?;
+        let others = (0..selected.terms.len()).filter(|other| *other != j && *other != k);
+        let scaffold = Scaffold::new(problem, others.map(|other| &selected.terms[other]).collect());
+        let misfit = |order: f64| {
+            let law = line(Per::OutputTurn, order);
+            scaffold.fit(Some(&Term::new(problem, &law, Vec::new()))).map_or(f64::INFINITY, |fit| fit.solution.misfit)
+        };
+        let (order, least) = least_near(found, misfit);
+        let is_broken = misfit(order.round()) > least + BROKEN;
+        is_broken.then_some(least - selected.fit.solution.misfit)
+    };
+    (0..selected.terms.len()).filter(|j| *j != k).filter_map(of_line).reduce(f64::min)
+}
+
+/// The order near one at which the misfit is least, and that misfit.
+fn least_near(order: f64, misfit: impl Fn(f64) -> f64 + Sync) -> (f64, f64) {
+    let mut best = (order, misfit(order));
+    let mut reach = ORDERS;
+    for _ in 0..=TIMES_FINER {
+        let step = 2.0 * reach / ORDER_STEPS as f64;
+        let from = best.0 - reach;
+        let tried = (0..=ORDER_STEPS)
+            .into_par_iter()
+            .map(|k| (from + step * k as f64).max(SLOWEST))
+            .map(|order| (order, misfit(order)));
+        best = tried.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|tried| tried.1 < best.1).unwrap_or(best);
+        reach /= FINER;
+    }
+    best
+}
+
+/// The lower end of the interval of a damping ratio, of a cause that has one.
+fn least_damping(known: &Known) -> Option<f64> {
+    known.parameters.get(ParameterName::DampingRatio.as_str()).map(|damping| damping.value - INTERVAL * damping.std)
+}
+
+/// Whether a law is a line of the output angle and nothing else, straight or of a whole order: a piece of whatever bends, however well it is known.
+fn of_output_angle(law: &Law, known: &Known) -> bool {
+    law.is(CauseName::RatioError)
+        || law.is(CauseName::OutputEncoderTilt)
+        || is_subdivision_of_output(law.cause(), known)
+}
+
+fn is_subdivision_of_output(cause: Option<CauseName>, known: &Known) -> bool {
+    let at_output = known.parameters.get(ParameterName::Encoder.as_str()).is_some_and(|encoder| encoder.value == 1.0);
+    cause == Some(CauseName::EncoderSubdivision) && at_output
+}
+
+/// Noise of an average, wander with it, arcsec.
+fn floor(problem: &Problem<'_>, noise: Noise) -> f64 {
+    let rows_of_an_average = problem.on.rows.count_used() as f64 / problem.data.len() as f64;
+    (noise.white * problem.on.rows.loudness_rms() / rows_of_an_average.sqrt()).hypot(noise.wander)
+}
+
+/// How well each term is known beside the others.
+fn known(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Vec<Known> {
+    let left = problem.certain_rms(&remainder::left(problem, selected));
+    uncertainty::known(problem, selected, beyond_noise(left, floor(problem, noise)))
+}
+
+/// The terms without those that hide others: where two causes do so nearly the same that the size of neither is told from zero, and that of one
+/// is where the other is left out, the smaller is set aside. As often as not the smaller is what the law of the larger leaves; what else may stand
+/// in the place of the larger, rivals and look-alikes say. Also what was set aside, with as much of it as the others do not take over.
+#[must_use]
+pub(super) fn told_apart<'l>(
+    problem: &Problem<'_>,
+    mut selected: Selected<'l>,
+    noise: Noise,
+    trace: &mut Trace,
+) -> (Selected<'l>, Vec<Unexplained>) {
+    let told = |selected: &Selected<'l>| -> Vec<f64> {
+        known(problem, selected, noise).iter().map(|known| known.told_from_zero).collect()
+    };
+    let mut aside = Vec::new();
+    while selected.terms.iter().filter(|term| term.law.named()).count() > 1 {
+        let now = told(&selected);
+        let standings = standings(problem, &selected);
+        let mut doubtful: Vec<usize> =
+            (0..selected.terms.len()).filter(|k| selected.terms[*k].law.named() && now[*k] < TOLD_FROM_ZERO).collect();
+        doubtful.sort_by(|a, b| standings[*a].size.total_cmp(&standings[*b].size));
+        let without = |k: usize| -> Option<Selected<'l>> {
+            let mut terms = selected.terms.clone();
+            terms.remove(k);
+            let less = select::settle(problem, Selected { fit: fit(problem, &terms)?, terms })?;
+            let then = told(&less);
+            let is_told = |j: usize| then[j - usize::from(j > k)] >= TOLD_FROM_ZERO;
+            let larger = doubtful.iter().skip_while(|j| **j != k).skip(1);
+            larger.copied().any(is_told).then_some(less)
+        };
+        let Some((k, less)) = doubtful.iter().find_map(|k| Some((*k, without(*k)?))) else { break };
+        let gone = &selected.terms[k];
+        let gates = vec![Judged::above(Gate::ToldFromZero, now[k], TOLD_FROM_ZERO)];
+        trace.judged(Stage::Understood, gone.law, &gone.values(), gates);
+        let size_arcsec = not_taken_over(problem, &selected, &less);
+        if size_arcsec > select::least_size(noise.white) {
+            aside.push(Unexplained { looks_like: gone.law.label.to_string(), size_arcsec });
+        }
+        selected = less;
+    }
+    (selected, aside)
+}
+
+/// What the terms explain and fewer of them, fitted anew, do not, arcsec: what is left without the others.
+fn not_taken_over(problem: &Problem<'_>, all: &Selected<'_>, fewer: &Selected<'_>) -> f64 {
+    let (left, then) = (remainder::left(problem, all), remainder::left(problem, fewer));
+    problem.certain_rms(&then.iter().zip(&left).map(|(then, left)| then - left).collect::<Vec<f64>>())
+}
+
+/// By what noise counts more where more is left than that (Birge 1932): the laws are not right to the noise then.
+fn beyond_noise(rms_after: f64, floor: f64) -> f64 {
+    let ratio = rms_after / floor.max(1e-30);
+    if ratio > NOISE_KNOWN_TO { ratio } else { 1.0 }
+}
+
+/// Whether something that is no cause of the library, or none that could be held against it, makes the same: a wheel before the encoder, where its
+/// subdivision repeats in less than a turn; a load that nobody recorded; and once in a turn of the generator the motor's torque, a subdivision
+/// of its encoder, and the pitch of the wheel that stands.
+fn has_a_double_outside(
+    k: usize,
+    name: CauseName,
+    known: &Known,
+    selected: &Selected<'_>,
+    problem: &Problem<'_>,
+) -> bool {
+    let nominal = problem.on.nominal;
+    let standing = standing_pitch_error(nominal);
+    let part_of_a_turn =
+        is_subdivision_of_output(Some(name), known) && problem.on.output_span_rad() < std::f64::consts::TAU;
+    let not_held_against_it = nominal.teeth.is_none()
+        || name == CauseName::EncoderSubdivision
+        || selected.others(k).iter().any(|other| other.law.is(standing));
+    let line_of_generator = waves_per_generator_turn(name, known, nominal).is_some();
+    name.has_a_double_outside()
+        || part_of_a_turn
+        || load_makes_it(Some(name), problem)
+        || line_of_generator && (name == standing || not_held_against_it)
+}
+
+/// The look-alikes of a cause; of a subdivision of the generator's encoder the pitch error of the wheel that stands is one always, though no law of
+/// its is tried.
+fn alike_with_wheel(name: CauseName, mut alike: Vec<CauseName>, known: &Known, nominal: &Nominal) -> Vec<CauseName> {
+    let standing = standing_pitch_error(nominal);
+    let at_generator = waves_per_generator_turn(name, known, nominal).is_some();
+    if name == CauseName::EncoderSubdivision && at_generator && nominal.teeth.is_some() && !alike.contains(&standing) {
+        alike.push(standing);
+    }
+    alike
+}
+
+/// Waves in a turn of the generator of a cause that is nothing but such a line: an encoder's, or a higher harmonic of the wheel that stands.
+fn waves_per_generator_turn(name: CauseName, known: &Known, nominal: &Nominal) -> Option<f64> {
+    let harmonic = || known.parameters.get(ParameterName::Harmonic.as_str()).map(|harmonic| harmonic.value);
+    let of_standing_wheel = || harmonic().filter(|harmonic| name == standing_pitch_error(nominal) && *harmonic > 2.0);
+    with_speed::order_of(name.into(), Some(known)).or_else(of_standing_wheel)
+}
+
+/// Whether a load that nobody recorded, a brake, a bearing, an arm, would make what a cause makes: an error that goes with speed, direction or the
+/// output's angle.
+fn load_makes_it(cause: Option<CauseName>, problem: &Problem<'_>) -> bool {
+    !problem.on.rows.recorded.torque && cause.is_some_and(CauseName::is_made_by_loads)
+}
+
+/// Probability of a cause against its look-alikes, whose misfits are higher by these; if there is none, against the closest rival. Less where its
+/// size is told from zero by few standard deviations (`size_told`).
+fn confidence(alike: &[f64], double_outside: bool, closest: f64, size_told: f64) -> f64 {
+    let odds = |misfit: f64| (-0.5 * misfit.clamp(0.0, 40.0)).exp();
+    let among = if alike.is_empty() && !double_outside {
+        1.0 / (1.0 + odds(closest)) - 0.01
+    } else {
+        1.0 / (1.0
+            + f64::from(u8::from(double_outside))
+            + alike.iter().map(|misfit| odds(*misfit).max(LEAST_WEIGHT)).sum::<f64>())
+    };
+    if size_told < SIZE_KNOWN { among.min(MOST_OF_UNSURE) } else { among }
+}
+
+fn compensation(problem: &Problem<'_>, rms_extended: f64) -> Compensation {
+    let about_mean = |values: Vec<f64>| {
+        let certain = values.iter().zip(&problem.certain).filter(|(_, c)| **c);
+        let mean = certain.clone().map(|(v, _)| v).sum::<f64>() / certain.count().max(1) as f64;
+        problem.certain_rms(&values.iter().map(|v| v - mean).collect::<Vec<f64>>())
+    };
+    Compensation {
+        rms_uncompensated_arcsec: about_mean(problem.whitener.average(&problem.on.rows.error)),
+        rms_nominal_tables_arcsec: about_mean(problem.data.clone()),
+        rms_extended_tables_arcsec: rms_extended,
+    }
+}
+
+fn recalibrated(problem: &Problem<'_>, selected: &Selected<'_>) -> BTreeMap<String, Parameter> {
+    let n = selected.fit.priors.len();
+    let mut named = BTreeMap::new();
+    let covariance = selected.fit.solution.covariance();
+    for (k, floating) in problem.on.base.floating.iter().enumerate() {
+        let name =
+            if named.contains_key(&floating.name) { format!("{} {k}", floating.name) } else { floating.name.clone() };
+        named.insert(
+            name,
+            Parameter { value: selected.fit.solution.coefficients[k], std: covariance[k * n + k].max(0.0).sqrt() },
+        );
+    }
+    named
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_left_is_in_the_dark_only_beyond_what_the_noise_is_known_to() {
+        let in_the_dark = |as_noise: bool| {
+            let of = Abstention {
+                by_name: 1.0,
+                without_name: 0.0,
+                described: 0.0,
+                unexplained: 2.0,
+                explainable: 3.0,
+                as_noise,
+            };
+            of.gates(false, HeldOut::default())
+                .into_iter()
+                .any(|judged| judged.gate == Gate::InTheDark && !judged.passed)
+        };
+        assert!(in_the_dark(false));
+        assert!(!in_the_dark(true));
+    }
+
+    #[test]
+    fn a_zero_that_is_hardly_told_from_that_of_the_first_session_is_none() {
+        let zeros = |values: [f64; 3]| values.map(|value| Parameter { value, std: 4.6 });
+        assert!(!is_another_one(&zeros([0.0, -15.0, -15.5])));
+        assert!(is_another_one(&zeros([0.0, -15.0, 130.0])));
+    }
+
+    #[test]
+    fn a_zero_that_moves_by_whole_pitches_may_be_teeth_that_skipped() {
+        assert!(is_whole_pitches(6416.0, 2.0, 6416.2) && is_whole_pitches(-12_810.0, 2.0, 6416.2));
+        assert!(!is_whole_pitches(0.4, 2.0, 6416.2) && !is_whole_pitches(5900.0, 2.0, 6416.2));
+        assert!(!is_whole_pitches(300.0, 2.0, 0.0), "teeth that nobody knows");
+    }
+
+    #[test]
+    fn a_damping_whose_interval_reaches_below_what_rings_is_that_of_a_resonance() {
+        let known = |value: f64, std: f64| Known {
+            parameters: [(ParameterName::DampingRatio.as_str(), Parameter { value, std })].into(),
+            times_its_doubt: 9.0,
+            ..Known::default()
+        };
+        let rings = |known: &Known| least_damping(known).is_some_and(|least| least < RINGS);
+        assert!(rings(&known(0.18, 0.02)), "0.15, fitted as 0.18");
+        assert!(rings(&known(0.3, 0.1)));
+        assert!(!rings(&known(0.3, 0.02)));
+        assert_eq!(least_damping(&Known::default()), None);
+    }
+
+    #[test]
+    fn what_follows_the_output_is_counted_in_turns_of_it_or_slower_than_the_generator() {
+        let line = |per, order| follows_output(Label::Deviation(Deviation::Line { per, order }));
+        assert!(line(Per::OutputTurn, 3.0) && line(Per::GeneratorTurn, 0.028));
+        assert!(!line(Per::GeneratorTurn, 3.0) && !line(Per::Second, 0.3));
+        assert!(!follows_output("offset with time".into()) && !follows_output(CauseName::RatioError.into()));
+        assert_eq!(waves_per_output_turn(Per::GeneratorTurn, 0.03125, -100.0), Some(3.125));
+    }
+
+    #[test]
+    fn the_order_of_a_line_is_found_near_where_the_line_was() {
+        let (order, least) = least_near(3.0, |order| 7.0 + (order - 2.6183).powi(2));
+        assert!((order - 2.6183).abs() < 1e-3 && (least - 7.0).abs() < 1e-6, "{order}, {least}");
+        // Where nothing is better it stays.
+        assert_eq!(least_near(3.0, |order| (order - 3.0).abs()), (3.0, 0.0));
+    }
+
+    #[test]
+    fn what_laws_leave_beyond_the_noise_widens_what_is_told_from_zero() {
+        assert_eq!(beyond_noise(5.0, 4.5), 1.0);
+        assert_eq!(beyond_noise(6.0, 4.0), 1.5);
+    }
+
+    #[test]
+    fn a_line_in_time_near_a_resonance_is_counted_against_it_and_one_elsewhere_is_not() {
+        let unnamed = Unnamed {
+            largest: 4.0,
+            together: 5.0,
+            of_output: 0.0,
+            of_speed: 0.0,
+            in_time: vec![(1.33, 4.0), (50.0, 3.0)],
+        };
+        assert_eq!(unnamed.swinging_near(1.37), 4.0);
+        assert_eq!(unnamed.swinging_near(9.0), 0.0);
+    }
+
+    #[test]
+    fn a_confidence_is_that_of_a_name_among_those_alike() {
+        let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-9, "{a} for {b}");
+        // Told no worse, or better: one of these.
+        near(confidence(&[0.0], false, 0.0, 20.0), 0.5);
+        near(confidence(&[-30.0, 0.0], false, -30.0, 20.0), 1.0 / 3.0);
+        // Told worse, though no law is known so well.
+        near(confidence(&[2.0], false, 2.0, 20.0), 1.0 / (1.0 + (-1.0_f64).exp()));
+        near(confidence(&[900.0], false, 900.0, 20.0), 1.0 / (1.0 + LEAST_WEIGHT));
+        // None alike.
+        assert!((0.98..0.99).contains(&confidence(&[], false, 900.0, 20.0)));
+        // A double that is no cause of the library; a size that is hardly known.
+        near(confidence(&[], true, 900.0, 20.0), 0.5);
+        near(confidence(&[], false, 900.0, 4.0), MOST_OF_UNSURE);
+        near(confidence(&[0.0], false, 0.0, 4.0), 0.5);
+    }
+}

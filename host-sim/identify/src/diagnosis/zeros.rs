@@ -1,0 +1,108 @@
+//! A bench that sets its zero anew in each session: told as a fault of the data, with what each session's zero is.
+
+use super::report::Parameter;
+use crate::measurement::{Fault, FaultName, Measures, Recording, Treatment};
+use flexspline_base::units::ARCSEC_PER_RAD;
+
+/// What to change where the zero is set anew.
+const ADVICE: &str = "home to one mark before each session, or log the offset that is set";
+/// Sessions whose zeros are said, at most.
+const SAID: usize = 12;
+
+/// Tells the `zeros` of sessions, each less that of the first, and has them count as zeros of their own from here on. A fault that was told of
+/// some of them when the rows were read gives way to this one, which has them all.
+pub(super) fn tell(recording: &mut Recording, zeros: &[Parameter]) {
+    let of_some = |fault: &Fault| fault.name == FaultName::PositionJump && fault.measures.turns.is_none();
+    let known = recording.faults.iter().any(of_some);
+    let by_notes = recording.sessions.iter().skip(1).all(|session| session.own_zero) && !known;
+    if zeros.len() < 2 || zeros.len() != recording.sessions.len() || by_notes {
+        return;
+    }
+    recording.faults.retain(|fault| !of_some(fault));
+    let all: Vec<f64> = (recording.sessions.iter().zip(zeros))
+        .map(|(session, zero)| zero.value + session.zero_off_rad * ARCSEC_PER_RAD)
+        .collect();
+    let std = zeros.iter().map(|zero| zero.std).fold(0.0, f64::max);
+    let largest = all.iter().map(|zero| zero - all[0]).fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
+    let said: Vec<String> = all[1..].iter().take(SAID).map(|zero| format!("{:+.1}", zero - all[0])).collect();
+    let more = if all.len() - 1 > said.len() { ", …" } else { "" };
+    let last = all.len();
+    let sessions = if last == 2 { "session 2".to_owned() } else { format!("sessions 2 to {last}") };
+    let what = format!(
+        "the zero of the error is another one in each session: that of {sessions} lies {}{more} arcsec (± {std:.1} at most) beside that of the \
+         first, by no whole number of motor turns or tooth pitches; the zero of each is fitted on its own",
+        said.join(", ")
+    );
+    for session in recording.sessions.iter_mut().skip(1) {
+        session.own_zero = true;
+    }
+    let (first, end) = (&recording.sessions[1], &recording.sessions[last - 1]);
+    recording.faults.push(Fault {
+        name: FaultName::PositionJump,
+        channel: None,
+        time_s: first.time_s.as_ref().and_then(|time| time.first().copied()),
+        until_s: end.time_s.as_ref().and_then(|time| time.last().copied()),
+        first_line: first.line.first().copied().unwrap_or_default(),
+        last_line: end.line.last().copied().unwrap_or_default(),
+        rows: recording.sessions[1..].iter().map(|session| session.len() as u64).sum(),
+        size_arcsec: Some(largest),
+        treatment: Treatment::Repaired,
+        what,
+        advice: ADVICE,
+        measures: Measures::default(),
+    });
+    recording.faults.sort_by_key(|fault| (fault.first_line, fault.name));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measurement::Session;
+
+    fn recording() -> Recording {
+        let session = |k: u64| Session {
+            line: (100 * k..100 * k + 50).collect(),
+            generator_rad: vec![0.0; 50],
+            error_rad: vec![0.0; 50],
+            ..Session::default()
+        };
+        Recording {
+            file: "made.csv".into(),
+            rows: 150,
+            sessions: (0..3).map(session).collect(),
+            faults: Vec::new(),
+            tooth_steps: Vec::new(),
+            notes: Vec::new(),
+            unusable: None,
+        }
+    }
+
+    fn zeros(values: [f64; 3]) -> Vec<Parameter> {
+        values.map(|value| Parameter { value, std: 0.4 }).to_vec()
+    }
+
+    #[test]
+    fn the_zero_of_every_session_is_told_with_what_was_taken_off_it_before() {
+        let mut two_far = recording();
+        two_far.sessions[2].own_zero = true;
+        two_far.sessions[2].zero_off_rad = 2000.0 / ARCSEC_PER_RAD;
+        tell(&mut two_far, &zeros([0.0, 120.5, -3.25]));
+        let [fault] = two_far.faults.as_slice() else { panic!("{:?}", two_far.faults) };
+        assert_eq!((fault.name, fault.first_line, fault.last_line), (FaultName::PositionJump, 100, 249));
+        assert!(fault.what.contains("+120.5, +1996.8 arcsec"), "{}", fault.what);
+        assert!((fault.size_arcsec.unwrap() - 1996.75).abs() < 1e-9);
+        assert!(two_far.sessions[1].own_zero && !two_far.sessions[0].own_zero);
+    }
+
+    #[test]
+    fn zeros_that_a_log_says_itself_are_no_fault() {
+        let mut guided = recording();
+        guided.sessions[1].own_zero = true;
+        guided.sessions[2].own_zero = true;
+        tell(&mut guided, &zeros([0.0, 120.5, -3.25]));
+        assert!(guided.faults.is_empty());
+        let mut none = recording();
+        tell(&mut none, &[]);
+        assert!(none.faults.is_empty() && !none.sessions[1].own_zero);
+    }
+}

@@ -1,0 +1,589 @@
+//! Causes that are geometry, as fields of a drive that the FEM runs.
+//!
+//! What is read is not the numbers of a cause but what it adds to the error under a light load on either flank: it is projected on
+//! the order that the imperfection has, and turned into size and place by the kinematics of rigid teeth. With `A` in arc-seconds,
+//! `x` the angle of the wave on the part, `a` the flank angle, `+-` the flank that carries under a positive and a negative load:
+//!
+//! | imperfection | error |
+//! |---|---|
+//! | displaced by `e` towards `d` | `-+ e / r_b \|sin(x - d +- a)\|`, second order `4 / 3 pi` of it |
+//! | pitch error `p cos k(x - f)` | `+p / r cos k(x - f)` on the flexspline, `-` on the circular spline, even `k` |
+//! | oval `w cos 2(x - c)` | `w / r (sin 2(x - c) / 2 +- tan a cos 2(x - c))` |
+//! | depth `w` off every flank | `+- w / r_b` |
+//!
+//! [`check_by_fem`] compares what the FEM then makes of the drive with what was found.
+
+use std::f64::consts::{PI, TAU};
+
+use flexspline::Table;
+
+use super::model::CauseEntry;
+use crate::causes::{CauseName, DriveField, ParameterName as Name};
+use crate::diagnosis::Extended;
+use crate::measurement::Session;
+use crate::nominal::Nominal;
+use flexspline_base::units::ARCSEC_PER_RAD;
+use flexspline_mechanics::drive::{
+    DamagedFlank, DamagedTooth, Drive, DriveError, GeneratorKind, Harmonic, SleeveKind, Wheel,
+};
+use flexspline_mechanics::motion::Motion;
+use flexspline_mechanics::stepping::{Problem, SolveError, SolverSettings};
+
+/// Load under which causes are looked at, N·m: light, as loads let more teeth share what is displaced.
+const PROBE_N_M: f64 = 2.0;
+/// Positions over a turn of the output; a prime.
+const POSITIONS: usize = 1009;
+/// The largest sizes that a drive file takes, µm.
+const LARGEST_UM: f64 = 100.0;
+
+/// A cause that is in the drive.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mapped {
+    /// The cause.
+    pub cause: CauseName,
+    /// The fields it set, `path = value`.
+    pub fields: Vec<String>,
+    /// Whether it depends on where the drive stands in its turns.
+    pub by_angle: bool,
+}
+
+/// A drive with the causes that are geometry, and the rest.
+#[derive(Clone, Debug)]
+pub struct FoundGeometry {
+    /// The drive.
+    pub drive: Drive,
+    /// What is in it.
+    pub mapped: Vec<Mapped>,
+    /// Causes that no field of a drive holds.
+    pub rest: Vec<CauseEntry>,
+}
+
+/// A complex number, `z = 2 mean(e exp(i k x))`: `A cos(k x - p)` has `A exp(i p)`.
+#[derive(Clone, Copy, Debug, Default)]
+struct Wave {
+    re: f64,
+    im: f64,
+}
+
+impl Wave {
+    fn of(error: &[f64], angle: impl Fn(usize) -> f64, order: f64) -> Wave {
+        let n = error.len().max(1) as f64;
+        error.iter().enumerate().fold(Wave::default(), |sum, (k, e)| {
+            let (sin, cos) = (order * angle(k)).sin_cos();
+            Wave { re: sum.re + 2.0 / n * e * cos, im: sum.im + 2.0 / n * e * sin }
+        })
+    }
+    fn turned(self, angle: f64) -> Wave {
+        let (sin, cos) = angle.sin_cos();
+        Wave { re: self.re * cos - self.im * sin, im: self.re * sin + self.im * cos }
+    }
+    fn plus(self, other: Wave) -> Wave {
+        Wave { re: self.re + other.re, im: self.im + other.im }
+    }
+    fn times(self, factor: f64) -> Wave {
+        Wave { re: self.re * factor, im: self.im * factor }
+    }
+    fn size(self) -> f64 {
+        self.re.hypot(self.im)
+    }
+    fn phase(self) -> f64 {
+        self.im.atan2(self.re)
+    }
+}
+
+/// What a cause adds under the probing load on either flank, over a turn of the output.
+struct Probe {
+    generator: Vec<f64>,
+    ratio: f64,
+    /// Under the positive and the negative load; per cause.
+    error: [Vec<Vec<f64>>; 2],
+}
+
+impl Probe {
+    fn new(
+        extended: &Extended,
+        nominal: &Nominal,
+        table: Option<&Table<'_>>,
+        generator: Vec<f64>,
+        orientation_rad: f64,
+    ) -> Probe {
+        let session = |load: f64| {
+            let n = generator.len();
+            Session {
+                line: (0..n as u64).collect(),
+                time_s: Some((0..n).map(|k| 1e4 * k as f64).collect()),
+                generator_rad: generator.clone(),
+                error_rad: vec![0.0; n],
+                torque_n_m: Some(vec![load; n]),
+                temperature_c: Some(vec![nominal.temperature_c; n]),
+                orientation_rad: Some(vec![orientation_rad; n]),
+                ..Session::default()
+            }
+        };
+        let load = PROBE_N_M.max(1.5 * nominal.friction_torque_n_m);
+        let [plus, minus] =
+            [load, -load].map(|load| extended.predict(&[session(load)], nominal, table).remove(0).cause_arcsec);
+        Probe { generator, ratio: nominal.ratio, error: [plus, minus] }
+    }
+
+    /// Projection of a cause on an order of the angle on the flexspline or the circular spline.
+    fn wave(&self, cause: usize, on_circular_spline: bool, order: f64) -> [Wave; 2] {
+        let share = if on_circular_spline { 1.0 - 1.0 / self.ratio } else { 1.0 };
+        [0, 1].map(|flank| Wave::of(&self.error[flank][cause], |k| share * self.generator[k], order))
+    }
+}
+
+/// `A exp(2 i d)` of what is displaced towards `d`; `a` is the flank angle.
+fn displaced([plus, minus]: [Wave; 2], a: f64) -> Wave {
+    let second = 4.0 / (3.0 * PI);
+    plus.turned(2.0 * a).plus(minus.turned(-2.0 * a).times(-1.0)).times(0.5 / second)
+}
+
+/// `A exp(2 i c)` of an oval with a crest at `c`; `a` is the flank angle.
+fn oval([plus, minus]: [Wave; 2], a: f64) -> Wave {
+    let tan = a.tan();
+    // Least squares of z = A exp(2 i c) (i/2 +- tan a) on both flanks.
+    let part = |z: Wave, sign: f64| z.turned(-PI / 2.0).times(0.5).plus(z.times(sign * tan));
+    part(plus, 1.0).plus(part(minus, -1.0)).times(0.5 / (0.25 + tan * tan))
+}
+
+fn degrees(phase: f64) -> f64 {
+    phase.to_degrees().rem_euclid(360.0)
+}
+
+/// Puts the causes that are geometry into a drive.
+///
+/// # Errors
+/// The drive that comes of it is none: sizes that do not fit.
+pub fn found_geometry(
+    drive: &Drive,
+    extended: &Extended,
+    causes: &[CauseEntry],
+    (nominal, table): (&Nominal, Option<&Table<'_>>),
+    orientation_rad: Option<f64>,
+) -> Result<FoundGeometry, DriveError> {
+    let step = TAU * nominal.ratio.abs() / POSITIONS as f64;
+    let generator: Vec<f64> = (0..POSITIONS).map(|k| k as f64 * step).collect();
+    let probe = Probe::new(extended, nominal, table, generator, orientation_rad.unwrap_or(0.0));
+    let um = |arcsec: f64, radius_mm: f64| 1e3 * arcsec / ARCSEC_PER_RAD * radius_mm;
+    let base_mm = drive.circular_spline.base_radius_mm();
+    let flank_angle_rad = drive.circular_spline.bearing_flank_angle_rad();
+    let mut found = drive.clone();
+    let (mut mapped, mut rest) = (Vec::new(), Vec::new());
+    for cause in causes {
+        let value = |name: Name| cause.parameters.get(name.as_str()).copied();
+        let mut fields: Vec<String> = Vec::new();
+        let mut by_angle = true;
+        let built = &mut found.as_built;
+        let place = extended.causes().iter().position(|fitted| fitted.name() == cause.name);
+        let mut set = |field: &str, slot: &mut f64, value: f64| {
+            *slot = (value * 1e4).round() / 1e4;
+            fields.push(format!("{field} = {slot}"));
+        };
+        let middle = |root: f64, tip: f64| 0.5 * (root + tip);
+        match (cause.name.drive_field(), place) {
+            (Some(DriveField::CircularSplineEccentricity), Some(k)) => {
+                let wave = displaced(probe.wave(k, true, 2.0), flank_angle_rad);
+                set(
+                    "as_built.circular_spline_eccentricity_um",
+                    &mut built.circular_spline_eccentricity_um,
+                    um(wave.size(), base_mm),
+                );
+                set(
+                    "as_built.circular_spline_eccentricity_phase_deg",
+                    &mut built.circular_spline_eccentricity_phase_deg,
+                    degrees(0.5 * wave.phase()),
+                );
+            }
+            (Some(DriveField::FlexsplineRunout), Some(k)) => {
+                let wave = displaced(probe.wave(k, false, 2.0), flank_angle_rad);
+                set("as_built.flexspline_runout_um", &mut built.flexspline_runout_um, um(wave.size(), base_mm));
+                set(
+                    "as_built.flexspline_runout_phase_deg",
+                    &mut built.flexspline_runout_phase_deg,
+                    degrees(0.5 * wave.phase()),
+                );
+            }
+            (Some(DriveField::CircularSplineOffset), Some(k)) if orientation_rad.is_some() => {
+                let wave = displaced(probe.wave(k, false, 2.0), flank_angle_rad);
+                set(
+                    "as_built.circular_spline_offset_um",
+                    &mut built.circular_spline_offset_um,
+                    um(wave.size(), base_mm),
+                );
+                set(
+                    "as_built.circular_spline_offset_direction_deg",
+                    &mut built.circular_spline_offset_direction_deg,
+                    degrees(0.5 * wave.phase()),
+                );
+            }
+            (Some(DriveField::CircularSplineOvality), Some(k)) => {
+                let wave = oval(probe.wave(k, true, 2.0), flank_angle_rad);
+                let radius = drive.circular_spline.pitch_radius_mm();
+                set(
+                    "as_built.circular_spline_ovality_um",
+                    &mut built.circular_spline_ovality_um,
+                    um(wave.size(), radius),
+                );
+                set(
+                    "as_built.circular_spline_ovality_phase_deg",
+                    &mut built.circular_spline_ovality_phase_deg,
+                    degrees(0.5 * wave.phase()),
+                );
+            }
+            (Some(DriveField::PitchHarmonics(wheel)), Some(k)) => {
+                let on_circular_spline = wheel == Wheel::CircularSpline;
+                let (f, c) = (&drive.flexspline, &drive.circular_spline);
+                let (field, list, radius, sign) = if on_circular_spline {
+                    let radius = middle(c.root_radius_mm, c.tip_radius_mm);
+                    ("circular_spline_pitch_harmonics", &mut built.circular_spline_pitch_harmonics, radius, -1.0)
+                } else {
+                    let radius = middle(f.root_radius_mm, f.tip_radius_mm);
+                    ("flexspline_pitch_harmonics", &mut built.flexspline_pitch_harmonics, radius, 1.0)
+                };
+                // Two lobes that share the load alike cancel odd orders; their size says nothing of the wheel.
+                for order in [2_u32, 4, 6] {
+                    let [plus, minus] = probe.wave(k, on_circular_spline, f64::from(order));
+                    let wave = plus.plus(minus).times(0.5 * sign);
+                    let amplitude_um = (um(wave.size(), radius) * 1e4).round() / 1e4;
+                    if amplitude_um >= 0.1 {
+                        let phase_deg = (degrees(wave.phase() / f64::from(order)) * 1e4).round() / 1e4;
+                        fields.push(format!(
+                            "as_built.{field}: order = {order}, amplitude_um = {amplitude_um}, phase_deg = {phase_deg}"
+                        ));
+                        list.push(Harmonic { order, amplitude_um, phase_deg });
+                    }
+                }
+            }
+            (Some(DriveField::DamagedTooth), Some(k)) => {
+                if let (Some(tooth), Some(wheel), Some(depth)) =
+                    (value(Name::Tooth), value(Name::Wheel), value(Name::DepthUm))
+                {
+                    let wheel = if wheel < 0.5 { Wheel::Flexspline } else { Wheel::CircularSpline };
+                    let teeth =
+                        if wheel == Wheel::Flexspline { drive.flexspline.teeth } else { drive.circular_spline.teeth };
+                    // Under a positive load the clockwise flanks of the flexspline bear, and the others of the circular spline.
+                    let felt =
+                        [0, 1].map(|flank: usize| probe.error[flank][k].iter().fold(0.0, |m: f64, e| m.max(e.abs())));
+                    let minus = (felt[0] > felt[1]) == (wheel == Wheel::Flexspline);
+                    let flank = match felt[0].min(felt[1]) > 0.5 * felt[0].max(felt[1]) {
+                        true => DamagedFlank::Both,
+                        false if minus => DamagedFlank::Minus,
+                        false => DamagedFlank::Plus,
+                    };
+                    let damaged = DamagedTooth {
+                        wheel,
+                        tooth: (tooth.rem_euclid(f64::from(teeth))) as u32 % teeth,
+                        flank,
+                        depth_um: (depth.clamp(0.0, 500.0) * 100.0).round() / 100.0,
+                    };
+                    fields.push(format!(
+                        "as_built.damaged_teeth: wheel = {}, tooth = {}, flank = {}, depth_um = {}",
+                        wheel.name(),
+                        damaged.tooth,
+                        flank.name(),
+                        damaged.depth_um
+                    ));
+                    built.damaged_teeth.push(damaged);
+                }
+            }
+            (Some(DriveField::FlankWear), _) => {
+                by_angle = false;
+                if let Some(growth) = value(Name::GrowthArcsec).filter(|growth| *growth > 0.0) {
+                    // Half of it from the flanks of either wheel.
+                    let depth = 0.25 * um(growth, base_mm);
+                    let (f, c) = (built.flexspline_wear_um + depth, built.circular_spline_wear_um + depth);
+                    set("as_built.flexspline_wear_um", &mut built.flexspline_wear_um, f);
+                    set("as_built.circular_spline_wear_um", &mut built.circular_spline_wear_um, c);
+                }
+            }
+            (Some(DriveField::Expansion), _) => {
+                by_angle = false;
+                if let Some(per_k) = value(Name::ClearanceArcsecPerK) {
+                    // A ring that grows by dr opens its spaces by 2 dr tan a / r.
+                    let more = per_k / ARCSEC_PER_RAD / (2.0 * flank_angle_rad.tan());
+                    let t = &mut found.temperature;
+                    for (field, slot) in [
+                        ("temperature.circular_spline_expansion_per_k", &mut t.circular_spline_expansion_per_k),
+                        ("temperature.housing_expansion_per_k", &mut t.housing_expansion_per_k),
+                    ] {
+                        *slot += more;
+                        fields.push(format!("{field} = {slot:e}"));
+                    }
+                }
+            }
+            (Some(DriveField::Stiffness), _) => {
+                by_angle = false;
+                if let Some(ratio) = value(Name::StiffnessRatio).filter(|ratio| *ratio > 0.0) {
+                    if ratio < 1.0 {
+                        // What gives more is put in series: the sleeve.
+                        let nominal_k = nominal.stiffness.last().map_or(f64::INFINITY, |[_, k]| *k);
+                        let before = drive.sleeve.torsion_stiffness_n_m_per_rad.map_or(0.0, |k| 1.0 / k);
+                        let k = 1.0 / (before + (1.0 / ratio - 1.0) / nominal_k);
+                        found.sleeve.torsion_stiffness_n_m_per_rad = Some(k.round());
+                        if found.sleeve.kind == SleeveKind::None {
+                            found.sleeve.kind = SleeveKind::Springs;
+                            fields.push("sleeve.kind = \"springs\"".to_owned());
+                        }
+                        fields.push(format!("sleeve.torsion_stiffness_n_m_per_rad = {}", k.round()));
+                    } else {
+                        let e = found.material.youngs_modulus_mpa * ratio;
+                        set("material.youngs_modulus_mpa", &mut found.material.youngs_modulus_mpa, e);
+                    }
+                }
+            }
+            (Some(DriveField::StiffnessPerKelvin), _) => {
+                by_angle = false;
+                if let Some(per_k) = value(Name::StiffnessRelativePerK) {
+                    let all = found.temperature.youngs_modulus_per_k + per_k;
+                    if all.abs() <= 1e-3 {
+                        found.temperature.youngs_modulus_per_k = all;
+                        fields.push(format!("temperature.youngs_modulus_per_k = {all:e}"));
+                    }
+                }
+            }
+            // No field holds it, the data do not show it, or it is no fixed direction.
+            (None, _)
+            | (
+                Some(
+                    DriveField::CircularSplineEccentricity
+                    | DriveField::FlexsplineRunout
+                    | DriveField::CircularSplineOffset
+                    | DriveField::CircularSplineOvality
+                    | DriveField::PitchHarmonics(_)
+                    | DriveField::DamagedTooth,
+                ),
+                _,
+            ) => {}
+        }
+        let b = &found.as_built;
+        let largest = [
+            b.circular_spline_eccentricity_um,
+            b.flexspline_runout_um,
+            b.circular_spline_offset_um,
+            b.circular_spline_ovality_um,
+        ]
+        .into_iter()
+        .fold(0.0, f64::max);
+        if fields.is_empty() || largest > LARGEST_UM {
+            rest.push(cause.clone());
+        } else {
+            mapped.push(Mapped { cause: cause.name, fields, by_angle });
+        }
+    }
+    if !mapped.is_empty() {
+        found.name = format!("{}-extended", drive.name);
+    }
+    found.check()?;
+    Ok(FoundGeometry { drive: found, mapped, rest })
+}
+
+/// How well the FEM of a drive agrees with what was found.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Agreement {
+    /// What the causes add, rms over the places looked at, arcsec.
+    pub found_rms_arcsec: f64,
+    /// What the FEM of the drive adds, less that, rms, arcsec.
+    pub difference_rms_arcsec: f64,
+}
+
+/// Places looked at: whole flexspline pitches, where the ideal drive is in one state, spread over the turns.
+const PLACES: u32 = 12;
+const PITCHES_APART: u32 = 23;
+
+/// Runs the FEM of both drives at a few places under a light load on either flank, and compares the difference with what the
+/// mapped causes add there. The mean on each flank takes no part: a displacement eats clearance, which is a cause of its own.
+///
+/// # Errors
+/// No convergence.
+pub fn check_by_fem(
+    (before, after): (&Drive, &FoundGeometry),
+    kind: GeneratorKind,
+    settings: SolverSettings,
+    extended: &Extended,
+    (nominal, table): (&Nominal, Option<&Table<'_>>),
+    orientation_rad: Option<f64>,
+) -> Result<Agreement, SolveError> {
+    let pitch = TAU / f64::from(before.flexspline.teeth);
+    let places: Vec<f64> = (0..PLACES).map(|k| f64::from(k * PITCHES_APART) * pitch).collect();
+    let probe = Probe::new(extended, nominal, table, places.clone(), orientation_rad.unwrap_or(0.0));
+    let chosen: Vec<usize> = after
+        .mapped
+        .iter()
+        .filter(|mapped| mapped.by_angle)
+        .filter_map(|mapped| extended.causes().iter().position(|fitted| fitted.name() == mapped.cause))
+        .collect();
+    let (mut found, mut difference, mut count) = (0.0, 0.0, 0);
+    let smooth = |drive: &Drive| {
+        let mut drive = drive.clone();
+        drive.flanks.friction_coefficient = 0.0;
+        drive
+    };
+    let temperature_c = before.temperature.reference_c;
+    let problems =
+        [&smooth(before), &smooth(&after.drive)].map(|drive| Problem::new(drive, kind, temperature_c, settings));
+    let [ideal, built] = problems;
+    let (ideal, built) = (ideal?, built?);
+    for (flank, load) in [PROBE_N_M, -PROBE_N_M].into_iter().enumerate() {
+        let reference = stands(&ideal, 0.0, load)?;
+        let by_fem = places
+            .iter()
+            .map(|psi| Ok(stands(&built, *psi, load)? - reference))
+            .collect::<Result<Vec<f64>, SolveError>>()?;
+        let by_causes: Vec<f64> =
+            (0..places.len()).map(|k| chosen.iter().map(|cause| probe.error[flank][*cause][k]).sum()).collect();
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        let (mean_fem, mean_causes) = (mean(&by_fem), mean(&by_causes));
+        for (a, b) in by_fem.iter().zip(&by_causes) {
+            let (a, b) = (a - mean_fem, b - mean_causes);
+            found += b * b;
+            difference += (a - b).powi(2);
+            count += 1;
+        }
+    }
+    let rms = |square: f64| (square / f64::from(count)).sqrt();
+    Ok(Agreement { found_rms_arcsec: rms(found), difference_rms_arcsec: rms(difference) })
+}
+
+/// Error of the drive deformed at a generator angle, then loaded, arcsec.
+fn stands(problem: &Problem, generator_rad: f64, torque_n_m: f64) -> Result<f64, SolveError> {
+    let mut motion = Motion::deformed_or_turned_in(problem, generator_rad)?;
+    motion.load(torque_n_m)?;
+    Ok(motion.error_arcsec())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flexspline_mechanics::mesh::MeshLevel;
+    use flexspline_mechanics::stepping::Method;
+
+    /// Errors by the closed forms above, over a turn of the output.
+    fn waves(error: impl Fn(f64, f64) -> f64, order: f64) -> [Wave; 2] {
+        let x = |k: usize| TAU * k as f64 / 720.0;
+        [1.0, -1.0].map(|flank| Wave::of(&(0..720).map(|k| error(x(k), flank)).collect::<Vec<f64>>(), x, order))
+    }
+
+    #[test]
+    fn size_and_place_come_back_from_the_closed_forms() {
+        let a = 0.4;
+        let wave = displaced(waves(|x, flank| -flank * 30.0 * (x - 0.7 + flank * a).sin().abs(), 2.0), a);
+        assert!((wave.size() - 30.0).abs() < 0.01 && (0.5 * wave.phase() - 0.7).abs() < 1e-3, "{wave:?}");
+        let two = |x: f64| 2.0 * (x - 0.4);
+        let wave = oval(waves(|x, flank| 20.0 * (0.5 * two(x).sin() + flank * a.tan() * two(x).cos()), 2.0), a);
+        assert!((wave.size() - 20.0).abs() < 0.01 && (0.5 * wave.phase() - 0.4).abs() < 1e-3, "{wave:?}");
+    }
+
+    /// The FEM of a drive that is known, read by the same formulas: signs and places of every field.
+    #[test]
+    fn the_fem_agrees_with_the_closed_forms_in_sign_place_and_size() {
+        type Change = fn(&mut Drive);
+        type Read = fn([Wave; 2], f64) -> Wave;
+        const PARTS: usize = 5;
+        fn whole([plus, minus]: [Wave; 2], _: f64) -> Wave {
+            plus.plus(minus).times(0.5)
+        }
+        let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
+        // Half a turn of the wave on the part, in as few places as tell the second order from the fourth and sixth.
+        let share = |on_circular_spline: bool| if on_circular_spline { 94.0 / 95.0 } else { 1.0 };
+        let psi = |k: usize, share: f64| k as f64 * PI / PARTS as f64 / share;
+        // At these places, with either flank.
+        let errors = |drive: &Drive, share: f64| {
+            let problem = Problem::new(drive, GeneratorKind::Cam, 20.0, settings).unwrap();
+            let at = |k, flank: f64| stands(&problem, psi(k, share), flank * PROBE_N_M).unwrap();
+            [1.0, -1.0].map(|flank| (0..PARTS).map(|k| at(k, flank)).collect::<Vec<f64>>())
+        };
+        let ideal = [false, true].map(|on_circular_spline| errors(&Drive::hhd_95(), share(on_circular_spline)));
+        let cases: [(&str, Change, Read, bool, f64, f64, f64); 6] = [
+            (
+                "circular-spline eccentricity",
+                |d| {
+                    d.as_built.circular_spline_eccentricity_um = 5.0;
+                    d.as_built.circular_spline_eccentricity_phase_deg = 50.0;
+                },
+                displaced,
+                true,
+                44.635,
+                5.0,
+                50.0,
+            ),
+            (
+                "flexspline runout",
+                |d| {
+                    d.as_built.flexspline_runout_um = 5.0;
+                    d.as_built.flexspline_runout_phase_deg = 50.0;
+                },
+                displaced,
+                false,
+                44.635,
+                5.0,
+                50.0,
+            ),
+            (
+                "axis displaced",
+                |d| {
+                    d.as_built.circular_spline_offset_um = 5.0;
+                    d.as_built.circular_spline_offset_direction_deg = 50.0;
+                },
+                displaced,
+                false,
+                44.635,
+                5.0,
+                50.0,
+            ),
+            (
+                "ovality",
+                |d| {
+                    d.as_built.circular_spline_ovality_um = 5.0;
+                    d.as_built.circular_spline_ovality_phase_deg = 50.0;
+                },
+                oval,
+                true,
+                48.7,
+                5.0,
+                50.0,
+            ),
+            (
+                "flexspline pitch",
+                |d| {
+                    d.as_built.flexspline_pitch_harmonics =
+                        vec![Harmonic { order: 2, amplitude_um: 5.0, phase_deg: 50.0 }];
+                },
+                whole,
+                false,
+                48.35,
+                5.0,
+                50.0,
+            ),
+            (
+                "circular-spline pitch",
+                |d| {
+                    d.as_built.circular_spline_pitch_harmonics =
+                        vec![Harmonic { order: 2, amplitude_um: 5.0, phase_deg: 50.0 }];
+                },
+                |waves, a| whole(waves, a).times(-1.0),
+                true,
+                49.05,
+                5.0,
+                50.0,
+            ),
+        ];
+        for (what, change, read, on_circular_spline, radius, size_um, place_deg) in cases {
+            let mut drive = Drive::hhd_95();
+            change(&mut drive);
+            let share = share(on_circular_spline);
+            let found = errors(&drive, share);
+            let found = [0, 1].map(|flank| {
+                let ideal = &ideal[usize::from(on_circular_spline)][flank];
+                let beyond: Vec<f64> = found[flank].iter().zip(ideal).map(|(built, ideal)| built - ideal).collect();
+                Wave::of(&beyond, |k| share * psi(k, share), 2.0)
+            });
+            let wave = read(found, drive.circular_spline.bearing_flank_angle_rad());
+            let size = 1e3 * wave.size() / ARCSEC_PER_RAD * radius;
+            let place = (0.5 * wave.phase()).to_degrees().rem_euclid(180.0);
+            println!("{what}: {size:.3} um at {place:.2} degrees, made {size_um} at {place_deg}");
+            assert!((size / size_um - 1.0).abs() < 0.15, "{what}: {size} um of {size_um}");
+            assert!((place - place_deg).abs() < 7.0, "{what}: at {place} degrees of {place_deg}");
+        }
+    }
+}

@@ -1,0 +1,331 @@
+//! `drive-extended.toml` of a drive known from its catalogue: `nominal.toml` with its numbers as the data have them, and the causes
+//! found.
+//!
+//! ```toml
+//! [[extension.cause]]
+//! name = "sensor_latency"
+//! [extension.cause.parameters]
+//! delay_s = 0.002
+//! ```
+//!
+//! The causes are re-simulated by the laws of [`crate::synthesize`], under the names that `diagnosis.json` gives their parameters.
+
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+use std::fmt::Write as _;
+use std::path::Path;
+
+use toml::de::DeTable;
+
+use crate::causes::{CauseName, ParameterName as Name};
+use crate::diagnosis::FittedCause;
+use crate::diagnosis::report::{Cause, Diagnosis, Parameter};
+use crate::measurement::Session;
+use crate::nominal::{Fixed, Nominal};
+use crate::synthesize::{Chosen, Excitation, Plant, Sizes, added_arcsec, parse};
+use flexspline_base::toml_file::{Entries, Refused, TomlFile, any, entries_of, one_of};
+use flexspline_mechanics::drive::{DriveError, Problem};
+
+/// A cause with the values of its parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CauseEntry {
+    /// Its name.
+    pub name: CauseName,
+    /// Parameters by name; the unit is the end of the name.
+    pub parameters: BTreeMap<String, f64>,
+}
+
+/// A nominal model with causes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Model {
+    /// The nominal model.
+    pub nominal: Nominal,
+    /// What was found beside it.
+    pub causes: Vec<CauseEntry>,
+}
+
+impl Model {
+    /// Reads `nominal.toml` or `drive-extended.toml`.
+    ///
+    /// # Errors
+    /// The file cannot be read; or every problem found, as [`Nominal::from_toml`] names them.
+    pub fn read(path: &Path) -> Result<Model, DriveError> {
+        let file = path.display().to_string();
+        let text = std::fs::read_to_string(path).map_err(|error| {
+            let problem = Problem { place: file.clone(), field: String::new(), what: error.to_string() };
+            DriveError { problems: vec![problem] }
+        })?;
+        Model::from_toml(&file, &text)
+    }
+
+    /// The model in the text of such a file.
+    ///
+    /// # Errors
+    /// Every problem found, each with file, field, value found and what is allowed.
+    pub fn from_toml(file_name: &str, text: &str) -> Result<Model, DriveError> {
+        let nominal = Nominal::from_toml(file_name, text)?;
+        let causes = causes_in(file_name, text)?;
+        Ok(Model { nominal, causes })
+    }
+
+    /// The nominal model recalibrated, with the causes of a diagnosis.
+    #[must_use]
+    pub fn of_diagnosis(nominal: &Nominal, diagnosis: &Diagnosis) -> Model {
+        let change = |name: &str| diagnosis.recalibrated.get(name).map_or(0.0, |p| p.value);
+        let mut nominal = nominal.clone();
+        // A relative change of the wind-up is the inverse one of the stiffness.
+        nominal.stiffness.iter_mut().for_each(|[_, k]| *k /= (1.0 + change("stiffness")).max(0.05));
+        nominal.backlash_arcsec *= (1.0 + change("backlash")).max(0.0);
+        if nominal.spread.harmonic > 0.0 {
+            // In phase and in quadrature, one pair for each harmonic that has an amplitude.
+            let changes = numbered(&diagnosis.recalibrated, "harmonic");
+            let waves = nominal.harmonics.iter_mut().filter(|h| h.amplitude_arcsec != 0.0);
+            for (harmonic, pair) in waves.zip(changes.chunks_exact(2)) {
+                let (along, across) = (1.0 + pair[0], pair[1]);
+                harmonic.amplitude_arcsec *= along.hypot(across);
+                harmonic.phase_rad += across.atan2(along);
+            }
+        }
+        let causes = diagnosis.causes.iter().map(CauseEntry::of).collect();
+        Model { nominal, causes }
+    }
+
+    /// The causes as effects that can be simulated.
+    #[must_use]
+    pub fn effects(&self) -> Vec<Chosen> {
+        self.causes.iter().filter_map(CauseEntry::effect).collect()
+    }
+
+    /// What the causes add to the error of each session, arcsec.
+    ///
+    /// # Errors
+    /// A parameter that does not fit the sessions.
+    pub fn added_arcsec(&self, sessions: &[Session], sizes: Sizes) -> Result<Vec<Vec<f64>>, String> {
+        let on = Excitation::of_sessions(sessions, 100.0, self.nominal.temperature_c);
+        let plant = Plant { nominal: &self.nominal, table: None };
+        let added = added_arcsec(&plant, sizes, &self.effects(), &on)?;
+        let mut of_session = on.sessions.iter().map(|rows| added[rows.clone()].to_vec());
+        Ok(sessions
+            .iter()
+            .map(
+                |session| {
+                    if session.len() > 1 { of_session.next().unwrap_or_default() } else { vec![0.0; session.len()] }
+                },
+            )
+            .collect())
+    }
+
+    /// The file.
+    #[must_use]
+    pub fn to_toml(&self) -> String {
+        let n = &self.nominal;
+        let mut text = String::from("[drive]\n");
+        match n.teeth {
+            Some(teeth) => {
+                let fixed = if teeth.fixed == Fixed::Flexspline { "flexspline" } else { "circular_spline" };
+                let _ = writeln!(
+                    text,
+                    "flexspline_teeth = {}\ncircular_spline_teeth = {}\nfixed = \"{fixed}\"",
+                    teeth.flexspline, teeth.circular_spline
+                );
+            }
+            None => {
+                let _ = writeln!(text, "ratio = {:?}", n.ratio);
+            }
+        }
+        let steps: Vec<String> = n.stiffness.iter().map(|[torque, k]| format!("[{torque:?}, {k:?}]")).collect();
+        let _ = writeln!(
+            text,
+            "\n[nominal]\nstiffness_n_m_per_rad = [{}]\nbacklash_arcsec = {:?}\nfriction_torque_n_m = {:?}\ntemperature_c = {:?}",
+            steps.join(", "),
+            n.backlash_arcsec,
+            n.friction_torque_n_m,
+            n.temperature_c
+        );
+        for h in &n.harmonics {
+            let _ = writeln!(
+                text,
+                "\n[[nominal.harmonic]]\norder_per_generator_turn = {:?}\namplitude_arcsec = {:?}\nphase_rad = {:?}",
+                h.order_per_generator_turn, h.amplitude_arcsec, h.phase_rad
+            );
+        }
+        let s = n.spread;
+        let _ = writeln!(
+            text,
+            "\n[nominal.unit_to_unit]\nstiffness = {:?}\nbacklash = {:?}\nharmonic = {:?}",
+            s.stiffness, s.backlash, s.harmonic
+        );
+        text + &causes_to_toml(&self.causes)
+    }
+}
+
+/// The causes in the part `[extension]` of a file, a drive's or a model's.
+///
+/// # Errors
+/// What is wrong, and in which line.
+pub fn causes_in(file_name: &str, text: &str) -> Result<Vec<CauseEntry>, DriveError> {
+    let mut file = TomlFile::new(file_name, text);
+    let causes = file.parse().map_or_else(Vec::new, |table| causes_of(&mut file, &table));
+    if file.is_sound() { Ok(causes) } else { Err(DriveError { problems: file.problems() }) }
+}
+
+fn causes_of(file: &mut TomlFile<'_>, table: &DeTable<'_>) -> Vec<CauseEntry> {
+    let Some(extension) = table.get("extension").and_then(|_| file.section(table, "extension")) else {
+        return Vec::new();
+    };
+    for key in extension.keys().filter(|key| key.get_ref() != "cause") {
+        let field = extension.path(key.get_ref());
+        file.refuse(key.span(), &field, "unknown key; allowed: cause".to_owned());
+    }
+    let known: Vec<(&'static str, CauseName)> = CauseName::ALL.iter().map(|cause| (cause.as_str(), *cause)).collect();
+    let causes = extension.each(file, "cause", |entry| {
+        let cause = Entries::of(entry, &["name", "parameters"])?;
+        let name = cause.needed("name", |v| one_of(&known, v))?;
+        let parameters = cause.given("parameters", |v| entries_of(v, any))?.unwrap_or_default();
+        let cause = CauseEntry { name, parameters };
+        cause.checked_effect().map_err(|what| Refused::because(entry, what))?;
+        Ok(cause)
+    });
+    causes.unwrap_or_default()
+}
+
+/// The part `[extension]` of a file; nothing without causes.
+pub fn causes_to_toml(causes: &[CauseEntry]) -> String {
+    let mut text = String::new();
+    for cause in causes {
+        let _ = writeln!(text, "\n[[extension.cause]]\nname = \"{}\"\n[extension.cause.parameters]", cause.name);
+        for (name, value) in &cause.parameters {
+            let _ = writeln!(text, "{name} = {value:?}");
+        }
+    }
+    text
+}
+
+/// Values of `name`, `name 4`, `name 5`, ... in the order of their numbers.
+fn numbered(parameters: &BTreeMap<String, Parameter>, name: &str) -> Vec<f64> {
+    let mut found: Vec<(usize, f64)> = parameters
+        .iter()
+        .filter_map(|(key, p)| {
+            let rest = key.strip_prefix(name)?;
+            let number = if rest.is_empty() { 0 } else { rest.trim().parse().ok()? };
+            Some((number, p.value))
+        })
+        .collect();
+    found.sort_by_key(|(number, _)| *number);
+    found.into_iter().map(|(_, value)| value).collect()
+}
+
+impl CauseEntry {
+    /// A cause of a diagnosis.
+    #[must_use]
+    pub fn of(cause: &Cause) -> CauseEntry {
+        CauseEntry {
+            name: cause.name,
+            parameters: cause.parameters.iter().map(|(name, p)| ((*name).to_owned(), p.value)).collect(),
+        }
+    }
+
+    /// A cause as it was fitted.
+    #[must_use]
+    pub fn of_fitted(cause: &FittedCause) -> CauseEntry {
+        CauseEntry {
+            name: cause.name(),
+            parameters: cause.parameters.iter().map(|(name, p)| ((*name).to_owned(), p.value)).collect(),
+        }
+    }
+
+    /// The effect that simulates it, if there is one.
+    #[must_use]
+    pub fn effect(&self) -> Option<Chosen> {
+        self.checked_effect().ok()
+    }
+
+    fn checked_effect(&self) -> Result<Chosen, String> {
+        let mut text = String::new();
+        let twice = [Name::AmplitudeUm, Name::DepthUm, Name::Tooth, Name::GeneratorAmplitudeArcsec];
+        let has = |name: Name| self.parameters.contains_key(name.as_str());
+        for parameter in self.name.parameters() {
+            let Some(&value) = self.parameters.get(parameter.name.as_str()) else { continue };
+            // Of two forms of the same, the one in arc-seconds and radians.
+            if twice.contains(&parameter.name) && (has(Name::AmplitudeArcsec) || has(Name::AngleRad)) {
+                continue;
+            }
+            let value = match parameter.name {
+                Name::PhaseRad => value.rem_euclid(TAU),
+                Name::Wheel | Name::Harmonic => value.round(),
+                _ => value,
+            };
+            let [low, high] = parameter.range;
+            let _ = write!(text, "{}={:?},", parameter.name, value.clamp(low, high));
+        }
+        parse(&format!("{}:{text}", self.name))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synthesize::catalogue_drive;
+
+    fn model() -> Model {
+        let entry = |name: CauseName, parameters: &[(&str, f64)]| CauseEntry {
+            name,
+            parameters: parameters.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect(),
+        };
+        Model {
+            nominal: catalogue_drive(),
+            causes: vec![
+                entry(CauseName::SensorLatency, &[("delay_s", 0.0021)]),
+                entry(
+                    CauseName::FlexsplineRunout,
+                    &[("amplitude_arcsec", 31.0), ("amplitude_um", 7.0), ("phase_rad", 3.0), ("half_load_n_m", 9.0)],
+                ),
+            ],
+        }
+    }
+
+    #[test]
+    fn what_is_written_reads_back_the_same() {
+        let model = model();
+        assert_eq!(Model::from_toml("d.toml", &model.to_toml()).unwrap(), model);
+        let effects = model.effects();
+        assert_eq!(effects.len(), 2);
+        assert_eq!(effects[0].given(Name::DelayS), Some(0.0021));
+        assert_eq!((effects[1].given(Name::AmplitudeArcsec), effects[1].given(Name::AmplitudeUm)), (Some(31.0), None));
+    }
+
+    #[test]
+    fn a_wrong_extension_is_refused_by_field_and_value() {
+        let text = model().to_toml();
+        for (from, to, message) in [
+            (
+                "sensor_latency",
+                "sensor_lag",
+                "d.toml:28: extension.cause[0].name: found \"sensor_lag\", allowed: \"circ",
+            ),
+            (
+                "delay_s = 0.0021",
+                "delay_s = \"old\"",
+                "d.toml:30: extension.cause[0].parameters.delay_s: found \"old\", allowed: a number",
+            ),
+            (
+                "[extension.cause.parameters]",
+                "[extension.cause.numbers]",
+                "d.toml:29: extension.cause[0].numbers: unknown key; allowed: name, parameters",
+            ),
+        ] {
+            let error = Model::from_toml("d.toml", &text.replacen(from, to, 1)).unwrap_err().to_string();
+            assert!(error.starts_with(message), "{to}: {error}");
+        }
+    }
+
+    #[test]
+    fn harmonics_take_the_changes_of_their_own() {
+        let parameter = |value| Parameter { value, std: 0.0 };
+        let recalibrated: BTreeMap<String, Parameter> =
+            [("backlash", 9.0), ("harmonic", 0.1), ("harmonic 4", 0.2), ("harmonic 10", 0.4), ("harmonic 5", 0.3)]
+                .map(|(name, value)| (name.to_owned(), parameter(value)))
+                .into();
+        assert_eq!(numbered(&recalibrated, "harmonic"), [0.1, 0.2, 0.3, 0.4]);
+    }
+}

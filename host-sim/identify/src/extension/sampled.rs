@@ -1,0 +1,296 @@
+//! Tables of the extended model: sampled in steady motion, both ways, at the nodes of torque and temperature, and projected by the
+//! core's own code.
+
+use std::f64::consts::TAU;
+
+use flexspline::make::{Harmonics, MissingDirection, NODES_PER_PERIOD, Plan, Sample};
+use flexspline::{Direction, Table};
+
+use crate::causes::{CauseName, InTable, ParameterName};
+use crate::diagnosis::{Extended, FittedCause};
+use crate::measurement::Session;
+use crate::nominal::Nominal;
+use flexspline_base::units::ARCSEC_PER_RAD;
+use flexspline_design::tables::{MadeTable, Source, TableError, from_plan, places_that_tell_apart};
+use flexspline_mechanics::drive::GeneratorKind;
+
+/// Positions over a whole turn of the output, at least and at most. Fitted are a few dozen numbers at each load.
+const LEAST_POSITIONS: usize = 151;
+const MOST_POSITIONS: usize = 1009;
+/// Orders that a model may have beside those fitted: of what is rectified by the clearance.
+const FURTHER_ORDERS: [u16; 3] = [8, 10, 12];
+/// Orders that are to be told apart stay apart by so much where the positions fold them.
+const APART: f64 = 0.9;
+/// Tooth meshes of higher order than this are none in the model.
+const MESHES: u16 = 4;
+/// Positions that a session runs through before those that are sampled: the play comes to rest.
+const BEFORE: usize = 40;
+/// Positions of the tooth pitch in a table.
+const RIPPLE_NODES: usize = 8;
+/// Orders fitted: of the generator and of the generator against the output, and of the output.
+const ORDERS: [u16; 5] = [1, 2, 3, 4, 6];
+const OUTPUT_ORDERS: [u16; 2] = [1, 2];
+/// Nodes of the torque axis on each side where no table gives them, how they crowd towards the friction, and half the width of the
+/// jump there, of the friction.
+const TORQUE_STEPS: u32 = 9;
+const CROWDING: f64 = 1.6;
+const JUMP_HALF_WIDTH: f64 = 0.002;
+/// Friction that a model without any is given, of the largest torque: the play needs a torque at which it changes flanks.
+const LEAST_FRICTION: f64 = 1e-3;
+/// Half-width (rad) below zero that is taken for what the projection leaves.
+const NEGATIVE_HALF_WIDTH_RAD: f64 = 1e-4;
+/// Temperatures closer than this, K, are one.
+const ONE_TEMPERATURE_K: f64 = 2.0;
+
+/// Nodes symmetric about zero: a pair at either side of the friction, where the flank changes, and further ones up to the largest
+/// torque.
+fn torque_nodes(friction: f64, largest: f64) -> Vec<f32> {
+    let half = JUMP_HALF_WIDTH * friction;
+    let further = (1..=TORQUE_STEPS).map(|k| {
+        let share = (f64::from(k) / f64::from(TORQUE_STEPS)).powf(CROWDING);
+        friction + half + (largest - friction - half) * share
+    });
+    let positive: Vec<f64> = [friction - half, friction + half].into_iter().chain(further).collect();
+    positive.iter().rev().map(|t| -t).chain(positive.iter().copied()).map(|t| t as f32).collect()
+}
+
+/// Positions over a whole turn of the output on which no order of the tooth mesh, of the generator, of the generator against the output,
+/// or of the output folds onto another: a prime.
+fn positions(ratio: f64, teeth: f64) -> usize {
+    let ratio = ratio.abs();
+    let turns = [ratio, ratio - 1.0, ratio + 1.0];
+    let of_generator =
+        ORDERS.iter().chain(&FURTHER_ORDERS).flat_map(|k| turns.map(|per_turn| f64::from(*k) * per_turn));
+    let of_output = OUTPUT_ORDERS.iter().map(|k| f64::from(*k));
+    let of_mesh = (1..=MESHES).map(|k| f64::from(k) * teeth * ratio);
+    let orders: Vec<f64> = of_generator.chain(of_output).chain(of_mesh).chain([0.0]).collect();
+    places_that_tell_apart(&orders, [LEAST_POSITIONS, MOST_POSITIONS], APART)
+}
+
+/// What a table is made for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TableSubject {
+    /// Generator that names the file.
+    pub kind: GeneratorKind,
+    /// Name of the drive.
+    pub drive: String,
+    /// BLAKE3 of the drive, or of the nominal model.
+    pub hash: [u8; 32],
+}
+
+/// What tables of an extended model are made from.
+#[derive(Clone, Copy)]
+pub struct ExtendedTables<'a> {
+    /// The nominal model.
+    pub nominal: &'a Nominal,
+    /// The table that takes its place, if there is one.
+    pub table: Option<&'a Table<'a>>,
+    /// What the table is made for.
+    pub subject: &'a TableSubject,
+    /// Torque, N·m, and temperatures, °C, of the data, where no table gives the axes.
+    pub torque_n_m: f64,
+    /// Least and largest.
+    pub temperatures_c: [f64; 2],
+    /// Angle against gravity at which the drive stays, rad; `None` if it is turned about, or not known.
+    pub orientation_rad: Option<f64>,
+}
+
+impl ExtendedTables<'_> {
+    /// Why a cause is not in a table of this drive, if it is not; `found` in data, if it was.
+    #[must_use]
+    pub fn left_out(&self, cause: CauseName, found: Option<&FittedCause>) -> Option<&'static str> {
+        let at_output = |found: &FittedCause| {
+            found.parameters.get(ParameterName::Encoder.as_str()).is_some_and(|encoder| encoder.value == 1.0)
+        };
+        match cause.in_table() {
+            InTable::Yes if found.is_some_and(at_output) => Some(CauseName::OF_THE_OUTPUT_ENCODER),
+            InTable::Yes => None,
+            InTable::AtOneOrientation => {
+                self.orientation_rad.is_none().then_some("the drive is turned against gravity")
+            }
+            InTable::No(why) => Some(why),
+        }
+    }
+
+    /// The nominal model as a table; the one given, if one is given.
+    ///
+    /// # Errors
+    /// The samples make no table.
+    pub fn nominal(&self, extended: &Extended) -> Result<MadeTable, TableError> {
+        self.make(extended, false)
+    }
+
+    /// The extended model as a table, without the causes that have no place there. The zero of the encoder is not in it.
+    ///
+    /// # Errors
+    /// The samples make no table.
+    pub fn extended(&self, extended: &Extended) -> Result<MadeTable, TableError> {
+        self.make(extended, true)
+    }
+
+    fn axes(&self) -> (Vec<f32>, Vec<f32>) {
+        if let Some(table) = self.table {
+            return (table.torque_nodes_n_m().collect(), table.temperature_nodes_c().collect());
+        }
+        let largest = self.torque_n_m.max(1e-3);
+        let friction = self.nominal.friction_torque_n_m.max(LEAST_FRICTION * largest);
+        let torques = torque_nodes(friction, largest.max(3.0 * friction));
+        let [low, high] = self.temperatures_c;
+        let temperatures = if high - low > ONE_TEMPERATURE_K {
+            vec![low as f32, high as f32]
+        } else {
+            vec![f64::midpoint(low, high) as f32]
+        };
+        (torques, temperatures)
+    }
+
+    fn make(&self, extended: &Extended, with_causes: bool) -> Result<MadeTable, TableError> {
+        let (torques, temperatures) = self.axes();
+        let drive = self.core_drive()?;
+        let samples = self.sample(extended, with_causes, &torques, &temperatures);
+        let curve = |orders: &'static [u16]| {
+            let highest = usize::from(orders.iter().copied().max().unwrap_or(1));
+            Harmonics { orders, nodes: NODES_PER_PERIOD * highest }
+        };
+        let plan = Plan {
+            drive,
+            torque_nodes_n_m: &torques,
+            temperature_nodes_c: &temperatures,
+            ripple_nodes: RIPPLE_NODES,
+            generator: curve(&ORDERS),
+            material: curve(&ORDERS),
+            output: curve(&OUTPUT_ORDERS),
+            missing_direction: MissingDirection::Refuse,
+            negative_half_width_tolerance_rad: NEGATIVE_HALF_WIDTH_RAD,
+            deviation_limit_rad: f64::from(flexspline::MAX_ERROR_RAD),
+        };
+        let of = if with_causes { "extended model" } else { "nominal model" };
+        let source =
+            Source::File { name: of.to_owned(), blake3: blake3::Hash::from(self.subject.hash).to_hex().to_string() };
+        from_plan(&self.subject.drive, self.subject.hash, self.subject.kind, &plan, &samples, source)
+    }
+
+    fn core_drive(&self) -> Result<flexspline::Drive, TableError> {
+        if let Some(table) = self.table {
+            return Ok(*table.drive());
+        }
+        let refuse = |flexspline, circular_spline, reason: String| TableError::Teeth {
+            drive: self.subject.drive.clone(),
+            flexspline,
+            circular_spline,
+            reason,
+        };
+        let teeth = self.nominal.teeth.ok_or_else(|| refuse(0, 0, "a ratio without teeth".to_owned()))?;
+        teeth.core_drive().map_err(|error| refuse(teeth.flexspline, teeth.circular_spline, error.to_string()))
+    }
+
+    /// Steady motion both ways through a whole turn of the output at every node.
+    fn sample(&self, extended: &Extended, with_causes: bool, torques: &[f32], temperatures: &[f32]) -> Vec<Sample> {
+        let ratio = self.nominal.ratio;
+        // Without teeth there is no mesh.
+        let positions = positions(ratio, self.nominal.teeth.map_or(0.5, |teeth| f64::from(teeth.flexspline)));
+        let mut nodes = Vec::new();
+        let mut sessions = Vec::new();
+        for &temperature in temperatures {
+            for &torque in torques {
+                for turn in [1.0, -1.0] {
+                    nodes.push((torque, temperature, turn * ratio.signum()));
+                    sessions.push(self.steady(
+                        turn,
+                        positions,
+                        f64::from(torque),
+                        f64::from(temperature),
+                        sessions.len(),
+                    ));
+                }
+            }
+        }
+        let series = extended.predict(&sessions, self.nominal, self.table);
+        let left_out: Vec<bool> =
+            extended.causes().iter().map(|cause| self.left_out(cause.name(), Some(cause)).is_some()).collect();
+        let mut samples = Vec::new();
+        let mut beyond = 0.0;
+        for (((torque, temperature, forward), session), series) in nodes.iter().zip(&sessions).zip(&series) {
+            for k in BEFORE..session.len() {
+                let error = if with_causes {
+                    let without: f64 = series
+                        .cause_arcsec
+                        .iter()
+                        .zip(&left_out)
+                        .filter(|(_, out)| **out)
+                        .map(|(part, _)| part[k])
+                        .sum();
+                    series.extended_arcsec[k] - without
+                } else {
+                    series.nominal_arcsec[k]
+                };
+                beyond += error - series.nominal_arcsec[k];
+                let generator_rad = session.generator_rad[k];
+                samples.push(Sample {
+                    generator_rad,
+                    torque_n_m: f64::from(*torque),
+                    temperature_c: f64::from(*temperature),
+                    direction: if *forward > 0.0 { Direction::Forward } else { Direction::Backward },
+                    output_rad: generator_rad / ratio + error / ARCSEC_PER_RAD,
+                });
+            }
+        }
+        // The zero of the encoder: what is left when both signs of load, both directions and all angles have their part.
+        let zero = beyond / samples.len().max(1) as f64 / ARCSEC_PER_RAD;
+        samples.iter_mut().for_each(|sample| sample.output_rad -= zero);
+        samples
+    }
+
+    fn steady(&self, turn: f64, positions: usize, torque: f64, temperature: f64, number: usize) -> Session {
+        let step = turn * TAU * self.nominal.ratio.abs() / positions as f64;
+        let rows = BEFORE + positions;
+        Session {
+            line: (0..rows as u64).collect(),
+            // So slow that nothing of it depends on speed.
+            time_s: Some((0..rows).map(|k| 1e4 * (k + 2 * rows * number) as f64).collect()),
+            generator_rad: (0..rows).map(|k| (k as f64 - BEFORE as f64) * step).collect(),
+            error_rad: vec![0.0; rows],
+            torque_n_m: Some(vec![torque; rows]),
+            temperature_c: Some(vec![temperature; rows]),
+            orientation_rad: Some(vec![self.orientation_rad.unwrap_or(0.0); rows]),
+            ..Session::default()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nodes_rise_and_the_jump_is_known_for_one() {
+        for (friction, largest) in [(1.5, 40.0), (0.04, 40.0), (10.0, 30.0), (1e-3, 1.0)] {
+            let nodes = torque_nodes(friction, largest);
+            assert!(nodes.windows(2).all(|pair| pair[0] < pair[1]), "{nodes:?}");
+            assert!((f64::from(nodes[nodes.len() - 1]) / largest - 1.0).abs() < 1e-6);
+            let width = |k: usize| nodes[k + 1] - nodes[k];
+            let jump = nodes.len() / 2;
+            assert!(width(jump + 1) > 8.0 * width(jump) && width(jump - 1) > 8.0 * width(jump), "{nodes:?}");
+        }
+    }
+
+    #[test]
+    fn no_order_folds_onto_another() {
+        for (ratio, teeth, fixed) in
+            [(95.0, 188i64, 1i64), (-94.0, 188, -1), (50.0, 100, 1), (121.0, 240, 1), (160.0, 318, 1)]
+        {
+            let count = positions(ratio, teeth as f64) as i64;
+            assert!(count < 400, "{count} positions for {ratio}");
+            let folded = |per_output_turn: i64| {
+                let rest = per_output_turn.rem_euclid(count);
+                rest.min(count - rest)
+            };
+            let generator = ratio.abs() as i64;
+            let orders = ORDERS.iter().flat_map(|k| [generator, generator - fixed].map(|of| of * i64::from(*k)));
+            let mesh = (1..=4).map(|k| teeth * generator * k);
+            let mut all: Vec<i64> = orders.chain([1, 2]).chain(mesh).map(folded).chain([0]).collect();
+            all.sort_unstable();
+            assert!(all.windows(2).all(|pair| pair[0] < pair[1]), "{ratio}: {all:?}");
+        }
+    }
+}

@@ -1,0 +1,453 @@
+//! Which column of a file holds what, and in which unit.
+
+use std::fmt;
+
+use thiserror::Error;
+
+use super::reader::{Layout, unit_word};
+use super::unit::Wrong;
+pub use super::unit::{Reading, Unit};
+use flexspline_base::csv_rows::TableProblem;
+use flexspline_base::suggest::{did_you_mean, likeliest, question};
+
+/// What a column may hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Quantity {
+    /// Time.
+    Time,
+    /// Generator angle.
+    Generator,
+    /// Output angle.
+    Output,
+    /// Output angle less generator over ratio.
+    Error,
+    /// Load torque at the output.
+    Torque,
+    /// Temperature.
+    Temperature,
+    /// Angle of the drive against gravity.
+    Orientation,
+}
+
+impl Quantity {
+    /// All of them.
+    pub const ALL: [Quantity; 7] = [
+        Quantity::Time,
+        Quantity::Generator,
+        Quantity::Output,
+        Quantity::Error,
+        Quantity::Torque,
+        Quantity::Temperature,
+        Quantity::Orientation,
+    ];
+
+    /// Its name in a mapping.
+    pub fn name(self) -> &'static str {
+        match self {
+            Quantity::Time => "time",
+            Quantity::Generator => "generator",
+            Quantity::Output => "output",
+            Quantity::Error => "error",
+            Quantity::Torque => "torque",
+            Quantity::Temperature => "temperature",
+            Quantity::Orientation => "orientation",
+        }
+    }
+
+    /// The column it has in a file without a mapping, and the unit there.
+    pub fn default_column(self) -> (&'static str, Unit) {
+        match self {
+            Quantity::Time => ("time_s", Unit::Second),
+            Quantity::Generator => ("generator_rad", Unit::Radian),
+            Quantity::Output => ("output_rad", Unit::Radian),
+            Quantity::Error => ("error_arcsec", Unit::Arcsecond),
+            Quantity::Torque => ("torque_n_m", Unit::NewtonMetre),
+            Quantity::Temperature => ("temperature_c", Unit::Celsius),
+            Quantity::Orientation => ("orientation_rad", Unit::Radian),
+        }
+    }
+
+    /// The units it may have.
+    pub fn units(self) -> &'static [Unit] {
+        match self {
+            Quantity::Time => &Unit::OF_TIME,
+            Quantity::Torque => &Unit::OF_TORQUE,
+            Quantity::Temperature => &Unit::OF_TEMPERATURE,
+            _ => &Unit::OF_ANGLES,
+        }
+    }
+
+    /// The largest size a value may have, in the unit used inside (rad, s, N·m, °C): beyond it a double no longer resolves an
+    /// arc-second, or nothing of the kind exists.
+    pub(super) fn limit(self) -> f64 {
+        match self {
+            Quantity::Time => 1e11,
+            Quantity::Torque => 1e9,
+            Quantity::Temperature => 1e6,
+            _ => 1e9,
+        }
+    }
+}
+
+impl fmt::Display for Quantity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// A mapping that cannot be used.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("--columns: {0}; for instance --columns generator=wave_gen_turns:turn,error=error_arcsec:arcsec")]
+pub struct MappingError(String);
+
+/// Names and units of columns where they differ from `time_s, generator_rad, output_rad, error_arcsec, torque_n_m, temperature_c,
+/// orientation_rad`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ColumnMap {
+    given: Vec<Given>,
+    rate_hz: Option<f64>,
+}
+
+/// A column that was named.
+#[derive(Debug, Clone, PartialEq)]
+struct Given {
+    quantity: Quantity,
+    column: String,
+    /// `None` where neither the mapping nor the name says a unit.
+    reading: Option<Reading>,
+}
+
+/// A column in use.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    /// What it holds.
+    pub quantity: Quantity,
+    /// Its name in the header.
+    pub name: String,
+    /// Where it stands, from 0.
+    pub place: usize,
+    /// Its unit; counts that are divided are turns.
+    pub unit: Unit,
+    /// How its numbers are read.
+    pub reading: Reading,
+}
+
+impl ColumnMap {
+    /// Reads `generator=wave_gen_turns:turn,error=error_arcsec:arcsec`, or with columns by number, signs and gains
+    /// `generator=#1:count/16777216,torque=#4:-N.m`. Without `:unit` a name that ends in a unit says it (`_rad`, `_deg`, `_turns`, …), else
+    /// a line of units below the names, else it is that of the default column.
+    pub fn parse(text: &str) -> Result<ColumnMap, MappingError> {
+        ColumnMap::with_torque_constant(text, None)
+    }
+
+    /// Reads a mapping with the torque at the output for an ampere where the torque is given as a current, N·m.
+    pub fn with_torque_constant(text: &str, per_ampere: Option<f64>) -> Result<ColumnMap, MappingError> {
+        let mut map = ColumnMap::default();
+        for entry in text.split(',').map(str::trim) {
+            let given = given(entry, per_ampere)?;
+            let clash = map.given.iter().find(|other| other.quantity == given.quantity || other.column == given.column);
+            if let Some(before) = clash {
+                let (name, column) = (given.quantity, &given.column);
+                let what = if before.quantity == name {
+                    format!("{name} is there twice")
+                } else {
+                    format!("column {column} stands for both {} and {name}", before.quantity)
+                };
+                return Err(MappingError(what));
+            }
+            map.given.push(given);
+        }
+        Ok(map)
+    }
+
+    /// With a rate of rows, Hz, for files that hold no time.
+    ///
+    /// # Errors
+    /// It is not above zero, or not finite.
+    pub fn at_rate(self, rate_hz: Option<f64>) -> Result<ColumnMap, String> {
+        match rate_hz {
+            Some(rate) if !(rate.is_finite() && rate > 0.0) => {
+                Err(format!("--rate: found {rate}, allowed: a rate above zero, Hz"))
+            }
+            _ => Ok(ColumnMap { rate_hz, ..self }),
+        }
+    }
+
+    /// The rate of rows, Hz, if it was said.
+    pub(super) fn rate_hz(&self) -> Option<f64> {
+        self.rate_hz
+    }
+
+    /// The names that are looked for.
+    pub(super) fn known(&self) -> Vec<&str> {
+        let defaults = Quantity::ALL.iter().map(|quantity| quantity.default_column().0);
+        self.given.iter().map(|given| given.column.as_str()).chain(defaults).collect()
+    }
+
+    /// The columns in use of a file with these `names`. Of output and error one is used: the one that was mapped, else the output.
+    /// `layout` if the file is not laid out as usual.
+    pub(super) fn resolve(
+        &self,
+        names: &[String],
+        line: u64,
+        layout: Option<&Layout>,
+    ) -> Result<Vec<Column>, TableProblem> {
+        let problem = |what: String| TableProblem { line, what };
+        let mut columns = Vec::new();
+        for quantity in Quantity::ALL {
+            let given = self.given.iter().find(|given| given.quantity == quantity);
+            let default = quantity.default_column();
+            let name = given.map_or(default.0, |given| given.column.as_str());
+            let mut places = names.iter().enumerate().filter(|(_, n)| *n == name).map(|(place, _)| place);
+            let place = match (places.next(), places.next()) {
+                (Some(_), Some(_)) => return Err(problem(format!("column {name} is there twice"))),
+                (Some(place), None) => Some(place),
+                (None, _) => given.and_then(|_| by_number(name, names.len())),
+            };
+            let Some(place) = place else {
+                if given.is_none() {
+                    continue;
+                }
+                let hint = meant(name, names);
+                let mut what = format!("column {name} is missing, which --columns gives for {quantity}; {hint}");
+                what.push_str(&found(names, layout));
+                return Err(problem(what));
+            };
+            let reading = match given.and_then(|given| given.reading) {
+                Some(reading) => reading,
+                None => unit_below(quantity, place, layout)
+                    .map_err(|what| problem(format!("column {name}: {what}")))?
+                    .unwrap_or(Reading::of(default.1)),
+            };
+            columns.push(Column { quantity, name: name.to_owned(), place, unit: reading.plain_unit(), reading });
+        }
+        let has = |columns: &[Column], quantity| columns.iter().any(|c| c.quantity == quantity);
+        let mapped = |quantity| self.given.iter().any(|given| given.quantity == quantity);
+        if has(&columns, Quantity::Output) && has(&columns, Quantity::Error) {
+            let spare =
+                if mapped(Quantity::Error) && !mapped(Quantity::Output) { Quantity::Output } else { Quantity::Error };
+            columns.retain(|c| c.quantity != spare);
+        }
+        let hint = separator(names);
+        if !has(&columns, Quantity::Generator) {
+            let meant = meant("generator_rad", names);
+            return Err(problem(format!("column generator_rad is missing; {hint}{meant}{}", found(names, layout))));
+        }
+        if !has(&columns, Quantity::Output) && !has(&columns, Quantity::Error) {
+            let what = "neither column output_rad nor error_arcsec is there; one is needed";
+            let meant = [meant("output_rad", names), meant("error_arcsec", names)].concat();
+            return Err(problem(format!("{what}; {hint}{meant}{}", found(names, layout))));
+        }
+        Ok(columns)
+    }
+
+    /// What to say of columns that are not among the `used` ones, though they are nearly called as one that is missing.
+    pub(super) fn misspelt(&self, names: &[String], used: &[Column]) -> Vec<String> {
+        let spare: Vec<&str> =
+            names.iter().map(String::as_str).filter(|name| used.iter().all(|column| column.name != *name)).collect();
+        let missing = Quantity::ALL.into_iter().filter(|q| used.iter().all(|column| column.quantity != *q));
+        // Of output and error one is used.
+        let missing = missing.filter(|q| !matches!(q, Quantity::Output | Quantity::Error));
+        missing
+            .filter_map(|quantity| {
+                let (default, _) = quantity.default_column();
+                let name = likeliest(default, spare.iter().copied())?;
+                let unit =
+                    Unit::in_name(name).filter(|unit| quantity.units().contains(unit)).map_or("UNIT", Unit::name);
+                Some(format!(
+                    "column {name} is not used; if it is {default}, say so with --columns {quantity}={name}:{unit}"
+                ))
+            })
+            .collect()
+    }
+}
+
+/// One entry of a mapping.
+fn given(entry: &str, per_ampere: Option<f64>) -> Result<Given, MappingError> {
+    let (name, column) = entry
+        .split_once('=')
+        .ok_or_else(|| MappingError(format!("found \"{entry}\", allowed: name=column:unit, separated by commas")))?;
+    let name = name.trim();
+    let quantity = Quantity::ALL.into_iter().find(|q| q.name() == name).ok_or_else(|| {
+        let names = Quantity::ALL.map(Quantity::name);
+        let hint = did_you_mean("; ", name, names);
+        MappingError(format!("found the name \"{name}\", allowed: {}{hint}", names.join(", ")))
+    })?;
+    let (column, reading) = match column.rsplit_once(':') {
+        None => {
+            let ending = Unit::in_name(column.trim()).filter(|unit| quantity.units().contains(unit));
+            let reading = ending.map(|unit| Reading::parse(unit.name(), quantity.units(), per_ampere));
+            (column, reading.transpose())
+        }
+        Some((column, unit)) => (column, Reading::parse(unit, quantity.units(), per_ampere).map(Some)),
+    };
+    let reading = reading.map_err(|wrong| match wrong {
+        Wrong::Text(what) => MappingError(format!("{name}: {what}")),
+        Wrong::Unit(unit) => {
+            let units: Vec<_> = quantity.units().iter().map(|u| u.name()).collect();
+            let hint = did_you_mean("; ", &unit, units.iter().copied());
+            MappingError(format!("{name}: found the unit \"{unit}\", allowed: {}{hint}", units.join(", ")))
+        }
+    })?;
+    let column = column.trim().to_owned();
+    if column.is_empty() {
+        return Err(MappingError(format!("{name}: found no column, allowed: the name of a column of the file")));
+    }
+    Ok(Given { quantity, column, reading })
+}
+
+/// The place that `#3`, or `3` where no column is called so, stands for.
+fn by_number(name: &str, columns: usize) -> Option<usize> {
+    let number: usize = name.strip_prefix('#').unwrap_or(name).parse().ok()?;
+    (1..=columns).contains(&number).then(|| number - 1)
+}
+
+/// What a line of units below the names says of a column, if it says something that the quantity may be in.
+fn unit_below(quantity: Quantity, place: usize, layout: Option<&Layout>) -> Result<Option<Reading>, String> {
+    let Some(word) = layout.and_then(|layout| layout.units.get(place)).map(|unit| unit_word(unit)) else {
+        return Ok(None);
+    };
+    let unit = Unit::written(word).filter(|unit| quantity.units().contains(unit));
+    let reading = unit.map(|unit| Reading::parse(unit.name(), quantity.units(), None)).transpose();
+    reading.map_err(|wrong| match wrong {
+        Wrong::Unit(unit) | Wrong::Text(unit) => unit,
+    })
+}
+
+/// The column that may be meant by `wanted`, if there is one.
+fn meant(wanted: &str, names: &[String]) -> String {
+    likeliest(wanted, names.iter().map(String::as_str)).map_or_else(String::new, |name| question(name) + " ")
+}
+
+/// What the header holds, and how to name it.
+fn found(names: &[String], layout: Option<&Layout>) -> String {
+    if names.iter().all(|name| name.is_empty()) {
+        return "the file has no header".to_owned();
+    }
+    let numbers = names.iter().all(|name| name.is_empty() || name.parse::<f64>().is_ok());
+    if numbers || layout.is_some_and(|layout| !layout.has_names) {
+        return format!(
+            "the first line has numbers, no names; the {} columns are mapped by number, --columns generator=#1:UNIT,output=#2:UNIT",
+            names.len()
+        );
+    }
+    let mut shown: Vec<String> = names.iter().take(12).map(|name| name.chars().take(40).collect()).collect();
+    if names.len() > 12 {
+        shown.push("…".to_owned());
+    }
+    format!(
+        "found: {}; other names are mapped with --columns generator=NAME:UNIT,… (`flexspline look FILE` proposes it)",
+        shown.join(", ")
+    )
+}
+
+/// Says so if the header is separated by something else than commas.
+fn separator(names: &[String]) -> &'static str {
+    match names {
+        [one] if one.contains([' ', '\t', ';', '|']) => "no rows of numbers were found below; ",
+        _ => "",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(text: &str) -> Vec<String> {
+        text.split(',').map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn a_mapping_names_columns_and_units() {
+        let map = ColumnMap::parse("generator=wave_gen_turns:turn, error=error_arcsec,time=t_s").unwrap();
+        let columns = map.resolve(&names("t_s,wave_gen_turns,error_arcsec,output_rad"), 1, None).unwrap();
+        let said: Vec<_> = columns.iter().map(|c| (c.quantity.name(), c.place, c.unit.name())).collect();
+        assert_eq!(said, [("time", 0, "s"), ("generator", 1, "turn"), ("error", 2, "arcsec")]);
+        // A name may hold a colon if the unit is said, and a unit in the name is believed.
+        let map = ColumnMap::parse("generator=enc:1:deg,output=load_deg").unwrap();
+        let columns = map.resolve(&names("enc:1,load_deg"), 1, None).unwrap();
+        assert_eq!((columns[0].unit, columns[1].unit), (Unit::Degree, Unit::Degree));
+    }
+
+    #[test]
+    fn the_output_is_used_where_both_are_there() {
+        let both = names("generator_rad,error_arcsec,output_rad");
+        let columns = ColumnMap::default().resolve(&both, 1, None).unwrap();
+        assert_eq!(columns[1].quantity, Quantity::Output);
+    }
+
+    #[test]
+    fn columns_go_by_number_where_no_name_is_meant() {
+        let map = ColumnMap::parse("generator=#2:count/4096,output=3:-deg,torque=1").unwrap();
+        let columns = map.resolve(&names("1,b,c"), 1, None).unwrap();
+        let said: Vec<_> = columns.iter().map(|c| (c.quantity.name(), c.place, c.unit.name())).collect();
+        assert_eq!(said, [("generator", 1, "turn"), ("output", 2, "deg"), ("torque", 0, "N.m")]);
+        assert_eq!(columns[0].reading.value(1024.0), std::f64::consts::TAU / 4.0);
+        assert_eq!(columns[1].reading.value(180.0), -std::f64::consts::PI);
+        let missing = ColumnMap::parse("generator=#4:deg").unwrap().resolve(&names("a,b,c"), 1, None).unwrap_err();
+        assert!(missing.what.contains("column #4 is missing"), "{missing:?}");
+    }
+
+    #[test]
+    fn wrong_mappings_are_refused_each_with_its_own_message() {
+        for (text, said) in [
+            ("", "found \"\""),
+            ("generator", "found \"generator\""),
+            ("generator=", "generator: found no column"),
+            ("angle=a:rad", "found the name \"angle\""),
+            ("generator=a:grad", "generator: found the unit \"grad\", allowed: rad, deg"),
+            ("torque=a:rad", "torque: found the unit \"rad\", allowed: N.m"),
+            ("time=a:K", "time: found the unit \"K\", allowed: s, ms"),
+            ("time=a,time=b", "time is there twice"),
+            ("generator=a:rad,output=a:rad", "column a stands for both generator and output"),
+            ("generater=a", "temperature, orientation; did you mean `generator`?"),
+            ("temp=a", "did you mean `temperature`?"),
+            ("generator=a:degrees", "mrad, count; did you mean `deg`?"),
+            ("torque=a:n.m", "did you mean `N.m`?"),
+            ("temperature=a:c", "allowed: C, K, F; did you mean `C`?"),
+            ("generator=a:count", "how many counts make a turn, for instance count/16777216"),
+            ("torque=a:mA", "--torque-constant"),
+            ("torque=a_mA", "--torque-constant"),
+            ("output=a:deg*x", "found \"*x\" after the unit"),
+            ("qwertz=a", "temperature, orientation; for instance"),
+            ("error=a:parsec", "did you mean `arcsec`?"),
+            ("error=a:mil", "arcmin, arcsec, mrad, count"),
+        ] {
+            let error = ColumnMap::parse(text).unwrap_err().to_string();
+            assert!(error.starts_with("--columns: ") && error.contains(said), "{text:?} gave {error:?}");
+        }
+    }
+
+    #[test]
+    fn a_missing_column_whose_misspelling_is_there_is_named() {
+        let refused = |header: &str| ColumnMap::default().resolve(&names(header), 1, None).unwrap_err().what;
+        for (header, said) in [
+            ("generator_deg,output_rad", "generator_rad is missing; did you mean `generator_deg`? found: "),
+            ("Generator_Rad,output_rad", "did you mean `Generator_Rad`?"),
+            ("generator_rad,ouput_rad", "did you mean `ouput_rad`?"),
+            ("generator_rad,error_arcmin", "did you mean `error_arcmin`?"),
+            ("generator_rad,qwertz", "one is needed; found: generator_rad, qwertz"),
+            ("psi,output_rad", "generator_rad is missing; found: psi"),
+        ] {
+            assert!(refused(header).contains(said), "{header}: {}", refused(header));
+        }
+        let map = ColumnMap::parse("torque=load_nm:N.m").unwrap();
+        let what = map.resolve(&names("generator_rad,output_rad,load_n_m"), 1, None).unwrap_err().what;
+        assert!(what.contains("did you mean `load_n_m`?"), "{what}");
+        // One that may be missing is not asked for, but told.
+        let noted = |header: &str| {
+            let names = names(header);
+            let map = ColumnMap::default();
+            map.misspelt(&names, &map.resolve(&names, 1, None).unwrap())
+        };
+        assert_eq!(
+            noted("generator_rad,output_rad,torque_Nm,time_ms"),
+            [
+                "column time_ms is not used; if it is time_s, say so with --columns time=time_ms:ms",
+                "column torque_Nm is not used; if it is torque_n_m, say so with --columns torque=torque_Nm:N.m"
+            ]
+        );
+        assert_eq!(noted("generator_rad,output_rad,torque_n_m,torque_Nm,current_a,error_arcsec"), [""; 0]);
+    }
+}

@@ -1,0 +1,564 @@
+//! Time that does not run as it should, and the gaps that part sessions.
+
+use std::f64::consts::TAU;
+
+use super::{Findings, span};
+use crate::measurement::columns::Quantity;
+use crate::measurement::fault::{FaultName, Treatment};
+use crate::measurement::log::Log;
+use flexspline_base::robust::{least_and_most, median_and_std, median_of, quantile_of, sampled};
+
+/// A gap longer than so many sample periods starts a new session.
+pub const SESSION_GAP_PERIODS: f64 = 10.0;
+/// A step of time above so many periods, jitter aside, has a row missing in it: half way between one lost row and none.
+const LOST_ROW_PERIODS: f64 = 1.5;
+/// A gap of up to so many periods that begins a session may be one of rows that were lost: where the motion goes on over it. *Guess*.
+const LONGEST_HOLE_PERIODS: f64 = 100.0;
+/// The motion goes on where the generator turns over the gap as it does on either side, within this share of the faster pace, and this, rad. *Guess*.
+const GOES_ON: (f64, f64) = (0.3, 0.05);
+/// Rows on either side that say the pace there.
+const PACE_ROWS: usize = 3;
+/// In a column that wraps an angle says nothing that may be off by more than this, rad.
+const WRAPS_RAD: f64 = 1.5;
+/// Of the gaps that may be such holes this share is, with the generator in motion: then those are, too, in which it stands, starts or turns round.
+/// *Guess*.
+const HOLES_IN_MOTION: f64 = 0.5;
+/// The median of many steps scatters by so many times what their mean does (√(π/2) of normal ones, *Source*), and is known to so many of that.
+const MEDIAN_TO_MEAN_STD: f64 = 1.253;
+const MEDIAN_STDS: f64 = 2.0;
+/// Where more steps than this are that long, rows are not evenly spaced by intent, and none is missing.
+const UNEVEN_SHARE: f64 = 0.05;
+/// Where more steps than this are zero, the clock is coarse; where fewer, rows are repeated.
+const COARSE_SHARE: f64 = 0.1;
+/// A clock jitters if its steps scatter by more than this share of a period…
+const JITTER_SHARE: f64 = 0.1;
+/// …and by so many times more than the motion from row to row.
+const JITTER_OVER_MOTION: f64 = 5.0;
+/// Sample periods that exist, s.
+const PERIODS_S: [f64; 2] = [1e-7, 3600.0];
+/// Generator speeds that exist, up to 20 000 turns a minute, rad/s.
+const FASTEST_RAD_S: f64 = 2100.0;
+/// Rows farther apart than this (s), for longer than this altogether (s), in which the motor stays slower than this (rad/s), are milliseconds
+/// read as seconds: a bench creeps for minutes, not for days. *Guess*.
+const CREEPS: (f64, f64, f64) = (1.0, 43_200.0, 0.1);
+/// The same of a motor that goes to and fro: a telescope creeps for nights, but one way. *Guess*.
+const CREEPS_TO_AND_FRO: (f64, f64, f64) = (0.9, 3600.0, 0.15);
+/// It goes to and fro where each direction has this share of the way, of so many radians at least.
+const EACH_WAY: (f64, f64) = (0.1, 6.0);
+/// And never changes its pace by more than this share of its fastest one from row to row. *Guess*.
+const SMOOTHLY: f64 = 0.35;
+/// What milliseconds read as seconds are divided by.
+const MILLI: f64 = 1e3;
+/// Of the distance of a stamp from where it is expected the phase takes this share, and the period this one: a loop that follows a clock and
+/// averages some forty stamps.
+const PHASE_GAIN: f64 = 0.05;
+const PERIOD_GAIN: f64 = 0.5 * PHASE_GAIN * PHASE_GAIN;
+/// Rows on either side that say which period one is of.
+const AROUND_ROWS: usize = 5;
+/// Steps of time that scatter by more than this share of a period tell lost rows by the count along the session, not one by one.
+const SCATTERS: f64 = 0.05;
+
+/// Finds faults of the clock, repairs or leaves out what they touch, and parts the rows into sessions.
+pub(in crate::measurement) fn check(log: &mut Log, findings: &mut Findings) {
+    if log.get(Quantity::Time).is_none() {
+        return;
+    }
+    let strays = order(log, findings);
+    standing(log, findings);
+    let Some(period) = period(log) else {
+        let mut fault = span(log, FaultName::ClockError, 0, log.len() - 1);
+        (fault.channel, fault.treatment) = (Some(Quantity::Time), Treatment::Masked);
+        (fault.time_s, fault.until_s) = (None, None);
+        fault.what = "time stands still: it is not used".to_owned();
+        findings.faults.push(fault);
+        log.take(Quantity::Time);
+        return;
+    };
+    gaps(log, period, &strays, findings);
+    jitter(log, period, findings);
+    scale(log, period, findings);
+}
+
+/// Median of the positive steps of time, s.
+fn period(log: &Log) -> Option<f64> {
+    let time = log.get(Quantity::Time)?;
+    let steps: Vec<f64> = time.windows(2).map(|t| t[1] - t[0]).filter(|dt| *dt > 0.0).collect();
+    (!steps.is_empty()).then(|| median_of(&mut sampled(&steps)))
+}
+
+/// Time that runs back: a row out of order is left out, a clock that was set back starts a session. Gives the lines left out.
+fn order(log: &mut Log, findings: &mut Findings) -> Vec<u64> {
+    let Some(period) = period(log) else { return Vec::new() };
+    let Some(time) = log.get(Quantity::Time) else { return Vec::new() };
+    let far = SESSION_GAP_PERIODS * period;
+    let rows = time.len();
+    let mut drop = vec![false; rows];
+    let mut session = vec![0_u32; rows];
+    let (mut latest, mut number) = (f64::NEG_INFINITY, 0);
+    let (mut strays, mut resets) = (Vec::new(), Vec::new());
+    for row in 0..rows {
+        let t = time[row];
+        number += u32::from(row > 0 && !log.continues(row));
+        if !t.is_finite() {
+            session[row] = number;
+            continue;
+        }
+        // A stamp that is far from both its neighbours, which are close to each other, is wrong by itself.
+        let next = time.get(row + 1).copied().unwrap_or(f64::NAN);
+        let alone = next >= latest && next - latest <= far && !(latest..=next).contains(&t) && latest.is_finite();
+        if alone || (t < latest && latest - t <= far) {
+            drop[row] = true;
+            strays.push(row);
+        } else {
+            if t < latest {
+                number += 1;
+                resets.push((row, latest - t));
+            }
+            latest = t;
+        }
+        session[row] = number;
+    }
+    if let (Some(&first), Some(&last)) = (strays.first(), strays.last()) {
+        let mut fault = span(log, FaultName::ClockError, first, last);
+        (fault.channel, fault.rows, fault.treatment) = (Some(Quantity::Time), strays.len() as u64, Treatment::Masked);
+        fault.what = format!("time runs back or is far off in {} rows: they are left out", strays.len());
+        findings.faults.push(fault);
+    }
+    if let (Some(&(first, back)), Some(&(last, _))) = (resets.first(), resets.last()) {
+        let mut fault = span(log, FaultName::ClockError, first, last);
+        (fault.channel, fault.rows, fault.treatment) = (Some(Quantity::Time), resets.len() as u64, Treatment::Kept);
+        fault.what =
+            format!("time is set back {} times, first by {back:.4} s: a new session is begun there", resets.len());
+        findings.faults.push(fault);
+    }
+    log.session = session;
+    let lines = strays.iter().map(|row| log.line[*row]).collect();
+    if !strays.is_empty() {
+        log.leave_out(&drop);
+    }
+    lines
+}
+
+/// Time that stands: rows that are repeated are left out, a coarse clock is spread.
+fn standing(log: &mut Log, findings: &mut Findings) {
+    if period(log).is_none() {
+        return;
+    }
+    let Some(time) = log.get(Quantity::Time) else { return };
+    let stands: Vec<usize> =
+        (1..time.len()).filter(|row| time[*row] == time[*row - 1] && log.continues(*row)).collect();
+    let (Some(&first), Some(&last)) = (stands.first(), stands.last()) else { return };
+    let mut fault = span(log, FaultName::ClockError, first, last);
+    (fault.channel, fault.rows) = (Some(Quantity::Time), stands.len() as u64);
+    if stands.len() as f64 <= COARSE_SHARE * time.len() as f64 {
+        let mut drop = vec![false; time.len()];
+        stands.iter().for_each(|row| drop[*row] = true);
+        fault.treatment = Treatment::Masked;
+        fault.what = format!("{} rows repeat the time of the row before: they are left out", stands.len());
+        findings.faults.push(fault);
+        log.leave_out(&drop);
+        return;
+    }
+    fault.treatment = Treatment::Repaired;
+    fault.what =
+        format!("time stands in {} of {} rows: rows of the same time are spread evenly", stands.len(), time.len());
+    findings.faults.push(fault);
+    let mut spread = time.to_vec();
+    let mut begin = 0;
+    while begin < spread.len() {
+        let mut end = begin + 1;
+        while end < spread.len() && spread[end] == spread[begin] && log.continues(end) {
+            end += 1;
+        }
+        let next = spread.get(end).copied().filter(|next| *next > spread[begin] && log.continues(end));
+        // At the end of a session: as fast as on the whole.
+        let step = next.map_or_else(
+            || (time[time.len() - 1] - time[0]).abs() / time.len() as f64,
+            |next| (next - spread[begin]) / (end - begin) as f64,
+        );
+        for row in begin + 1..end {
+            spread[row] = spread[begin] + step * (row - begin) as f64;
+        }
+        begin = end;
+    }
+    log.put(Quantity::Time, spread);
+}
+
+/// Change of an angle over one row, the shorter way round.
+fn turned(values: &[f64], row: usize) -> f64 {
+    let d = values[row] - values[row - 1];
+    d - TAU * (d / TAU).round()
+}
+
+/// Gaps in time: sessions, and rows that were lost. Near `strays`, lines left out for their time, none is counted as lost.
+fn gaps(log: &mut Log, period: f64, strays: &[u64], findings: &mut Findings) {
+    let Some(time) = log.get(Quantity::Time) else { return };
+    let rows = time.len();
+    let mut steps = sampled(&time.windows(2).map(|t| t[1] - t[0]).filter(|dt| *dt > 0.0).collect::<Vec<_>>());
+    let jitter = median_and_std(&mut steps).1;
+    let lost_from = (LOST_ROW_PERIODS * period).max(period + 6.0 * jitter);
+    let (mut lost, mut long_steps, mut parts) = (Vec::new(), 0, Vec::new());
+    for row in 1..rows {
+        let dt = time[row] - time[row - 1];
+        if !log.continues(row) || dt.is_nan() || dt <= lost_from {
+            continue;
+        }
+        long_steps += 1;
+        if dt <= SESSION_GAP_PERIODS * period {
+            // Rows that are in the file, but were left out, are not lost.
+            let there = log.line[row] - log.line[row - 1];
+            lost.push((row, ((dt / period).round() as u64).saturating_sub(there)));
+        } else {
+            parts.push(row);
+        }
+    }
+    lost.retain(|(row, rows)| {
+        let near = strays.iter().any(|line| line.abs_diff(log.line[*row]) <= 2);
+        *rows > 0 && !near
+    });
+    // Stamps that jitter make single steps long; rows are missing only where the stamps of a whole session count more periods than rows.
+    let counts: Vec<Counted> = counted(log, period).collect();
+    let near_stray = |row: usize| strays.iter().any(|line| line.abs_diff(log.line[row]) <= 2);
+    let holes: Vec<(usize, u64)> = holes(log, &parts, period).into_iter().filter(|hole| !near_stray(hole.0)).collect();
+    // The median step may be shorter than the period that a clock keeps on the mean: no more are missing than its time over that says, as well as
+    // the median is known.
+    let unsure = MEDIAN_STDS * MEDIAN_TO_MEAN_STD * jitter / period / (rows as f64).sqrt();
+    let within = counts.iter().map(|Counted { rows, lacking, .. }| {
+        let beyond = (time[rows.end - 1] - time[rows.start]) / period - (rows.len() as f64 - 1.0);
+        let is_borne_out = *lacking as f64 <= beyond + unsure * rows.len() as f64;
+        if is_borne_out { *lacking } else { beyond.max(0.0).round() as u64 }
+    });
+    let within = within.sum::<u64>();
+    let lacking = within.saturating_sub(strays.len() as u64);
+    if jitter > SCATTERS * period {
+        let beyond = |count: &Counted, k: usize| count.period[k] - count.period[k - 1] - 1;
+        let of = |count: &Counted| -> Vec<(usize, u64)> {
+            (1..count.rows.len())
+                .map(|k| (count.rows.start + k, beyond(count, k)))
+                .filter(|(_, rows)| *rows > 0)
+                .collect()
+        };
+        lost = counts.iter().flat_map(of).collect();
+    }
+    let in_steps = lost.iter().map(|(_, rows)| *rows).sum::<u64>().min(lacking);
+    let in_holes = holes.iter().map(|(_, rows)| *rows).sum::<u64>();
+    let total = in_steps + in_holes;
+    let places = lost.len().min(in_steps as usize) + holes.len();
+    lost.retain(|_| in_steps > 0);
+    lost.extend(&holes);
+    lost.sort_unstable();
+    if let (Some(&(first, _)), Some(&(last, _)), 1..) = (lost.first(), lost.last(), total) {
+        if long_steps as f64 <= UNEVEN_SHARE * rows as f64 {
+            let mut fault = span(log, FaultName::MissingSamples, first, last);
+            (fault.channel, fault.rows, fault.treatment) = (Some(Quantity::Time), total, Treatment::Kept);
+            let breaks = match holes.len() {
+                0 => String::new(),
+                1 => format!(
+                    "; one gap, of {in_holes} of them, is so long that a session begins behind it, though the motion goes on"
+                ),
+                n => format!(
+                    "; {n} gaps, with {in_holes} of them, are so long that a session begins behind each, though the motion goes on"
+                ),
+            };
+            fault.what = format!(
+                "{total} rows are missing, in up to {places} places: time goes on by more than {LOST_ROW_PERIODS} of the usual {period:.6} s{breaks}"
+            );
+            findings.faults.push(fault);
+        } else {
+            findings
+                .notes
+                .push(format!("rows are not evenly spaced in time: {} steps exceed {lost_from:.6} s", lost.len()));
+        }
+    }
+    if !parts.is_empty() {
+        let mut number = 0;
+        let mut session = vec![0; rows];
+        let mut next = parts.iter().peekable();
+        for row in 0..rows {
+            let parted = next.next_if(|part| **part == row).is_some();
+            if row > 0 && (parted || !log.continues(row)) {
+                number += 1;
+            }
+            session[row] = number;
+        }
+        log.session = session;
+    }
+}
+
+/// Of gaps that begin a session those in which rows were lost, for the motion goes on over them, and how many: the row behind each.
+fn holes(log: &Log, parts: &[usize], period: f64) -> Vec<(usize, u64)> {
+    let (Some(time), Some(generator)) = (log.get(Quantity::Time), log.get(Quantity::Generator)) else {
+        return Vec::new();
+    };
+    let (low, high) = least_and_most(generator.iter().copied());
+    let wraps = high - low <= TAU * (1.0 + 1e-6);
+    // The pace over some rows without a gap, rad/s.
+    let pace = |rows: std::ops::Range<usize>| {
+        let (from, to) = (rows.start, rows.end - 1);
+        let gap =
+            (from + 1..=to).any(|row| !log.continues(row) || time[row] - time[row - 1] > SESSION_GAP_PERIODS * period);
+        let turned =
+            (from + 1..=to).map(|row| if wraps { turned(generator, row) } else { generator[row] - generator[row - 1] });
+        (to > from && !gap).then(|| turned.sum::<f64>() / (time[to] - time[from]))
+    };
+    let short = parts.iter().copied().filter(|row| time[*row] - time[*row - 1] <= LONGEST_HOLE_PERIODS * period);
+    let mut of_gaps = 0_usize;
+    // Those over which the motion may go on, and whether it plainly does.
+    let mut found: Vec<(usize, u64, bool)> = Vec::new();
+    for row in short {
+        of_gaps += 1;
+        let before = pace(row.saturating_sub(PACE_ROWS)..row);
+        let after = pace(row..(row + PACE_ROWS).min(log.len()));
+        let Some((before, after)) = before.zip(after) else { continue };
+        let dt = time[row] - time[row - 1];
+        let off = generator[row] - generator[row - 1] - 0.5 * (before + after) * dt;
+        let off = if wraps { off - TAU * (off / TAU).round() } else { off };
+        let way = before.abs().max(after.abs()) * dt;
+        let may_be_off = GOES_ON.0 * way + GOES_ON.1;
+        if off.abs() <= way + GOES_ON.1 {
+            let there = log.line[row] - log.line[row - 1];
+            let rows = ((dt / period).round() as u64).saturating_sub(there);
+            let plainly = off.abs() <= may_be_off && way > 2.0 * GOES_ON.1 && !(wraps && may_be_off > WRAPS_RAD);
+            found.push((row, rows, plainly));
+        }
+    }
+    let in_motion = found.iter().filter(|hole| hole.2).count();
+    let all = in_motion > 0 && in_motion as f64 >= HOLES_IN_MOTION * of_gaps as f64;
+    found.retain(|(_, rows, plainly)| *rows > 0 && (*plainly || all));
+    found.into_iter().map(|(row, rows, _)| (row, rows)).collect()
+}
+
+/// The rows of a session by the periods that its stamps count.
+struct Counted {
+    rows: std::ops::Range<usize>,
+    /// Period that each row belongs to, from 0; each row has one of its own.
+    period: Vec<u64>,
+    /// Periods without a row.
+    lacking: u64,
+}
+
+/// Counts the periods of each session along its stamps with a phase-locked loop, so that their scatter does not add up. A stamp that scatters
+/// into the period beside its own is counted with its neighbours.
+fn counted(log: &Log, period_s: f64) -> impl Iterator<Item = Counted> + '_ {
+    let time = log.get(Quantity::Time).unwrap_or_default();
+    let mut begin = 0;
+    let parted = move |row: usize| !log.continues(row) || time[row] - time[row - 1] > SESSION_GAP_PERIODS * period_s;
+    let ends = (1..=time.len()).filter(move |row| *row == time.len() || parted(*row));
+    ends.map(move |end| {
+        let rows = std::mem::replace(&mut begin, end)..end;
+        let (mut expected, mut step_s, mut count) = (time[rows.start], period_s, 0.0);
+        // Periods beyond those of the rows.
+        let mut beyond = vec![0.0];
+        for row in rows.start + 1..rows.end {
+            let steps = ((time[row] - expected) / step_s).round().max(0.0);
+            count += steps;
+            let off = time[row] - expected - steps * step_s;
+            expected += steps * step_s + PHASE_GAIN * off;
+            step_s = (step_s + PERIOD_GAIN * off / steps.max(1.0)).clamp(0.9 * period_s, 1.1 * period_s);
+            beyond.push(count - (row - rows.start) as f64);
+        }
+        let mut most = 0.0f64;
+        let around = |k: usize| beyond[k.saturating_sub(AROUND_ROWS)..(k + AROUND_ROWS + 1).min(beyond.len())].to_vec();
+        let period = (0..rows.len()).map(|k| {
+            most = most.max(median_of(&mut around(k)));
+            k as u64 + most as u64
+        });
+        let period: Vec<u64> = period.collect();
+        Counted { lacking: period[period.len() - 1] - (rows.len() as u64 - 1), rows, period }
+    })
+}
+
+/// Stamps that scatter while the motion from row to row does not.
+fn jitter(log: &mut Log, period: f64, findings: &mut Findings) {
+    let (Some(time), Some(generator)) = (log.get(Quantity::Time), log.get(Quantity::Generator)) else { return };
+    let (mut of_time, mut of_motion) = (Vec::new(), Vec::new());
+    for row in 2..time.len() {
+        if !log.continues(row) || !log.continues(row - 1) {
+            continue;
+        }
+        let (a, b) = (turned(generator, row - 1), turned(generator, row));
+        let pace = 0.5 * (a.abs() + b.abs());
+        if pace > 0.0 && pace < 1.0 {
+            of_motion.push((b - a).abs() / pace);
+            of_time.push((time[row] - 2.0 * time[row - 1] + time[row - 2]).abs() / period);
+        }
+    }
+    if of_time.len() < 100 {
+        return;
+    }
+    let (time_scatter, motion_scatter) = (median_of(&mut sampled(&of_time)), median_of(&mut sampled(&of_motion)));
+    if time_scatter <= JITTER_SHARE || time_scatter <= JITTER_OVER_MOTION * motion_scatter {
+        return;
+    }
+    let mut fault = span(log, FaultName::ClockError, 0, log.len() - 1);
+    (fault.channel, fault.treatment) = (Some(Quantity::Time), Treatment::Repaired);
+    fault.what = format!(
+        "stamps scatter by {:.0} % of a period while the motion from row to row scatters by {:.1} %: rows are spaced evenly",
+        100.0 * time_scatter,
+        100.0 * motion_scatter
+    );
+    findings.faults.push(fault);
+    let sessions: Vec<Counted> = counted(log, period).collect();
+    let Some(time) = log.get_mut(Quantity::Time) else { return };
+    for Counted { rows, period, .. } in sessions {
+        let (from, to) = (time[rows.start], time[rows.end - 1]);
+        let last = period[period.len() - 1].max(1) as f64;
+        for (row, period) in rows.zip(period) {
+            time[row] = from + (to - from) * period as f64 / last;
+        }
+    }
+}
+
+/// A period or a speed that does not exist: a unit of time taken for another.
+fn scale(log: &mut Log, period: f64, findings: &mut Findings) {
+    let (Some(time), Some(generator)) = (log.get(Quantity::Time), log.get(Quantity::Generator)) else { return };
+    let mut speeds: Vec<f64> = (1..time.len())
+        .filter(|row| log.continues(*row) && time[*row] > time[*row - 1])
+        .map(|row| (turned(generator, row) / (time[row] - time[row - 1])).abs())
+        .filter(|speed| *speed > 0.0)
+        .collect();
+    let (speed, fastest) = (median_of(&mut speeds), quantile_of(&mut speeds, 0.95));
+    let lasts_s = period * time.len() as f64;
+    let slower = |limits: (f64, f64, f64)| period > limits.0 && lasts_s > limits.1 && fastest < limits.2;
+    let moves = || (1..time.len()).filter(|row| log.continues(*row)).map(|row| turned(generator, row));
+    let way = |sign: f64| moves().map(|by| (sign * by).max(0.0)).sum::<f64>();
+    let (there, back) = (way(1.0), way(-1.0));
+    let to_and_fro = there.min(back) > EACH_WAY.1.max(EACH_WAY.0 * (there + back));
+    // A motor that creeps starts and turns round within a row; one that takes many rows to do so is a fast one.
+    let changes = (2..time.len()).filter(|row| log.continues(*row) && log.continues(row - 1));
+    let change = changes.map(|row| (turned(generator, row) - turned(generator, row - 1)).abs()).fold(0.0, f64::max);
+    let smoothly = change < SMOOTHLY * fastest * period;
+    let in_milliseconds = to_and_fro && smoothly && slower(CREEPS_TO_AND_FRO);
+    let creeps = slower(CREEPS) || in_milliseconds;
+    let what = if !(PERIODS_S[0]..=PERIODS_S[1]).contains(&period) {
+        format!("a sample period of {period:e} s is not plausible")
+    } else if speed > FASTEST_RAD_S {
+        format!("a generator speed of {speed:.0} rad/s is not plausible")
+    } else if creeps {
+        format!(
+            "{} rows {period:.3} s apart, {:.1} hours in which the generator hardly exceeds {fastest:.3} rad/s, are milliseconds rather than \
+             seconds",
+            time.len(),
+            lasts_s / 3600.0
+        )
+    } else {
+        return;
+    };
+    let mut fault = span(log, FaultName::ClockError, 0, log.len() - 1);
+    (fault.channel, fault.treatment) = (Some(Quantity::Time), Treatment::Kept);
+    if in_milliseconds {
+        fault.treatment = Treatment::Repaired;
+        fault.what = format!("{what}, as it takes its speed and turns round over many rows: time was divided by 1000");
+        log.get_mut(Quantity::Time).into_iter().flatten().for_each(|time| *time /= MILLI);
+    } else {
+        fault.what = format!("{what}: is the unit of time right?");
+    }
+    findings.faults.push(fault);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A motor that goes to and fro, read every 2 ms; rows of `stamp(row)`, which gives none where the row is missing.
+    fn log(rows: usize, mut stamp: impl FnMut(usize) -> Option<f64>) -> Log {
+        let (mut time, mut generator) = (Vec::new(), Vec::new());
+        for row in 0..rows {
+            if let Some(stamp) = stamp(row) {
+                time.push(stamp);
+                generator.push(20.0 * (0.5 * 0.002 * row as f64).sin());
+            }
+        }
+        let mut log = Log::default();
+        log.line = (2..2 + time.len() as u64).collect();
+        log.session = vec![0; time.len()];
+        log.put(Quantity::Output, generator.iter().map(|psi| psi / 100.0).collect());
+        log.put(Quantity::Time, time);
+        log.put(Quantity::Generator, generator);
+        log
+    }
+
+    fn missing(mut log: Log) -> u64 {
+        let mut findings = Findings::default();
+        check(&mut log, &mut findings);
+        findings.faults.iter().filter(|fault| fault.name == FaultName::MissingSamples).map(|fault| fault.rows).sum()
+    }
+
+    #[test]
+    fn no_more_rows_are_missing_than_stamps_that_jitter_leave_room_for() {
+        for seed in 0..20 {
+            for lost in [0usize, 7] {
+                let mut random = fastrand::Rng::with_seed(seed);
+                // One stamp in 250 is taken when the system came to it.
+                let found = missing(log(10_000, |row| {
+                    let late = if row % 250 == 100 { 0.55 + 0.4 * random.f64() } else { 0.0 };
+                    let stamp = 0.002 * (row as f64 + 0.2 * (random.f64() - 0.5) + late);
+                    (row % 1400 != 1000 || lost == 0).then_some(stamp)
+                }));
+                assert!(found <= lost as u64 && found + 2 >= lost as u64, "seed {seed}: {found} of {lost}");
+            }
+        }
+    }
+
+    #[test]
+    fn rows_lost_in_long_gaps_are_told_where_the_motion_goes_on_and_sessions_are_none() {
+        // Holes of 3, 25 and 40 rows, and a session that begins a minute later.
+        let mut found = log(12_000, |row| {
+            let lost =
+                [(1500, 3), (2500, 40), (4000, 40), (5200, 25)].iter().any(|(at, n)| (*at..at + n).contains(&row));
+            (!lost).then_some(0.002 * row as f64 + if row >= 7000 { 60.0 } else { 0.0 })
+        });
+        assert_eq!(missing(found.clone()), 108);
+        // A bench that stands between its runs, and logs nothing then.
+        let rests = |row: usize| f64::from(u8::try_from(row / 3000).unwrap_or(9));
+        found = log(12_000, |row| Some(0.002 * row as f64 + 0.1 * rests(row)));
+        assert_eq!(missing(found), 0);
+    }
+
+    #[test]
+    fn no_more_rows_are_missing_than_the_median_step_leaves_room_for() {
+        // Stamps of a clock that takes most steps a little short and makes up for it.
+        let mut random = fastrand::Rng::with_seed(7);
+        let mut t = 0.0;
+        let stamped = log(20_000, |row| {
+            let drawn = random.f64();
+            t += 0.002 * if drawn < 0.04 { 1.62 } else { 0.985 + 0.01 * drawn };
+            (row % 1000 != 500).then_some(t)
+        });
+        let time = stamped.get(Quantity::Time).unwrap();
+        let room = (time[time.len() - 1] - time[0]) / period(&stamped).unwrap() - (time.len() as f64 - 1.0);
+        assert!(missing(stamped.clone()) as f64 <= room.max(0.0) + 3.0, "{room}");
+    }
+
+    #[test]
+    fn rows_keep_their_places_beside_those_that_are_missing() {
+        let mut random = fastrand::Rng::with_seed(5);
+        let mut log = log(8000, |row| {
+            let stamp = 0.002 * (row as f64 + 0.6 * (random.f64() - 0.5));
+            (row % 40 != 20).then_some(stamp)
+        });
+        let mut findings = Findings::default();
+        check(&mut log, &mut findings);
+        assert!(findings.faults.iter().any(|fault| fault.name == FaultName::ClockError), "{:?}", findings.faults);
+        let (time, generator) = (log.get(Quantity::Time).unwrap(), log.get(Quantity::Generator).unwrap());
+        let off = |row: usize| (20.0 * (0.5 * time[row]).sin() - generator[row]).abs() / 10.0;
+        let worst = (0..time.len()).map(off).fold(0.0, f64::max);
+        assert!(worst < 0.004, "a row is {worst} s off");
+    }
+
+    #[test]
+    fn milliseconds_read_as_seconds_are_told_by_a_motor_that_turns_round_slowly() {
+        let mut findings = Findings::default();
+        let mut fast = log(9000, |row| Some(2.0 * row as f64));
+        check(&mut fast, &mut findings);
+        assert_eq!((findings.faults.len(), findings.faults[0].treatment), (1, Treatment::Repaired), "{findings:?}");
+        assert!((fast.get(Quantity::Time).unwrap()[500] - 1.0).abs() < 1e-9);
+        // A bench that creeps turns round within a row, and is what it is.
+        let mut slow = log(9000, |row| Some(2.0 * row as f64));
+        let to_and_fro = |row: usize| 0.1 * if row % 4000 < 2000 { row % 4000 } else { 4000 - row % 4000 } as f64;
+        slow.put(Quantity::Generator, (0..9000).map(to_and_fro).collect());
+        let mut findings = Findings::default();
+        check(&mut slow, &mut findings);
+        assert!(findings.faults.is_empty(), "{findings:?}");
+    }
+}

@@ -1,0 +1,410 @@
+//! A zero that moves with time, the same in every state of the drive.
+//!
+//! Wear, heat and a falling stiffness move the error too, but not on both flanks alike; a wrong ratio and an eccentric encoder move
+//! it with the angle. Drift is named only where the data can tell it from them.
+
+use super::state::{Extra, State};
+use super::{ARCSEC, Findings, of_rows};
+use crate::measurement::Session;
+use crate::measurement::columns::Quantity;
+use crate::measurement::fault::{FaultName, Treatment};
+use crate::measurement::gear::Gear;
+use flexspline_base::robust::{least_and_most, median_of};
+use flexspline_base::statistics::correlation;
+
+/// Drift of less than this over the whole recording is not looked for, rad.
+const LEAST_RAD: f64 = 10.0 * ARCSEC;
+/// A trend is so many standard deviations, over stretches as long as the noise remembers.
+const CERTAIN: f64 = 6.0;
+/// Stretches of the recording that a trend is judged by.
+const STRETCHES: usize = 24;
+/// Fewest stretches that show a trend, and rows of a stretch.
+const FEWEST_STRETCHES: usize = 8;
+const STRETCH_ROWS: usize = 8;
+/// Fewest gaps between sessions that tell a drift from zeros that are set anew, and how far a session may lie off the line, as a share of all
+/// the drift. *Guess*: two gaps agree to a twentieth by chance in one recording of twenty.
+const FEWEST_GAPS: usize = 2;
+const OFF_THE_LINE: f64 = 0.05;
+/// Within sessions the zero moves as over all of them: the slope there is off by this share at most, but for so many of its standard deviations. *Guess*.
+const WITHIN: f64 = 0.5;
+const WITHIN_STDS: f64 = 3.0;
+/// Sessions whose zeros are free at once, at most.
+const MOST_ZEROS: usize = 64;
+/// Sessions in which a drift of this share would not show by so many standard deviations have to lie on its line, by [`OFF_THE_LINE`]. *Guess*.
+const SHOWS: f64 = 0.5;
+/// What is the same on both flanks: the part that differs is below this share.
+const ALIKE: f64 = 0.35;
+/// A trend whose standard deviation grows by more than this when position, load and temperature are considered may be one of them.
+const CONFUSED: f64 = 4.0;
+/// And is none of them where it is so many standard deviations, and the temperature does not go with time: correlation, from a span in K on.
+/// *Guess*.
+const BEYOND_CONFUSION: f64 = 50.0;
+const WITH_TIME: f64 = 0.8;
+const COUNTS_K: f64 = 2.0;
+/// Share of rows that each flank must have.
+const BOTH_FLANKS: f64 = 0.1;
+
+/// What moves by this within so many seconds, and by this share of the drift, is none: beyond any wind-up and clearance.
+const LEAST_LEAP_RAD: f64 = 1200.0 * ARCSEC;
+const LEAP_S: f64 = 2.0;
+const LEAP_SHARE: f64 = 0.3;
+/// Nor what moves between two recordings by so many times what the drift gives in that time.
+const GAP_SHARE: f64 = 2.0;
+/// Rows whose median is a level.
+const LEVEL_ROWS: usize = 12;
+
+/// How a recording is cut into stretches: evenly in time, or in rows, where long breaks would leave few of them.
+#[derive(Clone, Copy, PartialEq)]
+pub(in crate::measurement) enum Stretches {
+    OfTime,
+    OfRows,
+}
+
+/// Finds a linear drift over the whole recording, names it and takes it out.
+pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, cut: Stretches, findings: &mut Findings) {
+    let Some((per_s, from_s, std)) = slope(sessions, gear, cut) else { return };
+    let Some(last) = sessions.last().and_then(|s| s.time_s.as_ref()?.last().copied()) else { return };
+    let first = sessions[0].time_s.as_ref().map_or(from_s, |time| time[0]);
+    let total = per_s * (last - first);
+    let mut fault = of_rows(&sessions[0], FaultName::Drift, 0..sessions[0].len());
+    if let Some(session) = sessions.last() {
+        fault.last_line = session.line[session.len() - 1];
+    }
+    fault.until_s = Some(last);
+    fault.rows = sessions.iter().map(|session| session.len() as u64).sum();
+    (fault.channel, fault.treatment) = (Some(Quantity::Error), Treatment::Repaired);
+    fault.size_arcsec = Some(total / ARCSEC);
+    let per_hour = 3600.0 * per_s / ARCSEC;
+    fault.measures.arcsec_per_hour = Some(per_hour);
+    fault.what = format!(
+        "the zero of the error drifts by {:.2} arcsec in all, {per_hour:.1} an hour (standard deviation of all {:.2}), alike on both flanks, \
+         and not with temperature or position: a straight line in time is taken out",
+        total / ARCSEC,
+        std * (last - first) / ARCSEC
+    );
+    findings.faults.push(fault);
+    for session in sessions.iter_mut() {
+        if let Some(time) = &session.time_s {
+            session.error_rad.iter_mut().zip(time).for_each(|(error, t)| *error -= per_s * (t - from_s));
+        }
+    }
+}
+
+/// Whether there is a drift of about so much, rad/s.
+pub(in crate::measurement) fn confirms(sessions: &[Session], gear: &Gear, per_s: f64) -> bool {
+    slope(sessions, gear, Stretches::OfRows).is_some_and(|(found, ..)| (found - per_s).abs() < ABOUT * per_s.abs())
+}
+
+/// Two rates of drift are one if they differ by less than this share. *Guess*.
+const ABOUT: f64 = 0.2;
+
+/// Drift, rad/s, the time at which it is taken as zero (the middle), and its standard deviation.
+fn slope(sessions: &[Session], gear: &Gear, cut: Stretches) -> Option<(f64, f64, f64)> {
+    if sessions.iter().any(|session| session.time_s.is_none() || session.len() < 2) {
+        return None;
+    }
+    let time = |s: usize, r: usize| sessions[s].time_s.as_ref().map_or(0.0, |time| time[r]);
+    let begin = time(0, 0);
+    let end = sessions.len().checked_sub(1).map(|s| time(s, sessions[s].len() - 1))?;
+    // A clock that was set back gives no common time.
+    let ordered = (1..sessions.len()).all(|s| time(s, 0) >= time(s - 1, sessions[s - 1].len() - 1));
+    if end <= begin || !ordered {
+        return None;
+    }
+    let state = State::new(sessions, gear);
+    let rows: usize = sessions.iter().map(Session::len).sum();
+    let forward = sessions
+        .iter()
+        .enumerate()
+        .map(|(s, session)| (0..session.len()).filter(|row| state.flank(s, *row) > 0.0).count());
+    let forward = forward.sum::<usize>() as f64 / rows as f64;
+    if !(BOTH_FLANKS..=1.0 - BOTH_FLANKS).contains(&forward) {
+        return None;
+    }
+    let tau = |s: usize, r: usize| 2.0 * (time(s, r) - begin) / (end - begin) - 1.0;
+    let by_flank = |s: usize, r: usize| tau(s, r) * state.flank(s, r);
+    let by_load = |s: usize, r: usize| {
+        let torque = sessions[s].torque_n_m.as_ref().map_or(0.0, |torque| torque[r]);
+        tau(s, r) * if torque == 0.0 { 0.0 } else { torque.signum() }
+    };
+    let by_load_size = |s: usize, r: usize| sessions[s].torque_n_m.as_ref().map_or(0.0, |torque| torque[r] * tau(s, r));
+    let all: [Extra; 4] = [&tau, &by_flank, &by_load, &by_load_size];
+    let fit = state.fit(&all)?;
+    let place = fit.value.len() - 4;
+    let value = |k: usize| fit.value[place + k];
+    let (drift, formal) = (value(0), fit.std[place]);
+    // The part that goes with the flank, at the largest torque for the last.
+    let torque = sessions.iter().filter_map(|s| s.torque_n_m.as_ref()).flatten().fold(0.0, |m: f64, t| m.max(t.abs()));
+    let unlike = value(1).abs().max(value(2).abs()).max(value(3).abs() * torque);
+    if drift.abs() * 2.0 < LEAST_RAD || unlike > ALIKE * drift.abs() {
+        return None;
+    }
+    // Teeth that slip have a trend, too.
+    let per_s = 2.0 / (end - begin);
+    let leap = largest_leap(sessions).max(largest_leap_between(sessions, drift.abs() * per_s));
+    if leap > LEAST_LEAP_RAD.max(LEAP_SHARE * 2.0 * drift.abs()) {
+        return None;
+    }
+    // Sessions that all have load of one sign lie on one flank, whatever their direction.
+    let loaded = sessions.iter().filter_map(|s| s.torque_n_m.as_ref()).flatten();
+    let (mut plus, mut minus) = (0, 0);
+    for torque in loaded {
+        plus += usize::from(*torque > 0.0);
+        minus += usize::from(*torque < 0.0);
+    }
+    if plus + minus > 0 && (plus.min(minus) as f64) < BOTH_FLANKS * (plus + minus) as f64 {
+        return None;
+    }
+    // Time over the recording, alone, has the size 1/√3. Few sessions look like many a state of a drive: then it must not
+    // warm with time, and the sessions have to say it with one voice.
+    let confused = formal > CONFUSED * 3.0_f64.sqrt() * fit.unit_std;
+    if confused && (warms_with_time(sessions, &tau) || drift.abs() < BEYOND_CONFUSION * formal) {
+        return None;
+    }
+    // Once more by stretches: the trend of their medians, which noise of a long memory does not make so certain. A bench that rests for longer
+    // than it runs fills few stretches of time: then they are of rows, and what each session says by itself must not contradict.
+    let lefts: Vec<Vec<(f64, f64)>> = (0..sessions.len())
+        .map(|s| {
+            let left = state.left(&fit, s, &all);
+            left.iter().enumerate().map(|(row, left)| (tau(s, row), left + drift * tau(s, row))).collect()
+        })
+        .collect();
+    let mut points: Vec<(f64, f64)> = if cut == Stretches::OfTime { of_time(&lefts) } else { Vec::new() };
+    if points.len() < FEWEST_STRETCHES {
+        if cut == Stretches::OfTime && !alike_in_sessions(&lefts, drift) {
+            return None;
+        }
+        points = of_rows_alone(&lefts);
+    }
+    if confused && !alike_in_sessions(&lefts, drift) {
+        return None;
+    }
+    // A zero that is set anew in each session may lie anywhere, also about a line; within the sessions it stands then.
+    if (2..=MOST_ZEROS).contains(&lefts.len()) && !goes_on_within(&state, &all, place, drift, &lefts) {
+        return None;
+    }
+    let (trend, std) = line(&points)?;
+    let certain = (drift / formal).abs() > CERTAIN && (trend / std).abs() > CERTAIN && trend * drift > 0.0;
+    let steady = (trend - drift).abs() < 0.5 * drift.abs();
+    (certain && steady).then_some((drift * per_s, 0.5 * (begin + end), std.max(formal) * per_s))
+}
+
+/// Whether the temperature changes by what counts, and goes with time: then what bends with it looks like a drift.
+fn warms_with_time(sessions: &[Session], tau: Extra) -> bool {
+    let (times, temperatures): (Vec<f64>, Vec<f64>) = (sessions.iter().enumerate())
+        .filter_map(|(s, session)| Some((s, session.temperature_c.as_ref()?)))
+        .flat_map(|(s, values)| values.iter().enumerate().map(move |(row, value)| (tau(s, row), *value)))
+        .unzip();
+    let (low, high) = least_and_most(temperatures.iter().copied());
+    high - low > COUNTS_K && correlation(&times, &temperatures).is_some_and(|with| with.abs() > WITH_TIME)
+}
+
+/// A time in units of the recording, from -1 to 1, and what is left of the error there, rad.
+type Point = (f64, f64);
+
+/// Medians of stretches of time with a few rows at least.
+fn of_time(lefts: &[Vec<Point>]) -> Vec<Point> {
+    let mut stretches: Vec<Vec<f64>> = vec![Vec::new(); STRETCHES];
+    for (tau, left) in lefts.iter().flatten() {
+        stretches[(((tau + 1.0) / 2.0 * STRETCHES as f64) as usize).min(STRETCHES - 1)].push(*left);
+    }
+    let middle = |place: usize| (place as f64 + 0.5) / STRETCHES as f64 * 2.0 - 1.0;
+    let some = stretches.iter_mut().enumerate().filter(|(_, left)| left.len() >= STRETCH_ROWS);
+    some.map(|(place, left)| (middle(place), median_of(left))).collect()
+}
+
+/// Medians of stretches of rows, none over a break.
+fn of_rows_alone(lefts: &[Vec<Point>]) -> Vec<Point> {
+    let rows: usize = lefts.iter().map(Vec::len).sum();
+    let stretches = |left: &Vec<Point>| {
+        let long = left.len().div_ceil((STRETCHES * left.len()).div_ceil(rows).max(1)).max(1);
+        left.chunks(long).filter(|part| part.len() >= STRETCH_ROWS).map(middle_of).collect::<Vec<Point>>()
+    };
+    lefts.iter().flat_map(stretches).collect()
+}
+
+/// Mean time and median error.
+fn middle_of(part: &[Point]) -> Point {
+    let tau = part.iter().map(|of| of.0).sum::<f64>() / part.len() as f64;
+    (tau, median_of(&mut part.iter().map(|of| of.1).collect::<Vec<f64>>()))
+}
+
+/// Whether sessions lie on a line of this slope, and no session by itself has another slope.
+fn alike_in_sessions(lefts: &[Vec<Point>], drift: f64) -> bool {
+    let (within, std) = within_sessions(lefts, drift);
+    let contradicted = (within - drift).abs() > WITHIN * drift.abs() + CERTAIN * std;
+    lefts.len() > FEWEST_GAPS && on_the_line(lefts, drift) && !contradicted
+}
+
+/// Whether the zero moves within sessions, a zero of each free, as it does over all of them; where that does not show, whether the sessions lie on
+/// one line. `place` is where the first of the columns of `drifts` stands.
+fn goes_on_within(state: &State, drifts: &[Extra], place: usize, drift: f64, lefts: &[Vec<Point>]) -> bool {
+    let zeros: Vec<_> = (1..lefts.len()).map(|of| move |s: usize, _: usize| f64::from(u8::from(s == of))).collect();
+    let mut columns: Vec<Extra> = drifts.to_vec();
+    columns.extend(zeros.iter().map(|zero| zero as Extra));
+    let Some(fit) = state.fit(&columns) else { return true };
+    let (within, std) = (fit.value[place], fit.std[place]);
+    if (within - drift).abs() > WITHIN * drift.abs() + WITHIN_STDS * std {
+        return false;
+    }
+    let shows = WITHIN_STDS * std < SHOWS * drift.abs();
+    shows || on_the_line(lefts, drift)
+}
+
+/// Whether the middles of sessions lie on a line of this slope.
+fn on_the_line(lefts: &[Vec<Point>], drift: f64) -> bool {
+    let middles: Vec<Point> = lefts.iter().map(|left| middle_of(left)).collect();
+    let Some((low, high)) = middles.first().zip(middles.last()) else { return false };
+    let zero = median_of(&mut middles.iter().map(|of| of.1 - drift * of.0).collect::<Vec<f64>>());
+    let off = |of: &Point| (of.1 - drift * of.0 - zero).abs();
+    middles.iter().all(|of| off(of) < OFF_THE_LINE * (drift * (high.0 - low.0)).abs())
+}
+
+/// The slope within sessions, all together, from the medians of their stretches, and its standard deviation about `drift`.
+fn within_sessions(lefts: &[Vec<Point>], drift: f64) -> (f64, f64) {
+    let (mut xx, mut xy, mut left_over) = (0.0, 0.0, Vec::new());
+    for left in lefts {
+        let parts: Vec<Point> = left.chunks(left.len().div_ceil(STRETCHES).max(1)).map(middle_of).collect();
+        let count = parts.len() as f64;
+        let mean = parts.iter().fold((0.0, 0.0), |m, p| (m.0 + p.0 / count, m.1 + p.1 / count));
+        for (x, y) in parts.iter().map(|of| (of.0 - mean.0, of.1 - mean.1)) {
+            (xx, xy) = (xx + x * x, xy + x * y);
+            left_over.push((y - drift * x).powi(2));
+        }
+    }
+    let variance = left_over.iter().sum::<f64>() / left_over.len().max(1) as f64 / xx.max(1e-300);
+    (xy / xx.max(1e-300), variance.sqrt())
+}
+
+/// Median of a few rows from this one on, rad.
+fn level(session: &Session, row: usize) -> f64 {
+    median_of(&mut session.error_rad[row..(row + LEVEL_ROWS).min(session.len())].to_vec())
+}
+
+/// The largest change within [`LEAP_S`], rad, between medians of a few rows.
+fn largest_leap(sessions: &[Session]) -> f64 {
+    let mut largest = 0.0f64;
+    for session in sessions {
+        let Some(time) = &session.time_s else { continue };
+        let level = |row: usize| level(session, row);
+        let mut later = 0;
+        for row in (0..session.len()).step_by(LEVEL_ROWS / 2) {
+            while later + 1 < session.len() && time[later] < time[row] + LEAP_S {
+                later += 1;
+            }
+            largest = largest.max((level(later) - level(row)).abs());
+        }
+    }
+    largest
+}
+
+/// The largest change from one session to the next, rad, beyond [`GAP_SHARE`] times a drift of `per_s` rad/s.
+fn largest_leap_between(sessions: &[Session], per_s: f64) -> f64 {
+    let leap = |pair: &[Session]| {
+        let [before, after] = pair else { return 0.0 };
+        let (Some(then), Some(now)) = (&before.time_s, &after.time_s) else { return 0.0 };
+        let passed = now.first().zip(then.last()).map_or(0.0, |(now, then)| now - then);
+        let last = level(before, before.len().saturating_sub(LEVEL_ROWS));
+        (level(after, 0) - last).abs() - GAP_SHARE * per_s * passed
+    };
+    sessions.windows(2).map(leap).fold(0.0, f64::max)
+}
+
+/// Slope of a straight line and its standard deviation, neighbours being correlated as their residuals are.
+fn line(points: &[(f64, f64)]) -> Option<(f64, f64)> {
+    let n = points.len() as f64;
+    if points.len() < FEWEST_STRETCHES {
+        return None;
+    }
+    let (mx, my) = points.iter().fold((0.0, 0.0), |m, p| (m.0 + p.0 / n, m.1 + p.1 / n));
+    let (xx, xy) = points.iter().fold((0.0, 0.0), |s, p| (s.0 + (p.0 - mx).powi(2), s.1 + (p.0 - mx) * (p.1 - my)));
+    let slope = xy / xx;
+    let left: Vec<f64> = points.iter().map(|p| p.1 - my - slope * (p.0 - mx)).collect();
+    let own: f64 = left.iter().map(|l| l * l).sum();
+    let next: f64 = left.windows(2).map(|l| l[0] * l[1]).sum();
+    let correlation = if own > 0.0 { (next / own).clamp(0.0, 0.9) } else { 0.0 };
+    let std = (own / (n - 2.0) / xx * (1.0 + correlation) / (1.0 - correlation)).sqrt();
+    Some((slope, std.max(1e-12)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Sessions of 15 s at 100 Hz, minutes apart, on a drive with clearance and wind-up whose zero moves; `zeros` are those of the sessions.
+    fn sessions(per_hour_arcsec: f64, zeros: &[f64]) -> Vec<Session> {
+        sessions_apart(300.0, per_hour_arcsec, zeros)
+    }
+
+    /// The same, once to twice so many seconds apart.
+    fn sessions_apart(apart_s: f64, per_hour_arcsec: f64, zeros: &[f64]) -> Vec<Session> {
+        let mut random = fastrand::Rng::with_seed(8);
+        let mut begin = 0.0;
+        let one = |(number, zero): (usize, &f64)| {
+            let time: Vec<f64> = (0..1500).map(|k| begin + 0.01 * f64::from(k)).collect();
+            let since: Vec<f64> = time.iter().map(|t| t - begin).collect();
+            begin += 15.0 + apart_s * (1.0 + random.f64());
+            let torque: Vec<f64> = since.iter().map(|t| 20.0 * (0.9 * t + number as f64).sin()).collect();
+            let noise = |random: &mut fastrand::Rng| 2.0 * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0);
+            let error = time.iter().zip(&torque).map(|(t, torque)| {
+                let drive = 7.0 * torque + 30.0 * torque.signum() + noise(&mut random);
+                ARCSEC * (drive + zero + per_hour_arcsec * t / 3600.0)
+            });
+            Session {
+                error_rad: error.collect(),
+                line: (2..1502).collect(),
+                generator_rad: since.iter().map(|t| 30.0 * (0.6 * t).sin()).collect(),
+                torque_n_m: Some(torque),
+                time_s: Some(time),
+                ..Session::default()
+            }
+        };
+        zeros.iter().enumerate().map(one).collect()
+    }
+
+    #[test]
+    fn what_warms_with_time_is_told_by_its_span_and_its_trend() {
+        let warmed = |by_k: f64, late: f64| {
+            let mut sessions = sessions(0.0, &[0.0; 3]);
+            for (number, session) in sessions.iter_mut().enumerate() {
+                session.temperature_c = Some(vec![20.0 + by_k * (number as f64 - late).abs(); session.len()]);
+            }
+            let tau = |s: usize, _: usize| s as f64 - 1.0;
+            warms_with_time(&sessions, &tau)
+        };
+        assert!(warmed(4.0, 0.0));
+        assert!(!warmed(0.5, 0.0), "within what counts");
+        assert!(!warmed(4.0, 1.0), "cold again at the end");
+    }
+
+    #[test]
+    fn zeros_that_are_set_anew_are_no_drift_as_they_stand_within_the_sessions() {
+        for zeros in [[0.0, 130.0, 180.0, 370.0], [0.0, -150.0, -120.0, -400.0], [0.0, 60.0, 140.0, 190.0]] {
+            assert_eq!(found(sessions_apart(5.0, 0.0, &zeros)), None, "{zeros:?}");
+        }
+        for per_hour in [-9000.0, 3000.0] {
+            let rate = found(sessions_apart(5.0, per_hour, &[0.0; 4])).expect("a drift");
+            assert!((rate / per_hour - 1.0).abs() < 0.1, "{rate} for {per_hour}");
+        }
+    }
+
+    fn found(mut sessions: Vec<Session>) -> Option<f64> {
+        let mut findings = Findings::default();
+        check(&mut sessions, &Gear::of_ratio(100.0), Stretches::OfTime, &mut findings);
+        findings.faults.first().and_then(|fault| fault.measures.arcsec_per_hour)
+    }
+
+    #[test]
+    fn a_drift_over_sessions_that_are_short_beside_their_breaks_is_told_from_zeros_that_are_set_anew() {
+        for per_hour in [-2000.0, 600.0, 5000.0] {
+            let rate = found(sessions(per_hour, &[0.0; 4])).expect("a drift");
+            assert!((rate / per_hour - 1.0).abs() < 0.05, "{rate} for {per_hour}");
+        }
+        // Two breaks are enough where the zeros of both agree.
+        let rate = found(sessions(2600.0, &[0.0; 3])).expect("a drift");
+        assert!((rate / 2600.0 - 1.0).abs() < 0.05, "{rate}");
+        assert_eq!(found(sessions(0.0, &[0.0, 260.0, -340.0])), None);
+        assert_eq!(found(sessions(0.0, &[0.0; 4])), None);
+        assert_eq!(found(sessions(0.0, &[0.0, 210.0, 340.0, 690.0])), None);
+    }
+}

@@ -1,0 +1,300 @@
+//! Channels that repeat a value while they should change.
+
+use std::ops::Range;
+
+use super::lattice::lattice;
+use super::steps::whole_pitches;
+use super::{ARCSEC, Findings, of_rows};
+use crate::measurement::Session;
+use crate::measurement::columns::Quantity;
+use crate::measurement::fault::{FaultName, Treatment};
+use crate::measurement::gear::Gear;
+use flexspline_base::robust::{least_and_most, quantile_of, sampled, white_noise};
+
+/// Chance of one false alarm in a file, for a channel with noise.
+const CHANCE: f64 = 1e-6;
+/// Noise of at least this share of a step of the lattice moves a channel on at every second row at least.
+const BLURRED: f64 = 0.6;
+/// Shortest stretch that counts, rows.
+const SHORTEST: usize = 20;
+/// White noise below this is none at the output, rad: what a solver leaves.
+const NO_NOISE_RAD: f64 = 0.02 * ARCSEC;
+/// An output that dwells for longer than this, and catches up in one row, has been frozen; clearance is given back on the way.
+const DWELL_RAD: f64 = 600.0 * ARCSEC;
+/// No clearance is as wide as this.
+const LONG_DWELL_RAD: f64 = 1200.0 * ARCSEC;
+/// A channel without noise that is frozen catches up by so many of its usual largest steps.
+const CATCHES_UP: f64 = 10.0;
+
+/// Stretches of rows with one value, at least `shortest` rows long.
+fn stretches(values: &[f64], shortest: usize, same: impl Fn(f64, f64) -> bool) -> Vec<Range<usize>> {
+    let mut found = Vec::new();
+    let mut begin = 0;
+    for row in 1..=values.len() {
+        if row == values.len() || !same(values[row], values[begin]) {
+            if row - begin >= shortest {
+                found.push(begin..row);
+            }
+            begin = row;
+        }
+    }
+    found
+}
+
+/// Length of a stretch that chance does not give in so many rows, of a channel that changes at every second row at least.
+fn beyond_chance(rows: usize) -> usize {
+    let length = (CHANCE / rows.max(1) as f64).ln() / 0.5_f64.ln();
+    SHORTEST.max(length.ceil() as usize)
+}
+
+/// Whether an output beside a generator that stands leaves by whole tooth pitches and has done so within a part of the stretch: teeth that
+/// skip move it, not a generator that is not read.
+fn slips_a_tooth(output: &[f64], stretch: &Range<usize>, gear: &Gear) -> bool {
+    let angles = &output[stretch.clone()];
+    let (first, last) = (angles[0], angles[angles.len() - 1]);
+    let apart = (angles.len() / 4).max(1);
+    whole_pitches(last - first, gear)
+        && angles.windows(apart + 1).any(|a| (a[apart] - a[0]).abs() > SUDDEN * (last - first).abs())
+}
+
+/// A motion is sudden if this share of it happens within a quarter of the time.
+const SUDDEN: f64 = 0.9;
+
+/// Finds frozen stretches and leaves their rows out; a channel that is frozen throughout is an error.
+pub(in crate::measurement) fn check(
+    sessions: &mut Vec<Session>,
+    gear: &Gear,
+    error_recorded: bool,
+    findings: &mut Findings,
+) -> Result<(), String> {
+    let rows: usize = sessions.iter().map(Session::len).sum();
+    let outputs: Vec<Vec<f64>> = sessions.iter().map(|session| session.output_rad(gear.ratio)).collect();
+    let (noise, step) = noise_and_step(&outputs.iter().map(Vec::as_slice).collect::<Vec<_>>());
+    let noisy = noise > BLURRED * step && noise > NO_NOISE_RAD;
+    let mut drop: Vec<Vec<bool>> = sessions.iter().map(|session| vec![false; session.len()]).collect();
+    for (number, (session, output)) in sessions.iter().zip(&outputs).enumerate() {
+        let generator = &session.generator_rad;
+        // Digits of an error that was written down leave something of the angle.
+        let digits = if error_recorded { 1e-3 * ARCSEC } else { 0.0 };
+        let same = |a: f64, b: f64| (a - b).abs() <= digits + 1e-13 * (a.abs() + b.abs());
+        let mut frozen: Vec<(Quantity, Range<usize>, f64)> = Vec::new();
+        let follower = if error_recorded { Quantity::Error } else { Quantity::Output };
+        for stretch in stretches(output, 3, same) {
+            let missed = missed(generator, &stretch) / gear.ratio.abs();
+            let catches_up = output.get(stretch.end).is_some_and(|next| {
+                let due = (generator[stretch.end] - generator[stretch.start]) / gear.ratio;
+                let made = next - output[stretch.start];
+                made * due.signum() > 0.5 * due.abs() && due.abs() > 0.5 * missed
+            });
+            let by_dwell = missed > LONG_DWELL_RAD || (missed > DWELL_RAD && catches_up);
+            if by_dwell || (noisy && stretch.len() >= beyond_chance(rows)) {
+                frozen.push((follower, stretch, missed));
+            }
+        }
+        if error_recorded {
+            let (noise, step) = noise_and_step(&[&session.error_rad]);
+            let noisy = noise > BLURRED * step && noise > NO_NOISE_RAD;
+            for stretch in stretches(&session.error_rad, beyond_chance(rows), |a, b| a == b) {
+                if noisy || stretch.len() == session.len() {
+                    frozen.push((Quantity::Error, stretch, 0.0));
+                }
+            }
+        }
+        for stretch in stretches(generator, 3, |a, b| a == b) {
+            let moved = missed_by(output, &stretch);
+            let catches_up = generator.get(stretch.end).is_some_and(|next| {
+                let due = (output[stretch.end] - output[stretch.start]) * gear.ratio;
+                (next - generator[stretch.start]) * due.signum() > 0.5 * due.abs()
+            });
+            let stands = moved > LONG_DWELL_RAD && slips_a_tooth(output, &stretch, gear);
+            if !error_recorded && !stands && (moved > LONG_DWELL_RAD || (moved > DWELL_RAD && catches_up)) {
+                frozen.push((Quantity::Generator, stretch, moved));
+            }
+        }
+        for (channel, stretch, missed) in frozen {
+            let mut fault = of_rows(session, FaultName::FrozenChannel, stretch.clone());
+            (fault.channel, fault.treatment) = (Some(channel), Treatment::Masked);
+            fault.size_arcsec = Some(missed / ARCSEC);
+            fault.what = format!(
+                "the {channel} keeps one value over {} rows, in which it should have moved by {:.1} arcsec at the output: they are left out",
+                stretch.len(),
+                missed / ARCSEC
+            );
+            findings.faults.push(fault);
+            drop[number][stretch].iter_mut().for_each(|row| *row = true);
+        }
+    }
+    let left: usize = drop.iter().flatten().filter(|dropped| !**dropped).count();
+    if 2 * left < rows {
+        let fault = findings.faults.iter().find(|fault| fault.name == FaultName::FrozenChannel);
+        let channel = fault.and_then(|fault| fault.channel).map_or("output", Quantity::name);
+        return Err(format!(
+            "the {channel} keeps one value over {} of {rows} rows; allowed: at most half of them",
+            rows - left
+        ));
+    }
+    saturated(sessions, rows, &mut drop, findings);
+    beside(sessions, Quantity::Torque, rows, &mut drop, findings);
+    beside(sessions, Quantity::Temperature, rows, &mut drop, findings);
+    for (session, drop) in sessions.iter_mut().zip(&drop) {
+        if drop.contains(&true) {
+            session.leave_out(drop);
+        }
+    }
+    sessions.retain(|session| !session.is_empty());
+    Ok(())
+}
+
+/// White noise and resolution of a channel; no lattice is a step of zero.
+fn noise_and_step(series: &[&[f64]]) -> (f64, f64) {
+    let longest = series.iter().max_by_key(|values| values.len()).copied().unwrap_or(&[]);
+    (white_noise(series.iter().copied()), lattice(longest).unwrap_or(0.0))
+}
+
+/// The farthest an angle goes from its first value in a stretch.
+fn missed_by(values: &[f64], stretch: &Range<usize>) -> f64 {
+    values[stretch.clone()].iter().map(|value| (value - values[stretch.start]).abs()).fold(0.0, f64::max)
+}
+
+fn missed(generator: &[f64], stretch: &Range<usize>) -> f64 {
+    missed_by(generator, stretch)
+}
+
+/// A limit that the torque stands at: in so many rows of stretches as long as this, and this share of all.
+const AT_LIMIT_ROWS: usize = 3;
+const AT_LIMIT_SHARE: f64 = 0.005;
+
+/// Leaves out rows in which the torque stands at its largest or its least value, though it has noise elsewhere: the sensor or its amplifier
+/// is at its end, and nobody knows the load.
+fn saturated(sessions: &[Session], rows: usize, drop: &mut [Vec<bool>], findings: &mut Findings) {
+    let torques: Vec<&[f64]> = sessions.iter().filter_map(|session| session.beside(Quantity::Torque)).collect();
+    if torques.len() < sessions.len() || torques.is_empty() {
+        return;
+    }
+    let (least, most) = least_and_most(torques.iter().copied().flatten().copied());
+    let at_end = |torque: &f64| *torque == least || *torque == most;
+    let between: Vec<&[f64]> =
+        torques.iter().flat_map(|torque| torque.split(at_end)).filter(|part| part.len() > 8).collect();
+    let (noise, step) = noise_and_step(&between);
+    if most <= least || noise <= BLURRED * step || noise <= 0.0 {
+        return;
+    }
+    for limit in [least, most] {
+        let at_limit = |values: &[f64]| stretches(values, AT_LIMIT_ROWS, |a, b| a == limit && b == limit);
+        let found: Vec<Vec<Range<usize>>> = torques.iter().map(|torque| at_limit(torque)).collect();
+        let count: usize = found.iter().flatten().map(Range::len).sum();
+        let places =
+            || found.iter().enumerate().flat_map(|(number, of)| of.iter().map(move |stretch| (number, stretch)));
+        let (Some((first, from)), Some((last, to))) = (places().next(), places().last()) else { continue };
+        if limit == 0.0 || (count as f64) < AT_LIMIT_SHARE * rows as f64 || count < SHORTEST {
+            continue;
+        }
+        let mut fault = of_rows(&sessions[first], FaultName::FrozenChannel, from.clone());
+        let end = of_rows(&sessions[last], FaultName::FrozenChannel, to.clone());
+        (fault.last_line, fault.until_s, fault.rows) = (end.last_line, end.until_s, count as u64);
+        (fault.channel, fault.treatment) = (Some(Quantity::Torque), Treatment::Masked);
+        fault.advice = "take a torque sensor, or a gain of its amplifier, with room for the largest load";
+        fault.what = format!(
+            "the torque never passes {limit:.3} N·m, and stands there in {count} rows, though it has noise elsewhere: it saturates, and these \
+             rows are left out"
+        );
+        findings.faults.push(fault);
+        places().for_each(|(number, stretch)| drop[number][stretch.clone()].fill(true));
+    }
+}
+
+/// Torque or temperature: the whole channel is left out if half of it is frozen; else a temperature goes on by a straight line, and rows
+/// whose torque nobody knows are left out, since a load swings and the drive with it.
+///
+/// A constant load, a load in steps and a soak at one temperature are not faults: only a channel with noise that lost it, or a
+/// channel that always changes, stands, and catches up at once, is frozen.
+fn beside(sessions: &mut [Session], channel: Quantity, rows: usize, drop: &mut [Vec<bool>], findings: &mut Findings) {
+    let series: Vec<&[f64]> = sessions.iter().filter_map(|session| session.beside(channel)).collect();
+    if series.is_empty() {
+        return;
+    }
+    let (noise, step) = noise_and_step(&series);
+    let steps: Vec<f64> = series.iter().flat_map(|v| v.windows(2).map(|v| (v[1] - v[0]).abs())).collect();
+    let standing = steps.iter().filter(|step| **step == 0.0).count();
+    let usual = quantile_of(&mut sampled(&steps), 0.99);
+    let longest = beyond_chance(rows);
+    let mut frozen: Vec<(usize, Range<usize>)> = Vec::new();
+    for (number, values) in sessions.iter().enumerate().filter_map(|(k, session)| Some((k, session.beside(channel)?))) {
+        for stretch in stretches(values, longest, |a, b| a == b) {
+            // No load at all is a load, and may be written as exactly nothing; what saturates is known already.
+            if values[stretch.start] == 0.0 || drop[number][stretch.start] {
+                continue;
+            }
+            // Without this stretch the channel stands in so many of its steps.
+            let elsewhere = (standing + 1).saturating_sub(stretch.len()) as f64 / (rows - stretch.len()).max(1) as f64;
+            let noisy = noise > BLURRED * step && noise > 0.0 && elsewhere < 0.5;
+            let back = values.get(stretch.end).map_or(0.0, |next| (next - values[stretch.start]).abs());
+            let smooth = elsewhere < 0.02 && back > CATCHES_UP * usual && usual > 0.0;
+            if noisy || smooth {
+                frozen.push((number, stretch));
+            }
+        }
+    }
+    let count: usize = frozen.iter().map(|(_, stretch)| stretch.len()).sum();
+    let useless = 2 * count > rows;
+    for (number, stretch) in frozen {
+        let mut fault = of_rows(&sessions[number], FaultName::FrozenChannel, stretch.clone());
+        fault.channel = Some(channel);
+        let (treatment, done) = match channel {
+            _ if useless => (Treatment::Masked, "the channel is not used"),
+            Quantity::Torque => (Treatment::Masked, "they are left out"),
+            _ => (Treatment::Repaired, "a straight line is put in its place"),
+        };
+        fault.treatment = treatment;
+        fault.what = format!("the {channel} keeps one value over {} rows: {done}", stretch.len());
+        findings.faults.push(fault);
+        if channel == Quantity::Torque && !useless {
+            drop[number][stretch].fill(true);
+            continue;
+        }
+        if let Some(values) = sessions[number].beside_mut(channel) {
+            let from = values[stretch.start];
+            let to = values.get(stretch.end).copied().unwrap_or(from);
+            for row in stretch.clone() {
+                values[row] = from + (to - from) * (row - stretch.start) as f64 / stretch.len() as f64;
+            }
+        }
+    }
+    if useless {
+        sessions.iter_mut().for_each(|session| session.forget(channel));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rows left of a torque, and what is told.
+    fn left(torque: impl Iterator<Item = f64>) -> (usize, Vec<FaultName>) {
+        let mut sessions = vec![Session {
+            torque_n_m: Some(torque.collect()),
+            line: (2..4002).collect(),
+            generator_rad: (0..4000).map(|k| 0.02 * f64::from(k)).collect(),
+            error_rad: (0..4000).map(|k| 1e-5 * f64::from(k % 7)).collect(),
+            ..Session::default()
+        }];
+        let mut findings = Findings::default();
+        check(&mut sessions, &Gear::of_ratio(100.0), false, &mut findings).unwrap();
+        (sessions[0].len(), findings.faults.iter().map(|fault| fault.name).collect())
+    }
+
+    #[test]
+    fn a_torque_that_saturates_is_told_once_for_each_end_and_its_rows_are_left_out() {
+        let mut random = fastrand::Rng::with_seed(4);
+        let noisy: Vec<f64> =
+            (0..4000).map(|k| 40.0 * (0.01 * f64::from(k)).sin() + 0.1 * (random.f64() - 0.5)).collect();
+        let (rows, names) = left(noisy.iter().map(|load| load.clamp(-20.0, 20.0)));
+        // Beyond half of the amplitude of a sine are two thirds of its time.
+        assert!((1200..1500).contains(&rows), "{rows}");
+        assert_eq!(names, [FaultName::FrozenChannel; 2]);
+        assert_eq!(left(noisy.iter().copied()), (4000, vec![]));
+        // Ramps between two loads that are held, as they were asked for.
+        let ramps = |k: i32| (80.0 * ((0.002 * f64::from(k)).fract() - 0.5).abs() - 20.0).clamp(-10.0, 10.0);
+        assert_eq!(left((0..4000).map(ramps)), (4000, vec![]));
+    }
+}

@@ -1,0 +1,301 @@
+//! Counts that leap: by whole turns of the motor in one row, or from one session to the next.
+//!
+//! A counter that begins anew, or wraps at a power of two, moves one column by whole turns while the other goes on as it did. Teeth
+//! that skip move the output, and stay for the diagnosis. Between sessions nobody saw which of the two columns moved.
+
+use std::f64::consts::TAU;
+
+use super::{ARCSEC, Findings, span};
+use crate::measurement::columns::Quantity;
+use crate::measurement::fault::{FaultName, Measures, Treatment};
+use crate::measurement::gear::Gear;
+use crate::measurement::log::Log;
+use flexspline_base::robust::median_of;
+
+/// What is left beside whole turns, turns of the motor: clearance and wind-up are a tenth of that.
+const BESIDE_TURNS: f64 = 0.2;
+/// The column that leaps does so this many times more than the other.
+const LEAPS_MORE: f64 = 3.0;
+/// Before a leap the generator and the ratio times the output move alike, within this (rad in a row) and this share.
+const TOGETHER_RAD: f64 = 0.02;
+const TOGETHER: f64 = 0.3;
+/// Rows before and after, for what is usual there.
+const AROUND: usize = 3;
+/// More leaps than this share of the rows are no leaps: something else is wrong with the column.
+const SHARE: f64 = 0.02;
+/// Rows at the end of a session and at the beginning of the next whose medians are compared.
+const LEVEL_ROWS: usize = 8;
+/// A zero is another one if it is off by this, rad at the output: beyond any clearance and wind-up. *Guess*.
+const OTHER_ZERO_RAD: f64 = 1500.0 * ARCSEC;
+/// A jump of this share of a tooth pitch, or less, beside whole pitches is left to the diagnosis: teeth may have skipped.
+const BESIDE_PITCHES: f64 = 0.05;
+/// An error that grows with the angle by more than this is a wrong ratio, and grows between sessions, too.
+const SLOPE: f64 = 1e-3;
+
+/// Change of a column into a row.
+fn moved(values: &[f64], row: usize) -> f64 {
+    values[row] - values[row - 1]
+}
+
+/// What a column moves by in the rows around one, which is left out.
+fn usual(log: &Log, values: &[f64], row: usize) -> f64 {
+    let near = row.saturating_sub(AROUND).max(1)..(row + AROUND + 1).min(values.len());
+    let mut moves: Vec<f64> = near.filter(|k| *k != row && log.continues(*k)).map(|k| moved(values, k)).collect();
+    median_of(&mut moves)
+}
+
+/// Finds rows into which the generator's angle leaps by whole turns, and takes these out.
+pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut Findings) {
+    let (Some(generator), Some(output)) = (log.get(Quantity::Generator), log.get(Quantity::Output)) else { return };
+    let leaps: Vec<(usize, f64)> = (1..log.len())
+        .filter(|row| log.continues(*row))
+        .filter_map(|row| {
+            let turns = (moved(generator, row) - moved(output, row) * gear.ratio) / TAU;
+            if turns.abs() < 1.0 - BESIDE_TURNS || (turns - turns.round()).abs() > BESIDE_TURNS {
+                return None;
+            }
+            let by_generator = (moved(generator, row) - usual(log, generator, row)).abs();
+            let by_output = ((moved(output, row) - usual(log, output, row)) * gear.ratio).abs();
+            // A generator that was frozen leaps to where it is: before a leap both go on together.
+            let before = |values: &[f64]| {
+                let rows = row.saturating_sub(AROUND).max(1)..row;
+                median_of(&mut rows.map(|k| moved(values, k)).collect::<Vec<f64>>())
+            };
+            let (psi, delta) = (before(generator), before(output) * gear.ratio);
+            if (psi - delta).abs() > TOGETHER_RAD + TOGETHER * psi.abs().max(delta.abs()) {
+                return None;
+            }
+            let whole = (by_generator / TAU - turns.round().abs()).abs() < 2.0 * BESIDE_TURNS;
+            (whole && by_generator > LEAPS_MORE * by_output).then_some((row, turns.round()))
+        })
+        .collect();
+    let (Some(&(first, size)), Some(&(last, _))) = (leaps.first(), leaps.last()) else { return };
+    if leaps.len() as f64 > SHARE * log.len() as f64 {
+        return;
+    }
+    let largest = leaps.iter().map(|(_, turns)| *turns).fold(size, |a, b| if b.abs() > a.abs() { b } else { a });
+    let wraps = leaps.len() > 1 && leaps.iter().all(|(_, turns)| turns.abs() == size.abs());
+    let mut fault = span(log, FaultName::PositionJump, first, last);
+    (fault.channel, fault.rows) = (Some(Quantity::Generator), leaps.len() as u64);
+    fault.treatment = Treatment::Repaired;
+    fault.size_arcsec = Some(-largest * TAU / gear.ratio / ARCSEC);
+    fault.measures = Measures { turns: Some(largest as i64), ..Measures::default() };
+    let times = if leaps.len() == 1 { "once".to_owned() } else { format!("in {} rows", leaps.len()) };
+    fault.what = if wraps {
+        format!("the generator's count begins anew after {:.0} turns, {times}: it was made continuous", size.abs())
+    } else {
+        format!(
+            "the generator's angle leaps by whole turns ({largest:+.0} at most), {times}, while the output goes on: the turns are taken out"
+        )
+    };
+    findings.faults.push(fault);
+    take_turns_out(log, &leaps);
+}
+
+/// Takes turns out of the generator's angle, each from its row on.
+fn take_turns_out(log: &mut Log, leaps: &[(usize, f64)]) {
+    let Some(generator) = log.get_mut(Quantity::Generator) else { return };
+    let (mut next, mut turns) = (leaps.iter().peekable(), 0.0);
+    for (row, angle) in generator.iter_mut().enumerate() {
+        turns += next.next_if(|(at, _)| *at == row).map_or(0.0, |(_, turns)| *turns);
+        *angle -= turns * TAU;
+    }
+}
+
+/// Finds sessions before which the generator's counter began anew, and puts the turns back; gives those sessions whose zero is another
+/// one, by no whole turns or pitches, with what was taken off them, rad.
+pub(in crate::measurement) fn between_sessions(
+    log: &mut Log,
+    gear: &Gear,
+    findings: &mut Findings,
+) -> Vec<(usize, f64)> {
+    let (Some(generator), Some(output)) = (log.get(Quantity::Generator), log.get(Quantity::Output)) else {
+        return Vec::new();
+    };
+    let starts: Vec<usize> = (1..log.len()).filter(|row| !log.continues(*row)).collect();
+    if starts.is_empty() {
+        return Vec::new();
+    }
+    let error: Vec<f64> = output.iter().zip(generator).map(|(output, psi)| output - psi / gear.ratio).collect();
+    let bounds: Vec<usize> = [0].into_iter().chain(starts.iter().copied()).chain([log.len()]).collect();
+    let slope = slope(generator, &error, &bounds);
+    let mut restarts: Vec<(usize, f64)> = Vec::new();
+    let mut others: Vec<(usize, usize, f64)> = Vec::new();
+    for (session, at) in bounds.windows(3).enumerate() {
+        let (from, start, end) = (at[0], at[1], at[2]);
+        let level = |rows: std::ops::Range<usize>, of: &[f64]| median_of(&mut of[rows].to_vec());
+        let before = start.saturating_sub(LEVEL_ROWS).max(from)..start;
+        let after = start..(start + LEVEL_ROWS).min(end);
+        let apart = |of: &[f64]| level(after.clone(), of) - level(before.clone(), of);
+        let turns_without = |jump: f64| -jump * gear.ratio / TAU;
+        let near = |turns: f64| turns.abs() > 1.0 - BESIDE_TURNS && (turns - turns.round()).abs() <= BESIDE_TURNS;
+        let jump = apart(&error);
+        let jump_beside_slope = jump - slope * apart(generator);
+        let turns = turns_without(jump);
+        if near(turns) {
+            restarts.push((start, turns.round()));
+        } else if slope == 0.0 && jump_beside_slope.abs() > OTHER_ZERO_RAD && !whole_pitches(jump, gear) {
+            others.push((session + 1, start, jump));
+        }
+    }
+    // One turn of the motor is two tooth pitches: alone it may be teeth that have skipped, and is left to the diagnosis.
+    if gear.tooth_pitch_rad.is_some() && restarts.iter().all(|(_, turns)| turns.abs() < 2.0) {
+        for (start, _) in restarts.drain(..) {
+            findings.notes.push(format!(
+                "line {}: the error changes by one turn of the motor between two sessions: a counter that began anew, or teeth that have \
+                 skipped, which these data do not tell",
+                log.line[start]
+            ));
+        }
+    }
+    if let (Some(&(first, size)), Some(&(last, _))) = (restarts.first(), restarts.last()) {
+        let largest = restarts.iter().map(|(_, turns)| *turns).fold(size, |a, b| if b.abs() > a.abs() { b } else { a });
+        let mut fault = span(log, FaultName::CounterRestart, first, last);
+        (fault.channel, fault.rows) = (Some(Quantity::Generator), restarts.len() as u64);
+        fault.treatment = Treatment::Repaired;
+        fault.size_arcsec = Some(-largest * TAU / gear.ratio / ARCSEC);
+        fault.measures = Measures { turns: Some(largest as i64), ..Measures::default() };
+        let list: Vec<String> = restarts.iter().take(6).map(|(_, turns)| format!("{turns:+.0}")).collect();
+        fault.what = format!(
+            "the generator's counter begins anew before {} of {} sessions, by {}{} turns of the motor: they are put back",
+            restarts.len(),
+            bounds.len() - 1,
+            list.join(", "),
+            if restarts.len() > list.len() { ", …" } else { "" }
+        );
+        findings.faults.push(fault);
+    }
+    if let (Some(&(_, first, size)), Some(&(_, last, _))) = (others.first(), others.last()) {
+        let largest = others.iter().map(|(.., jump)| *jump).fold(size, |a, b| if b.abs() > a.abs() { b } else { a });
+        let mut fault = span(log, FaultName::PositionJump, first, last);
+        (fault.rows, fault.treatment) = (others.len() as u64, Treatment::Repaired);
+        fault.size_arcsec = Some(largest / ARCSEC);
+        fault.what = format!(
+            "the zero of {} sessions is another one, by up to {:.0} arcsec, which is no whole number of motor turns or tooth pitches: the \
+             zero of each is fitted on its own",
+            others.len(),
+            largest / ARCSEC
+        );
+        findings.faults.push(fault);
+    }
+    let mut off = 0.0;
+    if let Some(output) = log.get_mut(Quantity::Output) {
+        let mut next = others.iter().peekable();
+        for (row, angle) in output.iter_mut().enumerate() {
+            off += next.next_if(|(_, at, _)| *at == row).map_or(0.0, |(.., jump)| *jump);
+            *angle -= off;
+        }
+    }
+    take_turns_out(log, &restarts);
+    let mut off = 0.0;
+    let taken_off = |(session, _, jump)| {
+        off += jump;
+        (session, off)
+    };
+    others.into_iter().map(taken_off).collect()
+}
+
+/// The rate, rad/s, at which the error changes over all gaps between sessions alike, if it does: then no zero is another one, but it drifts.
+pub(in crate::measurement) fn changes_with_the_gaps(log: &Log, gear: &Gear) -> Option<f64> {
+    let (generator, output, time) =
+        (log.get(Quantity::Generator)?, log.get(Quantity::Output)?, log.get(Quantity::Time)?);
+    let error = |row: usize| output[row] - generator[row] / gear.ratio;
+    let level = |rows: std::ops::Range<usize>| median_of(&mut rows.map(error).collect::<Vec<f64>>());
+    let gaps: Vec<(f64, f64)> = (1..log.len())
+        .filter(|row| !log.continues(*row))
+        .map(|row| {
+            let jump = level(row..(row + LEVEL_ROWS).min(log.len())) - level(row.saturating_sub(LEVEL_ROWS)..row);
+            (time[row] - time[row - 1], jump)
+        })
+        .collect();
+    let (square, product) = gaps.iter().fold((0.0, 0.0), |sum, gap| (sum.0 + gap.0 * gap.0, sum.1 + gap.0 * gap.1));
+    let per_s = product / square;
+    let alike = |gap: &(f64, f64)| (gap.1 - per_s * gap.0).abs() < LIKE_THE_GAP * gap.1.abs() + STATE_RAD;
+    let large = gaps.iter().any(|gap| gap.1.abs() > OTHER_ZERO_RAD);
+    (gaps.len() >= FEWEST_GAPS && large && gaps.iter().all(alike)).then_some(per_s)
+}
+
+/// Gaps that have to agree; a jump over one is of its length within this share, and what wind-up and clearance may differ by, rad. *Guess*.
+const FEWEST_GAPS: usize = 3;
+const LIKE_THE_GAP: f64 = 0.1;
+const STATE_RAD: f64 = 600.0 * ARCSEC;
+
+/// By how much the error grows with the angle within sessions, where that is beyond what a drive does; else 0.
+fn slope(generator: &[f64], error: &[f64], bounds: &[usize]) -> f64 {
+    let mut slopes: Vec<f64> = bounds
+        .windows(2)
+        .filter_map(|at| {
+            let by = |a: &usize, b: &usize| generator[*a].total_cmp(&generator[*b]);
+            let (low, high) = ((at[0]..at[1]).min_by(by)?, (at[0]..at[1]).max_by(by)?);
+            let turned = generator[high] - generator[low];
+            (turned > TAU).then(|| (error[high] - error[low]) / turned)
+        })
+        .collect();
+    let of_turns = generator.first().map_or(0.0, |_| median_of(&mut slopes));
+    if of_turns.abs() > SLOPE / TAU / 10.0 { of_turns } else { 0.0 }
+}
+
+/// Whether a jump is of whole tooth pitches: the drive may have ratcheted.
+fn whole_pitches(jump: f64, gear: &Gear) -> bool {
+    gear.tooth_pitch_rad.is_some_and(|pitch| {
+        let pitches = (jump / pitch).round();
+        pitches != 0.0 && (jump - pitches * pitch).abs() < BESIDE_PITCHES * pitch
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measurement::fault::Fault;
+
+    const RATIO: f64 = 100.0;
+
+    /// A drive that turns on and on; `change` moves generator and output from row 500 on.
+    fn log(gap: bool, by_generator: f64, by_output: f64) -> Log {
+        let mut log = Log::default();
+        log.line = (0..1000).collect();
+        log.session = (0..1000).map(|k| u32::from(gap && k >= 500)).collect();
+        let late = |k: i32| f64::from(u8::from(k >= 500));
+        log.put(Quantity::Generator, (0..1000).map(|k| 0.1 * f64::from(k) + by_generator * late(k)).collect());
+        let output = |k: i32| 0.001 * f64::from(k) + 3.0 * ARCSEC * f64::from(k % 3) + by_output * late(k);
+        log.put(Quantity::Output, (0..1000).map(output).collect());
+        log
+    }
+
+    fn found(log: &mut Log) -> (Vec<Fault>, Vec<(usize, f64)>) {
+        let gear = Gear { tooth_pitch_rad: Some(TAU / 200.0), ..Gear::of_ratio(RATIO) };
+        let mut findings = Findings::default();
+        check(log, &gear, &mut findings);
+        let others = between_sessions(log, &gear, &mut findings);
+        (findings.faults, others)
+    }
+
+    fn generator_goes_on(log: &Log) -> bool {
+        let generator = log.get(Quantity::Generator).unwrap();
+        (1..1000).all(|row| (moved(generator, row) - 0.1).abs() < 1e-9)
+    }
+
+    #[test]
+    fn a_count_that_leaps_by_turns_is_put_right_and_teeth_that_skip_are_not() {
+        let mut leapt = log(false, -16.0 * TAU, 0.0);
+        let (faults, _) = found(&mut leapt);
+        assert_eq!((faults.len(), faults[0].name, faults[0].measures.turns), (1, FaultName::PositionJump, Some(-16)));
+        assert!(generator_goes_on(&leapt));
+        // Two pitches are one turn of the motor; here the output moves.
+        assert!(found(&mut log(false, 0.0, TAU / RATIO)).0.is_empty());
+        assert!(found(&mut log(false, 0.0, 0.0)).0.is_empty());
+    }
+
+    #[test]
+    fn between_sessions_turns_are_put_back_pitches_stay_and_any_other_zero_is_told() {
+        let mut restarted = log(true, 7.0 * TAU, 0.0);
+        let (faults, others) = found(&mut restarted);
+        assert_eq!((faults.len(), faults[0].name, faults[0].measures.turns), (1, FaultName::CounterRestart, Some(7)));
+        assert!(generator_goes_on(&restarted) && others.is_empty());
+        assert!(found(&mut log(true, 0.0, TAU / 200.0)).0.is_empty(), "one pitch");
+        let (faults, others) = found(&mut log(true, 0.0, 0.0123));
+        assert_eq!((faults.len(), faults[0].name, others.len(), others[0].0), (1, FaultName::PositionJump, 1, 1));
+        // Eight rows of motion are between the levels that are compared.
+        assert!((others[0].1 - 0.0123).abs() < 1e-4, "{others:?}");
+    }
+}

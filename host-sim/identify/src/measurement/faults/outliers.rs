@@ -1,0 +1,412 @@
+//! Single rows that neither the rows before nor those after bear out.
+
+use super::resolution::seen;
+use super::steps::{HELD, largest_torque};
+use super::{ARCSEC, Findings, of_rows};
+use crate::measurement::Session;
+use crate::measurement::columns::Quantity;
+use crate::measurement::fault::{FaultName, Treatment};
+use crate::measurement::gear::Gear;
+use flexspline_base::robust::{least_and_most, median_of, quantile_of, sampled, white_noise};
+
+/// A row is out by so many standard deviations of the white noise…
+const OUT: f64 = 10.0;
+/// …and by so many times what all rows around it but one are out by: ripple that rows follow too slowly stands out everywhere.
+const OUT_OF_AROUND: f64 = 3.0;
+/// And by this at least, rad at the output, and by two steps of the resolution.
+const LEAST_RAD: f64 = 3.0 * ARCSEC;
+const STEPS: f64 = 2.0;
+/// And, in torque and temperature, by this share of the range.
+const LEAST_OF_RANGE: f64 = 0.05;
+/// A few outliers of torque or temperature are named only if one is so large, as a share of the range: loads that change from row to row
+/// give small ones.
+const LARGE_OF_RANGE: f64 = 0.5;
+/// The pulse of a tooth is this wide, rad of the generator; rows that are farther apart may catch it once.
+const TOOTH_RAD: f64 = 0.05;
+/// Fewer outliers than this, or any in fast motion, are named only if they are large: teeth and kinks of the motion give small ones.
+const FEW: usize = 4;
+/// Large, rad at the output: more than a tooth or a usual clearance gives.
+const LARGE_RAD: f64 = 120.0 * ARCSEC;
+/// Load changes at once if it does by so many times its usual pace.
+const LOAD_PACE: f64 = 10.0;
+/// Load that changes by this share of its largest within the rows beside moves the drive: play is thrown over, wind-up follows.
+const SWINGS: f64 = 0.05;
+/// Rows before and after that are looked at.
+const BESIDE: usize = 3;
+/// Rows around, for what is usual there.
+const AROUND: usize = 15;
+/// If more rows than this are out, they are not outliers but the noise.
+const SHARE: f64 = 0.1;
+/// Where more rows than this are out, others are out around most of them: then so many of the rows around do not count for what is usual
+/// there, which 5 % of 30 rows exceed in one case of fifty (Poisson).
+const MANY: f64 = 0.003;
+const OTHERS_OUT: usize = 4;
+/// Mean resultant length above which four or more outliers repeat with position: a damaged tooth, which is the drive.
+const REPEATS: f64 = 0.9;
+/// Rayleigh's n R² above which many outliers repeat with position: chance exp(−12).
+const REPEATS_MANY: f64 = 12.0;
+
+/// How far row `row` is from the rows before and after, and from where they go on to, if all say so; 0 if one of them bears it out. A
+/// load turns sharply within a row and means it, and the wind-up with it: such a tip goes on as one of its sides does.
+fn off_course(values: &[f64], row: usize) -> f64 {
+    let by = out_by(values, row);
+    if by == 0.0 {
+        return 0.0;
+    }
+    let (before, after) = ([3, 2, 1].map(|k| values[row - k]), [3, 2, 1].map(|k| values[row + k]));
+    let borne_out = [before[2], after[2], carried_on(before), carried_on(after)];
+    let (low, high) = least_and_most(borne_out);
+    let beyond = values[row] - values[row].clamp(low, high);
+    if beyond * by <= 0.0 { 0.0 } else { by.signum() * by.abs().min(beyond.abs()) }
+}
+
+/// Where three rows go on to: their median slope (Theil and Sen) from the median of where it puts them, so that one of them may be out.
+fn carried_on([a, b, c]: [f64; BESIDE]) -> f64 {
+    let slope = median_of(&mut [b - a, c - b, 0.5 * (c - a)]);
+    median_of(&mut [a + 3.0 * slope, b + 2.0 * slope, c + slope])
+}
+
+/// Whether the load moves the drive for a row: it swings, and either holds no flank there or stands out itself.
+fn load_swings(session: &Session, row: usize, largest_n_m: f64) -> bool {
+    session.torque_n_m.as_ref().is_some_and(|torque| {
+        let near = &torque[row.saturating_sub(BESIDE)..(row + BESIDE + 1).min(torque.len())];
+        let (low, high) = least_and_most(near.iter().copied());
+        let beside = &torque[row.saturating_sub(1)..(row + 2).min(torque.len())];
+        let let_go = beside.iter().any(|torque| torque.abs() < HELD * largest_n_m);
+        high - low > SWINGS * largest_n_m && (let_go || out_by(torque, row).abs() > SWINGS * largest_n_m)
+    })
+}
+
+/// How far row `row` is from the rows before and after, if both say so; 0 if one of them bears it out.
+fn out_by(values: &[f64], row: usize) -> f64 {
+    if row < BESIDE || row + BESIDE >= values.len() {
+        return 0.0;
+    }
+    let middle = |from: usize| {
+        let (a, b, c) = (values[from], values[from + 1], values[from + 2]);
+        a.max(b).min(a.min(b).max(c))
+    };
+    let (before, after) = (values[row] - middle(row - BESIDE), values[row] - middle(row + 1));
+    if before * after <= 0.0 { 0.0 } else { before.signum() * before.abs().min(after.abs()) }
+}
+
+/// Whether the drive goes on steadily around a row: no reversal and no load that changes at once, which give peaks of their own.
+fn steady(session: &Session, row: usize) -> bool {
+    let near = row.saturating_sub(6).max(1)..(row + 7).min(session.len());
+    let moved = |k: usize| session.generator_rad[k] - session.generator_rad[k - 1];
+    // The row itself may be the one that is out.
+    let mut others = near.clone().filter(|k| *k != row && *k != row + 1);
+    let direction = others.clone().map(moved).sum::<f64>();
+    if others.any(|k| moved(k) * direction < 0.0) {
+        return false;
+    }
+    session.torque_n_m.as_ref().is_none_or(|torque| {
+        let mut paces: Vec<f64> = near.clone().map(|k| (torque[k] - torque[k - 1]).abs()).collect();
+        let largest = paces.iter().copied().fold(0.0, f64::max);
+        largest <= LOAD_PACE * median_of(&mut paces) || largest == 0.0
+    })
+}
+
+/// A row, and by how much it is out.
+type Out = (usize, f64);
+
+/// Rows that are out by more than `least`, in all sessions; looked for again with less regard for the rows around where there are many.
+fn in_sessions(sessions: &[Session], least: f64, values: fn(&Session) -> &[f64]) -> Vec<Vec<Out>> {
+    let beyond = |others: usize| -> Vec<Vec<Out>> {
+        sessions.iter().map(|session| rows_out(values(session), least, others)).collect()
+    };
+    let found = beyond(1);
+    let rows: usize = sessions.iter().map(Session::len).sum();
+    let many = found.iter().map(Vec::len).sum::<usize>() as f64 > MANY * rows as f64;
+    if many { beyond(OTHERS_OUT) } else { found }
+}
+
+/// Rows that are out by more than `least`, and by far more than all around them but so many `others`.
+fn rows_out(values: &[f64], least: f64, others: usize) -> Vec<Out> {
+    let mut found = Vec::new();
+    for row in BESIDE..values.len().saturating_sub(BESIDE) {
+        // The cheaper bound first: it is the larger one.
+        if out_by(values, row).abs() <= least {
+            continue;
+        }
+        let by = off_course(values, row);
+        if by.abs() <= least {
+            continue;
+        }
+        let around = row.saturating_sub(AROUND)..(row + AROUND + 1).min(values.len());
+        let mut usual: Vec<f64> = around.filter(|k| *k != row).map(|k| out_by(values, k).abs()).collect();
+        usual.sort_unstable_by(f64::total_cmp);
+        let usual = usual.iter().rev().nth(others).copied().unwrap_or(0.0);
+        let (mut before, mut after) = (values[row - BESIDE..row].to_vec(), values[row + 1..=row + BESIDE].to_vec());
+        let step = (median_of(&mut before) - median_of(&mut after)).abs();
+        if by.abs() > OUT_OF_AROUND * usual && step < 0.5 * by.abs() {
+            found.push((row, by));
+        }
+    }
+    found
+}
+
+/// Finds outliers; rows with an outlying error are left out, other channels are mended from the rows beside.
+pub(in crate::measurement) fn check(
+    sessions: &mut [Session],
+    gear: &Gear,
+    error_recorded: bool,
+    findings: &mut Findings,
+) {
+    of_error(sessions, gear, error_recorded, findings);
+    for channel in [Quantity::Torque, Quantity::Temperature] {
+        of_load(sessions, channel, findings);
+    }
+}
+
+/// Outliers of the error: left out, and named where they are the data's and not the drive's.
+fn of_error(sessions: &mut [Session], gear: &Gear, error_recorded: bool, findings: &mut Findings) {
+    let rows: usize = sessions.iter().map(Session::len).sum();
+    let noise = white_noise(sessions.iter().map(|session| session.error_rad.as_slice()));
+    let resolution = seen(sessions, gear, error_recorded).into_iter().map(|(_, step)| step).fold(0.0, f64::max);
+    let least = (OUT * noise).max(LEAST_RAD).max(STEPS * resolution);
+    let largest_n_m = largest_torque(sessions);
+    let out = in_sessions(sessions, least, |session| &session.error_rad);
+    let (moved, found): (Vec<Vec<Out>>, Vec<Vec<Out>>) = sessions
+        .iter()
+        .zip(out)
+        .map(|(session, out)| {
+            let steady = out.into_iter().filter(|(row, _)| steady(session, *row));
+            steady.partition(|(row, _)| load_swings(session, *row, largest_n_m))
+        })
+        .unzip();
+    let number = |found: &[Vec<Out>]| found.iter().map(Vec::len).sum::<usize>();
+    let some = |count: usize| count > 0 && count as f64 <= SHARE * rows as f64;
+    let mut leave_out: Vec<&Vec<Vec<Out>>> = Vec::new();
+    let mut many = false;
+    if some(number(&moved)) {
+        findings.notes.push(format!(
+            "{} single rows stand out where the load swings within a row, and the drive with it; they are left out",
+            number(&moved)
+        ));
+        leave_out.push(&moved);
+    }
+    let count = number(&found);
+    if some(count) {
+        let fast = found.iter().zip(sessions.iter()).all(|(rows, session)| {
+            rows.iter().all(|(row, _)| {
+                (session.generator_rad[row + 1] - session.generator_rad[row - 1]).abs() > 2.0 * TOOTH_RAD
+            })
+        });
+        let large = found.iter().flatten().any(|(_, by)| by.abs() > LARGE_RAD);
+        if (count < FEW || fast) && !large {
+            findings.notes.push(format!(
+                "{count} single rows stand out: too few, or in too fast a motion, to tell drive from data"
+            ));
+        } else if repeat_with_position(sessions, &found, gear) {
+            findings
+                .notes
+                .push(format!("{count} single rows stand out, always in the same position: the drive, not the data"));
+        } else {
+            report(sessions, &found, Quantity::Error, Treatment::Masked, "their rows are left out", findings);
+            leave_out.push(&found);
+            many = count as f64 > MANY * rows as f64;
+        }
+    }
+    for (number, session) in sessions.iter_mut().enumerate() {
+        let mut drop = vec![false; session.len()];
+        leave_out.iter().flat_map(|found| &found[number]).for_each(|(row, _)| drop[*row] = true);
+        if drop.contains(&true) {
+            session.leave_out(&drop);
+        }
+    }
+    if many {
+        let tail = (TAIL * noise).max(STEPS * resolution);
+        let mut more = leave_out_the_doubtful(sessions, tail, BESIDE);
+        more += (1..TAIL_ROUNDS).map(|_| leave_out_the_doubtful(sessions, tail, 0)).sum::<u64>();
+        if let Some(fault) = findings.faults.iter_mut().rfind(|fault| fault.name == FaultName::Outliers) {
+            fault.rows += more;
+        }
+    }
+}
+
+/// Rows before and after whose medians bear a row out where many are out: two of them may be out as well.
+const WIDELY_BESIDE: usize = 5;
+/// Where many rows are far out, others are out by less: the tail of the same fault, mostly to one side, which would move means. What is off by
+/// more than so many standard deviations of the white noise is left out as well, of sound rows one in thousands. *Source*: Hampel's
+/// identifier rejects from 3 on (Davies and Gather 1993); medians of five rows have a noise of their own.
+const TAIL: f64 = 4.0;
+/// So often, as rows that are out hide others.
+const TAIL_ROUNDS: usize = 3;
+
+/// Where many rows are out, those are as well that stand beside others, or where the drive might have moved them, at reversals and steps of
+/// the load; and nothing bears the first and last rows of a session out, `ends` of them. Gives how many are left out.
+fn leave_out_the_doubtful(sessions: &mut [Session], least: f64, ends: usize) -> u64 {
+    let mut more = 0;
+    for session in sessions.iter_mut().filter(|session| session.len() > 4 * BESIDE) {
+        let (error, last) = (&session.error_rad, session.len() - ends);
+        let drop: Vec<bool> = (0..error.len())
+            .map(|row| {
+                if row < ends || row >= last {
+                    return true;
+                }
+                if row < BESIDE || row + BESIDE >= error.len() {
+                    return false;
+                }
+                let before = median_of(&mut error[row.saturating_sub(WIDELY_BESIDE)..row].to_vec());
+                let after = median_of(&mut error[row + 1..(row + 1 + WIDELY_BESIDE).min(error.len())].to_vec());
+                let (from_before, from_after) = (error[row] - before, error[row] - after);
+                let by = from_before.abs().min(from_after.abs());
+                from_before * from_after > 0.0 && by > least && (after - before).abs() < 0.5 * by
+            })
+            .collect();
+        more += drop.iter().filter(|drop| **drop).count() as u64;
+        session.leave_out(&drop);
+    }
+    more
+}
+
+/// Outliers of torque or temperature: mended from the rows beside.
+fn of_load(sessions: &mut [Session], channel: Quantity, findings: &mut Findings) {
+    let series: Vec<&[f64]> = sessions.iter().filter_map(|session| session.beside(channel)).collect();
+    let mut some: Vec<f64> = series.iter().flat_map(|values| sampled(values)).collect();
+    let range = quantile_of(&mut some, 0.99) - quantile_of(&mut some, 0.01);
+    let least = (OUT * white_noise(series)).max(LEAST_OF_RANGE * range);
+    if least == 0.0 {
+        return;
+    }
+    let found: Vec<Vec<Out>> = sessions
+        .iter()
+        .map(|session| session.beside(channel).map_or_else(Vec::new, |values| rows_out(values, least, 1)))
+        .collect();
+    let rows: usize = sessions.iter().map(Session::len).sum();
+    let count: usize = found.iter().map(Vec::len).sum();
+    let large = found.iter().flatten().any(|(_, by)| by.abs() > LARGE_OF_RANGE * range);
+    if count == 0 || count as f64 > SHARE * rows as f64 || (count < FEW && !large) {
+        return;
+    }
+    report(sessions, &found, channel, Treatment::Repaired, "the rows beside stand in", findings);
+    for (session, found) in sessions.iter_mut().zip(&found) {
+        if let Some(values) = session.beside_mut(channel) {
+            found.iter().for_each(|(row, _)| values[*row] = 0.5 * (values[row - 1] + values[row + 1]));
+        }
+    }
+}
+
+fn report(
+    sessions: &[Session],
+    found: &[Vec<Out>],
+    channel: Quantity,
+    treatment: Treatment,
+    done: &str,
+    findings: &mut Findings,
+) {
+    let all = || found.iter().enumerate().flat_map(|(k, rows)| rows.iter().map(move |(row, by)| (k, *row, *by)));
+    let (Some(first), Some(last)) = (all().next(), all().last()) else { return };
+    let largest = all().map(|(.., by)| by).fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
+    let mut fault = of_rows(&sessions[first.0], FaultName::Outliers, first.1..first.1 + 1);
+    let end = of_rows(&sessions[last.0], FaultName::Outliers, last.1..last.1 + 1);
+    (fault.until_s, fault.last_line) = (end.until_s, end.last_line);
+    fault.rows = all().count() as u64;
+    (fault.channel, fault.treatment) = (Some(channel), treatment);
+    if channel != Quantity::Error {
+        fault.advice = "check the cable and the amplifier of this sensor; log its raw values";
+    }
+    let size = if channel == Quantity::Error {
+        fault.size_arcsec = Some(largest / ARCSEC);
+        format!("{:.1} arcsec", largest / ARCSEC)
+    } else {
+        format!("{largest:.3}")
+    };
+    fault.what = format!("{} single rows of the {channel} are out, the farthest by {size}: {done}", fault.rows);
+    findings.faults.push(fault);
+}
+
+/// Whether rows gather at the same angle of a wheel, more than all rows do.
+pub(super) fn repeat_with_position(sessions: &[Session], found: &[Vec<Out>], gear: &Gear) -> bool {
+    let count: usize = found.iter().map(Vec::len).sum();
+    if count < FEW {
+        return false;
+    }
+    // Generator on the flexspline, once or twice a turn (two lobes); on the circular spline likewise; the output.
+    let share = 1.0 / gear.ratio;
+    [1.0, 2.0, 1.0 - share, 2.0 * (1.0 - share), share, 2.0 * share].iter().any(|order| {
+        let resultant = |angles: &mut dyn Iterator<Item = f64>| {
+            let (mut c, mut s, mut n) = (0.0, 0.0, 0.0);
+            for angle in angles {
+                let (sin, cos) = (order * angle).sin_cos();
+                (c, s, n) = (c + cos, s + sin, n + 1.0);
+            }
+            f64::hypot(c, s) / f64::max(n, 1.0)
+        };
+        let of_found = resultant(
+            &mut sessions
+                .iter()
+                .zip(found)
+                .flat_map(|(session, rows)| rows.iter().map(|(row, _)| session.generator_rad[*row])),
+        );
+        let of_all = resultant(&mut sessions.iter().flat_map(|session| session.generator_rad.iter().copied()));
+        let n = count as f64;
+        of_found > of_all + 0.3 && (of_found > REPEATS || n * of_found.powi(2) > REPEATS_MANY)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An error that swings slowly with 2 arcsec of noise, and rows off by 60 to 600 arcsec.
+    fn with_rows_out(share: f64) -> (Vec<Session>, Vec<usize>) {
+        let mut random = fastrand::Rng::with_seed(12);
+        let mut session = Session::default();
+        let mut out = Vec::new();
+        for k in 0..6000u64 {
+            let noise = 2.0 * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0);
+            let mut error = 40.0 * (2e-3 * k as f64).sin() + noise;
+            if random.f64() < share {
+                out.push(k as usize);
+                error += (60.0 + 540.0 * random.f64()) * if random.bool() { 1.0 } else { -1.0 };
+            }
+            session.line.push(k);
+            session.generator_rad.push(0.06 * k as f64);
+            session.error_rad.push(error * ARCSEC);
+        }
+        (vec![session], out)
+    }
+
+    #[test]
+    fn of_many_rows_that_are_out_hardly_any_stays() {
+        for share in [0.01, 0.05] {
+            let (mut sessions, out) = with_rows_out(share);
+            let mut findings = Findings::default();
+            check(&mut sessions, &Gear::of_ratio(95.0), false, &mut findings);
+            let stay = sessions[0].line.iter().filter(|line| out.contains(&(**line as usize))).count();
+            let left_out = 6000 - sessions[0].len();
+            assert!(stay * 100 <= out.len(), "{stay} of {} stay", out.len());
+            assert!(left_out < out.len() + 40, "{left_out} for {}", out.len());
+            let told = findings.faults.iter().find(|fault| fault.name == FaultName::Outliers).expect("outliers");
+            assert_eq!(told.rows as usize, left_out);
+        }
+    }
+
+    #[test]
+    fn the_tip_of_a_load_is_borne_out_by_its_sides_and_a_spike_is_not() {
+        let mut load: Vec<f64> = (0..41).map(|k| 40.0 - 1.5 * (f64::from(k) - 20.0).abs()).collect();
+        let found = |load: &[f64]| rows_out(load, 1.0, 1).iter().map(|(row, _)| *row).collect::<Vec<_>>();
+        assert!(out_by(&load, 20) > 2.0, "a tip stands above the rows beside");
+        assert_eq!(found(&load), [0_usize; 0]);
+        load[10] += 20.0;
+        assert_eq!(found(&load), [10]);
+        load[30] -= 20.0;
+        assert_eq!(found(&load), [10, 30]);
+    }
+
+    #[test]
+    fn a_row_in_which_the_load_swings_is_the_drives() {
+        let session = |torque: [f64; 7]| Session {
+            generator_rad: (0..7).map(|k| 0.05 * f64::from(k)).collect(),
+            torque_n_m: Some(torque.to_vec()),
+            ..Session::default()
+        };
+        let swings = |torque| load_swings(&session(torque), 3, 40.0);
+        assert!(swings([-6.6, -5.1, -3.8, -0.4, -2.9, -4.1, -4.2]), "a flank is let go");
+        assert!(!swings([0.4; 7]), "a load that does not change leaves the play where it is");
+        assert!(swings([-24.6, -22.7, -20.3, -16.9, -20.7, -19.2, -21.7]), "wind-up follows a tip");
+        assert!(!swings([-26.6, -25.1, -23.8, -22.4, -21.9, -20.1, -19.2]), "and no more than a tip");
+    }
+}

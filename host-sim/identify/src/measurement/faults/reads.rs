@@ -1,0 +1,590 @@
+//! The two angles are not read at one instant.
+//!
+//! Between two readings the drive moves on: an instant that is off by τ puts the error off by τ times the speed. Where τ scatters, the
+//! scatter of neighbouring rows grows with the speed, its square by (τ · speed)²; at rest nothing shows. Some loggers read single rows
+//! late, by far more than the others and always to the same side.
+//!
+//! The scatter of a row is what the rows beside it leave of it when a cubic goes through them. Rows then weigh what noise and scatter
+//! together leave of them; rows that were read late are left out.
+
+use std::borrow::Cow;
+
+use super::outliers::repeat_with_position;
+use super::state::State;
+use super::{ARCSEC, Findings, of_rows};
+use crate::measurement::Session;
+use crate::measurement::fault::{FaultName, Measures, Treatment};
+use crate::measurement::gear::Gear;
+use flexspline_base::robust::{MAD_TO_STD, median_of, quantile_of};
+
+/// Classes of speed, of equally many rows.
+const CLASSES: usize = 14;
+/// Fewest rows of a class.
+const CLASS_ROWS: usize = 80;
+/// Largest speed of a class against its least one, and the share of the largest of all that comes to it.
+const WIDEST: f64 = 1.3;
+const NARROWEST: f64 = 0.05;
+/// Scatter that grows with the speed is told from this on, rad at the output, at the speed that a twentieth of the rows exceed: below, encoders of
+/// common loops scatter by themselves. *Chosen* so that loops polled within 20 µs are not named.
+const LEAST_RAD: f64 = 1.0 * ARCSEC;
+/// And from this share of the noise at rest on. *Guess*.
+const LEAST_OF_NOISE: f64 = 0.3;
+/// Fall of χ² by the scatter that grows with the speed: five standard deviations. *Source*: by definition.
+const CERTAIN: f64 = 25.0;
+/// Classes are no better known than this share of their variance: steps and teeth are in it, too. *Guess*.
+const CLASS_DOUBT: f64 = 0.05;
+/// Ripple of the teeth is smooth in slow rows and scatter in fast ones: half of it where a tooth passes in so many rows. *Guess*.
+const TOOTH_ROWS: f64 = 6.0;
+/// A row is read late if it is off by so many times what its speed lets expect.
+const LATE: f64 = 4.0;
+/// Late rows are told from this share of the rows that move on…
+const LATE_SHARE: f64 = 0.004;
+/// …and from so many on.
+const LATE_ROWS: usize = 30;
+/// Of them this share is off to the same side, seen in the direction of motion.
+const ONE_SIDED: f64 = 0.8;
+/// They are so much rarer at rest than in motion…
+const RARER_AT_REST: f64 = 0.3;
+/// …which is above and below these shares of the speed that a twentieth of the rows exceed.
+const IN_MOTION: f64 = 0.3;
+const AT_REST: f64 = 0.03;
+/// More late rows than this are no late rows.
+const MOST_LATE: f64 = 0.35;
+/// Rows that are late and not told from others are up to so many times those that are. *Guess*.
+const UNTOLD: f64 = 2.0;
+/// Rows in which the generator turns by more do not follow the waves of a drive, rad. *Guess*.
+const FOLLOWED_RAD: f64 = 0.25;
+/// A step of the time by more than so many usual ones is a pause: rows on both sides of it, as of a bench that goes from stop to stop, tell
+/// nothing of how they are read. *Guess*: a missing row is a step of two.
+const PAUSE: f64 = 2.5;
+/// Scatter of readings is white: of the scatter of a row and of the next, -56/70 is common, within this. What swings has more or less.
+const WHITE: f64 = 0.08;
+/// Rows that are late one after another, at most.
+const LONGEST_RUN: usize = 2;
+/// Quantile of absolute numbers that a third of them, being far off, move little; and what it is of normal ones.
+const LOW: (f64, f64) = (0.15, 0.1891);
+
+/// Speeds (rad of the output in a row), and the scatter that they come with.
+struct Class {
+    speed: f64,
+    /// Of the error of one row, rad².
+    variance: f64,
+    rows: f64,
+}
+
+/// The rows of a session that are not late, and how fast each row is.
+struct Reads<'a> {
+    error: Cow<'a, [f64]>,
+    /// Change of the output from row to row, rad.
+    speed: Vec<f64>,
+    /// Faster rows are too far apart to tell their scatter from waves of the drive.
+    fastest: f64,
+    /// Pauses before each row.
+    pauses: Vec<usize>,
+    /// Rows, in order.
+    good: Vec<usize>,
+}
+
+impl<'a> Reads<'a> {
+    fn new(session: &'a Session, gear: &Gear) -> Self {
+        let psi = &session.generator_rad;
+        let rows = psi.len();
+        let speed = (0..rows)
+            .map(|k| {
+                let (a, b) = (k.saturating_sub(2), (k + 2).min(rows - 1));
+                (psi[b] - psi[a]) / ((b - a).max(1) as f64 * gear.ratio)
+            })
+            .collect();
+        let fastest = FOLLOWED_RAD / gear.ratio.abs();
+        let pauses = pauses(session);
+        Reads { error: Cow::Borrowed(&session.error_rad), speed, fastest, pauses, good: (0..rows).collect() }
+    }
+
+    /// Whether there is no pause from one row to another.
+    fn goes_on(&self, from: usize, to: usize) -> bool {
+        self.pauses[from] == self.pauses[to]
+    }
+
+    /// By how much some good rows (a run from place `from` among them) are off the cubic through the two good rows before and after,
+    /// and by how much these two pairs differ; nothing near the ends.
+    fn off(&self, from: usize, run: usize) -> Option<(Vec<f64>, f64)> {
+        let at = |place: usize| self.good.get(place).copied();
+        let beside = [at(from.checked_sub(2)?)?, at(from - 1)?, at(from + run)?, at(from + run + 1)?];
+        // Neighbours in time, not across what was left out.
+        if beside[3] - beside[0] > 2 * (run + 4) || !self.goes_on(beside[0], beside[3]) {
+            return None;
+        }
+        let x: [f64; 4] = std::array::from_fn(|k| (beside[k] - beside[0]) as f64);
+        let cubic = |at: f64| -> f64 {
+            (0..4)
+                .map(|j| {
+                    let weight: f64 = (0..4).filter(|k| *k != j).map(|k| (at - x[k]) / (x[j] - x[k])).product();
+                    weight * self.error[beside[j]]
+                })
+                .sum()
+        };
+        let off =
+            (from..from + run).map(|place| self.error[self.good[place]] - cubic((self.good[place] - beside[0]) as f64));
+        let apart =
+            0.5 * (self.error[beside[2]] + self.error[beside[3]] - self.error[beside[1]] - self.error[beside[0]]);
+        Some((off.collect(), apart))
+    }
+
+    /// Row and scatter of each good row whose four neighbours are good: (-1, 4, -6, 4, -1) / 6 of the errors.
+    fn scatter(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let slow = |row: usize| self.speed[row].abs() <= self.fastest;
+        let beside = move |rows: &&[usize]| rows[4] - rows[0] == 4 && slow(rows[2]) && self.goes_on(rows[0], rows[4]);
+        self.good.windows(5).filter(beside).map(|rows| {
+            let e = |k: usize| self.error[rows[k]];
+            (rows[2], (6.0 * e(2) - 4.0 * (e(1) + e(3)) + e(0) + e(4)) / 6.0)
+        })
+    }
+}
+
+/// How many pauses there are before each row; none without time.
+fn pauses(session: &Session) -> Vec<usize> {
+    let Some(time) = &session.time_s else { return vec![0; session.len()] };
+    let steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let longest = PAUSE * median_of(&mut steps.clone());
+    let mut pauses = 0;
+    let after = steps.iter().map(|step| {
+        pauses += usize::from(*step > longest);
+        pauses
+    });
+    [0].into_iter().chain(after).take(time.len()).collect()
+}
+
+/// Variance of the scatter of a row against that of its error.
+const SCATTER_GAIN: f64 = 70.0 / 36.0;
+
+/// Scatter by speed, of classes with equally many rows. `spread` makes a standard deviation of numbers, which it may overwrite.
+fn classes(reads: &[Reads<'_>], spread: impl Fn(&mut [f64]) -> f64) -> Vec<Class> {
+    let mut rows: Vec<(f64, f64)> =
+        reads.iter().flat_map(|of| of.scatter().map(|(row, off)| (of.speed[row].abs(), off))).collect();
+    rows.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let size = rows.len().div_ceil(CLASSES).max(CLASS_ROWS);
+    let fastest = rows.last().map_or(0.0, |(speed, _)| *speed);
+    // A bench that turns at one pace passes the others on its ramps alone: few rows, and they tell.
+    let mut begun = (0, 0.0);
+    rows.chunk_by(|_, (speed, _)| {
+        begun.0 += 1;
+        let full = begun.0 >= size || begun.0 >= CLASS_ROWS && *speed > WIDEST * begun.1 + NARROWEST * fastest;
+        if full {
+            begun = (0, *speed);
+        }
+        !full
+    })
+    .filter(|class| class.len() >= CLASS_ROWS / 2)
+    .map(|class| {
+        let mut off: Vec<f64> = class.iter().map(|(_, off)| off.abs()).collect();
+        let square = class.iter().map(|(speed, _)| speed * speed).sum::<f64>() / class.len() as f64;
+        let variance = spread(&mut off).powi(2) / SCATTER_GAIN;
+        Class { speed: square.sqrt(), variance, rows: class.len() as f64 }
+    })
+    .collect()
+}
+
+/// Noise at rest, rad, and scatter of the time between the readings, in rows: what `classes` show of both; and the fall of χ² by the latter.
+fn fit(classes: &[Class], tooth_speed: f64) -> (f64, f64, f64) {
+    let floor = classes.iter().map(|class| class.variance).fold(f64::INFINITY, f64::min).max(1e-30);
+    let least_speed = classes.iter().map(|class| class.speed).fold(0.0, f64::max).max(1e-30);
+    // Noise, what grows with the square of the speed, and ripple of teeth that the rows are too far apart to follow.
+    let columns = |class: &Class| {
+        let fast = (class.speed / tooth_speed).powi(2);
+        [1.0, (class.speed / least_speed).powi(2), fast / (1.0 + fast)]
+    };
+    // Neighbouring scatters share rows: a class is worth about a third of its rows. A median deviation is known to 1.17 / sqrt(n).
+    let weight = |class: &Class| {
+        let doubt = (2.0 * 1.17f64).powi(2) * 3.0 / class.rows + CLASS_DOUBT * CLASS_DOUBT;
+        1.0 / (doubt * class.variance.max(floor).powi(2))
+    };
+    let solve = |kept: [bool; 3]| -> Option<([f64; 3], f64)> {
+        let of: Vec<usize> = (0..3).filter(|k| kept[*k]).collect();
+        let mut table = vec![vec![0.0; of.len() + 1]; of.len()];
+        for class in classes {
+            let (x, w) = (columns(class), weight(class));
+            for (i, a) in of.iter().enumerate() {
+                for (j, b) in of.iter().enumerate() {
+                    table[i][j] += w * x[*a] * x[*b];
+                }
+                table[i][of.len()] += w * x[*a] * class.variance;
+            }
+        }
+        for i in 0..of.len() {
+            let pivot = table[i][i];
+            if pivot <= 0.0 {
+                return None;
+            }
+            for row in 0..of.len() {
+                if row != i {
+                    let by = table[row][i] / pivot;
+                    let from = table[i].clone();
+                    table[row].iter_mut().zip(&from).for_each(|(a, b)| *a -= by * b);
+                }
+            }
+        }
+        let mut values = [0.0; 3];
+        for (i, k) in of.iter().enumerate() {
+            values[*k] = table[i][of.len()] / table[i][i];
+        }
+        let misfit = classes.iter().map(|class| {
+            let said: f64 = columns(class).iter().zip(values).map(|(x, c)| x * c).sum();
+            weight(class) * (class.variance - said).powi(2)
+        });
+        values.iter().all(|value| *value >= 0.0).then(|| (values, misfit.sum()))
+    };
+    let best = |all: &[[bool; 3]]| {
+        all.iter()
+            .filter_map(|kept| solve(*kept))
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .unwrap_or(([floor, 0.0, 0.0], 0.0))
+    };
+    let (values, misfit) = best(&[[true, true, false], [true, false, false], [true, true, true], [true, false, true]]);
+    let (_, without) = best(&[[true, false, false], [true, false, true]]);
+    (values[0].max(0.0).sqrt(), values[1].max(0.0).sqrt() / least_speed, without - misfit)
+}
+
+/// What rows show of how they are read.
+struct Found {
+    /// Rows that are off by far, with how far, session by session.
+    late: Vec<Vec<(usize, f64)>>,
+    /// Whether these were read late.
+    told_late: bool,
+    /// Whether the time between the readings scatters.
+    told_jitter: bool,
+    /// Noise at rest, rad.
+    noise: f64,
+    /// Scatter of the time between the readings, rows.
+    jitter_rows: f64,
+}
+
+impl Found {
+    fn of(reads: &mut [Reads<'_>], fast: f64, tooth_speed: f64, sessions: &[Session], gear: &Gear) -> Found {
+        let mut late: Vec<Vec<(usize, f64)>> = vec![Vec::new(); reads.len()];
+        // Few rows that stand out at all are no late rows: most logs end here.
+        let low = |off: &mut [f64]| quantile_of(off, LOW.0) / LOW.1;
+        let mut known = classes(reads, low);
+        let stand_out =
+            |of: &Reads<'_>| of.scatter().filter(|(row, off)| off.abs() > LATE * expected(&known, of, *row)).count();
+        let (standing_out, rows) = reads.iter().fold((0, 0), |sum, of| (sum.0 + stand_out(of), sum.1 + of.error.len()));
+        if standing_out >= LATE_ROWS && standing_out as f64 > LATE_SHARE * rows as f64 {
+            for run in [1, 1, 1, LONGEST_RUN, 1] {
+                for (of, late) in reads.iter_mut().zip(&mut late) {
+                    late.extend(read_late(of, &known, run));
+                }
+                known = classes(reads, low);
+            }
+        }
+        for late in &mut late {
+            late.sort_unstable_by_key(|(row, _)| *row);
+        }
+        let told_late = is_told(reads, &late, fast, sessions, gear);
+        let robust = |off: &mut [f64]| MAD_TO_STD * median_of(off);
+        if !told_late {
+            reads.iter_mut().for_each(|of| of.good = (0..of.error.len()).collect());
+        }
+        let (noise, jitter_rows, certain) = fit(&classes(reads, robust), tooth_speed);
+        let scatter = jitter_rows * fast;
+        let told_jitter = certain > CERTAIN && scatter > LEAST_RAD.max(LEAST_OF_NOISE * noise) && is_white(reads, fast);
+        Found { late, told_late, told_jitter, noise, jitter_rows }
+    }
+}
+
+/// Finds angles that are not read at one instant: rows weigh what their speed leaves of them, and rows that were read late are left out.
+pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) {
+    let rows: usize = sessions.iter().map(Session::len).sum();
+    if rows < CLASSES * CLASS_ROWS {
+        return;
+    }
+    let mut reads: Vec<Reads<'_>> =
+        sessions.iter().filter(|session| session.len() > 8).map(|session| Reads::new(session, gear)).collect();
+    let mut speeds: Vec<f64> = reads.iter().flat_map(|of| of.speed.iter().map(|speed| speed.abs())).collect();
+    let fast = quantile_of(&mut speeds, 0.95).min(FOLLOWED_RAD / gear.ratio.abs());
+    if fast == 0.0 {
+        return;
+    }
+    let pitch = gear.tooth_pitch_rad.unwrap_or(std::f64::consts::PI / gear.ratio.abs());
+    // A tooth of either wheel passes in a turn of the generator over its number: in a pitch of the output over the ratio.
+    let tooth_speed = pitch / gear.ratio.abs() / TOOTH_ROWS;
+    let mut found = Found::of(&mut reads, fast, tooth_speed, sessions, gear);
+    if !found.told_late && !found.told_jitter {
+        return;
+    }
+    // Waves of the drive that fast rows are too far apart to follow scatter as well: once more without what its state explains.
+    let state = State::new(sessions, gear);
+    if let Some(fit) = state.fit(&[]) {
+        let long = (0..sessions.len()).filter(|k| sessions[*k].len() > 8);
+        for (of, session) in reads.iter_mut().zip(long) {
+            of.error = Cow::Owned(state.left(&fit, session, &[]));
+            of.good = (0..of.speed.len()).collect();
+        }
+        found = Found::of(&mut reads, fast, tooth_speed, sessions, gear);
+    }
+    let Found { late, told_late, told_jitter, noise, jitter_rows } = found;
+    let scatter = jitter_rows * fast;
+    if !told_late && !told_jitter {
+        return;
+    }
+    // Rows that are late by less than can be told stay: as many again, and as late, on the mean.
+    let mut late_s: Vec<f64> = reads
+        .iter()
+        .zip(&late)
+        .flat_map(|(of, late)| late.iter().map(|(row, off)| (off / of.speed[*row].abs().max(0.3 * fast)).abs()))
+        .collect();
+    let late_rows_each = median_of(&mut late_s);
+    let speed: Vec<Vec<f64>> = reads.into_iter().map(|of| of.speed).collect();
+    let long: Vec<usize> = (0..sessions.len()).filter(|k| sessions[*k].len() > 8).collect();
+    let mut fault = of_rows(&sessions[0], FaultName::ReadJitter, 0..sessions[0].len());
+    let last = &sessions[sessions.len() - 1];
+    fault.last_line = last.line[last.len() - 1];
+    fault.until_s = last.time_s.as_ref().and_then(|time| time.last().copied());
+    (fault.rows, fault.treatment) = (rows as u64, Treatment::Masked);
+    let late_rows: usize = if told_late { late.iter().map(Vec::len).sum() } else { 0 };
+    let period_s = period_s(sessions);
+    let jitter_ms = period_s.map(|period_s| 1e3 * period_s * jitter_rows).filter(|_| told_jitter);
+    fault.measures =
+        Measures { jitter_ms, late_rows: Some(late_rows as u64).filter(|_| told_late), ..Measures::default() };
+    let mut said = Vec::new();
+    if told_jitter {
+        fault.size_arcsec = Some(scatter / ARCSEC);
+        let of_time = jitter_ms.map_or(format!("{jitter_rows:.4} rows"), |ms| format!("{ms:.3} ms"));
+        said.push(format!(
+            "the time between them scatters by {of_time}, {:.1} arcsec at full speed beside {:.1} of noise: fast rows are weighted down, to {:.2} \
+             of the worth of a row at rest",
+            scatter / ARCSEC,
+            noise / ARCSEC,
+            noise * noise / (noise * noise + scatter * scatter)
+        ));
+    }
+    if told_late {
+        let largest =
+            late.iter().flatten().map(|(_, off)| *off).fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
+        fault.size_arcsec = fault.size_arcsec.or(Some(largest.abs() / ARCSEC));
+        said.push(format!(
+            "{late_rows} rows ({:.1} %) are read late, by up to {:.0} arcsec: they are left out",
+            100.0 * late_rows as f64 / rows as f64,
+            largest.abs() / ARCSEC
+        ));
+    }
+    fault.what = format!("the two angles are not read at one instant: {}", said.join("; "));
+    findings.faults.push(fault);
+    let late_share = late_rows as f64 / rows as f64;
+    let unsure_rows = if told_jitter { jitter_rows } else { 0.0 } + UNTOLD * late_share * late_rows_each;
+    let unsure_s = unsure_rows * period_s.unwrap_or(1.0);
+    sessions.iter_mut().for_each(|session| session.unsure_s = unsure_s);
+    weigh(sessions, &long, &speed, noise.max(1e-3 * scatter), if told_jitter { jitter_rows } else { 0.0 });
+    if told_late {
+        for (session, late) in long.iter().zip(&late) {
+            let mut drop = vec![false; sessions[*session].len()];
+            late.iter().for_each(|(row, _)| drop[*row] = true);
+            sessions[*session].leave_out(&drop);
+        }
+    }
+}
+
+/// Whether the scatter of rows in motion is that of readings which know nothing of each other.
+fn is_white(reads: &[Reads<'_>], fast: f64) -> bool {
+    let pairs = || {
+        reads.iter().flat_map(|of| {
+            let off: Vec<(usize, f64)> = of.scatter().filter(|(row, _)| of.speed[*row].abs() > 0.5 * fast).collect();
+            let next = |pair: &[(usize, f64)]| (pair[1].0 == pair[0].0 + 1).then(|| [pair[0].1, pair[1].1]);
+            off.windows(2).filter_map(next).collect::<Vec<[f64; 2]>>()
+        })
+    };
+    let spread = MAD_TO_STD * median_of(&mut pairs().map(|[off, _]| off.abs()).collect::<Vec<f64>>());
+    let cut = |off: f64| off.clamp(-4.0 * spread, 4.0 * spread);
+    let (own, common) = pairs()
+        .fold((0.0, 0.0), |sum, [a, b]| (sum.0 + 0.5 * (cut(a).powi(2) + cut(b).powi(2)), sum.1 + cut(a) * cut(b)));
+    (common / f64::max(own, 1e-300) + 56.0 / 70.0).abs() < WHITE
+}
+
+/// Scatter of a row of this speed, rad.
+fn expected(known: &[Class], of: &Reads<'_>, row: usize) -> f64 {
+    let speed = of.speed[row].abs();
+    let class = known.iter().min_by(|a, b| (a.speed - speed).abs().total_cmp(&(b.speed - speed).abs()));
+    class.map_or(f64::INFINITY, |class| (class.variance * SCATTER_GAIN).sqrt())
+}
+
+/// Rows off by far more than their speed lets expect while those beside agree, `run` of them one after another: taken out of the good
+/// ones, and given with how far they are off.
+fn read_late(of: &mut Reads<'_>, known: &[Class], run: usize) -> Vec<(usize, f64)> {
+    let places = of.good.len().saturating_sub(run + 1);
+    let off: Vec<Option<(Vec<f64>, f64)>> = (0..places).map(|from| of.off(from, run)).collect();
+    let least = |from: usize| -> f64 {
+        let Some(Some((off, apart))) = off.get(from) else { return 0.0 };
+        let least = off.iter().fold(f64::INFINITY, |least: f64, off| least.min(off.abs()));
+        let one_side = off.iter().all(|one| one * off[0] > 0.0);
+        if one_side && apart.abs() < 0.5 * least { least } else { 0.0 }
+    };
+    let sizes: Vec<f64> = (0..places).map(least).collect();
+    let mut taken: Vec<(usize, f64)> = Vec::new();
+    let mut gone = vec![false; of.good.len()];
+    for from in 2..places {
+        let beside = from.saturating_sub(2)..(from + 3).min(places);
+        let largest = beside.map(|other| sizes[other]).fold(0.0, f64::max);
+        let stands_out = sizes[from] > 0.0 && sizes[from] >= largest;
+        if stands_out
+            && sizes[from] > LATE * expected(known, of, of.good[from])
+            && let Some((off, _)) = &off[from]
+        {
+            for (k, off) in off.iter().enumerate().filter(|(k, _)| !gone[from + k]).collect::<Vec<_>>() {
+                taken.push((of.good[from + k], *off));
+                gone[from + k] = true;
+            }
+        }
+    }
+    let mut place = 0;
+    of.good.retain(|_| {
+        place += 1;
+        !gone[place - 1]
+    });
+    taken
+}
+
+/// Whether rows that are off are rows that were read late: enough of them, in motion, to one side of it, at no one place of the drive.
+fn is_told(reads: &[Reads<'_>], late: &[Vec<(usize, f64)>], fast: f64, sessions: &[Session], gear: &Gear) -> bool {
+    let count: usize = late.iter().map(Vec::len).sum();
+    let moves = |speed: f64| speed.abs() > IN_MOTION * fast;
+    let rests = |speed: f64| speed.abs() < AT_REST * fast;
+    // Share of the rows of such a speed that are late.
+    let share = |such: &dyn Fn(f64) -> bool| -> f64 {
+        let all: usize = reads.iter().map(|of| of.speed.iter().filter(|speed| such(**speed)).count()).sum();
+        let of =
+            |(of, late): (&Reads<'_>, &Vec<(usize, f64)>)| late.iter().filter(|(row, _)| such(of.speed[*row])).count();
+        reads.iter().zip(late).map(of).sum::<usize>() as f64 / all.max(1) as f64
+    };
+    let (moving, at_rest) = (share(&moves), share(&rests));
+    if count < LATE_ROWS || !(LATE_SHARE..=MOST_LATE).contains(&moving) || at_rest > RARER_AT_REST * moving {
+        return false;
+    }
+    let ahead = |(of, late): (&Reads<'_>, &Vec<(usize, f64)>)| {
+        late.iter().filter(|(row, off)| moves(of.speed[*row]) && off * of.speed[*row] > 0.0).count()
+    };
+    let in_motion: usize =
+        reads.iter().zip(late).map(|(of, late)| late.iter().filter(|(row, _)| moves(of.speed[*row])).count()).sum();
+    let ahead = reads.iter().zip(late).map(ahead).sum::<usize>() as f64 / in_motion.max(1) as f64;
+    if ahead.max(1.0 - ahead) < ONE_SIDED {
+        return false;
+    }
+    let mut of_sessions = late.iter();
+    let found: Vec<Vec<(usize, f64)>> = sessions
+        .iter()
+        .map(|session| if session.len() > 8 { of_sessions.next().cloned().unwrap_or_default() } else { Vec::new() })
+        .collect();
+    !repeat_with_position(sessions, &found, gear)
+}
+
+/// Median period of the rows, s.
+fn period_s(sessions: &[Session]) -> Option<f64> {
+    let steps = |session: &Session| -> Vec<f64> {
+        session.time_s.as_ref().map_or_else(Vec::new, |time| time.windows(2).map(|t| t[1] - t[0]).collect())
+    };
+    let mut steps: Vec<f64> = sessions.iter().flat_map(steps).collect();
+    (!steps.is_empty()).then(|| median_of(&mut steps))
+}
+
+/// Gives each row its noise against that of a row of mean worth.
+fn weigh(sessions: &mut [Session], long: &[usize], speed: &[Vec<f64>], noise: f64, jitter_rows: f64) {
+    let mut all: Vec<Vec<f64>> = sessions.iter().map(|session| vec![noise; session.len()]).collect();
+    for (session, speed) in long.iter().zip(speed) {
+        all[*session] = speed.iter().map(|speed| noise.hypot(jitter_rows * speed)).collect();
+    }
+    let rows: usize = all.iter().map(Vec::len).sum();
+    let worth = all.iter().flatten().map(|loud| loud.powi(-2)).sum::<f64>() / rows as f64;
+    for (session, mut loud) in sessions.iter_mut().zip(all) {
+        loud.iter_mut().for_each(|loud| *loud *= worth.sqrt());
+        session.loudness = Some(loud);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RATIO: f64 = 100.0;
+
+    /// Normal deviates of unit variance.
+    fn normal(random: &mut fastrand::Rng) -> f64 {
+        (0..12).map(|_| random.f64()).sum::<f64>() - 6.0
+    }
+
+    /// A drive that swings at up to 12 rad/s of the motor, 100 rows a second, with 2 arcsec of noise; its output is read off by `jitter_s`
+    /// (one standard deviation), and by 0.5 ms and more in a share `late` of the rows.
+    fn session(jitter_s: f64, late: f64) -> Session {
+        let mut random = fastrand::Rng::with_seed(7);
+        let (mut psi, mut session) = (0.0, Session { time_s: Some(Vec::new()), ..Session::default() });
+        for k in 0..20_000 {
+            let t = 0.01 * f64::from(k);
+            let speed = 12.0 * (0.4 * t).sin();
+            psi += 0.01 * speed;
+            let is_late = random.f64() < late;
+            let off = jitter_s * normal(&mut random) + if is_late { 5e-4 * random.f64().powf(-0.5) } else { 0.0 };
+            let error = 12.0 * (2.0 * psi).sin() + 3.0 * (4.0 * psi).sin() + 2.0 * normal(&mut random);
+            session.line.push(k as u64 + 2);
+            session.time_s.as_mut().unwrap().push(t);
+            session.generator_rad.push(psi);
+            session.error_rad.push(error * ARCSEC + off * speed / RATIO);
+        }
+        session
+    }
+
+    fn checked(jitter_s: f64, late: f64) -> (Session, Option<Measures>) {
+        let mut sessions = vec![session(jitter_s, late)];
+        let mut findings = Findings::default();
+        check(
+            &mut sessions,
+            &Gear { tooth_pitch_rad: Some(std::f64::consts::TAU / 200.0), ..Gear::of_ratio(RATIO) },
+            &mut findings,
+        );
+        let measures = findings.faults.first().map(|fault| fault.measures);
+        (sessions.remove(0), measures)
+    }
+
+    #[test]
+    fn jitter_is_measured_and_rows_weigh_what_their_speed_leaves_of_them() {
+        for jitter_s in [1e-4, 3e-4] {
+            let (session, measures) = checked(jitter_s, 0.0);
+            let found = measures.unwrap();
+            let jitter_ms = found.jitter_ms.unwrap();
+            assert!((jitter_ms / (1e3 * jitter_s) - 1.0).abs() < 0.1, "{jitter_ms} of {jitter_s}");
+            assert_eq!(found.late_rows, None);
+            let loud = session.loudness.unwrap();
+            let worth = loud.iter().map(|loud| loud.powi(-2)).sum::<f64>() / loud.len() as f64;
+            assert!((worth - 1.0).abs() < 1e-9, "{worth}");
+            // Row 393 is at full speed, row 785 at rest.
+            let louder = f64::hypot(1.0, jitter_s * 0.12 / (2.0 * ARCSEC));
+            assert!((loud[393] / loud[785] / louder - 1.0).abs() < 0.1, "{} of {louder}", loud[393] / loud[785]);
+        }
+    }
+
+    #[test]
+    fn late_rows_are_left_out_and_a_good_logger_is_left_alone() {
+        let (session, measures) = checked(0.0, 0.12);
+        let late = measures.unwrap().late_rows.unwrap();
+        // A third of the time the drive is too slow for a row that is late by 0.7 ms to be seen.
+        assert!((800..2600).contains(&late), "{late} of about 2400");
+        assert_eq!(session.len(), 20_000 - late as usize);
+        for jitter_s in [0.0, 1e-5] {
+            let (session, measures) = checked(jitter_s, 0.0);
+            assert!(measures.is_none() && session.loudness.is_none(), "{jitter_s}: {measures:?}");
+        }
+    }
+
+    #[test]
+    fn a_bench_that_goes_from_stop_to_stop_tells_nothing_of_its_reads_while_it_moves_on() {
+        let mut random = fastrand::Rng::with_seed(5);
+        let mut session = Session { time_s: Some(Vec::new()), ..Session::default() };
+        for k in 0..20_000u32 {
+            let (stop, read) = (f64::from(k / 7), f64::from(k % 7));
+            let psi = 0.9 * stop;
+            let error = 12.0 * (2.0 * psi).sin() + 2.0 * normal(&mut random);
+            session.line.push(u64::from(k) + 2);
+            session.time_s.as_mut().unwrap().push(1.625 * stop + 0.125 * read);
+            session.generator_rad.push(psi);
+            session.error_rad.push(error * ARCSEC);
+        }
+        let mut findings = Findings::default();
+        check(std::slice::from_mut(&mut session), &Gear::of_ratio(RATIO), &mut findings);
+        assert!(findings.faults.is_empty() && session.loudness.is_none(), "{:?}", findings.faults);
+    }
+}

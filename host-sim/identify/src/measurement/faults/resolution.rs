@@ -1,0 +1,158 @@
+//! A resolution so coarse that no noise blurs it.
+
+use super::lattice::lattice;
+use super::{ARCSEC, Findings, of_rows};
+use crate::measurement::Session;
+use crate::measurement::columns::Quantity;
+use crate::measurement::fault::{FaultName, Treatment};
+use crate::measurement::gear::Gear;
+use flexspline_base::robust::{median_of, white_noise};
+
+/// Steps at the output below this are those of good encoders (19 bits a turn), and below what a drive repeats.
+const COARSE_RAD: f64 = 2.5 * ARCSEC;
+/// Noise of more than this share of a step blurs it, so that averages go below the step; a step alone leaves 0.29 of it.
+const BLURRED: f64 = 0.7;
+
+/// A step is real if the output leaves this share of it as noise…
+const SEEN: f64 = 0.15;
+/// …or the channel stands in this share of the rows while the other one moves…
+const STANDS: f64 = 0.3;
+/// …or, in even motion, its changes from row to row are uneven by a step in this share.
+const UNEVEN: f64 = 0.1;
+/// A generator that goes from stop to stop by the same angle lies on a lattice too, and is exact. What is rounded is in the error, which differs
+/// by 0.4 steps on the mean from one reading to another: where half of them differ by less than this share, nothing is. *Guess*.
+const ROUNDED: f64 = 0.1;
+/// So many rows are from one reading to another. At a speed that is nearly a whole number of steps to a row the next one is rounded by just about
+/// as much, and a later one is not.
+const APART: [usize; 4] = [1, 2, 4, 8];
+
+/// Resolutions that show in the data, in rad at the output.
+pub(super) fn seen(sessions: &[Session], gear: &Gear, error_recorded: bool) -> Vec<(Quantity, f64)> {
+    let Some(session) = sessions.iter().max_by_key(|session| session.len()) else { return Vec::new() };
+    let noise = white_noise(sessions.iter().map(|session| session.error_rad.as_slice()));
+    let (generator, output) = (&session.generator_rad, session.output_rad(gear.ratio));
+    let share = |rows: &mut dyn Iterator<Item = (bool, bool)>| {
+        let (mut of, mut are) = (0_usize, 0_usize);
+        for (counts, is) in rows {
+            of += usize::from(counts);
+            are += usize::from(counts && is);
+        }
+        are as f64 / of.max(1) as f64
+    };
+    // Round-off of an output that is the sum of two columns is no motion.
+    let stands = |values: &[f64], others: &[f64], least: f64| {
+        let moved = |v: &[f64], row: usize| (v[row] - v[row - 1]).abs() > least;
+        share(&mut (1..values.len()).map(|row| (moved(others, row), !moved(values, row))))
+    };
+    let uneven = |values: &[f64], step: f64| {
+        share(&mut values.windows(3).map(|v| (true, (v[2] - 2.0 * v[1] + v[0]).abs() > 0.5 * step)))
+    };
+    let mut found = Vec::new();
+    let (channel, measured) =
+        if error_recorded { (Quantity::Error, &session.error_rad) } else { (Quantity::Output, &output) };
+    if let Some(step) = lattice(measured)
+        && (noise >= SEEN * step
+            || uneven(measured, step) >= UNEVEN
+            || stands(measured, generator, 1e-3 * step) >= STANDS)
+    {
+        found.push((channel, step));
+    }
+    if let Some(step) = lattice(generator)
+        && (uneven(generator, step) >= UNEVEN || stands(generator, &output, 1e-3 * step) >= STANDS)
+        && differs(generator, &session.error_rad, step) >= ROUNDED * step / gear.ratio.abs()
+    {
+        found.push((Quantity::Generator, step / gear.ratio.abs()));
+    }
+    found
+}
+
+/// By how much the error differs, at the median, from one row to another where a channel has moved by a step or more, rad: at that distance of
+/// [`APART`] where it differs most.
+fn differs(channel: &[f64], error: &[f64], step: f64) -> f64 {
+    let at = |apart: usize| {
+        let moved = (apart..channel.len()).filter(|row| (channel[*row] - channel[row - apart]).abs() > 0.5 * step);
+        median_of(&mut moved.map(|row| (error[row] - error[row - apart]).abs()).collect::<Vec<f64>>())
+    };
+    APART.into_iter().map(at).fold(0.0, f64::max)
+}
+
+/// Names a resolution of output or generator that is coarse at the output; nothing can be done about it but to know that rounding is a noise.
+pub(in crate::measurement) fn check(
+    sessions: &mut [Session],
+    gear: &Gear,
+    error_recorded: bool,
+    findings: &mut Findings,
+) {
+    let mut coarsest = 0.0f64;
+    let Some(session) = sessions.iter().max_by_key(|session| session.len()) else { return };
+    let noise = white_noise(sessions.iter().map(|session| session.error_rad.as_slice()));
+    for (channel, step) in seen(sessions, gear, error_recorded) {
+        if step < COARSE_RAD || noise > BLURRED * step {
+            continue;
+        }
+        coarsest = coarsest.max(step);
+        let mut fault = of_rows(session, FaultName::Quantisation, 0..session.len());
+        (fault.channel, fault.treatment) = (Some(channel), Treatment::Kept);
+        fault.size_arcsec = Some(step / ARCSEC);
+        fault.what = format!(
+            "the {channel} has a resolution of {:.2} arcsec at the output, and too little noise to blur it ({:.2} arcsec)",
+            step / ARCSEC,
+            noise / ARCSEC
+        );
+        findings.faults.push(fault);
+    }
+    sessions.iter_mut().for_each(|session| session.coarse_rad = coarsest);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RATIO: f64 = 100.0;
+
+    fn session(rows: u32, generator: impl Fn(f64) -> f64, read_as: impl Fn(f64) -> f64) -> Session {
+        let mut random = fastrand::Rng::with_seed(3);
+        let mut session = Session::default();
+        for k in 0..rows {
+            let psi = generator(f64::from(k));
+            let noise = (random.f64() + random.f64() + random.f64() - 1.5) * 2.0;
+            let output = psi / RATIO + (15.0 * (2.0 * psi).sin() + 1.7 * noise) * ARCSEC;
+            session.line.push(u64::from(k) + 2);
+            session.generator_rad.push(read_as(psi));
+            session.error_rad.push(output - read_as(psi) / RATIO);
+        }
+        session
+    }
+
+    fn of_generator(session: Session) -> Option<f64> {
+        let found = seen(&[session], &Gear::of_ratio(RATIO), false);
+        found.into_iter().find(|(channel, _)| *channel == Quantity::Generator).map(|(_, step)| step)
+    }
+
+    #[test]
+    fn stops_at_even_distances_are_no_resolution() {
+        // Seven readings at each stop.
+        let stops = |k: f64| 1.1 * (k / 7.0).floor();
+        assert_eq!(of_generator(session(6000, stops, |psi| psi)), None);
+    }
+
+    #[test]
+    fn a_coarse_encoder_is_one_at_a_speed_of_nearly_whole_steps_to_a_row() {
+        // Of 8 bits a turn, in legs of three and of six steps to a row, and a little more, with rests between.
+        let step = std::f64::consts::TAU / 256.0;
+        let turns = |k: f64| {
+            let (leg, in_leg) = ((k / 400.0).floor(), (k % 400.0).min(330.0));
+            let by = if leg % 2.0 == 0.0 { 3.056 } else { -6.11 };
+            step * (by * in_leg + (leg / 2.0).ceil() * 330.0 * 3.056 - (leg / 2.0).floor() * 330.0 * 6.11)
+        };
+        let found = of_generator(session(6000, turns, |psi| step * (psi / step).round()));
+        assert!((found.expect("coarse") * RATIO - step).abs() < 1e-3 * step, "{found:?}");
+    }
+
+    #[test]
+    fn a_coarse_encoder_of_a_generator_that_turns_on_is_one() {
+        // Steps of 0.1 rad of the generator are 206 arcsec at the output.
+        let found = of_generator(session(6000, |k| 0.037 * k, |psi| 0.1 * (psi / 0.1).floor()));
+        assert!((found.expect("coarse") * RATIO - 0.1).abs() < 1e-3, "{found:?}");
+    }
+}

@@ -1,0 +1,195 @@
+//! A logger that stands still now and then while its time counts on: the angles leap over several rows' worth of motion, both of them,
+//! and the column of time does not show it.
+
+use super::{Findings, span};
+use crate::measurement::columns::Quantity;
+use crate::measurement::fault::{FaultName, Measures, Treatment};
+use crate::measurement::gear::Gear;
+use crate::measurement::log::Log;
+use flexspline_base::robust::{median_of, sampled};
+
+/// Rows before and after that must agree on the pace.
+const BESIDE: usize = 3;
+/// They agree within this share.
+const STEADY: f64 = 0.25;
+/// A leap is worth so many rows beyond what time says, at least…
+const EXTRA_ROWS: f64 = 0.8;
+/// …and the output takes part in it, within this share.
+const TOGETHER: f64 = 0.3;
+/// In one row the generator moves by so many times its own scatter, and in a leap both angles do.
+const OVER_NOISE: f64 = 8.0;
+/// So many leaps are stalls, at least…
+const FEWEST: usize = 8;
+/// …and no more than this share of the rows that tell.
+const MOST_SHARE: f64 = 0.2;
+/// They come every so many rows if this share of them does.
+const REGULAR: f64 = 0.7;
+
+/// A row, and the time that is missing before it, s.
+type Leap = (usize, f64);
+
+/// Finds stalls that the time does not show, and makes time anew where they are.
+pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut Findings) {
+    let Some((leaps, telling, period_s)) = leaps(log, gear) else { return };
+    if leaps.len() < FEWEST || leaps.len() as f64 > MOST_SHARE * telling as f64 {
+        return;
+    }
+    let mut sizes: Vec<f64> = leaps.iter().map(|(_, extra_s)| *extra_s).collect();
+    let size_s = median_of(&mut sizes);
+    let every = rhythm(log, &leaps);
+    let all: Vec<(usize, f64)> = match every {
+        // Where the motion does not tell, as long as elsewhere.
+        Some(every) => by_rhythm(log, &leaps, every, size_s),
+        None => leaps.clone(),
+    };
+    let lost_s: f64 = all.iter().map(|(_, extra_s)| extra_s).sum();
+    let mut fault = span(log, FaultName::Stalls, leaps[0].0, leaps[leaps.len() - 1].0);
+    (fault.channel, fault.rows, fault.treatment) = (Some(Quantity::Time), all.len() as u64, Treatment::Repaired);
+    fault.measures =
+        Measures { every_rows: every.map(|every| every as u64), size_ms: Some(1e3 * size_s), ..Measures::default() };
+    fault.what = format!(
+        "the logger stands still for {:.0} ms {}, {} times, while its time counts {:.2} ms from row to row: both angles leap there; time \
+         is made anew from the motion ({lost_s:.1} s more)",
+        1e3 * size_s,
+        every.map_or("now and then".to_owned(), |every| format!("after every {every} rows")),
+        all.len(),
+        1e3 * period_s
+    );
+    findings.faults.push(fault);
+    let Some(time) = log.get_mut(Quantity::Time) else { return };
+    let (mut next, mut more) = (all.iter().peekable(), 0.0);
+    for (row, t) in time.iter_mut().enumerate() {
+        more += next.next_if(|(at, _)| *at == row).map_or(0.0, |(_, extra_s)| *extra_s);
+        *t += more;
+    }
+}
+
+/// Rows into which both angles leap, with the time that is missing there (s); how many rows would tell; and the period, s.
+fn leaps(log: &Log, gear: &Gear) -> Option<(Vec<Leap>, usize, f64)> {
+    let (time, generator, output) =
+        (log.get(Quantity::Time)?, log.get(Quantity::Generator)?, log.get(Quantity::Output)?);
+    let steps: Vec<f64> = time.windows(2).map(|t| t[1] - t[0]).filter(|dt| *dt > 0.0).collect();
+    let period_s = median_of(&mut sampled(&steps));
+    // Scatter of the motion at the generator, from third differences that few leaps do not move.
+    let scatter = |values: &[f64]| {
+        let third = values.windows(4).map(|v| (v[3] - 3.0 * v[2] + 3.0 * v[1] - v[0]).abs()).collect::<Vec<f64>>();
+        median_of(&mut sampled(&third))
+    };
+    let least = OVER_NOISE * scatter(generator);
+    let least_leap = least.max(OVER_NOISE * gear.ratio.abs() * scatter(output));
+    let (mut found, mut telling) = (Vec::new(), 0);
+    for row in BESIDE + 1..log.len().saturating_sub(BESIDE) {
+        let near = row - BESIDE..=row + BESIDE;
+        if !near.clone().all(|k| log.continues(k)) {
+            continue;
+        }
+        // Motion of the generator for each second that the clock tells, the row itself aside.
+        let pace =
+            |values: &[f64], k: usize| (values[k] - values[k - 1]) / (time[k] - time[k - 1]).max(1e-9 * period_s);
+        let middle = |values: &[f64]| {
+            let mut paces: Vec<f64> = near.clone().filter(|k| *k != row).map(|k| pace(values, k)).collect();
+            let even = paces.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(*p), b.max(*p)));
+            (median_of(&mut paces), even.1 - even.0)
+        };
+        let (usual, spread) = middle(generator);
+        if usual.abs() * period_s < least || spread > STEADY * usual.abs() {
+            continue;
+        }
+        telling += 1;
+        let dt = time[row] - time[row - 1];
+        let extra_s = (generator[row] - generator[row - 1]) / usual - dt;
+        let by_output = (output[row] - output[row - 1]) * gear.ratio / usual - dt;
+        let is_seen = extra_s * usual.abs() > least_leap;
+        if extra_s > EXTRA_ROWS * period_s && is_seen && (by_output - extra_s).abs() < TOGETHER * extra_s {
+            found.push((row, extra_s));
+        }
+    }
+    Some((found, telling, period_s))
+}
+
+/// Every how many lines stalls come, if they come regularly.
+fn rhythm(log: &Log, leaps: &[(usize, f64)]) -> Option<usize> {
+    let mut distances: Vec<f64> =
+        leaps.windows(2).map(|pair| (log.line[pair[1].0] - log.line[pair[0].0]) as f64).collect();
+    let every = median_of(&mut distances).round();
+    // Some are not seen: the rhythm is the distance of neighbours, others are whole multiples of it.
+    let regular = distances.iter().filter(|d| (**d / every - (**d / every).round()).abs() * every < 1.5).count();
+    (every >= 2.0 && regular as f64 >= REGULAR * distances.len() as f64).then_some(every as usize)
+}
+
+/// The same leaps, and one of the usual size in each row where the rhythm of its session asks for it and the motion does not tell.
+fn by_rhythm(log: &Log, leaps: &[(usize, f64)], every: usize, size_s: f64) -> Vec<(usize, f64)> {
+    let mut known = leaps.iter().peekable();
+    let mut all = Vec::new();
+    // A session counts anew; before its first leap its rhythm is the one of that leap.
+    let starts: Vec<usize> = (0..log.len()).filter(|row| !log.continues(*row)).chain([log.len()]).collect();
+    for bounds in starts.windows(2) {
+        let of_session: Vec<(usize, f64)> =
+            std::iter::from_fn(|| known.next_if(|(row, _)| *row < bounds[1])).copied().collect();
+        let Some(&(first, _)) = of_session.first() else { continue };
+        let mut phases = vec![0usize; every];
+        of_session.iter().for_each(|(row, _)| phases[(log.line[*row] as usize) % every] += 1);
+        let phase = (0..every).max_by_key(|k| phases[*k]).unwrap_or(log.line[first] as usize % every);
+        for row in bounds[0] + 1..bounds[1] {
+            if let Ok(at) = of_session.binary_search_by_key(&row, |(row, _)| *row) {
+                all.push(of_session[at]);
+            } else if log.line[row] as usize % every == phase {
+                all.push((row, size_s));
+            }
+        }
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rows of a drive at an even pace with a stop; the logger stands still for `stall_s` after every 50 rows, and counts `counted`.
+    fn log(stall_s: f64, counted: bool, noise_rad: f64) -> Log {
+        let mut log = Log::default();
+        log.line = (2..3002).collect();
+        let (mut told, mut time, mut psi) = (Vec::new(), 0.0, 0.0);
+        let (mut generator, mut output) = (Vec::new(), Vec::new());
+        for k in 0..3000 {
+            let dt = if k % 50 == 0 { 0.01 + stall_s } else { 0.01 };
+            time += dt;
+            psi += dt * if (1000..1200).contains(&k) { 0.0 } else { 8.0 };
+            told.push(if counted { 0.01 * f64::from(k) } else { time });
+            generator.push(psi);
+            output.push(psi / 100.0 + noise_rad * f64::from(k % 3));
+        }
+        log.put(Quantity::Time, told);
+        log.put(Quantity::Generator, generator);
+        log.put(Quantity::Output, output);
+        log
+    }
+
+    #[test]
+    fn rows_may_be_so_close_that_one_moves_the_output_by_less_than_its_noise() {
+        let (mut log, mut findings) = (log(0.04, true, 1e-4), Findings::default());
+        check(&mut log, &Gear::of_ratio(100.0), &mut findings);
+        assert_eq!(findings.faults.first().map(|fault| fault.measures.every_rows), Some(Some(50)));
+    }
+
+    #[test]
+    fn stalls_are_told_with_rhythm_and_size_and_time_is_made_anew() {
+        let (mut log, mut findings) = (log(0.04, true, 5e-6), Findings::default());
+        check(&mut log, &Gear::of_ratio(100.0), &mut findings);
+        let fault = &findings.faults[0];
+        assert_eq!((fault.name, fault.measures.every_rows), (FaultName::Stalls, Some(50)));
+        assert!((fault.measures.size_ms.unwrap() - 40.0).abs() < 1.0, "{fault:?}");
+        let time = log.get(Quantity::Time).unwrap();
+        // 59 leaps after the first row.
+        assert!((time[2999] - time[0] - 29.99 - 59.0 * 0.04).abs() < 0.05, "{}", time[2999]);
+    }
+
+    #[test]
+    fn a_clock_that_shows_them_and_a_logger_without_any_are_left_alone() {
+        for mut log in [log(0.04, false, 5e-6), log(0.0, true, 5e-6)] {
+            let mut findings = Findings::default();
+            check(&mut log, &Gear::of_ratio(100.0), &mut findings);
+            assert!(findings.faults.is_empty(), "{:?}", findings.faults);
+        }
+    }
+}

@@ -1,0 +1,273 @@
+//! What a drive's error may be by its state alone: a plain regression that soaks up flanks, load, position, speed and temperature, so that
+//! what is left can be asked for steps and drift.
+//!
+//! It names no cause and is not the diagnosis; it only has to be rich enough that no cause is taken for a fault of the data.
+
+use std::sync::OnceLock;
+
+use flexspline_algebra::{Mat, cholesky, lower_of_product, product};
+
+use crate::measurement::Session;
+use crate::measurement::gear::Gear;
+use flexspline_base::robust::median_and_std;
+
+/// Rows that a fit uses at most, spread evenly.
+const FIT_ROWS: usize = 8000;
+/// The generator must turn back by so much, rad, before the flank is taken to have changed: its noise does not.
+const TURNED_BACK_RAD: f64 = 0.02;
+/// No clearance is wider, rad at the output: 10 arc-minutes.
+const CLEARANCE_RAD: f64 = 600.0 / 206_265.0;
+/// A reversal is noticed some rows late.
+const BEFORE: usize = 5;
+/// Weights fall from so many robust standard deviations on (Huber).
+const HUBER: f64 = 2.5;
+
+/// Columns that depend on the state.
+pub(super) struct State<'a> {
+    sessions: &'a [Session],
+    ratio: f64,
+    /// +1 after forward motion, -1 after backward.
+    flank: Vec<Vec<f64>>,
+    torque_scale: f64,
+    motion_scale: f64,
+    temperature: (f64, f64),
+    /// Rows that fits use, once there is one.
+    sampled: OnceLock<Sampled>,
+}
+
+/// Rows that a fit uses.
+#[derive(Default)]
+struct Sampled {
+    /// Session and row.
+    places: Vec<(usize, usize)>,
+    error: Vec<f64>,
+    /// Columns of the state.
+    columns: Vec<Vec<f64>>,
+}
+
+/// A fit of some columns.
+pub(super) struct Fit {
+    /// Coefficients in the order of the columns.
+    pub value: Vec<f64>,
+    /// Their standard deviations, correlation of neighbouring rows considered.
+    pub std: Vec<f64>,
+    /// Standard deviation of a coefficient whose column has size one and is like no other.
+    pub unit_std: f64,
+    /// Sum of squared, weighted residuals.
+    pub misfit: f64,
+}
+
+/// A column beside those of the state.
+pub(super) type Extra<'a> = &'a dyn Fn(usize, usize) -> f64;
+
+impl<'a> State<'a> {
+    pub fn new(sessions: &'a [Session], gear: &Gear) -> Self {
+        let flank = sessions.iter().map(|session| directions(&session.generator_rad)).collect();
+        let largest = |values: &dyn Fn(&Session) -> Option<&[f64]>| {
+            sessions.iter().filter_map(values).flatten().fold(0.0, |most: f64, value| most.max(value.abs()))
+        };
+        let mean = |values: &dyn Fn(&Session) -> Option<&[f64]>| {
+            let all = || sessions.iter().filter_map(values).flatten();
+            all().sum::<f64>() / (all().count().max(1) as f64)
+        };
+        let middle = mean(&|s| s.temperature_c.as_deref());
+        let warmest = largest(&|s| s.temperature_c.as_deref()).max(1.0);
+        State {
+            sessions,
+            ratio: gear.ratio,
+            flank,
+            torque_scale: largest(&|s| s.torque_n_m.as_deref()),
+            motion_scale: largest(&|s| Some(&s.generator_rad)).max(1e-12),
+            temperature: (middle, warmest),
+            sampled: OnceLock::new(),
+        }
+    }
+
+    /// Whether the generator last moved forward (+1) or backward (-1).
+    pub fn flank(&self, session: usize, row: usize) -> f64 {
+        self.flank[session][row]
+    }
+
+    /// Rows, by session, at which the generator has gone on so far since it turned back that clearance is taken up.
+    pub fn settled(&self) -> Vec<Vec<bool>> {
+        let of = |(session, flank): (&Session, &Vec<f64>)| {
+            let mut turned = session.generator_rad.first().copied().unwrap_or(0.0);
+            let turns_soon = |row: usize| {
+                let soon = (row + BEFORE).min(session.len() - 1);
+                flank[soon] != flank[row]
+            };
+            (0..session.len())
+                .map(|row| {
+                    if turns_soon(row) {
+                        return false;
+                    }
+                    if row > 0 && flank[row] != flank[row - 1] {
+                        turned = session.generator_rad[row];
+                    }
+                    (session.generator_rad[row] - turned).abs() > CLEARANCE_RAD * self.ratio.abs()
+                })
+                .collect()
+        };
+        self.sessions.iter().zip(&self.flank).map(of).collect()
+    }
+
+    /// The columns at a row.
+    fn fill(&self, session: usize, row: usize, to: &mut Vec<f64>) {
+        let s = &self.sessions[session];
+        let (psi, flank) = (s.generator_rad[row], self.flank[session][row]);
+        let delta = psi / self.ratio;
+        to.extend([1.0, flank, psi / self.motion_scale]);
+        let (s1, c1) = psi.sin_cos();
+        let (s2, c2) = (2.0 * psi).sin_cos();
+        let (s4, c4) = (4.0 * psi).sin_cos();
+        to.extend([s1, c1, s2, c2, s4, c4, flank * s2, flank * c2]);
+        for order in [1.0, 2.0, 4.0] {
+            let (sin, cos) = (order * (psi - delta)).sin_cos();
+            to.extend([sin, cos]);
+        }
+        for order in [1.0, 2.0] {
+            let (sin, cos) = (order * delta).sin_cos();
+            to.extend([sin, cos]);
+        }
+        let previous = if row == 0 { (row + 1).min(s.len() - 1) } else { row - 1 };
+        let moved = (s.generator_rad[row] - s.generator_rad[previous]) * if row == 0 { -1.0 } else { 1.0 };
+        let speed = match &s.time_s {
+            Some(time) if time[row] != time[previous] => moved / (time[row] - time[previous]).abs(),
+            _ => moved,
+        };
+        to.push(speed);
+        if let Some(torque) = s.torque_n_m.as_ref().filter(|_| self.torque_scale > 0.0) {
+            let t = torque[row] / self.torque_scale;
+            to.extend([t, t * t.abs(), (t / 0.05).tanh(), flank * t.abs()]);
+        } else {
+            to.extend([0.0; 4]);
+        }
+        if let Some(temperature) = &s.temperature_c {
+            let t = (temperature[row] - self.temperature.0) / self.temperature.1;
+            to.extend([t, flank * t]);
+        } else {
+            to.extend([0.0; 2]);
+        }
+    }
+
+    /// The error freed of what a fit without its last `extras` columns says, of all rows of a session.
+    pub fn left(&self, fit: &Fit, session: usize, extras: &[Extra]) -> Vec<f64> {
+        let mut columns = Vec::new();
+        (0..self.sessions[session].len())
+            .map(|row| {
+                columns.clear();
+                self.fill(session, row, &mut columns);
+                columns.extend(extras.iter().map(|extra| extra(session, row)));
+                let said: f64 = columns.iter().zip(&fit.value).map(|(column, value)| column * value).sum();
+                self.sessions[session].error_rad[row] - said
+            })
+            .collect()
+    }
+
+    /// Rows spread evenly, with the columns of the state.
+    fn sample(&self) -> Sampled {
+        let rows: usize = self.sessions.iter().map(Session::len).sum();
+        let step = rows.div_ceil(FIT_ROWS).max(1);
+        let mut sampled = Sampled::default();
+        let mut at_row = Vec::new();
+        for (number, session) in self.sessions.iter().enumerate() {
+            for row in (0..session.len()).step_by(step) {
+                at_row.clear();
+                self.fill(number, row, &mut at_row);
+                sampled.columns.resize_with(at_row.len(), Vec::new);
+                sampled.columns.iter_mut().zip(&at_row).for_each(|(column, value)| column.push(*value));
+                sampled.places.push((number, row));
+                sampled.error.push(session.error_rad[row]);
+            }
+        }
+        sampled
+    }
+
+    /// Fits state and extra columns to the error; coefficients of the extra ones come last.
+    pub fn fit(&self, extras: &[Extra]) -> Option<Fit> {
+        let Sampled { places, error, columns } = self.sampled.get_or_init(|| self.sample());
+        let n = error.len();
+        let width = columns.len() + extras.len();
+        if n < 2 * width {
+            return None;
+        }
+        let mut table = Mat::zeros(n, width);
+        for (c, column) in columns.iter().enumerate() {
+            table.col_as_slice_mut(c).copy_from_slice(column);
+        }
+        for (c, extra) in extras.iter().enumerate() {
+            let column = table.col_as_slice_mut(columns.len() + c);
+            column.iter_mut().zip(places).for_each(|(value, (session, row))| *value = extra(*session, *row));
+        }
+        // Columns of one size, so that one small ridge suits all of them.
+        let size: Vec<f64> = (0..width)
+            .map(|c| {
+                let column = table.col_as_slice_mut(c);
+                let size = (column.iter().map(|x| x * x).sum::<f64>() / n as f64).sqrt().max(1e-300);
+                column.iter_mut().for_each(|x| *x /= size);
+                size
+            })
+            .collect();
+        let errors = Mat::from_fn(n, 1, |i, _| error[i]);
+        let mut weight = vec![1.0; n];
+        let (mut value, mut inverse, mut left, mut sigma) = (vec![0.0; width], Mat::zeros(0, 0), error.clone(), 0.0);
+        for _ in 0..4 {
+            let mut weighted = table.clone();
+            for c in 0..width {
+                weighted.col_as_slice_mut(c).iter_mut().zip(&weight).for_each(|(x, w)| *x *= w);
+            }
+            let mut normal = lower_of_product(weighted.transpose(), table.as_ref());
+            (0..width).for_each(|c| normal[(c, c)] += 1e-9 * n as f64);
+            let right = product(weighted.transpose(), errors.as_ref());
+            let factor = cholesky(normal.as_ref()).ok()?;
+            let solution = factor.solve(right.as_ref());
+            value = solution.col_as_slice(0).to_vec();
+            inverse = factor.inverse();
+            let said = product(table.as_ref(), solution.as_ref());
+            left = error.iter().zip(said.col_as_slice(0)).map(|(y, said)| y - said).collect();
+            sigma = median_and_std(&mut left.clone()).1;
+            if sigma <= 0.0 {
+                break;
+            }
+            for (weight, left) in weight.iter_mut().zip(&left) {
+                *weight = (HUBER * sigma / left.abs()).min(1.0);
+            }
+        }
+        // Correlation from row to row, of residuals that are cut where outliers begin.
+        let cut = |x: f64| x.clamp(-3.0 * sigma, 3.0 * sigma);
+        let (mut own, mut next) = (0.0, 0.0);
+        for k in 1..n {
+            if places[k].1 != 0 {
+                own += cut(left[k]).powi(2);
+                next += cut(left[k]) * cut(left[k - 1]);
+            }
+        }
+        let correlation = if own > 0.0 { (next / own).clamp(0.0, 0.98) } else { 0.0 };
+        let inflation = (1.0 + correlation) / (1.0 - correlation);
+        let misfit = left.iter().zip(&weight).map(|(left, weight)| weight * left * left).sum();
+        let std = (0..width).map(|a| sigma * (inflation * inverse[(a, a)]).sqrt() / size[a]).collect();
+        value.iter_mut().zip(&size).for_each(|(value, size)| *value /= size);
+        Some(Fit { value, std, unit_std: sigma * (inflation / n as f64).sqrt(), misfit })
+    }
+}
+
+/// +1 from where an angle last moved forward by more than its noise, -1 backward.
+pub(super) fn directions(angle: &[f64]) -> Vec<f64> {
+    let Some(&start) = angle.first() else { return Vec::new() };
+    // The first clear motion also holds for what comes before it.
+    let first = angle.iter().map(|a| a - start).find(|moved| moved.abs() > TURNED_BACK_RAD);
+    let mut now = first.map_or(1.0, f64::signum);
+    let mut farthest = start;
+    angle
+        .iter()
+        .map(|a| {
+            if (a - farthest) * now > 0.0 {
+                farthest = *a;
+            } else if (farthest - a) * now > TURNED_BACK_RAD {
+                now = -now;
+                farthest = *a;
+            }
+            now
+        })
+        .collect()
+}

@@ -1,0 +1,745 @@
+//! Steps of the error that last: an encoder that lost its index, or a drive that has ratcheted.
+//!
+//! A step is made within one row, faster than an output at rest could give it (a dwell in the clearance changes the error by no more
+//! than the generator moves), and it stays, through reversals and at any load. Clearance that is thrown over, wind-up and
+//! damaged teeth do not: they come back with the state of the drive. A counter that loses counts may be set right before the next session:
+//! then its steps stay until their session ends.
+
+use super::state::{Extra, Fit, State};
+use super::{ARCSEC, Findings, of_rows};
+use crate::measurement::Session;
+use crate::measurement::columns::Quantity;
+use crate::measurement::fault::{FaultName, ToothStep, Treatment};
+use crate::measurement::gear::Gear;
+use flexspline_base::robust::{median_and_std, median_of, sampled, white_noise};
+
+/// A change in one row that is suspected exceeds the motion of the generator, over the ratio, by this factor…
+const FASTER_THAN_DWELL: f64 = 1.5;
+/// …and the robust spread of all such changes so many times.
+const SUDDEN: f64 = 10.0;
+/// Means over so many rows before and after are compared…
+const WINDOW: usize = 16;
+/// …and suspected from so many robust standard deviations of all such comparisons on.
+const STANDS_OUT: f64 = 8.0;
+/// The lasting part of a step is so many standard deviations.
+const LASTS: f64 = 8.0;
+/// The lasting part and the sudden part agree within this share.
+const AGREES: f64 = 0.4;
+/// A step is taken back by one of the other sign that differs by less than this share.
+const TAKEN_BACK: f64 = 0.35;
+/// By several together, whose sum is less than this share of the largest.
+const TAKEN_BACK_TOGETHER: f64 = 0.15;
+/// A clearance that is thrown over at two other places is thrown over here.
+const ELSEWHERE: usize = 2;
+/// No step smaller than this is looked for, rad.
+const LEAST_RAD: f64 = 5.0 * ARCSEC;
+/// Nor one that is not seen from one row to the next: so many standard deviations of the white noise.
+const SEEN: f64 = 6.0;
+/// Steps looked for at a time, and rounds of looking.
+const AT_ONCE: usize = 8;
+/// The same in all sessions, where each has steps of its own.
+const AT_ONCE_IN_ALL: usize = 16;
+const ROUNDS: usize = 4;
+/// A step is that many whole tooth pitches if it differs by less than this share of one.
+const WHOLE_PITCH: f64 = 0.01;
+/// Load of this share of its largest holds the drive on one flank.
+pub(super) const HELD: f64 = 0.1;
+/// Wider than any traverse of the clearance, rad: such a step may follow a reversal.
+const LONGEST_TRAVERSE_RAD: f64 = 1200.0 * ARCSEC;
+/// Wider than any clearance, rad: such a step needs no load to show that no flank was changed.
+const WIDER_THAN_CLEARANCE_RAD: f64 = 180.0 * ARCSEC;
+/// A change of load by this share of its largest, near the step, may be wind-up.
+const LOAD_STEP: f64 = 0.03;
+/// Its noise alone changes it by no more than so many of its standard deviations.
+const LOAD_NOISE: f64 = 8.0;
+/// And its usual pace no more than so many times.
+const LOAD_PACE: f64 = 6.0;
+/// A step that leaves less than this share of the misfit of what it might be instead is told from it.
+const TELLS: f64 = 0.95;
+/// A step that leaves less than this share of the misfit of a change of flank in its place is none. *Guess*.
+const DECIDES: f64 = 0.05;
+/// Medians of six rows before and after differ by no more than so many standard deviations of the white noise.
+const LOCAL_NOISE: f64 = 2.2;
+/// A jump stands alone: so many rows before and after it change the error by less than half as much.
+const APART: usize = 12;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Place {
+    session: usize,
+    row: usize,
+    stays: Stays,
+}
+
+/// How long steps stay.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Stays {
+    ForGood,
+    /// Until their session ends: the counter is set right before the next one.
+    ToTheEnd,
+}
+
+impl Place {
+    fn reached(self, session: usize, row: usize) -> f64 {
+        let stays = self.stays == Stays::ForGood || session == self.session;
+        f64::from(u8::from(stays && (session, row) >= (self.session, self.row)))
+    }
+}
+
+/// A column that steps from 0 to 1.
+fn column(place: Place) -> impl Fn(usize, usize) -> f64 {
+    move |session, row| place.reached(session, row)
+}
+
+/// Which steps stay in the data as nobody knows what they are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::measurement) enum Untold {
+    /// None.
+    Nowhere,
+    /// Only such as stand where a session begins or ends: they may as well be between two.
+    AtTheEnds,
+    /// Some inside a session.
+    Inside,
+}
+
+/// Finds lasting steps: index jumps are named and taken out, ratcheting is handed on. Gives where steps are that are not told apart.
+pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) -> Untold {
+    let Some(Found { sure, doubtful, stays, .. }) = likelier(sessions, gear) else { return Untold::Nowhere };
+    let untold = match doubtful.as_slice() {
+        [] => Untold::Nowhere,
+        steps if steps.iter().any(|(place, ..)| is_inside(&sessions[place.session], place.row)) => Untold::Inside,
+        _ => Untold::AtTheEnds,
+    };
+    for (place, size, _) in &doubtful {
+        let line = sessions[place.session].line[place.row];
+        findings.notes.push(format!(
+            "line {line}: the error steps by {:.1} arcsec; a jump of an encoder or a change of flank, which these data do not tell",
+            size / ARCSEC
+        ));
+    }
+    for (place, size, std) in sure {
+        let session = &sessions[place.session];
+        let fault = of_rows(session, FaultName::EncoderIndexJump, place.row..place.row + 1);
+        if let Some(pitch) = gear.tooth_pitch_rad.filter(|_| stays == Stays::ForGood) {
+            let pitches = (size / pitch).round();
+            if pitches != 0.0 && (size - pitches * pitch).abs() < (5.0 * std).max(WHOLE_PITCH * pitch) {
+                findings.tooth_steps.push(ToothStep {
+                    session: place.session,
+                    row: place.row,
+                    line: fault.first_line,
+                    time_s: fault.time_s,
+                    size_arcsec: size / ARCSEC,
+                    pitches: pitches as i32,
+                });
+                continue;
+            }
+        }
+        let mut fault = fault;
+        fault.channel = Some(Quantity::Error);
+        fault.size_arcsec = Some(size / ARCSEC);
+        fault.treatment = Treatment::Repaired;
+        let lasting = match stays {
+            Stays::ForGood => "there: an encoder has lost its index",
+            Stays::ToTheEnd => {
+                "until the session ends: a counter has lost counts, and was set right before the next one"
+            }
+        };
+        fault.what = format!(
+            "the error steps by {:.1} arcsec (standard deviation {:.1}) within one row and stays {lasting}; the step is taken out",
+            size / ARCSEC,
+            std / ARCSEC
+        );
+        fault.until_s = None;
+        findings.faults.push(fault);
+        for (number, session) in sessions.iter_mut().enumerate() {
+            let rows = session.error_rad.iter_mut().enumerate();
+            rows.for_each(|(row, error)| *error -= size * place.reached(number, row));
+        }
+    }
+    untold
+}
+
+/// Whether so many rows of its session are before and after a row that means over them are compared.
+fn is_inside(session: &Session, row: usize) -> bool {
+    row >= WINDOW && row + WINDOW <= session.len()
+}
+
+/// A step with its size and standard deviation.
+type Step = (Place, f64, f64);
+
+/// Steps of a recording.
+struct Found {
+    /// Lasting ones.
+    sure: Vec<Step>,
+    /// Those that may be a change of flank.
+    doubtful: Vec<Step>,
+    stays: Stays,
+    /// What is left with them: sum of squared, weighted residuals.
+    misfit: f64,
+    /// Whether any row was suspected.
+    suspected: bool,
+}
+
+/// Steps that stay for good or to the end of their session, whichever leaves less.
+fn likelier(sessions: &[Session], gear: &Gear) -> Option<Found> {
+    let noise = white_noise(sessions.iter().map(|session| session.error_rad.as_slice()));
+    let state = State::new(sessions, gear);
+    let for_good = find(sessions, gear, noise, &state, Stays::ForGood)?;
+    if sessions.len() == 1 || !for_good.suspected {
+        return Some(for_good);
+    }
+    let to_the_end = find(sessions, gear, noise, &state, Stays::ToTheEnd);
+    let mut better = to_the_end.filter(|found| found.misfit < TELLS * for_good.misfit);
+    if let Some(found) = &mut better {
+        let steps = [found.sure.as_slice(), &found.doubtful].concat();
+        let (told, doubtful): (Vec<Step>, Vec<Step>) = found
+            .doubtful
+            .iter()
+            .copied()
+            .partition(|(place, ..)| beyond_a_change_of_flank(sessions, &state, &steps, *place));
+        // A flank that friction lets go stays to the end of a session, too, where the load is small.
+        let largest = largest_torque(sessions);
+        let (loose, sure): (Vec<Step>, Vec<Step>) = (found.sure.iter().copied())
+            .partition(|(place, ..)| may_let_go(&sessions[place.session], place.row, largest));
+        (found.sure, found.doubtful) = ([sure, told].concat(), [doubtful, loose].concat());
+        found.sure.sort_by_key(|(place, ..)| (place.session, place.row));
+    }
+    Some(better.filter(|found| !found.sure.is_empty()).unwrap_or(for_good))
+}
+
+/// Whether the load at a row holds no flank, so that friction may have let go of one.
+fn may_let_go(session: &Session, row: usize, largest: f64) -> bool {
+    session.torque_n_m.as_ref().is_some_and(|torque| torque[row].abs() < least_that_holds(torque, largest))
+}
+
+/// Whether a step leaves far less than a change of flank would that comes in its place, whatever the other steps are: the model without the
+/// step, to which the flank that the load holds is given instead.
+fn beyond_a_change_of_flank(sessions: &[Session], state: &State, steps: &[Step], place: Place) -> bool {
+    let largest = largest_torque(sessions);
+    if may_let_go(&sessions[place.session], place.row, largest) {
+        return false;
+    }
+    let held_by: Vec<Vec<f64>> = sessions.iter().map(|session| held_flanks(session, largest)).collect();
+    let others: Vec<_> = steps.iter().map(|(other, ..)| *other).filter(|other| *other != place).map(column).collect();
+    let with = |this: Extra| {
+        let mut extras: Vec<Extra> = others.iter().map(|column| column as Extra).collect();
+        extras.push(this);
+        state.fit(&extras)
+    };
+    let flank = |session: usize, row: usize| held_by[session][row];
+    let (Some(step), Some(flank)) = (with(&column(place)), with(&flank)) else { return false };
+    step.misfit < DECIDES * flank.misfit
+}
+
+/// The flank, ±1, that the last load held which was large enough to hold one; 0 before there was one, and without loads.
+fn held_flanks(session: &Session, largest: f64) -> Vec<f64> {
+    let Some(torque) = session.torque_n_m.as_ref().filter(|_| largest > 0.0) else { return vec![0.0; session.len()] };
+    let held = least_that_holds(torque, largest);
+    let mut flank = 0.0;
+    let of = |torque: &f64| {
+        if torque.abs() >= held {
+            flank = torque.signum();
+        }
+        flank
+    };
+    torque.iter().map(of).collect()
+}
+
+/// The least load that holds a flank, N·m, noise considered.
+fn least_that_holds(torque: &[f64], largest: f64) -> f64 {
+    (HELD * largest).max(LOAD_NOISE * white_noise([torque]))
+}
+
+fn find(sessions: &[Session], gear: &Gear, noise: f64, state: &State, stays: Stays) -> Option<Found> {
+    let settled = state.settled();
+    let most = if stays == Stays::ForGood { AT_ONCE } else { AT_ONCE_IN_ALL };
+    let mut places = sudden(sessions, gear, noise, &settled, most);
+    places.iter_mut().for_each(|place| place.stays = stays);
+    let mut suspected = !places.is_empty();
+    let mut rejected: Vec<Place> = Vec::new();
+    let (mut steps, mut misfit): (Vec<Step>, f64) = (Vec::new(), f64::INFINITY);
+    for round in 0..ROUNDS {
+        // Drop one by one what does not last, the weakest first.
+        let fit = loop {
+            let columns: Vec<_> = places.iter().copied().map(column).collect();
+            let extras: Vec<Extra> = columns.iter().map(|column| column as Extra).collect();
+            let fit = state.fit(&extras)?;
+            let first = fit.value.len() - places.len();
+            let strength = |k: usize| {
+                strength(sessions, gear, noise, &settled, places[k], fit.value[first + k], fit.std[first + k])
+            };
+            let weakest = (0..places.len()).min_by(|a, b| strength(*a).total_cmp(&strength(*b)));
+            match weakest {
+                Some(k) if strength(k) < 1.0 => {
+                    rejected.push(places.remove(k));
+                }
+                _ => break fit,
+            }
+        };
+        let first = fit.value.len() - places.len();
+        steps = places.iter().enumerate().map(|(k, p)| (*p, fit.value[first + k], fit.std[first + k])).collect();
+        misfit = fit.misfit;
+        if round + 1 == ROUNDS {
+            break;
+        }
+        let known: Vec<Place> = places.iter().chain(&rejected).copied().collect();
+        let more = standing_out(sessions, gear, noise, state, &settled, &fit, &places, &known);
+        if more.is_empty() {
+            break;
+        }
+        suspected = true;
+        places.extend(more.into_iter().map(|place| Place { stays, ..place }));
+        places.sort_by_key(|place| (place.session, place.row));
+    }
+    steps = match stays {
+        Stays::ForGood => lasting(steps),
+        // What is set right between sessions takes nothing back.
+        Stays::ToTheEnd => {
+            steps.chunk_by(|a, b| a.0.session == b.0.session).flat_map(|of| lasting(of.to_vec())).collect()
+        }
+    };
+    let unsaid = !steps.is_empty() && !says_flank(sessions);
+    let turned_over = |place: Place, size: f64| unsaid && comes_elsewhere(sessions, &settled, place, size);
+    let (sure, doubtful): (Vec<Step>, Vec<Step>) = steps.iter().copied().partition(|(place, size, _)| {
+        !turned_over(*place, *size) && no_flank_was_changed(sessions, state, &steps, *place, *size)
+    });
+    // Where one step may be a change of flank, one of the other sign may be its way back.
+    let way_back = |(_, size, _): &Step| {
+        size.abs() <= WIDER_THAN_CLEARANCE_RAD && doubtful.iter().any(|(_, other, _)| size * other < 0.0)
+    };
+    let (back, sure): (Vec<Step>, Vec<Step>) = sure.into_iter().partition(way_back);
+    Some(Found { sure, doubtful: [doubtful, back].concat(), stays, misfit, suspected })
+}
+
+/// The steps without those that come and go by the same amount, which do not last: teeth and clearance that fast motion samples once, a
+/// flank that drag turns over until the drive slows down. Each is taken back once, by its nearest neighbour first.
+fn lasting(mut steps: Vec<Step>) -> Vec<Step> {
+    let together = |run: &[Step], share: f64| {
+        let largest = run.iter().fold(0.0, |most: f64, (_, size, _)| most.max(size.abs()));
+        let sum: f64 = run.iter().map(|(_, size, _)| size).sum();
+        sum.abs() < share * largest
+    };
+    let apart = |a: Place, b: Place| (b.session - a.session, b.row.abs_diff(a.row));
+    loop {
+        let pairs = (0..steps.len()).flat_map(|k| (0..k).map(move |j| (j, k)));
+        let there_and_back = pairs.filter(|(j, k)| together(&[steps[*j], steps[*k]], TAKEN_BACK));
+        let Some((j, k)) = there_and_back.min_by_key(|(j, k)| apart(steps[*j].0, steps[*k].0)) else { break };
+        steps.remove(k);
+        steps.remove(j);
+    }
+    for long in 3..=steps.len() {
+        while let Some(from) = steps.windows(long).position(|run| together(run, TAKEN_BACK_TOGETHER)) {
+            steps.drain(from..from + long);
+        }
+    }
+    steps
+}
+
+/// The change of the error into a row beyond what a dwell could give, 0 if less. An output dwells after the generator turned back.
+fn beyond_dwell(session: &Session, row: usize, settled: &[bool], gear: &Gear) -> f64 {
+    let change = session.error_rad[row] - session.error_rad[row - 1];
+    if settled[row] {
+        return change;
+    }
+    let motion = FASTER_THAN_DWELL * ((session.generator_rad[row] - session.generator_rad[row - 1]) / gear.ratio).abs();
+    change.signum() * (change.abs() - motion).max(0.0)
+}
+
+/// Rows into which the error changes more than anything smooth explains, the largest changes first.
+fn sudden(sessions: &[Session], gear: &Gear, noise: f64, settled: &[Vec<bool>], most: usize) -> Vec<Place> {
+    let changes: Vec<f64> =
+        sessions.iter().flat_map(|session| session.error_rad.windows(2).map(|error| error[1] - error[0])).collect();
+    let usual = median_and_std(&mut sampled(&changes)).1;
+    let least = (SUDDEN * usual.max(noise)).max(LEAST_RAD);
+    let mut found: Vec<(Place, f64)> = Vec::new();
+    for (number, session) in sessions.iter().enumerate() {
+        for row in 1..session.len() {
+            let by = beyond_dwell(session, row, &settled[number], gear).abs();
+            if by > least {
+                found.push((Place { session: number, row, stays: Stays::ForGood }, by));
+            }
+        }
+    }
+    largest(found, &[], most)
+}
+
+/// The places of the largest values, apart from each other and from those known.
+fn largest(mut found: Vec<(Place, f64)>, known: &[Place], most: usize) -> Vec<Place> {
+    found.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut places: Vec<Place> = Vec::new();
+    for (place, _) in found {
+        let near = |other: &Place| other.session == place.session && other.row.abs_diff(place.row) < WINDOW / 2;
+        if !places.iter().chain(known).any(near) {
+            places.push(place);
+            if places.len() == most {
+                break;
+            }
+        }
+    }
+    places.sort_by_key(|place| (place.session, place.row));
+    places
+}
+
+/// Rows where means before and after differ more than they do elsewhere, in what state and known steps leave.
+#[allow(clippy::too_many_arguments, reason = "all that is known of the recording")]
+fn standing_out(
+    sessions: &[Session],
+    gear: &Gear,
+    noise: f64,
+    state: &State,
+    settled: &[Vec<bool>],
+    fit: &Fit,
+    places: &[Place],
+    known: &[Place],
+) -> Vec<Place> {
+    let columns: Vec<_> = places.iter().copied().map(column).collect();
+    let extras: Vec<Extra> = columns.iter().map(|column| column as Extra).collect();
+    let differences: Vec<Vec<f64>> = (0..sessions.len())
+        .map(|number| {
+            let left = state.left(fit, number, &extras);
+            let mut sums = vec![0.0; left.len() + 1];
+            for row in 0..left.len() {
+                sums[row + 1] = sums[row] + left[row];
+            }
+            let mean = |from: usize, to: usize| (sums[to] - sums[from]) / (to - from) as f64;
+            (0..left.len())
+                .map(|row| {
+                    if is_inside(&sessions[number], row) {
+                        mean(row, row + WINDOW) - mean(row - WINDOW, row)
+                    } else {
+                        0.0
+                    }
+                })
+                .collect()
+        })
+        .collect();
+    let usual = median_and_std(&mut differences.iter().flat_map(|d| sampled(d)).collect::<Vec<_>>()).1;
+    let least = (STANDS_OUT * usual).max(LEAST_RAD);
+    let mut found = Vec::new();
+    for (number, (session, differences)) in sessions.iter().zip(&differences).enumerate() {
+        for row in 1..session.len() {
+            let size = differences[row];
+            if size.abs() > least {
+                // Of the rows around, the one where it happens.
+                let sharp = beyond_dwell(session, row, &settled[number], gear) * size.signum();
+                if sharp > (1.0 - AGREES) * size.abs() - 4.0 * noise {
+                    found.push((Place { session: number, row, stays: Stays::ForGood }, size.abs()));
+                }
+            }
+        }
+    }
+    largest(found, known, AT_ONCE)
+}
+
+/// At least 1 for a step that lasts, is sudden, and is the same in both views.
+fn strength(
+    sessions: &[Session],
+    gear: &Gear,
+    noise: f64,
+    settled: &[Vec<bool>],
+    place: Place,
+    size: f64,
+    std: f64,
+) -> f64 {
+    let session = &sessions[place.session];
+    let wide = size.abs() > LONGEST_TRAVERSE_RAD;
+    if (!settled[place.session][place.row] && !wide) || others_change_as_much(session, place.row, size) {
+        return 0.0;
+    }
+    let change = session.error_rad[place.row] - session.error_rad[place.row - 1];
+    let motion = ((session.generator_rad[place.row] - session.generator_rad[place.row - 1]) / gear.ratio).abs();
+    let agrees = (change - size).abs() < AGREES * size.abs() + 6.0 * noise + 0.5 * motion;
+    let loaded = load_changes(session, place.row, largest_torque(sessions)) && !whole_pitches(size, gear);
+    if !agrees || loaded || size.abs() < LEAST_RAD.max(SEEN * noise) {
+        return 0.0;
+    }
+    // Seen close by, so that a slow change is no step: medians of a few rows.
+    let beside = 6.min(place.row).min(session.len() - place.row);
+    let mut before = session.error_rad[place.row - beside..place.row].to_vec();
+    let mut after = session.error_rad[place.row..place.row + beside].to_vec();
+    let local = median_of(&mut after) - median_of(&mut before);
+    let mut paces: Vec<f64> = session.error_rad[place.row - beside..place.row + beside]
+        .windows(2)
+        .map(|error| (error[1] - error[0]).abs())
+        .collect();
+    let moves = beside as f64 * median_of(&mut paces);
+    if (local - size).abs() > AGREES * size.abs() + LOCAL_NOISE * noise + moves {
+        return 0.0;
+    }
+    size.abs() / (LASTS * std).max(1e-300)
+}
+
+/// Whether an angle is one tooth pitch or several.
+pub(super) fn whole_pitches(size: f64, gear: &Gear) -> bool {
+    gear.tooth_pitch_rad.is_some_and(|pitch| {
+        let pitches = (size / pitch).round();
+        pitches != 0.0 && (size - pitches * pitch).abs() < WHOLE_PITCH * pitch
+    })
+}
+
+/// Largest torque of either sign, N·m; 0 where none was recorded.
+pub(super) fn largest_torque(sessions: &[Session]) -> f64 {
+    sessions
+        .iter()
+        .filter_map(|s| s.torque_n_m.as_ref())
+        .flatten()
+        .fold(0.0, |most: f64, torque| most.max(torque.abs()))
+}
+
+/// Whether torque was recorded, and more of it than noise: then it says which flank carries.
+fn says_flank(sessions: &[Session]) -> bool {
+    let noise = white_noise(sessions.iter().filter_map(|session| session.torque_n_m.as_deref()));
+    largest_torque(sessions) > LOAD_NOISE * noise
+}
+
+/// Whether the error changes by as much, within a row, at other places that no reversal is near to: under a load that nobody recorded.
+fn comes_elsewhere(sessions: &[Session], settled: &[Vec<bool>], place: Place, size: f64) -> bool {
+    if size.abs() > WIDER_THAN_CLEARANCE_RAD {
+        return false;
+    }
+    let mut elsewhere = 0;
+    for (number, session) in sessions.iter().enumerate() {
+        for row in 1..session.len() {
+            let near = number == place.session && row.abs_diff(place.row) < WINDOW;
+            let change = session.error_rad[row] - session.error_rad[row - 1];
+            let as_much = (change.abs() - size.abs()).abs() < TAKEN_BACK * size.abs();
+            elsewhere += usize::from(!near && settled[number][row] && as_much);
+        }
+    }
+    elsewhere >= ELSEWHERE
+}
+
+/// Whether load changes at once, by more than its noise and its usual pace, near a row.
+fn load_changes(session: &Session, row: usize, largest: f64) -> bool {
+    session.torque_n_m.as_ref().is_some_and(|torque| {
+        let around = &torque[row.saturating_sub(50)..(row + 50).min(torque.len())];
+        let mut paces: Vec<f64> = around.windows(2).map(|t| (t[1] - t[0]).abs()).collect();
+        let usual =
+            (LOAD_STEP * largest).max(LOAD_NOISE * white_noise([around])).max(LOAD_PACE * median_of(&mut paces));
+        let near = &torque[row.saturating_sub(4)..(row + 4).min(torque.len())];
+        largest > 0.0 && near.windows(2).any(|t| (t[1] - t[0]).abs() > usual)
+    })
+}
+
+/// Whether the error changes about as much in other rows near by: ringing, a change of speed, a traverse of the clearance.
+fn others_change_as_much(session: &Session, row: usize, size: f64) -> bool {
+    let near = row.saturating_sub(APART).max(1)..(row + APART + 1).min(session.len());
+    near.filter(|k| *k != row).any(|k| (session.error_rad[k] - session.error_rad[k - 1]).abs() > 0.5 * size.abs())
+}
+
+/// Whether a row lies between a load that holds one flank and one that holds the other: there a flank is changed.
+fn load_turns_over(session: &Session, row: usize, largest: f64) -> bool {
+    let Some(torque) = session.torque_n_m.as_ref().filter(|_| largest > 0.0) else { return false };
+    let held = least_that_holds(torque, largest);
+    let holds = |torque: &&f64| torque.abs() >= held;
+    let before = torque[..row].iter().rev().find(holds);
+    let after = torque[row..].iter().find(holds);
+    may_let_go(session, row, largest) && before.zip(after).is_some_and(|(before, after)| before * after < 0.0)
+}
+
+/// Whether a step that happens under light load, where friction alone holds a flank, is seen under loads that hold one: a change of
+/// flank is not.
+fn lasts_under_load(sessions: &[Session], state: &State, steps: &[Step], place: Place, size: f64) -> bool {
+    let held = HELD * largest_torque(sessions);
+    let loaded = |s: usize, r: usize| sessions[s].torque_n_m.as_ref().is_some_and(|torque| torque[r].abs() >= held);
+    if held == 0.0 || loaded(place.session, place.row) {
+        return true;
+    }
+    let others: Vec<_> = steps.iter().map(|(other, ..)| *other).filter(|other| *other != place).map(column).collect();
+    let mut extras: Vec<Extra> = others.iter().map(|column| column as Extra).collect();
+    let lasting = column(place);
+    let under_load = |s: usize, r: usize| if loaded(s, r) { lasting(s, r) } else { 0.0 };
+    let under_none = |s: usize, r: usize| if loaded(s, r) { 0.0 } else { lasting(s, r) };
+    extras.extend([&under_none as Extra, &under_load]);
+    let Some(fit) = state.fit(&extras) else { return false };
+    let seen = |k: usize| {
+        let (value, std) = (fit.value[fit.value.len() - k], fit.std[fit.std.len() - k]);
+        (value - size).abs() < AGREES * size.abs() && value.abs() > LASTS * std
+    };
+    seen(1) && seen(2)
+}
+
+/// Whether a step cannot be a change of flank: the output came back to where it happened and the step did not, or load held the flank,
+/// or no clearance is so wide.
+fn no_flank_was_changed(sessions: &[Session], state: &State, steps: &[Step], place: Place, size: f64) -> bool {
+    if size.abs() > WIDER_THAN_CLEARANCE_RAD {
+        return true;
+    }
+    if load_turns_over(&sessions[place.session], place.row, largest_torque(sessions))
+        || !lasts_under_load(sessions, state, steps, place, size)
+    {
+        return false;
+    }
+    let here = sessions[place.session].generator_rad[place.row];
+    let mut crossings = 0;
+    for session in sessions {
+        let mut side = 0.0;
+        for psi in &session.generator_rad {
+            let away = psi - here;
+            if away.abs() > 0.5 {
+                if side * away < 0.0 {
+                    crossings += 1;
+                }
+                side = away.signum();
+            }
+        }
+    }
+    if crossings >= 2 {
+        let in_time = |s: usize, r: usize| place.reached(s, r);
+        let in_angle = |s: usize, r: usize| f64::from(u8::from(sessions[s].generator_rad[r] >= here));
+        // The other steps are there in either case.
+        let others: Vec<_> =
+            steps.iter().map(|(other, ..)| *other).filter(|other| *other != place).map(column).collect();
+        let with = |this: Extra| {
+            let mut extras: Vec<Extra> = others.iter().map(|column| column as Extra).collect();
+            extras.push(this);
+            state.fit(&extras)
+        };
+        let (Some(time), Some(angle)) = (with(&in_time), with(&in_angle)) else { return false };
+        return time.misfit < TELLS * angle.misfit;
+    }
+    let session = &sessions[place.session];
+    let held =
+        session.torque_n_m.as_ref().is_some_and(|torque| torque[place.row].abs() > HELD * largest_torque(sessions));
+    // The same direction before and after, and a load that says which flank.
+    held && state.flank(place.session, place.row) == state.flank(place.session, place.row - 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is left of steps in some rows.
+    fn left(steps: &[(usize, f64)]) -> Vec<f64> {
+        let step = |(row, size): &(usize, f64)| (Place { session: 0, row: *row, stays: Stays::ForGood }, *size, 0.1);
+        lasting(steps.iter().map(step).collect()).into_iter().map(|(_, size, _)| size).collect()
+    }
+
+    #[test]
+    fn a_step_is_taken_back_once_and_by_its_nearest_neighbour() {
+        assert_eq!(left(&[(1287, -60.5), (1364, 60.4), (9000, 76.3)]), [76.3]);
+        assert_eq!(left(&[(21, 47.2), (490, -45.7), (525, 46.4)]), [47.2]);
+        assert_eq!(left(&[(21, 46.1), (80, 30.0)]), [46.1, 30.0]);
+    }
+
+    /// A session at rest with this error and torque in each row.
+    fn session(error_rad: Vec<f64>, torque_n_m: Vec<f64>) -> Session {
+        let rows = error_rad.len();
+        Session {
+            line: (0..rows as u64).collect(),
+            time_s: None,
+            generator_rad: vec![0.0; rows],
+            error_rad,
+            torque_n_m: Some(torque_n_m),
+            ..Session::default()
+        }
+    }
+
+    #[test]
+    fn a_counter_that_is_set_right_between_sessions_is_told_and_put_right() {
+        let mut random = fastrand::Rng::with_seed(4);
+        let one = |number: usize, random: &mut fastrand::Rng| {
+            let time = || (0..2000).map(|k| 0.01 * f64::from(k));
+            let torque: Vec<f64> = time().map(|t| 20.0 * (0.8 * t + number as f64).sin()).collect();
+            let mut noise = || 2.0 * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0);
+            let error = torque.iter().map(|torque| ARCSEC * (7.0 * torque + 30.0 * torque.signum() + noise()));
+            let mut one = session(error.collect(), torque.clone());
+            one.generator_rad = time().map(|t| 30.0 * (0.6 * t).sin()).collect();
+            one.time_s = Some(time().collect());
+            one
+        };
+        let right: Vec<Session> = (0..3).map(|number| one(number, &mut random)).collect();
+        let mut slipped = right.clone();
+        for (session, row, by) in [(0, 700, 90.0), (1, 450, 120.0), (1, 1500, 80.0), (2, 900, 100.0)] {
+            slipped[session].error_rad[row..].iter_mut().for_each(|error| *error += by * ARCSEC);
+        }
+        let mut findings = Findings::default();
+        check(&mut slipped, &Gear::of_ratio(100.0), &mut findings);
+        let told = findings.faults.iter().filter(|fault| fault.name == FaultName::EncoderIndexJump).count();
+        assert_eq!(told, 4, "{:?}", findings.faults);
+        let pairs = right.iter().zip(&slipped).flat_map(|(a, b)| a.error_rad.iter().zip(&b.error_rad));
+        let off = pairs.map(|(a, b)| (a - b).abs() / ARCSEC).fold(0.0, f64::max);
+        assert!(off < 5.0, "{off}");
+    }
+
+    /// Sessions at rest but for slow waves of the generator, under a torque each. A light load leaves the flank where it is (friction); the
+    /// first session has a counter that slips once under load and is set right after it.
+    fn flanks_that_friction_holds(slip_arcsec: f64) -> Vec<Session> {
+        let mut random = fastrand::Rng::with_seed(11);
+        let torques: [fn(f64) -> f64; 3] =
+            [|x| 8.0 + 6.0 * (9.0 * x).sin(), |x| 2.4 * (x - 0.45) / 0.45, |x| 8.0 + 6.0 * (7.0 * x).cos()];
+        let one = |(number, torque): (usize, &fn(f64) -> f64)| {
+            let mut noise = || 2.0 * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0);
+            let mut flank = 0.0;
+            let torque: Vec<f64> = (0..2000).map(|k| torque(f64::from(k) / 2000.0)).collect();
+            let error = torque.iter().enumerate().map(|(k, torque)| {
+                if torque.abs() > 0.9 || flank == 0.0 {
+                    flank = torque.signum();
+                }
+                let slipped = if number == 0 && k >= 700 { slip_arcsec } else { 0.0 };
+                ARCSEC * (7.0 * torque + 40.0 * flank + slipped + noise())
+            });
+            let mut one = session(error.collect(), torque.clone());
+            one.generator_rad = (0..2000).map(|k| 30.0 * (6e-3 * f64::from(k)).sin()).collect();
+            one.time_s = Some((0..2000).map(|k| 0.01 * f64::from(k)).collect());
+            one
+        };
+        torques.iter().enumerate().map(one).collect()
+    }
+
+    #[test]
+    fn a_large_slip_makes_no_slip_of_a_change_of_flank() {
+        for slip_arcsec in [400.0, 3000.0] {
+            let sessions = flanks_that_friction_holds(slip_arcsec);
+            let change = (1..2000).find(|row| sessions[1].torque_n_m.as_ref().unwrap()[*row] > 0.9).unwrap();
+            let at = |session: usize, row: usize| Place { session, row, stays: Stays::ToTheEnd };
+            let gear = Gear::of_ratio(100.0);
+            let state = State::new(&sessions, &gear);
+            let steps = [(at(0, 700), slip_arcsec * ARCSEC, ARCSEC), (at(1, change), 80.0 * ARCSEC, ARCSEC)];
+            assert!(beyond_a_change_of_flank(&sessions, &state, &steps, at(0, 700)));
+            assert!(!beyond_a_change_of_flank(&sessions, &state, &steps, at(1, change)));
+            let mut findings = Findings::default();
+            check(&mut sessions.clone(), &gear, &mut findings);
+            let told: Vec<u64> = findings.faults.iter().map(|fault| fault.first_line).collect();
+            assert_eq!(told, [700], "{:?} {:?}", findings.faults, findings.notes);
+        }
+    }
+
+    #[test]
+    fn what_stands_at_the_ends_of_a_session_may_be_between_two() {
+        let session = session(vec![0.0; 400], vec![0.0; 400]);
+        let inside = |row: usize| is_inside(&session, row);
+        assert!(!inside(3) && !inside(395) && inside(WINDOW) && inside(200));
+    }
+
+    #[test]
+    fn between_loads_of_either_sign_a_flank_is_changed() {
+        let ramp: Vec<f64> = (0..400).map(|k| 0.1 * f64::from(k) - 20.0).collect();
+        let there_and_back: Vec<f64> = (0..400).map(|k| 20.0 - (0.2 * f64::from(k) - 40.0).abs()).collect();
+        let turns = |torque: Vec<f64>, row: usize| load_turns_over(&session(vec![0.0; 400], torque), row, 20.0);
+        assert!(turns(ramp.clone(), 210), "1 N·m, from -20 to 20");
+        assert!(!turns(ramp, 300), "10 N·m hold the flank");
+        assert!(!turns(there_and_back.iter().map(|t| t.abs()).collect(), 100), "never below nothing");
+    }
+
+    #[test]
+    fn a_step_that_comes_at_other_places_too_is_a_clearance_thrown_over() {
+        let mut error = vec![0.0; 900];
+        let step = 80.0 * ARCSEC;
+        error[200..].iter_mut().for_each(|e| *e += step);
+        error[400..].iter_mut().for_each(|e| *e -= step);
+        let settled = vec![vec![true; 900]];
+        let place = Place { session: 0, row: 600, stays: Stays::ForGood };
+        let elsewhere =
+            |error: &[f64]| comes_elsewhere(&[session(error.to_vec(), vec![0.0; 900])], &settled, place, step);
+        error[600..].iter_mut().for_each(|e| *e += step);
+        assert!(elsewhere(&error));
+        error[400..600].iter_mut().for_each(|e| *e += step);
+        assert!(!elsewhere(&error), "one other place is no habit");
+    }
+
+    #[test]
+    fn several_steps_that_end_where_they_began_do_not_last() {
+        assert_eq!(left(&[(39, 46.1), (132, -19.3), (3067, -25.1)]), [0.0; 0]);
+        assert_eq!(left(&[(39, 46.1), (132, -19.3), (3067, -10.1)]), [46.1, -19.3, -10.1]);
+    }
+}

@@ -1,0 +1,402 @@
+//! Units, signs and columns taken for others.
+//!
+//! An angle is converted where something proves its unit: the ratio, which is the user's word, or the turn after which a column begins anew.
+//! A torque or a temperature that cannot be in the unit given is in another one, but its size does not say in which: it is left out, with the
+//! units that it may have and how to say them.
+
+use super::{Findings, span};
+use crate::measurement::columns::{Column, Quantity, Reading, Unit};
+use crate::measurement::fault::{Fault, FaultName, Treatment};
+use crate::measurement::gear::Gear;
+use crate::measurement::log::Log;
+use flexspline_base::robust::{least_and_most, median_of, quantile_of, sampled};
+
+/// The output must have turned by so much, by the generator or by itself, before the ratio is judged: twenty times two
+/// arc-minutes of clearance, so that clearance moves the ratio by less than 5 %.
+const ENOUGH_MOTION_RAD: f64 = 20.0 * 120.0 / 206_265.0;
+/// A ratio this near to one that a mistake gives is that mistake; degrees for arc-minutes (60) and radians for degrees (57.3) are
+/// 4.6 % apart.
+const SAME: f64 = 0.02;
+/// A ratio within these factors of the right one is left to the diagnosis, as an error of the ratio; beyond, it is another gear.
+const RATIO_ERROR: [f64; 2] = [0.8, 1.25];
+/// The wheel that is fixed changes the ratio by one: it is seen where the output turned so far that clearance does not hide that, rad.
+const TELLS_WHEELS_APART_RAD: f64 = 0.2;
+/// A ratio is that of the other wheel if it is this near.
+const OTHER_WHEEL: f64 = 1e-3;
+/// Errors that spread by more (robust, 10°) or less (a thousandth of an arc-second) are not errors of a drive in the unit given.
+const SPREADS_RAD: [f64; 2] = [0.174_5, 1e-3 / 206_265.0];
+/// Temperatures at which a drive exists, °C.
+const TEMPERATURES_C: [f64; 2] = [-180.0, 180.0];
+
+/// Finds and repairs units; an error says what cannot be told.
+pub(in crate::measurement) fn check(
+    log: &mut Log,
+    columns: &[Column],
+    gear: &Gear,
+    findings: &mut Findings,
+) -> Result<(), String> {
+    torque(log, columns, gear, findings)?;
+    temperature(log, columns, findings);
+    if log.output_or_error() == Quantity::Output {
+        ratio(log, columns, gear, findings)
+    } else {
+        error_size(log, columns)
+    }
+}
+
+/// Converts both angles.
+pub(in crate::measurement) fn both_in_degrees(log: &mut Log, scale: f64, findings: &mut Findings) {
+    for channel in [Quantity::Generator, Quantity::Output, Quantity::Error] {
+        log.get_mut(channel).into_iter().flatten().for_each(|angle| *angle *= scale);
+    }
+    let mut fault = span(log, FaultName::UnitMismatch, 0, log.len() - 1);
+    fault.treatment = Treatment::Repaired;
+    fault.what = "generator and output are both in degrees: so the nominal model explains the error to the noise, and not in radians; they \
+                  were converted"
+        .to_owned();
+    findings.faults.push(fault);
+}
+
+fn name(columns: &[Column], quantity: Quantity) -> &str {
+    columns.iter().find(|column| column.quantity == quantity).map_or(quantity.name(), |column| &column.name)
+}
+
+fn unit(columns: &[Column], quantity: Quantity) -> Unit {
+    columns.iter().find(|column| column.quantity == quantity).map_or(quantity.default_column().1, |column| column.unit)
+}
+
+/// Units that have no gain to be said, in which a value of `unit` lies within `allowed`, with the value there.
+fn may_be(value: f64, unit: Unit, units: &[Unit], allowed: impl Fn(f64) -> bool) -> Vec<(Unit, f64)> {
+    let number = (value - unit.zero()) / unit.factor();
+    let plain = units.iter().filter(|other| !matches!(other, Unit::Ampere | Unit::Milliampere | Unit::Volt));
+    plain.map(|other| (*other, Reading::of(*other).value(number))).filter(|(_, value)| allowed(*value)).collect()
+}
+
+/// How to say a unit that a column may have.
+fn say_it(quantity: Quantity, column: &str, may_be: &[(Unit, f64)], inside: &str) -> String {
+    let read: Vec<String> = may_be.iter().map(|(unit, value)| format!("{unit} ({value:.4} {inside})")).collect();
+    let first = may_be.first().map_or("UNIT", |(unit, _)| unit.name());
+    format!("its size does not say in which; it may be in {}: --columns {quantity}={column}:{first}", read.join(" or "))
+}
+
+/// A torque beyond what a drive bears is in another unit, and is not used.
+fn torque(log: &mut Log, columns: &[Column], gear: &Gear, findings: &mut Findings) -> Result<(), String> {
+    let limit = gear.largest_torque_n_m;
+    let Some(values) = log.get(Quantity::Torque) else { return Ok(()) };
+    let mut sizes: Vec<f64> = sampled(values).into_iter().filter(|t| t.is_finite()).map(f64::abs).collect();
+    let size = quantile_of(&mut sizes, 0.95);
+    if size <= limit {
+        return Ok(());
+    }
+    let units = may_be(size, unit(columns, Quantity::Torque), Quantity::Torque.units(), |torque| torque <= limit);
+    if units.is_empty() {
+        return Err(format!("torque: found {size:e} N.m in a twentieth of the rows, allowed: at most {limit:e} N.m"));
+    }
+    let say_it = say_it(Quantity::Torque, name(columns, Quantity::Torque), &units, "N.m");
+    let what = format!(
+        "torque of {size:.0} N.m, where {limit:.0} N.m is the most: it is in another unit, and is not used; {say_it}"
+    );
+    leave_out(log, Quantity::Torque, what, findings);
+    Ok(())
+}
+
+/// A temperature at which no drive exists is in another unit, and is not used.
+fn temperature(log: &mut Log, columns: &[Column], findings: &mut Findings) {
+    let Some(values) = log.get(Quantity::Temperature) else { return };
+    let mut some: Vec<f64> = sampled(values).into_iter().filter(|t| t.is_finite()).collect();
+    let median = median_of(&mut some);
+    let exists = |celsius: f64| (TEMPERATURES_C[0]..=TEMPERATURES_C[1]).contains(&celsius);
+    if exists(median) {
+        return;
+    }
+    let units = may_be(median, unit(columns, Quantity::Temperature), Quantity::Temperature.units(), exists);
+    let say_it = if units.is_empty() {
+        String::new()
+    } else {
+        format!("; {}", say_it(Quantity::Temperature, name(columns, Quantity::Temperature), &units, "C"))
+    };
+    let what = format!("a temperature of {median:.1} degrees C is not plausible: it is not used{say_it}");
+    leave_out(log, Quantity::Temperature, what, findings);
+}
+
+/// Leaves out a column that is in another unit than the one given.
+fn leave_out(log: &mut Log, quantity: Quantity, what: String, findings: &mut Findings) {
+    log.take(quantity);
+    let mut fault = span(log, FaultName::UnitMismatch, 0, log.len() - 1);
+    (fault.channel, fault.treatment, fault.what) = (Some(quantity), Treatment::Masked, what);
+    findings.faults.push(fault);
+}
+
+/// Turns of the output for each of the generator, and how far the output went.
+///
+/// The farthest two rows of each session give the ratio that clearance moves least; the median over pieces of the sessions stands in
+/// where a jump has moved one of the two.
+fn slope(log: &Log) -> Option<(f64, f64, f64)> {
+    let (generator, output) = (log.get(Quantity::Generator)?, log.get(Quantity::Output)?);
+    let bounds: Vec<usize> = (0..=log.len()).filter(|row| *row == log.len() || !log.continues(*row)).collect();
+    let mut whole: Option<(f64, f64)> = None;
+    let mut pieces: Vec<(f64, f64)> = Vec::new();
+    let extent = |from: usize, to: usize| {
+        let by = |a: &usize, b: &usize| generator[*a].total_cmp(&generator[*b]);
+        let (low, high) = ((from..to).min_by(by)?, (from..to).max_by(by)?);
+        Some((generator[high] - generator[low], output[high] - output[low]))
+    };
+    for bound in bounds.windows(2) {
+        let (from, to) = (bound[0], bound[1]);
+        if let Some(found) = extent(from, to)
+            && whole.is_none_or(|(psi, _)| found.0 > psi)
+        {
+            whole = Some(found);
+        }
+        let size = ((to - from) / 32).max(2);
+        pieces.extend((from..to).step_by(size).filter_map(|start| extent(start, (start + size).min(to))));
+    }
+    let (psi, delta) = whole.filter(|(psi, _)| *psi > 0.0)?;
+    // An output that stands still says nothing of the ratio, unless it always does.
+    if pieces.iter().any(|(_, delta)| *delta != 0.0) {
+        pieces.retain(|(_, delta)| *delta != 0.0);
+    }
+    let median = typical_slope(pieces);
+    let slope = if (delta / psi - median).abs() <= 0.1 * median.abs() { delta / psi } else { median };
+    let travel = least_and_most(output.iter().copied());
+    Some((slope, psi, travel.1 - travel.0))
+}
+
+/// The slope that half of all motion falls short of: a generator that froze and leaps on is one piece of many, however far it leaps.
+fn typical_slope(mut pieces: Vec<(f64, f64)>) -> f64 {
+    pieces.retain(|(psi, _)| *psi > 0.0);
+    pieces.sort_by(|a, b| (a.1 / a.0).total_cmp(&(b.1 / b.0)));
+    let half = 0.5 * pieces.iter().map(|(psi, _)| psi).sum::<f64>();
+    let mut passed = 0.0;
+    let middle = pieces.iter().find(|(psi, _)| {
+        passed += psi;
+        passed >= half
+    });
+    middle.map_or(0.0, |(psi, delta)| delta / psi)
+}
+
+fn ratio(log: &mut Log, columns: &[Column], gear: &Gear, findings: &mut Findings) -> Result<(), String> {
+    let Some((slope, psi, travel)) = slope(log) else {
+        findings.notes.push("the generator stands still: nothing that turns with it can be seen".to_owned());
+        return Ok(());
+    };
+    // One for a drive with the ratio given.
+    let found = slope * gear.ratio;
+    if (RATIO_ERROR[0]..=RATIO_ERROR[1]).contains(&found) {
+        return Ok(());
+    }
+    let expected = (psi / gear.ratio).abs();
+    if expected < ENOUGH_MOTION_RAD && travel < ENOUGH_MOTION_RAD {
+        findings.notes.push("too little motion to judge units by the ratio".to_owned());
+        return Ok(());
+    }
+    let (generator, output) = (name(columns, Quantity::Generator), name(columns, Quantity::Output));
+    let seen = format!(
+        "{output} moves by {slope:.6} of {generator}, where the ratio {} asks for {:.6}",
+        gear.ratio,
+        1.0 / gear.ratio
+    );
+    let near = |a: f64| (found / a - 1.0).abs() <= SAME;
+    let mut fault = span(log, FaultName::UnitMismatch, 0, log.len() - 1);
+    fault.treatment = Treatment::Repaired;
+    let exchanged = found / gear.ratio.powi(2);
+    if (exchanged - 1.0).abs() <= 2.5 * SAME {
+        exchange(log, fault, &seen, findings);
+        return Ok(());
+    }
+    if let Some(other) = gear.other_wheel_ratio
+        && travel > TELLS_WHEELS_APART_RAD
+        && (slope * other - 1.0).abs() <= OTHER_WHEEL
+    {
+        return Err(format!(
+            "{seen}: that is the ratio {other} of the same teeth with the other wheel fixed; allowed: the wheel that is fixed in the drive \
+             measured"
+        ));
+    }
+    if (found + 1.0).abs() <= 0.1 {
+        fault.channel = Some(Quantity::Output);
+        fault.what = format!("{seen}: the output counts the other way, and was turned round");
+        findings.faults.push(fault);
+        if let Some(output) = log.get_mut(Quantity::Output) {
+            output.iter_mut().for_each(|angle| *angle = -*angle);
+        }
+        return Ok(());
+    }
+    // One column in a unit other than the one given: proved by the ratio if one reading alone gives it.
+    let mut fits: Vec<(Quantity, Unit, f64)> = Vec::new();
+    for channel in [Quantity::Generator, Quantity::Output] {
+        let given = unit(columns, channel);
+        for candidate in Unit::ANGLES.into_iter().filter(|candidate| *candidate != given) {
+            let scale = candidate.factor() / given.factor();
+            if near(if channel == Quantity::Generator { scale } else { scale.recip() }) {
+                fits.push((channel, candidate, scale));
+            }
+        }
+    }
+    match fits[..] {
+        [(channel, candidate, scale)] => {
+            fault.channel = Some(channel);
+            let (column, given) = (name(columns, channel), unit(columns, channel));
+            fault.what = format!("{seen}: {column} is in {candidate}, not in {given}, and was converted");
+            findings.faults.push(fault);
+            if let Some(values) = log.get_mut(channel) {
+                values.iter_mut().for_each(|angle| *angle *= scale);
+            }
+            return Ok(());
+        }
+        [_, _, ..] => {
+            let say = fits.iter().map(|(channel, unit, _)| format!("{channel}={}:{unit}", name(columns, *channel)));
+            let say = say.collect::<Vec<_>>().join(", or ");
+            return Err(format!(
+                "{seen}: one of the two is in another unit, and the ratio does not say which; allowed: --columns {say}"
+            ));
+        }
+        [] => {}
+    }
+    // Clearance and wind-up of a small motion change the ratio by more than units are apart; none of them is what was found.
+    if (RATIO_ERROR[0]..=RATIO_ERROR[1]).contains(&exchanged) {
+        exchange(log, fault, &seen, findings);
+        return Ok(());
+    }
+    let units = Unit::ANGLES.map(Unit::name).join(", ");
+    Err(if slope == 0.0 || (found.abs() < 0.05 && travel < ENOUGH_MOTION_RAD) {
+        format!(
+            "{output} does not follow: {generator} turns by {psi:.3} rad, {output} by {travel:.6} rad; allowed: an output that turns"
+        )
+    } else {
+        format!(
+            "{seen}; allowed: within a factor of {} of it. Are columns, units ({units}) and ratio right? They are mapped with --columns \
+             generator=NAME:UNIT,output=NAME:UNIT",
+            RATIO_ERROR[1]
+        )
+    })
+}
+
+/// Puts generator and output in each other's place.
+fn exchange(log: &mut Log, mut fault: Fault, seen: &str, findings: &mut Findings) {
+    fault.what = format!("{seen}: the two columns are exchanged, and were put right");
+    findings.faults.push(fault);
+    if let (Some(a), Some(b)) = (log.take(Quantity::Generator), log.take(Quantity::Output)) {
+        log.put(Quantity::Generator, b);
+        log.put(Quantity::Output, a);
+    }
+}
+
+/// Whether recorded errors have the size of errors.
+fn error_size(log: &Log, columns: &[Column]) -> Result<(), String> {
+    let (Some(error), Some(generator)) = (log.get(Quantity::Error), log.get(Quantity::Generator)) else {
+        return Ok(());
+    };
+    // Freed of a straight line in the generator angle, which a wrong ratio gives.
+    let pairs: Vec<(f64, f64)> = generator.iter().copied().zip(error.iter().copied()).collect();
+    let step = pairs.len().div_ceil(20_000);
+    let some: Vec<(f64, f64)> = pairs.into_iter().step_by(step).collect();
+    let n = some.len() as f64;
+    let mean = some.iter().fold((0.0, 0.0), |m, p| (m.0 + p.0 / n, m.1 + p.1 / n));
+    let (xx, xy) = some.iter().fold((0.0, 0.0), |s, p| {
+        let (x, y) = (p.0 - mean.0, p.1 - mean.1);
+        (s.0 + x * x, s.1 + x * y)
+    });
+    let slope = if xx > 0.0 { xy / xx } else { 0.0 };
+    let mut left: Vec<f64> = some.iter().map(|p| (p.1 - mean.1 - slope * (p.0 - mean.0)).abs()).collect();
+    let spread = quantile_of(&mut left, 0.75);
+    let (column, given) = (name(columns, Quantity::Error), unit(columns, Quantity::Error));
+    let units = Unit::ANGLES.map(Unit::name).join(", ");
+    if spread > SPREADS_RAD[0] || (spread > 0.0 && spread < SPREADS_RAD[1]) {
+        let found = spread / given.factor();
+        return Err(format!(
+            "{column}: found errors of {found:e} {given}, allowed: between a thousandth of an arc-second and ten degrees. Is its unit \
+             ({units}) right? It is mapped with --columns error=NAME:UNIT"
+        ));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::typical_slope;
+    use crate::measurement::{ColumnMap, FaultName, Gear, Quantity, Recording, Treatment, parse};
+
+    /// A drive of ratio 50 to and fro under a load in N·m at a temperature in °C, each times and plus something; angles in radians times some number.
+    fn read(columns: &str, torque: f64, celsius: f64, angles: [f64; 2]) -> Result<Recording, String> {
+        let mut text = "time_s,generator_rad,output_rad,torque_n_m,temperature_c\n".to_owned();
+        for k in 0..1200 {
+            let x = f64::from(k);
+            let psi = 40.0 * (0.01 * x).sin();
+            let load = 30.0 * (0.004 * x).sin();
+            let output = psi / 50.0 + load / 3e4 + 2e-5 * (2.0 * psi).sin();
+            let fields =
+                [0.01 * x, angles[0] * psi, angles[1] * output, torque * load, 21.0 + 0.3 * (0.01 * x).sin() + celsius];
+            text += &(fields.map(|field| format!("{field:.9}")).join(",") + "\n");
+        }
+        let map = if columns.is_empty() { ColumnMap::default() } else { ColumnMap::parse(columns).unwrap() };
+        parse("m.csv", text.as_bytes(), &map, &Gear::of_ratio(50.0)).map_err(|error| error.to_string())
+    }
+
+    /// The channel of the unit fault, what was done, and what is said.
+    fn unit_fault(recording: &Recording) -> Option<(Option<Quantity>, Treatment, &str)> {
+        let fault = recording.faults.iter().find(|fault| fault.name == FaultName::UnitMismatch)?;
+        Some((fault.channel, fault.treatment, fault.what.as_str()))
+    }
+
+    #[test]
+    fn a_torque_is_converted_on_the_word_of_the_user_alone() {
+        // 30 N·m in mN·m and in N·cm of a very large drive: beyond what any drive bears, and not used.
+        for (scale, units) in [(1e3, "mN.m (30.0000 N.m)"), (2e3, "N.cm (600.0000 N.m)")] {
+            let found = read("", scale, 0.0, [1.0; 2]).unwrap();
+            let (channel, treatment, what) = unit_fault(&found).unwrap();
+            assert_eq!((channel, treatment), (Some(Quantity::Torque), Treatment::Masked));
+            assert!(found.sessions[0].torque_n_m.is_none());
+            assert!(what.contains("--columns torque=torque_n_m:N.cm"), "{what}");
+            assert!(what.contains(units.split_once(' ').unwrap().0), "{what}");
+        }
+        let said = read("torque=torque_n_m:mN.m", 1e3, 0.0, [1.0; 2]).unwrap();
+        assert_eq!(unit_fault(&said), None);
+        let torque = said.sessions[0].torque_n_m.as_ref().unwrap();
+        assert!((torque[392] - 30.0).abs() < 0.01, "{}", torque[392]);
+        // One that a drive may bear stays as it is, however soft the drive then looks.
+        let soft = read("", 0.112_985, 0.0, [1.0; 2]).unwrap();
+        assert_eq!(unit_fault(&soft), None);
+        assert!((soft.sessions[0].torque_n_m.as_ref().unwrap()[392] - 3.389_55).abs() < 1e-3);
+        assert!(read("", 1e7, 0.0, [1.0; 2]).unwrap_err().contains("at most 1e4"));
+    }
+
+    #[test]
+    fn a_temperature_is_converted_on_the_word_of_the_user_alone() {
+        for (off, unit) in [(273.15, ":K"), (600.0, "")] {
+            let found = read("", 1.0, off, [1.0; 2]).unwrap();
+            let (channel, treatment, what) = unit_fault(&found).unwrap();
+            assert_eq!((channel, treatment), (Some(Quantity::Temperature), Treatment::Masked));
+            assert!(found.sessions[0].temperature_c.is_none());
+            assert!(what.contains("is not used") && what.contains("temperature_c:K") == (unit == ":K"), "{what}");
+        }
+        let said = read("temperature=temperature_c:K", 1.0, 273.15, [1.0; 2]).unwrap();
+        assert_eq!(unit_fault(&said), None);
+        assert!((said.sessions[0].temperature_c.as_ref().unwrap()[0] - 21.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn an_angle_is_converted_where_the_ratio_proves_its_unit_alone() {
+        let deg = 1f64.to_degrees();
+        let found = read("", 1.0, 0.0, [deg, 1.0]).unwrap();
+        assert!(matches!(unit_fault(&found), Some((Some(Quantity::Generator), Treatment::Repaired, _))));
+        // Both are in degrees, one is said to be in radians; or both are in radians, and one is said to be in degrees: no ratio tells.
+        for (angles, columns) in [
+            ([deg; 2], "generator=generator_rad:rad,output=output_rad:deg"),
+            ([1.0; 2], "generator=generator_rad:deg,output=output_rad:rad"),
+        ] {
+            let said = read(columns, 1.0, 0.0, angles).unwrap_err();
+            assert!(said.contains("does not say which") && said.contains("generator=generator_rad:"), "{said}");
+            assert!(said.contains("or output=output_rad:"), "{said}");
+        }
+    }
+
+    #[test]
+    fn one_leap_of_a_generator_that_froze_does_not_change_the_ratio() {
+        // Slow pieces of a drive of ratio 80, and the piece in which it leaps by more than six of them together.
+        let mut pieces = vec![(10.0, 0.125); 20];
+        pieces.push((70.0, 0.05));
+        assert_eq!(typical_slope(pieces), 0.0125);
+        assert_eq!(typical_slope(vec![(0.0, 0.0)]), 0.0);
+    }
+}

@@ -1,0 +1,415 @@
+//! Measured data: rows of a drive at work, in sessions.
+//!
+//! Angles are radians, torque N·m, temperature °C, time s; `error` is output less generator over ratio, rad at the output. All
+//! columns of a session have the same length; what was not recorded is `None`.
+//!
+//! [`read`] takes a CSV file to sessions: columns and units by a [`ColumnMap`], wrapped angles made continuous, gaps in time
+//! as the borders of sessions, and the faults of the data found, named and dealt with ([`Fault`]) before anything is asked of the
+//! drive.
+
+mod averages;
+mod columns;
+mod fault;
+mod faults;
+mod gear;
+mod log;
+mod phd2;
+pub mod reader;
+mod rollover;
+mod unit;
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+pub use columns::{ColumnMap, MappingError, Quantity, Reading, Unit};
+pub use fault::{Fault, FaultName, Measures, ToothStep, Treatment};
+pub use faults::clock::SESSION_GAP_PERIODS;
+pub use flexspline_base::csv_rows::{CsvRows, NotANumber, Row, TableProblem};
+pub use flexspline_base::robust::{
+    MAD_TO_STD, least_and_most, median_and_std, median_of, quantile_of, sampled, white_noise,
+};
+pub use gear::Gear;
+pub use log::{FEWEST_ROWS, MeasuredError};
+pub(crate) use reader::stamps;
+pub use reader::{Layout, Separator, Sheet, raw};
+pub(crate) use rollover::{Anew, begins_anew, continued, registers};
+
+use faults::Findings;
+use faults::drift::Stretches;
+use faults::steps::Untold;
+use log::Log;
+
+/// More sessions than a person makes. *Guess*.
+const MANY_SESSIONS: usize = 50;
+
+/// Rows without a gap, in order of time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Session {
+    /// Line of the file that each row came from.
+    pub line: Vec<u64>,
+    /// Time, s.
+    pub time_s: Option<Vec<f64>>,
+    /// Generator angle, rad, unwrapped.
+    pub generator_rad: Vec<f64>,
+    /// Output angle less generator over ratio, rad.
+    pub error_rad: Vec<f64>,
+    /// Load torque at the output, N·m.
+    pub torque_n_m: Option<Vec<f64>>,
+    /// Temperature, °C.
+    pub temperature_c: Option<Vec<f64>>,
+    /// Angle of the drive against gravity about its axis, rad.
+    pub orientation_rad: Option<Vec<f64>>,
+    /// Noise of each row against that of a row of mean worth, where rows differ: the mean of its inverse square is 1.
+    pub loudness: Option<Vec<f64>>,
+    /// Whether the zero of the error is not that of the session before.
+    pub own_zero: bool,
+    /// What was taken off the error, as its zero is that much off the zero of the first session, rad.
+    pub zero_off_rad: f64,
+    /// Time by which one angle may be read before the other on the mean, for all that is known of how they are read, s.
+    pub unsure_s: f64,
+    /// Step of the resolution at the output where no noise blurs it, rad; else 0.
+    pub coarse_rad: f64,
+    /// Time over which a row is a mean, s; 0 where it is read at one instant.
+    pub mean_over_s: f64,
+}
+
+impl Session {
+    /// Rows.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.generator_rad.len()
+    }
+
+    /// Whether there are no rows.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.generator_rad.is_empty()
+    }
+
+    /// Output angle, rad.
+    #[must_use]
+    pub fn output_rad(&self, ratio: f64) -> Vec<f64> {
+        self.generator_rad.iter().zip(&self.error_rad).map(|(generator, error)| generator / ratio + error).collect()
+    }
+
+    /// Torque, temperature or orientation, where recorded.
+    fn beside(&self, channel: Quantity) -> Option<&[f64]> {
+        match channel {
+            Quantity::Torque => self.torque_n_m.as_deref(),
+            Quantity::Temperature => self.temperature_c.as_deref(),
+            Quantity::Orientation => self.orientation_rad.as_deref(),
+            _ => None,
+        }
+    }
+
+    fn beside_mut(&mut self, channel: Quantity) -> Option<&mut Vec<f64>> {
+        match channel {
+            Quantity::Torque => self.torque_n_m.as_mut(),
+            Quantity::Temperature => self.temperature_c.as_mut(),
+            Quantity::Orientation => self.orientation_rad.as_mut(),
+            _ => None,
+        }
+    }
+
+    fn forget(&mut self, channel: Quantity) {
+        match channel {
+            Quantity::Torque => self.torque_n_m = None,
+            Quantity::Temperature => self.temperature_c = None,
+            Quantity::Orientation => self.orientation_rad = None,
+            _ => {}
+        }
+    }
+
+    /// Leaves out the rows for which `drop` is true.
+    fn leave_out(&mut self, drop: &[bool]) {
+        let others = [
+            &mut self.time_s,
+            &mut self.torque_n_m,
+            &mut self.temperature_c,
+            &mut self.orientation_rad,
+            &mut self.loudness,
+        ];
+        let columns = [&mut self.generator_rad, &mut self.error_rad];
+        for values in columns.into_iter().chain(others.into_iter().flatten()) {
+            let mut row = 0;
+            values.retain(|_| {
+                row += 1;
+                !drop[row - 1]
+            });
+        }
+        let mut row = 0;
+        self.line.retain(|_| {
+            row += 1;
+            !drop[row - 1]
+        });
+    }
+}
+
+/// A file of measured data, ready for use.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recording {
+    /// Which file.
+    pub file: String,
+    /// Rows of the file, those left out among them.
+    pub rows: usize,
+    /// Sessions, none of them empty.
+    pub sessions: Vec<Session>,
+    /// What is wrong with the data.
+    pub faults: Vec<Fault>,
+    /// Where the drive ratcheted; these steps are in the sessions still.
+    pub tooth_steps: Vec<ToothStep>,
+    /// What was noticed and is no fault, one sentence each.
+    pub notes: Vec<String>,
+    /// Why nothing can be said of the drive from these rows, if so.
+    pub unusable: Option<String>,
+}
+
+/// Reads a file of measured data of a drive with this `gear`.
+pub fn read(path: &Path, columns: &ColumnMap, gear: &Gear) -> Result<Recording, MeasuredError> {
+    let file = path.display().to_string();
+    match File::open(path) {
+        Ok(source) => parse(&file, source, columns, gear),
+        Err(error) => Err(MeasuredError { file, line: None, what: error.to_string() }),
+    }
+}
+
+/// The same where both angles are in degrees though radians are said, which no ratio tells: a fault, and converted.
+pub(crate) fn read_degrees(path: &Path, columns: &ColumnMap, gear: &Gear) -> Result<Recording, MeasuredError> {
+    let file = path.display().to_string();
+    match File::open(path) {
+        Ok(source) => parse_degrees(&file, source, columns, gear),
+        Err(error) => Err(MeasuredError { file, line: None, what: error.to_string() }),
+    }
+}
+
+/// Reads measured data from `source`, a file called `file`.
+pub fn parse(file: &str, source: impl Read, columns: &ColumnMap, gear: &Gear) -> Result<Recording, MeasuredError> {
+    parse_as(file, source, columns, gear, 1.0)
+}
+
+/// [`parse`] as [`read_degrees`] reads.
+pub(crate) fn parse_degrees(
+    file: &str,
+    source: impl Read,
+    columns: &ColumnMap,
+    gear: &Gear,
+) -> Result<Recording, MeasuredError> {
+    parse_as(file, source, columns, gear, Unit::Degree.factor())
+}
+
+/// The same with both angles times `angle_scale`.
+fn parse_as(
+    file: &str,
+    source: impl Read,
+    columns: &ColumnMap,
+    gear: &Gear,
+    angle_scale: f64,
+) -> Result<Recording, MeasuredError> {
+    let refuse = |what: String| MeasuredError { file: file.to_owned(), line: None, what };
+    if gear.ratio == 0.0 || !gear.ratio.is_finite() {
+        return Err(refuse(format!("ratio: found {}, allowed: a finite number other than zero", gear.ratio)));
+    }
+    let (mut log, found) = log::read(file, source, columns, gear.ratio, FEWEST_ROWS)?;
+    let rows = log.len();
+    let mut findings = Findings { notes: found.notes, ..Findings::default() };
+    if let Some(line) = found.broken_off {
+        findings.faults.push(Fault {
+            name: FaultName::MissingSamples,
+            channel: None,
+            time_s: None,
+            until_s: None,
+            first_line: line,
+            last_line: line,
+            rows: 1,
+            size_arcsec: None,
+            treatment: Treatment::Masked,
+            what: "the last line breaks off: it is left out".to_owned(),
+            advice: FaultName::MissingSamples.advice(),
+            measures: Measures::default(),
+        });
+    }
+    for what in found.order {
+        findings.faults.push(Fault {
+            name: FaultName::ClockError,
+            channel: Some(Quantity::Time),
+            time_s: None,
+            until_s: None,
+            first_line: log.line.iter().copied().min().unwrap_or(1),
+            last_line: log.line.iter().copied().max().unwrap_or(1),
+            rows: rows as u64,
+            size_arcsec: None,
+            treatment: Treatment::Repaired,
+            what,
+            advice: FaultName::ClockError.advice(),
+            measures: Measures::default(),
+        });
+    }
+    if angle_scale != 1.0 {
+        faults::units::both_in_degrees(&mut log, angle_scale, &mut findings);
+    }
+    faults::missing::fill(&mut log, &mut findings);
+    faults::clock::check(&mut log, &mut findings);
+    let recorded = recorded(&log);
+    faults::missing::leave_out(&mut log, &mut findings);
+    enough(&log, &recorded).map_err(refuse)?;
+    faults::wrap::unwrap(&mut log, &found.columns, gear.ratio, &mut findings);
+    faults::leaps::check(&mut log, gear, &mut findings);
+    faults::units::check(&mut log, &found.columns, gear, &mut findings).map_err(refuse)?;
+    let error_recorded = log.output_or_error() == Quantity::Error;
+    let drifts = faults::leaps::changes_with_the_gaps(&log, gear)
+        .is_some_and(|per_s| faults::drift::confirms(&into_sessions(log.clone(), gear.ratio), gear, per_s));
+    let other_zeros = if drifts { Vec::new() } else { faults::leaps::between_sessions(&mut log, gear, &mut findings) };
+    faults::stalls::check(&mut log, gear, &mut findings);
+    let mut sessions = into_sessions(log, gear.ratio);
+    findings.notes.extend(many_sessions(&sessions));
+    for (session, off_rad) in other_zeros.iter().copied() {
+        sessions[session].own_zero = true;
+        sessions[session..].iter_mut().for_each(|later| later.zero_off_rad = off_rad);
+    }
+    sessions.iter_mut().skip(1).for_each(|session| session.own_zero |= found.own_zeros);
+    if drifts {
+        faults::drift::check(&mut sessions, gear, Stretches::OfRows, &mut findings);
+    }
+    faults::held::check(&mut sessions, &mut findings);
+    faults::frozen::check(&mut sessions, gear, error_recorded, &mut findings).map_err(refuse)?;
+    faults::coarse_torque::check(&mut sessions, &mut findings);
+    faults::reads::check(&mut sessions, gear, &mut findings);
+    faults::outliers::check(&mut sessions, gear, error_recorded, &mut findings);
+    faults::resolution::check(&mut sessions, gear, error_recorded, &mut findings);
+    let untold = faults::steps::check(&mut sessions, gear, &mut findings);
+    // Steps that stay in the data look like drift; what may be one between two sessions may be drift as well.
+    if untold != Untold::Inside && findings.tooth_steps.is_empty() && !drifts {
+        faults::drift::check(&mut sessions, gear, Stretches::OfTime, &mut findings);
+    }
+    let Findings { mut faults, tooth_steps, notes } = findings;
+    faults.sort_by_key(|fault| (fault.first_line, fault.name));
+    Ok(Recording { file: file.to_owned(), rows, sessions, faults, tooth_steps, notes, unusable: None })
+}
+
+/// Rows as they stand in a file of this project's own columns, nothing corrected: for those who play a table over them.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct PlainRows {
+    pub generator_rad: Vec<f64>,
+    pub error_rad: Vec<f64>,
+    pub torque_n_m: Option<Vec<f64>>,
+    pub temperature_c: Option<Vec<f64>>,
+}
+
+/// Reads the rows of a file as they stand, by this project's own names.
+///
+/// # Errors
+/// It cannot be read, a column is missing or misspelt, or a row lacks a value.
+pub(crate) fn plain_rows(file: &str, source: impl Read, ratio: f64) -> Result<PlainRows, MeasuredError> {
+    let (mut log, found) = log::read(file, source, &ColumnMap::default(), ratio, 1)?;
+    let refuse = |line: u64, what: String| MeasuredError { file: file.to_owned(), line: Some(line), what };
+    for column in &found.columns {
+        let values = log.get(column.quantity).unwrap_or_default();
+        if let Some(row) = values.iter().position(|value| !value.is_finite()) {
+            let what = format!("{}: nothing is recorded, allowed: a finite number below 1e9", column.name);
+            return Err(refuse(log.line[row], what));
+        }
+    }
+    let generator_rad = log.take(Quantity::Generator).unwrap_or_default();
+    let error_rad = match log.take(Quantity::Output) {
+        Some(output) => {
+            output.iter().zip(&generator_rad).map(|(output, generator)| output - generator / ratio).collect()
+        }
+        None => log.take(Quantity::Error).unwrap_or_default(),
+    };
+    Ok(PlainRows {
+        generator_rad,
+        error_rad,
+        torque_n_m: log.take(Quantity::Torque),
+        temperature_c: log.take(Quantity::Temperature),
+    })
+}
+
+/// How many rows have the angles, for whoever finds none that has both.
+fn recorded(log: &Log) -> String {
+    let follower = log.output_or_error();
+    let has = |channel: Quantity, row: usize| log.get(channel).is_some_and(|values| values[row].is_finite());
+    let count = |of: &dyn Fn(usize) -> bool| (0..log.len()).filter(|row| of(*row)).count();
+    format!(
+        "of {} rows {} have the generator, {} the {follower}, {} both",
+        log.len(),
+        count(&|row| has(Quantity::Generator, row)),
+        count(&|row| has(follower, row)),
+        count(&|row| has(Quantity::Generator, row) && has(follower, row))
+    )
+}
+
+/// Whether enough rows are left, and anything moves in them.
+fn enough(log: &Log, recorded: &str) -> Result<(), String> {
+    if log.len() < FEWEST_ROWS {
+        return Err(format!("{} rows have all that is needed; at least {FEWEST_ROWS} must ({recorded})", log.len()));
+    }
+    let constant = |channel| log.get(channel).is_some_and(|values| values.iter().all(|value| *value == values[0]));
+    let follower = log.output_or_error();
+    if constant(Quantity::Generator) && constant(follower) {
+        return Err(format!("generator and {follower} keep one value throughout; at least one of them must change"));
+    }
+    Ok(())
+}
+
+/// What to say where the stamps part the rows into so many sessions that these are hardly any.
+fn many_sessions(sessions: &[Session]) -> Option<String> {
+    let rows: usize = sessions.iter().map(Session::len).sum();
+    (sessions.len() > MANY_SESSIONS && rows < FEWEST_ROWS * sessions.len()).then(|| {
+        format!(
+            "{} sessions of {} rows on the mean: time that steps by more than {SESSION_GAP_PERIODS} of its usual steps, or back, begins one; are the \
+             stamps those of the rows?",
+            sessions.len(),
+            rows / sessions.len()
+        )
+    })
+}
+
+/// The sessions of a log.
+fn into_sessions(mut log: Log, ratio: f64) -> Vec<Session> {
+    let generator = log.take(Quantity::Generator).unwrap_or_default();
+    let error = match log.take(Quantity::Output) {
+        Some(mut output) => {
+            output.iter_mut().zip(&generator).for_each(|(output, generator)| *output -= generator / ratio);
+            output
+        }
+        None => log.take(Quantity::Error).unwrap_or_default(),
+    };
+    let mut whole = Session {
+        generator_rad: generator,
+        error_rad: error,
+        time_s: log.take(Quantity::Time),
+        torque_n_m: log.take(Quantity::Torque),
+        temperature_c: log.take(Quantity::Temperature),
+        orientation_rad: log.take(Quantity::Orientation),
+        line: std::mem::take(&mut log.line),
+        loudness: None,
+        own_zero: false,
+        zero_off_rad: 0.0,
+        unsure_s: 0.0,
+        coarse_rad: 0.0,
+        mean_over_s: 0.0,
+    };
+    let starts: Vec<usize> = (1..log.session.len()).filter(|row| log.session[*row] != log.session[*row - 1]).collect();
+    // From the last session to the first, so that each is cut off the end.
+    let mut sessions: Vec<Session> = starts
+        .iter()
+        .rev()
+        .map(|start| {
+            let cut = |values: &mut Option<Vec<f64>>| values.as_mut().map(|values| values.split_off(*start));
+            Session {
+                line: whole.line.split_off(*start),
+                generator_rad: whole.generator_rad.split_off(*start),
+                error_rad: whole.error_rad.split_off(*start),
+                time_s: cut(&mut whole.time_s),
+                torque_n_m: cut(&mut whole.torque_n_m),
+                temperature_c: cut(&mut whole.temperature_c),
+                orientation_rad: cut(&mut whole.orientation_rad),
+                ..Session::default()
+            }
+        })
+        .collect();
+    sessions.push(whole);
+    sessions.reverse();
+    sessions
+}

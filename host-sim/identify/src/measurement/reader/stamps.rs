@@ -1,0 +1,132 @@
+//! The order of rows by their stamps: newest first, unsorted, written twice, a clock on the wall that is set for summer.
+
+use flexspline_base::robust::{median_of, sampled};
+
+/// Share of the steps that fall where rows stand from the newest to the oldest. *Guess*: between them sessions may begin.
+const FALLING: f64 = 0.9;
+/// Share of the rows that are out of order in a file without order: a clock that is set back, or a stray stamp, is seldom. *Guess*.
+const UNSORTED: f64 = 0.05;
+/// Sorted rows are those of one clock if this share of their steps is within half of the usual one. *Guess*.
+const EVEN: f64 = 0.8;
+/// Share of rows that repeat the one before in a file in which rows are written twice; fewer are left to the check of the clock. *Guess*.
+const TWICE: f64 = 0.1;
+/// Fewest steps that show an order.
+const FEWEST: usize = 8;
+/// By what clocks are set forward and back, s, and the time of the day at which they jump over an hour in spring, s.
+const HOUR_S: f64 = 3600.0;
+const SPRING_S: f64 = 2.0 * HOUR_S;
+
+/// The order of the rows by their stamps where they do not stand in it, and what is to be said of that.
+pub fn order(time: &[f64]) -> Option<(Vec<usize>, String)> {
+    let finite: Vec<usize> = (0..time.len()).filter(|row| time[*row].is_finite()).collect();
+    let steps: Vec<f64> = finite.windows(2).map(|pair| time[pair[1]] - time[pair[0]]).collect();
+    let falls = steps.iter().filter(|step| **step < 0.0).count();
+    let moves = steps.iter().filter(|step| **step != 0.0).count();
+    if moves < FEWEST || (falls as f64) < UNSORTED * moves as f64 {
+        return None;
+    }
+    if falls as f64 >= FALLING * moves as f64 {
+        let what = "the rows stand from the newest to the oldest: they are turned round".to_owned();
+        return Some(((0..time.len()).rev().collect(), what));
+    }
+    let mut sorted = finite;
+    sorted.sort_by(|a, b| time[*a].total_cmp(&time[*b]));
+    let steps: Vec<f64> = sorted.windows(2).map(|pair| time[pair[1]] - time[pair[0]]).collect();
+    let usual = median_of(&mut sampled(&steps));
+    let even = steps.iter().filter(|step| (**step - usual).abs() <= 0.5 * usual).count();
+    let of_one_clock = usual > 0.0 && even as f64 >= EVEN * steps.len() as f64;
+    of_one_clock.then(|| {
+        let what = format!("the rows do not stand in the order of their time ({falls} run back): they are sorted");
+        (sorted, what)
+    })
+}
+
+/// Which rows repeat the one before in all of these columns, where so many do that rows are written twice.
+pub fn twice(columns: &[&[f64]]) -> Option<(Vec<bool>, String)> {
+    let rows = columns.first()?.len();
+    let same = |a: f64, b: f64| a == b || (a.is_nan() && b.is_nan());
+    let repeats: Vec<bool> =
+        (0..rows).map(|row| row > 0 && columns.iter().all(|values| same(values[row], values[row - 1]))).collect();
+    let count = repeats.iter().filter(|repeats| **repeats).count();
+    (count >= FEWEST && count as f64 > TWICE * rows as f64).then(|| {
+        let what =
+            format!("{count} of {rows} rows repeat the row before in every column, its time too: they are left out");
+        (repeats, what)
+    })
+}
+
+/// Makes the time of a clock on the wall continuous where it is set back by an hour in autumn, or forward in spring.
+pub fn daylight_saving(time: &mut [f64], notes: &mut Vec<String>) {
+    let steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
+    if steps.len() < FEWEST {
+        return;
+    }
+    let period = median_of(&mut sampled(&steps));
+    let near = |step: f64, hour: f64| (step - hour).abs() <= (10.0 * period).min(0.1 * HOUR_S);
+    let (mut ahead, mut changes) = (0.0, 0);
+    for row in 1..time.len() {
+        let before = time[row - 1] - ahead;
+        let step = time[row] - before;
+        let of_day = before.rem_euclid(super::clock::DAY_S);
+        if near(step, -HOUR_S) {
+            (ahead, changes) = (ahead + HOUR_S, changes + 1);
+        } else if near(step, HOUR_S) && near(of_day, SPRING_S) {
+            (ahead, changes) = (ahead - HOUR_S, changes + 1);
+        }
+        time[row] += ahead;
+    }
+    if changes > 0 {
+        notes.push(format!(
+            "the clock is set by an hour {changes} time{}, as for summer: time goes on there",
+            if changes == 1 { "" } else { "s" }
+        ));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_are_put_in_order() {
+        let time: Vec<f64> = (0..200).map(|k| 0.01 * f64::from(k)).collect();
+        assert_eq!(order(&time), None);
+        let newest: Vec<f64> = time.iter().rev().copied().collect();
+        assert_eq!(order(&newest).unwrap().0[0], 199);
+        // Written by two threads: pairs are exchanged.
+        let mixed: Vec<f64> = (0..200).map(|k| time[k ^ 1]).collect();
+        let sorted = order(&mixed).unwrap().0;
+        assert!(sorted.iter().map(|row| mixed[*row]).eq(time.iter().copied()));
+        // Sessions that begin at zero are not mixed.
+        let sessions: Vec<f64> = (0..200).map(|k| 0.01 * f64::from(k % 12)).collect();
+        assert_eq!(order(&sessions), None);
+        let stray: Vec<f64> = (0..200).map(|k| if k == 70 { 5.0 } else { time[k] }).collect();
+        assert_eq!(order(&stray), None);
+    }
+
+    #[test]
+    fn rows_written_twice_are_found() {
+        let doubled: Vec<f64> = (0..100).map(|k| f64::from(k / 2)).collect();
+        let other: Vec<f64> = (0..100).map(f64::from).collect();
+        assert_eq!(twice(&[&doubled]).unwrap().0.iter().filter(|drop| **drop).count(), 50);
+        assert_eq!(twice(&[&doubled, &other]), None);
+        assert_eq!(twice(&[&other]), None);
+    }
+
+    #[test]
+    fn an_hour_in_spring_and_autumn() {
+        let run = |jump: f64, at: f64| -> Vec<f64> {
+            (0..200).map(|k| at + 0.1 * f64::from(k) + if k >= 100 { jump } else { 0.0 }).collect()
+        };
+        for (jump, at, changes) in
+            [(-3600.0, 3.0 * HOUR_S, 1), (3600.0, SPRING_S - 10.0, 1), (3600.0, 5e4, 0), (-60.0, 5e4, 0)]
+        {
+            let mut time = run(jump, at);
+            let mut notes = Vec::new();
+            daylight_saving(&mut time, &mut notes);
+            assert_eq!(notes.len(), changes);
+            let expected = if changes == 1 { run(0.0, at) } else { run(jump, at) };
+            assert!(time.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-6), "{jump} {at}");
+        }
+    }
+}

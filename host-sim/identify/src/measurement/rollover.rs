@@ -1,0 +1,361 @@
+//! Columns that begin anew: an angle after its turn, a counter after its last count.
+//!
+//! Such a column stays within a span, and from time to time leaps by nearly all of it, against its own motion. The span is the size
+//! that makes the values go on evenly over the leaps. A counter may have any span: 2^16 of a register of 16 bits, 32 767 of one that a
+//! program sets back to zero at its largest value. Whoever reads a file finds columns that begin anew with [`begins_anew`]; [`undo`]
+//! makes the counters of a log continuous. A single turn in radians is left to the check of wrapped angles, which the other angle helps.
+
+use super::columns::{Column, Quantity, Unit};
+use super::log::Log;
+use flexspline_base::robust::{least_and_most, median_of};
+
+/// Registers have so many bits.
+const BITS: std::ops::RangeInclusive<i32> = 8..=32;
+/// A column that begins anew covers at least this share of its span. *Guess*: a step over the border leaves out two steps of the span at most.
+pub(super) const COVERED: f64 = 0.75;
+/// Steps up to this share of the span are distinguishable from a leap. *Guess*.
+pub(super) const UNAMBIGUOUS: f64 = 0.4;
+/// A step longer than this share of the span is a leap: 1 less what is unambiguous. *Guess*.
+pub(super) const LEAPS: f64 = 0.6;
+/// A known span is that of the leaps within this share, or within their scatter. *Guess*: it is for motion that bends beside a leap.
+const NEARLY: f64 = 0.005;
+/// Rows on each side of a leap that show how the values go on.
+const ROWS_BESIDE: usize = 8;
+/// Standard deviation of a value that is rounded to whole counts: 1/√12.
+const ROUNDED: f64 = 0.288_675;
+/// A span is excluded beyond so many standard deviations. *Source*: by convention.
+const EXCLUDED: f64 = 3.0;
+/// Whole counts are distinguishable if the standard deviation of the span is below this: half a count is two of them.
+const TELLS_COUNTS: f64 = 0.25;
+/// One count is said to be in doubt if the standard deviation of the span is below this, counts; above it, nothing is known of single counts.
+const IN_DOUBT: f64 = 1.0;
+/// So many of the leaps must have one size. *Guess*: the others are gaps and counts that were lost.
+const AGREE: f64 = 0.8;
+/// A span that no register has is believed from so many leaps on: one leap may be anything.
+const FEWEST_LEAPS: usize = 2;
+
+/// How a column begins anew.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Anew {
+    /// After so much, in the unit of the values.
+    pub span: f64,
+    /// Times.
+    pub times: usize,
+    /// The other span that the leaps may have, one count or a few away, where they do not decide.
+    pub or: Option<f64>,
+    /// Whether some rows are so far apart that the way between them is not certain.
+    pub ambiguous: bool,
+}
+
+impl Anew {
+    /// What to say of it: "begins anew after 32767 (8 times)".
+    pub fn text(&self, unit: &str) -> String {
+        let or = self.or.map_or(String::new(), |or| format!("; one count is in doubt, it may be {or}"));
+        // A turn in degrees is 360 to the last digit but one.
+        format!("begins anew after {}{unit} ({} times{or})", (1e9 * self.span).round() / 1e9, self.times)
+    }
+}
+
+/// Spans of the registers of so many bits, counts.
+pub(crate) fn registers() -> impl Iterator<Item = f64> {
+    BITS.map(|bits| 2f64.powi(bits))
+}
+
+/// Whether values of this `range` stay within `span` and cover this share of it.
+pub(super) fn stays_within(range: f64, span: f64, covered: f64) -> bool {
+    range <= span * (1.0 + 1e-6) && range >= covered * span
+}
+
+/// How `values` begin anew, if they do: after one of the known `spans`, in rising order, or, if they are `counts`, after any number of
+/// them. `along` is the other angle, row by row: where the motion is uneven in time, it shows how the values go on.
+pub(crate) fn begins_anew(values: &[f64], spans: &[f64], counts: bool, along: Option<&[f64]>) -> Option<Anew> {
+    let rows: Vec<usize> = (0..values.len()).filter(|row| values[*row].is_finite()).collect();
+    let (least, most) = least_and_most(rows.iter().map(|row| values[*row]));
+    let range = most - least;
+    // A counter that is set to zero at either of its ends goes through twice its span.
+    let leaps: Vec<usize> =
+        (1..rows.len()).filter(|k| (values[rows[*k]] - values[rows[*k - 1]]).abs() > UNAMBIGUOUS * range).collect();
+    if leaps.is_empty() || range <= 0.0 {
+        return None;
+    }
+    let steps = || rows.windows(2).map(|pair| values[pair[1]] - values[pair[0]]);
+    let found = |span: f64, or: Option<f64>| {
+        let times = steps().filter(|step| step.abs() > LEAPS * span).count();
+        let ambiguous = steps().any(|step| (step - span * (step / span).round()).abs() > UNAMBIGUOUS * span);
+        (times > 0).then_some(Anew { span, times, or, ambiguous })
+    };
+    let whole = counts && steps().all(|step| (step - step.round()).abs() <= 1e-6 * (1.0 + step.abs()));
+    let measured = Measured::of(values, &rows, &leaps, whole, along);
+    let near =
+        |span: f64| measured.is_none_or(|seen| (seen.span - span).abs() <= (NEARLY * span).max(EXCLUDED * seen.std));
+    let known = spans.iter().copied().find(|span| stays_within(range, *span, COVERED) && near(*span));
+    let Some(seen) = measured.filter(|seen| whole && seen.is_sharp()) else {
+        return known.and_then(|span| found(span, None));
+    };
+    let (nearest, off) = (seen.span.round(), known.map(|span| (seen.span - span).abs() / seen.std));
+    match (known, off) {
+        // The register that the values fill is believed until the leaps exclude it.
+        (Some(span), Some(off)) if off <= if seen.tells_counts() { EXCLUDED } else { 0.5 * EXCLUDED } => {
+            found(span, None)
+        }
+        (Some(span), Some(_)) if !seen.tells_counts() => found(span, (seen.std < IN_DOUBT).then_some(nearest)),
+        _ if seen.std < IN_DOUBT => {
+            let next = nearest + if seen.span > nearest { 1.0 } else { -1.0 };
+            found(nearest, (!seen.tells_counts()).then_some(next))
+        }
+        _ => None,
+    }
+}
+
+/// The span as the leaps show it.
+#[derive(Debug, Clone, Copy)]
+struct Measured {
+    /// In the unit of the values.
+    span: f64,
+    /// Its standard deviation.
+    std: f64,
+    /// Leaps that show it.
+    leaps: usize,
+    /// Whether all leaps agree, go against the motion, and begin at one place of the span.
+    agree: bool,
+}
+
+impl Measured {
+    /// The mean over the leaps of the step that makes the values beside it go on in one straight line.
+    fn of(values: &[f64], rows: &[usize], leaps: &[usize], whole: bool, along: Option<&[f64]>) -> Option<Measured> {
+        let rounded = if whole { ROUNDED } else { 0.0 };
+        let mut seen: Vec<Leap> = Vec::new();
+        for (k, at) in leaps.iter().enumerate() {
+            let from = if k > 0 { leaps[k - 1] } else { 0 }.max(at.saturating_sub(ROWS_BESIDE));
+            let to = leaps.get(k + 1).copied().unwrap_or(rows.len()).min(at + ROWS_BESIDE);
+            let y = |k: usize| values[rows[k]];
+            let by_row = Leap::between(from..*at, *at..to, |k| k as f64, y, rounded);
+            let by_other = along.and_then(|other| Leap::between(from..*at, *at..to, |k| other[rows[k]], y, rounded));
+            // A noisy angle flattens the slope: it is asked only if it is clearly the better one.
+            let best = match (by_row, by_other) {
+                (Some(row), Some(other)) if other.std < 0.7 * row.std => Some(other),
+                (row, other) => row.or(other),
+            };
+            seen.extend(best);
+        }
+        let mut sizes: Vec<f64> = seen.iter().map(|leap| leap.size).collect();
+        if sizes.is_empty() {
+            return None;
+        }
+        let middle = median_of(&mut sizes);
+        let kept: Vec<&Leap> =
+            seen.iter().filter(|leap| (leap.size - middle).abs() <= 2.0 * EXCLUDED * leap.std.max(rounded)).collect();
+        let weight = |leap: &Leap| 1.0 / leap.std.max(1e-9 * middle).powi(2);
+        let sum: f64 = kept.iter().map(|leap| weight(leap)).sum();
+        let span = kept.iter().map(|leap| weight(leap) * leap.size).sum::<f64>() / sum;
+        let scatter = kept.iter().map(|leap| weight(leap) * (leap.size - span).powi(2)).sum::<f64>();
+        let scatter = if kept.len() > 1 { (scatter / (kept.len() - 1) as f64).max(1.0) } else { 1.0 };
+        // Where they begin, as a share of the span from the first: all over one border.
+        let place = |leap: &Leap| (leap.border - kept[0].border) / span;
+        let at_one_place = kept.iter().all(|leap| {
+            let off = place(leap) - place(leap).round();
+            off.abs() * span <= leap.step.abs().max(kept[0].step.abs()) + 1.0
+        });
+        let agree =
+            kept.len() as f64 >= AGREE * leaps.len() as f64 && kept.iter().all(|leap| leap.against) && at_one_place;
+        Some(Measured { span, std: (scatter / sum).sqrt(), leaps: kept.len(), agree })
+    }
+
+    /// Whether it can speak against what registers have.
+    fn is_sharp(&self) -> bool {
+        self.agree && self.leaps >= FEWEST_LEAPS
+    }
+
+    /// Whether it decides between two numbers of counts.
+    fn tells_counts(&self) -> bool {
+        self.std < TELLS_COUNTS
+    }
+}
+
+/// A leap between two rows.
+#[derive(Debug, Clone, Copy)]
+struct Leap {
+    /// Size without the motion, positive.
+    size: f64,
+    std: f64,
+    /// The value at which it begins or ends: the upper border of the span that is left, in the way of the motion.
+    border: f64,
+    /// Motion from row to row.
+    step: f64,
+    /// Whether it goes against the motion.
+    against: bool,
+}
+
+impl Leap {
+    /// Fits `y` by one slope in `x` and a step between the rows `before` and `after`.
+    fn between(
+        before: std::ops::Range<usize>,
+        after: std::ops::Range<usize>,
+        x: impl Fn(usize) -> f64,
+        y: impl Fn(usize) -> f64,
+        rounded: f64,
+    ) -> Option<Leap> {
+        let (n, m) = (before.len() as f64, after.len() as f64);
+        let mean = |of: &dyn Fn(usize) -> f64, rows: std::ops::Range<usize>| {
+            let count = rows.len() as f64;
+            rows.map(of).sum::<f64>() / count
+        };
+        let sides = [before.clone(), after.clone()];
+        if before.is_empty() || after.is_empty() || n + m < 4.0 {
+            return None;
+        }
+        let (mx, my) = (sides.clone().map(|rows| mean(&x, rows)), sides.clone().map(|rows| mean(&y, rows)));
+        let sum = |of: &dyn Fn(f64, f64) -> f64| -> f64 {
+            let side = |side: usize| sides[side].clone().map(|k| of(x(k) - mx[side], y(k) - my[side])).sum::<f64>();
+            side(0) + side(1)
+        };
+        let (xx, xy) = (sum(&|x, _| x * x), sum(&|x, y| x * y));
+        if !(xx > 0.0 && xx.is_finite() && xy.is_finite()) {
+            return None;
+        }
+        let slope = xy / xx;
+        let squares = sum(&|x, y| (y - slope * x).powi(2));
+        let variance = (squares / (n + m - 3.0)).max(rounded * rounded);
+        let step = (my[1] - my[0]) - slope * (mx[1] - mx[0]);
+        let std = (variance * (1.0 / n + 1.0 / m + (mx[1] - mx[0]).powi(2) / xx)).sqrt();
+        let (last, first) = (before.end - 1, after.start);
+        let moved = slope * (x(first) - x(last));
+        Some(Leap { size: step.abs(), std, border: y(last) + 0.5 * moved, step: moved, against: step * slope < 0.0 })
+    }
+}
+
+/// Values made continuous where they begin anew after `span`; what is missing stays so.
+pub(crate) fn continued(values: &mut [f64], span: f64) {
+    let mut last = f64::NAN;
+    for value in values.iter_mut().filter(|value| value.is_finite()) {
+        if last.is_finite() {
+            *value -= span * ((*value - last) / span).round();
+        }
+        last = *value;
+    }
+}
+
+/// Makes counters of angles continuous where they begin anew and the steps between leave no doubt.
+pub(super) fn undo(log: &mut Log, columns: &[Column], notes: &mut Vec<String>) {
+    let registers: Vec<f64> = registers().collect();
+    for column in columns {
+        let angle = matches!(column.quantity, Quantity::Generator | Quantity::Output | Quantity::Orientation);
+        if !angle || column.reading.unit != Unit::Count {
+            continue;
+        }
+        let count_rad = (column.reading.gain * column.unit.factor()).abs();
+        let Some(values) = log.get(column.quantity) else { continue };
+        let counts: Vec<f64> = values.iter().map(|value| value / count_rad).collect();
+        let other = match column.quantity {
+            Quantity::Generator => log.get(log.output_or_error()),
+            _ => log.get(Quantity::Generator),
+        };
+        let Some(anew) = begins_anew(&counts, &registers, true, other).filter(|anew| !anew.ambiguous) else { continue };
+        let range = anew.span * count_rad;
+        if (range / std::f64::consts::TAU - 1.0).abs() < 1e-9 {
+            continue;
+        }
+        let Some(values) = log.get_mut(column.quantity) else { continue };
+        continued(values, range);
+        notes.push(format!("{} {}: it was made continuous", column.name, anew.text(" counts")));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn counters(values: &[f64]) -> Option<Anew> {
+        begins_anew(values, &registers().collect::<Vec<_>>(), true, None)
+    }
+
+    /// An angle in counts that goes to and fro at several paces.
+    fn motion(rows: i32) -> Vec<f64> {
+        let mut at = 300.0;
+        (0..rows)
+            .map(|k| {
+                at += [23.4, -23.4, 34.1, 34.1, -34.1, 19.3, -19.3, 27.7][(k / (rows / 8)).min(7) as usize];
+                at
+            })
+            .collect()
+    }
+
+    fn span(values: &[f64]) -> Option<(f64, Option<f64>)> {
+        counters(values).filter(|anew| !anew.ambiguous).map(|anew| (anew.span, anew.or))
+    }
+
+    #[test]
+    fn an_overflow_is_told_from_a_jump() {
+        let sweep =
+            |step: i64| -> Vec<f64> { (0..2000i64).map(|k| ((k * step + 40_000) % 65_536 - 32_768) as f64).collect() };
+        assert_eq!(counters(&sweep(1000)).map(|anew| (anew.span, anew.times, anew.or)), Some((65_536.0, 31, None)));
+        // Too fast to tell which way.
+        assert!(counters(&sweep(30_000)).is_none_or(|anew| anew.ambiguous));
+        // A jump is no overflow, whatever its size.
+        for size in [33_000.0, 50_000.0, 65_000.0] {
+            let jump: Vec<f64> = (0..2000).map(|k| if k < 1000 { f64::from(k % 7) } else { size }).collect();
+            assert_eq!(counters(&jump), None, "{size}");
+        }
+        let steady: Vec<f64> = (0..2000).map(|k| 32.0 * f64::from(k)).collect();
+        assert_eq!(counters(&steady), None);
+    }
+
+    #[test]
+    fn a_counter_may_have_any_number_of_states() {
+        for states in [65_536.0, 32_768.0, 32_767.0, 32_766.0, 65_535.0, 10_000.0, 14_400.0] {
+            let values: Vec<f64> = motion(32_000).iter().map(|at| at.round().rem_euclid(states)).collect();
+            assert_eq!(span(&values), Some((states, None)), "{states}");
+            // From minus half to plus half.
+            let half = (states / 2.0).floor();
+            let values: Vec<f64> =
+                motion(32_000).iter().map(|at| (at.round() + half).rem_euclid(states) - half).collect();
+            assert_eq!(span(&values), Some((states, None)), "{states}, about zero");
+        }
+    }
+
+    #[test]
+    fn a_counter_that_is_set_to_zero_at_both_ends_is_continued() {
+        // A pulse counter with the limits ±32 767: it is set to zero where it reaches either.
+        let limit = 32_767.0;
+        let mut motion = motion(32_000);
+        motion.iter_mut().for_each(|at| *at = (*at - 60_000.0).round());
+        let values: Vec<f64> = motion.iter().map(|at| at % limit).collect();
+        assert!(values.iter().any(|at| *at < -32_000.0) && values.iter().any(|at| *at > 10_000.0));
+        assert_eq!(span(&values).map(|(span, _)| span), Some(limit));
+        let mut made = values;
+        continued(&mut made, limit);
+        let off = made[0] - motion[0];
+        assert!(made.iter().zip(&motion).all(|(made, at)| made - at == off));
+    }
+
+    #[test]
+    fn equal_leaps_at_other_places_are_no_counter() {
+        // An encoder that loses 9000 counts five times, each time elsewhere.
+        let mut lost = 0.0;
+        let values: Vec<f64> = (0..4000)
+            .map(|k| {
+                lost += if k % 750 == 700 { 9000.0 } else { 0.0 };
+                (23.4 * f64::from(k) % 9973.0).round() - lost + 0.1 * lost
+            })
+            .collect();
+        assert_eq!(span(&values), None);
+    }
+
+    #[test]
+    fn an_uneven_motion_leaves_one_count_in_doubt_unless_the_other_angle_tells() {
+        let mut random = fastrand::Rng::with_seed(9);
+        let mut at = 20_000.0;
+        let motion: Vec<f64> = (0..3000)
+            .map(|_| {
+                at += 20.0 + 12.0 * (random.f64() - 0.5);
+                at
+            })
+            .collect();
+        let values: Vec<f64> = motion.iter().map(|at| at.round().rem_euclid(32_767.0)).collect();
+        let alone = counters(&values).unwrap();
+        let other: Vec<f64> = motion.iter().map(|at| at / 101.0 / 4096.0).collect();
+        let helped = begins_anew(&values, &registers().collect::<Vec<_>>(), true, Some(&other)).unwrap();
+        println!("{alone:?} {helped:?}");
+        assert_eq!((helped.span, helped.or), (32_767.0, None));
+    }
+}

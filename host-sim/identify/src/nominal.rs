@@ -1,0 +1,547 @@
+//! A drive known only from its catalogue: `nominal.toml`.
+//!
+//! Nominal output = generator / ratio + harmonics + play (backlash, loaded by torque) + wind-up (torque). Angles are radians,
+//! errors arc-seconds at the output, torque N·m, positive where it turns the output forward.
+
+use std::sync::Arc;
+
+use flexspline::{FixedMember, GeneratorAngle, PlayState, Table};
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use crate::measurement::Gear;
+use flexspline_base::toml_file::{Allowed, Refused, Section, TomlFile, from, number, one_of, real, whole};
+use flexspline_base::units::ARCSEC_PER_RAD;
+use flexspline_design::kernels::Kernels;
+use flexspline_mechanics::drive::DriveError;
+
+/// Which wheel does not turn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fixed {
+    /// The flexspline; the circular spline is the output.
+    Flexspline,
+    /// The circular spline; the flexspline is the output.
+    CircularSpline,
+}
+
+impl Fixed {
+    const ALL: [Fixed; 2] = [Fixed::Flexspline, Fixed::CircularSpline];
+
+    /// Its name in a file.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Fixed::Flexspline => "flexspline",
+            Fixed::CircularSpline => "circular_spline",
+        }
+    }
+}
+
+/// Tooth counts of a strain wave drive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Teeth {
+    /// Of the flexspline.
+    pub flexspline: u32,
+    /// Of the circular spline.
+    pub circular_spline: u32,
+    /// Which of them is fixed.
+    pub fixed: Fixed,
+}
+
+impl Teeth {
+    /// The drive as the core knows it.
+    ///
+    /// # Errors
+    /// No pair of wheels has these teeth.
+    pub fn core_drive(self) -> Result<flexspline::Drive, flexspline::DriveError> {
+        let fixed = match self.fixed {
+            Fixed::Flexspline => FixedMember::Flexspline,
+            Fixed::CircularSpline => FixedMember::CircularSpline,
+        };
+        let narrow = |count: u32| u16::try_from(count).unwrap_or(u16::MAX);
+        flexspline::Drive::new(narrow(self.flexspline), narrow(self.circular_spline), fixed)
+    }
+
+    /// Of the wheel that is the output.
+    #[must_use]
+    pub const fn of_output(self) -> u32 {
+        match self.fixed {
+            Fixed::Flexspline => self.circular_spline,
+            Fixed::CircularSpline => self.flexspline,
+        }
+    }
+}
+
+/// One harmonic of the nominal output error, `amplitude sin(order generator + phase)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Harmonic {
+    /// Periods per generator turn; need not be whole.
+    pub order_per_generator_turn: f64,
+    /// Amplitude, arcsec.
+    pub amplitude_arcsec: f64,
+    /// Phase, rad.
+    pub phase_rad: f64,
+}
+
+/// Relative spread (one standard deviation) between units that is no discrepancy.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spread {
+    /// Of the torsional stiffness.
+    pub stiffness: f64,
+    /// Of the backlash.
+    pub backlash: f64,
+    /// Of the amplitude of each harmonic.
+    pub harmonic: f64,
+    /// Of its phase, rad.
+    pub harmonic_phase_rad: f64,
+}
+
+/// The nominal model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Nominal {
+    /// Generator turns per output turn, signed.
+    pub ratio: f64,
+    /// Teeth; `None` for a gear of another kind, known by its ratio.
+    pub teeth: Option<Teeth>,
+    /// Torsional stiffness (N·m/rad) from each torque (N·m) on; the first torque is 0.
+    pub stiffness: Vec<[f64; 2]>,
+    /// Backlash, arcsec: the whole width of the play.
+    pub backlash_arcsec: f64,
+    /// Friction of the output inside the clearance, N·m.
+    pub friction_torque_n_m: f64,
+    /// Temperature that the numbers hold at, °C.
+    pub temperature_c: f64,
+    /// Kinematic error.
+    pub harmonics: Vec<Harmonic>,
+    /// Spread between units.
+    pub spread: Spread,
+    /// What deviations of its geometry do, where the contact FEM has computed it.
+    pub kernels: Option<Arc<Kernels>>,
+}
+
+impl Nominal {
+    /// The gear, for the reader of data.
+    #[must_use]
+    pub fn gear(&self) -> Gear {
+        match self.teeth {
+            Some(teeth) => Gear::of_teeth(teeth.flexspline, teeth.circular_spline, teeth.fixed == Fixed::Flexspline),
+            None => Gear::of_ratio(self.ratio),
+        }
+    }
+
+    /// Wind-up under a torque, arcsec, of the sign of the torque.
+    #[must_use]
+    pub fn wind_up_arcsec(&self, torque_n_m: f64) -> f64 {
+        let load = torque_n_m.abs();
+        let mut angle_rad = 0.0;
+        for (k, &[from, stiffness]) in self.stiffness.iter().enumerate() {
+            let to = self.stiffness.get(k + 1).map_or(f64::INFINITY, |next| next[0]);
+            if load > from {
+                angle_rad += (load.min(to) - from) / stiffness;
+            }
+        }
+        angle_rad.copysign(torque_n_m) * ARCSEC_PER_RAD
+    }
+
+    /// Kinematic error at a generator angle, arcsec.
+    #[must_use]
+    pub fn harmonics_arcsec(&self, generator_rad: f64) -> f64 {
+        self.harmonics
+            .iter()
+            .map(|h| h.amplitude_arcsec * (h.order_per_generator_turn * generator_rad + h.phase_rad).sin())
+            .sum()
+    }
+
+    /// The teeth; of a model that gives a ratio alone, those of the strain wave drive of two waves that has it: `z_c / 2` with the
+    /// flexspline fixed, `-z_f / 2` with the circular spline fixed, and two teeth of difference.
+    #[must_use]
+    pub fn teeth_or_of_two_waves(&self) -> Teeth {
+        self.teeth.unwrap_or_else(|| {
+            let more = (2.0 * self.ratio.abs()).round().max(3.0) as u32;
+            if self.ratio > 0.0 {
+                Teeth { flexspline: more - 2, circular_spline: more, fixed: Fixed::Flexspline }
+            } else {
+                Teeth { flexspline: more, circular_spline: more + 2, fixed: Fixed::CircularSpline }
+            }
+        })
+    }
+
+    /// What a table says of wind-up and backlash: the part of the error that is odd in the torque, at mid temperature; the backlash is
+    /// what is left of it as the torque goes to zero. Kinematic error is left to the table's own prediction.
+    #[must_use]
+    pub fn of_table(table: &Table<'_>) -> Nominal {
+        let drive = table.drive();
+        let fixed = if drive.fixed() == FixedMember::Flexspline { Fixed::Flexspline } else { Fixed::CircularSpline };
+        let teeth = Teeth {
+            flexspline: u32::from(drive.flexspline_teeth()),
+            circular_spline: u32::from(drive.circular_spline_teeth()),
+            fixed,
+        };
+        let [low, high] = table.temperature_range_c();
+        let temperature = f32::midpoint(low, high).clamp(low, high);
+        let [from, to] = table.torque_range_n_m();
+        let largest = f64::from(from.abs().min(to.abs()));
+        // Mean of the error over a flexspline pitch, after the play has come to rest.
+        let mean = |torque: f64| -> f64 {
+            let mut play = PlayState::unknown();
+            let pitch = std::f64::consts::TAU / f64::from(teeth.flexspline);
+            let (mut sum, steps) = (0.0, 16);
+            for k in 0..4 * steps {
+                let generator = GeneratorAngle::from_rad(f64::from(k) * pitch / f64::from(steps));
+                let said =
+                    table.forward(&mut play, generator.unwrap_or(GeneratorAngle::ZERO), torque as f32, temperature);
+                if k >= 3 * steps {
+                    sum += f64::from(said.transmission_error_rad) / f64::from(steps);
+                }
+            }
+            sum
+        };
+        let odd = |torque: f64| 0.5 * (mean(torque) - mean(-torque));
+        let at: Vec<f64> = [0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0].iter().map(|share| share * largest).collect();
+        let angles: Vec<f64> = at.iter().map(|torque| odd(*torque)).collect();
+        let slope = |k: usize| ((angles[k + 1] - angles[k]) / (at[k + 1] - at[k])).max(1e-12);
+        let half_backlash_rad = (angles[0] - at[0] * slope(0)).max(0.0);
+        let stiffness = (0..at.len() - 1).map(|k| [if k == 0 { 0.0 } else { at[k] }, 1.0 / slope(k)]).collect();
+        Nominal {
+            ratio: drive.exact_ratio(),
+            teeth: Some(teeth),
+            stiffness,
+            backlash_arcsec: 2.0 * half_backlash_rad * ARCSEC_PER_RAD,
+            friction_torque_n_m: 0.0,
+            temperature_c: f64::from(temperature),
+            harmonics: Vec::new(),
+            spread: USUAL_SPREAD,
+            kernels: None,
+        }
+    }
+
+    /// A commented `nominal.toml` to fill in, of a drive with these teeth and a fixed flexspline: every key with unit, meaning, sign
+    /// and what is allowed. It is read back as it stands.
+    #[must_use]
+    pub fn template(flexspline_teeth: u32, circular_spline_teeth: u32) -> String {
+        let Spread { stiffness, backlash, harmonic, .. } = USUAL_SPREAD;
+        let (fewest, most) = (TEETH.low, TEETH.high);
+        format!(
+            "\
+# A drive known from its catalogue, for `flexspline diagnose DATA.csv --model THIS`: put in the numbers of yours.
+# Output angle = generator / ratio + harmonics + play (backlash, loaded by torque) + wind-up (torque).
+# Errors are arc-seconds at the output, positive where it leads; torque is positive where it turns the output forward.
+
+[drive]  # the teeth, or the ratio alone
+flexspline_teeth = {flexspline_teeth}         # number of teeth; {fewest} to {most}
+circular_spline_teeth = {circular_spline_teeth}    # number of teeth; 1 to {MOST_TEETH_MORE} more than the flexspline
+fixed = \"flexspline\"           # the wheel that does not turn; \"flexspline\" or \"circular_spline\"
+# ratio = -100.0               # generator turns to one of the output, instead of the three above, for a gear of
+                               # another kind; negative: they turn opposite ways; 1 to {LARGEST_RATIO:e} or -{LARGEST_RATIO:e} to -1
+
+[nominal]
+# Torsional stiffness, N.m/rad, {STIFFNESS}: one number, or that from each torque (N.m, the first is 0) on, as catalogues
+# give K1, K2, K3 beyond the torques 0, T1, T2.
+stiffness_n_m_per_rad = [[0.0, 20000.0], [10.0, 27000.0], [30.0, 30000.0]]
+backlash_arcsec = 60.0         # whole width of the play at the output, arcsec; {BACKLASH}
+friction_torque_n_m = 1.5      # load below which the output rests inside the play, N.m; {FRICTION}; 0 if left out
+temperature_c = 20.0           # at which these numbers hold, degrees C; {TEMPERATURE}; 20 if left out
+
+[[nominal.harmonic]]  # kinematic error: amplitude sin(order generator + phase); once for each harmonic, or not at all
+order_per_generator_turn = 2.0 # periods to a turn of the generator, need not be whole; {ORDER}
+amplitude_arcsec = 10.0        # half of peak to peak, arcsec; positive: the output leads where the sine is positive; {AMPLITUDE}
+phase_rad = 0.0                # at generator angle 0, rad; {PHASE}
+
+[nominal.unit_to_unit]  # by how much units of this type differ without a fault: one standard deviation over the number
+stiffness = {stiffness:?}               # of the stiffness; {SHARE}; {stiffness} if left out
+backlash = {backlash:?}                # of the backlash; {SHARE}; {backlash} if left out
+harmonic = {harmonic:?}                 # of the harmonics, of their amplitude; {SHARE}; {harmonic} if left out
+# harmonic_phase_rad = 0.05    # of their phases, rad; {SHARE}; the number of the amplitudes if left out: a wave of any phase, so large
+"
+        )
+    }
+
+    /// Reads `nominal.toml`.
+    ///
+    /// # Errors
+    /// Every problem found, each with file, line, field, value found and what is allowed.
+    pub fn from_toml(file_name: &str, text: &str) -> Result<Nominal, DriveError> {
+        let mut file = TomlFile::new(file_name, text);
+        let nominal = file.parse().and_then(|table| Nominal::of_file(&mut file, &table));
+        match nominal.filter(|_| file.is_sound()) {
+            Some(nominal) => Ok(nominal),
+            None => Err(DriveError { problems: file.problems() }),
+        }
+    }
+
+    /// Reads a file that has been parsed; nothing where what is wrong with it leaves no model.
+    fn of_file(file: &mut TomlFile<'_>, table: &DeTable<'_>) -> Option<Nominal> {
+        // What a diagnosis found stands in [extension], which `crate::extension` reads.
+        file.refuse_unknown_keys(table, &KEYS, &["extension"]);
+        if !file.is_sound() {
+            return None;
+        }
+        let drive = file.section(table, "drive");
+        let nominal = file.section(table, "nominal");
+        let (ratio, teeth) = drive.and_then(|drive| ratio_and_teeth(file, &drive))?;
+        let nominal = nominal?;
+        let stiffness = nominal.needed(file, "stiffness_n_m_per_rad", stiffness);
+        let backlash = nominal.needed(file, "backlash_arcsec", |v| real(&BACKLASH, v));
+        let friction = nominal.given(file, "friction_torque_n_m", |v| real(&FRICTION, v));
+        let temperature = nominal.given(file, "temperature_c", |v| real(&TEMPERATURE, v));
+        let harmonics = nominal.sections(file, "harmonic").iter().map(|section| harmonic(file, section)).collect();
+        let spread = nominal.section(file, "unit_to_unit").map_or(USUAL_SPREAD, |section| spread(file, &section));
+        Some(Nominal {
+            ratio,
+            teeth,
+            stiffness: stiffness?,
+            backlash_arcsec: backlash?,
+            friction_torque_n_m: friction.unwrap_or(0.0),
+            temperature_c: temperature.unwrap_or(USUAL_TEMPERATURE_C),
+            harmonics,
+            spread,
+            kernels: None,
+        })
+    }
+}
+
+/// Spread assumed where the file gives none: stiffness, backlash, harmonics of drives of one type.
+const USUAL_SPREAD: Spread = Spread { stiffness: 0.03, backlash: 0.05, harmonic: 0.20, harmonic_phase_rad: 0.20 };
+
+/// Temperature at which the numbers of a file hold that gives none, °C.
+const USUAL_TEMPERATURE_C: f64 = 20.0;
+
+/// Every key of the file; those of `nominal.harmonic` are of each entry.
+const KEYS: [&str; 18] = [
+    "drive",
+    "drive.flexspline_teeth",
+    "drive.circular_spline_teeth",
+    "drive.fixed",
+    "drive.ratio",
+    "nominal",
+    "nominal.stiffness_n_m_per_rad",
+    "nominal.backlash_arcsec",
+    "nominal.friction_torque_n_m",
+    "nominal.temperature_c",
+    "nominal.harmonic",
+    "nominal.harmonic.order_per_generator_turn",
+    "nominal.harmonic.amplitude_arcsec",
+    "nominal.harmonic.phase_rad",
+    "nominal.unit_to_unit.stiffness",
+    "nominal.unit_to_unit.backlash",
+    "nominal.unit_to_unit.harmonic",
+    "nominal.unit_to_unit.harmonic_phase_rad",
+];
+
+const TEETH: Allowed = from(20.0, 2000.0);
+/// Most teeth that the circular spline has more than the flexspline.
+const MOST_TEETH_MORE: u32 = 12;
+const LARGEST_RATIO: f64 = 1e6;
+const STIFFNESS: Allowed = from(1e-3, 1e12);
+const BACKLASH: Allowed = from(0.0, 1e5);
+const FRICTION: Allowed = from(0.0, 1e6);
+const TEMPERATURE: Allowed = from(-273.0, 500.0);
+const ORDER: Allowed = from(1e-6, 1e5);
+const AMPLITUDE: Allowed = from(-1e5, 1e5);
+const PHASE: Allowed = from(-100.0, 100.0);
+const SHARE: Allowed = from(0.0, 1.0);
+
+/// One stiffness, or that from each torque on: `[torque, stiffness]`.
+fn stiffness(value: &Spanned<DeValue>) -> Result<Vec<[f64; 2]>, Refused> {
+    let allowed = "a stiffness in N.m/rad or a list [[0.0, K1], [T1, K2], ...]";
+    let pair = |step: &Spanned<DeValue>| match step.get_ref().as_array().map(|pair| (pair.len(), pair)) {
+        Some((2, pair)) => number(pair[0].get_ref()).zip(number(pair[1].get_ref())).map(|(torque, k)| [torque, k]),
+        _ => None,
+    };
+    let steps: Option<Vec<[f64; 2]>> = match value.get_ref() {
+        DeValue::Array(steps) => steps.iter().map(pair).collect(),
+        one => number(one).map(|stiffness| vec![[0.0, stiffness]]),
+    };
+    let steps = steps.ok_or_else(|| Refused::found(value, allowed))?;
+    let rising = steps.windows(2).all(|pair| pair[0][0] < pair[1][0]);
+    let sound = steps.iter().all(|&[torque, k]| torque.is_finite() && STIFFNESS.refusal(k).is_none());
+    if steps.first().is_none_or(|first| first[0] != 0.0) || !rising || !sound {
+        let what =
+            format!("found {steps:?} as [torque, stiffness], allowed: torques from 0 upward, stiffness {STIFFNESS}");
+        return Err(Refused::because(value, what));
+    }
+    Ok(steps)
+}
+
+fn harmonic(file: &mut TomlFile<'_>, section: &Section<'_, '_>) -> Harmonic {
+    // What is refused has been told; the file is not read then, whatever stands here.
+    let mut needed = |key: &str, allowed: &Allowed| section.needed(file, key, |v| real(allowed, v)).unwrap_or(f64::NAN);
+    Harmonic {
+        order_per_generator_turn: needed("order_per_generator_turn", &ORDER),
+        amplitude_arcsec: needed("amplitude_arcsec", &AMPLITUDE),
+        phase_rad: needed("phase_rad", &PHASE),
+    }
+}
+
+fn spread(file: &mut TomlFile<'_>, section: &Section<'_, '_>) -> Spread {
+    let mut share = |key: &str, usual: f64| section.given(file, key, |v| real(&SHARE, v)).unwrap_or(usual);
+    let harmonic = share("harmonic", USUAL_SPREAD.harmonic);
+    Spread {
+        stiffness: share("stiffness", USUAL_SPREAD.stiffness),
+        backlash: share("backlash", USUAL_SPREAD.backlash),
+        harmonic,
+        harmonic_phase_rad: share("harmonic_phase_rad", harmonic),
+    }
+}
+
+/// The ratio, and the teeth if they are given instead of it.
+fn ratio_and_teeth(file: &mut TomlFile<'_>, drive: &Section<'_, '_>) -> Option<(f64, Option<Teeth>)> {
+    match ["flexspline_teeth", "circular_spline_teeth", "ratio"].map(|key| drive.has(key)) {
+        [true, true, false] => {
+            let f = drive.needed(file, "flexspline_teeth", |v| whole(&TEETH, v))?;
+            let more = from(f64::from(f + 1), f64::from(f + MOST_TEETH_MORE));
+            let c = drive.needed(file, "circular_spline_teeth", |v| {
+                whole(&more, v).map_err(|refused| Refused {
+                    what: format!("{}, more than the flexspline's {f}", refused.what),
+                    ..refused
+                })
+            })?;
+            let names = Fixed::ALL.map(|fixed| (fixed.name(), fixed));
+            let fixed = match drive.has("fixed") {
+                true => drive.needed(file, "fixed", |v| one_of(&names, v))?,
+                false => Fixed::Flexspline,
+            };
+            let waves = f64::from(c - f);
+            let ratio = match fixed {
+                Fixed::Flexspline => f64::from(c) / waves,
+                Fixed::CircularSpline => -f64::from(f) / waves,
+            };
+            Some((ratio, Some(Teeth { flexspline: f, circular_spline: c, fixed })))
+        }
+        [false, false, true] => {
+            let sizes = from(1.0, LARGEST_RATIO);
+            let ratio = drive.needed(file, "ratio", |v| match number(v.get_ref()) {
+                Some(ratio) if sizes.refusal(ratio.abs()).is_none() => Ok(ratio),
+                _ => Err(Refused::found(v, "1 to 1e6 or -1e6 to -1")),
+            })?;
+            Some((ratio, None))
+        }
+        given => {
+            let names = ["flexspline_teeth", "circular_spline_teeth", "ratio"];
+            let found: Vec<&str> =
+                names.into_iter().zip(given).filter(|(_, there)| *there).map(|(name, _)| name).collect();
+            let found = if found.is_empty() { "neither".to_owned() } else { found.join(", ") };
+            let what = format!("expected flexspline_teeth and circular_spline_teeth, or ratio alone; found {found}");
+            file.refuse_whole("drive", what);
+            None
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "[drive]\nflexspline_teeth = 188\ncircular_spline_teeth = 190\nfixed = \"flexspline\"\n[nominal]\n\
+        stiffness_n_m_per_rad = [[0.0, 20000.0], [10.0, 40000.0]]\nbacklash_arcsec = 60.0\nfriction_torque_n_m = 1.5\n\
+        [[nominal.harmonic]]\norder_per_generator_turn = 2.0\namplitude_arcsec = 10.0\nphase_rad = 0.4\n";
+
+    #[test]
+    fn a_file_is_read() {
+        let nominal = Nominal::from_toml("n.toml", TEXT).unwrap();
+        assert_eq!((nominal.ratio, nominal.temperature_c, nominal.spread), (95.0, 20.0, USUAL_SPREAD));
+        assert_eq!(nominal.harmonics.len(), 1);
+        let wind_up_rad = nominal.wind_up_arcsec(-30.0) / ARCSEC_PER_RAD;
+        assert!((wind_up_rad + 10.0 / 20000.0 + 20.0 / 40000.0).abs() < 1e-15);
+        let other = TEXT.replace("fixed = \"flexspline\"", "fixed = \"circular_spline\"");
+        assert_eq!(Nominal::from_toml("n.toml", &other).unwrap().ratio, -94.0);
+        let by_ratio = "[drive]\nratio = -6.0\n[nominal]\nstiffness_n_m_per_rad = 3e4\nbacklash_arcsec = 60\n";
+        let nominal = Nominal::from_toml("n.toml", by_ratio).unwrap();
+        assert_eq!((nominal.ratio, nominal.teeth, nominal.friction_torque_n_m), (-6.0, None, 0.0));
+        let teeth = |ratio: f64| Nominal { ratio, ..nominal.clone() }.teeth_or_of_two_waves();
+        assert_eq!(teeth(95.0), Teeth { flexspline: 188, circular_spline: 190, fixed: Fixed::Flexspline });
+        assert_eq!(teeth(-94.0), Teeth { flexspline: 188, circular_spline: 190, fixed: Fixed::CircularSpline });
+    }
+
+    #[test]
+    fn a_wrong_file_is_refused_by_line_field_and_value() {
+        for (from, to, message) in [
+            ("= 190", "= 187", "n.toml:3: drive.circular_spline_teeth: found 187, allowed: 189 to 200"),
+            ("= 60.0", "= -1.0", "n.toml:7: nominal.backlash_arcsec: found -1, allowed: 0 to 100000"),
+            ("= 60.0", "= nan", "n.toml:7: nominal.backlash_arcsec: found NaN"),
+            ("= 60.0", "= \"wide\"", "n.toml:7: nominal.backlash_arcsec: found \"wide\", allowed: 0 to 100000"),
+            ("friction_torque_n_m", "friktion", "n.toml:8: nominal.friktion: unknown key; allowed: stiffness"),
+            (
+                "\"flexspline\"",
+                "\"ring\"",
+                "n.toml:4: drive.fixed: found \"ring\", allowed: \"flexspline\", \"circular_spline\"",
+            ),
+            ("[10.0, 40000.0]", "[-1.0, 40000.0]", "n.toml:6: nominal.stiffness_n_m_per_rad: found"),
+            (
+                "amplitude_arcsec = 10.0",
+                "amplitude_arcsec = inf",
+                "n.toml:11: nominal.harmonic[0].amplitude_arcsec: found inf",
+            ),
+            ("circular_spline_teeth = 190\n", "", "n.toml: drive: expected flexspline_teeth and circular_spline_teeth"),
+        ] {
+            let text = TEXT.replacen(from, to, 1);
+            let error = Nominal::from_toml("n.toml", &text).unwrap_err().to_string();
+            assert!(error.starts_with(message), "{to}: {error}");
+        }
+    }
+
+    #[test]
+    fn the_template_is_read_back_as_it_stands() {
+        let text = Nominal::template(188, 190);
+        let nominal = Nominal::from_toml("n.toml", &text).unwrap();
+        assert_eq!((nominal.ratio, nominal.backlash_arcsec, nominal.friction_torque_n_m), (95.0, 60.0, 1.5));
+        assert_eq!((nominal.stiffness.len(), nominal.harmonics.len(), nominal.spread), (3, 1, USUAL_SPREAD));
+        assert_eq!(nominal.teeth.map(|t| t.fixed), Some(Fixed::Flexspline));
+        for key in KEYS {
+            assert!(text.contains(key.rsplit('.').next().unwrap()), "the template says nothing of {key}");
+        }
+        let by_ratio: String = text
+            .lines()
+            .filter(|line| {
+                !["flexspline_teeth", "circular_spline_teeth", "fixed"].iter().any(|key| line.starts_with(key))
+            })
+            .map(|line| line.replace("# ratio", "ratio") + "\n")
+            .collect();
+        assert_eq!(Nominal::from_toml("n.toml", &by_ratio).unwrap().ratio, -100.0);
+    }
+
+    #[test]
+    fn misspelt_keys_get_a_suggestion_all_at_once_and_garbage_gets_none() {
+        for (from, to, message) in [
+            ("[drive]", "[Drive]", "n.toml:1: Drive: unknown key; did you mean `drive`?; allowed: drive, nominal"),
+            ("[nominal]", "[nominel]", "n.toml:5: nominel: unknown key; did you mean `nominal`?"),
+            (
+                "flexspline_teeth",
+                "flexspline_tooth",
+                "n.toml:2: drive.flexspline_tooth: unknown key; did you mean `drive.flexspline_teeth`?",
+            ),
+            (
+                "backlash_arcsec",
+                "backlash",
+                "n.toml:7: nominal.backlash: unknown key; did you mean `nominal.backlash_arcsec`?",
+            ),
+            (
+                "backlash_arcsec",
+                "backlash_arcmin",
+                "n.toml:7: nominal.backlash_arcmin: unknown key; did you mean `nominal.backlash_arcsec`?",
+            ),
+            (
+                "[[nominal.harmonic]]",
+                "[[nominal.harmonics]]",
+                "n.toml:9: nominal.harmonics: unknown key; did you mean `nominal.harmonic`?",
+            ),
+            (
+                "phase_rad",
+                "phase_deg",
+                "n.toml:12: nominal.harmonic.phase_deg: unknown key; did you mean `nominal.harmonic.phase_rad`?",
+            ),
+            (
+                "fixed = \"flexspline\"",
+                "fixed = \"circular-spline\"",
+                "n.toml:4: drive.fixed: found \"circular-spline\", allowed: \"flexspline\", \"circular_spline\"; did you mean `circular_spline`?",
+            ),
+            ("friction_torque_n_m", "qwertz", "n.toml:8: nominal.qwertz: unknown key; allowed: "),
+        ] {
+            let text = TEXT.replacen(from, to, 1);
+            let error = Nominal::from_toml("n.toml", &text).unwrap_err().to_string();
+            assert!(error.starts_with(message), "{to}: {error}");
+        }
+        let two = TEXT.replace("friction_torque_n_m", "friction_torque").replace("phase_rad", "phase");
+        assert_eq!(Nominal::from_toml("n.toml", &two).unwrap_err().problems.len(), 2);
+    }
+}

@@ -1,0 +1,305 @@
+//! The core run over measured rows, open loop: what it would have predicted, row by row.
+//!
+//! CSV with a header, columns in any order, further columns ignored, `#` lines comments. Needed are `generator_rad` and one of
+//! `output_rad` and `error_arcsec`; `torque_n_m` (else 0) and `temperature_c` (else that given) are used where present.
+
+use std::path::Path;
+
+use flexspline::{GeneratorAngle, PlayState, Quality, Table};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use thiserror::Error;
+
+use crate::measurement::{MeasuredError, plain_rows};
+use crate::turns_off::{TurnsOff, about_mean, turns_off};
+use flexspline_base::units::ARCSEC_PER_RAD;
+use flexspline_design::tables::generator_of;
+
+/// A measured row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeasuredRow {
+    /// Generator angle, rad.
+    pub generator_rad: f64,
+    /// Output error, arcsec.
+    pub error_arcsec: f64,
+    /// Load torque, N m.
+    pub torque_n_m: f64,
+    /// Temperature, °C.
+    pub temperature_c: f64,
+}
+
+/// A row of `replay.csv`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ReplayedRow {
+    /// Generator angle, rad.
+    pub generator_rad: f64,
+    /// Load torque, N m.
+    pub torque_n_m: f64,
+    /// Temperature, °C.
+    pub temperature_c: f64,
+    /// Output error as measured, arcsec.
+    pub measured_arcsec: f64,
+    /// Output error as the core predicts it, arcsec.
+    pub predicted_arcsec: f64,
+    /// Measured less predicted, arcsec.
+    pub residual_arcsec: f64,
+    /// What the core says it does not know, arcsec.
+    pub uncertainty_arcsec: f64,
+    /// Quality of the prediction.
+    pub quality: &'static str,
+}
+
+/// `summary.json` of a replay.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ReplaySummary {
+    /// Version of this object.
+    pub schema_version: u32,
+    /// "in range", or "extrapolated" if any row lies outside the table.
+    pub status: &'static str,
+    /// Table.
+    pub table_id: String,
+    /// Rows.
+    pub rows: usize,
+    /// Root mean square of the measured error about its mean, arcsec.
+    pub rms_measured_arcsec: f64,
+    /// Root mean square of the residual about its mean, arcsec.
+    pub rms_residual_arcsec: f64,
+    /// Largest residual about the mean, arcsec.
+    pub max_residual_arcsec: f64,
+    /// Mean residual: the zero of the output encoder, which no table can know, arcsec.
+    pub mean_residual_arcsec: f64,
+    /// Rows by quality: in range, uncertain, extrapolated, disabled.
+    pub rows_by_quality: [usize; 4],
+    /// Whole turns of the motor by which the generator zero of the rows is off the table's, where the rows show that.
+    pub generator_zero_off: Option<TurnsOff>,
+    /// Whose rows they are, where that is known.
+    pub rows_of: Option<RowsOf>,
+    /// What has to be known of them: that they are another drive's, or nobody's.
+    pub remarks: Vec<String>,
+    /// Command line, once known.
+    pub command: String,
+}
+
+/// File of results as `simulate` names it, and what lies beside it.
+const RESULTS: [&str; 2] = ["results.csv", "summary.json"];
+
+/// Whose rows a file holds, as the run says that wrote them.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RowsOf {
+    /// Name of the drive.
+    pub drive: String,
+    /// Its BLAKE3, hex.
+    pub drive_hash: String,
+    /// Generator.
+    pub generator: String,
+    /// BLAKE3 of the file, hex: the summary of a replay, which may take the place of that of the run, says of which file it is.
+    #[serde(default)]
+    pub rows_blake3: String,
+}
+
+impl RowsOf {
+    /// What `summary.json` beside the results of `simulate` says of them; nothing of any other file, or where there is none.
+    pub fn beside(data: &Path, bytes: &[u8]) -> Option<RowsOf> {
+        let [results, summary] = RESULTS;
+        if data.file_name()?.to_str()? != results {
+            return None;
+        }
+        let text = std::fs::read_to_string(data.with_file_name(summary)).ok()?;
+        let of: Value = serde_json::from_str(&text).ok()?;
+        let rows_blake3 = blake3::hash(bytes).to_hex().to_string();
+        let replayed = of.get("rows_of");
+        let rows = serde_json::from_value::<RowsOf>(replayed.unwrap_or(&of).clone()).ok()?;
+        let of_these = replayed.is_none() || rows.rows_blake3 == rows_blake3;
+        of_these.then_some(RowsOf { rows_blake3, ..rows })
+    }
+
+    /// That these rows are of the drive and the generator that a table was made of.
+    ///
+    /// # Errors
+    /// They are not, or the table names no generator that is simulated.
+    pub fn check(&self, table: &Table<'_>) -> Result<(), Box<OtherRows>> {
+        let hash = blake3::Hash::from(table.drive_hash()).to_hex().to_string();
+        let generator = generator_of(table).map_or_else(|| "an unknown generator".to_owned(), |kind| kind.to_string());
+        if (hash.as_str(), generator.as_str()) == (self.drive_hash.as_str(), self.generator.as_str()) {
+            return Ok(());
+        }
+        Err(Box::new(OtherRows { rows: self.clone(), hash, generator, ratio: table.drive().exact_ratio() }))
+    }
+}
+
+/// What is said of rows that nothing speaks for.
+const OF_NOBODY: &str =
+    "nothing beside the rows says of which drive and generator they are: that they are the table's was not checked";
+
+impl ReplaySummary {
+    /// Puts in whose rows they are, and what has to be said of that.
+    pub fn of_rows(&mut self, rows_of: Option<RowsOf>, table: &Table<'_>) {
+        self.remarks = match &rows_of {
+            None => vec![OF_NOBODY.to_owned()],
+            Some(rows) => rows.check(table).err().iter().map(ToString::to_string).collect(),
+        };
+        self.remarks.extend(self.of_gain());
+        self.rows_of = rows_of;
+    }
+
+    /// What has to be said where the table gains less than it could, or nothing.
+    fn of_gain(&self) -> Option<String> {
+        let (measured, left) = (self.rms_measured_arcsec, self.rms_residual_arcsec);
+        if let Some(off) = &self.generator_zero_off {
+            return Some(off.text(left));
+        }
+        (left > measured).then(|| {
+            format!(
+                "the table leaves {left:.1} arcsec rms where the rows have {measured:.1} without it: it gains nothing here, and no whole turns of the \
+                 motor change that; is it the table of this unit, and its generator zero that of the rows?"
+            )
+        })
+    }
+}
+
+/// Rows and a table that do not belong together.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[error(
+    "the rows are of the drive {} (BLAKE3 {}) under {}, says {} beside them; the table is of a drive with ratio {ratio} and BLAKE3 {hash} \
+     under {generator}", rows.drive, rows.drive_hash, rows.generator, RESULTS[1]
+)]
+pub struct OtherRows {
+    rows: RowsOf,
+    hash: String,
+    generator: String,
+    ratio: f64,
+}
+
+/// Rows that cannot be used.
+#[derive(Debug, Error, PartialEq, Eq)]
+#[error("{file}:{line}: {what}")]
+pub struct MeasurementError {
+    /// File.
+    pub file: String,
+    /// Line, from 1.
+    pub line: u64,
+    /// Field, value, what is allowed.
+    pub what: String,
+}
+
+/// Reads measured rows; `temperature_c` stands where the file has no such column.
+pub fn parse(file: &str, bytes: &[u8], ratio: f64, temperature_c: f64) -> Result<Vec<MeasuredRow>, MeasurementError> {
+    let refuse = |error: MeasuredError| MeasurementError {
+        file: file.to_owned(),
+        line: error.line.unwrap_or(1),
+        what: error.what,
+    };
+    let rows = plain_rows(file, bytes, ratio).map_err(refuse)?;
+    let at = |values: &Option<Vec<f64>>, row: usize, usual: f64| values.as_ref().map_or(usual, |values| values[row]);
+    Ok((0..rows.generator_rad.len())
+        .map(|row| MeasuredRow {
+            generator_rad: rows.generator_rad[row],
+            error_arcsec: rows.error_rad[row] * ARCSEC_PER_RAD,
+            torque_n_m: at(&rows.torque_n_m, row, 0.0),
+            temperature_c: at(&rows.temperature_c, row, temperature_c),
+        })
+        .collect())
+}
+
+/// Runs the core over the rows, from a state it does not know.
+pub fn replay(table: &Table<'_>, rows: &[MeasuredRow]) -> (Vec<ReplayedRow>, ReplaySummary) {
+    let mut play = PlayState::unknown();
+    let mut by_quality = [0; 4];
+    let replayed: Vec<ReplayedRow> = rows
+        .iter()
+        .map(|row| {
+            // The reader bounds the angle, far inside the range of the angle type.
+            let generator = GeneratorAngle::from_rad(row.generator_rad).unwrap_or(GeneratorAngle::ZERO);
+            let said = table.forward(&mut play, generator, row.torque_n_m as f32, row.temperature_c as f32);
+            by_quality[said.quality as usize] += 1;
+            let predicted_arcsec = f64::from(said.transmission_error_rad) * ARCSEC_PER_RAD;
+            ReplayedRow {
+                generator_rad: row.generator_rad,
+                torque_n_m: row.torque_n_m,
+                temperature_c: row.temperature_c,
+                measured_arcsec: row.error_arcsec,
+                predicted_arcsec,
+                residual_arcsec: row.error_arcsec - predicted_arcsec,
+                uncertainty_arcsec: f64::from(said.uncertainty_rad) * ARCSEC_PER_RAD,
+                quality: match said.quality {
+                    Quality::InRange => "in range",
+                    Quality::Uncertain => "uncertain",
+                    Quality::Extrapolated => "extrapolated",
+                    Quality::Disabled => "disabled",
+                },
+            }
+        })
+        .collect();
+    let about = |value: fn(&ReplayedRow) -> f64| about_mean(&replayed.iter().map(value).collect::<Vec<_>>());
+    let count = replayed.len().max(1) as f64;
+    let mean_residual = replayed.iter().map(|row| row.residual_arcsec).sum::<f64>() / count;
+    let mut summary = ReplaySummary {
+        schema_version: 1,
+        status: if by_quality[2] + by_quality[3] == 0 { "in range" } else { "extrapolated" },
+        table_id: table.id().to_string(),
+        rows: replayed.len(),
+        rms_measured_arcsec: about(|row| row.measured_arcsec),
+        rms_residual_arcsec: about(|row| row.residual_arcsec),
+        max_residual_arcsec: replayed
+            .iter()
+            .fold(0.0, |m, row| f64::max(m, (row.residual_arcsec - mean_residual).abs())),
+        mean_residual_arcsec: mean_residual,
+        rows_by_quality: by_quality,
+        generator_zero_off: turns_off(table, rows),
+        rows_of: None,
+        remarks: Vec::new(),
+        command: String::new(),
+    };
+    summary.of_rows(None, table);
+    (replayed, summary)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The summary of a run speaks of its results alone, and that of a replay, which may have taken its place, of the rows replayed.
+    #[test]
+    fn a_run_says_whose_rows_they_are() {
+        let folder = tempfile::tempdir().unwrap();
+        let data = folder.path().join("results.csv");
+        let say = |text: &str| std::fs::write(folder.path().join("summary.json"), text).unwrap();
+        assert_eq!(RowsOf::beside(&data, b"rows"), None);
+        say(r#"{ "drive": "sc0.5", "drive_hash": "c28a", "generator": "cam", "rows": 8 }"#);
+        let run = RowsOf::beside(&data, b"rows").unwrap();
+        assert_eq!((run.drive.as_str(), run.drive_hash.as_str(), run.generator.as_str()), ("sc0.5", "c28a", "cam"));
+        assert_eq!(RowsOf::beside(&folder.path().join("measured.csv"), b"rows"), None);
+        say(&serde_json::json!({ "table_id": "1", "rows_of": run }).to_string());
+        assert_eq!(RowsOf::beside(&data, b"rows").as_ref(), Some(&run));
+        assert_eq!(RowsOf::beside(&data, b"other rows"), None);
+        say(r#"{ "table_id": "1", "rows_of": null }"#);
+        assert_eq!(RowsOf::beside(&data, b"rows"), None);
+    }
+
+    #[test]
+    fn error_and_output_columns_say_the_same() {
+        let by_error = parse("a.csv", b"error_arcsec,generator_rad\n12.5,0.5\n", 95.0, 20.0).unwrap();
+        let output = 0.5 / 95.0 + 12.5 / ARCSEC_PER_RAD;
+        let text = format!("generator_rad,output_rad,torque_n_m\n0.5,{output},3\n");
+        let by_output = parse("b.csv", text.as_bytes(), 95.0, 20.0).unwrap();
+        assert!((by_error[0].error_arcsec - by_output[0].error_arcsec).abs() < 1e-9);
+        assert_eq!((by_output[0].torque_n_m, by_output[0].temperature_c), (3.0, 20.0));
+    }
+
+    #[test]
+    fn wrong_files_are_refused_each_with_its_own_message() {
+        for (text, message) in [
+            ("", "column generator_rad is missing"),
+            ("generator_rad,torque_n_m\n1,2\n", "neither column output_rad nor error_arcsec"),
+            ("generator_rad,generator_rad,output_rad\n1,1,1\n", "generator_rad is there twice"),
+            ("generator_rad,output_rad\n", "no rows"),
+            ("generator_rad,output_rad\n1\n", "no rows after the header"),
+            ("generator_rad,output_rad\n1,abc\n", "output_rad: found \"abc\""),
+            ("generator_rad,output_rad\n1,nan\n", "output_rad: nothing is recorded"),
+            ("generator_rad,output_rad\n1e12,0\n", "generator_rad: found \"1e12\""),
+        ] {
+            let error = parse("m.csv", text.as_bytes(), 95.0, 20.0).unwrap_err().to_string();
+            assert!(error.starts_with("m.csv:") && error.contains(message), "{text:?} gave {error:?}");
+        }
+    }
+}

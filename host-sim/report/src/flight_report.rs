@@ -1,0 +1,187 @@
+//! The page of a flight: tracking, spectrum, torque, limits.
+
+use flexspline_motion::flight::{CONTROLLERS, Flight};
+use serde_json::{Map, json};
+
+use super::page::{
+    Axis, Block, Choice, Detail, EVERY_CHOICE, Figure, FigureBody, Headline, Lines, Mark, Page, Quantity, Section,
+    Series, Status, Table, Text,
+};
+use flexspline_fly::fly::{ByController, Flown, Results, spectrum};
+
+/// The page; `command` is the line that made it.
+#[must_use]
+pub fn page(flown: &Flown, flight: &Flight, results: &Results, command: &str) -> Page {
+    let mut named = Map::new();
+    named.insert("flight".to_owned(), json!(results));
+    let remarks: Vec<String> = results.remarks().into_iter().map(str::to_owned).collect();
+    Page {
+        title: format!("Flight {}, {} generator", results.scenario, results.generator),
+        command_name: "fly",
+        status: if remarks.is_empty() { Status::Good } else { Status::Remark },
+        also: Vec::new(),
+        remarks,
+        choices: vec![Choice { id: "flight".to_owned(), name: results.scenario.clone() }],
+        choice_is: "flight",
+        headlines: vec![headline(results)],
+        sections: vec![tracking(flight, results), details(flown, flight, results), reading()],
+        animations: Vec::new(),
+        provenance: vec![
+            ("command".to_owned(), command.to_owned()),
+            ("digest of all errors".to_owned(), results.digest.clone()),
+        ],
+        results: named,
+    }
+}
+
+fn headline(results: &Results) -> Headline {
+    let rms = &results.rms_arcsec;
+    Headline {
+        choice: None,
+        answer: Text::new("The compensated joint points to ")
+            .error(rms.compensated, 3)
+            .plain(" rms, where it leaves ")
+            .error(rms.none, 3)
+            .plain(" without compensation and ")
+            .error(rms.fourier_by_direction, 3)
+            .plain(" with an error map by angle and direction."),
+        number: Text::default().error(rms.compensated, 3),
+        number_is: "output less target, rms".to_owned(),
+    }
+}
+
+fn cells(of: &ByController<f64>) -> [f64; 5] {
+    [of.none, of.fourier, of.fourier_by_direction, of.compensated, of.ideal]
+}
+
+fn tracking(flight: &Flight, results: &Results) -> Section {
+    let columns = [&results.rms_arcsec, &results.max_arcsec, &results.velocity_ripple].map(cells);
+    let rows = CONTROLLERS
+        .iter()
+        .enumerate()
+        .map(|(k, name)| {
+            let mut row = vec![Text::new(name.replace('_', " "))];
+            row.extend(columns[..2].iter().map(|column| Text::default().error(column[k], 3)));
+            let ripple = columns[2][k];
+            row.push(Text::new(if ripple.is_finite() { format!("{ripple:.1} ″/s") } else { "–".to_owned() }));
+            row.push(results.settle_s.as_ref().map_or(Text::new("–"), |s| Text::new(format!("{:.2} s", cells(s)[k]))));
+            row
+        })
+        .collect();
+    let table = Table {
+        caption:
+            "Output less target; speed of the output less the target's while that is even; time to settle after a slew"
+                .to_owned(),
+        header: ["Controller", "rms", "largest", "velocity ripple", "settles in"].map(str::to_owned).to_vec(),
+        rows,
+    };
+    let over_time = |column: usize| -> Vec<Series> {
+        let series = |(k, name): (usize, &&str)| Series {
+            name: name.replace('_', " "),
+            mark: Mark::Line,
+            colour: k,
+            points: flight.flown[k].rows.iter().map(|row| [row[0], row[column]]).collect(),
+        };
+        CONTROLLERS.iter().enumerate().map(series).collect()
+    };
+    let figure = |id: &str, title: &str, caption: &str, y: Axis, series: Vec<Series>| {
+        Block::Figure(Figure {
+            id: id.to_owned(),
+            title: title.to_owned(),
+            caption: Text::new(caption),
+            alt: format!("{title}, a curve to each controller"),
+            body: FigureBody::Lines {
+                x: Axis::new("Time", Quantity::Second),
+                y,
+                charts: vec![(EVERY_CHOICE.to_owned(), Lines { series, ..Lines::default() })],
+            },
+        })
+    };
+    Section {
+        id: "tracking".to_owned(),
+        title: "Tracking".to_owned(),
+        detail: Detail::Summary,
+        blocks: vec![
+            Block::Table { choice: None, table },
+            figure(
+                "error",
+                "Error over time",
+                "Output less target. All controllers fly the same unit under the same sky.",
+                Axis::new("Error", Quantity::Error),
+                over_time(1),
+            ),
+            figure(
+                "mesh",
+                "Torque in the mesh",
+                "What the flanks carry: load, drag, and what inertia asks for.",
+                Axis::new("Torque", Quantity::Torque),
+                over_time(2),
+            ),
+        ],
+    }
+}
+
+fn details(flown: &Flown, flight: &Flight, results: &Results) -> Section {
+    let line = |name: &str, value: String| vec![Text::new(name), Text::new(value)];
+    let [margin, at_hz] = results.phase_margin_deg;
+    let [held, free] = results.resonances_hz;
+    let [all, held_back, not] = results.limited_ticks;
+    let mut rows = vec![
+        line("Phase margin of the servo, load attached", format!("{margin:.0}° at {at_hz:.0} Hz")),
+        line("Its least distance from −1", format!("{:.2}", results.servo_distance)),
+        line("Resonance, motor held / free", format!("{held:.0} Hz / {free:.0} Hz")),
+        line("Low-pass of the torque", format!("{:.2} Hz", results.bandwidth_hz)),
+        line("Stable after a knock", if results.stable { "yes" } else { "no" }.to_owned()),
+        line("Ticks in which the motor gave all it has", all.to_string()),
+        line("Ticks in which the limiter held back", held_back.to_string()),
+        line("Ticks without a correction", not.to_string()),
+        line(
+            "Of what an ideal inverse removes the core removes",
+            results.removed.map_or("–".to_owned(), |share| format!("{:.1} %", 100.0 * share)),
+        ),
+    ];
+    if let Some(share) = results.torque_within_bound {
+        rows.push(line(
+            "Ticks in which the torque by the motor's current is within its bound",
+            format!("{:.1} %", 100.0 * share),
+        ));
+    }
+    let series = CONTROLLERS
+        .iter()
+        .enumerate()
+        .map(|(k, name)| Series {
+            name: name.replace('_', " "),
+            mark: Mark::Line,
+            colour: k,
+            points: spectrum(&flown.scenario, &flight.flown[k]),
+        })
+        .collect();
+    let figure = Figure {
+        id: "spectrum".to_owned(),
+        title: "Spectrum of the error".to_owned(),
+        caption: Text::new("Amplitude of lines, from windows of 4 s."),
+        alt: "Amplitude of the error over frequency, a curve to each controller".to_owned(),
+        body: FigureBody::Lines {
+            x: Axis::new("Frequency, Hz", Quantity::Count),
+            y: Axis::new("Amplitude", Quantity::Error),
+            charts: vec![(EVERY_CHOICE.to_owned(), Lines { series, ..Lines::default() })],
+        },
+    };
+    let header = ["", "Value"].map(str::to_owned).to_vec();
+    let table = Table { caption: "Loops and limits".to_owned(), header, rows };
+    Section {
+        id: "loops".to_owned(),
+        title: "Spectrum, loops and limits".to_owned(),
+        detail: Detail::Summary,
+        blocks: vec![Block::Figure(figure), Block::Table { choice: None, table }],
+    }
+}
+
+fn reading() -> Section {
+    Section::reading(vec![Block::paragraph(
+        "The unit has wind-up, clearance and tooth ripple of the contact FEM of HHD-95, is 6 % stiffer with 2″ more clearance, and has lines of \
+         eccentric wheels, pitch errors and an eccentric encoder that the nominal table does not know. The two error maps hold the unit's own error over the angles, \
+         recorded without noise at the mean load. The ideal is told the unit's own law and the true torque; what it leaves is the servo's: friction, \
+         gusts, reversals. Friction is that of an eRob80 of ratio 100 as identified by Rhoban/bam.",
+    )])
+}

@@ -1,0 +1,810 @@
+//! What a page is made of. A command fills in a [`Page`] and writes [`Page::html`]; nothing here knows what a table or a
+//! diagnosis is.
+//!
+//! - A page answers its reader's question first: a [`Headline`] of one sentence and one number, under a [`Status`] that also
+//!   stands in the page's JSON block and decides the command's exit code.
+//! - It may speak of several *choices* (the four generators): a selector shows one at a time. Text and tables marked with a choice,
+//!   and every figure, follow it. A page of one thing has one choice and no selector.
+//! - [`Section`]s hold text, tables and [`Figure`]s, at one of three levels of [`Detail`]. Figures are numbered in their order.
+//! - Errors of the output are stored in arc-seconds and shown in the unit that the reader picks: give them as [`Text::error`] in
+//!   text, and as [`Quantity::Error`] on an axis.
+//! - A [`FigureBody::Drive`] shows the [`Animation`]s of the page. Charts whose x axis is marked [`Axis::linked`] turn its
+//!   generator, and are turned by it.
+
+use askama::Template;
+use serde::Serialize;
+use serde_json::{Map, Value, json};
+
+use super::animation::Animation;
+use super::assets::{self, SCRIPT, STYLE};
+use super::pack::Packed;
+use super::svg;
+
+/// Whether what the page says can be relied on, best first; what is wrong is stamped on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Status {
+    /// Every check passed.
+    Good,
+    /// Holds, with a remark that the reader has to know.
+    Remark,
+    /// A drive that is not to be built as it stands.
+    Caution,
+    /// Measured data had faults, which were repaired or left out.
+    DataFaults,
+    /// Something is wrong with the unit, and it has a name.
+    FaultFound,
+    /// The unit departs from what is nominal, and what does it has no name.
+    NotUnderstood,
+    /// A value is used outside the range it was made for.
+    Extrapolates,
+    /// A bound was missed.
+    BoundMissed,
+    /// Some run did not converge.
+    NotConverged,
+}
+
+impl Status {
+    /// As in the JSON block.
+    pub fn name(self) -> &'static str {
+        match self {
+            Status::Good => "good",
+            Status::Remark => "remark",
+            Status::Caution => "caution",
+            Status::DataFaults => "data faults",
+            Status::FaultFound => "fault found",
+            Status::NotUnderstood => "not understood",
+            Status::Extrapolates => "extrapolates",
+            Status::BoundMissed => "bound missed",
+            Status::NotConverged => "not converged",
+        }
+    }
+
+    /// Whether the command that made the page has failed.
+    pub fn is_failure(self) -> bool {
+        matches!(self, Status::BoundMissed | Status::NotConverged)
+    }
+}
+
+/// A piece of text: words, or an error of the output that follows the unit switch.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Span {
+    /// Words.
+    Plain(String),
+    /// Words that stand out.
+    Strong(String),
+    /// An error in arc-seconds, with so many significant digits.
+    Error {
+        /// The value.
+        arcsec: f64,
+        /// Significant digits.
+        digits: usize,
+    },
+}
+
+/// Text of [`Span`]s.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Text(pub Vec<Span>);
+
+impl Text {
+    /// Text that begins with these words.
+    pub fn new(words: impl Into<String>) -> Text {
+        Text(vec![Span::Plain(words.into())])
+    }
+
+    /// Goes on with words.
+    pub fn plain(mut self, words: impl Into<String>) -> Text {
+        self.0.push(Span::Plain(words.into()));
+        self
+    }
+
+    /// Goes on with words that stand out.
+    pub fn strong(mut self, words: impl Into<String>) -> Text {
+        self.0.push(Span::Strong(words.into()));
+        self
+    }
+
+    /// Goes on with an error of the output, arcsec, to so many significant digits.
+    pub fn error(mut self, arcsec: f64, digits: usize) -> Text {
+        self.0.push(Span::Error { arcsec, digits });
+        self
+    }
+}
+
+impl From<&str> for Text {
+    fn from(words: &str) -> Text {
+        Text::new(words)
+    }
+}
+
+impl From<String> for Text {
+    fn from(words: String) -> Text {
+        Text::new(words)
+    }
+}
+
+/// A number to significant digits, as the page's script writes it.
+pub fn significant(value: f64, digits: usize) -> String {
+    if !value.is_finite() {
+        return "–".into();
+    }
+    let magnitude = if value == 0.0 { digits as f64 - 1.0 } else { value.abs().log10().floor() };
+    let decimals = (digits as f64 - 1.0 - magnitude).clamp(0.0, 6.0) as usize;
+    format!("{value:.decimals$}").replace('-', "−")
+}
+
+impl Span {
+    /// An error as it stands before the script has run.
+    fn in_arcsec(arcsec: &f64, digits: &usize) -> String {
+        format!("{}″", significant(*arcsec, *digits))
+    }
+}
+
+/// Stands for every choice where a figure is the same for all of them.
+pub const EVERY_CHOICE: &str = "every";
+
+/// Something the page can show one at a time.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Choice {
+    /// Looked up by; letters, digits and hyphens.
+    pub id: String,
+    /// What the reader sees.
+    pub name: String,
+}
+
+/// The answer.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Headline {
+    /// Of which choice; `None` for all.
+    pub choice: Option<String>,
+    /// One sentence.
+    pub answer: Text,
+    /// The one number.
+    pub number: Text,
+    /// What it is.
+    pub number_is: String,
+}
+
+/// How much a reader wants to know.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Detail {
+    /// Always open.
+    Summary,
+    /// For those who work with the drive.
+    Engineering,
+    /// Everything.
+    Full,
+}
+
+impl Detail {
+    /// As the page's script knows it.
+    fn name(self) -> &'static str {
+        match self {
+            Detail::Summary => "summary",
+            Detail::Engineering => "engineering",
+            Detail::Full => "full",
+        }
+    }
+}
+
+/// A part of the page under a title.
+#[derive(Debug, Clone)]
+pub struct Section {
+    /// Anchor; letters, digits and hyphens.
+    pub id: String,
+    /// Title.
+    pub title: String,
+    /// From which level of detail on it is open.
+    pub detail: Detail,
+    /// What is in it.
+    pub blocks: Vec<Block>,
+}
+
+/// A piece of a section.
+#[derive(Debug, Clone)]
+pub enum Block {
+    /// A paragraph.
+    Paragraph {
+        /// Of which choice; `None` for all.
+        choice: Option<String>,
+        /// The words.
+        text: Text,
+    },
+    /// A table.
+    Table {
+        /// Of which choice; `None` for all.
+        choice: Option<String>,
+        /// The table.
+        table: Table,
+    },
+    /// A figure.
+    Figure(Figure),
+}
+
+/// A table; the first cell of each row is its heading.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Table {
+    /// What it shows.
+    pub caption: String,
+    /// Headings of the columns.
+    pub header: Vec<String>,
+    /// Rows, as long as the header.
+    pub rows: Vec<Vec<Text>>,
+}
+
+impl Block {
+    /// Words, whatever is chosen.
+    pub fn paragraph(text: impl Into<Text>) -> Block {
+        Block::Paragraph { choice: None, text: text.into() }
+    }
+}
+
+impl Section {
+    /// How to read the page: the last section, folded.
+    pub fn reading(blocks: Vec<Block>) -> Section {
+        Section { id: "reading".into(), title: "How to read this page".into(), detail: Detail::Full, blocks }
+    }
+}
+
+impl Table {
+    /// Whether a column holds words and no numbers: those stand to the left.
+    fn is_words(&self, column: &usize) -> bool {
+        let cells = || self.rows.iter().filter_map(|row| row.get(*column)).filter_map(|text| text.0.first());
+        let words = |span: &Span| match span {
+            Span::Plain(words) | Span::Strong(words) => words.chars().next().is_some_and(char::is_alphabetic),
+            Span::Error { .. } => false,
+        };
+        cells().count() > 0 && cells().all(words)
+    }
+}
+
+/// A numbered figure.
+#[derive(Debug, Clone)]
+pub struct Figure {
+    /// Anchor; letters, digits and hyphens.
+    pub id: String,
+    /// What it shows, in a few words.
+    pub title: String,
+    /// What there is to see.
+    pub caption: Text,
+    /// What it shows, for those who cannot see it.
+    pub alt: String,
+    /// The figure itself.
+    pub body: FigureBody,
+}
+
+/// What is drawn.
+#[derive(Debug, Clone)]
+pub enum FigureBody {
+    /// The drive, to scale, in motion: the page's animations.
+    Drive,
+    /// The flexspline with its sleeve, in three dimensions: what the page's animations have of it.
+    Sleeve,
+    /// Curves and points over an axis, one chart to each choice.
+    Lines {
+        /// Across.
+        x: Axis,
+        /// Up.
+        y: Axis,
+        /// By choice.
+        charts: Vec<(String, Lines)>,
+    },
+    /// A field over two axes in colour, one to each choice.
+    Field {
+        /// Across.
+        x: Axis,
+        /// Up.
+        y: Axis,
+        /// In colour.
+        z: Axis,
+        /// By choice.
+        fields: Vec<(String, Field)>,
+    },
+}
+
+/// Kinds of values, which decide the unit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Quantity {
+    /// Small angle at the output, stored in arcsec, shown in what the reader picks.
+    Error,
+    /// Angle, degrees.
+    Degree,
+    /// Torque, N m.
+    Torque,
+    /// Stress or pressure, MPa.
+    Stress,
+    /// Force, N.
+    Force,
+    /// Temperature, °C.
+    Temperature,
+    /// Time, s.
+    Second,
+    /// Angle, whole turns.
+    Turn,
+    /// Speed, rad/s.
+    Speed,
+    /// A number without a unit.
+    Count,
+    /// A whole number without a unit.
+    Whole,
+}
+
+impl Quantity {
+    /// Unit as stored, for headings of CSV columns and static pictures.
+    pub fn stored_unit(self) -> &'static str {
+        match self {
+            Quantity::Error => "arcsec",
+            Quantity::Degree => "°",
+            Quantity::Torque => "N·m",
+            Quantity::Stress => "MPa",
+            Quantity::Force => "N",
+            Quantity::Temperature => "°C",
+            Quantity::Second => "s",
+            Quantity::Turn => "turns",
+            Quantity::Speed => "rad/s",
+            Quantity::Count | Quantity::Whole => "",
+        }
+    }
+}
+
+/// An axis.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Axis {
+    /// Its title, without unit.
+    pub label: String,
+    /// What it measures.
+    pub quantity: Quantity,
+    /// Whether it is the generator angle from a pitch's beginning, and linked with the drive.
+    pub linked: bool,
+    /// Linear between minus and plus this, logarithmic beyond, for what changes most around zero.
+    pub stretched: Option<f64>,
+}
+
+impl Axis {
+    /// An axis of its own.
+    pub fn new(label: impl Into<String>, quantity: Quantity) -> Axis {
+        Axis { label: label.into(), quantity, linked: false, stretched: None }
+    }
+
+    /// The generator angle over a pitch, degrees, linked with the drive.
+    pub fn linked(label: impl Into<String>) -> Axis {
+        Axis { label: label.into(), quantity: Quantity::Degree, linked: true, stretched: None }
+    }
+
+    /// This axis, linear within `within` of zero and logarithmic beyond.
+    pub fn stretched(self, within: f64) -> Axis {
+        Axis { stretched: Some(within), ..self }
+    }
+
+    pub(crate) fn title(&self) -> String {
+        match self.quantity.stored_unit() {
+            "" => self.label.clone(),
+            unit => format!("{}, {unit}", self.label),
+        }
+    }
+}
+
+/// How a series is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Mark {
+    /// A line.
+    Line,
+    /// A line that values which are not finite break; other lines join across them.
+    Broken,
+    /// A dashed line.
+    Dashed,
+    /// Points alone.
+    Points,
+    /// Many points, small.
+    Dots,
+}
+
+/// Points of a chart that belong together.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Series {
+    /// In the legend.
+    pub name: String,
+    /// How it is drawn.
+    pub mark: Mark,
+    /// Which of the six colours; equal colours belong together.
+    pub colour: usize,
+    /// `[x, y]`, x ascending.
+    #[serde(skip)]
+    pub points: Vec<[f64; 2]>,
+}
+
+/// A level across a chart that has a name, such as a bound.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Limit {
+    /// Its name.
+    pub name: String,
+    /// Where.
+    pub y: f64,
+}
+
+/// A place across a chart that has a name, such as the border between two sessions.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Upright {
+    /// Its name.
+    pub name: String,
+    /// Where.
+    pub x: f64,
+}
+
+/// One chart.
+#[derive(Debug, Clone, PartialEq, Serialize, Default)]
+pub struct Lines {
+    /// Curves and points.
+    pub series: Vec<Series>,
+    /// Named levels.
+    pub limits: Vec<Limit>,
+    /// Named places.
+    pub uprights: Vec<Upright>,
+}
+
+impl Lines {
+    /// Columns: every x that occurs, then each series at it, NaN where it has no point.
+    fn columns(&self) -> Vec<Vec<f64>> {
+        let mut x: Vec<f64> = self.series.iter().flat_map(|s| s.points.iter().map(|p| p[0])).collect();
+        x.sort_by(f64::total_cmp);
+        x.dedup();
+        let mut columns = vec![x.clone()];
+        for series in &self.series {
+            let mut column = vec![f64::NAN; x.len()];
+            for [at, y] in &series.points {
+                // Two points of one series at one x (a jump) keep the later; series that jump are split by who makes them.
+                column[x.partition_point(|v| v < at)] = *y;
+            }
+            columns.push(column);
+        }
+        columns
+    }
+}
+
+/// A field over a grid.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Field {
+    /// Nodes across, ascending.
+    pub x: Vec<f64>,
+    /// Nodes up, ascending.
+    pub y: Vec<f64>,
+    /// Values, row by row from the lowest; NaN where there is none.
+    pub z: Vec<f64>,
+}
+
+/// A report.
+#[derive(Debug, Clone)]
+pub struct Page {
+    /// What it is about, for the browser's tab and the top of the page.
+    pub title: String,
+    /// Which command: `tables`, `validate`, …
+    pub command_name: &'static str,
+    /// Whether it can be relied on.
+    pub status: Status,
+    /// What is stamped on it beside that.
+    pub also: Vec<Status>,
+    /// What makes the status what it is, a sentence each.
+    pub remarks: Vec<String>,
+    /// What can be selected, at least one.
+    pub choices: Vec<Choice>,
+    /// What the selector is of, in one word.
+    pub choice_is: &'static str,
+    /// Answers, one for all or one to each choice.
+    pub headlines: Vec<Headline>,
+    /// Sections.
+    pub sections: Vec<Section>,
+    /// Drives in motion.
+    pub animations: Vec<Animation>,
+    /// What made the page: name and value.
+    pub provenance: Vec<(String, String)>,
+    /// The results for programs, by name.
+    pub results: Map<String, Value>,
+}
+
+/// Version of the JSON block.
+pub const PAGE_SCHEMA: u32 = 1;
+
+/// What marks the JSON block of a page.
+const BLOCK: &str = "id=\"flexspline-report\">";
+
+/// What a page that was written says of itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Written {
+    /// Which command wrote it.
+    pub command: String,
+    /// What it is about.
+    pub title: String,
+    /// The values of what made it.
+    provenance: Vec<String>,
+}
+
+impl Written {
+    /// Of the text of a page; nothing of what is none of ours.
+    pub fn of(html: &str) -> Option<Written> {
+        let (_, block) = html.split_once(BLOCK)?;
+        let json: Value = serde_json::from_str(block.split_once("</script")?.0).ok()?;
+        let word = |name: &str| json[name].as_str().map(str::to_owned);
+        let command = word("report").filter(|name| name.bytes().all(|letter| letter.is_ascii_lowercase()))?;
+        let provenance = json["provenance"].as_object()?.values();
+        let provenance = provenance.filter_map(|value| value.as_str().map(str::to_owned)).collect();
+        Some(Written { command, title: word("title")?, provenance })
+    }
+
+    /// Whether a value is among what made it, such as the hash of a drive.
+    pub fn names(&self, value: &str) -> bool {
+        self.provenance.iter().any(|made| made == value)
+    }
+}
+
+#[derive(Template)]
+#[template(path = "report.html")]
+struct PageTemplate<'a> {
+    page: &'a Page,
+    numbered: Vec<(usize, &'a Figure)>,
+    json: String,
+    packed: Vec<Packed>,
+    policy: String,
+    style: &'a str,
+    script: String,
+    version: &'a str,
+}
+
+impl PageTemplate<'_> {
+    fn number(&self, figure: &Figure) -> usize {
+        self.numbered.iter().find(|(_, f)| f.id == figure.id).map_or(0, |(number, _)| *number)
+    }
+
+    /// Choice, its name and the sketch.
+    fn sketches(&self, figure: &Figure) -> Vec<(String, String, String)> {
+        let named = |choice: &str| {
+            self.page.choices.iter().find(|c| c.id == choice).map_or_else(String::new, |c| c.name.clone())
+        };
+        match &figure.body {
+            FigureBody::Lines { x, y, charts } => {
+                charts.iter().map(|(choice, chart)| (choice.clone(), named(choice), svg::lines(x, y, chart))).collect()
+            }
+            FigureBody::Drive => {
+                let of = |a: &Animation| (a.kind.name().to_owned(), named(a.kind.name()), svg::drive(a));
+                self.page.animations.iter().take(1).map(of).collect()
+            }
+            FigureBody::Field { .. } | FigureBody::Sleeve => Vec::new(),
+        }
+    }
+}
+
+impl Page {
+    /// The page, whole: one file that asks the network for nothing.
+    pub fn html(&self) -> Result<String, askama::Error> {
+        let figures = || {
+            self.sections.iter().flat_map(|section| &section.blocks).filter_map(|block| match block {
+                Block::Figure(figure) => Some(figure),
+                _ => None,
+            })
+        };
+        let mut packed: Vec<Packed> = self.animations.iter().flat_map(Animation::pack).collect();
+        let mut described = Map::new();
+        for (number, figure) in (1..).zip(figures()) {
+            let (value, arrays) = describe(number, figure);
+            described.insert(figure.id.clone(), value);
+            packed.extend(arrays);
+        }
+        let animations: Map<String, Value> =
+            self.animations.iter().map(|a| (a.kind.to_string(), animation_json(a))).collect();
+        let json = json!({
+            "schema_version": PAGE_SCHEMA,
+            "report": self.command_name,
+            "title": self.title,
+            "status": self.status.name(),
+            "also": self.also.iter().map(|status| status.name()).collect::<Vec<_>>(),
+            "remarks": self.remarks,
+            "choices": self.choices,
+            "results": self.results,
+            "provenance": self.provenance.iter().cloned().collect::<std::collections::BTreeMap<_, _>>(),
+            "figures": described,
+            "animations": animations,
+        });
+        let script = SCRIPT.clone();
+        PageTemplate {
+            page: self,
+            numbered: (1..).zip(figures()).collect(),
+            // A script element ends at the first "</script", whatever surrounds it.
+            json: serde_json::to_string(&json).expect("plain values").replace('<', "\\u003c"),
+            packed,
+            policy: assets::policy(STYLE.as_str(), &script),
+            style: STYLE.as_str(),
+            script,
+            version: env!("CARGO_PKG_VERSION"),
+        }
+        .render()
+    }
+}
+
+/// What the script is told of a figure, and its numbers.
+fn describe(number: usize, figure: &Figure) -> (Value, Vec<Packed>) {
+    let name = |choice: &str| format!("{choice}/{}", figure.id);
+    match &figure.body {
+        FigureBody::Drive => (json!({ "number": number, "kind": "drive", "title": figure.title }), Vec::new()),
+        FigureBody::Sleeve => (json!({ "number": number, "kind": "sleeve", "title": figure.title }), Vec::new()),
+        FigureBody::Lines { x, y, charts } => {
+            let arrays = charts.iter().map(|(choice, chart)| {
+                let columns = chart.columns();
+                let shape = [columns.len(), columns[0].len()];
+                Packed::floats(name(choice), &shape, columns.into_iter().flatten())
+            });
+            let by_choice: Map<String, Value> =
+                charts.iter().map(|(choice, chart)| (choice.clone(), json!(chart))).collect();
+            let value = json!({ "number": number, "kind": "lines", "title": figure.title, "x": x, "y": y, "charts": by_choice });
+            (value, arrays.collect())
+        }
+        FigureBody::Field { x, y, z, fields } => {
+            let arrays = fields.iter().flat_map(|(choice, field)| {
+                let part = |part: &str| format!("{}/{part}", name(choice));
+                [
+                    Packed::floats(part("x"), &[field.x.len()], field.x.iter().copied()),
+                    Packed::floats(part("y"), &[field.y.len()], field.y.iter().copied()),
+                    Packed::floats(part("z"), &[field.y.len(), field.x.len()], field.z.iter().copied()),
+                ]
+            });
+            let choices: Vec<&String> = fields.iter().map(|(choice, _)| choice).collect();
+            let value = json!({ "number": number, "kind": "field", "title": figure.title, "x": x, "y": y, "z": z, "charts": choices });
+            (value, arrays.collect())
+        }
+    }
+}
+
+fn animation_json(a: &Animation) -> Value {
+    let wheel = |w: &super::animation::WheelMotion| json!({ "sectors": w.sectors, "samples": w.samples });
+    let rows: Vec<Value> = a
+        .rows
+        .iter()
+        .map(|row| {
+            json!({
+                "generator_rad": row.generator_rad,
+                "error_arcsec": row.error_arcsec,
+                "flank_contacts": row.flank_contacts,
+                "max_von_mises_mpa": row.max_von_mises_mpa,
+                "peak_flank_pressure_mpa": row.peak_flank_pressure_mpa,
+                "peak_generator_pressure_mpa": row.peak_generator_pressure_mpa,
+            })
+        })
+        .collect();
+    json!({
+        "torque_n_m": a.torque_n_m,
+        "temperature_c": a.temperature_c,
+        "ratio": a.ratio,
+        "frames": super::animation::FRAMES,
+        "sleeve": a.sleeve,
+        "flexspline": wheel(&a.flexspline),
+        "circular_spline": wheel(&a.circular_spline),
+        "bore_radius_mm": a.bore_radius_mm,
+        "error_arcsec": a.error_arcsec,
+        "colour_end_mpa": a.colour_end_mpa,
+        "peak_mpa": a.peak_mpa,
+        "rows": rows,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HOSTILE: &str = r#"</script><script>alert(1)</script>"'&{{1}}<!--"#;
+
+    fn page(status: Status) -> Page {
+        let series = Series { name: HOSTILE.into(), mark: Mark::Line, colour: 0, points: vec![[0.0, 1.0], [1.0, 3.0]] };
+        let lines = Lines {
+            series: vec![series],
+            limits: vec![Limit { name: HOSTILE.into(), y: 2.0 }],
+            uprights: vec![Upright { name: HOSTILE.into(), x: 0.5 }],
+        };
+        let figure = Figure {
+            id: "figure".into(),
+            title: HOSTILE.into(),
+            caption: HOSTILE.into(),
+            alt: HOSTILE.into(),
+            body: FigureBody::Lines {
+                x: Axis::new(HOSTILE, Quantity::Torque).stretched(0.02),
+                y: Axis::new(HOSTILE, Quantity::Error),
+                charts: vec![("one".into(), lines)],
+            },
+        };
+        Page {
+            title: HOSTILE.into(),
+            command_name: "tables",
+            status,
+            also: Vec::new(),
+            remarks: vec![HOSTILE.into()],
+            choices: vec![Choice { id: "one".into(), name: HOSTILE.into() }],
+            choice_is: "Generator",
+            headlines: vec![Headline {
+                choice: Some("one".into()),
+                answer: Text::new(HOSTILE).error(-12.345, 3),
+                number: Text::default().error(0.5, 2),
+                number_is: HOSTILE.into(),
+            }],
+            sections: vec![Section {
+                id: "section".into(),
+                title: HOSTILE.into(),
+                detail: Detail::Summary,
+                blocks: vec![Block::Figure(figure)],
+            }],
+            animations: Vec::new(),
+            provenance: vec![(HOSTILE.into(), HOSTILE.into())],
+            results: Map::from_iter([(HOSTILE.to_owned(), Value::from(HOSTILE))]),
+        }
+    }
+
+    /// The text between the first `<script … id="flexspline-report">` and the next `</script`, as a browser ends it.
+    fn json_block(html: &str) -> Value {
+        let (_, after) = html.split_once(r#"id="flexspline-report">"#).unwrap();
+        serde_json::from_str(after.split_once("</script").unwrap().0).unwrap()
+    }
+
+    #[test]
+    fn hostile_text_is_text_wherever_it_stands() {
+        let html = page(Status::Good).html().unwrap();
+        // Outside our own script and style nothing of it is markup.
+        assert_eq!(html.matches("<script>alert").count(), 0);
+        assert_eq!(html.matches("<script").count(), 3, "JSON, one packed array, the module");
+        assert_eq!(html.matches("<!--").count(), 0);
+        let json = json_block(&html);
+        assert_eq!(json["title"], HOSTILE);
+        assert_eq!(json["figures"]["figure"]["charts"]["one"]["series"][0]["name"], HOSTILE);
+        assert_eq!(json["results"][HOSTILE], HOSTILE);
+    }
+
+    #[test]
+    fn a_page_says_of_itself_which_command_wrote_it_and_of_what() {
+        let written = Written::of(&page(Status::Good).html().unwrap()).unwrap();
+        assert_eq!((written.command.as_str(), written.title.as_str()), ("tables", HOSTILE));
+        assert!(written.names(HOSTILE) && !written.names("tables"));
+        assert_eq!(Written::of("<!doctype html><p>another page"), None);
+        assert_eq!(Written::of("id=\"flexspline-report\">{\"report\":\"../x\"}</script>"), None);
+    }
+
+    #[test]
+    fn the_status_is_on_the_page_in_the_json_and_decides_the_command() {
+        for (status, name, failure) in [
+            (Status::Good, "good", false),
+            (Status::Remark, "remark", false),
+            (Status::Caution, "caution", false),
+            (Status::DataFaults, "data faults", false),
+            (Status::FaultFound, "fault found", false),
+            (Status::NotUnderstood, "not understood", false),
+            (Status::Extrapolates, "extrapolates", false),
+            (Status::BoundMissed, "bound missed", true),
+            (Status::NotConverged, "not converged", true),
+        ] {
+            let html = page(status).html().unwrap();
+            assert_eq!(json_block(&html)["status"], name);
+            assert!(html.contains(&format!(r#"class="stamp {}">{name}<"#, name.replace(' ', "-"))), "{name}");
+            assert_eq!(status.is_failure(), failure);
+        }
+    }
+
+    #[test]
+    fn errors_carry_their_value_for_the_unit_switch() {
+        let html = page(Status::Good).html().unwrap();
+        assert!(html.contains(r#"<data class="error" value="-12.345" data-digits="3">−12.3″</data>"#));
+    }
+
+    #[test]
+    fn numbers_have_significant_digits() {
+        for (value, digits, text) in
+            [(0.0, 3, "0"), (12.345, 3, "12.3"), (-0.012345, 2, "−0.012"), (1234.5, 2, "1234"), (f64::NAN, 2, "–")]
+        {
+            assert_eq!(significant(value, digits), text);
+        }
+    }
+
+    #[test]
+    fn series_of_different_points_share_their_axis() {
+        let of =
+            |points: &[[f64; 2]]| Series { name: String::new(), mark: Mark::Line, colour: 0, points: points.into() };
+        let lines = Lines { series: vec![of(&[[0.0, 1.0], [2.0, 3.0]]), of(&[[1.0, 5.0]])], ..Lines::default() };
+        let columns = lines.columns();
+        assert_eq!(columns[0], [0.0, 1.0, 2.0]);
+        assert!(columns[1][1].is_nan() && columns[1][2] == 3.0 && columns[2][1] == 5.0);
+    }
+}

@@ -1,1 +1,0 @@
-../../core/c99/flexspline_table.h
