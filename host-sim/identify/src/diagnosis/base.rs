@@ -133,7 +133,7 @@ pub struct Base {
 /// What floats where angles are read at other instants than is known, s.
 pub const BETWEEN_READINGS: &str = "time between the readings";
 /// What floats as the output takes a time to go to its other flank, s: that of a lag which does as much to the error as this time says. Beside
-/// the lag that the rows tell best ([`flank_lag`]) it is that lag to first order.
+/// the lag that the rows tell best (`flank_lag`) it is that lag to first order.
 pub const CHANGE_OF_FLANK: &str = "time of a change of flank";
 /// The output goes from one flank to the other in some milliseconds. *Guess*.
 pub(super) const FLANK_S: f64 = 5e-3;
