@@ -3,6 +3,7 @@
 
   picture.py page  REPORT.html[#ID] OUT.png [WIDTHxHEIGHT]   a report, from the top or from a part of it
   picture.py curve FILE.csv X Y[,Y...] OUT.png               columns of a CSV file as lines
+  picture.py columns FILE.csv OUT.png                        all of them, over the first
 """
 
 import csv
@@ -51,7 +52,9 @@ def drawing(xs, curves, x_name):
     for (name, ys), colour, place in zip(curves, COLOURS, range(9)):
         points = " ".join(f"{x_of(x):.1f},{y_of(y):.1f}" for x, y in zip(xs, ys))
         parts.append(f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="2"/>')
-        parts.append(f'<text x="{left + 10 + 220 * place}" y="20" fill="{colour}">{html.escape(name)}</text>')
+        # A name is some seven pixels a letter wide, and has 220 at least.
+        before = sum(max(220, 7 * len(other) + 20) for other, _ in curves[:place])
+        parts.append(f'<text x="{left + 10 + before}" y="20" fill="{colour}">{html.escape(name)}</text>')
     return (f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" '
             f'style="font:14px sans-serif">{"".join(parts)}</svg>')  # fmt: skip
 
@@ -62,11 +65,14 @@ def main(kind, file, *rest):
         path, _, part = file.partition("#")
         photograph(pathlib.Path(path).resolve().as_uri() + (f"#{part}" if part else ""), out, size)
         return
-    x_name, y_names, out = rest
     with open(file, newline="") as lines:
         rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    if kind == "columns":
+        (x_name, *y_names), out = list(rows[0]), rest[0]
+    else:
+        x_name, y_names, out = rest[0], rest[1].split(","), rest[2]
     xs = [float(row[x_name]) for row in rows]
-    curves = [(name, [float(row[name]) for row in rows]) for name in y_names.split(",")]
+    curves = [(name, [float(row[name]) for row in rows]) for name in y_names]
     with tempfile.TemporaryDirectory() as folder:
         page = pathlib.Path(folder, "curve.html")
         page.write_text(f"<!doctype html><meta charset=utf-8><body style='margin:8px'>{drawing(xs, curves, x_name)}")

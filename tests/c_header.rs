@@ -177,7 +177,7 @@ fn every_function_is_called_on_the_target_fuzzed_and_on_the_page() {
     for (what, text) in [
         ("tests/firmware/c", read("tests/firmware/c/main.c") + &read("tests/firmware/c/beside.c")),
         ("tests/fuzz/src/c_interface.rs", read("tests/fuzz/src/c_interface.rs")),
-        ("docs/c_interface.md", read("docs/c_interface.md")),
+        ("docs/reference/c_interface.md", read("docs/reference/c_interface.md")),
     ] {
         let words: BTreeSet<&str> = text.split(|c: char| !c.is_alphanumeric() && c != '_').collect();
         let functions = functions(&kept_header());

@@ -44,7 +44,7 @@ const HELPERS: [&str; 9] = ["cd", "cp", "cmp", "mkdir", "cat", "head", "awk", "l
 /// Parts of `tests/run` that run blocks marked with their name.
 const PARTS: [&str; 6] = ["firmware", "bundle", "c_interface", "campaign", "fmu", "python"];
 /// The page whose Python is run, by the tests of `host-sim/python`.
-const PYTHON: &str = "docs/python.md";
+const PYTHON: &str = "docs/how-to/python.md";
 /// Pictures of examples are small, bytes.
 const LARGEST_PICTURE: u64 = 150_000;
 /// Lines of an example's page: one screen.

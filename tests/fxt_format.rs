@@ -1,4 +1,4 @@
-//! `docs/fxt.md` says what is in a table image: a parser that takes offsets and types from the tables on that page, and evaluates
+//! `docs/reference/fxt.md` says what is in a table image: a parser that takes offsets and types from the tables on that page, and evaluates
 //! what they hold by its formulas, agrees with the core in every number.
 //!
 //! Nothing of the core's reader is used to read: bytes, page and arithmetic in `f64` are this file's own. References: the numbers that
@@ -16,7 +16,7 @@ use flexspline_sim::drive::{Drive as HostDrive, GeneratorKind as HostKind};
 use flexspline_sim::tables::samples;
 use flexspline_sim::tables::{SampleOptions, from_samples};
 
-const PAGE: &str = include_str!("../docs/fxt.md");
+const PAGE: &str = include_str!("../docs/reference/fxt.md");
 /// Rad in a count.
 const COUNT: f64 = TAU / 4_294_967_296.0;
 
@@ -35,7 +35,7 @@ impl Field {
                 "bytes" | "text" | "u8" => 1,
                 "u16" => 2,
                 "u32" | "f32" => 4,
-                other => panic!("docs/fxt.md: type {other}"),
+                other => panic!("docs/reference/fxt.md: type {other}"),
             }
     }
 }
@@ -69,7 +69,7 @@ struct Image<'a> {
 
 impl<'a> Image<'a> {
     fn field(&self, name: &str) -> &Field {
-        self.fields.get(name).unwrap_or_else(|| panic!("docs/fxt.md has no {name}"))
+        self.fields.get(name).unwrap_or_else(|| panic!("docs/reference/fxt.md has no {name}"))
     }
     fn raw(&self, name: &str) -> &'a [u8] {
         let field = self.field(name);

@@ -1,5 +1,5 @@
 //! Tables for others' playback hold what their devices play: each file is read here by a parser of its own, written from the
-//! description of the format (docs/doors.md), and looked up by a simulation of its own, forward from the command or through time,
+//! description of the format (docs/how-to/export_to_controllers.md), and looked up by a simulation of its own, forward from the command or through time,
 //! where the program goes backward from the generator.
 //!
 //! The unit: HHD-95 with the cam by its table of contact FEM, with a pitch error, two eccentricities and wider clearance,

@@ -13,7 +13,7 @@ import sys
 
 # What is of use without the source. Left out are pages for whoever changes the program, and examples that cargo builds.
 SHIPPED = ("docs/", "examples/", "core/include/", "core/c99/", "tests/firmware/samples/", "host-sim/report/web/report.png", "CHANGELOG.md", "LICENSE")
-LEFT_OUT = ("docs/add_a_", "docs/release.md", "examples/antenna_", "examples/learning_c")
+LEFT_OUT = ("docs/how-to/add_a_", "docs/how-to/release.md", "examples/antenna_", "examples/learning_c")
 LINK = re.compile(r"(!?)\[([^\]]*)\]\(([^)\s]+)\)")
 FENCE = re.compile(r"^\s*```")
 

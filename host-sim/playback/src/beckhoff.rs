@@ -1,5 +1,5 @@
 //! Beckhoff: the table of `MC_TableBasedPositionCompensation` (TwinCAT NC, library Tc2_MC2), and the compensation value list
-//! `kw.ssfk` of TwinCAT CNC. Both are closed: simulated from their manual pages (docs/doors.md).
+//! `kw.ssfk` of TwinCAT CNC. Both are closed: simulated from their manual pages (docs/how-to/export_to_controllers.md).
 
 use std::f64::consts::TAU;
 use std::fmt::Write;

@@ -129,7 +129,7 @@ fn padded(text: &str, length: usize) -> Vec<u8> {
     bytes
 }
 
-/// What `CFE_TBL_Register` is given: the image is of this format, as long as it says, and its CRC-32 (docs/fxt.md) holds. The core
+/// What `CFE_TBL_Register` is given: the image is of this format, as long as it says, and its CRC-32 (docs/reference/fxt.md) holds. The core
 /// checks the rest when it accepts the image.
 const VALIDATE: &str = r#"#include "flexspline_tbl.h"
 

@@ -1,7 +1,7 @@
 //! F´: the image of the core as parameters, for `fprime-prm-write` of fprime-gds, and the FPP that declares them.
 //!
 //! A parameter has to fit the framework's buffer (`FW_PARAM_BUFFER_MAX_SIZE`: 506 bytes by default), so the image comes in parts
-//! of one size, the last filled with zeros; the image says its own length (docs/fxt.md).
+//! of one size, the last filled with zeros; the image says its own length (docs/reference/fxt.md).
 
 use std::fmt::Write;
 

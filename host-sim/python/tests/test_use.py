@@ -180,7 +180,7 @@ def test_the_notebook_runs_and_is_stripped(tmp_path: Path) -> None:
 
 def test_the_python_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, image: Path, log_file: Path) -> None:
     """Block after block, as they stand there, in a folder with the table and the log that the page speaks of."""
-    page = (PROJECT / "docs/python.md").read_text()
+    page = (PROJECT / "docs/how-to/python.md").read_text()
     blocks = re.findall(r"^```python\n(.*?)^```", page, flags=re.MULTILINE | re.DOTALL)
     assert len(blocks) >= 6
     (tmp_path / "out/log").mkdir(parents=True)
@@ -190,7 +190,7 @@ def test_the_python_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
     for block in blocks:
-        exec(compile(block, "docs/python.md", "exec"), names)
+        exec(compile(block, "docs/how-to/python.md", "exec"), names)
     for name in flexspline.__all__:
         kind = getattr(flexspline, name)
         if callable(kind) and not isinstance(kind, type):

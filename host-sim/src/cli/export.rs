@@ -32,9 +32,9 @@ const LARGEST_STEP_RAD: f64 = 0.1;
 /// csv: the outlines of tooth, space and generator, undeformed, each in its own frame.
 /// inp: the undeformed mesh with contact, holding and load as a deck for CalculiX and Abaqus, which deforms, loads and turns
 /// the drive; mm, N, MPa, a slice of 1 mm. Of a drive with a sleeve in three dimensions (CUP-95): the flexspline alone, in solids, under w0.
-/// fmu: a table (--tables), or a joint with mass, for simulators that import FMI 2.0 co-simulation: docs/fmu.md.
+/// fmu: a table (--tables), or a joint with mass, for simulators that import FMI 2.0 co-simulation: docs/how-to/fmu.md.
 /// eqmod, onstepx, linuxcnc, beckhoff, moteus, odrive, ros2, cfs, fprime: a table (--tables) resampled for the lookup of that device,
-/// that lookup simulated, and what it leaves, on the table's own model and on a unit's data (--data): docs/doors.md.
+/// that lookup simulated, and what it leaves, on the table's own model and on a unit's data (--data): docs/how-to/export_to_controllers.md.
 #[derive(Debug, Args)]
 #[command(
     mut_args(beside_tables),

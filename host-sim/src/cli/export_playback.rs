@@ -51,7 +51,7 @@ impl PlaybackFormat {
         }
     }
 
-    /// Where the lookup that is simulated is described; docs/doors.md names files and versions.
+    /// Where the lookup that is simulated is described; docs/how-to/export_to_controllers.md names files and versions.
     fn source(self) -> &'static str {
         match self {
             EqmodFormat => "PEC.bas of EQASCOM",

@@ -46,7 +46,7 @@ pub(super) struct Fly {
 impl Fly {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         if let Some(option) = context.changes_the_drive() {
-            let what = "a flight has the unit of its scenario; allowed: table, load, servo and more in a scenario file (docs/motion.md)";
+            let what = "a flight has the unit of its scenario; allowed: table, load, servo and more in a scenario file (docs/explanation/motion.md)";
             return Err(Failure::BadInput(format!("{option}: {what}")));
         }
         if self.scenario == "all" || !self.vary.is_empty() {

@@ -16,7 +16,7 @@ const CUP: [f64; 4] = [0.5, 0.011, 2.0, 0.5];
 /// Shortest tube of a cup, over the pitch diameter: a guess. Of a face wider than usual the cup is longer, not without a tube.
 const SHORTEST_TUBE: f64 = 0.1;
 /// Load of a ball for its stiffness, N, of a drive with a pitch diameter of 63.5 mm (size 25): between the 46 N below T1 and the 154 N above T2
-/// that contact FEM has there (docs/hermetic.md). Forces go with the square of the size.
+/// that contact FEM has there (docs/explanation/third_dimension.md). Forces go with the square of the size.
 const BALL_N: f64 = 100.0;
 const BALL_N_AT_MM: f64 = 63.5;
 /// Preload of S-shaped teeth, µm, as of S-95. A guess: drives of catalogues have no play, and how much deeper their teeth mesh is not published.
@@ -228,7 +228,7 @@ mod tests {
             whole.check().unwrap();
             assert_eq!(left_out(&whole).len(), 2);
         }
-        // Size 25, as its parts were taken one by one in hermetic.md: a wall of 0.7 mm.
+        // Size 25, as its parts were taken one by one in third_dimension.md: a wall of 0.7 mm.
         let size_25 = made(200, 0.3175).drive;
         assert!(sets(&size_25).contains(&"sleeve.wall_mm=0.699".to_owned()), "{:?}", sets(&size_25));
     }

@@ -34,7 +34,7 @@ const PARTIAL: &str = "results.partial.csv";
 /// Where no equilibrium is found the last one is told, with its load and wind-up, and the rows so far are in results.partial.csv: those of
 /// the path, or of the loads that came on. Finer steps have been tried then.
 ///
-/// Where the drive's file has a [data_sheet] its figures stand beside those computed, with their ratio (docs/design.md).
+/// Where the drive's file has a [data_sheet] its figures stand beside those computed, with their ratio (docs/how-to/design.md).
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:

@@ -17,7 +17,7 @@ const HARMONICS: [u32; 6] = [2, 4, 6, 8, 10, 12];
 ///
 /// A generator that makes the rim of a cup oval bends it; the cup cones and hardly resists. The rim in the middle of a closed (hermetic)
 /// sleeve cannot cone to both sides: the walls stretch, and forces grow from tens of newtons to thousands. Computed with thin
-/// shells, one Fourier harmonic at a time; docs/hermetic.md says how. The sizes are those of [sleeve] in the drive file: kind (hermetic,
+/// shells, one Fourier harmonic at a time; docs/explanation/third_dimension.md says how. The sizes are those of [sleeve] in the drive file: kind (hermetic,
 /// cup, hat, springs, none), wall_mm, flange_side_mm, bottom_side_mm, flange (rigid, diaphragm), bottom (disc, plate, clamped).
 ///
 /// K is the amplitude of the reaction over that of the displacement, full circle. `line`: pressed on the middle line of the rim;

@@ -17,7 +17,7 @@ use crate::data_sheet::{DataSheet, FIGURES};
 use flexspline_mechanics::drive::GeneratorKind;
 
 /// Variants of each generator that are computed first, at least, and for each field and one more. Guesses. With these a study of 200 variants
-/// of two fields and four generators computes 227 of 800 runs (docs/commands.md, "200 variants"); each takes 0.3 to 0.8 s of processor.
+/// of two fields and four generators computes 227 of 800 runs (docs/reference/commands.md, "200 variants"); each takes 0.3 to 0.8 s of processor.
 const COMPUTED: usize = 48;
 const COMPUTED_PER_FIELD: usize = 12;
 /// Variants of each generator that are computed because nothing beats them, at most. A guess: more than a designer looks at.

@@ -99,7 +99,7 @@ pub mod verdict {
     /// Share of the square of what is beyond noise that may stay without any description where causes are named. *Chosen*.
     pub const MOST_UNEXPLAINED: f64 = 0.5;
     /// What is left of an explained error is no more than so many times the noise, wander with it. *Source*: where abstention begins in the
-    /// method that `docs/theory.md` describes.
+    /// method that `docs/explanation/theory.md` describes.
     pub const NEAR_NOISE: f64 = 1.6;
     /// Something without a name is large beside a cause from this share of its size on: what is not understood may reach into it. *Chosen*.
     pub const LARGE_BESIDE: f64 = 0.7;

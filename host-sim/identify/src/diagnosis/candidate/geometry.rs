@@ -1,4 +1,4 @@
-//! Errors of shape and place of the toothed wheels and the generator (docs/theory.md, "Signatures of causes").
+//! Errors of shape and place of the toothed wheels and the generator (docs/explanation/theory.md, "Signatures of causes").
 //!
 //! An error of harmonic k on the flexspline's material returns k times per turn of the wave on it, one on the circular spline's
 //! 94/95 as often: orders 2 and 1.979, apart after half an output turn. Eccentricities are rectified by the clearance, `|sin|` on the

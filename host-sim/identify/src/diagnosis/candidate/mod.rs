@@ -3,7 +3,7 @@
 //! A [`Law`] turns shape parameters (what enters non-linearly: a slip torque, a time constant, a place) into columns whose
 //! coefficients enter linearly. Laws in the field differ from those here in detail, so each carries *nuisance* columns: the
 //! directions in which its law is likely to be wrong, with coefficients of the order of a share of the main ones. A deviation
-//! of that kind then breeds no second cause. What each follows and why: docs/theory.md, "Signatures of causes".
+//! of that kind then breeds no second cause. What each follows and why: docs/explanation/theory.md, "Signatures of causes".
 
 mod among;
 mod displaced;
