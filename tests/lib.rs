@@ -13,6 +13,6 @@ pub mod motion;
 /// Pages with Rust in them; `tests/docs_commands.rs` sees that none is missing.
 #[cfg(doctest)]
 mod pages {
-    #[doc = include_str!("../README.md")]
-    struct Readme;
+    #[doc = include_str!("../docs/how-to/firmware_in_rust.md")]
+    struct FirmwareInRust;
 }

@@ -334,8 +334,7 @@ const PROFILE: &str = "flexspline.profile";
 fn head(teeth: Option<&Clearance>, left_out: &[&str]) -> String {
     let mut text: String = teeth.map(|teeth| format!("# As made here, {}.\n", teeth.text())).unwrap_or_default();
     if !left_out.is_empty() {
-        text +=
-            "# Left out, since no catalogue prints it; docs/explanation/third_dimension.md, \"Beside a catalogue\", has what each does:\n";
+        text += "# Left out, since no catalogue prints it; docs/explanation/third_dimension.md, \"Beside a catalogue\", has what each does:\n";
         text.extend(left_out.iter().map(|what| format!("# - {what}\n")));
     }
     text

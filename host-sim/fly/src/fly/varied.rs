@@ -29,7 +29,8 @@ impl FromStr for Vary {
         let (field, values) = text.split_once('=').unwrap_or((text, ""));
         let values = apart(values);
         if field.trim().is_empty() || values.iter().any(String::is_empty) {
-            return Err("allowed: FIELD=VALUE,VALUE,... with a field of a scenario file (docs/explanation/motion.md)".to_owned());
+            return Err("allowed: FIELD=VALUE,VALUE,... with a field of a scenario file (docs/explanation/motion.md)"
+                .to_owned());
         }
         Ok(Self { field: field.trim().to_owned(), values })
     }
