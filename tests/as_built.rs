@@ -7,15 +7,15 @@
 //!     +-----------------> psi
 //! ```
 //!
-//! HHD-95 with the cam, coarse mesh, without friction: the drive is deformed afresh at each generator angle and then loaded,
-//! so that positions far apart cost no way between them. Positions lie whole flexspline pitches (`2 pi / 188`) apart, where
-//! the ideal drive is in one state; what differs is the imperfection. Loads: 2 N.m unless said otherwise.
-//! References: the kinematics of rigid teeth in two lobes that share the load (harmonic drive theory: an error `p` along the
-//! pitch of one wheel turns the output by `p / r`; an eccentricity `e` of the toothing, seen by the one flank that bears, by the
-//! rectified sine `e / (r cos a) |sin(psi 94/95 - eps + a)|`, whose Fourier amplitudes are `4 / pi / (4 n^2 - 1)`); the
-//! bending of a thin ring of varying thickness (Castigliano); Maxwell's reciprocity.
-//! Physics wrong if this fails: a sign, a phase, a wheel taken for the other, a moment about the wrong axis, a rim that is thicker
-//! and no stiffer.
+//! HHD-95 with the cam, coarse mesh, without friction: the drive is deformed afresh at each generator angle and then
+//! loaded, so that positions far apart cost no way between them. Positions lie whole flexspline pitches (`2 pi / 188`)
+//! apart, where the ideal drive is in one state; what differs is the imperfection. Loads: 2 N.m unless said otherwise.
+//! References: the kinematics of rigid teeth in two lobes that share the load (harmonic drive theory: an error `p`
+//! along the pitch of one wheel turns the output by `p / r`; an eccentricity `e` of the toothing, seen by the one flank
+//! that bears, by the rectified sine `e / (r cos a) |sin(psi 94/95 - eps + a)|`, whose Fourier amplitudes are
+//! `4 / pi / (4 n^2 - 1)`); the bending of a thin ring of varying thickness (Castigliano); Maxwell's reciprocity.
+//! Physics wrong if this fails: a sign, a phase, a wheel taken for the other, a moment about the wrong axis, a rim that
+//! is thicker and no stiffer.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -64,7 +64,8 @@ fn beyond_ideal(change: impl FnOnce(&mut Drive), whole: &[u32], torque_n_m: f64)
     whole.iter().map(|k| error(&problem, f64::from(*k) * PITCH, torque_n_m) - ideal).collect()
 }
 
-/// Mean, and amplitude and phase (rad) of the orders 1 and 2 of samples that divide a period evenly: `A cos(n x - phase)`.
+/// Mean, and amplitude and phase (rad) of the orders 1 and 2 of samples that divide a period evenly:
+/// `A cos(n x - phase)`.
 fn harmonics(samples: &[f64]) -> (f64, [(f64, f64); 2]) {
     let n = samples.len() as f64;
     let mean = samples.iter().sum::<f64>() / n;
@@ -84,8 +85,8 @@ fn second(amplitude_um: f64) -> Vec<Harmonic> {
     vec![Harmonic { order: 2, amplitude_um, phase_deg: 0.0 }]
 }
 
-/// 95 flexspline pitches are the generator angle `pi 95/94` after which space `k + 95` stands where space `k` did: the period of
-/// order 2 * 94/95.
+/// 95 flexspline pitches are the generator angle `pi 95/94` after which space `k + 95` stands where space `k` did: the
+/// period of order 2 * 94/95.
 #[test]
 fn a_second_harmonic_of_the_circular_spline_pitch_has_order_2_times_94_95() {
     let positions: Vec<u32> = (0..5).map(|k| 19 * k).chain([94, 95]).collect();
@@ -95,15 +96,15 @@ fn a_second_harmonic_of_the_circular_spline_pitch_has_order_2_times_94_95() {
     let rigid = 5e-3 / 49.05 * ARCSEC_PER_RAD;
     let lobe = (phase.to_degrees() / 2.0).abs();
     println!(
-        "circular-spline pitch, k = 2, 5 um: {amplitude:.2}\" of p/r = {rigid:.2}\", crest {:.1} deg, mean {mean:.3}\", order 4 \
-         {twice:.3}\"; after 94 pitches {:+.4}\", after 95 {:+.1e}\"",
+        "circular-spline pitch, k = 2, 5 um: {amplitude:.2}\" of p/r = {rigid:.2}\", crest {:.1} deg, mean \
+         {mean:.3}\", order 4 {twice:.3}\"; after 94 pitches {:+.4}\", after 95 {:+.1e}\"",
         phase.to_degrees() / 2.0,
         found[5] - found[0],
         found[6] - found[0]
     );
     assert!(amplitude / rigid > 0.93 && amplitude / rigid < 1.0, "{amplitude}\" of {rigid}\"");
-    // Spaces displaced forward let the output lag: the crest of e is where the trough of p stands in the zone of contact, a few
-    // degrees beside the major axis.
+    // Spaces displaced forward let the output lag: the crest of e is where the trough of p stands in the zone of
+    // contact, a few degrees beside the major axis.
     assert!(lobe > 75.0 && lobe < 105.0, "crest at {lobe} degrees from the major axis");
     assert!(mean.abs() < 0.05 * amplitude && twice < 0.05 * amplitude);
     assert!((found[6] - found[0]).abs() < 1e-3, "not periodic after 95 pitches: {}", found[6] - found[0]);
@@ -149,7 +150,8 @@ fn an_oval_circular_spline_has_order_2_times_94_95() {
     let a = 24f64.to_radians();
     let rigid = 5e-3 / 48.7 * 0.5f64.hypot(a.tan()) * ARCSEC_PER_RAD;
     println!(
-        "circular-spline ovality 5 um: {amplitude:.2}\", rigid {rigid:.2}\", crest {:.1} deg, mean {mean:.2}\", order 4 {twice:.2}\"",
+        "circular-spline ovality 5 um: {amplitude:.2}\", rigid {rigid:.2}\", crest {:.1} deg, mean {mean:.2}\", order \
+         4 {twice:.2}\"",
         phase.to_degrees() / 2.0
     );
     assert!((amplitude / rigid - 1.0).abs() < 0.12, "{amplitude}\" of {rigid}\"");
@@ -166,8 +168,8 @@ fn an_eccentric_circular_spline_is_seen_as_a_rectified_sine() {
     let rigid = 5e-3 / 44.635 * ARCSEC_PER_RAD;
     let angle = -0.5 * phase;
     println!(
-        "circular-spline eccentricity 5 um: mean {mean:.2}\" ({:.2}), order 2*94/95 {second:.2}\" ({:.2}), order 4*94/95 {fourth:.2}\" \
-         ({:.2}), a {:.1} deg",
+        "circular-spline eccentricity 5 um: mean {mean:.2}\" ({:.2}), order 2*94/95 {second:.2}\" ({:.2}), order \
+         4*94/95 {fourth:.2}\" ({:.2}), a {:.1} deg",
         -2.0 / PI * rigid,
         4.0 / PI / 3.0 * rigid,
         4.0 / PI / 15.0 * rigid,
@@ -180,8 +182,8 @@ fn an_eccentric_circular_spline_is_seen_as_a_rectified_sine() {
     assert!((angle.to_degrees() - 22.5).abs() < 4.0, "flank at {} degrees", angle.to_degrees());
 }
 
-/// Displacing the axis of the circular spline one way is displacing the teeth of the flexspline the other way, and turning the whole
-/// half round changes nothing but the lobe that bears.
+/// Displacing the axis of the circular spline one way is displacing the teeth of the flexspline the other way, and
+/// turning the whole half round changes nothing but the lobe that bears.
 #[test]
 fn a_displaced_axis_is_a_flexspline_displaced_the_other_way() {
     let at = [0, 23, 60, 94];
@@ -202,7 +204,8 @@ fn a_displaced_axis_is_a_flexspline_displaced_the_other_way() {
     );
     let (one, other) = (offset(40.0), offset(220.0));
     println!(
-        "axis displaced by 5 um to 40 deg {one:.4?}\", flexspline to 220 deg {runout:.4?}\", axis to 220 deg {other:.4?}\""
+        "axis displaced by 5 um to 40 deg {one:.4?}\", flexspline to 220 deg {runout:.4?}\", axis to 220 deg \
+         {other:.4?}\""
     );
     assert!(one.iter().zip(&runout).all(|(a, b)| (a - b).abs() < 1e-3));
     assert!(one.iter().zip(&other).all(|(a, b)| (a - b).abs() < 1e-3));
@@ -246,8 +249,8 @@ fn wear_widens_the_backlash_by_its_depth_over_the_base_radius() {
     }
 }
 
-/// The mesh keeps its nominal teeth under an offset of their flanks. Here a mesh that does not: the same involutes, 5 um thinner
-/// on every flank, by a smaller profile shift (half thickness `(pi/2 + 2 x tan a) / z + inv a - inv a_r`).
+/// The mesh keeps its nominal teeth under an offset of their flanks. Here a mesh that does not: the same involutes, 5
+/// um thinner on every flank, by a smaller profile shift (half thickness `(pi/2 + 2 x tan a) / z + inv a - inv a_r`).
 #[test]
 fn what_an_offset_of_the_flanks_misses_is_hundredths_of_an_arc_second() {
     let worn = cam(|drive| drive.as_built.flexspline_wear_um = 5.0);
@@ -256,7 +259,8 @@ fn what_an_offset_of_the_flanks_misses_is_hundredths_of_an_arc_second() {
     let meshed = cam(|drive| drive.flexspline.profile_shift -= thinner);
     let [offset, mesh] = [&worn, &meshed].map(|problem| [LOAD_N_M, 100.0].map(|load| error(problem, 0.0, load)));
     println!(
-        "5 um off every flank at 2 and 100 N.m: as an offset {offset:.3?}\", in the mesh {mesh:.3?}\", wind-up {:.4}\" apart",
+        "5 um off every flank at 2 and 100 N.m: as an offset {offset:.3?}\", in the mesh {mesh:.3?}\", wind-up \
+         {:.4}\" apart",
         (offset[1] - offset[0]) - (mesh[1] - mesh[0])
     );
     assert!(offset.iter().zip(&mesh).all(|(a, b)| (a - b).abs() < 0.15), "{offset:?} {mesh:?}");
@@ -274,7 +278,8 @@ fn a_damaged_tooth_is_felt_where_it_bears_and_nowhere_else() {
     let minus = beyond_ideal(change(Wheel::Flexspline, 25, DamagedFlank::Minus), &at, LOAD_N_M);
     let plus = beyond_ideal(change(Wheel::Flexspline, 25, DamagedFlank::Plus), &[23, 25, 27, 121], LOAD_N_M);
     println!(
-        "flexspline tooth 25, minus flank, at {at:?} pitches:\n{minus:.4?}\"\nits plus flank, at 23, 25, 27, 121:\n{plus:.5?}\""
+        "flexspline tooth 25, minus flank, at {at:?} pitches:\n{minus:.4?}\"\nits plus flank, at 23, 25, 27, \
+         121:\n{plus:.5?}\""
     );
     assert!(plus.iter().all(|e| e.abs() < 1e-3), "a flank that does not bear is felt: {plus:?}");
     let felt: Vec<u32> = at.iter().zip(&minus).filter(|(_, e)| **e > 0.02).map(|(k, _)| *k).collect();
@@ -282,16 +287,17 @@ fn a_damaged_tooth_is_felt_where_it_bears_and_nowhere_else() {
     assert!(felt.iter().any(|k| *k < 94) && felt.iter().any(|k| *k > 94), "felt on one lobe only: {felt:?}");
     assert!(minus.iter().all(|e| *e > -1e-3), "less material cannot hold the output back");
 
-    // Circular-spline tooth k bears with its plus flank on the minus flank of the flexspline tooth in space k + 1: at 25 pitches
-    // flexspline tooth 25 + j is in space 25 + j. Where tooth 25 was felt, tooth 24 of the circular spline is.
+    // Circular-spline tooth k bears with its plus flank on the minus flank of the flexspline tooth in space k + 1: at
+    // 25 pitches flexspline tooth 25 + j is in space 25 + j. Where tooth 25 was felt, tooth 24 of the circular spline
+    // is.
     let position = felt.iter().copied().find(|k| *k < 94).unwrap();
     let circular = |tooth, flank| beyond_ideal(change(Wheel::CircularSpline, tooth, flank), &[position], LOAD_N_M)[0];
     let same = at.iter().position(|k| *k == position).unwrap();
     let (plus, minus_flank, other) =
         (circular(24, DamagedFlank::Plus), circular(24, DamagedFlank::Minus), circular(24 + 60, DamagedFlank::Both));
     println!(
-        "at {position} pitches: flexspline tooth 25 {:.4}\", circular-spline tooth 24, plus flank {plus:.4}\", minus flank \
-         {minus_flank:.5}\", tooth 84 {other:.5}\"",
+        "at {position} pitches: flexspline tooth 25 {:.4}\", circular-spline tooth 24, plus flank {plus:.4}\", minus \
+         flank {minus_flank:.5}\", tooth 84 {other:.5}\"",
         minus[same]
     );
     assert!((plus - minus[same]).abs() < 1e-3, "{plus}\" and {}\"", minus[same]);
@@ -320,7 +326,8 @@ fn a_malformed_generator_alone_leaves_the_period_of_one_pitch() {
     }
 }
 
-/// Two rollers on a smooth ring whose thickness varies four times around: pressed where it is thick and where it is thin.
+/// Two rollers on a smooth ring whose thickness varies four times around: pressed where it is thick and where it is
+/// thin.
 ///
 /// With `M = F R/2 (sin x - c)`, c such that the ends do not turn, the rollers are apart by twice
 /// `w = F R^3/2 int_0^(pi/2) (sin x - c)^2 / EI dx`.
@@ -344,8 +351,8 @@ fn a_thicker_rim_is_stiffer_by_the_cube_of_its_thickness() {
         });
         0.5 * outward
     };
-    // Compliance of a quarter, relative to 1/EI = 1 for the nominal thickness; x from 0 between the rollers to 90 degrees
-    // under one. `thick` is the thickness under the roller.
+    // Compliance of a quarter, relative to 1/EI = 1 for the nominal thickness; x from 0 between the rollers to 90
+    // degrees under one. `thick` is the thickness under the roller.
     let compliance = |thick: f64| {
         let n = 2000;
         let (mut c, mut total) = (0.0, 0.0);
@@ -367,8 +374,8 @@ fn a_thicker_rim_is_stiffer_by_the_cube_of_its_thickness() {
         let deflection = (0.2 + thick) / 0.2;
         let expected = deflection * compliance(0.0) / compliance(thick);
         println!(
-            "rim {:+.0} um under the rollers ({what}): force {found:.4} of the even rim, bending theory {expected:.4}, deflection \
-             alone {deflection:.4}",
+            "rim {:+.0} um under the rollers ({what}): force {found:.4} of the even rim, bending theory \
+             {expected:.4}, deflection alone {deflection:.4}",
             1e3 * thick
         );
         assert!((found / expected - 1.0).abs() < 0.02, "{what}: {found}, expected {expected}");
@@ -376,11 +383,12 @@ fn a_thicker_rim_is_stiffer_by_the_cube_of_its_thickness() {
     }
 }
 
-/// The generator of a drive as imperfect as can be still takes just the torque that its output gives, and the work it puts in
-/// does not depend on the way: `d(M_g)/dT = -d(delta)/d(psi)`, both at their own axes.
+/// The generator of a drive as imperfect as can be still takes just the torque that its output gives, and the work it
+/// puts in does not depend on the way: `d(M_g)/dT = -d(delta)/d(psi)`, both at their own axes.
 #[test]
 fn with_every_imperfection_forces_balance_and_work_is_reciprocal() {
-    // Where a point of the bore begins to bear under a roller within the step, the ideal drive too is out by up to 0.005.
+    // Where a point of the bore begins to bear under a roller within the step, the ideal drive too is out by up to
+    // 0.005.
     for (kind, bound) in [(GeneratorKind::Cam, 1e-4), (GeneratorKind::FourRoller, 1e-2)] {
         let problem = problem(&imperfect(), kind, SolverSettings { tolerance: 2e-7, ..on(MeshLevel::Coarse) });
         for psi in [0.3, 2.0] {
@@ -395,8 +403,8 @@ fn with_every_imperfection_forces_balance_and_work_is_reciprocal() {
             let torque_rate = (more.1.generator_torque_n_m - less.1.generator_torque_n_m) / (2.0 * load);
             let softness = (more.0.output_rad - less.0.output_rad) / (2.0 * load);
             println!(
-                "{kind}, all imperfections, psi {psi}: e {:.2}\", {} flanks, torque out of balance {unbalanced:.1e} N.m; 95 dM/dT \
-                 {:.5}, 95 d(delta)/d(psi) {:.5}; compliance by difference over tangent {:.5}",
+                "{kind}, all imperfections, psi {psi}: e {:.2}\", {} flanks, torque out of balance {unbalanced:.1e} \
+                 N.m; 95 dM/dT {:.5}, 95 d(delta)/d(psi) {:.5}; compliance by difference over tangent {:.5}",
                 (state.output_rad - psi / 95.0) * ARCSEC_PER_RAD,
                 here.flank_contacts,
                 95.0 * torque_rate,
@@ -439,9 +447,9 @@ fn steady(checked: &Validation) -> (f64, f64) {
     (rms, misses.iter().fold(0.0, |worst, e| e.abs().max(worst)))
 }
 
-/// Pitch errors of both wheels beat with each other twice in a turn of the output. Their effect depends little on load and flank (the
-/// teeth that bear stand some degrees before the major axis with the one flank, behind it with the other): a table holds it but for
-/// that, at places and loads that made none of it.
+/// Pitch errors of both wheels beat with each other twice in a turn of the output. Their effect depends little on load
+/// and flank (the teeth that bear stand some degrees before the major axis with the one flank, behind it with the
+/// other): a table holds it but for that, at places and loads that made none of it.
 #[test]
 fn a_table_over_whole_turns_holds_pitch_errors_of_both_wheels() {
     let (made, checked) = table_of(|drive| {
@@ -453,19 +461,21 @@ fn a_table_over_whole_turns_holds_pitch_errors_of_both_wheels() {
     let range = turns.by_torque.iter().map(|t| t.drive_peak_to_peak_arcsec).fold(0.0, f64::max);
     let (rms, worst) = steady(&checked);
     println!(
-        "pitch errors of 5 um: range {range:.1}\" at the places; the table states {:.2}\" rms, {:.2}\" at most, and misses fresh \
-         FEM in steady motion by {rms:.2}\" rms, {worst:.2}\" at most; {}",
+        "pitch errors of 5 um: range {range:.1}\" at the places; the table states {:.2}\" rms, {:.2}\" at most, and \
+         misses fresh FEM in steady motion by {rms:.2}\" rms, {worst:.2}\" at most; {}",
         made.info.projection_rms_arcsec, made.info.projection_worst_arcsec, checked.status
     );
-    // Both amplitudes are 20" (p/r, less what rounds the lobes): together 80" from crest to trough, if the places meet them.
+    // Both amplitudes are 20" (p/r, less what rounds the lobes): together 80" from crest to trough, if the places meet
+    // them.
     assert!(range > 65.0 && range < 85.0, "{range}");
     assert_eq!(checked.status, "passed", "{} {}", checked.rms_arcsec, checked.max_arcsec);
-    // Either wheel's 20" seen from 5 degrees beside the middle of the two flanks: 20" sin(2 * 5) = 3.5" at most, 2.5" rms.
+    // Either wheel's 20" seen from 5 degrees beside the middle of the two flanks: 20" sin(2 * 5) = 3.5" at most, 2.5"
+    // rms.
     assert!(rms < 5.0 && worst < 10.0, "the table misses fresh FEM by {rms} rms, {worst} at most");
 }
 
-/// An eccentricity is felt by the one flank from another side than by the other, and less under load: a table with one curve for
-/// all loads cannot hold that, and says how much it leaves.
+/// An eccentricity is felt by the one flank from another side than by the other, and less under load: a table with one
+/// curve for all loads cannot hold that, and says how much it leaves.
 #[test]
 #[ignore = "a minute and a half: a second table over whole turns"]
 fn what_a_table_leaves_of_an_eccentricity_is_stated_in_it() {
@@ -473,8 +483,8 @@ fn what_a_table_leaves_of_an_eccentricity_is_stated_in_it() {
     let stated = made.info.projection_rms_arcsec;
     let (rms, worst) = steady(&checked);
     println!(
-        "eccentricity of 5 um: the table states {stated:.2}\" rms, {:.2}\" at most, and misses fresh FEM in steady motion by \
-         {rms:.2}\" rms, {worst:.2}\" at most",
+        "eccentricity of 5 um: the table states {stated:.2}\" rms, {:.2}\" at most, and misses fresh FEM in steady \
+         motion by {rms:.2}\" rms, {worst:.2}\" at most",
         made.info.projection_worst_arcsec
     );
     assert!(stated > 2.0, "nothing left: does the table have room for it after all?");

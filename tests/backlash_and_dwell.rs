@@ -8,14 +8,16 @@
 //!        +----/-----|--- 95 b ---|-------> path      |  forward
 //! ```
 //!
-//! Loads: net torques of 0.02 and 0.01 N.m on the flanks (the drag of 0.02 N.m added), extrapolated to none: down there the
-//! error is linear in the torque for all four generators (two-roller 3.4'/N.m, four-roller 0.49'/N.m, double disc
+//! Loads: net torques of 0.02 and 0.01 N.m on the flanks (the drag of 0.02 N.m added), extrapolated to none: down there
+//! the error is linear in the torque for all four generators (two-roller 3.4'/N.m, four-roller 0.49'/N.m, double disc
 //! 0.041'/N.m, cam 0.010'/N.m in the backlash). By mirror symmetry b = 2 e, on the mean of a pitch. Standard mesh.
-//! Reference: an independent program with 8-node elements, which found 0.987' for the cam; 1.04' for the double disc (1.005'
-//! with a disc that stands 0.64 um proud of the constant-length curve); 1.061' and 0.93' for four-roller and two-roller with
-//! centres rounded to 1 um, which set the rollers back by 0.38 and 0.19 um. On w0 that is 0.67 and 0.19 um, at
+//! Reference: an independent program with 8-node elements, which found 0.987' for the cam; 1.04' for the double disc
+//! (1.005' with a disc that stands 0.64 um proud of the constant-length curve); 1.061' and 0.93' for four-roller and
+//! two-roller with centres rounded to 1 um, which set the rollers back by 0.38 and 0.19 um. On w0 that is 0.67 and 0.19
+//! um, at
 //! -0.052'/um: 1.026' and 0.920' without the rounding.
-//! Physics wrong if this fails: flank geometry, shape of the deformed rim, friction on the output, one-sidedness of contact.
+//! Physics wrong if this fails: flank geometry, shape of the deformed rim, friction on the output, one-sidedness of
+//! contact.
 
 use flexspline_sim::drive::{Drive, GeneratorKind, GeneratorOutline};
 use flexspline_sim::mesh::MeshLevel;

@@ -1,5 +1,5 @@
-//! Wrong drive files, sample files, table images and measurements: each is refused with its own clear message, exit code 2,
-//! and nothing is left behind.
+//! Wrong drive files, sample files, table images and measurements: each is refused with its own clear message, exit
+//! code 2, and nothing is left behind.
 //!
 //! The messages themselves are held by the tests beside the readers; here a user meets them at the command.
 

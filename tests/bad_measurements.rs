@@ -1,7 +1,9 @@
-//! Damaged, odd and mistaken files, given to `flexspline diagnose` as a user gives them: each ends in one clear message, exit code 2 and
-//! nothing written, or in a fault of the data with its name and a verdict that blames no physics.
+//! Damaged, odd and mistaken files, given to `flexspline diagnose` as a user gives them: each ends in one clear
+//! message, exit code 2 and nothing written, or in a fault of the data with its name and a verdict that blames no
+//! physics.
 //!
-//! The drive is healthy throughout: it does what its nominal model says, within noise. Whatever is named is the fault of the file.
+//! The drive is healthy throughout: it does what its nominal model says, within noise. Whatever is named is the fault
+//! of the file.
 
 use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
@@ -13,10 +15,11 @@ use crate::bench_data::{ARCSEC, Bench, RATIO, normal};
 use flexspline_tests::command::Desk;
 use serde_json::Value;
 
-const MODEL: &str = "[drive]\nflexspline_teeth = 188\ncircular_spline_teeth = 190\nfixed = \"flexspline\"\n\
-    [nominal]\nstiffness_n_m_per_rad = 30000.0\nbacklash_arcsec = 40.0\nfriction_torque_n_m = 1.0\ntemperature_c = 20.0\n\
-    [[nominal.harmonic]]\norder_per_generator_turn = 2.0\namplitude_arcsec = 12.0\nphase_rad = 0.4\n\
-    [nominal.unit_to_unit]\nstiffness = 0.03\nbacklash = 0.05\nharmonic = 0.2\n";
+const MODEL: &str = "[drive]\nflexspline_teeth = 188\ncircular_spline_teeth = 190\nfixed = \
+                     \"flexspline\"\n[nominal]\nstiffness_n_m_per_rad = 30000.0\nbacklash_arcsec = \
+                     40.0\nfriction_torque_n_m = 1.0\ntemperature_c = \
+                     20.0\n[[nominal.harmonic]]\norder_per_generator_turn = 2.0\namplitude_arcsec = 12.0\nphase_rad = \
+                     0.4\n[nominal.unit_to_unit]\nstiffness = 0.03\nbacklash = 0.05\nharmonic = 0.2\n";
 
 /// A drive that does what `MODEL` says: to and fro, a load that changes sign.
 fn healthy(rows: usize) -> Bench {

@@ -51,7 +51,8 @@ impl Bench {
         text
     }
 
-    /// A plain drive: two orders, clearance, wind-up, white noise of `noise_arcsec`; to and fro, load that changes sign.
+    /// A plain drive: two orders, clearance, wind-up, white noise of `noise_arcsec`; to and fro, load that changes
+    /// sign.
     pub fn plain(rows: usize, noise_arcsec: f64, seed: u64) -> Bench {
         let mut random = fastrand::Rng::with_seed(seed);
         let mut bench = Bench { torque_n_m: Some(Vec::new()), temperature_c: Some(Vec::new()), ..Bench::default() };
@@ -75,7 +76,8 @@ impl Bench {
         bench
     }
 
-    /// A drive with a random choice of real effects, some of them large, and random excitation. Nothing in it is wrong with the data.
+    /// A drive with a random choice of real effects, some of them large, and random excitation. Nothing in it is wrong
+    /// with the data.
     pub fn drawn(rows: usize, seed: u64) -> (Bench, Vec<&'static str>) {
         let mut random = fastrand::Rng::with_seed(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x51);
         let has = |name: &'static str, chance: f64, said: &mut Vec<&'static str>, random: &mut fastrand::Rng| {

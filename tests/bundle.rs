@@ -1,5 +1,5 @@
-//! `flexspline bundle`: whole or not at all, over its own and nothing else; every file is the one of the manifest; a library that was asked
-//! for is there or the reason is said.
+//! `flexspline bundle`: whole or not at all, over its own and nothing else; every file is the one of the manifest; a
+//! library that was asked for is there or the reason is said.
 //!
 //! What the bundle is worth to a compiler, to CMake and to others is checked by `tests/run bundle`.
 

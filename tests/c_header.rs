@@ -1,5 +1,5 @@
-//! The C header that is checked in is the one that cbindgen makes of the C interface, and what it once promised stays until the version
-//! changes.
+//! The C header that is checked in is the one that cbindgen makes of the C interface, and what it once promised stays
+//! until the version changes.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -44,13 +44,14 @@ fn the_header_is_up_to_date() {
     let line = made.lines().zip(kept.lines()).position(|(made, kept)| made != kept);
     assert!(
         made == kept,
-        "core/include/flexspline.h differs from what cbindgen makes, from line {}: run this test with FLEXSPLINE_KEEP_HEADER=1",
+        "core/include/flexspline.h differs from what cbindgen makes, from line {}: run this test with \
+         FLEXSPLINE_KEEP_HEADER=1",
         line.map_or(made.lines().count().min(kept.lines().count()), |line| line + 1)
     );
 }
 
-/// What a program in C relies on, by name: functions with their parameters, structures with their fields, enumerations with their
-/// values, constants. The version is none of it.
+/// What a program in C relies on, by name: functions with their parameters, structures with their fields, enumerations
+/// with their values, constants. The version is none of it.
 fn promises(header: &str) -> BTreeMap<String, String> {
     let body = header.split("#endif  /* FLEXSPLINE_H */").next().unwrap();
     let code: String =
@@ -96,8 +97,8 @@ fn size(text: &str) -> Option<(&str, u64)> {
     Some((name, value.parse().ok()?)).filter(|_| is_size)
 }
 
-/// What of `before` is no longer so. An enumeration may go on, and an object may grow: its room is the caller's by the name of its size, and
-/// `flexspline_layout` finds a program that was compiled for the smaller one.
+/// What of `before` is no longer so. An enumeration may go on, and an object may grow: its room is the caller's by the
+/// name of its size, and `flexspline_layout` finds a program that was compiled for the smaller one.
 fn broken(before: &BTreeMap<String, String>, now: &BTreeMap<String, String>) -> Vec<String> {
     let grew = |text: &str, now: &str| size(text).zip(size(now)).is_some_and(|(a, b)| a.0 == b.0 && a.1 <= b.1);
     let goes_on = |text: &str, now: &str| text.starts_with("enum ") && now.starts_with(text.trim_end_matches(" }"));
@@ -127,7 +128,9 @@ fn nothing_that_the_header_promised_changes_without_the_version() {
         wrong.join("\n")
     );
     if std::env::var_os("FLEXSPLINE_KEEP_ABI").is_some() {
-        let mut text = "# What flexspline.h promises in this version: tests/c_header.rs. FLEXSPLINE_KEEP_ABI=1 adds what is new.\n".to_owned();
+        let mut text = "# What flexspline.h promises in this version: tests/c_header.rs. FLEXSPLINE_KEEP_ABI=1 adds \
+                        what is new.\n"
+            .to_owned();
         let _ = writeln!(text, "{here}");
         for (name, promise) in &now {
             let _ = writeln!(text, "{name}: {promise}");

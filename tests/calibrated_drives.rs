@@ -1,5 +1,5 @@
-//! An hour on the bench, planned by `calibrate --plan`, makes a table that removes the error of an as-built drive in other motions, under other
-//! loads, on other days; its intervals hold.
+//! An hour on the bench, planned by `calibrate --plan`, makes a table that removes the error of an as-built drive in
+//! other motions, under other loads, on other days; its intervals hold.
 //!
 //! ```text
 //!   errors of all kinds --kernels of the contact FEM--> as-built drive --sensors--> planned hour --> calibrate --> table
@@ -7,12 +7,13 @@
 //!                                                              +--> other days: true output less what the core says +
 //! ```
 //!
-//! HHD-95 with the cam. The plant is the dense map of contact FEM that the closed loop flies, at points that made no table, with its own law of
-//! play over the flank torque, and on top the influence kernels, which know load, flank and place: pitch errors of both wheels, an oval, three
-//! axes beside one another (one vector, as the contact sees it), damaged teeth, a malformed cam, wear, another stiffness. Nothing of it has the
-//! form of a table or of a part. Each drive is drawn anew within twice the tolerances of the built-in typical drive.
-//! Wrong if this fails: a part that fits what is not there, an interval that is too narrow, a plan that leaves a hole, a table that does not hold
-//! what was fitted.
+//! HHD-95 with the cam. The plant is the dense map of contact FEM that the closed loop flies, at points that made no
+//! table, with its own law of play over the flank torque, and on top the influence kernels, which know load, flank and
+//! place: pitch errors of both wheels, an oval, three axes beside one another (one vector, as the contact sees it),
+//! damaged teeth, a malformed cam, wear, another stiffness. Nothing of it has the form of a table or of a part. Each
+//! drive is drawn anew within twice the tolerances of the built-in typical drive. Wrong if this fails: a part that fits
+//! what is not there, an interval that is too narrow, a plan that leaves a hole, a table that does not hold what was
+//! fitted.
 
 use std::f64::consts::{PI, TAU};
 
@@ -138,7 +139,8 @@ impl<'a> Unit<'a> {
             let (sin, cos) = (f64::from(*order) * (seen_from(*wheel) - phase)).sin_cos();
             error += um * (c * cos - s * sin);
         }
-        // Where the axis of the circular spline stands beside that of the generator: it turns with the output; the others stand.
+        // Where the axis of the circular spline stands beside that of the generator: it turns with the output; the
+        // others stand.
         let [turning, runout, housing] = self.errors.eccentric;
         let vectors = [(turning.0, turning.1 + output), (runout.0, runout.1 + PI), housing];
         let sum = |part: fn(f64) -> f64| vectors.iter().map(|(um, at)| um * part(*at)).sum::<f64>();
@@ -306,7 +308,8 @@ fn about(values: &[f64]) -> f64 {
     (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// A table of waves as any program fits them: orders of the generator and of the output, if wanted for each direction alone.
+/// A table of waves as any program fits them: orders of the generator and of the output, if wanted for each direction
+/// alone.
 struct Fourier {
     by_direction: bool,
     coefficients: [Vec<f64>; 2],
@@ -333,8 +336,8 @@ impl Fourier {
     }
 }
 
-/// What no table can hold: the nominal one with all that a table has room for (curves over three angles, wind-up, play, temperature), fitted
-/// without sensors to the truth everywhere in the range of the bench.
+/// What no table can hold: the nominal one with all that a table has room for (curves over three angles, wind-up, play,
+/// temperature), fitted without sensors to the truth everywhere in the range of the bench.
 struct Best(Vec<f64>);
 
 impl Best {
@@ -406,8 +409,8 @@ fn ways(generator: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Share of what a table can take out that is taken out at least, and what is left, of what the best of the other tables leaves, at most: below
-/// and above what ten drives gave when this was written.
+/// Share of what a table can take out that is taken out at least, and what is left, of what the best of the other
+/// tables leaves, at most: below and above what ten drives gave when this was written.
 const LEAST_REMOVED: f64 = 0.9;
 const LARGEST_OF_OTHERS: f64 = 0.5;
 
@@ -535,8 +538,8 @@ fn steady(table: &Table<'_>, at: &State) -> f64 {
     f64::from(said) * ARCSEC_PER_RAD
 }
 
-/// Share of states whose error the interval holds: of what a perfect reader of these encoders would see, since no log can tell an eccentric
-/// encoder from the drive.
+/// Share of states whose error the interval holds: of what a perfect reader of these encoders would see, since no log
+/// can tell an eccentric encoder from the drive.
 fn covered(made: &Calibrated, states: &[(State, f64)], sensors: &Sensors) -> f64 {
     let table = Table::check(&made.table.image).unwrap();
     let off: Vec<(f64, f64)> = states

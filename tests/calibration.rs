@@ -1,4 +1,5 @@
-//! `look` and `calibrate` on data that nobody in this project made: a gear against the stars, a robot's joint with an encoder on either side.
+//! `look` and `calibrate` on data that nobody in this project made: a gear against the stars, a robot's joint with an
+//! encoder on either side.
 
 use std::f64::consts::TAU;
 
@@ -39,9 +40,10 @@ fn other_half(learnt: &Recording, other: &Recording) -> [f64; 2] {
     [about(measured), about(left_by_core(&table, &other.sessions[0], 20.0))]
 }
 
-/// Each half of the record makes a table, which the core reads over the other half. The first predicts the second to 4.5 arc-seconds, where
-/// the two waves that everybody expects leave 6.2. The second predicts the first less well: that half has something that no curve over
-/// the turn has (eight waves of its own leave 4.7 of it), so it is held to what waves 1 to 4 leave, 5.8.
+/// Each half of the record makes a table, which the core reads over the other half. The first predicts the second to
+/// 4.5 arc-seconds, where the two waves that everybody expects leave 6.2. The second predicts the first less well: that
+/// half has something that no curve over the turn has (eight waves of its own leave 4.7 of it), so it is held to what
+/// waves 1 to 4 leave, 5.8.
 #[test]
 fn half_of_a_record_corrects_the_other_half() {
     let (first, second) = (half(false), half(true));
@@ -52,8 +54,8 @@ fn half_of_a_record_corrects_the_other_half() {
     assert!((back[0] - 16.5).abs() < 0.2 && back[1] <= 5.8, "{back:?}");
 }
 
-/// From raw counts, without a word on what they are: what is in the file, and a table that takes nine tenths of the error of blocks that
-/// it was not made from.
+/// From raw counts, without a word on what they are: what is in the file, and a table that takes nine tenths of the
+/// error of blocks that it was not made from.
 #[test]
 fn a_robots_log_is_understood_and_calibrated() {
     let bytes = std::fs::read(LARA8).unwrap();
@@ -81,7 +83,8 @@ fn a_robots_log_is_understood_and_calibrated() {
     assert!(core.rms_after_arcsec <= 0.1 * core.rms_before_arcsec, "{core:?}");
 }
 
-/// The command, its files, and `replay` over the same log with the same gain; a log in which nothing repeats makes no table.
+/// The command, its files, and `replay` over the same log with the same gain; a log in which nothing repeats makes no
+/// table.
 #[test]
 fn the_command_writes_a_table_that_replay_reads() {
     let desk = Desk::new();
@@ -125,8 +128,8 @@ fn the_command_writes_a_table_that_replay_reads() {
     assert!(plan.stdout.contains("80 tell it from the generator angle"), "{}", plan.stdout);
 }
 
-/// A log of a drive whose error does not repeat in each turn: 300 arcsec once a turn of the output (`eccentric`), 20 twice a turn of the motor.
-/// The motor's angle reads `turns` more than it is.
+/// A log of a drive whose error does not repeat in each turn: 300 arcsec once a turn of the output (`eccentric`), 20
+/// twice a turn of the motor. The motor's angle reads `turns` more than it is.
 fn log_of(ratio: f64, eccentric: f64, turns: f64) -> String {
     let mut random = fastrand::Rng::with_seed(11);
     let mut text = "time_s,generator_rad,output_rad\n".to_owned();
@@ -140,7 +143,8 @@ fn log_of(ratio: f64, eccentric: f64, turns: f64) -> String {
     text
 }
 
-/// A motor that was homed in another turn: the table adds the error of another place of the output. How many turns, and no word of a gain.
+/// A motor that was homed in another turn: the table adds the error of another place of the output. How many turns, and
+/// no word of a gain.
 #[test]
 fn a_motor_zero_that_is_off_by_whole_turns_is_reported() {
     for (ratio, turns) in [(101.0, 40.0), (50.0, -17.0)] {

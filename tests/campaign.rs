@@ -1,8 +1,8 @@
-//! What a campaign says of drives by kernels is what the FEM says of the same drives, figure by figure, where all of a small campaign are
-//! computed by both.
+//! What a campaign says of drives by kernels is what the FEM says of the same drives, figure by figure, where all of a
+//! small campaign are computed by both.
 //!
-//! Reference: the FEM of drives with those deviations. Physics wrong if this fails: a sign, a phase, a wheel taken for the other, or a
-//! load of the kernels that is not that of the campaign.
+//! Reference: the FEM of drives with those deviations. Physics wrong if this fails: a sign, a phase, a wheel taken for
+//! the other, or a load of the kernels that is not that of the campaign.
 
 use flexspline_tests::command::Desk;
 

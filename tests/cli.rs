@@ -1,6 +1,7 @@
 //! The command as a user meets it: what it writes, what it says, how it ends.
 //!
-//! Every run here is the real program in a folder of its own. Runs that solve anything use the coarse mesh and few points.
+//! Every run here is the real program in a folder of its own. Runs that solve anything use the coarse mesh and few
+//! points.
 
 use std::fs;
 
@@ -275,8 +276,8 @@ fn teeth_that_interfere_and_stress_that_no_steel_bears_are_said() {
     assert_eq!(figures, ["rigid_gap_um", "max_von_mises_mpa"]);
     let text = desk.line(&binds).done().stdout;
     assert!(text.contains("caution: the teeth of the drawing interfere by 8.9 um"), "{text}");
-    let tables = "tables --generator cam --mesh coarse --torque-n-m 20 --most-nodes 5 --positions 4 --temperatures-c 20 \
-                  --set circular_spline.profile_shift=2.95";
+    let tables = "tables --generator cam --mesh coarse --torque-n-m 20 --most-nodes 5 --positions 4 --temperatures-c \
+                  20 --set circular_spline.profile_shift=2.95";
     let page = desk.read("out/report.html");
     let run = desk.line(tables).done();
     let said = &run.stdout;
@@ -291,7 +292,8 @@ fn teeth_that_interfere_and_stress_that_no_steel_bears_are_said() {
     );
     assert!(desk.read("out/report.html").contains("class=\"stamp caution\""));
     // A sound drive, in root fillets, on bore and flanks, over three meshes.
-    let sound = "tables --generator cam --mesh coarse --torque-n-m 20 --most-nodes 5 --positions 4 --temperatures-c 20 --stress --no-report";
+    let sound = "tables --generator cam --mesh coarse --torque-n-m 20 --most-nodes 5 --positions 4 --temperatures-c \
+                 20 --stress --no-report";
     let stressed = desk.line(&format!("{sound} --json")).done().json()["tables"][0].clone();
     assert_eq!(stressed["stress"].as_array().unwrap().len(), 3, "{stressed}");
     assert!(stressed.get("no_stress").is_none(), "{stressed}");

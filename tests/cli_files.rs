@@ -114,7 +114,8 @@ fn a_drive_from_a_few_numbers_clears_its_teeth_and_says_how_it_was_made() {
         assert!(!bore || (wheel["root_radius_mm"].as_f64().unwrap() - rim_mm - 31.0).abs() < 1e-3, "{line}");
         assert_eq!(text.contains("as HHD-95\nrim_thickness_mm"), !bore && !line.contains("--set"), "{line}");
     }
-    // A size that is at hand brings its data sheet, and the command that adds guesses of what no catalogue prints works as it is told.
+    // A size that is at hand brings its data sheet, and the command that adds guesses of what no catalogue prints works
+    // as it is told.
     let made = desk.line("new like.toml --like CSG-25-80 --json").done().json();
     assert_eq!(made["data_sheet"]["k2_n_m_per_rad"], 50e3);
     assert_eq!(made["left_out"].as_array().unwrap().len(), 4);

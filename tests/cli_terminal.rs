@@ -57,7 +57,8 @@ const WORKING: Duration = Duration::from_millis(600);
 #[test]
 fn a_stopped_simulation_leaves_the_folder_as_it_was() {
     let desk = Desk::new();
-    // Where there was no folder there is none; one increment of the reference solver on the fine mesh takes longer than this.
+    // Where there was no folder there is none; one increment of the reference solver on the fine mesh takes longer than
+    // this.
     stopped(&desk, "simulate --generator cam --mesh fine --solver reference --frames", WORKING, &["-INT"]);
     desk.write("path.csv", "generator_rad\n0\n0.01\n");
     desk.line("simulate --generator cam --mesh coarse --path path.csv --frames").done();
@@ -164,7 +165,8 @@ fn a_full_disk_is_one_clear_error() {
     assert_eq!(names(&desk.path(".")), [""; 0], "the folder that was made for it is gone too");
 }
 
-/// Generous, as other programs may have the machine: the work of these commands takes ten times as long, but that of the diagnosis.
+/// Generous, as other programs may have the machine: the work of these commands takes ten times as long, but that of
+/// the diagnosis.
 const AT_ONCE: Duration = Duration::from_secs(6);
 
 #[test]

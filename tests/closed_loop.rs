@@ -1,8 +1,9 @@
-//! In closed loop the core points better: a servo with finite bandwidth, an encoder with steps, a torque sensor with noise, load
-//! that changes and crosses zero, temperature that drifts, reversals; the drive is contact FEM at points that made no table.
+//! In closed loop the core points better: a servo with finite bandwidth, an encoder with steps, a torque sensor with
+//! noise, load that changes and crosses zero, temperature that drifts, reversals; the drive is contact FEM at points
+//! that made no table.
 //!
-//! Short: four generators with five controllers over two minutes of antenna on the dense FEM map, the map against fresh FEM, and
-//! what can go wrong in a loop. `--ignored`: contact FEM itself in the loop.
+//! Short: four generators with five controllers over two minutes of antenna on the dense FEM map, the map against fresh
+//! FEM, and what can go wrong in a loop. `--ignored`: contact FEM itself in the loop.
 
 use std::sync::LazyLock;
 
@@ -112,14 +113,15 @@ fn the_plant_is_what_contact_fem_says() {
         }
         let [loaded, let_go] = table_worst;
         println!(
-            "{kind}: the plant misses fresh FEM by {worst:.3}\" at most; the table by {loaded:.2}\" under load, by {let_go:.2}\" after \
-             the load has gone, until the play has been crossed"
+            "{kind}: the plant misses fresh FEM by {worst:.3}\" at most; the table by {loaded:.2}\" under load, by \
+             {let_go:.2}\" after the load has gone, until the play has been crossed"
         );
         assert!(worst < bound, "{kind}: {worst}");
     }
 }
 
-/// Half a minute of arithmetic for two minutes of wind would be nothing; half an hour of FEM is why this is not in the short form.
+/// Half a minute of arithmetic for two minutes of wind would be nothing; half an hour of FEM is why this is not in the
+/// short form.
 #[test]
 #[ignore = "contact FEM in the loop: minutes"]
 fn contact_fem_in_the_loop_gives_the_same_errors() {
@@ -146,8 +148,8 @@ fn contact_fem_in_the_loop_gives_the_same_errors() {
     let worst = missed.iter().fold(0.0_f64, |most, missed| most.max(missed.abs()));
     let rms = (missed.iter().map(|missed| missed * missed).sum::<f64>() / missed.len() as f64).sqrt();
     println!(
-        "{} increments in {:.0} s; the map misses the FEM by {rms:.3}\" rms, {worst:.3}\" at most; core by FEM {:.3}\" rms \
-         {:.3}\" max, by map {:.3}\" rms {:.3}\" max",
+        "{} increments in {:.0} s; the map misses the FEM by {rms:.3}\" rms, {worst:.3}\" at most; core by FEM \
+         {:.3}\" rms {:.3}\" max, by map {:.3}\" rms {:.3}\" max",
         missed.len(),
         begun.elapsed().as_secs_f64(),
         by_fem.scores.whole.rms_arcsec(),
@@ -341,7 +343,8 @@ fn a_reset_in_the_middle_of_a_reversal_goes_on_or_starts_anew() {
     });
     let [a, b] = [&plain, &restored].map(|steps| worst(steps, at + 60, at + 500));
     println!(
-        "reset at tick {at}, in the middle of a reversal: {b:.2}\" after 60 ms with what was saved, {a:.2}\" without a reset"
+        "reset at tick {at}, in the middle of a reversal: {b:.2}\" after 60 ms with what was saved, {a:.2}\" without \
+         a reset"
     );
     assert!(b < 1.5, "{b}");
     assert_eq!(out(&restored, at + 100).quality, Quality::InRange);

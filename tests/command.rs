@@ -8,8 +8,8 @@ use std::sync::OnceLock;
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// The command `flexspline`, built in the profile that the tests were built in (their folder `PROFILE/deps` has its name), and
-/// like them with the features that the whole workspace asks for: so nothing is built twice.
+/// The command `flexspline`, built in the profile that the tests were built in (their folder `PROFILE/deps` has its
+/// name), and like them with the features that the whole workspace asks for: so nothing is built twice.
 pub fn flexspline() -> &'static Path {
     static BINARY: OnceLock<PathBuf> = OnceLock::new();
     BINARY.get_or_init(|| {

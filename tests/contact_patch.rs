@@ -1,4 +1,5 @@
-//! Contact forces are the derivatives of the energy of the gaps, balance one another, and pass a uniform pressure on evenly.
+//! Contact forces are the derivatives of the energy of the gaps, balance one another, and pass a uniform pressure on
+//! evenly.
 //!
 //! ```text
 //!   bore:   ring shrunk on a round generator      flank:  f_fs  <--|-->  f_cs = -f_fs
@@ -8,9 +9,10 @@
 //! ```
 //!
 //! Loads: HHD-95 as deformed by its generator, loaded with 20 N.m, disturbed at random by 1e-5 mm; a smooth ring on a
-//! generator 6e-6 larger than its bore. References: central differences of the energy and of the forces; Newton's third law;
-//! Lame's thick cylinder (Timoshenko and Goodier, Theory of Elasticity, art. 28). Physics wrong if this fails: the direction
-//! or the point of attack of a contact force, weights of the integration, a moment that is not that of the forces.
+//! generator 6e-6 larger than its bore. References: central differences of the energy and of the forces; Newton's third
+//! law; Lame's thick cylinder (Timoshenko and Goodier, Theory of Elasticity, art. 28). Physics wrong if this fails: the
+//! direction or the point of attack of a contact force, weights of the integration, a moment that is not that of the
+//! forces.
 
 use flexspline_sim::contact::{BoreContact, BoreLaw, Configuration, FlankLaw, FlankPair, FlankPoint};
 use flexspline_sim::drive::{Drive, GeneratorKind, GeneratorOutline};
@@ -119,15 +121,17 @@ fn bore_derivatives(drive: &Drive, kind: GeneratorKind) {
     let force_sum: f64 = here.force.chunks(2).map(|f| f[0].hypot(f[1])).sum();
     let arm = force_sum * problem.flexspline.base_radius;
     println!(
-        "bore, {kind}: {} edges touch; force against energy {force_error:.1e}, tangent against force {tangent_error:.1e}, \
-         moment {:.6} N mm/mm: against energy {:.1e}, against nodal forces {:.1e} of force times radius",
+        "bore, {kind}: {} edges touch; force against energy {force_error:.1e}, tangent against force \
+         {tangent_error:.1e}, moment {:.6} N mm/mm: against energy {:.1e}, against nodal forces {:.1e} of force times \
+         radius",
         here.peaks.len(),
         here.moment,
         (moment_by_difference - here.moment).abs() / arm,
         (nodal - here.moment).abs() / arm
     );
     assert!(force_error <= 1e-6);
-    // Tight enough to see the part that comes from the curvature of the outline, penetration over radius: 8e-6 under rollers.
+    // Tight enough to see the part that comes from the curvature of the outline, penetration over radius: 8e-6 under
+    // rollers.
     assert!(tangent_error <= 1e-6);
     assert!((moment_by_difference - here.moment).abs() <= 1e-6 * arm);
     assert!((nodal - here.moment).abs() <= 1e-8 * arm);
@@ -197,8 +201,8 @@ fn flank_forces_are_derivatives_of_the_energy_and_balance() {
     flank_derivatives(&Drive::hhd_95(), 1e-5);
 }
 
-/// Flanks displaced, turned and worn, on an axis beside that of the housing. The moment about the axis of the output is that of
-/// the forces where they act, 20 um beside the nodes that carry them: 4e-4 of 45 mm.
+/// Flanks displaced, turned and worn, on an axis beside that of the housing. The moment about the axis of the output is
+/// that of the forces where they act, 20 um beside the nodes that carry them: 4e-4 of 45 mm.
 #[test]
 fn as_built_flank_forces_are_derivatives_of_the_energy_and_balance() {
     flank_derivatives(&imperfect(), 1e-3);
@@ -326,13 +330,13 @@ fn flank_derivatives(drive: &Drive, moment_bound: f64) {
         }
     }
     println!(
-        "flanks, {touching} pairs: force against energy {:.1e}, tangent {:.1e}, tangent when sticking {:.1e}, action and \
-         reaction {:.1e}, moment on flexspline {:.1e} and on circular spline {:.1e} against the torque",
+        "flanks, {touching} pairs: force against energy {:.1e}, tangent {:.1e}, tangent when sticking {:.1e}, action \
+         and reaction {:.1e}, moment on flexspline {:.1e} and on circular spline {:.1e} against the torque",
         worst[0], worst[1], worst[2], worst[3], worst[4], worst[5]
     );
     assert!(touching >= 10);
-    // The tangent leaves out how the normal turns with the foot: pressure over radius of curvature, against the penalty, is
-    // a few thousandths on the tip rounding of the space.
+    // The tangent leaves out how the normal turns with the foot: pressure over radius of curvature, against the
+    // penalty, is a few thousandths on the tip rounding of the space.
     assert!(worst[0] <= 1e-5 && worst[1] <= 1e-2 && worst[2] <= 1e-2 && worst[3] <= 1e-12);
     assert!(worst[4] <= moment_bound && worst[5] <= moment_bound);
 }

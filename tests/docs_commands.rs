@@ -1,5 +1,6 @@
-//! The documentation is true where a machine can tell: every command on its pages runs, every Rust block compiles, every drive and
-//! nominal file in it is read, links and pictures exist, and so do the commands and options that the text names.
+//! The documentation is true where a machine can tell: every command on its pages runs, every Rust block compiles,
+//! every drive and nominal file in it is read, links and pictures exist, and so do the commands and options that the
+//! text names.
 //!
 //! Pages are all Markdown files of the project. What a fence is marked with says what is done with it:
 //!

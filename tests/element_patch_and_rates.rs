@@ -8,10 +8,10 @@
 //!   +--'--+---'--+                h, h/2, h/4, h/8: displacement error ~ h^3 (L2), energy error ~ h^4
 //! ```
 //!
-//! Material: E = 206 000 MPa, nu = 0.3, plane strain. References: affine fields; Lame's thick cylinder, u_r = C r + D / r
-//! (Timoshenko and Goodier, Theory of Elasticity, art. 28); a priori estimates for quadratic elements (Ciarlet, The Finite
-//! Element Method for Elliptic Problems, th. 3.2.5). Physics wrong if this fails: gradients, Jacobian, integration rule,
-//! a strain that does not vanish under rotation.
+//! Material: E = 206 000 MPa, nu = 0.3, plane strain. References: affine fields; Lame's thick cylinder, u_r = C r + D /
+//! r (Timoshenko and Goodier, Theory of Elasticity, art. 28); a priori estimates for quadratic elements (Ciarlet, The
+//! Finite Element Method for Elliptic Problems, th. 3.2.5). Physics wrong if this fails: gradients, Jacobian,
+//! integration rule, a strain that does not vanish under rotation.
 
 use flexspline_sim::fem::element::{
     GaussPoint, add_internal_force, cauchy_stress, gauss_points, linear_stiffness, shape,
@@ -173,7 +173,8 @@ fn an_affine_field_comes_out_exactly() {
     assert!(worst <= 1e-10 * 2e-3, "an affine field is off by {worst}");
 }
 
-/// Large strain: under a homogeneous deformation the inner nodes are in equilibrium and the stress is the same everywhere.
+/// Large strain: under a homogeneous deformation the inner nodes are in equilibrium and the stress is the same
+/// everywhere.
 #[test]
 fn a_large_homogeneous_deformation_is_in_equilibrium() {
     let mesh = Mesh::new(3, distorted);
@@ -287,7 +288,8 @@ fn the_thick_ring_converges_with_the_third_power_of_the_element() {
         if let Some((displacement_before, energy_before)) = before {
             let rate = [f64::log2(displacement_before / displacement), f64::log2(energy_before / energy)];
             println!(
-                "Lame ring, {n} x {n}: displacement error {displacement:.2e} (rate {:.2}), energy error {energy:.2e} (rate {:.2})",
+                "Lame ring, {n} x {n}: displacement error {displacement:.2e} (rate {:.2}), energy error {energy:.2e} \
+                 (rate {:.2})",
                 rate[0], rate[1]
             );
             rates.push(rate);

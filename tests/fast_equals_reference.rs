@@ -5,11 +5,11 @@
 //!               one sparse matrix                                |_^_|_^_|_^_|   faces around the ring, flanks that touch
 //! ```
 //!
-//! HHD-95, every generator: deformed, loaded, turned forward and back through the clearance; with friction, a sleeve that
-//! yields, and in the cold; with every imperfection at once, and with one of each kind. Bounds: 0.1″ in the output angle, 0.5 %
-//! in wind-up and in peak stress; they stand for the whole path, not for its end.
-//! Physics wrong if this fails: a cell condensed wrongly, a frame that carries a moment, strain that a turning frame cannot
-//! hold, contact that one solver sees and the other does not.
+//! HHD-95, every generator: deformed, loaded, turned forward and back through the clearance; with friction, a sleeve
+//! that yields, and in the cold; with every imperfection at once, and with one of each kind. Bounds: 0.1″ in the output
+//! angle, 0.5 % in wind-up and in peak stress; they stand for the whole path, not for its end.
+//! Physics wrong if this fails: a cell condensed wrongly, a frame that carries a moment, strain that a turning frame
+//! cannot hold, contact that one solver sees and the other does not.
 
 use flexspline_sim::drive::{DamagedFlank, DamagedTooth, Drive, GeneratorKind, Harmonic, Wheel};
 use flexspline_sim::mesh::MeshLevel;
@@ -98,8 +98,8 @@ fn compare(
     let wind_up = |a: &[Answer]| a[1].error_arcsec - a[0].error_arcsec;
     let winds = wind_up(&fast) / wind_up(&reference) - 1.0;
     println!(
-        "{kind}, {what}: output {output:.4}\", wind-up {:.2}\" and {:+.4} %, peak stress {:.3} %, displacements {:.1e} mm, \
-         generator torque {torque:.1e} N.m, compliance {:.2} %",
+        "{kind}, {what}: output {output:.4}\", wind-up {:.2}\" and {:+.4} %, peak stress {:.3} %, displacements \
+         {:.1e} mm, generator torque {torque:.1e} N.m, compliance {:.2} %",
         wind_up(&reference),
         100.0 * winds,
         100.0 * stress,

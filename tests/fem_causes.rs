@@ -1,14 +1,16 @@
-//! A deviation of the geometry, hidden in contact FEM, is named and measured with nothing but the ideal drive's table and kernels.
+//! A deviation of the geometry, hidden in contact FEM, is named and measured with nothing but the ideal drive's table
+//! and kernels.
 //!
 //! ```text
 //!   as-built drive --FEM--> output at 40 generator angles, six loads each, + noise --> diagnose <-- table, kernels <--FEM-- ideal drive
 //! ```
 //!
-//! HHD-95 with the cam, coarse mesh. The run is one that a bench can do: turn the generator to a place, step the load, read, go on; four
-//! sessions over 50 turns of the generator, so that what is locked to the flexspline (order 2) and to the circular spline
-//! (2 * 94/95) come apart. White noise of 0.5". The hidden drive is solved afresh, with finite deviations and contacts that open;
-//! the diagnosis has first-order kernels and the eccentricities of other sizes and places.
-//! Physics wrong if this fails: a kernel's sign, phase, wheel or dependence on load; a signature that another cause can imitate.
+//! HHD-95 with the cam, coarse mesh. The run is one that a bench can do: turn the generator to a place, step the load,
+//! read, go on; four sessions over 50 turns of the generator, so that what is locked to the flexspline (order 2) and to
+//! the circular spline (2 * 94/95) come apart. White noise of 0.5". The hidden drive is solved afresh, with finite
+//! deviations and contacts that open; the diagnosis has first-order kernels and the eccentricities of other sizes and
+//! places. Physics wrong if this fails: a kernel's sign, phase, wheel or dependence on load; a signature that another
+//! cause can imitate.
 
 use std::f64::consts::{PI, TAU};
 use std::ops::ControlFlow;
@@ -33,8 +35,9 @@ const SESSIONS: usize = 4;
 const PLACES: usize = 10;
 const LOADS: [f64; 3] = [4.0, 15.0, 50.0];
 
-/// Relative error allowed of a size. Pitch errors and ovals are known by kernels of first order. What an eccentricity does bends sharply
-/// where it has eaten up the clearance (7 to 9 um here), and the sizes between those of the kernels are known by a straight line.
+/// Relative error allowed of a size. Pitch errors and ovals are known by kernels of first order. What an eccentricity
+/// does bends sharply where it has eaten up the clearance (7 to 9 um here), and the sizes between those of the kernels
+/// are known by a straight line.
 const LINEAR: f64 = 0.05;
 const ECCENTRIC: f64 = 0.25;
 
@@ -47,7 +50,11 @@ pub(crate) fn known() -> &'static (Vec<u8>, Arc<Kernels>) {
     static KNOWN: OnceLock<(Vec<u8>, Arc<Kernels>)> = OnceLock::new();
     KNOWN.get_or_init(|| {
         let desk = Desk::new();
-        desk.line("tables --generator cam --mesh coarse --temperatures-c 20 --positions 8 --most-nodes 14 --no-report --out made").done();
+        desk.line(
+            "tables --generator cam --mesh coarse --temperatures-c 20 --positions 8 --most-nodes 14 --no-report --out \
+             made",
+        )
+        .done();
         let plan = KernelPlan {
             torques_n_m: vec![2.0, 10.0, 60.0],
             sizes_um: vec![5.5, 8.0, 12.0],
@@ -164,8 +171,8 @@ fn a_runout_of_the_flexspline_and_pitch_errors_of_the_circular_spline_are_told_a
     );
 }
 
-/// What is assumed of the two zones of teeth where no kernels are at hand, held against contact FEM: below the clearance and where both
-/// flanks bind (7 to 9 um here eat it up).
+/// What is assumed of the two zones of teeth where no kernels are at hand, held against contact FEM: below the
+/// clearance and where both flanks bind (7 to 9 um here eat it up).
 #[test]
 #[ignore = "half a minute of a processor: two more drives by FEM"]
 fn an_eccentric_circular_spline_is_told_without_kernels_before_and_after_its_flanks_bind() {

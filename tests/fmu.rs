@@ -1,6 +1,8 @@
-//! FMUs of `flexspline export --format fmu`, imported as a simulator does it: the zip, its description, and the library through `dlopen`.
+//! FMUs of `flexspline export --format fmu`, imported as a simulator does it: the zip, its description, and the library
+//! through `dlopen`.
 //!
-//! Wrong if these fail: an FMU that is not the core or not the flight, a state that is not all of it, an importer's mistake that ends its program.
+//! Wrong if these fail: an FMU that is not the core or not the flight, a state that is not all of it, an importer's
+//! mistake that ends its program.
 
 mod importer;
 
@@ -390,7 +392,8 @@ fn calls_in_a_wrong_state_and_wrong_arguments_are_refused_with_a_line_in_the_log
     refused(&odd, odd.call("fmi2ExitInitializationMode"), "rate_rad_s");
 }
 
-/// Every function with zeros and null pointers for all its arguments, in every state, on components that live, are null, were freed, or never were.
+/// Every function with zeros and null pointers for all its arguments, in every state, on components that live, are
+/// null, were freed, or never were.
 #[test]
 fn no_function_falls_over_null_pointers_and_strange_components() {
     type Any = unsafe extern "C" fn(*mut c_void, usize, usize, usize, usize, usize, usize) -> c_int;

@@ -7,9 +7,9 @@
 //!     +-----------> psi               +-----------> psi
 //! ```
 //!
-//! Loads: 50 N.m on the output, turning it forward; the generator turned forward, then backward; coefficient 0.1 and 0, no
-//! drag on the output. References: without friction the state does not know where it came from; with it, the work that
-//! generator and load do in a pitch is dissipated, and cannot be negative.
+//! Loads: 50 N.m on the output, turning it forward; the generator turned forward, then backward; coefficient 0.1 and 0,
+//! no drag on the output. References: without friction the state does not know where it came from; with it, the work
+//! that generator and load do in a pitch is dissipated, and cannot be negative.
 //! Physics wrong if this fails: friction that pushes instead of holding back, history that is lost or kept wrongly.
 
 use flexspline_sim::drive::{Drive, GeneratorKind};
@@ -20,13 +20,14 @@ use flexspline_tests::motion::{loaded, mean, mean_error, mean_generator_torque, 
 
 const TORQUE_N_M: f64 = 50.0;
 
-/// One pitch forward and one backward, each after settling; mean error (arc-seconds) and generator torque (N m) of each.
+/// One pitch forward and one backward, each after settling; mean error (arc-seconds) and generator torque (N m) of
+/// each.
 fn loop_of(kind: GeneratorKind, friction: f64, increments: usize) -> [(f64, f64); 2] {
     let mut drive = Drive::hhd_95();
     drive.flanks.friction_coefficient = friction;
     drive.output.drag_torque_n_m = 0.0;
-    // With 48 points to an edge, as rollers have by default, the two-roller finds no equilibrium beyond 48.6 N.m when the load
-    // comes on with friction at standstill.
+    // With 48 points to an edge, as rollers have by default, the two-roller finds no equilibrium beyond 48.6 N.m when
+    // the load comes on with friction at standstill.
     let settings = SolverSettings { bore_points: Some(16), ..on(MeshLevel::Standard) };
     let problem = problem(&drive, kind, settings);
     let mut run = loaded(&problem, TORQUE_N_M);
@@ -34,7 +35,8 @@ fn loop_of(kind: GeneratorKind, friction: f64, increments: usize) -> [(f64, f64)
     let describe = |way: &str, places: &[Place]| {
         let (error, torque) = (mean_error(places), mean_generator_torque(places));
         println!(
-            "{kind}, friction {friction}, {way}: e {error:.4}\", generator {torque:.5} N.m, {:.1} iterations, at most {}",
+            "{kind}, friction {friction}, {way}: e {error:.4}\", generator {torque:.5} N.m, {:.1} iterations, at most \
+             {}",
             mean_iterations(places),
             places.iter().map(|p| p.increment.iterations).max().unwrap()
         );
@@ -53,7 +55,8 @@ fn makes_a_loop(kind: GeneratorKind) {
     let [forward, backward] = loop_of(kind, 0.1, 5);
     let ideal = TORQUE_N_M / 95.0;
     let width = forward.0 - backward.0;
-    // Work that goes in over a pitch of either sense, over the work of the load: -M_g / (T/95) forward is what comes out.
+    // Work that goes in over a pitch of either sense, over the work of the load: -M_g / (T/95) forward is what comes
+    // out.
     let lost_forward = 1.0 + forward.1 / ideal;
     let lost_backward = -backward.1 / ideal - 1.0;
     println!(
@@ -86,8 +89,8 @@ fn without_friction_there_is_no_loop() {
     assert!((mean([-forward.1, -backward.1]) / (TORQUE_N_M / 95.0) - 1.0).abs() <= 1e-3);
 }
 
-/// Lifting a load, teeth that slip wedge themselves in: friction raises the pressure that it follows. A tangent without that
-/// coupling takes twice as many iterations, or runs out of them.
+/// Lifting a load, teeth that slip wedge themselves in: friction raises the pressure that it follows. A tangent without
+/// that coupling takes twice as many iterations, or runs out of them.
 #[test]
 fn lifting_the_rated_load_converges() {
     let mut drive = Drive::hhd_95();

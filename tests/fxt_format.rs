@@ -1,8 +1,9 @@
-//! `docs/reference/fxt.md` says what is in a table image: a parser that takes offsets and types from the tables on that page, and evaluates
-//! what they hold by its formulas, agrees with the core in every number.
+//! `docs/reference/fxt.md` says what is in a table image: a parser that takes offsets and types from the tables on that
+//! page, and evaluates what they hold by its formulas, agrees with the core in every number.
 //!
-//! Nothing of the core's reader is used to read: bytes, page and arithmetic in `f64` are this file's own. References: the numbers that
-//! an image was written from, and what [`Table`] says of it. Wrong if this fails: the page, or the format changed without its version.
+//! Nothing of the core's reader is used to read: bytes, page and arithmetic in `f64` are this file's own. References:
+//! the numbers that an image was written from, and what [`Table`] says of it. Wrong if this fails: the page, or the
+//! format changed without its version.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;

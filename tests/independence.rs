@@ -6,8 +6,8 @@
 //!   e with more increments     - e  |
 //! ```
 //!
-//! Loads: none but the drag, 0.7 and 1.3 pitches after the start, and 50 N.m; all generators. The bound is 0.1", for the
-//! loaded two-roller, which winds up by 15', 0.3".
+//! Loads: none but the drag, 0.7 and 1.3 pitches after the start, and 50 N.m; all generators. The bound is 0.1", for
+//! the loaded two-roller, which winds up by 15', 0.3".
 //! Reference: the same drive with the next finer choice. Physics wrong if this fails: something that sets the answer is
 //! not in drive.toml.
 

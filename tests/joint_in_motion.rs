@@ -1,5 +1,5 @@
-//! A joint with mass: what the core gains in flights on units that the nominal table does not know. The plant itself, the servo's ringing and the
-//! map of stable loops are claimed in `host-sim/motion/tests`.
+//! A joint with mass: what the core gains in flights on units that the nominal table does not know. The plant itself,
+//! the servo's ringing and the map of stable loops are claimed in `host-sim/motion/tests`.
 
 use std::process::Command;
 
@@ -15,8 +15,8 @@ fn flight(flown: &Flown) -> Results {
 /// A dish of 3 kg·m², target and load the same for every generator.
 fn dish(kind: GeneratorKind, torque: &str) -> Flown {
     let text = format!(
-        "base = \"antenna\"\ngenerator = \"{kind}\"\ntorque = \"{torque}\"\nlegs = [[2.0, 0.0], [3.0, 0.005], [3.0, -0.001], [3.0, 0.0001]]\n\
-         [load]\nbias_n_m = 4.0\nswing = [5.0, 0.05]\ngust = [1.0, 0.3]\n"
+        "base = \"antenna\"\ngenerator = \"{kind}\"\ntorque = \"{torque}\"\nlegs = [[2.0, 0.0], [3.0, 0.005], [3.0, \
+         -0.001], [3.0, 0.0001]]\n[load]\nbias_n_m = 4.0\nswing = [5.0, 0.05]\ngust = [1.0, 0.3]\n"
     );
     read("dish.toml", &text).unwrap()
 }
@@ -42,8 +42,8 @@ fn with_an_inert_load_the_core_removes_what_a_quasi_static_inverse_removes() {
     }
 }
 
-/// The low-pass of a torque in the mesh is wide on a stiff drive, and on a soft one so narrow that it tells little more than a mean; both come to
-/// rest after a knock.
+/// The low-pass of a torque in the mesh is wide on a stiff drive, and on a soft one so narrow that it tells little more
+/// than a mean; both come to rest after a knock.
 #[test]
 fn a_torque_in_the_mesh_passes_only_as_far_as_its_loop_keeps_the_margin() {
     let [stiff, soft] =
@@ -71,13 +71,14 @@ fn scenarios_with_a_name_are_stable_and_lose_less_than_a_tenth_of_what_the_ideal
     }
 }
 
-/// A dish at a constant rate under a constant load: what ripples is the drive, down to what encoder, servo and friction make of one without errors.
-/// Wind moves the output as much with a table as without.
+/// A dish at a constant rate under a constant load: what ripples is the drive, down to what encoder, servo and friction
+/// make of one without errors. Wind moves the output as much with a table as without.
 #[test]
 fn at_a_constant_rate_the_ripple_is_a_fifth_and_that_of_wind_stays() {
     for (rate, gust, least) in [(0.01, 0.0, 5.0), (0.02, 0.0, 8.0), (0.05, 0.0, 8.0), (0.02, 4.0, 0.9)] {
         let text = format!(
-            "base = \"antenna\"\nlegs = [[2.0, 0.0], [18.0, {rate}]]\n[load]\nswing = [0.0, 0.03]\ngust = [{gust}, 0.3]\n"
+            "base = \"antenna\"\nlegs = [[2.0, 0.0], [18.0, {rate}]]\n[load]\nswing = [0.0, 0.03]\ngust = [{gust}, \
+             0.3]\n"
         );
         let found = flight(&read("rate.toml", &text).unwrap());
         let (ripple, floor) = (found.velocity_ripple, found.velocity_ripple_floor);
@@ -93,9 +94,9 @@ fn about_zero_load_the_core_gains_with_every_generator() {
     for kind in GeneratorKind::ALL {
         for (torque, noise, load) in [("on_load", 0.3, 0.3), ("in_mesh", 0.03, 0.0), ("current", 0.0, 0.0)] {
             let text = format!(
-                "base = \"antenna\"\ngenerator = \"{kind}\"\ntorque = \"{torque}\"\ntorque_noise_n_m = {noise}\n\
-                 legs = [[2.0, 0.0], [2.0, 0.005], [2.0, -0.001], [2.0, 0.0001]]\n\
-                 [load]\nbias_n_m = {load}\nswing = [0.0, 0.05]\ngust = [0.0, 0.3]\n"
+                "base = \"antenna\"\ngenerator = \"{kind}\"\ntorque = \"{torque}\"\ntorque_noise_n_m = {noise}\nlegs \
+                 = [[2.0, 0.0], [2.0, 0.005], [2.0, -0.001], [2.0, 0.0001]]\n[load]\nbias_n_m = {load}\nswing = [0.0, \
+                 0.05]\ngust = [0.0, 0.3]\n"
             );
             let rms = flight(&read("light.toml", &text).unwrap()).rms_arcsec;
             println!(
@@ -107,13 +108,14 @@ fn about_zero_load_the_core_gains_with_every_generator() {
     }
 }
 
-/// A correction that crosses the play moves the torque in the mesh. Before that had to settle, the flank changed over and over here: 52″ and 64″ for 32 without, 1043 and 1742″/s; now 18 and 23″, 282 and 475″/s.
+/// A correction that crosses the play moves the torque in the mesh. Before that had to settle, the flank changed over
+/// and over here: 52″ and 64″ for 32 without, 1043 and 1742″/s; now 18 and 23″, 282 and 475″/s.
 #[test]
 fn a_load_just_below_the_drag_of_a_soft_drive_does_not_change_the_flank_over_and_over() {
     for [load, swing] in [[0.4, 0.0], [0.0, 0.4]] {
         let text = format!(
-            "base = \"antenna\"\ngenerator = \"four-roller\"\ntorque = \"in_mesh\"\nlegs = [[2.0, 0.0], [8.0, 0.005]]\n\
-             [load]\nbias_n_m = {load}\nswing = [{swing}, 0.05]\ngust = [0.0, 0.3]\n"
+            "base = \"antenna\"\ngenerator = \"four-roller\"\ntorque = \"in_mesh\"\nlegs = [[2.0, 0.0], [8.0, \
+             0.005]]\n[load]\nbias_n_m = {load}\nswing = [{swing}, 0.05]\ngust = [0.0, 0.3]\n"
         );
         let found = flight(&read("soft.toml", &text).unwrap());
         let (rms, ripple) = (found.rms_arcsec, found.velocity_ripple);

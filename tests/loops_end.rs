@@ -1,9 +1,11 @@
 //! Every loop of the host ends: by its form, or by a bound that is listed here.
 //!
-//! The source of the host's crates is parsed. A loop whose form bounds it needs nothing: `for` over what is finite, `while let` that takes from a queue
-//! or a reader, `while k < n` whose body always does `k += 1`. Every other `while`, `loop`, `for` over an open range, endless iterator (`successors`,
-//! `repeat_with`, `cycle`, `(0..)` that nothing finite is zipped with) and function that calls itself stands in [`BOUNDED`], with its bound: a constant
-//! that occurs in the loop, or why each round leaves fewer. A loop that is not listed fails, and so does a line of the list whose loop is gone.
+//! The source of the host's crates is parsed. A loop whose form bounds it needs nothing: `for` over what is finite,
+//! `while let` that takes from a queue or a reader, `while k < n` whose body always does `k += 1`. Every other `while`,
+//! `loop`, `for` over an open range, endless iterator (`successors`, `repeat_with`, `cycle`, `(0..)` that nothing
+//! finite is zipped with) and function that calls itself stands in [`BOUNDED`], with its bound: a constant that occurs
+//! in the loop, or why each round leaves fewer. A loop that is not listed fails, and so does a line of the list whose
+//! loop is gone.
 //!
 //! Not seen are functions that call themselves through others. Bodies of macros are not parsed: a loop in one fails.
 

@@ -1,5 +1,5 @@
-//! Measured data, damaged in every way that is known: each file ends in a clear error or in a fault with its name, and what is physics
-//! is not taken for a fault.
+//! Measured data, damaged in every way that is known: each file ends in a clear error or in a fault with its name, and
+//! what is physics is not taken for a fault.
 
 use crate::bench_data::{ARCSEC, Bench, RATIO, normal};
 use flexspline_sim::measurement::{ColumnMap, FaultName, Gear, MeasuredError, Recording, Treatment, parse};
@@ -36,7 +36,8 @@ fn clean_data_has_no_fault() {
     }
 }
 
-/// False alarms over many drives with backlash, hysteresis, resonance, damaged teeth, wear, heat, latency, gravity and the rest.
+/// False alarms over many drives with backlash, hysteresis, resonance, damaged teeth, wear, heat, latency, gravity and
+/// the rest.
 #[test]
 fn physics_is_not_taken_for_a_fault_of_the_data() {
     let seeds = seeds(100, 300);
@@ -53,8 +54,8 @@ fn physics_is_not_taken_for_a_fault_of_the_data() {
     assert!(alarms.len() as f64 <= 0.01 * seeds as f64, "{} in {seeds}:\n{}", alarms.len(), alarms.join("\n"));
 }
 
-/// Friction holds a flank until the load is worth a few percent of its largest; then the clearance is crossed within a row, while the
-/// wind-up still creeps after the load.
+/// Friction holds a flank until the load is worth a few percent of its largest; then the clearance is crossed within a
+/// row, while the wind-up still creeps after the load.
 #[test]
 fn a_flank_that_friction_lets_go_is_no_lost_index() {
     for seed in 0..30 {
@@ -88,7 +89,8 @@ fn a_flank_that_friction_lets_go_is_no_lost_index() {
     }
 }
 
-/// Under a generator that stands, an output that leaves by a tooth pitch has ratcheted; one that moves on slowly is a frozen generator.
+/// Under a generator that stands, an output that leaves by a tooth pitch has ratcheted; one that moves on slowly is a
+/// frozen generator.
 #[test]
 fn a_generator_that_stands_while_teeth_skip_is_not_frozen() {
     let pitch = std::f64::consts::TAU / 190.0;
@@ -773,7 +775,8 @@ fn columns_are_mapped_and_wrong_mappings_say_so() {
     assert!(error.contains("ratio: found 0"), "{error}");
 }
 
-/// Ten million rows, written as they are read: `cargo test --release --test claims ten_million -- --ignored --nocapture`.
+/// Ten million rows, written as they are read:
+/// `cargo test --release --test claims ten_million -- --ignored --nocapture`.
 #[test]
 #[ignore = "takes a minute and a gigabyte and a half"]
 fn ten_million_rows() {

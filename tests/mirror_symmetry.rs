@@ -10,7 +10,8 @@
 //! Loads: T = 0 (drag of 0.02 N.m only) and T = 20 N.m, each run from psi = 0 forwards, and its mirror image backwards.
 //! Reference: zero for the sum of the two errors. Coarse mesh: the symmetry
 //! is one of the mesh at any density.
-//! Physics wrong if this fails: flanks of the two sides treated differently, a sign, a mesh that is not its mirror image.
+//! Physics wrong if this fails: flanks of the two sides treated differently, a sign, a mesh that is not its mirror
+//! image.
 
 use flexspline_sim::drive::GeneratorKind;
 use flexspline_sim::mesh::MeshLevel;

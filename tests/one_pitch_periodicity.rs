@@ -11,8 +11,8 @@
 //! Loads: none but the drag of 0.02 N.m; 50 N.m on cam and two-roller. One pitch to settle, then two pitches compared
 //! point by point, the second by a solver that remembers nothing of the first.
 //! Reference: zero (the state goes over into itself, one tooth further).
-//! Physics wrong if this fails: a mesh or contact that is not the same at every tooth, history that should not be there,
-//! or equilibrium that was not reached.
+//! Physics wrong if this fails: a mesh or contact that is not the same at every tooth, history that should not be
+//! there, or equilibrium that was not reached.
 
 use flexspline_sim::drive::GeneratorKind;
 use flexspline_sim::mesh::MeshLevel;

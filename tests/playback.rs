@@ -1,9 +1,9 @@
-//! Tables for others' playback hold what their devices play: each file is read here by a parser of its own, written from the
-//! description of the format (docs/how-to/export_to_controllers.md), and looked up by a simulation of its own, forward from the command or through time,
-//! where the program goes backward from the generator.
+//! Tables for others' playback hold what their devices play: each file is read here by a parser of its own, written
+//! from the description of the format (docs/how-to/export_to_controllers.md), and looked up by a simulation of its own,
+//! forward from the command or through time, where the program goes backward from the generator.
 //!
-//! The unit: HHD-95 with the cam by its table of contact FEM, with a pitch error, two eccentricities and wider clearance,
-//! calibrated under 12 N.m from one log and judged on another. Nothing here was tried on hardware.
+//! The unit: HHD-95 with the cam by its table of contact FEM, with a pitch error, two eccentricities and wider
+//! clearance, calibrated under 12 N.m from one log and judged on another. Nothing here was tried on hardware.
 //! Wrong if this fails: a sign, half a bin, a direction, a unit, an entry played a second early, a byte order.
 
 use std::collections::BTreeMap;
@@ -20,15 +20,16 @@ const ARCSEC: f64 = 206_264.806_247_096_36;
 const RATIO: f64 = 95.0;
 const LOAD_N_M: f32 = 12.0;
 const TEMPERATURE_C: f32 = 20.0;
-const EFFECTS: &str = "--effect flexspline_pitch_error:amplitude_arcsec=20,phase_rad=0.4 \
-                       --effect generator_eccentricity:amplitude_arcsec=8,phase_rad=1.1 \
-                       --effect circular_spline_eccentricity:amplitude_arcsec=6,phase_rad=0.7 \
-                       --effect backlash_growth:growth_arcsec=20";
+const EFFECTS: &str = "--effect flexspline_pitch_error:amplitude_arcsec=20,phase_rad=0.4 --effect \
+                       generator_eccentricity:amplitude_arcsec=8,phase_rad=1.1 --effect \
+                       circular_spline_eccentricity:amplitude_arcsec=6,phase_rad=0.7 --effect \
+                       backlash_growth:growth_arcsec=20";
 const BOTH: [Direction; 2] = [Direction::Forward, Direction::Backward];
 /// Points in a direction: enough for 1 % of a root mean square.
 const POINTS: u32 = 20_011;
 
-/// A folder with the table of the unit, `cal/calibrated.fxt`, a log of it, `run/data.csv`, and the nominal table, `cam.fxt`.
+/// A folder with the table of the unit, `cal/calibrated.fxt`, a log of it, `run/data.csv`, and the nominal table,
+/// `cam.fxt`.
 struct Unit {
     desk: Desk,
     image: Vec<u8>,
@@ -282,7 +283,8 @@ fn onstepx_seconds_leave_what_is_said_and_a_short_buffer_is_refused() {
             let (entry, steps) = command.strip_prefix(":WR").unwrap().split_once(',').unwrap();
             buffer[entry.parse::<usize>().unwrap()] = steps.parse::<i8>().unwrap().into();
         }
-        // The controller's loop, every 10 ms of an output turn of sidereal seconds, with the entries so many seconds late.
+        // The controller's loop, every 10 ms of an output turn of sidereal seconds, with the entries so many seconds
+        // late.
         let left = |late: usize| {
             let (mut motor, mut index, mut began, mut last) = (0.0f64, 0usize, 0u32, -1.0);
             let mut left = Vec::new();
@@ -340,7 +342,8 @@ fn eqmod_curves_leave_what_is_said() {
                 .enumerate()
                 .all(|(k, row)| row[0] == k as f64 && (row[1] - steps_a_second * k as f64).abs() <= 1.0)
         );
-        // Rates: differences of the error, that over the seam the mean of its neighbours, without their mean, as dividers.
+        // Rates: differences of the error, that over the seam the mean of its neighbours, without their mean, as
+        // dividers.
         let value = |k: usize| rows[k][2];
         let drift = (value(period - 1) - value(0)) / (period as f64 + 1.0);
         let mut rates: Vec<f64> = (1..period).map(|k| value(k - 1) - value(k) + drift).collect();
@@ -354,7 +357,8 @@ fn eqmod_curves_leave_what_is_said() {
             carried = wanted - given;
             rates[k % period] = given - SIDEREAL;
         }
-        // Once a second, wherever in its second the first tick lies; which rate it is goes by the place in the worm turn.
+        // Once a second, wherever in its second the first tick lies; which rate it is goes by the place in the worm
+        // turn.
         let mut all = Vec::new();
         for phase in [0.1, 0.3, 0.5, 0.7, 0.9] {
             let mut led = -SIDEREAL * phase;
@@ -419,8 +423,8 @@ fn cfs_and_fprime_hold_the_image_itself() {
     assert_eq!(number(&said, "/playback/rms_played_arcsec"), core);
 }
 
-/// The C that is written compiles without warnings beside the types of cFE, and its function takes the table of its own object and
-/// refuses it with a bit turned.
+/// The C that is written compiles without warnings beside the types of cFE, and its function takes the table of its own
+/// object and refuses it with a bit turned.
 fn validates_on_board() {
     let folder = UNIT.desk.path("cfs");
     let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).unwrap();
@@ -430,21 +434,19 @@ fn validates_on_board() {
     );
     write(
         "cfe_tbl_filedef.h",
-        "#include \"common_types.h\"\n\
-         typedef struct { char ObjectName[64], TableName[40], Description[32], TgtFilename[20]; uint32 ObjectSize; } CFE_TBL_FileDef_t;\n\
-         #define CFE_TBL_FILEDEF(O, T, D, F) CFE_TBL_FileDef_t CFE_TBL_FileDef = {#O \"\\0\", #T \"\\0\", #D \"\\0\", #F \"\\0\", sizeof(O)};\n",
+        "#include \"common_types.h\"\ntypedef struct { char ObjectName[64], TableName[40], Description[32], \
+         TgtFilename[20]; uint32 ObjectSize; } CFE_TBL_FileDef_t;\n#define CFE_TBL_FILEDEF(O, T, D, F) \
+         CFE_TBL_FileDef_t CFE_TBL_FileDef = {#O \"\\0\", #T \"\\0\", #D \"\\0\", #F \"\\0\", sizeof(O)};\n",
     );
     write(
         "main.c",
-        "#include <string.h>\n#include \"cfe_tbl_filedef.h\"\n#include \"flexspline_tbl.h\"\n\
-         extern FLEXSPLINE_Table_t FLEXSPLINE_Table; extern CFE_TBL_FileDef_t CFE_TBL_FileDef;\n\
-         int main(void) {\n\
-           if (strcmp(CFE_TBL_FileDef.TableName, \"JOINT.FLEX_1\") || CFE_TBL_FileDef.ObjectSize != FLEXSPLINE_TABLE_BYTES) return 1;\n\
-           if (FLEXSPLINE_ValidateTable(&FLEXSPLINE_Table) != 0) return 2;\n\
-           for (unsigned k = 0; k < FLEXSPLINE_TABLE_BYTES; k += 97) {\n\
-             FLEXSPLINE_Table.Image[k] ^= 4; if (FLEXSPLINE_ValidateTable(&FLEXSPLINE_Table) == 0) return 3; FLEXSPLINE_Table.Image[k] ^= 4;\n\
-           }\n\
-           return 0; }\n",
+        "#include <string.h>\n#include \"cfe_tbl_filedef.h\"\n#include \"flexspline_tbl.h\"\nextern \
+         FLEXSPLINE_Table_t FLEXSPLINE_Table; extern CFE_TBL_FileDef_t CFE_TBL_FileDef;\nint main(void) {\nif \
+         (strcmp(CFE_TBL_FileDef.TableName, \"JOINT.FLEX_1\") || CFE_TBL_FileDef.ObjectSize != \
+         FLEXSPLINE_TABLE_BYTES) return 1;\nif (FLEXSPLINE_ValidateTable(&FLEXSPLINE_Table) != 0) return 2;\nfor \
+         (unsigned k = 0; k < FLEXSPLINE_TABLE_BYTES; k += 97) {\nFLEXSPLINE_Table.Image[k] ^= 4; if \
+         (FLEXSPLINE_ValidateTable(&FLEXSPLINE_Table) == 0) return 3; FLEXSPLINE_Table.Image[k] ^= 4;\n}\nreturn 0; \
+         }\n",
     );
     let built = Command::new("cc")
         .args([
@@ -529,8 +531,8 @@ fn data_that_the_playback_makes_worse_are_refused_and_say_whether_the_table_is_t
     let desk = &UNIT.desk;
     let export = |data: &str, more: &str, out: &str| {
         desk.line(&format!(
-            "export --format moteus --tables cal/calibrated.fxt --torque-n-m {LOAD_N_M} --temperature-c 20 --data {data} --out {out} --json \
-             {more}"
+            "export --format moteus --tables cal/calibrated.fxt --torque-n-m {LOAD_N_M} --temperature-c 20 --data \
+             {data} --out {out} --json {more}"
         ))
     };
     // Both angles turned over, a generator zero a third of a turn off, another ratio, the error of a unit turned over.
@@ -608,7 +610,8 @@ fn loads_beside_the_section_and_what_was_left_out_are_said() {
         }),
     );
     let line = format!(
-        "export --format moteus --tables cal/calibrated.fxt --torque-n-m {LOAD_N_M} --data heavy.csv --force --out heavy --json"
+        "export --format moteus --tables cal/calibrated.fxt --torque-n-m {LOAD_N_M} --data heavy.csv --force --out \
+         heavy --json"
     );
     let said = desk.line(&line).done().json();
     let notes = said["notes"].to_string();

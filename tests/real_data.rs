@@ -1,4 +1,5 @@
-//! Data that nobody in this project made: a CSF-17-100 against the stars (shipped), and other drives where they are at hand.
+//! Data that nobody in this project made: a CSF-17-100 against the stars (shipped), and other drives where they are at
+//! hand.
 
 use std::f64::consts::TAU;
 use std::path::PathBuf;
@@ -79,8 +80,8 @@ fn the_csf17_held_out() {
         (raw - 15.56).abs() < 0.01 && (two - 6.23).abs() < 0.01 && (four - 4.42).abs() < 0.01,
         "{raw} {two} {four}"
     );
-    // Strictly: whoever made the numbers took a quadratic drift out of the whole record. Here a drift is put back for the first half to
-    // find by itself: quadratic, and waves, fitted together to the first half, predict the second.
+    // Strictly: whoever made the numbers took a quadratic drift out of the whole record. Here a drift is put back for
+    // the first half to find by itself: quadratic, and waves, fitted together to the first half, predict the second.
     let strict = |orders: &[f64], degree: i32| {
         let (a, b) = (psi[0], psi[half - 1]);
         let x = |k: usize| 2.0 * (psi[k] - a) / (b - a) - 1.0;
@@ -137,8 +138,8 @@ fn names(json: &Value) -> Vec<&str> {
     json["causes"].as_array().unwrap().iter().map(|cause| cause["name"].as_str().unwrap()).collect()
 }
 
-/// Two waves a turn are not all: the gear has one, three and four as well, which is seen, and no cause is invented for what 2.5 turns in
-/// one direction cannot tell.
+/// Two waves a turn are not all: the gear has one, three and four as well, which is seen, and no cause is invented for
+/// what 2.5 turns in one direction cannot tell.
 #[test]
 fn the_csf17_has_more_than_two_waves_and_nothing_is_invented_for_the_rest() {
     let example = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/csf17_100");
@@ -150,7 +151,8 @@ fn the_csf17_has_more_than_two_waves_and_nothing_is_invented_for_the_rest() {
     }
     let residual = vec![session.error_rad.clone()];
     let picture = Picture::of(&[session], &residual, &Gear::of_ratio(nominal.ratio)).unwrap();
-    // What the picture of the nominal model shows: a hump at once a turn. In 2.5 turns it is no line above noise that remembers.
+    // What the picture of the nominal model shows: a hump at once a turn. In 2.5 turns it is no line above noise that
+    // remembers.
     let spectrum = &picture.spectra[0];
     let around = |order: f64| {
         let near = spectrum.orders.iter().zip(&spectrum.amplitude_arcsec).filter(|(o, _)| (*o - order).abs() < 0.2);
@@ -166,7 +168,8 @@ fn the_csf17_has_more_than_two_waves_and_nothing_is_invented_for_the_rest() {
     assert_eq!(json["data_faults"].as_array().unwrap().len(), 0);
     let verdict = json["verdict"].as_str().unwrap();
     assert!(["partly_explained", "unknown"].contains(&verdict), "4.6 of 6.1 arcsec stay unexplained: {verdict}");
-    // Only what has whole orders of the generator's turn may be named; nothing that needs load, heat, time or many turns.
+    // Only what has whole orders of the generator's turn may be named; nothing that needs load, heat, time or many
+    // turns.
     let whole_orders = [
         "flexspline_pitch_error",
         "circular_spline_pitch_error",
@@ -219,8 +222,8 @@ fn elsewhere(file: &str) -> Option<String> {
 
 #[test]
 fn joints_of_a_robot_and_printed_drives_have_no_fault_but_what_is_in_them() {
-    // Joint angle and joint torque of seven strain wave joints at 1 kHz, with steps of time up to 8.8 ms. There is no motor angle: the
-    // joint angle stands for the generator, the torque's wind-up for the error.
+    // Joint angle and joint torque of seven strain wave joints at 1 kHz, with steps of time up to 8.8 ms. There is no
+    // motor angle: the joint angle stands for the generator, the torque's wind-up for the error.
     let Some(text) = elsewhere("franka_panda_7joints/exciting_trajectory.csv") else {
         println!("skipped: FLEXSPLINE_DATA does not hold the data");
         return;
@@ -245,7 +248,8 @@ fn joints_of_a_robot_and_printed_drives_have_no_fault_but_what_is_in_them() {
     }
     for file in ["base_runin5", "split_4pre5", "conic_4pre5"] {
         let text = elsewhere(&format!("cycloidal_printed_hysteresis/{file}.csv")).unwrap();
-        // The output is held, the motor winds the drive up: angle against torque, the motor's angle being the error itself.
+        // The output is held, the motor winds the drive up: angle against torque, the motor's angle being the error
+        // itself.
         let map = ColumnMap::parse("time=t_s:s,generator=angle_arcmin:arcmin,error=torque_cmd_Nm:arcsec").unwrap();
         let read = parse(file, text.as_bytes(), &map, &Gear::of_ratio(15.0)).unwrap();
         let found: Vec<_> =
@@ -254,8 +258,8 @@ fn joints_of_a_robot_and_printed_drives_have_no_fault_but_what_is_in_them() {
     }
 }
 
-/// Output held, motor wound up and let go: a loop of torque over angle, three hundred times as wide as that of a strain wave gear. Load
-/// alone acts, so that nothing of teeth, encoders, temperature or speed is named with confidence.
+/// Output held, motor wound up and let go: a loop of torque over angle, three hundred times as wide as that of a strain
+/// wave gear. Load alone acts, so that nothing of teeth, encoders, temperature or speed is named with confidence.
 #[test]
 fn the_loops_of_printed_drives_are_laid_to_the_load() {
     let desk = Desk::new();
@@ -286,7 +290,8 @@ fn the_loops_of_printed_drives_are_laid_to_the_load() {
     }
 }
 
-/// Joint torque over stiffness stands for the error: what the arm weighs and how it moves is in it, which no law here describes.
+/// Joint torque over stiffness stands for the error: what the arm weighs and how it moves is in it, which no law here
+/// describes.
 #[test]
 fn what_a_robot_carries_is_not_taken_for_its_teeth() {
     let Some(text) = elsewhere("franka_panda_7joints/exciting_trajectory.csv") else {

@@ -86,7 +86,8 @@ fn the_page_of_a_settled_pitch_shows_its_rows_in_motion() {
     assert_eq!(names(&desk.path("bare")), ["results.csv", "summary.json"]);
 }
 
-/// A path that turns back and one whose torque comes and goes: a line to each way, solid and dashed, and what the teeth bear.
+/// A path that turns back and one whose torque comes and goes: a line to each way, solid and dashed, and what the teeth
+/// bear.
 #[test]
 fn the_page_of_a_path_tells_its_ways_apart() {
     let desk = Desk::new();
@@ -127,7 +128,8 @@ fn the_page_of_a_simulation_has_data_sheet_and_cautions() {
     let desk = Desk::new();
     desk.write(
         "drive.toml",
-        "base = \"HHD-95\"\n[data_sheet]\nsource = \"a catalogue\"\nt1_n_m = 5.0\nt2_n_m = 10.0\nrated_torque_n_m = 20.0\nk1_n_m_per_rad = 30e3\n",
+        "base = \"HHD-95\"\n[data_sheet]\nsource = \"a catalogue\"\nt1_n_m = 5.0\nt2_n_m = 10.0\nrated_torque_n_m = \
+         20.0\nk1_n_m_per_rad = 30e3\n",
     );
     let line = "simulate --drive drive.toml --generator cam --mesh coarse --path pitch --torque-n-m 20 --out made";
     desk.line(line).done();
@@ -144,7 +146,8 @@ fn the_page_of_a_simulation_has_data_sheet_and_cautions() {
     let lost = sheet["sheet"]["lost_motion_arcsec"].as_f64().unwrap();
     assert!(html.contains(&format!("value=\"{lost}\"")), "no lost motion of {lost}");
 
-    let binds = "simulate --generator cam --mesh coarse --path pitch --torque-n-m 20 --set circular_spline.profile_shift=2.95 --out binds";
+    let binds = "simulate --generator cam --mesh coarse --path pitch --torque-n-m 20 --set \
+                 circular_spline.profile_shift=2.95 --out binds";
     desk.line(binds).done();
     let (html, json) = page(&desk, "binds/report.html");
     assert_eq!(json["status"], "caution");
@@ -155,8 +158,11 @@ fn the_page_of_a_simulation_has_data_sheet_and_cautions() {
 #[test]
 fn a_missed_bound_is_stamped_and_fails_the_command() {
     let desk = Desk::new();
-    desk.line("tables --generator two-roller --mesh coarse --temperatures-c 20 --most-nodes 5 --positions 4 --no-report --out made")
-        .done();
+    desk.line(
+        "tables --generator two-roller --mesh coarse --temperatures-c 20 --most-nodes 5 --positions 4 --no-report \
+         --out made",
+    )
+    .done();
     let run = desk.line("validate --tables made --mesh coarse --solver fast --temperatures 1 --torques 8 --out made");
     assert_eq!(run.code, 1, "{}", run.stderr);
     let (html, json) = page(&desk, "made/validation.html");
@@ -216,8 +222,8 @@ fn faults_of_the_data_are_stamped_on_the_page_of_a_diagnosis() {
     desk.write("data.csv", &bench.csv());
     desk.write(
         "nominal.toml",
-        "[drive]\nflexspline_teeth = 188\ncircular_spline_teeth = 190\n[nominal]\nstiffness_n_m_per_rad = 4.4e5\n\
-         backlash_arcsec = 30.0\nfriction_torque_n_m = 1.0\n",
+        "[drive]\nflexspline_teeth = 188\ncircular_spline_teeth = 190\n[nominal]\nstiffness_n_m_per_rad = \
+         4.4e5\nbacklash_arcsec = 30.0\nfriction_torque_n_m = 1.0\n",
     );
     desk.line("diagnose data.csv --model nominal.toml --out made").done();
     let (html, json) = page(&desk, "made/report.html");

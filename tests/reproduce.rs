@@ -1,5 +1,5 @@
-//! `flexspline reproduce`: the verdicts follow from the numbers beside them, the numbers from the runs, and the runs are those of a drive
-//! whose error repeats with every tooth pitch.
+//! `flexspline reproduce`: the verdicts follow from the numbers beside them, the numbers from the runs, and the runs
+//! are those of a drive whose error repeats with every tooth pitch.
 //!
 //! ```text
 //!   paper: 10.3' .. 21.4'                    ours: half the clearance
@@ -9,9 +9,10 @@
 //!                                              |_____/
 //! ```
 //!
-//! References: drag of 0.02 N.m and standard gaps give 0.99' (cam) to 1.04' (double disc) of backlash (`backlash_and_dwell`); a rim that is held
-//! at one point turns by the tangential displacement of the thin ring there, `(v + (r_bore - R) theta) / r_bore`.
-//! Physics wrong if this fails: periodicity, the clearance, the deformation of the rim along its circumference.
+//! References: drag of 0.02 N.m and standard gaps give 0.99' (cam) to 1.04' (double disc) of backlash
+//! (`backlash_and_dwell`); a rim that is held at one point turns by the tangential displacement of the thin ring there,
+//! `(v + (r_bore - R) theta) / r_bore`. Physics wrong if this fails: periodicity, the clearance, the deformation of the
+//! rim along its circumference.
 
 use std::collections::BTreeSet;
 use std::fs;

@@ -1,4 +1,5 @@
-//! The picture of a residual: signals that are known come back with amplitude, phase and position, and noise shows nothing.
+//! The picture of a residual: signals that are known come back with amplitude, phase and position, and noise shows
+//! nothing.
 
 use std::f64::consts::TAU;
 use std::time::Instant;

@@ -9,10 +9,10 @@
 //!        '--....--'
 //! ```
 //!
-//! Loads: w0 = 0.005 mm on a rim of 0.4 mm, where second-order terms (w0/R = 1e-4) and stretch ((s/R)^2 = 7e-5) are gone;
-//! then w0 = 0.5 mm on the rim of HHD-95 (1.2 mm). Mesh: 752 by 2 elements.
-//! References: RingShape, NeutralCurve and RingBending (Timoshenko and Gere, Theory of Elastic Stability, ch. 7); force of
-//! the two-roller 13.443 E' I w0 / R^3.
+//! Loads: w0 = 0.005 mm on a rim of 0.4 mm, where second-order terms (w0/R = 1e-4) and stretch ((s/R)^2 = 7e-5) are
+//! gone; then w0 = 0.5 mm on the rim of HHD-95 (1.2 mm). Mesh: 752 by 2 elements.
+//! References: RingShape, NeutralCurve and RingBending (Timoshenko and Gere, Theory of Elastic Stability, ch. 7); force
+//! of the two-roller 13.443 E' I w0 / R^3.
 //! Physics wrong if this fails: bending stiffness of the element, place or size of a generator, large rotations.
 
 use flexspline_sim::contact::{BoreContact, BoreLaw};
@@ -100,8 +100,8 @@ fn closed_form_force(drive: &Drive, kind: GeneratorKind) -> Option<f64> {
 
 fn small_deflection(kind: GeneratorKind) {
     let drive = with_rim(0.005, 0.4);
-    // A roller is pressed with a thousandth of a newton here: its contact needs many points, and a softer law, to be wide
-    // enough to be integrated.
+    // A roller is pressed with a thousandth of a newton here: its contact needs many points, and a softer law, to be
+    // wide enough to be integrated.
     let settings = SolverSettings { bore_points: Some(64), bore_penalty: Some(1e5), ..settings() };
     let (problem, state) = ring(&drive, kind, settings);
     let shape = drive.generator.shape(kind);
@@ -117,7 +117,8 @@ fn small_deflection(kind: GeneratorKind) {
     let force = quadrant_force(&problem, &settings, &state);
     let expected = closed_form_force(&drive, kind);
     println!(
-        "{kind}, w0 {w0} mm: w within {:.4} %, v within {:.4} % of w0; force in a quadrant {force:.6e} N/mm, closed form {:.6e}",
+        "{kind}, w0 {w0} mm: w within {:.4} %, v within {:.4} % of w0; force in a quadrant {force:.6e} N/mm, closed \
+         form {:.6e}",
         100.0 * in_w,
         100.0 * in_v,
         expected.unwrap_or(f64::NAN)

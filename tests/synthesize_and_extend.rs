@@ -1,5 +1,5 @@
-//! Made-up data, diagnosed, and the loop closed: the extended model loads again, and tables made of it leave less pointing error in
-//! sessions that took no part.
+//! Made-up data, diagnosed, and the loop closed: the extended model loads again, and tables made of it leave less
+//! pointing error in sessions that took no part.
 //!
 //! ```text
 //!   effects ----> synthesize ----> data.csv ----> diagnose ----> causes ----> drive-extended.toml, <G>-extended.fxt
@@ -7,18 +7,19 @@
 //!      truth.json                                     +---- nominal model, tables <----+
 //! ```
 //!
-//! Wrong if this fails: a parameter that means one thing where data are made and another where causes are named; a sign or a phase
-//! lost on the way into a drive or a table; a table that was made with the sessions it is judged on; an extension of a drive
-//! that has nothing.
+//! Wrong if this fails: a parameter that means one thing where data are made and another where causes are named; a sign
+//! or a phase lost on the way into a drive or a table; a table that was made with the sessions it is judged on; an
+//! extension of a drive that has nothing.
 
 use flexspline_sim::causes::CauseName;
 use flexspline_tests::command::{Desk, names};
 use serde_json::Value;
 
 /// A drive known from its catalogue.
-const NOMINAL: &str = "[drive]\nflexspline_teeth = 188\ncircular_spline_teeth = 190\n\
-    [nominal]\nstiffness_n_m_per_rad = 30000.0\nbacklash_arcsec = 60.0\nfriction_torque_n_m = 1.5\n\
-    [[nominal.harmonic]]\norder_per_generator_turn = 2.0\namplitude_arcsec = 10.0\nphase_rad = 0.4\n";
+const NOMINAL: &str = "[drive]\nflexspline_teeth = 188\ncircular_spline_teeth = 190\n[nominal]\nstiffness_n_m_per_rad \
+                       = 30000.0\nbacklash_arcsec = 60.0\nfriction_torque_n_m = \
+                       1.5\n[[nominal.harmonic]]\norder_per_generator_turn = 2.0\namplitude_arcsec = 10.0\nphase_rad \
+                       = 0.4\n";
 
 fn number(value: &Value, path: &[&str]) -> f64 {
     let found = path.iter().fold(value, |value, key| &value[*key]);

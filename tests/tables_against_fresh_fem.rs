@@ -1,7 +1,8 @@
-//! Geometry to table to core and back: a table made by the command agrees with fresh FEM at points that made none of it, and
-//! the same samples through `--from-samples` give the same table.
+//! Geometry to table to core and back: a table made by the command agrees with fresh FEM at points that made none of
+//! it, and the same samples through `--from-samples` give the same table.
 //!
-//! Short form: coarse mesh, one temperature, cam and double disc. Bounds are those of the project: 0.5″ rms, 2″ at most.
+//! Short form: coarse mesh, one temperature, cam and double disc. Bounds are those of the project: 0.5″ rms, 2″ at
+//! most.
 
 use std::fs;
 

@@ -5,11 +5,11 @@
 //!   flexspline and generator warm: teeth grow into the spaces, b falls by 2 alpha tan(a) per kelvin
 //! ```
 //!
-//! Loads: 20 N.m at 20 C against f s^3 20 N.m at 70 C, the penalties scaled as a stiffness per area; no load for the backlash.
-//! References: similarity of elasticity (angles are the same when stress over E is); geometry of the flank at the pressure
-//! angle of about 24.7 degrees, -0.034 to -0.037'/K for 11.5e-6/K.
-//! Physics wrong if this fails: a length that does not expand, a generator fitted to the warm flexspline, thermal stress
-//! where there is none.
+//! Loads: 20 N.m at 20 C against f s^3 20 N.m at 70 C, the penalties scaled as a stiffness per area; no load for the
+//! backlash. References: similarity of elasticity (angles are the same when stress over E is); geometry of the flank at
+//! the pressure angle of about 24.7 degrees, -0.034 to -0.037'/K for 11.5e-6/K.
+//! Physics wrong if this fails: a length that does not expand, a generator fitted to the warm flexspline, thermal
+//! stress where there is none.
 
 use flexspline_sim::drive::{Drive, GeneratorKind};
 use flexspline_sim::mesh::MeshLevel;
@@ -40,7 +40,8 @@ fn similar(kind: GeneratorKind) {
     let at_warm = sweep(&warm, warm_c, settings(f / s), f * s.powi(3) * torque_n_m);
     let same_torque = sweep(&cold, warm_c, settings(1.0), torque_n_m);
     println!(
-        "{kind}: {at_cold:.5}\" at 20 C, {at_warm:.5}\" at {warm_c} C with the similar load, {same_torque:.5}\" with the same"
+        "{kind}: {at_cold:.5}\" at 20 C, {at_warm:.5}\" at {warm_c} C with the similar load, {same_torque:.5}\" with \
+         the same"
     );
     assert!((at_warm - at_cold).abs() <= 1e-3, "{kind}: {at_cold}\" cold, {at_warm}\" warm under the similar load");
     // With the same torque the warm drive is the cold one under a load greater by the fall of E.

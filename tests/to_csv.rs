@@ -1,7 +1,7 @@
 //! Files of other programs through `examples/to_csv.py` and the one reader: what was written there is read here.
 //!
-//! Parquet, MATLAB, TDMS and MCAP are written by the Python packages that bench programs write them with, in an environment of their own under
-//! `target/`; where these packages cannot be had, the test says so and ends.
+//! Parquet, MATLAB, TDMS and MCAP are written by the Python packages that bench programs write them with, in an
+//! environment of their own under `target/`; where these packages cannot be had, the test says so and ends.
 //! Wrong if this fails: a series under another name, a row lost, a clock in another unit.
 
 use std::path::{Path, PathBuf};

@@ -1,16 +1,17 @@
 //! A verdict says why: of each cause of the library, the gate that let it through or dropped it, with value and limit.
 //!
-//! Wrong if this fails: a cause that is dropped without a trace; a trace that names a gate which did not decide; an explanation that
-//! blames the drive where the data lack what the cause needs.
+//! Wrong if this fails: a cause that is dropped without a trace; a trace that names a gate which did not decide; an
+//! explanation that blames the drive where the data lack what the cause needs.
 
 use flexspline_sim::causes::CauseName;
 use flexspline_tests::command::Desk;
 use serde_json::Value;
 
 /// A drive known from its catalogue.
-const NOMINAL: &str = "[drive]\nflexspline_teeth = 188\ncircular_spline_teeth = 190\n\
-    [nominal]\nstiffness_n_m_per_rad = 30000.0\nbacklash_arcsec = 60.0\nfriction_torque_n_m = 1.5\n\
-    [[nominal.harmonic]]\norder_per_generator_turn = 2.0\namplitude_arcsec = 10.0\nphase_rad = 0.4\n";
+const NOMINAL: &str = "[drive]\nflexspline_teeth = 188\ncircular_spline_teeth = 190\n[nominal]\nstiffness_n_m_per_rad \
+                       = 30000.0\nbacklash_arcsec = 60.0\nfriction_torque_n_m = \
+                       1.5\n[[nominal.harmonic]]\norder_per_generator_turn = 2.0\namplitude_arcsec = 10.0\nphase_rad \
+                       = 0.4\n";
 const HIDDEN: &str = "circular_spline_eccentricity";
 
 fn steps<'d>(diagnosis: &'d Value, cause: &str) -> Vec<&'d Value> {
@@ -43,7 +44,8 @@ fn the_trace_names_the_gate_that_dropped_a_rival() {
     assert!(!verdict.is_empty());
     assert!(verdict.iter().all(|step| step["passed"] == true), "{verdict:?}");
 
-    // A wheel pushed aside by gravity turns with another angle: refitted in the place of the cause, it tells the data far worse.
+    // A wheel pushed aside by gravity turns with another angle: refitted in the place of the cause, it tells the data
+    // far worse.
     let rival = steps(&diagnosis, "gravity_side_load").into_iter().find(|step| step["stage"] == "rival").unwrap();
     assert_eq!((&rival["gate"], &rival["against"]), (&Value::from("as_rival"), &Value::from(HIDDEN)), "{rival}");
     assert_eq!(rival["passed"], false, "{rival}");
@@ -58,7 +60,8 @@ fn a_cracked_root_is_told_from_a_damaged_tooth_and_the_gate_says_how() {
     desk.write("nominal.toml", NOMINAL);
     let truth = desk
         .line(&format!(
-            "synthesize --model nominal.toml --effect {CRACK}:amplitude_arcsec=30,angle_rad=0.9 --seed 24 --out made --json"
+            "synthesize --model nominal.toml --effect {CRACK}:amplitude_arcsec=30,angle_rad=0.9 --seed 24 --out made \
+             --json"
         ))
         .done()
         .json();

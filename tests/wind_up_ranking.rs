@@ -22,8 +22,8 @@ use flexspline_tests::motion::{hhd_95, loaded, mean_error, mean_generator_torque
 
 const TORQUE_N_M: f64 = 50.0;
 
-/// Increments in a pitch. The torque of a roller also has a small false part that repeats with the edges of the mesh, eight
-/// to a pitch: thirteen increments meet the edges at thirteen phases, eight would meet them at one.
+/// Increments in a pitch. The torque of a roller also has a small false part that repeats with the edges of the mesh,
+/// eight to a pitch: thirteen increments meet the edges at thirteen phases, eight would meet them at one.
 fn increments(kind: GeneratorKind) -> usize {
     match kind {
         GeneratorKind::Cam | GeneratorKind::DoubleDisc => 7,
@@ -49,8 +49,8 @@ fn balances(kind: GeneratorKind) {
     let drag = samples[0].increment.drag_torque_n_m;
     let expected = -(TORQUE_N_M + drag) / 95.0;
     println!(
-        "{kind}: generator torque {torque:.6} N.m on the mean of a pitch, (T + drag)/95 = {:.6}, off by {:.1e}; \
-         in the pitch it varies by {:.4}",
+        "{kind}: generator torque {torque:.6} N.m on the mean of a pitch, (T + drag)/95 = {:.6}, off by {:.1e}; in \
+         the pitch it varies by {:.4}",
         -expected,
         torque / expected - 1.0,
         range(samples.iter().map(|s| s.increment.generator_torque_n_m).collect::<Vec<_>>())

@@ -132,8 +132,8 @@ angle! {
 }
 
 impl OutputAngle {
-    /// `self − other` in counts if that is within half a turn, else a quarter turn with its sign: half the instructions of
-    /// clamping it, for what only asks whether it is far.
+    /// `self − other` in counts if that is within half a turn, else a quarter turn with its sign: half the instructions
+    /// of clamping it, for what only asks whether it is far.
     #[must_use]
     #[inline(always)]
     pub(crate) const fn minus_near_counts(self, other: Self) -> i32 {

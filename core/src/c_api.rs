@@ -1,18 +1,21 @@
-//! The C interface: [`include/flexspline.h`](https://docs.rs/crate/flexspline/latest/source/include/flexspline.h), made by
-//! cbindgen.
+//! The C interface: [`include/flexspline.h`](https://docs.rs/crate/flexspline/latest/source/include/flexspline.h), made
+//! by cbindgen.
 //!
-//! Objects are the caller's, opaque and of known size; no pointer is kept beyond a call, also not to images. Every argument is
-//! checked: null, alignment, whether the object was initialised, overlap of what is written, lengths and enumerations. A call that
-//! returns anything but [`FlexsplineStatus::Ok`] has changed nothing unless its documentation says so.
+//! Objects are the caller's, opaque and of known size; no pointer is kept beyond a call, also not to images. Every
+//! argument is checked: null, alignment, whether the object was initialised, overlap of what is written, lengths and
+//! enumerations. A call that returns anything but [`FlexsplineStatus::Ok`] has changed nothing unless its documentation
+//! says so.
 //!
 //! # Threads and interrupts
-//! A call works on the objects that it is given and on nothing else: there is no state of its own, no lock, no memory from a heap. So
-//! calls for different joints may interrupt each other. One store, one state and one joint belong to one context at a time: a call in
-//! an interrupt must not be given an object that the code it interrupted is working on. A slow group in the background therefore
-//! runs with the interrupt of the tick held off, or in the same one. What is only read (`const`) may be shared while nobody writes.
+//! A call works on the objects that it is given and on nothing else: there is no state of its own, no lock, no memory
+//! from a heap. So calls for different joints may interrupt each other. One store, one state and one joint belong to
+//! one context at a time: a call in an interrupt must not be given an object that the code it interrupted is working
+//! on. A slow group in the background therefore runs with the interrupt of the tick held off, or in the same one. What
+//! is only read (`const`) may be shared while nobody writes.
 //!
-//! Not to be called from Rust, and private for that reason. The only `unsafe` of the crate. What it relies on, and what C cannot be kept from breaking: a pointer that is not null and
-//! is aligned points to an object of its type, and images have the length given.
+//! Not to be called from Rust, and private for that reason. The only `unsafe` of the crate. What it relies on, and what
+//! C cannot be kept from breaking: a pointer that is not null and is aligned points to an object of its type, and
+//! images have the length given.
 #![allow(unsafe_code)]
 
 mod ask;
@@ -76,8 +79,8 @@ pub enum FlexsplineStatus {
     Order = 14,
     /// Not all bytes of an upload came.
     Incomplete = 15,
-    /// The image is whole and its wind-up is none that a drive has: a flank falls while the load grows (the sign of the torque?),
-    /// or rises too fast.
+    /// The image is whole and its wind-up is none that a drive has: a flank falls while the load grows (the sign of the
+    /// torque?), or rises too fast.
     Implausible = 16,
     /// What was kept of an activation is not whole: begin again.
     Torn = 17,
@@ -181,8 +184,9 @@ pub struct FlexsplineSettings {
     pub acceleration_rad_s2: f32,
     /// Fastest generator, rad/s.
     pub generator_rate_rad_s: f32,
-    /// A target no further from the output than this is reached on the flank that bears already, rad; 0 for none. Three times the peak
-    /// of the encoder's noise at the output keeps the flank from changing to and fro; it costs up to this much after a reversal.
+    /// A target no further from the output than this is reached on the flank that bears already, rad; 0 for none. Three
+    /// times the peak of the encoder's noise at the output keeps the flank from changing to and fro; it costs up to
+    /// this much after a reversal.
     pub hold_rad: f32,
 }
 
@@ -208,9 +212,9 @@ pub struct FlexsplineInput {
     pub generator_counts: i64,
     /// Where the output shall be.
     pub target_counts: i64,
-    /// Load torque at the output, N m, positive when it turns the output forward: that in the mesh, with the drag added that the
-    /// table was made with (times the direction), not that on the load where drag or inertia differ: `flexspline_torque_tick` makes it
-    /// of a reading.
+    /// Load torque at the output, N m, positive when it turns the output forward: that in the mesh, with the drag added
+    /// that the table was made with (times the direction), not that on the load where drag or inertia differ:
+    /// `flexspline_torque_tick` makes it of a reading.
     pub torque_n_m: f32,
     /// Ticks missed since the last call.
     pub missed_ticks: u16,
@@ -234,7 +238,8 @@ pub struct FlexsplineOutput {
     pub transmission_error_rad: f32,
     /// It lies within +- this, rad.
     pub uncertainty_rad: f32,
-    /// Correction in the command, rad: target less command over ratio. It is taken off the target, and has the sign of the error.
+    /// Correction in the command, rad: target less command over ratio. It is taken off the target, and has the sign of
+    /// the error.
     pub correction_rad: f32,
     /// What the limiter held back, rad.
     pub held_back_rad: f32,
@@ -349,8 +354,8 @@ fn put<O, T>(object: *mut O, mark: u32, value: T) -> Result<(), FlexsplineStatus
 /// The value in an opaque object, to read.
 fn get<'a, O, T>(object: *const O, mark: u32) -> Result<&'a T, FlexsplineStatus> {
     usable(object)?;
-    // SAFETY: not null and aligned; all bytes of the mark are a number whatever they are. The value is only used if the mark
-    // says that `put` wrote it. The reference does not outlive the call it is made in.
+    // SAFETY: not null and aligned; all bytes of the mark are a number whatever they are. The value is only used if the
+    // mark says that `put` wrote it. The reference does not outlive the call it is made in.
     let marked = unsafe { &*object.cast::<Marked<MaybeUninit<T>>>() };
     if !is_marked(marked.mark, mark) {
         return Err(FlexsplineStatus::NotInitialised);
@@ -406,7 +411,8 @@ fn bytes<'a>(first: *const u8, length: usize) -> Result<&'a [u8], FlexsplineStat
     Ok(unsafe { core::slice::from_raw_parts(first, length) })
 }
 
-/// The images, apart from what is written: to be asked for before that is borrowed. Inlined: a tick would pay for a call.
+/// The images, apart from what is written: to be asked for before that is borrowed. Inlined: a tick would pay for a
+/// call.
 #[inline(always)]
 fn images<'a, const N: usize>(
     images: *const FlexsplineImages,
@@ -459,8 +465,8 @@ pub extern "C" fn flexspline_store_init(store: *mut FlexsplineStore) -> Flexspli
     let init = || {
         usable(store)?;
         let marked = store.cast::<Marked<Store>>();
-        // SAFETY: not null, aligned, large enough (asserted above), and the caller's. A store is made of numbers, and one without a table of
-        // zeros (a test holds that), so the reference is to a store.
+        // SAFETY: not null, aligned, large enough (asserted above), and the caller's. A store is made of numbers, and
+        // one without a table of zeros (a test holds that), so the reference is to a store.
         let marked = unsafe {
             marked.write_bytes(0, 1);
             &mut *marked
@@ -558,7 +564,8 @@ pub extern "C" fn flexspline_activation_begin(
     status(begin())
 }
 
-/// A step: the same store and images with each, until `progress` (`FLEXSPLINE_PROGRESS_...`) is done. If a step fails the activation is over; begin again.
+/// A step: the same store and images with each, until `progress` (`FLEXSPLINE_PROGRESS_...`) is done. If a step fails
+/// the activation is over; begin again.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_activation_step(
     activation: *mut FlexsplineActivation,
@@ -590,8 +597,8 @@ pub extern "C" fn flexspline_identity_begin(identity: *mut FlexsplineIdentity) -
     status(put(identity, IDENTITY_MARK, IdentityCheck::new()))
 }
 
-/// Takes in a block of 64 bytes of the image, the same one with each step. `found` (`FLEXSPLINE_IDENTITY_...`) is hashing while there is more, then same or other;
-/// with the next step it begins anew.
+/// Takes in a block of 64 bytes of the image, the same one with each step. `found` (`FLEXSPLINE_IDENTITY_...`) is
+/// hashing while there is more, then same or other; with the next step it begins anew.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_identity_step(
     identity: *mut FlexsplineIdentity,
@@ -683,8 +690,8 @@ pub extern "C" fn flexspline_store_report(
     status(tell())
 }
 
-/// Writes a damaged page of an image in memory again from the other image, both whole images of `bytes` bytes, and tells the store.
-/// What `flexspline_store_report` named is `image` and `page`.
+/// Writes a damaged page of an image in memory again from the other image, both whole images of `bytes` bytes, and
+/// tells the store. What `flexspline_store_report` named is `image` and `page`.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_store_mend_page(
     store: *mut FlexsplineStore,
@@ -699,7 +706,8 @@ pub extern "C" fn flexspline_store_mend_page(
         let good_bytes = bytes(good, length)?;
         apart([span(store), (damaged as usize, length), (good as usize, length)])?;
         let store: &mut Store = get_mut(store, STORE_MARK)?;
-        // SAFETY: not null, apart from the other image and the store; the caller says that so many bytes are there, and they are its own.
+        // SAFETY: not null, apart from the other image and the store; the caller says that so many bytes are there, and
+        // they are its own.
         let damaged = unsafe { core::slice::from_raw_parts_mut(damaged, length) };
         if image > 1 || !mend_page(damaged, good_bytes, page as usize) {
             return Err(FlexsplineStatus::Argument);
@@ -710,8 +718,8 @@ pub extern "C" fn flexspline_store_mend_page(
     status(mend())
 }
 
-/// Makes a copy of a joint's settings that is not whole anew from the other; `FLEXSPLINE_STATUS_ARGUMENT` if neither is. In a slow
-/// rate group.
+/// Makes a copy of a joint's settings that is not whole anew from the other; `FLEXSPLINE_STATUS_ARGUMENT` if neither
+/// is. In a slow rate group.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_joint_mend(joint: *mut FlexsplineJoint) -> FlexsplineStatus {
     let mend = || {
@@ -791,8 +799,8 @@ pub extern "C" fn flexspline_state_save(
     status(save())
 }
 
-/// Makes a state of bytes that the same joint saved with the same table, in mode off; only if the joint cannot have moved meanwhile.
-/// The first sample is held against the one that was saved.
+/// Makes a state of bytes that the same joint saved with the same table, in mode off; only if the joint cannot have
+/// moved meanwhile. The first sample is held against the one that was saved.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_state_restore(
     state: *mut FlexsplineState,
@@ -834,8 +842,8 @@ fn told(input: &FlexsplineInput) -> Input {
     }
 }
 
-/// One tick: from what was measured to what to command, once every `tick_s` and in the order of time. `FLEXSPLINE_STATUS_OK` also where no
-/// correction could be made: `flags` and `quality` of the output say so.
+/// One tick: from what was measured to what to command, once every `tick_s` and in the order of time.
+/// `FLEXSPLINE_STATUS_OK` also where no correction could be made: `flags` and `quality` of the output say so.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_tick(
     joint: *const FlexsplineJoint,

@@ -1,10 +1,10 @@
 //! Upsets of everything that a tick reads or keeps, one bit at a time, beside a twin that is not hit.
 //!
-//! Store, state and joint live on from tick to tick after the flip, and so does what feeds the tick: encoder, torque with its age, springs, learning,
-//! observer. The twin has its own and the same readings. A flip is *silent* if
-//! in any later tick the command is off by more than 0.1″ at the output (5″ where sensors feed the joint), and that tick tells nothing of it: no flag of doubt, no
-//! worse health, no object that says that it is lost or began anew, and bounds that do not hold the twin's. Told by what the limiter holds back alone is
-//! counted by itself.
+//! Store, state and joint live on from tick to tick after the flip, and so does what feeds the tick: encoder, torque
+//! with its age, springs, learning, observer. The twin has its own and the same readings. A flip is *silent* if
+//! in any later tick the command is off by more than 0.1″ at the output (5″ where sensors feed the joint), and that
+//! tick tells nothing of it: no flag of doubt, no worse health, no object that says that it is lost or began anew, and
+//! bounds that do not hold the twin's. Told by what the limiter holds back alone is counted by itself.
 
 use crate::fixture::{self, ARCSEC};
 use crate::store::{Health, Images, Store};
@@ -23,8 +23,8 @@ use std::vec::Vec;
 
 /// Off by more than this is wrong, rad at the output.
 const WRONG_RAD: f64 = 0.1 * ARCSEC;
-/// The same where encoder, torque and springs feed the joint: after a torque was missing (which is told) the low-pass is where it would be to less than
-/// this and not to the bit.
+/// The same where encoder, torque and springs feed the joint: after a torque was missing (which is told) the low-pass
+/// is where it would be to less than this and not to the bit.
 const WRONG_FED_RAD: f64 = 5.0 * ARCSEC;
 const TICKS: usize = 450;
 
@@ -243,8 +243,9 @@ enum Story {
     Blind,
     Adjusted,
     Restored,
-    /// By encoder, torque sensor, springs, and what was learnt until tick 110 and stays then: a tick that is done again teaches nothing, and what is learnt
-    /// a tick later would be another command. That learning goes on to the same bits is a test of its own.
+    /// By encoder, torque sensor, springs, and what was learnt until tick 110 and stays then: a tick that is done again
+    /// teaches nothing, and what is learnt a tick later would be another command. That learning goes on to the same
+    /// bits is a test of its own.
     Fed,
     /// With the torque that the observer finds.
     Observed,
@@ -321,7 +322,8 @@ impl Story {
 
     fn input(self, tick: usize, generator: GeneratorAngle) -> Input {
         // Forward, from tick 200 on backward, from 320 on standing.
-        // Springs differ by a little after a tick that moved them later: a standing target could then be reached on another flank.
+        // Springs differ by a little after a tick that moved them later: a standing target could then be reached on
+        // another flank.
         let last = if self.is_fed() { TICKS } else { 320 };
         let place = if tick < 200 { tick as f64 } else { 400.0 - tick.min(last) as f64 };
         let target = OutputAngle::from_rad(1e-3 + 1e-5 * place).unwrap();
@@ -528,7 +530,8 @@ fn no_single_bit_of_what_lives_on_is_wrong_in_silence() {
     assert_eq!(silent, 0);
 }
 
-/// Every bit of what feeds a tick, while learning goes on: what it says afterwards is the same to the bit, as if there had been no flip.
+/// Every bit of what feeds a tick, while learning goes on: what it says afterwards is the same to the bit, as if there
+/// had been no flip.
 #[test]
 fn what_feeds_a_tick_goes_on_to_the_same_bits_after_any_single_bit() {
     for (story, at) in [(Story::Fed, 100), (Story::Observed, 60)] {
@@ -590,8 +593,9 @@ impl Mixed {
     }
 }
 
-/// Flips at random over everything: single bits, pairs, bursts of neighbours, the same bit of words in a row, and bits that are
-/// turned again in every one of some ticks. What goes on after each is followed for so many ticks, until it is as if there had been none.
+/// Flips at random over everything: single bits, pairs, bursts of neighbours, the same bit of words in a row, and bits
+/// that are turned again in every one of some ticks. What goes on after each is followed for so many ticks, until it is
+/// as if there had been none.
 fn mixed(stories: &[(Story, &[usize])], trials: usize, seed: u64, follow: usize) -> Counts {
     let mut counts = Counts::default();
     let mut mixed = Mixed(seed);
@@ -602,7 +606,8 @@ fn mixed(stories: &[(Story, &[usize])], trials: usize, seed: u64, follow: usize)
         let number = mixed.below(at.len());
         let (from, world) = (at[number], &worlds[number]);
         let mut hit = world.clone();
-        // As often in what is not a copy of the table as in one, and half of all in what feeds the tick, where it is fed.
+        // As often in what is not a copy of the table as in one, and half of all in what feeds the tick, where it is
+        // fed.
         let used = 32 * world.store.used_words();
         let (joint, copy) = (world.joint.bits(), 32 * (crate::store::STORE_WORDS + 8));
         let bits = world.bits();
@@ -681,7 +686,8 @@ fn no_mixed_flips_of_a_million_are_wrong_in_silence() {
     assert_eq!(silent, 0);
 }
 
-/// What is known of the table is checked after everything that a tick reads of it: a flip within the tick is found in it.
+/// What is known of the table is checked after everything that a tick reads of it: a flip within the tick is found in
+/// it.
 #[test]
 fn a_flip_within_a_tick_is_found_in_it() {
     let world = World::new();
@@ -824,7 +830,8 @@ fn the_side_can_be_forgotten_on_command() {
     assert_eq!((last.quality, last.uncertainty_rad), (Quality::InRange, 0.0));
 }
 
-/// Standing target and a noisy encoder: how often the correction crosses the play in a second, and how far off the output is, ″.
+/// Standing target and a noisy encoder: how often the correction crosses the play in a second, and how far off the
+/// output is, ″.
 fn chatter(hold_rad: f32, noise_rad: f64, torque_n_m: f32) -> (usize, f64) {
     let limits = Limits { rate_rad_s: 0.1, acceleration_rad_s2: 20.0, hold_rad, ..fixture::LIMITS };
     let joint = Joint::new(fixture::drive(), limits, Overrun::SkipAndCount).unwrap();
@@ -863,7 +870,8 @@ fn a_hold_band_ends_the_chatter_and_costs_no_more_than_it_says() {
         let (without, _) = chatter(0.0, noise, torque);
         let (with, worst) = chatter((3.0 * noise) as f32, noise, torque);
         std::println!(
-            "{torque} N.m: {without} ticks of a second on the way through the play, {with} with a band, {worst:.3} arcsec off"
+            "{torque} N.m: {without} ticks of a second on the way through the play, {with} with a band, {worst:.3} \
+             arcsec off"
         );
         assert!(without > 20 && with == 0, "{without} {with}");
         assert!(worst <= 0.15 + 0.05, "{worst}");

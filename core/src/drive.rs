@@ -203,8 +203,8 @@ impl Drive {
     /// The generator angle that brings an output with this error to `target`, and the nominal output there:
     /// `target·ratio + command_correction` with `command_correction = −predicted_error·ratio`.
     ///
-    /// The error is at the output, positive when the output is ahead of ideal. This is the one place where the sign of the
-    /// correction is set. NaN corrects nothing.
+    /// The error is at the output, positive when the output is ahead of ideal. This is the one place where the sign of
+    /// the correction is set. NaN corrects nothing.
     #[must_use]
     pub fn corrected_command(&self, target: OutputAngle, predicted_error_rad: f32) -> (GeneratorAngle, OutputAngle) {
         let nominal = target.offset_rad(-predicted_error_rad);
@@ -244,7 +244,8 @@ impl Factor {
         Self { whole, fraction: fraction.wrapping_add(up as u64) & !1 }
     }
 
-    /// `counts·factor`, to within 5/4 count (half of one below 2²⁰ turns); wraps like the angles. The same work for all values.
+    /// `counts·factor`, to within 5/4 count (half of one below 2²⁰ turns); wraps like the angles. The same work for all
+    /// values.
     const fn of(self, counts: i64) -> i64 {
         let (high, low) = (counts >> 32, counts as u32 as u64);
         let (fraction_high, fraction_low) = ((self.fraction >> 32) as i64, self.fraction as u32 as u64);
@@ -406,7 +407,8 @@ mod tests {
                 let (there, here) = (drive.phases(generator, nominal), drive.phases_at_output(nominal));
                 prop_assert_eq!(there.output, here.output);
                 for (a, b) in [(there.generator, here.generator), (there.tooth, here.tooth), (there.material, here.material)] {
-                    // A count of the generator, which is rounded to 5/4, is as many counts of the tooth phase as there are teeth.
+                    // A count of the generator, which is rounded to 5/4, is as many counts of the tooth phase as there
+                    // are teeth.
                     let off = (a.wrapping_sub(b) as i32).unsigned_abs();
                     prop_assert!(off <= 2 * u32::from(cs), "{off}");
                 }

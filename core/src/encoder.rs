@@ -1,12 +1,13 @@
 //! From the register of an encoder to an angle and back.
 //!
-//! A register counts so many steps in a turn and begins anew somewhere: after a turn (a single-turn encoder), or after 2ᴺ counts (a timer
-//! that counts edges, a multi-turn encoder). An [`Encoder`] says which; an [`EncoderState`] follows it. What is kept is the whole number of
-//! counts since the zero, and the angle is made anew of that each time, to the nearest 2⁻³² turn: nothing drifts however long a
-//! joint turns, also where the counts in a turn are no power of two, and a count more never is an angle less.
+//! A register counts so many steps in a turn and begins anew somewhere: after a turn (a single-turn encoder), or after
+//! 2ᴺ counts (a timer that counts edges, a multi-turn encoder). An [`Encoder`] says which; an [`EncoderState`] follows
+//! it. What is kept is the whole number of counts since the zero, and the angle is made anew of that each time, to the
+//! nearest 2⁻³² turn: nothing drifts however long a joint turns, also where the counts in a turn are no power of two,
+//! and a count more never is an angle less.
 //!
-//! Settings and state are kept as words under a sum ([`whole`](../whole.rs)): where one word was hit by an upset it is mended in the next call; what is
-//! lost gives no angle.
+//! Settings and state are kept as words under a sum ([`whole`](../whole.rs)): where one word was hit by an upset it is
+//! mended in the next call; what is lost gives no angle.
 
 use crate::whole::{Sealed, high, low, sum_of};
 use core::fmt;
@@ -53,7 +54,8 @@ impl core::error::Error for EncoderError {}
 /// An encoder: all that does not change while it turns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Encoder {
-    /// Counts in a turn; bits of the register (0: a turn) and in the byte above whether it is reversed; the zero, low and high word.
+    /// Counts in a turn; bits of the register (0: a turn) and in the byte above whether it is reversed; the zero, low
+    /// and high word.
     settings: Sealed<[u32; 4]>,
 }
 
@@ -138,8 +140,8 @@ impl Encoder {
         self.settings.open().map(EncoderSettings::of)
     }
 
-    /// Makes the settings whole, where they lie in memory and an upset hit a word of them; false if they are lost, and the encoder has to be made
-    /// anew. For a slow rate group: until then each call mends a copy.
+    /// Makes the settings whole, where they lie in memory and an upset hit a word of them; false if they are lost, and
+    /// the encoder has to be made anew. For a slow rate group: until then each call mends a copy.
     pub fn mend(&mut self) -> bool {
         self.settings.mend()
     }
@@ -150,8 +152,8 @@ impl Encoder {
         self.settings.open().is_none()
     }
 
-    /// Where it is by its first reading: of all angles with this reading the one nearest to `near_counts` (2⁻³² turn), which is 0 or
-    /// what was known before a reset. `None` if the register cannot read that, or the settings are lost.
+    /// Where it is by its first reading: of all angles with this reading the one nearest to `near_counts` (2⁻³² turn),
+    /// which is 0 or what was known before a reset. `None` if the register cannot read that, or the settings are lost.
     #[must_use]
     pub fn start(&self, reading: u64, near_counts: i64) -> Option<EncoderState> {
         let settings = self.settings()?;
@@ -161,8 +163,9 @@ impl Encoder {
         Some(EncoderState::of(At { reading, since_zero: near.wrapping_add(way) }))
     }
 
-    /// Takes a reading: less than half of what the register counts since the one before, or half of it backward. False, and nothing
-    /// has changed, if the register cannot read that, or settings or state are lost: give the tick no sample then.
+    /// Takes a reading: less than half of what the register counts since the one before, or half of it backward. False,
+    /// and nothing has changed, if the register cannot read that, or settings or state are lost: give the tick no
+    /// sample then.
     #[must_use]
     pub fn read(&self, state: &mut EncoderState, reading: u64) -> bool {
         let read = || {
@@ -176,7 +179,8 @@ impl Encoder {
     }
 
     /// The angle, 2⁻³² turn, to the nearest: for [`GeneratorAngle::from_counts`](crate::GeneratorAngle::from_counts) or
-    /// [`OutputAngle::from_counts`](crate::OutputAngle::from_counts). 0 if settings or state are lost ([`Self::angle`]).
+    /// [`OutputAngle::from_counts`](crate::OutputAngle::from_counts). 0 if settings or state are lost
+    /// ([`Self::angle`]).
     #[must_use]
     pub fn angle_counts(&self, state: &EncoderState) -> i64 {
         self.angle(state).unwrap_or(0)
@@ -189,8 +193,8 @@ impl Encoder {
         Some(settings.angle(at.since_zero))
     }
 
-    /// What the register reads at an angle, to the nearest count: for a drive that is commanded in counts of its encoder. 0 if the settings are lost
-    /// ([`Self::mend`]).
+    /// What the register reads at an angle, to the nearest count: for a drive that is commanded in counts of its
+    /// encoder. 0 if the settings are lost ([`Self::mend`]).
     #[must_use]
     pub fn reading(&self, angle_counts: i64) -> u64 {
         let there = |settings: EncoderSettings| {

@@ -241,7 +241,8 @@ pub enum ImageError {
         /// Bound of the slope found; below 1 is allowed.
         found: f32,
     },
-    /// The error on one flank falls while the load grows. No drive gives way against its load; the torque may have the wrong sign.
+    /// The error on one flank falls while the load grows. No drive gives way against its load; the torque may have the
+    /// wrong sign.
     Falls {
         /// Temperature node.
         temperature: usize,
@@ -250,7 +251,8 @@ pub enum ImageError {
         /// The change of the error, or a part of it that the slopes at the nodes make, rad.
         found_rad: f32,
     },
-    /// The error on one flank grows faster with the load than that of any drive, or a jump is higher than half a tooth pitch.
+    /// The error on one flank grows faster with the load than that of any drive, or a jump is higher than half a tooth
+    /// pitch.
     Steep {
         /// Temperature node.
         temperature: usize,
@@ -318,14 +320,14 @@ impl fmt::Display for ImageError {
             }
             Self::Falls { temperature, torque, found_rad } => write!(
                 f,
-                "the error of a flank falls by {} rad up to torque node {torque} at temperature node {temperature}: it must \
-                 grow with the load, which is positive where it turns the output forward",
+                "the error of a flank falls by {} rad up to torque node {torque} at temperature node {temperature}: \
+                 it must grow with the load, which is positive where it turns the output forward",
                 -found_rad
             ),
             Self::Steep { temperature, torque, found_rad, allowed_rad } => write!(
                 f,
-                "the error of a flank grows by {found_rad} rad up to torque node {torque} at temperature node {temperature}, \
-                 allowed are {allowed_rad}"
+                "the error of a flank grows by {found_rad} rad up to torque node {torque} at temperature node \
+                 {temperature}, allowed are {allowed_rad}"
             ),
             Self::Inverse { left_rad } => write!(f, "the inverse is left with an error of {left_rad} rad"),
             Self::Slope { found } => write!(f, "slope bound |ratio*de/dpsi| = {found}, allowed is below 1"),

@@ -55,9 +55,10 @@
 //! # let reached = Table::check(&image).unwrap().forward(&mut state.play().clone(), command, 12.0, 20.0);
 //! # assert!(reached.output.minus_rad(target).abs() < 2e-8, "{}", reached.output.minus_rad(target));
 //! ```
-//! What an encoder counts becomes an angle by [`Encoder`], and back: any counts in a turn, registers that begin anew, no drift.
-//! In a slow rate group ([`RateGroup`]) the firmware tells the temperature ([`Store::set_temperature`]) and lets a few words of the
-//! images be checked ([`Store::check_images`]). Where no loop runs, as on the host, [`Table`] alone answers: [`Table::forward`],
+//! What an encoder counts becomes an angle by [`Encoder`], and back: any counts in a turn, registers that begin anew,
+//! no drift. In a slow rate group ([`RateGroup`]) the firmware tells the temperature ([`Store::set_temperature`]) and
+//! lets a few words of the images be checked ([`Store::check_images`]). Where no loop runs, as on the host, [`Table`]
+//! alone answers: [`Table::forward`],
 //! [`Table::inverse`].
 //!
 //! # Beside the table
@@ -139,18 +140,20 @@
 //!
 //! # Promises
 //! * No heap, no panic, no `unsafe`: what flies links with a panic handler that cannot be linked.
-//! * [`Joint::tick`] takes the same number of instructions in every tick with the same table (unless a glitch was believed, there was
-//!   no sample yet, something was hit by an upset, or the images differ): 1447 on a Cortex-M4F with the tables of all four
-//!   generators and a joint that is a constant; forward alone 588, inverse alone 617. No loop depends on data, no libm is called.
-//! * The two copies of what a tick reads are compared as they are read; settings, state and what is known of the table are kept twice
-//!   with sums. A tick that finds something not whole mends it, says so, and is done again; what cannot be mended is not used
-//!   ([`Flags`], [`store`](Store)).
-//! * A table is checked and filled in, in steps of at most 2000 instructions between ticks ([`Activation`]); so is found out whether
-//!   it is the one of its id ([`IdentityCheck`]).
+//! * [`Joint::tick`] takes the same number of instructions in every tick with the same table (unless a glitch was
+//!   believed, there was no sample yet, something was hit by an upset, or the images differ): 1447 on a Cortex-M4F with
+//!   the tables of all four generators and a joint that is a constant; forward alone 588, inverse alone 617. No loop
+//!   depends on data, no libm is called.
+//! * The two copies of what a tick reads are compared as they are read; settings, state and what is known of the table
+//!   are kept twice with sums. A tick that finds something not whole mends it, says so, and is done again; what cannot
+//!   be mended is not used ([`Flags`], [`store`](Store)).
+//! * A table is checked and filled in, in steps of at most 2000 instructions between ticks ([`Activation`]); so is
+//!   found out whether it is the one of its id ([`IdentityCheck`]).
 //! * A torque or temperature that is too old is not used ([`Aged`]).
-//! * A damaged image gives an [`ImageError`]. What a table can give at most is bounded from its coefficients when it is accepted, for
-//!   every input and not only at nodes: a hostile image can give no more either.
-//! * NaN or infinity in torque or temperature gives [`Quality::Disabled`] and no correction; such a temperature activates nothing.
+//! * A damaged image gives an [`ImageError`]. What a table can give at most is bounded from its coefficients when it is
+//!   accepted, for every input and not only at nodes: a hostile image can give no more either.
+//! * NaN or infinity in torque or temperature gives [`Quality::Disabled`] and no correction; such a temperature
+//!   activates nothing.
 //! * Which side of the play the drive rests on is unknown after a reset, until motion has shown it.
 //! * Angles are integers: turning for years, or a million small steps, adds no error.
 //! * The host makes tables with the code that reads them: one definition of where a node sits ([`grid`]), and the
@@ -163,7 +166,8 @@
 //! * The ratio is signed: `+cs/(cs − fs)` with the flexspline fixed, `−fs/(cs − fs)` with the circular spline fixed.
 //! * Positive load torque turns the output forward and gives positive wind-up.
 //! * A [`Direction`] is that of the output, in samples ([`make::Sample::direction`], a column `direction`: +1 where the
-//!   output turns forward, −1 where backward) as in the play; with the circular spline fixed the generator turns against it.
+//!   output turns forward, −1 where backward) as in the play; with the circular spline fixed the generator turns
+//!   against it.
 //!
 //! # Not in here
 //! Rate-dependent friction. The table is quasi-static; elastic oscillation is the [`Predictor`]'s.

@@ -10,9 +10,11 @@ pub(crate) fn larger64(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
-/// Square root of a number, 0 of one below 0, to 3e-7 of it: an estimate of 1/√x from the exponent and three steps of Newton.
+/// Square root of a number, 0 of one below 0, to 3e-7 of it: an estimate of 1/√x from the exponent and three steps of
+/// Newton.
 ///
-/// Square root: equal bits on every machine, and a tenth of the instructions that `libm` takes without a processor's own root.
+/// Square root: equal bits on every machine, and a tenth of the instructions that `libm` takes without a processor's
+/// own root.
 #[inline(always)]
 pub(crate) fn sqrt(x: f32) -> f32 {
     let bits = x.to_bits() & !((x.to_bits() as i32 >> 31) as u32);

@@ -1,13 +1,13 @@
 //! The play (backlash) operator, as an interval while its position is not known.
 //!
-//! With the nominal output `x`, and centre `c` and half-width `h ≥ 0` of the play there and under the load, the output follows
-//! `p ← clamp(p, x + c − h, x + c + h)`: it stands, held by the drag, until a flank takes it along, whether the flank comes by
-//! motion or by a load that goes. Its error is `e = p − x`; after steady motion forward the output lags, `e₊ = c − h`, backward
-//! `e₋ = c + h`.
+//! With the nominal output `x`, and centre `c` and half-width `h ≥ 0` of the play there and under the load, the output
+//! follows `p ← clamp(p, x + c − h, x + c + h)`: it stands, held by the drag, until a flank takes it along, whether the
+//! flank comes by motion or by a load that goes. Its error is `e = p − x`; after steady motion forward the output lags,
+//! `e₊ = c − h`, backward `e₋ = c + h`.
 //!
 //! After a reset nobody knows on which side of its play the drive rests. The state therefore is a lower and an upper
-//! bound of the offset `e − c`, both moved by the same operator. Each move and each reversal can only bring them closer; after one
-//! move through the full play they are equal, and from then on they stay equal.
+//! bound of the offset `e − c`, both moved by the same operator. Each move and each reversal can only bring them
+//! closer; after one move through the full play they are equal, and from then on they stay equal.
 //!
 //! Everything is in integer counts of 2⁻³² output turn: the result depends on the turning points only, not on how
 //! many steps a motion is cut into, and no rounding builds up.
@@ -39,7 +39,8 @@ impl Direction {
 pub(crate) const MAX_HALF_COUNTS: i32 = 34_178_720;
 /// Most that may be added to the mean or the half-width of a table, counts, 0.049 rad.
 pub(crate) const MAX_ADDED_COUNTS: i32 = (1 << 25) - 1;
-/// Largest half-width of a play in counts, 0.2 rad: far above any table with what may be added to it, far below overflow.
+/// Largest half-width of a play in counts, 0.2 rad: far above any table with what may be added to it, far below
+/// overflow.
 const MAX_PLAY_COUNTS: i32 = 1 << 27;
 
 /// Largest error that any table can give, with its rounding and the largest adjustment of mean and half-width, counts.
@@ -102,7 +103,8 @@ impl PlayState {
         self.lower == self.upper
     }
 
-    /// Estimate of the offset from the centre, `e − c`, in radians: the middle of the interval, 0 before the first update.
+    /// Estimate of the offset from the centre, `e − c`, in radians: the middle of the interval, 0 before the first
+    /// update.
     #[must_use]
     pub fn offset_rad(&self) -> f32 {
         if self.half < 0 { 0.0 } else { self.offset_counts() as f32 * RAD_PER_COUNT }
@@ -168,8 +170,9 @@ impl PlayState {
 
     /// Moves the play to `nominal`, with the centre and half-width there in counts; returns the error `p − x`.
     ///
-    /// Without either (`sane` is false: they could not be computed) it follows the motion with the centre and half-width of the last
-    /// update; before the first with a half-width that is wider than any. Masks instead of choices: the same work for all.
+    /// Without either (`sane` is false: they could not be computed) it follows the motion with the centre and
+    /// half-width of the last update; before the first with a half-width that is wider than any. Masks instead of
+    /// choices: the same work for all.
     #[inline(always)]
     pub(crate) const fn update(&mut self, nominal: OutputAngle, centre: i32, half: i32, sane: bool) -> i32 {
         let mask = (sane as i32).wrapping_neg();
@@ -189,7 +192,8 @@ impl PlayState {
         self.error
     }
 
-    /// What is known of the centre changed, not where the drive rests in its play: the output is now estimated so much further.
+    /// What is known of the centre changed, not where the drive rests in its play: the output is now estimated so much
+    /// further.
     #[inline(always)]
     pub(crate) const fn shift(&mut self, counts: i32) {
         self.error = self.error.wrapping_add(counts & !(self.half >> 31));

@@ -1,4 +1,5 @@
-//! Known answers of what a tick is made of, for a slow rate group: whether processor and program still do what they did.
+//! Known answers of what a tick is made of, for a slow rate group: whether processor and program still do what they
+//! did.
 
 use crate::angle::{GeneratorAngle, OutputAngle};
 use crate::crc::crc32;
@@ -88,7 +89,8 @@ const fn follow(play: &mut PlayState, (nominal, centre, half): (i64, i32, i32)) 
 }
 
 impl Answers {
-    /// Found by the compiler, but those of single precision: they are of IEEE 754 and were found on a host, bit by bit the same on the target.
+    /// Found by the compiler, but those of single precision: they are of IEEE 754 and were found on a host, bit by bit
+    /// the same on the target.
     const EXPECTED: Self = Self {
         crc: CHECK,
         sums: sums_of(WORDS),
@@ -129,7 +131,8 @@ impl Answers {
     }
 }
 
-/// Gives the parts of a tick known inputs and compares what they make of it. Some thousand instructions, nothing of joints, tables or state is touched.
+/// Gives the parts of a tick known inputs and compares what they make of it. Some thousand instructions, nothing of
+/// joints, tables or state is touched.
 ///
 /// # Errors
 /// [`SelfTestError`]: the first part with another answer. Processor, registers or the program's memory are not what they were; no correction of
@@ -180,7 +183,8 @@ mod tests {
     #[test]
     fn the_known_answers_are_right() {
         let Answers { play, angles, numbers, .. } = Answers::EXPECTED;
-        // Anywhere within 100 ± 5000; what was furthest ahead is taken along; all of it stands; then the other flank takes all of it along.
+        // Anywhere within 100 ± 5000; what was furthest ahead is taken along; all of it stands; then the other flank
+        // takes all of it along.
         assert_eq!(play, [100, (-5050 + 5100 - 9000) / 2, (-5050 + 5100 - 9000) / 2 + 4000, 70 + 4000]);
         let [first, second] = COUNTS.map(|counts| counts as f64);
         let expected = [first / 95.0, second * 95.0, first / (-200.0 / 3.0), second * (-200.0 / 3.0)];

@@ -1,4 +1,5 @@
-//! Single bits of everything that lives from tick to tick, by the name of the field they are in: for campaigns of upsets.
+//! Single bits of everything that lives from tick to tick, by the name of the field they are in: for campaigns of
+//! upsets.
 //!
 //! [`upsets!`] takes a structure apart without `..`, so a new field that is not listed does not compile.
 

@@ -1,20 +1,23 @@
 //! A sum of 64 bits over words that must not change unnoticed: of what a tick reads and keeps.
 //!
-//! Word after word `s ← (s mod 2³²)·f + ⌊s/2³²⌋ + word`, at the end once more without a word: a step of a generator that multiplies with carry, one
-//! instruction of a Cortex-M4 (`umaal`) beside the one that fetches the word. Modulo the prime `p = 2³²·f − 1` that is `s ← s·2⁻³² + word`: a
-//! difference in a word is multiplied with every step, by another factor for each place, so two differences cancel only if
-//! their ratio modulo p, near 2⁶⁴, is a power of 2³² that fits the distance of their words. No two bits of 24 words and their sum
-//! do, nor a column of neighbours (tests below). Words that are all zeros, or all ones, do not pass where the sum begins with
+//! Word after word `s ← (s mod 2³²)·f + ⌊s/2³²⌋ + word`, at the end once more without a word: a step of a generator
+//! that multiplies with carry, one instruction of a Cortex-M4 (`umaal`) beside the one that fetches the word. Modulo
+//! the prime `p = 2³²·f − 1` that is `s ← s·2⁻³² + word`: a difference in a word is multiplied with every step, by
+//! another factor for each place, so two differences cancel only if their ratio modulo p, near 2⁶⁴, is a power of 2³²
+//! that fits the distance of their words. No two bits of 24 words and their sum do, nor a column of neighbours (tests
+//! below). Words that are all zeros, or all ones, do not pass where the sum begins with
 //! [`SUMS_START`]. A cyclic check of the same words would take six times the instructions.
 //!
-//! What is summed up is a call of its own for each structure: inlined, the compiler moves the words to the stack and back.
+//! What is summed up is a call of its own for each structure: inlined, the compiler moves the words to the stack and
+//! back.
 //!
 //! # One sum, and what it mends
-//! [`Sealed`] keeps a value with its sum: settings and states of all that feeds a tick. Because the sum is linear modulo p, the
-//! difference between the sum that is kept and the sum that is found, multiplied by 2³² once for each word behind a place, is what
-//! that word has to change by. If that is a change of neighbouring bits of one word ([`BURST_BITS`]), the word is mended and the sum
-//! taken again; it must then be equal. So a value with one sum survives what a value with two copies survives, as long as one word was hit,
-//! for 8 bytes instead of its own size. Anything else is reported and not used.
+//! [`Sealed`] keeps a value with its sum: settings and states of all that feeds a tick. Because the sum is linear
+//! modulo p, the difference between the sum that is kept and the sum that is found, multiplied by 2³² once for each
+//! word behind a place, is what that word has to change by. If that is a change of neighbouring bits of one word
+//! ([`BURST_BITS`]), the word is mended and the sum taken again; it must then be equal. So a value with one sum
+//! survives what a value with two copies survives, as long as one word was hit, for 8 bytes instead of its own size.
+//! Anything else is reported and not used.
 
 /// The sums of words: so that a constant can be made of them, and nothing is a loop.
 macro_rules! sums {
@@ -133,7 +136,8 @@ impl<T: Words, const N: usize> Words for [T; N] {
     }
 }
 
-/// The words of a structure: those of its fields, in this order. Takes it apart without `..`, so that no field is left out.
+/// The words of a structure: those of its fields, in this order. Takes it apart without `..`, so that no field is left
+/// out.
 macro_rules! words {
     ([$($generic:tt)*] $type:ty { $($field:ident),* $(,)? }) => {
         impl<$($generic)*> $crate::whole::Words for $type {
@@ -153,8 +157,9 @@ macro_rules! words {
 }
 pub(crate) use words;
 
-/// Most neighbouring bits of a word, or of the sum, of which a change is mended: cells that one particle flips lie next to each other. The bound
-/// is a guess. Each bit more doubles the number of changes that may be mistaken for one: 2¹³ of 2⁶⁴ for every word.
+/// Most neighbouring bits of a word, or of the sum, of which a change is mended: cells that one particle flips lie next
+/// to each other. The bound is a guess. Each bit more doubles the number of changes that may be mistaken for one: 2¹³
+/// of 2⁶⁴ for every word.
 const BURST_BITS: u32 = 8;
 
 /// Whether these are neighbouring bits, as many as are mended.

@@ -1,5 +1,6 @@
-//! The laws of the play operator as a user meets it, through [`Table::forward`]: Madelung's rules, wiping-out, congruency, rate
-//! independence, order, symmetry. The table is flat: an error of zero and a play of ±1e-4 rad, so what is seen is the operator alone.
+//! The laws of the play operator as a user meets it, through [`Table::forward`]: Madelung's rules, wiping-out,
+//! congruency, rate independence, order, symmetry. The table is flat: an error of zero and a play of ±1e-4 rad, so what
+//! is seen is the operator alone.
 
 use std::sync::LazyLock;
 
@@ -87,8 +88,8 @@ fn a_loop_has_the_corners_of_the_play() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
-    /// Madelung's second and third rule, to any depth: inner loops close at their turning points, and beyond the turning
-    /// point of the outermost the motion goes on as if they had not been.
+    /// Madelung's second and third rule, to any depth: inner loops close at their turning points, and beyond the
+    /// turning point of the outermost the motion goes on as if they had not been.
     #[test]
     fn inner_loops_close_at_their_turning_points(
         before in prop::collection::vec(FAR, 0..5), stroke in 10..6 * HALF,
@@ -112,7 +113,8 @@ proptest! {
         prop_assert_eq!(follow(&mut state, [top + sign * beyond]), follow(&mut straight, [top + sign * beyond]));
     }
 
-    /// Madelung's first rule: after a turn the way depends on the turning point and the memory there alone, not on how it was come to.
+    /// Madelung's first rule: after a turn the way depends on the turning point and the memory there alone, not on how
+    /// it was come to.
     #[test]
     fn what_follows_a_turn_depends_on_the_turn(histories in prop::array::uniform2(prop::collection::vec(FAR, 0..6)), after in prop::collection::vec(FAR, 1..8)) {
         let mut ways = Vec::new();
@@ -141,7 +143,8 @@ proptest! {
         prop_assert_eq!(one, other);
     }
 
-    /// Congruency: loops between the same extremes have the same shape; here they differ in height alone, by any history.
+    /// Congruency: loops between the same extremes have the same shape; here they differ in height alone, by any
+    /// history.
     #[test]
     fn loops_between_the_same_extremes_are_congruent(
         histories in prop::array::uniform2(prop::collection::vec(FAR, 0..8)), amplitude in 1..4 * HALF, part in 0i64..=100,

@@ -1,4 +1,5 @@
-//! The dictionary of a record of telemetry, for the ground: an XTCE file, made here, and a record read by that file alone.
+//! The dictionary of a record of telemetry, for the ground: an XTCE file, made here, and a record read by that file
+//! alone.
 
 use flexspline::{Flags, Health, Mode, Quality, RECORD_BYTES, Record};
 use std::collections::BTreeMap;
@@ -18,7 +19,8 @@ enum Kind {
 }
 use Kind::{Bytes, Flag, Float, Names, Signed, Unsigned};
 
-/// Name, bits, kind, unit and meaning of every parameter, in the order of the bytes and in each from the highest bit down.
+/// Name, bits, kind, unit and meaning of every parameter, in the order of the bytes and in each from the highest bit
+/// down.
 const PARAMETERS: &[(&str, usize, Kind, &str, &str)] = &[
     ("mark", 16, Bytes, "", "FX"),
     ("version", 8, Unsigned, "", "version of the record: 2"),

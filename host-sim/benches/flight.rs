@@ -1,4 +1,5 @@
-//! Ten minutes of a joint with mass at 1 kHz (motor, servo, drive, friction, load, wind; five steps of the plant in a tick), by controller.
+//! Ten minutes of a joint with mass at 1 kHz (motor, servo, drive, friction, load, wind; five steps of the plant in a
+//! tick), by controller.
 //!
 //! ```text
 //! cargo bench --bench flight

@@ -4,16 +4,16 @@
 //! cargo bench --bench growth
 //! ```
 //!
-//! Prints a line for each drive and each mesh level: CPU milliseconds of an increment (median of several rounds, the machine
-//! being shared), Newton iterations, factorisations and contacts, how the time is made up (the solver's own wall clocks), and
-//! of the set-up. At the end the exponents `d log(y) / d log(N)` by least squares, of time and of what touches, for
-//! teeth and for degrees of freedom; 1 is in proportion.
+//! Prints a line for each drive and each mesh level: CPU milliseconds of an increment (median of several rounds, the
+//! machine being shared), Newton iterations, factorisations and contacts, how the time is made up (the solver's own
+//! wall clocks), and of the set-up. At the end the exponents `d log(y) / d log(N)` by least squares, of time and of
+//! what touches, for teeth and for degrees of freedom; 1 is in proportion.
 //!
-//! Drives of other tooth counts are HHD-95 grown or shrunk at the same module ([`with_teeth`]). They turn by the same fraction
-//! of a tooth pitch in each increment (0.01 rad of HHD-95) under a torque in proportion to the tooth count, which
-//! leaves the share of teeth in contact about as it is; in proportion to its square, which loads each tooth of a rigid wheel
-//! alike, more of them come to bear. What the generator supports is not similar whatever is done: w0 is one module, so a rim of
-//! more teeth is bent less and more of it lies on a cam. The four-roller generator touches in a few
+//! Drives of other tooth counts are HHD-95 grown or shrunk at the same module ([`with_teeth`]). They turn by the same
+//! fraction of a tooth pitch in each increment (0.01 rad of HHD-95) under a torque in proportion to the tooth count,
+//! which leaves the share of teeth in contact about as it is; in proportion to its square, which loads each tooth of a
+//! rigid wheel alike, more of them come to bear. What the generator supports is not similar whatever is done: w0 is one
+//! module, so a rim of more teeth is bent less and more of it lies on a cam. The four-roller generator touches in a few
 //! places however many teeth there are. The exponent depends on this choice of loads: say which when quoting it.
 
 mod common;
@@ -35,11 +35,11 @@ const TORQUE_N_M: f64 = 50.0;
 const ROUNDS: usize = 5;
 const ROUND: usize = 20;
 
-/// HHD-95 with another number of teeth of the same module: the wheels grow with the tooth count, and with them rim, ring and
-/// rollers; tooth heights, fillets, clearances and the deflection w0 stay.
+/// HHD-95 with another number of teeth of the same module: the wheels grow with the tooth count, and with them rim,
+/// ring and rollers; tooth heights, fillets, clearances and the deflection w0 stay.
 ///
-/// The teeth keep their place on the involute (profile shift and addendum in proportion to the tooth count), so that the angle
-/// of the flanks, the thickness of the teeth in modules and the clearance stay as they were.
+/// The teeth keep their place on the involute (profile shift and addendum in proportion to the tooth count), so that
+/// the angle of the flanks, the thickness of the teeth in modules and the clearance stay as they were.
 fn with_teeth(teeth: u32) -> Drive {
     let mut drive = Drive::hhd_95();
     let scale = f64::from(teeth) / f64::from(drive.flexspline.teeth);
@@ -71,7 +71,8 @@ fn describe(drive: &Drive) {
     let report = rigid.report(GeneratorKind::Cam).expect("the flanks meet");
     let radius = drive.flexspline.pitch_radius_mm();
     println!(
-        "{}: pitch radius {radius:.2} mm, rim {:.2} mm, w0 {:.2} mm, rigid backlash {:.1} um at the pitch circle, {} interferences",
+        "{}: pitch radius {radius:.2} mm, rim {:.2} mm, w0 {:.2} mm, rigid backlash {:.1} um at the pitch circle, {} \
+         interferences",
         drive.name,
         drive.flexspline.rim_thickness_mm,
         drive.generator.w0_mm,
@@ -110,8 +111,9 @@ fn measure(drive: &Drive, kind: GeneratorKind, mesh: MeshLevel) -> Case {
     let each = |time: Duration| time.as_secs_f64() * 1e3 / ROUND as f64;
     let [flanks, bore_edges] = run.contacts;
     println!(
-        "{kind} {}/{} {mesh}, {} dof: {:.2} ms CPU, {:.1} iterations, {:.2} factorisations, {flanks} flanks and {bore_edges} \
-         bore edges touch; clocks: assembly {:.2}, contact {:.2}, factorisation {:.2}, solution {:.2} ms; set-up {:.0} ms CPU",
+        "{kind} {}/{} {mesh}, {} dof: {:.2} ms CPU, {:.1} iterations, {:.2} factorisations, {flanks} flanks and \
+         {bore_edges} bore edges touch; clocks: assembly {:.2}, contact {:.2}, factorisation {:.2}, solution {:.2} \
+         ms; set-up {:.0} ms CPU",
         problem.flexspline.teeth,
         problem.circular_spline.teeth,
         problem.degrees_of_freedom(),

@@ -4,11 +4,11 @@
 //! cargo bench --bench increment
 //! ```
 //!
-//! Criterion's figures `increment/<generator> <torque> N.m/<solver>` are CPU time of one increment: predictor, contact, Newton
-//! iterations and all. The line after each gives the mean over all increments of that run (CPU), Newton iterations and
-//! factorisations for each, and how the time is made up by the solver's own clocks (those are wall clocks: on a machine
-//! that does other things they add up to more than the CPU time). The line `reference / fast` is the ratio of the means.
-//! The drive moves on from sample to sample; what was settled before is not timed.
+//! Criterion's figures `increment/<generator> <torque> N.m/<solver>` are CPU time of one increment: predictor, contact,
+//! Newton iterations and all. The line after each gives the mean over all increments of that run (CPU), Newton
+//! iterations and factorisations for each, and how the time is made up by the solver's own clocks (those are wall
+//! clocks: on a machine that does other things they add up to more than the CPU time). The line `reference / fast` is
+//! the ratio of the means. The drive moves on from sample to sample; what was settled before is not timed.
 
 mod common;
 
@@ -68,8 +68,8 @@ fn mean_ms<M: Measurement>(group: &mut BenchmarkGroup<'_, M>, problem: &Problem,
     let each = |time: Duration| time.as_secs_f64() * 1e3 / settled.increments as f64;
     let effort = settled.motion.take_effort();
     println!(
-        "    {kind} {torque_n_m} N.m, {method}, {} dof: {:.2} ms CPU, {:.1} iterations, {:.2} factorisations (mean of {}); \
-         clocks: assembly {:.2}, contact {:.2}, analysis {:.2}, factorisation {:.2}, solution {:.2} ms",
+        "    {kind} {torque_n_m} N.m, {method}, {} dof: {:.2} ms CPU, {:.1} iterations, {:.2} factorisations (mean of \
+         {}); clocks: assembly {:.2}, contact {:.2}, analysis {:.2}, factorisation {:.2}, solution {:.2} ms",
         problem.degrees_of_freedom(),
         each(time),
         settled.iterations as f64 / settled.increments as f64,

@@ -5,13 +5,14 @@
 //! ```
 //!
 //! * `reference/assembly`: element tangents and forces of the flexspline, added into the sparse matrix;
-//! * `reference/factorisation`: sparse Cholesky factor of both wheels, with the pattern of the flank pairs that are near;
+//! * `reference/factorisation`: sparse Cholesky factor of both wheels, with the pattern of the flank pairs that are
+//!   near;
 //! * `reference/solve`: one right-hand side;
 //! * `contact/bore`, `contact/flanks`: one pass at the deformed, loaded state; flanks: search, layout and forces;
 //! * `fast/set-up`: `Problem::new`, both wheels meshed and condensed (all threads);
 //! * `fast/condensation`: the condensation alone (all threads);
-//! * `fast/reduction`, `fast/chain`, `fast/solve`: one factorisation without contact in two parts (cells reduced to their faces,
-//!   faces eliminated around both rings), and one right-hand side brought there and back;
+//! * `fast/reduction`, `fast/chain`, `fast/solve`: one factorisation without contact in two parts (cells reduced to
+//!   their faces, faces eliminated around both rings), and one right-hand side brought there and back;
 //! * `fast/whole field`: the nodes that were condensed away; `fast/peak stress`: these and the stresses of every node.
 
 mod common;
@@ -271,8 +272,8 @@ impl<'m> Tangent<'m> {
         self.cells.iter().flat_map(|cell| cell.unknowns).max().map_or(0, |last| *last as usize + 1)
     }
 
-    /// Forces on flanks and bores to the faces, around the rings, and back. (Forces on the faces themselves, which the solver adds
-    /// in between, are left out.)
+    /// Forces on flanks and bores to the faces, around the rings, and back. (Forces on the faces themselves, which the
+    /// solver adds in between, are left out.)
     fn solve(&mut self, x: &mut [f64]) {
         let mut side = vec![0.0; self.chain.unknowns()];
         let (kernels, order) = (self.kernels, &self.chain);

@@ -5,8 +5,9 @@
 //! ```
 //!
 //! Criterion's figure is CPU time of all threads for a table of the cam up to 50 N.m, at both ends of the operating
-//! temperatures, on the torque nodes that the choice begins with (it may add none) and four positions over a tooth pitch, by
-//! the fast solver, standard mesh, set-up of the problems included. The line after it says what the table holds.
+//! temperatures, on the torque nodes that the choice begins with (it may add none) and four positions over a tooth
+//! pitch, by the fast solver, standard mesh, set-up of the problems included. The line after it says what the table
+//! holds.
 
 mod common;
 

@@ -5,8 +5,8 @@
 //! cargo run --release --example closed_loop -- fly antenna|brief TABLES [OUT]
 //! cargo run --release --example closed_loop -- rover TABLES
 //! ```
-//! `TABLES` is a folder of `<generator>.fxt`. With `OUT` every tick of the flights is written there as CSV. `fly brief` prints,
-//! line by line, what the program `antenna` prints on the target, and `rover` what `rover` does.
+//! `TABLES` is a folder of `<generator>.fxt`. With `OUT` every tick of the flights is written there as CSV. `fly brief`
+//! prints, line by line, what the program `antenna` prints on the target, and `rover` what `rover` does.
 
 use std::error::Error;
 use std::path::Path;

@@ -16,7 +16,8 @@ fn main() -> Result<(), SolveError> {
     let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
     // Meshes, outlines, contact and holding, at one temperature; immutable while it is solved.
     let problem = Problem::new(&drive, GeneratorKind::Cam, drive.temperature.reference_c, settings)?;
-    // The cam deforms the flexspline: teeth mesh at both ends of the major axis, the output stands in the middle of its clearance.
+    // The cam deforms the flexspline: teeth mesh at both ends of the major axis, the output stands in the middle of its
+    // clearance.
     let mut motion = Motion::deformed(&problem, 0.0)?;
     println!("torque N.m  generator rad  error\"  flanks in contact");
     for torque_n_m in [0.0, 10.0, 50.0] {

@@ -1,8 +1,9 @@
 //! A map of drives that a designer may draw: `map_of_drives COUNT SEED FILE.csv [FIRST]`
 //!
-//! Drive i is a pure function of the seed and i: 60 to 400 teeth, a module of 0.1 to 1 mm, one of the four generators, a rim up to a
-//! quarter thinner or thicker than the proportions of HHD-95, no friction or up to 0.15, a load of 10 % of the rated one up to all of
-//! it, and what holds the rim: springs, nothing, a cup, a hat or a closed sleeve of usual proportions. For each it is told whether it
+//! Drive i is a pure function of the seed and i: 60 to 400 teeth, a module of 0.1 to 1 mm, one of the four generators,
+//! a rim up to a quarter thinner or thicker than the proportions of HHD-95, no friction or up to 0.15, a load of 10 %
+//! of the rated one up to all of it, and what holds the rim: springs, nothing, a cup, a hat or a closed sleeve of usual
+//! proportions. For each it is told whether it
 //!
 //! - converged: the data sheet of the drive (`flexspline study`) is whole, and what it says can be true;
 //! - was cautioned: so, too, with something to know before it is built;
@@ -10,7 +11,8 @@
 //! - failed, with the reason and the last stable load;
 //! - was silently wrong: whole, but it cannot be true, and nothing was said.
 //!
-//! The rows go to the file as they come, the sums to the screen. It ends with 1 if any drive is silently wrong, or if more than 1 % failed.
+//! The rows go to the file as they come, the sums to the screen. It ends with 1 if any drive is silently wrong, or if
+//! more than 1 % failed.
 
 use std::fs::File;
 use std::io::Write as _;
@@ -35,7 +37,8 @@ const SLEEVES: [&str; 5] = ["springs", "none", "cup", "hat", "hermetic"];
 const POSITIONS: usize = 6;
 /// Share of drives that may fail.
 const MAY_FAIL: f64 = 0.01;
-/// A backlash by FEM may be larger than that of rigid teeth (the rim gives way), but not by this factor and these arc-seconds.
+/// A backlash by FEM may be larger than that of rigid teeth (the rim gives way), but not by this factor and these
+/// arc-seconds.
 const BACKLASH: (f64, f64) = (4.0, 120.0);
 
 /// What a drive of the map is.

@@ -1,4 +1,5 @@
-//! What the browser tests read beside real reports: packed arrays with what they hold, and a page whose every text is hostile.
+//! What the browser tests read beside real reports: packed arrays with what they hold, and a page whose every text is
+//! hostile.
 //!
 //! `cargo run --release --example report_fixtures -- DIR`
 

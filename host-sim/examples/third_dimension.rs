@@ -1,9 +1,9 @@
 //! Plane, cup and hermetic, with all four generators: `third_dimension [TORQUE_N_M [LEVEL]]`
 //!
-//! The figures of each drive as a catalogue would print them ([`flexspline_sim::data_sheet`]), one row for each drive and generator, with
-//! the load even along the face and with the face in slices, as a Markdown table. Torque 50 N·m and coarse mesh by default; a LEVEL is
-//! coarse, standard or fine. Where a drive finds no equilibrium its row has the figures until there, and
-//! it ends with 1.
+//! The figures of each drive as a catalogue would print them ([`flexspline_sim::data_sheet`]), one row for each drive
+//! and generator, with the load even along the face and with the face in slices, as a Markdown table. Torque 50 N·m and
+//! coarse mesh by default; a LEVEL is coarse, standard or fine. Where a drive finds no equilibrium its row has the
+//! figures until there, and it ends with 1.
 
 use std::process::ExitCode;
 use std::time::Instant;
@@ -18,8 +18,8 @@ use rayon::prelude::*;
 const TORQUE_N_M: f64 = 50.0;
 /// Positions over a tooth pitch.
 const POSITIONS: usize = 8;
-/// Taper of the rows with slices, mrad: that of the lowest peak along the face of `HHD-95-hermetic` under its cam, in steps of 0.2;
-/// of a cup the tilt of its rim under the cam.
+/// Taper of the rows with slices, mrad: that of the lowest peak along the face of `HHD-95-hermetic` under its cam, in
+/// steps of 0.2; of a cup the tilt of its rim under the cam.
 const TAPERS_MRAD: [(&str, f64); 2] = [("HHD-95-hermetic", 0.6), ("CUP-95", 5.5)];
 
 /// A drive of the table and what was done to it.

@@ -7,10 +7,11 @@
 //! measured.csv -> measurement -> residual -> diagnosis (beside a table, or nominal.toml) -> extension -> drive, tables
 //! ```
 //!
-//! [`drive::Drive`] says what the drive is, [`stepping::Problem`] makes meshes and contact of it with one wave generator at one
-//! temperature, [`motion::Motion`] deforms, loads and turns it. [`tables::make()`] samples steady motion at the torques and
-//! temperatures that it finds to be needed, and projects the samples onto the table that firmware reads; [`tables::validate()`]
-//! compares the table with fresh FEM. [`diagnosis`] says what measured data have beyond all that.
+//! [`drive::Drive`] says what the drive is, [`stepping::Problem`] makes meshes and contact of it with one wave
+//! generator at one temperature, [`motion::Motion`] deforms, loads and turns it. [`tables::make()`] samples steady
+//! motion at the torques and temperatures that it finds to be needed, and projects the samples onto the table that
+//! firmware reads; [`tables::validate()`] compares the table with fresh FEM. [`diagnosis`] says what measured data have
+//! beyond all that.
 //!
 //! A drive, a solver, one error:
 //!
@@ -30,9 +31,9 @@
 //! # Ok::<(), flexspline_sim::stepping::SolveError>(())
 //! ```
 //!
-//! `examples/contact.rs` goes on to loads and a whole tooth pitch. Lengths are mm, forces N, torques N m, angles rad, temperatures °C,
-//! and a name carries any other unit. A positive load turns the output forward; the error is output angle minus generator angle over
-//! the ratio, positive when the output leads.
+//! `examples/contact.rs` goes on to loads and a whole tooth pitch. Lengths are mm, forces N, torques N m, angles rad,
+//! temperatures °C, and a name carries any other unit. A positive load turns the output forward; the error is output
+//! angle minus generator angle over the ratio, positive when the output leads.
 #![forbid(unsafe_code)]
 
 pub use flexspline_base::{csv_rows, output, robust, statistics, suggest, toml_file, units};

@@ -15,8 +15,8 @@ use crate::program::{Limits, Used, run};
 
 /// Arc-seconds in a radian.
 const ARCSEC: f64 = 180.0 * 3600.0 / PI;
-/// What a deck cannot say is taken out of the drive, for both programs: the drag of the output, and the rounding of the tips,
-/// which our contact knows and the mesh does not (0.03 mm of it softens the load curve by 0.1″).
+/// What a deck cannot say is taken out of the drive, for both programs: the drag of the output, and the rounding of the
+/// tips, which our contact knows and the mesh does not (0.03 mm of it softens the load curve by 0.1″).
 pub const AS_IN_THE_DECK: [&str; 3] =
     ["output.drag_torque_n_m=0", "flexspline.tip_rounding_mm=0.002", "circular_spline.tip_rounding_mm=0.002"];
 /// The step of a deck that ends with the load on. One follows for each rotation increment, then one to the last load.
@@ -73,8 +73,8 @@ pub struct Comparison {
     pub wind_up_arcsec: [f64; 2],
     /// Largest difference of a displacement of the bore, µm, and the largest displacement.
     pub bore_um: [f64; 2],
-    /// Difference of the von Mises stress at the integration points of the bore row: the largest, what 99 % keep to, the root
-    /// mean square; and the largest stress, MPa.
+    /// Difference of the von Mises stress at the integration points of the bore row: the largest, what 99 % keep to,
+    /// the root mean square; and the largest stress, MPa.
     pub stress_mpa: [f64; 4],
     /// Processor time of ours in a rotation increment of a run, s.
     pub cpu_s: f64,
@@ -200,7 +200,8 @@ impl Case {
         Problem::new(&drive, self.generator, drive.temperature.reference_c, settings).map_err(|error| error.to_string())
     }
 
-    /// How far the output of our model would be from where it is if it had the penalties that it comes with, arc-seconds.
+    /// How far the output of our model would be from where it is if it had the penalties that it comes with,
+    /// arc-seconds.
     pub fn penalty_arcsec(&self, problem: &Problem, peer: &Peer) -> Result<f64, String> {
         let settings = SolverSettings { mesh: self.mesh, ..SolverSettings::default() };
         let (drive, kind) = (&problem.drive, problem.kind);

@@ -9,10 +9,11 @@
 //! ```
 //!
 //! Both cells are elastic, so that a slide of a fraction of a micrometre sticks in one part of the flank and
-//! slips in the other, and one of micrometres slips everywhere. Solved here with the elements and the flank contact of the drive
-//! ([`FlankContact`]), by Newton's method with the slope of the friction by the gap in it; in CalculiX by face-to-face contact with the
-//! same penalty, the same stick slope and `*FRICTION`. Compared are the torque on the output, the force along the flank over that across it,
-//! the torque by which forth and back differ, and the share that sticks.
+//! slips in the other, and one of micrometres slips everywhere. Solved here with the elements and the flank contact of
+//! the drive ([`FlankContact`]), by Newton's method with the slope of the friction by the gap in it; in CalculiX by
+//! face-to-face contact with the same penalty, the same stick slope and `*FRICTION`. Compared are the torque on the
+//! output, the force along the flank over that across it, the torque by which forth and back differ, and the share that
+//! sticks.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -37,24 +38,26 @@ const PENALTY: f64 = 5e6;
 const STICK_SLOPE: f64 = 0.1 * PENALTY;
 /// How far the tooth is pressed beyond where it touches, mm.
 const PRESSED_MM: f64 = 2e-3;
-/// The slides, in coefficients of friction times [`PRESSED_MM`]: pressed, slipping forth, turned back and partly stuck, slipping back, turned
-/// forth and partly stuck.
+/// The slides, in coefficients of friction times [`PRESSED_MM`]: pressed, slipping forth, turned back and partly stuck,
+/// slipping back, turned forth and partly stuck.
 const SLIDES: [f64; 5] = [0.0, 4.0, 3.2, -4.0, -3.2];
 /// Those that slip everywhere; the next of each is the way turned back.
 const FORTH: usize = 1;
 const BACK: usize = 3;
-/// Increments that CalculiX takes to each of them, ours being one: tips bear on lines, which CalculiX finds once in an increment. In one,
-/// and slides twice as long, its torque was 0.5 to 1 % from ours.
+/// Increments that CalculiX takes to each of them, ours being one: tips bear on lines, which CalculiX finds once in an
+/// increment. In one, and slides twice as long, its torque was 0.5 to 1 % from ours.
 const PARTS: usize = 8;
 /// Largest relative difference of the torque on the output. Found: 0.22 %.
 const TORQUE: f64 = 0.005;
-/// Of the change of the force along the flank over that across it: from forth to back, and where the way turns. Found: 0.21 and 0.25 %. A
-/// difference of 0.0004 to 0.0016 that is the same forth and back, its cause not found, falls out of it.
+/// Of the change of the force along the flank over that across it: from forth to back, and where the way turns. Found:
+/// 0.21 and 0.25 %. A difference of 0.0004 to 0.0016 that is the same forth and back, its cause not found, falls out of
+/// it.
 const ALONG: f64 = 0.01;
-/// Of the torque by which forth and back differ. Found: 1.8 %: the difference of two torques that are 25 times as large.
+/// Of the torque by which forth and back differ. Found: 1.8 %: the difference of two torques that are 25 times as
+/// large.
 const LOST: f64 = 0.03;
-/// Difference of the share that sticks where the way turned: by length here, by the number of points in CalculiX, which does not print
-/// their lengths. Found: 0.037.
+/// Difference of the share that sticks where the way turned: by length here, by the number of points in CalculiX, which
+/// does not print their lengths. Found: 0.037.
 const STICKS: f64 = 0.05;
 /// Newton's method ends when no force is further from balance, N/mm, of hundreds.
 const BALANCE: f64 = 1e-7;
@@ -260,7 +263,8 @@ impl<'m> Pressed<'m> {
                         "no balance after {MOST_ITERATIONS} iterations, friction {friction}, slide {slide}"
                     ));
                 }
-                // Points that stick and slip by turns send whole steps to and fro: half of a step goes back where it gained nothing.
+                // Points that stick and slip by turns send whole steps to and fro: half of a step goes back where it
+                // gained nothing.
                 if largest < GAIN * smallest {
                     smallest = largest;
                     step = system.solve();
@@ -384,7 +388,8 @@ fn told(coefficient: f64, ours: &[Borne], theirs: &[Borne], claims: &mut Claims)
     claims.check(&format!("turned back, change of the same within {:.0} %", percent(ALONG)), turned <= ALONG);
     claims.check(&format!("share that sticks within {:.0} % of the contact", percent(STICKS)), sticks <= STICKS);
     format!(
-        "friction {coefficient}: torque {:.2} %, slipping {:+.2} %, torque turned round {:+.2} %, partly stuck {:.2} %, share that sticks {:.3}",
+        "friction {coefficient}: torque {:.2} %, slipping {:+.2} %, torque turned round {:+.2} %, partly stuck {:.2} \
+         %, share that sticks {:.3}",
         percent(torque),
         percent(slipping),
         percent(lost),
@@ -431,12 +436,11 @@ fn deck(pressed: &Pressed, drive: &Drive, friction: f64) -> (String, BTreeMap<us
     let material = &drive.material;
     let _ = write!(
         text,
-        "*NSET, NSET=TOOTH_HELD\n{tooth}*NSET, NSET=SPACE_HELD\n{space}\
-         *SURFACE, NAME=TOOTH_FLANK\n{}*SURFACE, NAME=SPACE_FLANK\n{}\
-         *MATERIAL, NAME=STEEL\n*ELASTIC\n{:e}, {}\n*SOLID SECTION, ELSET=CELLS, MATERIAL=STEEL\n1.\n\
-         *SURFACE INTERACTION, NAME=SLIDING\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n{PENALTY:e}\n\
-         *FRICTION\n{friction}, {STICK_SLOPE:e}\n\
-         *CONTACT PAIR, INTERACTION=SLIDING, TYPE=SURFACE TO SURFACE\nTOOTH_FLANK, SPACE_FLANK\n",
+        "*NSET, NSET=TOOTH_HELD\n{tooth}*NSET, NSET=SPACE_HELD\n{space}*SURFACE, NAME=TOOTH_FLANK\n{}*SURFACE, \
+         NAME=SPACE_FLANK\n{}*MATERIAL, NAME=STEEL\n*ELASTIC\n{:e}, {}\n*SOLID SECTION, ELSET=CELLS, \
+         MATERIAL=STEEL\n1.\n*SURFACE INTERACTION, NAME=SLIDING\n*SURFACE BEHAVIOR, \
+         PRESSURE-OVERCLOSURE=LINEAR\n{PENALTY:e}\n*FRICTION\n{friction}, {STICK_SLOPE:e}\n*CONTACT PAIR, \
+         INTERACTION=SLIDING, TYPE=SURFACE TO SURFACE\nTOOTH_FLANK, SPACE_FLANK\n",
         faces[0], faces[1], material.youngs_modulus_mpa, material.poissons_ratio,
     );
     let part = 1.0 / PARTS as f64;
@@ -444,9 +448,9 @@ fn deck(pressed: &Pressed, drive: &Drive, friction: f64) -> (String, BTreeMap<us
         let [x, y] = pressed.held(friction, slide);
         let _ = write!(
             text,
-            "*STEP, NLGEOM, INC=200\n*STATIC\n{part}, 1., {part}, {part}\n*BOUNDARY\nSPACE_HELD, 1, 2\nTOOTH_HELD, 1, 1, {x:.12e}\n\
-             TOOTH_HELD, 2, 2, {y:.12e}\n*NODE PRINT, NSET=SPACE_HELD, FREQUENCY=1000\nRF\n\
-             *CONTACT PRINT, SLAVE=TOOTH_FLANK, MASTER=SPACE_FLANK, FREQUENCY=1000\nCSTR, CF\n*END STEP\n"
+            "*STEP, NLGEOM, INC=200\n*STATIC\n{part}, 1., {part}, {part}\n*BOUNDARY\nSPACE_HELD, 1, 2\nTOOTH_HELD, 1, \
+             1, {x:.12e}\nTOOTH_HELD, 2, 2, {y:.12e}\n*NODE PRINT, NSET=SPACE_HELD, FREQUENCY=1000\nRF\n*CONTACT \
+             PRINT, SLAVE=TOOTH_FLANK, MASTER=SPACE_FLANK, FREQUENCY=1000\nCSTR, CF\n*END STEP\n"
         );
     }
     let [_, space] = held;

@@ -1,12 +1,13 @@
 //! CalculiX beside flexspline: the same deck, the same path, the same machine.
 //!
-//! For each case the command `flexspline export --format inp` writes a deck, `ccx` runs it on one thread, and each of our
-//! solvers goes the same way on the same mesh: deformed, loaded, turned in increments, and at the end brought to another
-//! load. Compared are the output angle, the wind-up between the two loads, the displacements of the bore, the stress along
-//! it, and what both cost. The short form is the cam on the coarse mesh; `--long` adds the standard mesh and what CalculiX
-//! itself leaves open (each increment in two parts). A cup and a closed sleeve in solid elements stand beside our shells, a fine mesh of one root fillet
-//! beside the stress that `simulate --stress` tells. A tooth slid along its space
-//! with friction stands beside our flank contact. Rollers are not compared: see the header of `export/inp.rs`.
+//! For each case the command `flexspline export --format inp` writes a deck, `ccx` runs it on one thread, and each of
+//! our solvers goes the same way on the same mesh: deformed, loaded, turned in increments, and at the end brought to
+//! another load. Compared are the output angle, the wind-up between the two loads, the displacements of the bore, the
+//! stress along it, and what both cost. The short form is the cam on the coarse mesh; `--long` adds the standard mesh
+//! and what CalculiX itself leaves open (each increment in two parts). A cup and a closed sleeve in solid elements
+//! stand beside our shells, a fine mesh of one root fillet beside the stress that `simulate --stress` tells. A tooth
+//! slid along its space with friction stands beside our flank contact. Rollers are not compared: see the header of
+//! `export/inp.rs`.
 //!
 //! Prints what it finds, a line for each claim, and one line of ratios at the end; ends with 1 if a claim fails.
 
@@ -30,17 +31,18 @@ use flexspline_sim::stepping::Method;
 use ours::SOLVERS;
 use program::Limits;
 
-/// Contact penalties on bore and flanks in both programs, N/mm³. Ours is 5e7 on the flanks; ten times less moves the output by
-/// 0.1″ and spares CalculiX iterations. Printed with each case: what our own penalties would change.
+/// Contact penalties on bore and flanks in both programs, N/mm³. Ours is 5e7 on the flanks; ten times less moves the
+/// output by 0.1″ and spares CalculiX iterations. Printed with each case: what our own penalties would change.
 const PENALTIES: [f64; 2] = [1e6, 5e6];
 /// Largest difference of the output angle, arc-seconds: 0.015 was found on both meshes.
 const OUTPUT_ARCSEC: f64 = 0.1;
 /// Largest relative difference of the wind-up.
 const WIND_UP: f64 = 0.01;
-/// Difference of the stress that 99 % of the points along the bore keep to, relative to the largest stress: CalculiX itself
-/// moves single points by 0.5 to 2 MPa from run to run, with the last digits of the deck.
+/// Difference of the stress that 99 % of the points along the bore keep to, relative to the largest stress: CalculiX
+/// itself moves single points by 0.5 to 2 MPa from run to run, with the last digits of the deck.
 const STRESS: f64 = 0.03;
-/// How many times less processor time than CalculiX an increment of our solver takes: from 60 000 unknowns on, and below.
+/// How many times less processor time than CalculiX an increment of our solver takes: from 60 000 unknowns on, and
+/// below.
 fn cpu_ratio(solver: Method, unknowns: usize) -> f64 {
     match (solver, unknowns >= LARGE) {
         (Method::Reference, true) => 60.0,
@@ -167,7 +169,8 @@ fn beside(case: &Case, options: &Options, flexspline: &Path, claims: &mut Claims
     let rotation = &peer.cpu_s[1..=case.increments];
     let peer_cpu_s = rotation.iter().sum::<f64>() / rotation.len() as f64;
     println!(
-        "  CalculiX: {:.0} s in all, {peer_cpu_s:.1} s per rotation increment, iterations {:?} (load, rotations, load), {:.0} MB",
+        "  CalculiX: {:.0} s in all, {peer_cpu_s:.1} s per rotation increment, iterations {:?} (load, rotations, \
+         load), {:.0} MB",
         peer.used.cpu_s, peer.iterations, peer.used.memory_mb
     );
     let mut costs = vec![format!("CalculiX {peer_cpu_s:.1} s")];
@@ -213,7 +216,8 @@ fn report(ours: &Comparison, ratio: f64) {
     let [apart_um, moved_um] = ours.bore_um;
     let [apart_mpa, common_mpa, rms_mpa, most_mpa] = ours.stress_mpa;
     println!(
-        "  {}: {:.4} s per rotation increment of a run ({ratio:.0} times less), {:.4} s in the first after the load, {:.0} MB",
+        "  {}: {:.4} s per rotation increment of a run ({ratio:.0} times less), {:.4} s in the first after the load, \
+         {:.0} MB",
         ours.solver, ours.cpu_s, ours.first_cpu_s, ours.memory_mb
     );
     println!(
@@ -223,6 +227,7 @@ fn report(ours: &Comparison, ratio: f64) {
     println!("  wind-up between the loads: {peer_wound:.3}\" and {wound:.3}\"");
     println!("  bore: displacements up to {apart_um:.3} um apart, of {moved_um:.0} um");
     println!(
-        "  von Mises along the bore: up to {apart_mpa:.2} MPa apart, 99 % within {common_mpa:.2} (rms {rms_mpa:.3}), of {most_mpa:.0} MPa"
+        "  von Mises along the bore: up to {apart_mpa:.2} MPa apart, 99 % within {common_mpa:.2} (rms {rms_mpa:.3}), \
+         of {most_mpa:.0} MPa"
     );
 }

@@ -42,8 +42,8 @@ pub fn journey(problem: &Problem, stops: &[Stop], repeat: usize) -> Result<Journ
     Ok(Journey { states, cpu: cpu.into_iter().map(median).collect() })
 }
 
-/// Processor time (s) of an increment in a run: from the stop `start` on, the generator turned `increments` times by `step_rad`
-/// under its load. The first of them know nothing of the motion yet and cost most.
+/// Processor time (s) of an increment in a run: from the stop `start` on, the generator turned `increments` times by
+/// `step_rad` under its load. The first of them know nothing of the motion yet and cost most.
 pub fn run_cpu_s(problem: &Problem, start: Stop, step_rad: f64, increments: usize) -> Result<f64, String> {
     let mut motion = Motion::deformed(problem, start.0).map_err(|error| error.to_string())?;
     motion.load(start.1).map_err(|error| error.to_string())?;

@@ -32,7 +32,8 @@ pub struct Limits {
     pub memory_mb: f64,
 }
 
-/// Runs a command to its end, its output in `log`. A file that grows by a line for each thing done (`watched`) dates these.
+/// Runs a command to its end, its output in `log`. A file that grows by a line for each thing done (`watched`) dates
+/// these.
 pub fn run(command: &mut Command, log: &Path, watched: Option<&Path>, limits: Limits) -> Result<Used, String> {
     let name = command.get_program().to_string_lossy().into_owned();
     let failed = |error: &dyn std::fmt::Display| format!("{name}: {error}");

@@ -1,8 +1,10 @@
-//! Stress in a root fillet: over our meshes with its interval, and by CalculiX on a fine mesh of one tooth of the flexspline.
+//! Stress in a root fillet: over our meshes with its interval, and by CalculiX on a fine mesh of one tooth of the
+//! flexspline.
 //!
-//! The tooth is the one with the most stressed fillet. Its cell is cut out of the loaded drive; bore, flanks and the faces to its neighbours are
-//! displaced as our finest mesh of the whole drive has them, interpolated along its edges; fillet, root land and tip are free. CalculiX
-//! solves what is inside, with twice our elements in each direction, large displacements and its own elements.
+//! The tooth is the one with the most stressed fillet. Its cell is cut out of the loaded drive; bore, flanks and the
+//! faces to its neighbours are displaced as our finest mesh of the whole drive has them, interpolated along its edges;
+//! fillet, root land and tip are free. CalculiX solves what is inside, with twice our elements in each direction, large
+//! displacements and its own elements.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -25,7 +27,8 @@ use crate::program::{Limits, run};
 const STRESS: f64 = 0.03;
 /// Where a run stops being worth waiting for; it takes two seconds.
 const LIMITS: Limits = Limits { cpu_s: 120.0, memory_mb: 2000.0 };
-/// Generators and loads, N m: half of what a table of each spans, where the cam winds the drive up most and two rollers bend it most.
+/// Generators and loads, N m: half of what a table of each spans, where the cam winds the drive up most and two rollers
+/// bend it most.
 const CASES: [(GeneratorKind, f64); 2] = [(GeneratorKind::Cam, 100.0), (GeneratorKind::TwoRoller, 10.0)];
 
 /// Displacements (mm) of the nodes on the edge of a cell, by local number and the sectors it lies further.
@@ -81,7 +84,8 @@ fn told(
     format!("root fillet of {kind} {:+.1} %", 100.0 * apart)
 }
 
-/// Displacements of the nodes of `fine` on bore, flanks and faces of a cell, as the drive has them on a mesh half as fine.
+/// Displacements of the nodes of `fine` on bore, flanks and faces of a cell, as the drive has them on a mesh half as
+/// fine.
 fn edge_of_cell(problem: &Problem, state: &State, fine: &WheelMesh, tooth: usize) -> Edge {
     let mesh = &problem.flexspline;
     let moved = |(local, further): (u32, usize)| {
@@ -139,8 +143,8 @@ fn deck(drive: &Drive, mesh: &WheelMesh, tooth: usize, edge: &Edge) -> (String, 
     let material = &drive.material;
     let _ = write!(
         text,
-        "*MATERIAL, NAME=STEEL\n*ELASTIC\n{:e}, {}\n*SOLID SECTION, ELSET=CELL, MATERIAL=STEEL\n1.\n*STEP, NLGEOM\n*STATIC\n1., 1.\n\
-         *BOUNDARY\n",
+        "*MATERIAL, NAME=STEEL\n*ELASTIC\n{:e}, {}\n*SOLID SECTION, ELSET=CELL, MATERIAL=STEEL\n1.\n*STEP, \
+         NLGEOM\n*STATIC\n1., 1.\n*BOUNDARY\n",
         material.youngs_modulus_mpa, material.poissons_ratio
     );
     for ((local, further), [x, y]) in edge {

@@ -10,8 +10,8 @@ use crate::Claims;
 use crate::dat::{at_step, tables};
 use crate::program::{Limits, run};
 
-/// Largest relative difference of K2 of the band, and of its tilt. Found: 0.4 and 0.03 %; solids and shells were found to agree to 1 %
-/// on bands before there was this deck.
+/// Largest relative difference of K2 of the band, and of its tilt. Found: 0.4 and 0.03 %; solids and shells were found
+/// to agree to 1 % on bands before there was this deck.
 const STIFFNESS: f64 = 0.01;
 const TILT: f64 = 0.01;
 /// Where a run stops being worth waiting for; it takes one second.

@@ -79,12 +79,13 @@ pub struct FlexsplineImageReport {
     pub circular_spline_teeth: u16,
     /// `FLEXSPLINE_FIXED_...`.
     pub fixed_member: u8,
-    /// Kind of wave generator: 0 other, 1 two-roller, 2 four-roller, 3 double-disc, 4 cam (`flexspline_generator_name`).
+    /// Kind of wave generator: 0 other, 1 two-roller, 2 four-roller, 3 double-disc, 4 cam
+    /// (`flexspline_generator_name`).
     pub generator: u8,
 }
 
-/// Where the output will be at a generator angle, counts of 2^-32 turn, under a torque, N m: from where the state rests, which stays as it is. A path
-/// with a reversal is that of ticks.
+/// Where the output will be at a generator angle, counts of 2^-32 turn, under a torque, N m: from where the state
+/// rests, which stays as it is. A path with a reversal is that of ticks.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_forward(
     joint: *const FlexsplineJoint,
@@ -115,8 +116,8 @@ pub extern "C" fn flexspline_forward(
     status(ask())
 }
 
-/// Generator angle that brings the output to a target, counts of 2^-32 turn, under a torque, N m: in steady motion forward (+1) or backward (-1), or
-/// from where the state rests (0). No limiter and no mode: that is the tick's part.
+/// Generator angle that brings the output to a target, counts of 2^-32 turn, under a torque, N m: in steady motion
+/// forward (+1) or backward (-1), or from where the state rests (0). No limiter and no mode: that is the tick's part.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_inverse(
     joint: *const FlexsplineJoint,
@@ -215,7 +216,8 @@ pub extern "C" fn flexspline_state_play(state: *const FlexsplineState, play: *mu
     status(tell())
 }
 
-/// Checks one image in full, without a store, and tells what it says of itself. The work grows with the image: for start-up, or the host.
+/// Checks one image in full, without a store, and tells what it says of itself. The work grows with the image: for
+/// start-up, or the host.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_image_report(
     image: *const u8,

@@ -1,4 +1,5 @@
-//! What goes on beside a tick: a table received in chunks, events, records for the ground, an observer and what lies ahead.
+//! What goes on beside a tick: a table received in chunks, events, records for the ground, an observer and what lies
+//! ahead.
 
 use super::names::*;
 use super::{
@@ -291,7 +292,8 @@ fn upload_status(error: UploadError) -> FlexsplineStatus {
     }
 }
 
-/// Begins to receive a table of so many bytes. The buffer is the caller's and is given with every call; it is no image in use.
+/// Begins to receive a table of so many bytes. The buffer is the caller's and is given with every call; it is no image
+/// in use.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_upload_begin(upload: *mut FlexsplineUpload, announced: usize) -> FlexsplineStatus {
     status(put(upload, UPLOAD_MARK, Progress { announced, received: 0 }))
@@ -316,7 +318,8 @@ pub extern "C" fn flexspline_upload_chunk(
         if buffer_bytes > isize::MAX as usize {
             return Err(FlexsplineStatus::Argument);
         }
-        // SAFETY: not null, apart from the other objects; the caller says that so many bytes are there, and they are its own.
+        // SAFETY: not null, apart from the other objects; the caller says that so many bytes are there, and they are
+        // its own.
         let buffer = unsafe { core::slice::from_raw_parts_mut(buffer, buffer_bytes) };
         let mut resumed = Upload::resume(buffer, progress.announced, progress.received).map_err(upload_status)?;
         resumed.chunk(offset, chunk_read).map_err(upload_status)?;
@@ -406,8 +409,8 @@ pub extern "C" fn flexspline_watch_see(
     status(see())
 }
 
-/// Writes a record of telemetry of a tick: `FLEXSPLINE_RECORD_BYTES` bytes with a CRC-32. `number` and `lost` are the caller's: of the
-/// record, and of those that it could not keep.
+/// Writes a record of telemetry of a tick: `FLEXSPLINE_RECORD_BYTES` bytes with a CRC-32. `number` and `lost` are the
+/// caller's: of the record, and of those that it could not keep.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_record(
     tick: u32,
@@ -434,7 +437,8 @@ pub extern "C" fn flexspline_record(
     status(write())
 }
 
-/// Makes a predictor of its numbers, which the host discretised; `FLEXSPLINE_STATUS_ARGUMENT` if its observer does not contract.
+/// Makes a predictor of its numbers, which the host discretised; `FLEXSPLINE_STATUS_ARGUMENT` if its observer does not
+/// contract.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_predictor_init(
     predictor: *mut FlexsplinePredictor,
@@ -448,8 +452,9 @@ pub extern "C" fn flexspline_predictor_init(
     status(make())
 }
 
-/// Makes a predictor of two inertias: discretises them over a tick and finds the gains of the observer, in double precision. For the host, or for a start-up that has
-/// the time (some 20000 products of small matrices). `FLEXSPLINE_STATUS_ARGUMENT` if a number is not finite and positive, or the observer does not contract.
+/// Makes a predictor of two inertias: discretises them over a tick and finds the gains of the observer, in double
+/// precision. For the host, or for a start-up that has the time (some 20000 products of small matrices).
+/// `FLEXSPLINE_STATUS_ARGUMENT` if a number is not finite and positive, or the observer does not contract.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_predictor_of(
     predictor: *mut FlexsplinePredictor,
@@ -492,8 +497,9 @@ pub extern "C" fn flexspline_predictor_parts(
     status(tell())
 }
 
-/// Tells what the observer can be off by while the disturbances stay within their bounds: twist rad, speeds of motor and load rad/s, torque on the load N m; for
-/// `FlexsplineNow`. For the host or start-up: 10000 ticks in double precision.
+/// Tells what the observer can be off by while the disturbances stay within their bounds: twist rad, speeds of motor
+/// and load rad/s, torque on the load N m; for `FlexsplineNow`. For the host or start-up: 10000 ticks in double
+/// precision.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_predictor_state_bound(
     predictor: *const FlexsplinePredictor,
@@ -517,8 +523,9 @@ pub extern "C" fn flexspline_observer_init(observer: *mut FlexsplineObserver) ->
     status(put(observer, OBSERVER_MARK, PredictorState::new()))
 }
 
-/// One tick of the observer. `FLEXSPLINE_STATUS_ARGUMENT` if a number that is used is not finite or beyond any drive, and the estimate stays;
-/// `FLEXSPLINE_STATUS_NOT_INITIALISED` if an upset hit more than a word of observer or predictor (one is mended): make them anew. What is told then is NaN.
+/// One tick of the observer. `FLEXSPLINE_STATUS_ARGUMENT` if a number that is used is not finite or beyond any drive,
+/// and the estimate stays; `FLEXSPLINE_STATUS_NOT_INITIALISED` if an upset hit more than a word of observer or
+/// predictor (one is mended): make them anew. What is told then is NaN.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_observer_step(
     observer: *mut FlexsplineObserver,
@@ -561,8 +568,8 @@ pub extern "C" fn flexspline_observer_report(
     status(tell())
 }
 
-/// Tells where the output will be some ticks from now, with the table as the output map of the two inertias. The work grows with the
-/// ticks; call it in a slow rate group. `FLEXSPLINE_STATUS_ARGUMENT` if a number of `now` is not finite.
+/// Tells where the output will be some ticks from now, with the table as the output map of the two inertias. The work
+/// grows with the ticks; call it in a slow rate group. `FLEXSPLINE_STATUS_ARGUMENT` if a number of `now` is not finite.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_predict(
     predictor: *const FlexsplinePredictor,

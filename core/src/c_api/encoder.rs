@@ -22,8 +22,8 @@ pub struct FlexsplineEncoderSettings {
     pub zero_counts: i64,
     /// Counts in a turn, 2 to 2^31: four times the lines of an incremental one.
     pub counts_per_turn: u32,
-    /// Bits of the register, 1 to 64: it begins anew after 2^bits counts. 0: it begins anew after each turn. A signed register is given by
-    /// its bits, those above them zero.
+    /// Bits of the register, 1 to 64: it begins anew after 2^bits counts. 0: it begins anew after each turn. A signed
+    /// register is given by its bits, those above them zero.
     pub wrap_bits: u8,
     /// 1 if it counts up where the angle falls, else 0.
     pub reversed: u8,
@@ -66,8 +66,8 @@ pub extern "C" fn flexspline_encoder_init(
     status(make())
 }
 
-/// The first reading after a reset: of all angles with this reading the one nearest to `near_counts` (2^-32 turn) is taken, which is 0 or
-/// the angle that was saved. `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that.
+/// The first reading after a reset: of all angles with this reading the one nearest to `near_counts` (2^-32 turn) is
+/// taken, which is 0 or the angle that was saved. `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_encoder_start(
     encoder: *mut FlexsplineEncoder,
@@ -86,9 +86,10 @@ pub extern "C" fn flexspline_encoder_start(
     status(start())
 }
 
-/// Takes a reading and tells the angle, counts of 2^-32 turn, to the nearest. Between two readings it may move by less than half of what the
-/// register counts. `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that (give the tick no sample then),
-/// `FLEXSPLINE_STATUS_NOT_INITIALISED` before `flexspline_encoder_start`, and after an upset of more than a word (one word is mended): make it and start it again.
+/// Takes a reading and tells the angle, counts of 2^-32 turn, to the nearest. Between two readings it may move by less
+/// than half of what the register counts. `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that (give the tick
+/// no sample then), `FLEXSPLINE_STATUS_NOT_INITIALISED` before `flexspline_encoder_start`, and after an upset of more
+/// than a word (one word is mended): make it and start it again.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_encoder_read(
     encoder: *mut FlexsplineEncoder,
@@ -128,8 +129,8 @@ pub extern "C" fn flexspline_encoder_reading(
     status(tell())
 }
 
-/// Counts of 2^-32 turn of an angle in radians, to the nearest; `FLEXSPLINE_STATUS_ARGUMENT` if it is not finite or beyond 2^31 turns. For
-/// start-up and the host: in double precision.
+/// Counts of 2^-32 turn of an angle in radians, to the nearest; `FLEXSPLINE_STATUS_ARGUMENT` if it is not finite or
+/// beyond 2^31 turns. For start-up and the host: in double precision.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_counts_from_rad(rad: f64, angle_counts: *mut i64) -> FlexsplineStatus {
     let tell = || {
@@ -145,14 +146,15 @@ pub extern "C" fn flexspline_rad_from_counts(angle_counts: i64) -> f64 {
     OutputAngle::from_counts(angle_counts).to_rad()
 }
 
-/// Radians from one angle to another, both in counts of 2^-32 turn, held within half a turn: in single precision, exact to 1.2e-7 of it.
+/// Radians from one angle to another, both in counts of 2^-32 turn, held within half a turn: in single precision, exact
+/// to 1.2e-7 of it.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_rad_between(from_counts: i64, to_counts: i64) -> f32 {
     OutputAngle::from_counts(to_counts).minus_rad(OutputAngle::from_counts(from_counts))
 }
 
-/// 1 if a slower group that runs in every `divisor`-th tick, from `offset` on, runs in tick number `tick`, else 0; 0 too where `divisor` is 0 or
-/// `offset` not below it.
+/// 1 if a slower group that runs in every `divisor`-th tick, from `offset` on, runs in tick number `tick`, else 0; 0
+/// too where `divisor` is 0 or `offset` not below it.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_is_due(tick: u32, divisor: u32, offset: u32) -> u8 {
     RateGroup::new(divisor, offset).is_some_and(|group| group.is_due(tick)) as u8

@@ -84,7 +84,8 @@ pub struct FlexsplineSlip {
 pub struct FlexsplineCoefficient {
     /// It stays within +- this: rad, or rad/(N m); above 0, 0.049 at most.
     pub limit: f32,
-    /// Standard deviation that it is expected to have at first, and never exceeds: same unit; 1e-6 to 10 times the limit.
+    /// Standard deviation that it is expected to have at first, and never exceeds: same unit; 1e-6 to 10 times the
+    /// limit.
     pub initial_std: f32,
     /// `FLEXSPLINE_TERM_...`.
     pub term: u8,
@@ -102,7 +103,8 @@ pub struct FlexsplineLearnSettings {
     pub memory_measurements: f32,
     /// Standard deviations beyond which an innovation is an outlier: 1 to 100.
     pub gate: f32,
-    /// Way at the output after a reversal that is left out beside four times the limit of the half-width, rad; 0 to 0.049.
+    /// Way at the output after a reversal that is left out beside four times the limit of the half-width, rad; 0 to
+    /// 0.049.
     pub settle_rad: f32,
     /// Torque beyond which the wind-up's share grows no more, N m.
     pub torque_limit_n_m: f32,
@@ -142,7 +144,8 @@ pub struct FlexsplineLearnerReport {
     pub untrusted: u32,
     /// Coefficients held at their limit, once for each and each measurement.
     pub limited: u32,
-    /// Starts with the first variances: measurements contradicted what was learnt for a window, or, from zero, the state was hit by an upset.
+    /// Starts with the first variances: measurements contradicted what was learnt for a window, or, from zero, the
+    /// state was hit by an upset.
     pub restarts: u32,
     /// `FLEXSPLINE_LEARNING_...`.
     pub learning: u8,
@@ -231,8 +234,8 @@ fn coefficient(c: FlexsplineCoefficient) -> Result<Coefficient, FlexsplineStatus
     Ok(Coefficient { term, limit: c.limit, initial_std: c.initial_std })
 }
 
-/// Makes a learner of 1 to `FLEXSPLINE_LEARNER_COEFFICIENTS` coefficients that has learnt nothing yet and is off; `FLEXSPLINE_STATUS_ARGUMENT` if a
-/// setting is out of its range. An update takes as long with one as with all.
+/// Makes a learner of 1 to `FLEXSPLINE_LEARNER_COEFFICIENTS` coefficients that has learnt nothing yet and is off;
+/// `FLEXSPLINE_STATUS_ARGUMENT` if a setting is out of its range. An update takes as long with one as with all.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_learner_init(
     learner: *mut FlexsplineLearner,
@@ -278,10 +281,11 @@ pub extern "C" fn flexspline_learner_set(learner: *mut FlexsplineLearner, learni
     status(set())
 }
 
-/// Says whose coefficients are learnt: of this joint with the table in use. Saved learners carry both, and are restored only where they belong.
-/// `unit` tells joints with the same settings and the same table from each other, such as the wheels of a rover; 0 if there is one. After `flexspline_learner_init`
-/// and the table, before `flexspline_learner_restore`; again after another table was activated: what was learnt for another owner is forgotten.
-/// `FLEXSPLINE_STATUS_ARGUMENT` if no table is in use.
+/// Says whose coefficients are learnt: of this joint with the table in use. Saved learners carry both, and are restored
+/// only where they belong. `unit` tells joints with the same settings and the same table from each other, such as the
+/// wheels of a rover; 0 if there is one. After `flexspline_learner_init` and the table, before
+/// `flexspline_learner_restore`; again after another table was activated: what was learnt for another owner is
+/// forgotten. `FLEXSPLINE_STATUS_ARGUMENT` if no table is in use.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_learner_bind(
     learner: *mut FlexsplineLearner,
@@ -309,7 +313,8 @@ pub extern "C" fn flexspline_learner_bind(
     status(bind())
 }
 
-/// Forgets what was learnt; counters and `FLEXSPLINE_LEARNING_...` stay. The limiter of the joint takes the adjustment out.
+/// Forgets what was learnt; counters and `FLEXSPLINE_LEARNING_...` stay. The limiter of the joint takes the adjustment
+/// out.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_learner_reset(learner: *mut FlexsplineLearner) -> FlexsplineStatus {
     let reset = || {
@@ -320,10 +325,11 @@ pub extern "C" fn flexspline_learner_reset(learner: *mut FlexsplineLearner) -> F
     status(reset())
 }
 
-/// One tick, every tick and in order, after `flexspline_tick` with what it was given and gave: learns from the output angle measured at the same
-/// moment (`has_measured` 1, `measured_counts` of 2^-32 turn) if there is one, and tells what to add in the next tick. Nothing that comes in can make
-/// that exceed the limits. `input` is that of the tick with the learner's own adjustment alone: what springs or a model of yours added beside it counts
-/// as known then, and is not learnt a second time.
+/// One tick, every tick and in order, after `flexspline_tick` with what it was given and gave: learns from the output
+/// angle measured at the same moment (`has_measured` 1, `measured_counts` of 2^-32 turn) if there is one, and tells
+/// what to add in the next tick. Nothing that comes in can make that exceed the limits. `input` is that of the tick
+/// with the learner's own adjustment alone: what springs or a model of yours added beside it counts as known then, and
+/// is not learnt a second time.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_learner_update(
     learner: *mut FlexsplineLearner,
@@ -429,8 +435,8 @@ pub extern "C" fn flexspline_learner_report(
     status(tell())
 }
 
-/// Writes what was learnt, with a CRC-32, and how many bytes that took: `FLEXSPLINE_SAVED_LEARNER_BYTES` at most. `FLEXSPLINE_STATUS_TOO_LARGE` if there is
-/// less room. The same bytes as in Rust.
+/// Writes what was learnt, with a CRC-32, and how many bytes that took: `FLEXSPLINE_SAVED_LEARNER_BYTES` at most.
+/// `FLEXSPLINE_STATUS_TOO_LARGE` if there is less room. The same bytes as in Rust.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_learner_save(
     learner: *const FlexsplineLearner,
@@ -450,9 +456,10 @@ pub extern "C" fn flexspline_learner_save(
     status(save())
 }
 
-/// Takes back what a learner of the same coefficients and the same owner (`flexspline_learner_bind`) saved, and is off. `FLEXSPLINE_STATUS_SAVED` if the bytes
-/// are damaged, fewer, of another version, or were saved with other coefficients; `FLEXSPLINE_STATUS_OTHER_TABLE`, `FLEXSPLINE_STATUS_OTHER_JOINT` if they
-/// belong elsewhere. Then the learner is as it was. It is made first, by `flexspline_learner_init`, and bound.
+/// Takes back what a learner of the same coefficients and the same owner (`flexspline_learner_bind`) saved, and is off.
+/// `FLEXSPLINE_STATUS_SAVED` if the bytes are damaged, fewer, of another version, or were saved with other
+/// coefficients; `FLEXSPLINE_STATUS_OTHER_TABLE`, `FLEXSPLINE_STATUS_OTHER_JOINT` if they belong elsewhere. Then the
+/// learner is as it was. It is made first, by `flexspline_learner_init`, and bound.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_learner_restore(
     learner: *mut FlexsplineLearner,
@@ -474,8 +481,8 @@ pub extern "C" fn flexspline_learner_restore(
     status(restore())
 }
 
-/// Makes 1 to `FLEXSPLINE_SLIP_SPRINGS` springs that slip with `variable` (`FLEXSPLINE_SLIP_OF_...`), no deflection of which is known;
-/// `FLEXSPLINE_STATUS_ARGUMENT` if a width is not allowed or a gain not finite.
+/// Makes 1 to `FLEXSPLINE_SLIP_SPRINGS` springs that slip with `variable` (`FLEXSPLINE_SLIP_OF_...`), no deflection of
+/// which is known; `FLEXSPLINE_STATUS_ARGUMENT` if a width is not allowed or a gain not finite.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_slip_init(
     slip: *mut FlexsplineSlip,
@@ -502,7 +509,8 @@ pub extern "C" fn flexspline_slip_init(
     status(make())
 }
 
-/// Sets all deflections anew: 0, not known, as after a reset; 1, none, as before the first motion or after strokes that died away.
+/// Sets all deflections anew: 0, not known, as after a reset; 1, none, as before the first motion or after strokes that
+/// died away.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_slip_set(slip: *mut FlexsplineSlip, is_relaxed: u8) -> FlexsplineStatus {
     let set = || {
@@ -532,9 +540,10 @@ fn slip_report(slip: Slip, is_known: bool) -> FlexsplineSlipReport {
     }
 }
 
-/// One tick of springs that slip with the nominal output (`flexspline_nominal_output`), counts of 2^-32 turn: what they add in the next.
-/// `FLEXSPLINE_STATUS_ARGUMENT` if they slip with the torque; `FLEXSPLINE_STATUS_NOT_INITIALISED` if an upset hit more than a word of the springs (one is mended).
-/// Deflections of which more was hit are unknown again, as after a reset.
+/// One tick of springs that slip with the nominal output (`flexspline_nominal_output`), counts of 2^-32 turn: what they
+/// add in the next. `FLEXSPLINE_STATUS_ARGUMENT` if they slip with the torque; `FLEXSPLINE_STATUS_NOT_INITIALISED` if
+/// an upset hit more than a word of the springs (one is mended). Deflections of which more was hit are unknown again,
+/// as after a reset.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_slip_update(
     slip: *mut FlexsplineSlip,
@@ -556,8 +565,8 @@ pub extern "C" fn flexspline_slip_update(
     status(update())
 }
 
-/// One tick of springs that slip with the load torque, N m: what they add in the next. A torque that is not finite moves nothing.
-/// `FLEXSPLINE_STATUS_ARGUMENT` if they slip with the output.
+/// One tick of springs that slip with the load torque, N m: what they add in the next. A torque that is not finite
+/// moves nothing. `FLEXSPLINE_STATUS_ARGUMENT` if they slip with the output.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_slip_update_torque(
     slip: *mut FlexsplineSlip,
@@ -579,8 +588,9 @@ pub extern "C" fn flexspline_slip_update_torque(
     status(update())
 }
 
-/// Writes the deflections with a CRC-32, and how many bytes that took: `FLEXSPLINE_SAVED_SLIP_BYTES` at most. `FLEXSPLINE_STATUS_TOO_LARGE` if there is less room,
-/// or before the first update. They belong to no joint and no table: those of `flexspline_slip_save_for` do. The same bytes as in Rust.
+/// Writes the deflections with a CRC-32, and how many bytes that took: `FLEXSPLINE_SAVED_SLIP_BYTES` at most.
+/// `FLEXSPLINE_STATUS_TOO_LARGE` if there is less room, or before the first update. They belong to no joint and no
+/// table: those of `flexspline_slip_save_for` do. The same bytes as in Rust.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_slip_save(
     slip: *const FlexsplineSlip,
@@ -611,8 +621,9 @@ pub(super) fn save_slip(
     give(written, took.ok_or(refused)?)
 }
 
-/// Takes back the deflections that the same springs saved; only if the joint (of springs on the torque: the load) cannot have moved meanwhile.
-/// `FLEXSPLINE_STATUS_SAVED` if the bytes are damaged, fewer, of other springs, or were saved for a joint (`flexspline_slip_restore_for`). The springs are made first, by `flexspline_slip_init`.
+/// Takes back the deflections that the same springs saved; only if the joint (of springs on the torque: the load)
+/// cannot have moved meanwhile. `FLEXSPLINE_STATUS_SAVED` if the bytes are damaged, fewer, of other springs, or were
+/// saved for a joint (`flexspline_slip_restore_for`). The springs are made first, by `flexspline_slip_init`.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_slip_restore(
     slip: *mut FlexsplineSlip,
@@ -645,7 +656,8 @@ pub(super) fn restore_slip(
     Ok(())
 }
 
-/// Adds to the adjustment of an input, counts of 2^-32 turn at the output: what a learner, springs or a friction model of your own say. Each sum is held within
+/// Adds to the adjustment of an input, counts of 2^-32 turn at the output: what a learner, springs or a friction model
+/// of your own say. Each sum is held within
 /// +-0.049 rad.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_input_add(

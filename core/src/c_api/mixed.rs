@@ -417,7 +417,8 @@ fn an_image_tells_what_it_is() {
     assert_eq!(flexspline_image_report(image.as_ptr(), image.len(), &mut report), FlexsplineStatus::Image);
 }
 
-/// Any bit of the mark of every object of a tick, and of what feeds it: the calls go on, and a call that writes makes the mark anew.
+/// Any bit of the mark of every object of a tick, and of what feeds it: the calls go on, and a call that writes makes
+/// the mark anew.
 #[test]
 fn a_bit_of_a_mark_refuses_nothing() {
     let marks = [
@@ -489,9 +490,11 @@ fn each_number_has_its_name() {
         assert_eq!((text(name(0)), text(name(3)), text(name(0x8000))), ("?", "?", "?"));
         found.join(", ")
     };
-    let flags = "sample lost, glitch, overrun, held back, not corrected, table doubt, state torn, joint torn, safe, other images, bounded";
+    let flags = "sample lost, glitch, overrun, held back, not corrected, table doubt, state torn, joint torn, safe, \
+                 other images, bounded";
     assert_eq!(bits(flexspline_flag_name), flags);
-    let implausible = "generator lost, generator still, generator sign, generator ratio, output still, output sign, output ratio, torque still, torque sign, torque ratio, lost";
+    let implausible = "generator lost, generator still, generator sign, generator ratio, output still, output sign, \
+                       output ratio, torque still, torque sign, torque ratio, lost";
     assert_eq!(bits(flexspline_implausible_name), implausible);
     let events = "mode, health, page damaged, table doubt, fallback, recovered, overrun, state torn";
     assert_eq!(bits(flexspline_event_name), events);

@@ -156,8 +156,9 @@ const SIZES: [usize; 50] = [
     size_of::<FlexsplineStartUpStep>(),
 ];
 
-/// A sum of the sizes of all types of this header, as the library has them. Where it is not `FLEXSPLINE_LAYOUT` the program was compiled
-/// with another header, or with options that change a layout (packed structures, enumerations of another size): do not go on.
+/// A sum of the sizes of all types of this header, as the library has them. Where it is not `FLEXSPLINE_LAYOUT` the
+/// program was compiled with another header, or with options that change a layout (packed structures, enumerations of
+/// another size): do not go on.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_layout() -> u32 {
     const LAYOUT: u32 = {
@@ -227,7 +228,8 @@ pub extern "C" fn flexspline_mode_name(mode: u8) -> *const c_char {
     text(&[c"off", c"tracking", c"hold", c"safe"], mode as usize)
 }
 
-/// 1 if a mode may be followed by another, else 0: everything may become off or safe; off and hold tracking; tracking hold.
+/// 1 if a mode may be followed by another, else 0: everything may become off or safe; off and hold tracking; tracking
+/// hold.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_mode_may_become(mode: u8, next: u8) -> u8 {
     let known = mode <= FLEXSPLINE_MODE_SAFE && next <= FLEXSPLINE_MODE_SAFE;

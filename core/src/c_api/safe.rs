@@ -1,4 +1,5 @@
-//! What keeps what feeds a tick safe: a test of the sensors at start-up, saved springs that belong to a joint, mending in a slow group.
+//! What keeps what feeds a tick safe: a test of the sensors at start-up, saved springs that belong to a joint, mending
+//! in a slow group.
 
 use super::learn::FlexsplineSlip;
 use super::{
@@ -45,11 +46,13 @@ pub struct FlexsplineStartUp {
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct FlexsplineStartUpSettings {
-    /// Way of the generator, there and back, rad. At the output it must be ten times `output_error_rad` at least, and half a turn at most.
+    /// Way of the generator, there and back, rad. At the output it must be ten times `output_error_rad` at least, and
+    /// half a turn at most.
     pub way_rad: f32,
     /// What the output may be off by in a way, rad: twice the error that the table states is enough.
     pub output_error_rad: f32,
-    /// Coulomb drag of the output that a torque in the mesh turns over by, N m; it may be wrong by three times. Above 0.
+    /// Coulomb drag of the output that a torque in the mesh turns over by, N m; it may be wrong by three times. Above
+    /// 0.
     pub drag_n_m: f32,
     /// Ticks for each way, 8 or more; the last half of each is for the servo to settle.
     pub ticks: u16,
@@ -91,8 +94,8 @@ const _: () = {
     assert!(size_of::<Marked<StartUp>>() <= size_of::<FlexsplineStartUp>() && align_of::<Marked<StartUp>>() <= 8);
 };
 
-/// Begins a test of the sensors that moves the generator from where it is and back, before the first tick. `FLEXSPLINE_STATUS_ARGUMENT` if a number is not finite, the
-/// way too short to tell or too long, or the ticks too few.
+/// Begins a test of the sensors that moves the generator from where it is and back, before the first tick.
+/// `FLEXSPLINE_STATUS_ARGUMENT` if a number is not finite, the way too short to tell or too long, or the ticks too few.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_start_up_init(
     start_up: *mut FlexsplineStartUp,
@@ -116,8 +119,9 @@ pub extern "C" fn flexspline_start_up_init(
     status(make())
 }
 
-/// One tick of the test: what the sensors say, with the command of the tick before; what to command now, and with the last one what was found. Where something is
-/// implausible do not let the joint correct: its numbers are not what they are taken for.
+/// One tick of the test: what the sensors say, with the command of the tick before; what to command now, and with the
+/// last one what was found. Where something is implausible do not let the joint correct: its numbers are not what they
+/// are taken for.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_start_up_step(
     start_up: *mut FlexsplineStartUp,
@@ -166,8 +170,8 @@ pub extern "C" fn flexspline_slip_save_for(
     status(save())
 }
 
-/// As `flexspline_slip_restore`, of bytes that the same springs saved for the same joint with the same table: `FLEXSPLINE_STATUS_OTHER_TABLE` or
-/// `FLEXSPLINE_STATUS_OTHER_JOINT` (or other springs) if not.
+/// As `flexspline_slip_restore`, of bytes that the same springs saved for the same joint with the same table:
+/// `FLEXSPLINE_STATUS_OTHER_TABLE` or `FLEXSPLINE_STATUS_OTHER_JOINT` (or other springs) if not.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_slip_restore_for(
     slip: *mut FlexsplineSlip,

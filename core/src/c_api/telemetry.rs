@@ -166,8 +166,9 @@ fn length(places: u16) -> usize {
     size_of::<FlexsplineRecord>().saturating_mul(places as usize)
 }
 
-/// Makes a recorder for a list of so many records (1 or more), which is the caller's and given with every call. It keeps every `divisor`-th tick, from
-/// `offset` on; `full` (`FLEXSPLINE_FULL_...`) says what is lost where there is no room.
+/// Makes a recorder for a list of so many records (1 or more), which is the caller's and given with every call. It
+/// keeps every `divisor`-th tick, from `offset` on; `full` (`FLEXSPLINE_FULL_...`) says what is lost where there is no
+/// room.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_recorder_init(
     recorder: *mut FlexsplineRecorder,
@@ -191,8 +192,8 @@ pub extern "C" fn flexspline_recorder_init(
     status(make())
 }
 
-/// One tick, after `flexspline_tick`: kept if it is due, or whether due or not (`at_once` 1: something happened). Never waits. `records` are those that the
-/// recorder was made for.
+/// One tick, after `flexspline_tick`: kept if it is due, or whether due or not (`at_once` 1: something happened). Never
+/// waits. `records` are those that the recorder was made for.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_recorder_see(
     recorder: *mut FlexsplineRecorder,
@@ -225,7 +226,8 @@ pub extern "C" fn flexspline_recorder_see(
     status(see())
 }
 
-/// Takes the oldest record out: `is_taken` is 1, or 0 if none waits, and `record` is as it was. With the interrupt of the tick held off.
+/// Takes the oldest record out: `is_taken` is 1, or 0 if none waits, and `record` is as it was. With the interrupt of
+/// the tick held off.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_recorder_take(
     recorder: *mut FlexsplineRecorder,
@@ -250,8 +252,8 @@ pub extern "C" fn flexspline_recorder_take(
     status(take())
 }
 
-/// Writes a record as `FLEXSPLINE_RECORD_BYTES` bytes with a CRC-32, for the ground: docs/telemetry.xtce.xml is their dictionary.
-/// `FLEXSPLINE_STATUS_ARGUMENT` if its quality, mode or health is none.
+/// Writes a record as `FLEXSPLINE_RECORD_BYTES` bytes with a CRC-32, for the ground: docs/telemetry.xtce.xml is their
+/// dictionary. `FLEXSPLINE_STATUS_ARGUMENT` if its quality, mode or health is none.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_record_encode(
     record: *const FlexsplineRecord,
@@ -265,8 +267,8 @@ pub extern "C" fn flexspline_record_encode(
     status(encode())
 }
 
-/// Reads such bytes (`FLEXSPLINE_RECORD_BYTES`), on the ground: `FLEXSPLINE_STATUS_SAVED` if they are damaged or no record,
-/// `FLEXSPLINE_STATUS_ARGUMENT` if they are one of another version.
+/// Reads such bytes (`FLEXSPLINE_RECORD_BYTES`), on the ground: `FLEXSPLINE_STATUS_SAVED` if they are damaged or no
+/// record, `FLEXSPLINE_STATUS_ARGUMENT` if they are one of another version.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_record_decode(first: *const u8, record: *mut FlexsplineRecord) -> FlexsplineStatus {
     let decode = || {

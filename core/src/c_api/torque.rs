@@ -12,10 +12,12 @@ pub const FLEXSPLINE_TORQUE_PATH_WORDS: usize = 8;
 /// Eight-byte words of a [`FlexsplineAged`].
 pub const FLEXSPLINE_AGED_WORDS: usize = 4;
 
-/// The torque is that on the load: what gravity, wind and the like do to it. Inertia times the acceleration of the target comes off what the tick gives,
-/// unless that inertia torque is the larger: while a target speeds up from a light load the flank does not change.
+/// The torque is that on the load: what gravity, wind and the like do to it. Inertia times the acceleration of the
+/// target comes off what the tick gives, unless that inertia torque is the larger: while a target speeds up from a
+/// light load the flank does not change.
 pub const FLEXSPLINE_TORQUE_ON_LOAD: u8 = 0;
-/// The torque is that in the mesh: of a sensor between drive and load, of the twist, or of the motor's current less its friction.
+/// The torque is that in the mesh: of a sensor between drive and load, of the twist, or of the motor's current less its
+/// friction.
 pub const FLEXSPLINE_TORQUE_IN_MESH: u8 = 1;
 
 /// From a reading of torque to the one that a tick is given.
@@ -44,8 +46,8 @@ pub struct FlexsplineTorqueSettings {
     pub drag_n_m: f32,
     /// Coulomb drag that the table was made with, N m; 0 or more.
     pub table_drag_n_m: f32,
-    /// A torque in the mesh below this changes the flank only where the direction changes, N m: some three times the peak of the noise behind the
-    /// low-pass, and for a torque read in the mesh a fifth of the drag. 0 or more.
+    /// A torque in the mesh below this changes the flank only where the direction changes, N m: some three times the
+    /// peak of the noise behind the low-pass, and for a torque read in the mesh a fifth of the drag. 0 or more.
     pub hold_n_m: f32,
 }
 
@@ -71,8 +73,9 @@ fn direction_of(sign: i8) -> Result<Direction, FlexsplineStatus> {
 /// Largest reading that is believed where none is told, N m.
 const ANY_N_M: f32 = 1e9;
 
-/// Makes a path that has seen nothing yet; `FLEXSPLINE_STATUS_ARGUMENT` if a time or bandwidth is not finite and positive, or a drag or hold not
-/// finite or below 0. A torque in the mesh may change the flank in any tick, and any reading is believed: `flexspline_torque_init_sensor` says more.
+/// Makes a path that has seen nothing yet; `FLEXSPLINE_STATUS_ARGUMENT` if a time or bandwidth is not finite and
+/// positive, or a drag or hold not finite or below 0. A torque in the mesh may change the flank in any tick, and any
+/// reading is believed: `flexspline_torque_init_sensor` says more.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_torque_init(
     path: *mut FlexsplineTorquePath,
@@ -81,9 +84,10 @@ pub extern "C" fn flexspline_torque_init(
     flexspline_torque_init_sensor(path, settings, 0.0, ANY_N_M)
 }
 
-/// As `flexspline_torque_init`, with what is known of sensor and servo. After a torque read in the mesh has changed the flank it does not change it
-/// again for `settle_s`, s (some periods of the servo's position loop, 0 or more): the correction crosses the play then, and what its own motion makes of the
-/// torque has to die away. A reading beyond `largest_n_m`, N m (above 0), is forgotten as one that is not finite.
+/// As `flexspline_torque_init`, with what is known of sensor and servo. After a torque read in the mesh has changed the
+/// flank it does not change it again for `settle_s`, s (some periods of the servo's position loop, 0 or more): the
+/// correction crosses the play then, and what its own motion makes of the torque has to die away. A reading beyond
+/// `largest_n_m`, N m (above 0), is forgotten as one that is not finite.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_torque_init_sensor(
     path: *mut FlexsplineTorquePath,
@@ -107,9 +111,11 @@ pub extern "C" fn flexspline_torque_init_sensor(
     status(make())
 }
 
-/// One tick: a reading, N m, positive where it turns the output forward, where it was measured (`FLEXSPLINE_TORQUE_...`), and the direction in which
-/// the output moves or moved last, +1 or -1; what to give to `FlexsplineInput`. A reading that is not finite, larger than the sensor's largest, frozen, or too far
-/// from the last one gives NaN and is forgotten. `FLEXSPLINE_STATUS_NOT_INITIALISED` where an upset hit more than a word of it (one is mended): make the path anew.
+/// One tick: a reading, N m, positive where it turns the output forward, where it was measured
+/// (`FLEXSPLINE_TORQUE_...`), and the direction in which the output moves or moved last, +1 or -1; what to give to
+/// `FlexsplineInput`. A reading that is not finite, larger than the sensor's largest, frozen, or too far from the last
+/// one gives NaN and is forgotten. `FLEXSPLINE_STATUS_NOT_INITIALISED` where an upset hit more than a word of it (one
+/// is mended): make the path anew.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_torque_tick(
     path: *mut FlexsplineTorquePath,
@@ -138,10 +144,11 @@ pub extern "C" fn flexspline_torque_tick(
     status(tick())
 }
 
-/// Other limits of what a sensor can read, after `flexspline_torque_init_sensor`: the largest change from one tick to the next, N m (a quarter of the largest
-/// reading and twice the drag without this call; a reading that changes by more is believed once three in a row are near each other), and the number of ticks
-/// after which a reading that stays the same to the last bit is frozen (0 for never, as without this call: what comes from a model may stand still, a sensor has
-/// noise). `FLEXSPLINE_STATUS_ARGUMENT` if the change is not finite or below 1e-6 N m.
+/// Other limits of what a sensor can read, after `flexspline_torque_init_sensor`: the largest change from one tick to
+/// the next, N m (a quarter of the largest reading and twice the drag without this call; a reading that changes by more
+/// is believed once three in a row are near each other), and the number of ticks after which a reading that stays the
+/// same to the last bit is frozen (0 for never, as without this call: what comes from a model may stand still, a sensor
+/// has noise). `FLEXSPLINE_STATUS_ARGUMENT` if the change is not finite or below 1e-6 N m.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_torque_set_sensor(
     path: *mut FlexsplineTorquePath,
@@ -165,8 +172,9 @@ pub extern "C" fn flexspline_aged_init(aged: *mut FlexsplineAged, most_ticks: u1
     status(put(aged, AGED_MARK, Aged::new(most_ticks)))
 }
 
-/// One tick: what was measured in it, if anything (`has_measured` 1, else 0); the value to use, or NaN where it is too old, or was hit by an
-/// upset. A tick takes NaN as torque: it keeps its correction for `patience` ticks, then fades it out.
+/// One tick: what was measured in it, if anything (`has_measured` 1, else 0); the value to use, or NaN where it is too
+/// old, or was hit by an upset. A tick takes NaN as torque: it keeps its correction for `patience` ticks, then fades it
+/// out.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_aged_tick(
     aged: *mut FlexsplineAged,
@@ -194,9 +202,10 @@ pub extern "C" fn flexspline_aged_is_stale(aged: *const FlexsplineAged, is_stale
     status(tell())
 }
 
-/// Rate at which the generator has to turn so that the output moves at `rate_rad_s`, rad/s: the nominal one and what the error adds, along the way
-/// of the target over `ahead_s` (some ticks, above 0). For the speed loop of a servo; it cannot feed a torque back. NaN where the table gives nothing. Two
-/// inverse solutions: for a tick that has the time, or every few ticks.
+/// Rate at which the generator has to turn so that the output moves at `rate_rad_s`, rad/s: the nominal one and what
+/// the error adds, along the way of the target over `ahead_s` (some ticks, above 0). For the speed loop of a servo; it
+/// cannot feed a torque back. NaN where the table gives nothing. Two inverse solutions: for a tick that has the time,
+/// or every few ticks.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_rate_ahead(
     joint: *const FlexsplineJoint,
@@ -230,9 +239,10 @@ pub struct FlexsplineMotionAhead {
     pub acceleration_rad_s2: f32,
 }
 
-/// As `flexspline_rate_ahead`, with the acceleration that goes with it: what the error's curvature adds along the way of the target, and what a target
-/// asks for that itself accelerates by `acceleration_rad_s2`. Inertia of motor and generator times it goes to the motor's current; the load's inertia times
-/// `acceleration_rad_s2` over the ratio comes on top. Both are NaN where the table gives nothing. Three inverse solutions.
+/// As `flexspline_rate_ahead`, with the acceleration that goes with it: what the error's curvature adds along the way
+/// of the target, and what a target asks for that itself accelerates by `acceleration_rad_s2`. Inertia of motor and
+/// generator times it goes to the motor's current; the load's inertia times `acceleration_rad_s2` over the ratio comes
+/// on top. Both are NaN where the table gives nothing. Three inverse solutions.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_motion_ahead(
     joint: *const FlexsplineJoint,

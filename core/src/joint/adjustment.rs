@@ -5,8 +5,8 @@ use crate::play::MAX_ADDED_COUNTS;
 
 /// What is added to the table in one tick: what a friction model, or what was learnt on board, knows beyond it.
 ///
-/// Counts of 2⁻³² output turn. Each is taken within ±[`Adjustment::MAX_RAD`]. The half-width never falls below zero anywhere on the
-/// tooth pitch: a reduction is taken only that far. The error that a table may give
+/// Counts of 2⁻³² output turn. Each is taken within ±[`Adjustment::MAX_RAD`]. The half-width never falls below zero
+/// anywhere on the tooth pitch: a reduction is taken only that far. The error that a table may give
 /// ([`Table::error_limit_rad`](crate::Table::error_limit_rad)) is that much larger.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Adjustment {

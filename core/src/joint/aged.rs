@@ -2,9 +2,11 @@
 
 /// A measurement with its age, kept twice.
 ///
-/// Call [`Self::tick`] once in every tick and give what it says to [`Input::torque_n_m`](crate::Input::torque_n_m): a torque that is too old then is none, the
-/// joint keeps its correction for `patience` ticks, fades it out, and says so by [`Flags::NOT_CORRECTED`](crate::Flags::NOT_CORRECTED). For a temperature once for every
-/// [`Store::set_temperature`](crate::Store::set_temperature), which takes no NaN; [`Self::is_stale`] then asks for the sensor.
+/// Call [`Self::tick`] once in every tick and give what it says to [`Input::torque_n_m`](crate::Input::torque_n_m): a
+/// torque that is too old then is none, the joint keeps its correction for `patience` ticks, fades it out, and says so
+/// by [`Flags::NOT_CORRECTED`](crate::Flags::NOT_CORRECTED). For a temperature once for every
+/// [`Store::set_temperature`](crate::Store::set_temperature), which takes no NaN; [`Self::is_stale`] then asks for the
+/// sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Aged {
     /// Bits of the value, its age and the largest age, ticks; again, each bit turned.
@@ -34,7 +36,8 @@ impl Aged {
         self.words.into_iter().zip(self.again).any(|(one, other)| one != !other)
     }
 
-    /// A tick: what was measured in it, if anything; the value to use, or NaN if it is too old, or was hit by an upset since.
+    /// A tick: what was measured in it, if anything; the value to use, or NaN if it is too old, or was hit by an upset
+    /// since.
     ///
     /// Where the largest age was hit nothing is used until it is made anew.
     #[must_use]

@@ -19,15 +19,17 @@ pub struct MotionAhead {
 }
 
 impl Joint {
-    /// As [`Self::rate_ahead`], and the acceleration that goes with it, where the target itself moves at `rate_rad_s` and with
-    /// `acceleration_rad_s2`:
+    /// As [`Self::rate_ahead`], and the acceleration that goes with it, where the target itself moves at `rate_rad_s`
+    /// and with `acceleration_rad_s2`:
     /// ```text
     /// dψ/dt = ψ'·v,   d²ψ/dt² = ψ''·v² + ψ'·a
     /// ```
-    /// with the generator angle `ψ(δ)` that the table wants for an output angle `δ` under this torque. Three inverse solutions.
+    /// with the generator angle `ψ(δ)` that the table wants for an output angle `δ` under this torque. Three inverse
+    /// solutions.
     ///
-    /// Inertia of motor and generator times this acceleration is the torque to feed forward to the motor's current. What the load's inertia takes is its
-    /// own times `acceleration_rad_s2` over the ratio: the output moves as the target does. Both are NaN where the table gives nothing, or a number is not finite.
+    /// Inertia of motor and generator times this acceleration is the torque to feed forward to the motor's current.
+    /// What the load's inertia takes is its own times `acceleration_rad_s2` over the ratio: the output moves as the
+    /// target does. Both are NaN where the table gives nothing, or a number is not finite.
     #[must_use]
     pub fn motion_ahead(
         &self,
@@ -58,8 +60,8 @@ impl Joint {
         if ahead.rate_rad_s.is_finite() && ahead.acceleration_rad_s2.is_finite() { ahead } else { nothing }
     }
 
-    /// Half of the way over which slopes are taken, rad: that of the target in half of `ahead_s`, but no less than counts of both angles resolve, and
-    /// no more than a quarter of the generator's turn.
+    /// Half of the way over which slopes are taken, rad: that of the target in half of `ahead_s`, but no less than
+    /// counts of both angles resolve, and no more than a quarter of the generator's turn.
     fn way_rad(&self, rate_rad_s: f32, ahead_s: f32) -> f32 {
         let ratio = self.drive().ratio();
         let most = core::f32::consts::FRAC_PI_2 / if ratio < 0.0 { -ratio } else { ratio };
@@ -75,12 +77,13 @@ impl Joint {
         counts_from_rad(way) as f32 * RAD_PER_COUNT
     }
 
-    /// Rate at which the generator has to turn so that the output moves at `rate_rad_s`, rad/s: the nominal rate and what the error adds to it, by
-    /// the table's slope along the way of the target (over `ahead_s`, some ticks).
+    /// Rate at which the generator has to turn so that the output moves at `rate_rad_s`, rad/s: the nominal rate and
+    /// what the error adds to it, by the table's slope along the way of the target (over `ahead_s`, some ticks).
     ///
-    /// Torque and flank are the same at both ends. So nothing that a torque does comes through here, and what is fed forward cannot feed
-    /// back: the differences of the command itself do, and make a loop that compensates a torque in the mesh ring. NaN where the table
-    /// gives nothing. Two inverse solutions: for a tick that has the time, or every few ticks.
+    /// Torque and flank are the same at both ends. So nothing that a torque does comes through here, and what is fed
+    /// forward cannot feed back: the differences of the command itself do, and make a loop that compensates a torque in
+    /// the mesh ring. NaN where the table gives nothing. Two inverse solutions: for a tick that has the time, or every
+    /// few ticks.
     #[must_use]
     pub fn rate_ahead(
         &self,
@@ -164,7 +167,8 @@ mod tests {
         }
     }
 
-    /// Against differences of the inverse over longer ways, in double precision; and a target that accelerates from rest wants the ratio.
+    /// Against differences of the inverse over longer ways, in double precision; and a target that accelerates from
+    /// rest wants the ratio.
     #[test]
     fn the_acceleration_is_that_of_the_exact_inverse() {
         let (one, two) = (fixture::image(true), fixture::image(true));
@@ -190,8 +194,9 @@ mod tests {
                 let exact = (goes - came) as f64 * core::f64::consts::TAU / 4_294_967_296.0 / (h * h);
                 let found = ask(&store, target, [rate, acceleration]);
                 assert_eq!(found.rate_rad_s, joint.rate_ahead(&store, target, rate, 5.0, 4e-3));
-                // Places are counts: half of one at the output is 0.02 rad/s² of the generator over 2 ms. The way of one that accelerates is not even:
-                // where the slope (91 to 97 here) bends within 2 ms, part of its change comes in, times the target's acceleration.
+                // Places are counts: half of one at the output is 0.02 rad/s² of the generator over 2 ms. The way of
+                // one that accelerates is not even: where the slope (91 to 97 here) bends within 2 ms, part of its
+                // change comes in, times the target's acceleration.
                 let off = (f64::from(found.acceleration_rad_s2) - exact).abs();
                 assert!(
                     off < 0.1 + 2.5 * f64::from(acceleration.abs()),

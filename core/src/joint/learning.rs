@@ -1,6 +1,7 @@
-//! Learning with its settings and its state each under a sum ([`whole`](../../whole.rs)): where an upset hit one word of them it is mended in the next update. Settings that
-//! are lost add nothing ([`Verdict::Untrusted`]); what was learnt and is lost begins anew from zero, off, and is counted
-//! ([`AdaptCounters::restarts`]). What it adds is bounded by the limits of the coefficients, whatever the state.
+//! Learning with its settings and its state each under a sum ([`whole`](../../whole.rs)): where an upset hit one word
+//! of them it is mended in the next update. Settings that are lost add nothing ([`Verdict::Untrusted`]); what was
+//! learnt and is lost begins anew from zero, off, and is counted ([`AdaptCounters::restarts`]). What it adds is bounded
+//! by the limits of the coefficients, whatever the state.
 
 use super::adapt::{
     self, AdaptCounters, AdaptError, AdaptRestoreError, AdaptSettings, Adapted, Learning, Seen, Verdict,
@@ -31,14 +32,14 @@ impl<const N: usize> Adapter<N> {
         Self::of_first(settings, N)
     }
 
-    /// An adapter of the first so many coefficients: those after them (`NO_COEFFICIENT`) change no bit of what these come to, and are
-    /// in no sum and no saved state.
+    /// An adapter of the first so many coefficients: those after them (`NO_COEFFICIENT`) change no bit of what these
+    /// come to, and are in no sum and no saved state.
     pub(crate) fn of_first(settings: &AdaptSettings<N>, used: usize) -> Result<Self, AdaptError> {
         adapt::Adapter::of_first(settings, used).map(|adapter| Self { adapter: Sealed::new(adapter) })
     }
 
-    /// Makes the settings whole, where they lie in memory and an upset hit a word of them; false if they are lost, and the adapter has to be made anew.
-    /// For a slow rate group: until then each update mends a copy.
+    /// Makes the settings whole, where they lie in memory and an upset hit a word of them; false if they are lost, and
+    /// the adapter has to be made anew. For a slow rate group: until then each update mends a copy.
     pub fn mend(&mut self) -> bool {
         self.adapter.mend()
     }
@@ -63,9 +64,10 @@ impl<const N: usize> Adapter<N> {
 
     /// One tick: follows the play, learns from the measurement if there is one, and tells what to add in the next tick.
     ///
-    /// Call it every tick, in order, also without a measurement. Nothing that comes in can make the adjustment exceed the limits
-    /// or be undefined. No search, no loop that depends on data: on a Cortex-M4F a tick with a measurement that is used takes 2303
-    /// instructions for five coefficients, whatever the values, and one without at most 921 (counted by `tests/firmware`).
+    /// Call it every tick, in order, also without a measurement. Nothing that comes in can make the adjustment exceed
+    /// the limits or be undefined. No search, no loop that depends on data: on a Cortex-M4F a tick with a measurement
+    /// that is used takes 2303 instructions for five coefficients, whatever the values, and one without at most 921
+    /// (counted by `tests/firmware`).
     pub fn update(&self, state: &mut AdaptState<N>, seen: &Seen<'_>) -> Adapted {
         let nothing = Adapted { adjustment: Adjustment::default(), uncertainty_rad: 0.0, verdict: Verdict::Untrusted };
         self.on(state, |adapter, learnt| adapter.update(learnt, seen)).unwrap_or(nothing)
@@ -88,16 +90,19 @@ impl<const N: usize> Adapter<N> {
             .flatten()
     }
 
-    /// The coefficients in the order of the settings, and their standard deviations: rad, or rad/(N·m). NaN if settings or state are lost.
+    /// The coefficients in the order of the settings, and their standard deviations: rad, or rad/(N·m). NaN if settings
+    /// or state are lost.
     #[must_use]
     pub fn coefficients(&self, state: &AdaptState<N>) -> [(f32, f32); N] {
         let look = |adapter: &adapt::Adapter<N>| state.learnt.with(|learnt| adapter.coefficients(learnt));
         self.adapter.with(look).flatten().unwrap_or([(f32::NAN, f32::NAN); N])
     }
 
-    /// Says whose coefficients are learnt: of this joint, with the table that is in use now. Saved states carry both, and are restored only where they belong.
+    /// Says whose coefficients are learnt: of this joint, with the table that is in use now. Saved states carry both,
+    /// and are restored only where they belong.
     ///
-    /// `unit` tells joints with the same settings and the same table from each other, such as the wheels of a rover; 0 if there is one.
+    /// `unit` tells joints with the same settings and the same table from each other, such as the wheels of a rover; 0
+    /// if there is one.
     #[must_use]
     pub fn owned_by(self, joint: &Joint, store: &Store, unit: u32) -> Self {
         let owned = self.adapter.open().map(|adapter| adapter.owned_by(joint, store, unit));
@@ -110,8 +115,9 @@ impl<const N: usize> Adapter<N> {
         self.adapter.kept().has_other_owner(other.adapter.kept())
     }
 
-    /// Writes what was learnt, with a CRC-32, for storage across a reset: the first [`saved_adapt_bytes`](crate::saved_adapt_bytes)`(N)` bytes.
-    /// `None` if there are fewer, or settings or state are lost.
+    /// Writes what was learnt, with a CRC-32, for storage across a reset: the first
+    /// [`saved_adapt_bytes`](crate::saved_adapt_bytes)`(N)` bytes. `None` if there are fewer, or settings or state are
+    /// lost.
     ///
     /// | bytes | what, little endian |
     /// |---|---|
@@ -141,8 +147,8 @@ impl<const N: usize> Adapter<N> {
 
     /// A state from [`Self::save`], in [`Learning::Off`], of the same coefficients and the same owner.
     ///
-    /// Nobody knows what happened meanwhile. Until measurements agree, the stated variance has half of the prior one, and half of
-    /// the evidence that is needed otherwise starts it anew.
+    /// Nobody knows what happened meanwhile. Until measurements agree, the stated variance has half of the prior one,
+    /// and half of the evidence that is needed otherwise starts it anew.
     ///
     /// # Errors
     /// [`AdaptRestoreError`] says why the bytes are no state of this adapter; one that is lost has other coefficients.

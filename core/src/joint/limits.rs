@@ -15,7 +15,8 @@ impl fmt::Display for SettingError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{} = {}: must be finite and above zero (hold_rad: or zero), and neither beyond what one tick can do nor too small to matter in it",
+            "{} = {}: must be finite and above zero (hold_rad: or zero), and neither beyond what one tick can do nor \
+             too small to matter in it",
             self.name, self.found
         )
     }
@@ -36,10 +37,12 @@ pub struct Limits {
     pub generator_rate_rad_s: f32,
     /// Ticks for which a glitch is not believed, and for which the last correction is kept where none can be made.
     pub patience: u16,
-    /// A target that is no further from the output than this is reached on the flank that bears already, rad; 0 for none.
+    /// A target that is no further from the output than this is reached on the flank that bears already, rad; 0 for
+    /// none.
     ///
-    /// Else noise of the encoder, or of a target that stands, changes the flank to and fro, which crosses the whole play each time.
-    /// It costs up to this much where a motion turns back by less. Some three times the peak of the noise at the output is enough.
+    /// Else noise of the encoder, or of a target that stands, changes the flank to and fro, which crosses the whole
+    /// play each time. It costs up to this much where a motion turns back by less. Some three times the peak of the
+    /// noise at the output is enough.
     pub hold_rad: f32,
 }
 

@@ -53,8 +53,8 @@ impl Mode {
         }
     }
 
-    /// Whether `self` may be followed by `to`: everything may stop, tracking starts from off or hold, hold only from tracking,
-    /// and safe is left to off alone.
+    /// Whether `self` may be followed by `to`: everything may stop, tracking starts from off or hold, hold only from
+    /// tracking, and safe is left to off alone.
     #[must_use]
     pub const fn may_become(self, to: Self) -> bool {
         matches!(

@@ -7,24 +7,27 @@
 //! τ̇  = 0
 //! ```
 //!
-//! All at the output; angles do not occur, so nothing drifts and nothing wraps. [`Predictor::new`] discretises that exactly
-//! over one tick, finds the gains of a stationary Kalman observer, both in double precision, and proves that the observer
-//! contracts; it is meant for the host or for start-up, and [`Predictor::check`] proves it again for one that was made elsewhere.
-//! [`Predictor::step`] is for every tick, with the motor's speed alone or with the twist measured too (output angle less nominal
-//! less the error of the table).
+//! All at the output; angles do not occur, so nothing drifts and nothing wraps. [`Predictor::new`] discretises that
+//! exactly over one tick, finds the gains of a stationary Kalman observer, both in double precision, and proves that
+//! the observer contracts; it is meant for the host or for start-up, and [`Predictor::check`] proves it again for one
+//! that was made elsewhere.
+//! [`Predictor::step`] is for every tick, with the motor's speed alone or with the twist measured too (output angle
+//! less nominal less the error of the table).
 //!
 //! # Ahead
-//! [`Predictor::ahead`] goes on without measurements, and bounds what it says: each disturbance ([`Disturbance`]) and each part of
-//! the state by its own response at the output, summed by magnitude. For this model and disturbances that stay within their bounds
-//! no smaller bound holds. [`Predictor::state_bound`] is the same sum for the observer: what its estimate can be off by.
+//! [`Predictor::ahead`] goes on without measurements, and bounds what it says: each disturbance ([`Disturbance`]) and
+//! each part of the state by its own response at the output, summed by magnitude. For this model and disturbances that
+//! stay within their bounds no smaller bound holds. [`Predictor::state_bound`] is the same sum for the observer: what
+//! its estimate can be off by.
 //!
-//! [`Predictor::output_ahead`] takes the table as the output map of this model: the output is expected at the nominal output of
-//! the generator then, plus the error of the table at the torque that the spring carries then (stiffness times twist, which at rest is
-//! the load). So the play is followed, ripple and curves are those of the angle then, and the wind-up is the table's, not that of a straight
-//! spring. With an encoder at the output what it measures now takes the place of the table's error now, and only its change comes from the table.
+//! [`Predictor::output_ahead`] takes the table as the output map of this model: the output is expected at the nominal
+//! output of the generator then, plus the error of the table at the torque that the spring carries then (stiffness
+//! times twist, which at rest is the load). So the play is followed, ripple and curves are those of the angle then, and
+//! the wind-up is the table's, not that of a straight spring. With an encoder at the output what it measures now takes
+//! the place of the table's error now, and only its change comes from the table.
 //!
-//! Model and estimate are each kept under a sum ([`whole`](../../whole.rs)): where an upset hit one word it is mended in the next step. An estimate or a
-//! model that is lost says NaN, and a bound without end.
+//! Model and estimate are each kept under a sum ([`whole`](../../whole.rs)): where an upset hit one word it is mended
+//! in the next step. An estimate or a model that is lost says NaN, and a bound without end.
 //!
 //! Not in here: friction other than the table's.
 
@@ -309,7 +312,8 @@ impl Predictor {
         for _ in 0..RICCATI_TICKS {
             p = a * p * a.transpose() + q;
             let s = c * p * c.transpose() + r;
-            // Without an encoder at the output its row is left out: its gain is zero, and the other's that of itself alone.
+            // Without an encoder at the output its row is left out: its gain is zero, and the other's that of itself
+            // alone.
             let inverse =
                 if used > 0.0 { s.try_inverse().unwrap_or_default() } else { Matrix2::new(1.0 / s.m11, 0.0, 0.0, 0.0) };
             gain = p * c.transpose() * inverse;
@@ -328,8 +332,8 @@ impl Predictor {
         model.checked()
     }
 
-    /// Makes the model whole, where it lies in memory and an upset hit a word of it; false if it is lost, and the predictor has to be made anew. For a
-    /// slow rate group: until then each step mends a copy.
+    /// Makes the model whole, where it lies in memory and an upset hit a word of it; false if it is lost, and the
+    /// predictor has to be made anew. For a slow rate group: until then each step mends a copy.
     pub fn mend(&mut self) -> bool {
         self.model.mend()
     }
@@ -340,8 +344,8 @@ impl Predictor {
         self.model.open().is_none()
     }
 
-    /// All numbers of a predictor, for the image of the firmware: the matrices by columns, what the load turns in a tick, the
-    /// stiffness. NaN where the model is lost.
+    /// All numbers of a predictor, for the image of the firmware: the matrices by columns, what the load turns in a
+    /// tick, the stiffness. NaN where the model is lost.
     #[must_use]
     pub fn parts(&self) -> [f32; PREDICTOR_PARTS] {
         let mut parts = [f32::NAN; PREDICTOR_PARTS];
@@ -381,7 +385,8 @@ impl Predictor {
         model.checked()
     }
 
-    /// Proves that the observer contracts: the error of an estimate is less than before after 1024 ticks, whatever it is.
+    /// Proves that the observer contracts: the error of an estimate is less than before after 1024 ticks, whatever it
+    /// is.
     ///
     /// # Errors
     /// [`PredictorError::Observer`].
@@ -391,15 +396,16 @@ impl Predictor {
 
     /// One tick: what the last estimate leads to, corrected by what was measured. The same work for all values.
     ///
-    /// False, and the estimate stays, if a number that is used is not finite or beyond any drive (`MOST`), or the estimate would come to be; and if model or
-    /// estimate are lost: make them anew.
+    /// False, and the estimate stays, if a number that is used is not finite or beyond any drive (`MOST`), or the
+    /// estimate would come to be; and if model or estimate are lost: make them anew.
     #[inline]
     pub fn step(&self, state: &mut PredictorState, measured: &Measured) -> bool {
         self.model.with(|model| model.step(state, measured)).unwrap_or(false)
     }
 
-    /// What the estimate can be off by when the disturbances stay within these bounds, once the start is forgotten: φ rad,
-    /// ω_m, ω_l rad/s, τ N·m. For start-up and the host: 10 000 ticks of the observer in double precision. Infinite where the model is lost.
+    /// What the estimate can be off by when the disturbances stay within these bounds, once the start is forgotten: φ
+    /// rad, ω_m, ω_l rad/s, τ N·m. For start-up and the host: 10 000 ticks of the observer in double precision.
+    /// Infinite where the model is lost.
     #[must_use]
     pub fn state_bound(&self, disturbance: &Disturbance) -> [f32; 4] {
         let Some(model) = self.model.open() else { return [f32::INFINITY; 4] };
@@ -426,10 +432,11 @@ impl Predictor {
     }
 
     /// What motor and load do in `ticks` more ticks with this motor torque, if the state differs from the truth by
-    /// ± `state_bound` at most (φ rad, ω_m, ω_l rad/s, τ N·m) and torque and load from what is assumed (the load: that it stays) by
-    /// `disturbance` (what is measured does not matter here).
+    /// ± `state_bound` at most (φ rad, ω_m, ω_l rad/s, τ N·m) and torque and load from what is assumed (the load: that
+    /// it stays) by `disturbance` (what is measured does not matter here).
     ///
-    /// Where model or estimate are lost, or a number given is not finite, the bounds are infinite. The work grows with `ticks` and with nothing else. The rounding of `f32` is in the bounds, with 1.2e-7 of the angle turned for each
+    /// Where model or estimate are lost, or a number given is not finite, the bounds are infinite. The work grows with
+    /// `ticks` and with nothing else. The rounding of `f32` is in the bounds, with 1.2e-7 of the angle turned for each
     /// tick. The torque is held during a tick.
     #[must_use]
     pub fn ahead(
@@ -484,10 +491,11 @@ impl Predictor {
 
     /// Where the output will be after what [`Self::ahead`] says, with the table as the output map.
     ///
-    /// `now.play` is that of the joint and stays as it is. The play is taken through the farthest angles of the motor on the way:
-    /// exact for up to two reversals until then. The bound is that of the table at the ends of what motor and twist can be then
-    /// (the error grows with the torque, and the output with the generator), the uncertainty of play and jumps, and what is measured.
-    /// Where the twist is known to a jump of the table or less exactly, that is the height of the jump. Costs twelve calls of [`Joint::forward`], in every case.
+    /// `now.play` is that of the joint and stays as it is. The play is taken through the farthest angles of the motor
+    /// on the way: exact for up to two reversals until then. The bound is that of the table at the ends of what motor
+    /// and twist can be then (the error grows with the torque, and the output with the generator), the uncertainty of
+    /// play and jumps, and what is measured. Where the twist is known to a jump of the table or less exactly, that is
+    /// the height of the jump. Costs twelve calls of [`Joint::forward`], in every case.
     #[must_use]
     pub fn output_ahead(
         &self,
@@ -551,8 +559,8 @@ fn allowed(found: f64) -> bool {
     (1e-12..=1e12).contains(&found)
 }
 
-/// No twist, rad, speed of motor and load, rad/s, or torque, N·m, of a joint is larger: a whole radian, a thousand turns a second, ten times the rating of
-/// the largest drives. Guesses; they only keep what is no measurement out.
+/// No twist, rad, speed of motor and load, rad/s, or torque, N·m, of a joint is larger: a whole radian, a thousand
+/// turns a second, ten times the rating of the largest drives. Guesses; they only keep what is no measurement out.
 const MOST: [f32; 4] = [1.0, 6.3e3, 6.3e3, 1e6];
 
 /// Whether all four are numbers, and not larger than any drive's.
@@ -673,7 +681,8 @@ mod tests {
     const NOISE: Noise = Noise { torque_n_m: 0.5, load_change_n_m: 0.2, speed_rad_s: 1e-4, twist_rad: Some(1e-6) };
     const TICK_S: f64 = 1e-3;
 
-    /// The equations of the predictor in arithmetic of the test's own: Runge-Kutta of fourth order in a hundredth of a tick.
+    /// The equations of the predictor in arithmetic of the test's own: Runge-Kutta of fourth order in a hundredth of a
+    /// tick.
     #[derive(Clone, Copy)]
     struct Plant {
         x: [f64; 3],
@@ -765,7 +774,8 @@ mod tests {
         }
     }
 
-    /// A bounded disturbance drives the estimate no farther than its bound, and nearly as far where it is the worst one.
+    /// A bounded disturbance drives the estimate no farther than its bound, and nearly as far where it is the worst
+    /// one.
     #[test]
     fn the_observer_keeps_its_bound_and_can_come_near_it() {
         let off = Disturbance { torque_n_m: 0.5, load_change_n_m: 0.01, speed_rad_s: 1e-4, twist_rad: 1e-6 };
@@ -843,8 +853,8 @@ mod tests {
         }
     }
 
-    /// Twelve hundred drawn runs, half with the motor's encoder alone, half with one at the output: the output is where it was said to be, within
-    /// the bound, and the bound is not empty.
+    /// Twelve hundred drawn runs, half with the motor's encoder alone, half with one at the output: the output is where
+    /// it was said to be, within the bound, and the bound is not empty.
     #[test]
     fn the_output_is_where_it_was_predicted() {
         let image = fixture::image(true);

@@ -1,9 +1,10 @@
 //! The fixed-step runtime of one joint: one call for each tick, with the same work in each.
 //!
-//! In this order: the measured generator angle is judged; torque and temperature are located in the table; the play follows the
-//! generator (forward); the target is turned into a correction (inverse); mode and overrun policy say how much of it is wanted;
-//! a limiter moves the correction there; settings, state and what is known of the table are checked. What slower rate groups do is called by the
-//! firmware after [`Joint::tick`], in an order that is fixed in its source ([`RateGroup`](crate::RateGroup)).
+//! In this order: the measured generator angle is judged; torque and temperature are located in the table; the play
+//! follows the generator (forward); the target is turned into a correction (inverse); mode and overrun policy say how
+//! much of it is wanted; a limiter moves the correction there; settings, state and what is known of the table are
+//! checked. What slower rate groups do is called by the firmware after [`Joint::tick`], in an order that is fixed in
+//! its source ([`RateGroup`](crate::RateGroup)).
 //!
 //! | what happens | what the joint does | flag |
 //! |---|---|---|
@@ -38,8 +39,8 @@ use core::num::NonZeroU32;
 /// Less than a count.
 const WITHIN: i32 = FINE - 1;
 
-/// One joint: all that does not change while it runs. Can be made at compile time and lie in flash; in memory an upset of one of
-/// its two copies is noticed in the tick.
+/// One joint: all that does not change while it runs. Can be made at compile time and lie in flash; in memory an upset
+/// of one of its two copies is noticed in the tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Joint {
     copies: [Settings; 2],
@@ -75,8 +76,8 @@ impl Joint {
     ///
     /// # Errors
     /// [`SettingError`]: a limit that is not finite and positive, or beyond 0.05 rad (rate, hold) or half a turn (generator) in a tick,
-    /// or a rate below 1.8e-10 rad in a tick, an acceleration below that in a tick more each tick, a fastest generator below 1.5e-9 rad in a tick, a hold below
-    /// that, or a tick below 1e-7 s.
+    /// or a rate below 1.8e-10 rad in a tick, an acceleration below that in a tick more each tick, a fastest generator
+    /// below 1.5e-9 rad in a tick, a hold below that, or a tick below 1e-7 s.
     pub const fn new(drive: Drive, limits: Limits, overrun: Overrun) -> Result<Self, SettingError> {
         match Settings::new(drive, limits, overrun) {
             Ok(settings) => Ok(Self { copies: [settings; 2] }),
@@ -101,15 +102,16 @@ impl Joint {
         self.copies.iter().find(|settings| settings.is_whole())
     }
 
-    /// Makes a copy of the settings that is not whole anew from the other; false if neither is, and the joint has to be made anew.
-    /// For a slow rate group, where the joint lies in memory.
+    /// Makes a copy of the settings that is not whole anew from the other; false if neither is, and the joint has to be
+    /// made anew. For a slow rate group, where the joint lies in memory.
     pub fn mend(&mut self) -> bool {
         let Some(&sound) = self.sound() else { return false };
         self.copies = [sound; 2];
         true
     }
 
-    /// Output angle for a generator angle, with the play followed in `play`: as [`crate::Table::forward`], from the copies.
+    /// Output angle for a generator angle, with the play followed in `play`: as [`crate::Table::forward`], from the
+    /// copies.
     #[must_use]
     pub fn forward(
         &self,
@@ -134,8 +136,8 @@ impl Joint {
 
     /// One tick.
     ///
-    /// Instructions are counted by `tests/firmware`; the same number in every tick with the same table. A tick that finds something
-    /// not whole mends it, as far as it can, and is done a second time.
+    /// Instructions are counted by `tests/firmware`; the same number in every tick with the same table. A tick that
+    /// finds something not whole mends it, as far as it can, and is done a second time.
     #[must_use]
     pub fn tick(&self, images: &Images<'_>, store: &mut Store, state: &mut JointState, input: &Input) -> Output {
         let [first, _] = &self.copies;
@@ -266,8 +268,8 @@ impl Settings {
         same(pair(self.of_words()), self.sums)
     }
 
-    /// One tick; asks for another ([`Flags::AGAIN`]) without having changed the state if something it read was not whole, unless it
-    /// is the second.
+    /// One tick; asks for another ([`Flags::AGAIN`]) without having changed the state if something it read was not
+    /// whole, unless it is the second.
     #[inline(never)]
     fn attempt(
         &self,
@@ -379,7 +381,8 @@ impl Settings {
         let good = ((!lost & !glitch) as u32).wrapping_neg();
         let seen_now = seen ^ (seen ^ SAMPLED) & good;
         now.marks = now.marks & !SEEN | seen_now;
-        // After too long without an answer of the table nobody followed the play; of small numbers the sign tells which is larger.
+        // After too long without an answer of the table nobody followed the play; of small numbers the sign tells which
+        // is larger.
         let late = patience.wrapping_sub(now.uncorrected as u32) >> 31;
         let sampled = seen >> SAMPLED.trailing_zeros();
         Judged {
@@ -416,10 +419,11 @@ impl Settings {
 
     /// Moves the correction towards the goal, and never beyond `most`, whatever state it is in.
     ///
-    /// As fast as it can be stopped there in whole ticks, braking with half of the acceleration `b`: from a distance `l` the speed is
-    /// `(l + b·n(n + 1)/2)/(n + 1)`, with so many ticks `n` of braking as bring that between `n·b` and `(n + 1)·b`. So it never leaves the range of the goals that
-    /// it was given, and a goal that moves by less than `b` in a tick is where it is. Braking with all of the acceleration takes a fifth less time, and
-    /// lets slow noise out 7 % larger than it came in.
+    /// As fast as it can be stopped there in whole ticks, braking with half of the acceleration `b`: from a distance
+    /// `l` the speed is `(l + b·n(n + 1)/2)/(n + 1)`, with so many ticks `n` of braking as bring that between `n·b` and
+    /// `(n + 1)·b`. So it never leaves the range of the goals that it was given, and a goal that moves by less than `b`
+    /// in a tick is where it is. Braking with all of the acceleration takes a fifth less time, and lets slow noise out
+    /// 7 % larger than it came in.
     #[inline(always)]
     fn limit(&self, now: &mut Kept, goal: i32, most: i32) -> i32 {
         let before = now.correction;
@@ -522,7 +526,8 @@ mod tests {
         /// One tick; no correction may jump.
         fn tick(&mut self, input: &Input) -> Output {
             let out = self.joint.tick(&images(), &mut self.store, &mut self.state, input);
-            // As it is kept: what is told is rounded to 24 bits, and a large one to more than the change of a tick may be off.
+            // As it is kept: what is told is rounded to 24 bits, and a large one to more than the change of a tick may
+            // be off.
             let now = self.state.open().0.correction as f64 * (RAD_PER_COUNT as f64 / FINE as f64);
             assert!(
                 (out.correction_rad as f64 - now).abs() <= f32::EPSILON as f64 * now.abs(),
@@ -935,7 +940,8 @@ mod tests {
                     );
                     (before, ticks) = (now, ticks + 1);
                 }
-                // Speeding up with all, braking with half of it: √(6·way/acceleration); and rounding to whole ticks and counts.
+                // Speeding up with all, braking with half of it: √(6·way/acceleration); and rounding to whole ticks and
+                // counts.
                 let least = (6.0 * f64::from(goal.abs()) / f64::from(acceleration)).sqrt();
                 assert!(f64::from(ticks) <= 1.01 * least + 8.0, "{acceleration} {goal}: {ticks} {least}");
             }

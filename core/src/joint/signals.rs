@@ -11,8 +11,8 @@ pub struct Input {
     pub generator: Option<GeneratorAngle>,
     /// Where the output shall be.
     pub target: OutputAngle,
-    /// Load torque at the output, N·m, positive when it turns the output forward: that in the mesh, with the drag added that the table was made with
-    /// ([`TorquePath`](crate::TorquePath) makes it of a reading).
+    /// Load torque at the output, N·m, positive when it turns the output forward: that in the mesh, with the drag added
+    /// that the table was made with ([`TorquePath`](crate::TorquePath) makes it of a reading).
     pub torque_n_m: f32,
     /// Ticks that were missed since the last call.
     pub missed_ticks: u16,
@@ -35,21 +35,25 @@ impl Flags {
     pub const HELD_BACK: Self = Self(8);
     /// No correction could be made; the last one is kept or fades out.
     pub const NOT_CORRECTED: Self = Self(16);
-    /// What was read of the table was not the same in both copies, or what the store knows of it was not whole. It was made anew and
-    /// the tick done again, so the answer is sound, unless [`Self::NOT_CORRECTED`] is set too: then it could not be mended, and
-    /// was not used. Also set, with that one, where the table is for another drive than the joint.
+    /// What was read of the table was not the same in both copies, or what the store knows of it was not whole. It was
+    /// made anew and the tick done again, so the answer is sound, unless [`Self::NOT_CORRECTED`] is set too: then it
+    /// could not be mended, and was not used. Also set, with that one, where the table is for another drive than the
+    /// joint.
     pub const TABLE_DOUBT: Self = Self(32);
-    /// The state was not whole, and was taken from its other copy; where neither was whole the joint is in [`Mode::Safe`](crate::Mode::Safe).
+    /// The state was not whole, and was taken from its other copy; where neither was whole the joint is in
+    /// [`Mode::Safe`](crate::Mode::Safe).
     pub const STATE_TORN: Self = Self(64);
     /// Settings of the joint in memory are not whole. Those of the other copy are used until the joint is made anew
-    /// ([`Joint::mend`](crate::Joint::mend)); if neither is whole the command is where the generator is, and nothing is corrected.
+    /// ([`Joint::mend`](crate::Joint::mend)); if neither is whole the command is where the generator is, and nothing is
+    /// corrected.
     pub const JOINT_TORN: Self = Self(128);
     /// The joint is in [`Mode::Safe`](crate::Mode::Safe): no correction is made.
     pub const SAFE: Self = Self(256);
-    /// An image is not the one that was activated, or both are the same one: copies are made anew from the other, or not at all.
+    /// An image is not the one that was activated, or both are the same one: copies are made anew from the other, or
+    /// not at all.
     pub const OTHER_IMAGES: Self = Self(512);
-    /// The adjustment of the input was larger than [`Adjustment::MAX_COUNTS`](crate::Adjustment::MAX_COUNTS) and was taken at that: what made it
-    /// (learning, springs, a model) is not sound.
+    /// The adjustment of the input was larger than [`Adjustment::MAX_COUNTS`](crate::Adjustment::MAX_COUNTS) and was
+    /// taken at that: what made it (learning, springs, a model) is not sound.
     pub const BOUNDED: Self = Self(1024);
     /// Within a tick: it has to be done again.
     pub(super) const AGAIN: Self = Self(1 << 15);
@@ -89,8 +93,8 @@ pub struct Output {
     pub transmission_error_rad: f32,
     /// It lies within ± this, as far as play and jumps go, rad.
     pub uncertainty_rad: f32,
-    /// The correction in the command: target − command/ratio, rad. It is taken off the target, and so has the sign of the
-    /// transmission error that it takes out.
+    /// The correction in the command: target − command/ratio, rad. It is taken off the target, and so has the sign of
+    /// the transmission error that it takes out.
     pub correction_rad: f32,
     /// What the limiter held back of the correction, rad.
     pub held_back_rad: f32,

@@ -4,18 +4,20 @@
 //! zᵢ ← clamp(zᵢ + Δx, −wᵢ, wᵢ),      e = Σ gᵢ·zᵢ
 //! ```
 //!
-//! with `x` the nominal output ([`NominalOutput`]: the friction of the generator's path) or the load torque ([`LoadTorque`]: wind-up
-//! that does not come back the way it went). Springs that stick give the slope after a reversal, springs that slip the dwell; the
-//! sum gives the branches of a loop, whose memory are the turning points. Deflections are integer counts: the result depends on the
-//! turning points only, not on how many steps a motion is cut into.
+//! with `x` the nominal output ([`NominalOutput`]: the friction of the generator's path) or the load torque
+//! ([`LoadTorque`]: wind-up that does not come back the way it went). Springs that stick give the slope after a
+//! reversal, springs that slip the dwell; the sum gives the branches of a loop, whose memory are the turning points.
+//! Deflections are integer counts: the result depends on the turning points only, not on how many steps a motion is cut
+//! into.
 //!
 //! In the loop: one update each tick, and [`Slip::added_to`] the [`Adjustment`] of the next.
 //!
-//! After a reset no deflection is known. Each is an interval, moved at both ends by the same operator: motion brings the ends
-//! together, and one stroke of `2wᵢ` makes them one.
+//! After a reset no deflection is known. Each is an interval, moved at both ends by the same operator: motion brings
+//! the ends together, and one stroke of `2wᵢ` makes them one.
 //!
-//! Springs and deflections are each kept under a sum ([`whole`](../../whole.rs)): where an upset hit one word it is mended in the next update. Deflections that
-//! are lost are unknown, as after a reset; springs that are lost add nothing, with an uncertainty of [`Adjustment::MAX_RAD`].
+//! Springs and deflections are each kept under a sum ([`whole`](../../whole.rs)): where an upset hit one word it is
+//! mended in the next update. Deflections that are lost are unknown, as after a reset; springs that are lost add
+//! nothing, with an uncertainty of [`Adjustment::MAX_RAD`].
 
 use super::adjustment::Adjustment;
 use super::runtime::Joint;
@@ -162,10 +164,12 @@ impl<const N: usize> SlipBank<N, NominalOutput> {
         self.follow(state, Some(nominal.counts()))
     }
 
-    /// Gains at given widths from samples of error, rad, at nominal outputs along a path, in its order: a curve of first loading
-    /// from [`SlipState::relaxed`], or loops from [`SlipState::unknown`], of which that part is used where every deflection is known.
+    /// Gains at given widths from samples of error, rad, at nominal outputs along a path, in its order: a curve of
+    /// first loading from [`SlipState::relaxed`], or loops from [`SlipState::unknown`], of which that part is used
+    /// where every deflection is known.
     ///
-    /// Non-negative least squares with a free offset. For the host. `None` if a width is not allowed or no sample is of use.
+    /// Non-negative least squares with a free offset. For the host. `None` if a width is not allowed or no sample is of
+    /// use.
     pub fn fit(
         widths_rad: [f32; N],
         start: SlipState<N>,
@@ -190,8 +194,8 @@ impl<const N: usize> SlipBank<N, LoadTorque> {
         sound.then(|| Self::of(elements.map(width), elements.map(gain), N))
     }
 
-    /// Follows the load torque, N·m, once each tick: beyond ±10 000 N·m it is taken there, and one that is not finite moves
-    /// nothing. The same work for all values.
+    /// Follows the load torque, N·m, once each tick: beyond ±10 000 N·m it is taken there, and one that is not finite
+    /// moves nothing. The same work for all values.
     pub fn update(&self, state: &mut SlipState<N, LoadTorque>, torque_n_m: f32) -> Slip {
         self.follow(state, torque_counts(torque_n_m))
     }
@@ -278,15 +282,16 @@ impl<const N: usize, V: SlipVariable> SlipBank<N, V> {
         Self { springs: Sealed::new(Springs { widths, gains, sum }), variable: PhantomData }
     }
 
-    /// A bank of the first so many springs: those after them, of no width and no gain, are in no sum and no saved state.
+    /// A bank of the first so many springs: those after them, of no width and no gain, are in no sum and no saved
+    /// state.
     #[cfg(feature = "c-api")]
     pub(crate) fn of_first(self, used: usize) -> Self {
         let Springs { widths, gains, .. } = *self.springs.kept();
         Self::of(widths, gains, used)
     }
 
-    /// Makes the springs whole, where they lie in memory and an upset hit a word of them; false if they are lost, and the bank has to be made anew. For a
-    /// slow rate group: until then each update mends a copy.
+    /// Makes the springs whole, where they lie in memory and an upset hit a word of them; false if they are lost, and
+    /// the bank has to be made anew. For a slow rate group: until then each update mends a copy.
     pub fn mend(&mut self) -> bool {
         self.springs.mend()
     }
@@ -316,11 +321,13 @@ impl<const N: usize, V: SlipVariable> SlipBank<N, V> {
         slip.unwrap_or(Slip { error_rad: 0.0, uncertainty_rad: Adjustment::MAX_RAD })
     }
 
-    /// Writes the state with a CRC-32, for storage across a reset: the first [`saved_slip_bytes`]`(N)` bytes. `None` if there are
-    /// fewer, before the first update, or if springs or deflections are lost. It belongs to no joint: [`Self::save_for`] has one.
+    /// Writes the state with a CRC-32, for storage across a reset: the first [`saved_slip_bytes`]`(N)` bytes. `None` if
+    /// there are fewer, before the first update, or if springs or deflections are lost. It belongs to no joint:
+    /// [`Self::save_for`] has one.
     ///
-    /// Little endian: `FXS` and the version 2, id of the table (8 bytes), sums of the joint's settings (2 × `u32`), variable (`i64`), lower ends, upper
-    /// ends (`i32`), sum of the springs, CRC-32 of all before. Table and joint are zeros if they are not known.
+    /// Little endian: `FXS` and the version 2, id of the table (8 bytes), sums of the joint's settings (2 × `u32`),
+    /// variable (`i64`), lower ends, upper ends (`i32`), sum of the springs, CRC-32 of all before. Table and joint are
+    /// zeros if they are not known.
     pub fn save(&self, state: &SlipState<N, V>, bytes: &mut [u8]) -> Option<usize> {
         self.save_first(state, NOBODY, N, bytes)
     }
@@ -353,8 +360,9 @@ impl<const N: usize, V: SlipVariable> SlipBank<N, V> {
         Some(saved_slip_bytes(used))
     }
 
-    /// A state from [`Self::save`]; `None` if the bytes are damaged, were saved with other springs, or belong to a joint. Only if the joint cannot have
-    /// moved (for a bank on the torque: the load cannot have changed) meanwhile, else [`SlipState::unknown`].
+    /// A state from [`Self::save`]; `None` if the bytes are damaged, were saved with other springs, or belong to a
+    /// joint. Only if the joint cannot have moved (for a bank on the torque: the load cannot have changed) meanwhile,
+    /// else [`SlipState::unknown`].
     #[must_use]
     pub fn restore(&self, bytes: &[u8]) -> Option<SlipState<N, V>> {
         self.restore_first(NOBODY, N, bytes).ok()
@@ -627,7 +635,8 @@ mod tests {
         SlipBank::of_torque([element(2.0, 4e-6), element(10.0, 1.5e-6)]).unwrap()
     }
 
-    /// The loop of wind-up over torque, in closed form: as wide as twice what slips, and nothing that is no number moves it.
+    /// The loop of wind-up over torque, in closed form: as wide as twice what slips, and nothing that is no number
+    /// moves it.
     #[test]
     fn torque_has_its_loop() {
         let mut state = SlipState::unknown();
@@ -750,8 +759,8 @@ mod tests {
             prop_assert!(work >= -1e-3, "{}", work);
         }
 
-        /// Madelung: a loop inside the last stroke comes back to its turning point, with all that came before, however deep loops are
-        /// nested in it; beyond the turning point the motion goes on as if the loop had not been.
+        /// Madelung: a loop inside the last stroke comes back to its turning point, with all that came before, however
+        /// deep loops are nested in it; beyond the turning point the motion goes on as if the loop had not been.
         #[test]
         fn inner_loops_close_at_their_turning_point(
             before in prop::collection::vec(-2 * WIDTH..2 * WIDTH, 0..5), stroke in 10..3 * WIDTH,

@@ -1,8 +1,9 @@
 //! Whether the sensors of a joint say what its motor does: units, signs and dead wires, before the first tick.
 //!
-//! The motor turns the generator a little forward and back. What each sensor says of that is held against what must come of it: the generator's encoder
-//! against the command, an encoder at the output against the ratio, a torque in the mesh against the drag, which turns over with the direction. A wrong unit is a wrong
-//! ratio, a wrong sign a wrong sign, a frozen sensor says nothing.
+//! The motor turns the generator a little forward and back. What each sensor says of that is held against what must
+//! come of it: the generator's encoder against the command, an encoder at the output against the ratio, a torque in the
+//! mesh against the drag, which turns over with the direction. A wrong unit is a wrong ratio, a wrong sign a wrong
+//! sign, a frozen sensor says nothing.
 //!
 //! ```
 //! use flexspline::*;
@@ -36,14 +37,16 @@ use crate::drive::Drive;
 /// How far the motor moves, and what is expected of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StartUpSettings {
-    /// Way of the generator, there and back, rad: positive turns it counter-clockwise. At the output it must be ten times `output_error_rad` at least, and
-    /// half a turn at most.
+    /// Way of the generator, there and back, rad: positive turns it counter-clockwise. At the output it must be ten
+    /// times `output_error_rad` at least, and half a turn at most.
     pub way_rad: f32,
     /// Ticks for each way, 8 or more; the last half of each is for the servo to settle.
     pub ticks: u16,
-    /// What the output may be off by in a way, rad: twice the error that the table states ([`Table::error_limit_rad`](crate::Table::error_limit_rad)) is enough.
+    /// What the output may be off by in a way, rad: twice the error that the table states
+    /// ([`Table::error_limit_rad`](crate::Table::error_limit_rad)) is enough.
     pub output_error_rad: f32,
-    /// Coulomb drag of the output that a torque in the mesh turns over by, N·m; it may be wrong by three times. Above 0.
+    /// Coulomb drag of the output that a torque in the mesh turns over by, N·m; it may be wrong by three times. Above
+    /// 0.
     pub drag_n_m: f32,
 }
 
@@ -149,8 +152,9 @@ const WAY_SHARE: i64 = 10;
 const STILL_SHIFT: u32 = 8;
 /// Of the output's, beside the error that is stated: a hundredth.
 const RATIO_SHARE: i64 = 100;
-/// The torque turns over by this part of what the drag says, and by so many times, at least and at most; below a tenth it does not change. Drag differs from
-/// unit to unit and with the temperature by two or three times ([motion.md](https://docs.rs/crate/flexspline)); the nearest unit is 8.9 times off (N·m and lbf·in).
+/// The torque turns over by this part of what the drag says, and by so many times, at least and at most; below a tenth
+/// it does not change. Drag differs from unit to unit and with the temperature by two or three times
+/// ([motion.md](https://docs.rs/crate/flexspline)); the nearest unit is 8.9 times off (N·m and lbf·in).
 const DRAG_TIMES: f32 = 3.0;
 const DRAG_STILL: f32 = 0.1;
 

@@ -14,7 +14,8 @@ pub(super) const FINE: i32 = 8;
 /// No table with its adjustment gives a larger correction, and no joint a faster one, fine counts.
 pub(super) const MOST_FINE: u32 = MOST_ERROR_COUNTS * FINE as u32;
 
-/// What changes while a joint runs: two copies with sums over each, so that an upset of one is noticed and mended in the next tick.
+/// What changes while a joint runs: two copies with sums over each, so that an upset of one is noticed and mended in
+/// the next tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointState {
     copies: [Sealed; 2],
@@ -46,8 +47,8 @@ pub(super) struct Kept {
     pub glitches: u16,
     pub uncorrected: u16,
     pub fading: u32,
-    /// Mode, what samples there were, and towards which flank the last motion went; a whole word, of which every bit means something
-    /// or is zero.
+    /// Mode, what samples there were, and towards which flank the last motion went; a whole word, of which every bit
+    /// means something or is zero.
     pub marks: u32,
 }
 
@@ -284,7 +285,8 @@ impl JointState {
         self.missed_ticks = self.missed_ticks.wrapping_add(ticks as u32);
     }
 
-    /// What must survive a reset: play, correction and the last sample, with version, table and joint, and a CRC-32 over all of it.
+    /// What must survive a reset: play, correction and the last sample, with version, table and joint, and a CRC-32
+    /// over all of it.
     ///
     /// | offset | type | what |
     /// |---|---|---|
@@ -339,12 +341,13 @@ impl JointState {
         bytes
     }
 
-    /// A state from [`Self::save`], in [`Mode::Off`] with the correction still there, for the same joint with the same table.
+    /// A state from [`Self::save`], in [`Mode::Off`] with the correction still there, for the same joint with the same
+    /// table.
     ///
-    /// The first sample is held against the one that was saved: if the generator is further away than a tick allows, it is a glitch,
-    /// and if it stays there the side of the play is unknown. Until there is a sample nothing is corrected anew.
-    /// Restore only if the joint cannot have moved meanwhile, else start from [`Self::new`]. Ask for [`Mode::Tracking`] before
-    /// the first tick to keep the correction.
+    /// The first sample is held against the one that was saved: if the generator is further away than a tick allows, it
+    /// is a glitch, and if it stays there the side of the play is unknown. Until there is a sample nothing is corrected
+    /// anew. Restore only if the joint cannot have moved meanwhile, else start from [`Self::new`]. Ask for
+    /// [`Mode::Tracking`] before the first tick to keep the correction.
     ///
     /// # Errors
     /// [`RestoreError`]; then [`Self::new`] is left.
@@ -397,8 +400,8 @@ pub const JOINT_STATE_WORDS: usize = 18;
 
 #[cfg(any(test, feature = "std"))]
 impl JointState {
-    /// All of it, for a simulation that goes on from here, now or elsewhere. Unlike what [`Self::save`] keeps over a reset, with mode,
-    /// limiter and all counters: the ticks that follow are the same.
+    /// All of it, for a simulation that goes on from here, now or elsewhere. Unlike what [`Self::save`] keeps over a
+    /// reset, with mode, limiter and all counters: the ticks that follow are the same.
     #[must_use]
     pub fn words(&self) -> [u32; JOINT_STATE_WORDS] {
         let kept = self.open().0;

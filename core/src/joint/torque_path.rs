@@ -1,11 +1,13 @@
 //! Which torque a table is asked with, and how a reading becomes it.
 //!
-//! What twists a drive is the torque that its flanks carry, the torque *in the mesh*. A table is made in steady motion under a torque on
-//! the load `T`, with the drag `d_t` that its drive had then: in the mesh was `T − d_t` moving forward, `T + d_t` backward. So a joint wants
+//! What twists a drive is the torque that its flanks carry, the torque *in the mesh*. A table is made in steady motion
+//! under a torque on the load `T`, with the drag `d_t` that its drive had then: in the mesh was `T − d_t` moving
+//! forward, `T + d_t` backward. So a joint wants
 //! ```text
 //! T = M + d_t·direction,    M = torque on the load − drag·direction − inertia·acceleration
 //! ```
-//! with the drag of *this* unit. Where the load is less than the drag, a torque on the load given as it is picks the wrong flank.
+//! with the drag of *this* unit. Where the load is less than the drag, a torque on the load given as it is picks the
+//! wrong flank.
 //!
 //! | from | is | what it needs |
 //! |---|---|---|
@@ -13,18 +15,18 @@
 //! | a torque sensor between drive and load, twist of two encoders | in the mesh | drag, for where the motion turns back; a low-pass: below |
 //! | the motor's current times ratio, less friction, less inertia of the motor | in the mesh | likewise, and a model of the friction |
 //!
-//! At a reversal the drag turns over, and the torque in the mesh leaps by twice of it. A sensor behind a low-pass tells that late, and near zero load
-//! not at all, where the leap is below its noise: so what is behind the low-pass is the torque on the load, from either reading, and the drag comes
-//! off it by the direction.
+//! At a reversal the drag turns over, and the torque in the mesh leaps by twice of it. A sensor behind a low-pass tells
+//! that late, and near zero load not at all, where the leap is below its noise: so what is behind the low-pass is the
+//! torque on the load, from either reading, and the drag comes off it by the direction.
 //!
-//! A torque in the mesh is moved by the compensation itself: the motor turns to make up for the wind-up, the load's inertia resists, and that is a
-//! torque in the mesh again. That loop is closed on +1, and above the resonance of the load on the held motor only the
-//! low-pass keeps it from ringing. `flexspline_motion::loops` finds the widest one that keeps a margin; a torque on the
-//! load has no such loop.
+//! A torque in the mesh is moved by the compensation itself: the motor turns to make up for the wind-up, the load's
+//! inertia resists, and that is a torque in the mesh again. That loop is closed on +1, and above the resonance of the
+//! load on the held motor only the low-pass keeps it from ringing. `flexspline_motion::loops` finds the widest one that
+//! keeps a margin; a torque on the load has no such loop.
 //!
-//! A reading is refused (NaN, and the tick keeps its correction) where it is no number, beyond the sensor, too far from the last one that was believed, or,
-//! if that is asked for, the same for too long. Settings and state are kept under one sum ([`whole`](../../whole.rs)): where an upset hit one word it is mended in
-//! the next tick.
+//! A reading is refused (NaN, and the tick keeps its correction) where it is no number, beyond the sensor, too far from
+//! the last one that was believed, or, if that is asked for, the same for too long. Settings and state are kept under
+//! one sum ([`whole`](../../whole.rs)): where an upset hit one word it is mended in the next tick.
 
 use core::f64::consts::TAU;
 
@@ -53,11 +55,12 @@ pub struct TorqueSettings {
     pub drag_n_m: f32,
     /// Coulomb drag that the table was made with, N·m; 0 or more.
     pub table_drag_n_m: f32,
-    /// A torque in the mesh below this changes the flank only where the direction changes, N·m: some three times the peak of the noise behind the
-    /// low-pass, and for a torque read in the mesh a fifth of the drag. 0 or more.
+    /// A torque in the mesh below this changes the flank only where the direction changes, N·m: some three times the
+    /// peak of the noise behind the low-pass, and for a torque read in the mesh a fifth of the drag. 0 or more.
     pub hold_n_m: f32,
-    /// After a torque read in the mesh has changed the flank it does not change it again for so long, s: the correction crosses the play then, and
-    /// what its own motion makes of the torque has to die away. Some periods of the servo's position loop; 0 or more.
+    /// After a torque read in the mesh has changed the flank it does not change it again for so long, s: the correction
+    /// crosses the play then, and what its own motion makes of the torque has to die away. Some periods of the servo's
+    /// position loop; 0 or more.
     pub settle_s: f32,
     /// Largest reading that the sensor can have, N·m; a larger one is forgotten as one that is not finite. Above 0.
     pub largest_n_m: f32,
@@ -73,8 +76,8 @@ pub struct TorquePath {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Path {
-    /// Bits of drag, drag of the table, hold, largest reading, the share of a reading that a tick believes, and the largest change from one reading to
-    /// the next.
+    /// Bits of drag, drag of the table, hold, largest reading, the share of a reading that a tick believes, and the
+    /// largest change from one reading to the next.
     set: [u32; 6],
     /// Bits of the torque on the load behind the low-pass; NaN before the first.
     behind: u32,
@@ -92,11 +95,11 @@ struct Path {
 }
 words!([] Path { set, behind, believed, doubted, settle, frozen, gap, marks });
 
-/// Readings in a row near each other that are not believed where they begin too far from the last one: the third is. A spike of one or two ticks is none
-/// of the torque, and a step that is one comes two ticks late. A guess.
+/// Readings in a row near each other that are not believed where they begin too far from the last one: the third is. A
+/// spike of one or two ticks is none of the torque, and a step that is one comes two ticks late. A guess.
 const DOUBTED: u32 = 2;
-/// A reading that changes by more than this share of the largest in a tick, and twice the drag, is too far where no other limit is set: of a sinusoid
-/// from end to end of the sensor that is a fortieth of the rate of ticks. A guess.
+/// A reading that changes by more than this share of the largest in a tick, and twice the drag, is too far where no
+/// other limit is set: of a sinusoid from end to end of the sensor that is a fortieth of the rate of ticks. A guess.
 const JUMP_SHARE: f32 = 0.25;
 
 /// The upper half of a word.
@@ -171,9 +174,10 @@ impl TorquePath {
         Ok(Path { set, behind: none, believed: none, doubted: none, settle, frozen: 0, gap: 0, marks: 0 }.sealed())
     }
 
-    /// With other limits of what a sensor can read: the largest change from one tick to the next, N·m (above 0; a reading that changes by more is
-    /// believed once three in a row are near each other), and the number of ticks after which a reading that stays the same to the last bit is frozen (0 for
-    /// never: what comes from a model may stand still, a sensor has noise).
+    /// With other limits of what a sensor can read: the largest change from one tick to the next, N·m (above 0; a
+    /// reading that changes by more is believed once three in a row are near each other), and the number of ticks after
+    /// which a reading that stays the same to the last bit is frozen (0 for never: what comes from a model may stand
+    /// still, a sensor has noise).
     ///
     /// # Errors
     /// [`SettingError`]: a change that is not finite or below 1e-6 N·m, or a path that is lost to an upset.
@@ -209,8 +213,8 @@ impl TorquePath {
     }
 
     /// One tick: a reading, and the direction in which the output moves or moved last; what to give to
-    /// [`Input::torque_n_m`](crate::Input::torque_n_m). A reading that is not finite, larger than the sensor's largest, frozen, or too far from the last one,
-    /// gives NaN and is forgotten.
+    /// [`Input::torque_n_m`](crate::Input::torque_n_m). A reading that is not finite, larger than the sensor's largest,
+    /// frozen, or too far from the last one, gives NaN and is forgotten.
     #[must_use]
     pub fn tick(&mut self, reading: TorqueReading, direction: Direction) -> f32 {
         let Some(mut path) = self.path.open() else { return f32::NAN };
@@ -263,7 +267,8 @@ impl Path {
         let turned_back = self.marks & SEEN == 0 || (self.marks & BACKWARD != 0) != backward;
         let way = if backward { -1.0 } else { 1.0 };
         let drag = way * drag_n_m;
-        // Kept as a torque on the load, which a reversal does not change: the one in the mesh leaps there by twice the drag.
+        // Kept as a torque on the load, which a reversal does not change: the one in the mesh leaps there by twice the
+        // drag.
         let (read, on_load, in_mesh) = match reading {
             TorqueReading::OnLoad(torque) => (torque, torque, false),
             TorqueReading::InMesh(torque) => (torque, torque + drag, true),
@@ -385,7 +390,8 @@ mod tests {
         assert!(TorquePath::new(TorqueSettings { hold_n_m: 0.0, ..SETTINGS }).is_ok());
     }
 
-    /// What the correction's own way across the play makes of the torque does not turn it back; a reversal of the motion does.
+    /// What the correction's own way across the play makes of the torque does not turn it back; a reversal of the
+    /// motion does.
     #[test]
     fn a_flank_that_a_reading_changed_stays_until_its_correction_has_settled() {
         let mut path = TorquePath::new(TorqueSettings { bandwidth_hz: 1e6, ..SETTINGS }).unwrap();
@@ -434,7 +440,8 @@ mod tests {
         }
     }
 
-    /// A thousand ticks a second for twenty seconds, a light load on one flank and noise, and one reading of a hundred that is a spike.
+    /// A thousand ticks a second for twenty seconds, a light load on one flank and noise, and one reading of a hundred
+    /// that is a spike.
     #[test]
     fn spikes_of_a_sensor_change_no_flank() {
         for (place, jump) in

@@ -110,7 +110,8 @@ pub enum ProjectError {
         /// Relative residual reached.
         residual: f64,
     },
-    /// The table misses a sample by more than the limit: samples contradict each other, or an effect has no place in the plan.
+    /// The table misses a sample by more than the limit: samples contradict each other, or an effect has no place in
+    /// the plan.
     Deviation {
         /// Index of the sample.
         sample: usize,
@@ -150,8 +151,8 @@ impl fmt::Display for ProjectError {
             }
             Self::TooFewPositions { temperature, torque, direction, found, needed } => write!(
                 f,
-                "{direction:?} samples at temperature node {temperature}, torque node {torque}: {found} usable positions \
-                 in the tooth pitch, {needed} evenly spread ones are needed"
+                "{direction:?} samples at temperature node {temperature}, torque node {torque}: {found} usable \
+                 positions in the tooth pitch, {needed} evenly spread ones are needed"
             ),
             Self::Order { curve, order, nodes } => write!(f, "{curve}: order {order} does not fit on {nodes} nodes"),
             Self::Coverage { needed_turns, found_turns } => {

@@ -7,20 +7,21 @@
 //! e = Σ wθτ·wᵢ·c±[θ][τ][i]  +  Σ vθτ·D[θ][τ]  +  Σ aₖ·cos(k·phase) + bₖ·sin(k·phase)
 //! ```
 //!
-//! with the same weights (torque, temperature, tooth phase) as the control step uses, one set of ripple coefficients `c±`
-//! for each direction, and harmonics of ψ, ψ − δ and δ. D, the average of `(c₋ + c₊)/2` over the pitch, counts again with the
-//! weights `v` of what its cubic adds to a straight line between torque nodes; they are zero at the nodes. All are fitted
-//! together by conjugate gradients on the normal equations, scaled by their diagonal. Then centre `(c₋ + c₊)/2` and
-//! half-width `(c₋ − c₊)/2` give D, R and H, h.
+//! with the same weights (torque, temperature, tooth phase) as the control step uses, one set of ripple coefficients
+//! `c±` for each direction, and harmonics of ψ, ψ − δ and δ. D, the average of `(c₋ + c₊)/2` over the pitch, counts
+//! again with the weights `v` of what its cubic adds to a straight line between torque nodes; they are zero at the
+//! nodes. All are fitted together by conjugate gradients on the normal equations, scaled by their diagonal. Then centre
+//! `(c₋ + c₊)/2` and half-width `(c₋ − c₊)/2` give D, R and H, h.
 //!
 //! # Between torque nodes
-//! The slope of D at a torque node is that of a polynomial through D at the nodes around it, never across a jump. Wind-up that
-//! starts steeply at a jump and saturates wants nodes close together there. In a piece of five nodes or more between a jump
-//! and an end of the axis the polynomial is a quartic in `√(|τ − τⱼ| + w/4)`, τⱼ the node at the jump and w the interval
-//! after it: exact for parabolas, close for roots. In other pieces it is a parabola through three nodes.
+//! The slope of D at a torque node is that of a polynomial through D at the nodes around it, never across a jump.
+//! Wind-up that starts steeply at a jump and saturates wants nodes close together there. In a piece of five nodes or
+//! more between a jump and an end of the axis the polynomial is a quartic in `√(|τ − τⱼ| + w/4)`, τⱼ the node at the
+//! jump and w the interval after it: exact for parabolas, close for roots. In other pieces it is a parabola through
+//! three nodes.
 //!
-//! Largest interpolation error, as part of the rise from 0 to 50 N·m, with nodes at 0.021, 0.12, 0.35, 0.9, 2, 4, 8, 15,
-//! 28, 50 N·m, and in the last row at 0.021, 0.12, 0.4, 1.2, 3, 6.5, 12, 20, 33, 50 N·m:
+//! Largest interpolation error, as part of the rise from 0 to 50 N·m, with nodes at 0.021, 0.12, 0.35, 0.9, 2, 4, 8,
+//! 15, 28, 50 N·m, and in the last row at 0.021, 0.12, 0.4, 1.2, 3, 6.5, 12, 20, 33, 50 N·m:
 //!
 //! | | τ^0.45 to τ^0.6 | τ/(τ + 30) | 1 − exp(−τ/20) | tanh(τ/25) |
 //! |---|---|---|---|---|

@@ -40,7 +40,8 @@ impl Sampled<'_> {
         self.marks.get(direction_number(direction) * self.records + record).is_some_and(|mark| *mark != 0)
     }
 
-    /// Share of the average coefficient of each direction in D, and the sign of the half-width given that D has besides.
+    /// Share of the average coefficient of each direction in D, and the sign of the half-width given that D has
+    /// besides.
     fn shares(self, record: usize) -> ([(Direction, f64); 2], f64) {
         let (forward, backward, sign) =
             match (self.is(Direction::Forward, record), self.is(Direction::Backward, record)) {

@@ -13,8 +13,8 @@ use crate::whole::{pair, same, sums};
 /// Words of the images that a step compares, and of the copies that it fills.
 const COMPARED: usize = 64;
 const FILLED: usize = 8;
-/// More steps than any activation takes: 512 records of 64 torques and 8 temperatures at 16 steps each, twice for each of two images.
-/// What goes on for longer was hit.
+/// More steps than any activation takes: 512 records of 64 torques and 8 temperatures at 16 steps each, twice for each
+/// of two images. What goes on for longer was hit.
 const MOST_STEPS: u32 = 40_000;
 /// Of [`Found::images`].
 const OF_SECOND: u32 = 2;
@@ -53,11 +53,13 @@ pub enum Progress {
 
 /// A table on its way into a store: [`Store::begin`]. Nothing of images or store is kept in it.
 ///
-/// Ticks go on between its steps. While it checks, with the table in use; while it fills, without correction, so a firmware that has to go on
-/// correcting fills a second store and exchanges the two between two ticks: then the table before is also the way back. To give up,
-/// drop it; before the first [`Progress::Filling`] the store has not been touched.
+/// Ticks go on between its steps. While it checks, with the table in use; while it fills, without correction, so a
+/// firmware that has to go on correcting fills a second store and exchanges the two between two ticks: then the table
+/// before is also the way back. To give up, drop it; before the first [`Progress::Filling`] the store has not been
+/// touched.
 ///
-/// The images are checked twice, and what is found must be the same: an upset of what is kept in here between two steps ends in
+/// The images are checked twice, and what is found must be the same: an upset of what is kept in here between two steps
+/// ends in
 /// [`ActivateError::Torn`] or another error, or changes nothing.
 #[derive(Clone, Copy, Debug)]
 pub struct Activation {
@@ -79,7 +81,8 @@ pub struct Activation {
     confirmed: Option<Found>,
 }
 
-/// What the store will know of the table, and how much of it was filled: it lies in memory from step to step, so it has sums.
+/// What the store will know of the table, and how much of it was filled: it lies in memory from step to step, so it has
+/// sums.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Found {
     source: Source,
@@ -124,8 +127,8 @@ impl Activation {
         }
     }
 
-    /// Does at most 2000 instructions of it on a Cortex-M4F. Give the same images and the same store with every step; a store of which
-    /// steps went into two activations has a mixture, which its ticks find and do not use.
+    /// Does at most 2000 instructions of it on a Cortex-M4F. Give the same images and the same store with every step; a
+    /// store of which steps went into two activations has a mixture, which its ticks find and do not use.
     ///
     /// # Errors
     /// [`ActivateError`]; the store has not been touched then, and further steps say the same.
@@ -235,7 +238,8 @@ impl Activation {
         Ok(found)
     }
 
-    /// Takes the table before out of the store, then fills words of both copies, and after the last puts the table into use.
+    /// Takes the table before out of the store, then fills words of both copies, and after the last puts the table into
+    /// use.
     fn fill(
         &mut self,
         stage: Stage,

@@ -2,7 +2,8 @@
 
 use crate::table::{Doubt, words_from};
 
-/// Largest copy that fits into a [`Store`](crate::Store), words: 72 for the axes, curves, and for each torque node 3 and its ripple.
+/// Largest copy that fits into a [`Store`](crate::Store), words: 72 for the axes, curves, and for each torque node 3
+/// and its ripple.
 pub const STORE_WORDS: usize = 1024;
 /// Words that a read may take from the last place on.
 pub(super) const SLACK: usize = 8;

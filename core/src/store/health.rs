@@ -33,7 +33,8 @@ pub enum Health {
     Lost,
     /// No table was activated.
     Empty,
-    /// What the store knew of the table was hit in both its copies: nothing is corrected until the table is activated again.
+    /// What the store knew of the table was hit in both its copies: nothing is corrected until the table is activated
+    /// again.
     Torn,
 }
 

@@ -10,7 +10,8 @@ pub struct Images<'a> {
 }
 
 impl<'a> Images<'a> {
-    /// Two images, at two places: the same one twice is not activated, and a tick that is given it does not make the copies anew.
+    /// Two images, at two places: the same one twice is not activated, and a tick that is given it does not make the
+    /// copies anew.
     #[must_use]
     pub const fn new(first: &'a [u8], second: &'a [u8]) -> Self {
         Self { words: [first.as_chunks::<4>().0, second.as_chunks::<4>().0] }
@@ -36,9 +37,10 @@ impl<'a> Images<'a> {
     }
 }
 
-/// Writes a page of `good` over the same page of `damaged`, and its checksum, and tells whether it did: not if the page of `good` is
-/// damaged too. Both are whole images of the same table. The page after the last is the CRC-32 of the whole image, by which a store
-/// knows it ([`Flags::OTHER_IMAGES`](crate::Flags::OTHER_IMAGES)). Then tell the store: [`Store::mended`](crate::Store::mended).
+/// Writes a page of `good` over the same page of `damaged`, and its checksum, and tells whether it did: not if the page
+/// of `good` is damaged too. Both are whole images of the same table. The page after the last is the CRC-32 of the
+/// whole image, by which a store knows it ([`Flags::OTHER_IMAGES`](crate::Flags::OTHER_IMAGES)). Then tell the store:
+/// [`Store::mended`](crate::Store::mended).
 #[must_use]
 pub fn mend_page(damaged: &mut [u8], good: &[u8], page: usize) -> bool {
     let body_bytes = (word_at(good.as_chunks::<4>().0, word::BODY) as usize).saturating_mul(4);

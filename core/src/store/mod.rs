@@ -1,14 +1,15 @@
 //! The table that a joint flies with: two images, and from them two copies at the temperature of the drive.
 //!
-//! The images lie where the firmware has them, in flash or in memory, and are read in place. Of what a step needs, the store
-//! holds two copies in memory, blended to one temperature. What a step reads it reads in both copies; if they differ, they are made
-//! anew in that tick.
+//! The images lie where the firmware has them, in flash or in memory, and are read in place. Of what a step needs, the
+//! store holds two copies in memory, blended to one temperature. What a step reads it reads in both copies; if they
+//! differ, they are made anew in that tick.
 //!
-//! In a slower rate group [`Store::check_images`] makes word by word of both copies anew from both images, so that nothing stays wrong
-//! for longer than a pass, and the copies follow the temperature; and it goes over the CRC-32 of the pages of both images. A word that differs between the images is taken from the one whose page is intact, or not at all. A page that is damaged in
-//! one image is named, so that the firmware writes it again from the other ([`Store::damaged_page`], [`mend_page`]); one that is
-//! damaged in both is lost, the copies stay as they were, and the health says so. The work is the same in every tick, whatever is
-//! found.
+//! In a slower rate group [`Store::check_images`] makes word by word of both copies anew from both images, so that
+//! nothing stays wrong for longer than a pass, and the copies follow the temperature; and it goes over the CRC-32 of
+//! the pages of both images. A word that differs between the images is taken from the one whose page is intact, or not
+//! at all. A page that is damaged in one image is named, so that the firmware writes it again from the other
+//! ([`Store::damaged_page`], [`mend_page`]); one that is damaged in both is lost, the copies stay as they were, and the
+//! health says so. The work is the same in every tick, whatever is found.
 //!
 //! A new table comes in chunks ([`crate::Upload`]). It is checked in full, and filled in, in short steps between ticks
 //! ([`Store::begin`], [`Activation`]), or at once where nothing waits ([`Store::activate`]).
@@ -64,7 +65,8 @@ impl Scrub {
     const START: Self = Self { second: 0, page: 0, word: 0, crc: 0 };
 }
 
-/// Pages found damaged, one bit each, of both images; once more, turned, so that an upset of it is noticed. All zeros for none.
+/// Pages found damaged, one bit each, of both images; once more, turned, so that an upset of it is noticed. All zeros
+/// for none.
 #[derive(Clone, Copy, Debug)]
 struct Damaged {
     pages: [u32; 2],
@@ -163,9 +165,9 @@ impl Store {
 
     /// Begins to check the images and to fill the copies from them, at this temperature: step by step, between ticks.
     ///
-    /// At least one image must pass [`Table::check`](crate::Table::check); if the other does not, it is damaged and will be named; if it is another
-    /// table, neither is taken. They must lie at two places: one image given twice would be believed against the copies wherever it is
-    /// hit.
+    /// At least one image must pass [`Table::check`](crate::Table::check); if the other does not, it is damaged and
+    /// will be named; if it is another table, neither is taken. They must lie at two places: one image given twice
+    /// would be believed against the copies wherever it is hit.
     ///
     /// # Errors
     /// [`ActivateError::Temperature`]; every other with the step that finds it.
@@ -176,7 +178,8 @@ impl Store {
         Ok(Activation::new(*drive, temperature_c))
     }
 
-    /// All of [`Self::begin`] and its steps in one call, some hundred thousand instructions; the table is used from the next tick on.
+    /// All of [`Self::begin`] and its steps in one call, some hundred thousand instructions; the table is used from the
+    /// next tick on.
     ///
     /// # Errors
     /// [`ActivateError`]; the table in use stays, and goes on only if its images stay too.
@@ -204,8 +207,9 @@ impl Store {
         }
     }
 
-    /// The temperature that the copies follow, °C, within one pass. Call it in a slow rate group; false, and nothing changes, if it
-    /// is not finite, the images disagree about where what is or are not those that were activated, or there is no table.
+    /// The temperature that the copies follow, °C, within one pass. Call it in a slow rate group; false, and nothing
+    /// changes, if it is not finite, the images disagree about where what is or are not those that were activated, or
+    /// there is no table.
     pub fn set_temperature(&mut self, images: &Images<'_>, temperature_c: f32) -> bool {
         self.mend_source();
         let source = *self.source();
@@ -233,7 +237,8 @@ impl Store {
         true
     }
 
-    /// Mends what a tick at this torque reads: what is known of the table, and words that differ between the copies. Whether anything was to be done.
+    /// Mends what a tick at this torque reads: what is known of the table, and words that differ between the copies.
+    /// Whether anything was to be done.
     pub(crate) fn mend(&mut self, images: &Images<'_>, torque_n_m: f32) -> bool {
         let mut found = self.mend_source();
         let Source { nodes_from, records_from, record, last_torque, torque_range, .. } = *self.source();
@@ -296,7 +301,8 @@ impl Store {
         }
     }
 
-    /// A page that is damaged in one image and not known to be so in the other: image (0 or 1) and page, to be written again.
+    /// A page that is damaged in one image and not known to be so in the other: image (0 or 1) and page, to be written
+    /// again.
     #[must_use]
     pub fn damaged_page(&self) -> Option<(usize, usize)> {
         let [first, second] = self.damaged.pages();
@@ -306,8 +312,9 @@ impl Store {
             .find_map(|(image, pages)| (pages != 0).then_some((image, pages.trailing_zeros() as usize)))
     }
 
-    /// To be told when [`mend_page`], or what writes flash in its place, has written this page of image 0 or 1 again from an intact
-    /// one. Without it the other image would be believed alone until the page is checked anew, also when it is hit itself.
+    /// To be told when [`mend_page`], or what writes flash in its place, has written this page of image 0 or 1 again
+    /// from an intact one. Without it the other image would be believed alone until the page is checked anew, also when
+    /// it is hit itself.
     pub const fn mended(&mut self, image: usize, page: usize) {
         let [first, second] = self.damaged.pages();
         let sound = !1u32.wrapping_shl(page as u32);
@@ -365,7 +372,8 @@ impl Store {
         grid::search_64(start, torque).min(last)
     }
 
-    /// Locates a torque, with this added to D and H, counts ([`OperatingPoint::adjusted`]). The same work for all values.
+    /// Locates a torque, with this added to D and H, counts ([`OperatingPoint::adjusted`]). The same work for all
+    /// values.
     #[inline(always)]
     pub(crate) fn locate(&self, torque_n_m: f32, mean: i32, half_width: i32) -> OperatingPoint {
         let source = self.source();
@@ -428,9 +436,10 @@ impl Store {
         *counter = counter.wrapping_add(1);
     }
 
-    /// Takes `words` words of the images into the CRC-32 of their pages: tells which of two images is damaged, and finds what both
-    /// have. Makes as many words of the copies anew. Call it in a slow rate group, the same number each time: a word takes at
-    /// most 733 instructions, and with 16 words every 100 ms the copies follow the temperature within 6 s.
+    /// Takes `words` words of the images into the CRC-32 of their pages: tells which of two images is damaged, and
+    /// finds what both have. Makes as many words of the copies anew. Call it in a slow rate group, the same number each
+    /// time: a word takes at most 733 instructions, and with 16 words every 100 ms the copies follow the temperature
+    /// within 6 s.
     pub fn check_images(&mut self, images: &Images<'_>, words: usize) {
         self.mend_source();
         let strangers = self.strangers(images);

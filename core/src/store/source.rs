@@ -32,7 +32,8 @@ pub(super) struct Source {
     pub records_ahead: u16,
     pub node_plane: u16,
     pub record_plane: u16,
-    /// Words of the body of an image, and where its last word is: the CRC-32 of all before, by which the image is known again.
+    /// Words of the body of an image, and where its last word is: the CRC-32 of all before, by which the image is known
+    /// again.
     pub body: u16,
     pub seal_at: u16,
     pub seal: u32,
@@ -210,10 +211,11 @@ impl Strangers {
 }
 
 impl Source {
-    /// A word of the images, and whether it can be used: both have it, or one has it in a page that is not known to be damaged.
+    /// A word of the images, and whether it can be used: both have it, or one has it in a page that is not known to be
+    /// damaged.
     ///
-    /// By its own page: beside a damaged page of one image another page of the other may be damaged, and not found yet. Beside a
-    /// stranger no image is believed alone.
+    /// By its own page: beside a damaged page of one image another page of the other may be damaged, and not found yet.
+    /// Beside a stranger no image is believed alone.
     #[inline(never)]
     fn believed(images: &[Words<'_>; 2], at: usize, strangers: Strangers, damaged: [u32; 2]) -> (u32, bool) {
         let [a, b] = images.map(|words| word_at(words, at));

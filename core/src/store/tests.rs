@@ -150,8 +150,8 @@ fn every_bit_of_what_a_step_reads_is_compared() {
     assert!(noticed > 2 * (2 + 6 + 2 * 3 + 2 * 9), "{noticed}");
 }
 
-/// Random flips in copies and images while the loop runs: every output either equals that of a joint without upsets or says
-/// that it is not to be used. Returns flips, ticks in doubt, words mended, pages found damaged.
+/// Random flips in copies and images while the loop runs: every output either equals that of a joint without upsets or
+/// says that it is not to be used. Returns flips, ticks in doubt, words mended, pages found damaged.
 fn campaign(flips: usize, seed: u64) -> [usize; 4] {
     let (mut sound, mut hit) = (active(20.0), active(20.0));
     let mut images = [IMAGE.clone(), IMAGE.clone()];
@@ -312,8 +312,9 @@ fn after_a_page_is_mended_the_other_image_is_no_longer_believed_alone() {
     assert!(store.counters().words_skipped > 0);
 }
 
-/// With a bit for each page modulo 32, damage of page 33 of one image would have been looked for in page 1 of the other.
-/// Found by a fuzzer: a word is blended from two pages; one is damaged in one image, and known, the other in the other, and not found yet.
+/// With a bit for each page modulo 32, damage of page 33 of one image would have been looked for in page 1 of the
+/// other. Found by a fuzzer: a word is blended from two pages; one is damaged in one image, and known, the other in the
+/// other, and not found yet.
 #[test]
 fn beside_a_damaged_page_another_page_of_the_other_image_is_not_believed_alone() {
     let pages = IMAGE.len().div_ceil(PAGE_BYTES);
@@ -454,7 +455,8 @@ fn images_replaced_under_the_store_are_told_and_not_used() {
     assert!(store.first == before && store.second == before);
 }
 
-/// The word by which a store knows an image is hit itself: told, mended like a page, and no word is made anew from what differs.
+/// The word by which a store knows an image is hit itself: told, mended like a page, and no word is made anew from what
+/// differs.
 #[test]
 fn the_seal_of_an_image_is_mended_like_a_page() {
     let mut hit = IMAGE.clone();
@@ -539,7 +541,8 @@ fn targets_are_met_as_by_the_table_in_place() {
     assert!(worst < 0.01 * ARCSEC, "{} arcsec", worst / ARCSEC);
 }
 
-/// Two stores: a table is checked and filled in beside the one in use, in the background; between two ticks they are exchanged, and back.
+/// Two stores: a table is checked and filled in beside the one in use, in the background; between two ticks they are
+/// exchanged, and back.
 #[test]
 fn a_new_table_takes_over_between_two_ticks_and_can_be_rolled_back() {
     let other = fixture::image(false);
@@ -610,7 +613,8 @@ fn steps(
     panic!("it does not end")
 }
 
-/// While the images are checked the store flies on with its table, to the bit; then it is as if it had been activated at once.
+/// While the images are checked the store flies on with its table, to the bit; then it is as if it had been activated
+/// at once.
 #[test]
 #[cfg_attr(miri, ignore = "takes too long")]
 fn an_activation_in_steps_leaves_the_table_in_use_until_the_new_one_has_passed() {
@@ -668,8 +672,8 @@ fn an_activation_that_fails_has_not_touched_the_store() {
     }
 }
 
-/// Every bit of what an activation keeps, among its checks, before it fills and while it does: what comes out is the table of the
-/// images at the temperature that was given, or an error, and in the end.
+/// Every bit of what an activation keeps, among its checks, before it fills and while it does: what comes out is the
+/// table of the images at the temperature that was given, or an error, and in the end.
 #[test]
 #[cfg_attr(miri, ignore = "takes too long")]
 fn no_single_bit_of_an_activation_makes_another_table() {

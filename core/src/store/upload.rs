@@ -1,4 +1,5 @@
-//! A new table in chunks, as a telecommand brings it: in order, into a buffer of the caller, checked in full at the end.
+//! A new table in chunks, as a telecommand brings it: in order, into a buffer of the caller, checked in full at the
+//! end.
 //!
 //! Nothing of it can be used before [`Upload::finish`] gives a [`Table`]; the table in use is not touched.
 
@@ -182,8 +183,8 @@ mod tests {
         assert!(upload.finish().is_ok());
     }
 
-    /// Damage of every kind, with the checksums left as they were and with checksums made right: either the table is refused,
-    /// or it is one that keeps every bound that a table must keep.
+    /// Damage of every kind, with the checksums left as they were and with checksums made right: either the table is
+    /// refused, or it is one that keeps every bound that a table must keep.
     fn campaign(images: usize, seed: u64) -> [usize; 2] {
         let whole = fixture::image(true);
         let mut random = seed;

@@ -1,9 +1,10 @@
-//! What a table can give at most, and what the iterations of its inverse leave; how they converge is told in [`model`](super::model).
+//! What a table can give at most, and what the iterations of its inverse leave; how they converge is told in
+//! [`model`](super::model).
 
 use crate::num::larger;
 
-/// Error of the inverse that the number of its iterations aims at, rad at the output: 0.02″, far below what a table misses of
-/// its samples.
+/// Error of the inverse that the number of its iterations aims at, rad at the output: 0.02″, far below what a table
+/// misses of its samples.
 pub const INVERSE_TOLERANCE_RAD: f32 = 1.0e-7;
 /// Most iterations of an inverse.
 pub const MAX_INVERSE_ITERATIONS: u8 = 8;
@@ -27,7 +28,8 @@ pub struct Bounds {
     pub curve_slope: f32,
     /// Largest ripple, in cells of the ripple's axis: how far off a first guess of the inverse can be.
     pub ripple_cells: f32,
-    /// What the integers of a step round of A, B, C and the ripple, rad: the place in a cell and the weights have 15 bits.
+    /// What the integers of a step round of A, B, C and the ripple, rad: the place in a cell and the weights have 15
+    /// bits.
     pub rounding_rad: f32,
 }
 
@@ -47,8 +49,8 @@ impl Bounds {
     pub(crate) const NONE: Self =
         Self { error_rad: 0.0, periodic_rad: 0.0, slope: 0.0, curve_slope: 0.0, ripple_cells: 0.0, rounding_rad: 0.0 };
 
-    /// Iterations that bring the error below [`INVERSE_TOLERANCE_RAD`], 1 to 8, and what they and rounding leave; `cell_rad` is a cell of the
-    /// ripple at the output.
+    /// Iterations that bring the error below [`INVERSE_TOLERANCE_RAD`], 1 to 8, and what they and rounding leave;
+    /// `cell_rad` is a cell of the ripple at the output.
     pub(crate) fn inverse(self, cell_rad: f32) -> InverseBound {
         let rate = self.curve_slope / (1.0 - self.slope);
         let mut bound = InverseBound { iterations: 0, error_rad: self.periodic_rad };

@@ -4,15 +4,15 @@
 //! * Clamped axis: strictly increasing nodes of any spacing; beyond its ends the end value holds. Two nodes may nearly
 //!   coincide to represent a jump between them.
 //!
-//! Curves on a periodic axis are uniform quadratic B-splines, `curve(t) = Σ wᵢ(t)·cᵢ` over the three nodes around `t`. The
-//! weights are never negative and add up to one, so a curve stays between its smallest and largest coefficient, its slope
-//! below `n·max|cᵢ₊₁ − cᵢ|` and its second derivative at most `n²·max|cᵢ₊₁ − 2cᵢ + cᵢ₋₁|` per period: the image check bounds
-//! every value a curve can take from its coefficients alone. Value and slope are continuous across cells and across the
-//! wrap. Coefficients are not curve values: at a node the curve is `(cᵢ₋₁ + 6cᵢ + cᵢ₊₁)/8`.
+//! Curves on a periodic axis are uniform quadratic B-splines, `curve(t) = Σ wᵢ(t)·cᵢ` over the three nodes around `t`.
+//! The weights are never negative and add up to one, so a curve stays between its smallest and largest coefficient, its
+//! slope below `n·max|cᵢ₊₁ − cᵢ|` and its second derivative at most `n²·max|cᵢ₊₁ − 2cᵢ + cᵢ₋₁|` per period: the image
+//! check bounds every value a curve can take from its coefficients alone. Value and slope are continuous across cells
+//! and across the wrap. Coefficients are not curve values: at a node the curve is `(cᵢ₋₁ + 6cᵢ + cᵢ₊₁)/8`.
 //!
-//! Interpolation error for a harmonic with `m` nodes to its period, `h = 2π/m`: `h³·(1 + h²/3)/122` of its amplitude (asserted
-//! in the tests): 5.1e-4 for 16 nodes, 4.6e-3 for 8, 5.6e-2 for 4. (A cubic would have a quarter of that for a third more
-//! reading; what is read is also compared between two copies, and that is most of a control step.)
+//! Interpolation error for a harmonic with `m` nodes to its period, `h = 2π/m`: `h³·(1 + h²/3)/122` of its amplitude
+//! (asserted in the tests): 5.1e-4 for 16 nodes, 4.6e-3 for 8, 5.6e-2 for 4. (A cubic would have a quarter of that for
+//! a third more reading; what is read is also compared between two copies, and that is most of a control step.)
 
 /// Most nodes a clamped axis may have.
 pub const MAX_CLAMPED_NODES: usize = 1 << MAX_HALVINGS;
@@ -26,8 +26,8 @@ pub const MAX_PERIODIC_NODES: usize = 128;
 /// A place on a periodic axis: a cell that reaches half a spacing to either side of a node, and how far into it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cell {
-    /// The node in the middle; the number of nodes for the first half of the first cell, beyond the wrap. Also where the
-    /// three coefficients around the place start in a stored curve ([`PeriodicAxis::stored_node`]).
+    /// The node in the middle; the number of nodes for the first half of the first cell, beyond the wrap. Also where
+    /// the three coefficients around the place start in a stored curve ([`PeriodicAxis::stored_node`]).
     pub node: usize,
     /// How far from the start of the cell, in 2⁻³² of the spacing.
     pub fraction: u32,
@@ -164,7 +164,8 @@ pub fn locate_clamped<const HALVINGS: u32>(len: usize, node: impl Fn(usize) -> f
     Place { below, above, weight: if above == below { 0.0 } else { weight } }
 }
 
-/// The interval among starts padded to 64 with a larger number that holds `value`: the last start at or below it, or the first.
+/// The interval among starts padded to 64 with a larger number that holds `value`: the last start at or below it, or
+/// the first.
 ///
 /// Six comparisons, whatever the data. As [`locate_clamped`] finds it, for the control step.
 pub(crate) fn search_64(start: impl Fn(usize) -> f32, value: f32) -> usize {

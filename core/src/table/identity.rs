@@ -1,7 +1,8 @@
 //! Whether an image is the one of its id: BLAKE3 of its body, in steps of one block.
 //!
-//! Checksums tell damage from chance; the id also tells an image that was changed and sealed again. BLAKE3 as its specification has it, without key, for at
-//! most [`MOST_CHUNKS`] chunks of 1024 bytes: what is finished is kept as a stack of roots of whole trees, one for each bit of their number.
+//! Checksums tell damage from chance; the id also tells an image that was changed and sealed again. BLAKE3 as its
+//! specification has it, without key, for at most [`MOST_CHUNKS`] chunks of 1024 bytes: what is finished is kept as a
+//! stack of roots of whole trees, one for each bit of their number.
 
 use super::TableId;
 use super::image::{ID_OFFSET, Laid};
@@ -38,7 +39,8 @@ pub enum Identity {
 
 /// Takes an image in, block by block: holds nothing of it, so give the same with every step.
 ///
-/// An upset of it between two steps ends in [`Identity::Other`], or changes nothing: ask once more before an image is given up.
+/// An upset of it between two steps ends in [`Identity::Other`], or changes nothing: ask once more before an image is
+/// given up.
 #[derive(Clone, Copy, Debug)]
 pub struct IdentityCheck {
     /// Blocks of the body that were taken in.
@@ -63,8 +65,9 @@ impl IdentityCheck {
         Self { block: 0, top: START, joined: None, trees: [[0; 8]; TREES] }
     }
 
-    /// Takes in one block of 64 bytes, or joins two trees, in at most 2000 instructions on a Cortex-M4F. After the last it says whether the image
-    /// is the one of the id in it, and begins anew. An image that is not as long as it says is [`Identity::Other`].
+    /// Takes in one block of 64 bytes, or joins two trees, in at most 2000 instructions on a Cortex-M4F. After the last
+    /// it says whether the image is the one of the id in it, and begins anew. An image that is not as long as it says
+    /// is [`Identity::Other`].
     pub fn step(&mut self, image: &[u8]) -> Identity {
         let most = MOST_CHUNKS.saturating_mul(BLOCKS_OF_CHUNK).saturating_mul(BLOCK_BYTES);
         let Some(Laid { body, id }) = Laid::of(image).filter(|laid| laid.body.len() <= most) else {
@@ -114,8 +117,8 @@ impl IdentityCheck {
         only
     }
 
-    /// Joins the chunk that has ended with a tree before it: with those of its size, and after the last chunk with all. True if that
-    /// was all.
+    /// Joins the chunk that has ended with a tree before it: with those of its size, and after the last chunk with all.
+    /// True if that was all.
     fn join(&mut self, level: usize, last: bool) -> bool {
         let before = self.block.saturating_sub(1) / BLOCKS_OF_CHUNK;
         let left = before.checked_shr(level as u32).unwrap_or(0);
@@ -262,8 +265,8 @@ mod tests {
         }
     }
 
-    /// Every bit of what is kept from step to step, at blocks within a chunk, at its end and among joins: an answer comes, no later than as if
-    /// all began anew; an image that is not the one of its id is never taken for it.
+    /// Every bit of what is kept from step to step, at blocks within a chunk, at its end and among joins: an answer
+    /// comes, no later than as if all began anew; an image that is not the one of its id is never taken for it.
     #[test]
     #[cfg_attr(miri, ignore = "takes too long")]
     fn an_upset_of_the_check_never_makes_another_image_the_one_of_its_id() {

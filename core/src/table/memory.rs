@@ -37,8 +37,8 @@ pub(crate) const CELL: i32 = 1 << 24;
 pub(crate) struct Plan {
     pub ripple_nodes: u32,
     pub ripple_unit: u32,
-    /// A sum of ripple units and weights, in 2⁻¹⁴, times this is 2⁻²⁴ cells of the ripple at the output, times 2³²; signed like
-    /// the ratio.
+    /// A sum of ripple units and weights, in 2⁻¹⁴, times this is 2⁻²⁴ cells of the ripple at the output, times 2³²;
+    /// signed like the ratio.
     pub ripple_cells: i32,
     /// Nodes and place of A, B, C, 16 bits each.
     pub curves: [u32; 3],

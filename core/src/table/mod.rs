@@ -8,20 +8,20 @@
 //! e          = centre + (p − x),   p = clamp(p, x − half-width, x + half-width),   x = nominal output
 //! ```
 //!
-//! Between torque nodes D is a cubic through the values and slopes of the two around the torque, but straight inside a jump:
-//! D and its slope are continuous from one jump, or end of the axis, to the next. H, R, h are linear in torque. All are
-//! linear in temperature and constant beyond the range of the table. R, h, A, B, C are periodic quadratic B-splines
-//! ([`grid`]).
+//! Between torque nodes D is a cubic through the values and slopes of the two around the torque, but straight inside a
+//! jump: D and its slope are continuous from one jump, or end of the axis, to the next. H, R, h are linear in torque.
+//! All are linear in temperature and constant beyond the range of the table. R, h, A, B, C are periodic quadratic
+//! B-splines ([`grid`]).
 //!
-//! A run fixes the torque axis: with frictionless flanks and a drag torque `Td` at the output, steady motion in direction
-//! `d` loads the flanks by `τ − d·Td`, and the error jumps by the backlash where that load changes sign. So the tables
-//! have two nearly coincident torque nodes each side of `±Td`. While the torque lies inside such an interval the error is
-//! known only up to the height of the jump, and the [`Quality`] says so.
+//! A run fixes the torque axis: with frictionless flanks and a drag torque `Td` at the output, steady motion in
+//! direction `d` loads the flanks by `τ − d·Td`, and the error jumps by the backlash where that load changes sign. So
+//! the tables have two nearly coincident torque nodes each side of `±Td`. While the torque lies inside such an interval
+//! the error is known only up to the height of the jump, and the [`Quality`] says so.
 //!
 //! # How it is read
-//! Everything a step needs is in the words of the image, offsets too, so that two copies of the image can be compared word
-//! for word while they are read (`Memory`). The error is in counts of 2⁻³² output turn from there on, in integers but for
-//! the cubic and one division: the same bits on every machine.
+//! Everything a step needs is in the words of the image, offsets too, so that two copies of the image can be compared
+//! word for word while they are read (`Memory`). The error is in counts of 2⁻³² output turn from there on, in integers
+//! but for the cubic and one division: the same bits on every machine.
 
 mod bounds;
 pub mod grid;

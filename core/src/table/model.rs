@@ -4,19 +4,20 @@
 //! ([`Drive::corrected_command`](crate::Drive::corrected_command)). Positive load torque turns the
 //! output forward.
 //!
-//! No search or loop whose length depends on the inputs, no heap, no panic, no libm. The instructions that a step takes are
-//! counted by `tests/firmware` and held by `tests/run firmware`.
+//! No search or loop whose length depends on the inputs, no heap, no panic, no libm. The instructions that a step takes
+//! are counted by `tests/firmware` and held by `tests/run firmware`.
 //!
 //! # The inverse
 //! On a known side of the play it solves `x + e(x) = target` for the nominal output `x`. At `xₖ = target − eₖ`, from
-//! `e₀ = D ∓ H`, it takes A, B, C as they are there and the ripple as what it is: a parabola in each of three cells, that of the
-//! node next to `xₖ` and its two neighbours. `x + ripple` grows steadily (its slope bound `L` is below 1), so the signs at the
-//! boundaries tell in which cell the solution lies, and the root of its parabola is the solution, exactly.
+//! `e₀ = D ∓ H`, it takes A, B, C as they are there and the ripple as what it is: a parabola in each of three cells,
+//! that of the node next to `xₖ` and its two neighbours. `x + ripple` grows steadily (its slope bound `L` is below 1),
+//! so the signs at the boundaries tell in which cell the solution lies, and the root of its parabola is the solution,
+//! exactly.
 //!
-//! What is left comes from A, B, C, with the slope bound `Lc`: `|eₖ₊₁ − e| ≤ Lc/(1 − L)·|eₖ − e|`. A ripple so large that the
-//! solution can lie beyond the three cells takes further iterations; each brings it a cell nearer at least. How many are
-//! needed is found from the coefficients, stands in the image and is found again when the table is accepted: one, without
-//! A, B, C and with a ripple below a cell.
+//! What is left comes from A, B, C, with the slope bound `Lc`: `|eₖ₊₁ − e| ≤ Lc/(1 − L)·|eₖ − e|`. A ripple so large
+//! that the solution can lie beyond the three cells takes further iterations; each brings it a cell nearer at least.
+//! How many are needed is found from the coefficients, stands in the image and is found again when the table is
+//! accepted: one, without A, B, C and with a ripple below a cell.
 
 use super::memory::{Doubt, Memory, Plan};
 use super::point::{OperatingPoint, Quality};
@@ -34,8 +35,8 @@ pub struct Prediction {
     pub nominal: OutputAngle,
     /// Actual minus nominal, rad; 0 when disabled.
     pub transmission_error_rad: f32,
-    /// The error lies within ± this of the value given, as far as play and jumps go, rad. What the table itself missed of
-    /// its samples comes on top: [`Table::projection_worst_rad`].
+    /// The error lies within ± this of the value given, as far as play and jumps go, rad. What the table itself missed
+    /// of its samples comes on top: [`Table::projection_worst_rad`].
     pub uncertainty_rad: f32,
     /// How far to trust it.
     pub quality: Quality,
@@ -62,8 +63,8 @@ pub enum Approach<'s> {
     Moving(Direction),
     /// From where the drive rests now: forward if the target is ahead of the output, backward if behind it. A reversal
     /// takes up the whole play at once; limiting the rate of that is the caller's part. A target within
-    /// [`Table::inverse_error_bound_rad`] plus 8 counts (1.2e-8 rad) of where the output is holds the generator still, so
-    /// that rounding cannot make it cross the play to and fro.
+    /// [`Table::inverse_error_bound_rad`] plus 8 counts (1.2e-8 rad) of where the output is holds the generator still,
+    /// so that rounding cannot make it cross the play to and fro.
     ///
     /// A state that was never updated gives the middle of the play, with its half-width as uncertainty.
     From(&'s PlayState),
@@ -74,7 +75,8 @@ pub enum Approach<'s> {
 pub(crate) struct Departure {
     /// Backward motion.
     pub backward: bool,
-    /// What is not known of where the output is, and of the side of the play on which the target will be reached, counts.
+    /// What is not known of where the output is, and of the side of the play on which the target will be reached,
+    /// counts.
     pub unknown: i32,
     pub guess: i32,
     /// The target is where the output is.
@@ -116,7 +118,8 @@ impl<M: Memory> Model<'_, M> {
 
     /// Estimate of the output in counts.
     ///
-    /// Inlined, as what locates the torque: 58 instructions fewer in a tick than calls, and [`Self::solve`] too would cost 12.
+    /// Inlined, as what locates the torque: 58 instructions fewer in a tick than calls, and [`Self::solve`] too would
+    /// cost 12.
     #[inline(always)]
     pub fn estimate(&self, point: &OperatingPoint, state: &mut PlayState, generator: GeneratorAngle) -> Estimate {
         let nominal = self.drive.nominal_output(generator);
@@ -170,8 +173,8 @@ impl<M: Memory> Model<'_, M> {
         }
     }
 
-    /// The error on one side of the play where that brings the output to `target`, counts, and whether it is one that the table
-    /// can give.
+    /// The error on one side of the play where that brings the output to `target`, counts, and whether it is one that
+    /// the table can give.
     #[inline(never)]
     pub fn solve(&self, point: &OperatingPoint, target: OutputAngle, backward: bool, doubt: &mut Doubt) -> (i32, bool) {
         let plan = self.memory.plan();
@@ -214,7 +217,8 @@ impl<M: Memory> Model<'_, M> {
     ) -> i32 {
         let plan = self.memory.plan();
         let (mut error, mut curves) = (base, 0);
-        // How far the guess is ahead of where the solution would be without ripple, 2⁻²⁴ cells: as far as the last solution was.
+        // How far the guess is ahead of where the solution would be without ripple, 2⁻²⁴ cells: as far as the last
+        // solution was.
         let mut ahead = 0;
         // As many times for every call with this table.
         for _ in 0..plan.iterations() {
@@ -269,8 +273,8 @@ impl<'a> Table<'a> {
     /// Output angle for a generator angle, with the play followed in `state`.
     ///
     /// Call it once for every measured generator angle, in order: the play lives on the turning points. If torque or
-    /// temperature is not finite the answer is `Disabled` with no error, and `state` follows the motion with the half-width
-    /// of the last good step.
+    /// temperature is not finite the answer is `Disabled` with no error, and `state` follows the motion with the
+    /// half-width of the last good step.
     #[must_use]
     pub fn forward(
         &self,
@@ -284,15 +288,15 @@ impl<'a> Table<'a> {
 
     /// Generator angle that brings the output to `target`.
     ///
-    /// How it is solved is told at the top of this module. If an input is not finite the ideal command is given and marked
-    /// `Disabled`.
+    /// How it is solved is told at the top of this module. If an input is not finite the ideal command is given and
+    /// marked `Disabled`.
     #[must_use]
     pub fn inverse(&self, target: OutputAngle, torque_n_m: f32, temperature_c: f32, approach: Approach<'_>) -> Command {
         self.model().aim(&read::locate(self, torque_n_m, temperature_c), target, approach)
     }
 
-    /// One tick: [`Self::forward`] at the measured generator angle, then [`Self::inverse`] from there to the target. Locates
-    /// torque and temperature once; the answers are the same.
+    /// One tick: [`Self::forward`] at the measured generator angle, then [`Self::inverse`] from there to the target.
+    /// Locates torque and temperature once; the answers are the same.
     #[must_use]
     pub fn step(
         &self,
@@ -333,8 +337,8 @@ impl<'a> Table<'a> {
         self.inverse.iterations
     }
 
-    /// Largest error that the iterations leave in the inverse, rad at the output, beyond the rounding of angles (4 counts,
-    /// 6e-9 rad).
+    /// Largest error that the iterations leave in the inverse, rad at the output, beyond the rounding of angles (4
+    /// counts, 6e-9 rad).
     #[must_use]
     pub const fn inverse_error_bound_rad(&self) -> f32 {
         self.inverse.error_rad

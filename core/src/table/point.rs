@@ -20,7 +20,8 @@ pub enum Quality {
     Disabled,
 }
 
-/// A torque and temperature, located in the table: [`Table::at`](crate::Table::at). What forward and inverse of one tick share.
+/// A torque and temperature, located in the table: [`Table::at`](crate::Table::at). What forward and inverse of one
+/// tick share.
 #[derive(Clone, Copy, Debug)]
 pub struct OperatingPoint {
     /// Half words: where the record below the torque starts, its torque step and its temperature step.
@@ -50,8 +51,8 @@ impl OperatingPoint {
         if sane { quality } else { Quality::Disabled }
     }
 
-    /// The point with this added to D and H, each within ±2²⁵ counts. H stays where the ripple can take no play below zero, or
-    /// where it is.
+    /// The point with this added to D and H, each within ±2²⁵ counts. H stays where the ripple can take no play below
+    /// zero, or where it is.
     #[inline(always)]
     pub(crate) fn adjusted(mut self, plan: &Plan, mean: i32, half_width: i32) -> Self {
         let before = self.half_width;

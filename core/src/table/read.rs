@@ -30,8 +30,8 @@ const fn weighed([a, b, c]: [i32; 3], [first, second, third]: [i32; 3]) -> i32 {
     mul_high(a, first << 16).wrapping_add(mul_high(b, second << 16)).wrapping_add(mul_high(c, third << 16))
 }
 
-/// Locates a torque (N·m) and temperature (°C). The same work for all values; those that are not finite give the lower end of
-/// the range and are marked.
+/// Locates a torque (N·m) and temperature (°C). The same work for all values; those that are not finite give the lower
+/// end of the range and are marked.
 pub(crate) fn locate(table: &Table<'_>, torque_n_m: f32, temperature_c: f32) -> OperatingPoint {
     let mut doubt = Doubt::default();
     let [torque_least, torque_most, least, most] = table.words(word::TORQUE_RANGE, &mut doubt).map(f32::from_bits);
@@ -62,7 +62,8 @@ pub(crate) fn locate(table: &Table<'_>, torque_n_m: f32, temperature_c: f32) -> 
     let [h0, h1, h2, h3, h4, h5] = there;
     let around = [[blend(c0, h0), blend(c1, h1), blend(c2, h2)], [blend(c3, h3), blend(c4, h4), blend(c5, h5)]];
     let width = high - low;
-    // 0 in the endless width that an axis of one node has. The last bit of H tells whether the interval above is a jump.
+    // 0 in the endless width that an axis of one node has. The last bit of H tells whether the interval above is a
+    // jump.
     let place = TorquePlace { weight: (torque - low) / width, width, jump: flagged & 1 != 0 };
     let first_record =
         records.wrapping_add(plane.wrapping_mul(record_plane)).wrapping_add(interval.wrapping_mul(record_step));
@@ -155,9 +156,10 @@ pub(crate) fn play_at<M: Memory>(memory: &M, point: &OperatingPoint, phases: Pha
 
 /// How far from a place the solution of `x + ripple(x) = place` is, 2⁻²⁴ cells. The same work for all places.
 ///
-/// `tooth` is the phase at a guess that is `ahead` of the place, 2⁻²⁴ cells. Within a cell of the guess the answer is exact: in the
-/// cell around the node next to the guess, or that before or after it, whichever has the solution between its ends, it is the root
-/// of a parabola. `x + ripple` grows steadily, so what is further away is at least the end of these that is given.
+/// `tooth` is the phase at a guess that is `ahead` of the place, 2⁻²⁴ cells. Within a cell of the guess the answer is
+/// exact: in the cell around the node next to the guess, or that before or after it, whichever has the solution between
+/// its ends, it is the root of a parabola. `x + ripple` grows steadily, so what is further away is at least the end of
+/// these that is given.
 #[inline(always)]
 pub(crate) fn to_solution<M: Memory>(
     memory: &M,
@@ -184,7 +186,8 @@ pub(crate) fn to_solution<M: Memory>(
     // All from here on in 2⁻²⁴ cells from the node: the place, and what is missing at either end of the cell.
     let place = ((cell.fraction ^ 0x8000_0000) as i32 >> 8).wrapping_sub(ahead);
     let missing = |a: i32, b: i32| (a.wrapping_add(b) >> 1).wrapping_sub(place);
-    // 0 the cell before, 1 that of the node, 2 the one after. An index, not choices: the compiler makes branches of choices.
+    // 0 the cell before, 1 that of the node, 2 the one after. An index, not choices: the compiler makes branches of
+    // choices.
     let which = (missing(b, c) <= CELL / 2) as usize;
     let which = which.wrapping_add((missing(c, d) <= -CELL / 2) as usize);
     let [a, b, c] = cells.get(which..).and_then(|cells| cells.first_chunk::<3>()).copied().unwrap_or([0; 3]);

@@ -1,11 +1,11 @@
 //! How the wind-up D goes between its torque nodes: a cubic through the values and slopes of two nodes.
 //!
-//! Intervals that are jumps cut the torque axis into pieces. Inside a piece D and its slope are continuous; across a jump D is
-//! linear, and each of its two nodes has the slope of its own side.
+//! Intervals that are jumps cut the torque axis into pieces. Inside a piece D and its slope are continuous; across a
+//! jump D is linear, and each of its two nodes has the slope of its own side.
 //!
-//! Slopes come from the node values alone and linearly: [`Slopes`] is what the image writer stores and what the least squares
-//! of [`crate::make`] assumes; [`bend`] is what the control step and the least squares evaluate. A limiter against
-//! overshoot would not be linear; what a cubic can reach is bounded when a table is accepted instead.
+//! Slopes come from the node values alone and linearly: [`Slopes`] is what the image writer stores and what the least
+//! squares of [`crate::make`] assumes; [`bend`] is what the control step and the least squares evaluate. A limiter
+//! against overshoot would not be linear; what a cubic can reach is bounded when a table is accepted instead.
 
 use super::grid::{self, MAX_CLAMPED_NODES};
 
@@ -16,8 +16,8 @@ const ROOT_NODES: usize = STENCIL;
 /// Where the root is zero: this part of the first interval short of the piece.
 const ROOT_ORIGIN: f64 = 0.25;
 
-/// What a cubic adds to the straight line at `weight` of an interval of `width`, from its rise over the interval, its slope
-/// below and its slope above.
+/// What a cubic adds to the straight line at `weight` of an interval of `width`, from its rise over the interval, its
+/// slope below and its slope above.
 #[inline(always)]
 pub(crate) fn bend(weight: f32, width: f32, [rise, below, above]: [f32; 3]) -> f32 {
     let rest = 1.0 - weight;
@@ -75,9 +75,9 @@ impl Slopes {
 
 /// Slopes at the nodes of one piece; `jumps` tells whether it ends at a jump below and above.
 ///
-/// Of a polynomial through the nearest nodes. Wind-up starts steeply at a jump and flattens, with nodes closer together there;
-/// so in a piece of five nodes or more that has a jump at one end, it is a quartic in the root u of the distance from that
-/// end (plus a quarter of the first interval), which contains τ = u² and τ² = u⁴. Elsewhere a parabola in τ.
+/// Of a polynomial through the nearest nodes. Wind-up starts steeply at a jump and flattens, with nodes closer together
+/// there; so in a piece of five nodes or more that has a jump at one end, it is a quartic in the root u of the distance
+/// from that end (plus a quarter of the first interval), which contains τ = u² and τ² = u⁴. Elsewhere a parabola in τ.
 fn slopes_of_piece(piece: &[f32], jumps: [bool; 2], out: &mut [Slope]) {
     let torque = |node: usize| piece.get(node).copied().unwrap_or(0.0) as f64;
     let last = piece.len().saturating_sub(1);

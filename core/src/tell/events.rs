@@ -1,8 +1,8 @@
-//! What changed from tick to tick and is worth a line in a log: modes, doubts about the table, pages, corrections that could not
-//! be made.
+//! What changed from tick to tick and is worth a line in a log: modes, doubts about the table, pages, corrections that
+//! could not be made.
 //!
-//! [`Watch::see`] compares a tick with the one before; what it returns can be sent, counted, or, with the feature `defmt`, logged
-//! ([`Events::log`]). Only edges are events, so a fault that stays gives one line.
+//! [`Watch::see`] compares a tick with the one before; what it returns can be sent, counted, or, with the feature
+//! `defmt`, logged ([`Events::log`]). Only edges are events, so a fault that stays gives one line.
 
 use crate::joint::{Flags, JointState, Mode, Output};
 use crate::store::{Health, Store};
@@ -62,8 +62,8 @@ impl Events {
         self.events.iter().copied().flatten()
     }
 
-    /// Logs each, with the number of the tick: a page or table lost as an error, what needs looking at as a warning, the rest as
-    /// information.
+    /// Logs each, with the number of the tick: a page or table lost as an error, what needs looking at as a warning,
+    /// the rest as information.
     #[cfg(feature = "defmt")]
     pub fn log(&self, tick: u32) {
         for event in self.iter() {

@@ -1,7 +1,8 @@
-//! What a joint did, as records of fixed size: into a bounded queue in the tick, out of it and to the ground when there is time.
+//! What a joint did, as records of fixed size: into a bounded queue in the tick, out of it and to the ground when there
+//! is time.
 //!
-//! [`Recorder::record`] is called each tick and keeps every n-th ([`RateGroup`]). It never waits. Where a record goes, and what
-//! happens when there is no room, is a type:
+//! [`Recorder::record`] is called each tick and keeps every n-th ([`RateGroup`]). It never waits. Where a record goes,
+//! and what happens when there is no room, is a type:
 //!
 //! | sink | where reader and writer are | when full |
 //! |---|---|---|

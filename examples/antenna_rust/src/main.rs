@@ -1,8 +1,9 @@
-//! One joint of an antenna: a slew of 1.1° and back in four seconds, under a load that swings through zero, a thousand ticks a second.
+//! One joint of an antenna: a slew of 1.1° and back in four seconds, under a load that swings through zero, a thousand
+//! ticks a second.
 //!
-//! Printed every 20 ms: time, load, what the drive is off by, and how far the output is from its target with the correction. There is
-//! no drive here: the motor is taken to stand where it was told to, and the output where the table says.
-//! `tests/firmware/src/bin/antenna.rs` flies the same calls against contact FEM.
+//! Printed every 20 ms: time, load, what the drive is off by, and how far the output is from its target with the
+//! correction. There is no drive here: the motor is taken to stand where it was told to, and the output where the table
+//! says. `tests/firmware/src/bin/antenna.rs` flies the same calls against contact FEM.
 #![no_std]
 #![no_main]
 

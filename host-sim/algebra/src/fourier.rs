@@ -13,8 +13,8 @@ pub fn spectrum(values: &mut [f64]) -> Vec<Complex<f64>> {
     sums
 }
 
-/// Back from the [`spectrum`] of `length` values, times their number; the spectrum is lost. The imaginary parts at zero and, for
-/// an even length, at the end belong to no real values and are left out.
+/// Back from the [`spectrum`] of `length` values, times their number; the spectrum is lost. The imaginary parts at zero
+/// and, for an even length, at the end belong to no real values and are left out.
 #[must_use]
 pub fn values_of(sums: &mut [Complex<f64>], length: usize) -> Vec<f64> {
     let transform = RealFftPlanner::new().plan_fft_inverse(length);

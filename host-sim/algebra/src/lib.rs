@@ -1,7 +1,7 @@
 //! Factors and products of matrices (faer) and Fourier transforms (realfft), for `f64` alone.
 //!
-//! Both libraries are generic: a crate that calls them compiles them. They are called here and nowhere else, so that a change of
-//! the simulation does not compile them again.
+//! Both libraries are generic: a crate that calls them compiles them. They are called here and nowhere else, so that a
+//! change of the simulation does not compile them again.
 #![forbid(unsafe_code)]
 
 mod dense;

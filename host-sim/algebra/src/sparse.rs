@@ -9,8 +9,8 @@ use faer::{Conj, MatMut, Par, Side};
 
 use crate::NotPositiveDefinite;
 
-/// `A = L Lᵀ` of a symmetric positive definite matrix, of which the lower triangle is stored column by column: the rows of column
-/// `j` are `rows[column_starts[j]..column_starts[j + 1]]`, ascending.
+/// `A = L Lᵀ` of a symmetric positive definite matrix, of which the lower triangle is stored column by column: the rows
+/// of column `j` are `rows[column_starts[j]..column_starts[j + 1]]`, ascending.
 pub struct SparseCholesky {
     symbolic: SymbolicCholesky<u32>,
     factor: Vec<f64>,

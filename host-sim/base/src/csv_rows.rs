@@ -1,8 +1,9 @@
-//! Rows of a CSV file that this project defines (samples, paths): read strictly, so that what does not fit is refused. Other people's files
-//! are read by the reader of the crate `flexspline-identify`.
+//! Rows of a CSV file that this project defines (samples, paths): read strictly, so that what does not fit is refused.
+//! Other people's files are read by the reader of the crate `flexspline-identify`.
 //!
-//! Commas between fields, a point in numbers, fields quoted where needed, `#` lines comments, blank lines nothing, lines ended by
-//! LF or CRLF, a byte order mark passed over. What a field must hold is for the caller to say; here stands where it was found.
+//! Commas between fields, a point in numbers, fields quoted where needed, `#` lines comments, blank lines nothing,
+//! lines ended by LF or CRLF, a byte order mark passed over. What a field must hold is for the caller to say; here
+//! stands where it was found.
 
 use std::io::{BufRead, BufReader, Read};
 

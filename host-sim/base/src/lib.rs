@@ -1,4 +1,5 @@
-//! What every part computes and writes with: units, statistics, rows of CSV, TOML read with its lines, files written whole.
+//! What every part computes and writes with: units, statistics, rows of CSV, TOML read with its lines, files written
+//! whole.
 #![forbid(unsafe_code)]
 
 pub mod csv_rows;

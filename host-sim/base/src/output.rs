@@ -3,8 +3,8 @@
 //! A reader never sees a half-written file, and a run that fails or is stopped leaves the files of the run before it as
 //! they were. The files of one run appear together ([`Outputs`]).
 //!
-//! Whatever is on disk and no output yet is known in one place, so that a process that is told to end can clear up at once,
-//! wherever its threads are ([`abandon`]).
+//! Whatever is on disk and no output yet is known in one place, so that a process that is told to end can clear up at
+//! once, wherever its threads are ([`abandon`]).
 
 use std::fs;
 use std::io::{self, BufWriter, Write};
@@ -74,8 +74,8 @@ impl Drop for Hidden {
     }
 }
 
-/// Removes all that is unfinished, and lets nothing be begun or finished any more: for a process that is about to end. True if
-/// outputs of it stand in their place already.
+/// Removes all that is unfinished, and lets nothing be begun or finished any more: for a process that is about to end.
+/// True if outputs of it stand in their place already.
 pub fn abandon() -> bool {
     let mut unfinished = unfinished();
     for path in std::mem::take(&mut unfinished.hidden).iter().rev() {

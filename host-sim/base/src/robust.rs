@@ -31,7 +31,8 @@ pub fn median_of(values: &mut [f64]) -> f64 {
     quantile_of(values, 0.5)
 }
 
-/// Median and robust standard deviation (1.4826 times the median absolute deviation) of `values`, which are overwritten.
+/// Median and robust standard deviation (1.4826 times the median absolute deviation) of `values`, which are
+/// overwritten.
 pub fn median_and_std(values: &mut [f64]) -> (f64, f64) {
     let median = median_of(values);
     for value in values.iter_mut() {
@@ -45,8 +46,9 @@ pub fn sampled(values: &[f64]) -> Vec<f64> {
     values.iter().copied().step_by(values.len().div_ceil(ENOUGH).max(1)).collect()
 }
 
-/// Standard deviation of the white part of the noise of `series`, taken in order: what differences of neighbours leave, order 1 to
-/// 4, each freed of a polynomial of one degree more; the least of them, since a signal that is smooth from row to row only adds.
+/// Standard deviation of the white part of the noise of `series`, taken in order: what differences of neighbours leave,
+/// order 1 to 4, each freed of a polynomial of one degree more; the least of them, since a signal that is smooth from
+/// row to row only adds.
 pub fn white_noise<'a>(series: impl IntoIterator<Item = &'a [f64]>) -> f64 {
     let mut differences: [Vec<f64>; 4] = Default::default();
     for rows in series {

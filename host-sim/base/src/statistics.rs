@@ -142,8 +142,9 @@ pub fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
     (scale > 0.0).then(|| product / scale)
 }
 
-/// The quantile of a sorted sample, with the interval of its order statistics: ranks between which a binomial variable lies with
-/// probability [`CONFIDENCE`]. Points of a scrambled net scatter less than independent ones, so that it then holds more often.
+/// The quantile of a sorted sample, with the interval of its order statistics: ranks between which a binomial variable
+/// lies with probability [`CONFIDENCE`]. Points of a scrambled net scatter less than independent ones, so that it then
+/// holds more often.
 pub fn quantile(sorted: &[f64], share: f64) -> Quantile {
     let n = sorted.len();
     let rank = (share * n as f64).ceil() as usize;
@@ -217,7 +218,8 @@ mod tests {
         assert!((student(11) - 2.228).abs() < 3e-3 && (student(31) - 2.042).abs() < 1e-3 && student(8) == 2.365);
     }
 
-    /// Ranks by hand: of 100 numbers the median lies between the 40th and the 61st (Conover, Practical Nonparametric Statistics).
+    /// Ranks by hand: of 100 numbers the median lies between the 40th and the 61st (Conover, Practical Nonparametric
+    /// Statistics).
     #[test]
     fn ranks_of_a_median_are_those_of_the_books() {
         let sorted: Vec<f64> = (1..=100).map(f64::from).collect();

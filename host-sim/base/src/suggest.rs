@@ -1,8 +1,9 @@
 //! What somebody who misspelt a name may have meant: one rule for keys, columns, effects, generators and units.
 //!
-//! Case and the signs between words do not count. A known name is suggested if it differs by at most one letter in three (Damerau
-//! and Levenshtein: letters changed, left out, put in, exchanged), has its words cut short, in another order or but for the unit at the end, or if one of the two
-//! is a whole word of the other at its beginning or end. Anything farther is no suggestion: a wrong one costs more than none.
+//! Case and the signs between words do not count. A known name is suggested if it differs by at most one letter in
+//! three (Damerau and Levenshtein: letters changed, left out, put in, exchanged), has its words cut short, in another
+//! order or but for the unit at the end, or if one of the two is a whole word of the other at its beginning or end.
+//! Anything farther is no suggestion: a wrong one costs more than none.
 
 use strsim::damerau_levenshtein;
 
@@ -23,8 +24,8 @@ pub fn likeliest<'k>(found: &str, known: impl IntoIterator<Item = &'k str>) -> O
         .and_then(|(_, name)| (name != found).then_some(name))
 }
 
-/// The path of `known`, `section.key`, that `found` is likely to mean: the same key in a section like the one found, or one there that
-/// goes on where it ends; the same key in any other; else a key like it.
+/// The path of `known`, `section.key`, that `found` is likely to mean: the same key in a section like the one found, or
+/// one there that goes on where it ends; the same key in any other; else a key like it.
 #[must_use]
 pub fn likeliest_path<'k>(found: &str, known: &[&'k str]) -> Option<&'k str> {
     fn split(path: &str) -> (&str, &str) {
@@ -69,7 +70,8 @@ fn words(name: &str) -> Vec<String> {
     name.to_lowercase().split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty()).map(str::to_owned).collect()
 }
 
-/// How far two names are apart: letters that differ, and which rule found it; `None` if nobody would mean the one by the other.
+/// How far two names are apart: letters that differ, and which rule found it; `None` if nobody would mean the one by
+/// the other.
 fn distance(found: &[String], known: &[String]) -> Option<(usize, usize)> {
     let (a, b) = (found.concat(), known.concat());
     if a.is_empty() || b.is_empty() {

@@ -1,7 +1,7 @@
 //! Reading TOML files: every mistake of a file named at once, each by line, field, value found and what is allowed.
 //!
-//! Drives, nominal models and what a diagnosis adds to either are read by these parts: `TomlFile` keeps what is wrong with a file,
-//! `Section` is a table of it, and `real`, `whole`, `one_of`, `each_of` and `Entries` read values.
+//! Drives, nominal models and what a diagnosis adds to either are read by these parts: `TomlFile` keeps what is wrong
+//! with a file, `Section` is a table of it, and `real`, `whole`, `one_of`, `each_of` and `Entries` read values.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -160,8 +160,8 @@ impl<'a> TomlFile<'a> {
         Some(Section { path: key.to_owned(), entries: self.take(key, entries)? })
     }
 
-    /// Refuses every key whose path is not among `known`, nor leads to one of them; `left_out` are read by others. The paths in arrays
-    /// are those of one entry.
+    /// Refuses every key whose path is not among `known`, nor leads to one of them; `left_out` are read by others. The
+    /// paths in arrays are those of one entry.
     pub fn refuse_unknown_keys(&mut self, table: &DeTable<'_>, known: &[&str], left_out: &[&str]) {
         self.refuse_unknown_keys_in("", table, known, left_out);
     }

@@ -12,8 +12,8 @@ use flexspline_sim::stepping::{Method, Problem, SolverSettings};
 
 /// One increment of the generator, rad.
 pub const STEP_RAD: f64 = 0.01;
-/// Increments before anything is timed: the predictor then knows states of more than 14 tooth pitches of HHD-95, and three of
-/// them at almost the phase of the next.
+/// Increments before anything is timed: the predictor then knows states of more than 14 tooth pitches of HHD-95, and
+/// three of them at almost the phase of the next.
 pub const SETTLING: usize = 50;
 
 /// CPU time of all threads of the process: what others run on the machine does not count.
@@ -60,8 +60,8 @@ pub fn problem(kind: GeneratorKind, method: Method) -> Problem {
     Problem::new(&drive, kind, drive.temperature.reference_c, settings).expect("HHD-95 is sound")
 }
 
-/// A drive that turns forward under a load. Every increment is a new one: the solver remembers where it was, and one that is
-/// repeated would be predicted by its own answer.
+/// A drive that turns forward under a load. Every increment is a new one: the solver remembers where it was, and one
+/// that is repeated would be predicted by its own answer.
 pub struct Run<'p> {
     pub motion: Motion<'p>,
     pub step_rad: f64,
@@ -82,8 +82,8 @@ impl<'p> Run<'p> {
         Run::settled(motion, step_rad, increments)
     }
 
-    /// The same for the reference solver, which takes over from the fast one: deforming and loading the drive by itself takes it
-    /// longer than all that is timed here.
+    /// The same for the reference solver, which takes over from the fast one: deforming and loading the drive by itself
+    /// takes it longer than all that is timed here.
     pub fn taken_over(problem: &'p Problem, torque_n_m: f64, step_rad: f64, increments: usize) -> Run<'p> {
         let fast = self::problem(problem.kind, Method::Fast);
         let before = Run::new(&fast, torque_n_m, step_rad, 5).motion;

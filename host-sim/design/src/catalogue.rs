@@ -1,8 +1,9 @@
 //! What a catalogue prints of its sizes, for the `[data_sheet]` of a drive that is made like one of them.
 //!
-//! The figures are those of Harmonic Drive's CSF and CSG cups (Harmonic Drive LLC, CSF/CSG catalogue, pages 14 and 49; Harmonic Drive AG,
-//! HFUS-2A 1019658, 11/2014): stiffness and its ranges, which both series share, ratcheting torque and accuracy of each, rated torque
-//! of the CSG. That of the CSF is not in these sources. They also say that a single unit may be 30 % off the stiffness.
+//! The figures are those of Harmonic Drive's CSF and CSG cups (Harmonic Drive LLC, CSF/CSG catalogue, pages 14 and 49;
+//! Harmonic Drive AG, HFUS-2A 1019658, 11/2014): stiffness and its ranges, which both series share, ratcheting torque
+//! and accuracy of each, rated torque of the CSG. That of the CSF is not in these sources. They also say that a single
+//! unit may be 30 % off the stiffness.
 
 use serde::Deserialize;
 
@@ -83,7 +84,8 @@ fn rows() -> Vec<Row> {
 mod tests {
     use super::*;
 
-    /// As the catalogue's page has them; both series share the stiffness, and neither has what the other alone is sold with.
+    /// As the catalogue's page has them; both series share the stiffness, and neither has what the other alone is sold
+    /// with.
     #[test]
     fn a_size_has_its_own_figures() {
         let csg = sheet("CSG", 32.0, 80).unwrap();

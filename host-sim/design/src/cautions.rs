@@ -1,7 +1,8 @@
-//! What has to be said beside figures that converged as well as any: that they are not to be built, or not to be believed.
+//! What has to be said beside figures that converged as well as any: that they are not to be built, or not to be
+//! believed.
 //!
-//! The model is elastic and plane and does not mind teeth that interfere on the drawing, steel that yields, or an error so steep that no
-//! command undoes it. Each of these is one [`Caution`], with the value found and its limit.
+//! The model is elastic and plane and does not mind teeth that interfere on the drawing, steel that yields, or an error
+//! so steep that no command undoes it. Each of these is one [`Caution`], with the value found and its limit.
 
 use serde::Serialize;
 
@@ -9,16 +10,19 @@ use crate::simulate::PlaceStress;
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::drive::{Drive, GeneratorKind, RigidMesh};
 
-/// Von Mises stress above which steel of a flexspline yields, MPa. A guess in the middle: quenched and tempered nickel-chromium-molybdenum
-/// steels (34CrNiMo6, EN 10083-3: 900 to 1000 MPa of yield strength in thin sections; precipitation-hardened ones have more).
+/// Von Mises stress above which steel of a flexspline yields, MPa. A guess in the middle: quenched and tempered
+/// nickel-chromium-molybdenum steels (34CrNiMo6, EN 10083-3: 900 to 1000 MPa of yield strength in thin sections;
+/// precipitation-hardened ones have more).
 pub const YIELD_MPA: f64 = 1000.0;
-/// Pressure between flanks that no steel bears for long, MPa. A guess below what ISO 76 allows once of rolling bearings (4000 to 4600 MPa).
+/// Pressure between flanks that no steel bears for long, MPa. A guess below what ISO 76 allows once of rolling bearings
+/// (4000 to 4600 MPa).
 pub const MOST_FLANK_PRESSURE_MPA: f64 = 3000.0;
-/// Slope of the error over the generator's motion from which on the inverse is in doubt; at 1 there is none. A guess: half way.
+/// Slope of the error over the generator's motion from which on the inverse is in doubt; at 1 there is none. A guess:
+/// half way.
 pub const MOST_SLOPE: f64 = 0.5;
 
-/// Room of rigid teeth as built, arcsec, below which they wedge more than rim and sleeve give way. A guess: three times what `HHD-95-typical`
-/// lacks (94 arcsec), whose teeth bear it at 1150 MPa.
+/// Room of rigid teeth as built, arcsec, below which they wedge more than rim and sleeve give way. A guess: three times
+/// what `HHD-95-typical` lacks (94 arcsec), whose teeth bear it at 1150 MPa.
 pub const LEAST_ROOM_ARCSEC: f64 = -300.0;
 
 /// One thing to know before figures are used.
@@ -39,12 +43,14 @@ pub struct Caution {
 pub struct Looked {
     /// Least gap of the rigid teeth of the drawing, µm.
     pub rigid_gap_um: Option<f64>,
-    /// What rigid teeth as built leave the output to turn at the tightest place of its turn, arcsec; missing of a drive that is as drawn.
+    /// What rigid teeth as built leave the output to turn at the tightest place of its turn, arcsec; missing of a drive
+    /// that is as drawn.
     pub room_as_built_arcsec: Option<f64>,
     /// Largest von Mises stress at a node, MPa.
     pub max_von_mises_mpa: Option<f64>,
-    /// Largest von Mises stress in the root fillets by the strain of their surface, MPa. In a fillet the nodal value of a mesh is too low, by a
-    /// third and more; on bore and flanks it is all there is. So the larger of both is looked at.
+    /// Largest von Mises stress in the root fillets by the strain of their surface, MPa. In a fillet the nodal value of
+    /// a mesh is too low, by a third and more; on bore and flanks it is all there is. So the larger of both is looked
+    /// at.
     pub root_fillet_mpa: Option<f64>,
     /// Largest pressure between flanks, MPa, as Hertz has it and the limit means it.
     pub peak_flank_pressure_mpa: Option<f64>,
@@ -65,13 +71,15 @@ impl Looked {
         };
         say("rigid_gap_um", self.rigid_gap_um, -1.0, -1e3 * RigidMesh::TOUCHES_MM, |gap| {
             format!(
-                "the teeth of the drawing interfere by {:.1} um when rigid: such a drive binds; drive --check says where",
+                "the teeth of the drawing interfere by {:.1} um when rigid: such a drive binds; drive --check says \
+                 where",
                 -gap
             )
         });
         say("room_as_built_arcsec", self.room_as_built_arcsec, -1.0, LEAST_ROOM_ARCSEC, |room| {
             format!(
-                "the teeth as built lack {:.0} arcsec of room at the tightest place of a turn, more than {} arcsec: rim and sleeve have to give way",
+                "the teeth as built lack {:.0} arcsec of room at the tightest place of a turn, more than {} arcsec: \
+                 rim and sleeve have to give way",
                 -room, -LEAST_ROOM_ARCSEC
             )
         });
@@ -82,12 +90,14 @@ impl Looked {
         }
         say("peak_flank_pressure_mpa", self.peak_flank_pressure_mpa, 1.0, MOST_FLANK_PRESSURE_MPA, |pressure| {
             format!(
-                "a flank pressure of {pressure:.0} MPa is above {MOST_FLANK_PRESSURE_MPA} MPa, which no steel bears for long"
+                "a flank pressure of {pressure:.0} MPa is above {MOST_FLANK_PRESSURE_MPA} MPa, which no steel bears \
+                 for long"
             )
         });
         say("slope_bound", self.slope_bound, 1.0, MOST_SLOPE, |slope| {
             format!(
-                "the error changes by up to {slope:.2} of the motion; from 1 on no command undoes it, from {MOST_SLOPE} on it is in doubt"
+                "the error changes by up to {slope:.2} of the motion; from 1 on no command undoes it, from \
+                 {MOST_SLOPE} on it is in doubt"
             )
         });
         cautions
@@ -112,11 +122,13 @@ const OVER_MESHES: &str = "stress";
 
 fn above_yield(stress_mpa: f64, place: &str) -> String {
     format!(
-        "a stress of {stress_mpa:.0} MPa{place} is above {YIELD_MPA} MPa, where steel yields, which the model does not do"
+        "a stress of {stress_mpa:.0} MPa{place} is above {YIELD_MPA} MPa, where steel yields, which the model does \
+         not do"
     )
 }
 
-/// Adds what has to be said of stress over three meshes. It takes the place of what one mesh says, which is worse known.
+/// Adds what has to be said of stress over three meshes. It takes the place of what one mesh says, which is worse
+/// known.
 pub fn add_stress(cautions: &mut Vec<Caution>, stress: &[PlaceStress]) {
     let Some(worst) = stress.iter().max_by(|a, b| a.von_mises_mpa.total_cmp(&b.von_mises_mpa)) else { return };
     let value = worst.von_mises_mpa;
@@ -127,14 +139,15 @@ pub fn add_stress(cautions: &mut Vec<Caution>, stress: &[PlaceStress]) {
     }
 }
 
-/// Least gap between the rigid teeth of the drawing over a mesh cycle, µm; negative where they interfere. Missing where they never meet.
+/// Least gap between the rigid teeth of the drawing over a mesh cycle, µm; negative where they interfere. Missing where
+/// they never meet.
 pub fn rigid_gap_um(drive: &Drive, kind: GeneratorKind) -> Option<f64> {
     let least = RigidMesh::new(drive, kind).ok()?.least()?;
     Some(1e3 * least.gap_mm)
 }
 
-/// What rigid teeth leave the output of a drive as built to turn at the tightest place of its turn, arcsec; negative where they bind.
-/// Missing of a drive that is as drawn: [`rigid_gap_um`] says all of it.
+/// What rigid teeth leave the output of a drive as built to turn at the tightest place of its turn, arcsec; negative
+/// where they bind. Missing of a drive that is as drawn: [`rigid_gap_um`] says all of it.
 pub fn room_as_built_arcsec(drive: &Drive, kind: GeneratorKind) -> Option<f64> {
     drive.as_built.first_not_uniform()?;
     let room = RigidMesh::new(drive, kind).ok()?.room_as_built(drive, kind)?;
@@ -165,7 +178,8 @@ mod tests {
         assert_eq!(figures(Looked { slope_bound: Some(0.6), ..sound }), ["slope_bound"]);
     }
 
-    /// A nodal value of 664 MPa beside 1204 in a root fillet: the drive is no sounder for it. The larger is told, once, under its name.
+    /// A nodal value of 664 MPa beside 1204 in a root fillet: the drive is no sounder for it. The larger is told, once,
+    /// under its name.
     #[test]
     fn stress_is_judged_by_the_larger_of_nodal_and_root_fillet() {
         let told = |nodal, fillet| {

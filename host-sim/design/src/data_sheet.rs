@@ -1,10 +1,11 @@
-//! The figures that a catalogue prints of a drive, by contact FEM: backlash, stiffness in three ranges of torque, lost motion,
-//! transmission error, stresses.
+//! The figures that a catalogue prints of a drive, by contact FEM: backlash, stiffness in three ranges of torque, lost
+//! motion, transmission error, stresses.
 //!
-//! The generator is held at angle 0, without load, and the output is loaded step by step to [`Loads::largest_n_m`]; then the drive
-//! turns on by a tooth pitch under that load. Stiffness is told as catalogues tell it (Harmonic Drive, CSF/CSG, "torsional stiffness"):
-//! K1 from the first contact to T1, K2 from T1 to T2, K3 above T2, secants of the torsion of the output. The clearance of the teeth is
-//! no part of it. An ideal drive is its own mirror image and is loaded one way; any other is loaded both ways where the clearance counts.
+//! The generator is held at angle 0, without load, and the output is loaded step by step to [`Loads::largest_n_m`];
+//! then the drive turns on by a tooth pitch under that load. Stiffness is told as catalogues tell it (Harmonic Drive,
+//! CSF/CSG, "torsional stiffness"): K1 from the first contact to T1, K2 from T1 to T2, K3 above T2, secants of the
+//! torsion of the output. The clearance of the teeth is no part of it. An ideal drive is its own mirror image and is
+//! loaded one way; any other is loaded both ways where the clearance counts.
 
 use flexspline::{Direction, GeneratorAngle, Table};
 use serde::Serialize;
@@ -19,11 +20,13 @@ use flexspline_mechanics::stepping::{Problem, SolveError, SolverSettings};
 
 /// T1 and T2 over the largest load: of a CSF-25-100 they are 14 and 48 of 67 N·m.
 const RANGES: [f64; 2] = [0.21, 0.72];
-/// Share of the largest load, either way, between which lost motion is told (Harmonic Drive AG, glossary, "lost motion").
+/// Share of the largest load, either way, between which lost motion is told (Harmonic Drive AG, glossary, "lost
+/// motion").
 const LOST_MOTION_SHARE: f64 = 0.04;
 /// A light touch, over the largest load: it closes the clearance and winds nothing up.
 const TOUCH_SHARE: f64 = 2e-4;
-/// An ideal drive whose output stands further than this (rad) from the middle when deformed has teeth that bind: it went to one side.
+/// An ideal drive whose output stands further than this (rad) from the middle when deformed has teeth that bind: it
+/// went to one side.
 const TO_ONE_SIDE_RAD: f64 = 1e-8;
 /// A touch overcomes the drag of the output so many times.
 const TOUCH_OVER_DRAG: f64 = 2.0;
@@ -62,8 +65,8 @@ pub struct Stiffness {
 }
 
 impl Stiffness {
-    /// That of a table of `drive`, forward loads up to the table's largest, at reference temperature, in the middle between both
-    /// directions of motion; none where the table does not reach beyond the drag.
+    /// That of a table of `drive`, forward loads up to the table's largest, at reference temperature, in the middle
+    /// between both directions of motion; none where the table does not reach beyond the drag.
     pub fn of_table(drive: &Drive, table: &Table<'_>) -> Option<Stiffness> {
         let largest_n_m = f64::from(table.torque_nodes_n_m().last()?);
         let loads = Loads::up_to(largest_n_m);
@@ -94,9 +97,11 @@ pub(crate) fn touch_n_m(drive: &Drive, loads: Loads) -> f64 {
 /// What a catalogue prints. A figure is missing where the drive was not brought so far.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct DataSheet {
-    /// Least gap between the rigid teeth of the drawing over a mesh cycle, µm; negative where they interfere. Missing where they never meet.
+    /// Least gap between the rigid teeth of the drawing over a mesh cycle, µm; negative where they interfere. Missing
+    /// where they never meet.
     pub rigid_gap_um: Option<f64>,
-    /// What rigid teeth as built leave the output to turn at the tightest place of its turn, arcsec; missing of a drive as drawn.
+    /// What rigid teeth as built leave the output to turn at the tightest place of its turn, arcsec; missing of a drive
+    /// as drawn.
     pub room_as_built_arcsec: Option<f64>,
     /// Turn of the output between light touches either way, arcsec.
     pub backlash_arcsec: Option<f64>,
@@ -110,13 +115,14 @@ pub struct DataSheet {
     pub k3_n_m_per_rad: Option<f64>,
     /// Turn of the output from first contact to the largest load, arcsec.
     pub wind_up_arcsec: Option<f64>,
-    /// Kinematic error over a tooth pitch under the largest load, peak to peak, arcsec: of the wave through the positions, of a drive that repeats
-    /// with the pitch.
+    /// Kinematic error over a tooth pitch under the largest load, peak to peak, arcsec: of the wave through the
+    /// positions, of a drive that repeats with the pitch.
     pub kinematic_error_pp_arcsec: Option<f64>,
-    /// Largest von Mises stress under the largest load, MPa: a nodal value, which grows with the mesh at roots and contacts.
+    /// Largest von Mises stress under the largest load, MPa: a nodal value, which grows with the mesh at roots and
+    /// contacts.
     pub max_von_mises_mpa: Option<f64>,
-    /// Largest von Mises stress in the root fillets of the flexspline, MPa, by the strain of their surface: `simulate --stress` says what it tends
-    /// to with the mesh.
+    /// Largest von Mises stress in the root fillets of the flexspline, MPa, by the strain of their surface:
+    /// `simulate --stress` says what it tends to with the mesh.
     pub root_fillet_mpa: Option<f64>,
     /// The largest on the bore, MPa, nodal.
     pub bore_mpa: Option<f64>,

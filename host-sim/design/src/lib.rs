@@ -1,8 +1,9 @@
 //! A drive on paper: what contact FEM says of it.
 //!
-//! [`simulate`] runs one drive along one path, [`tables`] makes and validates the table that firmware reads, [`data_sheet`] gives the
-//! figures of a data sheet and [`stated`] compares them with those of a maker, [`study`] compares variants, [`campaign`] draws
-//! drives from tolerances, [`kernels`] holds what small deviations of the surfaces do to the error.
+//! [`simulate`] runs one drive along one path, [`tables`] makes and validates the table that firmware reads,
+//! [`data_sheet`] gives the figures of a data sheet and [`stated`] compares them with those of a maker, [`study`]
+//! compares variants, [`campaign`] draws drives from tolerances, [`kernels`] holds what small deviations of the
+//! surfaces do to the error.
 #![forbid(unsafe_code)]
 
 pub mod campaign;

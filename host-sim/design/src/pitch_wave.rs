@@ -1,10 +1,10 @@
-//! The error over a tooth pitch from a few places of it: a smooth periodic wave is known better by the sum of sines through its samples than
-//! by the largest and smallest of them.
+//! The error over a tooth pitch from a few places of it: a smooth periodic wave is known better by the sum of sines
+//! through its samples than by the largest and smallest of them.
 
 use std::f64::consts::TAU;
 
-/// Places between two samples at which the wave is looked at. The highest wave that samples tell goes up and down between two of them: its crest
-/// is then found to `1 - cos(pi / 64)`, a thousandth of it.
+/// Places between two samples at which the wave is looked at. The highest wave that samples tell goes up and down
+/// between two of them: its crest is then found to `1 - cos(pi / 64)`, a thousandth of it.
 const BETWEEN: usize = 32;
 
 /// Largest less smallest of the wave of least order through samples at equal steps over one period.
@@ -45,7 +45,8 @@ mod tests {
         (0..count).map(|k| wave(from + TAU * k as f64 / count as f64)).collect()
     }
 
-    /// A closed form, wherever the samples begin: `cos x + a cos 2x` with a below 1/4 has its ends at 0 and π, and goes 2 from one to the other.
+    /// A closed form, wherever the samples begin: `cos x + a cos 2x` with a below 1/4 has its ends at 0 and π, and goes
+    /// 2 from one to the other.
     #[test]
     fn the_ends_of_a_wave_are_found_between_its_samples() {
         for from in [0.0, 0.1, 0.3, 0.39] {

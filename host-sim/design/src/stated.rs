@@ -11,9 +11,9 @@
 //! unit_scatter_percent = 30.0
 //! ```
 //!
-//! Every key may be left out. The computed figures are those of [`crate::data_sheet`] at the loads of the sheet. Three are computed for the
-//! sake of a stated one alone: the width of the hysteresis loop, whether the drive holds the ratcheting torque, and the torque that
-//! starts the generator.
+//! Every key may be left out. The computed figures are those of [`crate::data_sheet`] at the loads of the sheet. Three
+//! are computed for the sake of a stated one alone: the width of the hysteresis loop, whether the drive holds the
+//! ratcheting torque, and the torque that starts the generator.
 
 use serde::Serialize;
 
@@ -55,7 +55,8 @@ pub const KEYS: [&str; 13] = [
 
 /// The section as a comment, for files to be filled in.
 pub const TEMPLATE: &str = "
-# [data_sheet]  # what a catalogue prints of this drive; simulate and tables show what is computed beside it; any line may be left out
+# [data_sheet]  # what a catalogue prints of this drive; simulate and tables show what is computed beside it; any line \
+                            may be left out
 # source = \"catalogue, type\"
 # rated_torque_n_m = 0.0
 # t1_n_m = 0.0                 # K1 from first contact to T1
@@ -125,7 +126,8 @@ impl Stated {
             // Numbers and texts are written as in TOML.
             value => format!("{key} = {value}\n"),
         };
-        let head = "\n[data_sheet]  # what a catalogue prints; simulate and tables show what is computed beside it; any line may be left out\n";
+        let head = "\n[data_sheet]  # what a catalogue prints; simulate and tables show what is computed beside it; \
+                    any line may be left out\n";
         head.to_owned() + &KEYS.iter().map(line).collect::<String>()
     }
 
@@ -194,7 +196,8 @@ impl Stated {
         [self.t1_n_m, self.t2_n_m, self.rated_torque_n_m].iter().any(Option::is_some)
     }
 
-    /// The loads that it does not state, by their keys; the rated torque, too, if it is not above T2 and the largest load is another.
+    /// The loads that it does not state, by their keys; the rated torque, too, if it is not above T2 and the largest
+    /// load is another.
     pub fn assumed(&self) -> Vec<&'static str> {
         let rated = self.rated_torque_n_m.filter(|_| !self.is_rated_within_t2());
         let loads = [("t1_n_m", self.t1_n_m), ("t2_n_m", self.t2_n_m), ("rated_torque_n_m", rated)];
@@ -213,7 +216,8 @@ pub struct Beside {
     pub computed: Option<f64>,
     /// Computed over stated; missing where either is missing or nothing is stated.
     pub ratio: Option<f64>,
-    /// Whether the ratio is within the scatter of units that the sheet tells; missing where it tells none of this figure.
+    /// Whether the ratio is within the scatter of units that the sheet tells; missing where it tells none of this
+    /// figure.
     pub within_scatter: Option<bool>,
     /// What the computed figure is, and what it leaves out.
     pub words: &'static str,
@@ -299,7 +303,8 @@ pub fn beside(
             stated.accuracy_arcmin,
             arcmin(sheet.kinematic_error_pp_arcsec),
             None,
-            "over a tooth pitch under the rated torque; what errors of single teeth and axes add over a turn is no part of it",
+            "over a tooth pitch under the rated torque; what errors of single teeth and axes add over a turn is no \
+             part of it",
         ),
     ];
     let beside = figures
@@ -322,8 +327,8 @@ pub fn beside(
     }
 }
 
-/// Width of the loop at no load, arcmin: the drive is loaded to the rated torque one way and let go to a light touch, then the other.
-/// Without friction it comes back the way it went: the clearance alone.
+/// Width of the loop at no load, arcmin: the drive is loaded to the rated torque one way and let go to a light touch,
+/// then the other. Without friction it comes back the way it went: the clearance alone.
 fn hysteresis_arcmin(problem: &Problem, loads: Loads, sheet: &DataSheet) -> Result<f64, SolveError> {
     if problem.drive.flanks.friction_coefficient == 0.0
         && let Some(backlash) = sheet.backlash_arcsec
@@ -372,8 +377,9 @@ fn starting_n_m(problem: &Problem) -> Result<f64, SolveError> {
 }
 
 /// Why the stiffness of a table and that of a data sheet are told with other figures.
-pub const TWO_SETS_OF_K: &str = "K of a table is read off its nodes, with ranges that end at 21, 72 and 100 % of its largest torque, in the middle of both \
-                                 directions; K beside the data sheet is by secants of the FEM to the torques of the sheet";
+pub const TWO_SETS_OF_K: &str = "K of a table is read off its nodes, with ranges that end at 21, 72 and 100 % of its \
+                                 largest torque, in the middle of both directions; K beside the data sheet is by \
+                                 secants of the FEM to the torques of the sheet";
 
 impl SheetBeside {
     /// In lines, as the commands print it.
@@ -440,7 +446,8 @@ impl SheetBeside {
         match self.assumed.len() {
             0 => None,
             3 => Some(format!(
-                "not stated, so guessed: {keys}. The rated torque is what a table of this generator spans by default; {proportion}"
+                "not stated, so guessed: {keys}. The rated torque is what a table of this generator spans by default; \
+                 {proportion}"
             )),
             _ => Some(format!("not stated, so guessed: {keys}, from those that are; {proportion}")),
         }
@@ -610,8 +617,8 @@ mod tests {
         assert!(said.contains("108 N.m is not above T2, so t1_n_m, and the largest load"), "{said}");
     }
 
-    /// Friction of the flanks widens the loop; without it the loop is the clearance. A torque that the drive bears is held.
-    /// A sheet filled in with a figure in a wrong unit: every column is a word of its own.
+    /// Friction of the flanks widens the loop; without it the loop is the clearance. A torque that the drive bears is
+    /// held. A sheet filled in with a figure in a wrong unit: every column is a word of its own.
     #[test]
     fn columns_stand_apart_whatever_the_ratio() {
         let stated = Stated { k1_n_m_per_rad: Some(3.1), ..Stated::default() };

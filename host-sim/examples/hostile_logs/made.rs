@@ -1,4 +1,5 @@
-//! Files that nobody means: drives at work written down by loggers of any habit, degenerate in any way, and damaged. A pure function of the seed.
+//! Files that nobody means: drives at work written down by loggers of any habit, degenerate in any way, and damaged. A
+//! pure function of the seed.
 
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
@@ -10,8 +11,9 @@ pub const RATIO: f64 = -94.0;
 const ARCSEC: f64 = PI / 648_000.0;
 
 /// The model that the files are held against.
-pub const MODEL: &str = "[drive]\nflexspline_teeth = 188\ncircular_spline_teeth = 190\nfixed = \"circular_spline\"\n[nominal]\n\
-    stiffness_n_m_per_rad = 30000.0\nbacklash_arcsec = 60.0\nfriction_torque_n_m = 1.5\ntemperature_c = 20.0\n";
+pub const MODEL: &str = "[drive]\nflexspline_teeth = 188\ncircular_spline_teeth = 190\nfixed = \
+                         \"circular_spline\"\n[nominal]\nstiffness_n_m_per_rad = 30000.0\nbacklash_arcsec = \
+                         60.0\nfriction_torque_n_m = 1.5\ntemperature_c = 20.0\n";
 
 /// Texts that stand where a number is meant.
 const CELLS: [&str; 22] = [
@@ -61,7 +63,8 @@ pub fn log(seed: u64) -> Vec<u8> {
     bytes
 }
 
-/// How many rows: most are few, so that many files are tried; some are as many as a diagnosis needs, and as its slowest search.
+/// How many rows: most are few, so that many files are tried; some are as many as a diagnosis needs, and as its slowest
+/// search.
 fn rows(random: &mut Rng) -> usize {
     match random.u32(..1000) {
         0..=49 => random.usize(..4),
@@ -206,7 +209,8 @@ fn guide_log(random: &mut Rng) -> String {
         let hour = 20 + random.u32(..4);
         let _ = write!(
             text,
-            "Guiding Begins at 2026-10-0{} {hour}:{:02}:00\nPixel scale = {} arc-sec/px\nMount = M, xAngle = 30.0, xRate = {}, yRate = 4.9\n{}{}\n",
+            "Guiding Begins at 2026-10-0{} {hour}:{:02}:00\nPixel scale = {} arc-sec/px\nMount = M, xAngle = 30.0, \
+             xRate = {}, yRate = 4.9\n{}{}\n",
             1 + section % 2,
             random.u32(..60),
             one(random, &["1.50", "1,50", "0", "-1", "nan", "1e300"]),
@@ -221,7 +225,8 @@ fn guide_log(random: &mut Rng) -> String {
                 ]
             ),
         );
-        text += "Frame,Time,mount,dx,dy,RARawDistance,DECRawDistance,RAGuideDistance,DECGuideDistance,RADuration,RADirection,ErrorCode\n";
+        text += "Frame,Time,mount,dx,dy,RARawDistance,DECRawDistance,RAGuideDistance,DECGuideDistance,RADuration,\
+                 RADirection,ErrorCode\n";
         for k in 0..rows(random) {
             let t = [2.0, 0.0, -1.0, 1e8][if chance(random, 0.97) { 0 } else { random.usize(..4) }] * k as f64;
             let ms = random.u32(..900);

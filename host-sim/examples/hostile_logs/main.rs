@@ -1,11 +1,13 @@
-//! Files that nobody means, read by `look`, `calibrate`, `diagnose` and `replay`: `hostile_logs COUNT [FIRST_SEED [PROGRAM RUNS]]`
+//! Files that nobody means, read by `look`, `calibrate`, `diagnose` and `replay`:
+//! `hostile_logs COUNT [FIRST_SEED [PROGRAM RUNS]]`
 //!
-//! File `k` is a pure function of the seed `FIRST_SEED + k` (`made.rs`). Each is read in this program by the functions behind the four commands. None may
-//! panic or take ten seconds of a processor, and what is refused says why. RUNS of them go through PROGRAM, the command itself, too: it ends with 0, 1
-//! or 2, with a message on stderr where it is not 0, as the functions did here, and leaves nothing half-written.
+//! File `k` is a pure function of the seed `FIRST_SEED + k` (`made.rs`). Each is read in this program by the functions
+//! behind the four commands. None may panic or take ten seconds of a processor, and what is refused says why. RUNS of
+//! them go through PROGRAM, the command itself, too: it ends with 0, 1 or 2, with a message on stderr where it is not
+//! 0, as the functions did here, and leaves nothing half-written.
 //!
-//! The screen has how each command ended, how often, and the slowest file. It ends with 1 if anything was wrong; each line of that has the seed:
-//! `hostile_logs 1 SEED` does it again, and `hostile_logs write SEED FILE` writes the file.
+//! The screen has how each command ended, how often, and the slowest file. It ends with 1 if anything was wrong; each
+//! line of that has the seed: `hostile_logs 1 SEED` does it again, and `hostile_logs write SEED FILE` writes the file.
 
 mod made;
 

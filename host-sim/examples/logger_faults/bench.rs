@@ -16,7 +16,8 @@ const FINER: usize = 8;
 const ROWS: [f64; 2] = [8000.0, 20_000.0];
 /// Rows per second.
 const RATE_HZ: [f64; 2] = [100.0, 1000.0];
-/// Fastest speed of the generator, rad/s, and how far it may turn in a row, rad: a logger is chosen for the speed of its bench.
+/// Fastest speed of the generator, rad/s, and how far it may turn in a row, rad: a logger is chosen for the speed of
+/// its bench.
 const SPEED: [f64; 2] = [4.0, 120.0];
 const TURNS_IN_A_ROW_RAD: f64 = 0.2;
 /// Largest load as a share of the rated one.
@@ -24,7 +25,8 @@ const LOAD: [f64; 2] = [0.3, 0.9];
 /// Noise of the output's encoder, arcsec; that of the torque as a share of its range.
 const NOISE_ARCSEC: [f64; 2] = [0.5, 4.0];
 const TORQUE_NOISE: [f64; 2] = [2e-4, 2e-3];
-/// Time in which the output goes from one flank to the other where nothing holds it, s: of most benches, and of those with a large load.
+/// Time in which the output goes from one flank to the other where nothing holds it, s: of most benches, and of those
+/// with a large load.
 const FLANK_S: f64 = 0.004;
 const SLOW_FLANK_S: [f64; 2] = [0.006, 0.03];
 /// A unit is within so many standard deviations of its drawing.
@@ -118,7 +120,8 @@ impl Bench {
         self.rows = rows / self.sessions;
     }
 
-    /// What a perfect unit of the drive does in each session; `ratio_off` is by how much its ratio is another than the model's.
+    /// What a perfect unit of the drive does in each session; `ratio_off` is by how much its ratio is another than the
+    /// model's.
     pub fn run(&self, drive: &Drive<'_>, ratio_off: f64, chance: &mut Chance) -> Vec<Truth> {
         let unit = Unit::drawn(drive, chance);
         let mut begin_s = 0.0;

@@ -80,10 +80,12 @@ impl Wrong {
         name
     }
 
-    /// Faults of the data by which it is told rightly; empty where no record can show it, or where it is none of the logger.
+    /// Faults of the data by which it is told rightly; empty where no record can show it, or where it is none of the
+    /// logger.
     pub fn told_as(self) -> &'static [&'static str] {
         match self {
-            // One angle against the other says nothing of a clock that is fast; nor is it wrong. Slow flanks are the bench's.
+            // One angle against the other says nothing of a clock that is fast; nor is it wrong. Slow flanks are the
+            // bench's.
             Wrong::Nothing | Wrong::FastClock | Wrong::MotorRipple | Wrong::SlowFlanks => &[],
             Wrong::JitterOfReads => &["read_jitter"],
             Wrong::LateRows => &["read_jitter", "outliers"],
@@ -208,7 +210,8 @@ fn shows(wrong: Wrong, bench: &Bench, drive: &Drive<'_>, truths: &[Truth], sessi
     let rows = sessions.iter().map(Vec::len).sum::<usize>() as f64;
     match wrong {
         Wrong::RegisterWraps => count(&|[before, after]| (after[GENERATOR] - before[GENERATOR]).abs() > TAU) > 0,
-        // A load that is put on in steps may never come near the zero; below friction the flank stays, whatever is read.
+        // A load that is put on in steps may never come near the zero; below friction the flank stays, whatever is
+        // read.
         Wrong::TorqueZero => {
             let other_side = |(truth, rows): (&Truth, &Vec<Row>)| {
                 let friction = drive.subject.nominal.friction_torque_n_m;

@@ -1,14 +1,17 @@
 //! Perfect drives under faults of loggers: `logger_faults COUNT SEED FILE.csv [TABLES [FAULT]]`
 //!
-//! Record i of a fault is a pure function of the seed, the fault and i: a drive of a catalogue's model or of a table made by FEM, which is
-//! what its model says within the spread between units; a bench that moves and loads it; and a logger with one thing wrong, made as
-//! loggers make it. None of it may yield a cause, as nothing is wrong with the drive, and the fault is to be told by its name.
+//! Record i of a fault is a pure function of the seed, the fault and i: a drive of a catalogue's model or of a table
+//! made by FEM, which is what its model says within the spread between units; a bench that moves and loads it; and a
+//! logger with one thing wrong, made as loggers make it. None of it may yield a cause, as nothing is wrong with the
+//! drive, and the fault is to be told by its name.
 //!
-//! For each fault the screen has of how many records a cause was named, the fault was told, the drive was not understood or could not be
-//! read. The rows go to the file. TABLES is a folder of tables made by `flexspline tables` from the drive built in; without it, or with `-`,
-//! all drives are of models. With a FAULT there is only that one, and its logs and models are left beside the file.
+//! For each fault the screen has of how many records a cause was named, the fault was told, the drive was not
+//! understood or could not be read. The rows go to the file. TABLES is a folder of tables made by `flexspline tables`
+//! from the drive built in; without it, or with `-`, all drives are of models. With a FAULT there is only that one, and
+//! its logs and models are left beside the file.
 //!
-//! It ends with 1 if a cause was named in more than 3 % of all records, or if fewer than nine in ten of the faults were told.
+//! It ends with 1 if a cause was named in more than 3 % of all records, or if fewer than nine in ten of the faults were
+//! told.
 
 mod bench;
 mod chance;
@@ -31,13 +34,13 @@ use flexspline_sim::measurement::ColumnMap;
 use logger::{Log, Wrong, log};
 use rayon::prelude::*;
 
-/// Share of the faults that have to be told, and of the records in which a cause may be named: none should, and 2 of 112 were when this was
-/// written.
+/// Share of the faults that have to be told, and of the records in which a cause may be named: none should, and 2 of
+/// 112 were when this was written.
 const TOLD: f64 = 0.9;
 const MAY_BE_NAMED: f64 = 0.03;
 
-/// Teeth of flexspline and circular spline, the wheel that stands, stiffness N·m/rad, backlash arcsec, friction N·m, harmonics (order,
-/// arcsec), rated load N·m: drives of a catalogue's kind, not of any catalogue.
+/// Teeth of flexspline and circular spline, the wheel that stands, stiffness N·m/rad, backlash arcsec, friction N·m,
+/// harmonics (order, arcsec), rated load N·m: drives of a catalogue's kind, not of any catalogue.
 type Catalogue = (u32, u32, &'static str, f64, f64, f64, &'static [[f64; 2]], f64);
 const CATALOGUE: [Catalogue; 4] = [
     (188, 190, "flexspline", 30_000.0, 60.0, 1.5, &[[2.0, 10.0], [4.0, 3.0]], 60.0),
@@ -49,13 +52,15 @@ const CATALOGUE: [Catalogue; 4] = [
 /// `nominal.toml` of a drive.
 fn model_text((flexspline, circular, fixed, stiffness, backlash, friction, harmonics, _): Catalogue) -> String {
     let mut text = format!(
-        "[drive]\nflexspline_teeth = {flexspline}\ncircular_spline_teeth = {circular}\nfixed = \"{fixed}\"\n[nominal]\n\
-         stiffness_n_m_per_rad = {stiffness:.1}\nbacklash_arcsec = {backlash:.1}\nfriction_torque_n_m = {friction:.1}\n"
+        "[drive]\nflexspline_teeth = {flexspline}\ncircular_spline_teeth = {circular}\nfixed = \
+         \"{fixed}\"\n[nominal]\nstiffness_n_m_per_rad = {stiffness:.1}\nbacklash_arcsec = \
+         {backlash:.1}\nfriction_torque_n_m = {friction:.1}\n"
     );
     for (number, [order, amplitude]) in harmonics.iter().enumerate() {
         let _ = write!(
             text,
-            "[[nominal.harmonic]]\norder_per_generator_turn = {order:.1}\namplitude_arcsec = {amplitude:.1}\nphase_rad = {:.1}\n",
+            "[[nominal.harmonic]]\norder_per_generator_turn = {order:.1}\namplitude_arcsec = \
+             {amplitude:.1}\nphase_rad = {:.1}\n",
             0.4 + 0.7 * number as f64
         );
     }

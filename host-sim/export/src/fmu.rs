@@ -1,6 +1,8 @@
-//! FMUs for co-simulation with FMI 2.0: description, resources, page and libraries in one zip (section 2.3 of the standard).
+//! FMUs for co-simulation with FMI 2.0: description, resources, page and libraries in one zip (section 2.3 of the
+//! standard).
 //!
-//! The libraries are those of `flexspline-fmu`, the same in every FMU. What is simulated is in the resources, so nobody needs a compiler.
+//! The libraries are those of `flexspline-fmu`, the same in every FMU. What is simulated is in the resources, so nobody
+//! needs a compiler.
 
 mod description;
 mod libraries;
@@ -41,7 +43,8 @@ pub fn compensation(image: Vec<u8>) -> Result<Fmu, String> {
     Fmu::new(ModelKind::Compensation, &[("temperature", USUAL_C.clamp(coldest, warmest))], image, None)
 }
 
-/// A joint with mass: the drive that a table describes, compensated with that table; without one the scenario's unit and table, as
+/// A joint with mass: the drive that a table describes, compensated with that table; without one the scenario's unit
+/// and table, as
 /// [`flexspline_fly::fly`] flies them.
 ///
 /// # Errors

@@ -1,7 +1,7 @@
 //! The drive as an input deck for CalculiX (2.20) and Abaqus: the same mesh, contact, holding and load.
 //!
-//! Keywords and their meaning are those of the CalculiX CrunchiX 2.20 user's manual; all of them are Abaqus keywords too.
-//! Lengths mm, forces N, stresses MPa. The model is a slice of 1 mm: forces and moments are per mm of face width.
+//! Keywords and their meaning are those of the CalculiX CrunchiX 2.20 user's manual; all of them are Abaqus keywords
+//! too. Lengths mm, forces N, stresses MPa. The model is a slice of 1 mm: forces and moments are per mm of face width.
 //!
 //! | part | in the deck |
 //! |---|---|
@@ -13,29 +13,31 @@
 //! | circular spline | every node of its outer circle on one rotation, the node `OUTPUT`, which carries the load |
 //!
 //! Steps: `1` the generator takes its form, the circular spline away from the teeth (contact removed); `2` the circular
-//! spline is turned against the teeth by a little more than the rigid clearance; `3` it is let go and the load comes on; then
-//! one for each rotation increment, and if wanted a last one to another load.
+//! spline is turned against the teeth by a little more than the rigid clearance; `3` it is let go and the load comes
+//! on; then one for each rotation increment, and if wanted a last one to another load.
 //!
 //! What differs from our model:
-//! * Flanks are the faces of the elements, parabolas through three points of the involute (1 nm off it on the standard mesh),
-//!   and tips are sharp: the rounding of a tip is in our contact but in no mesh. 0.03 mm of it is 0.05 to 0.08″ of output at
-//!   50 N·m, and all that CalculiX and we differ by beyond its own scatter.
-//! * The circular spline turns by a linear equation, which stretches it by `theta²/2`: at an output angle of 1e-3 rad its
-//!   teeth stand 25 nm too far out, 0.05″ of output. Ours turns exactly. Its small strains are Green-Lagrange here, linear in
-//!   ours.
-//! * Springs of [`STABILISING_TORSION`] on the output and [`STABILISING_LATERAL`] on the bore hold what nothing else holds
-//!   before the parts touch. The first takes 1e-4 rad times itself off the load: 0.1 N mm of 2500.
-//! * The Coulomb drag of the output is left out: [`Deck::new`] refuses a drive that has it rather than drop it silently.
-//! * CalculiX pairs points of the faces once in an increment and keeps to the tangents there ([`generator`]). Teeth and cam
-//!   slide too little in a step for that to show. The rim creeps along two rollers by 0.1 mm as 20 N·m come on, which leaves
-//!   the output 19″ of 600″ behind. Rollers therefore stand for [`STANDS`] more steps after each load and one after each
-//!   rotation, which pair again and move nothing: two rollers on the coarse mesh are then 0.9″ from ours, 0.4″ of it the
-//!   stretch above. (One run with these steps put in by hand; the peer check compares the cam.)
+//! * Flanks are the faces of the elements, parabolas through three points of the involute (1 nm off it on the standard
+//!   mesh), and tips are sharp: the rounding of a tip is in our contact but in no mesh. 0.03 mm of it is 0.05 to 0.08″
+//!   of output at 50 N·m, and all that CalculiX and we differ by beyond its own scatter.
+//! * The circular spline turns by a linear equation, which stretches it by `theta²/2`: at an output angle of 1e-3 rad
+//!   its teeth stand 25 nm too far out, 0.05″ of output. Ours turns exactly. Its small strains are Green-Lagrange here,
+//!   linear in ours.
+//! * Springs of [`STABILISING_TORSION`] on the output and [`STABILISING_LATERAL`] on the bore hold what nothing else
+//!   holds before the parts touch. The first takes 1e-4 rad times itself off the load: 0.1 N mm of 2500.
+//! * The Coulomb drag of the output is left out: [`Deck::new`] refuses a drive that has it rather than drop it
+//!   silently.
+//! * CalculiX pairs points of the faces once in an increment and keeps to the tangents there ([`generator`]). Teeth and
+//!   cam slide too little in a step for that to show. The rim creeps along two rollers by 0.1 mm as 20 N·m come on,
+//!   which leaves the output 19″ of 600″ behind. Rollers therefore stand for [`STANDS`] more steps after each load and
+//!   one after each rotation, which pair again and move nothing: two rollers on the coarse mesh are then 0.9″ from
+//!   ours, 0.4″ of it the stretch above. (One run with these steps put in by hand; the peer check compares the cam.)
 //! * Within a step the nodes of the generator move along straight lines: only states at the ends of steps count.
 //!
-//! Abaqus was not at hand: that it reads the deck is a claim from its documented syntax, not from a run. The second number
-//! under `*FRICTION` is CalculiX's stick slope; Abaqus takes it for a slip rate, which changes nothing where there is one row.
-//! A degree of freedom 3 that is held has a meaning only for CalculiX, which makes bricks of plane elements.
+//! Abaqus was not at hand: that it reads the deck is a claim from its documented syntax, not from a run. The second
+//! number under `*FRICTION` is CalculiX's stick slope; Abaqus takes it for a slip rate, which changes nothing where
+//! there is one row. A degree of freedom 3 that is held has a meaning only for CalculiX, which makes bricks of plane
+//! elements.
 
 mod generator;
 mod holding;
@@ -64,8 +66,8 @@ pub const STABILISING_TORSION: f64 = 1e3;
 pub const STABILISING_LATERAL: f64 = 1.0;
 /// Modulus of the generator, MPa: all its nodes are prescribed, and what strains it must not enter the force balance.
 const GENERATOR_MODULUS: f64 = 1.0;
-/// How far the circular spline is turned against the teeth before the load, in rigid clearances: enough that many bear, about
-/// 50 N·m under the cam. Fewer (1.2) made CalculiX hesitate which.
+/// How far the circular spline is turned against the teeth before the load, in rigid clearances: enough that many bear,
+/// about 50 N·m under the cam. Fewer (1.2) made CalculiX hesitate which.
 const BEARING_TURN: f64 = 1.5;
 
 /// Steps in which a loaded roller drive stands, to pair its faces again.
@@ -92,18 +94,20 @@ pub enum DeckError {
     Outline(#[from] DriveError),
     /// Drag on the output.
     #[error(
-        "output.drag_torque_n_m: found {0}, and a deck has no Coulomb drag on the output; allowed: 0 \
-         (--set output.drag_torque_n_m=0)"
+        "output.drag_torque_n_m: found {0}, and a deck has no Coulomb drag on the output; allowed: 0 (--set \
+         output.drag_torque_n_m=0)"
     )]
     Drag(f64),
     /// A sleeve in three dimensions.
     #[error(
-        "sleeve.kind: found \"{0}\", and a deck is plane where it has contact; allowed: \"springs\", \"none\" (--set sleeve.kind=springs)"
+        "sleeve.kind: found \"{0}\", and a deck is plane where it has contact; allowed: \"springs\", \"none\" (--set \
+         sleeve.kind=springs)"
     )]
     Shells(&'static str),
     /// An end of the sleeve that the deck in three dimensions has not.
     #[error(
-        "sleeve.{field}: found \"{found}\", and the deck in three dimensions has no plates; allowed: {allowed} (--set sleeve.{field}=…)"
+        "sleeve.{field}: found \"{found}\", and the deck in three dimensions has no plates; allowed: {allowed} (--set \
+         sleeve.{field}=…)"
     )]
     End {
         /// Field of the sleeve.
@@ -167,7 +171,8 @@ pub struct Deck {
     pub outer: Vec<usize>,
     /// Faces of the bore, the flanks of the flexspline, those of the circular spline, the generator.
     pub surfaces: [Vec<Face>; 4],
-    /// Node whose first degree of freedom is the output angle (rad), and the second the displacement of the outer circle (mm).
+    /// Node whose first degree of freedom is the output angle (rad), and the second the displacement of the outer
+    /// circle (mm).
     pub output: usize,
     generator: GeneratorBody,
     /// Number of the first node of the generator.
@@ -460,8 +465,8 @@ impl Deck {
     fn write_step(&self, out: &mut dyn Write, k: usize, step: &Step) -> io::Result<()> {
         let [_, fs_flanks, cs_flanks, _] = SURFACES;
         writeln!(out, "** step {}: generator at {} rad", k + 1, short(step.generator_rad))?;
-        // One increment to a step; the program halves it where it has to. Where flanks meet it finds its way in less than half the
-        // iterations from a first step of half the way: 22 for 55 with the cam on the coarse mesh.
+        // One increment to a step; the program halves it where it has to. Where flanks meet it finds its way in less
+        // than half the iterations from a first step of half the way: 22 for 55 with the cam on the coarse mesh.
         let first = if step.flanks == Flanks::Added { "0.5" } else { "1." };
         writeln!(out, "*STEP, NLGEOM, INC=200\n*STATIC\n{first}, 1.")?;
         let change = match step.flanks {

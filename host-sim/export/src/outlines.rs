@@ -18,8 +18,8 @@ pub struct OutlinePoint {
 }
 
 /// The whole outline of a flexspline tooth and of a circular-spline space, from the root land on the side of negative
-/// angles over the tip to that of positive angles (for the space from tip land to tip land), and the closed curves of the
-/// generator, `per_piece` intervals to a piece. Joints appear in both pieces that meet there.
+/// angles over the tip to that of positive angles (for the space from tip land to tip land), and the closed curves of
+/// the generator, `per_piece` intervals to a piece. Joints appear in both pieces that meet there.
 pub fn outlines(drive: &Drive, kind: GeneratorKind, per_piece: usize) -> Result<Vec<OutlinePoint>, DriveError> {
     let mut points = Vec::new();
     for (part, profile) in

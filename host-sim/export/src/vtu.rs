@@ -1,8 +1,8 @@
 //! VTK unstructured grids (`.vtu`) and their series (`.pvd`), for ParaView and anything else that reads VTK XML.
 //!
 //! Both wheels stand where they are: points are the deformed positions in the global frame. Cells are
-//! `VTK_QUADRATIC_QUAD` (23), whose node order is ours: four corners counter-clockwise, then the midsides of edges 0-1, 1-2,
-//! 2-3, 3-0.
+//! `VTK_QUADRATIC_QUAD` (23), whose node order is ours: four corners counter-clockwise, then the midsides of edges 0-1,
+//! 1-2, 2-3, 3-0.
 //!
 //! | field | on | what |
 //! |---|---|---|
@@ -101,7 +101,8 @@ pub fn write_vtu(out: &mut dyn Write, problem: &Problem, state: &State) -> io::R
     writeln!(out, "</Piece>\n</UnstructuredGrid>\n</VTKFile>")
 }
 
-/// Writes the list of a series. Its time is the step: the generator angle of a reversing run comes back to where it was.
+/// Writes the list of a series. Its time is the step: the generator angle of a reversing run comes back to where it
+/// was.
 pub fn write_pvd(out: &mut dyn Write, frames: &[Frame]) -> io::Result<()> {
     writeln!(out, r#"<?xml version="1.0"?>"#)?;
     writeln!(out, r#"<VTKFile type="Collection" version="1.0" byte_order="LittleEndian">"#)?;

@@ -1,16 +1,18 @@
 //! The whole flexspline in three dimensions as a VTK unstructured grid: toothed rim and tubes, deformed.
 //!
-//! The rim is the plane mesh at places across its face (`VTK_HEXAHEDRON`, 12, between them): each node moves as its plane slice does, and
-//! beside the middle of the face by tilt and skew of the rim. The tubes are their middle surfaces (`VTK_QUAD`, 9). Both follow the waves
-//! of the rim, n of 2 and more, that the contact FEM found ([`flexspline_mechanics::sleeve`]); what turns or shifts the flexspline as a body
-//! (n = 0 and 1) is on the plane slice alone.
+//! The rim is the plane mesh at places across its face (`VTK_HEXAHEDRON`, 12, between them): each node moves as its
+//! plane slice does, and beside the middle of the face by tilt and skew of the rim. The tubes are their middle surfaces
+//! (`VTK_QUAD`, 9). Both follow the waves of the rim, n of 2 and more, that the contact FEM found
+//! ([`flexspline_mechanics::sleeve`]); what turns or shifts the flexspline as a body (n = 0 and 1) is on the plane
+//! slice alone.
 //!
 //! | field | on | what |
 //! |---|---|---|
 //! | `displacement` | points | from the undeformed flexspline to here, mm; z is the axis, from the flange to the bottom |
 //! | `part` | cells | 0 toothed rim, 1 tube to the flange, 2 tube to the bottom |
 //!
-//! Points are deformed positions, mm; a filter such as ParaView's Warp By Vector makes more of them. Arrays as in [`super::vtu`].
+//! Points are deformed positions, mm; a filter such as ParaView's Warp By Vector makes more of them. Arrays as in
+//! [`super::vtu`].
 
 use std::f64::consts::TAU;
 use std::io::{self, Write};
@@ -219,7 +221,8 @@ mod tests {
     use flexspline_mechanics::mesh::MeshLevel;
     use flexspline_mechanics::stepping::{Method, SolverSettings};
 
-    /// Where rim and tube meet they move together; the bottom of a cup stays round; and at the open end the cone is widest.
+    /// Where rim and tube meet they move together; the bottom of a cup stays round; and at the open end the cone is
+    /// widest.
     #[test]
     fn the_parts_of_a_cup_hang_together() {
         let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };

@@ -1,7 +1,9 @@
-//! The functions of FMI 2.0 (section 2.1.1: a library exports them by these names), with our own declarations of its types.
+//! The functions of FMI 2.0 (section 2.1.1: a library exports them by these names), with our own declarations of its
+//! types.
 //!
-//! A component is a number that is looked up, and never a pointer that is followed: a call with one that was freed, or that never was, is
-//! refused. Pointers to arrays and strings are read as the standard says they are, null pointers are refused. No panic gets out.
+//! A component is a number that is looked up, and never a pointer that is followed: a call with one that was freed, or
+//! that never was, is refused. Pointers to arrays and strings are read as the standard says they are, null pointers are
+//! refused. No panic gets out.
 
 use std::collections::BTreeMap;
 use std::ffi::{CStr, CString, c_char, c_int, c_uint, c_void};
@@ -18,7 +20,8 @@ pub type Component = *mut c_void;
 /// `fmi2FMUstate`.
 pub type FmuState = *mut c_void;
 
-/// `fmi2CallbackLogger`: environment, name of the instance, status, category, message in the form of `printf`, its arguments.
+/// `fmi2CallbackLogger`: environment, name of the instance, status, category, message in the form of `printf`, its
+/// arguments.
 pub type Logger = unsafe extern "C" fn(*mut c_void, *const c_char, c_int, *const c_char, *const c_char, ...);
 
 /// `fmi2CallbackFunctions` (section 2.1.5).
@@ -90,7 +93,8 @@ unsafe fn list_mut<'a, T>(pointer: *mut T, count: usize) -> Option<&'a mut [T]> 
     }
 }
 
-/// Calls with the instance of a component. One that is in a call already, from a callback or another thread, is refused.
+/// Calls with the instance of a component. One that is in a call already, from a callback or another thread, is
+/// refused.
 fn with(component: Component, call: impl FnOnce(&mut Instance) -> c_int) -> c_int {
     let done = catch_unwind(AssertUnwindSafe(|| {
         let shared = instances().get(&component.addr()).cloned();
@@ -155,8 +159,8 @@ pub unsafe extern "C" fn fmi2SetDebugLogging(
     })
 }
 
-/// A log that goes to the importer, or nowhere. What means something to `printf`, or to the standard (section 2.1.5: `#` begins a
-/// reference to a variable), is doubled.
+/// A log that goes to the importer, or nowhere. What means something to `printf`, or to the standard (section 2.1.5:
+/// `#` begins a reference to a variable), is doubled.
 fn log_to(Callbacks { logger, environment, .. }: Callbacks, name: CString) -> Log {
     let environment = environment.expose_provenance();
     Box::new(move |status, category, message| {

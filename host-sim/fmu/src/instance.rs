@@ -1,10 +1,12 @@
 //! One simulation: what an importer may call when, its values, its time, and its state as bytes.
 //!
-//! States and calls are those of sections 2.1.6 to 2.1.8 and 4.2.4 of the standard. A call that is not allowed is refused: it returns an error with a
-//! line in the log, and nothing changes. A model that cannot go on ends in [`State::Failed`].
+//! States and calls are those of sections 2.1.6 to 2.1.8 and 4.2.4 of the standard. A call that is not allowed is
+//! refused: it returns an error with a line in the log, and nothing changes. A model that cannot go on ends in
+//! [`State::Failed`].
 //!
-//! A model has ticks of a fixed time. A communication step does all ticks that end within it; what is left of the step is carried over
-//! to the next. An input holds from the point at which it was set on, or changes with the derivative that was given for the step.
+//! A model has ticks of a fixed time. A communication step does all ticks that end within it; what is left of the step
+//! is carried over to the next. An input holds from the point at which it was set on, or changes with the derivative
+//! that was given for the step.
 
 use std::collections::BTreeMap;
 use std::ffi::{CStr, CString};
@@ -115,7 +117,8 @@ fn made(resources: &Resources, values: &[f64]) -> Result<Box<dyn Model>, String>
     })
 }
 
-/// A tick that ends this part of a tick after the step still belongs to it: communication points are sums of rounded numbers.
+/// A tick that ends this part of a tick after the step still belongs to it: communication points are sums of rounded
+/// numbers.
 const SLACK: f64 = 1e-3;
 /// Most ticks in one communication step: a slip in the unit of time is told, and does not run for hours. *Guess*.
 const MOST_TICKS: f64 = 1e8;
@@ -466,7 +469,8 @@ impl Instance {
     /// Goes on from bytes.
     ///
     /// # Errors
-    /// Why they are no state of this description; then nothing changes, or, where the model itself cannot take them up, it has failed.
+    /// Why they are no state of this description; then nothing changes, or, where the model itself cannot take them up,
+    /// it has failed.
     pub fn go_on_from(&mut self, bytes: &[u8]) -> Result<(), String> {
         let words = self.words(bytes)?;
         let (&[state, set_up, start, stops, stop, time, ticks, has_model], rest) =

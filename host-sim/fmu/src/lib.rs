@@ -1,10 +1,12 @@
 //! The compensation of a strain wave drive, and a joint with mass, behind the C interface of FMI 2.0 for co-simulation.
 //!
-//! The library is the same in every FMU. What it simulates, with which table and which start values, is in the FMU's resources
-//! ([`resources`]); which variables there are is in [`variables`], for the library and for who writes `modelDescription.xml`.
+//! The library is the same in every FMU. What it simulates, with which table and which start values, is in the FMU's
+//! resources ([`resources`]); which variables there are is in [`variables`], for the library and for who writes
+//! `modelDescription.xml`.
 //! [`instance`] is the state machine of the standard, in safe code; [`abi`] is nothing but pointers.
 //!
-//! Facts about FMI are from "Functional Mock-up Interface for Model Exchange and Co-Simulation", version 2.0.4; sections are named.
+//! Facts about FMI are from "Functional Mock-up Interface for Model Exchange and Co-Simulation", version 2.0.4;
+//! sections are named.
 #![deny(unsafe_code)]
 
 #[allow(unsafe_code, non_snake_case)] // Pointers from C, and the names of the standard.

@@ -1,8 +1,9 @@
-//! What lies in the folder `resources` of an FMU: `model.txt`, `table.fxt`, and for a joint `drive.bin` and `designed.bin`.
+//! What lies in the folder `resources` of an FMU: `model.txt`, `table.fxt`, and for a joint `drive.bin` and
+//! `designed.bin`.
 //!
-//! `model.txt` has lines `name = value`: `model`, `guid`, and start values of variables that differ from the usual. `table.fxt` is the table of
-//! the compensation. `drive.bin` is the drive that moves, `designed.bin` what is known of it without a measurement (where it is missing: the
-//! same), as little-endian `f64` ([`Gear::numbers`]).
+//! `model.txt` has lines `name = value`: `model`, `guid`, and start values of variables that differ from the usual.
+//! `table.fxt` is the table of the compensation. `drive.bin` is the drive that moves, `designed.bin` what is known of
+//! it without a measurement (where it is missing: the same), as little-endian `f64` ([`Gear::numbers`]).
 
 use std::path::{Path, PathBuf};
 
@@ -143,8 +144,8 @@ impl Resources {
     }
 }
 
-/// The path that a `file:` URI names (section 2.1.5: the unzipped folder `resources`), percent-decoded, without the slash before a drive letter
-/// of Windows; a path that is none is taken as it is, as some importers give it.
+/// The path that a `file:` URI names (section 2.1.5: the unzipped folder `resources`), percent-decoded, without the
+/// slash before a drive letter of Windows; a path that is none is taken as it is, as some importers give it.
 ///
 /// # Errors
 /// Another scheme, another host, or bad escapes.

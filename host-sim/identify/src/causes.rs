@@ -1,9 +1,10 @@
 //! The causes of the library, and everything that belongs to a cause but its laws.
 //!
-//! A [`CauseName`] says what the cause is called, in words and in files, which orders it makes, what its misfit may be taken for, what
-//! data have to hold to speak of it, whether a table or a drive can hold it, and which parameters it has. Every property is an
-//! exhaustive match: the compiler asks a new cause for each of them. The laws are not here: the diagnosis fits its own
-//! (`crate::diagnosis::candidate`), and [`crate::synthesize`] hides others, so that a mistake in one does not hide in the other.
+//! A [`CauseName`] says what the cause is called, in words and in files, which orders it makes, what its misfit may be
+//! taken for, what data have to hold to speak of it, whether a table or a drive can hold it, and which parameters it
+//! has. Every property is an exhaustive match: the compiler asks a new cause for each of them. The laws are not here:
+//! the diagnosis fits its own (`crate::diagnosis::candidate`), and [`crate::synthesize`] hides others, so that a
+//! mistake in one does not hide in the other.
 
 mod parameter;
 
@@ -383,7 +384,8 @@ impl CauseName {
     pub const fn does(self) -> &'static str {
         match self {
             CauseName::CircularSplineEccentricity => {
-                "its axis beside the axis of the generator: two waves in a turn of the generator against the circular spline"
+                "its axis beside the axis of the generator: two waves in a turn of the generator against the circular \
+                 spline"
             }
             CauseName::FlexsplineRunout => "its axis beside the axis of the generator: two waves in a generator turn",
             CauseName::CircularSplineOvality => "pressed out of round: two waves in a turn against the circular spline",
@@ -612,14 +614,15 @@ impl CauseName {
         }
     }
 
-    /// Whether something that is no cause of the library makes just the same, whatever is recorded: a shaft that is bent or misaligned before
-    /// the encoder of the output, two waves in a turn like an encoder that is tilted.
+    /// Whether something that is no cause of the library makes just the same, whatever is recorded: a shaft that is
+    /// bent or misaligned before the encoder of the output, two waves in a turn like an encoder that is tilted.
     #[must_use]
     pub const fn has_a_double_outside(self) -> bool {
         matches!(self, CauseName::OutputEncoderTilt)
     }
 
-    /// Whether a load on the output makes much the same: an error that goes with the speed, the direction or the angle of the output.
+    /// Whether a load on the output makes much the same: an error that goes with the speed, the direction or the angle
+    /// of the output.
     #[must_use]
     pub const fn is_made_by_loads(self) -> bool {
         matches!(

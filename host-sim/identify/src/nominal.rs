@@ -1,7 +1,7 @@
 //! A drive known only from its catalogue: `nominal.toml`.
 //!
-//! Nominal output = generator / ratio + harmonics + play (backlash, loaded by torque) + wind-up (torque). Angles are radians,
-//! errors arc-seconds at the output, torque N·m, positive where it turns the output forward.
+//! Nominal output = generator / ratio + harmonics + play (backlash, loaded by torque) + wind-up (torque). Angles are
+//! radians, errors arc-seconds at the output, torque N·m, positive where it turns the output forward.
 
 use std::sync::Arc;
 
@@ -152,8 +152,8 @@ impl Nominal {
             .sum()
     }
 
-    /// The teeth; of a model that gives a ratio alone, those of the strain wave drive of two waves that has it: `z_c / 2` with the
-    /// flexspline fixed, `-z_f / 2` with the circular spline fixed, and two teeth of difference.
+    /// The teeth; of a model that gives a ratio alone, those of the strain wave drive of two waves that has it:
+    /// `z_c / 2` with the flexspline fixed, `-z_f / 2` with the circular spline fixed, and two teeth of difference.
     #[must_use]
     pub fn teeth_or_of_two_waves(&self) -> Teeth {
         self.teeth.unwrap_or_else(|| {
@@ -166,8 +166,9 @@ impl Nominal {
         })
     }
 
-    /// What a table says of wind-up and backlash: the part of the error that is odd in the torque, at mid temperature; the backlash is
-    /// what is left of it as the torque goes to zero. Kinematic error is left to the table's own prediction.
+    /// What a table says of wind-up and backlash: the part of the error that is odd in the torque, at mid temperature;
+    /// the backlash is what is left of it as the torque goes to zero. Kinematic error is left to the table's own
+    /// prediction.
     #[must_use]
     pub fn of_table(table: &Table<'_>) -> Nominal {
         let drive = table.drive();
@@ -215,8 +216,8 @@ impl Nominal {
         }
     }
 
-    /// A commented `nominal.toml` to fill in, of a drive with these teeth and a fixed flexspline: every key with unit, meaning, sign
-    /// and what is allowed. It is read back as it stands.
+    /// A commented `nominal.toml` to fill in, of a drive with these teeth and a fixed flexspline: every key with unit,
+    /// meaning, sign and what is allowed. It is read back as it stands.
     #[must_use]
     pub fn template(flexspline_teeth: u32, circular_spline_teeth: u32) -> String {
         let Spread { stiffness, backlash, harmonic, .. } = USUAL_SPREAD;
@@ -232,10 +233,12 @@ flexspline_teeth = {flexspline_teeth}         # number of teeth; {fewest} to {mo
 circular_spline_teeth = {circular_spline_teeth}    # number of teeth; 1 to {MOST_TEETH_MORE} more than the flexspline
 fixed = \"flexspline\"           # the wheel that does not turn; \"flexspline\" or \"circular_spline\"
 # ratio = -100.0               # generator turns to one of the output, instead of the three above, for a gear of
-                               # another kind; negative: they turn opposite ways; 1 to {LARGEST_RATIO:e} or -{LARGEST_RATIO:e} to -1
+                               # another kind; negative: they turn opposite ways; 1 to {LARGEST_RATIO:e} or \
+             -{LARGEST_RATIO:e} to -1
 
 [nominal]
-# Torsional stiffness, N.m/rad, {STIFFNESS}: one number, or that from each torque (N.m, the first is 0) on, as catalogues
+# Torsional stiffness, N.m/rad, {STIFFNESS}: one number, or that from each torque (N.m, the first is 0) on, as \
+             catalogues
 # give K1, K2, K3 beyond the torques 0, T1, T2.
 stiffness_n_m_per_rad = [[0.0, 20000.0], [10.0, 27000.0], [30.0, 30000.0]]
 backlash_arcsec = 60.0         # whole width of the play at the output, arcsec; {BACKLASH}
@@ -244,14 +247,16 @@ temperature_c = 20.0           # at which these numbers hold, degrees C; {TEMPER
 
 [[nominal.harmonic]]  # kinematic error: amplitude sin(order generator + phase); once for each harmonic, or not at all
 order_per_generator_turn = 2.0 # periods to a turn of the generator, need not be whole; {ORDER}
-amplitude_arcsec = 10.0        # half of peak to peak, arcsec; positive: the output leads where the sine is positive; {AMPLITUDE}
+amplitude_arcsec = 10.0        # half of peak to peak, arcsec; positive: the output leads where the sine is positive; \
+             {AMPLITUDE}
 phase_rad = 0.0                # at generator angle 0, rad; {PHASE}
 
 [nominal.unit_to_unit]  # by how much units of this type differ without a fault: one standard deviation over the number
 stiffness = {stiffness:?}               # of the stiffness; {SHARE}; {stiffness} if left out
 backlash = {backlash:?}                # of the backlash; {SHARE}; {backlash} if left out
 harmonic = {harmonic:?}                 # of the harmonics, of their amplitude; {SHARE}; {harmonic} if left out
-# harmonic_phase_rad = 0.05    # of their phases, rad; {SHARE}; the number of the amplitudes if left out: a wave of any phase, so large
+# harmonic_phase_rad = 0.05    # of their phases, rad; {SHARE}; the number of the amplitudes if left out: a wave of \
+             any phase, so large
 "
         )
     }
@@ -432,9 +437,11 @@ fn ratio_and_teeth(file: &mut TomlFile<'_>, drive: &Section<'_, '_>) -> Option<(
 mod tests {
     use super::*;
 
-    const TEXT: &str = "[drive]\nflexspline_teeth = 188\ncircular_spline_teeth = 190\nfixed = \"flexspline\"\n[nominal]\n\
-        stiffness_n_m_per_rad = [[0.0, 20000.0], [10.0, 40000.0]]\nbacklash_arcsec = 60.0\nfriction_torque_n_m = 1.5\n\
-        [[nominal.harmonic]]\norder_per_generator_turn = 2.0\namplitude_arcsec = 10.0\nphase_rad = 0.4\n";
+    const TEXT: &str = "[drive]\nflexspline_teeth = 188\ncircular_spline_teeth = 190\nfixed = \
+                        \"flexspline\"\n[nominal]\nstiffness_n_m_per_rad = [[0.0, 20000.0], [10.0, \
+                        40000.0]]\nbacklash_arcsec = 60.0\nfriction_torque_n_m = \
+                        1.5\n[[nominal.harmonic]]\norder_per_generator_turn = 2.0\namplitude_arcsec = 10.0\nphase_rad \
+                        = 0.4\n";
 
     #[test]
     fn a_file_is_read() {
@@ -533,7 +540,8 @@ mod tests {
             (
                 "fixed = \"flexspline\"",
                 "fixed = \"circular-spline\"",
-                "n.toml:4: drive.fixed: found \"circular-spline\", allowed: \"flexspline\", \"circular_spline\"; did you mean `circular_spline`?",
+                "n.toml:4: drive.fixed: found \"circular-spline\", allowed: \"flexspline\", \"circular_spline\"; did \
+                 you mean `circular_spline`?",
             ),
             ("friction_torque_n_m", "qwertz", "n.toml:8: nominal.qwertz: unknown key; allowed: "),
         ] {

@@ -1,7 +1,8 @@
 //! The core run over measured rows, open loop: what it would have predicted, row by row.
 //!
-//! CSV with a header, columns in any order, further columns ignored, `#` lines comments. Needed are `generator_rad` and one of
-//! `output_rad` and `error_arcsec`; `torque_n_m` (else 0) and `temperature_c` (else that given) are used where present.
+//! CSV with a header, columns in any order, further columns ignored, `#` lines comments. Needed are `generator_rad` and
+//! one of `output_rad` and `error_arcsec`; `torque_n_m` (else 0) and `temperature_c` (else that given) are used where
+//! present.
 
 use std::path::Path;
 
@@ -92,13 +93,15 @@ pub struct RowsOf {
     pub drive_hash: String,
     /// Generator.
     pub generator: String,
-    /// BLAKE3 of the file, hex: the summary of a replay, which may take the place of that of the run, says of which file it is.
+    /// BLAKE3 of the file, hex: the summary of a replay, which may take the place of that of the run, says of which
+    /// file it is.
     #[serde(default)]
     pub rows_blake3: String,
 }
 
 impl RowsOf {
-    /// What `summary.json` beside the results of `simulate` says of them; nothing of any other file, or where there is none.
+    /// What `summary.json` beside the results of `simulate` says of them; nothing of any other file, or where there is
+    /// none.
     pub fn beside(data: &Path, bytes: &[u8]) -> Option<RowsOf> {
         let [results, summary] = RESULTS;
         if data.file_name()?.to_str()? != results {
@@ -150,8 +153,9 @@ impl ReplaySummary {
         }
         (left > measured).then(|| {
             format!(
-                "the table leaves {left:.1} arcsec rms where the rows have {measured:.1} without it: it gains nothing here, and no whole turns of the \
-                 motor change that; is it the table of this unit, and its generator zero that of the rows?"
+                "the table leaves {left:.1} arcsec rms where the rows have {measured:.1} without it: it gains nothing \
+                 here, and no whole turns of the motor change that; is it the table of this unit, and its generator \
+                 zero that of the rows?"
             )
         })
     }
@@ -258,7 +262,8 @@ pub fn replay(table: &Table<'_>, rows: &[MeasuredRow]) -> (Vec<ReplayedRow>, Rep
 mod tests {
     use super::*;
 
-    /// The summary of a run speaks of its results alone, and that of a replay, which may have taken its place, of the rows replayed.
+    /// The summary of a run speaks of its results alone, and that of a replay, which may have taken its place, of the
+    /// rows replayed.
     #[test]
     fn a_run_says_whose_rows_they_are() {
         let folder = tempfile::tempdir().unwrap();

@@ -1,8 +1,8 @@
 //! Whether the generator zero of measured rows is whole turns off that of a table.
 //!
-//! A table of a drive whose error does not repeat in each turn says another error a turn later. A motor that was homed in another turn
-//! reads the same within its turn, and the table adds the error of another place: it may leave more than there was. The rows show it by
-//! the turn at which the table leaves least of them.
+//! A table of a drive whose error does not repeat in each turn says another error a turn later. A motor that was homed
+//! in another turn reads the same within its turn, and the table adds the error of another place: it may leave more
+//! than there was. The rows show it by the turn at which the table leaves least of them.
 
 use flexspline::{GeneratorAngle, PlayState, Table};
 use serde::Serialize;
@@ -12,8 +12,9 @@ use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// Rows that a turn is looked for with, about.
 const LOOKED_AT: usize = 2000;
-/// The zero is said to be off if another turn leaves less than this share of what the table leaves as the rows stand. *Guess*: of an output
-/// eccentric once a turn a zero that is off by a turn of hundred leaves a sixteenth of it, which is next to nothing beside a residual.
+/// The zero is said to be off if another turn leaves less than this share of what the table leaves as the rows
+/// stand. *Guess*: of an output eccentric once a turn a zero that is off by a turn of hundred leaves a sixteenth of it,
+/// which is next to nothing beside a residual.
 const LEAVES: f64 = 0.7;
 /// Turns that leave less than this share more than the best are as likely. *Guess*.
 const AS_LIKELY: f64 = 1.05;
@@ -39,16 +40,18 @@ impl TurnsOff {
             if fewest == most { String::new() } else { format!(" ({fewest} to {most} leave about as little)") };
         let off = format!("{}{}", if *turns > 0 { "-" } else { "+" }, turns.abs());
         format!(
-            "the motor's zero is off by whole turns: the generator angle reads {} turns {ahead} than that of the table{likely}; the table leaves \
-             {rms_residual_arcsec:.1} arcsec rms as the rows stand, and {so:.1} without these turns. Home the motor in the turn of the table, or take \
-             them off: --columns generator=NAME:turn{off} (in the unit of the column; in rad {:+.6})",
+            "the motor's zero is off by whole turns: the generator angle reads {} turns {ahead} than that of the \
+             table{likely}; the table leaves {rms_residual_arcsec:.1} arcsec rms as the rows stand, and {so:.1} \
+             without these turns. Home the motor in the turn of the table, or take them off: --columns \
+             generator=NAME:turn{off} (in the unit of the column; in rad {:+.6})",
             turns.abs(),
             -std::f64::consts::TAU * *turns as f64
         )
     }
 }
 
-/// Looks for the turn at which the table leaves least of the rows; `None` if that is the one in which they stand, or is not clear.
+/// Looks for the turn at which the table leaves least of the rows; `None` if that is the one in which they stand, or is
+/// not clear.
 #[must_use]
 pub fn turns_off(table: &Table<'_>, rows: &[MeasuredRow]) -> Option<TurnsOff> {
     let some: Vec<&MeasuredRow> = rows.iter().step_by(rows.len().div_ceil(LOOKED_AT).max(1)).collect();

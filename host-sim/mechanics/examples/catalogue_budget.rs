@@ -1,14 +1,16 @@
-//! Which part of a drive gives how much of its torsion, hysteresis and loss, beside a catalogue: `catalogue_budget [SIZE …]`
+//! Which part of a drive gives how much of its torsion, hysteresis and loss, beside a catalogue:
+//! `catalogue_budget [SIZE …]`
 //!
-//! Sizes 17, 25 and 40, i = 100 (Harmonic Drive CSF). Module and teeth follow from the catalogue's pitch diameter; rim, width, clearance and
-//! tooth form are those of HHD-95 in proportion, cup and balls are guesses in proportion (`CUP`, [`Balls::in_proportion`]): no maker
-//! publishes them. Nothing is fitted to the catalogue.
+//! Sizes 17, 25 and 40, i = 100 (Harmonic Drive CSF). Module and teeth follow from the catalogue's pitch diameter; rim,
+//! width, clearance and tooth form are those of HHD-95 in proportion, cup and balls are guesses in proportion (`CUP`,
+//! [`Balls::in_proportion`]): no maker publishes them. Nothing is fitted to the catalogue.
 //!
-//! The same drive is computed by contact FEM with one part more at a time: teeth, rim and cam alone; the cup; the balls of the generator
-//! bearing, each range of torque with the stiffness that the balls have under its mean load. A difference of compliances is the part's.
+//! The same drive is computed by contact FEM with one part more at a time: teeth, rim and cam alone; the cup; the balls
+//! of the generator bearing, each range of torque with the stiffness that the balls have under its mean load. A
+//! difference of compliances is the part's.
 //!
-//! Once more with S-shaped teeth in place of the involutes, and then the loop: what flank friction makes of it by contact FEM, with and
-//! without preload, and bounds in closed form of what is not in the FEM (`race_on_bore`, `seal`).
+//! Once more with S-shaped teeth in place of the involutes, and then the loop: what flank friction makes of it by
+//! contact FEM, with and without preload, and bounds in closed form of what is not in the FEM (`race_on_bore`, `seal`).
 
 use std::f64::consts::PI;
 use std::process::ExitCode;
@@ -21,8 +23,8 @@ use flexspline_mechanics::motion::Motion;
 use flexspline_mechanics::sleeve::Flexspline3d;
 use flexspline_mechanics::stepping::{Method, Problem, SolveError, SolverSettings};
 
-/// What the catalogue has (Harmonic Drive CSF/CSG, i = 100; rated torque CSG over 1.3; starting, no-load torque at 2000 rpm and efficiency
-/// of Schaeffler's RT1, same sizes).
+/// What the catalogue has (Harmonic Drive CSF/CSG, i = 100; rated torque CSG over 1.3; starting, no-load torque at 2000
+/// rpm and efficiency of Schaeffler's RT1, same sizes).
 struct Catalogue {
     size: u32,
     /// T1, T2 and the rated torque, N·m.
@@ -56,10 +58,11 @@ const CATALOGUE: [Catalogue; 3] = [
     },
 ];
 
-/// Length and wall of the cup over its pitch diameter, thickness of its bottom over the wall, hub over the pitch radius. Guesses: a cup is
-/// about half as long as wide, its wall about a hundredth.
+/// Length and wall of the cup over its pitch diameter, thickness of its bottom over the wall, hub over the pitch
+/// radius. Guesses: a cup is about half as long as wide, its wall about a hundredth.
 const CUP: [f64; 4] = [0.5, 0.011, 2.0, 0.5];
-/// Teeth carry about so far to either side of the major axis, rad: for the share of two lobes in the cup's torsion. A tenth of all teeth.
+/// Teeth carry about so far to either side of the major axis, rad: for the share of two lobes in the cup's torsion. A
+/// tenth of all teeth.
 const LOBE_RAD: f64 = 0.16;
 /// Flank friction: greased steel.
 const FRICTION: f64 = 0.08;
@@ -69,17 +72,20 @@ const LOOP_SHARE: f64 = 0.04;
 const F0: f64 = 1.5;
 const F1: f64 = 5e-4;
 
-/// Preloads of S-shaped teeth, µm: drives of the catalogue have no play, and how much deeper their teeth mesh is not published.
+/// Preloads of S-shaped teeth, µm: drives of the catalogue have no play, and how much deeper their teeth mesh is not
+/// published.
 const PRELOADS_UM: [f64; 2] = [1.0, 3.0];
 /// Friction of the bearing's outer race in the bore: greased steel, as on the flanks.
 const RACE_FRICTION: f64 = 0.08;
-/// Friction of a seal's lip for each mm around, N: a lip pressed on with 0.1 N/mm (radial shaft seals: DIN 3760 sizes, maker's charts of lip
-/// loads reach from 0.05 to 0.15) and rubber on greased steel, 0.3. A guess; component sets have no seal at all.
+/// Friction of a seal's lip for each mm around, N: a lip pressed on with 0.1 N/mm (radial shaft seals: DIN 3760 sizes,
+/// maker's charts of lip loads reach from 0.05 to 0.15) and rubber on greased steel, 0.3. A guess; component sets have
+/// no seal at all.
 const SEAL_N_PER_MM: f64 = 0.03;
 
-/// Widest loop, arcsec at the output, that the outer race can make by slipping in the bore. All its normal force held by friction is a
-/// torque `mu F r` on the rim. It stays behind on the rim when the load goes, which gives it up over the torsional stiffness of what holds
-/// it; both ways, twice. A bound: the race may turn with the rim, since nothing but its balls holds it back.
+/// Widest loop, arcsec at the output, that the outer race can make by slipping in the bore. All its normal force held
+/// by friction is a torque `mu F r` on the rim. It stays behind on the rim when the load goes, which gives it up over
+/// the torsional stiffness of what holds it; both ways, twice. A bound: the race may turn with the rim, since nothing
+/// but its balls holds it back.
 fn race_on_bore(force_n: f64, bore_mm: f64, k_n_m_per_rad: f64) -> f64 {
     2.0 * 1e-3 * RACE_FRICTION * force_n * 0.5 * bore_mm / k_n_m_per_rad * ARCSEC_PER_RAD
 }
@@ -110,7 +116,8 @@ fn loaded(drive: &Drive, loads_n_m: [f64; 3]) -> Result<Loaded, SolveError> {
     let edges = problem.flexspline.base_edges.len() * problem.flexspline.teeth;
     let balls = Balls::in_proportion(2.0 * drive.flexspline.bore_radius_mm());
     let mut motion = Motion::deformed(&problem, 0.0)?;
-    // Balls under the part of the bore that the generator touches; along the axis of the lobe a load counts by its cosine, about its mean.
+    // Balls under the part of the bore that the generator touches; along the axis of the lobe a load counts by its
+    // cosine, about its mean.
     let carried = |motion: &Motion<'_>| {
         let last = motion.last();
         let share = last.generator_contacts as f64 / edges as f64;
@@ -135,7 +142,8 @@ fn loaded(drive: &Drive, loads_n_m: [f64; 3]) -> Result<Loaded, SolveError> {
     Ok(Loaded { k, ball_n, share_in_contact, sum_n: [unloaded.1, carried(&motion).1] })
 }
 
-/// Width of the loop by flank friction, arcsec: at a light load, or none, coming from the rated load and from the opposite one.
+/// Width of the loop by flank friction, arcsec: at a light load, or none, coming from the rated load and from the
+/// opposite one.
 fn loop_arcsec(drive: &Drive, rated_n_m: f64, share: f64) -> Result<f64, SolveError> {
     let mut rough = drive.clone();
     rough.flanks.friction_coefficient = FRICTION;
@@ -279,7 +287,8 @@ fn budget(entry: &Catalogue) -> Result<(), Box<dyn std::error::Error>> {
                 + load_torque_n_mm(F1, in_cup.sum_n[0], mean_mm))
         };
         println!(
-            "  bearing drag, {name}: at 1 rpm {:.3} N·m, 2000 rpm {:.3} N·m, 2000 rpm at −20 °C {:.3} N·m; catalogue start {}, 2000 rpm {}",
+            "  bearing drag, {name}: at 1 rpm {:.3} N·m, 2000 rpm {:.3} N·m, 2000 rpm at −20 °C {:.3} N·m; catalogue \
+             start {}, 2000 rpm {}",
             drag(20.0, 1.0),
             drag(20.0, 2000.0),
             drag(-20.0, 2000.0),

@@ -1,10 +1,11 @@
 //! The rolling bearing of a wave generator by closed forms: how balls give way, and what they cost.
 //!
-//! * **Approach** of a ball between two races of usual osculation, both contacts together: `4.37e-4 (Q²/d)^(1/3)` mm (Palmgren, *Ball and
-//!   Roller Bearing Engineering*, 1959).
-//! * **Friction** of a bearing, the sum of what lubricant and load take: `M0 = 1e-7 f0 (nu n)^(2/3) d_m³` N·mm from nu n = 2000 cSt/min on,
-//!   `160e-7 f0 d_m³` below; `M1 = f1 P d_m` (Palmgren; Harris, *Rolling Bearing Analysis*, "friction in rolling bearings"). A generator is
-//!   loaded at two lobes, so P is the sum of all ball loads and no resultant.
+//! * **Approach** of a ball between two races of usual osculation, both contacts together: `4.37e-4 (Q²/d)^(1/3)` mm
+//!   (Palmgren, *Ball and Roller Bearing Engineering*, 1959).
+//! * **Friction** of a bearing, the sum of what lubricant and load take: `M0 = 1e-7 f0 (nu n)^(2/3) d_m³` N·mm from nu
+//!   n = 2000 cSt/min on, `160e-7 f0 d_m³` below; `M1 = f1 P d_m` (Palmgren; Harris, *Rolling Bearing Analysis*,
+//!   "friction in rolling bearings"). A generator is loaded at two lobes, so P is the sum of all ball loads and no
+//!   resultant.
 //! * **Viscosity** over temperature: `lg lg (nu + 0.7) = A - B lg T` (Walther; ASTM D341), T in kelvin.
 //!
 //! f0 depends on how much grease there is and is the least known number here.
@@ -19,8 +20,8 @@ pub struct Balls {
 }
 
 impl Balls {
-    /// Those that `HHD-95-typical` takes for its bore of 93.35 mm, in proportion: 23 balls, 0.076 bores in diameter. A guess: makers
-    /// publish neither.
+    /// Those that `HHD-95-typical` takes for its bore of 93.35 mm, in proportion: 23 balls, 0.076 bores in diameter. A
+    /// guess: makers publish neither.
     pub fn in_proportion(bore_mm: f64) -> Balls {
         Balls { count: 23, diameter_mm: 7.1 / 93.35 * bore_mm }
     }
@@ -35,7 +36,8 @@ impl Balls {
         1.5 * load_n / self.approach_mm(load_n)
     }
 
-    /// That of all balls over a bore of this diameter and width: pressure per approach, N/mm³, as `generator.bearing_stiffness_n_per_mm3`.
+    /// That of all balls over a bore of this diameter and width: pressure per approach, N/mm³, as
+    /// `generator.bearing_stiffness_n_per_mm3`.
     pub fn bedding_n_per_mm3(&self, load_n: f64, bore_mm: f64, width_mm: f64) -> f64 {
         let each_mm = std::f64::consts::PI * bore_mm / f64::from(self.count);
         self.stiffness_n_per_mm(load_n) / (each_mm * width_mm)

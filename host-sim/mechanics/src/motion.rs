@@ -1,27 +1,29 @@
 //! Quasi-static motion of a drive: deformed by its generator, loaded, turned until it has settled, looked at.
 //!
-//! *When a drive has settled* is one rule for everything that samples steady motion. Since the generator last turned back, and since
-//! the load last changed,
+//! *When a drive has settled* is one rule for everything that samples steady motion. Since the generator last turned
+//! back, and since the load last changed,
 //!
-//! * the output has followed: in some increment it turned by more than half of what the ratio says. Before that it stands, or
-//!   creeps, while the clearance is crossed;
-//! * if there is friction between the flanks, the generator has gone on for two flexspline pitches: every tooth that bore when the
-//!   motion began has by then slipped as far as those that came after it do.
+//! * the output has followed: in some increment it turned by more than half of what the ratio says. Before that it
+//!   stands, or creeps, while the clearance is crossed;
+//! * if there is friction between the flanks, the generator has gone on for two flexspline pitches: every tooth that
+//!   bore when the motion began has by then slipped as far as those that came after it do.
 //!
-//! Without friction nothing else remembers where the drive came from. Contact is elastic, and the drag of the output is at its
-//! limit as soon as the output moves: the drive is in steady motion at the end of the increment in which it follows.
+//! Without friction nothing else remembers where the drive came from. Contact is elastic, and the drag of the output is
+//! at its limit as soon as the output moves: the drive is in steady motion at the end of the increment in which it
+//! follows.
 
 use std::f64::consts::TAU;
 
 use crate::stepping::{Effort, Increment, Problem, SolveError, Solver, State};
 use crate::units::ARCSEC_PER_RAD;
 
-/// Share of its nominal rate at which an output follows: it stands while clearance is crossed, then moves on at about the whole.
+/// Share of its nominal rate at which an output follows: it stands while clearance is crossed, then moves on at about
+/// the whole.
 const FOLLOWS: f64 = 0.5;
 /// Pitches of motion after which flanks with friction have settled.
 const PITCHES_WITH_FRICTION: f64 = 2.0;
-/// Pitches after which a drive that has not settled never will. Of HHD-95 this is a clearance of 48′ at the output, fifty times its
-/// own.
+/// Pitches after which a drive that has not settled never will. Of HHD-95 this is a clearance of 48′ at the output,
+/// fifty times its own.
 const MOST_PITCHES: f64 = 40.0;
 /// Where else a drive is deformed that finds no equilibrium in its place, flexspline pitches before it.
 const BESIDE_PITCHES: [f64; 3] = [0.3, -0.3, 1.4];
@@ -73,8 +75,9 @@ impl<'p> Motion<'p> {
         Ok(Motion { problem, solver, state, last, travel: Travel::default() })
     }
 
-    /// The drive deformed at an angle where both flanks may come to bear at once, as they do of an eccentric drive: there Newton may go
-    /// round in a circle, and the drive is deformed beside and turned in. The output then need not be in the middle of its clearance.
+    /// The drive deformed at an angle where both flanks may come to bear at once, as they do of an eccentric drive:
+    /// there Newton may go round in a circle, and the drive is deformed beside and turned in. The output then need not
+    /// be in the middle of its clearance.
     ///
     /// # Errors
     /// No equilibrium, neither there nor beside.
@@ -266,7 +269,8 @@ impl<'p> Motion<'p> {
         Ok(())
     }
 
-    /// Settles in the sense of `sense` (+1 or −1), then turns by one flexspline pitch; the place at the end of each of its increments.
+    /// Settles in the sense of `sense` (+1 or −1), then turns by one flexspline pitch; the place at the end of each of
+    /// its increments.
     ///
     /// # Errors
     /// No equilibrium; or the drive does not settle.
@@ -385,7 +389,8 @@ mod tests {
         assert!((generator_rad - from - 81.0 * step).abs() < 1e-9);
     }
 
-    /// Two rollers in a hat leave the teeth of this drive no play: they bear before there is a load. Softened they would wedge.
+    /// Two rollers in a hat leave the teeth of this drive no play: they bear before there is a load. Softened they
+    /// would wedge.
     #[test]
     fn teeth_that_bind_without_load_take_a_light_touch() {
         let kind = GeneratorKind::TwoRoller;

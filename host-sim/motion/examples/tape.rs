@@ -1,5 +1,5 @@
-//! Flights of a joint with mass, and what its core was told in every tick as tapes for the emulated target: `tape FOLDER` writes `joint.fxt`,
-//! `on_load.tape` and `in_mesh.tape` there, and prints what the core gave.
+//! Flights of a joint with mass, and what its core was told in every tick as tapes for the emulated target:
+//! `tape FOLDER` writes `joint.fxt`, `on_load.tape` and `in_mesh.tape` there, and prints what the core gave.
 
 use std::path::PathBuf;
 

@@ -9,7 +9,8 @@ use super::gear::Sampled;
 use super::scenario::{Leg, Load, Scenario, TableKnown, TorqueKnown};
 use super::servo::ServoSettings;
 
-/// A unit like HHD-95 with a double disc, with these tooth counts: 31″ of clearance to each side, wind-up that hardens, a ripple of the tooth pitch.
+/// A unit like HHD-95 with a double disc, with these tooth counts: 31″ of clearance to each side, wind-up that hardens,
+/// a ripple of the tooth pitch.
 pub fn unit(drive: Drive) -> Unit {
     let law = |phase: f64, flank: f64| {
         (31.0 + 1.1 * flank / (1.0 + 0.006 * flank) + 0.2 * libm::cos(TAU * phase)) / ARCSEC_PER_RAD
@@ -17,8 +18,8 @@ pub fn unit(drive: Drive) -> Unit {
     Unit::of_spring(drive, Sampled::of_law(f64::from(drive.ripple_order()), 100.0, law))
 }
 
-/// A dish of 3 kg·m² under a load that swings and gusts, turned to and fro, quickly and slowly; the torque is known on the load, the table
-/// calibrated.
+/// A dish of 3 kg·m² under a load that swings and gusts, turned to and fro, quickly and slowly; the torque is known on
+/// the load, the table calibrated.
 pub fn scenario() -> Scenario {
     Scenario {
         name: "dish".to_owned(),

@@ -33,7 +33,8 @@ pub const COMPENSATED: usize = 3;
 /// The ideal among them.
 pub const IDEAL: usize = 4;
 
-/// Beside those, for [`fly_one`]: the core's table, torque and rate, by the sign of the target's velocity instead of a play that is followed.
+/// Beside those, for [`fly_one`]: the core's table, torque and rate, by the sign of the target's velocity instead of a
+/// play that is followed.
 pub const BY_TORQUE: usize = CONTROLLERS.len();
 
 /// Time at the beginning that is not scored, s: all start at rest without knowing where in their play.
@@ -45,18 +46,22 @@ const ACCELERATION_RAD_S2: f64 = 5.0;
 const HOLD_RAD: f32 = 2.4e-6;
 /// Drag that tables are made with, N·m: that of the drive as designed.
 pub const TABLE_DRAG_N_M: f64 = 0.02;
-/// Distance that the loop of a torque in the mesh keeps from +1, with a drive a fifth stiffer or softer than its table says.
+/// Distance that the loop of a torque in the mesh keeps from +1, with a drive a fifth stiffer or softer than its table
+/// says.
 pub const DISTANCE: [f64; 2] = [0.5, 0.2];
 /// Widest low-pass of a torque, Hz: a tenth of the sampling frequency of usual torque sensors (guess).
 const WIDEST_HZ: f64 = 100.0;
 /// Slope and curvature along the way are taken over this time, s.
 const AHEAD_S: f32 = 4e-3;
-/// A torque in the mesh that is less than this part of the drag does not change the flank: while flanks cross it passes through zero. *Guess*.
+/// A torque in the mesh that is less than this part of the drag does not change the flank: while flanks cross it passes
+/// through zero. *Guess*.
 const HELD_OF_DRAG: f64 = 0.2;
-/// Nor does one for this long after it did, in time constants of the servo's position loop: the correction's own way across the play has to die away. With
-/// none a load 0.1 N·m below the drag of four rollers changed the flank over and over, 52″ for 32 without compensation; with ten 18.
+/// Nor does one for this long after it did, in time constants of the servo's position loop: the correction's own way
+/// across the play has to die away. With none a load 0.1 N·m below the drag of four rollers changed the flank over and
+/// over, 52″ for 32 without compensation; with ten 18.
 const SETTLES: f64 = 10.0;
-/// Range of the torque sensor: so many times the largest load that is to be expected, and so many N·m for what inertia and servo add. *Guess*.
+/// Range of the torque sensor: so many times the largest load that is to be expected, and so many N·m for what inertia
+/// and servo add. *Guess*.
 const SENSOR_RANGE: [f64; 2] = [3.0, 10.0];
 /// After a change of the target's rate the motor's current tells no torque for so long, s: friction builds up anew.
 const SETTLES_S: f64 = 0.3;
@@ -66,15 +71,17 @@ const TURNED_RAD: f64 = HOLD_RAD as f64;
 const SLOWER: f64 = 0.3;
 /// For so long gravity pulls the same way more, s. *Guess*.
 const TURNS_S: f64 = 1.0;
-/// A bound is this many standard deviations: what is heard is not normal where the motor sticks and slips, and 2.5 hold in 94.6 % of the ticks of the
-/// antenna with a cam, whose servo has a phase margin of 16° alone.
+/// A bound is this many standard deviations: what is heard is not normal where the motor sticks and slips, and 2.5 hold
+/// in 94.6 % of the ticks of the antenna with a cam, whose servo has a phase margin of 16° alone.
 const SURE: f64 = 3.0;
 /// Noise of the torque that the current tells, behind its low-pass, for its bound, N·m.
 const CURRENT_SURE_N_M: f64 = 0.5;
-/// Low-pass of the torque told by the motor's current, Hz: the motor's own acceleration is told by two differences of the encoder.
+/// Low-pass of the torque told by the motor's current, Hz: the motor's own acceleration is told by two differences of
+/// the encoder.
 const CURRENT_HZ: f64 = 2.0;
-/// Noise of the samples of a calibrated table, rad: a reading has 1″, and a hundred of them, a tenth of a second at 1 kHz, are averaged at each
-/// place. Of single readings the curve of the tooth pitch would be noise of some 0.5″, which costs nothing in pointing and ripples by tens of ″/s.
+/// Noise of the samples of a calibrated table, rad: a reading has 1″, and a hundred of them, a tenth of a second at 1
+/// kHz, are averaged at each place. Of single readings the curve of the tooth pitch would be noise of some 0.5″, which
+/// costs nothing in pointing and ripples by tens of ″/s.
 const CALIBRATION_NOISE_RAD: f64 = 0.1 / ARCSEC_PER_RAD;
 /// Share of the lines that an extended table knows.
 const EXTENDED_SHARE: f64 = 0.95;
@@ -91,9 +98,9 @@ pub struct Unit {
 }
 
 impl Unit {
-    /// A unit of a drive whose nominal spring was sampled from a map: with the lines that wheels eccentric by 10 µm, pitch errors of 2 µm and an
-    /// encoder eccentric by 2 µm make in HHD-95 (amplitudes by the closed forms of rigid wheels), 6 % stiffer, and with 2″ more
-    /// clearance. None of it is in the nominal table.
+    /// A unit of a drive whose nominal spring was sampled from a map: with the lines that wheels eccentric by 10 µm,
+    /// pitch errors of 2 µm and an encoder eccentric by 2 µm make in HHD-95 (amplitudes by the closed forms of rigid
+    /// wheels), 6 % stiffer, and with 2″ more clearance. None of it is in the nominal table.
     pub fn of_spring(drive: Drive, spring: Sampled) -> Self {
         let ratio = drive.exact_ratio();
         let line = |generator: f64, output: f64, arcsec: f64, phase_rad: f64| Line {
@@ -117,7 +124,8 @@ impl Unit {
         }
     }
 
-    /// Built without errors: no lines, no ripple of the tooth pitch. What ripples with it is encoder, servo, friction and wind.
+    /// Built without errors: no lines, no ripple of the tooth pitch. What ripples with it is encoder, servo, friction
+    /// and wind.
     #[must_use]
     pub fn flawless(&self) -> Self {
         let spring = match &self.built.spring {
@@ -199,7 +207,8 @@ pub struct Flight {
     pub flown: Vec<Flown>,
     /// No compensation, of a drive without errors: what of the velocity ripple is not the drive's.
     pub flawless: Flown,
-    /// Whether the servo is stable with this load, and the compensated joint comes to rest after a knock as the one without compensation does.
+    /// Whether the servo is stable with this load, and the compensated joint comes to rest after a knock as the one
+    /// without compensation does.
     pub stable: bool,
     /// From what the torque was known: nothing, where no low-pass of the torque in the mesh keeps the margin.
     pub torque: TorqueKnown,
@@ -693,8 +702,8 @@ impl Sensing {
         }
     }
 
-    /// Torque on the load, and what of the friction is not known, by the motor's current; kept as a torque on the load, as that does not change at a
-    /// reversal, and the one in the mesh does by twice the drag.
+    /// Torque on the load, and what of the friction is not known, by the motor's current; kept as a torque on the load,
+    /// as that does not change at a reversal, and the one in the mesh does by twice the drag.
     fn by_current(&mut self, made: &Made, servo: &mut Servo, now: &Moment) {
         let scenario = &made.scenario;
         let tick_s = scenario.servo.tick_s;
@@ -732,8 +741,8 @@ impl Sensing {
         self.bound_n_m = SURE * load.sqrt() + unknown + turning + held_back + rubs + CURRENT_SURE_N_M;
     }
 
-    /// A motor that slides at a rate: what pulls at it less the friction, by a Kalman filter. The friction turns over where the motor turns back, and the
-    /// load does not, so that one motion to and fro tells them apart.
+    /// A motor that slides at a rate: what pulls at it less the friction, by a Kalman filter. The friction turns over
+    /// where the motor turns back, and the load does not, so that one motion to and fro tells them apart.
     fn heard_sliding(&mut self, made: &Made, rate_rad_s: f64, pulls_n_m: f64) {
         let scenario = &made.scenario;
         let way = libm::copysign(1.0, rate_rad_s);
@@ -753,8 +762,8 @@ impl Sensing {
         *friction -= gain[1] * along[1];
     }
 
-    /// A motor that sticks: its friction takes up whatever it can, either way, so the load is no further from what pulls than that. However long it
-    /// sticks, no more is known.
+    /// A motor that sticks: its friction takes up whatever it can, either way, so the load is no further from what
+    /// pulls than that. However long it sticks, no more is known.
     fn heard_stuck(&mut self, pulls_n_m: f64) {
         let level = self.friction.level_n_m(0.0, pulls_n_m.abs() + self.friction.level_n_m(0.0, pulls_n_m));
         let [likely, _] = &mut self.likely_n_m;
@@ -767,17 +776,18 @@ impl Sensing {
         *shared *= less.sqrt();
     }
 
-    /// What of the load the motor has to hold, N·m at the output: of a torque known on the load, less the drag of the last motion. Its
-    /// inertia is fed forward as the target's acceleration.
+    /// What of the load the motor has to hold, N·m at the output: of a torque known on the load, less the drag of the
+    /// last motion. Its inertia is fed forward as the target's acceleration.
     fn held_n_m(&self, scenario: &Scenario, way: f64) -> f64 {
         if self.fed_n_m.is_finite() { self.fed_n_m - way * scenario.drag_n_m } else { 0.0 }
     }
 
-    /// Friction that the servo is told before, N·m at the output: against the way in which the motor moves, and where the target stands, moved last
-    /// or was corrected to.
+    /// Friction that the servo is told before, N·m at the output: against the way in which the motor moves, and where
+    /// the target stands, moved last or was corrected to.
     ///
-    /// At rest it stays. Taken off there, the integral part would hold the friction instead, and as the target moves on the motor would be given it twice.
-    /// Where the torque comes from the mesh or the motor the correction tells the way but once: else it would be a relay in a loop.
+    /// At rest it stays. Taken off there, the integral part would hold the friction instead, and as the target moves on
+    /// the motor would be given it twice. Where the torque comes from the mesh or the motor the correction tells the
+    /// way but once: else it would be a relay in a loop.
     fn rubbing_told_n_m(&mut self, made: &Made, rate_rad_s: f64, command_rad: f64, mesh_n_m: f64) -> f64 {
         let scenario = &made.scenario;
         let loops = matches!(made.torque, TorqueKnown::InMesh | TorqueKnown::Current);
@@ -917,9 +927,9 @@ fn lane(made: &Made, kind: usize, told: &(dyn Fn() + Sync)) -> Result<Flown, Str
     Ok(flown)
 }
 
-/// A target that stands, a knock, and what is left of it 2.5 s later: speed of the load (rad/s rms) about its mean, which a slow low-pass moves, in
-/// three of six half seconds. What rings does so in each of them; a servo that unwinds its integral part while the motor sticks lets it slip
-/// once, at any time.
+/// A target that stands, a knock, and what is left of it 2.5 s later: speed of the load (rad/s rms) about its mean,
+/// which a slow low-pass moves, in three of six half seconds. What rings does so in each of them; a servo that unwinds
+/// its integral part while the motor sticks lets it slip once, at any time.
 fn left_of_a_knock(made: &Made, kind: usize) -> Result<f64, String> {
     let mut lane = Lane::new(made, kind)?;
     let tick_s = made.scenario.servo.tick_s;
@@ -940,7 +950,8 @@ fn left_of_a_knock(made: &Made, kind: usize) -> Result<f64, String> {
         let mean = sum / f64::from(left.count.max(1));
         (left.rms() * left.rms() - mean * mean).max(0.0).sqrt()
     };
-    // Until a slow low-pass follows, the motor creeps after the torque that it tells, and sticks and slips: that is no ringing.
+    // Until a slow low-pass follows, the motor creeps after the torque that it tells, and sticks and slips: that is no
+    // ringing.
     fly(&mut lane, ticks(1.0 + TIME_CONSTANTS / (TAU * made.bandwidth_hz)));
     let mut rates = lane.plant.rate_rad_s;
     rates[1] += 1e-3;
@@ -952,7 +963,8 @@ fn left_of_a_knock(made: &Made, kind: usize) -> Result<f64, String> {
     Ok(left[HALF_SECONDS / 2 - 1])
 }
 
-/// Half seconds after a knock in half of which a joint is quiet that comes to rest: a slip, and what it leaves ringing, takes up to a second.
+/// Half seconds after a knock in half of which a joint is quiet that comes to rest: a slip, and what it leaves ringing,
+/// takes up to a second.
 const HALF_SECONDS: usize = 6;
 
 /// Time constants of the torque's low-pass before the knock: what is left of a step of it is 3e-4.
@@ -961,8 +973,9 @@ const TIME_CONSTANTS: f64 = 8.0;
 /// Speed below which a joint counts as at rest, rad/s: 4″/s, with an encoder that steps.
 const AT_REST_RAD_S: f64 = 2e-5;
 
-/// Whether the compensated joint comes to rest after a knock as the one without compensation does, with all that flies: limiter, hold, rate and
-/// acceleration fed forward, the torque's path. And the low-pass that the torque got, Hz; none where a torque in the mesh may not be used.
+/// Whether the compensated joint comes to rest after a knock as the one without compensation does, with all that flies:
+/// limiter, hold, rate and acceleration fed forward, the torque's path. And the low-pass that the torque got, Hz; none
+/// where a torque in the mesh may not be used.
 ///
 /// # Errors
 /// As [`fly`].

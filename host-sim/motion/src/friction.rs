@@ -1,13 +1,13 @@
 //! Friction of motor and generator, and hysteresis of the drive.
 
-/// Friction on the motor's side, all at the output: Coulomb and Stribeck parts with and without load, and viscous drag, the last
-/// growing in the cold.
+/// Friction on the motor's side, all at the output: Coulomb and Stribeck parts with and without load, and viscous drag,
+/// the last growing in the cold.
 ///
 /// ```text
 /// friction = base + load_base·|F| + exp(−|v/v_s|^α)·(stribeck + load_stribeck·|F|),   drag = viscous·v
 /// ```
-/// with the torque in the mesh `F` and the speed `v` of motor over ratio: model M4 of M. Duclusaud, G. Passault and others,
-/// "Extended friction models for the physics simulation of servo actuators", arXiv:2410.08650.
+/// with the torque in the mesh `F` and the speed `v` of motor over ratio: model M4 of M. Duclusaud, G. Passault and
+/// others, "Extended friction models for the physics simulation of servo actuators", arXiv:2410.08650.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Friction {
     /// Coulomb part, N·m.
@@ -30,8 +30,8 @@ pub struct Friction {
     pub cold_k: f64,
 }
 
-/// Kelvin for a factor e: three times the torque without load at −10 °C that there is at 20 °C, as catalogues' curves of the
-/// no-load running torque go. A prior, not measured by us.
+/// Kelvin for a factor e: three times the torque without load at −10 °C that there is at 20 °C, as catalogues' curves
+/// of the no-load running torque go. A prior, not measured by us.
 pub const CATALOGUE_COLD_K: f64 = 27.3;
 
 impl Friction {
@@ -48,7 +48,8 @@ impl Friction {
         cold_k: CATALOGUE_COLD_K,
     };
 
-    /// eRob80 with a strain wave drive of ratio 100: `params/erob80_100/m4.json` of the repository Rhoban/bam (commit f016154).
+    /// eRob80 with a strain wave drive of ratio 100: `params/erob80_100/m4.json` of the repository Rhoban/bam (commit
+    /// f016154).
     pub const EROB80_100: Friction = Friction {
         base_n_m: 1.25e-4,
         load_base: 2.13e-6,

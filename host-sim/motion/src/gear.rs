@@ -1,4 +1,5 @@
-//! The drive between motor and load as a potential: what it stores is a function of both angles, so it can make no energy.
+//! The drive between motor and load as a potential: what it stores is a function of both angles, so it can make no
+//! energy.
 //!
 //! ```text
 //! x  = δ − ψ/N − e(ψ, δ)              twist beyond the kinematic error e
@@ -6,7 +7,8 @@
 //! on the load:   −∂V/∂δ = −F·(1 − ∂e/∂δ)
 //! on the motor:  −∂V/∂ψ =  F/N·(1 + N·∂e/∂ψ) − ∂U/∂ψ
 //! ```
-//! A drive that pulled at its motor with F/N alone would make energy from every line of its error, most of it at resonance.
+//! A drive that pulled at its motor with F/N alone would make energy from every line of its error, most of it at
+//! resonance.
 
 use core::f64::consts::TAU;
 
@@ -14,8 +16,8 @@ use super::keep::kept;
 
 /// A line of the kinematic error: `amplitude·sin(generator·ψ + output·δ + phase)`, rad at the output.
 ///
-/// An error of the flexspline's teeth of order k has `generator = k`; one of the circular spline, which is met at ψ − δ, `k` and
-/// `−k`; of the encoder at the output, `0` and `k`.
+/// An error of the flexspline's teeth of order k has `generator = k`; one of the circular spline, which is met at ψ −
+/// δ, `k` and `−k`; of the encoder at the output, `0` and `k`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Line {
     /// Periods in a generator turn, the output held.
@@ -35,8 +37,9 @@ impl Line {
     }
 }
 
-/// Twist, and sines and cosines of everything that turns, at one place. Near it they are found by adding angles, which costs a third of asking for
-/// each anew, and does not round what is near to the last digit of a large angle: times the stiffness that would be 4e-10 N·m.
+/// Twist, and sines and cosines of everything that turns, at one place. Near it they are found by adding angles, which
+/// costs a third of asking for each anew, and does not round what is near to the last digit of a large angle: times the
+/// stiffness that would be 4e-10 N·m.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Near {
     error_rad: f64,
@@ -122,8 +125,8 @@ pub struct Sprung {
 }
 
 impl Sampled {
-    /// From an error law: `error(phase, flank)` is the error (rad) under a positive flank torque at a phase of the tooth pitch from
-    /// 0 to 1, rising with the torque. Negative torques are its mirror image.
+    /// From an error law: `error(phase, flank)` is the error (rad) under a positive flank torque at a phase of the
+    /// tooth pitch from 0 to 1, rising with the torque. Negative torques are its mirror image.
     pub fn of_law(teeth: f64, largest_n_m: f64, error: impl Fn(f64, f64) -> f64) -> Self {
         let phase = |k: usize| k as f64 / PHASES as f64;
         let most = (0..PHASES).map(|k| error(phase(k), largest_n_m)).fold(f64::INFINITY, f64::min);
@@ -475,8 +478,8 @@ impl Gear {
         Meshed { energy_j, torque_n_m, stiffness, twist_rad, twist_by, energy_by }
     }
 
-    /// Error of the output at rest (rad: output less generator over ratio) with this torque in the mesh; for none, on the side of
-    /// `sign`.
+    /// Error of the output at rest (rad: output less generator over ratio) with this torque in the mesh; for none, on
+    /// the side of `sign`.
     pub fn error_under_rad(&self, generator_rad: f64, mesh_n_m: f64, sign: f64) -> f64 {
         let side = if mesh_n_m == 0.0 { sign } else { mesh_n_m };
         let torque = |twist: f64| self.sprung(generator_rad, libm::copysign(twist, side)).torque_n_m.abs();

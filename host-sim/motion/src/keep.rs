@@ -1,4 +1,5 @@
-//! What changes while something moves, as words of 64 bits: to go on from there later, or elsewhere, with the same bits.
+//! What changes while something moves, as words of 64 bits: to go on from there later, or elsewhere, with the same
+//! bits.
 
 use flexspline::GeneratorAngle;
 

@@ -1,15 +1,17 @@
-//! The loops that close over a joint, in the frequency domain: the servo's own, and that of a torque fed back through the compensation.
+//! The loops that close over a joint, in the frequency domain: the servo's own, and that of a torque fed back through
+//! the compensation.
 //!
-//! With motor `J_m`, load `J_l`, stiffness `K`, damping `c` of the twist, all at the output, and `P` from motor torque to motor angle:
+//! With motor `J_m`, load `J_l`, stiffness `K`, damping `c` of the twist, all at the output, and `P` from motor torque
+//! to motor angle:
 //! ```text
 //! P   = (J_l s² + c s + K) / (s²·(J_m J_l s² + (J_m + J_l)(c s + K)))
 //! L_s = P·C                                     the servo, closed on −1
 //! H   = P·C_r/(1 + P·C)                         command to motor angle
 //! L   = g·LP·H·J_l s²·(1 + c s/K)/(J_l s² + c s + K)   mesh torque through the compensation, closed on +1
 //! ```
-//! The mesh carries what the load's inertia asks for, the compensation turns the motor by torque/K to make up for the wind-up, and
-//! that asks the inertia for more: above `√(K/J_l)` the mesh torque is in phase with the motor's own swing. Whatever is told
-//! by a torque *on* the load instead (wind, gravity, a model) has no such loop.
+//! The mesh carries what the load's inertia asks for, the compensation turns the motor by torque/K to make up for the
+//! wind-up, and that asks the inertia for more: above `√(K/J_l)` the mesh torque is in phase with the motor's own
+//! swing. Whatever is told by a torque *on* the load instead (wind, gravity, a model) has no such loop.
 
 use core::f64::consts::{PI, TAU};
 
@@ -172,10 +174,12 @@ impl TwoMasses {
         margin(servo, |w| Complex::ONE.plus(self.returned(servo, path, w).scaled(-1.0)))
     }
 
-    /// The widest low-pass (Hz) with which the mesh torque's loop is stable at this distance from +1, up to the most that is asked for, with
-    /// a drive that is stiffer or softer by a part; that of a table which does not know it.
+    /// The widest low-pass (Hz) with which the mesh torque's loop is stable at this distance from +1, up to the most
+    /// that is asked for, with a drive that is stiffer or softer by a part; that of a table which does not know it.
     ///
-    /// `None` if there is none: then the servo by itself is about to ring, and only a torque on the load may be compensated. Found by halving: a wider low-pass only ever brings the loop's resonance, which is its nearest point, closer.
+    /// `None` if there is none: then the servo by itself is about to ring, and only a torque on the load may be
+    /// compensated. Found by halving: a wider low-pass only ever brings the loop's resonance, which is its nearest
+    /// point, closer.
     pub fn widest_hz(
         &self,
         servo: &ServoSettings,
@@ -232,8 +236,8 @@ fn frequencies(servo: &ServoSettings) -> impl Iterator<Item = f64> + use<> {
     (0..=count).map(move |k| FROM_HZ * libm::pow(10.0, k as f64 / IN_TEN))
 }
 
-/// Least size of a return difference, and whether it turns around zero: by how much its phase has turned from low frequencies to half of
-/// the sampling frequency, where it must be back to what its ends are.
+/// Least size of a return difference, and whether it turns around zero: by how much its phase has turned from low
+/// frequencies to half of the sampling frequency, where it must be back to what its ends are.
 fn margin(servo: &ServoSettings, difference: impl Fn(f64) -> Complex) -> Margin {
     let (mut least, mut at_hz) = (f64::INFINITY, 0.0);
     let mut turned = 0.0;
@@ -250,7 +254,8 @@ fn margin(servo: &ServoSettings, difference: impl Fn(f64) -> Complex) -> Margin 
             (least, at_hz) = (now.size(), f);
         }
     }
-    // Integrals in the loop begin with their own phase: what it turns by, if it goes round nothing, is from there to the end.
+    // Integrals in the loop begin with their own phase: what it turns by, if it goes round nothing, is from there to
+    // the end.
     let last = before.unwrap_or(Complex::ONE);
     let begins = if first.size() > 100.0 { -1.5 * PI } else { first.angle() };
     let stable = (turned - (last.angle() - begins)).abs() < PI;

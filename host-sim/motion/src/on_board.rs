@@ -1,5 +1,6 @@
-//! What firmware does in a tick of a joint, from reading to command: the torque's path, rate and acceleration ahead, the joint. And a flight as a tape
-//! of what firmware was told, so that it can be flown again where nothing else runs. `no_std`: the firmware of `tests/firmware` is made of this file.
+//! What firmware does in a tick of a joint, from reading to command: the torque's path, rate and acceleration ahead,
+//! the joint. And a flight as a tape of what firmware was told, so that it can be flown again where nothing else runs.
+//! `no_std`: the firmware of `tests/firmware` is made of this file.
 
 use flexspline::{
     Adjustment, Direction, Drive, GeneratorAngle, Images, Input, Joint, JointState, Limits, Mode, MotionAhead, Output,
@@ -34,7 +35,8 @@ pub struct Told {
     pub direction: Direction,
     /// Torque as it was read.
     pub reading: TorqueReading,
-    /// What the load's inertia asks for on the way of the target, N·m: inertia times its acceleration. A torque in the mesh has it in it.
+    /// What the load's inertia asks for on the way of the target, N·m: inertia times its acceleration. A torque in the
+    /// mesh has it in it.
     pub inertia_n_m: f32,
 }
 
@@ -97,8 +99,8 @@ impl OnBoard {
         Given { out: self.joint.tick(images, store, &mut self.state, &input), torque_n_m, ahead }
     }
 
-    /// The torque that a table is asked with. A torque on the load has the load's inertia taken off, unless that is the larger of both: while a
-    /// target speeds up the flank does not change, as the play is not crossed by then.
+    /// The torque that a table is asked with. A torque on the load has the load's inertia taken off, unless that is the
+    /// larger of both: while a target speeds up the flank does not change, as the play is not crossed by then.
     pub fn torque_n_m(&mut self, told: &Told) -> f32 {
         let torque_n_m = self.path.tick(told.reading, told.direction);
         match told.reading {
@@ -108,8 +110,9 @@ impl OnBoard {
     }
 }
 
-/// Whether tooth pitches pass so slowly at a rate of the output that their acceleration may be fed forward: six ticks or more for each. What comes a tick
-/// late is then less than 60° behind, and takes off more than it adds; faster ones excite the resonance.
+/// Whether tooth pitches pass so slowly at a rate of the output that their acceleration may be fed forward: six ticks
+/// or more for each. What comes a tick late is then less than 60° behind, and takes off more than it adds; faster ones
+/// excite the resonance.
 #[must_use]
 pub fn passes_slowly(drive: &Drive, rate_rad_s: f32, tick_s: f32) -> bool {
     const TICKS: f32 = 6.0;

@@ -4,11 +4,12 @@
 //! ```text
 //! q' = q + h·v,   J·(w' − w) = h·(τ − ∇̄V − friction),   v = (w + w')/2
 //! ```
-//! for the mean speed `v`. `∇̄V` is the slope at the middle, corrected so that its product with the way is the change of energy (the discrete
-//! gradient of O. Gonzalez, "Time integration and discrete Hamiltonian systems", J. Nonlinear Sci. 6, 1996): what is stored never
-//! drifts, whatever the step, and contact comes without an impact. Friction acts on `v`, and holds fast where nothing overcomes it.
-//! The equations are solved by repetition. By itself that shrinks the error by `(h·ω/2)²` each time, with the fastest resonance `ω`; with the
-//! spring between motor and load taken along to first order what is left is how much that spring changes over the step.
+//! for the mean speed `v`. `∇̄V` is the slope at the middle, corrected so that its product with the way is the change
+//! of energy (the discrete gradient of O. Gonzalez, "Time integration and discrete Hamiltonian systems", J. Nonlinear
+//! Sci. 6, 1996): what is stored never drifts, whatever the step, and contact comes without an impact. Friction acts on
+//! `v`, and holds fast where nothing overcomes it. The equations are solved by repetition. By itself that shrinks the
+//! error by `(h·ω/2)²` each time, with the fastest resonance `ω`; with the spring between motor and load taken along to
+//! first order what is left is how much that spring changes over the step.
 
 use super::friction::{Friction, SlipElement, slipped};
 use super::gear::{Gear, Meshed, Near};
@@ -18,7 +19,8 @@ use super::keep::kept;
 pub const PARTS: usize = 3;
 /// Most repetitions in a step; four are usual.
 const REPETITIONS: usize = 40;
-/// After so many the spring is no longer taken along: where flanks touch and part in one step the plain repetition ends surely.
+/// After so many the spring is no longer taken along: where flanks touch and part in one step the plain repetition ends
+/// surely.
 const TAKEN_ALONG: usize = 8;
 /// Two speeds are the same if they differ by no more than this part of themselves, and this much, rad/s.
 const SAME: [f64; 2] = [1e-11, 1e-16];
@@ -45,7 +47,8 @@ pub struct PlantSettings {
     pub load_kg_m2: f64,
     /// The drive.
     pub gear: Gear,
-    /// Damping of the twist as a time, s: damping is this times the stiffness that the mesh has, so none where flanks do not touch.
+    /// Damping of the twist as a time, s: damping is this times the stiffness that the mesh has, so none where flanks
+    /// do not touch.
     pub damping_s: f64,
     /// Friction on the motor's side.
     pub friction: Friction,
@@ -168,7 +171,8 @@ impl Plant {
         let mut end = self.meshed;
         let mut loss = 0.0;
         let mut outside = 0.0;
-        // As fast as in the step before. With as much in the mesh as in that, its friction would come late, and pull a joint that gives way to its load on.
+        // As fast as in the step before. With as much in the mesh as in that, its friction would come late, and pull a
+        // joint that gives way to its load on.
         let [idle, by_load] = self.settings.friction.parts(self.mean[0]).map(|part| self.cold * part);
         self.settings.gear.nearby(&mut self.near, start[0], start[1]);
         for repetition in 0..REPETITIONS {
@@ -213,8 +217,8 @@ impl Plant {
         self.meshed = end;
     }
 
-    /// Takes the slopes of the energy off the push; gives those of the twist, so corrected that their product with the way is its
-    /// change.
+    /// Takes the slopes of the energy off the push; gives those of the twist, so corrected that their product with the
+    /// way is its change.
     fn sloped(&self, end: &Meshed, way: &[f64; PARTS], push: &mut [f64; PARTS]) -> [f64; 2] {
         let Meshed { mut energy_by, mut twist_by, .. } = self.middle;
         let square = way[0] * way[0] + way[1] * way[1];
@@ -257,10 +261,11 @@ impl Plant {
         heat
     }
 
-    /// The mean speed that the next repetition begins with: where this one would go on to, if the spring between motor and load were straight.
+    /// The mean speed that the next repetition begins with: where this one would go on to, if the spring between motor
+    /// and load were straight.
     ///
-    /// A repetition `G` turns what `mean` is off by, across the twist `t`, into `A = −h/2·J⁻¹·K·(h/2 + damping)·t·tᵀ` of it; the solution is
-    /// `mean + (1 − A)⁻¹·(G − mean)`. What friction holds does not move.
+    /// A repetition `G` turns what `mean` is off by, across the twist `t`, into `A = −h/2·J⁻¹·K·(h/2 + damping)·t·tᵀ`
+    /// of it; the solution is `mean + (1 − A)⁻¹·(G − mean)`. What friction holds does not move.
     fn taken_along(&self, h: f64, mean: &[f64; PARTS], next: [f64; PARTS], twist_by: &[f64; 2]) -> [f64; PARTS] {
         let PlantSettings { motor_kg_m2, load_kg_m2, damping_s, .. } = &self.settings;
         let moves = |k: usize, inertia: f64| if next[k] == 0.0 { 0.0 } else { 0.5 * h / inertia * twist_by[k] };

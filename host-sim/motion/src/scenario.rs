@@ -79,8 +79,8 @@ pub struct Scenario {
     pub friction: f64,
     /// Share of the friction on the motor's side that the servo is told before, by the sign of the target's rate.
     pub friction_known: f64,
-    /// Share of a torque known on the load that the servo is told before: what weight and wind will ask of the motor. No other torque is told to it,
-    /// as that would close a loop.
+    /// Share of a torque known on the load that the servo is told before: what weight and wind will ask of the motor.
+    /// No other torque is told to it, as that would close a loop.
     pub load_fed_forward: f64,
     /// From what the torque is known.
     pub torque: TorqueKnown,
@@ -136,11 +136,13 @@ impl Scenario {
             + self.load_kg_m2 * self.acceleration_rad_s2
     }
 
-    /// Corner of the low-pass with which a torque known on the load is told best, Hz: between what is late behind it and the noise that passes it.
+    /// Corner of the low-pass with which a torque known on the load is told best, Hz: between what is late behind it
+    /// and the noise that passes it.
     ///
-    /// Gusts, and steps for which chance is taken, wander: their mean square change in a tick against the noise gives the gain of a stationary
-    /// Kalman filter (R. E. Kalman, "A new approach to linear filtering and prediction problems", J. Basic Eng. 82, 1960). What swings changes evenly:
-    /// there the corner is where the lag is as large as the noise. 1 Hz at least, as weather changes, and `widest_hz` at most.
+    /// Gusts, and steps for which chance is taken, wander: their mean square change in a tick against the noise gives
+    /// the gain of a stationary Kalman filter (R. E. Kalman, "A new approach to linear filtering and prediction
+    /// problems", J. Basic Eng. 82, 1960). What swings changes evenly: there the corner is where the lag is as large as
+    /// the noise. 1 Hz at least, as weather changes, and `widest_hz` at most.
     pub fn told_best_hz(&self, widest_hz: f64) -> f64 {
         let Load { swing, gust, step, gravity, .. } = self.load;
         let tick_s = self.servo.tick_s;
@@ -162,7 +164,8 @@ impl Scenario {
         wandering_hz.max(swinging_hz).clamp(LEAST_HZ.min(widest_hz), widest_hz)
     }
 
-    /// How fast a torque on the load wanders that nobody knows, N²·m²/s, and its variance about the mean at most, N²·m².
+    /// How fast a torque on the load wanders that nobody knows, N²·m²/s, and its variance about the mean at most,
+    /// N²·m².
     pub fn load_wanders(&self) -> (f64, f64) {
         let Load { swing, gust, step, gravity, .. } = self.load;
         let square = |value: f64| value * value;

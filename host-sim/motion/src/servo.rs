@@ -1,4 +1,5 @@
-//! The servo as drives have it: a position loop around a speed loop around the current, sampled, late, with an encoder of so many counts.
+//! The servo as drives have it: a position loop around a speed loop around the current, sampled, late, with an encoder
+//! of so many counts.
 
 use core::f64::consts::TAU;
 
@@ -45,8 +46,8 @@ pub struct Asked {
     pub acceleration_rad_s2: f64,
     /// Torque that friction and load are expected to take, fed forward, N·m at the motor.
     pub torque_n_m: f64,
-    /// The way (1 or −1) in which the target starts to move in this tick, where the load is in that torque; else 0. The integral part is made anew then:
-    /// at rest it may hold the friction either way.
+    /// The way (1 or −1) in which the target starts to move in this tick, where the load is in that torque; else 0. The
+    /// integral part is made anew then: at rest it may hold the friction either way.
     pub starts: f64,
 }
 

@@ -1,5 +1,5 @@
-//! A compensation table sampled from a gear at rest: what a drive's table, an extended or a calibrated one knows of it. And the other way
-//! round, the gear that a table describes.
+//! A compensation table sampled from a gear at rest: what a drive's table, an extended or a calibrated one knows of it.
+//! And the other way round, the gear that a table describes.
 
 use core::f64::consts::TAU;
 
@@ -27,7 +27,8 @@ const OUTPUT_ORDERS: [u16; 2] = [1, 2];
 
 /// Orders looked for in a table: of the generator, of its angle to the output, of the output.
 const FOUND_ORDERS: [i32; 3] = [8, 8, 4];
-/// Places over whole turns of the output at which they are looked for: a prime above what any of them turns by, with their ripple.
+/// Places over whole turns of the output at which they are looked for: a prime above what any of them turns by, with
+/// their ripple.
 const FOUND_PLACES: i32 = 8009;
 /// Smaller lines than this are rounding of the table, rad: 0.002″.
 const SMALLEST_LINE_RAD: f64 = 1e-8;
@@ -100,11 +101,11 @@ pub fn image(
     Ok(image)
 }
 
-/// The gear that a table describes at a temperature: with a load on it at rest it is where the table says that steady motion ends on the flank
-/// which carries the load.
+/// The gear that a table describes at a temperature: with a load on it at rest it is where the table says that steady
+/// motion ends on the flank which carries the load.
 ///
-/// The table was made with a drag `drag_n_m`: what it has for backward motion under a load `T` is a flank that carries `T + drag`. `None` if
-/// the table gives nothing at this temperature.
+/// The table was made with a drag `drag_n_m`: what it has for backward motion under a load `T` is a flank that carries
+/// `T + drag`. `None` if the table gives nothing at this temperature.
 pub fn gear_of(table: &Table<'_>, temperature_c: f64, drag_n_m: f64) -> Option<Gear> {
     let ratio = table.drive().exact_ratio();
     let at = |generator_rad: f64, flank_n_m: f64| {
@@ -232,7 +233,8 @@ mod tests {
             }
         }
         println!("off by {:.3}\" of {:.0}\"", worst * 206_264.8, most * 206_264.8);
-        // What a table of these nodes leaves: a curve of eight nodes in a period, and the wind-up between two nodes of torque.
+        // What a table of these nodes leaves: a curve of eight nodes in a period, and the wind-up between two nodes of
+        // torque.
         assert!(worst < 2e-7, "{worst}");
     }
 }

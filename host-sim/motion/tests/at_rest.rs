@@ -1,4 +1,5 @@
-//! With all that flies in the loop no joint that comes to rest by itself is kept from it: over inertias, stiffnesses, servos, and what is known of the torque.
+//! With all that flies in the loop no joint that comes to rest by itself is kept from it: over inertias, stiffnesses,
+//! servos, and what is known of the torque.
 
 use flexspline::{Drive, FixedMember};
 use flexspline_motion::dish;

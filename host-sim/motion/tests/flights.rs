@@ -34,8 +34,8 @@ fn alone(scenario: &Scenario, kind: usize) -> Flown {
     fly_one(scenario, &unit(), kind).unwrap()
 }
 
-/// On a unit that its table was sampled from with noise, the core removes what an inverse that knows everything but the motion removes, and keeps
-/// the joint as stable as it was.
+/// On a unit that its table was sampled from with noise, the core removes what an inverse that knows everything but the
+/// motion removes, and keeps the joint as stable as it was.
 #[test]
 fn the_core_removes_what_a_quasi_static_inverse_removes() {
     let mut left = Vec::new();

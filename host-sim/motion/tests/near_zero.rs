@@ -1,4 +1,5 @@
-//! Loads about zero, where the drag decides which flank carries: the core is never worse than no compensation, and near the ideal.
+//! Loads about zero, where the drag decides which flank carries: the core is never worse than no compensation, and near
+//! the ideal.
 
 use flexspline::{Drive, FixedMember};
 use flexspline_motion::dish;
@@ -30,7 +31,8 @@ fn rms(scenario: &Scenario, unit: &Unit, kind: usize) -> f64 {
 /// Drag and load differ by no more than this: the load floats in the play while it moves one way, N·m.
 const FLOATS_N_M: f64 = 0.06;
 
-/// What is left is the servo's, as it crosses the play at the reversals: the ideal has it too. A load that is as large as the drag floats from flank to flank, and there nothing knows where it is.
+/// What is left is the servo's, as it crosses the play at the reversals: the ideal has it too. A load that is as large
+/// as the drag floats from flank to flank, and there nothing knows where it is.
 #[test]
 fn about_zero_load_the_core_is_never_worse_than_no_compensation_and_near_the_ideal() {
     let unit = unit();
@@ -52,7 +54,8 @@ fn about_zero_load_the_core_is_never_worse_than_no_compensation_and_near_the_ide
                 let scenario = Scenario { seed: flights, ..calm(load_n_m, drag_n_m, noise_n_m, torque) };
                 let core = rms(&scenario, &unit, COMPENSATED);
                 let what = format!(
-                    "load {load_n_m:.2}, drag {drag_n_m}, noise {noise_n_m} N.m, {torque:?}: {none:.2} without, {core:.2} core, {ideal:.2} ideal"
+                    "load {load_n_m:.2}, drag {drag_n_m}, noise {noise_n_m} N.m, {torque:?}: {none:.2} without, \
+                     {core:.2} core, {ideal:.2} ideal"
                 );
                 println!("{what}");
                 // A noise far above the drag tells no flank either, and the motor's current knows it by friction.
@@ -72,7 +75,8 @@ fn about_zero_load_the_core_is_never_worse_than_no_compensation_and_near_the_ide
             }
         }
     }
-    // 2.1 where a load beyond the drag never leaves its flank: what is left are 1.9", the servo's, which is told no torque in the mesh.
+    // 2.1 where a load beyond the drag never leaves its flank: what is left are 1.9", the servo's, which is told no
+    // torque in the mesh.
     println!("{flights} flights; most of none and of the ideal: {worst:#?}");
     assert!(worst[0].0 < 1.0 && worst[1].0 < 2.2, "{worst:?}");
 }

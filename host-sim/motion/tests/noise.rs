@@ -1,4 +1,5 @@
-//! White noise of a torque through the joint's limiter: never made larger, and made less by the path of the torque before.
+//! White noise of a torque through the joint's limiter: never made larger, and made less by the path of the torque
+//! before.
 
 use flexspline::{
     Adjustment, Drive, FixedMember, GeneratorAngle, Images, Input, Joint, JointState, Limits, Mode, OutputAngle,
@@ -81,7 +82,8 @@ fn noise_out_is_no_more_than_noise_in_and_less_with_the_path_of_the_torque() {
         let [wanted, bare] = through(acceleration, None);
         let [_, behind] = through(acceleration, Some(10.0));
         println!(
-            "{acceleration} rad/s2: {wanted:.1} arcsec wanted by the noise, {bare:.1} made as it is, {behind:.1} behind 10 Hz"
+            "{acceleration} rad/s2: {wanted:.1} arcsec wanted by the noise, {bare:.1} made as it is, {behind:.1} \
+             behind 10 Hz"
         );
         assert!(bare <= wanted, "{acceleration}: {bare} {wanted}");
         assert!(behind < 0.25 * wanted, "{acceleration}: {behind} {wanted}");

@@ -61,7 +61,8 @@ fn flights() -> Vec<(&'static str, Scenario)> {
     ]
 }
 
-/// Friction is known to 80 %, so below some newton metres the current does not tell the flank: the core then gains less, and never loses.
+/// Friction is known to 80 %, so below some newton metres the current does not tell the flank: the core then gains
+/// less, and never loses.
 #[test]
 fn the_bound_holds_and_the_core_gains_without_a_torque_sensor() {
     let unit = dish::unit(Drive::new(188, 190, FixedMember::Flexspline).unwrap());

@@ -127,8 +127,8 @@ fn energy_balances_to_a_millionth_over_minutes() {
     assert!(missing.abs() < 1e-6 * plant.energy.heat, "{missing}");
 }
 
-/// Runge and Kutta of fourth order, small steps, forces written down from the error alone; `whole` without and with the factor that the
-/// generator feels.
+/// Runge and Kutta of fourth order, small steps, forces written down from the error alone; `whole` without and with the
+/// factor that the generator feels.
 fn reference(gear: &Gear, start: [[f64; 2]; 2], step: f64, steps: usize, whole: bool) -> [[f64; 2]; 2] {
     let Spring::Cubic { half_clearance_rad, stiffness, hardening } = gear.spring else { unreachable!() };
     let slope = |[[motor, load], rates]: [[f64; 2]; 2]| {
@@ -247,8 +247,9 @@ fn a_joint_at_rest_under_less_than_its_drag_stays_there() {
     assert!(plant.angle_rad[1] > 1.4e-4 && plant.rate_rad_s[1].abs() < 1e-6, "{plant:?}");
 }
 
-/// Friction that grows with the load changes the frequency, and takes or gives nothing: `d²x/dt² = −(K·x + c·dx/dt)/J_l − ((1 + μ)·K·x + c·dx/dt)/J_m` of the twist
-/// `x`, where the motor lifts the load. If it followed the load a step late it would be a damper of −µ·K·h, here three times the damping there is.
+/// Friction that grows with the load changes the frequency, and takes or gives nothing:
+/// `d²x/dt² = −(K·x + c·dx/dt)/J_l − ((1 + μ)·K·x + c·dx/dt)/J_m` of the twist `x`, where the motor lifts the load. If
+/// it followed the load a step late it would be a damper of −µ·K·h, here three times the damping there is.
 #[test]
 fn friction_by_load_neither_damps_nor_drives_a_swing_whatever_the_step() {
     let (stiffness, damping, share, load_n_m) = (1e5, 1.0, 0.166, 6.0);

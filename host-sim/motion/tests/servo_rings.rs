@@ -68,8 +68,8 @@ fn plant_stiffness(plant: &Plant) -> f64 {
     stiffness
 }
 
-/// Largest speed of the load over each tenth of a second; `split` integrates the motor over a whole tick with the torque that the mesh
-/// had at its beginning, as the flights with an inert load did.
+/// Largest speed of the load over each tenth of a second; `split` integrates the motor over a whole tick with the
+/// torque that the mesh had at its beginning, as the flights with an inert load did.
 fn knocked(joint: &TwoMasses, servo: &ServoSettings, path: Option<&TorquePath>, seconds: f64, split: bool) -> Vec<f64> {
     let mut plant = plant(joint);
     let mut servo = Servo::new(*servo, RATIO, 1);
@@ -139,9 +139,9 @@ fn split_tick(plant: &mut Plant, servo: &mut Servo, asked: &Asked) {
     plant.set_motion([motor, load, 0.0], [motor_rate, load_rate, 0.0]);
 }
 
-/// The two-mass resonance of the cam with 3 kg·m² is where the ringing was. The servo itself is stable around it; what rang
-/// was the integration: over a tick the motor felt the mesh's torque of the tick before, which is a negative damping of the stiffness times
-/// the time that it is late.
+/// The two-mass resonance of the cam with 3 kg·m² is where the ringing was. The servo itself is stable around it; what
+/// rang was the integration: over a tick the motor felt the mesh's torque of the tick before, which is a negative
+/// damping of the stiffness times the time that it is late.
 #[test]
 fn the_servo_does_not_ring_at_the_resonance_of_motor_and_load() {
     let margin = CAM.servo(&SERVO);
@@ -227,7 +227,8 @@ fn theory_says_which_loops_are_stable_and_motion_agrees() {
         }
     }
     println!(
-        "{count} loops, {unstable} unstable in motion, {near} near the limit, {wrong} where theory and motion differ, and {fast} that swing faster than 160 Hz"
+        "{count} loops, {unstable} unstable in motion, {near} near the limit, {wrong} where theory and motion differ, \
+         and {fast} that swing faster than 160 Hz"
     );
     assert!(count > 100 && unstable > 10);
     assert!(wrong == 0 && fast < 8, "{wrong} {fast}");
@@ -279,7 +280,8 @@ fn with_the_low_pass_that_keeps_the_margin_no_stable_loop_turns_unstable() {
         }
     }
     println!(
-        "{checked} loops stable ({unsound} whose servo alone is not sound, {refused} for which there is no low-pass), least distance {least:?}; low-pass {range:.2?} Hz"
+        "{checked} loops stable ({unsound} whose servo alone is not sound, {refused} for which there is no low-pass), \
+         least distance {least:?}; low-pass {range:.2?} Hz"
     );
     assert!(checked > 300 && least.0 > 0.3, "{least:?}");
 }

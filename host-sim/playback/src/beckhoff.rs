@@ -1,5 +1,6 @@
-//! Beckhoff: the table of `MC_TableBasedPositionCompensation` (TwinCAT NC, library Tc2_MC2), and the compensation value list
-//! `kw.ssfk` of TwinCAT CNC. Both are closed: simulated from their manual pages (docs/how-to/export_to_controllers.md).
+//! Beckhoff: the table of `MC_TableBasedPositionCompensation` (TwinCAT NC, library Tc2_MC2), and the compensation value
+//! list `kw.ssfk` of TwinCAT CNC. Both are closed: simulated from their manual pages
+//! (docs/how-to/export_to_controllers.md).
 
 use std::f64::consts::TAU;
 use std::fmt::Write;
@@ -59,8 +60,8 @@ fn too_many(entries: u32) -> Refusal {
     Refusal::Impossible(format!("--points: found {entries}; allowed: 3 to {MAX_ENTRIES}"))
 }
 
-/// An array of `ST_PositionCompensationTableElement`: `Position` uncorrected, `Compensation` added to it. One value for both
-/// directions. The page does not say how a value between two positions is found: taken as linear.
+/// An array of `ST_PositionCompensationTableElement`: `Position` uncorrected, `Compensation` added to it. One value for
+/// both directions. The page does not say how a value between two positions is found: taken as linear.
 #[derive(Debug, Clone)]
 pub struct Nc {
     directions: Vec<Direction>,
@@ -133,8 +134,8 @@ impl Player for Nc {
         let _ = writeln!(text, "    FLEXSPLINE_LAST : UDINT := {last};\nEND_VAR\nVAR_GLOBAL");
         let _ = writeln!(
             text,
-            "    FlexsplineParameter : ST_PositionCompensationTableParameter := (MinPosition := {:.9}, MaxPosition := {:.9}, \
-             NoOfTableElements := {}, Modulo := {});",
+            "    FlexsplineParameter : ST_PositionCompensationTableParameter := (MinPosition := {:.9}, MaxPosition := \
+             {:.9}, NoOfTableElements := {}, Modulo := {});",
             self.travel[0].to_degrees(),
             self.travel[1].to_degrees(),
             last + 1,
@@ -266,8 +267,8 @@ impl Player for Cnc {
         notes.extend(more);
         notes.extend(self.asked.filter(|asked| *asked as usize != entries).map(|asked| {
             format!(
-                "--points {asked}: {entries} entries were written, {} units of 0.0001 deg apart; a list has one distance, a whole \
-                 number of units, and entries at that distance fill {}",
+                "--points {asked}: {entries} entries were written, {} units of 0.0001 deg apart; a list has one \
+                 distance, a whole number of units, and entries at that distance fill {}",
                 self.interval,
                 degrees(self.travel)
             )

@@ -1,5 +1,5 @@
-//! NASA core Flight System: the image of the core as a table file that table services load, as `elf2cfetbl` would write it, and
-//! the sources of a table app's own build.
+//! NASA core Flight System: the image of the core as a table file that table services load, as `elf2cfetbl` would write
+//! it, and the sources of a table app's own build.
 //!
 //! cFE file header (64 bytes) and table file header (52 bytes) big-endian, with the default lengths of names
 //! (`CFE_FS_HDR_DESC_MAX_LEN` 32, `CFE_MISSION_TBL_MAX_FULL_NAME_LEN` 40); then the image as it is.
@@ -67,11 +67,13 @@ impl Cfs {
     /// What a user has to know.
     pub fn notes(&self) -> Vec<String> {
         let register = format!(
-            "CFE_TBL_Register(&handle, \"{}\", sizeof(FLEXSPLINE_Table_t), CFE_TBL_OPT_DEFAULT, FLEXSPLINE_ValidateTable) in app {}",
+            "CFE_TBL_Register(&handle, \"{}\", sizeof(FLEXSPLINE_Table_t), CFE_TBL_OPT_DEFAULT, \
+             FLEXSPLINE_ValidateTable) in app {}",
             self.table, self.app
         );
         let ids = (self.spacecraft == 0 || self.processor == 0).then(|| {
-            "spacecraft or processor id is 0: refused where CFE_PLATFORM_TBL_VALID_SCID_COUNT or _PRID_COUNT is not 0".to_owned()
+            "spacecraft or processor id is 0: refused where CFE_PLATFORM_TBL_VALID_SCID_COUNT or _PRID_COUNT is not 0"
+                .to_owned()
         });
         std::iter::once(register).chain(ids).collect()
     }
@@ -97,17 +99,18 @@ impl Cfs {
             let _ = writeln!(text, " * {line}");
         }
         text + &format!(
-            " */\n#ifndef FLEXSPLINE_TBL_H\n#define FLEXSPLINE_TBL_H\n\n#include \"common_types.h\"\n\n\
-             #define FLEXSPLINE_TABLE_BYTES {}\n\n/* An image of the core, little-endian on every target, read in place. */\n\
-             typedef struct\n{{\n    uint8 Image[FLEXSPLINE_TABLE_BYTES];\n}} FLEXSPLINE_Table_t;\n\n\
-             /* For CFE_TBL_Register: 0 if the image is whole. */\nint32 FLEXSPLINE_ValidateTable(void *Table);\n\n#endif\n",
+            " */\n#ifndef FLEXSPLINE_TBL_H\n#define FLEXSPLINE_TBL_H\n\n#include \"common_types.h\"\n\n#define \
+             FLEXSPLINE_TABLE_BYTES {}\n\n/* An image of the core, little-endian on every target, read in place. \
+             */\ntypedef struct\n{{\n    uint8 Image[FLEXSPLINE_TABLE_BYTES];\n}} FLEXSPLINE_Table_t;\n\n/* For \
+             CFE_TBL_Register: 0 if the image is whole. */\nint32 FLEXSPLINE_ValidateTable(void *Table);\n\n#endif\n",
             self.image.len()
         )
     }
 
     fn source(&self, origin: &Origin) -> String {
         let mut text = String::from(
-            "#include \"cfe_tbl_filedef.h\"\n#include \"flexspline_tbl.h\"\n\nFLEXSPLINE_Table_t FLEXSPLINE_Table = {\n    {",
+            "#include \"cfe_tbl_filedef.h\"\n#include \"flexspline_tbl.h\"\n\nFLEXSPLINE_Table_t FLEXSPLINE_Table = \
+             {\n    {",
         );
         for (k, byte) in self.image.iter().enumerate() {
             text += if k % 16 == 0 { "\n        " } else { " " };
@@ -129,8 +132,8 @@ fn padded(text: &str, length: usize) -> Vec<u8> {
     bytes
 }
 
-/// What `CFE_TBL_Register` is given: the image is of this format, as long as it says, and its CRC-32 (docs/reference/fxt.md) holds. The core
-/// checks the rest when it accepts the image.
+/// What `CFE_TBL_Register` is given: the image is of this format, as long as it says, and its CRC-32
+/// (docs/reference/fxt.md) holds. The core checks the rest when it accepts the image.
 const VALIDATE: &str = r#"#include "flexspline_tbl.h"
 
 static uint32 FLEXSPLINE_Word(const uint8 *At)

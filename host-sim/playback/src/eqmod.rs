@@ -1,9 +1,9 @@
-//! EQMOD (EQASCOM) periodic error correction: the file that `Import` of PEC.bas reads, the rates that `CalcRates` makes of it, and
-//! `PEC_Timer`, which plays one a second and looks for its place once a worm turn.
+//! EQMOD (EQASCOM) periodic error correction: the file that `Import` of PEC.bas reads, the rates that `CalcRates` makes
+//! of it, and `PEC_Timer`, which plays one a second and looks for its place once a worm turn.
 //!
-//! The file holds the error; EQMOD differences it, takes the mean rate out and rounds each rate to what the mount's divider
-//! gives, with the remainder carried on. A tick lies anywhere in its second, so a rate begins half a second late on average: the
-//! fit is made for that, and the playback is started so.
+//! The file holds the error; EQMOD differences it, takes the mean rate out and rounds each rate to what the mount's
+//! divider gives, with the remainder carried on. A tick lies anywhere in its second, so a rate begins half a second
+//! late on average: the fit is made for that, and the playback is started so.
 
 use std::f64::consts::TAU;
 use std::fmt::Write;
@@ -238,14 +238,16 @@ impl Player for Eqmod {
         let mut notes = vec![
             format!("EQMOD's own worm has to be {} steps; PEC gain 1, threshold 0, phase 0", self.worm_steps),
             format!(
-                "a rate that is {:.3} arcsec an output turn off is left to guiding; the mount's own divider makes one too",
+                "a rate that is {:.3} arcsec an output turn off is left to guiding; the mount's own divider makes one \
+                 too",
                 self.track.drift_arcsec()
             ),
         ];
         notes.extend(self.better.map(|(zero, [left, best])| {
             format!(
-                "this --motor-zero has the counter of a worm turn start anew where EQMOD loses its place, and leaves {left:.2} arcsec rms \
-                 on the table's own model; --motor-zero {zero} would leave {best:.2}: set the mount's counter so"
+                "this --motor-zero has the counter of a worm turn start anew where EQMOD loses its place, and leaves \
+                 {left:.2} arcsec rms on the table's own model; --motor-zero {zero} would leave {best:.2}: set the \
+                 mount's counter so"
             )
         }));
         notes

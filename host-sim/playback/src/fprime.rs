@@ -1,7 +1,7 @@
 //! F´: the image of the core as parameters, for `fprime-prm-write` of fprime-gds, and the FPP that declares them.
 //!
-//! A parameter has to fit the framework's buffer (`FW_PARAM_BUFFER_MAX_SIZE`: 506 bytes by default), so the image comes in parts
-//! of one size, the last filled with zeros; the image says its own length (docs/reference/fxt.md).
+//! A parameter has to fit the framework's buffer (`FW_PARAM_BUFFER_MAX_SIZE`: 506 bytes by default), so the image comes
+//! in parts of one size, the last filled with zeros; the image says its own length (docs/reference/fxt.md).
 
 use std::fmt::Write;
 
@@ -78,7 +78,8 @@ impl Fprime {
     pub fn notes(&self) -> Vec<String> {
         let parts = self.image.len().div_ceil(self.part_bytes);
         let mut notes = vec![format!(
-            "FW_PARAM_BUFFER_MAX_SIZE has to be {} or more (506 by default); the parts one after the other are the image",
+            "FW_PARAM_BUFFER_MAX_SIZE has to be {} or more (506 by default); the parts one after the other are the \
+             image",
             self.part_bytes
         )];
         if parts > DATABASE {

@@ -1,11 +1,12 @@
-//! Tables for the playback of others: a table resampled for a device's own lookup, written as the device reads it, and what that
-//! lookup leaves.
+//! Tables for the playback of others: a table resampled for a device's own lookup, written as the device reads it, and
+//! what that lookup leaves.
 //!
-//! A device corrects by less than a table says: by the position alone, in steps, at one load. So each format fits by least
-//! squares what its device interpolates, rounds it as the device stores it, and then looks it up as the device's source or
-//! manual says ([`Player`]). The figures are those of that lookup, not of the fit.
+//! A device corrects by less than a table says: by the position alone, in steps, at one load. So each format fits by
+//! least squares what its device interpolates, rounds it as the device stores it, and then looks it up as the device's
+//! source or manual says ([`Player`]). The figures are those of that lookup, not of the fit.
 //!
-//! The zero of the output is the machine's own: the mean error is left out of every file, and every figure is about its mean.
+//! The zero of the output is the machine's own: the mean error is left out of every file, and every figure is about its
+//! mean.
 #![forbid(unsafe_code)]
 
 mod beckhoff;
@@ -40,20 +41,23 @@ pub use section::{BOTH, Sample, Section};
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_identify::replay::{MeasuredRow, ReplayedRow};
 
-/// Points of a section that a fit sees in each direction: prime, see [`Section::samples`], and 7 to each ripple of 188 teeth at
-/// ratio 95.
+/// Points of a section that a fit sees in each direction: prime, see [`Section::samples`], and 7 to each ripple of 188
+/// teeth at ratio 95.
 const FIT_POINTS: u32 = 131_071;
 /// Points at which a lookup is judged, in each direction: prime, and none of those of the fit but the first.
 const JUDGE_POINTS: u32 = 32_749;
 /// Loads of the table at which a lookup is judged.
 const JUDGE_LOADS: usize = 5;
-/// A file that leaves more than this share of the error is refused: a guess of what is not worth the risk of a wrong one.
+/// A file that leaves more than this share of the error is refused: a guess of what is not worth the risk of a wrong
+/// one.
 pub const POINTLESS: f64 = 0.7;
-/// Fewer rows of a unit's data than this are not judged by: some to each half wave of order 2 over a few generator turns, a guess.
+/// Fewer rows of a unit's data than this are not judged by: some to each half wave of order 2 over a few generator
+/// turns, a guess.
 pub const FEWEST_ROWS: usize = 32;
 /// Loads of the data that lie further from the section's than this share of the table's range are told: a guess.
 const NEAR_LOAD: f64 = 0.1;
-/// Rounds in which a corrected command is met: a correction changes by less than its place does, so each is a digit or more.
+/// Rounds in which a corrected command is met: a correction changes by less than its place does, so each is a digit or
+/// more.
 const MEET_ROUNDS: usize = 60;
 
 /// Why there is no file.
@@ -81,8 +85,8 @@ impl Written {
         Written { name: name.to_owned(), bytes: text.into_bytes() }
     }
 
-    /// Whether what stands in its place was written by this program, as far as can be told: it has the mark that this file has,
-    /// or, where the format takes no comment, no line of another kind.
+    /// Whether what stands in its place was written by this program, as far as can be told: it has the mark that this
+    /// file has, or, where the format takes no comment, no line of another kind.
     pub fn replaces(&self, old: &[u8]) -> bool {
         let has = |bytes: &[u8], mark: &str| bytes.windows(mark.len()).any(|window| window == mark.as_bytes());
         if let Some(mark) = ["table_id", "flexspline ", "FLEXSPLINE"].into_iter().find(|mark| has(&self.bytes, mark)) {
@@ -124,8 +128,8 @@ impl Origin {
 
 /// A device's own lookup, bit for bit where its source says how.
 pub trait Player {
-    /// What the device adds to the output that it is asked for, rad, when it has led the generator to `led_rad` times the ratio
-    /// and the output moves in this direction. The error that is left is the error there plus this.
+    /// What the device adds to the output that it is asked for, rad, when it has led the generator to `led_rad` times
+    /// the ratio and the output moves in this direction. The error that is left is the error there plus this.
     fn correction_rad(&self, led_rad: f64, direction: Direction) -> f64;
 
     /// Directions in which it plays.
@@ -170,8 +174,9 @@ fn met(led_rad: f64, lookup: impl Fn(f64) -> f64) -> f64 {
     correction
 }
 
-/// The wanted correction at each output that is asked for: where the generator stands at ψ, the output is at ψ/N + e, so that
-/// is what had to be asked for to get it there. Pairs of output (rad) and correction (rad), the mean error taken out.
+/// The wanted correction at each output that is asked for: where the generator stands at ψ, the output is at ψ/N + e,
+/// so that is what had to be asked for to get it there. Pairs of output (rad) and correction (rad), the mean error
+/// taken out.
 fn wanted(samples: &[Sample]) -> Vec<(f64, f64)> {
     let mean = mean(samples.iter().map(|sample| sample.error_rad));
     let of = |sample: &Sample| {
@@ -209,8 +214,8 @@ pub struct ModelFigures {
     pub torque_n_m: f64,
     /// Temperature, °C.
     pub temperature_c: f64,
-    /// Mean error at the nominal load, arcsec, left out of all figures and of what a controller's own lookup is given: a constant
-    /// shift, which homing holds.
+    /// Mean error at the nominal load, arcsec, left out of all figures and of what a controller's own lookup is given:
+    /// a constant shift, which homing holds.
     pub mean_left_out_arcsec: f64,
     /// Error without playback at the nominal load, arcsec, about its mean.
     pub rms_uncorrected_arcsec: f64,
@@ -320,8 +325,8 @@ pub fn core_on_model(table: &Table<'_>, torque_n_m: f64, temperature_c: f64) -> 
     }
 }
 
-/// What a player leaves on measured rows, beside what the core left of them; without a player the core plays. `torque_n_m` is the
-/// load of the section.
+/// What a player leaves on measured rows, beside what the core left of them; without a player the core plays.
+/// `torque_n_m` is the load of the section.
 pub fn on_data(
     table: &Table<'_>,
     torque_n_m: f64,
@@ -377,8 +382,8 @@ pub fn on_data(
     })
 }
 
-/// How far a load may be from the section's before it is told, N·m; a table of one load holds for that alone, to a single
-/// precision's rounding.
+/// How far a load may be from the section's before it is told, N·m; a table of one load holds for that alone, to a
+/// single precision's rounding.
 fn near_load_n_m(table: &Table<'_>) -> f64 {
     let [least, most] = table.torque_range_n_m().map(f64::from);
     (NEAR_LOAD * (most - least)).max(1e-6 * most.abs())
@@ -390,8 +395,9 @@ impl DataFigures {
         let [least, mean, most] = self.loads_n_m;
         let off = (self.rows_off_load > 0).then(|| {
             format!(
-                "{} of {} rows of the data have a load more than {:.3} N.m from the {torque_n_m} N.m that the file is made for (loads of \
-                 the data: {least} to {most} N.m, mean {mean:.3}); a playback does not know the load",
+                "{} of {} rows of the data have a load more than {:.3} N.m from the {torque_n_m} N.m that the file is \
+                 made for (loads of the data: {least} to {most} N.m, mean {mean:.3}); a playback does not know the \
+                 load",
                 self.rows_off_load,
                 self.rows,
                 near_load_n_m(table)
@@ -401,8 +407,8 @@ impl DataFigures {
             let [low, high] = table.torque_range_n_m();
             let [cold, warm] = table.temperature_range_c();
             format!(
-                "{} of {} rows of the data are extrapolated by the core: the table holds from {low} to {high} N.m and from {cold} to \
-                 {warm} degrees C",
+                "{} of {} rows of the data are extrapolated by the core: the table holds from {low} to {high} N.m and \
+                 from {cold} to {warm} degrees C",
                 self.rows_extrapolated, self.rows
             )
         });
@@ -418,18 +424,18 @@ impl DataFigures {
         let turned = self.rms_core_turned_arcsec;
         let why = if core <= POINTLESS * all {
             format!(
-                "the core leaves {core:.2} with the same table, so the data belong to it, and hold what this playback does not know: \
-                 other loads, or play"
+                "the core leaves {core:.2} with the same table, so the data belong to it, and hold what this playback \
+                 does not know: other loads, or play"
             )
         } else if turned <= POINTLESS * all {
             format!(
-                "the core leaves {core:.2} too, but {turned:.2} if the error had the other sign: turn that of the error in --columns \
-                 (error=NAME:-arcsec)"
+                "the core leaves {core:.2} too, but {turned:.2} if the error had the other sign: turn that of the \
+                 error in --columns (error=NAME:-arcsec)"
             )
         } else {
             format!(
-                "the core leaves {core:.2} too, so the data do not belong to this table: another unit, another zero or sign of the \
-                 generator or the output, another ratio"
+                "the core leaves {core:.2} too, so the data do not belong to this table: another unit, another zero \
+                 or sign of the generator or the output, another ratio"
             )
         };
         Err(Refusal::Pointless(format!(
@@ -439,7 +445,8 @@ impl DataFigures {
     }
 }
 
-/// Direction of the output at each row: that of the step to it; where it stands, the one before; at the start, the first there is.
+/// Direction of the output at each row: that of the step to it; where it stands, the one before; at the start, the
+/// first there is.
 fn directions_of(rows: &[MeasuredRow], ratio: f64) -> Vec<Direction> {
     let step = |k: usize| {
         let moved = (rows[k].generator_rad - rows[k - 1].generator_rad) / ratio;
@@ -470,14 +477,15 @@ pub fn worth_it(section: &Section<'_>, figures: &ModelFigures, player: &dyn Play
             ""
         };
         format!(
-            "play dominates: the two directions differ by ±{by_play:.2} arcsec rms, and this lookup holds one value for both{side}"
+            "play dominates: the two directions differ by ±{by_play:.2} arcsec rms, and this lookup holds one value \
+             for both{side}"
         )
     } else {
         let samples = section.samples(player.travel(), JUDGE_POINTS, player.directions());
         let (order, amplitude) = section.strongest_order(&samples);
         format!(
-            "{}; the strongest part of this table repeats {order} times a generator turn, {:.0} times an output turn, with {:.2} \
-             arcsec",
+            "{}; the strongest part of this table repeats {order} times a generator turn, {:.0} times an output turn, \
+             with {:.2} arcsec",
             player.points(),
             f64::from(order) * section.ratio().abs(),
             amplitude * ARCSEC_PER_RAD

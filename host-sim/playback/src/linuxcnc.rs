@@ -1,9 +1,9 @@
 //! LinuxCNC screw compensation: `COMP_FILE`, read by `usrmotLoadComp` (src/emc/motion/usrmotintf.cc), kept by
 //! `EMCMOT_SET_JOINT_COMP` (command.c), looked up by `compute_screw_comp` (control.c).
 //!
-//! Triplets of nominal position and, for each direction, the actual position (type 0) or the trim that is added to the command
-//! (type 1). Linear between triplets from the left edge, the end values beyond; trims and slopes are kept as `float`. The ramp
-//! of a reversal is left out: steady motion.
+//! Triplets of nominal position and, for each direction, the actual position (type 0) or the trim that is added to the
+//! command (type 1). Linear between triplets from the left edge, the end values beyond; trims and slopes are kept as
+//! `float`. The ramp of a reversal is left out: steady motion.
 
 use std::fmt::Write;
 

@@ -1,8 +1,9 @@
-//! moteus: `motor_position.sources.N.compensation_table` (fw/motor_position.h), a correction of the encoder on the generator.
+//! moteus: `motor_position.sources.N.compensation_table` (fw/motor_position.h), a correction of the encoder on the
+//! generator.
 //!
-//! 256 `int8` over a turn of the encoder, in 127ths of `compensation_scale`, which is a fraction of a turn. The comment beside
-//! the table says that a value holds in the middle of its bin; `lerp`, its test and `utils/compensate_encoder.py` take it at the
-//! left edge, and so does this. Single precision throughout.
+//! 256 `int8` over a turn of the encoder, in 127ths of `compensation_scale`, which is a fraction of a turn. The comment
+//! beside the table says that a value holds in the middle of its bin; `lerp`, its test and
+//! `utils/compensate_encoder.py` take it at the left edge, and so does this. Single precision throughout.
 
 use std::f64::consts::TAU;
 use std::fmt::Write;
@@ -100,8 +101,8 @@ impl Player for Moteus {
     fn notes(&self) -> Vec<String> {
         vec![
             format!(
-                "write it with moteus_tool --write-config moteus.cfg, then conf write; the zero of source {} has to be the \
-                 generator's (sources.{}.offset, .sign)",
+                "write it with moteus_tool --write-config moteus.cfg, then conf write; the zero of source {} has to \
+                 be the generator's (sources.{}.offset, .sign)",
                 self.source, self.source
             ),
             "where that source commutates the motor, calibrate the motor again with the table in force".to_owned(),

@@ -1,5 +1,5 @@
-//! OnStepX periodic error correction (src/telescope/mount/pec): one `int8` of motor steps for each sidereal second of a turn,
-//! played as a rate one entry late, the turn found again where the motor's steps wrap.
+//! OnStepX periodic error correction (src/telescope/mount/pec): one `int8` of motor steps for each sidereal second of a
+//! turn, played as a rate one entry late, the turn found again where the motor's steps wrap.
 //!
 //! The loop that looks for all this runs every 10 ms; its wait is left out.
 
@@ -40,8 +40,8 @@ struct Timing {
     worm_steps: u32,
     /// Entries in use.
     entries: usize,
-    /// Whole seconds that are free to be chosen, and the second that the first of them is. What is left of the turn plays an
-    /// entry that a whole second plays too; both are kept at 0.
+    /// Whole seconds that are free to be chosen, and the second that the first of them is. What is left of the turn
+    /// plays an entry that a whole second plays too; both are kept at 0.
     free: usize,
     first: usize,
 }
@@ -67,8 +67,9 @@ impl Timing {
         }
         if entries > room {
             return Err(Refusal::Impossible(format!(
-                "the buffer of {buffer_s} s is shorter than a generator turn: at the sidereal rate and ratio {:.4} that takes \
-                 {seconds:.1} sidereal seconds; set PEC_BUFFER_SIZE_LIMIT to {needed} or more in Config.h, then --buffer-s {needed}",
+                "the buffer of {buffer_s} s is shorter than a generator turn: at the sidereal rate and ratio {:.4} \
+                 that takes {seconds:.1} sidereal seconds; set PEC_BUFFER_SIZE_LIMIT to {needed} or more in Config.h, \
+                 then --buffer-s {needed}",
                 ratio.abs()
             )));
         }
@@ -125,8 +126,9 @@ impl OnStepX {
     }
 }
 
-/// Knots of a playback at most: it has one for each of the 86 164 sidereal seconds of an output turn, and one for each turn of the generator, which
-/// takes 61 s or more. The entries of a turn add up to nothing, so that the mean rate is the sidereal one.
+/// Knots of a playback at most: it has one for each of the 86 164 sidereal seconds of an output turn, and one for each
+/// turn of the generator, which takes 61 s or more. The entries of a turn add up to nothing, so that the mean rate is
+/// the sidereal one.
 const MOST_KNOTS: usize = 200_000;
 
 /// Plays the buffer for an output turn of tracking: where the motor is and what was added, rad, at each change.
@@ -203,8 +205,8 @@ impl Player for OnStepX {
                 self.buffer.len().div_ceil(PARTITION_STEP as usize) * PARTITION_STEP as usize
             ),
             format!(
-                "for tracking that turns the output {sense}, the worm index at the generator's zero; a rate that is {:.3} arcsec an \
-                 output turn off is left to guiding",
+                "for tracking that turns the output {sense}, the worm index at the generator's zero; a rate that is \
+                 {:.3} arcsec an output turn off is left to guiding",
                 self.track.drift_arcsec()
             ),
         ]

@@ -1,5 +1,5 @@
-//! ros2_control: the parameters of `transmission_interface/SimpleTransmission`: joint = actuator/reduction + offset. It holds no
-//! curve, so it leaves all that changes.
+//! ros2_control: the parameters of `transmission_interface/SimpleTransmission`: joint = actuator/reduction + offset. It
+//! holds no curve, so it leaves all that changes.
 
 use flexspline::Direction;
 
@@ -34,9 +34,10 @@ impl Player for Ros2 {
         let lines = origin.lines("joint position = actuator position / reduction + offset; rad").join("\n  ");
         let text = format!(
             "<!--\n  {lines}\n-->\n<transmission name=\"flexspline\">\n  \
-             <plugin>transmission_interface/SimpleTransmission</plugin>\n  \
-             <actuator name=\"generator\" role=\"actuator1\"/>\n  <joint name=\"output\" role=\"joint1\">\n    \
-             <mechanical_reduction>{}</mechanical_reduction>\n    <offset>{:.9}</offset>\n  </joint>\n</transmission>\n",
+             <plugin>transmission_interface/SimpleTransmission</plugin>\n  <actuator name=\"generator\" \
+             role=\"actuator1\"/>\n  <joint name=\"output\" role=\"joint1\">\n    \
+             <mechanical_reduction>{}</mechanical_reduction>\n    <offset>{:.9}</offset>\n  \
+             </joint>\n</transmission>\n",
             self.reduction, self.offset_rad
         );
         vec![Written::text("transmission.xml", text)]

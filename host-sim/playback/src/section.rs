@@ -58,8 +58,8 @@ impl<'a> Section<'a> {
         f64::from(error.unwrap_or(0.0))
     }
 
-    /// `count` points evenly over a travel of the output (rad), or over the whole period, in each of the directions. With a prime
-    /// count no order of the drive divides it, so that each is sampled at all its phases.
+    /// `count` points evenly over a travel of the output (rad), or over the whole period, in each of the directions.
+    /// With a prime count no order of the drive divides it, so that each is sampled at all its phases.
     pub fn samples(&self, travel: Option<[f64; 2]>, count: u32, directions: &[Direction]) -> Vec<Sample> {
         let [from, to] = travel.unwrap_or([0.0, TAU * f64::from(self.period_turns())]);
         let at = |k: u32| from + (to - from) * f64::from(k) / f64::from(count);

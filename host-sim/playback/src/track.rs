@@ -1,4 +1,5 @@
-//! A mount that tracks: its playback changes the rate second by second, and what it has added so far is a curve over its motor.
+//! A mount that tracks: its playback changes the rate second by second, and what it has added so far is a curve over
+//! its motor.
 
 use std::f64::consts::TAU;
 
@@ -18,8 +19,8 @@ pub(super) struct Track {
 }
 
 impl Track {
-    /// From the knots of one output turn, the first at 0. What has piled up over the turn is taken out evenly: it is a wrong
-    /// rate, which any guiding holds.
+    /// From the knots of one output turn, the first at 0. What has piled up over the turn is taken out evenly: it is a
+    /// wrong rate, which any guiding holds.
     pub(super) fn new(direction: Direction, mut knots: Vec<[f64; 2]>) -> Track {
         let [first, last] = [knots[0], knots[knots.len() - 1]];
         let drift_rad = last[1] - first[1];
@@ -49,8 +50,8 @@ impl Track {
     }
 }
 
-/// The wanted correction over the time since the generator's zero: pairs of time and correction, both as angles of the output
-/// along the tracking (rad). The correction that is in force at the zero has been added before.
+/// The wanted correction over the time since the generator's zero: pairs of time and correction, both as angles of the
+/// output along the tracking (rad). The correction that is in force at the zero has been added before.
 pub(super) fn wanted_in_time(section: &Section<'_>, samples: &[Sample], direction: Direction) -> Vec<(f64, f64)> {
     let zero = mean(samples.iter().map(|sample| sample.error_rad));
     let turn = TAU / section.ratio().abs();

@@ -1,9 +1,10 @@
-//! The core's step over rows of a file, as the Python package runs it over arrays: what its bits and its speed are held against.
+//! The core's step over rows of a file, as the Python package runs it over arrays: what its bits and its speed are held
+//! against.
 //!
-//! `step_rows TABLE.fxt ROWS.f64 OUT.bin`: rows of generator angle (rad), torque (N·m) and temperature (°C), each three little-endian
-//! doubles. Forward runs in row order from an unknown play; inverse asks for each output that forward gave, in forward motion. Written are,
-//! row by row, output (f64), transmission error, uncertainty (f32), quality (u8), then generator (f64), error, uncertainty (f32), quality
-//! (u8). Printed are the seconds of either loop.
+//! `step_rows TABLE.fxt ROWS.f64 OUT.bin`: rows of generator angle (rad), torque (N·m) and temperature (°C), each three
+//! little-endian doubles. Forward runs in row order from an unknown play; inverse asks for each output that forward
+//! gave, in forward motion. Written are, row by row, output (f64), transmission error, uncertainty (f32), quality (u8),
+//! then generator (f64), error, uncertainty (f32), quality (u8). Printed are the seconds of either loop.
 
 use std::hint::black_box;
 use std::path::PathBuf;

@@ -8,7 +8,8 @@ use serde_json::{Map, Value};
 
 use crate::failure::bad;
 
-/// The columns of records: whole numbers as int64, truth values as bool, other numbers as float64 (absent ones as NaN), text as a list.
+/// The columns of records: whole numbers as int64, truth values as bool, other numbers as float64 (absent ones as NaN),
+/// text as a list.
 pub fn columns<'py, R: Serialize>(py: Python<'py>, records: &[R]) -> PyResult<Bound<'py, PyDict>> {
     let result = PyDict::new(py);
     let Some(first) = records.first() else { return Ok(result) };

@@ -43,7 +43,8 @@ impl From<Failure> for PyErr {
     }
 }
 
-/// A message with the names of arguments where it speaks of options of the command: `--node-tolerance-arcsec` is `node_tolerance_arcsec`.
+/// A message with the names of arguments where it speaks of options of the command: `--node-tolerance-arcsec` is
+/// `node_tolerance_arcsec`.
 fn with_arguments(message: &str) -> String {
     let mut text = String::with_capacity(message.len());
     let mut rest = message;

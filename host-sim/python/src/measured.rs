@@ -149,7 +149,8 @@ fn calibration_failure(error: &CalibrationError, logs: &[LogFrom]) -> Failure {
     }
 }
 
-/// What a diagnosis gives: text of the JSON, drive-extended.toml, extended table, why a cause was named or not, columns.
+/// What a diagnosis gives: text of the JSON, drive-extended.toml, extended table, why a cause was named or not,
+/// columns.
 type Diagnosed<'py> = (String, Option<String>, Option<Parts<'py>>, Option<(String, String)>, Bound<'py, PyDict>);
 
 /// Names what the simulation gets wrong in measured data.

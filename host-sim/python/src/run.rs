@@ -1,8 +1,9 @@
 //! Long work on a thread of its own, so that the thread that asked hears Ctrl-C and can show how far it is.
 //!
-//! Nothing that computes touches Python. The thread that asked sleeps without the GIL, wakes a few times in a second, lets Python handle
-//! signals, and tells the progress. Once an exception comes of that, the work is asked to stop, which it does where it next tells how far
-//! it is; what it would still have found is thrown away. Who asked does not wait longer for it than a moment.
+//! Nothing that computes touches Python. The thread that asked sleeps without the GIL, wakes a few times in a second,
+//! lets Python handle signals, and tells the progress. Once an exception comes of that, the work is asked to stop,
+//! which it does where it next tells how far it is; what it would still have found is thrown away. Who asked does not
+//! wait longer for it than a moment.
 
 use std::any::Any;
 use std::ops::ControlFlow;
@@ -51,7 +52,8 @@ impl Watch {
     }
 }
 
-/// Runs `work` on `threads` threads (by default one for each core). `progress(done, total, note)` is called from the thread that asked.
+/// Runs `work` on `threads` threads (by default one for each core). `progress(done, total, note)` is called from the
+/// thread that asked.
 pub fn run<R: Send + 'static>(
     py: Python<'_>,
     threads: Option<usize>,

@@ -43,7 +43,8 @@ pub fn simulate<'py>(
         (None, None) => {
             let text = std::fs::read_to_string(path).map_err(|error| {
                 bad(format!(
-                    "path: found {path:?}, which cannot be read as a file ({error}); allowed: paper, pitch, turn, a CSV file or columns"
+                    "path: found {path:?}, which cannot be read as a file ({error}); allowed: paper, pitch, turn, a \
+                     CSV file or columns"
                 ))
             })?;
             let temperatures_c = drive.temperature.minimum_c..=drive.temperature.maximum_c;

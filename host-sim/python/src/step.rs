@@ -215,7 +215,8 @@ impl Table {
         Ok(header)
     }
 
-    /// `Table::forward` of the core. With `direction` each row for itself, in steady motion; else in row order from `state`, which follows.
+    /// `Table::forward` of the core. With `direction` each row for itself, in steady motion; else in row order from
+    /// `state`, which follows.
     #[expect(clippy::too_many_arguments, reason = "each is a column")]
     fn forward(
         &self,
@@ -305,7 +306,8 @@ impl Table {
         for_rows(py, rows, |row| put(row, Approach::From(&play)))
     }
 
-    /// The core over measured rows, as the command `replay` runs it: the columns of `replay.csv` and the text of `summary.json`.
+    /// The core over measured rows, as the command `replay` runs it: the columns of `replay.csv` and the text of
+    /// `summary.json`.
     fn replay<'py>(
         &self,
         py: Python<'py>,

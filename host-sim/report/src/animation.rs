@@ -1,14 +1,16 @@
 //! The drive in motion, small enough for a page.
 //!
-//! A drive in steady motion repeats with the flexspline pitch p: at generator angle ψ + p everything, both wheels and the
-//! generator, stands as at ψ, turned by p about the axis. What happens to tooth j at ψ is therefore what happened to tooth 0 at
-//! ψ − j p, seen from the frame of the tooth: one function of the *phase* θ = j p − ψ describes all teeth at all times. For the
-//! circular spline with its pitch q the phase is j q + ψ/ratio − ψ, and because p and q differ by p/ratio that is (j − ψ/p) q: the
-//! same count of pitches. Where both wheels have an even number of teeth, two waves make half a turn of phase enough.
+//! A drive in steady motion repeats with the flexspline pitch p: at generator angle ψ + p everything, both wheels and
+//! the generator, stands as at ψ, turned by p about the axis. What happens to tooth j at ψ is therefore what happened
+//! to tooth 0 at ψ − j p, seen from the frame of the tooth: one function of the *phase* θ = j p − ψ describes all teeth
+//! at all times. For the circular spline with its pitch q the phase is j q + ψ/ratio − ψ, and because p and q differ by
+//! p/ratio that is (j − ψ/p) q: the same count of pitches. Where both wheels have an even number of teeth, two waves
+//! make half a turn of phase enough.
 //!
-//! A FEM run over one pitch in [`FRAMES`] increments samples this function at `FRAMES` phases to each pitch, at once for every
-//! tooth. A page draws sector j of a wheel at generator angle ψ from sample `FRAMES (j − ψ/p)`, interpolated, whatever the
-//! angle: a whole turn, and more, from eight frames. Exact for drives that are alike from tooth to tooth; others are refused.
+//! A FEM run over one pitch in [`FRAMES`] increments samples this function at `FRAMES` phases to each pitch, at once
+//! for every tooth. A page draws sector j of a wheel at generator angle ψ from sample `FRAMES (j − ψ/p)`, interpolated,
+//! whatever the angle: a whole turn, and more, from eight frames. Exact for drives that are alike from tooth to tooth;
+//! others are refused.
 
 use super::pack::Packed;
 use super::sleeve_view::SleeveView;
@@ -66,8 +68,8 @@ pub struct Animation {
     pub circular_spline: WheelMotion,
     /// Closed outlines of the generator at angle 0, mm.
     pub generator: Vec<Vec<[f64; 2]>>,
-    /// Forces on a flexspline tooth in its frame, by sample: force x, y (N) and point x, y (mm) on its plus flank; the same of its
-    /// minus flank; force x, y of the generator on its piece of the bore. `[row][sample]`.
+    /// Forces on a flexspline tooth in its frame, by sample: force x, y (N) and point x, y (mm) on its plus flank; the
+    /// same of its minus flank; force x, y of the generator on its piece of the bore. `[row][sample]`.
     pub forces: Vec<f64>,
     /// Radius at which the generator bears, mm.
     pub bore_radius_mm: f64,
@@ -124,10 +126,12 @@ pub fn animate(
     Ok(made.expect("a pitch has all frames"))
 }
 
-/// How near to a frame, in frames, a generator angle has to be: what rounding leaves of an angle of a thousand turns is less.
+/// How near to a frame, in frames, a generator angle has to be: what rounding leaves of an angle of a thousand turns is
+/// less.
 const AT_A_FRAME: f64 = 1e-6;
 
-/// A run that is watched for a pitch of steady motion: where its rows pass all frames one after the other, they are an animation.
+/// A run that is watched for a pitch of steady motion: where its rows pass all frames one after the other, they are an
+/// animation.
 pub struct Passing {
     uniform: bool,
     taken: Option<Taken>,
@@ -231,7 +235,8 @@ impl WheelMotion {
     }
 }
 
-/// Forces of the generator on the first teeth (N), added up over the piece of the bore under each, in the frame of the tooth.
+/// Forces of the generator on the first teeth (N), added up over the piece of the bore under each, in the frame of the
+/// tooth.
 pub(super) fn bore_forces(problem: &Problem, state: &State, teeth: usize) -> Vec<[f64; 2]> {
     let bore = BoreContact::new(problem.wheels().0, problem.settings.bore_points(problem.kind));
     let law =
@@ -436,7 +441,8 @@ mod tests {
         SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() }
     }
 
-    /// Eight frames of one pitch must give back every node of every sector in a drive that has gone on for another pitch.
+    /// Eight frames of one pitch must give back every node of every sector in a drive that has gone on for another
+    /// pitch.
     #[test]
     fn eight_frames_describe_every_tooth_at_any_time() {
         let drive = Drive::hhd_95();
@@ -492,8 +498,8 @@ mod tests {
         assert!(animation.peak_mpa > 100.0 && animation.colour_end_mpa <= animation.peak_mpa * 1.5);
     }
 
-    /// The arrows hold the load: their moments about the axis are the torque less the drag, and the generator carries what the
-    /// flanks press inwards.
+    /// The arrows hold the load: their moments about the axis are the torque less the drag, and the generator carries
+    /// what the flanks press inwards.
     #[test]
     fn the_forces_that_are_shown_hold_the_load() {
         let drive = Drive::hhd_95();

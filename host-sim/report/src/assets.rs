@@ -1,7 +1,8 @@
 //! Style sheet and script of a page, from the files of `web/`.
 //!
-//! The sources are plain ES modules that refer to one another; in a page they stand as one module, in the order below, so the lines
-//! that import and the words that export are left out. Names are therefore unique among the files, which a test holds them to.
+//! The sources are plain ES modules that refer to one another; in a page they stand as one module, in the order below,
+//! so the lines that import and the words that export are left out. Names are therefore unique among the files, which a
+//! test holds them to.
 
 use std::fmt::Write as _;
 use std::sync::LazyLock;
@@ -56,8 +57,8 @@ fn without_linkage(source: &str) -> String {
     text
 }
 
-/// The content security policy of a page: this style sheet, this script, pictures from its own data, and nothing from anywhere.
-/// A script that found its way into the text would not run.
+/// The content security policy of a page: this style sheet, this script, pictures from its own data, and nothing from
+/// anywhere. A script that found its way into the text would not run.
 pub(super) fn policy(style: &str, script: &str) -> String {
     let hash = |text: &str| String::from_utf8(base64(&Sha256::digest(text))).expect("base64 is ASCII");
     format!(

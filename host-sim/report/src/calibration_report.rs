@@ -116,7 +116,8 @@ fn parts(c: &Calibration) -> Section {
         })
         .collect();
     let header = ["Part", "Verdict", "Gain", "Size", "Why"].map(str::to_owned).to_vec();
-    let caption = "Parts; the gain is the share of the squares before that a part takes where nothing was fitted, the size half of peak to peak";
+    let caption = "Parts; the gain is the share of the squares before that a part takes where nothing was fitted, the \
+                   size half of peak to peak";
     Section {
         id: "parts".to_owned(),
         title: "Its parts".to_owned(),
@@ -127,8 +128,9 @@ fn parts(c: &Calibration) -> Section {
 
 fn reading() -> Section {
     Section::reading(vec![Block::paragraph(
-        "A table of one unit says what its error is, not why: two causes that look alike in these logs are one part here. It holds for the \
-         torques, temperatures and angles recorded. The figures where nothing was fitted leave out each file, session or block in turn; which \
-         parts there are, how smooth they are and their coefficients are then found without it.",
+        "A table of one unit says what its error is, not why: two causes that look alike in these logs are one part \
+         here. It holds for the torques, temperatures and angles recorded. The figures where nothing was fitted leave \
+         out each file, session or block in turn; which parts there are, how smooth they are and their coefficients \
+         are then found without it.",
     )])
 }

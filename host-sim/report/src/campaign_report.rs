@@ -1,4 +1,5 @@
-//! The page of a campaign: how errors scatter, what makes them, what to tighten first, what tables leave, kernels beside FEM.
+//! The page of a campaign: how errors scatter, what makes them, what to tighten first, what tables leave, kernels
+//! beside FEM.
 
 use serde_json::{Map, json};
 
@@ -52,7 +53,8 @@ pub fn page(of: Sources<'_>) -> Page {
         }
         if one.play_closed > 0 {
             remarks.push(format!(
-                "{}: on {} of {} drives no play is left somewhere by kernels; lost motion there is the elastic wind-up alone.",
+                "{}: on {} of {} drives no play is left somewhere by kernels; lost motion there is the elastic \
+                 wind-up alone.",
                 one.generator, one.play_closed, campaign.drives
             ));
         }
@@ -213,7 +215,9 @@ fn scatter(of: &Sources<'_>) -> Section {
             row
         });
         Table {
-            caption: "Figures of the drives; the interval is that of the 95 % value, – where the drives are too few to bound it".to_owned(),
+            caption: "Figures of the drives; the interval is that of the 95 % value, – where the drives are too few \
+                      to bound it"
+                .to_owned(),
             header: words(&["Figure", "mean", "std", "5 %", "50 %", "95 %", "99 %", "from", "to"]),
             rows: rows.collect(),
         }
@@ -438,10 +442,11 @@ fn tolerances(of: &Sources<'_>) -> Section {
 
 fn reading() -> Section {
     Section::reading(vec![Block::paragraph(
-        "Drives are computed by influence kernels of contact FEM: linear in the errors of single teeth, interpolated in the distance of the axes, \
-         parabolas in every other dimension, each as if the others were as drawn. The drives by FEM say how good that is for these tolerances. \
-         Intervals hold with 95 %: of quantiles by order statistics, of probabilities after Wilson, of shares and gains by eight replicates. A \
-         table of each unit is one without noise, with the curves that a table has room for: eight orders of the generator's turn, eight of the \
-         turn against the output, six of the output's.",
+        "Drives are computed by influence kernels of contact FEM: linear in the errors of single teeth, interpolated \
+         in the distance of the axes, parabolas in every other dimension, each as if the others were as drawn. The \
+         drives by FEM say how good that is for these tolerances. Intervals hold with 95 %: of quantiles by order \
+         statistics, of probabilities after Wilson, of shares and gains by eight replicates. A table of each unit is \
+         one without noise, with the curves that a table has room for: eight orders of the generator's turn, eight of \
+         the turn against the output, six of the output's.",
     )])
 }

@@ -1,4 +1,5 @@
-//! Figures and tables of a drive that more than one page shows: the drive in motion, its stress, how its teeth share the load, its data sheet.
+//! Figures and tables of a drive that more than one page shows: the drive in motion, its stress, how its teeth share
+//! the load, its data sheet.
 
 use std::f64::consts::TAU;
 
@@ -21,8 +22,9 @@ pub(super) const STRESSES: [OfRow; 3] = [
     ("pressure of generator on bore", |row| row.peak_generator_pressure_mpa),
 ];
 /// What they are, for their caption.
-pub(super) const STRESSES_ARE: &str = "Von Mises stress is averaged at nodes; pressures are those of the contact. Plane strain: no bending over the length of the sleeve, and no \
-     stress raiser finer than the mesh.";
+pub(super) const STRESSES_ARE: &str = "Von Mises stress is averaged at nodes; pressures are those of the contact. \
+                                       Plane strain: no bending over the length of the sleeve, and no stress raiser \
+                                       finer than the mesh.";
 
 /// A tooth pitch of the flexspline, rad.
 fn pitch(animation: &Animation) -> f64 {
@@ -62,15 +64,15 @@ pub(super) fn drive_figure(state: &str) -> Figure {
         id: "drive".into(),
         title: "The drive to scale".into(),
         caption: Text::new(format!(
-            "Contact FEM, plane strain, {state}; both wheels meshed as \
-             computed. The flexspline stands and is deformed by the generator (grey); the circular spline turns: the red dot is \
-             on tooth 0, the blue one on space 0, which meet on the major axis at generator angle 0. Arrows push on the \
-             flexspline: red from the circular spline, at the flanks, blue from the generator. What is seen at one angle is \
-             seen again a tooth pitch later, one tooth on; between computed positions, an eighth of a pitch apart, the picture \
+            "Contact FEM, plane strain, {state}; both wheels meshed as computed. The flexspline stands and is \
+             deformed by the generator (grey); the circular spline turns: the red dot is on tooth 0, the blue one on \
+             space 0, which meet on the major axis at generator angle 0. Arrows push on the flexspline: red from the \
+             circular spline, at the flanks, blue from the generator. What is seen at one angle is seen again a tooth \
+             pitch later, one tooth on; between computed positions, an eighth of a pitch apart, the picture \
              interpolates. Move along figure 2 to turn the generator.",
         )),
-        alt: "Cross section of the drive: circular spline outside, deformed flexspline inside it, wave generator in the middle, \
-              coloured by von Mises stress, and an enlargement of the teeth at the major axis"
+        alt: "Cross section of the drive: circular spline outside, deformed flexspline inside it, wave generator in \
+              the middle, coloured by von Mises stress, and an enlargement of the teeth at the major axis"
             .into(),
         body: FigureBody::Drive,
     }
@@ -82,12 +84,15 @@ pub fn sleeve_figure() -> Figure {
         id: "sleeve".into(),
         title: "The flexspline in three dimensions".into(),
         caption: Text::new(
-            "Its middle surface, the wave of the generator in the state of the figure above: each harmonic of the rim by contact FEM, extended \
-             along rim and tubes by the theory of shells. Displacements are drawn larger than they are, by the factor that is told; colours are \
-             their outward part as it is. The toothed rim is outlined. The sleeve stands, the wave turns with the generator. In the corner, where \
-             the drive is computed with face = \"slices\": how the load lies along the face of the flank that bears most.",
+            "Its middle surface, the wave of the generator in the state of the figure above: each harmonic of the rim \
+             by contact FEM, extended along rim and tubes by the theory of shells. Displacements are drawn larger \
+             than they are, by the factor that is told; colours are their outward part as it is. The toothed rim is \
+             outlined. The sleeve stands, the wave turns with the generator. In the corner, where the drive is \
+             computed with face = \"slices\": how the load lies along the face of the flank that bears most.",
         ),
-        alt: "The flexspline as a tube in perspective, deformed by the wave generator, coloured by its outward displacement".into(),
+        alt: "The flexspline as a tube in perspective, deformed by the wave generator, coloured by its outward \
+              displacement"
+            .into(),
         body: FigureBody::Sleeve,
     }
 }
@@ -156,8 +161,8 @@ pub(super) fn sharing_figure(charts: Vec<(String, Lines)>) -> Figure {
         id: "sharing".into(),
         title: "How the teeth share the load".into(),
         caption: Text::new(
-            "Force on a flexspline tooth by its angle from the major axis, at the load of figure 1: of each flank, and of the \
-             generator on the piece of bore under the tooth. The other lobe carries the same.",
+            "Force on a flexspline tooth by its angle from the major axis, at the load of figure 1: of each flank, \
+             and of the generator on the piece of bore under the tooth. The other lobe carries the same.",
         ),
         alt: "Curves of the force on a tooth over its angle from the major axis".into(),
         body: FigureBody::Lines {

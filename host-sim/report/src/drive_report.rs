@@ -376,7 +376,10 @@ pub fn drive_report(sources: Sources<'_>) -> Page {
         {
             provenance.push((
                 format!("FEM, {}", k.subject.kind.in_words()),
-                format!("{solver} solver, {mesh} mesh, {degrees_of_freedom} degrees of freedom, residual at most {worst_residual:.1e}"),
+                format!(
+                    "{solver} solver, {mesh} mesh, {degrees_of_freedom} degrees of freedom, residual at most \
+                     {worst_residual:.1e}"
+                ),
             ));
         }
     }
@@ -463,7 +466,8 @@ fn judge(known: &[Known<'_>]) -> (Status, Vec<String>) {
     (status, remarks)
 }
 
-/// A value as its JSON file has it: single precision there has the digits it needs, as a [`Value`] all of double precision.
+/// A value as its JSON file has it: single precision there has the digits it needs, as a [`Value`] all of double
+/// precision.
 fn as_written(info: &TableInfo) -> Value {
     serde_json::to_string(info).and_then(|text| serde_json::from_str(&text)).expect("plain values")
 }
@@ -570,14 +574,14 @@ fn comparison(known: &[Known<'_>], validated: bool) -> Section {
     };
     let words = if validated {
         Text::new(
-            "The table_id is what firmware returns for the table it carries: it matches this page with a device in the \
-             field. Without a table the output is off by up to the second column; with it, by the third.",
+            "The table_id is what firmware returns for the table it carries: it matches this page with a device in \
+             the field. Without a table the output is off by up to the second column; with it, by the third.",
         )
     } else {
         Text::new(format!(
-            "The table_id is what firmware returns for the table it carries: it matches this page with a device in the field. \
-             * At {FRAMES} points over a pitch, at half load, forward, at {:.0} °C: few, but none of them made the table. \
-             The command validate draws many, at random loads and temperatures.",
+            "The table_id is what firmware returns for the table it carries: it matches this page with a device in \
+             the field. * At {FRAMES} points over a pitch, at half load, forward, at {:.0} °C: few, but none of them \
+             made the table. The command validate draws many, at random loads and temperatures.",
             known.first().map_or(20.0, |k| k.temperature)
         ))
     };
@@ -604,8 +608,9 @@ fn motion_section(known: &[Known<'_>]) -> Section {
         id: "ripple".into(),
         title: "Error over one tooth pitch, less its mean".into(),
         caption: Text::new(
-            "Output angle less generator angle over the ratio, by the table, at three loads in both directions; dots are fresh \
-             FEM, the states that figure 1 shows. It repeats with every pitch of the flexspline. The mean is in figure 3.",
+            "Output angle less generator angle over the ratio, by the table, at three loads in both directions; dots \
+             are fresh FEM, the states that figure 1 shows. It repeats with every pitch of the flexspline. The mean \
+             is in figure 3.",
         ),
         alt: "Curves of the output error over one tooth pitch of the generator".into(),
         body: FigureBody::Lines {
@@ -618,9 +623,9 @@ fn motion_section(known: &[Known<'_>]) -> Section {
         id: "wind-up".into(),
         title: "Error over the load".into(),
         caption: Text::new(
-            "Mean over a pitch, by the table, at the reference temperature: wind-up, and, where the load is too small to hold \
-             the flanks together, the clearance. A positive load turns the output forward. Drag across to zoom, double-click to \
-             come back.",
+            "Mean over a pitch, by the table, at the reference temperature: wind-up, and, where the load is too small \
+             to hold the flanks together, the clearance. A positive load turns the output forward. Drag across to \
+             zoom, double-click to come back.",
         ),
         alt: "Curves of the mean output error over the load torque, forward and backward".into(),
         body: FigureBody::Lines {
@@ -690,8 +695,8 @@ fn validation_section(known: &[Known<'_>]) -> Section {
         id: "reversal".into(),
         title: "Through the clearance at a reversal".into(),
         caption: Text::new(
-            "Without load the generator turns back: the output stands until the clearance is crossed, and the error grows with \
-             the generator. The line is what the core, with its play, gives from the same generator angles.",
+            "Without load the generator turns back: the output stands until the clearance is crossed, and the error \
+             grows with the generator. The line is what the core, with its play, gives from the same generator angles.",
         ),
         alt: "Output error while the generator reverses, by table and by FEM".into(),
         body: FigureBody::Lines {
@@ -709,8 +714,9 @@ fn table_section(known: &[Known<'_>]) -> Section {
             id: "play".into(),
             title: "Play between the directions".into(),
             caption: Text::new(
-                "Backward less forward error, mean over a pitch: both half-widths of the play. Below the drag of the output \
-                 nothing holds the flanks together and it is the backlash; beyond, what drag and friction leave.",
+                "Backward less forward error, mean over a pitch: both half-widths of the play. Below the drag of the \
+                 output nothing holds the flanks together and it is the backlash; beyond, what drag and friction \
+                 leave.",
             ),
             alt: "Curves of the difference between backward and forward error over the load torque".into(),
             body: FigureBody::Lines {
@@ -740,8 +746,8 @@ fn table_section(known: &[Known<'_>]) -> Section {
             id: "residual".into(),
             title: "Table less the samples that made it".into(),
             caption: Text::new(
-                "The largest at each torque node, over positions and temperatures. This is what single precision and the play \
-                 as a single half-width leave; it says nothing of what lies between the nodes.",
+                "The largest at each torque node, over positions and temperatures. This is what single precision and \
+                 the play as a single half-width leave; it says nothing of what lies between the nodes.",
             ),
             alt: "Points of the deviation of the table from its samples over the load torque".into(),
             body: FigureBody::Lines {
@@ -803,17 +809,17 @@ fn load_section(known: &[Known<'_>]) -> Section {
 fn reading_section() -> Section {
     Section::reading(vec![
         Block::paragraph(
-            "Error: output angle less generator angle over the ratio; positive when the output leads. The flexspline is \
-                 fixed, the circular spline is the output. Forward is growing generator angle.",
+            "Error: output angle less generator angle over the ratio; positive when the output leads. The flexspline \
+             is fixed, the circular spline is the output. Forward is growing generator angle.",
         ),
         Block::paragraph(
-            "Fresh FEM means runs that made none of the tables, by the same model: agreement says that the table holds what \
-                 the model says, not that the model holds what a real drive does. Plane strain, quasi-static: the cup of the \
-                 flexspline, its skew, lubricant and speed are left out.",
+            "Fresh FEM means runs that made none of the tables, by the same model: agreement says that the table \
+             holds what the model says, not that the model holds what a real drive does. Plane strain, quasi-static: \
+             the cup of the flexspline, its skew, lubricant and speed are left out.",
         ),
         Block::paragraph(
-            "Figures zoom by dragging and come back by a double click. Pointing along figure 2 turns the drive of figure 1. \
-                 Every figure has its numbers as a table and as CSV, in the unit that is selected.",
+            "Figures zoom by dragging and come back by a double click. Pointing along figure 2 turns the drive of \
+             figure 1. Every figure has its numbers as a table and as CSV, in the unit that is selected.",
         ),
     ])
 }

@@ -69,9 +69,9 @@ fn tracking(flight: &Flight, results: &Results) -> Section {
         })
         .collect();
     let table = Table {
-        caption:
-            "Output less target; speed of the output less the target's while that is even; time to settle after a slew"
-                .to_owned(),
+        caption: "Output less target; speed of the output less the target's while that is even; time to settle after \
+                  a slew"
+            .to_owned(),
         header: ["Controller", "rms", "largest", "velocity ripple", "settles in"].map(str::to_owned).to_vec(),
         rows,
     };
@@ -179,9 +179,10 @@ fn details(flown: &Flown, flight: &Flight, results: &Results) -> Section {
 
 fn reading() -> Section {
     Section::reading(vec![Block::paragraph(
-        "The unit has wind-up, clearance and tooth ripple of the contact FEM of HHD-95, is 6 % stiffer with 2″ more clearance, and has lines of \
-         eccentric wheels, pitch errors and an eccentric encoder that the nominal table does not know. The two error maps hold the unit's own error over the angles, \
-         recorded without noise at the mean load. The ideal is told the unit's own law and the true torque; what it leaves is the servo's: friction, \
-         gusts, reversals. Friction is that of an eRob80 of ratio 100 as identified by Rhoban/bam.",
+        "The unit has wind-up, clearance and tooth ripple of the contact FEM of HHD-95, is 6 % stiffer with 2″ more \
+         clearance, and has lines of eccentric wheels, pitch errors and an eccentric encoder that the nominal table \
+         does not know. The two error maps hold the unit's own error over the angles, recorded without noise at the \
+         mean load. The ideal is told the unit's own law and the true torque; what it leaves is the servo's: \
+         friction, gusts, reversals. Friction is that of an eRob80 of ratio 100 as identified by Rhoban/bam.",
     )])
 }

@@ -1,8 +1,8 @@
 //! Numbers in a page: quantised, as differences, byte plane by byte plane, deflated, in base64.
 //!
-//! A field that varies smoothly along its last axis has small differences, whose high bytes are nearly all zero; collected in a
-//! plane of their own they cost almost nothing. A browser inflates them without a library (`DecompressionStream`,
-//! format `deflate-raw`); `web/pack.js` undoes each step.
+//! A field that varies smoothly along its last axis has small differences, whose high bytes are nearly all zero;
+//! collected in a plane of their own they cost almost nothing. A browser inflates them without a library
+//! (`DecompressionStream`, format `deflate-raw`); `web/pack.js` undoes each step.
 //!
 //! | kind | stored | error at most |
 //! |---|---|---|

@@ -1,15 +1,16 @@
-//! What a page is made of. A command fills in a [`Page`] and writes [`Page::html`]; nothing here knows what a table or a
-//! diagnosis is.
+//! What a page is made of. A command fills in a [`Page`] and writes [`Page::html`]; nothing here knows what a table or
+//! a diagnosis is.
 //!
-//! - A page answers its reader's question first: a [`Headline`] of one sentence and one number, under a [`Status`] that also
-//!   stands in the page's JSON block and decides the command's exit code.
-//! - It may speak of several *choices* (the four generators): a selector shows one at a time. Text and tables marked with a choice,
-//!   and every figure, follow it. A page of one thing has one choice and no selector.
-//! - [`Section`]s hold text, tables and [`Figure`]s, at one of three levels of [`Detail`]. Figures are numbered in their order.
-//! - Errors of the output are stored in arc-seconds and shown in the unit that the reader picks: give them as [`Text::error`] in
-//!   text, and as [`Quantity::Error`] on an axis.
-//! - A [`FigureBody::Drive`] shows the [`Animation`]s of the page. Charts whose x axis is marked [`Axis::linked`] turn its
-//!   generator, and are turned by it.
+//! - A page answers its reader's question first: a [`Headline`] of one sentence and one number, under a [`Status`] that
+//!   also stands in the page's JSON block and decides the command's exit code.
+//! - It may speak of several *choices* (the four generators): a selector shows one at a time. Text and tables marked
+//!   with a choice, and every figure, follow it. A page of one thing has one choice and no selector.
+//! - [`Section`]s hold text, tables and [`Figure`]s, at one of three levels of [`Detail`]. Figures are numbered in
+//!   their order.
+//! - Errors of the output are stored in arc-seconds and shown in the unit that the reader picks: give them as
+//!   [`Text::error`] in text, and as [`Quantity::Error`] on an axis.
+//! - A [`FigureBody::Drive`] shows the [`Animation`]s of the page. Charts whose x axis is marked [`Axis::linked`] turn
+//!   its generator, and are turned by it.
 
 use askama::Template;
 use serde::Serialize;
@@ -453,7 +454,8 @@ impl Lines {
         for series in &self.series {
             let mut column = vec![f64::NAN; x.len()];
             for [at, y] in &series.points {
-                // Two points of one series at one x (a jump) keep the later; series that jump are split by who makes them.
+                // Two points of one series at one x (a jump) keep the later; series that jump are split by who makes
+                // them.
                 column[x.partition_point(|v| v < at)] = *y;
             }
             columns.push(column);

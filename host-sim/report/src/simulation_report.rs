@@ -1,5 +1,5 @@
-//! The page of a run along a path: what was found, the error along the path, the loop over the torque, how the teeth share the load, and
-//! the drive in motion where the path settles for a tooth pitch.
+//! The page of a run along a path: what was found, the error along the path, the loop over the torque, how the teeth
+//! share the load, and the drive in motion where the path settles for a tooth pitch.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -28,7 +28,8 @@ const MOST_STRETCHES: usize = 6;
 const MOST_COLUMNS: usize = 240;
 /// Rows from which a map says more than a curve.
 const ROWS_OF_A_MAP: usize = 4;
-/// Rows of one stretch of the torque from which it is drawn as a curve: fewer are a load that is changed, not a test of torsion.
+/// Rows of one stretch of the torque from which it is drawn as a curve: fewer are a load that is changed, not a test of
+/// torsion.
 const ROWS_OF_A_LOOP: usize = 3;
 /// Teeth that a map shows beside the last that bears: that it ends there is then seen.
 const TEETH_BESIDE: usize = 2;
@@ -37,7 +38,8 @@ const TEETH_BESIDE: usize = 2;
 pub struct Seen {
     passing: Passing,
     teeth: Vec<[Vec<f64>; 2]>,
-    /// The row of the largest pressure between flanks so far: that pressure, the row's place, what the generator bears on each tooth.
+    /// The row of the largest pressure between flanks so far: that pressure, the row's place, what the generator bears
+    /// on each tooth.
     highest: (f64, usize, Vec<f64>),
 }
 
@@ -217,8 +219,8 @@ impl Known<'_> {
             id: "ripple".into(),
             title: "Error over one tooth pitch, less its mean".into(),
             caption: Text::new(
-                "Output angle less generator angle over the ratio, the states that figure 1 shows: it repeats with every pitch of the \
-                 flexspline. The mean is ",
+                "Output angle less generator angle over the ratio, the states that figure 1 shows: it repeats with \
+                 every pitch of the flexspline. The mean is ",
             )
             .error(motion.error_arcsec.iter().sum::<f64>() / FRAMES as f64, 4)
             .plain("."),
@@ -274,8 +276,9 @@ impl Known<'_> {
             blocks.push(figure(
                 "error",
                 "Error over the generator angle",
-                "Output angle less generator angle over the ratio; positive when the output leads. A line to each stretch in which the \
-                 generator goes one way, as far as there are few. Where it turns back without load the output stands until the clearance is crossed.",
+                "Output angle less generator angle over the ratio; positive when the output leads. A line to each \
+                 stretch in which the generator goes one way, as far as there are few. Where it turns back without \
+                 load the output stands until the clearance is crossed.",
                 Axis::new("Generator", Quantity::Degree),
                 Lines { series, ..Lines::default() },
             ));
@@ -287,8 +290,9 @@ impl Known<'_> {
             blocks.push(figure(
                 "torsion",
                 "Error over the torque",
-                "The torsion of the output, its clearance included, as a torsion test draws it: the slope is the compliance, and what lies \
-                 between growing and falling torque is lost to friction and drag. A positive torque turns the output forward.",
+                "The torsion of the output, its clearance included, as a torsion test draws it: the slope is the \
+                 compliance, and what lies between growing and falling torque is lost to friction and drag. A \
+                 positive torque turns the output forward.",
                 Axis::new("Load torque", Quantity::Torque),
                 Lines { series, ..Lines::default() },
             ));
@@ -338,8 +342,8 @@ impl Known<'_> {
             blocks.push(curves(
                 "generator-torque",
                 "Torque of the generator",
-                "On the flexspline, quasi-static: what is left of it beside the load over the ratio is friction and drag, and what the teeth store \
-                 from place to place. Positive turns the generator forward.",
+                "On the flexspline, quasi-static: what is left of it beside the load over the ratio is friction and \
+                 drag, and what the teeth store from place to place. Positive turns the generator forward.",
                 Axis::new("Torque of the generator", Quantity::Torque),
                 &[("generator", |row| row.generator_torque_n_m)],
             ));
@@ -347,7 +351,8 @@ impl Known<'_> {
         Section { id: "load".into(), title: "Load and stress".into(), detail: Detail::Engineering, blocks }
     }
 
-    /// What the rows are drawn over, and the places of the rows, ascending: generator or torque where that goes one way all along, else the step.
+    /// What the rows are drawn over, and the places of the rows, ascending: generator or torque where that goes one way
+    /// all along, else the step.
     fn along(&self) -> (Axis, Vec<(f64, usize)>) {
         let goes_one_way = |of: fn(&Row) -> f64| matches!(one_way(self.rows, of).as_slice(), [(_, stretch)] if stretch.len() == self.rows.len());
         let (axis, of): (Axis, fn(&Row) -> f64) = if goes_one_way(|row| row.generator_rad) {
@@ -362,7 +367,8 @@ impl Known<'_> {
         (axis, places)
     }
 
-    /// Of every tooth its angle from the major axis, degrees, ascending from -90 so that no lobe is cut, and the tooth, at a row.
+    /// Of every tooth its angle from the major axis, degrees, ascending from -90 so that no lobe is cut, and the tooth,
+    /// at a row.
     fn around_major_axis(&self, row: &Row) -> Vec<(f64, usize)> {
         let teeth = i64::from(self.drive.flexspline.teeth);
         let pitch = TAU / teeth as f64;
@@ -409,8 +415,9 @@ impl Known<'_> {
             id: "sharing".into(),
             title: "How the teeth share the load".into(),
             caption: Text::new(format!(
-                "Force on each flexspline tooth by its angle from the major axis, at step {}, where the pressure between flanks is largest \
-                 ({} N·m, generator at {}°): of each flank that bears, and of the generator on the piece of bore under the tooth.",
+                "Force on each flexspline tooth by its angle from the major axis, at step {}, where the pressure \
+                 between flanks is largest ({} N·m, generator at {}°): of each flank that bears, and of the generator \
+                 on the piece of bore under the tooth.",
                 row.step,
                 plain(row.torque_n_m),
                 plain(row.generator_rad.to_degrees()),
@@ -462,8 +469,8 @@ impl Known<'_> {
             id: "map".into(),
             title: "Which teeth bear along the path".into(),
             caption: Text::new(format!(
-                "Force on each flexspline tooth: positive on its {}, negative on its {}. Teeth that bear nothing are left out; the angle is that \
-                 from the major axis, to half a tooth.{most}{lobes}",
+                "Force on each flexspline tooth: positive on its {}, negative on its {}. Teeth that bear nothing are \
+                 left out; the angle is that from the major axis, to half a tooth.{most}{lobes}",
                 BEARS[0], BEARS[1]
             )),
             alt: "Colour map of the force on the teeth over the path and their angle from the major axis".into(),
@@ -478,19 +485,21 @@ impl Known<'_> {
 
     fn reading(&self) -> Section {
         let motion = if self.motion.is_some() {
-            "The drive in motion is made of the first tooth pitch of the path on which it had settled under one load, at eighths of the pitch."
+            "The drive in motion is made of the first tooth pitch of the path on which it had settled under one load, \
+             at eighths of the pitch."
         } else {
-            "There is no drive in motion: the path has no settled tooth pitch with rows at its eighths, as pitch and turn have, or the drive differs \
-             from tooth to tooth."
+            "There is no drive in motion: the path has no settled tooth pitch with rows at its eighths, as pitch and \
+             turn have, or the drive differs from tooth to tooth."
         };
         Section::reading(vec![
             Block::paragraph(
-                "Error: output angle less generator angle over the ratio; positive when the output leads. The flexspline is fixed, the circular \
-                 spline is the output. Forward is growing generator angle. Every row of the path is in results.csv.",
+                "Error: output angle less generator angle over the ratio; positive when the output leads. The \
+                 flexspline is fixed, the circular spline is the output. Forward is growing generator angle. Every \
+                 row of the path is in results.csv.",
             ),
             Block::paragraph(
-                "Plane strain, quasi-static: no inertia, no lubricant, no speed. What is settled, and how means are taken, is in summary.json's \
-                 documentation: a figure that the path cannot give is left out.",
+                "Plane strain, quasi-static: no inertia, no lubricant, no speed. What is settled, and how means are \
+                 taken, is in summary.json's documentation: a figure that the path cannot give is left out.",
             ),
             Block::paragraph(motion),
         ])
@@ -515,8 +524,8 @@ impl Known<'_> {
     }
 }
 
-/// Stretches of at least two rows in which `x` goes one way, and whether it grows. Each begins where the one before ended, unless something else
-/// than `x` changed there.
+/// Stretches of at least two rows in which `x` goes one way, and whether it grows. Each begins where the one before
+/// ended, unless something else than `x` changed there.
 fn one_way(rows: &[Row], x: impl Fn(&Row) -> f64) -> Vec<(bool, Range<usize>)> {
     let mut found: Vec<(bool, Range<usize>)> = Vec::new();
     for k in 1..rows.len() {
@@ -615,8 +624,8 @@ mod tests {
         assert_eq!(many.iter().map(|s| (s.mark, s.points.len())).collect::<Vec<_>>(), [(Mark::Dots, 12); 2]);
         assert!(many[0].points.windows(2).all(|pair| pair[0][0] < pair[1][0]));
 
-        // A forward load is borne by flanks towards falling angles, a backward one by the others: together a little more than the load over
-        // the radius, since flanks lean by some 20 to 30 degrees.
+        // A forward load is borne by flanks towards falling angles, a backward one by the others: together a little
+        // more than the load over the radius, since flanks lean by some 20 to 30 degrees.
         let radius_m = 1e-3 * drive.flexspline.root_radius_mm;
         for (at, bears) in [(6, 1), (8, 0)] {
             let sum = |side: usize| seen.teeth[at][side].iter().sum::<f64>();
@@ -634,7 +643,8 @@ mod tests {
         let Some(FigureBody::Field { fields, .. }) = figure("map") else { panic!("no map") };
         let field = &fields[0].1;
         let column = |at: usize| field.z.iter().skip(at).step_by(run.rows.len()).filter(|force| force.is_finite());
-        // Signs diverge about zero; of a drive whose lobes are alike one is shown, and the teeth that bear lie near its middle.
+        // Signs diverge about zero; of a drive whose lobes are alike one is shown, and the teeth that bear lie near its
+        // middle.
         assert!(column(6).all(|force| *force <= 0.0) && column(8).all(|force| *force >= 0.0));
         let bearing: Vec<f64> = (0..field.y.len())
             .filter(|line| field.z[line * run.rows.len() + 6] < -1.0)

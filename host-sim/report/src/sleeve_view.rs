@@ -1,7 +1,8 @@
 //! The flexspline in three dimensions, small enough for a page: each harmonic of the rim with its shape along the axis.
 //!
-//! In steady motion the rim keeps its form in the frame of the generator, so that one state shows a whole turn: amplitudes of `cos n theta`
-//! and `sin n theta`, theta from the major axis, and for each a shape of U, V and W at stations along the axis. A page adds them up.
+//! In steady motion the rim keeps its form in the frame of the generator, so that one state shows a whole turn:
+//! amplitudes of `cos n theta` and `sin n theta`, theta from the major axis, and for each a shape of U, V and W at
+//! stations along the axis. A page adds them up.
 
 use serde::Serialize;
 
@@ -24,7 +25,8 @@ pub struct Wave {
     pub n: u32,
     /// Amplitudes of `cos n theta` and of `sin n theta` in the middle of the rim, mm.
     pub amplitudes_mm: [f64; 2],
-    /// For an amplitude of 1, at each station: along the axis (`cos n theta`), around it (`sin n theta`), outward (`cos n theta`).
+    /// For an amplitude of 1, at each station: along the axis (`cos n theta`), around it (`sin n theta`), outward
+    /// (`cos n theta`).
     pub along: Vec<f64>,
     /// See `along`.
     pub around: Vec<f64>,
@@ -51,7 +53,8 @@ pub struct SleeveView {
     pub tilt_mrad: f64,
     /// See `tilt_mrad`.
     pub skew_mrad: f64,
-    /// Load along the face of the flank that bears most, over its mean, from the flange's end to the bottom's; empty where it is even.
+    /// Load along the face of the flank that bears most, over its mean, from the flange's end to the bottom's; empty
+    /// where it is even.
     pub load_over_mean: Vec<f64>,
 }
 

@@ -131,7 +131,8 @@ fn in_words(name: &str) -> (String, Option<&'static str>, Quantity) {
     }
 }
 
-/// A figure as a reader takes it: what it is with its unit, and its quantity. A unit that the page adds or changes is left to it.
+/// A figure as a reader takes it: what it is with its unit, and its quantity. A unit that the page adds or changes is
+/// left to it.
 fn shown(name: &str) -> (String, Quantity) {
     match in_words(name) {
         (words, Some(unit), Quantity::Count) => (format!("{words}, {unit}"), Quantity::Count),
@@ -302,8 +303,9 @@ fn does(of: &Sources<'_>) -> Option<Section> {
                     [Text::new(heading(effect.figure))].into_iter().chain(changes).chain([straight]).collect()
                 })
                 .collect();
-            let caption = "Change of each figure from the least to the largest value of a field, the others held: the slopes of a straight \
-                           line through all variants, and the share of the scatter that it explains";
+            let caption = "Change of each figure from the least to the largest value of a field, the others held: the \
+                           slopes of a straight line through all variants, and the share of the scatter that it \
+                           explains";
             let table = Table { caption: caption.to_owned(), header: header.clone(), rows };
             (!table.rows.is_empty()).then(|| Block::Table { choice: Some(kind.to_string()), table })
         })
@@ -332,9 +334,11 @@ fn off(of: &Sources<'_>) -> Option<Section> {
                     value(trust.figure, Some(trust.largest)),
                 ]
             };
-            let rows: Vec<Vec<Text>> = of.study.trust.iter().filter(|trust| trust.generator == *kind).map(row).collect();
+            let rows: Vec<Vec<Text>> =
+                of.study.trust.iter().filter(|trust| trust.generator == *kind).map(row).collect();
             let caption = format!(
-                "{estimated} variants are estimated by a surface through the others. What it is off by where a computed variant is left out of it"
+                "{estimated} variants are estimated by a surface through the others. What it is off by where a \
+                 computed variant is left out of it"
             );
             let table = Table { caption, header: header.map(str::to_owned).to_vec(), rows };
             (!table.rows.is_empty()).then(|| Block::Table { choice: Some(kind.to_string()), table })
@@ -524,10 +528,11 @@ fn map(of: &Sources<'_>, name: &'static str) -> Option<Figure> {
 
 fn reading() -> Section {
     Section::reading(vec![Block::paragraph(
-        "Each variant is loaded from first contact with its generator held, and then turned by a tooth pitch under the largest load. K1 is the \
-         secant of its torsion up to T1, K2 from T1 to T2, K3 above; the clearance of the teeth is no part of them. Stress in root fillets \
-         (root fillet) is found by the strain of their surface. The largest nodal value (max von mises) grows with the mesh, and is too low in \
-         fillets. A caution judges the larger of both; simulate --stress tells the stress of one variant over three meshes.",
+        "Each variant is loaded from first contact with its generator held, and then turned by a tooth pitch under \
+         the largest load. K1 is the secant of its torsion up to T1, K2 from T1 to T2, K3 above; the clearance of the \
+         teeth is no part of them. Stress in root fillets (root fillet) is found by the strain of their surface. The \
+         largest nodal value (max von mises) grows with the mesh, and is too low in fillets. A caution judges the \
+         larger of both; simulate --stress tells the stress of one variant over three meshes.",
     )])
 }
 
@@ -535,7 +540,8 @@ fn reading() -> Section {
 mod tests {
     use super::*;
 
-    /// Of what a study can be asked, all but a ratio, and every field of a drive that ends in a unit, have it in the heading of a column.
+    /// Of what a study can be asked, all but a ratio, and every field of a drive that ends in a unit, have it in the
+    /// heading of a column.
     #[test]
     fn figures_and_fields_say_their_units() {
         for (name, due) in [

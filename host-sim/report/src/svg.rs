@@ -40,8 +40,8 @@ fn span(values: impl Iterator<Item = f64>) -> (f64, f64) {
     }
 }
 
-/// Points of a line, thinned to about `most`: of each group the least and the largest, so that no peak is lost, and a place that is not finite
-/// where it has one.
+/// Points of a line, thinned to about `most`: of each group the least and the largest, so that no peak is lost, and a
+/// place that is not finite where it has one.
 fn thinned(points: &[[f64; 2]], most: usize) -> Vec<[f64; 2]> {
     if points.len() <= most {
         return points.to_vec();

@@ -17,9 +17,9 @@ use flexspline_export::bundle::{Bundle, MANIFEST, Manifest, Table, TableEntry, t
 
 /// Tables, a reader in C99, the core as static libraries, vectors and build files, in one folder for firmware
 ///
-/// Writes what CMake, Zephyr, PlatformIO, ESP-IDF and Arduino take as it is: c99/ (the reader), include/, tables/ (as .fxt and as C),
-/// lib/<target>/ (the core), vectors/ (what a port has to say) and manifest.json. Replaces a bundle that is there as it was written, and no
-/// other folder.
+/// Writes what CMake, Zephyr, PlatformIO, ESP-IDF and Arduino take as it is: c99/ (the reader), include/, tables/ (as
+/// .fxt and as C), lib/<target>/ (the core), vectors/ (what a port has to say) and manifest.json. Replaces a bundle
+/// that is there as it was written, and no other folder.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -36,7 +36,8 @@ pub(super) struct BundleCommand {
     /// No static libraries: the reader in C99 alone
     #[arg(long, conflicts_with_all = ["targets", "libraries"])]
     no_core: bool,
-    /// Folder with TARGET/libflexspline.a; default: that of the release, beside this program, or a build of the sources here
+    /// Folder with TARGET/libflexspline.a; default: that of the release, beside this program, or a build of the sources
+    /// here
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     libraries: Option<PathBuf>,
     /// The same as one file beside the folder, DIR.tar.gz

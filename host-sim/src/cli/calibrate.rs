@@ -21,12 +21,13 @@ use flexspline_report::calibration_report;
 
 /// Make the table of one unit from its logs, whatever the cause of its error
 ///
-/// Takes what a nominal model or a table says from what was measured, and fits what remains by smooth parts: wind-up by torque, play by
-/// direction, curves over generator, tooth and output angle, temperature. A part is kept if it gains in files, sessions or blocks
-/// that were left out. Writes calibrated.fxt, .h and .rs, calibration.json and report.html.
+/// Takes what a nominal model or a table says from what was measured, and fits what remains by smooth parts: wind-up by
+/// torque, play by direction, curves over generator, tooth and output angle, temperature. A part is kept if it gains in
+/// files, sessions or blocks that were left out. Writes calibrated.fxt, .h and .rs, calibration.json and report.html.
 ///
-/// With --plan it says instead what to record, before there is a log: passes of the bench that tell most in the time there is, with the accuracy
-/// to expect. With --more it says what to add to the logs. Both write plan.csv and plan.json.
+/// With --plan it says instead what to record, before there is a log: passes of the bench that tell most in the time
+/// there is, with the accuracy to expect. With --more it says what to add to the logs. Both write plan.csv and
+/// plan.json.
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("known").required(true).args(["tables", "model", "ratio"]))]
 #[command(after_help = "\
@@ -221,7 +222,8 @@ impl Calibrate {
         if let Some(path) = &self.model {
             let model = Model::read(path).map_err(|error| Failure::BadInput(error.to_string()))?;
             if !model.causes.is_empty() {
-                let what = "found [[extension.cause]], allowed: a nominal model without causes; what they are is fitted here anew";
+                let what = "found [[extension.cause]], allowed: a nominal model without causes; what they are is \
+                            fitted here anew";
                 return Err(Failure::BadInput(format!("{}: {what}", path.display())));
             }
             let bytes =
@@ -263,14 +265,16 @@ fn put_plan(planned: &Planned, out: &Path, outputs: &mut Outputs) -> Result<(), 
 fn planned_text(planned: &Planned, out: &Path) -> String {
     let logs = planned.passes.iter().map(|pass| pass.log).max().unwrap_or(0);
     let mut text = format!(
-        "{}: {} passes in {:.0} minutes, each there and back with a second of rest at either end; {} rows in a second\n",
+        "{}: {} passes in {:.0} minutes, each there and back with a second of rest at either end; {} rows in a \
+         second\n",
         planned.drive,
         planned.passes.len(),
         planned.minutes,
         planned.bench.rate_hz
     );
     if logs > 1 {
-        text += "each temperature is a log of its own, recorded when the drive has settled there; the encoders keep their zeros\n";
+        text += "each temperature is a log of its own, recorded when the drive has settled there; the encoders keep \
+                 their zeros\n";
     }
     text += "   log   output, deg           generator, turns      rpm   load, N.m     C   tells most of\n";
     for p in &planned.passes {
@@ -307,8 +311,8 @@ fn planned_text(planned: &Planned, out: &Path) -> String {
     }
     let _ = writeln!(
         text,
-        "error of the parts to expect, arcsec rms: {:.2}, for a noise of {:.2} arcsec from row to row and {:.2} besides; what no part has, and \
-         an eccentric encoder at the output, come on top",
+        "error of the parts to expect, arcsec rms: {:.2}, for a noise of {:.2} arcsec from row to row and {:.2} \
+         besides; what no part has, and an eccentric encoder at the output, come on top",
         planned.expected_rms_arcsec,
         planned.noise.white_arcsec,
         planned.noise.beside_white_arcsec()
@@ -343,14 +347,16 @@ fn text(made: &Calibrated, out: &Path, with_page: bool) -> String {
         let used = if found.told { "used" } else { "not told by these logs, not used" };
         let _ = writeln!(
             text,
-            "phase of the table: its generator angle 0 is where the logs read {:.3} ± {:.3} deg (it repeats every {:.3} deg): {used}; {}",
+            "phase of the table: its generator angle 0 is where the logs read {:.3} ± {:.3} deg (it repeats every \
+             {:.3} deg): {used}; {}",
             found.generator_zero_deg, found.generator_half_width_deg, found.repeats_deg, found.why
         );
     }
     let removed = 100.0 * (1.0 - held_out.rms_after_arcsec / held_out.rms_before_arcsec);
     let _ = writeln!(
         text,
-        "where nothing was fitted, arcsec rms: {:.2} as measured, {:.2} with what was known, {:.2} with the table ({removed:.1} % less)",
+        "where nothing was fitted, arcsec rms: {:.2} as measured, {:.2} with what was known, {:.2} with the table \
+         ({removed:.1} % less)",
         held_out.rms_before_arcsec, held_out.rms_prior_arcsec, held_out.rms_after_arcsec
     );
     let _ = writeln!(
@@ -360,7 +366,8 @@ fn text(made: &Calibrated, out: &Path, with_page: bool) -> String {
     );
     let _ = writeln!(
         text,
-        "the table holds the error to ±{:.2} arcsec (95 %, where it was recorded); a generator degree in its zero costs {:.2} arcsec rms",
+        "the table holds the error to ±{:.2} arcsec (95 %, where it was recorded); a generator degree in its zero \
+         costs {:.2} arcsec rms",
         c.half_width_arcsec, c.zero_cost.rms_arcsec_per_generator_deg
     );
     let mut files = vec!["calibrated.fxt", "calibrated.h", "calibrated.rs", "calibration.json"];

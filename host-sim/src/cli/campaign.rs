@@ -22,10 +22,11 @@ use flexspline_report::campaign_report;
 
 /// Draw thousands of drives from tolerances, on any engine, and say what to tighten first
 ///
-/// `plan` reads what a drawing allows, computes the drive as drawn by contact FEM (influence kernels, and what each dimension does) and
-/// writes plan.json. `run` computes a shard of the drives: any program that calls a command with a number can run all of them, in any order,
-/// more than once; the same bits come out. `reduce` tells quantiles, probabilities, what each tolerance has part in, what halving it buys,
-/// what tables leave, and writes the worst drives as files.
+/// `plan` reads what a drawing allows, computes the drive as drawn by contact FEM (influence kernels, and what each
+/// dimension does) and writes plan.json. `run` computes a shard of the drives: any program that calls a command with a
+/// number can run all of them, in any order, more than once; the same bits come out. `reduce` tells quantiles,
+/// probabilities, what each tolerance has part in, what halving it buys, what tables leave, and writes the worst drives
+/// as files.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -471,7 +472,8 @@ fn lines(of: &OfGenerator) -> String {
         if fem.figures.is_empty() {
             let _ = writeln!(
                 text,
-                "  {} by FEM: too few for a correlation, {} are needed; largest difference {:.3} of error_pp_arcsec by kernels",
+                "  {} by FEM: too few for a correlation, {} are needed; largest difference {:.3} of error_pp_arcsec \
+                 by kernels",
                 counted(fem.drives, "drive"),
                 fem.drives_needed,
                 fem.largest_difference_arcsec

@@ -56,8 +56,8 @@ impl Context {
                     let meant = likeliest(name, Drive::BUILT_IN).map(str::to_owned).or_else(|| file_like(name));
                     let hint = meant.map_or_else(String::new, |meant| format!("; {}", question(&meant)));
                     Failure::BadInput(format!(
-                        "{option}: found {name:?}, which cannot be read as a file ({error}); allowed: a drive file, or one \
-                         of the built-in drives {known}{hint}"
+                        "{option}: found {name:?}, which cannot be read as a file ({error}); allowed: a drive file, \
+                         or one of the built-in drives {known}{hint}"
                     ))
                 })?;
                 let drive = Drive::from_toml(name, &text).map_err(|error| Failure::BadInput(error.to_string()))?;
@@ -216,7 +216,8 @@ pub(super) fn table_image(folder: &Path, generator: GeneratorKind) -> Result<(Pa
     }))
 }
 
-/// The bytes of an image, sound or not; one that is sound but not of its id, as the identity is told in flight, is refused here.
+/// The bytes of an image, sound or not; one that is sound but not of its id, as the identity is told in flight, is
+/// refused here.
 pub(super) fn image_file(path: &Path) -> Result<Vec<u8>, Failure> {
     let bad = |what: String| Failure::BadInput(format!("{}: {what}", path.display()));
     if path.is_dir() {

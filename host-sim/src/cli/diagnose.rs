@@ -25,10 +25,11 @@ use flexspline_mechanics::mesh::MeshLevel;
 
 /// Find what the simulation gets wrong in measured data, name the cause, measure what the extension gains
 ///
-/// Reads a CSV with a generator angle and an output angle (or error_arcsec), if wanted time_s, torque_n_m, temperature_c and
-/// orientation_rad; writes diagnosis.json. The nominal model is a catalogue's (--model) or that of a table (--tables). Where causes are
-/// found it writes drive-extended.toml, which `flexspline` loads again as --model or --drive, and where tables that hold the causes
-/// leave less error in sessions that took no part, <G>-extended.fxt, .json, .rs and .h.
+/// Reads a CSV with a generator angle and an output angle (or error_arcsec), if wanted time_s, torque_n_m,
+/// temperature_c and orientation_rad; writes diagnosis.json. The nominal model is a catalogue's (--model) or that of a
+/// table (--tables). Where causes are found it writes drive-extended.toml, which `flexspline` loads again as --model
+/// or --drive, and where tables that hold the causes leave less error in sessions that took no part, <G>-extended.fxt,
+/// .json, .rs and .h.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -57,8 +58,8 @@ pub(super) struct Diagnose {
     mesh: Option<MeshLevel>,
     #[command(flatten)]
     logs: LogOptions,
-    /// Say why this cause was named or not (snake case, for instance flexspline_runout); with --json the gates that it came to. Several with
-    /// commas, or repeated: a list in JSON, and without what to record to tell them apart
+    /// Say why this cause was named or not (snake case, for instance flexspline_runout); with --json the gates that it
+    /// came to. Several with commas, or repeated: a list in JSON, and without what to record to tell them apart
     #[arg(long, value_name = "CAUSE", value_delimiter = ',')]
     explain: Vec<String>,
     /// Do not write report.html
@@ -231,7 +232,8 @@ fn text(recording: &Recording, diagnosis: &Diagnosis, extension: &Extension, out
     if let Some(evaluation) = &extension.compensation {
         let _ = writeln!(
             text,
-            "pointing error the core leaves in sessions held out, arcsec rms\n  session      rows   no table    nominal   extended"
+            "pointing error the core leaves in sessions held out, arcsec rms\n  session      rows   no table    \
+             nominal   extended"
         );
         for s in &evaluation.sessions {
             let _ = writeln!(

@@ -12,9 +12,10 @@ use flexspline_mechanics::drive::{Drive, GeneratorKind, MeshReport, RigidMesh};
 
 /// Print the drive as a commented TOML file, or check whether its teeth clear one another
 ///
-/// The file that it prints is complete, says of every field what it is, its unit, its sign and what is allowed, and can be read back
-/// with --drive (`flexspline new` writes it to a file); a file of one's own may be shorter, with base = "HHD-95" and the fields that
-/// differ. --check looks for rigid teeth that interfere: gaps in um, backlash in arcmin and ripple in arcsec at the output.
+/// The file that it prints is complete, says of every field what it is, its unit, its sign and what is allowed, and can
+/// be read back with --drive (`flexspline new` writes it to a file); a file of one's own may be shorter, with base =
+/// "HHD-95" and the fields that differ. --check looks for rigid teeth that interfere: gaps in um, backlash in arcmin
+/// and ripple in arcsec at the output.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -77,8 +78,8 @@ fn mesh_reports(drive: &Drive) -> Result<Vec<MeshReport>, Failure> {
             let mesh = RigidMesh::new(drive, kind).map_err(|error| Failure::BadInput(error.to_string()))?;
             mesh.report(kind).ok_or_else(|| {
                 Failure::Failed(format!(
-                    "the teeth never meet with the {kind} generator: the tip of the flexspline does not reach past the \
-                     tips of the circular spline"
+                    "the teeth never meet with the {kind} generator: the tip of the flexspline does not reach past \
+                     the tips of the circular spline"
                 ))
             })
         })

@@ -27,14 +27,15 @@ const LARGEST_STEP_RAD: f64 = 0.1;
 
 /// Export a mesh, outlines, a deck, or a table for other programs
 ///
-/// vtu: both wheels deformed and loaded at one generator angle, with displacement and von Mises stress, for ParaView; of a drive with a
-/// sleeve in three dimensions also the whole flexspline, <G>-3d.vtu.
+/// vtu: both wheels deformed and loaded at one generator angle, with displacement and von Mises stress, for ParaView;
+/// of a drive with a sleeve in three dimensions also the whole flexspline, <G>-3d.vtu.
 /// csv: the outlines of tooth, space and generator, undeformed, each in its own frame.
-/// inp: the undeformed mesh with contact, holding and load as a deck for CalculiX and Abaqus, which deforms, loads and turns
-/// the drive; mm, N, MPa, a slice of 1 mm. Of a drive with a sleeve in three dimensions (CUP-95): the flexspline alone, in solids, under w0.
-/// fmu: a table (--tables), or a joint with mass, for simulators that import FMI 2.0 co-simulation: docs/how-to/fmu.md.
-/// eqmod, onstepx, linuxcnc, beckhoff, moteus, odrive, ros2, cfs, fprime: a table (--tables) resampled for the lookup of that device,
-/// that lookup simulated, and what it leaves, on the table's own model and on a unit's data (--data): docs/how-to/export_to_controllers.md.
+/// inp: the undeformed mesh with contact, holding and load as a deck for CalculiX and Abaqus, which deforms, loads and
+/// turns the drive; mm, N, MPa, a slice of 1 mm. Of a drive with a sleeve in three dimensions (CUP-95): the flexspline
+/// alone, in solids, under w0. fmu: a table (--tables), or a joint with mass, for simulators that import FMI 2.0
+/// co-simulation: docs/how-to/fmu.md. eqmod, onstepx, linuxcnc, beckhoff, moteus, odrive, ros2, cfs, fprime: a table
+/// (--tables) resampled for the lookup of that device, that lookup simulated, and what it leaves, on the table's own
+/// model and on a unit's data (--data): docs/how-to/export_to_controllers.md.
 #[derive(Debug, Args)]
 #[command(
     mut_args(beside_tables),
@@ -58,8 +59,8 @@ pub(super) struct Export {
     /// What to write
     #[arg(long, value_enum)]
     format: Format,
-    /// Table image, for all formats but vtu, csv and inp; --torque-n-m and --temperature-c are then the section of it that is
-    /// taken [default: the middle of what it holds for]
+    /// Table image, for all formats but vtu, csv and inp; --torque-n-m and --temperature-c are then the section of it
+    /// that is taken [default: the middle of what it holds for]
     #[arg(long, value_name = "FILE.fxt", value_hint = ValueHint::FilePath)]
     tables: Option<PathBuf>,
     #[command(flatten)]
@@ -210,7 +211,9 @@ impl Export {
         }
         if self.generator_rad.is_some() {
             return Err(Failure::BadInput(
-                "--generator-rad: a deck starts at 0 and turns by --increments of --step-rad; allowed with --format vtu".into(),
+                "--generator-rad: a deck starts at 0 and turns by --increments of --step-rad; allowed with --format \
+                 vtu"
+                .into(),
             ));
         }
         if let Some(step_rad) = self.step_rad.filter(|step| !(step.abs() > 0.0 && step.abs() <= LARGEST_STEP_RAD)) {
@@ -291,7 +294,8 @@ impl Export {
         ];
         if let Some((option, _)) = of_the_plane.into_iter().find(|(_, given)| *given) {
             return Err(Failure::BadInput(format!(
-                "{option}: the deck of a sleeve is the flexspline alone, under w0; allowed with a plane drive (--set sleeve.kind=springs)"
+                "{option}: the deck of a sleeve is the flexspline alone, under w0; allowed with a plane drive (--set \
+                 sleeve.kind=springs)"
             )));
         }
         let deck = SleeveDeck::new(drive).map_err(|error| Failure::BadInput(error.to_string()))?;

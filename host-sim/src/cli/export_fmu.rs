@@ -16,10 +16,12 @@ const USUAL_SCENARIO: &str = "antenna";
 /// Options of this format.
 #[derive(Debug, Args)]
 pub(super) struct FmuOptions {
-    /// What the FMU simulates: compensation (the core over its table) or joint (motor, servo, drive and load) [default: compensation]
+    /// What the FMU simulates: compensation (the core over its table) or joint (motor, servo, drive and load) [default:
+    /// compensation]
     #[arg(long, value_enum, value_name = "MODEL", help_heading = "FMU", hide_possible_values = true)]
     model: Option<Model>,
-    /// Masses, friction, servo and expected load of a joint: antenna, rover, camera, telescope, or a TOML file [default: antenna]
+    /// Masses, friction, servo and expected load of a joint: antenna, rover, camera, telescope, or a TOML file
+    /// [default: antenna]
     #[arg(long, value_name = "SCENARIO", help_heading = "FMU", value_hint = ValueHint::FilePath)]
     scenario: Option<String>,
     /// Library of flexspline-fmu to put in, repeatable for several platforms [default: those beside this program]

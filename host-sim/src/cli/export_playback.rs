@@ -1,4 +1,5 @@
-//! `flexspline export --format eqmod|onstepx|linuxcnc|beckhoff|moteus|odrive|ros2|cfs|fprime`: tables for others' playback.
+//! `flexspline export --format eqmod|onstepx|linuxcnc|beckhoff|moteus|odrive|ros2|cfs|fprime`: tables for others'
+//! playback.
 
 use std::path::{Path, PathBuf};
 
@@ -93,11 +94,12 @@ pub(super) struct PlaybackOptions {
     data: Option<PathBuf>,
     #[command(flatten)]
     logs: LogOptions,
-    /// Write a file that leaves nearly all of the error, or a table larger than the default of cFS, or over a file of another hand
+    /// Write a file that leaves nearly all of the error, or a table larger than the default of cFS, or over a file of
+    /// another hand
     #[arg(long)]
     force: bool,
-    /// Directions of the output's motion: moteus and beckhoff hold one value for both [default: both]; eqmod and onstepx track
-    /// in one [default: forward]
+    /// Directions of the output's motion: moteus and beckhoff hold one value for both [default: both]; eqmod and
+    /// onstepx track in one [default: forward]
     #[arg(long, value_enum, value_name = "D", hide_possible_values = true)]
     direction: Option<Directions>,
     /// Travel of the output where the lookup starts, degrees: linuxcnc, beckhoff [default: 0]
@@ -106,7 +108,8 @@ pub(super) struct PlaybackOptions {
     /// Where it ends, degrees, at most a turn on: linuxcnc, beckhoff [default: a turn on]
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     to_deg: Option<f64>,
-    /// Points of the lookup: linuxcnc [default: 256], beckhoff [default: 32 to a generator turn, on a CNC at most 1499 in all]
+    /// Points of the lookup: linuxcnc [default: 256], beckhoff [default: 32 to a generator turn, on a CNC at most 1499
+    /// in all]
     #[arg(long, value_name = "N")]
     points: Option<u32>,
     /// COMP_FILE_TYPE of linuxcnc: 0 actual positions, 1 trims [default: 1]
@@ -392,8 +395,8 @@ impl PlaybackOptions {
             }
             Odrive => {
                 return Err(Failure::BadInput(
-                    "odrive: nothing of its firmware fits. Its one map, anticogging, is a torque over 3600 places of an encoder turn \
-                     and moves no position; compensate before input_pos, with the core"
+                    "odrive: nothing of its firmware fits. Its one map, anticogging, is a torque over 3600 places of \
+                     an encoder turn and moves no position; compensate before input_pos, with the core"
                         .into(),
                 ));
             }
@@ -401,8 +404,8 @@ impl PlaybackOptions {
             CfsFormat => {
                 if image.len() > MAX_TABLE_BYTES && !self.force {
                     return Err(Failure::BadInput(format!(
-                        "the image has {} bytes, more than the default of CFE_PLATFORM_TBL_MAX_SNGL_TABLE_SIZE, {MAX_TABLE_BYTES}; \
-                         --force writes it all the same",
+                        "the image has {} bytes, more than the default of CFE_PLATFORM_TBL_MAX_SNGL_TABLE_SIZE, \
+                         {MAX_TABLE_BYTES}; --force writes it all the same",
                         image.len()
                     )));
                 }

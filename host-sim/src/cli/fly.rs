@@ -19,8 +19,9 @@ use flexspline_report::flight_report;
 
 /// Fly a joint with mass in closed loop: motor, servo, drive, friction, load and wind; with and without compensation
 ///
-/// SCENARIO is antenna, rover, camera or telescope, or a TOML file that starts from one of them. The unit flown was built with errors; the table knows the
-/// drive as designed, with its diagnosed lines, or calibrated. Writes flight.json and report.html.
+/// SCENARIO is antenna, rover, camera or telescope, or a TOML file that starts from one of them. The unit flown was
+/// built with errors; the table knows the drive as designed, with its diagnosed lines, or calibrated. Writes
+/// flight.json and report.html.
 ///
 /// With --vary, or for all scenarios, flights are put side by side: a row for each, to the screen and to flights.json.
 #[derive(Debug, Args)]
@@ -35,7 +36,8 @@ pub(super) struct Fly {
     /// antenna, rover, camera, telescope, a TOML file, or all (those with a name)
     #[arg(value_name = "SCENARIO")]
     scenario: String,
-    /// A field of the scenario file and its values: FIELD=VALUE,VALUE,...; repeat for more fields [default: as the scenario has it]
+    /// A field of the scenario file and its values: FIELD=VALUE,VALUE,...; repeat for more fields [default: as the
+    /// scenario has it]
     #[arg(long, value_name = "FIELD=VALUES", allow_hyphen_values = true)]
     vary: Vec<Vary>,
     /// Write no report.html
@@ -46,7 +48,8 @@ pub(super) struct Fly {
 impl Fly {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         if let Some(option) = context.changes_the_drive() {
-            let what = "a flight has the unit of its scenario; allowed: table, load, servo and more in a scenario file (docs/explanation/motion.md)";
+            let what = "a flight has the unit of its scenario; allowed: table, load, servo and more in a scenario \
+                        file (docs/explanation/motion.md)";
             return Err(Failure::BadInput(format!("{option}: {what}")));
         }
         if self.scenario == "all" || !self.vary.is_empty() {
@@ -123,7 +126,8 @@ fn table(flights: &[VariedFlight], out: &Path) -> String {
     };
     let width = flights.iter().map(|flight| label(flight).chars().count()).max().unwrap_or(0).max(8);
     let mut text = format!(
-        "{:width$}  rms ″: none  angle  by way   core  ideal  removed  ripple ″/s: none   core  ideal  floor  settles s: none  core  bound holds  stable\n",
+        "{:width$}  rms ″: none  angle  by way   core  ideal  removed  ripple ″/s: none   core  ideal  floor  settles \
+         s: none  core  bound holds  stable\n",
         "scenario"
     );
     let part = |share: Option<f64>| share.map_or("–".to_owned(), |share| format!("{:.1} %", 100.0 * share));
@@ -139,7 +143,8 @@ fn table(flights: &[VariedFlight], out: &Path) -> String {
         let settles = |of: fn(&ByController<f64>) -> f64| settles.map_or("–".to_owned(), |s| format!("{:.2}", of(s)));
         let _ = writeln!(
             text,
-            "{:width$} {:>12.2} {:>6.2} {:>7.2} {:>6.2} {:>6.2} {:>8} {:>17} {:>6} {:>6} {:>6} {:>16} {:>5} {:>12} {:>7}",
+            "{:width$} {:>12.2} {:>6.2} {:>7.2} {:>6.2} {:>6.2} {:>8} {:>17} {:>6} {:>6} {:>6} {:>16} {:>5} {:>12} \
+             {:>7}",
             label(flight),
             rms.none,
             rms.fourier,

@@ -17,10 +17,11 @@ use flexspline_mechanics::stepping::{Method, SolverSettings};
 
 /// Compute influence kernels: what a deviation of a tooth, of the generator or of an axis does to the output
 ///
-/// From contact FEM of the drive without deviations, for each generator: the response to a micrometre on any flexspline tooth, any
-/// circular-spline space, any place of the generator, under loads up to the rated one (from the change of the contact forces with
-/// the load), and to a circular spline that stands beside the axis (from FEM of such drives). Written is <G>.kernels.json, which
-/// `diagnose --tables` takes for the signatures of geometric causes where it stands beside the table.
+/// From contact FEM of the drive without deviations, for each generator: the response to a micrometre on any flexspline
+/// tooth, any circular-spline space, any place of the generator, under loads up to the rated one (from the change of
+/// the contact forces with the load), and to a circular spline that stands beside the axis (from FEM of such drives).
+/// Written is <G>.kernels.json, which `diagnose --tables` takes for the signatures of geometric causes where it stands
+/// beside the table.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -129,8 +130,9 @@ fn text(told: &Told) -> String {
     let [fs, cs] = told.second_harmonic_arcsec_per_um;
     let [at_light, at_heavy] = told.eccentricity_pp_arcsec;
     format!(
-        "{}: arcsec of error at {light} and {heavy} N.m\n  1 um second harmonic of the flexspline's pitch: {:.2}, {:.2}; of the circular \
-         spline's: {:.2}, {:.2}\n  circular spline {} um beside the axis: {at_light:.1}, {at_heavy:.1} p-p\nwrote {}",
+        "{}: arcsec of error at {light} and {heavy} N.m\n  1 um second harmonic of the flexspline's pitch: {:.2}, \
+         {:.2}; of the circular spline's: {:.2}, {:.2}\n  circular spline {} um beside the axis: {at_light:.1}, \
+         {at_heavy:.1} p-p\nwrote {}",
         told.generator, fs[0], fs[1], cs[0], cs[1], told.eccentricity_um, told.file
     )
 }

@@ -11,8 +11,8 @@ use flexspline_identify::measurement::raw;
 
 /// Look at log files of a bench: columns, units, ratio, torque, time, coverage; proposes the mapping to read them with
 ///
-/// Reads text files with a row for each instant, separated by commas, semicolons, tabs, bars or blanks, decimals behind a point or
-/// a comma, with or without names; several files are sessions of one bench. Nothing is written.
+/// Reads text files with a row for each instant, separated by commas, semicolons, tabs, bars or blanks, decimals behind
+/// a point or a comma, with or without names; several files are sessions of one bench. Nothing is written.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:

@@ -1,5 +1,5 @@
-//! A drive made of a few numbers, before it is written: S-shaped teeth, what no catalogue says, under which generators its teeth clear, and the
-//! formulas above its fields.
+//! A drive made of a few numbers, before it is written: S-shaped teeth, what no catalogue says, under which generators
+//! its teeth clear, and the formulas above its fields.
 
 use std::collections::BTreeMap;
 
@@ -10,19 +10,22 @@ use super::Failure;
 use flexspline_mechanics::bearing::Balls;
 use flexspline_mechanics::drive::{Drive, DriveError, GeneratorKind, MadeDrive, RigidMesh};
 
-/// Length of a cup and its wall over the pitch diameter, thickness of its bottom over the wall, hub over the pitch radius: guesses, as in
-/// `catalogue_budget`. A cup is about half as long as wide, its wall about a hundredth.
+/// Length of a cup and its wall over the pitch diameter, thickness of its bottom over the wall, hub over the pitch
+/// radius: guesses, as in `catalogue_budget`. A cup is about half as long as wide, its wall about a hundredth.
 const CUP: [f64; 4] = [0.5, 0.011, 2.0, 0.5];
-/// Shortest tube of a cup, over the pitch diameter: a guess. Of a face wider than usual the cup is longer, not without a tube.
+/// Shortest tube of a cup, over the pitch diameter: a guess. Of a face wider than usual the cup is longer, not without
+/// a tube.
 const SHORTEST_TUBE: f64 = 0.1;
-/// Load of a ball for its stiffness, N, of a drive with a pitch diameter of 63.5 mm (size 25): between the 46 N below T1 and the 154 N above T2
-/// that contact FEM has there (docs/explanation/third_dimension.md). Forces go with the square of the size.
+/// Load of a ball for its stiffness, N, of a drive with a pitch diameter of 63.5 mm (size 25): between the 46 N below
+/// T1 and the 154 N above T2 that contact FEM has there (docs/explanation/third_dimension.md). Forces go with the
+/// square of the size.
 const BALL_N: f64 = 100.0;
 const BALL_N_AT_MM: f64 = 63.5;
-/// Preload of S-shaped teeth, µm, as of S-95. A guess: drives of catalogues have no play, and how much deeper their teeth mesh is not published.
+/// Preload of S-shaped teeth, µm, as of S-95. A guess: drives of catalogues have no play, and how much deeper their
+/// teeth mesh is not published.
 const PRELOAD_UM: f64 = 1.0;
-/// Teeth that have room for the S shape (tested): of fewer they are made lower, until they do not reach into one another. Those that still fit are
-/// taken.
+/// Teeth that have room for the S shape (tested): of fewer they are made lower, until they do not reach into one
+/// another. Those that still fit are taken.
 const S_TEETH: u32 = 100;
 /// Tip roundings of S-shaped teeth, modules, as of S-95.
 const S_TIP_ROUNDING: f64 = 0.1;
@@ -35,7 +38,8 @@ fn balls_n_per_mm3(drive: &Drive) -> f64 {
     Balls::in_proportion(bore_mm).bedding_n_per_mm3(load_n, bore_mm, drive.flexspline.width_mm).round()
 }
 
-/// The drive with S-shaped teeth for the cam, preloaded, on balls: between rigid parts a micrometre of preload is kilonewtons.
+/// The drive with S-shaped teeth for the cam, preloaded, on balls: between rigid parts a micrometre of preload is
+/// kilonewtons.
 pub(super) fn with_s_teeth(made: MadeDrive) -> Result<MadeDrive, Failure> {
     let MadeDrive { drive, mut formulas } = made;
     let mut drive = drive.with_s_teeth(PRELOAD_UM);
@@ -58,7 +62,8 @@ pub(super) fn with_s_teeth(made: MadeDrive) -> Result<MadeDrive, Failure> {
     formulas.extend(anew);
     drive.check().map_err(|error| {
         Failure::BadInput(format!(
-            "--set flexspline.profile=s: S-shaped teeth have no room in this drive of {} teeth ({error}); allowed: more teeth, {S_TEETH} have it",
+            "--set flexspline.profile=s: S-shaped teeth have no room in this drive of {} teeth ({error}); allowed: \
+             more teeth, {S_TEETH} have it",
             drive.flexspline.teeth
         ))
     })?;
@@ -145,8 +150,8 @@ impl Clearance {
         match self.interfere_um.get(&GeneratorKind::Cam) {
             None => Ok(()),
             Some(um) => Err(Failure::BadInput(format!(
-                "--set flexspline.profile=s: the S-shaped teeth of this drive interfere by {um:.1} um under the cam, for which they are \
-                 drawn; allowed: more teeth, or no change of radii, shift and w0_mm by --set"
+                "--set flexspline.profile=s: the S-shaped teeth of this drive interfere by {um:.1} um under the cam, \
+                 for which they are drawn; allowed: more teeth, or no change of radii, shift and w0_mm by --set"
             ))),
         }
     }

@@ -12,8 +12,8 @@ use flexspline_base::suggest::did_you_mean;
 
 /// Print a manual page, or write all of them
 ///
-/// Without --out one page goes to standard output. With --out DIR the folder gets flexspline.1 and flexspline-COMMAND.1 of every
-/// command; a folder called man1 within one that `manpath` names is where `man flexspline` looks.
+/// Without --out one page goes to standard output. With --out DIR the folder gets flexspline.1 and flexspline-COMMAND.1
+/// of every command; a folder called man1 within one that `manpath` names is where `man flexspline` looks.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:

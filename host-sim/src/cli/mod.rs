@@ -75,8 +75,8 @@ impl From<OutputError> for Failure {
     }
 }
 
-/// Computes the errors of strain wave (harmonic) drives by contact FEM, makes tables that correct them, and finds what a
-/// measured drive does otherwise
+/// Computes the errors of strain wave (harmonic) drives by contact FEM, makes tables that correct them, and finds what
+/// a measured drive does otherwise
 #[derive(Debug, Parser)]
 #[command(name = "flexspline", version, propagate_version = true, max_term_width = 100)]
 #[command(after_help = "\
@@ -200,7 +200,8 @@ enum Command {
 #[derive(Debug, Args)]
 struct Common {
     /// Drive file, or the name of a built-in drive: HHD-95 (ideal), HHD-95-typical (friction, compliances,
-    /// tolerances), CUP-95 (a cup), HHD-95-hermetic (a closed sleeve), HHD-95-plane (no third dimension), S-95 (S-shaped teeth)
+    /// tolerances), CUP-95 (a cup), HHD-95-hermetic (a closed sleeve), HHD-95-plane (no third dimension), S-95
+    /// (S-shaped teeth)
     #[arg(long, global = true, value_name = "FILE|NAME", default_value = USUAL_DRIVE, value_hint = ValueHint::FilePath, help_heading = "Common options")]
     drive: String,
     /// Override fields of the drive, for instance flanks.friction_coefficient=0.08; several with commas, or repeated

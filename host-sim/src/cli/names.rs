@@ -1,4 +1,5 @@
-//! Options that take one of a few names: an error says what is allowed and what may have been meant, and a shell completes them.
+//! Options that take one of a few names: an error says what is allowed and what may have been meant, and a shell
+//! completes them.
 
 use std::ffi::OsStr;
 use std::fmt::Display;

@@ -16,14 +16,15 @@ use flexspline_mechanics::drive::{Drive, DriveError, FewNumbers, GeneratorKind, 
 
 /// Write a commented drive file, or a catalogue model, to edit
 ///
-/// A drive file (the default) has every size, stiffness and imperfection of a drive for the FEM, each with its unit, meaning, sign and
-/// allowed range; as it stands it is the drive that it was made from. --teeth and --module (or --like, the name of a catalogue's size)
-/// make a drive of one's own, whose teeth clear one another; what follows from them has its formula in the file. With --like its
-/// [data_sheet] is filled in where the catalogue's figures are at hand. What is left out because no catalogue prints it (cup, balls,
-/// friction, errors) is told in the file and here, with a command that adds guesses of cup and balls. --set flexspline.profile=s makes
-/// S-shaped teeth for the cam. A catalogue model
-/// (a file with "nominal" in its name, or --kind nominal) has the few numbers that a catalogue gives, for `diagnose --model` and
-/// `synthesize --model`.
+/// A drive file (the default) has every size, stiffness and imperfection of a drive for the FEM, each with its unit,
+/// meaning, sign and allowed range; as it stands it is the drive that it was made from. --teeth and --module
+/// (or --like, the name of a catalogue's size) make a drive of one's own, whose teeth clear one another; what follows
+/// from them has its formula in the file. With --like its
+/// [data_sheet] is filled in where the catalogue's figures are at hand. What is left out because no catalogue prints it
+/// (cup, balls, friction, errors) is told in the file and here, with a command that adds guesses of cup and
+/// balls. --set flexspline.profile=s makes S-shaped teeth for the cam. A catalogue model
+/// (a file with "nominal" in its name, or --kind nominal) has the few numbers that a catalogue gives, for
+/// `diagnose --model` and `synthesize --model`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -61,7 +62,8 @@ pub(super) struct New {
     /// Generator under which the rigid backlash is made one arc-minute
     #[arg(long, value_name = "G", default_value = "cam", value_parser = names::generator(), hide_possible_values = true)]
     generator: GeneratorKind,
-    /// Teeth and module as a catalogue's size has them: SERIES-SIZE-RATIO, with a pitch diameter of 2.54 mm a size (Harmonic Drive)
+    /// Teeth and module as a catalogue's size has them: SERIES-SIZE-RATIO, with a pitch diameter of 2.54 mm a size
+    /// (Harmonic Drive)
     #[arg(long, value_name = "NAME", conflicts_with = "from")]
     like: Option<String>,
     /// Replace the file if it is there
@@ -172,8 +174,8 @@ impl New {
         context.print(&written, || {
             let what = match kind {
                 Kind::Drive => format!(
-                    "the drive {}, every field explained; ratio {} with the flexspline held, as it is simulated, {} with the circular \
-                     spline held",
+                    "the drive {}, every field explained; ratio {} with the flexspline held, as it is simulated, {} \
+                     with the circular spline held",
                     drive.name,
                     drive.ratio(),
                     1.0 - drive.ratio()
@@ -236,7 +238,8 @@ impl New {
         let asked = context.set_to(PROFILE).is_some_and(|profile| profile.eq_ignore_ascii_case("s"));
         if asked && self.generator != GeneratorKind::Cam {
             return Err(Failure::BadInput(format!(
-                "--generator: found {}, allowed with --set {PROFILE}=s: cam, whose way through the teeth their space is cut by",
+                "--generator: found {}, allowed with --set {PROFILE}=s: cam, whose way through the teeth their space \
+                 is cut by",
                 self.generator
             )));
         }
@@ -256,8 +259,8 @@ impl New {
         if let Some(name) = &self.like {
             let Some((_, size, ratio)) = size_and_ratio(name) else {
                 return bad(format!(
-                    "--like: found {name:?}, allowed: SERIES-SIZE-RATIO as CSF-25-100, size 5 to 100, ratio 30 to 320; a built-in drive goes \
-                     with --from"
+                    "--like: found {name:?}, allowed: SERIES-SIZE-RATIO as CSF-25-100, size 5 to 100, ratio 30 to \
+                     320; a built-in drive goes with --from"
                 ));
             };
             if self.ratio.is_some_and(|asked| asked.abs() != f64::from(ratio)) {
@@ -270,9 +273,9 @@ impl New {
         }
         let Some(module_mm) = self.module else {
             if self.bore.is_some() || self.width.is_some() || self.ratio.is_some() {
-                return bad(
-                    "--bore, --width, --ratio: found without a drive to make; add --module and --teeth or --ratio, or --like".to_owned()
-                );
+                return bad("--bore, --width, --ratio: found without a drive to make; add --module and --teeth or \
+                            --ratio, or --like"
+                    .to_owned());
             }
             return Ok(None);
         };
@@ -285,8 +288,8 @@ impl New {
             }
             (Some(teeth), Some(ratio)) => {
                 return bad(format!(
-                    "--ratio: found {ratio}, allowed: {} (circular spline held) or {} (flexspline held) with {teeth} teeth and two \
-                     waves; for this ratio: --teeth {}",
+                    "--ratio: found {ratio}, allowed: {} (circular spline held) or {} (flexspline held) with {teeth} \
+                     teeth and two waves; for this ratio: --teeth {}",
                     teeth / 2,
                     teeth / 2 + 1,
                     2.0 * ratio.abs().round(),
@@ -334,14 +337,15 @@ const PROFILE: &str = "flexspline.profile";
 fn head(teeth: Option<&Clearance>, left_out: &[&str]) -> String {
     let mut text: String = teeth.map(|teeth| format!("# As made here, {}.\n", teeth.text())).unwrap_or_default();
     if !left_out.is_empty() {
-        text += "# Left out, since no catalogue prints it; docs/explanation/third_dimension.md, \"Beside a catalogue\", has what each does:\n";
+        text += "# Left out, since no catalogue prints it; docs/explanation/third_dimension.md, \"Beside a \
+                 catalogue\", has what each does:\n";
         text.extend(left_out.iter().map(|what| format!("# - {what}\n")));
     }
     text
 }
 
-/// What to type next of a drive file: nothing that fails. Where teeth bind under a generator nobody wants its table, and where they bind under
-/// all of them nobody wants the drive.
+/// What to type next of a drive file: nothing that fails. Where teeth bind under a generator nobody wants its table,
+/// and where they bind under all of them nobody wants the drive.
 fn next_of(file: &str, teeth: Option<&Clearance>, drawn_for: GeneratorKind) -> Vec<String> {
     let tables = format!("flexspline tables --drive {file}");
     let clear = teeth.map_or(&GeneratorKind::ALL[..], |teeth| &teeth.clear);
@@ -381,7 +385,8 @@ fn refused(error: &DriveError, like: bool) -> Failure {
 mod tests {
     use super::*;
 
-    /// A rim of 5 mm under teeth of 120 x 0.5 mm: they bind under every generator, and no command is proposed that would fail.
+    /// A rim of 5 mm under teeth of 120 x 0.5 mm: they bind under every generator, and no command is proposed that
+    /// would fail.
     #[test]
     fn teeth_that_bind_under_every_generator_have_no_next_command() {
         let few =

@@ -18,10 +18,11 @@ use flexspline_mechanics::drive::GeneratorKind;
 /// Run the core over measured rows, open loop, and show what it leaves
 ///
 /// Reads a table image and a CSV with generator_rad and output_rad (or error_arcsec), optionally torque_n_m and
-/// temperature_c, or a log with columns of its own (--columns); writes replay.csv, one row for each with the prediction, the residual and its quality, and summary.json.
+/// temperature_c, or a log with columns of its own (--columns); writes replay.csv, one row for each with the
+/// prediction, the residual and its quality, and summary.json.
 ///
-/// Rows of `simulate` (results.csv, with its summary.json beside it) have to be of the drive and the generator of the table. Of other rows nobody
-/// knows, which is said.
+/// Rows of `simulate` (results.csv, with its summary.json beside it) have to be of the drive and the generator of the
+/// table. Of other rows nobody knows, which is said.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -31,7 +32,8 @@ pub(super) struct Replay {
     /// Table image, as `flexspline tables` writes it
     #[arg(long, value_name = "FILE.fxt", value_hint = ValueHint::FilePath)]
     tables: PathBuf,
-    /// Measured rows: CSV with generator_rad (rad), output_rad (rad) or error_arcsec, and if wanted torque_n_m, temperature_c
+    /// Measured rows: CSV with generator_rad (rad), output_rad (rad) or error_arcsec, and if wanted torque_n_m,
+    /// temperature_c
     #[arg(value_name = "DATA.csv", value_hint = ValueHint::FilePath)]
     data: PathBuf,
     /// Take rows of a run of another drive or generator than the table's: of one as built, for instance
@@ -126,9 +128,9 @@ fn of_log(data: &Path, map: &ColumnMap, table: &Table<'_>, temperature_c: f64) -
 fn text(summary: &ReplaySummary, out: &std::path::Path) -> String {
     let remarks: String = summary.remarks.iter().map(|remark| format!("remark: {remark}\n")).collect();
     format!(
-        "table {}, {} rows, {}\n{remarks}  error as measured, rms              {:>12.3} arcsec\n  left by the table, rms             {:>12.3} \
-         arcsec\n  left by the table, largest         {:>12.3} arcsec\n  zero of the output, taken out      {:>12.3} arcsec\nwrote {} \
-         and {}",
+        "table {}, {} rows, {}\n{remarks}  error as measured, rms              {:>12.3} arcsec\n  left by the table, \
+         rms             {:>12.3} arcsec\n  left by the table, largest         {:>12.3} arcsec\n  zero of the output, \
+         taken out      {:>12.3} arcsec\nwrote {} and {}",
         summary.table_id,
         summary.rows,
         summary.status,

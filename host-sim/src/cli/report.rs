@@ -1,4 +1,5 @@
-//! `report.html`, for the commands that write one. The page of another command that stands in the folder is kept under another name.
+//! `report.html`, for the commands that write one. The page of another command that stands in the folder is kept under
+//! another name.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -80,8 +81,9 @@ pub(super) fn diagnosis<'p>(
 /// The page of every command.
 const PAGE: &str = "report.html";
 
-/// Says, before there is much work, what becomes of a page that stands where the command `name` is to write one: that of another command is
-/// kept under another name, that of the same command is replaced. Of another drive than this that is said, too.
+/// Says, before there is much work, what becomes of a page that stands where the command `name` is to write one: that
+/// of another command is kept under another name, that of the same command is replaced. Of another drive than this that
+/// is said, too.
 pub(super) fn before(context: &Context, out: &Path, name: &str, drive: Option<&Drive>) {
     if let Some(words) = fate(&out.join(PAGE), name, drive).filter(|_| !context.quiet()) {
         say::talk(&format!("remark: {words}"));

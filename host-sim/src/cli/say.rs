@@ -1,7 +1,7 @@
 //! What goes to the terminal: data and results to stdout, talk to stderr, colour only where somebody looks.
 //!
-//! Colour is for a terminal; `NO_COLOR` takes it away, `CLICOLOR_FORCE` puts it into a pipe too (<https://bixense.com/clicolors>). A
-//! reader that has gone, as behind `| head`, is no error; a full disk is.
+//! Colour is for a terminal; `NO_COLOR` takes it away, `CLICOLOR_FORCE` puts it into a pipe too
+//! (<https://bixense.com/clicolors>). A reader that has gone, as behind `| head`, is no error; a full disk is.
 
 use std::io::{self, ErrorKind, Write};
 

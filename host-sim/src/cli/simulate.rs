@@ -27,14 +27,16 @@ const PARTIAL: &str = "results.partial.csv";
 
 /// Simulate the drive along a generator path by contact FEM
 ///
-/// Writes results.csv (one row to each increment), summary.json (kinematic error, backlash, wind-up, stress) and report.html, a page with
-/// these figures, the error along the path, how the teeth share the load and, where the path settles for a tooth pitch, the drive in motion,
-/// into the output folder, and frames/ with --frames. The drive is deformed, then loaded, then turned.
+/// Writes results.csv (one row to each increment), summary.json (kinematic error, backlash, wind-up, stress) and
+/// report.html, a page with these figures, the error along the path, how the teeth share the load and, where the path
+/// settles for a tooth pitch, the drive in motion, into the output folder, and frames/ with --frames. The drive is
+/// deformed, then loaded, then turned.
 ///
-/// Where no equilibrium is found the last one is told, with its load and wind-up, and the rows so far are in results.partial.csv: those of
-/// the path, or of the loads that came on. Finer steps have been tried then.
+/// Where no equilibrium is found the last one is told, with its load and wind-up, and the rows so far are in
+/// results.partial.csv: those of the path, or of the loads that came on. Finer steps have been tried then.
 ///
-/// Where the drive's file has a [data_sheet] its figures stand beside those computed, with their ratio (docs/how-to/design.md).
+/// Where the drive's file has a [data_sheet] its figures stand beside those computed, with their ratio
+/// (docs/how-to/design.md).
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -85,10 +87,12 @@ pub(super) struct ModelOptions {
     /// Mesh: coarse, standard or fine
     #[arg(long, value_name = "LEVEL", default_value = "standard", value_parser = names::mesh(), hide_possible_values = true)]
     pub(super) mesh: MeshLevel,
-    /// Solver: fast condenses the teeth onto the nodes that touch something, reference keeps every node; they agree to 0.1 arcsec
+    /// Solver: fast condenses the teeth onto the nodes that touch something, reference keeps every node; they agree to
+    /// 0.1 arcsec
     #[arg(long, value_name = "SOLVER", default_value = "fast", value_parser = names::solver(), hide_possible_values = true)]
     pub(super) solver: Method,
-    /// Contact penalty on the flanks, N/mm^3; the pressure that is told is found from the forces and does not hang on it
+    /// Contact penalty on the flanks, N/mm^3; the pressure that is told is found from the forces and does not hang on
+    /// it
     #[arg(long, value_name = "K", default_value_t = SolverSettings::default().flank_penalty, allow_negative_numbers = true, help_heading = "Numerical method")]
     flank_penalty: f64,
     /// Contact penalty on the bore, N/mm^3 [default: 1e7 under rollers, 1e6 under discs and cam]
@@ -239,7 +243,8 @@ impl Simulate {
         let name = &self.path;
         let text = std::fs::read_to_string(name).map_err(|error| {
             Failure::BadInput(format!(
-                "--path: found {name:?}, which cannot be read as a file ({error}); allowed: paper, pitch, turn or a CSV file"
+                "--path: found {name:?}, which cannot be read as a file ({error}); allowed: paper, pitch, turn or a \
+                 CSV file"
             ))
         })?;
         let temperatures_c = drive.temperature.minimum_c..=drive.temperature.maximum_c;

@@ -15,14 +15,15 @@ const HARMONICS: [u32; 6] = [2, 4, 6, 8, 10, 12];
 
 /// What the sleeve or cup of the flexspline adds in three dimensions: stiffness by harmonic, tilt, torsion
 ///
-/// A generator that makes the rim of a cup oval bends it; the cup cones and hardly resists. The rim in the middle of a closed (hermetic)
-/// sleeve cannot cone to both sides: the walls stretch, and forces grow from tens of newtons to thousands. Computed with thin
-/// shells, one Fourier harmonic at a time; docs/explanation/third_dimension.md says how. The sizes are those of [sleeve] in the drive file: kind (hermetic,
-/// cup, hat, springs, none), wall_mm, flange_side_mm, bottom_side_mm, flange (rigid, diaphragm), bottom (disc, plate, clamped).
+/// A generator that makes the rim of a cup oval bends it; the cup cones and hardly resists. The rim in the middle of a
+/// closed (hermetic) sleeve cannot cone to both sides: the walls stretch, and forces grow from tens of newtons to
+/// thousands. Computed with thin shells, one Fourier harmonic at a time; docs/explanation/third_dimension.md says how.
+/// The sizes are those of [sleeve] in the drive file: kind (hermetic, cup, hat, springs, none), wall_mm,
+/// flange_side_mm, bottom_side_mm, flange (rigid, diaphragm), bottom (disc, plate, clamped).
 ///
-/// K is the amplitude of the reaction over that of the displacement, full circle. `line`: pressed on the middle line of the rim;
-/// `band`: by a generator five eighths as wide as the teeth, which tilts with the rim. A tilt is positive where the displacement grows
-/// away from the flange (of a cup: from its bottom).
+/// K is the amplitude of the reaction over that of the displacement, full circle. `line`: pressed on the middle line of
+/// the rim; `band`: by a generator five eighths as wide as the teeth, which tilts with the rim. A tilt is positive
+/// where the displacement grows away from the flange (of a cup: from its bottom).
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -87,9 +88,8 @@ fn table(drive: &Drive, result: &SleeveResult) -> String {
     let two = &result.harmonics[0];
     let _ = writeln!(
         text,
-        "at w0 = {w0} mm: {:.0} N of cos 2 theta, tilt {:.2} mrad\n\
-         torsion {:.0} N.m/rad, lateral {:.0} N/mm\n\
-         two rollers: w(45°) {:+.3}, w(90°) {:+.3} of w0",
+        "at w0 = {w0} mm: {:.0} N of cos 2 theta, tilt {:.2} mrad\ntorsion {:.0} N.m/rad, lateral {:.0} N/mm\ntwo \
+         rollers: w(45°) {:+.3}, w(90°) {:+.3} of w0",
         two.k_band_n_per_mm * w0,
         1e3 * two.tilt_rad_per_mm * w0,
         result.torsion_n_m_per_rad,
@@ -113,7 +113,8 @@ fn described(sleeve: &Sleeve) -> String {
         SleeveKind::Hat => format!("hat, wall {wall_mm} mm, {flange_side_mm} mm to the flange ({flange})"),
         SleeveKind::Springs => {
             format!(
-                "runs with springs in place of its sleeve (kind = \"springs\"); as a hermetic sleeve of its sizes, {hermetic}"
+                "runs with springs in place of its sleeve (kind = \"springs\"); as a hermetic sleeve of its sizes, \
+                 {hermetic}"
             )
         }
         SleeveKind::None => "the bare rim (kind = \"none\")".to_owned(),

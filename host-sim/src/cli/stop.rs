@@ -1,7 +1,8 @@
 //! Ctrl-C, and a polite request to end: the process clears up and ends at once, wherever it is.
 //!
-//! Results are hidden files until all of them are complete, and all of these are known ([`flexspline_base::output`]). So nothing that computes
-//! has to look whether it should stop: the thread that hears of the signal removes them and ends the process.
+//! Results are hidden files until all of them are complete, and all of these are known ([`flexspline_base::output`]).
+//! So nothing that computes has to look whether it should stop: the thread that hears of the signal removes them and
+//! ends the process.
 
 use std::sync::{Once, OnceLock};
 use std::time::{Duration, Instant};
@@ -10,8 +11,9 @@ use super::{Outcome, say};
 use flexspline_base::output::abandon;
 use flexspline_base::progress;
 
-/// From now on SIGINT, SIGTERM and SIGHUP end the process with exit code 1 and leave no unfinished file. A second one does not wait for
-/// the clearing up. Who started it with SIGHUP ignored, as `nohup` does, means it to go on without a terminal.
+/// From now on SIGINT, SIGTERM and SIGHUP end the process with exit code 1 and leave no unfinished file. A second one
+/// does not wait for the clearing up. Who started it with SIGHUP ignored, as `nohup` does, means it to go on without a
+/// terminal.
 pub(super) fn end_cleanly_on_signals() {
     static WATCH: Once = Once::new();
     // Where the signals cannot be heard they end the process as the second would.

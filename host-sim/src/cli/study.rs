@@ -31,19 +31,22 @@ const SHOWN: usize = 5;
 
 /// Vary fields of a drive, and see what a catalogue would print of each variant
 ///
-/// Every variant is deformed by each generator, loaded and turned by a tooth pitch, by contact FEM: backlash, lost motion, stiffness
-/// K1, K2, K3, wind-up, transmission error, stresses, teeth in contact. Written are study.csv (a row for each variant and generator),
-/// study.json and report.html: curves or maps, the front of what nothing beats, what each field does.
+/// Every variant is deformed by each generator, loaded and turned by a tooth pitch, by contact FEM: backlash, lost
+/// motion, stiffness K1, K2, K3, wind-up, transmission error, stresses, teeth in contact. Written are study.csv (a row
+/// for each variant and generator), study.json and report.html: curves or maps, the front of what nothing beats, what
+/// each field does.
 ///
-/// A drive with imperfections is looked at in one place of its turns, and the gap of its rigid teeth is that of the drawing. A field of
-/// as_built that varies is an error of making and no choice: variants are compared with those made alike.
+/// A drive with imperfections is looked at in one place of its turns, and the gap of its rigid teeth is that of the
+/// drawing. A field of as_built that varies is an error of making and no choice: variants are compared with those made
+/// alike.
 ///
-/// Of many variants (more than 48; with four fields or more, 12 for each and 12) so many are computed that cover all ranges, and what
-/// nothing beats; a surface through them estimates the others. The column `basis` says which a row is, and what estimates are off by is
-/// measured, leaving out each computed variant in turn, and told. --compute-all computes every one.
+/// Of many variants (more than 48; with four fields or more, 12 for each and 12) so many are computed that cover all
+/// ranges, and what nothing beats; a surface through them estimates the others. The column `basis` says which a row is,
+/// and what estimates are off by is measured, leaving out each computed variant in turn, and told. --compute-all
+/// computes every one.
 ///
-/// A variant that finds no equilibrium has the figures until then, its last stable load and the reason; one whose fields make no
-/// drive has the reason.
+/// A variant that finds no equilibrium has the figures until then, its last stable load and the reason; one whose
+/// fields make no drive has the reason.
 #[derive(Debug, Args)]
 #[command(after_help = format!("\
 Examples:
@@ -57,7 +60,8 @@ Figures:
 T1 and T2, where the ranges of stiffness end, are those of the drive's [data_sheet], or 21 and 72 %
 of the largest load.", figures()))]
 pub(super) struct StudyCommand {
-    /// A field and its values: PATH=FROM..TO (5 values), PATH=FROM..TO:N, or PATH=VALUE,VALUE,...; repeat for more fields
+    /// A field and its values: PATH=FROM..TO (5 values), PATH=FROM..TO:N, or PATH=VALUE,VALUE,...; repeat for more
+    /// fields
     #[arg(long, value_name = "PATH=VALUES", required = true, allow_hyphen_values = true)]
     vary: Vec<Vary>,
     /// So many variants spread over all ranges at once (Sobol) [default: every combination of the values]
@@ -69,11 +73,12 @@ pub(super) struct StudyCommand {
     /// Wave generator: two-roller, four-roller, double-disc, cam, or all
     #[arg(short, long, value_name = "G", default_value = "all", value_parser = names::generators(), hide_possible_values = true)]
     generator: Generators,
-    /// Largest load, N.m [default: the rated torque of the drive's [data_sheet]; else what a table of that generator spans: 200;
-    /// four-roller 100, two-roller 20; by the size of the drive]
+    /// Largest load, N.m [default: the rated torque of the drive's [data_sheet]; else what a table of that generator
+    /// spans: 200; four-roller 100, two-roller 20; by the size of the drive]
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     torque_n_m: Option<f64>,
-    /// What a variant has to keep to, FIGURE=LEAST..MOST, either end may be left out [default: teeth that clear one another]
+    /// What a variant has to keep to, FIGURE=LEAST..MOST, either end may be left out [default: teeth that clear one
+    /// another]
     #[arg(long, value_name = "FIGURE=RANGE", allow_hyphen_values = true)]
     keep: Vec<Constraint>,
     /// A figure of which less is better [default: kinematic_error_pp_arcsec, root_fillet_mpa]
@@ -403,7 +408,8 @@ fn figure_of(run: &Run, name: &str) -> String {
     value.map_or_else(|| "-".to_owned(), |value| format!("{bound}{}", short(value)))
 }
 
-/// Where not every variant has all that is asked: how many have each thing alone, and the variant that comes nearest if none has all.
+/// Where not every variant has all that is asked: how many have each thing alone, and the variant that comes nearest if
+/// none has all.
 fn what_is_asked(told: &Told<'_>, settings: &StudySettings, kind: GeneratorKind) -> String {
     let of_kind = || told.asked.iter().filter(|asked| asked.generator == kind);
     if settings.constraints.is_empty() && of_kind().all(|asked| asked.meet_alone == asked.of) {
@@ -441,8 +447,8 @@ fn what_is_asked(told: &Told<'_>, settings: &StudySettings, kind: GeneratorKind)
     text
 }
 
-/// What has to be known beside the figures: loads of the data sheet that are beyond what a table of a generator spans, fields that have
-/// one value, and fields that do nothing with a generator.
+/// What has to be known beside the figures: loads of the data sheet that are beyond what a table of a generator spans,
+/// fields that have one value, and fields that do nothing with a generator.
 fn remarks(drive: &Drive, settings: &StudySettings, study: &Study) -> Vec<String> {
     let beyond = settings.generators.iter().filter_map(|kind| {
         let sheet_n_m = settings.sheet_beyond_table_n_m(drive, *kind)?;
@@ -498,14 +504,16 @@ fn cautioned(runs: &[Run], kind: GeneratorKind) -> Option<String> {
     })
 }
 
-/// What has to be known of errors of making: that they are no choice, and that one place of a turn does not say what they do.
+/// What has to be known of errors of making: that they are no choice, and that one place of a turn does not say what
+/// they do.
 fn as_made(drive: &Drive, settings: &StudySettings) -> Vec<String> {
     let errors: Vec<&Vary> = settings.vary.iter().filter(|field| is_error_of_making(&field.path)).collect();
     let mut remarks: Vec<String> = errors
         .iter()
         .map(|field| {
             format!(
-                "{} is an error of making and no choice: variants are compared with those made alike, and the next command leaves it out",
+                "{} is an error of making and no choice: variants are compared with those made alike, and the next \
+                 command leaves it out",
                 field.path
             )
         })
@@ -517,16 +525,16 @@ fn as_made(drive: &Drive, settings: &StudySettings) -> Vec<String> {
     };
     if uneven(drive) || errors.iter().any(made) {
         remarks.push(
-            "a drive with errors of teeth, axes or generator is looked at in one place of its turns, which does not say what they do: \
-             tables looks at whole turns, and campaign at what tolerances do"
+            "a drive with errors of teeth, axes or generator is looked at in one place of its turns, which does not \
+             say what they do: tables looks at whole turns, and campaign at what tolerances do"
                 .to_owned(),
         );
     }
     remarks
 }
 
-/// Tables of the best variant of all generators, in the first target, under the loads that were studied. Errors of making are no part of it:
-/// of variants that differ in them those count that are made as the drive is.
+/// Tables of the best variant of all generators, in the first target, under the loads that were studied. Errors of
+/// making are no part of it: of variants that differ in them those count that are made as the drive is.
 fn best_next(context: &Context, drive: &Drive, settings: &StudySettings, study: &Study) -> Vec<String> {
     let Some((run, words)) = best(drive, settings, study) else { return Vec::new() };
     let torque = match (settings.torque_n_m, settings.sheet_beyond_table_n_m(drive, run.generator)) {

@@ -23,9 +23,9 @@ use flexspline_mechanics::mesh::MeshLevel;
 
 /// Make data that look measured: the drive of the simulation, with effects, noise and sensors of your choice
 ///
-/// Writes data.csv, which `flexspline diagnose` reads, and truth.json, which says what is in it. The drive is a table made by FEM
-/// (--tables; without one it is made on the coarse mesh first) or a catalogue's model (--model), and a unit drawn from the spread
-/// between units. --list shows every effect with its parameters.
+/// Writes data.csv, which `flexspline diagnose` reads, and truth.json, which says what is in it. The drive is a table
+/// made by FEM (--tables; without one it is made on the coarse mesh first) or a catalogue's model (--model), and a unit
+/// drawn from the spread between units. --list shows every effect with its parameters.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -248,7 +248,8 @@ impl Synthesize {
             [low, high] if low <= high => [low, high],
             _ => {
                 return Err(Failure::BadInput(format!(
-                    "--temperature-c: found \"{}\"; allowed: LOW,HIGH in degrees C, for instance -20,50, or one temperature",
+                    "--temperature-c: found \"{}\"; allowed: LOW,HIGH in degrees C, for instance -20,50, or one \
+                     temperature",
                     self.temperature_c
                 )));
             }

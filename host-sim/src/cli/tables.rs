@@ -33,11 +33,11 @@ use flexspline_report::{Sources, Subject, drive_report};
 
 /// Make compensation tables: from FEM sweeps of the drive, or from samples of another program or a bench
 ///
-/// For each generator the drive is swept by contact FEM over one tooth pitch at every torque and temperature node (a drive with
-/// imperfections also at places spread over the turns of generator and output), and the samples are projected onto the table by
-/// the code that also runs on board. Written are <G>.fxt (the image that firmware reads in place), <G>.json (what made it and how
-/// good it is), <G>.rs and <G>.h (the same bytes as source), and <G>.samples.csv; and report.html, a page with the drive in
-/// motion that any browser opens.
+/// For each generator the drive is swept by contact FEM over one tooth pitch at every torque and temperature node (a
+/// drive with imperfections also at places spread over the turns of generator and output), and the samples are
+/// projected onto the table by the code that also runs on board. Written are <G>.fxt (the image that firmware reads in
+/// place), <G>.json (what made it and how good it is), <G>.rs and <G>.h (the same bytes as source), and
+/// <G>.samples.csv; and report.html, a page with the drive in motion that any browser opens.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -90,8 +90,8 @@ pub(super) struct Tables {
     /// Solver: fast or reference
     #[arg(long, value_name = "SOLVER", default_value = "fast", conflicts_with = "from_samples", value_parser = names::solver(), hide_possible_values = true)]
     solver: Method,
-    /// Stress in root fillet, on bore and flank under the largest load, over three meshes, with its interval; takes one more pitch
-    /// and three meshes for each generator
+    /// Stress in root fillet, on bore and flank under the largest load, over three meshes, with its interval; takes one
+    /// more pitch and three meshes for each generator
     #[arg(long, conflicts_with = "from_samples")]
     stress: bool,
     /// Do not write report.html, which takes a FEM run over one more tooth pitch for each generator
@@ -349,7 +349,8 @@ pub(super) fn fresh_table(
 
 fn text(report: &Report<'_>, out: &std::path::Path, with_page: bool) -> String {
     let mut text = String::from(
-        "generator    table_id          bytes  torque N.m   backlash\"  wind-up\" at the ends   slope  worst deviation\"\n",
+        "generator    table_id          bytes  torque N.m   backlash\"  wind-up\" at the ends   slope  worst \
+         deviation\"\n",
     );
     for info in &report.tables {
         let [first, last] = [info.torque_nodes_n_m[0], info.torque_nodes_n_m[info.torque_nodes_n_m.len() - 1]];

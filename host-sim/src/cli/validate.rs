@@ -25,10 +25,11 @@ use flexspline_report::{Sources, Subject, drive_report};
 
 /// Compare tables with fresh FEM at points that made none of them
 ///
-/// Torques, temperatures, directions and positions are drawn between the nodes of each table; the drive is settled there and
-/// the table read by the code that firmware links. One run is reversed through the backlash. Ends with exit code 1 if a
-/// table misses the FEM by more than 0.5 arcsec rms or 2 arcsec at any point; the table of a drive with imperfections is
-/// looked at over whole turns, and may miss it by half as much again as it states of itself beyond that.
+/// Torques, temperatures, directions and positions are drawn between the nodes of each table; the drive is settled
+/// there and the table read by the code that firmware links. One run is reversed through the backlash. Ends with exit
+/// code 1 if a table misses the FEM by more than 0.5 arcsec rms or 2 arcsec at any point; the table of a drive with
+/// imperfections is looked at over whole turns, and may miss it by half as much again as it states of itself beyond
+/// that.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -59,7 +60,8 @@ pub(super) struct Validate {
     /// Solver of the fresh FEM: reference or fast
     #[arg(long, value_name = "SOLVER", default_value = "reference", value_parser = names::solver(), hide_possible_values = true)]
     solver: Method,
-    /// Do not write report.html (validation.html beside the page of the tables), which takes a FEM run over one more tooth pitch for each generator
+    /// Do not write report.html (validation.html beside the page of the tables), which takes a FEM run over one more
+    /// tooth pitch for each generator
     #[arg(long)]
     no_report: bool,
 }

@@ -81,8 +81,8 @@ pub struct Draw {
     /// One family alone [default: A, B and C, case by case]
     #[arg(long, value_enum, ignore_case = true)]
     pub family: Option<Plant>,
-    /// Cases of one kind alone [default: in 25 cases 5 nulls, 10 singles, 6 compounds, 4 outside the library; of families D and
-    /// E in 10 cases 2, 5, 1 and 2]
+    /// Cases of one kind alone [default: in 25 cases 5 nulls, 10 singles, 6 compounds, 4 outside the library; of
+    /// families D and E in 10 cases 2, 5, 1 and 2]
     #[arg(long, value_enum)]
     pub kind: Option<Kind>,
     /// Singles of one cause alone
@@ -335,7 +335,8 @@ mod tests {
         }
     }
 
-    /// Errors of the wheels that two zones share grow faster than their size: the search must not swing from one side to the other.
+    /// Errors of the wheels that two zones share grow faster than their size: the search must not swing from one side
+    /// to the other.
     #[test]
     fn sizes_are_found_where_an_effect_grows_faster_than_its_size() {
         for (at, cause) in [Cause::CircularSplineEccentricity, Cause::GeneratorEccentricity, Cause::GravitySideLoad]

@@ -158,8 +158,9 @@ impl Drive {
             }
         };
         let mut text = format!(
-            "[drive]\nflexspline_teeth = {}\ncircular_spline_teeth = {}\nfixed = \"{fixed}\"\n\n[nominal]\n\
-             stiffness_n_m_per_rad = {stiffness}\nbacklash_arcsec = {:.1}\nfriction_torque_n_m = {:.3}\ntemperature_c = 20.0\n",
+            "[drive]\nflexspline_teeth = {}\ncircular_spline_teeth = {}\nfixed = \
+             \"{fixed}\"\n\n[nominal]\nstiffness_n_m_per_rad = {stiffness}\nbacklash_arcsec = \
+             {:.1}\nfriction_torque_n_m = {:.3}\ntemperature_c = 20.0\n",
             self.flexspline_teeth, self.circular_spline_teeth, self.backlash_arcsec, self.friction_torque_n_m
         );
         for line in &self.harmonics {
@@ -171,8 +172,8 @@ impl Drive {
         }
         let _ = write!(
             text,
-            "\n[nominal.unit_to_unit]\nstiffness = {STIFFNESS_SPREAD}\nbacklash = {BACKLASH_SPREAD}\nharmonic = {HARMONIC_SPREAD}\n\
-             harmonic_phase_rad = {PHASE_SPREAD_RAD}\n"
+            "\n[nominal.unit_to_unit]\nstiffness = {STIFFNESS_SPREAD}\nbacklash = {BACKLASH_SPREAD}\nharmonic = \
+             {HARMONIC_SPREAD}\nharmonic_phase_rad = {PHASE_SPREAD_RAD}\n"
         );
         text
     }

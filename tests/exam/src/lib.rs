@@ -1,9 +1,9 @@
 //! Examines `flexspline diagnose` from outside: measured-looking data from a plant of its own, the truth kept apart and
 //! committed to beforehand, and scores with intervals.
 //!
-//! Nothing here is linked with the simulator or shares a law with the diagnosis; what they have in common is the written
-//! contract: column names, `nominal.toml`, names of causes, `diagnosis.json`. The laws, their sources and what is counted
-//! as fair are in the README of this crate.
+//! Nothing here is linked with the simulator or shares a law with the diagnosis; what they have in common is the
+//! written contract: column names, `nominal.toml`, names of causes, `diagnosis.json`. The laws, their sources and what
+//! is counted as fair are in the README of this crate.
 
 pub mod answer;
 pub mod bench;

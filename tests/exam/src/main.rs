@@ -69,8 +69,8 @@ struct Run {
     demands: Demands,
 }
 
-/// Bounds that fail the run. A bound is missed where its side of the 95 % interval lies beyond it, so that few cases fail
-/// only what is surely wrong; `--strict` takes the bare share.
+/// Bounds that fail the run. A bound is missed where its side of the 95 % interval lies beyond it, so that few cases
+/// fail only what is surely wrong; `--strict` takes the bare share.
 #[derive(Args)]
 struct Demands {
     /// At least this share: `NAME=SHARE`, a rate of the table; repeat for more

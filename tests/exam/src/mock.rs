@@ -1,5 +1,5 @@
-//! Diagnosers that are no diagnosers, to test the examiner: one that never names anything, one that always names the same,
-//! and one that reads the truth.
+//! Diagnosers that are no diagnosers, to test the examiner: one that never names anything, one that always names the
+//! same, and one that reads the truth.
 
 use std::error::Error;
 use std::fs;

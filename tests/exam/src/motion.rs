@@ -1,5 +1,5 @@
-//! What the drive goes through: sessions of generator motion, load, temperature and orientation, on a step finer than the
-//! rows of the data.
+//! What the drive goes through: sessions of generator motion, load, temperature and orientation, on a step finer than
+//! the rows of the data.
 
 use serde::Serialize;
 use std::f64::consts::{PI, TAU};

@@ -44,8 +44,8 @@ outside! {
     VibrationBursts "vibration_bursts",
 }
 
-/// Effects that do to the readings what a cause of the contract does, by the name of that cause: a shaft askew before an encoder and the encoder
-/// itself askew are one second order. That name is right, any other wrong.
+/// Effects that do to the readings what a cause of the contract does, by the name of that cause: a shaft askew before
+/// an encoder and the encoder itself askew are one second order. That name is right, any other wrong.
 pub const ALSO_CALLED: [(&str, &str); 1] = [("misaligned_shaft", "output_encoder_tilt")];
 
 impl Serialize for Outside {
@@ -123,7 +123,8 @@ const CREEP_S: [f64; 6] = [0.7, 2.2, 7.0, 22.0, 70.0, 220.0];
 impl Law for Stranger {
     fn mesh(&mut self, now: &Now, mesh: &mut Mesh) {
         match self.kind {
-            // The generator is driven through a slot: its angle lags by half the lash each way (5 to 18", Harmonic Drive HFUS-2A manual, table 24.5).
+            // The generator is driven through a slot: its angle lags by half the lash each way (5 to 18", Harmonic
+            // Drive HFUS-2A manual, table 24.5).
             Outside::OldhamDeadZone => {
                 let lash = self.size * self.ratio.abs() / crate::ARCSEC;
                 let angle = now.generator_rad;

@@ -1,5 +1,5 @@
-//! Look-alikes: causes that these data cannot tell from the one that is there. Every rival is refitted with the plant's own
-//! law, all base parameters floating.
+//! Look-alikes: causes that these data cannot tell from the one that is there. Every rival is refitted with the plant's
+//! own law, all base parameters floating.
 
 use crate::bench::{Bench, LEAST_D, difference, tangents};
 use crate::cause::Cause;
@@ -9,8 +9,8 @@ use crate::effect::{Effect, Family, What};
 
 /// Draws of a rival's numbers that span its signatures for the first, linear, look.
 const DRAWS: usize = 8;
-/// The linear look is not the whole family of a law's signatures: a rival that takes up this share of the distance, or comes
-/// this near, is refitted in earnest.
+/// The linear look is not the whole family of a law's signatures: a rival that takes up this share of the distance, or
+/// comes this near, is refitted in earnest.
 const TAKES_UP: f64 = 0.4;
 const NEAR: f64 = 3.0 * LEAST_D;
 /// Phases tried before a refit: errors of a wheel repeat in half a turn where both flanks clash, with a narrow valley.
@@ -36,7 +36,8 @@ pub fn look_alikes(
         }
         let what = What::Cause(rival);
         let mut d = distance(bench, drive, what, hidden.family, contribution, chance);
-        // Numbers that mean the same: the valley of a displacement beyond the clearance is too narrow to be met by chance.
+        // Numbers that mean the same: the valley of a displacement beyond the clearance is too narrow to be met by
+        // chance.
         let twin = twin(what, hidden, drive, chance);
         for turned in bench.orientations_rad() {
             if d >= LEAST_D

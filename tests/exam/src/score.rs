@@ -253,8 +253,8 @@ pub fn judge(truth: &Truth, answer: &Result<Answer, String>, seconds: f64) -> Ju
     judged
 }
 
-/// Whether a bench adds nothing that a log shows. One that was set to zero anew, or whose counter started again, is a discrepancy of its
-/// own.
+/// Whether a bench adds nothing that a log shows. One that was set to zero anew, or whose counter started again, is a
+/// discrepancy of its own.
 fn is_quiet(bench: &[String]) -> bool {
     bench.iter().all(|what| what == "chamber")
 }

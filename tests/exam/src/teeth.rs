@@ -1,9 +1,9 @@
 //! Two zones of engaged teeth share the load: what each wheel's errors do to the output.
 //!
-//! Rigid wheels, a spring in each zone. A zone touches the flank that turns the output forward at `upper`, the other one at
-//! `lower` (arcsec at the output, relative to the driven position). Without load the zone that comes first holds; a load
-//! presses it in until the second touches, and from there both share. So odd errors of a wheel vanish under load and are
-//! rectified without it.
+//! Rigid wheels, a spring in each zone. A zone touches the flank that turns the output forward at `upper`, the other
+//! one at `lower` (arcsec at the output, relative to the driven position). Without load the zone that comes first
+//! holds; a load presses it in until the second touches, and from there both share. So odd errors of a wheel vanish
+//! under load and are rectified without it.
 
 use crate::effect::Family;
 
@@ -17,8 +17,8 @@ pub struct Zones {
 }
 
 impl Zones {
-    /// A displacement of the wheel's axis: `x` is the angle on the wheel from the displacement to the first zone, `amplitude`
-    /// the displacement over radius and cosine of the pressure angle.
+    /// A displacement of the wheel's axis: `x` is the angle on the wheel from the displacement to the first zone,
+    /// `amplitude` the displacement over radius and cosine of the pressure angle.
     pub fn displace(&mut self, x: f64, amplitude: f64, pressure_angle_rad: f64) {
         let (plus, minus) = ((x + pressure_angle_rad).sin(), (x - pressure_angle_rad).sin());
         for (zone, sign) in [1.0, -1.0].into_iter().enumerate() {
@@ -41,7 +41,8 @@ impl Zones {
         }
     }
 
-    /// Lowest and highest position of the output inside the clearance. `press` is the load over the tooth stiffness, arcsec.
+    /// Lowest and highest position of the output inside the clearance. `press` is the load over the tooth stiffness,
+    /// arcsec.
     pub fn limits(&self, clearance: f64, press: f64, family: Family) -> (f64, f64) {
         let half = 0.5 * clearance;
         let [a, b] = self.upper;
@@ -71,12 +72,12 @@ fn first(a: f64, b: f64, press: f64, family: Family) -> f64 {
 /// Deflection of the teeth (arcsec) at which a force that grows with its power 3/2 is as stiff as the linear spring.
 const EQUAL_PRESS_ARCSEC: f64 = 20.0;
 
-/// How far a load presses the output beyond where it would rest on two zones that touch together, from where the first of two
-/// zones touches that are `2 half` apart, arcsec.
+/// How far a load presses the output beyond where it would rest on two zones that touch together, from where the first
+/// of two zones touches that are `2 half` apart, arcsec.
 ///
-/// The gaps of a zone grow with the square of the distance from its middle, so teeth enter as the root of the deflection δ and
-/// the force is as δ^(3/2) (derived here; the power of Hertz 1882 for a sphere): δ₁^(3/2) + (δ₁ - 2 half)₊^(3/2) = 2 δ₀^(3/2),
-/// where δ₀ is the deflection of equal zones.
+/// The gaps of a zone grow with the square of the distance from its middle, so teeth enter as the root of the
+/// deflection δ and the force is as δ^(3/2) (derived here; the power of Hertz 1882 for a sphere): δ₁^(3/2) + (δ₁ - 2
+/// half)₊^(3/2) = 2 δ₀^(3/2), where δ₀ is the deflection of equal zones.
 fn entering(half: f64, press: f64) -> f64 {
     let force = |deflection: f64| deflection.max(0.0).powf(1.5);
     let equal = (EQUAL_PRESS_ARCSEC * press * press).cbrt();
@@ -97,13 +98,14 @@ fn entering(half: f64, press: f64) -> f64 {
     deflection - equal
 }
 
-/// Position of the teeth of a wheel around its circumference, as a sum of harmonics; forward positive, arcsec. Held is the factor
-/// of `exp(i k angle)`, real and imaginary part, for each order `k` from zero.
+/// Position of the teeth of a wheel around its circumference, as a sum of harmonics; forward positive, arcsec. Held is
+/// the factor of `exp(i k angle)`, real and imaginary part, for each order `k` from zero.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Profile(Vec<(f64, f64)>);
 
 impl Profile {
-    /// From order (a whole number), amplitude and phase, each averaged over the engaged arc (`half_arc_rad` to both sides).
+    /// From order (a whole number), amplitude and phase, each averaged over the engaged arc (`half_arc_rad` to both
+    /// sides).
     pub fn new(lines: impl IntoIterator<Item = (f64, f64, f64)>, half_arc_rad: f64) -> Self {
         Self::averaged(lines, |k| (k * half_arc_rad).sin() / (k * half_arc_rad))
     }

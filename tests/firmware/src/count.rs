@@ -1,7 +1,8 @@
 //! Instructions executed, counted exactly.
 //!
 //! Under `-icount shift=10` every instruction takes 1.024 µs of virtual time, and the 25 MHz SysTick of the MPS2 counts
-//! 25.6 ticks for each. (The cycle counter of the DWT reads 0 in QEMU; without `-icount` SysTick follows the wall clock.)
+//! 25.6 ticks for each. (The cycle counter of the DWT reads 0 in QEMU; without `-icount` SysTick follows the wall
+//! clock.)
 
 use core::sync::atomic::{Ordering, compiler_fence};
 
@@ -55,8 +56,8 @@ impl Counter {
 
     /// Instructions that `work` takes and what it gave.
     ///
-    /// Never inlined, so that nothing of what comes before or after is moved in between; what the caller hands over is fetched in
-    /// it and counted.
+    /// Never inlined, so that nothing of what comes before or after is moved in between; what the caller hands over is
+    /// fetched in it and counted.
     #[inline(never)]
     pub fn of<T>(&self, work: impl FnOnce() -> T) -> (u32, T) {
         let _ = &self.timer;

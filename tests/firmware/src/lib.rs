@@ -1,4 +1,5 @@
-//! What the programs share: exact instruction counts under QEMU's `-icount`, a trajectory, the tables, and how a program ends.
+//! What the programs share: exact instruction counts under QEMU's `-icount`, a trajectory, the tables, and how a
+//! program ends.
 #![no_std]
 
 pub mod count;

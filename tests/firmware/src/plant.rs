@@ -2,7 +2,8 @@
 
 use crate::flight::gear::{GearMap, MOST, parse};
 
-/// Contact FEM of the four generators, in the order of [`crate::TABLES`]: name, largest torque of the table in N·m, file.
+/// Contact FEM of the four generators, in the order of [`crate::TABLES`]: name, largest torque of the table in N·m,
+/// file.
 static FILES: [(&str, f64, &str); 4] = [
     ("cam", 200.0, include_str!("../../../host-sim/fly/plant/cam.csv")),
     ("double-disc", 200.0, include_str!("../../../host-sim/fly/plant/double-disc.csv")),

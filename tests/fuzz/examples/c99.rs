@@ -3,8 +3,8 @@
 //! ```sh
 //! c99 OUT TICKS IMAGES TABLE.fxt...
 //! ```
-//! So many ticks in all, spread over the tables named and those of [`tables::BASES`]; then so many hostile images, and some ticks with
-//! each that is accepted. Little-endian records, told in [`Vectors`].
+//! So many ticks in all, spread over the tables named and those of [`tables::BASES`]; then so many hostile images, and
+//! some ticks with each that is accepted. Little-endian records, told in [`Vectors`].
 
 use flexspline::{
     Approach, Command, Direction, Field, GeneratorAngle, ImageError, OutputAngle, PlayState, Prediction, Table,
@@ -12,8 +12,9 @@ use flexspline::{
 use flexspline_fuzz::{Choices, image, tables};
 use std::io::{BufWriter, Write};
 
-/// Records: 1, an image: length, bytes, verdict and what is known of the table. 2, a call: kind, two angles, torque, temperature, what it
-/// gives, and the play after it. 3, a saved play: bytes, and whether they are restored. 0, the end.
+/// Records: 1, an image: length, bytes, verdict and what is known of the table. 2, a call: kind, two angles, torque,
+/// temperature, what it gives, and the play after it. 3, a saved play: bytes, and whether they are restored. 0, the
+/// end.
 struct Vectors<W> {
     out: W,
     calls: u64,
@@ -199,7 +200,8 @@ impl<W: Write> Vectors<W> {
         self.out.write_all(&[PlayState::restore(&bytes).is_some() as u8])
     }
 
-    /// Mixed motion: reversals, standing, leaps, torques at, between and beyond nodes, what is not finite; all kinds of calls.
+    /// Mixed motion: reversals, standing, leaps, torques at, between and beyond nodes, what is not finite; all kinds of
+    /// calls.
     fn ticks(&mut self, table: &Table<'_>, ticks: usize, mixed: &mut Mixed) -> std::io::Result<()> {
         let torques: Vec<f32> = table.torque_nodes_n_m().collect();
         let temperatures: Vec<f32> = table.temperature_nodes_c().collect();
@@ -251,8 +253,8 @@ impl<W: Write> Vectors<W> {
     }
 }
 
-/// A sound table whose numbers of one kind are moved by `part` of a large change, under right checksums: a step of D at a torque node, H,
-/// the slope of D at a node, the ripple unit, or a curve.
+/// A sound table whose numbers of one kind are moved by `part` of a large change, under right checksums: a step of D at
+/// a torque node, H, the slope of D at a node, the ripple unit, or a curve.
 fn moved(base: &[u8], [kind, split, sign]: [usize; 3], part: f64) -> Vec<u8> {
     let mut image = base.to_vec();
     let (torques, temperatures) = (usize::from(image[110]), usize::from(image[111]));
@@ -288,7 +290,8 @@ fn moved(base: &[u8], [kind, split, sign]: [usize; 3], part: f64) -> Vec<u8> {
     image
 }
 
-/// The two images next to each other of which one is accepted and one is not; or the end of the change, if it is accepted too.
+/// The two images next to each other of which one is accepted and one is not; or the end of the change, if it is
+/// accepted too.
 fn at_the_limit(choices: &mut Choices<'_>) -> [Vec<u8>; 2] {
     let base = &tables::BASES[[1, 2, 3, 5][choices.below(4)]];
     // As often as not at the jump at −1.5 N·m.

@@ -1,7 +1,7 @@
 //! The C interface: calls in any order with null, misaligned, uninitialised, overlapping and short arguments.
 //!
-//! Only what C can be kept from breaking: a pointer that is aligned and not null points to an object of its type, or to one that
-//! the same call must refuse, and images have the length given.
+//! Only what C can be kept from breaking: a pointer that is aligned and not null points to an object of its type, or to
+//! one that the same call must refuse, and images have the length given.
 
 use crate::Choices;
 use crate::tables::BASES;
@@ -631,7 +631,8 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
             }
         },
         34 => {
-            // The numbers of a sound predictor, now and then one of them another; finding the gains takes too long for a fuzzer.
+            // The numbers of a sound predictor, now and then one of them another; finding the gains takes too long for
+            // a fuzzer.
             let mut parts = [*PARTS; 2];
             if choices.any() {
                 parts[0][choices.below(PARTS.len())] = choices.wild();

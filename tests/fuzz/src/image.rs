@@ -20,7 +20,8 @@ pub fn run(data: &[u8]) {
     }
 }
 
-/// An image: any bytes, a sound one damaged on the way, one with wrong numbers under right checksums, or one of any numbers.
+/// An image: any bytes, a sound one damaged on the way, one with wrong numbers under right checksums, or one of any
+/// numbers.
 pub fn hostile(choices: &mut Choices<'_>) -> Option<Vec<u8>> {
     match choices.below(4) {
         0 => Some(choices.bytes(65_535).to_vec()),
@@ -67,7 +68,8 @@ fn put(image: &mut [u8], at: usize, value: u32) {
     }
 }
 
-/// Wrong numbers, then the checksums and whatever follows from the numbers made right: what is left are the checks of meaning.
+/// Wrong numbers, then the checksums and whatever follows from the numbers made right: what is left are the checks of
+/// meaning.
 pub fn change_numbers(image: &mut [u8], choices: &mut Choices<'_>) {
     for _ in 0..=choices.below(12) {
         let low = |at: usize, image: &[u8]| word(image, at) as usize & 0xffff;

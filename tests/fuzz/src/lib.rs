@@ -1,7 +1,7 @@
 //! Hostile input for the core: what each target feeds it, and what must hold whatever comes.
 //!
-//! A target is a function of bytes. `tests/run fuzz` lets libFuzzer look for bytes that break a promise; what it once found lies in
-//! `corpus/` and is played again by `cargo test` here, without libFuzzer.
+//! A target is a function of bytes. `tests/run fuzz` lets libFuzzer look for bytes that break a promise; what it once
+//! found lies in `corpus/` and is played again by `cargo test` here, without libFuzzer.
 //!
 //! | target | what is hostile | what must hold |
 //! |---|---|---|

@@ -65,7 +65,8 @@ impl Watch {
         self.last = [Some(correction_rad), None];
     }
 
-    /// Whether a correction with this speed, rad and rad in a tick, can be stopped before it is larger than any table gives.
+    /// Whether a correction with this speed, rad and rad in a tick, can be stopped before it is larger than any table
+    /// gives.
     pub fn stops_in_time(&self, correction_rad: f64, speed_rad: f64) -> bool {
         let speed = speed_rad.abs().min(self.rate);
         correction_rad.abs() + speed + speed * speed / (2.0 * self.acceleration) <= f64::from(MAX_ERROR_RAD)

@@ -156,8 +156,8 @@ fn drive(flexspline: u16, circular_spline: u16, fixed: FixedMember) -> Drive {
 /// Torque nodes with jumps at ±1.5 N·m.
 const JUMPS: [f32; 11] = [-50.0, -20.0, -5.0, -1.51, -1.49, 0.0, 1.49, 1.51, 5.0, 20.0, 50.0];
 
-/// Images to start from: one node; every part and two temperatures; jumps; the circular spline fixed; more pages than a store
-/// takes; a ratio of thirds.
+/// Images to start from: one node; every part and two temperatures; jumps; the circular spline fixed; more pages than a
+/// store takes; a ratio of thirds.
 pub static BASES: LazyLock<[Vec<u8>; 6]> = LazyLock::new(|| {
     let hhd_95 = drive(188, 190, FixedMember::Flexspline);
     let many: Vec<f32> = (-12..=12).map(|i| 4.0 * i as f32).collect();

@@ -1,9 +1,9 @@
 //! Whether measurements agree with what was learnt, over windows: what lets an estimate that is wrong recover.
 //!
-//! A Kalman filter with a gate believes its own covariance. If a sensor was wrong while it learnt, a right measurement is an outlier
-//! afterwards, for ever. So each measurement is judged under three hypotheses, with `ν₁` its innovation with the coefficients, `ν₀`
-//! without them, both in units of the stated noise, `r` the measured ratio of the innovations' variance to the expected one, and `P₀`
-//! the covariance of the settings:
+//! A Kalman filter with a gate believes its own covariance. If a sensor was wrong while it learnt, a right measurement
+//! is an outlier afterwards, for ever. So each measurement is judged under three hypotheses, with `ν₁` its innovation
+//! with the coefficients, `ν₀` without them, both in units of the stated noise, `r` the measured ratio of the
+//! innovations' variance to the expected one, and `P₀` the covariance of the settings:
 //!
 //! ```text
 //! learnt:  S₁ = r + hᵀP h,    q₁ = ν₁²/S₁        what was learnt holds
@@ -11,45 +11,52 @@
 //! sensor:  ν₀² > gate²·(1 + hᵀP₀h)               the measurement is impossible, whatever the coefficients are
 //! ```
 //!
-//! * **Sensor.** While more than half of the measurements of a window are impossible, none is used: a sensor that is frozen or has
-//!   the wrong sign passes by the right value now and then.
-//! * **Anew.** The evidence for a start from the prior is Page's cumulative sum of the logarithm of the likelihood ratio,
+//! * **Sensor.** While more than half of the measurements of a window are impossible, none is used: a sensor that is
+//!   frozen or has the wrong sign passes by the right value now and then.
+//! * **Anew.** The evidence for a start from the prior is Page's cumulative sum of the logarithm of the likelihood
+//!   ratio,
 //!
 //!   ```text
 //!   e ← max(0, e + [q₁]₂₅ − [q₀]₆ − [ln S₀/S₁]₁₂),      start anew at e = 8·W
 //!   ```
 //!
-//!   with `[·]ₘ` bounded by `m`: one measurement has a bounded part in it, and a burst of outliers shorter than W/3 does nothing. Then the
-//!   covariance is P₀ again, and the next measurements correct the coefficients in their direction; others stay. As soon as there is evidence, the stated variance has its share of the prior one: `(e/8W)·hᵀP₀h`.
-//! * **Noise.** `r ← r·(1 + ([q₁]₄ − 0.92)/10W)`, Huber's M-estimate of scale as a recursion. It is the noise of the filter, so that a
-//!   sensor that is worse than stated is neither believed too much nor locked out, and what exceeds 1 of it is model error, by
-//!   so much the stated variance is larger.
-//! * **Worth.** `w ← w + ([ν₁²/r]₂₅ − [ν₀²/r]₂₅ − w)/W`: above 0 the table alone does better than the table with the coefficients; then
-//!   these fade towards 0 by `min(w, 1)/W` with each measurement.
+//!   with `[·]ₘ` bounded by `m`: one measurement has a bounded part in it, and a burst of outliers shorter than W/3
+//!   does nothing. Then the covariance is P₀ again, and the next measurements correct the coefficients in their
+//!   direction; others stay. As soon as there is evidence, the stated variance has its share of the prior one:
+//!   `(e/8W)·hᵀP₀h`.
+//! * **Noise.** `r ← r·(1 + ([q₁]₄ − 0.92)/10W)`, Huber's M-estimate of scale as a recursion. It is the noise of the
+//!   filter, so that a sensor that is worse than stated is neither believed too much nor locked out, and what exceeds 1
+//!   of it is model error, by so much the stated variance is larger.
+//! * **Worth.** `w ← w + ([ν₁²/r]₂₅ − [ν₀²/r]₂₅ − w)/W`: above 0 the table alone does better than the table with the
+//!   coefficients; then these fade towards 0 by `min(w, 1)/W` with each measurement.
 //!
-//! Sources: E. S. Page, *Continuous inspection schemes*, Biometrika 41 (1954), 100-115, the sum; R. K. Mehra, *On the identification of
-//! variances and adaptive Kalman filtering*, IEEE Trans. AC-15 (1970), 175-184, the noise from the innovations; P. J. Huber, *Robust
-//! Statistics* (1981), ch. 5, its bounded form; G. C. Goodwin, H. Elliott and E. K. Teoh, *Deterministic convergence of a
-//! self-tuning regulator with covariance resetting*, IEE Proc. D 130 (1983), 6-8, the start from the first covariance.
+//! Sources: E. S. Page, *Continuous inspection schemes*, Biometrika 41 (1954), 100-115, the sum; R. K. Mehra, *On the
+//! identification of variances and adaptive Kalman filtering*, IEEE Trans. AC-15 (1970), 175-184, the noise from the
+//! innovations; P. J. Huber, *Robust Statistics* (1981), ch. 5, its bounded form; G. C. Goodwin, H. Elliott and E. K.
+//! Teoh, *Deterministic convergence of a self-tuning regulator with covariance resetting*, IEE Proc. D 130 (1983), 6-8,
+//! the start from the first covariance.
 
 use crate::num;
 
-/// Part of the memory that a window is, and its limits, measurements. Guesses: a tenth is long enough that bursts of bad measurements do
-/// nothing, and short enough that an estimate recovers within the memory; a thousand measurements are evidence enough.
+/// Part of the memory that a window is, and its limits, measurements. Guesses: a tenth is long enough that bursts of
+/// bad measurements do nothing, and short enough that an estimate recovers within the memory; a thousand measurements
+/// are evidence enough.
 const WINDOW: (f32, [f32; 2]) = (0.1, [10.0, 1000.0]);
 /// Most that one measurement says against what was learnt: five standard deviations. Guess.
 const MOST: f32 = 25.0;
-/// Most that it says against the prior, and most that a wide prior costs: together less than [`MOST`], so that measurements
-/// which contradict what was learnt are evidence for a start anew whatever the prior is.
+/// Most that it says against the prior, and most that a wide prior costs: together less than [`MOST`], so that
+/// measurements which contradict what was learnt are evidence for a start anew whatever the prior is.
 const MOST_ANEW: f32 = 6.0;
 const MOST_COST: f32 = 12.0;
-/// Most that one measurement is taken for noise, and the mean of what is bounded by it of the square of a normal number: a quarter of
-/// the measurements may be outliers before the noise is.
+/// Most that one measurement is taken for noise, and the mean of what is bounded by it of the square of a normal
+/// number: a quarter of the measurements may be outliers before the noise is.
 const MOST_NOISE: f32 = 4.0;
 const MEAN_NOISE: f32 = 0.920_5;
-/// Evidence for a start anew in each measurement of a window, on average. At least 7 is what a contradicted one has, 16 is usual.
+/// Evidence for a start anew in each measurement of a window, on average. At least 7 is what a contradicted one has, 16
+/// is usual.
 const EVIDENCE: f32 = 8.0;
-/// The noise adapts in so many windows: slower than what was learnt is found to be wrong, or that would be taken for noise. Guess.
+/// The noise adapts in so many windows: slower than what was learnt is found to be wrong, or that would be taken for
+/// noise. Guess.
 const NOISE_WINDOWS: f32 = 10.0;
 /// Limits of the variance of the innovations over the expected one: up to ten times the stated noise. Guesses.
 const NOISE: [f32; 2] = [0.5, 100.0];
@@ -71,7 +78,8 @@ crate::whole::words!([] Consistency { noise, anew, worse, impossible });
 #[cfg(test)]
 crate::upset::upsets!(Consistency { noise, anew, worse, impossible });
 
-/// One measurement as both hypotheses see it: squares of innovations, and their expected spreads, in units of the stated noise.
+/// One measurement as both hypotheses see it: squares of innovations, and their expected spreads, in units of the
+/// stated noise.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Judged {
     pub with: f32,

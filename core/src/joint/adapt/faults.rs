@@ -1,7 +1,7 @@
 //! Sensors that are wrong while a joint learns, and right again afterwards.
 //!
-//! The plant, its table and the noise are those of [`super::tests`], 1000 measurements a second. A twin does not learn. T counts from
-//! when the sensor is right again.
+//! The plant, its table and the noise are those of [`super::tests`], 1000 measurements a second. A twin does not learn.
+//! T counts from when the sensor is right again.
 
 use super::tests::{HIDDEN, Loop, SETTINGS, mixed};
 use super::*;
@@ -100,7 +100,8 @@ struct Story {
     stated: f64,
 }
 
-/// Learning is worse than no learning by more than three times what it states for no longer than this, measurements: half of the memory.
+/// Learning is worse than no learning by more than three times what it states for no longer than this, measurements:
+/// half of the memory.
 const T: usize = 1000;
 
 /// A fault after so many good measurements, for so many; then 20 000 good ones.

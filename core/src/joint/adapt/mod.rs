@@ -4,43 +4,47 @@
 //! y − ŷ = h·x + v,      error = table + m + g·τ + Σ (aₙ·cos nψ + bₙ·sin nψ) − s·w
 //! ```
 //!
-//! with `y` the measured output and `ŷ` what the table says, `m` a mean offset, `g` a wind-up beside the table's, `w` a half-width
-//! beside the table's with `s` = ±1 the side of the play in contact, and `a`, `b` the cosine and sine of a few orders of the
-//! generator angle. Which of them are estimated is a list of [`Term`]s; their number is a type.
+//! with `y` the measured output and `ŷ` what the table says, `m` a mean offset, `g` a wind-up beside the table's, `w` a
+//! half-width beside the table's with `s` = ±1 the side of the play in contact, and `a`, `b` the cosine and sine of a
+//! few orders of the generator angle. Which of them are estimated is a list of [`Term`]s; their number is a type.
 //!
-//! [`Adapter::update`] is called once each tick after [`Joint::tick`](crate::Joint::tick), with a measurement if there is one: an
-//! encoder at the output each tick, or a star or beacon now and then. What it returns is added in the next tick.
+//! [`Adapter::update`] is called once each tick after [`Joint::tick`](crate::Joint::tick), with a measurement if there
+//! is one: an encoder at the output each tick, or a star or beacon now and then. What it returns is added in the next
+//! tick.
 //!
 //! # How
-//! A Kalman filter for coefficients that wander, in the form `P = U·D·Uᵀ` (Bierman, *Factorization Methods for Discrete Sequential
-//! Estimation*, 1977, ch. V: the measurement; Agee and Turner 1972: the wandering). `D ≥ 0` holds whatever the rounding, so the
-//! covariance stays symmetric and positive in `f32`, for any number of updates.
+//! A Kalman filter for coefficients that wander, in the form `P = U·D·Uᵀ` (Bierman, *Factorization Methods for Discrete
+//! Sequential Estimation*, 1977, ch. V: the measurement; Agee and Turner 1972: the wandering). `D ≥ 0` holds whatever
+//! the rounding, so the covariance stays symmetric and positive in `f32`, for any number of updates.
 //!
-//! * Measurements are judged over windows, see [`consistency`]: where they contradict what was learnt the covariance goes back to the
-//!   first one, where the table alone does better the coefficients fade, and what is not explained is in the stated uncertainty.
+//! * Measurements are judged over windows, see [`consistency`]: where they contradict what was learnt the covariance
+//!   goes back to the first one, where the table alone does better the coefficients fade, and what is not explained is
+//!   in the stated uncertainty.
 //! * Forgetting is directional: a measurement in direction `h` adds `h·hᵀ/(|h|⁴·M²)` to the covariance first, `M` the
-//!   [memory](AdaptSettings::memory_measurements). In directions in which nothing is measured nothing is forgotten, so nothing
-//!   drifts there and no variance winds up; a correlation learnt long ago fades where only one of the two is excited.
+//!   [memory](AdaptSettings::memory_measurements). In directions in which nothing is measured nothing is forgotten, so
+//!   nothing drifts there and no variance winds up; a correlation learnt long ago fades where only one of the two is
+//!   excited.
 //! * No variance grows beyond its first one.
-//! * An innovation beyond so many standard deviations is an outlier: counted, not used. So is every one while the sensor is impossible.
-//! * Where the error is known to within ± an interval only (side of the play unknown, torque inside a jump), that much of an
-//!   innovation says nothing: only what exceeds it is used (a dead zone), with the interval added to the noise.
-//! * After a reversal, from where contact is lost until the play has moved on by four times the limit of the half-width (it is taken
-//!   up later or earlier than estimated by no more) and [`AdaptSettings::settle_rad`], nothing is learnt.
+//! * An innovation beyond so many standard deviations is an outlier: counted, not used. So is every one while the
+//!   sensor is impossible.
+//! * Where the error is known to within ± an interval only (side of the play unknown, torque inside a jump), that much
+//!   of an innovation says nothing: only what exceeds it is used (a dead zone), with the interval added to the noise.
+//! * After a reversal, from where contact is lost until the play has moved on by four times the limit of the half-width
+//!   (it is taken up later or earlier than estimated by no more) and [`AdaptSettings::settle_rad`], nothing is learnt.
 //! * Every coefficient stays within its limit.
 //!
 //! # What it promises
-//! From when the sensors are right, learning is worse than no learning by more than three times the stated uncertainty for no longer
-//! than T, five windows of measurements: half of the memory between memories of 100 and 10 000. Measured with a memory of 2000: at
-//! most 67 measurements after a sensor that was off, sliding, jumping, frozen, late or of the other sign, or a load sensor with another gain or
-//! dead, for 20 s (`faults`).
+//! From when the sensors are right, learning is worse than no learning by more than three times the stated uncertainty
+//! for no longer than T, five windows of measurements: half of the memory between memories of 100 and 10 000. Measured
+//! with a memory of 2000: at most 67 measurements after a sensor that was off, sliding, jumping, frozen, late or of the
+//! other sign, or a load sensor with another gain or dead, for 20 s (`faults`).
 //!
 //! # Not in here
-//! While a sensor is off by something that coefficients could be, the estimate is off by as much: nothing here can see it. The stated
-//! uncertainty has no bias of the sensor.
+//! While a sensor is off by something that coefficients could be, the estimate is off by as much: nothing here can see
+//! it. The stated uncertainty has no bias of the sensor.
 //!
-//! The measurement must be of the same moment as the generator sample of the tick. What a delay does looks like an offset that
-//! changes with the direction, and would be taken for play.
+//! The measurement must be of the same moment as the generator sample of the tick. What a delay does looks like an
+//! offset that changes with the direction, and would be taken for play.
 
 #![allow(clippy::arithmetic_side_effects)] // Floating-point numbers: nothing overflows. Integers are handled by name.
 
@@ -72,8 +76,8 @@ use factors::{dot, measure, spread_of, transform, wander_by};
 /// One tick as the adapter sees it.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen<'s> {
-    /// What the tick was given: generator, torque, and of the adjustment what this adapter said. What was added beside it (springs that slip)
-    /// is left out here and counts as known; left in, it is learnt a second time.
+    /// What the tick was given: generator, torque, and of the adjustment what this adapter said. What was added beside
+    /// it (springs that slip) is left out here and counts as known; left in, it is learnt a second time.
     pub input: &'s Input,
     /// The play after the tick.
     pub play: &'s PlayState,
@@ -164,8 +168,8 @@ impl<const N: usize> Adapter<N> {
         Self::of_first(settings, N)
     }
 
-    /// An adapter of the first so many coefficients: those after them (`NO_COEFFICIENT`) change no bit of what these come to, and are
-    /// in no sum and no saved state.
+    /// An adapter of the first so many coefficients: those after them (`NO_COEFFICIENT`) change no bit of what these
+    /// come to, and are in no sum and no saved state.
     pub(crate) fn of_first(settings: &AdaptSettings<N>, used: usize) -> Result<Self, AdaptError> {
         let AdaptSettings { coefficients, noise_rad, memory_measurements, gate, settle_rad, torque_limit_n_m } =
             *settings;
@@ -220,10 +224,12 @@ impl<const N: usize> Adapter<N> {
         })
     }
 
-    /// The same adapter of this joint with the table in use. Saved states carry both and are restored only where they belong.
+    /// The same adapter of this joint with the table in use. Saved states carry both and are restored only where they
+    /// belong.
     ///
-    /// `unit` tells joints with the same settings and the same table from each other, such as the wheels of a rover; 0 if there is one.
-    /// Activate the table first; without one there is no owner. Make it anew after another table was activated, and [`Self::reset`] the state: what was learnt belongs to the table before.
+    /// `unit` tells joints with the same settings and the same table from each other, such as the wheels of a rover; 0
+    /// if there is one. Activate the table first; without one there is no owner. Make it anew after another table was
+    /// activated, and [`Self::reset`] the state: what was learnt belongs to the table before.
     #[must_use]
     pub fn owned_by(mut self, joint: &Joint, store: &Store, unit: u32) -> Self {
         self.owner = Owner::of(joint, store, unit);
@@ -273,9 +279,10 @@ impl<const N: usize> Adapter<N> {
 
     /// One tick: follows the play, learns from the measurement if there is one, and tells what to add in the next tick.
     ///
-    /// Call it every tick, in order, also without a measurement. Nothing that comes in can make the adjustment exceed the limits
-    /// or be undefined. No search, no loop that depends on data: on a Cortex-M4F a tick with a measurement that is used takes 1834
-    /// instructions for five coefficients, whatever the values, and one without at most 452 (counted by `tests/firmware`).
+    /// Call it every tick, in order, also without a measurement. Nothing that comes in can make the adjustment exceed
+    /// the limits or be undefined. No search, no loop that depends on data: on a Cortex-M4F a tick with a measurement
+    /// that is used takes 1834 instructions for five coefficients, whatever the values, and one without at most 452
+    /// (counted by `tests/firmware`).
     pub fn update(&self, state: &mut AdaptState<N>, seen: &Seen<'_>) -> Adapted {
         let contact = self.follow(state, seen.play);
         let generator = seen.input.generator.unwrap_or(state.generator);
@@ -412,7 +419,8 @@ impl<const N: usize> Adapter<N> {
             let free = *x + gain * excess;
             let held = num::within(free, [-1.0, 1.0]);
             state.counters.limited = state.counters.limited.saturating_add(u32::from(held != free));
-            // No measurement said to hold it at its limit: by so much it is less known. Else what follows would look like outliers for ever.
+            // No measurement said to hold it at its limit: by so much it is less known. Else what follows would look
+            // like outliers for ever.
             *wander = *wander * share + (free - held);
             *x = held;
         }
@@ -513,8 +521,8 @@ impl<const N: usize> Adapter<N> {
 
     /// A state from [`Self::save`], in [`Learning::Off`], of the same coefficients and the same owner.
     ///
-    /// Nobody knows what happened meanwhile. Until measurements agree, the stated variance has half of the prior one, and half of
-    /// the evidence that is needed otherwise starts it anew.
+    /// Nobody knows what happened meanwhile. Until measurements agree, the stated variance has half of the prior one,
+    /// and half of the evidence that is needed otherwise starts it anew.
     ///
     /// # Errors
     /// [`AdaptRestoreError`] says why the bytes are no state of this adapter.

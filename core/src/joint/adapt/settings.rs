@@ -40,8 +40,8 @@ pub struct AdaptSettings<const N: usize> {
     pub memory_measurements: f32,
     /// Standard deviations beyond which an innovation is an outlier: 1 to 100.
     pub gate: f32,
-    /// Way at the output after a reversal that is left out beside four times the limit of the half-width, rad: elastic hysteresis;
-    /// 0 to 0.05.
+    /// Way at the output after a reversal that is left out beside four times the limit of the half-width, rad: elastic
+    /// hysteresis; 0 to 0.05.
     pub settle_rad: f32,
     /// Torque beyond which the wind-up's share grows no more, N·m.
     pub torque_limit_n_m: f32,

@@ -32,7 +32,8 @@ pub enum Verdict {
     Unsettled,
     /// No coefficient changes the output enough here to be seen in the noise.
     Unexcited,
-    /// The tick itself was not to be trusted: sample lost or not believed, torque out of range or not finite, table in doubt.
+    /// The tick itself was not to be trusted: sample lost or not believed, torque out of range or not finite, table in
+    /// doubt.
     Untrusted,
 }
 
@@ -56,7 +57,8 @@ pub struct AdaptCounters {
     pub untrusted: u32,
     /// Coefficients held at their limit, once for each and each measurement.
     pub limited: u32,
-    /// Starts with the first variances: measurements contradicted what was learnt for a window, or, from zero, the state was hit by an upset.
+    /// Starts with the first variances: measurements contradicted what was learnt for a window, or, from zero, the
+    /// state was hit by an upset.
     pub restarts: u32,
 }
 

@@ -241,8 +241,8 @@ fn outliers_and_what_is_no_number_change_nothing() {
     assert!(run.state.counters().outliers_in_a_row > 2500);
 }
 
-/// However long it measures, the variance stays at what the memory allows, and what is stated covers a sensor that is worse than
-/// its settings say.
+/// However long it measures, the variance stays at what the memory allows, and what is stated covers a sensor that is
+/// worse than its settings say.
 #[test]
 fn the_variance_stays_above_what_the_memory_allows() {
     for times in [1.0, 3.0] {
@@ -480,8 +480,8 @@ fn coefficients_come_back_only_where_they_belong() {
     }
 }
 
-/// Where nobody said whose they are, they are stated as uncertain as before anything was learnt, and the first window of
-/// measurements decides.
+/// Where nobody said whose they are, they are stated as uncertain as before anything was learnt, and the first window
+/// of measurements decides.
 #[test]
 fn restored_coefficients_that_are_wrong_are_stated_and_forgotten() {
     let mut run = Loop::new(&SETTINGS, [1.45e-4, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], 13);
@@ -659,8 +659,8 @@ fn fewer_coefficients_take_fewer_numbers() {
     assert_eq!(sizes, [40, 52, 68, 172]);
 }
 
-/// Found by chance: early on, coefficients that are not yet told apart swing beyond their limits and are held there. What was taken
-/// off them must widen what is thought of them, or every later measurement is an outlier.
+/// Found by chance: early on, coefficients that are not yet told apart swing beyond their limits and are held there.
+/// What was taken off them must widen what is thought of them, or every later measurement is an outlier.
 #[test]
 fn what_is_held_at_a_limit_is_found_later() {
     let parts = [0.0, -0.210_628_3, 0.194_511_7, 0.0, 0.0, 0.073_871_1, 0.203_876_1];

@@ -19,16 +19,18 @@ use core::f64::consts::TAU;
 
 /// Half-widths may miss zero by this, counts, and the ripple unit: rounding.
 const HALF_WIDTH_ROUNDING_COUNTS: f64 = 3.0;
-/// The error of a flank may lie so far below what it was at a smaller torque, rad, 10″: noise of a table that was measured, and cubics
-/// that swing. Chosen; the tables of the four generators never fall at their nodes, and swing by 5e-6 between them.
+/// The error of a flank may lie so far below what it was at a smaller torque, rad, 10″: noise of a table that was
+/// measured, and cubics that swing. Chosen; the tables of the four generators never fall at their nodes, and swing by
+/// 5e-6 between them.
 const FALL_RAD: f32 = 5.0e-5;
-/// The softest drive that is believed, rad/N·m. Chosen: a hundred times the compliance of size 5 in catalogues (some 1e-2), five hundred
-/// times the steepest place in a table of contact FEM (two-roller at no load, 5e-4; with friction learnt 1.9e-3).
+/// The softest drive that is believed, rad/N·m. Chosen: a hundred times the compliance of size 5 in catalogues (some
+/// 1e-2), five hundred times the steepest place in a table of contact FEM (two-roller at no load, 5e-4; with friction
+/// learnt 1.9e-3).
 const MAX_COMPLIANCE_RAD_PER_N_M: f32 = 1.0;
 /// Largest ripple unit for each count of a cell: a ripple of 15.9 cells.
 const MAX_UNITS_PER_CELL: f32 = 255.0;
-/// How far B-spline weights of 15 bits can be off, times the largest step between coefficients: one unit for the place in the
-/// cell and one for each of the two weights that are rounded.
+/// How far B-spline weights of 15 bits can be off, times the largest step between coefficients: one unit for the place
+/// in the cell and one for each of the two weights that are rounded.
 const WEIGHT_ROUNDING: f32 = 3.0 / 32_768.0;
 
 #[inline(never)]
@@ -394,8 +396,8 @@ impl Check {
         Ok(end >= slots)
     }
 
-    /// What D and H can give at a node, and between it and the one before: linear interpolation between temperatures stays within them,
-    /// a cubic within its Bernstein coefficients.
+    /// What D and H can give at a node, and between it and the one before: linear interpolation between temperatures
+    /// stays within them, a cubic within its Bernstein coefficients.
     #[inline(never)]
     fn node(&mut self, words: Words<'_>) -> Result<(), ImageError> {
         let most = num::counts(MAX_ERROR_RAD as f64) as f32;
@@ -430,9 +432,11 @@ impl Check {
         Ok(())
     }
 
-    /// Whether the error of both flanks, D − H and D + H, grows with the load up to this node, and no faster than a drive can.
+    /// Whether the error of both flanks, D − H and D + H, grows with the load up to this node, and no faster than a
+    /// drive can.
     ///
-    /// From node to node, and where there is no jump from each control point of the cubic to the next: a cubic with rising control points rises.
+    /// From node to node, and where there is no jump from each control point of the cubic to the next: a cubic with
+    /// rising control points rises.
     #[inline(never)]
     fn rise(&mut self, words: Words<'_>) -> Result<(), ImageError> {
         let torque = self.at.checked_rem(self.facts.torque_nodes).unwrap_or(0);
@@ -443,7 +447,8 @@ impl Check {
         }
         let jumps = self.facts.jumps;
         let pitch_rad = TAU as f32 / self.facts.drive.circular_spline_teeth() as f32;
-        // Between two jumps the load is within the drag and the flanks let go: a table that was sampled one way falls there by its play.
+        // Between two jumps the load is within the drag and the flanks let go: a table that was sampled one way falls
+        // there by its play.
         let [first, last] = [jumps.trailing_zeros() as usize, 63_usize.saturating_sub(jumps.leading_zeros() as usize)];
         let below = torque.saturating_sub(1);
         let [low, high] = [self.at.saturating_sub(1), self.at].map(|index| {
@@ -522,7 +527,8 @@ impl Check {
         Ok(end >= stored)
     }
 
-    /// Adds what some of the ripple of one direction can give: steady motion follows forward or backward. True after the last.
+    /// Adds what some of the ripple of one direction can give: steady motion follows forward or backward. True after
+    /// the last.
     fn ripple(&mut self, words: Words<'_>) -> bool {
         let ended = self.extremes(words, self.facts.ripple.stored_len());
         if ended {
@@ -552,8 +558,8 @@ impl Check {
         rad(half_at(self.facts.record(words, self.at), first.saturating_add(i)) as f32 * self.facts.unit(words))
     }
 
-    /// What a closed B-spline has at most: coefficient, slope per node spacing, value. Coefficients bound values too, and are simpler
-    /// to blend; values tell how far the curve really goes. Some of it; true after the last.
+    /// What a closed B-spline has at most: coefficient, slope per node spacing, value. Coefficients bound values too,
+    /// and are simpler to blend; values tell how far the curve really goes. Some of it; true after the last.
     #[inline(never)]
     fn extremes(&mut self, words: Words<'_>, stored: usize) -> bool {
         let last = stored.saturating_sub(2);
@@ -562,7 +568,8 @@ impl Check {
         for i in self.within..end {
             let [largest, steepest, reached] = self.most;
             let c = self.number(words, i.saturating_add(2));
-            // A parabola from (a + b)/2 to (b + c)/2; its top, if inside, where the slope b − a + t·(a − 2b + c) vanishes.
+            // A parabola from (a + b)/2 to (b + c)/2; its top, if inside, where the slope b − a + t·(a − 2b + c)
+            // vanishes.
             let turn = (a - b) / (a - 2.0 * b + c);
             let top = 0.5 * (a + b) + 0.5 * turn * (b - a);
             let top = if turn > 0.0 && turn < 1.0 { top.abs() } else { 0.0 };
@@ -805,13 +812,14 @@ impl<'a> Table<'a> {
     /// Checks an image and gives the table in it. Nothing of an image can be used before.
     ///
     /// Verified: length, magic, version, byte order, CRC-32 of the whole and of every page, texts, tooth counts, node
-    /// counts; every number finite; axes strictly increasing; half-width of the play ≥ 0 everywhere; torque intervals that
-    /// meet at their nodes; wind-up that grows with the load on both flanks, and no faster than a drive can; the largest error the table can give within its stated limit and [`MAX_ERROR_RAD`];
-    /// `|ratio·de/dψ| < 1` everywhere, so that the inverse exists, and how it converges; periodic parts closed at the wrap;
-    /// every offset, unit and bound that follows from other numbers.
+    /// counts; every number finite; axes strictly increasing; half-width of the play ≥ 0 everywhere; torque intervals
+    /// that meet at their nodes; wind-up that grows with the load on both flanks, and no faster than a drive can; the
+    /// largest error the table can give within its stated limit and [`MAX_ERROR_RAD`]; `|ratio·de/dψ| < 1` everywhere,
+    /// so that the inverse exists, and how it converges; periodic parts closed at the wrap; every offset, unit and
+    /// bound that follows from other numbers.
     ///
-    /// Bounds hold for every input, not only at nodes: a B-spline stays within its coefficients, and what the cubic of the
-    /// wind-up departs from the straight line between two nodes counts in full.
+    /// Bounds hold for every input, not only at nodes: a B-spline stays within its coefficients, and what the cubic of
+    /// the wind-up departs from the straight line between two nodes counts in full.
     ///
     /// All at once; [`Store::begin`](crate::Store::begin) does the same step by step.
     ///

@@ -59,7 +59,8 @@ impl<'a> Table<'a> {
 
     /// What the [id](Self::id) is a hash of, one part after another: the body with zeros where the id is.
     ///
-    /// [`IdentityCheck`](crate::IdentityCheck) hashes it on board; on the host any BLAKE3 takes these parts, and the first eight bytes are compared.
+    /// [`IdentityCheck`](crate::IdentityCheck) hashes it on board; on the host any BLAKE3 takes these parts, and the
+    /// first eight bytes are compared.
     #[must_use]
     pub fn hashed(&self) -> [&'a [u8]; 3] {
         let body = self.image.get(..self.body_bytes).unwrap_or_default();

@@ -129,7 +129,8 @@ pub(super) fn cell_width(drive: &Drive, ripple_nodes: usize) -> f32 {
 /// Words that follow from the bounds: iterations, hold.
 pub(super) const DERIVED_WORDS: [usize; 2] = [word::CELL_WIDTH.saturating_add(8), word::CELL_WIDTH.saturating_add(9)];
 
-/// An error limit in counts, rounded up; the per mille takes up the rounding of single precision, the counts that of integers.
+/// An error limit in counts, rounded up; the per mille takes up the rounding of single precision, the counts that of
+/// integers.
 pub(super) fn limit_counts(limit_rad: f32) -> u32 {
     (num::counts(limit_rad as f64) * 1.001 + 16.0) as u32
 }

@@ -43,16 +43,17 @@
 //! | | | CRC-32 of each 256-byte page of the body (the last may be shorter) |
 //! | | 4 | CRC-32 of everything before |
 //!
-//! Counts are of 2⁻³² output turn; places and steps are in words of four bytes, steps 0 along an axis of one node. A periodic
-//! curve of n nodes is stored closed, as n + 3 values: the last node, all nodes, the first two; the three around any place
-//! are then neighbours. A ripple goes on for one or two nodes more, n + 4 or n + 5 values: so are the five. CRC-32 is the one of ISO-HDLC (zlib).
+//! Counts are of 2⁻³² output turn; places and steps are in words of four bytes, steps 0 along an axis of one node. A
+//! periodic curve of n nodes is stored closed, as n + 3 values: the last node, all nodes, the first two; the three
+//! around any place are then neighbours. A ripple goes on for one or two nodes more, n + 4 or n + 5 values: so are the
+//! five. CRC-32 is the one of ISO-HDLC (zlib).
 //!
-//! What follows from other numbers (offsets, units, the inverse) is stored so that a step finds all it needs in the image, where
-//! two copies are compared; [`Table::check`](super::Table::check) computes it again.
+//! What follows from other numbers (offsets, units, the inverse) is stored so that a step finds all it needs in the
+//! image, where two copies are compared; [`Table::check`](super::Table::check) computes it again.
 //!
 //! Size with 3 temperatures, 25 torques, 8 ripple nodes and 32 nodes each for A, B, C:
-//! 544 + 4·3·35 + 75·(12 + 48) = 5464, and 22 pages and the end 4·23 = 92: 5556 bytes. With 2 temperatures and 60 torques, as
-//! the two-roller generator needs: 7872. Both are below 8 KiB.
+//! 544 + 4·3·35 + 75·(12 + 48) = 5464, and 22 pages and the end 4·23 = 92: 5556 bytes. With 2 temperatures and 60
+//! torques, as the two-roller generator needs: 7872. Both are below 8 KiB.
 
 mod check;
 mod header;

@@ -326,7 +326,8 @@ fn each_damage_of_the_numbers_has_its_own_error() {
     assert!(matches!(error, ImageError::Slope { found } if found > 1.0 && found < 20.0), "{error}");
 }
 
-/// With every checksum right and every bound of the format kept: what no drive does is refused, by a rule that has a name.
+/// With every checksum right and every bound of the format kept: what no drive does is refused, by a rule that has a
+/// name.
 #[test]
 fn a_wind_up_that_no_drive_has_is_refused() {
     let refused = |change: &dyn Fn(&mut TableData<'_>) -> WindUp| {

@@ -1,7 +1,7 @@
 //! Drive i: a pure function of the plan's hash and i.
 //!
-//! Sizes and phases are points of a Sobol sequence with Owen's scrambling (Burley 2020), two dimensions to a tolerance; errors of teeth
-//! are noise by a counter, so that tooth k of drive i needs no other tooth and no other drive.
+//! Sizes and phases are points of a Sobol sequence with Owen's scrambling (Burley 2020), two dimensions to a tolerance;
+//! errors of teeth are noise by a counter, so that tooth k of drive i needs no other tooth and no other drive.
 
 use super::tolerance::{Acts, Law, TeethError, Tolerance};
 use flexspline_base::statistics::mean;

@@ -8,9 +8,10 @@
 //! shards   -> reduce    -> quantiles, probabilities, Sobol indices, what to tighten first, the worst drives
 //! ```
 //!
-//! Nothing passes between shards, and nothing is remembered outside their files: any engine may run them in any order, more than once,
-//! and kill them. What it takes to evaluate a drive by kernels is in `plan.json`, and elementary functions are those of `libm`, so
-//! that its figures have the same bits on every machine; those of the FEM are the same on one kind of processor.
+//! Nothing passes between shards, and nothing is remembered outside their files: any engine may run them in any order,
+//! more than once, and kill them. What it takes to evaluate a drive by kernels is in `plan.json`, and elementary
+//! functions are those of `libm`, so that its figures have the same bits on every machine; those of the FEM are the
+//! same on one kind of processor.
 
 mod by_fem;
 mod draw;

@@ -1,8 +1,9 @@
-//! The figures of a drive by kernels: linear in the errors of its teeth, by interpolation in how far its axes stand apart, by parabolas in
-//! what changes it everywhere alike.
+//! The figures of a drive by kernels: linear in the errors of its teeth, by interpolation in how far its axes stand
+//! apart, by parabolas in what changes it everywhere alike.
 //!
-//! Over a turn of the output, at [`places`](Model::places) evenly apart, with `ψ` the angle of the generator, `α = ψ (1 − 1/ratio)` that on the
-//! circular spline, and `s` the axis of the circular spline beside that of the flexspline, seen from the major axis:
+//! Over a turn of the output, at [`places`](Model::places) evenly apart, with `ψ` the angle of the generator,
+//! `α = ψ (1 − 1/ratio)` that on the circular spline, and `s` the axis of the circular spline beside that of the
+//! flexspline, seen from the major axis:
 //!
 //! ```text
 //! e(ψ, T) = wave(ψ, T) + Σ p_k w_F(2πk/z_F − ψ, T) + Σ p_k w_C(2πk/z_C − α, T) + oval(α, T) + d(s(ψ), T)
@@ -10,8 +11,8 @@
 //! ```
 //!
 //! `wave` is settled motion over a tooth pitch of the drive that is alike everywhere; `w`, `oval` and `d` are those of
-//! [`crate::kernels`]. That errors of teeth and displaced axes do not change each other's effect, and that what is alike everywhere does
-//! not change the kernels, is what a campaign assumes, and what its drives by FEM test.
+//! [`crate::kernels`]. That errors of teeth and displaced axes do not change each other's effect, and that what is
+//! alike everywhere does not change the kernels, is what a campaign assumes, and what its drives by FEM test.
 
 use std::f64::consts::TAU;
 
@@ -48,7 +49,8 @@ pub const FIGURES: [&str; 21] = [
     "places_rms_arcsec",
     CLOSED,
 ];
-/// Share of the places, %, where no play is left between the flanks: lost motion there is that of the elastic wind-up alone.
+/// Share of the places, %, where no play is left between the flanks: lost motion there is that of the elastic wind-up
+/// alone.
 pub const CLOSED: &str = "play_closed_percent";
 /// Figures of a data sheet that follow what is alike everywhere.
 pub const SHEET: [&str; 6] =
@@ -109,7 +111,8 @@ impl Parabola {
     }
 }
 
-/// Kernels of a wheel's teeth, as they are summed: by load, by sample within a pitch, twice around for sums in one piece.
+/// Kernels of a wheel's teeth, as they are summed: by load, by sample within a pitch, twice around for sums in one
+/// piece.
 struct WheelSums {
     wheel: Wheel,
     teeth: usize,
@@ -471,8 +474,9 @@ impl Model {
         [c / n as f64, s / n as f64]
     }
 
-    /// Root mean square over the turn and both signs of the load, arcsec, that is left without a table, with that of the middle drive, and
-    /// with one of this drive, whose curves have [`TABLE_ORDERS`]. The zero of the output is set once for both signs.
+    /// Root mean square over the turn and both signs of the load, arcsec, that is left without a table, with that of
+    /// the middle drive, and with one of this drive, whose curves have [`TABLE_ORDERS`]. The zero of the output is set
+    /// once for both signs.
     fn left(&self, curves: &Curves, errors: &[[f64; 4]]) -> [f64; 3] {
         let both = |of: &dyn Fn(usize, usize) -> f64| {
             let all: Vec<f64> = (0..errors.len()).flat_map(|j| [of(j, 0), of(j, 1)]).collect();
@@ -498,9 +502,11 @@ impl Model {
     }
 }
 
-/// Lost motion where there is no play, arcsec: what a drive as stiff as the stiffest of K1, K2 and K3 winds up between the light loads.
+/// Lost motion where there is no play, arcsec: what a drive as stiff as the stiffest of K1, K2 and K3 winds up between
+/// the light loads.
 ///
-/// Kernels add what each deviation takes of the play. Once it is used up flanks bear on both sides, and nothing is left to be taken.
+/// Kernels add what each deviation takes of the play. Once it is used up flanks bear on both sides, and nothing is left
+/// to be taken.
 fn least_wind_up(state: &[f64], light_n_m: f64) -> f64 {
     let sheet = SHEET.iter().zip(&state[2 * WAVE..]);
     let stiffest = sheet.filter(|(name, _)| name.starts_with('k')).map(|(_, k)| *k).fold(0.0, f64::max);

@@ -23,16 +23,19 @@ use flexspline_mechanics::stepping::{Method, SolveError, SolverSettings};
 const SCHEMA: u32 = 1;
 /// Shards, at most.
 const MOST_SHARDS: u32 = 9999;
-/// Where the parabola of what is alike everywhere is taken: the value that this share of the drives lies below, and its mirror.
+/// Where the parabola of what is alike everywhere is taken: the value that this share of the drives lies below, and its
+/// mirror.
 const OUTER_SHARE: f64 = 0.05;
-/// Lost motion is told between this share of the rated load either way, as catalogues do, and at most half of the campaign's load.
+/// Lost motion is told between this share of the rated load either way, as catalogues do, and at most half of the
+/// campaign's load.
 const LIGHT: [f64; 2] = [0.04, 0.5];
 /// Positions over the tooth pitch of a data sheet.
 const SHEET_POSITIONS: usize = 4;
-/// Share of the drives whose displacements kernels must reach. Where teeth wedge further out, as they may at limits that one drive in millions meets,
-/// kernels go on as they ended, and `reduce` counts the drives beyond.
+/// Share of the drives whose displacements kernels must reach. Where teeth wedge further out, as they may at limits
+/// that one drive in millions meets, kernels go on as they ended, and `reduce` counts the drives beyond.
 const NEARLY_ALL: f64 = 0.99;
-/// Displacement (µm for a millimetre of module) and directions of kernels that no tolerance asks for: the fewest there may be.
+/// Displacement (µm for a millimetre of module) and directions of kernels that no tolerance asks for: the fewest there
+/// may be.
 const UNUSED: (f64, usize) = (20.0, 4);
 
 /// What to plan.
@@ -209,8 +212,9 @@ fn kernels_failed(of: &Tolerances, kind: GeneratorKind, error: &KernelError) -> 
     };
     let which: Vec<String> = of.list.iter().filter(|t| displaces(t)).map(told).collect();
     PlanError::Failed(format!(
-        "{kind}: {}: {error}. The teeth wedge: give narrower limits (limits = [0, {reached_um:.3}] together), or the drive more clearance \
-         (flanks.preload_um below 0), or a generator bearing that yields (generator.bearing_stiffness_n_per_mm3)",
+        "{kind}: {}: {error}. The teeth wedge: give narrower limits (limits = [0, {reached_um:.3}] together), or the \
+         drive more clearance (flanks.preload_um below 0), or a generator bearing that yields \
+         (generator.bearing_stiffness_n_per_mm3)",
         which.join(" and ")
     ))
 }
@@ -369,8 +373,8 @@ mod tests {
     /// Who is told that teeth wedge has to know which line of the file to change, and to what.
     #[test]
     fn kernels_that_fail_name_the_tolerance_and_how_far_it_may_go() {
-        let text = "drive = \"HHD-95\"\ngenerator = \"cam\"\ntorque_n_m = 5\n[[tolerance]]\n\
-                    field = \"as_built.circular_spline_eccentricity_um\"\ndistribution = \"rayleigh\"\nstd = 5\n";
+        let text = "drive = \"HHD-95\"\ngenerator = \"cam\"\ntorque_n_m = 5\n[[tolerance]]\nfield = \
+                    \"as_built.circular_spline_eccentricity_um\"\ndistribution = \"rayleigh\"\nstd = 5\n";
         let of = Tolerances::read("t.toml", text, |name| Drive::built_in(name).ok_or_else(String::new)).unwrap();
         let reason = SolveError::NotConverged {
             generator_rad: 0.0,

@@ -23,7 +23,8 @@ const SHARES: [f64; 7] = [0.01, 0.05, 0.5, 0.9, 0.95, 0.99, 0.999];
 const WORST: usize = 20;
 /// Figures whose variance is shared out.
 pub const SHARED: [&str; 3] = ["error_pp_arcsec", "lost_motion_arcsec", "unit_table_rms_arcsec"];
-/// Points of each replicate of the shares: a power of two, at least and at most, and no more than an eighth of the drives.
+/// Points of each replicate of the shares: a power of two, at least and at most, and no more than an eighth of the
+/// drives.
 const SHARE_POINTS: [u32; 2] = [16, 256];
 /// Drives, at most, that a tolerance is halved for.
 const HALVED_DRIVES: usize = 2048;
@@ -31,7 +32,8 @@ const HALVED_DRIVES: usize = 2048;
 const BLOCKS: usize = 8;
 /// The quantile that tightening is judged by.
 pub const JUDGED: f64 = 0.95;
-/// Below this correlation of drives above a limit, by kernels and by FEM, and with fewer of either than that, a probability is not corrected.
+/// Below this correlation of drives above a limit, by kernels and by FEM, and with fewer of either than that, a
+/// probability is not corrected.
 const LEAST_CORRELATION: f64 = 0.5;
 const LEAST_ABOVE: usize = 10;
 /// Fewest drives by FEM that have a correlation, means and probabilities.

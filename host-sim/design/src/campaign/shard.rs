@@ -1,8 +1,9 @@
 //! A shard: some of the drives of a plan, in one Parquet file.
 //!
-//! Columns `drive` and `generator` (whole numbers from 0), what was drawn (a column for each tolerance, and one for its phase), the figures by
-//! kernels, and those by FEM, which are not a number where there are none. The file's metadata hold the hash of the plan, the number of the
-//! shard, of its rows, and a BLAKE3 of all columns. A file is written whole, under another name, and then renamed.
+//! Columns `drive` and `generator` (whole numbers from 0), what was drawn (a column for each tolerance, and one for its
+//! phase), the figures by kernels, and those by FEM, which are not a number where there are none. The file's metadata
+//! hold the hash of the plan, the number of the shard, of its rows, and a BLAKE3 of all columns. A file is written
+//! whole, under another name, and then renamed.
 
 use std::fs::{self, File};
 use std::io;

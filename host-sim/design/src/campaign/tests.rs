@@ -148,7 +148,8 @@ fn the_example_is_read_and_mistakes_are_named_by_line_field_value_and_what_is_al
         ),
         (
             "[[tolerance]]\nfield = \"generator.w0_mm\"\ndistribution = \"normal\"\nmean = 0.8\nstd = 0.001\n",
-            "t.toml:4: tolerance[0]: mean: \"generator.w0_mm\" is 0.5 in the drive, and the tolerance scatters about 0.8, 300 standard deviations",
+            "t.toml:4: tolerance[0]: mean: \"generator.w0_mm\" is 0.5 in the drive, and the tolerance scatters about \
+             0.8, 300 standard deviations",
         ),
         (
             "[[tolerance]]\nfield = \"generator.w0_mm\"\ndistribution = \"uniform\"\nlimits = [0.8, 0.81]\n",
@@ -235,7 +236,8 @@ fn errors_of_single_pitches_add_up_and_close() {
 /// A harmonic of the pitch and a displaced axis do what their kernels say, whichever way they are summed.
 #[test]
 fn the_model_is_that_of_the_kernels() {
-    let harmonic = "[[tolerance]]\nfield = \"as_built.flexspline_pitch_harmonics\"\norder = 2\ndistribution = \"uniform\"\nlimits = [0.0, 9.0]\n";
+    let harmonic = "[[tolerance]]\nfield = \"as_built.flexspline_pitch_harmonics\"\norder = 2\ndistribution = \
+                    \"uniform\"\nlimits = [0.0, 9.0]\n";
     let plan = plan_of(&format!("{ECCENTRIC}{harmonic}"), 8, 1);
     let model = &plan.models()[0];
     let at = |name: &str| FIGURES.iter().position(|known| *known == name).unwrap();
@@ -259,7 +261,8 @@ fn the_model_is_that_of_the_kernels() {
     assert!((apart[at("no_table_rms_arcsec")] - apart[at("nominal_table_rms_arcsec")]).abs() < 1e-9);
 }
 
-/// A drive whose axis takes more of the play than there is has none: its lost motion is what its stiffness winds up, not less.
+/// A drive whose axis takes more of the play than there is has none: its lost motion is what its stiffness winds up,
+/// not less.
 #[test]
 fn flanks_do_not_overlap() {
     let mut plan = plan_of(ECCENTRIC, 8, 1);
@@ -354,7 +357,8 @@ fn shares_of_what_adds_up_add_up_and_a_product_has_no_first_order() {
     }
 }
 
-/// What the kernels miss is not their mean: with it as control the mean by FEM is that of FEM, only narrower, and its interval holds.
+/// What the kernels miss is not their mean: with it as control the mean by FEM is that of FEM, only narrower, and its
+/// interval holds.
 #[test]
 fn the_control_variate_is_unbiased_and_narrower_and_tails_are_refused_where_it_is_poor() {
     let (seeds, all, some) = (400_u64, 2000, 50);

@@ -18,15 +18,16 @@ use flexspline_mechanics::drive::{Drive, GeneratorKind, Wheel};
 /// A commented file of tolerances.
 pub const EXAMPLE: &str = include_str!("example.toml");
 
-/// Tolerances of a file, at most: each takes four dimensions of the Sobol sequence, which has 256, where its share is sought.
+/// Tolerances of a file, at most: each takes four dimensions of the Sobol sequence, which has 256, where its share is
+/// sought.
 const MOST_TOLERANCES: usize = 60;
 /// `plus_minus` of a normal distribution is so many standard deviations: the "natural tolerance" of quality control.
 const SIGMAS: f64 = 3.0;
 /// Limits of a normal or Rayleigh law that is given none, standard deviations: one drive in millions lies outside.
 const FAR: f64 = 5.5;
 
-/// The middle of a tolerance is refused if it is more than so many standard deviations, and more than this share, away from the value of the
-/// drive: guesses beyond what any drawing means.
+/// The middle of a tolerance is refused if it is more than so many standard deviations, and more than this share, away
+/// from the value of the drive: guesses beyond what any drawing means.
 const FAR_OFF: (f64, f64) = (10.0, 0.1);
 
 /// What a file of tolerances says.
@@ -162,8 +163,9 @@ impl Distribution {
         value.clamp(low, high)
     }
 
-    /// What is wrong with a distribution that scatters about another value than the drive has: nothing within so many standard deviations, or
-    /// so small a share of the value. Of a field that is 0 as drawn, such as a wear, nobody knows.
+    /// What is wrong with a distribution that scatters about another value than the drive has: nothing within so many
+    /// standard deviations, or so small a share of the value. Of a field that is 0 as drawn, such as a wear, nobody
+    /// knows.
     fn beside_drive(&self, nominal: f64) -> Option<String> {
         let [low, high] = self.limits;
         let (middle, std) = match self.law {
@@ -174,8 +176,8 @@ impl Distribution {
         let off = (middle - nominal).abs();
         (nominal != 0.0 && off > FAR_OFF.0 * std && off > FAR_OFF.1 * nominal.abs()).then(|| {
             format!(
-                "the tolerance scatters about {}, {:.0} standard deviations of {} away; allowed: about the value of the drive, which its file or \
-                 --set changes",
+                "the tolerance scatters about {}, {:.0} standard deviations of {} away; allowed: about the value of \
+                 the drive, which its file or --set changes",
                 told(middle),
                 off / std,
                 told(std)
@@ -247,9 +249,9 @@ impl Acts {
                 "rim_thickness_harmonics" | "cam_form_harmonics" | "damaged_teeth" | "generator_lobe_asymmetry_um",
             ) => {
                 return Err(format!(
-                    "field: found {field:?}, for which there are no kernels; allowed of [as_built]: eccentricity, ovality and offset of the \
-                     circular spline, runout of the flexspline, eccentricity of the generator, pitch errors and their harmonics, wear, \
-                     differences of temperature"
+                    "field: found {field:?}, for which there are no kernels; allowed of [as_built]: eccentricity, \
+                     ovality and offset of the circular spline, runout of the flexspline, eccentricity of the \
+                     generator, pitch errors and their harmonics, wear, differences of temperature"
                 ));
             }
             Some(phase) if phase.ends_with("_phase_deg") || phase.ends_with("_direction_deg") => {
@@ -306,8 +308,8 @@ impl Tolerances {
             file.refuse_whole(
                 "drive",
                 format!(
-                    "{field} is not zero: give the drive as drawn; kernels are of first order about a drive that repeats from tooth to \
-                     tooth, and about one unit there would be as many of them as teeth"
+                    "{field} is not zero: give the drive as drawn; kernels are of first order about a drive that \
+                     repeats from tooth to tooth, and about one unit there would be as many of them as teeth"
                 ),
             );
         }
@@ -477,8 +479,8 @@ fn tolerance(entry: &Spanned<DeValue<'_>>, drive: &Drive) -> Result<Tolerance, R
     let distribution = match law {
         LawName::Normal if is_size => {
             let what = format!(
-                "distribution: found \"normal\" for {field:?}, a size in a random direction; allowed: \"rayleigh\" (both components \
-                 normal), \"uniform\""
+                "distribution: found \"normal\" for {field:?}, a size in a random direction; allowed: \"rayleigh\" \
+                 (both components normal), \"uniform\""
             );
             return Err(Refused::because(place("distribution"), what));
         }
@@ -494,7 +496,8 @@ fn tolerance(entry: &Spanned<DeValue<'_>>, drive: &Drive) -> Result<Tolerance, R
         }
         LawName::Rayleigh if !is_size => {
             let what = format!(
-                "distribution: found \"rayleigh\" for {field:?}, which is no size in a direction; allowed: \"normal\", \"uniform\""
+                "distribution: found \"rayleigh\" for {field:?}, which is no size in a direction; allowed: \
+                 \"normal\", \"uniform\""
             );
             return Err(Refused::because(place("distribution"), what));
         }

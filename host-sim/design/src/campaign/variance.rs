@@ -1,7 +1,8 @@
 //! Shares of the variance of a figure: Sobol indices of first order and total, by pick and freeze.
 //!
-//! Two independent points `A` and `B`, and `A` with one tolerance of `B`, each a drive by kernels; first order after Saltelli (2010), total
-//! after Jansen (1999). Replicates, each scrambled on its own, give the intervals. Size and phase of a tolerance, or all its teeth, are one.
+//! Two independent points `A` and `B`, and `A` with one tolerance of `B`, each a drive by kernels; first order after
+//! Saltelli (2010), total after Jansen (1999). Replicates, each scrambled on its own, give the intervals. Size and
+//! phase of a tolerance, or all its teeth, are one.
 
 use rayon::prelude::*;
 use serde::Serialize;

@@ -22,8 +22,8 @@ pub struct KernelPlan {
     pub torques_n_m: Vec<f64>,
     /// Displacements of the circular spline, µm, ascending.
     pub sizes_um: Vec<f64>,
-    /// Displacement up to which there must be an equilibrium, µm: sizes beyond it are left out from the first that has none. Without it there
-    /// must be one at all sizes.
+    /// Displacement up to which there must be an equilibrium, µm: sizes beyond it are left out from the first that has
+    /// none. Without it there must be one at all sizes.
     pub enough_um: Option<f64>,
     /// Directions of the displacement over half a turn (a turn, where only that repeats).
     pub directions: usize,
@@ -34,9 +34,9 @@ pub struct KernelPlan {
 }
 
 impl KernelPlan {
-    /// The default: loads from 0.25 % of the largest that the generator is used to, evenly in their roots above 2 %; the
-    /// displacements that drives of this kind are built with (up to 15 µm), close where they eat up the clearance, and twice that;
-    /// directions 9.5° apart.
+    /// The default: loads from 0.25 % of the largest that the generator is used to, evenly in their roots above 2 %;
+    /// the displacements that drives of this kind are built with (up to 15 µm), close where they eat up the clearance,
+    /// and twice that; directions 9.5° apart.
     #[must_use]
     pub fn for_generator(kind: GeneratorKind) -> KernelPlan {
         let largest = kind.rated_torque_n_m();
@@ -105,7 +105,8 @@ pub enum KernelError {
     Solve(#[from] SolveError),
     /// It did not with the circular spline displaced.
     #[error(
-        "with the circular spline {size_um:.1} um beside its axis no equilibrium is found ({reason}); the largest displacement that has one is {reached_um:.1} um"
+        "with the circular spline {size_um:.1} um beside its axis no equilibrium is found ({reason}); the largest \
+         displacement that has one is {reached_um:.1} um"
     )]
     Displaced {
         /// Displacement, µm.
@@ -133,7 +134,8 @@ const MOST_SIZES: usize = 40;
 /// Halvings of a growing displacement on the way to one that is not found from nothing.
 const DISPLACEMENT_HALVINGS: usize = 4;
 
-/// Kernels of a drive without deviations that act place by place (uniform wear and temperature may be there). Friction is left out.
+/// Kernels of a drive without deviations that act place by place (uniform wear and temperature may be there). Friction
+/// is left out.
 ///
 /// # Errors
 /// A deviation in the drive; a run that does not converge; stopped.
@@ -194,7 +196,8 @@ pub fn make(
 
 /// Forces of the contacts by place in the wave, N and N mm, over a whole turn.
 struct Forces {
-    /// On flexspline teeth, by the flanks' push on the circular spline: outward, along, moment about the axis, plus, minus flank.
+    /// On flexspline teeth, by the flanks' push on the circular spline: outward, along, moment about the axis, plus,
+    /// minus flank.
     flexspline: Vec<[f64; 5]>,
     /// Kernels of flanks on circular-spline spaces.
     circular_spline: Vec<[f64; 5]>,
@@ -310,8 +313,9 @@ impl Forces {
     }
 }
 
-/// The drive with its circular spline displaced, deformed afresh for each direction, whole flexspline pitches apart so that the teeth
-/// stand alike, and loaded step by step. What a displacement that is too large does is told before the rest is computed.
+/// The drive with its circular spline displaced, deformed afresh for each direction, whole flexspline pitches apart so
+/// that the teeth stand alike, and loaded step by step. What a displacement that is too large does is told before the
+/// rest is computed.
 fn eccentric(
     drive: &Drive,
     kind: GeneratorKind,
@@ -342,7 +346,8 @@ fn eccentric(
     let enough = plan.sizes_um.iter().position(|size| plan.enough_um.is_some_and(|enough| *size >= enough));
     let least = enough.map_or(plan.sizes_um.len(), |k| k + 1);
     let towards = |direction: usize| {
-        // Seen from the major axis the axis of a spline displaced towards its angle 0 stands at minus the generator angle.
+        // Seen from the major axis the axis of a spline displaced towards its angle 0 stands at minus the generator
+        // angle.
         let psi = -whole(direction) * TAU / f64::from(drive.flexspline.teeth);
         let (errors, reason) = displaced.errors(&problems, psi)?;
         match reason {
@@ -536,8 +541,8 @@ mod tests {
 
     #[test]
     fn a_pitch_error_and_an_oval_do_what_fem_says() {
-        // 0.2 µm: at 2 N m a tooth gives way by no more. The kernel's harmonic is the mean over tooth phases, the run is at one of
-        // them, which with the few teeth that carry 2 N m differs by 2 % at order 2 and 7 % at order 6.
+        // 0.2 µm: at 2 N m a tooth gives way by no more. The kernel's harmonic is the mean over tooth phases, the run
+        // is at one of them, which with the few teeth that carry 2 N m differs by 2 % at order 2 and 7 % at order 6.
         let (places, size) = ([0.0, 20.0, 47.0, 70.0], 0.2);
         for torque in [2.0, 50.0, -50.0] {
             type Change = fn(&mut AsBuilt);
@@ -667,7 +672,8 @@ mod tests {
         assert!((grown - directly).abs() < 0.01, "{grown} {directly}");
     }
 
-    /// Far beyond the clearance teeth reach the root of the other wheel, here 55 µm away, and no more is computed than stands.
+    /// Far beyond the clearance teeth reach the root of the other wheel, here 55 µm away, and no more is computed than
+    /// stands.
     #[test]
     fn displacements_that_do_not_stand_are_left_out_or_told() {
         let plan = |enough_um| KernelPlan {

@@ -1,34 +1,35 @@
-//! Influence kernels: how a deviation at one tooth, at one place of the generator, or of a whole axis moves the output, at each
-//! place in the wave and each load, from the contact FEM of the drive without deviations.
+//! Influence kernels: how a deviation at one tooth, at one place of the generator, or of a whole axis moves the output,
+//! at each place in the wave and each load, from the contact FEM of the drive without deviations.
 //!
 //! # First order: load sharing
 //!
-//! Let `V(T; p)` be the stationary value of elastic and contact energy less `T δ`, with the generator held, load `T`, output angle
-//! `δ` and a small deviation `p` of some surface. Then `∂V/∂T = −δ` and `∂V/∂p = f`, the force conjugate to the deviation: the
-//! contact force in its direction. The mixed derivative is the same either way,
+//! Let `V(T; p)` be the stationary value of elastic and contact energy less `T δ`, with the generator held, load `T`,
+//! output angle `δ` and a small deviation `p` of some surface. Then `∂V/∂T = −δ` and `∂V/∂p = f`, the force conjugate
+//! to the deviation: the contact force in its direction. The mixed derivative is the same either way,
 //!
 //! ```text
 //! ∂δ/∂p = − ∂f/∂T
 //! ```
 //!
-//! so that what a deviation of any tooth does to the output is read from how the contact force *on that tooth* changes as the
-//! load changes (Maxwell's reciprocity). One run under a few loads holds the kernels of all teeth, all spaces and the whole
-//! generator. For a rigid pair of wheels this is `e = −(1/r) Σ share · p`. It holds without friction, for deviations that are
-//! small against how far the contact patches give way.
+//! so that what a deviation of any tooth does to the output is read from how the contact force *on that tooth* changes
+//! as the load changes (Maxwell's reciprocity). One run under a few loads holds the kernels of all teeth, all spaces
+//! and the whole generator. For a rigid pair of wheels this is `e = −(1/r) Σ share · p`. It holds without friction, for
+//! deviations that are small against how far the contact patches give way.
 //!
 //! # Eccentricity
 //!
-//! Two lobes share the load evenly, so that to first order the push of an axis displaced by `s` cancels. What is left is how one
-//! lobe closes up while the other opens: not linear in `s`, and the stronger the lighter the load. It is computed by the FEM of the
-//! drive with the circular spline displaced, at a few sizes, directions and loads ([`Eccentric`]). To this order a displaced axis
-//! of the flexspline's teeth is the same as the opposite displacement of the circular spline.
+//! Two lobes share the load evenly, so that to first order the push of an axis displaced by `s` cancels. What is left
+//! is how one lobe closes up while the other opens: not linear in `s`, and the stronger the lighter the load. It is
+//! computed by the FEM of the drive with the circular spline displaced, at a few sizes, directions and loads
+//! ([`Eccentric`]). To this order a displaced axis of the flexspline's teeth is the same as the opposite displacement
+//! of the circular spline.
 //!
 //! # Conventions
 //!
-//! Angles in rad, counter-clockwise; `place` is the angle of a tooth or space from the major axis of the generator (from lobe 0).
-//! A position error is counter-clockwise along the pitch at half the height of the teeth ([`flexspline_mechanics::drive::AsBuilt`]). Kernels are
-//! arc-seconds at the output for one micrometre. Loads are positive; those of the other sign follow by mirror symmetry, which
-//! is applied here.
+//! Angles in rad, counter-clockwise; `place` is the angle of a tooth or space from the major axis of the generator
+//! (from lobe 0). A position error is counter-clockwise along the pitch at half the height of the teeth
+//! ([`flexspline_mechanics::drive::AsBuilt`]). Kernels are arc-seconds at the output for one micrometre. Loads are
+//! positive; those of the other sign follow by mirror symmetry, which is applied here.
 
 mod make;
 
@@ -113,7 +114,8 @@ pub struct Eccentric {
     pub sizes_um: Vec<f64>,
     /// Loads, N m, ascending.
     pub torques_n_m: Vec<f64>,
-    /// Directions of the displacement from the major axis, evenly over half a turn (over a turn where `repeats` is 1), from 0.
+    /// Directions of the displacement from the major axis, evenly over half a turn (over a turn where `repeats` is 1),
+    /// from 0.
     pub directions: usize,
     /// arcsec, `[size][load][direction]`.
     pub deviation_arcsec: Vec<Vec<Vec<f64>>>,
@@ -134,7 +136,8 @@ impl Kernels {
         (1.0 - part) * kernel[below] + part * kernel[(below + 1) % n]
     }
 
-    /// Neighbouring loads of a torque and the weight of the heavier: linear in the root of the load, held beyond the ends.
+    /// Neighbouring loads of a torque and the weight of the heavier: linear in the root of the load, held beyond the
+    /// ends.
     fn between(torques: impl ExactSizeIterator<Item = f64> + Clone, load_n_m: f64) -> (usize, usize, f64) {
         let count = torques.len();
         let above = torques.clone().position(|t| t > load_n_m).unwrap_or(count);
@@ -159,8 +162,8 @@ impl Kernels {
         of(low).blend(of(high), part)
     }
 
-    /// Response to a harmonic of a kernel, arcsec per µm: to `cos(k α)` on the wheel answers `g₀ cos(k θ) − g₁ sin(k θ)`, θ the angle
-    /// of the generator as seen from the wheel.
+    /// Response to a harmonic of a kernel, arcsec per µm: to `cos(k α)` on the wheel answers
+    /// `g₀ cos(k θ) − g₁ sin(k θ)`, θ the angle of the generator as seen from the wheel.
     fn transfer(&self, kernel: &[f64], wheel: Wheel, order: f64) -> Gain {
         let around = self.around(wheel) as f64;
         // Only harmonics that repeat as the state does come through.
@@ -182,7 +185,8 @@ impl Kernels {
         self.under(torque_n_m, gain, |l| conjugate(gain(l)))
     }
 
-    /// Error (arcsec) for each µm that one tooth (or space) at `place_rad` from the major axis is displaced along the pitch.
+    /// Error (arcsec) for each µm that one tooth (or space) at `place_rad` from the major axis is displaced along the
+    /// pitch.
     #[must_use]
     pub fn displaced(&self, wheel: Wheel, place_rad: f64, torque_n_m: f64) -> f64 {
         let at = |l: &LoadKernels, place: f64| self.at(&l.wheel(wheel).along, wheel, place);
@@ -190,16 +194,16 @@ impl Kernels {
         self.under(torque_n_m, |l| at(l, place_rad), |l| at(l, -place_rad))
     }
 
-    /// Response to an oval circular spline, `cos(2 α)` µm outward, with the displacement along the ring and the rotation of a ring that
-    /// keeps its length.
+    /// Response to an oval circular spline, `cos(2 α)` µm outward, with the displacement along the ring and the
+    /// rotation of a ring that keeps its length.
     #[must_use]
     pub fn ovality(&self, torque_n_m: f64) -> Gain {
         let wheel = Wheel::CircularSpline;
         let gain = |l: &LoadKernels| {
             let k = l.wheel(wheel);
             let [out, along, turned] = [&k.outward, &k.along, &k.turned].map(|w| self.transfer(w, wheel, 2.0));
-            // −½ sin 2α aside, 3/2 sin 2α turned; a move aside is one along the pitch less the turn that comes with it. The
-            // response to sin is that to cos, a quarter behind.
+            // −½ sin 2α aside, 3/2 sin 2α turned; a move aside is one along the pitch less the turn that comes with it.
+            // The response to sin is that to cos, a quarter behind.
             let quarter = |g: Gain| [g[1], -g[0]];
             let (along, turned) = (quarter(along), quarter(turned));
             [0, 1].map(|i| out[i] - 0.5 * along[i] + 2.0 * turned[i])
@@ -207,8 +211,8 @@ impl Kernels {
         self.under(torque_n_m, gain, |l| conjugate(gain(l)).map(|x| -x))
     }
 
-    /// Error (arcsec) for each µm that a flank lacks, its tooth (or, for the circular spline, its space) at `place_rad` from the major
-    /// axis.
+    /// Error (arcsec) for each µm that a flank lacks, its tooth (or, for the circular spline, its space) at `place_rad`
+    /// from the major axis.
     #[must_use]
     pub fn missing(&self, wheel: Wheel, flank: DamagedFlank, place_rad: f64, torque_n_m: f64) -> f64 {
         let plus = |l: &LoadKernels, place: f64| self.at(&l.wheel(wheel).plus_flank, wheel, place);
@@ -239,8 +243,8 @@ impl Kernels {
         PlaceOfLoad { low, high, part }
     }
 
-    /// Error of a circular spline whose axis stands `size_um` beside the generator's, in every direction and under every load. Between
-    /// sizes linear, from nothing at nothing; beyond the largest along the last slope.
+    /// Error of a circular spline whose axis stands `size_um` beside the generator's, in every direction and under
+    /// every load. Between sizes linear, from nothing at nothing; beyond the largest along the last slope.
     #[must_use]
     pub fn eccentric_field(&self, size_um: f64) -> EccentricField {
         let e = &self.eccentric;
@@ -268,8 +272,8 @@ impl Kernels {
         EccentricField { by_load, per_rad: (n * FINER * self.repeats) as f64 / TAU }
     }
 
-    /// Error (arcsec) of a circular spline whose axis stands `size_um` beside the generator's, in the direction `direction_rad` from
-    /// the major axis.
+    /// Error (arcsec) of a circular spline whose axis stands `size_um` beside the generator's, in the direction
+    /// `direction_rad` from the major axis.
     #[must_use]
     pub fn eccentricity(&self, size_um: f64, direction_rad: f64, torque_n_m: f64) -> f64 {
         self.eccentric_field(size_um).at(direction_rad, torque_n_m < 0.0, self.place_of_load(torque_n_m))

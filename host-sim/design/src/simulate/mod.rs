@@ -40,16 +40,18 @@ use summary::{Metrics, Touches, largest, shared, wheel_name};
 const PAPER_INCREMENT_RAD: f64 = 0.01;
 /// Increments to a flexspline tooth pitch while the drive settles, and on `turn`.
 const INCREMENTS_PER_PITCH: f64 = 8.0;
-/// Rows of `pitch`. HHD-95 under 50 N·m, standard mesh, against 48 rows: the wave through 8, 12 and 24 of them is 0.96, 0.98 and 1.01 of the ripple of
-/// two rollers, 0.82, 0.90 and 0.98 of four; of discs and cam (coarse mesh) 24 give 0.99 and 0.98.
+/// Rows of `pitch`. HHD-95 under 50 N·m, standard mesh, against 48 rows: the wave through 8, 12 and 24 of them is 0.96,
+/// 0.98 and 1.01 of the ripple of two rollers, 0.82, 0.90 and 0.98 of four; of discs and cam (coarse mesh) 24 give 0.99
+/// and 0.98.
 const ROWS_OF_A_PITCH: f64 = 24.0;
-/// A light touch presses the flanks with as much as the drag takes of it, but at least and at most with these shares of what presses them under
-/// the load. The least keeps the touch of a drive without drag small beside any load; the most keeps it below a load that hardly exceeds the drag.
+/// A light touch presses the flanks with as much as the drag takes of it, but at least and at most with these shares of
+/// what presses them under the load. The least keeps the touch of a drive without drag small beside any load; the most
+/// keeps it below a load that hardly exceeds the drag.
 const TOUCH_SHARES: [f64; 2] = [2e-5, 0.25];
 /// Halvings of a change of temperature before giving up.
 const TEMPERATURE_HALVINGS: usize = 5;
-/// Parts of what is tried again where the solver found no equilibrium on its own steps. A guess: steps that are eight times finer than
-/// the solver's own first ones, and a torsion curve of so many points where they do not help either.
+/// Parts of what is tried again where the solver found no equilibrium on its own steps. A guess: steps that are eight
+/// times finer than the solver's own first ones, and a torsion curve of so many points where they do not help either.
 const SECOND_TRY_PARTS: u32 = 8;
 
 /// Which way a one-way path goes.
@@ -78,8 +80,8 @@ pub struct SimulationSettings {
     pub generator: GeneratorKind,
     /// Where it goes.
     pub path: Path,
-    /// Largest increment, rad; by default 0.01 on `paper`, a twenty-fourth of a tooth pitch on `pitch` and an eighth of one on `turn`. Paths
-    /// given by points have their own.
+    /// Largest increment, rad; by default 0.01 on `paper`, a twenty-fourth of a tooth pitch on `pitch` and an eighth of
+    /// one on `turn`. Paths given by points have their own.
     pub increment_rad: Option<f64>,
     /// Which way `pitch` and `turn` go.
     pub direction: Direction,
@@ -199,7 +201,8 @@ pub enum SimulateError {
 pub struct Unfinished {
     /// Why, after all that is tried.
     pub error: SolveError,
-    /// The rows of the path so far. Where the load did not come on: the drive under the loads that did, its generator at rest.
+    /// The rows of the path so far. Where the load did not come on: the drive under the loads that did, its generator
+    /// at rest.
     pub rows: Vec<Row>,
     /// Error of the last row against the middle of the backlash, arc-seconds; missing where that was not looked for.
     pub wind_up_arcsec: Option<f64>,
@@ -507,8 +510,9 @@ impl<'a> Run<'a> {
         self.record(motion, motion.last(), to.generator_rad - from_rad)
     }
 
-    /// A load that did not come on at once: up to the last one that had an equilibrium in parts, each a row, and on from there in finer ones by
-    /// a solver that remembers nothing. Where that helps the rows go, since they are none of the path.
+    /// A load that did not come on at once: up to the last one that had an equilibrium in parts, each a row, and on
+    /// from there in finer ones by a solver that remembers nothing. Where that helps the rows go, since they are none
+    /// of the path.
     fn load_in_parts(
         &mut self,
         motion: &mut Motion<'_>,
@@ -743,8 +747,8 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Torque of a light touch before a load that exceeds the drag: more than the drag, less than the load, N m. It is made of these two alone, so
-/// that drives that are one another's image at another scale are touched alike.
+/// Torque of a light touch before a load that exceeds the drag: more than the drag, less than the load, N m. It is made
+/// of these two alone, so that drives that are one another's image at another scale are touched alike.
 fn light_touch_n_m(drag_n_m: f64, load_n_m: f64) -> f64 {
     let pressing = load_n_m.abs() - drag_n_m;
     let [least, most] = TOUCH_SHARES.map(|share| share * pressing);
@@ -772,8 +776,8 @@ fn line(from: f64, to: f64, increment: f64) -> Vec<f64> {
     (1..=count as usize).map(|i| from + (to - from) * (i as f64 / count)).collect()
 }
 
-/// A first guess of the state at another temperature: displacements grow with the sizes of the wheels, the seat holds the
-/// circular spline where the new temperature has it.
+/// A first guess of the state at another temperature: displacements grow with the sizes of the wheels, the seat holds
+/// the circular spline where the new temperature has it.
 fn resized(state: &State, old: &ThermalState, problem: &Problem) -> State {
     let new = &problem.drive.thermal_state;
     let mut guess = state.clone();
@@ -893,7 +897,8 @@ mod tests {
         drive
     }
 
-    /// Angles are the same where lengths go with the scale, torques with its cube and penalties with its inverse: the bodies are the same.
+    /// Angles are the same where lengths go with the scale, torques with its cube and penalties with its inverse: the
+    /// bodies are the same.
     #[test]
     fn a_drive_a_tenth_as_large_winds_up_alike() {
         let of = |scale: f64| {
@@ -910,7 +915,8 @@ mod tests {
         assert!((small_elastic / elastic - 1.0).abs() < 0.01, "{small_elastic} {elastic}");
     }
 
-    /// The pressure between flanks is a result of forces and shapes: as stiff as the penalty is, and as large as the drive, it is the same.
+    /// The pressure between flanks is a result of forces and shapes: as stiff as the penalty is, and as large as the
+    /// drive, it is the same.
     #[test]
     fn flanks_press_alike_whatever_the_penalty_and_the_scale() {
         let of = |scale: f64, flank_penalty: f64| {

@@ -73,9 +73,9 @@ const REPORTED: usize = 10;
 /// Columns of a path file.
 const COLUMNS: [&str; 3] = ["generator_rad", "torque_n_m", "temperature_c"];
 
-/// Reads a path: CSV with a header, `generator_rad` and, if wanted, `torque_n_m` and `temperature_c`, in any order. Lines
-/// that begin with `#` are comments. Other columns are ignored, so that a `results.csv` is a path too, unless their name
-/// is nearly one of the three. `temperatures_c` are those that the drive is made for.
+/// Reads a path: CSV with a header, `generator_rad` and, if wanted, `torque_n_m` and `temperature_c`, in any order.
+/// Lines that begin with `#` are comments. Other columns are ignored, so that a `results.csv` is a path too, unless
+/// their name is nearly one of the three. `temperatures_c` are those that the drive is made for.
 pub fn read_path(
     file_name: &str,
     text: &str,
@@ -170,7 +170,8 @@ mod tests {
 
     #[test]
     fn columns_come_in_any_order_with_comments_between() {
-        let text = "\u{feff}# warm, loaded\ntemperature_c, other ,generator_rad,torque_n_m\n20, x, 0.0, 5\n# on\n60,y,-0.5,-5e0\n";
+        let text = "\u{feff}# warm, loaded\ntemperature_c, other ,generator_rad,torque_n_m\n20, x, 0.0, 5\n# \
+                    on\n60,y,-0.5,-5e0\n";
         let points = read("p.csv", text).unwrap();
         let point = |generator_rad, torque, temperature| PathPoint {
             generator_rad,

@@ -1,14 +1,16 @@
 //! Stress of the flexspline at named places of its surface, and what it tends to as the mesh becomes finer.
 //!
-//! The largest nodal stress of a mesh grows with the mesh: 176, 199, 244, 268 MPa in a root fillet of HHD-95 (cam, 50 N m) on meshes of
-//! which each has twice the elements of the one before in each direction. A fillet is narrow, and stress falls steeply under it. Its surface is free, so that
-//! the strain along the surface says all: `E / (1 - nu^2)` times it is the stress (plane strain), and it comes from displacements along the edge, which converge
-//! faster: 250, 297, 306 MPa. On bore and flanks, where something presses, nodal values are taken.
+//! The largest nodal stress of a mesh grows with the mesh: 176, 199, 244, 268 MPa in a root fillet of HHD-95 (cam, 50 N
+//! m) on meshes of which each has twice the elements of the one before in each direction. A fillet is narrow, and
+//! stress falls steeply under it. Its surface is free, so that the strain along the surface says all: `E / (1 - nu^2)`
+//! times it is the stress (plane strain), and it comes from displacements along the edge, which converge faster: 250,
+//! 297, 306 MPa. On bore and flanks, where something presses, nodal values are taken.
 //!
-//! The drive is solved on three meshes, each with the nodes of the one before. The stress is that of the finest; its interval is three times what the
-//! last step moved, the grid convergence index of P. J. Roache (J. Fluids Eng. 116 (1994) 405) for two meshes of first order, 3 % at least.
-//! Nothing is added by extrapolation: the peak is sampled at points that move with the mesh and has no single order. Extrapolated (Richardson) it
-//! was found to lie 5 % (cam, 100 N m) and 3 % (two rollers, 10 N m) above CalculiX on a mesh twice as fine; the finest mesh 3.0 and 2.5 %.
+//! The drive is solved on three meshes, each with the nodes of the one before. The stress is that of the finest; its
+//! interval is three times what the last step moved, the grid convergence index of P. J. Roache (J. Fluids Eng. 116
+//! (1994) 405) for two meshes of first order, 3 % at least. Nothing is added by extrapolation: the peak is sampled at
+//! points that move with the mesh and has no single order. Extrapolated (Richardson) it was found to lie 5 % (cam, 100
+//! N m) and 3 % (two rollers, 10 N m) above CalculiX on a mesh twice as fine; the finest mesh 3.0 and 2.5 %.
 
 use std::collections::HashMap;
 
@@ -75,7 +77,8 @@ pub type SurfaceEdge = [(u32, usize); 3];
 /// The edges of one sector of the flexspline on root fillets and root land.
 pub fn fillet_edges(mesh: &WheelMesh) -> Vec<SurfaceEdge> {
     let per_sector = mesh.nodes_per_sector;
-    // An edge between two sectors is met once as the far end of this one and once as the near end: counted where it begins.
+    // An edge between two sectors is met once as the far end of this one and once as the near end: counted where it
+    // begins.
     let mut edges: HashMap<[(u32, usize); 2], (usize, SurfaceEdge)> = HashMap::new();
     for element in &mesh.elements[..mesh.elements_per_sector] {
         for k in 0..4 {
@@ -99,8 +102,8 @@ pub fn fillet_edges(mesh: &WheelMesh) -> Vec<SurfaceEdge> {
     found
 }
 
-/// Largest von Mises stress (MPa) along a free edge of a mesh, by the stretch of the edge at its two points of integration; `moved` has the
-/// displacements of its nodes.
+/// Largest von Mises stress (MPa) along a free edge of a mesh, by the stretch of the edge at its two points of
+/// integration; `moved` has the displacements of its nodes.
 pub fn edge_stress(positions: [[f64; 2]; 3], moved: [[f64; 2]; 3], material: &PlaneStrain) -> f64 {
     let stretched = [0, 1, 2].map(|a| [0, 1].map(|axis| positions[a][axis] + moved[a][axis]));
     let length = |nodes: &[[f64; 2]; 3], x: f64| {

@@ -39,8 +39,8 @@ pub struct Row {
     pub peak_generator_pressure_mpa: f64,
     /// Residual force relative to the largest contact force.
     pub residual: f64,
-    /// Whether the drive has settled since the last reversal or change of load or temperature, by the rule of [`flexspline_mechanics::motion`]: the
-    /// output follows, and friction between the flanks has had two tooth pitches.
+    /// Whether the drive has settled since the last reversal or change of load or temperature, by the rule of
+    /// [`flexspline_mechanics::motion`]: the output follows, and friction between the flanks has had two tooth pitches.
     pub settled: bool,
     /// The teeth along their face, and how the load lies along it.
     #[serde(skip)]

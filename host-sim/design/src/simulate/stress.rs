@@ -1,12 +1,12 @@
 //! Von Mises stress of both wheels, recovered from a converged state.
 //!
-//! Cauchy stress at the 2 x 2 integration points, where the 8-node element is most accurate; carried to its nodes by the
-//! bilinear field through them; averaged, component by component, over the elements that meet in a node; then the
-//! invariant. Averaging components rather than invariants keeps the stress of a smooth field smooth and does not bias the
-//! peak upwards.
+//! Cauchy stress at the 2 x 2 integration points, where the 8-node element is most accurate; carried to its nodes by
+//! the bilinear field through them; averaged, component by component, over the elements that meet in a node; then the
+//! invariant. Averaging components rather than invariants keeps the stress of a smooth field smooth and does not bias
+//! the peak upwards.
 //!
-//! Plane strain: the axial stress `nu (s11 + s22)` takes part. Contact pressure acts on edges and is resolved only as finely
-//! as the mesh: [`flexspline_mechanics::stepping::Increment::peak_pressure_mpa`] is the better number for it.
+//! Plane strain: the axial stress `nu (s11 + s22)` takes part. Contact pressure acts on edges and is resolved only as
+//! finely as the mesh: [`flexspline_mechanics::stepping::Increment::peak_pressure_mpa`] is the better number for it.
 //!
 //! The circular spline is recovered in the frame that turns with it; the invariant does not see the turn.
 
@@ -18,7 +18,8 @@ use flexspline_mechanics::fem::material::PlaneStrain;
 use flexspline_mechanics::mesh::{WheelKind, WheelMesh};
 use flexspline_mechanics::stepping::{Problem, State};
 
-/// Cauchy stress `[s11, s22, s12]` (MPa) at every node of a wheel with nodal displacements `field` (x and y of each node).
+/// Cauchy stress `[s11, s22, s12]` (MPa) at every node of a wheel with nodal displacements `field` (x and y of each
+/// node).
 pub fn nodal_stress(mesh: &WheelMesh, material: &PlaneStrain, field: &[f64]) -> Vec<[f64; 3]> {
     assert_eq!(field.len(), 2 * mesh.nodes.len(), "two displacements for each node");
     let at_nodes: Vec<[[f64; 3]; 8]> = mesh
@@ -70,7 +71,8 @@ pub struct PeakStress {
     pub position_mm: [f64; 2],
     /// Von Mises stress, MPa.
     pub von_mises_mpa: f64,
-    /// Largest stress of the flexspline in the root fillets (by the strain of their surface), on the bore and on the flanks (nodal), MPa.
+    /// Largest stress of the flexspline in the root fillets (by the strain of their surface), on the bore and on the
+    /// flanks (nodal), MPa.
     pub by_place_mpa: [f64; 3],
 }
 
@@ -173,8 +175,8 @@ mod tests {
         }
     }
 
-    /// Bending of the rim over two rollers is what stresses the drive: in the flexspline, under a roller. The smooth ring
-    /// alone bends to 130 MPa at its fibres; the roots of the teeth concentrate that, by less than three.
+    /// Bending of the rim over two rollers is what stresses the drive: in the flexspline, under a roller. The smooth
+    /// ring alone bends to 130 MPa at its fibres; the roots of the teeth concentrate that, by less than three.
     #[test]
     fn the_two_roller_drive_is_stressed_most_in_the_flexspline_on_the_major_axis() {
         let settings = SolverSettings { mesh: MeshLevel::Coarse, ..Default::default() };

@@ -24,8 +24,8 @@ const ROWS_OF_A_RIPPLE: usize = 8;
 
 /// The content of `summary.json`.
 ///
-/// Means are taken over the last whole number of flexspline tooth pitches (`2 pi / z_f` of generator angle) of the settled
-/// rows of a one-way stretch: a perfect drive repeats with that period, so its ripple drops out.
+/// Means are taken over the last whole number of flexspline tooth pitches (`2 pi / z_f` of generator angle) of the
+/// settled rows of a one-way stretch: a perfect drive repeats with that period, so its ripple drops out.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
     /// Layout of this object.
@@ -34,7 +34,8 @@ pub struct Summary {
     pub tool_version: &'static str,
     /// The command that made it; empty when made by a program.
     pub command: String,
-    /// `converged`: every increment of the path reached equilibrium. A run that does not is an error and leaves no summary.
+    /// `converged`: every increment of the path reached equilibrium. A run that does not is an error and leaves no
+    /// summary.
     pub status: &'static str,
     /// Name of the drive.
     pub drive: String,
@@ -61,9 +62,10 @@ pub struct Summary {
     /// Rows of the results.
     pub rows: usize,
 
-    /// Ripple: largest minus smallest error of a settled one-way stretch at constant load and temperature; the largest if
-    /// there are several. Needs a whole tooth pitch and eight rows. Where these are equal parts of a pitch and the drive repeats with it,
-    /// it is that of the wave through the rows of the last pitch ([`crate::pitch_wave`]), whose ends lie between rows.
+    /// Ripple: largest minus smallest error of a settled one-way stretch at constant load and temperature; the largest
+    /// if there are several. Needs a whole tooth pitch and eight rows. Where these are equal parts of a pitch and the
+    /// drive repeats with it, it is that of the wave through the rows of the last pitch ([`crate::pitch_wave`]), whose
+    /// ends lie between rows.
     pub kinematic_error_pp_arcsec: Option<f64>,
     /// The same of the rows alone.
     pub kinematic_error_pp_of_rows_arcsec: Option<f64>,
@@ -72,28 +74,31 @@ pub struct Summary {
     /// Mean error while it turns backward.
     pub mean_error_backward_arcsec: Option<f64>,
     /// What the output has lost between turning forward and turning backward, at the first reversal and the same load:
-    /// mean error backward minus mean error forward. Without load it is the clearance of the mesh, pushed to either side
-    /// by the drag on the output, so `null` when the load exceeds the drag.
+    /// mean error backward minus mean error forward. Without load it is the clearance of the mesh, pushed to either
+    /// side by the drag on the output, so `null` when the load exceeds the drag.
     pub backlash_arcsec: Option<f64>,
-    /// What the output has lost at the first reversal under a load that exceeds the drag and keeps the flanks of one side together: what friction
-    /// and the drag leave. `null` when the load does not exceed the drag.
+    /// What the output has lost at the first reversal under a load that exceeds the drag and keeps the flanks of one
+    /// side together: what friction and the drag leave. `null` when the load does not exceed the drag.
     pub reversal_lost_motion_arcsec: Option<f64>,
-    /// Generator travel from the first reversal during which the output stays within 0.05″ of where it stood. Between two
-    /// rows, the output is taken to go at its nominal rate once it goes.
+    /// Generator travel from the first reversal during which the output stays within 0.05″ of where it stood. Between
+    /// two rows, the output is taken to go at its nominal rate once it goes.
     pub dwell_generator_rad: Option<f64>,
     /// Error under load relative to the middle of the backlash at zero load: what a joint that was zeroed in the middle
-    /// of its play turns when it is loaded, the usual reading of a torsion curve. It includes half the backlash. The error
-    /// under load is the mean of both directions where both are known, so that the drag drops out, else of the one. The
-    /// middle is that of two light touches either way on the freshly deformed drive: twice the drag, more where that is less than 2e-5 of the
-    /// load, less where the load is not some times the drag. `null` when the load changes or does not exceed the drag.
+    /// of its play turns when it is loaded, the usual reading of a torsion curve. It includes half the backlash. The
+    /// error under load is the mean of both directions where both are known, so that the drag drops out, else of the
+    /// one. The middle is that of two light touches either way on the freshly deformed drive: twice the drag, more
+    /// where that is less than 2e-5 of the load, less where the load is not some times the drag. `null` when the load
+    /// changes or does not exceed the drag.
     pub wind_up_arcsec: Option<f64>,
-    /// The elastic part: the same error relative to the light touch on the side that the load pushes to. The touch is at one place of the
-    /// tooth pitch and the error a mean over it, so that it is known to about the ripple, which counts where the wind-up is no more than that.
+    /// The elastic part: the same error relative to the light touch on the side that the load pushes to. The touch is
+    /// at one place of the tooth pitch and the error a mean over it, so that it is known to about the ripple, which
+    /// counts where the wind-up is no more than that.
     pub wind_up_elastic_arcsec: Option<f64>,
     /// Middle of the backlash at zero load on which `wind_up_arcsec` rests.
     pub backlash_middle_arcsec: Option<f64>,
 
-    /// Largest von Mises stress of all rows at a node of the mesh, MPa. It grows with the mesh where stress is steep; `stress` is what it tends to.
+    /// Largest von Mises stress of all rows at a node of the mesh, MPa. It grows with the mesh where stress is steep;
+    /// `stress` is what it tends to.
     pub max_von_mises_mpa: f64,
     /// Where: `flexspline` or `circular_spline`.
     pub max_von_mises_wheel: &'static str,
@@ -101,18 +106,20 @@ pub struct Summary {
     pub max_von_mises_position_mm: [f64; 2],
     /// When: step of the results.
     pub max_von_mises_step: usize,
-    /// The largest in the root fillets of the flexspline, of all rows, MPa: by the strain of their surface, which needs no such fine mesh.
+    /// The largest in the root fillets of the flexspline, of all rows, MPa: by the strain of their surface, which needs
+    /// no such fine mesh.
     pub root_fillet_mpa: f64,
     /// The largest at a node on its bore.
     pub nodal_bore_mpa: f64,
     /// On its flanks.
     pub nodal_flank_mpa: f64,
-    /// Stress of the flexspline at these places where and under what the nodal one is largest, over three meshes, with its
-    /// interval; left out where it was not asked for.
+    /// Stress of the flexspline at these places where and under what the nodal one is largest, over three meshes, with
+    /// its interval; left out where it was not asked for.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub stress: Vec<PlaceStress>,
     /// Largest pressure between flanks, by their force and the shape of their gap
-    /// ([`flexspline_mechanics::contact::FlankContact::peak_pressure_mpa`]); where they do not bear evenly along the face, under the largest load there.
+    /// ([`flexspline_mechanics::contact::FlankContact::peak_pressure_mpa`]); where they do not bear evenly along the
+    /// face, under the largest load there.
     pub peak_flank_pressure_mpa: f64,
     /// Largest force of the generator along its major axis on one half of the rim, outward, N.
     pub lobe_force_n: f64,
@@ -120,7 +127,8 @@ pub struct Summary {
     pub tilt_mrad: f64,
     /// Largest skew of a tooth along its face, around, mrad.
     pub skew_mrad: f64,
-    /// How the load lies along the face of the flank that bears most anywhere, at the row of the largest: peak over mean. 1 is even.
+    /// How the load lies along the face of the flank that bears most anywhere, at the row of the largest: peak over
+    /// mean. 1 is even.
     pub load_across_face_peak_over_mean: f64,
     /// Share of the face of that flank that bears, at that row.
     pub face_in_contact: f64,
@@ -128,8 +136,8 @@ pub struct Summary {
     pub peak_generator_pressure_mpa: f64,
     /// Mean torque of the generator over the first settled stretch.
     pub generator_torque_mean_n_m: Option<f64>,
-    /// What that mean is without friction, by virtual work: minus load and drag, over the ratio. Of a drive without friction it is the better
-    /// number: the mean of rows has what the rows miss between them.
+    /// What that mean is without friction, by virtual work: minus load and drag, over the ratio. Of a drive without
+    /// friction it is the better number: the mean of rows has what the rows miss between them.
     pub generator_torque_virtual_work_n_m: Option<f64>,
     /// Whether the flanks have no friction.
     #[serde(skip)]
@@ -139,7 +147,8 @@ pub struct Summary {
     /// Largest residual of all rows, relative to the largest contact force.
     pub residual_worst: f64,
 
-    /// What rigid teeth as built leave the output to turn at the tightest place of its turn, arcsec; `null` of a drive as drawn.
+    /// What rigid teeth as built leave the output to turn at the tightest place of its turn, arcsec; `null` of a drive
+    /// as drawn.
     pub room_as_built_arcsec: Option<f64>,
     /// What has to be known before these figures are used; empty for a sound drive.
     pub cautions: Vec<Caution>,

@@ -74,9 +74,10 @@ pub fn asked(runs: &[Run], constraints: &[Constraint], generator: GeneratorKind)
     told
 }
 
-/// Of the variants of a generator that converge and whose teeth clear, the one that misses the constraints by least: by the sum of
-/// what is missing, each over the range in which the figure was found. A figure that a variant does not have, or that is missed where
-/// it has no range, counts as missed by a whole one. None where there is no such variant, or where one meets.
+/// Of the variants of a generator that converge and whose teeth clear, the one that misses the constraints by least: by
+/// the sum of what is missing, each over the range in which the figure was found. A figure that a variant does not
+/// have, or that is missed where it has no range, counts as missed by a whole one. None where there is no such variant,
+/// or where one meets.
 pub fn nearest(runs: &[Run], constraints: &[Constraint], generator: GeneratorKind) -> Option<Nearest> {
     let all = || runs.iter().filter(|run| run.generator == generator);
     if all().any(|run| run.meets) {
@@ -127,7 +128,8 @@ mod tests {
         texts.iter().map(|text| text.parse().unwrap()).collect()
     }
 
-    /// Each is met by some variant and both by none. The second misses a tenth of the range of one figure, the others more.
+    /// Each is met by some variant and both by none. The second misses a tenth of the range of one figure, the others
+    /// more.
     #[test]
     fn each_constraint_is_counted_alone_and_the_nearest_variant_says_what_it_misses() {
         let keep = constraints(&["kinematic_error_pp_arcsec=..1.5", "max_von_mises_mpa=..250"]);
@@ -175,7 +177,8 @@ mod tests {
         }
     }
 
-    /// A figure that no variant has does not hide which of them is nearer in another, nor does one that is 0 everywhere.
+    /// A figure that no variant has does not hide which of them is nearer in another, nor does one that is 0
+    /// everywhere.
     #[test]
     fn what_no_variant_has_leaves_the_nearest_to_the_other_figures() {
         let mut runs = [3.0, 2.0, 4.0].map(|e| made_up(1, 1.0, e, 0.0)).to_vec();

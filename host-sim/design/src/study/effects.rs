@@ -21,14 +21,15 @@ pub struct Effect {
     pub generator: GeneratorKind,
     /// The figure.
     pub figure: &'static str,
-    /// Its change from the least to the largest value of each field, the others held, in the order of the fields; missing for a
-    /// field of words or of one value.
+    /// Its change from the least to the largest value of each field, the others held, in the order of the fields;
+    /// missing for a field of words or of one value.
     pub change: Vec<Option<f64>>,
     /// Share of the scatter of the figure that these lines explain: 1 where all is straight and adds up.
     pub straight: f64,
 }
 
-/// The effects of all fields on a figure, by least squares over the variants that have it; none where these are too few.
+/// The effects of all fields on a figure, by least squares over the variants that have it; none where these are too
+/// few.
 pub fn effects(study: &Study, generator: GeneratorKind, name: &'static str) -> Option<Effect> {
     let (_, of) = figure(name).ok()?;
     let runs: Vec<(&Run, f64)> = study
@@ -56,9 +57,10 @@ pub fn effects(study: &Study, generator: GeneratorKind, name: &'static str) -> O
     Some(Effect { generator, figure: name, change, straight })
 }
 
-/// Whether the field number `field` changes no figure of a generator: of computed runs that differ in this field alone, all figures are
-/// the same, and so is how the runs ended. Where none differ in it alone, as when variants are spread, all runs have to be the same. A
-/// slope would not do: a figure that is even in a field that varies about zero has none.
+/// Whether the field number `field` changes no figure of a generator: of computed runs that differ in this field alone,
+/// all figures are the same, and so is how the runs ended. Where none differ in it alone, as when variants are spread,
+/// all runs have to be the same. A slope would not do: a figure that is even in a field that varies about zero has
+/// none.
 pub fn is_idle(study: &Study, generator: GeneratorKind, field: usize) -> bool {
     let computed = |run: &&Run| run.generator == generator && run.basis == Basis::Computed;
     let runs: Vec<&Run> = study.runs.iter().filter(computed).collect();

@@ -1,12 +1,16 @@
-//! Many variants: those that cover all ranges by contact FEM, and those that nothing beats; the others by a surface through these.
+//! Many variants: those that cover all ranges by contact FEM, and those that nothing beats; the others by a surface
+//! through these.
 //!
 //! 1. Of each generator [`computed_first`] variants are computed: each the one that is furthest from those before it.
-//! 2. Of every other variant the drawing is looked at: whether its fields make a drive, and whether its teeth clear. Where the computed variant
-//!    nearest to it found no equilibrium it is computed, too. All other figures are estimated ([`Surface`]).
-//! 3. What nothing beats and is estimated is computed, and the surfaces are made anew, [`ROUNDS`] times and [`MOST_OF_FRONT`] variants at most.
+//! 2. Of every other variant the drawing is looked at: whether its fields make a drive, and whether its teeth clear.
+//!    Where the computed variant nearest to it found no equilibrium it is computed, too. All other figures are
+//!    estimated ([`Surface`]).
+//! 3. What nothing beats and is estimated is computed, and the surfaces are made anew, [`ROUNDS`] times and
+//!    [`MOST_OF_FRONT`] variants at most.
 //! 4. What the surfaces are off by where they leave out a computed variant is told by generator and figure.
 //!
-//! A surface goes through [`MOST_POINTS`] computed variants at most: of more, those that cover best where the computed ones stand.
+//! A surface goes through [`MOST_POINTS`] computed variants at most: of more, those that cover best where the computed
+//! ones stand.
 
 use std::collections::BTreeMap;
 
@@ -16,17 +20,19 @@ use super::{Basis, Job, Run, RunStatus, StudyError, StudySettings, Target, is_er
 use crate::data_sheet::{DataSheet, FIGURES};
 use flexspline_mechanics::drive::GeneratorKind;
 
-/// Variants of each generator that are computed first, at least, and for each field and one more. Guesses. With these a study of 200 variants
-/// of two fields and four generators computes 227 of 800 runs (docs/reference/commands.md, "200 variants"); each takes 0.3 to 0.8 s of processor.
+/// Variants of each generator that are computed first, at least, and for each field and one more. Guesses. With these a
+/// study of 200 variants of two fields and four generators computes 227 of 800 runs (docs/reference/commands.md, "200
+/// variants"); each takes 0.3 to 0.8 s of processor.
 const COMPUTED: usize = 48;
 const COMPUTED_PER_FIELD: usize = 12;
-/// Variants of each generator that are computed because nothing beats them, at most. A guess: more than a designer looks at.
+/// Variants of each generator that are computed because nothing beats them, at most. A guess: more than a designer
+/// looks at.
 const MOST_OF_FRONT: usize = 12;
 /// Times that the front is looked at anew: what was computed may fall behind, and others come to the front.
 const ROUNDS: usize = 3;
-/// Computed variants that a surface goes through, at most. More are computed where many found no equilibrium, and the time of a surface grows
-/// with the cube of their number: of eight coordinates 0.16 s with 160 points, 1.9 s with 400, and there is one for each figure, generator and
-/// round. A study of twelve fields computes 156 first.
+/// Computed variants that a surface goes through, at most. More are computed where many found no equilibrium, and the
+/// time of a surface grows with the cube of their number: of eight coordinates 0.16 s with 160 points, 1.9 s with 400,
+/// and there is one for each figure, generator and round. A study of twelve fields computes 156 first.
 const MOST_POINTS: usize = 160;
 /// Figures that the drawing says, and need no estimate.
 const OF_THE_DRAWING: [&str; 2] = ["rigid_gap_um", "room_as_built_arcsec"];
@@ -36,7 +42,8 @@ pub fn computed_first(fields: usize) -> usize {
     COMPUTED.max(COMPUTED_PER_FIELD * (1 + fields))
 }
 
-/// Makes these runs, in their order, by contact FEM or by the drawing alone; it is told how many there will be in all, about.
+/// Makes these runs, in their order, by contact FEM or by the drawing alone; it is told how many there will be in all,
+/// about.
 pub(super) type Make<'a> = dyn Fn(&[Job], usize, Basis) -> Result<Vec<Run>, StudyError> + 'a;
 
 /// All runs, in the order of `jobs`, as many of them computed as matter, and what the estimates are off by.
@@ -128,7 +135,8 @@ fn square(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
 }
 
-/// So many different places, each the one furthest from those before it; the first is the one nearest to the middle of all ranges.
+/// So many different places, each the one furthest from those before it; the first is the one nearest to the middle of
+/// all ranges.
 pub(super) fn furthest_first(places: &[Vec<f64>], count: usize) -> Vec<usize> {
     let middle = vec![0.5; places[0].len()];
     let first = (0..places.len()).min_by(|a, b| square(&places[*a], &middle).total_cmp(&square(&places[*b], &middle)));
@@ -145,7 +153,8 @@ pub(super) fn furthest_first(places: &[Vec<f64>], count: usize) -> Vec<usize> {
     chosen
 }
 
-/// Whether that of the computed runs of the same generator which is nearest to run `k` found no equilibrium; or none was computed.
+/// Whether that of the computed runs of the same generator which is nearest to run `k` found no equilibrium; or none
+/// was computed.
 fn nearest_failed(runs: &[Run], jobs: &[Job], places: &[Vec<f64>], computed: &[usize], k: usize) -> bool {
     let apart = |other: usize| square(&places[jobs[other].0], &places[jobs[k].0]);
     let same = computed.iter().copied().filter(|other| runs[*other].generator == runs[k].generator);
@@ -170,7 +179,8 @@ fn best_first(all: &[usize], runs: &[Run], targets: &[Target]) -> Vec<usize> {
     found
 }
 
-/// Of these runs, as many as a surface goes through: where there are too many, those that cover best where they all stand.
+/// Of these runs, as many as a surface goes through: where there are too many, those that cover best where they all
+/// stand.
 fn thinned(known: Vec<usize>, jobs: &[Job], places: &[Vec<f64>]) -> Vec<usize> {
     if known.len() <= MOST_POINTS {
         return known;
@@ -254,8 +264,8 @@ mod tests {
     /// Places along each side of a made-up study.
     const SIDE: usize = 14;
 
-    /// A made-up study of two fields, 14 places of each, where the drawing of a variant says nothing but that its teeth clear. Each generator
-    /// has a front of its own, small or large, and one of them fails in one corner.
+    /// A made-up study of two fields, 14 places of each, where the drawing of a variant says nothing but that its teeth
+    /// clear. Each generator has a front of its own, small or large, and one of them fails in one corner.
     struct MadeUp {
         settings: StudySettings,
         variants: Vec<Vec<String>>,
@@ -361,7 +371,8 @@ mod tests {
         assert_eq!(computed(GeneratorKind::TwoRoller), computed_first(2) + MOST_OF_FRONT);
     }
 
-    /// The last corner is among the first that are computed. Its neighbours are not: they are estimated where it converged.
+    /// The last corner is among the first that are computed. Its neighbours are not: they are estimated where it
+    /// converged.
     #[test]
     fn what_stands_beside_a_variant_that_failed_is_computed() {
         let of = MadeUp::new();

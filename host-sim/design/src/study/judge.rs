@@ -84,7 +84,8 @@ impl Constraint {
         figure(self.figure).ok().and_then(|(_, of)| of(sheet))
     }
 
-    /// By how much a sheet misses the range, in the unit of the figure, 0 within it; none where it does not have the figure.
+    /// By how much a sheet misses the range, in the unit of the figure, 0 within it; none where it does not have the
+    /// figure.
     pub(super) fn lacks(&self, sheet: &DataSheet) -> Option<f64> {
         self.value(sheet).map(|value| (self.least - value).max(value - self.most).max(0.0))
     }
@@ -135,10 +136,11 @@ pub(super) fn clears(sheet: &DataSheet) -> bool {
 
 /// Marks what meets the constraints, and of each generator what nothing that meets them beats (Pareto's front).
 ///
-/// Variants are compared with those made alike: `errors` are the places of the fields that are errors of making among the values. A variant is no better
-/// for what was made worse of it.
+/// Variants are compared with those made alike: `errors` are the places of the fields that are errors of making among
+/// the values. A variant is no better for what was made worse of it.
 ///
-/// What converged bears the largest load of the study. That is where the search ends, known of every such run, and nothing to estimate.
+/// What converged bears the largest load of the study. That is where the search ends, known of every such run, and
+/// nothing to estimate.
 pub(super) fn judge(runs: &mut [Run], constraints: &[Constraint], targets: &[Target], errors: &[usize]) {
     for run in runs.iter_mut() {
         if let (true, Some(loads)) = (run.bears_all(), run.loads) {

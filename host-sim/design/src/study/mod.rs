@@ -1,5 +1,5 @@
-//! Variants of a drive side by side: which fields vary, what a catalogue would print of each variant, which of them meet the
-//! constraints, which are best, and what each field does.
+//! Variants of a drive side by side: which fields vary, what a catalogue would print of each variant, which of them
+//! meet the constraints, which are best, and what each field does.
 
 mod asked;
 mod effects;
@@ -71,8 +71,9 @@ impl StudySettings {
         self.torque_n_m.is_some() || self.stated.as_ref().is_some_and(Stated::has_loads)
     }
 
-    /// The largest load of the data sheet, N·m, where it is beyond what a table of this generator spans by default. A catalogue rates
-    /// its own generator, a cam: rollers, which leave the rim unsupported, may find no equilibrium there.
+    /// The largest load of the data sheet, N·m, where it is beyond what a table of this generator spans by default. A
+    /// catalogue rates its own generator, a cam: rollers, which leave the rim unsupported, may find no equilibrium
+    /// there.
     pub fn sheet_beyond_table_n_m(&self, drive: &Drive, kind: GeneratorKind) -> Option<f64> {
         let by_sheet = self.torque_n_m.is_none() && self.has_fixed_loads();
         let largest_n_m = self.loads(drive, kind).largest_n_m;
@@ -107,7 +108,8 @@ pub enum StudyError {
     },
     /// A value that a field takes twice.
     #[error(
-        "--vary {path}: found the value {value} twice, allowed: each once; a field that does not vary goes with --set {path}={value}"
+        "--vary {path}: found the value {value} twice, allowed: each once; a field that does not vary goes with --set \
+         {path}={value}"
     )]
     Twice {
         /// The field.
@@ -117,8 +119,8 @@ pub enum StudyError {
     },
     /// A last stable load beyond the largest load.
     #[error(
-        "--keep {constraint}: the largest load of any variant with the {generator} generator is {largest_n_m} N.m, where the search for it \
-         ends; allowed: a least value up to that, or a larger --torque-n-m"
+        "--keep {constraint}: the largest load of any variant with the {generator} generator is {largest_n_m} N.m, \
+         where the search for it ends; allowed: a least value up to that, or a larger --torque-n-m"
     )]
     BeyondLoad {
         /// The constraint.
@@ -170,7 +172,8 @@ impl RunStatus {
 pub enum Basis {
     /// Contact FEM of this variant.
     Computed,
-    /// The drawing of this variant and, for all that takes FEM, a surface through the variants that were computed ([`Trust`]).
+    /// The drawing of this variant and, for all that takes FEM, a surface through the variants that were computed
+    /// ([`Trust`]).
     Estimated,
 }
 
@@ -217,8 +220,9 @@ impl Run {
         errors.iter().all(|k| self.values[*k] == other.values[*k])
     }
 
-    /// Whether it bears the largest load of the study: its last stable load is a bound, and no figure of its own. A run that failed may
-    /// have borne it, too, before the turn over a tooth pitch; an estimate of one that failed does not say.
+    /// Whether it bears the largest load of the study: its last stable load is a bound, and no figure of its own. A run
+    /// that failed may have borne it, too, before the turn over a tooth pitch; an estimate of one that failed does not
+    /// say.
     pub fn bears_all(&self) -> bool {
         let bears = |last: f64| self.loads.is_some_and(|loads| last >= loads.largest_n_m);
         match self.status {
@@ -241,8 +245,8 @@ pub struct Study {
 }
 
 impl Study {
-    /// What nothing beats of a generator, best in the first target first. Where errors of making vary, those made as the first variant come
-    /// first, then those made as the next: between them there is no better.
+    /// What nothing beats of a generator, best in the first target first. Where errors of making vary, those made as
+    /// the first variant come first, then those made as the next: between them there is no better.
     pub fn front(&self, generator: GeneratorKind, targets: &[Target]) -> Vec<&Run> {
         let mut front: Vec<&Run> = self.runs.iter().filter(|run| run.generator == generator && run.front).collect();
         let errors = errors_of_making(&self.fields);
@@ -269,8 +273,8 @@ pub type Observer<'a> = dyn Fn(usize, usize, &Run) -> ControlFlow<()> + Sync + '
 /// Runs every variant of `drive` with every generator. The result does not depend on threads.
 ///
 /// # Errors
-/// Nothing varies, too much varies, a field can take none of its values, or the observer stopped it. A variant that fails or is
-/// refused is a row of the result.
+/// Nothing varies, too much varies, a field can take none of its values, or the observer stopped it. A variant that
+/// fails or is refused is a row of the result.
 pub fn study(drive: &Drive, settings: &StudySettings, observer: &Observer<'_>) -> Result<Study, StudyError> {
     let variants = variants(drive, settings)?;
     let paths: Vec<&str> = settings.vary.iter().map(|field| field.path.as_str()).collect();
@@ -399,8 +403,8 @@ fn variants(drive: &Drive, settings: &StudySettings) -> Result<Vec<Vec<String>>,
         Some(count) => vary::spread(vary, count, settings.seed),
         None => vary::grid(vary),
     };
-    // A field that does not exist, or a range that makes no drive, is told before anything is computed. Fields may be possible together
-    // that are not alone.
+    // A field that does not exist, or a range that makes no drive, is told before anything is computed. Fields may be
+    // possible together that are not alone.
     let paths: Vec<&str> = vary.iter().map(|field| field.path.as_str()).collect();
     if variants.iter().all(|values| varied(drive, &paths, values).is_err()) {
         for (k, path) in paths.iter().enumerate() {

@@ -1,19 +1,21 @@
-//! A smooth surface through a figure of the variants that were computed: a Gaussian process with the kernel of Matérn of order 5/2 (Rasmussen and
-//! Williams, Gaussian Processes for Machine Learning, 2006, ch. 4), a length for each coordinate and a share of noise.
+//! A smooth surface through a figure of the variants that were computed: a Gaussian process with the kernel of Matérn
+//! of order 5/2 (Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, ch. 4), a length for each
+//! coordinate and a share of noise.
 //!
-//! Lengths and noise are those with which leaving out each variant in turn is foretold best (ch. 5.4.2; the residuals of that are
-//! `[K⁻¹ y]ᵢ / [K⁻¹]ᵢᵢ`). These residuals are also what the surface is said to be off by.
+//! Lengths and noise are those with which leaving out each variant in turn is foretold best (ch. 5.4.2; the residuals
+//! of that are `[K⁻¹ y]ᵢ / [K⁻¹]ᵢᵢ`). These residuals are also what the surface is said to be off by.
 
 use flexspline_algebra::{Mat, cholesky};
 
-/// Lengths that are tried, over the range of a field. Guesses: from a fifth of the range to what is straight over all of it.
+/// Lengths that are tried, over the range of a field. Guesses: from a fifth of the range to what is straight over all
+/// of it.
 const LENGTHS: [f64; 6] = [0.2, 0.5, 1.0, 2.0, 5.0, 20.0];
 /// Shares of noise that are tried. Guesses: from round-off to a quarter of the variance.
 const NOISES: [f64; 5] = [1e-6, 1e-4, 1e-3, 1e-2, 0.25];
 /// Times that lengths and noise are gone through, one after the other. A guess.
 const SWEEPS: usize = 2;
-/// Coordinates up to which each has a length of its own: of more one length serves all. A field of numbers has one coordinate, a field of words
-/// one for each word. A guess.
+/// Coordinates up to which each has a length of its own: of more one length serves all. A field of numbers has one
+/// coordinate, a field of words one for each word. A guess.
 const OWN_LENGTHS: usize = 8;
 
 /// A surface.
@@ -68,7 +70,8 @@ impl Fit {
 }
 
 impl Surface {
-    /// Through `values` at `points`, whose coordinates are 0 to 1; none of fewer than three. What is positive everywhere is so between, too.
+    /// Through `values` at `points`, whose coordinates are 0 to 1; none of fewer than three. What is positive
+    /// everywhere is so between, too.
     pub fn through(points: Vec<Vec<f64>>, values: &[f64]) -> Option<Surface> {
         if points.len() < 3 {
             return None;
@@ -140,8 +143,8 @@ mod tests {
         (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt()
     }
 
-    /// What a study estimates of `figure` on a grid of 14 by 14 variants: how far that is off, and how far the surface says it is, root mean
-    /// squares.
+    /// What a study estimates of `figure` on a grid of 14 by 14 variants: how far that is off, and how far the surface
+    /// says it is, root mean squares.
     fn off_and_told(figure: impl Fn(&[f64]) -> f64) -> [f64; 2] {
         let all = grid(14);
         let computed = furthest_first(&all, computed_first(2));
@@ -185,7 +188,8 @@ mod tests {
         }
     }
 
-    /// Of a straight line with noise the surface keeps the line: at its own points it is nearer to the line than the values are.
+    /// Of a straight line with noise the surface keeps the line: at its own points it is nearer to the line than the
+    /// values are.
     #[test]
     fn noise_is_not_followed() {
         let mut random = fastrand::Rng::with_seed(5);

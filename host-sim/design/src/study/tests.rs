@@ -45,7 +45,8 @@ pub(super) fn made_up(variant: usize, value: f64, error: f64, stress: f64) -> Ru
     }
 }
 
-/// A thicker rim is stiffer, most where two rollers bend it most, and presses on them harder: the signs are known without FEM.
+/// A thicker rim is stiffer, most where two rollers bend it most, and presses on them harder: the signs are known
+/// without FEM.
 #[test]
 fn a_thicker_rim_is_stiffer_under_two_rollers() {
     let mut settings = settings(&["flexspline.rim_thickness_mm=1.4..2.2:2"]);
@@ -98,7 +99,8 @@ fn constraints_leave_out_and_the_front_is_what_nothing_beats() {
     assert_eq!(told, [(true, true), (false, false), (true, false), (false, false), (true, true)]);
 }
 
-/// The one made worse has the smaller error where it was looked at. It is no better for that, and the one as drawn comes first.
+/// The one made worse has the smaller error where it was looked at. It is no better for that, and the one as drawn
+/// comes first.
 #[test]
 fn variants_are_compared_with_those_made_alike() {
     let targets = [Target::new("kinematic_error_pp_arcsec", Sense::Least).unwrap()];

@@ -1,8 +1,9 @@
-//! How far estimated figures can be trusted, in the figure's own unit: what they are off by in the middle, beside how far variants differ.
+//! How far estimated figures can be trusted, in the figure's own unit: what they are off by in the middle, beside how
+//! far variants differ.
 //!
-//! Root mean squares, and percents of a mean, are ruled by a few variants with large values. Here both are medians: of what a surface is off by
-//! where it leaves out a computed variant, and of how far the computed variants lie from the one in their middle. Where the first is
-//! as large as the second an estimate says no more than "as the middle one".
+//! Root mean squares, and percents of a mean, are ruled by a few variants with large values. Here both are medians: of
+//! what a surface is off by where it leaves out a computed variant, and of how far the computed variants lie from the
+//! one in their middle. Where the first is as large as the second an estimate says no more than "as the middle one".
 
 use serde::Serialize;
 

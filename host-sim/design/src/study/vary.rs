@@ -37,7 +37,8 @@ pub enum Values {
 /// A `PATH=VALUES` that cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error(
-    "--vary: found {found:?}, {what}; allowed: PATH=FROM..TO, PATH=FROM..TO:N (N values, 1 to {MOST_VALUES}) or PATH=VALUE,VALUE,…"
+    "--vary: found {found:?}, {what}; allowed: PATH=FROM..TO, PATH=FROM..TO:N (N values, 1 to {MOST_VALUES}) or \
+     PATH=VALUE,VALUE,…"
 )]
 pub struct VaryError {
     found: String,
@@ -135,7 +136,8 @@ impl Vary {
     }
 }
 
-/// A number as a drive file has it, to nine digits: whole numbers without a point, so that fields of whole numbers take them.
+/// A number as a drive file has it, to nine digits: whole numbers without a point, so that fields of whole numbers take
+/// them.
 fn written(value: f64) -> String {
     let rounded: f64 = format!("{value:.8e}").parse().unwrap_or(value);
     format!("{rounded}")
@@ -152,8 +154,8 @@ pub fn grid(vary: &[Vary]) -> Vec<Vec<String>> {
     })
 }
 
-/// `count` variants spread evenly over all ranges at once: a Sobol sequence with Owen's scrambling (Burley 2020). Variant i does not
-/// depend on how many there are.
+/// `count` variants spread evenly over all ranges at once: a Sobol sequence with Owen's scrambling (Burley 2020).
+/// Variant i does not depend on how many there are.
 pub fn spread(vary: &[Vary], count: u32, seed: u32) -> Vec<Vec<String>> {
     (0..count)
         .map(|i| (0..).zip(vary).map(|(d, field)| field.at(f64::from(sobol_burley::sample(i, d, seed)))).collect())

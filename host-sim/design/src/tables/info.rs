@@ -77,7 +77,8 @@ pub struct TableInfo {
     /// What the data sheet in the drive's file says, beside what is computed; left out where the file has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub data_sheet: Option<SheetBeside>,
-    /// Stress in root fillets, on bore and flanks under the largest load of the table, over three meshes; left out unless it was asked for.
+    /// Stress in root fillets, on bore and flanks under the largest load of the table, over three meshes; left out
+    /// unless it was asked for.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub stress: Vec<PlaceStress>,
     /// Why there is no stress although it was asked for; left out where there is, or where it was not.
@@ -90,8 +91,8 @@ pub struct TableInfo {
 }
 
 impl TableInfo {
-    /// Where the table ends short of the rated torque of a data sheet, that it does, and whether the drive bears that torque as far as the sheet
-    /// was computed.
+    /// Where the table ends short of the rated torque of a data sheet, that it does, and whether the drive bears that
+    /// torque as far as the sheet was computed.
     pub fn short_of_sheet(&self, stated: &Stated) -> Option<String> {
         let ends_n_m = self.torque_nodes_n_m.last().copied().map(f64::from)?;
         let last_n_m = self.data_sheet.as_ref().and_then(|beside| beside.sheet.last_stable_n_m);
@@ -99,7 +100,8 @@ impl TableInfo {
     }
 }
 
-/// That a table ends short of a rated torque, and what is known of that torque: the last load that was borne, where it was looked for.
+/// That a table ends short of a rated torque, and what is known of that torque: the last load that was borne, where it
+/// was looked for.
 fn short_of_sheet(ends_n_m: f64, rated_n_m: f64, last_n_m: Option<f64>) -> Option<String> {
     // Nodes are of single precision.
     if rated_n_m <= ends_n_m * (1.0 + 1e-6) {
@@ -112,14 +114,15 @@ fn short_of_sheet(ends_n_m: f64, rated_n_m: f64, last_n_m: Option<f64>) -> Optio
         _ => format!("--torque-n-m {rated_n_m} asks for it"),
     };
     Some(format!(
-        "the table ends at {} N.m, and the data sheet rates the drive {} N.m: beyond its end a table extrapolates; {found}",
+        "the table ends at {} N.m, and the data sheet rates the drive {} N.m: beyond its end a table extrapolates; \
+         {found}",
         short(ends_n_m),
         short(rated_n_m)
     ))
 }
 
-/// A drive that does not repeat from tooth to tooth, and what its table has no room for: one curve for each of the angles, the
-/// same under every load, for either flank.
+/// A drive that does not repeat from tooth to tooth, and what its table has no room for: one curve for each of the
+/// angles, the same under every load, for either flank.
 #[derive(Debug, Clone, Serialize)]
 pub struct TurnsInfo {
     /// Places over the turns of generator and output, for each sign of the load.
@@ -135,8 +138,8 @@ pub struct TurnsInfo {
 pub struct TurnsAtTorque {
     /// Torque node, N m.
     pub torque_n_m: f32,
-    /// Range of the drive's error over the places, the ripple within a pitch left out, arcsec. So few places see most, not all, of
-    /// its transmission accuracy.
+    /// Range of the drive's error over the places, the ripple within a pitch left out, arcsec. So few places see most,
+    /// not all, of its transmission accuracy.
     pub drive_peak_to_peak_arcsec: f64,
     /// What the table leaves of it, arcsec: root mean square.
     pub left_rms_arcsec: f64,

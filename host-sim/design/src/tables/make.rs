@@ -38,8 +38,8 @@ pub enum TorqueNodes {
     Given(Vec<f32>),
 }
 
-/// Torque nodes on each side at most, and the miss (arcsec) at which one is added: for a drive that repeats from tooth to tooth, and
-/// for one whose imperfections are sampled at every node and leave more than nodes do.
+/// Torque nodes on each side at most, and the miss (arcsec) at which one is added: for a drive that repeats from tooth
+/// to tooth, and for one whose imperfections are sampled at every node and leave more than nodes do.
 const CHOICES: [(usize, f64); 2] = [(28, 0.6), (12, 2.0)];
 /// The largest torque must be so many times the drag of the output, or there is no wind-up to sample.
 const LEAST_OVER_DRAG: f64 = 20.0;
@@ -49,8 +49,8 @@ const MOST_TORQUE_N_M: f64 = 1e4;
 const TOLERANCES_ARCSEC: [f64; 2] = [0.01, 60.0];
 
 impl TableSettings {
-    /// What a table is made with unless told otherwise: nodes as the FEM asks for them up to the generator's rated torque, the ends
-    /// of the operating temperatures, eight positions, the fast solver on the standard mesh.
+    /// What a table is made with unless told otherwise: nodes as the FEM asks for them up to the generator's rated
+    /// torque, the ends of the operating temperatures, eight positions, the fast solver on the standard mesh.
     pub fn for_generator(drive: &Drive, kind: GeneratorKind) -> TableSettings {
         let plan = SweepPlan::for_generator(drive, kind);
         let (most, tolerance_arcsec) = CHOICES[usize::from(!repeats(drive))];

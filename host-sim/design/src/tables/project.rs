@@ -16,7 +16,8 @@ use flexspline_mechanics::stepping::SolverSettings;
 
 /// Turns of the output that separate 2 per generator turn from 2 per turn of the generator against the output.
 const OUTPUT_TURNS_FOR_HARMONICS: f64 = 0.5;
-/// Orders fitted where the samples cover enough turns: per generator turn, per turn against the output, per output turn.
+/// Orders fitted where the samples cover enough turns: per generator turn, per turn against the output, per output
+/// turn.
 pub(super) const GENERATOR_ORDERS: [u16; 4] = [1, 2, 3, 4];
 pub(super) const MATERIAL_ORDERS: [u16; 4] = [1, 2, 3, 4];
 pub(super) const OUTPUT_ORDERS: [u16; 2] = [1, 2];
@@ -24,8 +25,8 @@ pub(super) const OUTPUT_ORDERS: [u16; 2] = [1, 2];
 const SAME_TORQUE: f64 = 1e-6;
 /// Deviation (rad) that FEM samples may have from the table; they are exact but for rounding.
 const FEM_DEVIATION_RAD: f64 = 1e-6;
-/// Largest deviation (rad) of a sample from the table for a drive with imperfections, whose error changes with the load in ways that a
-/// table has no room for: 120″. What it is stands in the table; only what is no drive at all is refused.
+/// Largest deviation (rad) of a sample from the table for a drive with imperfections, whose error changes with the load
+/// in ways that a table has no room for: 120″. What it is stands in the table; only what is no drive at all is refused.
 const AS_BUILT_DEVIATION_RAD: f64 = 6e-4;
 /// Negative half-width (rad) taken for the noise of the contact discretisation: 0.1″.
 const HALF_WIDTH_NOISE_RAD: f64 = 5e-7;
@@ -87,9 +88,9 @@ pub fn from_sweep(
             "forward motion over one flexspline pitch at every torque and temperature node; backward motion is its \
              mirror image"
         } else {
-            "the drive without imperfections in forward motion over one flexspline pitch at every torque and temperature node, \
-             backward motion its mirror image; what the imperfections add without friction, at five loads of either sign and \
-             places spread over the turns of generator and output, at reference temperature"
+            "the drive without imperfections in forward motion over one flexspline pitch at every torque and \
+             temperature node, backward motion its mirror image; what the imperfections add without friction, at five \
+             loads of either sign and places spread over the turns of generator and output, at reference temperature"
         }
         .to_owned(),
         increments: sweep.work.increments,
@@ -115,8 +116,8 @@ pub fn from_sweep(
     Ok(made)
 }
 
-/// A table of forward samples at positive torque `nodes` alone, for choosing nodes: the other quadrants are filled by mirror
-/// images that neglect the drag. Only its image is wanted.
+/// A table of forward samples at positive torque `nodes` alone, for choosing nodes: the other quadrants are filled by
+/// mirror images that neglect the drag. Only its image is wanted.
 pub(super) fn trial_table(
     drive: &Drive,
     kind: GeneratorKind,
@@ -177,8 +178,8 @@ fn harmonics_of(orders: &'static [u16]) -> Harmonics<'static> {
     Harmonics { orders, nodes: flexspline::make::NODES_PER_PERIOD * highest }
 }
 
-/// The table of samples from elsewhere: every torque and temperature that occurs is a node, the ripple has as many nodes as
-/// every node has positions, and harmonics are fitted where the samples cover enough turns to tell them apart.
+/// The table of samples from elsewhere: every torque and temperature that occurs is a node, the ripple has as many
+/// nodes as every node has positions, and harmonics are fitted where the samples cover enough turns to tell them apart.
 pub fn from_samples(
     drive: &Drive,
     kind: GeneratorKind,
@@ -349,8 +350,9 @@ fn turns_info(drive: &Drive, plan: &SweepPlan, sweep: &Sweep, table: &Table<'_>)
         .collect();
     let largest = |of: fn(&TurnsAtTorque) -> f64| by_torque.iter().map(of).fold(0.0, f64::max);
     let remark = format!(
-        "at these places over whole turns the drive's error ranges over up to {:.1}\"; the table has one curve for each angle, the same under every \
-         load, and leaves {:.1}\" rms and {:.1}\" at most where the curves change with load and flank",
+        "at these places over whole turns the drive's error ranges over up to {:.1}\"; the table has one curve for \
+         each angle, the same under every load, and leaves {:.1}\" rms and {:.1}\" at most where the curves change \
+         with load and flank",
         largest(|t| t.drive_peak_to_peak_arcsec),
         largest(|t| t.left_rms_arcsec),
         largest(|t| t.left_worst_arcsec)

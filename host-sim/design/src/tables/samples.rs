@@ -1,7 +1,7 @@
 //! Samples of steady motion: what a table is made from, whether computed here, by another program, or measured.
 //!
-//! CSV with the columns `generator_rad, torque_n_m, temperature_c, direction, output_rad` in any order; further columns are
-//! ignored, lines that begin with `#` are comments. `direction` is +1 while the output turns forward, −1 backward.
+//! CSV with the columns `generator_rad, torque_n_m, temperature_c, direction, output_rad` in any order; further columns
+//! are ignored, lines that begin with `#` are comments. `direction` is +1 while the output turns forward, −1 backward.
 
 use std::path::Path;
 

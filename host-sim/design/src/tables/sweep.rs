@@ -1,12 +1,12 @@
 //! FEM sweeps that sample what a table holds: steady motion over one tooth pitch at every torque and temperature node.
 //!
-//! An ideal drive repeats every flexspline pitch (`2 pi / z_f` of generator angle), so one pitch says all. It is also its own
-//! mirror image: backward motion under a torque T is the reflection of forward motion under −T, so only forward motion is
-//! computed, and `e_backward(-psi, -T) = -e_forward(psi, T)` gives the other direction.
+//! An ideal drive repeats every flexspline pitch (`2 pi / z_f` of generator angle), so one pitch says all. It is also
+//! its own mirror image: backward motion under a torque T is the reflection of forward motion under −T, so only forward
+//! motion is computed, and `e_backward(-psi, -T) = -e_forward(psi, T)` gives the other direction.
 //!
-//! Frictionless flanks leave nothing but the drag of the output to tell the directions apart: the flanks carry `T - d` in
-//! forward and `T + d` in backward motion, and the state is an elastic one that depends on nothing else. So one torque sign
-//! is enough too: from a forward state under T the backward one follows by the compliance c of the output,
+//! Frictionless flanks leave nothing but the drag of the output to tell the directions apart: the flanks carry `T - d`
+//! in forward and `T + d` in backward motion, and the state is an elastic one that depends on nothing else. So one
+//! torque sign is enough too: from a forward state under T the backward one follows by the compliance c of the output,
 //! `e_backward(psi, T) = e_forward(psi, T) + 2 d c`. The drag is small (0.02 N.m; the second order is below 0.05″).
 
 use std::ops::ControlFlow;
@@ -36,8 +36,8 @@ const JUMP_HALF_WIDTH: f64 = 0.05;
 
 impl SweepPlan {
     /// The default: one pair of nodes at each end of the dead zone of the drag, from there nine steps to the rated
-    /// torque of the generator; eight positions; the ends of the operating temperatures, between which wind-up is linear
-    /// to 0.05″, because Young's modulus is.
+    /// torque of the generator; eight positions; the ends of the operating temperatures, between which wind-up is
+    /// linear to 0.05″, because Young's modulus is.
     pub fn for_generator(drive: &Drive, kind: GeneratorKind) -> SweepPlan {
         let temperature = &drive.temperature;
         SweepPlan {
@@ -48,9 +48,10 @@ impl SweepPlan {
     }
 }
 
-/// Nodes symmetric about zero: a nearly coincident pair at ± the drag torque, where the loaded flank changes, and `steps`
-/// further nodes on each side up to `largest_n_m`, dense where wind-up is steep: node k of n at `(k/n)^3.2` of the way. (On
-/// nodes like these the cubic of the core leaves below 0.6″ of curves that rise by 870″ as a root or a tanh does.)
+/// Nodes symmetric about zero: a nearly coincident pair at ± the drag torque, where the loaded flank changes, and
+/// `steps` further nodes on each side up to `largest_n_m`, dense where wind-up is steep: node k of n at `(k/n)^3.2` of
+/// the way. (On nodes like these the cubic of the core leaves below 0.6″ of curves that rise by 870″ as a root or a
+/// tanh does.)
 pub fn symmetric_nodes(drag_n_m: f64, largest_n_m: f64, steps: usize) -> Vec<f32> {
     const CROWDING: f64 = 3.2;
     let half = JUMP_HALF_WIDTH * drag_n_m;
@@ -122,8 +123,8 @@ pub struct Sweep {
     pub work: Work,
     /// Unknowns of the model.
     pub degrees_of_freedom: usize,
-    /// Places over the turns of generator and output at which every torque of a sign was sampled; 0 for a drive that repeats from
-    /// tooth to tooth.
+    /// Places over the turns of generator and output at which every torque of a sign was sampled; 0 for a drive that
+    /// repeats from tooth to tooth.
     pub places: usize,
 }
 
@@ -138,8 +139,8 @@ pub enum SweepError {
     Table(#[from] super::project::TableError),
     /// One tooth pitch in one direction does not say all of the drive.
     #[error(
-        "{field}: one tooth pitch in one direction does not say all of this drive; allowed: an ideal drive, uniform wear \
-         (flexspline_wear_um, circular_spline_wear_um) and temperature differences (generator_warmer_k, \
+        "{field}: one tooth pitch in one direction does not say all of this drive; allowed: an ideal drive, uniform \
+         wear (flexspline_wear_um, circular_spline_wear_um) and temperature differences (generator_warmer_k, \
          circular_spline_warmer_k); others are swept over whole turns (sweep_turns)"
     )]
     NotUniform {
@@ -156,8 +157,8 @@ fn check_uniform(drive: &Drive) -> Result<(), SweepError> {
     drive.as_built.first_not_uniform().map_or(Ok(()), |field| Err(SweepError::NotUniform { field }))
 }
 
-/// Runs the sweep of one generator; torque of either sign is a chain of its own, from light to heavy. Nodes that are `known`
-/// are not computed again.
+/// Runs the sweep of one generator; torque of either sign is a chain of its own, from light to heavy. Nodes that are
+/// `known` are not computed again.
 pub fn sweep(
     drive: &Drive,
     kind: GeneratorKind,
@@ -204,8 +205,8 @@ pub fn sweep(
     Ok(joined.expect("a plan has temperatures"))
 }
 
-/// Increments that a sweep over so many torque nodes on each side of zero takes, about, where so many are known at one temperature:
-/// at each of them the load comes on, the drive settles and is sampled.
+/// Increments that a sweep over so many torque nodes on each side of zero takes, about, where so many are known at one
+/// temperature: at each of them the load comes on, the drive settles and is sampled.
 pub(super) fn planned_increments(drive: &Drive, plan: &SweepPlan, nodes: usize, known: usize) -> usize {
     let sides = match Half::of(drive) {
         Half::Forward => 2,

@@ -1,9 +1,9 @@
 //! Torque nodes where the drive needs them.
 //!
-//! Wind-up and ripple change where further teeth take load: under rollers several times below a tenth of the rated torque,
-//! under a cam hardly at all. So the nodes are not guessed: between two nodes the FEM is asked at the middle (of the square
-//! roots), and where the table made so far misses it, the middle becomes a node. The same core code reads the trial table as
-//! will read the final one.
+//! Wind-up and ripple change where further teeth take load: under rollers several times below a tenth of the rated
+//! torque, under a cam hardly at all. So the nodes are not guessed: between two nodes the FEM is asked at the middle
+//! (of the square roots), and where the table made so far misses it, the middle becomes a node. The same core code
+//! reads the trial table as will read the final one.
 
 use flexspline::make::ProjectError;
 use flexspline::{Direction, GeneratorAngle, ImageError, Table, WriteError};
@@ -102,9 +102,9 @@ pub struct Refined {
     pub resolved: bool,
 }
 
-/// Puts a node into the middle (of the roots) of every interval of `open` where the table of the nodes so far misses by more than
-/// `tolerance`, the worst first, and looks into the halves again, until nothing is missed or there are `most` nodes. `misses` is given the nodes
-/// so far and the middles that are asked for.
+/// Puts a node into the middle (of the roots) of every interval of `open` where the table of the nodes so far misses by
+/// more than `tolerance`, the worst first, and looks into the halves again, until nothing is missed or there are `most`
+/// nodes. `misses` is given the nodes so far and the middles that are asked for.
 pub fn refined<E>(
     mut nodes: Vec<f32>,
     mut open: Vec<[f32; 2]>,

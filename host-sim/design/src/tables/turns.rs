@@ -1,24 +1,26 @@
-//! FEM sweeps of a drive that does not repeat from tooth to tooth: every imperfection of [`flexspline_mechanics::drive::AsBuilt`] but uniform
-//! wear and temperature.
+//! FEM sweeps of a drive that does not repeat from tooth to tooth: every imperfection of
+//! [`flexspline_mechanics::drive::AsBuilt`] but uniform wear and temperature.
 //!
-//! What such a drive does beyond the same drive without them depends on where generator and output stand in their turns. It is
-//! geometry: friction has little part in it, and without friction contact converges several times faster. So two sweeps are put
-//! together:
+//! What such a drive does beyond the same drive without them depends on where generator and output stand in their
+//! turns. It is geometry: friction has little part in it, and without friction contact converges several times faster.
+//! So two sweeps are put together:
 //!
 //! * the drive without the imperfections, over one tooth pitch at every node, as [`crate::tables::sweep`] does it;
-//! * the *deviation*, the output with the imperfections less the output without, both frictionless, at a few loads of either
-//!   sign, from many places. The places cover the turn of the generator and the turn of the output as evenly as so few points
-//!   can (the additive recurrence of the plastic number), so that harmonics of ψ, δ and ψ − δ do not pass for one another.
+//! * the *deviation*, the output with the imperfections less the output without, both frictionless, at a few loads of
+//!   either sign, from many places. The places cover the turn of the generator and the turn of the output as evenly as
+//!   so few points can (the additive recurrence of the plastic number), so that harmonics of ψ, δ and ψ − δ do not pass
+//!   for one another.
 //!
-//! The places lie whole flexspline pitches apart. There the drive without imperfections is in one state, and the drive with them
-//! nearly so: under each load it jumps from place to place ([`Motion::jump`]).
+//! The places lie whole flexspline pitches apart. There the drive without imperfections is in one state, and the drive
+//! with them nearly so: under each load it jumps from place to place ([`Motion::jump`]).
 //!
-//! The samples are those of the first sweep, each at every place, with the deviation there added: between loads linear in the
-//! cube root of the load, within the pitch along the harmonics that the table will hold.
+//! The samples are those of the first sweep, each at every place, with the deviation there added: between loads linear
+//! in the cube root of the load, within the pitch along the harmonics that the table will hold.
 //!
-//! The table has one curve for each of the angles, the same at every load. What of the deviation changes with the load or the
-//! flank that bears (an eccentricity is felt less where more teeth share it, and from another side by the other flank), or depends
-//! on two angles at once, stays as a difference that the table states; what the putting together misses is seen by `validate`.
+//! The table has one curve for each of the angles, the same at every load. What of the deviation changes with the load
+//! or the flank that bears (an eccentricity is felt less where more teeth share it, and from another side by the other
+//! flank), or depends on two angles at once, stays as a difference that the table states; what the putting together
+//! misses is seen by `validate`.
 
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
@@ -49,9 +51,9 @@ pub fn deviation_increments() -> usize {
     2 * LEVELS * (PLACES + 4)
 }
 
-/// Runs the sweep of one generator at the torque and temperature nodes of the plan, for any drive: one that repeats from tooth to
-/// tooth is swept over one pitch ([`sweep`]), any other over whole turns of generator and output. Nodes that are `known` (of the
-/// drive without the imperfections) are not computed again.
+/// Runs the sweep of one generator at the torque and temperature nodes of the plan, for any drive: one that repeats
+/// from tooth to tooth is swept over one pitch ([`sweep`]), any other over whole turns of generator and output. Nodes
+/// that are `known` (of the drive without the imperfections) are not computed again.
 pub fn sweep_turns(
     drive: &Drive,
     kind: GeneratorKind,
@@ -103,8 +105,8 @@ fn levels(largest_n_m: f64) -> [f64; LEVELS] {
     std::array::from_fn(|k| (first + (last - first) * k as f64 / (LEVELS - 1) as f64).powi(3))
 }
 
-/// Generator angles of the places, ascending: evenly spread over one turn of the output and one turn of the generator, whole
-/// flexspline pitches apart; others for either sign of the load.
+/// Generator angles of the places, ascending: evenly spread over one turn of the output and one turn of the generator,
+/// whole flexspline pitches apart; others for either sign of the load.
 fn places(drive: &Drive, sign: f64) -> Vec<f64> {
     let pitch = TAU / f64::from(drive.flexspline.teeth);
     let mut places: Vec<f64> = (0..PLACES)
@@ -177,8 +179,8 @@ struct Run {
 struct Deviations {
     /// Loads, N m, light to heavy.
     levels: [f64; LEVELS],
-    /// Of loads that turn the output forward, then of those that turn it back: places and, at each, the deviation under each
-    /// load.
+    /// Of loads that turn the output forward, then of those that turn it back: places and, at each, the deviation under
+    /// each load.
     signs: [(Vec<f64>, Vec<[f64; LEVELS]>); 2],
     /// Amplitudes of the harmonics that all loads have in common, of the cosine and the sine in turn.
     amplitudes: Vec<f64>,
@@ -230,7 +232,8 @@ fn harmonics(drive: &Drive, generator_rad: f64) -> Vec<f64> {
         .collect()
 }
 
-/// The harmonics that all loads of both signs have in common, by least squares; each sign and load has a mean of its own.
+/// The harmonics that all loads of both signs have in common, by least squares; each sign and load has a mean of its
+/// own.
 fn common_harmonics(drive: &Drive, signs: &[(Vec<f64>, Vec<[f64; LEVELS]>); 2]) -> Vec<f64> {
     // The means are taken out of columns and data alike. The columns of a sign are the same under every load.
     let mut normal: Option<(Mat, Mat)> = None;
@@ -303,8 +306,8 @@ mod tests {
         }
     }
 
-    /// A pitch error of the flexspline teeth that bear displaces the output by itself, whatever the load: at every place the
-    /// sample is the one without, displaced by the harmonic there.
+    /// A pitch error of the flexspline teeth that bear displaces the output by itself, whatever the load: at every
+    /// place the sample is the one without, displaced by the harmonic there.
     #[test]
     fn a_sample_is_spread_with_the_deviation_of_each_place() {
         let mut drive = Drive::hhd_95();

@@ -1,11 +1,12 @@
 //! Tables against fresh FEM at points that made none of them, through the core code that firmware links.
 //!
-//! Torques, temperatures, directions and positions are drawn between the nodes; the drive is settled under each torque and then followed over
-//! a few positions. A run at zero torque is also reversed, so that the play operator is seen crossing the backlash.
+//! Torques, temperatures, directions and positions are drawn between the nodes; the drive is settled under each torque
+//! and then followed over a few positions. A run at zero torque is also reversed, so that the play operator is seen
+//! crossing the backlash.
 //!
-//! A drive that does not repeat from tooth to tooth is deformed anew for each torque, anywhere in the turns of generator and
-//! output. Its table says how far it is from its own samples, for it has no room for all that such a drive does: the bounds are
-//! wider by one and a half times that much.
+//! A drive that does not repeat from tooth to tooth is deformed anew for each torque, anywhere in the turns of
+//! generator and output. Its table says how far it is from its own samples, for it has no room for all that such a
+//! drive does: the bounds are wider by one and a half times that much.
 
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
@@ -25,8 +26,8 @@ pub const RMS_BOUND_ARCSEC: f64 = 0.5;
 /// Largest difference, arcsec.
 pub const MAX_BOUND_ARCSEC: f64 = 2.0;
 
-/// How much more than a table states of itself at the places it was made of it may miss at a dozen others: the root mean square of
-/// twelve differences scatters by a fifth.
+/// How much more than a table states of itself at the places it was made of it may miss at a dozen others: the root
+/// mean square of twelve differences scatters by a fifth.
 const ELSEWHERE: f64 = 1.5;
 
 /// How to validate.
@@ -113,8 +114,8 @@ pub enum ValidateError {
     Solve(#[from] SolveError),
     /// The table is of another drive.
     #[error(
-        "the table is of a drive with BLAKE3 {found}, the drive given ({name}) has {given}; name the drive with --drive \
-         and --set"
+        "the table is of a drive with BLAKE3 {found}, the drive given ({name}) has {given}; name the drive with \
+         --drive and --set"
     )]
     OtherDrive {
         /// Hash in the table, hex.

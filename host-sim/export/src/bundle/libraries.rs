@@ -71,7 +71,8 @@ pub struct Places {
 }
 
 impl Places {
-    /// A folder that was named; or that of a release, beside this program, and then the checkout around the current folder.
+    /// A folder that was named; or that of a release, beside this program, and then the checkout around the current
+    /// folder.
     #[must_use]
     pub fn new(named: Option<&Path>) -> Places {
         if let Some(named) = named {
@@ -102,8 +103,8 @@ impl Places {
         let Some(checkout) = &self.checkout else {
             let looked = self.folders.iter().map(|folder| folder.display().to_string()).collect::<Vec<_>>().join(", ");
             return Err(missing(format!(
-                "no {target}/{ARCHIVE} in {looked}, and no checkout of the sources here to build it; a release has the libraries, \
-                 --libraries names another folder"
+                "no {target}/{ARCHIVE} in {looked}, and no checkout of the sources here to build it; a release has \
+                 the libraries, --libraries names another folder"
             )));
         };
         let header = fs::read_to_string(checkout.join("core/include/flexspline.h")).unwrap_or_default();
@@ -140,7 +141,8 @@ impl Places {
         let folder =
             std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| checkout.join("target"), PathBuf::from).join("bundle");
         let folder = std::path::absolute(&folder).unwrap_or(folder);
-        // Without an operating system the library is one piece with no panic path; with one it has the panic handler of the standard library.
+        // Without an operating system the library is one piece with no panic path; with one it has the panic handler of
+        // the standard library.
         let (features, lto) = if target.contains("-none-") { ("c-api", "fat") } else { ("c-api,std", "off") };
         let output = Command::new("cargo")
             .args(["rustc", "--release", "-p", "flexspline", "--features", features, "--target", target])

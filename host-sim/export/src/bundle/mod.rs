@@ -1,7 +1,9 @@
-//! What firmware people add to a project: tables, a reader in C99, the core as static libraries, vectors, and what their build systems ask for.
+//! What firmware people add to a project: tables, a reader in C99, the core as static libraries, vectors, and what
+//! their build systems ask for.
 //!
-//! [`Table`]s and [`Library`]s to the files of a folder ([`Bundle::files`]); [`libraries`] finds or builds the libraries. The sources in C
-//! and what is the same in every bundle are in this program; names, versions and lists are put in where a template has `@NAME@`.
+//! [`Table`]s and [`Library`]s to the files of a folder ([`Bundle::files`]); [`libraries`] finds or builds the
+//! libraries. The sources in C and what is the same in every bundle are in this program; names, versions and lists are
+//! put in where a template has `@NAME@`.
 
 mod archive;
 pub mod libraries;
@@ -120,10 +122,11 @@ impl Table {
     fn header(&self) -> String {
         let (name, array) = (self.name.to_uppercase(), self.array());
         format!(
-            "/* {about}.\n * The image for fxt_open or flexspline_store_activate; the second is the same at another address, as the core \
-             wants it. */\n#ifndef FLEXSPLINE_{name}_TABLE_H\n#define FLEXSPLINE_{name}_TABLE_H\n\n#include <stdint.h>\n\n#define \
-             FLEXSPLINE_{name}_TABLE_ID \"{id}\"\n#define FLEXSPLINE_{name}_TABLE_BYTES {bytes}u\n\n#ifdef __cplusplus\nextern \"C\" \
-             {{\n#endif\n\nextern const uint8_t {array}[FLEXSPLINE_{name}_TABLE_BYTES];\nextern const uint8_t \
+            "/* {about}.\n * The image for fxt_open or flexspline_store_activate; the second is the same at another \
+             address, as the core wants it. */\n#ifndef FLEXSPLINE_{name}_TABLE_H\n#define \
+             FLEXSPLINE_{name}_TABLE_H\n\n#include <stdint.h>\n\n#define FLEXSPLINE_{name}_TABLE_ID \"{id}\"\n#define \
+             FLEXSPLINE_{name}_TABLE_BYTES {bytes}u\n\n#ifdef __cplusplus\nextern \"C\" {{\n#endif\n\nextern const \
+             uint8_t {array}[FLEXSPLINE_{name}_TABLE_BYTES];\nextern const uint8_t \
              {array}_second[FLEXSPLINE_{name}_TABLE_BYTES];\n\n#ifdef __cplusplus\n}}\n#endif\n\n#endif\n",
             about = self.about(),
             id = self.checked().id(),
@@ -136,9 +139,10 @@ impl Table {
         let (suffix, section) =
             if second { ("_second", "FLEXSPLINE_SECOND_SECTION") } else { ("", "FLEXSPLINE_TABLE_SECTION") };
         let mut text = format!(
-            "/* {about}. */\n#include \"flexspline_{name}.h\"\n\n/* A section of its own if {section} names one; at a multiple of four. \
-             */\n#if defined(__GNUC__) && defined({section})\n__attribute__((section({section}), aligned(4), used))\n#elif \
-             defined(__GNUC__)\n__attribute__((aligned(4)))\n#endif\nconst uint8_t {array}{suffix}[{bytes}] = {{\n",
+            "/* {about}. */\n#include \"flexspline_{name}.h\"\n\n/* A section of its own if {section} names one; at a \
+             multiple of four. */\n#if defined(__GNUC__) && defined({section})\n__attribute__((section({section}), \
+             aligned(4), used))\n#elif defined(__GNUC__)\n__attribute__((aligned(4)))\n#endif\nconst uint8_t \
+             {array}{suffix}[{bytes}] = {{\n",
             about = self.about(),
             name = self.name,
             array = self.array(),

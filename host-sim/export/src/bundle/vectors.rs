@@ -5,8 +5,9 @@ use std::fmt::Write as _;
 use flexspline::{Command, GeneratorAngle, OutputAngle, PlayState, Prediction, Table};
 
 /// Columns of the CSV, in the order of the fields of `flexspline_vector`; `_bits` are those of a `float`.
-const COLUMNS: &str = "measured_counts,target_counts,torque_bits,temperature_bits,output_counts,error_bits,uncertainty_bits,quality,\
-                       command_counts,predicted_error_bits,command_uncertainty_bits,command_quality,torque_n_m,temperature_c,error_rad";
+const COLUMNS: &str = "measured_counts,target_counts,torque_bits,temperature_bits,output_counts,error_bits,\
+                       uncertainty_bits,quality,command_counts,predicted_error_bits,command_uncertainty_bits,\
+                       command_quality,torque_n_m,temperature_c,error_rad";
 
 /// A step: what it is asked, and what it answers.
 struct Step {
@@ -18,8 +19,8 @@ struct Step {
     next: Command,
 }
 
-/// Steps from a play that is not known: both directions, standing, reversals inside the play, torques and temperatures in the range, at
-/// nodes, beyond, and not finite.
+/// Steps from a play that is not known: both directions, standing, reversals inside the play, torques and temperatures
+/// in the range, at nodes, beyond, and not finite.
 fn steps(table: &Table<'_>, count: usize) -> Vec<Step> {
     let mut random = fastrand::Rng::with_seed(3);
     let torques: Vec<f32> = table.torque_nodes_n_m().collect();
@@ -86,7 +87,8 @@ pub(super) fn array(name: &str, table: &Table<'_>, count: usize) -> String {
         let Step { measured, target, torque, temperature, now, next } = step;
         let _ = writeln!(
             text,
-            "    {{INT64_C({}), INT64_C({}), 0x{:08x}, 0x{:08x}, INT64_C({}), 0x{:08x}, 0x{:08x}, {}, INT64_C({}), 0x{:08x}, 0x{:08x}, {}}},",
+            "    {{INT64_C({}), INT64_C({}), 0x{:08x}, 0x{:08x}, INT64_C({}), 0x{:08x}, 0x{:08x}, {}, INT64_C({}), \
+             0x{:08x}, 0x{:08x}, {}}},",
             measured.counts(),
             target.counts(),
             torque.to_bits(),
@@ -113,7 +115,8 @@ pub(super) fn header(tables: &[super::Table]) -> String {
 
 #include \"flexspline_table.h\"
 
-/* A call of fxt_step and its answers, in the order of the columns of the .csv; torque, temperature and errors are the bits of a float. */
+/* A call of fxt_step and its answers, in the order of the columns of the .csv; torque, temperature and errors are the \
+                    bits of a float. */
 typedef struct flexspline_vector {
     int64_t measured, target;
     uint32_t torque, temperature;
@@ -129,8 +132,8 @@ typedef struct flexspline_vector {
         let _ = writeln!(text, "#include \"flexspline_{0}.h\"\n#include \"{0}_vectors.h\"", table.name);
     }
     text.push_str(
-        "\n/* Each table from a play that is not known. */\nstatic const struct {\n    const uint8_t *image;\n    uint32_t bytes;\n    \
-         const flexspline_vector *vectors;\n    uint32_t steps;\n} flexspline_cases[] = {\n",
+        "\n/* Each table from a play that is not known. */\nstatic const struct {\n    const uint8_t *image;\n    \
+         uint32_t bytes;\n    const flexspline_vector *vectors;\n    uint32_t steps;\n} flexspline_cases[] = {\n",
     );
     for table in tables {
         let (name, array) = (&table.name, table.array());

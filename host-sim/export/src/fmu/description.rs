@@ -24,7 +24,8 @@ fn escaped(text: &str) -> String {
 fn about(kind: ModelKind) -> &'static str {
     match kind {
         ModelKind::Compensation => {
-            "Compensation of a strain wave drive: where to turn its generator so that the output comes to where it is wanted"
+            "Compensation of a strain wave drive: where to turn its generator so that the output comes to where it is \
+             wanted"
         }
         ModelKind::Joint => {
             "A joint with mass: motor, servo, strain wave drive and load, with and without compensation"
@@ -69,7 +70,8 @@ pub(super) fn xml(resources: &Resources) -> String {
     }
     let _ = write!(
         xml,
-        "  </LogCategories>\n  <DefaultExperiment startTime=\"0\" stopTime=\"{STOP_S}\" stepSize=\"{tick_s}\"/>\n  <ModelVariables>\n"
+        "  </LogCategories>\n  <DefaultExperiment startTime=\"0\" stopTime=\"{STOP_S}\" stepSize=\"{tick_s}\"/>\n  \
+         <ModelVariables>\n"
     );
     for (place, variable) in kind.variables().iter().enumerate() {
         xml += &scalar(place, variable, resources);
@@ -142,7 +144,8 @@ fn start(place: usize, variable: &Variable, resources: &Resources) -> Option<Str
 fn scalar(place: usize, variable: &Variable, resources: &Resources) -> String {
     let [causality, variability, initial] = attributes(variable);
     let mut text = format!(
-        "    <ScalarVariable name=\"{}\" valueReference=\"{place}\" description=\"{}\" causality=\"{causality}\" variability=\"{variability}\"",
+        "    <ScalarVariable name=\"{}\" valueReference=\"{place}\" description=\"{}\" causality=\"{causality}\" \
+         variability=\"{variability}\"",
         variable.name,
         escaped(variable.says)
     );
@@ -176,13 +179,15 @@ pub(super) fn page(resources: &Resources) -> String {
         format!(", for {low} to {high} N.m and {cold} to {warm} degrees C")
     });
     let mut page = format!(
-        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>flexspline {name}</title>\n<style>body{{font:15px \
-         system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem}}td,th{{text-align:left;padding:.15rem .6rem;vertical-align:top}}\
-         </style></head><body>\n<h1>flexspline {name}</h1>\n<p>{about}. Ratio {ratio}, table <code>{id}</code>{range}.</p>\n<p>Angles \
-         are radians, positive counter-clockwise for generator and output, seen from the same side. A positive torque turns the output \
-         forward. An error is output less generator over the ratio, positive where the output leads.</p>\n<p>FMI 2.0 for \
-         co-simulation. The model has ticks of <code>tick</code>. A communication step does all ticks that end within it, and carries \
-         what is left over to the next.</p>\n<table><tr><th>variable<th>unit<th>is<th>start<th>what\n",
+        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>flexspline \
+         {name}</title>\n<style>body{{font:15px system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 \
+         1rem}}td,th{{text-align:left;padding:.15rem .6rem;vertical-align:top}}</style></head><body>\n<h1>flexspline \
+         {name}</h1>\n<p>{about}. Ratio {ratio}, table <code>{id}</code>{range}.</p>\n<p>Angles are radians, positive \
+         counter-clockwise for generator and output, seen from the same side. A positive torque turns the output \
+         forward. An error is output less generator over the ratio, positive where the output leads.</p>\n<p>FMI 2.0 \
+         for co-simulation. The model has ticks of <code>tick</code>. A communication step does all ticks that end \
+         within it, and carries what is left over to the \
+         next.</p>\n<table><tr><th>variable<th>unit<th>is<th>start<th>what\n",
         name = kind.name(),
         about = about(kind),
         ratio = resources.start("ratio"),

@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// A platform of FMI 2.0 (section 2.3): its folder, how its library ends and is called by cargo, and what such a file begins with.
+/// A platform of FMI 2.0 (section 2.3): its folder, how its library ends and is called by cargo, and what such a file
+/// begins with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Platform {
     /// Folder of `binaries`.
@@ -57,7 +58,8 @@ pub struct Library {
     pub bytes: Vec<u8>,
 }
 
-/// The libraries of these files, one for each platform; without any, those that lie where a build or a release has them.
+/// The libraries of these files, one for each platform; without any, those that lie where a build or a release has
+/// them.
 ///
 /// # Errors
 /// A file that is none, or what to do where there is none at all.
@@ -86,8 +88,8 @@ pub fn find_libraries(named: &[PathBuf]) -> Result<Vec<Library>, String> {
     if libraries.is_empty() {
         let looked: Vec<String> = places(beside, &PLATFORMS[0]).iter().map(|file| file.display().to_string()).collect();
         return Err(format!(
-            "found no library for an FMU; looked for {}. In a checkout run: cargo build --release -p flexspline-fmu, and give --library \
-             target/release/{}",
+            "found no library for an FMU; looked for {}. In a checkout run: cargo build --release -p flexspline-fmu, \
+             and give --library target/release/{}",
             looked.join(", "),
             PLATFORMS[0].file
         ));

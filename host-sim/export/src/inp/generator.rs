@@ -1,16 +1,16 @@
 //! The wave generator as bodies of a deck: strips of elements behind the outline, every node prescribed.
 //!
-//! A rigid generator without friction acts by its outline alone; which of its points lies where along it is free. The points
-//! follow the bore: each face of cam and discs stays opposite the edge of the bore that it faces, its nodes where the rim of
-//! exactly constant length would put the nodes of that edge, projected onto the outline, and rollers roll. Turning the
-//! generator by 0.01 rad then moves a face by some 10 µm, outward or inward, instead of sliding it along the bore by 0.5 mm.
-//! CalculiX needs that: it pairs points of the faces at the start of an increment and keeps to the tangent there
-//! (`precontact` in its `nonlingeo.c`), so that a bore that has slid by s along a generator ends `s²/2R` inside it: 2.4 µm,
-//! and 13″ of output, for 0.01 rad.
+//! A rigid generator without friction acts by its outline alone; which of its points lies where along it is free. The
+//! points follow the bore: each face of cam and discs stays opposite the edge of the bore that it faces, its nodes
+//! where the rim of exactly constant length would put the nodes of that edge, projected onto the outline, and rollers
+//! roll. Turning the generator by 0.01 rad then moves a face by some 10 µm, outward or inward, instead of sliding it
+//! along the bore by 0.5 mm. CalculiX needs that: it pairs points of the faces at the start of an increment and keeps
+//! to the tangent there (`precontact` in its `nonlingeo.c`), so that a bore that has slid by s along a generator ends
+//! `s²/2R` inside it: 2.4 µm, and 13″ of output, for 0.01 rad.
 //!
-//! Before assembly cam and discs are a circle that just fits the undeformed bore; rollers stand pulled in along their arm.
-//! Faces are quadratic through points of the exact outline: parabolas that leave the sharpest of them, a roller of 13 mm
-//! radius, by less than 1 nm.
+//! Before assembly cam and discs are a circle that just fits the undeformed bore; rollers stand pulled in along their
+//! arm. Faces are quadratic through points of the exact outline: parabolas that leave the sharpest of them, a roller of
+//! 13 mm radius, by less than 1 nm.
 
 use std::f64::consts::TAU;
 
@@ -122,7 +122,8 @@ impl GeneratorBody {
         let inward = self.outline.neutral().radius_mm() - self.bore_radius;
         let n = unit_at(normal);
         let mut point = [x - inward * n[0], y - inward * n[1]];
-        // One step along the normal lands on the outline, but for what a change of the nearest circle or round-off leaves.
+        // One step along the normal lands on the outline, but for what a change of the nearest circle or round-off
+        // leaves.
         for _ in 0..3 {
             let foot = self.outline.nearest(point);
             point = [point[0] - foot.distance * foot.normal[0], point[1] - foot.distance * foot.normal[1]];

@@ -1,8 +1,8 @@
 //! Linear equations that hold a deck's wheels as ours are held.
 //!
-//! The mean rotation of the bore and its mean displacement are sums over all its nodes. One equation with all of them would
-//! fill the matrix: eliminating one unknown by 3000 others couples each of these with each. Running sums say the same with
-//! short equations: for sector k
+//! The mean rotation of the bore and its mean displacement are sums over all its nodes. One equation with all of them
+//! would fill the matrix: eliminating one unknown by 3000 others couples each of these with each. Running sums say the
+//! same with short equations: for sector k
 //!
 //! `sum over its edges of weight . u  =  t_k - t_(k-1)`,  `t_0 = 0`,
 //!
@@ -23,9 +23,9 @@ pub(super) struct BoreSums {
     pub edges: usize,
 }
 
-/// Equations between the nodes of the bore and one helper node for each running sum: `sum_node(sector, which)` with `which`
-/// 0 the rotation times the bore radius (mm), 1 and 2 the displacement in x and y (mm), each in its first degree of freedom;
-/// `None` stands for a sum that is held at zero.
+/// Equations between the nodes of the bore and one helper node for each running sum: `sum_node(sector, which)` with
+/// `which` 0 the rotation times the bore radius (mm), 1 and 2 the displacement in x and y (mm), each in its first
+/// degree of freedom; `None` stands for a sum that is held at zero.
 pub(super) fn bore_sums(
     mesh: &WheelMesh,
     bore_node: impl Fn(usize) -> usize,

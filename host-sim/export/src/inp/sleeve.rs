@@ -1,9 +1,11 @@
-//! The flexspline alone in three dimensions as a deck for CalculiX and Abaqus: what `flexspline sleeve --no-teeth` says, by solids.
+//! The flexspline alone in three dimensions as a deck for CalculiX and Abaqus: what `flexspline sleeve --no-teeth`
+//! says, by solids.
 //!
-//! A quarter of it, `C3D20R`, with a smooth rim; rim and tubes share their middle surface. A generator of `w0 cos 2 theta` holds the rim on the
-//! same five lines as the shells ([`flexspline_mechanics::sleeve`]) and tilts as it will: linear equations tie the radial displacement of each node on
-//! them to the node `BAND`, whose first degree of freedom is the amplitude W and whose second is the tilt (rad, along z). The force on the
-//! first is a quarter of what makes w0 by the shells; K of the band is four times that force over W.
+//! A quarter of it, `C3D20R`, with a smooth rim; rim and tubes share their middle surface. A generator of
+//! `w0 cos 2 theta` holds the rim on the same five lines as the shells ([`flexspline_mechanics::sleeve`]) and tilts as
+//! it will: linear equations tie the radial displacement of each node on them to the node `BAND`, whose first degree of
+//! freedom is the amplitude W and whose second is the tilt (rad, along z). The force on the first is a quarter of what
+//! makes w0 by the shells; K of the band is four times that force over W.
 //!
 //! | end | in the deck |
 //! |---|---|
@@ -11,7 +13,8 @@
 //! | bottom `disc` | held in its plane, free along the axis |
 //! | bottom `clamped` | all nodes held |
 //!
-//! Equations stand in place of coordinates transformed at nodes, which CalculiX 2.20 gets wrong on shells; solids need none.
+//! Equations stand in place of coordinates transformed at nodes, which CalculiX 2.20 gets wrong on shells; solids need
+//! none.
 
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
@@ -21,12 +24,13 @@ use super::{DeckError, list, short};
 use flexspline_mechanics::drive::{Bottom, Drive, Flange};
 use flexspline_mechanics::sleeve::Flexspline3d;
 
-/// Elements around a quarter, through a tube, and between two lines of the rim. 20 around and twice as many between the lines move K2 of
-/// CUP-95 and of HHD-95-hermetic by less than 0.01 %.
+/// Elements around a quarter, through a tube, and between two lines of the rim. 20 around and twice as many between the
+/// lines move K2 of CUP-95 and of HHD-95-hermetic by less than 0.01 %.
 const AROUND: usize = 14;
 const THROUGH: usize = 2;
 const BETWEEN_LINES: usize = 1;
-/// First element of a tube at either end, in decay lengths `sqrt(R t)`; how much longer each next one may be; the longest, in radii.
+/// First element of a tube at either end, in decay lengths `sqrt(R t)`; how much longer each next one may be; the
+/// longest, in radii.
 const FIRST: f64 = 0.4;
 const GROWTH: f64 = 1.6;
 const LONGEST: f64 = 0.25;
@@ -269,7 +273,8 @@ impl SleeveDeck {
     }
 }
 
-/// Nodes of a brick by halves through, around and along: corners of the near face and of the far, midsides of both, and between.
+/// Nodes of a brick by halves through, around and along: corners of the near face and of the far, midsides of both, and
+/// between.
 const BRICK: [[usize; 3]; 20] = [
     [0, 0, 0],
     [2, 0, 0],

@@ -1,9 +1,9 @@
 //! Contact FEM in the loop: the check of the dense map and of its law of play.
 //!
-//! The FEM goes on by an increment whenever the generator or the load has moved by more than a window, with its own Coulomb
-//! drag and its own contact, and its output angle is what the loop sees. Between two increments the output moves as the dense map
-//! does, set to the FEM at the last of them. How far the map had drifted from the FEM each time is kept: that is what the map
-//! misses, with its law of play.
+//! The FEM goes on by an increment whenever the generator or the load has moved by more than a window, with its own
+//! Coulomb drag and its own contact, and its output angle is what the loop sees. Between two increments the output
+//! moves as the dense map does, set to the FEM at the last of them. How far the map had drifted from the FEM each time
+//! is kept: that is what the map misses, with its law of play.
 
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::motion::Motion;

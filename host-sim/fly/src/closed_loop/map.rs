@@ -13,7 +13,8 @@ use flexspline_mechanics::stepping::{Problem, SolveError, SolverSettings};
 
 /// Temperatures of the map, °C: the ends of the flight's; tables of HHD-95 have nodes at −60 and 80.
 pub const TEMPERATURES_C: [f64; 2] = [0.0, 40.0];
-/// Least flank torque that is solved for, N·m; below it the error runs on along the straight line through the first two nodes.
+/// Least flank torque that is solved for, N·m; below it the error runs on along the straight line through the first two
+/// nodes.
 const LEAST_N_M: f64 = 1e-3;
 
 /// A map that owns its numbers.
@@ -114,8 +115,8 @@ impl DenseMap {
     }
 }
 
-/// Flank torques and phases: where rollers leave the rim unsupported, teeth come into contact one by one with a corner in the
-/// wind-up at each, and it takes more of both.
+/// Flank torques and phases: where rollers leave the rim unsupported, teeth come into contact one by one with a corner
+/// in the wind-up at each, and it takes more of both.
 fn size(kind: GeneratorKind) -> (usize, usize) {
     match kind {
         GeneratorKind::TwoRoller => (128, 32),

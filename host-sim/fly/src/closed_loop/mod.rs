@@ -1,9 +1,10 @@
 //! The core in a closed loop with the simulated drive: what it gains in pointing.
 //!
 //! The plant is contact FEM at points that made no table ([`map::DenseMap`]), read with a law of play of its own
-//! ([`flight::gear`]); the direct FEM ([`fem::FemPlant`]) flies the same loop as a check of it. What has mass is flown by
-//! [`crate::fly`]. Everything that flies is in [`flight`], which `tests/firmware` compiles for the target as well: the joint's
-//! tick is the very same code in both.
+//! ([`flight::gear`]); the direct FEM ([`fem::FemPlant`]) flies the same loop as a check of it. What has mass is flown
+//! by
+//! [`crate::fly`]. Everything that flies is in [`flight`], which `tests/firmware` compiles for the target as well: the
+//! joint's tick is the very same code in both.
 
 pub mod fem;
 pub mod flight;

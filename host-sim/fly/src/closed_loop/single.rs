@@ -66,8 +66,8 @@ impl<'a, P: Plant> Single<'a, P> {
         })
     }
 
-    /// One tick. `disturb` may change what the joint is told, and says whether it is called at all; if not, the last command
-    /// stands.
+    /// One tick. `disturb` may change what the joint is told, and says whether it is called at all; if not, the last
+    /// command stands.
     pub fn tick(&mut self, now: &Moment, disturb: impl FnOnce(&mut Told, &mut Compensated<'a>) -> bool) -> Step {
         let error_rad = self.lane.output_rad() - now.target_rad;
         let shown_n_m = self.sensors.torque(self.noise.part(), now.torque_n_m);

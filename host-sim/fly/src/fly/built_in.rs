@@ -9,8 +9,8 @@ use flexspline_mechanics::drive::GeneratorKind;
 /// Names of scenarios.
 pub const SCENARIOS: [&str; 4] = ["antenna", "rover", "camera", "telescope"];
 
-/// A servo of the size of HHD-95's motor, at 1 kHz, 0.2 ms late: 17 bits, tuned for the motor alone at a speed loop that the load's resonance
-/// leaves a margin.
+/// A servo of the size of HHD-95's motor, at 1 kHz, 0.2 ms late: 17 bits, tuned for the motor alone at a speed loop
+/// that the load's resonance leaves a margin.
 const SERVO: ServoSettings = ServoSettings {
     tick_s: 1e-3,
     steps: 5,

@@ -286,7 +286,8 @@ mod tests {
         for (text, said) in [
             (
                 "base = \"anntena\"",
-                "own.toml: base: found \"anntena\", allowed: antenna, rover, camera, telescope; did you mean `antenna`?",
+                "own.toml: base: found \"anntena\", allowed: antenna, rover, camera, telescope; did you mean \
+                 `antenna`?",
             ),
             ("base = \"rover\"\ndrag_n_m = -1.0", "own.toml: drag_n_m: found -1, allowed: 0 to 10"),
             (

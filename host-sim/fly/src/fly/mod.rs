@@ -1,4 +1,5 @@
-//! Flights of a joint with mass: scenarios with a name or from a file, on units built from the contact FEM of the four generators.
+//! Flights of a joint with mass: scenarios with a name or from a file, on units built from the contact FEM of the four
+//! generators.
 //!
 //! What moves is in `flexspline-motion`; here scenarios are read, units made, and results put into numbers.
 
@@ -40,7 +41,8 @@ fn map(kind: GeneratorKind) -> &'static str {
     }
 }
 
-/// A unit of HHD-95 with this generator at a temperature: wind-up, clearance and ripple of the contact FEM, and what was built otherwise.
+/// A unit of HHD-95 with this generator at a temperature: wind-up, clearance and ripple of the contact FEM, and what
+/// was built otherwise.
 ///
 /// # Errors
 /// What is wrong, in words.

@@ -33,7 +33,8 @@ pub struct Results {
     pub scenario: String,
     /// Wave generator.
     pub generator: String,
-    /// From what the torque is known (`none` also where no low-pass of the torque in the mesh keeps the margin), and what the table knows.
+    /// From what the torque is known (`none` also where no low-pass of the torque in the mesh keeps the margin), and
+    /// what the table knows.
     pub torque: String,
     /// See there.
     pub table: String,
@@ -43,21 +44,26 @@ pub struct Results {
     pub rms_arcsec: ByController<f64>,
     /// Largest of it.
     pub max_arcsec: ByController<f64>,
-    /// Speed of the output less that of the target while that moves evenly, arcsec/s rms; not a number (`null`) where it never does.
+    /// Speed of the output less that of the target while that moves evenly, arcsec/s rms; not a number (`null`) where
+    /// it never does.
     pub velocity_ripple: ByController<f64>,
-    /// The same of a drive without errors, not compensated: what is not the drive's, but encoder, servo, friction and wind.
+    /// The same of a drive without errors, not compensated: what is not the drive's, but encoder, servo, friction and
+    /// wind.
     pub velocity_ripple_floor: f64,
     /// Torque in the mesh, N·m, largest.
     pub mesh_n_m: ByController<f64>,
-    /// From the end of a slew until the output stays within 2″ of where it comes to rest, s, mean; none if the scenario never stands.
+    /// From the end of a slew until the output stays within 2″ of where it comes to rest, s, mean; none if the scenario
+    /// never stands.
     pub settle_s: Option<ByController<f64>>,
     /// Share of what the ideal removes that the core removes; none where the ideal removes next to nothing.
     pub removed: Option<f64>,
-    /// Whether the servo is stable with this load, and the compensated joint comes to rest after a knock as the one without compensation does.
+    /// Whether the servo is stable with this load, and the compensated joint comes to rest after a knock as the one
+    /// without compensation does.
     pub stable: bool,
     /// Low-pass of a torque in the mesh that keeps the margin, Hz.
     pub bandwidth_hz: f64,
-    /// Phase margin of the servo, degrees, at Hz; the least distance of its open loop from −1, 0 where it is not stable.
+    /// Phase margin of the servo, degrees, at Hz; the least distance of its open loop from −1, 0 where it is not
+    /// stable.
     pub phase_margin_deg: [f64; 2],
     /// See there.
     pub servo_distance: f64,

@@ -2,11 +2,12 @@
 
 use super::folds::{Chosen, Folds};
 
-/// Penalties that are tried, of a column's mean square. Below the least of them a curve is free to run away where nothing was recorded: with a
-/// tenth of it the first eighth of the record of `examples/lara8` is missed by 120 arc-seconds by the others, with it by 25.
+/// Penalties that are tried, of a column's mean square. Below the least of them a curve is free to run away where
+/// nothing was recorded: with a tenth of it the first eighth of the record of `examples/lara8` is missed by 120
+/// arc-seconds by the others, with it by 25.
 pub(super) const PENALTIES: [f64; 4] = [1e-4, 1e-3, 1e-2, 1e-1];
-/// A part is kept if it takes at least this share of the squares left without it: one per cent of the error. Chosen on the two records of
-/// `examples/`.
+/// A part is kept if it takes at least this share of the squares left without it: one per cent of the error. Chosen on
+/// the two records of `examples/`.
 pub(super) const LEAST_GAIN: f64 = 0.02;
 
 /// Parts chosen one after another, the best first, as long as each gains: none, the first, the first two, and so on.
@@ -70,8 +71,8 @@ fn tuned(folds: &Folds, of: &[usize], chosen: &mut [Chosen]) -> f64 {
     left
 }
 
-/// Squares that the choice and the fit, both made without a fold, leave in that fold, summed over all folds, arcsec²: with no part at most,
-/// with one, and so on.
+/// Squares that the choice and the fit, both made without a fold, leave in that fold, summed over all folds, arcsec²:
+/// with no part at most, with one, and so on.
 pub(super) fn nested(folds: &Folds) -> Vec<f64> {
     let all = folds.all();
     let mut left = vec![0.0; folds.parts().len() + 1];

@@ -1,4 +1,5 @@
-//! Least squares with a penalty by sums over folds: what a fit to all folds but one leaves in that one costs no pass over the rows.
+//! Least squares with a penalty by sums over folds: what a fit to all folds but one leaves in that one costs no pass
+//! over the rows.
 
 use flexspline_algebra::{Mat, cholesky};
 
@@ -43,7 +44,8 @@ pub(super) struct Folds {
 pub(super) const FLOOR: f64 = 1e-9;
 
 impl Folds {
-    /// Sums of all parts that may be fitted. With `own_zero` each fold has a zero of its own, found in it; else `zeros` of them are shared.
+    /// Sums of all parts that may be fitted. With `own_zero` each fold has a zero of its own, found in it; else `zeros`
+    /// of them are shared.
     pub fn new(rows: &[Row], parts: &[PartName], scales: &Scales, zeros: usize, own_zero: bool) -> Folds {
         let zeros = if own_zero { 0 } else { zeros };
         let (mut begins, mut all) = (Vec::new(), vec![0.0; zeros]);

@@ -1,8 +1,10 @@
-//! How well the fitted parts are known: the information matrix, the noise that the rows show, an interval for each node.
+//! How well the fitted parts are known: the information matrix, the noise that the rows show, an interval for each
+//! node.
 //!
-//! The rows `x c + zero + noise` have the information `G = Σ x xᵀ`, the zero of each file taken out. With the penalty `Λ` of the fit the
-//! coefficients have the covariance `σ² κ (G + Λ)⁻¹`; `κ` says how much more the mean of many rows varies than white noise would let it (drift,
-//! jitter, what no part has). The penalty pulls the coefficients by `−(G + Λ)⁻¹ Λ c`; the square of that is added.
+//! The rows `x c + zero + noise` have the information `G = Σ x xᵀ`, the zero of each file taken out. With the penalty
+//! `Λ` of the fit the coefficients have the covariance `σ² κ (G + Λ)⁻¹`; `κ` says how much more the mean of many rows
+//! varies than white noise would let it (drift, jitter, what no part has). The penalty pulls the coefficients by
+//! `−(G + Λ)⁻¹ Λ c`; the square of that is added.
 
 use std::f64::consts::{PI, TAU};
 
@@ -116,7 +118,8 @@ pub(super) fn row(chosen: &[Chosen], at: &State, scales: &Scales) -> Vec<f64> {
 pub struct Noise {
     /// What the model leaves of the rows that it was fitted to, arcsec rms.
     pub rms_arcsec: f64,
-    /// Of that the noise of single rows; 0 where rows are so far apart that what no part has changes from row to row as well.
+    /// Of that the noise of single rows; 0 where rows are so far apart that what no part has changes from row to row as
+    /// well.
     pub white_arcsec: f64,
     /// How much more the mean of many rows varies than if all of it did: 1 or more.
     pub hangs_together: f64,
@@ -230,7 +233,8 @@ pub(super) fn nodes_of(part: PartName, scales: &Scales) -> Vec<(&'static str, f6
         .collect()
 }
 
-/// The half widths of all nodes of some parts, from the covariance of noise one and the variance of a row; in the order of the parts.
+/// The half widths of all nodes of some parts, from the covariance of noise one and the variance of a row; in the order
+/// of the parts.
 pub(super) fn widths(
     chosen: &[Chosen],
     scales: &Scales,
@@ -304,8 +308,8 @@ impl Known {
         })
     }
 
-    /// Half width of the interval that holds, with 95 %, what the table has at a state against the true error there, arcsec, but for one zero of
-    /// all.
+    /// Half width of the interval that holds, with 95 %, what the table has at a state against the true error there,
+    /// arcsec, but for one zero of all.
     #[must_use]
     pub fn half_width_arcsec(&self, at: &State) -> f64 {
         let x = row(&self.model.chosen, at, &self.model.scales);

@@ -4,11 +4,12 @@
 //! logs -> measurement -> rows in steady motion, less the prior -> parts, chosen by folds left out -> samples -> table (.fxt) -> the core over the logs
 //! ```
 //!
-//! Physics first: the nominal model, or a table, is the prior, and is taken from what was measured. What remains is fitted by smooth
-//! [parts](PartName), each with a penalty against wrinkles. Which parts are kept, and how smooth they are, is decided by what fits leave in
-//! files, sessions or blocks that they did not see; the figure given for the whole is nested: choice, penalties and fit are all made
-//! without the fold that they are judged in. No part is fitted where nothing was recorded that could show it, and no table is made that leaves
-//! more than a simpler one.
+//! Physics first: the nominal model, or a table, is the prior, and is taken from what was measured. What remains is
+//! fitted by smooth
+//! [parts](PartName), each with a penalty against wrinkles. Which parts are kept, and how smooth they are, is decided
+//! by what fits leave in files, sessions or blocks that they did not see; the figure given for the whole is nested:
+//! choice, penalties and fit are all made without the fold that they are judged in. No part is fitted where nothing was
+//! recorded that could show it, and no table is made that leaves more than a simpler one.
 
 mod choose;
 mod folds;
@@ -39,11 +40,13 @@ pub use zero::{Alignment, OutputZero, ZeroCost, cost};
 const GOLDEN: f64 = 0.618_033_988_749_895;
 /// Fewest rows in steady motion that make a table.
 const FEWEST_ROWS: usize = 64;
-/// Load that decides the flank where no model says a friction, of the largest recorded: a guess, small beside any load of interest.
+/// Load that decides the flank where no model says a friction, of the largest recorded: a guess, small beside any load
+/// of interest.
 const LEAST_FRICTION: f64 = 0.02;
 /// Rows between two dead zones tell them apart if their load is clear of both by so many times the torque's noise…
 const CLEAR_OF_NOISE: f64 = 6.0;
-/// …and if the other leaves less than this share of their squares: where it is right, half of them lie on the wrong flank.
+/// …and if the other leaves less than this share of their squares: where it is right, half of them lie on the wrong
+/// flank.
 const OTHER_DEAD_ZONE: f64 = 0.8;
 /// Torques within this share of the largest are one.
 const SAME_TORQUE: f64 = 1e-3;
@@ -54,7 +57,8 @@ const MOST_OF_A_TURN: f64 = 0.75;
 const HALF_A_TURN: f64 = 0.5;
 /// Rows that a tooth pitch needs for its curve.
 const ROWS_OF_A_PITCH: f64 = 6.0;
-/// Files do not share their zeros if fits to each alone leave less than this share of what the others leave in it. A guess.
+/// Files do not share their zeros if fits to each alone leave less than this share of what the others leave in it. A
+/// guess.
 const ALONE: f64 = 0.3;
 /// Rows that the usual half width is taken of.
 const ROWS_OF_A_WIDTH: usize = 2000;
@@ -62,7 +66,8 @@ const ROWS_OF_A_WIDTH: usize = 2000;
 const FINE_TURNS: f64 = 1.0;
 /// The penalty that a plan counts with: the least that a fit takes.
 const PENALTY_OF_PLANS: f64 = PENALTIES[0];
-/// A ratio is refused if another leaves less than this share of the squares. A guess: of what a wrong whole number does, nothing is left.
+/// A ratio is refused if another leaves less than this share of the squares. A guess: of what a wrong whole number
+/// does, nothing is left.
 const OTHER_RATIO: f64 = 0.25;
 /// A lag that is negative by no more than this, and this share of the largest number of the play, is noise: guesses.
 const NO_LAG_ARCSEC: f64 = 0.5;
@@ -143,8 +148,8 @@ impl Model {
         2.0 * [play[0] + play[2], play[0], play[0] + play[1]].into_iter().fold(0.0, f64::max)
     }
 
-    /// Whether the flanks keep their sides, with half the prior's play where no load decides. A lag that is negative by no more than noise is
-    /// none.
+    /// Whether the flanks keep their sides, with half the prior's play where no load decides. A lag that is negative by
+    /// no more than noise is none.
     fn has_sound_flanks(&mut self, prior_half_arcsec: f64) -> bool {
         let mut least_lag = 0.0;
         if let Some(play) = self.of(PartName::Play)
@@ -177,8 +182,8 @@ pub struct PartSays {
     pub name: &'static str,
     /// Whether it is in the table.
     pub kept: bool,
-    /// Share of the squares before that it takes in folds left out; of one that was refused, that it would take beside the others.
-    /// Absent where nothing was recorded that shows it.
+    /// Share of the squares before that it takes in folds left out; of one that was refused, that it would take beside
+    /// the others. Absent where nothing was recorded that shows it.
     pub held_out_gain: Option<f64>,
     /// Penalty of its coefficients, of a column's mean square.
     pub penalty: Option<f64>,
@@ -237,7 +242,8 @@ pub struct Calibration {
     pub nodes: Vec<Node>,
     /// What the rows show of noise.
     pub noise: Noise,
-    /// Half width of the interval that holds the table's error in a state with 95 %, mean square root over the rows, arcsec.
+    /// Half width of the interval that holds the table's error in a state with 95 %, mean square root over the rows,
+    /// arcsec.
     pub half_width_arcsec: f64,
     /// Phase of the table that was known before, if one was.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -318,8 +324,8 @@ fn check_ratio(files: &[Recording], prior: &Prior<'_>) -> Result<Option<String>,
     let whole = found.round();
     if (whole - ratio).abs() >= 1.0 && whole.abs() >= 2.0 && left(whole) < OTHER_RATIO {
         return Err(CalibrationError::Ratio(format!(
-            "ratio: found {ratio}, but the generator turns {found:.2} times for one turn of the output in these rows; allowed: {whole}, or \
-             other units or signs of the columns"
+            "ratio: found {ratio}, but the generator turns {found:.2} times for one turn of the output in these rows; \
+             allowed: {whole}, or other units or signs of the columns"
         )));
     }
     let half = found.floor() + 0.5;
@@ -329,13 +335,14 @@ fn check_ratio(files: &[Recording], prior: &Prior<'_>) -> Result<Option<String>,
     }))
 }
 
-/// Generator turns that tell two waves in a turn from two in a turn against the output: half a turn of the output, in which the one gains a wave on
-/// the other.
+/// Generator turns that tell two waves in a turn from two in a turn against the output: half a turn of the output, in
+/// which the one gains a wave on the other.
 fn turns_to_tell_wheels(ratio: f64) -> f64 {
     0.5 * ratio.abs()
 }
 
-/// The first two files that hold the same rows: one log that was given twice would be left out by what was fitted to it.
+/// The first two files that hold the same rows: one log that was given twice would be left out by what was fitted to
+/// it.
 fn given_twice(files: &[Recording]) -> Option<[&str; 2]> {
     fn angles(file: &Recording) -> impl Iterator<Item = [&[f64]; 2]> {
         file.sessions.iter().map(|session| [session.generator_rad.as_slice(), &session.error_rad])
@@ -394,7 +401,8 @@ fn by_zeros(file: &Recording) -> Vec<Recording> {
     pieces
 }
 
-/// Calibrates from `rows` with the load that decides the flank as it stands in `recorded`; `doubt` is what is said of the ratio.
+/// Calibrates from `rows` with the load that decides the flank as it stands in `recorded`; `doubt` is what is said of
+/// the ratio.
 fn with_dead_zone(
     files: &[Recording],
     prior: &Prior<'_>,
@@ -435,8 +443,8 @@ fn with_dead_zone(
         let alone = fitted_alone(&rows, &folds, &every_part(&folds));
         let zeros = (alone < ALONE * held_out.rms_after_arcsec).then(|| {
             format!(
-                "; each log alone is fitted to {alone:.2}: do they share their zeros? Home the encoders in the same place before each log, or give \
-                 one log alone"
+                "; each log alone is fitted to {alone:.2}: do they share their zeros? Home the encoders in the same \
+                 place before each log, or give one log alone"
             )
         });
         return Err(CalibrationError::NothingGained(format!(
@@ -529,8 +537,8 @@ fn with_faults(error: CalibrationError, files: &[Recording]) -> CalibrationError
     }
 }
 
-/// Load below which the direction decides the flank beside a table, N·m: its own dead zone, unless rows with loads between it and that of a drive
-/// with the usual friction say otherwise; with the rows less what the table says so.
+/// Load below which the direction decides the flank beside a table, N·m: its own dead zone, unless rows with loads
+/// between it and that of a drive with the usual friction say otherwise; with the rows less what the table says so.
 fn dead_zone(rows: Rows, prior: &Prior<'_>, table: &Table<'_>, recorded: &Recorded) -> (Rows, f64) {
     let (own, usual) = (dead_zone_n_m(table), recorded.scales.friction_n_m);
     let less = |rows: Rows, least_friction_n_m: f64| rows.less(&Prior { least_friction_n_m, ..prior.clone() });
@@ -721,13 +729,15 @@ fn remarks(
     }
     if model.chosen.is_empty() {
         remarks.push(
-            "no part gains in what was left out: the table is what was known before, its zeros aside; are the logs of this unit, and of one?".to_owned(),
+            "no part gains in what was left out: the table is what was known before, its zeros aside; are the logs of \
+             this unit, and of one?"
+                .to_owned(),
         );
     }
     if recorded.output_share < 1.0 && has(PartName::OutputAngle) {
         remarks.push(format!(
-            "{:.0} % of an output turn was recorded: in the rest the curve over the output angle is the smoothest that joins its ends, and not \
-             measured",
+            "{:.0} % of an output turn was recorded: in the rest the curve over the output angle is the smoothest \
+             that joins its ends, and not measured",
             100.0 * recorded.output_share
         ));
     }
@@ -736,15 +746,15 @@ fn remarks(
     }
     if fitted_alone < ALONE * held_out.rms_after_arcsec {
         remarks.push(format!(
-            "each log alone is fitted to {fitted_alone:.2} arcsec, and left with {:.2} by the others: they do not seem to share their zeros; home the \
-             encoders in the same place before each log, or give one log alone",
+            "each log alone is fitted to {fitted_alone:.2} arcsec, and left with {:.2} by the others: they do not \
+             seem to share their zeros; home the encoders in the same place before each log, or give one log alone",
             held_out.rms_after_arcsec
         ));
     }
     if has(PartName::OutputAngle) && parts.iter().any(|part| part.name == "wind_up" && part.held_out_gain.is_some()) {
         remarks.push(
-            "a load that turns with the output (the weight of an arm) and an eccentric encoder look alike here: the table holds for the loads \
-             of these logs"
+            "a load that turns with the output (the weight of an arm) and an eccentric encoder look alike here: the \
+             table holds for the loads of these logs"
                 .to_owned(),
         );
     }

@@ -1,7 +1,8 @@
-//! The parts that a unit may have beside its nominal model: smooth, periodic where the drive is, each linear in its coefficients.
+//! The parts that a unit may have beside its nominal model: smooth, periodic where the drive is, each linear in its
+//! coefficients.
 //!
-//! Every column is of the order of one, so that a penalty means the same in all parts. The weight of a column within its part rises with
-//! its order: smooth curves cost little, wrinkles much.
+//! Every column is of the order of one, so that a penalty means the same in all parts. The weight of a column within
+//! its part rises with its order: smooth curves cost little, wrinkles much.
 
 use std::f64::consts::TAU;
 
@@ -56,18 +57,20 @@ impl PartName {
 
 /// Waves of a curve over the generator's turn, or over that against the output: what a table holds.
 pub(super) const GENERATOR_ORDERS: u16 = 8;
-/// Waves of the curve over the output's turn: an encoder's two, the weight of an arm that swings through angles and winds up a spring that
-/// hardens (up to three times its order), and some more. Chosen on the two records of `examples/`.
+/// Waves of the curve over the output's turn: an encoder's two, the weight of an arm that swings through angles and
+/// winds up a spring that hardens (up to three times its order), and some more. Chosen on the two records of
+/// `examples/`.
 pub(super) const OUTPUT_ORDERS: u16 = 6;
 /// Waves of the curve over a tooth pitch: eight nodes of a table hold them.
 pub(super) const TOOTH_ORDERS: u16 = 3;
 /// Degree of the wind-up over the torques recorded.
 const WIND_UP_DEGREE: usize = 6;
-/// Load, of the largest recorded, at which half of what light loads do is done: clearance that closes, teeth that come into contact. A polynomial
-/// has no such bend, and swings between the loads recorded instead. A guess, between the dead zone and the first loads of a plan.
+/// Load, of the largest recorded, at which half of what light loads do is done: clearance that closes, teeth that come
+/// into contact. A polynomial has no such bend, and swings between the loads recorded instead. A guess, between the
+/// dead zone and the first loads of a plan.
 const LIGHT_LOAD: f64 = 0.05;
-/// How the weight of a wave rises with its order: between the energies of a slope (second power) and of a curvature (fourth). Chosen on
-/// halves of the record of `examples/csf17_100`.
+/// How the weight of a wave rises with its order: between the energies of a slope (second power) and of a curvature
+/// (fourth). Chosen on halves of the record of `examples/csf17_100`.
 const WAVE_POWER: i32 = 3;
 /// How the weight of a degree of the wind-up rises with the degree: a guess.
 const DEGREE_POWER: i32 = 4;

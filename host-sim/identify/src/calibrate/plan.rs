@@ -1,8 +1,10 @@
-//! What to record: the motion that tells most of the parts in the time there is, found from the same columns that the fit uses.
+//! What to record: the motion that tells most of the parts in the time there is, found from the same columns that the
+//! fit uses.
 //!
-//! Passes that a bench can make (over the whole travel there and back at one load; a few slow generator turns) are added one after the other,
-//! each time the one that lowers the expected variance of the table, over all that it is to hold, most for its time. The expected accuracy is that of
-//! the information matrix of all of them, for the noise that is assumed or that a first log has shown.
+//! Passes that a bench can make (over the whole travel there and back at one load; a few slow generator turns) are
+//! added one after the other, each time the one that lowers the expected variance of the table, over all that it is to
+//! hold, most for its time. The expected accuracy is that of the information matrix of all of them, for the noise that
+//! is assumed or that a first log has shown.
 
 use std::f64::consts::TAU;
 
@@ -15,7 +17,8 @@ use super::parts::{PartName, Scales, State};
 use super::rows::MOST_ROWS;
 use super::{GOLDEN, LEAST_FRICTION, ONE_TEMPERATURE_K, PENALTY_OF_PLANS, Prior, ROWS_OF_A_PITCH};
 
-/// Beyond what any bench or catalogue of these drives has, so a slip of the pen: generator, load and temperature. Guesses.
+/// Beyond what any bench or catalogue of these drives has, so a slip of the pen: generator, load and temperature.
+/// Guesses.
 const FASTEST_RPM: f64 = 2e4;
 const LOADS_N_M: [f64; 2] = [-1e5, 1e5];
 const TEMPERATURES_C: [f64; 2] = [-200.0, 300.0];
@@ -31,7 +34,8 @@ const ASKED: usize = 1500;
 const ROWS_OF_A_PASS: usize = 500;
 /// A slower pass is not worth its own kind below this share of the speed.
 const SLOWER: f64 = 0.7;
-/// Slowest that a pass is made to spread its rows, of the fastest; speeds that are tried; and places of a turn that rows would come back to.
+/// Slowest that a pass is made to spread its rows, of the fastest; speeds that are tried; and places of a turn that
+/// rows would come back to.
 const SLOWEST_TO_SPREAD: f64 = 0.9;
 const SPEEDS: usize = 101;
 const PLACES_OF_A_TURN: u32 = 24;
@@ -283,7 +287,8 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&First<'_>>) -> Resu
     if taken.len() == MOST_PASSES {
         let hours = bench.minutes / 60.0;
         return Err(format!(
-            "--minutes: found {}: in {hours:.0} hours there is time for {MOST_PASSES} passes and more; allowed: less time",
+            "--minutes: found {}: in {hours:.0} hours there is time for {MOST_PASSES} passes and more; allowed: less \
+             time",
             bench.minutes
         ));
     }
@@ -332,7 +337,8 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&First<'_>>) -> Resu
     })
 }
 
-/// Cold first; at each temperature in the order in which they tell most, so that a log that is broken off is worth most.
+/// Cold first; at each temperature in the order in which they tell most, so that a log that is broken off is worth
+/// most.
 fn in_order(taken: Vec<(usize, Pass)>) -> Vec<Pass> {
     let warmths = taken.iter().map(|(warmth, _)| warmth + 1).max().unwrap_or(0);
     let mut passes = Vec::new();
@@ -346,7 +352,8 @@ fn in_order(taken: Vec<(usize, Pass)>) -> Vec<Pass> {
     passes
 }
 
-/// The column of the temperature that moves the zero alone, which logs of one temperature each cannot tell from the encoder's.
+/// The column of the temperature that moves the zero alone, which logs of one temperature each cannot tell from the
+/// encoder's.
 fn column_of_zero(chosen: &[Chosen]) -> Option<usize> {
     let at = chosen.iter().position(|chosen| chosen.part == PartName::Temperature)?;
     Some(width_of(&chosen[..at]))
@@ -465,8 +472,8 @@ fn loads([low, high]: [f64; 2]) -> Vec<f64> {
     loads
 }
 
-/// A speed at which rows do not come back to the same few places of the generator's turn: the one, of those not much slower than the
-/// fastest, whose turns from row to row stay farthest from every fraction with a small denominator.
+/// A speed at which rows do not come back to the same few places of the generator's turn: the one, of those not much
+/// slower than the fastest, whose turns from row to row stay farthest from every fraction with a small denominator.
 fn spreading_rpm(fastest: f64, rate_hz: f64) -> f64 {
     let turns_of_a_row = |rpm: f64| rpm / 60.0 / rate_hz;
     if turns_of_a_row(fastest) * f64::from(PLACES_OF_A_TURN) < 1.0 {
@@ -541,7 +548,9 @@ impl Planned {
     /// The passes as a table for whoever programs the bench.
     #[must_use]
     pub fn csv(&self) -> String {
-        let mut text = "log,begin_s,duration_s,from_output_deg,to_output_deg,from_generator_turn,to_generator_turn,speed_rpm,torque_n_m,temperature_c,tells\n".to_owned();
+        let mut text = "log,begin_s,duration_s,from_output_deg,to_output_deg,from_generator_turn,to_generator_turn,\
+                        speed_rpm,torque_n_m,temperature_c,tells\n"
+            .to_owned();
         for p in &self.passes {
             text += &format!(
                 "{},{:.1},{:.1},{:.3},{:.3},{:.3},{:.3},{:.2},{:.3},{:.1},{}\n",

@@ -96,8 +96,8 @@ impl<'a> Prior<'a> {
         let drive = drive.map_err(|error| format!("ratio {}: {error}", self.nominal.ratio))?;
         if (drive.exact_ratio() / self.nominal.ratio - 1.0).abs() > 1e-9 {
             return Err(format!(
-                "ratio: found {}, allowed: a ratio that wheels with two teeth of difference have, a whole number or a half; \
-                 or a model with the teeth, --model nominal.toml",
+                "ratio: found {}, allowed: a ratio that wheels with two teeth of difference have, a whole number or a \
+                 half; or a model with the teeth, --model nominal.toml",
                 self.nominal.ratio
             ));
         }

@@ -12,7 +12,8 @@ use flexspline_base::units::ARCSEC_PER_RAD;
 const BLOCKS: usize = 8;
 /// With so many files, or sessions, each is a fold.
 const ENOUGH_SESSIONS: usize = 3;
-/// Left-out sessions are folds if none of them holds more than this share of the rows: without a larger one the rest is another record. A guess.
+/// Left-out sessions are folds if none of them holds more than this share of the rows: without a larger one the rest is
+/// another record. A guess.
 const LARGEST_SESSION: f64 = 0.4;
 /// Rows that are fitted, at most; of longer records every so many-th.
 pub(super) const MOST_ROWS: usize = 40_000;
@@ -240,7 +241,8 @@ impl Rows {
         (at.torque_n_m.abs() - friction_n_m).abs() >= SURE * recorded.torque_noise_n_m
     }
 
-    /// Without the rows of which the noise of the torque leaves open on which flank they lie, where loads from `friction_n_m` on decide it.
+    /// Without the rows of which the noise of the torque leaves open on which flank they lie, where loads from
+    /// `friction_n_m` on decide it.
     pub fn sure(mut self, friction_n_m: f64, recorded: &Recorded) -> Rows {
         let keep: Vec<bool> = self.rows.iter().map(|row| Self::is_sure(&row.at, friction_n_m, recorded)).collect();
         let mut kept = keep.iter();

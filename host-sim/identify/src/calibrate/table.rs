@@ -17,11 +17,13 @@ use flexspline_design::tables::{
 
 /// Torque nodes that the choice starts with, evenly over the torques recorded.
 const FIRST_TORQUE_NODES: usize = 5;
-/// A torque node is put in where the table misses the model by more than this, arcsec: a tenth of what the best encoders resolve.
+/// A torque node is put in where the table misses the model by more than this, arcsec: a tenth of what the best
+/// encoders resolve.
 const MISS_ARCSEC: f64 = 0.05;
 /// No node is put in nearer to another than this many times the width of the widest jump, which would be none any more.
 const CLEAR_OF_NODES: f64 = 9.0;
-/// Half the width of the jump at the friction, of the friction; and how near to it no other node may lie, of the friction and of the range.
+/// Half the width of the jump at the friction, of the friction; and how near to it no other node may lie, of the
+/// friction and of the range.
 const JUMP_HALF_WIDTH: f64 = 0.002;
 const CLEAR_OF_JUMP: [f64; 2] = [0.2, 0.02];
 /// Nodes over a tooth pitch.
@@ -86,8 +88,8 @@ pub(super) fn make(prior: &Prior<'_>, model: &Model, recorded: &Recorded) -> Res
     Ok(of_nodes(&chosen.nodes)?)
 }
 
-/// How far a trial table misses the model under a load, in the mean over the places at which other than the first node are sampled, arcsec: the ripple
-/// about the mean is the nodes' own.
+/// How far a trial table misses the model under a load, in the mean over the places at which other than the first node
+/// are sampled, arcsec: the ripple about the mean is the nodes' own.
 fn misses(trial: Option<&MadeTable>, prior: &Prior<'_>, model: &Model, torque: f32, temperatures: &[f32]) -> f64 {
     let Some(table) = trial.and_then(|made| Table::check(&made.image).ok()) else { return f64::INFINITY };
     let mut worst = 0.0_f64;
@@ -132,7 +134,8 @@ fn temperature_nodes(prior: &Prior<'_>, recorded: &Recorded) -> Vec<f32> {
     }
 }
 
-/// Torque nodes that the choice starts with: even ones, or those of the table that was there before; about each jump two.
+/// Torque nodes that the choice starts with: even ones, or those of the table that was there before; about each jump
+/// two.
 fn first_torque_nodes(prior: &Prior<'_>, model: &Model, recorded: &Recorded) -> Vec<f32> {
     let [low, high] = match prior.table {
         Some(table) => table.torque_range_n_m().map(f64::from),
@@ -203,8 +206,8 @@ fn samples(prior: &Prior<'_>, model: &Model, teeth: f64, torques: &[f32], temper
     samples
 }
 
-/// Places over a turn of the output on which no order of the generator, of the generator against the output, of the output or of the mesh
-/// folds onto another: a prime.
+/// Places over a turn of the output on which no order of the generator, of the generator against the output, of the
+/// output or of the mesh folds onto another: a prime.
 fn places(ratio: f64, teeth: f64) -> usize {
     let against = (ratio - 1.0).abs();
     let waves = (1..=GENERATOR_ORDERS).flat_map(|k| [ratio.abs(), against].map(|turns| f64::from(k) * turns));

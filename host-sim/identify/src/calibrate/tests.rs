@@ -16,8 +16,8 @@ fn noise(random: &mut fastrand::Rng) -> f64 {
     2.0 * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0)
 }
 
-/// A recording of one session: to and fro through 1.2 output turns under a load that swings, with an error by `law` (arcsec) of generator
-/// angle, output angle, torque and direction.
+/// A recording of one session: to and fro through 1.2 output turns under a load that swings, with an error by `law`
+/// (arcsec) of generator angle, output angle, torque and direction.
 fn recording(seed: u64, law: impl Fn(f64, f64, f64, f64) -> f64) -> Recording {
     let mut random = fastrand::Rng::with_seed(seed);
     let mut session = Session { torque_n_m: Some(Vec::new()), ..Session::default() };
@@ -103,7 +103,8 @@ fn files_are_left_out_whole_each_with_its_zero() {
     assert!(c.core.rms_after_arcsec < 2.2, "{:?}", c.core);
 }
 
-/// A model of another drive has a wave that no part can take out: with a part that gains it still leaves more than no table.
+/// A model of another drive has a wave that no part can take out: with a part that gains it still leaves more than no
+/// table.
 #[test]
 fn a_table_that_loses_to_none_is_not_made() {
     let files: Vec<Recording> = (0..4).map(|seed| recording(seed, |_, out, _, _| 60.0 * out.cos())).collect();
@@ -237,7 +238,8 @@ fn a_plan_says_what_noise_leaves_and_its_intervals_hold() {
     }
     let rms = (squares / count).sqrt();
     println!("expected {expected:.3}, found {rms:.3} arcsec rms, inside {:.3}", inside / count);
-    // A plan knows the noise alone. The step of this unit's wind-up at no load is no polynomial, and leaves as much again.
+    // A plan knows the noise alone. The step of this unit's wind-up at no load is no polynomial, and leaves as much
+    // again.
     assert!(rms < 3.0 * expected && rms > 0.5 * expected, "{rms} of {expected}");
     assert!(inside / count > 0.9, "{}", inside / count);
 }

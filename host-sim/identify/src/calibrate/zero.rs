@@ -1,7 +1,8 @@
-//! Where the zeros are: a table says its error from the generator's angle, and only whoever knows where that is zero can use it.
+//! Where the zeros are: a table says its error from the generator's angle, and only whoever knows where that is zero
+//! can use it.
 //!
-//! The phase of a table against a log is the one with which it leaves least of what was measured; load and direction, which no phase changes, are
-//! fitted beside it. Its interval is that of blocks of the log left out in turn.
+//! The phase of a table against a log is the one with which it leaves least of what was measured; load and direction,
+//! which no phase changes, are fitted beside it. Its interval is that of blocks of the log left out in turn.
 
 use std::f64::consts::TAU;
 
@@ -23,7 +24,8 @@ const STEPS_OF_A_PITCH: usize = 24;
 const CLOSELY: usize = 4;
 /// A table repeats if its error does to this, arcsec.
 const REPEATS_ARCSEC: f64 = 0.05;
-/// The phase is told if the best leaves so much less than the usual one, and than the best of those elsewhere, of the squares. Guesses.
+/// The phase is told if the best leaves so much less than the usual one, and than the best of those elsewhere, of the
+/// squares. Guesses.
 const LEAST_GAIN: f64 = 0.02;
 const LEAST_BEFORE_SECOND: f64 = 0.005;
 /// Blocks left out in turn, and the half width of 95 % in standard deviations of their number.
@@ -37,7 +39,8 @@ pub struct Alignment {
     pub generator_zero_deg: f64,
     /// Half width of the interval that holds it with 95 %, deg.
     pub generator_half_width_deg: f64,
-    /// The table's error is the same after so many degrees of the generator: a tooth pitch of an ideal drive, turns of one as built.
+    /// The table's error is the same after so many degrees of the generator: a tooth pitch of an ideal drive, turns of
+    /// one as built.
     pub repeats_deg: f64,
     /// What the table leaves with the zeros of the logs taken for its own, arcsec rms.
     pub left_before_arcsec: f64,
@@ -52,8 +55,8 @@ pub struct Alignment {
 /// What an error in the zeros of a table costs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ZeroCost {
-    /// For a degree of the generator, arcsec rms and at most: the slope of the error. The nominal output angle moves by 3600/ratio arcsec besides, which
-    /// an output zero that is found afterwards takes up.
+    /// For a degree of the generator, arcsec rms and at most: the slope of the error. The nominal output angle moves by
+    /// 3600/ratio arcsec besides, which an output zero that is found afterwards takes up.
     pub rms_arcsec_per_generator_deg: f64,
     /// See above.
     pub most_arcsec_per_generator_deg: f64,

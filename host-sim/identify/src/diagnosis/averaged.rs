@@ -1,5 +1,5 @@
-//! Rows averaged before laws are evaluated on them. A law that changes little from one row to the next says the same of an average as
-//! the average of what it says of the rows, and is evaluated on a third or a tenth of them.
+//! Rows averaged before laws are evaluated on them. A law that changes little from one row to the next says the same of
+//! an average as the average of what it says of the rows, and is evaluated on a third or a tenth of them.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -29,7 +29,8 @@ pub struct Averaged {
 }
 
 impl Averaged {
-    /// Averages of `stride` rows, none across sessions; nothing where rows are taken one by one, or move too far within an average.
+    /// Averages of `stride` rows, none across sessions; nothing where rows are taken one by one, or move too far within
+    /// an average.
     #[must_use]
     pub fn of(on: &Excitation<'_>, stride: usize) -> Option<Averaged> {
         if stride < 2 {

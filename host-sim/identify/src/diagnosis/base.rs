@@ -1,11 +1,11 @@
 //! The nominal prediction over the rows, and what of it may float without being a discrepancy.
 //!
 //! # Play
-//! The flank that carries follows the load: `p = +1` where the torque turns the output forward onto one flank, `−1` on the other,
-//! and the error holds `p · backlash / 2`. Inside `|torque| < friction` drives differ, so several laws are tried and the one
-//! that leaves least is taken:
-//! held (p stays where it was), pushed (friction holds the output until the generator has used up the clearance and pushes it:
-//! a play operator in the nominal output), by sign alone, and smooth.
+//! The flank that carries follows the load: `p = +1` where the torque turns the output forward onto one flank, `−1` on
+//! the other, and the error holds `p · backlash / 2`. Inside `|torque| < friction` drives differ, so several laws are
+//! tried and the one that leaves least is taken:
+//! held (p stays where it was), pushed (friction holds the output until the generator has used up the clearance and
+//! pushes it: a play operator in the nominal output), by sign alone, and smooth.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -132,8 +132,8 @@ pub struct Base {
 
 /// What floats where angles are read at other instants than is known, s.
 pub const BETWEEN_READINGS: &str = "time between the readings";
-/// What floats as the output takes a time to go to its other flank, s: that of a lag which does as much to the error as this time says. Beside
-/// the lag that the rows tell best (`flank_lag`) it is that lag to first order.
+/// What floats as the output takes a time to go to its other flank, s: that of a lag which does as much to the error as
+/// this time says. Beside the lag that the rows tell best (`flank_lag`) it is that lag to first order.
 pub const CHANGE_OF_FLANK: &str = "time of a change of flank";
 /// The output goes from one flank to the other in some milliseconds. *Guess*.
 pub(super) const FLANK_S: f64 = 5e-3;
@@ -143,7 +143,8 @@ pub(super) const FREE: f64 = 1e4;
 const LEAST_TURN: f64 = 1e-3;
 /// A play law that leaves this much less (relative) than the first is taken instead.
 const CLEARLY_BETTER: f64 = 0.995;
-/// A play law is taken that leaves less than the first by this factor though it leaves the flank in doubt far beyond friction.
+/// A play law is taken that leaves less than the first by this factor though it leaves the flank in doubt far beyond
+/// friction.
 const FAR_BETTER: f64 = 0.8;
 /// Rows are uncertain where the torque is below this multiple of friction.
 pub(super) const NEAR_FRICTION: f64 = 1.25;
@@ -218,7 +219,8 @@ impl Base {
                 rows.generator.iter().map(|psi| harmonic.amplitude_arcsec * at(psi).sin()).collect()
             };
             add("harmonic", wave(0.0), nominal.spread.harmonic);
-            // A wave a quarter of a period ahead turns the phase. It floats with the amplitude: they are read as a pair.
+            // A wave a quarter of a period ahead turns the phase. It floats with the amplitude: they are read as a
+            // pair.
             let turns = nominal.spread.harmonic_phase_rad.max(LEAST_TURN * nominal.spread.harmonic);
             add("harmonic", wave(std::f64::consts::FRAC_PI_2), turns);
         }
@@ -259,8 +261,8 @@ impl Base {
     }
 }
 
-/// Sum of squares that a law of the play leaves where the torque is around friction. A zero, a late reading and a wrong ratio are taken out before:
-/// any drive may have them, whatever its play does, and they would decide between the laws.
+/// Sum of squares that a law of the play leaves where the torque is around friction. A zero, a late reading and a wrong
+/// ratio are taken out before: any drive may have them, whatever its play does, and they would decide between the laws.
 fn middle_spread(rows: &Rows, left: &[f64], friction: f64) -> f64 {
     let used: Vec<usize> = rows.sessions_used().flatten().collect();
     let of = |column: &[f64]| -> Vec<f64> {
@@ -303,7 +305,8 @@ fn uncertain(rows: &Rows, nominal: &Nominal, law: PlayLaw, flank: &[f64]) -> Vec
     if let Some(by_motion) = by_motion.filter(|uncertain| few(uncertain)) {
         return by_motion;
     }
-    // … or nothing says it but at the beginning. Sessions without a load are set aside as a whole, unless too little is left then.
+    // … or nothing says it but at the beginning. Sessions without a load are set aside as a whole, unless too little is
+    // left then.
     [true, false]
         .into_iter()
         .map(|unloaded_too| uncertain_at_first(rows, nominal, unloaded_too))
@@ -311,8 +314,8 @@ fn uncertain(rows: &Rows, nominal: &Nominal, law: PlayLaw, flank: &[f64]) -> Vec
         .unwrap_or_else(|| vec![false; rows.len()])
 }
 
-/// Rows of a session before the first load that says which flank carries: nobody knows where the drive was left. Of a session that nothing loads
-/// these are all, if such sessions count.
+/// Rows of a session before the first load that says which flank carries: nobody knows where the drive was left. Of a
+/// session that nothing loads these are all, if such sessions count.
 fn uncertain_at_first(rows: &Rows, nominal: &Nominal, unloaded_too: bool) -> Vec<bool> {
     let mut uncertain = vec![false; rows.len()];
     for session in &rows.sessions {

@@ -1,9 +1,11 @@
-//! Rows that are means over some time: a logger that reads often and writes the mean, or that filters angles and torque alike.
+//! Rows that are means over some time: a logger that reads often and writes the mean, or that filters angles and torque
+//! alike.
 //!
-//! What bends within that time comes out round. The output goes to its other flank over it, and begins to before the load has changed its side,
-//! which a drive, which follows its load, never does; and waves of the generator fade with the speed, by the sine of half the angle that they
-//! turn in that time over that half angle. Where both say the same time, and no flank that takes a while, nor a torque that is read late, does as
-//! well, the rows are means. What the means take of what the model says is put back then; what has no model stays round.
+//! What bends within that time comes out round. The output goes to its other flank over it, and begins to before the
+//! load has changed its side, which a drive, which follows its load, never does; and waves of the generator fade with
+//! the speed, by the sine of half the angle that they turn in that time over that half angle. Where both say the same
+//! time, and no flank that takes a while, nor a torque that is read late, does as well, the rows are means. What the
+//! means take of what the model says is put back then; what has no model stays round.
 
 use flexspline::Table;
 
@@ -28,14 +30,16 @@ const LONGER: f64 = 1.19;
 const LEAST_PERIODS: f64 = 0.9;
 /// Steps to a row with which a mean over rows is taken.
 const STEPS: f64 = 4.0;
-/// Flanks that take a while, s, and torques that are read late or early by as much, s: what else may tell the rows. *Guess*.
+/// Flanks that take a while, s, and torques that are read late or early by as much, s: what else may tell the
+/// rows. *Guess*.
 const LAGS_S: [f64; 4] = [5e-3, 0.01, 0.02, 0.04];
 const LATE_S: [f64; 8] = [-0.1, -0.05, -0.02, -0.005, 0.005, 0.02, 0.05, 0.1];
-/// Means leave no more than this share of what is left by the best of these, … *Chosen* between perfect drives, 0.93 and more, and those whose rows
-/// are means over 40 to 80 ms, mostly 0.91 and less, of a plant that somebody else wrote.
+/// Means leave no more than this share of what is left by the best of these, … *Chosen* between perfect drives, 0.93
+/// and more, and those whose rows are means over 40 to 80 ms, mostly 0.91 and less, of a plant that somebody else
+/// wrote.
 const LEAVE: f64 = 0.92;
-/// … of what is left where flanks alone are round, and where waves alone fade, … *Chosen* on the same: of flanks alone 0.996 and more without means,
-/// 0.95 and less with them.
+/// … of what is left where flanks alone are round, and where waves alone fade, … *Chosen* on the same: of flanks alone
+/// 0.996 and more without means, 0.95 and less with them.
 const LEAVE_OF_EACH: f64 = 0.97;
 /// … for certain, by so many standard deviations of the blocks' means. *Guess*.
 const CERTAIN: f64 = 3.0;
@@ -76,7 +80,8 @@ impl<'a> Held<'a> {
             columns.extend(waves(order, &rows.on_flexspline, &held.places));
             columns.extend(waves(order, &rows.on_circular_spline, &held.places));
         }
-        // The form of a generator repeats from tooth to tooth, another one on each flank, and is as large as what means take.
+        // The form of a generator repeats from tooth to tooth, another one on each flank, and is as large as what means
+        // take.
         if let Some(teeth) = nominal.teeth {
             let mesh = waves(f64::from(teeth.flexspline), &rows.on_flexspline, &held.places);
             let by_side = |wave: &Vec<f64>| -> Vec<f64> {
@@ -148,7 +153,8 @@ impl<'a> Held<'a> {
         by_block(&left)
     }
 
-    /// What means over `s` seconds take of what the model says, in all rows, arcsec; sizes are those that the rows tell.
+    /// What means over `s` seconds take of what the model says, in all rows, arcsec; sizes are those that the rows
+    /// tell.
     fn taken(&self, law: PlayLaw, s: f64) -> Option<Vec<f64>> {
         let (means, at_once) = (self.columns(law, Read::Mean(s)), self.columns(law, Read::AtOnce));
         let freed: Vec<Vec<f64>> =
@@ -185,7 +191,8 @@ fn sinc(x: f64) -> f64 {
     if x.abs() < 1e-4 { 1.0 } else { x.sin() / x }
 }
 
-/// Means over so many seconds about each row, between rows by straight lines, at the ends of a session of what there is.
+/// Means over so many seconds about each row, between rows by straight lines, at the ends of a session of what there
+/// is.
 fn averaged(rows: &Rows, values: &[f64], s: f64) -> Vec<f64> {
     let wide = s / rows.period;
     let steps = (STEPS * wide).ceil().max(STEPS) as usize;
@@ -228,7 +235,8 @@ fn find(held: &Held<'_>) -> Option<(f64, PlayLaw)> {
     let at_once = least(Read::AtOnce);
     let shortest = TIMES_S[0].max(LEAST_PERIODS * held.rows.period);
     let times = std::iter::successors(Some(shortest), |s| Some(s * LONGER)).take_while(|s| *s <= TIMES_S[1]);
-    // The law that friction makes of the play is the one that most drives have; the others are tried where it tells enough.
+    // The law that friction makes of the play is the one that most drives have; the others are tried where it tells
+    // enough.
     let tried = times.map(|s| (s, sum(&held.left(PlayLaw::Held, Read::Mean(s)))));
     let (s, left) = tried.min_by(|a, b| a.1.total_cmp(&b.1))?;
     if left > LEAVE * at_once {
@@ -272,9 +280,9 @@ pub(super) fn check(recording: &mut Recording, nominal: &Nominal, table: Option<
     }
     recording.sessions.iter_mut().for_each(|session| session.mean_over_s = s);
     let what = format!(
-        "rows are means over about {:.0} ms: the output goes to its other flank over that time, and begins to before the load has changed its side, \
-         and waves of the generator fade with the speed as in such means; what that takes of what the model says was put back, and a load that \
-         swings is not looked for",
+        "rows are means over about {:.0} ms: the output goes to its other flank over that time, and begins to before \
+         the load has changed its side, and waves of the generator fade with the speed as in such means; what that \
+         takes of what the model says was put back, and a load that swings is not looked for",
         1e3 * s
     );
     let mut fault = fault_throughout(recording, FaultName::AveragedRows, Treatment::Repaired, rms(&taken), what);
@@ -289,8 +297,9 @@ mod tests {
     use crate::measurement::{Fault, Session};
     use crate::synthesize::catalogue_drive;
 
-    /// A drive as its catalogue says, every millisecond, that turns to and fro at up to 42 rad/s under a load that swings, with a flank that takes
-    /// `lag_s`; read every 10 ms, as means over `mean_s`, with 1.5 arcsec and `torque_noise` N·m of noise, the torque `late_s` late.
+    /// A drive as its catalogue says, every millisecond, that turns to and fro at up to 42 rad/s under a load that
+    /// swings, with a flank that takes `lag_s`; read every 10 ms, as means over `mean_s`, with 1.5 arcsec and
+    /// `torque_noise` N·m of noise, the torque `late_s` late.
     fn recording(nominal: &Nominal, mean_s: f64, lag_s: f64, late_s: f64, torque_noise: f64) -> Recording {
         let mut random = fastrand::Rng::with_seed(3);
         let mut gauss = move || (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;

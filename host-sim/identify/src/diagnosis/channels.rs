@@ -1,8 +1,9 @@
-//! Channels held against the nominal model before any cause is asked: does the torque wind this drive up, with its sign and in its unit;
-//! are both angles in degrees, which no ratio tells?
+//! Channels held against the nominal model before any cause is asked: does the torque wind this drive up, with its sign
+//! and in its unit; are both angles in degrees, which no ratio tells?
 //!
-//! What floats freely in every drive is taken out first: zeros, the ratio, first orders, the nominal harmonics, speed and the direction of
-//! motion. What is left of the error is then held against what the nominal model says of the torque, as recorded and otherwise.
+//! What floats freely in every drive is taken out first: zeros, the ratio, first orders, the nominal harmonics, speed
+//! and the direction of motion. What is left of the error is then held against what the nominal model says of the
+//! torque, as recorded and otherwise.
 
 use flexspline::Table;
 
@@ -17,14 +18,16 @@ use crate::nominal::{Harmonic, Nominal};
 const SAMPLE: usize = 6000;
 /// Zeros of sessions that float, at most.
 const MOST_ZEROS: usize = 24;
-/// Blocks of rows that are left out one at a time, to know how certain a share is: loads repeat, rows do not count one by one.
+/// Blocks of rows that are left out one at a time, to know how certain a share is: loads repeat, rows do not count one
+/// by one.
 const BLOCKS: usize = 24;
 /// What the torque should do is seen from so many times the white noise on, and from so many arcsec. *Guess*.
 const SEEN_OF_NOISE: f64 = 3.0;
 const SEEN_ARCSEC: f64 = 8.0;
 /// A share of it is certain from so many of its standard deviations on. *Source*: by convention.
 const CERTAIN: f64 = 5.0;
-/// Shares that a drive may show of its nominal wind-up and clearance: springs are softer and harder than catalogues say. *Guess*.
+/// Shares that a drive may show of its nominal wind-up and clearance: springs are softer and harder than catalogues
+/// say. *Guess*.
 const OF_THIS_DRIVE: [f64; 2] = [0.4, 2.5];
 /// No drive winds up by so many times what its model says: a torque that asks for that is in another unit. *Guess*.
 const FAR_TOO_SOFT: f64 = 8.0;
@@ -38,15 +41,18 @@ const NO_EFFECT: f64 = 0.3;
 const FAR_FROM_NOISE: f64 = 4.0;
 /// They are where degrees leave this at most. *Guess*.
 const TO_THE_NOISE: f64 = 4.0;
-/// And where wind-up and clearance are those of the model within this share, or, where nothing winds up, the harmonics within the factors.
-/// *Guess*: springs of drives of a type differ by some per cent, the factors of torques taken for others from 57 by more than that, except 1/60.
+/// And where wind-up and clearance are those of the model within this share, or, where nothing winds up, the harmonics
+/// within the factors.
+/// *Guess*: springs of drives of a type differ by some per cent, the factors of torques taken for others from 57 by
+/// more than that, except 1/60.
 const AS_NOMINAL: f64 = 0.35;
 const HARMONICS_AS_NOMINAL: [f64; 2] = [0.25, 4.0];
 /// What is left is next to nothing below this share of what the load does. *Guess*.
 const NEXT_TO_NOTHING: f64 = 0.1;
 /// Residuals farther out than so many standard deviations are cut there.
 const CUT: f64 = 5.0;
-/// The deviation is that of the block which this share of all does not exceed. *Guess*: two of [`BLOCKS`] may be full of bad rows.
+/// The deviation is that of the block which this share of all does not exceed. *Guess*: two of [`BLOCKS`] may be full
+/// of bad rows.
 const MOST_GOES_ON: f64 = 0.9;
 
 /// Rows that are used, about so many, spread evenly.
@@ -60,8 +66,8 @@ pub(super) fn waves(order: f64, angle: &[f64], places: &[usize]) -> [Vec<f64>; 2
     [f64::sin, f64::cos].map(|wave| places.iter().map(|k| wave(order * angle[*k])).collect())
 }
 
-/// What floats freely in every drive, column by column at the places: zeros of the error and of sessions, ratio, speed, direction, nominal
-/// harmonics, and two orders of the output.
+/// What floats freely in every drive, column by column at the places: zeros of the error and of sessions, ratio, speed,
+/// direction, nominal harmonics, and two orders of the output.
 pub(super) fn floating(rows: &Rows, nominal: &Nominal, places: &[usize]) -> Vec<Vec<f64>> {
     let of = |value: &dyn Fn(usize) -> f64| -> Vec<f64> { places.iter().map(|k| value(*k)).collect() };
     let mut columns = vec![of(&|_| 1.0), of(&|k| rows.output[k]), of(&|k| rows.speed[k]), of(&|k| rows.direction[k])];
@@ -84,8 +90,8 @@ struct Freed {
     error: Vec<f64>,
 }
 
-/// Standard deviation of a residual in the blocks in which most goes on: at a bench that loads the drive in some sessions alone, what the load does
-/// is far out in the others. One block of bad rows lifts it by little.
+/// Standard deviation of a residual in the blocks in which most goes on: at a bench that loads the drive in some
+/// sessions alone, what the load does is far out in the others. One block of bad rows lifts it by little.
 fn spread(error: &[f64]) -> f64 {
     let blocks = error.chunks(error.len().div_ceil(BLOCKS).max(1));
     quantile(blocks.map(|block| robust_std(block.iter().copied())), MOST_GOES_ON)
@@ -126,7 +132,8 @@ impl Freed {
 }
 
 impl Freed {
-    /// Amplitude of the wave of this order of the generator, which floats freely, in the error less what is `said` of the load, arcsec.
+    /// Amplitude of the wave of this order of the generator, which floats freely, in the error less what is `said` of
+    /// the load, arcsec.
     fn amplitude(&self, rows: &Rows, said: &[f64], order: f64) -> f64 {
         let [sine, cosine] = waves(order, &rows.generator, &self.places);
         let unsaid: Vec<f64> = rows.error.iter().zip(said).map(|(error, said)| error - said).collect();
@@ -223,8 +230,8 @@ fn unit_of(factor: f64) -> Option<String> {
     UNITS.iter().find(|(_, of)| *of == factor.abs()).map(|(name, _)| format!("{sign}{name}"))
 }
 
-/// Holds the torque against what it should do; turned round, or taken to the other shaft, where that explains it; left out where it does nothing, or
-/// where it looks like another unit. Gives
+/// Holds the torque against what it should do; turned round, or taken to the other shaft, where that explains it; left
+/// out where it does nothing, or where it looks like another unit. Gives
 /// why the data are unusable, where they are.
 pub(super) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: Option<&Table<'_>>) -> Option<String> {
     let rows = Rows::new(&recording.sessions, nominal);
@@ -252,8 +259,8 @@ pub(super) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: 
             Treatment::Repaired,
             none,
             format!(
-                "the error follows the torque with {:.2} (± {:.2}) of the nominal wind-up and clearance: it counts the other way, and was \
-                 turned round",
+                "the error follows the torque with {:.2} (± {:.2}) of the nominal wind-up and clearance: it counts \
+                 the other way, and was turned round",
                 recorded.share, recorded.std
             ),
         ));
@@ -268,8 +275,9 @@ pub(super) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: 
     if let Some((unit, (_, told))) = best.as_ref().and_then(|best| Some((unit_of(best.0)?, best))) {
         // A stiffness that looks like another unit is a look, no word: a soft drive does the same.
         let what = format!(
-            "the torque leaves {:.0} arcsec as it stands, and {:.0} if it is in {unit}: nothing says so, and it is not converted; if it is, say \
-             --columns torque=NAME:{unit}, else the drive is not as stiff as its model says; what the load does cannot be told from what the drive does",
+            "the torque leaves {:.0} arcsec as it stands, and {:.0} if it is in {unit}: nothing says so, and it is \
+             not converted; if it is, say --columns torque=NAME:{unit}, else the drive is not as stiff as its model \
+             says; what the load does cannot be told from what the drive does",
             recorded.left, told.left
         );
         recording.sessions.iter_mut().for_each(|session| session.torque_n_m = None);
@@ -290,8 +298,8 @@ pub(super) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: 
             Treatment::Repaired,
             none,
             format!(
-                "the torque times {factor:.4} gives the wind-up and clearance that the error shows ({:.2} ± {:.2} of the nominal ones); as \
-                 it stands it leaves {:.0} arcsec, so {:.0}: it was converted",
+                "the torque times {factor:.4} gives the wind-up and clearance that the error shows ({:.2} ± {:.2} of \
+                 the nominal ones); as it stands it leaves {:.0} arcsec, so {:.0}: it was converted",
                 told.share, told.std, recorded.left, told.left
             ),
         ));
@@ -303,8 +311,8 @@ pub(super) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: 
     }
     recording.sessions.iter_mut().for_each(|session| session.torque_n_m = None);
     let what = format!(
-        "the torque should move the error by {:.0} arcsec rms, and it shows {:.2} (± {:.2}) of that: it is not the torque at this output, and \
-         is not used; what the load does cannot be told from what the drive does",
+        "the torque should move the error by {:.0} arcsec rms, and it shows {:.2} (± {:.2}) of that: it is not the \
+         torque at this output, and is not used; what the load does cannot be told from what the drive does",
         recorded.size, recorded.share, recorded.std
     );
     recording.faults.push(fault_throughout(
@@ -364,8 +372,9 @@ pub(super) fn fault_throughout(
     }
 }
 
-/// Whether both angles may be in degrees where radians are said: with zeros and ratio free, the nominal model leaves far more than noise, or
-/// winds up far too little. Division by 57 shrinks any misfit; so what is left counts against its own noise, and the ratio is free.
+/// Whether both angles may be in degrees where radians are said: with zeros and ratio free, the nominal model leaves
+/// far more than noise, or winds up far too little. Division by 57 shrinks any misfit; so what is left counts against
+/// its own noise, and the ratio is free.
 pub(super) fn may_be_in_degrees(recording: &Recording, nominal: &Nominal, table: Option<&Table<'_>>) -> bool {
     let predicts = !nominal.harmonics.is_empty() || nominal.wind_up_arcsec(1.0) != 0.0;
     let rough = predicts.then(|| Rough::of(&recording.sessions, nominal, table));
@@ -379,7 +388,8 @@ pub(super) fn is_explained(recording: &Recording, nominal: &Nominal, table: Opti
     let like_the_load = !winds_up || (rough.told.share - 1.0).abs() < AS_NOMINAL && rough.told.is_certain();
     let within = |share: f64| (HARMONICS_AS_NOMINAL[0]..=HARMONICS_AS_NOMINAL[1]).contains(&share);
     let like_the_harmonics = rough.harmonics.map_or(winds_up, within);
-    // Where a spring and the wheels both have their size, what is left may be a flank that friction holds otherwise than the model says.
+    // Where a spring and the wheels both have their size, what is left may be a flank that friction holds otherwise
+    // than the model says.
     let near_the_noise = rough.left < TO_THE_NOISE;
     let next_to_nothing = rough.harmonics.is_some() && rough.left * rough.white < NEXT_TO_NOTHING * rough.told.size;
     (near_the_noise || next_to_nothing) && like_the_load && like_the_harmonics
@@ -464,7 +474,8 @@ mod tests {
         assert!(without > 10.0 && (with / without - 1.0).abs() < 0.1, "{with}, {without}");
     }
 
-    /// A drive as its catalogue says under a load that swings, 2 arcsec of noise; `told` is what the column of torque says of the load.
+    /// A drive as its catalogue says under a load that swings, 2 arcsec of noise; `told` is what the column of torque
+    /// says of the load.
     fn recording(nominal: &Nominal, told: impl Fn(f64, f64) -> f64) -> Recording {
         recording_under(nominal, |t| 25.0 * (0.9 * t).sin() + 6.0 * (2.3 * t).cos(), 0.05, told)
     }

@@ -1,8 +1,8 @@
 //! What to record next, to tell look-alikes apart.
 //!
-//! Each run of a short menu is imagined: the cause named, as it was fitted, is simulated on it without noise, and every look-alike is
-//! fitted to that. The run is chosen whose closest look-alike stands off the furthest, in standard deviations (Hunter & Reiner 1965;
-//! T-optimality, Atkinson & Fedorov 1975).
+//! Each run of a short menu is imagined: the cause named, as it was fitted, is simulated on it without noise, and every
+//! look-alike is fitted to that. The run is chosen whose closest look-alike stands off the furthest, in standard
+//! deviations (Hunter & Reiner 1965; T-optimality, Atkinson & Fedorov 1975).
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -57,7 +57,8 @@ fn menu() -> Vec<Run> {
             [|s| state(95.0 * there_and_back(s), 0.7, 0.0, 0.0), |s| state(95.0 * there_and_back(s), -0.7, 0.0, 0.0)],
         ),
         run(
-            "half an output turn forward and back with torque steps of both signs, drive turned against gravity by 0, 90 and 180 degrees",
+            "half an output turn forward and back with torque steps of both signs, drive turned against gravity by 0, \
+             90 and 180 degrees",
             [
                 |s| state(50.0 * there_and_back(s), steps(s), 0.0, 0.0),
                 |s| state(50.0 * there_and_back(s), steps(s), 0.0, FRAC_PI_2),
@@ -119,8 +120,8 @@ pub fn anyhow(on: &Excitation<'_>, not_understood: bool) -> String {
     }
     if asked.is_empty() {
         let again = if not_understood {
-            "the same run slower, at a third of the speed, and once with another load: what stays where it is comes from angles, what moves \
-             from time or load"
+            "the same run slower, at a third of the speed, and once with another load: what stays where it is comes \
+             from angles, what moves from time or load"
         } else {
             "the same run again on another day, then with the cause put right: it should come back, and be gone"
         };
@@ -129,12 +130,13 @@ pub fn anyhow(on: &Excitation<'_>, not_understood: bool) -> String {
     asked.join("; ")
 }
 
-/// What tells so many waves of the generator's encoder in a turn from those of a wheel or of the motor: half a period turns them over.
+/// What tells so many waves of the generator's encoder in a turn from those of a wheel or of the motor: half a period
+/// turns them over.
 #[must_use]
 pub fn turn_the_encoder(waves: f64) -> String {
     format!(
-        "the same run with the generator's encoder turned on its shaft by {:.1} degrees, or with another one: an encoder's waves turn over \
-         with it, those of a wheel and of the motor stay",
+        "the same run with the generator's encoder turned on its shaft by {:.1} degrees, or with another one: an \
+         encoder's waves turn over with it, those of a wheel and of the motor stay",
         180.0 / waves
     )
 }

@@ -1,4 +1,5 @@
-//! The extended model: the nominal drive recalibrated, plus the causes with the values found, to be evaluated on any rows.
+//! The extended model: the nominal drive recalibrated, plus the causes with the values found, to be evaluated on any
+//! rows.
 //!
 //! [`Extended::fit_to`] learns from some of the sessions alone, so that what it says of the others was not seen by it.
 
@@ -103,8 +104,8 @@ fn fineness(on: &Excitation<'_>, laws: &[Law], uncertain: &[bool], averages: usi
 }
 
 impl Extended {
-    /// Fits the nominal model and the named causes to sessions. A name that these data cannot speak about (a load without
-    /// torque, a law of teeth without teeth) is left out.
+    /// Fits the nominal model and the named causes to sessions. A name that these data cannot speak about (a load
+    /// without torque, a law of teeth without teeth) is left out.
     ///
     /// # Errors
     /// As [`super::diagnose`].
@@ -164,7 +165,8 @@ impl Extended {
         &self.causes
     }
 
-    /// What was found as a prediction on the rows of `sessions`, which need not be those of the fit: one series for each.
+    /// What was found as a prediction on the rows of `sessions`, which need not be those of the fit: one series for
+    /// each.
     #[must_use]
     pub fn predict(&self, sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> Vec<Series> {
         let rows = Rows::new(sessions, nominal);

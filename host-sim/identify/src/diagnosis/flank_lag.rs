@@ -1,5 +1,5 @@
-//! How long the output takes to its other flank, found where the flank changes and nowhere else: a lag that is known to first order alone
-//! leaves of one of 10 ms what passes for a hysteresis.
+//! How long the output takes to its other flank, found where the flank changes and nowhere else: a lag that is known to
+//! first order alone leaves of one of 10 ms what passes for a hysteresis.
 
 use std::ops::Range;
 
@@ -8,7 +8,8 @@ use super::rows::Rows;
 
 /// Each lag that is tried is so many times the one before, from [`FLANK_S`] on.
 const LONGER: f64 = std::f64::consts::SQRT_2;
-/// The longest lag that a change of flank has, s. *Guess*: a load behind a clearance takes some milliseconds, and what takes longer swings.
+/// The longest lag that a change of flank has, s. *Guess*: a load behind a clearance takes some milliseconds, and what
+/// takes longer swings.
 const LONGEST_S: f64 = 0.06;
 /// Rows this long before a change of flank and after it tell of the lag, s. *Guess*: five of the longest lags.
 const BEFORE_S: f64 = 0.05;
@@ -20,8 +21,8 @@ const WAY: Range<f64> = 0.5..WIDER;
 /// … and this share of all that moves there beyond noise: a load that swings to and fro leaves most of it. *Guess*.
 const LEAST_SHARE: f64 = 0.5;
 
-/// The lag, s, with which the output follows a change of flank; [`FLANK_S`] where the rows tell no other. `left` is the error less what is
-/// predicted with `flank`, arcsec.
+/// The lag, s, with which the output follows a change of flank; [`FLANK_S`] where the rows tell no other. `left` is the
+/// error less what is predicted with `flank`, arcsec.
 pub(super) fn flank_lag(rows: &Rows, left: &[f64], flank: &[f64], half_backlash: f64) -> f64 {
     let windows = windows(rows, flank);
     let data = straightened(left, &windows);

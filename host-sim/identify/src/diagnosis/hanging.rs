@@ -1,5 +1,5 @@
-//! An output that hangs in the clearance: the load has changed its side, but hardly exceeds friction, and does not move the output to the
-//! other flank yet.
+//! An output that hangs in the clearance: the load has changed its side, but hardly exceeds friction, and does not move
+//! the output to the other flank yet.
 
 use std::ops::Range;
 
@@ -7,20 +7,20 @@ use super::base::rows_of_crossing;
 use super::candidate::Excitation;
 use super::rows::Rows;
 
-/// The load has changed its side, and the flank with it, once it was this many times friction there: until then the output may hang in the
-/// clearance, as what hardly exceeds friction hardly moves a load behind it. *Chosen*: of joints in motion, one clean and one worn, hung at 1.36
-/// and 1.45 times.
+/// The load has changed its side, and the flank with it, once it was this many times friction there: until then the
+/// output may hang in the clearance, as what hardly exceeds friction hardly moves a load behind it. *Chosen*: of joints
+/// in motion, one clean and one worn, hung at 1.36 and 1.45 times.
 const CARRIES: f64 = 2.0;
 /// Or once it is beyond friction for so long, s. *Guess*: those hung for 0.3 and 1.3 s.
 const HANGS_S: f64 = 3.0;
-/// The output is this share of half the clearance short of the flank, at least, where it hangs. *Chosen*: those joints hung at 0.9 to 2 times, by
-/// what was explained when other causes still stood in for it.
+/// The output is this share of half the clearance short of the flank, at least, where it hangs. *Chosen*: those joints
+/// hung at 0.9 to 2 times, by what was explained when other causes still stood in for it.
 const SHORT: f64 = 0.6;
 /// A clearance shows where that is at least so many times the noise of a row. *Guess*.
 const BEYOND_NOISE: f64 = 3.0;
 
-/// Rows in which the output hangs in the clearance, as it stays far short of what causes and base explain beside the nominal prediction. The
-/// noise of a row is `white`, arcsec.
+/// Rows in which the output hangs in the clearance, as it stays far short of what causes and base explain beside the
+/// nominal prediction. The noise of a row is `white`, arcsec.
 #[must_use]
 pub fn hanging(on: &Excitation<'_>, explained: &[f64], white: f64) -> Vec<bool> {
     let rows = on.rows;

@@ -1,5 +1,5 @@
-//! Gain on sessions that took no part in the fit: each session predicted by a fit to the others, without any offset of its own
-//! unless the bench sets its zero anew in each. Which causes are fitted was chosen on all sessions.
+//! Gain on sessions that took no part in the fit: each session predicted by a fit to the others, without any offset of
+//! its own unless the bench sets its zero anew in each. Which causes are fitted was chosen on all sessions.
 
 use super::linear::Gram;
 use super::model::{Problem, Scaffold, Term, white_columns};
@@ -33,8 +33,8 @@ pub fn evaluate(problem: &Problem<'_>, terms: &[&Term<'_>]) -> Evaluated {
     Evaluated { total: HeldOut { rms_before_arcsec: rms(before), rms_after_arcsec: rms(after) }, gains }
 }
 
-/// The terms that predict sessions they were not fitted to: while all together predict them worse than none, the one that harms most is
-/// set aside, as long as that helps and another is left. Also what was set aside.
+/// The terms that predict sessions they were not fitted to: while all together predict them worse than none, the one
+/// that harms most is set aside, as long as that helps and another is left. Also what was set aside.
 #[must_use]
 pub fn proved<'l>(
     problem: &Problem<'_>,
@@ -87,8 +87,8 @@ impl Zero {
     }
 }
 
-/// Mean squared error of prediction, arcsec², over averages without uncertain rows. With `anew` the shape parameters are
-/// found without the session as well, by a step of Gauss-Newton where that tells the others better.
+/// Mean squared error of prediction, arcsec², over averages without uncertain rows. With `anew` the shape parameters
+/// are found without the session as well, by a step of Gauss-Newton where that tells the others better.
 fn left_out(problem: &Problem<'_>, terms: &[&Term<'_>], anew: bool, zero: Zero) -> Option<f64> {
     let scaffold = Scaffold::new(problem, terms.to_vec());
     let fit = scaffold.fit(None)?;

@@ -1,7 +1,7 @@
 //! Linear least squares with Gaussian priors: solution, penalised misfit, evidence, covariance.
 //!
-//! With whitened data y, columns X, prior mean m and precision P: `A = XᵀX + P`, `b = Xᵀy + P m`, `J = |y|² + mᵀP m − bᵀA⁻¹b`, and
-//! `ln evidence = −J/2 − ln|A|/2 + ln|P|/2` but for what all models share.
+//! With whitened data y, columns X, prior mean m and precision P: `A = XᵀX + P`, `b = Xᵀy + P m`,
+//! `J = |y|² + mᵀP m − bᵀA⁻¹b`, and `ln evidence = −J/2 − ln|A|/2 + ln|P|/2` but for what all models share.
 
 use std::ops::Range;
 use std::sync::LazyLock;
@@ -61,7 +61,8 @@ impl Gram {
         }
     }
 
-    /// With new columns before the data: `meeting` holds their products, each with those before, the data, and the new ones.
+    /// With new columns before the data: `meeting` holds their products, each with those before, the data, and the new
+    /// ones.
     #[must_use]
     pub fn with(&self, meeting: &[Vec<f64>]) -> Gram {
         let old = self.size - 1;
@@ -107,10 +108,11 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(x, y)| x * y).sum::<f64>()
 }
 
-/// Products of each column of `a` with each of `b` over a range of rows, row by row of the result; with `lower`, only as many of `b` as
-/// the place of the column of `a` says, for products that are symmetric.
+/// Products of each column of `a` with each of `b` over a range of rows, row by row of the result; with `lower`, only
+/// as many of `b` as the place of the column of `a` says, for products that are symmetric.
 ///
-/// Rows are taken in blocks that stay in the cache while all pairs meet, with the widest registers that the machine has.
+/// Rows are taken in blocks that stay in the cache while all pairs meet, with the widest registers that the machine
+/// has.
 #[must_use]
 pub fn products(a: &[&[f64]], b: &[&[f64]], range: Range<usize>, lower: bool) -> Vec<f64> {
     static ARCH: LazyLock<Arch> = LazyLock::new(Arch::new);
@@ -286,7 +288,8 @@ fn factor(mut a: Vec<f64>, n: usize) -> Option<Vec<f64>> {
     Some(a)
 }
 
-/// Solves with priors. `worth` scales all information in the data: below 1 where the noise is not as white as it was taken for.
+/// Solves with priors. `worth` scales all information in the data: below 1 where the noise is not as white as it was
+/// taken for.
 ///
 /// `None` if the products are not finite.
 #[must_use]

@@ -1,8 +1,11 @@
-//! Diagnosis: what the nominal model gets wrong in measured data, which physical cause explains it, and what the extension gains.
+//! Diagnosis: what the nominal model gets wrong in measured data, which physical cause explains it, and what the
+//! extension gains.
 //!
 //! The order of work:
-//! 1. `rows`, `base`: the nominal prediction on the data's own excitation, its parameters floating within the unit-to-unit spread.
-//! 2. `prepare`, `noise`: white noise and wander, found with everything explainable taken out; data and columns made white.
+//! 1. `rows`, `base`: the nominal prediction on the data's own excitation, its parameters floating within the
+//!    unit-to-unit spread.
+//! 2. `prepare`, `noise`: white noise and wander, found with everything explainable taken out; data and columns made
+//!    white.
 //! 3. `candidate`: causes as laws, re-simulated; deviations without a name beside them.
 //! 4. `select`: forward, backward, exchange; evidence, size, sessions left out.
 //! 5. `rivals`: every rival refitted; look-alikes.

@@ -1,7 +1,8 @@
-//! A model: the nominal drive plus terms, each a law at given shape parameters, fitted by penalised generalised least squares.
+//! A model: the nominal drive plus terms, each a law at given shape parameters, fitted by penalised generalised least
+//! squares.
 //!
-//! Coefficients are solved exactly; shape parameters by Gauss-Newton around the best of the values tried first. Nuisance columns
-//! get a prior in proportion to what the main columns of their law explain, found by iteration.
+//! Coefficients are solved exactly; shape parameters by Gauss-Newton around the best of the values tried first.
+//! Nuisance columns get a prior in proportion to what the main columns of their law explain, found by iteration.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -230,8 +231,8 @@ pub struct Term<'l> {
     pub averaged: Vec<Vec<f64>>,
     /// Columns, white.
     pub white: White,
-    /// What freedom of the shape parameters costs: logarithm of the share of their range that the data leave (0 before refinement); less the
-    /// odds against the law before any data.
+    /// What freedom of the shape parameters costs: logarithm of the share of their range that the data leave (0 before
+    /// refinement); less the odds against the law before any data.
     pub occam: f64,
     /// What other causes leave to it.
     among: Option<Arc<Among>>,
@@ -306,14 +307,14 @@ impl<'l> Term<'l> {
     }
 }
 
-/// Parameters of the nominal model are held within this many standard deviations between units: what is beyond is a discrepancy, however
-/// well the nominal model could follow it.
+/// Parameters of the nominal model are held within this many standard deviations between units: what is beyond is a
+/// discrepancy, however well the nominal model could follow it.
 pub const TOLERANCE: f64 = 3.3;
 /// Spread of a parameter that is held at its limit, in units of its tolerance.
 const HELD: f64 = 1e-3;
 
-/// Solves with the nominal model's parameters within their tolerance, and deviations of laws (`deviations` tells which coefficients
-/// are some) within as many of theirs; returns the priors used as well.
+/// Solves with the nominal model's parameters within their tolerance, and deviations of laws (`deviations` tells which
+/// coefficients are some) within as many of theirs; returns the priors used as well.
 pub(super) fn within_tolerance(
     gram: &Gram,
     mut priors: Vec<Prior>,
@@ -366,7 +367,8 @@ const DIRECTIONS: usize = 8;
 const SMALLER: [f64; 2] = [0.05, 0.2];
 /// Sizes at which one is tried under an eccentric generator, arcsec.
 const BESIDE_ARCSEC: [f64; 2] = [5.0, 20.0];
-/// All steps together gain no more than so many times what the linear model of the first one promises, and this much evidence.
+/// All steps together gain no more than so many times what the linear model of the first one promises, and this much
+/// evidence.
 const FARTHER_THAN_LINEAR: f64 = 3.0;
 const BEYOND_LINEAR: f64 = 10.0;
 /// A step that promises less evidence than this is not tried; one that gains less than this is the last.
@@ -488,7 +490,8 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
         }
     }
 
-    /// The solution with a law tried at some places: with its main columns alone, or where they mean nothing by themselves all of them.
+    /// The solution with a law tried at some places: with its main columns alone, or where they mean nothing by
+    /// themselves all of them.
     #[must_use]
     pub fn trial(&self, law: &Law, places: &[f64]) -> Option<Solution> {
         let extent = if law.search.whole { Extent::Whole } else { Extent::Bare };
@@ -595,7 +598,8 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     #[must_use]
     pub fn begin(&self, law: &Law) -> Vec<Vec<f64>> {
         let mut places = self.begin_alone(law);
-        // Beside one that is there, another displacement may stand in any direction: together they are not what either is alone.
+        // Beside one that is there, another displacement may stand in any direction: together they are not what either
+        // is alone.
         let met = self.terms.iter().find(|t| t.law.meets(law));
         if let (Some(met), Some([phase, size])) = (met, law.displacement_at()) {
             for k in 0..DIRECTIONS {
@@ -664,7 +668,8 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
             .collect()
     }
 
-    /// Columns (white) by which the prediction of `term` changes with each of its places, and how far the place may move.
+    /// Columns (white) by which the prediction of `term` changes with each of its places, and how far the place may
+    /// move.
     fn derivatives(&self, term: &Term<'_>, coefficients: &[f64]) -> Vec<(Vec<f64>, Prior)> {
         let problem = self.problem;
         let here = term.contribution(coefficients);
@@ -733,8 +738,8 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
         Some((term, fit))
     }
 
-    /// The fit of the scaffold's terms with all their shape parameters free to first order: for uncertainties. Returns the fit, whose
-    /// last coefficients are moves of the shape parameters, term after term.
+    /// The fit of the scaffold's terms with all their shape parameters free to first order: for uncertainties. Returns
+    /// the fit, whose last coefficients are moves of the shape parameters, term after term.
     #[must_use]
     pub fn linearised(&self) -> Option<(Fit, Vec<Vec<f64>>)> {
         let fit = self.fit(None)?;

@@ -1,8 +1,9 @@
-//! Noise of the measurement: white, plus a slow wander (an Ornstein-Uhlenbeck process), and columns made white under it.
+//! Noise of the measurement: white, plus a slow wander (an Ornstein-Uhlenbeck process), and columns made white under
+//! it.
 //!
-//! Neighbouring rows of a wandering measurement do not count as two. A Kalman filter of the wander turns the data, and every column
-//! alike, into innovations of unit variance; least squares on those is generalised least squares on the rows, and forty
-//! thousand correlated rows weigh what they are worth (n_eff).
+//! Neighbouring rows of a wandering measurement do not count as two. A Kalman filter of the wander turns the data, and
+//! every column alike, into innovations of unit variance; least squares on those is generalised least squares on the
+//! rows, and forty thousand correlated rows weigh what they are worth (n_eff).
 
 use super::rows::{Rows, mean, parts, quantile, rms, robust_std};
 
@@ -164,7 +165,8 @@ impl Whitener {
         white
     }
 
-    /// Innovations of several columns of averaged values. Each value waits for the one before it, so columns go side by side.
+    /// Innovations of several columns of averaged values. Each value waits for the one before it, so columns go side by
+    /// side.
     #[must_use]
     pub fn whiten_each(&self, averaged: &[Vec<f64>]) -> Vec<Vec<f64>> {
         averaged.chunks(ABREAST).flat_map(|columns| self.whiten_abreast(columns)).collect()
@@ -237,7 +239,8 @@ pub fn white_level(rows: &Rows, left: &[f64]) -> f64 {
             differences.push((left[k] - 2.0 * left[k - 1] + left[k - 2]).abs() / louder);
         }
     }
-    // Their variance is six times that of a row; more where a line close to half the rate of rows swings them, but no more than is there.
+    // Their variance is six times that of a row; more where a line close to half the rate of rows swings them, but no
+    // more than is there.
     let middle = quantile(rows.sessions_used().flatten().map(|k| left[k]), 0.5);
     let there = robust_std(rows.sessions_used().flatten().map(|k| left[k] - middle));
     // Rows that a coarse resolution rounds to the same value differ by nothing, and are off all the same.

@@ -6,8 +6,8 @@
 //!         tables worth it? <- evaluate (sessions held out, read by the core) +-> drive-extended.toml
 //! ```
 //!
-//! [`Subject`] is what the rows are held against. [`read_rows`] and [`diagnose_rows`] come to the verdict; [`Diagnosed::extend`] makes the
-//! extended drive and its tables. Nothing is printed or written here.
+//! [`Subject`] is what the rows are held against. [`read_rows`] and [`diagnose_rows`] come to the verdict;
+//! [`Diagnosed::extend`] makes the extended drive and its tables. Nothing is printed or written here.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -42,9 +42,11 @@ use flexspline_mechanics::stepping::{Method, SolveError, SolverSettings};
 const MOST_ROWS: usize = 1_000_000;
 
 /// What to look at where an error leaps so often that no row counts.
-const IS_IT_THIS_DRIVE: &str = "see that ratio, units and zeros of both angles are right and that the rows are of this drive; record it under a load that keeps one flank";
+const IS_IT_THIS_DRIVE: &str = "see that ratio, units and zeros of both angles are right and that the rows are of \
+                                this drive; record it under a load that keeps one flank";
 
-/// What the FEM of an extended drive may differ by from the causes found, as a share of them, for these to be taken for shapes of it.
+/// What the FEM of an extended drive may differ by from the causes found, as a share of them, for these to be taken for
+/// shapes of it.
 const WORST_AGREEMENT: f64 = 0.5;
 
 /// Why a file was not diagnosed, or what was found not extended.
@@ -55,8 +57,8 @@ pub enum PipelineError {
     Image(ImageError),
     /// The table is of another drive.
     #[error(
-        "the table was made from the drive with BLAKE3 {of}, and --drive {drive} has {given}; give the drive that made the table, with \
-         every --set"
+        "the table was made from the drive with BLAKE3 {of}, and --drive {drive} has {given}; give the drive that \
+         made the table, with every --set"
     )]
     OtherDrive {
         /// Hash in the table.
@@ -68,7 +70,8 @@ pub enum PipelineError {
     },
     /// The kernels are of another drive or generator.
     #[error(
-        "found kernels of the {found} of the drive with BLAKE3 {found_of}, allowed: those of the {kind} of {of}, as the table's"
+        "found kernels of the {found} of the drive with BLAKE3 {found_of}, allowed: those of the {kind} of {of}, as \
+         the table's"
     )]
     OtherKernels {
         /// Their generator.
@@ -292,8 +295,8 @@ fn without_torque(recording: &Recording) -> Option<String> {
     recording.faults.iter().filter(|_| gone).find(lost).map(|fault| fault.what.clone())
 }
 
-/// Diagnoses rows, and says what the core leaves of their error with tables of what was found. `progress(done, of, what)` is told how far
-/// it is.
+/// Diagnoses rows, and says what the core leaves of their error with tables of what was found.
+/// `progress(done, of, what)` is told how far it is.
 ///
 /// # Errors
 /// The rows cannot be diagnosed; a table that was to be made by FEM was not.
@@ -409,8 +412,8 @@ impl Diagnosed {
         DiagnosisFile { diagnosis: &self.diagnosis, extension, data_faults: faults, notes, command }
     }
 
-    /// Makes the extended drive, and the extended tables if they are worth it; nothing where no cause was found. `by_fem` is told before the
-    /// FEM of the drive begins.
+    /// Makes the extended drive, and the extended tables if they are worth it; nothing where no cause was found.
+    /// `by_fem` is told before the FEM of the drive begins.
     ///
     /// # Errors
     /// The causes make no drive; the FEM of it does not converge.
@@ -510,7 +513,8 @@ fn remade(
     make(&found.drive, subject.kind, subject.mesh(mesh)).map(Some)
 }
 
-/// Tables of the extended model over what the rows hold: their largest torque, their temperatures, the angle against gravity if it stays.
+/// Tables of the extended model over what the rows hold: their largest torque, their temperatures, the angle against
+/// gravity if it stays.
 fn tables_of<'a>(subject: &'a Subject<'_>, of: &'a TableSubject, sessions: &[Session]) -> ExtendedTables<'a> {
     let all = |column: fn(&Session) -> Option<&Vec<f64>>| {
         sessions.iter().filter_map(column).flatten().copied().fold(None, |range: Option<[f64; 2]>, value| {
@@ -540,7 +544,8 @@ mod tests {
     use crate::diagnosis::report::Finding;
     use crate::synthesize::catalogue_drive;
 
-    /// The finding, the notes and the diagnosis on terminal of a drive under 12 N·m, one way, with this error beside what its model says, arcsec.
+    /// The finding, the notes and the diagnosis on terminal of a drive under 12 N·m, one way, with this error beside
+    /// what its model says, arcsec.
     fn found(error_arcsec: impl Fn(f64) -> f64) -> (Finding, Vec<String>, String) {
         let nominal = catalogue_drive();
         let model = Model { nominal: nominal.clone(), causes: Vec::new() };

@@ -60,8 +60,9 @@ impl Jump {
     }
 }
 
-/// Where the error leaves for another level: at once, or, where that shows no whole pitches, while the wave passes (half a turn of the
-/// generator): so long teeth take to climb over each other. Where the load rings after that, the level is what it rings about.
+/// Where the error leaves for another level: at once, or, where that shows no whole pitches, while the wave passes
+/// (half a turn of the generator): so long teeth take to climb over each other. Where the load rings after that, the
+/// level is what it rings about.
 #[must_use]
 pub fn jumps(rows: &Rows, base: &Base, nominal: &Nominal) -> Vec<Jump> {
     let left: Vec<f64> = rows.error.iter().zip(&base.prediction).map(|(e, p)| e - p).collect();
@@ -89,7 +90,8 @@ pub fn whole_pitches(nominal: &Nominal, height_arcsec: f64) -> Option<f64> {
     })
 }
 
-/// Jumps that are over after [`JUMPING_S`] and after the generator has turned by `turned_rad`, to the level of `level_s` from there on.
+/// Jumps that are over after [`JUMPING_S`] and after the generator has turned by `turned_rad`, to the level of
+/// `level_s` from there on.
 fn jumps_within(rows: &Rows, left: &[f64], turned_rad: f64, level_s: f64) -> Vec<Jump> {
     let last = rows.len().saturating_sub(1);
     let middle = |range: std::ops::Range<usize>| quantile(range.map(|k| left[k]), 0.5);
@@ -98,8 +100,8 @@ fn jumps_within(rows: &Rows, left: &[f64], turned_rad: f64, level_s: f64) -> Vec
     let mut heights: Vec<f64> = Vec::new();
     let mut before_gap: Option<usize> = None;
     for session in rows.sessions_used() {
-        // Teeth slide into the next space, and the output swings out: what counts is where it comes to rest. At the end of a
-        // recording the next one says where.
+        // Teeth slide into the next space, and the output swings out: what counts is where it comes to rest. At the end
+        // of a recording the next one says where.
         let mut rest = session.start;
         for k in session.clone() {
             let from = k.saturating_sub(1).max(session.start);
@@ -126,7 +128,8 @@ fn jumps_within(rows: &Rows, left: &[f64], turned_rad: f64, level_s: f64) -> Vec
         }
         before_gap = Some(session.end.saturating_sub(BESIDE).max(session.start));
     }
-    // Rows one after another that see the same one: the one that sees the most of it; the first where all later ones see it ring.
+    // Rows one after another that see the same one: the one that sees the most of it; the first where all later ones
+    // see it ring.
     let mut seen: Vec<(usize, usize)> = Vec::new();
     for k in 0..found.len() {
         let row = found[k][1];
@@ -155,7 +158,8 @@ fn jumps_within(rows: &Rows, left: &[f64], turned_rad: f64, level_s: f64) -> Vec
         .collect()
 }
 
-/// Rows whose flank is not known well, with what the causes chosen add to the load, and those in which the output `hung` in the clearance.
+/// Rows whose flank is not known well, with what the causes chosen add to the load, and those in which the output
+/// `hung` in the clearance.
 #[must_use]
 pub fn uncertain(on: &Excitation<'_>, terms: &[Term<'_>], hung: &[bool]) -> Vec<bool> {
     let mut uncertain = on.base.uncertain.clone();
@@ -182,11 +186,12 @@ pub fn uncertain(on: &Excitation<'_>, terms: &[Term<'_>], hung: &[bool]) -> Vec<
     if few(&uncertain) { uncertain } else { without }
 }
 
-/// Where a drive is found sound, no more than this share of its rows may have been set aside. *Guess*: by definition most of them must count.
+/// Where a drive is found sound, no more than this share of its rows may have been set aside. *Guess*: by definition
+/// most of them must count.
 const MOST_SET_ASIDE: f64 = 0.5;
 
-/// Why the rows that count say nothing of the unit, if too few of them do. What was found in spite of that is the trouble itself, and stands as long
-/// as there are rows to judge it by.
+/// Why the rows that count say nothing of the unit, if too few of them do. What was found in spite of that is the
+/// trouble itself, and stands as long as there are rows to judge it by.
 #[must_use]
 pub fn too_few_left(problem: &Problem<'_>, finding: Finding) -> Option<String> {
     let rows = problem.on.rows;
@@ -243,7 +248,8 @@ pub struct FreeColumns {
 }
 
 impl FreeColumns {
-    /// Main columns of laws, at some places of their shape parameters. Smooth laws are evaluated on `averaged`, if there is any.
+    /// Main columns of laws, at some places of their shape parameters. Smooth laws are evaluated on `averaged`, if
+    /// there is any.
     #[must_use]
     pub fn of(on: &Excitation<'_>, laws: &[Law], averaged: Option<Arc<Averaged>>) -> FreeColumns {
         let finest = averaged.as_ref().map_or(1, |averaged| averaged.stride());
@@ -261,9 +267,10 @@ impl FreeColumns {
     }
 }
 
-/// White noise and wander, with everything a law could explain taken out: each hypothesis of the wander is judged by its evidence
-/// with the main columns of all laws as free columns. Returns also the worth of the information: below 1 where innovations are
-/// not white. `explained` is what is explained already, row by row; `near` is what was found before.
+/// White noise and wander, with everything a law could explain taken out: each hypothesis of the wander is judged by
+/// its evidence with the main columns of all laws as free columns. Returns also the worth of the information: below 1
+/// where innovations are not white. `explained` is what is explained already, row by row; `near` is what was found
+/// before.
 #[must_use]
 pub fn noise(
     on: &Excitation<'_>,
@@ -281,7 +288,8 @@ pub fn noise(
     let free = Free { columns: &columns.columns, priors: &columns.priors, data: plain.average(&left) };
     let unit = if rows.recorded.time { 1.0 } else { 100.0 * rows.period };
     let hypotheses = hypotheses(white, unit);
-    // Rows that a flank turned over too early or a ringing throws out are no noise: they would make a fast wander of it.
+    // Rows that a flank turned over too early or a ringing throws out are no noise: they would make a fast wander of
+    // it.
     let uncertain = match free.judge(plain) {
         Some(judged) => thrown_out(&judged, uncertain),
         None => uncertain.to_vec(),
@@ -314,8 +322,8 @@ pub fn noise(
         next.dedup();
         next.retain(|k| !asked[*k]);
     }
-    // As restless as this no sensor is: what is left is a cause. On a drive without load it is one that turns flanks over, which a wander
-    // that follows everything would hide.
+    // As restless as this no sensor is: what is left is a cause. On a drive without load it is one that turns flanks
+    // over, which a wander that follows everything would hide.
     let restless = on.unloaded()
         && hypotheses[best].wander >= MOST_WANDER * white
         && hypotheses[best].correlation_s <= FASTEST_S * unit;
@@ -327,8 +335,8 @@ pub fn noise(
     (hypotheses[best], worth)
 }
 
-/// Wanders that are tried, in units of the white noise, and their correlation times, s. A wander is slow: what is faster is a line, or a
-/// cause.
+/// Wanders that are tried, in units of the white noise, and their correlation times, s. A wander is slow: what is
+/// faster is a line, or a cause.
 const WANDERS: [f64; 8] = [0.1, 0.2, 0.3, 0.45, 0.7, 1.0, 1.5, MOST_WANDER];
 const CORRELATIONS_S: [f64; 4] = [FASTEST_S, 8.0, 25.0, 80.0];
 

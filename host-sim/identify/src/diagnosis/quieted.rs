@@ -1,5 +1,6 @@
-//! A torque that is read with more noise than the output shows: what a torque does to the output is then not what its column says row by
-//! row. Laws of the torque would be told by its noise: what lags it loses that noise, and looks like creep.
+//! A torque that is read with more noise than the output shows: what a torque does to the output is then not what its
+//! column says row by row. Laws of the torque would be told by its noise: what lags it loses that noise, and looks like
+//! creep.
 
 use super::channels::slope_arcsec;
 use super::rows::quantile;
@@ -12,7 +13,8 @@ use flexspline_base::units::ARCSEC_PER_RAD;
 const LOUDER: f64 = 1.5;
 /// Rows on either side of which the mean is taken, …
 const BESIDE: usize = 8;
-/// … as far as they are no farther from the row than so many standard deviations of the noise: a step of the load stays one (Lee 1983).
+/// … as far as they are no farther from the row than so many standard deviations of the noise: a step of the load stays
+/// one (Lee 1983).
 const NEAR: f64 = 4.0;
 
 /// Takes the noise out of the torque where it is not the load's, and gives a note that says so.
@@ -27,8 +29,9 @@ pub(super) fn torque(sessions: &mut [Session], nominal: &Nominal) -> Option<Stri
     }
     sessions.iter_mut().for_each(|session| quiet(session, NEAR * noise));
     Some(format!(
-        "the torque is read with a noise of {noise:.3} N·m, which would move the output by {wound_up:.1} arcsec and does not ({of_output:.1} arcsec \
-         is there): each row has the mean of up to {BESIDE} rows on either side, steps of the load left as they are"
+        "the torque is read with a noise of {noise:.3} N·m, which would move the output by {wound_up:.1} arcsec and \
+         does not ({of_output:.1} arcsec is there): each row has the mean of up to {BESIDE} rows on either side, \
+         steps of the load left as they are"
     ))
 }
 

@@ -61,8 +61,8 @@ pub fn every_row(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -
 
 /// The strongest line in the innovations of every row, by generator angle and by time.
 ///
-/// Innovations are laid on an even grid of the angle (all sessions, both directions) or of time and transformed; a grid place
-/// that was visited often counts often, as in a periodogram at uneven places.
+/// Innovations are laid on an even grid of the angle (all sessions, both directions) or of time and transformed; a grid
+/// place that was visited often counts often, as in a periodogram at uneven places.
 #[must_use]
 pub fn lines(problem: &Problem<'_>, innovations: &[f64], highest_order: f64) -> Vec<Line> {
     let rows = problem.on.rows;
@@ -154,8 +154,8 @@ pub fn beyond_noise(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise
 /// Cells of a grid at most: a power of two.
 const MOST_CELLS: usize = 1 << 18;
 
-/// Frequency (per unit of `places`) and power of the strongest line from `lowest` to `highest`. Places that are even are laid on a grid of
-/// this `cell` (a part of their distance), which loses nothing of what is fast.
+/// Frequency (per unit of `places`) and power of the strongest line from `lowest` to `highest`. Places that are even
+/// are laid on a grid of this `cell` (a part of their distance), which loses nothing of what is fast.
 fn strongest(places: &[f64], values: &[f64], lowest: f64, highest: f64, cell: Option<f64>) -> Option<(f64, f64)> {
     let (low, high) = places.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
     let span = high - low;

@@ -78,7 +78,8 @@ pub struct Cause {
     pub confidence: f64,
     /// Parameters; the unit is the end of the name.
     pub parameters: BTreeMap<&'static str, Parameter>,
-    /// Share of the squared error left by the recalibrated nominal model that this cause removes in sessions it was not fitted to.
+    /// Share of the squared error left by the recalibrated nominal model that this cause removes in sessions it was not
+    /// fitted to.
     pub held_out_gain: f64,
     /// Root mean square of what it explains, arcsec.
     pub size_arcsec: f64,
@@ -161,7 +162,8 @@ pub struct Diagnosis {
     /// Of the cause that was asked about, if it is not named: what to record to tell it from those that are.
     #[serde(skip)]
     pub experiment_for_asked: Option<String>,
-    /// Where the bench sets its zero anew in each session: that of every session less that of the first. Told as a fault of the data.
+    /// Where the bench sets its zero anew in each session: that of every session less that of the first. Told as a
+    /// fault of the data.
     #[serde(skip)]
     pub zeros: Vec<Parameter>,
     /// Why the rows that are left to judge by say nothing of the unit, where too many had to be set aside.
@@ -171,7 +173,8 @@ pub struct Diagnosis {
     pub trace: Trace,
 }
 
-/// A value and its standard deviation as text: four decimals, or powers of ten where these would show nothing of either.
+/// A value and its standard deviation as text: four decimals, or powers of ten where these would show nothing of
+/// either.
 fn digits(parameter: &Parameter) -> [String; 2] {
     let all = [parameter.value, parameter.std];
     if all.iter().any(|v| *v != 0.0 && v.abs() < 5e-4) {

@@ -1,6 +1,6 @@
-//! How many neighbouring rows are averaged to one. Averages make a diagnosis quick, and hide what changes from row to row: the tooth
-//! mesh, at z periods per generator turn. So the differences that averaging would throw away are looked at first, for the laws that
-//! live in them; where one shows, every row is kept.
+//! How many neighbouring rows are averaged to one. Averages make a diagnosis quick, and hide what changes from row to
+//! row: the tooth mesh, at z periods per generator turn. So the differences that averaging would throw away are looked
+//! at first, for the laws that live in them; where one shows, every row is kept.
 
 use super::candidate::{Excitation, Law, Tolerance};
 use super::linear::{Gram, Prior, solve};
@@ -26,8 +26,9 @@ pub struct Resolution {
     pub fast: Vec<f64>,
 }
 
-/// Rows to an average that leave about `averages` of them, or every row where averaging would hide a law that the data hold.
-/// Rows marked uncertain are not looked at; `explained` is what is explained already, row by row, arcsec (nothing if it is empty).
+/// Rows to an average that leave about `averages` of them, or every row where averaging would hide a law that the data
+/// hold. Rows marked uncertain are not looked at; `explained` is what is explained already, row by row, arcsec (nothing
+/// if it is empty).
 #[must_use]
 pub fn resolution(
     on: &Excitation<'_>,

@@ -39,7 +39,8 @@ impl Rival {
         vec![Judged::number(Gate::AsRival, self.misfit, TOLD_BETTER, self.tells_better(size_arcsec))]
     }
 
-    /// Whether it tells the data better than a cause of this size, and otherwise: not by telling what the laws of the other causes leave.
+    /// Whether it tells the data better than a cause of this size, and otherwise: not by telling what the laws of the
+    /// other causes leave.
     #[must_use]
     pub fn tells_better(&self, size_arcsec: f64) -> bool {
         !self.mops_up
@@ -48,8 +49,8 @@ impl Rival {
             && self.apart_arcsec < IN_ITS_PLACE * size_arcsec
     }
 
-    /// Whether the data cannot tell it from a cause of this size. With a base parameter `out_of_tolerance` any rival predicts the
-    /// same, as the base takes its place: there the misfit alone decides, which has the tolerance in it.
+    /// Whether the data cannot tell it from a cause of this size. With a base parameter `out_of_tolerance` any rival
+    /// predicts the same, as the base takes its place: there the misfit alone decides, which has the tolerance in it.
     #[must_use]
     pub fn looks_alike(&self, size_arcsec: f64, out_of_tolerance: bool) -> bool {
         let same = self.apart_arcsec < SAME_ARCSEC.max(SAME_SHARE * size_arcsec);

@@ -1,4 +1,5 @@
-//! The rows of all sessions in one place, with what follows from them: speed, direction, travel, and angles on each wheel.
+//! The rows of all sessions in one place, with what follows from them: speed, direction, travel, and angles on each
+//! wheel.
 
 use std::ops::Range;
 
@@ -125,8 +126,9 @@ impl Rows {
         rows
     }
 
-    /// The generator angle of each row as those beside it have it: a cubic in time through the two before and the two after. The instant
-    /// at which a row was read is in its error, and whatever follows the angle itself would follow that.
+    /// The generator angle of each row as those beside it have it: a cubic in time through the two before and the two
+    /// after. The instant at which a row was read is in its error, and whatever follows the angle itself would follow
+    /// that.
     fn by_neighbours(&self) -> Vec<f64> {
         let mut angle = self.generator.clone();
         for session in &self.sessions {

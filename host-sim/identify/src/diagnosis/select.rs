@@ -1,5 +1,6 @@
-//! Which causes: forward by evidence, each held against all others and against deviations without a name; then backward, then
-//! exchange. A cause has to earn its place four times: evidence, size, size against the misfit of the other laws, sessions it was not fitted to.
+//! Which causes: forward by evidence, each held against all others and against deviations without a name; then
+//! backward, then exchange. A cause has to earn its place four times: evidence, size, size against the misfit of the
+//! other laws, sessions it was not fitted to.
 
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
@@ -16,7 +17,8 @@ use crate::causes::CauseName;
 
 /// Rounds at most.
 const MOST_ROUNDS: usize = 10;
-/// Of the laws refined, so many of the best settle with all other terms where they gain this share of what the best gains.
+/// Of the laws refined, so many of the best settle with all other terms where they gain this share of what the best
+/// gains.
 const CONTENDERS: usize = 3;
 const CONTENDS: f64 = 0.6;
 /// Laws that are refined in each round.
@@ -77,7 +79,8 @@ impl<'l> Selected<'l> {
 pub struct Standing {
     /// Gain of evidence over the selection without it.
     pub evidence: f64,
-    /// Root mean square of what it adds, arcsec; for what is there at times only, the larger of that and 0.4 of its 97 % quantile.
+    /// Root mean square of what it adds, arcsec; for what is there at times only, the larger of that and 0.4 of its 97
+    /// % quantile.
     pub size: f64,
     /// Root mean square of what nothing else can take over, arcsec.
     pub alone: f64,
@@ -144,8 +147,9 @@ pub fn fit(problem: &Problem<'_>, terms: &[Term<'_>]) -> Option<Fit> {
 /// Sizes this far apart on the scale of a shape parameter, from least to largest, are begun with both.
 const ANOTHER_SIZE: f64 = 0.1;
 
-/// The places of those tried, with what each is worth, that a law is refined from: the best, and for a wheel beside its place the best of
-/// another size. Small ones leave clearance and large ones none, and no refinement goes from one to the other.
+/// The places of those tried, with what each is worth, that a law is refined from: the best, and for a wheel beside its
+/// place the best of another size. Small ones leave clearance and large ones none, and no refinement goes from one to
+/// the other.
 pub(super) fn begun(law: &Law, mut tried: Vec<(f64, Vec<f64>)>) -> Vec<Vec<f64>> {
     tried.sort_by(|a, b| b.0.total_cmp(&a.0));
     let size = law.displacement_at().filter(|_| law.acts.meets_zones).map(|[_, size]| size);
@@ -214,8 +218,8 @@ impl Bests {
         self.close.contains_key(&law.id())
     }
 
-    /// Places to begin with a law that takes the place of a term: where it was at its best beside all terms so far or before, and
-    /// where its lead points now.
+    /// Places to begin with a law that takes the place of a term: where it was at its best beside all terms so far or
+    /// before, and where its lead points now.
     pub fn begin(&self, scaffold: &Scaffold<'_, '_, '_, '_>, law: &Law) -> Vec<Vec<f64>> {
         match self.tried.get(&law.id()).filter(|_| law.search.lead.is_none()) {
             Some(known) => known.clone(),
@@ -254,8 +258,8 @@ fn tried(
     by_law
 }
 
-/// Laws at the best of the places tried: those that are refined, best evidence first, and those that are not, with the gates that they
-/// came to.
+/// Laws at the best of the places tried: those that are refined, best evidence first, and those that are not, with the
+/// gates that they came to.
 struct Screened<'l> {
     terms: Vec<Term<'l>>,
     refused: Vec<(&'l Law, Vec<f64>, Vec<Judged>)>,
@@ -404,7 +408,8 @@ pub fn blocks(problem: &Problem<'_>) -> Vec<std::ops::Range<usize>> {
 
 /// Relative gain of squared innovations in blocks left out, by having all `terms` instead of `fewer`.
 fn left_out_gain(problem: &Problem<'_>, terms: &[&Term<'_>], fewer: &[&Term<'_>]) -> f64 {
-    // Nobody foretells a zero that the bench sets in each session: there it is found in the block itself. The first column is the zero.
+    // Nobody foretells a zero that the bench sets in each session: there it is found in the block itself. The first
+    // column is the zero.
     let own_zero = Zero::of(problem, terms) == Zero::Own;
     let misfit = |terms: &[&Term<'_>]| -> Option<f64> {
         let columns = white_columns(problem, terms, &[]);
@@ -436,7 +441,8 @@ fn left_out_gain(problem: &Problem<'_>, terms: &[&Term<'_>], fewer: &[&Term<'_>]
     }
 }
 
-/// Whether a base parameter has left its tolerance far enough for `law` to be named; none for a law that is no base parameter.
+/// Whether a base parameter has left its tolerance far enough for `law` to be named; none for a law that is no base
+/// parameter.
 fn tolerance(problem: &Problem<'_>, fit: &Fit, law: &Law) -> Option<Judged> {
     let name = law.acts.tolerance_of?;
     let floating = &problem.on.base.floating;
@@ -479,8 +485,8 @@ impl Limits {
         Limits { least: least_size(white) }
     }
 
-    /// The gates that a law comes to, whatever the ones before say. `misfit` is what the laws of the other terms may be wrong by, arcsec,
-    /// `strongest` the largest size, arcsec.
+    /// The gates that a law comes to, whatever the ones before say. `misfit` is what the laws of the other terms may be
+    /// wrong by, arcsec, `strongest` the largest size, arcsec.
     fn gates(&self, law: &Law, standing: &Standing, misfit: f64, strongest: f64) -> Vec<Judged> {
         let share = if law.named() { LEAST_OF_MISFIT } else { LEAST_UNNAMED_OF_MISFIT };
         let evidence = if law.acts.tolerance_of.is_some() { LEAST_GAIN } else { LEAST_EVIDENCE };
@@ -499,7 +505,8 @@ impl Limits {
         gates
     }
 
-    /// Whether the last term is clear beside something without a name that tells the data better, and is too small to count.
+    /// Whether the last term is clear beside something without a name that tells the data better, and is too small to
+    /// count.
     fn clear_beside(
         &self,
         problem: &Problem<'_>,
@@ -555,7 +562,8 @@ pub fn select<'l>(
         selected = settle(problem, next)?;
         selected = backward(problem, selected, &limits, trace)?;
         if round > 0 || selected.terms.len() > 1 {
-            // What was taken just now was held against all others beside the same terms, unless one of them has gone since.
+            // What was taken just now was held against all others beside the same terms, unless one of them has gone
+            // since.
             let compared = if selected.terms.len() == taken { taken - 1 } else { usize::MAX };
             selected = exchange(problem, laws, selected, &limits, compared, &mut given, bests, scope, trace)?;
             selected = backward(problem, selected, &limits, trace)?;
@@ -676,7 +684,8 @@ fn forward<'l>(
         }
     }
     contenders_settled(problem, &mut grown, before);
-    // Something with a name goes before something without unless that is clearly better: by more than the law may be wrong by.
+    // Something with a name goes before something without unless that is clearly better: by more than the law may be
+    // wrong by.
     let best_named = grown.iter().filter(|(_, next)| next.newest().law.named()).max_by(|a, b| a.0.total_cmp(&b.0));
     let misfit = best_named.map_or(0.0, |(_, next)| next.newest().law.wrong.misfit);
     let ahead = |(gain, next): &(f64, Selected<'l>)| {
@@ -736,8 +745,9 @@ fn forward<'l>(
     None
 }
 
-/// The best by name of selections that have grown by a term, and those close to it, settle before they are compared: what they were
-/// refined beside has taken some of what is there, which is not the same share of each. Gains are over `before`.
+/// The best by name of selections that have grown by a term, and those close to it, settle before they are compared:
+/// what they were refined beside has taken some of what is there, which is not the same share of each. Gains are over
+/// `before`.
 fn contenders_settled<'l>(problem: &Problem<'_>, grown: &mut [(f64, Selected<'l>)], before: f64) {
     let mut named: Vec<&mut (f64, Selected<'l>)> =
         grown.iter_mut().filter(|(_, next)| next.newest().law.named()).collect();
@@ -758,7 +768,8 @@ fn contenders_settled<'l>(problem: &Problem<'_>, grown: &mut [(f64, Selected<'l>
     });
 }
 
-/// Of selections that have grown by a term, best first, the simplest that predicts the same as the best, or is as likely, goes first.
+/// Of selections that have grown by a term, best first, the simplest that predicts the same as the best, or is as
+/// likely, goes first.
 fn simplest_first<'l>(problem: &Problem<'_>, selected: &Selected<'l>, grown: &mut [(f64, Selected<'l>)]) {
     let Some((best_gain, best)) = grown.first() else { return };
     let there = best.predicted(problem);
@@ -789,7 +800,8 @@ pub(super) fn settle_all<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> O
     settle_from(problem, selected, |_, term| vec![term.clone()])
 }
 
-/// Settles every term where one has gone that the others were refined beside: those with a lead begin where it points now, too.
+/// Settles every term where one has gone that the others were refined beside: those with a lead begin where it points
+/// now, too.
 fn settle_anew<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> Option<Selected<'l>> {
     settle_from(problem, selected, |scaffold, term| {
         let anew = if term.law.search.lead.is_some() { scaffold.begin(term.law) } else { Vec::new() };

@@ -218,8 +218,8 @@ fn what_swings_short_of_where_it_is_driven_is_no_resonance() {
 #[test]
 fn a_line_that_grows_with_the_speed_is_no_encoder_and_one_that_does_not_is() {
     let order = 8.0;
-    // Torque of a motor's poles turns a load on its spring, of 8 Hz: the nearer its frequency comes to that, the more. Speeds of the generator
-    // come with its angle: rows are a hundredth of a second apart.
+    // Torque of a motor's poles turns a load on its spring, of 8 Hz: the nearer its frequency comes to that, the more.
+    // Speeds of the generator come with its angle: rows are a hundredth of a second apart.
     let swinging = |sessions: Vec<Session>| -> Vec<Session> {
         let mut sessions = sessions;
         for session in &mut sessions {
@@ -276,7 +276,8 @@ fn a_coupling_before_the_generator_that_gives_way_is_no_soft_spring_with_a_late_
     assert!(diagnosis.unexplained.iter().any(coupling), "{}", diagnosis.text());
 }
 
-/// The wheel that stands makes the wave of an encoder's subdivision, and of a motor's ripple: one of two, with the run that tells.
+/// The wheel that stands makes the wave of an encoder's subdivision, and of a motor's ripple: one of two, with the run
+/// that tells.
 #[test]
 fn a_higher_harmonic_of_the_pitch_is_found_and_not_sure_where_the_wheel_stands() {
     for order in [4.0, 6.0] {
@@ -300,7 +301,8 @@ fn what_a_load_makes_that_nobody_recorded_has_no_name() {
     assert!(names(&diagnosis).iter().all(|name| !name.is_made_by_loads()), "{}", diagnosis.text());
 }
 
-/// The same sessions as a file in which a share of the rows is off, one by one: by far as a heavy tail has it, or to one side alone.
+/// The same sessions as a file in which a share of the rows is off, one by one: by far as a heavy tail has it, or to
+/// one side alone.
 fn with_bad_rows(sessions: &[Session], share: f64, one_sided: bool, seed: u64) -> Vec<Session> {
     let nominal = catalogue_drive();
     let mut random = fastrand::Rng::with_seed(seed);
@@ -664,8 +666,8 @@ fn a_clearance_that_shuts_is_found_beside_a_runout_that_binds_in_it() {
     assert!((per_k.value - 1.7).abs() < 3.0 * per_k.std && per_k.std < 0.3, "{per_k:?}");
 }
 
-/// A drive brought into the cold minutes before it is recorded has not cooled down: its teeth lag behind the sensor for as long as they do
-/// while it is recorded.
+/// A drive brought into the cold minutes before it is recorded has not cooled down: its teeth lag behind the sensor for
+/// as long as they do while it is recorded.
 #[test]
 fn what_lags_behind_the_temperature_goes_on_between_sessions() {
     let (drive, mut sessions) = (catalogue_drive(), data(&[], Richness::Rich, 0, 47));
@@ -776,7 +778,8 @@ fn a_moment_that_turns_flanks_over_without_a_load_is_found_and_measured() {
 #[test]
 fn a_small_moment_beside_a_load_is_found_where_the_load_crosses_none() {
     let drive = catalogue_drive();
-    // 0.3 % of the load: it winds the drive up by a part of an arc-second, and turns its play over a little earlier or later.
+    // 0.3 % of the load: it winds the drive up by a part of an arc-second, and turns its play over a little earlier or
+    // later.
     let small = [effect(CauseName::GravityTorque, 0.12, 1.0, 0.0)];
     let sessions = recorded(&small, 5, 12000, 100.0, 1.0, 3);
     let diagnosis = diagnose(&sessions, &drive, None, &Settings::default(), |_, _, _| {}).unwrap();
@@ -956,8 +959,9 @@ fn a_wheel_is_told_from_the_other_whichever_of_them_stands() {
         let drive = Nominal::from_toml(
             "test",
             &format!(
-                "[drive]\nflexspline_teeth = 188\ncircular_spline_teeth = 190\nfixed = \"{fixed}\"\n[nominal]\n\
-                 stiffness_n_m_per_rad = 30000.0\nbacklash_arcsec = 60.0\nfriction_torque_n_m = 1.5\n"
+                "[drive]\nflexspline_teeth = 188\ncircular_spline_teeth = 190\nfixed = \
+                 \"{fixed}\"\n[nominal]\nstiffness_n_m_per_rad = 30000.0\nbacklash_arcsec = 60.0\nfriction_torque_n_m \
+                 = 1.5\n"
             ),
         )
         .unwrap();
@@ -1216,7 +1220,8 @@ fn a_zero_that_is_set_in_each_session_hides_no_cause() {
     assert!(found.held_out.rms_after_arcsec < 0.5 * found.held_out.rms_before_arcsec, "{:?}", found.held_out);
 }
 
-/// Data in which the output hangs on the flank that it left, for 0.1 to 0.3 s, at every third change of the load's side.
+/// Data in which the output hangs on the flank that it left, for 0.1 to 0.3 s, at every third change of the load's
+/// side.
 fn hanging(mut sessions: Vec<Session>, drive: &Nominal) -> Vec<Session> {
     let friction = drive.friction_torque_n_m;
     let across_rad = drive.backlash_arcsec / ARCSEC_PER_RAD;

@@ -1,7 +1,7 @@
 //! A sample of the rows, on which causes are searched for. What a search finds there is settled and judged on all rows.
 //!
-//! The sample is made of stretches of neighbouring rows, so that tooth mesh, play and ringing are in it as they are in the rows. One
-//! stretch is taken out of every few, at a place that no period of the drive follows.
+//! The sample is made of stretches of neighbouring rows, so that tooth mesh, play and ringing are in it as they are in
+//! the rows. One stretch is taken out of every few, at a place that no period of the drive follows.
 
 use std::sync::Arc;
 

@@ -1,10 +1,11 @@
-//! A torque sensor whose zero is off: it reads a load where there is none. The drive then changes flanks, and stiffens, at other torques
-//! than its model, always by the same amount; whatever turns with an angle or follows the motion may explain a part of that, and none of it
-//! is there.
+//! A torque sensor whose zero is off: it reads a load where there is none. The drive then changes flanks, and stiffens,
+//! at other torques than its model, always by the same amount; whatever turns with an angle or follows the motion may
+//! explain a part of that, and none of it is there.
 //!
-//! The torque less a constant is tried, from a share of the load on either side: what the model leaves of the error then, with everything
-//! free that floats in any drive, tells the constant. It counts where neither an unbalanced load nor a drag, all of their sizes and phases
-//! free, leaves as little, nor a spring that is stiffer one way than the other: a spring that stiffens makes of a zero just about that.
+//! The torque less a constant is tried, from a share of the load on either side: what the model leaves of the error
+//! then, with everything free that floats in any drive, tells the constant. It counts where neither an unbalanced load
+//! nor a drag, all of their sizes and phases free, leaves as little, nor a spring that is stiffer one way than the
+//! other: a spring that stiffens makes of a zero just about that.
 
 use flexspline::Table;
 
@@ -14,24 +15,26 @@ use super::rows::{Rows, mean, rms};
 use crate::measurement::{FaultName, Measures, Recording, Session, Treatment};
 use crate::nominal::Nominal;
 
-/// Rows that are followed, about: of longer recordings the beginnings of all sessions; and of these the rows that are compared.
+/// Rows that are followed, about: of longer recordings the beginnings of all sessions; and of these the rows that are
+/// compared.
 const FOLLOWED: usize = 200_000;
 const SAMPLE: usize = 8000;
 /// Blocks of rows that are left out one at a time.
 const BLOCKS: usize = 24;
 
-/// The largest zero that is looked for, as a share of the load: sensors are good to some per cent of their range. One from there on is none that was
-/// found, but the end of what was tried: something else goes on as far as one lets it. *Guess*.
+/// The largest zero that is looked for, as a share of the load: sensors are good to some per cent of their range. One
+/// from there on is none that was found, but the end of what was tried: something else goes on as far as one lets
+/// it. *Guess*.
 const LARGEST_SHARE: f64 = 0.06;
 /// A smaller one is no matter. *Guess*.
 const LEAST_SHARE: f64 = 0.004;
-/// Step of the first look, as a share of the load, and how often it is halved then: what is left grows with the distance from the zero on
-/// either side, so that a coarse look leads there.
+/// Step of the first look, as a share of the load, and how often it is halved then: what is left grows with the
+/// distance from the zero on either side, so that a coarse look leads there.
 const STEP_SHARE: f64 = 0.01;
 const HALVINGS: u32 = 5;
 
-// Chosen on healthy drives of the catalogue and of a table (zero of 0.3 to 2 N·m at 40 N·m: share 3 % to 65 %, 3.2 to 6.1 standard
-// deviations) against 24 unbalanced loads and drags of the examination (share below 6 %, below 1.9).
+// Chosen on healthy drives of the catalogue and of a table (zero of 0.3 to 2 N·m at 40 N·m: share 3 % to 65 %, 3.2 to
+// 6.1 standard deviations) against 24 unbalanced loads and drags of the examination (share below 6 %, below 1.9).
 /// A zero takes this share of what is left without it, …
 const LEAST_GAIN: f64 = 0.03;
 /// … by so many standard deviations of the blocks' means, …
@@ -42,11 +45,12 @@ const TOLD_FROM_NONE: f64 = 4.0;
 const RIVALS_LEAVE: f64 = 0.99;
 /// … and with it no less than this: else they are there.
 const BESIDE_IT_LEAVE: f64 = 0.95;
-/// In either case by this share of what the zero has taken away. *Chosen* between what they take of a zero in the tests below, at most 0.09, and
-/// of an unbalanced load there, 0.149; on the drives of `logger_faults` more is trifles.
+/// In either case by this share of what the zero has taken away. *Chosen* between what they take of a zero in the tests
+/// below, at most 0.09, and of an unbalanced load there, 0.149; on the drives of `logger_faults` more is trifles.
 const NO_TRIFLE: f64 = 0.12;
-/// A play that goes over smoothly is taken where it leaves less than this of the least that another law leaves. *Guess*: these are sums of magnitudes, so
-/// that it asks for more than where squares decide between the laws; a load beside the torque looks like such a play.
+/// A play that goes over smoothly is taken where it leaves less than this of the least that another law
+/// leaves. *Guess*: these are sums of magnitudes, so that it asks for more than where squares decide between the laws;
+/// a load beside the torque looks like such a play.
 const FAR_LESS: f64 = 0.8;
 /// First and last step of the search for such loads, as shares of the load.
 const RIVAL_STEPS: [f64; 2] = [0.04, 0.002];
@@ -76,8 +80,9 @@ impl<'a> Held<'a> {
         held
     }
 
-    /// Takes the law of the play that leaves least at any of some zeros, and gives what each of them leaves by it, block by block; and what is
-    /// left at least without a zero, by any law. A zero turns flanks over too early, which by itself looks like a play that goes over slowly.
+    /// Takes the law of the play that leaves least at any of some zeros, and gives what each of them leaves by it,
+    /// block by block; and what is left at least without a zero, by any law. A zero turns flanks over too early, which
+    /// by itself looks like a play that goes over slowly.
     fn with_zeros(&mut self, zeros: &[f64]) -> (Vec<Try>, f64) {
         let of_law = |law: PlayLaw| -> (PlayLaw, Vec<Try>) {
             let left = |zero: &f64| (*zero, by_block(&self.of_law(law, [-zero, 0.0, 0.0, 0.0])));
@@ -174,8 +179,8 @@ impl<'a> Held<'a> {
         left
     }
 
-    /// What is left at least, block by block, with an unbalanced load and a drag beside `from`, and a constant where it is `free`: by steps
-    /// that are halved where none leads on.
+    /// What is left at least, block by block, with an unbalanced load and a drag beside `from`, and a constant where it
+    /// is `free`: by steps that are halved where none leads on.
     fn least_beside(&self, from: Beside, free: bool, load: f64) -> Vec<f64> {
         let left = |beside: Beside| self.left(beside).iter().map(|v| v.abs()).sum::<f64>();
         let (mut at, mut least) = (from, left(from));
@@ -222,7 +227,8 @@ fn take_away(column: &mut [f64], other: &[f64]) {
     }
 }
 
-/// How much is left in each block of rows: the sum of the magnitudes, which the rows of a flank turned over too early do not rule.
+/// How much is left in each block of rows: the sum of the magnitudes, which the rows of a flank turned over too early
+/// do not rule.
 pub(super) fn by_block(left: &[f64]) -> Vec<f64> {
     left.chunks(left.len().div_ceil(BLOCKS).max(1)).map(|block| block.iter().map(|v| v.abs()).sum()).collect()
 }
@@ -298,8 +304,8 @@ fn find(sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> O
     let least = sum(there);
     let by_rivals = held.least_beside([0.0; 4], false, load);
     let rivals = sum(&by_rivals);
-    // They have three numbers to its one: they are there only where they leave less, for certain, and by more than the lag of flanks and other
-    // trifles, of which three numbers always tell a part.
+    // They have three numbers to its one: they are there only where they leave less, for certain, and by more than the
+    // lag of flanks and other trifles, of which three numbers always tell a part.
     let better = |than: &[f64], share: f64| {
         sum(than) < share * least && is_certain(there, than, CERTAIN) && least - sum(than) > NO_TRIFLE * gain
     };
@@ -336,13 +342,14 @@ pub(super) fn check(recording: &mut Recording, nominal: &Nominal, table: Option<
     let torques = recording.sessions.iter_mut().flat_map(|session| &mut session.torque_n_m).flatten();
     torques.for_each(|torque| *torque -= n_m);
     let alike = if may_be_unbalance {
-        "; an unbalanced load of that size, which is nearly constant where the load changes its side, would do the same here"
+        "; an unbalanced load of that size, which is nearly constant where the load changes its side, would do the \
+         same here"
     } else {
         ""
     };
     let what = format!(
-        "the torque reads {n_m:+.2} N·m (± {std:.2}) where there is none: the output changes its flank at that reading, wherever it stands and \
-         whichever way it turns; it was taken off{alike}"
+        "the torque reads {n_m:+.2} N·m (± {std:.2}) where there is none: the output changes its flank at that \
+         reading, wherever it stands and whichever way it turns; it was taken off{alike}"
     );
     let mut fault = fault_throughout(recording, FaultName::TorqueZero, Treatment::Repaired, size_arcsec, what);
     fault.measures = Measures { zero_n_m: Some(n_m), zero_std_n_m: Some(std), ..Measures::default() };
@@ -356,8 +363,8 @@ mod tests {
     use crate::synthesize::catalogue_drive;
     use flexspline_base::units::ARCSEC_PER_RAD;
 
-    /// A drive as its catalogue says that turns to and fro by so much from row to row under a load that swings, 2 arcsec of noise; with
-    /// `unseen` N·m (of output angle and direction) beside what the column of torque tells.
+    /// A drive as its catalogue says that turns to and fro by so much from row to row under a load that swings, 2
+    /// arcsec of noise; with `unseen` N·m (of output angle and direction) beside what the column of torque tells.
     fn recording(nominal: &Nominal, turned: f64, unseen: impl Fn(f64, f64) -> f64) -> Recording {
         with_spring(nominal, turned, unseen, |load| nominal.wind_up_arcsec(load))
     }
@@ -462,7 +469,8 @@ mod tests {
     #[test]
     fn the_search_ends_where_nothing_is_left_but_round_off() {
         let nominal = catalogue_drive();
-        // Exact rows at one load, there and back or one way, as anybody writes who tries the program on numbers of his own; and what is no number.
+        // Exact rows at one load, there and back or one way, as anybody writes who tries the program on numbers of his
+        // own; and what is no number.
         for (back, backlash, error) in [(true, 1.0, 0.0), (false, 1.0, 0.0), (true, 0.0, 0.0), (true, 1.0, f64::NAN)] {
             let mut session =
                 Session { time_s: Some(Vec::new()), torque_n_m: Some(vec![1.0; 2000]), ..Session::default() };

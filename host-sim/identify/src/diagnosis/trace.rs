@@ -1,8 +1,9 @@
 //! Every decision of a diagnosis: which law was judged, at which stage, by which gates, with which values and limits.
 //!
-//! The verdict alone does not say why a cause was *not* named. The trace does: of each cause it knows how far it came, and the gate that
-//! stopped it. What `-v` prints, what `diagnosis.json` has under `trace`, what the report shows and what `--explain` says are all
-//! made from it. What is collected are numbers that the search has in hand anyway, some hundred of them.
+//! The verdict alone does not say why a cause was *not* named. The trace does: of each cause it knows how far it came,
+//! and the gate that stopped it. What `-v` prints, what `diagnosis.json` has under `trace`, what the report shows and
+//! what `--explain` says are all made from it. What is collected are numbers that the search has in hand anyway, some
+//! hundred of them.
 
 use std::fmt;
 use std::io::Write as _;
@@ -119,7 +120,8 @@ pub enum Gate {
     Named,
     /// What has no name is no larger than this against it.
     BesideUnknown,
-    /// It is no piece of a line beside it whose order is not whole: without it, and with that line of any order, the misfit rises by this much.
+    /// It is no piece of a line beside it whose order is not whole: without it, and with that line of any order, the
+    /// misfit rises by this much.
     NoPiece,
     /// A line of the generator's angle does not grow with the speed.
     NoGrowthWithSpeed,
@@ -238,7 +240,8 @@ impl Gate {
                 "leaves no more than noise, as a load that was not recorded may make it (times the noise)"
             }
             Gate::NoLineBeside => {
-                "does not stand beside a line in time near its frequency that nothing in the drive drives (its size as a share of the cause)"
+                "does not stand beside a line in time near its frequency that nothing in the drive drives (its size as \
+                 a share of the cause)"
             }
             Gate::Rings => "may ring (lower end of the interval of its damping ratio)",
             Gate::KnownWell => "is known well beside what has no name (times its own uncertainty)",
@@ -492,8 +495,8 @@ impl Trace {
         self.steps.iter().filter(move |step| step.label == Label::Cause(cause))
     }
 
-    /// The decision that says why a cause was not named: of the last stage that it came to, the one of the law that came farthest.
-    /// None if all gates let it through to the end.
+    /// The decision that says why a cause was not named: of the last stage that it came to, the one of the law that
+    /// came farthest. None if all gates let it through to the end.
     #[must_use]
     pub fn stopped(&self, cause: CauseName) -> Option<&Step> {
         let search = |step: &&Step| !matches!(step.stage, Stage::Exchange | Stage::Rival);
@@ -514,8 +517,8 @@ impl Trace {
         beside.max_by(|a, b| a.stage.cmp(&b.stage).then(gained(a).total_cmp(&gained(b))))
     }
 
-    /// The decisions that say what became of a cause: those of the last round that it was judged in, and from any round those where it
-    /// was chosen, given up, or held against a rival.
+    /// The decisions that say what became of a cause: those of the last round that it was judged in, and from any round
+    /// those where it was chosen, given up, or held against a rival.
     pub fn telling(&self, cause: CauseName) -> Vec<&Step> {
         let last = self.of(cause).map(|step| step.round).max().unwrap_or(0);
         let tells =

@@ -1,5 +1,5 @@
-//! Parameters of the causes with their uncertainty: Laplace's approximation, shape parameters included, on the information the
-//! rows are worth; spread over sessions left out where that is larger.
+//! Parameters of the causes with their uncertainty: Laplace's approximation, shape parameters included, on the
+//! information the rows are worth; spread over sessions left out where that is larger.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +16,8 @@ const STEP: f64 = 0.1;
 /// A parameter is no longer determined where its standard deviation grows by this factor.
 const UNDETERMINED: f64 = 100.0;
 
-/// A block tells something of a parameter where leaving it out adds this share to the variance; a smaller one is round-off.
+/// A block tells something of a parameter where leaving it out adds this share to the variance; a smaller one is
+/// round-off.
 const LEAST_TOLD: f64 = 1e-6;
 
 /// Stretches of the data whose misfits are taken as independent, in each session.
@@ -66,13 +67,14 @@ pub struct Known {
     pub times_its_doubt: f64,
     /// The best known of its sizes, in standard deviations, which count noise by what is left beyond it.
     pub size_told: f64,
-    /// How well it is told from zero: that, or all that it adds where this is known well and zero is outside the interval of the size. What its own
-    /// columns make of one another, as where a wave with the load and one without are the same at one load, is no doubt that it is there.
+    /// How well it is told from zero: that, or all that it adds where this is known well and zero is outside the
+    /// interval of the size. What its own columns make of one another, as where a wave with the load and one without
+    /// are the same at one load, is no doubt that it is there.
     pub told_from_zero: f64,
 }
 
-/// Sizes by which causes are told; what else they have are places, shapes and the same in other units. The gain of a resonance is none: it trades
-/// with the damping, while what it adds is known.
+/// Sizes by which causes are told; what else they have are places, shapes and the same in other units. The gain of a
+/// resonance is none: it trades with the damping, while what it adds is known.
 const SIZES: [ParameterName; 13] = [
     ParameterName::AmplitudeArcsec,
     ParameterName::ClearanceArcsecPerK,
@@ -102,15 +104,15 @@ struct Spread {
 }
 
 impl Spread {
-    /// Variance of a quadratic form, row by row: the largest of Laplace's, that by stretches, and that of a jackknife. A jackknife holds for blocks
-    /// that tell alike much; of others it counts only up to what Laplace's variance lacks.
+    /// Variance of a quadratic form, row by row: the largest of Laplace's, that by stretches, and that of a jackknife.
+    /// A jackknife holds for blocks that tell alike much; of others it counts only up to what Laplace's variance lacks.
     fn of(&self, form: &[f64]) -> f64 {
         let (within, jackknife, lacking) = self.parts(form);
         within.max(jackknife.min(lacking))
     }
 
-    /// The same where the noise is `beyond` times what it was taken for. What blocks of the data tell of themselves holds as it is: they have
-    /// what is beyond noise in them.
+    /// The same where the noise is `beyond` times what it was taken for. What blocks of the data tell of themselves
+    /// holds as it is: they have what is beyond noise in them.
     fn beyond_noise(&self, form: &[f64], beyond: f64) -> f64 {
         let laplace =
             trace(form, &self.covariances[0]) + (beyond * beyond - 1.0) * trace(form, &self.by_noise).max(0.0);
@@ -138,8 +140,9 @@ impl Spread {
         let from_mean = |shift: &[f64]| -> Vec<f64> { shift.iter().zip(&mean).map(|(s, m)| s - m).collect() };
         let shifted: f64 = shifts.iter().map(|shift| trace(&outer(&from_mean(shift)))).sum();
         let jackknife = (count - 1.0) / count * shifted;
-        // Where one block tells more than the others, the rest is less sure without it, and may shift by as much as that. What the blocks shift
-        // against what they may is what Laplace's variance lacks. Of blocks that were driven alike it comes to the jackknife.
+        // Where one block tells more than the others, the rest is less sure without it, and may shift by as much as
+        // that. What the blocks shift against what they may is what Laplace's variance lacks. Of blocks that were
+        // driven alike it comes to the jackknife.
         let against: Vec<[f64; 2]> = repeated()
             .map(|(shift, without)| [trace(&outer(shift)), trace(without) - trace(laplace)])
             .filter(|[_, may]| *may > LEAST_TOLD * trace(laplace))
@@ -154,8 +157,9 @@ fn trace(form: &[f64], covariance: &[f64]) -> f64 {
     form.iter().zip(covariance).map(|(a, b)| a * b).sum()
 }
 
-/// By what factor squares of shifts are larger than they may be, from both of each block. The mean of the blocks' own factors: each is one draw of
-/// chance, and in the sums a block that tells most is the only one, which by chance may shift by next to nothing. That of the sums where it is larger.
+/// By what factor squares of shifts are larger than they may be, from both of each block. The mean of the blocks' own
+/// factors: each is one draw of chance, and in the sums a block that tells most is the only one, which by chance may
+/// shift by next to nothing. That of the sums where it is larger.
 fn beyond_what_may(against: &[[f64; 2]]) -> f64 {
     let all = |of: usize| against.iter().map(|block| block[of]).sum::<f64>();
     let each = against.iter().map(|[shifted, may]| shifted / may).sum::<f64>() / against.len() as f64;
@@ -241,7 +245,8 @@ pub fn known(problem: &Problem<'_>, selected: &Selected<'_>, beyond: f64) -> Vec
     all
 }
 
-/// Parameters of a term with their standard deviations, and how well its best known size is told from zero where `beyond` times the noise is left.
+/// Parameters of a term with their standard deviations, and how well its best known size is told from zero where
+/// `beyond` times the noise is left.
 fn parameters(
     problem: &Problem<'_>,
     term: &Term<'_>,

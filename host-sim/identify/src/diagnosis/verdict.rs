@@ -39,7 +39,8 @@ pub(super) fn conclude(
         trace.judged(Stage::Settled, term.law, &term.values(), gates);
     }
     let all: Vec<&Term<'_>> = selected.terms.iter().collect();
-    // A zero that the bench sets in each session is told of the data: it is no discrepancy of the drive, with or without a cause.
+    // A zero that the bench sets in each session is told of the data: it is no discrepancy of the drive, with or
+    // without a cause.
     let zeros = zeros_of_sessions(problem, &selected);
     let of_the_bench = |term: &Term<'_>| term.law.is_zero_of_sessions() && !zeros.is_empty();
     let given: Vec<Term<'_>> = selected.terms.iter().filter(|term| of_the_bench(term)).cloned().collect();
@@ -67,8 +68,8 @@ pub(super) fn conclude(
             .map(|k| size(&k))
             .sum::<f64>(),
     );
-    // A zero of each session hides nothing of what goes on within one. One that may be teeth that have skipped is not understood with nothing else
-    // found.
+    // A zero of each session hides nothing of what goes on within one. One that may be teeth that have skipped is not
+    // understood with nothing else found.
     let zeros_alone = named.is_empty() && all.iter().any(|term| term.law.is_zero_of_sessions() && !of_the_bench(term));
     let strongest = named.iter().map(|k| standings[*k].size).fold(0.0, f64::max);
     left_over.retain(|l| l.size_arcsec > LEAST_LEFT_OF_STRONGEST * strongest);
@@ -193,7 +194,8 @@ pub(super) fn conclude(
         residual: Residual {
             rms_before_arcsec: rms_before,
             rms_after_arcsec: rms_after,
-            // A wander that is looked for before the causes may hold a part of them: noise is no more than what is left.
+            // A wander that is looked for before the causes may hold a part of them: noise is no more than what is
+            // left.
             noise_floor_arcsec: floor.min(rms_after),
             unexplained_fraction: if explainable > 0.0 { (unexplained / explainable).min(1.0) } else { 0.0 },
         },
@@ -211,8 +213,9 @@ pub(super) fn conclude(
     }
 }
 
-/// The zero of every session less that of the first, where the bench sets it anew: a law of it was chosen, or sessions are known to have their
-/// own. None where from one session to the next it moves by whole tooth pitches: teeth may have skipped.
+/// The zero of every session less that of the first, where the bench sets it anew: a law of it was chosen, or sessions
+/// are known to have their own. None where from one session to the next it moves by whole tooth pitches: teeth may have
+/// skipped.
 fn zeros_of_sessions(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<Parameter> {
     let rows = problem.on.rows;
     let term = selected.terms.iter().position(|term| term.law.is_zero_of_sessions());
@@ -227,7 +230,8 @@ fn zeros_of_sessions(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<Para
     let mut zeros: Vec<Parameter> = Vec::new();
     let (mut place, mut before) = (0, 0.0);
     for session in 0..rows.sessions.len() {
-        // Those that are known to be own ones count from their session on, and float first among the base, after the one zero of all.
+        // Those that are known to be own ones count from their session on, and float first among the base, after the
+        // one zero of all.
         let known = (1..=rows.zeros.len()).filter(|j| rows.zeros[j - 1] <= session);
         let learnt = rows.used.get(session).copied().unwrap_or(false);
         let of_law = at_term.filter(|_| learnt).and_then(|at| {
@@ -254,15 +258,16 @@ fn is_another_one(zeros: &[Parameter]) -> bool {
     zeros.iter().any(|zero| zero.value.abs() > SIZE_KNOWN * zero.std)
 }
 
-/// Whether a zero moves by one tooth pitch or several, as well as it is known: then teeth may have skipped while nobody recorded.
+/// Whether a zero moves by one tooth pitch or several, as well as it is known: then teeth may have skipped while nobody
+/// recorded.
 fn is_whole_pitches(jump_arcsec: f64, std_arcsec: f64, pitch_arcsec: f64) -> bool {
     let pitches = (jump_arcsec / pitch_arcsec.max(f64::MIN_POSITIVE)).round();
     let off = (jump_arcsec - pitches * pitch_arcsec).abs();
     pitch_arcsec > 0.0 && pitches != 0.0 && off < (BESIDE_PITCHES * pitch_arcsec).max(INTERVAL * std_arcsec)
 }
 
-/// Whether causes explain the error: what is left is near the noise, and in sessions left out the model with them beats the nominal one and
-/// none at all.
+/// Whether causes explain the error: what is left is near the noise, and in sessions left out the model with them beats
+/// the nominal one and none at all.
 fn is_explained(problem: &Problem<'_>, rms_after: f64, floor: f64, held_out: HeldOut) -> bool {
     let compared = compensation(problem, held_out.rms_after_arcsec);
     let best_without = compared.rms_uncompensated_arcsec.min(held_out.rms_before_arcsec);
@@ -317,8 +322,9 @@ impl Abstention {
     }
 }
 
-/// Sizes of what has no name, arcsec: the largest at all, all together, the largest that follows the output angle, the largest that follows how fast the
-/// generator turns and which way, and lines in time with their frequencies, Hz. A zero that the bench sets in each session is none of it.
+/// Sizes of what has no name, arcsec: the largest at all, all together, the largest that follows the output angle, the
+/// largest that follows how fast the generator turns and which way, and lines in time with their frequencies, Hz. A
+/// zero that the bench sets in each session is none of it.
 struct Unnamed {
     largest: f64,
     together: f64,
@@ -394,7 +400,8 @@ fn understood(
             Judged::above(Gate::ToldFromZero, known[k].told_from_zero, TOLD_FROM_ZERO),
         ];
         if of_output_angle(selected.terms[k].law, &known[k]) {
-            // However well it is known, what follows the same angle and has no name may be the whole of which it is a piece.
+            // However well it is known, what follows the same angle and has no name may be the whole of which it is a
+            // piece.
             gates.push(beside(unnamed.of_output));
             gates.extend(
                 rise_without_a_piece(problem, selected, k).map(|rise| Judged::above(Gate::NoPiece, rise, NO_PIECE)),
@@ -422,8 +429,8 @@ fn understood(
     named
 }
 
-/// Whether a cause that is one line of the generator's angle is no larger in fast motion than in slow: what the motor's torque shakes is. Lines of
-/// an encoder may fade where its reading is averaged, or scatters in time.
+/// Whether a cause that is one line of the generator's angle is no larger in fast motion than in slow: what the motor's
+/// torque shakes is. Lines of an encoder may fade where its reading is averaged, or scatters in time.
 fn growth_with_speed(problem: &Problem<'_>, selected: &Selected<'_>, known: &Known, k: usize) -> Option<Judged> {
     let order = waves_per_generator_turn(selected.terms[k].law.cause()?, known, problem.on.nominal)?;
     let growth = with_speed::with_speed(problem, selected, Some(k), order)?.grows_by();
@@ -433,8 +440,8 @@ fn growth_with_speed(problem: &Problem<'_>, selected: &Selected<'_>, known: &Kno
 /// What a free function of the output angle that is left is called.
 const OF_OUTPUT_ANGLE: &str = "a function of the output angle";
 
-/// Whether what has no name follows the output angle: it is counted in turns of it, or in less than one wave to a turn of the generator, where
-/// nothing repeats that the generator does.
+/// Whether what has no name follows the output angle: it is counted in turns of it, or in less than one wave to a turn
+/// of the generator, where nothing repeats that the generator does.
 fn follows_output(label: Label) -> bool {
     match label {
         Label::Deviation(Deviation::Line { per, order }) => waves_per_output_turn(per, order, 1.0).is_some(),
@@ -451,16 +458,18 @@ fn waves_per_output_turn(per: Per, order: f64, ratio: f64) -> Option<f64> {
     }
 }
 
-/// Farthest that the order of a line is looked for from where it was found, waves in a turn of the output: over less than a turn whole orders
-/// stand in for all between. Smallest order of a line, and steps at first; each time finer by this factor, so many times.
+/// Farthest that the order of a line is looked for from where it was found, waves in a turn of the output: over less
+/// than a turn whole orders stand in for all between. Smallest order of a line, and steps at first; each time finer by
+/// this factor, so many times.
 const ORDERS: f64 = 1.0;
 const SLOWEST: f64 = 0.1;
 const ORDER_STEPS: usize = 20;
 const FINER: f64 = 4.0;
 const TIMES_FINER: usize = 5;
 
-/// Rise of the misfit where a cause is left out and a line of the output angle that was found beside it may have any order near its own: what is a
-/// piece of that line is not missed then. The least of all such lines whose order is not whole; nothing where there is none.
+/// Rise of the misfit where a cause is left out and a line of the output angle that was found beside it may have any
+/// order near its own: what is a piece of that line is not missed then. The least of all such lines whose order is not
+/// whole; nothing where there is none.
 fn rise_without_a_piece(problem: &Problem<'_>, selected: &Selected<'_>, k: usize) -> Option<f64> {
     let at = |label: Label| match label {
         Label::Deviation(Deviation::Line { per, order }) => waves_per_output_turn(per, order, problem.on.nominal.ratio),
@@ -503,7 +512,8 @@ fn least_damping(known: &Known) -> Option<f64> {
     known.parameters.get(ParameterName::DampingRatio.as_str()).map(|damping| damping.value - INTERVAL * damping.std)
 }
 
-/// Whether a law is a line of the output angle and nothing else, straight or of a whole order: a piece of whatever bends, however well it is known.
+/// Whether a law is a line of the output angle and nothing else, straight or of a whole order: a piece of whatever
+/// bends, however well it is known.
 fn of_output_angle(law: &Law, known: &Known) -> bool {
     law.is(CauseName::RatioError)
         || law.is(CauseName::OutputEncoderTilt)
@@ -527,9 +537,10 @@ fn known(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Vec<Kn
     uncertainty::known(problem, selected, beyond_noise(left, floor(problem, noise)))
 }
 
-/// The terms without those that hide others: where two causes do so nearly the same that the size of neither is told from zero, and that of one
-/// is where the other is left out, the smaller is set aside. As often as not the smaller is what the law of the larger leaves; what else may stand
-/// in the place of the larger, rivals and look-alikes say. Also what was set aside, with as much of it as the others do not take over.
+/// The terms without those that hide others: where two causes do so nearly the same that the size of neither is told
+/// from zero, and that of one is where the other is left out, the smaller is set aside. As often as not the smaller is
+/// what the law of the larger leaves; what else may stand in the place of the larger, rivals and look-alikes say. Also
+/// what was set aside, with as much of it as the others do not take over.
 #[must_use]
 pub(super) fn told_apart<'l>(
     problem: &Problem<'_>,
@@ -581,9 +592,9 @@ fn beyond_noise(rms_after: f64, floor: f64) -> f64 {
     if ratio > NOISE_KNOWN_TO { ratio } else { 1.0 }
 }
 
-/// Whether something that is no cause of the library, or none that could be held against it, makes the same: a wheel before the encoder, where its
-/// subdivision repeats in less than a turn; a load that nobody recorded; and once in a turn of the generator the motor's torque, a subdivision
-/// of its encoder, and the pitch of the wheel that stands.
+/// Whether something that is no cause of the library, or none that could be held against it, makes the same: a wheel
+/// before the encoder, where its subdivision repeats in less than a turn; a load that nobody recorded; and once in a
+/// turn of the generator the motor's torque, a subdivision of its encoder, and the pitch of the wheel that stands.
 fn has_a_double_outside(
     k: usize,
     name: CauseName,
@@ -605,8 +616,8 @@ fn has_a_double_outside(
         || line_of_generator && (name == standing || not_held_against_it)
 }
 
-/// The look-alikes of a cause; of a subdivision of the generator's encoder the pitch error of the wheel that stands is one always, though no law of
-/// its is tried.
+/// The look-alikes of a cause; of a subdivision of the generator's encoder the pitch error of the wheel that stands is
+/// one always, though no law of its is tried.
 fn alike_with_wheel(name: CauseName, mut alike: Vec<CauseName>, known: &Known, nominal: &Nominal) -> Vec<CauseName> {
     let standing = standing_pitch_error(nominal);
     let at_generator = waves_per_generator_turn(name, known, nominal).is_some();
@@ -616,21 +627,22 @@ fn alike_with_wheel(name: CauseName, mut alike: Vec<CauseName>, known: &Known, n
     alike
 }
 
-/// Waves in a turn of the generator of a cause that is nothing but such a line: an encoder's, or a higher harmonic of the wheel that stands.
+/// Waves in a turn of the generator of a cause that is nothing but such a line: an encoder's, or a higher harmonic of
+/// the wheel that stands.
 fn waves_per_generator_turn(name: CauseName, known: &Known, nominal: &Nominal) -> Option<f64> {
     let harmonic = || known.parameters.get(ParameterName::Harmonic.as_str()).map(|harmonic| harmonic.value);
     let of_standing_wheel = || harmonic().filter(|harmonic| name == standing_pitch_error(nominal) && *harmonic > 2.0);
     with_speed::order_of(name.into(), Some(known)).or_else(of_standing_wheel)
 }
 
-/// Whether a load that nobody recorded, a brake, a bearing, an arm, would make what a cause makes: an error that goes with speed, direction or the
-/// output's angle.
+/// Whether a load that nobody recorded, a brake, a bearing, an arm, would make what a cause makes: an error that goes
+/// with speed, direction or the output's angle.
 fn load_makes_it(cause: Option<CauseName>, problem: &Problem<'_>) -> bool {
     !problem.on.rows.recorded.torque && cause.is_some_and(CauseName::is_made_by_loads)
 }
 
-/// Probability of a cause against its look-alikes, whose misfits are higher by these; if there is none, against the closest rival. Less where its
-/// size is told from zero by few standard deviations (`size_told`).
+/// Probability of a cause against its look-alikes, whose misfits are higher by these; if there is none, against the
+/// closest rival. Less where its size is told from zero by few standard deviations (`size_told`).
 fn confidence(alike: &[f64], double_outside: bool, closest: f64, size_told: f64) -> f64 {
     let odds = |misfit: f64| (-0.5 * misfit.clamp(0.0, 40.0)).exp();
     let among = if alike.is_empty() && !double_outside {

@@ -1,6 +1,7 @@
-//! How the amplitude of a line of the generator's angle goes with the speed. Wheels and encoders make the same wave at every speed; what a
-//! torque of the motor shakes, or a load that swings, makes more of it the nearer its frequency comes to that of the load on its spring. Less of it
-//! in fast motion speaks against no encoder: a reading that is averaged, or whose instant scatters, smears its lines.
+//! How the amplitude of a line of the generator's angle goes with the speed. Wheels and encoders make the same wave at
+//! every speed; what a torque of the motor shakes, or a load that swings, makes more of it the nearer its frequency
+//! comes to that of the load on its spring. Less of it in fast motion speaks against no encoder: a reading that is
+//! averaged, or whose instant scatters, smears its lines.
 
 use super::candidate::{Deviation, Label, Per};
 use super::model::Problem;
@@ -17,7 +18,8 @@ const FAST: f64 = 0.65;
 const IN_MOTION: f64 = 0.05;
 /// … and these have to turn so many times as fast as those, on the median. *Guess*.
 const APART: f64 = 1.5;
-/// Blocks of neighbouring rows whose misfits are taken as independent. *Guess*: as many as where shares of a torque are looked for.
+/// Blocks of neighbouring rows whose misfits are taken as independent. *Guess*: as many as where shares of a torque are
+/// looked for.
 const BLOCKS: usize = 24;
 /// Fewest rows of either.
 const FEWEST: usize = 200;
@@ -38,7 +40,8 @@ pub(super) struct WithSpeed {
 }
 
 impl WithSpeed {
-    /// By how many standard deviations the amplitude grows, negative where it fades; 0 where it changes by less than laws hold to.
+    /// By how many standard deviations the amplitude grows, negative where it fades; 0 where it changes by less than
+    /// laws hold to.
     pub fn grows_by(&self) -> f64 {
         let [slow, fast] = self.amplitudes;
         let clear = slow.max(fast) > CLEARLY * slow.min(fast);
@@ -55,7 +58,8 @@ impl WithSpeed {
         let sizes = format!("{at_slow:.1} arcsec at {slow:.1} rad/s of the generator, {at_fast:.1} at {fast:.1}");
         match (self.changes(), self.grows_by() > 0.0) {
             (true, true) => format!(
-                ", which grows with the speed ({sizes}): what the motor's torque or the load shakes, not what is out of shape"
+                ", which grows with the speed ({sizes}): what the motor's torque or the load shakes, not what is out \
+                 of shape"
             ),
             (true, false) => format!(", which fades with the speed ({sizes})"),
             (false, _) => format!(", the same at every speed ({sizes})"),
@@ -79,7 +83,8 @@ pub(super) fn order_of(label: Label, known: Option<&Known>) -> Option<f64> {
     }
 }
 
-/// The line of term `k` of a model, of this order, at two speeds; without a term what is left is looked at. Nothing where the speeds tell nothing.
+/// The line of term `k` of a model, of this order, at two speeds; without a term what is left is looked at. Nothing
+/// where the speeds tell nothing.
 pub(super) fn with_speed(
     problem: &Problem<'_>,
     selected: &Selected<'_>,
@@ -112,8 +117,9 @@ pub(super) fn with_speed(
     Some(WithSpeed { speeds, amplitudes: [slow, fast], stds: [slow_std, fast_std] })
 }
 
-/// Amplitude of the wave of an angle in values of some rows, with its standard deviation: least squares beside a mean. The deviation is that of white
-/// noise, or that by blocks of neighbouring rows (a sandwich), whichever is larger: wander and other lines are alike from row to row.
+/// Amplitude of the wave of an angle in values of some rows, with its standard deviation: least squares beside a mean.
+/// The deviation is that of white noise, or that by blocks of neighbouring rows (a sandwich), whichever is larger:
+/// wander and other lines are alike from row to row.
 fn amplitude(rows: &[usize], angle: impl Fn(usize) -> f64, value: impl Fn(usize) -> f64) -> Option<(f64, f64)> {
     let count = rows.len() as f64;
     let waves: Vec<[f64; 3]> = rows.iter().map(|k| [angle(*k).cos(), angle(*k).sin(), value(*k)]).collect();
@@ -142,7 +148,8 @@ fn amplitude(rows: &[usize], angle: impl Fn(usize) -> f64, value: impl Fn(usize)
     Some((amplitude, white.max(by_blocks)))
 }
 
-/// What is said of lines of the generator's angle beside their name: of terms of a model, and of lines that averages hide.
+/// What is said of lines of the generator's angle beside their name: of terms of a model, and of lines that averages
+/// hide.
 pub(super) fn words(
     problem: &Problem<'_>,
     selected: &Selected<'_>,

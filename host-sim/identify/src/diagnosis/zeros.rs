@@ -9,8 +9,8 @@ const ADVICE: &str = "home to one mark before each session, or log the offset th
 /// Sessions whose zeros are said, at most.
 const SAID: usize = 12;
 
-/// Tells the `zeros` of sessions, each less that of the first, and has them count as zeros of their own from here on. A fault that was told of
-/// some of them when the rows were read gives way to this one, which has them all.
+/// Tells the `zeros` of sessions, each less that of the first, and has them count as zeros of their own from here on. A
+/// fault that was told of some of them when the rows were read gives way to this one, which has them all.
 pub(super) fn tell(recording: &mut Recording, zeros: &[Parameter]) {
     let of_some = |fault: &Fault| fault.name == FaultName::PositionJump && fault.measures.turns.is_none();
     let known = recording.faults.iter().any(of_some);
@@ -29,8 +29,9 @@ pub(super) fn tell(recording: &mut Recording, zeros: &[Parameter]) {
     let last = all.len();
     let sessions = if last == 2 { "session 2".to_owned() } else { format!("sessions 2 to {last}") };
     let what = format!(
-        "the zero of the error is another one in each session: that of {sessions} lies {}{more} arcsec (± {std:.1} at most) beside that of the \
-         first, by no whole number of motor turns or tooth pitches; the zero of each is fitted on its own",
+        "the zero of the error is another one in each session: that of {sessions} lies {}{more} arcsec (± {std:.1} at \
+         most) beside that of the first, by no whole number of motor turns or tooth pitches; the zero of each is \
+         fitted on its own",
         said.join(", ")
     );
     for session in recording.sessions.iter_mut().skip(1) {

@@ -1,9 +1,9 @@
-//! What the core leaves of the pointing error: without tables, with nominal ones, with extended ones, over sessions that took no
-//! part in the fit.
+//! What the core leaves of the pointing error: without tables, with nominal ones, with extended ones, over sessions
+//! that took no part in the fit.
 //!
-//! The core itself predicts each row from generator angle, torque and temperature, as it does on board. The zero of the encoder is
-//! found over the sessions of the fit, once, and taken from the others; where the bench sets it anew, over those that share it, or in the
-//! session held out itself.
+//! The core itself predicts each row from generator angle, torque and temperature, as it does on board. The zero of the
+//! encoder is found over the sessions of the fit, once, and taken from the others; where the bench sets it anew, over
+//! those that share it, or in the session held out itself.
 
 use flexspline::{GeneratorAngle, PlayState, Table};
 use serde::Serialize;
@@ -84,8 +84,8 @@ impl Evaluation {
     }
 }
 
-/// Cuts sessions into those to learn from (true) and those held out: every second one; with fewer than three sessions the last
-/// third of each.
+/// Cuts sessions into those to learn from (true) and those held out: every second one; with fewer than three sessions
+/// the last third of each.
 #[must_use]
 pub fn split(sessions: &[Session]) -> (Vec<Session>, Vec<bool>) {
     if sessions.len() >= FEWEST_SESSIONS {
@@ -226,8 +226,8 @@ pub fn evaluate(
     })
 }
 
-/// Takes the zero away: of sessions that share one, from each that has its `own` on, the mean over those learnt from, or over all of them where
-/// nothing was learnt from any.
+/// Takes the zero away: of sessions that share one, from each that has its `own` on, the mean over those learnt from,
+/// or over all of them where nothing was learnt from any.
 fn without_zero(mut left: Vec<Vec<f64>>, used: &[bool], own: &[bool]) -> Vec<Vec<f64>> {
     let starts = (0..left.len()).filter(|k| *k == 0 || own[*k]).chain([left.len()]).collect::<Vec<usize>>();
     for sharing in starts.windows(2).map(|at| at[0]..at[1]) {

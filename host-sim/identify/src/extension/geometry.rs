@@ -1,8 +1,9 @@
 //! Causes that are geometry, as fields of a drive that the FEM runs.
 //!
-//! What is read is not the numbers of a cause but what it adds to the error under a light load on either flank: it is projected on
-//! the order that the imperfection has, and turned into size and place by the kinematics of rigid teeth. With `A` in arc-seconds,
-//! `x` the angle of the wave on the part, `a` the flank angle, `+-` the flank that carries under a positive and a negative load:
+//! What is read is not the numbers of a cause but what it adds to the error under a light load on either flank: it is
+//! projected on the order that the imperfection has, and turned into size and place by the kinematics of rigid teeth.
+//! With `A` in arc-seconds, `x` the angle of the wave on the part, `a` the flank angle, `+-` the flank that carries
+//! under a positive and a negative load:
 //!
 //! | imperfection | error |
 //! |---|---|
@@ -262,7 +263,8 @@ pub fn found_geometry(
                     let wheel = if wheel < 0.5 { Wheel::Flexspline } else { Wheel::CircularSpline };
                     let teeth =
                         if wheel == Wheel::Flexspline { drive.flexspline.teeth } else { drive.circular_spline.teeth };
-                    // Under a positive load the clockwise flanks of the flexspline bear, and the others of the circular spline.
+                    // Under a positive load the clockwise flanks of the flexspline bear, and the others of the circular
+                    // spline.
                     let felt =
                         [0, 1].map(|flank: usize| probe.error[flank][k].iter().fold(0.0, |m: f64, e| m.max(e.abs())));
                     let minus = (felt[0] > felt[1]) == (wheel == Wheel::Flexspline);
@@ -391,8 +393,9 @@ pub struct Agreement {
 const PLACES: u32 = 12;
 const PITCHES_APART: u32 = 23;
 
-/// Runs the FEM of both drives at a few places under a light load on either flank, and compares the difference with what the
-/// mapped causes add there. The mean on each flank takes no part: a displacement eats clearance, which is a cause of its own.
+/// Runs the FEM of both drives at a few places under a light load on either flank, and compares the difference with
+/// what the mapped causes add there. The mean on each flank takes no part: a displacement eats clearance, which is a
+/// cause of its own.
 ///
 /// # Errors
 /// No convergence.

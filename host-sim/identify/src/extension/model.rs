@@ -1,5 +1,5 @@
-//! `drive-extended.toml` of a drive known from its catalogue: `nominal.toml` with its numbers as the data have them, and the causes
-//! found.
+//! `drive-extended.toml` of a drive known from its catalogue: `nominal.toml` with its numbers as the data have them,
+//! and the causes found.
 //!
 //! ```toml
 //! [[extension.cause]]
@@ -8,7 +8,8 @@
 //! delay_s = 0.002
 //! ```
 //!
-//! The causes are re-simulated by the laws of [`crate::synthesize`], under the names that `diagnosis.json` gives their parameters.
+//! The causes are re-simulated by the laws of [`crate::synthesize`], under the names that `diagnosis.json` gives their
+//! parameters.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -136,7 +137,8 @@ impl Model {
         let steps: Vec<String> = n.stiffness.iter().map(|[torque, k]| format!("[{torque:?}, {k:?}]")).collect();
         let _ = writeln!(
             text,
-            "\n[nominal]\nstiffness_n_m_per_rad = [{}]\nbacklash_arcsec = {:?}\nfriction_torque_n_m = {:?}\ntemperature_c = {:?}",
+            "\n[nominal]\nstiffness_n_m_per_rad = [{}]\nbacklash_arcsec = {:?}\nfriction_torque_n_m = \
+             {:?}\ntemperature_c = {:?}",
             steps.join(", "),
             n.backlash_arcsec,
             n.friction_torque_n_m,

@@ -1,5 +1,5 @@
-//! Tables of the extended model: sampled in steady motion, both ways, at the nodes of torque and temperature, and projected by the
-//! core's own code.
+//! Tables of the extended model: sampled in steady motion, both ways, at the nodes of torque and temperature, and
+//! projected by the core's own code.
 
 use std::f64::consts::TAU;
 
@@ -30,20 +30,21 @@ const RIPPLE_NODES: usize = 8;
 /// Orders fitted: of the generator and of the generator against the output, and of the output.
 const ORDERS: [u16; 5] = [1, 2, 3, 4, 6];
 const OUTPUT_ORDERS: [u16; 2] = [1, 2];
-/// Nodes of the torque axis on each side where no table gives them, how they crowd towards the friction, and half the width of the
-/// jump there, of the friction.
+/// Nodes of the torque axis on each side where no table gives them, how they crowd towards the friction, and half the
+/// width of the jump there, of the friction.
 const TORQUE_STEPS: u32 = 9;
 const CROWDING: f64 = 1.6;
 const JUMP_HALF_WIDTH: f64 = 0.002;
-/// Friction that a model without any is given, of the largest torque: the play needs a torque at which it changes flanks.
+/// Friction that a model without any is given, of the largest torque: the play needs a torque at which it changes
+/// flanks.
 const LEAST_FRICTION: f64 = 1e-3;
 /// Half-width (rad) below zero that is taken for what the projection leaves.
 const NEGATIVE_HALF_WIDTH_RAD: f64 = 1e-4;
 /// Temperatures closer than this, K, are one.
 const ONE_TEMPERATURE_K: f64 = 2.0;
 
-/// Nodes symmetric about zero: a pair at either side of the friction, where the flank changes, and further ones up to the largest
-/// torque.
+/// Nodes symmetric about zero: a pair at either side of the friction, where the flank changes, and further ones up to
+/// the largest torque.
 fn torque_nodes(friction: f64, largest: f64) -> Vec<f32> {
     let half = JUMP_HALF_WIDTH * friction;
     let further = (1..=TORQUE_STEPS).map(|k| {
@@ -54,8 +55,8 @@ fn torque_nodes(friction: f64, largest: f64) -> Vec<f32> {
     positive.iter().rev().map(|t| -t).chain(positive.iter().copied()).map(|t| t as f32).collect()
 }
 
-/// Positions over a whole turn of the output on which no order of the tooth mesh, of the generator, of the generator against the output,
-/// or of the output folds onto another: a prime.
+/// Positions over a whole turn of the output on which no order of the tooth mesh, of the generator, of the generator
+/// against the output, or of the output folds onto another: a prime.
 fn positions(ratio: f64, teeth: f64) -> usize {
     let ratio = ratio.abs();
     let turns = [ratio, ratio - 1.0, ratio + 1.0];
@@ -120,7 +121,8 @@ impl ExtendedTables<'_> {
         self.make(extended, false)
     }
 
-    /// The extended model as a table, without the causes that have no place there. The zero of the encoder is not in it.
+    /// The extended model as a table, without the causes that have no place there. The zero of the encoder is not in
+    /// it.
     ///
     /// # Errors
     /// The samples make no table.
@@ -235,7 +237,8 @@ impl ExtendedTables<'_> {
                 });
             }
         }
-        // The zero of the encoder: what is left when both signs of load, both directions and all angles have their part.
+        // The zero of the encoder: what is left when both signs of load, both directions and all angles have their
+        // part.
         let zero = beyond / samples.len().max(1) as f64 / ARCSEC_PER_RAD;
         samples.iter_mut().for_each(|sample| sample.output_rad -= zero);
         samples

@@ -1,8 +1,8 @@
-//! What is in log files of a gear on a bench: separators, columns with role and unit, ratio, counts of a turn, sign of a torque, time,
-//! coverage; and the mapping to read them with.
+//! What is in log files of a gear on a bench: separators, columns with role and unit, ratio, counts of a turn, sign of
+//! a torque, time, coverage; and the mapping to read them with.
 //!
-//! Names, units and numbers are asked in this order. Whatever is guessed says why, and how sure it is; nothing is used silently: the mapping is
-//! proposed, and the reader takes it only when it is given.
+//! Names, units and numbers are asked in this order. Whatever is guessed says why, and how sure it is; nothing is used
+//! silently: the mapping is proposed, and the reader takes it only when it is given.
 
 mod column;
 mod coverage;
@@ -134,7 +134,8 @@ pub struct Looked {
     pub header_line: Option<u64>,
     /// The columns.
     pub columns: Vec<Column>,
-    /// Other columns that may be generator and output as well, or the same ones with other counts of a turn, the likeliest first.
+    /// Other columns that may be generator and output as well, or the same ones with other counts of a turn, the
+    /// likeliest first.
     pub rivals: Vec<Rival>,
     /// Turns of the generator for one of the output as the rows have it, signed.
     pub ratio_found: Option<f64>,
@@ -200,7 +201,8 @@ impl Guess {
         }
     }
 
-    /// Whether a time is in days as spreadsheets count them: a date from 1954 to 2119, and rows at most a quarter of an hour apart.
+    /// Whether a time is in days as spreadsheets count them: a date from 1954 to 2119, and rows at most a quarter of an
+    /// hour apart.
     fn is_in_days(&self) -> bool {
         (20_000.0..=80_000.0).contains(&self.facts.least)
             && self.facts.most <= 80_000.0
@@ -338,7 +340,8 @@ fn in_order(guesses: &mut [Guess], files: &[RawFile], notes: &mut Vec<String>) {
     }
 }
 
-/// Whether the reader takes the files by this mapping: a cell in use that is no number, or a row of another width, is for people to mend.
+/// Whether the reader takes the files by this mapping: a cell in use that is no number, or a row of another width, is
+/// for people to mend.
 fn is_accepted(files: &[RawFile], guesses: &[Guess], columns: &str, notes: &mut Vec<String>) -> bool {
     let mut refused = Vec::new();
     for file in files {
@@ -558,8 +561,8 @@ fn nameless_torque(guesses: &[Guess], error: &[f64], output: &[f64], notes: &mut
     if let Some((place, says)) = best {
         let sign = if says.slope < 0.0 { "-" } else { "" };
         notes.push(format!(
-            "column {place} may be the torque: it explains {:.0} % of the error beside the turn of the output; name its unit, \
-             torque=#{place}:{sign}N.m",
+            "column {place} may be the torque: it explains {:.0} % of the error beside the turn of the output; name \
+             its unit, torque=#{place}:{sign}N.m",
             100.0 * says.share
         ));
     }
@@ -705,7 +708,8 @@ fn option(guesses: &[Guess], names: &[String], notes: &mut Vec<String>) -> Optio
     Some(entries.collect::<Vec<_>>().join(","))
 }
 
-/// A column as a mapping names it: names with signs of the mapping in them, and names that are there twice, go by number.
+/// A column as a mapping names it: names with signs of the mapping in them, and names that are there twice, go by
+/// number.
 fn name_in_mapping(file: &RawFile, place: usize) -> String {
     let name = &file.columns[place].name;
     let twice = file.columns.iter().filter(|column| column.name == *name).count() > 1;

@@ -1,7 +1,8 @@
 //! Which columns are generator and output.
 //!
-//! Names and units come first, then the joint that a name numbers, then what turns on before what swings about zero, and last of all how
-//! straight a line two columns make: a motor torque that a robot computes from that of the joint makes a straighter one than two encoders.
+//! Names and units come first, then the joint that a name numbers, then what turns on before what swings about zero,
+//! and last of all how straight a line two columns make: a motor torque that a robot computes from that of the joint
+//! makes a straighter one than two encoders.
 
 use std::cmp::Ordering;
 use std::f64::consts::TAU;
@@ -69,7 +70,8 @@ impl Rank {
     }
 }
 
-/// Generator and output, with their units; the ratio between them, and what they may be, too. `names` are those of a mapping.
+/// Generator and output, with their units; the ratio between them, and what they may be, too. `names` are those of a
+/// mapping.
 pub(super) fn pair(guesses: &mut [Guess], names: &[String], notes: &mut Vec<String>) -> (Option<f64>, Vec<Rival>) {
     let mut pairs = pairs(guesses);
     pairs.sort_by(|a, b| b.rank.cmp(&a.rank));
@@ -114,11 +116,20 @@ pub(super) fn pair(guesses: &mut [Guess], names: &[String], notes: &mut Vec<Stri
     for rival in rivals.iter().take(counts + SAID) {
         let pass_on = rival.columns_option.as_ref().map_or(String::new(), |columns| format!(", --columns {columns}"));
         notes.push(if (rival.generator.as_str(), rival.output.as_str()) == (names[g].as_str(), names[o].as_str()) {
-            format!("the ratio may be {:.2} as well{pass_on}: the file does not say how many counts make a turn", rival.ratio)
+            format!(
+                "the ratio may be {:.2} as well{pass_on}: the file does not say how many counts make a turn",
+                rival.ratio
+            )
         } else {
             format!(
-                "columns {} and {} may be generator and output as well, {:.2} to 1{pass_on}; columns {} and {} are proposed because {}",
-                rival.generator, rival.output, rival.ratio, g + 1, o + 1, rival.why
+                "columns {} and {} may be generator and output as well, {:.2} to 1{pass_on}; columns {} and {} are \
+                 proposed because {}",
+                rival.generator,
+                rival.output,
+                rival.ratio,
+                g + 1,
+                o + 1,
+                rival.why
             )
         });
     }

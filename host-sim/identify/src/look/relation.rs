@@ -10,7 +10,8 @@ use crate::measurement::least_and_most;
 const LOOKED_AT: usize = 4000;
 /// Two columns turn together if what a straight line leaves is below this share of the range of the second.
 const TOGETHER: f64 = 5e-3;
-/// Counts of a turn are a power of two or a round number to this: one encoder against another on the same shaft, eccentric by an arc-minute.
+/// Counts of a turn are a power of two or a round number to this: one encoder against another on the same shaft,
+/// eccentric by an arc-minute.
 const SAME_COUNT: f64 = 1e-4;
 /// Incremental encoders have round numbers of counts, up to this; of larger numbers nearly each is near a round one.
 const MOST_ROUND: f64 = 1e6;
@@ -64,8 +65,8 @@ impl Slope {
     }
 }
 
-/// Counts of a turn, from counts over an angle in rad: the power of two that they nearly are, or the round number of an incremental
-/// encoder; and how far off, as a share.
+/// Counts of a turn, from counts over an angle in rad: the power of two that they nearly are, or the round number of an
+/// incremental encoder; and how far off, as a share.
 pub(super) fn counts_of_a_turn(per_rad: f64, round: bool) -> Option<(f64, f64)> {
     let counts = (per_rad * TAU).abs();
     let near = if round {
@@ -95,8 +96,8 @@ impl TorqueSays {
     }
 }
 
-/// How an error (rad) follows a torque beside what turns with the output (rad): an eccentric encoder and the weight of an arm look alike, so
-/// both may explain what one of them does.
+/// How an error (rad) follows a torque beside what turns with the output (rad): an eccentric encoder and the weight of
+/// an arm look alike, so both may explain what one of them does.
 pub(super) fn torque_says(error: &[f64], output: &[f64], torque: &[f64]) -> Option<TorqueSays> {
     let rows = rows(&[error, output, torque]);
     let travel = least_and_most(rows.iter().map(|row| row[1]));

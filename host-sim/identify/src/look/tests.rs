@@ -1,5 +1,5 @@
-//! Odd files, as loggers, robots and spreadsheets write them: each is read right by the mapping proposed (or one that a user who knows
-//! the bench would give), or ends in one clear error.
+//! Odd files, as loggers, robots and spreadsheets write them: each is read right by the mapping proposed (or one that a
+//! user who knows the bench would give), or ends in one clear error.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
@@ -557,8 +557,8 @@ fn proposed(looked: &Looked) -> [Option<&str>; 3] {
     })
 }
 
-/// A motor torque that a robot computes from that of the joint makes a straighter line than two encoders; it is a torque by its name and
-/// its unit, and without either it swings about zero where a motor turns on.
+/// A motor torque that a robot computes from that of the joint makes a straighter line than two encoders; it is a
+/// torque by its name and its unit, and without either it swings about zero where a motor turns on.
 #[test]
 fn names_and_units_go_before_the_straightest_line() {
     let time = |t: &Truth, k: usize| format!("{:.4}", t.time_s[k]);
@@ -645,14 +645,16 @@ fn names_and_units_go_before_the_straightest_line() {
 /// A robot logs all its joints: what is proposed is of one joint, the others are named.
 #[test]
 fn the_columns_of_one_joint_are_proposed_together() {
-    // Each joint follows the same way with its own travel, as a planner makes them; the torque of the first is the straightest of all lines.
+    // Each joint follows the same way with its own travel, as a planner makes them; the torque of the first is the
+    // straightest of all lines.
     let reach = |joint: usize| [1.0, 0.7, 0.4][joint - 1];
     for motor in ["encoder_motorinc", "motor_position"] {
         let mut header = "Timestamp".to_owned();
         for joint in 1..=3 {
             let _ = write!(
                 header,
-                ",target_joint_torque_{joint},joint_torque_current_{joint},{motor}_{joint},encoder_loadinc_{joint},target_joint_angles_{joint}"
+                ",target_joint_torque_{joint},joint_torque_current_{joint},{motor}_{joint},encoder_loadinc_{joint},\
+                 target_joint_angles_{joint}"
             );
         }
         let text_of = file(&(header + "\n"), ",", |t, k| {

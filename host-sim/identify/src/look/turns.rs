@@ -10,8 +10,8 @@ use crate::measurement::{Unit, registers};
 const CLOSE_TO_HALF: f64 = 0.1;
 /// A ratio is whole to this: clearance and the error of the ratio that few turns leave. *Guess*.
 const WHOLE: f64 = 0.005;
-/// Ratios of catalogues with the flexspline's wheel fixed; with the other wheel fixed they are one larger. *Source*: the series CSF, CSG and
-/// SHF of Harmonic Drive.
+/// Ratios of catalogues with the flexspline's wheel fixed; with the other wheel fixed they are one larger. *Source*:
+/// the series CSF, CSG and SHF of Harmonic Drive.
 const CATALOGUE: [f64; 6] = [30.0, 50.0, 80.0, 100.0, 120.0, 160.0];
 /// Counts of a turn that are tried, powers of two.
 const POWERS: std::ops::RangeInclusive<i32> = 6..=28;
@@ -150,8 +150,8 @@ impl Units {
     }
 }
 
-/// The units that two columns may have as generator and output, the likeliest first; `raw` is the change of the generator's number for one
-/// of the output's. None if no unit makes it the ratio of a strain wave gear.
+/// The units that two columns may have as generator and output, the likeliest first; `raw` is the change of the
+/// generator's number for one of the output's. None if no unit makes it the ratio of a strain wave gear.
 pub(super) fn units_of_pair(generator: &Guess, output: &Guess, raw: f64) -> Vec<Units> {
     let within = |ratio: f64| (RATIOS[0]..=RATIOS[1]).contains(&ratio.abs());
     let nameless = |guess: &Guess| guess.rad().is_none();

@@ -3,8 +3,9 @@
 use super::Role;
 use crate::measurement::Unit;
 
-/// Words of names, in the order in which the first that fits decides: a joint's velocity is a velocity, a motor's temperature a
-/// temperature. English and German, as loggers, robots and controllers have them; the list is made by hand from the logs at hand.
+/// Words of names, in the order in which the first that fits decides: a joint's velocity is a velocity, a motor's
+/// temperature a temperature. English and German, as loggers, robots and controllers have them; the list is made by
+/// hand from the logs at hand.
 const WORDS: [(Role, &[&str]); 9] = [
     (
         Role::Speed,
@@ -125,8 +126,8 @@ pub(super) struct Said {
     pub joint: Option<u32>,
 }
 
-/// What a name says, and the unit that stands in a line of its own if there is one. Units count before words: a load in N·m is a torque,
-/// whatever it is called.
+/// What a name says, and the unit that stands in a line of its own if there is one. Units count before words: a load in
+/// N·m is a torque, whatever it is called.
 pub(super) fn said(name: &str, unit: Option<&str>) -> Said {
     let words = words(name);
     let is = |known: &str| words.iter().any(|word| word == known);
@@ -201,7 +202,8 @@ fn kind(unit: Unit) -> Option<Kind> {
     }
 }
 
-/// The words of a name, lower case, whole and parted where a capital follows a small letter: `ActPos` is `actpos`, `act` and `pos`.
+/// The words of a name, lower case, whole and parted where a capital follows a small letter: `ActPos` is `actpos`,
+/// `act` and `pos`.
 fn words(name: &str) -> Vec<String> {
     let plain = name.split(['[', '(']).next().unwrap_or_default();
     let mut words = Vec::new();
@@ -221,7 +223,8 @@ fn words(name: &str) -> Vec<String> {
     without_numbers.filter(|word| !word.is_empty()).collect()
 }
 
-/// The number of a joint or an axis in a name: the last number, if it is a small one. `#3` is a place in the file, and no name.
+/// The number of a joint or an axis in a name: the last number, if it is a small one. `#3` is a place in the file, and
+/// no name.
 fn joint(name: &str) -> Option<u32> {
     if name.starts_with('#') || !name.contains(char::is_alphabetic) {
         return None;

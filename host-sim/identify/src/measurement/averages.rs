@@ -1,4 +1,5 @@
-//! Very long recordings, averaged: a diagnosis holds dozens of columns of all rows in memory, and no cause needs more than a million.
+//! Very long recordings, averaged: a diagnosis holds dozens of columns of all rows in memory, and no cause needs more
+//! than a million.
 
 use super::{Recording, Session};
 
@@ -18,8 +19,8 @@ impl Recording {
         }
         let left: usize = self.sessions.iter().map(Session::len).sum();
         self.notes.push(format!(
-            "{rows} rows: every {together} neighbours are averaged, {left} rows are diagnosed; what repeats within {together} rows cannot be \
-             seen (cut the file to see it)"
+            "{rows} rows: every {together} neighbours are averaged, {left} rows are diagnosed; what repeats within \
+             {together} rows cannot be seen (cut the file to see it)"
         ));
     }
 }

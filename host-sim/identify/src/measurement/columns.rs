@@ -78,8 +78,8 @@ impl Quantity {
         }
     }
 
-    /// The largest size a value may have, in the unit used inside (rad, s, N·m, °C): beyond it a double no longer resolves an
-    /// arc-second, or nothing of the kind exists.
+    /// The largest size a value may have, in the unit used inside (rad, s, N·m, °C): beyond it a double no longer
+    /// resolves an arc-second, or nothing of the kind exists.
     pub(super) fn limit(self) -> f64 {
         match self {
             Quantity::Time => 1e11,
@@ -101,8 +101,8 @@ impl fmt::Display for Quantity {
 #[error("--columns: {0}; for instance --columns generator=wave_gen_turns:turn,error=error_arcsec:arcsec")]
 pub struct MappingError(String);
 
-/// Names and units of columns where they differ from `time_s, generator_rad, output_rad, error_arcsec, torque_n_m, temperature_c,
-/// orientation_rad`.
+/// Names and units of columns where they differ from
+/// `time_s, generator_rad, output_rad, error_arcsec, torque_n_m, temperature_c, orientation_rad`.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ColumnMap {
     given: Vec<Given>,
@@ -135,8 +135,8 @@ pub struct Column {
 
 impl ColumnMap {
     /// Reads `generator=wave_gen_turns:turn,error=error_arcsec:arcsec`, or with columns by number, signs and gains
-    /// `generator=#1:count/16777216,torque=#4:-N.m`. Without `:unit` a name that ends in a unit says it (`_rad`, `_deg`, `_turns`, …), else
-    /// a line of units below the names, else it is that of the default column.
+    /// `generator=#1:count/16777216,torque=#4:-N.m`. Without `:unit` a name that ends in a unit says it (`_rad`,
+    /// `_deg`, `_turns`, …), else a line of units below the names, else it is that of the default column.
     pub fn parse(text: &str) -> Result<ColumnMap, MappingError> {
         ColumnMap::with_torque_constant(text, None)
     }
@@ -185,8 +185,8 @@ impl ColumnMap {
         self.given.iter().map(|given| given.column.as_str()).chain(defaults).collect()
     }
 
-    /// The columns in use of a file with these `names`. Of output and error one is used: the one that was mapped, else the output.
-    /// `layout` if the file is not laid out as usual.
+    /// The columns in use of a file with these `names`. Of output and error one is used: the one that was mapped, else
+    /// the output. `layout` if the file is not laid out as usual.
     pub(super) fn resolve(
         &self,
         names: &[String],
@@ -328,7 +328,8 @@ fn found(names: &[String], layout: Option<&Layout>) -> String {
     let numbers = names.iter().all(|name| name.is_empty() || name.parse::<f64>().is_ok());
     if numbers || layout.is_some_and(|layout| !layout.has_names) {
         return format!(
-            "the first line has numbers, no names; the {} columns are mapped by number, --columns generator=#1:UNIT,output=#2:UNIT",
+            "the first line has numbers, no names; the {} columns are mapped by number, --columns \
+             generator=#1:UNIT,output=#2:UNIT",
             names.len()
         );
     }

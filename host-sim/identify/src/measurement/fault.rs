@@ -159,7 +159,8 @@ pub struct Measures {
     /// Rows whose angles were read far apart, which are left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub late_rows: Option<u64>,
-    /// The logger stands still after every so many rows, none where it does so irregularly; or a channel has a new value in one of so many rows.
+    /// The logger stands still after every so many rows, none where it does so irregularly; or a channel has a new
+    /// value in one of so many rows.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every_rows: Option<u64>,
     /// For so long (median), ms; or the time over which a row is a mean.

@@ -5,8 +5,8 @@
 pub struct Gear {
     /// Turns of the generator for one of the output, negative if the output turns against it.
     pub ratio: f64,
-    /// Pitch of the teeth by which the output skips when the drive ratchets, rad at the output: 2π over the teeth of the wheel that turns.
-    /// `None` for a gear without known teeth.
+    /// Pitch of the teeth by which the output skips when the drive ratchets, rad at the output: 2π over the teeth of
+    /// the wheel that turns. `None` for a gear without known teeth.
     pub tooth_pitch_rad: Option<f64>,
     /// Ratio with the other wheel fixed; `None` for a gear without known teeth.
     pub other_wheel_ratio: Option<f64>,
@@ -15,7 +15,8 @@ pub struct Gear {
 }
 
 impl Gear {
-    /// Torque beyond which a unit is wrong where no drive says more, N·m: drives of common sizes do not take it even for a moment.
+    /// Torque beyond which a unit is wrong where no drive says more, N·m: drives of common sizes do not take it even
+    /// for a moment.
     pub const LARGEST_TORQUE_N_M: f64 = 10_000.0;
 
     /// A gear of which the ratio is known.

@@ -111,7 +111,8 @@ pub(super) struct Found {
     pub own_zeros: bool,
 }
 
-/// Reads a file called `file`, of at least `fewest` rows; `ratio` is that of the axis of a guide log, which says no generator angle.
+/// Reads a file called `file`, of at least `fewest` rows; `ratio` is that of the axis of a guide log, which says no
+/// generator angle.
 pub(super) fn read(
     file: &str,
     mut source: impl Read,
@@ -188,7 +189,8 @@ fn guide_log(file: &str, bytes: Vec<u8>, map: &ColumnMap, ratio: f64) -> Result<
     Ok((log, Found { columns: phd2::columns(), broken_off: None, order: Vec::new(), notes, own_zeros: true }))
 }
 
-/// The line that breaks off, if it is the last one, whose row is then left out. A row of another width anywhere else is an error.
+/// The line that breaks off, if it is the last one, whose row is then left out. A row of another width anywhere else is
+/// an error.
 fn broken_off(sheet: &Sheet, columns: &[Column], read: &mut Columns) -> Result<Option<u64>, TableProblem> {
     let rows = read.lines.len();
     let width = sheet.layout.names.len();
@@ -289,8 +291,8 @@ fn align_channels(sheet: &Sheet, columns: &[Column], log: &mut Log, notes: &mut 
         log.put(channel, values);
     }
     notes.push(format!(
-        "generator and {follower} are never recorded in one row: the other channels are laid on the {} rows of the {base}, up to {farthest:.3} s away, \
-         by cubics through their own values",
+        "generator and {follower} are never recorded in one row: the other channels are laid on the {} rows of the \
+         {base}, up to {farthest:.3} s away, by cubics through their own values",
         at.len()
     ));
 }
@@ -318,7 +320,8 @@ fn align_pairs(sheet: &Sheet, columns: &[Column], log: &mut Log, notes: &mut Vec
     }
     if moved > 0 {
         notes.push(format!(
-            "each channel has stamps of its own: {moved} are laid on those of column {}, which are up to {farthest} (in its unit) away",
+            "each channel has stamps of its own: {moved} are laid on those of column {}, which are up to {farthest} \
+             (in its unit) away",
             time + 1
         ));
     }

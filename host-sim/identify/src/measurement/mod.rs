@@ -1,11 +1,11 @@
 //! Measured data: rows of a drive at work, in sessions.
 //!
-//! Angles are radians, torque N·m, temperature °C, time s; `error` is output less generator over ratio, rad at the output. All
-//! columns of a session have the same length; what was not recorded is `None`.
+//! Angles are radians, torque N·m, temperature °C, time s; `error` is output less generator over ratio, rad at the
+//! output. All columns of a session have the same length; what was not recorded is `None`.
 //!
-//! [`read`] takes a CSV file to sessions: columns and units by a [`ColumnMap`], wrapped angles made continuous, gaps in time
-//! as the borders of sessions, and the faults of the data found, named and dealt with ([`Fault`]) before anything is asked of the
-//! drive.
+//! [`read`] takes a CSV file to sessions: columns and units by a [`ColumnMap`], wrapped angles made continuous, gaps in
+//! time as the borders of sessions, and the faults of the data found, named and dealt with ([`Fault`]) before anything
+//! is asked of the drive.
 
 mod averages;
 mod columns;
@@ -357,8 +357,8 @@ fn many_sessions(sessions: &[Session]) -> Option<String> {
     let rows: usize = sessions.iter().map(Session::len).sum();
     (sessions.len() > MANY_SESSIONS && rows < FEWEST_ROWS * sessions.len()).then(|| {
         format!(
-            "{} sessions of {} rows on the mean: time that steps by more than {SESSION_GAP_PERIODS} of its usual steps, or back, begins one; are the \
-             stamps those of the rows?",
+            "{} sessions of {} rows on the mean: time that steps by more than {SESSION_GAP_PERIODS} of its usual \
+             steps, or back, begins one; are the stamps those of the rows?",
             sessions.len(),
             rows / sessions.len()
         )

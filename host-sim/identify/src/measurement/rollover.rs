@@ -1,9 +1,10 @@
 //! Columns that begin anew: an angle after its turn, a counter after its last count.
 //!
-//! Such a column stays within a span, and from time to time leaps by nearly all of it, against its own motion. The span is the size
-//! that makes the values go on evenly over the leaps. A counter may have any span: 2^16 of a register of 16 bits, 32 767 of one that a
-//! program sets back to zero at its largest value. Whoever reads a file finds columns that begin anew with [`begins_anew`]; [`undo`]
-//! makes the counters of a log continuous. A single turn in radians is left to the check of wrapped angles, which the other angle helps.
+//! Such a column stays within a span, and from time to time leaps by nearly all of it, against its own motion. The span
+//! is the size that makes the values go on evenly over the leaps. A counter may have any span: 2^16 of a register of 16
+//! bits, 32 767 of one that a program sets back to zero at its largest value. Whoever reads a file finds columns that
+//! begin anew with [`begins_anew`]; [`undo`] makes the counters of a log continuous. A single turn in radians is left
+//! to the check of wrapped angles, which the other angle helps.
 
 use super::columns::{Column, Quantity, Unit};
 use super::log::Log;
@@ -11,13 +12,15 @@ use flexspline_base::robust::{least_and_most, median_of};
 
 /// Registers have so many bits.
 const BITS: std::ops::RangeInclusive<i32> = 8..=32;
-/// A column that begins anew covers at least this share of its span. *Guess*: a step over the border leaves out two steps of the span at most.
+/// A column that begins anew covers at least this share of its span. *Guess*: a step over the border leaves out two
+/// steps of the span at most.
 pub(super) const COVERED: f64 = 0.75;
 /// Steps up to this share of the span are distinguishable from a leap. *Guess*.
 pub(super) const UNAMBIGUOUS: f64 = 0.4;
 /// A step longer than this share of the span is a leap: 1 less what is unambiguous. *Guess*.
 pub(super) const LEAPS: f64 = 0.6;
-/// A known span is that of the leaps within this share, or within their scatter. *Guess*: it is for motion that bends beside a leap.
+/// A known span is that of the leaps within this share, or within their scatter. *Guess*: it is for motion that bends
+/// beside a leap.
 const NEARLY: f64 = 0.005;
 /// Rows on each side of a leap that show how the values go on.
 const ROWS_BESIDE: usize = 8;
@@ -27,7 +30,8 @@ const ROUNDED: f64 = 0.288_675;
 const EXCLUDED: f64 = 3.0;
 /// Whole counts are distinguishable if the standard deviation of the span is below this: half a count is two of them.
 const TELLS_COUNTS: f64 = 0.25;
-/// One count is said to be in doubt if the standard deviation of the span is below this, counts; above it, nothing is known of single counts.
+/// One count is said to be in doubt if the standard deviation of the span is below this, counts; above it, nothing is
+/// known of single counts.
 const IN_DOUBT: f64 = 1.0;
 /// So many of the leaps must have one size. *Guess*: the others are gaps and counts that were lost.
 const AGREE: f64 = 0.8;
@@ -66,8 +70,9 @@ pub(super) fn stays_within(range: f64, span: f64, covered: f64) -> bool {
     range <= span * (1.0 + 1e-6) && range >= covered * span
 }
 
-/// How `values` begin anew, if they do: after one of the known `spans`, in rising order, or, if they are `counts`, after any number of
-/// them. `along` is the other angle, row by row: where the motion is uneven in time, it shows how the values go on.
+/// How `values` begin anew, if they do: after one of the known `spans`, in rising order, or, if they are `counts`,
+/// after any number of them. `along` is the other angle, row by row: where the motion is uneven in time, it shows how
+/// the values go on.
 pub(crate) fn begins_anew(values: &[f64], spans: &[f64], counts: bool, along: Option<&[f64]>) -> Option<Anew> {
     let rows: Vec<usize> = (0..values.len()).filter(|row| values[*row].is_finite()).collect();
     let (least, most) = least_and_most(rows.iter().map(|row| values[*row]));

@@ -135,7 +135,8 @@ impl Unit {
         }
     }
 
-    /// One of it in the unit used inside: rad, s, N·m, °C. Of a count, an ampere and a volt what the gain makes of it: turns, N·m.
+    /// One of it in the unit used inside: rad, s, N·m, °C. Of a count, an ampere and a volt what the gain makes of it:
+    /// turns, N·m.
     pub fn factor(self) -> f64 {
         use std::f64::consts::TAU;
         match self {
@@ -324,8 +325,8 @@ impl Reading {
         if self.unit == Unit::Count { Unit::Turn } else { self.unit }
     }
 
-    /// Reads `[-]unit` and any number of `*g`, `/g`, `+o`, `-o`, done from left to right; numbers may be `2^24`. `torque_per_ampere` stands
-    /// in where a current has no gain.
+    /// Reads `[-]unit` and any number of `*g`, `/g`, `+o`, `-o`, done from left to right; numbers may be `2^24`.
+    /// `torque_per_ampere` stands in where a current has no gain.
     ///
     /// # Errors
     /// What was found and what is allowed; the unit itself if it is not known or not one of `allowed`.
@@ -342,9 +343,12 @@ impl Reading {
         let (mut gain, mut offset, mut scaled) = (sign, 0.0, false);
         let mut rest = rest[end..].trim_start();
         while let Some(operator) = rest.chars().next() {
-            let (number, after) = leading_number(rest[1..].trim_start()).ok_or_else(|| Wrong::Text(format!(
-                "found \"{rest}\" after the unit, allowed: *, /, + or - and a number, for instance count/16777216 or V*20-0.4"
-            )))?;
+            let (number, after) = leading_number(rest[1..].trim_start()).ok_or_else(|| {
+                Wrong::Text(format!(
+                    "found \"{rest}\" after the unit, allowed: *, /, + or - and a number, for instance count/16777216 \
+                     or V*20-0.4"
+                ))
+            })?;
             match operator {
                 '*' => (gain, offset, scaled) = (gain * number, offset * number, true),
                 '/' => (gain, offset, scaled) = (gain / number, offset / number, true),

@@ -1,11 +1,11 @@
 //! The picture before the verdict: what a residual (measured less model) looks like, before anybody says why.
 //!
-//! By direction, load, temperature, speed and session; over the angle of each wheel; its orders with their uncertainty; pulses that
-//! stay in one position; what moves with time; and the noise under all that. Everything is in arc-seconds at the output, angles in
-//! radians, and can be written as JSON.
+//! By direction, load, temperature, speed and session; over the angle of each wheel; its orders with their uncertainty;
+//! pulses that stay in one position; what moves with time; and the noise under all that. Everything is in arc-seconds
+//! at the output, angles in radians, and can be written as JSON.
 //!
-//! Three angles matter in a strain wave gear. The contact passes the flexspline once in a generator turn (ψ), the circular spline
-//! once in ψ−δ, which is 94/95 of it for a ratio of 95, and whatever sits on the output turns with δ.
+//! Three angles matter in a strain wave gear. The contact passes the flexspline once in a generator turn (ψ), the
+//! circular spline once in ψ−δ, which is 94/95 of it for a ratio of 95, and whatever sits on the output turns with δ.
 
 mod groups;
 mod map;

@@ -15,7 +15,8 @@ const WINDOW: f64 = 6.0;
 pub struct Noise {
     /// Standard deviation of the part that changes from row to row, arcsec.
     pub white_arcsec: f64,
-    /// Robust standard deviation of the rest, lines and means by direction taken out: wander, and what is not explained, arcsec.
+    /// Robust standard deviation of the rest, lines and means by direction taken out: wander, and what is not
+    /// explained, arcsec.
     pub correlated_arcsec: f64,
     /// Rows after which that is forgotten: sum of the correlations of both signs of the lag.
     pub decorrelation_rows: f64,

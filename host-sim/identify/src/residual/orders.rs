@@ -55,8 +55,8 @@ pub struct Line {
     pub amplitude_std: f64,
 }
 
-/// A constant and sines of these orders that fit `y` over `angle` (rad) best, all together; weights are those of the squares.
-/// `None` if the data cannot tell the orders apart, or are too few.
+/// A constant and sines of these orders that fit `y` over `angle` (rad) best, all together; weights are those of the
+/// squares. `None` if the data cannot tell the orders apart, or are too few.
 pub fn harmonics(angle: &[f64], y: &[f64], weight: Option<&[f64]>, orders: &[f64]) -> Option<(f64, Vec<Line>)> {
     let width = 1 + 2 * orders.len();
     let n = angle.len().min(y.len());
@@ -79,8 +79,8 @@ pub fn harmonics(angle: &[f64], y: &[f64], weight: Option<&[f64]>, orders: &[f64
     Some((value[0], lines))
 }
 
-/// Standard deviation of each amplitude for white noise of one, over that of a sine that stands alone in evenly spread rows: how
-/// much the orders and the places of the rows confuse each other. `None` as for [`harmonics`].
+/// Standard deviation of each amplitude for white noise of one, over that of a sine that stands alone in evenly spread
+/// rows: how much the orders and the places of the rows confuse each other. `None` as for [`harmonics`].
 pub(super) fn confusion(angle: &[f64], weight: Option<&[f64]>, orders: &[f64]) -> Option<Vec<f64>> {
     let fit = Normal::of(angle, &[], weight, orders)?;
     Some(fit.amplitude_stds().into_iter().map(|std| std * (angle.len() as f64 / 2.0).sqrt()).collect())

@@ -14,7 +14,8 @@ const BINS: usize = 180;
 const WAVES: usize = 4;
 /// Widths of a pulse that are tried (standard deviation of a bell), rad: the arc of engaged teeth is 10 to 30 degrees.
 const WIDTHS_RAD: [f64; 3] = [0.06, 0.12, 0.2];
-/// Standard deviations that a pulse stands out by: of 180 places, 3 widths and 2 periods one does so by chance once in 10^6.
+/// Standard deviations that a pulse stands out by: of 180 places, 3 widths and 2 periods one does so by chance once in
+/// 10^6.
 const STANDS_OUT: f64 = 6.5;
 /// Turns of the axis below which another wheel's lines do not average out.
 const FEWEST_TURNS: f64 = 6.0;

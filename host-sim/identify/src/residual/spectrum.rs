@@ -1,9 +1,10 @@
-//! Spectrum of orders: least squares of a sine and a floating mean at each order (generalised Lomb-Scargle; Zechmeister and
-//! Kürster, Astron. Astrophys. 496, 577, 2009), for rows that are not evenly spaced in the angle.
+//! Spectrum of orders: least squares of a sine and a floating mean at each order (generalised Lomb-Scargle; Zechmeister
+//! and Kürster, Astron. Astrophys. 496, 577, 2009), for rows that are not evenly spaced in the angle.
 //!
-//! The sums over rows that it needs are Fourier sums of the weights and of the weighted values. Rows are shared out linearly between
-//! the cells of a fine grid, the sums are taken by FFT, and the sharing is undone by its transform, sinc². Lines are then found
-//! one by one, the strongest first, taken out, and at last fitted all together to the rows themselves.
+//! The sums over rows that it needs are Fourier sums of the weights and of the weighted values. Rows are shared out
+//! linearly between the cells of a fine grid, the sums are taken by FFT, and the sharing is undone by its transform,
+//! sinc². Lines are then found one by one, the strongest first, taken out, and at last fitted all together to the rows
+//! themselves.
 
 use std::f64::consts::{PI, TAU};
 
@@ -20,7 +21,8 @@ const CELLS_PER_WAVE: f64 = 10.0;
 const OVERSAMPLING: f64 = 5.0;
 /// Largest transform.
 const LARGEST: usize = 1 << 22;
-/// The spectrum is sampled this much finer than its independent values, and its maxima are that much more (Baluev 2008 has 2 to 4).
+/// The spectrum is sampled this much finer than its independent values, and its maxima are that much more (Baluev 2008
+/// has 2 to 4).
 const MAXIMA: f64 = 4.0;
 /// The noise at an order is judged by the orders around it within this factor…
 const AROUND: f64 = 1.6;
@@ -128,8 +130,8 @@ impl OrderSpectrum {
     }
 }
 
-/// The spectrum of `value` (arcsec) along `angle` (rad), an `axis` of a drive with this ratio. Orders below one wave in the record
-/// are left out; a record that turns too little for any order gives an empty spectrum.
+/// The spectrum of `value` (arcsec) along `angle` (rad), an `axis` of a drive with this ratio. Orders below one wave in
+/// the record are left out; a record that turns too little for any order gives an empty spectrum.
 pub fn order_spectrum(
     axis: Axis,
     angle: &[f64],
@@ -195,7 +197,8 @@ pub fn order_spectrum(
         scan = grid.scan(&left);
         noise = background(&orders, &scan, resolution);
     }
-    // Noise with a memory has its own spectrum, steepest where local medians say least: lines must stand above that, too.
+    // Noise with a memory has its own spectrum, steepest where local medians say least: lines must stand above that,
+    // too.
     if !found.is_empty() {
         let red = grid.remembering(&left);
         noise.iter_mut().zip(&red).for_each(|(noise, red)| *noise = noise.max(*red));
@@ -233,8 +236,8 @@ fn peaks(
         .enumerate()
         .map(|(place, line)| {
             let at = orders.partition_point(|order| *order < line.order).min(orders.len() - 1);
-            // Of a squared amplitude that noise gives, half belongs to each of sine and cosine. Lines that pull at each other are less
-            // certain, by as much as the joint fit says.
+            // Of a squared amplitude that noise gives, half belongs to each of sine and cosine. Lines that pull at each
+            // other are less certain, by as much as the joint fit says.
             let std = (0.5 * noise[at]).sqrt() * confused[place].max(1.0);
             let per_generator_turn = line.order * turns_of_axis;
             let near =
@@ -345,8 +348,9 @@ impl<'a> Grid<'a> {
 }
 
 impl Grid<'_> {
-    /// Mean squared amplitude, at each order, of noise as white and with as long a memory (in rows, first-order autoregressive) as what is
-    /// `left`, from surrogates in the places of the rows (Schulz and Mudelsee, Comput. Geosci. 28, 421, 2002, for REDFIT).
+    /// Mean squared amplitude, at each order, of noise as white and with as long a memory (in rows, first-order
+    /// autoregressive) as what is `left`, from surrogates in the places of the rows (Schulz and Mudelsee, Comput.
+    /// Geosci. 28, 421, 2002, for REDFIT).
     fn remembering(&self, left: &[f64]) -> Vec<f64> {
         let n = left.len();
         let mean = left.iter().sum::<f64>() / n as f64;
@@ -392,8 +396,8 @@ impl Grid<'_> {
     }
 }
 
-/// Mean squared amplitude of the noise at each order, from the median around it: squares of noise are exponentially distributed, with
-/// a median of ln 2 of the mean, and lines, being few, do not move it.
+/// Mean squared amplitude of the noise at each order, from the median around it: squares of noise are exponentially
+/// distributed, with a median of ln 2 of the mean, and lines, being few, do not move it.
 fn background(orders: &[f64], scan: &[f64], resolution: f64) -> Vec<f64> {
     let n = orders.len();
     // At a few places, interpolated between.

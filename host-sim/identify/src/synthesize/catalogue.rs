@@ -1,7 +1,8 @@
 //! The effects that can be asked for by name: parameters with unit, meaning, range and default.
 //!
-//! Names and conventions are those of `diagnosis.json`: amplitudes in arc-seconds are at the output; `amplitude_um` is a displacement
-//! along the normal of the flanks for eccentricities (over the base radius), along the pitch circle for pitch errors.
+//! Names and conventions are those of `diagnosis.json`: amplitudes in arc-seconds are at the output; `amplitude_um` is
+//! a displacement along the normal of the flanks for eccentricities (over the base radius), along the pitch circle for
+//! pitch errors.
 
 use std::f64::consts::TAU;
 
@@ -151,7 +152,8 @@ const fn fault_parameters(fault: FaultName) -> (&'static str, &'static [Paramete
     }
 }
 
-/// Parameters that came to effects later, none of which is drawn: they take no number, so that a seed goes on making the same noise.
+/// Parameters that came to effects later, none of which is drawn: they take no number, so that a seed goes on making
+/// the same noise.
 const CAME_LATER: [ParameterName; 1] = [ParameterName::DeeperArcsec];
 
 /// Data faults in the order of lists.

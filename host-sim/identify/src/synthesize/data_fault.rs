@@ -222,7 +222,8 @@ mod tests {
             let found: Vec<FaultName> = recording(effect).faults.iter().map(|fault| fault.name).collect();
             assert!(found.contains(&name), "{effect}: {found:?}");
         }
-        // Where the load crosses zero for a row, the flank changes for a row: that is taken for an outlier, and nothing else is.
+        // Where the load crosses zero for a row, the flank changes for a row: that is taken for an outlier, and nothing
+        // else is.
         assert!(recording("wear").faults.iter().all(|f| f.name == FaultName::Outliers && f.rows < 60));
     }
 

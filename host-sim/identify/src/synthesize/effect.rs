@@ -162,8 +162,8 @@ impl Effect {
         }
     }
 
-    /// The law that the command `synthesize` makes of a cause, with this size and place and otherwise its usual parameters. Tests that
-    /// want more of a cause give it an arm of its own above.
+    /// The law that the command `synthesize` makes of a cause, with this size and place and otherwise its usual
+    /// parameters. Tests that want more of a cause give it an arm of its own above.
     fn as_asked_for(&self, cause: CauseName, plant: &Plant<'_>, on: &Excitation) -> Law {
         let mut chosen = parse(cause.as_str()).expect("a cause can be asked for");
         let size = cause

@@ -69,8 +69,8 @@ impl Excitation {
         speeds
     }
 
-    /// That of measured sessions. What was not recorded is taken as rows `1 / rate_hz` apart, no load, the nominal temperature and
-    /// no turn against gravity.
+    /// That of measured sessions. What was not recorded is taken as rows `1 / rate_hz` apart, no load, the nominal
+    /// temperature and no turn against gravity.
     #[must_use]
     pub fn of_sessions(sessions: &[Session], rate_hz: f64, temperature_c: f64) -> Excitation {
         let mut all = Excitation::default();

@@ -1,4 +1,5 @@
-//! What an effect does to the error, the load and the clearance: one law each, in the form of this plant and in a changed one.
+//! What an effect does to the error, the load and the clearance: one law each, in the form of this plant and in a
+//! changed one.
 
 use std::f64::consts::{PI, TAU};
 
@@ -11,13 +12,14 @@ use crate::causes::{CauseName, ParameterName};
 use crate::nominal::{Fixed, Nominal};
 use flexspline_base::units::ARCSEC_PER_RAD;
 
-/// Flank angle where teeth bear, rad: the phase of a rectified sine on the flank that carries. A guess of its own: the diagnosis, which
-/// must not share its laws, expects 0.39.
+/// Flank angle where teeth bear, rad: the phase of a rectified sine on the flank that carries. A guess of its own: the
+/// diagnosis, which must not share its laws, expects 0.39.
 const FLANK_ANGLE_RAD: f64 = 0.36;
-/// Half the arc in which a cracked tooth carries over the half width of what is felt of it, which is stated as the deviation of a bell
-/// curve: the square of a parabola comes closest to one (least squares) at this.
+/// Half the arc in which a cracked tooth carries over the half width of what is felt of it, which is stated as the
+/// deviation of a bell curve: the square of a parabola comes closest to one (least squares) at this.
 const CARRYING_HALF_ARC: f64 = 2.38;
-/// The largest first wave of a reading under signals of unlike size, rad of theirs: beyond, it is this shape made larger.
+/// The largest first wave of a reading under signals of unlike size, rad of theirs: beyond, it is this shape made
+/// larger.
 const MOST_UNLIKE: f64 = 0.25;
 /// Steps to a row where a state is followed.
 const STEPS: u32 = 40;
@@ -45,23 +47,23 @@ pub(super) enum Encoder {
 /// A law with its numbers. Amplitudes are arcsec at the output unless their name says otherwise.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Law {
-    /// A toothing or an axis beside its place, rectified by the clearance: `-+A |sin(angle - direction +- a)|` on the flank that
-    /// carries, less where more teeth share the load.
+    /// A toothing or an axis beside its place, rectified by the clearance: `-+A |sin(angle - direction +- a)|` on the
+    /// flank that carries, less where more teeth share the load.
     Displaced { angle: Angle, amplitude: f64, direction_rad: f64, half_load_n_m: f64 },
-    /// With `y` twice the angle on the circular spline plus a phase, `A (cos y -+ radial sin y)` on either flank, normalised to `A`: teeth
-    /// that an oval ring moves along, and spaces that its radius opens.
+    /// With `y` twice the angle on the circular spline plus a phase, `A (cos y -+ radial sin y)` on either flank,
+    /// normalised to `A`: teeth that an oval ring moves along, and spaces that its radius opens.
     Oval { amplitude: f64, phase_rad: f64, radial: f64 },
     /// Lines `(order, amplitude, phase)`, `A cos(order angle + phase)`.
     Pitch { angle: Angle, lines: Vec<(f64, f64, f64)> },
-    /// One lobe is deeper: it takes clearance at either flank, and shows order 1 of the teeth of both wheels. A load presses it in. Wheels
-    /// without such errors (`amplitude` 0) show the clearance alone, as in contact FEM.
+    /// One lobe is deeper: it takes clearance at either flank, and shows order 1 of the teeth of both wheels. A load
+    /// presses it in. Wheels without such errors (`amplitude` 0) show the clearance alone, as in contact FEM.
     Lobes { amplitude: f64, phase_rad: f64, deeper: f64, half_load_n_m: f64 },
     /// The tooth mesh and its first overtone.
     CamForm { amplitude: f64, phase_rad: f64 },
     /// A pulse where a lobe meets the tooth.
     Damage { angle: Angle, amplitude: f64, place_rad: f64, half_width_rad: f64, both_flanks: bool },
-    /// A tooth of the circular spline bends more than its neighbours: the wind-up is more by this at the full load, in the middle of the
-    /// arc in which it carries.
+    /// A tooth of the circular spline bends more than its neighbours: the wind-up is more by this at the full load, in
+    /// the middle of the arc in which it carries.
     Crack { at_full_load: f64, full_load_n_m: f64, place_rad: f64, half_width_rad: f64 },
     /// The clearance is wider by this, whole width.
     Wider { growth: f64 },
@@ -88,8 +90,8 @@ pub(super) enum Law {
     Resonance { frequency_hz: f64, damping_ratio: f64 },
     /// `A sin(angle + phase)` in a reading.
     Disc { encoder: Encoder, amplitude: f64, phase_rad: f64 },
-    /// A reading that is an angle `x` under two signals of unlike size, `atan2((1 + a) sin nx, cos nx) / n`: order 2n of the angle, of this
-    /// amplitude, and little of its multiples.
+    /// A reading that is an angle `x` under two signals of unlike size, `atan2((1 + a) sin nx, cos nx) / n`: order 2n
+    /// of the angle, of this amplitude, and little of its multiples.
     Unlike { encoder: Encoder, order: f64, amplitude: f64, phase_rad: f64 },
     /// The output's reading is older by this.
     Latency { delay_s: f64 },
@@ -102,7 +104,8 @@ pub(super) enum Law {
     Strange { name: Strange, size: f64, phase: f64 },
 }
 
-/// When a law acts: loads wind the drive up, the load's inertia follows all that the drive does, sensors read what comes of it.
+/// When a law acts: loads wind the drive up, the load's inertia follows all that the drive does, sensors read what
+/// comes of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Stage {
     Mesh,
@@ -364,7 +367,8 @@ impl Law {
                 error[k] += amplitude * faded(torque[k], *half_load_n_m, changed) * one;
             }),
             Law::CamForm { amplitude, phase_rad } => {
-                // Every tooth meets the same generator: nothing repeats less often than the teeth, and the clearance is another.
+                // Every tooth meets the same generator: nothing repeats less often than the teeth, and the clearance is
+                // another.
                 let teeth = f64::from(now.nominal().teeth_or_of_two_waves().flexspline);
                 let (top, overtone, wider) =
                     (now.top(), if changed { 0.25 } else { 0.1 }, if changed { 0.4 } else { 0.0 });
@@ -439,12 +443,13 @@ impl Law {
                 error[k] += amplitude * (x.sin() + if changed { 0.1 * (2.0 * x + 1.0).sin() } else { 0.0 });
             }),
             Law::Unlike { encoder, order, amplitude, phase_rad } => {
-                // Signals of a circle pressed to an ellipse: the reading runs ahead and behind twice in a period of theirs. One arcsec of
-                // the angle that they turn by is this much of it at the output.
+                // Signals of a circle pressed to an ellipse: the reading runs ahead and behind twice in a period of
+                // theirs. One arcsec of the angle that they turn by is this much of it at the output.
                 let at_output = if *encoder == Encoder::Output { 1.0 } else { 1.0 / now.nominal().ratio.abs() };
                 let signals = 0.5 * order;
                 let per_signal = ARCSEC_PER_RAD * at_output / signals;
-                // The first wave of what follows is m, its overtones m²/2, m³/3, ..., for signals that are unlike by 2m / (1 - m).
+                // The first wave of what follows is m, its overtones m²/2, m³/3, ..., for signals that are unlike by 2m
+                // / (1 - m).
                 let first = (amplitude / per_signal).clamp(1e-9, MOST_UNLIKE);
                 let unlike = 2.0 * first / (1.0 - first);
                 let scale = amplitude / first;

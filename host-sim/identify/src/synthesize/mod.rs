@@ -1,8 +1,8 @@
 //! Made-up measurements of a drive with known effects: for tests of the diagnosis and for the command `synthesize`.
 //!
-//! The plant here shares no law with the candidates of the diagnosis: each effect comes in two forms of its own (the second with a
-//! changed law, for tests), at a finer step where it has a state, under sensors with white noise and a wander of another kind than
-//! the one the diagnosis assumes.
+//! The plant here shares no law with the candidates of the diagnosis: each effect comes in two forms of its own (the
+//! second with a changed law, for tests), at a finer step where it has a state, under sensors with white noise and a
+//! wander of another kind than the one the diagnosis assumes.
 //!
 //! * [`effects`]: the effects by name, their parameters with units, ranges and defaults; [`parse`] reads
 //!   `NAME:param=value,...`.
@@ -53,10 +53,10 @@ const TEMPERATURE_NOISE_K: f64 = 0.02;
 pub fn catalogue_drive() -> Nominal {
     Nominal::from_toml(
         "built in",
-        "[drive]\nflexspline_teeth = 188\ncircular_spline_teeth = 190\n[nominal]\nstiffness_n_m_per_rad = 30000.0\n\
-         backlash_arcsec = 60.0\nfriction_torque_n_m = 1.5\n[[nominal.harmonic]]\norder_per_generator_turn = 2.0\n\
-         amplitude_arcsec = 10.0\nphase_rad = 0.4\n[[nominal.harmonic]]\norder_per_generator_turn = 4.0\n\
-         amplitude_arcsec = 3.0\nphase_rad = 1.1\n",
+        "[drive]\nflexspline_teeth = 188\ncircular_spline_teeth = 190\n[nominal]\nstiffness_n_m_per_rad = \
+         30000.0\nbacklash_arcsec = 60.0\nfriction_torque_n_m = 1.5\n[[nominal.harmonic]]\norder_per_generator_turn = \
+         2.0\namplitude_arcsec = 10.0\nphase_rad = 0.4\n[[nominal.harmonic]]\norder_per_generator_turn = \
+         4.0\namplitude_arcsec = 3.0\nphase_rad = 1.1\n",
     )
     .expect("the built-in text is valid")
 }
@@ -119,8 +119,8 @@ fn law_of(effect: &Chosen, setting: &Setting<'_>) -> Option<Law> {
     }
 }
 
-/// What `chosen` effects add to the error of a nominal drive under an excitation, without sensors, row by row, arcsec. Parameters
-/// that are not given take their default; nothing is drawn.
+/// What `chosen` effects add to the error of a nominal drive under an excitation, without sensors, row by row, arcsec.
+/// Parameters that are not given take their default; nothing is drawn.
 ///
 /// # Errors
 /// As [`synthesize`].
@@ -140,8 +140,8 @@ pub fn added_arcsec(plant: &Plant<'_>, sizes: Sizes, chosen: &[Chosen], on: &Exc
     Ok(error(&laws).iter().zip(error(&[])).map(|(with, without)| with - without).collect())
 }
 
-/// Measures a drive with `chosen` effects: the output encoder as `sensors` say, and a torque sensor and a thermometer with a little
-/// noise. `encoder_bits` is the resolution of the output encoder, bits to a turn.
+/// Measures a drive with `chosen` effects: the output encoder as `sensors` say, and a torque sensor and a thermometer
+/// with a little noise. `encoder_bits` is the resolution of the output encoder, bits to a turn.
 ///
 /// # Errors
 /// A parameter that does not fit the excitation, such as a time outside it.

@@ -8,8 +8,8 @@ use crate::nominal::Nominal;
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::dead_zone_n_m;
 
-/// The nominal drive: a catalogue's model, or a table made by FEM and read by the core, whose wind-up and clearance then stand in
-/// the model.
+/// The nominal drive: a catalogue's model, or a table made by FEM and read by the core, whose wind-up and clearance
+/// then stand in the model.
 #[derive(Clone, Copy, Debug)]
 pub struct Plant<'a> {
     /// Ratio, wind-up, clearance; without a table the whole prediction.
@@ -73,8 +73,8 @@ impl Plant<'_> {
         torque
     }
 
-    /// Error without sensors and before `laws` have added to it, arcsec. Below the friction of a model the output stands until the
-    /// generator has used up the clearance and pushes it; or, if not `pushed`, its error stands.
+    /// Error without sensors and before `laws` have added to it, arcsec. Below the friction of a model the output
+    /// stands until the generator has used up the clearance and pushes it; or, if not `pushed`, its error stands.
     pub(super) fn error(
         &self,
         on: &Excitation,

@@ -1,9 +1,10 @@
 //! Block factorisation of the faces around both rings.
 //!
-//! Unknowns come in blocks: the nodes of one face, or the tractions of one pair of flanks. A block matrix is a sum of dense
-//! contributions, each over a few blocks that are near one another on the ring. Blocks are eliminated one after the other
-//! around the ring, the last one closing it (multifrontal method, Duff and Reid 1983); with tractions as unknowns the matrix
-//! is quasi-definite: their blocks are negative definite, those of the faces positive, and any order serves (Vanderbei 1995).
+//! Unknowns come in blocks: the nodes of one face, or the tractions of one pair of flanks. A block matrix is a sum of
+//! dense contributions, each over a few blocks that are near one another on the ring. Blocks are eliminated one after
+//! the other around the ring, the last one closing it (multifrontal method, Duff and Reid 1983); with tractions as
+//! unknowns the matrix is quasi-definite: their blocks are negative definite, those of the faces positive, and any
+//! order serves (Vanderbei 1995).
 
 use super::dense::Kernels;
 

@@ -1,16 +1,16 @@
 //! A cell in the frame that turns with it.
 //!
-//! The frame is the rotation that fits the nodes of the faces best: with their positions X from their middle and x in the
-//! deformed cell, `tan phi = sum X cross x / sum X . x`. Seen from it, what is left of the displacement,
+//! The frame is the rotation that fits the nodes of the faces best: with their positions X from their middle and x in
+//! the deformed cell, `tan phi = sum X cross x / sum X . x`. Seen from it, what is left of the displacement,
 //!
 //! `q = R(-phi) x - X`,
 //!
-//! is strain and little else (5e-4), and the energy is `q^T K q / 2`. Its derivatives are taken exactly, so that forces and
-//! moments balance whatever frame was chosen: with `a = dphi/dx` (in the frame), `S` a quarter turn, `F = K q`,
+//! is strain and little else (5e-4), and the energy is `q^T K q / 2`. Its derivatives are taken exactly, so that forces
+//! and moments balance whatever frame was chosen: with `a = dphi/dx` (in the frame), `S` a quarter turn, `F = K q`,
 //!
 //! * force: `F - (F . S q) a`, in the frame;
-//! * tangent: `K + g a^T + a g^T + c a a^T`, with `g = S F - K S q` and `c = (S q)^T K (S q) - F . (X + q)`; a term of the
-//!   order of the energy is left out.
+//! * tangent: `K + g a^T + a g^T + c a a^T`, with `g = S F - K S q` and `c = (S q)^T K (S q) - F . (X + q)`; a term of
+//!   the order of the energy is left out.
 //!
 //! After Felippa and Haugen, A unified formulation of small-strain corotational finite elements, 2005.
 
@@ -49,7 +49,8 @@ impl CoRotation {
         CoRotation { position: self.position[nodes..].to_vec(), first_face: self.first_face - nodes }
     }
 
-    /// The frame and what is left of the displacements `d` (x and y of each kept node, in the frame of the cell at rest).
+    /// The frame and what is left of the displacements `d` (x and y of each kept node, in the frame of the cell at
+    /// rest).
     pub fn split(&self, d: &[f64], state: &mut CellState) {
         let faces = self.first_face..self.position.len();
         let count = faces.len() as f64;
@@ -85,8 +86,8 @@ impl CoRotation {
         }
     }
 
-    /// The other way: displacements (in the frame of the cell at rest) of nodes at `positions` from the middle of the faces,
-    /// displaced by `q` in the turned frame.
+    /// The other way: displacements (in the frame of the cell at rest) of nodes at `positions` from the middle of the
+    /// faces, displaced by `q` in the turned frame.
     pub fn join(state: &CellState, positions: &[[f64; 2]], q: &[f64]) -> Vec<f64> {
         let forth @ (sin, _) = state.turn.sin_cos();
         let shortening = -2.0 * (0.5 * state.turn).sin().powi(2);

@@ -1,7 +1,7 @@
 //! Dense kernels for fronts of some tens of unknowns, column-major, lower triangle.
 //!
-//! At this size the calls of a general library cost as much as the arithmetic; these loops are compiled for the vector unit
-//! that the machine has (pulp).
+//! At this size the calls of a general library cost as much as the arithmetic; these loops are compiled for the vector
+//! unit that the machine has (pulp).
 
 use pulp::{Arch, NullaryFnOnce};
 
@@ -16,7 +16,8 @@ impl Default for Kernels {
 }
 
 impl Kernels {
-    /// Eliminates the first `p` unknowns of a symmetric m x m front whose pivot block has the given sign (+1 or −1 definite):
+    /// Eliminates the first `p` unknowns of a symmetric m x m front whose pivot block has the given sign (+1 or −1
+    /// definite):
     ///
     /// ```text
     ///   [ A  B^T ]    sign A = L L^T,  P = B L^-T:    [ L              ]

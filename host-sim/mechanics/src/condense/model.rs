@@ -89,7 +89,8 @@ impl Cell {
         self.unknowns[2]
     }
 
-    /// Displacements of the flank nodes that no force acts on, from those of the other nodes and of the seat, in the frame.
+    /// Displacements of the flank nodes that no force acts on, from those of the other nodes and of the seat, in the
+    /// frame.
     pub fn free_flanks(&self, kernels: Kernels, body: &[f64], seat_mm: f64) -> Vec<f64> {
         let mut flanks = vec![0.0; self.flank()];
         kernels.multiply_add(&self.flank_coupling, body, -1.0, &mut flanks);
@@ -161,8 +162,8 @@ impl CondensedWheel {
         if flanks { (whole, unknowns) } else { (bare, &unknowns[whole.flank()..]) }
     }
 
-    /// How the nodes of a cell that were condensed away follow, and by how many sectors this cell stands further than the one
-    /// that was condensed.
+    /// How the nodes of a cell that were condensed away follow, and by how many sectors this cell stands further than
+    /// the one that was condensed.
     pub fn element(&self, place: usize) -> (&Superelement, usize) {
         let class = self.class[place];
         (&self.elements[class], place - class)
@@ -208,8 +209,8 @@ mod tests {
         force
     }
 
-    /// Displacements of kept nodes, small: spread over the wheel by the cells, they leave no force on what was condensed, and
-    /// the forces on what was kept are those of the condensed cells.
+    /// Displacements of kept nodes, small: spread over the wheel by the cells, they leave no force on what was
+    /// condensed, and the forces on what was kept are those of the condensed cells.
     fn condensation_is_exact(mesh: &WheelMesh, held: impl Fn(u32) -> bool + Sync + Copy, seat_mm: f64) {
         let wheel = CondensedWheel::new(mesh, &steel(), 0, held);
         let mut rng = fastrand::Rng::with_seed(11);

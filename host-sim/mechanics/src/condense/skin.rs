@@ -8,8 +8,8 @@ use super::superelement::CellNodes;
 
 /// A wheel reduced to the nodes on the faces between its cells, on the bore and on the flanks.
 ///
-/// `mesh` numbers them sector by sector as the whole mesh does, has its flanks and base edges, and no elements: contact and
-/// travelling-wave predictor work on it as on the whole.
+/// `mesh` numbers them sector by sector as the whole mesh does, has its flanks and base edges, and no elements: contact
+/// and travelling-wave predictor work on it as on the whole.
 #[derive(Debug, Clone)]
 pub struct Skin {
     /// The kept nodes.
@@ -127,8 +127,8 @@ impl Skin {
     }
 }
 
-/// Nodes of sector 0 on the face between two cells, from the axis outwards: on the near boundary of a flexspline sector, on
-/// the space axis of a circular-spline sector.
+/// Nodes of sector 0 on the face between two cells, from the axis outwards: on the near boundary of a flexspline
+/// sector, on the space axis of a circular-spline sector.
 fn face_nodes(whole: &WheelMesh, held: &impl Fn(u32) -> bool) -> Vec<u32> {
     let axis = match whole.kind {
         WheelKind::Flexspline => -0.5 * whole.pitch(),

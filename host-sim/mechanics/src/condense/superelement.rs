@@ -136,7 +136,8 @@ impl Superelement {
         (&self.interior, &self.interior_position)
     }
 
-    /// Displacements of the interior nodes, in the frame of the cell, for displacements `kept` and a seat moved by `seat_mm`.
+    /// Displacements of the interior nodes, in the frame of the cell, for displacements `kept` and a seat moved by
+    /// `seat_mm`.
     pub fn recover(&self, kept: &[f64], seat_mm: f64) -> Vec<f64> {
         let mut out: Vec<f64> = (0..self.recovery.nrows()).map(|i| seat_mm * self.seat_recovery[(i, 0)]).collect();
         for (j, x) in kept.iter().enumerate() {

@@ -1,7 +1,7 @@
 //! The tangent of one cell, reduced to its faces and to the tractions on its flanks; and the way back.
 //!
-//! With the tangent `K + g a^T + a g^T + c a a^T` of a turning cell (see [`super::corotation`]; a reaches the faces only) and
-//! the columns G of the contact on its flanks (see [`Traction`]), flank and bore nodes are eliminated from
+//! With the tangent `K + g a^T + a g^T + c a a^T` of a turning cell (see [`super::corotation`]; a reaches the faces
+//! only) and the columns G of the contact on its flanks (see [`Traction`]), flank and bore nodes are eliminated from
 //!
 //! ```text
 //!           flank      bore        faces   tractions  geometric
@@ -12,9 +12,9 @@
 //!   geom.   g_f^T      g_b^T       g_i^T    0          c
 //! ```
 //!
-//! and the geometric row, which is no equation, is folded onto the faces: with the reduced `g_i`, `g_t`, `c`, the faces get
-//! `g_i a^T + a g_i^T + c a a^T` and their coupling with the tractions `g_t a^T`. This is exact, because a is zero on what was
-//! eliminated.
+//! and the geometric row, which is no equation, is folded onto the faces: with the reduced `g_i`, `g_t`, `c`, the faces
+//! get `g_i a^T + a g_i^T + c a a^T` and their coupling with the tractions `g_t a^T`. This is exact, because a is zero
+//! on what was eliminated.
 
 use crate::mesh::rotate;
 
@@ -24,8 +24,8 @@ use super::model::Cell;
 
 /// Contact of a pair of flanks as this cell sees it: columns of G on its flank nodes, in its frame.
 ///
-/// The contact has the stiffness `D = G G^T`. With the tractions `lambda = G^T z` as unknowns `[K G; G^T -I]` stands for
-/// `K + G G^T`, and what one wheel contributes does not depend on the other.
+/// The contact has the stiffness `D = G G^T`. With the tractions `lambda = G^T z` as unknowns `[K G; G^T -I]` stands
+/// for `K + G G^T`, and what one wheel contributes does not depend on the other.
 #[derive(Debug, Clone)]
 pub struct Traction {
     /// Its block in the chain.
@@ -115,8 +115,8 @@ pub struct Local {
 }
 
 impl CellTangent {
-    /// Reduces a cell. `contact` adds what touches the bore to the lower triangle of the matrix of bore and faces (of the given
-    /// order) and says whether it did.
+    /// Reduces a cell. `contact` adds what touches the bore to the lower triangle of the matrix of bore and faces (of
+    /// the given order) and says whether it did.
     pub fn reduce(
         &mut self,
         kernels: Kernels,

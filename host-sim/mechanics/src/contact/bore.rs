@@ -35,8 +35,8 @@ pub struct BoreContact {
     points: Vec<(f64, [f64; 3])>,
 }
 
-/// What the gap along an edge of 0.4 mm may differ by from a quadratic, mm: of the distance from a circle of 13 mm the fourth
-/// order is 1e-7 mm.
+/// What the gap along an edge of 0.4 mm may differ by from a quadratic, mm: of the distance from a circle of 13 mm the
+/// fourth order is 1e-7 mm.
 const BORE_SMOOTHNESS: f64 = 1e-6;
 
 /// Edges known to be open, and for how long.
@@ -97,8 +97,8 @@ impl BoreContact {
         BoreContact { edges, middle_angles, places, point_places, points }
     }
 
-    /// Contact of the bore displaced by `u` (x and y of each node) with the generator turned by `generator_rad`, edge by
-    /// edge; edges without contact are not reported.
+    /// Contact of the bore displaced by `u` (x and y of each node) with the generator turned by `generator_rad`, edge
+    /// by edge; edges without contact are not reported.
     pub fn evaluate(
         &self,
         law: BoreLaw,
@@ -143,7 +143,8 @@ impl BoreContact {
             };
             let gaps = [shared.unwrap_or_else(|| gap(0)), gap(1), gap(2)];
             shared = Some(gaps[2]);
-            // Along the edge the gap is quadratic to BORE_SMOOTHNESS, and a quadratic lies above its Bernstein coefficients.
+            // Along the edge the gap is quadratic to BORE_SMOOTHNESS, and a quadratic lies above its Bernstein
+            // coefficients.
             let bound = gaps[0].min(gaps[2]).min(2.0 * gaps[1] - 0.5 * (gaps[0] + gaps[2])) - BORE_SMOOTHNESS;
             if bound > 0.0 {
                 open.until[edge] = open.moved + bound;

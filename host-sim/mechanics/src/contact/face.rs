@@ -1,22 +1,24 @@
 //! A pair of flanks across the face: teeth that lean or are askew along their width, and flanks that are crowned.
 //!
-//! The plane slice carries the mean over the face. Slices beside it stand further apart or nearer by an offset o(x): the tooth's tilt
-//! and skew times x, along the normal of the flank, and the crowning. Each slice gives way by itself, C mm for 1 N/mm beyond the mean
-//! (thin slices, as in ISO 6336 for the load along a face), so with a level L the load at x is
+//! The plane slice carries the mean over the face. Slices beside it stand further apart or nearer by an offset o(x):
+//! the tooth's tilt and skew times x, along the normal of the flank, and the crowning. Each slice gives way by itself,
+//! C mm for 1 N/mm beyond the mean (thin slices, as in ISO 6336 for the load along a face), so with a level L the load
+//! at x is
 //!
 //! `q(x) = <L - o(x)> / C`, and the plane slice meets the other flank earlier by `d = C q̄ - L`,
 //!
-//! q̄ the mean of q. While nothing touches, d is the largest `-o`; once all of the face bears, the mean of `-o`, and nothing is
-//! softer than without. Pressures p of the plane slice give `sum p(d) = q̄`: one number L for each pair, found within its contact law.
+//! q̄ the mean of q. While nothing touches, d is the largest `-o`; once all of the face bears, the mean of `-o`, and
+//! nothing is softer than without. Pressures p of the plane slice give `sum p(d) = q̄`: one number L for each pair,
+//! found within its contact law.
 //!
-//! All of it is the slope of one energy. Beside the forces on the plane slice it gives the load's moment along the face,
-//! `mean of q x`, which acts on what makes the teeth lean.
+//! All of it is the slope of one energy. Beside the forces on the plane slice it gives the load's moment along the
+//! face, `mean of q x`, which acts on what makes the teeth lean.
 
 use super::flank::FlankLaw;
 use crate::drive::{ActiveFlank, Side};
 
-/// Stations along the face between which offsets are straight: exact for tilt; 8 times as many move the load of a crowned pair by
-/// less than 1e-3 (a test).
+/// Stations along the face between which offsets are straight: exact for tilt; 8 times as many move the load of a
+/// crowned pair by less than 1e-3 (a test).
 const STATIONS: usize = 33;
 /// Iterations for the level of a pair: Newton within a bracket.
 const MOST_ITERATIONS: usize = 100;
@@ -115,8 +117,8 @@ fn place(k: usize) -> f64 {
     2.0 * k as f64 / (STATIONS - 1) as f64 - 1.0
 }
 
-/// Load at a level: mean, its slope with the level times C (the share that bears), and the mean of load times place; means of place and
-/// of its square over what bears.
+/// Load at a level: mean, its slope with the level times C (the share that bears), and the mean of load times place;
+/// means of place and of its square over what bears.
 struct Load {
     mean: f64,
     share: f64,
@@ -167,7 +169,8 @@ impl Across {
         load
     }
 
-    /// The bearing of a pair whose points have these gaps where the face is nearest, with weights; `None` while nothing touches.
+    /// The bearing of a pair whose points have these gaps where the face is nearest, with weights; `None` while nothing
+    /// touches.
     pub fn bearing(&self, law: FlankLaw, points: &[(f64, f64)]) -> Option<Bearing> {
         // Load of the plane slice that meets the other flank later by so much.
         let plane = |later: f64| {
@@ -298,8 +301,8 @@ mod tests {
         assert!((bearing.peak_over_mean / (15.0 / half) - 1.0).abs() < 2e-3 && bearing.moment.abs() < 1e-9);
     }
 
-    /// The mean load over the face is what the plane slice carries, of pairs that bear on a hair of their face as of those that bear on
-    /// all of it, however stiff their contact is.
+    /// The mean load over the face is what the plane slice carries, of pairs that bear on a hair of their face as of
+    /// those that bear on all of it, however stiff their contact is.
     #[test]
     fn the_face_bears_what_the_plane_slice_carries() {
         let face = face(0.0);

@@ -6,15 +6,15 @@
 //! `g = n(s) . (x - V(s) - P(s))`,
 //!
 //! with P(s) the exact outline of the circular spline (flank and tip rounding), V its interpolated displacement, and s
-//! the foot of `x - V`. To first order in the slope of V (1e-3; the neglected second order is below 1e-6 of the gap) all
-//! derivatives of g are those of one vector `c = n - (n . dV/ds) t`: +c on the flexspline, −c on the circular spline, so
-//! that action equals reaction and the moment on the output is that of the forces themselves.
+//! the foot of `x - V`. To first order in the slope of V (1e-3; the neglected second order is below 1e-6 of the gap)
+//! all derivatives of g are those of one vector `c = n - (n . dV/ds) t`: +c on the flexspline, −c on the circular
+//! spline, so that action equals reaction and the moment on the output is that of the forces themselves.
 //!
-//! As built ([`FlankDeviations`]) the point becomes that of a tooth displaced as a rigid body, and P(s) the outline of a space
-//! displaced likewise; the axis of the circular spline may stand beside that of the housing, and a worn flank adds its depth to
-//! g. All are constants, so that c and its work stay what they were. The frame that turns with the circular spline has its
-//! origin on the axis of the output bearing: `x` counts from there, and the torque on the output is the moment about it, wherever
-//! toothing and housing have theirs.
+//! As built ([`FlankDeviations`]) the point becomes that of a tooth displaced as a rigid body, and P(s) the outline of
+//! a space displaced likewise; the axis of the circular spline may stand beside that of the housing, and a worn flank
+//! adds its depth to g. All are constants, so that c and its work stay what they were. The frame that turns with the
+//! circular spline has its origin on the axis of the output bearing: `x` counts from there, and the torque on the
+//! output is the moment about it, wherever toothing and housing have theirs.
 
 use crate::fem::element::edge_shape;
 use crate::mesh::{FlankMesh, WheelMesh, rotate};
@@ -24,7 +24,8 @@ use super::hertz::{Place, peak_pressure_mpa};
 use super::quadrature::gauss_legendre;
 use crate::drive::{ActiveFlank, FlankDeviations, Foot, Placement, Side, golden};
 
-/// Flanks further apart than this do not touch within an increment that a layout is made for, mm: the reach of the search for pairs.
+/// Flanks further apart than this do not touch within an increment that a layout is made for, mm: the reach of the
+/// search for pairs.
 const NEAR_ENOUGH_MM: f64 = 0.02;
 
 /// Law of the flanks.
@@ -152,7 +153,8 @@ pub struct AlongFace {
     pub by_slope: f64,
 }
 
-/// A point that slips: a change of its gap changes the force along the flank, by `stiffness` times the change along `slip`.
+/// A point that slips: a change of its gap changes the force along the flank, by `stiffness` times the change along
+/// `slip`.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct SlipPoint {
     /// Unknowns of its nodes.
@@ -306,8 +308,8 @@ impl<'a> FlankContact<'a> {
         pairs
     }
 
-    /// Smallest gap of a pair at a few points of the flank (mm), where the face is nearest; points outside the space's flank do not count
-    /// unless the face is uneven: its offsets may bring the rounding of a tip to bear alone.
+    /// Smallest gap of a pair at a few points of the flank (mm), where the face is nearest; points outside the space's
+    /// flank do not count unless the face is uneven: its offsets may bring the rounding of a tip to bear alone.
     pub fn smallest_gap(&self, pair: FlankPair, at: Configuration) -> f64 {
         self.smallest_gap_in(pair, &self.local_field(pair, at))
     }
@@ -332,8 +334,8 @@ impl<'a> FlankContact<'a> {
         })
     }
 
-    /// A lower bound of the gap at a point: it leaves out the rounding of the tip, and no displacement of the circular spline
-    /// brings the flank nearer than its own length.
+    /// A lower bound of the gap at a point: it leaves out the rounding of the tip, and no displacement of the circular
+    /// spline brings the flank nearer than its own length.
     #[inline]
     fn least_distance(&self, field: &LocalField, x: [f64; 2]) -> f64 {
         self.space.least_distance(field.space.recover(x)) + field.depth - field.largest_cs - self.deepest_facet
@@ -384,7 +386,8 @@ impl<'a> FlankContact<'a> {
         0.5 * face.width_mm * at.leans.iter().map(|lean| lean[0].hypot(lean[1])).fold(0.0, f64::max)
     }
 
-    /// How the pair bears along its face: `None` where it is open, nothing later and nothing softer where the face is even.
+    /// How the pair bears along its face: `None` where it is open, nothing later and nothing softer where the face is
+    /// even.
     fn bearing(&self, pair: FlankPair, field: &LocalField, law: FlankLaw, points: &[FlankPoint]) -> Option<Bearing> {
         let Some(across) = &field.across else { return Some(Bearing::EVEN) };
         let near = points.iter().filter_map(|point| {
@@ -398,8 +401,8 @@ impl<'a> FlankContact<'a> {
         across.bearing(law, &near.collect::<Vec<_>>())
     }
 
-    /// Load of a pair over its mean, at equal steps along the face and growing away from what holds the flexspline; nothing where the pair is
-    /// open or its load is even.
+    /// Load of a pair over its mean, at equal steps along the face and growing away from what holds the flexspline;
+    /// nothing where the pair is open or its load is even.
     pub fn load_over_mean(&self, pair: FlankPair, at: Configuration, law: FlankLaw, points: &[FlankPoint]) -> Vec<f64> {
         let field = self.local_field(pair, at);
         let bearing = self.bearing(pair, &field, law, points);
@@ -409,7 +412,8 @@ impl<'a> FlankContact<'a> {
         }
     }
 
-    /// Foot, on the deformed circular spline, of a point given in the space frame, whose origin lies on the axis of the output.
+    /// Foot, on the deformed circular spline, of a point given in the space frame, whose origin lies on the axis of the
+    /// output.
     #[inline]
     fn foot(&self, pair: FlankPair, field: &LocalField, x: [f64; 2]) -> Foot {
         let cs = self.cs_flank(pair);
@@ -590,8 +594,8 @@ impl<'a> FlankContact<'a> {
             .collect()
     }
 
-    /// Largest pressure of a pair, MPa, by its force and the shape of its gap ([`super::contact_modulus_mpa`]); where the load along the face is
-    /// largest. Nothing of a pair that is open.
+    /// Largest pressure of a pair, MPa, by its force and the shape of its gap ([`super::contact_modulus_mpa`]); where
+    /// the load along the face is largest. Nothing of a pair that is open.
     pub fn peak_pressure_mpa(
         &self,
         pair: FlankPair,
@@ -612,8 +616,8 @@ impl<'a> FlankContact<'a> {
         peak_pressure_mpa(&places, bearing.peak_over_mean, modulus_mpa, least_radius)
     }
 
-    /// Gap of every integration point where the face is nearest, how it changes as the output alone turns (mm/rad), and its weight; with
-    /// the offsets along the face, where there are any.
+    /// Gap of every integration point where the face is nearest, how it changes as the output alone turns (mm/rad), and
+    /// its weight; with the offsets along the face, where there are any.
     pub fn gaps(
         &self,
         pair: FlankPair,
@@ -937,7 +941,8 @@ mod tests {
         });
     }
 
-    /// Forces and their tangent of a pair that bears on part of its face: by its nodes, by the output angle, and by a slope along the face.
+    /// Forces and their tangent of a pair that bears on part of its face: by its nodes, by the output angle, and by a
+    /// slope along the face.
     #[test]
     fn the_tangent_of_an_uneven_face_is_the_slope_of_its_forces() {
         with_flanks(|flanks, fs, cs| {

@@ -1,18 +1,22 @@
-//! The pressure between two flanks from the force that they bear with and the shape of their gap: what a penalty cannot say.
+//! The pressure between two flanks from the force that they bear with and the shape of their gap: what a penalty cannot
+//! say.
 //!
-//! The pressure of a penalty law is as high as the penalty is stiff where flanks bear with a corner: only the force is a result, and where it
-//! acts. Two elastic bodies that touch along a line with a gap `x²/(2R)` and bear with F' for the width press one another with
+//! The pressure of a penalty law is as high as the penalty is stiff where flanks bear with a corner: only the force is
+//! a result, and where it acts. Two elastic bodies that touch along a line with a gap `x²/(2R)` and bear with F' for
+//! the width press one another with
 //!
 //! `p0 = sqrt(F' E* / (π R))`, `1/E* = (1 - ν²)/E + (1 - ν²)/E`
 //!
-//! at most (Hertz; Johnson, Contact Mechanics, 1985, chapter 4). A gap that is no parabola, as beside the joint of flank and tip rounding, which
-//! has a radius on one side and hardly any curvature on the other, has no such closed form. It is taken for a foundation (Johnson, section 4.3)
-//! whose stiffness for the length is E* over half the width of contact b,
+//! at most (Hertz; Johnson, Contact Mechanics, 1985, chapter 4). A gap that is no parabola, as beside the joint of
+//! flank and tip rounding, which has a radius on one side and hardly any curvature on the other, has no such closed
+//! form. It is taken for a foundation (Johnson, section 4.3) whose stiffness for the length is E* over half the width
+//! of contact b,
 //!
 //! `p = c (E*/b) <L - g(x)>`, `∫ p dx = F'`,
 //!
-//! with L found from the force, and `c = 8/(3π)`, for which a parabola has the p0 of Hertz exactly. *The rest is derived here:* the foundation
-//! has no more length in it than the gap, so that drives that are one another's image at another scale have the same pressures.
+//! with L found from the force, and `c = 8/(3π)`, for which a parabola has the p0 of Hertz exactly. *The rest is
+//! derived here:* the foundation has no more length in it than the gap, so that drives that are one another's image at
+//! another scale have the same pressures.
 
 /// For which a parabola has the pressure of Hertz.
 const FOUNDATION: f64 = 8.0 / (3.0 * std::f64::consts::PI);
@@ -34,10 +38,11 @@ pub fn contact_modulus_mpa(youngs_modulus_mpa: f64, poissons_ratio: f64) -> f64 
     0.5 * youngs_modulus_mpa / (1.0 - poissons_ratio * poissons_ratio)
 }
 
-/// Largest pressure of flanks that bear at these places, in growing arc, with so many times the force; MPa. Where they bear in several places,
-/// as at both of their tips, each is a contact of its own, up to where the gap between them is widest.
-/// `least_radius` (mm) is that of both roundings together, tip on tip: no gap is more curved, and no pressure larger than what Hertz has with it.
-/// It counts where flanks bear on a rounding beyond the last of the places, where a gap seems to end in an edge.
+/// Largest pressure of flanks that bear at these places, in growing arc, with so many times the force; MPa. Where they
+/// bear in several places, as at both of their tips, each is a contact of its own, up to where the gap between them is
+/// widest. `least_radius` (mm) is that of both roundings together, tip on tip: no gap is more curved, and no pressure
+/// larger than what Hertz has with it. It counts where flanks bear on a rounding beyond the last of the places, where a
+/// gap seems to end in an edge.
 pub(super) fn peak_pressure_mpa(places: &[Place], times: f64, modulus_mpa: f64, least_radius: f64) -> f64 {
     let bears = |k: usize| places[k].force > 0.0;
     // The first and the last place of each contact.

@@ -1,7 +1,8 @@
 //! A smooth curve of circular arcs: what a flank without a closed form is kept as.
 //!
-//! Two arcs lead from one point and direction to the next (a biarc: Bolton 1975, "Biarc curves", Computer-Aided Design 7), so that the
-//! direction never jumps. The distance from a point to an arc is a closed form; which arc is nearest is a search over the joints.
+//! Two arcs lead from one point and direction to the next (a biarc: Bolton 1975, "Biarc curves", Computer-Aided Design
+//! 7), so that the direction never jumps. The distance from a point to an arc is a closed form; which arc is nearest is
+//! a search over the joints.
 
 /// One arc; straight where its curvature is zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,8 +17,8 @@ struct Arc {
     length: f64,
 }
 
-/// Arcs one after the other, each beginning where the one before ends and in its direction. Beyond its ends the chain goes on as the
-/// first and the last arc do.
+/// Arcs one after the other, each beginning where the one before ends and in its direction. Beyond its ends the chain
+/// goes on as the first and the last arc do.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ArcChain {
     arcs: Vec<Arc>,
@@ -176,15 +177,16 @@ impl ArcChain {
         self.arc(s).curvature
     }
 
-    /// Foot of a point that is nearer to the chain than its radii of curvature: the first arc whose end the point does not lie beyond.
+    /// Foot of a point that is nearer to the chain than its radii of curvature: the first arc whose end the point does
+    /// not lie beyond.
     pub fn foot(&self, p: [f64; 2]) -> ChainFoot {
         let beyond = |arc: &Arc| dot(minus(p, arc.start), arc.tangent) > 0.0;
         let after = 1 + self.arcs[1..].partition_point(beyond);
         self.arcs[after - 1].foot(p)
     }
 
-    /// Arc length at a distance from the origin, for a chain on which that distance grows; where its ends going on do not reach so far,
-    /// as near as they come.
+    /// Arc length at a distance from the origin, for a chain on which that distance grows; where its ends going on do
+    /// not reach so far, as near as they come.
     pub fn arc_at_radius(&self, radius: f64) -> f64 {
         let within = |arc: &Arc| dot(arc.start, arc.start) <= radius * radius;
         let arc = &self.arcs[self.arcs.partition_point(within).saturating_sub(1)];

@@ -3,25 +3,26 @@
 //! Conventions, the same for all:
 //!
 //! * µm and degrees; angles count counter-clockwise **on the body of the part**: on the flexspline from tooth 0, on the
-//!   circular spline from space 0 (so they turn with the output), on the generator from its major axis (so they turn with
-//!   the generator), in the housing from where the major axis stands at generator angle zero.
+//!   circular spline from space 0 (so they turn with the output), on the generator from its major axis (so they turn
+//!   with the generator), in the housing from where the major axis stands at generator angle zero.
 //! * A harmonic is `amplitude cos(order (angle - phase))`: its phase is the angle of a crest.
 //! * A position error counts counter-clockwise, as an arc at half the height of the teeth.
 //! * Sizes hold at every temperature: 10 µm grow by 5 nm in 50 K.
 //!
 //! # How they enter the model
 //!
-//! All of them but one are exact offsets of the surfaces in contact, against meshes that stay nominal: teeth and spaces are
-//! displaced and turned as rigid bodies ([`super::FlankDeviations`]), a worn flank lies deeper along its normal, the outline of
-//! the generator is displaced and deformed ([`super::GeneratorOutline`]), the axis of the circular spline stands beside that of
-//! the housing. What the mesh then misses is the change of stiffness by a change of shape, and that is small: a tooth is 0.8 mm
-//! thick and gives way by 1 to 2 µm at rated load, so that 5 µm of shape are below a hundredth of nearly nothing. Measured (cam,
-//! coarse mesh, `tests/as_built.rs`): 5 µm taken off every flank, once as an offset and once in the mesh, leave the output 0.02″
-//! apart at 2 N·m and 0.04″ apart at 100 N·m, where it stands at 78″. Thickness of the rim is the exception: it bends with the
-//! cube, 10 µm of 1.2 mm is 2.5 %. It goes into the mesh, sector by sector ([`RimVariation`]).
+//! All of them but one are exact offsets of the surfaces in contact, against meshes that stay nominal: teeth and spaces
+//! are displaced and turned as rigid bodies ([`super::FlankDeviations`]), a worn flank lies deeper along its normal,
+//! the outline of the generator is displaced and deformed ([`super::GeneratorOutline`]), the axis of the circular
+//! spline stands beside that of the housing. What the mesh then misses is the change of stiffness by a change of shape,
+//! and that is small: a tooth is 0.8 mm thick and gives way by 1 to 2 µm at rated load, so that 5 µm of shape are below
+//! a hundredth of nearly nothing. Measured (cam, coarse mesh, `tests/as_built.rs`): 5 µm taken off every flank, once as
+//! an offset and once in the mesh, leave the output 0.02″ apart at 2 N·m and 0.04″ apart at 100 N·m, where it stands at
+//! 78″. Thickness of the rim is the exception: it bends with the cube, 10 µm of 1.2 mm is 2.5 %. It goes into the mesh,
+//! sector by sector ([`RimVariation`]).
 //!
-//! An imperfect drive does not repeat from tooth to tooth any more. What still does, with period `2 pi / z_f` in the generator
-//! angle: any generator (a constant shape), uniform wear, a difference in temperature.
+//! An imperfect drive does not repeat from tooth to tooth any more. What still does, with period `2 pi / z_f` in the
+//! generator angle: any generator (a constant shape), uniform wear, a difference in temperature.
 
 use super::spec::Drive;
 use crate::toml_file::Problem;
@@ -35,24 +36,25 @@ pub struct AsBuilt {
     pub circular_spline_eccentricity_um: f64,
     /// Whereto, degrees on the circular spline.
     pub circular_spline_eccentricity_phase_deg: f64,
-    /// The toothing of the circular spline is pressed to an oval: amplitude of its radius, µm. The ring keeps its length: a
-    /// point moves by `a cos 2(angle - phase)` outward and `-a/2 sin 2(angle - phase)` along the ring, and the teeth turn by
-    /// `3a/(2r) sin 2(angle - phase)`.
+    /// The toothing of the circular spline is pressed to an oval: amplitude of its radius, µm. The ring keeps its
+    /// length: a point moves by `a cos 2(angle - phase)` outward and `-a/2 sin 2(angle - phase)` along the ring, and
+    /// the teeth turn by `3a/(2r) sin 2(angle - phase)`.
     pub circular_spline_ovality_um: f64,
     /// Angle of a crest of the oval, degrees on the circular spline.
     pub circular_spline_ovality_phase_deg: f64,
     /// Cumulative pitch error of the circular spline by harmonic: position error of its spaces along the pitch.
     pub circular_spline_pitch_harmonics: Vec<Harmonic>,
-    /// Position error of each space of the circular spline, µm, space 0 first; none, or one for each. Adds to the harmonics.
+    /// Position error of each space of the circular spline, µm, space 0 first; none, or one for each. Adds to the
+    /// harmonics.
     pub circular_spline_pitch_error_um: Vec<f64>,
-    /// How far the axis that the circular spline turns about stands beside the axis of the housing, about which the generator
-    /// turns, µm: misalignment, or what a side load makes of the output bearing.
+    /// How far the axis that the circular spline turns about stands beside the axis of the housing, about which the
+    /// generator turns, µm: misalignment, or what a side load makes of the output bearing.
     pub circular_spline_offset_um: f64,
     /// Whereto, degrees in the housing.
     pub circular_spline_offset_direction_deg: f64,
-    /// How far the toothing of the flexspline stands beside the axis of its bore, µm. This is its kinematic part; the wall that
-    /// is then thicker on one side is order 1 of [`AsBuilt::rim_thickness_harmonics`], which has the same kinematic part and takes
-    /// the place of this one.
+    /// How far the toothing of the flexspline stands beside the axis of its bore, µm. This is its kinematic part; the
+    /// wall that is then thicker on one side is order 1 of [`AsBuilt::rim_thickness_harmonics`], which has the same
+    /// kinematic part and takes the place of this one.
     pub flexspline_runout_um: f64,
     /// Whereto, degrees on the flexspline.
     pub flexspline_runout_phase_deg: f64,
@@ -60,17 +62,17 @@ pub struct AsBuilt {
     pub flexspline_pitch_harmonics: Vec<Harmonic>,
     /// Position error of each tooth of the flexspline, µm, tooth 0 first; none, or one for each. Adds to the harmonics.
     pub flexspline_pitch_error_um: Vec<f64>,
-    /// Thickness of the flexspline's rim by harmonic. The teeth are true, the bore is not: where the rim is thicker, the bore
-    /// stands further in.
+    /// Thickness of the flexspline's rim by harmonic. The teeth are true, the bore is not: where the rim is thicker,
+    /// the bore stands further in.
     pub rim_thickness_harmonics: Vec<Harmonic>,
     /// How far the generator stands beside the axis it turns about, µm.
     pub generator_eccentricity_um: f64,
     /// Whereto, degrees on the generator.
     pub generator_eccentricity_phase_deg: f64,
-    /// How much higher the lobe of the generator at 0° stands than the one at 180°, µm: half of it is added to the one and taken
-    /// from the other. The rollers or disc of a lobe are moved along the normal on which they were placed (for two rollers or
-    /// discs an eccentricity of half the asymmetry along the major axis); a cam takes the form `a/2 cos 3 angle`, as order 1
-    /// would be an eccentricity.
+    /// How much higher the lobe of the generator at 0° stands than the one at 180°, µm: half of it is added to the one
+    /// and taken from the other. The rollers or disc of a lobe are moved along the normal on which they were placed
+    /// (for two rollers or discs an eccentricity of half the asymmetry along the major axis); a cam takes the form
+    /// `a/2 cos 3 angle`, as order 1 would be an eccentricity.
     pub generator_lobe_asymmetry_um: f64,
     /// Form error of the cam by harmonic, along its outward normal; other generators are circles and have none.
     pub cam_form_harmonics: Vec<Harmonic>,
@@ -82,8 +84,8 @@ pub struct AsBuilt {
     pub damaged_teeth: Vec<DamagedTooth>,
     /// How much warmer the generator is than the flexspline, K.
     pub generator_warmer_k: f64,
-    /// How much warmer the circular spline, and what holds it, is than the flexspline, K. Its stiffness stays that of the drive's
-    /// temperature: 30 K are 1 % of a part that gives a tenth of the compliance.
+    /// How much warmer the circular spline, and what holds it, is than the flexspline, K. Its stiffness stays that of
+    /// the drive's temperature: 30 K are 1 % of a part that gives a tenth of the compliance.
     pub circular_spline_warmer_k: f64,
 }
 
@@ -176,9 +178,9 @@ impl AsBuilt {
             && self.circular_spline_warmer_k == 0.0
     }
 
-    /// The first field, as it stands in a file, that takes from the drive what tables of one tooth pitch and one direction are
-    /// made by: that it repeats from tooth to tooth, and that it is its own mirror image. Uniform wear and a difference in
-    /// temperature leave both.
+    /// The first field, as it stands in a file, that takes from the drive what tables of one tooth pitch and one
+    /// direction are made by: that it repeats from tooth to tooth, and that it is its own mirror image. Uniform wear
+    /// and a difference in temperature leave both.
     pub fn first_not_uniform(&self) -> Option<&'static str> {
         let acts = |harmonics: &[Harmonic]| harmonics.iter().any(|harmonic| harmonic.amplitude_um != 0.0);
         let any = |list: &[f64]| list.iter().any(|x| *x != 0.0);
@@ -294,8 +296,8 @@ fn greatest_common_divisor(a: usize, b: usize) -> usize {
     if b == 0 { a } else { greatest_common_divisor(b, a % b) }
 }
 
-/// Radial displacement, displacement along the ring and rotation of an inextensible ring of radius `radius` pressed to an oval of
-/// amplitude `amplitude`, at the angle `from_crest` from a crest.
+/// Radial displacement, displacement along the ring and rotation of an inextensible ring of radius `radius` pressed to
+/// an oval of amplitude `amplitude`, at the angle `from_crest` from a crest.
 pub(super) fn oval(amplitude: f64, radius: f64, from_crest: f64) -> (f64, f64, f64) {
     let (sin, cos) = (2.0 * from_crest).sin_cos();
     (amplitude * cos, -0.5 * amplitude * sin, 1.5 * amplitude / radius * sin)

@@ -1,9 +1,9 @@
 //! A drive from a few numbers: teeth, module, bore, width.
 //!
-//! The rest is the toothing of [`Drive::hhd_95`] in modules, whose teeth clear one another from 90 to 800 teeth. Fewer teeth leave no
-//! room at the root of the circular spline, so they are made lower there. One number has no formula: the profile shift of the circular
-//! spline, which sets the clearance. It is solved for a rigid backlash of one arc-minute, more only where teeth would interfere under
-//! one of the four generators.
+//! The rest is the toothing of [`Drive::hhd_95`] in modules, whose teeth clear one another from 90 to 800 teeth. Fewer
+//! teeth leave no room at the root of the circular spline, so they are made lower there. One number has no formula: the
+//! profile shift of the circular spline, which sets the clearance. It is solved for a rigid backlash of one arc-minute,
+//! more only where teeth would interfere under one of the four generators.
 
 use super::error::DriveError;
 use super::interference::RigidMesh;
@@ -19,7 +19,8 @@ pub struct FewNumbers {
     pub teeth: u32,
     /// Module, mm.
     pub module_mm: f64,
-    /// Diameter of the flexspline's bore, undeformed, mm; without it the rim is as thick for its radius as that of HHD-95.
+    /// Diameter of the flexspline's bore, undeformed, mm; without it the rim is as thick for its radius as that of
+    /// HHD-95.
     pub bore_mm: Option<f64>,
     /// Face width, mm; without it as wide for its diameter as HHD-95.
     pub width_mm: Option<f64>,
@@ -193,8 +194,8 @@ impl FewNumbers {
         Ok(made)
     }
 
-    /// Least profile shift of the circular spline, modules, with which the rigid backlash is at least [`BACKLASH_RAD`] and no tooth
-    /// interferes under any of the four generators.
+    /// Least profile shift of the circular spline, modules, with which the rigid backlash is at least [`BACKLASH_RAD`]
+    /// and no tooth interferes under any of the four generators.
     fn shift(&self, drive: &Drive) -> Result<f64, DriveError> {
         let report = |shift: f64, kind| {
             let mut drive = drive.clone();

@@ -87,7 +87,8 @@ pub(super) const SECTIONS: &[(&str, &str)] = &[
     ("output", "what brakes the output beside its load"),
     (
         "sleeve",
-        "what holds the rim of the flexspline: shells (hermetic: rim between two tubes; cup; hat: tube and flange), springs or nothing",
+        "what holds the rim of the flexspline: shells (hermetic: rim between two tubes; cup; hat: tube and flange), \
+         springs or nothing",
     ),
     ("flanks", "where the teeth touch"),
     ("temperature", "what warmth changes"),
@@ -198,8 +199,8 @@ impl Field {
         format!("{}; {allowed}", self.meaning)
     }
 
-    /// True if the file of this drive may leave it out: a stiffness that is not there is rigid, an imperfection that is not there
-    /// is none, and of a sleeve only the sizes that it has are needed.
+    /// True if the file of this drive may leave it out: a stiffness that is not there is rigid, an imperfection that is
+    /// not there is none, and of a sleeve only the sizes that it has are needed.
     pub fn is_optional(&self, drive: &Drive) -> bool {
         let sleeve = &drive.sleeve;
         match self.path {

@@ -49,7 +49,8 @@ impl Drive {
         self.with_sets([assignment])
     }
 
-    /// This drive with several fields changed, checked once all of them are; one text may hold several, with commas between them.
+    /// This drive with several fields changed, checked once all of them are; one text may hold several, with commas
+    /// between them.
     pub fn with_sets<'a>(&self, assignments: impl IntoIterator<Item = &'a str>) -> Result<Drive, DriveError> {
         let mut drive = self.clone();
         let mut problems = Vec::new();
@@ -246,7 +247,8 @@ impl Reader<'_> {
         };
         for (key, value) in table {
             let section = key.get_ref().as_ref();
-            // What a diagnosis found that no field holds stands in [extension], what a catalogue says in [data_sheet]: others read them.
+            // What a diagnosis found that no field holds stands in [extension], what a catalogue says in [data_sheet]:
+            // others read them.
             if ["base", "name", "extension", "data_sheet"].contains(&section) {
                 continue;
             }
@@ -417,9 +419,10 @@ mod tests {
         assert_eq!(hash.as_str(), "137827daaec6b8161369acdb8b4a3d4f1cd1392483cc42d2d990f2a92df89bd6");
         let list: Vec<String> = (0..190).map(|k| format!("{:.1}", 0.1 * f64::from(k % 7))).collect();
         let text = format!(
-            "base = \"HHD-95\"\n[as_built]\ncircular_spline_eccentricity_um = 10\ncircular_spline_pitch_error_um = [{}]\n\
-             flexspline_pitch_harmonics = [{{ order = 2, amplitude_um = 5.0, phase_deg = 30.0 }}, {{ order = 1, amplitude_um = 3 }}]\n\
-             [[as_built.damaged_teeth]]\nwheel = \"circular_spline\"\ntooth = 189\ndepth_um = 20.5\n",
+            "base = \"HHD-95\"\n[as_built]\ncircular_spline_eccentricity_um = 10\ncircular_spline_pitch_error_um = \
+             [{}]\nflexspline_pitch_harmonics = [{{ order = 2, amplitude_um = 5.0, phase_deg = 30.0 }}, {{ order = 1, \
+             amplitude_um = 3 }}]\n[[as_built.damaged_teeth]]\nwheel = \"circular_spline\"\ntooth = 189\ndepth_um = \
+             20.5\n",
             list.join(", ")
         );
         let drive = Drive::from_toml("d.toml", &text).unwrap();
@@ -505,7 +508,8 @@ mod tests {
             ),
             (
                 "[flexspline]\nmodule = 0.5",
-                "wrong.toml:3: flexspline.module: unknown key; did you mean `flexspline.module_mm`?; allowed: teeth, module_mm",
+                "wrong.toml:3: flexspline.module: unknown key; did you mean `flexspline.module_mm`?; allowed: teeth, \
+                 module_mm",
             ),
             (
                 "[flexspline]\nprofile_shift = nan",
@@ -523,7 +527,8 @@ mod tests {
             ),
             (
                 "[flexspline]\ntip_radius_mm = 48.96",
-                "wrong.toml:3: flexspline.tip_radius_mm: found 48.96: with w0_mm = 0.5 the tip would stand in the circular-spline root",
+                "wrong.toml:3: flexspline.tip_radius_mm: found 48.96: with w0_mm = 0.5 the tip would stand in the \
+                 circular-spline root",
             ),
             (
                 "[flexspline]\nrim_thickness_mm = 12",
@@ -555,7 +560,8 @@ mod tests {
             ),
             (
                 "[circular_spline]\ntip_radius_mm = 48.3",
-                "wrong.toml:3: circular_spline.tip_radius_mm: found 48.3: with w0_mm = 0.5 the tip would stand in the flexspline root",
+                "wrong.toml:3: circular_spline.tip_radius_mm: found 48.3: with w0_mm = 0.5 the tip would stand in the \
+                 flexspline root",
             ),
             (
                 "[circular_spline]\nouter_radius_mm = 49.5",
@@ -579,7 +585,8 @@ mod tests {
             ),
             (
                 "[generator]\nw0_mm = 0.05",
-                "wrong.toml:3: generator.w0_mm: found 0.05: with the two-roller generator the tips meet at the minor axis",
+                "wrong.toml:3: generator.w0_mm: found 0.05: with the two-roller generator the tips meet at the minor \
+                 axis",
             ),
             ("[generator]\nw0_mm = 3.0", "wrong.toml:3: generator.w0_mm: found 3, allowed: up to 2.3638"),
             (
@@ -592,7 +599,8 @@ mod tests {
             ),
             (
                 "[generator]\nfriction_coefficient = 0.1",
-                "wrong.toml:3: generator.friction_coefficient: unknown key; did you mean `flanks.friction_coefficient`?; allowed: w0_mm",
+                "wrong.toml:3: generator.friction_coefficient: unknown key; did you mean \
+                 `flanks.friction_coefficient`?; allowed: w0_mm",
             ),
             (
                 "[generator]\nbearing_stiffness_n_per_mm3 = 0",
@@ -600,7 +608,8 @@ mod tests {
             ),
             (
                 "[generator]\nbearing_stiffness_n_per_mm3 = \"soft\"",
-                "wrong.toml:3: generator.bearing_stiffness_n_per_mm3: found \"soft\", allowed: above 0 to 1e7 or \"rigid\"",
+                "wrong.toml:3: generator.bearing_stiffness_n_per_mm3: found \"soft\", allowed: above 0 to 1e7 or \
+                 \"rigid\"",
             ),
             (
                 "[flanks]\nfriction_coefficient = true",
@@ -640,7 +649,8 @@ mod tests {
             ),
             (
                 "[as_built]\nflexspline_runout_mm = 0.01",
-                "wrong.toml:3: as_built.flexspline_runout_mm: unknown key; did you mean `as_built.flexspline_runout_um`?",
+                "wrong.toml:3: as_built.flexspline_runout_mm: unknown key; did you mean \
+                 `as_built.flexspline_runout_um`?",
             ),
             (
                 "[as_built]\ncircular_spline_ovality_phase_deg = 400",
@@ -648,7 +658,8 @@ mod tests {
             ),
             (
                 "[as_built]\nflexspline_pitch_error_um = [1.0, 2.0]",
-                "wrong.toml:3: as_built.flexspline_pitch_error_um: found 2 numbers, allowed: none, or 188, one for each tooth",
+                "wrong.toml:3: as_built.flexspline_pitch_error_um: found 2 numbers, allowed: none, or 188, one for \
+                 each tooth",
             ),
             (
                 "[as_built]\ncircular_spline_pitch_error_um = [1.0,\n nan]",
@@ -660,7 +671,8 @@ mod tests {
             ),
             (
                 "[as_built]\nflexspline_pitch_error_um = 3.0",
-                "wrong.toml:3: as_built.flexspline_pitch_error_um: found 3.0, allowed: an array of numbers, -100 to 100 each",
+                "wrong.toml:3: as_built.flexspline_pitch_error_um: found 3.0, allowed: an array of numbers, -100 to \
+                 100 each",
             ),
             (
                 "[as_built]\nflexspline_pitch_harmonics = [{ order = 0, amplitude_um = 1.0 }]",
@@ -668,10 +680,12 @@ mod tests {
             ),
             (
                 "[as_built]\nflexspline_pitch_harmonics = [{ order = 2.5, amplitude_um = 1.0 }]",
-                "wrong.toml:3: as_built.flexspline_pitch_harmonics[0].order: found 2.5, allowed: a whole number, 1 to 1000",
+                "wrong.toml:3: as_built.flexspline_pitch_harmonics[0].order: found 2.5, allowed: a whole number, 1 to \
+                 1000",
             ),
             (
-                "[as_built]\nflexspline_pitch_harmonics = [{ order = 2, amplitude_um = 1 }, { order = 95, amplitude_um = 1 }]",
+                "[as_built]\nflexspline_pitch_harmonics = [{ order = 2, amplitude_um = 1 }, { order = 95, \
+                 amplitude_um = 1 }]",
                 "wrong.toml:3: as_built.flexspline_pitch_harmonics[1].order: found 95, allowed: 1 to 94 (two teeth",
             ),
             (
@@ -695,12 +709,14 @@ mod tests {
                 "wrong.toml:3: as_built.cam_form_harmonics[0]: found 2, allowed: { order, amplitude_um, phase_deg }",
             ),
             (
-                "[as_built]\nrim_thickness_harmonics = [{ order = 2, amplitude_um = 150 }, { order = 3, amplitude_um = 100 }]",
+                "[as_built]\nrim_thickness_harmonics = [{ order = 2, amplitude_um = 150 }, { order = 3, amplitude_um \
+                 = 100 }]",
                 "wrong.toml:3: as_built.rim_thickness_harmonics: found 250.0 µm in all, allowed: up to 240.0 µm",
             ),
             (
                 "[as_built]\ndamaged_teeth = [{ wheel = \"generator\", tooth = 1, depth_um = 1 }]",
-                "wrong.toml:3: as_built.damaged_teeth[0].wheel: found \"generator\", allowed: \"flexspline\", \"circular_spline\"",
+                "wrong.toml:3: as_built.damaged_teeth[0].wheel: found \"generator\", allowed: \"flexspline\", \
+                 \"circular_spline\"",
             ),
             (
                 "[as_built]\ndamaged_teeth = [{ wheel = \"flexspline\", tooth = 188, depth_um = 1 }]",
@@ -723,17 +739,20 @@ mod tests {
             ),
             (
                 "[sleeve]\nkind = \"bellows\"",
-                "wrong.toml:3: sleeve.kind: found \"bellows\", allowed: \"hermetic\", \"cup\", \"hat\", \"springs\", \"none\"",
+                "wrong.toml:3: sleeve.kind: found \"bellows\", allowed: \"hermetic\", \"cup\", \"hat\", \"springs\", \
+                 \"none\"",
             ),
             (
                 "[sleeve]\nkind = \"hermetc\"",
-                "wrong.toml:3: sleeve.kind: found \"hermetc\", allowed: \"hermetic\", \"cup\", \"hat\", \"springs\", \"none\"; did you mean `hermetic`?",
+                "wrong.toml:3: sleeve.kind: found \"hermetc\", allowed: \"hermetic\", \"cup\", \"hat\", \"springs\", \
+                 \"none\"; did you mean `hermetic`?",
             ),
             ("[sleeve]\nflange = 2", "wrong.toml:3: sleeve.flange: found 2, allowed: \"rigid\", \"diaphragm\""),
             ("[sleeve]\nwall_mm = 0", "wrong.toml:3: sleeve.wall_mm: found 0, allowed: above 0 to 100"),
             (
                 "[sleeve]\nkind = \"cup\"\nwall_mm = 5",
-                "wrong.toml:4: sleeve.wall_mm: found 5, allowed: up to 4.7275 (a tenth of the neutral radius: a thin shell)",
+                "wrong.toml:4: sleeve.wall_mm: found 5, allowed: up to 4.7275 (a tenth of the neutral radius: a thin \
+                 shell)",
             ),
             (
                 "[sleeve]\nkind = \"hermetic\"\nflange_side_mm = 0.9",
@@ -749,7 +768,8 @@ mod tests {
             ),
             (
                 "[sleeve]\nkind = \"none\"\ntorsion_stiffness_n_m_per_rad = 4.6e5",
-                "wrong.toml:4: sleeve.torsion_stiffness_n_m_per_rad: found 460000, allowed with kind = \"none\": \"rigid\"",
+                "wrong.toml:4: sleeve.torsion_stiffness_n_m_per_rad: found 460000, allowed with kind = \"none\": \
+                 \"rigid\"",
             ),
             (
                 "[sleeve]\nkind = \"cup\"\nbottom = \"plate\"\nbottom_thickness_mm = 20",
@@ -785,7 +805,8 @@ mod tests {
         let message = Drive::from_toml("d.toml", "base = \"HHD95\"").unwrap_err().to_string();
         assert_eq!(
             message,
-            "d.toml:1: base: found \"HHD95\", allowed: HHD-95, HHD-95-typical, CUP-95, HHD-95-hermetic, HHD-95-plane, S-95; did you mean `HHD-95`?"
+            "d.toml:1: base: found \"HHD95\", allowed: HHD-95, HHD-95-typical, CUP-95, HHD-95-hermetic, HHD-95-plane, \
+             S-95; did you mean `HHD-95`?"
         );
         let message = Drive::from_toml("d.toml", "base = 95").unwrap_err().to_string();
         assert_eq!(message, "d.toml:1: base: found 95, allowed: a string");
@@ -798,14 +819,15 @@ mod tests {
             Drive::from_toml("e.toml", &text.replace("rim_thickness_mm", "# ").replace("w0_mm", "# ")).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "e.toml: flexspline.rim_thickness_mm: missing (rim under the root circle, mm); give it, or a base = \"HHD-95\" \
-             to start from\ne.toml: generator.w0_mm: missing (radial displacement of the neutral layer on the major axis, \
-             outward, mm); give it, or a base = \"HHD-95\" to start from"
+            "e.toml: flexspline.rim_thickness_mm: missing (rim under the root circle, mm); give it, or a base = \
+             \"HHD-95\" to start from\ne.toml: generator.w0_mm: missing (radial displacement of the neutral layer on \
+             the major axis, outward, mm); give it, or a base = \"HHD-95\" to start from"
         );
         let empty = Drive::from_toml("f.toml", "").unwrap_err();
         let count = |of: &dyn Fn(&Field) -> bool| fields::ALL.iter().filter(|field| of(field)).count();
         let optional = count(&|field| field.is_optional(&Drive::hhd_95()));
-        // Two stiffnesses that may be rigid, what springs have not, what straight teeth have not, and what involutes have not.
+        // Two stiffnesses that may be rigid, what springs have not, what straight teeth have not, and what involutes
+        // have not.
         let not_there = [Field::is_imperfection, Field::is_of_shells, Field::is_of_the_face, Field::is_of_the_profile];
         assert_eq!(optional, 2 + not_there.iter().map(|of| count(&|field| of(field))).sum::<usize>());
         assert_eq!(empty.problems.len(), fields::ALL.len() - optional);

@@ -1,8 +1,8 @@
 //! The active flank of a tooth as a distance field: the flank and its tip rounding, in closed form.
 //!
-//! Parallel curves of an involute are the same involute turned about the base circle, so the distance of a point at polar
-//! `(rho, theta)` is `r_b (H(rho) - theta)` with `H(rho)` the half angle of the flank at radius rho: exact, without a search.
-//! An S-shaped flank is a chain of arcs, and the distance that to the nearest of them.
+//! Parallel curves of an involute are the same involute turned about the base circle, so the distance of a point at
+//! polar `(rho, theta)` is `r_b (H(rho) - theta)` with `H(rho)` the half angle of the flank at radius rho: exact,
+//! without a search. An S-shaped flank is a chain of arcs, and the distance that to the nearest of them.
 
 use super::arcs::ArcChain;
 use super::tooth::{FlankShape, PieceKind, ToothFlank};
@@ -64,7 +64,8 @@ pub struct Foot {
     pub radius: f64,
     /// d(radius)/d(arc length) at the foot along the tangent.
     pub radius_rate: f64,
-    /// Arc length of the foot along the flank, growing with the tangent, mm (of an involute zero where it leaves its base circle).
+    /// Arc length of the foot along the flank, growing with the tangent, mm (of an involute zero where it leaves its
+    /// base circle).
     pub arc: f64,
 }
 
@@ -87,8 +88,8 @@ impl Involute {
         [radius * c, radius * s]
     }
 
-    /// The facet at an arc length, if there are facets and it lies on them: arc lengths of its ends, and the radius of curvature of
-    /// the involute half way.
+    /// The facet at an arc length, if there are facets and it lies on them: arc lengths of its ends, and the radius of
+    /// curvature of the involute half way.
     fn facet(&self, arc: f64) -> Option<([f64; 2], f64)> {
         let count = f64::from(self.facets?);
         let [a, b] = self.ends;
@@ -101,8 +102,8 @@ impl Involute {
         Some((ends, (self.base_radius * (ends[0] + ends[1])).sqrt()))
     }
 
-    /// How far the chord stands off the involute at an arc length, towards the centre of its curvature, and how that changes along
-    /// the arc. A parabola: within 2 % of the chord where one facet is the whole flank.
+    /// How far the chord stands off the involute at an arc length, towards the centre of its curvature, and how that
+    /// changes along the arc. A parabola: within 2 % of the chord where one facet is the whole flank.
     fn facet_depth(&self, arc: f64) -> (f64, f64) {
         let Some(([a, b], curvature_radius)) = self.facet(arc) else { return (0.0, 0.0) };
         (0.5 * (arc - a) * (b - arc) / curvature_radius, 0.5 * (a + b - 2.0 * arc) / curvature_radius)
@@ -115,11 +116,11 @@ impl Involute {
         [p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])]
     }
 
-    /// Length of the tangent from a point to the base circle, and signed distance of the point from the involute continued
-    /// beyond its ends.
+    /// Length of the tangent from a point to the base circle, and signed distance of the point from the involute
+    /// continued beyond its ends.
     ///
-    /// `r_b (H(rho) - theta)`, `H = half_base - roll + atan roll`, the two arc tangents taken as one of a small argument:
-    /// `atan roll - theta = atan(middle) + atan z`.
+    /// `r_b (H(rho) - theta)`, `H = half_base - roll + atan roll`, the two arc tangents taken as one of a small
+    /// argument: `atan roll - theta = atan(middle) + atan z`.
     #[inline]
     fn distance(&self, p: [f64; 2]) -> (f64, f64) {
         let rho_squared = p[0] * p[0] + p[1] * p[1];
@@ -240,7 +241,8 @@ impl ActiveFlank {
         }
     }
 
-    /// What facets add to the material of a space at most beyond the curve that [`ActiveFlank::least_distance`] is from, mm.
+    /// What facets add to the material of a space at most beyond the curve that [`ActiveFlank::least_distance`] is
+    /// from, mm.
     pub fn deepest_facet(&self) -> f64 {
         match &self.curve {
             Curve::Involute(involute) => involute
@@ -300,8 +302,8 @@ impl ActiveFlank {
         [0, 1].map(|k| (self.junction[k] - self.rounding_centre[k]) / self.rounding_radius)
     }
 
-    /// Signed distance of a point from the flank of a space continued beyond its ends. A tip rounding lies behind it: the distance to
-    /// the flank with its rounding is at least this.
+    /// Signed distance of a point from the flank of a space continued beyond its ends. A tip rounding lies behind it:
+    /// the distance to the flank with its rounding is at least this.
     #[inline]
     pub fn least_distance(&self, p: [f64; 2]) -> f64 {
         match &self.curve {

@@ -4,10 +4,10 @@
 //! the bore it is meant to make. The cam is that curve; the rollers and discs are circles placed against it. All are
 //! evaluated analytically, never as facets. The outline is symmetric about both axes.
 //!
-//! As built ([`super::AsBuilt`]) it may stand beside the axis it turns about, one lobe may be higher than the other, and a cam
-//! may have a form error `d(angle)` along its normal, the angle being that of the foot on the neutral curve. The distance to
-//! such a cam is `distance - d(angle of the foot)`, which leaves out the square of the slope of `d`: 10 µm at order 8 have a slope
-//! of 2e-3.
+//! As built ([`super::AsBuilt`]) it may stand beside the axis it turns about, one lobe may be higher than the other,
+//! and a cam may have a form error `d(angle)` along its normal, the angle being that of the foot on the neutral curve.
+//! The distance to such a cam is `distance - d(angle of the foot)`, which leaves out the square of the slope of `d`: 10
+//! µm at order 8 have a slope of 2e-3.
 
 use super::as_built::{Harmonic, direction};
 use super::error::DriveError;
@@ -57,8 +57,8 @@ fn form_error(form: &[Harmonic], angle: f64) -> [f64; 3] {
 pub struct OutlineFoot {
     /// Signed distance from outline to point, mm: positive outside (a gap), negative inside (interference).
     pub distance: f64,
-    /// Unit outward normal of the outline at the foot: the gradient of the distance. That of a cam with a form error is longer by
-    /// half the square of its slope, 1e-6.
+    /// Unit outward normal of the outline at the foot: the gradient of the distance. That of a cam with a form error is
+    /// longer by half the square of its slope, 1e-6.
     pub normal: [f64; 2],
     /// Curvature of the outline at the foot, 1/mm, positive where convex.
     pub curvature: f64,
@@ -154,8 +154,8 @@ impl GeneratorOutline {
         &self.neutral
     }
 
-    /// Circle centre in the first quadrant (or on the axis), from the centre of the outline, and the radius, mm; `None` for the
-    /// cam.
+    /// Circle centre in the first quadrant (or on the axis), from the centre of the outline, and the radius, mm; `None`
+    /// for the cam.
     pub fn circle(&self) -> Option<([f64; 2], f64)> {
         match self.contour {
             Contour::Cam { .. } => None,
@@ -235,9 +235,9 @@ impl GeneratorOutline {
         }
     }
 
-    /// Sine and cosine of the polar angle of the point of the neutral curve closest to `(px, py)`: the cam is parallel to it, so
-    /// the foot on the cam has the same normal. Newton from the direction of the point, which at the bore is off by 3e-4 rad; if it
-    /// strays (points near the centre), a scan and bisection.
+    /// Sine and cosine of the polar angle of the point of the neutral curve closest to `(px, py)`: the cam is parallel
+    /// to it, so the foot on the cam has the same normal. Newton from the direction of the point, which at the bore is
+    /// off by 3e-4 rad; if it strays (points near the centre), a scan and bisection.
     fn foot_on_neutral(&self, px: f64, py: f64) -> (f64, f64) {
         let rho = (px * px + py * py).sqrt();
         let mut foot = (py / rho, px / rho);

@@ -1,16 +1,17 @@
 //! Do the teeth clear one another, and by how much? Rigid teeth on the exactly inextensible neutral curve.
 //!
 //! The generator turns under a fixed flexspline, so in the generator frame a flexspline tooth of material angle `phi`
-//! sits at [`NeutralCurve::position`], its axis along the normal, and the circular-spline space it belongs to has its axis
-//! at `phi z_f / z_c`. The mesh therefore depends on `phi` alone: each tooth goes through the whole cycle
+//! sits at [`NeutralCurve::position`], its axis along the normal, and the circular-spline space it belongs to has its
+//! axis at `phi z_f / z_c`. The mesh therefore depends on `phi` alone: each tooth goes through the whole cycle
 //! `-pi/2..pi/2` as the generator turns half a turn, tooth `k` being at `phi = 2 pi k / z_f - psi`.
 //!
 //! The gap at a point of the flexspline flank is the angle, seen from the axis, to the flank of the space at the same
 //! radius, fillets and roundings of both wheels included; positive is open. Turning the circular spline by `e` changes
 //! every gap by exactly `e`, so the least gap on each side is what it can turn: their sum is the rigid backlash.
 //!
-//! Not covered: a preload of the flanks ([`super::Flanks::preload_um`]), elastic deflection, imperfections ([`super::AsBuilt`]; these are the nominal teeth), and tips meeting roots
-//! radially ([`super::Drive::check`] asks for clearance there).
+//! Not covered: a preload of the flanks ([`super::Flanks::preload_um`]), elastic deflection, imperfections
+//! ([`super::AsBuilt`]; these are the nominal teeth), and tips meeting roots radially ([`super::Drive::check`] asks for
+//! clearance there).
 
 use super::as_built::{direction, sum_at};
 use super::error::DriveError;
@@ -27,8 +28,9 @@ use std::fmt;
 const CYCLE_STEPS: usize = 720;
 /// Points tried on each piece of a flank before refining.
 const PIECE_STEPS: usize = 12;
-/// Places over a turn of the output at which teeth as built are looked at: some twenty in each turn of the generator of a drive of ratio 100
-/// (and no whole number of them, so that each turn is seen in others), where errors of teeth and axes change little between two.
+/// Places over a turn of the output at which teeth as built are looked at: some twenty in each turn of the generator of
+/// a drive of ratio 100 (and no whole number of them, so that each turn is seen in others), where errors of teeth and
+/// axes change little between two.
 const PLACES: usize = 1999;
 /// Generator angles within one tooth pitch at which the backlash is taken.
 const PITCH_STEPS: usize = 24;
@@ -160,8 +162,8 @@ pub struct MeshReport {
 }
 
 impl RigidMesh {
-    /// Overlap that is none, mm: S-shaped flanks are drawn to touch without clearance, and are kept to some nanometres. A guess, far above
-    /// these and far below what an error of manufacture is.
+    /// Overlap that is none, mm: S-shaped flanks are drawn to touch without clearance, and are kept to some nanometres.
+    /// A guess, far above these and far below what an error of manufacture is.
     pub const TOUCHES_MM: f64 = 1e-4;
 
     /// The mesh of `drive` with the generator of `kind`.
@@ -295,9 +297,10 @@ impl RigidMesh {
 
     /// What the teeth as built leave the output to turn at the tightest place of a whole turn of it, the teeth rigid.
     ///
-    /// Errors of teeth, spaces, axes, rim and generator move each tooth against its space, to first order: the least gap of the drawing,
-    /// [`RigidMesh::gap`], opens and closes by what the motion has along the normal of the flank. A turn of the output is looked at in
-    /// 1999 places. Missing where the teeth never meet.
+    /// Errors of teeth, spaces, axes, rim and generator move each tooth against its space, to first order: the least
+    /// gap of the drawing,
+    /// [`RigidMesh::gap`], opens and closes by what the motion has along the normal of the flank. A turn of the output
+    /// is looked at in 1999 places. Missing where the teeth never meet.
     pub fn room_as_built(&self, drive: &Drive, generator: GeneratorKind) -> Option<Room> {
         let moved = FlankDeviations::new(drive);
         let built = &drive.as_built;
@@ -315,7 +318,8 @@ impl RigidMesh {
             let psi = TAU * ratio * place as f64 / PLACES as f64;
             let mut room = [f64::INFINITY; 2];
             for (tooth, at) in moved.teeth.iter().enumerate() {
-                // The tooth in the generator's frame, and the lobe that it is with: with every lobe it has passed it is a space further.
+                // The tooth in the generator's frame, and the lobe that it is with: with every lobe it has passed it is
+                // a space further.
                 let phi = TAU * tooth as f64 / teeth as f64 - psi;
                 let lobe = (phi / PI).round();
                 let space = (tooth as i64 + lobe as i64).rem_euclid(spaces as i64) as usize;
@@ -417,8 +421,9 @@ mod tests {
         RigidMesh::new(drive, kind).unwrap().report(kind).unwrap()
     }
 
-    /// An ideal drive has the room of its backlash at the tightest phase. A spline beside its axis, or an oval one, presses teeth into their spaces: the room
-    /// falls by twice what the flank's lean makes of the displacement, or more; wear opens it by its depth on both flanks of both wheels.
+    /// An ideal drive has the room of its backlash at the tightest phase. A spline beside its axis, or an oval one,
+    /// presses teeth into their spaces: the room falls by twice what the flank's lean makes of the displacement, or
+    /// more; wear opens it by its depth on both flanks of both wheels.
     #[test]
     fn teeth_as_built_leave_less_room_and_worn_ones_more() {
         let room = |set: &str| {
@@ -433,7 +438,8 @@ mod tests {
         assert!(worn - ideal > 2.0 * 5e-3 / 49.0 && worn - ideal < 2.4 * 5e-3 / 49.0, "{worn} {ideal}");
         let [near, far] = [5.0, 40.0].map(|um| room(&format!("as_built.circular_spline_eccentricity_um={um}")));
         assert!(near < ideal && far < 0.0 && far < near, "{ideal} {near} {far}");
-        // The room is the least of many that are straight in the displacement: it falls in proportion, or faster once another tooth is tightest.
+        // The room is the least of many that are straight in the displacement: it falls in proportion, or faster once
+        // another tooth is tightest.
         let faster = (far - ideal) / (near - ideal);
         assert!((8.0 - 1e-6..12.0).contains(&faster), "{ideal} {near} {far}");
         assert!(room("as_built.circular_spline_ovality_um=20") < ideal);

@@ -118,8 +118,8 @@ impl NeutralCurve {
         alpha.copysign(p) + PI * turns
     }
 
-    /// Place of the material point at undeformed angle `phi`, and the direction angle of the outward normal there; exact
-    /// arc length, any real `phi`. The rotation of the material is `normal_angle - phi`.
+    /// Place of the material point at undeformed angle `phi`, and the direction angle of the outward normal there;
+    /// exact arc length, any real `phi`. The rotation of the material is `normal_angle - phi`.
     pub fn position(&self, phi: f64) -> ([f64; 2], f64) {
         let alpha = self.polar_angle(phi);
         let [r, dr, _] = self.polar(alpha);

@@ -1,8 +1,8 @@
 //! Where the flanks of an as-built drive stand beside those of the ideal one.
 //!
-//! Teeth and spaces are rigid bodies of their own here: each is turned about the axis of its wheel and then displaced, in the
-//! frame that has the axis of the ideal tooth or space along +x. What is worn or broken off a flank opens the gap along the
-//! normal: the parallel of an involute at that depth.
+//! Teeth and spaces are rigid bodies of their own here: each is turned about the axis of its wheel and then displaced,
+//! in the frame that has the axis of the ideal tooth or space along +x. What is worn or broken off a flank opens the
+//! gap along the normal: the parallel of an involute at that depth.
 
 use super::as_built::{DamagedFlank, Wheel, direction, oval, sum_at};
 use super::interference::Side;
@@ -68,8 +68,8 @@ pub struct FlankDeviations {
     pub tooth_depth: Vec<[f64; 2]>,
     /// Depth missing on the plus and the minus flank of each circular-spline space, mm; a preload is depth too much.
     pub space_depth: Vec<[f64; 2]>,
-    /// Axis that the circular spline turns about, in the housing, mm. Its torque is the moment about this axis: that of its own
-    /// bearing.
+    /// Axis that the circular spline turns about, in the housing, mm. Its torque is the moment about this axis: that of
+    /// its own bearing.
     pub axis: [f64; 2],
     /// No point of a flank stands further beside its ideal place than this, mm; both wheels and the axis together.
     pub largest: f64,

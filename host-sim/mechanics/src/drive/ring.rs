@@ -6,7 +6,8 @@
 //! concentrated radial forces, where `w'''` jumps; `w''` is continuous everywhere.
 //!
 //! Source: inextensional bending of a thin curved bar with circular axis, S. Timoshenko and J. Gere, *Theory of Elastic
-//! Stability*, ch. 7, solved for the loads of each generator; `crate::reference` adds forces and moments and tests both.
+//! Stability*, ch. 7, solved for the loads of each generator; `crate::reference` adds forces and moments and tests
+//! both.
 
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -50,8 +51,9 @@ impl GeneratorKind {
         }
     }
 
-    /// Largest load (N m) that tables, kernels and closed loops are made for unless told otherwise: up to where the model holds
-    /// with the rim of HHD-95. Rollers leave the rim unsupported: beyond these loads teeth slip or no equilibrium is found.
+    /// Largest load (N m) that tables, kernels and closed loops are made for unless told otherwise: up to where the
+    /// model holds with the rim of HHD-95. Rollers leave the rim unsupported: beyond these loads teeth slip or no
+    /// equilibrium is found.
     pub const fn rated_torque_n_m(self) -> f64 {
         match self {
             Self::TwoRoller => 20.0,

@@ -1,18 +1,21 @@
 //! S-shaped teeth: flanks of which a long part bears at once.
 //!
-//! A tooth of the flexspline goes in and out of its space on a path `c(theta)`. Where both wheels were racks it would be
+//! A tooth of the flexspline goes in and out of its space on a path `c(theta)`. Where both wheels were racks it would
+//! be
 //!
 //! `x = m (theta - k sin theta)/2,  y = k m (1 - cos theta)`,
 //!
-//! `theta` twice the angle from the major axis, m the pitch over pi, k = w0/m. A flank that is this path made half as large, and its
-//! counterpart turned by half a turn, touch at every `theta`: tooth and space have the path's own direction where they meet. This is
-//! the tooth of S. Ishikawa ("Tooth profile of spline of strain wave gearing", European patent 0 266 972, 1993).
+//! `theta` twice the angle from the major axis, m the pitch over pi, k = w0/m. A flank that is this path made half as
+//! large, and its counterpart turned by half a turn, touch at every `theta`: tooth and space have the path's own
+//! direction where they meet. This is the tooth of S. Ishikawa ("Tooth profile of spline of strain wave gearing",
+//! European patent 0 266 972, 1993).
 //!
-//! Here the addendum of the flexspline tooth is that half path, laid around its pitch circle. It begins where the path is steepest;
-//! below, the flank goes straight on. Teeth on a ring also tilt, by 1.5 w0/R, and their tips go a little further around than their feet:
-//! the space is therefore not the other half path, but what the tooth leaves free as it goes through its whole cycle under the cam, the
-//! neutral curve of constant length. Between `phi` of some 3 and 52 degrees the two then touch without clearance.
-//! The space is kept as a chain of arcs through points of this envelope, exact to some nanometres.
+//! Here the addendum of the flexspline tooth is that half path, laid around its pitch circle. It begins where the path
+//! is steepest; below, the flank goes straight on. Teeth on a ring also tilt, by 1.5 w0/R, and their tips go a little
+//! further around than their feet: the space is therefore not the other half path, but what the tooth leaves free as it
+//! goes through its whole cycle under the cam, the neutral curve of constant length. Between `phi` of some 3 and 52
+//! degrees the two then touch without clearance. The space is kept as a chain of arcs through points of this envelope,
+//! exact to some nanometres.
 
 use super::arcs::ArcChain;
 use super::interference::golden;
@@ -26,11 +29,12 @@ use std::f64::consts::PI;
 const NODES: usize = 24;
 /// Half the path is left where it turns over: beyond this angle its flank would lie flatter than 45 degrees.
 const LAST_THETA_DEG: f64 = 125.0;
-/// Angles of the cycle, degrees from the major axis, that are looked at for the envelope, and how many. On the other side the tooth
-/// stands behind.
+/// Angles of the cycle, degrees from the major axis, that are looked at for the envelope, and how many. On the other
+/// side the tooth stands behind.
 const CYCLE_DEG: [f64; 2] = [-10.0, 85.0];
 const CYCLE_STEPS: usize = 190;
-/// What the envelope is left before the tip of the tooth comes to its end, modules: there its direction is that of a corner.
+/// What the envelope is left before the tip of the tooth comes to its end, modules: there its direction is that of a
+/// corner.
 const BEFORE_THE_TIP: f64 = 0.02;
 
 /// The flank of the flexspline tooth in its frame, positive-angle side, in growing radius, at reference temperature.
@@ -46,8 +50,9 @@ pub(super) fn tooth(drive: &Drive) -> Result<ArcChain, Problem> {
         return Err(Problem::of(
             "flexspline.profile_shift",
             format!(
-                "found {}: with profile = \"s\" the pitch circle at {pitch_radius:.4} mm lies between root and tip circle, 0.1 module to {furthest:.4} mm \
-                 below the tip (a deflection w0 carries no higher tooth); allowed: {:.3} to {:.3}",
+                "found {}: with profile = \"s\" the pitch circle at {pitch_radius:.4} mm lies between root and tip \
+                 circle, 0.1 module to {furthest:.4} mm below the tip (a deflection w0 carries no higher tooth); \
+                 allowed: {:.3} to {:.3}",
                 f.profile_shift,
                 ((f.tip_radius_mm - furthest).max(f.root_radius_mm) - f.pitch_radius_mm()) / f.module_mm,
                 (f.tip_radius_mm - f.pitch_radius_mm()) / f.module_mm - 0.1,
@@ -75,7 +80,8 @@ pub(super) fn tooth(drive: &Drive) -> Result<ArcChain, Problem> {
     Ok(ArcChain::through(&nodes).with_lead(pitch_radius - f.root_radius_mm))
 }
 
-/// The flank of the circular-spline space in its frame, positive-angle side, in growing radius, at reference temperature.
+/// The flank of the circular-spline space in its frame, positive-angle side, in growing radius, at reference
+/// temperature.
 pub(super) fn space(drive: &Drive) -> Result<ArcChain, Problem> {
     let cycle = Cycle {
         tooth: tooth(drive)?,
@@ -115,8 +121,8 @@ struct Cycle {
 }
 
 impl Cycle {
-    /// Angle, seen in the space, at which the flank of the tooth at material angle `phi` crosses the circle of radius `r`; `None` where it
-    /// ends below.
+    /// Angle, seen in the space, at which the flank of the tooth at material angle `phi` crosses the circle of radius
+    /// `r`; `None` where it ends below.
     fn angle(&self, phi: f64, r: f64) -> Option<f64> {
         let ([x, y], normal) = self.curve.position(phi);
         let axis = phi * self.ratio;
@@ -149,7 +155,8 @@ impl Cycle {
         let refined = golden(behind, phi(widest) - step, phi(widest) + step);
         let at = if behind(refined) < behind(phi(widest)) { refined } else { phi(widest) };
         let angle = self.angle(at, r)?;
-        // Of all angles the widest does not change with phi: its slope is that of the tooth where it stands, on one side where its tip is.
+        // Of all angles the widest does not change with phi: its slope is that of the tooth where it stands, on one
+        // side where its tip is.
         let h = 1e-4;
         let slope = match (self.angle(at, r - h), self.angle(at, r + h)) {
             (Some(low), Some(high)) => (high - low) / (2.0 * h),
@@ -182,9 +189,9 @@ mod tests {
             .collect()
     }
 
-    /// Tooth and space touch from some degrees behind the major axis until the tip leaves, without clearance and without overlap; the tip of
-    /// the space's own rounding lets the tooth out. Where racks of this height bear, of `1 - cos theta = 2 h/(k m)`, `theta/(2 pi)` of all teeth
-    /// do.
+    /// Tooth and space touch from some degrees behind the major axis until the tip leaves, without clearance and
+    /// without overlap; the tip of the space's own rounding lets the tooth out. Where racks of this height bear, of
+    /// `1 - cos theta = 2 h/(k m)`, `theta/(2 pi)` of all teeth do.
     #[test]
     fn a_quarter_of_all_teeth_touch_without_clearance_and_none_overlap() {
         let gaps = clear_of(&drawn(), GeneratorKind::Cam);
@@ -205,8 +212,8 @@ mod tests {
         assert!(involute.iter().filter(|(_, gap)| *gap < tight + 5e-5).count() < 6);
     }
 
-    /// The rack that the tooth is the limit of: with more and more teeth of one size the envelope becomes the counterpart of the tooth, the
-    /// same path turned by half a turn.
+    /// The rack that the tooth is the limit of: with more and more teeth of one size the envelope becomes the
+    /// counterpart of the tooth, the same path turned by half a turn.
     #[test]
     fn of_many_teeth_the_space_is_the_tooth_turned_around() {
         let off = |teeth: u32| {
@@ -227,8 +234,8 @@ mod tests {
             drive.generator.w0_mm = w0;
             let (tooth, space) = (tooth(&drive).unwrap(), space(&drive).unwrap());
             let half_pitch = PI / f64::from(teeth);
-            // Turned about the point where both pitch circles and the middle of the flank meet, a point of the addendum of the tooth, h above
-            // its pitch circle, is one of the space h below its own.
+            // Turned about the point where both pitch circles and the middle of the flank meet, a point of the addendum
+            // of the tooth, h above its pitch circle, is one of the space h below its own.
             (1..8)
                 .map(|k| {
                     let h = 0.04 * f64::from(k);

@@ -59,7 +59,8 @@ macro_rules! choice {
 choice! {
     /// What holds the rim.
     SleeveKind {
-        /// The rim in the middle of a closed sleeve: a tube to the flange on one side, a tube with a bottom on the other.
+        /// The rim in the middle of a closed sleeve: a tube to the flange on one side, a tube with a bottom on the
+        /// other.
         Hermetic = "hermetic",
         /// The rim at the open end of a cup, whose bottom is on the shaft.
         Cup = "cup",
@@ -87,7 +88,8 @@ choice! {
     Profile {
         /// Involutes.
         Involute = "involute",
-        /// S-shaped: the path of a tooth made half as large, and the space that it leaves free on its way under the cam.
+        /// S-shaped: the path of a tooth made half as large, and the space that it leaves free on its way under the
+        /// cam.
         S = "s",
     }
 }
@@ -137,15 +139,16 @@ pub struct Sleeve {
     pub diaphragm_width_mm: f64,
     /// Radius of the hub on which the bottom of a cup is clamped, mm.
     pub hub_radius_mm: f64,
-    /// Torsional stiffness, N·m/rad, of springs in place of the sleeve, or of what holds a sleeve of shells; `None` is rigid.
+    /// Torsional stiffness, N·m/rad, of springs in place of the sleeve, or of what holds a sleeve of shells; `None` is
+    /// rigid.
     pub torsion_stiffness_n_m_per_rad: Option<f64>,
     /// Lateral stiffness of springs in place of the sleeve, N/mm; 0 leaves the rim to the generator.
     pub lateral_stiffness_n_per_mm: f64,
 }
 
 impl Default for Sleeve {
-    /// No third dimension, and the sizes of the sleeve that HHD-95 would have: 0.5 mm, 140 mm on both sides, a rigid flange. The
-    /// plate of a bottom, the diaphragm and the hub are of usual proportions.
+    /// No third dimension, and the sizes of the sleeve that HHD-95 would have: 0.5 mm, 140 mm on both sides, a rigid
+    /// flange. The plate of a bottom, the diaphragm and the hub are of usual proportions.
     fn default() -> Sleeve {
         Sleeve {
             kind: SleeveKind::Springs,

@@ -68,8 +68,8 @@ pub struct Flexspline {
     pub tip_rounding_mm: f64,
     /// How the load lies along the face; `even` takes taper, crowning and the cone of a rim in its sleeve for nothing.
     pub face: FaceLoad,
-    /// Taper of the teeth along the face, mrad; positive: they stand further in toward the open end, away from what holds the flexspline,
-    /// and further out at the other, the middle of the face being as drawn.
+    /// Taper of the teeth along the face, mrad; positive: they stand further in toward the open end, away from what
+    /// holds the flexspline, and further out at the other, the middle of the face being as drawn.
     pub taper_mrad: f64,
     /// How far both ends of the face stand back from the flank in its middle, along its normal, µm; a parabola.
     pub crowning_um: f64,
@@ -136,8 +136,8 @@ pub struct OutputLoadPath {
 pub struct Flanks {
     /// Coulomb friction coefficient.
     pub friction_coefficient: f64,
-    /// How much deeper the flanks mesh than drawn, along their normal, on both sides of each tooth, µm; positive: less clearance,
-    /// more preload.
+    /// How much deeper the flanks mesh than drawn, along their normal, on both sides of each tooth, µm; positive: less
+    /// clearance, more preload.
     pub preload_um: f64,
 }
 
@@ -232,8 +232,8 @@ impl CircularSpline {
         self.pitch_radius_mm() * self.pressure_angle_rad().cos()
     }
 
-    /// Angle between the circumference and the normal of a flank at the tip circle, where the flexspline's teeth come to bear, rad:
-    /// `cos a = r_b / r` of the involute.
+    /// Angle between the circumference and the normal of a flank at the tip circle, where the flexspline's teeth come
+    /// to bear, rad: `cos a = r_b / r` of the involute.
     pub fn bearing_flank_angle_rad(&self) -> f64 {
         (self.base_radius_mm() / self.tip_radius_mm).acos()
     }
@@ -326,24 +326,24 @@ impl Drive {
     ///   the 12.8 mm of bore and 20 mm of width of each ball is 170 N/mm³;
     /// * output drag 0.5 N·m: seals and output bearing.
     ///
-    /// Tolerances that a good workshop leaves; phases are arbitrary. ISO 1328-1 allows, for 50 to 125 mm and this module, a total
-    /// cumulative pitch deviation of 18 µm in grade 5; it is largest once or twice around, where work and cutter stand beside their
-    /// axes or the ring is clamped, and falls with the order.
+    /// Tolerances that a good workshop leaves; phases are arbitrary. ISO 1328-1 allows, for 50 to 125 mm and this
+    /// module, a total cumulative pitch deviation of 18 µm in grade 5; it is largest once or twice around, where work
+    /// and cutter stand beside their axes or the ring is clamped, and falls with the order.
     ///
-    /// * pitch of the flexspline: 4, 4 and 1.5 µm of orders 1, 2 and 3, 14 µm in all; of the circular spline 5, 4.5 and 1.5 µm,
-    ///   17 µm in all: grade 5;
-    /// * runout of the flexspline, eccentricity of the circular spline, its bearing beside the axis of the housing, the generator
-    ///   beside its axis: 3 µm each, 6 µm on a dial where grade 5 allows 15 µm. More would be taken up by the Oldham coupling, in
-    ///   which a real generator floats; here its axis is held;
+    /// * pitch of the flexspline: 4, 4 and 1.5 µm of orders 1, 2 and 3, 14 µm in all; of the circular spline 5, 4.5 and
+    ///   1.5 µm, 17 µm in all: grade 5;
+    /// * runout of the flexspline, eccentricity of the circular spline, its bearing beside the axis of the housing, the
+    ///   generator beside its axis: 3 µm each, 6 µm on a dial where grade 5 allows 15 µm. More would be taken up by the
+    ///   Oldham coupling, in which a real generator floats; here its axis is held;
     /// * ovality of the circular spline 4 µm: what bolts leave of a round ring of 53.5 mm radius and 4 mm wall;
-    /// * one lobe of the generator 3 µm higher, form of the cam 1.5 and 1 µm of orders 3 and 4, 5 µm in all: a ground cam, roundness
-    ///   of IT 4 to 5.
+    /// * one lobe of the generator 3 µm higher, form of the cam 1.5 and 1 µm of orders 3 and 4, 5 µm in all: a ground
+    ///   cam, roundness of IT 4 to 5.
     ///
-    /// Its transmission error over a turn of the output (range at 101 places, cam, coarse mesh) is 93″ at 1 N·m and 53″ at 200 N·m;
-    /// catalogues allow 60″ to 120″.
+    /// Its transmission error over a turn of the output (range at 101 places, cam, coarse mesh) is 93″ at 1 N·m and 53″
+    /// at 200 N·m; catalogues allow 60″ to 120″.
     ///
-    /// Not among them: scatter from tooth to tooth, which two dozen teeth in mesh average to below 1″, and a rim that is thicker on
-    /// one side, which runout stands for.
+    /// Not among them: scatter from tooth to tooth, which two dozen teeth in mesh average to below 1″, and a rim that
+    /// is thicker on one side, which runout stands for.
     pub fn hhd_95_typical() -> Drive {
         let mut drive = Drive::hhd_95();
         let (wall_mm, length_mm) = (0.7, 80.0);
@@ -380,7 +380,8 @@ impl Drive {
         drive
     }
 
-    /// [`Drive::hhd_95`] with its rim at the open end of a cup, as most drives have it: wall 0.7 mm, 80 mm long, a thin bottom.
+    /// [`Drive::hhd_95`] with its rim at the open end of a cup, as most drives have it: wall 0.7 mm, 80 mm long, a thin
+    /// bottom.
     pub fn cup_95() -> Drive {
         let sleeve = Sleeve {
             kind: SleeveKind::Cup,
@@ -392,7 +393,8 @@ impl Drive {
         Drive { name: "CUP-95".to_owned(), sleeve, ..Drive::hhd_95() }
     }
 
-    /// [`Drive::hhd_95`] with its rim in the middle of a closed sleeve: wall 0.5 mm, 140 mm to either side, on a rigid flange, a bottom of 2 mm.
+    /// [`Drive::hhd_95`] with its rim in the middle of a closed sleeve: wall 0.5 mm, 140 mm to either side, on a rigid
+    /// flange, a bottom of 2 mm.
     pub fn hhd_95_hermetic() -> Drive {
         let sleeve = Sleeve { kind: SleeveKind::Hermetic, bottom: Bottom::Plate, ..Sleeve::default() };
         Drive { name: "HHD-95-hermetic".to_owned(), sleeve, ..Drive::hhd_95() }
@@ -404,10 +406,10 @@ impl Drive {
         Drive { name: "HHD-95-plane".to_owned(), sleeve, ..Drive::hhd_95() }
     }
 
-    /// [`Drive::cup_95`] with S-shaped teeth, preloaded by 1 µm, on the balls of [`Drive::hhd_95_typical`]: no clearance, and a quarter of
-    /// all teeth in contact, as drives of the catalogue have. Root and tip circles are those of HHD-95; the pitch circle lies half way
-    /// along the teeth that mesh. Of the preload it is only known that drives without play have some; 1 µm is a guess, and on a rigid
-    /// generator that would be kilonewtons.
+    /// [`Drive::cup_95`] with S-shaped teeth, preloaded by 1 µm, on the balls of [`Drive::hhd_95_typical`]: no
+    /// clearance, and a quarter of all teeth in contact, as drives of the catalogue have. Root and tip circles are
+    /// those of HHD-95; the pitch circle lies half way along the teeth that mesh. Of the preload it is only known that
+    /// drives without play have some; 1 µm is a guess, and on a rigid generator that would be kilonewtons.
     pub fn s_95() -> Drive {
         let mut drive = Drive { name: "S-95".to_owned(), ..Drive::cup_95() }.with_s_teeth(1.0);
         drive.flexspline.tip_rounding_mm = 0.05;
@@ -416,7 +418,8 @@ impl Drive {
         drive
     }
 
-    /// This drive with S-shaped teeth between the same circles, preloaded; the pitch circle half way along the teeth that mesh.
+    /// This drive with S-shaped teeth between the same circles, preloaded; the pitch circle half way along the teeth
+    /// that mesh.
     pub fn with_s_teeth(mut self, preload_um: f64) -> Drive {
         let f = &mut self.flexspline;
         let meshes_from = self.circular_spline.tip_radius_mm - self.generator.w0_mm;
@@ -441,8 +444,9 @@ impl Drive {
         }
     }
 
-    /// Largest load (N m) that tables and kernels are made for unless told otherwise: that of the generator in HHD-95, with the square
-    /// of the diameter and with the width, which leaves the stresses of a drive of like shape as they are; to two digits.
+    /// Largest load (N m) that tables and kernels are made for unless told otherwise: that of the generator in HHD-95,
+    /// with the square of the diameter and with the width, which leaves the stresses of a drive of like shape as they
+    /// are; to two digits.
     pub fn rated_torque_n_m(&self, kind: GeneratorKind) -> f64 {
         let diameter = |f: &Flexspline| f.module_mm * f64::from(f.teeth);
         let (ours, like) = (&self.flexspline, Drive::hhd_95().flexspline);
@@ -458,10 +462,11 @@ impl Drive {
         zc / (zc - zf)
     }
 
-    /// The drive at another temperature (uniform, but for what [`AsBuilt`] says is warmer than the flexspline): every length of a wheel times `1 + expansion * dT` of that wheel,
-    /// Young's modulus times `1 + coefficient * dT`. The `generator` table stays as made; its outline is expanded
-    /// by [`ThermalState::generator_scale`], and the seat of the circular spline by [`ThermalState::housing_scale`].
-    /// `self` must be at reference temperature or made by this function; either way the result is for `temperature_c`.
+    /// The drive at another temperature (uniform, but for what [`AsBuilt`] says is warmer than the flexspline): every
+    /// length of a wheel times `1 + expansion * dT` of that wheel, Young's modulus times `1 + coefficient * dT`. The
+    /// `generator` table stays as made; its outline is expanded by [`ThermalState::generator_scale`], and the seat of
+    /// the circular spline by [`ThermalState::housing_scale`]. `self` must be at reference temperature or made by this
+    /// function; either way the result is for `temperature_c`.
     pub fn at_temperature(&self, temperature_c: f64) -> Drive {
         let t = &self.temperature;
         let rise = temperature_c - t.reference_c;
@@ -682,7 +687,8 @@ impl Drive {
             f.tip_radius_mm + g.w0_mm < c.root_radius_mm,
             "flexspline.tip_radius_mm",
             format!(
-                "found {}: with w0_mm = {} the tip would stand in the circular-spline root at the major axis; allowed: below {:.4}",
+                "found {}: with w0_mm = {} the tip would stand in the circular-spline root at the major axis; \
+                 allowed: below {:.4}",
                 f.tip_radius_mm,
                 g.w0_mm,
                 c.root_radius_mm - g.w0_mm
@@ -692,7 +698,8 @@ impl Drive {
             f.root_radius_mm + g.w0_mm < c.tip_radius_mm,
             "circular_spline.tip_radius_mm",
             format!(
-                "found {}: with w0_mm = {} the tip would stand in the flexspline root at the major axis; allowed: above {:.4}",
+                "found {}: with w0_mm = {} the tip would stand in the flexspline root at the major axis; allowed: \
+                 above {:.4}",
                 c.tip_radius_mm,
                 g.w0_mm,
                 f.root_radius_mm + g.w0_mm
@@ -704,8 +711,8 @@ impl Drive {
                 minor < c.tip_radius_mm,
                 "generator.w0_mm",
                 format!(
-                    "found {}: with the {kind} generator the tips meet at the minor axis (flexspline tip at {minor:.4} mm, \
-                     circular-spline tip at {} mm); allowed: a larger w0_mm or lower tips",
+                    "found {}: with the {kind} generator the tips meet at the minor axis (flexspline tip at \
+                     {minor:.4} mm, circular-spline tip at {} mm); allowed: a larger w0_mm or lower tips",
                     g.w0_mm, c.tip_radius_mm
                 ),
             );
@@ -796,9 +803,9 @@ mod tests {
         drive.as_built.cam_form_harmonics = vec![Harmonic { order: 0, amplitude_um: f64::NAN, phase_deg: 0.0 }];
         assert_eq!(
             drive.check().unwrap_err().to_string(),
-            "as_built.flexspline_pitch_error_um[7]: found inf, allowed: -100 to 100\n\
-             as_built.cam_form_harmonics[0].order: found 0, allowed: 1 to 1000\n\
-             as_built.cam_form_harmonics[0].amplitude_um: found NaN, allowed: 0 to 100"
+            "as_built.flexspline_pitch_error_um[7]: found inf, allowed: -100 to \
+             100\nas_built.cam_form_harmonics[0].order: found 0, allowed: 1 to \
+             1000\nas_built.cam_form_harmonics[0].amplitude_um: found NaN, allowed: 0 to 100"
         );
     }
 
@@ -825,8 +832,8 @@ mod tests {
         drive.material.poissons_ratio = 0.6;
         assert_eq!(
             drive.check().unwrap_err().to_string(),
-            "material.poissons_ratio: found 0.6, allowed: 0 to 0.49\n\
-             flanks.friction_coefficient: found NaN, allowed: 0 to 0.5"
+            "material.poissons_ratio: found 0.6, allowed: 0 to 0.49\nflanks.friction_coefficient: found NaN, allowed: \
+             0 to 0.5"
         );
     }
 
@@ -839,8 +846,8 @@ mod tests {
         assert_ne!(drive.hash(), drive.at_temperature(50.0).hash());
     }
 
-    /// Every field at both ends of its range, one at a time: refused with that or a related field named, or a drive whose
-    /// outlines and mesh are finite.
+    /// Every field at both ends of its range, one at a time: refused with that or a related field named, or a drive
+    /// whose outlines and mesh are finite.
     #[test]
     fn the_ends_of_every_range_are_refused_or_work() {
         let (mut refused, mut sound) = (0, 0);

@@ -1,8 +1,8 @@
 //! Outlines of the teeth: five pieces from the middle of the root land to the middle of the tip land.
 //!
-//! In the tooth frame (axis of the flexspline tooth, or of the circular-spline *space*, along +x) the half outline on the
-//! positive-angle side is, in this order, an arc of the root circle, a root fillet, the flank, a tip rounding and an
-//! arc of the tip circle. The negative side is its mirror image about the x axis.
+//! In the tooth frame (axis of the flexspline tooth, or of the circular-spline *space*, along +x) the half outline on
+//! the positive-angle side is, in this order, an arc of the root circle, a root fillet, the flank, a tip rounding and
+//! an arc of the tip circle. The negative side is its mirror image about the x axis.
 //!
 //! ```text
 //!   flexspline tooth (material below the line)       circular-spline space (material above the line)

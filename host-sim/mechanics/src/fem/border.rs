@@ -5,8 +5,9 @@
 //!   [ B^T  D ] [ z ] = [ g ]
 //! ```
 //!
-//! by block elimination: `(D - B^T A^-1 B) z = g - B^T A^-1 f`, then `x = A^-1 f - A^-1 B z`. The output angle, the mean
-//! rotation of the bore and other quantities that couple with many nodes at once enter as borders and leave A sparse.
+//! by block elimination: `(D - B^T A^-1 B) z = g - B^T A^-1 f`, then `x = A^-1 f - A^-1 B z`. The output angle, the
+//! mean rotation of the bore and other quantities that couple with many nodes at once enter as borders and leave A
+//! sparse.
 
 /// Right-hand sides that a factor takes at once.
 const MOST_COLUMNS: usize = 8;
@@ -73,7 +74,8 @@ impl BorderedSystem {
         BorderedSystem { border: border.clone(), solved, schur }
     }
 
-    /// Solves in place, with the factor it was made with: `f` becomes x, `g` becomes z. False when the small system is singular.
+    /// Solves in place, with the factor it was made with: `f` becomes x, `g` becomes z. False when the small system is
+    /// singular.
     #[must_use]
     pub fn solve(&self, factor: &mut (impl Factor + ?Sized), f: &mut [f64], g: &mut [f64]) -> bool {
         let n = f.len();

@@ -1,7 +1,7 @@
 //! Isotropic St Venant-Kirchhoff material in plane strain.
 //!
-//! `S = lambda tr(E) I + 2 mu E` with the Green-Lagrange strain `E`. For the strains of a strain wave drive (below 2e-3)
-//! this is Hooke's law under arbitrarily large rotations.
+//! `S = lambda tr(E) I + 2 mu E` with the Green-Lagrange strain `E`. For the strains of a strain wave drive (below
+//! 2e-3) this is Hooke's law under arbitrarily large rotations.
 
 /// Lamé constants in MPa.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,7 +32,8 @@ impl PlaneStrain {
         self.lambda / (2.0 * (self.lambda + self.mu))
     }
 
-    /// Von Mises stress (MPa) of the in-plane Cauchy stress `[s11, s22, s12]`; plane strain adds `s33 = nu (s11 + s22)`.
+    /// Von Mises stress (MPa) of the in-plane Cauchy stress `[s11, s22, s12]`; plane strain adds
+    /// `s33 = nu (s11 + s22)`.
     pub fn von_mises(&self, cauchy: [f64; 3]) -> f64 {
         let [s11, s22, s12] = cauchy;
         let s33 = self.poissons_ratio() * (s11 + s22);

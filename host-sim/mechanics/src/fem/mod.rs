@@ -1,5 +1,5 @@
-//! Finite elements: the element and its material; sparse linear algebra of the whole drive: pattern, assembly positions, Cholesky
-//! factor with a dense border.
+//! Finite elements: the element and its material; sparse linear algebra of the whole drive: pattern, assembly
+//! positions, Cholesky factor with a dense border.
 
 mod border;
 mod cholesky;

@@ -74,7 +74,8 @@ impl MeshLevel {
         MeshDensity { tooth_columns, space_columns, rim_rows, root_rows, fillet_elements, flank_elements }
     }
 
-    /// Density of the circular spline: a solid ring that needs little, and flanks that need as much as the load is narrow.
+    /// Density of the circular spline: a solid ring that needs little, and flanks that need as much as the load is
+    /// narrow.
     pub fn circular_spline(self) -> MeshDensity {
         let [tooth_columns, space_columns, rim_rows, root_rows, fillet_elements, flank_elements] = match self {
             MeshLevel::Coarse => [1, 1, 1, 1, 1, 2],

@@ -1,7 +1,7 @@
 //! The half sector of a wheel: three structured blocks between the tooth axis and the space axis.
 //!
-//! Blocks are mapped by transfinite interpolation (Gordon and Hall 1973) on a grid twice as fine as the elements, so that
-//! the midside nodes come out of the same mapping and lie exactly on the outline.
+//! Blocks are mapped by transfinite interpolation (Gordon and Hall 1973) on a grid twice as fine as the elements, so
+//! that the midside nodes come out of the same mapping and lie exactly on the outline.
 
 use super::density::MeshDensity;
 use crate::drive::DriveError;
@@ -10,8 +10,8 @@ use thiserror::Error;
 /// A point in the plane, mm.
 pub type Point = [f64; 2];
 
-/// The shape that a half sector is meshed from, in the frame whose +x axis is the tooth axis, the half sector lying on the
-/// side of positive angles. Radii in mm.
+/// The shape that a half sector is meshed from, in the frame whose +x axis is the tooth axis, the half sector lying on
+/// the side of positive angles. Radii in mm.
 pub struct HalfOutline<'a> {
     /// Half the angular pitch: the angle of the space axis, rad.
     pub half_pitch: f64,
@@ -89,8 +89,8 @@ fn join(first: SidePoints, second: &[Point]) -> SidePoints {
     joined
 }
 
-/// Transfinite interpolation between four sides; `bottom` and `top` run the same way, as do `left` and `right`, which lead
-/// from bottom to top.
+/// Transfinite interpolation between four sides; `bottom` and `top` run the same way, as do `left` and `right`, which
+/// lead from bottom to top.
 fn transfinite(bottom: &[Point], top: &[Point], left: &[Point], right: &[Point]) -> Vec<Vec<Point>> {
     let (nx, ny) = (bottom.len() - 1, left.len() - 1);
     let (c00, c10, c01, c11) = (bottom[0], bottom[nx], top[0], top[nx]);
@@ -197,7 +197,8 @@ impl HalfSector {
         sector
     }
 
-    /// Adds the elements of a block grid (indexed row, column at half-element spacing), with tags for right and bottom edges.
+    /// Adds the elements of a block grid (indexed row, column at half-element spacing), with tags for right and bottom
+    /// edges.
     fn add_block(
         &mut self,
         grid: &[Vec<Point>],
@@ -205,8 +206,8 @@ impl HalfSector {
         right_tag: impl Fn(usize, usize) -> Option<EdgeTag>,
         bottom_tag: impl Fn(usize) -> Option<EdgeTag>,
     ) {
-        // With the base inside the tip (external wheel) columns run with positive angle while rows run outwards: the pair is
-        // right-handed only when flipped.
+        // With the base inside the tip (external wheel) columns run with positive angle while rows run outwards: the
+        // pair is right-handed only when flipped.
         let external = outline.base_radius < outline.tip_radius;
         for j in 0..(grid.len() - 1) / 2 {
             for i in 0..(grid[0].len() - 1) / 2 {
@@ -232,7 +233,8 @@ impl HalfSector {
     }
 }
 
-/// Where the ray from `start` along the unit vector `direction` meets the circle of `radius` about the origin, nearest first.
+/// Where the ray from `start` along the unit vector `direction` meets the circle of `radius` about the origin, nearest
+/// first.
 fn line_to_circle(start: Point, direction: Point, radius: f64) -> Point {
     let b = start[0] * direction[0] + start[1] * direction[1];
     let c = start[0] * start[0] + start[1] * start[1] - radius * radius;

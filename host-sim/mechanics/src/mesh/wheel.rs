@@ -1,11 +1,12 @@
 //! A whole wheel: the half sector mirrored, and the sector repeated around the ring.
 //!
-//! Sector j of the flexspline is centred on tooth j, sector j of the circular spline on space j; sector 0 on the +x axis,
-//! numbers growing counter-clockwise. Node `k` of sector `j` has the number `j * nodes_per_sector + k` and is the rotated
-//! image of node `k` of sector 0: whatever repeats from tooth to tooth in the drive repeats in the mesh.
+//! Sector j of the flexspline is centred on tooth j, sector j of the circular spline on space j; sector 0 on the +x
+//! axis, numbers growing counter-clockwise. Node `k` of sector `j` has the number `j * nodes_per_sector + k` and is the
+//! rotated image of node `k` of sector 0: whatever repeats from tooth to tooth in the drive repeats in the mesh.
 //!
-//! A rim of varying thickness ([`RimVariation`]) moves the nodes between bore and interface circle along their radii; numbers
-//! and elements stay what they are, and [`WheelMesh::sector_class`] says which sectors are images of one another still.
+//! A rim of varying thickness ([`RimVariation`]) moves the nodes between bore and interface circle along their radii;
+//! numbers and elements stay what they are, and [`WheelMesh::sector_class`] says which sectors are images of one
+//! another still.
 
 use std::collections::HashMap;
 use std::f64::consts::TAU;
@@ -46,8 +47,8 @@ impl FlankMesh {
         (self.nodes.len() - 1) / 2
     }
 
-    /// The edge that carries the flank point of radius `radius_mm` and its coordinate in [-1, 1]; points beyond an end are
-    /// carried by the end itself.
+    /// The edge that carries the flank point of radius `radius_mm` and its coordinate in [-1, 1]; points beyond an end
+    /// are carried by the end itself.
     #[inline]
     pub fn locate(&self, radius_mm: f64) -> (usize, f64) {
         let (first, last) = (self.radii[0], self.radii[self.radii.len() - 1]);
@@ -91,7 +92,8 @@ impl WheelMesh {
         WheelMesh::flexspline_as_fine_as(drive, &level.flexspline())
     }
 
-    /// Meshes the flexspline with so many elements; meshes of which one has twice as many in each direction have the coarser's nodes.
+    /// Meshes the flexspline with so many elements; meshes of which one has twice as many in each direction have the
+    /// coarser's nodes.
     pub fn flexspline_as_fine_as(drive: &Drive, density: &MeshDensity) -> Result<WheelMesh, MeshError> {
         let wheel = &drive.flexspline;
         let interface_radius = wheel.root_radius_mm - 0.3 * wheel.rim_thickness_mm;
@@ -211,8 +213,8 @@ impl WheelMesh {
             let (s, c) = angle.sin_cos();
             [c * p[0] - s * p[1], s * p[0] + c * p[1]]
         };
-        // The half sector as it stands lies on the plus side of a tooth; about a space it is the minus side, turned by half a
-        // pitch. Its mirror image is the other half.
+        // The half sector as it stands lies on the plus side of a tooth; about a space it is the minus side, turned by
+        // half a pitch. Its mirror image is the other half.
         let upper = |p: Point| match kind {
             WheelKind::Flexspline => p,
             WheelKind::CircularSpline => {
@@ -288,8 +290,8 @@ impl WheelMesh {
         })
     }
 
-    /// Sectors of the same class are congruent: one is the other turned by their distance around the ring. Classes count from 0
-    /// and sector `c` is of class `c`, so that each can be treated once, at its first sector.
+    /// Sectors of the same class are congruent: one is the other turned by their distance around the ring. Classes
+    /// count from 0 and sector `c` is of class `c`, so that each can be treated once, at its first sector.
     #[inline]
     pub fn sector_class(&self, sector: usize) -> usize {
         sector % self.sector_classes()
@@ -438,8 +440,8 @@ mod tests {
         (profile, flank)
     }
 
-    /// Area between the base circle and the outline: root land, fillet, involute, and the tip circle, half a pitch of it by
-    /// `r² dθ / 2`, times the number of halves.
+    /// Area between the base circle and the outline: root land, fillet, involute, and the tip circle, half a pitch of
+    /// it by `r² dθ / 2`, times the number of halves.
     fn area_of_outline(mesh: &WheelMesh) -> f64 {
         let (profile, involute) = profile(mesh.kind);
         let mut outline: Vec<Point> = Vec::new();

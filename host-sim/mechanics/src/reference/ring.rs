@@ -1,7 +1,7 @@
 //! Forces, moments and stress of the thin ring under each wave generator, all per unit width.
 //!
-//! The ring bends by `M = E' I (w + w'') / R²` (moment taken positive where the curvature falls) and is inextensible. From
-//! equilibrium of an unloaded arc the shear is `M'/R`, so a concentrated radial force is the jump of
+//! The ring bends by `M = E' I (w + w'') / R²` (moment taken positive where the curvature falls) and is inextensible.
+//! From equilibrium of an unloaded arc the shear is `M'/R`, so a concentrated radial force is the jump of
 //! `E' I (w + w'')' / R³` over its point, and a pressed arc of constant curvature carries its normal force
 //! as a uniform pressure. `E' = E / (1 - nu²)` (plane strain), `I = s³/12`.
 //!

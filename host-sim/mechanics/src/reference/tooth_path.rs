@@ -1,8 +1,10 @@
-//! The path of a flexspline tooth past a circular-spline tooth by the formulae (1)-(10) of Pacana, Siwiec, Pacana et al.,
-//! *Numerical analysis of the kinematic accuracy of the hermetic harmonic drive in space vehicles*, Appl. Sci. 13 (2023).
+//! The path of a flexspline tooth past a circular-spline tooth by the formulae (1)-(10) of Pacana, Siwiec, Pacana et
+//! al.,
+//! *Numerical analysis of the kinematic accuracy of the hermetic harmonic drive in space vehicles*, Appl. Sci. 13
+//! (2023).
 //!
-//! Frame fixed to the circular spline, its origin on the undeformed neutral radius `R` on the axis of the tooth that is met
-//! at the minor axis: `w` counts outward from `R`, `v` counter-clockwise. The angle `phi` is that of the tooth
+//! Frame fixed to the circular spline, its origin on the undeformed neutral radius `R` on the axis of the tooth that is
+//! met at the minor axis: `w` counts outward from `R`, `v` counter-clockwise. The angle `phi` is that of the tooth
 //! from the major axis (the only reading of (5) and (6) without contradiction: at the minor axis, `phi = pi/2`, tooth
 //! stands on tooth, at the major axis, `phi = 0`, it is half a pitch `(pi/2)/i = pi/z_c` away, in the space).
 //!

@@ -1,13 +1,15 @@
 //! What the third dimension adds to a plane slice of the rim.
 //!
-//! A slice in plane strain has the ring of the rim already, over all its width. The rest is the stiffness of the whole flexspline
-//! less that of the same rim moved alike over all its width: a 2 x 2 matrix K in the amplitudes of `w = W cos n theta` and
-//! `v = V sin n theta`, for a generator that holds W on its band and loads around the rim that are spread evenly.
+//! A slice in plane strain has the ring of the rim already, over all its width. The rest is the stiffness of the whole
+//! flexspline less that of the same rim moved alike over all its width: a 2 x 2 matrix K in the amplitudes of
+//! `w = W cos n theta` and `v = V sin n theta`, for a generator that holds W on its band and loads around the rim that
+//! are spread evenly.
 //!
-//! One direction of it is the oval without stretching, `e = (1, -1/n)`. The other stretches the rim around, which the slice resists
-//! a thousand times as much itself, and which it does by itself, to second order, when it turns by finite angles; a linear shell would
-//! take that for a load. So the rest acts as the one term `½ k a²` that is exact along e, forces included:
-//! `k = e·K e`, `a = (K e / k)·(W, V)`. With the ring of the slice it gives the whole flexspline's K under a radial load to 0.2 % (a test).
+//! One direction of it is the oval without stretching, `e = (1, -1/n)`. The other stretches the rim around, which the
+//! slice resists a thousand times as much itself, and which it does by itself, to second order, when it turns by finite
+//! angles; a linear shell would take that for a load. So the rest acts as the one term `½ k a²` that is exact along e,
+//! forces included: `k = e·K e`, `a = (K e / k)·(W, V)`. With the ring of the slice it gives the whole flexspline's K
+//! under a radial load to 0.2 % (a test).
 
 use std::f64::consts::PI;
 
@@ -106,8 +108,8 @@ mod tests {
         }
     }
 
-    /// A cup cones without stretching: `W = w0 x/L`, and V follows W as in any oval, `V = -W/n`; so do their slopes. The rim is stiff
-    /// enough for n = 2 to take the shape of the tube.
+    /// A cup cones without stretching: `W = w0 x/L`, and V follows W as in any oval, `V = -W/n`; so do their slopes.
+    /// The rim is stiff enough for n = 2 to take the shape of the tube.
     #[test]
     fn the_teeth_of_a_cup_are_skewed_as_its_cone_is() {
         let cup = Flexspline3d::of(&Drive::cup_95(), true).unwrap().addition(2);

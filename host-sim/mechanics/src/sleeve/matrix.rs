@@ -2,8 +2,8 @@
 
 use crate::fem::element::packed_index;
 
-/// What is left of a pivot, relative to its diagonal entry at the start, below which the unknown carries nothing: it moves without
-/// force (a rigid body's motion). Round-off of a few hundred eliminations leaves 1e-13.
+/// What is left of a pivot, relative to its diagonal entry at the start, below which the unknown carries nothing: it
+/// moves without force (a rigid body's motion). Round-off of a few hundred eliminations leaves 1e-13.
 const NO_STIFFNESS: f64 = 1e-11;
 
 /// A symmetric matrix, stored whole by rows.

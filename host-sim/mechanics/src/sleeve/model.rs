@@ -9,7 +9,8 @@ use super::tube::{Edge, End, Tube};
 use crate::drive::{Bottom, Drive, Flange, SleeveKind};
 use crate::mesh::MeshError;
 
-/// Width of the band that a generator presses on, relative to the face width: a bearing of 12.5 mm under teeth of 20 mm.
+/// Width of the band that a generator presses on, relative to the face width: a bearing of 12.5 mm under teeth of 20
+/// mm.
 const BAND: f64 = 0.625;
 /// Highest harmonic of two rollers. Twice as many move w(45°)/w0 of a closed sleeve by less than 0.002 (a test).
 const HIGHEST: u32 = 48;
@@ -27,12 +28,13 @@ pub struct Flexspline3d {
     pub flange: Option<(Tube, End)>,
     /// The tube to the bottom, and its bottom.
     pub bottom: Option<(Tube, End)>,
-    /// Whether the bottom stands on a shaft: that of a cup. Else it goes where the tube takes it as a body (n = 0 and 1).
+    /// Whether the bottom stands on a shaft: that of a cup. Else it goes where the tube takes it as a body (n = 0 and
+    /// 1).
     pub on_shaft: bool,
 }
 
-/// What one harmonic of a radial load meets. Stiffness is the amplitude of the reaction, full circle, over the amplitude of the
-/// displacement: twice the energy over the amplitude squared.
+/// What one harmonic of a radial load meets. Stiffness is the amplitude of the reaction, full circle, over the
+/// amplitude of the displacement: twice the energy over the amplitude squared.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Harmonic {
     /// Waves around the rim.
@@ -55,8 +57,8 @@ pub struct Rollers {
 }
 
 impl Flexspline3d {
-    /// The flexspline of a drive, with its teeth as ribs or as a smooth rim. Springs have no shape: for a drive that has them in
-    /// place of a sleeve it is the hermetic sleeve of the sizes given; for `none` the bare rim.
+    /// The flexspline of a drive, with its teeth as ribs or as a smooth rim. Springs have no shape: for a drive that
+    /// has them in place of a sleeve it is the hermetic sleeve of the sizes given; for `none` the bare rim.
     pub fn of(drive: &Drive, with_teeth: bool) -> Result<Flexspline3d, MeshError> {
         let (wheel, sleeve, material) = (&drive.flexspline, &drive.sleeve, &drive.material);
         let wall = |thickness_mm: f64, ribs: Ribs| Shell {
@@ -133,11 +135,12 @@ impl Flexspline3d {
         around * self.rim.radius_mm * self.rim.radius_mm / 1e3
     }
 
-    /// Torque over turn of the rim where the torque comes in through teeth at two lobes, each bearing evenly over `half_angle_rad` to
-    /// either side of the major axis and turning by its mean, N·m/rad; the generator lets no part of the band move in or out.
+    /// Torque over turn of the rim where the torque comes in through teeth at two lobes, each bearing evenly over
+    /// `half_angle_rad` to either side of the major axis and turning by its mean, N·m/rad; the generator lets no part
+    /// of the band move in or out.
     ///
-    /// The load is `T/(2 pi R) (1 + 2 sum s_n cos n theta)`, n = 2, 4 …, `s_n = sin(n h)/(n h)`; each harmonic is a spring in series,
-    /// `1/K = 1/K_0 + sum s_n²/(R² k_n)`, k_n the stiffness of V. Zero where nothing holds the rim.
+    /// The load is `T/(2 pi R) (1 + 2 sum s_n cos n theta)`, n = 2, 4 …, `s_n = sin(n h)/(n h)`; each harmonic is a
+    /// spring in series, `1/K = 1/K_0 + sum s_n²/(R² k_n)`, k_n the stiffness of V. Zero where nothing holds the rim.
     pub fn torsion_at_lobes_n_m_per_rad(&self, half_angle_rad: f64) -> f64 {
         let radius_mm = self.rim.radius_mm;
         let evenly = self.torsion_n_m_per_rad().recip();
@@ -205,9 +208,9 @@ mod tests {
         assert!((found / expected - 1.0).abs() < part, "{what}: {found}, expected {expected}");
     }
 
-    /// Fourier shells and solid elements of CalculiX 2.20, computed apart from this program, agree on these numbers to 0.2 %
-    /// (n of 4 and more 0.5 %, bands 1 %): K2, K4, K6 of a line, K2 of the band, tilt at w0 0.5 mm in mrad, w(45°) and w(90°) over w0
-    /// under two rollers.
+    /// Fourier shells and solid elements of CalculiX 2.20, computed apart from this program, agree on these numbers to
+    /// 0.2 % (n of 4 and more 0.5 %, bands 1 %): K2, K4, K6 of a line, K2 of the band, tilt at w0 0.5 mm in mrad,
+    /// w(45°) and w(90°) over w0 under two rollers.
     #[test]
     fn stiffness_tilt_and_rollers_are_those_of_solid_elements() {
         let free = smooth(&["sleeve.kind=none"]);
@@ -229,9 +232,9 @@ mod tests {
         }
     }
 
-    /// A load spread over all of the rim is torsion as ever; the narrower the lobes, the softer. What two lobes add is mostly the rim
-    /// between them: pulled around by `cos n theta` it stretches as a ring that cannot move in or out, `pi E b t n²/R`, a tenth softer at
-    /// most where it bulges beside the band.
+    /// A load spread over all of the rim is torsion as ever; the narrower the lobes, the softer. What two lobes add is
+    /// mostly the rim between them: pulled around by `cos n theta` it stretches as a ring that cannot move in or out,
+    /// `pi E b t n²/R`, a tenth softer at most where it bulges beside the band.
     #[test]
     fn torque_at_two_lobes_turns_the_rim_further_than_torque_all_around() {
         let cup = cup();
@@ -275,8 +278,8 @@ mod tests {
         assert!(free.torsion_n_m_per_rad() < 1e-3 && free.lateral_n_per_mm() < 1e-3);
     }
 
-    /// What solid elements say of other ends, of K2: a bottom of 2 mm adds 1 to 1.5 %, a thin one takes 2 %; a flange on a diaphragm takes 29
-    /// to 41 %, and nearly all of the lateral stiffness.
+    /// What solid elements say of other ends, of K2: a bottom of 2 mm adds 1 to 1.5 %, a thin one takes 2 %; a flange
+    /// on a diaphragm takes 29 to 41 %, and nearly all of the lateral stiffness.
     #[test]
     fn other_ends_change_what_they_are_known_to() {
         for (wall, side, diaphragm) in [(0.7, 80.0, -0.29), (0.5, 140.0, -0.41)] {
@@ -297,8 +300,8 @@ mod tests {
         assert!((-0.025..-0.015).contains(&change), "a thin bottom: {change}");
     }
 
-    /// A long sleeve is a beam on two supports, `12 B (a+b)³/(a³ b² (3 (a+b) + b))` with `B = pi E t R³/n⁴`: without shear it is an upper
-    /// bound that is approached.
+    /// A long sleeve is a beam on two supports, `12 B (a+b)³/(a³ b² (3 (a+b) + b))` with `B = pi E t R³/n⁴`: without
+    /// shear it is an upper bound that is approached.
     #[test]
     fn a_long_sleeve_approaches_the_beam_of_the_closed_form() {
         let beam = |t: f64, a: f64, b: f64| {

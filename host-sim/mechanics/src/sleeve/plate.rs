@@ -1,7 +1,7 @@
 //! A plane ring-shaped plate across the end of a tube, one Fourier harmonic at a time: a bottom, or a flexible flange.
 //!
-//! In polar coordinates, with `u_r = P cos n theta`, `u_t = Q sin n theta` in its plane and the deflection `Z cos n theta` along the
-//! axis, Kirchhoff's plate has
+//! In polar coordinates, with `u_r = P cos n theta`, `u_t = Q sin n theta` in its plane and the deflection
+//! `Z cos n theta` along the axis, Kirchhoff's plate has
 //!
 //! ```text
 //!   eps_r = P'     eps_t = (P + n Q)/r         gamma = Q' - Q/r - n P/r
@@ -14,7 +14,8 @@ use super::matrix::Symmetric;
 use super::shell::{GAUSS, NODE, SLOPE, Shell, U, U_SLOPE, V, V_SLOPE, W, add_energy, around, hermite, row, sum};
 use super::tube::Edge;
 
-/// Elements from edge to edge, their radii growing by equal factors. Twice as many change a full disc by less than 1e-5 (a test).
+/// Elements from edge to edge, their radii growing by equal factors. Twice as many change a full disc by less than 1e-5
+/// (a test).
 const ELEMENTS: usize = 48;
 /// Radius of the hole that stands for the centre of a full disc, relative to its edge.
 const CENTRE: f64 = 1e-3;
@@ -66,7 +67,8 @@ impl Plate {
         std::array::from_fn(|i| std::array::from_fn(|j| sign(i) * sign(j) * edge.at(i, j)))
     }
 
-    /// Stiffness of the ring between two radii. Unknowns as of a shell: U is Z, V is Q, W is P, SLOPE is Z', U_SLOPE is P'.
+    /// Stiffness of the ring between two radii. Unknowns as of a shell: U is Z, V is Q, W is P, SLOPE is Z', U_SLOPE is
+    /// P'.
     fn element(&self, inner: f64, outer: f64, n: u32) -> [[f64; 2 * NODE]; 2 * NODE] {
         let (nu, order, length) = (self.wall.poissons_ratio, f64::from(n), outer - inner);
         let shear = 0.5 * (1.0 - nu);
@@ -129,17 +131,19 @@ mod tests {
         let (a, b) = (b_v / determinant, -q / determinant);
         assert!((edge[W][W] / (PI * r * t * -b) - 1.0).abs() < 1e-4, "{}", edge[W][W]);
         assert!((edge[V][W] / (PI * r * t * (6.0 * a * r * r + b)) - 1.0).abs() < 1e-4, "{}", edge[V][W]);
-        // Z = 1, Z' = 0 at the edge: a = 2/r², b = -1/r⁴; edge force of Kirchhoff -D[(lap)' - (1-nu) n² (w/r² - w'/r)/r ...].
+        // Z = 1, Z' = 0 at the edge: a = 2/r², b = -1/r⁴; edge force of Kirchhoff -D[(lap)' - (1-nu) n² (w/r² - w'/r)/r
+        // ...].
         let d = e * t.powi(3) / (12.0 * (1.0 - nu * nu));
         let (a, b) = (2.0 / (r * r), -1.0 / r.powi(4));
-        // w = a r² + b r⁴: lap w = 12 b r² cos; (lap)' = 24 b r; (w'/r - w/r²)' ... of the twist: (a + 3 b r²) -> n² (p-1) r^(p-3).
+        // w = a r² + b r⁴: lap w = 12 b r² cos; (lap)' = 24 b r; (w'/r - w/r²)' ... of the twist: (a + 3 b r²) -> n²
+        // (p-1) r^(p-3).
         let force = d * (-24.0 * b * r + 4.0 * (1.0 - nu) * (a / r + 3.0 * b * r));
         assert!((edge[U][U] / (PI * r * force) - 1.0).abs() < 1e-4, "{} {}", edge[U][U], PI * r * force);
         assert!((edge[U][SLOPE] - edge[SLOPE][U]).abs() < 1e-6 * edge[SLOPE][SLOPE]);
     }
 
-    /// A ring clamped outside and pulled along the axis, n = 0: Roark's formula for an annular plate is the closed form of
-    /// `w = c1 + c2 ln r + c3 r² + c4 r² ln r`, solved here for its four edge conditions.
+    /// A ring clamped outside and pulled along the axis, n = 0: Roark's formula for an annular plate is the closed form
+    /// of `w = c1 + c2 ln r + c3 r² + c4 r² ln r`, solved here for its four edge conditions.
     #[test]
     fn a_ring_that_is_clamped_outside_holds_along_the_axis() {
         let outer: f64 = 62.275;

@@ -1,4 +1,5 @@
-//! What the teeth add to the stiffness of the rim under them: along the axis they are ribs, around it they stiffen their roots.
+//! What the teeth add to the stiffness of the rim under them: along the axis they are ribs, around it they stiffen
+//! their roots.
 
 use super::matrix::Symmetric;
 use super::shell::Ribs;
@@ -13,9 +14,9 @@ const SLICES: usize = 200;
 impl Ribs {
     /// The teeth of a drive on its rim.
     ///
-    /// Along the axis a tooth is a straight rib of its own cross-section: it carries its area, and its second moment about the
-    /// common centroid, beside the wall's. Around the axis the toothed rim bends like a smooth one that is stiffer; by how much is
-    /// asked of plane FEM of one tooth pitch in pure bending.
+    /// Along the axis a tooth is a straight rib of its own cross-section: it carries its area, and its second moment
+    /// about the common centroid, beside the wall's. Around the axis the toothed rim bends like a smooth one that is
+    /// stiffer; by how much is asked of plane FEM of one tooth pitch in pure bending.
     pub fn of_teeth(drive: &Drive) -> Result<Ribs, MeshError> {
         let wheel = &drive.flexspline;
         let wall = wheel.rim_thickness_mm;
@@ -53,8 +54,8 @@ fn tooth_moments(drive: &Drive) -> Result<[f64; 3], DriveError> {
 
 /// Bending stiffness of the toothed rim around the axis, relative to that of the smooth one.
 ///
-/// One sector of the mesh; its far face moves as the near one, turned by a pitch, and beside that as a rigid body: by a translation
-/// that is free and a rotation, whose stiffness is asked for.
+/// One sector of the mesh; its far face moves as the near one, turned by a pitch, and beside that as a rigid body: by a
+/// translation that is free and a rotation, whose stiffness is asked for.
 fn bending_around(drive: &Drive) -> Result<f64, MeshError> {
     let plain = Drive { as_built: Default::default(), ..drive.clone() };
     let mesh = WheelMesh::flexspline(&plain, MeshLevel::Coarse)?;
@@ -123,8 +124,9 @@ mod tests {
         }
     }
 
-    /// Solid elements with ribs in CalculiX are met to 2 % by membrane x 1.44 and bending x 4.2 along the axis and x 1.245 around:
-    /// rectangles five ninths of a pitch wide, and plane FEM. Real teeth taper; the stiffness of the band hardly feels it.
+    /// Solid elements with ribs in CalculiX are met to 2 % by membrane x 1.44 and bending x 4.2 along the axis and x
+    /// 1.245 around: rectangles five ninths of a pitch wide, and plane FEM. Real teeth taper; the stiffness of the band
+    /// hardly feels it.
     #[test]
     fn teeth_stiffen_the_rim_as_ribs_of_solid_elements() {
         let found = Ribs::of_teeth(&Drive::hhd_95()).unwrap();

@@ -4,8 +4,8 @@ use super::matrix::Symmetric;
 use super::shell::{NODE, SLOPE, Shell, U, V, W};
 use super::tube::{Edge, mirrored};
 
-/// Lines on which a generator presses on the band under it. Lines closer together than about two walls only sharpen the pressure
-/// at the edges of the band, which no theory of shells resolves: 11 in place of 5 add 0.3 % to the stiffness.
+/// Lines on which a generator presses on the band under it. Lines closer together than about two walls only sharpen the
+/// pressure at the edges of the band, which no theory of shells resolves: 11 in place of 5 add 0.3 % to the stiffness.
 pub(super) const LINES: usize = 5;
 /// The line in the middle of the rim.
 const MIDDLE: usize = LINES / 2;
@@ -20,8 +20,8 @@ pub(super) struct Rim {
 }
 
 impl Rim {
-    /// A rim of this width whose generator presses on a band of another, with what hangs on its edges: that on the flange's side
-    /// and that on the bottom's, either seen along an axis that leads away from the rim.
+    /// A rim of this width whose generator presses on a band of another, with what hangs on its edges: that on the
+    /// flange's side and that on the bottom's, either seen along an axis that leads away from the rim.
     pub fn new(wall: &Shell, width_mm: f64, band_mm: f64, n: u32, sides: [Option<Edge>; 2]) -> Rim {
         let band = band_mm.min(width_mm);
         let places: [f64; LINES] = std::array::from_fn(|k| band * (k as f64 / (LINES - 1) as f64 - 0.5));
@@ -69,8 +69,8 @@ impl Rim {
         self.matrix.condensed(&keep, &[]).in_basis(&[vec![1.0; LINES], self.places.to_vec()])
     }
 
-    /// Stiffness of the band in its W, tilt, mean V, and slope of V along the axis: loads around the rim are spread evenly over the
-    /// lines.
+    /// Stiffness of the band in its W, tilt, mean V, and slope of V along the axis: loads around the rim are spread
+    /// evenly over the lines.
     pub fn band_and_turn(&self) -> Symmetric {
         let of = |k: usize| self.lines.iter().map(move |first| first + k);
         let keep: Vec<usize> = of(W).chain(of(V)).collect();
@@ -78,7 +78,8 @@ impl Rim {
         let mut basis = vec![[vec![1.0; LINES], none.clone()].concat(), [self.places.to_vec(), none.clone()].concat()];
         basis.push([none.clone(), vec![1.0; LINES]].concat());
         basis.push([none.clone(), self.places.to_vec()].concat());
-        // V of the single lines beside mean and slope: second differences have neither, the lines being equally far apart.
+        // V of the single lines beside mean and slope: second differences have neither, the lines being equally far
+        // apart.
         for k in 0..LINES - 2 {
             let mut apart = vec![0.0; 2 * LINES];
             for (at, weight) in [1.0, -2.0, 1.0].into_iter().enumerate() {

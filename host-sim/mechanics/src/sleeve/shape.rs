@@ -6,8 +6,8 @@ use super::rim::LINES;
 use super::shell::{NODE, SLOPE, Shell, U, U_SLOPE, V, V_SLOPE, W};
 use super::tube::{End, Tube, mirrored};
 
-/// Displacement of the middle surface at one place along the axis: `u = U cos n theta` along it, `v = V sin n theta` around it,
-/// `w = W cos n theta` outward.
+/// Displacement of the middle surface at one place along the axis: `u = U cos n theta` along it, `v = V sin n theta`
+/// around it, `w = W cos n theta` outward.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Station {
     /// From the middle of the rim, mm; positive from the flange to the bottom.
@@ -33,8 +33,8 @@ struct Axis {
 }
 
 impl Flexspline3d {
-    /// The flexspline where harmonic n (2 or more) of the rim has the amplitude 1 mm of an oval without stretching, its band straight
-    /// and free to tilt: from the flange's end to the bottom's.
+    /// The flexspline where harmonic n (2 or more) of the rim has the amplitude 1 mm of an oval without stretching, its
+    /// band straight and free to tilt: from the flange's end to the bottom's.
     pub fn shape(&self, n: u32) -> Vec<Station> {
         let axis = self.axis(n);
         // The band: W and its tilt, mean V and its slope, what else V does.
@@ -171,7 +171,8 @@ mod tests {
         }
     }
 
-    /// What is known at the rim otherwise: amplitude 1 in its middle, tilt and skew of the addition; and the ends are held.
+    /// What is known at the rim otherwise: amplitude 1 in its middle, tilt and skew of the addition; and the ends are
+    /// held.
     #[test]
     fn the_rim_of_the_whole_is_the_rim_that_is_coupled() {
         for drive in [Drive::hhd_95_hermetic(), Drive::cup_95(), Drive::hhd_95().with_set("sleeve.kind=hat").unwrap()] {

@@ -1,7 +1,7 @@
 //! A thin circular cylindrical shell, one Fourier harmonic around it at a time.
 //!
-//! With `u = U(x) cos n theta` along the axis, `v = V(x) sin n theta` around it and `w = W(x) cos n theta` outward the theory of
-//! Sanders and Koiter has
+//! With `u = U(x) cos n theta` along the axis, `v = V(x) sin n theta` around it and `w = W(x) cos n theta` outward the
+//! theory of Sanders and Koiter has
 //!
 //! ```text
 //!   eps_x = U'    eps_t = (n V + W)/R      gamma = V' - n U/R
@@ -15,16 +15,16 @@
 //!          + D (kap_x² + kap_t² + 2 nu kap_x kap_t + ½(1-nu) tau²) dx,   C = E t/(1-nu²),  D = C t²/12.
 //! ```
 //!
-//! Rigid motions have no energy in it: Donnell's theory, which has not, bends a ring with n⁴ for (n² - 1)², 78 % too stiff at n = 2.
-//! Along the axis U, V and W are cubic Hermite polynomials on each element; the integrals are exact.
+//! Rigid motions have no energy in it: Donnell's theory, which has not, bends a ring with n⁴ for (n² - 1)², 78 % too
+//! stiff at n = 2. Along the axis U, V and W are cubic Hermite polynomials on each element; the integrals are exact.
 //!
-//! Sources: J. L. Sanders, An improved first-approximation theory for thin shells, NASA TR R-24 (1959); W. T. Koiter, A consistent
-//! first approximation in the general theory of thin elastic shells (1960).
+//! Sources: J. L. Sanders, An improved first-approximation theory for thin shells, NASA TR R-24 (1959); W. T. Koiter, A
+//! consistent first approximation in the general theory of thin elastic shells (1960).
 
 use std::f64::consts::PI;
 
-/// Unknowns of a node: U, V, W, and their slopes along the axis. Where two walls of different thickness meet, U, V, W and W' go
-/// through; U' and V' jump.
+/// Unknowns of a node: U, V, W, and their slopes along the axis. Where two walls of different thickness meet, U, V, W
+/// and W' go through; U' and V' jump.
 pub(super) const U: usize = 0;
 pub(super) const V: usize = 1;
 pub(super) const W: usize = 2;
@@ -33,13 +33,13 @@ pub(super) const U_SLOPE: usize = 4;
 pub(super) const V_SLOPE: usize = 5;
 pub(super) const NODE: usize = 6;
 
-/// Elements per decay length `sqrt(R t)` of an edge disturbance, and per `R/n`, over which a short wave dies away: with these twice
-/// as many change no stiffness by 3e-4 up to n = 24 (a test).
+/// Elements per decay length `sqrt(R t)` of an edge disturbance, and per `R/n`, over which a short wave dies away: with
+/// these twice as many change no stiffness by 3e-4 up to n = 24 (a test).
 const ELEMENTS_PER_DECAY: f64 = 4.0;
 const ELEMENTS_PER_WAVE: f64 = 2.0;
 
-/// What stiffens a wall beside its thickness: factors on the membrane stiffness along the axis, and on the bending stiffness along
-/// the axis and around it.
+/// What stiffens a wall beside its thickness: factors on the membrane stiffness along the axis, and on the bending
+/// stiffness along the axis and around it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ribs {
     /// On C along the axis.
@@ -111,7 +111,8 @@ pub(super) fn sum<const N: usize>(parts: &[(f64, &[f64; N])]) -> [f64; N] {
     std::array::from_fn(|i| parts.iter().map(|(factor, row)| factor * row[i]).sum())
 }
 
-/// Adds the energy of the strains `[along, around, shear]` of stiffness `[along, around, along with around, shear]` to a matrix.
+/// Adds the energy of the strains `[along, around, shear]` of stiffness `[along, around, along with around, shear]` to
+/// a matrix.
 pub(super) fn add_energy<const N: usize>(to: &mut [[f64; N]; N], strains: &[[f64; N]; 3], stiffness: [f64; 4]) {
     let [along, around, coupling, shear] = stiffness;
     let [x, t, g] = strains;
@@ -203,8 +204,8 @@ mod tests {
         }
     }
 
-    /// Moved along, turned around (n = 0), moved across and tilted (n = 1) no shell has energy; nor has a cone of two walls
-    /// membrane energy, `W = x`, `V = -x/n`, `U = -R/n²`.
+    /// Moved along, turned around (n = 0), moved across and tilted (n = 1) no shell has energy; nor has a cone of two
+    /// walls membrane energy, `W = x`, `V = -x/n`, `U = -R/n²`.
     #[test]
     fn rigid_motions_have_no_energy() {
         let (h, r) = (2.0, wall().radius_mm);
@@ -242,8 +243,8 @@ mod tests {
         assert!((found / expected - 1.0).abs() < 1e-8, "{found} {expected}");
     }
 
-    /// Navier: simply supported, L 100 mm, pressure `cos 2 theta sin(pi x/L)` of 1 MPa. The amplitude is the solution of three
-    /// equations, computed apart from this program.
+    /// Navier: simply supported, L 100 mm, pressure `cos 2 theta sin(pi x/L)` of 1 MPa. The amplitude is the solution
+    /// of three equations, computed apart from this program.
     #[test]
     fn navier_is_met() {
         let (length, elements, n) = (100.0, 40, 2);
@@ -263,8 +264,8 @@ mod tests {
                 }
             }
         }
-        // By symmetry about the middle the amplitude there is the work of the load over the load's own measure: with the exact
-        // shape sin, `load^T x = W integral(sin²)`.
+        // By symmetry about the middle the amplitude there is the work of the load over the load's own measure: with
+        // the exact shape sin, `load^T x = W integral(sin²)`.
         let held = [V, W, elements * NODE + V, elements * NODE + W];
         let work = matrix.work_of(&load, &held);
         let amplitude = work / (around(n) * shell.radius_mm * 0.5 * length);

@@ -8,8 +8,9 @@ use crate::mesh::{MeshError, MeshLevel, WheelMesh, rotate};
 
 /// Normal approach of a pair of flanks by the deformation of the two teeth, for 1 N per mm of face width: mm²/N.
 ///
-/// Plane FEM of one pitch of each wheel, all teeth loaded alike by a uniform pressure over the flank. What lies deeper than one tooth
-/// height below the root is held: that moves with the neighbouring slices. Twice that depth adds 6 % for HHD-95 (a test).
+/// Plane FEM of one pitch of each wheel, all teeth loaded alike by a uniform pressure over the flank. What lies deeper
+/// than one tooth height below the root is held: that moves with the neighbouring slices. Twice that depth adds 6 % for
+/// HHD-95 (a test).
 pub fn pair_compliance(drive: &Drive) -> Result<f64, MeshError> {
     let plain = Drive { as_built: Default::default(), ..drive.clone() };
     let material = PlaneStrain::new(drive.material.youngs_modulus_mpa, drive.material.poissons_ratio);
@@ -77,8 +78,8 @@ fn flank_load(mesh: &WheelMesh) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// ISO 6336-1 gives 14 N/(mm µm) as the largest stiffness of a pair of steel spur teeth of usual proportions, the load at the tip of one;
-    /// stub teeth like these, loaded over the whole flank, are stiffer, but of that order.
+    /// ISO 6336-1 gives 14 N/(mm µm) as the largest stiffness of a pair of steel spur teeth of usual proportions, the
+    /// load at the tip of one; stub teeth like these, loaded over the whole flank, are stiffer, but of that order.
     #[test]
     fn a_pair_of_teeth_gives_way_as_pairs_of_gears_do() {
         let drive = Drive::hhd_95();

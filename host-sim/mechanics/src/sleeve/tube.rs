@@ -35,7 +35,8 @@ impl Tube {
         self.edge_with(self.shell.elements(self.length_mm, n), n, end)
     }
 
-    /// Stiffness of an edge of a tube of so many elements: they are eliminated one after the other, from the far end on.
+    /// Stiffness of an edge of a tube of so many elements: they are eliminated one after the other, from the far end
+    /// on.
     pub(super) fn edge_with(&self, elements: usize, n: u32, end: End) -> Edge {
         let element = self.shell.element(self.length_mm / elements as f64, n);
         let mut held: Vec<usize> = match end {
@@ -82,7 +83,8 @@ mod tests {
         Tube { shell, length_mm }
     }
 
-    /// Computed apart from this program, by Fourier shells of the same theory; there the clamp is at x = 0, here at the far end.
+    /// Computed apart from this program, by Fourier shells of the same theory; there the clamp is at x = 0, here at the
+    /// far end.
     #[test]
     fn a_clamped_tube_has_the_stiffness_found_elsewhere() {
         let wall = tube(47.275, 0.7, 206_000.0, 80.0);
@@ -109,8 +111,8 @@ mod tests {
         }
     }
 
-    /// MacNeal and Harder (1985): a cylinder of radius 300 and length 600 between diaphragms, pinched in the middle, 1.8248e-5;
-    /// by this theory, with harmonics to 120, 1.8240e-5.
+    /// MacNeal and Harder (1985): a cylinder of radius 300 and length 600 between diaphragms, pinched in the middle,
+    /// 1.8248e-5; by this theory, with harmonics to 120, 1.8240e-5.
     #[test]
     fn a_pinched_cylinder_gives_way_as_known() {
         let half = tube(300.0, 3.0, 3e6, 300.0);
@@ -144,7 +146,8 @@ mod tests {
         }
     }
 
-    /// Torsion of a clamped tube is `2 pi G R t / L` for its V, and the curvature of the wall adds `9/4 t²/12R²` of that.
+    /// Torsion of a clamped tube is `2 pi G R t / L` for its V, and the curvature of the wall adds `9/4 t²/12R²` of
+    /// that.
     #[test]
     fn torsion_is_that_of_a_tube() {
         let wall = tube(47.275, 0.7, 206_000.0, 80.0);

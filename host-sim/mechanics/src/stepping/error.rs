@@ -32,7 +32,8 @@ pub enum SolveError {
     },
     /// The load pushes the rim out of the range of the model.
     #[error(
-        "at generator angle {generator_rad:.6} rad and load {torque_n_m} N.m the rim leaves the range of the model: {what}"
+        "at generator angle {generator_rad:.6} rad and load {torque_n_m} N.m the rim leaves the range of the model: \
+         {what}"
     )]
     OutOfRange {
         /// Where, rad.
@@ -44,9 +45,9 @@ pub enum SolveError {
     },
     /// The output does not follow the generator.
     #[error(
-        "the drive has not settled after {pitches:.1} tooth pitches of motion one way, at generator angle {generator_rad:.4} rad and load \
-         {torque_n_m} N.m: in the last increment the output turned by {rate:.3} of what the ratio says; check the clearance between the \
-         teeth, or the drag, of the drive"
+        "the drive has not settled after {pitches:.1} tooth pitches of motion one way, at generator angle \
+         {generator_rad:.4} rad and load {torque_n_m} N.m: in the last increment the output turned by {rate:.3} of \
+         what the ratio says; check the clearance between the teeth, or the drag, of the drive"
     )]
     NotSettled {
         /// Where, rad.

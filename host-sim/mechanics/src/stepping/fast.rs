@@ -1,7 +1,7 @@
 //! The `fast` solver's wheels: condensed cells in turning frames, and a block factorisation around the rings.
 //!
-//! A factorisation reduces every cell to its faces and to the tractions on its flanks ([`CellTangent`]) and then eliminates
-//! faces and tractions around both rings ([`Chain`]).
+//! A factorisation reduces every cell to its faces and to the tractions on its flanks ([`CellTangent`]) and then
+//! eliminates faces and tractions around both rings ([`Chain`]).
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::ops::Range;
@@ -223,7 +223,8 @@ impl<'p> CondensedWheels<'p> {
         }
     }
 
-    /// The contact of every pair as tractions on the cells of both wheels; and the size and tooth side of each pair's block.
+    /// The contact of every pair as tractions on the cells of both wheels; and the size and tooth side of each pair's
+    /// block.
     fn tractions(&self) -> (Vec<Vec<Traction>>, Vec<(FlankPair, usize)>) {
         let (fs, cs) = (self.model.fs_mesh(), self.model.cs_mesh());
         let mut by_cell = vec![Vec::new(); fs.teeth + cs.teeth];
@@ -383,8 +384,8 @@ impl<'p> CondensedWheels<'p> {
 /// Tangent of a pair of flanks of less than this, relative to the largest, is left out of the factor.
 const RANK_TOLERANCE: f64 = 1e-10;
 
-/// Order n and columns of G with `D = G G^T` for a positive semi-definite D (n x n by rows, lower triangle): Cholesky with
-/// diagonal pivoting until nothing is left.
+/// Order n and columns of G with `D = G G^T` for a positive semi-definite D (n x n by rows, lower triangle): Cholesky
+/// with diagonal pivoting until nothing is left.
 fn low_rank(stiffness: &[f64]) -> (usize, Vec<f64>) {
     let n = (stiffness.len() as f64).sqrt().round() as usize;
     let entry = |i: usize, j: usize| if i >= j { stiffness[i * n + j] } else { stiffness[j * n + i] };
@@ -608,7 +609,8 @@ mod tests {
     use crate::stepping::near::configuration;
     use crate::stepping::{Method, SolverSettings};
 
-    /// A step that was solved without a tooth's flanks moves the tooth alone; following it, the flanks bear no force, as before.
+    /// A step that was solved without a tooth's flanks moves the tooth alone; following it, the flanks bear no force,
+    /// as before.
     #[test]
     fn flanks_that_come_near_after_a_step_was_solved_stay_with_their_teeth() {
         let drive = Drive::hhd_95();

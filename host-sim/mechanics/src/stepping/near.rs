@@ -145,8 +145,8 @@ impl NearPairs {
             .collect()
     }
 
-    /// Output angle at which `torque` of everything but the flanks (and its slope), and frictionless flanks balance while the
-    /// wheels keep their shape; `None` when no flank is in reach.
+    /// Output angle at which `torque` of everything but the flanks (and its slope), and frictionless flanks balance
+    /// while the wheels keep their shape; `None` when no flank is in reach.
     ///
     /// Gaps are linear in so small a turn: the points are looked at once, and again where the turn was not so small.
     pub fn balance(
@@ -198,8 +198,8 @@ impl NearPairs {
     }
 }
 
-/// A point of a flank while the wheels keep their shape: its gap, how it changes as the output turns (mm/rad), and the length that it
-/// stands for.
+/// A point of a flank while the wheels keep their shape: its gap, how it changes as the output turns (mm/rad), and the
+/// length that it stands for.
 struct RigidPoint {
     gap: f64,
     rate: f64,
@@ -280,7 +280,8 @@ pub(super) fn configuration(state: &State) -> Configuration<'_> {
 mod tests {
     use super::*;
 
-    /// A flank that meets a load of 1 after a clearance: wherever it is within the reach, it is found, and beyond it is not.
+    /// A flank that meets a load of 1 after a clearance: wherever it is within the reach, it is found, and beyond it is
+    /// not.
     #[test]
     fn a_clearance_is_crossed_up_to_the_reach() {
         let reach = 1.344e-3;

@@ -1,7 +1,8 @@
 //! Newton's method on the whole drive, the same for both solvers; only the wheels differ (see [`Wheels`]).
 //!
 //! Unknowns are the displacements of both wheels and, as a dense border, the output angle, the moment of the sleeve (a
-//! Lagrange multiplier when the sleeve is rigid), its lateral force, and those of its shells on waves of the bore. One increment:
+//! Lagrange multiplier when the sleeve is rigid), its lateral force, and those of its shells on waves of the bore. One
+//! increment:
 //!
 //! predict, lay out the contact; repeat { assemble; done? factorise; solve; update } until done.
 
@@ -25,12 +26,13 @@ use super::wheels::Wheels;
 
 /// Pairs closer than this (mm) get a place in the sparsity pattern.
 const PATTERN_REACH: f64 = 0.04;
-/// Stiffness (N/mm per mm) that anchors one node of the flexspline while the matrix is factorised; the border takes it out
-/// again.
+/// Stiffness (N/mm per mm) that anchors one node of the flexspline while the matrix is factorised; the border takes it
+/// out again.
 pub(super) const ANCHOR: f64 = 1e5;
 /// Springs (N/mm per mm) that are tried in turn when the tangent is not positive definite.
 const GROUNDED_SPRINGS: [f64; 4] = [1e-3, 1e-1, 1e1, 1e3];
-/// Largest change of a displacement that an undamped Newton step may make, modules: a drive twice as large goes the same way.
+/// Largest change of a displacement that an undamped Newton step may make, modules: a drive twice as large goes the
+/// same way.
 const LARGEST_STEP: f64 = 0.2;
 /// Largest first step of a changing load, N m.
 const LARGEST_LOAD_STEP: f64 = 100.0;
@@ -38,35 +40,38 @@ const LARGEST_LOAD_STEP: f64 = 100.0;
 const LOADING_SOFTNESS: [f64; 3] = [1e-3, 3e-2, 1.0];
 /// No way at all: contact as hard as it is.
 const DIRECTLY: [f64; 1] = [1.0];
-/// Factors on the penalties on the way to a far place: of 1, 0.1, 0.03, 0.01 and (0.001, 0.03) before 1 this takes the fewest iterations where most
-/// are needed (20 to 30; cam, 5 µm of eccentricity and pitch errors, 4 and 100 N·m).
+/// Factors on the penalties on the way to a far place: of 1, 0.1, 0.03, 0.01 and (0.001, 0.03) before 1 this takes the
+/// fewest iterations where most are needed (20 to 30; cam, 5 µm of eccentricity and pitch errors, 4 and 100 N·m).
 const JUMPING_SOFTNESS: [f64; 2] = [1e-2, 1.0];
-/// Relative residual at which a stage with soft contact is done: it only finds the way. Drives of all four generators to their rated load and over
-/// a tooth pitch (HHD-95, coarse) take 1002 iterations with the tolerance of the last stage, 877 with 1e-2, 825 with 1e-1, and end within
-/// 1e-5″ of one another.
+/// Relative residual at which a stage with soft contact is done: it only finds the way. Drives of all four generators
+/// to their rated load and over a tooth pitch (HHD-95, coarse) take 1002 iterations with the tolerance of the last
+/// stage, 877 with 1e-2, 825 with 1e-1, and end within 1e-5″ of one another.
 const FOUND_THE_WAY: f64 = 0.1;
-/// Share of the new load from which on the load that there is shows the way by itself, and contact need not be softened first: the same drives
-/// then take 716 iterations. A guess: between the loads of a data sheet it is 0.19 and more, from its light touch on 0.005.
+/// Share of the new load from which on the load that there is shows the way by itself, and contact need not be softened
+/// first: the same drives then take 716 iterations. A guess: between the loads of a data sheet it is 0.19 and more,
+/// from its light touch on 0.005.
 const SHOWS_THE_WAY: f64 = 0.03;
 /// Stiffness of the bore (N/mm³) below which it is not softened: the softest penalty on the way to a new load.
 const SOFTEST_BORE: f64 = 1e3;
 /// Iterations after which the next part of an increment may be twice as large.
 const EASY: usize = 10;
-/// Halvings after which Newton is given so many times the iterations. Heavily loaded rollers creep along their way, and halving does
-/// not shorten it: of nine drives that failed with 60 iterations at 63 % of their rated load and more, eight converge with 200, in less
-/// time than failing took.
+/// Halvings after which Newton is given so many times the iterations. Heavily loaded rollers creep along their way, and
+/// halving does not shorten it: of nine drives that failed with 60 iterations at 63 % of their rated load and more,
+/// eight converge with 200, in less time than failing took.
 const PATIENT_AFTER: usize = 2;
 const PATIENCE: usize = 4;
 
-/// Share of the force along a step that may act back at its end. Where contact opens and closes with each step, iterations that give back
-/// nearly all they took go round in a circle: after so many they may give back less. (Straight teeth that wedge in a cup, loaded to 24 N·m.)
+/// Share of the force along a step that may act back at its end. Where contact opens and closes with each step,
+/// iterations that give back nearly all they took go round in a circle: after so many they may give back less.
+/// (Straight teeth that wedge in a cup, loaded to 24 N·m.)
 const RETURNS: f64 = 0.9;
 const RETURNS_LITTLE: f64 = 0.3;
 const GOES_ROUND_AFTER: usize = 25;
 
-/// Halvings of a step after which the pairs that were open are looked at again before it is made shorter still: far from equilibrium a flank may
-/// come past the tip of a space, where its gap changes by more than it moves, and bear in a state that took it for open. Not while the drive is
-/// assembled: from so far off a step that took in all that bears may carry every flank out of reach, and then nothing holds an output without drag.
+/// Halvings of a step after which the pairs that were open are looked at again before it is made shorter still: far
+/// from equilibrium a flank may come past the tip of a space, where its gap changes by more than it moves, and bear in
+/// a state that took it for open. Not while the drive is assembled: from so far off a step that took in all that bears
+/// may carry every flank out of reach, and then nothing holds an output without drag.
 const LOOKS_BACK_AT: usize = 5;
 
 /// Relative residual below which steps are taken whole: what is left is near round-off.
@@ -74,7 +79,8 @@ const ROUND_OFF: f64 = 1e-6;
 
 /// Gain of an iteration after which the last factor serves again.
 const CHORD_GAIN: f64 = 0.2;
-/// Fraction of a pitch off which a tangent of an earlier pitch still serves, and the gain that each iteration must then make.
+/// Fraction of a pitch off which a tangent of an earlier pitch still serves, and the gain that each iteration must then
+/// make.
 const RECALL_WITHIN: f64 = 0.06;
 const RECALL_GAIN: f64 = 0.3;
 /// A tangent made further from equilibrium than this (relative residual) knows the wrong contact.
@@ -85,10 +91,12 @@ const MOST_LAYOUTS: usize = 3;
 const MOST_TRIALS: usize = 10;
 /// Parts of one increment at most. *Guess*: a load of 100 kN m that comes on without a single easy part has 1000.
 const MOST_PARTS: usize = 10_000;
-/// Stiffness (N mm/mm per rad) of an output that nothing holds and nothing turns, so that the wheels have a step. Of any size: no torque acts on it.
+/// Stiffness (N mm/mm per rad) of an output that nothing holds and nothing turns, so that the wheels have a step. Of
+/// any size: no torque acts on it.
 const HOLDS_A_FREE_OUTPUT: f64 = 1.0;
 /// Why Newton finds no place for an output that nothing holds.
-const FLOATS: &str = "without load and without drag nothing holds the output within its clearance; give it a load, or output.drag_torque_n_m";
+const FLOATS: &str = "without load and without drag nothing holds the output within its clearance; give it a load, or \
+                      output.drag_torque_n_m";
 /// Tangents remembered.
 const TANGENTS: usize = 12;
 
@@ -124,8 +132,8 @@ pub struct Increment {
     pub compliance_rad_per_n_m: f64,
     /// Force of the generator along its major axis on the half of the rim at 0°, outward, N.
     pub lobe_force_n: f64,
-    /// Largest contact pressure on a flank and on the bore, MPa; on a flank that of two elastic bodies under its force, where the load along the
-    /// face is largest ([`FlankContact::peak_pressure_mpa`]); on the bore that of the penalty.
+    /// Largest contact pressure on a flank and on the bore, MPa; on a flank that of two elastic bodies under its force,
+    /// where the load along the face is largest ([`FlankContact::peak_pressure_mpa`]); on the bore that of the penalty.
     pub peak_pressure_mpa: [f64; 2],
     /// The teeth and the load along the face.
     pub face: Face,
@@ -138,8 +146,8 @@ pub struct Face {
     pub tilt_rad: f64,
     /// Largest skew of a tooth, around along its face, rad.
     pub skew_rad: f64,
-    /// Load along the face of the flank with the largest load for its width anywhere: peak over mean. 1 where nothing leans, or
-    /// nothing bears.
+    /// Load along the face of the flank with the largest load for its width anywhere: peak over mean. 1 where nothing
+    /// leans, or nothing bears.
     pub peak_over_mean: f64,
     /// Share of the face of that flank that bears.
     pub share: f64,
@@ -258,8 +266,8 @@ impl<'p> Solver<'p> {
         unreachable!("the last softening is 1")
     }
 
-    /// Turns the generator to `generator_rad` and brings the load to `torque_n_m`, in one increment or, where Newton needs
-    /// it, in several.
+    /// Turns the generator to `generator_rad` and brings the load to `torque_n_m`, in one increment or, where Newton
+    /// needs it, in several.
     pub fn increment(
         &mut self,
         from: &State,
@@ -327,9 +335,9 @@ impl<'p> Solver<'p> {
         })
     }
 
-    /// Turns the generator on, by whole flexspline pitches and under the same load, to a place where an imperfect drive stands
-    /// differently: the state is turned with it, and a soft contact finds the way first. For flanks without friction: what they
-    /// remember is not carried along.
+    /// Turns the generator on, by whole flexspline pitches and under the same load, to a place where an imperfect drive
+    /// stands differently: the state is turned with it, and a soft contact finds the way first. For flanks without
+    /// friction: what they remember is not carried along.
     pub fn jump(&mut self, from: &State, generator_rad: f64) -> Result<(State, Increment), SolveError> {
         // The output goes on at its mean rate, whatever it did last.
         let from = &State { output_rate: 1.0 / self.problem.drive.ratio(), ..from.clone() };
@@ -338,9 +346,10 @@ impl<'p> Solver<'p> {
         Ok(solved)
     }
 
-    /// One part of an increment. A load that changes has no predictor: unless the load that there is shows the way, a soft contact finds it
-    /// first. Where one does not lead there the other may: teeth that bind without load sink into one another while they are soft, and
-    /// wedge (two rollers in a hat, loaded to twice the drag). Last of all each soft stage is brought to its end.
+    /// One part of an increment. A load that changes has no predictor: unless the load that there is shows the way, a
+    /// soft contact finds it first. Where one does not lead there the other may: teeth that bind without load sink into
+    /// one another while they are soft, and wedge (two rollers in a hat, loaded to twice the drag). Last of all each
+    /// soft stage is brought to its end.
     fn solve_part(
         &mut self,
         from: &State,
@@ -350,7 +359,8 @@ impl<'p> Solver<'p> {
         if torque_n_m == from.torque_n_m {
             let turned = self.newton(from, from, generator_rad, torque_n_m);
             return match turned {
-                // Halved as often as this, the way is not too long but blocked: with two rollers in a hat, teeth that wedge.
+                // Halved as often as this, the way is not too long but blocked: with two rollers in a hat, teeth that
+                // wedge.
                 Err(SolveError::NotConverged { .. }) if self.patient => {
                     self.newton_softly(from, generator_rad, torque_n_m, &LOADING_SOFTNESS)
                 }
@@ -505,14 +515,16 @@ impl<'p> Solver<'p> {
                 chords.clear();
                 self.made_at = relative;
             }
-            // The force along the step falls from `before` to nothing at the end of a perfect step; far beyond, halve it.
+            // The force along the step falls from `before` to nothing at the end of a perfect step; far beyond, halve
+            // it.
             let before = step.work(&residual);
             let mut length = (largest_step / step.largest()).min(1.0).min(8.0 * last_length);
             let motion = self.motion(&step);
             near.advance(length * motion);
             let mut mistaken = false;
             for trial in 0..=MOST_TRIALS {
-                // Teeth that come near from here on need their flanks in this state, too: the next candidate starts from it.
+                // Teeth that come near from here on need their flanks in this state, too: the next candidate starts
+                // from it.
                 if near.must_search() {
                     self.wheels.complete(&mut state);
                 }
@@ -555,8 +567,8 @@ impl<'p> Solver<'p> {
         Err(failed(history, if floats { FLOATS } else { "the iterations ran out" }))
     }
 
-    /// Bound on the motion of flanks against one another in a step, mm. Nodal displacements bound those between them to 1.25
-    /// (the Lebesgue constant of a quadratic).
+    /// Bound on the motion of flanks against one another in a step, mm. Nodal displacements bound those between them to
+    /// 1.25 (the Lebesgue constant of a quadratic).
     fn motion(&self, step: &Step) -> f64 {
         let largest = |x: &[f64]| x.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
         let nodes = largest(&step.u) + largest(&step.v);
@@ -761,8 +773,8 @@ impl<'p> Solver<'p> {
         if !chord || self.eliminated.is_none() {
             let clock = Instant::now();
             self.eliminated = None;
-            // Far from equilibrium the rim may resist no sliding along the generator; a grounded spring at every node then
-            // shortens the step and leaves its direction downhill.
+            // Far from equilibrium the rim may resist no sliding along the generator; a grounded spring at every node
+            // then shortens the step and leaves its direction downhill.
             let definite = std::iter::once(0.0).chain(GROUNDED_SPRINGS).any(|spring| self.wheels.factorise(spring));
             self.effort.factorisation += clock.elapsed();
             self.effort.factorisations += 1;
@@ -964,7 +976,8 @@ impl Leaning {
     }
 }
 
-/// The border of this drive; the columns of the output angle and of the amplitudes and the corner change with the contact.
+/// The border of this drive; the columns of the output angle and of the amplitudes and the corner change with the
+/// contact.
 fn fixed_border(problem: &Problem, wheels: &dyn Wheels) -> Border {
     let width = problem.first_amplitude().unwrap_or(problem.first_wave()) + problem.waves.len();
     let mut border = Border::zeros(wheels.unknowns(), width);

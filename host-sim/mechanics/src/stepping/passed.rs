@@ -6,8 +6,8 @@ use super::predictor::turn_field;
 use super::problem::Problem;
 use super::state::State;
 
-/// Number of states that the predictor interpolates in phase, how far off they may be and must be apart (pitches), and the
-/// largest weight.
+/// Number of states that the predictor interpolates in phase, how far off they may be and must be apart (pitches), and
+/// the largest weight.
 const PHASES: usize = 3;
 const PHASE_REACH: f64 = 0.06;
 const PHASES_APART: f64 = 1e-3;
@@ -55,10 +55,10 @@ impl Passed {
 
     /// State predicted for a generator angle: the wave turned, the output going on as it did before.
     ///
-    /// A drive in steady motion passes through the same state after every flexspline pitch, one tooth further: states that
-    /// stood nearly there, whole pitches ago, are turned and interpolated. Otherwise the last state, or one that needs a smaller fraction
-    /// of a pitch, is turned. An output that carries no load stays where it is when the generator reverses: it has the clearance to
-    /// cross.
+    /// A drive in steady motion passes through the same state after every flexspline pitch, one tooth further: states
+    /// that stood nearly there, whole pitches ago, are turned and interpolated. Otherwise the last state, or one that
+    /// needs a smaller fraction of a pitch, is turned. An output that carries no load stays where it is when the
+    /// generator reverses: it has the clearance to cross.
     pub fn predict(&self, problem: &Problem, from: &State, generator_rad: f64, torque_n_m: f64) -> State {
         let turn = generator_rad - from.generator_rad;
         if turn == 0.0 {
@@ -139,8 +139,8 @@ struct PhaseWeights {
     nearest: f64,
 }
 
-/// Interpolates (or goes on from) the few states whose distance in pitches is nearest to a whole number; the latest of those
-/// that coincide.
+/// Interpolates (or goes on from) the few states whose distance in pitches is nearest to a whole number; the latest of
+/// those that coincide.
 fn phase_weights(pitches: &[f64]) -> Option<PhaseWeights> {
     let off = |k: usize| pitches[k] - pitches[k].round();
     let mut order: Vec<usize> = (0..pitches.len()).collect();

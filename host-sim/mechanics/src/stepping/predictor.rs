@@ -1,7 +1,8 @@
 //! Travelling-wave predictor: the deformation turns with the generator.
 //!
-//! Node k of sector j is the rotated image of node k of sector 0, so the displacement of a node in polar components is a
-//! periodic function of the sector alone. Turning the wave by a fraction of a pitch is interpolation of that function.
+//! Node k of sector j is the rotated image of node k of sector 0, so the displacement of a node in polar components is
+//! a periodic function of the sector alone. Turning the wave by a fraction of a pitch is interpolation of that
+//! function.
 
 use crate::mesh::WheelMesh;
 
@@ -50,7 +51,8 @@ mod tests {
     use crate::drive::Drive;
     use crate::mesh::MeshLevel;
 
-    /// A wave of two lobes with its crest at `crest`: radial `cos 2(phi - crest)`, circumferential `-sin 2(phi - crest) / 2`.
+    /// A wave of two lobes with its crest at `crest`: radial `cos 2(phi - crest)`, circumferential
+    /// `-sin 2(phi - crest) / 2`.
     fn wave(mesh: &WheelMesh, crest: f64) -> Vec<f64> {
         mesh.nodes
             .iter()

@@ -51,8 +51,8 @@ impl FromStr for Method {
 
 /// What of the bore may not turn.
 ///
-/// A rim that is deformed by its generator turns locally by `v/R`, two waves around it: the mean of the whole bore does not see
-/// that, a single point carries it whole to the output.
+/// A rim that is deformed by its generator turns locally by `v/R`, two waves around it: the mean of the whole bore does
+/// not see that, a single point carries it whole to the output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Holding {
     /// The mean rotation of the whole bore: what a sleeve holds.
@@ -74,23 +74,23 @@ pub struct SolverSettings {
     pub method: Method,
     /// Mesh of both wheels.
     pub mesh: MeshLevel,
-    /// So many times the elements of that mesh in each direction. A finer mesh of the same level has its nodes, and more: what the
-    /// interval of a stress is taken from.
+    /// So many times the elements of that mesh in each direction. A finer mesh of the same level has its nodes, and
+    /// more: what the interval of a stress is taken from.
     pub refine: usize,
-    /// Contact penalty on the bore, N/mm³; `None` chooses by generator: 1e7 under rollers, whose contact is narrow and hard
-    /// pressed, 1e6 under discs and cam, which conform to the bore. Ten times more moves the output of HHD-95 at 50 N.m by
-    /// 0.02″ (cam), 0.01″ (double disc), 0.07″ (two-roller).
+    /// Contact penalty on the bore, N/mm³; `None` chooses by generator: 1e7 under rollers, whose contact is narrow and
+    /// hard pressed, 1e6 under discs and cam, which conform to the bore. Ten times more moves the output of HHD-95 at
+    /// 50 N.m by 0.02″ (cam), 0.01″ (double disc), 0.07″ (two-roller).
     pub bore_penalty: Option<f64>,
     /// Contact penalty on the flanks, N/mm³. Twice as much moves the output of HHD-95 at 50 N.m by 0.01″ (cam) to 0.04″
     /// (two-roller).
     pub flank_penalty: f64,
-    /// Integration points in each bore edge; `None` chooses by generator: 48 under rollers (a point every 4 µm; 16 leave
-    /// 0.07″ of false ripple and a rim that may slip along the roller by steps), 8 under discs and cam.
+    /// Integration points in each bore edge; `None` chooses by generator: 48 under rollers (a point every 4 µm; 16
+    /// leave 0.07″ of false ripple and a rim that may slip along the roller by steps), 8 under discs and cam.
     pub bore_points: Option<usize>,
     /// What holds the rotation of the flexspline.
     pub holding: Holding,
-    /// Straight facets in place of each flank of both wheels, as contact on the edges of a mesh has them; `None`: the curve. To
-    /// show what that does.
+    /// Straight facets in place of each flank of both wheels, as contact on the edges of a mesh has them; `None`: the
+    /// curve. To show what that does.
     pub flank_facets: Option<u32>,
     /// Residual force, relative to the largest contact force, at which an increment is done.
     pub tolerance: f64,
@@ -138,8 +138,8 @@ impl Default for SolverSettings {
     }
 }
 
-/// Torsional stiffness of the drag while the output sticks, N mm/rad per mm of width: 0.02 N.m on 20 mm is reached after
-/// 1e-9 rad (0.0002″), which is invisible.
+/// Torsional stiffness of the drag while the output sticks, N mm/rad per mm of width: 0.02 N.m on 20 mm is reached
+/// after 1e-9 rad (0.0002″), which is invisible.
 const DRAG_STICK_STIFFNESS: f64 = 1e9;
 
 /// A drive with one generator at one temperature.
@@ -315,7 +315,8 @@ impl Problem {
         state.leans = leans;
     }
 
-    /// The waves of the rim that shells beside it hold, in a state: harmonic, and amplitude a (mm) of `cos n theta` and of `sin n theta`.
+    /// The waves of the rim that shells beside it hold, in a state: harmonic, and amplitude a (mm) of `cos n theta` and
+    /// of `sin n theta`.
     pub fn rim_waves(&self, state: &State) -> Vec<(u32, [f64; 2])> {
         let pairs = self.third.additions.iter().zip(self.waves.chunks_exact(2));
         pairs.map(|(addition, waves)| (addition.n, [0, 1].map(|k| waves[k].amplitude(&state.u)))).collect()
@@ -334,7 +335,8 @@ impl Problem {
         if self.lateral_stiffness > 0.0 { LATERAL + 2 } else { LATERAL }
     }
 
-    /// Row of the border where the amplitudes of the waves begin, by which the teeth lean; none where the load along the face is even.
+    /// Row of the border where the amplitudes of the waves begin, by which the teeth lean; none where the load along
+    /// the face is even.
     pub(super) fn first_amplitude(&self) -> Option<usize> {
         (self.face.is_some() && !self.waves.is_empty()).then(|| self.first_wave() + self.waves.len())
     }
@@ -361,7 +363,8 @@ impl Problem {
         torque_n_m * 1e3 / self.drive.flexspline.width_mm
     }
 
-    /// Refuses a state in which wheels touch where no contact is modelled: a tooth of the flexspline in the root of a space.
+    /// Refuses a state in which wheels touch where no contact is modelled: a tooth of the flexspline in the root of a
+    /// space.
     pub(super) fn check_range(&self, state: &State) -> Result<(), SolveError> {
         let (mesh, _) = self.wheels();
         // As built, some root of a space may stand further in, and the tooth and the axis beside their places.
@@ -382,8 +385,8 @@ impl Problem {
                         generator_rad: state.generator_rad,
                         torque_n_m: state.torque_n_m,
                         what: format!(
-                            "the tip of flexspline tooth {tooth} reaches radius {radius:.3} mm, the root circle of the \
-                             circular spline is at {root:.3} mm, and contact of tip and root is not modelled"
+                            "the tip of flexspline tooth {tooth} reaches radius {radius:.3} mm, the root circle of \
+                             the circular spline is at {root:.3} mm, and contact of tip and root is not modelled"
                         ),
                     });
                 }
@@ -412,8 +415,8 @@ impl Problem {
         self.held.iter().map(&mut number).collect()
     }
 
-    /// A state of this problem on all nodes of both wheels ([`Problem::flexspline`], [`Problem::circular_spline`]): itself, or,
-    /// from the fast solver, with the nodes that were condensed away.
+    /// A state of this problem on all nodes of both wheels ([`Problem::flexspline`], [`Problem::circular_spline`]):
+    /// itself, or, from the fast solver, with the nodes that were condensed away.
     pub fn whole_state<'s>(&self, state: &'s State) -> Cow<'s, State> {
         match &self.condensed {
             Some(condensed) => Cow::Owned(condensed.recover(self, state)),
@@ -441,7 +444,8 @@ impl Problem {
         }
     }
 
-    /// Unknowns of the whole model: flexspline nodes, circular-spline nodes that are not held, two each, and the output angle.
+    /// Unknowns of the whole model: flexspline nodes, circular-spline nodes that are not held, two each, and the output
+    /// angle.
     pub fn degrees_of_freedom(&self) -> usize {
         self.degrees_of_freedom
     }
@@ -523,7 +527,8 @@ fn bore_averages(mesh: &WheelMesh, bore: &BoreContact, holding: Holding) -> (Vec
 mod tests {
     use super::*;
 
-    /// Whatever is held measures a rotation as a rotation; what the wave does along the circumference only the whole bore leaves out.
+    /// Whatever is held measures a rotation as a rotation; what the wave does along the circumference only the whole
+    /// bore leaves out.
     #[test]
     fn what_is_held_turns_with_the_rim() {
         let drive = Drive::hhd_95();

@@ -1,7 +1,7 @@
 //! The `reference` solver's wheels: every node of both meshes in one sparse matrix.
 //!
-//! The flexspline is geometrically non-linear (total Lagrangian); the circular spline, which hardly deforms, is linear in the
-//! frame that turns with it.
+//! The flexspline is geometrically non-linear (total Lagrangian); the circular spline, which hardly deforms, is linear
+//! in the frame that turns with it.
 
 use std::collections::BTreeMap;
 

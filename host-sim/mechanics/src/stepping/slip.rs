@@ -1,8 +1,9 @@
 //! The part of the tangent that is not symmetric: where flanks slip, their friction follows the pressure.
 //!
-//! At a point that slips under the gap g the traction along the flank is ±μ p, p = −k g. A change of the gap changes the force
-//! along the flank, a slip does not change the force across it. With the symmetric rest of the tangent K and the columns `s`
-//! (forces along the flank) and rows `g` (change of the gap) of all points that slip, scaled by `d = ∓μ k w`, the step solves
+//! At a point that slips under the gap g the traction along the flank is ±μ p, p = −k g. A change of the gap changes
+//! the force along the flank, a slip does not change the force across it. With the symmetric rest of the tangent K and
+//! the columns `s` (forces along the flank) and rows `g` (change of the gap) of all points that slip, scaled by
+//! `d = ∓μ k w`, the step solves
 //!
 //! ```text
 //! (K + Σ d s gᵀ) x = r

@@ -26,8 +26,8 @@ pub struct State {
     pub lateral_force: [f64; 2],
     /// Tangential tractions on the flanks of flexspline teeth (only with friction).
     pub friction: BTreeMap<(usize, Side), FrictionHistory>,
-    /// How each flexspline tooth leans along its face, outward and around, away from what holds the flexspline (rad): by the waves of the
-    /// rim and its taper. Empty where the load along the face is even.
+    /// How each flexspline tooth leans along its face, outward and around, away from what holds the flexspline (rad):
+    /// by the waves of the rim and its taper. Empty where the load along the face is even.
     pub leans: Vec<Lean>,
     /// Output turn per generator turn of the last increment: what the predictor expects to go on.
     pub output_rate: f64,

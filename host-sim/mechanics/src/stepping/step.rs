@@ -3,8 +3,8 @@
 use super::state::State;
 use super::waves::MOST_WAVES;
 
-/// Rows of the border: output angle, mean rotation of the bore, anchor, then where there are any lateral x and y, forces of the waves of
-/// the bore, and where teeth lean the amplitudes of these waves.
+/// Rows of the border: output angle, mean rotation of the bore, anchor, then where there are any lateral x and y,
+/// forces of the waves of the bore, and where teeth lean the amplitudes of these waves.
 pub(super) const OUTPUT: usize = 0;
 pub(super) const SLEEVE: usize = 1;
 pub(super) const ANCHORED: usize = 2;
@@ -31,7 +31,8 @@ pub(super) struct Residual {
     pub torque_round_off: f64,
     /// Largest pressure on the bore, MPa.
     pub bore_peak: f64,
-    /// Largest load for the width anywhere along the face of a flank, N/mm; of that flank peak over mean, and the share that bears.
+    /// Largest load for the width anywhere along the face of a flank, N/mm; of that flank peak over mean, and the share
+    /// that bears.
     pub line_load: f64,
     pub peak_over_mean: f64,
     pub face_share: f64,
@@ -116,8 +117,8 @@ impl Step {
     }
 }
 
-/// Broyden's update of an old tangent by the steps that were taken with it (Kelley, Iterative Methods for Linear and Nonlinear
-/// Equations, 1995, section 7.3): `step` is the old tangent's.
+/// Broyden's update of an old tangent by the steps that were taken with it (Kelley, Iterative Methods for Linear and
+/// Nonlinear Equations, 1995, section 7.3): `step` is the old tangent's.
 pub(super) fn improve(step: &mut Step, taken: &[Step]) {
     for pair in taken.windows(2) {
         let part = pair[0].dot(step) / pair[0].dot(&pair[0]);

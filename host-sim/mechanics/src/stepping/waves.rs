@@ -1,8 +1,8 @@
 //! The shells beside the rim in the plane model: waves of the bore that are held by more than the slice.
 //!
-//! Each harmonic n of the rim ([`crate::sleeve`]) has two phases, and each is one amplitude `a = w·u` of the bore's displacements with a
-//! stiffness k: energy `½ k a²`, forces `-k a w`, and `k w wᵀ` in the tangent. All nodes of the bore couple in it, so it stands in the border
-//! as a column w with `-1/k` in the corner.
+//! Each harmonic n of the rim ([`crate::sleeve`]) has two phases, and each is one amplitude `a = w·u` of the bore's
+//! displacements with a stiffness k: energy `½ k a²`, forces `-k a w`, and `k w wᵀ` in the tangent. All nodes of the
+//! bore couple in it, so it stands in the border as a column w with `-1/k` in the corner.
 
 use std::f64::consts::TAU;
 
@@ -68,8 +68,8 @@ pub(super) struct Third {
 }
 
 impl Third {
-    /// What the shells of a drive add to its plane slice; nothing where it has none. Odd harmonics are excited only where the drive is
-    /// not the same on both lobes.
+    /// What the shells of a drive add to its plane slice; nothing where it has none. Odd harmonics are excited only
+    /// where the drive is not the same on both lobes.
     pub fn of(drive: &Drive) -> Result<Third, MeshError> {
         let springs = &drive.sleeve;
         if !springs.is_shell() {
@@ -127,8 +127,8 @@ fn wave(drive: &Drive, mesh: &WheelMesh, bore: &BoreContact, addition: &Addition
     }
 }
 
-/// How the teeth lean along their faces for an amplitude of 1 mm: outward by the tilt of the rim, around by the slope of V. Half way up
-/// the flank, z above the middle of the rim, V is `V + z (V + n W)/R`, normals being straight.
+/// How the teeth lean along their faces for an amplitude of 1 mm: outward by the tilt of the rim, around by the slope
+/// of V. Half way up the flank, z above the middle of the rim, V is `V + z (V + n W)/R`, normals being straight.
 fn leans(drive: &Drive, mesh: &WheelMesh, addition: &Addition, phase: usize) -> Vec<Lean> {
     let (n, wheel) = (f64::from(addition.n), &drive.flexspline);
     let radius = wheel.neutral_radius_mm();
@@ -200,8 +200,9 @@ mod tests {
         assert!((1.0 / both - 1.0 / alone - 1.0 / 4e5).abs() < 1e-12);
     }
 
-    /// A cam in the sleeve of 0.5 mm, 140 mm to either side: solid elements and a rigid cam gave 2.4 kN a lobe without teeth, which add 2 to
-    /// 3 %. Under load the state repeats after a pitch, and the generator gives what load and drag take.
+    /// A cam in the sleeve of 0.5 mm, 140 mm to either side: solid elements and a rigid cam gave 2.4 kN a lobe without
+    /// teeth, which add 2 to 3 %. Under load the state repeats after a pitch, and the generator gives what load and
+    /// drag take.
     #[test]
     fn a_cam_in_a_closed_sleeve_pushes_with_kilonewtons_and_loses_nothing() {
         let drive = Drive::hhd_95().with_set("sleeve.kind=hermetic").unwrap();
@@ -222,7 +223,8 @@ mod tests {
         assert!((mean - expected).abs() < 1e-4, "{mean} N.m, expected {expected}");
     }
 
-    /// Mirrored in the axis of a tooth: the same drive under the opposite load, turned the other way, errs by the opposite.
+    /// Mirrored in the axis of a tooth: the same drive under the opposite load, turned the other way, errs by the
+    /// opposite.
     fn errs_by_the_opposite_when_mirrored(drive: &Drive) {
         let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
         let problem = Problem::new(drive, GeneratorKind::Cam, 20.0, settings).unwrap();
@@ -254,8 +256,8 @@ mod tests {
         drive.with_sets(["flexspline.face=slices", &format!("flexspline.taper_mrad={taper_mrad}")]).unwrap()
     }
 
-    /// Teeth that lean do work on the wave that leans them: without the force of the load's moment on it the generator would gain or lose
-    /// what the flanks do. And the state repeats.
+    /// Teeth that lean do work on the wave that leans them: without the force of the load's moment on it the generator
+    /// would gain or lose what the flanks do. And the state repeats.
     #[test]
     fn leaning_teeth_lose_nothing() {
         // Eight places sample the ripple of a cup, which bears on single edges, less well.
@@ -276,8 +278,8 @@ mod tests {
         }
     }
 
-    /// A taper against the cone levels the load along the face: best near the tilt of the rim where the teeth bear. The skew, which no
-    /// taper meets, is left.
+    /// A taper against the cone levels the load along the face: best near the tilt of the rim where the teeth bear. The
+    /// skew, which no taper meets, is left.
     #[test]
     fn a_taper_against_the_cone_levels_the_load() {
         let peak = |taper_mrad: f64| {
@@ -290,7 +292,8 @@ mod tests {
         assert!(some < 0.7 * straight && tapered < some && tapered < more, "{peaks:?}");
     }
 
-    /// A taper that is next to nothing leaves the plane drive what it is; the law of the face is then in force, with nothing to do.
+    /// A taper that is next to nothing leaves the plane drive what it is; the law of the face is then in force, with
+    /// nothing to do.
     #[test]
     fn a_straight_face_is_the_plane_slice() {
         let error = |drive: Drive| {
@@ -315,7 +318,8 @@ mod tests {
         assert!((tapered - plane).abs() > 0.01 && uneven > 1.5, "{tapered} {plane} {uneven}");
     }
 
-    /// Where few teeth touch, lightly and by their ends, there is an equilibrium as well, and it is found as fast as any.
+    /// Where few teeth touch, lightly and by their ends, there is an equilibrium as well, and it is found as fast as
+    /// any.
     #[test]
     fn leaning_teeth_that_hardly_touch_find_their_equilibrium() {
         let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
@@ -336,8 +340,9 @@ mod tests {
         }
     }
 
-    /// Straight teeth that wedge in a cup: the bore opens and closes under their cam with every step. With a line search that lets a step give
-    /// back nine tenths of what it took, iterations went round in a circle from 23.7 N·m on.
+    /// Straight teeth that wedge in a cup: the bore opens and closes under their cam with every step. With a line
+    /// search that lets a step give back nine tenths of what it took, iterations went round in a circle from 23.7 N·m
+    /// on.
     #[test]
     fn teeth_that_wedge_do_not_go_round_in_a_circle() {
         let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
@@ -378,7 +383,8 @@ mod tests {
         }
     }
 
-    /// The two solvers share what the shells add: they differ as they do without it. Standard mesh, minutes without optimisation.
+    /// The two solvers share what the shells add: they differ as they do without it. Standard mesh, minutes without
+    /// optimisation.
     #[test]
     #[ignore = "a minute; run by name"]
     fn both_solvers_agree_in_a_sleeve_and_in_a_cup() {
@@ -398,8 +404,8 @@ mod tests {
         }
     }
 
-    /// S-shaped teeth in the contact FEM: a pitch repeats, the generator takes what the load gives, and six times as many flanks bear as of
-    /// involutes. Cam and disc; two outlines without corners.
+    /// S-shaped teeth in the contact FEM: a pitch repeats, the generator takes what the load gives, and six times as
+    /// many flanks bear as of involutes. Cam and disc; two outlines without corners.
     #[test]
     fn s_shaped_teeth_lose_nothing_and_a_quarter_of_them_bears() {
         let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
@@ -412,10 +418,12 @@ mod tests {
             let places = motion.turn_in(2.0 * motion.pitch(), 16).unwrap();
             for k in 0..8 {
                 let apart = places[k + 8].error_arcsec - places[k].error_arcsec;
-                // 0.004 arcsec: the ends of the pressure at tips that bear hard are where integration points are laid out anew.
+                // 0.004 arcsec: the ends of the pressure at tips that bear hard are where integration points are laid
+                // out anew.
                 assert!(apart.abs() < 0.01, "{kind}: one pitch on the error differs by {apart}");
             }
-            // A hundredth was lost where points stood further apart than the few micrometres that curved flanks bear on.
+            // A hundredth was lost where points stood further apart than the few micrometres that curved flanks bear
+            // on.
             let mean = places[8..].iter().map(|place| place.increment.generator_torque_n_m).sum::<f64>() / 8.0;
             let expected = (drive.output.drag_torque_n_m - 200.0) / drive.ratio();
             println!("{kind}: {mean} {expected} N.m, {} flanks", places[8].increment.flank_contacts);
@@ -441,7 +449,8 @@ mod tests {
         assert!((fast - reference).abs() < 0.1, "{fast} {reference}");
     }
 
-    /// A preload is the depth that is missing of a worn flank, with the other sign: clearance opens by it along the normal.
+    /// A preload is the depth that is missing of a worn flank, with the other sign: clearance opens by it along the
+    /// normal.
     #[test]
     fn clearance_is_worn_flanks_by_another_name() {
         let play = |set: &str| {

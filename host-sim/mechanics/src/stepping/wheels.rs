@@ -14,13 +14,15 @@ pub(super) trait Wheels: Factor {
     /// Number of unknowns.
     fn unknowns(&self) -> usize;
 
-    /// Prepares for the contact of pairs that are near; `widely` looks further. Whether the factor there was has become void.
+    /// Prepares for the contact of pairs that are near; `widely` looks further. Whether the factor there was has become
+    /// void.
     fn prepare(&mut self, near: &[FlankPair], widely: &dyn Fn() -> Vec<FlankPair>) -> bool;
 
     /// Places the nodes of a state that [`Wheels::assemble`] leaves aside, being far from any contact.
     fn complete(&self, state: &mut State);
 
-    /// Places the nodes that have come near contact since the last solution, which a step of it therefore leaves behind.
+    /// Places the nodes that have come near contact since the last solution, which a step of it therefore leaves
+    /// behind.
     fn follow(&self, _state: &mut State) {}
 
     /// Begins anew at this state: subtracts the internal forces of both wheels from `force`. The tangent that
@@ -36,8 +38,8 @@ pub(super) trait Wheels: Factor {
     /// The direction held by [`super::newton::ANCHOR`] while the tangent is factorised: unknowns and weights.
     fn anchor(&self) -> Vec<(usize, f64)>;
 
-    /// Factorises the tangent, stiffened by `spring` (N/mm per mm) at every node or at some that hold the rest; false when it
-    /// is not positive definite.
+    /// Factorises the tangent, stiffened by `spring` (N/mm per mm) at every node or at some that hold the rest; false
+    /// when it is not positive definite.
     fn factorise(&mut self, spring: f64) -> bool;
 
     /// The factor, to be used again in a state like the one it was made for; `None` where that is not worth while.
@@ -45,8 +47,8 @@ pub(super) trait Wheels: Factor {
         None
     }
 
-    /// Uses a kept factor in a state that is turned by so many flexspline pitches against its own: it solves in the numbering of
-    /// its own state.
+    /// Uses a kept factor in a state that is turned by so many flexspline pitches against its own: it solves in the
+    /// numbering of its own state.
     fn recall(&mut self, _kept: &Kept, _pitches: isize) {}
 
     /// Turns a vector of forces or displacements by so many pitches of each wheel.

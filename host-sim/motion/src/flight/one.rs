@@ -47,7 +47,8 @@ kept!(Sensing {
 });
 
 impl OneJoint {
-    /// At rest at zero; with the image of a table that was made before, or one made for the scenario; with the core or with none.
+    /// At rest at zero; with the image of a table that was made before, or one made for the scenario; with the core or
+    /// with none.
     ///
     /// # Errors
     /// What cannot be flown, in words.
@@ -72,7 +73,8 @@ impl OneJoint {
         }
     }
 
-    /// As long as a tick without the servo: the motor's torque (N·m at the motor), and the torque on the load at both ends.
+    /// As long as a tick without the servo: the motor's torque (N·m at the motor), and the torque on the load at both
+    /// ends.
     pub fn push(&mut self, motor_n_m: f64, [first, last]: [f64; 2]) {
         let servo = &self.made.scenario.servo;
         let (motor_n_m, step_s) = (motor_n_m * self.made.unit.nominal.ratio, servo.tick_s / servo.steps as f64);

@@ -1,8 +1,9 @@
 //! The page of a diagnosis: what an analyst with a log file sees.
 //!
-//! The answer first, in one sentence and one number; then the picture before the verdict, which nobody has to believe; then what
-//! explains it, what that gains, what is wrong with the data, and what to record next. Residuals come row by row in three levels
-//! (nominal, recalibrated, with the causes), and a selector shows the picture of each: what the causes explain is gone in the last.
+//! The answer first, in one sentence and one number; then the picture before the verdict, which nobody has to believe;
+//! then what explains it, what that gains, what is wrong with the data, and what to record next. Residuals come row by
+//! row in three levels (nominal, recalibrated, with the causes), and a selector shows the picture of each: what the
+//! causes explain is gone in the last.
 
 mod orders;
 mod picture;
@@ -55,7 +56,8 @@ pub struct Part {
     pub adds_arcsec: Vec<f64>,
 }
 
-/// What each model leaves of the rows, and what each cause adds, from what the model that was found says of all sessions.
+/// What each model leaves of the rows, and what each cause adds, from what the model that was found says of all
+/// sessions.
 pub fn levels_and_parts(series: &[Series], extended: &Extended, diagnosis: &Diagnosis) -> (Vec<Level>, Vec<Part>) {
     let joined = |of: &dyn Fn(&Series) -> Vec<f64>| series.iter().flat_map(of).collect::<Vec<f64>>();
     let level = |id, name, residual_arcsec| Level { id, name, residual_arcsec };
@@ -248,8 +250,9 @@ impl Known<'_> {
         }
     }
 
-    /// What departs from the nominal model beyond noise, arcsec rms. Lines that averages hide are not in the residual: where that is no more than
-    /// noise they are what departs. Otherwise what was found is part of it, and two parts may cancel one another.
+    /// What departs from the nominal model beyond noise, arcsec rms. Lines that averages hide are not in the residual:
+    /// where that is no more than noise they are what departs. Otherwise what was found is part of it, and two parts
+    /// may cancel one another.
     fn departure_arcsec(&self) -> f64 {
         let (left, unexplained) = (self.sources.diagnosis.residual, &self.sources.diagnosis.unexplained);
         let beyond = (left.rms_before_arcsec.powi(2) - left.noise_floor_arcsec.powi(2)).max(0.0).sqrt();
@@ -295,7 +298,8 @@ impl Known<'_> {
             ),
             Verdict::None => (
                 Text::new(
-                    "Nothing found: the drive does what the nominal model says, within noise and the spread between units.",
+                    "Nothing found: the drive does what the nominal model says, within noise and the spread between \
+                     units.",
                 ),
                 Text::default().error(diagnosis.residual.rms_before_arcsec, 3),
                 "rms error of the nominal model, recalibrated to this unit".to_owned(),
@@ -315,7 +319,10 @@ impl Known<'_> {
                     .error(held.rms_before_arcsec, 3)
                     .plain(" to ")
                     .error(held.rms_after_arcsec, 3)
-                    .plain(" rms: first the nominal model recalibrated to this unit, then the same with the causes in it. Noise and wander of the measurement are ")
+                    .plain(
+                        " rms: first the nominal model recalibrated to this unit, then the same with the causes in \
+                         it. Noise and wander of the measurement are ",
+                    )
                     .error(left.noise_floor_arcsec, 3)
                     .plain("."),
             ));
@@ -440,17 +447,18 @@ impl Known<'_> {
             figure(
                 "over-time",
                 "What each model leaves, over time",
-                "Least and largest of each stretch of rows, so that single rows show. Nominal: the model as it was given. \
-                     Recalibrated: its zero, stiffness, backlash and harmonics as this unit has them, within the spread between \
-                     units. With the causes: what was named is in the model. Breaks between sessions are taken out.",
+                "Least and largest of each stretch of rows, so that single rows show. Nominal: the model as it was \
+                 given. Recalibrated: its zero, stiffness, backlash and harmonics as this unit has them, within the \
+                 spread between units. With the causes: what was named is in the model. Breaks between sessions are \
+                 taken out.",
                 self.time_axis(),
                 over_time,
             ),
             figure(
                 "over-turn",
                 "What each model leaves, over the generator's turn",
-                "Medians of all rows, both directions together. What is flat here may still depend on load or direction: see \
-                     the figures above, with the selector at the top.",
+                "Medians of all rows, both directions together. What is flat here may still depend on load or \
+                 direction: see the figures above, with the selector at the top.",
                 Axis::new("Generator angle in its turn", Quantity::Degree),
                 over_turn,
             ),
@@ -512,9 +520,10 @@ impl Known<'_> {
                 rows,
             ));
             blocks.push(Block::paragraph(format!(
-                "Confidence: that it is this cause and not its best rival, given that it is one of the library. Gain: share of the \
-                 squared error of the recalibrated nominal model that it removes in {}. Look-alikes: causes that these data \
-                 cannot tell from it. Parameters are of the law that was fitted; µm are displacements on the pitch circle.",
+                "Confidence: that it is this cause and not its best rival, given that it is one of the library. Gain: \
+                 share of the squared error of the recalibrated nominal model that it removes in {}. Look-alikes: \
+                 causes that these data cannot tell from it. Parameters are of the law that was fitted; µm are \
+                 displacements on the pitch circle.",
                 self.left_out()
             )));
             for cause in &diagnosis.causes {
@@ -592,8 +601,9 @@ impl Known<'_> {
         if !rows.is_empty() {
             blocks.push(table("The nominal model as this unit has it", &["Parameter", "Against nominal"], rows));
             blocks.push(Block::paragraph(
-                "Within the spread between units: wind-up and clearance by these shares of nominal, each harmonic by a share of its \
-                 amplitude in phase with it and a quarter of a wave before it. The zero is that of the encoder.",
+                "Within the spread between units: wind-up and clearance by these shares of nominal, each harmonic by \
+                 a share of its amplitude in phase with it and a quarter of a wave before it. The zero is that of the \
+                 encoder.",
             ));
         }
         Section { id: "gain".into(), title: "What it gains".into(), detail: Detail::Summary, blocks }
@@ -633,8 +643,8 @@ impl Known<'_> {
         let text = match &self.sources.diagnosis.next_experiment {
             Some(next) => Text::default().strong("Record next: ").plain(format!("{next}.")),
             None if self.sources.diagnosis.verdict == Verdict::Unknown => Text::new(
-                "The same motion again, on another day, shows whether the remainder is the drive's. Torque, temperature and \
-                 orientation, where they were not recorded, tell more causes apart.",
+                "The same motion again, on another day, shows whether the remainder is the drive's. Torque, \
+                 temperature and orientation, where they were not recorded, tell more causes apart.",
             ),
             None => Text::new("Nothing: no two causes that these data cannot tell apart explain them equally well."),
         };
@@ -750,22 +760,24 @@ impl Known<'_> {
     fn reading(&self) -> Section {
         Section::reading(vec![
             Block::paragraph(
-                "Error: output angle less generator angle over the ratio; positive when the output leads. ψ is the angle of the \
-                     generator, δ that of the output. Forward is growing generator angle.",
+                "Error: output angle less generator angle over the ratio; positive when the output leads. ψ is the \
+                 angle of the generator, δ that of the output. Forward is growing generator angle.",
             ),
             Block::paragraph(
-                "The selector shows the same figures of what the nominal model leaves, of what it leaves recalibrated to this \
-                     unit, and of what is left with the causes that were named. A cause that is right takes its marks away in the \
-                     last without putting others in their place.",
+                "The selector shows the same figures of what the nominal model leaves, of what it leaves recalibrated \
+                 to this unit, and of what is left with the causes that were named. A cause that is right takes its \
+                 marks away in the last without putting others in their place.",
             ),
             Block::paragraph(format!(
-                "A name is given only where a cause gains in {}, where no rival does as well, and where it is large enough \
-                     against noise and against how wrong its law may be. What does not meet that is described and not named.",
+                "A name is given only where a cause gains in {}, where no rival does as well, and where it is large \
+                 enough against noise and against how wrong its law may be. What does not meet that is described and \
+                 not named.",
                 self.left_out()
             )),
             Block::paragraph(
-                "Figures zoom by dragging and come back by a double click. Every figure has its numbers as a table and as CSV, in \
-                     the unit that is selected; of many rows it holds what is drawn, which is a part of them.",
+                "Figures zoom by dragging and come back by a double click. Every figure has its numbers as a table \
+                 and as CSV, in the unit that is selected; of many rows it holds what is drawn, which is a part of \
+                 them.",
             ),
             Block::paragraph(format!("Verdict: {}.", words::verdict(self.sources.diagnosis.verdict))),
         ])

@@ -110,8 +110,8 @@ impl Known<'_> {
             blocks.push(self.figure(
                 "map",
                 "Over one turn of generator and output",
-                "Median of the rows in each cell; cells that were not visited are empty. What sits on the generator stands upright, \
-                 what sits on the output lies flat, what sits on the wheel that turns runs aslant.",
+                "Median of the rows in each cell; cells that were not visited are empty. What sits on the generator \
+                 stands upright, what sits on the output lies flat, what sits on the wheel that turns runs aslant.",
                 FigureBody::Field {
                     x: Axis::new("Generator angle ψ in its turn", Quantity::Degree),
                     y: Axis::new("Output angle δ in its turn", Quantity::Degree),
@@ -124,7 +124,8 @@ impl Known<'_> {
             blocks.extend(self.lines(
                 "over-torque",
                 "Over the load torque",
-                "Dots are some rows, lines medians of all. A slope is stiffness, a step at zero backlash, a loop hysteresis.",
+                "Dots are some rows, lines medians of all. A slope is stiffness, a step at zero backlash, a loop \
+                 hysteresis.",
                 Axis::new("Load torque", Quantity::Torque),
                 |shown| self.over(&rows.torque, shown),
             ));
@@ -142,7 +143,8 @@ impl Known<'_> {
             blocks.extend(self.lines(
                 "over-speed",
                 "Over the generator speed",
-                "Dots are some rows, lines medians of all. Sensors read at different instants make a straight line through zero.",
+                "Dots are some rows, lines medians of all. Sensors read at different instants make a straight line \
+                 through zero.",
                 Axis::new("Generator speed", Quantity::Speed),
                 |shown| self.over(&rows.speed, shown),
             ));
@@ -218,7 +220,8 @@ impl Known<'_> {
             blocks.extend(self.lines(
                 &format!("angle-{id}"),
                 &format!("Over one turn of {symbol}: {wheel}"),
-                "Medians of bins of three degrees, by direction. A sound drive has what its nominal model has, and these are flat.",
+                "Medians of bins of three degrees, by direction. A sound drive has what its nominal model has, and \
+                 these are flat.",
                 Axis::new(format!("{symbol} in its turn"), Quantity::Degree),
                 |shown| {
                     let mut lines = Lines::default();
@@ -247,9 +250,9 @@ impl Known<'_> {
         for (angle, id) in ANGLES {
             let (symbol, wheel) = self.angle_name(angle);
             let caption = format!(
-                "Amplitude of the sine that explains most at each order ({wheel}: whole orders), and the level that noise exceeds \
-                 nowhere but once in a thousand spectra. Points are lines above it. Upright: where the causes that were named put \
-                 theirs."
+                "Amplitude of the sine that explains most at each order ({wheel}: whole orders), and the level that \
+                 noise exceeds nowhere but once in a thousand spectra. Points are lines above it. Upright: where the \
+                 causes that were named put theirs."
             );
             blocks.extend(self.lines(
                 &format!("orders-{id}"),
@@ -358,8 +361,8 @@ impl Known<'_> {
     fn drift(&self) -> Section {
         let rows = &self.rows;
         let mut blocks = Vec::new();
-        let caption = "Medians of up to 24 stretches of each session, a standard deviation on either side; breaks between sessions are \
-                       taken out.";
+        let caption = "Medians of up to 24 stretches of each session, a standard deviation on either side; breaks \
+                       between sessions are taken out.";
         blocks.extend(self.lines("drift", "Over time", caption, self.time_axis(), |shown| {
             let drift = &shown.picture.as_ref()?.drift;
             let mut parts: [Vec<[f64; 2]>; 3] = Default::default();

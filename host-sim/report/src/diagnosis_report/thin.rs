@@ -1,4 +1,5 @@
-//! Forty thousand rows to what a chart can show: the least and the largest of each stretch, medians of bins, some rows of all.
+//! Forty thousand rows to what a chart can show: the least and the largest of each stretch, medians of bins, some rows
+//! of all.
 
 use crate::page::{Mark, Series, Upright};
 use flexspline_identify::diagnosis::rows::Rows;
@@ -82,7 +83,8 @@ pub(super) fn envelope(rows: &Rows, clock: &Clock, values: &[f64], name: &str, c
     Series { name: name.to_owned(), mark: Mark::Broken, colour, points }
 }
 
-/// Which rows are shown as dots: one of each stretch of equally many, drawn, so that they fall in with no rhythm of the drive.
+/// Which rows are shown as dots: one of each stretch of equally many, drawn, so that they fall in with no rhythm of the
+/// drive.
 pub(super) fn some_rows(rows: usize) -> Vec<usize> {
     if rows <= DOTS {
         return (0..rows).collect();

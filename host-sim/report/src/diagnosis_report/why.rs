@@ -1,4 +1,5 @@
-//! Why these causes, and not others: the gate that decided for each cause of the library, and every gate that it came to.
+//! Why these causes, and not others: the gate that decided for each cause of the library, and every gate that it came
+//! to.
 
 use super::{table, words};
 use crate::page::{Block, Detail, Section, Text, significant};
@@ -15,8 +16,8 @@ pub(super) fn in_short(diagnosis: &Diagnosis) -> Section {
     let rows = CauseName::ALL.iter().map(|cause| decided(diagnosis, *cause)).collect();
     let blocks = vec![
         Block::paragraph(
-            "Every cause of the library comes to the same gates; a name needs all of them. For each cause this is the gate that decided: \
-             for one that is not named the one that it did not pass.",
+            "Every cause of the library comes to the same gates; a name needs all of them. For each cause this is the \
+             gate that decided: for one that is not named the one that it did not pass.",
         ),
         table("The gate that decided for each cause", &["Cause", "Named", "What decided", "Found", "Asked for"], rows),
     ];
@@ -26,8 +27,8 @@ pub(super) fn in_short(diagnosis: &Diagnosis) -> Section {
 /// Every gate that the causes came to which were refined at least.
 pub(super) fn gate_by_gate(diagnosis: &Diagnosis) -> Section {
     let mut blocks = vec![Block::paragraph(
-        "All gates that a cause came to, in their order, for causes that were at least refined. A sentence is what the gate asks of the \
-         cause. Later rounds begin with the causes that the earlier ones chose.",
+        "All gates that a cause came to, in their order, for causes that were at least refined. A sentence is what \
+         the gate asks of the cause. Later rounds begin with the causes that the earlier ones chose.",
     )];
     for cause in CauseName::ALL {
         let steps = diagnosis.trace.telling(*cause);

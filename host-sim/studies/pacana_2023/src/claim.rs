@@ -109,8 +109,8 @@ pub struct Claim {
     pub reason: String,
 }
 
-/// The verdict, from the checks alone: a failed check of the paper's own numbers is an inconsistency; what is missing, or a number that
-/// no run gave, leaves a claim untestable; else the model's checks decide.
+/// The verdict, from the checks alone: a failed check of the paper's own numbers is an inconsistency; what is missing,
+/// or a number that no run gave, leaves a claim untestable; else the model's checks decide.
 pub fn verdict(checks: &[Check], missing: bool) -> Verdict {
     let of = |whose| checks.iter().filter(move |check| check.of == whose);
     if of(Of::Paper).any(|check| !check.passes()) {

@@ -1,4 +1,5 @@
-//! What would have to be changed in the model to get the paper's errors of 10′ to 21′: each suspect alone, through the same protocol.
+//! What would have to be changed in the model to get the paper's errors of 10′ to 21′: each suspect alone, through the
+//! same protocol.
 
 use serde::Serialize;
 
@@ -39,8 +40,8 @@ pub enum Change {
     FourPoints,
 }
 
-/// Angle of the point of [`Change::OnePointAside`] from the major axis at the start, degrees: by the cam's `v = −(w0/2) sin 2φ` the
-/// error then is zero again after 1 rad, at `φ = (3π + 2)/4`, which is 163.6° or −16.4°.
+/// Angle of the point of [`Change::OnePointAside`] from the major axis at the start, degrees: by the cam's
+/// `v = −(w0/2) sin 2φ` the error then is zero again after 1 rad, at `φ = (3π + 2)/4`, which is 163.6° or −16.4°.
 const ASIDE_DEG: i32 = -16;
 /// Friction coefficient and drag of [`Change::Friction`].
 const FRICTION: (f64, f64) = (0.15, 20.0);
@@ -100,16 +101,13 @@ impl Change {
     pub fn what(self) -> String {
         match self {
             Change::None => "Nothing is changed; coarse mesh, as in all these runs.".into(),
-            Change::StartUp => {
-                "The error is set to zero with the output against its other flank, as if it had last been driven \
-                                backwards; the run is the one above."
-                    .into()
-            }
+            Change::StartUp => "The error is set to zero with the output against its other flank, as if it had last \
+                                been driven backwards; the run is the one above."
+                .into(),
             Change::NoDrag => format!("Drag on the output {HARDLY_ANY_DRAG} N·m in place of 0.02 N·m."),
-            Change::Facets => {
-                "Each flank of both wheels is a single straight facet, as on a mesh with one linear element there."
-                    .into()
-            }
+            Change::Facets => "Each flank of both wheels is a single straight facet, as on a mesh with one linear \
+                               element there."
+                .into(),
             Change::SoftContact => {
                 format!("All contact penalties {SOFT:.0} N/mm³, a thousandth of what is used and less.")
             }
@@ -121,11 +119,9 @@ impl Change {
                 "The output is braked with the paper's {} N·m in either direction, in place of being loaded.",
                 paper::TORQUE_N_M
             ),
-            Change::OnePoint => {
-                "The flexspline is kept from turning at a single node of its bore, on the major axis at the start, \
-                                 in place of the mean of the bore."
-                    .into()
-            }
+            Change::OnePoint => "The flexspline is kept from turning at a single node of its bore, on the major axis \
+                                 at the start, in place of the mean of the bore."
+                .into(),
             Change::OnePointAside => format!("The same at a node −{}° from the major axis.", ASIDE_DEG.abs()),
             Change::FourPoints => {
                 "The flexspline is kept from turning by the mean of four nodes of its bore, 90° apart.".into()
@@ -160,8 +156,8 @@ impl Change {
             Change::Friction => "friction of the flanks with some drag",
             Change::Drag => "an output that is braked by 200 N·m and lags by its wind-up either way",
             Change::OnePoint => {
-                "a rim that is kept from turning at a single point, whose tangential displacement v in the wave is then read as \
-                 motion of the output"
+                "a rim that is kept from turning at a single point, whose tangential displacement v in the wave is \
+                 then read as motion of the output"
             }
             Change::OnePointAside => {
                 "the same point held elsewhere, where the error may vanish at 1 rad and be larger on the way back"
@@ -172,8 +168,8 @@ impl Change {
         }
     }
 
-    /// Whether a generator is run with it. Two rollers do not hold the rim against such a drag; held at one point between them it finds
-    /// no equilibrium by this solver, near 0.3 rad.
+    /// Whether a generator is run with it. Two rollers do not hold the rim against such a drag; held at one point
+    /// between them it finds no equilibrium by this solver, near 0.3 rad.
     fn suits(self, kind: GeneratorKind) -> bool {
         let beyond = matches!(self, Change::Drag | Change::Friction | Change::OnePoint | Change::OnePointAside);
         kind != GeneratorKind::TwoRoller || !beyond
@@ -228,7 +224,8 @@ pub struct Experiment {
     pub what: String,
     /// By generator.
     pub effects: Vec<Effect>,
-    /// Mean of |ln(largest error / the paper's)| over the generators that the paper has a number for; 0 is the paper's size.
+    /// Mean of |ln(largest error / the paper's)| over the generators that the paper has a number for; 0 is the paper's
+    /// size.
     pub distance: Option<f64>,
     /// Whether the largest error lies within the paper's 10.3′ to 21.4′ for every generator that has a number.
     pub reaches: bool,

@@ -1,8 +1,8 @@
 //! The paper's protocol beside the paper's results, claim by claim.
 //!
-//! Pacana et al. (Appl. Sci. 13, 2023) turned a plane model of a hermetic harmonic drive by +1 rad and −2 rad under four wave
-//! generators. Here the same is done with the drive of this project, by contact FEM; each statement of the paper gets the number that
-//! would bear it out, a criterion, and a verdict that follows from the two.
+//! Pacana et al. (Appl. Sci. 13, 2023) turned a plane model of a hermetic harmonic drive by +1 rad and −2 rad under
+//! four wave generators. Here the same is done with the drive of this project, by contact FEM; each statement of the
+//! paper gets the number that would bear it out, a criterion, and a verdict that follows from the two.
 //!
 //! 1. `runs`: the protocol, standard and with another mesh, increment and penalty;
 //! 2. `metrics`: what a run comes to; `rank`: when one is more than another;
@@ -89,7 +89,8 @@ pub struct Reproduction {
     pub experiments: Vec<Experiment>,
     /// Runs of the drive itself that found no equilibrium, in words.
     pub not_converged: Vec<String>,
-    /// Changed models that have none, in words: what comes of the change, and no failure. A changed model need not be one that stands.
+    /// Changed models that have none, in words: what comes of the change, and no failure. A changed model need not be
+    /// one that stands.
     pub changes_without_equilibrium: Vec<String>,
     /// Time, s.
     pub wall_s: f64,

@@ -1,4 +1,5 @@
-//! What a run of the protocol comes to. Each metric is one thing and keeps its name: a lag is no ripple, a ripple no lost motion.
+//! What a run of the protocol comes to. Each metric is one thing and keeps its name: a lag is no ripple, a ripple no
+//! lost motion.
 //!
 //! ```text
 //!  e ^        B ______________________ C   e_b   backward: the other flank drives
@@ -7,8 +8,8 @@
 //!    |  \_______________ A                 e_f   forward, after start-up
 //! ```
 //!
-//! - *largest lag*: largest |e| from the start to the turn, and on the way back, from where the drive was deformed, the output in the
-//!   middle of its clearance;
+//! - *largest lag*: largest |e| from the start to the turn, and on the way back, from where the drive was deformed, the
+//!   output in the middle of its clearance;
 //! - *mean lag* e_f, e_b: over whole tooth pitches after start-up;
 //! - *ripple*: largest less smallest e of one way after start-up;
 //! - *half-width at reversal*: (e_b − e_f) / 2; the whole is the backlash at no load;
@@ -44,7 +45,8 @@ pub struct ProtocolMetrics {
     pub error_at_end_arcsec: f64,
     /// Mean of |e(B–C) − e(0–A)| at the same generator angles, the start and A–B left out.
     pub lost_motion_arcsec: Option<f64>,
-    /// How far the error moves over a pitch a third of the way on against the last before the turn; a perfect drive repeats.
+    /// How far the error moves over a pitch a third of the way on against the last before the turn; a perfect drive
+    /// repeats.
     pub drift_arcsec: Option<f64>,
     /// Largest von Mises stress on the path, MPa.
     pub peak_mpa: f64,

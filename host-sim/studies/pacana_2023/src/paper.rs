@@ -31,8 +31,8 @@ pub const MODEL_THICKNESS_MM: f64 = 1.0;
 pub const FACE_WIDTH_MM: Option<f64> = None;
 /// How the curves of figures 14 and 15 are labelled: no load (black), load with the motion (green), against it (red).
 pub const LOAD_LABELS: [u32; 3] = [0, 2, 2];
-/// Whether the load matters for the accuracy: section 4, above figure 16 ("significant impact"), and section 5 ("no negative effect …
-/// regardless of its direction").
+/// Whether the load matters for the accuracy: section 4, above figure 16 ("significant impact"), and section 5 ("no
+/// negative effect … regardless of its direction").
 pub const LOAD_MATTERS: [bool; 2] = [true, false];
 /// Backlash of the double-disc drive, arc-minutes: below figure 17.
 pub const BACKLASH_DOUBLE_DISC_ARCMIN: f64 = 1.16;
@@ -55,7 +55,8 @@ pub fn error_rad(kind: GeneratorKind) -> Option<f64> {
     }
 }
 
-/// The order of the errors that the paper gives: the larger rank has the larger error; two-roller is "similar" to four-roller.
+/// The order of the errors that the paper gives: the larger rank has the larger error; two-roller is "similar" to
+/// four-roller.
 pub const ERROR_RANK: [(GeneratorKind, u32); 4] = [
     (GeneratorKind::FourRoller, 2),
     (GeneratorKind::TwoRoller, 2),
@@ -73,8 +74,8 @@ pub fn share_of_travel(error_rad: f64) -> f64 {
     error_rad * ARCMIN_PER_RAD / output_travel_arcmin()
 }
 
-/// Circular-spline teeth for which formula (6) puts a tooth that is on a tooth at the minor axis into a space at the major axis:
-/// half a pitch `π/z` in a quarter turn of the generator.
+/// Circular-spline teeth for which formula (6) puts a tooth that is on a tooth at the minor axis into a space at the
+/// major axis: half a pitch `π/z` in a quarter turn of the generator.
 pub fn circular_spline_teeth() -> f64 {
     PI / (FRAC_PI_2 / RATIO)
 }

@@ -1,5 +1,5 @@
-//! Ranks with their discretisation spread: which generator has more of something is only said where the gap exceeds three times
-//! what mesh, increment and penalty move that gap by.
+//! Ranks with their discretisation spread: which generator has more of something is only said where the gap exceeds
+//! three times what mesh, increment and penalty move that gap by.
 
 use serde::Serialize;
 
@@ -25,8 +25,9 @@ impl Measured {
         Measured { value, spread, variants }
     }
 
-    /// The gap to another over the spread of that gap, signed: above [`SPREADS`] this one is larger, below −[`SPREADS`] smaller. The
-    /// spread is that of the difference in each variant, both being discretised alike: what moves both does not count.
+    /// The gap to another over the spread of that gap, signed: above [`SPREADS`] this one is larger, below −[`SPREADS`]
+    /// smaller. The spread is that of the difference in each variant, both being discretised alike: what moves both
+    /// does not count.
     pub fn gap_in_spreads(&self, other: &Measured) -> f64 {
         let gap = self.value - other.value;
         let paired = self.variants.iter().filter_map(|(name, value)| {
@@ -40,8 +41,8 @@ impl Measured {
     }
 }
 
-/// Kendall's rank correlation of two rankings over the pairs that the first one orders: concordant less discordant over all; a pair
-/// whose `ours` is closer than the spread allows counts as neither.
+/// Kendall's rank correlation of two rankings over the pairs that the first one orders: concordant less discordant over
+/// all; a pair whose `ours` is closer than the spread allows counts as neither.
 pub fn kendall_tau(paper_ranks: &[u32], ours: &[Measured]) -> Agreement {
     let mut agreement = Agreement { concordant: 0, discordant: 0, undecided: 0, tau: f64::NAN };
     for i in 0..ours.len() {

@@ -1,5 +1,5 @@
-//! The runs: the paper's protocol with each generator, the same with another discretisation, and what one of them shows of the
-//! deformed flexspline.
+//! The runs: the paper's protocol with each generator, the same with another discretisation, and what one of them shows
+//! of the deformed flexspline.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::fmt;
@@ -88,10 +88,11 @@ impl Job {
 /// The drive as it was deformed, at generator angle 0 and no load.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Snapshot {
-    /// Path of a tooth tip past the tooth it meets at the minor axis, the frame of the paper's figure 6: angle from the major axis
-    /// (rad), w and v (mm). All teeth of a quarter at once, which is one tooth through a quarter turn.
+    /// Path of a tooth tip past the tooth it meets at the minor axis, the frame of the paper's figure 6: angle from the
+    /// major axis (rad), w and v (mm). All teeth of a quarter at once, which is one tooth through a quarter turn.
     pub tip_path: Vec<[f64; 3]>,
-    /// Largest von Mises stress in each sector of the flexspline: angle from the major axis (degrees, −90 to 90) and MPa.
+    /// Largest von Mises stress in each sector of the flexspline: angle from the major axis (degrees, −90 to 90) and
+    /// MPa.
     pub stress: Vec<[f64; 2]>,
 }
 

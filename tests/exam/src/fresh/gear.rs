@@ -1,9 +1,10 @@
 //! The gear of families D and E: where the teeth let the hub of the output rest, and the spring behind the hub.
 //!
-//! Order of the parts: generator, teeth with clearance, hub with friction against the housing, spring, flange, torque sensor,
-//! load. A positive load turns the output forward. The teeth of two zones, half a turn of the generator apart, hold the hub
-//! between a lower and an upper limit. Each zone has limits of its own; they share by a sum of exponentials, as many teeth
-//! with spread gaps do: nearly the tighter zone alone without load, nearly the mean of both under load.
+//! Order of the parts: generator, teeth with clearance, hub with friction against the housing, spring, flange, torque
+//! sensor, load. A positive load turns the output forward. The teeth of two zones, half a turn of the generator apart,
+//! hold the hub between a lower and an upper limit. Each zone has limits of its own; they share by a sum of
+//! exponentials, as many teeth with spread gaps do: nearly the tighter zone alone without load, nearly the mean of both
+//! under load.
 
 use std::f64::consts::{PI, TAU};
 
@@ -137,7 +138,8 @@ impl<'a> Gear<'a> {
                     }
                 }
                 Thing::Cause(Cause::GeneratorEccentricity) => {
-                    // One lobe is deeper, so its zone is tight on both flanks and shows the first order of either wheel.
+                    // One lobe is deeper, so its zone is tight on both flanks and shows the first order of either
+                    // wheel.
                     let deeper = match self.laws {
                         Laws::D => 0.7 * size,
                         Laws::E => 0.7 * size * (-at.torque_n_m.abs() / (0.6 * rated)).exp(),
@@ -181,7 +183,8 @@ impl<'a> Gear<'a> {
                         };
                 }
                 Thing::Cause(Cause::ThermalClearance) => {
-                    // The housing opens the circular spline; the generator, which follows the teeth, closes the clearance.
+                    // The housing opens the circular spline; the generator, which follows the teeth, closes the
+                    // clearance.
                     let warmer = match self.laws {
                         Laws::D => 1.4 * (at.housing_c - 20.0) - 0.4 * (at.temperature_c - 20.0),
                         Laws::E => at.housing_c - 20.0,
@@ -244,7 +247,8 @@ impl<'a> Gear<'a> {
 
     /// Torque of the spring at a deflection (output ahead of the hub positive), N m.
     pub fn torque(&self, deflection_arcsec: f64, at: &Place) -> f64 {
-        // The catalogue's deflection is the torque's over the factor, so the spring is read at the stretched deflection.
+        // The catalogue's deflection is the torque's over the factor, so the spring is read at the stretched
+        // deflection.
         let x = (deflection_arcsec * self.stiffer(at, deflection_arcsec)).abs();
         let part = self.corners.iter().rposition(|(from, _)| *from <= x).unwrap_or(0);
         let (from, torque) = self.corners[part];
@@ -378,7 +382,8 @@ fn profile(one: &Hides, laws: Laws) -> Vec<f64> {
                 .collect();
             (0..PROFILE).map(|at| lines.iter().map(|(k, a, p)| a * (k * angle(at) + p).sin()).sum()).collect()
         }
-        // Cut in two passes by an indexing head that gained in each: a saw-tooth twice around, and one of another height once.
+        // Cut in two passes by an indexing head that gained in each: a saw-tooth twice around, and one of another
+        // height once.
         Laws::E => {
             let (start, uneven) = (one.shape[0], 0.3 + 0.4 * one.shape[2]);
             let raw: Vec<f64> = (0..PROFILE)

@@ -1,10 +1,10 @@
-//! Family D: a joint in motion. Motor and load have inertia, the gear between them gives way, a servo turns the motor, the load
-//! is an arm under gravity and a brake, and a logger polls both encoders one after the other.
+//! Family D: a joint in motion. Motor and load have inertia, the gear between them gives way, a servo turns the motor,
+//! the load is an arm under gravity and a brake, and a logger polls both encoders one after the other.
 //!
 //! Equations, with the parts of [`Gear`] between them (ψ generator, p hub, θ output, T torque of the spring):
-//! `J_m ψ'' = τ - friction(ψ') - N dp/dψ`, `N = f(p') - T` where a flank pushes the hub and 0 elsewhere, `J_l θ'' = -(T - unseen) + load -
-//! friction(θ')`. In the clearance the hub, which has no mass, gives way until its friction holds the spring. Semi-implicit Euler; dry
-//! friction takes at most the momentum that is there.
+//! `J_m ψ'' = τ - friction(ψ') - N dp/dψ`, `N = f(p') - T` where a flank pushes the hub and 0 elsewhere,
+//! `J_l θ'' = -(T - unseen) + load - friction(θ')`. In the clearance the hub, which has no mass, gives way until its
+//! friction holds the spring. Semi-implicit Euler; dry friction takes at most the momentum that is there.
 
 use std::collections::VecDeque;
 use std::f64::consts::{PI, TAU};
@@ -164,7 +164,8 @@ impl Joint {
                 }
             })
             .collect();
-        // Above what the lines of the gear excite at these speeds: a joint that rattles through its clearance is not run so.
+        // Above what the lines of the gear excite at these speeds: a joint that rattles through its clearance is not
+        // run so.
         let mode = TAU * chance.log_uniform(12.0, 30.0);
         let stiffness = drive.first_stiffness();
         let load = stiffness / (mode * mode);

@@ -1,5 +1,5 @@
-//! Faults of loggers and of those who set them up, on a drive that has nothing: it is exactly as its catalogue says. A name of a
-//! cause is wrong; the fault is to be told.
+//! Faults of loggers and of those who set them up, on a drive that has nothing: it is exactly as its catalogue says. A
+//! name of a cause is wrong; the fault is to be told.
 
 use serde::{Serialize, Serializer};
 use std::f64::consts::TAU;
@@ -25,8 +25,8 @@ macro_rules! faults {
                 match self { $(Self::$variant => $name),* }
             }
 
-            /// Names in `diagnosis.json` that tell it, of faults and of causes that are the same thing; of none, nothing in
-            /// the angles is wrong, and silence is right.
+            /// Names in `diagnosis.json` that tell it, of faults and of causes that are the same thing; of none,
+            /// nothing in the angles is wrong, and silence is right.
             pub fn told_by(self) -> &'static [&'static str] {
                 match self { $(Self::$variant => &[$($told),*]),* }
             }

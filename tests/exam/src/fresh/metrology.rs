@@ -1,6 +1,7 @@
-//! Family E: a slow bench. An autocollimator or an index table reads the output while the drive stands: it moves on, waits, is
-//! read several times. Weights on a lever or over a pulley load it in steps. Some sessions turn slowly behind a heavy flywheel.
-//! Between sessions the bench may be set to zero anew, and the counter of the motor may start again some turns off.
+//! Family E: a slow bench. An autocollimator or an index table reads the output while the drive stands: it moves on,
+//! waits, is read several times. Weights on a lever or over a pulley load it in steps. Some sessions turn slowly behind
+//! a heavy flywheel. Between sessions the bench may be set to zero anew, and the counter of the motor may start again
+//! some turns off.
 
 use std::f64::consts::{PI, TAU};
 
@@ -24,9 +25,11 @@ const PARTS: usize = 10;
 
 #[derive(Debug, Clone)]
 enum Manner {
-    /// From stop to stop around the output, a weight over a pulley: step of the generator in rad, share of the rated torque.
+    /// From stop to stop around the output, a weight over a pulley: step of the generator in rad, share of the rated
+    /// torque.
     Index(f64, f64),
-    /// A lever clamped on the output: weights on and off at places some degrees apart. Stream of the order of the weights.
+    /// A lever clamped on the output: weights on and off at places some degrees apart. Stream of the order of the
+    /// weights.
     Lever(u64),
     /// Without stops: speed of the generator, rad/s, and the weight over the pulley.
     Flywheel(f64, f64),
@@ -267,7 +270,8 @@ impl Programme {
             Manner::Lever(_) => {
                 let mut turns_rad = 0.0;
                 if self.levels.is_empty() {
-                    // On to the next place within a quarter of a right angle, then weights on one side, off, on the other, off.
+                    // On to the next place within a quarter of a right angle, then weights on one side, off, on the
+                    // other, off.
                     let to = self.clamped_rad + self.chance.uniform(-0.4, 0.4);
                     turns_rad = (to - output_rad) * self.ratio;
                     let most = 2 + self.chance.below(3);

@@ -1,5 +1,5 @@
-//! Families D, E and F, and perfect drives under faults of the logger: plants of their own that share nothing with families A to C
-//! but the catalogue's drive, the noise of the sensors and the scores.
+//! Families D, E and F, and perfect drives under faults of the logger: plants of their own that share nothing with
+//! families A to C but the catalogue's drive, the noise of the sensors and the scores.
 
 pub mod gear;
 pub mod hides;
@@ -59,8 +59,8 @@ pub struct Fresh {
     floor_arcsec: f64,
 }
 
-/// So many times over the limit of detection an effect is aimed at, at least and at most; what comes out at less than the third
-/// is drawn anew.
+/// So many times over the limit of detection an effect is aimed at, at least and at most; what comes out at less than
+/// the third is drawn anew.
 const AIM: (f64, f64, f64) = (2.0, 15.0, 1.3);
 /// Draws of a case before one that is too small is taken as it is; it then counts as below the limit.
 const DRAWS: u64 = 12;
@@ -246,7 +246,8 @@ impl Fresh {
         self.fault.map_or(self.drive.clone(), |fault| fault.told(&self.drive)).nominal_toml()
     }
 
-    /// Residual of the catalogue's model without noise, that of the unit alone, and what each hidden effect adds: for plots.
+    /// Residual of the catalogue's model without noise, that of the unit alone, and what each hidden effect adds: for
+    /// plots.
     pub fn parts(&self) -> String {
         let left = |hidden: &[Hides]| {
             let (motion, readings) = self.run(hidden);

@@ -1,9 +1,10 @@
-//! What could be known at best of a case of families D and E: how far an effect stands out of the noise once the catalogue's
-//! parameters have floated, and which causes are like it on these rows.
+//! What could be known at best of a case of families D and E: how far an effect stands out of the noise once the
+//! catalogue's parameters have floated, and which causes are like it on these rows.
 //!
-//! An effect is weighed by what it adds to the residual of the catalogue's model, read at the angles and the torque that the log
-//! itself would hold without noise. A rival is like it where the span of the rival's signatures leaves less than can be
-//! seen. The span is linear and wide (every phase, every flank, several laws), so it rather finds one look-alike too many.
+//! An effect is weighed by what it adds to the residual of the catalogue's model, read at the angles and the torque
+//! that the log itself would hold without noise. A rival is like it where the span of the rival's signatures leaves
+//! less than can be seen. The span is linear and wide (every phase, every flank, several laws), so it rather finds one
+//! look-alike too many.
 
 use std::f64::consts::TAU;
 
@@ -20,8 +21,8 @@ use crate::plant::Readings;
 /// Rows on which it works.
 const ROWS: usize = 8000;
 
-/// Error (arcsec) of the catalogue's model with the parameters of a unit, as the contract words it: lines, play that the load
-/// or the friction holds, wind-up; and the flank on which the model stands.
+/// Error (arcsec) of the catalogue's model with the parameters of a unit, as the contract words it: lines, play that
+/// the load or the friction holds, wind-up; and the flank on which the model stands.
 pub fn nominal(drive: &Drive, unit: &Unit, generator_rad: &[f64], torque_n_m: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let half = 0.5 * drive.backlash_arcsec * unit.backlash;
     let friction = drive.friction_torque_n_m * unit.friction;
@@ -49,7 +50,8 @@ pub fn residual(drive: &Drive, motion: &Motion, readings: &Readings) -> Vec<f64>
     difference(&readings.error_arcsec, &model)
 }
 
-/// 1 where the load lies on a flank, 0 near the friction of the hub and for a tenth of a second after a change of flanks.
+/// 1 where the load lies on a flank, 0 near the friction of the hub and for a tenth of a second after a change of
+/// flanks.
 fn settled(drive: &Drive, torque_n_m: &[f64], flank: &[f64]) -> Vec<f64> {
     let mut since = 0;
     (0..flank.len())
@@ -79,8 +81,8 @@ pub struct Oracle<'a> {
 }
 
 impl<'a> Oracle<'a> {
-    /// For a log without hidden effects. `jitter_s` is the scatter of the instants at which the angles are read, where the drive moves
-    /// while it is read; `zeroed`: the output was set to zero in each session.
+    /// For a log without hidden effects. `jitter_s` is the scatter of the instants at which the angles are read, where
+    /// the drive moves while it is read; `zeroed`: the output was set to zero in each session.
     pub fn new(
         drive: &'a Drive,
         unit: &Unit,
@@ -154,8 +156,8 @@ impl<'a> Oracle<'a> {
 
     /// Causes whose signatures leave less of it than can be seen, with the distance left.
     ///
-    /// Either less than [`LEAST_D`], or no more than a sixth of it and less than counts as there: who does not know the plant's own law
-    /// to its last digit cannot hold such a remainder against a rival.
+    /// Either less than [`LEAST_D`], or no more than a sixth of it and less than counts as there: who does not know the
+    /// plant's own law to its last digit cannot hold such a remainder against a rival.
     pub fn look_alikes(&self, added: &[f64], own: Option<Cause>, white_arcsec: f64) -> Vec<(Cause, f64)> {
         let whole = self.weigh(added).d;
         let mut found = Vec::new();

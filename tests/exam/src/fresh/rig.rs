@@ -1,12 +1,13 @@
-//! Family F: an acceptance rig. A motor with its servo turns the generator, a load motor behind a torque sensor turns against the output,
-//! and a bus polls counts of both encoders. It runs what such rigs run: once around and back under a small load, torque ramps at rest,
-//! speeds up and down, moves from point to point.
+//! Family F: an acceptance rig. A motor with its servo turns the generator, a load motor behind a torque sensor turns
+//! against the output, and a bus polls counts of both encoders. It runs what such rigs run: once around and back under
+//! a small load, torque ramps at rest, speeds up and down, moves from point to point.
 //!
-//! Nothing of the gear is taken from the other families. Two zones of teeth, half a turn of the generator apart, each with limits of its
-//! own; the torque of a zone is `c (y + y² / d)` of what its teeth are pressed in by `y`, as more of them meet under load, so the two share
-//! in closed form. What is not told by the limits is the wind-up of the catalogue. With ψ generator, θ output, T torque of the gear:
-//! `J_m ψ'' = τ + T dp/dψ - friction(ψ')`, `J_l θ'' = load - T - friction(θ')`, `θ = R(T, ψ) + wind-up(T)`; below the friction of the hub
-//! R stays where it is within the limits. Both frictions are Stribeck's. Semi-implicit Euler for the inertias, a secant for T.
+//! Nothing of the gear is taken from the other families. Two zones of teeth, half a turn of the generator apart, each
+//! with limits of its own; the torque of a zone is `c (y + y² / d)` of what its teeth are pressed in by `y`, as more of
+//! them meet under load, so the two share in closed form. What is not told by the limits is the wind-up of the
+//! catalogue. With ψ generator, θ output, T torque of the gear: `J_m ψ'' = τ + T dp/dψ - friction(ψ')`,
+//! `J_l θ'' = load - T - friction(θ')`, `θ = R(T, ψ) + wind-up(T)`; below the friction of the hub R stays where it is
+//! within the limits. Both frictions are Stribeck's. Semi-implicit Euler for the inertias, a secant for T.
 
 use std::f64::consts::{PI, TAU};
 
@@ -376,7 +377,8 @@ impl<'a> Train<'a> {
             let Thing::Cause(cause) = one.thing else { continue };
             let (size, phase) = (one.size, one.phase(0));
             match cause {
-                // An axis beside the other: each zone is turned by the part along the flank's motion and opened by the other.
+                // An axis beside the other: each zone is turned by the part along the flank's motion and opened by the
+                // other.
                 Cause::CircularSplineEccentricity | Cause::FlexsplineRunout | Cause::GravitySideLoad => {
                     let x = match cause {
                         Cause::FlexsplineRunout => on_flexspline,
@@ -405,7 +407,8 @@ impl<'a> Train<'a> {
                         turned[zone] += sign * size * around(profile, angle(x, zone));
                     }
                 }
-                // One lobe is pressed deeper, and shows what each wheel has once around, which two lobes alike would not.
+                // One lobe is pressed deeper, and shows what each wheel has once around, which two lobes alike would
+                // not.
                 Cause::GeneratorEccentricity => {
                     for (zone, sign) in [1.0, -1.0].into_iter().enumerate() {
                         out[zone] -= sign * 0.8 * size;
@@ -451,8 +454,8 @@ impl<'a> Train<'a> {
         0.5 * depth * ((1.0 + 2.0 * torque / (press * depth)).sqrt() - 1.0)
     }
 
-    /// Where the teeth rest on two zones with these limits (of the flank towards which the torque, not below zero, turns), less what
-    /// two zones alike would be pressed in by.
+    /// Where the teeth rest on two zones with these limits (of the flank towards which the torque, not below zero,
+    /// turns), less what two zones alike would be pressed in by.
     fn rests(&self, limits: [f64; 2], torque: f64) -> f64 {
         let (press, depth) = self.zone;
         let first = limits[0].min(limits[1]);
@@ -485,7 +488,8 @@ impl<'a> Train<'a> {
         x + lag
     }
 
-    /// A deflection that nears its bound as an exponential of the path of the load (Duhem), sooner backwards than forwards.
+    /// A deflection that nears its bound as an exponential of the path of the load (Duhem), sooner backwards than
+    /// forwards.
     fn lag(&self, one: &Hides, torque: f64, state: &State) -> f64 {
         let by = torque - state.torque_n_m;
         let path = (0.15 + 0.25 * one.shape[0]) * self.drive.rated_n_m * if by > 0.0 { 1.0 } else { 0.8 };
@@ -544,7 +548,8 @@ impl<'a> Train<'a> {
             if at_b.abs() < 1e-6 {
                 break;
             }
-            // What rises by less than a tenth or more than ten times the catalogue's is a corner: a step of the catalogue's spring.
+            // What rises by less than a tenth or more than ten times the catalogue's is a corner: a step of the
+            // catalogue's spring.
             let slope = if (b - a).abs() < 1e-12 { per_arcsec } else { (b - a) / (at_b - at_a) };
             let slope = if slope.is_finite() { slope.clamp(0.1 * per_arcsec, 10.0 * per_arcsec) } else { per_arcsec };
             (a, at_a) = (b, at_b);
@@ -651,8 +656,8 @@ fn around(profile: &[f64], angle_rad: f64) -> f64 {
     profile[at] + part * (profile[(at + 1) % PROFILE] - profile[at])
 }
 
-/// Teeth out of place around a wheel as a gear tester draws them: cumulative error that falls as the order, twice around leading, and
-/// single teeth, averaged over the arc that is engaged with a cosine.
+/// Teeth out of place around a wheel as a gear tester draws them: cumulative error that falls as the order, twice
+/// around leading, and single teeth, averaged over the arc that is engaged with a cosine.
 fn profile(one: &Hides) -> Vec<f64> {
     if !matches!(one.thing, Thing::Cause(Cause::FlexsplinePitchError | Cause::CircularSplinePitchError)) {
         return Vec::new();

@@ -1,5 +1,5 @@
-//! The plants against their own claims: a perfect drive returns the catalogue's error, energy is kept, a seed repeats, and nothing of
-//! the truth is in what the diagnosis is given.
+//! The plants against their own claims: a perfect drive returns the catalogue's error, energy is kept, a seed repeats,
+//! and nothing of the truth is in what the diagnosis is given.
 
 use super::hides::range;
 use super::joint::Poll;
@@ -21,8 +21,8 @@ fn quantiles(residual: &[f64]) -> [f64; 3] {
     [0.5, 0.95, 0.99].map(|share| sizes[(share * (sizes.len() - 1) as f64) as usize])
 }
 
-/// The catalogue's model is quasi-static, so what a perfect joint leaves is the damping of its spring, and up to half of the clearance in
-/// the rows in which the load is on its way through it.
+/// The catalogue's model is quasi-static, so what a perfect joint leaves is the damping of its spring, and up to half
+/// of the clearance in the rows in which the load is on its way through it.
 #[test]
 fn a_perfect_joint_returns_the_error_of_the_catalogue() {
     for index in 0..4 {

@@ -54,9 +54,10 @@ impl Law for DamagedTooth {
                         mesh.wind_up += self.amplitude * give * now.load_n_m / self.rated_n_m;
                     }
                 }
-                // Teeth enter over a gap that grows with the square of the distance from the middle of the zone, so its force
-                // is as δ^(3/2), its width as δ^(1/2). The missing tooth carried (1 - distance²/width²) δ, the zone is as stiff
-                // as δ^(1/2): both the pulse and its width grow with the root of δ, the cube root of the load (derived here).
+                // Teeth enter over a gap that grows with the square of the distance from the middle of the zone, so its
+                // force is as δ^(3/2), its width as δ^(1/2). The missing tooth carried (1 - distance²/width²) δ, the
+                // zone is as stiff as δ^(1/2): both the pulse and its width grow with the root of δ, the cube root of
+                // the load (derived here).
                 Family::C => {
                     let root = (now.load_n_m * self.flank / self.rated_n_m).max(0.0).cbrt();
                     let distance = wrapped(angle).abs() / (self.half_width * root.max(1e-3));
@@ -106,7 +107,8 @@ impl Law for Ratchet {
             Family::A => self.jumped = aim,
             // The teeth slide into the next space.
             Family::B => self.jumped += (aim - self.jumped) * (1.0 - (-now.step_s / 0.01).exp()),
-            // The teeth of one lobe climb, and the next lobe takes the others over: done in half a turn of the generator.
+            // The teeth of one lobe climb, and the next lobe takes the others over: done in half a turn of the
+            // generator.
             Family::C => {
                 let (travel, last) = &mut self.climbed;
                 if now.at >= self.at {

@@ -44,8 +44,8 @@ impl Law for GeneratorEncoder {
                 (self.amplitude_rad * x.sin()).atan2(1.0 + self.amplitude_rad * x.cos())
                     + 0.07 * self.amplitude_rad * (2.0 * x - 0.4).sin()
             }
-            // Two heads a third of a turn apart, where room left none opposite: their mean keeps half of the disc's first
-            // harmonic, which is `amplitude_rad`, and of its second (derived here).
+            // Two heads a third of a turn apart, where room left none opposite: their mean keeps half of the disc's
+            // first harmonic, which is `amplitude_rad`, and of its second (derived here).
             Family::C => {
                 let disc = 2.0 * self.amplitude_rad;
                 let head = |at: f64| (disc * at.sin()).atan2(1.0 + disc * at.cos());

@@ -3,8 +3,8 @@
 use super::{Law, Mesh, Now, Setting};
 use crate::effect::Family;
 
-/// An eccentric generator: one lobe deeper than the other, so that the first harmonics of both wheels, which equal sharing
-/// cancels, come through until the load brings both zones in.
+/// An eccentric generator: one lobe deeper than the other, so that the first harmonics of both wheels, which equal
+/// sharing cancels, come through until the load brings both zones in.
 pub struct Lobes {
     lobe: f64,
     flexspline: (f64, f64),
@@ -82,8 +82,8 @@ impl Law for CamForm {
                 mesh.driven += self.amplitude * (x.sin() + 0.35 * (2.0 * x + 0.8).sin()) * (1.0 - 0.2 * load.min(1.0));
                 mesh.clearance += 0.5 * self.amplitude;
             }
-            // Each tooth hands over to the next along a parabola (Litvin and Fuentes 2004), here by its first four harmonics;
-            // lobes too proud narrow the clearance, and the teeth level out as (load)^(2/3) (Hertz 1882).
+            // Each tooth hands over to the next along a parabola (Litvin and Fuentes 2004), here by its first four
+            // harmonics; lobes too proud narrow the clearance, and the teeth level out as (load)^(2/3) (Hertz 1882).
             Family::C => {
                 let parabola: f64 = (1..=4).map(f64::from).map(|k| (k * x).cos() / (k * k)).sum();
                 mesh.driven += self.amplitude * parabola / (1.0 + 0.4 * load.cbrt().powi(2));

@@ -102,8 +102,8 @@ impl Law for BoucWen {
 }
 
 /// Partial slip between pressed surfaces (Mindlin 1949): a ring of slip grows inwards, so the compliance grows as
-/// (1 - Q/Q*)^(-1/3) until all slides at Q*. As plays on the load (Prandtl-Ishlinskii) with the density of thresholds that
-/// gives this curve; and the friction of teeth grows with the load that presses them.
+/// (1 - Q/Q*)^(-1/3) until all slides at Q*. As plays on the load (Prandtl-Ishlinskii) with the density of thresholds
+/// that gives this curve; and the friction of teeth grows with the load that presses them.
 pub struct PartialSlip {
     half_width: f64,
     rated_n_m: f64,
@@ -128,7 +128,8 @@ struct Slip {
 impl PartialSlip {
     pub fn new(half_width_arcsec: f64, yield_share: f64, setting: Setting) -> Self {
         let rated_n_m = setting.drive.rated_n_m;
-        // Reversed from its largest load, a joint slides as a whole after twice the load at which a new one does (Masing 1926).
+        // Reversed from its largest load, a joint slides as a whole after twice the load at which a new one does
+        // (Masing 1926).
         let all_slides_n_m = 0.5 * yield_share * rated_n_m;
         let mut slips = [Slip::default(); SLIPS];
         for (at, slip) in slips.iter_mut().enumerate() {
@@ -161,7 +162,8 @@ mod tests {
     use crate::drive::{Drive, Unit};
     use crate::motion::Motion;
 
-    /// Area of the loop in load and wind-up over one cycle of this amplitude, and the half width where the load is zero.
+    /// Area of the loop in load and wind-up over one cycle of this amplitude, and the half width where the load is
+    /// zero.
     fn cycle(law: &mut dyn Law, amplitude_n_m: f64, steps: usize, step_s: f64) -> (f64, f64) {
         let (mut area, mut width, mut last) = (0.0, 0.0, None);
         for at in 0..3 * steps {
@@ -208,8 +210,8 @@ mod tests {
 
     #[test]
     fn energy_is_lost_never_won() {
-        // Loss per cycle of a saturated loop is at most four half widths times the amplitude; the third law's mean half width is
-        // larger by half of what the load adds.
+        // Loss per cycle of a saturated loop is at most four half widths times the amplitude; the third law's mean half
+        // width is larger by half of what the load adds.
         let drive = Drive::draw(&mut Chance::new(2, "drive", 0));
         let wider = [1.0, 1.0, 1.0 + 0.5 * WIDER_WITH_LOAD];
         for (law, wider) in laws(&drive).iter_mut().zip(wider) {

@@ -4,8 +4,8 @@ use super::{Law, Now};
 use crate::effect::Family;
 use std::f64::consts::TAU;
 
-/// A mode driven by the motion of the mesh. Between points the mesh moves straight; the mode then swings freely, which is
-/// solved exactly, and each change of speed is a kick.
+/// A mode driven by the motion of the mesh. Between points the mesh moves straight; the mode then swings freely, which
+/// is solved exactly, and each change of speed is a kick.
 pub struct Mode {
     participation: f64,
     swings: Vec<Swing>,
@@ -62,8 +62,8 @@ impl Law for Mode {
             let (damping, natural) = match self.family {
                 Family::A => (swing.damping, swing.omega),
                 Family::B => (swing.damping + 0.02 * (swing.speed.abs() / swing.omega / 10.0).min(3.0), swing.omega),
-                // Harmonic balance (Krylov and Bogoliubov 1937), by the amplitude of the swing: a spring that hardens (Duffing)
-                // is quicker, and dry friction damps large swings less.
+                // Harmonic balance (Krylov and Bogoliubov 1937), by the amplitude of the swing: a spring that hardens
+                // (Duffing) is quicker, and dry friction damps large swings less.
                 Family::C => {
                     let amplitude = swing.position.hypot(swing.speed / swing.omega);
                     let hardens = amplitude * amplitude / (amplitude * amplitude + HARDENS_ARCSEC * HARDENS_ARCSEC);

@@ -47,8 +47,8 @@ impl Law for Hardening {
         let load = now.load_n_m.abs();
         let linear = load / self.k;
         let x = match self.family {
-            // T = k x + k3 x³ with k3 such that the cubic part is `relative` of k x where the linear spring has its rated
-            // deflection; Newton from above.
+            // T = k x + k3 x³ with k3 such that the cubic part is `relative` of k x where the linear spring has its
+            // rated deflection; Newton from above.
             Family::A => {
                 let full = self.rated_n_m / self.k;
                 let k3 = self.relative * self.k / (full * full);
@@ -64,8 +64,8 @@ impl Law for Hardening {
                 let (k2, k3) = (self.k * (1.0 + 0.7 * self.relative), self.k * (1.0 + 1.1 * self.relative));
                 load.min(t1) / self.k + (load.min(t2) - t1).max(0.0) / k2 + (load - t2).max(0.0) / k3
             }
-            // Teeth enter one after another: the stiffness of the next N m is k (1 + r (1 - exp(-T / T_c))), which integrates to
-            // x = (T + T_c ln(1 + r (1 - exp(-T / T_c)))) / (k (1 + r)) (derived here).
+            // Teeth enter one after another: the stiffness of the next N m is k (1 + r (1 - exp(-T / T_c))), which
+            // integrates to x = (T + T_c ln(1 + r (1 - exp(-T / T_c)))) / (k (1 + r)) (derived here).
             Family::C => {
                 let (r, enters_n_m) = (self.relative, 2.0 * self.knee * self.rated_n_m);
                 let entered = 1.0 - (-load / enters_n_m).exp();
@@ -93,8 +93,8 @@ impl Law for Error {
                 Family::A => self.setting.wind_up(load),
                 // A soft part in series, slightly softer one way than the other.
                 Family::B => self.setting.wind_up(load) * (1.0 + 0.06 * load.signum()),
-                // It is the bearing under the generator that is not the catalogue's: rollers give way as F^0.9 (Palmgren 1959);
-                // the size is that at rated load.
+                // It is the bearing under the generator that is not the catalogue's: rollers give way as F^0.9
+                // (Palmgren 1959); the size is that at rated load.
                 Family::C => {
                     let rated_n_m = self.setting.drive.rated_n_m;
                     self.setting.wind_up(rated_n_m) * (load.abs() / rated_n_m).powf(0.9).copysign(load)

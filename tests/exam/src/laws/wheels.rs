@@ -32,9 +32,9 @@ pub struct Displaced {
     pub float: Float,
 }
 
-/// A generator on an Oldham coupling gives way across its major axis and takes up a share of what stands there; along the axis
-/// the lobes hold it. The load clamps the coupling. Floating generators reduce eccentric errors (Jia et al. 2021); the form is
-/// derived here.
+/// A generator on an Oldham coupling gives way across its major axis and takes up a share of what stands there; along
+/// the axis the lobes hold it. The load clamps the coupling. Floating generators reduce eccentric errors (Jia et al.
+/// 2021); the form is derived here.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Float {
     /// Share that is taken up without load.
@@ -47,8 +47,8 @@ impl Float {
     /// A generator that is held.
     pub const HELD: Self = Self { share: 0.0, clamps_n_m: f64::INFINITY };
 
-    /// Displacement (arcsec) and pressure angle (rad) that the teeth see: the part along the teeth is less, the part that opens
-    /// them as before.
+    /// Displacement (arcsec) and pressure angle (rad) that the teeth see: the part along the teeth is less, the part
+    /// that opens them as before.
     fn seen(self, amplitude: f64, pressure_angle_rad: f64, load_n_m: f64) -> (f64, f64) {
         let (open, along) = pressure_angle_rad.sin_cos();
         let along = along * (1.0 - self.share * (-load_n_m.abs() / self.clamps_n_m).exp());
@@ -72,8 +72,8 @@ impl Law for Displaced {
     }
 }
 
-/// A circular spline bent to an oval without stretching: half the radial motion goes along the teeth, and where its spaces are
-/// displaced forward the output lags.
+/// A circular spline bent to an oval without stretching: half the radial motion goes along the teeth, and where its
+/// spaces are displaced forward the output lags.
 pub struct Oval {
     pub amplitude: f64,
     pub phase: f64,
@@ -92,7 +92,8 @@ impl Law for Oval {
                 let four = 4.0 * x + 1.7 * self.phase;
                 (-0.5 * two.sin() - 0.25 * 0.2 * four.sin(), two.cos() + 0.2 * four.cos())
             }
-            // Six bolts, and three of them tighter: sixth harmonic, and a third that the two zones see with opposite signs.
+            // Six bolts, and three of them tighter: sixth harmonic, and a third that the two zones see with opposite
+            // signs.
             Family::C => {
                 let (three, six) = (3.0 * x + 1.3 * self.phase, 6.0 * x + 2.1 * self.phase);
                 let (along, out) = (-0.15 / 3.0 * three.sin(), 0.15 * three.cos());
@@ -132,8 +133,8 @@ impl Pitch {
                 }
                 Profile::new(lines, 0.14)
             }
-            // An indexing head: its own errors at orders one and two, and teeth out of place independently of each other, which
-            // is a flat spectrum; the teeth in the middle of the arc carry the most.
+            // An indexing head: its own errors at orders one and two, and teeth out of place independently of each
+            // other, which is a flat spectrum; the teeth in the middle of the arc carry the most.
             Family::C => {
                 let mut chance = Chance::new(shape[5] as u64, "indexed", 0);
                 let mut lines = vec![(1.0, shape[2] * size, shape[1]), (2.0, size, shape[0])];

@@ -16,7 +16,8 @@ impl Law for Growth {
             Family::A => self.size,
             // Uneven around the circular spline.
             Family::B => self.size * (1.0 + 0.1 * (2.0 * now.on_circular_spline_rad + self.phase).sin()),
-            // The flexspline was worn more on one side: one zone has more room than the other, and the tighter one holds.
+            // The flexspline was worn more on one side: one zone has more room than the other, and the tighter one
+            // holds.
             Family::C => {
                 let more = 0.2 * 0.5 * self.size * (now.on_flexspline_rad + self.phase).cos();
                 for (zone, more) in [more, -more].into_iter().enumerate() {
@@ -48,8 +49,8 @@ impl Wear {
     }
 }
 
-/// Work of the load on the sliding teeth, W; a tenth of a N m is there without load. In family C their path alone, rad/s at
-/// the output: what presses them together is the generator.
+/// Work of the load on the sliding teeth, W; a tenth of a N m is there without load. In family C their path alone,
+/// rad/s at the output: what presses them together is the generator.
 fn rate(torque_n_m: f64, speed_rad_s: f64, ratio: f64, family: Family) -> f64 {
     let presses = if family == Family::C { 1.0 } else { torque_n_m.abs() + 0.1 };
     presses * speed_rad_s.abs() / ratio
@@ -67,8 +68,9 @@ impl Law for Wear {
                 let quick = |t: f64| 1.0 - (-t / self.running_in).exp();
                 0.6 * quick(t) / quick(1.0) + 0.4 * t
             }
-            // Archard with a coefficient that changes along the path: slow while a film holds, quickest at `running_in`, slow
-            // again on conforming flanks. An S, as curves of running-in are (Blau 1989); the logistic form is derived here.
+            // Archard with a coefficient that changes along the path: slow while a film holds, quickest at
+            // `running_in`, slow again on conforming flanks. An S, as curves of running-in are (Blau 1989); the
+            // logistic form is derived here.
             Family::C => {
                 let grown = |path: f64| (1.0 + (-(path - self.running_in) / 0.2).exp()).recip();
                 (grown(self.work / self.all_work) - grown(0.0)) / (grown(1.0) - grown(0.0))
@@ -110,8 +112,8 @@ impl Law for ThermalClearance {
             Family::A => self.per_k * warmer,
             // The generator warms first; the housing, of another metal, follows.
             Family::B => self.per_k * (0.6 * (*slow - 20.0) + 0.4 * warmer + 0.8 * (now.temperature_c - *slow)),
-            // The sensor sits on the housing, the teeth follow through flange and rim (second order); and metals expand more as
-            // they warm.
+            // The sensor sits on the housing, the teeth follow through flange and rim (second order); and metals expand
+            // more as they warm.
             Family::C => self.per_k * (self.slower_c - 20.0) * (1.0 + 0.002 * (self.slower_c - 20.0)),
         };
     }

@@ -1,5 +1,5 @@
-//! The plant against its own claims: the nominal model where nothing is hidden, convergence in the step, and each effect at
-//! the orders that theory gives it.
+//! The plant against its own claims: the nominal model where nothing is hidden, convergence in the step, and each
+//! effect at the orders that theory gives it.
 
 use super::*;
 use crate::bench::rms;
@@ -259,8 +259,8 @@ fn teeth_jump_by_whole_pitches_of_the_output_wheel() {
     }
 }
 
-/// Of what is given at once, nothing is there before: every law of every family starts and stays finite, and a size of next to
-/// nothing does next to nothing.
+/// Of what is given at once, nothing is there before: every law of every family starts and stays finite, and a size of
+/// next to nothing does next to nothing.
 #[test]
 fn a_vanishing_size_does_nothing() {
     let (drive, motion) = setting(5, &[Poor::Short]);

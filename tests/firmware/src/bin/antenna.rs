@@ -1,9 +1,10 @@
-//! An antenna of one joint, pointed in closed loop with each generator's table in flash and a drive made of contact FEM: what is
-//! flown, and every line printed, is what `examples/closed_loop.rs fly brief` has on the host.
+//! An antenna of one joint, pointed in closed loop with each generator's table in flash and a drive made of contact
+//! FEM: what is flown, and every line printed, is what `examples/closed_loop.rs fly brief` has on the host.
 //!
-//! In every tick: target, encoder and torque sensor; the joint; the servo; the observer of the two inertias. Every 100th tick the
-//! thermometer, every 20th a slice of the check of the images. Off, tracking, and at the end hold. Ends with exit code 0 if the
-//! core points at least ten times better than the nominal ratio and three times better than tables by sign of velocity.
+//! In every tick: target, encoder and torque sensor; the joint; the servo; the observer of the two inertias. Every
+//! 100th tick the thermometer, every 20th a slice of the check of the images. Off, tracking, and at the end hold. Ends
+//! with exit code 0 if the core points at least ten times better than the nominal ratio and three times better than
+//! tables by sign of velocity.
 #![no_std]
 #![no_main]
 
@@ -21,7 +22,8 @@ use flexspline_firmware::{MOTOR_PREDICTOR, TABLES, finish};
 
 /// Ticks of holding after the flight.
 const HELD: u32 = 100;
-/// Most that a correction may move while it is brought to rest, rad: 10″, from 0.016 rad/s, braking with half of 5 rad/s².
+/// Most that a correction may move while it is brought to rest, rad: 10″, from 0.016 rad/s, braking with half of 5
+/// rad/s².
 const MOST_MOVED_RAD: f32 = 5e-5;
 
 #[entry]
@@ -51,7 +53,8 @@ fn fly(generator: usize, room: &mut Room) -> Option<bool> {
         observer.tick(antenna.lane(CORE), map.header.ratio);
         let missed_n_m = f64::from(observer.state.load_torque_n_m()) - moment.torque_n_m;
         missed_squares += missed_n_m * missed_n_m / f64::from(BRIEF.ticks());
-        // Here telemetry takes `antenna.core.out` and the observer's state, once it has a bounded queue to put them into.
+        // Here telemetry takes `antenna.core.out` and the observer's state, once it has a bounded queue to put them
+        // into.
         last = moment;
     }
     antenna.write(name, &mut Console).ok()?;

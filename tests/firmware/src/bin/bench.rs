@@ -1,5 +1,5 @@
-//! Instructions of a tick and of forward and inverse over 10 000 mixed inputs, least and most, with each generator's table.
-//! The last line is that of the costliest.
+//! Instructions of a tick and of forward and inverse over 10 000 mixed inputs, least and most, with each generator's
+//! table. The last line is that of the costliest.
 #![no_std]
 #![no_main]
 
@@ -136,10 +136,10 @@ type Ranges = [(&'static str, Range); 8];
 
 /// Counts with one table; the tick's is given back.
 ///
-/// `tick`, and `forward` and `inverse` as they are called alone, from locating the torque to angles. Then the parts of a tick, each
-/// called alone: `locate` the torque, `output` (nominal, ripple and play) and, of that, the `play`, `solve` for the command; the
-/// rest is what is left of the tick: judging the sample, goal, limiter, flags, sums. A `slice` of the slow group checks a word of the images
-/// and makes one of the copies anew.
+/// `tick`, and `forward` and `inverse` as they are called alone, from locating the torque to angles. Then the parts of
+/// a tick, each called alone: `locate` the torque, `output` (nominal, ripple and play) and, of that, the `play`,
+/// `solve` for the command; the rest is what is left of the tick: judging the sample, goal, limiter, flags, sums. A
+/// `slice` of the slow group checks a word of the images and makes one of the copies anew.
 fn measure(counter: &Counter, name: &str, [first, second]: [&[u8]; 2]) -> Option<Range> {
     let images = Images::new(first, second);
     let mut store = Store::new();

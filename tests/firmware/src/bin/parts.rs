@@ -1,5 +1,5 @@
-//! What a tick costs with a joint made at run time, and the parts beside it: the update of the coefficients, the slip bank, the telemetry. With `--features flight` it
-//! counts nothing and shows that they link without a panic path.
+//! What a tick costs with a joint made at run time, and the parts beside it: the update of the coefficients, the slip
+//! bank, the telemetry. With `--features flight` it counts nothing and shows that they link without a panic path.
 #![no_std]
 #![no_main]
 

@@ -1,6 +1,7 @@
-//! A rover of four joints, one of each generator, in one loop: static order, the slow groups of each joint in ticks of their own.
-//! Beside each joint runs one at the nominal ratio, for comparison. The same lines as `examples/closed_loop.rs rover` on the host.
-//! Ends with exit code 0 if every joint points ten times better than at the nominal ratio.
+//! A rover of four joints, one of each generator, in one loop: static order, the slow groups of each joint in ticks of
+//! their own. Beside each joint runs one at the nominal ratio, for comparison. The same lines as
+//! `examples/closed_loop.rs rover` on the host. Ends with exit code 0 if every joint points ten times better than at
+//! the nominal ratio.
 #![no_std]
 #![no_main]
 

@@ -83,8 +83,8 @@ pub struct Pointing {
 }
 
 impl<'a, P: Plant> Antenna<'a, P> {
-    /// At rest with a table and a plant for each controller; `None` if the table cannot be flown. `mean_torque_n_m` is the mean
-    /// of the load to come.
+    /// At rest with a table and a plant for each controller; `None` if the table cannot be flown. `mean_torque_n_m` is
+    /// the mean of the load to come.
     pub fn new(
         images: [&'a [u8]; 2],
         plants: [P; 5],
@@ -198,8 +198,9 @@ impl<'a, P: Plant> Antenna<'a, P> {
         &self.flags
     }
 
-    /// Results in lines, the same on every machine: for each controller rms and largest error in arcsec over all, over steady
-    /// tracking, and both without the ticks in which the core was held back; counts; a digest of every bit of every error.
+    /// Results in lines, the same on every machine: for each controller rms and largest error in arcsec over all, over
+    /// steady tracking, and both without the ticks in which the core was held back; counts; a digest of every bit of
+    /// every error.
     ///
     /// # Errors
     /// Those of `to`.
@@ -249,4 +250,5 @@ impl Observer {
 }
 
 /// What the columns of [`Antenna::write`] are.
-pub const COLUMNS: &str = "generator   controller           whole rms\"     max\"  steady rms\"    max\"   not held rms\"  max\" steady rms\"    max\"";
+pub const COLUMNS: &str = "generator   controller           whole rms\"     max\"  steady rms\"    max\"   not held \
+                           rms\"  max\" steady rms\"    max\"";

@@ -1,11 +1,13 @@
 //! Ways to command the generator so that the output comes to its target. All get the same target, servo and limits.
 //!
 //! * [`Uncompensated`]: target times ratio.
-//! * [`BySign`]: what motion controllers do: the kinematic error over the generator angle, one curve for each sign of the
-//!   commanded velocity, recorded at one load and temperature. It knows the backlash between its curves and the ripple; it knows
-//!   nothing of a torque that changes, and takes up the whole backlash whenever the command turns around.
-//! * [`ByTorque`]: the whole table of torque and temperature, again for the sign of the commanded velocity: without a state of
-//!   the play. No controller that we know does this; it tells apart what the torque gains and what the play gains.
+//! * [`BySign`]: what motion controllers do: the kinematic error over the generator angle, one curve for each sign of
+//!   the commanded velocity, recorded at one load and temperature. It knows the backlash between its curves and the
+//!   ripple; it knows nothing of a torque that changes, and takes up the whole backlash whenever the command turns
+//!   around.
+//! * [`ByTorque`]: the whole table of torque and temperature, again for the sign of the commanded velocity: without a
+//!   state of the play. No controller that we know does this; it tells apart what the torque gains and what the play
+//!   gains.
 //! * [`Compensated`]: the core.
 
 use core::f64::consts::TAU;
@@ -16,8 +18,9 @@ use flexspline::{
 
 use super::profile::TICK_S;
 
-/// Limits of every correction, suited to the servo: a step of 60″ overshoots by 1″ and has settled after 18 ms; with four times the
-/// acceleration it overshoots by 19″, and the output, carried too far, stays there until the target has come by.
+/// Limits of every correction, suited to the servo: a step of 60″ overshoots by 1″ and has settled after 18 ms; with
+/// four times the acceleration it overshoots by 19″, and the output, carried too far, stays there until the target has
+/// come by.
 pub const LIMITS: Limits = Limits {
     tick_s: TICK_S as f32,
     rate_rad_s: 0.05,
@@ -72,8 +75,8 @@ impl Uncompensated {
     }
 }
 
-/// Moves a correction towards its goal within [`LIMITS`], as the core's limiter does its own: as fast as it can be stopped there in whole ticks,
-/// braking with half of the acceleration.
+/// Moves a correction towards its goal within [`LIMITS`], as the core's limiter does its own: as fast as it can be
+/// stopped there in whole ticks, braking with half of the acceleration.
 #[derive(Clone, Debug, Default)]
 pub struct Limiter {
     at_rad: f64,
@@ -180,10 +183,10 @@ const TOO_FAR_RAD: f32 = 1e-4;
 
 /// The core: store, joint and its state.
 ///
-/// The core goes forward if the target is ahead of where it estimates the output, backward if behind. A servo that tracks is now
-/// ahead, now behind, by less than an arc-second, and each time the whole play would be asked for. So the target that the core is
-/// given is at least 0.04″ ahead of the output in the direction of the commanded velocity, and what was added is
-/// taken off the command again.
+/// The core goes forward if the target is ahead of where it estimates the output, backward if behind. A servo that
+/// tracks is now ahead, now behind, by less than an arc-second, and each time the whole play would be asked for. So the
+/// target that the core is given is at least 0.04″ ahead of the output in the direction of the commanded velocity, and
+/// what was added is taken off the command again.
 pub struct Compensated<'a> {
     joint: Joint,
     images: Images<'a>,

@@ -1,14 +1,14 @@
 //! The drive that is flown: contact FEM sampled densely at points that made no table, with its own law of play.
 //!
-//! On frictionless flanks the drive is elastic: the error of the output depends on the phase within a tooth pitch and on the
-//! torque `F` that the flanks carry, and jumps by the clearance where `F` changes sign. What the output rests on besides is
-//! the Coulomb drag `d` of its bearing: it stays where it is as long as the drag can hold it,
+//! On frictionless flanks the drive is elastic: the error of the output depends on the phase within a tooth pitch and
+//! on the torque `F` that the flanks carry, and jumps by the clearance where `F` changes sign. What the output rests on
+//! besides is the Coulomb drag `d` of its bearing: it stays where it is as long as the drag can hold it,
 //! ```text
 //! E(phase, T − d) ≤ output − generator/ratio ≤ E(phase, T + d)
 //! ```
-//! and is carried along at the end that it reaches. Backlash, lost motion and the reversal come out of that; none of it is
-//! told to the plant. In double precision and from other numbers than the tables: those hold the middle and the half-width of
-//! the play over the load torque, this holds `E` over the flank torque.
+//! and is carried along at the end that it reaches. Backlash, lost motion and the reversal come out of that; none of it
+//! is told to the plant. In double precision and from other numbers than the tables: those hold the middle and the
+//! half-width of the play over the load torque, this holds `E` over the flank torque.
 
 /// Most numbers of one temperature.
 pub const MOST: usize = 128 * 32;
@@ -43,8 +43,8 @@ pub struct GearMap<'a> {
     pub planes: [&'a [f64]; 2],
 }
 
-/// Reads a file of a map: a comment with `drag_n_m=`, `teeth=`, `ratio=`, a header, then for each of two temperatures one line
-/// for each flank torque: temperature, flank torque, errors in arc-seconds by phase.
+/// Reads a file of a map: a comment with `drag_n_m=`, `teeth=`, `ratio=`, a header, then for each of two temperatures
+/// one line for each flank torque: temperature, flank torque, errors in arc-seconds by phase.
 ///
 /// # Errors
 /// The line, from 1, that is not so.
@@ -114,15 +114,16 @@ impl<'a> Gear<'a> {
         for (to, (a, b)) in self.plane.iter_mut().skip(phases).zip(first.iter().zip(second)) {
             *to = a + share * (b - a);
         }
-        // Where the load vanishes: the parabola through the first three nodes, which are evenly spaced in the fourth root.
+        // Where the load vanishes: the parabola through the first three nodes, which are evenly spaced in the fourth
+        // root.
         for phase in 0..phases {
             let at = |row: usize| self.plane[row * phases + phase];
             self.plane[phase] = 3.0 * at(1) - 3.0 * at(2) + at(3);
         }
     }
 
-    /// Error of the output with this flank torque at a generator angle, rad; exactly none on the flanks is the limit from the
-    /// side of `sign`.
+    /// Error of the output with this flank torque at a generator angle, rad; exactly none on the flanks is the limit
+    /// from the side of `sign`.
     pub fn elastic_error_rad(&self, generator_rad: f64, flank_n_m: f64, sign: f64) -> f64 {
         let (phases, nodes) = (self.map.header.phases, self.map.header.nodes);
         let turns = self.map.header.teeth * generator_rad * (1.0 / core::f64::consts::TAU);

@@ -1,11 +1,11 @@
 //! What the closed loop on the host and the programs on the target share: the flight, all of it but the tables.
 //!
-//! `no_std`, deterministic and without a transcendental function of the machine, so that both give the same numbers to the
-//! last bit: `tests/firmware` includes this folder.
+//! `no_std`, deterministic and without a transcendental function of the machine, so that both give the same numbers to
+//! the last bit: `tests/firmware` includes this folder.
 //!
-//! In every tick, at the same time: the output is where the plant has it, and its distance from the target is scored; encoder,
-//! torque sensor and thermometer are read; the controller commands a generator angle; the servo sets the torque of the motor;
-//! motor and plant go on to the next tick.
+//! In every tick, at the same time: the output is where the plant has it, and its distance from the target is scored;
+//! encoder, torque sensor and thermometer are read; the controller commands a generator angle; the servo sets the
+//! torque of the motor; motor and plant go on to the next tick.
 
 pub mod antenna;
 pub mod controllers;
@@ -52,15 +52,16 @@ pub struct Sensors {
     pub torque_step_n_m: f64,
     /// Noise of the torque sensor: evenly between ± this, N·m.
     pub torque_noise_n_m: f64,
-    /// A torque that shows less than this is taken for none, N·m. What noise makes of no load would throw the output from one side
-    /// of the clearance to the other, in the model only.
+    /// A torque that shows less than this is taken for none, N·m. What noise makes of no load would throw the output
+    /// from one side of the clearance to the other, in the model only.
     pub torque_dead_zone_n_m: f64,
     /// Resolution of the thermometer, K.
     pub temperature_step_k: f64,
 }
 
 impl Sensors {
-    /// Of the usual kind for a table up to this torque: 14 bits over ± the range, noise of one step, quarters of a degree.
+    /// Of the usual kind for a table up to this torque: 14 bits over ± the range, noise of one step, quarters of a
+    /// degree.
     pub fn for_range(largest_n_m: f64) -> Self {
         let step = 2.0 * largest_n_m / 16_384.0;
         Self {
@@ -138,7 +139,8 @@ impl<P: Plant> Lane<P> {
         self.servo.encoder()
     }
 
-    /// To the next tick with this command; the torque sensor shows the one, at the end of the tick the load has the other.
+    /// To the next tick with this command; the torque sensor shows the one, at the end of the tick the load has the
+    /// other.
     pub fn go(&mut self, command: GeneratorAngle, shown_n_m: f32, torque_n_m: f64, ratio: f64) {
         self.servo.control(command, -f64::from(shown_n_m) / ratio);
         self.servo.turn(TICK_S, self.plant.carried_n_m(torque_n_m) / ratio);

@@ -1,8 +1,8 @@
 //! What an antenna is asked to do, and what the weather does to it: target, load torque and temperature, tick by tick.
 //!
-//! The target is made of legs of constant rate, joined by constant acceleration. The load is a bias (gravity), a slow swing
-//! (wind, or gravity as the dish turns) and a gust, and crosses zero again and again; in the calm it vanishes, so that the
-//! output may rest anywhere in its play. Temperature drifts evenly from first to last.
+//! The target is made of legs of constant rate, joined by constant acceleration. The load is a bias (gravity), a slow
+//! swing (wind, or gravity as the dish turns) and a gust, and crosses zero again and again; in the calm it vanishes, so
+//! that the output may rest anywhere in its play. Temperature drifts evenly from first to last.
 
 use core::f64::consts::TAU;
 
@@ -86,8 +86,8 @@ pub const ANTENNA: Profile = Profile {
     temperature_c: [0.0, 40.0],
 };
 
-/// The antenna's flight in a sixth of the time, for an emulated target and for contact FEM in the loop: a slew, stars, a satellite, four
-/// reversals, a calm.
+/// The antenna's flight in a sixth of the time, for an emulated target and for contact FEM in the loop: a slew, stars,
+/// a satellite, four reversals, a calm.
 pub const BRIEF: Profile = Profile {
     legs: &[
         leg(0.5, 0.0),

@@ -1,5 +1,5 @@
-//! A rover of several joints in one loop: each with its table, motor and drive, in an order that never changes, the slow groups of
-//! each in ticks of their own.
+//! A rover of several joints in one loop: each with its table, motor and drive, in an order that never changes, the
+//! slow groups of each in ticks of their own.
 
 use core::fmt;
 
@@ -103,7 +103,8 @@ impl<'a, P: Plant + Clone> RoverJoint<'a, P> {
         let [nominal, core] = [self.nominal_scores, self.scores].map(|scores| scores.whole);
         writeln!(
             to,
-            "rover {:11} uncompensated {:9.3} {:9.3}, core {:9.3} {:9.3} arcsec rms, max; {} readings, {} checks, missed {}",
+            "rover {:11} uncompensated {:9.3} {:9.3}, core {:9.3} {:9.3} arcsec rms, max; {} readings, {} checks, \
+             missed {}",
             self.name,
             nominal.rms_arcsec(),
             nominal.max_arcsec(),

@@ -1,7 +1,8 @@
 //! Motor, its encoder, and the position servo that turns the generator where it is told.
 //!
-//! A position loop with the command's rate and acceleration fed forward, a speed loop with integral part inside, the torque of
-//! the motor limited, the load as the torque sensor shows it fed forward; an encoder of so many bits. The drive is felt as the flank torque over the ratio.
+//! A position loop with the command's rate and acceleration fed forward, a speed loop with integral part inside, the
+//! torque of the motor limited, the load as the torque sensor shows it fed forward; an encoder of so many bits. The
+//! drive is felt as the flank torque over the ratio.
 
 use core::f64::consts::TAU;
 use flexspline::GeneratorAngle;
@@ -89,8 +90,8 @@ impl Servo {
         GeneratorAngle::from_counts(step << (32 - self.settings.encoder_bits))
     }
 
-    /// The torque of the motor for the tick that begins, from the encoder and the command; `against_n_m` is what the load is
-    /// known to ask of the motor.
+    /// The torque of the motor for the tick that begins, from the encoder and the command; `against_n_m` is what the
+    /// load is known to ask of the motor.
     pub fn control(&mut self, command: GeneratorAngle, against_n_m: f64) {
         let ServoSettings { inertia_kg_m2, largest_torque_n_m, position_hz, speed_hz, integral_hz, .. } = self.settings;
         let measured = self.encoder();

@@ -1,11 +1,12 @@
-//! Causes among each other. Most add up. Some do not: a load that gravity adds passes through the springs that slip, makes the load
-//! ring and turns the flank over like any other load; a clearance that has grown decides when an eccentric wheel binds; and two wheels
-//! beside their axis, or one under a generator that is, meet in the same two zones of teeth, of which only the one ahead carries.
+//! Causes among each other. Most add up. Some do not: a load that gravity adds passes through the springs that slip,
+//! makes the load ring and turns the flank over like any other load; a clearance that has grown decides when an
+//! eccentric wheel binds; and two wheels beside their axis, or one under a generator that is, meet in the same two
+//! zones of teeth, of which only the one ahead carries.
 //!
 //! A softer spring gives way to what is added to the load as well.
 //!
-//! So a law is evaluated on the excitation as the causes that act on it leave it. Of two that meet in the zones the later one is
-//! evaluated beside the earlier, and together they make what both do.
+//! So a law is evaluated on the excitation as the causes that act on it leave it. Of two that meet in the zones the
+//! later one is evaluated beside the earlier, and together they make what both do.
 
 use super::{Coefficients, Excitation, Law, Role};
 use crate::causes::Kin;
@@ -55,7 +56,8 @@ pub struct Among {
 pub(super) const STIFFNESS: &str = "stiffness";
 
 impl Law {
-    /// Whether this cause changes what another one does. Two that meet in the zones act on each other: the order decides.
+    /// Whether this cause changes what another one does. Two that meet in the zones act on each other: the order
+    /// decides.
     #[must_use]
     pub fn acts_on(&self, other: &Law) -> bool {
         // What a load winds up in a softer spring is in the load's law.

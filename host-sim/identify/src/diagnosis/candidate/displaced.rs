@@ -1,11 +1,11 @@
-//! A wheel beside the axis of the generator: an eccentric circular spline, a flexspline that runs out of true, an axis that gravity
-//! pushes aside.
+//! A wheel beside the axis of the generator: an eccentric circular spline, a flexspline that runs out of true, an axis
+//! that gravity pushes aside.
 //!
-//! Two zones of engaged teeth lie half a turn apart. A displacement `A = ε / (r cos a)` brings the teeth of one zone forward by
-//! `A sin(x ± a)` and those of the other back by as much, other on each flank: the zone that is ahead stops the output, which
-//! therefore rests `A |sin(x ± a)|` short of where it would. A load presses that zone in until the other one carries as well, and moves
-//! a rim that gives towards the middle. Where the flanks come so far that no clearance is left between them, both bind, and the output
-//! stands in the middle, whatever the load.
+//! Two zones of engaged teeth lie half a turn apart. A displacement `A = ε / (r cos a)` brings the teeth of one zone
+//! forward by `A sin(x ± a)` and those of the other back by as much, other on each flank: the zone that is ahead stops
+//! the output, which therefore rests `A |sin(x ± a)|` short of where it would. A load presses that zone in until the
+//! other one carries as well, and moves a rim that gives towards the middle. Where the flanks come so far that no
+//! clearance is left between them, both bind, and the output stands in the middle, whatever the load.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -16,8 +16,8 @@ use super::{
 };
 use crate::causes::{CauseName, ParameterName as Name};
 
-/// Relative uncertainty of an eccentricity: how much of it a wave shows depends on the teeth that give and on a rim that centres
-/// itself, which differ between generators (FEM: from 5 % to a factor).
+/// Relative uncertainty of an eccentricity: how much of it a wave shows depends on the teeth that give and on a rim
+/// that centres itself, which differ between generators (FEM: from 5 % to a factor).
 const ECCENTRICITY_DOUBT: f64 = 0.15;
 /// Angle on the wheel by which a flank is ahead of the eccentricity, rad: the pressure angle, 20 to 25 degrees.
 const FLANK_AHEAD: f64 = 0.39;
@@ -110,7 +110,8 @@ impl Displacement {
     }
 }
 
-/// Second orders that fade with the load, and those that do not: as waves of both flanks alike, and of opposite sign on each.
+/// Second orders that fade with the load, and those that do not: as waves of both flanks alike, and of opposite sign on
+/// each.
 const FADING: Role = Role("second order that fades");
 const FADING_BY_FLANK: Role = Role("second order that fades, by flank");
 const STEADY: Role = Role("second order");
@@ -219,7 +220,8 @@ pub(super) fn displaced(cause: CauseName, of: Angle, on: &Excitation<'_>) -> Law
 }
 
 /// Second order of a rectified eccentricity without load, all columns together: what fades and what does not share it
-/// in proportions that loads of a narrow range cannot tell. Each column of order 2 is projected on the pattern, flank by flank.
+/// in proportions that loads of a narrow range cannot tell. Each column of order 2 is projected on the pattern, flank
+/// by flank.
 fn second_order_unloaded(c: Coefficients<'_>, shape: Shaped<'_>, ahead_by: f64) -> f64 {
     let loaded = shape.get(Name::HalfLoadNM).is_some();
     // Without a load the place of the steady wave is that of what a flank farther ahead changes.

@@ -9,13 +9,15 @@ use crate::diagnosis::rows::quantile;
 use crate::diagnosis::thinned::Thinned;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
-/// Moments, over the scale of the load, and directions that are tried on a drive without load; and how closely the best is followed.
+/// Moments, over the scale of the load, and directions that are tried on a drive without load; and how closely the best
+/// is followed.
 const MOMENTS: [f64; 5] = [0.2, 0.35, 0.6, 1.0, 1.6];
 const DIRECTIONS: usize = 16;
 const CLOSER: usize = 6;
 
-/// Moment and phase with which the `load` leaves least of the error by the flanks that it turns over. Where it turns one over too early or
-/// too late rows are off by the whole clearance, which a wander would follow: so all rows count alike.
+/// Moment and phase with which the `load` leaves least of the error by the flanks that it turns over. Where it turns
+/// one over too early or too late rows are off by the whole clearance, which a wander would follow: so all rows count
+/// alike.
 fn moment_that_turns_flanks(
     on: &Excitation<'_>,
     play: PlayLaw,
@@ -57,11 +59,12 @@ fn moment_that_turns_flanks(
     [best[0], best[1].rem_euclid(2.0 * PI)]
 }
 
-/// An unbalanced load, m g l sin of the output angle against gravity: adds to the torque, so it winds the drive up and moves the play.
-/// On a drive without load, `on_sample` tells where to begin.
+/// An unbalanced load, m g l sin of the output angle against gravity: adds to the torque, so it winds the drive up and
+/// moves the play. On a drive without load, `on_sample` tells where to begin.
 fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>, on_sample: &Excitation<'_>) -> Law {
     let scale = on.plausible_load();
-    // Next to no moment of a law of another play is that play alone; with the play that is there it adds next to nothing.
+    // Next to no moment of a law of another play is that play alone; with the play that is there it adds next to
+    // nothing.
     let least = if play == on.base.law { LEAST_MOMENT } else { LEAST_MOMENT_OF_ANOTHER_PLAY };
     let load = move |on: &Excitation<'_>, [moment, phase]: [f64; 2]| -> Vec<f64> {
         let rows = on.rows;
@@ -122,7 +125,8 @@ fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>, on_sample: &Exc
     law
 }
 
-/// Least moment, as a share of the load. *Guess*: moments of 0.09 and 0.13 N·m of examinations, 2.1 and 2.6″ rms, were below the one of another play.
+/// Least moment, as a share of the load. *Guess*: moments of 0.09 and 0.13 N·m of examinations, 2.1 and 2.6″ rms, were
+/// below the one of another play.
 const LEAST_MOMENT: f64 = 0.001;
 /// The same where the law of the play is another one than that found before. *Guess*.
 const LEAST_MOMENT_OF_ANOTHER_PLAY: f64 = 0.004;
@@ -137,22 +141,23 @@ const TURNING: Role = Role("turning");
 
 /// A load that is damped more than this does not swing.
 const MOST_DAMPING: f64 = 0.5;
-/// A damping beyond this share of the largest stands on the bound, or as good as: what is fitted hardly swings, and a flank or a reading that
-/// takes some milliseconds looks like it.
+/// A damping beyond this share of the largest stands on the bound, or as good as: what is fitted hardly swings, and a
+/// flank or a reading that takes some milliseconds looks like it.
 const ON_THE_BOUND: f64 = 0.8;
 
 /// Spread of the share of a jump that makes the load ring, beside that of a step of the torque.
 const SLIDING: f64 = 0.3;
 
-/// Speeds that are apart by this share make the waves of the drive sweep over frequencies; a load that changes by this share in so many
-/// seconds is a step. Guesses.
+/// Speeds that are apart by this share make the waves of the drive sweep over frequencies; a load that changes by this
+/// share in so many seconds is a step. Guesses.
 const SPEEDS_APART: f64 = 0.2;
 const STEP_SHARE: f64 = 0.1;
 const STEP_S: f64 = 0.1;
 /// Starts, stops and steps that have to be there.
 const FEWEST_STEPS: usize = 3;
 
-/// Whether speed or load changes so that a load on a spring would swing: waves at one speed are a line in time, whatever makes them.
+/// Whether speed or load changes so that a load on a spring would swing: waves at one speed are a line in time,
+/// whatever makes them.
 pub(super) fn makes_a_load_swing(on: &Excitation<'_>) -> bool {
     let rows = on.rows;
     if !on.scales.jumps.is_empty() {
@@ -226,18 +231,18 @@ fn transition(omega: f64, damping: f64, dt: f64) -> [f64; 4] {
     ]
 }
 
-/// How far the load swings beyond what drives it: the gain of wind-up or of kinematic error, whichever adds more. The other may have any gain, as
-/// badly known as it is.
+/// How far the load swings beyond what drives it: the gain of wind-up or of kinematic error, whichever adds more. The
+/// other may have any gain, as badly known as it is.
 fn gain_of(c: Coefficients<'_>) -> f64 {
     c.of(if c.adds(KINEMATIC) > c.adds(WIND_UP) { KINEMATIC } else { WIND_UP })
 }
 
-/// A load on a spring swings beyond where it is driven to, and not short of it as what hangs on a string may: its gain is not below none by
-/// more than this. *Guess*: eleven resonances of the examinations have 0.2 to 1.9.
+/// A load on a spring swings beyond where it is driven to, and not short of it as what hangs on a string may: its gain
+/// is not below none by more than this. *Guess*: eleven resonances of the examinations have 0.2 to 1.9.
 const NO_GAIN: f64 = 0.1;
 
-/// The load's inertia on the torsion of the drive: rings after steps of the torque, where the kinematic error meets its frequency, and
-/// where teeth skip.
+/// The load's inertia on the torsion of the drive: rings after steps of the torque, where the kinematic error meets its
+/// frequency, and where teeth skip.
 fn torsional_resonance(on: &Excitation<'_>) -> Law {
     let fastest = 0.45 / on.rows.period;
     let mut law = Law::new(CauseName::TorsionalResonance, |on, shape| {
@@ -255,7 +260,8 @@ fn torsional_resonance(on: &Excitation<'_>) -> Law {
             main(ringing(on, &moved_to, frequency, damping), 1.0).called(WIND_UP),
             main(ringing(on, &kinematic, frequency, damping), 1.0).called(KINEMATIC),
         ];
-        // The scatter of when an angle is read swings as a load would that the turning shakes: then the turning tells nothing.
+        // The scatter of when an angle is read swings as a load would that the turning shakes: then the turning tells
+        // nothing.
         if !on.rows.jitters {
             columns.push(main(moved, 0.5).called(TURNING));
         }
@@ -285,7 +291,8 @@ fn torsional_resonance(on: &Excitation<'_>) -> Law {
 pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     let mut laws = Vec::new();
     if on.speaks_of(CauseName::GravityTorque) {
-        // The load that gravity adds moves the torque at which the play turns over: which law it follows there shows only now.
+        // The load that gravity adds moves the torque at which the play turns over: which law it follows there shows
+        // only now.
         let mut plays = vec![PlayLaw::Held, PlayLaw::Pushed];
         if !plays.contains(&on.base.law) {
             plays.push(on.base.law);

@@ -1,5 +1,5 @@
-//! Deviations without a cause in the library. They compete with the causes: where one of them tells the data better, no cause is
-//! named for it.
+//! Deviations without a cause in the library. They compete with the causes: where one of them tells the data better, no
+//! cause is named for it.
 
 use super::stiffness::follow;
 use super::{Deviation, Excitation, Label, Law, Per, Role, Shape, by_row, lagged, main};
@@ -47,7 +47,8 @@ fn wave(label: Deviation, angle: fn(&Excitation<'_>, usize) -> f64, order: f64) 
     })
 }
 
-/// Lost motion before the generator, as of an Oldham coupling: whatever the load, the output lags by half of it either way.
+/// Lost motion before the generator, as of an Oldham coupling: whatever the load, the output lags by half of it either
+/// way.
 fn lash_before_the_generator() -> Law {
     Law::new(LASH_BEFORE_THE_GENERATOR, |on, shape| {
         let half_rad = shape.of(Name::HalfLashArcsec) * on.nominal.ratio.abs() / ARCSEC_PER_RAD;
@@ -61,8 +62,9 @@ fn lash_before_the_generator() -> Law {
     .physical_if(|_, c| c.of(Role::SIZE) > 0.0)
 }
 
-/// A coupling between the motor's encoder and the generator that gives way: it is wound up by what the load, friction, oil and inertia of the
-/// generator ask of the motor, a ratio-th of which is seen at the output. Softer under load and late in motion, at once.
+/// A coupling between the motor's encoder and the generator that gives way: it is wound up by what the load, friction,
+/// oil and inertia of the generator ask of the motor, a ratio-th of which is seen at the output. Softer under load and
+/// late in motion, at once.
 fn coupling_before_the_generator() -> Law {
     const LOAD: Role = Role("load");
     const FRICTION: Role = Role("friction");
@@ -85,7 +87,8 @@ fn coupling_before_the_generator() -> Law {
     .physical_if(|_, c| c.of(LOAD) > 0.0 && c.of(FRICTION) > 0.0)
 }
 
-/// Wind-up that comes late: what relaxes within about a second, ten, a hundred and a thousand, from rest under the first load.
+/// Wind-up that comes late: what relaxes within about a second, ten, a hundred and a thousand, from rest under the
+/// first load.
 fn creep_under_load() -> Law {
     Law::new("creep under load", |on, _| {
         let late = |lasts_s: f64| {
@@ -204,7 +207,8 @@ fn map(name: &'static str, grids: Vec<(Vec<f64>, usize)>) -> Law {
     })
 }
 
-/// What is left as a free function of what was measured: tried only when the causes are in, to see whether anything is left.
+/// What is left as a free function of what was measured: tried only when the causes are in, to see whether anything is
+/// left.
 #[must_use]
 pub fn maps(on: &Excitation<'_>) -> Vec<Law> {
     let rows = on.rows;

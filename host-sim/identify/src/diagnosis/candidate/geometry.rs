@@ -1,9 +1,10 @@
-//! Errors of shape and place of the toothed wheels and the generator (docs/explanation/theory.md, "Signatures of causes").
+//! Errors of shape and place of the toothed wheels and the generator (docs/explanation/theory.md, "Signatures of
+//! causes").
 //!
-//! An error of harmonic k on the flexspline's material returns k times per turn of the wave on it, one on the circular spline's
-//! 94/95 as often: orders 2 and 1.979, apart after half an output turn. Eccentricities are rectified by the clearance, `|sin|` on the
-//! flank that carries: orders 2, 4, 6 as 1 : 1/5 : 3/35, phase turned by twice the flank angle between flanks, a mean that eats
-//! backlash, and less the more teeth share the load.
+//! An error of harmonic k on the flexspline's material returns k times per turn of the wave on it, one on the circular
+//! spline's 94/95 as often: orders 2 and 1.979, apart after half an output turn. Eccentricities are rectified by the
+//! clearance, `|sin|` on the flank that carries: orders 2, 4, 6 as 1 : 1/5 : 3/35, phase turned by twice the flank
+//! angle between flanks, a mean that eats backlash, and less the more teeth share the load.
 
 use std::f64::consts::PI;
 
@@ -26,8 +27,8 @@ pub(super) const USUAL_ARCSEC: f64 = 20.0;
 /// Cosine of the pressure angle of a working flank, 20 to 25 degrees.
 pub(super) const COS_PRESSURE_ANGLE: f64 = 0.93;
 
-/// Clearance that odd orders of a pitch error take on a flank, over its second order: a first order as large as the second takes 2/π of it,
-/// and a wheel that takes more and shows little is one beside its place.
+/// Clearance that odd orders of a pitch error take on a flank, over its second order: a first order as large as the
+/// second takes 2/π of it, and a wheel that takes more and shows little is one beside its place.
 const MOST_CLEARANCE_TAKEN: f64 = 0.85;
 
 /// The wave that a law is, in waves of both flanks alike and of opposite sign on each.
@@ -101,8 +102,8 @@ fn load_shares(on: &Excitation<'_>) -> Vec<f64> {
     on.rows.torque.iter().map(|torque| (torque / on.scales.load).abs()).collect()
 }
 
-/// +1 where the circular spline is the output. Where the flexspline is, a load that turns it forward rests on the other flank of the
-/// circular spline, and what a flank is ahead by changes its sign.
+/// +1 where the circular spline is the output. Where the flexspline is, a load that turns it forward rests on the other
+/// flank of the circular spline, and what a flank is ahead by changes its sign.
 pub(super) fn sense(on: &Excitation<'_>) -> f64 {
     match on.nominal.teeth.map(|teeth| teeth.fixed) {
         Some(Fixed::CircularSpline) => -1.0,
@@ -110,8 +111,8 @@ pub(super) fn sense(on: &Excitation<'_>) -> f64 {
     }
 }
 
-/// Errors of position along the pitch: nearly the same on both flanks and under any load. Of the teeth in mesh the foremost carries,
-/// which is another one on each flank: flanks differ somewhat, and a part of the clearance goes.
+/// Errors of position along the pitch: nearly the same on both flanks and under any load. Of the teeth in mesh the
+/// foremost carries, which is another one on each flank: flanks differ somewhat, and a part of the clearance goes.
 fn pitch(cause: CauseName, of: Angle) -> Law {
     let mut law = Law::new(cause, move |on, _| {
         let (flank, light) = (&on.base.flank, light(on));
@@ -152,7 +153,8 @@ fn pitch(cause: CauseName, of: Angle) -> Law {
     law
 }
 
-/// Pitch error of a wheel whose error is one smooth wave, as of a cutter or a clamping that is off: order 2 with a little of 1 and 4.
+/// Pitch error of a wheel whose error is one smooth wave, as of a cutter or a clamping that is off: order 2 with a
+/// little of 1 and 4.
 fn smooth_pitch(cause: CauseName, of: Angle) -> Law {
     Law::new(cause, move |on, _| {
         let (flank, light) = (&on.base.flank, light(on));
@@ -185,11 +187,13 @@ fn wave_parameters(on: &Excitation<'_>, c: Coefficients<'_>, harmonic: f64) -> V
     ]
 }
 
-/// Further harmonics that both lobes see alike, as jaws, screws or an indexing head with so many places leave them; odd ones cancel.
+/// Further harmonics that both lobes see alike, as jaws, screws or an indexing head with so many places leave them; odd
+/// ones cancel.
 const HIGHER_HARMONICS: [f64; 5] = [4.0, 6.0, 8.0, 10.0, 12.0];
 
-/// Pitch errors that are one wave of a higher harmonic, with little of the second: rarer than those that the second leads. At the wheel that
-/// stands a subdivision of the generator's encoder makes the very same wave, and is the rule: it has the name there.
+/// Pitch errors that are one wave of a higher harmonic, with little of the second: rarer than those that the second
+/// leads. At the wheel that stands a subdivision of the generator's encoder makes the very same wave, and is the rule:
+/// it has the name there.
 fn higher_pitch(cause: CauseName, of: Angle, nominal: &Nominal) -> impl Iterator<Item = Law> {
     let of_encoder = is_standing(nominal, of);
     HIGHER_HARMONICS
@@ -231,9 +235,10 @@ pub fn standing_pitch_error(nominal: &Nominal) -> CauseName {
     }
 }
 
-/// Ring pressed to an oval: order 2 alone. Radius `d cos 2x` with the tangential part `-d/2 sin 2x` of a ring that keeps its length: the
-/// output lags where spaces are displaced forward, and a flank at the pressure angle gives way where they are displaced outward,
-/// `e = d/r (1/2 sin 2x ± tan a cos 2x)`. 10 µm of radius are 0.67 of 10 µm on the pitch circle.
+/// Ring pressed to an oval: order 2 alone. Radius `d cos 2x` with the tangential part `-d/2 sin 2x` of a ring that
+/// keeps its length: the output lags where spaces are displaced forward, and a flank at the pressure angle gives way
+/// where they are displaced outward, `e = d/r (1/2 sin 2x ± tan a cos 2x)`. 10 µm of radius are 0.67 of 10 µm on the
+/// pitch circle.
 fn ovality() -> Law {
     let of = Angle::CircularSpline;
     Law::new(CauseName::CircularSplineOvality, move |on, _| {
@@ -272,8 +277,8 @@ fn ovality() -> Law {
 /// Radial over tangential part of an oval ring as a flank sees them: twice the tangent of the pressure angle.
 const RADIAL_OF_TANGENTIAL: f64 = 0.8;
 
-/// Form error of the generator: a constant shape repeats from tooth to tooth, so its order is the tooth mesh (z per turn), other on each
-/// flank, with a change of the clearance.
+/// Form error of the generator: a constant shape repeats from tooth to tooth, so its order is the tooth mesh (z per
+/// turn), other on each flank, with a change of the clearance.
 fn cam_form_error() -> Law {
     Law::new(CauseName::CamFormError, |on, _| {
         let teeth = on.nominal.teeth.map_or(188.0, |t| f64::from(t.flexspline));
@@ -307,8 +312,8 @@ fn cam_form_error() -> Law {
 /// A pulse is nothing beyond so many of its widths.
 const PULSE_ENDS: f64 = 8.0;
 
-/// Widest pulse of a tooth that is looked for, rad, and the share of it beyond which one is on that bound. *Guess*: eight damaged teeth of the
-/// examinations have 0.10 to 0.27.
+/// Widest pulse of a tooth that is looked for, rad, and the share of it beyond which one is on that bound. *Guess*:
+/// eight damaged teeth of the examinations have 0.10 to 0.27.
 const WIDEST_PULSE: f64 = 0.4;
 const ON_THE_BOUND: f64 = 0.9;
 
@@ -319,7 +324,8 @@ pub(super) fn pulse(from_tooth: f64, width: f64) -> f64 {
     if away.abs() < PULSE_ENDS { (-0.5 * away * away).exp() } else { 0.0 }
 }
 
-/// A tooth that lacks material: a pulse each time a lobe of the wave passes it, twice per turn, on the flank that carries, under load.
+/// A tooth that lacks material: a pulse each time a lobe of the wave passes it, twice per turn, on the flank that
+/// carries, under load.
 fn damaged_tooth(of: Angle) -> Law {
     Law::new(CauseName::DamagedTooth, move |on, shape| {
         let (place, width) = (shape.of(Name::AngleRad), shape.of(Name::WidthRad));

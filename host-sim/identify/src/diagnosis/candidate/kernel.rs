@@ -1,7 +1,8 @@
-//! Signatures of geometric causes from the influence kernels of the contact FEM ([`flexspline_design::kernels`]), where the drive has them: what
-//! each load and each place in the wave makes of an error is then computed, not assumed.
+//! Signatures of geometric causes from the influence kernels of the contact FEM ([`flexspline_design::kernels`]), where
+//! the drive has them: what each load and each place in the wave makes of an error is then computed, not assumed.
 //!
-//! What the kernels leave open stays a nuisance: they are those of the frictionless drive at one temperature and on one mesh.
+//! What the kernels leave open stays a nuisance: they are those of the frictionless drive at one temperature and on one
+//! mesh.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -14,7 +15,8 @@ use flexspline_mechanics::drive::Wheel;
 
 /// Share by which a kernel's signature may be wrong: friction, temperature, mesh.
 const KERNEL_MISFIT: f64 = 0.08;
-/// Share by which the scale of a signature may be wrong: the size itself is a parameter, and enters otherwise than as a factor.
+/// Share by which the scale of a signature may be wrong: the size itself is a parameter, and enters otherwise than as a
+/// factor.
 const SCALE_MISFIT: f64 = 0.02;
 /// Plausible size of an error of pitch, of an oval, µm: one standard deviation.
 const USUAL_UM: f64 = 6.0;

@@ -1,8 +1,9 @@
 //! An eccentric generator: one lobe of the wave lies deeper in mesh than the other.
 //!
-//! The deeper lobe stops the output on either flank, by as much as it is deeper, and with it go the teeth that are out of place in it: odd
-//! harmonics of both wheels, which equal lobes cancel, come through, order 1 of each above all. A load presses the deeper lobe in until the
-//! other one carries as well: from there on both share, and the odd harmonics vanish.
+//! The deeper lobe stops the output on either flank, by as much as it is deeper, and with it go the teeth that are out
+//! of place in it: odd harmonics of both wheels, which equal lobes cancel, come through, order 1 of each above all. A
+//! load presses the deeper lobe in until the other one carries as well: from there on both share, and the odd harmonics
+//! vanish.
 
 use super::displaced::{PRESSED_ARCSEC, ZONES_MISFIT, stopped};
 use super::geometry::{Angle, USUAL_ARCSEC, kept, waves, weighted_waves};
@@ -14,11 +15,12 @@ use crate::causes::{CauseName, ParameterName as Name};
 
 /// Plausible differences between the lobes, arcsec at the output.
 const DEEPER_ARCSEC: [f64; 2] = [2.0, 200.0];
-/// Errors of the teeth over the difference of the lobes, at most. Well above one, the other lobe is the deeper one for part of a turn,
-/// which the law does not tell. *Chosen* on plants in which the teeth are out by 1.43 times that difference; at 2, waves of
-/// a wheel passed for a lobe.
+/// Errors of the teeth over the difference of the lobes, at most. Well above one, the other lobe is the deeper one for
+/// part of a turn, which the law does not tell. *Chosen* on plants in which the teeth are out by 1.43 times that
+/// difference; at 2, waves of a wheel passed for a lobe.
 const MOST_TEETH: f64 = 1.5;
-/// Where the full load leaves less than this share of the teeth's errors, a lobe that is pressed in has been seen. *Guess*.
+/// Where the full load leaves less than this share of the teeth's errors, a lobe that is pressed in has been
+/// seen. *Guess*.
 const LEFT_BY_LOAD: f64 = 0.5;
 /// What the deeper lobe takes of the clearance, under a load and without one.
 const TAKEN: Role = Role("clearance taken");

@@ -1,9 +1,10 @@
 //! Candidate causes: each a law of physics with named parameters, re-simulated on the data's own excitation.
 //!
-//! A [`Law`] turns shape parameters (what enters non-linearly: a slip torque, a time constant, a place) into columns whose
-//! coefficients enter linearly. Laws in the field differ from those here in detail, so each carries *nuisance* columns: the
-//! directions in which its law is likely to be wrong, with coefficients of the order of a share of the main ones. A deviation
-//! of that kind then breeds no second cause. What each follows and why: docs/explanation/theory.md, "Signatures of causes".
+//! A [`Law`] turns shape parameters (what enters non-linearly: a slip torque, a time constant, a place) into columns
+//! whose coefficients enter linearly. Laws in the field differ from those here in detail, so each carries *nuisance*
+//! columns: the directions in which its law is likely to be wrong, with coefficients of the order of a share of the
+//! main ones. A deviation of that kind then breeds no second cause. What each follows and why:
+//! docs/explanation/theory.md, "Signatures of causes".
 
 mod among;
 mod displaced;
@@ -57,17 +58,19 @@ pub struct Excitation<'a> {
 
 /// Generator turns below which a pulse in one place is not told from a wave; as in the picture of a residual.
 const FEWEST_TURNS_OF_PULSES: f64 = 6.0;
-/// At temperatures closer to each other than this, and this close to the nominal one, K, nothing thermal can be told from a changed
-/// constant.
+/// At temperatures closer to each other than this, and this close to the nominal one, K, nothing thermal can be told
+/// from a changed constant.
 const LEAST_SPAN_K: f64 = 2.0;
 const LEAST_OFF_NOMINAL_K: f64 = 5.0;
 
-/// Least use in which a drive may have worn: generator turns, and seconds from the first row to the last where time is known. Steel teeth
-/// under oil wear by micrometres in hours: this is where even a dry or a plastic one has hardly begun.
+/// Least use in which a drive may have worn: generator turns, and seconds from the first row to the last where time is
+/// known. Steel teeth under oil wear by micrometres in hours: this is where even a dry or a plastic one has hardly
+/// begun.
 const USED_TURNS: f64 = 20.0;
 const USED_S: f64 = 60.0;
 
-/// A load that nobody recorded on an unloaded drive may be so many times its friction, or wind it up by so much, arcsec.
+/// A load that nobody recorded on an unloaded drive may be so many times its friction, or wind it up by so much,
+/// arcsec.
 const UNLOADED_FRICTIONS: f64 = 4.0;
 const UNLOADED_ARCSEC: f64 = 20.0;
 
@@ -144,8 +147,8 @@ impl<'a> Excitation<'a> {
         (slope > 0.0).then_some(slope)
     }
 
-    /// Scale of a load that the torque column does not hold, N·m. Without a load on the output that column is noise, and says nothing
-    /// of what its friction and its spring bear.
+    /// Scale of a load that the torque column does not hold, N·m. Without a load on the output that column is noise,
+    /// and says nothing of what its friction and its spring bear.
     fn plausible_load(&self) -> f64 {
         let wound_up = self.slope_at_rest().map_or(0.0, |slope| UNLOADED_ARCSEC / slope);
         self.scales.load.max(UNLOADED_FRICTIONS * self.nominal.friction_torque_n_m).max(wound_up)
@@ -157,7 +160,8 @@ impl<'a> Excitation<'a> {
     }
 }
 
-/// What the coefficients of laws are counted in: taken from the rows that a model is fitted to, kept where it predicts others.
+/// What the coefficients of laws are counted in: taken from the rows that a model is fitted to, kept where it predicts
+/// others.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scales {
     /// Scale of the load, N·m; 0 without torque.
@@ -262,8 +266,8 @@ pub enum Tolerance {
     Main(Prior),
     /// A deviation of the law: its size is of the order of this share of the main coefficients.
     Nuisance(f64),
-    /// A deviation that comes with the cause by right, and may well be the larger part of it: clearance that a wheel beside its
-    /// place takes.
+    /// A deviation that comes with the cause by right, and may well be the larger part of it: clearance that a wheel
+    /// beside its place takes.
     Beside(f64),
     /// A nuisance of these rows alone: what was before anybody recorded. It predicts nothing.
     History(f64),
@@ -338,7 +342,8 @@ pub struct Lead {
 /// Laws made so far: each has a number of its own.
 static LAWS: AtomicU64 = AtomicU64::new(0);
 
-/// One law of one cause: what it tells of, how it is evaluated, how it may be wrong, how it is looked for, and how it acts on others.
+/// One law of one cause: what it tells of, how it is evaluated, how it may be wrong, how it is looked for, and how it
+/// acts on others.
 pub struct Law {
     id: u64,
     /// What it tells of.
@@ -392,8 +397,8 @@ pub struct Search {
     pub whole: bool,
     /// Natural logarithm of the odds against it before any data, beside the other laws.
     pub odds_against: f64,
-    /// All its columns are taken out before the noise is measured, those of its deviations too: a free profile has its finest detail in them, a long
-    /// delay what comes with it.
+    /// All its columns are taken out before the noise is measured, those of its deviations too: a free profile has its
+    /// finest detail in them, a long delay what comes with it.
     pub whole_beside_noise: bool,
 }
 
@@ -417,7 +422,8 @@ const NO_KIN: f64 = 0.25;
 
 /// Size of all deviations over that of the law, at most: beyond, the law is there for its deviations.
 const MOST_NUISANCE: f64 = 0.9;
-/// Size of all deviations over that of the law, at most, for laws that are well known, and whose deviations are those of another cause.
+/// Size of all deviations over that of the law, at most, for laws that are well known, and whose deviations are those
+/// of another cause.
 const MOST_NUISANCE_OF_KNOWN: f64 = 0.6;
 
 /// Share by which the law of a contact, a friction or a lubricant may be wrong.
@@ -466,7 +472,8 @@ impl Law {
     pub const fn named(&self) -> bool {
         self.cause().is_some()
     }
-    /// Whether it is the bench's zero in each session: what nobody can foretell of a session, and what says nothing of the drive.
+    /// Whether it is the bench's zero in each session: what nobody can foretell of a session, and what says nothing of
+    /// the drive.
     #[must_use]
     pub const fn is_zero_of_sessions(&self) -> bool {
         !self.wrong.foretells
@@ -495,7 +502,8 @@ impl Law {
         self.search.odds_against = AFTER_WHEELS;
         self.kin_of_shapes()
     }
-    /// What a misfit of wheels may look like: of an eccentric spline whose flanks bind, a second order of the output of a sixth of its size.
+    /// What a misfit of wheels may look like: of an eccentric spline whose flanks bind, a second order of the output of
+    /// a sixth of its size.
     fn kin_of_shapes(mut self) -> Law {
         self.wrong.kin = Kin::Shape;
         self
@@ -574,8 +582,8 @@ impl Law {
         }
     }
 
-    /// Values of the shape parameters to begin with, from those tried and the coefficients of the columns of the lead; nothing without
-    /// a lead.
+    /// Values of the shape parameters to begin with, from those tried and the coefficients of the columns of the lead;
+    /// nothing without a lead.
     #[must_use]
     pub fn beginnings(&self, values: &[f64], coefficients: Coefficients<'_>) -> Vec<Vec<f64>> {
         let lead = self.search.lead.as_ref();
@@ -696,7 +704,8 @@ fn lagged(on: &Excitation<'_>, values: &[f64], lag_s: f64) -> Vec<f64> {
     lagged_from(on, values, lag_s, |_, first| first)
 }
 
-/// Values that lag where the lag goes on from one session to the next: between them it nears what the next one begins with.
+/// Values that lag where the lag goes on from one session to the next: between them it nears what the next one begins
+/// with.
 fn lagged_through(on: &Excitation<'_>, values: &[f64], lag_s: f64) -> Vec<f64> {
     lagged_from(on, values, lag_s, |before, first| match before {
         // Where clocks begin anew nobody knows how long it had.
@@ -705,8 +714,8 @@ fn lagged_through(on: &Excitation<'_>, values: &[f64], lag_s: f64) -> Vec<f64> {
     })
 }
 
-/// What follows `values` with a lag; `begin` gives the state at the first row of a session, of what it was at the last row of the session
-/// before and how many seconds ago that was, and of the value.
+/// What follows `values` with a lag; `begin` gives the state at the first row of a session, of what it was at the last
+/// row of the session before and how many seconds ago that was, and of the value.
 fn lagged_from(
     on: &Excitation<'_>,
     values: &[f64],

@@ -1,4 +1,5 @@
-//! Columns and shape parameters by name: what a law says of its own coefficients stays true when a column is put in between.
+//! Columns and shape parameters by name: what a law says of its own coefficients stays true when a column is put in
+//! between.
 
 use super::Shape;
 use crate::causes::ParameterName;
@@ -52,8 +53,8 @@ impl<'c> Coefficients<'c> {
         self.get(role).unwrap_or(0.0)
     }
 
-    /// What the first column of a role adds, root mean square, without a sign: 0 where the law has no such column here. Where the columns are
-    /// not known all are taken to be alike.
+    /// What the first column of a role adds, root mean square, without a sign: 0 where the law has no such column here.
+    /// Where the columns are not known all are taken to be alike.
     #[must_use]
     pub fn adds(self, role: Role) -> f64 {
         let Some(at) = self.roles.iter().position(|of| *of == role) else { return 0.0 };

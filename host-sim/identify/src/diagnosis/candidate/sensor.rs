@@ -31,11 +31,12 @@ fn encoder(cause: CauseName, phase: fn(&Excitation<'_>, usize) -> f64, per_ratio
     })
 }
 
-/// Share of a second order that its own first overtone may have, and a subdivision of its own: signals of unlike size make little of it. Guess.
+/// Share of a second order that its own first overtone may have, and a subdivision of its own: signals of unlike size
+/// make little of it. Guess.
 const OVERTONE: f64 = 0.15;
 
-/// A line of an encoder at `order` waves in a turn of it, with a little of its overtone. At the generator there is none: overtones are what
-/// tells a wheel.
+/// A line of an encoder at `order` waves in a turn of it, with a little of its overtone. At the generator there is
+/// none: overtones are what tells a wheel.
 fn waves_of(
     cause: CauseName,
     phase: fn(&Excitation<'_>, usize) -> f64,
@@ -63,7 +64,8 @@ fn waves_of(
 const OUTPUT: fn(&Excitation<'_>, usize) -> f64 = |on, k| on.rows.output[k];
 const GENERATOR: fn(&Excitation<'_>, usize) -> f64 = |on, k| on.rows.generator[k];
 
-/// The second order of an encoder: a disc or a magnet that is tilted, a ring that is not flat, two signals of unlike size in a magnetic one.
+/// The second order of an encoder: a disc or a magnet that is tilted, a ring that is not flat, two signals of unlike
+/// size in a magnetic one.
 fn encoder_tilt() -> [Law; 2] {
     let at_output =
         |_: &Excitation<'_>, amplitude, phase| vec![(Name::AmplitudeArcsec, amplitude), (Name::PhaseRad, phase)];
@@ -80,8 +82,8 @@ fn encoder_tilt() -> [Law; 2] {
     [of_output.kin_of_shapes(), of_generator.after_wheels()]
 }
 
-/// Waves in a turn that interpolation leaves: four of a magnet with two poles, and so on for 4, 8, ... signal periods in a turn, the orders
-/// that loggers of such encoders resolve.
+/// Waves in a turn that interpolation leaves: four of a magnet with two poles, and so on for 4, 8, ... signal periods
+/// in a turn, the orders that loggers of such encoders resolve.
 const SUBDIVISIONS: [f64; 5] = [4.0, 8.0, 16.0, 32.0, 64.0];
 
 /// Whether an encoder may leave this many waves in a turn.
@@ -138,7 +140,8 @@ fn sensor_latency() -> Law {
             main(by_row(on, |k| -on.rows.speed[k] * per_s), 5e-3).called(Role::SIZE),
             // Two clocks seldom run at the same rate.
             nuisance(by_row(on, |k| -on.rows.speed[k] * per_s * since(k)), 0.3),
-            // The error is that of the instant at which the output was read: its waves are where the generator was then, …
+            // The error is that of the instant at which the output was read: its waves are where the generator was
+            // then, …
             nuisance(behind(&of_angle), 1.0),
             // … and so is its wind-up, if it is the output that is read early, and not the generator; …
             nuisance(behind(&on.base.wind_up), 1.0),

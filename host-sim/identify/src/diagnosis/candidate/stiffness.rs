@@ -15,8 +15,8 @@ fn load_share(on: &Excitation<'_>, k: usize) -> f64 {
     on.rows.torque[k] / on.scales.load.max(1e-9)
 }
 
-/// The spring part of a slip element (stop operator): follows the torque up to ±`slip`, in units of `slip`. Each session begins with
-/// the element at rest before its first load.
+/// The spring part of a slip element (stop operator): follows the torque up to ±`slip`, in units of `slip`. Each
+/// session begins with the element at rest before its first load.
 pub(super) fn stop_operator(on: &Excitation<'_>, slip: f64) -> Vec<f64> {
     let torque = &on.rows.torque;
     let mut held = vec![0.0; torque.len()];
@@ -38,8 +38,8 @@ pub(super) fn follow(torque: &[f64], session: Range<usize>, slip: f64, first: f6
     }
 }
 
-/// Half the difference between the two extremes that the element may have begun a session with: what nobody recorded, until the torque
-/// has swung far enough to wipe it out. One column for each of the sessions that remember longest.
+/// Half the difference between the two extremes that the element may have begun a session with: what nobody recorded,
+/// until the torque has swung far enough to wipe it out. One column for each of the sessions that remember longest.
 fn unknown_beginnings(on: &Excitation<'_>, slip: f64) -> Vec<Vec<f64>> {
     let torque = &on.rows.torque;
     let mut columns: Vec<Vec<f64>> = on
@@ -74,8 +74,8 @@ const FASTER: Role = Role("faster");
 /// A jump by whole teeth.
 const JUMP: Role = Role("jump");
 
-/// Half the opening of a loop at no torque, arcsec: on the way back from the full load an element holds this share of what it can when the torque
-/// passes zero.
+/// Half the opening of a loop at no torque, arcsec: on the way back from the full load an element holds this share of
+/// what it can when the torque passes zero.
 fn half_width(full: f64, shape: Shaped<'_>, c: Coefficients<'_>) -> f64 {
     let slips = shape.of(Name::SlipTorqueNM);
     let held = |slip: f64| ((full - slip) / slip).clamp(0.0, 1.0);
@@ -83,7 +83,8 @@ fn half_width(full: f64, shape: Shaped<'_>, c: Coefficients<'_>) -> f64 {
     springs.iter().map(|(factor, role)| c.of(*role) * held(factor * slips)).sum()
 }
 
-/// Springs that slip one after the other (Maxwell slip, Prandtl-Ishlinskii): the output lags the torque by what they hold.
+/// Springs that slip one after the other (Maxwell slip, Prandtl-Ishlinskii): the output lags the torque by what they
+/// hold.
 fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
     let load = on.scales.load;
     let mut law = Law::new(CauseName::TorsionalHysteresis, |on, shape| {
@@ -91,7 +92,8 @@ fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
         let usual = on.nominal.wind_up_arcsec(on.scales.load).mul_add(0.3, 30.0);
         let negative = |values: Vec<f64>| values.into_iter().map(|z| -z).collect::<Vec<f64>>();
         let mut columns = vec![
-            // The opening is a share of the wind-up: a plastic gear's is wide, a steel drive's at rated load 0.5 to 2' of 3'.
+            // The opening is a share of the wind-up: a plastic gear's is wide, a steel drive's at rated load 0.5 to 2'
+            // of 3'.
             main(negative(stop_operator(on, slip)), usual).called(SPRING),
             nuisance(negative(stop_operator(on, EARLIER * slip)), 0.35).called(EARLIER_SPRING),
             nuisance(negative(stop_operator(on, LATER * slip)), 0.5).called(LATER_SPRING),
@@ -113,8 +115,8 @@ fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
     })
     // All springs together take work; of three that stand for many one may be too much.
     .physical_if(move |shape, c| half_width(load, shape, c) > 0.0);
-    // Three elements stand for the many of a real drive: where the load passes zero they hold about, not exactly, as much (a fifth to a
-    // quarter less than springs that give way smoothly, hidden in made-up data).
+    // Three elements stand for the many of a real drive: where the load passes zero they hold about, not exactly, as
+    // much (a fifth to a quarter less than springs that give way smoothly, hidden in made-up data).
     law.wrong.doubt = 0.15;
     law.wrong.misfit_unnamed = LOOKS_LIKE_CREEP;
     // What springs hold goes with the load; the wind-up beside them takes that back, and the beginnings are nobody's.
@@ -122,8 +124,9 @@ fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
     law
 }
 
-/// Share of a loop by which another curve of it may look like something that lags the load in time: where the load swings with one period the
-/// two are one. *Chosen* on Bouc-Wen loops of 2 to 12 arcsec, none of which were named before.
+/// Share of a loop by which another curve of it may look like something that lags the load in time: where the load
+/// swings with one period the two are one. *Chosen* on Bouc-Wen loops of 2 to 12 arcsec, none of which were named
+/// before.
 const LOOKS_LIKE_CREEP: f64 = 0.5;
 /// Stiffer the higher the load: the wind-up lags behind the nominal line by a power of the torque.
 fn stiffness_hardening() -> Law {
@@ -156,8 +159,8 @@ fn stiffness_error() -> Law {
     law
 }
 
-/// Shares by which the law of a cracked root may be wrong: a crack that opens bends more than one that is pressed shut, the two loaded
-/// zones may carry unequally, and the arc in which the tooth carries has another shape. Guesses.
+/// Shares by which the law of a cracked root may be wrong: a crack that opens bends more than one that is pressed shut,
+/// the two loaded zones may carry unequally, and the arc in which the tooth carries has another shape. Guesses.
 const OPENING: f64 = 0.3;
 const UNEQUAL_LOBES: f64 = 0.3;
 const OTHER_ARC: f64 = 0.3;
@@ -165,8 +168,8 @@ const OTHER_ARC: f64 = 0.3;
 const BROADER: f64 = 1.7;
 const BROADER_ARC: Role = Role("broader arc");
 
-/// A tooth of the circular spline that is cracked at its root: the drive winds up more, both ways, while a loaded zone is on it, twice in
-/// a turn of the wave on that wheel. Without load it is where it was.
+/// A tooth of the circular spline that is cracked at its root: the drive winds up more, both ways, while a loaded zone
+/// is on it, twice in a turn of the wave on that wheel. Without load it is where it was.
 fn cracked_tooth_root() -> Law {
     const WHEEL: Angle = Angle::CircularSpline;
     Law::new(CauseName::CrackedToothRoot, |on, shape| {
@@ -184,7 +187,8 @@ fn cracked_tooth_root() -> Law {
     })
     .shapes([Shape::angle(Name::AngleRad, PI, 30), Shape::by_factors(Name::WidthRad, 0.03, 0.4, 2)])
     .parameters_by(|on, shape, c| {
-        // Both arcs have their top where the tooth is. Together they are as wide as the bell curve of that height and area.
+        // Both arcs have their top where the tooth is. Together they are as wide as the bell curve of that height and
+        // area.
         let (narrow, broad) = (c.of(Role::SIZE), c.of(BROADER_ARC));
         let top = narrow + broad;
         let width = shape.of(Name::WidthRad) * (narrow + BROADER * broad) / top;
@@ -275,10 +279,12 @@ fn wear(by: Progress) -> Law {
 
 /// What the clearance has widened by between two sessions.
 const STEP: Role = Role("step between sessions");
-/// A clearance that is narrower in a session than before does not wear; nor does one that is by less than this share of all its growth. *Guess*.
+/// A clearance that is narrower in a session than before does not wear; nor does one that is by less than this share of
+/// all its growth. *Guess*.
 const NOT_NARROWER: f64 = 0.1;
-/// Fewest sessions and most in which wear may go on between them. Of two any change of the clearance would be a growth, as it has one step and no
-/// order; and each session has a step of its own, so that of many the law follows what it likes. *Guess*.
+/// Fewest sessions and most in which wear may go on between them. Of two any change of the clearance would be a growth,
+/// as it has one step and no order; and each session has a step of its own, so that of many the law follows what it
+/// likes. *Guess*.
 const SESSIONS: std::ops::RangeInclusive<usize> = 3..=12;
 
 /// A clearance that widens with travel, and while nobody records: the drive works on between the sessions.

@@ -3,14 +3,15 @@
 use super::{Excitation, Law, Named, Role, Shape, Shaped, by_row, lagged_through, main, main_about, nuisance};
 use crate::causes::{CauseName, ParameterName as Name};
 
-/// Temperature above nominal, felt with a lag of `lag_s`, K. Metal does not know when it is recorded: what was felt when a session ended
-/// nears the temperature at which the next one begins.
+/// Temperature above nominal, felt with a lag of `lag_s`, K. Metal does not know when it is recorded: what was felt
+/// when a session ended nears the temperature at which the next one begins.
 fn warmer_by(on: &Excitation<'_>, lag_s: f64) -> Vec<f64> {
     let felt = lagged_through(on, &on.rows.temperature, lag_s);
     by_row(on, |k| felt[k] - on.nominal.temperature_c)
 }
 
-/// Warm parts close the clearance, cold ones open it (or the reverse): −2″/K of generator and flexspline against the circular spline.
+/// Warm parts close the clearance, cold ones open it (or the reverse): −2″/K of generator and flexspline against the
+/// circular spline.
 fn thermal_clearance(on: &Excitation<'_>) -> Law {
     Law::new(CauseName::ThermalClearance, |on, shape| {
         let warmer = warmer_by(on, lag_of(shape));
@@ -38,7 +39,8 @@ fn named_clearance(arcsec_per_k: f64, shape: Shaped<'_>) -> Vec<Named> {
     [(Name::ClearanceArcsecPerK, arcsec_per_k)].into_iter().chain(lag).collect()
 }
 
-/// The clearance where it changes so far that the clearance is shut in the cold or in the heat: it cannot be less than nothing.
+/// The clearance where it changes so far that the clearance is shut in the cold or in the heat: it cannot be less than
+/// nothing.
 fn thermal_clearance_shut(on: &Excitation<'_>) -> Law {
     Law::new(CauseName::ThermalClearance, |on, shape| {
         let (warmer, per_k) = (warmer_by(on, lag_of(shape)), shape.of(Name::ClearanceArcsecPerK));
@@ -93,7 +95,8 @@ impl Drag {
         Drag { power: shape.of(Name::SpeedExponent), per_k: shape.of(Name::PerK), bend: shape.of(Name::BendPerK) }
     }
 
-    /// Whether it is one of a lubricant: at the edge of the range it is dry friction or lash, which knows neither speed nor cold.
+    /// Whether it is one of a lubricant: at the edge of the range it is dry friction or lash, which knows neither speed
+    /// nor cold.
     fn is_viscous(self) -> bool {
         self.power > 0.27 && self.per_k > 0.009
     }
@@ -135,18 +138,21 @@ fn wind_up_arcsec_per_n_m(on: &Excitation<'_>) -> f64 {
     on.slope_at_rest().map_or(1.0, |slope| on.softer * slope)
 }
 
-/// How much thicker a lubricant is that is `cold` K below the nominal temperature. Vogel's `ln ν = B / (T + C)` written by its slope
-/// there, `per_k`, and `bend` = 1 / (nominal temperature + C): 0 is an exponential, 1/293 K Andrade's law at 20 °C, 1/115 K Vogel's.
+/// How much thicker a lubricant is that is `cold` K below the nominal temperature. Vogel's `ln ν = B / (T + C)` written
+/// by its slope there, `per_k`, and `bend` = 1 / (nominal temperature + C): 0 is an exponential, 1/293 K Andrade's law
+/// at 20 °C, 1/115 K Vogel's.
 fn thicker(cold: f64, per_k: f64, bend: f64) -> f64 {
     (per_k * cold / (1.0 - bend * cold).max(LEAST_ABOVE_SETTING)).exp()
 }
 
-/// Vogel's law holds down to where a lubricant sets: not closer to it than this share of the way from the nominal temperature.
+/// Vogel's law holds down to where a lubricant sets: not closer to it than this share of the way from the nominal
+/// temperature.
 const LEAST_ABOVE_SETTING: f64 = 0.2;
 /// Largest [`thicker`] bend, 1/K.
 const MOST_BEND: f64 = 0.01;
 
-/// Drag of the lubricant, against the motion: a power of the speed, and thicker in the cold (Vogel, close to exponential).
+/// Drag of the lubricant, against the motion: a power of the speed, and thicker in the cold (Vogel, close to
+/// exponential).
 fn lubricant_viscosity() -> Law {
     Law::new(CauseName::LubricantViscosity, |on, shape| {
         let drag = Drag::of(shape);
@@ -168,7 +174,8 @@ fn lubricant_viscosity() -> Law {
     .evaluated_on_averages()
 }
 
-/// Drag of the lubricant as a load: it winds the drive up and, where it exceeds the torque, moves the play to the other flank.
+/// Drag of the lubricant as a load: it winds the drive up and, where it exceeds the torque, moves the play to the other
+/// flank.
 fn lubricant_load(on: &Excitation<'_>) -> Law {
     let scale = on.plausible_load();
     let load = |on: &Excitation<'_>, shape: Shaped<'_>| -> Vec<f64> {

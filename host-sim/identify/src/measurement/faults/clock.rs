@@ -12,18 +12,22 @@ use flexspline_base::robust::{least_and_most, median_and_std, median_of, quantil
 pub const SESSION_GAP_PERIODS: f64 = 10.0;
 /// A step of time above so many periods, jitter aside, has a row missing in it: half way between one lost row and none.
 const LOST_ROW_PERIODS: f64 = 1.5;
-/// A gap of up to so many periods that begins a session may be one of rows that were lost: where the motion goes on over it. *Guess*.
+/// A gap of up to so many periods that begins a session may be one of rows that were lost: where the motion goes on
+/// over it. *Guess*.
 const LONGEST_HOLE_PERIODS: f64 = 100.0;
-/// The motion goes on where the generator turns over the gap as it does on either side, within this share of the faster pace, and this, rad. *Guess*.
+/// The motion goes on where the generator turns over the gap as it does on either side, within this share of the faster
+/// pace, and this, rad. *Guess*.
 const GOES_ON: (f64, f64) = (0.3, 0.05);
 /// Rows on either side that say the pace there.
 const PACE_ROWS: usize = 3;
 /// In a column that wraps an angle says nothing that may be off by more than this, rad.
 const WRAPS_RAD: f64 = 1.5;
-/// Of the gaps that may be such holes this share is, with the generator in motion: then those are, too, in which it stands, starts or turns round.
+/// Of the gaps that may be such holes this share is, with the generator in motion: then those are, too, in which it
+/// stands, starts or turns round.
 /// *Guess*.
 const HOLES_IN_MOTION: f64 = 0.5;
-/// The median of many steps scatters by so many times what their mean does (√(π/2) of normal ones, *Source*), and is known to so many of that.
+/// The median of many steps scatters by so many times what their mean does (√(π/2) of normal ones, *Source*), and is
+/// known to so many of that.
 const MEDIAN_TO_MEAN_STD: f64 = 1.253;
 const MEDIAN_STDS: f64 = 2.0;
 /// Where more steps than this are that long, rows are not evenly spaced by intent, and none is missing.
@@ -38,8 +42,8 @@ const JITTER_OVER_MOTION: f64 = 5.0;
 const PERIODS_S: [f64; 2] = [1e-7, 3600.0];
 /// Generator speeds that exist, up to 20 000 turns a minute, rad/s.
 const FASTEST_RAD_S: f64 = 2100.0;
-/// Rows farther apart than this (s), for longer than this altogether (s), in which the motor stays slower than this (rad/s), are milliseconds
-/// read as seconds: a bench creeps for minutes, not for days. *Guess*.
+/// Rows farther apart than this (s), for longer than this altogether (s), in which the motor stays slower than this
+/// (rad/s), are milliseconds read as seconds: a bench creeps for minutes, not for days. *Guess*.
 const CREEPS: (f64, f64, f64) = (1.0, 43_200.0, 0.1);
 /// The same of a motor that goes to and fro: a telescope creeps for nights, but one way. *Guess*.
 const CREEPS_TO_AND_FRO: (f64, f64, f64) = (0.9, 3600.0, 0.15);
@@ -49,13 +53,14 @@ const EACH_WAY: (f64, f64) = (0.1, 6.0);
 const SMOOTHLY: f64 = 0.35;
 /// What milliseconds read as seconds are divided by.
 const MILLI: f64 = 1e3;
-/// Of the distance of a stamp from where it is expected the phase takes this share, and the period this one: a loop that follows a clock and
-/// averages some forty stamps.
+/// Of the distance of a stamp from where it is expected the phase takes this share, and the period this one: a loop
+/// that follows a clock and averages some forty stamps.
 const PHASE_GAIN: f64 = 0.05;
 const PERIOD_GAIN: f64 = 0.5 * PHASE_GAIN * PHASE_GAIN;
 /// Rows on either side that say which period one is of.
 const AROUND_ROWS: usize = 5;
-/// Steps of time that scatter by more than this share of a period tell lost rows by the count along the session, not one by one.
+/// Steps of time that scatter by more than this share of a period tell lost rows by the count along the session, not
+/// one by one.
 const SCATTERS: f64 = 0.05;
 
 /// Finds faults of the clock, repairs or leaves out what they touch, and parts the rows into sessions.
@@ -86,7 +91,8 @@ fn period(log: &Log) -> Option<f64> {
     (!steps.is_empty()).then(|| median_of(&mut sampled(&steps)))
 }
 
-/// Time that runs back: a row out of order is left out, a clock that was set back starts a session. Gives the lines left out.
+/// Time that runs back: a row out of order is left out, a clock that was set back starts a session. Gives the lines
+/// left out.
 fn order(log: &mut Log, findings: &mut Findings) -> Vec<u64> {
     let Some(period) = period(log) else { return Vec::new() };
     let Some(time) = log.get(Quantity::Time) else { return Vec::new() };
@@ -190,7 +196,8 @@ fn turned(values: &[f64], row: usize) -> f64 {
     d - TAU * (d / TAU).round()
 }
 
-/// Gaps in time: sessions, and rows that were lost. Near `strays`, lines left out for their time, none is counted as lost.
+/// Gaps in time: sessions, and rows that were lost. Near `strays`, lines left out for their time, none is counted as
+/// lost.
 fn gaps(log: &mut Log, period: f64, strays: &[u64], findings: &mut Findings) {
     let Some(time) = log.get(Quantity::Time) else { return };
     let rows = time.len();
@@ -216,12 +223,13 @@ fn gaps(log: &mut Log, period: f64, strays: &[u64], findings: &mut Findings) {
         let near = strays.iter().any(|line| line.abs_diff(log.line[*row]) <= 2);
         *rows > 0 && !near
     });
-    // Stamps that jitter make single steps long; rows are missing only where the stamps of a whole session count more periods than rows.
+    // Stamps that jitter make single steps long; rows are missing only where the stamps of a whole session count more
+    // periods than rows.
     let counts: Vec<Counted> = counted(log, period).collect();
     let near_stray = |row: usize| strays.iter().any(|line| line.abs_diff(log.line[row]) <= 2);
     let holes: Vec<(usize, u64)> = holes(log, &parts, period).into_iter().filter(|hole| !near_stray(hole.0)).collect();
-    // The median step may be shorter than the period that a clock keeps on the mean: no more are missing than its time over that says, as well as
-    // the median is known.
+    // The median step may be shorter than the period that a clock keeps on the mean: no more are missing than its time
+    // over that says, as well as the median is known.
     let unsure = MEDIAN_STDS * MEDIAN_TO_MEAN_STD * jitter / period / (rows as f64).sqrt();
     let within = counts.iter().map(|Counted { rows, lacking, .. }| {
         let beyond = (time[rows.end - 1] - time[rows.start]) / period - (rows.len() as f64 - 1.0);
@@ -254,14 +262,17 @@ fn gaps(log: &mut Log, period: f64, strays: &[u64], findings: &mut Findings) {
             let breaks = match holes.len() {
                 0 => String::new(),
                 1 => format!(
-                    "; one gap, of {in_holes} of them, is so long that a session begins behind it, though the motion goes on"
+                    "; one gap, of {in_holes} of them, is so long that a session begins behind it, though the motion \
+                     goes on"
                 ),
                 n => format!(
-                    "; {n} gaps, with {in_holes} of them, are so long that a session begins behind each, though the motion goes on"
+                    "; {n} gaps, with {in_holes} of them, are so long that a session begins behind each, though the \
+                     motion goes on"
                 ),
             };
             fault.what = format!(
-                "{total} rows are missing, in up to {places} places: time goes on by more than {LOST_ROW_PERIODS} of the usual {period:.6} s{breaks}"
+                "{total} rows are missing, in up to {places} places: time goes on by more than {LOST_ROW_PERIODS} of \
+                 the usual {period:.6} s{breaks}"
             );
             findings.faults.push(fault);
         } else {
@@ -285,7 +296,8 @@ fn gaps(log: &mut Log, period: f64, strays: &[u64], findings: &mut Findings) {
     }
 }
 
-/// Of gaps that begin a session those in which rows were lost, for the motion goes on over them, and how many: the row behind each.
+/// Of gaps that begin a session those in which rows were lost, for the motion goes on over them, and how many: the row
+/// behind each.
 fn holes(log: &Log, parts: &[usize], period: f64) -> Vec<(usize, u64)> {
     let (Some(time), Some(generator)) = (log.get(Quantity::Time), log.get(Quantity::Generator)) else {
         return Vec::new();
@@ -337,8 +349,8 @@ struct Counted {
     lacking: u64,
 }
 
-/// Counts the periods of each session along its stamps with a phase-locked loop, so that their scatter does not add up. A stamp that scatters
-/// into the period beside its own is counted with its neighbours.
+/// Counts the periods of each session along its stamps with a phase-locked loop, so that their scatter does not add up.
+/// A stamp that scatters into the period beside its own is counted with its neighbours.
 fn counted(log: &Log, period_s: f64) -> impl Iterator<Item = Counted> + '_ {
     let time = log.get(Quantity::Time).unwrap_or_default();
     let mut begin = 0;
@@ -393,7 +405,8 @@ fn jitter(log: &mut Log, period: f64, findings: &mut Findings) {
     let mut fault = span(log, FaultName::ClockError, 0, log.len() - 1);
     (fault.channel, fault.treatment) = (Some(Quantity::Time), Treatment::Repaired);
     fault.what = format!(
-        "stamps scatter by {:.0} % of a period while the motion from row to row scatters by {:.1} %: rows are spaced evenly",
+        "stamps scatter by {:.0} % of a period while the motion from row to row scatters by {:.1} %: rows are spaced \
+         evenly",
         100.0 * time_scatter,
         100.0 * motion_scatter
     );
@@ -436,8 +449,8 @@ fn scale(log: &mut Log, period: f64, findings: &mut Findings) {
         format!("a generator speed of {speed:.0} rad/s is not plausible")
     } else if creeps {
         format!(
-            "{} rows {period:.3} s apart, {:.1} hours in which the generator hardly exceeds {fastest:.3} rad/s, are milliseconds rather than \
-             seconds",
+            "{} rows {period:.3} s apart, {:.1} hours in which the generator hardly exceeds {fastest:.3} rad/s, are \
+             milliseconds rather than seconds",
             time.len(),
             lasts_s / 3600.0
         )

@@ -1,8 +1,9 @@
-//! A torque that is written in coarse steps while the load goes on between them: laws of the load would see steps that the drive does not
-//! make.
+//! A torque that is written in coarse steps while the load goes on between them: laws of the load would see steps that
+//! the drive does not make.
 //!
-//! Where the column goes from one step to the next the load is halfway between them: a curve through these points, within half a step of
-//! what is written, stands in. A load that is put on in steps moves the error within the row, too, and is left alone.
+//! Where the column goes from one step to the next the load is halfway between them: a curve through these points,
+//! within half a step of what is written, stands in. A load that is put on in steps moves the error within the row,
+//! too, and is left alone.
 
 use std::collections::HashSet;
 
@@ -16,14 +17,15 @@ use flexspline_base::robust::median_of;
 
 /// Steps of less than this share of the largest load are no matter: those of eight bits are. *Guess*.
 const LEAST_STEP: f64 = 0.004;
-/// Steps are a sensor's, and not weights that somebody put on and wrote down, where there are so many of them, and this share of the runs of one
-/// value is shorter than [`LEAST_ROWS`]: noise and changes tear them. *Guess*.
+/// Steps are a sensor's, and not weights that somebody put on and wrote down, where there are so many of them, and this
+/// share of the runs of one value is shorter than [`LEAST_ROWS`]: noise and changes tear them. *Guess*.
 const MANY_STEPS: usize = 12;
 const TORN: f64 = 0.2;
 /// Rows to a step at least on either side of a change that is looked at, and changes that say something.
 const LEAST_ROWS: usize = 3;
 const LEAST_CHANGES: usize = 12;
-/// Share of what the error changes by from step to step that it changes by in the very row where the load does so, too. *Guess*.
+/// Share of what the error changes by from step to step that it changes by in the very row where the load does so,
+/// too. *Guess*.
 const WITHIN_THE_ROW: f64 = 0.5;
 /// The error changes from step to step by so many standard deviations of the mean.
 const CERTAIN: f64 = 4.0;
@@ -73,8 +75,8 @@ pub(in crate::measurement) fn check(sessions: &mut Vec<Session>, findings: &mut 
     }
     fault.treatment = Treatment::Repaired;
     fault.what = format!(
-        "the torque is written in steps of {step:.3} N·m, and the load goes on between them: where it goes from one to the next it is halfway, \
-         and a curve through these points stands in{}",
+        "the torque is written in steps of {step:.3} N·m, and the load goes on between them: where it goes from one \
+         to the next it is halfway, and a curve through these points stands in{}",
         if leave_out && out > 0 { format!("; {out} rows far from any such point are left out") } else { String::new() }
     );
     findings.faults.push(fault);
@@ -101,7 +103,8 @@ fn kept(sessions: &[Session], step: f64) -> Option<Fault> {
     }
     let mut fault = throughout(sessions)?;
     fault.what = format!(
-        "the torque is written in steps of {step:.3} N·m: what the load does within a step is not seen, and nothing in the rows tells it"
+        "the torque is written in steps of {step:.3} N·m: what the load does within a step is not seen, and nothing \
+         in the rows tells it"
     );
     Some(fault)
 }
@@ -113,8 +116,8 @@ fn runs(values: &[f64]) -> Vec<std::ops::Range<usize>> {
     ends.map(|end| std::mem::replace(&mut from, end)..end).collect()
 }
 
-/// Whether the error goes on from step to step, instead of changing with the torque within a row. Around no load the flank changes: those
-/// steps do not count.
+/// Whether the error goes on from step to step, instead of changing with the torque within a row. Around no load the
+/// flank changes: those steps do not count.
 fn goes_on_between(sessions: &[Session], step: f64) -> bool {
     let mut changes: Vec<[f64; 2]> = Vec::new();
     for session in sessions {
@@ -142,7 +145,8 @@ fn goes_on_between(sessions: &[Session], step: f64) -> bool {
     in_all > CERTAIN * (variance / count).sqrt() && within < WITHIN_THE_ROW * in_all
 }
 
-/// Where the load of a session is known, in stretches without a change by more than one step: there it is put on, or goes on too fast.
+/// Where the load of a session is known, in stretches without a change by more than one step: there it is put on, or
+/// goes on too fast.
 fn stretches(torque: &[f64], step: f64) -> Vec<Vec<Known>> {
     let mut found: Vec<Vec<Known>> = vec![Vec::new()];
     // Rows that a change torn by noise begins and ends at, and what it is halfway between.
@@ -174,8 +178,8 @@ fn stretches(torque: &[f64], step: f64) -> Vec<Vec<Known>> {
     found
 }
 
-/// Slopes of the natural cubic spline through what is known: of all curves the least bent one, as a load is that a machine swings. A
-/// tridiagonal system, solved by elimination (Thomas).
+/// Slopes of the natural cubic spline through what is known: of all curves the least bent one, as a load is that a
+/// machine swings. A tridiagonal system, solved by elimination (Thomas).
 fn slopes(known: &[Known]) -> Vec<f64> {
     let length = |k: usize| known[k + 1].0 - known[k].0;
     let chord = |k: usize| (known[k + 1].1 - known[k].1) / length(k);
@@ -203,8 +207,8 @@ fn slopes(known: &[Known]) -> Vec<f64> {
     slopes
 }
 
-/// Puts a curve through what is known in the place of the torque, within half a step of it, and says of which rows: not those of a step that
-/// lasts `long`.
+/// Puts a curve through what is known in the place of the torque, within half a step of it, and says of which rows: not
+/// those of a step that lasts `long`.
 fn between(torque: &mut [f64], known: &[Known], step: f64, long: f64, drop: &mut [bool]) {
     let slopes = slopes(known);
     for (k, pair) in known.windows(2).enumerate() {
@@ -225,7 +229,8 @@ fn between(torque: &mut [f64], known: &[Known], step: f64, long: f64, drop: &mut
 mod tests {
     use super::*;
 
-    /// A load that swings, the error it makes (30 µrad per N·m and some noise), and what a column in steps of `step` says of the load.
+    /// A load that swings, the error it makes (30 µrad per N·m and some noise), and what a column in steps of `step`
+    /// says of the load.
     fn sessions(step: f64, load: impl Fn(f64) -> f64, felt: impl Fn(f64) -> f64) -> Vec<Session> {
         let mut random = fastrand::Rng::with_seed(6);
         let times = || (0..6000).map(|k| 0.01 * f64::from(k));

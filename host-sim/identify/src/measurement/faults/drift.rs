@@ -1,7 +1,7 @@
 //! A zero that moves with time, the same in every state of the drive.
 //!
-//! Wear, heat and a falling stiffness move the error too, but not on both flanks alike; a wrong ratio and an eccentric encoder move
-//! it with the angle. Drift is named only where the data can tell it from them.
+//! Wear, heat and a falling stiffness move the error too, but not on both flanks alike; a wrong ratio and an eccentric
+//! encoder move it with the angle. Drift is named only where the data can tell it from them.
 
 use super::state::{Extra, State};
 use super::{ARCSEC, Findings, of_rows};
@@ -21,22 +21,26 @@ const STRETCHES: usize = 24;
 /// Fewest stretches that show a trend, and rows of a stretch.
 const FEWEST_STRETCHES: usize = 8;
 const STRETCH_ROWS: usize = 8;
-/// Fewest gaps between sessions that tell a drift from zeros that are set anew, and how far a session may lie off the line, as a share of all
-/// the drift. *Guess*: two gaps agree to a twentieth by chance in one recording of twenty.
+/// Fewest gaps between sessions that tell a drift from zeros that are set anew, and how far a session may lie off the
+/// line, as a share of all the drift. *Guess*: two gaps agree to a twentieth by chance in one recording of twenty.
 const FEWEST_GAPS: usize = 2;
 const OFF_THE_LINE: f64 = 0.05;
-/// Within sessions the zero moves as over all of them: the slope there is off by this share at most, but for so many of its standard deviations. *Guess*.
+/// Within sessions the zero moves as over all of them: the slope there is off by this share at most, but for so many of
+/// its standard deviations. *Guess*.
 const WITHIN: f64 = 0.5;
 const WITHIN_STDS: f64 = 3.0;
 /// Sessions whose zeros are free at once, at most.
 const MOST_ZEROS: usize = 64;
-/// Sessions in which a drift of this share would not show by so many standard deviations have to lie on its line, by [`OFF_THE_LINE`]. *Guess*.
+/// Sessions in which a drift of this share would not show by so many standard deviations have to lie on its line, by
+/// [`OFF_THE_LINE`]. *Guess*.
 const SHOWS: f64 = 0.5;
 /// What is the same on both flanks: the part that differs is below this share.
 const ALIKE: f64 = 0.35;
-/// A trend whose standard deviation grows by more than this when position, load and temperature are considered may be one of them.
+/// A trend whose standard deviation grows by more than this when position, load and temperature are considered may be
+/// one of them.
 const CONFUSED: f64 = 4.0;
-/// And is none of them where it is so many standard deviations, and the temperature does not go with time: correlation, from a span in K on.
+/// And is none of them where it is so many standard deviations, and the temperature does not go with time: correlation,
+/// from a span in K on.
 /// *Guess*.
 const BEYOND_CONFUSION: f64 = 50.0;
 const WITH_TIME: f64 = 0.8;
@@ -44,7 +48,8 @@ const COUNTS_K: f64 = 2.0;
 /// Share of rows that each flank must have.
 const BOTH_FLANKS: f64 = 0.1;
 
-/// What moves by this within so many seconds, and by this share of the drift, is none: beyond any wind-up and clearance.
+/// What moves by this within so many seconds, and by this share of the drift, is none: beyond any wind-up and
+/// clearance.
 const LEAST_LEAP_RAD: f64 = 1200.0 * ARCSEC;
 const LEAP_S: f64 = 2.0;
 const LEAP_SHARE: f64 = 0.3;
@@ -77,8 +82,8 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, cut: 
     let per_hour = 3600.0 * per_s / ARCSEC;
     fault.measures.arcsec_per_hour = Some(per_hour);
     fault.what = format!(
-        "the zero of the error drifts by {:.2} arcsec in all, {per_hour:.1} an hour (standard deviation of all {:.2}), alike on both flanks, \
-         and not with temperature or position: a straight line in time is taken out",
+        "the zero of the error drifts by {:.2} arcsec in all, {per_hour:.1} an hour (standard deviation of all \
+         {:.2}), alike on both flanks, and not with temperature or position: a straight line in time is taken out",
         total / ARCSEC,
         std * (last - first) / ARCSEC
     );
@@ -155,14 +160,15 @@ fn slope(sessions: &[Session], gear: &Gear, cut: Stretches) -> Option<(f64, f64,
     if plus + minus > 0 && (plus.min(minus) as f64) < BOTH_FLANKS * (plus + minus) as f64 {
         return None;
     }
-    // Time over the recording, alone, has the size 1/√3. Few sessions look like many a state of a drive: then it must not
-    // warm with time, and the sessions have to say it with one voice.
+    // Time over the recording, alone, has the size 1/√3. Few sessions look like many a state of a drive: then it must
+    // not warm with time, and the sessions have to say it with one voice.
     let confused = formal > CONFUSED * 3.0_f64.sqrt() * fit.unit_std;
     if confused && (warms_with_time(sessions, &tau) || drift.abs() < BEYOND_CONFUSION * formal) {
         return None;
     }
-    // Once more by stretches: the trend of their medians, which noise of a long memory does not make so certain. A bench that rests for longer
-    // than it runs fills few stretches of time: then they are of rows, and what each session says by itself must not contradict.
+    // Once more by stretches: the trend of their medians, which noise of a long memory does not make so certain. A
+    // bench that rests for longer than it runs fills few stretches of time: then they are of rows, and what each
+    // session says by itself must not contradict.
     let lefts: Vec<Vec<(f64, f64)>> = (0..sessions.len())
         .map(|s| {
             let left = state.left(&fit, s, &all);
@@ -236,8 +242,8 @@ fn alike_in_sessions(lefts: &[Vec<Point>], drift: f64) -> bool {
     lefts.len() > FEWEST_GAPS && on_the_line(lefts, drift) && !contradicted
 }
 
-/// Whether the zero moves within sessions, a zero of each free, as it does over all of them; where that does not show, whether the sessions lie on
-/// one line. `place` is where the first of the columns of `drifts` stands.
+/// Whether the zero moves within sessions, a zero of each free, as it does over all of them; where that does not show,
+/// whether the sessions lie on one line. `place` is where the first of the columns of `drifts` stands.
 fn goes_on_within(state: &State, drifts: &[Extra], place: usize, drift: f64, lefts: &[Vec<Point>]) -> bool {
     let zeros: Vec<_> = (1..lefts.len()).map(|of| move |s: usize, _: usize| f64::from(u8::from(s == of))).collect();
     let mut columns: Vec<Extra> = drifts.to_vec();
@@ -260,7 +266,8 @@ fn on_the_line(lefts: &[Vec<Point>], drift: f64) -> bool {
     middles.iter().all(|of| off(of) < OFF_THE_LINE * (drift * (high.0 - low.0)).abs())
 }
 
-/// The slope within sessions, all together, from the medians of their stretches, and its standard deviation about `drift`.
+/// The slope within sessions, all together, from the medians of their stretches, and its standard deviation about
+/// `drift`.
 fn within_sessions(lefts: &[Vec<Point>], drift: f64) -> (f64, f64) {
     let (mut xx, mut xy, mut left_over) = (0.0, 0.0, Vec::new());
     for left in lefts {
@@ -331,7 +338,8 @@ fn line(points: &[(f64, f64)]) -> Option<(f64, f64)> {
 mod tests {
     use super::*;
 
-    /// Sessions of 15 s at 100 Hz, minutes apart, on a drive with clearance and wind-up whose zero moves; `zeros` are those of the sessions.
+    /// Sessions of 15 s at 100 Hz, minutes apart, on a drive with clearance and wind-up whose zero moves; `zeros` are
+    /// those of the sessions.
     fn sessions(per_hour_arcsec: f64, zeros: &[f64]) -> Vec<Session> {
         sessions_apart(300.0, per_hour_arcsec, zeros)
     }

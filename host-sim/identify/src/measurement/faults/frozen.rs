@@ -19,7 +19,8 @@ const BLURRED: f64 = 0.6;
 const SHORTEST: usize = 20;
 /// White noise below this is none at the output, rad: what a solver leaves.
 const NO_NOISE_RAD: f64 = 0.02 * ARCSEC;
-/// An output that dwells for longer than this, and catches up in one row, has been frozen; clearance is given back on the way.
+/// An output that dwells for longer than this, and catches up in one row, has been frozen; clearance is given back on
+/// the way.
 const DWELL_RAD: f64 = 600.0 * ARCSEC;
 /// No clearance is as wide as this.
 const LONG_DWELL_RAD: f64 = 1200.0 * ARCSEC;
@@ -41,14 +42,15 @@ fn stretches(values: &[f64], shortest: usize, same: impl Fn(f64, f64) -> bool) -
     found
 }
 
-/// Length of a stretch that chance does not give in so many rows, of a channel that changes at every second row at least.
+/// Length of a stretch that chance does not give in so many rows, of a channel that changes at every second row at
+/// least.
 fn beyond_chance(rows: usize) -> usize {
     let length = (CHANCE / rows.max(1) as f64).ln() / 0.5_f64.ln();
     SHORTEST.max(length.ceil() as usize)
 }
 
-/// Whether an output beside a generator that stands leaves by whole tooth pitches and has done so within a part of the stretch: teeth that
-/// skip move it, not a generator that is not read.
+/// Whether an output beside a generator that stands leaves by whole tooth pitches and has done so within a part of the
+/// stretch: teeth that skip move it, not a generator that is not read.
 fn slips_a_tooth(output: &[f64], stretch: &Range<usize>, gear: &Gear) -> bool {
     let angles = &output[stretch.clone()];
     let (first, last) = (angles[0], angles[angles.len() - 1]);
@@ -116,7 +118,8 @@ pub(in crate::measurement) fn check(
             (fault.channel, fault.treatment) = (Some(channel), Treatment::Masked);
             fault.size_arcsec = Some(missed / ARCSEC);
             fault.what = format!(
-                "the {channel} keeps one value over {} rows, in which it should have moved by {:.1} arcsec at the output: they are left out",
+                "the {channel} keeps one value over {} rows, in which it should have moved by {:.1} arcsec at the \
+                 output: they are left out",
                 stretch.len(),
                 missed / ARCSEC
             );
@@ -164,8 +167,8 @@ fn missed(generator: &[f64], stretch: &Range<usize>) -> f64 {
 const AT_LIMIT_ROWS: usize = 3;
 const AT_LIMIT_SHARE: f64 = 0.005;
 
-/// Leaves out rows in which the torque stands at its largest or its least value, though it has noise elsewhere: the sensor or its amplifier
-/// is at its end, and nobody knows the load.
+/// Leaves out rows in which the torque stands at its largest or its least value, though it has noise elsewhere: the
+/// sensor or its amplifier is at its end, and nobody knows the load.
 fn saturated(sessions: &[Session], rows: usize, drop: &mut [Vec<bool>], findings: &mut Findings) {
     let torques: Vec<&[f64]> = sessions.iter().filter_map(|session| session.beside(Quantity::Torque)).collect();
     if torques.len() < sessions.len() || torques.is_empty() {
@@ -195,19 +198,19 @@ fn saturated(sessions: &[Session], rows: usize, drop: &mut [Vec<bool>], findings
         (fault.channel, fault.treatment) = (Some(Quantity::Torque), Treatment::Masked);
         fault.advice = "take a torque sensor, or a gain of its amplifier, with room for the largest load";
         fault.what = format!(
-            "the torque never passes {limit:.3} N·m, and stands there in {count} rows, though it has noise elsewhere: it saturates, and these \
-             rows are left out"
+            "the torque never passes {limit:.3} N·m, and stands there in {count} rows, though it has noise elsewhere: \
+             it saturates, and these rows are left out"
         );
         findings.faults.push(fault);
         places().for_each(|(number, stretch)| drop[number][stretch.clone()].fill(true));
     }
 }
 
-/// Torque or temperature: the whole channel is left out if half of it is frozen; else a temperature goes on by a straight line, and rows
-/// whose torque nobody knows are left out, since a load swings and the drive with it.
+/// Torque or temperature: the whole channel is left out if half of it is frozen; else a temperature goes on by a
+/// straight line, and rows whose torque nobody knows are left out, since a load swings and the drive with it.
 ///
-/// A constant load, a load in steps and a soak at one temperature are not faults: only a channel with noise that lost it, or a
-/// channel that always changes, stands, and catches up at once, is frozen.
+/// A constant load, a load in steps and a soak at one temperature are not faults: only a channel with noise that lost
+/// it, or a channel that always changes, stands, and catches up at once, is frozen.
 fn beside(sessions: &mut [Session], channel: Quantity, rows: usize, drop: &mut [Vec<bool>], findings: &mut Findings) {
     let series: Vec<&[f64]> = sessions.iter().filter_map(|session| session.beside(channel)).collect();
     if series.is_empty() {

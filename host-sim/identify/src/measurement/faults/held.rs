@@ -1,7 +1,7 @@
 //! A torque that is read more slowly than the angles, and repeated in between: one value for so many rows, all along.
 //!
-//! What the load does between two readings moves the drive, and the column does not say it. A load that is put on in steps as long as these
-//! moves the error in the very row of a step, and is left alone.
+//! What the load does between two readings moves the drive, and the column does not say it. A load that is put on in
+//! steps as long as these moves the error in the very row of a step, and is left alone.
 
 use std::ops::Range;
 
@@ -19,7 +19,8 @@ const REGULAR: f64 = 0.8;
 const LONGEST: usize = 64;
 /// Where runs are shorter than this no bench puts the load on in such steps. *Guess*.
 const NO_STEPS_OF_A_BENCH: usize = 5;
-/// Share of what the error changes by from run to run that it changes by in the very row where the load does: below, the load goes on between.
+/// Share of what the error changes by from run to run that it changes by in the very row where the load does: below,
+/// the load goes on between.
 /// *Guess*.
 const WITHIN_THE_ROW: f64 = 0.5;
 
@@ -47,8 +48,8 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], findings: &mut Fin
     (fault.channel, fault.treatment) = (Some(Quantity::Torque), Treatment::Repaired);
     fault.measures = Measures { every_rows: Some(every as u64), ..Measures::default() };
     fault.what = format!(
-        "the torque has a new value in one of {every} rows, and is repeated in the others, while the load goes on: a straight line from one to the \
-         next stands in"
+        "the torque has a new value in one of {every} rows, and is repeated in the others, while the load goes on: a \
+         straight line from one to the next stands in"
     );
     findings.faults.push(fault);
     for (session, runs) in sessions.iter_mut().zip(&of) {
@@ -70,8 +71,8 @@ fn runs(values: &[f64]) -> Vec<Range<usize>> {
     ends.map(|end| std::mem::replace(&mut from, end)..end).collect()
 }
 
-/// Whether the error goes on from run to run, instead of changing with the torque within a row. Where the torque changes its sign the flank does,
-/// and those do not count.
+/// Whether the error goes on from run to run, instead of changing with the torque within a row. Where the torque
+/// changes its sign the flank does, and those do not count.
 fn goes_on_between(sessions: &[Session], of: &[Vec<Range<usize>>]) -> bool {
     let (mut within, mut in_all) = (0.0, 0.0);
     for (session, runs) in sessions.iter().zip(of) {

@@ -1,7 +1,8 @@
 //! Counts that leap: by whole turns of the motor in one row, or from one session to the next.
 //!
-//! A counter that begins anew, or wraps at a power of two, moves one column by whole turns while the other goes on as it did. Teeth
-//! that skip move the output, and stay for the diagnosis. Between sessions nobody saw which of the two columns moved.
+//! A counter that begins anew, or wraps at a power of two, moves one column by whole turns while the other goes on as
+//! it did. Teeth that skip move the output, and stay for the diagnosis. Between sessions nobody saw which of the two
+//! columns moved.
 
 use std::f64::consts::TAU;
 
@@ -27,7 +28,8 @@ const SHARE: f64 = 0.02;
 const LEVEL_ROWS: usize = 8;
 /// A zero is another one if it is off by this, rad at the output: beyond any clearance and wind-up. *Guess*.
 const OTHER_ZERO_RAD: f64 = 1500.0 * ARCSEC;
-/// A jump of this share of a tooth pitch, or less, beside whole pitches is left to the diagnosis: teeth may have skipped.
+/// A jump of this share of a tooth pitch, or less, beside whole pitches is left to the diagnosis: teeth may have
+/// skipped.
 const BESIDE_PITCHES: f64 = 0.05;
 /// An error that grows with the angle by more than this is a wrong ratio, and grows between sessions, too.
 const SLOPE: f64 = 1e-3;
@@ -85,7 +87,8 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
         format!("the generator's count begins anew after {:.0} turns, {times}: it was made continuous", size.abs())
     } else {
         format!(
-            "the generator's angle leaps by whole turns ({largest:+.0} at most), {times}, while the output goes on: the turns are taken out"
+            "the generator's angle leaps by whole turns ({largest:+.0} at most), {times}, while the output goes on: \
+             the turns are taken out"
         )
     };
     findings.faults.push(fault);
@@ -102,8 +105,8 @@ fn take_turns_out(log: &mut Log, leaps: &[(usize, f64)]) {
     }
 }
 
-/// Finds sessions before which the generator's counter began anew, and puts the turns back; gives those sessions whose zero is another
-/// one, by no whole turns or pitches, with what was taken off them, rad.
+/// Finds sessions before which the generator's counter began anew, and puts the turns back; gives those sessions whose
+/// zero is another one, by no whole turns or pitches, with what was taken off them, rad.
 pub(in crate::measurement) fn between_sessions(
     log: &mut Log,
     gear: &Gear,
@@ -138,12 +141,13 @@ pub(in crate::measurement) fn between_sessions(
             others.push((session + 1, start, jump));
         }
     }
-    // One turn of the motor is two tooth pitches: alone it may be teeth that have skipped, and is left to the diagnosis.
+    // One turn of the motor is two tooth pitches: alone it may be teeth that have skipped, and is left to the
+    // diagnosis.
     if gear.tooth_pitch_rad.is_some() && restarts.iter().all(|(_, turns)| turns.abs() < 2.0) {
         for (start, _) in restarts.drain(..) {
             findings.notes.push(format!(
-                "line {}: the error changes by one turn of the motor between two sessions: a counter that began anew, or teeth that have \
-                 skipped, which these data do not tell",
+                "line {}: the error changes by one turn of the motor between two sessions: a counter that began anew, \
+                 or teeth that have skipped, which these data do not tell",
                 log.line[start]
             ));
         }
@@ -157,7 +161,8 @@ pub(in crate::measurement) fn between_sessions(
         fault.measures = Measures { turns: Some(largest as i64), ..Measures::default() };
         let list: Vec<String> = restarts.iter().take(6).map(|(_, turns)| format!("{turns:+.0}")).collect();
         fault.what = format!(
-            "the generator's counter begins anew before {} of {} sessions, by {}{} turns of the motor: they are put back",
+            "the generator's counter begins anew before {} of {} sessions, by {}{} turns of the motor: they are put \
+             back",
             restarts.len(),
             bounds.len() - 1,
             list.join(", "),
@@ -171,8 +176,8 @@ pub(in crate::measurement) fn between_sessions(
         (fault.rows, fault.treatment) = (others.len() as u64, Treatment::Repaired);
         fault.size_arcsec = Some(largest / ARCSEC);
         fault.what = format!(
-            "the zero of {} sessions is another one, by up to {:.0} arcsec, which is no whole number of motor turns or tooth pitches: the \
-             zero of each is fitted on its own",
+            "the zero of {} sessions is another one, by up to {:.0} arcsec, which is no whole number of motor turns \
+             or tooth pitches: the zero of each is fitted on its own",
             others.len(),
             largest / ARCSEC
         );
@@ -195,7 +200,8 @@ pub(in crate::measurement) fn between_sessions(
     others.into_iter().map(taken_off).collect()
 }
 
-/// The rate, rad/s, at which the error changes over all gaps between sessions alike, if it does: then no zero is another one, but it drifts.
+/// The rate, rad/s, at which the error changes over all gaps between sessions alike, if it does: then no zero is
+/// another one, but it drifts.
 pub(in crate::measurement) fn changes_with_the_gaps(log: &Log, gear: &Gear) -> Option<f64> {
     let (generator, output, time) =
         (log.get(Quantity::Generator)?, log.get(Quantity::Output)?, log.get(Quantity::Time)?);
@@ -215,7 +221,8 @@ pub(in crate::measurement) fn changes_with_the_gaps(log: &Log, gear: &Gear) -> O
     (gaps.len() >= FEWEST_GAPS && large && gaps.iter().all(alike)).then_some(per_s)
 }
 
-/// Gaps that have to agree; a jump over one is of its length within this share, and what wind-up and clearance may differ by, rad. *Guess*.
+/// Gaps that have to agree; a jump over one is of its length within this share, and what wind-up and clearance may
+/// differ by, rad. *Guess*.
 const FEWEST_GAPS: usize = 3;
 const LIKE_THE_GAP: f64 = 0.1;
 const STATE_RAD: f64 = 600.0 * ARCSEC;

@@ -8,7 +8,8 @@ use crate::measurement::log::Log;
 /// Rows in a row that are filled by a straight line in a channel beside the angles.
 const LONGEST_FILL: usize = 10;
 
-/// Fills short holes of time, torque, temperature and orientation, leaves out a channel of which more than half is missing.
+/// Fills short holes of time, torque, temperature and orientation, leaves out a channel of which more than half is
+/// missing.
 pub(in crate::measurement) fn fill(log: &mut Log, findings: &mut Findings) {
     let rows = log.len();
     for channel in [Quantity::Time, Quantity::Torque, Quantity::Temperature, Quantity::Orientation] {
@@ -41,8 +42,8 @@ pub(in crate::measurement) fn fill(log: &mut Log, findings: &mut Findings) {
         }
         fault.treatment = if left == 0 { Treatment::Repaired } else { Treatment::Masked };
         fault.what = format!(
-            "{} values of the {channel} are missing or not finite: holes of up to {LONGEST_FILL} rows are filled by a straight \
-             line, {left} rows left out",
+            "{} values of the {channel} are missing or not finite: holes of up to {LONGEST_FILL} rows are filled by a \
+             straight line, {left} rows left out",
             holes.len()
         );
         findings.faults.push(fault);

@@ -1,6 +1,7 @@
 //! What is wrong with data, found before any physics is blamed. One file for each kind, its thresholds at its head.
 //!
-//! Two grades: what cannot go on is an error with one message; all else is a [`Fault`] that is named, and repaired or left out.
+//! Two grades: what cannot go on is an error with one message; all else is a [`Fault`] that is named, and repaired or
+//! left out.
 //!
 //! | found | done |
 //! |---|---|

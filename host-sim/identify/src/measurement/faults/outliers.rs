@@ -11,25 +11,28 @@ use flexspline_base::robust::{least_and_most, median_of, quantile_of, sampled, w
 
 /// A row is out by so many standard deviations of the white noise…
 const OUT: f64 = 10.0;
-/// …and by so many times what all rows around it but one are out by: ripple that rows follow too slowly stands out everywhere.
+/// …and by so many times what all rows around it but one are out by: ripple that rows follow too slowly stands out
+/// everywhere.
 const OUT_OF_AROUND: f64 = 3.0;
 /// And by this at least, rad at the output, and by two steps of the resolution.
 const LEAST_RAD: f64 = 3.0 * ARCSEC;
 const STEPS: f64 = 2.0;
 /// And, in torque and temperature, by this share of the range.
 const LEAST_OF_RANGE: f64 = 0.05;
-/// A few outliers of torque or temperature are named only if one is so large, as a share of the range: loads that change from row to row
-/// give small ones.
+/// A few outliers of torque or temperature are named only if one is so large, as a share of the range: loads that
+/// change from row to row give small ones.
 const LARGE_OF_RANGE: f64 = 0.5;
 /// The pulse of a tooth is this wide, rad of the generator; rows that are farther apart may catch it once.
 const TOOTH_RAD: f64 = 0.05;
-/// Fewer outliers than this, or any in fast motion, are named only if they are large: teeth and kinks of the motion give small ones.
+/// Fewer outliers than this, or any in fast motion, are named only if they are large: teeth and kinks of the motion
+/// give small ones.
 const FEW: usize = 4;
 /// Large, rad at the output: more than a tooth or a usual clearance gives.
 const LARGE_RAD: f64 = 120.0 * ARCSEC;
 /// Load changes at once if it does by so many times its usual pace.
 const LOAD_PACE: f64 = 10.0;
-/// Load that changes by this share of its largest within the rows beside moves the drive: play is thrown over, wind-up follows.
+/// Load that changes by this share of its largest within the rows beside moves the drive: play is thrown over, wind-up
+/// follows.
 const SWINGS: f64 = 0.05;
 /// Rows before and after that are looked at.
 const BESIDE: usize = 3;
@@ -37,8 +40,8 @@ const BESIDE: usize = 3;
 const AROUND: usize = 15;
 /// If more rows than this are out, they are not outliers but the noise.
 const SHARE: f64 = 0.1;
-/// Where more rows than this are out, others are out around most of them: then so many of the rows around do not count for what is usual
-/// there, which 5 % of 30 rows exceed in one case of fifty (Poisson).
+/// Where more rows than this are out, others are out around most of them: then so many of the rows around do not count
+/// for what is usual there, which 5 % of 30 rows exceed in one case of fifty (Poisson).
 const MANY: f64 = 0.003;
 const OTHERS_OUT: usize = 4;
 /// Mean resultant length above which four or more outliers repeat with position: a damaged tooth, which is the drive.
@@ -46,8 +49,9 @@ const REPEATS: f64 = 0.9;
 /// Rayleigh's n R² above which many outliers repeat with position: chance exp(−12).
 const REPEATS_MANY: f64 = 12.0;
 
-/// How far row `row` is from the rows before and after, and from where they go on to, if all say so; 0 if one of them bears it out. A
-/// load turns sharply within a row and means it, and the wind-up with it: such a tip goes on as one of its sides does.
+/// How far row `row` is from the rows before and after, and from where they go on to, if all say so; 0 if one of them
+/// bears it out. A load turns sharply within a row and means it, and the wind-up with it: such a tip goes on as one of
+/// its sides does.
 fn off_course(values: &[f64], row: usize) -> f64 {
     let by = out_by(values, row);
     if by == 0.0 {
@@ -60,7 +64,8 @@ fn off_course(values: &[f64], row: usize) -> f64 {
     if beyond * by <= 0.0 { 0.0 } else { by.signum() * by.abs().min(beyond.abs()) }
 }
 
-/// Where three rows go on to: their median slope (Theil and Sen) from the median of where it puts them, so that one of them may be out.
+/// Where three rows go on to: their median slope (Theil and Sen) from the median of where it puts them, so that one of
+/// them may be out.
 fn carried_on([a, b, c]: [f64; BESIDE]) -> f64 {
     let slope = median_of(&mut [b - a, c - b, 0.5 * (c - a)]);
     median_of(&mut [a + 3.0 * slope, b + 2.0 * slope, c + slope])
@@ -90,7 +95,8 @@ fn out_by(values: &[f64], row: usize) -> f64 {
     if before * after <= 0.0 { 0.0 } else { before.signum() * before.abs().min(after.abs()) }
 }
 
-/// Whether the drive goes on steadily around a row: no reversal and no load that changes at once, which give peaks of their own.
+/// Whether the drive goes on steadily around a row: no reversal and no load that changes at once, which give peaks of
+/// their own.
 fn steady(session: &Session, row: usize) -> bool {
     let near = row.saturating_sub(6).max(1)..(row + 7).min(session.len());
     let moved = |k: usize| session.generator_rad[k] - session.generator_rad[k - 1];
@@ -110,7 +116,8 @@ fn steady(session: &Session, row: usize) -> bool {
 /// A row, and by how much it is out.
 type Out = (usize, f64);
 
-/// Rows that are out by more than `least`, in all sessions; looked for again with less regard for the rows around where there are many.
+/// Rows that are out by more than `least`, in all sessions; looked for again with less regard for the rows around where
+/// there are many.
 fn in_sessions(sessions: &[Session], least: f64, values: fn(&Session) -> &[f64]) -> Vec<Vec<Out>> {
     let beyond = |others: usize| -> Vec<Vec<Out>> {
         sessions.iter().map(|session| rows_out(values(session), least, others)).collect()
@@ -227,15 +234,17 @@ fn of_error(sessions: &mut [Session], gear: &Gear, error_recorded: bool, finding
 
 /// Rows before and after whose medians bear a row out where many are out: two of them may be out as well.
 const WIDELY_BESIDE: usize = 5;
-/// Where many rows are far out, others are out by less: the tail of the same fault, mostly to one side, which would move means. What is off by
-/// more than so many standard deviations of the white noise is left out as well, of sound rows one in thousands. *Source*: Hampel's
-/// identifier rejects from 3 on (Davies and Gather 1993); medians of five rows have a noise of their own.
+/// Where many rows are far out, others are out by less: the tail of the same fault, mostly to one side, which would
+/// move means. What is off by more than so many standard deviations of the white noise is left out as well, of sound
+/// rows one in thousands. *Source*: Hampel's identifier rejects from 3 on (Davies and Gather 1993); medians of five
+/// rows have a noise of their own.
 const TAIL: f64 = 4.0;
 /// So often, as rows that are out hide others.
 const TAIL_ROUNDS: usize = 3;
 
-/// Where many rows are out, those are as well that stand beside others, or where the drive might have moved them, at reversals and steps of
-/// the load; and nothing bears the first and last rows of a session out, `ends` of them. Gives how many are left out.
+/// Where many rows are out, those are as well that stand beside others, or where the drive might have moved them, at
+/// reversals and steps of the load; and nothing bears the first and last rows of a session out, `ends` of them. Gives
+/// how many are left out.
 fn leave_out_the_doubtful(sessions: &mut [Session], least: f64, ends: usize) -> u64 {
     let mut more = 0;
     for session in sessions.iter_mut().filter(|session| session.len() > 4 * BESIDE) {

@@ -1,11 +1,11 @@
 //! The two angles are not read at one instant.
 //!
-//! Between two readings the drive moves on: an instant that is off by τ puts the error off by τ times the speed. Where τ scatters, the
-//! scatter of neighbouring rows grows with the speed, its square by (τ · speed)²; at rest nothing shows. Some loggers read single rows
-//! late, by far more than the others and always to the same side.
+//! Between two readings the drive moves on: an instant that is off by τ puts the error off by τ times the speed. Where
+//! τ scatters, the scatter of neighbouring rows grows with the speed, its square by (τ · speed)²; at rest nothing
+//! shows. Some loggers read single rows late, by far more than the others and always to the same side.
 //!
-//! The scatter of a row is what the rows beside it leave of it when a cubic goes through them. Rows then weigh what noise and scatter
-//! together leave of them; rows that were read late are left out.
+//! The scatter of a row is what the rows beside it leave of it when a cubic goes through them. Rows then weigh what
+//! noise and scatter together leave of them; rows that were read late are left out.
 
 use std::borrow::Cow;
 
@@ -24,8 +24,9 @@ const CLASS_ROWS: usize = 80;
 /// Largest speed of a class against its least one, and the share of the largest of all that comes to it.
 const WIDEST: f64 = 1.3;
 const NARROWEST: f64 = 0.05;
-/// Scatter that grows with the speed is told from this on, rad at the output, at the speed that a twentieth of the rows exceed: below, encoders of
-/// common loops scatter by themselves. *Chosen* so that loops polled within 20 µs are not named.
+/// Scatter that grows with the speed is told from this on, rad at the output, at the speed that a twentieth of the rows
+/// exceed: below, encoders of common loops scatter by themselves. *Chosen* so that loops polled within 20 µs are not
+/// named.
 const LEAST_RAD: f64 = 1.0 * ARCSEC;
 /// And from this share of the noise at rest on. *Guess*.
 const LEAST_OF_NOISE: f64 = 0.3;
@@ -33,7 +34,8 @@ const LEAST_OF_NOISE: f64 = 0.3;
 const CERTAIN: f64 = 25.0;
 /// Classes are no better known than this share of their variance: steps and teeth are in it, too. *Guess*.
 const CLASS_DOUBT: f64 = 0.05;
-/// Ripple of the teeth is smooth in slow rows and scatter in fast ones: half of it where a tooth passes in so many rows. *Guess*.
+/// Ripple of the teeth is smooth in slow rows and scatter in fast ones: half of it where a tooth passes in so many
+/// rows. *Guess*.
 const TOOTH_ROWS: f64 = 6.0;
 /// A row is read late if it is off by so many times what its speed lets expect.
 const LATE: f64 = 4.0;
@@ -54,10 +56,11 @@ const MOST_LATE: f64 = 0.35;
 const UNTOLD: f64 = 2.0;
 /// Rows in which the generator turns by more do not follow the waves of a drive, rad. *Guess*.
 const FOLLOWED_RAD: f64 = 0.25;
-/// A step of the time by more than so many usual ones is a pause: rows on both sides of it, as of a bench that goes from stop to stop, tell
-/// nothing of how they are read. *Guess*: a missing row is a step of two.
+/// A step of the time by more than so many usual ones is a pause: rows on both sides of it, as of a bench that goes
+/// from stop to stop, tell nothing of how they are read. *Guess*: a missing row is a step of two.
 const PAUSE: f64 = 2.5;
-/// Scatter of readings is white: of the scatter of a row and of the next, -56/70 is common, within this. What swings has more or less.
+/// Scatter of readings is white: of the scatter of a row and of the next, -56/70 is common, within this. What swings
+/// has more or less.
 const WHITE: f64 = 0.08;
 /// Rows that are late one after another, at most.
 const LONGEST_RUN: usize = 2;
@@ -105,8 +108,8 @@ impl<'a> Reads<'a> {
         self.pauses[from] == self.pauses[to]
     }
 
-    /// By how much some good rows (a run from place `from` among them) are off the cubic through the two good rows before and after,
-    /// and by how much these two pairs differ; nothing near the ends.
+    /// By how much some good rows (a run from place `from` among them) are off the cubic through the two good rows
+    /// before and after, and by how much these two pairs differ; nothing near the ends.
     fn off(&self, from: usize, run: usize) -> Option<(Vec<f64>, f64)> {
         let at = |place: usize| self.good.get(place).copied();
         let beside = [at(from.checked_sub(2)?)?, at(from - 1)?, at(from + run)?, at(from + run + 1)?];
@@ -157,7 +160,8 @@ fn pauses(session: &Session) -> Vec<usize> {
 /// Variance of the scatter of a row against that of its error.
 const SCATTER_GAIN: f64 = 70.0 / 36.0;
 
-/// Scatter by speed, of classes with equally many rows. `spread` makes a standard deviation of numbers, which it may overwrite.
+/// Scatter by speed, of classes with equally many rows. `spread` makes a standard deviation of numbers, which it may
+/// overwrite.
 fn classes(reads: &[Reads<'_>], spread: impl Fn(&mut [f64]) -> f64) -> Vec<Class> {
     let mut rows: Vec<(f64, f64)> =
         reads.iter().flat_map(|of| of.scatter().map(|(row, off)| (of.speed[row].abs(), off))).collect();
@@ -184,7 +188,8 @@ fn classes(reads: &[Reads<'_>], spread: impl Fn(&mut [f64]) -> f64) -> Vec<Class
     .collect()
 }
 
-/// Noise at rest, rad, and scatter of the time between the readings, in rows: what `classes` show of both; and the fall of χ² by the latter.
+/// Noise at rest, rad, and scatter of the time between the readings, in rows: what `classes` show of both; and the fall
+/// of χ² by the latter.
 fn fit(classes: &[Class], tooth_speed: f64) -> (f64, f64, f64) {
     let floor = classes.iter().map(|class| class.variance).fold(f64::INFINITY, f64::min).max(1e-30);
     let least_speed = classes.iter().map(|class| class.speed).fold(0.0, f64::max).max(1e-30);
@@ -193,7 +198,8 @@ fn fit(classes: &[Class], tooth_speed: f64) -> (f64, f64, f64) {
         let fast = (class.speed / tooth_speed).powi(2);
         [1.0, (class.speed / least_speed).powi(2), fast / (1.0 + fast)]
     };
-    // Neighbouring scatters share rows: a class is worth about a third of its rows. A median deviation is known to 1.17 / sqrt(n).
+    // Neighbouring scatters share rows: a class is worth about a third of its rows. A median deviation is known to 1.17
+    // / sqrt(n).
     let weight = |class: &Class| {
         let doubt = (2.0 * 1.17f64).powi(2) * 3.0 / class.rows + CLASS_DOUBT * CLASS_DOUBT;
         1.0 / (doubt * class.variance.max(floor).powi(2))
@@ -290,7 +296,8 @@ impl Found {
     }
 }
 
-/// Finds angles that are not read at one instant: rows weigh what their speed leaves of them, and rows that were read late are left out.
+/// Finds angles that are not read at one instant: rows weigh what their speed leaves of them, and rows that were read
+/// late are left out.
 pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) {
     let rows: usize = sessions.iter().map(Session::len).sum();
     if rows < CLASSES * CLASS_ROWS {
@@ -304,13 +311,15 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
         return;
     }
     let pitch = gear.tooth_pitch_rad.unwrap_or(std::f64::consts::PI / gear.ratio.abs());
-    // A tooth of either wheel passes in a turn of the generator over its number: in a pitch of the output over the ratio.
+    // A tooth of either wheel passes in a turn of the generator over its number: in a pitch of the output over the
+    // ratio.
     let tooth_speed = pitch / gear.ratio.abs() / TOOTH_ROWS;
     let mut found = Found::of(&mut reads, fast, tooth_speed, sessions, gear);
     if !found.told_late && !found.told_jitter {
         return;
     }
-    // Waves of the drive that fast rows are too far apart to follow scatter as well: once more without what its state explains.
+    // Waves of the drive that fast rows are too far apart to follow scatter as well: once more without what its state
+    // explains.
     let state = State::new(sessions, gear);
     if let Some(fit) = state.fit(&[]) {
         let long = (0..sessions.len()).filter(|k| sessions[*k].len() > 8);
@@ -349,8 +358,8 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
         fault.size_arcsec = Some(scatter / ARCSEC);
         let of_time = jitter_ms.map_or(format!("{jitter_rows:.4} rows"), |ms| format!("{ms:.3} ms"));
         said.push(format!(
-            "the time between them scatters by {of_time}, {:.1} arcsec at full speed beside {:.1} of noise: fast rows are weighted down, to {:.2} \
-             of the worth of a row at rest",
+            "the time between them scatters by {of_time}, {:.1} arcsec at full speed beside {:.1} of noise: fast rows \
+             are weighted down, to {:.2} of the worth of a row at rest",
             scatter / ARCSEC,
             noise / ARCSEC,
             noise * noise / (noise * noise + scatter * scatter)
@@ -405,8 +414,8 @@ fn expected(known: &[Class], of: &Reads<'_>, row: usize) -> f64 {
     class.map_or(f64::INFINITY, |class| (class.variance * SCATTER_GAIN).sqrt())
 }
 
-/// Rows off by far more than their speed lets expect while those beside agree, `run` of them one after another: taken out of the good
-/// ones, and given with how far they are off.
+/// Rows off by far more than their speed lets expect while those beside agree, `run` of them one after another: taken
+/// out of the good ones, and given with how far they are off.
 fn read_late(of: &mut Reads<'_>, known: &[Class], run: usize) -> Vec<(usize, f64)> {
     let places = of.good.len().saturating_sub(run + 1);
     let off: Vec<Option<(Vec<f64>, f64)>> = (0..places).map(|from| of.off(from, run)).collect();
@@ -441,7 +450,8 @@ fn read_late(of: &mut Reads<'_>, known: &[Class], run: usize) -> Vec<(usize, f64
     taken
 }
 
-/// Whether rows that are off are rows that were read late: enough of them, in motion, to one side of it, at no one place of the drive.
+/// Whether rows that are off are rows that were read late: enough of them, in motion, to one side of it, at no one
+/// place of the drive.
 fn is_told(reads: &[Reads<'_>], late: &[Vec<(usize, f64)>], fast: f64, sessions: &[Session], gear: &Gear) -> bool {
     let count: usize = late.iter().map(Vec::len).sum();
     let moves = |speed: f64| speed.abs() > IN_MOTION * fast;
@@ -508,8 +518,8 @@ mod tests {
         (0..12).map(|_| random.f64()).sum::<f64>() - 6.0
     }
 
-    /// A drive that swings at up to 12 rad/s of the motor, 100 rows a second, with 2 arcsec of noise; its output is read off by `jitter_s`
-    /// (one standard deviation), and by 0.5 ms and more in a share `late` of the rows.
+    /// A drive that swings at up to 12 rad/s of the motor, 100 rows a second, with 2 arcsec of noise; its output is
+    /// read off by `jitter_s` (one standard deviation), and by 0.5 ms and more in a share `late` of the rows.
     fn session(jitter_s: f64, late: f64) -> Session {
         let mut random = fastrand::Rng::with_seed(7);
         let (mut psi, mut session) = (0.0, Session { time_s: Some(Vec::new()), ..Session::default() });

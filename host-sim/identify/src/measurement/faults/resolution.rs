@@ -10,7 +10,8 @@ use flexspline_base::robust::{median_of, white_noise};
 
 /// Steps at the output below this are those of good encoders (19 bits a turn), and below what a drive repeats.
 const COARSE_RAD: f64 = 2.5 * ARCSEC;
-/// Noise of more than this share of a step blurs it, so that averages go below the step; a step alone leaves 0.29 of it.
+/// Noise of more than this share of a step blurs it, so that averages go below the step; a step alone leaves 0.29 of
+/// it.
 const BLURRED: f64 = 0.7;
 
 /// A step is real if the output leaves this share of it as noise…
@@ -19,11 +20,12 @@ const SEEN: f64 = 0.15;
 const STANDS: f64 = 0.3;
 /// …or, in even motion, its changes from row to row are uneven by a step in this share.
 const UNEVEN: f64 = 0.1;
-/// A generator that goes from stop to stop by the same angle lies on a lattice too, and is exact. What is rounded is in the error, which differs
-/// by 0.4 steps on the mean from one reading to another: where half of them differ by less than this share, nothing is. *Guess*.
+/// A generator that goes from stop to stop by the same angle lies on a lattice too, and is exact. What is rounded is in
+/// the error, which differs by 0.4 steps on the mean from one reading to another: where half of them differ by less
+/// than this share, nothing is. *Guess*.
 const ROUNDED: f64 = 0.1;
-/// So many rows are from one reading to another. At a speed that is nearly a whole number of steps to a row the next one is rounded by just about
-/// as much, and a later one is not.
+/// So many rows are from one reading to another. At a speed that is nearly a whole number of steps to a row the next
+/// one is rounded by just about as much, and a later one is not.
 const APART: [usize; 4] = [1, 2, 4, 8];
 
 /// Resolutions that show in the data, in rad at the output.
@@ -66,7 +68,8 @@ pub(super) fn seen(sessions: &[Session], gear: &Gear, error_recorded: bool) -> V
     found
 }
 
-/// By how much the error differs, at the median, from one row to another where a channel has moved by a step or more, rad: at that distance of
+/// By how much the error differs, at the median, from one row to another where a channel has moved by a step or more,
+/// rad: at that distance of
 /// [`APART`] where it differs most.
 fn differs(channel: &[f64], error: &[f64], step: f64) -> f64 {
     let at = |apart: usize| {
@@ -76,7 +79,8 @@ fn differs(channel: &[f64], error: &[f64], step: f64) -> f64 {
     APART.into_iter().map(at).fold(0.0, f64::max)
 }
 
-/// Names a resolution of output or generator that is coarse at the output; nothing can be done about it but to know that rounding is a noise.
+/// Names a resolution of output or generator that is coarse at the output; nothing can be done about it but to know
+/// that rounding is a noise.
 pub(in crate::measurement) fn check(
     sessions: &mut [Session],
     gear: &Gear,
@@ -95,7 +99,8 @@ pub(in crate::measurement) fn check(
         (fault.channel, fault.treatment) = (Some(channel), Treatment::Kept);
         fault.size_arcsec = Some(step / ARCSEC);
         fault.what = format!(
-            "the {channel} has a resolution of {:.2} arcsec at the output, and too little noise to blur it ({:.2} arcsec)",
+            "the {channel} has a resolution of {:.2} arcsec at the output, and too little noise to blur it ({:.2} \
+             arcsec)",
             step / ARCSEC,
             noise / ARCSEC
         );

@@ -1,5 +1,5 @@
-//! A logger that stands still now and then while its time counts on: the angles leap over several rows' worth of motion, both of them,
-//! and the column of time does not show it.
+//! A logger that stands still now and then while its time counts on: the angles leap over several rows' worth of
+//! motion, both of them, and the column of time does not show it.
 
 use super::{Findings, span};
 use crate::measurement::columns::Quantity;
@@ -48,8 +48,8 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
     fault.measures =
         Measures { every_rows: every.map(|every| every as u64), size_ms: Some(1e3 * size_s), ..Measures::default() };
     fault.what = format!(
-        "the logger stands still for {:.0} ms {}, {} times, while its time counts {:.2} ms from row to row: both angles leap there; time \
-         is made anew from the motion ({lost_s:.1} s more)",
+        "the logger stands still for {:.0} ms {}, {} times, while its time counts {:.2} ms from row to row: both \
+         angles leap there; time is made anew from the motion ({lost_s:.1} s more)",
         1e3 * size_s,
         every.map_or("now and then".to_owned(), |every| format!("after every {every} rows")),
         all.len(),
@@ -64,7 +64,8 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
     }
 }
 
-/// Rows into which both angles leap, with the time that is missing there (s); how many rows would tell; and the period, s.
+/// Rows into which both angles leap, with the time that is missing there (s); how many rows would tell; and the period,
+/// s.
 fn leaps(log: &Log, gear: &Gear) -> Option<(Vec<Leap>, usize, f64)> {
     let (time, generator, output) =
         (log.get(Quantity::Time)?, log.get(Quantity::Generator)?, log.get(Quantity::Output)?);
@@ -117,7 +118,8 @@ fn rhythm(log: &Log, leaps: &[(usize, f64)]) -> Option<usize> {
     (every >= 2.0 && regular as f64 >= REGULAR * distances.len() as f64).then_some(every as usize)
 }
 
-/// The same leaps, and one of the usual size in each row where the rhythm of its session asks for it and the motion does not tell.
+/// The same leaps, and one of the usual size in each row where the rhythm of its session asks for it and the motion
+/// does not tell.
 fn by_rhythm(log: &Log, leaps: &[(usize, f64)], every: usize, size_s: f64) -> Vec<(usize, f64)> {
     let mut known = leaps.iter().peekable();
     let mut all = Vec::new();
@@ -145,7 +147,8 @@ fn by_rhythm(log: &Log, leaps: &[(usize, f64)], every: usize, size_s: f64) -> Ve
 mod tests {
     use super::*;
 
-    /// Rows of a drive at an even pace with a stop; the logger stands still for `stall_s` after every 50 rows, and counts `counted`.
+    /// Rows of a drive at an even pace with a stop; the logger stands still for `stall_s` after every 50 rows, and
+    /// counts `counted`.
     fn log(stall_s: f64, counted: bool, noise_rad: f64) -> Log {
         let mut log = Log::default();
         log.line = (2..3002).collect();

@@ -1,7 +1,8 @@
-//! What a drive's error may be by its state alone: a plain regression that soaks up flanks, load, position, speed and temperature, so that
-//! what is left can be asked for steps and drift.
+//! What a drive's error may be by its state alone: a plain regression that soaks up flanks, load, position, speed and
+//! temperature, so that what is left can be asked for steps and drift.
 //!
-//! It names no cause and is not the diagnosis; it only has to be rich enough that no cause is taken for a fault of the data.
+//! It names no cause and is not the diagnosis; it only has to be rich enough that no cause is taken for a fault of the
+//! data.
 
 use std::sync::OnceLock;
 

@@ -1,9 +1,9 @@
 //! Steps of the error that last: an encoder that lost its index, or a drive that has ratcheted.
 //!
-//! A step is made within one row, faster than an output at rest could give it (a dwell in the clearance changes the error by no more
-//! than the generator moves), and it stays, through reversals and at any load. Clearance that is thrown over, wind-up and
-//! damaged teeth do not: they come back with the state of the drive. A counter that loses counts may be set right before the next session:
-//! then its steps stay until their session ends.
+//! A step is made within one row, faster than an output at rest could give it (a dwell in the clearance changes the
+//! error by no more than the generator moves), and it stays, through reversals and at any load. Clearance that is
+//! thrown over, wind-up and damaged teeth do not: they come back with the state of the drive. A counter that loses
+//! counts may be set right before the next session: then its steps stay until their session ends.
 
 use super::state::{Extra, Fit, State};
 use super::{ARCSEC, Findings, of_rows};
@@ -101,7 +101,8 @@ pub(in crate::measurement) enum Untold {
     Inside,
 }
 
-/// Finds lasting steps: index jumps are named and taken out, ratcheting is handed on. Gives where steps are that are not told apart.
+/// Finds lasting steps: index jumps are named and taken out, ratcheting is handed on. Gives where steps are that are
+/// not told apart.
 pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) -> Untold {
     let Some(Found { sure, doubtful, stays, .. }) = likelier(sessions, gear) else { return Untold::Nowhere };
     let untold = match doubtful.as_slice() {
@@ -112,7 +113,8 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
     for (place, size, _) in &doubtful {
         let line = sessions[place.session].line[place.row];
         findings.notes.push(format!(
-            "line {line}: the error steps by {:.1} arcsec; a jump of an encoder or a change of flank, which these data do not tell",
+            "line {line}: the error steps by {:.1} arcsec; a jump of an encoder or a change of flank, which these \
+             data do not tell",
             size / ARCSEC
         ));
     }
@@ -144,7 +146,8 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
             }
         };
         fault.what = format!(
-            "the error steps by {:.1} arcsec (standard deviation {:.1}) within one row and stays {lasting}; the step is taken out",
+            "the error steps by {:.1} arcsec (standard deviation {:.1}) within one row and stays {lasting}; the step \
+             is taken out",
             size / ARCSEC,
             std / ARCSEC
         );
@@ -211,8 +214,8 @@ fn may_let_go(session: &Session, row: usize, largest: f64) -> bool {
     session.torque_n_m.as_ref().is_some_and(|torque| torque[row].abs() < least_that_holds(torque, largest))
 }
 
-/// Whether a step leaves far less than a change of flank would that comes in its place, whatever the other steps are: the model without the
-/// step, to which the flank that the load holds is given instead.
+/// Whether a step leaves far less than a change of flank would that comes in its place, whatever the other steps are:
+/// the model without the step, to which the flank that the load holds is given instead.
 fn beyond_a_change_of_flank(sessions: &[Session], state: &State, steps: &[Step], place: Place) -> bool {
     let largest = largest_torque(sessions);
     if may_let_go(&sessions[place.session], place.row, largest) {
@@ -230,7 +233,8 @@ fn beyond_a_change_of_flank(sessions: &[Session], state: &State, steps: &[Step],
     step.misfit < DECIDES * flank.misfit
 }
 
-/// The flank, ±1, that the last load held which was large enough to hold one; 0 before there was one, and without loads.
+/// The flank, ±1, that the last load held which was large enough to hold one; 0 before there was one, and without
+/// loads.
 fn held_flanks(session: &Session, largest: f64) -> Vec<f64> {
     let Some(torque) = session.torque_n_m.as_ref().filter(|_| largest > 0.0) else { return vec![0.0; session.len()] };
     let held = least_that_holds(torque, largest);
@@ -310,8 +314,9 @@ fn find(sessions: &[Session], gear: &Gear, noise: f64, state: &State, stays: Sta
     Some(Found { sure, doubtful: [doubtful, back].concat(), stays, misfit, suspected })
 }
 
-/// The steps without those that come and go by the same amount, which do not last: teeth and clearance that fast motion samples once, a
-/// flank that drag turns over until the drive slows down. Each is taken back once, by its nearest neighbour first.
+/// The steps without those that come and go by the same amount, which do not last: teeth and clearance that fast motion
+/// samples once, a flank that drag turns over until the drive slows down. Each is taken back once, by its nearest
+/// neighbour first.
 fn lasting(mut steps: Vec<Step>) -> Vec<Step> {
     let together = |run: &[Step], share: f64| {
         let largest = run.iter().fold(0.0, |most: f64, (_, size, _)| most.max(size.abs()));
@@ -334,7 +339,8 @@ fn lasting(mut steps: Vec<Step>) -> Vec<Step> {
     steps
 }
 
-/// The change of the error into a row beyond what a dwell could give, 0 if less. An output dwells after the generator turned back.
+/// The change of the error into a row beyond what a dwell could give, 0 if less. An output dwells after the generator
+/// turned back.
 fn beyond_dwell(session: &Session, row: usize, settled: &[bool], gear: &Gear) -> f64 {
     let change = session.error_rad[row] - session.error_rad[row - 1];
     if settled[row] {
@@ -491,7 +497,8 @@ fn says_flank(sessions: &[Session]) -> bool {
     largest_torque(sessions) > LOAD_NOISE * noise
 }
 
-/// Whether the error changes by as much, within a row, at other places that no reversal is near to: under a load that nobody recorded.
+/// Whether the error changes by as much, within a row, at other places that no reversal is near to: under a load that
+/// nobody recorded.
 fn comes_elsewhere(sessions: &[Session], settled: &[Vec<bool>], place: Place, size: f64) -> bool {
     if size.abs() > WIDER_THAN_CLEARANCE_RAD {
         return false;
@@ -520,7 +527,8 @@ fn load_changes(session: &Session, row: usize, largest: f64) -> bool {
     })
 }
 
-/// Whether the error changes about as much in other rows near by: ringing, a change of speed, a traverse of the clearance.
+/// Whether the error changes about as much in other rows near by: ringing, a change of speed, a traverse of the
+/// clearance.
 fn others_change_as_much(session: &Session, row: usize, size: f64) -> bool {
     let near = row.saturating_sub(APART).max(1)..(row + APART + 1).min(session.len());
     near.filter(|k| *k != row).any(|k| (session.error_rad[k] - session.error_rad[k - 1]).abs() > 0.5 * size.abs())
@@ -536,8 +544,8 @@ fn load_turns_over(session: &Session, row: usize, largest: f64) -> bool {
     may_let_go(session, row, largest) && before.zip(after).is_some_and(|(before, after)| before * after < 0.0)
 }
 
-/// Whether a step that happens under light load, where friction alone holds a flank, is seen under loads that hold one: a change of
-/// flank is not.
+/// Whether a step that happens under light load, where friction alone holds a flank, is seen under loads that hold one:
+/// a change of flank is not.
 fn lasts_under_load(sessions: &[Session], state: &State, steps: &[Step], place: Place, size: f64) -> bool {
     let held = HELD * largest_torque(sessions);
     let loaded = |s: usize, r: usize| sessions[s].torque_n_m.as_ref().is_some_and(|torque| torque[r].abs() >= held);
@@ -558,8 +566,8 @@ fn lasts_under_load(sessions: &[Session], state: &State, steps: &[Step], place: 
     seen(1) && seen(2)
 }
 
-/// Whether a step cannot be a change of flank: the output came back to where it happened and the step did not, or load held the flank,
-/// or no clearance is so wide.
+/// Whether a step cannot be a change of flank: the output came back to where it happened and the step did not, or load
+/// held the flank, or no clearance is so wide.
 fn no_flank_was_changed(sessions: &[Session], state: &State, steps: &[Step], place: Place, size: f64) -> bool {
     if size.abs() > WIDER_THAN_CLEARANCE_RAD {
         return true;
@@ -661,8 +669,8 @@ mod tests {
         assert!(off < 5.0, "{off}");
     }
 
-    /// Sessions at rest but for slow waves of the generator, under a torque each. A light load leaves the flank where it is (friction); the
-    /// first session has a counter that slips once under load and is set right after it.
+    /// Sessions at rest but for slow waves of the generator, under a torque each. A light load leaves the flank where
+    /// it is (friction); the first session has a counter that slips once under load and is set right after it.
     fn flanks_that_friction_holds(slip_arcsec: f64) -> Vec<Session> {
         let mut random = fastrand::Rng::with_seed(11);
         let torques: [fn(f64) -> f64; 3] =

@@ -1,8 +1,8 @@
 //! Units, signs and columns taken for others.
 //!
-//! An angle is converted where something proves its unit: the ratio, which is the user's word, or the turn after which a column begins anew.
-//! A torque or a temperature that cannot be in the unit given is in another one, but its size does not say in which: it is left out, with the
-//! units that it may have and how to say them.
+//! An angle is converted where something proves its unit: the ratio, which is the user's word, or the turn after which
+//! a column begins anew. A torque or a temperature that cannot be in the unit given is in another one, but its size
+//! does not say in which: it is left out, with the units that it may have and how to say them.
 
 use super::{Findings, span};
 use crate::measurement::columns::{Column, Quantity, Reading, Unit};
@@ -14,16 +14,19 @@ use flexspline_base::robust::{least_and_most, median_of, quantile_of, sampled};
 /// The output must have turned by so much, by the generator or by itself, before the ratio is judged: twenty times two
 /// arc-minutes of clearance, so that clearance moves the ratio by less than 5 %.
 const ENOUGH_MOTION_RAD: f64 = 20.0 * 120.0 / 206_265.0;
-/// A ratio this near to one that a mistake gives is that mistake; degrees for arc-minutes (60) and radians for degrees (57.3) are
-/// 4.6 % apart.
+/// A ratio this near to one that a mistake gives is that mistake; degrees for arc-minutes (60) and radians for degrees
+/// (57.3) are 4.6 % apart.
 const SAME: f64 = 0.02;
-/// A ratio within these factors of the right one is left to the diagnosis, as an error of the ratio; beyond, it is another gear.
+/// A ratio within these factors of the right one is left to the diagnosis, as an error of the ratio; beyond, it is
+/// another gear.
 const RATIO_ERROR: [f64; 2] = [0.8, 1.25];
-/// The wheel that is fixed changes the ratio by one: it is seen where the output turned so far that clearance does not hide that, rad.
+/// The wheel that is fixed changes the ratio by one: it is seen where the output turned so far that clearance does not
+/// hide that, rad.
 const TELLS_WHEELS_APART_RAD: f64 = 0.2;
 /// A ratio is that of the other wheel if it is this near.
 const OTHER_WHEEL: f64 = 1e-3;
-/// Errors that spread by more (robust, 10°) or less (a thousandth of an arc-second) are not errors of a drive in the unit given.
+/// Errors that spread by more (robust, 10°) or less (a thousandth of an arc-second) are not errors of a drive in the
+/// unit given.
 const SPREADS_RAD: [f64; 2] = [0.174_5, 1e-3 / 206_265.0];
 /// Temperatures at which a drive exists, °C.
 const TEMPERATURES_C: [f64; 2] = [-180.0, 180.0];
@@ -51,8 +54,8 @@ pub(in crate::measurement) fn both_in_degrees(log: &mut Log, scale: f64, finding
     }
     let mut fault = span(log, FaultName::UnitMismatch, 0, log.len() - 1);
     fault.treatment = Treatment::Repaired;
-    fault.what = "generator and output are both in degrees: so the nominal model explains the error to the noise, and not in radians; they \
-                  were converted"
+    fault.what = "generator and output are both in degrees: so the nominal model explains the error to the noise, and \
+                  not in radians; they were converted"
         .to_owned();
     findings.faults.push(fault);
 }
@@ -129,8 +132,8 @@ fn leave_out(log: &mut Log, quantity: Quantity, what: String, findings: &mut Fin
 
 /// Turns of the output for each of the generator, and how far the output went.
 ///
-/// The farthest two rows of each session give the ratio that clearance moves least; the median over pieces of the sessions stands in
-/// where a jump has moved one of the two.
+/// The farthest two rows of each session give the ratio that clearance moves least; the median over pieces of the
+/// sessions stands in where a jump has moved one of the two.
 fn slope(log: &Log) -> Option<(f64, f64, f64)> {
     let (generator, output) = (log.get(Quantity::Generator)?, log.get(Quantity::Output)?);
     let bounds: Vec<usize> = (0..=log.len()).filter(|row| *row == log.len() || !log.continues(*row)).collect();
@@ -162,7 +165,8 @@ fn slope(log: &Log) -> Option<(f64, f64, f64)> {
     Some((slope, psi, travel.1 - travel.0))
 }
 
-/// The slope that half of all motion falls short of: a generator that froze and leaps on is one piece of many, however far it leaps.
+/// The slope that half of all motion falls short of: a generator that froze and leaps on is one piece of many, however
+/// far it leaps.
 fn typical_slope(mut pieces: Vec<(f64, f64)>) -> f64 {
     pieces.retain(|(psi, _)| *psi > 0.0);
     pieces.sort_by(|a, b| (a.1 / a.0).total_cmp(&(b.1 / b.0)));
@@ -209,8 +213,8 @@ fn ratio(log: &mut Log, columns: &[Column], gear: &Gear, findings: &mut Findings
         && (slope * other - 1.0).abs() <= OTHER_WHEEL
     {
         return Err(format!(
-            "{seen}: that is the ratio {other} of the same teeth with the other wheel fixed; allowed: the wheel that is fixed in the drive \
-             measured"
+            "{seen}: that is the ratio {other} of the same teeth with the other wheel fixed; allowed: the wheel that \
+             is fixed in the drive measured"
         ));
     }
     if (found + 1.0).abs() <= 0.1 {
@@ -253,7 +257,8 @@ fn ratio(log: &mut Log, columns: &[Column], gear: &Gear, findings: &mut Findings
         }
         [] => {}
     }
-    // Clearance and wind-up of a small motion change the ratio by more than units are apart; none of them is what was found.
+    // Clearance and wind-up of a small motion change the ratio by more than units are apart; none of them is what was
+    // found.
     if (RATIO_ERROR[0]..=RATIO_ERROR[1]).contains(&exchanged) {
         exchange(log, fault, &seen, findings);
         return Ok(());
@@ -261,12 +266,13 @@ fn ratio(log: &mut Log, columns: &[Column], gear: &Gear, findings: &mut Findings
     let units = Unit::ANGLES.map(Unit::name).join(", ");
     Err(if slope == 0.0 || (found.abs() < 0.05 && travel < ENOUGH_MOTION_RAD) {
         format!(
-            "{output} does not follow: {generator} turns by {psi:.3} rad, {output} by {travel:.6} rad; allowed: an output that turns"
+            "{output} does not follow: {generator} turns by {psi:.3} rad, {output} by {travel:.6} rad; allowed: an \
+             output that turns"
         )
     } else {
         format!(
-            "{seen}; allowed: within a factor of {} of it. Are columns, units ({units}) and ratio right? They are mapped with --columns \
-             generator=NAME:UNIT,output=NAME:UNIT",
+            "{seen}; allowed: within a factor of {} of it. Are columns, units ({units}) and ratio right? They are \
+             mapped with --columns generator=NAME:UNIT,output=NAME:UNIT",
             RATIO_ERROR[1]
         )
     })
@@ -305,8 +311,8 @@ fn error_size(log: &Log, columns: &[Column]) -> Result<(), String> {
     if spread > SPREADS_RAD[0] || (spread > 0.0 && spread < SPREADS_RAD[1]) {
         let found = spread / given.factor();
         return Err(format!(
-            "{column}: found errors of {found:e} {given}, allowed: between a thousandth of an arc-second and ten degrees. Is its unit \
-             ({units}) right? It is mapped with --columns error=NAME:UNIT"
+            "{column}: found errors of {found:e} {given}, allowed: between a thousandth of an arc-second and ten \
+             degrees. Is its unit ({units}) right? It is mapped with --columns error=NAME:UNIT"
         ));
     }
     Ok(())
@@ -317,7 +323,8 @@ mod tests {
     use super::typical_slope;
     use crate::measurement::{ColumnMap, FaultName, Gear, Quantity, Recording, Treatment, parse};
 
-    /// A drive of ratio 50 to and fro under a load in N·m at a temperature in °C, each times and plus something; angles in radians times some number.
+    /// A drive of ratio 50 to and fro under a load in N·m at a temperature in °C, each times and plus something; angles
+    /// in radians times some number.
     fn read(columns: &str, torque: f64, celsius: f64, angles: [f64; 2]) -> Result<Recording, String> {
         let mut text = "time_s,generator_rad,output_rad,torque_n_m,temperature_c\n".to_owned();
         for k in 0..1200 {
@@ -380,7 +387,8 @@ mod tests {
         let deg = 1f64.to_degrees();
         let found = read("", 1.0, 0.0, [deg, 1.0]).unwrap();
         assert!(matches!(unit_fault(&found), Some((Some(Quantity::Generator), Treatment::Repaired, _))));
-        // Both are in degrees, one is said to be in radians; or both are in radians, and one is said to be in degrees: no ratio tells.
+        // Both are in degrees, one is said to be in radians; or both are in radians, and one is said to be in degrees:
+        // no ratio tells.
         for (angles, columns) in [
             ([deg; 2], "generator=generator_rad:rad,output=output_rad:deg"),
             ([1.0; 2], "generator=generator_rad:deg,output=output_rad:rad"),

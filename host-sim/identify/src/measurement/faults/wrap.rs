@@ -15,8 +15,8 @@ const EXCHANGED: f64 = 0.75;
 const OFTEN: usize = 3;
 /// A unit other than the one given is believed of a column that covers this share of its turn.
 const COVERED_BY_ANOTHER: f64 = 0.98;
-/// A step that differs from the one before by less than this share of a turn goes on as it did; where files are joined without a time
-/// between them, it does not.
+/// A step that differs from the one before by less than this share of a turn goes on as it did; where files are joined
+/// without a time between them, it does not.
 const GOES_ON: f64 = 0.25;
 /// Teeth do not skip by more than so many turns of the motor in a row: two pitches are one.
 const MOST_SKIPPED: f64 = 3.5;
@@ -31,7 +31,8 @@ pub(in crate::measurement) fn unwrap(log: &mut Log, columns: &[Column], ratio: f
             .get(Quantity::Output)
             .filter(|_| channel == Quantity::Generator)
             .map_or(0.0, |output| span_of(output) * ratio.abs());
-        // An output that turns by the ratio times as much is the generator: columns taken for each other, and not an angle that began anew.
+        // An output that turns by the ratio times as much is the generator: columns taken for each other, and not an
+        // angle that began anew.
         let leaps = values.windows(2).any(|pair| (pair[1] - pair[0]).abs() > 0.5 * TAU);
         if !leaps && travel > EXCHANGED * ratio.powi(2) * span_of(values) {
             continue;
@@ -72,7 +73,8 @@ fn span_of(values: &[f64]) -> f64 {
     most - least
 }
 
-/// The unit in which a column stays within one turn and begins anew, as it shows by its steps, or by the output, which has travelled so far.
+/// The unit in which a column stays within one turn and begins anew, as it shows by its steps, or by the output, which
+/// has travelled so far.
 fn wrapped_at(values: &[f64], unit: Unit, travel_rad: f64, log: &Log) -> Option<Unit> {
     let range = span_of(values);
     let again = |turn: f64| {
@@ -89,8 +91,9 @@ fn wrapped_at(values: &[f64], unit: Unit, travel_rad: f64, log: &Log) -> Option<
         .find(|other| stays_within(range, turn_of(*other), COVERED_BY_ANOTHER) && again(turn_of(*other)) >= OFTEN)
 }
 
-/// Makes `values` continuous. `output`, if given, is continuous and turns `ratio` times slower; it counts turns where one row is
-/// too far from the next, where a session begins, and at the very first row. Returns whether rows are too far apart.
+/// Makes `values` continuous. `output`, if given, is continuous and turns `ratio` times slower; it counts turns where
+/// one row is too far from the next, where a session begins, and at the very first row. Returns whether rows are too
+/// far apart.
 fn along(values: &mut [f64], log: &Log, ratio: f64, output: Option<&[f64]>) -> bool {
     let nearest = |d: f64| d - TAU * (d / TAU).round();
     let mut steps: Vec<f64> = match output {

@@ -4,16 +4,18 @@
 //! axis (turns) = hour angle / 24 h + half a turn on the west side of the pier
 //! ```
 //!
-//! While the mount tracks, the axis follows the sidereal clock: axis less clock is one number for each target. Hour angles are written to 0.01 h, which
-//! is a good part of a generator turn; the clock is known to a second. So sections whose hour angles agree with the clock within what is written are of
-//! one target, and the mean of them says where it is. A slew is another target, with the hour angles of its own sections.
+//! While the mount tracks, the axis follows the sidereal clock: axis less clock is one number for each target. Hour
+//! angles are written to 0.01 h, which is a good part of a generator turn; the clock is known to a second. So sections
+//! whose hour angles agree with the clock within what is written are of one target, and the mean of them says where it
+//! is. A slew is another target, with the hour angles of its own sections.
 
 use super::SIDEREAL_DAY_S;
 use super::text::Written;
 
 /// Hours to a turn.
 const HOURS: f64 = 24.0;
-/// Two hour angles that are rounded differ by up to one step of what is written; and a clock by a second, which is 0.03 of one. *Source*.
+/// Two hour angles that are rounded differ by up to one step of what is written; and a clock by a second, which is 0.03
+/// of one. *Source*.
 const STEPS_APART: f64 = 1.1;
 
 /// What a section says of where the mount points.
@@ -67,7 +69,8 @@ pub(super) fn stands(sections: &[Pointing], ratio: f64) -> (Vec<f64>, Vec<String
         .zip(&of)
         .map(|(section, of)| of.map(|(place, axis)| axis + shorter(targets[place].offset - (axis - clock(section)))))
         .collect();
-    // What says nothing goes on with the section before it; what comes before all that say something, with the first of them.
+    // What says nothing goes on with the section before it; what comes before all that say something, with the first of
+    // them.
     let known = stands.iter().position(Option::is_some);
     let first = known.unwrap_or(0);
     let begins = |k: usize| sections.get(k).map_or(0.0, clock);
@@ -81,15 +84,16 @@ pub(super) fn stands(sections: &[Pointing], ratio: f64) -> (Vec<f64>, Vec<String
     let mut notes = Vec::new();
     if known.is_none() {
         notes.push(
-            "no hour angle is said: the generator's angle follows the clock, as that of a mount that tracks on without a slew"
+            "no hour angle is said: the generator's angle follows the clock, as that of a mount that tracks on \
+             without a slew"
                 .to_owned(),
         );
     } else if targets.len() > 1 {
         let half = targets.iter().map(|target| 0.5 * target.within).fold(0.0, f64::max);
         let flipped = sections.iter().any(|s| s.west) && !sections.iter().all(|s| s.west);
         notes.push(format!(
-            "the mount points at {} targets: where its generator stands for each is taken from the hour angle, which is written so that this is known to \
-             {:.0} deg{}",
+            "the mount points at {} targets: where its generator stands for each is taken from the hour angle, which \
+             is written so that this is known to {:.0} deg{}",
             targets.len(),
             (360.0 * ratio * half).abs().min(180.0),
             if flipped { "; on the other side of the pier the axis is taken half a turn farther" } else { "" }

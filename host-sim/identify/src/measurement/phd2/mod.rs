@@ -1,16 +1,18 @@
-//! Guide logs of PHD2 (and KStars and the ASIAIR, which write the same): the error of a mount's hour axis against the stars, with what guiding took
-//! out put back.
+//! Guide logs of PHD2 (and KStars and the ASIAIR, which write the same): the error of a mount's hour axis against the
+//! stars, with what guiding took out put back.
 //!
 //! ```text
 //! unguided error = distance of the star − Σ pulses sent before     (a pulse west sets the axis forward)
 //! generator      = ratio · (hour axis as the section begins + sidereal rate · time)
 //! ```
 //!
-//! Distances are pixels in the sky: times the pixel scale, over the cosine of the declination they are angles of the axis. A pulse moves the axis
-//! by its duration at the rate that the mount was calibrated with. Each section `Guiding Begins` and each dither begins a session with a zero of
-//! its own. Times are those of the section, on the clock of its first line. [`axis`] says where the axis stands, [`text`] what a line says.
+//! Distances are pixels in the sky: times the pixel scale, over the cosine of the declination they are angles of the
+//! axis. A pulse moves the axis by its duration at the rate that the mount was calibrated with. Each section
+//! `Guiding Begins` and each dither begins a session with a zero of its own. Times are those of the section, on the
+//! clock of its first line. [`axis`] says where the axis stands, [`text`] what a line says.
 //!
-//! A section that cannot be read (no pixel scale, too near to the pole) is left out, which a note says; it is an error where none is left.
+//! A section that cannot be read (no pixel scale, too near to the pole) is left out, which a note says; it is an error
+//! where none is left.
 
 mod axis;
 mod text;
@@ -141,7 +143,11 @@ impl Section {
         });
         if duration_s > 0.0 && forward != 0.0 {
             let rate = self.x_rate.map(|rate| rate * of_axis).or(self.guide_speed).ok_or_else(|| {
-                problem("a pulse, but neither \"xRate = ...\" nor \"RA Guide Speed = ...\" above; allowed: a log that says its guide rate".to_owned())
+                problem(
+                    "a pulse, but neither \"xRate = ...\" nor \"RA Guide Speed = ...\" above; allowed: a log that \
+                     says its guide rate"
+                        .to_owned(),
+                )
             })?;
             self.sent_arcsec += forward * duration_s * rate;
             self.pulses += 1;

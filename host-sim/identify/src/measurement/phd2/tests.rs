@@ -3,7 +3,8 @@ use std::fmt::Write as _;
 use super::super::{ColumnMap, Gear, MeasuredError, Recording, parse};
 use super::*;
 
-const HEADER: &str = "Frame,Time,mount,dx,dy,RARawDistance,DECRawDistance,RAGuideDistance,DECGuideDistance,RADuration,RADirection,DECDuration,DECDirection,XStep,YStep,StarMass,SNR,ErrorCode\n";
+const HEADER: &str = "Frame,Time,mount,dx,dy,RARawDistance,DECRawDistance,RAGuideDistance,DECGuideDistance,RADuration,\
+                      RADirection,DECDuration,DECDirection,XStep,YStep,StarMass,SNR,ErrorCode\n";
 const RATIO: f64 = 100.0;
 const SCALE: f64 = 1.5;
 const AMPLITUDE: f64 = 12.0;
@@ -14,7 +15,8 @@ fn wave(axis: f64) -> f64 {
     AMPLITUDE * (2.0 * RATIO * TAU * axis + 0.4).sin()
 }
 
-/// A section as it is made: a guider that measures once in two seconds, and sends a pulse for seven tenths of what it sees where it guides.
+/// A section as it is made: a guider that measures once in two seconds, and sends a pulse for seven tenths of what it
+/// sees where it guides.
 #[derive(Clone, Copy)]
 struct Part<'a> {
     begins: &'a str,
@@ -43,17 +45,17 @@ const PART: Part<'static> = Part {
 
 /// The log of some sections.
 fn night(parts: &[Part<'_>]) -> String {
-    let mut text = "PHD2 version 2.6.13 [Linux], Log version 2.5. Log enabled at 2026-11-01 20:00:00\n\n\
-                    Calibration Begins at 2026-11-01 20:10:00\nMount = M, Dec = 4.0 deg, Hour angle = 3.0 hr\nWest,1,2.5,3.1,4.0\n\
-                    Calibration complete\n\n"
+    let mut text = "PHD2 version 2.6.13 [Linux], Log version 2.5. Log enabled at 2026-11-01 20:00:00\n\nCalibration \
+                    Begins at 2026-11-01 20:10:00\nMount = M, Dec = 4.0 deg, Hour angle = 3.0 \
+                    hr\nWest,1,2.5,3.1,4.0\nCalibration complete\n\n"
         .to_owned();
     for part in parts {
         let _ = write!(
             text,
-            "Guiding Begins at {}\nEquipment Profile = Rig\n{}\n\
-             Mount = M, connected, guiding enabled, xAngle = 30.0, xRate = 4.096, yAngle = 120.0, yRate = 4.900\n\
-             Norm rates RA = 7.0\"/s @ dec 0, Dec = 6.8\"/s; ortho.err. = 1.8 deg\n\
-             RA Guide Speed = 7.5 a-s/s, Dec Guide Speed = 7.5 a-s/s, Cal Dec = 4.0 deg, Last Cal Issue = None\n{}\n{HEADER}",
+            "Guiding Begins at {}\nEquipment Profile = Rig\n{}\nMount = M, connected, guiding enabled, xAngle = 30.0, \
+             xRate = 4.096, yAngle = 120.0, yRate = 4.900\nNorm rates RA = 7.0\"/s @ dec 0, Dec = 6.8\"/s; ortho.err. \
+             = 1.8 deg\nRA Guide Speed = 7.5 a-s/s, Dec Guide Speed = 7.5 a-s/s, Cal Dec = 4.0 deg, Last Cal Issue = \
+             None\n{}\n{HEADER}",
             part.begins, part.scale, part.pointing
         );
         let cosine = part.declination_deg.to_radians().cos();
@@ -94,8 +96,8 @@ fn read_night(text: &str) -> Recording {
     try_night(text).unwrap()
 }
 
-/// Amplitude of the wave twice a generator turn that all sessions have in common, and what it leaves, arcsec rms. Each has a zero and a drift of its
-/// own.
+/// Amplitude of the wave twice a generator turn that all sessions have in common, and what it leaves, arcsec rms. Each
+/// has a zero and a drift of its own.
 fn common_wave(recordings: &[Recording]) -> [f64; 2] {
     let straightened = |mut values: Vec<f64>| {
         let n = values.len() as f64;

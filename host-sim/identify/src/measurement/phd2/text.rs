@@ -1,7 +1,7 @@
 //! The text of a guide log: what a line says of a section, and the fields of its rows.
 //!
-//! PHD2 writes a point in its numbers, but has written the comma of the system's locale (its issue 453: unquoted, between fields that commas part),
-//! and a spreadsheet that saves a log again writes semicolons or quotes.
+//! PHD2 writes a point in its numbers, but has written the comma of the system's locale (its issue 453: unquoted,
+//! between fields that commas part), and a spreadsheet that saves a log again writes semicolons or quotes.
 
 /// Columns whose numbers have decimals.
 const DECIMAL: [&str; 8] =
@@ -16,8 +16,9 @@ pub(super) struct Written {
     pub decimals: i32,
 }
 
-/// The number behind `word`, which begins a line or stands behind a comma or a semicolon: `Dec = ` is none in `Cal Dec = 5.0`. Nothing where another
-/// unit than one of `units` follows (`Dec = 6.8"/s` is a rate); no units are any.
+/// The number behind `word`, which begins a line or stands behind a comma or a semicolon: `Dec = ` is none in
+/// `Cal Dec = 5.0`. Nothing where another unit than one of `units` follows (`Dec = 6.8"/s` is a rate); no units are
+/// any.
 pub(super) fn said(line: &str, word: &str, units: &[&str]) -> Option<Written> {
     let begins = |at: &usize| {
         let before = line[..*at].trim_end().chars().next_back();

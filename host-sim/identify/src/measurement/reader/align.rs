@@ -2,13 +2,15 @@
 
 use flexspline_base::robust::{least_and_most, median_of, sampled};
 
-/// Two channels are never recorded together if they share fewer rows than this share of those of the rarer one. *Guess*.
+/// Two channels are never recorded together if they share fewer rows than this share of those of the rarer
+/// one. *Guess*.
 const TOGETHER: f64 = 0.1;
 /// Values farther apart than so many of a channel's usual distances have a gap between them.
 const GAP: f64 = 4.0;
 /// Fewest values of a channel.
 const FEWEST: usize = 16;
-/// An angle moves at a pace if it does by this share of its usual one: what jitters at rest does not turn round. *Guess*.
+/// An angle moves at a pace if it does by this share of its usual one: what jitters at rest does not turn
+/// round. *Guess*.
 const AT_PACE: f64 = 0.25;
 /// An angle that moves by more than this share of all that it goes through begins anew there.
 const BEGINS_ANEW: f64 = 0.5;
@@ -21,9 +23,9 @@ pub fn apart(a: &[f64], b: &[f64]) -> bool {
     rarer >= FEWEST && (both as f64) < TOGETHER * rarer as f64
 }
 
-/// A channel at these instants: cubic between four values that follow one another, straight beside a gap, nothing in one. Gives the largest
-/// distance to a value of its own, in the unit of the instants. An angle that turns round between two values has nothing there: how far it went is
-/// not recorded.
+/// A channel at these instants: cubic between four values that follow one another, straight beside a gap, nothing in
+/// one. Gives the largest distance to a value of its own, in the unit of the instants. An angle that turns round
+/// between two values has nothing there: how far it went is not recorded.
 pub fn at(instants: &[f64], own: &[f64], values: &[f64], is_angle: bool) -> (Vec<f64>, f64) {
     let mut known: Vec<(f64, f64)> = own
         .iter()
@@ -93,7 +95,8 @@ mod tests {
         let (aligned, farthest) = at(&instants, &own, &values, false);
         assert!(aligned[0].is_nan() && (farthest - 0.017).abs() < 1e-9);
         let off = (1..400).map(|k| (aligned[k] - wave(t(k))).abs()).fold(0.0, f64::max);
-        // The cubic's error is h^3 f''' / (9 sqrt 3) at most where its slopes are off: 3e-5 of 2.2; the straight line's is 5e-4.
+        // The cubic's error is h^3 f''' / (9 sqrt 3) at most where its slopes are off: 3e-5 of 2.2; the straight line's
+        // is 5e-4.
         assert!(off < 3e-4, "{off}");
         // Nothing in a gap, nor where the channel begins anew.
         let gap: Vec<f64> = own.iter().map(|t| if *t > 10.0 { t + 5.0 } else { *t }).collect();

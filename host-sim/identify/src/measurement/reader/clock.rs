@@ -1,5 +1,5 @@
-//! Time written as text: `2026-11-22T14:05:00.25Z`, `22.11.2026 14:05:00,25`, `05/04/2025 11:59:50.000 AM`, `25 May 2025 14:05`,
-//! `20250504T142611`, `14:05:00.250`.
+//! Time written as text: `2026-11-22T14:05:00.25Z`, `22.11.2026 14:05:00,25`, `05/04/2025 11:59:50.000 AM`,
+//! `25 May 2025 14:05`, `20250504T142611`, `14:05:00.250`.
 
 use jiff::civil::Date;
 
@@ -79,7 +79,8 @@ pub(super) fn stamp(text: &str, order: Order) -> Option<Stamp> {
             "utc" | "gmt" | "z" => zone_s = Some(0.0),
             other => match zone(word) {
                 Some(("", Some(ahead))) => zone_s = Some(ahead),
-                // The name of a zone (CET, PST): all stamps of a log have the same, or the clock is set back, which is looked for.
+                // The name of a zone (CET, PST): all stamps of a log have the same, or the clock is set back, which is
+                // looked for.
                 _ if (3..=5).contains(&other.len())
                     && other.bytes().all(|b| b.is_ascii_alphabetic())
                     && month(other).is_none() => {}
@@ -104,7 +105,8 @@ pub(super) fn is_date(text: &str) -> bool {
     !text.contains(':') && days(text, Order::default()).is_some()
 }
 
-/// Which number is the day in these dates: what one above twelve shows, else as where half days are counted (`AM`), else the day first.
+/// Which number is the day in these dates: what one above twelve shows, else as where half days are counted (`AM`),
+/// else the day first.
 pub(super) fn order<'a>(texts: impl Iterator<Item = &'a str>) -> Order {
     let mut found = Order::DayFirst;
     for text in texts.filter(|text| text.contains('/')) {

@@ -1,8 +1,8 @@
-//! How a text file of numbers is laid out: what separates fields, how decimals are written, where the names of the columns and their units
-//! stand, which lines above the rows are settings.
+//! How a text file of numbers is laid out: what separates fields, how decimals are written, where the names of the
+//! columns and their units stand, which lines above the rows are settings.
 //!
-//! One idea serves all forms: the lines of the file's majority have one width and columns of one kind (number, time, word). That majority
-//! says the separator; a line that begins with a word where the majority has a number is no row.
+//! One idea serves all forms: the lines of the file's majority have one width and columns of one kind (number, time,
+//! word). That majority says the separator; a line that begins with a word where the majority has a number is no row.
 
 use std::collections::BTreeSet;
 
@@ -16,7 +16,8 @@ pub(super) const HEAD: usize = 1 << 16;
 const SAME_WIDTH: f64 = 0.8;
 /// Share of the fields that are numbers, times or empty, at least: a row may hold a word or two.
 const NUMBERS: f64 = 0.5;
-/// Names that a file with one value in a line may have, and rows of each in its head: a word that is seldom is a remark. *Guess*.
+/// Names that a file with one value in a line may have, and rows of each in its head: a word that is seldom is a
+/// remark. *Guess*.
 const NAMES_OF_VALUES: std::ops::RangeInclusive<usize> = 2..=64;
 const ROWS_OF_A_NAME: usize = 4;
 /// Seconds since 1970 of the years 2001 to 2065.
@@ -72,7 +73,8 @@ impl Separator {
         }
     }
 
-    /// Hands on the fields of a line in order, without the space and the quotes around them; returns how many there are.
+    /// Hands on the fields of a line in order, without the space and the quotes around them; returns how many there
+    /// are.
     pub(super) fn split<'a>(self, line: &'a [u8], mut field: impl FnMut(usize, &'a [u8])) -> usize {
         let line = line.trim_ascii_end();
         let mut count = 0;
@@ -232,8 +234,8 @@ impl Layout {
         }
         lines.retain(|line| !line.text.trim().is_empty());
         let (comments, lines): (Vec<Line>, Vec<Line>) = lines.into_iter().partition(|line| line.text.starts_with('#'));
-        // Names that are looked for, in the first line with commas, are a header whatever stands below: what does not fit is for the reader to
-        // refuse.
+        // Names that are looked for, in the first line with commas, are a header whatever stands below: what does not
+        // fit is for the reader to refuse.
         let own = is_own(&lines, known);
         let guessed = guess(&lines).map(|guess| Layout::guessed(&comments, &lines, guess, known));
         match guessed {
@@ -337,7 +339,8 @@ impl Layout {
         self.notes.push(format!("{which} neither names nor units ({}): left out", shortened(&words.join(", "))));
     }
 
-    /// Headers that say `Name, motor, Name, joint` and `SampleTime[ms], 50, SampleTime[ms], 50`: a time and a value for each channel.
+    /// Headers that say `Name, motor, Name, joint` and `SampleTime[ms], 50, SampleTime[ms], 50`: a time and a value for
+    /// each channel.
     fn keys_and_values(&mut self, fields: &[Vec<String>], header: &Header, rows_from: usize) {
         let width = self.names.len();
         let keyed = |k: usize| {
@@ -450,7 +453,8 @@ impl Layout {
             if let Some((factor, unit)) = self.parts_of_a_second(whole, &column) {
                 self.stamp = Some(StampParts::Seconds { whole, part: whole + 1, factor });
                 self.notes.push(format!(
-                    "column {} has seconds since 1970, column {} what is to be added in {unit}: they are read together, as column {}",
+                    "column {} has seconds since 1970, column {} what is to be added in {unit}: they are read \
+                     together, as column {}",
                     whole + 1,
                     whole + 2,
                     whole + 1
@@ -530,7 +534,8 @@ fn guess(lines: &[Line]) -> Option<Guess> {
     best.map(|(_, guess)| guess)
 }
 
-/// Whether the decimals of a column follow a comma: by the numbers that can be read in one way, of the column or else of the file.
+/// Whether the decimals of a column follow a comma: by the numbers that can be read in one way, of the column or else
+/// of the file.
 fn decimal_commas(rows: &[&Vec<String>], width: usize) -> Vec<bool> {
     let says: Vec<[usize; 2]> = (0..width)
         .map(|k| {

@@ -1,8 +1,8 @@
 //! The one reader of other people's files: bytes to text, text to rows of one layout, cells to numbers.
 //!
-//! [`Sheet::read`] finds the layout and which lines are rows; [`Sheet::columns`] reads the columns that are asked for. Whatever is left out
-//! or read otherwise than it stands is said in [`Sheet::notes`] with its line. `look` asks for all columns, `calibrate`, `diagnose` and
-//! `replay` for those of the mapping.
+//! [`Sheet::read`] finds the layout and which lines are rows; [`Sheet::columns`] reads the columns that are asked for.
+//! Whatever is left out or read otherwise than it stands is said in [`Sheet::notes`] with its line. `look` asks for all
+//! columns, `calibrate`, `diagnose` and `replay` for those of the mapping.
 
 pub(super) mod align;
 pub(super) mod clock;
@@ -78,7 +78,8 @@ pub struct Cells {
     pub first_time: Option<FoundCell>,
     /// Whether a time has no date.
     pub time_of_day: bool,
-    /// Whether the times have a date and no zone: a clock on the wall, which is set forward and back in spring and autumn.
+    /// Whether the times have a date and no zone: a clock on the wall, which is set forward and back in spring and
+    /// autumn.
     pub local_time: bool,
     /// Whether a number is written with decimals: then they are no counts, though all may be whole.
     pub decimals: bool,
@@ -173,7 +174,8 @@ impl Sheet {
         self.fields(self.rows[row]).into_iter().nth(place)
     }
 
-    /// Finds the lines that are rows: not comments, names once more, summaries at the end, lines with holes of zero bytes.
+    /// Finds the lines that are rows: not comments, names once more, summaries at the end, lines with holes of zero
+    /// bytes.
     fn find_rows(&mut self, zeros: &[(u64, usize)]) -> Result<(), TableProblem> {
         let text = std::mem::take(&mut self.text);
         let mut group: Vec<RowAt> = Vec::new();
@@ -243,7 +245,8 @@ impl Sheet {
         (self.layout.has_names && there >= 2.min(names.len()) && looks_like_names(fields)).then_some(order)
     }
 
-    /// Lines in the middle that begin with words: a logger that was started anew, if names are among them, else rows that cannot be read.
+    /// Lines in the middle that begin with words: a logger that was started anew, if names are among them, else rows
+    /// that cannot be read.
     fn take_group(&mut self, text: &[u8], group: &mut Vec<RowAt>, found: &mut Found) -> Result<(), TableProblem> {
         let fields: Vec<Vec<String>> =
             group.iter().map(|at| self.layout.separator.fields(&text[at.begin..at.end])).collect();
@@ -265,7 +268,8 @@ impl Sheet {
                 });
                 if let Some(k) = other.filter(|_| self.layout.has_names) {
                     let what = format!(
-                        "a second line of names ({}), which are not those of line {}; allowed: one form in a file, so cut it there",
+                        "a second line of names ({}), which are not those of line {}; allowed: one form in a file, so \
+                         cut it there",
                         shortened(&fields[k].join(", ")),
                         self.layout.header_line
                     );
@@ -289,7 +293,8 @@ impl Sheet {
         }
     }
 
-    /// The channels of a file with one value in a line become columns: the time, and one for each name in the order in which they come.
+    /// The channels of a file with one value in a line become columns: the time, and one for each name in the order in
+    /// which they come.
     fn find_channels(&mut self, name: usize, value: usize, time: usize) {
         let mut places: HashMap<Vec<u8>, usize> = HashMap::new();
         for row in &self.rows {
@@ -535,7 +540,8 @@ impl Cells {
     pub fn over_note(&self, name: &str) -> Option<String> {
         let first = self.first_over.as_ref()?;
         Some(format!(
-            "{name}: {} cell{} beyond the range of the instrument, the first in line {} (\"{}\"): nothing is taken to be recorded there",
+            "{name}: {} cell{} beyond the range of the instrument, the first in line {} (\"{}\"): nothing is taken to \
+             be recorded there",
             self.over,
             if self.over == 1 { " is" } else { "s are" },
             first.line,
@@ -558,7 +564,8 @@ impl Found {
         if let Some(first) = self.holes.first() {
             let holes = self.holes.len();
             notes.push(format!(
-                "zero bytes stand in {holes} line{}, first in line {first}, as a card leaves them that lost its power: {} left out",
+                "zero bytes stand in {holes} line{}, first in line {first}, as a card leaves them that lost its \
+                 power: {} left out",
                 if holes == 1 { "" } else { "s" },
                 if holes == 1 { "it is" } else { "they are" }
             ));

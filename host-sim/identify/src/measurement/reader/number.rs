@@ -1,5 +1,5 @@
-//! A cell as a number: decimals behind a point or a comma, groups of thousands, exponents of Fortran, units inside of cells, marks of what
-//! was beyond a range.
+//! A cell as a number: decimals behind a point or a comma, groups of thousands, exponents of Fortran, units inside of
+//! cells, marks of what was beyond a range.
 
 use super::super::unit::Unit;
 
@@ -35,7 +35,8 @@ const MISSING: [&str; 16] = [
     "1.#qnan",
     "-1.#ind",
 ];
-/// What says that a value was beyond the range, as voltmeters, loggers (Keyence, Keysight, NI) and spreadsheets write it.
+/// What says that a value was beyond the range, as voltmeters, loggers (Keyence, Keysight, NI) and spreadsheets write
+/// it.
 const OVER: [&str; 17] = [
     "over",
     "under",
@@ -55,7 +56,8 @@ const OVER: [&str; 17] = [
     "1.#inf",
     "#num!",
 ];
-/// SCPI-99, volume 1, 7.2.1.4: 9.9E37 is infinity, 9.91E37 no number; some instruments write 9.9E36. The largest single float is another.
+/// SCPI-99, volume 1, 7.2.1.4: 9.9E37 is infinity, 9.91E37 no number; some instruments write 9.9E36. The largest single
+/// float is another.
 const OVER_NUMBERS: [(f64, f64); 2] = [(9.89e36, 1.0e38), (3.402e38, 3.404e38)];
 /// Units of cells that no column of a mapping has.
 const OTHER_UNITS: [&str; 12] = ["rpm", "1/min", "%", "deg/s", "°/s", "rad/s", "mm", "um", "µm", "Hz", "W", "bar"];
@@ -174,7 +176,8 @@ fn ungrouped(text: &str, group: char) -> Option<String> {
     Some(all)
 }
 
-/// What a cell says of how decimals are written: `Some(true)` behind a comma, `Some(false)` behind a point, `None` nothing.
+/// What a cell says of how decimals are written: `Some(true)` behind a comma, `Some(false)` behind a point, `None`
+/// nothing.
 pub(super) fn decimals(text: &str) -> Option<bool> {
     let (point, comma) = (text.rfind('.'), text.rfind(','));
     let number = |comma: bool| matches!(odd_cell(text, comma), Cell::Number(..));

@@ -82,9 +82,9 @@ pub fn parse(file: &str, mut source: impl Read) -> Result<RawFile, MeasuredError
     let mut bytes = Vec::new();
     source.read_to_end(&mut bytes).map_err(|error| refuse(TableProblem { line: 1, what: error.to_string() }))?;
     if phd2::is_one(&bytes[..bytes.len().min(super::layout::HEAD)]) {
-        let what =
-            "a guide log of PHD2 has columns of its own, and needs no mapping: flexspline calibrate FILE --ratio N"
-                .to_owned();
+        let what = "a guide log of PHD2 has columns of its own, and needs no mapping: flexspline calibrate FILE \
+                    --ratio N"
+            .to_owned();
         return Err(refuse(TableProblem { line: 1, what }));
     }
     let sheet = Sheet::of(bytes, &[]).map_err(refuse)?;
@@ -185,7 +185,8 @@ impl RawFile {
             };
         }
         self.notes.push(format!(
-            "the channels are not recorded in the same rows: {} of {} rows have {}, and the others are laid on these by their time",
+            "the channels are not recorded in the same rows: {} of {} rows have {}, and the others are laid on these \
+             by their time",
             keep.len(),
             self.rows,
             self.columns[base].name
@@ -200,7 +201,8 @@ fn rises(values: &[f64]) -> bool {
     finite.windows(2).all(|pair| pair[1] >= pair[0])
 }
 
-/// Lays channels on the instants of the first time column, where they differ; `own` are the time columns, `columns` all columns, times first.
+/// Lays channels on the instants of the first time column, where they differ; `own` are the time columns, `columns` all
+/// columns, times first.
 pub(in crate::measurement) fn align_pairs<'a>(
     own: &[Vec<f64>],
     columns: impl Iterator<Item = &'a mut Vec<f64>>,
@@ -223,6 +225,9 @@ pub(in crate::measurement) fn align_pairs<'a>(
         (moved, farthest) = (moved + 1, farthest.max(far));
     }
     (moved > 0).then(|| {
-        format!("each channel has stamps of its own: {moved} are laid on those of the first, which are up to {farthest} (in its unit) away")
+        format!(
+            "each channel has stamps of its own: {moved} are laid on those of the first, which are up to {farthest} \
+             (in its unit) away"
+        )
     })
 }

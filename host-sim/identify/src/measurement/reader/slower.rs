@@ -3,7 +3,8 @@
 use super::super::columns::Quantity;
 use super::super::log::Log;
 
-/// Share of the distances between values that are the usual one (one row more or less), at least: a slower clock, not holes.
+/// Share of the distances between values that are the usual one (one row more or less), at least: a slower clock, not
+/// holes.
 const REGULAR: f64 = 0.9;
 /// Fewest values that show a rhythm.
 const FEWEST: usize = 8;
@@ -30,7 +31,10 @@ pub fn fill(log: &mut Log, notes: &mut Vec<String>) {
         for row in (first.saturating_sub(every)..first).chain(last + 1..rows.min(last + 1 + every)) {
             values[row] = values[if row < first { first } else { last }];
         }
-        notes.push(format!("the {channel} has a value in one of {every} rows: between them it is a straight line, at the ends it is held"));
+        notes.push(format!(
+            "the {channel} has a value in one of {every} rows: between them it is a straight line, at the ends it is \
+             held"
+        ));
     }
 }
 

@@ -1,14 +1,18 @@
-//! The order of rows by their stamps: newest first, unsorted, written twice, a clock on the wall that is set for summer.
+//! The order of rows by their stamps: newest first, unsorted, written twice, a clock on the wall that is set for
+//! summer.
 
 use flexspline_base::robust::{median_of, sampled};
 
-/// Share of the steps that fall where rows stand from the newest to the oldest. *Guess*: between them sessions may begin.
+/// Share of the steps that fall where rows stand from the newest to the oldest. *Guess*: between them sessions may
+/// begin.
 const FALLING: f64 = 0.9;
-/// Share of the rows that are out of order in a file without order: a clock that is set back, or a stray stamp, is seldom. *Guess*.
+/// Share of the rows that are out of order in a file without order: a clock that is set back, or a stray stamp, is
+/// seldom. *Guess*.
 const UNSORTED: f64 = 0.05;
 /// Sorted rows are those of one clock if this share of their steps is within half of the usual one. *Guess*.
 const EVEN: f64 = 0.8;
-/// Share of rows that repeat the one before in a file in which rows are written twice; fewer are left to the check of the clock. *Guess*.
+/// Share of rows that repeat the one before in a file in which rows are written twice; fewer are left to the check of
+/// the clock. *Guess*.
 const TWICE: f64 = 0.1;
 /// Fewest steps that show an order.
 const FEWEST: usize = 8;

@@ -1,5 +1,5 @@
-//! Files as other people's loggers, robots, scopes and spreadsheets write them: each is read right by the mapping that `look` proposes, or ends in
-//! one clear error that `look` and the reader of measurements share.
+//! Files as other people's loggers, robots, scopes and spreadsheets write them: each is read right by the mapping that
+//! `look` proposes, or ends in one clear error that `look` and the reader of measurements share.
 //!
 //! The bench is one of 600 rows: a motor that turns 7.5 turns forth and back, a joint behind a ratio of 100, a load.
 

@@ -7,9 +7,11 @@ use encoding_rs::{UTF_16BE, UTF_16LE, WINDOWS_1252};
 
 /// Bytes that a file is judged by.
 const LOOKED_AT: usize = 4096;
-/// Share of control characters above which a file is no text. *Guess*: text has none, compressed and binary numbers 12 % (32 of 256 values).
+/// Share of control characters above which a file is no text. *Guess*: text has none, compressed and binary numbers 12
+/// % (32 of 256 values).
 const BINARY: f64 = 0.02;
-/// Share of zeros at every second byte that makes UTF-16 of a file without a byte order mark: numbers in UTF-16 have nothing else there.
+/// Share of zeros at every second byte that makes UTF-16 of a file without a byte order mark: numbers in UTF-16 have
+/// nothing else there.
 const UTF_16: f64 = 0.9;
 
 /// A file as text: UTF-8 but for stray bytes, lines ended by LF.

@@ -25,8 +25,15 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
     let depth_mm = drive.flexspline.tip_radius_mm + drive.generator.w0_mm - drive.circular_spline.tip_radius_mm;
     let differences = all.map(|kind| path_differences_um(evidence, kind));
     let worst = most(differences.iter().flatten().copied());
-    let mut path = claim("tip-path", "Fig. 6, (7) and (9)", "The tip of a flexspline tooth moves along the path of formulas (7) and (9).")
-        .metric("Largest distance of that path from the path of the tooth tip in the FEM, deformed, no load, over a quarter turn");
+    let mut path = claim(
+        "tip-path",
+        "Fig. 6, (7) and (9)",
+        "The tip of a flexspline tooth moves along the path of formulas (7) and (9).",
+    )
+    .metric(
+        "Largest distance of that path from the path of the tooth tip in the FEM, deformed, no load, over a quarter \
+         turn",
+    );
     for (kind, [outward, around]) in all.iter().zip(differences) {
         path = path.ours(kind.in_words(), outward.max(around), "µm");
     }
@@ -34,8 +41,8 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
         .at_most("largest distance over the working depth", worst / (1e3 * depth_mm), "", OF_WORKING_DEPTH)
         .because(|verdict| match verdict {
             Verdict::Reproduced => format!(
-                "The formulas are first order in the displacement and stay within {worst:.1} µm; good for a drawing, while the \
-                 flanks clear each other by 7 µm."
+                "The formulas are first order in the displacement and stay within {worst:.1} µm; good for a drawing, \
+                 while the flanks clear each other by 7 µm."
             ),
             _ => format!("The formulas are off by up to {worst:.1} µm."),
         });
@@ -55,7 +62,9 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
         [Some(0.0), Some(0.0)],
     )
     .because(|_| {
-        "The two are a quarter turn apart; the formulas make sense only with φ from the major axis and t = 0 at the minor axis.".into()
+        "The two are a quarter turn apart; the formulas make sense only with φ from the major axis and t = 0 at the \
+         minor axis."
+            .into()
     });
 
     // Where the tip reaches farthest out, in teeth from the major axis.
@@ -70,7 +79,10 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
         "Fig. 6, text",
         "At φ = 0 the tooth enters the space as far as it goes, at φ = 90° it has left it.",
     )
-    .metric("Angle from the major axis at which the tip is farthest out; height of the tip below the tip circle of the other wheel at 90°")
+    .metric(
+        "Angle from the major axis at which the tip is farthest out; height of the tip below the tip circle of the \
+         other wheel at 90°",
+    )
     .ours("farthest out at", deepest, "°")
     .at_most("angle of the deepest tooth from the major axis", deepest, "°", 1.0)
     .at_least(

@@ -69,8 +69,8 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
     .ours_each(LOADED, ", −200 N·m, forward", |kind| against(kind, true), "′");
     let opposite = opposite.at_least("least ratio of the two", more, "", 1.0).because(|verdict| match verdict {
         Verdict::Reproduced => "They are larger.".into(),
-        _ => "The other way round: without load the output already lies on the flank that a load against the motion presses, so that \
-              only the wind-up shows; a load with the motion adds the clearance."
+        _ => "The other way round: without load the output already lies on the flank that a load against the motion \
+              presses, so that only the wind-up shows; a load with the motion adds the clearance."
             .into(),
     });
 
@@ -114,7 +114,8 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
         .ours_each(LOADED, "", |kind| loaded_error(kind).value / 60.0, "′");
     let better = better.at_least("gap, in spreads", gap, "", SPREADS).because(|verdict| match verdict {
         Verdict::Reproduced => format!(
-            "The cam holds the rim all around; the discs let it go between their arcs, and it winds up {:.1} times as far.",
+            "The cam holds the rim all around; the discs let it go between their arcs, and it winds up {:.1} times as \
+             far.",
             loaded_error(DoubleDisc).value / loaded_error(Cam).value
         ),
         _ => "The gap is within the discretisation.".into(),
@@ -124,8 +125,8 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
     let words = claim(
         "load-significant",
         "Section 4 against section 5",
-        "Section 4: the load had a significant impact on the accuracy. Section 5: no negative effect of the torque on the error was \
-         observed, regardless of its direction.",
+        "Section 4: the load had a significant impact on the accuracy. Section 5: no negative effect of the torque on \
+         the error was observed, regardless of its direction.",
     )
     .metric("Whether sections 4 and 5 say the same; ours: mean lag under −200 N·m over the largest unloaded error")
     .ours("least ratio", significant, "")
@@ -135,7 +136,12 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
         "",
         [Some(1.0), None],
     )
-    .because(|_| format!("The two sections contradict each other; with us 200 N·m makes the error {significant:.1} times as large or more."));
+    .because(|_| {
+        format!(
+            "The two sections contradict each other; with us 200 N·m makes the error {significant:.1} times as large \
+             or more."
+        )
+    });
 
     let [_, forward, backward] = paper::LOAD_LABELS;
     let labels = claim("load-labels", "Figs. 14 and 15", "The loaded curves are labelled (2), green, and (2), red.")
@@ -156,19 +162,17 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
         "The plane model has unit thickness and carries about 200 N·m.",
     )
     .paper("on 1 mm at the radius of the teeth", unit, "N/mm")
-    .metric("Tangential line load of 200 N·m on a model of 1 mm, and what it stretches the built-in rim by; ours with the width of the drive")
+    .metric(
+        "Tangential line load of 200 N·m on a model of 1 mm, and what it stretches the built-in rim by; ours with the \
+         width of the drive",
+    )
     .ours(format!("on {} mm", evidence.drive.flexspline.width_mm), ours, "N/mm")
     .ours("membrane stress of the rim on 1 mm", membrane, "MPa")
-    .paper_keeps(
-        "face widths given",
-        f64::from(u8::from(paper::FACE_WIDTH_MM.is_some())),
-        "",
-        [Some(1.0), None],
-    )
+    .paper_keeps("face widths given", f64::from(u8::from(paper::FACE_WIDTH_MM.is_some())), "", [Some(1.0), None])
     .because(|_| {
         format!(
-            "No width is given: on unit thickness 200 N·m are {unit:.0} N/mm and stretch a 1.2 mm rim by {membrane:.0} MPa. All runs here \
-             spread it over {} mm.",
+            "No width is given: on unit thickness 200 N·m are {unit:.0} N/mm and stretch a 1.2 mm rim by \
+             {membrane:.0} MPa. All runs here spread it over {} mm.",
             evidence.drive.flexspline.width_mm
         )
     });

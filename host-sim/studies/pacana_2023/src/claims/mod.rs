@@ -1,7 +1,7 @@
 //! The paper's results one by one, in its order.
 //!
-//! Sizes are reproduced where ours is within [`SHARE`] of the paper's: it gives no tooth sizes, so nothing finer can be asked.
-//! Ranks hold where the gap exceeds three times what the discretisation moves it by ([`super::rank`]).
+//! Sizes are reproduced where ours is within [`SHARE`] of the paper's: it gives no tooth sizes, so nothing finer can be
+//! asked. Ranks hold where the gap exceeds three times what the discretisation moves it by ([`super::rank`]).
 
 mod kinematics;
 mod load;

@@ -13,12 +13,13 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
     let by_dwell = |kind| evidence.arcmin(kind, |m| m.dwell_arcsec);
     let backlash = |kind: GeneratorKind| evidence.backlash(kind);
 
-    let stands = claim(
-        "dwell",
-        "Figs. 16 and 17",
-        "After the reversal the output stands (A–B) because of the backlash.",
-    )
-    .metric("Generator travel from the reversal while the output stays within 0.05″, over the ratio, against the backlash of both ways").ours_each(REVERSED, ", generator", |kind| dwell(kind).value.to_degrees(), "°");
+    let stands =
+        claim("dwell", "Figs. 16 and 17", "After the reversal the output stands (A–B) because of the backlash.")
+            .metric(
+                "Generator travel from the reversal while the output stays within 0.05″, over the ratio, against the \
+                 backlash of both ways",
+            )
+            .ours_each(REVERSED, ", generator", |kind| dwell(kind).value.to_degrees(), "°");
     let agreement = most(REVERSED.map(|kind| (by_dwell(kind) * 60.0 / backlash(kind).value - 1.0).abs()));
     let stands = stands
         .at_most("dwell over the ratio against the backlash, largest deviation", agreement, "", 0.05)
@@ -49,8 +50,9 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
             .ours(kind.in_words(), ours, "′")
             .within("backlash", ours, "′", paper_arcmin, SHARE)
             .because(move |verdict| match verdict {
-                Verdict::Reproduced => "Of the same size, but that is no evidence: the clearance of the built-in drive was chosen to give the \
-                                        cam about 1′; only the difference of the two generators is."
+                Verdict::Reproduced => "Of the same size, but that is no evidence: the clearance of the built-in \
+                                        drive was chosen to give the cam about 1′; only the difference of the two \
+                                        generators is."
                     .into(),
                 _ => "Another clearance between the teeth.".into(),
             })
@@ -86,8 +88,8 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
         .because(|verdict| match verdict {
             Verdict::Reproduced => "Within a quarter.".into(),
             _ => format!(
-                "Ours is {ours:.2}′: the sign is the paper's, the size is not; 1 µm of deflection more or less moves a backlash by 0.05′, and \
-                 the paper does not say how equal its generators are."
+                "Ours is {ours:.2}′: the sign is the paper's, the size is not; 1 µm of deflection more or less moves \
+                 a backlash by 0.05′, and the paper does not say how equal its generators are."
             ),
         });
 
@@ -104,8 +106,8 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
         lost.value / lost.spread.max(1e-3 * lost.value)
     }));
     let paths = paths.at_least("least lost motion, in spreads", apart, "", SPREADS).because(|verdict| match verdict {
-        Verdict::Reproduced => "They are a backlash apart all the way. The paper leaves this number out; in its charts it would be what the joint \
-                                really loses."
+        Verdict::Reproduced => "They are a backlash apart all the way. The paper leaves this number out; in its \
+                                charts it would be what the joint really loses."
             .into(),
         _ => "They coincide.".into(),
     });
@@ -152,7 +154,9 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
     .ours_each(GeneratorKind::ALL, "", |kind| backlash(kind).value / 60.0, "′");
     let winner = winner.at_least("least gap, in spreads", best, "", SPREADS).because(|verdict| match verdict {
         Verdict::Reproduced => "It loses least.".into(),
-        _ => "Without load the two-roller drive has slightly less backlash, and all are within 0.07′; under load the cam is best by far.".into(),
+        _ => "Without load the two-roller drive has slightly less backlash, and all are within 0.07′; under load the \
+              cam is best by far."
+            .into(),
     });
 
     let data = claim(
@@ -163,8 +167,8 @@ pub(super) fn claims(evidence: &Evidence<'_>) -> Vec<Claim> {
     .metric("Whether the same model can be built from what is given")
     .missing("tooth sizes, materials, mesh, contact law, friction, time step, how the rim was kept from turning")
     .because(|_| {
-        "Tooth sizes, mesh, contact, friction, time step and how the rim was kept from turning are not given: only the protocol can be \
-         repeated, not the model."
+        "Tooth sizes, mesh, contact, friction, time step and how the rim was kept from turning are not given: only the \
+         protocol can be repeated, not the model."
             .into()
     });
     vec![stands, longer, disc, cam, order, difference, paths, limits, recurring, winner, data]

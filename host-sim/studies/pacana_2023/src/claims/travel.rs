@@ -71,29 +71,30 @@ fn figure_12(evidence: &Evidence<'_>) -> Vec<Claim> {
     let equal = claim(
         "equal-at-one-radian",
         "Fig. 12, text",
-        "After 1 rad the output of the roller drives is equal to the nominal value; therefore the motion is reversed there.",
+        "After 1 rad the output of the roller drives is equal to the nominal value; therefore the motion is reversed \
+         there.",
     )
-    .metric("Error at +1 rad over the largest error up to there, no load").ours_each(rollers, ", error at +1 rad", at_turn, "′");
+    .metric("Error at +1 rad over the largest error up to there, no load")
+    .ours_each(rollers, ", error at +1 rad", at_turn, "′");
     let equal = equal.at_most("error at +1 rad over the largest", most(rollers.map(vanished)), "", VANISHED).because(
         |verdict| match verdict {
             Verdict::Reproduced => "The error is gone at +1 rad.".into(),
-            _ => {
-                "One radian is 29.9 tooth pitches: after start-up a perfect drive has the same error there as anywhere."
-                    .into()
-            }
+            _ => "One radian is 29.9 tooth pitches: after start-up a perfect drive has the same error there as \
+                  anywhere."
+                .into(),
         },
     );
 
     let return_ratio = |kind| {
         evidence.unloaded(kind).map_or(f64::NAN, |s| s.metrics.largest_back_arcsec / s.metrics.largest_out_arcsec)
     };
-    let back = claim(
-        "return-greater",
-        "Fig. 12, text",
-        "On the way back the delay of the roller drives is even greater.",
-    )
-    .metric("Largest |error| on the way back over that on the way there, zero where the drive was deformed, no load")
-    .ours_each(rollers, "", return_ratio, "");
+    let back =
+        claim("return-greater", "Fig. 12, text", "On the way back the delay of the roller drives is even greater.")
+            .metric(
+                "Largest |error| on the way back over that on the way there, zero where the drive was deformed, no \
+                 load",
+            )
+            .ours_each(rollers, "", return_ratio, "");
     let back =
         back.at_least("least ratio", least(rollers.map(return_ratio)), "", GREATER).because(|verdict| match verdict {
             Verdict::Reproduced => "It is greater.".into(),
@@ -129,14 +130,18 @@ fn figure_12(evidence: &Evidence<'_>) -> Vec<Claim> {
         "Fig. 12 (c), (d)",
         "With double disc and cam the curve is much closer to the nominal one than with rollers.",
     )
-    .metric("Largest |error| of the unloaded path: each roller drive against each of the others, in spreads, and least ratio").ours_each(all, "", |kind| evidence.largest(kind).value / 60.0, "′");
+    .metric(
+        "Largest |error| of the unloaded path: each roller drive against each of the others, in spreads, and least \
+         ratio",
+    )
+    .ours_each(all, "", |kind| evidence.largest(kind).value / 60.0, "′");
     let course = course
         .at_least("least gap, in spreads", least(closer.into_iter().flatten()), "", SPREADS)
         .at_least("least ratio of a roller drive to another (much: 1.5)", factor, "", 1.5)
         .because(|verdict| match verdict {
             Verdict::Reproduced => "It is.".into(),
-            _ => "Unloaded, all four are half their clearance off, 0.5′, whatever deforms the rim; under load the claim holds, see the \
-                  wind-up."
+            _ => "Unloaded, all four are half their clearance off, 0.5′, whatever deforms the rim; under load the \
+                  claim holds, see the wind-up."
                 .into(),
         });
 
@@ -241,12 +246,21 @@ fn sizes(evidence: &Evidence<'_>) -> Vec<Claim> {
     )
     .paper("error of the four-roller drive over the travel of its output", 100.0 * share, "%")
     .paper("error of the double-disc drive", paper::ERROR_DOUBLE_DISC_RAD * ARCMIN_PER_RAD, "′")
-    .metric("Errors of Fig. 13 over all that the output turns in 1 rad of the generator, 1/95 rad; and against the range of 1′ to 9′")
-    .paper_keeps("error of the double-disc drive", paper::ERROR_DOUBLE_DISC_RAD * ARCMIN_PER_RAD, "′", [None, Some(high)])
+    .metric(
+        "Errors of Fig. 13 over all that the output turns in 1 rad of the generator, 1/95 rad; and against the range \
+         of 1′ to 9′",
+    )
+    .paper_keeps(
+        "error of the double-disc drive",
+        paper::ERROR_DOUBLE_DISC_RAD * ARCMIN_PER_RAD,
+        "′",
+        [None, Some(high)],
+    )
     .paper_keeps("error of the cam drive", cam_arcmin, "′", [None, Some(high)])
     .because(|_| {
         format!(
-            "In 1 rad the output turns {:.1}′; a lag of 21.4′ is {:.0} % of that, and 10.3′ of the cam {:.0} %: no error of a gear that works.",
+            "In 1 rad the output turns {:.1}′; a lag of 21.4′ is {:.0} % of that, and 10.3′ of the cam {:.0} %: no \
+             error of a gear that works.",
             paper::output_travel_arcmin(),
             100.0 * share,
             100.0 * paper::share_of_travel(paper::ERROR_CAM_RAD)
@@ -261,18 +275,21 @@ fn order(evidence: &Evidence<'_>) -> Claim {
     let missing = ours.iter().any(|m| m.value.is_nan());
     let agreement = kendall_tau(&ranks, &ours);
     let mut order = claim("error-order", "Fig. 13", "Errors rank four-roller ≥ two-roller > double disc > cam.")
-        .metric("Kendall's tau of the largest |error| of the unloaded path against that order, pairs closer than three spreads undecided");
+        .metric(
+            "Kendall's tau of the largest |error| of the unloaded path against that order, pairs closer than three \
+             spreads undecided",
+        );
     for ((kind, _), measured) in paper::ERROR_RANK.iter().zip(&ours) {
         order = order.ours(kind.in_words(), measured.value / 60.0, "′");
     }
-    order
-        .at_least("Kendall's tau", if missing { f64::NAN } else { agreement.tau }, "", 1.0)
-        .because(|verdict| match verdict {
+    order.at_least("Kendall's tau", if missing { f64::NAN } else { agreement.tau }, "", 1.0).because(|verdict| {
+        match verdict {
             Verdict::Reproduced => "All pairs stand as in the paper.".into(),
             _ => format!(
-                "Of the pairs {} stand as in the paper, {} the other way, {} undecided; unloaded, the error is half the clearance, which \
-                 the generators change by a few arc-seconds.",
+                "Of the pairs {} stand as in the paper, {} the other way, {} undecided; unloaded, the error is half \
+                 the clearance, which the generators change by a few arc-seconds.",
                 agreement.concordant, agreement.discordant, agreement.undecided
             ),
-        })
+        }
+    })
 }

@@ -1,4 +1,5 @@
-//! The page of `reproduce`: the paper's results beside ours, claim by claim, and where numbers like the paper's come from.
+//! The page of `reproduce`: the paper's results beside ours, claim by claim, and where numbers like the paper's come
+//! from.
 
 mod charts;
 mod tables;
@@ -82,8 +83,8 @@ pub fn page(sources: Sources<'_>) -> Page {
         ("BLAKE3 of the drive".to_owned(), hash),
         (
             "Paper".to_owned(),
-            "Pacana et al., Numerical Analysis of the Kinematic Accuracy of the Hermetic Harmonic Drive in Space Vehicles, Appl. Sci. 13 \
-             (2023)"
+            "Pacana et al., Numerical Analysis of the Kinematic Accuracy of the Hermetic Harmonic Drive in Space \
+             Vehicles, Appl. Sci. 13 (2023)"
                 .to_owned(),
         ),
         ("Runs of the protocol".to_owned(), format!("{} in all, {:.0} s", r.runs.0.len(), r.wall_s)),
@@ -136,8 +137,8 @@ fn judge(r: &Reproduction, animations: &[Result<Animation, AnimationError>]) -> 
     if r.settings.quick {
         status = status.max(Status::Remark);
         remarks.push(
-            "Quick form: coarse mesh, one other discretisation and few changes of the model. Ranks may be called decided that the whole \
-             form leaves open."
+            "Quick form: coarse mesh, one other discretisation and few changes of the model. Ranks may be called \
+             decided that the whole form leaves open."
                 .into(),
         );
     }
@@ -166,8 +167,8 @@ fn headline(r: &Reproduction) -> Headline {
     let four = paper::ERROR_FOUR_ROLLER_RAD * ARCMIN_PER_RAD;
     let cam = paper::ERROR_CAM_RAD * ARCMIN_PER_RAD;
     let mut answer = format!(
-        "Of {} claims of the paper {} are reproduced, {} are not, {} contradict the paper itself and {} cannot be tested: unloaded, a sound drive is \
-         off by half its clearance, {:.1}′, not by {cam:.0}′ to {four:.0}′",
+        "Of {} claims of the paper {} are reproduced, {} are not, {} contradict the paper itself and {} cannot be \
+         tested: unloaded, a sound drive is off by half its clearance, {:.1}′, not by {cam:.0}′ to {four:.0}′",
         r.claims.len(),
         n(Verdict::Reproduced),
         n(Verdict::NotReproduced),
@@ -194,9 +195,9 @@ fn headline(r: &Reproduction) -> Headline {
 fn glance(r: &Reproduction) -> Section {
     let mut blocks = vec![Block::Table { choice: None, table: tables::by_part(r) }];
     blocks.push(Block::paragraph(
-        "Each claim of the paper has a metric and a criterion, and the verdict follows from the numbers alone. The paper \
-         gives no tooth sizes: sizes count as reproduced within a quarter, ranks where the gap exceeds three times what mesh, increment and \
-         penalty move it by.",
+        "Each claim of the paper has a metric and a criterion, and the verdict follows from the numbers alone. The \
+         paper gives no tooth sizes: sizes count as reproduced within a quarter, ranks where the gap exceeds three \
+         times what mesh, increment and penalty move it by.",
     ));
     if let Some(nearest) = r.nearest() {
         blocks.push(Block::Paragraph { choice: None, text: Text::default().strong(nearest.takeaway.clone()) });
@@ -211,20 +212,20 @@ fn motion(r: &Reproduction, animations: &[Animation]) -> Section {
             id: "drive".into(),
             title: "The drive to scale, as in the paper's figures 8 to 11".into(),
             caption: Text::new(
-                "Contact FEM, plane strain, no load, turning forward, both wheels meshed as computed, coloured by von Mises stress. The \
-                 flexspline stands and is deformed by the generator (grey), the circular spline turns: the red dot is on tooth 0, the blue \
-                 one on space 0. Move along figure 2 to turn the generator.",
+                "Contact FEM, plane strain, no load, turning forward, both wheels meshed as computed, coloured by von \
+                 Mises stress. The flexspline stands and is deformed by the generator (grey), the circular spline \
+                 turns: the red dot is on tooth 0, the blue one on space 0. Move along figure 2 to turn the generator.",
             ),
-            alt: "Cross section of the drive: circular spline outside, deformed flexspline inside it, wave generator in the middle, coloured \
-                  by von Mises stress, and an enlargement of the teeth at the major axis"
+            alt: "Cross section of the drive: circular spline outside, deformed flexspline inside it, wave generator \
+                  in the middle, coloured by von Mises stress, and an enlargement of the teeth at the major axis"
                 .into(),
             body: FigureBody::Drive,
         }));
         blocks.push(lines(
             "ripple",
             "Error over one tooth pitch, after start-up",
-            "Figure 1's states, forward, no load. This repeats with every tooth pitch, 59.8 times in the paper's 2 rad: the scale is all that a \
-             sound drive has to show.",
+            "Figure 1's states, forward, no load. This repeats with every tooth pitch, 59.8 times in the paper's 2 \
+             rad: the scale is all that a sound drive has to show.",
             Axis::linked("Generator from the beginning of a pitch"),
             error_axis(),
             animations.iter().map(|a| (a.kind.to_string(), charts::ripple(a))).collect(),
@@ -233,8 +234,9 @@ fn motion(r: &Reproduction, animations: &[Animation]) -> Section {
     blocks.push(lines(
         "errors",
         "Kinematic error of the four generators: the paper's figure 13",
-        "Output angle less generator angle over the ratio, from where the drive was deformed, the output in the middle of its clearance: forward \
-         to +1 rad, then back to −1 rad (dashed). The paper has 10.3′ (cam), 14.2′ (double disc), 21.4′ (four-roller) on this scale.",
+        "Output angle less generator angle over the ratio, from where the drive was deformed, the output in the \
+         middle of its clearance: forward to +1 rad, then back to −1 rad (dashed). The paper has 10.3′ (cam), 14.2′ \
+         (double disc), 21.4′ (four-roller) on this scale.",
         generator_axis(),
         error_axis(),
         every(charts::errors(r)),
@@ -242,8 +244,8 @@ fn motion(r: &Reproduction, animations: &[Animation]) -> Section {
     blocks.push(lines(
         "travel",
         "Output over generator: the paper's figure 12",
-        "The output angle of the selected generator with the nominal line, generator over 95. The error is a seventieth of the travel and can \
-         hardly be seen: drag across to zoom, double-click to come back.",
+        "The output angle of the selected generator with the nominal line, generator over 95. The error is a \
+         seventieth of the travel and can hardly be seen: drag across to zoom, double-click to come back.",
         generator_axis(),
         Axis::new("Output angle", Quantity::Error),
         by_generator(|kind| charts::travel(r, kind)),
@@ -261,13 +263,14 @@ fn claims(r: &Reproduction) -> Section {
 
 fn sources_of_errors(r: &Reproduction) -> Section {
     let mut blocks = vec![Block::paragraph(
-        "The paper's errors are 20 to 40 times what a sound drive shows. Each suspect was put into the model alone and run through the same \
-         protocol, on the coarse mesh, without load.",
+        "The paper's errors are 20 to 40 times what a sound drive shows. Each suspect was put into the model alone \
+         and run through the same protocol, on the coarse mesh, without load.",
     )];
     blocks.push(lines(
         "sources",
         "What each change of the model does to the error",
-        "The way out with the selected generator and, where it is more than 5′, the way back (dashed). What stays at zero here is in the table. The paper's size is marked.",
+        "The way out with the selected generator and, where it is more than 5′, the way back (dashed). What stays at \
+         zero here is in the table. The paper's size is marked.",
         generator_axis(),
         error_axis(),
         by_generator(|kind| charts::sources(r, kind)),
@@ -279,12 +282,14 @@ fn sources_of_errors(r: &Reproduction) -> Section {
     }
     blocks.push(Block::Table { choice: None, table: tables::takeaways(r) });
     blocks.push(Block::paragraph(format!(
-        "How the rim is kept from turning matters because the rim is deformed: a point of it moves along the circumference by v, twice around in \
-         each turn of the generator, by a quarter of a millimetre and more at the bore. The mean of the whole bore does not move. One point that is \
-         held still makes the whole flexspline turn by v over the radius instead, and the output with it. The paper says that rotation of the \
-         flexspline “was blocked” and that it was tied to a point on the axis “using rigid links”, not which of its nodes were. That its numbers come \
-         from there is a suspicion: {}. A hard brake on the output gives delays in the first phase and after each reversal, as the paper has them, but \
-         no equality at 1 rad. What was held, and at which nodes, would tell.",
+        "How the rim is kept from turning matters because the rim is deformed: a point of it moves along the \
+         circumference by v, twice around in each turn of the generator, by a quarter of a millimetre and more at the \
+         bore. The mean of the whole bore does not move. One point that is held still makes the whole flexspline turn \
+         by v over the radius instead, and the output with it. The paper says that rotation of the flexspline “was \
+         blocked” and that it was tied to a point on the axis “using rigid links”, not which of its nodes were. That \
+         its numbers come from there is a suspicion: {}. A hard brake on the output gives delays in the first phase \
+         and after each reversal, as the paper has them, but no equality at 1 rad. What was held, and at which nodes, \
+         would tell.",
         fit_of_one_point(r)
     )));
     Section {
@@ -322,8 +327,9 @@ fn path_and_stress(r: &Reproduction) -> Section {
         lines(
             "tip-path",
             "Path of a tooth tip: the paper's figure 6",
-            "From the minor axis (right, below) into the space at the major axis (left, above), seen from the tooth of the circular spline that is met \
-             at the minor axis: formulas (7) and (9), and the tips of the FEM, deformed, no load, one dot to each tooth of a quarter.",
+            "From the minor axis (right, below) into the space at the major axis (left, above), seen from the tooth \
+             of the circular spline that is met at the minor axis: formulas (7) and (9), and the tips of the FEM, \
+             deformed, no load, one dot to each tooth of a quarter.",
             Axis::new("Around, v, mm", Quantity::Count),
             Axis::new("Outward, w, mm", Quantity::Count),
             by_generator(|kind| charts::tip_path(r, kind)),
@@ -331,8 +337,8 @@ fn path_and_stress(r: &Reproduction) -> Section {
         lines(
             "tip-difference",
             "Formulas less FEM",
-            "The formulas are of first order in the displacement. Outward they are off by the second-order shortening of the rim, 5 µm and more; the \
-             flanks clear each other by 7 µm.",
+            "The formulas are of first order in the displacement. Outward they are off by the second-order shortening \
+             of the rim, 5 µm and more; the flanks clear each other by 7 µm.",
             Axis::new("Tooth from the major axis", Quantity::Degree),
             Axis::new("Formula less FEM, µm", Quantity::Count),
             by_generator(|kind| charts::tip_difference(r, kind)),
@@ -340,8 +346,8 @@ fn path_and_stress(r: &Reproduction) -> Section {
         lines(
             "stress",
             "Largest stress in each tooth sector: the paper's figures 10 and 11",
-            "Von Mises stress of the flexspline, deformed, no load, by angle from the major axis (D at 0°, M at ±90°). Averaged at nodes; the notch at \
-             the tooth root is as sharp as the mesh.",
+            "Von Mises stress of the flexspline, deformed, no load, by angle from the major axis (D at 0°, M at \
+             ±90°). Averaged at nodes; the notch at the tooth root is as sharp as the mesh.",
             Axis::new("Sector from the major axis", Quantity::Degree),
             Axis::new("Von Mises stress", Quantity::Stress),
             every(charts::stress(r)),
@@ -355,8 +361,8 @@ fn load_and_reversal(r: &Reproduction) -> Section {
         lines(
             id,
             &format!("Under load, {}: the paper's figure {number}", kind.in_words()),
-            "Error under +200, 0 and −200 N·m (10 N·m to the millimetre of width), forward (lines) and back (dashed). The paper shows the output angle, \
-             in which this is hard to see.",
+            "Error under +200, 0 and −200 N·m (10 N·m to the millimetre of width), forward (lines) and back (dashed). \
+             The paper shows the output angle, in which this is hard to see.",
             generator_axis(),
             error_axis(),
             every(charts::load(r, kind)),
@@ -368,9 +374,9 @@ fn load_and_reversal(r: &Reproduction) -> Section {
         lines(
             "reversal",
             "Reversal: the paper's figures 16 and 17",
-            "From 0 to A forward; at A the generator turns back and the output stands (A to B) while the error grows by the backlash; from B to C it \
-             follows. The paper reads its backlash from A–B and leaves out the distance of 0–A and B–C, which is what a joint loses. The paper has \
-             double disc and cam.",
+            "From 0 to A forward; at A the generator turns back and the output stands (A to B) while the error grows \
+             by the backlash; from B to C it follows. The paper reads its backlash from A–B and leaves out the \
+             distance of 0–A and B–C, which is what a joint loses. The paper has double disc and cam.",
             generator_axis(),
             error_axis(),
             by_generator(|kind| charts::reversal(r, kind)),
@@ -382,9 +388,9 @@ fn load_and_reversal(r: &Reproduction) -> Section {
 
 fn spread(r: &Reproduction) -> Section {
     let mut blocks = vec![Block::paragraph(
-        "Every metric that ranks generators was computed again with other meshes, increments and penalties. A rank holds where the gap between two \
-         generators exceeds three times the spread of that gap. Kendall's tau compares with the paper's order four-roller ≥ two-roller > double disc > \
-         cam.",
+        "Every metric that ranks generators was computed again with other meshes, increments and penalties. A rank \
+         holds where the gap between two generators exceeds three times the spread of that gap. Kendall's tau \
+         compares with the paper's order four-roller ≥ two-roller > double disc > cam.",
     )];
     blocks.push(Block::Table { choice: None, table: tables::rankings(r) });
     Section {
@@ -398,8 +404,8 @@ fn spread(r: &Reproduction) -> Section {
 fn judged(r: &Reproduction) -> Section {
     let blocks = vec![
         Block::paragraph(
-            "A failed check of the paper's own numbers makes a claim inconsistent; else what is missing, or a run without equilibrium, leaves it \
-             untestable; else the checks of the model decide.",
+            "A failed check of the paper's own numbers makes a claim inconsistent; else what is missing, or a run \
+             without equilibrium, leaves it untestable; else the checks of the model decide.",
         ),
         Block::Table { choice: None, table: tables::checks(r) },
     ];
@@ -409,14 +415,16 @@ fn judged(r: &Reproduction) -> Section {
 fn reading() -> Section {
     Section::reading(vec![
         Block::paragraph(
-            "Error: output angle less generator angle over the ratio; positive when the output leads. Mean lag: its mean over whole tooth pitches after \
-                 start-up. Ripple: its range in that time. Half-width at reversal: half of what is lost between forward and backward; the whole is the \
-                 backlash. Dwell: generator travel while the output stands. They are different things, and a claim is held against one of them.",
+            "Error: output angle less generator angle over the ratio; positive when the output leads. Mean lag: its \
+             mean over whole tooth pitches after start-up. Ripple: its range in that time. Half-width at reversal: \
+             half of what is lost between forward and backward; the whole is the backlash. Dwell: generator travel \
+             while the output stands. They are different things, and a claim is held against one of them.",
         ),
         Block::paragraph(format!(
-            "The drive is built in: 188 and 190 teeth of module 0.5 mm, 20 mm wide, ideal, without friction, drag of 0.02 N·m on the output. Its clearance \
-                 was chosen to give the cam a backlash near 1′, so that the size of the paper's backlash is no evidence. {FRAMES} states of one pitch show it \
-                 in motion. Plane strain, quasi-static: speed, inertia and the third dimension are left out, in the paper too.",
+            "The drive is built in: 188 and 190 teeth of module 0.5 mm, 20 mm wide, ideal, without friction, drag of \
+             0.02 N·m on the output. Its clearance was chosen to give the cam a backlash near 1′, so that the size of \
+             the paper's backlash is no evidence. {FRAMES} states of one pitch show it in motion. Plane strain, \
+             quasi-static: speed, inertia and the third dimension are left out, in the paper too.",
         )),
     ])
 }

@@ -155,8 +155,9 @@ pub(super) fn takeaways(r: &Reproduction) -> Table {
     let rows =
         r.experiments.iter().map(|e| vec![Text::new(e.name), Text::new(e.what.clone()), Text::new(e.takeaway.clone())]);
     Table {
-        caption: "What was changed and what it shows. *Drift: how far the error moves between a pitch and one many whole pitches on, 0 in a sound drive; \
-                  where it is more than 1″ there is no steady lag, ripple or half-width"
+        caption: "What was changed and what it shows. *Drift: how far the error moves between a pitch and one many \
+                  whole pitches on, 0 in a sound drive; where it is more than 1″ there is no steady lag, ripple or \
+                  half-width"
             .into(),
         header: header(["Change", "Exactly", "To take away"]),
         rows: rows.collect(),

@@ -14,8 +14,8 @@ fn added(drive: &Drive, motion: &Motion, cause: Cause, size: f64, shape: &[f64])
     with.iter().zip(run(drive, &unit, motion, &[]).error_arcsec).map(|(with, without)| with - without).collect()
 }
 
-/// A missing tooth of the flexspline: two pulses in each turn of the generator, on the loaded flank alone, higher and wider with
-/// the cube root of the load.
+/// A missing tooth of the flexspline: two pulses in each turn of the generator, on the loaded flank alone, higher and
+/// wider with the cube root of the load.
 #[test]
 fn a_missing_tooth_shows_wider_under_load() {
     let drive = hhd();
@@ -33,8 +33,8 @@ fn a_missing_tooth_shows_wider_under_load() {
     assert!(full.2 > 0.0 && missing(-25.0, -1.0).2 < 0.0, "the output gives way to the load");
 }
 
-/// Even orders alone, less than where the generator is held and one zone carries, and still less where the load brings in the
-/// other.
+/// Even orders alone, less than where the generator is held and one zone carries, and still less where the load brings
+/// in the other.
 #[test]
 fn a_displaced_axis_is_rectified_and_shared() {
     let drive = hhd();
@@ -50,8 +50,8 @@ fn a_displaced_axis_is_rectified_and_shared() {
     assert!(loaded[1] < 0.7 * light[1] && loaded[3] < 0.7 * light[3], "{light:?} {loaded:?}");
 }
 
-/// Six bolts, three of them tighter: half of the radial second harmonic along the teeth, a sixth of the sixth, and the flank's
-/// share of what opens; the third is not seen where both zones carry.
+/// Six bolts, three of them tighter: half of the radial second harmonic along the teeth, a sixth of the sixth, and the
+/// flank's share of what opens; the third is not seen where both zones carry.
 #[test]
 fn bolts_leave_a_sixth_harmonic_and_hide_the_third() {
     let drive = hhd();
@@ -150,7 +150,8 @@ fn teeth_climb_in_half_a_turn() {
     assert!(climb.windows(2).all(|pair| pair[1] - pair[0] > -1e-6 && pair[1] - pair[0] < 0.01 * pitch));
 }
 
-/// Growth that is uneven around the flexspline: less than its full width without load, all of it where both zones share.
+/// Growth that is uneven around the flexspline: less than its full width without load, all of it where both zones
+/// share.
 #[test]
 fn the_tighter_zone_holds_where_one_side_is_worn_more() {
     let drive = hhd();
