@@ -157,11 +157,13 @@
 // Eight-byte words of a [`FlexsplineAged`].
 #define FLEXSPLINE_AGED_WORDS 4
 
-// The torque is that on the load: what gravity, wind and the like do to it. Inertia times the acceleration of the target comes off what the tick gives,
-// unless that inertia torque is the larger: while a target speeds up from a light load the flank does not change.
+// The torque is that on the load: what gravity, wind and the like do to it. Inertia times the acceleration of the
+// target comes off what the tick gives, unless that inertia torque is the larger: while a target speeds up from a
+// light load the flank does not change.
 #define FLEXSPLINE_TORQUE_ON_LOAD 0
 
-// The torque is that in the mesh: of a sensor between drive and load, of the twist, or of the motor's current less its friction.
+// The torque is that in the mesh: of a sensor between drive and load, of the twist, or of the motor's current less its
+// friction.
 #define FLEXSPLINE_TORQUE_IN_MESH 1
 
 // Largest number of coefficients of a learner.
@@ -354,8 +356,8 @@ typedef enum FlexsplineStatus {
   FLEXSPLINE_STATUS_ORDER = 14,
   // Not all bytes of an upload came.
   FLEXSPLINE_STATUS_INCOMPLETE = 15,
-  // The image is whole and its wind-up is none that a drive has: a flank falls while the load grows (the sign of the torque?),
-  // or rises too fast.
+  // The image is whole and its wind-up is none that a drive has: a flank falls while the load grows (the sign of the
+  // torque?), or rises too fast.
   FLEXSPLINE_STATUS_IMPLAUSIBLE = 16,
   // What was kept of an activation is not whole: begin again.
   FLEXSPLINE_STATUS_TORN = 17,
@@ -395,8 +397,9 @@ typedef struct FlexsplineSettings {
   float acceleration_rad_s2;
   // Fastest generator, rad/s.
   float generator_rate_rad_s;
-  // A target no further from the output than this is reached on the flank that bears already, rad; 0 for none. Three times the peak
-  // of the encoder's noise at the output keeps the flank from changing to and fro; it costs up to this much after a reversal.
+  // A target no further from the output than this is reached on the flank that bears already, rad; 0 for none. Three
+  // times the peak of the encoder's noise at the output keeps the flank from changing to and fro; it costs up to
+  // this much after a reversal.
   float hold_rad;
 } FlexsplineSettings;
 
@@ -465,9 +468,9 @@ typedef struct FlexsplineInput {
   int64_t generator_counts;
   // Where the output shall be.
   int64_t target_counts;
-  // Load torque at the output, N m, positive when it turns the output forward: that in the mesh, with the drag added that the
-  // table was made with (times the direction), not that on the load where drag or inertia differ: `flexspline_torque_tick` makes it
-  // of a reading.
+  // Load torque at the output, N m, positive when it turns the output forward: that in the mesh, with the drag added
+  // that the table was made with (times the direction), not that on the load where drag or inertia differ:
+  // `flexspline_torque_tick` makes it of a reading.
   float torque_n_m;
   // Ticks missed since the last call.
   uint16_t missed_ticks;
@@ -489,7 +492,8 @@ typedef struct FlexsplineOutput {
   float transmission_error_rad;
   // It lies within +- this, rad.
   float uncertainty_rad;
-  // Correction in the command, rad: target less command over ratio. It is taken off the target, and has the sign of the error.
+  // Correction in the command, rad: target less command over ratio. It is taken off the target, and has the sign of
+  // the error.
   float correction_rad;
   // What the limiter held back, rad.
   float held_back_rad;
@@ -510,8 +514,8 @@ typedef struct FlexsplineEncoderSettings {
   int64_t zero_counts;
   // Counts in a turn, 2 to 2^31: four times the lines of an incremental one.
   uint32_t counts_per_turn;
-  // Bits of the register, 1 to 64: it begins anew after 2^bits counts. 0: it begins anew after each turn. A signed register is given by
-  // its bits, those above them zero.
+  // Bits of the register, 1 to 64: it begins anew after 2^bits counts. 0: it begins anew after each turn. A signed
+  // register is given by its bits, those above them zero.
   uint8_t wrap_bits;
   // 1 if it counts up where the angle falls, else 0.
   uint8_t reversed;
@@ -532,8 +536,8 @@ typedef struct FlexsplineTorqueSettings {
   float drag_n_m;
   // Coulomb drag that the table was made with, N m; 0 or more.
   float table_drag_n_m;
-  // A torque in the mesh below this changes the flank only where the direction changes, N m: some three times the peak of the noise behind the
-  // low-pass, and for a torque read in the mesh a fifth of the drag. 0 or more.
+  // A torque in the mesh below this changes the flank only where the direction changes, N m: some three times the
+  // peak of the noise behind the low-pass, and for a torque read in the mesh a fifth of the drag. 0 or more.
   float hold_n_m;
 } FlexsplineTorqueSettings;
 
@@ -612,7 +616,8 @@ typedef struct FlexsplineImageReport {
   uint16_t circular_spline_teeth;
   // `FLEXSPLINE_FIXED_...`.
   uint8_t fixed_member;
-  // Kind of wave generator: 0 other, 1 two-roller, 2 four-roller, 3 double-disc, 4 cam (`flexspline_generator_name`).
+  // Kind of wave generator: 0 other, 1 two-roller, 2 four-roller, 3 double-disc, 4 cam
+  // (`flexspline_generator_name`).
   uint8_t generator;
 } FlexsplineImageReport;
 
@@ -629,7 +634,8 @@ typedef struct FlexsplineLearnSettings {
   float memory_measurements;
   // Standard deviations beyond which an innovation is an outlier: 1 to 100.
   float gate;
-  // Way at the output after a reversal that is left out beside four times the limit of the half-width, rad; 0 to 0.049.
+  // Way at the output after a reversal that is left out beside four times the limit of the half-width, rad; 0 to
+  // 0.049.
   float settle_rad;
   // Torque beyond which the wind-up's share grows no more, N m.
   float torque_limit_n_m;
@@ -639,7 +645,8 @@ typedef struct FlexsplineLearnSettings {
 typedef struct FlexsplineCoefficient {
   // It stays within +- this: rad, or rad/(N m); above 0, 0.049 at most.
   float limit;
-  // Standard deviation that it is expected to have at first, and never exceeds: same unit; 1e-6 to 10 times the limit.
+  // Standard deviation that it is expected to have at first, and never exceeds: same unit; 1e-6 to 10 times the
+  // limit.
   float initial_std;
   // `FLEXSPLINE_TERM_...`.
   uint8_t term;
@@ -685,7 +692,8 @@ typedef struct FlexsplineLearnerReport {
   uint32_t untrusted;
   // Coefficients held at their limit, once for each and each measurement.
   uint32_t limited;
-  // Starts with the first variances: measurements contradicted what was learnt for a window, or, from zero, the state was hit by an upset.
+  // Starts with the first variances: measurements contradicted what was learnt for a window, or, from zero, the
+  // state was hit by an upset.
   uint32_t restarts;
   // `FLEXSPLINE_LEARNING_...`.
   uint8_t learning;
@@ -904,11 +912,13 @@ typedef struct FlexsplineStartUp {
 
 // How far the motor moves, and what is expected of it.
 typedef struct FlexsplineStartUpSettings {
-  // Way of the generator, there and back, rad. At the output it must be ten times `output_error_rad` at least, and half a turn at most.
+  // Way of the generator, there and back, rad. At the output it must be ten times `output_error_rad` at least, and
+  // half a turn at most.
   float way_rad;
   // What the output may be off by in a way, rad: twice the error that the table states is enough.
   float output_error_rad;
-  // Coulomb drag of the output that a torque in the mesh turns over by, N m; it may be wrong by three times. Above 0.
+  // Coulomb drag of the output that a torque in the mesh turns over by, N m; it may be wrong by three times. Above
+  // 0.
   float drag_n_m;
   // Ticks for each way, 8 or more; the last half of each is for the servo to settle.
   uint16_t ticks;
@@ -965,7 +975,8 @@ enum FlexsplineStatus flexspline_activation_begin(struct FlexsplineActivation *a
                                                   const struct FlexsplineJoint *joint,
                                                   float temperature_c);
 
-// A step: the same store and images with each, until `progress` (`FLEXSPLINE_PROGRESS_...`) is done. If a step fails the activation is over; begin again.
+// A step: the same store and images with each, until `progress` (`FLEXSPLINE_PROGRESS_...`) is done. If a step fails
+// the activation is over; begin again.
 enum FlexsplineStatus flexspline_activation_step(struct FlexsplineActivation *activation,
                                                  struct FlexsplineStore *store,
                                                  const struct FlexsplineImages *table,
@@ -974,8 +985,8 @@ enum FlexsplineStatus flexspline_activation_step(struct FlexsplineActivation *ac
 // Begins to find out whether an image is the one of its id.
 enum FlexsplineStatus flexspline_identity_begin(struct FlexsplineIdentity *identity);
 
-// Takes in a block of 64 bytes of the image, the same one with each step. `found` (`FLEXSPLINE_IDENTITY_...`) is hashing while there is more, then same or other;
-// with the next step it begins anew.
+// Takes in a block of 64 bytes of the image, the same one with each step. `found` (`FLEXSPLINE_IDENTITY_...`) is
+// hashing while there is more, then same or other; with the next step it begins anew.
 enum FlexsplineStatus flexspline_identity_step(struct FlexsplineIdentity *identity,
                                                const uint8_t *image,
                                                size_t image_bytes,
@@ -998,8 +1009,8 @@ enum FlexsplineStatus flexspline_store_check_images(struct FlexsplineStore *stor
 enum FlexsplineStatus flexspline_store_report(const struct FlexsplineStore *store,
                                               struct FlexsplineStoreReport *report);
 
-// Writes a damaged page of an image in memory again from the other image, both whole images of `bytes` bytes, and tells the store.
-// What `flexspline_store_report` named is `image` and `page`.
+// Writes a damaged page of an image in memory again from the other image, both whole images of `bytes` bytes, and
+// tells the store. What `flexspline_store_report` named is `image` and `page`.
 enum FlexsplineStatus flexspline_store_mend_page(struct FlexsplineStore *store,
                                                  uint8_t *damaged,
                                                  const uint8_t *good,
@@ -1007,8 +1018,8 @@ enum FlexsplineStatus flexspline_store_mend_page(struct FlexsplineStore *store,
                                                  uint8_t image,
                                                  uint8_t page);
 
-// Makes a copy of a joint's settings that is not whole anew from the other; `FLEXSPLINE_STATUS_ARGUMENT` if neither is. In a slow
-// rate group.
+// Makes a copy of a joint's settings that is not whole anew from the other; `FLEXSPLINE_STATUS_ARGUMENT` if neither
+// is. In a slow rate group.
 enum FlexsplineStatus flexspline_joint_mend(struct FlexsplineJoint *joint);
 
 // Changes the mode (`FLEXSPLINE_MODE_...`): `FLEXSPLINE_STATUS_MODE` where there is no such transition
@@ -1029,15 +1040,15 @@ enum FlexsplineStatus flexspline_state_save(const struct FlexsplineState *state,
                                             const struct FlexsplineStore *store,
                                             uint8_t (*saved)[FLEXSPLINE_SAVED_BYTES]);
 
-// Makes a state of bytes that the same joint saved with the same table, in mode off; only if the joint cannot have moved meanwhile.
-// The first sample is held against the one that was saved.
+// Makes a state of bytes that the same joint saved with the same table, in mode off; only if the joint cannot have
+// moved meanwhile. The first sample is held against the one that was saved.
 enum FlexsplineStatus flexspline_state_restore(struct FlexsplineState *state,
                                                const struct FlexsplineJoint *joint,
                                                const struct FlexsplineStore *store,
                                                const uint8_t (*saved)[FLEXSPLINE_SAVED_BYTES]);
 
-// One tick: from what was measured to what to command, once every `tick_s` and in the order of time. `FLEXSPLINE_STATUS_OK` also where no
-// correction could be made: `flags` and `quality` of the output say so.
+// One tick: from what was measured to what to command, once every `tick_s` and in the order of time.
+// `FLEXSPLINE_STATUS_OK` also where no correction could be made: `flags` and `quality` of the output say so.
 enum FlexsplineStatus flexspline_tick(const struct FlexsplineJoint *joint,
                                       const struct FlexsplineImages *table,
                                       struct FlexsplineStore *store,
@@ -1045,8 +1056,9 @@ enum FlexsplineStatus flexspline_tick(const struct FlexsplineJoint *joint,
                                       const struct FlexsplineInput *input,
                                       struct FlexsplineOutput *output);
 
-// A sum of the sizes of all types of this header, as the library has them. Where it is not `FLEXSPLINE_LAYOUT` the program was compiled
-// with another header, or with options that change a layout (packed structures, enumerations of another size): do not go on.
+// A sum of the sizes of all types of this header, as the library has them. Where it is not `FLEXSPLINE_LAYOUT` the
+// program was compiled with another header, or with options that change a layout (packed structures, enumerations of
+// another size): do not go on.
 uint32_t flexspline_layout(void);
 
 // Version of this library, as text.
@@ -1064,7 +1076,8 @@ const char *flexspline_status_text(int status);
 // Name of a mode.
 const char *flexspline_mode_name(uint8_t mode);
 
-// 1 if a mode may be followed by another, else 0: everything may become off or safe; off and hold tracking; tracking hold.
+// 1 if a mode may be followed by another, else 0: everything may become off or safe; off and hold tracking; tracking
+// hold.
 uint8_t flexspline_mode_may_become(uint8_t mode,
                                    uint8_t next);
 
@@ -1111,15 +1124,16 @@ const char *flexspline_term_name(uint8_t term);
 enum FlexsplineStatus flexspline_encoder_init(struct FlexsplineEncoder *encoder,
                                               const struct FlexsplineEncoderSettings *settings);
 
-// The first reading after a reset: of all angles with this reading the one nearest to `near_counts` (2^-32 turn) is taken, which is 0 or
-// the angle that was saved. `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that.
+// The first reading after a reset: of all angles with this reading the one nearest to `near_counts` (2^-32 turn) is
+// taken, which is 0 or the angle that was saved. `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that.
 enum FlexsplineStatus flexspline_encoder_start(struct FlexsplineEncoder *encoder,
                                                uint64_t reading,
                                                int64_t near_counts);
 
-// Takes a reading and tells the angle, counts of 2^-32 turn, to the nearest. Between two readings it may move by less than half of what the
-// register counts. `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that (give the tick no sample then),
-// `FLEXSPLINE_STATUS_NOT_INITIALISED` before `flexspline_encoder_start`, and after an upset of more than a word (one word is mended): make it and start it again.
+// Takes a reading and tells the angle, counts of 2^-32 turn, to the nearest. Between two readings it may move by less
+// than half of what the register counts. `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that (give the tick
+// no sample then), `FLEXSPLINE_STATUS_NOT_INITIALISED` before `flexspline_encoder_start`, and after an upset of more
+// than a word (one word is mended): make it and start it again.
 enum FlexsplineStatus flexspline_encoder_read(struct FlexsplineEncoder *encoder,
                                               uint64_t reading,
                                               int64_t *angle_counts);
@@ -1129,50 +1143,56 @@ enum FlexsplineStatus flexspline_encoder_reading(const struct FlexsplineEncoder 
                                                  int64_t angle_counts,
                                                  uint64_t *reading);
 
-// Counts of 2^-32 turn of an angle in radians, to the nearest; `FLEXSPLINE_STATUS_ARGUMENT` if it is not finite or beyond 2^31 turns. For
-// start-up and the host: in double precision.
+// Counts of 2^-32 turn of an angle in radians, to the nearest; `FLEXSPLINE_STATUS_ARGUMENT` if it is not finite or
+// beyond 2^31 turns. For start-up and the host: in double precision.
 enum FlexsplineStatus flexspline_counts_from_rad(double rad,
                                                  int64_t *angle_counts);
 
 // Radians of an angle in counts of 2^-32 turn. For start-up and the host: in double precision.
 double flexspline_rad_from_counts(int64_t angle_counts);
 
-// Radians from one angle to another, both in counts of 2^-32 turn, held within half a turn: in single precision, exact to 1.2e-7 of it.
+// Radians from one angle to another, both in counts of 2^-32 turn, held within half a turn: in single precision, exact
+// to 1.2e-7 of it.
 float flexspline_rad_between(int64_t from_counts,
                              int64_t to_counts);
 
-// 1 if a slower group that runs in every `divisor`-th tick, from `offset` on, runs in tick number `tick`, else 0; 0 too where `divisor` is 0 or
-// `offset` not below it.
+// 1 if a slower group that runs in every `divisor`-th tick, from `offset` on, runs in tick number `tick`, else 0; 0
+// too where `divisor` is 0 or `offset` not below it.
 uint8_t flexspline_is_due(uint32_t tick,
                           uint32_t divisor,
                           uint32_t offset);
 
-// Makes a path that has seen nothing yet; `FLEXSPLINE_STATUS_ARGUMENT` if a time or bandwidth is not finite and positive, or a drag or hold not
-// finite or below 0. A torque in the mesh may change the flank in any tick, and any reading is believed: `flexspline_torque_init_sensor` says more.
+// Makes a path that has seen nothing yet; `FLEXSPLINE_STATUS_ARGUMENT` if a time or bandwidth is not finite and
+// positive, or a drag or hold not finite or below 0. A torque in the mesh may change the flank in any tick, and any
+// reading is believed: `flexspline_torque_init_sensor` says more.
 enum FlexsplineStatus flexspline_torque_init(struct FlexsplineTorquePath *path,
                                              const struct FlexsplineTorqueSettings *settings);
 
-// As `flexspline_torque_init`, with what is known of sensor and servo. After a torque read in the mesh has changed the flank it does not change it
-// again for `settle_s`, s (some periods of the servo's position loop, 0 or more): the correction crosses the play then, and what its own motion makes of the
-// torque has to die away. A reading beyond `largest_n_m`, N m (above 0), is forgotten as one that is not finite.
+// As `flexspline_torque_init`, with what is known of sensor and servo. After a torque read in the mesh has changed the
+// flank it does not change it again for `settle_s`, s (some periods of the servo's position loop, 0 or more): the
+// correction crosses the play then, and what its own motion makes of the torque has to die away. A reading beyond
+// `largest_n_m`, N m (above 0), is forgotten as one that is not finite.
 enum FlexsplineStatus flexspline_torque_init_sensor(struct FlexsplineTorquePath *path,
                                                     const struct FlexsplineTorqueSettings *settings,
                                                     float settle_s,
                                                     float largest_n_m);
 
-// One tick: a reading, N m, positive where it turns the output forward, where it was measured (`FLEXSPLINE_TORQUE_...`), and the direction in which
-// the output moves or moved last, +1 or -1; what to give to `FlexsplineInput`. A reading that is not finite, larger than the sensor's largest, frozen, or too far
-// from the last one gives NaN and is forgotten. `FLEXSPLINE_STATUS_NOT_INITIALISED` where an upset hit more than a word of it (one is mended): make the path anew.
+// One tick: a reading, N m, positive where it turns the output forward, where it was measured
+// (`FLEXSPLINE_TORQUE_...`), and the direction in which the output moves or moved last, +1 or -1; what to give to
+// `FlexsplineInput`. A reading that is not finite, larger than the sensor's largest, frozen, or too far from the last
+// one gives NaN and is forgotten. `FLEXSPLINE_STATUS_NOT_INITIALISED` where an upset hit more than a word of it (one
+// is mended): make the path anew.
 enum FlexsplineStatus flexspline_torque_tick(struct FlexsplineTorquePath *path,
                                              uint8_t place,
                                              float reading_n_m,
                                              int8_t direction,
                                              float *torque_n_m);
 
-// Other limits of what a sensor can read, after `flexspline_torque_init_sensor`: the largest change from one tick to the next, N m (a quarter of the largest
-// reading and twice the drag without this call; a reading that changes by more is believed once three in a row are near each other), and the number of ticks
-// after which a reading that stays the same to the last bit is frozen (0 for never, as without this call: what comes from a model may stand still, a sensor has
-// noise). `FLEXSPLINE_STATUS_ARGUMENT` if the change is not finite or below 1e-6 N m.
+// Other limits of what a sensor can read, after `flexspline_torque_init_sensor`: the largest change from one tick to
+// the next, N m (a quarter of the largest reading and twice the drag without this call; a reading that changes by more
+// is believed once three in a row are near each other), and the number of ticks after which a reading that stays the
+// same to the last bit is frozen (0 for never, as without this call: what comes from a model may stand still, a sensor
+// has noise). `FLEXSPLINE_STATUS_ARGUMENT` if the change is not finite or below 1e-6 N m.
 enum FlexsplineStatus flexspline_torque_set_sensor(struct FlexsplineTorquePath *path,
                                                    float jump_n_m,
                                                    uint16_t frozen_ticks);
@@ -1180,8 +1200,9 @@ enum FlexsplineStatus flexspline_torque_set_sensor(struct FlexsplineTorquePath *
 // Nothing measured yet; what is older than `most_ticks` is not used.
 enum FlexsplineStatus flexspline_aged_init(struct FlexsplineAged *aged, uint16_t most_ticks);
 
-// One tick: what was measured in it, if anything (`has_measured` 1, else 0); the value to use, or NaN where it is too old, or was hit by an
-// upset. A tick takes NaN as torque: it keeps its correction for `patience` ticks, then fades it out.
+// One tick: what was measured in it, if anything (`has_measured` 1, else 0); the value to use, or NaN where it is too
+// old, or was hit by an upset. A tick takes NaN as torque: it keeps its correction for `patience` ticks, then fades it
+// out.
 enum FlexsplineStatus flexspline_aged_tick(struct FlexsplineAged *aged,
                                            uint8_t has_measured,
                                            float measured,
@@ -1191,9 +1212,10 @@ enum FlexsplineStatus flexspline_aged_tick(struct FlexsplineAged *aged,
 enum FlexsplineStatus flexspline_aged_is_stale(const struct FlexsplineAged *aged,
                                                uint8_t *is_stale);
 
-// Rate at which the generator has to turn so that the output moves at `rate_rad_s`, rad/s: the nominal one and what the error adds, along the way
-// of the target over `ahead_s` (some ticks, above 0). For the speed loop of a servo; it cannot feed a torque back. NaN where the table gives nothing. Two
-// inverse solutions: for a tick that has the time, or every few ticks.
+// Rate at which the generator has to turn so that the output moves at `rate_rad_s`, rad/s: the nominal one and what
+// the error adds, along the way of the target over `ahead_s` (some ticks, above 0). For the speed loop of a servo; it
+// cannot feed a torque back. NaN where the table gives nothing. Two inverse solutions: for a tick that has the time,
+// or every few ticks.
 enum FlexsplineStatus flexspline_rate_ahead(const struct FlexsplineJoint *joint,
                                             const struct FlexsplineStore *store,
                                             int64_t target_counts,
@@ -1202,9 +1224,10 @@ enum FlexsplineStatus flexspline_rate_ahead(const struct FlexsplineJoint *joint,
                                             float ahead_s,
                                             float *generator_rate_rad_s);
 
-// As `flexspline_rate_ahead`, with the acceleration that goes with it: what the error's curvature adds along the way of the target, and what a target
-// asks for that itself accelerates by `acceleration_rad_s2`. Inertia of motor and generator times it goes to the motor's current; the load's inertia times
-// `acceleration_rad_s2` over the ratio comes on top. Both are NaN where the table gives nothing. Three inverse solutions.
+// As `flexspline_rate_ahead`, with the acceleration that goes with it: what the error's curvature adds along the way
+// of the target, and what a target asks for that itself accelerates by `acceleration_rad_s2`. Inertia of motor and
+// generator times it goes to the motor's current; the load's inertia times `acceleration_rad_s2` over the ratio comes
+// on top. Both are NaN where the table gives nothing. Three inverse solutions.
 enum FlexsplineStatus flexspline_motion_ahead(const struct FlexsplineJoint *joint,
                                               const struct FlexsplineStore *store,
                                               int64_t target_counts,
@@ -1214,8 +1237,8 @@ enum FlexsplineStatus flexspline_motion_ahead(const struct FlexsplineJoint *join
                                               float ahead_s,
                                               struct FlexsplineMotionAhead *ahead);
 
-// Where the output will be at a generator angle, counts of 2^-32 turn, under a torque, N m: from where the state rests, which stays as it is. A path
-// with a reversal is that of ticks.
+// Where the output will be at a generator angle, counts of 2^-32 turn, under a torque, N m: from where the state
+// rests, which stays as it is. A path with a reversal is that of ticks.
 enum FlexsplineStatus flexspline_forward(const struct FlexsplineJoint *joint,
                                          const struct FlexsplineStore *store,
                                          const struct FlexsplineState *state,
@@ -1223,8 +1246,8 @@ enum FlexsplineStatus flexspline_forward(const struct FlexsplineJoint *joint,
                                          float torque_n_m,
                                          struct FlexsplinePrediction *prediction);
 
-// Generator angle that brings the output to a target, counts of 2^-32 turn, under a torque, N m: in steady motion forward (+1) or backward (-1), or
-// from where the state rests (0). No limiter and no mode: that is the tick's part.
+// Generator angle that brings the output to a target, counts of 2^-32 turn, under a torque, N m: in steady motion
+// forward (+1) or backward (-1), or from where the state rests (0). No limiter and no mode: that is the tick's part.
 enum FlexsplineStatus flexspline_inverse(const struct FlexsplineJoint *joint,
                                          const struct FlexsplineStore *store,
                                          const struct FlexsplineState *state,
@@ -1250,13 +1273,14 @@ enum FlexsplineStatus flexspline_ratio(const struct FlexsplineJoint *joint, floa
 enum FlexsplineStatus flexspline_state_play(const struct FlexsplineState *state,
                                             struct FlexsplinePlay *play);
 
-// Checks one image in full, without a store, and tells what it says of itself. The work grows with the image: for start-up, or the host.
+// Checks one image in full, without a store, and tells what it says of itself. The work grows with the image: for
+// start-up, or the host.
 enum FlexsplineStatus flexspline_image_report(const uint8_t *image,
                                               size_t image_bytes,
                                               struct FlexsplineImageReport *report);
 
-// Makes a learner of 1 to `FLEXSPLINE_LEARNER_COEFFICIENTS` coefficients that has learnt nothing yet and is off; `FLEXSPLINE_STATUS_ARGUMENT` if a
-// setting is out of its range. An update takes as long with one as with all.
+// Makes a learner of 1 to `FLEXSPLINE_LEARNER_COEFFICIENTS` coefficients that has learnt nothing yet and is off;
+// `FLEXSPLINE_STATUS_ARGUMENT` if a setting is out of its range. An update takes as long with one as with all.
 enum FlexsplineStatus flexspline_learner_init(struct FlexsplineLearner *learner,
                                               const struct FlexsplineLearnSettings *settings,
                                               const struct FlexsplineCoefficient *coefficients,
@@ -1265,22 +1289,25 @@ enum FlexsplineStatus flexspline_learner_init(struct FlexsplineLearner *learner,
 // Switches learning (`FLEXSPLINE_LEARNING_...`), from the next update on.
 enum FlexsplineStatus flexspline_learner_set(struct FlexsplineLearner *learner, uint8_t learning);
 
-// Says whose coefficients are learnt: of this joint with the table in use. Saved learners carry both, and are restored only where they belong.
-// `unit` tells joints with the same settings and the same table from each other, such as the wheels of a rover; 0 if there is one. After `flexspline_learner_init`
-// and the table, before `flexspline_learner_restore`; again after another table was activated: what was learnt for another owner is forgotten.
-// `FLEXSPLINE_STATUS_ARGUMENT` if no table is in use.
+// Says whose coefficients are learnt: of this joint with the table in use. Saved learners carry both, and are restored
+// only where they belong. `unit` tells joints with the same settings and the same table from each other, such as the
+// wheels of a rover; 0 if there is one. After `flexspline_learner_init` and the table, before
+// `flexspline_learner_restore`; again after another table was activated: what was learnt for another owner is
+// forgotten. `FLEXSPLINE_STATUS_ARGUMENT` if no table is in use.
 enum FlexsplineStatus flexspline_learner_bind(struct FlexsplineLearner *learner,
                                               const struct FlexsplineJoint *joint,
                                               const struct FlexsplineStore *store,
                                               uint32_t unit);
 
-// Forgets what was learnt; counters and `FLEXSPLINE_LEARNING_...` stay. The limiter of the joint takes the adjustment out.
+// Forgets what was learnt; counters and `FLEXSPLINE_LEARNING_...` stay. The limiter of the joint takes the adjustment
+// out.
 enum FlexsplineStatus flexspline_learner_reset(struct FlexsplineLearner *learner);
 
-// One tick, every tick and in order, after `flexspline_tick` with what it was given and gave: learns from the output angle measured at the same
-// moment (`has_measured` 1, `measured_counts` of 2^-32 turn) if there is one, and tells what to add in the next tick. Nothing that comes in can make
-// that exceed the limits. `input` is that of the tick with the learner's own adjustment alone: what springs or a model of yours added beside it counts
-// as known then, and is not learnt a second time.
+// One tick, every tick and in order, after `flexspline_tick` with what it was given and gave: learns from the output
+// angle measured at the same moment (`has_measured` 1, `measured_counts` of 2^-32 turn) if there is one, and tells
+// what to add in the next tick. Nothing that comes in can make that exceed the limits. `input` is that of the tick
+// with the learner's own adjustment alone: what springs or a model of yours added beside it counts as known then, and
+// is not learnt a second time.
 enum FlexsplineStatus flexspline_learner_update(struct FlexsplineLearner *learner,
                                                 const struct FlexsplineState *state,
                                                 const struct FlexsplineInput *input,
@@ -1298,58 +1325,64 @@ enum FlexsplineStatus flexspline_learner_coefficient(const struct FlexsplineLear
 enum FlexsplineStatus flexspline_learner_report(const struct FlexsplineLearner *learner,
                                                 struct FlexsplineLearnerReport *report);
 
-// Writes what was learnt, with a CRC-32, and how many bytes that took: `FLEXSPLINE_SAVED_LEARNER_BYTES` at most. `FLEXSPLINE_STATUS_TOO_LARGE` if there is
-// less room. The same bytes as in Rust.
+// Writes what was learnt, with a CRC-32, and how many bytes that took: `FLEXSPLINE_SAVED_LEARNER_BYTES` at most.
+// `FLEXSPLINE_STATUS_TOO_LARGE` if there is less room. The same bytes as in Rust.
 enum FlexsplineStatus flexspline_learner_save(const struct FlexsplineLearner *learner,
                                               uint8_t *saved,
                                               size_t saved_bytes,
                                               size_t *written);
 
-// Takes back what a learner of the same coefficients and the same owner (`flexspline_learner_bind`) saved, and is off. `FLEXSPLINE_STATUS_SAVED` if the bytes
-// are damaged, fewer, of another version, or were saved with other coefficients; `FLEXSPLINE_STATUS_OTHER_TABLE`, `FLEXSPLINE_STATUS_OTHER_JOINT` if they
-// belong elsewhere. Then the learner is as it was. It is made first, by `flexspline_learner_init`, and bound.
+// Takes back what a learner of the same coefficients and the same owner (`flexspline_learner_bind`) saved, and is off.
+// `FLEXSPLINE_STATUS_SAVED` if the bytes are damaged, fewer, of another version, or were saved with other
+// coefficients; `FLEXSPLINE_STATUS_OTHER_TABLE`, `FLEXSPLINE_STATUS_OTHER_JOINT` if they belong elsewhere. Then the
+// learner is as it was. It is made first, by `flexspline_learner_init`, and bound.
 enum FlexsplineStatus flexspline_learner_restore(struct FlexsplineLearner *learner,
                                                  const uint8_t *saved,
                                                  size_t saved_bytes);
 
-// Makes 1 to `FLEXSPLINE_SLIP_SPRINGS` springs that slip with `variable` (`FLEXSPLINE_SLIP_OF_...`), no deflection of which is known;
-// `FLEXSPLINE_STATUS_ARGUMENT` if a width is not allowed or a gain not finite.
+// Makes 1 to `FLEXSPLINE_SLIP_SPRINGS` springs that slip with `variable` (`FLEXSPLINE_SLIP_OF_...`), no deflection of
+// which is known; `FLEXSPLINE_STATUS_ARGUMENT` if a width is not allowed or a gain not finite.
 enum FlexsplineStatus flexspline_slip_init(struct FlexsplineSlip *slip,
                                            uint8_t variable,
                                            const struct FlexsplineSpring *springs,
                                            uint8_t number);
 
-// Sets all deflections anew: 0, not known, as after a reset; 1, none, as before the first motion or after strokes that died away.
+// Sets all deflections anew: 0, not known, as after a reset; 1, none, as before the first motion or after strokes that
+// died away.
 enum FlexsplineStatus flexspline_slip_set(struct FlexsplineSlip *slip,
                                           uint8_t is_relaxed);
 
-// One tick of springs that slip with the nominal output (`flexspline_nominal_output`), counts of 2^-32 turn: what they add in the next.
-// `FLEXSPLINE_STATUS_ARGUMENT` if they slip with the torque; `FLEXSPLINE_STATUS_NOT_INITIALISED` if an upset hit more than a word of the springs (one is mended).
-// Deflections of which more was hit are unknown again, as after a reset.
+// One tick of springs that slip with the nominal output (`flexspline_nominal_output`), counts of 2^-32 turn: what they
+// add in the next. `FLEXSPLINE_STATUS_ARGUMENT` if they slip with the torque; `FLEXSPLINE_STATUS_NOT_INITIALISED` if
+// an upset hit more than a word of the springs (one is mended). Deflections of which more was hit are unknown again,
+// as after a reset.
 enum FlexsplineStatus flexspline_slip_update(struct FlexsplineSlip *slip,
                                              int64_t nominal_counts,
                                              struct FlexsplineSlipReport *report);
 
-// One tick of springs that slip with the load torque, N m: what they add in the next. A torque that is not finite moves nothing.
-// `FLEXSPLINE_STATUS_ARGUMENT` if they slip with the output.
+// One tick of springs that slip with the load torque, N m: what they add in the next. A torque that is not finite
+// moves nothing. `FLEXSPLINE_STATUS_ARGUMENT` if they slip with the output.
 enum FlexsplineStatus flexspline_slip_update_torque(struct FlexsplineSlip *slip,
                                                     float torque_n_m,
                                                     struct FlexsplineSlipReport *report);
 
-// Writes the deflections with a CRC-32, and how many bytes that took: `FLEXSPLINE_SAVED_SLIP_BYTES` at most. `FLEXSPLINE_STATUS_TOO_LARGE` if there is less room,
-// or before the first update. They belong to no joint and no table: those of `flexspline_slip_save_for` do. The same bytes as in Rust.
+// Writes the deflections with a CRC-32, and how many bytes that took: `FLEXSPLINE_SAVED_SLIP_BYTES` at most.
+// `FLEXSPLINE_STATUS_TOO_LARGE` if there is less room, or before the first update. They belong to no joint and no
+// table: those of `flexspline_slip_save_for` do. The same bytes as in Rust.
 enum FlexsplineStatus flexspline_slip_save(const struct FlexsplineSlip *slip,
                                            uint8_t *saved,
                                            size_t saved_bytes,
                                            size_t *written);
 
-// Takes back the deflections that the same springs saved; only if the joint (of springs on the torque: the load) cannot have moved meanwhile.
-// `FLEXSPLINE_STATUS_SAVED` if the bytes are damaged, fewer, of other springs, or were saved for a joint (`flexspline_slip_restore_for`). The springs are made first, by `flexspline_slip_init`.
+// Takes back the deflections that the same springs saved; only if the joint (of springs on the torque: the load)
+// cannot have moved meanwhile. `FLEXSPLINE_STATUS_SAVED` if the bytes are damaged, fewer, of other springs, or were
+// saved for a joint (`flexspline_slip_restore_for`). The springs are made first, by `flexspline_slip_init`.
 enum FlexsplineStatus flexspline_slip_restore(struct FlexsplineSlip *slip,
                                               const uint8_t *saved,
                                               size_t saved_bytes);
 
-// Adds to the adjustment of an input, counts of 2^-32 turn at the output: what a learner, springs or a friction model of your own say. Each sum is held within
+// Adds to the adjustment of an input, counts of 2^-32 turn at the output: what a learner, springs or a friction model
+// of your own say. Each sum is held within
 // +-0.049 rad.
 enum FlexsplineStatus flexspline_input_add(struct FlexsplineInput *input,
                                            int32_t mean_counts,
@@ -1360,16 +1393,17 @@ enum FlexsplineStatus flexspline_input_add_rad(struct FlexsplineInput *input,
                                                float mean_rad,
                                                float half_width_rad);
 
-// Makes a recorder for a list of so many records (1 or more), which is the caller's and given with every call. It keeps every `divisor`-th tick, from
-// `offset` on; `full` (`FLEXSPLINE_FULL_...`) says what is lost where there is no room.
+// Makes a recorder for a list of so many records (1 or more), which is the caller's and given with every call. It
+// keeps every `divisor`-th tick, from `offset` on; `full` (`FLEXSPLINE_FULL_...`) says what is lost where there is no
+// room.
 enum FlexsplineStatus flexspline_recorder_init(struct FlexsplineRecorder *recorder,
                                                uint16_t places,
                                                uint32_t divisor,
                                                uint32_t offset,
                                                uint8_t full);
 
-// One tick, after `flexspline_tick`: kept if it is due, or whether due or not (`at_once` 1: something happened). Never waits. `records` are those that the
-// recorder was made for.
+// One tick, after `flexspline_tick`: kept if it is due, or whether due or not (`at_once` 1: something happened). Never
+// waits. `records` are those that the recorder was made for.
 enum FlexsplineStatus flexspline_recorder_see(struct FlexsplineRecorder *recorder,
                                               struct FlexsplineRecord *records,
                                               uint32_t tick,
@@ -1378,23 +1412,25 @@ enum FlexsplineStatus flexspline_recorder_see(struct FlexsplineRecorder *recorde
                                               const struct FlexsplineStore *store,
                                               const struct FlexsplineOutput *output);
 
-// Takes the oldest record out: `is_taken` is 1, or 0 if none waits, and `record` is as it was. With the interrupt of the tick held off.
+// Takes the oldest record out: `is_taken` is 1, or 0 if none waits, and `record` is as it was. With the interrupt of
+// the tick held off.
 enum FlexsplineStatus flexspline_recorder_take(struct FlexsplineRecorder *recorder,
                                                const struct FlexsplineRecord *records,
                                                struct FlexsplineRecord *record,
                                                uint8_t *is_taken);
 
-// Writes a record as `FLEXSPLINE_RECORD_BYTES` bytes with a CRC-32, for the ground: docs/telemetry.xtce.xml is their dictionary.
-// `FLEXSPLINE_STATUS_ARGUMENT` if its quality, mode or health is none.
+// Writes a record as `FLEXSPLINE_RECORD_BYTES` bytes with a CRC-32, for the ground: docs/telemetry.xtce.xml is their
+// dictionary. `FLEXSPLINE_STATUS_ARGUMENT` if its quality, mode or health is none.
 enum FlexsplineStatus flexspline_record_encode(const struct FlexsplineRecord *record,
                                                uint8_t (*bytes)[FLEXSPLINE_RECORD_BYTES]);
 
-// Reads such bytes (`FLEXSPLINE_RECORD_BYTES`), on the ground: `FLEXSPLINE_STATUS_SAVED` if they are damaged or no record,
-// `FLEXSPLINE_STATUS_ARGUMENT` if they are one of another version.
+// Reads such bytes (`FLEXSPLINE_RECORD_BYTES`), on the ground: `FLEXSPLINE_STATUS_SAVED` if they are damaged or no
+// record, `FLEXSPLINE_STATUS_ARGUMENT` if they are one of another version.
 enum FlexsplineStatus flexspline_record_decode(const uint8_t *first,
                                                struct FlexsplineRecord *record);
 
-// Begins to receive a table of so many bytes. The buffer is the caller's and is given with every call; it is no image in use.
+// Begins to receive a table of so many bytes. The buffer is the caller's and is given with every call; it is no image
+// in use.
 enum FlexsplineStatus flexspline_upload_begin(struct FlexsplineUpload *upload,
                                               size_t announced);
 
@@ -1422,8 +1458,8 @@ enum FlexsplineStatus flexspline_watch_see(struct FlexsplineWatch *watch,
                                            const struct FlexsplineOutput *output,
                                            struct FlexsplineEvents *events);
 
-// Writes a record of telemetry of a tick: `FLEXSPLINE_RECORD_BYTES` bytes with a CRC-32. `number` and `lost` are the caller's: of the
-// record, and of those that it could not keep.
+// Writes a record of telemetry of a tick: `FLEXSPLINE_RECORD_BYTES` bytes with a CRC-32. `number` and `lost` are the
+// caller's: of the record, and of those that it could not keep.
 enum FlexsplineStatus flexspline_record(uint32_t tick,
                                         uint16_t number,
                                         uint16_t lost,
@@ -1432,12 +1468,14 @@ enum FlexsplineStatus flexspline_record(uint32_t tick,
                                         const struct FlexsplineOutput *output,
                                         uint8_t (*record)[FLEXSPLINE_RECORD_BYTES]);
 
-// Makes a predictor of its numbers, which the host discretised; `FLEXSPLINE_STATUS_ARGUMENT` if its observer does not contract.
+// Makes a predictor of its numbers, which the host discretised; `FLEXSPLINE_STATUS_ARGUMENT` if its observer does not
+// contract.
 enum FlexsplineStatus flexspline_predictor_init(struct FlexsplinePredictor *predictor,
                                                 const float (*parts)[FLEXSPLINE_PREDICTOR_PARTS]);
 
-// Makes a predictor of two inertias: discretises them over a tick and finds the gains of the observer, in double precision. For the host, or for a start-up that has
-// the time (some 20000 products of small matrices). `FLEXSPLINE_STATUS_ARGUMENT` if a number is not finite and positive, or the observer does not contract.
+// Makes a predictor of two inertias: discretises them over a tick and finds the gains of the observer, in double
+// precision. For the host, or for a start-up that has the time (some 20000 products of small matrices).
+// `FLEXSPLINE_STATUS_ARGUMENT` if a number is not finite and positive, or the observer does not contract.
 enum FlexsplineStatus flexspline_predictor_of(struct FlexsplinePredictor *predictor,
                                               const struct FlexsplineInertias *inertias,
                                               const struct FlexsplineNoise *noise,
@@ -1447,8 +1485,9 @@ enum FlexsplineStatus flexspline_predictor_of(struct FlexsplinePredictor *predic
 enum FlexsplineStatus flexspline_predictor_parts(const struct FlexsplinePredictor *predictor,
                                                  float (*parts)[FLEXSPLINE_PREDICTOR_PARTS]);
 
-// Tells what the observer can be off by while the disturbances stay within their bounds: twist rad, speeds of motor and load rad/s, torque on the load N m; for
-// `FlexsplineNow`. For the host or start-up: 10000 ticks in double precision.
+// Tells what the observer can be off by while the disturbances stay within their bounds: twist rad, speeds of motor
+// and load rad/s, torque on the load N m; for `FlexsplineNow`. For the host or start-up: 10000 ticks in double
+// precision.
 enum FlexsplineStatus flexspline_predictor_state_bound(const struct FlexsplinePredictor *predictor,
                                                        const struct FlexsplineDisturbance *disturbance,
                                                        float (*bound)[4]);
@@ -1456,8 +1495,9 @@ enum FlexsplineStatus flexspline_predictor_state_bound(const struct FlexsplinePr
 // Makes an observer at rest, without load.
 enum FlexsplineStatus flexspline_observer_init(struct FlexsplineObserver *observer);
 
-// One tick of the observer. `FLEXSPLINE_STATUS_ARGUMENT` if a number that is used is not finite or beyond any drive, and the estimate stays;
-// `FLEXSPLINE_STATUS_NOT_INITIALISED` if an upset hit more than a word of observer or predictor (one is mended): make them anew. What is told then is NaN.
+// One tick of the observer. `FLEXSPLINE_STATUS_ARGUMENT` if a number that is used is not finite or beyond any drive,
+// and the estimate stays; `FLEXSPLINE_STATUS_NOT_INITIALISED` if an upset hit more than a word of observer or
+// predictor (one is mended): make them anew. What is told then is NaN.
 enum FlexsplineStatus flexspline_observer_step(struct FlexsplineObserver *observer,
                                                const struct FlexsplinePredictor *predictor,
                                                const struct FlexsplineMeasured *measured);
@@ -1466,8 +1506,8 @@ enum FlexsplineStatus flexspline_observer_step(struct FlexsplineObserver *observ
 enum FlexsplineStatus flexspline_observer_report(const struct FlexsplineObserver *observer,
                                                  struct FlexsplineObserverReport *report);
 
-// Tells where the output will be some ticks from now, with the table as the output map of the two inertias. The work grows with the
-// ticks; call it in a slow rate group. `FLEXSPLINE_STATUS_ARGUMENT` if a number of `now` is not finite.
+// Tells where the output will be some ticks from now, with the table as the output map of the two inertias. The work
+// grows with the ticks; call it in a slow rate group. `FLEXSPLINE_STATUS_ARGUMENT` if a number of `now` is not finite.
 enum FlexsplineStatus flexspline_predict(const struct FlexsplinePredictor *predictor,
                                          const struct FlexsplineObserver *observer,
                                          const struct FlexsplineJoint *joint,
@@ -1476,15 +1516,16 @@ enum FlexsplineStatus flexspline_predict(const struct FlexsplinePredictor *predi
                                          const struct FlexsplineNow *now,
                                          struct FlexsplineAhead *ahead);
 
-// Begins a test of the sensors that moves the generator from where it is and back, before the first tick. `FLEXSPLINE_STATUS_ARGUMENT` if a number is not finite, the
-// way too short to tell or too long, or the ticks too few.
+// Begins a test of the sensors that moves the generator from where it is and back, before the first tick.
+// `FLEXSPLINE_STATUS_ARGUMENT` if a number is not finite, the way too short to tell or too long, or the ticks too few.
 enum FlexsplineStatus flexspline_start_up_init(struct FlexsplineStartUp *start_up,
                                                const struct FlexsplineJoint *joint,
                                                int64_t generator_counts,
                                                const struct FlexsplineStartUpSettings *settings);
 
-// One tick of the test: what the sensors say, with the command of the tick before; what to command now, and with the last one what was found. Where something is
-// implausible do not let the joint correct: its numbers are not what they are taken for.
+// One tick of the test: what the sensors say, with the command of the tick before; what to command now, and with the
+// last one what was found. Where something is implausible do not let the joint correct: its numbers are not what they
+// are taken for.
 enum FlexsplineStatus flexspline_start_up_step(struct FlexsplineStartUp *start_up,
                                                const struct FlexsplineReadings *readings,
                                                struct FlexsplineStartUpStep *step);
@@ -1497,8 +1538,8 @@ enum FlexsplineStatus flexspline_slip_save_for(const struct FlexsplineSlip *slip
                                                size_t saved_bytes,
                                                size_t *written);
 
-// As `flexspline_slip_restore`, of bytes that the same springs saved for the same joint with the same table: `FLEXSPLINE_STATUS_OTHER_TABLE` or
-// `FLEXSPLINE_STATUS_OTHER_JOINT` (or other springs) if not.
+// As `flexspline_slip_restore`, of bytes that the same springs saved for the same joint with the same table:
+// `FLEXSPLINE_STATUS_OTHER_TABLE` or `FLEXSPLINE_STATUS_OTHER_JOINT` (or other springs) if not.
 enum FlexsplineStatus flexspline_slip_restore_for(struct FlexsplineSlip *slip,
                                                   const struct FlexsplineJoint *joint,
                                                   const struct FlexsplineStore *store,
