@@ -15,11 +15,11 @@ use flexspline_base::suggest::{likeliest, question};
 use flexspline_export::bundle::libraries::{Library, LibraryError, Places, TARGETS};
 use flexspline_export::bundle::{Bundle, MANIFEST, Manifest, Table, TableEntry, tar_gz};
 
-/// Tables, a reader in C99, the core as static libraries, vectors and build files, in one folder for firmware
+/// Pack tables, a C99 reader, the core as static libraries, test vectors and build files into one firmware folder
 ///
-/// Writes what CMake, Zephyr, PlatformIO, ESP-IDF and Arduino take as it is: c99/ (the reader), include/, tables/ (as
-/// .fxt and as C), lib/<target>/ (the core), vectors/ (what a port has to say) and manifest.json. Replaces a bundle
-/// that is there as it was written, and no other folder.
+/// CMake, Zephyr, PlatformIO, ESP-IDF and Arduino can use the folder as it is: c99/ (the reader), include/, tables/ (as
+/// .fxt and as C), lib/<target>/ (the core), vectors/ (expected outputs for a port) and manifest.json. An unmodified
+/// bundle is replaced; any other existing folder is left alone.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -30,17 +30,17 @@ pub(super) struct BundleCommand {
     /// Folder with table images, or one image
     #[arg(long, value_name = "DIR|FILE.fxt", value_hint = ValueHint::AnyPath)]
     tables: PathBuf,
-    /// Targets of the static library, several with commas, or repeated; default: all that can be had
+    /// Targets of the static library, separated by commas or repeated; default: all that are available
     #[arg(long = "target", value_name = "TARGET", value_delimiter = ',')]
     targets: Vec<String>,
-    /// No static libraries: the reader in C99 alone
+    /// No static libraries, only the reader in C99
     #[arg(long, conflicts_with_all = ["targets", "libraries"])]
     no_core: bool,
-    /// Folder with TARGET/libflexspline.a; default: that of the release, beside this program, or a build of the sources
-    /// here
+    /// Folder with TARGET/libflexspline.a; default: the one of the release next to this program, or a build of these
+    /// sources
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     libraries: Option<PathBuf>,
-    /// The same as one file beside the folder, DIR.tar.gz
+    /// Also write the folder as one file, DIR.tar.gz
     #[arg(long)]
     archive: bool,
 }

@@ -21,13 +21,13 @@ use flexspline_report::calibration_report;
 
 /// Make the table of one unit from its logs, whatever the cause of its error
 ///
-/// Takes what a nominal model or a table says from what was measured, and fits what remains by smooth parts: wind-up by
-/// torque, play by direction, curves over generator, tooth and output angle, temperature. A part is kept if it gains in
-/// files, sessions or blocks that were left out. Writes calibrated.fxt, .h and .rs, calibration.json and report.html.
+/// Subtracts the nominal model or table from the measurement and fits the residual with smooth parts: wind-up over
+/// torque, play by direction, curves over generator, tooth and output angle, temperature. A part is kept if it improves
+/// the prediction of files, sessions or blocks that were left out of the fit. Writes calibrated.fxt, .h and .rs,
+/// calibration.json and report.html.
 ///
-/// With --plan it says instead what to record, before there is a log: passes of the bench that tell most in the time
-/// there is, with the accuracy to expect. With --more it says what to add to the logs. Both write plan.csv and
-/// plan.json.
+/// --plan reports what to record before there is a log: the most informative passes of the bench in the time available,
+/// with the accuracy to expect. --more reports what to record in addition to the logs. Both write plan.csv and plan.json.
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("known").required(true).args(["tables", "model", "ratio"]))]
 #[command(after_help = "\
@@ -37,25 +37,25 @@ Examples:
   flexspline calibrate monday.csv tuesday.csv --model nominal.toml --out unit7
   flexspline calibrate measured.csv --tables out --generator cam")]
 pub(super) struct Calibrate {
-    /// Logs of one unit; several files are sessions, each with a zero of its own
+    /// Logs of one unit; several files are sessions, each with its own offset
     #[arg(value_name = "LOG", value_hint = ValueHint::FilePath, required_unless_present = "plan")]
     logs: Vec<PathBuf>,
-    /// Say what to record on a bench, instead of reading logs
+    /// Report what to record on a bench, instead of reading logs
     #[arg(long, conflicts_with = "logs")]
     plan: bool,
-    /// Say also what to record next, after these logs
+    /// Also report what to record next, after these logs
     #[arg(long, conflicts_with = "plan")]
     more: bool,
-    /// Folder of tables made by `flexspline tables`: the one of --generator is known before
+    /// Folder of tables made by `flexspline tables`; the one of --generator is the starting point
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     tables: Option<PathBuf>,
-    /// Nominal model from the catalogue that is known before
+    /// Nominal model from the catalogue as the starting point
     #[arg(long, value_name = "nominal.toml", value_hint = ValueHint::FilePath)]
     model: Option<PathBuf>,
-    /// Generator turns to one of the output, negative if they turn opposite ways, where nothing more is known
+    /// Generator turns per output turn, negative if they turn in opposite directions, if nothing else is known
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     ratio: Option<f64>,
-    /// Wave generator that the table is marked with: two-roller, four-roller, double-disc or cam
+    /// Wave generator recorded in the table: two-roller, four-roller, double-disc or cam
     #[arg(long, value_name = "G", default_value = "cam", value_parser = names::generator(), hide_possible_values = true)]
     generator: GeneratorKind,
     #[command(flatten)]
@@ -73,7 +73,7 @@ struct BenchOptions {
     /// Time on the bench for --plan or --more, minutes [default: 60, with --more 10]
     #[arg(long, value_name = "MIN")]
     minutes: Option<f64>,
-    /// Fastest generator for --plan or --more, rpm [default: 60]
+    /// Largest generator speed for --plan or --more, rpm [default: 60]
     #[arg(long, value_name = "RPM")]
     speed_rpm: Option<f64>,
     /// Least and largest load at the output for --plan or --more, N.m [default: none]
@@ -85,10 +85,10 @@ struct BenchOptions {
     /// Travel of the output for --plan or --more, deg [default: a turn, 0,360]
     #[arg(long, value_name = "FROM,TO", value_delimiter = ',', num_args = 1, allow_hyphen_values = true)]
     travel_deg: Vec<f64>,
-    /// Noise of output less generator over ratio from row to row that --plan expects, arcsec [default: 1]
+    /// White noise of the error (output minus generator over ratio) that --plan assumes, arcsec [default: 1]
     #[arg(long, value_name = "ARCSEC")]
     noise_arcsec: Option<f64>,
-    /// Wander of the sensors within a minute that --plan expects, arcsec [default: 0.5]
+    /// Drift of the sensors within a minute that --plan assumes, arcsec [default: 0.5]
     #[arg(long, value_name = "ARCSEC")]
     wander_arcsec: Option<f64>,
 }

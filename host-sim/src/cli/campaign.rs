@@ -20,13 +20,12 @@ use flexspline_design::campaign::{
 use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_report::campaign_report;
 
-/// Draw thousands of drives from tolerances, on any engine, and say what to tighten first
+/// Simulate thousands of drives drawn from tolerances and report which tolerance to tighten first
 ///
-/// `plan` reads what a drawing allows, computes the drive as drawn by contact FEM (influence kernels, and what each
-/// dimension does) and writes plan.json. `run` computes a shard of the drives: any program that calls a command with a
-/// number can run all of them, in any order, more than once; the same bits come out. `reduce` tells quantiles,
-/// probabilities, what each tolerance has part in, what halving it buys, what tables leave, and writes the worst drives
-/// as files.
+/// `plan` reads the tolerances, computes the drive as drawn by contact FEM (influence kernels and the effect of each
+/// dimension) and writes plan.json. `run` computes one shard of the drives. Shards can run anywhere, in any order and
+/// more than once: the results are the same to the bit. `reduce` reports quantiles, exceedance probabilities, variance
+/// shares, the benefit of halving each tolerance and the error that tables leave, and writes the worst drives as files.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -62,16 +61,16 @@ struct PlanCommand {
     /// Print a commented file of tolerances
     #[arg(long, conflicts_with = "tolerances")]
     example: bool,
-    /// Drives, up to 65536
+    /// Number of drives, up to 65536
     #[arg(long, value_name = "N", default_value_t = 10_000)]
     drives: u32,
-    /// Shards that they are computed in
+    /// Number of shards
     #[arg(long, value_name = "S", default_value_t = 20)]
     shards: u32,
-    /// Drives that are computed by FEM too, beside which the kernels are held: the first
+    /// Number of drives, from the first on, that are also computed by FEM to check the kernels
     #[arg(long, value_name = "M", default_value_t = 0)]
     fem: u32,
-    /// Places over a turn of the output where these are computed
+    /// Positions over an output turn at which the FEM computes them
     #[arg(long, value_name = "P", default_value_t = 23)]
     fem_places: u32,
     /// Mesh: coarse, standard or fine
@@ -89,7 +88,7 @@ struct RunCommand {
     /// Folder of the campaign
     #[arg(value_name = "DIR", value_hint = ValueHint::DirPath)]
     folder: PathBuf,
-    /// Number of the shard, from 0, or all
+    /// Number of the shard, from 0, or all of them
     #[arg(long, value_name = "I|all")]
     shard: Which,
 }
@@ -104,7 +103,7 @@ struct ReduceCommand {
     /// Folder of the campaign
     #[arg(value_name = "DIR", value_hint = ValueHint::DirPath)]
     folder: PathBuf,
-    /// Take the shards that are there
+    /// Accept a campaign with missing shards
     #[arg(long)]
     partial: bool,
 }

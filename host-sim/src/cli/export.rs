@@ -28,14 +28,15 @@ const LARGEST_STEP_RAD: f64 = 0.1;
 /// Export a mesh, outlines, a deck, or a table for other programs
 ///
 /// vtu: both wheels deformed and loaded at one generator angle, with displacement and von Mises stress, for ParaView;
-/// of a drive with a sleeve in three dimensions also the whole flexspline, <G>-3d.vtu.
+/// for a drive with a three-dimensional sleeve also the whole flexspline, <G>-3d.vtu.
 /// csv: the outlines of tooth, space and generator, undeformed, each in its own frame.
 /// inp: the undeformed mesh with contact, holding and load as a deck for CalculiX and Abaqus, which deforms, loads and
-/// turns the drive; mm, N, MPa, a slice of 1 mm. Of a drive with a sleeve in three dimensions (CUP-95): the flexspline
-/// alone, in solids, under w0. fmu: a table (--tables), or a joint with mass, for simulators that import FMI 2.0
-/// co-simulation: docs/how-to/fmu.md. eqmod, onstepx, linuxcnc, beckhoff, moteus, odrive, ros2, cfs, fprime: a table
-/// (--tables) resampled for the lookup of that device, that lookup simulated, and what it leaves, on the table's own
-/// model and on a unit's data (--data): docs/how-to/export_to_controllers.md.
+/// turns the drive; mm, N, MPa, a slice of 1 mm. For a drive with a three-dimensional sleeve (CUP-95): the flexspline
+/// alone, in solids, under w0.
+/// fmu: a table (--tables), or a joint with mass, for simulators that import FMI 2.0 co-simulation: docs/how-to/fmu.md.
+/// eqmod, onstepx, linuxcnc, beckhoff, moteus, odrive, ros2, cfs, fprime: a table (--tables) resampled for the lookup of
+/// that device. The lookup is simulated, and its residual reported on the table's own model and on the data of a unit
+/// (--data): docs/how-to/export_to_controllers.md.
 #[derive(Debug, Args)]
 #[command(
     mut_args(beside_tables),
@@ -59,8 +60,8 @@ pub(super) struct Export {
     /// What to write
     #[arg(long, value_enum)]
     format: Format,
-    /// Table image, for all formats but vtu, csv and inp; --torque-n-m and --temperature-c are then the section of it
-    /// that is taken [default: the middle of what it holds for]
+    /// Table image, for all formats but vtu, csv and inp; --torque-n-m and --temperature-c select the section of the
+    /// table [default: the middle of its range]
     #[arg(long, value_name = "FILE.fxt", value_hint = ValueHint::FilePath)]
     tables: Option<PathBuf>,
     #[command(flatten)]
@@ -76,7 +77,7 @@ pub(super) struct Export {
     /// Size of each increment, rad; negative turns the generator backward [default: 0.01]
     #[arg(long, value_name = "RAD", allow_negative_numbers = true, help_heading = "Deck")]
     step_rad: Option<f64>,
-    /// Load that a last step brings the output to, N.m: the wind-up between two loads [default: no such step]
+    /// Load of an additional last step, N.m, for the wind-up between two loads [default: no such step]
     #[arg(long, value_name = "T", allow_negative_numbers = true, help_heading = "Deck")]
     last_torque_n_m: Option<f64>,
 }

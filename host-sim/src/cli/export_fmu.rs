@@ -24,7 +24,7 @@ pub(super) struct FmuOptions {
     /// [default: antenna]
     #[arg(long, value_name = "SCENARIO", help_heading = "FMU", value_hint = ValueHint::FilePath)]
     scenario: Option<String>,
-    /// Library of flexspline-fmu to put in, repeatable for several platforms [default: those beside this program]
+    /// Library of flexspline-fmu to pack, repeatable for several platforms [default: those next to this program]
     #[arg(long, value_name = "FILE", help_heading = "FMU", value_hint = ValueHint::FilePath)]
     library: Vec<PathBuf>,
 }

@@ -89,27 +89,27 @@ enum Controller {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Playback")]
 pub(super) struct PlaybackOptions {
-    /// Measured rows of the unit, on which what is left is found too
+    /// Measured rows of the unit, on which the residual is computed too
     #[arg(long, value_name = "LOG.csv", value_hint = ValueHint::FilePath, requires = "tables")]
     data: Option<PathBuf>,
     #[command(flatten)]
     logs: LogOptions,
-    /// Write a file that leaves nearly all of the error, or a table larger than the default of cFS, or over a file of
-    /// another hand
+    /// Write even if the correction is useless, the table exceeds the default size of cFS, or an unrelated file would be
+    /// overwritten
     #[arg(long)]
     force: bool,
-    /// Directions of the output's motion: moteus and beckhoff hold one value for both [default: both]; eqmod and
+    /// Directions of motion of the output: moteus and beckhoff have one value for both [default: both]; eqmod and
     /// onstepx track in one [default: forward]
     #[arg(long, value_enum, value_name = "D", hide_possible_values = true)]
     direction: Option<Directions>,
-    /// Travel of the output where the lookup starts, degrees: linuxcnc, beckhoff [default: 0]
+    /// Output angle at which the lookup starts, degrees: linuxcnc, beckhoff [default: 0]
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     from_deg: Option<f64>,
-    /// Where it ends, degrees, at most a turn on: linuxcnc, beckhoff [default: a turn on]
+    /// Output angle at which it ends, degrees, at most a turn later: linuxcnc, beckhoff [default: a turn later]
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     to_deg: Option<f64>,
-    /// Points of the lookup: linuxcnc [default: 256], beckhoff [default: 32 to a generator turn, on a CNC at most 1499
-    /// in all]
+    /// Number of points of the lookup: linuxcnc [default: 256], beckhoff [default: 32 per generator turn, on a CNC at
+    /// most 1499 in all]
     #[arg(long, value_name = "N")]
     points: Option<u32>,
     /// COMP_FILE_TYPE of linuxcnc: 0 actual positions, 1 trims [default: 1]
@@ -118,16 +118,16 @@ pub(super) struct PlaybackOptions {
     /// Which of Beckhoff's controllers: nc or cnc [default: nc]
     #[arg(long, value_enum, value_name = "C", hide_possible_values = true)]
     controller: Option<Controller>,
-    /// Motor steps of a degree of the output: onstepx, AXIS1_STEPS_PER_DEGREE [default: 12800]
+    /// Motor steps per degree of the output: onstepx, AXIS1_STEPS_PER_DEGREE [default: 12800]
     #[arg(long, value_name = "STEPS")]
     steps_per_degree: Option<f64>,
     /// Buffer of onstepx, s: PEC_BUFFER_SIZE_LIMIT [default: 720]
     #[arg(long, value_name = "S")]
     buffer_s: Option<u32>,
-    /// Motor steps of an output turn: eqmod [default: 9024000]
+    /// Motor steps per output turn: eqmod [default: 9024000]
     #[arg(long, value_name = "STEPS")]
     steps_per_turn: Option<f64>,
-    /// Rate of a divider of 1: eqmod, arcsec/s [default: 9325.46154]
+    /// Rate at a divider of 1: eqmod, arcsec/s [default: 9325.46154]
     #[arg(long, value_name = "RATE")]
     track_factor: Option<f64>,
     /// Step counter of the mount where the generator stands at its zero: eqmod [default: 0]
@@ -136,7 +136,7 @@ pub(super) struct PlaybackOptions {
     /// Encoder source of moteus on the generator: 0 to 2 [default: 0]
     #[arg(long, value_name = "N")]
     source: Option<u8>,
-    /// Counts of that encoder in a turn: moteus [default: 16384]
+    /// Counts of that encoder per turn: moteus [default: 16384]
     #[arg(long, value_name = "COUNTS")]
     cpr: Option<u32>,
     /// Full name of the table: cfs [default: FLEXSPLINE.TABLE]

@@ -15,13 +15,13 @@ use flexspline_mechanics::drive::Wheel;
 use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_mechanics::stepping::{Method, SolverSettings};
 
-/// Compute influence kernels: what a deviation of a tooth, of the generator or of an axis does to the output
+/// Compute influence kernels: the response of the output to a deviation of a tooth, of the generator or of an axis
 ///
-/// From contact FEM of the drive without deviations, for each generator: the response to a micrometre on any flexspline
-/// tooth, any circular-spline space, any place of the generator, under loads up to the rated one (from the change of
-/// the contact forces with the load), and to a circular spline that stands beside the axis (from FEM of such drives).
-/// Written is <G>.kernels.json, which `diagnose --tables` takes for the signatures of geometric causes where it stands
-/// beside the table.
+/// For each generator the contact FEM of the ideal drive gives the response to one micrometre on any flexspline tooth,
+/// any circular-spline space and any point of the generator, for loads up to the rated one (from the change of the
+/// contact forces with the load). The response to an eccentric circular spline comes from FEM of such drives. Writes
+/// <G>.kernels.json. `diagnose --tables` uses it for the signatures of geometric causes if it lies in the folder of the
+/// table.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:

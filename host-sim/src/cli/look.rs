@@ -9,10 +9,10 @@ use super::{Failure, say};
 use flexspline_identify::look::{Looked, look, text};
 use flexspline_identify::measurement::raw;
 
-/// Look at log files of a bench: columns, units, ratio, torque, time, coverage; proposes the mapping to read them with
+/// Inspect log files of a bench: columns, units, ratio, torque, time, coverage; propose the mapping to read them with
 ///
-/// Reads text files with a row for each instant, separated by commas, semicolons, tabs, bars or blanks, decimals behind
-/// a point or a comma, with or without names; several files are sessions of one bench. Nothing is written.
+/// Reads text files with one row per instant, separated by commas, semicolons, tabs, bars or blanks, with decimal point
+/// or comma, with or without column names. Several files are sessions of one bench. Nothing is written.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:

@@ -75,8 +75,8 @@ impl From<OutputError> for Failure {
     }
 }
 
-/// Computes the errors of strain wave (harmonic) drives by contact FEM, makes tables that correct them, and finds what
-/// a measured drive does otherwise
+/// Simulates strain wave (harmonic) drives by contact FEM, makes tables that correct their errors, and finds the causes
+/// of error in measured drives
 #[derive(Debug, Parser)]
 #[command(name = "flexspline", version, propagate_version = true, max_term_width = 100)]
 #[command(after_help = "\
@@ -91,44 +91,44 @@ struct Cli {
     command: Command,
 }
 
-/// What one wants to do, and the commands for it.
+/// Commands by what they are used for.
 const GROUPS: [(&str, &[(&str, &str)]); 4] = [
     (
         "Simulate",
         &[
             ("simulate", "run the drive along a path: kinematic error, backlash, wind-up, stress"),
             ("sleeve", "the sleeve or cup in three dimensions: stiffness by harmonic, tilt, torsion"),
-            ("study", "vary fields of a drive: what a catalogue would print of each variant"),
-            ("campaign", "tolerances: thousands of drives on any engine, and what to tighten first"),
+            ("study", "vary fields of a drive: the catalogue figures of each variant"),
+            ("campaign", "tolerances: thousands of random drives, and what to tighten first"),
             ("fly", "a joint with mass in closed loop, with and without compensation"),
             ("export", "the mesh, the outlines, a CalculiX deck or an FMU, for other programs"),
-            ("reproduce", "the paper's protocol for all four generators, beside its figures"),
+            ("reproduce", "the paper's protocol for all four generators, compared with its results"),
         ],
     ),
     (
         "Make tables",
         &[
             ("tables", "compensation tables for firmware, from FEM or from samples"),
-            ("validate", "are they right? against fresh FEM at other points"),
-            ("bundle", "tables, a reader in C99 and the core, for your firmware's build"),
-            ("kernels", "what a deviation of any tooth does to the output, for diagnose"),
+            ("validate", "compare tables with new FEM runs at other points"),
+            ("bundle", "tables, a C99 reader and the core, for your firmware's build"),
+            ("kernels", "response of the output to a deviation of any tooth, for diagnose"),
         ],
     ),
     (
         "Measured data",
         &[
-            ("look", "what is in log files, and how to read them"),
-            ("diagnose", "what measured data say that the simulation does not, and why"),
-            ("calibrate", "logs of one unit to its table, whatever the cause of its error"),
-            ("replay", "what a table leaves of a measured error"),
-            ("synthesize", "measured-looking data with effects of your choice, to try diagnose on"),
+            ("look", "inspect log files and propose how to read them"),
+            ("diagnose", "find what the simulation gets wrong in measured data, and the cause"),
+            ("calibrate", "make the table of one unit from its logs, whatever the cause of its error"),
+            ("replay", "the residual of a measured error after a table"),
+            ("synthesize", "synthetic measurements with effects of your choice, to try diagnose on"),
         ],
     ),
     (
         "Files and set-up",
         &[
             ("new", "a commented drive file, or a catalogue model, to edit"),
-            ("drive", "print a drive, or check that its teeth clear one another"),
+            ("drive", "print a drive, or check its teeth for interference"),
             ("completions", "let the shell complete commands, options and names"),
             ("man", "manual pages"),
             ("help", "this page, or that of a command"),
@@ -140,7 +140,7 @@ const GROUPS: [(&str, &[(&str, &str)]); 4] = [
 const USUAL_PATH: [(&str, &str); 3] = [
     ("flexspline new drive.toml", "your drive, to edit; without it HHD-95"),
     ("flexspline tables --drive drive.toml", "FEM, about a minute: tables and report.html in out/"),
-    ("flexspline validate --tables out --drive drive.toml", "are they right?"),
+    ("flexspline validate --tables out --drive drive.toml", "compare them with new FEM runs"),
 ];
 
 /// The drive where none is named.
@@ -216,10 +216,10 @@ struct Common {
     /// Threads to use; default: one for each core
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Common options")]
     threads: Option<u16>,
-    /// No progress and no summary
+    /// Print no progress and no summary
     #[arg(short, long, global = true, conflicts_with = "verbose", help_heading = "Common options")]
     quiet: bool,
-    /// Say more: a line for every increment
+    /// Print more: a line for every increment
     #[arg(short, long, global = true, help_heading = "Common options")]
     verbose: bool,
 }

@@ -15,14 +15,14 @@ use flexspline_identify::nominal::Nominal;
 use flexspline_identify::replay::{MeasuredRow, ReplaySummary, RowsOf, parse, replay};
 use flexspline_mechanics::drive::GeneratorKind;
 
-/// Run the core over measured rows, open loop, and show what it leaves
+/// Run the core over measured rows, open loop, and show the residual
 ///
 /// Reads a table image and a CSV with generator_rad and output_rad (or error_arcsec), optionally torque_n_m and
-/// temperature_c, or a log with columns of its own (--columns); writes replay.csv, one row for each with the
-/// prediction, the residual and its quality, and summary.json.
+/// temperature_c, or a log with other columns (--columns). Writes replay.csv, with prediction, residual and quality of
+/// each row, and summary.json.
 ///
-/// Rows of `simulate` (results.csv, with its summary.json beside it) have to be of the drive and the generator of the
-/// table. Of other rows nobody knows, which is said.
+/// Rows of `simulate` (results.csv with summary.json in the same folder) must belong to the drive and generator of the
+/// table. For other rows this cannot be checked, and a note says so.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -36,7 +36,7 @@ pub(super) struct Replay {
     /// temperature_c
     #[arg(value_name = "DATA.csv", value_hint = ValueHint::FilePath)]
     data: PathBuf,
-    /// Take rows of a run of another drive or generator than the table's: of one as built, for instance
+    /// Accept simulated rows of another drive or generator than the table's, for instance of a drive as built
     #[arg(long)]
     other_drive: bool,
     #[command(flatten)]

@@ -15,12 +15,12 @@ use flexspline_pacana_2023::claim::Verdict;
 use flexspline_pacana_2023::page::{Sources, page};
 use flexspline_pacana_2023::{ReproduceSettings, Reproduction, reproduce};
 
-/// Run the protocol of the paper with all four generators, beside the paper's results
+/// Run the protocol of the paper with all four generators and compare with the paper's results
 ///
-/// Deform, +1 rad, -2 rad in increments of 0.01 rad, without load and, with double disc and cam, under +-200 N.m, as
-/// Pacana et al. (Appl. Sci. 13, 2023) did. Each of the paper's results stands beside ours with a verdict that follows
-/// from the numbers; the runs are repeated with other meshes, increments and penalties, and with changes of the model
-/// that might give the paper's errors of 10 to 21 arc-minutes. Writes reproduce.json and report.html.
+/// Deform, then turn +1 rad and -2 rad in increments of 0.01 rad, without load and, for double disc and cam, under
+/// +-200 N.m, as Pacana et al. (Appl. Sci. 13, 2023) did. Each result of the paper is compared with ours and gets a
+/// verdict from the numbers. The runs are repeated with other meshes, increments and penalties, and with changes of the
+/// model that might explain the paper's errors of 10 to 21 arc-minutes. Writes reproduce.json and report.html.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -32,8 +32,8 @@ A claim that is not reproduced is a result, not a failure, and so is a changed m
 equilibrium. Exit code 1: a run of the drive as it is found none, or the page is not sound;
 2: bad input.")]
 pub(super) struct Reproduce {
-    /// Coarse mesh, one other discretisation and few changes of the model: about a minute on two cores instead of some
-    /// minutes
+    /// Coarse mesh, one other discretisation and few changes of the model: about a minute on two cores instead of
+    /// several
     #[arg(long, conflicts_with = "mesh")]
     quick: bool,
     /// Mesh of the standard runs: coarse, standard or fine [default: standard]

@@ -21,11 +21,11 @@ use flexspline_identify::synthesize::{
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
 
-/// Make data that look measured: the drive of the simulation, with effects, noise and sensors of your choice
+/// Make synthetic measurements: a simulated drive with effects, noise and sensors of your choice
 ///
-/// Writes data.csv, which `flexspline diagnose` reads, and truth.json, which says what is in it. The drive is a table
-/// made by FEM (--tables; without one it is made on the coarse mesh first) or a catalogue's model (--model), and a unit
-/// drawn from the spread between units. --list shows every effect with its parameters.
+/// Writes data.csv, which `flexspline diagnose` reads, and truth.json, which holds the effects and their values. The
+/// drive is a table made by FEM (--tables; without one it is made on the coarse mesh first) or a model from a catalogue
+/// (--model). Its unit is drawn from the spread between units. --list shows every effect with its parameters.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -37,7 +37,7 @@ Examples:
 
 Without --effect the data are those of a drive within its spread, in which nothing is to be found.")]
 pub(super) struct Synthesize {
-    /// An effect, with parameters if wanted; may be repeated
+    /// An effect, optionally with parameters: NAME:parameter=value,...; may be repeated
     #[arg(long = "effect", value_name = "NAME[:param=value,...]", allow_hyphen_values = true)]
     effects: Vec<String>,
     /// List the effects with their parameters, units, ranges and defaults
@@ -52,25 +52,25 @@ pub(super) struct Synthesize {
     /// Nominal model from the catalogue, or one that `flexspline diagnose` has extended
     #[arg(long, value_name = "nominal.toml", value_hint = ValueHint::FilePath)]
     model: Option<PathBuf>,
-    /// The drawing itself, not a unit drawn from the spread between units
+    /// The drive as drawn, not a unit drawn at random from the spread between units
     #[arg(long)]
     no_spread: bool,
     /// White noise of the output angle, arcsec
     #[arg(long, value_name = "ARCSEC", default_value_t = 2.0, allow_negative_numbers = true, help_heading = "Sensors")]
     noise_arcsec: f64,
-    /// Slow wander of the output angle, arcsec rms
+    /// Slow drift of the output angle, arcsec rms
     #[arg(long, value_name = "ARCSEC", default_value_t = 0.8, allow_negative_numbers = true, help_heading = "Sensors")]
     wander_arcsec: f64,
-    /// Time scale of the wander, s
+    /// Time scale of the drift, s
     #[arg(long, value_name = "S", default_value_t = 12.0, allow_negative_numbers = true, help_heading = "Sensors")]
     wander_s: f64,
-    /// Resolution of the output encoder, bits to a turn
+    /// Resolution of the output encoder, bits per turn
     #[arg(long, value_name = "N", default_value_t = 22, value_parser = clap::value_parser!(u32).range(10..=40), help_heading = "Sensors")]
     encoder_bits: u32,
-    /// Sessions
+    /// Number of sessions
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u16).range(1..=100), help_heading = "Excitation")]
     sessions: u16,
-    /// Rows of each session
+    /// Rows per session
     #[arg(long, value_name = "N", default_value_t = 3000, value_parser = clap::value_parser!(u32).range(50..=1_000_000), help_heading = "Excitation")]
     rows: u32,
     /// Rows per second
@@ -109,7 +109,7 @@ pub(super) struct Synthesize {
         help_heading = "Excitation"
     )]
     temperature_c: String,
-    /// Take motion, load, temperature and time from this file instead
+    /// Take motion, load, temperature and time from this file
     #[arg(long, value_name = "DATA.csv", value_hint = ValueHint::FilePath, help_heading = "Excitation")]
     like: Option<PathBuf>,
     /// Names and units of the columns of that file, as for `flexspline diagnose` [default: the usual names]
@@ -122,7 +122,7 @@ pub(super) struct Synthesize {
         help_heading = "Excitation"
     )]
     columns: String,
-    /// Seed of everything drawn [default: drawn, and said]
+    /// Seed of all random draws [default: a random one, printed]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
 }

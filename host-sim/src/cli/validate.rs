@@ -23,45 +23,44 @@ use flexspline_mechanics::stepping::{Method, SolverSettings};
 use flexspline_report::page::Page;
 use flexspline_report::{Sources, Subject, drive_report};
 
-/// Compare tables with fresh FEM at points that made none of them
+/// Compare tables with new FEM runs at points that were not used to make them
 ///
-/// Torques, temperatures, directions and positions are drawn between the nodes of each table; the drive is settled
-/// there and the table read by the code that firmware links. One run is reversed through the backlash. Ends with exit
-/// code 1 if a table misses the FEM by more than 0.5 arcsec rms or 2 arcsec at any point; the table of a drive with
-/// imperfections is looked at over whole turns, and may miss it by half as much again as it states of itself beyond
-/// that.
+/// Torques, temperatures, directions and positions are drawn between the nodes of each table. The FEM settles the drive
+/// there, and the table is read by the code that firmware links. One run is reversed through the backlash. Exit code 1
+/// if a table differs from the FEM by more than 0.5 arcsec rms or 2 arcsec at any point. The table of a drive with
+/// imperfections is checked over whole turns, and may differ in addition by 1.5 times its own stated error.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   flexspline validate --tables out
   flexspline validate --tables out --generator cam --torques 24 --seed 7")]
 pub(super) struct Validate {
-    /// Folder with <G>.fxt files, as `tables` writes them
+    /// Folder with <G>.fxt files written by `tables`
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     tables: PathBuf,
-    /// Wave generator: two-roller, four-roller, double-disc, cam, or all that are in the folder
+    /// Wave generator: two-roller, four-roller, double-disc, cam, or all in the folder
     #[arg(short, long, value_name = "G", default_value = "all", value_parser = names::generators(), hide_possible_values = true)]
     generator: Generators,
-    /// Torques drawn for each table, 2 to 1000
+    /// Number of torques per table, 2 to 1000
     #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u16).range(2..=1000))]
     torques: u16,
-    /// Positions at each torque, 1 to 100
+    /// Number of positions per torque, 1 to 100
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=100))]
     positions: u16,
-    /// Temperatures drawn for each table, 1 to 100
+    /// Number of temperatures per table, 1 to 100
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..=100))]
     temperatures: u16,
-    /// Seed of the draw
+    /// Random seed of these points
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Mesh of the fresh FEM: coarse, standard or fine
+    /// Mesh of the new FEM runs: coarse, standard or fine
     #[arg(long, value_name = "LEVEL", default_value = "standard", value_parser = names::mesh(), hide_possible_values = true)]
     mesh: MeshLevel,
-    /// Solver of the fresh FEM: reference or fast
+    /// Solver of the new FEM runs: reference or fast
     #[arg(long, value_name = "SOLVER", default_value = "reference", value_parser = names::solver(), hide_possible_values = true)]
     solver: Method,
-    /// Do not write report.html (validation.html beside the page of the tables), which takes a FEM run over one more
-    /// tooth pitch for each generator
+    /// Do not write report.html (validation.html if the page of the tables is in the same folder), which takes a FEM run
+    /// over one more tooth pitch for each generator
     #[arg(long)]
     no_report: bool,
 }
