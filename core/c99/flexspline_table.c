@@ -1788,6 +1788,12 @@ static judged judge(fxt_joint *now, const fxt_input *input)
     return is;
 }
 
+/* A part of a goal, of 0 to 1. */
+static int32_t part_of(int32_t goal, float part)
+{
+    return to_i32((float)goal * part);
+}
+
 /* The correction wanted in this tick, fine counts: by mode, in a tick that came late, and while none can be made. */
 static int32_t goal_of(fxt_joint *now, bool late, int32_t wanted_counts, bool sane)
 {
@@ -1803,8 +1809,7 @@ static int32_t goal_of(fxt_joint *now, bool late, int32_t wanted_counts, bool sa
     const uint32_t start = now->fade * 2u, left = now->fading > 0u ? now->fading - 1u : 0u;
     now->fading = late ? start : left;
     const uint32_t above = now->fading > now->fade ? now->fading - now->fade : 0u;
-    const float part = (float)above * now->fade_step;
-    return now->fading > 0u ? to_i32((float)now->goal * part) : now->goal;
+    return now->fading > 0u ? part_of(now->goal, (float)above * now->fade_step) : now->goal;
 }
 
 /* What braking in so many whole ticks takes. */

@@ -192,7 +192,8 @@ static fxt_joint any_joint(int32_t size)
     joint.generator = nondet_long();
     joint.hold_late = nondet_bool() ? 1u : 0u;
     joint.sampled = nondet_bool() ? 1u : 0u;
-    __ESBMC_assume(joint.rate >= 1 && joint.rate <= MOST_FINE_RATE && joint.acceleration >= 1 && joint.acceleration <= 2 * joint.rate);
+    __ESBMC_assume(joint.rate >= 1 && joint.rate <= MOST_FINE_RATE && joint.acceleration >= 1 && joint.acceleration <= MOST_CHANGE &&
+                   joint.acceleration <= 2 * joint.rate + 1);
     __ESBMC_assume(joint.correction >= -size && joint.correction <= size && joint.speed >= -joint.rate && joint.speed <= joint.rate);
     __ESBMC_assume(joint.largest_move >= 1 && joint.mode <= FXT_SAFE && joint.patience < UINT16_MAX);
     return joint;
@@ -206,18 +207,31 @@ static int32_t any_size(void)
 }
 
 /* fxt_tick moves its correction by this alone, wherever it wants to have it: so these are the limits of a tick. */
-void correction_is_within_size_rate_and_acceleration(void)
+void correction_is_within_the_limit_of_the_table(void)
 {
     const int32_t size = any_size();
     fxt_joint joint = any_joint(size);
-    const fxt_joint before = joint;
     const int32_t found = moved_by(&joint, nondet_int(), size);
     PROMISE(found == joint.correction && found >= -size && found <= size);
-    PROMISE(joint.speed == found - before.correction && joint.speed >= -before.rate && joint.speed <= before.rate);
-    const int32_t change = joint.speed - before.speed;
+    END;
+}
+
+void correction_moves_within_the_rate(void)
+{
+    const int32_t size = any_size();
+    fxt_joint joint = any_joint(size);
+    const int32_t before = joint.correction, found = moved_by(&joint, nondet_int(), size);
+    PROMISE(joint.speed == found - before && joint.speed >= -joint.rate && joint.speed <= joint.rate);
+    END;
+}
+
+void correction_moves_within_the_acceleration(void)
+{
+    const int32_t size = any_size();
+    fxt_joint joint = any_joint(size);
+    const int32_t before = joint.speed, found = moved_by(&joint, nondet_int(), size), change = joint.speed - before;
     /* At the limit of the table it stops whatever its speed was. */
-    PROMISE((change >= -before.acceleration && change <= before.acceleration) || found == size || found == -size);
-    PROMISE(found / FINE >= -size / FINE && found / FINE <= size / FINE);
+    PROMISE((change >= -joint.acceleration && change <= joint.acceleration) || found == size || found == -size);
     END;
 }
 
@@ -235,7 +249,7 @@ void limits_that_are_accepted_keep_a_joint_in_its_ranges(void)
     fxt_joint joint;
     if (fxt_joint_init(&joint, &limits) == FXT_LIMITS_OK) {
         PROMISE(joint.rate >= 1 && joint.rate <= MOST_FINE_RATE && joint.acceleration >= 1);
-        PROMISE((int64_t)joint.acceleration <= 2 * (int64_t)joint.rate && joint.acceleration <= MOST_CHANGE);
+        PROMISE(joint.acceleration <= 2 * joint.rate + 1 && joint.acceleration <= MOST_CHANGE);
         PROMISE(joint.largest_move >= 1 && joint.hold >= 0 && joint.patience < UINT16_MAX);
         PROMISE(joint.mode == FXT_OFF && joint.correction == 0 && joint.speed == 0 && is_made(&joint));
         END;
@@ -278,19 +292,15 @@ void goal_follows_the_mode(void)
     END;
 }
 
-void a_fade_takes_away_and_adds_nothing(void)
+/* That the part of a fade is one of 0 to 1: limiter.c, for each length of a fade. */
+void a_part_of_a_goal_is_no_larger(void)
 {
-    const int32_t size = any_size();
-    fxt_joint joint = any_joint(size);
-    __ESBMC_assume(joint.goal >= -size && joint.goal <= size && joint.fade >= 1u && joint.fading <= 2u * joint.fade);
-    joint.fade_step = 1.0f / (float)joint.fade;
-    joint.mode = FXT_HOLD;
-    const int32_t goal = joint.goal, faded = goal_of(&joint, nondet_bool(), 0, true);
-    const int32_t most = goal < 0 ? -goal : goal, is = faded < 0 ? -faded : faded;
+    const int32_t goal = nondet_int();
+    const float part = nondet_float();
+    __ESBMC_assume(goal >= -MOST_LIMIT * FINE && goal <= MOST_LIMIT * FINE && part >= 0.0f && part <= 1.0f);
+    const int32_t found = part_of(goal, part), most = goal < 0 ? -goal : goal, is = found < 0 ? -found : found;
     /* Sixteen: a goal has 29 bits, a float 24. */
-    PROMISE(is <= most + 16 && (faded == 0 || (faded < 0) == (goal < 0)));
-    PROMISE(joint.fading == 0u || joint.fading > joint.fade || faded == 0);
-    PROMISE(joint.fading <= 2u * joint.fade);
+    PROMISE(is <= most + 16 && (found == 0 || (found < 0) == (goal < 0)));
     END;
 }
 
@@ -312,25 +322,29 @@ void a_sample_moves_no_further_than_a_tick_allows_or_is_doubted(void)
 static fxt_encoder any_encoder(void)
 {
     fxt_encoder encoder;
-    if (!fxt_encoder_init(&encoder, nondet_uint(), (uint8_t)nondet_uint(), nondet_bool(), nondet_long())) {
-        __ESBMC_assume(0);
-    }
+    __ESBMC_assume(fxt_encoder_init(&encoder, nondet_uint(), (uint8_t)nondet_uint(), nondet_bool(), nondet_long()));
     return encoder;
 }
 
-void an_encoder_takes_the_shorter_way(void)
+void the_shorter_way_within_a_turn(void)
+{
+    const fxt_encoder encoder = any_encoder();
+    const int64_t from = nondet_long(), to = nondet_long(), turn = encoder.counts_per_turn;
+    __ESBMC_assume(encoder.wrap_bits == 0u && from >= 0 && to >= 0 && can_read(&encoder, (uint64_t)from) && can_read(&encoder, (uint64_t)to));
+    const int64_t way = encoder_way(&encoder, (uint64_t)from, (uint64_t)to);
+    PROMISE(2 * way < turn && 2 * way >= -turn && from + way >= -turn && from + way < 2 * turn);
+    PROMISE(from + way == to || from + way == to + turn || from + way == to - turn);
+    END;
+}
+
+void the_shorter_way_of_a_register(void)
 {
     const fxt_encoder encoder = any_encoder();
     const uint64_t from = (uint64_t)nondet_long(), to = (uint64_t)nondet_long();
-    __ESBMC_assume(can_read(&encoder, from) && can_read(&encoder, to));
+    __ESBMC_assume(encoder.wrap_bits > 0u && can_read(&encoder, from) && can_read(&encoder, to));
     const int64_t way = encoder_way(&encoder, from, to);
-    if (encoder.wrap_bits == 0u) {
-        const int64_t turn = encoder.counts_per_turn, there = (int64_t)from + way;
-        PROMISE(2 * way < turn && 2 * way >= -turn);
-        PROMISE(there == (int64_t)to || there == (int64_t)to + turn || there == (int64_t)to - turn);
-    } else {
-        PROMISE(((from + (uint64_t)way) & most_of_bits(encoder.wrap_bits)) == to);
-        PROMISE(encoder.wrap_bits == 64u || (way < (INT64_C(1) << (encoder.wrap_bits - 1u)) && way >= -(INT64_C(1) << (encoder.wrap_bits - 1u))));
-    }
+    const uint64_t all = most_of_bits(encoder.wrap_bits);
+    const int64_t half = (int64_t)(all / 2u);
+    PROMISE(((from + (uint64_t)way) & all) == to && way <= half && way >= -half - 1);
     END;
 }
