@@ -1826,7 +1826,8 @@ static int32_t stoppable(int32_t acceleration, int32_t lag)
     const float root = root_of(1.0f + 8.0f * ((float)away / (float)braking));
     const uint32_t up = to_count(0.5f * (root * (1.0f + 1e-6f) - 1.0f));
     const uint32_t ticks = way_of(braking, up) > away ? up - 1u : up;
-    const uint32_t speed = (away + way_of(braking, ticks)) / (1u + ticks);
+    /* Below 2^17, the root of twice the integers. */
+    const uint32_t speed = (away + way_of(braking, ticks)) / (1u + (ticks & 0x1ffffu));
     return i32(lag < 0 ? 0u - speed : speed);
 }
 
@@ -1835,7 +1836,7 @@ static int32_t moved_by(fxt_joint *now, int32_t wanted, int32_t size)
 {
     const int32_t before = now->correction;
     const int32_t slower = sub(now->speed, now->acceleration), faster = add(now->speed, now->acceleration);
-    const int32_t speed = between(between(wanted, slower, faster), -now->rate, now->rate);
+    const int32_t speed = between(between(wanted, slower, faster), sub(0, now->rate), now->rate);
     /* Where a table with a smaller limit is used it is on its way back, and goes no further out. */
     const int32_t least = before < -size ? before : -size, most = before > size ? before : size;
     now->correction = between(add(before, speed), least, most);
@@ -1899,7 +1900,7 @@ fxt_output fxt_tick(const fxt_table *table, fxt_joint *joint, const fxt_input *i
 
 static inline uint64_t most_of_bits(uint8_t bits)
 {
-    return UINT64_MAX >> (64u - bits);
+    return UINT64_MAX >> ((64u - bits) & 63u);
 }
 
 static inline int64_t as_signed(const fxt_encoder *encoder, int64_t counts)
@@ -1912,7 +1913,7 @@ static int64_t turns_of(int64_t counts, int64_t per_turn, int64_t *left)
 {
     const int64_t towards = counts / per_turn, rest = counts % per_turn;
     *left = rest < 0 ? rest + per_turn : rest;
-    return rest < 0 ? towards - 1 : towards;
+    return rest < 0 ? minus(towards, 1) : towards;
 }
 
 /* The angle of so many counts since the zero, to the nearest. */
@@ -1949,21 +1950,16 @@ static bool can_read(const fxt_encoder *encoder, uint64_t reading)
     return encoder->wrap_bits > 0u ? reading <= most_of_bits(encoder->wrap_bits) : reading < encoder->counts_per_turn;
 }
 
-/* The shorter way from a reading to another; both can be read. */
+/* The shorter way from a reading to another; both can be read. Half of what the register counts is backward. */
 static int64_t encoder_way(const fxt_encoder *encoder, uint64_t from, uint64_t to)
 {
-    const uint64_t way = to - from;
+    const uint64_t turn = encoder->counts_per_turn, all = most_of_bits(encoder->wrap_bits);
     if (encoder->wrap_bits > 0u) {
-        /* The upper half is behind. */
-        const uint64_t half = most_of_bits(encoder->wrap_bits) / 2u + 1u, all = most_of_bits(encoder->wrap_bits);
-        const uint64_t bits = ((way & all) ^ half) - half;
+        const uint64_t half = (all >> 1) + 1u, bits = (((to - from) & all) ^ half) - half;
         return (int64_t)bits;
     }
-    const int64_t turn = (int64_t)encoder->counts_per_turn, straight = (int64_t)way;
-    if (straight * 2 >= turn) {
-        return straight - turn;
-    }
-    return straight * 2 < -turn ? straight + turn : straight;
+    const uint64_t ahead = to >= from ? to - from : to + turn - from, way = ahead * 2u >= turn ? ahead - turn : ahead;
+    return (int64_t)way;
 }
 
 static bool is_encoder(const fxt_encoder *encoder)

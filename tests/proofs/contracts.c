@@ -292,18 +292,6 @@ void goal_follows_the_mode(void)
     END;
 }
 
-/* That the part of a fade is one of 0 to 1: limiter.c, for each length of a fade. */
-void a_part_of_a_goal_is_no_larger(void)
-{
-    const int32_t goal = nondet_int();
-    const float part = nondet_float();
-    __ESBMC_assume(goal >= -MOST_LIMIT * FINE && goal <= MOST_LIMIT * FINE && part >= 0.0f && part <= 1.0f);
-    const int32_t found = part_of(goal, part), most = goal < 0 ? -goal : goal, is = found < 0 ? -found : found;
-    /* Sixteen: a goal has 29 bits, a float 24. */
-    PROMISE(is <= most + 16 && (found == 0 || (found < 0) == (goal < 0)));
-    END;
-}
-
 void a_sample_moves_no_further_than_a_tick_allows_or_is_doubted(void)
 {
     fxt_joint joint = any_joint(any_size());
