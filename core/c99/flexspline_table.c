@@ -554,7 +554,8 @@ static void ripple_at(const fxt_table *table, const point *at, uint32_t tooth, i
     for (int i = 0; i < 3; i++) {
         weights[i] = (int16_t)weights[i];
     }
-    ripple[0] = ripple[1] = 0;
+    ripple[0] = 0;
+    ripple[1] = 0;
     for (uint32_t row = 0u; row < rows; row++) {
         for (uint32_t side = 0u; side < 2u; side++) {
             uint32_t words[2];
@@ -609,8 +610,8 @@ static int32_t to_solution(const fxt_table *table, const point *at, uint32_t too
     }
     const int32_t place = sub(shifted(i32(guess.fraction ^ 0x80000000u), 8u), ahead);
     /* What is missing at either end of the node's cell tells whether the solution is in it, before or after. */
-    int which = sub(shifted(add(sums[1], sums[2]), 1u), place) <= CELL / 2 ? 1 : 0;
-    which += sub(shifted(add(sums[2], sums[3]), 1u), place) <= -CELL / 2 ? 1 : 0;
+    const int32_t below = sub(shifted(add(sums[1], sums[2]), 1u), place), above = sub(shifted(add(sums[2], sums[3]), 1u), place);
+    const int32_t which = add(below <= CELL / 2 ? 1 : 0, above <= -(CELL / 2) ? 1 : 0);
     const int32_t a = sums[which], b = sums[which + 1], c = sums[which + 2];
     const int32_t start = sub(which * CELL - CELL / 2 * 3, place);
     const float linear = (float)add(CELL, sub(b, a));
@@ -831,7 +832,10 @@ static bool refuse(check *is, fxt_reason reason, fxt_field field, uint32_t index
 
 static bool finite_is(check *is, fxt_field field, uint32_t index, float value)
 {
-    return is_finite(value) || refuse(is, FXT_NOT_FINITE, field, index, 0);
+    if (!is_finite(value)) {
+        return refuse(is, FXT_NOT_FINITE, field, index, 0);
+    }
+    return true;
 }
 
 static bool in_range(check *is, fxt_field field, uint32_t index, float value, float least, float most)
@@ -839,12 +843,18 @@ static bool in_range(check *is, fxt_field field, uint32_t index, float value, fl
     if (!finite_is(is, field, index, value)) {
         return false;
     }
-    return (value >= least && value <= most) || refuse(is, FXT_OUT_OF_RANGE, field, 0, 0);
+    if (value < least || value > most) {
+        return refuse(is, FXT_OUT_OF_RANGE, field, 0, 0);
+    }
+    return true;
 }
 
 static bool derived_is(check *is, uint32_t at, uint32_t value)
 {
-    return word_at(is->table, at) == value || refuse(is, FXT_DERIVED, FXT_NO_FIELD, 4u * at, 0);
+    if (word_at(is->table, at) != value) {
+        return refuse(is, FXT_DERIVED, FXT_NO_FIELD, 4u * at, 0);
+    }
+    return true;
 }
 
 static uint32_t u16_at(const uint8_t *image, uint32_t at)
@@ -889,7 +899,10 @@ static bool check_text(check *is, const uint8_t *text, fxt_field field)
     while (length < (uint32_t)TEXT_BYTES && text[length] == 0u) {
         length++;
     }
-    return length == (uint32_t)TEXT_BYTES || refuse(is, FXT_TEXT, field, 0, 0);
+    if (length != (uint32_t)TEXT_BYTES) {
+        return refuse(is, FXT_TEXT, field, 0, 0);
+    }
+    return true;
 }
 
 static bool check_drive(check *is, const uint8_t *image)
@@ -972,7 +985,10 @@ static bool check_identity(check *is, const uint8_t *image)
     is->table->body_bytes = 4u * is->end;
     const uint32_t pages = (is->table->body_bytes + PAGE_BYTES - 1u) / PAGE_BYTES;
     const uint32_t needed = is->table->body_bytes + 4u * (pages + 1u);
-    return needed == is->table->bytes || refuse(is, FXT_SIZE, FXT_NO_FIELD, needed, 0);
+    if (needed != is->table->bytes) {
+        return refuse(is, FXT_SIZE, FXT_NO_FIELD, needed, 0);
+    }
+    return true;
 }
 
 static uint32_t along(uint32_t nodes, uint32_t step)
@@ -1131,7 +1147,7 @@ static bool check_nodes(check *is)
 static uint32_t leading_zeros(uint64_t bits)
 {
     uint32_t zeros = 0;
-    while (zeros < 64u && (bits >> (63u - zeros) & 1u) == 0u) {
+    for (uint64_t bit = (uint64_t)1 << 63; bit != 0u && (bits & bit) == 0u; bit >>= 1) {
         zeros++;
     }
     return zeros;
@@ -1140,7 +1156,7 @@ static uint32_t leading_zeros(uint64_t bits)
 static uint32_t trailing_zeros(uint64_t bits)
 {
     uint32_t zeros = 0;
-    while (zeros < 64u && (bits >> zeros & 1u) == 0u) {
+    for (uint64_t bit = 1; bit != 0u && (bits & bit) == 0u; bit <<= 1) {
         zeros++;
     }
     return zeros;
@@ -1156,7 +1172,8 @@ static bool check_rise(check *is)
     for (uint32_t index = 0u; index < is->torques * is->temperatures; index++) {
         const uint32_t torque = index % is->torques, temperature = index / is->torques;
         if (torque == 0u) {
-            highest[0] = highest[1] = endless;
+            highest[0] = endless;
+            highest[1] = endless;
             continue;
         }
         const uint32_t below = torque - 1u, from = node_at(is, index - 1u), to = node_at(is, index);
@@ -1215,7 +1232,9 @@ static float curve_rad(const curve *of, uint32_t i)
 /* What a closed B-spline has at most: coefficient, slope per node spacing, value. */
 static void extremes(const curve *of, uint32_t count, float most[3])
 {
-    most[0] = most[1] = most[2] = 0.0f;
+    most[0] = 0.0f;
+    most[1] = 0.0f;
+    most[2] = 0.0f;
     for (uint32_t i = 0u; i + 2u < count; i++) {
         const float a = curve_rad(of, i), b = curve_rad(of, i + 1u), c = curve_rad(of, i + 2u);
         const float turn = (a - b) / (a - 2.0f * b + c);
@@ -1520,7 +1539,7 @@ fxt_play fxt_play_unknown(void)
 
 fxt_play fxt_play_after(fxt_direction direction)
 {
-    const int32_t side = direction == FXT_FORWARD ? INT32_MIN : INT32_MAX;
+    const int32_t side = i32(direction == FXT_FORWARD ? 0x80000000u : 0x7fffffffu);
     const play_state is = {0, 0, side, side, -1};
     return kept(&is);
 }
@@ -1666,10 +1685,10 @@ bool fxt_steady_error(const fxt_table *table, int64_t generator, float torque_n_
 #define MOST_RATE (0.05 * (TURN / TAU) * 8.0)
 #define MOST_CHANGE INT32_C(0x20000000)
 
-enum { NO_FLANK = 0, FLANK_FORWARD, FLANK_BACKWARD };
-
-static const fxt_limits no_limits;
-static const fxt_joint no_joint;
+/* The flank that the last motion went to. */
+#define NO_FLANK 0u
+#define FLANK_FORWARD 1u
+#define FLANK_BACKWARD 2u
 
 static inline uint32_t to_count(float value)
 {
@@ -1691,6 +1710,8 @@ static bool may_be(double counts, double least, double most)
 
 fxt_limit fxt_joint_init(fxt_joint *joint, const fxt_limits *limits)
 {
+    static const fxt_limits no_limits;
+    static const fxt_joint no_joint;
     if (joint == NULL) {
         return FXT_NO_JOINT;
     }
@@ -1781,7 +1802,7 @@ static judged judge(fxt_joint *now, const fxt_input *input)
     is.glitch = far && !believed;
     now->glitches = (uint16_t)(believed ? 0u : glitches);
     now->generator = is.glitch ? now->generator : sample;
-    now->sampled = was_sampled || (input->has_generator && !is.glitch) ? 1u : 0u;
+    now->sampled = was_sampled || input->has_generator ? 1u : 0u;
     /* After too long without an answer of the table nobody followed the play. */
     is.forgotten = believed || (was_sampled && now->uncorrected > now->patience);
     is.blind = now->sampled == 0u;
@@ -1865,14 +1886,14 @@ fxt_output fxt_tick(const fxt_table *table, fxt_joint *joint, const fxt_input *i
     const departure from = departure_from(table, &at, input->target, &play, output);
     /* The flank that the last motion went to is kept for a target that is near. */
     const bool near_by = magnitude_of(from.ahead) < joint->hold && joint->flank != NO_FLANK;
-    const bool backward = near_by ? joint->flank == FLANK_BACKWARD : from.backward;
+    const bool backward = near_by ? (joint->flank == FLANK_BACKWARD) : from.backward;
     int32_t found;
     const bool sane = solve(table, &at, input->target, backward, &found) && is.sane && !sample.blind;
     const bool hold = from.hold && !near_by;
     const int32_t open = hold ? from.unknown : from.guess, aimed = sane ? add(open, at.jump) : table->limit;
     const bool late = input->missed_ticks > 0u;
     if (sane) {
-        joint->flank = backward ? FLANK_BACKWARD : FLANK_FORWARD;
+        joint->flank = (uint8_t)(backward ? FLANK_BACKWARD : FLANK_FORWARD);
     }
     /* Held, the correction leaves the generator where it is. */
     const int32_t goal = goal_of(joint, late, hold ? add(from.ahead, is.error) : found, sane);
@@ -1889,7 +1910,7 @@ fxt_output fxt_tick(const fxt_table *table, fxt_joint *joint, const fxt_input *i
     out.uncertainty_rad = (float)uncertainty * rad_per_count;
     out.correction_rad = (float)correction * (rad_per_count / (float)FINE);
     out.held_back_rad = (float)held_back * (rad_per_count / (float)FINE);
-    out.quality = quality_of(&at, sane, play.lower == play.upper && open <= 0);
+    out.quality = quality_of(&at, sane, play.lower == play.upper);
     out.flags = (input->has_generator ? 0u : (uint32_t)FXT_SAMPLE_LOST) | (sample.glitch ? (uint32_t)FXT_GLITCH : 0u) |
                 (late ? (uint32_t)FXT_LATE : 0u) | (magnitude_of(held_back) >= FINE ? (uint32_t)FXT_HELD_BACK : 0u) |
                 (sane ? 0u : (uint32_t)FXT_NOT_CORRECTED) | (joint->mode == FXT_SAFE ? (uint32_t)FXT_IN_SAFE_MODE : 0u);

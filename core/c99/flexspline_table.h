@@ -38,8 +38,8 @@
 extern "C" {
 #endif
 
-/* The format that is read, and no other. */
-#define FXT_FORMAT_VERSION 3
+/** The format that is read, and no other; bytes of a page, and of a saved play. */
+#define FXT_FORMAT_VERSION 3u
 #define FXT_PAGE_BYTES 256
 #define FXT_SAVED_PLAY_BYTES 28
 

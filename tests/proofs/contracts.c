@@ -176,6 +176,7 @@ void only_a_play_is_restored(void)
 /* What fxt_joint_init can leave (limits_that_are_accepted), and a correction that a tick can have left with this table. */
 static fxt_joint any_joint(int32_t size)
 {
+    static const fxt_joint no_joint;
     fxt_joint joint = no_joint;
     joint.rate = nondet_int();
     joint.acceleration = nondet_int();
