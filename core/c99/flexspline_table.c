@@ -1886,7 +1886,7 @@ fxt_output fxt_tick(const fxt_table *table, fxt_joint *joint, const fxt_input *i
     const departure from = departure_from(table, &at, input->target, &play, output);
     /* The flank that the last motion went to is kept for a target that is near. */
     const bool near_by = magnitude_of(from.ahead) < joint->hold && joint->flank != NO_FLANK;
-    const bool backward = near_by ? (joint->flank == FLANK_BACKWARD) : from.backward;
+    const bool was_backward = joint->flank == FLANK_BACKWARD, backward = near_by ? was_backward : from.backward;
     int32_t found;
     const bool sane = solve(table, &at, input->target, backward, &found) && is.sane && !sample.blind;
     const bool hold = from.hold && !near_by;

@@ -1,4 +1,6 @@
-/* Finds again with the reader in C what the core said: tests/fuzz/examples/c99.rs writes the records that are read here.
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
+/** @file
+ * Finds again with the reader in C what the core said: tests/fuzz/examples/c99.rs writes the records that are read here.
  *
  * On a host: driver FILE. On a Cortex-M4F in QEMU the file VECTORS is read through semihosting. 0 if all bits are equal. */
 #include "flexspline_table.h"

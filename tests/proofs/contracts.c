@@ -1,4 +1,6 @@
-/* ESBMC: what functions of the reader promise, for any argument that their premise allows. One function here is one proof.
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
+/** @file
+ * ESBMC: what functions of the reader promise, for any argument that their premise allows. One function here is one proof.
  * READER is the reader, or one with a planted bug. With REACH each proof ends in an assertion that is false: it has to fail, or nothing was
  * proved, as no argument meets the premise. */
 #include <stdlib.h>

@@ -1,4 +1,6 @@
-/* A drive on a bench that exists in this program alone: the generator goes forth and back, the table says where the output is, and what to
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
+/** @file
+ * A drive on a bench that exists in this program alone: the generator goes forth and back, the table says where the output is, and what to
  * command so that the output would be where the ideal drive has it. Beside each step it looks at one page of the table's memory.
  *
  * cc -std=c99 -ffp-contract=off -I include example.c c99/flexspline_table.c tables/flexspline_@FIRST@.c -o ../example && ../example */
