@@ -554,7 +554,8 @@ static void ripple_at(const fxt_table *table, const point *at, uint32_t tooth, i
     for (int i = 0; i < 3; i++) {
         weights[i] = (int16_t)weights[i];
     }
-    ripple[0] = ripple[1] = 0;
+    ripple[0] = 0;
+    ripple[1] = 0;
     for (uint32_t row = 0u; row < rows; row++) {
         for (uint32_t side = 0u; side < 2u; side++) {
             uint32_t words[2];
@@ -609,8 +610,8 @@ static int32_t to_solution(const fxt_table *table, const point *at, uint32_t too
     }
     const int32_t place = sub(shifted(i32(guess.fraction ^ 0x80000000u), 8u), ahead);
     /* What is missing at either end of the node's cell tells whether the solution is in it, before or after. */
-    int which = sub(shifted(add(sums[1], sums[2]), 1u), place) <= CELL / 2 ? 1 : 0;
-    which += sub(shifted(add(sums[2], sums[3]), 1u), place) <= -CELL / 2 ? 1 : 0;
+    const int32_t below = sub(shifted(add(sums[1], sums[2]), 1u), place), above = sub(shifted(add(sums[2], sums[3]), 1u), place);
+    const int32_t which = add(below <= CELL / 2 ? 1 : 0, above <= -(CELL / 2) ? 1 : 0);
     const int32_t a = sums[which], b = sums[which + 1], c = sums[which + 2];
     const int32_t start = sub(which * CELL - CELL / 2 * 3, place);
     const float linear = (float)add(CELL, sub(b, a));
@@ -721,21 +722,34 @@ static int32_t play_update(play_state *play, int64_t nominal, int32_t centre, in
     return play->error;
 }
 
-static fxt_prediction follow(const fxt_table *table, const point *at, play_state *play, int64_t generator)
+/* What the output does now, counts. */
+typedef struct {
+    int64_t nominal;
+    int32_t error, uncertainty;
+    bool sane;
+} estimate;
+
+static estimate estimated(const fxt_table *table, const point *at, play_state *play, int64_t generator)
 {
     const int64_t nominal = nominal_output(table, generator);
     const phases where = phases_at(table, generator, nominal);
     int32_t centre, half;
     const bool sane = play_at(table, at, &where, &centre, &half) && at->finite && !at->led_astray;
     const int32_t followed = play_update(play, nominal, centre, half, sane);
-    const int32_t error = sane ? followed : 0;
-    const int32_t uncertainty = sane ? add(play_uncertainty(play), at->jump) : table->limit;
+    const int32_t known = add(play_uncertainty(play), at->jump);
+    const estimate now = {nominal, sane ? followed : 0, sane ? known : table->limit, sane};
+    return now;
+}
+
+static fxt_prediction follow(const fxt_table *table, const point *at, play_state *play, int64_t generator)
+{
+    const estimate is = estimated(table, at, play, generator);
     fxt_prediction now;
-    now.output = plus(nominal, error);
-    now.nominal = nominal;
-    now.transmission_error_rad = (float)error * rad_per_count;
-    now.uncertainty_rad = (float)uncertainty * rad_per_count;
-    now.quality = quality_of(at, sane, play->lower == play->upper);
+    now.output = plus(is.nominal, is.error);
+    now.nominal = is.nominal;
+    now.transmission_error_rad = (float)is.error * rad_per_count;
+    now.uncertainty_rad = (float)is.uncertainty * rad_per_count;
+    now.quality = quality_of(at, is.sane, play->lower == play->upper);
     return now;
 }
 
@@ -758,6 +772,26 @@ static fxt_command aim_moving(const fxt_table *table, const point *at, int64_t t
     return commanded(table, at, target, sane, minus(target, error), error, 0);
 }
 
+/* What a motion ends in: how far the target is, and what is not known of where the output is and of the side on which it will be reached. */
+typedef struct {
+    int32_t ahead, unknown, guess;
+    bool backward, hold;
+} departure;
+
+static inline int32_t magnitude_of(int32_t value)
+{
+    return value == INT32_MIN ? INT32_MAX : value < 0 ? -value : value;
+}
+
+static inline departure departure_from(const fxt_table *table, const point *at, int64_t target, const play_state *play, int64_t output)
+{
+    const int32_t ahead = minus_near(target, output), away = magnitude_of(ahead), unknown = play_uncertainty(play);
+    /* A target inside the interval may lie on the other side of the output: then the whole play is in doubt. */
+    const int32_t guess = away <= unknown && unknown > 0 ? mul(at->half_width, 2) : 0;
+    const departure from = {ahead, unknown, guess, ahead <= 0, away <= table->hold};
+    return from;
+}
+
 static fxt_command aim_from(const fxt_table *table, const point *at, int64_t target, const play_state *play)
 {
     int32_t error;
@@ -768,16 +802,12 @@ static fxt_command aim_from(const fxt_table *table, const point *at, int64_t tar
         const int32_t middle = shifted(add(error, back), 1u);
         return commanded(table, at, target, sane, minus(target, middle), middle, at->half_width);
     }
-    const int32_t ahead = minus_near(target, plus(play->nominal, play->error));
-    const int32_t away = ahead == INT32_MIN ? INT32_MAX : ahead < 0 ? -ahead : ahead;
-    const int32_t unknown = play_uncertainty(play);
-    const bool sane = solve(table, at, target, ahead <= 0, &error);
-    if (away <= table->hold) {
-        return commanded(table, at, target, sane, play->nominal, play->error, unknown);
+    const departure from = departure_from(table, at, target, play, plus(play->nominal, play->error));
+    const bool sane = solve(table, at, target, from.backward, &error);
+    if (from.hold) {
+        return commanded(table, at, target, sane, play->nominal, play->error, from.unknown);
     }
-    /* A target inside the interval may lie on the other side of the output: then the whole play is in doubt. */
-    const int32_t guess = away <= unknown && unknown > 0 ? mul(at->half_width, 2) : 0;
-    return commanded(table, at, target, sane, minus(target, error), error, guess);
+    return commanded(table, at, target, sane, minus(target, error), error, from.guess);
 }
 
 /* The check of an image. */
@@ -802,7 +832,10 @@ static bool refuse(check *is, fxt_reason reason, fxt_field field, uint32_t index
 
 static bool finite_is(check *is, fxt_field field, uint32_t index, float value)
 {
-    return is_finite(value) || refuse(is, FXT_NOT_FINITE, field, index, 0);
+    if (!is_finite(value)) {
+        return refuse(is, FXT_NOT_FINITE, field, index, 0);
+    }
+    return true;
 }
 
 static bool in_range(check *is, fxt_field field, uint32_t index, float value, float least, float most)
@@ -810,12 +843,18 @@ static bool in_range(check *is, fxt_field field, uint32_t index, float value, fl
     if (!finite_is(is, field, index, value)) {
         return false;
     }
-    return (value >= least && value <= most) || refuse(is, FXT_OUT_OF_RANGE, field, 0, 0);
+    if (value < least || value > most) {
+        return refuse(is, FXT_OUT_OF_RANGE, field, 0, 0);
+    }
+    return true;
 }
 
 static bool derived_is(check *is, uint32_t at, uint32_t value)
 {
-    return word_at(is->table, at) == value || refuse(is, FXT_DERIVED, FXT_NO_FIELD, 4u * at, 0);
+    if (word_at(is->table, at) != value) {
+        return refuse(is, FXT_DERIVED, FXT_NO_FIELD, 4u * at, 0);
+    }
+    return true;
 }
 
 static uint32_t u16_at(const uint8_t *image, uint32_t at)
@@ -860,7 +899,10 @@ static bool check_text(check *is, const uint8_t *text, fxt_field field)
     while (length < (uint32_t)TEXT_BYTES && text[length] == 0u) {
         length++;
     }
-    return length == (uint32_t)TEXT_BYTES || refuse(is, FXT_TEXT, field, 0, 0);
+    if (length != (uint32_t)TEXT_BYTES) {
+        return refuse(is, FXT_TEXT, field, 0, 0);
+    }
+    return true;
 }
 
 static bool check_drive(check *is, const uint8_t *image)
@@ -943,7 +985,10 @@ static bool check_identity(check *is, const uint8_t *image)
     is->table->body_bytes = 4u * is->end;
     const uint32_t pages = (is->table->body_bytes + PAGE_BYTES - 1u) / PAGE_BYTES;
     const uint32_t needed = is->table->body_bytes + 4u * (pages + 1u);
-    return needed == is->table->bytes || refuse(is, FXT_SIZE, FXT_NO_FIELD, needed, 0);
+    if (needed != is->table->bytes) {
+        return refuse(is, FXT_SIZE, FXT_NO_FIELD, needed, 0);
+    }
+    return true;
 }
 
 static uint32_t along(uint32_t nodes, uint32_t step)
@@ -1102,7 +1147,7 @@ static bool check_nodes(check *is)
 static uint32_t leading_zeros(uint64_t bits)
 {
     uint32_t zeros = 0;
-    while (zeros < 64u && (bits >> (63u - zeros) & 1u) == 0u) {
+    for (uint64_t bit = (uint64_t)1 << 63; bit != 0u && (bits & bit) == 0u; bit >>= 1) {
         zeros++;
     }
     return zeros;
@@ -1111,7 +1156,7 @@ static uint32_t leading_zeros(uint64_t bits)
 static uint32_t trailing_zeros(uint64_t bits)
 {
     uint32_t zeros = 0;
-    while (zeros < 64u && (bits >> zeros & 1u) == 0u) {
+    for (uint64_t bit = 1; bit != 0u && (bits & bit) == 0u; bit <<= 1) {
         zeros++;
     }
     return zeros;
@@ -1127,7 +1172,8 @@ static bool check_rise(check *is)
     for (uint32_t index = 0u; index < is->torques * is->temperatures; index++) {
         const uint32_t torque = index % is->torques, temperature = index / is->torques;
         if (torque == 0u) {
-            highest[0] = highest[1] = endless;
+            highest[0] = endless;
+            highest[1] = endless;
             continue;
         }
         const uint32_t below = torque - 1u, from = node_at(is, index - 1u), to = node_at(is, index);
@@ -1186,7 +1232,9 @@ static float curve_rad(const curve *of, uint32_t i)
 /* What a closed B-spline has at most: coefficient, slope per node spacing, value. */
 static void extremes(const curve *of, uint32_t count, float most[3])
 {
-    most[0] = most[1] = most[2] = 0.0f;
+    most[0] = 0.0f;
+    most[1] = 0.0f;
+    most[2] = 0.0f;
     for (uint32_t i = 0u; i + 2u < count; i++) {
         const float a = curve_rad(of, i), b = curve_rad(of, i + 1u), c = curve_rad(of, i + 2u);
         const float turn = (a - b) / (a - 2.0f * b + c);
@@ -1491,7 +1539,7 @@ fxt_play fxt_play_unknown(void)
 
 fxt_play fxt_play_after(fxt_direction direction)
 {
-    const int32_t side = direction == FXT_FORWARD ? INT32_MIN : INT32_MAX;
+    const int32_t side = i32(direction == FXT_FORWARD ? 0x80000000u : 0x7fffffffu);
     const play_state is = {0, 0, side, side, -1};
     return kept(&is);
 }
@@ -1627,6 +1675,366 @@ bool fxt_steady_error(const fxt_table *table, int64_t generator, float torque_n_
     const bool sane = play_at(table, &at, &where, &centre, &half);
     *error_rad = (float)(direction == FXT_BACKWARD ? add(centre, half) : sub(centre, half)) * rad_per_count;
     return sane && at.finite;
+}
+
+/* A joint: what the core's `Joint` does in a tick with one copy of a table and nothing added to it (core/src/joint/runtime.rs). */
+
+/* Parts of a count that a correction is kept in. */
+#define FINE INT32_C(8)
+/* The fastest correction, and what it may change by, in a tick: 0.05 rad; a quarter of the integers. */
+#define MOST_RATE (0.05 * (TURN / TAU) * 8.0)
+#define MOST_CHANGE INT32_C(0x20000000)
+
+/* The flank that the last motion went to. */
+#define NO_FLANK 0u
+#define FLANK_FORWARD 1u
+#define FLANK_BACKWARD 2u
+
+static inline uint32_t to_count(float value)
+{
+    const int32_t whole = to_i32(value);
+    return whole > 0 ? (uint32_t)whole : 0u;
+}
+
+static inline int32_t between(int32_t value, int32_t least, int32_t most)
+{
+    const int32_t above = value > least ? value : least;
+    return above < most ? above : most;
+}
+
+/* Within its range; of NaN nothing is. */
+static bool may_be(double counts, double least, double most)
+{
+    return counts >= least && counts <= most;
+}
+
+fxt_limit fxt_joint_init(fxt_joint *joint, const fxt_limits *limits)
+{
+    static const fxt_limits no_limits;
+    static const fxt_joint no_joint;
+    if (joint == NULL) {
+        return FXT_NO_JOINT;
+    }
+    *joint = no_joint;
+    const fxt_limits is = limits != NULL ? *limits : no_limits;
+    const double tick = (double)is.tick_s, rate = counts_of_rad((double)is.rate_rad_s * tick) * 8.0;
+    const double change = counts_of_rad((double)is.acceleration_rad_s2 * tick * tick) * 8.0;
+    const double move = counts_of_rad((double)is.generator_rate_rad_s * tick), hold = counts_of_rad((double)is.hold_rad);
+    if (!may_be(tick, 1.0e-7, 1.0e3)) {
+        return FXT_TICK;
+    }
+    if (!may_be(rate, 1.0, MOST_RATE)) {
+        return FXT_RATE;
+    }
+    if (!may_be(change, 1.0, 1.0e12)) {
+        return FXT_ACCELERATION;
+    }
+    if (!may_be(move, 1.0, 2147483000.0)) {
+        return FXT_GENERATOR_RATE;
+    }
+    if (is.hold_rad != 0.0f && !may_be(hold, 1.0, 0.05 * (TURN / TAU))) {
+        return FXT_HOLD_RAD;
+    }
+    if ((uint32_t)is.overrun > (uint32_t)FXT_FADE_OUT) {
+        return FXT_OVERRUN_POLICY;
+    }
+    /* More than from full speed to full speed back is not needed, and would drown what is left to go in rounding. */
+    const float fast = (float)rate, quick = within((float)change, 1.0f, 2.0f * fast);
+    joint->rate = to_i32(fast);
+    joint->acceleration = quick < (float)MOST_CHANGE ? to_i32(quick) : MOST_CHANGE;
+    joint->largest_move = to_i32((float)move);
+    joint->hold = to_i32((float)hold);
+    /* One tick more can still be counted. */
+    joint->patience = (uint16_t)(is.patience < UINT16_MAX ? is.patience : UINT16_MAX - 1u);
+    joint->fade = (uint16_t)(is.overrun == FXT_FADE_OUT ? is.fade_ticks : 0u);
+    joint->fade_step = joint->fade > 0u ? 1.0f / (float)joint->fade : 0.0f;
+    joint->hold_late = is.overrun == FXT_HOLD_LAST ? 1u : 0u;
+    return FXT_LIMITS_OK;
+}
+
+/* Made, and of a number that an init can have left: memory of zeros, or any other, is no joint. */
+static bool is_made(const fxt_joint *joint)
+{
+    return joint != NULL && joint->rate >= 1 && joint->acceleration >= 1 && joint->acceleration <= MOST_CHANGE &&
+           joint->rate <= MOST_CHANGE;
+}
+
+fxt_mode fxt_joint_mode(const fxt_joint *joint)
+{
+    return is_made(joint) ? joint->mode : FXT_SAFE;
+}
+
+bool fxt_joint_request(fxt_joint *joint, fxt_mode mode)
+{
+    if (!is_made(joint)) {
+        return false;
+    }
+    const fxt_mode from = joint->mode;
+    const bool stops = mode == FXT_OFF || mode == FXT_SAFE;
+    const bool starts = mode == FXT_TRACKING && (from == FXT_OFF || from == FXT_TRACKING || from == FXT_HOLD);
+    const bool stays = mode == FXT_HOLD && (from == FXT_TRACKING || from == FXT_HOLD);
+    const bool may = stops || starts || stays;
+    joint->mode = may ? mode : from;
+    return may;
+}
+
+void fxt_joint_forget_side(fxt_joint *joint)
+{
+    if (joint != NULL) {
+        joint->play = kept(&unknown_state);
+        joint->flank = NO_FLANK;
+    }
+}
+
+/* A sample, judged: whether it was taken for none, whether the play is where it was thought, whether there was one at all. */
+typedef struct {
+    bool glitch, forgotten, blind;
+} judged;
+
+static judged judge(fxt_joint *now, const fxt_input *input)
+{
+    const int64_t sample = input->has_generator ? input->generator : now->generator;
+    const uint64_t most = (uint64_t)now->largest_move, beyond = (uint64_t)minus(sample, now->generator) + most;
+    const bool was_sampled = now->sampled != 0u, far = was_sampled && beyond > most * 2u;
+    const uint32_t glitches = far ? now->glitches + 1u : 0u;
+    const bool believed = glitches > now->patience;
+    judged is;
+    is.glitch = far && !believed;
+    now->glitches = (uint16_t)(believed ? 0u : glitches);
+    now->generator = is.glitch ? now->generator : sample;
+    now->sampled = was_sampled || input->has_generator ? 1u : 0u;
+    /* After too long without an answer of the table nobody followed the play. */
+    is.forgotten = believed || (was_sampled && now->uncorrected > now->patience);
+    is.blind = now->sampled == 0u;
+    return is;
+}
+
+/* A part of a goal, of 0 to 1. */
+static int32_t part_of(int32_t goal, float part)
+{
+    return to_i32((float)goal * part);
+}
+
+/* The correction wanted in this tick, fine counts: by mode, in a tick that came late, and while none can be made. */
+static int32_t goal_of(fxt_joint *now, bool late, int32_t wanted_counts, bool sane)
+{
+    const uint32_t missing = now->uncorrected < UINT16_MAX ? now->uncorrected + 1u : now->uncorrected;
+    now->uncorrected = (uint16_t)(sane ? 0u : missing);
+    const bool off = now->uncorrected > now->patience || (now->mode != FXT_TRACKING && now->mode != FXT_HOLD);
+    const bool keep = now->mode == FXT_HOLD || (late && now->hold_late != 0u);
+    if (!keep) {
+        const int32_t wanted = sane ? mul(wanted_counts, FINE) : now->goal;
+        now->goal = off ? 0 : wanted;
+    }
+    /* Down in `fade` ticks, none for as many; without that policy `fade` is 0. */
+    const uint32_t start = now->fade * 2u, left = now->fading > 0u ? now->fading - 1u : 0u;
+    now->fading = late ? start : left;
+    const uint32_t above = now->fading > now->fade ? now->fading - now->fade : 0u;
+    return now->fading > 0u ? part_of(now->goal, (float)above * now->fade_step) : now->goal;
+}
+
+/* What braking in so many whole ticks takes. */
+static inline uint32_t way_of(uint32_t braking, uint32_t ticks)
+{
+    return (braking * ticks * (ticks + 1u)) >> 1;
+}
+
+/* The speed that can be stopped at the goal in whole ticks, braking with half of the acceleration; its sign is the way to go. */
+static int32_t stoppable(int32_t acceleration, int32_t lag)
+{
+    const uint32_t away = lag < 0 ? 0u - (uint32_t)lag : (uint32_t)lag, braking = ((uint32_t)acceleration + 1u) >> 1;
+    /* Rounded up, so that it is right or one too many. */
+    const float root = root_of(1.0f + 8.0f * ((float)away / (float)braking));
+    const uint32_t up = to_count(0.5f * (root * (1.0f + 1e-6f) - 1.0f));
+    const uint32_t ticks = way_of(braking, up) > away ? up - 1u : up;
+    /* Below 2^17, the root of twice the integers. */
+    const uint32_t speed = (away + way_of(braking, ticks)) / (1u + (ticks & 0x1ffffu));
+    return i32(lag < 0 ? 0u - speed : speed);
+}
+
+/* A correction moved by what is wanted: within acceleration, rate and size, whatever is wanted. */
+static int32_t moved_by(fxt_joint *now, int32_t wanted, int32_t size)
+{
+    const int32_t before = now->correction;
+    const int32_t slower = sub(now->speed, now->acceleration), faster = add(now->speed, now->acceleration);
+    const int32_t speed = between(between(wanted, slower, faster), sub(0, now->rate), now->rate);
+    /* Where a table with a smaller limit is used it is on its way back, and goes no further out. */
+    const int32_t least = before < -size ? before : -size, most = before > size ? before : size;
+    now->correction = between(add(before, speed), least, most);
+    now->speed = sub(now->correction, before);
+    return now->correction;
+}
+
+/* Without a table or a joint: where the generator is. */
+static fxt_output standing(const fxt_input *input, int64_t generator)
+{
+    fxt_output out = {0, 0, 0.0f, 0.05f, 0.0f, 0.0f, FXT_DISABLED, FXT_NOT_CORRECTED | FXT_NO_JOINT_OR_TABLE};
+    out.command = input != NULL && input->has_generator ? input->generator : generator;
+    return out;
+}
+
+fxt_output fxt_tick(const fxt_table *table, fxt_joint *joint, const fxt_input *input)
+{
+    if (!is_made(joint) || input == NULL || given(table)->image == NULL) {
+        return standing(input, joint != NULL ? joint->generator : 0);
+    }
+    const point at = locate(table, input->torque_n_m, input->temperature_c);
+    const judged sample = judge(joint, input);
+    play_state play = sample.forgotten ? unknown_state : state_of(&joint->play);
+    const estimate is = estimated(table, &at, &play, joint->generator);
+    const int64_t output = plus(is.nominal, is.error);
+    const departure from = departure_from(table, &at, input->target, &play, output);
+    /* The flank that the last motion went to is kept for a target that is near. */
+    const bool near_by = magnitude_of(from.ahead) < joint->hold && joint->flank != NO_FLANK;
+    const bool was_backward = joint->flank == FLANK_BACKWARD, backward = near_by ? was_backward : from.backward;
+    int32_t found;
+    const bool sane = solve(table, &at, input->target, backward, &found) && is.sane && !sample.blind;
+    const bool hold = from.hold && !near_by;
+    const int32_t open = hold ? from.unknown : from.guess, aimed = sane ? add(open, at.jump) : table->limit;
+    const bool late = input->missed_ticks > 0u;
+    if (sane) {
+        joint->flank = (uint8_t)(backward ? FLANK_BACKWARD : FLANK_FORWARD);
+    }
+    /* Held, the correction leaves the generator where it is. */
+    const int32_t goal = goal_of(joint, late, hold ? add(from.ahead, is.error) : found, sane);
+    const int32_t wanted = stoppable(joint->acceleration, sub(goal, joint->correction));
+    const int32_t correction = moved_by(joint, wanted, mul(table->limit, FINE));
+    const int32_t held_back = sub(goal, correction), uncertainty = aimed > is.uncertainty ? aimed : is.uncertainty;
+    /* Nothing was seen of the generator yet. */
+    joint->play = kept(joint->sampled != 0u ? &play : &unknown_state);
+    joint->missed_ticks += input->missed_ticks;
+    fxt_output out;
+    out.command = nominal_generator(table, minus(input->target, shifted(correction, 3u)));
+    out.output = output;
+    out.transmission_error_rad = (float)is.error * rad_per_count;
+    out.uncertainty_rad = (float)uncertainty * rad_per_count;
+    out.correction_rad = (float)correction * (rad_per_count / (float)FINE);
+    out.held_back_rad = (float)held_back * (rad_per_count / (float)FINE);
+    out.quality = quality_of(&at, sane, play.lower == play.upper);
+    out.flags = (input->has_generator ? 0u : (uint32_t)FXT_SAMPLE_LOST) | (sample.glitch ? (uint32_t)FXT_GLITCH : 0u) |
+                (late ? (uint32_t)FXT_LATE : 0u) | (magnitude_of(held_back) >= FINE ? (uint32_t)FXT_HELD_BACK : 0u) |
+                (sane ? 0u : (uint32_t)FXT_NOT_CORRECTED) | (joint->mode == FXT_SAFE ? (uint32_t)FXT_IN_SAFE_MODE : 0u);
+    return out;
+}
+
+/* An encoder (core/src/encoder.rs). */
+
+static inline uint64_t most_of_bits(uint8_t bits)
+{
+    return UINT64_MAX >> ((64u - bits) & 63u);
+}
+
+static inline int64_t as_signed(const fxt_encoder *encoder, int64_t counts)
+{
+    return encoder->reversed != 0u ? minus(0, counts) : counts;
+}
+
+/* Whole turns, rounded down, and what is left. */
+static int64_t turns_of(int64_t counts, int64_t per_turn, int64_t *left)
+{
+    const int64_t towards = counts / per_turn, rest = counts % per_turn;
+    *left = rest < 0 ? rest + per_turn : rest;
+    return rest < 0 ? minus(towards, 1) : towards;
+}
+
+/* The angle of so many counts since the zero, to the nearest. */
+static int64_t encoder_angle(const fxt_encoder *encoder)
+{
+    const uint64_t per_turn = encoder->counts_per_turn;
+    int64_t left;
+    const uint64_t turns = (uint64_t)turns_of(as_signed(encoder, encoder->since_zero), (int64_t)per_turn, &left);
+    /* Rounding up at the end of a turn carries into the next. */
+    const uint64_t fraction = (((uint64_t)left << 32) + (per_turn >> 1)) / per_turn, angle = (turns << 32) + fraction;
+    return (int64_t)angle;
+}
+
+static int64_t encoder_since_zero(const fxt_encoder *encoder, int64_t angle)
+{
+    const uint64_t per_turn = encoder->counts_per_turn, whole = (uint64_t)whole_turns(angle) * per_turn;
+    const uint64_t counts = whole + (((uint64_t)(uint32_t)angle * per_turn + ((uint64_t)1 << 31)) >> 32);
+    return as_signed(encoder, (int64_t)counts);
+}
+
+/* What the register reads where it has counted so far. */
+static uint64_t encoder_register(const fxt_encoder *encoder, int64_t counts)
+{
+    int64_t left;
+    if (encoder->wrap_bits > 0u) {
+        return (uint64_t)counts & most_of_bits(encoder->wrap_bits);
+    }
+    (void)turns_of(counts, (int64_t)encoder->counts_per_turn, &left);
+    return (uint64_t)left;
+}
+
+static bool can_read(const fxt_encoder *encoder, uint64_t reading)
+{
+    return encoder->wrap_bits > 0u ? reading <= most_of_bits(encoder->wrap_bits) : reading < encoder->counts_per_turn;
+}
+
+/* The shorter way from a reading to another; both can be read. Half of what the register counts is backward. */
+static int64_t encoder_way(const fxt_encoder *encoder, uint64_t from, uint64_t to)
+{
+    const uint64_t turn = encoder->counts_per_turn, all = most_of_bits(encoder->wrap_bits);
+    if (encoder->wrap_bits > 0u) {
+        const uint64_t half = (all >> 1) + 1u, bits = (((to - from) & all) ^ half) - half;
+        return (int64_t)bits;
+    }
+    const uint64_t ahead = to >= from ? to - from : to + turn - from, way = ahead * 2u >= turn ? ahead - turn : ahead;
+    return (int64_t)way;
+}
+
+static bool is_encoder(const fxt_encoder *encoder)
+{
+    return encoder != NULL && encoder->counts_per_turn >= 2u && encoder->counts_per_turn <= 0x80000000u && encoder->wrap_bits <= 64u;
+}
+
+bool fxt_encoder_init(fxt_encoder *encoder, uint32_t counts_per_turn, uint8_t wrap_bits, bool reversed, int64_t zero_counts)
+{
+    const int64_t most = INT64_C(1) << 62;
+    const fxt_encoder made = {0u, 0, zero_counts, counts_per_turn, wrap_bits, reversed ? 1u : 0u, 0u};
+    const fxt_encoder none = {0u, 0, 0, 0u, 0u, 0u, 0u};
+    if (encoder == NULL) {
+        return false;
+    }
+    const bool may = is_encoder(&made) && zero_counts >= -most && zero_counts <= most;
+    *encoder = may ? made : none;
+    return may;
+}
+
+bool fxt_encoder_start(fxt_encoder *encoder, uint64_t reading, int64_t near_counts)
+{
+    if (!is_encoder(encoder) || !can_read(encoder, reading)) {
+        return false;
+    }
+    const int64_t there = encoder_since_zero(encoder, near_counts);
+    const uint64_t from = encoder_register(encoder, plus(there, encoder->zero_counts));
+    encoder->since_zero = plus(there, encoder_way(encoder, from, reading));
+    encoder->reading = reading;
+    encoder->started = 1u;
+    return true;
+}
+
+bool fxt_encoder_read(fxt_encoder *encoder, uint64_t reading, int64_t *angle)
+{
+    if (angle == NULL || !is_encoder(encoder) || !can_read(encoder, reading)) {
+        return false;
+    }
+    if (encoder->started == 0u) {
+        (void)fxt_encoder_start(encoder, reading, 0);
+    } else if (can_read(encoder, encoder->reading)) {
+        encoder->since_zero = plus(encoder->since_zero, encoder_way(encoder, encoder->reading, reading));
+        encoder->reading = reading;
+    } else {
+        /* Its memory changed. */
+        return false;
+    }
+    *angle = encoder_angle(encoder);
+    return true;
+}
+
+uint64_t fxt_encoder_reading(const fxt_encoder *encoder, int64_t angle)
+{
+    return is_encoder(encoder) ? encoder_register(encoder, plus(encoder_since_zero(encoder, angle), encoder->zero_counts)) : 0u;
 }
 
 bool fxt_from_rad(double rad, int64_t *counts)

@@ -15,14 +15,14 @@
  *   if (!fxt_page_intact(&table, page++ % fxt_page_count(&table))) stop();
  *
  * A pointer that is NULL is refused: each function says how below. A table that was refused, or is NULL, knows no ratio: all its angles are 0.
- * A command has no limiter: from one tick to the next it moves as far as the correction does, the whole of it where the quality becomes
- * FXT_DISABLED. Watch the quality, and limit the rate.
+ * A command of fxt_step has no limiter: from one tick to the next it moves as far as the correction does, the whole of it where the quality
+ * becomes FXT_DISABLED. fxt_tick has one, with modes and what else a joint needs: see below.
  *
  * Angles are counts of 2^-32 turn in 64 bits: whole turns above, the fraction below. Positive is counter-clockwise; a positive torque turns
  * the output forward. Torque N*m, temperature degrees Celsius, errors rad at the output.
  *
  * Not in here, but in the core with its C interface (flexspline.h): two copies of the table compared in each tick, state that is whole after
- * an upset, the limiter of the correction, glitches and late samples, learning, predictor, uploads, telemetry, the BLAKE3 of the table.
+ * an upset, learning, predictor, uploads, telemetry, the BLAKE3 of the table.
  *
  * Compile it without contraction and without -ffast-math or any of its parts: -ffp-contract=off. Where that was forgotten it does not compile, or
  * fxt_open refuses with FXT_ARITHMETIC; two parts that Clang takes alone are found by vectors/check only (-freciprocal-math,
@@ -38,8 +38,8 @@
 extern "C" {
 #endif
 
-/* The format that is read, and no other. */
-#define FXT_FORMAT_VERSION 3
+/** The format that is read, and no other; bytes of a page, and of a saved play. */
+#define FXT_FORMAT_VERSION 3u
 #define FXT_PAGE_BYTES 256
 #define FXT_SAVED_PLAY_BYTES 28
 
@@ -228,6 +228,141 @@ void fxt_step(const fxt_table *table, fxt_play *play, int64_t measured, int64_t 
 /** The transmission error in steady motion, rad; false if there is none, or no place for it. */
 bool fxt_steady_error(const fxt_table *table, int64_t generator, float torque_n_m, float temperature_c, fxt_direction direction,
                       float *error_rad);
+
+/* A joint: a step for every tick, with a limiter, modes and what is to be done where a sample, a tick or an answer is missing. With one
+ * temperature node, or at a temperature of a node but the hottest, all bits are those of the core's `Joint` to which nothing is added; between
+ * nodes the core blends its copies first, which differs by less than 0.004 arc-seconds.
+ *
+ *   static fxt_table table;
+ *   static fxt_joint joint;
+ *   static fxt_encoder encoder;
+ *   static const fxt_limits limits = {.tick_s = 1e-3f, .rate_rad_s = 0.05f, .acceleration_rad_s2 = 5.0f,
+ *                                     .generator_rate_rad_s = 600.0f, .patience = 5};
+ *   if (fxt_open(&table, image, sizeof image).reason != FXT_OK || fxt_joint_init(&joint, &limits) != FXT_LIMITS_OK ||
+ *       !fxt_encoder_init(&encoder, 65536, 16, false, 0) || !fxt_joint_request(&joint, FXT_TRACKING)) stop();
+ *   // every tick:
+ *   fxt_input in = {.target = wanted, .torque_n_m = torque_n_m, .temperature_c = temperature_c};
+ *   in.has_generator = fxt_encoder_read(&encoder, timer_register(), &in.generator);
+ *   move_generator_to(fxt_tick(&table, &joint, &in).command);
+ */
+
+/** What a joint does with its correction. */
+typedef enum fxt_mode {
+    FXT_OFF = 0,  /**< none: it is taken back within the limits. The start */
+    FXT_TRACKING, /**< it follows the table */
+    FXT_HOLD,     /**< it stays as it is */
+    FXT_SAFE      /**< none, and none before FXT_OFF was asked for: after a fault */
+} fxt_mode;
+
+/** What a tick that came late does to the correction. */
+typedef enum fxt_overrun {
+    FXT_SKIP = 0,  /**< nothing more: the ticks missed are skipped */
+    FXT_HOLD_LAST, /**< it stays as it is in this tick */
+    FXT_FADE_OUT   /**< it fades to none within fade_ticks, stays there as long, and comes back */
+} fxt_overrun;
+
+/** Limits of a joint, in units of its output and of seconds. */
+typedef struct fxt_limits {
+    float tick_s;               /**< time from tick to tick, 1e-7 to 1e3 s */
+    float rate_rad_s;           /**< fastest correction: 1.8e-10 to 0.05 rad in a tick */
+    float acceleration_rad_s2;  /**< largest acceleration of the correction, no less than 1.8e-10 rad in a tick more each tick; it brakes with half of that */
+    float generator_rate_rad_s; /**< fastest generator: what moves faster from tick to tick is a glitch; 1.5e-9 rad to half a turn in a tick */
+    float hold_rad;             /**< a target no further from the output is reached on the flank that bears already; 0: none; 1.5e-9 to 0.05 */
+    uint16_t patience;          /**< ticks for which a glitch is not believed, and the last correction kept where none can be made */
+    uint16_t fade_ticks;        /**< of FXT_FADE_OUT */
+    fxt_overrun overrun;
+} fxt_limits;
+
+/** Which limit a joint cannot have: the first that is not finite or out of its range. */
+typedef enum fxt_limit {
+    FXT_LIMITS_OK = 0,
+    FXT_TICK,
+    FXT_RATE,
+    FXT_ACCELERATION,
+    FXT_GENERATOR_RATE,
+    FXT_HOLD_RAD,
+    FXT_OVERRUN_POLICY,
+    FXT_NO_JOINT /**< the pointer to the joint is NULL */
+} fxt_limit;
+
+/** A joint: its limits, and what changes while it runs. Its fields are nobody else's, but for the play, which may be saved. Memory of zeros is no
+ * joint: it corrects nothing. */
+typedef struct fxt_joint {
+    fxt_play play;
+    int64_t generator;                                   /* the last sample that was believed */
+    int32_t correction, goal, speed;                     /* eighths of a count */
+    int32_t rate, acceleration, largest_move, hold;      /* eighths of a count in a tick, and more each tick; counts */
+    float fade_step;
+    uint32_t fading, missed_ticks;
+    uint16_t glitches, uncorrected, patience, fade;
+    fxt_mode mode;
+    uint8_t flank, sampled, hold_late;
+} fxt_joint;
+
+/** One tick's measurements. */
+typedef struct fxt_input {
+    int64_t generator, target;        /**< counts: the measured generator angle; where the output shall be */
+    float torque_n_m, temperature_c;
+    uint16_t missed_ticks;            /**< since the last call */
+    bool has_generator;               /**< false where there is no sample in this tick */
+} fxt_input;
+
+/** What happened in a tick: bits of fxt_output.flags, those of the core. */
+typedef enum fxt_flag {
+    FXT_SAMPLE_LOST = 1,
+    FXT_GLITCH = 2,         /**< the sample was not believed */
+    FXT_LATE = 4,           /**< ticks were missed */
+    FXT_HELD_BACK = 8,      /**< the limiter held the correction back */
+    FXT_NOT_CORRECTED = 16, /**< no correction could be made; the last one is kept or fades out */
+    FXT_NO_JOINT_OR_TABLE = 128, /**< the joint was not made or the table was refused; the command is where the generator is */
+    FXT_IN_SAFE_MODE = 256
+} fxt_flag;
+
+/** One tick's results. */
+typedef struct fxt_output {
+    int64_t command, output;      /**< counts: the generator angle to command; where the output is */
+    float transmission_error_rad; /**< now; 0 if disabled */
+    float uncertainty_rad;        /**< it lies within this of it, as far as play and jumps go */
+    float correction_rad;         /**< in the command: target less command over ratio */
+    float held_back_rad;          /**< what the limiter held back of it */
+    fxt_quality quality;
+    uint32_t flags;
+} fxt_output;
+
+/** Makes a joint: off, no correction, the side of the play unknown. One that is refused corrects nothing. NULL limits are refused. */
+fxt_limit fxt_joint_init(fxt_joint *joint, const fxt_limits *limits);
+/** Changes the mode from the next tick on; false, and nothing changes, if it may not follow: everything may stop, tracking starts from off or
+ * hold, hold only from tracking, and safe is left to off alone. One that was not made is in FXT_SAFE. */
+bool fxt_joint_request(fxt_joint *joint, fxt_mode mode);
+fxt_mode fxt_joint_mode(const fxt_joint *joint);
+/** Which side of the play the drive rests on is not known any more, as after work on it. */
+void fxt_joint_forget_side(fxt_joint *joint);
+/** One tick: in the order of its calls the play follows the generator. The correction moves within rate and acceleration, and stays within the
+ * error limit of the table (times 1.001, and 16 counts), whatever comes in. Without a joint, a table or an input the command is where the generator
+ * is. It does not see that the memory of the table changed: fxt_page_intact. */
+fxt_output fxt_tick(const fxt_table *table, fxt_joint *joint, const fxt_input *input);
+
+/** An encoder and where it is: from its register to an angle and back, as the core's; nothing drifts, also where the counts in a turn are no power
+ * of two. Its fields are nobody else's; memory of zeros is none. */
+typedef struct fxt_encoder {
+    uint64_t reading;
+    int64_t since_zero, zero_counts;
+    uint32_t counts_per_turn;
+    uint8_t wrap_bits, reversed, started;
+} fxt_encoder;
+
+/** counts_per_turn: 2 to 2^31, four times the lines of an incremental one. wrap_bits: the register begins anew after 2^wrap_bits counts, 1 to 64 (a
+ * signed one is taken by its bits); 0: after each turn. reversed: it counts up where the angle falls. zero_counts: what it reads at the angle 0,
+ * -2^62 to 2^62. False, and no encoder, if one is out of its range. */
+bool fxt_encoder_init(fxt_encoder *encoder, uint32_t counts_per_turn, uint8_t wrap_bits, bool reversed, int64_t zero_counts);
+/** The first reading after a reset: of all angles with this reading the one nearest to near_counts (2^-32 turn), one that was saved. Without this
+ * call the first reading is taken near 0. False if the register cannot read that. */
+bool fxt_encoder_start(fxt_encoder *encoder, uint64_t reading, int64_t near_counts);
+/** Takes a reading and tells the angle, counts of 2^-32 turn, to the nearest. Between two readings it moves by less than half of what the register
+ * counts. False, and nothing changes, if the register cannot read that: give the tick no sample then. */
+bool fxt_encoder_read(fxt_encoder *encoder, uint64_t reading, int64_t *angle);
+/** What the register reads at an angle, to the nearest count: for a drive that is commanded in counts of its encoder. 0 without an encoder. */
+uint64_t fxt_encoder_reading(const fxt_encoder *encoder, int64_t angle);
 
 /** Radians to the nearest count, false beyond 2^31 turns and without a place for it; counts to radians. For start-up: double precision. */
 bool fxt_from_rad(double rad, int64_t *counts);

@@ -1,4 +1,5 @@
-// One joint of an antenna in C: the program of ../antenna_rust, call by call, and the same lines.
+// SPDX-License-Identifier: MIT OR Apache-2.0
+/// @file One joint of an antenna in C: the program of ../antenna_rust, call by call, and the same lines.
 
 #include "cam.h"
 #include "flexspline.h"

@@ -1,5 +1,6 @@
-// One joint on a PC: encoder counts in, commands out; a star now and then teaches what this unit has beside its table, springs that slip
-// add its hysteresis, an observer says where the output will be, and records go to the ground.
+// SPDX-License-Identifier: MIT OR Apache-2.0
+/// @file One joint on a PC: encoder counts in, commands out; a star now and then teaches what this unit has beside its table, springs that slip
+/// add its hysteresis, an observer says where the output will be, and records go to the ground.
 
 #include "cam.h"
 #include "flexspline.h"

@@ -1,4 +1,6 @@
-/* The reader beside the vectors, then the core from its static library with both images: 0 if all is well. */
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
+/** @file
+ * The reader beside the vectors, then the core from its static library with both images: 0 if all is well. */
 #include "flexspline.h"
 #include "flexspline_cam.h"
 #include "flexspline_table.h"

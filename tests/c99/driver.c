@@ -1,4 +1,6 @@
-/* Finds again with the reader in C what the core said: tests/fuzz/examples/c99.rs writes the records that are read here.
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
+/** @file
+ * Finds again with the reader in C what the core said: tests/fuzz/examples/c99.rs writes the records that are read here.
  *
  * On a host: driver FILE. On a Cortex-M4F in QEMU the file VECTORS is read through semihosting. 0 if all bits are equal. */
 #include "flexspline_table.h"
@@ -11,7 +13,7 @@ static uint8_t *alone(uint8_t *image, uint32_t length);
 static void begin(void);
 static void end(uint32_t kind);
 
-static unsigned calls, accepted, refused, differences;
+static unsigned calls, ticks, accepted, refused, differences;
 
 static void print_number(unsigned number)
 {
@@ -232,12 +234,86 @@ static void restore(void)
     same(equal == restored, "restored and saved again", 3);
 }
 
+/* The limits of a joint. */
+static void make_joint(fxt_joint *joint)
+{
+    fxt_limits limits;
+    limits.tick_s = number();
+    limits.rate_rad_s = number();
+    limits.acceleration_rad_s2 = number();
+    limits.generator_rate_rad_s = number();
+    limits.hold_rad = number();
+    const uint32_t both = word();
+    limits.patience = (uint16_t)(both & 0xffffu);
+    limits.fade_ticks = (uint16_t)(both >> 16);
+    limits.overrun = (fxt_overrun)word();
+    same((uint32_t)fxt_joint_init(joint, &limits) == byte(), "limits of a joint", 4);
+    same(fxt_joint_mode(joint) == (joint->rate > 0 ? FXT_OFF : FXT_SAFE), "mode at the start", 4);
+}
+
+static void tick(const fxt_table *table, fxt_joint *joint)
+{
+    const uint32_t asked = byte();
+    const bool taken = byte() != 0u;
+    fxt_input input;
+    input.has_generator = byte() != 0u;
+    input.generator = angle();
+    input.target = angle();
+    input.torque_n_m = number();
+    input.temperature_c = number();
+    input.missed_ticks = (uint16_t)word();
+    if (asked < 4u)
+        same(fxt_joint_request(joint, (fxt_mode)asked) == taken, "a mode that may be or not", 5);
+    else if (asked == 4u)
+        fxt_joint_forget_side(joint);
+    ticks++;
+    begin();
+    const fxt_output found = fxt_tick(table, joint, &input);
+    end(7);
+    same(found.command == angle(), "command of a tick", 5);
+    same(found.output == angle(), "output of a tick", 5);
+    same(bits(found.transmission_error_rad) == word(), "transmission error of a tick", 5);
+    same(bits(found.uncertainty_rad) == word(), "uncertainty of a tick", 5);
+    same(bits(found.correction_rad) == word(), "correction", 5);
+    same(bits(found.held_back_rad) == word(), "what is held back", 5);
+    same((uint32_t)found.quality == word(), "quality of a tick", 5);
+    same(found.flags == word(), "flags of a tick", 5);
+    same(joint->missed_ticks == word(), "ticks missed", 5);
+}
+
+static void make_encoder(fxt_encoder *encoder)
+{
+    const uint32_t per_turn = word(), bits_of_it = byte();
+    const bool reversed = byte() != 0u;
+    const int64_t zero = angle();
+    same(fxt_encoder_init(encoder, per_turn, (uint8_t)bits_of_it, reversed, zero) == (byte() != 0u), "an encoder or none", 6);
+}
+
+static void call_encoder(fxt_encoder *encoder)
+{
+    const uint32_t kind = byte();
+    const uint64_t asked = (uint64_t)angle();
+    const bool taken = byte() != 0u;
+    const int64_t told = angle();
+    int64_t found = 0;
+    if (kind == 0u)
+        same(fxt_encoder_start(encoder, asked, told) == taken, "start of an encoder", 7);
+    else if (kind == 1u) {
+        same(fxt_encoder_read(encoder, asked, &found) == taken, "a reading or none", 7);
+        same(!taken || found == told, "angle of an encoder", 7);
+    } else
+        same(fxt_encoder_reading(encoder, (int64_t)asked) == (uint64_t)told, "reading at an angle", 7);
+}
+
 /* The memory of an accepted image changes after the check: whatever is read then lies in it, and an error is within the stated limit. */
 static void damage(const fxt_table *table, uint8_t *image)
 {
+    static const fxt_limits fast = {.tick_s = 1e-3f, .rate_rad_s = 1.0f, .acceleration_rad_s2 = 1e3f, .generator_rate_rad_s = 3e3f};
     fxt_play play = fxt_play_unknown();
+    fxt_joint joint;
     const float limit = 1.002f * fxt_tell(table).error_limit_rad + 1e-6f;
     uint32_t mixed = 1;
+    same(fxt_joint_init(&joint, &fast) == FXT_LIMITS_OK && fxt_joint_request(&joint, FXT_TRACKING), "a joint", 0);
     for (uint32_t i = 0; i < 64u; i++) {
         fxt_prediction now;
         fxt_command next;
@@ -249,9 +325,13 @@ static void damage(const fxt_table *table, uint8_t *image)
             image[136u + (mixed >> 16) % 60u] = (uint8_t)(mixed >> 24);
         const float at = (float)((int32_t)mixed >> 24);
         fxt_step(table, &play, (int64_t)mixed << 8, (int64_t)mixed << 2, at, at, &now, &next);
+        const fxt_input input = {(int64_t)mixed << 8, (int64_t)mixed << 2, at, at, 0, true};
+        const fxt_output ticked = fxt_tick(table, &joint, &input);
         /* The play of before may still be in the first. */
         const float error = now.transmission_error_rad, aimed = next.predicted_error_rad;
         const bool bounded = error >= -2.0f * limit && error <= 2.0f * limit && aimed >= -2.0f * limit && aimed <= 2.0f * limit;
+        /* A correction stays within once, whatever is read. */
+        same(ticked.correction_rad >= -limit && ticked.correction_rad <= limit && ticked.quality <= FXT_DISABLED, "a tick after damage", i);
         same(bounded && now.quality <= FXT_DISABLED && next.quality <= FXT_DISABLED, "after damage", i);
     }
 }
@@ -259,6 +339,8 @@ static void damage(const fxt_table *table, uint8_t *image)
 static int compare(void)
 {
     static fxt_table table;
+    static fxt_joint joint;
+    static fxt_encoder encoder;
     fxt_play play = fxt_play_unknown();
     bool whole = true, ended = false;
     uint8_t *image = NULL;
@@ -274,20 +356,30 @@ static int compare(void)
             call(&table, &play);
         else if (record == 3)
             restore();
+        else if (record == 4)
+            make_joint(&joint);
+        else if (record == 5)
+            tick(&table, &joint);
+        else if (record == 6)
+            make_encoder(&encoder);
+        else if (record == 7)
+            call_encoder(&encoder);
         else
             ended = record == 0;
-        if (record > 3)
+        if (record > 7)
             whole = false;
     }
     print_number(calls);
     print(" calls, ");
+    print_number(ticks);
+    print(" ticks, ");
     print_number(accepted);
     print(" images accepted, ");
     print_number(refused);
     print(" refused, ");
     print_number(differences);
     print(" differences\n");
-    return whole && calls > 0u && accepted > 0u && differences == 0u ? 0 : 1;
+    return whole && calls > 0u && ticks > 0u && accepted > 0u && differences == 0u ? 0 : 1;
 }
 
 #ifdef VECTORS
@@ -362,7 +454,7 @@ void *memcpy(void *to, const void *from, size_t count)
 #define COUNTED 4u
 
 static uint32_t started;
-static uint32_t least[5], most[5];
+static uint32_t least[8], most[8];
 
 static void begin(void)
 {
@@ -380,12 +472,14 @@ static void end(uint32_t kind)
 
 int run(void)
 {
-    static const char *const names[5] = {"forward", "inverse", "inverse", "inverse from", "step"};
+    static const char *const names[8] = {"forward", "inverse", "inverse", "inverse from", "step", NULL, NULL, "tick"};
     SYSTICK[1] = RELOAD;
     SYSTICK[2] = 0;
     SYSTICK[0] = 5;
     const int status = compare();
-    for (uint32_t kind = 0; kind < 5; kind++) {
+    for (uint32_t kind = 0; kind < 8; kind++) {
+        if (names[kind] == NULL)
+            continue;
         print(names[kind]);
         print(": ");
         print_number(most[kind]);

@@ -1,4 +1,6 @@
-/* The reader in C99 as it is called by mistake: pointers that are not there, a play that nobody started, angles beyond the range, memory
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
+/** @file
+ * The reader in C99 as it is called by mistake: pointers that are not there, a play that nobody started, angles beyond the range, memory
  * that changes. 0 if each is answered as flexspline_table.h says; else the number of the line.
  *
  * misuse TABLE.fxt */

@@ -1,4 +1,6 @@
-/* Steps an FMU of the compensation on this system, by declarations of its own: step LIBRARY GUID RESOURCES
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
+/** @file
+ * Steps an FMU of the compensation on this system, by declarations of its own: step LIBRARY GUID RESOURCES
  *
  * RESOURCES is a file URI. Prints the command of the generator after each of 500 steps, with all digits: the same on every system. */
 #include <stdio.h>

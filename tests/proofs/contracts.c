@@ -1,4 +1,6 @@
-/* ESBMC: what functions of the reader promise, for any argument that their premise allows. One function here is one proof.
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
+/** @file
+ * ESBMC: what functions of the reader promise, for any argument that their premise allows. One function here is one proof.
  * READER is the reader, or one with a planted bug. With REACH each proof ends in an assertion that is false: it has to fail, or nothing was
  * proved, as no argument meets the premise. */
 #include <stdlib.h>
@@ -21,6 +23,8 @@ void __ESBMC_assert(_Bool, const char *);
 
 /* The largest limit that fxt_open accepts: 0.05 rad in counts, times 1.001, plus 16. */
 #define MOST_LIMIT 34212915
+/* The fastest correction that fxt_joint_init accepts: 0.05 rad in a tick, eighths of a count, as a float. */
+#define MOST_FINE_RATE 273429760
 
 void weights_sum_to_one(void)
 {
@@ -169,4 +173,169 @@ void only_a_play_is_restored(void)
         PROMISE(is_play(&is));
         END;
     }
+}
+
+/* What fxt_joint_init can leave (limits_that_are_accepted), and a correction that a tick can have left with this table. */
+static fxt_joint any_joint(int32_t size)
+{
+    static const fxt_joint no_joint;
+    fxt_joint joint = no_joint;
+    joint.rate = nondet_int();
+    joint.acceleration = nondet_int();
+    joint.correction = nondet_int();
+    joint.speed = nondet_int();
+    joint.goal = nondet_int();
+    joint.mode = (fxt_mode)nondet_uint();
+    joint.patience = (uint16_t)nondet_uint();
+    joint.uncorrected = (uint16_t)nondet_uint();
+    joint.glitches = (uint16_t)nondet_uint();
+    joint.fade = (uint16_t)nondet_uint();
+    joint.fading = nondet_uint();
+    joint.largest_move = nondet_int();
+    joint.generator = nondet_long();
+    joint.hold_late = nondet_bool() ? 1u : 0u;
+    joint.sampled = nondet_bool() ? 1u : 0u;
+    __ESBMC_assume(joint.rate >= 1 && joint.rate <= MOST_FINE_RATE && joint.acceleration >= 1 && joint.acceleration <= MOST_CHANGE &&
+                   joint.acceleration <= 2 * joint.rate + 1);
+    __ESBMC_assume(joint.correction >= -size && joint.correction <= size && joint.speed >= -joint.rate && joint.speed <= joint.rate);
+    __ESBMC_assume(joint.largest_move >= 1 && joint.mode <= FXT_SAFE && joint.patience < UINT16_MAX);
+    return joint;
+}
+
+static int32_t any_size(void)
+{
+    const int32_t limit = nondet_int();
+    __ESBMC_assume(limit >= 16 && limit <= MOST_LIMIT);
+    return limit * FINE;
+}
+
+/* fxt_tick moves its correction by this alone, wherever it wants to have it: so these are the limits of a tick. */
+void correction_is_within_the_limit_of_the_table(void)
+{
+    const int32_t size = any_size();
+    fxt_joint joint = any_joint(size);
+    const int32_t found = moved_by(&joint, nondet_int(), size);
+    PROMISE(found == joint.correction && found >= -size && found <= size);
+    END;
+}
+
+void correction_moves_within_the_rate(void)
+{
+    const int32_t size = any_size();
+    fxt_joint joint = any_joint(size);
+    const int32_t before = joint.correction, found = moved_by(&joint, nondet_int(), size);
+    PROMISE(joint.speed == found - before && joint.speed >= -joint.rate && joint.speed <= joint.rate);
+    END;
+}
+
+void correction_moves_within_the_acceleration(void)
+{
+    const int32_t size = any_size();
+    fxt_joint joint = any_joint(size);
+    const int32_t before = joint.speed, found = moved_by(&joint, nondet_int(), size), change = joint.speed - before;
+    /* At the limit of the table it stops whatever its speed was. */
+    PROMISE((change >= -joint.acceleration && change <= joint.acceleration) || found == size || found == -size);
+    END;
+}
+
+void limits_that_are_accepted_keep_a_joint_in_its_ranges(void)
+{
+    fxt_limits limits;
+    limits.tick_s = nondet_float();
+    limits.rate_rad_s = nondet_float();
+    limits.acceleration_rad_s2 = nondet_float();
+    limits.generator_rate_rad_s = nondet_float();
+    limits.hold_rad = nondet_float();
+    limits.patience = (uint16_t)nondet_uint();
+    limits.fade_ticks = (uint16_t)nondet_uint();
+    limits.overrun = (fxt_overrun)nondet_uint();
+    fxt_joint joint;
+    if (fxt_joint_init(&joint, &limits) == FXT_LIMITS_OK) {
+        PROMISE(joint.rate >= 1 && joint.rate <= MOST_FINE_RATE && joint.acceleration >= 1);
+        PROMISE(joint.acceleration <= 2 * joint.rate + 1 && joint.acceleration <= MOST_CHANGE);
+        PROMISE(joint.largest_move >= 1 && joint.hold >= 0 && joint.patience < UINT16_MAX);
+        PROMISE(joint.mode == FXT_OFF && joint.correction == 0 && joint.speed == 0 && is_made(&joint));
+        END;
+    }
+    PROMISE(joint.correction == 0);
+}
+
+void modes_follow_the_rules(void)
+{
+    fxt_joint joint = any_joint(any_size());
+    const fxt_mode from = joint.mode, to = (fxt_mode)nondet_uint();
+    __ESBMC_assume(to <= FXT_SAFE);
+    const bool may = fxt_joint_request(&joint, to);
+    PROMISE(joint.mode == (may ? to : from));
+    PROMISE(may || to == FXT_TRACKING || to == FXT_HOLD);
+    PROMISE(!(may && from == FXT_SAFE) || to == FXT_SAFE || to == FXT_OFF);
+    PROMISE(!(may && to == FXT_HOLD) || from == FXT_TRACKING || from == FXT_HOLD);
+    END;
+}
+
+void goal_follows_the_mode(void)
+{
+    const int32_t size = any_size();
+    fxt_joint joint = any_joint(size);
+    const int32_t before = joint.goal, wanted = nondet_int();
+    __ESBMC_assume(before >= -size && before <= size && wanted >= -MOST_LIMIT && wanted <= MOST_LIMIT);
+    /* No fade. */
+    joint.fade = 0u;
+    joint.fading = 0u;
+    const bool late = nondet_bool(), sane = nondet_bool();
+    const int32_t goal = goal_of(&joint, late, wanted, sane);
+    if (joint.mode == FXT_HOLD || (late && joint.hold_late != 0u)) {
+        PROMISE(goal == before);
+    } else if (joint.mode == FXT_TRACKING && joint.uncorrected <= joint.patience) {
+        PROMISE(goal == (sane ? wanted * FINE : before));
+    } else {
+        PROMISE(goal == 0);
+    }
+    PROMISE(!sane || joint.uncorrected == 0u);
+    END;
+}
+
+void a_sample_moves_no_further_than_a_tick_allows_or_is_doubted(void)
+{
+    fxt_joint joint = any_joint(any_size());
+    const fxt_joint before = joint;
+    fxt_input input;
+    input.generator = nondet_long();
+    input.has_generator = nondet_bool();
+    const judged is = judge(&joint, &input);
+    const int64_t way = minus(joint.generator, before.generator);
+    PROMISE((way >= -(int64_t)before.largest_move && way <= before.largest_move) || is.forgotten || before.sampled == 0u);
+    PROMISE(joint.generator == before.generator || (input.has_generator && joint.generator == input.generator));
+    PROMISE(joint.glitches <= joint.patience && (is.blind || joint.sampled != 0u));
+    END;
+}
+
+static fxt_encoder any_encoder(void)
+{
+    fxt_encoder encoder;
+    __ESBMC_assume(fxt_encoder_init(&encoder, nondet_uint(), (uint8_t)nondet_uint(), nondet_bool(), nondet_long()));
+    return encoder;
+}
+
+void the_shorter_way_within_a_turn(void)
+{
+    const fxt_encoder encoder = any_encoder();
+    const int64_t from = nondet_long(), to = nondet_long(), turn = encoder.counts_per_turn;
+    __ESBMC_assume(encoder.wrap_bits == 0u && from >= 0 && to >= 0 && can_read(&encoder, (uint64_t)from) && can_read(&encoder, (uint64_t)to));
+    const int64_t way = encoder_way(&encoder, (uint64_t)from, (uint64_t)to);
+    PROMISE(2 * way < turn && 2 * way >= -turn && from + way >= -turn && from + way < 2 * turn);
+    PROMISE(from + way == to || from + way == to + turn || from + way == to - turn);
+    END;
+}
+
+void the_shorter_way_of_a_register(void)
+{
+    const fxt_encoder encoder = any_encoder();
+    const uint64_t from = (uint64_t)nondet_long(), to = (uint64_t)nondet_long();
+    __ESBMC_assume(encoder.wrap_bits > 0u && can_read(&encoder, from) && can_read(&encoder, to));
+    const int64_t way = encoder_way(&encoder, from, to);
+    const uint64_t all = most_of_bits(encoder.wrap_bits);
+    const int64_t half = (int64_t)(all / 2u);
+    PROMISE(((from + (uint64_t)way) & all) == to && way <= half && way >= -half - 1);
+    END;
 }

@@ -1,3 +1,6 @@
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
+/** @file
+ * A table that fxt_open accepts as sources of C, for a prover: dump TABLE.fxt. */
 #include "flexspline_table.c"
 #include <stdio.h>
 static uint8_t d[100000];

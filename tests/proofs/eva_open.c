@@ -1,4 +1,6 @@
-/* Frama-C Eva: an image of any bytes and any length up to the largest that a header can state is opened.
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
+/** @file
+ * Frama-C Eva: an image of any bytes and any length up to the largest that a header can state is opened.
  * READER is the reader, or one with a planted bug. */
 #include READER
 #include "__fc_builtin.h"

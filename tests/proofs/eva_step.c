@@ -1,4 +1,6 @@
-/* Frama-C Eva: one step with a shipped table, from any memory of a play, for any angle, torque and temperature.
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
+/** @file
+ * Frama-C Eva: one step with a shipped table, from any memory of a play, for any angle, torque and temperature.
  * TABLE is what dump.c wrote of the table; READER the reader, or one with a planted bug. */
 #include READER
 #include TABLE

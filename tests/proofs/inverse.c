@@ -1,4 +1,6 @@
-/* Enumeration: forward after inverse, for every STRIDE-th of the 2^32 angles of a generator turn, both directions, at torques of the table.
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
+/** @file
+ * Enumeration: forward after inverse, for every STRIDE-th of the 2^32 angles of a generator turn, both directions, at torques of the table.
  *
  * inverse STRIDE TABLE.fxt: 0 if each output is within what the table states (error of the inverse, and 8 counts of rounding) of its target. */
 #include READER

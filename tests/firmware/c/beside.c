@@ -1,4 +1,5 @@
-// What goes on beside a tick, from C: a sum over every bit of it, the same on a PC and on the target.
+// SPDX-License-Identifier: MIT OR Apache-2.0
+/// @file What goes on beside a tick, from C: a sum over every bit of it, the same on a PC and on the target.
 
 #include "beside.h"
 

@@ -1,4 +1,5 @@
-// See beside.c.
+// SPDX-License-Identifier: MIT OR Apache-2.0
+/// @file See beside.c.
 
 #ifndef BESIDE_H
 #define BESIDE_H

@@ -1,4 +1,5 @@
-// beside.c on this machine: prints the sum that the target has to find.
+// SPDX-License-Identifier: MIT OR Apache-2.0
+/// @file beside.c on this machine: prints the sum that the target has to find.
 
 #include "beside.h"
 #include "cam.h"

@@ -1,7 +1,8 @@
-// The core from C: the table of the cam generator in flash, 2000 ticks with a reversal and what they cost, a table sent in chunks, events,
-// a record, and what must be refused.
-//
-//   tests/run firmware
+// SPDX-License-Identifier: MIT OR Apache-2.0
+/// @file The core from C: the table of the cam generator in flash, 2000 ticks with a reversal and what they cost, a table sent in chunks, events,
+/// a record, and what must be refused.
+///
+/// tests/run firmware
 
 #include "beside.h"
 #include "cam.h"

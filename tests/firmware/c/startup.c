@@ -1,4 +1,5 @@
-// Vectors, start of the floating-point unit, memory, and the end of the emulation by semihosting.
+// SPDX-License-Identifier: MIT OR Apache-2.0
+/// @file Vectors, start of the floating-point unit, memory, and the end of the emulation by semihosting.
 
 #include <stdint.h>
 

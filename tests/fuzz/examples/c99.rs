@@ -7,17 +7,22 @@
 //! some ticks with each that is accepted. Little-endian records, told in [`Vectors`].
 
 use flexspline::{
-    Approach, Command, Direction, Field, GeneratorAngle, ImageError, OutputAngle, PlayState, Prediction, Table,
+    Adjustment, Approach, Command, Direction, Encoder, EncoderSettings, EncoderState, EncoderWrap, Field, Flags,
+    GeneratorAngle, ImageError, Images, Input, Joint, JointState, Limits, Mode, OutputAngle, Overrun, PlayState,
+    Prediction, Store, Table,
 };
 use flexspline_fuzz::{Choices, image, tables};
 use std::io::{BufWriter, Write};
 
 /// Records: 1, an image: length, bytes, verdict and what is known of the table. 2, a call: kind, two angles, torque,
-/// temperature, what it gives, and the play after it. 3, a saved play: bytes, and whether they are restored. 0, the
-/// end.
+/// temperature, what it gives, and the play after it. 3, a saved play: bytes, and whether they are restored. 4, the
+/// limits of a joint, and which of them is refused. 5, a tick: what is asked of the mode and whether it may be, the
+/// input, what the tick gives. 6, settings of an encoder, and whether they can be. 7, a call of it: kind, reading or
+/// angle, whether it is taken, the angle or reading. 0, the end.
 struct Vectors<W> {
     out: W,
     calls: u64,
+    ticks: u64,
     accepted: u64,
     refused: std::collections::BTreeMap<u8, u64>,
 }
@@ -35,6 +40,11 @@ impl Mixed {
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         z ^ (z >> 31)
+    }
+
+    /// From 0 to 1.
+    fn unit(&mut self) -> f64 {
+        (self.number() >> 11) as f64 / (1u64 << 53) as f64
     }
 
     fn bytes(&mut self, count: usize) -> Vec<u8> {
@@ -251,6 +261,216 @@ impl<W: Write> Vectors<W> {
         }
         Ok(())
     }
+    /// Ticks of joints with this table, at temperatures where the copies of a store hold the words of the image: below
+    /// the axis, at any node but the last, or anywhere with a single one.
+    fn joints(&mut self, image: &[u8], runs: usize, ticks: usize, mixed: &mut Mixed) -> std::io::Result<()> {
+        let table = Table::check(image).expect("accepted");
+        let nodes: Vec<f32> = table.temperature_nodes_c().collect();
+        let second = image.to_vec();
+        let images = Images::new(image, &second);
+        for run in 0..runs {
+            let [least, most] = table.temperature_range_c();
+            let temperature = match (run % 4, nodes.len()) {
+                (0, _) => nodes[0] - 1.0,
+                (_, 1) => least + (most - least) * mixed.unit() as f32,
+                (_, count) => nodes[mixed.number() as usize % (count - 1)],
+            };
+            let mut store = Store::new();
+            // A table may be too large for a store.
+            if store.activate(&images, table.drive(), temperature).is_err() {
+                return Ok(());
+            }
+            let Some(joint) = self.joint(&table, mixed)? else { continue };
+            self.motion(&table, &joint, (&mut store, &images, temperature), ticks, mixed)?;
+        }
+        Ok(())
+    }
+
+    /// A joint with limits that can be, or with one that cannot.
+    fn joint(&mut self, table: &Table<'_>, mixed: &mut Mixed) -> std::io::Result<Option<Joint>> {
+        let mut decade = |least: f64, most: f64| 10f64.powf(least + (most - least) * mixed.unit()) as f32;
+        let mut limits = Limits {
+            tick_s: decade(-4.0, -2.0),
+            rate_rad_s: decade(-4.0, 0.6),
+            acceleration_rad_s2: decade(-3.0, 4.0),
+            generator_rate_rad_s: decade(0.0, 2.4),
+            patience: 0,
+            hold_rad: decade(-8.0, -4.0),
+        };
+        let number = mixed.number();
+        limits.patience = if number & 7 == 0 { (number >> 8) as u16 } else { (number >> 8 & 15) as u16 };
+        limits.hold_rad = if number & 0x30 == 0 { 0.0 } else { limits.hold_rad };
+        if number & 0xc0 == 0 {
+            let bad =
+                [0.0, -1.0, f32::NAN, f32::INFINITY, 1e-40, 1e-9, 1e12, -0.0, f32::from_bits((number >> 16) as u32)];
+            let found = bad[(number >> 50) as usize % bad.len()];
+            match number >> 56 & 7 {
+                0 => limits.tick_s = found,
+                1 => limits.rate_rad_s = found,
+                2 => limits.acceleration_rad_s2 = found,
+                3 => limits.generator_rate_rad_s = found,
+                _ => limits.hold_rad = found,
+            }
+        }
+        let ticks = if number >> 33 & 7 == 0 { (number >> 36) as u16 } else { (number >> 36 & 31) as u16 };
+        let code = number >> 30 & 3;
+        let overrun = [Overrun::SkipAndCount, Overrun::HoldLast, Overrun::FadeOut { ticks }];
+        let overrun = overrun[code.min(2) as usize];
+        let made = Joint::new(*table.drive(), limits, overrun);
+        let names = ["tick_s", "rate_rad_s", "acceleration_rad_s2", "generator_rate_rad_s", "hold_rad"];
+        let refused = made.as_ref().err().map(|error| names.iter().position(|&name| name == error.name));
+        self.out.write_all(&[4])?;
+        let Limits { tick_s, rate_rad_s, acceleration_rad_s2, generator_rate_rad_s, hold_rad, patience } = limits;
+        self.numbers(&[tick_s, rate_rad_s, acceleration_rad_s2, generator_rate_rad_s, hold_rad])?;
+        self.words(&[u32::from(patience) | u32::from(ticks) << 16, code.min(2) as u32])?;
+        self.out.write_all(&[refused.map_or(0, |at| at.expect("a setting of these") as u8 + 1)])?;
+        Ok(made.ok())
+    }
+
+    /// A joint that follows targets, with noise, glitches, samples and ticks that are missing, modes, and inputs that
+    /// are no number.
+    fn motion(
+        &mut self,
+        table: &Table<'_>,
+        joint: &Joint,
+        (store, images, temperature): (&mut Store, &Images<'_>, f32),
+        ticks: usize,
+        mixed: &mut Mixed,
+    ) -> std::io::Result<()> {
+        let torques: Vec<f32> = table.torque_nodes_n_m().collect();
+        let modes = [Mode::Off, Mode::Tracking, Mode::Hold, Mode::Safe];
+        let mut state = JointState::new();
+        let (mut torque, mut target, mut speed) = (0.0, mixed.number() as i64 >> 20, 0i64);
+        let mut generator = table.drive().nominal_generator(OutputAngle::from_counts(target)).counts();
+        for tick in 0..ticks {
+            let number = mixed.number();
+            if tick == 0 || number.is_multiple_of(64) {
+                let bytes = mixed.bytes(64);
+                torque = tables::hostile_axis(&mut Choices::new(&bytes), &torques);
+                speed = (mixed.number() as i64) >> (40 + mixed.number() % 24);
+            }
+            target = target.wrapping_add(speed);
+            if number.is_multiple_of(2053) {
+                target = mixed.number() as i64;
+            }
+            // Tracking at first; later whatever may be asked for.
+            let asked = match number >> 32 & 127 {
+                _ if tick == 0 => 1,
+                code @ 0..4 => code as usize,
+                4..8 => 1,
+                8 if number >> 40 & 7 == 0 => 4,
+                _ => 5,
+            };
+            let taken = match asked {
+                0..4 => state.request(modes[asked]).is_ok(),
+                4 => {
+                    state.forget_side();
+                    true
+                }
+                _ => true,
+            };
+            let noise = (mixed.number() as i64) >> (64 - (number >> 42 & 31));
+            let glitch = if number >> 48 & 63 == 0 { (mixed.number() as i64) >> 20 } else { 0 };
+            let sample = generator.wrapping_add(noise).wrapping_add(glitch);
+            let has_generator = number >> 54 & 15 != 0;
+            let missed_ticks = if number >> 58 == 0 { (mixed.number() & 3) as u16 } else { 0 };
+            let input = Input {
+                generator: has_generator.then_some(GeneratorAngle::from_counts(sample)),
+                target: OutputAngle::from_counts(target),
+                torque_n_m: torque,
+                missed_ticks,
+                adjustment: Adjustment::default(),
+            };
+            let found = joint.tick(images, store, &mut state, &input);
+            let told = [
+                Flags::SAMPLE_LOST,
+                Flags::GLITCH,
+                Flags::OVERRUN,
+                Flags::HELD_BACK,
+                Flags::NOT_CORRECTED,
+                Flags::SAFE,
+            ];
+            let known = told.iter().fold(0, |bits, flag| bits | flag.bits());
+            assert_eq!(found.flags.bits() & !known, 0, "{:?}", found.flags);
+            self.out.write_all(&[5, asked as u8, taken as u8, has_generator as u8])?;
+            self.angle(sample)?;
+            self.angle(target)?;
+            self.numbers(&[torque, temperature])?;
+            self.words(&[missed_ticks.into()])?;
+            self.angle(found.command.counts())?;
+            self.angle(found.output.counts())?;
+            self.numbers(&[
+                found.transmission_error_rad,
+                found.uncertainty_rad,
+                found.correction_rad,
+                found.held_back_rad,
+            ])?;
+            self.words(&[found.quality as u32, found.flags.bits().into(), state.missed_ticks()])?;
+            self.ticks += 1;
+            // Where it was told to go, as long as that is not a leap.
+            generator = found.command.counts();
+        }
+        Ok(())
+    }
+
+    /// An encoder of any settings, and calls of it.
+    fn encoder(&mut self, calls: usize, mixed: &mut Mixed) -> std::io::Result<()> {
+        let number = mixed.number();
+        let bits = match number & 3 {
+            0 => 0,
+            1 => (number >> 8 & 127) as u8,
+            _ => 16 + (number >> 8 & 15) as u8,
+        };
+        let per_turn = (mixed.number() as u32) >> (number >> 16 & 31);
+        let zero_counts = (mixed.number() as i64) >> (number >> 24 & 63);
+        let reversed = number >> 40 & 1 != 0;
+        let wrap = if bits == 0 { EncoderWrap::Turn } else { EncoderWrap::Bits(bits) };
+        let made = Encoder::new(EncoderSettings { counts_per_turn: per_turn, wrap, reversed, zero_counts });
+        self.out.write_all(&[6])?;
+        self.words(&[per_turn])?;
+        self.out.write_all(&[bits, reversed as u8])?;
+        self.angle(zero_counts)?;
+        self.out.write_all(&[made.is_ok() as u8])?;
+        let Ok(encoder) = made else { return Ok(()) };
+        let mut state: Option<EncoderState> = None;
+        let (mut at, mut speed) = ((mixed.number() as i64) >> 8, 0i64);
+        for _ in 0..calls {
+            let number = mixed.number();
+            if number & 15 == 0 {
+                speed = (mixed.number() as i64) >> (mixed.number() & 63);
+            }
+            at = at.wrapping_add(speed);
+            let reading = match number >> 4 & 7 {
+                0 => mixed.number() >> (mixed.number() & 63),
+                _ => encoder.reading(at),
+            };
+            let kind = if number >> 8 & 63 == 0 { 0 } else { 1 + (number >> 16 & 3 == 0) as u8 };
+            let (asked, taken, told) = match kind {
+                0 => {
+                    let started = encoder.start(reading, at);
+                    state = started.or(state);
+                    (reading, started.is_some(), at)
+                }
+                1 => {
+                    let started = state.or_else(|| encoder.start(reading, 0));
+                    let mut now = started;
+                    let taken = match &mut now {
+                        Some(now) if state.is_some() => encoder.read(now, reading),
+                        Some(_) => true,
+                        None => false,
+                    };
+                    state = now.or(state);
+                    (reading, taken, state.filter(|_| taken).map_or(0, |state| encoder.angle_counts(&state)))
+                }
+                _ => (at as u64, true, encoder.reading(at) as i64),
+            };
+            self.out.write_all(&[7, kind])?;
+            self.angle(asked as i64)?;
+            self.out.write_all(&[taken as u8])?;
+            self.angle(told)?;
+        }
+        Ok(())
+    }
 }
 
 /// A sound table whose numbers of one kind are moved by `part` of a large change, under right checksums: a step of D at
@@ -319,7 +539,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let (ticks, images): (usize, usize) = (ticks.parse()?, images.parse()?);
     let out = BufWriter::new(std::fs::File::create(out)?);
-    let mut vectors = Vectors { out, calls: 0, accepted: 0, refused: Default::default() };
+    let mut vectors = Vectors { out, calls: 0, ticks: 0, accepted: 0, refused: Default::default() };
     let mut mixed = Mixed(1);
     let mut sound: Vec<Vec<u8>> = named.iter().map(std::fs::read).collect::<Result<_, _>>()?;
     sound.extend(tables::BASES.iter().cloned());
@@ -327,6 +547,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         vectors.image(image)?;
         let table = Table::check(image).map_err(|error| error.to_string())?;
         vectors.ticks(&table, ticks.div_ceil(sound.len()), &mut mixed)?;
+        vectors.joints(image, 40, ticks.div_ceil(40 * sound.len()), &mut mixed)?;
+    }
+    for _ in 0..ticks / 40 {
+        vectors.encoder(40, &mut mixed)?;
     }
     for number in 0..images {
         let bytes = mixed.bytes(2048);
@@ -349,11 +573,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             vectors.image(&image)?;
             if let Ok(table) = Table::check(&image) {
                 vectors.ticks(&table, 16, &mut mixed)?;
+                vectors.joints(&image, 1, 16, &mut mixed)?;
             }
         }
     }
     vectors.out.write_all(&[0])?;
     vectors.out.flush()?;
-    println!("{} calls, {} images accepted, refused by reason: {:?}", vectors.calls, vectors.accepted, vectors.refused);
+    let Vectors { calls, ticks, accepted, refused, .. } = vectors;
+    println!("{calls} calls, {ticks} ticks of joints, {accepted} images accepted, refused by reason: {refused:?}");
     Ok(())
 }

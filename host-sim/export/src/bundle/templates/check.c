@@ -1,4 +1,6 @@
-/* Steps of each table beside what the core says of them, bit by bit: 0 if a port is right, else the number of the first step that differs, or
+/* SPDX-License-Identifier: MIT OR Apache-2.0 */
+/** @file
+ * Steps of each table beside what the core says of them, bit by bit: 0 if a port is right, else the number of the first step that differs, or
  * less than 0 where a table is refused: -reason of fxt_open.
  *
  * On a PC: cc -std=c99 -ffp-contract=off -I include vectors/check.c c99/flexspline_table.c tables/[a-z]*.c -o ../check && ../check
