@@ -74,7 +74,7 @@ export async function driveBench(view, asked, bench) {
   // ---- Frame
   const drawing = sketch();
   const form = el("div", { class: "form" });
-  const main = el("div", { class: "fields" });
+  const main = el("div", { class: "fields", id: "main-fields" });
   const rest = el("div", {});
   const wrong = el("div", { role: "status" });
   const live = el("p", { class: "readout", role: "status", id: "live" });
@@ -518,14 +518,15 @@ export async function driveBench(view, asked, bench) {
     if (making) return;
     const of = now.generators[0];
     const choice = select(GENERATORS, of, () => undefined, { id: "table-generator" });
+    const fineness = select(["coarse", "standard", "fine"], "standard", () => undefined, { id: "table-mesh" });
     const go = button(
       "Make the tables",
       async () => {
-        const [drive, generator] = [request(), choice.value];
+        const [drive, generator, mesh] = [request(), choice.value, fineness.value];
         const place = el("div", { role: "status" });
         makePlace.replaceChildren(place);
         try {
-          const job = await run({ work: "tables", drive, generator, mesh: "standard" }, (j) => {
+          const job = await run({ work: "tables", drive, generator, mesh }, (j) => {
             making = j.id;
             place.replaceChildren(progressOf(j));
           });
@@ -542,7 +543,7 @@ export async function driveBench(view, asked, bench) {
       el("p", {
         text: "Sweeps by contact FEM over torque and temperature, a minute or two; the page may be closed meanwhile.",
       }),
-      el("div", { class: "form" }, el("label", {}, "Generator", choice), go),
+      el("div", { class: "form" }, el("label", {}, "Generator", choice), el("label", {}, "Mesh", fineness), go),
     );
   }
   const again = () => button("Back", () => make());
