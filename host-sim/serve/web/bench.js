@@ -4,7 +4,7 @@ import { driveBench } from "./drive-bench.js";
 import { button, el, section, select } from "./elements.js";
 import { follow, run, show, why } from "./jobs.js";
 import { logBench } from "./log-bench.js";
-import { setUnits, writeNumbers } from "./quantities.js";
+import { setUnits } from "./quantities.js";
 import { certificate, tableBench } from "./table-bench.js";
 
 /** What every bench may use. */
@@ -227,7 +227,7 @@ async function result(view, asked) {
 
 const BENCHES = { start, drive: driveBench, log: logBench, table: tableBench, certificate, result };
 let leave = () => undefined;
-let shown = "";
+let shown = null;
 
 async function route() {
   const [name, query] = location.hash.slice(1).split(/\?(.*)/s);
@@ -276,10 +276,6 @@ async function begin() {
   const units = document.getElementById("units");
   units.addEventListener("change", () => setUnits(units.value));
   setUnits(units.value);
-  new MutationObserver(() => writeNumbers(document.getElementById("view"))).observe(document.getElementById("view"), {
-    childList: true,
-    subtree: true,
-  });
   await bench.refresh();
   document.getElementById("folder").textContent = bench.state.folder;
   let lost = false;

@@ -1,4 +1,5 @@
 // Elements of the page, made of words and values: text is always text.
+import { written } from "./quantities.js";
 
 /** An element: `props` are attributes, `on` listeners by event, `text` its words; children are elements or words. */
 export function el(tag, props = {}, ...children) {
@@ -8,7 +9,7 @@ export function el(tag, props = {}, ...children) {
     if (name === "text") element.textContent = value;
     else if (name === "on")
       for (const [event, listener] of Object.entries(value)) element.addEventListener(event, listener);
-    else if (name === "value") element.value = value;
+    else if (name === "value" && tag !== "data") element.value = value;
     else if (name === "checked") element.checked = true;
     else element.setAttribute(name, value === true ? "" : value);
   }
@@ -41,7 +42,11 @@ export function table(caption, head, rows, props = {}) {
       "table",
       props,
       el("caption", {}, el("span", { text: caption })),
-      el("thead", {}, el("tr", {}, ...head.map((words) => el("th", { scope: "col", text: words })))),
+      el(
+        "thead",
+        {},
+        el("tr", {}, ...head.map((words) => (words ? el("th", { scope: "col", text: words }) : el("td")))),
+      ),
       el("tbody", {}, ...rows.map((row) => el("tr", {}, ...row.map(cell)))),
     ),
   );
@@ -55,7 +60,8 @@ export function section(id, title, ...children) {
 /** An error that follows the unit switch, from arcsec. */
 export function errorOf(arcsec, digits = 3) {
   if (typeof arcsec !== "number") return "–";
-  return el("data", { class: "error", value: String(arcsec), "data-digits": digits });
+  const text = written(arcsec, "error", digits);
+  return el("data", { class: "error", value: String(arcsec), "data-digits": digits, text });
 }
 
 /** A number to significant digits. */
