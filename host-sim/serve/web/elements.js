@@ -32,9 +32,15 @@ export function select(options, value, listener, props = {}) {
   return made;
 }
 
-/** A table; `head` are words, rows are words or elements, the first of each its heading. */
+/** A table; `head` are words, rows are words or elements, the first of each its heading. Columns of words stand to the left. */
 export function table(caption, head, rows, props = {}) {
-  const cell = (content, k) => el(k ? "td" : "th", k ? {} : { scope: "row" }, content ?? "–");
+  const isWords = (k) =>
+    rows.some((row) =>
+      typeof row[k] !== "string" ? row[k] instanceof HTMLElement && row[k].tagName !== "DATA" : /^[a-z]/i.test(row[k]),
+    );
+  const kind = head.map((_, k) => (isWords(k) ? "words" : null));
+  const cell = (content, k) => el(k ? "td" : "th", { class: kind[k], ...(k ? {} : { scope: "row" }) }, content ?? "–");
+  const title = (words, k) => (words ? el("th", { scope: "col", class: kind[k], text: words }) : el("td"));
   return el(
     "div",
     { class: "table", tabindex: 0, role: "region", "aria-label": caption },
@@ -42,11 +48,7 @@ export function table(caption, head, rows, props = {}) {
       "table",
       props,
       el("caption", {}, el("span", { text: caption })),
-      el(
-        "thead",
-        {},
-        el("tr", {}, ...head.map((words) => (words ? el("th", { scope: "col", text: words }) : el("td")))),
-      ),
+      el("thead", {}, el("tr", {}, ...head.map(title))),
       el("tbody", {}, ...rows.map((row) => el("tr", {}, ...row.map(cell)))),
     ),
   );

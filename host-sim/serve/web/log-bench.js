@@ -86,12 +86,18 @@ export async function logBench(view, asked, bench) {
   );
   const over = liveChart(
     "residual-turn",
-    "Residual over the generator",
-    "What each model leaves, over the generator's turn",
+    "Residual over the generator angle",
+    "The residual over the generator angle",
+    "What is left with the causes found, where there are any.",
+  );
+  const orders = liveChart(
+    "residual-orders",
+    "Orders of the residual in a turn of the generator",
+    "Amplitude of the residual at each order of the generator angle",
     "",
   );
   const added = liveChart("added", "What each cause adds", "The contribution of each cause over time", "");
-  for (const { figure } of [residual, over, added]) figure.hidden = true;
+  for (const { figure } of [residual, over, orders, added]) figure.hidden = true;
   view.append(
     el("h1", { text: "A log" }),
     bench.dropZone("Drop logs of one unit here, or choose them:", (names) => {
@@ -108,7 +114,16 @@ export async function logBench(view, asked, bench) {
     el(
       "div",
       { class: "two" },
-      section("verdict", "What is wrong with it", verdict, causes, residual.figure, over.figure, added.figure),
+      section(
+        "verdict",
+        "What is wrong with it",
+        verdict,
+        residual.figure,
+        added.figure,
+        causes,
+        over.figure,
+        orders.figure,
+      ),
       section("table-section", "Its table", calibrated),
     ),
   );
@@ -518,15 +533,10 @@ backlash_arcsec = ${Number(now.backlash)}
       wholeReport(job.out),
     );
     showCauses(d);
-    for (const [chart, figure] of [
-      [residual, "over-time"],
-      [over, "over-turn"],
-      [added, "added"],
-    ]) {
-      const there = report.json.figures[figure]?.kind === "lines";
-      chart.figure.hidden = !there;
-      if (there) await chart.of(report, figure, "every");
-    }
+    await residual.of(report, "over-time", "every");
+    await over.of(report, "over-generator", "extended", "recalibrated", "nominal");
+    await orders.of(report, "orders-generator", "extended", "recalibrated", "nominal");
+    await added.of(report, "added", "every");
     document.documentElement.dataset.verdict = `${d.finding} ${Math.round(performance.now() - begun)}`;
   }
 

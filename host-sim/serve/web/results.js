@@ -8,7 +8,9 @@ import { provide, unpack } from "./pack.js";
 
 /** A report that a command wrote: its JSON, and its packed numbers by name. Nothing else of it comes into this page. */
 export async function readReport(name) {
-  const parsed = new DOMParser().parseFromString(await fileText(name), "text/html");
+  // Its style sheet is of no use here, and this page's policy would complain of it.
+  const text = (await fileText(name)).replace(/<style>[\s\S]*?<\/style>/g, "");
+  const parsed = new DOMParser().parseFromString(text, "text/html");
   const json = JSON.parse(parsed.getElementById("flexspline-report").textContent);
   const packed = new Map();
   for (const element of parsed.querySelectorAll("script.packed")) {
@@ -51,7 +53,7 @@ let numbered = 0;
 /** A chart that is made once and shows one set of data after another. */
 export function liveChart(id, title, alt, words) {
   const { figure, drawing, strong } = frame(id, title, alt, words);
-  const spec = {
+  const chart = {
     number: ++numbered,
     kind: "lines",
     title,
@@ -64,9 +66,9 @@ export function liveChart(id, title, alt, words) {
   const put = (x, y, description, numbers) => {
     // The name before is not needed any more: what it holds is let go with it.
     const key = `${id}-${++turn % 2}`;
-    Object.assign(spec, { x, y, charts: { [key]: description } });
+    Object.assign(chart, { x, y, charts: { [key]: description } });
     provide(`${key}/${id}`, numbers);
-    view ??= lineChart(drawing, id, spec);
+    view ??= lineChart(drawing, id, chart);
     return view.choose(key);
   };
   return {
@@ -79,11 +81,14 @@ export function liveChart(id, title, alt, words) {
       columns.forEach((column, c) => values.set(column, c * rows));
       return put(x, y, { series, ...more }, Promise.resolve({ values, shape: [columns.length, rows] }));
     },
-    /** A figure of lines of a report, as its choice has it. */
-    of(report, name, choice) {
-      const figure = report.json.figures[name];
-      const key = Object.hasOwn(figure.charts, choice) ? choice : Object.keys(figure.charts)[0];
-      return put(figure.x, figure.y, figure.charts[key], unpacked(report.packed.get(`${key}/${name}`)));
+    /** A figure of lines of a report, as the first of these choices that it has shows it; hidden if there is none. */
+    async of(report, name, ...choices) {
+      const spec = report.json.figures[name];
+      const key = choices.find((choice) => Object.hasOwn(spec?.charts ?? {}, choice));
+      const numbers = key && report.packed.get(`${key}/${name}`);
+      figure.hidden = !numbers || numbers.shape.endsWith(",0");
+      if (figure.hidden) return undefined;
+      return put(spec.x, spec.y, spec.charts[key], unpacked(numbers));
     },
   };
 }

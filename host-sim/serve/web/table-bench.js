@@ -315,8 +315,7 @@ export async function certificate(view, asked) {
       id: "steepest",
       text: `Steepest slope, all parts together at most: ${number(steepest)} ″ for a degree of the output.`,
     }),
-    turn.figure,
-    spectrum.figure,
+    el("div", { class: "two" }, turn.figure, spectrum.figure),
     el(
       "dl",
       {},
