@@ -74,7 +74,7 @@ pub(crate) fn routes(shared: Arc<Shared>) -> Router {
         .route("/api/drive", post(show_drive))
         .route("/api/files/{name}", received.layer(DefaultBodyLimit::max(LARGEST_FILE as usize)))
         .route("/files/{*name}", get(file))
-        .fallback(async || words(StatusCode::NOT_FOUND, "nothing has this address"))
+        .fallback(|| async { words(StatusCode::NOT_FOUND, "nothing has this address") })
         .layer(DefaultBodyLimit::max(LARGEST_REQUEST))
         .layer(middleware::from_fn_with_state(shared.clone(), guarded))
         .with_state(shared)
@@ -132,9 +132,9 @@ fn json(value: &impl Serialize) -> Answer {
 
 /// Work that reads and writes files, beside the thread that answers.
 async fn aside(work: impl FnOnce() -> Answer + Send + 'static) -> Answer {
-    spawn_blocking(work)
-        .await
-        .unwrap_or_else(|_| words(StatusCode::INTERNAL_SERVER_ERROR, "this request ended unforeseen; the server goes on"))
+    spawn_blocking(work).await.unwrap_or_else(|_| {
+        words(StatusCode::INTERNAL_SERVER_ERROR, "this request ended unforeseen; the server goes on")
+    })
 }
 
 fn refused(error: &FolderError) -> Answer {
@@ -249,7 +249,8 @@ async fn show_drive(State(shared): Of, body: Bytes) -> Answer {
 
 async fn receive(shared: Arc<Shared>, receiving: Arc<Semaphore>, name: String, request: Request) -> Answer {
     // Refused before it is read, where it says how large it is.
-    let says = request.headers().get(header::CONTENT_LENGTH).and_then(|length| length.to_str().ok()?.parse::<u64>().ok());
+    let says =
+        request.headers().get(header::CONTENT_LENGTH).and_then(|length| length.to_str().ok()?.parse::<u64>().ok());
     match says {
         None => return words(StatusCode::LENGTH_REQUIRED, "how large is it?"),
         Some(length) if length > LARGEST_FILE => return refused(&FolderError::Large(name, length)),

@@ -37,7 +37,8 @@ pub enum FolderError {
     /// A name that is no plain word.
     #[error(
         "{0:?}: allowed: names of letters, digits, \".\", \"_\" and \"-\" that begin with a letter or a digit, at most \
-         {LONGEST_NAME} characters, folders between with \"/\""
+         {longest} characters, folders between with \"/\"",
+        longest = LONGEST_NAME
     )]
     Name(String),
     /// Nothing there.
@@ -47,10 +48,10 @@ pub enum FolderError {
     #[error("{0}: allowed: a file, not behind a link")]
     NoFile(String),
     /// More than is sent or received.
-    #[error("{0}: {1} bytes; allowed: {LARGEST_FILE}")]
+    #[error("{0}: {1} bytes; allowed: {largest}", largest = LARGEST_FILE)]
     Large(String, u64),
     /// More than one run receives.
-    #[error("this run has received {MOST_FILES} files or {} MB, which is all that it takes", MOST_BYTES >> 20)]
+    #[error("this run has received {files} files or {} MB, which is all that it takes", MOST_BYTES >> 20, files = MOST_FILES)]
     Full,
     /// The system refuses.
     #[error("{0}: {1}")]

@@ -43,7 +43,7 @@ pub enum JobError {
     #[error(transparent)]
     Work(#[from] WorkError),
     /// Too many wait.
-    #[error("{MOST_WAITING} jobs wait already: cancel one, or wait for them")]
+    #[error("{most} jobs wait already: cancel one, or wait for them", most = MOST_WAITING)]
     Full,
     /// The folder cannot be written to.
     #[error("{0}")]

@@ -105,13 +105,10 @@ impl Server {
     /// The system does not let it listen.
     pub fn run(self) -> Result<(), ServeError> {
         self.listener.set_nonblocking(true).map_err(ServeError::System)?;
-        let runtime =
-            tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(ServeError::System)?;
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(ServeError::System)?;
         runtime.block_on(async {
             let listener = tokio::net::TcpListener::from_std(self.listener).map_err(ServeError::System)?;
-            axum::serve(answers::Limited::new(listener), answers::routes(self.shared))
-                .await
-                .map_err(ServeError::System)
+            axum::serve(answers::Limited::new(listener), answers::routes(self.shared)).await.map_err(ServeError::System)
         })
     }
 }

@@ -439,7 +439,11 @@ impl Line<'_> {
             }
             Known { ratio: None, model: Some(model), tables: None } => self.file_option("model", model),
             Known { ratio: None, model: None, tables: Some(tables) } => self.folder_option("tables", tables),
-            _ => refuse("known", "none, or several", if ratio_will_do { "ratio, model or tables" } else { "model or tables" }),
+            _ => refuse(
+                "known",
+                "none, or several",
+                if ratio_will_do { "ratio, model or tables" } else { "model or tables" },
+            ),
         }
     }
 
@@ -571,9 +575,7 @@ mod tests {
             assert!(found.is_err(), "{name}: {found:?}");
         }
         let columns = "x' --out=/ ; rm -rf /";
-        let json = format!(
-            r#"{{"work":"replay","file":"a.csv","table":"a.csv","reading":{{"columns":{columns:?}}}}}"#
-        );
+        let json = format!(r#"{{"work":"replay","file":"a.csv","table":"a.csv","reading":{{"columns":{columns:?}}}}}"#);
         let words = asked(&json).unwrap();
         assert_eq!(words.arguments.iter().filter(|word| word.starts_with("--out")).count(), 1);
         assert!(words.arguments.contains(&format!("--columns={columns}")));

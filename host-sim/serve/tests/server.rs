@@ -76,7 +76,11 @@ fn the_address_lets_in_and_nothing_else_does() {
     };
     let entered = get(&format!("/?token={token}"), "");
     assert_eq!(entered.status, 303);
-    assert!(entered.head.contains(&format!("set-cookie: {cookie}; path=/; httponly; samesite=strict")), "{}", entered.head);
+    assert!(
+        entered.head.contains(&format!("set-cookie: {cookie}; path=/; httponly; samesite=strict")),
+        "{}",
+        entered.head
+    );
     for path in ["/", "/api/state", "/files/a.csv", "/app/bench.js", "/nothing", "/?token=0123", "/?token="] {
         assert_eq!(get(path, "").status, 403, "{path}");
     }
@@ -181,7 +185,8 @@ fn a_page_of_a_result_has_no_rights() {
 fn what_is_too_large_or_has_no_size_is_refused_before_it_is_read() {
     let bench = Bench::new();
     let Bench { host, cookie, .. } = &bench;
-    let head = format!("HTTP/1.1\r\nHost: {host}\r\nCookie: {cookie}\r\nOrigin: http://{host}\r\nConnection: close\r\n");
+    let head =
+        format!("HTTP/1.1\r\nHost: {host}\r\nCookie: {cookie}\r\nOrigin: http://{host}\r\nConnection: close\r\n");
     let large = bench.raw(&format!("PUT /api/files/large.csv {head}Content-Length: 999999999999\r\n\r\nx"));
     assert_eq!(large.status, 413, "{}", large.body);
     let endless = bench.raw(&format!("PUT /api/files/large.csv {head}Transfer-Encoding: chunked\r\n\r\n1\r\nx\r\n"));
@@ -194,7 +199,14 @@ fn what_is_too_large_or_has_no_size_is_refused_before_it_is_read() {
 #[test]
 fn a_job_is_what_was_asked_for_or_a_reason() {
     let bench = Bench::new();
-    for bad in ["", "[]", "{}", r#"{"work":"sh"}"#, r#"{"work":"look","files":["../a.csv"]}"#, "{\"work\":\"look\",\"files\":[]}"] {
+    for bad in [
+        "",
+        "[]",
+        "{}",
+        r#"{"work":"sh"}"#,
+        r#"{"work":"look","files":["../a.csv"]}"#,
+        "{\"work\":\"look\",\"files\":[]}",
+    ] {
         assert_eq!(bench.ask("POST", "/api/jobs", bad).status, 400, "{bad}");
     }
     let added = bench.ask("POST", "/api/jobs", r#"{"work":"look","files":["a.csv"]}"#);

@@ -64,12 +64,8 @@ impl Serve {
         }
         let program = std::env::current_exe()
             .map_err(|error| Failure::Failed(format!("cannot tell where this program is: {error}")))?;
-        let settings = Settings {
-            folder: self.folder.clone(),
-            port: self.port,
-            program,
-            jobs_at_a_time: usize::from(self.jobs),
-        };
+        let settings =
+            Settings { folder: self.folder.clone(), port: self.port, program, jobs_at_a_time: usize::from(self.jobs) };
         let server = Server::new(settings).map_err(|error| match error {
             ServeError::Folder(_) | ServeError::Port(..) => Failure::BadInput(error.to_string()),
             _ => Failure::Failed(error.to_string()),

@@ -138,7 +138,14 @@ pub struct Fineness {
 
 impl Default for Settings {
     fn default() -> Settings {
-        Settings { pitch_radius_mm: 48.7, averages: 12_000, verbose: false, asked: None, without: CauseSet::default(), fineness: None }
+        Settings {
+            pitch_radius_mm: 48.7,
+            averages: 12_000,
+            verbose: false,
+            asked: None,
+            without: CauseSet::default(),
+            fineness: None,
+        }
     }
 }
 
