@@ -25,17 +25,17 @@ use tokio::time::{Instant, Sleep, sleep};
 use crate::Shared;
 use crate::drive::{self, ReadError};
 use crate::folder::{Entry, Folder, FolderError, LARGEST_FILE};
-use crate::guard::{FILE_POLICY, PAGE_POLICY, RESULT_POLICY, Refusal, harden, refusal};
+use crate::guard::{FILE_POLICY, NoEntry, PAGE_POLICY, RESULT_POLICY, harden, refusal};
 use crate::jobs::JobError;
-use crate::work::{DriveAsked, Work};
+use crate::work::{DriveAsked, WorkAsked};
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_report::assets;
 
-/// Connections at a time: a browser opens six, and a few windows of it a few times that.
+/// Connections at a time: a browser opens six, and a few windows of it a few times that (a guess).
 const MOST_CONNECTIONS: usize = 64;
-/// Bytes of a request in words.
+/// Limit of a request in words, bytes: the longest value of a field, and some.
 const LARGEST_REQUEST: usize = 256 << 10;
-/// Files that are received at a time: each is held whole.
+/// Limit of files received at a time: each is held whole.
 const MOST_RECEIVING: usize = 2;
 /// How long a connection may be open with nothing passing: longer than a page waits for a change.
 const LONGEST_IDLE: Duration = Duration::from_secs(40);
@@ -100,7 +100,7 @@ async fn guarded(State(shared): Of, request: Request, next: Next) -> Answer {
 /// Takes the key of the address into a cookie, and the address without it.
 fn entered(shared: &Shared, query: &str) -> Answer {
     if !value(Some(query), "token").is_some_and(|token| shared.guard.is_token(token)) {
-        return refusal(Refusal::Token);
+        return refusal(NoEntry::Token);
     }
     let mut answer = words(StatusCode::SEE_OTHER, "");
     answer.headers_mut().insert(header::LOCATION, HeaderValue::from_static("/"));
@@ -200,7 +200,7 @@ async fn jobs(State(shared): Of, RawQuery(query): RawQuery) -> Answer {
 }
 
 async fn add_job(State(shared): Of, body: Bytes) -> Answer {
-    let work: Work = match serde_json::from_slice(&body) {
+    let work: WorkAsked = match serde_json::from_slice(&body) {
         Ok(work) => work,
         Err(error) => return words(StatusCode::BAD_REQUEST, error),
     };
@@ -306,25 +306,25 @@ fn sent(folder: &Folder, name: &str, head: Option<u64>, download: bool, page: bo
 }
 
 /// A listener with so many connections at a time.
-pub(crate) struct Limited {
+pub(crate) struct FewConnections {
     listener: TcpListener,
     open: Arc<Semaphore>,
 }
 
-impl Limited {
-    pub(crate) fn new(listener: TcpListener) -> Limited {
-        Limited { listener, open: Arc::new(Semaphore::new(MOST_CONNECTIONS)) }
+impl FewConnections {
+    pub(crate) fn new(listener: TcpListener) -> FewConnections {
+        FewConnections { listener, open: Arc::new(Semaphore::new(MOST_CONNECTIONS)) }
     }
 }
 
 /// A connection, counted while it lasts; it ends when nothing passes for a while.
-pub(crate) struct Counted {
+pub(crate) struct Connection {
     stream: TcpStream,
     idle: Pin<Box<Sleep>>,
     _permit: Option<OwnedSemaphorePermit>,
 }
 
-impl Counted {
+impl Connection {
     /// Something passed.
     fn awake<T>(&mut self, passed: Poll<io::Result<T>>) -> Poll<io::Result<T>> {
         if matches!(passed, Poll::Ready(Ok(_))) {
@@ -334,14 +334,14 @@ impl Counted {
     }
 }
 
-impl Listener for Limited {
-    type Io = Counted;
+impl Listener for FewConnections {
+    type Io = Connection;
     type Addr = SocketAddr;
 
-    async fn accept(&mut self) -> (Counted, SocketAddr) {
+    async fn accept(&mut self) -> (Connection, SocketAddr) {
         let permit = self.open.clone().acquire_owned().await.ok();
         let (stream, from) = Listener::accept(&mut self.listener).await;
-        (Counted { stream, idle: Box::pin(sleep(LONGEST_IDLE)), _permit: permit }, from)
+        (Connection { stream, idle: Box::pin(sleep(LONGEST_IDLE)), _permit: permit }, from)
     }
 
     fn local_addr(&self) -> io::Result<SocketAddr> {
@@ -349,7 +349,7 @@ impl Listener for Limited {
     }
 }
 
-impl AsyncRead for Counted {
+impl AsyncRead for Connection {
     fn poll_read(mut self: Pin<&mut Self>, cx: &mut Context<'_>, to: &mut ReadBuf<'_>) -> Poll<io::Result<()>> {
         let passed = Pin::new(&mut self.stream).poll_read(cx, to);
         if passed.is_pending() && self.idle.as_mut().poll(cx).is_ready() {
@@ -359,7 +359,7 @@ impl AsyncRead for Counted {
     }
 }
 
-impl AsyncWrite for Counted {
+impl AsyncWrite for Connection {
     fn poll_write(mut self: Pin<&mut Self>, cx: &mut Context<'_>, from: &[u8]) -> Poll<io::Result<usize>> {
         let passed = Pin::new(&mut self.stream).poll_write(cx, from);
         self.awake(passed)

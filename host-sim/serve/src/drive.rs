@@ -13,9 +13,9 @@ use flexspline_mechanics::drive::{Drive, DriveError, GeneratorKind, GeneratorOut
 
 /// Bytes of a drive file, at most: those with an error for each of 2000 teeth have 50 kB.
 const LARGEST_DRIVE: u64 = 1 << 20;
-/// Intervals to a piece of a tooth outline: 0.1 mm, which is a pixel of a close view.
+/// Intervals to a piece of a tooth outline: 0.1 mm, a pixel of a close view (a guess).
 const POINTS_PER_PIECE: usize = 6;
-/// Stations around the rim at which the wave is given; a browser draws straight lines between.
+/// Stations around the rim at which the wave is given; a browser draws straight lines between. A guess.
 const STATIONS: usize = 720;
 
 /// A drive that cannot be read.

@@ -18,7 +18,7 @@ use flexspline_base::output::{OutputError, write_whole};
 pub const JOBS: &str = "bench";
 /// Characters of a name, at most: a guess, and far below what file systems take.
 const LONGEST_NAME: usize = 100;
-/// Folders that a name may lead through: `bench/NAME/extended` and one more.
+/// Limit of the folders that a name may lead through: `bench/NAME/extended` and one more.
 const DEEPEST: usize = 5;
 /// Bytes of a file that is sent or received, at most: a guess; logs of an hour at 1 kHz have 200 MB.
 pub const LARGEST_FILE: u64 = 256 << 20;
@@ -28,7 +28,7 @@ const MOST_BYTES: u64 = 4 << 30;
 const MOST_FILES: usize = 1000;
 /// Entries of the folder and of each folder in it that are looked at: a guess.
 const MOST_ENTRIES: usize = 2000;
-/// Other names that are tried for a file whose name is taken.
+/// Limit of the names that are tried for a file whose name is taken.
 const MOST_TRIES: usize = 1000;
 
 /// Why a file is not read or written.

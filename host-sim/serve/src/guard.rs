@@ -1,11 +1,12 @@
 //! Who may ask: a page of this server, in the browser of whoever started it.
 //!
-//! | against | what is asked for |
-//! |---|---|
-//! | other users and programs of this machine | the token of this run: in the address once, then in a cookie that scripts cannot read |
-//! | a name of somebody's that leads to 127.0.0.1 (DNS rebinding) | `Host` is an address of this server |
-//! | other pages in the same browser | `Origin` is this server wherever it is given, and it is given with all that changes something; `Sec-Fetch-Site` is not that of another site; the cookie is `SameSite=Strict`; no answer allows another origin to read it |
-//! | scripts in names, logs and reports | a content security policy: scripts of this server alone, nothing from elsewhere |
+//! - Other users and programs of this machine: the token of this run, in the address once, then in a cookie that scripts
+//!   cannot read.
+//! - A name of somebody's that leads to 127.0.0.1 (DNS rebinding): `Host` is an address of this server.
+//! - Other pages in the same browser: `Origin` is this server wherever it is given, and it is given with all that
+//!   changes something; `Sec-Fetch-Site` is not that of another site; the cookie is `SameSite=Strict`; no answer allows
+//!   another origin to read it.
+//! - Scripts in names, logs and reports: a content security policy, scripts of this server alone, nothing from elsewhere.
 
 use axum::body::Body;
 use axum::http::header::{self, HeaderMap, HeaderName, HeaderValue};
@@ -34,7 +35,7 @@ pub struct Guard {
 
 /// Why somebody may not ask.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Refusal {
+pub enum NoEntry {
     /// `Host` is no address of this server.
     Host,
     /// The request is of another page.
@@ -43,13 +44,13 @@ pub enum Refusal {
     Token,
 }
 
-impl Refusal {
+impl NoEntry {
     /// In words.
     pub fn words(self) -> &'static str {
         match self {
-            Refusal::Host => "this server answers as 127.0.0.1 and localhost alone",
-            Refusal::Origin => "this request is of another page; allowed: pages of this server",
-            Refusal::Token => "open the address that `flexspline serve` printed: it holds the key of this run",
+            NoEntry::Host => "this server answers as 127.0.0.1 and localhost alone",
+            NoEntry::Origin => "this request is of another page; allowed: pages of this server",
+            NoEntry::Token => "open the address that `flexspline serve` printed: it holds the key of this run",
         }
     }
 }
@@ -95,29 +96,29 @@ impl Guard {
     ///
     /// # Errors
     /// `Host`, `Origin` or `Sec-Fetch-Site` say otherwise.
-    pub fn check_place(&self, method: &Method, headers: &HeaderMap) -> Result<(), Refusal> {
+    pub fn check_place(&self, method: &Method, headers: &HeaderMap) -> Result<(), NoEntry> {
         let only = |name: HeaderName| {
             let mut all = headers.get_all(name).iter();
             (all.next().and_then(|value| value.to_str().ok()), all.next().is_some())
         };
         let (host, several) = only(header::HOST);
         if several || !host.is_some_and(|host| self.hosts().iter().any(|own| own == host)) {
-            return Err(Refusal::Host);
+            return Err(NoEntry::Host);
         }
         let reads = matches!(*method, Method::GET | Method::HEAD);
         let (origin, several) = only(header::ORIGIN);
         let own = |origin: &str| host.is_some_and(|host| origin.strip_prefix("http://") == Some(host));
         match origin {
-            _ if several => return Err(Refusal::Origin),
-            Some(origin) if !own(origin) => return Err(Refusal::Origin),
-            None if headers.contains_key(header::ORIGIN) || !reads => return Err(Refusal::Origin),
+            _ if several => return Err(NoEntry::Origin),
+            Some(origin) if !own(origin) => return Err(NoEntry::Origin),
+            None if headers.contains_key(header::ORIGIN) || !reads => return Err(NoEntry::Origin),
             _ => {}
         }
         let site = headers.get("sec-fetch-site").map(|site| site.as_bytes());
         match site {
             None | Some(b"same-origin" | b"none") => Ok(()),
             // A page of a result has no origin of its own: it may be shown, and asks for nothing.
-            Some(_) => Err(Refusal::Origin),
+            Some(_) => Err(NoEntry::Origin),
         }
     }
 
@@ -125,19 +126,19 @@ impl Guard {
     ///
     /// # Errors
     /// It has not.
-    pub fn check_token(&self, headers: &HeaderMap) -> Result<(), Refusal> {
+    pub fn check_token(&self, headers: &HeaderMap) -> Result<(), NoEntry> {
         let name = self.cookie_name();
         let cookies = headers.get_all(header::COOKIE).iter().filter_map(|value| value.to_str().ok());
         let found = cookies
             .flat_map(|all| all.split(';'))
             .filter_map(|cookie| cookie.trim().split_once('='))
             .any(|(of, token)| of == name && self.is_token(token));
-        if found { Ok(()) } else { Err(Refusal::Token) }
+        if found { Ok(()) } else { Err(NoEntry::Token) }
     }
 }
 
 /// An answer in words.
-pub fn refusal(refusal: Refusal) -> Response<Body> {
+pub fn refusal(refusal: NoEntry) -> Response<Body> {
     let mut answer = Response::new(Body::from(format!("{}\n", refusal.words())));
     *answer.status_mut() = StatusCode::FORBIDDEN;
     answer.headers_mut().insert(header::CONTENT_TYPE, HeaderValue::from_static("text/plain; charset=utf-8"));
@@ -199,7 +200,7 @@ mod tests {
             let found = guard().check_token(&headers(&[("cookie", &cookie)]));
             assert_eq!(found.is_ok(), opens, "{cookie}");
         }
-        assert_eq!(guard().check_token(&HeaderMap::new()), Err(Refusal::Token));
+        assert_eq!(guard().check_token(&HeaderMap::new()), Err(NoEntry::Token));
     }
 
     #[test]
@@ -207,25 +208,25 @@ mod tests {
         let (get, post) = (Method::GET, Method::POST);
         let host = ("host", "127.0.0.1:4000");
         let own = ("origin", "http://127.0.0.1:4000");
-        let cases: &[(&Method, &[(&str, &str)], Result<(), Refusal>)] = &[
+        let cases: &[(&Method, &[(&str, &str)], Result<(), NoEntry>)] = &[
             (&get, &[host], Ok(())),
             (&get, &[("host", "localhost:4000")], Ok(())),
             (&post, &[host, own], Ok(())),
             (&get, &[host, ("sec-fetch-site", "none")], Ok(())),
-            (&get, &[], Err(Refusal::Host)),
-            (&get, &[("host", "127.0.0.1")], Err(Refusal::Host)),
-            (&get, &[("host", "evil.example:4000")], Err(Refusal::Host)),
-            (&get, &[("host", "127.0.0.1:4001")], Err(Refusal::Host)),
-            (&get, &[host, ("host", "evil.example:4000")], Err(Refusal::Host)),
-            (&post, &[host], Err(Refusal::Origin)),
-            (&post, &[host, ("origin", "null")], Err(Refusal::Origin)),
-            (&post, &[host, ("origin", "https://127.0.0.1:4000")], Err(Refusal::Origin)),
-            (&post, &[host, ("origin", "http://127.0.0.1:4000.evil.example")], Err(Refusal::Origin)),
-            (&post, &[host, ("origin", "http://localhost:4000")], Err(Refusal::Origin)),
-            (&post, &[host, own, ("origin", "http://evil.example")], Err(Refusal::Origin)),
-            (&get, &[host, ("origin", "http://evil.example")], Err(Refusal::Origin)),
-            (&get, &[host, ("sec-fetch-site", "cross-site")], Err(Refusal::Origin)),
-            (&get, &[host, ("sec-fetch-site", "same-site")], Err(Refusal::Origin)),
+            (&get, &[], Err(NoEntry::Host)),
+            (&get, &[("host", "127.0.0.1")], Err(NoEntry::Host)),
+            (&get, &[("host", "evil.example:4000")], Err(NoEntry::Host)),
+            (&get, &[("host", "127.0.0.1:4001")], Err(NoEntry::Host)),
+            (&get, &[host, ("host", "evil.example:4000")], Err(NoEntry::Host)),
+            (&post, &[host], Err(NoEntry::Origin)),
+            (&post, &[host, ("origin", "null")], Err(NoEntry::Origin)),
+            (&post, &[host, ("origin", "https://127.0.0.1:4000")], Err(NoEntry::Origin)),
+            (&post, &[host, ("origin", "http://127.0.0.1:4000.evil.example")], Err(NoEntry::Origin)),
+            (&post, &[host, ("origin", "http://localhost:4000")], Err(NoEntry::Origin)),
+            (&post, &[host, own, ("origin", "http://evil.example")], Err(NoEntry::Origin)),
+            (&get, &[host, ("origin", "http://evil.example")], Err(NoEntry::Origin)),
+            (&get, &[host, ("sec-fetch-site", "cross-site")], Err(NoEntry::Origin)),
+            (&get, &[host, ("sec-fetch-site", "same-site")], Err(NoEntry::Origin)),
         ];
         for (method, given, expected) in cases {
             // A map collected of equal names keeps the last; two of a kind have to be appended.

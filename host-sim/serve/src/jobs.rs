@@ -23,15 +23,15 @@ use thiserror::Error;
 use tokio::sync::watch;
 
 use crate::folder::{Folder, JOBS};
-use crate::work::{Work, WorkError, shown};
-use process::{Ended, Running};
-pub use record::{Job, Progress, State};
+use crate::work::{WorkAsked, WorkError, shown};
+use process::{ProcessEnd, Running};
+pub use record::{JobRecord, Progress, State};
 
 /// Jobs that wait, at most: a guess; a person does not queue more.
 pub const MOST_WAITING: usize = 32;
 /// Records that are kept in view: a guess.
 const MOST_KEPT: usize = 500;
-/// Short jobs over that keep their folders; of older ones, which were looks and single pitches, they are cleared away.
+/// Short jobs over that keep their folders; of older ones, which were looks and single pitches, they are cleared away (a guess).
 const SHORT_KEPT: usize = 100;
 /// How often a running process is looked at.
 const LOOK_EVERY: Duration = Duration::from_millis(10);
@@ -59,7 +59,7 @@ enum Line {
 
 #[derive(Default)]
 struct Inside {
-    jobs: BTreeMap<u64, Job>,
+    jobs: BTreeMap<u64, JobRecord>,
     next: u64,
     short: VecDeque<u64>,
     long: VecDeque<u64>,
@@ -93,7 +93,7 @@ pub struct Seen {
     /// Counts changes.
     pub revision: u64,
     /// The jobs, the newest first.
-    pub jobs: Vec<Job>,
+    pub jobs: Vec<JobRecord>,
 }
 
 /// Now, seconds since 1970.
@@ -153,7 +153,7 @@ impl Jobs {
     }
 
     /// One job.
-    pub fn job(&self, id: u64) -> Option<Job> {
+    pub fn job(&self, id: u64) -> Option<JobRecord> {
         self.lock().jobs.get(&id).cloned()
     }
 
@@ -161,7 +161,7 @@ impl Jobs {
     ///
     /// # Errors
     /// It makes no command, too much waits, or there is nowhere to write to.
-    pub fn add(&self, work: Work) -> Result<Job, JobError> {
+    pub fn add(&self, work: WorkAsked) -> Result<JobRecord, JobError> {
         let mut inside = self.lock();
         let line = if work.is_short() { Line::Short } else { Line::Long };
         if inside.short.len() + inside.long.len() >= MOST_WAITING {
@@ -170,7 +170,7 @@ impl Jobs {
         let id = inside.next;
         let out = format!("{JOBS}/{}-{id}", work.name());
         let words = work.words(&self.folder, &out)?;
-        let job = Job {
+        let job = JobRecord {
             id,
             work: work.name().to_owned(),
             asked: serde_json::to_value(&work).unwrap_or_default(),
@@ -204,7 +204,7 @@ impl Jobs {
 
     /// Folders of short work long over go; so does the view of what is older still.
     fn forget_the_oldest(&self, inside: &mut Inside) {
-        let passing = |job: &Job| job.is_over() && matches!(job.work.as_str(), "look" | "simulate" | "study");
+        let passing = |job: &JobRecord| job.is_over() && matches!(job.work.as_str(), "look" | "simulate" | "study");
         let old: Vec<u64> = inside.jobs.values().rev().filter(|job| passing(job)).map(|job| job.id).collect();
         for id in old.into_iter().skip(SHORT_KEPT) {
             let Some(job) = inside.jobs.remove(&id) else { continue };
@@ -327,7 +327,7 @@ impl Jobs {
         job.state == State::Running
     }
 
-    fn finish(&self, id: u64, ended: Ended) {
+    fn finish(&self, id: u64, ended: ProcessEnd) {
         let mut inside = self.lock();
         let Some(job) = inside.jobs.get_mut(&id) else { return };
         (job.pid, job.progress, job.ended_s) = (None, None, Some(now_s()));

@@ -10,8 +10,8 @@
 //! | `answers` | addresses to answers |
 //! | `web/` | the page |
 //!
-//! Nothing is computed here that a command does not compute, but the drawing of a drive. What a page shows are the files
-//! that commands wrote into the folder.
+//! Nothing is computed here that a command does not compute, but the drawing of a drive. What a page shows are the
+//! files that commands wrote into the folder.
 #![forbid(unsafe_code)]
 
 mod answers;
@@ -108,7 +108,9 @@ impl Server {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(ServeError::System)?;
         runtime.block_on(async {
             let listener = tokio::net::TcpListener::from_std(self.listener).map_err(ServeError::System)?;
-            axum::serve(answers::Limited::new(listener), answers::routes(self.shared)).await.map_err(ServeError::System)
+            axum::serve(answers::FewConnections::new(listener), answers::routes(self.shared))
+                .await
+                .map_err(ServeError::System)
         })
     }
 }

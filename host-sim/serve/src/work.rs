@@ -13,12 +13,12 @@ use flexspline_mechanics::drive::{Drive, GeneratorKind};
 
 /// Logs of one job, at most: a guess.
 const MOST_LOGS: usize = 50;
-/// Fields that a page changes at once, at most: there are some seventy.
+/// Fields that a page changes at once, at most: there are some seventy (a bound above them).
 const MOST_SETS: usize = 100;
 /// Characters of a free value (columns, a list of numbers), at most: a guess; one number for each of 2000 teeth fits.
 const LONGEST_VALUE: usize = 20_000;
 
-/// Increments to a tooth pitch of a first look: the least that a settled pitch has.
+/// Increments to a tooth pitch of a first look: the lower limit of what a settled pitch has.
 const FIRST_LOOK: f64 = 8.0;
 
 /// Why a request makes no command.
@@ -110,7 +110,7 @@ impl Mesh {
 /// A command.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "work", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Work {
+pub enum WorkAsked {
     /// What is in log files.
     Look {
         /// The logs.
@@ -240,31 +240,33 @@ pub struct Words {
     pub printed_to: Option<&'static str>,
 }
 
-impl Work {
+impl WorkAsked {
     /// Its name: that of the command.
     pub fn name(&self) -> &'static str {
         match self {
-            Work::Look { .. } => "look",
-            Work::Calibrate { .. } => "calibrate",
-            Work::Diagnose { .. } => "diagnose",
-            Work::Replay { .. } => "replay",
-            Work::Simulate { .. } => "simulate",
-            Work::Sheet { .. } => "study",
-            Work::Tables { .. } | Work::Samples { .. } => "tables",
-            Work::Validate { .. } => "validate",
-            Work::Bundle { .. } => "bundle",
-            Work::New { .. } => "new",
+            WorkAsked::Look { .. } => "look",
+            WorkAsked::Calibrate { .. } => "calibrate",
+            WorkAsked::Diagnose { .. } => "diagnose",
+            WorkAsked::Replay { .. } => "replay",
+            WorkAsked::Simulate { .. } => "simulate",
+            WorkAsked::Sheet { .. } => "study",
+            WorkAsked::Tables { .. } | WorkAsked::Samples { .. } => "tables",
+            WorkAsked::Validate { .. } => "validate",
+            WorkAsked::Bundle { .. } => "bundle",
+            WorkAsked::New { .. } => "new",
         }
     }
 
     /// Whether somebody waits for it with the page open: seconds, not minutes.
     pub fn is_short(&self) -> bool {
         match self {
-            Work::Look { .. } | Work::Simulate { .. } | Work::Sheet { .. } | Work::New { .. } | Work::Replay { .. } => {
-                true
-            }
-            Work::Diagnose { .. } | Work::Calibrate { .. } | Work::Samples { .. } => true,
-            Work::Tables { .. } | Work::Validate { .. } | Work::Bundle { .. } => false,
+            WorkAsked::Look { .. }
+            | WorkAsked::Simulate { .. }
+            | WorkAsked::Sheet { .. }
+            | WorkAsked::New { .. }
+            | WorkAsked::Replay { .. } => true,
+            WorkAsked::Diagnose { .. } | WorkAsked::Calibrate { .. } | WorkAsked::Samples { .. } => true,
+            WorkAsked::Tables { .. } | WorkAsked::Validate { .. } | WorkAsked::Bundle { .. } => false,
         }
     }
 
@@ -276,18 +278,18 @@ impl Work {
         let mut words = Line { folder, arguments: vec![self.name().to_owned()] };
         let mut printed_to = None;
         match self {
-            Work::Look { files } => {
+            WorkAsked::Look { files } => {
                 words.logs(files)?;
                 words.word("--json");
                 printed_to = Some("look.json");
             }
-            Work::Calibrate { files, reading, known, generator } => {
+            WorkAsked::Calibrate { files, reading, known, generator } => {
                 words.logs(files)?;
                 words.known(known, true)?;
                 words.option("generator", generator);
                 words.reading(reading)?;
             }
-            Work::Diagnose { file, reading, known, generator, without } => {
+            WorkAsked::Diagnose { file, reading, known, generator, without } => {
                 words.file("file", file)?;
                 words.known(known, false)?;
                 words.option("generator", generator);
@@ -299,12 +301,12 @@ impl Work {
                 }
                 words.reading(reading)?;
             }
-            Work::Replay { file, reading, table } => {
+            WorkAsked::Replay { file, reading, table } => {
                 words.file("file", file)?;
                 words.file_option("tables", table)?;
                 words.reading(reading)?;
             }
-            Work::Simulate { drive, generator, torque_n_m, mesh } => {
+            WorkAsked::Simulate { drive, generator, torque_n_m, mesh } => {
                 words.drive(drive)?;
                 words.option("generator", generator);
                 words.option("path", "pitch");
@@ -315,28 +317,28 @@ impl Work {
                     words.option("increment", std::f64::consts::TAU / f64::from(teeth) / FIRST_LOOK);
                 }
             }
-            Work::Sheet { drive, generator, torque_n_m } => {
+            WorkAsked::Sheet { drive, generator, torque_n_m } => {
                 words.sheet(drive)?;
                 words.option("generator", generator);
                 words.number("torque-n-m", *torque_n_m)?;
                 words.option("positions", 4);
             }
-            Work::Tables { drive, generator, mesh } => {
+            WorkAsked::Tables { drive, generator, mesh } => {
                 words.drive(drive)?;
                 words.option("generator", generator);
                 words.option("mesh", mesh.name());
             }
-            Work::Samples { file, drive, generator } => {
+            WorkAsked::Samples { file, drive, generator } => {
                 words.file_option("from-samples", file)?;
                 words.drive(drive)?;
                 words.option("generator", generator);
             }
-            Work::Validate { tables, drive, generator } => {
+            WorkAsked::Validate { tables, drive, generator } => {
                 words.folder_option("tables", tables)?;
                 words.drive(drive)?;
                 words.option("generator", generator);
             }
-            Work::Bundle { tables } => {
+            WorkAsked::Bundle { tables } => {
                 if folder.file(tables).is_ok() {
                     words.file_option("tables", tables)?;
                 } else {
@@ -347,7 +349,7 @@ impl Work {
                 words.option("out", format!("{out}/flexspline"));
                 return Ok(Words { arguments: words.arguments, printed_to });
             }
-            Work::New { file, of } => {
+            WorkAsked::New { file, of } => {
                 if !is_plain(file) || !file.ends_with(".toml") {
                     return refuse("file", file, "a plain name that ends in .toml");
                 }
@@ -537,7 +539,7 @@ mod tests {
 
     fn asked(json: &str) -> Result<Words, String> {
         let (_place, folder) = folder();
-        let work: Work = serde_json::from_str(json).map_err(|error| error.to_string())?;
+        let work: WorkAsked = serde_json::from_str(json).map_err(|error| error.to_string())?;
         work.words(&folder, "bench/x-1").map_err(|error| error.to_string())
     }
 
@@ -586,7 +588,7 @@ mod tests {
             r#"{"work":"new","file":"../x.toml","of":{"like":"CSG-25-80"}}"#,
             r#"{"work":"new","file":"x.toml","of":{"like":"--force"}}"#,
             r#"{"work":"simulate","drive":{"drive":"../x"},"generator":"cam","torque_n_m":1,"mesh":"coarse"}"#,
-            r#"{"work":"simulate","drive":{"drive":"HHD-95","sets":{"a --b":"1"}},"generator":"cam","torque_n_m":1,"mesh":"coarse"}"#,
+            r#"{"work":"samples","file":"a.csv","drive":{"drive":"HHD-95","sets":{"a --b":"1"}},"generator":"cam"}"#,
             r#"{"work":"diagnose","file":"a.csv","reading":{},"known":{"ratio":50},"generator":"cam"}"#,
             r#"{"work":"calibrate","files":["a.csv"],"reading":{"columns":"a\nb"},"known":{"ratio":50},"generator":"cam"}"#,
         ] {

@@ -15,9 +15,9 @@ use flexspline_base::progress;
 const GRACE: Duration = Duration::from_millis(500);
 /// Bytes of what a process prints that are kept: a guess; what `look` prints of fifty columns has 50 kB.
 const MOST_PRINTED: u64 = 8 << 20;
-/// Lines on stderr that are kept.
+/// Limit of the lines on stderr that are kept.
 const MOST_LINES: usize = 40;
-/// Bytes of a line on stderr that are kept.
+/// Limit of a line on stderr, bytes.
 const LONGEST_LINE: u64 = 4000;
 /// How long the threads that read a process that has ended have to come to its end.
 const DRAIN: Duration = Duration::from_millis(500);
@@ -31,7 +31,7 @@ struct Talk {
 
 /// How a process ended.
 #[derive(Debug)]
-pub struct Ended {
+pub struct ProcessEnd {
     /// Its exit code; none if a signal ended it.
     pub code: Option<i32>,
     /// Whether it was cancelled.
@@ -121,7 +121,7 @@ impl Running {
     }
 
     /// How it ended, if it has; one that was told to end and does not is ended.
-    pub fn ended(&mut self) -> Option<Ended> {
+    pub fn ended(&mut self) -> Option<ProcessEnd> {
         let status = match self.child.try_wait() {
             Ok(Some(status)) => status.code(),
             Ok(None) => {
@@ -137,7 +137,7 @@ impl Running {
         while Instant::now() < until && !self.readers.iter().all(JoinHandle::is_finished) {
             thread::sleep(Duration::from_millis(2));
         }
-        Some(Ended {
+        Some(ProcessEnd {
             code: status,
             cancelled: self.told_to_end.is_some(),
             said: std::mem::take(&mut lock(&self.talk).lines),

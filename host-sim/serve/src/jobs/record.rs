@@ -11,13 +11,13 @@ use flexspline_base::output::{OutputError, write_json};
 
 /// The record in a job's folder.
 const FILE: &str = "job.json";
-/// Bytes of a record, at most: more than what is kept of a process.
+/// Limit of a record, bytes: more than what is kept of a process.
 const LARGEST: u64 = 4 << 20;
-/// Lines of what a job says that are kept.
+/// Limit of the lines of what a job says that are kept.
 const MOST_LINES: usize = 40;
-/// Characters of a line that are kept.
+/// Limit of such a line, characters.
 const LONGEST_LINE: usize = 2000;
-/// Folders of jobs that are looked at when a server starts.
+/// Limit of the folders of jobs that are looked at when a server starts.
 const MOST_FOLDERS: usize = 10_000;
 
 /// How far a job is.
@@ -51,7 +51,7 @@ pub struct Progress {
 
 /// A job.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Job {
+pub struct JobRecord {
     /// Number, counting up in a folder.
     pub id: u64,
     /// The command.
@@ -91,7 +91,7 @@ pub struct Job {
     pub pid: Option<u32>,
 }
 
-impl Job {
+impl JobRecord {
     /// Adds a line to what it said.
     pub fn say(&mut self, line: &str) {
         if self.said.len() < MOST_LINES {
@@ -106,23 +106,23 @@ impl Job {
 }
 
 /// Writes the record of a job, whole.
-pub fn write(folder: &Folder, job: &Job) -> Result<(), OutputError> {
+pub fn write(folder: &Folder, job: &JobRecord) -> Result<(), OutputError> {
     write_json(&folder.path().join(&job.out).join(FILE), job)
 }
 
 /// The jobs that a folder has records of.
-pub fn all(folder: &Folder) -> Vec<Job> {
+pub fn all(folder: &Folder) -> Vec<JobRecord> {
     let Ok(entries) = fs::read_dir(folder.path().join(JOBS)) else { return Vec::new() };
     entries.take(MOST_FOLDERS).flatten().filter_map(|entry| one(folder, &entry.path())).collect()
 }
 
 /// The record of a folder, if it is one of this folder: others cannot say where results are.
-fn one(folder: &Folder, path: &Path) -> Option<Job> {
+fn one(folder: &Folder, path: &Path) -> Option<JobRecord> {
     let name = format!("{JOBS}/{}", path.file_name()?.to_str()?);
     let record = folder.file(&format!("{name}/{FILE}")).ok()?;
     if fs::metadata(&record).ok()?.len() > LARGEST {
         return None;
     }
-    let job: Job = serde_json::from_slice(&fs::read(record).ok()?).ok()?;
+    let job: JobRecord = serde_json::from_slice(&fs::read(record).ok()?).ok()?;
     (job.out == name && name == format!("{JOBS}/{}-{}", job.work, job.id)).then_some(job)
 }

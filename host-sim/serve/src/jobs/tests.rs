@@ -44,7 +44,7 @@ impl Bench {
         Bench { place, folder, jobs }
     }
 
-    fn until(&self, id: u64, state: State) -> Job {
+    fn until(&self, id: u64, state: State) -> JobRecord {
         let from = Instant::now();
         loop {
             let job = self.jobs.job(id).unwrap();
@@ -57,11 +57,11 @@ impl Bench {
     }
 }
 
-fn look() -> Work {
-    Work::Look { files: vec!["a.csv".to_owned()] }
+fn look() -> WorkAsked {
+    WorkAsked::Look { files: vec!["a.csv".to_owned()] }
 }
 
-fn long(work: &str) -> Work {
+fn long(work: &str) -> WorkAsked {
     let drive = r#"{"drive":"HHD-95"}"#;
     let json = match work {
         "tables" => format!(r#"{{"work":"tables","drive":{drive},"generator":"cam","mesh":"coarse"}}"#),
@@ -84,7 +84,8 @@ fn what_a_command_prints_and_says_is_kept() {
 #[test]
 fn a_command_that_fails_says_why() {
     let bench = Bench::new();
-    let work = Work::Replay { file: "a.csv".into(), reading: crate::work::Reading::default(), table: "a.csv".into() };
+    let work =
+        WorkAsked::Replay { file: "a.csv".into(), reading: crate::work::Reading::default(), table: "a.csv".into() };
     let id = bench.jobs.add(work).unwrap().id;
     let job = bench.until(id, State::Failed);
     assert_eq!((job.exit_code, job.said.as_slice()), (Some(2), ["error: no".to_owned()].as_slice()));
