@@ -19,7 +19,7 @@ use syn::visit::{self, Visit};
 use syn::{BinOp, Expr, Item, Lit, Stmt};
 
 /// The host's crates.
-const SOURCES: [&str; 14] = [
+const SOURCES: [&str; 15] = [
     "host-sim/src",
     "host-sim/base/src",
     "host-sim/algebra/src",
@@ -31,6 +31,7 @@ const SOURCES: [&str; 14] = [
     "host-sim/playback/src",
     "host-sim/export/src",
     "host-sim/report/src",
+    "host-sim/serve/src",
     "host-sim/studies/pacana_2023/src",
     "host-sim/fmu/src",
     "host-sim/python/src",
@@ -68,6 +69,13 @@ const BOUNDED: &[(&str, &str, usize, Bound)] = &[
     ("mechanics/src/stepping/slip.rs", "gmres", 1, Most("MOST_VECTORS")),
     ("base/src/toml_file.rs", "refuse_unknown_keys_in", 1, Shrinks("tables within a table of a file")),
     ("motion/src/scenario.rs", "next", 1, Shrinks("legs of a scenario; it ends where there is none")),
+    ("serve/src/folder.rs", "collect", 1, Shrinks("how deep it still looks")),
+    ("serve/src/jobs.rs", "work", 1, Shrinks("jobs of its line, until the server ends")),
+    ("serve/src/jobs.rs", "next_of", 1, Shrinks("waits for a job, or for the server to end")),
+    ("serve/src/jobs.rs", "run", 1, Shrinks("as long as a process runs, which whoever asked for it may end")),
+    ("serve/src/jobs/process.rs", "kill", 1, Shrinks("the time of GRACE")),
+    ("serve/src/jobs/process.rs", "ended", 1, Shrinks("the time of DRAIN")),
+    ("serve/src/jobs/process.rs", "listen", 1, Shrinks("lines that a process says, until it has ended")),
     ("python/src/failure.rs", "with_arguments", 1, Shrinks("the rest of a message")),
     ("python/src/run.rs", "run", 1, Shrinks("as long as the work in the other thread lasts, or until it is stopped")),
     ("python/src/step.rs", "for_rows", 1, Shrinks("rows that are left")),

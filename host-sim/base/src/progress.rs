@@ -1,12 +1,13 @@
 //! Progress on stderr: how far, how hard the solver works, how long it will take.
 //!
-//! A bar is drawn only on a terminal, and only for work that takes more than a second.
+//! A bar is drawn only on a terminal, and only for work that takes more than a second. A program that starts this one
+//! and wants to show how far it is sets [`LINES`], and [`read`]s lines.
 
 use std::io::{IsTerminal, Write, stderr};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError, mpsc};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle, WeakProgressBar};
 
@@ -14,6 +15,13 @@ use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, P
 const PATIENCE: Duration = Duration::from_secs(1);
 /// How often the time on a bar moves on.
 const TICK: Duration = Duration::from_millis(250);
+
+/// With this variable of the environment set there is no bar, but lines for another program, [`read`] by it.
+pub const LINES: &str = "FLEXSPLINE_PROGRESS_LINES";
+/// How a line for another program begins.
+const BEGINS: &str = "progress: ";
+/// How often there is such a line, at most.
+const LINE_EVERY: Duration = Duration::from_millis(50);
 
 /// Bars that are drawn.
 static DRAWN: Mutex<Vec<WeakProgressBar>> = Mutex::new(Vec::new());
@@ -32,6 +40,8 @@ pub fn silence() {
 /// A progress bar that may never show.
 pub struct Progress {
     bar: Option<ProgressBar>,
+    /// Title of lines for another program, and when the last one was written.
+    lines: Option<(String, Option<Instant>)>,
     /// Ends the wait for the bar to show.
     _over: Option<mpsc::Sender<()>>,
 }
@@ -39,10 +49,14 @@ pub struct Progress {
 impl Progress {
     /// Progress of work called `title`; `quiet` keeps it hidden.
     pub fn new(title: impl Into<String>, quiet: bool) -> Progress {
-        if quiet || !stderr().is_terminal() {
-            return Progress { bar: None, _over: None };
+        let title = title.into();
+        if !quiet && std::env::var_os(LINES).is_some() {
+            return Progress { bar: None, lines: Some((title, None)), _over: None };
         }
-        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden()).with_prefix(title.into());
+        if quiet || !stderr().is_terminal() {
+            return Progress { bar: None, lines: None, _over: None };
+        }
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden()).with_prefix(title);
         let (over, wait) = mpsc::channel();
         let waiting = bar.clone();
         thread::spawn(move || {
@@ -50,7 +64,7 @@ impl Progress {
                 show(&waiting);
             }
         });
-        Progress { bar: Some(bar), _over: Some(over) }
+        Progress { bar: Some(bar), lines: None, _over: Some(over) }
     }
 
     /// `done` of `total` parts are done; `note` says what just happened.
@@ -59,6 +73,13 @@ impl Progress {
             bar.set_length(total as u64);
             bar.set_position(done as u64);
             bar.set_message(note.to_owned());
+        }
+        if let Some((title, last)) = &mut self.lines
+            && (done == total || last.is_none_or(|last| last.elapsed() >= LINE_EVERY))
+        {
+            *last = Some(Instant::now());
+            // A reader that has gone is no reason to fail.
+            drop(writeln!(stderr(), "{}", written(title, done, total, note)));
         }
     }
 
@@ -70,6 +91,18 @@ impl Progress {
             None => drop(writeln!(stderr(), "{text}")),
         }
     }
+}
+
+/// A line for another program.
+fn written(title: &str, done: usize, total: usize, note: &str) -> String {
+    format!("{BEGINS}{done}/{total} {title}: {}", note.replace('\n', " "))
+}
+
+/// Reads a line for another program: parts done, of how many, and what was said.
+pub fn read(line: &str) -> Option<(u64, u64, &str)> {
+    let (count, note) = line.strip_prefix(BEGINS)?.split_once(' ')?;
+    let (done, of) = count.split_once('/')?;
+    Some((done.parse().ok()?, of.parse().ok()?, note))
 }
 
 /// Draws a bar from now on.
@@ -103,6 +136,20 @@ impl Drop for Progress {
     fn drop(&mut self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_for_another_program_is_read_as_it_was_written() {
+        let line = written("cam", 3, 24, "turning,\n4 iterations");
+        assert_eq!(read(&line), Some((3, 24, "cam: turning, 4 iterations")));
+        for other in ["", "error: no", "progress: 3 of 4", "progress: a/b c", "progress: 1/2"] {
+            assert_eq!(read(other), None, "{other}");
         }
     }
 }

@@ -12,7 +12,7 @@ use sha2::{Digest, Sha256};
 use flexspline_export::base64;
 
 /// Modules, each after those that it imports.
-const MODULES: [(&str, &str); 10] = [
+pub const MODULES: [(&str, &str); 10] = [
     ("pack.js", include_str!("../web/pack.js")),
     ("quantities.js", include_str!("../web/quantities.js")),
     ("theme.js", include_str!("../web/theme.js")),
@@ -24,13 +24,14 @@ const MODULES: [(&str, &str); 10] = [
     ("sleeve.js", include_str!("../web/sleeve.js")),
     ("page.js", include_str!("../web/page.js")),
 ];
-const UPLOT: &str = include_str!("../web/vendor/uPlot.iife.min.js");
+/// The chart library, for its global name `uPlot`.
+pub const UPLOT: &str = include_str!("../web/vendor/uPlot.iife.min.js");
 const UPLOT_LICENCE: &str = include_str!("../web/vendor/uPlot.LICENSE");
 const UPLOT_STYLE: &str = include_str!("../web/vendor/uPlot.min.css");
 const OWN_STYLE: &str = include_str!("../web/report.css");
 
-/// The style sheet.
-pub(super) static STYLE: LazyLock<String> = LazyLock::new(|| format!("{UPLOT_STYLE}\n{OWN_STYLE}"));
+/// The style sheet, that of the chart library first.
+pub static STYLE: LazyLock<String> = LazyLock::new(|| format!("{UPLOT_STYLE}\n{OWN_STYLE}"));
 
 /// The script, a module.
 pub(super) static SCRIPT: LazyLock<String> = LazyLock::new(|| {

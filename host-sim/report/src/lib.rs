@@ -9,7 +9,7 @@
 #![forbid(unsafe_code)]
 
 pub mod animation;
-mod assets;
+pub mod assets;
 pub mod calibration_report;
 pub mod campaign_report;
 pub mod diagnosis_report;

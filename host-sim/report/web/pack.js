@@ -51,8 +51,14 @@ export async function unpack({ kind, scale, offset, text }) {
   throw new Error(`packed array of kind "${kind}"`);
 }
 
-/** The packed array of this name: { values, shape }. Arrays are inflated when first asked for, and kept. */
 const inflated = new Map();
+
+/** Gives a page numbers that do not stand in its source: a promise of { values, shape } under a name. */
+export function provide(name, promise) {
+  inflated.set(name, promise);
+}
+
+/** The packed array of this name: { values, shape }. Arrays are inflated when first asked for, and kept. */
 export function numbers(name) {
   if (!inflated.has(name)) {
     const element = document.querySelector(`script.packed[data-name="${CSS.escape(name)}"]`);

@@ -62,16 +62,25 @@ pub(super) struct Diagnose {
     /// came to. Several with commas, or repeated: a list in JSON, and without what to record to tell them apart
     #[arg(long, value_name = "CAUSE", value_delimiter = ',')]
     explain: Vec<String>,
+    /// Do not consider this cause, which is known not to be there; several with commas, or repeated
+    #[arg(long, value_name = "CAUSE", value_delimiter = ',')]
+    without: Vec<String>,
     /// Do not write report.html
     #[arg(long)]
     no_report: bool,
 }
 
+/// Causes by their names, of an option.
+fn causes(option: &str, names: &[String]) -> Result<Vec<CauseName>, Failure> {
+    let causes = names.iter().map(|name| name.trim().parse::<CauseName>()).collect::<Result<Vec<_>, _>>();
+    causes.map_err(|error| Failure::BadInput(format!("{option}: {error}")))
+}
+
 impl Diagnose {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         let map = self.logs.map()?;
-        let explained = self.explain.iter().map(|name| name.trim().parse::<CauseName>()).collect::<Result<Vec<_>, _>>();
-        let explained = explained.map_err(|error| Failure::BadInput(format!("--explain: {error}")))?;
+        let explained = causes("--explain", &self.explain)?;
+        let without = causes("--without", &self.without)?;
         let image = self.image()?;
         let subject = self.subject(context, image.as_deref())?;
         let failed = |error: PipelineError| self.failed(&error);
@@ -88,7 +97,7 @@ impl Diagnose {
         let remake: Option<&MakeTable<'_>> = if self.remake_tables { Some(&by_fem) } else { None };
         // What tells a cause from the strongest that was named is looked for of one.
         let asked = explained.first().copied().filter(|_| explained.len() == 1);
-        let options = Options { verbose: context.verbose(), asked, remake, mesh: self.mesh };
+        let options = Options { verbose: context.verbose(), asked, without: &without, remake, mesh: self.mesh };
         let mut progress = context.progress("diagnose");
         let done = diagnose_rows(recording, &subject, &options, |done, of, what| progress.set(done, of, what))
             .map_err(failed)?;

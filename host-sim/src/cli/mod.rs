@@ -25,6 +25,8 @@ mod replay;
 mod report;
 mod reproduce;
 mod say;
+#[cfg(feature = "serve")]
+mod serve;
 mod simulate;
 mod sleeve;
 mod stop;
@@ -127,6 +129,7 @@ const GROUPS: [(&str, &[(&str, &str)]); 4] = [
     (
         "Files and set-up",
         &[
+            ("serve", "the bench in a browser: logs, drives and tables to look at and change"),
             ("new", "a commented drive file, or a catalogue model, to edit"),
             ("drive", "print a drive, or check its teeth for interference"),
             ("completions", "let the shell complete commands, options and names"),
@@ -192,6 +195,8 @@ enum Command {
     Diagnose(diagnose::Diagnose),
     Reproduce(reproduce::Reproduce),
     New(new::New),
+    #[cfg(feature = "serve")]
+    Serve(serve::Serve),
     Completions(completions::Completions),
     Man(man::ManPages),
 }
@@ -278,6 +283,8 @@ impl Command {
             Command::Diagnose(command) => command.run(context),
             Command::Reproduce(command) => command.run(context),
             Command::New(command) => command.run(context),
+            #[cfg(feature = "serve")]
+            Command::Serve(command) => command.run(context),
             Command::Completions(command) => command.run(context),
             Command::Man(command) => command.run(context),
         }

@@ -20,6 +20,17 @@ pub(super) fn end_cleanly_on_signals() {
     WATCH.call_once(|| drop(listen(stop)));
 }
 
+/// What a command that runs until it is told to end does then: it is done, not stopped.
+static ENDING: OnceLock<Box<dyn Fn() + Send + Sync>> = OnceLock::new();
+
+/// From now on a signal is how this command ends: `ending` clears up after it, and the exit code is that of a command
+/// that is done.
+#[cfg(feature = "serve")]
+pub(super) fn ends_by_signal(ending: impl Fn() + Send + Sync + 'static) {
+    // A process runs one command.
+    let _ = ENDING.set(Box::new(ending));
+}
+
 /// A second signal so soon is the first again: `timeout` and shells send one to a process and to its group.
 const ECHO: Duration = Duration::from_millis(300);
 
@@ -37,6 +48,11 @@ fn stop() {
     // On a thread of its own, so that the next signal is heard.
     std::thread::spawn(move || {
         progress::silence();
+        if let Some(ending) = ENDING.get() {
+            ending();
+            abandon();
+            std::process::exit(i32::from(Outcome::Done as u8));
+        }
         let written = abandon();
         let left = if written { "what was written is whole" } else { "nothing was written" };
         say::error(&format!("stopped; {left}"));

@@ -91,6 +91,23 @@ pub enum DiagnosisError {
     NotFinite,
 }
 
+/// Some of the causes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CauseSet(u64);
+
+impl CauseSet {
+    /// These.
+    pub fn of(causes: &[CauseName]) -> CauseSet {
+        const { assert!(CauseName::ALL.len() <= 64, "a bit for each cause") };
+        CauseSet(causes.iter().fold(0, |all, cause| all | 1 << *cause as u64))
+    }
+
+    /// Whether it is one of them.
+    pub fn has(self, cause: CauseName) -> bool {
+        self.0 >> cause as u64 & 1 == 1
+    }
+}
+
 /// Settings of a diagnosis.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
@@ -102,6 +119,8 @@ pub struct Settings {
     pub verbose: bool,
     /// A cause that is asked about: if it is not named, what to record to tell it from those that are is looked for.
     pub asked: Option<CauseName>,
+    /// Causes that are not considered: somebody knows that they are not there, or wants to see what the rows say then.
+    pub without: CauseSet,
     /// How finely rows are looked at, and their noise, where that is known from before.
     pub fineness: Option<Fineness>,
 }
@@ -119,7 +138,14 @@ pub struct Fineness {
 
 impl Default for Settings {
     fn default() -> Settings {
-        Settings { pitch_radius_mm: 48.7, averages: 12_000, verbose: false, asked: None, fineness: None }
+        Settings {
+            pitch_radius_mm: 48.7,
+            averages: 12_000,
+            verbose: false,
+            asked: None,
+            without: CauseSet::default(),
+            fineness: None,
+        }
     }
 }
 
@@ -232,6 +258,7 @@ impl<'a> Search<'a> {
     fn new(on: &'a Excitation<'a>, settings: &Settings) -> Result<Search<'a>, DiagnosisError> {
         let mut laws = library(on);
         laws.extend(unnamed(on));
+        laws.retain(|law| law.cause().is_none_or(|cause| !settings.without.has(cause)));
         let mut trace = Trace::new(settings.verbose);
         for cause in CauseName::ALL {
             if let Some(need) = on.lacks(*cause) {

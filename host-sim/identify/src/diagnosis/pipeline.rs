@@ -18,7 +18,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::report::{Compensation, Diagnosis};
-use super::{DiagnosisError, Extended, Settings, diagnose_extended};
+use super::{CauseSet, DiagnosisError, Extended, Settings, diagnose_extended};
 use super::{blurred, channels, quieted, torque_zero, zeros};
 use crate::causes::CauseName;
 use crate::extension::{
@@ -216,6 +216,8 @@ pub struct Options<'a> {
     pub verbose: bool,
     /// A cause that is asked about.
     pub asked: Option<CauseName>,
+    /// Causes that are not considered.
+    pub without: &'a [CauseName],
     /// Makes extended tables by FEM; else they are sampled from the extended model.
     pub remake: Option<&'a MakeTable<'a>>,
     /// Mesh of FEM runs; else that of the table.
@@ -309,6 +311,7 @@ pub fn diagnose_rows(
     let settings = Settings {
         verbose: options.verbose,
         asked: options.asked,
+        without: CauseSet::of(options.without),
         pitch_radius_mm: subject.drive.circular_spline.pitch_radius_mm(),
         ..Settings::default()
     };

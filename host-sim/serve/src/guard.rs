@@ -1,0 +1,258 @@
+//! Who may ask: a page of this server, in the browser of whoever started it.
+//!
+//! - Other users and programs of this machine: the token of this run, in the address once, then in a cookie that scripts
+//!   cannot read.
+//! - A name of somebody's that leads to 127.0.0.1 (DNS rebinding): `Host` is an address of this server.
+//! - Other pages in the same browser: `Origin` is this server wherever it is given, and it is given with all that
+//!   changes something; `Sec-Fetch-Site` is not that of another site; the cookie is `SameSite=Strict`; no answer allows
+//!   another origin to read it.
+//! - Scripts in names, logs and reports: a content security policy, scripts of this server alone, nothing from elsewhere.
+
+use axum::body::Body;
+use axum::http::header::{self, HeaderMap, HeaderName, HeaderValue};
+use axum::http::{Method, Response, StatusCode};
+
+/// Bytes of a token: 128 bits, which nobody guesses.
+const TOKEN_BYTES: usize = 16;
+
+/// What a page of this server may load and ask: itself, and pictures that it made.
+pub const PAGE_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; \
+                               connect-src 'self'; frame-src 'self'; base-uri 'none'; form-action 'none'; \
+                               frame-ancestors 'none'";
+/// What a page of a result may: run its own scripts in an origin that is nobody's, and ask for nothing.
+pub const RESULT_POLICY: &str = "sandbox allow-scripts allow-downloads allow-modals; default-src 'none'; script-src \
+                                 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; frame-ancestors \
+                                 'self'";
+/// What any other file may: nothing.
+pub const FILE_POLICY: &str = "sandbox; default-src 'none'";
+
+/// The token of one run, and where the server listens.
+#[derive(Debug, Clone)]
+pub struct Guard {
+    token: String,
+    port: u16,
+}
+
+/// Why somebody may not ask.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NoEntry {
+    /// `Host` is no address of this server.
+    Host,
+    /// The request is of another page.
+    Origin,
+    /// No token, or that of another run.
+    Token,
+}
+
+impl NoEntry {
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            NoEntry::Host => "this server answers as 127.0.0.1 and localhost alone",
+            NoEntry::Origin => "this request is of another page; allowed: pages of this server",
+            NoEntry::Token => "open the address that `flexspline serve` printed: it holds the key of this run",
+        }
+    }
+}
+
+impl Guard {
+    /// A guard with a new token.
+    ///
+    /// # Errors
+    /// The system has no random numbers.
+    pub fn new(port: u16) -> Result<Guard, getrandom::Error> {
+        let mut bytes = [0; TOKEN_BYTES];
+        getrandom::fill(&mut bytes)?;
+        Ok(Guard { token: bytes.iter().map(|byte| format!("{byte:02x}")).collect(), port })
+    }
+
+    /// The address to open.
+    pub fn address(&self) -> String {
+        format!("http://127.0.0.1:{}/?token={}", self.port, self.token)
+    }
+
+    /// The name of the cookie. Cookies do not know ports, and another server of this machine may have one too.
+    fn cookie_name(&self) -> String {
+        format!("flexspline-{}", self.port)
+    }
+
+    /// The cookie that holds the token.
+    pub fn cookie(&self) -> String {
+        format!("{}={}; Path=/; HttpOnly; SameSite=Strict", self.cookie_name(), self.token)
+    }
+
+    /// Whether this is the token of this run; takes the same time whatever is wrong with it.
+    pub fn is_token(&self, found: &str) -> bool {
+        let same = found.bytes().zip(self.token.bytes()).fold(0, |all, (a, b)| all | (a ^ b));
+        found.len() == self.token.len() && same == 0
+    }
+
+    /// The names under which this server may be addressed.
+    fn hosts(&self) -> [String; 2] {
+        ["127.0.0.1", "localhost"].map(|name| format!("{name}:{}", self.port))
+    }
+
+    /// Whether the request may be of a page of this server, whoever asks.
+    ///
+    /// # Errors
+    /// `Host`, `Origin` or `Sec-Fetch-Site` say otherwise.
+    pub fn check_place(&self, method: &Method, headers: &HeaderMap) -> Result<(), NoEntry> {
+        let only = |name: HeaderName| {
+            let mut all = headers.get_all(name).iter();
+            (all.next().and_then(|value| value.to_str().ok()), all.next().is_some())
+        };
+        let (host, several) = only(header::HOST);
+        if several || !host.is_some_and(|host| self.hosts().iter().any(|own| own == host)) {
+            return Err(NoEntry::Host);
+        }
+        let reads = matches!(*method, Method::GET | Method::HEAD);
+        let (origin, several) = only(header::ORIGIN);
+        let own = |origin: &str| host.is_some_and(|host| origin.strip_prefix("http://") == Some(host));
+        match origin {
+            _ if several => return Err(NoEntry::Origin),
+            Some(origin) if !own(origin) => return Err(NoEntry::Origin),
+            None if headers.contains_key(header::ORIGIN) || !reads => return Err(NoEntry::Origin),
+            _ => {}
+        }
+        let site = headers.get("sec-fetch-site").map(|site| site.as_bytes());
+        match site {
+            None | Some(b"same-origin" | b"none") => Ok(()),
+            // A page of a result has no origin of its own: it may be shown, and asks for nothing.
+            Some(_) => Err(NoEntry::Origin),
+        }
+    }
+
+    /// Whether the request has the token of this run.
+    ///
+    /// # Errors
+    /// It has not.
+    pub fn check_token(&self, headers: &HeaderMap) -> Result<(), NoEntry> {
+        let name = self.cookie_name();
+        let cookies = headers.get_all(header::COOKIE).iter().filter_map(|value| value.to_str().ok());
+        let found = cookies
+            .flat_map(|all| all.split(';'))
+            .filter_map(|cookie| cookie.trim().split_once('='))
+            .any(|(of, token)| of == name && self.is_token(token));
+        if found { Ok(()) } else { Err(NoEntry::Token) }
+    }
+}
+
+/// An answer in words.
+pub fn refusal(refusal: NoEntry) -> Response<Body> {
+    let mut answer = Response::new(Body::from(format!("{}\n", refusal.words())));
+    *answer.status_mut() = StatusCode::FORBIDDEN;
+    answer.headers_mut().insert(header::CONTENT_TYPE, HeaderValue::from_static("text/plain; charset=utf-8"));
+    answer
+}
+
+/// Puts on an answer what every answer has: nothing is kept, guessed, framed or told to others.
+pub fn harden(headers: &mut HeaderMap) {
+    let every = [
+        (header::CACHE_CONTROL, "no-store"),
+        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+        (header::REFERRER_POLICY, "no-referrer"),
+        (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
+        (HeaderName::from_static("cross-origin-opener-policy"), "same-origin"),
+        (HeaderName::from_static("permissions-policy"), "camera=(), microphone=(), geolocation=()"),
+    ];
+    for (name, value) in every {
+        headers.insert(name, HeaderValue::from_static(value));
+    }
+    headers.entry(header::CONTENT_SECURITY_POLICY).or_insert(HeaderValue::from_static(FILE_POLICY));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn guard() -> Guard {
+        Guard { token: "0123456789abcdef0123456789abcdef".to_owned(), port: 4000 }
+    }
+
+    fn headers(all: &[(&str, &str)]) -> HeaderMap {
+        let each = |(name, value): &(&str, &str)| {
+            (HeaderName::from_bytes(name.as_bytes()).unwrap(), HeaderValue::from_str(value).unwrap())
+        };
+        all.iter().map(each).collect()
+    }
+
+    #[test]
+    fn tokens_are_long_and_each_run_has_its_own() {
+        let [one, other] = [Guard::new(1).unwrap(), Guard::new(1).unwrap()];
+        assert_eq!(one.token.len(), 2 * TOKEN_BYTES);
+        assert_ne!(one.token, other.token);
+        assert!(one.is_token(&one.token) && !one.is_token(&other.token));
+        assert!(!one.is_token("") && !one.is_token(&one.token[1..]) && !one.is_token(&format!("{}0", one.token)));
+    }
+
+    #[test]
+    fn only_the_cookie_of_this_run_on_this_port_opens() {
+        let token = guard().token;
+        for (cookie, opens) in [
+            (format!("flexspline-4000={token}"), true),
+            (format!("other=1; flexspline-4000={token}; x=y"), true),
+            (format!("flexspline-4001={token}"), false),
+            (format!("flexspline-4000={}", token.to_uppercase()), false),
+            (format!("flexspline-4000={token}0"), false),
+            ("flexspline-4000".to_owned(), false),
+            (String::new(), false),
+        ] {
+            let found = guard().check_token(&headers(&[("cookie", &cookie)]));
+            assert_eq!(found.is_ok(), opens, "{cookie}");
+        }
+        assert_eq!(guard().check_token(&HeaderMap::new()), Err(NoEntry::Token));
+    }
+
+    #[test]
+    fn another_host_origin_or_site_is_refused() {
+        let (get, post) = (Method::GET, Method::POST);
+        let host = ("host", "127.0.0.1:4000");
+        let own = ("origin", "http://127.0.0.1:4000");
+        let cases: &[(&Method, &[(&str, &str)], Result<(), NoEntry>)] = &[
+            (&get, &[host], Ok(())),
+            (&get, &[("host", "localhost:4000")], Ok(())),
+            (&post, &[host, own], Ok(())),
+            (&get, &[host, ("sec-fetch-site", "none")], Ok(())),
+            (&get, &[], Err(NoEntry::Host)),
+            (&get, &[("host", "127.0.0.1")], Err(NoEntry::Host)),
+            (&get, &[("host", "evil.example:4000")], Err(NoEntry::Host)),
+            (&get, &[("host", "127.0.0.1:4001")], Err(NoEntry::Host)),
+            (&get, &[host, ("host", "evil.example:4000")], Err(NoEntry::Host)),
+            (&post, &[host], Err(NoEntry::Origin)),
+            (&post, &[host, ("origin", "null")], Err(NoEntry::Origin)),
+            (&post, &[host, ("origin", "https://127.0.0.1:4000")], Err(NoEntry::Origin)),
+            (&post, &[host, ("origin", "http://127.0.0.1:4000.evil.example")], Err(NoEntry::Origin)),
+            (&post, &[host, ("origin", "http://localhost:4000")], Err(NoEntry::Origin)),
+            (&post, &[host, own, ("origin", "http://evil.example")], Err(NoEntry::Origin)),
+            (&get, &[host, ("origin", "http://evil.example")], Err(NoEntry::Origin)),
+            (&get, &[host, ("sec-fetch-site", "cross-site")], Err(NoEntry::Origin)),
+            (&get, &[host, ("sec-fetch-site", "same-site")], Err(NoEntry::Origin)),
+        ];
+        for (method, given, expected) in cases {
+            // A map collected of equal names keeps the last; two of a kind have to be appended.
+            let mut map = HeaderMap::new();
+            for (name, value) in headers_each(given) {
+                map.append(name, value);
+            }
+            assert_eq!(guard().check_place(method, &map), *expected, "{method} {given:?}");
+        }
+    }
+
+    fn headers_each(all: &[(&str, &str)]) -> Vec<(HeaderName, HeaderValue)> {
+        let each = |(name, value): &(&str, &str)| {
+            (HeaderName::from_bytes(name.as_bytes()).unwrap(), HeaderValue::from_str(value).unwrap())
+        };
+        all.iter().map(each).collect()
+    }
+
+    #[test]
+    fn every_answer_is_hardened_and_a_page_keeps_its_own_policy() {
+        let mut map = HeaderMap::new();
+        harden(&mut map);
+        assert_eq!(map[header::CONTENT_SECURITY_POLICY], FILE_POLICY);
+        assert!(!map.contains_key(header::ACCESS_CONTROL_ALLOW_ORIGIN));
+        map.insert(header::CONTENT_SECURITY_POLICY, HeaderValue::from_static(PAGE_POLICY));
+        harden(&mut map);
+        assert_eq!(map[header::CONTENT_SECURITY_POLICY], PAGE_POLICY);
+    }
+}

@@ -1,0 +1,626 @@
+// The bench of a drive: fields as sliders, teeth while they move, a pitch of contact FEM when they rest.
+import { fileJson, fileText, showDrive } from "./api.js";
+import { button, calm, commandLine, el, errorOf, number, section, select, table } from "./elements.js";
+import { cancel, over, progressOf, run, why } from "./jobs.js";
+import { csvColumns, downloads, liveChart, liveDrive, readReport, wholeReport } from "./results.js";
+import { sketch } from "./draw.js";
+
+/** What is shown first; the rest is folded. */
+const MAIN = [
+  "generator.w0_mm",
+  "flexspline.rim_thickness_mm",
+  "flexspline.width_mm",
+  "flexspline.profile_shift",
+  "circular_spline.profile_shift",
+  "flanks.friction_coefficient",
+];
+/** How far a slider reaches around the value of the file, as a share of it: the ranges allowed are for every size of drive. A guess. */
+const REACH = 0.2;
+/** How far it reaches where the value is zero, in its unit. Guesses. */
+const REACH_OF_ZERO = 0.2;
+const STEPS = 200;
+/** How long sliders rest before the FEM begins, ms. */
+const REST_MS = 150;
+const GENERATORS = ["two-roller", "four-roller", "double-disc", "cam"];
+/** Variants that stand side by side at most: a chart has colours for so many. */
+const MOST_PINNED = 3;
+const ARCSEC = (180 / Math.PI) * 3600;
+
+const shortly = (x) => String(Number(Number(x).toPrecision(5)));
+
+export async function driveBench(view, asked, bench) {
+  await bench.refresh();
+  const drives = [
+    ...bench.state.built_in,
+    ...bench.state.files.filter((f) => /^[^/]+\.toml$/.test(f.name) && !/nominal/.test(f.name)).map((f) => f.name),
+  ];
+  const now = {
+    drive: drives.includes(asked.get("drive")) ? asked.get("drive") : "HHD-95",
+    sets: {},
+    generators: asked.getAll("g").filter((g) => GENERATORS.includes(g)),
+    torque: asked.has("torque") ? Number(asked.get("torque")) : 20,
+  };
+  if (!now.generators.length) now.generators = ["cam"];
+  for (const set of asked.getAll("set")) {
+    const [path, ...value] = set.split("=");
+    now.sets[path] = value.join("=");
+  }
+  const request = (state = now) => ({ drive: state.drive, sets: { ...state.sets } });
+  const entries = () => [
+    ["drive", now.drive],
+    ...Object.entries(now.sets).map(([path, value]) => ["set", `${path}=${value}`]),
+    ...now.generators.map((g) => ["g", g]),
+    ["torque", String(now.torque)],
+  ];
+
+  // ---- Undo: states before, as text
+  const past = [];
+  const undo = button("Undo", () => {
+    const before = past.pop();
+    if (before) Object.assign(now, JSON.parse(before));
+    undo.disabled = !past.length;
+    controls();
+    changed();
+  });
+  undo.disabled = true;
+  const remember = () => {
+    const text = JSON.stringify(now);
+    if (past.at(-1) === text) return;
+    past.push(text);
+    if (past.length > 100) past.shift();
+    undo.disabled = false;
+  };
+
+  // ---- Frame
+  const drawing = sketch();
+  const form = el("div", { class: "form" });
+  const main = el("div", { class: "fields", id: "main-fields" });
+  const rest = el("div", {});
+  const wrong = el("div", { role: "status" });
+  const live = el("p", { class: "readout", role: "status", id: "live" });
+  const commands = el("div");
+  const chart = liveChart(
+    "ripple",
+    "Error over the generator angle",
+    "Error of the output over one tooth pitch, less its mean, for each generator and variant",
+    "One flexspline tooth pitch under the load, each line less its mean.",
+  );
+  const stress = liveDrive("stress", "Stress, forces and motion");
+  const figures = el("div");
+  const pinnedPlace = el("div");
+  const makePlace = el("div");
+  view.append(
+    el("h1", { text: "A drive" }),
+    section("fields", "Its fields", form, wrong, main, rest),
+    section("drawn", "Its teeth", drawing.element),
+    section("pitch", "A pitch of contact FEM", live, figures, chart.figure, pinnedPlace, stress.figure, commands),
+    section("make", "Its tables", makePlace),
+  );
+
+  // ---- Fields
+  let listed = [];
+  const inputs = new Map();
+  const original = new Map();
+
+  function set(path, value) {
+    if (value === original.get(path)) delete now.sets[path];
+    else now.sets[path] = value;
+    changed();
+  }
+
+  function fieldOf(field) {
+    const id = `f-${field.path.replace(".", "-")}`;
+    const value = now.sets[field.path] ?? field.value;
+    const problem = el("p", { class: "wrong", id: `${id}-wrong` });
+    const small = el("small", {
+      id: `${id}-about`,
+      text: field.meaning + (field.range ? `; ${field.range[0]} to ${field.range[1]}` : ""),
+    });
+    const name = field.path.split(".").join(": ").replaceAll("_", " ");
+    const common = { "aria-describedby": `${id}-about ${id}-wrong` };
+    const row = el("div", { class: "row" });
+    if (field.kind === "word") {
+      row.append(
+        select(
+          field.words,
+          value,
+          (chosen) => {
+            remember();
+            set(field.path, chosen);
+          },
+          { id, ...common },
+        ),
+      );
+    } else {
+      const text = el("input", { type: "text", inputmode: "decimal", id, value, ...common });
+      const [at, whole] = [Number(original.get(field.path)), field.kind === "count"];
+      let slider = null;
+      if (Number.isFinite(at) && field.range) {
+        const reach = at === 0 ? REACH_OF_ZERO : REACH * Math.abs(at);
+        const [low, high] = [Math.max(field.range[0], at - reach), Math.min(field.range[1], at + reach)];
+        const step = whole ? 2 : (high - low) / STEPS;
+        slider = el("input", {
+          type: "range",
+          min: low,
+          max: high,
+          step: whole ? 2 : "any",
+          value: String(at),
+          "aria-label": `${name}, slider`,
+        });
+        slider.value = value;
+        slider.addEventListener("pointerdown", remember);
+        slider.addEventListener("keydown", (event) => {
+          const by = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1, PageUp: 10, PageDown: -10 }[event.key];
+          if (!by) return;
+          event.preventDefault();
+          remember();
+          slider.value = String(Math.min(high, Math.max(low, Number(slider.value) + by * step)));
+          slider.dispatchEvent(new Event("input"));
+        });
+        slider.addEventListener("input", () => {
+          text.value = whole ? slider.value : shortly(slider.value);
+          set(field.path, text.value);
+        });
+        row.append(slider);
+      }
+      text.addEventListener("change", () => {
+        remember();
+        if (slider) slider.value = text.value;
+        set(field.path, text.value.trim().replace(",", "."));
+      });
+      row.append(text);
+    }
+    inputs.set(field.path, { control: row.lastChild, problem });
+    return el("div", { class: "field" }, el("label", { for: id, text: name }), row, small, problem);
+  }
+
+  function controls() {
+    inputs.clear();
+    form.replaceChildren(
+      el(
+        "label",
+        {},
+        "Drive",
+        select(
+          drives,
+          now.drive,
+          (chosen) => {
+            remember();
+            now.drive = chosen;
+            now.sets = {};
+            fields();
+          },
+          { id: "drive-name" },
+        ),
+      ),
+      el(
+        "fieldset",
+        { class: "form" },
+        el("legend", { text: "Generators" }),
+        ...GENERATORS.map((g) =>
+          el(
+            "label",
+            { class: "line" },
+            el("input", {
+              type: "checkbox",
+              checked: now.generators.includes(g),
+              on: {
+                change: (event) => {
+                  remember();
+                  now.generators = GENERATORS.filter((of) =>
+                    of === g ? event.target.checked : now.generators.includes(of),
+                  );
+                  if (!now.generators.length) now.generators = [g];
+                  event.target.checked = now.generators.includes(g);
+                  changed();
+                },
+              },
+            }),
+            ` ${g}`,
+          ),
+        ),
+      ),
+      el(
+        "label",
+        {},
+        "Load, N·m",
+        el("input", {
+          type: "number",
+          id: "torque",
+          step: "any",
+          value: String(now.torque),
+          on: {
+            change: (event) => {
+              remember();
+              now.torque = Number(event.target.value) || 0;
+              changed();
+            },
+          },
+        }),
+      ),
+      undo,
+    );
+    main.replaceChildren(...listed.filter((f) => MAIN.includes(f.path)).map(fieldOf));
+    const groups = Map.groupBy(
+      listed.filter((f) => !MAIN.includes(f.path) && f.kind !== "list"),
+      (f) => f.path.split(".")[0],
+    );
+    rest.replaceChildren(
+      ...[...groups].map(([name, all]) =>
+        el(
+          "details",
+          {},
+          el("summary", { text: `${name.replaceAll("_", " ")}: ${all.length} more` }),
+          el("div", { class: "fields" }, ...all.map(fieldOf)),
+        ),
+      ),
+    );
+    for (const { path } of listed) {
+      if (now.sets[path] !== undefined) inputs.get(path)?.control.closest("details")?.setAttribute("open", "");
+    }
+  }
+
+  /** The fields of another drive. */
+  async function fields() {
+    const shown = await showDrive({ drive: now.drive, sets: {} }, now.generators[0]);
+    listed = shown.fields;
+    original.clear();
+    for (const field of listed) original.set(field.path, field.value);
+    controls();
+    await changed();
+  }
+
+  // ---- While one drags: drawing and mistakes
+  let drawingNow = null;
+  let wanted = false;
+  let whole = false;
+  async function draw() {
+    if (drawingNow) {
+      wanted = true;
+      return drawingNow;
+    }
+    drawingNow = (async () => {
+      do {
+        wanted = false;
+        const shown = await showDrive(request(), now.generators[0]);
+        whole = shown.problems.length === 0;
+        for (const { control, problem } of inputs.values()) {
+          problem.textContent = "";
+          control.removeAttribute("aria-invalid");
+        }
+        const others = [];
+        for (const { field, what } of shown.problems) {
+          const at = inputs.get(field);
+          if (at) {
+            at.problem.textContent = what;
+            at.control.setAttribute("aria-invalid", "true");
+          } else others.push(field ? `${field}: ${what}` : what);
+        }
+        wrong.replaceChildren(
+          ...[...others, ...shown.cautions].map((words) => el("p", { class: "wrong", text: words })),
+        );
+        if (shown.drawing) drawing.draw(shown.drawing);
+      } while (wanted);
+    })();
+    try {
+      await drawingNow;
+    } catch (error) {
+      whole = false;
+      bench.complain(error);
+    } finally {
+      drawingNow = null;
+    }
+  }
+
+  // ---- When one stops: FEM
+  let round = 0;
+  let pinned = [];
+  const running = new Set();
+  /** What was found of this drive, by generator. */
+  let found = new Map();
+
+  const rested = calm(REST_MS, () => compute().catch((error) => bench.complain(error)));
+  async function changed() {
+    round += 1;
+    live.textContent = "";
+    figures.classList.add("waits");
+    bench.keep("drive", entries());
+    for (const id of running) cancel(id);
+    running.clear();
+    make();
+    rested();
+    await draw();
+  }
+
+  async function pitch(drive, g, torque, mesh, mine) {
+    const begun = performance.now();
+    const job = await run({ work: "simulate", drive, generator: g, torque_n_m: torque, mesh }, (j) => {
+      if (mine !== round) return;
+      running.add(j.id);
+    });
+    running.delete(job.id);
+    if (mine !== round) return null;
+    if (job.state !== "done") throw new Error(why(job));
+    const [summary, csv] = await Promise.all([fileJson(`${job.out}/summary.json`), fileText(`${job.out}/results.csv`)]);
+    return { job, summary, rows: csvColumns(csv), mesh, waited_ms: performance.now() - begun };
+  }
+
+  async function sheet(drive, g, mine) {
+    const job = await run(
+      { work: "sheet", drive, generator: g, torque_n_m: null },
+      (j) => mine === round && running.add(j.id),
+    );
+    running.delete(job.id);
+    if (mine !== round || job.state !== "done") return null;
+    const study = await fileJson(`${job.out}/study.json`);
+    return { job, run: study.runs[0] };
+  }
+
+  async function compute() {
+    await draw();
+    if (!whole) {
+      live.textContent = "The FEM waits for a drive that is whole: see the fields marked above.";
+      return;
+    }
+    const mine = round;
+    const [drive, torque, generators] = [request(), now.torque, [...now.generators]];
+    const begun = performance.now();
+    found = new Map(generators.map((g) => [g, {}]));
+    for (const mesh of ["coarse", "standard"]) {
+      for (const g of generators) {
+        live.textContent = `${g}: contact FEM, ${mesh} mesh …`;
+        try {
+          const result = await pitch(drive, g, torque, mesh, mine);
+          if (!result) return;
+          Object.assign(found.get(g), result);
+        } catch (error) {
+          if (mine !== round) return;
+          found.get(g).failed = error.message;
+        }
+        await present(mine);
+        if (mine !== round) return;
+      }
+      const ms = Math.round(performance.now() - begun);
+      document.documentElement.dataset[mesh] = `${mine} ${ms}`;
+      live.textContent = `${mesh} mesh, ${(ms / 1000).toFixed(1)} s`;
+    }
+    for (const g of generators) {
+      live.textContent = `${g}: stiffness K1 to K3 …`;
+      const of = await sheet(drive, g, mine);
+      if (mine !== round) return;
+      found.get(g).sheet = of;
+      await present(mine);
+    }
+    live.textContent =
+      "Standard mesh; stiffness on the coarse mesh, each K a secant between the loads T1, T2 and the largest.";
+    document.documentElement.dataset.sheet = String(mine);
+  }
+
+  const FIGURES = [
+    ["Kinematic error, peak to peak", (f) => errorOf(f.summary?.kinematic_error_pp_arcsec)],
+    ["Backlash", (f) => errorOf(f.sheet?.run.sheet?.backlash_arcsec)],
+    ["Wind-up under the load, clearance included", (f) => errorOf(f.summary?.wind_up_arcsec)],
+    ["of it elastic", (f) => errorOf(f.summary?.wind_up_elastic_arcsec)],
+    ["K1, N·m/rad", (f) => number(f.sheet?.run.sheet?.k1_n_m_per_rad, 4)],
+    ["K2, N·m/rad", (f) => number(f.sheet?.run.sheet?.k2_n_m_per_rad, 4)],
+    ["K3, N·m/rad", (f) => number(f.sheet?.run.sheet?.k3_n_m_per_rad, 4)],
+    [
+      "T1, T2 and largest load, N·m",
+      (f) =>
+        f.sheet?.run.loads
+          ? [f.sheet.run.loads.t1_n_m, f.sheet.run.loads.t2_n_m, f.sheet.run.loads.largest_n_m]
+              .map((t) => number(t))
+              .join(", ")
+          : "–",
+    ],
+    ["Root fillets, MPa", (f) => number(f.summary?.root_fillet_mpa)],
+    ["Bore, MPa", (f) => number(f.summary?.nodal_bore_mpa)],
+    ["Flank pressure, MPa", (f) => number(f.summary?.peak_flank_pressure_mpa)],
+    ["Mesh", (f) => f.mesh ?? (f.failed ? "failed" : "…")],
+  ];
+
+  let seenStress = "";
+  async function present(mine) {
+    if (mine !== round) return;
+    figures.classList.remove("waits");
+    const shown = [...pinned, ...[...found].map(([g, of]) => ({ name: g, of }))];
+    const failed = shown.filter(({ of }) => of.failed);
+    figures.replaceChildren(
+      table(
+        "What the FEM finds; pinned variants first",
+        ["", ...shown.map(({ name }) => name)],
+        FIGURES.map(([words, of]) => [words, ...shown.map((s) => of(s.of))]),
+      ),
+      ...failed.map(({ name, of }) => el("p", { class: "wrong line", text: `${name}: ${of.failed}` })),
+      button("Pin these to compare", pin, {
+        disabled: pinned.length >= MOST_PINNED || !shown.some(({ of }) => of.summary),
+      }),
+    );
+    const lines = shown.filter(({ of }) => of.rows);
+    if (lines.length) {
+      const curve = ({ of }) => {
+        const mean = of.rows.error_arcsec.reduce((a, b) => a + b, 0) / of.rows.error_arcsec.length;
+        const from = of.rows.generator_rad[0];
+        return of.rows.generator_rad.map((x, k) => [((x - from) * 180) / Math.PI, of.rows.error_arcsec[k] - mean]);
+      };
+      const curves = lines.map(curve);
+      const xs = [...new Set(curves.flat().map(([x]) => Number(x.toFixed(6))))].sort((a, b) => a - b);
+      const columns = curves.map((points) => {
+        const at = new Map(points.map(([x, y]) => [Number(x.toFixed(6)), y]));
+        return xs.map((x) => at.get(x) ?? NaN);
+      });
+      await chart.columns(
+        { label: "Generator from the beginning of the pitch", quantity: "degree" },
+        { label: "Error less its mean", quantity: "error" },
+        lines.map(({ name, of }, k) => ({
+          name: `${name}, ${of.mesh}`,
+          mark: pinned.includes(lines[k]) ? "dashed" : "line",
+          colour: k,
+        })),
+        [xs, ...columns],
+      );
+    }
+    const first = [...found.values()].find((of) => of.job);
+    if (first && seenStress !== first.job.out) {
+      seenStress = first.job.out;
+      await stress.of(await readReport(`${first.job.out}/report.html`));
+    }
+    commands.replaceChildren(
+      el("h3", { text: "The commands that make the same files" }),
+      ...[...found.values()].flatMap((of) =>
+        [of.job, of.sheet?.job].filter(Boolean).map((job) => commandLine(job.command)),
+      ),
+      ...(first ? [wholeReport(first.job.out)] : []),
+    );
+  }
+
+  function pin() {
+    const count = pinned.length + 1;
+    for (const [g, of] of found) {
+      if (of.summary && pinned.length < MOST_PINNED)
+        pinned.push({ name: `${count}: ${g}`, of: { ...of }, state: JSON.stringify(now) });
+    }
+    pinnedPlace.replaceChildren(
+      ...pinned.map((one, k) =>
+        el(
+          "p",
+          {},
+          `Pinned ${one.name}: ${
+            Object.entries(JSON.parse(one.state).sets)
+              .map(([p, v]) => `${p} = ${v}`)
+              .join(", ") || "as its file has it"
+          } `,
+          button("Go back to it", () => {
+            remember();
+            Object.assign(now, JSON.parse(one.state));
+            controls();
+            changed();
+          }),
+          " ",
+          button(
+            "Let go",
+            () => {
+              pinned = pinned.filter((other) => other !== one);
+              pinnedPlace.children[k]?.remove();
+              present(round);
+            },
+            { "aria-label": `Let go of ${one.name}` },
+          ),
+        ),
+      ),
+    );
+    present(round);
+  }
+
+  // ---- Tables
+  let making = null;
+  function make() {
+    if (making) return;
+    const of = now.generators[0];
+    const choice = select(GENERATORS, of, () => undefined, { id: "table-generator" });
+    const fineness = select(["coarse", "standard", "fine"], "standard", () => undefined, { id: "table-mesh" });
+    const go = button(
+      "Make the tables",
+      async () => {
+        const [drive, generator, mesh] = [request(), choice.value, fineness.value];
+        const place = el("div", { role: "status" });
+        makePlace.replaceChildren(place);
+        try {
+          const job = await run({ work: "tables", drive, generator, mesh }, (j) => {
+            making = j.id;
+            place.replaceChildren(progressOf(j));
+          });
+          making = null;
+          await made(job, drive, generator);
+        } catch (error) {
+          making = null;
+          makePlace.replaceChildren(el("p", { class: "wrong line", text: error.message }), again());
+        }
+      },
+      { id: "make-tables" },
+    );
+    makePlace.replaceChildren(
+      el("p", {
+        text: "Sweeps by contact FEM over torque and temperature, a minute or two; the page may be closed meanwhile.",
+      }),
+      el("div", { class: "form" }, el("label", {}, "Generator", choice), el("label", {}, "Mesh", fineness), go),
+    );
+  }
+  const again = () => button("Back", () => make());
+
+  async function made(job, drive, generator) {
+    if (job.state !== "done") {
+      makePlace.replaceChildren(el("p", { class: "wrong line", text: why(job) }), commandLine(job.command), again());
+      return;
+    }
+    const info = await fileJson(`${job.out}/${generator}.json`);
+    const extra = el("div", { role: "status" });
+    const also = async (work, then) => {
+      const ended = await run(work, (j) => extra.replaceChildren(progressOf(j)));
+      extra.replaceChildren(commandLine(ended.command));
+      if (ended.state === "done") extra.prepend(then(ended));
+      else extra.prepend(el("p", { class: "wrong line", text: why(ended) }));
+    };
+    makePlace.replaceChildren(
+      el("p", { text: `Table ${info.table_id} of ${generator} is made.` }),
+      downloads(job.out, [
+        [`${generator}.fxt`, "the image that firmware reads"],
+        [`${generator}.h`, "the same as a C header"],
+        [`${generator}.rs`, "the same for Rust"],
+        [`${generator}.json`, "what made it, and how good it is"],
+        [`${generator}.samples.csv`, "its samples"],
+      ]),
+      el(
+        "div",
+        { class: "form" },
+        button("Bundle for firmware", () =>
+          also({ work: "bundle", tables: job.out }, (ended) =>
+            downloads(ended.out, [["flexspline.tar.gz", "table, reader in C99, build files"]]),
+          ),
+        ),
+        button("Validate against fresh FEM", () =>
+          also({ work: "validate", tables: job.out, drive, generator }, (ended) =>
+            el("pre", { text: ended.printed, tabindex: 0, role: "region", "aria-label": "Validation" }),
+          ),
+        ),
+        el("a", {
+          href: `#table?${new URLSearchParams({ table: `${job.out}/${generator}.fxt` })}`,
+          text: "Open its bench",
+        }),
+        again(),
+      ),
+      extra,
+      commandLine(job.command),
+      wholeReport(job.out),
+    );
+    makePlace.dataset.made = job.out;
+  }
+
+  /** A job that was begun before this page was opened. */
+  async function resume() {
+    const { jobs } = await import("./jobs.js");
+    const wanted = JSON.stringify(request());
+    const mine = [...jobs.values()]
+      .filter(
+        (j) =>
+          j.work === "tables" &&
+          j.asked.drive &&
+          JSON.stringify({ drive: j.asked.drive.drive, sets: j.asked.drive.sets }) === wanted,
+      )
+      .sort((a, b) => b.id - a.id)[0];
+    if (!mine || !["waiting", "running", "done"].includes(mine.state)) return;
+    const place = el("div", { role: "status" });
+    makePlace.replaceChildren(place);
+    making = mine.id;
+    const job = await over(mine.id, (j) => place.replaceChildren(progressOf(j)));
+    making = null;
+    await made(job, request(), mine.asked.generator);
+  }
+
+  await fields();
+  setTimeout(() => resume().catch((error) => bench.complain(error)), 300);
+  return () => {
+    round += 1;
+    for (const id of running) cancel(id);
+  };
+}

@@ -1,0 +1,353 @@
+// The bench of a table, and the certificate of a calibrated unit.
+import { fileJson, fileText } from "./api.js";
+import { button, commandLine, el, errorOf, number, section, select, table } from "./elements.js";
+import { progressOf, run, why } from "./jobs.js";
+import { csvColumns, downloads, liveChart, readReport, wholeReport } from "./results.js";
+
+const GENERATORS = ["cam", "double-disc", "four-roller", "two-roller"];
+/** Points of a chart at most: a screen shows no more. */
+const MOST_POINTS = 4000;
+/** Points of an angle over a turn. */
+const FINE = 720;
+/** Orders of a spectrum that are shown. */
+const ORDERS = 12;
+
+/** What a table is: an image, and what was written beside it. */
+export async function tableBench(view, asked, bench) {
+  await bench.refresh();
+  let name = asked.get("table") ?? "";
+  const there = new Set(bench.state.files.map((f) => f.name));
+  view.append(
+    el("h1", { text: "A table" }),
+    bench.dropZone("Drop a table (.fxt) or samples (.csv) here:", (names) => {
+      location.hash = `#table?${new URLSearchParams({ table: names[0] })}`;
+    }),
+  );
+  if (!there.has(name)) return undefined;
+  if (!name.endsWith(".fxt")) {
+    view.append(samples(name));
+    return undefined;
+  }
+  const out = name.includes("/") ? name.slice(0, name.lastIndexOf("/")) : "";
+  const stem = name
+    .split("/")
+    .at(-1)
+    .replace(/\.fxt$/, "");
+  const beside = (file) => (out ? `${out}/${file}` : file);
+  const about = el("div");
+  view.append(section("about", name, about));
+  if (there.has(beside("calibration.json")) && stem === "calibrated") {
+    about.append(
+      el(
+        "p",
+        {},
+        el("a", { href: `#certificate?${new URLSearchParams({ of: out || "." })}`, text: "Certificate of this unit" }),
+      ),
+    );
+  }
+  if (there.has(beside(`${stem}.json`))) {
+    const info = await fileJson(beside(`${stem}.json`));
+    const rows = Object.entries(info)
+      .filter(([, value]) => ["string", "number"].includes(typeof value))
+      .map(([key, value]) => [key.replaceAll("_", " "), typeof value === "number" ? number(value, 4) : value]);
+    about.append(table("What was written beside it", ["", ""], rows));
+  }
+  about.append(
+    downloads(out || ".", [
+      [`${stem}.fxt`, "the image that firmware reads"],
+      ...["h", "rs", "json"].filter((e) => there.has(beside(`${stem}.${e}`))).map((e) => [`${stem}.${e}`, "beside it"]),
+    ]),
+  );
+  for (const link of about.querySelectorAll("a[download]")) link.href = link.getAttribute("href").replace("/./", "/");
+
+  // ---- What it leaves of a log
+  const logs = bench.state.files
+    .filter(
+      (f) => /\.(csv|log|txt|tsv|dat)$/i.test(f.name) && !/(samples|results|study|replay|plan)\.csv$/.test(f.name),
+    )
+    .map((f) => f.name);
+  const place = el("div", { role: "status" });
+  const chart = liveChart(
+    "left",
+    "What it leaves",
+    "The measured error, and what the table leaves of it, over the rows",
+    "",
+  );
+  chart.figure.hidden = true;
+  const columns = el("input", { type: "text", id: "replay-columns", value: asked.get("columns") ?? "", size: 40 });
+  const file = logs.length
+    ? select(logs, logs.includes(asked.get("file")) ? asked.get("file") : logs[0], () => undefined, {
+        id: "replay-file",
+      })
+    : null;
+  const replay = async () => {
+    try {
+      // Without a mapping that somebody gave, that which `look` proposes.
+      let map = columns.value.trim();
+      if (!map) {
+        const job = await run({ work: "look", files: [file.value] }, (j) => place.replaceChildren(progressOf(j)));
+        if (job.state === "done") map = (await fileJson(`${job.out}/look.json`)).columns_option ?? "";
+        columns.value = map;
+      }
+      const job = await run({ work: "replay", file: file.value, table: name, reading: { columns: map } }, (j) =>
+        place.replaceChildren(progressOf(j)),
+      );
+      if (job.state !== "done") {
+        place.replaceChildren(el("p", { class: "wrong line", text: why(job) }), commandLine(job.command));
+        return;
+      }
+      const rows = csvColumns(await fileText(`${job.out}/replay.csv`));
+      place.replaceChildren(
+        el("pre", { text: job.printed, tabindex: 0, role: "region", "aria-label": "What replay says" }),
+        downloads(job.out, [
+          ["replay.csv", "each row with what the table says"],
+          ["summary.json", "the figures"],
+        ]),
+        commandLine(job.command),
+      );
+      const names = Object.keys(rows).filter((n) => n.endsWith("_arcsec"));
+      const every = Math.ceil(rows[names[0]].length / MOST_POINTS);
+      const thin = (all) => all.filter((_, k) => k % every === 0);
+      const x = thin(rows[names[0]].map((_, k) => k));
+      await chart.columns(
+        { label: "Row", quantity: "count" },
+        { label: "Error", quantity: "error" },
+        names
+          .slice(0, 4)
+          .map((n, k) => ({ name: n.replace(/_arcsec$/, "").replaceAll("_", " "), mark: "dots", colour: k })),
+        [x, ...names.slice(0, 4).map((n) => thin(rows[n]))],
+      );
+      chart.figure.hidden = false;
+      document.documentElement.dataset.replayed = job.out;
+    } catch (error) {
+      place.replaceChildren(el("p", { class: "wrong line", text: error.message }));
+    }
+  };
+  view.append(
+    section(
+      "replay",
+      "What it leaves of a log",
+      file
+        ? el(
+            "div",
+            { class: "form" },
+            el("label", {}, "Log", file),
+            el("label", { for: "replay-columns" }, "Columns (empty: as they look)", columns),
+            button("Replay", replay, { id: "replay-go" }),
+          )
+        : el("p", { text: "Drop a log above, then come back: there is none in this folder." }),
+      place,
+      chart.figure,
+    ),
+    firmware(name),
+  );
+  return undefined;
+}
+
+function firmware(name) {
+  const place = el("div", { role: "status" });
+  const go = button("Bundle for firmware", async () => {
+    try {
+      const job = await run({ work: "bundle", tables: name }, (j) => place.replaceChildren(progressOf(j)));
+      place.replaceChildren(
+        job.state === "done"
+          ? downloads(job.out, [["flexspline.tar.gz", "table, reader in C99, build files"]])
+          : el("p", { class: "wrong line", text: why(job) }),
+        commandLine(job.command),
+      );
+    } catch (error) {
+      place.replaceChildren(el("p", { class: "wrong line", text: error.message }));
+    }
+  });
+  return section("firmware", "For firmware", el("div", { class: "form" }, go), place);
+}
+
+/** Samples of another program, to a table. */
+function samples(name) {
+  const place = el("div", { role: "status" });
+  const generator = select(GENERATORS, GENERATORS.find((g) => name.includes(g)) ?? "cam", () => undefined, {
+    id: "samples-generator",
+  });
+  const go = button(
+    "Make the table",
+    async () => {
+      try {
+        const job = await run(
+          { work: "samples", file: name, drive: { drive: "HHD-95" }, generator: generator.value },
+          (j) => place.replaceChildren(progressOf(j)),
+        );
+        if (job.state !== "done") {
+          place.replaceChildren(el("p", { class: "wrong line", text: why(job) }), commandLine(job.command));
+          return;
+        }
+        place.replaceChildren(
+          downloads(job.out, [
+            [`${generator.value}.fxt`, "the image that firmware reads"],
+            [`${generator.value}.h`, "the same as a C header"],
+            [`${generator.value}.json`, "how good it is"],
+          ]),
+          el(
+            "p",
+            {},
+            el("a", {
+              href: `#table?${new URLSearchParams({ table: `${job.out}/${generator.value}.fxt` })}`,
+              text: "Open its bench",
+            }),
+          ),
+          commandLine(job.command),
+          wholeReport(job.out),
+        );
+        document.documentElement.dataset.made = job.out;
+      } catch (error) {
+        place.replaceChildren(el("p", { class: "wrong line", text: error.message }));
+      }
+    },
+    { id: "samples-go" },
+  );
+  return section(
+    "samples",
+    name,
+    el("p", {
+      text: "Samples with generator_rad, torque_n_m, temperature_c, direction and output_rad, of the drive HHD-95.",
+    }),
+    el("div", { class: "form" }, el("label", {}, "Generator", generator), go),
+    place,
+  );
+}
+
+// ---- Certificate
+
+/** A curve through nodes of one part, over `period` degrees, at equal places; linear between nodes. */
+function curve(nodes, period, count) {
+  const at = nodes.map((n) => [n.at, n.value_arcsec]).sort((a, b) => a[0] - b[0]);
+  const all = [[at.at(-1)[0] - period, at.at(-1)[1]], ...at, [at[0][0] + period, at[0][1]]];
+  return Array.from({ length: count }, (_, k) => {
+    const x = (period * k) / count;
+    const j = Math.max(
+      1,
+      all.findIndex(([to]) => to >= x),
+    );
+    const [[a, p], [b, q]] = [all[j - 1], all[j]];
+    return b > a ? p + ((x - a) / (b - a)) * (q - p) : p;
+  });
+}
+
+/** Amplitudes of the first orders of what repeats. */
+function amplitudes(values) {
+  return Array.from({ length: ORDERS }, (_, k) => {
+    let [c, s] = [0, 0];
+    values.forEach((v, j) => {
+      const angle = (2 * Math.PI * (k + 1) * j) / values.length;
+      c += v * Math.cos(angle);
+      s += v * Math.sin(angle);
+    });
+    return (2 * Math.hypot(c, s)) / values.length;
+  });
+}
+
+/** The certificate of a calibrated unit, one page to print. */
+export async function certificate(view, asked) {
+  const of = asked.get("of") ?? ".";
+  const file = (name) => (of === "." ? name : `${of}/${name}`);
+  const c = await fileJson(file("calibration.json"));
+  const report = await readReport(file("report.html")).catch(() => null);
+  view.classList.add("certificate");
+  // Parts over an angle that repeats: by the turn that they repeat over, degrees, and turns of it to one of the output.
+  const parts = Map.groupBy(c.nodes, (n) => n.part);
+  const cyclic = [...parts]
+    .filter(([, nodes]) => /_deg$/.test(nodes[0].of) && nodes.length > 3)
+    .map(([part, nodes]) => {
+      const ofOutput = nodes[0].of === "output_deg";
+      const values = curve(nodes, 360, FINE);
+      const perOutput = ofOutput ? 1 : Math.abs(c.ratio);
+      const slopes = values.map((v, k) => ((values[(k + 1) % FINE] - v) / (360 / FINE)) * perOutput);
+      return {
+        part: part.replaceAll("_", " "),
+        ofOutput,
+        values,
+        perOutput,
+        steepest: Math.max(...slopes.map(Math.abs)),
+        pp: Math.max(...values) - Math.min(...values),
+        orders: amplitudes(values),
+      };
+    });
+  const turn = liveChart(
+    "turn",
+    "Error over a whole turn of the output",
+    "Measured error and what the table leaves, over a turn of the output",
+    "Rows in steady motion, as measured and with the table.",
+  );
+  const spectrum = liveChart(
+    "spectrum",
+    "Spectrum by part",
+    "Amplitude of each order of each part of the table",
+    "Orders of the angle that each part repeats over.",
+  );
+  const steepest = cyclic.reduce((sum, p) => sum + p.steepest, 0);
+  view.append(
+    el("h1", { text: "Certificate of a unit" }),
+    el(
+      "p",
+      { class: "no-print" },
+      button("Print", () => print()),
+    ),
+    table(
+      "What was measured, and what the table leaves",
+      ["", "rms"],
+      [
+        ["As measured", errorOf(c.held_out.rms_before_arcsec)],
+        ["With the table, where nothing was fitted", errorOf(c.held_out.rms_after_arcsec)],
+        ["Left by the core, all rows, reversals among them", errorOf(c.core.rms_after_arcsec)],
+        ["The table holds the error to, 95 %", errorOf(c.half_width_arcsec)],
+      ],
+    ),
+    table(
+      "Parts of the table over an angle",
+      ["Part", "Peak to peak", "Steepest slope, ″ for a degree of the output", "Largest order"],
+      cyclic.map((p) => [
+        p.part,
+        errorOf(p.pp),
+        number(p.steepest),
+        String(p.orders.indexOf(Math.max(...p.orders)) + 1),
+      ]),
+    ),
+    el("p", {
+      id: "steepest",
+      text: `Steepest slope, all parts together at most: ${number(steepest)} ″ for a degree of the output.`,
+    }),
+    el("div", { class: "two" }, turn.figure, spectrum.figure),
+    el(
+      "dl",
+      {},
+      ...[
+        ["Table", c.table_id],
+        ["Ratio", String(c.ratio)],
+        ["Logs", c.files.join(", ")],
+        ["Rows", String(c.rows)],
+        ["Loads, N·m", c.torque_n_m.map((t) => number(t)).join(" to ")],
+        ["Temperatures, °C", c.temperature_c.map((t) => number(t)).join(" to ")],
+      ].map(([name, value]) => el("div", {}, el("dt", { text: name }), el("dd", { text: value }))),
+    ),
+    ...c.notes.map((note) => el("p", { class: "line", text: note })),
+    el(
+      "p",
+      { class: "no-print" },
+      "Drawn of ",
+      el("code", { text: file("calibration.json") }),
+      "; the command that makes it:",
+    ),
+    commandLine(c.command),
+  );
+  if (report?.json.figures["over-output"]) await turn.of(report, "over-output", "every");
+  else turn.figure.hidden = true;
+  if (cyclic.length) {
+    const orders = Array.from({ length: ORDERS }, (_, k) => k + 1);
+    await spectrum.columns(
+      { label: "Order", quantity: "whole" },
+      { label: "Amplitude", quantity: "error" },
+      cyclic.map((p, k) => ({ name: `${p.part}, ${p.ofOutput ? "output" : "generator"}`, mark: "points", colour: k })),
+      [orders, ...cyclic.map((p) => p.orders)],
+    );
+  } else spectrum.figure.hidden = true;
+  return () => view.classList.remove("certificate");
+}

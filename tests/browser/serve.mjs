@@ -1,0 +1,489 @@
+// The bench in a real browser: node serve.mjs DIR PROGRAM, where DIR holds node_modules and PROGRAM is flexspline.
+//
+// Every check prints a line; the last lines are "test result: … N passed; N failed" and the exit code is 1 if any failed.
+import { spawn, spawnSync } from "node:child_process";
+import { copyFileSync, existsSync, mkdirSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import path from "node:path";
+import { fileURLToPath } from "node:url";
+
+const folder = path.resolve(process.argv[2]);
+const program = path.resolve(process.argv[3]);
+const project = fileURLToPath(new URL("../..", import.meta.url));
+const need = createRequire(path.join(folder, "package.json"));
+const { chromium } = need("playwright-core");
+const axe = readFileSync(need.resolve("axe-core/axe.min.js"), "utf8");
+const shots = path.join(folder, "screenshots");
+const taken = path.join(folder, "taken");
+const bench = path.join(folder, "bench-folder");
+for (const one of [bench, taken]) rmSync(one, { recursive: true, force: true });
+for (const one of [bench, taken, shots]) mkdirSync(one, { recursive: true });
+copyFileSync(path.join(project, "examples/csf17_100/nominal.toml"), path.join(bench, "nominal.toml"));
+
+/** The checks share their machine: a second of an idle one may be some here. What was found is printed. */
+const SLACK = Number(process.env.FLEXSPLINE_SERVE_SLACK ?? 6);
+/** Bytes of page, style and scripts. */
+const MOST_BYTES = 400_000;
+
+let [passed, failed] = [0, 0];
+async function check(name, body) {
+  try {
+    const note = await body();
+    passed += 1;
+    console.log(`ok    ${name}${note ? `: ${note}` : ""}`);
+  } catch (error) {
+    failed += 1;
+    console.log(`FAIL  ${name}: ${error.message}`);
+  }
+}
+function assert(condition, message) {
+  if (!condition) throw new Error(message);
+}
+
+let server = null;
+async function serve() {
+  server = spawn(program, ["serve", bench], { stdio: ["ignore", "pipe", "inherit"] });
+  let said = "";
+  return new Promise((resolve, reject) => {
+    server.stdout.on("data", (bytes) => {
+      said += bytes;
+      const address = /http:\S+/.exec(said)?.[0];
+      if (address) resolve(address);
+    });
+    server.on("exit", (code) => reject(new Error(`the server ended with ${code}: ${said}`)));
+  });
+}
+const ended = (child) =>
+  new Promise((resolve) =>
+    child.exitCode !== null || child.signalCode ? resolve(child.exitCode) : child.once("exit", resolve),
+  );
+
+let address = await serve();
+const browser = await chromium.launch({
+  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
+  args: [
+    "--no-sandbox",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--disable-gpu",
+    "--enable-unsafe-swiftshader",
+  ],
+});
+
+/** A page of the bench; `noise` is whatever it said on the console or asked of others. */
+async function open(hash = "", { width = 1440, dark = false } = {}) {
+  const context = await browser.newContext({
+    viewport: { width, height: 900 },
+    colorScheme: dark ? "dark" : "light",
+    isMobile: width < 600,
+    hasTouch: width < 600,
+    acceptDownloads: true,
+  });
+  const page = await context.newPage();
+  const noise = [];
+  page.on("console", (message) => {
+    if (message.text().includes("GPU stall due to ReadPixels")) return;
+    if (["error", "warning"].includes(message.type())) noise.push(message.text());
+  });
+  page.on("pageerror", (error) => noise.push(String(error)));
+  page.on("dialog", (dialog) => {
+    noise.push(`dialog: ${dialog.message()}`);
+    dialog.dismiss();
+  });
+  const host = new URL(address).host;
+  page.on("request", (request) => {
+    const url = new URL(request.url());
+    if (url.protocol === "http:" && url.host !== host) noise.push(`request: ${url}`);
+  });
+  const begun = Date.now();
+  await page.goto(address + hash);
+  await page.waitForFunction(() => document.documentElement.dataset.ready);
+  return { page, noise, readyMs: Date.now() - begun, close: () => context.close() };
+}
+
+const problem = (page) => page.locator("#problem").textContent();
+const data = (page, name) => page.evaluate((of) => document.documentElement.dataset[of], name);
+async function until(page, name, fits = (value) => value, ms = 120_000) {
+  const from = Date.now();
+  while (Date.now() - from < ms) {
+    const value = await data(page, name);
+    if (value !== undefined && fits(value)) return value;
+    await page.waitForTimeout(30);
+  }
+  throw new Error(
+    `data-${name} is ${await data(page, name)} after ${ms} ms; the page says: ${(await problem(page)) || "nothing"}; ${await page.locator("#live, #verdict, #table-section").allTextContents()}`,
+  );
+}
+/** A file that a link of the page downloads. */
+async function download(page, name, as) {
+  const [file] = await Promise.all([
+    page.waitForEvent("download"),
+    page.locator(`a[download="${name}"]`).first().click(),
+  ]);
+  const to = path.join(taken, as);
+  await file.saveAs(to);
+  return to;
+}
+function command(...words) {
+  const { status, stdout, stderr } = spawnSync(program, words, { cwd: bench, encoding: "utf8" });
+  assert(status === 0, `flexspline ${words.join(" ")}: ${status} ${stderr}`);
+  return stdout;
+}
+async function findings(page) {
+  await page.evaluate(axe);
+  const { violations } = await page.evaluate(() => globalThis.axe.run(document, { resultTypes: ["violations"] }));
+  return violations.map((v) => `${v.id} (${v.nodes.length}): ${v.nodes[0].target} ${v.nodes[0].failureSummary ?? ""}`);
+}
+/** That a page, as it stands, is sound at both widths. */
+async function sound(page, name) {
+  for (const width of [1440, 390]) {
+    await page.setViewportSize({ width, height: 900 });
+    await page.waitForTimeout(300);
+    const [wide, has] = await page.evaluate(() => [
+      document.documentElement.scrollWidth,
+      document.documentElement.clientWidth,
+    ]);
+    assert(wide <= has, `${name} at ${width} px: ${wide} px of content`);
+    const told = await findings(page);
+    assert(!told.length, `${name} at ${width} px: ${told.join(" | ")}`);
+    await page.screenshot({ path: path.join(shots, `bench-${name}-${width}.png`), fullPage: true, caret: "initial" });
+  }
+  await page.setViewportSize({ width: 1440, height: 900 });
+}
+
+// ---- The first page
+
+await check("the first page opens, light and dark, asks nobody else, and axe finds nothing", async () => {
+  const notes = [];
+  for (const dark of [false, true]) {
+    const { page, noise, readyMs, close } = await open("", { dark });
+    const bytes = await page.evaluate(() =>
+      [...performance.getEntriesByType("navigation"), ...performance.getEntriesByType("resource")]
+        .filter((entry) => !entry.name.includes("/api/"))
+        .reduce((sum, entry) => sum + entry.decodedBodySize, 0),
+    );
+    assert((await page.locator("h1").textContent()) === "What have you got?", "another page");
+    assert((await page.locator(".cards section").count()) === 4, "four ways");
+    assert(!page.url().includes("token"), `the key stays in the address: ${page.url()}`);
+    await sound(page, `start-${dark ? "dark" : "light"}`);
+    assert(readyMs < 1000 * SLACK && bytes > 50_000 && bytes < MOST_BYTES, `${readyMs} ms, ${bytes} bytes`);
+    assert(!noise.length, noise.join(" | "));
+    const paint = await page.evaluate(() => performance.getEntriesByName("first-contentful-paint")[0]?.startTime);
+    notes.push(`painted after ${Math.round(paint)} ms, ready after ${readyMs} ms, ${Math.round(bytes / 1000)} kB`);
+    await close();
+  }
+  return notes.join("; ");
+});
+
+// ---- A log
+
+await check("a log dropped on the first page leads to a verdict and a table that replay accepts", async () => {
+  const { page, noise, close } = await open();
+  const begun = Date.now();
+  await page
+    .locator("#start-log input[type=file]")
+    .setInputFiles(path.join(project, "examples/csf17_100/error_vs_input.csv"));
+  await page.locator("#first-rows").waitFor();
+  assert(await page.locator("#first-rows td.role-generator").count(), "columns are not marked");
+  // These rows do not tell their ratio: it is asked for.
+  await page.locator("#ratio").fill("100");
+  await page.locator("#ratio").press("Enter");
+  const verdict = await until(page, "verdict");
+  const ms = Date.now() - begun;
+  assert(/^(not_understood|fault_found|nothing_found) \d+$/.test(verdict), verdict);
+  assert((await page.locator("#causes-table input[type=checkbox]").count()) > 15, "candidate causes");
+  assert(await page.locator("#residual canvas").count(), "no residual picture");
+  const table = await download(page, "calibrated.fxt", "log.fxt");
+  const said = command(
+    "replay",
+    "--tables",
+    table,
+    "error_vs_input.csv",
+    "--columns",
+    "time=t_s:s,generator=wave_gen_turns:turn,error=error_arcsec:arcsec",
+    "--out",
+    "replayed",
+  );
+  assert(/rms/.test(said), said);
+  await sound(page, "log");
+  assert(!(await problem(page)) && !noise.length, `${await problem(page)} ${noise.join(" | ")}`);
+  await close();
+  return `dropped to verdict ${ms} ms, both jobs ${verdict.split(" ")[1]} ms`;
+});
+
+await check("a guess is mended by one choice, a cause left out by one click, and all below is redone", async () => {
+  const { page, noise, close } = await open("#log?file=error_vs_input.csv&ratio=100");
+  await until(page, "verdict");
+  const before = await page.locator("#verdict .command code").first().textContent();
+  await page.getByLabel("What star_sd_arcsec is").selectOption("temperature");
+  await page.waitForFunction((old) => document.querySelector("#verdict .command code")?.textContent !== old, before, {
+    timeout: 60_000,
+  });
+  await page.getByLabel("What star_sd_arcsec is").selectOption("ignored");
+  await until(page, "verdict");
+  await page.locator("#cause-flexspline_pitch_error").uncheck();
+  await page.waitForFunction(
+    () => document.querySelector("#verdict .command code")?.textContent.includes("--without=flexspline_pitch_error"),
+    null,
+    { timeout: 60_000 },
+  );
+  assert(page.url().includes("without=flexspline_pitch_error"), page.url());
+  await until(page, "verdict");
+  const row = await page.locator("tr", { has: page.locator("#cause-flexspline_pitch_error") }).textContent();
+  assert(row.includes("not considered"), row);
+  assert(!noise.length, noise.join(" | "));
+  await close();
+});
+
+await check("the certificate is one page on paper", async () => {
+  const { page, noise, close } = await open("#log?file=error_vs_input.csv&ratio=100");
+  await until(page, "calibrated");
+  await page.getByRole("link", { name: /Certificate/ }).click();
+  await page.waitForFunction(() => document.documentElement.dataset.ready === "certificate");
+  assert(/\d″? ?″? for a degree|Steepest slope/.test(await page.locator("#steepest").textContent()), "no slope");
+  assert(await page.locator("#turn canvas").count(), "no error over a turn");
+  await sound(page, "certificate");
+  const pdf = await page.pdf({ format: "A4", path: path.join(shots, "certificate.pdf") });
+  const pages = (pdf.toString("latin1").match(/\/Type\s*\/Page[^s]/g) ?? []).length;
+  assert(pages === 1, `${pages} pages`);
+  assert(!noise.length, noise.join(" | "));
+  await close();
+});
+
+// ---- A drive
+
+/** Makes the tables of the drive on the page, coarse, and tries them on a run of that drive. */
+async function tablesOf(page, as) {
+  await until(page, "standard");
+  await page.locator("#table-mesh").selectOption("coarse");
+  await page.locator("#make-tables").click();
+  await page.locator("#make a[download='cam.fxt']").waitFor({ timeout: 400_000 });
+  const table = await download(page, "cam.fxt", as);
+  const run = /bench\/simulate-\d+/.exec(await page.locator("#pitch .command code").first().textContent())[0];
+  const said = command("replay", "--tables", table, `${run}/results.csv`, "--out", `replayed-${as}`);
+  assert(/rms/.test(said), said);
+  return said
+    .split("\n")
+    .find((line) => line.includes("rms"))
+    ?.trim();
+}
+
+await check("a drive on paper: teeth while one drags, FEM when one stops, times measured", async () => {
+  const { page, noise, close } = await open();
+  await page.locator("#start-paper button").click();
+  await page.waitForFunction(() => document.documentElement.dataset.ready === "drive");
+  await until(page, "standard");
+  const slider = page.locator("#main-fields input[type=range]").first();
+  await slider.focus();
+  const drawn = () => page.locator(".sketch").getAttribute("data-drawn");
+  const before = await drawn();
+  const begun = Date.now();
+  await page.keyboard.press("ArrowRight");
+  await page.waitForFunction((old) => document.querySelector(".sketch").dataset.drawn !== old, before, { polling: 10 });
+  const drag = Date.now() - begun;
+  const [round, coarse] = (await until(page, "coarse", (value) => Number(value.split(" ")[0]) > 1))
+    .split(" ")
+    .map(Number);
+  const [, standard] = (await until(page, "standard", (value) => Number(value.split(" ")[0]) === round))
+    .split(" ")
+    .map(Number);
+  assert(coarse < 1000 * SLACK && standard < 3000 * SLACK, `coarse ${coarse} ms, standard ${standard} ms`);
+  assert(await page.locator("#ripple canvas").count(), "no error over the generator angle");
+  await page.waitForFunction(() => document.querySelector("#stress .drawing")?.dataset.drawn, null, {
+    timeout: 30_000,
+  });
+  await until(page, "sheet", (value) => Number(value) === round);
+  const k1 = await page.locator("tr", { hasText: "K1, N·m/rad" }).locator("td").first().textContent();
+  assert(Number(k1) > 1000, `K1 ${k1}`);
+  await sound(page, "drive");
+  assert(!(await problem(page)) && !noise.length, `${await problem(page)} ${noise.join(" | ")}`);
+  await close();
+  return `drawn ${drag} ms after the key; FEM after rest: coarse ${coarse} ms, standard ${standard} ms`;
+});
+
+await check(
+  "the state is in the address, undo takes it back, a mistake stands at its field, variants are pinned",
+  async () => {
+    const hash = "#drive?drive=HHD-95&set=generator.w0_mm%3D0.49&g=cam&g=double-disc&torque=10";
+    const { page, noise, close } = await open(hash);
+    const w0 = page.locator("#f-generator-w0_mm");
+    assert((await w0.inputValue()) === "0.49", await w0.inputValue());
+    await until(page, "coarse");
+    assert(
+      (await page.locator("#pitch table thead th").allTextContents()).join() === "cam,double-disc",
+      "two generators side by side",
+    );
+    await page.getByRole("button", { name: "Pin these" }).click();
+    await w0.fill("400");
+    await w0.press("Enter");
+    await page.waitForFunction(() =>
+      document.querySelector("#f-generator-w0_mm-wrong").textContent.includes("allowed"),
+    );
+    assert((await w0.getAttribute("aria-invalid")) === "true", "the field is not marked");
+    assert(page.url().includes("w0_mm%3D400"), page.url());
+    await page.getByRole("button", { name: "Undo" }).press("Enter");
+    assert(
+      (await w0.inputValue()) === "0.49" && page.url().includes("w0_mm%3D0.49"),
+      `after undo ${await w0.inputValue()}`,
+    );
+    await until(page, "coarse", (value) => Number(value.split(" ")[0]) > 2);
+    const head = await page.locator("#pitch table thead th").allTextContents();
+    assert(head.length === 4 && head[0].startsWith("1:"), head.join());
+    assert(!noise.length, noise.join(" | "));
+    await close();
+  },
+);
+
+await check("a page closed and opened again finds its job; it is cancelled within a second", async () => {
+  const first = await open("#drive?drive=HHD-95&set=generator.w0_mm%3D0.495&g=cam&torque=10");
+  await until(first.page, "coarse");
+  await first.page.locator("#make-tables").click();
+  await first.page.locator("#make progress").waitFor();
+  const hash = new URL(first.page.url()).hash;
+  await first.close();
+  const { page, close } = await open(hash);
+  await page.locator("#make progress").waitFor({ timeout: 20_000 });
+  await page.waitForFunction(() => document.querySelector("#make .progress")?.textContent.includes(" of "), null, {
+    timeout: 60_000,
+  });
+  const begun = Date.now();
+  await page.locator("#make .progress button").click();
+  await page.locator("#make .wrong").waitFor();
+  const ms = Date.now() - begun;
+  assert(ms < 1000 * Math.max(1, SLACK / 3), `${ms} ms`);
+  const left = readdirSync(bench, { recursive: true }).filter((name) => String(name).includes(".part-"));
+  assert(!left.length, `unfinished: ${left}`);
+  await close();
+  return `${ms} ms`;
+});
+
+await check("a drive on paper leads to a table that replay accepts", async () => {
+  const { page, close } = await open("#drive?drive=drive.toml&g=cam&torque=10");
+  const said = await tablesOf(page, "paper.fxt");
+  await close();
+  return said;
+});
+
+await check("a drive from a catalogue leads to a table that replay accepts", async () => {
+  const { page, close } = await open();
+  await page.locator("#like").fill("CSG-25-80");
+  await page.locator("#start-catalogue button").click();
+  await page.waitForFunction(() => document.documentElement.dataset.ready === "drive");
+  assert(page.url().includes("csg-25-80.toml"), page.url());
+  const said = await tablesOf(page, "catalogue.fxt");
+  await close();
+  return said;
+});
+
+// ---- A table
+
+await check(
+  "samples dropped on the first page lead to a table that replay accepts, and to files for firmware",
+  async () => {
+    const { page, noise, close } = await open();
+    await page
+      .locator("#start-table input[type=file]")
+      .setInputFiles(path.join(project, "tests/firmware/samples/cam.samples.csv"));
+    await page.locator("#samples-go").click();
+    await until(page, "made");
+    const table = await download(page, "cam.fxt", "samples.fxt");
+    command("replay", "--tables", table, "cam.samples.csv", "--out", "replayed-samples");
+    await page.getByRole("link", { name: "Open its bench" }).click();
+    await page.locator("#replay-file").selectOption("error_vs_input.csv");
+    await page.locator("#replay-go").click();
+    await until(page, "replayed");
+    await page.getByRole("button", { name: "Bundle for firmware" }).click();
+    const archive = await download(page, "flexspline.tar.gz", "bundle.tar.gz");
+    assert(readFileSync(archive).length > 1000, "an empty bundle");
+    await sound(page, "table");
+    assert(!noise.length, noise.join(" | "));
+    await close();
+  },
+);
+
+// ---- The keyboard, hostile files, the end
+
+await check("the keyboard alone goes from the first page to a drive", async () => {
+  const { page, close } = await open();
+  await page.locator("body").press("Tab");
+  let reached = "";
+  for (let k = 0; k < 40; k++) {
+    reached = await page.evaluate(() => document.activeElement.textContent.trim());
+    if (reached === "Draw it") break;
+    await page.keyboard.press("Tab");
+  }
+  assert(reached === "Draw it", "the button is not reached by Tab");
+  await page.keyboard.press("Enter");
+  await page.waitForFunction(() => document.documentElement.dataset.ready === "drive");
+  assert(/drive-2\.toml/.test(page.url()), page.url());
+  await close();
+});
+
+await check("names and cells of hostile files stay text", async () => {
+  const { page, noise, close } = await open();
+  const name = path.join(folder, "<img src=x onerror=alert(1)>.csv");
+  writeFileSync(name, "<script>alert(1)</script>,<b>y\n<img src=x onerror=alert(2)>,2\n\u202e,\u0000\n");
+  await page.locator("#start-log input[type=file]").setInputFiles(name);
+  await page.locator("#reading .wrong, #first-rows").first().waitFor();
+  assert(!(await page.locator("#view img, #view b, #view script").count()), "a cell became an element");
+  assert(!noise.filter((line) => line.startsWith("dialog")).length, noise.join(" | "));
+  await close();
+});
+
+await check("every result says its command, and that command writes the same files", async () => {
+  const { page, close } = await open("#log?file=error_vs_input.csv&ratio=100");
+  await until(page, "calibrated");
+  const line = await page.locator("#table-section .command code").first().textContent();
+  const out = /--out=(\S+)/.exec(line)[1];
+  const words = line.replace(/--out=\S+/, "--out=again");
+  const { status, stderr } = spawnSync("sh", ["-c", `PATH=${path.dirname(program)}:$PATH; ${words}`], {
+    cwd: bench,
+    encoding: "utf8",
+  });
+  assert(status === 0, stderr);
+  const same = readFileSync(path.join(bench, out, "calibrated.fxt")).equals(
+    readFileSync(path.join(bench, "again/calibrated.fxt")),
+  );
+  assert(same, "another table");
+  // What a terminal wrote opens in the bench.
+  await page.goto(address + "#start");
+  await page.waitForFunction(() => document.documentElement.dataset.ready === "start");
+  assert(await page.getByRole("link", { name: "again/calibration.json" }).count(), "the result is not listed");
+  await close();
+});
+
+await check("a server killed and started again finds what was finished", async () => {
+  server.removeAllListeners("exit");
+  server.kill("SIGKILL");
+  await ended(server);
+  address = await serve();
+  const { page, close } = await open();
+  await page.locator(".job.done").first().waitFor();
+  const done = await page.locator(".job.done").count();
+  assert(done > 5, `${done} jobs`);
+  await close();
+  return `${done} jobs in view`;
+});
+
+await check("Ctrl-C ends the server and what it has started", async () => {
+  const { page } = await open("#drive?drive=HHD-95&set=generator.w0_mm%3D0.492&g=cam&torque=10");
+  await until(page, "coarse");
+  await page.locator("#make-tables").click();
+  await page.locator("#make progress").waitFor();
+  await page.waitForTimeout(500);
+  const job = readdirSync(path.join(bench, "bench"))
+    .filter((name) => name.startsWith("tables-"))
+    .map((name) => JSON.parse(readFileSync(path.join(bench, "bench", name, "job.json"), "utf8")))
+    .find((j) => j.state === "running");
+  server.removeAllListeners("exit");
+  server.kill("SIGINT");
+  assert((await ended(server)) === 0, "not the exit code of what is done");
+  assert(!job || !existsSync(`/proc/${job.pid}`), "the job goes on");
+});
+
+await browser.close();
+console.log(`test result: ${failed ? "FAILED" : "ok"}. ${passed} passed; ${failed} failed`);
+process.exit(failed ? 1 : 0);
