@@ -35,6 +35,17 @@ impl PlayLaw {
     /// All laws.
     pub const ALL: [PlayLaw; 4] = [PlayLaw::Held, PlayLaw::Pushed, PlayLaw::Sign, PlayLaw::Smooth];
 
+    /// Its name in a file.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            PlayLaw::Held => "held",
+            PlayLaw::Pushed => "pushed",
+            PlayLaw::Sign => "sign",
+            PlayLaw::Smooth => "smooth",
+        }
+    }
+
     /// Which flank carries in each row, −1 to 1, under a torque.
     #[must_use]
     pub fn flanks(self, rows: &Rows, torque: &[f64], nominal: &Nominal) -> Vec<f64> {

@@ -10,7 +10,7 @@ use flexspline::Table;
 
 use super::averaged::Averaged;
 use super::base::{Base, PlayLaw};
-use super::candidate::{Acting, Column, Excitation, Law, Role, Scales, Tolerance, library, together};
+use super::candidate::{Acting, Column, Excitation, Law, Role, Scales, Tolerance, library, together, whole_library};
 use super::model::{Problem, Scaffold, terms_at};
 use super::noise::Whitener;
 use super::report::Parameter;
@@ -40,6 +40,89 @@ impl FittedCause {
     #[must_use]
     pub fn name(&self) -> CauseName {
         self.name
+    }
+}
+
+/// The model of a cause as it was fitted, to be evaluated on other recordings.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FittedLaw {
+    /// Which of the models of its cause it is.
+    pub(crate) variant: String,
+    /// Values of its shape parameters.
+    pub(crate) shape: Vec<f64>,
+    /// Coefficients of its columns.
+    pub(crate) coefficients: Vec<f64>,
+    /// What the coefficients are counted in.
+    pub(crate) scales: Scales,
+    /// How the flank was found to change below friction.
+    pub(crate) play: PlayLaw,
+    /// Stiffness at the least torque, N·m/rad, and backlash, arcsec, of the nominal model that it was fitted beside:
+    /// those of the file are recalibrated.
+    pub(crate) beside: [f64; 2],
+}
+
+/// What causes as they were fitted add to the error of each session, arcsec, in the order of the causes; nothing where
+/// such a model cannot be evaluated on these sessions.
+///
+/// Causes of one fit act on each other as they did in it.
+#[must_use]
+pub fn added_by(fitted: &[(CauseName, &FittedLaw)], sessions: &[Session], nominal: &Nominal) -> Option<Vec<Vec<f64>>> {
+    let rows = Rows::new(sessions, nominal);
+    let mut added = vec![0.0; rows.len()];
+    let of_one_fit = |(_, a): &(CauseName, &FittedLaw), (_, b): &(CauseName, &FittedLaw)| {
+        a.scales == b.scales && a.play == b.play && a.beside == b.beside
+    };
+    for causes in fitted.chunk_by(of_one_fit) {
+        let (_, first) = causes.first()?;
+        let nominal = first.nominal(nominal);
+        let base = Base::with_play(&rows, &nominal, None, first.play);
+        let on = Excitation::new(&rows, &nominal, &base, &first.scales);
+        let laws = whole_library(&on);
+        let acting = causes.iter().map(|(name, fit)| fit.acting(*name, &on, &laws)).collect::<Option<Vec<_>>>()?;
+        for (cause, columns) in acting.iter().zip(together(&on, &acting)) {
+            add_part(&mut added, &columns, &cause.coefficients);
+        }
+    }
+    Some(rows.sessions.iter().map(|session| added[session.clone()].to_vec()).collect())
+}
+
+impl FittedLaw {
+    /// The nominal model that it was fitted beside, made of the recalibrated one.
+    fn nominal(&self, recalibrated: &Nominal) -> Nominal {
+        let [stiffness, backlash_arcsec] = self.beside;
+        let mut nominal = Nominal { backlash_arcsec, ..recalibrated.clone() };
+        let factor = nominal.stiffness.first().map_or(1.0, |[_, now]| stiffness / now);
+        nominal.stiffness.iter_mut().for_each(|[_, k]| *k *= factor);
+        nominal
+    }
+
+    /// The model among `laws`, if it is there with the same shape parameters and columns.
+    fn acting<'l>(&self, cause: CauseName, on: &Excitation<'_>, laws: &'l [Law]) -> Option<Acting<'l>> {
+        let law = laws.iter().find(|law| law.is(cause) && law.variant == self.variant)?;
+        if law.shapes.len() != self.shape.len() {
+            return None;
+        }
+        let roles: Vec<Role> = law.columns(on, &self.shape).iter().map(|column| column.role).collect();
+        (roles.len() == self.coefficients.len()).then(|| Acting {
+            law,
+            values: self.shape.clone(),
+            roles,
+            coefficients: self.coefficients.clone(),
+        })
+    }
+}
+
+/// Adds what the columns of a model predict: not what was before the rows that it was fitted to.
+fn add_part(sum: &mut [f64], columns: &[Column], coefficients: &[f64]) {
+    let predicts = |column: &Column| !matches!(column.tolerance, Tolerance::History(_));
+    for (column, c) in columns.iter().zip(coefficients).filter(|(column, _)| predicts(column)) {
+        add_scaled(sum, &column.values, *c);
+    }
+}
+
+fn add_scaled(sum: &mut [f64], column: &[f64], c: f64) {
+    for (s, v) in sum.iter_mut().zip(column) {
+        *s += c * v;
     }
 }
 
@@ -165,6 +248,21 @@ impl Extended {
         &self.causes
     }
 
+    /// The model of the cause at `at` in [`Extended::causes`], fitted beside `nominal`, to be evaluated on other
+    /// recordings.
+    #[must_use]
+    pub fn fitted_law(&self, at: usize, nominal: &Nominal) -> Option<FittedLaw> {
+        let cause = self.causes.get(at)?;
+        Some(FittedLaw {
+            variant: cause.law.variant.to_string(),
+            shape: cause.law.values(&cause.places),
+            coefficients: cause.coefficients.clone(),
+            scales: self.scales.clone(),
+            play: self.play,
+            beside: [nominal.stiffness.first().map_or(0.0, |[_, k]| *k), nominal.backlash_arcsec],
+        })
+    }
+
     /// What was found as a prediction on the rows of `sessions`, which need not be those of the fit: one series for
     /// each.
     #[must_use]
@@ -191,15 +289,10 @@ impl Extended {
 
     /// Recalibrated, extended, and each cause, row by row.
     pub(super) fn rows(&self, on: &Excitation<'_>) -> (Vec<f64>, Vec<f64>, Vec<Vec<f64>>) {
-        let add = |sum: &mut [f64], column: &[f64], c: f64| {
-            for (s, v) in sum.iter_mut().zip(column) {
-                *s += c * v;
-            }
-        };
         let (mut recalibrated, mut extended) = (on.base.prediction.clone(), on.base.prediction.clone());
         for (k, floating) in on.base.floating.iter().enumerate() {
-            add(&mut recalibrated, &floating.values, self.recalibrated.get(k).copied().unwrap_or(0.0));
-            add(&mut extended, &floating.values, self.base.get(k).copied().unwrap_or(0.0));
+            add_scaled(&mut recalibrated, &floating.values, self.recalibrated.get(k).copied().unwrap_or(0.0));
+            add_scaled(&mut extended, &floating.values, self.base.get(k).copied().unwrap_or(0.0));
         }
         let mut parts = Vec::new();
         let causes: Vec<Acting<'_>> = self
@@ -214,11 +307,8 @@ impl Extended {
             .collect();
         for (cause, columns) in self.causes.iter().zip(together(on, &causes)) {
             let mut part = vec![0.0; on.rows.len()];
-            let predicts = |column: &Column| !matches!(column.tolerance, Tolerance::History(_));
-            for (column, c) in columns.iter().zip(&cause.coefficients).filter(|(column, _)| predicts(column)) {
-                add(&mut part, &column.values, *c);
-            }
-            add(&mut extended, &part, 1.0);
+            add_part(&mut part, &columns, &cause.coefficients);
+            add_scaled(&mut extended, &part, 1.0);
             parts.push(part);
         }
         (recalibrated, extended, parts)

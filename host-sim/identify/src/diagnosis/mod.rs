@@ -60,7 +60,7 @@ use averaged::Averaged;
 use candidate::{Deviation, Excitation, Label, Law, Scales, library, line, unnamed};
 pub use explain::Explanation;
 use extended::Found;
-pub use extended::{Extended, FittedCause, Series};
+pub use extended::{Extended, FittedCause, FittedLaw, Series, added_by};
 use model::{Problem, Term, terms_at};
 use noise::{Noise, Whitener};
 pub use pipeline::{

@@ -442,7 +442,7 @@ impl Diagnosed {
         let mut table: Option<MadeTable> = None;
         let drive_toml = match &subject.model {
             Some(known) => {
-                let mut model = Model::of_diagnosis(&subject.nominal, &self.diagnosis);
+                let mut model = Model::of_diagnosis(&subject.nominal, &self.diagnosis, &self.extended);
                 model.causes.splice(0..0, known.causes.iter().cloned());
                 extension.named_causes = model.causes.iter().map(|cause| cause.name).collect();
                 model.to_toml()

@@ -8,23 +8,28 @@
 //! delay_s = 0.002
 //! ```
 //!
-//! The causes are re-simulated by the laws of [`crate::synthesize`], under the names that `diagnosis.json` gives their
-//! parameters.
+//! A diagnosis also writes `[extension.cause.fit]`: the model of the cause as it was fitted. It predicts what the cause
+//! adds as long as the parameters are those of the fit. A cause written by hand, or changed, is simulated from its
+//! parameters by [`crate::synthesize`], under the names that `diagnosis.json` gives them.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use toml::de::DeTable;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
 
 use crate::causes::{CauseName, ParameterName as Name};
-use crate::diagnosis::FittedCause;
+use crate::diagnosis::base::PlayLaw;
+use crate::diagnosis::candidate::Scales;
+use crate::diagnosis::prepare::Jump;
 use crate::diagnosis::report::{Cause, Diagnosis, Parameter};
+use crate::diagnosis::{Extended, FittedCause, FittedLaw, added_by};
 use crate::measurement::Session;
 use crate::nominal::{Fixed, Nominal};
 use crate::synthesize::{Chosen, Excitation, Plant, Sizes, added_arcsec, parse};
-use flexspline_base::toml_file::{Entries, Refused, TomlFile, any, entries_of, one_of};
+use flexspline_base::toml_file::{Entries, Refused, TomlFile, any, each_of, entries_of, one_of, text as text_of};
 use flexspline_mechanics::drive::{DriveError, Problem};
 
 /// A cause with the values of its parameters.
@@ -34,6 +39,8 @@ pub struct CauseEntry {
     pub name: CauseName,
     /// Parameters by name; the unit is the end of the name.
     pub parameters: BTreeMap<String, f64>,
+    /// The model that was fitted, if the cause comes from a diagnosis.
+    pub fit: Option<FittedLaw>,
 }
 
 /// A nominal model with causes.
@@ -69,9 +76,10 @@ impl Model {
         Ok(Model { nominal, causes })
     }
 
-    /// The nominal model recalibrated, with the causes of a diagnosis.
+    /// The nominal model recalibrated, with the causes of a diagnosis as they were fitted.
     #[must_use]
-    pub fn of_diagnosis(nominal: &Nominal, diagnosis: &Diagnosis) -> Model {
+    pub fn of_diagnosis(nominal: &Nominal, diagnosis: &Diagnosis, fitted: &Extended) -> Model {
+        let causes = diagnosis.causes.iter().map(|cause| CauseEntry::of(cause).fitted_by(fitted, nominal)).collect();
         let change = |name: &str| diagnosis.recalibrated.get(name).map_or(0.0, |p| p.value);
         let mut nominal = nominal.clone();
         // A relative change of the wind-up is the inverse one of the stiffness.
@@ -87,7 +95,6 @@ impl Model {
                 harmonic.phase_rad += across.atan2(along);
             }
         }
-        let causes = diagnosis.causes.iter().map(CauseEntry::of).collect();
         Model { nominal, causes }
     }
 
@@ -97,14 +104,37 @@ impl Model {
         self.causes.iter().filter_map(CauseEntry::effect).collect()
     }
 
-    /// What the causes add to the error of each session, arcsec.
+    /// What the causes add to the error of each session, arcsec: by the models that were fitted where the causes have
+    /// them, and by [`crate::synthesize`] where they have none.
     ///
     /// # Errors
     /// A parameter that does not fit the sessions.
     pub fn added_arcsec(&self, sessions: &[Session], sizes: Sizes) -> Result<Vec<Vec<f64>>, String> {
+        let fitted: Vec<(CauseName, &FittedLaw)> =
+            self.causes.iter().filter_map(|cause| Some((cause.name, cause.fit.as_ref()?))).collect();
+        let Some(mut added) = added_by(&fitted, sessions, &self.nominal) else {
+            return self.simulated_arcsec(&self.effects(), sessions, sizes);
+        };
+        let others: Vec<Chosen> =
+            self.causes.iter().filter(|cause| cause.fit.is_none()).filter_map(CauseEntry::effect).collect();
+        if !others.is_empty() {
+            let simulated = self.simulated_arcsec(&others, sessions, sizes)?;
+            for (sum, more) in added.iter_mut().flatten().zip(simulated.into_iter().flatten()) {
+                *sum += more;
+            }
+        }
+        Ok(added)
+    }
+
+    fn simulated_arcsec(
+        &self,
+        effects: &[Chosen],
+        sessions: &[Session],
+        sizes: Sizes,
+    ) -> Result<Vec<Vec<f64>>, String> {
         let on = Excitation::of_sessions(sessions, 100.0, self.nominal.temperature_c);
         let plant = Plant { nominal: &self.nominal, table: None };
-        let added = added_arcsec(&plant, sizes, &self.effects(), &on)?;
+        let added = added_arcsec(&plant, sizes, effects, &on)?;
         let mut of_session = on.sessions.iter().map(|rows| added[rows.clone()].to_vec());
         Ok(sessions
             .iter()
@@ -181,10 +211,11 @@ fn causes_of(file: &mut TomlFile<'_>, table: &DeTable<'_>) -> Vec<CauseEntry> {
     }
     let known: Vec<(&'static str, CauseName)> = CauseName::ALL.iter().map(|cause| (cause.as_str(), *cause)).collect();
     let causes = extension.each(file, "cause", |entry| {
-        let cause = Entries::of(entry, &["name", "parameters"])?;
+        let cause = Entries::of(entry, &["name", "parameters", "fit"])?;
         let name = cause.needed("name", |v| one_of(&known, v))?;
-        let parameters = cause.given("parameters", |v| entries_of(v, any))?.unwrap_or_default();
-        let cause = CauseEntry { name, parameters };
+        let parameters: BTreeMap<String, f64> = cause.given("parameters", |v| entries_of(v, any))?.unwrap_or_default();
+        let fit = cause.given("fit", fit_of)?.filter(|(of, _)| *of == fingerprint(&parameters)).map(|(_, fit)| fit);
+        let cause = CauseEntry { name, parameters, fit };
         cause.checked_effect().map_err(|what| Refused::because(entry, what))?;
         Ok(cause)
     });
@@ -199,8 +230,98 @@ pub fn causes_to_toml(causes: &[CauseEntry]) -> String {
         for (name, value) in &cause.parameters {
             let _ = writeln!(text, "{name} = {value:?}");
         }
+        if let Some(fit) = &cause.fit {
+            write_fit(&mut text, fit, &cause.parameters);
+        }
     }
     text
+}
+
+/// What tells whether parameters are those of a fit.
+fn fingerprint(parameters: &BTreeMap<String, f64>) -> String {
+    let mut hash = blake3::Hasher::new();
+    for (name, value) in parameters {
+        hash.update(name.as_bytes());
+        hash.update(&value.to_bits().to_le_bytes());
+    }
+    hash.finalize().to_hex()[..16].to_owned()
+}
+
+/// Numbers of [`Scales`] by their names in a file.
+const SCALES: [(&str, fn(&mut Scales) -> &mut f64); 7] = [
+    ("load_n_m", |s| &mut s.load),
+    ("mean_speed_rad_s", |s| &mut s.mean_speed),
+    ("begin_s", |s| &mut s.begin_s),
+    ("duration_s", |s| &mut s.duration_s),
+    ("travel_rad", |s| &mut s.travel),
+    ("work_rad_n_m", |s| &mut s.work),
+    ("arcsec_per_um", |s| &mut s.arcsec_per_um),
+];
+
+fn write_fit(text: &mut String, fit: &FittedLaw, parameters: &BTreeMap<String, f64>) {
+    let mut scales = fit.scales.clone();
+    let counted_in = SCALES.map(|(name, of)| format!("{name} = {:?}", of(&mut scales))).join(", ");
+    let jumps: Vec<String> = scales
+        .jumps
+        .iter()
+        .map(|Jump { time_s: [begin, half, over], height_arcsec }| {
+            format!("[{begin:?}, {half:?}, {over:?}, {height_arcsec:?}]")
+        })
+        .collect();
+    let _ = writeln!(
+        text,
+        "# The model of this cause as it was fitted. It counts as long as the parameters above are not changed.\n\
+         [extension.cause.fit]\n\
+         of = \"{}\"\n\
+         variant = \"{}\"\n\
+         play = \"{}\"\n\
+         stiffness_n_m_per_rad = {:?}\n\
+         backlash_arcsec = {:?}\n\
+         shape = {:?}\n\
+         coefficients = {:?}\n\
+         scales = {{ {counted_in} }}\n\
+         jumps = [{}]",
+        fingerprint(parameters),
+        fit.variant,
+        fit.play.as_str(),
+        fit.beside[0],
+        fit.beside[1],
+        fit.shape,
+        fit.coefficients,
+        jumps.join(", ")
+    );
+}
+
+/// Fields of a fit.
+const FIT: [&str; 9] =
+    ["of", "variant", "play", "stiffness_n_m_per_rad", "backlash_arcsec", "shape", "coefficients", "scales", "jumps"];
+
+/// A fit, and the fingerprint of the parameters that it belongs to.
+fn fit_of(value: &Spanned<DeValue<'_>>) -> Result<(String, FittedLaw), Refused> {
+    let fit = Entries::of(value, &FIT)?;
+    let numbers = |v: &Spanned<DeValue<'_>>| each_of(v, "[ numbers ]", any);
+    let mut scales = Scales::default();
+    let given = fit.needed("scales", |v| entries_of(v, any))?;
+    for (name, of) in SCALES {
+        *of(&mut scales) = *given
+            .get(name)
+            .ok_or_else(|| Refused::because(value, format!("scales.{name}: missing; give a number")))?;
+    }
+    for jump in fit.given("jumps", |v| each_of(v, "[ jumps ]", numbers))?.unwrap_or_default() {
+        let &[begin, half, over, height_arcsec] = jump.as_slice() else {
+            return Err(Refused::because(value, format!("found a jump of {} numbers, allowed: 4", jump.len())));
+        };
+        scales.jumps.push(Jump { time_s: [begin, half, over], height_arcsec });
+    }
+    let law = FittedLaw {
+        variant: fit.needed("variant", text_of)?,
+        play: fit.needed("play", |v| one_of(&PlayLaw::ALL.map(|play| (play.as_str(), play)), v))?,
+        shape: fit.needed("shape", numbers)?,
+        coefficients: fit.needed("coefficients", numbers)?,
+        beside: [fit.needed("stiffness_n_m_per_rad", any)?, fit.needed("backlash_arcsec", any)?],
+        scales,
+    };
+    Ok((fit.needed("of", text_of)?, law))
 }
 
 /// Values of `name`, `name 4`, `name 5`, ... in the order of their numbers.
@@ -224,7 +345,15 @@ impl CauseEntry {
         CauseEntry {
             name: cause.name,
             parameters: cause.parameters.iter().map(|(name, p)| ((*name).to_owned(), p.value)).collect(),
+            fit: None,
         }
+    }
+
+    /// The cause with the model that was fitted to it, beside a nominal model.
+    #[must_use]
+    pub fn fitted_by(self, extended: &Extended, nominal: &Nominal) -> CauseEntry {
+        let at = extended.causes().iter().position(|cause| cause.name() == self.name);
+        CauseEntry { fit: at.and_then(|at| extended.fitted_law(at, nominal)), ..self }
     }
 
     /// A cause as it was fitted.
@@ -233,6 +362,7 @@ impl CauseEntry {
         CauseEntry {
             name: cause.name(),
             parameters: cause.parameters.iter().map(|(name, p)| ((*name).to_owned(), p.value)).collect(),
+            fit: None,
         }
     }
 
@@ -273,6 +403,7 @@ mod tests {
         let entry = |name: CauseName, parameters: &[(&str, f64)]| CauseEntry {
             name,
             parameters: parameters.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect(),
+            fit: None,
         };
         Model {
             nominal: catalogue_drive(),
@@ -313,7 +444,7 @@ mod tests {
             (
                 "[extension.cause.parameters]",
                 "[extension.cause.numbers]",
-                "d.toml:29: extension.cause[0].numbers: unknown key; allowed: name, parameters",
+                "d.toml:29: extension.cause[0].numbers: unknown key; allowed: name, parameters, fit",
             ),
         ] {
             let error = Model::from_toml("d.toml", &text.replacen(from, to, 1)).unwrap_err().to_string();

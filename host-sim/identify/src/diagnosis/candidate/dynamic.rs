@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use super::geometry::TURNED_BACK;
 use super::{Coefficients, Excitation, Law, Role, Shape, Shaped, by_row, main, main_about};
 use crate::causes::{CauseName, ParameterName as Name};
 use crate::diagnosis::base::PlayLaw;
@@ -300,9 +301,10 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
         let thinned = if on.unloaded() { Thinned::of(on, 1) } else { None };
         let on_sample = thinned.as_ref().map_or(*on, |thinned| thinned.excitation(on));
         for play in plays {
-            laws.push(gravity_torque(1.0, play, on, &on_sample));
+            laws.push(gravity_torque(1.0, play, on, &on_sample).variant(play.as_str()));
             if on.is_turned_about() {
-                laws.push(gravity_torque(-1.0, play, on, &on_sample));
+                let back = format!("{}, {TURNED_BACK}", play.as_str());
+                laws.push(gravity_torque(-1.0, play, on, &on_sample).variant(back));
             }
         }
     }

@@ -40,6 +40,9 @@ const TAKEN_UNDER_LIGHT_LOAD: Role = Role("clearance taken under light load");
 /// Pulses of a damaged tooth, by flank and load.
 const PULSE: Role = Role("pulse");
 
+/// The variant of a law of gravity whose orientation is counted against the output angle.
+pub(super) const TURNED_BACK: &str = "orientation counted back";
+
 /// Which angle an error is locked to.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Angle {
@@ -170,6 +173,7 @@ fn smooth_pitch(cause: CauseName, of: Angle) -> Law {
         columns
     })
     .parameters_by(pitch_parameters)
+    .variant("smooth")
 }
 
 fn pitch_parameters(on: &Excitation<'_>, _: Shaped<'_>, c: Coefficients<'_>) -> Vec<Named> {
@@ -214,6 +218,7 @@ fn higher_harmonic(cause: CauseName, of: Angle, harmonic: f64) -> Law {
         columns
     })
     .parameters_by(move |on, _, c| wave_parameters(on, c, harmonic))
+    .variant(format!("order {harmonic}"))
     .after_wheels()
 }
 
@@ -380,12 +385,12 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
         generator_eccentricity(on),
         cam_form_error(),
         damaged_tooth(Angle::Flexspline),
-        damaged_tooth(Angle::CircularSpline),
+        damaged_tooth(Angle::CircularSpline).variant("circular spline"),
     ];
     laws.extend(higher_pitch(CauseName::FlexsplinePitchError, Angle::Flexspline, on.nominal));
     laws.extend(higher_pitch(CauseName::CircularSplinePitchError, Angle::CircularSpline, on.nominal));
     if on.is_turned_about() {
-        laws.push(displaced(CauseName::GravitySideLoad, Angle::Gravity(-1.0), on));
+        laws.push(displaced(CauseName::GravitySideLoad, Angle::Gravity(-1.0), on).variant(TURNED_BACK));
     }
     for law in &mut laws {
         if !law.is_in_zones() {

@@ -7,7 +7,7 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use super::geometry::{Angle, COS_PRESSURE_ANGLE, angle};
+use super::geometry::{Angle, COS_PRESSURE_ANGLE, TURNED_BACK, angle};
 use super::{Column, Excitation, Law, Role, Shape, beside, by_row, main, main_about, nuisance, of_wave};
 use crate::causes::{CauseName, Kin, ParameterName as Name};
 use flexspline_design::kernels::{Gain, Kernels};
@@ -167,11 +167,14 @@ pub(super) fn laws(on: &Excitation<'_>, kernels: &Arc<Kernels>) -> Vec<Law> {
         pitch(CauseName::CircularSplinePitchError, Wheel::CircularSpline, Arc::clone(kernels)),
     ];
     if on.is_turned_about() {
-        laws.push(of(CauseName::GravitySideLoad, Angle::Gravity(-1.0)));
+        laws.push(of(CauseName::GravitySideLoad, Angle::Gravity(-1.0)).variant(format!("kernels, {TURNED_BACK}")));
     }
     for law in &mut laws {
         law.wrong.misfit = KERNEL_MISFIT;
         law.wrong.kin = Kin::Unlike;
+        if law.variant.is_empty() {
+            law.variant = "kernels".into();
+        }
     }
     laws
 }

@@ -19,6 +19,7 @@ mod sensor;
 mod stiffness;
 mod thermal;
 
+use std::borrow::Cow;
 use std::f64::consts::PI;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -348,6 +349,8 @@ pub struct Law {
     id: u64,
     /// What it tells of.
     pub label: Label,
+    /// Which of several models of one cause it is: a word that stays the same from one recording to the next.
+    pub variant: Cow<'static, str>,
     /// Shape parameters.
     pub shapes: Vec<Shape>,
     evaluated: Evaluated,
@@ -443,6 +446,7 @@ impl Law {
         Law {
             id: LAWS.fetch_add(1, Ordering::Relaxed),
             label,
+            variant: Cow::Borrowed(""),
             shapes: Vec::new(),
             evaluated: Evaluated {
                 columns: Box::new(columns),
@@ -487,6 +491,10 @@ impl Law {
     #[must_use]
     pub fn id(&self) -> u64 {
         self.id
+    }
+    fn variant(mut self, variant: impl Into<Cow<'static, str>>) -> Law {
+        self.variant = variant.into();
+        self
     }
     fn exact(mut self) -> Law {
         self.wrong.misfit = EXACT_MISFIT;
@@ -685,6 +693,14 @@ impl Law {
 /// Every law of every cause that the data can speak about.
 #[must_use]
 pub fn library(on: &Excitation<'_>) -> Vec<Law> {
+    let mut laws = whole_library(on);
+    laws.retain(|law| law.cause().is_none_or(|cause| on.speaks_of(cause)));
+    laws
+}
+
+/// Every law of every cause, whether the data can speak about it or not: what was found in other data acts in these.
+#[must_use]
+pub fn whole_library(on: &Excitation<'_>) -> Vec<Law> {
     let mut laws = geometry::laws(on);
     if let Some(kernels) = on.nominal.kernels.as_ref().filter(|_| on.nominal.teeth.is_some()) {
         let known = kernel::laws(on, kernels);
@@ -695,7 +711,6 @@ pub fn library(on: &Excitation<'_>) -> Vec<Law> {
     laws.extend(thermal::laws(on));
     laws.extend(dynamic::laws(on));
     laws.extend(sensor::laws(on));
-    laws.retain(|law| law.cause().is_none_or(|cause| on.speaks_of(cause)));
     laws
 }
 

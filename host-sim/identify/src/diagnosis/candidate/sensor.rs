@@ -102,6 +102,7 @@ fn encoder_subdivision(of_output: bool, order: f64) -> Law {
             .chain([(Name::Harmonic, order), (Name::Encoder, f64::from(u8::from(of_output))), (Name::PhaseRad, phase)])
             .collect()
     });
+    let law = law.variant(format!("{} {order}", if of_output { "output" } else { "generator" }));
     if of_output { law } else { law.after_wheels() }
 }
 

@@ -308,6 +308,7 @@ fn wear_between_sessions(on: &Excitation<'_>) -> Option<Law> {
         growth > 0.0 && c.all(STEP).all(|step| step > -NOT_NARROWER * growth)
     })
     .well_known()
+    .variant("between sessions")
     .evaluated_on_averages();
     Some(law)
 }
@@ -342,14 +343,14 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
         stiffness_hardening(),
         stiffness_error(),
         backlash_growth(),
-        wear(Progress::Travel),
+        wear(Progress::Travel).variant("travel"),
         cracked_tooth_root(),
     ]);
     if on.rows.recorded.time {
-        laws.push(wear(Progress::Time));
+        laws.push(wear(Progress::Time).variant("time"));
     }
     if on.scales.load > 0.0 {
-        laws.push(wear(Progress::Work));
+        laws.push(wear(Progress::Work).variant("work"));
     }
     laws.extend(wear_between_sessions(on).filter(|_| on.rows.recorded.time));
     laws.extend(ratcheting(on));

@@ -213,11 +213,11 @@ fn lubricant_load(on: &Excitation<'_>) -> Law {
 pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     let mut laws = vec![thermal_clearance(on)];
     if on.base.half_backlash > 0.0 {
-        laws.push(thermal_clearance_shut(on));
+        laws.push(thermal_clearance_shut(on).variant("shut"));
     }
     laws.extend([thermal_stiffness(), lubricant_viscosity()]);
     if on.scales.load > 0.0 && on.nominal.wind_up_arcsec(1.0) > 0.0 {
-        laws.push(lubricant_load(on));
+        laws.push(lubricant_load(on).variant("load"));
     }
     laws
 }
