@@ -729,7 +729,7 @@ typedef struct {
     bool sane;
 } estimate;
 
-static estimate estimated(const fxt_table *table, const point *at, play_state *play, int64_t generator)
+static inline estimate estimated(const fxt_table *table, const point *at, play_state *play, int64_t generator)
 {
     const int64_t nominal = nominal_output(table, generator);
     const phases where = phases_at(table, generator, nominal);
@@ -741,7 +741,7 @@ static estimate estimated(const fxt_table *table, const point *at, play_state *p
     return now;
 }
 
-static fxt_prediction follow(const fxt_table *table, const point *at, play_state *play, int64_t generator)
+static inline fxt_prediction follow(const fxt_table *table, const point *at, play_state *play, int64_t generator)
 {
     const estimate is = estimated(table, at, play, generator);
     fxt_prediction now;
