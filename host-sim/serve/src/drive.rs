@@ -49,7 +49,7 @@ pub struct Wrong {
 
 /// A drive as a page shows it.
 #[derive(Debug, Serialize)]
-pub struct Shown {
+pub struct DriveShown {
     /// Its name.
     pub name: String,
     /// Turns of the generator for one of the output; of a drive that is whole.
@@ -85,7 +85,8 @@ pub struct Drawing {
     pub outer_radius_mm: f64,
     /// Where the material at equal angles around the neutral layer stands: x, y, direction of the outward normal (rad).
     pub wave: Vec<[f64; 3]>,
-    /// Least gap between rigid teeth over the mesh cycle, µm, negative where they interfere; none where they never meet.
+    /// Least gap between rigid teeth over the mesh cycle, µm, negative where they interfere; none where they never
+    /// meet.
     pub least_gap_um: Option<f64>,
     /// Backlash of the rigid teeth, arcsec at the output.
     pub backlash_arcsec: Option<f64>,
@@ -95,7 +96,7 @@ pub struct Drawing {
 ///
 /// # Errors
 /// The drive that it starts from cannot be read.
-pub fn show(folder: &Folder, asked: &DriveAsked, kind: GeneratorKind) -> Result<Shown, ReadError> {
+pub fn show(folder: &Folder, asked: &DriveAsked, kind: GeneratorKind) -> Result<DriveShown, ReadError> {
     let from = read(folder, &asked.drive)?;
     let sets: Vec<String> = asked.sets.iter().map(|(path, value)| format!("{path}={value}")).collect();
     // One field after another, so that each says what is wrong with it whatever the others are.
@@ -142,7 +143,7 @@ pub fn show(folder: &Folder, asked: &DriveAsked, kind: GeneratorKind) -> Result<
     {
         cautions.push(format!("rigid teeth interfere by {:.1} µm under this generator: the drive binds", -gap));
     }
-    Ok(Shown {
+    Ok(DriveShown {
         name: from.name.clone(),
         ratio: whole.map(Drive::ratio),
         rated_torque_n_m: whole.map(|drive| drive.rated_torque_n_m(kind)),
@@ -201,7 +202,7 @@ fn draw(drive: &Drive, kind: GeneratorKind) -> Result<Drawing, DriveError> {
 mod tests {
     use super::*;
 
-    fn shown(sets: &[(&str, &str)]) -> Shown {
+    fn shown(sets: &[(&str, &str)]) -> DriveShown {
         let place = tempfile::tempdir().unwrap();
         let folder = Folder::new(place.path()).unwrap();
         let sets = sets.iter().map(|(path, value)| ((*path).to_owned(), (*value).to_owned())).collect();

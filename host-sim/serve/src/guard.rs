@@ -1,12 +1,13 @@
 //! Who may ask: a page of this server, in the browser of whoever started it.
 //!
-//! - Other users and programs of this machine: the token of this run, in the address once, then in a cookie that scripts
-//!   cannot read.
+//! - Other users and programs of this machine: the token of this run, in the address once, then in a cookie that
+//!   scripts cannot read.
 //! - A name of somebody's that leads to 127.0.0.1 (DNS rebinding): `Host` is an address of this server.
 //! - Other pages in the same browser: `Origin` is this server wherever it is given, and it is given with all that
 //!   changes something; `Sec-Fetch-Site` is not that of another site; the cookie is `SameSite=Strict`; no answer allows
 //!   another origin to read it.
-//! - Scripts in names, logs and reports: a content security policy, scripts of this server alone, nothing from elsewhere.
+//! - Scripts in names, logs and reports: a content security policy, scripts of this server alone, nothing from
+//!   elsewhere.
 
 use axum::body::Body;
 use axum::http::header::{self, HeaderMap, HeaderName, HeaderValue};
