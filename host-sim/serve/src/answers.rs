@@ -232,6 +232,9 @@ async fn cancel_job(State(shared): Of, Path(id): Path<String>) -> Answer {
 struct ShowDrive {
     drive: DriveAsked,
     generator: GeneratorKind,
+    /// Whether gaps between teeth are looked for.
+    #[serde(default)]
+    gaps: bool,
 }
 
 async fn show_drive(State(shared): Of, body: Bytes) -> Answer {
@@ -239,7 +242,7 @@ async fn show_drive(State(shared): Of, body: Bytes) -> Answer {
         Ok(asked) => asked,
         Err(error) => return words(StatusCode::BAD_REQUEST, error),
     };
-    aside(move || match drive::show(&shared.folder, &asked.drive, asked.generator) {
+    aside(move || match drive::show(&shared.folder, &asked.drive, asked.generator, asked.gaps) {
         Ok(shown) => json(&shown),
         Err(ReadError::Folder(error)) => refused(&error),
         Err(ReadError::Drive(error)) => words(StatusCode::BAD_REQUEST, error),

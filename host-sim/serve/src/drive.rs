@@ -85,6 +85,8 @@ pub struct Drawing {
     pub outer_radius_mm: f64,
     /// Where the material at equal angles around the neutral layer stands: x, y, direction of the outward normal (rad).
     pub wave: Vec<[f64; 3]>,
+    /// Whether the gaps were looked for.
+    pub gaps: bool,
     /// Least gap between rigid teeth over the mesh cycle, µm, negative where they interfere; none where they never
     /// meet.
     pub least_gap_um: Option<f64>,
@@ -92,11 +94,11 @@ pub struct Drawing {
     pub backlash_arcsec: Option<f64>,
 }
 
-/// The drive that a page asks for.
+/// The drive that a page asks for; with the gaps of its teeth, a tenth of a second, or without.
 ///
 /// # Errors
 /// The drive that it starts from cannot be read.
-pub fn show(folder: &Folder, asked: &DriveAsked, kind: GeneratorKind) -> Result<DriveShown, ReadError> {
+pub fn show(folder: &Folder, asked: &DriveAsked, kind: GeneratorKind, gaps: bool) -> Result<DriveShown, ReadError> {
     let from = read(folder, &asked.drive)?;
     let sets: Vec<String> = asked.sets.iter().map(|(path, value)| format!("{path}={value}")).collect();
     // One field after another, so that each says what is wrong with it whatever the others are.
@@ -124,7 +126,7 @@ pub fn show(folder: &Folder, asked: &DriveAsked, kind: GeneratorKind) -> Result<
     };
     let whole = drive.as_ref().filter(|_| problems.is_empty());
     // Geometry at the edge of what is allowed is the one thing here that could go wrong unforeseen.
-    let drawn = whole.map(|drive| catch_unwind(|| draw(drive, kind)));
+    let drawn = whole.map(|drive| catch_unwind(|| draw(drive, kind, gaps)));
     let drawing = match drawn {
         Some(Ok(Ok(drawing))) => Some(drawing),
         Some(Ok(Err(error))) => {
@@ -162,7 +164,7 @@ fn words(error: &DriveError, path: &str) -> String {
     error.problems.iter().map(of).collect::<Vec<_>>().join("; ")
 }
 
-fn draw(drive: &Drive, kind: GeneratorKind) -> Result<Drawing, DriveError> {
+fn draw(drive: &Drive, kind: GeneratorKind, gaps: bool) -> Result<Drawing, DriveError> {
     let points = outlines(drive, kind, POINTS_PER_PIECE)?;
     let of = |part: &str| points.iter().filter(|p| p.part == part).map(|p| [p.x_mm, p.y_mm]).collect::<Vec<_>>();
     let mut generator: Vec<Vec<[f64; 2]>> = Vec::new();
@@ -183,7 +185,7 @@ fn draw(drive: &Drive, kind: GeneratorKind) -> Result<Drawing, DriveError> {
             [x, y, normal]
         })
         .collect();
-    let report = RigidMesh::new(drive, kind)?.report(kind);
+    let report = if gaps { RigidMesh::new(drive, kind)?.report(kind) } else { None };
     Ok(Drawing {
         tooth: of("flexspline_tooth"),
         space: of("circular_spline_space"),
@@ -193,6 +195,7 @@ fn draw(drive: &Drive, kind: GeneratorKind) -> Result<Drawing, DriveError> {
         bore_radius_mm: drive.flexspline.bore_radius_mm(),
         outer_radius_mm: drive.circular_spline.outer_radius_mm,
         wave,
+        gaps,
         least_gap_um: report.as_ref().map(|report| 1e3 * report.least.gap_mm),
         backlash_arcsec: report.map(|report| report.backlash_rad.to_degrees() * 3600.0),
     })
@@ -206,7 +209,7 @@ mod tests {
         let place = tempfile::tempdir().unwrap();
         let folder = Folder::new(place.path()).unwrap();
         let sets = sets.iter().map(|(path, value)| ((*path).to_owned(), (*value).to_owned())).collect();
-        show(&folder, &DriveAsked { drive: "HHD-95".to_owned(), sets }, GeneratorKind::Cam).unwrap()
+        show(&folder, &DriveAsked { drive: "HHD-95".to_owned(), sets }, GeneratorKind::Cam, true).unwrap()
     }
 
     #[test]
