@@ -622,8 +622,14 @@ export async function driveBench(view, asked, bench) {
 
   await fields();
   setTimeout(() => resume().catch((error) => bench.complain(error)), 300);
-  return () => {
+  /** Nobody waits any more for what the sliders asked. */
+  const gone = () => {
     round += 1;
     for (const id of running) cancel(id);
+  };
+  addEventListener("pagehide", gone);
+  return () => {
+    removeEventListener("pagehide", gone);
+    gone();
   };
 }
