@@ -31,8 +31,8 @@ use crate::work::{DriveAsked, WorkAsked};
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_report::assets;
 
-/// Connections at a time (a guess): a browser opens six, and a few windows of it a few times that; a process may have 1024
-/// files open.
+/// Connections at a time (a guess): a browser opens six, and a few windows of it a few times that; a process may have
+/// 1024 files open.
 const MOST_CONNECTIONS: usize = 256;
 /// Limit of the time until a connection has said what it wants: those that say nothing do not keep others out.
 const LONGEST_HEAD: Duration = Duration::from_secs(5);

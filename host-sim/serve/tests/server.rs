@@ -120,7 +120,8 @@ fn a_request_by_another_name_or_of_another_page_is_refused() {
     }
     // What changes something says that it is of this server.
     let request = format!(
-        "POST /api/jobs HTTP/1.1\r\nHost: {host}\r\nCookie: {cookie}\r\nContent-Length: 2\r\nConnection: close\r\n\r\n{{}}"
+        "POST /api/jobs HTTP/1.1\r\nHost: {host}\r\nCookie: {cookie}\r\nContent-Length: 2\r\nConnection: \
+         close\r\n\r\n{{}}"
     );
     assert_eq!(bench.raw(&request).status, 403);
     let preflight = format!(
