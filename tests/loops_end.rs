@@ -70,7 +70,6 @@ const BOUNDED: &[(&str, &str, usize, Bound)] = &[
     ("base/src/toml_file.rs", "refuse_unknown_keys_in", 1, Shrinks("tables within a table of a file")),
     ("motion/src/scenario.rs", "next", 1, Shrinks("legs of a scenario; it ends where there is none")),
     ("serve/src/folder.rs", "collect", 1, Shrinks("how deep it still looks")),
-    ("serve/src/jobs.rs", "work", 1, Shrinks("jobs of its line, until the server ends")),
     ("serve/src/jobs.rs", "next_of", 1, Shrinks("waits for a job, or for the server to end")),
     ("serve/src/jobs.rs", "run", 1, Shrinks("as long as a process runs, which whoever asked for it may end")),
     ("serve/src/jobs/process.rs", "kill", 1, Shrinks("the time of GRACE")),

@@ -257,7 +257,7 @@ await check("the certificate is one page on paper", async () => {
 
 /** Makes the tables of the drive on the page, coarse, and tries them on a run of that drive. */
 async function tablesOf(page, as) {
-  await until(page, "standard");
+  await until(page, "coarse");
   await page.locator("#table-mesh").selectOption("coarse");
   await page.locator("#make-tables").click();
   await page.locator("#make a[download='cam.fxt']").waitFor({ timeout: 400_000 });

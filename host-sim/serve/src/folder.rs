@@ -51,7 +51,11 @@ pub enum FolderError {
     #[error("{0}: {1} bytes; allowed: {largest}", largest = LARGEST_FILE)]
     Large(String, u64),
     /// More than one run receives.
-    #[error("this run has received {files} files or {} MB, which is all that it takes", MOST_BYTES >> 20, files = MOST_FILES)]
+    #[error(
+        "this run has received {files} files or {} MB, which is all that it takes",
+        MOST_BYTES >> 20,
+        files = MOST_FILES
+    )]
     Full,
     /// The system refuses.
     #[error("{0}: {1}")]

@@ -1,12 +1,13 @@
 //! Who may ask: a page of this server, in the browser of whoever started it.
 //!
-//! - Other users and programs of this machine: the token of this run, in the address once, then in a cookie that scripts
-//!   cannot read.
+//! - Other users and programs of this machine: the token of this run, in the address once, then in a cookie that
+//!   scripts cannot read.
 //! - A name of somebody's that leads to 127.0.0.1 (DNS rebinding): `Host` is an address of this server.
 //! - Other pages in the same browser: `Origin` is this server wherever it is given, and it is given with all that
 //!   changes something; `Sec-Fetch-Site` is not that of another site; the cookie is `SameSite=Strict`; no answer allows
 //!   another origin to read it.
-//! - Scripts in names, logs and reports: a content security policy, scripts of this server alone, nothing from elsewhere.
+//! - Scripts in names, logs and reports: a content security policy, scripts of this server alone, nothing from
+//!   elsewhere.
 
 use axum::body::Body;
 use axum::http::header::{self, HeaderMap, HeaderName, HeaderValue};
@@ -169,11 +170,16 @@ mod tests {
         Guard { token: "0123456789abcdef0123456789abcdef".to_owned(), port: 4000 }
     }
 
+    /// What is asked, by whom, and what becomes of it.
+    type Case<'a> = (&'a Method, &'a [(&'a str, &'a str)], Result<(), NoEntry>);
+
+    /// Headers, those of one name beside one another.
     fn headers(all: &[(&str, &str)]) -> HeaderMap {
-        let each = |(name, value): &(&str, &str)| {
-            (HeaderName::from_bytes(name.as_bytes()).unwrap(), HeaderValue::from_str(value).unwrap())
-        };
-        all.iter().map(each).collect()
+        let mut map = HeaderMap::new();
+        for (name, value) in all {
+            map.append(HeaderName::from_bytes(name.as_bytes()).unwrap(), HeaderValue::from_str(value).unwrap());
+        }
+        map
     }
 
     #[test]
@@ -208,7 +214,7 @@ mod tests {
         let (get, post) = (Method::GET, Method::POST);
         let host = ("host", "127.0.0.1:4000");
         let own = ("origin", "http://127.0.0.1:4000");
-        let cases: &[(&Method, &[(&str, &str)], Result<(), NoEntry>)] = &[
+        let cases: &[Case<'_>] = &[
             (&get, &[host], Ok(())),
             (&get, &[("host", "localhost:4000")], Ok(())),
             (&post, &[host, own], Ok(())),
@@ -229,20 +235,8 @@ mod tests {
             (&get, &[host, ("sec-fetch-site", "same-site")], Err(NoEntry::Origin)),
         ];
         for (method, given, expected) in cases {
-            // A map collected of equal names keeps the last; two of a kind have to be appended.
-            let mut map = HeaderMap::new();
-            for (name, value) in headers_each(given) {
-                map.append(name, value);
-            }
-            assert_eq!(guard().check_place(method, &map), *expected, "{method} {given:?}");
+            assert_eq!(guard().check_place(method, &headers(given)), *expected, "{method} {given:?}");
         }
-    }
-
-    fn headers_each(all: &[(&str, &str)]) -> Vec<(HeaderName, HeaderValue)> {
-        let each = |(name, value): &(&str, &str)| {
-            (HeaderName::from_bytes(name.as_bytes()).unwrap(), HeaderValue::from_str(value).unwrap())
-        };
-        all.iter().map(each).collect()
     }
 
     #[test]

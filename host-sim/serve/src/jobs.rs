@@ -31,7 +31,8 @@ pub use record::{JobRecord, Progress, State};
 pub const MOST_WAITING: usize = 32;
 /// Records that are kept in view: a guess.
 const MOST_KEPT: usize = 500;
-/// Short jobs over that keep their folders; of older ones, which were looks and single pitches, they are cleared away (a guess).
+/// Short jobs over that keep their folders (a guess); of older ones, which were looks and single pitches, they are
+/// cleared away.
 const SHORT_KEPT: usize = 100;
 /// How often a running process is looked at.
 const LOOK_EVERY: Duration = Duration::from_millis(10);

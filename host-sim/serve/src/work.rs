@@ -590,7 +590,7 @@ mod tests {
             r#"{"work":"simulate","drive":{"drive":"../x"},"generator":"cam","torque_n_m":1,"mesh":"coarse"}"#,
             r#"{"work":"samples","file":"a.csv","drive":{"drive":"HHD-95","sets":{"a --b":"1"}},"generator":"cam"}"#,
             r#"{"work":"diagnose","file":"a.csv","reading":{},"known":{"ratio":50},"generator":"cam"}"#,
-            r#"{"work":"calibrate","files":["a.csv"],"reading":{"columns":"a\nb"},"known":{"ratio":50},"generator":"cam"}"#,
+            r#"{"work":"replay","file":"a.csv","table":"a.csv","reading":{"columns":"a\nb"}}"#,
         ] {
             assert!(asked(bad).is_err(), "{bad}");
         }

@@ -15,9 +15,9 @@ const sent = (value) => ({
 export const state = async () => (await ask("/api/state")).json();
 export const jobsAfter = async (revision) => (await ask(`/api/jobs?after=${revision}`)).json();
 export const addJob = async (work) => (await ask("/api/jobs", sent(work))).json();
-export const cancelJob = async (id) => (await ask(`/api/jobs/${id}`, { method: "DELETE" })).json();
-export const showDrive = async (drive, generator, signal) =>
-  (await ask("/api/drive", { ...sent({ drive, generator }), signal })).json();
+export const cancelJob = async (id) => (await ask(`/api/jobs/${id}`, { method: "DELETE", keepalive: true })).json();
+export const showDrive = async (drive, generator, gaps = false) =>
+  (await ask("/api/drive", sent({ drive, generator, gaps }))).json();
 export const fileText = async (name, head) => (await ask(`/files/${name}${head ? `?head=${head}` : ""}`)).text();
 export const fileJson = async (name) => (await ask(`/files/${name}`)).json();
 

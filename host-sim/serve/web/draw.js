@@ -164,8 +164,9 @@ export function sketch() {
     element,
     draw(next) {
       drawing = next;
-      readout.textContent =
-        typeof next.least_gap_um === "number"
+      readout.textContent = !next.gaps
+        ? "Rigid teeth."
+        : typeof next.least_gap_um === "number"
           ? `Rigid teeth: least gap ${next.least_gap_um.toFixed(1).replace("-", "−")} µm, backlash ${next.backlash_arcsec.toFixed(1)}″ at the output.`
           : "Rigid teeth of these sizes never meet.";
       paint();

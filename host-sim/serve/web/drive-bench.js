@@ -273,8 +273,11 @@ export async function driveBench(view, asked, bench) {
   // ---- While one drags: drawing and mistakes
   let drawingNow = null;
   let wanted = false;
+  let gaps = false;
   let whole = false;
-  async function draw() {
+  /** Draws what there is now; with the gaps of the teeth when sliders rest. */
+  async function draw(atRest = false) {
+    gaps = atRest;
     if (drawingNow) {
       wanted = true;
       return drawingNow;
@@ -282,7 +285,7 @@ export async function driveBench(view, asked, bench) {
     drawingNow = (async () => {
       do {
         wanted = false;
-        const shown = await showDrive(request(), now.generators[0]);
+        const shown = await showDrive(request(), now.generators[0], gaps);
         whole = shown.problems.length === 0;
         for (const { control, problem } of inputs.values()) {
           problem.textContent = "";
@@ -357,7 +360,7 @@ export async function driveBench(view, asked, bench) {
   }
 
   async function compute() {
-    await draw();
+    await draw(true);
     if (!whole) {
       live.textContent = "The FEM waits for a drive that is whole: see the fields marked above.";
       return;
@@ -619,8 +622,14 @@ export async function driveBench(view, asked, bench) {
 
   await fields();
   setTimeout(() => resume().catch((error) => bench.complain(error)), 300);
-  return () => {
+  /** Nobody waits any more for what the sliders asked. */
+  const gone = () => {
     round += 1;
     for (const id of running) cancel(id);
+  };
+  addEventListener("pagehide", gone);
+  return () => {
+    removeEventListener("pagehide", gone);
+    gone();
   };
 }

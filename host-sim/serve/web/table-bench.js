@@ -245,6 +245,15 @@ function amplitudes(values) {
   });
 }
 
+/** How often an angle of the nodes turns in a turn of the output. Two waves: teeth of a held flexspline, or of a held ring. */
+function turnsOf(of, ratio) {
+  const turns = Math.abs(ratio);
+  if (of === "output_deg") return 1;
+  if (of === "generator_against_output_deg") return Math.abs(ratio - 1);
+  if (of === "share_of_pitch_deg") return turns * 2 * (ratio > 0 ? turns - 1 : turns);
+  return turns;
+}
+
 /** The certificate of a calibrated unit, one page to print. */
 export async function certificate(view, asked) {
   const of = asked.get("of") ?? ".";
@@ -257,13 +266,14 @@ export async function certificate(view, asked) {
   const cyclic = [...parts]
     .filter(([, nodes]) => /_deg$/.test(nodes[0].of) && nodes.length > 3)
     .map(([part, nodes]) => {
-      const ofOutput = nodes[0].of === "output_deg";
+      const of = nodes[0].of;
+      const ofOutput = of === "output_deg";
       const values = curve(nodes, 360, FINE);
-      const perOutput = ofOutput ? 1 : Math.abs(c.ratio);
+      const perOutput = turnsOf(of, c.ratio);
       const slopes = values.map((v, k) => ((values[(k + 1) % FINE] - v) / (360 / FINE)) * perOutput);
       return {
         part: part.replaceAll("_", " "),
-        ofOutput,
+        angle: ofOutput ? "output" : of === "share_of_pitch_deg" ? "tooth pitch" : "generator",
         values,
         perOutput,
         steepest: Math.max(...slopes.map(Math.abs)),
@@ -271,10 +281,18 @@ export async function certificate(view, asked) {
         orders: amplitudes(values),
       };
     });
+  // What a screen can show apart: a wave of the tooth pitch would be a band.
+  const shown = cyclic.filter((p) => p.perOutput <= MOST_POINTS / 8);
+  const whole = liveChart(
+    "whole",
+    "Error that the table holds, over a whole turn of the output",
+    "The sum of the parts of the table over a turn of the output, without load",
+    `Without load: ${shown.map((p) => p.part).join(", ") || "no part repeats"}${shown.length < cyclic.length ? "; the wave of the tooth pitch is in the table above alone" : ""}.`,
+  );
   const turn = liveChart(
     "turn",
-    "Error over a whole turn of the output",
-    "Measured error and what the table leaves, over a turn of the output",
+    "Where it was recorded",
+    "Measured error and what the table leaves, over turns of the output",
     "Rows in steady motion, as measured and with the table.",
   );
   const spectrum = liveChart(
@@ -315,6 +333,7 @@ export async function certificate(view, asked) {
       id: "steepest",
       text: `Steepest slope, all parts together at most: ${number(steepest)} ″ for a degree of the output.`,
     }),
+    whole.figure,
     el("div", { class: "two" }, turn.figure, spectrum.figure),
     el(
       "dl",
@@ -338,6 +357,18 @@ export async function certificate(view, asked) {
     ),
     commandLine(c.command),
   );
+  const turns = Array.from({ length: MOST_POINTS }, (_, k) => k / MOST_POINTS);
+  whole.figure.hidden = !shown.length;
+  if (shown.length) {
+    const at = (p, output) => p.values[Math.floor(((output * p.perOutput) % 1) * FINE)];
+    const sum = turns.map((output) => shown.reduce((all, p) => all + at(p, output), 0));
+    await whole.columns(
+      { label: "Output", quantity: "turn" },
+      { label: "Error", quantity: "error" },
+      [{ name: "held by the table", mark: "line", colour: 0 }],
+      [turns, sum],
+    );
+  }
   if (report?.json.figures["over-output"]) await turn.of(report, "over-output", "every");
   else turn.figure.hidden = true;
   if (cyclic.length) {
@@ -345,7 +376,7 @@ export async function certificate(view, asked) {
     await spectrum.columns(
       { label: "Order", quantity: "whole" },
       { label: "Amplitude", quantity: "error" },
-      cyclic.map((p, k) => ({ name: `${p.part}, ${p.ofOutput ? "output" : "generator"}`, mark: "points", colour: k })),
+      cyclic.map((p, k) => ({ name: `${p.part}, ${p.angle}`, mark: "points", colour: k })),
       [orders, ...cyclic.map((p) => p.orders)],
     );
   } else spectrum.figure.hidden = true;

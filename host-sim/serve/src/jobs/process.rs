@@ -215,8 +215,9 @@ pub fn end_orphan(pid: Option<u32>, arguments: &[String]) {
     {
         use rustix::process::{Pid, Signal, kill_process_group};
         let line = fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
-        let mut words = line.split(|byte| *byte == 0).skip(1);
-        let same = !line.is_empty() && arguments.iter().all(|argument| words.next() == Some(argument.as_bytes()));
+        let words: Vec<&[u8]> = line.strip_suffix(&[0]).unwrap_or(&line).split(|byte| *byte == 0).collect();
+        let wanted: Vec<&[u8]> = arguments.iter().map(|argument| argument.as_bytes()).collect();
+        let same = words.len() > wanted.len() && words.ends_with(&wanted);
         if let Some(group) = i32::try_from(pid).ok().and_then(Pid::from_raw).filter(|_| same) {
             let _ = kill_process_group(group, Signal::TERM);
         }
