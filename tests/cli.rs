@@ -226,7 +226,7 @@ fn a_run_that_does_not_converge_ends_with_1_and_touches_no_file() {
     let run = desk.line(&format!("{base} --max-iterations 2"));
     assert_eq!(run.code, 1, "{}", run.stderr);
     assert_eq!(run.stdout, "");
-    assert!(run.stderr.starts_with("error: no equilibrium found at generator angle 0.000000 rad"), "{}", run.stderr);
+    assert!(run.stderr.starts_with("error: not solved at generator angle 0.000000 rad"), "{}", run.stderr);
     assert!(!run.stderr.contains("residual"), "{}", run.stderr);
     let told = desk.line(&format!("{base} --max-iterations 2 -v"));
     assert!(told.stderr.contains("relative residual by iteration: "), "{}", told.stderr);
