@@ -254,11 +254,8 @@ impl Diagnosis {
             let _ = writeln!(text, "  without a cause: {}, {:.1} arcsec rms", left.looks_like, left.size_arcsec);
         }
         let (r, h) = (&self.residual, &self.held_out);
-        let _ = writeln!(
-            text,
-            "the model behind it is adapted to the zero, stiffness and backlash of these data, which a table on board \
-             is not, and so leaves another error:"
-        );
+        let _ =
+            writeln!(text, "the model behind it is adapted to these data, which a table on board is not; it leaves");
         let _ = writeln!(
             text,
             "  in data left out: {:.2} -> {:.2} arcsec rms, without the causes and with them",
