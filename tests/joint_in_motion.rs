@@ -148,8 +148,8 @@ fn the_bound_of_the_torque_by_the_motors_current_holds() {
     }
 }
 
-/// A servo that a little more delay makes ring is told as such, with its numbers, on the terminal and on the page, where
-/// the loop is drawn with its margins; one that is sound is not.
+/// A servo that a little more delay makes ring is told as such, with its numbers, on the terminal and on the page,
+/// where the loop is drawn with its margins; one that is sound is not.
 #[test]
 fn a_servo_near_the_edge_of_instability_is_cautioned() {
     let folder = tempfile::tempdir().unwrap();

@@ -15,7 +15,7 @@ use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, P
 const PATIENCE: Duration = Duration::from_secs(1);
 /// How often the time on a bar moves on.
 const TICK: Duration = Duration::from_millis(250);
-/// How often a line goes where no bar can be drawn.
+/// How often a line goes where no bar can be drawn. A guess: as long as one waits before one looks.
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
 /// Bars that are drawn.

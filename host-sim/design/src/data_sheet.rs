@@ -140,8 +140,8 @@ pub struct DataSheet {
     pub teeth_in_contact_percent: Option<f64>,
     /// Largest load at which equilibrium was found, N·m.
     pub last_stable_n_m: Option<f64>,
-    /// Share of the largest load that bears on tips outside the main zones, percent, at the worst position: 0 of a sound
-    /// drive.
+    /// Share of the largest load that bears on tips outside the main zones, percent, at the worst position: 0 of a
+    /// sound drive.
     pub tips_bear_percent: Option<f64>,
     /// What bears there; missing where nothing does, and where figures were estimated.
     #[serde(skip)]

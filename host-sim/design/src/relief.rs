@@ -3,8 +3,9 @@
 //! Teeth drawn to clear one another when rigid may clash when the drive is loaded. The rim turns in its cup, the lobes
 //! give way on their balls, and beside the teeth in mesh, where tips of both wheels just pass one another 40° to 60°
 //! from the major axis, these displacements add up: the clearance there, a few micrometres, is gone before the load is
-//! all there. Tips that are lower reach past one another later, nearer to the major axis, where the spaces are wide. How
-//! much lower follows from the contact FEM of the drive itself: by what the tips that bear reach past one another.
+//! all there. Tips that are lower reach past one another later, nearer to the major axis, where the spaces are wide.
+//! How much lower follows from the contact FEM of the drive itself: by what the tips that bear reach past one another,
+//! and by how the load on them falls from run to run.
 
 use flexspline_mechanics::drive::{Drive, GeneratorKind, Profile};
 use flexspline_mechanics::mesh::MeshLevel;
@@ -13,9 +14,9 @@ use flexspline_mechanics::stepping::{Method, Problem, SolveError, SolverSettings
 
 use crate::simulate::{TipContact, zones};
 
-/// Places over a tooth pitch at which tips are looked at: one tooth after another comes by.
+/// Places over a tooth pitch at which tips are looked at, where one tooth after another comes by. A guess.
 const PLACES: usize = 4;
-/// Times that tips are lowered.
+/// Times that tips are lowered at most: the sizes of a catalogue take 2 to 4. A guess.
 const MOST_STEPS: usize = 6;
 /// What is taken off beyond what tips reach past one another, modules. A guess: a tenth of a tip rounding.
 const MORE_MODULES: f64 = 0.006;
@@ -112,8 +113,8 @@ mod tests {
         assert_eq!((relief.lowered_mm, relief.left, runs), (0.0, None, 1));
     }
 
-    /// Tips that are a fifth of a module too high clash under a load; those that may not be lowered are told, others are
-    /// lowered by less than what was added to them.
+    /// Tips that are a tenth of a module too high clash under a load; those that may not be lowered are told, others
+    /// are lowered until they pass.
     #[test]
     fn tips_that_clash_are_lowered_or_told() {
         let drive = Drive::cup_95().with_set("generator.bearing_stiffness_n_per_mm3=150").unwrap();

@@ -226,10 +226,10 @@ pub struct Beside {
     pub reason: Option<String>,
 }
 
-/// Shares of the compliance that a catalogue has, percent, of cup, balls and what is in no model, of K1 and of K2 and K3:
-/// means of CSF sizes 17, 25 and 40 (docs/explanation/third_dimension.md, "Beside a catalogue").
+/// Shares of the compliance that a catalogue has, percent, of cup, balls and what is in no model, of K1 and of K2 and
+/// K3: means of CSF sizes 17, 25 and 40, measured (docs/explanation/third_dimension.md, "Beside a catalogue").
 const SHARES_OF_K1: [u32; 3] = [9, 21, 57];
-/// See [`SHARES_OF_K1`].
+/// Measured, see [`SHARES_OF_K1`].
 const SHARES_OF_K2_AND_K3: [u32; 3] = [21, 24, 36];
 
 /// Why a drive is stiffer than its data sheet has it, by what is left out of it.

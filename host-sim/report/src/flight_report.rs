@@ -192,11 +192,11 @@ fn details(flown: &Flown, flight: &Flight, results: &Results) -> Section {
     }
 }
 
-/// Sizes of the open loop that the pictures show: what is far from 1 says nothing about margins.
+/// Sizes of the open loop that the pictures show. A guess: what is far from 1 says nothing about margins.
 const SIZES: [f64; 2] = [1e-2, 1e2];
-/// Size of the open loop up to which it is in the picture of the complex plane.
+/// Size of the open loop up to which it is in the picture of the complex plane. A guess.
 const NEAR: f64 = 2.5;
-/// Points of a circle.
+/// Points of a circle. A guess: they nearly touch.
 const CIRCLE: u32 = 120;
 
 /// The servo's open loop, with the margins in it.

@@ -13,17 +13,17 @@ use flexspline_mechanics::contact::{BearingPlace, Configuration, FlankLaw};
 use flexspline_mechanics::drive::Side;
 use flexspline_mechanics::stepping::{Problem, State};
 
-/// Pairs that are nearer than this are looked at, mm: a pair that bears has no gap.
+/// Pairs that are nearer than this are looked at, mm. A guess: a pair that bears has no gap.
 const NEAR_MM: f64 = 1e-3;
-/// Places of teeth by which neighbours in a zone may be apart: a tooth between two that bear may just be open.
+/// Places of teeth by which neighbours in a zone may be apart. A guess: one tooth between two that bear may be open.
 const NEXT: usize = 2;
 
 /// Share of the load on tips outside the main zones up to which nothing is said. A guess: what a thousandth of the load
 /// does to an output that is wound up by minutes is some hundredths of an arc-second.
 pub const MOST_TIP_SHARE: f64 = 1e-3;
 
-/// What is taken off tips that clash at a time, modules. The sizes of a catalogue need 0.1 to 0.4 in all, more the larger
-/// their ratio: what gives way is in proportion to the size, not to the module ([`crate::relief`]).
+/// What is taken off tips that clash at a time, modules. A guess: the sizes of a catalogue need 0.1 to 0.4 in all, more
+/// the larger their ratio, as what gives way is in proportion to the size and not to the module ([`crate::relief`]).
 const RELIEF_MODULES: f64 = 0.1;
 
 /// A run of neighbouring teeth that bear on the same flank beside one lobe.
@@ -65,8 +65,8 @@ pub struct TipContact {
     pub largest_n: [f64; 2],
     /// The largest pressure there and in the main zones, MPa.
     pub peak_mpa: [f64; 2],
-    /// How far the teeth there reach past the tips of the circular spline, mm: tips that are lower by this do not bear at
-    /// that place, but teeth nearer to the axis may.
+    /// How far the teeth there reach past the tips of the circular spline, mm: tips that are lower by this do not bear
+    /// at that place, but teeth nearer to the axis may.
     pub reach_mm: f64,
     /// A step by which to lower them, mm.
     pub relief_step_mm: f64,
@@ -155,8 +155,8 @@ impl TipContact {
     pub fn in_words(&self) -> String {
         let ([tip_n, mesh_n], [tip_mpa, mesh_mpa]) = (self.largest_n, self.peak_mpa);
         format!(
-            "tips bear on one another {:.0} deg from the major axis, outside the teeth in mesh: {:.1} % of the load, up \
-             to {tip_n:.0} N on a pair ({mesh_n:.0} N in mesh) at {tip_mpa:.0} MPa ({mesh_mpa:.0} MPa in mesh); \
+            "tips bear on one another {:.0} deg from the major axis, outside the teeth in mesh: {:.1} % of the load, \
+             up to {tip_n:.0} N on a pair ({mesh_n:.0} N in mesh) at {tip_mpa:.0} MPa ({mesh_mpa:.0} MPa in mesh); \
              kinematic error, stiffness and pressure are those of this contact: lower flexspline.tip_radius_mm, \
              {:.3} mm at a time, until none bears",
             self.at_deg.abs(),

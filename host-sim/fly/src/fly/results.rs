@@ -8,11 +8,11 @@ use flexspline_algebra::spectrum as sums_of;
 
 /// Output less target within this of where it ends counts as settled, arcsec.
 const SETTLED_ARCSEC: f64 = 2.0;
-/// Least phase margin, degrees, and least distance of the open loop from −1 of a servo that is sound: the lower ends of
-/// what K. J. Åström and R. M. Murray call reasonable (Feedback Systems, 2nd ed. 2021, section 10.3: 30° to 60°, 0.5 to
-/// 0.8).
+/// Least phase margin, degrees, and least distance of the open loop from −1 of a servo that is sound: the lower ends
+/// of what K. J. Åström and R. M. Murray call reasonable (Feedback Systems, 2nd ed. 2021, section 10.3: 30° to 60°,
+/// 0.5 to 0.8).
 pub const LEAST_PHASE_MARGIN_DEG: f64 = 30.0;
-/// See [`LEAST_PHASE_MARGIN_DEG`].
+/// Source: see [`LEAST_PHASE_MARGIN_DEG`].
 pub const LEAST_DISTANCE: f64 = 0.5;
 /// Ticks of one spectrum.
 const WINDOW: usize = 4096;

@@ -59,8 +59,8 @@ const DEFORMING_SOFTNESS: [&[f64]; 3] = [&[1e-3, 1.0], &[1e-3, 3e-2, 1.0], &[1e-
 /// Iterations of one increment, all its parts and ways together, over those that Newton has before an increment is
 /// halved: so much work at most, whatever it leads to. A guess, far above what increments that converge take.
 const MOST_WORK: usize = 100;
-/// Share of the output's largest stiffness from which on downward a load that finds no equilibrium is taken for one that
-/// the drive does not bear: it softens as teeth begin to climb over one another. A guess: half.
+/// Share of the output's largest stiffness below which a load that finds no equilibrium is taken for one that the drive
+/// does not bear: it softens as teeth begin to climb over one another. A guess: half.
 const GIVES_WAY: f64 = 0.5;
 /// Iterations after which the next part of an increment may be twice as large.
 const EASY: usize = 10;
