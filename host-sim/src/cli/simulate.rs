@@ -182,6 +182,10 @@ impl Simulate {
             beside(&drive, settings.generator, temperature_c, &stated, settings.solver)
         });
 
+        // Data sheet and stress took their time, too.
+        let spent = context.spent();
+        (simulation.summary.wall_s, simulation.summary.processor_s) = (spent.wall_s, spent.processor_s);
+
         let (has_frames, has_page) = (frames.is_some(), seen.is_some());
         let mut outputs = Outputs::new();
         outputs.csv(&out.join("results.csv"), &simulation.rows)?;

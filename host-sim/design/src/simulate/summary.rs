@@ -166,7 +166,7 @@ pub struct Summary {
     /// Newton iterations of all increments.
     pub iterations: usize,
     /// Time on the clock from the beginning of the path to its end, s; as the command writes it, of the whole command
-    /// until its files are written.
+    /// until its results are there.
     pub wall_s: f64,
     /// Time that all threads of the process took of the processor in it, s; `null` where the system does not say.
     pub processor_s: Option<f64>,
@@ -262,7 +262,7 @@ impl Summary {
         let room = "what rigid teeth leave the output to turn; below 0 rim and bearing have to give way";
         put("room of rigid teeth as built", self.room_as_built_arcsec, ("arcsec", 1), "least of a turn", room);
         let processor = self.processor_s.map_or_else(String::new, |s| format!("on the clock; {s:.2} s of processor"));
-        let until = "of the whole command, until its files are written";
+        let until = "of the whole command, until its results are there";
         put("time", Some(self.wall_s), ("s", 2), &processor, until);
         all
     }
