@@ -70,6 +70,7 @@ fn a_run_writes_the_columns_and_fields_that_others_rely_on() {
         assert!(summary.get(field).is_some(), "no {field}");
     }
     assert_eq!(summary["schema_version"], 1);
+    assert!(summary["wall_s"].as_f64().unwrap() > 0.0 && summary["processor_s"].as_f64().unwrap() > 0.0);
     assert_eq!(summary["generator"], "cam");
     assert_eq!(summary["solver"], "fast", "the solver that ran");
     assert_eq!(summary["torque_n_m"], Value::Null, "the load changes along this path");
