@@ -157,7 +157,7 @@ fn a_servo_near_the_edge_of_instability_is_cautioned() {
     let fly = |position_hz: f64| {
         let file = folder.path().join("servo.toml");
         let legs = "legs = [[2.0, 0.0], [1.5, 0.02]]";
-        std::fs::write(&file, format!("base = \"camera\"\n{legs}\n[servo]\nposition_hz = {position_hz:?}\n")).unwrap();
+        std::fs::write(&file, format!("base = \"antenna\"\n{legs}\n[servo]\nposition_hz = {position_hz:?}\n")).unwrap();
         let args = ["fly", file.to_str().unwrap(), "--out", out.to_str().unwrap()];
         let done = Command::new(flexspline()).args(args).output().unwrap();
         assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
@@ -171,7 +171,7 @@ fn a_servo_near_the_edge_of_instability_is_cautioned() {
     assert!(!said.contains("caution") && page.contains("\"status\":\"good\""), "{said}");
     let (said, results, page) = fly(40.0);
     println!("{said}");
-    assert!(results["stable"] == true && results["servo_distance"].as_f64().unwrap() < 0.1, "{said}");
+    assert!(results["stable"] == true && results["servo_distance"].as_f64().unwrap() < 0.3, "{said}");
     assert!(
         said.contains("stable, but near the edge") && said.contains("caution: The servo is near the edge"),
         "{said}"
