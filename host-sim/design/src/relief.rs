@@ -20,8 +20,9 @@ const PLACES: usize = 4;
 const MOST_STEPS: usize = 6;
 /// What is taken off beyond what tips reach past one another, modules. A guess: a tenth of a tip rounding.
 const MORE_MODULES: f64 = 0.006;
-/// What is taken off in all at most, modules. A guess: of the working depth of 1.35 modules it leaves two thirds.
-const MOST_MODULES: f64 = 0.45;
+/// What is taken off in all at most, modules. A guess: of the working depth of 1.35 modules it leaves more than half. A
+/// CSG-20-160 takes 0.5, the most of 27 sizes.
+const MOST_MODULES: f64 = 0.6;
 
 /// What became of the tips of a drive.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -22,7 +22,7 @@ const NEXT: usize = 2;
 /// does to an output that is wound up by minutes is some hundredths of an arc-second.
 pub const MOST_TIP_SHARE: f64 = 1e-3;
 
-/// What is taken off tips that clash at a time, modules. A guess: the sizes of a catalogue need 0.1 to 0.4 in all, more
+/// What is taken off tips that clash at a time, modules. A guess: the sizes of a catalogue need 0.1 to 0.5 in all, more
 /// the larger their ratio, as what gives way is in proportion to the size and not to the module ([`crate::relief`]).
 const RELIEF_MODULES: f64 = 0.1;
 
