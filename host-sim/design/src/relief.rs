@@ -15,11 +15,12 @@ use flexspline_mechanics::stepping::{Method, Problem, SolveError, SolverSettings
 use crate::simulate::{TipContact, zones};
 
 /// Places over a tooth pitch at which tips are looked at, where one tooth after another comes by. A guess.
-const PLACES: usize = 4;
+const PLACES: usize = 6;
 /// Times that tips are lowered at most: the sizes of a catalogue take 2 to 4. A guess.
 const MOST_STEPS: usize = 6;
-/// What is taken off beyond what tips reach past one another, modules. A guess: a tenth of a tip rounding.
-const MORE_MODULES: f64 = 0.006;
+/// What is taken off beyond what tips reach past one another, modules. A guess: half a tip rounding, for the places
+/// between those that are looked at (a CSG-25-100 lowered by 0.006 more than needed at four places bears at a fifth).
+const MORE_MODULES: f64 = 0.03;
 /// What is taken off in all at most, modules. A guess: of the working depth of 1.35 modules it leaves more than half. A
 /// CSG-20-160 takes 0.5, the most of 27 sizes.
 const MOST_MODULES: f64 = 0.6;
