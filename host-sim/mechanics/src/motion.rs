@@ -389,8 +389,8 @@ mod tests {
         assert!((generator_rad - from - 81.0 * step).abs() < 1e-9);
     }
 
-    /// Two rollers in a soft bearing creep to where they stand: of a CSG-32-120 with cup and balls in proportion, with a
-    /// rim of 1.05 mm, where 0.8 and 1.3 mm take half of the iterations.
+    /// Two rollers in a soft bearing creep to where they stand: of a CSG-32-120 with cup and balls in proportion, with
+    /// a rim of 1.05 mm, where 0.8 and 1.3 mm take half of the iterations.
     #[test]
     fn a_drive_that_creeps_is_deformed_with_patience() {
         let few = FewNumbers {
