@@ -102,6 +102,24 @@ fn a_stopped_diagnosis_leaves_the_folder_as_it_was() {
     stopped(&desk, "diagnose out/data.csv --model nominal.toml", Duration::from_millis(1800), &["-TERM"]);
 }
 
+/// Ten minutes without a word look like a program that hangs: into a pipe goes a line every ten seconds, but none where
+/// quiet was asked for.
+#[test]
+fn long_work_into_a_pipe_says_how_far_it_is() {
+    let said = |quiet: &str| {
+        let desk = Desk::new();
+        let line = format!("simulate --generator cam --mesh fine --solver reference --path turn{quiet}");
+        let words: Vec<&str> = line.split(' ').collect();
+        let child = desk.command(&words).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        sleep(Duration::from_secs(11));
+        signal(&child, "-TERM");
+        Output::of(child.wait_with_output().unwrap()).stderr
+    };
+    let lines = said("");
+    assert!(lines.starts_with("cam") && lines.contains("10 s so far") && lines.lines().count() == 2, "{lines}");
+    assert_eq!(said(" -q"), "error: stopped; nothing was written\n");
+}
+
 #[test]
 fn a_run_that_was_started_to_outlive_its_terminal_does() {
     let desk = Desk::new();

@@ -148,6 +148,40 @@ fn the_bound_of_the_torque_by_the_motors_current_holds() {
     }
 }
 
+/// A servo that a little more delay makes ring is told as such, with its numbers, on the terminal and on the page,
+/// where the loop is drawn with its margins; one that is sound is not.
+#[test]
+fn a_servo_near_the_edge_of_instability_is_cautioned() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let fly = |position_hz: f64| {
+        let file = folder.path().join("servo.toml");
+        let legs = "legs = [[2.0, 0.0], [1.5, 0.02]]";
+        std::fs::write(&file, format!("base = \"antenna\"\n{legs}\n[servo]\nposition_hz = {position_hz:?}\n")).unwrap();
+        let args = ["fly", file.to_str().unwrap(), "--out", out.to_str().unwrap()];
+        let done = Command::new(flexspline()).args(args).output().unwrap();
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        let results: Value = serde_json::from_slice(&std::fs::read(out.join("flight.json")).unwrap()).unwrap();
+        let page = std::fs::read_to_string(out.join("report.html")).unwrap();
+        (String::from_utf8_lossy(&done.stdout).to_string(), results, page)
+    };
+    let (said, results, page) = fly(6.0);
+    println!("{said}");
+    assert!(results["servo_distance"].as_f64().unwrap() >= 0.5 && results["remarks"] == serde_json::json!([]));
+    assert!(!said.contains("caution") && page.contains("\"status\":\"good\""), "{said}");
+    let (said, results, page) = fly(40.0);
+    println!("{said}");
+    assert!(results["stable"] == true && results["servo_distance"].as_f64().unwrap() < 0.3, "{said}");
+    assert!(
+        said.contains("stable, but near the edge") && said.contains("caution: The servo is near the edge"),
+        "{said}"
+    );
+    assert!(page.contains("\"status\":\"caution\""));
+    for figure in ["bode-gain", "bode-phase", "nyquist"] {
+        assert!(page.contains(&format!("id=\"{figure}\"")), "no {figure}");
+    }
+}
+
 #[test]
 fn the_command_prints_what_was_promised_and_names_a_scenario_that_is_not_there() {
     let folder = tempfile::tempdir().unwrap();

@@ -48,6 +48,12 @@ use Bound::{Most, Shrinks};
 
 /// Loops that their form does not bound: file below `host-sim/`, function, how many there, bound.
 const BOUNDED: &[(&str, &str, usize, Bound)] = &[
+    (
+        "base/src/progress.rs",
+        "new",
+        1,
+        Shrinks("lines of work that goes on, one in ten seconds; it ends with the work, which drops the other end"),
+    ),
     ("fmu/src/instance.rs", "ticked", 1, Shrinks("ticks that are due, at most MOST_TICKS by the check above")),
     ("fmu/src/resources.rs", "decoded", 1, Shrinks("the rest of the text")),
     ("mechanics/src/condense/dense.rs", "eliminate", 2, Shrinks("columns that are left, four or one at a time")),

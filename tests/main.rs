@@ -40,6 +40,7 @@ mod ring_under_each_generator;
 mod synthesize_and_extend;
 mod tables_against_fresh_fem;
 mod temperature;
+mod tips_under_load;
 mod to_csv;
 mod verdict_says_why;
 mod wind_up_ranking;

@@ -6,6 +6,7 @@ pub mod csv_rows;
 pub mod output;
 pub mod progress;
 pub mod robust;
+pub mod spent;
 pub mod statistics;
 pub mod suggest;
 pub mod toml_file;

@@ -1,11 +1,12 @@
 //! Progress on stderr: how far, how hard the solver works, how long it will take.
 //!
-//! A bar is drawn only on a terminal, and only for work that takes more than a second. A program that starts this one
-//! and wants to show how far it is sets [`LINES`], and [`read`]s lines.
+//! A bar is drawn on a terminal, for work that takes more than a second. Into a file or a pipe goes a line every ten
+//! seconds: work that says nothing for minutes looks like work that has died. A program that starts this one and wants
+//! to show how far it is sets [`LINES`], and [`read`]s lines.
 
 use std::io::{IsTerminal, Write, stderr};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, PoisonError, mpsc};
+use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -15,13 +16,15 @@ use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, P
 const PATIENCE: Duration = Duration::from_secs(1);
 /// How often the time on a bar moves on.
 const TICK: Duration = Duration::from_millis(250);
+/// How often a line goes where no bar can be drawn. A guess: as long as one waits before one looks.
+const LINE_EVERY: Duration = Duration::from_secs(10);
 
 /// With this variable of the environment set there is no bar, but lines for another program, [`read`] by it.
 pub const LINES: &str = "FLEXSPLINE_PROGRESS_LINES";
 /// How a line for another program begins.
 const BEGINS: &str = "progress: ";
 /// How often there is such a line, at most.
-const LINE_EVERY: Duration = Duration::from_millis(50);
+const PROGRAM_LINE_EVERY: Duration = Duration::from_millis(50);
 
 /// Bars that are drawn.
 static DRAWN: Mutex<Vec<WeakProgressBar>> = Mutex::new(Vec::new());
@@ -37,12 +40,22 @@ pub fn silence() {
     }
 }
 
-/// A progress bar that may never show.
+/// How far work has come.
+#[derive(Default)]
+struct Stand {
+    done: usize,
+    total: usize,
+    note: String,
+}
+
+/// Progress that may never show.
 pub struct Progress {
     bar: Option<ProgressBar>,
     /// Title of lines for another program, and when the last one was written.
     lines: Option<(String, Option<Instant>)>,
-    /// Ends the wait for the bar to show.
+    /// What the lines tell, where no bar can be drawn.
+    stand: Option<Arc<Mutex<Stand>>>,
+    /// Ends the wait for the bar to show, or for the next line.
     _over: Option<mpsc::Sender<()>>,
 }
 
@@ -50,21 +63,36 @@ impl Progress {
     /// Progress of work called `title`; `quiet` keeps it hidden.
     pub fn new(title: impl Into<String>, quiet: bool) -> Progress {
         let title = title.into();
-        if !quiet && std::env::var_os(LINES).is_some() {
-            return Progress { bar: None, lines: Some((title, None)), _over: None };
+        if quiet {
+            return Progress { bar: None, lines: None, stand: None, _over: None };
         }
-        if quiet || !stderr().is_terminal() {
-            return Progress { bar: None, lines: None, _over: None };
+        if std::env::var_os(LINES).is_some() {
+            return Progress { bar: None, lines: Some((title, None)), stand: None, _over: None };
+        }
+        let (over, wait) = mpsc::channel();
+        if !stderr().is_terminal() {
+            let stand = Arc::new(Mutex::new(Stand::default()));
+            let (told, begun) = (stand.clone(), Instant::now());
+            thread::spawn(move || {
+                while wait.recv_timeout(LINE_EVERY) == Err(mpsc::RecvTimeoutError::Timeout) {
+                    if SILENT.load(Ordering::Relaxed) {
+                        break;
+                    }
+                    let line = told.lock().unwrap_or_else(PoisonError::into_inner).line(&title, begun.elapsed());
+                    // A reader that has gone is no reason to fail.
+                    let _ = writeln!(stderr(), "{line}");
+                }
+            });
+            return Progress { bar: None, lines: None, stand: Some(stand), _over: Some(over) };
         }
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden()).with_prefix(title);
-        let (over, wait) = mpsc::channel();
         let waiting = bar.clone();
         thread::spawn(move || {
             if wait.recv_timeout(PATIENCE) == Err(mpsc::RecvTimeoutError::Timeout) {
                 show(&waiting);
             }
         });
-        Progress { bar: Some(bar), lines: None, _over: Some(over) }
+        Progress { bar: Some(bar), lines: None, stand: None, _over: Some(over) }
     }
 
     /// `done` of `total` parts are done; `note` says what just happened.
@@ -75,11 +103,16 @@ impl Progress {
             bar.set_message(note.to_owned());
         }
         if let Some((title, last)) = &mut self.lines
-            && (done == total || last.is_none_or(|last| last.elapsed() >= LINE_EVERY))
+            && (done == total || last.is_none_or(|last| last.elapsed() >= PROGRAM_LINE_EVERY))
         {
             *last = Some(Instant::now());
             // A reader that has gone is no reason to fail.
             drop(writeln!(stderr(), "{}", written(title, done, total, note)));
+        }
+        if let Some(stand) = &self.stand {
+            let mut stand = stand.lock().unwrap_or_else(PoisonError::into_inner);
+            (stand.done, stand.total) = (done, total);
+            note.clone_into(&mut stand.note);
         }
     }
 
@@ -103,6 +136,22 @@ pub fn read(line: &str) -> Option<(u64, u64, &str)> {
     let (count, note) = line.strip_prefix(BEGINS)?.split_once(' ')?;
     let (done, of) = count.split_once('/')?;
     Some((done.parse().ok()?, of.parse().ok()?, note))
+}
+
+impl Stand {
+    /// As a line: how far, what just happened, how long so far and, where it can be told, how long from here.
+    fn line(&self, title: &str, elapsed: Duration) -> String {
+        let Stand { done, total, note } = self;
+        let far = if *total > 0 { format!(" {done}/{total}") } else { String::new() };
+        let note = if note.is_empty() { String::new() } else { format!(", {note}") };
+        let left = if *done > 0 && *total as u64 >= TELLING {
+            let each_s = elapsed.as_secs_f64() / *done as f64;
+            format!(", about {:.0} s left", each_s * (total.saturating_sub(*done)) as f64)
+        } else {
+            String::new()
+        };
+        format!("{title}{far}{note}: {:.0} s so far{left}", elapsed.as_secs_f64())
+    }
 }
 
 /// Draws a bar from now on.
@@ -151,5 +200,15 @@ mod tests {
         for other in ["", "error: no", "progress: 3 of 4", "progress: a/b c", "progress: 1/2"] {
             assert_eq!(read(other), None, "{other}");
         }
+    }
+
+    #[test]
+    fn a_line_says_how_far_how_long_and_what_is_left() {
+        let line = |done, total, note: &str, s| {
+            Stand { done, total, note: note.to_owned() }.line("cam", Duration::from_secs(s))
+        };
+        assert_eq!(line(0, 0, "", 10), "cam: 10 s so far");
+        assert_eq!(line(1, 4, "loading", 20), "cam 1/4, loading: 20 s so far");
+        assert_eq!(line(10, 40, "turning", 20), "cam 10/40, turning: 20 s so far, about 60 s left");
     }
 }

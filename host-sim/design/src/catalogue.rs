@@ -29,12 +29,13 @@ pub fn sheet(series: &str, size: f64, ratio: u32) -> Option<Stated> {
         _ => return None,
     };
     let line = rows().into_iter().find(|row| row.size == size && row.ratio == ratio)?;
+    let source = format!("Harmonic Drive {}-{size}-{ratio}", series.to_ascii_uppercase());
     let [rated_n_m, ratcheting_n_m] = match which {
         Series::Csf => [None, line.ratcheting_csf_n_m],
         Series::Csg => [line.rated_csg_n_m, line.ratcheting_csg_n_m],
     };
     Some(Stated {
-        source: Some(format!("Harmonic Drive {}-{size}-{ratio}", series.to_ascii_uppercase())),
+        source: Some(source),
         rated_torque_n_m: rated_n_m,
         t1_n_m: line.t1_n_m,
         t2_n_m: line.t2_n_m,
@@ -46,6 +47,22 @@ pub fn sheet(series: &str, size: f64, ratio: u32) -> Option<Stated> {
         unit_scatter_percent: Some(UNIT_SCATTER_PERCENT),
         ..Stated::default()
     })
+}
+
+/// What the catalogue prints of a size and ratio or, where that ratio is not at hand, of the nearest of the same size,
+/// whose source then says so. With it the ratio that the figures are of. A drive's load and stiffness hang on its size
+/// far more than on its ratio: from 80 to 160 the stiffness is printed as the same.
+pub fn nearest_sheet(series: &str, size: f64, ratio: u32) -> Option<(Stated, u32)> {
+    let off = |other: u32| (f64::from(other) / f64::from(ratio)).ln().abs();
+    let of_size = rows().into_iter().filter(|row| row.size == size).map(|row| row.ratio);
+    let nearest = of_size.min_by(|a, b| off(*a).total_cmp(&off(*b)))?;
+    let mut stated = sheet(series, size, nearest)?;
+    if nearest != ratio
+        && let Some(source) = &mut stated.source
+    {
+        *source += &format!(" (the nearest ratio at hand to {ratio})");
+    }
+    Some((stated, nearest))
 }
 
 /// The sizes and ratios that are at hand, in words.
@@ -99,6 +116,18 @@ mod tests {
         for (series, size, ratio) in [("SHG", 32.0, 80), ("CSG", 33.0, 80), ("CSG", 32.0, 81)] {
             assert_eq!(sheet(series, size, ratio), None);
         }
+    }
+
+    /// Of a ratio that is not at hand the nearest stands in, and says so.
+    #[test]
+    fn the_nearest_ratio_of_a_size_stands_in_and_is_marked() {
+        let (stated, ratio) = nearest_sheet("CSG", 32.0, 120).unwrap();
+        assert_eq!((ratio, stated.rated_torque_n_m), (100, Some(178.0)));
+        let source = "Harmonic Drive CSG-32-100 (the nearest ratio at hand to 120)";
+        assert_eq!(stated.source.as_deref(), Some(source));
+        let (stated, ratio) = nearest_sheet("CSG", 32.0, 80).unwrap();
+        assert_eq!((Some(stated), ratio), (sheet("CSG", 32.0, 80), 80));
+        assert_eq!(nearest_sheet("CSG", 33.0, 80), None);
     }
 
     /// Every line gives all of a sheet, its loads in their order and its stiffness growing.

@@ -6,7 +6,8 @@
 
 use serde::Serialize;
 
-use crate::simulate::PlaceStress;
+use crate::simulate::zones::MOST_TIP_SHARE;
+use crate::simulate::{PlaceStress, TipContact};
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::drive::{Drive, GeneratorKind, RigidMesh};
 
@@ -54,6 +55,8 @@ pub struct Looked {
     pub root_fillet_mpa: Option<f64>,
     /// Largest pressure between flanks, MPa, as Hertz has it and the limit means it.
     pub peak_flank_pressure_mpa: Option<f64>,
+    /// What bears on tips outside the main zones.
+    pub tip_contact: Option<TipContact>,
     /// Bound of the slope of the error over the generator's motion.
     pub slope_bound: Option<f64>,
 }
@@ -100,6 +103,11 @@ impl Looked {
                  {MOST_SLOPE} on it is in doubt"
             )
         });
+        // What makes the others what they are comes first.
+        if let Some(tips) = self.tip_contact.filter(TipContact::counts) {
+            let (value, words) = (tips.share, tips.in_words());
+            cautions.insert(0, Caution { figure: "tip_contact", value, limit: MOST_TIP_SHARE, words });
+        }
         cautions
     }
 
@@ -167,6 +175,7 @@ mod tests {
             max_von_mises_mpa: Some(YIELD_MPA),
             root_fillet_mpa: Some(YIELD_MPA),
             peak_flank_pressure_mpa: Some(MOST_FLANK_PRESSURE_MPA),
+            tip_contact: None,
             slope_bound: Some(MOST_SLOPE),
         };
         assert_eq!(sound.cautions(), []);

@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use crate::cautions::{Looked, rigid_gap_um, room_as_built_arcsec};
 use crate::pitch_wave::peak_to_peak;
-use crate::simulate::peak_stress;
+use crate::simulate::{TipContact, peak_stress, zones};
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::motion::Motion;
@@ -140,6 +140,12 @@ pub struct DataSheet {
     pub teeth_in_contact_percent: Option<f64>,
     /// Largest load at which equilibrium was found, N·m.
     pub last_stable_n_m: Option<f64>,
+    /// Share of the largest load that bears on tips outside the main zones, percent, at the worst position: 0 of a
+    /// sound drive.
+    pub tips_bear_percent: Option<f64>,
+    /// What bears there; missing where nothing does, and where figures were estimated.
+    #[serde(skip)]
+    pub tip_contact: Option<TipContact>,
 }
 
 impl DataSheet {
@@ -165,6 +171,7 @@ impl DataSheet {
             load_across_face_peak_over_mean,
             teeth_in_contact_percent,
             last_stable_n_m,
+            tips_bear_percent,
         ] = figures;
         DataSheet {
             rigid_gap_um,
@@ -186,6 +193,8 @@ impl DataSheet {
             load_across_face_peak_over_mean,
             teeth_in_contact_percent,
             last_stable_n_m,
+            tips_bear_percent,
+            tip_contact: None,
         }
     }
 
@@ -197,6 +206,7 @@ impl DataSheet {
             max_von_mises_mpa: self.max_von_mises_mpa,
             root_fillet_mpa: self.root_fillet_mpa,
             peak_flank_pressure_mpa: self.peak_flank_pressure_mpa,
+            tip_contact: self.tip_contact,
             slope_bound: None,
         }
     }
@@ -206,7 +216,7 @@ impl DataSheet {
 pub type FigureOf = (&'static str, fn(&DataSheet) -> Option<f64>);
 
 /// The figures that can be asked for by name, as the fields are called.
-pub const FIGURES: [FigureOf; 19] = [
+pub const FIGURES: [FigureOf; 20] = [
     ("rigid_gap_um", |s| s.rigid_gap_um),
     ("room_as_built_arcsec", |s| s.room_as_built_arcsec),
     ("backlash_arcsec", |s| s.backlash_arcsec),
@@ -226,6 +236,7 @@ pub const FIGURES: [FigureOf; 19] = [
     ("load_across_face_peak_over_mean", |s| s.load_across_face_peak_over_mean),
     ("teeth_in_contact_percent", |s| s.teeth_in_contact_percent),
     ("last_stable_n_m", |s| s.last_stable_n_m),
+    ("tips_bear_percent", |s| s.tips_bear_percent),
 ];
 
 /// The sheet of a drive with one generator at a temperature. `positions` over the tooth pitch, 4 or more.
@@ -254,7 +265,7 @@ pub fn data_sheet(
 
 fn fill(sheet: &mut DataSheet, problem: &Problem, loads: Loads, positions: usize) -> Result<(), SolveError> {
     let drive = &problem.drive;
-    let mut motion = Motion::deformed(problem, 0.0)?;
+    let mut motion = Motion::deformed_or_turned_in(problem, 0.0)?;
     sheet.last_stable_n_m = Some(0.0);
     let unloaded = motion.state().clone();
     let touch = touch_n_m(drive, loads);
@@ -297,7 +308,16 @@ fn fill(sheet: &mut DataSheet, problem: &Problem, loads: Loads, positions: usize
     sheet.wind_up_arcsec = Some((from.1 - touched) * ARCSEC_PER_RAD);
 
     motion.settle(motion.pitch() / positions as f64)?;
-    let places = motion.turn_in(motion.pitch(), positions)?;
+    let mut tips = Vec::new();
+    let start = motion.state().generator_rad;
+    let mut places = Vec::with_capacity(positions);
+    for k in 1..=positions {
+        motion.turn_to(start + motion.pitch() * k as f64 / positions as f64)?;
+        places.push(motion.place());
+        tips.extend(TipContact::of(&zones(problem, motion.state()), drive.flexspline.module_mm));
+    }
+    sheet.tips_bear_percent = Some(100.0 * tips.iter().map(|tips| tips.share).fold(0.0, f64::max));
+    sheet.tip_contact = TipContact::worst(tips.into_iter());
     let errors: Vec<f64> = places.iter().map(|place| place.error_arcsec).collect();
     let most = |of: fn(&flexspline_mechanics::stepping::Increment) -> f64| {
         places.iter().map(|place| of(&place.increment)).fold(0.0, f64::max)

@@ -389,6 +389,36 @@ mod tests {
         assert!((generator_rad - from - 81.0 * step).abs() < 1e-9);
     }
 
+    /// Two rollers in a soft bearing creep to where they stand: of a CSG-32-120 with cup and balls in proportion, with
+    /// a rim of 1.05 mm, where 0.8 and 1.3 mm take half of the iterations.
+    #[test]
+    fn a_drive_that_creeps_is_deformed_with_patience() {
+        let few = FewNumbers {
+            teeth: 240,
+            module_mm: 2.54 * 32.0 / 240.0,
+            bore_mm: None,
+            width_mm: None,
+            generator: GeneratorKind::Cam,
+        };
+        let sets = [
+            "sleeve.kind=cup",
+            "sleeve.bottom=plate",
+            "sleeve.wall_mm=0.894",
+            "sleeve.bottom_side_mm=23.3",
+            "sleeve.bottom_thickness_mm=1.788",
+            "sleeve.hub_radius_mm=20.3",
+            "generator.bearing_stiffness_n_per_mm3=181",
+            "flexspline.rim_thickness_mm=1.05",
+        ];
+        let drive = few.drive("creeps").unwrap().drive.with_sets(sets).unwrap();
+        let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
+        let problem = Problem::new(&drive, GeneratorKind::TwoRoller, drive.temperature.reference_c, settings).unwrap();
+        let motion = Motion::deformed(&problem, 0.0).unwrap();
+        println!("{} iterations", motion.last().iterations);
+        assert!(motion.last().iterations > settings.max_iterations);
+        assert!(motion.error_arcsec().abs() < 1.0, "{}", motion.error_arcsec());
+    }
+
     /// Two rollers in a hat leave the teeth of this drive no play: they bear before there is a load. Softened they
     /// would wedge.
     #[test]

@@ -218,6 +218,8 @@ pub struct Flight {
     pub phase_margin_deg: [f64; 2],
     /// See there.
     pub servo_distance: f64,
+    /// Motor, load and what is between, as the servo's loop is judged by.
+    pub joint: TwoMasses,
     /// Stiffness under the mean load, N·m/rad, and resonances with the motor held and free, Hz.
     pub stiffness: f64,
     /// See there.
@@ -309,6 +311,7 @@ pub fn fly_told(scenario: &Scenario, unit: &Unit, told: &(dyn Fn() + Sync)) -> R
         bandwidth_hz: made.bandwidth_hz,
         phase_margin_deg: made.masses.phase_margin_deg(&scenario.servo),
         servo_distance: if margin.stable { margin.distance } else { 0.0 },
+        joint: made.masses,
         stiffness: made.masses.stiffness,
         resonances_hz: [made.masses.locked_hz(), made.masses.free_hz()],
     })

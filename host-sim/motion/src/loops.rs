@@ -96,6 +96,30 @@ pub struct Margin {
     pub at_hz: f64,
 }
 
+/// An open loop at a frequency.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OpenLoop {
+    /// Frequency, Hz.
+    pub hz: f64,
+    /// Real part.
+    pub real: f64,
+    /// Imaginary part.
+    pub imaginary: f64,
+}
+
+impl OpenLoop {
+    /// Its size: 1 at a crossover.
+    pub fn size(&self) -> f64 {
+        libm::hypot(self.real, self.imaginary)
+    }
+
+    /// Its phase, degrees, from −360 to 0: −180 with a size of 1 is the point that it must not go round.
+    pub fn phase_deg(&self) -> f64 {
+        let degrees = libm::atan2(self.imaginary, self.real) * 360.0 / TAU;
+        if degrees > 0.0 { degrees - 360.0 } else { degrees }
+    }
+}
+
 /// Frequencies looked at: from, and how many in a factor of ten.
 const FROM_HZ: f64 = 0.01;
 const IN_TEN: f64 = 1000.0;
@@ -134,6 +158,15 @@ impl TwoMasses {
         // L is infinite at zero: looked at from where it is large. Two integrals and more bring the phase there.
         let distance = |w: f64| Complex::ONE.plus(l(w));
         margin(servo, distance)
+    }
+
+    /// The open loop of the servo over frequency.
+    pub fn servo_loop(&self, servo: &ServoSettings) -> impl Iterator<Item = OpenLoop> + use<> {
+        let (joint, servo) = (*self, *servo);
+        frequencies(&servo).map(move |hz| {
+            let Complex(real, imaginary) = joint.plant(TAU * hz).times(control(&servo, joint.ratio, TAU * hz, true).0);
+            OpenLoop { hz, real, imaginary }
+        })
     }
 
     /// Phase margin of the servo, degrees, and where, Hz: the least at all crossings.

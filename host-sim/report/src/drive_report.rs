@@ -186,9 +186,12 @@ impl<'a> Known<'a> {
         let worst = f64::from(self.subject.table.projection_worst_rad()) * ARCSEC_PER_RAD;
         Headline {
             choice,
-            answer: uncorrected.plain("its table follows the samples to ").error(worst, 2).plain("."),
-            number: Text::default().error(worst, 2),
-            number_is: "largest deviation from the samples that made the table".into(),
+            answer: uncorrected
+                .plain("what its table leaves is not measured here. It holds the samples that made it to ")
+                .error(worst, 2)
+                .plain(", which says nothing of other points."),
+            number: Text::default().error(self.largest_error, 3),
+            number_is: "largest error without a table; with one, see validate, or replay on rows that made none".into(),
         }
     }
 
@@ -454,6 +457,11 @@ fn judge(known: &[Known<'_>]) -> (Status, Vec<String>) {
         if let Some([_, worst]) = k.fresh.filter(|[_, worst]| *worst > MAX_BOUND_ARCSEC) {
             let words = format!("the table misses fresh FEM by {worst:.2}″, more than {MAX_BOUND_ARCSEC}″");
             remark(Status::BoundMissed, format!("{name}: {words}."));
+        }
+        if k.fresh.is_none() && k.subject.validation.is_none() {
+            let words = "nothing here measures what the table leaves: validate does against fresh FEM, replay against \
+                         measured rows that made no table";
+            remark(Status::Remark, format!("{name}: {words}."));
         }
         if let Some(v) = k.subject.validation.filter(|v| v.status != "passed") {
             let words = format!(

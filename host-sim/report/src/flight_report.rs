@@ -1,30 +1,45 @@
-//! The page of a flight: tracking, spectrum, torque, limits.
+//! The page of a flight: tracking, spectrum, torque, the servo's loop, limits.
+
+use std::f64::consts::TAU;
 
 use flexspline_motion::flight::{CONTROLLERS, Flight};
+use flexspline_motion::loops::OpenLoop;
 use serde_json::{Map, json};
 
 use super::page::{
-    Axis, Block, Choice, Detail, EVERY_CHOICE, Figure, FigureBody, Headline, Lines, Mark, Page, Quantity, Section,
-    Series, Status, Table, Text,
+    Axis, Block, Choice, Detail, EVERY_CHOICE, Figure, FigureBody, Headline, Limit, Lines, Mark, Page, Quantity,
+    Section, Series, Status, Table, Text, Upright,
 };
-use flexspline_fly::fly::{ByController, Flown, Results, spectrum};
+use flexspline_fly::fly::{ByController, Flown, LEAST_DISTANCE, LEAST_PHASE_MARGIN_DEG, Results, spectrum};
 
 /// The page; `command` is the line that made it.
 #[must_use]
 pub fn page(flown: &Flown, flight: &Flight, results: &Results, command: &str) -> Page {
     let mut named = Map::new();
     named.insert("flight".to_owned(), json!(results));
-    let remarks: Vec<String> = results.remarks().into_iter().map(str::to_owned).collect();
+    let remarks = results.remarks.clone();
+    let status = if results.servo_is_near_the_edge() || !results.stable {
+        Status::Caution
+    } else if remarks.is_empty() {
+        Status::Good
+    } else {
+        Status::Remark
+    };
     Page {
         title: format!("Flight {}, {} generator", results.scenario, results.generator),
         command_name: "fly",
-        status: if remarks.is_empty() { Status::Good } else { Status::Remark },
+        status,
         also: Vec::new(),
         remarks,
         choices: vec![Choice { id: "flight".to_owned(), name: results.scenario.clone() }],
         choice_is: "flight",
         headlines: vec![headline(results)],
-        sections: vec![tracking(flight, results), details(flown, flight, results), reading()],
+        sections: vec![
+            tracking(flight, results),
+            details(flown, flight, results),
+            servo(flown, flight, results),
+            reading(),
+        ],
         animations: Vec::new(),
         provenance: vec![
             ("command".to_owned(), command.to_owned()),
@@ -174,6 +189,121 @@ fn details(flown: &Flown, flight: &Flight, results: &Results) -> Section {
         title: "Spectrum, loops and limits".to_owned(),
         detail: Detail::Summary,
         blocks: vec![Block::Figure(figure), Block::Table { choice: None, table }],
+    }
+}
+
+/// Sizes of the open loop that the pictures show. A guess: what is far from 1 says nothing about margins.
+const SIZES: [f64; 2] = [1e-2, 1e2];
+/// Size of the open loop up to which it is in the picture of the complex plane. A guess.
+const NEAR: f64 = 2.5;
+/// Points of a circle. A guess: they nearly touch.
+const CIRCLE: u32 = 120;
+
+/// The servo's open loop, with the margins in it.
+fn servo(flown: &Flown, flight: &Flight, results: &Results) -> Section {
+    let open: Vec<OpenLoop> = flight.joint.servo_loop(&flown.scenario.servo).collect();
+    let shown = |at: &&OpenLoop| (SIZES[0]..=SIZES[1]).contains(&at.size());
+    let line = |value: fn(&OpenLoop) -> f64| Series {
+        name: "open loop".to_owned(),
+        mark: Mark::Line,
+        colour: 0,
+        points: open.iter().filter(shown).map(|at| [at.hz, value(at)]).collect(),
+    };
+    let from_edge = |at: &OpenLoop| (at.real + 1.0).hypot(at.imaginary);
+    let nearest = open.iter().min_by(|a, b| from_edge(a).total_cmp(&from_edge(b)));
+    let [margin, at_hz] = results.phase_margin_deg;
+    let is_stable = results.servo_distance > 0.0;
+    let margin_in_words = format!("phase margin {margin:.0}° at {at_hz:.0} Hz");
+    let uprights: Vec<Upright> = [
+        (margin.is_finite() && is_stable).then(|| Upright { name: margin_in_words.clone(), x: at_hz }),
+        nearest.map(|at| Upright { name: format!("nearest to −1 at {:.0} Hz", at.hz), x: at.hz }),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    let sound_deg = LEAST_PHASE_MARGIN_DEG - 180.0;
+    let bode = |id: &str, title: &str, caption: &str, y: Axis, series: Series, limits: Vec<Limit>| {
+        Block::Figure(Figure {
+            id: id.to_owned(),
+            title: title.to_owned(),
+            caption: Text::new(caption),
+            alt: format!("{title} over frequency, with its margins: {margin_in_words}"),
+            body: FigureBody::Lines {
+                x: Axis::new("Frequency, Hz", Quantity::Count).stretched(1.0),
+                y,
+                charts: vec![(
+                    EVERY_CHOICE.to_owned(),
+                    Lines { series: vec![series], limits, uprights: uprights.clone() },
+                )],
+            },
+        })
+    };
+    let limit = |name: &str, y: f64| Limit { name: name.to_owned(), y };
+    let sorted = |mut points: Vec<[f64; 2]>| {
+        points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        points
+    };
+    // No two points of the circle share an x, of which a chart keeps one.
+    let around = |k: u32| {
+        let (sin, cos) = (TAU * (f64::from(k) + 0.25) / f64::from(CIRCLE)).sin_cos();
+        [LEAST_DISTANCE * cos - 1.0, LEAST_DISTANCE * sin]
+    };
+    let series = |name: String, mark, colour, points| Series { name, mark, colour, points: sorted(points) };
+    let mut in_plane = vec![
+        series(
+            "open loop".to_owned(),
+            Mark::Dots,
+            0,
+            open.iter().filter(|at| at.size() < NEAR).map(|at| [at.real, at.imaginary]).collect(),
+        ),
+        series(format!("{LEAST_DISTANCE} from −1"), Mark::Dots, 5, (0..CIRCLE).map(around).collect()),
+        series("−1".to_owned(), Mark::Points, 1, vec![[-1.0, 0.0]]),
+    ];
+    in_plane.extend(nearest.map(|at| {
+        let name = format!("nearest to −1: {:.2} at {:.0} Hz", from_edge(at), at.hz);
+        series(name, Mark::Points, 2, vec![[at.real, at.imaginary]])
+    }));
+    if is_stable && let Some(crossing) = open.iter().find(|at| at.hz >= at_hz && margin.is_finite()) {
+        in_plane.push(series(margin_in_words.clone(), Mark::Points, 3, vec![[crossing.real, crossing.imaginary]]));
+    }
+    let nyquist = Block::Figure(Figure {
+        id: "nyquist".to_owned(),
+        title: "Open loop of the servo in the complex plane".to_owned(),
+        caption: Text::new(
+            "Nyquist's picture, from low frequencies at the left or below to half of the sampling frequency at the \
+             origin. A sound servo stays out of the circle around −1.",
+        ),
+        alt: format!("The open loop beside the point −1; least distance {:.2}", results.servo_distance),
+        body: FigureBody::Lines {
+            x: Axis::new("Real part", Quantity::Count),
+            y: Axis::new("Imaginary part", Quantity::Count),
+            charts: vec![(EVERY_CHOICE.to_owned(), Lines { series: in_plane, ..Lines::default() })],
+        },
+    });
+    Section {
+        id: "servo".to_owned(),
+        title: "The servo and its margins".to_owned(),
+        detail: Detail::Summary,
+        blocks: vec![
+            bode(
+                "bode-gain",
+                "Gain of the servo's open loop",
+                "Motor, load and servo with the delay of its ticks. Where the gain is 1 (0 dB) the phase margin is \
+                 taken.",
+                Axis::new("Gain, dB", Quantity::Count),
+                line(|at| 20.0 * at.size().log10()),
+                vec![limit("0 dB", 0.0)],
+            ),
+            bode(
+                "bode-phase",
+                "Phase of the servo's open loop",
+                "The phase margin is what is left to −180° where the gain is 1.",
+                Axis::new("Phase", Quantity::Degree),
+                line(OpenLoop::phase_deg),
+                vec![limit("−180°", -180.0), limit(&format!("{LEAST_PHASE_MARGIN_DEG}° of margin"), sound_deg)],
+            ),
+            nyquist,
+        ],
     }
 }
 

@@ -17,7 +17,7 @@ use super::page::{
 };
 use super::study_report::{heading, value};
 use flexspline_design::data_sheet::{FIGURES, FigureOf};
-use flexspline_design::simulate::{Observation, Row, Simulation, Summary, Told};
+use flexspline_design::simulate::{Observation, Row, Simulation, Summary, TipContact, Told};
 use flexspline_design::stated;
 use flexspline_mechanics::drive::{Drive, GeneratorKind, Side};
 use flexspline_mechanics::mesh::MeshError;
@@ -134,6 +134,14 @@ impl Known<'_> {
             None => text.plain("."),
         };
         let errors = || self.rows.iter().map(|row| row.error_arcsec);
+        if let Some(tips) = summary.tip_contact.filter(TipContact::counts) {
+            return Headline {
+                choice: None,
+                answer: Text::new(format!("In the {name} drive {}.", tips.in_words().replace(" deg", "°"))),
+                number: Text::new(format!("{:.1} %", 100.0 * tips.share)),
+                number_is: "of the load on tips that should pass freely".into(),
+            };
+        }
         let (answer, number, number_is) = if let Some(backlash) = summary.backlash_arcsec {
             let answer = Text::new(format!("Without load the {name} drive has a backlash of ")).error(backlash, 3);
             (ripples(answer), backlash, "backlash at the output")

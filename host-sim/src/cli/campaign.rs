@@ -231,7 +231,7 @@ impl PlanCommand {
         context.print(&told, || {
             let folder = quoted(&out.display().to_string());
             format!(
-                "plan {}: {} of {}, {}, {}, {} by FEM\nwrote {} in {:.0} s",
+                "plan {}: {} of {}, {}, {}, {} by FEM\nwrote {} in {}",
                 told.plan_hash,
                 counted(told.drives as usize, "drive"),
                 told.drive,
@@ -239,7 +239,7 @@ impl PlanCommand {
                 counted(told.shards as usize, "shard"),
                 counted(told.fem_drives as usize, "drive"),
                 path.display(),
-                told.wall_s
+                context.spent().in_words()
             ) + &say::next(&[
                 format!("flexspline campaign run {folder} --shard all"),
                 format!("flexspline campaign reduce {folder}"),
@@ -324,12 +324,12 @@ impl RunCommand {
         ran.wall_s = clock.elapsed().as_secs_f64();
         context.print(&ran, || {
             format!(
-                "plan {}: {} computed, {} computed anew, {} there already, in {:.1} s",
+                "plan {}: {} computed, {} computed anew, {} there already, in {}",
                 ran.plan_hash,
                 counted(ran.computed.len(), "shard"),
                 ran.redone.len(),
                 ran.there.len(),
-                ran.wall_s
+                context.spent().in_words()
             )
         })
     }

@@ -10,6 +10,7 @@ use flexspline::{Identity, IdentityCheck, Table};
 use super::{Common, Failure, say};
 use flexspline_base::output::prepare_folder;
 use flexspline_base::progress::Progress;
+use flexspline_base::spent::{Spent, Stopwatch};
 use flexspline_base::suggest::{likeliest, question};
 use flexspline_design::stated::Stated;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
@@ -22,13 +23,14 @@ pub(super) struct Context {
     common: Common,
     /// The command line as it was given.
     pub(super) command: String,
+    clock: Stopwatch,
 }
 
 impl Context {
     pub(super) fn new(common: Common, args: &[OsString]) -> Context {
         let words = args.iter().skip(1).map(|arg| quoted(&arg.to_string_lossy()));
         let command = ["flexspline".to_owned()].into_iter().chain(words).collect::<Vec<_>>().join(" ");
-        Context { common, command }
+        Context { common, command, clock: Stopwatch::start() }
     }
 
     /// Runs `work` on as many threads as were asked for.
@@ -154,6 +156,11 @@ impl Context {
     /// A progress bar for work called `title`.
     pub(super) fn progress(&self, title: &str) -> Progress {
         Progress::new(title, self.common.quiet)
+    }
+
+    /// What the command has taken so far.
+    pub(super) fn spent(&self) -> Spent {
+        self.clock.spent()
     }
 
     pub(super) fn quiet(&self) -> bool {

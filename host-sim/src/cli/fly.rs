@@ -159,7 +159,11 @@ fn table(flights: &[VariedFlight], out: &Path) -> String {
             settles(|s| s.none),
             settles(|s| s.compensated),
             part(results.torque_within_bound),
-            if results.stable { "yes" } else { "NO" }
+            match (results.stable, results.servo_is_near_the_edge()) {
+                (false, _) => "NO",
+                (true, true) => "barely",
+                (true, false) => "yes",
+            }
         );
     }
     text + &format!("flights.json in {}", out.display())
@@ -212,10 +216,14 @@ fn text(results: &Results, out: &Path, report: bool) -> String {
         Some(share) => format!("removed {:.1} % of what an ideal inverse removes", 100.0 * share),
         None => "an ideal inverse removes next to nothing here".to_owned(),
     };
-    let stable = if results.stable { "stable" } else { "NOT stable" };
+    let stable = match (results.stable, results.servo_is_near_the_edge()) {
+        (false, _) => "NOT stable",
+        (true, true) => "stable, but near the edge",
+        (true, false) => "stable",
+    };
     // A servo that is not stable has no margin.
     let margin = if results.servo_distance > 0.0 {
-        format!("; servo's phase margin {margin:.0}° at {at_hz:.0} Hz")
+        format!("; servo's phase margin {margin:.0}° at {at_hz:.0} Hz, distance to −1 {:.2}", results.servo_distance)
     } else {
         String::new()
     };
@@ -227,8 +235,8 @@ fn text(results: &Results, out: &Path, report: bool) -> String {
             100.0 * share
         );
     }
-    for remark in results.remarks() {
-        let _ = writeln!(text, "{remark}");
+    for remark in &results.remarks {
+        let _ = writeln!(text, "caution: {remark}");
     }
     let written = if report { "report.html and flight.json" } else { "flight.json" };
     let _ = write!(text, "{written} in {}", out.display());

@@ -142,7 +142,7 @@ const GROUPS: [(&str, &[(&str, &str)]); 4] = [
 /// The shortest way to a result, for the first page.
 const USUAL_PATH: [(&str, &str); 3] = [
     ("flexspline new drive.toml", "your drive, to edit; without it HHD-95"),
-    ("flexspline tables --drive drive.toml", "FEM, about a minute: tables and report.html in out/"),
+    ("flexspline tables --drive drive.toml", "FEM, two minutes of processor: tables and report.html in out/"),
     ("flexspline validate --tables out --drive drive.toml", "compare them with new FEM runs"),
 ];
 

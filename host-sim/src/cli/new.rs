@@ -10,9 +10,11 @@ use super::made::{Clearance, cup_and_balls, left_out, with_formulas, with_s_teet
 use super::{Context, Failure, names, say};
 use flexspline_base::output::write_whole;
 use flexspline_design::catalogue;
+use flexspline_design::relief::relieve_tips;
+use flexspline_design::simulate::TipContact;
 use flexspline_design::stated::{Stated, TEMPLATE};
 use flexspline_identify::nominal::Nominal;
-use flexspline_mechanics::drive::{Drive, DriveError, FewNumbers, GeneratorKind, Profile};
+use flexspline_mechanics::drive::{Drive, DriveError, FewNumbers, GeneratorKind, MadeDrive, Profile};
 
 /// Write a commented drive file, or a catalogue model, to edit
 ///
@@ -69,6 +71,9 @@ pub(super) struct New {
     /// Replace the file if it is there
     #[arg(long)]
     force: bool,
+    /// Do not run a drive of one's own under its rated load: tips that clash there are then neither lowered nor told
+    #[arg(long)]
+    no_run: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
@@ -97,8 +102,43 @@ struct Written {
     /// What the catalogue prints of a drive that is like one of its sizes, if it is at hand.
     #[serde(skip_serializing_if = "Option::is_none")]
     data_sheet: Option<Stated>,
+    /// Of a drive of one's own: how its tips passed one another under its rated load, with cup and balls.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    under_load: Option<UnderLoad>,
     /// Commands to type next.
     next: Vec<String>,
+}
+
+/// How a drive of one's own did under its rated load.
+#[derive(Serialize)]
+struct UnderLoad {
+    /// The load, N·m.
+    torque_n_m: f64,
+    /// The generator that it was run with.
+    generator: GeneratorKind,
+    /// What was taken off the flexspline's tips so that they pass those of the circular spline freely, mm.
+    tips_lowered_mm: f64,
+    /// What bears on tips yet.
+    tip_contact: Option<TipContact>,
+    /// Why the run gave no result.
+    not_solved: Option<String>,
+}
+
+impl UnderLoad {
+    /// As a line.
+    fn text(&self) -> String {
+        let under = format!("under {} N.m, {} generator", self.torque_n_m, self.generator);
+        match (&self.not_solved, &self.tip_contact) {
+            (Some(why), _) => format!("not run {under}: {why}"),
+            (None, Some(tips)) => format!("caution: {under}, {}", tips.in_words()),
+            (None, None) if self.tips_lowered_mm > 0.0 => format!(
+                "{under}, tips pass one another freely, after flexspline.tip_radius_mm was lowered by {:.4} mm: as \
+                 drawn they bore on one another outside the teeth in mesh",
+                self.tips_lowered_mm
+            ),
+            (None, None) => format!("{under}, tips pass one another freely"),
+        }
+    }
 }
 
 impl New {
@@ -115,6 +155,16 @@ impl New {
             }
             None => None,
         };
+        self.check()?;
+        let kind = self.kind.unwrap_or_else(|| self.kind_by_name());
+        let sized = self.like.as_deref().and_then(size_and_ratio).filter(|_| kind == Kind::Drive);
+        let data_sheet = sized.and_then(|(series, size, ratio)| catalogue::nearest_sheet(series, size, ratio));
+        let data_sheet = data_sheet.map(|(stated, _)| stated);
+        let mut made = made;
+        let under_load = match &mut made {
+            Some(made) if kind == Kind::Drive && !self.no_run => self.under_load(context, made, data_sheet.as_ref())?,
+            _ => None,
+        };
         let drive = match (&made, &self.from) {
             (Some(made), _) => context.with_sets(made.drive.clone())?,
             (None, Some(name)) if context.has_drive() => {
@@ -124,10 +174,8 @@ impl New {
             (None, Some(name)) => context.drive_called("--from", name)?,
             (None, None) => context.drive()?,
         };
-        self.check()?;
         let shown = self.file.display().to_string();
         let file = quoted(&shown);
-        let kind = self.kind.unwrap_or_else(|| self.kind_by_name());
         let own = made.as_ref().filter(|_| kind == Kind::Drive);
         let teeth = own.map(|_| Clearance::of(&drive)).transpose();
         let teeth = teeth.map_err(|error| Failure::BadInput(error.to_string()))?;
@@ -135,8 +183,6 @@ impl New {
             teeth.check_s_teeth()?;
         }
         let left_out = own.map_or_else(Vec::new, |_| left_out(&drive));
-        let sized = self.like.as_deref().and_then(size_and_ratio).filter(|_| kind == Kind::Drive);
-        let data_sheet = sized.and_then(|(series, size, ratio)| catalogue::sheet(series, size, ratio));
         let (text, drive_hash, next) = match kind {
             Kind::Drive => {
                 let hash = blake3::Hash::from_bytes(drive.hash()).to_hex().to_string();
@@ -169,6 +215,7 @@ impl New {
             teeth,
             left_out,
             data_sheet,
+            under_load,
             next,
         };
         context.print(&written, || {
@@ -189,6 +236,7 @@ impl New {
     /// Teeth, data sheet and what is left out of a drive of one's own, a line each.
     fn more(&self, written: &Written) -> String {
         let mut lines: Vec<String> = written.teeth.iter().map(Clearance::text).collect();
+        lines.extend(written.under_load.iter().map(UnderLoad::text));
         match (&self.like, &written.data_sheet) {
             (Some(_), Some(sheet)) => {
                 let missing: Vec<&str> = match sheet.rated_torque_n_m {
@@ -213,6 +261,66 @@ impl New {
         }
         lines.extend(written.left_out.iter().map(|what| format!("left out: {what}")));
         lines.iter().map(|line| format!("\n{line}")).collect()
+    }
+
+    /// Runs a drive of one's own under its rated load, with guesses of cup and balls where it is to have them and does
+    /// not, and lowers its tips until they pass one another freely. Nothing of a drive that binds as drawn.
+    fn under_load(
+        &self,
+        context: &Context,
+        made: &mut MadeDrive,
+        sheet: Option<&Stated>,
+    ) -> Result<Option<UnderLoad>, Failure> {
+        let mut drive = context.with_sets(made.drive.clone())?;
+        if self.like.is_some() && !drive.sleeve.is_shell() {
+            let guesses = cup_and_balls(&drive).into_iter().filter(|(path, _)| !context.sets_field(path));
+            let sets: Vec<String> = guesses.map(|(path, value)| format!("{path}={value}")).collect();
+            drive = drive
+                .with_sets(sets.iter().map(String::as_str))
+                .map_err(|error| Failure::BadInput(error.to_string()))?;
+        }
+        let binds = |error: DriveError| Failure::BadInput(error.to_string());
+        if !Clearance::of(&drive).map_err(binds)?.clear.contains(&self.generator) {
+            return Ok(None);
+        }
+        let generator = self.generator;
+        // The sheet's rated torque is that of a cam.
+        let rated_n_m = sheet.and_then(|sheet| sheet.rated_torque_n_m).filter(|_| generator == GeneratorKind::Cam);
+        let torque_n_m = rated_n_m.unwrap_or_else(|| drive.rated_torque_n_m(generator));
+        let mut progress = context.progress("run under load");
+        let mut runs = 0;
+        let mut told = |what: &str| {
+            progress.set(runs, 0, what);
+            runs += 1;
+        };
+        let relief = relieve_tips(&drive, generator, torque_n_m, !context.sets_field(TIP_RADIUS), &mut told);
+        Ok(Some(match relief {
+            Ok(relief) => {
+                if relief.lowered_mm > 0.0 {
+                    made.drive.flexspline.tip_radius_mm = relief.tip_radius_mm;
+                    for (_, formula) in made.formulas.iter_mut().filter(|(path, _)| *path == TIP_RADIUS) {
+                        *formula += &format!(
+                            ", lowered by {:.4} mm: so tips pass one another freely under {torque_n_m} N.m",
+                            relief.lowered_mm
+                        );
+                    }
+                }
+                UnderLoad {
+                    torque_n_m,
+                    generator,
+                    tips_lowered_mm: relief.lowered_mm,
+                    tip_contact: relief.left,
+                    not_solved: None,
+                }
+            }
+            Err(error) => UnderLoad {
+                torque_n_m,
+                generator,
+                tips_lowered_mm: 0.0,
+                tip_contact: None,
+                not_solved: Some(error.to_string()),
+            },
+        }))
     }
 
     /// The command that makes this drive with guesses of cup and balls, of what is not set.
@@ -329,6 +437,9 @@ impl New {
 
 /// Pitch diameter for each size, mm: 63.5 of size 25, as the catalogues of Harmonic Drive have it.
 const CATALOGUE_MM_PER_SIZE: f64 = 2.54;
+
+/// The field that is lowered where tips clash.
+const TIP_RADIUS: &str = "flexspline.tip_radius_mm";
 
 /// The field that says which teeth.
 const PROFILE: &str = "flexspline.profile";

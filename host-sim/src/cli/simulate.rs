@@ -9,7 +9,7 @@ use clap::{Args, ValueEnum, ValueHint};
 use super::{Context, Failure, names, report, say};
 use flexspline_base::output::{OutputError, Outputs, WholeFolder, write_whole};
 use flexspline_base::progress::Progress;
-use flexspline_design::cautions::add_stress;
+use flexspline_design::cautions::{Caution, add_stress};
 use flexspline_design::simulate::{
     Direction, Observation, Path, PathPoint, Phase, PlaceStress, SimulateError, Simulation, SimulationSettings,
     Summary, Told, read_path, simulate, stress_by_place,
@@ -172,13 +172,19 @@ impl Simulate {
         };
         simulation.summary.command = context.command.clone();
         if self.stress {
+            let _bar = context.progress("stress on three meshes");
             simulation.summary.stress = stress(&drive, &settings, &simulation)?;
             add_stress(&mut simulation.summary.cautions, &simulation.summary.stress);
         }
         simulation.summary.data_sheet = context.stated()?.map(|stated| {
             let temperature_c = settings.temperature_c.unwrap_or(drive.temperature.reference_c);
+            let _bar = context.progress("figures of the data sheet");
             beside(&drive, settings.generator, temperature_c, &stated, settings.solver)
         });
+
+        // Data sheet and stress took their time, too.
+        let spent = context.spent();
+        (simulation.summary.wall_s, simulation.summary.processor_s) = (spent.wall_s, spent.processor_s);
 
         let (has_frames, has_page) = (frames.is_some(), seen.is_some());
         let mut outputs = Outputs::new();
@@ -348,12 +354,17 @@ fn text(summary: &Summary, out: &FilePath, has_frames: bool, has_page: bool) -> 
         "{} with {} generator, path {}, {} mesh, {} degrees of freedom\n",
         summary.drive, summary.generator, summary.path, summary.mesh, summary.degrees_of_freedom
     );
+    // Where the figures are not those of the teeth in mesh, that comes first.
+    let is_first = |caution: &&Caution| caution.figure == "tip_contact";
+    for caution in summary.cautions.iter().filter(is_first) {
+        let _ = writeln!(text, "caution: {}", caution.words);
+    }
     for Told { name, value, unit, decimals, caveat, .. } in summary.told() {
         let comma = if unit.is_empty() || caveat.is_empty() { "" } else { ", " };
         let _ = writeln!(text, "  {name:<36} {value:>12.decimals$} {unit}{comma}{caveat}");
     }
     text += &summary.data_sheet.as_ref().map(SheetBeside::text).unwrap_or_default();
-    for caution in &summary.cautions {
+    for caution in summary.cautions.iter().filter(|caution| !is_first(caution)) {
         let _ = writeln!(text, "caution: {}", caution.words);
     }
     let _ = writeln!(

@@ -210,9 +210,9 @@ impl StudyCommand {
             let mut text = text(&told, &settings);
             let _ = write!(
                 text,
-                "wrote study.csv, study.json and report.html to {}/ in {:.0} s",
+                "wrote study.csv, study.json and report.html to {}/ in {}",
                 out.display(),
-                told.wall_s
+                context.spent().in_words()
             );
             text + &say::next(&best_next(context, &drive, &settings, &made))
         })?;

@@ -4,7 +4,6 @@ use std::fmt::Write as _;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Mutex;
-use std::time::Instant;
 
 use clap::{Args, ValueHint};
 use flexspline::Table;
@@ -16,6 +15,7 @@ use super::names::{self, Generators};
 use super::simulate::{refused_or_failed, stress};
 use super::{Failure, report, say};
 use flexspline_base::output::Outputs;
+use flexspline_base::spent::Spent;
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::cautions::add_stress;
 use flexspline_design::simulate::{Path, PlaceStress, SimulationSettings, simulate};
@@ -107,12 +107,13 @@ struct Report<'a> {
     /// Generators without a table.
     failed: Vec<String>,
     tables: Vec<&'a TableInfo>,
+    /// On the clock, and of the processor, s.
     wall_s: f64,
+    processor_s: Option<f64>,
 }
 
 impl Tables {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
-        let clock = Instant::now();
         let drive = context.drive()?;
         let generators = self.generator.0.as_slice();
         if !self.no_report {
@@ -172,12 +173,14 @@ impl Tables {
             report::write(page, out, &mut outputs)?;
         }
         outputs.finish()?;
+        let spent = context.spent();
         let report = Report {
             schema_version: 1,
             failed: failed.iter().map(|(kind, _)| kind.to_string()).collect(),
             status: page.as_ref().filter(|page| page.status.is_failure()).map_or("made", |page| page.status.name()),
             tables: made.iter().map(|table| &table.info).collect(),
-            wall_s: clock.elapsed().as_secs_f64(),
+            wall_s: spent.wall_s,
+            processor_s: spent.processor_s,
         };
         context.print(&report, || {
             let tables = quoted(&out.display().to_string());
@@ -418,12 +421,12 @@ fn text(report: &Report<'_>, out: &std::path::Path, with_page: bool) -> String {
         text.push_str(&format!("{}: {}\n", info.generator, turns.remark));
     }
     text.push_str(&format!(
-        "wrote {} table{}{} to {}/ in {:.0} s",
+        "wrote {} table{}{} to {}/ in {}",
         report.tables.len(),
         if report.tables.len() == 1 { "" } else { "s" },
         if with_page { " and report.html (for any browser)" } else { "" },
         out.display(),
-        report.wall_s
+        Spent { wall_s: report.wall_s, processor_s: report.processor_s }.in_words()
     ));
     text
 }

@@ -380,6 +380,7 @@ mod tests {
             generator_rad: 0.0,
             torque_n_m: 0.0,
             reached_n_m: 0.0,
+            softened_to: None,
             reason: "the iterations ran out",
             history: Vec::new(),
         };

@@ -13,14 +13,15 @@ pub(crate) mod places;
 mod row;
 pub mod stress;
 mod summary;
+pub mod zones;
 
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
-use std::time::Instant;
 
 use thiserror::Error;
 
 use crate::cautions::{Looked, rigid_gap_um, room_as_built_arcsec};
+use flexspline_base::spent::Stopwatch;
 use flexspline_mechanics::drive::{Drive, GeneratorKind, ThermalState};
 use flexspline_mechanics::motion::Motion;
 use flexspline_mechanics::stepping::{Face, Increment, Problem, SolveError, Solver, SolverSettings, State};
@@ -32,6 +33,7 @@ pub use places::{
 pub use row::Row;
 pub use stress::{PeakStress, peak_stress};
 pub use summary::{SUMMARY_SCHEMA, Summary, Told};
+pub use zones::{TipContact, Zone, zones};
 
 use path::LARGEST_TORQUE_N_M;
 use summary::{Metrics, Touches, largest, shared, wheel_name};
@@ -306,12 +308,14 @@ struct Run<'a> {
     drive: &'a Drive,
     settings: &'a SimulationSettings,
     observer: &'a mut dyn FnMut(&Observation) -> ControlFlow<()>,
-    begun: Instant,
+    begun: Stopwatch,
     pitch: f64,
     temperature_c: f64,
     rows: Vec<Row>,
     peak: Option<(PeakStress, usize)>,
     by_place_mpa: [f64; 3],
+    /// The zones of the row that has the largest pressure between flanks, and that pressure.
+    zones: (f64, Vec<Zone>),
     touches: Option<Touches>,
     degrees_of_freedom: usize,
     increments: usize,
@@ -331,12 +335,13 @@ impl<'a> Run<'a> {
             drive,
             settings,
             observer,
-            begun: Instant::now(),
+            begun: Stopwatch::start(),
             pitch: TAU / f64::from(drive.flexspline.teeth),
             temperature_c: settings.temperature_c.unwrap_or(drive.temperature.reference_c),
             rows: Vec::new(),
             peak: None,
             by_place_mpa: [0.0; 3],
+            zones: (f64::NEG_INFINITY, Vec::new()),
             touches: None,
             degrees_of_freedom: 0,
             increments: 0,
@@ -468,7 +473,7 @@ impl<'a> Run<'a> {
         at: Target,
         one_load: bool,
     ) -> Result<(Motion<'p>, Increment), SimulateError> {
-        let mut motion = Motion::deformed(problem, at.generator_rad)?;
+        let mut motion = Motion::deformed_or_turned_in(problem, at.generator_rad)?;
         let mut increment = motion.last().clone();
         self.solved(Phase::Deforming, &motion)?;
         if one_load && self.exceeds_drag(at.torque_n_m) {
@@ -572,6 +577,13 @@ impl<'a> Run<'a> {
     fn row(&mut self, motion: &Motion<'_>, increment: &Increment, turn_rad: f64) -> (Row, PeakStress) {
         let state = motion.state();
         let peak = peak_stress(motion.problem(), state);
+        let zones = zones(motion.problem(), state);
+        let tips =
+            TipContact::of(&zones, self.drive.flexspline.module_mm).filter(|_| self.exceeds_drag(state.torque_n_m));
+        let pressure_mpa = increment.peak_pressure_mpa[0];
+        if pressure_mpa > self.zones.0 {
+            self.zones = (pressure_mpa, zones);
+        }
         // Rows of a path that begins with the deformed drive count from 0, others from 1.
         let step = match self.rows.last() {
             Some(row) => row.step + 1,
@@ -597,6 +609,7 @@ impl<'a> Run<'a> {
             settled: motion.settled(),
             face: increment.face,
             lobe_force_n: increment.lobe_force_n,
+            tips,
             turn_rad,
         };
         (row, peak)
@@ -681,14 +694,17 @@ impl<'a> Run<'a> {
             rows.iter().map(|row| row.face).reduce(|a, b| if b.peak_over_mean > a.peak_over_mean { b } else { a });
         let uneven = uneven.unwrap_or(Face::EVEN);
         let peak_flank_pressure_mpa = largest(rows, |row| row.peak_flank_pressure_mpa);
+        let tip_contact = TipContact::worst(rows.iter().filter_map(|row| row.tips));
         let looked = Looked {
             rigid_gap_um: rigid_gap_um(self.drive, settings.generator),
             room_as_built_arcsec: room_as_built_arcsec(self.drive, settings.generator),
             max_von_mises_mpa: Some(peak.von_mises_mpa),
             root_fillet_mpa: Some(self.by_place_mpa[0]),
             peak_flank_pressure_mpa: Some(peak_flank_pressure_mpa),
+            tip_contact,
             slope_bound: None,
         };
+        let spent = self.begun.spent();
         let summary = Summary {
             schema_version: SUMMARY_SCHEMA,
             tool_version: env!("CARGO_PKG_VERSION"),
@@ -725,6 +741,8 @@ impl<'a> Run<'a> {
             nodal_flank_mpa: self.by_place_mpa[2],
             stress: Vec::new(),
             peak_flank_pressure_mpa,
+            zones: self.zones.1,
+            tip_contact,
             peak_generator_pressure_mpa: largest(rows, |row| row.peak_generator_pressure_mpa),
             lobe_force_n: largest(rows, |row| row.lobe_force_n),
             tilt_mrad: 1e3 * largest(rows, |row| row.face.tilt_rad),
@@ -741,7 +759,8 @@ impl<'a> Run<'a> {
             data_sheet: None,
             increments: self.increments,
             iterations: self.iterations,
-            wall_s: self.begun.elapsed().as_secs_f64(),
+            wall_s: spent.wall_s,
+            processor_s: spent.processor_s,
         };
         Simulation { rows: self.rows, summary }
     }

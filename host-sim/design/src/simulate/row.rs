@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::zones::TipContact;
 use flexspline_mechanics::stepping::Face;
 
 /// The drive after an increment; the fields are the columns of `results.csv`.
@@ -48,6 +49,9 @@ pub struct Row {
     /// Force of the generator along its major axis on the half of the rim at 0°, outward, N.
     #[serde(skip)]
     pub lobe_force_n: f64,
+    /// What bears on tips outside the main zones, under a load that exceeds the drag.
+    #[serde(skip)]
+    pub tips: Option<TipContact>,
     /// Generator travel of the increment, rad, signed.
     #[serde(skip)]
     pub turn_rad: f64,

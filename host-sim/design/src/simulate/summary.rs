@@ -8,6 +8,7 @@ use std::ops::Range;
 use super::places::PlaceStress;
 use super::row::Row;
 use super::stress::PeakStress;
+use super::zones::{TipContact, Zone};
 use crate::cautions::Caution;
 use crate::pitch_wave::peak_to_peak;
 use crate::stated::SheetBeside;
@@ -121,6 +122,10 @@ pub struct Summary {
     /// ([`flexspline_mechanics::contact::FlankContact::peak_pressure_mpa`]); where they do not bear evenly along the
     /// face, under the largest load there.
     pub peak_flank_pressure_mpa: f64,
+    /// Where the teeth bear at the row of that pressure, the zones with the largest force first.
+    pub zones: Vec<Zone>,
+    /// What bears on tips outside the main zones at the worst row; `null` where nothing does.
+    pub tip_contact: Option<TipContact>,
     /// Largest force of the generator along its major axis on one half of the rim, outward, N.
     pub lobe_force_n: f64,
     /// Largest tilt of a tooth along its face, outward, mrad: the coning of the rim. 0 in a plane model.
@@ -160,8 +165,11 @@ pub struct Summary {
     pub increments: usize,
     /// Newton iterations of all increments.
     pub iterations: usize,
-    /// Time from start to end, s.
+    /// Time on the clock from the beginning of the path to its end, s; as the command writes it, of the whole command
+    /// until its results are there.
     pub wall_s: f64,
+    /// Time that all threads of the process took of the processor in it, s; `null` where the system does not say.
+    pub processor_s: Option<f64>,
 }
 
 /// A figure of a run in words, as the terminal and the page tell it.
@@ -193,11 +201,14 @@ impl Summary {
         let (arcsec, mpa) = (("arcsec", 3), ("MPa", 1));
         put("load torque", self.torque_n_m, ("N.m", 3), "", "on the output, positive turns it forward");
         let ripple = "largest less smallest error of a settled stretch one way under one load";
+        let of_tips =
+            self.tip_contact.filter(TipContact::counts).map(|_| "of tips that bear outside the mesh".to_owned());
         let between = self.kinematic_error_pp_arcsec.zip(self.kinematic_error_pp_of_rows_arcsec);
         let of_rows = between
             .filter(|(wave, rows)| wave != rows)
             .map_or_else(String::new, |(_, rows)| format!("of the wave through the rows; of the rows alone {rows:.3}"));
-        put("kinematic error, peak to peak", self.kinematic_error_pp_arcsec, arcsec, &of_rows, ripple);
+        let caveat = of_tips.unwrap_or(of_rows);
+        put("kinematic error, peak to peak", self.kinematic_error_pp_arcsec, arcsec, &caveat, ripple);
         let mean = "output less generator over the ratio, over whole tooth pitches";
         put("mean error forward", self.mean_error_forward_arcsec, arcsec, "", mean);
         put("mean error backward", self.mean_error_backward_arcsec, arcsec, "", mean);
@@ -250,7 +261,9 @@ impl Summary {
         put("share of that face that bears", of_leaning(self.face_in_contact), ("", 3), "", "1 is all of it");
         let room = "what rigid teeth leave the output to turn; below 0 rim and bearing have to give way";
         put("room of rigid teeth as built", self.room_as_built_arcsec, ("arcsec", 1), "least of a turn", room);
-        put("time", Some(self.wall_s), ("s", 2), "", "from start to end");
+        let processor = self.processor_s.map_or_else(String::new, |s| format!("on the clock; {s:.2} s of processor"));
+        let until = "of the whole command, until its results are there";
+        put("time", Some(self.wall_s), ("s", 2), &processor, until);
         all
     }
 }
@@ -497,6 +510,7 @@ mod tests {
                     residual: 0.0,
                     face: flexspline_mechanics::stepping::Face::EVEN,
                     lobe_force_n: 0.0,
+                    tips: None,
                     settled: travel.settled(0.0),
                     turn_rad: generator - from,
                 });

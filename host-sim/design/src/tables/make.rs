@@ -13,6 +13,7 @@ use super::torque_nodes::{NodeChoice, choose_torque_nodes};
 use super::turns::{deviation_increments, sweep_turns};
 use crate::cautions::{Looked, rigid_gap_um, room_as_built_arcsec};
 use crate::data_sheet::Stiffness;
+use crate::relief::tips_that_bear;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::stepping::{Method, SolveError, SolverSettings};
 
@@ -208,12 +209,14 @@ pub fn make(
     let peak_flank_pressure_mpa = swept.work.peak_flank_pressure_mpa;
     let mut made = from_sweep(drive, &plan, swept, settings.solver, clock.elapsed().as_secs_f64())?;
     made.info.torque_nodes_resolved = chosen.map(|chosen| chosen.resolved);
+    let largest_n_m = plan.torque_nodes_n_m.iter().copied().map(f64::from).fold(0.0, f64::max);
     made.info.cautions = Looked {
         rigid_gap_um: rigid_gap_um(drive, kind),
         room_as_built_arcsec: room_as_built_arcsec(drive, kind),
         max_von_mises_mpa: None,
         root_fillet_mpa: None,
         peak_flank_pressure_mpa: Some(peak_flank_pressure_mpa),
+        tip_contact: tips_that_bear(drive, kind, largest_n_m).ok().flatten(),
         slope_bound: Some(f64::from(made.info.slope_bound)),
     }
     .cautions();

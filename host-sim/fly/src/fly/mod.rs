@@ -19,7 +19,7 @@ use flexspline_mechanics::drive::{Drive, GeneratorKind};
 
 pub use built_in::{SCENARIOS, built_in};
 pub use file::read;
-pub use results::{ByController, Results, Row, results, spectrum};
+pub use results::{ByController, LEAST_DISTANCE, LEAST_PHASE_MARGIN_DEG, Results, Row, results, spectrum};
 pub use varied::{Flight as VariedFlight, Vary, every, fly_varied};
 
 /// A scenario, and what flies it.

@@ -8,6 +8,12 @@ use flexspline_algebra::spectrum as sums_of;
 
 /// Output less target within this of where it ends counts as settled, arcsec.
 const SETTLED_ARCSEC: f64 = 2.0;
+/// Least phase margin, degrees, and least distance of the open loop from −1 of a servo that is sound: the lower ends
+/// of what K. J. Åström and R. M. Murray call reasonable (Feedback Systems, 2nd ed. 2021, section 10.3: 30° to 60°,
+/// 0.5 to 0.8).
+pub const LEAST_PHASE_MARGIN_DEG: f64 = 30.0;
+/// Source: see [`LEAST_PHASE_MARGIN_DEG`].
+pub const LEAST_DISTANCE: f64 = 0.5;
 /// Ticks of one spectrum.
 const WINDOW: usize = 4096;
 
@@ -69,6 +75,8 @@ pub struct Results {
     pub servo_distance: f64,
     /// Resonances with motor held and free, Hz.
     pub resonances_hz: [f64; 2],
+    /// What speaks against the flight, in sentences; empty of a sound one.
+    pub remarks: Vec<String>,
     /// Ticks in which the motor gave all it has, the limiter held back, nothing was corrected, with the core.
     pub limited_ticks: [u32; 3],
     /// Share of ticks in which the torque told by the motor's current lay within its bound; none where another is used.
@@ -78,17 +86,33 @@ pub struct Results {
 }
 
 impl Results {
-    /// What speaks against the flight, in sentences.
+    /// Whether the servo is stable and a little more delay, gain or inertia would make it ring.
     #[must_use]
-    pub fn remarks(&self) -> Vec<&'static str> {
+    pub fn servo_is_near_the_edge(&self) -> bool {
+        self.servo_distance > 0.0
+            && (self.servo_distance < LEAST_DISTANCE || self.phase_margin_deg[0] < LEAST_PHASE_MARGIN_DEG)
+    }
+
+    /// What speaks against the flight, in sentences.
+    fn against(&self) -> Vec<String> {
         let servo_is_stable = self.servo_distance > 0.0;
+        let [margin, at_hz] = self.phase_margin_deg;
         let remarks = [
-            (!servo_is_stable, "The servo itself is not stable with this load, whatever is compensated."),
+            (!servo_is_stable, "The servo itself is not stable with this load, whatever is compensated.".to_owned()),
+            (
+                self.servo_is_near_the_edge(),
+                format!(
+                    "The servo is near the edge of instability with this load: its phase margin is {margin:.0}° at \
+                     {at_hz:.0} Hz ({LEAST_PHASE_MARGIN_DEG}° or more is sound), its least distance from −1 is {:.2} \
+                     ({LEAST_DISTANCE} or more); lower servo.position_hz, servo.speed_hz or servo.integral_hz.",
+                    self.servo_distance
+                ),
+            ),
             (
                 servo_is_stable && !self.stable,
-                "With compensation the joint does not come to rest after a knock as it does without.",
+                "With compensation the joint does not come to rest after a knock as it does without.".to_owned(),
             ),
-            (self.rms_arcsec.compensated > self.rms_arcsec.none, "Compensation makes this flight worse."),
+            (self.rms_arcsec.compensated > self.rms_arcsec.none, "Compensation makes this flight worse.".to_owned()),
         ];
         remarks.into_iter().filter(|(there, _)| *there).map(|(_, remark)| remark).collect()
     }
@@ -120,7 +144,7 @@ pub fn results(flown: &super::Flown, flight: &Flight) -> Option<Results> {
     let digest = flight.flown.iter().fold(0_u64, |sum, flown| sum.rotate_left(9) ^ flown.digest);
     let core = flight.flown.get(COMPENSATED)?;
     let current = flight.torque == flexspline_motion::scenario::TorqueKnown::Current;
-    Some(Results {
+    let mut results = Results {
         scenario: scenario.name.clone(),
         generator: flown.kind.to_string(),
         torque: snake(&format!("{:?}", flight.torque)),
@@ -142,10 +166,13 @@ pub fn results(flown: &super::Flown, flight: &Flight) -> Option<Results> {
         phase_margin_deg: flight.phase_margin_deg,
         servo_distance: flight.servo_distance,
         resonances_hz: flight.resonances_hz,
+        remarks: Vec::new(),
         limited_ticks: core.limits,
         torque_within_bound: current.then_some(core.told),
         digest: format!("{digest:016x}"),
-    })
+    };
+    results.remarks = results.against();
+    Some(results)
 }
 
 /// `OnLoad` as `on_load`; what is not known is `none`.

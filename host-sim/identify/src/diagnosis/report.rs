@@ -211,6 +211,24 @@ impl Diagnosis {
             Verdict::Unknown => "a discrepancy that no known cause explains",
         };
         let _ = writeln!(text, "finding: {}", self.finding.words());
+        let c = &self.compensation;
+        if self.finding != Finding::DataUnusable {
+            // The one number first: what is left where it is used.
+            let _ = if self.causes.is_empty() {
+                writeln!(
+                    text,
+                    "left after correction: {:.2} arcsec rms with the nominal table, {:.2} without a table",
+                    c.rms_nominal_tables_arcsec, c.rms_uncompensated_arcsec
+                )
+            } else {
+                writeln!(
+                    text,
+                    "left after correction, in data left out of the fit: {:.2} -> {:.2} arcsec rms, with the nominal \
+                     table and with one that holds the causes; {:.2} without a table",
+                    c.rms_nominal_tables_arcsec, c.rms_extended_tables_arcsec, c.rms_uncompensated_arcsec
+                )
+            };
+        }
         let _ = writeln!(text, "verdict: {verdict}");
         for cause in &self.causes {
             let _ = writeln!(
@@ -236,15 +254,17 @@ impl Diagnosis {
             let _ = writeln!(text, "  without a cause: {}, {:.1} arcsec rms", left.looks_like, left.size_arcsec);
         }
         let (r, h) = (&self.residual, &self.held_out);
+        let _ =
+            writeln!(text, "the model behind it is adapted to these data, which a table on board is not; it leaves");
         let _ = writeln!(
             text,
-            "residual, rms: {:.2} arcsec recalibrated, {:.2} with the causes, {:.2} is noise",
-            r.rms_before_arcsec, r.rms_after_arcsec, r.noise_floor_arcsec
+            "  in data left out: {:.2} -> {:.2} arcsec rms, without the causes and with them",
+            h.rms_before_arcsec, h.rms_after_arcsec
         );
         let _ = writeln!(
             text,
-            "in sessions left out: {:.2} arcsec recalibrated, {:.2} with the causes",
-            h.rms_before_arcsec, h.rms_after_arcsec
+            "  in the data it was fitted to: {:.2} -> {:.2}, of which {:.2} is noise",
+            r.rms_before_arcsec, r.rms_after_arcsec, r.noise_floor_arcsec
         );
         if let Some(ratio) = self.ratio_proposed {
             let _ = writeln!(

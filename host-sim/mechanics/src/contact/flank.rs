@@ -136,6 +136,21 @@ pub struct PairContribution {
     pub along_face: Option<AlongFace>,
 }
 
+/// Where a pair bears.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BearingPlace {
+    /// Normal force of the pair, N for each mm of the face.
+    pub load: f64,
+    /// Largest pressure, MPa ([`FlankContact::peak_pressure_mpa`]).
+    pub peak_mpa: f64,
+    /// Share of the force on a tip: on its rounding, or within one rounding radius of where that begins; of the tooth
+    /// of the flexspline, and of the teeth of the circular spline.
+    pub on_tips: [f64; 2],
+    /// How much further from the axis the tip of the tooth stands than the tips of the circular spline do, mm: what it
+    /// reaches into the space.
+    pub reach_mm: f64,
+}
+
 /// How the load of a pair lies along the face, and what a slope s of its offsets ([`FaceLaw::slope`]) changes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AlongFace {
@@ -614,6 +629,39 @@ impl<'a> FlankContact<'a> {
         let places: Vec<Place> = points.iter().map(place).collect();
         let least_radius = 1.0 / (1.0 / self.tooth.rounding_radius + 1.0 / self.space.rounding_radius);
         peak_pressure_mpa(&places, bearing.peak_over_mean, modulus_mpa, least_radius)
+    }
+
+    /// Where a pair bears, whether on flanks or on tips; nothing of a pair that is open.
+    pub fn bearing_place(
+        &self,
+        pair: FlankPair,
+        at: Configuration,
+        law: FlankLaw,
+        points: &[FlankPoint],
+        modulus_mpa: f64,
+    ) -> Option<BearingPlace> {
+        let field = self.local_field(pair, at);
+        let bearing = self.bearing(pair, &field, law, points)?;
+        let (tooth, space) = (&self.tooth, &self.space);
+        let tooth_tip_from = tooth.arc_at(tooth.junction_radius) - tooth.rounding_radius;
+        // On the circular spline the tip lies inward.
+        let space_tip_to = space.junction_radius + space.rounding_radius;
+        let (mut load, mut on_tips, mut reach_mm) = (0.0, [0.0; 2], f64::NEG_INFINITY);
+        for point in points {
+            let x = self.seen_from_space(&field, point.position, point.edge, &point.shape);
+            reach_mm = reach_mm.max(x[0].hypot(x[1]) - space.tip_radius);
+            let foot = self.foot(pair, &field, x);
+            let force = law.stiffness * point.weight * (-(foot.distance + bearing.later_mm)).max(0.0);
+            load += force;
+            on_tips[0] += if point.arc >= tooth_tip_from { force } else { 0.0 };
+            on_tips[1] += if foot.radius <= space_tip_to { force } else { 0.0 };
+        }
+        (load > 0.0).then(|| BearingPlace {
+            load,
+            peak_mpa: self.peak_pressure_mpa(pair, at, law, points, modulus_mpa),
+            on_tips: on_tips.map(|force| force / load),
+            reach_mm,
+        })
     }
 
     /// Gap of every integration point where the face is nearest, how it changes as the output alone turns (mm/rad), and

@@ -18,8 +18,8 @@ mod quadrature;
 pub use bore::{BoreContact, BoreLaw, BorePressure, OpenEdges};
 pub use face::{Across, Bearing, FaceLaw, Lean};
 pub use flank::{
-    AlongFace, Configuration, FlankContact, FlankLaw, FlankLayout, FlankPair, FlankPoint, FrictionHistory,
-    PairContribution, SlipPoint,
+    AlongFace, BearingPlace, Configuration, FlankContact, FlankLaw, FlankLayout, FlankPair, FlankPoint,
+    FrictionHistory, PairContribution, SlipPoint,
 };
 pub use hertz::contact_modulus_mpa;
 pub use quadrature::gauss_legendre;

@@ -15,8 +15,10 @@ pub enum SolveError {
     Mesh(#[from] MeshError),
     /// Newton did not converge, not even in the smallest increment.
     #[error(
-        "no equilibrium found at generator angle {generator_rad:.6} rad, load {torque_n_m} N.m: {reason}{}",
-        beyond(*torque_n_m, *reached_n_m)
+        "{} at generator angle {generator_rad:.6} rad, load {torque_n_m} N.m: {reason}{}{}",
+        if softened_to.is_some() { GIVES_WAY } else { UNSOLVED },
+        beyond(*torque_n_m, *reached_n_m),
+        meaning(*torque_n_m, *softened_to)
     )]
     NotConverged {
         /// Where, rad.
@@ -25,6 +27,9 @@ pub enum SolveError {
         torque_n_m: f64,
         /// The last load on the way for which there was an equilibrium, N m.
         reached_n_m: f64,
+        /// What is left of the output's stiffness at that last load, of the largest on the way, where it has fallen so
+        /// far that the drive itself gives way. Missing where the solver failed on a drive that may well stand.
+        softened_to: Option<f64>,
         /// What stopped it.
         reason: &'static str,
         /// Residual of each iteration relative to the contact forces.
@@ -59,6 +64,22 @@ pub enum SolveError {
         /// Turn of the output in the last increment, as a share of what the ratio says.
         rate: f64,
     },
+}
+
+/// How the message of a load begins that the drive does not bear.
+const GIVES_WAY: &str = "the drive gives way: no equilibrium";
+/// How it begins where nothing is known of the drive.
+const UNSOLVED: &str = "not solved";
+
+/// What the failure says of the drive.
+fn meaning(torque_n_m: f64, softened_to: Option<f64>) -> String {
+    match softened_to {
+        Some(left) => format!(", where {:.0} % of the output's stiffness is left", 100.0 * left),
+        None if torque_n_m == 0.0 => {
+            "; this is a failure of the solver: without load an elastic drive stands".to_owned()
+        }
+        None => "; whether the drive stands there is not known".to_owned(),
+    }
 }
 
 /// The last load that there was an equilibrium for, where a load came on.

@@ -347,7 +347,7 @@ impl Problem {
     }
 
     /// Modulus of two flanks that touch, MPa.
-    pub(super) fn contact_modulus_mpa(&self) -> f64 {
+    pub fn contact_modulus_mpa(&self) -> f64 {
         let material = &self.drive.material;
         contact_modulus_mpa(material.youngs_modulus_mpa, material.poissons_ratio)
     }

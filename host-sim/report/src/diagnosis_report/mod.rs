@@ -275,9 +275,15 @@ impl Known<'_> {
             text.plain(".")
         };
         // Never a second percentage beside the confidence: what proves the causes is what they leave.
-        let held = diagnosis.held_out;
-        let share = Text::default().error(held.rms_before_arcsec, 2).plain(" → ").error(held.rms_after_arcsec, 2);
-        let share_is = format!("rms in {}, without the causes and with them", self.left_out());
+        let left = diagnosis.compensation;
+        let share = Text::default()
+            .error(left.rms_nominal_tables_arcsec, 3)
+            .plain(" → ")
+            .error(left.rms_extended_tables_arcsec, 3);
+        let share_is = format!(
+            "rms left after correction in {}, with the nominal table and with one that holds the causes",
+            self.left_out()
+        );
         let (answer, number, number_is) = match diagnosis.verdict {
             Verdict::Explained => (listed(Text::new("Explained by ")), share, share_is),
             Verdict::PartlyExplained => (listed(Text::new("Partly explained by ")), share, share_is),
@@ -315,16 +321,20 @@ impl Known<'_> {
         let mut blocks = Vec::new();
         if !diagnosis.causes.is_empty() {
             blocks.push(Block::paragraph(
-                Text::new(format!("In {} the error of the prediction falls from ", self.left_out()))
-                    .error(held.rms_before_arcsec, 3)
-                    .plain(" to ")
-                    .error(held.rms_after_arcsec, 3)
-                    .plain(
-                        " rms: first the nominal model recalibrated to this unit, then the same with the causes in \
-                         it. Noise and wander of the measurement are ",
-                    )
-                    .error(left.noise_floor_arcsec, 3)
-                    .plain("."),
+                Text::new(
+                    "The model behind the tables is adapted to the zero, stiffness and backlash of these data, which \
+                     a table on board is not, and so leaves another error: ",
+                )
+                .error(held.rms_before_arcsec, 3)
+                .plain(" → ")
+                .error(held.rms_after_arcsec, 3)
+                .plain(format!(" rms in {}, without the causes and with them; ", self.left_out()))
+                .error(left.rms_before_arcsec, 3)
+                .plain(" → ")
+                .error(left.rms_after_arcsec, 3)
+                .plain(" in the data that it was fitted to. Noise and wander of the measurement are ")
+                .error(left.noise_floor_arcsec, 3)
+                .plain("."),
             ));
         } else {
             blocks.push(Block::paragraph(
@@ -596,7 +606,8 @@ impl Known<'_> {
                 line(&format!("extended tables, in {}", self.left_out()), compensation.rms_extended_tables_arcsec),
             ],
         );
-        let mut blocks = vec![all, noise, pointing];
+        // The number that a joint feels, then what is behind it.
+        let mut blocks = vec![pointing, all, noise];
         let rows = self.recalibrated_rows();
         if !rows.is_empty() {
             blocks.push(table("The nominal model as this unit has it", &["Parameter", "Against nominal"], rows));

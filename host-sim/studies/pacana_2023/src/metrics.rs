@@ -147,6 +147,7 @@ mod tests {
             residual: 0.0,
             face: flexspline_mechanics::stepping::Face::EVEN,
             lobe_force_n: 0.0,
+            tips: None,
             settled: true,
             turn_rad: 0.0,
         }
