@@ -7,12 +7,14 @@
 //! time, and no flank that takes a while, nor a torque that is read late, does as well, the rows are means. What the
 //! means take of what the model says is put back then; what has no model stays round.
 
+use std::borrow::Cow;
+
 use flexspline::Table;
 
 use super::base::PlayLaw;
 use super::channels::{fault_throughout, floating, sample, waves};
 use super::flank_lag::behind;
-use super::linear::{Gram, Prior, solve};
+use super::linear::{Gram, Prior, dot, solve};
 use super::rows::{Rows, combined, rms};
 use super::torque_zero::{by_block, is_certain, sum};
 use crate::measurement::{FaultName, Measures, Recording, Treatment};
@@ -68,12 +70,15 @@ struct Held<'a> {
     places: Vec<usize>,
     free: Vec<Vec<f64>>,
     error: Vec<f64>,
+    /// Sine and cosine of each harmonic at the places.
+    waves: Vec<Vec<f64>>,
 }
 
 impl<'a> Held<'a> {
     fn new(rows: &'a Rows, nominal: &'a Nominal) -> Held<'a> {
         let places = sample(rows, SAMPLE);
-        let mut held = Held { rows, nominal, places, free: Vec::new(), error: Vec::new() };
+        let waves_at_places = waves_at(rows, nominal, &places);
+        let mut held = Held { rows, nominal, places, free: Vec::new(), error: Vec::new(), waves: waves_at_places };
         let smooth = Nominal { harmonics: Vec::new(), ..nominal.clone() };
         let mut columns = floating(rows, &smooth, &held.places);
         for order in [1.0, 2.0] {
@@ -103,37 +108,41 @@ impl<'a> Held<'a> {
         column
     }
 
-    /// What the model says, column by column in all rows, arcsec: the waves of its harmonics, wind-up, flank.
-    fn columns(&self, law: PlayLaw, read: Read) -> Vec<Vec<f64>> {
+    /// What the model says, column by column at some rows, arcsec: the waves of its harmonics (`waves` at these rows),
+    /// wind-up, flank.
+    fn columns(&self, law: PlayLaw, read: Read, at: &[usize], waves: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let (rows, nominal) = (self.rows, self.nominal);
         let mut columns = Vec::new();
-        for harmonic in &nominal.harmonics {
-            let order = harmonic.order_per_generator_turn;
+        for (harmonic, pair) in nominal.harmonics.iter().zip(waves.chunks(2)) {
             let share = |k: usize| match read {
-                Read::Mean(s) | Read::MeanOfWaves(s) => sinc(0.5 * order * rows.speed[k] * s),
+                Read::Mean(s) | Read::MeanOfWaves(s) => {
+                    sinc(0.5 * harmonic.order_per_generator_turn * rows.speed[k] * s)
+                }
                 _ => 1.0,
             };
-            for wave in [f64::sin, f64::cos] {
-                let of = |k: usize| harmonic.amplitude_arcsec * share(k) * wave(order * rows.generator[k]);
-                columns.push((0..rows.len()).map(of).collect());
-            }
+            let amplitude: Vec<f64> = at.iter().map(|k| harmonic.amplitude_arcsec * share(*k)).collect();
+            columns.extend(pair.iter().map(|wave| amplitude.iter().zip(wave).map(|(a, wave)| a * wave).collect()));
         }
         let shifted = match read {
-            Read::Late(s) => shifted(rows, s),
-            _ => rows.torque.clone(),
+            Read::Late(s) => Cow::Owned(shifted(rows, s)),
+            _ => Cow::Borrowed(&rows.torque),
         };
         let half = 0.5 * nominal.backlash_arcsec;
-        let mut wind_up: Vec<f64> = shifted.iter().map(|torque| nominal.wind_up_arcsec(*torque)).collect();
         let flank = law.flanks(rows, &shifted, nominal);
         let mut play: Vec<f64> = flank.iter().map(|flank| half * flank).collect();
-        match read {
+        let wind_up = |k: usize| nominal.wind_up_arcsec(shifted[k]);
+        let wound: Vec<f64> = match read {
             Read::Mean(s) | Read::MeanOfLoad(s) => {
-                (wind_up, play) = (averaged(rows, &wind_up, s), averaged(rows, &play, s));
+                let wound: Vec<f64> = (0..rows.len()).map(wind_up).collect();
+                columns.extend([averaged(rows, &wound, s, at), averaged(rows, &play, s, at)]);
+                return columns;
             }
-            Read::Lag(s) => play.iter_mut().zip(behind(rows, &flank, half, s)).for_each(|(play, late)| *play += late),
-            _ => {}
+            _ => at.iter().map(|k| wind_up(*k)).collect(),
+        };
+        if let Read::Lag(s) = read {
+            play.iter_mut().zip(behind(rows, &flank, half, s)).for_each(|(play, late)| *play += late);
         }
-        columns.extend([wind_up, play]);
+        columns.extend([wound, at.iter().map(|k| play[*k]).collect()]);
         columns
     }
 
@@ -141,8 +150,7 @@ impl<'a> Held<'a> {
     fn left(&self, law: PlayLaw, read: Read) -> Vec<f64> {
         let mut left = self.error.clone();
         let mut before: Vec<Vec<f64>> = Vec::new();
-        for column in self.columns(law, read) {
-            let column: Vec<f64> = self.places.iter().map(|k| column[*k]).collect();
+        for column in self.columns(law, read, &self.places, &self.waves) {
             let mut rest = self.freed(column.clone());
             before.iter().for_each(|before| take_away(&mut rest, before));
             if let Some(rest) = unit(&column, rest) {
@@ -156,7 +164,9 @@ impl<'a> Held<'a> {
     /// What means over `s` seconds take of what the model says, in all rows, arcsec; sizes are those that the rows
     /// tell.
     fn taken(&self, law: PlayLaw, s: f64) -> Option<Vec<f64>> {
-        let (means, at_once) = (self.columns(law, Read::Mean(s)), self.columns(law, Read::AtOnce));
+        let all: Vec<usize> = (0..self.rows.len()).collect();
+        let waves = waves_at(self.rows, self.nominal, &all);
+        let [means, at_once] = [Read::Mean(s), Read::AtOnce].map(|read| self.columns(law, read, &all, &waves));
         let freed: Vec<Vec<f64>> =
             means.iter().map(|column| self.freed(self.places.iter().map(|k| column[*k]).collect())).collect();
         let views: Vec<&[f64]> = freed.iter().chain([&self.error]).map(Vec::as_slice).collect();
@@ -182,7 +192,7 @@ fn unit(was: &[f64], mut column: Vec<f64>) -> Option<Vec<f64>> {
 
 /// Takes from a column what it holds of a unit column.
 fn take_away(column: &mut [f64], unit: &[f64]) {
-    let share: f64 = column.iter().zip(unit).map(|(a, b)| a * b).sum();
+    let share = dot(column, unit);
     column.iter_mut().zip(unit).for_each(|(left, v)| *left -= share * v);
 }
 
@@ -191,26 +201,37 @@ fn sinc(x: f64) -> f64 {
     if x.abs() < 1e-4 { 1.0 } else { x.sin() / x }
 }
 
-/// Means over so many seconds about each row, between rows by straight lines, at the ends of a session of what there
-/// is.
-fn averaged(rows: &Rows, values: &[f64], s: f64) -> Vec<f64> {
+/// Sine and cosine of each harmonic at some rows.
+fn waves_at(rows: &Rows, nominal: &Nominal, at: &[usize]) -> Vec<Vec<f64>> {
+    nominal
+        .harmonics
+        .iter()
+        .flat_map(|harmonic| waves(harmonic.order_per_generator_turn, &rows.generator, at))
+        .collect()
+}
+
+/// Means over so many seconds about some rows, which are in order, between rows by straight lines, at the ends of a
+/// session of what there is.
+fn averaged(rows: &Rows, values: &[f64], s: f64, at: &[usize]) -> Vec<f64> {
     let wide = s / rows.period;
     let steps = (STEPS * wide).ceil().max(STEPS) as usize;
-    let mut averaged = vec![0.0; values.len()];
-    for session in rows.sessions.iter().filter(|session| !session.is_empty()) {
-        let last = (session.end - 1) as f64;
-        for k in session.clone() {
-            let at = |step: usize| {
-                let place = k as f64 + wide * ((step as f64 + 0.5) / steps as f64 - 0.5);
-                let place = place.clamp(session.start as f64, last);
-                let below = place.floor() as usize;
-                let share = place - place.floor();
-                values[below] + share * (values[(below + 1).min(session.end - 1)] - values[below])
-            };
-            averaged[k] = (0..steps).map(at).sum::<f64>() / steps as f64;
+    let mut sessions = rows.sessions.iter().filter(|session| !session.is_empty());
+    let mut session = 0..0;
+    let mean = |k: &usize| {
+        while *k >= session.end {
+            session = sessions.next().cloned().unwrap_or(0..values.len());
         }
-    }
-    averaged
+        let (first, last) = (session.start as f64, (session.end - 1) as f64);
+        let at = |step: usize| {
+            let place = *k as f64 + wide * ((step as f64 + 0.5) / steps as f64 - 0.5);
+            let place = place.clamp(first, last);
+            let below = place as usize;
+            let share = place - below as f64;
+            values[below] + share * (values[(below + 1).min(session.end - 1)] - values[below])
+        };
+        (0..steps).map(at).sum::<f64>() / steps as f64
+    };
+    at.iter().map(mean).collect()
 }
 
 /// The torque of so many seconds later, held at the ends of a session.

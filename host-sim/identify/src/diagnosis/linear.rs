@@ -96,7 +96,7 @@ impl Gram {
 const MANY: usize = 24;
 
 /// Sum of products, in eight sums side by side.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let (a_eights, a_rest) = a.as_chunks::<8>();
     let (b_eights, b_rest) = b.as_chunks::<8>();
     let mut sums = [0.0; 8];

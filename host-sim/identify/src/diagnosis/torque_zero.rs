@@ -11,6 +11,7 @@ use flexspline::Table;
 
 use super::base::{PlayLaw, predicted_by_table};
 use super::channels::{fault_throughout, floating, sample, waves};
+use super::linear::dot;
 use super::rows::{Rows, mean, rms};
 use crate::measurement::{FaultName, Measures, Recording, Session, Treatment};
 use crate::nominal::Nominal;
@@ -61,8 +62,12 @@ struct Held<'a> {
     nominal: &'a Nominal,
     table: Option<&'a Table<'a>>,
     law: PlayLaw,
+    /// Sine and cosine of the angle against gravity, in each row.
+    turned: Vec<(f64, f64)>,
     /// The rows that are compared.
     places: Vec<usize>,
+    /// The nominal harmonics there, arcsec.
+    harmonics: Vec<f64>,
     /// What floats in any drive: columns of unit length, each free of those before it.
     free: Vec<Vec<f64>>,
     /// Whether the spring may be stiffer one way than the other.
@@ -75,7 +80,11 @@ type Beside = [f64; 4];
 impl<'a> Held<'a> {
     fn new(rows: Rows, nominal: &'a Nominal, table: Option<&'a Table<'a>>) -> Held<'a> {
         let places = sample(&rows, SAMPLE);
-        let mut held = Held { rows, nominal, table, law: PlayLaw::Held, places, free: Vec::new(), by_sign: false };
+        let turned =
+            rows.output.iter().zip(&rows.orientation).map(|(out, housing)| (out + housing).sin_cos()).collect();
+        let harmonics = places.iter().map(|k| nominal.harmonics_arcsec(rows.generator[*k])).collect();
+        let (law, free, by_sign) = (PlayLaw::Held, Vec::new(), false);
+        let mut held = Held { rows, nominal, table, law, turned, places, harmonics, free, by_sign };
         held.float();
         held
     }
@@ -125,7 +134,7 @@ impl<'a> Held<'a> {
     /// What the free columns leave of a column.
     fn freed(&self, mut column: Vec<f64>) -> Vec<f64> {
         for free in &self.free {
-            let share: f64 = free.iter().zip(&column).map(|(a, b)| a * b).sum();
+            let share = dot(free, &column);
             column.iter_mut().zip(free).for_each(|(left, v)| *left -= share * v);
         }
         column
@@ -140,7 +149,7 @@ impl<'a> Held<'a> {
         let rows = &self.rows;
         let torque: Vec<f64> = (0..rows.len())
             .map(|k| {
-                let (sin, cos) = (rows.output[k] + rows.orientation[k]).sin_cos();
+                let (sin, cos) = self.turned[k];
                 rows.torque[k] + constant + sine * sin + cosine * cos + drag * rows.direction[k]
             })
             .collect();
@@ -153,9 +162,7 @@ impl<'a> Held<'a> {
                 let all = predicted_by_table(rows, &torque, table);
                 self.places.iter().map(|k| all[*k]).collect()
             }
-            None => (0..self.places.len())
-                .map(|j| wind_up[j] + flank[j] + self.nominal.harmonics_arcsec(rows.generator[self.places[j]]))
-                .collect(),
+            None => (0..self.places.len()).map(|j| wind_up[j] + flank[j] + self.harmonics[j]).collect(),
         };
         let left = self.places.iter().zip(&predicted).map(|(k, predicted)| rows.error[*k] - predicted).collect();
         // Stiffness and backlash float as well.
@@ -220,9 +227,9 @@ const WORTH_A_ROUND: f64 = 0.999;
 
 /// Takes from `column` what it holds of `other`.
 fn take_away(column: &mut [f64], other: &[f64]) {
-    let power: f64 = other.iter().map(|v| v * v).sum();
+    let power = dot(other, other);
     if power > 0.0 {
-        let share = column.iter().zip(other).map(|(a, b)| a * b).sum::<f64>() / power;
+        let share = dot(column, other) / power;
         column.iter_mut().zip(other).for_each(|(left, v)| *left -= share * v);
     }
 }

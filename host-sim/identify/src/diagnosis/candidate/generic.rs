@@ -1,6 +1,7 @@
 //! Deviations without a cause in the library. They compete with the causes: where one of them tells the data better, no
 //! cause is named for it.
 
+use super::geometry::{Angle, waves};
 use super::stiffness::follow;
 use super::{Deviation, Excitation, Label, Law, Per, Role, Shape, by_row, lagged, main};
 use crate::causes::ParameterName as Name;
@@ -35,15 +36,6 @@ fn law(name: &'static str, values: impl Fn(&Excitation<'_>, usize) -> f64 + Send
         let column = by_row(on, |k| values(on, k));
         let size = super::super::rows::rms(&column).max(1e-12);
         vec![main(column.into_iter().map(|v| v / size).collect(), 20.0)]
-    })
-}
-
-fn wave(label: Deviation, angle: fn(&Excitation<'_>, usize) -> f64, order: f64) -> Law {
-    Law::new(Label::Deviation(label), move |on, _| {
-        vec![
-            main(by_row(on, |k| (order * angle(on, k)).cos()), 15.0),
-            main(by_row(on, |k| (order * angle(on, k)).sin()), 15.0),
-        ]
     })
 }
 
@@ -114,19 +106,18 @@ fn zero_of_each_session() -> Law {
 /// A line at any order of an angle or of time: `per` is what it is counted against.
 #[must_use]
 pub fn line(per: Per, order: f64) -> Law {
-    let angle: fn(&Excitation<'_>, usize) -> f64 = match per {
-        Per::GeneratorTurn => |on, k| on.rows.generator[k],
-        Per::OutputTurn => |on, k| on.rows.output[k],
-        Per::Second => |on, k| 2.0 * std::f64::consts::PI * on.rows.time[k],
-    };
-    let label = Deviation::Line { per, order };
-    if per != Per::Second {
-        return wave(label, angle, order);
+    let label = Label::Deviation(Deviation::Line { per, order });
+    let of_angle = |of: Angle| Law::new(label, move |on, _| waves(on, of, order).map(|wave| main(wave, 15.0)).into());
+    match per {
+        Per::GeneratorTurn => return of_angle(Angle::Generator),
+        Per::OutputTurn => return of_angle(Angle::Output),
+        Per::Second => {}
     }
     // Nothing says that a line in time keeps its phase while nobody records.
-    Law::new(Label::Deviation(label), move |on, _| {
+    Law::new(label, move |on, _| {
+        let turned = |k: usize| order * (2.0 * std::f64::consts::PI * on.rows.time[k]);
         let of = |session: &std::ops::Range<usize>, shift: f64| {
-            let inside = |k: usize| if session.contains(&k) { (order * angle(on, k) - shift).cos() } else { 0.0 };
+            let inside = |k: usize| if session.contains(&k) { (turned(k) - shift).cos() } else { 0.0 };
             main(by_row(on, inside), 15.0)
         };
         on.rows.sessions.iter().flat_map(|s| [of(s, 0.0), of(s, std::f64::consts::FRAC_PI_2)]).collect()

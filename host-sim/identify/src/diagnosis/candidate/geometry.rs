@@ -46,6 +46,8 @@ pub(super) const TURNED_BACK: &str = "orientation counted back";
 /// Which angle an error is locked to.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Angle {
+    Generator,
+    Output,
     Flexspline,
     CircularSpline,
     /// Gravity as the wave sees it, orientation counted with this sign.
@@ -54,6 +56,8 @@ pub(super) enum Angle {
 
 pub(super) fn angle(on: &Excitation<'_>, of: Angle, k: usize) -> f64 {
     match of {
+        Angle::Generator => on.rows.generator[k],
+        Angle::Output => on.rows.output[k],
         Angle::Flexspline => on.rows.on_flexspline[k],
         Angle::CircularSpline => on.rows.on_circular_spline[k],
         Angle::Gravity(sign) => on.rows.generator[k] + sign * on.rows.orientation[k],
@@ -82,6 +86,8 @@ pub(super) fn kept(on: &Excitation<'_>, of: Angle, order: f64) -> std::sync::Arc
         Angle::Flexspline => 0,
         Angle::CircularSpline => 1,
         Angle::Gravity(sign) => 2 + i8::from(sign > 0.0),
+        Angle::Generator => 4,
+        Angle::Output => 5,
     };
     on.base.waves.of(which, order, || {
         let (sin, cos) = (0..on.rows.len()).map(|k| (order * angle(on, of, k)).sin_cos()).unzip();

@@ -2,22 +2,17 @@
 
 use std::f64::consts::TAU;
 
-use super::{Excitation, Law, Named, Role, by_row, main, nuisance, polar};
+use super::geometry::{Angle, waves};
+use super::{Column, Excitation, Law, Named, Role, by_row, main, nuisance, polar};
 use crate::causes::{CauseName, ParameterName as Name};
 
 /// The first order of an encoder.
 const WAVE: Role = Role("wave");
 
-fn encoder(cause: CauseName, phase: fn(&Excitation<'_>, usize) -> f64, per_ratio: bool) -> Law {
+fn encoder(cause: CauseName, angle: Angle, per_ratio: bool) -> Law {
     Law::new(cause, move |on, _| {
-        let wave = |order: f64, shift: f64| by_row(on, |k| (order * phase(on, k) - shift).cos());
-        let quarter = std::f64::consts::FRAC_PI_2;
-        vec![
-            main(wave(1.0, 0.0), 30.0).called(WAVE),
-            main(wave(1.0, quarter), 30.0).called(WAVE),
-            nuisance(wave(2.0, 0.0), 0.15),
-            nuisance(wave(2.0, quarter), 0.15),
-        ]
+        let first = waves(on, angle, 1.0).map(|wave| main(wave, 30.0).called(WAVE));
+        first.into_iter().chain(waves(on, angle, 2.0).map(|wave| nuisance(wave, 0.15))).collect()
     })
     .parameters_by(move |on, _, c| {
         // c cos(x) + s sin(x) = A sin(x + phase).
@@ -39,18 +34,15 @@ const OVERTONE: f64 = 0.15;
 /// none: overtones are what tells a wheel.
 fn waves_of(
     cause: CauseName,
-    phase: fn(&Excitation<'_>, usize) -> f64,
+    angle: Angle,
     order: f64,
     has_overtone: bool,
     parameters: impl Fn(&Excitation<'_>, f64, f64) -> Vec<Named> + Send + Sync + 'static,
 ) -> Law {
     Law::new(cause, move |on, _| {
-        let wave = |order: f64, shift: f64| by_row(on, |k| (order * phase(on, k) - shift).cos());
-        let quarter = std::f64::consts::FRAC_PI_2;
-        let mut columns =
-            vec![main(wave(order, 0.0), 15.0).called(WAVE), main(wave(order, quarter), 15.0).called(WAVE)];
+        let mut columns: Vec<Column> = waves(on, angle, order).map(|wave| main(wave, 15.0).called(WAVE)).into();
         if has_overtone {
-            columns.extend([0.0, quarter].map(|shift| nuisance(wave(2.0 * order, shift), OVERTONE)));
+            columns.extend(waves(on, angle, 2.0 * order).map(|wave| nuisance(wave, OVERTONE)));
         }
         columns
     })
@@ -60,9 +52,6 @@ fn waves_of(
         parameters(on, amplitude, phase)
     })
 }
-
-const OUTPUT: fn(&Excitation<'_>, usize) -> f64 = |on, k| on.rows.output[k];
-const GENERATOR: fn(&Excitation<'_>, usize) -> f64 = |on, k| on.rows.generator[k];
 
 /// The second order of an encoder: a disc or a magnet that is tilted, a ring that is not flat, two signals of unlike
 /// size in a magnetic one.
@@ -77,8 +66,8 @@ fn encoder_tilt() -> [Law; 2] {
             (Name::PhaseRad, phase),
         ]
     };
-    let of_generator = waves_of(CauseName::GeneratorEncoderTilt, GENERATOR, 2.0, false, at_generator);
-    let of_output = waves_of(CauseName::OutputEncoderTilt, OUTPUT, 2.0, true, at_output);
+    let of_generator = waves_of(CauseName::GeneratorEncoderTilt, Angle::Generator, 2.0, false, at_generator);
+    let of_output = waves_of(CauseName::OutputEncoderTilt, Angle::Output, 2.0, true, at_output);
     [of_output.kin_of_shapes(), of_generator.after_wheels()]
 }
 
@@ -93,7 +82,7 @@ pub(super) fn is_subdivision(order: f64) -> bool {
 
 /// An encoder that divides the periods of its signals unevenly.
 fn encoder_subdivision(of_output: bool, order: f64) -> Law {
-    let angle = if of_output { OUTPUT } else { GENERATOR };
+    let angle = if of_output { Angle::Output } else { Angle::Generator };
     let law = waves_of(CauseName::EncoderSubdivision, angle, order, of_output, move |on, amplitude, phase| {
         let at_generator = (Name::GeneratorAmplitudeArcsec, amplitude * on.nominal.ratio.abs());
         [(Name::AmplitudeArcsec, amplitude)]
@@ -177,8 +166,8 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
             .map(move |order| encoder_subdivision(of_output, order))
     });
     [
-        encoder(CauseName::OutputEncoderEccentricity, OUTPUT, false),
-        encoder(CauseName::GeneratorEncoderEccentricity, GENERATOR, true),
+        encoder(CauseName::OutputEncoderEccentricity, Angle::Output, false),
+        encoder(CauseName::GeneratorEncoderEccentricity, Angle::Generator, true),
         ratio_error(),
         sensor_latency(),
     ]
