@@ -674,6 +674,7 @@ mod tests {
             ratio: Some(ratio),
             within_scatter: None,
             words: "secant",
+            reason: None,
         };
         let beside = vec![row(244_747.3), row(2.447e11), row(0.98)];
         let told = SheetBeside { generator: GeneratorKind::Cam, stated, loads, assumed, sheet, beside, why: None };

@@ -247,8 +247,10 @@ fn fingerprint(parameters: &BTreeMap<String, f64>) -> String {
     hash.finalize().to_hex()[..16].to_owned()
 }
 
-/// Numbers of [`Scales`] by their names in a file.
-const SCALES: [(&str, fn(&mut Scales) -> &mut f64); 7] = [
+/// A number of [`Scales`] and its name in a file.
+type ScaleField = (&'static str, fn(&mut Scales) -> &mut f64);
+
+const SCALES: [ScaleField; 7] = [
     ("load_n_m", |s| &mut s.load),
     ("mean_speed_rad_s", |s| &mut s.mean_speed),
     ("begin_s", |s| &mut s.begin_s),

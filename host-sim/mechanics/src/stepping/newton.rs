@@ -263,7 +263,7 @@ impl<'p> Solver<'p> {
     /// The flexspline deformed by the generator at `generator_rad`, without load.
     pub fn deform(&mut self, generator_rad: f64) -> Result<(State, Increment), SolveError> {
         self.work = 0;
-        let first = self.deform_by(&DEFORMING_SOFTNESS[0], generator_rad);
+        let first = self.deform_by(DEFORMING_SOFTNESS[0], generator_rad);
         if !matches!(first, Err(SolveError::NotConverged { .. })) {
             return first;
         }
