@@ -62,7 +62,7 @@ pub(super) struct Diagnose {
     /// came to. Several with commas, or repeated: a list in JSON, and without what to record to tell them apart
     #[arg(long, value_name = "CAUSE", value_delimiter = ',')]
     explain: Vec<String>,
-    /// Do not consider this cause, which is known not to be there; several with commas, or repeated
+    /// Do not consider this cause, which is known not to be there; several with commas, or repeated [default: none]
     #[arg(long, value_name = "CAUSE", value_delimiter = ',')]
     without: Vec<String>,
     /// Do not write report.html

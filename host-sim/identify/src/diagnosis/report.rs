@@ -120,6 +120,14 @@ pub struct Compensation {
     pub rms_extended_tables_arcsec: f64,
 }
 
+impl Compensation {
+    /// Whether it was evaluated: no data are without any error.
+    #[must_use]
+    pub fn is_known(&self) -> bool {
+        self.rms_uncompensated_arcsec > 0.0
+    }
+}
+
 /// Something found that has no name.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Unexplained {
@@ -212,7 +220,7 @@ impl Diagnosis {
         };
         let _ = writeln!(text, "finding: {}", self.finding.words());
         let c = &self.compensation;
-        if self.finding != Finding::DataUnusable {
+        if self.finding != Finding::DataUnusable && c.is_known() {
             // The one number first: what is left where it is used.
             let _ = if self.causes.is_empty() {
                 writeln!(

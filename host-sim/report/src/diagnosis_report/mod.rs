@@ -275,15 +275,17 @@ impl Known<'_> {
             text.plain(".")
         };
         // Never a second percentage beside the confidence: what proves the causes is what they leave.
-        let left = diagnosis.compensation;
-        let share = Text::default()
-            .error(left.rms_nominal_tables_arcsec, 3)
-            .plain(" → ")
-            .error(left.rms_extended_tables_arcsec, 3);
-        let share_is = format!(
-            "rms left after correction in {}, with the nominal table and with one that holds the causes",
-            self.left_out()
-        );
+        let fell = |from: f64, to: f64| Text::default().error(from, 3).plain(" → ").error(to, 3);
+        let (corrected, held) = (diagnosis.compensation, diagnosis.held_out);
+        let (share, share_is) = if corrected.is_known() {
+            (
+                fell(corrected.rms_nominal_tables_arcsec, corrected.rms_extended_tables_arcsec),
+                "rms left after correction in {}, with the nominal table and with one that holds the causes",
+            )
+        } else {
+            (fell(held.rms_before_arcsec, held.rms_after_arcsec), "rms in {}, without the causes and with them")
+        };
+        let share_is = share_is.replace("{}", self.left_out());
         let (answer, number, number_is) = match diagnosis.verdict {
             Verdict::Explained => (listed(Text::new("Explained by ")), share, share_is),
             Verdict::PartlyExplained => (listed(Text::new("Partly explained by ")), share, share_is),
@@ -955,6 +957,14 @@ mod tests {
             assert_eq!(stamps.contains(&status), status != Status::Good);
             assert!(faulty.remarks[0].contains("index jump of an encoder; the output jumps."), "{:?}", faulty.remarks);
         }
+        // What a joint would feel comes first where it was evaluated.
+        let mut evaluated = diagnosis(Verdict::Explained, &[CauseName::Wear]);
+        evaluated.compensation = Compensation {
+            rms_uncompensated_arcsec: 20.0,
+            rms_nominal_tables_arcsec: 8.0,
+            rms_extended_tables_arcsec: 3.0,
+        };
+        assert_eq!(words(&page_of(&evaluated, Vec::new()).headlines[0].number), "8″ → 3″");
     }
 
     #[test]
