@@ -134,9 +134,14 @@ fn a_drive_from_a_few_numbers_clears_its_teeth_and_says_how_it_was_made() {
     assert_eq!(wide["drive"]["flexspline"]["width_mm"], 40.0, "{guesses}");
     assert_eq!(wide["drive"]["generator"]["bearing_stiffness_n_per_mm3"], 5000.0, "{guesses}");
     assert!(desk.read("wide.toml").contains("half the bore of 62.4"), "{guesses}");
-    // The rated torque of a CSF is not at hand, nor is anything of a ratio that is not in the catalogue.
+    // The rated torque of a CSF is not at hand; a ratio that is not in the catalogue has the figures of its neighbour.
     assert!(desk.line("new csf.toml --like CSF-25-80").done().stdout.contains("to be filled in: rated_torque_n_m"));
-    assert!(desk.line("new odd.toml --like CSF-25-90").done().stdout.contains("figures of CSF-25-90 are not at hand"));
+    assert!(
+        desk.line("new odd.toml --like CSF-25-90")
+            .done()
+            .stdout
+            .contains("CSF-25-100 (the nearest ratio at hand to 90)")
+    );
     // S-shaped teeth are drawn for the cam.
     let s = desk.line("new s.toml --like CSG-25-80 --set flexspline.profile=s --json").done().json();
     assert_eq!(s["teeth"]["clear"], serde_json::json!(["cam"]));
@@ -323,8 +328,8 @@ fn every_command_prints_one_json_object_and_nothing_else() {
         assert!(run.code == 1 || said.count() == 0, "{line}: {}", run.stderr);
     }
     for command in commands(&desk) {
-        // These take minutes: what they print is tested beside their code.
-        let long = ["kernels", "reproduce"].contains(&&*command);
+        // These take minutes, or go on until they are stopped: what they print is tested beside their code.
+        let long = ["kernels", "reproduce", "serve"].contains(&&*command);
         let tried = lines.iter().any(|line| line.split(' ').next() == Some(&command));
         assert!(tried != long, "{command} is not tried with --json");
     }
