@@ -218,8 +218,8 @@ fn averaged(rows: &Rows, values: &[f64], s: f64, at: &[usize]) -> Vec<f64> {
     let mut sessions = rows.sessions.iter().filter(|session| !session.is_empty());
     let mut session = 0..0;
     let mean = |k: &usize| {
-        while *k >= session.end {
-            session = sessions.next().cloned().unwrap_or(0..values.len());
+        if *k >= session.end {
+            session = sessions.find(|session| *k < session.end).cloned().unwrap_or(0..values.len());
         }
         let (first, last) = (session.start as f64, (session.end - 1) as f64);
         let at = |step: usize| {
