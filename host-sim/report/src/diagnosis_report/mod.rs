@@ -277,7 +277,9 @@ impl Known<'_> {
         // Never a second percentage beside the confidence: what proves the causes is what they leave.
         let fell = |from: f64, to: f64| Text::default().error(from, 3).plain(" → ").error(to, 3);
         let (corrected, held) = (diagnosis.compensation, diagnosis.held_out);
-        let (share, share_is) = if corrected.is_known() {
+        // A table cannot correct every cause: what a sensor reads wrong the output does not do.
+        let corrects = corrected.rms_extended_tables_arcsec != corrected.rms_nominal_tables_arcsec;
+        let (share, share_is) = if corrected.is_known() && corrects {
             (
                 fell(corrected.rms_nominal_tables_arcsec, corrected.rms_extended_tables_arcsec),
                 "rms left after correction in {}, with the nominal table and with one that holds the causes",
