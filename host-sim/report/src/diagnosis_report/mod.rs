@@ -275,7 +275,7 @@ impl Known<'_> {
             text.plain(".")
         };
         // Never a second percentage beside the confidence: what proves the causes is what they leave.
-        let fell = |from: f64, to: f64| Text::default().error(from, 3).plain(" → ").error(to, 3);
+        let fell = |from: f64, to: f64| Text::default().error(from, 2).plain(" → ").error(to, 2);
         let (corrected, held) = (diagnosis.compensation, diagnosis.held_out);
         // A table cannot correct every cause: what a sensor reads wrong the output does not do.
         let corrects = corrected.rms_extended_tables_arcsec != corrected.rms_nominal_tables_arcsec;
