@@ -56,6 +56,7 @@ BOOK = {
         "CONTRIBUTING",
         "CHANGELOG",
         "tests/exam/README",
+        "tests/c99/*",
         "tests/firmware/samples/README",
         "core/MUTANTS",
         "host-sim/fly/plant/README",

@@ -27,7 +27,8 @@ use flexspline_report::calibration_report;
 /// calibration.json and report.html.
 ///
 /// --plan reports what to record before there is a log: the most informative passes of the bench in the time available,
-/// with the accuracy to expect. --more reports what to record in addition to the logs. Both write plan.csv and plan.json.
+/// with the accuracy to expect. --more reports what to record in addition to the logs. Both write plan.csv and
+/// plan.json.
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("known").required(true).args(["tables", "model", "ratio"]))]
 #[command(after_help = "\

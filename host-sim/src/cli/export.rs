@@ -34,9 +34,9 @@ const LARGEST_STEP_RAD: f64 = 0.1;
 /// turns the drive; mm, N, MPa, a slice of 1 mm. For a drive with a three-dimensional sleeve (CUP-95): the flexspline
 /// alone, in solids, under w0.
 /// fmu: a table (--tables), or a joint with mass, for simulators that import FMI 2.0 co-simulation: docs/how-to/fmu.md.
-/// eqmod, onstepx, linuxcnc, beckhoff, moteus, odrive, ros2, cfs, fprime: a table (--tables) resampled for the lookup of
-/// that device. The lookup is simulated, and its residual reported on the table's own model and on the data of a unit
-/// (--data): docs/how-to/export_to_controllers.md.
+/// eqmod, onstepx, linuxcnc, beckhoff, moteus, odrive, ros2, cfs, fprime: a table (--tables) resampled for the lookup
+/// of that device. The lookup is simulated, and its residual reported on the table's own model and on the data of a
+/// unit (--data): docs/how-to/export_to_controllers.md.
 #[derive(Debug, Args)]
 #[command(
     mut_args(beside_tables),

@@ -94,8 +94,8 @@ pub(super) struct PlaybackOptions {
     data: Option<PathBuf>,
     #[command(flatten)]
     logs: LogOptions,
-    /// Write even if the correction is useless, the table exceeds the default size of cFS, or an unrelated file would be
-    /// overwritten
+    /// Write even if the correction is useless, the table exceeds the default size of cFS, or an unrelated file would
+    /// be overwritten
     #[arg(long)]
     force: bool,
     /// Directions of motion of the output: moteus and beckhoff have one value for both [default: both]; eqmod and

@@ -59,8 +59,8 @@ pub(super) struct Validate {
     /// Solver of the new FEM runs: reference or fast
     #[arg(long, value_name = "SOLVER", default_value = "reference", value_parser = names::solver(), hide_possible_values = true)]
     solver: Method,
-    /// Do not write report.html (validation.html if the page of the tables is in the same folder), which takes a FEM run
-    /// over one more tooth pitch for each generator
+    /// Do not write report.html (validation.html if the page of the tables is in the same folder), which takes a FEM
+    /// run over one more tooth pitch for each generator
     #[arg(long)]
     no_report: bool,
 }

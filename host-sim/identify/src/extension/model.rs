@@ -43,6 +43,9 @@ pub struct CauseEntry {
     pub fit: Option<FittedLaw>,
 }
 
+/// What causes add to the error of each session, arcsec, or the parameter that does not fit.
+pub type Added = Result<Vec<Vec<f64>>, String>;
+
 /// A nominal model with causes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
@@ -109,7 +112,7 @@ impl Model {
     ///
     /// # Errors
     /// A parameter that does not fit the sessions.
-    pub fn added_arcsec(&self, sessions: &[Session], sizes: Sizes) -> Result<Vec<Vec<f64>>, String> {
+    pub fn added_arcsec(&self, sessions: &[Session], sizes: Sizes) -> Added {
         let fitted: Vec<(CauseName, &FittedLaw)> =
             self.causes.iter().filter_map(|cause| Some((cause.name, cause.fit.as_ref()?))).collect();
         let Some(mut added) = added_by(&fitted, sessions, &self.nominal) else {
@@ -126,12 +129,7 @@ impl Model {
         Ok(added)
     }
 
-    fn simulated_arcsec(
-        &self,
-        effects: &[Chosen],
-        sessions: &[Session],
-        sizes: Sizes,
-    ) -> Result<Vec<Vec<f64>>, String> {
+    fn simulated_arcsec(&self, effects: &[Chosen], sessions: &[Session], sizes: Sizes) -> Added {
         let on = Excitation::of_sessions(sessions, 100.0, self.nominal.temperature_c);
         let plant = Plant { nominal: &self.nominal, table: None };
         let added = added_arcsec(&plant, sizes, effects, &on)?;
