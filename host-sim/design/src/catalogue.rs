@@ -29,13 +29,12 @@ pub fn sheet(series: &str, size: f64, ratio: u32) -> Option<Stated> {
         _ => return None,
     };
     let line = rows().into_iter().find(|row| row.size == size && row.ratio == ratio)?;
-    let source = format!("Harmonic Drive {}-{size}-{ratio}", series.to_ascii_uppercase());
     let [rated_n_m, ratcheting_n_m] = match which {
         Series::Csf => [None, line.ratcheting_csf_n_m],
         Series::Csg => [line.rated_csg_n_m, line.ratcheting_csg_n_m],
     };
     Some(Stated {
-        source: Some(source),
+        source: Some(format!("Harmonic Drive {}-{size}-{ratio}", series.to_ascii_uppercase())),
         rated_torque_n_m: rated_n_m,
         t1_n_m: line.t1_n_m,
         t2_n_m: line.t2_n_m,

@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use crate::cautions::{Looked, rigid_gap_um, room_as_built_arcsec};
 use crate::pitch_wave::peak_to_peak;
-use crate::simulate::{TipContact, peak_stress, zones};
+use crate::simulate::{TipContact, peak_stress};
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::motion::Motion;
@@ -314,7 +314,7 @@ fn fill(sheet: &mut DataSheet, problem: &Problem, loads: Loads, positions: usize
     for k in 1..=positions {
         motion.turn_to(start + motion.pitch() * k as f64 / positions as f64)?;
         places.push(motion.place());
-        tips.extend(TipContact::of(&zones(problem, motion.state()), drive.flexspline.module_mm));
+        tips.extend(TipContact::at(problem, motion.state()));
     }
     sheet.tips_bear_percent = Some(100.0 * tips.iter().map(|tips| tips.share).fold(0.0, f64::max));
     sheet.tip_contact = TipContact::worst(tips.into_iter());

@@ -12,7 +12,7 @@ use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_mechanics::motion::Motion;
 use flexspline_mechanics::stepping::{Method, Problem, SolveError, SolverSettings};
 
-use crate::simulate::{TipContact, zones};
+use crate::simulate::TipContact;
 
 /// Places over a tooth pitch at which tips are looked at, where one tooth after another comes by. A guess.
 const PLACES: usize = 6;
@@ -97,8 +97,7 @@ pub fn tips_that_bear(drive: &Drive, kind: GeneratorKind, torque_n_m: f64) -> Re
         if place > 0 {
             motion.turn(motion.pitch() / PLACES as f64)?;
         }
-        let found =
-            TipContact::of(&zones(&problem, motion.state()), drive.flexspline.module_mm).filter(TipContact::counts);
+        let found = TipContact::at(&problem, motion.state()).filter(TipContact::counts);
         if found.is_some() {
             return Ok(found);
         }

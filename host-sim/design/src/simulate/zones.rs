@@ -141,6 +141,11 @@ fn pairs(problem: &Problem, state: &State) -> Vec<Pair> {
 }
 
 impl TipContact {
+    /// What bears on tips in a state that has all nodes near the flanks.
+    pub fn at(problem: &Problem, state: &State) -> Option<TipContact> {
+        TipContact::of(&zones(problem, state), problem.drive.flexspline.module_mm)
+    }
+
     /// The worst of some states: the one with the largest pressure on tips.
     pub fn worst(all: impl Iterator<Item = TipContact>) -> Option<TipContact> {
         all.max_by(|a, b| a.peak_mpa[0].total_cmp(&b.peak_mpa[0]))

@@ -136,6 +136,14 @@ pub struct PairContribution {
     pub along_face: Option<AlongFace>,
 }
 
+/// A point of a pair that bears: its place along the flank, and how far from the axis of the circular spline it and its
+/// foot stand, mm.
+struct BearingPoint {
+    place: Place,
+    radius: f64,
+    foot_radius: f64,
+}
+
 /// Where a pair bears.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BearingPlace {
@@ -619,16 +627,8 @@ impl<'a> FlankContact<'a> {
         points: &[FlankPoint],
         modulus_mpa: f64,
     ) -> f64 {
-        let field = self.local_field(pair, at);
-        let Some(bearing) = self.bearing(pair, &field, law, points) else { return 0.0 };
-        let place = |point: &FlankPoint| {
-            let x = self.seen_from_space(&field, point.position, point.edge, &point.shape);
-            let gap = self.foot(pair, &field, x).distance + bearing.later_mm;
-            Place { arc: point.arc, gap, force: law.stiffness * point.weight * (-gap).max(0.0) }
-        };
-        let places: Vec<Place> = points.iter().map(place).collect();
-        let least_radius = 1.0 / (1.0 / self.tooth.rounding_radius + 1.0 / self.space.rounding_radius);
-        peak_pressure_mpa(&places, bearing.peak_over_mean, modulus_mpa, least_radius)
+        self.touches(pair, at, law, points)
+            .map_or(0.0, |(bearing, touches)| self.peak_of(&bearing, &touches, modulus_mpa))
     }
 
     /// Where a pair bears, whether on flanks or on tips; nothing of a pair that is open.
@@ -640,28 +640,51 @@ impl<'a> FlankContact<'a> {
         points: &[FlankPoint],
         modulus_mpa: f64,
     ) -> Option<BearingPlace> {
-        let field = self.local_field(pair, at);
-        let bearing = self.bearing(pair, &field, law, points)?;
+        let (bearing, touches) = self.touches(pair, at, law, points)?;
         let (tooth, space) = (&self.tooth, &self.space);
         let tooth_tip_from = tooth.arc_at(tooth.junction_radius) - tooth.rounding_radius;
         // On the circular spline the tip lies inward.
         let space_tip_to = space.junction_radius + space.rounding_radius;
         let (mut load, mut on_tips, mut reach_mm) = (0.0, [0.0; 2], f64::NEG_INFINITY);
-        for point in points {
-            let x = self.seen_from_space(&field, point.position, point.edge, &point.shape);
-            reach_mm = reach_mm.max(x[0].hypot(x[1]) - space.tip_radius);
-            let foot = self.foot(pair, &field, x);
-            let force = law.stiffness * point.weight * (-(foot.distance + bearing.later_mm)).max(0.0);
+        for BearingPoint { place: Place { arc, force, .. }, radius, foot_radius } in &touches {
+            reach_mm = reach_mm.max(radius - space.tip_radius);
             load += force;
-            on_tips[0] += if point.arc >= tooth_tip_from { force } else { 0.0 };
-            on_tips[1] += if foot.radius <= space_tip_to { force } else { 0.0 };
+            on_tips[0] += if *arc >= tooth_tip_from { *force } else { 0.0 };
+            on_tips[1] += if *foot_radius <= space_tip_to { *force } else { 0.0 };
         }
         (load > 0.0).then(|| BearingPlace {
             load,
-            peak_mpa: self.peak_pressure_mpa(pair, at, law, points, modulus_mpa),
+            peak_mpa: self.peak_of(&bearing, &touches, modulus_mpa),
             on_tips: on_tips.map(|force| force / load),
             reach_mm,
         })
+    }
+
+    /// How a pair bears, and each of its points; nothing of a pair that is open.
+    fn touches(
+        &self,
+        pair: FlankPair,
+        at: Configuration,
+        law: FlankLaw,
+        points: &[FlankPoint],
+    ) -> Option<(Bearing, Vec<BearingPoint>)> {
+        let field = self.local_field(pair, at);
+        let bearing = self.bearing(pair, &field, law, points)?;
+        let touch = |point: &FlankPoint| {
+            let x = self.seen_from_space(&field, point.position, point.edge, &point.shape);
+            let foot = self.foot(pair, &field, x);
+            let gap = foot.distance + bearing.later_mm;
+            let place = Place { arc: point.arc, gap, force: law.stiffness * point.weight * (-gap).max(0.0) };
+            BearingPoint { place, radius: x[0].hypot(x[1]), foot_radius: foot.radius }
+        };
+        let touches = points.iter().map(touch).collect();
+        Some((bearing, touches))
+    }
+
+    fn peak_of(&self, bearing: &Bearing, touches: &[BearingPoint], modulus_mpa: f64) -> f64 {
+        let places: Vec<Place> = touches.iter().map(|touch| touch.place).collect();
+        let least_radius = 1.0 / (1.0 / self.tooth.rounding_radius + 1.0 / self.space.rounding_radius);
+        peak_pressure_mpa(&places, bearing.peak_over_mean, modulus_mpa, least_radius)
     }
 
     /// Gap of every integration point where the face is nearest, how it changes as the output alone turns (mm/rad), and
