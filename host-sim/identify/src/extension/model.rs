@@ -43,9 +43,6 @@ pub struct CauseEntry {
     pub fit: Option<FittedLaw>,
 }
 
-/// What causes add to the error of each session, arcsec, or the parameter that does not fit.
-pub type Added = Result<Vec<Vec<f64>>, String>;
-
 /// A nominal model with causes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
@@ -112,36 +109,24 @@ impl Model {
     ///
     /// # Errors
     /// A parameter that does not fit the sessions.
-    pub fn added_arcsec(&self, sessions: &[Session], sizes: Sizes) -> Added {
+    pub fn added_arcsec(&self, sessions: &[Session], sizes: Sizes) -> Result<Vec<Vec<f64>>, String> {
         let fitted: Vec<(CauseName, &FittedLaw)> =
             self.causes.iter().filter_map(|cause| Some((cause.name, cause.fit.as_ref()?))).collect();
-        let Some(mut added) = added_by(&fitted, sessions, &self.nominal) else {
-            return self.simulated_arcsec(&self.effects(), sessions, sizes);
-        };
-        let others: Vec<Chosen> =
-            self.causes.iter().filter(|cause| cause.fit.is_none()).filter_map(CauseEntry::effect).collect();
-        if !others.is_empty() {
-            let simulated = self.simulated_arcsec(&others, sessions, sizes)?;
-            for (sum, more) in added.iter_mut().flatten().zip(simulated.into_iter().flatten()) {
-                *sum += more;
+        let by_fit = added_by(&fitted, sessions, &self.nominal);
+        let simulated = |cause: &&CauseEntry| by_fit.is_none() || cause.fit.is_none();
+        let effects: Vec<Chosen> = self.causes.iter().filter(simulated).filter_map(CauseEntry::effect).collect();
+        let mut added = by_fit.unwrap_or_else(|| sessions.iter().map(|session| vec![0.0; session.len()]).collect());
+        if !effects.is_empty() {
+            let on = Excitation::of_sessions(sessions, 100.0, self.nominal.temperature_c);
+            let plant = Plant { nominal: &self.nominal, table: None };
+            let more = added_arcsec(&plant, sizes, &effects, &on)?;
+            // A session of one row has no motion to simulate.
+            let moving = added.iter_mut().filter(|session| session.len() > 1);
+            for (sum, rows) in moving.zip(&on.sessions) {
+                sum.iter_mut().zip(&more[rows.clone()]).for_each(|(sum, more)| *sum += more);
             }
         }
         Ok(added)
-    }
-
-    fn simulated_arcsec(&self, effects: &[Chosen], sessions: &[Session], sizes: Sizes) -> Added {
-        let on = Excitation::of_sessions(sessions, 100.0, self.nominal.temperature_c);
-        let plant = Plant { nominal: &self.nominal, table: None };
-        let added = added_arcsec(&plant, sizes, effects, &on)?;
-        let mut of_session = on.sessions.iter().map(|rows| added[rows.clone()].to_vec());
-        Ok(sessions
-            .iter()
-            .map(
-                |session| {
-                    if session.len() > 1 { of_session.next().unwrap_or_default() } else { vec![0.0; session.len()] }
-                },
-            )
-            .collect())
     }
 
     /// The file.
