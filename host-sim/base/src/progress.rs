@@ -50,13 +50,20 @@ struct Stand {
 
 /// Progress that may never show.
 pub struct Progress {
-    bar: Option<ProgressBar>,
-    /// Title of lines for another program, and when the last one was written.
-    lines: Option<(String, Option<Instant>)>,
-    /// What the lines tell, where no bar can be drawn.
-    stand: Option<Arc<Mutex<Stand>>>,
+    shown: Shown,
     /// Ends the wait for the bar to show, or for the next line.
     _over: Option<mpsc::Sender<()>>,
+}
+
+/// How progress is shown.
+enum Shown {
+    Nothing,
+    /// On a terminal.
+    Bar(ProgressBar),
+    /// A line every ten seconds, of what stands here.
+    Lines(Arc<Mutex<Stand>>),
+    /// Lines for another program: their title, and when the last one was written.
+    Program(String, Option<Instant>),
 }
 
 impl Progress {
@@ -64,10 +71,10 @@ impl Progress {
     pub fn new(title: impl Into<String>, quiet: bool) -> Progress {
         let title = title.into();
         if quiet {
-            return Progress { bar: None, lines: None, stand: None, _over: None };
+            return Progress { shown: Shown::Nothing, _over: None };
         }
         if std::env::var_os(LINES).is_some() {
-            return Progress { bar: None, lines: Some((title, None)), stand: None, _over: None };
+            return Progress { shown: Shown::Program(title, None), _over: None };
         }
         let (over, wait) = mpsc::channel();
         if !stderr().is_terminal() {
@@ -83,7 +90,7 @@ impl Progress {
                     let _ = writeln!(stderr(), "{line}");
                 }
             });
-            return Progress { bar: None, lines: None, stand: Some(stand), _over: Some(over) };
+            return Progress { shown: Shown::Lines(stand), _over: Some(over) };
         }
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden()).with_prefix(title);
         let waiting = bar.clone();
@@ -92,36 +99,41 @@ impl Progress {
                 show(&waiting);
             }
         });
-        Progress { bar: Some(bar), lines: None, stand: None, _over: Some(over) }
+        Progress { shown: Shown::Bar(bar), _over: Some(over) }
     }
 
     /// `done` of `total` parts are done; `note` says what just happened.
     pub fn set(&mut self, done: usize, total: usize, note: &str) {
-        if let Some(bar) = self.bar.as_ref().filter(|_| !SILENT.load(Ordering::Relaxed)) {
-            bar.set_length(total as u64);
-            bar.set_position(done as u64);
-            bar.set_message(note.to_owned());
-        }
-        if let Some((title, last)) = &mut self.lines
-            && (done == total || last.is_none_or(|last| last.elapsed() >= PROGRAM_LINE_EVERY))
-        {
-            *last = Some(Instant::now());
-            // A reader that has gone is no reason to fail.
-            drop(writeln!(stderr(), "{}", written(title, done, total, note)));
-        }
-        if let Some(stand) = &self.stand {
-            let mut stand = stand.lock().unwrap_or_else(PoisonError::into_inner);
-            (stand.done, stand.total) = (done, total);
-            note.clone_into(&mut stand.note);
+        match &mut self.shown {
+            Shown::Nothing => {}
+            Shown::Bar(bar) => {
+                if !SILENT.load(Ordering::Relaxed) {
+                    bar.set_length(total as u64);
+                    bar.set_position(done as u64);
+                    bar.set_message(note.to_owned());
+                }
+            }
+            Shown::Lines(stand) => {
+                let mut stand = stand.lock().unwrap_or_else(PoisonError::into_inner);
+                (stand.done, stand.total) = (done, total);
+                note.clone_into(&mut stand.note);
+            }
+            Shown::Program(title, last) => {
+                if done == total || last.is_none_or(|last| last.elapsed() >= PROGRAM_LINE_EVERY) {
+                    *last = Some(Instant::now());
+                    // A reader that has gone is no reason to fail.
+                    drop(writeln!(stderr(), "{}", written(title, done, total, note)));
+                }
+            }
         }
     }
 
     /// A line above the bar, or alone.
     pub fn line(&self, text: &str) {
-        match self.bar.as_ref().filter(|bar| !bar.is_hidden()) {
-            Some(bar) => bar.println(text),
+        match &self.shown {
+            Shown::Bar(bar) if !bar.is_hidden() => bar.println(text),
             // A reader that has gone is no reason to fail.
-            None => drop(writeln!(stderr(), "{text}")),
+            _ => drop(writeln!(stderr(), "{text}")),
         }
     }
 }
@@ -183,7 +195,7 @@ fn time_left(state: &ProgressState, to: &mut dyn std::fmt::Write) {
 
 impl Drop for Progress {
     fn drop(&mut self) {
-        if let Some(bar) = &self.bar {
+        if let Shown::Bar(bar) = &self.shown {
             bar.finish_and_clear();
         }
     }
