@@ -9,7 +9,9 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::folder::{Folder, FolderError, is_plain};
+use flexspline_base::output::quoted;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
+use flexspline_mechanics::mesh::MeshLevel;
 
 /// Logs of one job, at most: a guess.
 const MOST_LOGS: usize = 50;
@@ -85,28 +87,6 @@ pub struct Known {
     pub tables: Option<String>,
 }
 
-/// How fine a mesh is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Mesh {
-    /// For a first look.
-    Coarse,
-    /// What results are told of.
-    Standard,
-    /// For a check.
-    Fine,
-}
-
-impl Mesh {
-    fn name(self) -> &'static str {
-        match self {
-            Mesh::Coarse => "coarse",
-            Mesh::Standard => "standard",
-            Mesh::Fine => "fine",
-        }
-    }
-}
-
 /// A command.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "work", rename_all = "kebab-case", deny_unknown_fields)]
@@ -159,7 +139,7 @@ pub enum WorkAsked {
         /// Load at the output, N·m.
         torque_n_m: f64,
         /// How fine.
-        mesh: Mesh,
+        mesh: MeshLevel,
     },
     /// What a catalogue would print: backlash, K1 to K3, stresses.
     Sheet {
@@ -177,7 +157,7 @@ pub enum WorkAsked {
         /// The generator.
         generator: GeneratorKind,
         /// How fine.
-        mesh: Mesh,
+        mesh: MeshLevel,
     },
     /// A table of samples of another program.
     Samples {
@@ -311,8 +291,8 @@ impl WorkAsked {
                 words.option("generator", generator);
                 words.option("path", "pitch");
                 words.number("torque-n-m", Some(*torque_n_m))?;
-                words.option("mesh", mesh.name());
-                if *mesh == Mesh::Coarse {
+                words.option("mesh", mesh);
+                if *mesh == MeshLevel::Coarse {
                     let teeth = words.read(drive)?.flexspline.teeth;
                     words.option("increment", std::f64::consts::TAU / f64::from(teeth) / FIRST_LOOK);
                 }
@@ -326,7 +306,7 @@ impl WorkAsked {
             WorkAsked::Tables { drive, generator, mesh } => {
                 words.drive(drive)?;
                 words.option("generator", generator);
-                words.option("mesh", mesh.name());
+                words.option("mesh", mesh);
             }
             WorkAsked::Samples { file, drive, generator } => {
                 words.file_option("from-samples", file)?;
@@ -501,16 +481,6 @@ impl Line<'_> {
         self.text("vary", &format!("{FIELD}={w0}"))?;
         self.drive_itself(asked)?;
         self.sets(asked.sets.iter().filter(|(path, _)| *path != FIELD))
-    }
-}
-
-/// A word as a shell takes it.
-fn quoted(word: &str) -> String {
-    let plain = |c: char| c.is_alphanumeric() || "-_=./,:+".contains(c);
-    if !word.is_empty() && word.chars().all(plain) {
-        word.to_owned()
-    } else {
-        format!("'{}'", word.replace('\'', r"'\''"))
     }
 }
 

@@ -9,6 +9,7 @@ use flexspline::{Identity, IdentityCheck, Table};
 
 use super::{Common, Failure, say};
 use flexspline_base::output::prepare_folder;
+pub(super) use flexspline_base::output::quoted;
 use flexspline_base::progress::Progress;
 use flexspline_base::spent::{Spent, Stopwatch};
 use flexspline_base::suggest::{likeliest, question};
@@ -247,16 +248,6 @@ pub(super) fn image_file(path: &Path) -> Result<Vec<u8>, Failure> {
         }
     }
     Ok(bytes)
-}
-
-/// A word as a shell takes it.
-pub(super) fn quoted(word: &str) -> String {
-    let plain = |c: char| c.is_alphanumeric() || "-_=./,:+".contains(c);
-    if !word.is_empty() && word.chars().all(plain) {
-        word.to_owned()
-    } else {
-        format!("'{}'", word.replace('\'', r"'\''"))
-    }
 }
 
 /// A drive file beside the one that is not there, with a name like it.

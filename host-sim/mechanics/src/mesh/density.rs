@@ -3,6 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use serde::{Deserialize, Serialize};
+
 use crate::suggest::did_you_mean;
 
 /// Elements of one half sector of a wheel, in each direction.
@@ -49,7 +51,8 @@ impl MeshDensity {
 }
 
 /// A named pair of densities.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum MeshLevel {
     /// For quick looks and tests.
     Coarse,
