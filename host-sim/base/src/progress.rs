@@ -50,13 +50,13 @@ struct Stand {
 
 /// Progress that may never show.
 pub struct Progress {
-    shown: Shown,
+    shown: Outlet,
     /// Ends the wait for the bar to show, or for the next line.
     _over: Option<mpsc::Sender<()>>,
 }
 
-/// How progress is shown.
-enum Shown {
+/// Where progress is shown.
+enum Outlet {
     Nothing,
     /// On a terminal.
     Bar(ProgressBar),
@@ -71,10 +71,10 @@ impl Progress {
     pub fn new(title: impl Into<String>, quiet: bool) -> Progress {
         let title = title.into();
         if quiet {
-            return Progress { shown: Shown::Nothing, _over: None };
+            return Progress { shown: Outlet::Nothing, _over: None };
         }
         if std::env::var_os(LINES).is_some() {
-            return Progress { shown: Shown::Program(title, None), _over: None };
+            return Progress { shown: Outlet::Program(title, None), _over: None };
         }
         let (over, wait) = mpsc::channel();
         if !stderr().is_terminal() {
@@ -90,7 +90,7 @@ impl Progress {
                     let _ = writeln!(stderr(), "{line}");
                 }
             });
-            return Progress { shown: Shown::Lines(stand), _over: Some(over) };
+            return Progress { shown: Outlet::Lines(stand), _over: Some(over) };
         }
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden()).with_prefix(title);
         let waiting = bar.clone();
@@ -99,26 +99,26 @@ impl Progress {
                 show(&waiting);
             }
         });
-        Progress { shown: Shown::Bar(bar), _over: Some(over) }
+        Progress { shown: Outlet::Bar(bar), _over: Some(over) }
     }
 
     /// `done` of `total` parts are done; `note` says what just happened.
     pub fn set(&mut self, done: usize, total: usize, note: &str) {
         match &mut self.shown {
-            Shown::Nothing => {}
-            Shown::Bar(bar) => {
+            Outlet::Nothing => {}
+            Outlet::Bar(bar) => {
                 if !SILENT.load(Ordering::Relaxed) {
                     bar.set_length(total as u64);
                     bar.set_position(done as u64);
                     bar.set_message(note.to_owned());
                 }
             }
-            Shown::Lines(stand) => {
+            Outlet::Lines(stand) => {
                 let mut stand = stand.lock().unwrap_or_else(PoisonError::into_inner);
                 (stand.done, stand.total) = (done, total);
                 note.clone_into(&mut stand.note);
             }
-            Shown::Program(title, last) => {
+            Outlet::Program(title, last) => {
                 if done == total || last.is_none_or(|last| last.elapsed() >= PROGRAM_LINE_EVERY) {
                     *last = Some(Instant::now());
                     // A reader that has gone is no reason to fail.
@@ -131,7 +131,7 @@ impl Progress {
     /// A line above the bar, or alone.
     pub fn line(&self, text: &str) {
         match &self.shown {
-            Shown::Bar(bar) if !bar.is_hidden() => bar.println(text),
+            Outlet::Bar(bar) if !bar.is_hidden() => bar.println(text),
             // A reader that has gone is no reason to fail.
             _ => drop(writeln!(stderr(), "{text}")),
         }
@@ -195,7 +195,7 @@ fn time_left(state: &ProgressState, to: &mut dyn std::fmt::Write) {
 
 impl Drop for Progress {
     fn drop(&mut self) {
-        if let Shown::Bar(bar) = &self.shown {
+        if let Outlet::Bar(bar) = &self.shown {
             bar.finish_and_clear();
         }
     }
