@@ -1,11 +1,11 @@
 //! Gain on sessions that took no part in the fit: each session predicted by a fit to the others, without any offset of
 //! its own unless the bench sets its zero anew in each. Which causes are fitted was chosen on all sessions.
 
-use super::linear::Gram;
-use super::model::{Problem, Scaffold, Term, white_columns};
+use super::model::{Fit, Problem, Scaffold, Term};
+use super::products::{Part, Set};
 use super::report::{HeldOut, Unexplained};
 use super::rows::mean;
-use super::select::{self, Selected, blocks};
+use super::select::{self, Selected};
 use super::trace::{Gate, Judged, Stage, Trace};
 
 /// Errors of prediction in blocks left out.
@@ -92,29 +92,28 @@ impl Zero {
 fn left_out(problem: &Problem<'_>, terms: &[&Term<'_>], anew: bool, zero: Zero) -> Option<f64> {
     let scaffold = Scaffold::new(problem, terms.to_vec());
     let fit = scaffold.fit(None)?;
-    let white = white_columns(problem, terms, &[]);
     let free = if anew && terms.iter().any(|t| !t.places.is_empty()) { Some(scaffold.linearised()?) } else { None };
     let (mut sum, mut count) = (0.0, 0usize);
-    for block in blocks(problem) {
-        let solution = fit.without(&Gram::of(&white, block.clone()), problem.worth)?;
+    for (k, block) in problem.blocks().iter().enumerate() {
+        let without = |fit: &Fit, terms: &[&Term<'_>], moves: Option<&Set>| {
+            fit.without(&problem.gram(terms, moves, Part::Block(k)), problem.worth)
+        };
+        let solution = without(&fit, terms, None)?;
         let mut best = (solution, None);
         if let Some((free, moves)) = &free {
-            let white = white_columns(problem, terms, moves);
-            let to_first_order = free.without(&Gram::of(&white, block.clone()), problem.worth)?;
+            let to_first_order = without(free, terms, Some(moves))?;
             let moved = moved(problem, terms, &to_first_order.coefficients[fit.priors.len()..]);
             let there: Vec<&Term<'_>> = moved.iter().collect();
-            let white = white_columns(problem, &there, &[]);
-            let solution = Scaffold::new(problem, there.clone())
-                .fit(None)?
-                .without(&Gram::of(&white, block.clone()), problem.worth)?;
+            let solution = without(&Scaffold::new(problem, there.clone()).fit(None)?, &there, None)?;
             if solution.misfit < best.0.misfit {
                 best = (solution, Some(moved));
             }
         }
         let (solution, moved) = &best;
         let there = moved.as_ref().map_or_else(|| terms.to_vec(), |moved| moved.iter().collect());
-        let columns: Vec<&Vec<f64>> = problem.base.iter().chain(there.iter().flat_map(|t| &t.averaged)).collect();
+        let columns: Vec<&Vec<f64>> = problem.base.iter().chain(there.iter().flat_map(|t| t.averaged.iter())).collect();
         let left: Vec<f64> = block
+            .clone()
             .filter(|g| problem.certain[*g])
             .map(|g| {
                 let predicted: f64 = columns.iter().zip(&solution.coefficients).map(|(column, c)| c * column[g]).sum();

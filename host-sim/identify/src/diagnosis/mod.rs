@@ -30,6 +30,7 @@ pub(crate) mod model;
 pub(crate) mod noise;
 pub mod pipeline;
 pub(crate) mod prepare;
+mod products;
 mod quieted;
 pub(crate) mod remainder;
 pub mod report;

@@ -4,13 +4,16 @@
 //! Coefficients are solved exactly; shape parameters by Gauss-Newton around the best of the values tried first.
 //! Nuisance columns get a prior in proportion to what the main columns of their law explain, found by iteration.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::averaged::{Averaged, Grain};
 use super::candidate::{Acting, Among, Coefficients, Column, Excitation, Law, Role, Tolerance, left_by};
 use super::linear::{Gram, Prior, Solution, products, solve};
 use super::noise::Whitener;
+use super::products::{Part, Products, Set};
 use super::rows::{combined, rms};
 
 /// Data and nominal model, averaged and white.
@@ -25,18 +28,21 @@ pub struct Problem<'a> {
     pub certain: Vec<bool>,
     /// Data less nominal prediction, averaged.
     pub data: Vec<f64>,
-    /// `data`, whitened.
-    pub data_white: Vec<f64>,
+    /// `data`, whitened: one column.
+    data_white: Set,
     /// Floating base columns, averaged.
     pub base: Vec<Vec<f64>>,
     /// `base`, whitened.
-    pub base_white: Vec<Vec<f64>>,
+    base_white: Set,
     /// Worth of the information, at most 1.
     pub worth: f64,
     /// What laws are evaluated on.
     grain: Grain,
     /// What was evaluated where laws are tried first.
     tried: Mutex<Tried>,
+    /// Products of white columns; their blocks are left out one at a time: sessions, or quarters of the data where
+    /// there are fewer than three.
+    products: Products,
 }
 
 /// White columns by law, extent and places (their bits), as long as there is room.
@@ -73,12 +79,37 @@ impl<'a> Problem<'a> {
         let grain = Grain::new(averaged, &whitener);
         let rows: Vec<f64> = on.rows.error.iter().zip(&on.base.prediction).map(|(e, p)| e - p).collect();
         let data = whitener.average(&rows);
-        let data_white = whitener.whiten_averaged(&data);
+        let data_white = Set::new(vec![whitener.whiten_averaged(&data)]);
         let base: Vec<Vec<f64>> = on.base.floating.iter().map(|f| whitener.average(&f.values)).collect();
-        let base_white = base.iter().map(|column| whitener.whiten_averaged(column)).collect();
+        let base_white = Set::new(whitener.whiten_each(&base));
         let certain = whitener.certain(uncertain);
         let (uncertain, tried) = (uncertain.to_vec(), Mutex::default());
-        Problem { on, uncertain, whitener, certain, data, data_white, base, base_white, worth, grain, tried }
+        let products = Products::over(whitener.blocks());
+        Problem { on, uncertain, whitener, certain, data, data_white, base, base_white, worth, grain, tried, products }
+    }
+
+    /// Blocks of averages that are left out one at a time.
+    #[must_use]
+    pub fn blocks(&self) -> &[Range<usize>] {
+        &self.products.blocks
+    }
+
+    /// Products of base, terms, further columns and data.
+    #[must_use]
+    pub fn gram(&self, terms: &[&Term<'_>], further: Option<&Set>, part: Part) -> Gram {
+        self.products.gram(&self.sets(terms, further), part)
+    }
+
+    /// Sets of white columns of a model, the data last.
+    fn sets<'s>(&'s self, terms: &[&'s Term<'_>], further: Option<&'s Set>) -> Vec<&'s Set> {
+        let terms = terms.iter().map(|term| &term.white.columns);
+        [&self.base_white].into_iter().chain(terms).chain(further).chain([&self.data_white]).collect()
+    }
+
+    /// White columns of a model, the data last.
+    #[must_use]
+    pub fn white_columns<'s>(&'s self, terms: &[&'s Term<'_>], further: Option<&'s Set>) -> Vec<&'s [f64]> {
+        self.sets(terms, further).into_iter().flat_map(|set| set.iter()).map(Vec::as_slice).collect()
     }
 
     /// White columns of a law by itself at places where it is tried again and again.
@@ -131,15 +162,13 @@ fn columns(law: &Law, extent: Extent, on: &Excitation<'_>, places: &[f64]) -> Ve
 #[derive(Clone, Debug)]
 pub struct White {
     /// Columns.
-    pub columns: Vec<Vec<f64>>,
+    columns: Set,
     /// What coefficients may be.
     pub tolerances: Vec<Tolerance>,
     /// What the columns are.
     roles: Vec<Role>,
     /// Root mean square of each averaged column.
     size: Vec<f64>,
-    /// Products of the columns with base, data, and themselves.
-    products: OnceLock<Vec<f64>>,
 }
 
 impl White {
@@ -147,27 +176,17 @@ impl White {
     fn of(problem: &Problem<'_>, law: &Law, columns: Vec<Column>) -> (Vec<Vec<f64>>, White) {
         let average = |c: &Column| problem.grain.average(law.smooth(), &problem.whitener, &c.values);
         let averaged: Vec<Vec<f64>> = columns.iter().map(average).collect();
-        let white = problem.whitener.whiten_each(&averaged);
+        let columns_white = Set::new(problem.whitener.whiten_each(&averaged));
         let size = averaged.iter().map(|c| rms(c)).collect();
         let tolerances = columns.iter().map(|c| c.tolerance).collect();
         let roles = columns.iter().map(|c| c.role).collect();
-        (averaged, White { columns: white, tolerances, roles, size, products: OnceLock::new() })
+        (averaged, White { columns: columns_white, tolerances, roles, size })
     }
 
     /// Columns.
     #[must_use]
     pub fn len(&self) -> usize {
         self.columns.len()
-    }
-
-    /// Products of the columns with base, data, and themselves, column by column.
-    fn bare_products(&self, problem: &Problem<'_>) -> &[f64] {
-        self.products.get_or_init(|| {
-            let own: Vec<&[f64]> = self.columns.iter().map(Vec::as_slice).collect();
-            let mut with = white_columns(problem, &[], &[]);
-            with.extend(&own);
-            products(&own, &with, 0..problem.data_white.len(), false)
-        })
     }
 
     /// Coefficients of these columns by what the columns are.
@@ -183,11 +202,11 @@ impl White {
     /// Only the main columns.
     fn main_only(mut self) -> White {
         let main = self.main();
-        keep(&mut self.columns, &main);
+        self.columns = Set::new(kept(&self.columns, &main));
         keep(&mut self.size, &main);
         keep(&mut self.roles, &main);
         keep(&mut self.tolerances, &main);
-        White { products: OnceLock::new(), ..self }
+        self
     }
 
     /// Priors, nuisance scaled to what the main columns explain with `coefficients`.
@@ -214,6 +233,11 @@ impl White {
     }
 }
 
+/// Those columns that are told to be kept.
+fn kept(columns: &[Vec<f64>], kept: &[bool]) -> Vec<Vec<f64>> {
+    columns.iter().zip(kept).filter(|(_, kept)| **kept).map(|(column, _)| column.clone()).collect()
+}
+
 /// Keeps those values that are told to be kept.
 fn keep<T>(values: &mut Vec<T>, kept: &[bool]) {
     let mut kept = kept.iter();
@@ -228,7 +252,7 @@ pub struct Term<'l> {
     /// Places of the shape parameters, 0 to 1.
     pub places: Vec<f64>,
     /// Columns, averaged.
-    pub averaged: Vec<Vec<f64>>,
+    pub averaged: Arc<Vec<Vec<f64>>>,
     /// Columns, white.
     pub white: White,
     /// What freedom of the shape parameters costs: logarithm of the share of their range that the data leave (0 before
@@ -250,7 +274,7 @@ impl<'l> Term<'l> {
         let recorded = problem.excitation(law);
         let on = left_by(among.as_deref(), &recorded);
         let (averaged, white) = White::of(problem, law, columns(law, Extent::Whole, &on, &places));
-        Term { law, places, averaged, white, occam: -law.search.odds_against, among }
+        Term { law, places, averaged: Arc::new(averaged), white, occam: -law.search.odds_against, among }
     }
 
     /// This term with each normalised parameter moved, within its range and no farther than a step reaches.
@@ -288,7 +312,7 @@ impl<'l> Term<'l> {
     /// Only its main columns.
     #[must_use]
     pub fn main_only(mut self) -> Term<'l> {
-        keep(&mut self.averaged, &self.white.main());
+        self.averaged = Arc::new(kept(&self.averaged, &self.white.main()));
         self.white = self.white.main_only();
         self
     }
@@ -377,6 +401,9 @@ const LEAST_STEP: f64 = 0.3;
 /// Gauss-Newton steps at most.
 const STEPS: usize = 6;
 
+/// How far a place may move.
+const MOVE: Prior = Prior { mean: 0.0, std: PLACE_SPREAD };
+
 /// Products of a fixed set of terms, to which others are added for a trial.
 pub struct Scaffold<'p, 'a, 't, 'l> {
     problem: &'p Problem<'a>,
@@ -450,17 +477,11 @@ impl Fit {
     }
 }
 
-/// The white columns that a fit has the products of: base, terms, further ones, the data last.
-pub fn white_columns<'c>(problem: &'c Problem<'_>, terms: &[&'c Term<'_>], further: &'c [Vec<f64>]) -> Vec<&'c [f64]> {
-    let terms = terms.iter().flat_map(|t| &t.white.columns);
-    problem.base_white.iter().chain(terms).chain(further).chain([&problem.data_white]).map(Vec::as_slice).collect()
-}
-
 impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     /// Products of the base and some terms.
     #[must_use]
     pub fn new(problem: &'p Problem<'a>, terms: Vec<&'t Term<'l>>) -> Self {
-        let gram = Gram::of(&white_columns(problem, &terms, &[]), 0..problem.data_white.len());
+        let gram = problem.gram(&terms, None, Part::All);
         let ahead = terms.len();
         Scaffold { problem, terms, gram, ahead, left: Default::default() }
     }
@@ -495,13 +516,13 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     #[must_use]
     pub fn trial(&self, law: &Law, places: &[f64]) -> Option<Solution> {
         let extent = if law.search.whole { Extent::Whole } else { Extent::Bare };
-        Some(self.fit_with(Some(&self.white(law, extent, places)), &[])?.0.solution)
+        Some(self.fit_with(Some(&self.white(law, extent, places)), None)?.solution)
     }
 
     /// The solution with all columns of a law at some places.
     #[must_use]
     pub fn whole_trial(&self, law: &Law, places: &[f64]) -> Option<Solution> {
-        Some(self.fit_with(Some(&self.white(law, Extent::Whole, places)), &[])?.0.solution)
+        Some(self.fit_with(Some(&self.white(law, Extent::Whole, places)), None)?.solution)
     }
 
     /// Whether a law changes what some of the terms do, and they do not change it.
@@ -529,14 +550,19 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     /// Fits the terms of the scaffold and one more.
     #[must_use]
     pub fn fit(&self, added: Option<&Term<'_>>) -> Option<Fit> {
-        let (fit, _) = self.fit_with(added.map(|t| &t.white), &[])?;
-        Some(fit)
+        self.fit_with(added.map(|t| &t.white), None)
     }
 
-    /// Fits this model with further columns, each with its prior, after all others; returns their coefficients.
-    fn fit_with(&self, added: Option<&White>, further: &[(Vec<f64>, Prior)]) -> Option<(Fit, Vec<f64>)> {
+    /// Fits this model with the moves of shape parameters after all other columns.
+    fn fit_with(&self, added: Option<&White>, moves: Option<&Set>) -> Option<Fit> {
         let problem = self.problem;
-        let gram = self.gram.with(&self.meeting(added, further));
+        let mut sets = problem.sets(&self.terms, None);
+        let mut gram = Cow::Borrowed(&self.gram);
+        for new in added.map(|white| &white.columns).into_iter().chain(moves) {
+            gram = Cow::Owned(gram.with(&problem.products.meeting(new, &sets)));
+            sets.insert(sets.len() - 1, new);
+        }
+        let gram = gram.into_owned();
         let mut starts = Vec::new();
         let mut at = problem.base_white.len();
         let all: Vec<&White> = self.terms.iter().map(|t| &t.white).chain(added).collect();
@@ -551,7 +577,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
                 let known = last.as_ref().map(|(s, _)| &s.coefficients[*start..start + term.len()]);
                 priors.extend(term.priors(known));
             }
-            priors.extend(further.iter().map(|(_, prior)| *prior));
+            priors.extend(moves.iter().flat_map(|moves| moves.iter()).map(|_| MOVE));
             let mut deviations = vec![false; starts.first().copied().unwrap_or(0)];
             if round + 1 == ROUNDS {
                 deviations
@@ -563,35 +589,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
             }
         }
         let (solution, priors) = last?;
-        let extra = solution.coefficients[at..].to_vec();
-        Some((Fit { solution, starts, priors, gram }, extra))
-    }
-
-    /// Products of new columns: those of a law, then further ones; each with base, terms, data, and the new ones.
-    fn meeting(&self, added: Option<&White>, further: &[(Vec<f64>, Prior)]) -> Vec<Vec<f64>> {
-        let problem = self.problem;
-        let rows = 0..problem.data_white.len();
-        let mut meeting = Vec::new();
-        if let Some(white) = added {
-            // What does not depend on the terms is known from the last time.
-            let bare = white.bare_products(problem);
-            let new: Vec<&[f64]> = white.columns.iter().map(Vec::as_slice).collect();
-            let terms: Vec<&[f64]> = self.terms.iter().flat_map(|t| &t.white.columns).map(Vec::as_slice).collect();
-            let with_terms = products(&new, &terms, rows.clone(), false);
-            let base = problem.base_white.len();
-            for (k, bare) in bare.chunks_exact((base + 1 + new.len()).max(1)).enumerate() {
-                let with_terms = &with_terms[k * terms.len()..(k + 1) * terms.len()];
-                meeting.push([&bare[..base], with_terms, &bare[base..]].concat());
-            }
-        }
-        if !further.is_empty() {
-            let further: Vec<&[f64]> = further.iter().map(|(column, _)| column.as_slice()).collect();
-            let mut all = white_columns(problem, &self.terms, &[]);
-            all.extend(added.iter().flat_map(|t| &t.columns).map(Vec::as_slice));
-            all.extend(&further);
-            meeting.extend(products(&further, &all, rows, false).chunks_exact(all.len()).map(<[f64]>::to_vec));
-        }
-        meeting
+        Some(Fit { solution, starts, priors, gram })
     }
 
     /// Places at which to begin with a law: those to be tried, or where its lead points.
@@ -643,7 +641,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
         let masked = |column: &[f64]| -> Vec<f64> {
             column.iter().zip(&mask).map(|(v, m)| if *m || !some { *v } else { 0.0 }).collect()
         };
-        let known: Vec<Vec<f64>> = white_columns(problem, &self.terms, &[]).into_iter().map(masked).collect();
+        let known: Vec<Vec<f64>> = problem.white_columns(&self.terms, None).into_iter().map(masked).collect();
         let known: Vec<&[f64]> = known.iter().map(Vec::as_slice).collect();
         let gram = Gram::of(&known, 0..mask.len());
         let mut priors = problem.base_priors();
@@ -668,9 +666,8 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
             .collect()
     }
 
-    /// Columns (white) by which the prediction of `term` changes with each of its places, and how far the place may
-    /// move.
-    fn derivatives(&self, term: &Term<'_>, coefficients: &[f64]) -> Vec<(Vec<f64>, Prior)> {
+    /// Columns (white) by which the prediction of `term` changes with each of its places.
+    fn derivatives(&self, term: &Term<'_>, coefficients: &[f64]) -> Vec<Vec<f64>> {
         let problem = self.problem;
         let here = term.contribution(coefficients);
         let recorded = problem.excitation(term.law);
@@ -686,7 +683,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
                 let there = combined(on.rows.len(), moved.iter().map(|column| column.values.as_slice()), coefficients);
                 let mut change = problem.grain.average(term.law.smooth(), &problem.whitener, &there);
                 change.iter_mut().zip(&here).for_each(|(there, here)| *there = (*there - here) / step);
-                (problem.whitener.whiten_averaged(&change), Prior { mean: 0.0, std: PLACE_SPREAD })
+                problem.whitener.whiten_averaged(&change)
             })
             .collect()
     }
@@ -706,7 +703,8 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
         }
         for step in 0..STEPS {
             let coefficients = fit.of(fit.starts.len() - 1).to_vec();
-            let (free, moves) = self.fit_with(Some(&term.white), &self.derivatives(&term, &coefficients))?;
+            let free = self.fit_with(Some(&term.white), Some(&Set::new(self.derivatives(&term, &coefficients))))?;
+            let moves = &free.solution.coefficients[fit.priors.len()..];
             let now = fit.solution.evidence;
             let promised = 0.5 * (fit.solution.misfit - free.solution.misfit);
             term.occam = (free.solution.evidence - now - promised).min(0.0) - term.law.search.odds_against;
@@ -741,13 +739,10 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     /// The fit of the scaffold's terms with all their shape parameters free to first order: for uncertainties. Returns
     /// the fit, whose last coefficients are moves of the shape parameters, term after term.
     #[must_use]
-    pub fn linearised(&self) -> Option<(Fit, Vec<Vec<f64>>)> {
+    pub fn linearised(&self) -> Option<(Fit, Set)> {
         let fit = self.fit(None)?;
-        let mut further = Vec::new();
-        for (k, term) in self.terms.iter().enumerate() {
-            further.extend(self.derivatives(term, fit.of(k)));
-        }
-        let (fit, _) = self.fit_with(None, &further)?;
-        Some((fit, further.into_iter().map(|(column, _)| column).collect()))
+        let terms = self.terms.iter().enumerate();
+        let moves = Set::new(terms.flat_map(|(k, term)| self.derivatives(term, fit.of(k))).collect());
+        Some((self.fit_with(None, Some(&moves))?, moves))
     }
 }

@@ -106,6 +106,24 @@ impl Whitener {
         Whitener::new(rows, uncertain, stride, Noise { white, wander: 0.0, correlation_s: 1.0 })
     }
 
+    /// Blocks that are left out one at a time: sessions, or quarters of the data where there are fewer than three.
+    #[must_use]
+    pub fn blocks(&self) -> Vec<std::ops::Range<usize>> {
+        let sessions = &self.sessions;
+        if sessions.len() >= 3 {
+            return sessions.clone();
+        }
+        sessions
+            .iter()
+            .flat_map(|s| {
+                let parts = 4;
+                let len = s.len();
+                (0..parts).map(move |p| s.start + len * p / parts..s.start + len * (p + 1) / parts)
+            })
+            .filter(|b| !b.is_empty())
+            .collect()
+    }
+
     /// Rows of each average.
     #[must_use]
     pub fn groups(&self) -> &[std::ops::Range<usize>] {

@@ -122,7 +122,7 @@ fn refitted<'l>(
     let scaffold = Scaffold::new(problem, others.clone());
     let now = selected.predicted(problem);
     // Where more is left than noise, as much may hide in any rival: rises count against what is left.
-    let left = selected.fit.solution.misfit / (problem.worth * problem.data_white.len().max(1) as f64);
+    let left = selected.fit.solution.misfit / (problem.worth * problem.data.len().max(1) as f64);
     let lacking = scaffold.fit(None).map(|fit| predicted(problem, &others, &fit));
     let others_may_err = |law: &Law| {
         let of = |j: usize| standings[j].size * selected.terms[j].law.misfit_as(law);

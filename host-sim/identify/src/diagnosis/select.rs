@@ -9,8 +9,8 @@ use rayon::prelude::*;
 
 use super::candidate::{Coefficients, Law, Role, Tolerance};
 use super::held_out::Zero;
-use super::linear::Gram;
-use super::model::{Fit, Problem, Scaffold, Term, among_each_other, white_columns};
+use super::model::{Fit, Problem, Scaffold, Term, among_each_other};
+use super::products::Part;
 use super::thresholds::selection::*;
 use super::trace::{Gate, Judged, Stage, Trace, passed};
 use crate::causes::CauseName;
@@ -384,26 +384,8 @@ pub(super) fn less(a: &[f64], b: &[f64]) -> Vec<f64> {
 /// Prediction beside the nominal one, averaged.
 #[must_use]
 pub fn predicted(problem: &Problem<'_>, terms: &[&Term<'_>], fit: &Fit) -> Vec<f64> {
-    let columns = problem.base.iter().chain(terms.iter().flat_map(|t| &t.averaged)).map(Vec::as_slice);
+    let columns = problem.base.iter().chain(terms.iter().flat_map(|t| t.averaged.iter())).map(Vec::as_slice);
     super::rows::combined(problem.data.len(), columns, &fit.solution.coefficients)
-}
-
-/// Blocks that are left out one at a time: sessions, or quarters of the data where there are fewer than three.
-#[must_use]
-pub fn blocks(problem: &Problem<'_>) -> Vec<std::ops::Range<usize>> {
-    let sessions = &problem.whitener.sessions;
-    if sessions.len() >= 3 {
-        return sessions.clone();
-    }
-    sessions
-        .iter()
-        .flat_map(|s| {
-            let parts = 4;
-            let len = s.len();
-            (0..parts).map(move |p| s.start + len * p / parts..s.start + len * (p + 1) / parts)
-        })
-        .filter(|b| !b.is_empty())
-        .collect()
 }
 
 /// Relative gain of squared innovations in blocks left out, by having all `terms` instead of `fewer`.
@@ -412,11 +394,10 @@ fn left_out_gain(problem: &Problem<'_>, terms: &[&Term<'_>], fewer: &[&Term<'_>]
     // column is the zero.
     let own_zero = Zero::of(problem, terms) == Zero::Own;
     let misfit = |terms: &[&Term<'_>]| -> Option<f64> {
-        let columns = white_columns(problem, terms, &[]);
         let fit = Scaffold::new(problem, terms.to_vec()).fit(None)?;
         let mut all = 0.0;
-        for block in blocks(problem) {
-            let inside = Gram::of(&columns, block);
+        for block in 0..problem.blocks().len() {
+            let inside = problem.gram(terms, None, Part::Block(block));
             let solution = fit.without(&inside, problem.worth)?;
             let n = fit.priors.len();
             let c = &solution.coefficients;

@@ -3,10 +3,12 @@
 
 use std::collections::BTreeMap;
 
-use super::linear::Gram;
-use super::model::{Fit, Problem, Scaffold, Term, white_columns};
+use super::linear::dot;
+use super::model::{Fit, Problem, Scaffold, Term};
+use super::products::Part;
 use super::report::Parameter;
-use super::select::{Selected, blocks};
+use super::rows::combined;
+use super::select::Selected;
 use super::thresholds::verdict::{INTERVAL, KNOWN_BESIDE};
 use crate::causes::{Kind, ParameterName};
 
@@ -26,16 +28,16 @@ const STRETCHES: usize = 12;
 /// Covariance by the misfit of stretches of the data (a sandwich): holds where the wander is not what it was taken for.
 fn stretched(problem: &Problem<'_>, fit: &Fit, white: &[&[f64]]) -> Vec<f64> {
     let n = fit.priors.len();
-    let c = &fit.solution.coefficients;
+    let data = white[n];
+    let explained = combined(data.len(), white[..n].iter().copied(), &fit.solution.coefficients);
+    let left: Vec<f64> = data.iter().zip(explained).map(|(data, explained)| data - explained).collect();
     let mut meat = vec![0.0; n * n];
     for session in &problem.whitener.sessions {
         let len = session.len();
         for part in 0..STRETCHES {
             let block = session.start + len * part / STRETCHES..session.start + len * (part + 1) / STRETCHES;
-            let gram = Gram::of(white, block);
-            let score: Vec<f64> = (0..n)
-                .map(|i| problem.worth * (gram.at(i, n) - (0..n).map(|j| gram.at(i, j) * c[j]).sum::<f64>()))
-                .collect();
+            let score: Vec<f64> =
+                white[..n].iter().map(|c| problem.worth * dot(&c[block.clone()], &left[block.clone()])).collect();
             for i in 0..n {
                 for j in 0..n {
                     meat[i * n + j] += score[i] * score[j];
@@ -194,18 +196,16 @@ pub fn known(problem: &Problem<'_>, selected: &Selected<'_>, beyond: f64) -> Vec
     let scaffold = Scaffold::new(problem, terms.clone());
     let Some((fit, moves)) = scaffold.linearised() else { return vec![Known::default(); terms.len()] };
     let n = fit.priors.len();
-    let white = white_columns(problem, &terms, &moves);
-    let left_out: Vec<(Vec<f64>, Vec<f64>)> = blocks(problem)
-        .into_iter()
+    let left_out: Vec<(Vec<f64>, Vec<f64>)> = (0..problem.blocks().len())
         .filter_map(|block| {
-            let solved = fit.without(&Gram::of(&white, block), problem.worth)?;
+            let solved = fit.without(&problem.gram(&terms, Some(&moves), Part::Block(block)), problem.worth)?;
             let moved = solved.coefficients.iter().zip(&fit.solution.coefficients).map(|(a, b)| a - b).collect();
             Some((moved, solved.covariance()))
         })
         .collect();
     let covariance = fit.solution.covariance();
     let of_noise = by_noise(&fit, &covariance);
-    let by_stretches = stretched(problem, &fit, &white);
+    let by_stretches = stretched(problem, &fit, &problem.white_columns(&terms, Some(&moves)));
     let mut place = n - moves.len();
     let mut all = Vec::new();
     for (k, term) in terms.into_iter().enumerate() {
