@@ -185,6 +185,7 @@ pub(super) fn nodes_of(part: PartName, scales: &Scales) -> Vec<(&'static str, f6
         torque_n_m: 0.0,
         temperature_c: f64::midpoint(cold, warm),
         way: 1.0,
+        speed_rad_s: 0.0,
     };
     let turn = |count: usize| (0..count).map(move |k| TAU * k as f64 / count as f64);
     let states: Vec<(&'static str, f64, State)> = match part {
@@ -218,6 +219,7 @@ pub(super) fn nodes_of(part: PartName, scales: &Scales) -> Vec<(&'static str, f6
                 ("temperature_c", temperature_c, State { temperature_c, torque_n_m, ..middle })
             })
             .collect(),
+        PartName::ReadingDelay => Vec::new(),
     };
     states
         .into_iter()
@@ -353,6 +355,7 @@ pub(super) fn spread(scales: &Scales, ratio: f64, output_rad: [f64; 2], count: u
                 torque_n_m: between(scales.torque_n_m, share(k, 2)),
                 temperature_c: between(scales.temperature_c, share(k, 3)),
                 way: if k % 2 == 0 { 1.0 } else { -1.0 },
+                speed_rad_s: 0.0,
             }
         })
         .collect()

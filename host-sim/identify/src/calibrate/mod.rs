@@ -72,6 +72,8 @@ const OTHER_RATIO: f64 = 0.25;
 /// A lag that is negative by no more than this, and this share of the largest number of the play, is noise: guesses.
 const NO_LAG_ARCSEC: f64 = 0.5;
 const NO_LAG_SHARE: f64 = 0.1;
+/// Paces that tell a delay from play: the fastest is so many times the slowest. *Guess*.
+const OTHER_PACE: f64 = 1.25;
 /// Temperatures closer than this, K, are one.
 const ONE_TEMPERATURE_K: f64 = 2.0;
 
@@ -372,10 +374,47 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
     let mut recorded = Recorded::of(files, prior);
     let play_rad = prior.nominal.backlash_arcsec / flexspline_base::units::ARCSEC_PER_RAD;
     let mut rows = settled(files, prior, &recorded, play_rad);
+    let at_one_instant: Vec<Recording>;
+    let delay_s = reading_delay_s(&rows, prior, &recorded)?;
+    let files = if delay_s == 0.0 {
+        files
+    } else {
+        at_one_instant = files.iter().map(|file| without_delay(file, delay_s, prior.nominal.ratio)).collect();
+        rows = settled(&at_one_instant, prior, &recorded, play_rad);
+        &at_one_instant
+    };
     if let Some(table) = prior.table {
         (rows, recorded.scales.friction_n_m) = dead_zone(rows, prior, table, &recorded);
     }
     with_dead_zone(files, prior, (rows, recorded), doubt).map_err(|error| with_faults(error, files))
+}
+
+/// By how much the output is read after the generator, s, where that tells what was left out better than play and all
+/// other parts do; 0 where it does not.
+fn reading_delay_s(rows: &Rows, prior: &Prior<'_>, recorded: &Recorded) -> Result<f64, CalibrationError> {
+    if recorded.lacks(PartName::ReadingDelay, prior).is_some() {
+        return Ok(0.0);
+    }
+    let rows = rows.clone().sure(recorded.scales.friction_n_m, recorded).less(prior);
+    let fitted = fit(rows, prior, recorded, PartName::ALL.into_iter().chain([PartName::ReadingDelay]))?;
+    let arcsec = fitted.model.of(PartName::ReadingDelay).map_or(0.0, |of| fitted.model.coefficients[of.start]);
+    Ok(-arcsec / flexspline_base::units::ARCSEC_PER_RAD / recorded.scales.speed_rad_s)
+}
+
+/// A file with both angles as they are at one instant.
+fn without_delay(file: &Recording, delay_s: f64, ratio: f64) -> Recording {
+    let mut file = file.clone();
+    for session in &mut file.sessions {
+        let speeds: Vec<f64> = (0..session.len()).map(|k| rows::speed_rad_s(session, k, ratio)).collect();
+        session.error_rad.iter_mut().zip(speeds).for_each(|(error, speed)| *error += delay_s * speed);
+    }
+    let (late, early) = if delay_s > 0.0 { ("output", "generator") } else { ("generator", "output") };
+    file.notes.push(format!(
+        "the {late} is read {:.2} ms after the {early}: what that does goes with the speed, which no table knows; it \
+         was taken out of the rows. Read both at one instant, or tell the controller of the delay",
+        1e3 * delay_s.abs()
+    ));
+    file
 }
 
 /// A file in pieces, each with one zero.
@@ -419,7 +458,8 @@ fn with_dead_zone(
         ..prior.clone()
     };
     let prior = &aligned;
-    let mut fitted = fit(rows.sure(recorded.scales.friction_n_m, &recorded).less(prior), prior, &recorded)?;
+    let mut fitted =
+        fit(rows.sure(recorded.scales.friction_n_m, &recorded).less(prior), prior, &recorded, PartName::ALL)?;
     let found = fitted.model.play_arcsec() / flexspline_base::units::ARCSEC_PER_RAD;
     if found > 0.0 {
         // Now that the play is known, without the rows inside it.
@@ -428,6 +468,7 @@ fn with_dead_zone(
             settled(files, prior, &recorded, play_rad).sure(recorded.scales.friction_n_m, &recorded).less(prior),
             prior,
             &recorded,
+            PartName::ALL,
         )?;
     }
     let Fitted { rows, folds, model, held_out, mut parts } = fitted;
@@ -585,12 +626,17 @@ struct Fitted {
 }
 
 /// Chooses and fits parts to the rows that are outside of a play.
-fn fit(rows: Rows, prior: &Prior<'_>, recorded: &Recorded) -> Result<Fitted, CalibrationError> {
+fn fit(
+    rows: Rows,
+    prior: &Prior<'_>,
+    recorded: &Recorded,
+    parts: impl IntoIterator<Item = PartName>,
+) -> Result<Fitted, CalibrationError> {
     if rows.rows.len() < FEWEST_ROWS {
         return Err(CalibrationError::TooFew(rows.rows.len()));
     }
     let may = |part: &PartName| recorded.lacks(*part, prior).is_none();
-    let mut open: Vec<PartName> = PartName::ALL.into_iter().filter(may).collect();
+    let mut open: Vec<PartName> = parts.into_iter().filter(may).collect();
     let own_zero = rows.folds == FoldKind::Files;
     let mut backwards = false;
     // Once more where the play has to go: without it the flanks are sound.

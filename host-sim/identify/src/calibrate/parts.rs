@@ -26,10 +26,12 @@ pub enum PartName {
     OutputAngle,
     /// What temperature changes: zero, wind-up and play.
     Temperature,
+    /// One angle is read after the other: what goes with the speed. It is the logger's, and no table holds it.
+    ReadingDelay,
 }
 
 impl PartName {
-    /// All of them, in the order in which they are shown.
+    /// All that a table holds, in the order in which they are shown.
     pub const ALL: [PartName; 7] = [
         PartName::WindUp,
         PartName::Play,
@@ -51,6 +53,7 @@ impl PartName {
             PartName::ToothPitch => "tooth_pitch",
             PartName::OutputAngle => "output_angle",
             PartName::Temperature => "temperature",
+            PartName::ReadingDelay => "reading_delay",
         }
     }
 }
@@ -88,6 +91,8 @@ pub struct State {
     pub temperature_c: f64,
     /// Direction of the output: 1, −1; 0 if not known.
     pub way: f64,
+    /// Speed of the output, rad/s; 0 of a table, which knows none.
+    pub speed_rad_s: f64,
 }
 
 /// What the columns are made with.
@@ -101,6 +106,8 @@ pub struct Scales {
     pub temperature_c: [f64; 2],
     /// Tooth pitches in a turn of the generator.
     pub teeth: f64,
+    /// Speed of the output that a tenth of the rows exceed, rad/s; 0 where no time was recorded.
+    pub speed_rad_s: f64,
 }
 
 impl Scales {
@@ -148,6 +155,7 @@ pub(super) fn columns(part: PartName, at: &State, scales: &Scales, to: &mut Vec<
             let warm = scales.temperature_share(at.temperature_c);
             to.extend([warm, warm * load, warm * lag]);
         }
+        PartName::ReadingDelay => to.push(at.speed_rad_s / scales.speed_rad_s.max(f64::MIN_POSITIVE)),
     }
 }
 
@@ -159,6 +167,7 @@ pub(super) fn weights(part: PartName) -> Vec<f64> {
             (1..=WIND_UP_DEGREE).map(|k| (k as f64).powi(DEGREE_POWER)).chain(std::iter::once(1.0)).collect()
         }
         PartName::Play | PartName::Temperature => vec![1.0; 3],
+        PartName::ReadingDelay => vec![1.0],
         PartName::GeneratorAngle | PartName::MaterialAngle => of_waves(GENERATOR_ORDERS),
         PartName::ToothPitch => of_waves(TOOTH_ORDERS),
         PartName::OutputAngle => of_waves(OUTPUT_ORDERS),
@@ -190,14 +199,27 @@ mod tests {
 
     #[test]
     fn parts_repeat_where_the_drive_does_and_have_a_weight_for_each_column() {
-        let scales = Scales { torque_n_m: [-10.0, 30.0], friction_n_m: 1.0, temperature_c: [10.0, 30.0], teeth: 200.0 };
-        let at = State { generator_rad: 1.3, output_rad: 0.4, torque_n_m: 5.0, temperature_c: 20.0, way: 1.0 };
+        let scales = Scales {
+            torque_n_m: [-10.0, 30.0],
+            friction_n_m: 1.0,
+            temperature_c: [10.0, 30.0],
+            teeth: 200.0,
+            speed_rad_s: 0.2,
+        };
+        let at = State {
+            generator_rad: 1.3,
+            output_rad: 0.4,
+            torque_n_m: 5.0,
+            temperature_c: 20.0,
+            way: 1.0,
+            speed_rad_s: 0.1,
+        };
         let of = |part, at: &State| {
             let mut to = Vec::new();
             columns(part, at, &scales, &mut to);
             to
         };
-        for part in PartName::ALL {
+        for part in PartName::ALL.into_iter().chain([PartName::ReadingDelay]) {
             assert_eq!(of(part, &at).len(), weights(part).len(), "{}", part.as_str());
         }
         let same = |part, other: &State| of(part, &at).iter().zip(of(part, other)).all(|(a, b)| (a - b).abs() < 1e-9);

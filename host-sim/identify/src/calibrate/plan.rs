@@ -237,6 +237,7 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&First<'_>>) -> Resu
         friction_n_m: prior.friction_n_m().max(LEAST_FRICTION * torque[0].abs().max(torque[1].abs())),
         temperature_c: wide(bench.temperature_c, first.map(|first| first.scales.temperature_c)),
         teeth: prior.tooth_pitches(),
+        speed_rad_s: 0.0,
     };
     let ratio = prior.nominal.ratio;
     let (open, cannot) = open_parts(prior, bench, &scales);
@@ -521,7 +522,7 @@ fn candidates(prior: &Prior<'_>, bench: &Bench, scales: &Scales, chosen: &[Chose
                     // Not all at one phase of generator and teeth.
                     let generator_rad = output_rad * ratio
                         + TAU * (k as f64 * GOLDEN).fract() * (ratio.abs() / ROWS_OF_A_PASS as f64).min(1.0);
-                    let at = State { generator_rad, output_rad, torque_n_m, temperature_c, way };
+                    let at = State { generator_rad, output_rad, torque_n_m, temperature_c, way, speed_rad_s: 0.0 };
                     tells.add(&row(chosen, &at, scales), weight);
                 }
                 let pass = Pass {

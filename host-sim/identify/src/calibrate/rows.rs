@@ -67,6 +67,8 @@ pub(super) struct Recorded {
     /// Generator turns in steps that are short beside a tooth pitch.
     pub fine_turns: f64,
     pub temperature_c: f64,
+    /// Speed of the output that a tenth of the rows that move stay below, rad/s.
+    pub slow_rad_s: f64,
 }
 
 impl Recorded {
@@ -95,6 +97,11 @@ impl Recorded {
         let all_steps = sessions().flat_map(|s| s.generator_rad.windows(2).map(|p| (p[1] - p[0]).abs()));
         let fine_turns = all_steps.filter(|step| *step <= fine_rad * (1.0 + 1e-3)).sum::<f64>() / TAU;
         let most = torque.0.abs().max(torque.1.abs());
+        let speeds = sessions().flat_map(|session| {
+            (0..session.len()).map(|k| speed_rad_s(session, k, prior.nominal.ratio).abs()).collect::<Vec<f64>>()
+        });
+        let mut speeds = sampled(&speeds.filter(|speed| *speed > 0.0).collect::<Vec<f64>>());
+        let [slow, fast] = [0.1, 0.9].map(|share| quantile_of(&mut speeds, share));
         let torque_noise_n_m = white_noise(sessions().filter_map(|session| session.torque_n_m.as_deref()));
         Recorded {
             torque_noise_n_m,
@@ -103,7 +110,9 @@ impl Recorded {
                 friction_n_m: prior.friction_n_m().max(if has_torque { super::LEAST_FRICTION * most } else { 0.0 }),
                 temperature_c: if has_temperature { [temperature.0, temperature.1] } else { [usual; 2] },
                 teeth: prior.tooth_pitches(),
+                speed_rad_s: fast,
             },
+            slow_rad_s: slow,
             has_torque,
             has_temperature,
             generator_share: covered(angles(1.0), 24),
@@ -152,9 +161,21 @@ impl Recorded {
             PartName::Temperature if warm - cold < super::ONE_TEMPERATURE_K => {
                 Some(format!("the temperature varies by {:.1} K", warm - cold))
             }
+            PartName::ReadingDelay if self.scales.speed_rad_s <= 0.0 => Some("no time was recorded".to_owned()),
+            PartName::ReadingDelay if self.scales.speed_rad_s < super::OTHER_PACE * self.slow_rad_s => {
+                Some("the generator keeps to one pace: there a delay and play are one".to_owned())
+            }
             _ => None,
         }
     }
+}
+
+/// Speed of the output at a row, rad/s; 0 where no time says it.
+pub(super) fn speed_rad_s(session: &Session, row: usize, ratio: f64) -> f64 {
+    let (from, to) = (row.saturating_sub(1), (row + 1).min(session.len() - 1));
+    let Some(time) = &session.time_s else { return 0.0 };
+    let span = time[to] - time[from];
+    if span > 0.0 { (session.generator_rad[to] - session.generator_rad[from]) / span / ratio } else { 0.0 }
 }
 
 /// Share of a turn with angles in it.
@@ -211,6 +232,7 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
                     torque_n_m: if recorded.has_torque { at(&session.torque_n_m, 0.0) } else { 0.0 },
                     temperature_c: at(&session.temperature_c, recorded.temperature_c),
                     way,
+                    speed_rad_s: speed_rad_s(session, k, prior.nominal.ratio),
                 };
                 all.measured_arcsec.push(session.error_rad[k] * ARCSEC_PER_RAD);
                 all.rows.push(Row { at, left_arcsec: 0.0, zero, fold: session_number });

@@ -120,7 +120,8 @@ fn error_arcsec(
 ) -> f64 {
     let way = if direction == Direction::Forward { 1.0 } else { -1.0 };
     let (torque_n_m, temperature_c) = (f64::from(torque), f64::from(temperature));
-    let at = State { generator_rad, output_rad: generator_rad / prior.nominal.ratio, torque_n_m, temperature_c, way };
+    let output_rad = generator_rad / prior.nominal.ratio;
+    let at = State { generator_rad, output_rad, torque_n_m, temperature_c, way, speed_rad_s: 0.0 };
     prior.steady_arcsec(&at) + model.adds_arcsec(&at)
 }
 

@@ -80,6 +80,36 @@ fn parts_that_a_unit_has_are_found_and_the_core_takes_them_out() {
     assert!(made.calibration.core.rms_after_arcsec < 2.6, "{:?}", made.calibration.core);
 }
 
+/// The same rows at paces of the motor of 2, 3.5, 5 and 2.8 rad/s, leg by leg, the output read `delay_s` late.
+fn at_paces(mut recording: Recording, delay_s: f64) -> Recording {
+    let session = &mut recording.sessions[0];
+    let (mut t, mut time) = (0.0, Vec::new());
+    for k in 0..session.len() {
+        time.push(t);
+        let pace = [2.0, 3.5, 5.0, 2.8][k / 500 % 4];
+        t += 0.38 / pace;
+        let way = if k < session.len() / 2 { 1.0 } else { -1.0 };
+        session.error_rad[k] -= delay_s * way * pace / RATIO;
+    }
+    session.time_s = Some(time);
+    recording
+}
+
+#[test]
+fn a_delay_is_no_play_and_play_is_no_delay() {
+    let prior = Prior::of_ratio(RATIO, GeneratorKind::Cam);
+    for (delay_s, play) in [(0.005, 0.0), (0.0, 18.0), (0.005, 18.0)] {
+        let law = |psi: f64, _: f64, _: f64, way: f64| 25.0 * (2.0 * psi).sin() - play * way;
+        let made = calibrate(&[at_paces(recording(3, law), delay_s)], &prior).unwrap();
+        let c = &made.calibration;
+        let told = c.notes.iter().find(|note| note.contains("is read"));
+        assert_eq!(told.is_some(), delay_s > 0.0, "{delay_s} {play}: {:?}", c.notes);
+        assert!(told.is_none_or(|note| note.contains("output is read 5.0") || note.contains("output is read 4.9")));
+        assert_eq!(kept(c).contains(&"play"), play > 0.0, "{delay_s} {play}: {:?}", c.parts);
+        assert!(c.core.rms_after_arcsec < 3.0, "{:?}", c.core);
+    }
+}
+
 #[test]
 fn noise_makes_no_table_and_lone_parts_no_others() {
     let prior = Prior::of_ratio(RATIO, GeneratorKind::Cam);

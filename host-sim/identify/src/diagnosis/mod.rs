@@ -372,7 +372,7 @@ fn remembered(laws: &[Law], terms: &[Term<'_>]) -> Vec<(usize, Vec<f64>)> {
 fn lines_left(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Vec<(remainder::Line, f64)> {
     let every = remainder::every_row(problem, selected, noise);
     let rows = every.len();
-    remainder::lines(problem, &every, HIGHEST_ORDER)
+    remainder::lines(problem, &every, HIGHEST_ORDER.min(problem.on.rows.highest_order()))
         .into_iter()
         .filter(|line| line.power > remainder::line_limit(rows))
         .map(|line| {
@@ -380,6 +380,7 @@ fn lines_left(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> V
             let size = noise.white * rows::rms(&every) * (2.0 * line.power / rows as f64).sqrt();
             (line, size)
         })
-        .filter(|(_, size)| *size > 0.25 * select::least_size(noise.white))
+        // Rounding of a steady motion makes lines, of no more than all of it.
+        .filter(|(_, size)| *size > (0.25 * select::least_size(noise.white)).max(problem.on.rows.rounding))
         .collect()
 }

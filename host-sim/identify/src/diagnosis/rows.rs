@@ -193,6 +193,17 @@ impl Rows {
         self.sessions.iter().zip(&self.used).filter(|(_, used)| **used).map(|(session, _)| session.clone())
     }
 
+    /// Highest order per turn of the generator of which half of the rows that move see a period or more in two: beyond,
+    /// a wave is on these rows what one of a lower order is, or a constant.
+    #[must_use]
+    pub fn highest_order(&self) -> f64 {
+        let steps = self.sessions_used().flat_map(|session| {
+            self.generator[session].windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect::<Vec<f64>>()
+        });
+        let half = quantile_of(&mut steps.filter(|step| *step > 0.0).collect::<Vec<f64>>(), 0.5);
+        if half > 0.0 { std::f64::consts::PI / half } else { f64::INFINITY }
+    }
+
     /// Rows that are learnt from.
     #[must_use]
     pub fn count_used(&self) -> usize {

@@ -271,7 +271,7 @@ fn parse_as(
     if drifts {
         faults::drift::check(&mut sessions, gear, Stretches::OfRows, &mut findings);
     }
-    faults::held::check(&mut sessions, &mut findings);
+    faults::held::check(&mut sessions, gear, &mut findings);
     faults::frozen::check(&mut sessions, gear, error_recorded, &mut findings).map_err(refuse)?;
     faults::coarse_torque::check(&mut sessions, &mut findings);
     faults::reads::check(&mut sessions, gear, &mut findings);

@@ -1,14 +1,19 @@
-//! A torque that is read more slowly than the angles, and repeated in between: one value for so many rows, all along.
+//! A channel that is read more slowly than the log is written, and repeated in between: one value for so many rows, all
+//! along.
 //!
 //! What the load does between two readings moves the drive, and the column does not say it. A load that is put on in
-//! steps as long as these moves the error in the very row of a step, and is left alone.
+//! steps as long as these moves the error in the very row of a step, and is left alone. An angle that is repeated is
+//! as old as the row is late: only rows with a new one tell an error. One that stands because it is read in coarse
+//! counts goes on by single counts.
 
 use std::ops::Range;
 
+use super::lattice::lattice;
 use super::{Findings, of_rows};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
-use crate::measurement::fault::{FaultName, Measures, Treatment};
+use crate::measurement::fault::{Fault, FaultName, Measures, Treatment};
+use crate::measurement::gear::Gear;
 use flexspline_base::robust::median_of;
 
 /// Runs of one value that show a rhythm, at least. *Guess*.
@@ -24,29 +29,85 @@ const NO_STEPS_OF_A_BENCH: usize = 5;
 /// *Guess*.
 const WITHIN_THE_ROW: f64 = 0.5;
 
-/// Names a torque that is repeated from row to row, and puts a straight line between its readings.
-pub(in crate::measurement) fn check(sessions: &mut [Session], findings: &mut Findings) {
-    let of: Vec<Vec<Range<usize>>> =
-        sessions.iter().map(|session| session.torque_n_m.as_deref().map_or_else(Vec::new, runs)).collect();
+/// Readings go on by so many counts from one to the next, at the median, where it is not the counts that make an angle
+/// stand. *Guess*.
+const COUNTS: f64 = 4.0;
+/// Two values of an angle that are this near each other are the same, against the largest: round-off of a sum.
+const SAME: f64 = 1e-13;
+
+/// Names channels that are repeated from row to row: a straight line takes the place of what is repeated of a torque,
+/// and rows that repeat an angle are left out.
+pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) {
+    check_torque(sessions, findings);
+    check_angle(sessions, Quantity::Generator, |session| session.generator_rad.clone(), findings);
+    check_angle(sessions, Quantity::Output, |session| session.output_rad(gear.ratio), findings);
+}
+
+/// Rows from one new value to the next, if most runs of one value are as long.
+fn rhythm(of: &[Vec<Range<usize>>]) -> Option<usize> {
     // The first and the last of a session are cut.
     let inner = || of.iter().flat_map(|runs| runs.get(1..runs.len().saturating_sub(1)).unwrap_or_default());
     let mut lengths: Vec<f64> = inner().map(|run| run.len() as f64).collect();
     let every = median_of(&mut lengths) as usize;
     let regular = inner().filter(|run| run.len() == every || run.len() == 2 * every).count();
-    if lengths.len() < FEWEST_RUNS
-        || !(2..=LONGEST).contains(&every)
-        || (regular as f64) < REGULAR * lengths.len() as f64
-        || (every >= NO_STEPS_OF_A_BENCH && !goes_on_between(sessions, &of))
-    {
-        return;
-    }
-    let (Some(first), Some(last)) = (sessions.first(), sessions.last()) else { return };
+    let is_one = lengths.len() >= FEWEST_RUNS
+        && (2..=LONGEST).contains(&every)
+        && (regular as f64) >= REGULAR * lengths.len() as f64;
+    is_one.then_some(every)
+}
+
+/// A fault of a channel with a new value in one of `every` rows, to be completed.
+fn fault(sessions: &[Session], of: &[Vec<Range<usize>>], channel: Quantity, every: usize) -> Option<Fault> {
+    let (first, last) = (sessions.first()?, sessions.last()?);
     let mut fault = of_rows(first, FaultName::FrozenChannel, 0..first.len());
     fault.last_line = last.line[last.len() - 1];
     fault.until_s = last.time_s.as_ref().and_then(|time| time.last().copied());
     fault.rows = of.iter().flatten().map(|run| run.len() as u64 - 1).sum();
-    (fault.channel, fault.treatment) = (Some(Quantity::Torque), Treatment::Repaired);
+    fault.channel = Some(channel);
     fault.measures = Measures { every_rows: Some(every as u64), ..Measures::default() };
+    Some(fault)
+}
+
+fn check_angle(
+    sessions: &mut [Session],
+    channel: Quantity,
+    angle: impl Fn(&Session) -> Vec<f64>,
+    findings: &mut Findings,
+) {
+    let angles: Vec<Vec<f64>> = sessions.iter().map(angle).collect();
+    let of: Vec<Vec<Range<usize>>> = angles.iter().map(|angle| runs(angle)).collect();
+    let Some(every) = rhythm(&of) else { return };
+    let of_counts = angles.iter().zip(&of).max_by_key(|(angle, _)| angle.len()).is_some_and(|(angle, runs)| {
+        let mut steps: Vec<f64> =
+            runs.windows(2).map(|pair| (angle[pair[1].start] - angle[pair[0].start]).abs()).collect();
+        lattice(angle).is_some_and(|count| median_of(&mut steps) < COUNTS * count)
+    });
+    let Some(mut fault) = fault(sessions, &of, channel, every).filter(|_| !of_counts) else { return };
+    fault.treatment = Treatment::Masked;
+    fault.what = format!(
+        "the {channel} has a new value in one of {every} rows, and is repeated in the others while the drive moves on: \
+         rows that repeat one are left out"
+    );
+    findings.faults.push(fault);
+    for (session, runs) in sessions.iter_mut().zip(&of) {
+        let mut drop = vec![false; session.len()];
+        // Where it stands for longer, it is the drive that stands.
+        for run in runs.iter().filter(|run| run.len() <= 2 * every) {
+            drop[run.start + 1..run.end].fill(true);
+        }
+        session.leave_out(&drop);
+    }
+}
+
+fn check_torque(sessions: &mut [Session], findings: &mut Findings) {
+    let of: Vec<Vec<Range<usize>>> =
+        sessions.iter().map(|session| session.torque_n_m.as_deref().map_or_else(Vec::new, runs)).collect();
+    let Some(every) = rhythm(&of) else { return };
+    if every >= NO_STEPS_OF_A_BENCH && !goes_on_between(sessions, &of) {
+        return;
+    }
+    let Some(mut fault) = fault(sessions, &of, Quantity::Torque, every) else { return };
+    fault.treatment = Treatment::Repaired;
     fault.what = format!(
         "the torque has a new value in one of {every} rows, and is repeated in the others, while the load goes on: a \
          straight line from one to the next stands in"
@@ -67,7 +128,9 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], findings: &mut Fin
 /// Runs of rows with one value.
 fn runs(values: &[f64]) -> Vec<Range<usize>> {
     let mut from = 0;
-    let ends = (1..=values.len()).filter(|row| *row == values.len() || values[*row] != values[*row - 1]);
+    let same = SAME * values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+    let goes_on = |row: usize| (values[row] - values[row - 1]).abs() <= same;
+    let ends = (1..=values.len()).filter(|row| *row == values.len() || !goes_on(*row));
     ends.map(|end| std::mem::replace(&mut from, end)..end).collect()
 }
 
@@ -113,7 +176,7 @@ mod tests {
 
     fn found(sessions: &mut [Session]) -> Option<(FaultName, Option<u64>)> {
         let mut findings = Findings::default();
-        check(sessions, &mut findings);
+        check(sessions, &Gear::of_ratio(100.0), &mut findings);
         findings.faults.pop().map(|fault| (fault.name, fault.measures.every_rows))
     }
 
@@ -130,6 +193,32 @@ mod tests {
         let mut right = sessions(at, at);
         let before = right.clone();
         assert!(found(&mut right).is_none() && right == before);
+    }
+
+    /// A drive of ratio 100 whose generator turns by 0.04 rad in a row; its output is read as `read` says of its angle
+    /// in each row.
+    fn read_as(read: impl Fn(&dyn Fn(usize) -> f64, usize) -> f64) -> Vec<Session> {
+        let output = |row: usize| 4e-4 * row as f64 + 5e-5 * (0.04 * row as f64).sin();
+        let generator = |row: usize| 0.04 * row as f64;
+        vec![Session {
+            line: (2..6002).collect(),
+            generator_rad: (0..6000).map(generator).collect(),
+            error_rad: (0..6000).map(|row| read(&output, row) - generator(row) / 100.0).collect(),
+            ..Session::default()
+        }]
+    }
+
+    #[test]
+    fn rows_that_repeat_an_angle_are_left_out_and_those_of_coarse_counts_are_not() {
+        let mut held = read_as(|output, row| output(row / 5 * 5));
+        assert_eq!(found(&mut held), Some((FaultName::FrozenChannel, Some(5))));
+        assert_eq!(held[0].len(), 1200);
+        let largest = held[0].error_rad.iter().fold(0.0, |largest: f64, error| largest.max(error.abs()));
+        assert!(largest < 5.1e-5, "{largest}: as old as the row is");
+        // 2e-3 rad are five rows.
+        let mut coarse = read_as(|output, row| 2e-3 * (output(row) / 2e-3).round());
+        assert_eq!(found(&mut coarse), None);
+        assert_eq!(coarse[0].len(), 6000);
     }
 
     #[test]

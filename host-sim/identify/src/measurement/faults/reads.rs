@@ -6,13 +6,19 @@
 //!
 //! The scatter of a row is what the rows beside it leave of it when a cubic goes through them. Rows then weigh what
 //! noise and scatter together leave of them; rows that were read late are left out.
+//!
+//! Where it is the generator that is read at scattered instants, or in coarse counts, its angle shows it: what it is
+//! off by is in the error, over the ratio, with the sign turned, at any pace. An output that follows a generator which
+//! really moves so has no such error.
 
 use std::borrow::Cow;
 
 use super::outliers::repeat_with_position;
+use super::resolution::seen;
 use super::state::State;
 use super::{ARCSEC, Findings, of_rows};
 use crate::measurement::Session;
+use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Measures, Treatment};
 use crate::measurement::gear::Gear;
 use flexspline_base::robust::{MAD_TO_STD, median_of, quantile_of};
@@ -64,6 +70,11 @@ const PAUSE: f64 = 2.5;
 const WHITE: f64 = 0.08;
 /// Rows that are late one after another, at most.
 const LONGEST_RUN: usize = 2;
+/// Scatter of the error against that of the generator's angle over the ratio is −1 within this, where it is that angle
+/// that is misread: what other noise of the angle and motion that is real leave of it. *Guess*.
+const MISREAD: f64 = 0.15;
+/// Share of the rows that decide it: those that are farthest off are something else.
+const NEAR: f64 = 0.99;
 /// Quantile of absolute numbers that a third of them, being far off, move little; and what it is of normal ones.
 const LOW: (f64, f64) = (0.15, 0.1891);
 
@@ -78,6 +89,8 @@ struct Class {
 /// The rows of a session that are not late, and how fast each row is.
 struct Reads<'a> {
     error: Cow<'a, [f64]>,
+    /// The generator's angle over the ratio, rad.
+    turned: Vec<f64>,
     /// Change of the output from row to row, rad.
     speed: Vec<f64>,
     /// Faster rows are too far apart to tell their scatter from waves of the drive.
@@ -100,7 +113,8 @@ impl<'a> Reads<'a> {
             .collect();
         let fastest = FOLLOWED_RAD / gear.ratio.abs();
         let pauses = pauses(session);
-        Reads { error: Cow::Borrowed(&session.error_rad), speed, fastest, pauses, good: (0..rows).collect() }
+        let turned = psi.iter().map(|psi| psi / gear.ratio).collect();
+        Reads { error: Cow::Borrowed(&session.error_rad), turned, speed, fastest, pauses, good: (0..rows).collect() }
     }
 
     /// Whether there is no pause from one row to another.
@@ -133,14 +147,65 @@ impl<'a> Reads<'a> {
         Some((off.collect(), apart))
     }
 
-    /// Row and scatter of each good row whose four neighbours are good: (-1, 4, -6, 4, -1) / 6 of the errors.
+    /// Row and scatter of each good row whose four neighbours are good, but for those that are too fast.
     fn scatter(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         let slow = |row: usize| self.speed[row].abs() <= self.fastest;
-        let beside = move |rows: &&[usize]| rows[4] - rows[0] == 4 && slow(rows[2]) && self.goes_on(rows[0], rows[4]);
-        self.good.windows(5).filter(beside).map(|rows| {
-            let e = |k: usize| self.error[rows[k]];
-            (rows[2], (6.0 * e(2) - 4.0 * (e(1) + e(3)) + e(0) + e(4)) / 6.0)
-        })
+        self.beside().filter(move |rows| slow(rows[2])).map(|rows| (rows[2], off_cubic(&self.error, rows)))
+    }
+
+    /// Scatter of the error and of the generator's angle over the ratio, and speed, of each row at any speed.
+    fn both(&self) -> impl Iterator<Item = [f64; 3]> + '_ {
+        self.beside().map(|rows| [off_cubic(&self.error, rows), off_cubic(&self.turned, rows), self.speed[rows[2]]])
+    }
+
+    /// Five good rows one after another.
+    fn beside(&self) -> impl Iterator<Item = &[usize]> + '_ {
+        self.good.windows(5).filter(|rows| rows[4] - rows[0] == 4 && self.goes_on(rows[0], rows[4]))
+    }
+}
+
+/// What the middle one of five rows is off the cubic through the others: (-1, 4, -6, 4, -1) / 6 of the values.
+fn off_cubic(values: &[f64], rows: &[usize]) -> f64 {
+    let e = |k: usize| values[rows[k]];
+    (6.0 * e(2) - 4.0 * (e(1) + e(3)) + e(0) + e(4)) / 6.0
+}
+
+/// The generator's angle is misread.
+struct Misread {
+    /// Noise beside it, rad.
+    noise: f64,
+    /// Scatter of the instants at which it is read, rows.
+    jitter_rows: f64,
+    /// What it is off by, rad at the output.
+    off: f64,
+}
+
+impl Misread {
+    /// What the scatter of both angles shows. Few rows that are far off decide nothing.
+    fn of(reads: &[Reads<'_>], fast: f64) -> Option<Misread> {
+        let rows: Vec<[f64; 3]> = reads.iter().flat_map(Reads::both).collect();
+        let most = |of: usize| quantile_of(&mut rows.iter().map(|row| row[of].abs()).collect::<Vec<f64>>(), NEAR);
+        let [of_error, of_turned] = [most(0), most(1)];
+        let near = || rows.iter().filter(|[error, turned, _]| error.abs() <= of_error && turned.abs() <= of_turned);
+        let [mut xx, mut xy, mut yy, mut vv, mut count] = [0.0; 5];
+        for [error, turned, speed] in near() {
+            xx += turned * turned;
+            xy += turned * error;
+            yy += error * error;
+            vv += speed * speed;
+            count += 1.0;
+        }
+        if xx <= 0.0 || vv <= 0.0 || count < CLASS_ROWS as f64 {
+            return None;
+        }
+        let (slope, left) = (xy / xx, (yy - xy * xy / xx).max(0.0));
+        let noise = (left / count / SCATTER_GAIN).sqrt();
+        let jitter_rows = (xx / vv / SCATTER_GAIN).sqrt();
+        let scatter = jitter_rows * fast;
+        // Neighbouring scatters share rows: they are worth about a third.
+        let certain = count / 3.0 * (xy * xy / xx) / left.max(f64::MIN_POSITIVE) > CERTAIN;
+        let told = (slope + 1.0).abs() < MISREAD && certain && scatter > LEAST_RAD.max(LEAST_OF_NOISE * noise);
+        told.then_some(Misread { noise, jitter_rows, off: (xx / count / SCATTER_GAIN).sqrt() })
     }
 }
 
@@ -265,7 +330,14 @@ struct Found {
 }
 
 impl Found {
-    fn of(reads: &mut [Reads<'_>], fast: f64, tooth_speed: f64, sessions: &[Session], gear: &Gear) -> Found {
+    /// Where the generator is known to be misread, that is the scatter.
+    fn of(
+        reads: &mut [Reads<'_>],
+        misread: Option<&Misread>,
+        (fast, tooth_speed): (f64, f64),
+        sessions: &[Session],
+        gear: &Gear,
+    ) -> Found {
         let mut late: Vec<Vec<(usize, f64)>> = vec![Vec::new(); reads.len()];
         // Few rows that stand out at all are no late rows: most logs end here.
         let low = |off: &mut [f64]| quantile_of(off, LOW.0) / LOW.1;
@@ -284,11 +356,15 @@ impl Found {
         for late in &mut late {
             late.sort_unstable_by_key(|(row, _)| *row);
         }
-        let told_late = is_told(reads, &late, fast, sessions, gear);
+        let told_late = is_told(reads, &late, fast.min(FOLLOWED_RAD / gear.ratio.abs()), sessions, gear);
         let robust = |off: &mut [f64]| MAD_TO_STD * median_of(off);
         if !told_late {
             reads.iter_mut().for_each(|of| of.good = (0..of.error.len()).collect());
         }
+        if let Some(Misread { noise, jitter_rows, .. }) = misread {
+            return Found { late, told_late, told_jitter: true, noise: *noise, jitter_rows: *jitter_rows };
+        }
+        let fast = fast.min(FOLLOWED_RAD / gear.ratio.abs());
         let (noise, jitter_rows, certain) = fit(&classes(reads, robust), tooth_speed);
         let scatter = jitter_rows * fast;
         let told_jitter = certain > CERTAIN && scatter > LEAST_RAD.max(LEAST_OF_NOISE * noise) && is_white(reads, fast);
@@ -306,15 +382,22 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
     let mut reads: Vec<Reads<'_>> =
         sessions.iter().filter(|session| session.len() > 8).map(|session| Reads::new(session, gear)).collect();
     let mut speeds: Vec<f64> = reads.iter().flat_map(|of| of.speed.iter().map(|speed| speed.abs())).collect();
-    let fast = quantile_of(&mut speeds, 0.95).min(FOLLOWED_RAD / gear.ratio.abs());
+    let fast = quantile_of(&mut speeds, 0.95);
     if fast == 0.0 {
+        return;
+    }
+    // By what was measured alone: waves of a fast drive, once they are fitted, follow what its angle is misread by.
+    let misread = Misread::of(&reads, fast);
+    if misread.as_ref().is_some_and(|misread| is_of_counts(sessions, gear, misread.off)) {
+        drop(reads);
+        sessions.iter_mut().for_each(|session| session.loudness = Some(vec![1.0; session.len()]));
         return;
     }
     let pitch = gear.tooth_pitch_rad.unwrap_or(std::f64::consts::PI / gear.ratio.abs());
     // A tooth of either wheel passes in a turn of the generator over its number: in a pitch of the output over the
     // ratio.
     let tooth_speed = pitch / gear.ratio.abs() / TOOTH_ROWS;
-    let mut found = Found::of(&mut reads, fast, tooth_speed, sessions, gear);
+    let mut found = Found::of(&mut reads, misread.as_ref(), (fast, tooth_speed), sessions, gear);
     if !found.told_late && !found.told_jitter {
         return;
     }
@@ -327,7 +410,7 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
             of.error = Cow::Owned(state.left(&fit, session, &[]));
             of.good = (0..of.speed.len()).collect();
         }
-        found = Found::of(&mut reads, fast, tooth_speed, sessions, gear);
+        found = Found::of(&mut reads, misread.as_ref(), (fast, tooth_speed), sessions, gear);
     }
     let Found { late, told_late, told_jitter, noise, jitter_rows } = found;
     let scatter = jitter_rows * fast;
@@ -389,6 +472,13 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
             sessions[*session].leave_out(&drop);
         }
     }
+}
+
+/// Whether what the generator's angle is off by, rad at the output, is mostly that it is read in counts: that is its
+/// resolution, and known as such.
+fn is_of_counts(sessions: &[Session], gear: &Gear, off: f64) -> bool {
+    let counts = seen(sessions, gear, false).into_iter().filter(|(channel, _)| *channel == Quantity::Generator);
+    counts.into_iter().any(|(_, step)| step * step / 12.0 > 0.5 * off * off)
 }
 
 /// Whether the scatter of rows in motion is that of readings which know nothing of each other.
@@ -564,6 +654,30 @@ mod tests {
             // Row 393 is at full speed, row 785 at rest.
             let louder = f64::hypot(1.0, jitter_s * 0.12 / (2.0 * ARCSEC));
             assert!((loud[393] / loud[785] / louder - 1.0).abs() < 0.1, "{} of {louder}", loud[393] / loud[785]);
+        }
+    }
+
+    #[test]
+    fn a_misread_generator_is_told_at_one_pace_however_fast_and_a_real_motion_is_none() {
+        let mut random = fastrand::Rng::with_seed(9);
+        for (step_rad, misread, real) in [(0.35, 0.025, 0.0), (0.05, 0.025, 0.0), (0.05, 0.0, 0.025)] {
+            let mut session = Session { time_s: Some(Vec::new()), ..Session::default() };
+            for k in 0..6000u32 {
+                let (off, moved) = (misread * normal(&mut random), real * normal(&mut random));
+                let psi = step_rad * f64::from(k) + moved;
+                session.line.push(u64::from(k) + 2);
+                session.time_s.as_mut().unwrap().push(0.004 * f64::from(k));
+                session.generator_rad.push(psi + off);
+                session.error_rad.push((12.0 * (2.0 * psi).sin() + 2.0 * normal(&mut random)) * ARCSEC - off / RATIO);
+            }
+            let mut findings = Findings::default();
+            check(std::slice::from_mut(&mut session), &Gear::of_ratio(RATIO), &mut findings);
+            let told = findings.faults.first().and_then(|fault| fault.measures.jitter_ms);
+            assert_eq!(told.is_some(), misread > 0.0, "{step_rad} {misread} {real}: {told:?}");
+            if let Some(jitter_ms) = told {
+                let was = misread / step_rad * 4.0;
+                assert!((jitter_ms / was - 1.0).abs() < 0.1, "{jitter_ms} of {was}");
+            }
         }
     }
 
