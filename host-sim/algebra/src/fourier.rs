@@ -26,28 +26,3 @@ pub fn values_of(sums: &mut [Complex<f64>], length: usize) -> Vec<f64> {
     transform.process(sums, &mut values).expect("lengths are those of the plan");
     values
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::f64::consts::TAU;
-
-    #[test]
-    fn a_wave_stands_where_it_belongs_and_comes_back() {
-        for length in [48_usize, 75] {
-            let wave: Vec<f64> =
-                (0..length).map(|n| 0.5 + 3.0 * (TAU * 7.0 * n as f64 / length as f64).sin()).collect();
-            let mut sums = spectrum(&mut wave.clone());
-            for (k, sum) in sums.iter().enumerate() {
-                let due = match k {
-                    0 => Complex::new(0.5, 0.0),
-                    7 => Complex::new(0.0, -1.5),
-                    _ => Complex::default(),
-                };
-                assert!((sum / length as f64 - due).norm() < 1e-13, "{length}, {k}: {sum}");
-            }
-            let back = values_of(&mut sums, length);
-            assert!(wave.iter().zip(&back).all(|(a, b)| (a - b / length as f64).abs() < 1e-13));
-        }
-    }
-}

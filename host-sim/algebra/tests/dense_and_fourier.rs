@@ -1,0 +1,64 @@
+//! Beside the library, not in it: within it, faer would be compiled once more for these tests.
+
+use std::f64::consts::TAU;
+
+use flexspline_algebra::{Complex, Mat, NotPositiveDefinite, cholesky, lower_of_product, product, spectrum, values_of};
+
+/// Entries that look random, and twice as many rows as columns.
+fn tall(columns: usize) -> Mat {
+    let mut random = fastrand::Rng::with_seed(3);
+    Mat::from_fn(2 * columns, columns, |_, _| random.f64() - 0.5)
+}
+
+#[test]
+fn a_factor_solves_what_it_was_made_of() {
+    let a = tall(30);
+    let square = product(a.transpose(), a.as_ref());
+    let factor = cholesky(square.as_ref()).unwrap();
+    let identity = product(square.as_ref(), factor.inverse().as_ref());
+    let solved = product(square.as_ref(), factor.solve(a.transpose()).as_ref());
+    for i in 0..30 {
+        for j in 0..30 {
+            assert!((identity[(i, j)] - f64::from(u8::from(i == j))).abs() < 1e-12);
+            assert!((solved[(i, j)] - a[(j, i)]).abs() < 1e-12);
+        }
+    }
+}
+
+#[test]
+fn what_is_not_positive_definite_is_refused() {
+    let flat = Mat::from_fn(3, 3, |_, _| 1.0);
+    let negative = Mat::from_fn(3, 3, |i, j| if i == j { -1.0 } else { 0.0 });
+    assert_eq!(cholesky(negative.as_ref()).err(), Some(NotPositiveDefinite));
+    assert_eq!(cholesky(flat.as_ref()).err(), Some(NotPositiveDefinite));
+}
+
+#[test]
+fn the_lower_triangle_is_that_of_the_product() {
+    let a = tall(20);
+    let (whole, lower) = (product(a.transpose(), a.as_ref()), lower_of_product(a.transpose(), a.as_ref()));
+    for i in 0..20 {
+        for j in 0..20 {
+            let due = if j <= i { whole[(i, j)] } else { 0.0 };
+            assert!((lower[(i, j)] - due).abs() < 1e-12);
+        }
+    }
+}
+
+#[test]
+fn a_wave_stands_where_it_belongs_and_comes_back() {
+    for length in [48_usize, 75] {
+        let wave: Vec<f64> = (0..length).map(|n| 0.5 + 3.0 * (TAU * 7.0 * n as f64 / length as f64).sin()).collect();
+        let mut sums = spectrum(&mut wave.clone());
+        for (k, sum) in sums.iter().enumerate() {
+            let due = match k {
+                0 => Complex::new(0.5, 0.0),
+                7 => Complex::new(0.0, -1.5),
+                _ => Complex::default(),
+            };
+            assert!((sum / length as f64 - due).norm() < 1e-13, "{length}, {k}: {sum}");
+        }
+        let back = values_of(&mut sums, length);
+        assert!(wave.iter().zip(&back).all(|(a, b)| (a - b / length as f64).abs() < 1e-13));
+    }
+}
