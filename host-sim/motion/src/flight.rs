@@ -1,10 +1,13 @@
 //! A joint flown by every controller, each with its own motor, drive and load under one sky.
 
 use core::f64::consts::TAU;
+use std::panic::resume_unwind;
+use std::thread::ScopedJoinHandle;
 
+use flexspline::make::ProjectError;
 use flexspline::{
-    Approach, Direction, Drive, Flags, GeneratorAngle, Images, Limits, OutputAngle, Quality, Store, TorqueReading,
-    TorqueSettings,
+    ActivateError, Approach, Direction, Drive, Flags, GeneratorAngle, Images, Limits, OutputAngle, Quality,
+    SettingError, Store, TorqueReading, TorqueSettings,
 };
 
 use super::friction::Friction;
@@ -280,28 +283,51 @@ impl Made {
     }
 }
 
+/// Why a joint is not flown, or not to its end.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FlightError {
+    /// The gear makes no table.
+    #[error("no table: {0}")]
+    Table(#[from] ProjectError),
+    /// A setting of the core's joint.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// The core does not take the table.
+    #[error("the table cannot be flown: {0}")]
+    Activate(#[from] ActivateError),
+    /// The load is further from its target than any joint that is controlled.
+    #[error("{controller}: the joint runs away at {time_s:.2} s")]
+    RunsAway {
+        /// What commands it, one of [`CONTROLLERS`] or "by_torque".
+        controller: &'static str,
+        /// Time since the start, s.
+        time_s: f64,
+    },
+}
+
 /// Flies a scenario.
 ///
 /// # Errors
-/// What cannot be flown, in words.
-pub fn fly(scenario: &Scenario, unit: &Unit) -> Result<Flight, String> {
+/// [`FlightError`].
+pub fn fly(scenario: &Scenario, unit: &Unit) -> Result<Flight, FlightError> {
     fly_told(scenario, unit, &|| {})
 }
 
 /// Flies a scenario; `told` is called by each controller's joint for each second that it flew.
 ///
 /// # Errors
-/// What cannot be flown, in words.
-pub fn fly_told(scenario: &Scenario, unit: &Unit, told: &(dyn Fn() + Sync)) -> Result<Flight, String> {
+/// [`FlightError`].
+pub fn fly_told(scenario: &Scenario, unit: &Unit, told: &(dyn Fn() + Sync)) -> Result<Flight, FlightError> {
     let made = made(scenario, unit, None)?;
     let flawless = Made { unit: unit.flawless(), ..made.clone() };
-    let flown: Vec<Result<Flown, String>> = std::thread::scope(|threads| {
-        let lanes = (0..CONTROLLERS.len()).map(|kind| (&made, kind)).chain([(&flawless, 0)]);
-        let flying: Vec<_> = lanes.map(|(made, kind)| threads.spawn(move || lane(made, kind, told))).collect();
-        flying.into_iter().map(|lane| lane.join().unwrap_or_else(|_| Err("a lane ended early".to_owned()))).collect()
+    let (flown, flawless) = std::thread::scope(|threads| {
+        let start = |made, kind| threads.spawn(move || lane(made, kind, told));
+        let flying: Vec<_> = (0..CONTROLLERS.len()).map(|kind| start(&made, kind)).collect();
+        let flawless = start(&flawless, 0);
+        let landed = |lane: ScopedJoinHandle<'_, _>| lane.join().unwrap_or_else(|panic| resume_unwind(panic));
+        (flying.into_iter().map(landed).collect::<Result<Vec<Flown>, _>>(), landed(flawless))
     });
-    let mut flown = flown.into_iter().collect::<Result<Vec<_>, _>>()?;
-    let flawless = flown.pop().ok_or("nothing was flown")?;
+    let (flown, flawless) = (flown?, flawless?);
     let margin = made.masses.servo(&scenario.servo);
     Ok(Flight {
         flown,
@@ -321,23 +347,27 @@ pub fn fly_told(scenario: &Scenario, unit: &Unit, told: &(dyn Fn() + Sync)) -> R
 ///
 /// # Errors
 /// As [`fly`].
-pub fn fly_one(scenario: &Scenario, unit: &Unit, controller: usize) -> Result<Flown, String> {
+pub fn fly_one(scenario: &Scenario, unit: &Unit, controller: usize) -> Result<Flown, FlightError> {
     lane(&made(scenario, unit, None)?, controller, &|| {})
 }
 
 /// The image of the table that a scenario's joint flies with; `id` makes its id of what is hashed for it.
 ///
 /// # Errors
-/// Why there is none, in words.
-pub fn table_image(scenario: &Scenario, unit: &Unit, id: impl FnOnce(&[u8]) -> [u8; 8]) -> Result<Vec<u8>, String> {
+/// [`FlightError::Table`].
+pub fn table_image(
+    scenario: &Scenario,
+    unit: &Unit,
+    id: impl FnOnce(&[u8]) -> [u8; 8],
+) -> Result<Vec<u8>, FlightError> {
     let largest_n_m = 1.5 * scenario.largest_n_m() + 1.0;
     let noise_rad = if scenario.table == TableKnown::Calibrated { CALIBRATION_NOISE_RAD } else { 0.0 };
     let sampling = Sampling { largest_n_m, drag_n_m: TABLE_DRAG_N_M, temperature_c: scenario.temperature_c, noise_rad };
-    image(&unit.known(scenario.table), unit.drive, &sampling, id).map_err(|error| format!("no table: {error:?}"))
+    Ok(image(&unit.known(scenario.table), unit.drive, &sampling, id)?)
 }
 
 /// With the image of a table that was made before, or one made for the scenario.
-fn made(scenario: &Scenario, unit: &Unit, image: Option<Vec<u8>>) -> Result<Made, String> {
+fn made(scenario: &Scenario, unit: &Unit, image: Option<Vec<u8>>) -> Result<Made, FlightError> {
     let image = image.map_or_else(|| table_image(scenario, unit, |_| [0; 8]), Ok)?;
     // The stiffest that the flight comes to: the loop of the mesh torque is judged by what the table says there.
     let stiffness = stiffness(&unit.nominal, scenario.largest_n_m());
@@ -531,22 +561,16 @@ struct Core {
     last: Option<(on_board::Told, Given)>,
 }
 
-fn setting(error: flexspline::SettingError) -> String {
-    error.to_string()
-}
-
 impl Controller {
-    fn new(made: &Made, kind: usize) -> Result<Self, String> {
+    fn new(made: &Made, kind: usize) -> Result<Self, FlightError> {
         let Made { scenario, unit, .. } = made;
         Ok(match kind {
             0 => Self::Uncompensated,
             1 | 2 => Self::Fourier(Box::new(Fourier::new(made, kind == 2))),
             COMPENSATED | BY_TORQUE => {
-                let on_board = OnBoard::new(unit.drive, &made.on_board_settings()).map_err(setting)?;
+                let on_board = OnBoard::new(unit.drive, &made.on_board_settings())?;
                 let mut store = Store::new();
-                store
-                    .activate(&made.images(), &unit.drive, scenario.temperature_c as f32)
-                    .map_err(|error| format!("the table cannot be flown: {error:?}"))?;
+                store.activate(&made.images(), &unit.drive, scenario.temperature_c as f32)?;
                 let core = Box::new(Core { on_board, store, last: None });
                 if kind == BY_TORQUE { Self::ByTorque(core, Limiter::default()) } else { Self::Core(core) }
             }
@@ -841,7 +865,7 @@ struct Lane {
 }
 
 impl Lane {
-    fn new(made: &Made, kind: usize) -> Result<Self, String> {
+    fn new(made: &Made, kind: usize) -> Result<Self, FlightError> {
         let scenario = &made.scenario;
         Ok(Self {
             plant: plant(made),
@@ -891,7 +915,7 @@ impl Lane {
     }
 }
 
-fn lane(made: &Made, kind: usize, told: &(dyn Fn() + Sync)) -> Result<Flown, String> {
+fn lane(made: &Made, kind: usize, told: &(dyn Fn() + Sync)) -> Result<Flown, FlightError> {
     let scenario = &made.scenario;
     let mut lane = Lane::new(made, kind)?;
     let every = (scenario.seconds() / scenario.servo.tick_s / ROWS).ceil().max(1.0) as usize;
@@ -903,7 +927,8 @@ fn lane(made: &Made, kind: usize, told: &(dyn Fn() + Sync)) -> Result<Flown, Str
         let ripple = (lane.plant.rate_rad_s[1] - now.rate_rad_s) * ARCSEC_PER_RAD;
         let mesh = lane.plant.mesh_n_m();
         if !error.is_finite() || error.abs() > 1e6 {
-            return Err(format!("{}: the joint runs away at {:.2} s", CONTROLLERS[kind], now.time_s));
+            let controller = CONTROLLERS.get(kind).copied().unwrap_or("by_torque");
+            return Err(FlightError::RunsAway { controller, time_s: now.time_s });
         }
         flown.digest = (flown.digest ^ error.to_bits()).wrapping_mul(0x0100_0000_01b3);
         if tick % second == second - 1 {
@@ -933,7 +958,7 @@ fn lane(made: &Made, kind: usize, told: &(dyn Fn() + Sync)) -> Result<Flown, Str
 /// A target that stands, a knock, and what is left of it 2.5 s later: speed of the load (rad/s rms) about its mean,
 /// which a slow low-pass moves, in three of six half seconds. What rings does so in each of them; a servo that unwinds
 /// its integral part while the motor sticks lets it slip once, at any time.
-fn left_of_a_knock(made: &Made, kind: usize) -> Result<f64, String> {
+fn left_of_a_knock(made: &Made, kind: usize) -> Result<f64, FlightError> {
     let mut lane = Lane::new(made, kind)?;
     let tick_s = made.scenario.servo.tick_s;
     let outside = made.scenario.load.bias_n_m + 0.5 * made.scenario.load.swing[0];
@@ -982,13 +1007,13 @@ const AT_REST_RAD_S: f64 = 2e-5;
 ///
 /// # Errors
 /// As [`fly`].
-pub fn comes_to_rest(scenario: &Scenario, unit: &Unit) -> Result<(bool, Option<f64>), String> {
+pub fn comes_to_rest(scenario: &Scenario, unit: &Unit) -> Result<(bool, Option<f64>), FlightError> {
     let made = made(scenario, unit, None)?;
     let used = made.torque == scenario.torque;
     Ok((stable(&made)?, used.then_some(made.bandwidth_hz)))
 }
 
-fn stable(made: &Made) -> Result<bool, String> {
+fn stable(made: &Made) -> Result<bool, FlightError> {
     // What noise moves is no ringing.
     let quiet = Made { scenario: Scenario { torque_noise_n_m: 0.0, ..made.scenario.clone() }, ..made.clone() };
     let [without, with] = [0, COMPENSATED].map(|kind| left_of_a_knock(&quiet, kind));

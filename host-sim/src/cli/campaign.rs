@@ -115,13 +115,13 @@ enum Which {
 }
 
 impl FromStr for Which {
-    type Err = String;
+    type Err = &'static str;
 
-    fn from_str(text: &str) -> Result<Which, String> {
+    fn from_str(text: &str) -> Result<Which, Self::Err> {
         if text == "all" {
             return Ok(Which::All);
         }
-        text.parse().map(Which::One).map_err(|_| "allowed: a number from 0, or all".to_owned())
+        text.parse().map(Which::One).map_err(|_| "allowed: a number from 0, or all")
     }
 }
 
@@ -137,8 +137,8 @@ impl CampaignCommand {
 
 fn of_plan(error: PlanError) -> Failure {
     match error {
-        PlanError::BadInput(what) => Failure::BadInput(what),
         PlanError::Failed(what) => Failure::Failed(what),
+        refused => Failure::BadInput(refused.to_string()),
     }
 }
 
@@ -195,7 +195,7 @@ impl PlanCommand {
                 Failure::BadInput(what) | Failure::Failed(what) => what.trim_start_matches("drive: ").to_owned(),
             })
         })
-        .map_err(Failure::BadInput)?;
+        .map_err(of_plan)?;
         let out = context.out()?;
         let settings = PlanSettings {
             drives: self.drives,

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::context::image_file;
 use super::{Context, Failure, fly};
 use flexspline_base::output::write_whole;
-use flexspline_export::fmu::{Fmu, compensation, find_libraries, joint};
+use flexspline_export::fmu::{Fmu, FmuExportError, compensation, find_libraries, joint};
 
 /// The scenario of a joint where none is named.
 const USUAL_SCENARIO: &str = "antenna";
@@ -74,7 +74,7 @@ impl FmuOptions {
             )));
         }
         let fmu = self.fmu(tables)?;
-        let libraries = find_libraries(&self.library).map_err(Failure::BadInput)?;
+        let libraries = find_libraries(&self.library).map_err(|error| Failure::BadInput(error.to_string()))?;
         let resources = fmu.resources();
         let file = context.out()?.join(format!("{}.fmu", resources.kind.identifier()));
         write_whole(&file, |out| fmu.write(out, &libraries))?;
@@ -99,7 +99,7 @@ impl FmuOptions {
 
     fn fmu(&self, tables: Option<&Path>) -> Result<Fmu, Failure> {
         let image = tables.map(image_file).transpose()?;
-        let of_table = |error: String| {
+        let of_table = |error: FmuExportError| {
             let file = tables.map_or("scenario".to_owned(), |file| file.display().to_string());
             Failure::BadInput(format!("{file}: {error}"))
         };

@@ -634,7 +634,7 @@ mod tests {
         assert!(same(again.generator(0.1, 9.0), cam().generator(0.1, 9.0)));
         assert_eq!(again.drive_blake3, cam().drive_blake3);
         let wrong = text.replacen("\"positions\":8", "\"positions\":9", 1);
-        assert!(Kernels::from_json(&wrong).unwrap_err().contains("allowed"));
+        assert!(Kernels::from_json(&wrong).unwrap_err().what.contains("allowed"));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! One joint of a flight, ticked from outside: what a simulator of something larger drives.
 
-use super::{COMPENSATED, Commanded, Controller, Lane, Made, Sensing, Unit, made};
+use super::{COMPENSATED, Commanded, Controller, FlightError, Lane, Made, Sensing, Unit, made};
 use crate::keep::{Kept, kept};
 use crate::on_board::{Given, Settings, Told};
 use crate::plant::Plant;
@@ -51,8 +51,13 @@ impl OneJoint {
     /// with none.
     ///
     /// # Errors
-    /// What cannot be flown, in words.
-    pub fn new(scenario: &Scenario, unit: &Unit, image: Option<Vec<u8>>, compensated: bool) -> Result<Self, String> {
+    /// [`FlightError`].
+    pub fn new(
+        scenario: &Scenario,
+        unit: &Unit,
+        image: Option<Vec<u8>>,
+        compensated: bool,
+    ) -> Result<Self, FlightError> {
         let made = made(scenario, unit, image)?;
         let lane = Lane::new(&made, if compensated { COMPENSATED } else { 0 })?;
         let started_j = lane.plant.stored_j();
