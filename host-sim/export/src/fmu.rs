@@ -136,7 +136,7 @@ impl Fmu {
 
     /// The files of its resources, by name.
     #[must_use]
-    pub fn resource_files(&self) -> Vec<(&'static str, Vec<u8>)> {
+    pub(crate) fn resource_files(&self) -> Vec<(&'static str, Vec<u8>)> {
         let Resources { image, gears, .. } = &self.resources;
         let mut files = vec![(MODEL_FILE, self.resources.model_file().into_bytes()), (TABLE_FILE, image.clone())];
         if let Some([built, designed]) = gears {

@@ -13,7 +13,7 @@ use crate::resources::Resources;
 use crate::variables::{Choices, Kind, Role, Variable, variables};
 
 /// What a joint does with its correction.
-pub static MODES: Choices = Choices {
+pub(crate) static MODES: Choices = Choices {
     name: "Mode",
     items: &[
         ("off", "no correction; one that is there is taken back within the limits"),
@@ -23,7 +23,7 @@ pub static MODES: Choices = Choices {
     ],
 };
 /// How far an answer of the table can be trusted.
-pub static QUALITIES: Choices = Choices {
+pub(crate) static QUALITIES: Choices = Choices {
     name: "Quality",
     items: &[
         ("in_range", "inside the range of the table, side of the play known"),
@@ -33,7 +33,7 @@ pub static QUALITIES: Choices = Choices {
     ],
 };
 /// Which torque is given.
-pub static READINGS: Choices = Choices {
+pub(crate) static READINGS: Choices = Choices {
     name: "TorqueReading",
     items: &[
         (

@@ -217,7 +217,7 @@ impl Instance {
     }
 
     /// `fmi2SetDebugLogging`: all categories, or those named.
-    pub fn set_logging(&mut self, on: bool, categories: &[&str]) -> Status {
+    pub(crate) fn set_logging(&mut self, on: bool, categories: &[&str]) -> Status {
         let unknown = categories.iter().find(|category| !CATEGORIES.contains(category));
         if let Some(unknown) = unknown {
             let allowed = CATEGORIES.join(", ");
@@ -246,7 +246,7 @@ impl Instance {
     }
 
     /// `fmi2EnterInitializationMode`.
-    pub fn enter_initialization(&mut self) -> Result<(), Status> {
+    pub(crate) fn enter_initialization(&mut self) -> Result<(), Status> {
         self.expect("fmi2EnterInitializationMode", &[State::Instantiated])?;
         self.state = State::Initializing;
         if self.set_up {
@@ -256,7 +256,7 @@ impl Instance {
     }
 
     /// `fmi2ExitInitializationMode`: the model is made of the parameters.
-    pub fn exit_initialization(&mut self) -> Result<(), Status> {
+    pub(crate) fn exit_initialization(&mut self) -> Result<(), Status> {
         self.expect("fmi2ExitInitializationMode", &[State::Initializing])?;
         self.model = Some(
             made(&self.resources, &self.values)
@@ -279,7 +279,7 @@ impl Instance {
     }
 
     /// `fmi2Terminate`.
-    pub fn terminate(&mut self) -> Result<(), Status> {
+    pub(crate) fn terminate(&mut self) -> Result<(), Status> {
         self.expect("fmi2Terminate", &[State::Stepping, State::Failed])?;
         self.state = State::Terminated;
         Ok(())
@@ -305,7 +305,7 @@ impl Instance {
     }
 
     /// Reads the only text that there is.
-    pub fn get_text(&self, call: &str, reference: u32) -> Result<&CStr, Status> {
+    pub(crate) fn get_text(&self, call: &str, reference: u32) -> Result<&CStr, Status> {
         self.expect(call, &[State::Initializing, State::Stepping, State::Failed, State::Terminated])?;
         self.place(call, |kind| kind == Kind::Text, reference).map(|_| self.table_id.as_c_str())
     }
@@ -348,7 +348,7 @@ impl Instance {
     }
 
     /// `fmi2SetRealInputDerivatives`: of the first order, for the next step.
-    pub fn set_slopes(&mut self, set: &[(u32, i32, f64)]) -> Result<(), Status> {
+    pub(crate) fn set_slopes(&mut self, set: &[(u32, i32, f64)]) -> Result<(), Status> {
         let call = "fmi2SetRealInputDerivatives";
         self.expect(call, &[State::Instantiated, State::Initializing, State::Stepping])?;
         for &(reference, order, value) in set {
@@ -471,7 +471,7 @@ impl Instance {
     /// # Errors
     /// Why they are no state of this description; then nothing changes, or, where the model itself cannot take them up,
     /// it has failed.
-    pub fn go_on_from(&mut self, bytes: &[u8]) -> Result<(), FmuError> {
+    pub(crate) fn go_on_from(&mut self, bytes: &[u8]) -> Result<(), FmuError> {
         let words = self.words(bytes)?;
         let (&[state, set_up, start, stops, stop, time, ticks, has_model], rest) =
             words.split_first_chunk::<8>().ok_or(FmuError::State("no state"))?;
@@ -519,7 +519,7 @@ impl Instance {
     }
 
     /// Keeps bytes under a name.
-    pub fn keep_bytes(&mut self, name: usize, bytes: Vec<u8>) {
+    pub(crate) fn keep_bytes(&mut self, name: usize, bytes: Vec<u8>) {
         self.states.insert(name, bytes);
     }
 

@@ -154,7 +154,7 @@ impl Resources {
 ///
 /// # Errors
 /// Another scheme, another host, or bad escapes.
-pub fn folder_of(uri: &str) -> Result<PathBuf, FmuError> {
+pub(crate) fn folder_of(uri: &str) -> Result<PathBuf, FmuError> {
     let refuse = |why| FmuError::Location { uri: uri.to_owned(), why };
     let letter = |text: &str| matches!(text.as_bytes(), [letter, b':', ..] if letter.is_ascii_alphabetic());
     let Some(rest) = uri.strip_prefix("file:").or_else(|| uri.strip_prefix("FILE:")) else {

@@ -69,7 +69,7 @@ impl Tolerance {
     }
 
     /// The column of its phase.
-    pub fn phase_column(&self) -> Option<String> {
+    pub(crate) fn phase_column(&self) -> Option<String> {
         self.acts.has_phase().then(|| format!("{}, phase_deg", self.name))
     }
 }
@@ -223,7 +223,7 @@ fn told(value: f64) -> f64 {
 
 impl Acts {
     /// Whether a direction or a phase is drawn beside the size.
-    pub fn has_phase(self) -> bool {
+    pub(crate) fn has_phase(self) -> bool {
         matches!(self, Acts::Directed | Acts::Harmonic { .. })
     }
 

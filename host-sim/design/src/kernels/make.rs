@@ -67,7 +67,7 @@ impl KernelPlan {
 
     /// Displacements of this plan as far as `reach_um`, and where they do not go so far, on to it.
     #[must_use]
-    pub fn sizes_to(&self, reach_um: f64) -> Vec<f64> {
+    pub(crate) fn sizes_to(&self, reach_um: f64) -> Vec<f64> {
         let mut sizes = self.sizes_um.clone();
         if let Some(enough) = sizes.iter().position(|size| *size >= reach_um) {
             sizes.truncate(enough + 1);

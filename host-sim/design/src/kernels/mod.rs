@@ -43,7 +43,7 @@ use flexspline_mechanics::drive::{DamagedFlank, GeneratorKind, Wheel};
 pub use make::{KernelError, KernelPlan, KernelProgress, make};
 
 /// Version of `<G>.kernels.json`.
-pub const KERNELS_SCHEMA: u32 = 1;
+pub(crate) const KERNELS_SCHEMA: u32 = 1;
 
 /// A response to a harmonic `cos(k angle)` of a deviation: in phase with it and a quarter behind, arcsec per µm.
 pub type Gain = [f64; 2];
@@ -407,7 +407,7 @@ mod kind_by_name {
         to.collect_str(kind)
     }
 
-    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<GeneratorKind, D::Error> {
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<GeneratorKind, D::Error> {
         String::deserialize(from)?.parse().map_err(D::Error::custom)
     }
 }

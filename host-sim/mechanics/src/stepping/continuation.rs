@@ -48,13 +48,13 @@ pub(super) struct ContactStage {
 }
 
 impl ContactStage {
-    pub fn bore_law(self, law: BoreLaw) -> BoreLaw {
+    pub(crate) fn bore_law(self, law: BoreLaw) -> BoreLaw {
         // A bearing that yields is soft enough as it is.
         let soft = |factor: f64| law.stiffness.min((factor * law.stiffness).max(SOFTEST_BORE));
         BoreLaw { stiffness: self.softening.map_or(law.stiffness, soft) }
     }
 
-    pub fn flank_law(self, law: FlankLaw) -> FlankLaw {
+    pub(crate) fn flank_law(self, law: FlankLaw) -> FlankLaw {
         let softening = self.softening.unwrap_or(1.0);
         FlankLaw {
             stiffness: softening * law.stiffness,
@@ -68,7 +68,7 @@ impl ContactStage {
         if finds_the_way { FOUND_THE_WAY.max(settings.tolerance) } else { settings.tolerance }
     }
 
-    pub fn most_iterations(self, settings: &SolverSettings) -> usize {
+    pub(crate) fn most_iterations(self, settings: &SolverSettings) -> usize {
         settings.max_iterations * if self.patient { PATIENCE } else { 1 }
     }
 }
@@ -106,7 +106,7 @@ impl Way {
     /// shows the way, a soft contact finds it first. Where one does not lead there the other may: teeth that bind
     /// without load sink into one another while they are soft, and wedge (two rollers in a hat, loaded to twice the
     /// drag). Last of all each soft stage is brought to its end.
-    pub fn to_load(from_n_m: f64, torque_n_m: f64) -> [Way; 3] {
+    pub(crate) fn to_load(from_n_m: f64, torque_n_m: f64) -> [Way; 3] {
         if (SHOWS_THE_WAY..=SHOWS_THE_WAY.recip()).contains(&(from_n_m / torque_n_m)) {
             [Way::Directly, Way::Softly, Way::Carefully]
         } else {
@@ -159,12 +159,12 @@ impl Continuation {
         [0, 1].map(|k| self.from[k] + self.change[k] * self.next_share())
     }
 
-    pub fn changes_load(&self) -> bool {
+    pub(crate) fn changes_load(&self) -> bool {
         self.change[1] != 0.0
     }
 
     /// Whether a part that failed may be halved.
-    pub fn may_halve(&self, problem: &Problem) -> bool {
+    pub(crate) fn may_halve(&self, problem: &Problem) -> bool {
         self.halvings < problem.settings.max_halvings && self.change != [0.0; 2]
     }
 

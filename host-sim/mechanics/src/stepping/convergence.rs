@@ -19,7 +19,7 @@ impl WorkLimit {
         WorkLimit { done: 0, most: MOST_WORK * settings.max_iterations }
     }
 
-    pub fn is_left(&self) -> bool {
+    pub(crate) fn is_left(&self) -> bool {
         self.done < self.most
     }
 }
@@ -70,7 +70,7 @@ impl Convergence {
         self.history.last().copied().unwrap_or(f64::INFINITY)
     }
 
-    pub fn is_met(&self) -> bool {
+    pub(crate) fn is_met(&self) -> bool {
         self.relative() <= self.tolerance
     }
 
@@ -83,7 +83,7 @@ impl Convergence {
     }
 
     /// A new layout of the contact is a new start, up to a few times.
-    pub fn start_again(&mut self) {
+    pub(crate) fn start_again(&mut self) {
         self.layouts += 1;
         if self.layouts <= MOST_LAYOUTS {
             self.last_iteration = self.history.len() + self.most_iterations;

@@ -27,7 +27,7 @@ use super::near::{NearPairs, configuration};
 use super::passed::Passed;
 use super::problem::Problem;
 use super::reference::SparseWheels;
-use super::slip::{Field, Slipping};
+use super::slip::{NodalField, Slipping};
 use super::state::State;
 use super::step::{ANCHORED, BORDERS, LATERAL, OUTPUT, Residual, SLEEVE, Step, improve};
 use super::wheels::Wheels;
@@ -679,11 +679,11 @@ impl<'p> Solver<'p> {
         }
         let clock = Instant::now();
         let slipping = std::mem::take(&mut self.slipping);
-        let forces = Field { free: residual.force.clone(), border: residual.border };
+        let forces = NodalField { free: residual.force.clone(), border: residual.border };
         let solved = slipping.solve(forces, |field| self.solve_symmetric(field));
         self.slipping = slipping;
         self.effort.solution += clock.elapsed();
-        let Field { free, border } = solved?;
+        let NodalField { free, border } = solved?;
         let (fs, _) = self.problem.wheels();
         let u = free[..2 * fs.nodes.len()].to_vec();
         let mut v = vec![0.0; 2 * self.cs_index.len()];
@@ -697,8 +697,8 @@ impl<'p> Solver<'p> {
     }
 
     /// Solves with the last factor, in place.
-    fn solve_symmetric(&mut self, field: &mut Field) -> Option<()> {
-        let Field { free, border } = field;
+    fn solve_symmetric(&mut self, field: &mut NodalField) -> Option<()> {
+        let NodalField { free, border } = field;
         self.turn(free, border, -self.turned);
         let solved = self.eliminated.as_ref()?.solve(self.wheels.as_mut(), free, &mut border[..self.border.width]);
         self.turn(free, border, self.turned);
