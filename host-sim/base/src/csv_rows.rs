@@ -129,7 +129,7 @@ impl<R: Read> CsvRows<R> {
     }
 
     /// A problem of the header.
-    pub fn header_problem(&self, what: String) -> TableProblem {
+    pub(crate) fn header_problem(&self, what: String) -> TableProblem {
         TableProblem { line: self.header_line, what }
     }
 

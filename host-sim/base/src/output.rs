@@ -30,7 +30,7 @@ fn failed(path: &Path) -> impl FnOnce(io::Error) -> OutputError + '_ {
 }
 
 /// What is on disk and no output yet. Hidden files are made, and become outputs, while this is held.
-struct Unfinished {
+struct UnfinishedFiles {
     /// Hidden files and folders.
     hidden: Vec<PathBuf>,
     /// Folders made for outputs, the outermost first.
@@ -39,15 +39,15 @@ struct Unfinished {
     written: bool,
 }
 
-static UNFINISHED: Mutex<Unfinished> =
-    Mutex::new(Unfinished { hidden: Vec::new(), folders: Vec::new(), written: false });
+static UNFINISHED: Mutex<UnfinishedFiles> =
+    Mutex::new(UnfinishedFiles { hidden: Vec::new(), folders: Vec::new(), written: false });
 
-fn unfinished() -> MutexGuard<'static, Unfinished> {
+fn unfinished() -> MutexGuard<'static, UnfinishedFiles> {
     // The list is whole at every instant, whoever panicked with it.
     UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-impl Unfinished {
+impl UnfinishedFiles {
     /// Removes the folders made for outputs that hold none.
     fn remove_empty_folders(&mut self) {
         while let Some(folder) = self.folders.pop() {
@@ -59,16 +59,16 @@ impl Unfinished {
 
 /// A hidden file or folder, known to be unfinished as long as this lives.
 #[derive(Debug)]
-struct Hidden(PathBuf);
+struct HiddenPath(PathBuf);
 
-impl Hidden {
-    fn new(unfinished: &mut Unfinished, path: &Path) -> Hidden {
+impl HiddenPath {
+    fn new(unfinished: &mut UnfinishedFiles, path: &Path) -> HiddenPath {
         unfinished.hidden.push(path.to_owned());
-        Hidden(path.to_owned())
+        HiddenPath(path.to_owned())
     }
 }
 
-impl Drop for Hidden {
+impl Drop for HiddenPath {
     fn drop(&mut self) {
         unfinished().hidden.retain(|path| *path != self.0);
     }
@@ -108,25 +108,25 @@ pub fn prepare_folder(folder: &Path) -> Result<(), OutputError> {
 /// The files of one run, which appear under their names together, or not at all.
 #[derive(Debug, Default)]
 pub struct Outputs {
-    files: Vec<Part>,
+    files: Vec<HiddenFile>,
     folders: Vec<WholeFolder>,
 }
 
 /// A file that is complete under a hidden name.
 #[derive(Debug)]
-struct Part {
+struct HiddenFile {
     target: PathBuf,
     file: Option<NamedTempFile>,
-    _hidden: Hidden,
+    _hidden: HiddenPath,
 }
 
-impl Part {
+impl HiddenFile {
     /// Writes it.
-    fn new(target: &Path, content: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<Part> {
+    fn new(target: &Path, content: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<HiddenFile> {
         let (mut file, hidden) = {
             let mut unfinished = unfinished();
             let file = tempfile::Builder::new().prefix(".part-").tempfile_in(parent_of(target))?;
-            let hidden = Hidden::new(&mut unfinished, file.path());
+            let hidden = HiddenPath::new(&mut unfinished, file.path());
             (file, hidden)
         };
         let mut buffer = BufWriter::new(file.as_file_mut());
@@ -135,7 +135,7 @@ impl Part {
         drop(buffer);
         file.as_file().sync_all()?;
         readable_by_all(file.path())?;
-        Ok(Part { target: target.to_owned(), file: Some(file), _hidden: hidden })
+        Ok(HiddenFile { target: target.to_owned(), file: Some(file), _hidden: hidden })
     }
 }
 
@@ -152,7 +152,7 @@ impl Outputs {
         path: &Path,
         content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> Result<(), OutputError> {
-        self.files.push(Part::new(path, content).map_err(failed(path))?);
+        self.files.push(HiddenFile::new(path, content).map_err(failed(path))?);
         Ok(())
     }
 
@@ -188,7 +188,7 @@ impl Outputs {
             for folder in &mut self.folders {
                 folder.put(&mut unfinished, &mut replaced)?;
             }
-            for Part { target, file, .. } in &mut self.files {
+            for HiddenFile { target, file, .. } in &mut self.files {
                 let file = file.take().expect("a part is put in its place once");
                 file.persist(&*target).map_err(|error| failed(target)(error.error))?;
                 // One in a folder that is itself hidden goes with it.
@@ -241,7 +241,7 @@ fn readable_by_all(_path: &Path) -> io::Result<()> {
 pub struct WholeFolder {
     target: PathBuf,
     parts: Option<TempDir>,
-    path: Hidden,
+    path: HiddenPath,
 }
 
 impl WholeFolder {
@@ -249,7 +249,7 @@ impl WholeFolder {
     pub fn new(target: &Path) -> Result<WholeFolder, OutputError> {
         let mut unfinished = unfinished();
         let parts = tempfile::Builder::new().prefix(".part-").tempdir_in(parent_of(target)).map_err(failed(target))?;
-        let path = Hidden::new(&mut unfinished, parts.path());
+        let path = HiddenPath::new(&mut unfinished, parts.path());
         Ok(WholeFolder { target: target.to_owned(), parts: Some(parts), path })
     }
 
@@ -266,14 +266,18 @@ impl WholeFolder {
     }
 
     /// Puts the folder in its place; the one that stood there is in `replaced`.
-    fn put(&mut self, unfinished: &mut Unfinished, replaced: &mut Vec<(TempDir, Hidden)>) -> Result<(), OutputError> {
+    fn put(
+        &mut self,
+        unfinished: &mut UnfinishedFiles,
+        replaced: &mut Vec<(TempDir, HiddenPath)>,
+    ) -> Result<(), OutputError> {
         let WholeFolder { target, parts, .. } = self;
         let parts = parts.take().expect("a folder is put in its place once");
         let swap = || -> io::Result<()> {
             let mut before = None;
             if target.exists() {
                 let aside = tempfile::Builder::new().prefix(".old-").tempdir_in(parent_of(target))?;
-                let hidden = Hidden::new(unfinished, aside.path());
+                let hidden = HiddenPath::new(unfinished, aside.path());
                 let old = aside.path().join("old");
                 replaced.push((aside, hidden));
                 fs::rename(&*target, &old)?;

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 /// Intervals hold with this probability.
-pub const CONFIDENCE: f64 = 0.95;
+pub(crate) const CONFIDENCE: f64 = 0.95;
 /// The normal quantile of [`CONFIDENCE`], two-sided.
 const Z: f64 = 1.959_963_984_540_054;
 

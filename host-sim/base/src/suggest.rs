@@ -6,6 +6,21 @@
 //! Anything farther is no suggestion: a wrong one costs more than none.
 
 use strsim::damerau_levenshtein;
+use thiserror::Error;
+
+/// A name that is none of those known.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error(
+    "{what} \"{found}\": allowed are {}{}", known.join(", "), did_you_mean("; ", found, known.iter().copied())
+)]
+pub struct UnknownName {
+    /// What has the name.
+    pub what: &'static str,
+    /// The name.
+    pub found: String,
+    /// The names that there are.
+    pub known: &'static [&'static str],
+}
 
 /// Shortest word that stands for the longer name it begins or ends.
 const SHORTEST_WORD: usize = 3;

@@ -31,6 +31,13 @@ impl Problem {
     }
 }
 
+impl std::error::Error for Problem {}
+
+/// Problems, one a line.
+pub fn lines(problems: &[Problem]) -> String {
+    problems.iter().map(Problem::to_string).collect::<Vec<_>>().join("\n")
+}
+
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for part in [&self.place, &self.field] {

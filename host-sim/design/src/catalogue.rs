@@ -16,7 +16,7 @@ const UNIT_SCATTER_PERCENT: f64 = 30.0;
 
 /// A series of cups.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Series {
+enum CupSeries {
     Csf,
     Csg,
 }
@@ -24,14 +24,14 @@ enum Series {
 /// What the catalogue prints of a size and ratio: none of a series, size or ratio that is not at hand.
 pub fn sheet(series: &str, size: f64, ratio: u32) -> Option<Stated> {
     let which = match series.to_ascii_uppercase().as_str() {
-        "CSF" => Series::Csf,
-        "CSG" => Series::Csg,
+        "CSF" => CupSeries::Csf,
+        "CSG" => CupSeries::Csg,
         _ => return None,
     };
     let line = rows().into_iter().find(|row| row.size == size && row.ratio == ratio)?;
     let [rated_n_m, ratcheting_n_m] = match which {
-        Series::Csf => [None, line.ratcheting_csf_n_m],
-        Series::Csg => [line.rated_csg_n_m, line.ratcheting_csg_n_m],
+        CupSeries::Csf => [None, line.ratcheting_csf_n_m],
+        CupSeries::Csg => [line.rated_csg_n_m, line.ratcheting_csg_n_m],
     };
     Some(Stated {
         source: Some(format!("Harmonic Drive {}-{size}-{ratio}", series.to_ascii_uppercase())),
@@ -66,7 +66,7 @@ pub fn nearest_sheet(series: &str, size: f64, ratio: u32) -> Option<(Stated, u32
 
 /// The sizes and ratios that are at hand, in words.
 pub fn sizes_in_words() -> String {
-    let of = |value: fn(&Row) -> f64| {
+    let of = |value: fn(&SizeRow) -> f64| {
         let mut values: Vec<f64> = rows().iter().map(value).collect();
         values.sort_by(f64::total_cmp);
         values.dedup();
@@ -78,7 +78,7 @@ pub fn sizes_in_words() -> String {
 
 /// A line.
 #[derive(Debug, Deserialize)]
-struct Row {
+struct SizeRow {
     size: f64,
     ratio: u32,
     rated_csg_n_m: Option<f64>,
@@ -92,7 +92,7 @@ struct Row {
     accuracy_arcmin: Option<f64>,
 }
 
-fn rows() -> Vec<Row> {
+fn rows() -> Vec<SizeRow> {
     csv::Reader::from_reader(SIZES.as_bytes()).into_deserialize().collect::<Result<_, _>>().expect("the file is ours")
 }
 

@@ -14,17 +14,17 @@ use flexspline_mechanics::drive::{Drive, GeneratorKind, RigidMesh};
 /// Von Mises stress above which steel of a flexspline yields, MPa. A guess in the middle: quenched and tempered
 /// nickel-chromium-molybdenum steels (34CrNiMo6, EN 10083-3: 900 to 1000 MPa of yield strength in thin sections;
 /// precipitation-hardened ones have more).
-pub const YIELD_MPA: f64 = 1000.0;
+pub(crate) const YIELD_MPA: f64 = 1000.0;
 /// Pressure between flanks that no steel bears for long, MPa. A guess below what ISO 76 allows once of rolling bearings
 /// (4000 to 4600 MPa).
-pub const MOST_FLANK_PRESSURE_MPA: f64 = 3000.0;
+pub(crate) const MOST_FLANK_PRESSURE_MPA: f64 = 3000.0;
 /// Slope of the error over the generator's motion from which on the inverse is in doubt; at 1 there is none. A guess:
 /// half way.
-pub const MOST_SLOPE: f64 = 0.5;
+pub(crate) const MOST_SLOPE: f64 = 0.5;
 
 /// Room of rigid teeth as built, arcsec, below which they wedge more than rim and sleeve give way. A guess: three times
 /// what `HHD-95-typical` lacks (94 arcsec), whose teeth bear it at 1150 MPa.
-pub const LEAST_ROOM_ARCSEC: f64 = -300.0;
+pub(crate) const LEAST_ROOM_ARCSEC: f64 = -300.0;
 
 /// One thing to know before figures are used.
 #[derive(Debug, Clone, PartialEq, Serialize)]

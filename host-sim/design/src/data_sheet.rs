@@ -150,7 +150,7 @@ pub struct DataSheet {
 
 impl DataSheet {
     /// A sheet of figures in the order of [`FIGURES`].
-    pub fn of_figures(figures: [Option<f64>; FIGURES.len()]) -> DataSheet {
+    pub(crate) fn of_figures(figures: [Option<f64>; FIGURES.len()]) -> DataSheet {
         let [
             rigid_gap_um,
             room_as_built_arcsec,

@@ -10,7 +10,7 @@ const BETWEEN: usize = 32;
 /// Largest less smallest of the wave of least order through samples at equal steps over one period.
 ///
 /// Waves of more than half as many orders as there are samples pass for lower ones, here as in the samples.
-pub fn peak_to_peak(samples: &[f64]) -> f64 {
+pub(crate) fn peak_to_peak(samples: &[f64]) -> f64 {
     let count = samples.len();
     let waves: Vec<[f64; 2]> = (0..=count / 2)
         .map(|order| {

@@ -88,7 +88,11 @@ pub fn relieve_tips(
 ///
 /// # Errors
 /// No equilibrium.
-pub fn tips_that_bear(drive: &Drive, kind: GeneratorKind, torque_n_m: f64) -> Result<Option<TipContact>, SolveError> {
+pub(crate) fn tips_that_bear(
+    drive: &Drive,
+    kind: GeneratorKind,
+    torque_n_m: f64,
+) -> Result<Option<TipContact>, SolveError> {
     let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
     let problem = Problem::new(drive, kind, drive.temperature.reference_c, settings)?;
     let mut motion = Motion::deformed_or_turned_in(&problem, 0.0)?;

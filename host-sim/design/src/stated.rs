@@ -192,7 +192,7 @@ impl Stated {
     }
 
     /// Whether any of its loads is stated: the others then follow from it, whatever the size of the drive.
-    pub fn has_loads(&self) -> bool {
+    pub(crate) fn has_loads(&self) -> bool {
         [self.t1_n_m, self.t2_n_m, self.rated_torque_n_m].iter().any(Option::is_some)
     }
 

@@ -76,7 +76,8 @@ fn tables(folder: &Path) -> Result<Vec<Image>, String> {
     for kind in GeneratorKind::ALL {
         let Ok(image) = std::fs::read(folder.join(format!("{kind}.fxt"))) else { continue };
         let kernels = std::fs::read_to_string(folder.join(format!("{kind}.kernels.json"))).ok();
-        found.push((kind, image, kernels.map(|text| Kernels::from_json(&text)).transpose()?));
+        let kernels = kernels.map(|text| Kernels::from_json(&text)).transpose();
+        found.push((kind, image, kernels.map_err(|problem| problem.to_string())?));
     }
     if found.is_empty() {
         return Err(format!(

@@ -5,6 +5,7 @@
 //! needs a compiler.
 
 mod description;
+mod error;
 mod libraries;
 
 use std::io::{self, Cursor, Write};
@@ -21,6 +22,7 @@ use zip::{CompressionMethod, DateTime, ZipWriter};
 
 use flexspline_fly::fly::{Flown, unit};
 
+pub use error::FmuExportError;
 pub use libraries::{Library, Platform, find_libraries};
 
 /// Temperature at which an FMU starts, as far as its table goes, °C.
@@ -36,9 +38,9 @@ pub struct Fmu {
 /// The core's joint over a table.
 ///
 /// # Errors
-/// What is wrong with the table, in words.
-pub fn compensation(image: Vec<u8>) -> Result<Fmu, String> {
-    let table = Table::check(&image).map_err(|error| error.to_string())?;
+/// [`FmuExportError`].
+pub fn compensation(image: Vec<u8>) -> Result<Fmu, FmuExportError> {
+    let table = Table::check(&image)?;
     let [coldest, warmest] = table.temperature_range_c().map(f64::from);
     Fmu::new(ModelKind::Compensation, &[("temperature", USUAL_C.clamp(coldest, warmest))], image, None)
 }
@@ -48,8 +50,8 @@ pub fn compensation(image: Vec<u8>) -> Result<Fmu, String> {
 /// [`flexspline_fly::fly`] flies them.
 ///
 /// # Errors
-/// What is wrong with table or scenario, in words.
-pub fn joint(flown: &Flown, image: Option<Vec<u8>>) -> Result<Fmu, String> {
+/// [`FmuExportError`].
+pub fn joint(flown: &Flown, image: Option<Vec<u8>>) -> Result<Fmu, FmuExportError> {
     let scenario = &flown.scenario;
     let Some(image) = image else {
         let unit = unit(flown.kind, scenario.temperature_c)?;
@@ -57,25 +59,26 @@ pub fn joint(flown: &Flown, image: Option<Vec<u8>>) -> Result<Fmu, String> {
         let Unit { built, nominal, .. } = unit;
         return Fmu::new(ModelKind::Joint, &starts_of(scenario), image, Some([built, nominal]));
     };
-    let table = Table::check(&image).map_err(|error| error.to_string())?;
+    let table = Table::check(&image)?;
     if table.drive().exact_ratio() < 0.0 {
-        return Err(
-            "found a drive whose circular spline is fixed; allowed for a joint: the flexspline fixed".to_owned()
-        );
+        return Err(FmuExportError::FixedMember);
     }
-    let [coldest, warmest] = table.temperature_range_c().map(f64::from);
-    let temperature_c = scenario.temperature_c;
-    if !(temperature_c >= coldest && temperature_c <= warmest) {
-        return Err(format!(
-            "temperature_c of the scenario: found {temperature_c}, allowed with this table: {coldest} to {warmest}"
-        ));
+    let [coldest_c, warmest_c] = table.temperature_range_c().map(f64::from);
+    let found_c = scenario.temperature_c;
+    if !(found_c >= coldest_c && found_c <= warmest_c) {
+        return Err(FmuExportError::Temperature { found_c, coldest_c, warmest_c });
     }
-    let gear = gear_of(&table, temperature_c, TABLE_DRAG_N_M).ok_or("the table gives nothing")?;
+    let gear = gear_of(&table, found_c, TABLE_DRAG_N_M).ok_or(FmuExportError::NoGear)?;
     Fmu::new(ModelKind::Joint, &starts_of(scenario), image, Some([gear.clone(), gear]))
 }
 
 impl Fmu {
-    fn new(kind: ModelKind, starts: &[(&str, f64)], image: Vec<u8>, gears: Option<[Gear; 2]>) -> Result<Fmu, String> {
+    fn new(
+        kind: ModelKind,
+        starts: &[(&str, f64)],
+        image: Vec<u8>,
+        gears: Option<[Gear; 2]>,
+    ) -> Result<Fmu, FmuExportError> {
         // Through the reader of the FMU itself: what it would refuse is refused here.
         let mut model = format!("model = {}\nguid = none\n", kind.name());
         for (name, start) in starts {
@@ -133,7 +136,7 @@ impl Fmu {
 
     /// The files of its resources, by name.
     #[must_use]
-    pub fn resource_files(&self) -> Vec<(&'static str, Vec<u8>)> {
+    pub(crate) fn resource_files(&self) -> Vec<(&'static str, Vec<u8>)> {
         let Resources { image, gears, .. } = &self.resources;
         let mut files = vec![(MODEL_FILE, self.resources.model_file().into_bytes()), (TABLE_FILE, image.clone())];
         if let Some([built, designed]) = gears {

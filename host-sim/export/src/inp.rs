@@ -63,7 +63,7 @@ type Point = [f64; 2];
 /// Torsional spring from the output to ground, N mm/rad per mm of width.
 pub const STABILISING_TORSION: f64 = 1e3;
 /// Lateral spring from the mean of the bore to ground where the drive has a softer sleeve, N/mm per mm of width.
-pub const STABILISING_LATERAL: f64 = 1.0;
+pub(crate) const STABILISING_LATERAL: f64 = 1.0;
 /// Modulus of the generator, MPa: all its nodes are prescribed, and what strains it must not enter the force balance.
 const GENERATOR_MODULUS: f64 = 1.0;
 /// How far the circular spline is turned against the teeth before the load, in rigid clearances: enough that many bear,
@@ -127,7 +127,7 @@ pub enum DeckError {
 
 /// One term of a linear equation.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Term {
+pub struct EquationTerm {
     /// Node number.
     pub node: usize,
     /// Degree of freedom: 1 or 2.
@@ -140,7 +140,7 @@ pub struct Term {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Equation {
     /// Its terms.
-    pub terms: Vec<Term>,
+    pub terms: Vec<EquationTerm>,
 }
 
 /// A face of an element: element number and face 1 to 4, face e running from corner e to the next.
@@ -148,7 +148,7 @@ pub type Face = (usize, usize);
 
 /// A spring to ground.
 #[derive(Debug, Clone, PartialEq)]
-struct Spring {
+struct GroundSpring {
     name: &'static str,
     node: usize,
     stiffness: f64,
@@ -177,7 +177,7 @@ pub struct Deck {
     generator: GeneratorBody,
     /// Number of the first node of the generator.
     pub first_generator_node: usize,
-    springs: Vec<Spring>,
+    springs: Vec<GroundSpring>,
     seat_mm: f64,
     bearing_turn_rad: f64,
     load_per_mm: f64,
@@ -311,14 +311,18 @@ impl Deck {
             for (dof, turned, along) in [(1, -y, x), (2, x, y)] {
                 self.equations.push(Equation {
                     terms: vec![
-                        Term { node, dof, coefficient: 1.0 },
-                        Term { node: self.output, dof: 1, coefficient: -turned },
-                        Term { node: self.output, dof: 2, coefficient: -along / r },
+                        EquationTerm { node, dof, coefficient: 1.0 },
+                        EquationTerm { node: self.output, dof: 1, coefficient: -turned },
+                        EquationTerm { node: self.output, dof: 2, coefficient: -along / r },
                     ],
                 });
             }
         }
-        self.springs.push(Spring { name: "OUTPUT_STABILISER", node: self.output, stiffness: STABILISING_TORSION });
+        self.springs.push(GroundSpring {
+            name: "OUTPUT_STABILISER",
+            node: self.output,
+            stiffness: STABILISING_TORSION,
+        });
     }
 
     /// Bore: mean rotation zero, or on the spring of the sleeve; mean displacement on the lateral spring.
@@ -347,7 +351,7 @@ impl Deck {
         ];
         for (name, which, stiffness) in springs {
             if let (Some(node), Some(stiffness)) = (sum_node(last, which), stiffness) {
-                self.springs.push(Spring { name, node, stiffness });
+                self.springs.push(GroundSpring { name, node, stiffness });
             }
         }
     }
@@ -389,7 +393,7 @@ impl Deck {
                 writeln!(out, "{e}, {a}, {b}, {c}, {d}, {ab}, {bc}, {cd}, {da}")?;
             }
         }
-        for (number, Spring { name, node, stiffness }) in (self.elements.len() + 1..).zip(&self.springs) {
+        for (number, GroundSpring { name, node, stiffness }) in (self.elements.len() + 1..).zip(&self.springs) {
             writeln!(out, "*ELEMENT, TYPE=SPRING1, ELSET={name}\n{number}, {node}")?;
             writeln!(out, "*SPRING, ELSET={name}\n1\n{}", short(*stiffness))?;
         }
@@ -444,35 +448,36 @@ impl Deck {
         Ok(())
     }
 
-    fn steps(&self) -> Vec<Step> {
-        let loaded = Step { generator_rad: 0.0, output: Output::Loaded(self.load_per_mm), flanks: Flanks::On };
+    fn steps(&self) -> Vec<DeckStep> {
+        let loaded =
+            DeckStep { generator_rad: 0.0, output: DeckOutput::Loaded(self.load_per_mm), flanks: DeckFlanks::On };
         let mut steps = vec![
-            Step { output: Output::Held(0.0), flanks: Flanks::Removed, ..loaded },
-            Step { output: Output::Held(self.bearing_turn_rad), flanks: Flanks::Added, ..loaded },
+            DeckStep { output: DeckOutput::Held(0.0), flanks: DeckFlanks::Removed, ..loaded },
+            DeckStep { output: DeckOutput::Held(self.bearing_turn_rad), flanks: DeckFlanks::Added, ..loaded },
         ];
-        let turned = |k| Step { generator_rad: k as f64 * self.settings.step_rad, ..loaded };
+        let turned = |k| DeckStep { generator_rad: k as f64 * self.settings.step_rad, ..loaded };
         let rollers = self.generator.is_rollers();
         let stands = |steps: usize| 1 + if rollers { steps } else { 0 };
         steps.extend(std::iter::repeat_n(loaded, stands(STANDS)));
         steps.extend((1..=self.settings.increments).flat_map(|k| std::iter::repeat_n(turned(k), stands(1))));
         if let Some(load) = self.last_load_per_mm {
-            let last = Step { output: Output::Loaded(load), ..turned(self.settings.increments) };
+            let last = DeckStep { output: DeckOutput::Loaded(load), ..turned(self.settings.increments) };
             steps.extend(std::iter::repeat_n(last, stands(STANDS)));
         }
         steps
     }
 
-    fn write_step(&self, out: &mut dyn Write, k: usize, step: &Step) -> io::Result<()> {
+    fn write_step(&self, out: &mut dyn Write, k: usize, step: &DeckStep) -> io::Result<()> {
         let [_, fs_flanks, cs_flanks, _] = SURFACES;
         writeln!(out, "** step {}: generator at {} rad", k + 1, short(step.generator_rad))?;
         // One increment to a step; the program halves it where it has to. Where flanks meet it finds its way in less
         // than half the iterations from a first step of half the way: 22 for 55 with the cam on the coarse mesh.
-        let first = if step.flanks == Flanks::Added { "0.5" } else { "1." };
+        let first = if step.flanks == DeckFlanks::Added { "0.5" } else { "1." };
         writeln!(out, "*STEP, NLGEOM, INC=200\n*STATIC\n{first}, 1.")?;
         let change = match step.flanks {
-            Flanks::On => None,
-            Flanks::Removed => Some("REMOVE"),
-            Flanks::Added => Some("ADD"),
+            DeckFlanks::On => None,
+            DeckFlanks::Removed => Some("REMOVE"),
+            DeckFlanks::Added => Some("ADD"),
         };
         if let Some(change) = change {
             writeln!(out, "*MODEL CHANGE, TYPE=CONTACT PAIR, {change}\n{fs_flanks}, {cs_flanks}")?;
@@ -485,7 +490,7 @@ impl Deck {
             }
         }
         writeln!(out, "{0}, 2, 2, {1}", self.output, short(self.seat_mm))?;
-        if let Output::Held(angle) = step.output {
+        if let DeckOutput::Held(angle) = step.output {
             writeln!(out, "{0}, 1, 1, {1}", self.output, short(angle))?;
         }
         // A node of a spring has all its degrees of freedom; the spring holds the first.
@@ -493,7 +498,7 @@ impl Deck {
             let first = if spring.node == self.output { 3 } else { 2 };
             writeln!(out, "{}, {first}, 3", spring.node)?;
         }
-        if let Output::Loaded(load) = step.output {
+        if let DeckOutput::Loaded(load) = step.output {
             writeln!(out, "*CLOAD, OP=NEW\n{}, 1, {}", self.output, short(load))?;
         }
         // Of each step its end: the frequency is beyond its increments.
@@ -509,14 +514,14 @@ impl Deck {
 const SURFACES: [&str; 4] = ["BORE_FACE", "FLEXSPLINE_FLANKS", "CIRCULAR_SPLINE_FLANKS", "GENERATOR_FACE"];
 
 #[derive(Clone, Copy, PartialEq)]
-enum Flanks {
+enum DeckFlanks {
     On,
     Removed,
     Added,
 }
 
 #[derive(Clone, Copy)]
-enum Output {
+enum DeckOutput {
     /// At an angle, rad.
     Held(f64),
     /// Free to turn under a load, N mm per mm of width.
@@ -525,10 +530,10 @@ enum Output {
 
 /// One step of the deck: where everything stands at its end.
 #[derive(Clone, Copy)]
-struct Step {
+struct DeckStep {
     generator_rad: f64,
-    output: Output,
-    flanks: Flanks,
+    output: DeckOutput,
+    flanks: DeckFlanks,
 }
 
 fn sign(x: f64) -> f64 {

@@ -8,9 +8,8 @@ mod outlines;
 mod vtu;
 mod vtu_whole;
 
-pub use inp::{
-    Deck, DeckError, DeckSettings, Equation, Face, STABILISING_LATERAL, STABILISING_TORSION, SleeveDeck, Term,
-};
+pub use inp::{Deck, DeckError, DeckSettings, Equation, EquationTerm, Face, STABILISING_TORSION, SleeveDeck};
+
 pub use outlines::{OutlinePoint, outlines};
 pub use vtu::base64;
 pub use vtu::{Frame, write_pvd, write_vtu};

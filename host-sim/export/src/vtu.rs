@@ -38,12 +38,12 @@ pub struct Frame {
 pub fn write_vtu(out: &mut dyn Write, problem: &Problem, state: &State) -> io::Result<()> {
     let state = &*problem.whole_state(state);
     let wheels = [
-        Wheel::new(&problem.flexspline, &state.u, 0.0),
-        Wheel::new(&problem.circular_spline, &state.v, state.output_rad),
+        MovedWheel::new(&problem.flexspline, &state.u, 0.0),
+        MovedWheel::new(&problem.circular_spline, &state.v, state.output_rad),
     ];
     let points: usize = wheels.iter().map(|wheel| wheel.mesh.nodes.len()).sum();
     let cells: usize = wheels.iter().map(|wheel| wheel.mesh.elements.len()).sum();
-    let both = |f: &dyn Fn(&Wheel) -> Vec<f32>| wheels.iter().flat_map(f).collect::<Vec<f32>>();
+    let both = |f: &dyn Fn(&MovedWheel) -> Vec<f32>| wheels.iter().flat_map(f).collect::<Vec<f32>>();
 
     writeln!(out, r#"<?xml version="1.0"?>"#)?;
     writeln!(out, r#"<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">"#)?;
@@ -114,15 +114,15 @@ pub fn write_pvd(out: &mut dyn Write, frames: &[Frame]) -> io::Result<()> {
 }
 
 /// A wheel with its displacements, in a frame turned by `turn_rad`.
-struct Wheel<'a> {
+struct MovedWheel<'a> {
     mesh: &'a WheelMesh,
     field: &'a [f64],
     turn: (f64, f64),
 }
 
-impl<'a> Wheel<'a> {
+impl<'a> MovedWheel<'a> {
     fn new(mesh: &'a WheelMesh, field: &'a [f64], turn_rad: f64) -> Self {
-        Wheel { mesh, field, turn: (turn_rad % TAU).sin_cos() }
+        MovedWheel { mesh, field, turn: (turn_rad % TAU).sin_cos() }
     }
 
     /// Turned into the global frame, as a point of space.

@@ -30,13 +30,13 @@ const VTK_QUAD: u8 = 9;
 const VTK_HEXAHEDRON: u8 = 12;
 
 /// One harmonic of the rim: its shape along the axis for 1 mm, and its amplitudes.
-struct Wave {
+struct RimWave {
     n: f64,
     amplitudes: [f64; 2],
     shape: Vec<Station>,
 }
 
-impl Wave {
+impl RimWave {
     /// Displacement of the middle surface by station: along, around, outward, and the slope of the last.
     fn at(&self, station: &Station, angle: f64) -> [f64; 4] {
         let (sin, cos) = (self.n * angle).sin_cos();
@@ -48,7 +48,7 @@ impl Wave {
 
 /// Points, displacements and cells as they come.
 #[derive(Default)]
-struct Grid {
+struct CellGrid {
     points: Vec<f32>,
     displacements: Vec<f32>,
     connectivity: Vec<i32>,
@@ -57,7 +57,7 @@ struct Grid {
     parts: Vec<u8>,
 }
 
-impl Grid {
+impl CellGrid {
     fn point(&mut self, at: [f64; 3], moved: [f64; 3]) {
         self.points.extend((0..3).map(|k| (at[k] + moved[k]) as f32));
         self.displacements.extend(moved.map(|x| x as f32));
@@ -77,19 +77,19 @@ impl Grid {
 /// An impossible mesh of the teeth, or one of `out`.
 pub fn write_whole_flexspline(out: &mut dyn Write, problem: &Problem, state: &State) -> io::Result<()> {
     let shells = Flexspline3d::of(&problem.drive, true).map_err(|error: MeshError| io::Error::other(error))?;
-    let waves: Vec<Wave> = problem
+    let waves: Vec<RimWave> = problem
         .rim_waves(state)
         .into_iter()
-        .map(|(n, amplitudes)| Wave { n: f64::from(n), amplitudes, shape: shells.shape(n) })
+        .map(|(n, amplitudes)| RimWave { n: f64::from(n), amplitudes, shape: shells.shape(n) })
         .collect();
-    let mut grid = Grid::default();
+    let mut grid = CellGrid::default();
     add_rim(&mut grid, problem, state, &waves);
     add_tubes(&mut grid, &shells, &waves);
     write(out, &grid)
 }
 
 /// The plane mesh across the face: corners of its elements alone.
-fn add_rim(grid: &mut Grid, problem: &Problem, state: &State, waves: &[Wave]) {
+fn add_rim(grid: &mut CellGrid, problem: &Problem, state: &State, waves: &[RimWave]) {
     let state = &*problem.whole_state(state);
     let mesh = &problem.flexspline;
     let radius = problem.drive.flexspline.neutral_radius_mm();
@@ -142,7 +142,7 @@ fn slopes(shape: &[Station]) -> (Station, f64, f64) {
     (shape[k], over(|s| s.outward), over(|s| s.around))
 }
 
-fn add_tubes(grid: &mut Grid, shells: &Flexspline3d, waves: &[Wave]) {
+fn add_tubes(grid: &mut CellGrid, shells: &Flexspline3d, waves: &[RimWave]) {
     let half = 0.5 * shells.width_mm + 1e-9;
     let Some(first) = waves.first() else { return };
     // Other harmonics need other elements: all are read at the places of the first.
@@ -192,7 +192,7 @@ fn read(shape: &[Station], x_mm: f64) -> Station {
     }
 }
 
-fn write(out: &mut dyn Write, grid: &Grid) -> io::Result<()> {
+fn write(out: &mut dyn Write, grid: &CellGrid) -> io::Result<()> {
     let (points, cells) = (grid.points.len() / 3, grid.types.len());
     writeln!(out, r#"<?xml version="1.0"?>"#)?;
     writeln!(out, r#"<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">"#)?;
@@ -229,13 +229,13 @@ mod tests {
         let problem = Problem::new(&Drive::cup_95(), GeneratorKind::Cam, 20.0, settings).unwrap();
         let state = problem.starting_shape(0.0);
         let shells = Flexspline3d::of(&problem.drive, true).unwrap();
-        let waves: Vec<Wave> = problem
+        let waves: Vec<RimWave> = problem
             .rim_waves(&state)
             .into_iter()
-            .map(|(n, amplitudes)| Wave { n: f64::from(n), amplitudes, shape: shells.shape(n) })
+            .map(|(n, amplitudes)| RimWave { n: f64::from(n), amplitudes, shape: shells.shape(n) })
             .collect();
         assert!((waves[0].amplitudes[0] / 0.5 - 1.0).abs() < 0.02 && waves[0].amplitudes[1].abs() < 1e-3);
-        let mut grid = Grid::default();
+        let mut grid = CellGrid::default();
         add_rim(&mut grid, &problem, &state, &waves);
         let rim = grid.points.len() / 3;
         add_tubes(&mut grid, &shells, &waves);

@@ -210,14 +210,14 @@ pub unsafe extern "C" fn fmi2Instantiate(
         let folder = match folder_of(location) {
             Ok(folder) => folder,
             Err(error) => {
-                refuse(&log, &error);
+                refuse(&log, &error.to_string());
                 return None;
             }
         };
         match Instance::new(&folder, guid, log, logging_on != 0) {
             Ok(instance) => Some(instance),
             Err((log, error)) => {
-                refuse(&log, &error);
+                refuse(&log, &error.to_string());
                 None
             }
         }

@@ -7,12 +7,13 @@ use flexspline::{
 use flexspline_motion::flight::{ARCSEC_PER_RAD, TABLE_DRAG_N_M};
 use flexspline_motion::keep::Kept;
 
+use crate::FmuError;
 use crate::instance::{Inputs, Model};
 use crate::resources::Resources;
 use crate::variables::{Choices, Kind, Role, Variable, variables};
 
 /// What a joint does with its correction.
-pub static MODES: Choices = Choices {
+pub(crate) static MODES: Choices = Choices {
     name: "Mode",
     items: &[
         ("off", "no correction; one that is there is taken back within the limits"),
@@ -22,7 +23,7 @@ pub static MODES: Choices = Choices {
     ],
 };
 /// How far an answer of the table can be trusted.
-pub static QUALITIES: Choices = Choices {
+pub(crate) static QUALITIES: Choices = Choices {
     name: "Quality",
     items: &[
         ("in_range", "inside the range of the table, side of the play known"),
@@ -32,7 +33,7 @@ pub static QUALITIES: Choices = Choices {
     ],
 };
 /// Which torque is given.
-pub static READINGS: Choices = Choices {
+pub(crate) static READINGS: Choices = Choices {
     name: "TorqueReading",
     items: &[
         (
@@ -140,8 +141,8 @@ impl Compensation {
     ///
     /// # Errors
     /// Which of them cannot be.
-    pub fn new(resources: &Resources, values: &[f64]) -> Result<Self, String> {
-        let table = Table::check(&resources.image).map_err(|error| error.to_string())?;
+    pub fn new(resources: &Resources, values: &[f64]) -> Result<Self, FmuError> {
+        let table = Table::check(&resources.image)?;
         let limits = Limits {
             tick_s: values[TICK] as f32,
             rate_rad_s: values[RATE_LIMIT] as f32,
@@ -150,7 +151,7 @@ impl Compensation {
             patience: values[PATIENCE] as u16,
             hold_rad: values[HOLD] as f32,
         };
-        let joint = Joint::new(*table.drive(), limits, Overrun::SkipAndCount).map_err(|error| error.to_string())?;
+        let joint = Joint::new(*table.drive(), limits, Overrun::SkipAndCount)?;
         let path = TorquePath::new(TorqueSettings {
             tick_s: values[TICK] as f32,
             bandwidth_hz: values[TORQUE_BANDWIDTH] as f32,
@@ -159,13 +160,12 @@ impl Compensation {
             hold_n_m: values[TORQUE_HOLD] as f32,
             settle_s: values[TORQUE_SETTLE] as f32,
             largest_n_m: LARGEST_READING_N_M,
-        })
-        .map_err(|error| error.to_string())?;
+        })?;
         let image = [resources.image.clone(), resources.image.clone()];
         let mut store = Store::new();
         let temperature_c = values[TEMPERATURE] as f32;
         let activated = store.activate(&Images::new(&image[0], &image[1]), joint.drive(), temperature_c);
-        activated.map_err(|error| format!("temperature {temperature_c}: {error}"))?;
+        activated.map_err(|error| FmuError::Activate { temperature_c, error })?;
         let target = angle(values[OUTPUT_COMMAND], "output_command", OutputAngle::from_rad)?;
         let command = joint.drive().nominal_generator(target);
         Ok(Self {
@@ -204,8 +204,8 @@ impl Compensation {
     }
 }
 
-fn angle<T>(rad: f64, name: &str, of: impl Fn(f64) -> Option<T>) -> Result<T, String> {
-    of(rad).ok_or_else(|| format!("{name}: found {rad}, allowed: a finite angle of less than 2e9 turns"))
+fn angle<T>(rad: f64, name: &'static str, of: impl Fn(f64) -> Option<T>) -> Result<T, FmuError> {
+    of(rad).ok_or(FmuError::Value { name, found: rad, allowed: "a finite angle of less than 2e9 turns" })
 }
 
 impl Model for Compensation {
@@ -213,7 +213,7 @@ impl Model for Compensation {
         values[TICK]
     }
 
-    fn tick(&mut self, at: &Inputs<'_>, outputs: &mut [f64], says: &mut dyn FnMut(String)) -> Result<(), String> {
+    fn tick(&mut self, at: &Inputs<'_>, outputs: &mut [f64], says: &mut dyn FnMut(String)) -> Result<(), FmuError> {
         let rate_rad_s = at.start(OUTPUT_COMMAND_RATE);
         let target = angle(at.start(OUTPUT_COMMAND), "output_command", OutputAngle::from_rad)?;
         let asked = at.start(MODE) as u32;

@@ -12,6 +12,7 @@ use std::collections::BTreeMap;
 use std::ffi::{CStr, CString};
 use std::path::Path;
 
+use crate::FmuError;
 use crate::compensation::{self, Compensation};
 use crate::joint::{self, MovingJoint};
 use crate::resources::Resources;
@@ -101,7 +102,7 @@ pub trait Model: Send {
     ///
     /// # Errors
     /// Why the model cannot go on.
-    fn tick(&mut self, at: &Inputs<'_>, outputs: &mut [f64], says: &mut dyn FnMut(String)) -> Result<(), String>;
+    fn tick(&mut self, at: &Inputs<'_>, outputs: &mut [f64], says: &mut dyn FnMut(String)) -> Result<(), FmuError>;
 
     /// Adds all that changes.
     fn keep(&self, to: &mut Vec<u64>);
@@ -110,7 +111,7 @@ pub trait Model: Send {
     fn take(&mut self, from: &mut dyn Iterator<Item = u64>) -> Option<()>;
 }
 
-fn made(resources: &Resources, values: &[f64]) -> Result<Box<dyn Model>, String> {
+fn made(resources: &Resources, values: &[f64]) -> Result<Box<dyn Model>, FmuError> {
     Ok(match resources.kind {
         ModelKind::Compensation => Box::new(Compensation::new(resources, values)?),
         ModelKind::Joint => Box::new(MovingJoint::new(resources, values)?),
@@ -148,12 +149,11 @@ impl Instance {
     ///
     /// # Errors
     /// What is wrong with the folder, or that the description belongs to another one.
-    pub fn new(folder: &Path, guid: &str, log: Log, logging: bool) -> Result<Self, (Log, String)> {
+    pub fn new(folder: &Path, guid: &str, log: Log, logging: bool) -> Result<Self, (Log, FmuError)> {
         match Resources::read(folder) {
             Err(error) => Err((log, error)),
             Ok(resources) if resources.guid != guid => {
-                let what = format!("guid: found \"{guid}\", allowed: {}", resources.guid);
-                Err((log, what))
+                Err((log, FmuError::Guid { found: guid.to_owned(), allowed: resources.guid }))
             }
             Ok(resources) => Ok(Self::of(resources, log, logging)),
         }
@@ -217,7 +217,7 @@ impl Instance {
     }
 
     /// `fmi2SetDebugLogging`: all categories, or those named.
-    pub fn set_logging(&mut self, on: bool, categories: &[&str]) -> Status {
+    pub(crate) fn set_logging(&mut self, on: bool, categories: &[&str]) -> Status {
         let unknown = categories.iter().find(|category| !CATEGORIES.contains(category));
         if let Some(unknown) = unknown {
             let allowed = CATEGORIES.join(", ");
@@ -246,7 +246,7 @@ impl Instance {
     }
 
     /// `fmi2EnterInitializationMode`.
-    pub fn enter_initialization(&mut self) -> Result<(), Status> {
+    pub(crate) fn enter_initialization(&mut self) -> Result<(), Status> {
         self.expect("fmi2EnterInitializationMode", &[State::Instantiated])?;
         self.state = State::Initializing;
         if self.set_up {
@@ -256,7 +256,7 @@ impl Instance {
     }
 
     /// `fmi2ExitInitializationMode`: the model is made of the parameters.
-    pub fn exit_initialization(&mut self) -> Result<(), Status> {
+    pub(crate) fn exit_initialization(&mut self) -> Result<(), Status> {
         self.expect("fmi2ExitInitializationMode", &[State::Initializing])?;
         self.model = Some(
             made(&self.resources, &self.values)
@@ -279,7 +279,7 @@ impl Instance {
     }
 
     /// `fmi2Terminate`.
-    pub fn terminate(&mut self) -> Result<(), Status> {
+    pub(crate) fn terminate(&mut self) -> Result<(), Status> {
         self.expect("fmi2Terminate", &[State::Stepping, State::Failed])?;
         self.state = State::Terminated;
         Ok(())
@@ -305,7 +305,7 @@ impl Instance {
     }
 
     /// Reads the only text that there is.
-    pub fn get_text(&self, call: &str, reference: u32) -> Result<&CStr, Status> {
+    pub(crate) fn get_text(&self, call: &str, reference: u32) -> Result<&CStr, Status> {
         self.expect(call, &[State::Initializing, State::Stepping, State::Failed, State::Terminated])?;
         self.place(call, |kind| kind == Kind::Text, reference).map(|_| self.table_id.as_c_str())
     }
@@ -348,7 +348,7 @@ impl Instance {
     }
 
     /// `fmi2SetRealInputDerivatives`: of the first order, for the next step.
-    pub fn set_slopes(&mut self, set: &[(u32, i32, f64)]) -> Result<(), Status> {
+    pub(crate) fn set_slopes(&mut self, set: &[(u32, i32, f64)]) -> Result<(), Status> {
         let call = "fmi2SetRealInputDerivatives";
         self.expect(call, &[State::Instantiated, State::Initializing, State::Stepping])?;
         for &(reference, order, value) in set {
@@ -447,22 +447,22 @@ impl Instance {
     ///
     /// # Errors
     /// Why they are not.
-    pub fn check(&self, bytes: &[u8]) -> Result<(), String> {
+    pub fn check(&self, bytes: &[u8]) -> Result<(), FmuError> {
         self.words(bytes).map(|_| ())
     }
 
     /// The words of a state but for mark, description and sum.
-    fn words(&self, bytes: &[u8]) -> Result<Vec<u64>, String> {
+    fn words(&self, bytes: &[u8]) -> Result<Vec<u64>, FmuError> {
         let (words, left) = bytes.as_chunks::<8>();
         let mut words: Vec<u64> = words.iter().map(|bytes| u64::from_le_bytes(*bytes)).collect();
-        let sum = words.pop().filter(|_| left.is_empty()).ok_or("no state")?;
+        let sum = words.pop().filter(|_| left.is_empty()).ok_or(FmuError::State("no state"))?;
         if sum != digest(words.iter().copied()) {
-            return Err("a damaged state".to_owned());
+            return Err(FmuError::State("a damaged state"));
         }
         let of = digest(self.resources.guid.bytes().map(u64::from));
         match words.split_first_chunk::<2>() {
             Some((&[STATE_MARK, guid], rest)) if guid == of => Ok(rest.to_vec()),
-            _ => Err("a state of another FMU".to_owned()),
+            _ => Err(FmuError::State("a state of another FMU")),
         }
     }
 
@@ -471,19 +471,19 @@ impl Instance {
     /// # Errors
     /// Why they are no state of this description; then nothing changes, or, where the model itself cannot take them up,
     /// it has failed.
-    pub fn go_on_from(&mut self, bytes: &[u8]) -> Result<(), String> {
+    pub(crate) fn go_on_from(&mut self, bytes: &[u8]) -> Result<(), FmuError> {
         let words = self.words(bytes)?;
         let (&[state, set_up, start, stops, stop, time, ticks, has_model], rest) =
-            words.split_first_chunk::<8>().ok_or("no state")?;
+            words.split_first_chunk::<8>().ok_or(FmuError::State("no state"))?;
         let count = self.values.len();
-        let (numbers, kept) = rest.split_at_checked(2 * count).ok_or("no state")?;
+        let (numbers, kept) = rest.split_at_checked(2 * count).ok_or(FmuError::State("no state"))?;
         let numbers: Vec<f64> = numbers.iter().map(|word| f64::from_bits(*word)).collect();
         let (values, slopes) = numbers.split_at(count);
         let variables = self.resources.kind.variables();
         let sound = |(variable, value): (&Variable, &f64)| variable.is_output() || variable.allows(*value);
-        let state = State::ALL.into_iter().find(|known| *known as u64 == state).ok_or("no state")?;
+        let state = State::ALL.into_iter().find(|known| *known as u64 == state).ok_or(FmuError::State("no state"))?;
         if !variables.iter().zip(values).all(sound) {
-            return Err("impossible values".to_owned());
+            return Err(FmuError::State("impossible values"));
         }
         let model = if has_model == 0 { None } else { Some(self.taken(values, kept)?) };
         self.model = model;
@@ -497,7 +497,7 @@ impl Instance {
     }
 
     /// The model of these values in a state that was kept: the one that there is, where its parameters are the same.
-    fn taken(&mut self, values: &[f64], kept: &[u64]) -> Result<Box<dyn Model>, String> {
+    fn taken(&mut self, values: &[f64], kept: &[u64]) -> Result<Box<dyn Model>, FmuError> {
         let variables = self.resources.kind.variables().iter();
         let same = |((variable, a), b): ((&Variable, &f64), &f64)| variable.role != Role::Parameter || a == b;
         let mut model = match self.model.take() {
@@ -507,7 +507,7 @@ impl Instance {
         let mut from = kept.iter().copied();
         if model.take(&mut from).is_none() || from.next().is_some() {
             self.state = State::Failed;
-            return Err("a state that no model has".to_owned());
+            return Err(FmuError::State("a state that no model has"));
         }
         Ok(model)
     }
@@ -519,7 +519,7 @@ impl Instance {
     }
 
     /// Keeps bytes under a name.
-    pub fn keep_bytes(&mut self, name: usize, bytes: Vec<u8>) {
+    pub(crate) fn keep_bytes(&mut self, name: usize, bytes: Vec<u8>) {
         self.states.insert(name, bytes);
     }
 

@@ -6,9 +6,10 @@ use flexspline_motion::keep::Kept;
 use flexspline_motion::scenario::{Load, Moment, Scenario, TableKnown, TorqueKnown};
 use flexspline_motion::servo::ServoSettings;
 
+use crate::FmuError;
 use crate::compensation::{QUALITIES, quality};
 use crate::instance::{Inputs, Model};
-use crate::resources::Resources;
+use crate::resources::{DRIVE_FILE, Resources, file_error};
 use crate::variables::{Choices, Kind, Variable, variables};
 
 /// From what the torque is known.
@@ -187,16 +188,17 @@ impl MovingJoint {
     ///
     /// # Errors
     /// Which of them cannot be.
-    pub fn new(resources: &Resources, values: &[f64]) -> Result<Self, String> {
+    pub fn new(resources: &Resources, values: &[f64]) -> Result<Self, FmuError> {
         let scenario = scenario_of(values);
         if scenario.servo.late_steps > scenario.servo.steps {
-            return Err(format!("late_steps: found {}, allowed: up to steps", scenario.servo.late_steps));
+            let found = scenario.servo.late_steps as f64;
+            return Err(FmuError::Value { name: VARIABLES[LATE_STEPS].name, found, allowed: "up to steps" });
         }
-        let table = Table::check(&resources.image).map_err(|error| error.to_string())?;
-        let [built, nominal] = resources.gears.clone().ok_or("no drive")?;
+        let table = Table::check(&resources.image)?;
+        let [built, nominal] = resources.gears.clone().ok_or_else(|| file_error(DRIVE_FILE, "missing"))?;
         let unit = Unit { drive: *table.drive(), nominal, built };
         let compensated = values[COMPENSATE] != 0.0;
-        OneJoint::new(&scenario, &unit, Some(resources.image.clone()), compensated).map(Self)
+        Ok(Self(OneJoint::new(&scenario, &unit, Some(resources.image.clone()), compensated)?))
     }
 }
 
@@ -205,21 +207,22 @@ impl Model for MovingJoint {
         values[TICK]
     }
 
-    fn tick(&mut self, at: &Inputs<'_>, outputs: &mut [f64], _: &mut dyn FnMut(String)) -> Result<(), String> {
+    fn tick(&mut self, at: &Inputs<'_>, outputs: &mut [f64], _: &mut dyn FnMut(String)) -> Result<(), FmuError> {
         let joint = &mut self.0;
         let outside_n_m = [at.start(LOAD_TORQUE), at.end(LOAD_TORQUE)];
         let read = [TARGET, TARGET_RATE, TARGET_ACCELERATION, MOTOR_TORQUE, LOAD_TORQUE];
         if let Some(place) = read.into_iter().find(|&place| !at.start(place).is_finite()) {
-            return Err(format!("{}: found {}, allowed: a finite number", VARIABLES[place].name, at.start(place)));
+            let (name, found) = (VARIABLES[place].name, at.start(place));
+            return Err(FmuError::Value { name, found, allowed: "a finite number" });
         }
         let servo = at.start(SERVO) != 0.0;
         if servo {
             let target_rad = at.start(TARGET);
             let held = OutputAngle::from_rad(target_rad).and(GeneratorAngle::from_rad(target_rad * joint.ratio()));
-            held.ok_or_else(|| {
-                format!(
-                    "target: found {target_rad}, allowed: an angle for which the generator makes less than 2e9 turns"
-                )
+            held.ok_or(FmuError::Value {
+                name: VARIABLES[TARGET].name,
+                found: target_rad,
+                allowed: "an angle for which the generator makes less than 2e9 turns",
             })?;
         }
         let ticked = if servo {
@@ -239,7 +242,7 @@ impl Model for MovingJoint {
         let ratio = joint.ratio();
         let ([motor, output, _], [motor_rate, output_rate, _]) = (plant.angle_rad, plant.rate_rad_s);
         if !(motor.is_finite() && output.is_finite()) {
-            return Err("the joint runs away".to_owned());
+            return Err(FmuError::RunsAway);
         }
         outputs[MOTOR_ANGLE] = motor * ratio;
         outputs[MOTOR_RATE] = motor_rate * ratio;

@@ -12,10 +12,13 @@
 #[allow(unsafe_code, non_snake_case)] // Pointers from C, and the names of the standard.
 pub mod abi;
 pub mod compensation;
+mod error;
 pub mod instance;
 pub mod joint;
 pub mod resources;
 pub mod variables;
+
+pub use error::FmuError;
 
 /// What a library for the resources of this version has among its bytes.
 pub const MARK: &str = concat!("flexspline-fmu ", env!("CARGO_PKG_VERSION"), ", resources 1");

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use flexspline::{Table, TableId};
 use flexspline_motion::gear::Gear;
 
+use crate::FmuError;
 use crate::variables::{Kind, ModelKind, Role};
 
 /// Name of the file with model and start values.
@@ -44,11 +45,15 @@ pub fn drive_file(gear: &Gear) -> Vec<u8> {
     gear.numbers().into_iter().flat_map(f64::to_le_bytes).collect()
 }
 
-fn gear_of(name: &str, bytes: &[u8]) -> Result<Gear, String> {
+pub(crate) fn file_error(file: &str, what: &str) -> FmuError {
+    FmuError::File { file: file.to_owned(), what: what.to_owned() }
+}
+
+fn gear_of(name: &str, bytes: &[u8]) -> Result<Gear, FmuError> {
     let (numbers, left) = bytes.as_chunks::<8>();
     let numbers: Vec<f64> = numbers.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
     let gear = Gear::of_numbers(&numbers).filter(|_| left.is_empty());
-    gear.ok_or_else(|| format!("{name}: damaged"))
+    gear.ok_or_else(|| file_error(name, "damaged"))
 }
 
 impl Resources {
@@ -56,8 +61,8 @@ impl Resources {
     ///
     /// # Errors
     /// File, line or field, value found and what is allowed.
-    pub fn parse(model: &str, image: Vec<u8>, drives: [Option<&[u8]>; 2]) -> Result<Self, String> {
-        let refuse = |line: usize, what: String| Err(format!("{MODEL_FILE}:{line}: {what}"));
+    pub fn parse(model: &str, image: Vec<u8>, drives: [Option<&[u8]>; 2]) -> Result<Self, FmuError> {
+        let refuse = |line: usize, what: String| Err(FmuError::Line { line, what });
         let mut guid = None;
         let mut found = None;
         let mut starts = Vec::new();
@@ -91,15 +96,15 @@ impl Resources {
                 (_, None) => return refuse(line, format!("found \"{name}\", allowed first: model")),
             }
         }
-        let kind = found.ok_or_else(|| format!("{MODEL_FILE}: model is missing"))?;
-        let guid = guid.ok_or_else(|| format!("{MODEL_FILE}: guid is missing"))?;
-        let table = Table::check(&image).map_err(|error| format!("{TABLE_FILE}: {error}"))?;
+        let kind = found.ok_or_else(|| file_error(MODEL_FILE, "model is missing"))?;
+        let guid = guid.ok_or_else(|| file_error(MODEL_FILE, "guid is missing"))?;
+        let table = Table::check(&image)?;
         let table_id = table.id();
         let gears = match kind {
             ModelKind::Compensation => None,
             ModelKind::Joint => {
                 let [built, designed] = drives;
-                let built = gear_of(DRIVE_FILE, built.ok_or_else(|| format!("{DRIVE_FILE}: missing"))?)?;
+                let built = gear_of(DRIVE_FILE, built.ok_or_else(|| file_error(DRIVE_FILE, "missing"))?)?;
                 let designed = designed.map_or_else(|| Ok(built.clone()), |bytes| gear_of(DESIGNED_FILE, bytes))?;
                 Some([built, designed])
             }
@@ -115,15 +120,15 @@ impl Resources {
     ///
     /// # Errors
     /// As [`Self::parse`], with the folder.
-    pub fn read(folder: &Path) -> Result<Self, String> {
+    pub fn read(folder: &Path) -> Result<Self, FmuError> {
         let bytes = |name: &str| {
             let file = folder.join(name);
-            std::fs::read(&file).map_err(|error| format!("{}: {error}", file.display()))
+            std::fs::read(&file).map_err(|error| file_error(&file.display().to_string(), &error.to_string()))
         };
-        let model = String::from_utf8(bytes(MODEL_FILE)?).map_err(|_| format!("{MODEL_FILE}: no UTF-8"))?;
+        let model = String::from_utf8(bytes(MODEL_FILE)?).map_err(|_| file_error(MODEL_FILE, "no UTF-8"))?;
         let drives = [DRIVE_FILE, DESIGNED_FILE].map(|name| bytes(name).ok());
         let read = Self::parse(&model, bytes(TABLE_FILE)?, drives.each_ref().map(Option::as_deref));
-        read.map_err(|error| format!("{}: {error}", folder.display()))
+        read.map_err(|error| FmuError::Folder { folder: folder.to_owned(), error: Box::new(error) })
     }
 
     /// Start value of a variable of a name; not a number if there is none.
@@ -149,12 +154,12 @@ impl Resources {
 ///
 /// # Errors
 /// Another scheme, another host, or bad escapes.
-pub fn folder_of(uri: &str) -> Result<PathBuf, String> {
-    let allowed = "allowed: file:///folder";
+pub(crate) fn folder_of(uri: &str) -> Result<PathBuf, FmuError> {
+    let refuse = |why| FmuError::Location { uri: uri.to_owned(), why };
     let letter = |text: &str| matches!(text.as_bytes(), [letter, b':', ..] if letter.is_ascii_alphabetic());
     let Some(rest) = uri.strip_prefix("file:").or_else(|| uri.strip_prefix("FILE:")) else {
         return match uri.split_once("://") {
-            Some(_) => Err(format!("resource location: found \"{uri}\", {allowed}")),
+            Some(_) => Err(refuse("")),
             None => Ok(PathBuf::from(uri)),
         };
     };
@@ -163,14 +168,13 @@ pub fn folder_of(uri: &str) -> Result<PathBuf, String> {
         Some(rest) if letter(rest) => ("", rest),
         Some(rest) => rest.split_at(rest.find('/').unwrap_or(rest.len())),
     };
-    let decoded =
-        decoded(path).ok_or_else(|| format!("resource location: found \"{uri}\" with a bad escape, {allowed}"))?;
+    let decoded = decoded(path).ok_or_else(|| refuse(" with a bad escape"))?;
     if !host.is_empty() && !host.eq_ignore_ascii_case("localhost") {
         // A share of Windows.
         return if cfg!(windows) {
             Ok(PathBuf::from(format!("//{host}{decoded}")))
         } else {
-            Err(format!("resource location: found \"{uri}\" on another host, {allowed}"))
+            Err(refuse(" on another host"))
         };
     }
     let bare = decoded.strip_prefix('/').filter(|bare| letter(bare)).unwrap_or(&decoded);
@@ -211,7 +215,7 @@ mod tests {
             ("/tmp/a", "/tmp/a"),
             (r"C:\tmp\a", r"C:\tmp\a"),
         ] {
-            assert_eq!(folder_of(uri).as_deref(), Ok(Path::new(path)), "{uri}");
+            assert_eq!(folder_of(uri), Ok(PathBuf::from(path)), "{uri}");
         }
         for uri in ["http://x/y", "file:///tmp/%2", "file:///tmp/%zz", "file:///%ff", "file://host/tmp"] {
             assert!(folder_of(uri).is_err() || cfg!(windows), "{uri}");
@@ -220,7 +224,7 @@ mod tests {
 
     #[test]
     fn a_bad_model_file_says_where() {
-        let said = |text: &str| Resources::parse(text, Vec::new(), [None; 2]).unwrap_err();
+        let said = |text: &str| Resources::parse(text, Vec::new(), [None; 2]).unwrap_err().to_string();
         assert_eq!(said("guid = 1\ntick_s = 1\nmodel = joint"), "model.txt:2: found \"tick_s\", allowed first: model");
         assert_eq!(said("model = joints"), "model.txt:1: model: found \"joints\", allowed: compensation, joint");
         let model = "model = compensation\n";

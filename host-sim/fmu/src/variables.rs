@@ -175,14 +175,14 @@ macro_rules! variables {
     ($($place:ident => $variable:expr;)+) => {
         // A model need not look at all of them.
         #[allow(clippy::upper_case_acronyms, non_camel_case_types, dead_code)]
-        enum Place {
+        enum VariablePlace {
             $($place),+
         }
         $(#[allow(dead_code)]
-        const $place: usize = Place::$place as usize;)+
+        const $place: usize = VariablePlace::$place as usize;)+
 
         /// All of them.
-        pub const VARIABLES: &[Variable] = &[$($variable),+];
+        pub(crate) const VARIABLES: &[Variable] = &[$($variable),+];
     };
 }
 pub(crate) use variables;

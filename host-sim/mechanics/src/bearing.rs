@@ -27,12 +27,12 @@ impl Balls {
     }
 
     /// Approach of both races under a ball that carries `load_n`, mm.
-    pub fn approach_mm(&self, load_n: f64) -> f64 {
+    pub(crate) fn approach_mm(&self, load_n: f64) -> f64 {
         4.37e-4 * (load_n * load_n / self.diameter_mm).cbrt()
     }
 
     /// Change of load over change of approach, N/mm; balls stiffen as they are loaded.
-    pub fn stiffness_n_per_mm(&self, load_n: f64) -> f64 {
+    pub(crate) fn stiffness_n_per_mm(&self, load_n: f64) -> f64 {
         1.5 * load_n / self.approach_mm(load_n)
     }
 

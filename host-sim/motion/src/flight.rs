@@ -1,10 +1,13 @@
 //! A joint flown by every controller, each with its own motor, drive and load under one sky.
 
 use core::f64::consts::TAU;
+use std::panic::resume_unwind;
+use std::thread::ScopedJoinHandle;
 
+use flexspline::make::ProjectError;
 use flexspline::{
-    Approach, Direction, Drive, Flags, GeneratorAngle, Images, Limits, OutputAngle, Quality, Store, TorqueReading,
-    TorqueSettings,
+    ActivateError, Approach, Direction, Drive, Flags, GeneratorAngle, Images, Limits, OutputAngle, Quality,
+    SettingError, Store, TorqueReading, TorqueSettings,
 };
 
 use super::friction::Friction;
@@ -228,7 +231,7 @@ pub struct Flight {
 
 /// What every lane is made of.
 #[derive(Clone)]
-struct Made {
+struct LaneParts {
     scenario: Scenario,
     unit: Unit,
     /// Twice, as a joint has it.
@@ -241,7 +244,7 @@ struct Made {
     bandwidth_hz: f64,
 }
 
-impl Made {
+impl LaneParts {
     fn images(&self) -> Images<'_> {
         let [image, twin] = &self.image;
         Images::new(image, twin)
@@ -280,28 +283,51 @@ impl Made {
     }
 }
 
+/// Why a joint is not flown, or not to its end.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FlightError {
+    /// The gear makes no table.
+    #[error("no table: {0}")]
+    Table(#[from] ProjectError),
+    /// A setting of the core's joint.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// The core does not take the table.
+    #[error("the table cannot be flown: {0}")]
+    Activate(#[from] ActivateError),
+    /// The load is further from its target than any joint that is controlled.
+    #[error("{controller}: the joint runs away at {time_s:.2} s")]
+    RunsAway {
+        /// What commands it, one of [`CONTROLLERS`] or "by_torque".
+        controller: &'static str,
+        /// Time since the start, s.
+        time_s: f64,
+    },
+}
+
 /// Flies a scenario.
 ///
 /// # Errors
-/// What cannot be flown, in words.
-pub fn fly(scenario: &Scenario, unit: &Unit) -> Result<Flight, String> {
+/// [`FlightError`].
+pub fn fly(scenario: &Scenario, unit: &Unit) -> Result<Flight, FlightError> {
     fly_told(scenario, unit, &|| {})
 }
 
 /// Flies a scenario; `told` is called by each controller's joint for each second that it flew.
 ///
 /// # Errors
-/// What cannot be flown, in words.
-pub fn fly_told(scenario: &Scenario, unit: &Unit, told: &(dyn Fn() + Sync)) -> Result<Flight, String> {
+/// [`FlightError`].
+pub fn fly_told(scenario: &Scenario, unit: &Unit, told: &(dyn Fn() + Sync)) -> Result<Flight, FlightError> {
     let made = made(scenario, unit, None)?;
-    let flawless = Made { unit: unit.flawless(), ..made.clone() };
-    let flown: Vec<Result<Flown, String>> = std::thread::scope(|threads| {
-        let lanes = (0..CONTROLLERS.len()).map(|kind| (&made, kind)).chain([(&flawless, 0)]);
-        let flying: Vec<_> = lanes.map(|(made, kind)| threads.spawn(move || lane(made, kind, told))).collect();
-        flying.into_iter().map(|lane| lane.join().unwrap_or_else(|_| Err("a lane ended early".to_owned()))).collect()
+    let flawless = LaneParts { unit: unit.flawless(), ..made.clone() };
+    let (flown, flawless) = std::thread::scope(|threads| {
+        let start = |made, kind| threads.spawn(move || lane(made, kind, told));
+        let flying: Vec<_> = (0..CONTROLLERS.len()).map(|kind| start(&made, kind)).collect();
+        let flawless = start(&flawless, 0);
+        let landed = |lane: ScopedJoinHandle<'_, _>| lane.join().unwrap_or_else(|panic| resume_unwind(panic));
+        (flying.into_iter().map(landed).collect::<Result<Vec<Flown>, _>>(), landed(flawless))
     });
-    let mut flown = flown.into_iter().collect::<Result<Vec<_>, _>>()?;
-    let flawless = flown.pop().ok_or("nothing was flown")?;
+    let (flown, flawless) = (flown?, flawless?);
     let margin = made.masses.servo(&scenario.servo);
     Ok(Flight {
         flown,
@@ -321,23 +347,27 @@ pub fn fly_told(scenario: &Scenario, unit: &Unit, told: &(dyn Fn() + Sync)) -> R
 ///
 /// # Errors
 /// As [`fly`].
-pub fn fly_one(scenario: &Scenario, unit: &Unit, controller: usize) -> Result<Flown, String> {
+pub fn fly_one(scenario: &Scenario, unit: &Unit, controller: usize) -> Result<Flown, FlightError> {
     lane(&made(scenario, unit, None)?, controller, &|| {})
 }
 
 /// The image of the table that a scenario's joint flies with; `id` makes its id of what is hashed for it.
 ///
 /// # Errors
-/// Why there is none, in words.
-pub fn table_image(scenario: &Scenario, unit: &Unit, id: impl FnOnce(&[u8]) -> [u8; 8]) -> Result<Vec<u8>, String> {
+/// [`FlightError::Table`].
+pub fn table_image(
+    scenario: &Scenario,
+    unit: &Unit,
+    id: impl FnOnce(&[u8]) -> [u8; 8],
+) -> Result<Vec<u8>, FlightError> {
     let largest_n_m = 1.5 * scenario.largest_n_m() + 1.0;
     let noise_rad = if scenario.table == TableKnown::Calibrated { CALIBRATION_NOISE_RAD } else { 0.0 };
     let sampling = Sampling { largest_n_m, drag_n_m: TABLE_DRAG_N_M, temperature_c: scenario.temperature_c, noise_rad };
-    image(&unit.known(scenario.table), unit.drive, &sampling, id).map_err(|error| format!("no table: {error:?}"))
+    Ok(image(&unit.known(scenario.table), unit.drive, &sampling, id)?)
 }
 
 /// With the image of a table that was made before, or one made for the scenario.
-fn made(scenario: &Scenario, unit: &Unit, image: Option<Vec<u8>>) -> Result<Made, String> {
+fn made(scenario: &Scenario, unit: &Unit, image: Option<Vec<u8>>) -> Result<LaneParts, FlightError> {
     let image = image.map_or_else(|| table_image(scenario, unit, |_| [0; 8]), Ok)?;
     // The stiffest that the flight comes to: the loop of the mesh torque is judged by what the table says there.
     let stiffness = stiffness(&unit.nominal, scenario.largest_n_m());
@@ -362,7 +392,7 @@ fn made(scenario: &Scenario, unit: &Unit, image: Option<Vec<u8>>) -> Result<Made
         (TorqueKnown::OnLoad, _) => (TorqueKnown::OnLoad, known_hz),
         _ => (TorqueKnown::Not, known_hz),
     };
-    Ok(Made {
+    Ok(LaneParts {
         scenario: scenario.clone(),
         unit: unit.clone(),
         image: [image.clone(), image],
@@ -390,8 +420,8 @@ fn damping_s(scenario: &Scenario, unit: &Unit) -> f64 {
     2.0 * scenario.damping / free.sqrt()
 }
 
-fn plant(made: &Made) -> Plant {
-    let Made { scenario, unit, .. } = made;
+fn plant(made: &LaneParts) -> Plant {
+    let LaneParts { scenario, unit, .. } = made;
     let settings = PlantSettings {
         motor_kg_m2: motor_kg_m2(scenario, unit),
         load_kg_m2: scenario.load_kg_m2,
@@ -417,7 +447,7 @@ struct Told {
 }
 
 impl Told {
-    fn on_board(&self, made: &Made) -> on_board::Told {
+    fn on_board(&self, made: &LaneParts) -> on_board::Told {
         let Moment { target_rad, rate_rad_s, acceleration_rad_s2, .. } = self.moment;
         on_board::Told {
             generator: self.generator,
@@ -431,12 +461,12 @@ impl Told {
 }
 
 /// Ways to command the generator.
-enum Controller {
+enum JointController {
     Uncompensated,
     Fourier(Box<Fourier>),
     Ideal(Box<Ideal>),
     Core(Box<Core>),
-    ByTorque(Box<Core>, Limiter),
+    ByTorque(Box<Core>, CorrectionLimiter),
 }
 
 /// A command, its rate and acceleration, and what the limiter and the table could not do.
@@ -452,12 +482,12 @@ struct Commanded {
 
 /// Moves a correction within limits, as the core does.
 #[derive(Default)]
-struct Limiter {
+struct CorrectionLimiter {
     at: f64,
     speed: f64,
 }
 
-impl Limiter {
+impl CorrectionLimiter {
     fn go(&mut self, goal: f64, tick_s: f64) -> f64 {
         // As in whole ticks the core stops: with half of the acceleration.
         let step = ACCELERATION_RAD_S2 * tick_s;
@@ -481,12 +511,12 @@ struct Fourier {
     teeth: f64,
     /// Forward and backward, or their mean twice.
     curves: [[f64; CURVE]; 2],
-    limiter: Limiter,
+    limiter: CorrectionLimiter,
 }
 
 impl Fourier {
-    fn new(made: &Made, by_direction: bool) -> Self {
-        let Made { scenario, unit, .. } = made;
+    fn new(made: &LaneParts, by_direction: bool) -> Self {
+        let LaneParts { scenario, unit, .. } = made;
         let plain = Gear { lines: Vec::new(), ..unit.built.clone() };
         let teeth = f64::from(unit.drive.ripple_order());
         let mut curves = [1.0, -1.0].map(|way| {
@@ -499,7 +529,7 @@ impl Fourier {
             let mean: [f64; CURVE] = core::array::from_fn(|k| 0.5 * (forward[k] + backward[k]));
             curves = [mean; 2];
         }
-        Self { lines: unit.built.clone(), teeth, curves, limiter: Limiter::default() }
+        Self { lines: unit.built.clone(), teeth, curves, limiter: CorrectionLimiter::default() }
     }
 
     fn error(&self, output_rad: f64, direction: Direction) -> f64 {
@@ -520,7 +550,7 @@ impl Fourier {
 /// The unit itself, and the true torque: no table can do better, but for what the joint's motion adds.
 struct Ideal {
     gear: Gear,
-    limiter: Limiter,
+    limiter: CorrectionLimiter,
 }
 
 /// The core.
@@ -531,34 +561,28 @@ struct Core {
     last: Option<(on_board::Told, Given)>,
 }
 
-fn setting(error: flexspline::SettingError) -> String {
-    error.to_string()
-}
-
-impl Controller {
-    fn new(made: &Made, kind: usize) -> Result<Self, String> {
-        let Made { scenario, unit, .. } = made;
+impl JointController {
+    fn new(made: &LaneParts, kind: usize) -> Result<Self, FlightError> {
+        let LaneParts { scenario, unit, .. } = made;
         Ok(match kind {
             0 => Self::Uncompensated,
             1 | 2 => Self::Fourier(Box::new(Fourier::new(made, kind == 2))),
             COMPENSATED | BY_TORQUE => {
-                let on_board = OnBoard::new(unit.drive, &made.on_board_settings()).map_err(setting)?;
+                let on_board = OnBoard::new(unit.drive, &made.on_board_settings())?;
                 let mut store = Store::new();
-                store
-                    .activate(&made.images(), &unit.drive, scenario.temperature_c as f32)
-                    .map_err(|error| format!("the table cannot be flown: {error:?}"))?;
+                store.activate(&made.images(), &unit.drive, scenario.temperature_c as f32)?;
                 let core = Box::new(Core { on_board, store, last: None });
-                if kind == BY_TORQUE { Self::ByTorque(core, Limiter::default()) } else { Self::Core(core) }
+                if kind == BY_TORQUE { Self::ByTorque(core, CorrectionLimiter::default()) } else { Self::Core(core) }
             }
-            _ => Self::Ideal(Box::new(Ideal { gear: unit.built.clone(), limiter: Limiter::default() })),
+            _ => Self::Ideal(Box::new(Ideal { gear: unit.built.clone(), limiter: CorrectionLimiter::default() })),
         })
     }
 
-    fn tick(&mut self, made: &Made, told: &Told) -> Commanded {
+    fn tick(&mut self, made: &LaneParts, told: &Told) -> Commanded {
         let Moment { target_rad, rate_rad_s, acceleration_rad_s2, .. } = told.moment;
         let (ratio, tick_s) = (made.unit.nominal.ratio, made.scenario.servo.tick_s);
         // A correction, and what it does along the way of the target.
-        let corrected = |[before, goal, after]: [f64; 3], limiter: &mut Limiter| {
+        let corrected = |[before, goal, after]: [f64; 3], limiter: &mut CorrectionLimiter| {
             let correction = limiter.go(goal, tick_s);
             let command = GeneratorAngle::from_rad((target_rad - correction) * ratio).unwrap_or(GeneratorAngle::ZERO);
             let ahead = f64::from(AHEAD_S);
@@ -577,7 +601,7 @@ impl Controller {
         };
         let times = [-0.5, 0.0, 0.5].map(|part| part * f64::from(AHEAD_S));
         match self {
-            Self::Uncompensated => corrected([0.0; 3], &mut Limiter::default()),
+            Self::Uncompensated => corrected([0.0; 3], &mut CorrectionLimiter::default()),
             Self::Fourier(fourier) => {
                 let at = |time: f64| fourier.error(target_rad + rate_rad_s * time, told.direction);
                 corrected(times.map(at), &mut fourier.limiter)
@@ -611,7 +635,7 @@ impl Controller {
 }
 
 impl Core {
-    fn tick(&mut self, made: &Made, told: &Told) -> Commanded {
+    fn tick(&mut self, made: &LaneParts, told: &Told) -> Commanded {
         let Moment { rate_rad_s, acceleration_rad_s2, .. } = told.moment;
         let told = told.on_board(made);
         let given = self.on_board.tick(&made.images(), &mut self.store, &told);
@@ -681,7 +705,7 @@ impl Sensing {
         }
     }
 
-    fn read(&mut self, made: &Made, plant: &Plant, servo: &mut Servo, now: &Moment) -> TorqueReading {
+    fn read(&mut self, made: &LaneParts, plant: &Plant, servo: &mut Servo, now: &Moment) -> TorqueReading {
         let scenario = &made.scenario;
         let noise = scenario.torque_noise_n_m * self.noise.normal();
         if scenario.warming_k_s != 0.0 {
@@ -707,7 +731,7 @@ impl Sensing {
 
     /// Torque on the load, and what of the friction is not known, by the motor's current; kept as a torque on the load,
     /// as that does not change at a reversal, and the one in the mesh does by twice the drag.
-    fn by_current(&mut self, made: &Made, servo: &mut Servo, now: &Moment) {
+    fn by_current(&mut self, made: &LaneParts, servo: &mut Servo, now: &Moment) {
         let scenario = &made.scenario;
         let tick_s = scenario.servo.tick_s;
         let rate = servo.rate_rad_s();
@@ -746,7 +770,7 @@ impl Sensing {
 
     /// A motor that slides at a rate: what pulls at it less the friction, by a Kalman filter. The friction turns over
     /// where the motor turns back, and the load does not, so that one motion to and fro tells them apart.
-    fn heard_sliding(&mut self, made: &Made, rate_rad_s: f64, pulls_n_m: f64) {
+    fn heard_sliding(&mut self, made: &LaneParts, rate_rad_s: f64, pulls_n_m: f64) {
         let scenario = &made.scenario;
         let way = libm::copysign(1.0, rate_rad_s);
         let heard = pulls_n_m + scenario.friction_known * self.rubbing_n_m(rate_rad_s, self.told_n_m - self.drag_n_m);
@@ -791,7 +815,7 @@ impl Sensing {
     /// At rest it stays. Taken off there, the integral part would hold the friction instead, and as the target moves on
     /// the motor would be given it twice. Where the torque comes from the mesh or the motor the correction tells the
     /// way but once: else it would be a relay in a loop.
-    fn rubbing_told_n_m(&mut self, made: &Made, rate_rad_s: f64, command_rad: f64, mesh_n_m: f64) -> f64 {
+    fn rubbing_told_n_m(&mut self, made: &LaneParts, rate_rad_s: f64, command_rad: f64, mesh_n_m: f64) -> f64 {
         let scenario = &made.scenario;
         let loops = matches!(made.torque, TorqueKnown::InMesh | TorqueKnown::Current);
         let gone = command_rad - self.furthest_rad;
@@ -832,27 +856,27 @@ fn on_load_n_m(scenario: &Scenario, now: &Moment) -> f64 {
 /// Rows of a flight in the report, at most.
 const ROWS: f64 = 4000.0;
 
-struct Lane {
+struct JointLane {
     plant: Plant,
     servo: Servo,
     sensing: Sensing,
-    controller: Controller,
+    controller: JointController,
     direction: Direction,
 }
 
-impl Lane {
-    fn new(made: &Made, kind: usize) -> Result<Self, String> {
+impl JointLane {
+    fn new(made: &LaneParts, kind: usize) -> Result<Self, FlightError> {
         let scenario = &made.scenario;
         Ok(Self {
             plant: plant(made),
             servo: Servo::new(scenario.servo, made.unit.nominal.ratio, scenario.seed),
             sensing: Sensing::new(scenario),
-            controller: Controller::new(made, kind)?,
+            controller: JointController::new(made, kind)?,
             direction: Direction::Forward,
         })
     }
 
-    fn tick(&mut self, made: &Made, now: &Moment) -> Commanded {
+    fn tick(&mut self, made: &LaneParts, now: &Moment) -> Commanded {
         let scenario = &made.scenario;
         let generator = self.servo.read(&self.plant);
         let reading = self.sensing.read(made, &self.plant, &mut self.servo, now);
@@ -891,9 +915,9 @@ impl Lane {
     }
 }
 
-fn lane(made: &Made, kind: usize, told: &(dyn Fn() + Sync)) -> Result<Flown, String> {
+fn lane(made: &LaneParts, kind: usize, told: &(dyn Fn() + Sync)) -> Result<Flown, FlightError> {
     let scenario = &made.scenario;
-    let mut lane = Lane::new(made, kind)?;
+    let mut lane = JointLane::new(made, kind)?;
     let every = (scenario.seconds() / scenario.servo.tick_s / ROWS).ceil().max(1.0) as usize;
     let mut flown = Flown { digest: 0xcbf2_9ce4_8422_2325, ..Flown::default() };
     let mut within = 0_u32;
@@ -903,7 +927,8 @@ fn lane(made: &Made, kind: usize, told: &(dyn Fn() + Sync)) -> Result<Flown, Str
         let ripple = (lane.plant.rate_rad_s[1] - now.rate_rad_s) * ARCSEC_PER_RAD;
         let mesh = lane.plant.mesh_n_m();
         if !error.is_finite() || error.abs() > 1e6 {
-            return Err(format!("{}: the joint runs away at {:.2} s", CONTROLLERS[kind], now.time_s));
+            let controller = CONTROLLERS.get(kind).copied().unwrap_or("by_torque");
+            return Err(FlightError::RunsAway { controller, time_s: now.time_s });
         }
         flown.digest = (flown.digest ^ error.to_bits()).wrapping_mul(0x0100_0000_01b3);
         if tick % second == second - 1 {
@@ -933,13 +958,13 @@ fn lane(made: &Made, kind: usize, told: &(dyn Fn() + Sync)) -> Result<Flown, Str
 /// A target that stands, a knock, and what is left of it 2.5 s later: speed of the load (rad/s rms) about its mean,
 /// which a slow low-pass moves, in three of six half seconds. What rings does so in each of them; a servo that unwinds
 /// its integral part while the motor sticks lets it slip once, at any time.
-fn left_of_a_knock(made: &Made, kind: usize) -> Result<f64, String> {
-    let mut lane = Lane::new(made, kind)?;
+fn left_of_a_knock(made: &LaneParts, kind: usize) -> Result<f64, FlightError> {
+    let mut lane = JointLane::new(made, kind)?;
     let tick_s = made.scenario.servo.tick_s;
     let outside = made.scenario.load.bias_n_m + 0.5 * made.scenario.load.swing[0];
     let ticks = |seconds: f64| (seconds / tick_s) as u32;
     let mut tick = 0;
-    let mut fly = |lane: &mut Lane, ticks: u32| {
+    let mut fly = |lane: &mut JointLane, ticks: u32| {
         let (mut left, mut sum) = (Score::default(), 0.0);
         for _ in 0..ticks {
             lane.tick(
@@ -982,15 +1007,15 @@ const AT_REST_RAD_S: f64 = 2e-5;
 ///
 /// # Errors
 /// As [`fly`].
-pub fn comes_to_rest(scenario: &Scenario, unit: &Unit) -> Result<(bool, Option<f64>), String> {
+pub fn comes_to_rest(scenario: &Scenario, unit: &Unit) -> Result<(bool, Option<f64>), FlightError> {
     let made = made(scenario, unit, None)?;
     let used = made.torque == scenario.torque;
     Ok((stable(&made)?, used.then_some(made.bandwidth_hz)))
 }
 
-fn stable(made: &Made) -> Result<bool, String> {
+fn stable(made: &LaneParts) -> Result<bool, FlightError> {
     // What noise moves is no ringing.
-    let quiet = Made { scenario: Scenario { torque_noise_n_m: 0.0, ..made.scenario.clone() }, ..made.clone() };
+    let quiet = LaneParts { scenario: Scenario { torque_noise_n_m: 0.0, ..made.scenario.clone() }, ..made.clone() };
     let [without, with] = [0, COMPENSATED].map(|kind| left_of_a_knock(&quiet, kind));
     Ok(with? <= (2.0 * without?).max(AT_REST_RAD_S))
 }

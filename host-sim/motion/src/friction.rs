@@ -32,7 +32,7 @@ pub struct Friction {
 
 /// Kelvin for a factor e: three times the torque without load at −10 °C that there is at 20 °C, as catalogues' curves
 /// of the no-load running torque go. A prior, not measured by us.
-pub const CATALOGUE_COLD_K: f64 = 27.3;
+pub(crate) const CATALOGUE_COLD_K: f64 = 27.3;
 
 impl Friction {
     /// None.
@@ -79,7 +79,7 @@ impl Friction {
     }
 
     /// Coulomb friction at a speed, with a torque in the mesh, N·m.
-    pub fn level_n_m(&self, rate_rad_s: f64, mesh_n_m: f64) -> f64 {
+    pub(crate) fn level_n_m(&self, rate_rad_s: f64, mesh_n_m: f64) -> f64 {
         let [idle, by_load] = self.parts(rate_rad_s);
         idle + by_load * mesh_n_m.abs()
     }

@@ -67,7 +67,7 @@ fn turned_on((s, c): (f64, f64), by: f64) -> (f64, f64) {
 }
 
 /// How many harmonics of the tooth pitch a sampled spring keeps.
-pub const PITCH_HARMONICS: usize = 4;
+pub(crate) const PITCH_HARMONICS: usize = 4;
 /// Curves of a sampled spring: the mean, and cosine and sine of each harmonic.
 const CURVES: usize = 1 + 2 * PITCH_HARMONICS;
 /// Intervals of a sampled spring.
@@ -164,23 +164,6 @@ impl Sampled {
         Self { pieces: pieces(&nodes, width_rad), width_rad, teeth }
     }
 
-    /// Between two springs of the same kind: `share` of the other.
-    #[must_use]
-    pub fn blended(&self, other: &Sampled, share: f64) -> Self {
-        // Same twist of both ends of the grid, so that knots are those of the first.
-        let width_rad = self.width_rad + share * (other.width_rad - self.width_rad);
-        let mix = |a: f64, b: f64| a + share * (b - a);
-        let pieces = self.pieces.iter().zip(&other.pieces).map(|(a, b)| {
-            core::array::from_fn(|curve| Piece {
-                energy: mix(a[curve].energy, b[curve].energy),
-                torque: core::array::from_fn(|k| mix(a[curve].torque[k], b[curve].torque[k])),
-            })
-        });
-        let mut blended = Self { pieces: pieces.collect(), width_rad, teeth: self.teeth };
-        blended.sum_energies();
-        blended
-    }
-
     /// Stiffer by a factor, and with so much more clearance on each side: what a unit has beside the nominal drive.
     #[must_use]
     pub fn as_built(&self, stiffer: f64, wider_rad: f64) -> Self {
@@ -196,7 +179,7 @@ impl Sampled {
 
     /// Its mean over the tooth pitch.
     #[must_use]
-    pub fn without_ripple(&self) -> Self {
+    pub(crate) fn without_ripple(&self) -> Self {
         let mean = |curves: &[Piece; CURVES]| {
             let [mean, ..] = curves;
             core::array::from_fn(|curve| if curve == 0 { *mean } else { Piece::default() })
@@ -446,7 +429,7 @@ impl Gear {
     }
 
     /// Makes a place to ask near of.
-    pub fn nearby(&self, near: &mut Near, motor_rad: f64, output_rad: f64) {
+    pub(crate) fn nearby(&self, near: &mut Near, motor_rad: f64, output_rad: f64) {
         let generator_rad = motor_rad * self.ratio;
         near.pitch = self.pitch(generator_rad);
         near.lines.clear();
@@ -456,7 +439,7 @@ impl Gear {
     }
 
     /// As [`Self::at`], so much further than a place: generator angle over ratio, and output.
-    pub fn at_near(&self, near: &Near, motor_by_rad: f64, output_by_rad: f64) -> Meshed {
+    pub(crate) fn at_near(&self, near: &Near, motor_by_rad: f64, output_by_rad: f64) -> Meshed {
         let (generator, output) = (motor_by_rad * self.ratio, output_by_rad);
         let turned =
             |(line, at): (&Line, &(f64, f64))| turned_on(*at, line.generator * generator + line.output * output);
@@ -480,7 +463,7 @@ impl Gear {
 
     /// Error of the output at rest (rad: output less generator over ratio) with this torque in the mesh; for none, on
     /// the side of `sign`.
-    pub fn error_under_rad(&self, generator_rad: f64, mesh_n_m: f64, sign: f64) -> f64 {
+    pub(crate) fn error_under_rad(&self, generator_rad: f64, mesh_n_m: f64, sign: f64) -> f64 {
         let side = if mesh_n_m == 0.0 { sign } else { mesh_n_m };
         let torque = |twist: f64| self.sprung(generator_rad, libm::copysign(twist, side)).torque_n_m.abs();
         let (mut low, mut high) = (0.0, 1e-6);

@@ -126,7 +126,7 @@ const IN_TEN: f64 = 1000.0;
 
 impl TwoMasses {
     /// Resonance with the motor held, Hz: where the mesh torque goes from against to with the motor's swing.
-    pub fn locked_hz(&self) -> f64 {
+    pub(crate) fn locked_hz(&self) -> f64 {
         (self.stiffness / self.load_kg_m2).sqrt() / TAU
     }
 

@@ -166,7 +166,7 @@ impl Scenario {
 
     /// How fast a torque on the load wanders that nobody knows, N²·m²/s, and its variance about the mean at most,
     /// N²·m².
-    pub fn load_wanders(&self) -> (f64, f64) {
+    pub(crate) fn load_wanders(&self) -> (f64, f64) {
         let Load { swing, gust, step, gravity, .. } = self.load;
         let square = |value: f64| value * value;
         let stepped = if step[1] > 0.0 { 8.0 * square(step[0]) / step[1] } else { 0.0 };

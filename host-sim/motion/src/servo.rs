@@ -95,7 +95,7 @@ impl Servo {
     }
 
     /// Motor torque times ratio as its current tells it, N·m at the output, of the tick before.
-    pub fn current_n_m(&mut self) -> f64 {
+    pub(crate) fn current_n_m(&mut self) -> f64 {
         self.ratio * (self.torque_n_m + self.settings.current_noise_n_m * self.noise.normal())
     }
 

@@ -21,7 +21,7 @@ const CNC_UNITS: f64 = 1e4;
 
 /// Evenly spaced values over a travel of the output, linear between them.
 #[derive(Debug, Clone)]
-struct Curve {
+struct TravelCurve {
     from: f64,
     step: f64,
     /// The last value stands where the first does, a turn on.
@@ -29,16 +29,16 @@ struct Curve {
     values: Vec<f64>,
 }
 
-impl Curve {
+impl TravelCurve {
     /// Least squares over pairs of place and value; a ring repeats its first value at its end.
-    fn fit(pairs: &[(f64, f64)], travel: [f64; 2], step: f64, entries: usize, ring: bool) -> Curve {
+    fn fit(pairs: &[(f64, f64)], travel: [f64; 2], step: f64, entries: usize, ring: bool) -> TravelCurve {
         let mut hats = Hats::new(if ring { entries - 1 } else { entries }, travel[0], step, ring);
         pairs.iter().for_each(|(place, value)| hats.add(*place, *value));
         let mut values = hats.solve();
         if ring {
             values.push(values[0]);
         }
-        Curve { from: travel[0], step, ring, values }
+        TravelCurve { from: travel[0], step, ring, values }
     }
 
     fn at(&self, place: f64) -> f64 {
@@ -68,7 +68,7 @@ pub struct Nc {
     travel: [f64; 2],
     points_a_turn: f64,
     /// Degrees of both.
-    curve: Curve,
+    curve: TravelCurve,
 }
 
 impl Nc {
@@ -86,7 +86,7 @@ impl Nc {
         }
         let step = (travel[1] - travel[0]) / f64::from(entries - 1);
         let samples = section.samples(Some(travel), FIT_POINTS, directions);
-        let mut curve = Curve::fit(&wanted(&samples), travel, step, entries as usize, whole_turn(travel));
+        let mut curve = TravelCurve::fit(&wanted(&samples), travel, step, entries as usize, whole_turn(travel));
         // As the file says it: nine decimals of a degree.
         curve.values.iter_mut().for_each(|value| *value = (value.to_degrees() * 1e9).round() / 1e9);
         Ok(Nc { directions: directions.to_vec(), travel, points_a_turn: f64::from(entries - 1) / turns, curve })
@@ -167,7 +167,7 @@ pub struct Cnc {
     start: i64,
     interval: i64,
     /// Forward and backward: errors in 0.0001 degrees.
-    curves: [Curve; 2],
+    curves: [TravelCurve; 2],
 }
 
 impl Cnc {
@@ -201,7 +201,7 @@ impl Cnc {
         let pairs = wanted(&samples);
         let (forward, backward) = pairs.split_at(pairs.len() / 2);
         let curves = [forward, backward].map(|pairs| {
-            let mut curve = Curve::fit(pairs, reach, step, steps as usize + 1, whole_turn(travel));
+            let mut curve = TravelCurve::fit(pairs, reach, step, steps as usize + 1, whole_turn(travel));
             curve.values.iter_mut().for_each(|value| *value = (-value.to_degrees() * CNC_UNITS).round());
             curve
         });

@@ -50,7 +50,7 @@ const JUDGE_POINTS: u32 = 32_749;
 const JUDGE_LOADS: usize = 5;
 /// A file that leaves more than this share of the error is refused: a guess of what is not worth the risk of a wrong
 /// one.
-pub const POINTLESS: f64 = 0.7;
+pub(crate) const POINTLESS: f64 = 0.7;
 /// Fewer rows of a unit's data than this are not judged by: some to each half wave of order 2 over a few generator
 /// turns, a guess.
 pub const FEWEST_ROWS: usize = 32;

@@ -26,7 +26,7 @@ pub enum CompType {
 
 /// A triplet as it is kept.
 #[derive(Debug, Clone, Copy)]
-struct Entry {
+struct Triplet {
     nominal: f64,
     trims: [f32; 2],
     slopes: [f32; 2],
@@ -40,7 +40,7 @@ pub struct LinuxCnc {
     turns_per_point: f64,
     /// The numbers of the file.
     triplets: Vec<[f64; 3]>,
-    entries: Vec<Entry>,
+    entries: Vec<Triplet>,
 }
 
 impl LinuxCnc {
@@ -97,13 +97,13 @@ fn printed(degrees: f64) -> f64 {
 }
 
 /// What LinuxCNC keeps of a file.
-fn kept(triplets: &[[f64; 3]], kind: CompType) -> Vec<Entry> {
+fn kept(triplets: &[[f64; 3]], kind: CompType) -> Vec<Triplet> {
     let trims = |[nominal, forward, backward]: [f64; 3]| match kind {
         CompType::Trim => [forward as f32, backward as f32],
         CompType::Actual => [(nominal - forward) as f32, (nominal - backward) as f32],
     };
-    let mut entries: Vec<Entry> =
-        triplets.iter().map(|row| Entry { nominal: row[0], trims: trims(*row), slopes: [0.0; 2] }).collect();
+    let mut entries: Vec<Triplet> =
+        triplets.iter().map(|row| Triplet { nominal: row[0], trims: trims(*row), slopes: [0.0; 2] }).collect();
     for k in 1..entries.len() {
         let width = entries[k].nominal - entries[k - 1].nominal;
         let slope = |side: usize| (f64::from(entries[k].trims[side] - entries[k - 1].trims[side]) / width) as f32;

@@ -45,7 +45,7 @@ impl<'a> Section<'a> {
     }
 
     /// Output turns after which everything repeats: those that take a whole number of generator turns.
-    pub fn period_turns(&self) -> u32 {
+    pub(crate) fn period_turns(&self) -> u32 {
         let waves = self.table.drive().circular_spline_teeth() - self.table.drive().flexspline_teeth();
         let turns = |count: &u32| (self.ratio() * f64::from(*count)).fract().abs() < 1e-9;
         (1..u32::from(waves)).find(turns).unwrap_or(u32::from(waves))
@@ -74,7 +74,7 @@ impl<'a> Section<'a> {
     }
 
     /// Order per generator turn, up to 32, that holds most of these samples, and its amplitude in rad.
-    pub fn strongest_order(&self, samples: &[Sample]) -> (u32, f64) {
+    pub(crate) fn strongest_order(&self, samples: &[Sample]) -> (u32, f64) {
         let count = samples.len().max(1) as f64;
         let mean = samples.iter().map(|sample| sample.error_rad).sum::<f64>() / count;
         let amplitude = |order: u32| {

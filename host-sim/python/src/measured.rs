@@ -224,7 +224,7 @@ pub fn diagnose<'py>(
 fn with_kernels<'a>(subject: Subject<'a>, path: &Path) -> Result<Subject<'a>, Failure> {
     let named = |what: String| Failure::bad(format!("{}: {what}", path.display()));
     let text = std::fs::read_to_string(path).map_err(|error| named(error.to_string()))?;
-    let kernels = Kernels::from_json(&text).map_err(named)?;
+    let kernels = Kernels::from_json(&text).map_err(|problem| named(problem.to_string()))?;
     subject.with_kernels(kernels).map_err(|error| named(error.to_string()))
 }
 

@@ -41,7 +41,7 @@ impl Watch {
     }
 
     /// The same for work that does not ask whether it should stop: it is unwound from here.
-    pub fn tell_or_unwind(&self, done: usize, total: usize, note: String) {
+    pub(crate) fn tell_or_unwind(&self, done: usize, total: usize, note: String) {
         if self.tell(done, total, note).is_break() {
             resume_unwind(Box::new(Stopped));
         }

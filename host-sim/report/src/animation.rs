@@ -49,7 +49,7 @@ pub struct WheelMotion {
 }
 
 /// Rows of [`Animation::forces`].
-pub const FORCE_ROWS: usize = 10;
+pub(crate) const FORCE_ROWS: usize = 10;
 
 /// A drive over one pitch of steady motion.
 #[derive(Debug, Clone)]

@@ -71,7 +71,7 @@ fn torque_text(torque_n_m: f32) -> String {
 }
 
 /// A subject with what is derived from it.
-struct Known<'a> {
+struct DriveKnown<'a> {
     subject: Subject<'a>,
     drive: &'a Drive,
     /// Temperature of curves, °C: the drive's reference, within the table's range.
@@ -81,11 +81,11 @@ struct Known<'a> {
     largest_error: f64,
 }
 
-impl<'a> Known<'a> {
-    fn new(subject: Subject<'a>, drive: &'a Drive) -> Known<'a> {
+impl<'a> DriveKnown<'a> {
+    fn new(subject: Subject<'a>, drive: &'a Drive) -> DriveKnown<'a> {
         let [cold, warm] = subject.table.temperature_range_c();
         let temperature = (drive.temperature.reference_c as f32).clamp(cold, warm);
-        let mut known = Known { subject, drive, temperature, fresh: None, largest_error: 0.0 };
+        let mut known = DriveKnown { subject, drive, temperature, fresh: None, largest_error: 0.0 };
         known.fresh = known.check_fresh();
         known.largest_error = known
             .torques()
@@ -346,14 +346,14 @@ fn reversal(v: &Validation) -> Lines {
 /// The page.
 pub fn drive_report(sources: Sources<'_>) -> Page {
     let Sources { drive, command_name, command, inputs, subjects } = sources;
-    let known: Vec<Known<'_>> = subjects.into_iter().map(|subject| Known::new(subject, drive)).collect();
+    let known: Vec<DriveKnown<'_>> = subjects.into_iter().map(|subject| DriveKnown::new(subject, drive)).collect();
     let (status, remarks) = judge(&known);
     let validated = known.iter().any(|k| k.subject.validation.is_some());
     let mut sections = vec![comparison(&known, validated), motion_section(&known)];
     if validated {
         sections.push(validation_section(&known));
     }
-    let sheet = |k: &Known<'_>| k.subject.info.and_then(|info| Some((k.id(), info.data_sheet.clone()?)));
+    let sheet = |k: &DriveKnown<'_>| k.subject.info.and_then(|info| Some((k.id(), info.data_sheet.clone()?)));
     let mut sheets = sheet_section(known.iter().filter_map(sheet).collect());
     if let Some(section) = &mut sheets {
         section.blocks.push(Block::paragraph(format!("The JSON of a table has stiffness, too: {TWO_SETS_OF_K}.")));
@@ -409,7 +409,7 @@ pub fn drive_report(sources: Sources<'_>) -> Page {
         remarks,
         choices: known.iter().map(|k| Choice { id: k.id(), name: k.subject.kind.in_words().to_owned() }).collect(),
         choice_is: "Generator",
-        headlines: known.iter().map(Known::headline).collect(),
+        headlines: known.iter().map(DriveKnown::headline).collect(),
         sections,
         animations: known.into_iter().filter_map(|k| k.subject.animation.ok()).collect(),
         provenance,
@@ -418,7 +418,7 @@ pub fn drive_report(sources: Sources<'_>) -> Page {
 }
 
 /// Whether the page can be relied on, and what to know before one does.
-fn judge(known: &[Known<'_>]) -> (Status, Vec<String>) {
+fn judge(known: &[DriveKnown<'_>]) -> (Status, Vec<String>) {
     let mut status = Status::Good;
     let mut remarks = Vec::new();
     let mut remark = |worse: Status, words: String| {
@@ -480,7 +480,7 @@ fn as_written(info: &TableInfo) -> Value {
     serde_json::to_string(info).and_then(|text| serde_json::from_str(&text)).expect("plain values")
 }
 
-fn result_of(k: &Known<'_>) -> Value {
+fn result_of(k: &DriveKnown<'_>) -> Value {
     let [rms, worst] = k.fresh.map_or([None; 2], |pair| pair.map(Some));
     json!({
         "generator": k.subject.kind.to_string(),
@@ -502,8 +502,8 @@ fn result_of(k: &Known<'_>) -> Value {
 }
 
 /// Stress over three meshes, where it was asked for.
-fn stress_section(known: &[Known<'_>]) -> Option<Section> {
-    let block = |k: &Known<'_>| {
+fn stress_section(known: &[DriveKnown<'_>]) -> Option<Section> {
+    let block = |k: &DriveKnown<'_>| {
         let info = k.subject.info.filter(|info| !info.stress.is_empty())?;
         let number = |value: f64| Text::new(significant(value, 3));
         let rows = info.stress.iter().map(|stress| {
@@ -523,7 +523,7 @@ fn stress_section(known: &[Known<'_>]) -> Option<Section> {
     (!blocks.is_empty()).then_some(Section { id, title, detail: Detail::Summary, blocks })
 }
 
-fn comparison(known: &[Known<'_>], validated: bool) -> Section {
+fn comparison(known: &[DriveKnown<'_>], validated: bool) -> Section {
     let rows = known.iter().map(|k| {
         let error = |arcsec: f64, digits| Text::default().error(arcsec, digits);
         let [_, highest] = k.subject.table.torque_range_n_m();
@@ -602,16 +602,16 @@ fn comparison(known: &[Known<'_>], validated: bool) -> Section {
 }
 
 /// The load, stretched about the drag, where the loaded flank changes.
-fn load_axis(known: &[Known<'_>]) -> Axis {
+fn load_axis(known: &[DriveKnown<'_>]) -> Axis {
     let drag = known.first().map_or(0.02, |k| k.drive.output.drag_torque_n_m);
     Axis::new("Load torque (stretched about zero)", Quantity::Torque).stretched(drag.max(1e-3))
 }
 
-fn charts(known: &[Known<'_>], of: impl Fn(&Known<'_>) -> Option<Lines>) -> Vec<(String, Lines)> {
+fn charts(known: &[DriveKnown<'_>], of: impl Fn(&DriveKnown<'_>) -> Option<Lines>) -> Vec<(String, Lines)> {
     known.iter().filter_map(|k| Some((k.id(), of(k)?))).collect()
 }
 
-fn motion_section(known: &[Known<'_>]) -> Section {
+fn motion_section(known: &[DriveKnown<'_>]) -> Section {
     let ripple = Figure {
         id: "ripple".into(),
         title: "Error over one tooth pitch, less its mean".into(),
@@ -650,7 +650,7 @@ fn motion_section(known: &[Known<'_>]) -> Section {
     Section { id: "motion".into(), title: "The drive at work".into(), detail: Detail::Summary, blocks }
 }
 
-fn validation_section(known: &[Known<'_>]) -> Section {
+fn validation_section(known: &[DriveKnown<'_>]) -> Section {
     let of = |kind: &'static str, over: fn(&Point) -> f64| {
         charts(known, move |k| k.subject.validation.map(|v| misses(v, kind, over)))
     };
@@ -716,7 +716,7 @@ fn validation_section(known: &[Known<'_>]) -> Section {
     Section { id: "validation".into(), title: "Against fresh FEM".into(), detail: Detail::Summary, blocks }
 }
 
-fn table_section(known: &[Known<'_>]) -> Section {
+fn table_section(known: &[DriveKnown<'_>]) -> Section {
     let mut blocks = vec![
         Block::Figure(Figure {
             id: "play".into(),
@@ -802,7 +802,7 @@ fn table_section(known: &[Known<'_>]) -> Section {
     Section { id: "table".into(), title: "The table".into(), detail: Detail::Engineering, blocks }
 }
 
-fn load_section(known: &[Known<'_>]) -> Section {
+fn load_section(known: &[DriveKnown<'_>]) -> Section {
     Section {
         id: "load".into(),
         title: "Load and stress".into(),

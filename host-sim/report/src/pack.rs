@@ -94,7 +94,7 @@ impl Packed {
     }
 
     /// The shape as the page has it.
-    pub fn shape_text(&self) -> String {
+    pub(crate) fn shape_text(&self) -> String {
         self.shape.iter().map(usize::to_string).collect::<Vec<_>>().join(",")
     }
 }

@@ -332,7 +332,7 @@ pub enum Quantity {
 
 impl Quantity {
     /// Unit as stored, for headings of CSV columns and static pictures.
-    pub fn stored_unit(self) -> &'static str {
+    pub(crate) fn stored_unit(self) -> &'static str {
         match self {
             Quantity::Error => "arcsec",
             Quantity::Degree => "°",
@@ -505,7 +505,7 @@ pub struct Page {
 }
 
 /// Version of the JSON block.
-pub const PAGE_SCHEMA: u32 = 1;
+pub(crate) const PAGE_SCHEMA: u32 = 1;
 
 /// What marks the JSON block of a page.
 const BLOCK: &str = "id=\"flexspline-report\">";

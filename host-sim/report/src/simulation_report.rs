@@ -76,7 +76,7 @@ fn plain(value: f64) -> String {
 }
 
 /// A run and what was seen of it.
-struct Known<'a> {
+struct RunKnown<'a> {
     drive: &'a Drive,
     kind: GeneratorKind,
     summary: &'a Summary,
@@ -99,7 +99,7 @@ pub fn simulation_report(
     let Simulation { rows, summary } = simulation;
     let motion = seen.passing.finish()?;
     let known =
-        Known { drive, kind, summary, rows, teeth: &seen.teeth, highest: &seen.highest, motion: motion.as_ref() };
+        RunKnown { drive, kind, summary, rows, teeth: &seen.teeth, highest: &seen.highest, motion: motion.as_ref() };
     let mut sections = vec![known.found()];
     sections.extend(summary.data_sheet.as_ref().and_then(|sheet| {
         let mut section = sheet_section(vec![(kind.to_string(), sheet.clone())])?;
@@ -126,7 +126,7 @@ pub fn simulation_report(
     })
 }
 
-impl Known<'_> {
+impl RunKnown<'_> {
     fn headline(&self) -> Headline {
         let (summary, name) = (self.summary, self.kind.in_words());
         let ripples = |text: Text| match summary.kinematic_error_pp_arcsec {

@@ -15,13 +15,13 @@ use thiserror::Error;
 use flexspline_base::output::{OutputError, write_whole};
 
 /// Where the results of jobs lie.
-pub const JOBS: &str = "bench";
+pub(crate) const JOBS: &str = "bench";
 /// Characters of a name, at most: a guess, and far below what file systems take.
 const LONGEST_NAME: usize = 100;
 /// Limit of the folders that a name may lead through: `bench/NAME/extended` and one more.
 const DEEPEST: usize = 5;
 /// Bytes of a file that is sent or received, at most: a guess; logs of an hour at 1 kHz have 200 MB.
-pub const LARGEST_FILE: u64 = 256 << 20;
+pub(crate) const LARGEST_FILE: u64 = 256 << 20;
 /// Bytes received in one run, at most: a guess.
 const MOST_BYTES: u64 = 4 << 30;
 /// Files received in one run, at most: a guess.
@@ -86,7 +86,7 @@ pub struct Entry {
 }
 
 /// Whether this is one plain word.
-pub fn is_plain(word: &str) -> bool {
+pub(crate) fn is_plain(word: &str) -> bool {
     let allowed = |c: char| c.is_ascii_alphanumeric() || matches!(c, '.' | '_' | '-');
     let begins = word.chars().next().is_some_and(|c| c.is_ascii_alphanumeric());
     begins && word.len() <= LONGEST_NAME && word.chars().all(allowed) && !word.ends_with('.')

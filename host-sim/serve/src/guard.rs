@@ -25,7 +25,7 @@ pub const RESULT_POLICY: &str = "sandbox allow-scripts allow-downloads allow-mod
                                  'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; frame-ancestors \
                                  'self'";
 /// What any other file may: nothing.
-pub const FILE_POLICY: &str = "sandbox; default-src 'none'";
+pub(crate) const FILE_POLICY: &str = "sandbox; default-src 'none'";
 
 /// The token of one run, and where the server listens.
 #[derive(Debug, Clone)]
@@ -83,7 +83,7 @@ impl Guard {
     }
 
     /// Whether this is the token of this run; takes the same time whatever is wrong with it.
-    pub fn is_token(&self, found: &str) -> bool {
+    pub(crate) fn is_token(&self, found: &str) -> bool {
         let same = found.bytes().zip(self.token.bytes()).fold(0, |all, (a, b)| all | (a ^ b));
         found.len() == self.token.len() && same == 0
     }
@@ -97,7 +97,7 @@ impl Guard {
     ///
     /// # Errors
     /// `Host`, `Origin` or `Sec-Fetch-Site` say otherwise.
-    pub fn check_place(&self, method: &Method, headers: &HeaderMap) -> Result<(), NoEntry> {
+    pub(crate) fn check_place(&self, method: &Method, headers: &HeaderMap) -> Result<(), NoEntry> {
         let only = |name: HeaderName| {
             let mut all = headers.get_all(name).iter();
             (all.next().and_then(|value| value.to_str().ok()), all.next().is_some())
@@ -127,7 +127,7 @@ impl Guard {
     ///
     /// # Errors
     /// It has not.
-    pub fn check_token(&self, headers: &HeaderMap) -> Result<(), NoEntry> {
+    pub(crate) fn check_token(&self, headers: &HeaderMap) -> Result<(), NoEntry> {
         let name = self.cookie_name();
         let cookies = headers.get_all(header::COOKIE).iter().filter_map(|value| value.to_str().ok());
         let found = cookies
@@ -147,7 +147,7 @@ pub fn refusal(refusal: NoEntry) -> Response<Body> {
 }
 
 /// Puts on an answer what every answer has: nothing is kept, guessed, framed or told to others.
-pub fn harden(headers: &mut HeaderMap) {
+pub(crate) fn harden(headers: &mut HeaderMap) {
     let every = [
         (header::CACHE_CONTROL, "no-store"),
         (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),

@@ -28,7 +28,7 @@ use process::{ProcessEnd, Running};
 pub use record::{JobRecord, Progress, State};
 
 /// Jobs that wait, at most: a guess; a person does not queue more.
-pub const MOST_WAITING: usize = 32;
+pub(crate) const MOST_WAITING: usize = 32;
 /// Records that are kept in view: a guess.
 const MOST_KEPT: usize = 500;
 /// Short jobs over that keep their folders (a guess); of older ones, which were looks and single pitches, they are
@@ -53,7 +53,7 @@ pub enum JobError {
 
 /// The two lines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Line {
+enum JobLine {
     Short,
     Long,
 }
@@ -69,10 +69,10 @@ struct Inside {
 }
 
 impl Inside {
-    fn line(&mut self, line: Line) -> &mut VecDeque<u64> {
+    fn line(&mut self, line: JobLine) -> &mut VecDeque<u64> {
         match line {
-            Line::Short => &mut self.short,
-            Line::Long => &mut self.long,
+            JobLine::Short => &mut self.short,
+            JobLine::Long => &mut self.long,
         }
     }
 }
@@ -125,7 +125,7 @@ impl Jobs {
             something: Condvar::new(),
             changes: watch::Sender::new(1),
         });
-        for line in [Line::Short, Line::Long] {
+        for line in [JobLine::Short, JobLine::Long] {
             for _ in 0..at_a_time.max(1) {
                 let jobs = jobs.clone();
                 thread::spawn(move || jobs.work(line));
@@ -164,7 +164,7 @@ impl Jobs {
     /// It makes no command, too much waits, or there is nowhere to write to.
     pub fn add(&self, work: WorkAsked) -> Result<JobRecord, JobError> {
         let mut inside = self.lock();
-        let line = if work.is_short() { Line::Short } else { Line::Long };
+        let line = if work.is_short() { JobLine::Short } else { JobLine::Long };
         if inside.short.len() + inside.long.len() >= MOST_WAITING {
             return Err(JobError::Full);
         }
@@ -180,7 +180,7 @@ impl Jobs {
             printed_to: words.printed_to.map(str::to_owned),
             out,
             state: State::Waiting,
-            short: line == Line::Short,
+            short: line == JobLine::Short,
             begun_s: None,
             ended_s: None,
             wall_ms: None,
@@ -256,7 +256,7 @@ impl Jobs {
     }
 
     /// A line at work, until all is over.
-    fn work(&self, line: Line) {
+    fn work(&self, line: JobLine) {
         while let Some(id) = self.next_of(line) {
             self.run(id);
             self.changed();
@@ -264,7 +264,7 @@ impl Jobs {
     }
 
     /// The next job of a line, when there is one; none when all is over.
-    fn next_of(&self, line: Line) -> Option<u64> {
+    fn next_of(&self, line: JobLine) -> Option<u64> {
         let mut inside = self.lock();
         loop {
             if inside.over {

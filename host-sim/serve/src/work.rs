@@ -255,7 +255,7 @@ impl WorkAsked {
     /// # Errors
     /// A name is no plain one, a file is not there, or a number is none.
     pub fn words(&self, folder: &Folder, out: &str) -> Result<Words, WorkError> {
-        let mut words = Line { folder, arguments: vec![self.name().to_owned()] };
+        let mut words = CommandLine { folder, arguments: vec![self.name().to_owned()] };
         let mut printed_to = None;
         match self {
             WorkAsked::Look { files } => {
@@ -355,12 +355,12 @@ impl WorkAsked {
 }
 
 /// The words of a command while they are put together.
-struct Line<'a> {
+struct CommandLine<'a> {
     folder: &'a Folder,
     arguments: Vec<String>,
 }
 
-impl Line<'_> {
+impl CommandLine<'_> {
     fn word(&mut self, word: &str) {
         self.arguments.push(word.to_owned());
     }

@@ -176,7 +176,7 @@ impl Calibrate {
             put_plan(further, out, &mut outputs)?;
         }
         outputs.finish()?;
-        let said = Said { calibration: &made.calibration, more: further.as_ref() };
+        let said = CalibrationReport { calibration: &made.calibration, more: further.as_ref() };
         context.print(&said, || {
             let more = further.as_ref().map_or_else(String::new, |further| format!("\n{}", planned_text(further, out)));
             text(&made, out, !self.no_report) + &more + &say::next(&self.next(out))
@@ -249,7 +249,7 @@ impl Calibrate {
 
 /// What `--json` prints: the calibration, and what to add.
 #[derive(serde::Serialize)]
-struct Said<'a> {
+struct CalibrationReport<'a> {
     #[serde(flatten)]
     calibration: &'a Calibration,
     #[serde(skip_serializing_if = "Option::is_none")]

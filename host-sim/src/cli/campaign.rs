@@ -38,11 +38,11 @@ Examples:
 Every shard that is there and sound is skipped; a damaged one is computed anew.")]
 pub(super) struct CampaignCommand {
     #[command(subcommand)]
-    step: Step,
+    step: CampaignStep,
 }
 
 #[derive(Debug, Subcommand)]
-enum Step {
+enum CampaignStep {
     Plan(PlanCommand),
     Run(RunCommand),
     Reduce(ReduceCommand),
@@ -115,30 +115,30 @@ enum Which {
 }
 
 impl FromStr for Which {
-    type Err = String;
+    type Err = &'static str;
 
-    fn from_str(text: &str) -> Result<Which, String> {
+    fn from_str(text: &str) -> Result<Which, Self::Err> {
         if text == "all" {
             return Ok(Which::All);
         }
-        text.parse().map(Which::One).map_err(|_| "allowed: a number from 0, or all".to_owned())
+        text.parse().map(Which::One).map_err(|_| "allowed: a number from 0, or all")
     }
 }
 
 impl CampaignCommand {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         match &self.step {
-            Step::Plan(step) => step.run(context),
-            Step::Run(step) => step.run(context),
-            Step::Reduce(step) => step.run(context),
+            CampaignStep::Plan(step) => step.run(context),
+            CampaignStep::Run(step) => step.run(context),
+            CampaignStep::Reduce(step) => step.run(context),
         }
     }
 }
 
 fn of_plan(error: PlanError) -> Failure {
     match error {
-        PlanError::BadInput(what) => Failure::BadInput(what),
         PlanError::Failed(what) => Failure::Failed(what),
+        refused => Failure::BadInput(refused.to_string()),
     }
 }
 
@@ -156,7 +156,7 @@ fn short(hash: &[u8; 32]) -> String {
 
 /// What `plan --json` prints.
 #[derive(Serialize)]
-struct Planned<'a> {
+struct PlanReport<'a> {
     schema_version: u32,
     plan_hash: String,
     drive: &'a str,
@@ -195,7 +195,7 @@ impl PlanCommand {
                 Failure::BadInput(what) | Failure::Failed(what) => what.trim_start_matches("drive: ").to_owned(),
             })
         })
-        .map_err(Failure::BadInput)?;
+        .map_err(of_plan)?;
         let out = context.out()?;
         let settings = PlanSettings {
             drives: self.drives,
@@ -218,7 +218,7 @@ impl PlanCommand {
         keeps_other_shards(out, &text)?;
         prepare_folder(&out.join("shards"))?;
         write_whole(&path, |to| to.write_all(text.as_bytes()))?;
-        let told = Planned {
+        let told = PlanReport {
             schema_version: 1,
             plan_hash: short(&hash),
             drive: &tolerances.drive.name,

@@ -221,7 +221,7 @@ fn kernels(path: &Path) -> Result<Option<Kernels>, Failure> {
         return Ok(None);
     }
     let text = std::fs::read_to_string(path).map_err(|error| bad(error.to_string()))?;
-    Kernels::from_json(&text).map_err(bad).map(Some)
+    Kernels::from_json(&text).map_err(|problem| bad(problem.to_string())).map(Some)
 }
 
 /// The first lines of a file that was written here.

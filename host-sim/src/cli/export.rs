@@ -153,7 +153,7 @@ impl Format {
 
 /// Result with `--json`.
 #[derive(Serialize)]
-struct Exported {
+struct ExportReport {
     schema_version: u32,
     written: Vec<PathBuf>,
 }
@@ -179,7 +179,7 @@ impl Export {
             _ => Vec::new(),
         };
         let text = format!("wrote {}{}", all.join(", "), say::next(&next));
-        context.print(&Exported { schema_version: 1, written }, || text)
+        context.print(&ExportReport { schema_version: 1, written }, || text)
     }
 
     /// Refuses options that the format has no use for, and numbers that are none.

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::context::image_file;
 use super::{Context, Failure, fly};
 use flexspline_base::output::write_whole;
-use flexspline_export::fmu::{Fmu, compensation, find_libraries, joint};
+use flexspline_export::fmu::{Fmu, FmuExportError, compensation, find_libraries, joint};
 
 /// The scenario of a joint where none is named.
 const USUAL_SCENARIO: &str = "antenna";
@@ -19,7 +19,7 @@ pub(super) struct FmuOptions {
     /// What the FMU simulates: compensation (the core over its table) or joint (motor, servo, drive and load) [default:
     /// compensation]
     #[arg(long, value_enum, value_name = "MODEL", help_heading = "FMU", hide_possible_values = true)]
-    model: Option<Model>,
+    model: Option<FmuModel>,
     /// Masses, friction, servo and expected load of a joint: antenna, rover, camera, telescope, or a TOML file
     /// [default: antenna]
     #[arg(long, value_name = "SCENARIO", help_heading = "FMU", value_hint = ValueHint::FilePath)]
@@ -30,14 +30,14 @@ pub(super) struct FmuOptions {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Model {
+enum FmuModel {
     Compensation,
     Joint,
 }
 
 /// Result with `--json`.
 #[derive(Serialize)]
-struct Exported {
+struct FmuReport {
     schema_version: u32,
     written: Vec<PathBuf>,
     model: &'static str,
@@ -74,7 +74,7 @@ impl FmuOptions {
             )));
         }
         let fmu = self.fmu(tables)?;
-        let libraries = find_libraries(&self.library).map_err(Failure::BadInput)?;
+        let libraries = find_libraries(&self.library).map_err(|error| Failure::BadInput(error.to_string()))?;
         let resources = fmu.resources();
         let file = context.out()?.join(format!("{}.fmu", resources.kind.identifier()));
         write_whole(&file, |out| fmu.write(out, &libraries))?;
@@ -86,7 +86,7 @@ impl FmuOptions {
             resources.table_id,
             platforms.join(", ")
         );
-        let exported = Exported {
+        let exported = FmuReport {
             schema_version: 1,
             written: vec![file],
             model: resources.kind.name(),
@@ -99,19 +99,19 @@ impl FmuOptions {
 
     fn fmu(&self, tables: Option<&Path>) -> Result<Fmu, Failure> {
         let image = tables.map(image_file).transpose()?;
-        let of_table = |error: String| {
+        let of_table = |error: FmuExportError| {
             let file = tables.map_or("scenario".to_owned(), |file| file.display().to_string());
             Failure::BadInput(format!("{file}: {error}"))
         };
-        match (self.model.unwrap_or(Model::Compensation), image) {
-            (Model::Compensation, _) if self.scenario.is_some() => Err(Failure::BadInput(
+        match (self.model.unwrap_or(FmuModel::Compensation), image) {
+            (FmuModel::Compensation, _) if self.scenario.is_some() => Err(Failure::BadInput(
                 "--scenario: the compensation alone has no mass; allowed with --model joint".to_owned(),
             )),
-            (Model::Compensation, None) => Err(Failure::BadInput(
+            (FmuModel::Compensation, None) => Err(Failure::BadInput(
                 "--tables: missing; needed for the compensation: an image as flexspline tables writes it".to_owned(),
             )),
-            (Model::Compensation, Some(image)) => compensation(image).map_err(of_table),
-            (Model::Joint, image) => {
+            (FmuModel::Compensation, Some(image)) => compensation(image).map_err(of_table),
+            (FmuModel::Joint, image) => {
                 let flown = fly::scenario(self.scenario.as_deref().unwrap_or(USUAL_SCENARIO))?;
                 joint(&flown, image).map_err(of_table)
             }

@@ -78,7 +78,7 @@ enum Directions {
 
 /// Which of Beckhoff's controllers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Controller {
+enum BeckhoffController {
     /// MC_TableBasedPositionCompensation of TwinCAT NC
     Nc,
     /// Compensation value list kw.ssfk of TwinCAT CNC
@@ -117,7 +117,7 @@ pub(super) struct PlaybackOptions {
     comp_type: Option<u8>,
     /// Which of Beckhoff's controllers: nc or cnc [default: nc]
     #[arg(long, value_enum, value_name = "C", hide_possible_values = true)]
-    controller: Option<Controller>,
+    controller: Option<BeckhoffController>,
     /// Motor steps per degree of the output: onstepx, AXIS1_STEPS_PER_DEGREE [default: 12800]
     #[arg(long, value_name = "STEPS")]
     steps_per_degree: Option<f64>,
@@ -174,7 +174,7 @@ struct Played {
 }
 
 /// What a format comes to: its files, and its lookup if that is not the core.
-struct Made {
+struct FormatFiles {
     player: Option<Box<dyn Player>>,
     files: Vec<Written>,
     notes: Vec<String>,
@@ -359,9 +359,12 @@ impl PlaybackOptions {
         section: &Section<'_>,
         image: &[u8],
         origin: &Origin,
-    ) -> Result<Made, Failure> {
-        let of =
-            |player: Box<dyn Player>| Made { files: player.files(origin), notes: player.notes(), player: Some(player) };
+    ) -> Result<FormatFiles, Failure> {
+        let of = |player: Box<dyn Player>| FormatFiles {
+            files: player.files(origin),
+            notes: player.notes(),
+            player: Some(player),
+        };
         Ok(match format {
             EqmodFormat => {
                 let mount = EqmodMount {
@@ -379,7 +382,7 @@ impl PlaybackOptions {
                 let kind = if self.comp_type == Some(0) { CompType::Actual } else { CompType::Trim };
                 of(Box::new(LinuxCnc::fit(section, self.travel()?, self.points.unwrap_or(MAX_TRIPLETS), kind)?))
             }
-            Beckhoff if self.controller == Some(Controller::Cnc) => {
+            Beckhoff if self.controller == Some(BeckhoffController::Cnc) => {
                 if self.direction.is_some() {
                     return Err(Failure::BadInput(
                         "--direction: a list of the CNC has a column for each direction; allowed with --controller nc"
@@ -411,12 +414,12 @@ impl PlaybackOptions {
                 }
                 let name = self.table_name.as_deref().unwrap_or("FLEXSPLINE.TABLE");
                 let table = Cfs::new(image, name, self.spacecraft_id.unwrap_or(0), self.processor_id.unwrap_or(0))?;
-                Made { player: None, files: table.files(origin), notes: table.notes() }
+                FormatFiles { player: None, files: table.files(origin), notes: table.notes() }
             }
             FprimeFormat => {
                 let component = self.component.as_deref().unwrap_or("Ref.joint");
                 let parameters = Fprime::new(image, component, self.part_bytes.unwrap_or(500))?;
-                Made { player: None, files: parameters.files(origin), notes: parameters.notes() }
+                FormatFiles { player: None, files: parameters.files(origin), notes: parameters.notes() }
             }
         })
     }

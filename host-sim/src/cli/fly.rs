@@ -13,7 +13,7 @@ use super::{Failure, report};
 use flexspline_base::output::Outputs;
 use flexspline_base::suggest::did_you_mean;
 use flexspline_fly::fly::{
-    ByController, Flown, Results, SCENARIOS, VariedFlight, Vary, built_in, every, fly_varied, read, results,
+    ByController, Flown, FlyError, Results, SCENARIOS, VariedFlight, Vary, built_in, every, fly_varied, read, results,
 };
 use flexspline_report::flight_report;
 
@@ -94,7 +94,7 @@ impl Fly {
         let names = if self.scenario == "all" { SCENARIOS.to_vec() } else { vec![self.scenario.as_str()] };
         let mut flights = Vec::new();
         for name in names {
-            flights.extend(every(name, &text_of(name)?, &self.vary).map_err(Failure::BadInput)?);
+            flights.extend(every(name, &text_of(name)?, &self.vary).map_err(refused)?);
         }
         let out = context.out()?;
         let (progress, done) = (Mutex::new(context.progress("fly")), AtomicUsize::new(0));
@@ -171,7 +171,11 @@ fn table(flights: &[VariedFlight], out: &Path) -> String {
 
 /// The scenario of a name, or of a file.
 pub(super) fn scenario(name: &str) -> Result<Flown, Failure> {
-    read(name, &text_of(name)?).map_err(Failure::BadInput)
+    read(name, &text_of(name)?).map_err(refused)
+}
+
+fn refused(error: FlyError) -> Failure {
+    Failure::BadInput(error.to_string())
 }
 
 /// A scenario's file: of a name, one that only starts from it.

@@ -41,20 +41,20 @@ pub(super) struct KernelsCommand {
 
 /// What `--json` prints.
 #[derive(Serialize)]
-struct Report {
+struct KernelsReport {
     schema_version: u32,
-    kernels: Vec<Told>,
+    kernels: Vec<GeneratorReport>,
 }
 
-impl Report {
-    fn of(kernels: Vec<Told>) -> Report {
-        Report { schema_version: 1, kernels }
+impl KernelsReport {
+    fn of(kernels: Vec<GeneratorReport>) -> KernelsReport {
+        KernelsReport { schema_version: 1, kernels }
     }
 }
 
 /// What the command says of one generator.
 #[derive(Serialize)]
-struct Told {
+struct GeneratorReport {
     generator: String,
     file: String,
     /// Response to a second harmonic of the pitch of either wheel at the lightest and the heaviest load, arcsec per µm.
@@ -100,7 +100,7 @@ impl KernelsCommand {
                 let (low, high) = around.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), e| (l.min(e), h.max(e)));
                 high - low
             };
-            told.push(Told {
+            told.push(GeneratorReport {
                 generator: kind.to_string(),
                 file: path.display().to_string(),
                 second_harmonic_arcsec_per_um: [Wheel::Flexspline, Wheel::CircularSpline]
@@ -112,7 +112,7 @@ impl KernelsCommand {
         }
         drop(progress);
         outputs.finish()?;
-        let told = Report::of(told);
+        let told = KernelsReport::of(told);
         context.print(&told, || {
             let texts: Vec<String> = told.kernels.iter().map(text).collect();
             let next =
@@ -125,7 +125,7 @@ impl KernelsCommand {
     }
 }
 
-fn text(told: &Told) -> String {
+fn text(told: &GeneratorReport) -> String {
     let [light, heavy] = told.torque_n_m;
     let [fs, cs] = told.second_harmonic_arcsec_per_um;
     let [at_light, at_heavy] = told.eccentricity_pp_arcsec;
@@ -143,7 +143,7 @@ mod tests {
 
     #[test]
     fn json_is_one_object_with_an_entry_for_each_generator() {
-        let told = Told {
+        let told = GeneratorReport {
             generator: "cam".into(),
             file: "out/cam.kernels.json".into(),
             second_harmonic_arcsec_per_um: [[4.2; 2]; 2],
@@ -151,7 +151,7 @@ mod tests {
             eccentricity_um: 5.0,
             torque_n_m: [2.0, 100.0],
         };
-        let json = serde_json::to_value(Report::of(vec![told])).unwrap();
+        let json = serde_json::to_value(KernelsReport::of(vec![told])).unwrap();
         assert!(json.is_object());
         assert_eq!((json["schema_version"].as_u64(), json["kernels"][0]["generator"].as_str()), (Some(1), Some("cam")));
     }

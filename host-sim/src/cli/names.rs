@@ -1,8 +1,8 @@
 //! Options that take one of a few names: an error says what is allowed and what may have been meant, and a shell
 //! completes them.
 
+use std::error::Error;
 use std::ffi::OsStr;
-use std::fmt::Display;
 use std::str::FromStr;
 
 use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
@@ -12,11 +12,13 @@ use flexspline_mechanics::drive::GeneratorKind;
 use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_mechanics::stepping::Method;
 
+type BoxedError = Box<dyn Error + Send + Sync>;
+
 /// Reads one of `names`.
 #[derive(Clone)]
 pub(super) struct Named<T> {
     names: Vec<&'static str>,
-    read: fn(&str) -> Result<T, String>,
+    read: fn(&str) -> Result<T, BoxedError>,
 }
 
 impl<T: Clone + Send + Sync + 'static> TypedValueParser for Named<T> {
@@ -33,8 +35,8 @@ impl<T: Clone + Send + Sync + 'static> TypedValueParser for Named<T> {
 }
 
 /// These names, read as the type reads them.
-fn of<T: FromStr<Err: Display>>(names: impl IntoIterator<Item = &'static str>) -> Named<T> {
-    Named { names: names.into_iter().collect(), read: |text| text.parse().map_err(|error: T::Err| error.to_string()) }
+fn of<T: FromStr<Err: Error + Send + Sync + 'static>>(names: impl IntoIterator<Item = &'static str>) -> Named<T> {
+    Named { names: names.into_iter().collect(), read: |text| Ok(text.parse::<T>()?) }
 }
 
 /// One wave generator.
@@ -44,12 +46,12 @@ pub(super) fn generator() -> Named<GeneratorKind> {
 
 /// A mesh level.
 pub(super) fn mesh() -> Named<MeshLevel> {
-    of(["coarse", "standard", "fine"])
+    of(MeshLevel::NAMES)
 }
 
 /// A solver.
 pub(super) fn solver() -> Named<Method> {
-    of(["reference", "fast"])
+    of(Method::NAMES)
 }
 
 /// One wave generator, or all of them.
@@ -63,14 +65,14 @@ pub(super) fn generators() -> Named<Generators> {
     Named { names, read: read_generators }
 }
 
-fn read_generators(name: &str) -> Result<Generators, String> {
+fn read_generators(name: &str) -> Result<Generators, BoxedError> {
     if name == "all" {
         return Ok(Generators(GeneratorKind::ALL.to_vec()));
     }
     name.parse().map(|kind| Generators(vec![kind])).map_err(|_| {
         let known = GeneratorKind::ALL.map(GeneratorKind::name);
         let hint = did_you_mean("; ", name, known.into_iter().chain(["all"]));
-        format!("generator {name:?} is not known; allowed: {}, all{hint}", known.join(", "))
+        format!("generator {name:?} is not known; allowed: {}, all{hint}", known.join(", ")).into()
     })
 }
 
@@ -80,7 +82,7 @@ mod tests {
 
     #[test]
     fn misspelt_names_get_a_suggestion_and_garbage_gets_none() {
-        let said = |found: &str| (generator().read)(found).unwrap_err();
+        let said = |found: &str| (generator().read)(found).unwrap_err().to_string();
         for (found, meant) in [
             ("two_roller", "two-roller"),
             ("tworoller", "two-roller"),
@@ -92,10 +94,10 @@ mod tests {
             assert!(said(found).ends_with(&format!("; did you mean `{meant}`?")), "{}", said(found));
         }
         assert!(said("cog").ends_with("allowed: two-roller, four-roller, double-disc, cam"));
-        assert!(read_generators("al").unwrap_err().ends_with("cam, all; did you mean `all`?"));
-        assert!((mesh().read)("course").unwrap_err().ends_with("did you mean `coarse`?"));
-        assert!((mesh().read)("huge").unwrap_err().ends_with("fine"));
-        assert!((solver().read)("refrence").unwrap_err().ends_with("did you mean `reference`?"));
+        assert!(read_generators("al").unwrap_err().to_string().ends_with("cam, all; did you mean `all`?"));
+        assert!((mesh().read)("course").unwrap_err().to_string().ends_with("did you mean `coarse`?"));
+        assert!((mesh().read)("huge").unwrap_err().to_string().ends_with("fine"));
+        assert!((solver().read)("refrence").unwrap_err().to_string().ends_with("did you mean `reference`?"));
     }
 
     #[test]

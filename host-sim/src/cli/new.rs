@@ -42,7 +42,7 @@ pub(super) struct New {
     file: PathBuf,
     /// What to write [default: nominal if the file is called so, else drive]
     #[arg(long, value_enum)]
-    kind: Option<Kind>,
+    kind: Option<NewKind>,
     /// The drive to start from, a built-in one or a file; the same as --drive [default: HHD-95]
     #[arg(long, value_name = "FILE|NAME", value_hint = ValueHint::FilePath)]
     from: Option<String>,
@@ -78,7 +78,7 @@ pub(super) struct New {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
 #[serde(rename_all = "snake_case")]
-enum Kind {
+enum NewKind {
     /// A drive for the FEM
     Drive,
     /// A drive as its catalogue has it, without FEM
@@ -87,9 +87,9 @@ enum Kind {
 
 /// Result with `--json`.
 #[derive(Serialize)]
-struct Written {
+struct NewReport {
     schema_version: u32,
-    kind: Kind,
+    kind: NewKind,
     written: Vec<PathBuf>,
     /// Of the drive that a drive file holds.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -157,12 +157,14 @@ impl New {
         };
         self.check()?;
         let kind = self.kind.unwrap_or_else(|| self.kind_by_name());
-        let sized = self.like.as_deref().and_then(size_and_ratio).filter(|_| kind == Kind::Drive);
+        let sized = self.like.as_deref().and_then(size_and_ratio).filter(|_| kind == NewKind::Drive);
         let data_sheet = sized.and_then(|(series, size, ratio)| catalogue::nearest_sheet(series, size, ratio));
         let data_sheet = data_sheet.map(|(stated, _)| stated);
         let mut made = made;
         let under_load = match &mut made {
-            Some(made) if kind == Kind::Drive && !self.no_run => self.under_load(context, made, data_sheet.as_ref())?,
+            Some(made) if kind == NewKind::Drive && !self.no_run => {
+                self.under_load(context, made, data_sheet.as_ref())?
+            }
             _ => None,
         };
         let drive = match (&made, &self.from) {
@@ -176,7 +178,7 @@ impl New {
         };
         let shown = self.file.display().to_string();
         let file = quoted(&shown);
-        let own = made.as_ref().filter(|_| kind == Kind::Drive);
+        let own = made.as_ref().filter(|_| kind == NewKind::Drive);
         let teeth = own.map(|_| Clearance::of(&drive)).transpose();
         let teeth = teeth.map_err(|error| Failure::BadInput(error.to_string()))?;
         if let Some(teeth) = teeth.as_ref().filter(|_| drive.flexspline.profile == Profile::S) {
@@ -184,7 +186,7 @@ impl New {
         }
         let left_out = own.map_or_else(Vec::new, |_| left_out(&drive));
         let (text, drive_hash, next) = match kind {
-            Kind::Drive => {
+            NewKind::Drive => {
                 let hash = blake3::Hash::from_bytes(drive.hash()).to_hex().to_string();
                 let mut next = next_of(&file, teeth.as_ref(), self.generator);
                 let text = match own {
@@ -197,7 +199,7 @@ impl New {
                 let sheet = data_sheet.as_ref().map_or_else(|| TEMPLATE.to_owned(), Stated::to_toml);
                 (text + &sheet, Some(hash), next)
             }
-            Kind::Nominal => {
+            NewKind::Nominal => {
                 let next = vec![
                     format!("flexspline synthesize --model {file} --effect circular_spline_eccentricity --out try"),
                     format!("flexspline diagnose try/data.csv --model {file} --out try"),
@@ -207,7 +209,7 @@ impl New {
         };
         write_whole(&self.file, |out| out.write_all(text.as_bytes()))
             .map_err(|error| Failure::BadInput(error.to_string()))?;
-        let written = Written {
+        let written = NewReport {
             schema_version: 1,
             kind,
             written: vec![self.file.clone()],
@@ -220,21 +222,21 @@ impl New {
         };
         context.print(&written, || {
             let what = match kind {
-                Kind::Drive => format!(
+                NewKind::Drive => format!(
                     "the drive {}, every field explained; ratio {} with the flexspline held, as it is simulated, {} \
                      with the circular spline held",
                     drive.name,
                     drive.ratio(),
                     1.0 - drive.ratio()
                 ),
-                Kind::Nominal => "a catalogue model: put in the numbers of your drive".to_owned(),
+                NewKind::Nominal => "a catalogue model: put in the numbers of your drive".to_owned(),
             };
             format!("wrote {shown}: {what}{}{}", self.more(&written), say::next(&written.next))
         })
     }
 
     /// Teeth, data sheet and what is left out of a drive of one's own, a line each.
-    fn more(&self, written: &Written) -> String {
+    fn more(&self, written: &NewReport) -> String {
         let mut lines: Vec<String> = written.teeth.iter().map(Clearance::text).collect();
         lines.extend(written.under_load.iter().map(UnderLoad::text));
         match (&self.like, &written.data_sheet) {
@@ -253,7 +255,7 @@ impl New {
                     sheet.source.as_deref().unwrap_or("the catalogue")
                 ));
             }
-            (Some(name), None) if written.kind == Kind::Drive => lines.push(format!(
+            (Some(name), None) if written.kind == NewKind::Drive => lines.push(format!(
                 "[data_sheet] is empty, fill it in: the figures of {name} are not at hand; those of {} are",
                 catalogue::sizes_in_words()
             )),
@@ -411,9 +413,9 @@ impl New {
         )))
     }
 
-    fn kind_by_name(&self) -> Kind {
+    fn kind_by_name(&self) -> NewKind {
         let name = self.file.file_name().map(|name| name.to_string_lossy().to_lowercase()).unwrap_or_default();
-        if name.contains("nominal") { Kind::Nominal } else { Kind::Drive }
+        if name.contains("nominal") { NewKind::Nominal } else { NewKind::Drive }
     }
 
     /// Refuses a place where nothing may be written.

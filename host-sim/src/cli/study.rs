@@ -106,7 +106,7 @@ fn figures() -> String {
 
 /// What `--json` prints, and `study.json`.
 #[derive(Serialize)]
-struct Told<'a> {
+struct StudyReport<'a> {
     schema_version: u32,
     tool_version: &'static str,
     command: &'a str,
@@ -172,7 +172,7 @@ impl StudyCommand {
             settings.generators.iter().filter_map(|kind| nearest(&made.runs, keep, *kind)).collect();
         let remarks = remarks(&drive, &settings, &made);
         let count = |status| made.runs.iter().filter(|run| run.status == status).count();
-        let told = Told {
+        let told = StudyReport {
             schema_version: 1,
             tool_version: env!("CARGO_PKG_VERSION"),
             command: &context.command,
@@ -318,7 +318,7 @@ fn line(run: &Run) -> String {
 }
 
 /// The front of each generator, best first in the first target.
-fn text(told: &Told<'_>, settings: &StudySettings) -> String {
+fn text(told: &StudyReport<'_>, settings: &StudySettings) -> String {
     let study = told.study;
     let mut text = format!(
         "{}: {} runs, {} of them estimated; {} converged, {} failed, {} refused; {} meet what has to be kept\n",
@@ -377,7 +377,7 @@ fn firsts(runs: &[Run], kind: GeneratorKind) -> String {
 }
 
 /// What estimates of the targets are off by, and which rank nothing.
-fn how_far_to_trust(told: &Told<'_>, settings: &StudySettings, kind: GeneratorKind) -> String {
+fn how_far_to_trust(told: &StudyReport<'_>, settings: &StudySettings, kind: GeneratorKind) -> String {
     let of = |target: &Target| {
         told.study.trust.iter().find(|trust| trust.generator == kind && trust.figure == target.figure)
     };
@@ -410,7 +410,7 @@ fn figure_of(run: &Run, name: &str) -> String {
 
 /// Where not every variant has all that is asked: how many have each thing alone, and the variant that comes nearest if
 /// none has all.
-fn what_is_asked(told: &Told<'_>, settings: &StudySettings, kind: GeneratorKind) -> String {
+fn what_is_asked(told: &StudyReport<'_>, settings: &StudySettings, kind: GeneratorKind) -> String {
     let of_kind = || told.asked.iter().filter(|asked| asked.generator == kind);
     if settings.constraints.is_empty() && of_kind().all(|asked| asked.meet_alone == asked.of) {
         return String::new();

@@ -101,7 +101,7 @@ pub(super) struct Tables {
 
 /// What `--json` prints.
 #[derive(Serialize)]
-struct Report<'a> {
+struct TablesReport<'a> {
     schema_version: u32,
     status: &'static str,
     /// Generators without a table.
@@ -174,7 +174,7 @@ impl Tables {
         }
         outputs.finish()?;
         let spent = context.spent();
-        let report = Report {
+        let report = TablesReport {
             schema_version: 1,
             failed: failed.iter().map(|(kind, _)| kind.to_string()).collect(),
             status: page.as_ref().filter(|page| page.status.is_failure()).map_or("made", |page| page.status.name()),
@@ -350,7 +350,7 @@ pub(super) fn fresh_table(
     by_fem(context, drive, &[(kind, settings)]).remove(0)
 }
 
-fn text(report: &Report<'_>, out: &std::path::Path, with_page: bool) -> String {
+fn text(report: &TablesReport<'_>, out: &std::path::Path, with_page: bool) -> String {
     let mut text = String::from(
         "generator    table_id          bytes  torque N.m   backlash\"  wind-up\" at the ends   slope  worst \
          deviation\"\n",

@@ -67,7 +67,7 @@ pub(super) struct Validate {
 
 /// `validation.json`.
 #[derive(Serialize)]
-struct Report {
+struct ValidationReport {
     schema_version: u32,
     status: &'static str,
     rms_bound_arcsec: f64,
@@ -126,7 +126,7 @@ impl Validate {
             })
             .collect::<Result<Vec<Validation>, Failure>>()?;
         let passed = tables.iter().all(|table| table.status == "passed");
-        let report = Report {
+        let report = ValidationReport {
             schema_version: 1,
             status: if passed { "passed" } else { "bound missed" },
             rms_bound_arcsec: RMS_BOUND_ARCSEC,
@@ -177,7 +177,7 @@ impl Validate {
         context: &Context,
         drive: &Drive,
         images: &[(PathBuf, Vec<u8>)],
-        report: &Report,
+        report: &ValidationReport,
     ) -> Result<Page, Failure> {
         let failed = |error: &dyn std::fmt::Display| Failure::Failed(error.to_string());
         let mut tables = Vec::new();
@@ -224,7 +224,7 @@ fn page_path(out: &Path, tables: &Path) -> PathBuf {
     out.join(if same() == Some(true) { "validation.html" } else { "report.html" })
 }
 
-fn text(report: &Report, out: &Path, page: Option<&Path>) -> String {
+fn text(report: &ValidationReport, out: &Path, page: Option<&Path>) -> String {
     let mut text = String::from(
         "generator    table_id          points  rms\"    max\"    reversal rms\"  max\"    without table, rms\"\n",
     );

@@ -19,7 +19,7 @@ pub struct Conditions {
 }
 
 /// Figures of a drive by FEM, as columns of a shard have them.
-pub const FEM_FIGURES: [&str; 2] = ["fem_places_pp_arcsec", "fem_places_rms_arcsec"];
+pub(crate) const FEM_FIGURES: [&str; 2] = ["fem_places_pp_arcsec", "fem_places_rms_arcsec"];
 
 /// Error of a drive deformed afresh at each generator angle and loaded: peak to peak and root mean square, arcsec.
 pub fn figures(drive: &Drive, at: Conditions, angles_rad: impl Iterator<Item = f64>) -> Result<[f64; 2], SolveError> {

@@ -8,7 +8,7 @@ use flexspline_base::statistics::mean;
 use flexspline_mechanics::drive::{AsBuilt, Drive, DriveError, Harmonic, Wheel};
 
 /// Longest sequence of the crate `sobol_burley`.
-pub const MOST_DRIVES: u32 = 1 << 16;
+pub(crate) const MOST_DRIVES: u32 = 1 << 16;
 /// Half the spacing of its numbers, which are 0 to 1 − 2⁻²⁴: added, none of them is 0 or 1.
 const HALF_STEP: f64 = 1.0 / (1 << 25) as f64;
 
@@ -142,7 +142,7 @@ fn added_up(pitches: &[f64]) -> Vec<f64> {
 
 impl Drawn {
     /// Puts what places of the drive have into its imperfections.
-    pub fn deviate(&self, tolerances: &[Tolerance], built: &mut AsBuilt) {
+    pub(crate) fn deviate(&self, tolerances: &[Tolerance], built: &mut AsBuilt) {
         for (t, tolerance) in tolerances.iter().enumerate() {
             let (value, phase) = (self.values[t], self.phases_deg[t]);
             match tolerance.acts {

@@ -22,7 +22,8 @@ mod shard;
 mod tolerance;
 mod variance;
 
-pub use by_fem::{Conditions, FEM_FIGURES};
+pub use by_fem::Conditions;
+
 pub use draw::{Draw, Drawn};
 pub use flexspline_base::statistics::{Exceeded, Interval, Quantile};
 pub use model::{FIGURES, Model, Parabola, Response};

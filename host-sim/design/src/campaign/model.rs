@@ -51,14 +51,14 @@ pub const FIGURES: [&str; 21] = [
 ];
 /// Share of the places, %, where no play is left between the flanks: lost motion there is that of the elastic wind-up
 /// alone.
-pub const CLOSED: &str = "play_closed_percent";
+pub(crate) const CLOSED: &str = "play_closed_percent";
 /// Figures of a data sheet that follow what is alike everywhere.
-pub const SHEET: [&str; 6] =
+pub(crate) const SHEET: [&str; 6] =
     ["backlash_arcsec", "k1_n_m_per_rad", "k2_n_m_per_rad", "k3_n_m_per_rad", "wind_up_arcsec", "max_von_mises_mpa"];
 /// Samples of the wave over a tooth pitch.
 pub const WAVE: usize = 8;
 /// Numbers of the state of a drive that is alike everywhere: the wave under the load and under a light one, the sheet.
-pub const STATE: usize = 2 * WAVE + SHEET.len();
+pub(crate) const STATE: usize = 2 * WAVE + SHEET.len();
 /// Samples of a wheel's error over its pitch. Kernels have a multiple.
 const SAMPLES: usize = 4;
 /// Places over a turn of the output, at least and at most.
@@ -194,7 +194,7 @@ fn along(samples: &[f64], turns: f64) -> f64 {
 
 /// Where the drive stands: angles in turns.
 #[derive(Debug, Clone, Copy)]
-struct Place {
+struct DriveAngles {
     /// Of the generator, and on the circular spline.
     generator: f64,
     on_circular_spline: f64,
@@ -203,14 +203,14 @@ struct Place {
     circular_spline_direction: [f64; 2],
 }
 
-impl Place {
-    fn at(generator: f64, ratio: f64) -> Place {
+impl DriveAngles {
+    fn at(generator: f64, ratio: f64) -> DriveAngles {
         let on_circular_spline = generator * (1.0 - 1.0 / ratio);
         let direction = |turns: f64| {
             let angle = TAU * (turns - turns.floor());
             [libm::cos(angle), libm::sin(angle)]
         };
-        Place {
+        DriveAngles {
             generator,
             on_circular_spline,
             flexspline_direction: direction(generator),
@@ -251,8 +251,8 @@ pub struct Model {
     loads: [PlaceOfLoad; 2],
     /// The light load, N·m.
     light_n_m: f64,
-    places: Vec<Place>,
-    fem_places: Vec<Place>,
+    places: Vec<DriveAngles>,
+    fem_places: Vec<DriveAngles>,
     /// Cosine and sine of a turn in as many steps as there are places.
     circle: Vec<[f64; 2]>,
     nominal: Vec<[f64; 2]>,
@@ -281,7 +281,9 @@ impl Model {
             .chain(of_output(TABLE_ORDERS[2], 1.0))
             .collect();
         let count = places_that_tell_apart(&orders, PLACES, APART);
-        let even = |n: usize| -> Vec<Place> { (0..n).map(|j| Place::at(ratio * j as f64 / n as f64, ratio)).collect() };
+        let even = |n: usize| -> Vec<DriveAngles> {
+            (0..n).map(|j| DriveAngles::at(ratio * j as f64 / n as f64, ratio)).collect()
+        };
         let mut model = Model {
             tolerances: tolerances.to_vec(),
             teeth: kernels.teeth,
@@ -320,7 +322,7 @@ impl Model {
     }
 
     /// Generator angles of the drives by FEM, rad.
-    pub fn fem_angles_rad(&self) -> impl Iterator<Item = f64> {
+    pub(crate) fn fem_angles_rad(&self) -> impl Iterator<Item = f64> {
         self.fem_places.iter().map(|place| TAU * place.generator)
     }
 
@@ -366,14 +368,14 @@ impl Model {
     }
 
     /// Axis of the circular spline beside that of the flexspline, seen from the major axis, µm.
-    fn apart_at(apart: &[[f64; 2]; 3], place: &Place) -> [f64; 2] {
+    fn apart_at(apart: &[[f64; 2]; 3], place: &DriveAngles) -> [f64; 2] {
         let [x, y] = turned(apart[0], place.flexspline_direction);
         let [u, v] = turned(apart[1], place.circular_spline_direction);
         [x + u + apart[2][0], y + v + apart[2][1]]
     }
 
     /// Error of what is alike everywhere, arcsec.
-    fn wave_error(&self, curves: &Curves, place: &Place, load: usize) -> f64 {
+    fn wave_error(&self, curves: &Curves, place: &DriveAngles, load: usize) -> f64 {
         let (size, negative) = SIGNS[load];
         let in_pitch = place.generator * f64::from(self.teeth[0]);
         // Mirrored, the drive stands on the other side of its place and errs the other way.
@@ -381,7 +383,7 @@ impl Model {
     }
 
     /// Errors at a place under each of the [`SIGNS`], arcsec.
-    fn errors(&self, curves: &Curves, place: &Place) -> [f64; 4] {
+    fn errors(&self, curves: &Curves, place: &DriveAngles) -> [f64; 4] {
         let mut errors = std::array::from_fn(|load| self.wave_error(curves, place, load));
         for (w, turns) in [place.generator, place.on_circular_spline].into_iter().enumerate() {
             if let Some(fields) = &curves.wheels[w] {
@@ -522,6 +524,6 @@ pub(super) fn spread(values: &[f64]) -> (f64, f64) {
 }
 
 /// Whether a tolerance needs kernels of displaced axes.
-pub fn displaces(tolerance: &Tolerance) -> bool {
+pub(crate) fn displaces(tolerance: &Tolerance) -> bool {
     tolerance.acts == Acts::Directed && tolerance.field != "as_built.circular_spline_ovality_um"
 }

@@ -15,6 +15,7 @@ use super::model::{Model, Parabola, Response, SHEET, displaces};
 use super::tolerance::{Acts, Tolerance, Tolerances};
 use crate::data_sheet::{FIGURES, Loads, data_sheet};
 use crate::kernels::{KernelError, KernelPlan, Kernels, make};
+use flexspline_base::toml_file::{Problem, lines};
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_mechanics::stepping::{Method, SolveError, SolverSettings};
@@ -100,6 +101,9 @@ pub struct OfOne {
 /// Why there is no plan.
 #[derive(Debug, Error)]
 pub enum PlanError {
+    /// The file of tolerances: everything that is wrong with it.
+    #[error("{}", lines(.0))]
+    Tolerances(Vec<Problem>),
     /// The user has to change something.
     #[error("{0}")]
     BadInput(String),
@@ -315,7 +319,7 @@ impl Plan {
             return Err(told(what.to_owned()));
         }
         for one in &plan.generators {
-            one.kernels.check().map_err(told)?;
+            one.kernels.check().map_err(|problem| told(problem.to_string()))?;
             if !one.response.fits(plan.tolerances.len()) {
                 return Err(told("a response has not as many numbers as it should".to_owned()));
             }
@@ -375,7 +379,7 @@ mod tests {
     fn kernels_that_fail_name_the_tolerance_and_how_far_it_may_go() {
         let text = "drive = \"HHD-95\"\ngenerator = \"cam\"\ntorque_n_m = 5\n[[tolerance]]\nfield = \
                     \"as_built.circular_spline_eccentricity_um\"\ndistribution = \"rayleigh\"\nstd = 5\n";
-        let of = Tolerances::read("t.toml", text, |name| Drive::built_in(name).ok_or_else(String::new)).unwrap();
+        let of = Tolerances::read("t.toml", text, |name| Drive::built_in(name).ok_or("no drive")).unwrap();
         let reason = SolveError::NotConverged {
             generator_rad: 0.0,
             torque_n_m: 0.0,

@@ -96,10 +96,10 @@ pub fn path(folder: &Path, shard: u32) -> PathBuf {
 }
 
 /// The first two columns.
-pub const OWN_COLUMNS: [&str; 2] = ["drive", "generator"];
+pub(crate) const OWN_COLUMNS: [&str; 2] = ["drive", "generator"];
 
 /// Names of all columns but the first two.
-pub fn column_names(plan: &Plan) -> Vec<String> {
+pub(crate) fn column_names(plan: &Plan) -> Vec<String> {
     let values = plan.tolerances.iter().map(|t| t.name.clone());
     let phases = plan.tolerances.iter().filter_map(|t| t.phase_column());
     let figures = FIGURES.iter().chain(&FEM_FIGURES).map(|name| (*name).to_owned());

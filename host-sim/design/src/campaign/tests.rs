@@ -56,11 +56,11 @@ fn kernels() -> Kernels {
 }
 
 fn tolerances(text: &str) -> Tolerances {
-    Tolerances::read("t.toml", text, |name| Drive::built_in(name).ok_or_else(|| "no drive".to_owned())).unwrap()
+    Tolerances::read("t.toml", text, |name| Drive::built_in(name).ok_or("no drive")).unwrap()
 }
 
 fn refused(text: &str) -> String {
-    Tolerances::read("t.toml", text, |name| Drive::built_in(name).ok_or_else(|| "no drive".to_owned())).unwrap_err()
+    Tolerances::read("t.toml", text, |name| Drive::built_in(name).ok_or("no drive")).unwrap_err().to_string()
 }
 
 const ECCENTRIC: &str =

@@ -1,6 +1,6 @@
 //! The file of tolerances: a drive, its load, and what its drawing allows.
 
-use std::fmt;
+use std::fmt::{self, Display};
 
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
@@ -9,6 +9,7 @@ use toml::de::DeValue;
 use super::by_fem::FEM_FIGURES;
 use super::draw::Drawn;
 use super::model::FIGURES;
+use super::plan::PlanError;
 use super::shard::OWN_COLUMNS;
 use flexspline_base::statistics::{normal_cdf, normal_quantile};
 use flexspline_base::suggest::likeliest_path;
@@ -68,7 +69,7 @@ impl Tolerance {
     }
 
     /// The column of its phase.
-    pub fn phase_column(&self) -> Option<String> {
+    pub(crate) fn phase_column(&self) -> Option<String> {
         self.acts.has_phase().then(|| format!("{}, phase_deg", self.name))
     }
 }
@@ -222,16 +223,17 @@ fn told(value: f64) -> f64 {
 
 impl Acts {
     /// Whether a direction or a phase is drawn beside the size.
-    pub fn has_phase(self) -> bool {
+    pub(crate) fn has_phase(self) -> bool {
         matches!(self, Acts::Directed | Acts::Harmonic { .. })
     }
 
-    /// How a field acts; `order` where one is given.
-    fn of(field: &str, order: Option<u32>, errors: TeethError) -> Result<Acts, String> {
+    /// How the field `at` a place acts; `order` where one is given.
+    fn of(at: &Spanned<DeValue<'_>>, field: &str, order: Option<u32>, errors: TeethError) -> Result<Acts, Refused> {
+        let refused = |what| Err(Refused::because(at, what));
         let section_key = field.strip_prefix("as_built.");
         let harmonic = |wheel| match order {
             Some(order) => Ok(Acts::Harmonic { wheel, order }),
-            None => Err("order: missing; give the waves around the wheel".to_owned()),
+            None => refused("order: missing; give the waves around the wheel".to_owned()),
         };
         let acts = match section_key {
             Some("flexspline_pitch_harmonics") => return harmonic(Wheel::Flexspline),
@@ -248,19 +250,21 @@ impl Acts {
             Some(
                 "rim_thickness_harmonics" | "cam_form_harmonics" | "damaged_teeth" | "generator_lobe_asymmetry_um",
             ) => {
-                return Err(format!(
+                return refused(format!(
                     "field: found {field:?}, for which there are no kernels; allowed of [as_built]: eccentricity, \
                      ovality and offset of the circular spline, runout of the flexspline, eccentricity of the \
                      generator, pitch errors and their harmonics, wear, differences of temperature"
                 ));
             }
             Some(phase) if phase.ends_with("_phase_deg") || phase.ends_with("_direction_deg") => {
-                return Err(format!("field: found {field:?}, which is drawn with its size; leave it out"));
+                return refused(format!("field: found {field:?}, which is drawn with its size; leave it out"));
             }
             _ => Acts::Alike,
         };
         match order {
-            Some(order) => Err(format!("order: found {order} beside {field:?}, allowed: with pitch harmonics alone")),
+            Some(order) => {
+                refused(format!("order: found {order} beside {field:?}, allowed: with pitch harmonics alone"))
+            }
             None => Ok(acts),
         }
     }
@@ -285,25 +289,27 @@ impl Tolerances {
     ///
     /// # Errors
     /// Everything that is wrong with it: file, line, field, the value found and what is allowed.
-    pub fn read(
+    pub fn read<E: Display>(
         name: &str,
         file_text: &str,
-        drive: impl FnOnce(&str) -> Result<Drive, String>,
-    ) -> Result<Tolerances, String> {
+        drive: impl FnOnce(&str) -> Result<Drive, E>,
+    ) -> Result<Tolerances, PlanError> {
         let mut file = TomlFile::new(name, file_text);
-        let told = |file: TomlFile<'_>| file.problems().iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
+        let told = |file: TomlFile<'_>| PlanError::Tolerances(file.problems());
         let Some(table) = file.parse() else { return Err(told(file)) };
         let mut known: Vec<String> = KEYS.iter().map(|key| (*key).to_owned()).collect();
         known.extend(TOLERANCE_KEYS.iter().map(|key| format!("tolerance.{key}")));
         file.refuse_unknown_keys(&table, &known.iter().map(String::as_str).collect::<Vec<_>>(), &[]);
         let value = |key: &str| -> Option<&Spanned<DeValue<'_>>> { table.get(key) };
-        let drive = match value("drive") {
-            None => drive("HHD-95"),
-            Some(value) => match file.take("drive", text(value)) {
-                Some(drive_name) => drive(&drive_name).map_err(|why| format!("{name}: drive: {why}")),
-                None => return Err(told(file)),
-            },
-        }?;
+        let named = value("drive").map_or(Some("HHD-95".to_owned()), |value| file.take("drive", text(value)));
+        let Some(named) = named else { return Err(told(file)) };
+        let drive = match drive(&named) {
+            Ok(drive) => drive,
+            Err(why) => {
+                file.refuse_whole("drive", why.to_string());
+                return Err(told(file));
+            }
+        };
         if let Some(field) = drive.as_built.first_not_uniform() {
             file.refuse_whole(
                 "drive",
@@ -365,7 +371,7 @@ impl Tolerances {
                             let what = format!("found {column:?}, which another column of the shards has; give a name");
                             file.refuse(span.clone(), &format!("tolerance[{k}].name"), what);
                         }
-                        if let Err(what) = every_limit_makes_a_drive(&drive, &list, k) {
+                        if let Some(what) = limit_without_drive(&drive, &list, k) {
                             file.refuse(span, &format!("tolerance[{k}]"), what);
                         }
                     }
@@ -388,21 +394,19 @@ fn column_taken(list: &[Tolerance], k: usize) -> Option<String> {
     list[k].columns().find(|column| taken.contains(column) || figure(column))
 }
 
-/// A tolerance at either of its limits, the others in their middle.
-fn every_limit_makes_a_drive(drive: &Drive, list: &[Tolerance], k: usize) -> Result<(), String> {
+/// What is wrong where a tolerance at one of its limits, the others in their middle, makes no drive.
+fn limit_without_drive(drive: &Drive, list: &[Tolerance], k: usize) -> Option<String> {
     let teeth = [drive.flexspline.teeth, drive.circular_spline.teeth];
     let tolerance = &list[k];
-    for limit in tolerance.distribution.limits {
+    tolerance.distribution.limits.into_iter().find_map(|limit| {
         let mut drawn = Drawn::middle(list);
         drawn.values[k] = limit;
         if let Acts::Teeth { wheel, .. } = tolerance.acts {
             drawn.teeth_um[k] = vec![limit; teeth[usize::from(wheel == Wheel::CircularSpline)] as usize];
         }
-        drawn
-            .drive(drive, list)
-            .map_err(|error| format!("{:?} at its limit {limit} makes no drive: {error}", tolerance.name))?;
-    }
-    Ok(())
+        let error = drawn.drive(drive, list).err()?;
+        Some(format!("{:?} at its limit {limit} makes no drive: {error}", tolerance.name))
+    })
 }
 
 /// Load where none is given, of the rated one: a guess at what a joint sees most.
@@ -436,16 +440,13 @@ fn tolerance(entry: &Spanned<DeValue<'_>>, drive: &Drive) -> Result<Tolerance, R
     let order = table.given("order", |value| whole(&ANY_ORDER, value))?;
     let errors = [("position", TeethError::Position), ("pitch", TeethError::Pitch)];
     let errors_given = table.given("errors", |value| one_of(&errors, value))?;
-    let acts = Acts::of(&field, order, errors_given.unwrap_or(TeethError::Position))
-        .map_err(|what| Refused::because(place("field"), what))?;
+    let acts = Acts::of(place("field"), &field, order, errors_given.unwrap_or(TeethError::Position))?;
     if errors_given.is_some() && !matches!(acts, Acts::Teeth { .. }) {
         let what = format!("errors: found it beside {field:?}, allowed: with errors of every tooth alone");
         return Err(Refused::because(place("errors"), what));
     }
     let nominal = match acts {
-        Acts::Alike => {
-            nominal(drive, &field).map_err(|what| Refused::because(place("field"), what).within(".field"))?
-        }
+        Acts::Alike => nominal(place("field"), drive, &field).map_err(|refused| refused.within(".field"))?,
         _ => 0.0,
     };
     let laws = [("normal", LawName::Normal), ("uniform", LawName::Uniform), ("rayleigh", LawName::Rayleigh)];
@@ -528,17 +529,23 @@ fn tolerance(entry: &Spanned<DeValue<'_>>, drive: &Drive) -> Result<Tolerance, R
 /// Share of a law that must lie within its limits: below it a quantile has no digits left.
 const LEAST_INSIDE: f64 = 1e-6;
 
-/// The number that a field of the drive holds.
-fn nominal(drive: &Drive, field: &str) -> Result<f64, String> {
+/// The number that a field of the drive, named `at` a place, holds.
+fn nominal(at: &Spanned<DeValue<'_>>, drive: &Drive, field: &str) -> Result<f64, Refused> {
+    let refused = |what| Err(Refused::because(at, what));
     // Every field of a written drive stands on a line of its own, with its section above.
     let written = drive.to_toml();
-    let table: toml::Table = written.parse().map_err(|error: toml::de::Error| error.to_string())?;
+    let table = match written.parse::<toml::Table>() {
+        Ok(table) => table,
+        Err(error) => return refused(error.to_string()),
+    };
     let found = field.split_once('.').and_then(|(section, key)| table.get(section)?.get(key));
     match found {
         Some(toml::Value::Float(number)) => Ok(*number),
-        Some(toml::Value::Integer(_)) => Err(format!("found {field:?}, a whole number, allowed: fields that scatter")),
+        Some(toml::Value::Integer(_)) => {
+            refused(format!("found {field:?}, a whole number, allowed: fields that scatter"))
+        }
         Some(other) => {
-            Err(format!("found {field:?}, which is {other} in this drive, allowed: a field that is a number"))
+            refused(format!("found {field:?}, which is {other} in this drive, allowed: a field that is a number"))
         }
         None => {
             let paths: Vec<String> = table
@@ -549,7 +556,7 @@ fn nominal(drive: &Drive, field: &str) -> Result<f64, String> {
             let known: Vec<&str> = paths.iter().map(String::as_str).collect();
             let hint =
                 likeliest_path(field, &known).map_or_else(String::new, |meant| format!("; did you mean `{meant}`?"));
-            Err(format!("found {field:?}, allowed: a field of the drive, as --set takes it{hint}"))
+            refused(format!("found {field:?}, allowed: a field of the drive, as --set takes it{hint}"))
         }
     }
 }

@@ -67,7 +67,7 @@ impl KernelPlan {
 
     /// Displacements of this plan as far as `reach_um`, and where they do not go so far, on to it.
     #[must_use]
-    pub fn sizes_to(&self, reach_um: f64) -> Vec<f64> {
+    pub(crate) fn sizes_to(&self, reach_um: f64) -> Vec<f64> {
         let mut sizes = self.sizes_um.clone();
         if let Some(enough) = sizes.iter().position(|size| *size >= reach_um) {
             sizes.truncate(enough + 1);
@@ -634,7 +634,7 @@ mod tests {
         assert!(same(again.generator(0.1, 9.0), cam().generator(0.1, 9.0)));
         assert_eq!(again.drive_blake3, cam().drive_blake3);
         let wrong = text.replacen("\"positions\":8", "\"positions\":9", 1);
-        assert!(Kernels::from_json(&wrong).unwrap_err().contains("allowed"));
+        assert!(Kernels::from_json(&wrong).unwrap_err().what.contains("allowed"));
     }
 
     #[test]

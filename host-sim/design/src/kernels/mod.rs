@@ -37,12 +37,13 @@ use std::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
 
+use flexspline_base::toml_file::Problem;
 use flexspline_mechanics::drive::{DamagedFlank, GeneratorKind, Wheel};
 
 pub use make::{KernelError, KernelPlan, KernelProgress, make};
 
 /// Version of `<G>.kernels.json`.
-pub const KERNELS_SCHEMA: u32 = 1;
+pub(crate) const KERNELS_SCHEMA: u32 = 1;
 
 /// A response to a harmonic `cos(k angle)` of a deviation: in phase with it and a quarter behind, arcsec per µm.
 pub type Gain = [f64; 2];
@@ -282,17 +283,18 @@ impl Kernels {
     /// Reads `<G>.kernels.json`.
     ///
     /// # Errors
-    /// What is wrong with the text: where, and what is allowed.
-    pub fn from_json(text: &str) -> Result<Kernels, String> {
-        let kernels: Kernels = serde_json::from_str(text).map_err(|error| error.to_string())?;
+    /// The [`Problem`] of the text: field, value found and what is allowed.
+    pub fn from_json(text: &str) -> Result<Kernels, Problem> {
+        let kernels: Kernels = serde_json::from_str(text).map_err(|error| Problem::of("", error.to_string()))?;
         if kernels.schema_version != KERNELS_SCHEMA {
-            return Err(format!("schema_version: found {}, allowed: {KERNELS_SCHEMA}", kernels.schema_version));
+            let what = format!("found {}, allowed: {KERNELS_SCHEMA}", kernels.schema_version);
+            return Err(Problem::of("schema_version", what));
         }
         kernels.check().map(|()| kernels)
     }
 
     /// Whether sizes fit one another, so that evaluation cannot fail.
-    pub(crate) fn check(&self) -> Result<(), String> {
+    pub(crate) fn check(&self) -> Result<(), Problem> {
         let ascending = |of: &[f64]| !of.is_empty() && of[0] > 0.0 && of.windows(2).all(|w| w[0] < w[1]);
         let torques: Vec<f64> = self.loads.iter().map(|l| l.torque_n_m).collect();
         let e = &self.eccentric;
@@ -303,11 +305,11 @@ impl Kernels {
         ];
         for (what, list) in lists {
             if !ascending(list) {
-                return Err(format!("{what}: found {list:?}, allowed: positive numbers, ascending"));
+                return Err(Problem::of(what, format!("found {list:?}, allowed: positive numbers, ascending")));
             }
         }
         if self.positions == 0 || !(1..=2).contains(&self.repeats) || self.teeth.contains(&0) {
-            return Err("positions, repeats, teeth: allowed: positive, repeats 1 or 2".to_owned());
+            return Err(Problem::of("positions, repeats, teeth", "allowed: positive, repeats 1 or 2"));
         }
         for load in &self.loads {
             for wheel in [Wheel::Flexspline, Wheel::CircularSpline] {
@@ -318,8 +320,8 @@ impl Kernels {
                 }
                 if let Some(wrong) = all.into_iter().find(|list| list.len() != n || list.iter().any(|x| !x.is_finite()))
                 {
-                    let at = load.torque_n_m;
-                    return Err(format!("a kernel at {at} N m: found {} numbers, allowed: {n}, finite", wrong.len()));
+                    let field = format!("a kernel at {} N m", load.torque_n_m);
+                    return Err(Problem::of(&field, format!("found {} numbers, allowed: {n}, finite", wrong.len())));
                 }
             }
         }
@@ -327,7 +329,8 @@ impl Kernels {
             && e.deviation_arcsec.iter().all(|s| {
                 s.len() == e.torques_n_m.len() && s.iter().all(|d| d.len() == e.directions && e.directions > 3)
             });
-        if shape { Ok(()) } else { Err("eccentric.deviation_arcsec: allowed: [size][load][direction]".to_owned()) }
+        let refused = || Problem::of("eccentric.deviation_arcsec", "allowed: [size][load][direction]");
+        if shape { Ok(()) } else { Err(refused()) }
     }
 }
 
@@ -404,7 +407,7 @@ mod kind_by_name {
         to.collect_str(kind)
     }
 
-    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<GeneratorKind, D::Error> {
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<GeneratorKind, D::Error> {
         String::deserialize(from)?.parse().map_err(D::Error::custom)
     }
 }

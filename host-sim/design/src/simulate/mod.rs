@@ -27,12 +27,11 @@ use flexspline_mechanics::motion::Motion;
 use flexspline_mechanics::stepping::{Face, Increment, Problem, SolveError, Solver, SolverSettings, State};
 
 pub use path::{Path, PathError, PathPoint, read_path};
-pub use places::{
-    MESHES, Place, PlaceStress, SurfaceEdge, edge_stress, fillet_edges, largest_by_place, on_mesh, stress_by_place,
-};
+pub use places::{MESHES, Place, PlaceStress, SurfaceEdge, edge_stress, fillet_edges, on_mesh, stress_by_place};
 pub use row::Row;
 pub use stress::{PeakStress, peak_stress};
-pub use summary::{SUMMARY_SCHEMA, Summary, Told};
+pub(crate) use summary::SUMMARY_SCHEMA;
+pub use summary::{Summary, Told};
 pub use zones::{TipContact, Zone, zones};
 
 use path::LARGEST_TORQUE_N_M;
@@ -293,18 +292,18 @@ pub fn simulate(
     observer: &mut dyn FnMut(&Observation) -> ControlFlow<()>,
 ) -> Result<Simulation, SimulateError> {
     settings.check(drive)?;
-    Run::new(drive, settings, observer).run()
+    RunState::new(drive, settings, observer).run()
 }
 
 /// A point of the path with nothing left open.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Target {
+struct PathTarget {
     generator_rad: f64,
     torque_n_m: f64,
     temperature_c: f64,
 }
 
-struct Run<'a> {
+struct RunState<'a> {
     drive: &'a Drive,
     settings: &'a SimulationSettings,
     observer: &'a mut dyn FnMut(&Observation) -> ControlFlow<()>,
@@ -325,13 +324,13 @@ struct Run<'a> {
     pending_iterations: usize,
 }
 
-impl<'a> Run<'a> {
+impl<'a> RunState<'a> {
     fn new(
         drive: &'a Drive,
         settings: &'a SimulationSettings,
         observer: &'a mut dyn FnMut(&Observation) -> ControlFlow<()>,
     ) -> Self {
-        Run {
+        RunState {
             drive,
             settings,
             observer,
@@ -369,13 +368,14 @@ impl<'a> Run<'a> {
             Path::Paper => {
                 let increment = self.settings.increment_rad.unwrap_or(PAPER_INCREMENT_RAD);
                 let angles = [line(0.0, 1.0, increment), line(1.0, -1.0, increment)].concat();
-                let targets: Vec<Target> = [0.0].into_iter().chain(angles).map(|angle| self.target(angle)).collect();
+                let targets: Vec<PathTarget> =
+                    [0.0].into_iter().chain(angles).map(|angle| self.target(angle)).collect();
                 self.follow(&targets)?;
             }
             Path::Points(points) => {
-                let targets: Vec<Target> = points
+                let targets: Vec<PathTarget> = points
                     .iter()
-                    .map(|point| Target {
+                    .map(|point| PathTarget {
                         generator_rad: point.generator_rad,
                         torque_n_m: point.torque_n_m.unwrap_or(self.settings.torque_n_m),
                         temperature_c: point.temperature_c.unwrap_or(self.temperature_c),
@@ -389,12 +389,12 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    fn target(&self, generator_rad: f64) -> Target {
-        Target { generator_rad, torque_n_m: self.settings.torque_n_m, temperature_c: self.temperature_c }
+    fn target(&self, generator_rad: f64) -> PathTarget {
+        PathTarget { generator_rad, torque_n_m: self.settings.torque_n_m, temperature_c: self.temperature_c }
     }
 
     /// Paths that begin where the drive is deformed; the first point makes a row too.
-    fn follow(&mut self, targets: &[Target]) -> Result<(), SimulateError> {
+    fn follow(&mut self, targets: &[PathTarget]) -> Result<(), SimulateError> {
         let one_load = targets.iter().all(|target| target.torque_n_m == targets[0].torque_n_m);
         self.total = targets.len() + self.increments_to_start(targets[0].torque_n_m, one_load) - 1;
         let mut carried: Option<State> = None;
@@ -470,7 +470,7 @@ impl<'a> Run<'a> {
     fn start<'p>(
         &mut self,
         problem: &'p Problem,
-        at: Target,
+        at: PathTarget,
         one_load: bool,
     ) -> Result<(Motion<'p>, Increment), SimulateError> {
         let mut motion = Motion::deformed_or_turned_in(problem, at.generator_rad)?;
@@ -502,7 +502,7 @@ impl<'a> Run<'a> {
     }
 
     /// One increment along the path, with its row.
-    fn advance(&mut self, motion: &mut Motion<'_>, to: Target) -> Result<(), SimulateError> {
+    fn advance(&mut self, motion: &mut Motion<'_>, to: PathTarget) -> Result<(), SimulateError> {
         let from_rad = motion.state().generator_rad;
         if let Err(error) = motion.to(to.generator_rad, to.torque_n_m) {
             if !matches!(error, SolveError::NotConverged { .. }) {

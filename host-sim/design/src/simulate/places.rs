@@ -124,7 +124,7 @@ pub fn edge_stress(positions: [[f64; 2]; 3], moved: [[f64; 2]; 3], material: &Pl
 }
 
 /// The largest von Mises stress of the flexspline at each place (MPa), and its tooth. `state` has all nodes.
-pub fn largest_by_place(problem: &Problem, state: &State) -> [(f64, usize); 3] {
+pub(crate) fn largest_by_place(problem: &Problem, state: &State) -> [(f64, usize); 3] {
     let nodal = nodal_von_mises(&problem.flexspline, &problem.material, &state.u);
     largest_of(&problem.flexspline, &problem.material, &state.u, &nodal)
 }

@@ -20,7 +20,7 @@ use flexspline_mechanics::stepping::{Problem, State};
 
 /// Cauchy stress `[s11, s22, s12]` (MPa) at every node of a wheel with nodal displacements `field` (x and y of each
 /// node).
-pub fn nodal_stress(mesh: &WheelMesh, material: &PlaneStrain, field: &[f64]) -> Vec<[f64; 3]> {
+pub(crate) fn nodal_stress(mesh: &WheelMesh, material: &PlaneStrain, field: &[f64]) -> Vec<[f64; 3]> {
     assert_eq!(field.len(), 2 * mesh.nodes.len(), "two displacements for each node");
     let at_nodes: Vec<[[f64; 3]; 8]> = mesh
         .elements

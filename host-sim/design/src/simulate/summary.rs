@@ -16,7 +16,7 @@ use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::mesh::WheelKind;
 
 /// Version of the layout of `summary.json`; grows when a field changes its meaning or goes.
-pub const SUMMARY_SCHEMA: u32 = 1;
+pub(crate) const SUMMARY_SCHEMA: u32 = 1;
 
 /// Output travel, arc-seconds, within which the output counts as standing still at a reversal.
 const STANDING_ARCSEC: f64 = 0.05;
@@ -290,14 +290,14 @@ pub(super) struct Metrics {
 }
 
 /// Settled rows of a one-way stretch at one load and temperature.
-struct Stretch<'a> {
+struct SteadyStretch<'a> {
     range: Range<usize>,
     rows: &'a [Row],
     /// Those of them that cover the last whole number of pitches; empty when there is not one.
     whole: &'a [Row],
 }
 
-impl<'a> Stretch<'a> {
+impl<'a> SteadyStretch<'a> {
     fn new(all: &'a [Row], range: Range<usize>, pitch: f64) -> Self {
         let rows = &all[range.clone()];
         let (first, last) = (&rows[0], &rows[rows.len() - 1]);
@@ -307,7 +307,7 @@ impl<'a> Stretch<'a> {
             .iter()
             .position(|row| (last.generator_rad - row.generator_rad).abs() < window - 1e-6 * pitch)
             .unwrap_or(rows.len());
-        Stretch { range, rows, whole: &rows[begin..] }
+        SteadyStretch { range, rows, whole: &rows[begin..] }
     }
 
     fn forward(&self) -> bool {
@@ -343,7 +343,7 @@ impl<'a> Stretch<'a> {
 }
 
 /// Settled one-way stretches, in order.
-fn stretches(rows: &[Row], pitch: f64) -> Vec<Stretch<'_>> {
+fn stretches(rows: &[Row], pitch: f64) -> Vec<SteadyStretch<'_>> {
     let mut found = Vec::new();
     let mut begin = 0;
     let same = |a: &Row, b: &Row| {
@@ -355,7 +355,7 @@ fn stretches(rows: &[Row], pitch: f64) -> Vec<Stretch<'_>> {
             while end < rows.len() && rows[end].settled && same(&rows[begin], &rows[end]) {
                 end += 1;
             }
-            found.push(Stretch::new(rows, begin..end, pitch));
+            found.push(SteadyStretch::new(rows, begin..end, pitch));
         }
         begin = end;
     }
@@ -393,7 +393,7 @@ impl Metrics {
     /// `repeats`: the drive passes through the same states after every pitch.
     pub(super) fn new(rows: &[Row], pitch: f64, ratio: f64, repeats: bool) -> Metrics {
         let stretches = stretches(rows, pitch);
-        let error = |stretch: &Stretch| stretch.mean(|row| row.error_arcsec);
+        let error = |stretch: &SteadyStretch| stretch.mean(|row| row.error_arcsec);
         let mean_of = |forward: bool| stretches.iter().filter(|stretch| stretch.forward() == forward).find_map(error);
         let reversed_at = first_reversal(rows);
         let reversal = reversed_at.and_then(|at| {
@@ -416,7 +416,7 @@ impl Metrics {
                 .iter()
                 .filter_map(|stretch| stretch.ripple_of_wave(pitch).filter(|_| repeats).or(stretch.ripple()))
                 .reduce(f64::max),
-            kinematic_error_pp_of_rows: stretches.iter().filter_map(Stretch::ripple).reduce(f64::max),
+            kinematic_error_pp_of_rows: stretches.iter().filter_map(SteadyStretch::ripple).reduce(f64::max),
             mean_forward: mean_of(true),
             mean_backward: mean_of(false),
             reversal,

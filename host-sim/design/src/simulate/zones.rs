@@ -20,7 +20,7 @@ const NEXT: usize = 2;
 
 /// Share of the load on tips outside the main zones up to which nothing is said. A guess: what a thousandth of the load
 /// does to an output that is wound up by minutes is some hundredths of an arc-second.
-pub const MOST_TIP_SHARE: f64 = 1e-3;
+pub(crate) const MOST_TIP_SHARE: f64 = 1e-3;
 
 /// What is taken off tips that clash at a time, modules. A guess: the sizes of a catalogue need 0.1 to 0.5 in all, more
 /// the larger their ratio, as what gives way is in proportion to the size and not to the module ([`crate::relief`]).
@@ -73,7 +73,7 @@ pub struct TipContact {
 }
 
 /// A pair that bears.
-struct Pair {
+struct BearingPair {
     tooth: usize,
     side: Side,
     lobe: i64,
@@ -89,15 +89,15 @@ pub fn zones(problem: &Problem, state: &State) -> Vec<Zone> {
     // Along each flank beside each lobe, in the order of the angle.
     pairs.sort_by(|a, b| (a.side, a.lobe).cmp(&(b.side, b.lobe)).then(a.from_lobe_rad.total_cmp(&b.from_lobe_rad)));
     let pitch = problem.flexspline.pitch();
-    let goes_on = |a: &Pair, b: &Pair| {
+    let goes_on = |a: &BearingPair, b: &BearingPair| {
         (a.side, a.lobe) == (b.side, b.lobe) && b.from_lobe_rad - a.from_lobe_rad < (NEXT as f64 + 0.5) * pitch
     };
     let mut found: Vec<(i64, Zone)> = pairs
         .chunk_by(goes_on)
         .map(|run| {
-            let most = |of: fn(&Pair) -> f64| run.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
+            let most = |of: fn(&BearingPair) -> f64| run.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
             let load: f64 = run.iter().map(|pair| pair.place.load).sum();
-            let tips = |pair: &Pair| pair.place.load * pair.place.on_tips[0].max(pair.place.on_tips[1]);
+            let tips = |pair: &BearingPair| pair.place.load * pair.place.on_tips[0].max(pair.place.on_tips[1]);
             let zone = Zone {
                 is_main: false,
                 side: run[0].side,
@@ -123,7 +123,7 @@ pub fn zones(problem: &Problem, state: &State) -> Vec<Zone> {
     found.into_iter().map(|(_, zone)| zone).collect()
 }
 
-fn pairs(problem: &Problem, state: &State) -> Vec<Pair> {
+fn pairs(problem: &Problem, state: &State) -> Vec<BearingPair> {
     let flanks = problem.flanks();
     let at = Configuration { u: &state.u, v: &state.v, output_rad: state.output_rad, leans: &state.leans };
     let law = FlankLaw { stiffness: problem.settings.flank_penalty, stick_stiffness: 0.0, friction: 0.0 };
@@ -133,9 +133,15 @@ fn pairs(problem: &Problem, state: &State) -> Vec<Pair> {
         let place = flanks.bearing_place(pair, at, law, &layout.points, modulus_mpa)?;
         let phi = (problem.flexspline.sector_angle(pair.tooth) - state.generator_rad).rem_euclid(TAU);
         let lobe = (phi / PI).round();
-        Some(Pair { tooth: pair.tooth, side: pair.side, lobe: lobe as i64 % 2, from_lobe_rad: phi - PI * lobe, place })
+        Some(BearingPair {
+            tooth: pair.tooth,
+            side: pair.side,
+            lobe: lobe as i64 % 2,
+            from_lobe_rad: phi - PI * lobe,
+            place,
+        })
     };
-    let mut pairs: Vec<Pair> = flanks.near_pairs(at, NEAR_MM).into_iter().filter_map(of_pair).collect();
+    let mut pairs: Vec<BearingPair> = flanks.near_pairs(at, NEAR_MM).into_iter().filter_map(of_pair).collect();
     pairs.sort_by_key(|pair| pair.tooth);
     pairs
 }

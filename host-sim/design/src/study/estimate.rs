@@ -38,7 +38,7 @@ const MOST_POINTS: usize = 160;
 const OF_THE_DRAWING: [&str; 2] = ["rigid_gap_um", "room_as_built_arcsec"];
 
 /// Variants of a study of so many fields that are computed first; of no more all are.
-pub fn computed_first(fields: usize) -> usize {
+pub(crate) fn computed_first(fields: usize) -> usize {
     COMPUTED.max(COMPUTED_PER_FIELD * (1 + fields))
 }
 

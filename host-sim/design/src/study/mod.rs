@@ -25,15 +25,15 @@ use flexspline_mechanics::stepping::SolverSettings;
 
 pub use asked::{Asked, Miss, Nearest, asked, nearest};
 pub use effects::{Effect, effects, is_idle};
-pub use estimate::computed_first;
+pub(crate) use estimate::computed_first;
 pub use judge::{Constraint, JudgeError, Sense, Target, figure};
 pub use trust::Trust;
 pub use vary::{Values, Vary, VaryError, is_error_of_making};
 
 /// Fields that vary at once, at most.
-pub const MOST_FIELDS: usize = 32;
+pub(crate) const MOST_FIELDS: usize = 32;
 /// Variants of a study, at most.
-pub const MOST_VARIANTS: usize = 100_000;
+pub(crate) const MOST_VARIANTS: usize = 100_000;
 
 /// The figure whose search ends at the largest load.
 pub const LAST_STABLE: &str = "last_stable_n_m";

@@ -21,7 +21,7 @@ const OWN_LENGTHS: usize = 8;
 /// A surface.
 pub struct Surface {
     points: Vec<Vec<f64>>,
-    settings: Settings,
+    settings: SurfaceSettings,
     mean: f64,
     weights: Vec<f64>,
     logarithmic: bool,
@@ -30,12 +30,12 @@ pub struct Surface {
 }
 
 #[derive(Clone)]
-struct Settings {
+struct SurfaceSettings {
     lengths: Vec<f64>,
     noise: f64,
 }
 
-impl Settings {
+impl SurfaceSettings {
     fn covariance(&self, a: &[f64], b: &[f64]) -> f64 {
         let square: f64 = a.iter().zip(b).zip(&self.lengths).map(|((a, b), length)| ((a - b) / length).powi(2)).sum();
         let r = (5.0 * square).sqrt();
@@ -50,7 +50,7 @@ struct Fit {
 }
 
 impl Fit {
-    fn new(points: &[Vec<f64>], values: &[f64], settings: &Settings) -> Option<Fit> {
+    fn new(points: &[Vec<f64>], values: &[f64], settings: &SurfaceSettings) -> Option<Fit> {
         let n = points.len();
         let covariance = Mat::from_fn(n, n, |i, j| {
             settings.covariance(&points[i], &points[j]) + if i == j { settings.noise } else { 0.0 }
@@ -96,12 +96,12 @@ impl Surface {
 }
 
 /// The settings that foretell best what is left out, one looked for after the other.
-fn best(points: &[Vec<f64>], values: &[f64]) -> Option<(Settings, Fit)> {
+fn best(points: &[Vec<f64>], values: &[f64]) -> Option<(SurfaceSettings, Fit)> {
     let coordinates = points[0].len();
     let own = coordinates <= OWN_LENGTHS;
-    let mut settings = Settings { lengths: vec![1.0; coordinates], noise: 1e-3 };
+    let mut settings = SurfaceSettings { lengths: vec![1.0; coordinates], noise: 1e-3 };
     let mut fit = Fit::new(points, values, &settings)?;
-    let mut try_one = |settings: &mut Settings, tried: Settings| {
+    let mut try_one = |settings: &mut SurfaceSettings, tried: SurfaceSettings| {
         if let Some(found) = Fit::new(points, values, &tried)
             && found.squares() < fit.squares()
         {
@@ -122,7 +122,7 @@ fn best(points: &[Vec<f64>], values: &[f64]) -> Option<(Settings, Fit)> {
             }
         }
         for noise in NOISES {
-            let tried = Settings { noise, ..settings.clone() };
+            let tried = SurfaceSettings { noise, ..settings.clone() };
             try_one(&mut settings, tried);
         }
     }
@@ -176,7 +176,7 @@ mod tests {
     fn what_is_left_out_is_foretold_by_the_others() {
         let points = grid(4);
         let values: Vec<f64> = points.iter().map(|p| p[0] * p[0] - 0.4 * p[1]).collect();
-        let settings = Settings { lengths: vec![0.5, 2.0], noise: 1e-3 };
+        let settings = SurfaceSettings { lengths: vec![0.5, 2.0], noise: 1e-3 };
         let all = Fit::new(&points, &values, &settings).unwrap();
         for k in [0, 5, 15] {
             let but = |list: &[f64]| [&list[..k], &list[k + 1..]].concat();

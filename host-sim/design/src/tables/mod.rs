@@ -21,7 +21,7 @@ pub use info::{MadeTable, Source, TableInfo, TurnsAtTorque, TurnsInfo};
 pub use make::{MakeError, TableObserver, TableProgress, TableSettings, TorqueNodes, make};
 pub use positions::places_that_tell_apart;
 pub use project::from_plan;
-pub use project::{SampleOptions, TableError, core_drive, core_kind, from_samples, from_sweep};
+pub use project::{SampleOptions, TableError, core_drive, core_kind, from_samples};
 pub use source_files::put_bytes;
 pub use source_files::{c_header, rust_source};
 pub use sweep::{SweepError, SweepPlan, SweepProgress, symmetric_nodes};

@@ -70,7 +70,7 @@ impl Default for SampleOptions {
 }
 
 /// The table of a FEM sweep.
-pub fn from_sweep(
+pub(crate) fn from_sweep(
     drive: &Drive,
     plan: &SweepPlan,
     sweep: Sweep,

@@ -79,7 +79,7 @@ pub fn parse(file: &str, text: &[u8]) -> Result<Vec<Sample>, SampleError> {
     }
     let mut samples = Vec::new();
     while let Some(found) = rows.next_row().map_err(row)? {
-        samples.push(sample(&found, places).map_err(|what| row(TableProblem { line: found.line, what }))?);
+        samples.push(sample(&found, places).map_err(row)?);
     }
     if samples.is_empty() {
         return Err(SampleError::Empty { file: file.to_owned() });
@@ -88,26 +88,27 @@ pub fn parse(file: &str, text: &[u8]) -> Result<Vec<Sample>, SampleError> {
 }
 
 /// The sample in a row; the error says field, value and what is allowed.
-fn sample(row: &Row<'_>, places: [usize; 5]) -> Result<Sample, String> {
+fn sample(row: &Row<'_>, places: [usize; 5]) -> Result<Sample, TableProblem> {
+    let refused = |what: String| TableProblem { line: row.line, what };
     let mut numbers = [0.0_f64; 5];
     for ((number, place), name) in numbers.iter_mut().zip(places).zip(COLUMNS) {
         *number = row.number(place).map_err(|wrong| match wrong {
-            NotANumber::Absent(fields) => format!("{fields} fields, but {name} is field {}", place + 1),
-            NotANumber::Text(text) => format!("{name} is \"{text}\", not a number"),
+            NotANumber::Absent(fields) => refused(format!("{fields} fields, but {name} is field {}", place + 1)),
+            NotANumber::Text(text) => refused(format!("{name} is \"{text}\", not a number")),
         })?;
         if !number.is_finite() {
-            return Err(format!("{name} is {number}; a finite number is needed"));
+            return Err(refused(format!("{name} is {number}; a finite number is needed")));
         }
     }
     let [generator_rad, torque_n_m, temperature_c, direction, output_rad] = numbers;
     let direction = match direction {
         1.0 => Direction::Forward,
         -1.0 => Direction::Backward,
-        other => return Err(format!("direction is {other}; allowed are 1 and -1")),
+        other => return Err(refused(format!("direction is {other}; allowed are 1 and -1"))),
     };
     for ((name, limit, unit), value) in LIMITS.iter().zip([generator_rad, torque_n_m, temperature_c, output_rad]) {
         if value.abs() > *limit {
-            return Err(format!("{name} is {value} {unit}; at most {limit:e} {unit} is plausible"));
+            return Err(refused(format!("{name} is {value} {unit}; at most {limit:e} {unit} is plausible")));
         }
     }
     Ok(Sample { generator_rad, torque_n_m, temperature_c, direction, output_rad })

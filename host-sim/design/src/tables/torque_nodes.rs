@@ -43,7 +43,7 @@ pub struct ChosenNodes {
 const FIRST_NODES: usize = 5;
 
 /// Chooses the torque nodes of a generator at the first temperature of the plan, whose other fields stay.
-pub fn choose_torque_nodes(
+pub(crate) fn choose_torque_nodes(
     drive: &Drive,
     kind: GeneratorKind,
     plan: &SweepPlan,

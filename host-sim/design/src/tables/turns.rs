@@ -47,14 +47,14 @@ const SMOOTH_DRAG_N_M: f64 = 0.02;
 const PLASTIC: f64 = 1.324_717_957_244_746;
 
 /// Increments that the deviation takes, about.
-pub fn deviation_increments() -> usize {
+pub(crate) fn deviation_increments() -> usize {
     2 * LEVELS * (PLACES + 4)
 }
 
 /// Runs the sweep of one generator at the torque and temperature nodes of the plan, for any drive: one that repeats
 /// from tooth to tooth is swept over one pitch ([`sweep`]), any other over whole turns of generator and output. Nodes
 /// that are `known` (of the drive without the imperfections) are not computed again.
-pub fn sweep_turns(
+pub(crate) fn sweep_turns(
     drive: &Drive,
     kind: GeneratorKind,
     plan: &SweepPlan,
@@ -88,7 +88,7 @@ pub fn sweep_turns(
             let places = places(drive, sign);
             let deviation: Vec<f64> =
                 count.errors(&with, &places, torque_n_m)?.into_iter().map(|error| error - all_alike).collect();
-            let run = Run { level, sign, deviation };
+            let run = TurnRun { level, sign, deviation };
             Ok((run, count.work))
         })
         .collect::<Result<Vec<_>, SweepError>>()?;
@@ -169,7 +169,7 @@ impl Count<'_> {
 }
 
 /// Output with imperfections less output without, at every place of a sign under one load, rad.
-struct Run {
+struct TurnRun {
     level: usize,
     sign: f64,
     deviation: Vec<f64>,
@@ -187,7 +187,7 @@ struct Deviations {
 }
 
 impl Deviations {
-    fn new(drive: &Drive, levels: [f64; LEVELS], runs: Vec<Run>) -> Deviations {
+    fn new(drive: &Drive, levels: [f64; LEVELS], runs: Vec<TurnRun>) -> Deviations {
         let mut signs = [1.0, -1.0].map(|sign| (places(drive, sign), vec![[0.0; LEVELS]; PLACES]));
         for run in runs {
             let deviations = &mut signs[usize::from(run.sign < 0.0)].1;
@@ -289,7 +289,7 @@ mod tests {
                 let sum: f64 = harmonics(&drive, *place).iter().zip(&amplitudes).map(|(a, b)| a * b).sum();
                 sum + 1e-4 * sign * level as f64
             };
-            Run { level, sign, deviation: places(&drive, sign).iter().map(deviation).collect() }
+            TurnRun { level, sign, deviation: places(&drive, sign).iter().map(deviation).collect() }
         });
         let found = Deviations::new(&drive, levels(200.0), runs.collect());
         for (found, expected) in found.amplitudes.iter().zip(&amplitudes) {
@@ -313,7 +313,7 @@ mod tests {
         let mut drive = Drive::hhd_95();
         drive.as_built.flexspline_pitch_harmonics = vec![Harmonic { order: 2, amplitude_um: 5.0, phase_deg: 0.0 }];
         let deviation = |psi: f64| 1e-4 * (2.0 * psi - 0.3).cos();
-        let runs = (0..LEVELS).flat_map(|level| [(level, 1.0), (level, -1.0)]).map(|(level, sign)| Run {
+        let runs = (0..LEVELS).flat_map(|level| [(level, 1.0), (level, -1.0)]).map(|(level, sign)| TurnRun {
             level,
             sign,
             deviation: places(&drive, sign).into_iter().map(deviation).collect(),

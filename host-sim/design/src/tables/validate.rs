@@ -172,7 +172,7 @@ pub fn validate(
     let mut random = fastrand::Rng::with_seed(settings.seed);
     let draws = draw(&mut random, drive, table, settings);
     let total = settings.torques * (settings.positions + 3) + settings.temperatures + REVERSAL_STEPS + 6;
-    let mut fresh = Fresh { drive, table, observe, increments: 0, total, points: Vec::new() };
+    let mut fresh = FreshRun { drive, table, observe, increments: 0, total, points: Vec::new() };
     for (k, (temperature_c, torques)) in draws.iter().enumerate() {
         let problem = Problem::new(drive, kind, *temperature_c, settings.solver)?;
         let mut motion = Motion::deformed(&problem, random.f64() * if repeats { 1.0 } else { whole_turns })?;
@@ -227,7 +227,7 @@ const REVERSAL_STEPS: usize = 16;
 /// Increments to a flexspline pitch while the drive settles.
 const SETTLING_STEPS: f64 = 8.0;
 
-struct Fresh<'a> {
+struct FreshRun<'a> {
     drive: &'a Drive,
     table: &'a Table<'a>,
     observe: &'a mut dyn FnMut(usize, usize) -> ControlFlow<()>,
@@ -236,7 +236,7 @@ struct Fresh<'a> {
     points: Vec<Point>,
 }
 
-impl Fresh<'_> {
+impl FreshRun<'_> {
     fn told(&mut self) -> Result<(), ValidateError> {
         self.increments += 1;
         match (self.observe)(self.increments, self.total.max(self.increments)) {

@@ -10,7 +10,7 @@ const COLUMNS: &str = "measured_counts,target_counts,torque_bits,temperature_bit
                        command_quality,torque_n_m,temperature_c,error_rad";
 
 /// A step: what it is asked, and what it answers.
-struct Step {
+struct TestStep {
     measured: GeneratorAngle,
     target: OutputAngle,
     torque: f32,
@@ -21,7 +21,7 @@ struct Step {
 
 /// Steps from a play that is not known: both directions, standing, reversals inside the play, torques and temperatures
 /// in the range, at nodes, beyond, and not finite.
-fn steps(table: &Table<'_>, count: usize) -> Vec<Step> {
+fn steps(table: &Table<'_>, count: usize) -> Vec<TestStep> {
     let mut random = fastrand::Rng::with_seed(3);
     let torques: Vec<f32> = table.torque_nodes_n_m().collect();
     let mut play = PlayState::unknown();
@@ -47,7 +47,7 @@ fn steps(table: &Table<'_>, count: usize) -> Vec<Step> {
             .unwrap_or(OutputAngle::ZERO)
             .offset_counts(random.i64(-(1i64 << 24)..1i64 << 24) >> random.u32(0..24));
         let (now, next) = table.step(&mut play, measured, target, torque, temperature);
-        steps.push(Step { measured, target, torque, temperature, now, next });
+        steps.push(TestStep { measured, target, torque, temperature, now, next });
     }
     steps
 }
@@ -56,7 +56,7 @@ fn steps(table: &Table<'_>, count: usize) -> Vec<Step> {
 pub(super) fn csv(table: &Table<'_>, count: usize) -> String {
     let mut text = format!("{COLUMNS}\n");
     for step in steps(table, count) {
-        let Step { measured, target, torque, temperature, now, next } = step;
+        let TestStep { measured, target, torque, temperature, now, next } = step;
         let bits = |number: f32| format!("0x{:08x}", number.to_bits());
         let _ = writeln!(
             text,
@@ -84,7 +84,7 @@ pub(super) fn array(name: &str, table: &Table<'_>, count: usize) -> String {
     let mut text = format!("/* Steps of {name}.fxt, table {}: see vectors.h. */\n", table.id());
     let _ = writeln!(text, "static const flexspline_vector flexspline_{name}_vectors[{count}] = {{");
     for step in steps(table, count) {
-        let Step { measured, target, torque, temperature, now, next } = step;
+        let TestStep { measured, target, torque, temperature, now, next } = step;
         let _ = writeln!(
             text,
             "    {{INT64_C({}), INT64_C({}), 0x{:08x}, 0x{:08x}, INT64_C({}), 0x{:08x}, 0x{:08x}, {}, INT64_C({}), \

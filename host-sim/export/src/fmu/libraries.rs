@@ -3,6 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::FmuExportError;
+
 /// A platform of FMI 2.0 (section 2.3): its folder, how its library ends and is called by cargo, and what such a file
 /// begins with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -63,21 +65,20 @@ pub struct Library {
 ///
 /// # Errors
 /// A file that is none, or what to do where there is none at all.
-pub fn find_libraries(named: &[PathBuf]) -> Result<Vec<Library>, String> {
+pub fn find_libraries(named: &[PathBuf]) -> Result<Vec<Library>, FmuExportError> {
     let mut libraries: Vec<Library> = Vec::new();
     for file in named {
         let library = read(file)?;
         if let Some(other) = libraries.iter().find(|other| other.platform == library.platform) {
-            let (other, folder) = (other.file.display(), library.platform.folder);
-            return Err(format!("--library: found {other} and {}, both for {folder}; allowed: one", file.display()));
+            let files = [other.file.clone(), file.clone()];
+            return Err(FmuExportError::TwoLibraries { files, folder: library.platform.folder });
         }
         libraries.push(library);
     }
     if !named.is_empty() {
         return Ok(libraries);
     }
-    let program =
-        std::env::current_exe().and_then(fs::canonicalize).map_err(|error| format!("this program: {error}"))?;
+    let program = std::env::current_exe().and_then(fs::canonicalize).map_err(FmuExportError::Program)?;
     let beside = program.parent().unwrap_or(Path::new("."));
     for platform in &PLATFORMS {
         // One that does not fit is left out: it is of an earlier build.
@@ -86,13 +87,7 @@ pub fn find_libraries(named: &[PathBuf]) -> Result<Vec<Library>, String> {
         libraries.extend(found);
     }
     if libraries.is_empty() {
-        let looked: Vec<String> = places(beside, &PLATFORMS[0]).iter().map(|file| file.display().to_string()).collect();
-        return Err(format!(
-            "found no library for an FMU; looked for {}. In a checkout run: cargo build --release -p flexspline-fmu, \
-             and give --library target/release/{}",
-            looked.join(", "),
-            PLATFORMS[0].file
-        ));
+        return Err(FmuExportError::Missing { looked: places(beside, &PLATFORMS[0]), built: PLATFORMS[0].file });
     }
     Ok(libraries)
 }
@@ -115,9 +110,8 @@ fn places(beside: &Path, platform: &Platform) -> Vec<PathBuf> {
     places
 }
 
-fn read(file: &Path) -> Result<Library, String> {
-    let refuse =
-        |what: &str| format!("{}: {what}; allowed: a library that cargo built of flexspline-fmu", file.display());
+fn read(file: &Path) -> Result<Library, FmuExportError> {
+    let refuse = |why: &str| FmuExportError::NoLibrary { file: file.to_owned(), why: why.to_owned() };
     let bytes = fs::read(file).map_err(|error| refuse(&error.to_string()))?;
     let platform = PLATFORMS.iter().find(|platform| bytes.starts_with(platform.magic));
     let platform = platform.ok_or_else(|| refuse("no library of Linux, Windows or macOS with 64 bits"))?;

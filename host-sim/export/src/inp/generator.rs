@@ -30,13 +30,13 @@ const CLEARANCE: f64 = 1e-4;
 pub(super) struct GeneratorBody {
     outline: GeneratorOutline,
     bore_radius: f64,
-    shape: Shape,
+    shape: SurfaceShape,
     /// Elements; the second edge of each (from corner 1 to corner 2) lies on the outline.
     pub elements: Vec<[u32; 8]>,
 }
 
 #[derive(Debug, Clone)]
-enum Shape {
+enum SurfaceShape {
     /// A ring with its faces opposite the edges of the bore: material angles of corners and midsides in turn.
     Ring(Vec<f64>),
     /// Circles about these centres: corners and midsides of each.
@@ -54,14 +54,17 @@ impl GeneratorBody {
             None => {
                 let points = 2 * mesh.teeth * mesh.base_edges.len();
                 let first = -0.5 * mesh.pitch();
-                (Shape::Ring((0..points).map(|k| first + TAU * k as f64 / points as f64).collect()), vec![points])
+                (
+                    SurfaceShape::Ring((0..points).map(|k| first + TAU * k as f64 / points as f64).collect()),
+                    vec![points],
+                )
             }
             Some(([x, y], radius)) => {
                 let points = 2 * (TAU * radius / ROLLER_FACE).ceil() as usize;
                 let centres =
                     if y == 0.0 { vec![[x, 0.0], [-x, 0.0]] } else { vec![[x, y], [-x, y], [-x, -y], [x, -y]] };
                 let strips = vec![points; centres.len()];
-                (Shape::Rollers { centres, radius, points }, strips)
+                (SurfaceShape::Rollers { centres, radius, points }, strips)
             }
         };
         let mut elements = Vec::new();
@@ -79,18 +82,18 @@ impl GeneratorBody {
     }
 
     /// Whether the rim touches it in narrow places and may creep along them.
-    pub fn is_rollers(&self) -> bool {
-        matches!(self.shape, Shape::Rollers { .. })
+    pub(crate) fn is_rollers(&self) -> bool {
+        matches!(self.shape, SurfaceShape::Rollers { .. })
     }
 
     /// Where the nodes stand before assembly, mm.
     pub fn before(&self) -> Vec<Point> {
         match &self.shape {
-            Shape::Ring(angles) => nodes_behind(angles.iter().map(|angle| {
+            SurfaceShape::Ring(angles) => nodes_behind(angles.iter().map(|angle| {
                 let radial = unit_at(*angle);
                 (radial.map(|x| (self.bore_radius - CLEARANCE) * x), radial)
             })),
-            Shape::Rollers { centres, radius, .. } => {
+            SurfaceShape::Rollers { centres, radius, .. } => {
                 let pulled = |c: &Point| {
                     let arm = c[0].hypot(c[1]);
                     let to = self.bore_radius - CLEARANCE - radius;
@@ -104,11 +107,11 @@ impl GeneratorBody {
     /// Where they stand with the generator at an angle (rad), mm.
     pub fn at(&self, generator_rad: f64) -> Vec<Point> {
         match &self.shape {
-            Shape::Ring(angles) => nodes_behind(angles.iter().map(|angle| {
+            SurfaceShape::Ring(angles) => nodes_behind(angles.iter().map(|angle| {
                 let (point, normal) = self.opposite(angle - generator_rad);
                 (rotate(point, generator_rad), rotate(normal, generator_rad))
             })),
-            Shape::Rollers { centres, radius, .. } => {
+            SurfaceShape::Rollers { centres, radius, .. } => {
                 let centres: Vec<Point> = centres.iter().map(|c| rotate(*c, generator_rad)).collect();
                 // The bore passes the generator by its own radius times the angle.
                 self.rollers(&centres, generator_rad * (1.0 - self.bore_radius / radius))
@@ -132,7 +135,7 @@ impl GeneratorBody {
     }
 
     fn rollers(&self, centres: &[Point], turned_rad: f64) -> Vec<Point> {
-        let Shape::Rollers { radius, points, .. } = self.shape else { return Vec::new() };
+        let SurfaceShape::Rollers { radius, points, .. } = self.shape else { return Vec::new() };
         let mut nodes = Vec::new();
         for centre in centres {
             nodes.extend(nodes_behind((0..points).map(|k| {

@@ -8,7 +8,7 @@
 //!
 //! so that the last t is the sum over the whole bore. Weights along an edge are Simpson's (1, 4, 1)/6.
 
-use super::{Equation, Term};
+use super::{Equation, EquationTerm};
 use flexspline_mechanics::mesh::WheelMesh;
 
 /// The three sums.
@@ -68,7 +68,7 @@ pub(super) fn bore_sums(
         gauss_jordan(&mut rows, &mut sums, pivots);
 
         for ((row, sum), pivot) in rows.iter().zip(&sums).zip(pivots) {
-            let term = |column: usize| Term {
+            let term = |column: usize| EquationTerm {
                 node: bore_node(nodes[column / 2]),
                 dof: 1 + (column % 2) as u8,
                 coefficient: row[column],
@@ -81,7 +81,7 @@ pub(super) fn bore_sums(
                 }
                 let before = if sector == 0 { None } else { sum_node(sector - 1, which) };
                 for (helper, sign) in [(sum_node(sector, which), -1.0), (before, 1.0)] {
-                    terms.extend(helper.map(|node| Term { node, dof: 1, coefficient: sign * share }));
+                    terms.extend(helper.map(|node| EquationTerm { node, dof: 1, coefficient: sign * share }));
                 }
             }
             equations.push(Equation { terms });
@@ -189,7 +189,7 @@ mod tests {
     fn no_unknown_depends_twice_and_none_that_depends_serves_another() {
         let mesh = WheelMesh::flexspline(&Drive::hhd_95(), MeshLevel::Standard).unwrap();
         let sums = bore_sums(&mesh, |n| n, |sector, which| Some(HELPERS + SUMS * sector + which));
-        let name = |term: &Term| (term.node, term.dof);
+        let name = |term: &EquationTerm| (term.node, term.dof);
         let dependent: std::collections::BTreeSet<_> = sums.equations.iter().map(|e| name(&e.terms[0])).collect();
         assert_eq!(dependent.len(), SUMS * mesh.teeth);
         for equation in &sums.equations {

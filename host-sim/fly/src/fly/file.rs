@@ -1,12 +1,13 @@
 //! A scenario from a file: a built-in one, and what is otherwise.
 
+use flexspline_mechanics::drive::GeneratorKind;
 use flexspline_motion::scenario::{Leg, TableKnown, TorqueKnown};
 use serde::Deserialize;
 
-use super::Flown;
 use super::built_in::{SCENARIOS, built_in};
+use super::{Flown, FlyError};
 use flexspline_base::suggest::did_you_mean;
-use flexspline_base::toml_file::TomlFile;
+use flexspline_base::toml_file::{Problem, TomlFile};
 
 /// What a file may say.
 #[derive(Debug, Deserialize)]
@@ -105,17 +106,21 @@ const SLOWEST_GUST_HZ: f64 = 1e-3;
 /// Longest flight, s.
 const LONGEST_S: f64 = 3600.0;
 
+fn refused(file: &str, field: &str, what: String) -> FlyError {
+    FlyError::Scenario(Problem { place: file.to_owned(), field: field.to_owned(), what })
+}
+
 /// Sets values that were given, within their bounds.
 struct Setter<'f> {
     file: &'f str,
 }
 
 impl Setter<'_> {
-    fn refused(&self, field: &str, found: impl std::fmt::Display, allowed: &str) -> String {
-        format!("{}: {field}: found {found}, allowed: {allowed}", self.file)
+    fn refused(&self, field: &str, found: impl std::fmt::Display, allowed: &str) -> FlyError {
+        refused(self.file, field, format!("found {found}, allowed: {allowed}"))
     }
 
-    fn number(&self, field: &str, to: &mut f64, found: Option<f64>, [least, most]: [f64; 2]) -> Result<(), String> {
+    fn number(&self, field: &str, to: &mut f64, found: Option<f64>, [least, most]: [f64; 2]) -> Result<(), FlyError> {
         let Some(found) = found else { return Ok(()) };
         if !(found >= least && found <= most) {
             return Err(self.refused(field, found, &format!("{least} to {most}")));
@@ -130,7 +135,7 @@ impl Setter<'_> {
         to: &mut [f64; 2],
         found: Option<[f64; 2]>,
         bounds: [[f64; 2]; 2],
-    ) -> Result<(), String> {
+    ) -> Result<(), FlyError> {
         let Some([a, b]) = found else { return Ok(()) };
         self.number(&format!("{field}[0]"), &mut to[0], Some(a), bounds[0])?;
         self.number(&format!("{field}[1]"), &mut to[1], Some(b), bounds[1])
@@ -142,7 +147,7 @@ impl Setter<'_> {
         to: &mut T,
         found: Option<&String>,
         names: &[(&str, T)],
-    ) -> Result<(), String> {
+    ) -> Result<(), FlyError> {
         let Some(found) = found else { return Ok(()) };
         let known = names.iter().find(|(name, _)| name == found);
         let allowed: Vec<&str> = names.iter().map(|(name, _)| *name).collect();
@@ -155,27 +160,25 @@ impl Setter<'_> {
 /// Reads a file.
 ///
 /// # Errors
-/// File, field, value found and what is allowed.
-pub fn read(name: &str, text: &str) -> Result<Flown, String> {
+/// [`FlyError::Scenario`]: file, field, value found and what is allowed.
+pub fn read(name: &str, text: &str) -> Result<Flown, FlyError> {
     let mut whole = TomlFile::new(name, text);
     if let Some(table) = whole.parse() {
         whole.refuse_unknown_keys(&table, &KEYS, &[]);
     }
-    if let Some(problem) = whole.problems().first() {
-        return Err(problem.to_string());
+    if let Some(problem) = whole.problems().into_iter().next() {
+        return Err(FlyError::Scenario(problem));
     }
-    let file: File = toml::from_str(text).map_err(|error| format!("{name}: {}", error.to_string().trim_end()))?;
+    let file: File =
+        toml::from_str(text).map_err(|error| refused(name, "", error.to_string().trim_end().to_owned()))?;
     let set = Setter { file: name };
     let mut flown = built_in(&file.base).ok_or_else(|| {
         let hint = did_you_mean("; ", &file.base, SCENARIOS);
         set.refused("base", format!("{:?}", file.base), &(SCENARIOS.join(", ") + &hint))
     })?;
     if let Some(generator) = &file.generator {
-        flown.kind = generator.parse().map_err(
-            |error: <flexspline_mechanics::drive::GeneratorKind as std::str::FromStr>::Err| {
-                format!("{name}: generator: {error}")
-            },
-        )?;
+        let kind = generator.parse::<GeneratorKind>();
+        flown.kind = kind.map_err(|error| refused(name, "generator", error.to_string()))?;
     }
     let scenario = &mut flown.scenario;
     if let Some(own) = &file.name {
@@ -273,7 +276,7 @@ mod tests {
         };
         let lines = KEYS.iter().map(|key| format!("{key} = {}\n", value(key)));
         let found = read("own.toml", &lines.collect::<String>());
-        assert_eq!(found.as_ref().map(|flown| flown.scenario.servo.speed_hz), Ok(0.3), "{found:?}");
+        assert_eq!(found.unwrap().scenario.servo.speed_hz, 0.3);
     }
 
     #[test]
@@ -283,7 +286,8 @@ mod tests {
         let flown = read("own.toml", good).unwrap();
         assert_eq!(flown.scenario.torque, TorqueKnown::InMesh);
         assert_eq!((flown.scenario.legs.len(), flown.scenario.load.bias_n_m), (2, 2.0));
-        for (text, said) in [
+        let said = |text: &str| read("own.toml", text).unwrap_err().to_string();
+        for (text, begins) in [
             (
                 "base = \"anntena\"",
                 "own.toml: base: found \"anntena\", allowed: antenna, rover, camera, telescope; did you mean \
@@ -299,15 +303,15 @@ mod tests {
                 "own.toml: servo.encoder_bits: found 40, allowed: 8 to 30",
             ),
         ] {
-            let found = read("own.toml", text).unwrap_err();
-            assert!(found.starts_with(said), "{found}");
+            let found = said(text);
+            assert!(found.starts_with(begins), "{found}");
         }
-        assert!(read("own.toml", "base = \"rover\"\nspeed = 1").unwrap_err().starts_with("own.toml:2: speed: "));
-        let misspelt = read("own.toml", "base = \"rover\"\n[servo]\nencoder_bit = 20").unwrap_err();
+        assert!(said("base = \"rover\"\nspeed = 1").starts_with("own.toml:2: speed: "));
+        let misspelt = said("base = \"rover\"\n[servo]\nencoder_bit = 20");
         assert!(misspelt.starts_with("own.toml:3: servo.encoder_bit: unknown key"), "{misspelt}");
         assert!(misspelt.contains("did you mean `servo.encoder_bits`?"), "{misspelt}");
-        let hot = read("own.toml", "base = \"telescope\"\nwarming_k_s = 1.0").unwrap_err();
-        for (text, said) in [
+        let hot = said("base = \"telescope\"\nwarming_k_s = 1.0");
+        for (text, begins) in [
             (
                 "legs = [[2.0, 0.0], [2.0, 0.0, 9.0]]",
                 "own.toml: legs[1]: found [2.0, 0.0, 9.0], allowed: [seconds, rad/s]",
@@ -316,8 +320,8 @@ mod tests {
             ("legs = []", "own.toml: legs: found 0 s in all, allowed: 3 to 3600 s"),
             ("load.gust = [1.0, 0.0]", "own.toml: load.gust[1]: found 0, allowed: 0.001 to 50 for gusts above 0 N.m"),
         ] {
-            let found = read("own.toml", &format!("base = \"camera\"\n{text}\n")).unwrap_err();
-            assert!(found.starts_with(said), "{found}");
+            let found = said(&format!("base = \"camera\"\n{text}\n"));
+            assert!(found.starts_with(begins), "{found}");
         }
         assert!(hot.starts_with("own.toml: warming_k_s: found an end at 82 °C, allowed: "), "{hot}");
     }

@@ -4,6 +4,7 @@
 //! What moves is in `flexspline-motion`; here scenarios are read, units made, and results put into numbers.
 
 mod built_in;
+mod error;
 mod file;
 mod results;
 mod varied;
@@ -18,6 +19,7 @@ use flexspline_design::tables::core_drive;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 
 pub use built_in::{SCENARIOS, built_in};
+pub use error::FlyError;
 pub use file::read;
 pub use results::{ByController, LEAST_DISTANCE, LEAST_PHASE_MARGIN_DEG, Results, Row, results, spectrum};
 pub use varied::{Flight as VariedFlight, Vary, every, fly_varied};
@@ -45,15 +47,15 @@ fn map(kind: GeneratorKind) -> &'static str {
 /// was built otherwise.
 ///
 /// # Errors
-/// What is wrong, in words.
-pub fn unit(kind: GeneratorKind, temperature_c: f64) -> Result<Unit, String> {
+/// [`FlyError::Map`], [`FlyError::Teeth`].
+pub fn unit(kind: GeneratorKind, temperature_c: f64) -> Result<Unit, FlyError> {
     let name = format!("{kind}.csv");
-    let map = DenseMap::parse(kind, &name, map(kind)).map_err(|error| error.to_string())?;
+    let map = DenseMap::parse(kind, &name, map(kind))?;
     let gear = Gear::new(map.view(), temperature_c);
     let teeth = gear.map().header.teeth;
     let largest = gear.map().header.largest_n_m;
     let law = |phase: f64, flank: f64| gear.elastic_error_rad(phase * std::f64::consts::TAU / teeth, flank, 1.0);
-    let drive = core_drive(&Drive::hhd_95()).map_err(|error| error.to_string())?;
+    let drive = core_drive(&Drive::hhd_95())?;
     Ok(Unit::of_spring(drive, Sampled::of_law(teeth, largest, law)))
 }
 
@@ -61,8 +63,8 @@ impl Flown {
     /// Flies it.
     ///
     /// # Errors
-    /// What cannot be flown, in words.
-    pub fn fly(&self) -> Result<Flight, String> {
+    /// [`FlyError::Load`], [`FlyError::Flight`].
+    pub fn fly(&self) -> Result<Flight, FlyError> {
         self.fly_told(&|| {})
     }
 
@@ -75,24 +77,20 @@ impl Flown {
     /// Flies it; `told` is called for each second that one of its joints flew.
     ///
     /// # Errors
-    /// What cannot be flown, in words.
-    pub fn fly_told(&self, told: &(dyn Fn() + Sync)) -> Result<Flight, String> {
+    /// [`FlyError::Load`], [`FlyError::Flight`].
+    pub fn fly_told(&self, told: &(dyn Fn() + Sync)) -> Result<Flight, FlyError> {
         self.carries()?;
-        fly_told(&self.scenario, &unit(self.kind, self.scenario.temperature_c)?, told)
+        Ok(fly_told(&self.scenario, &unit(self.kind, self.scenario.temperature_c)?, told)?)
     }
 
     /// Whether its generator carries its load.
     ///
     /// # Errors
-    /// What was found and what is allowed.
-    pub fn carries(&self) -> Result<(), String> {
-        let most = self.kind.rated_torque_n_m();
-        let largest = self.scenario.largest_n_m();
-        if largest > most {
-            return Err(format!(
-                "load: found up to {largest:.1} N.m, allowed: {most} N.m with a {} generator",
-                self.kind
-            ));
+    /// [`FlyError::Load`].
+    pub fn carries(&self) -> Result<(), FlyError> {
+        let (largest_n_m, most_n_m) = (self.scenario.largest_n_m(), self.kind.rated_torque_n_m());
+        if largest_n_m > most_n_m {
+            return Err(FlyError::Load { largest_n_m, most_n_m, kind: self.kind });
         }
         Ok(())
     }

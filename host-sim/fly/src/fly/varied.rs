@@ -5,7 +5,8 @@ use std::str::FromStr;
 
 use serde::Serialize;
 
-use super::{Flown, Results, read, results};
+use super::{Flown, FlyError, Results, read, results};
+use flexspline_base::toml_file::Problem;
 
 /// A field of a scenario and the values that it gets, as a TOML file has them; a name needs no quotes.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,14 +24,13 @@ impl fmt::Display for Vary {
 }
 
 impl FromStr for Vary {
-    type Err = String;
+    type Err = FlyError;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> Result<Self, FlyError> {
         let (field, values) = text.split_once('=').unwrap_or((text, ""));
         let values = apart(values);
         if field.trim().is_empty() || values.iter().any(String::is_empty) {
-            return Err("allowed: FIELD=VALUE,VALUE,... with a field of a scenario file (docs/explanation/motion.md)"
-                .to_owned());
+            return Err(FlyError::VaryForm);
         }
         Ok(Self { field: field.trim().to_owned(), values })
     }
@@ -70,11 +70,12 @@ pub struct Flight {
 /// Every combination of the values, on a scenario's file.
 ///
 /// # Errors
-/// File, field, value and what is allowed.
-pub fn every(name: &str, text: &str, vary: &[Vary]) -> Result<Vec<(Varied, Flown)>, String> {
+/// [`FlyError::Scenario`], [`FlyError::Vary`]: file, field, value and what is allowed.
+pub fn every(name: &str, text: &str, vary: &[Vary]) -> Result<Vec<(Varied, Flown)>, FlyError> {
     for (at, Vary { field, .. }) in vary.iter().enumerate() {
         if vary[..at].iter().any(|before| before.field == *field) {
-            return Err(format!("--vary {field}: found twice, allowed: once, its values with commas"));
+            let (field, found) = (field.clone(), "twice".to_owned());
+            return Err(FlyError::Vary { field, found, allowed: "once, its values with commas" });
         }
     }
     let mut combinations: Vec<Varied> = vec![Vec::new()];
@@ -88,13 +89,14 @@ pub fn every(name: &str, text: &str, vary: &[Vary]) -> Result<Vec<(Varied, Flown
 }
 
 /// A scenario's file with some values changed.
-fn changed(name: &str, text: &str, varied: &[(String, String)]) -> Result<Flown, String> {
+fn changed(name: &str, text: &str, varied: &[(String, String)]) -> Result<Flown, FlyError> {
     if varied.is_empty() {
         return read(name, text);
     }
     // What is wrong with the file itself is told with its own lines.
     read(name, text)?;
-    let mut whole: toml::Table = text.parse().map_err(|error: toml::de::Error| format!("{name}: {error}"))?;
+    let refused = |what| FlyError::Scenario(Problem { place: name.to_owned(), field: String::new(), what });
+    let mut whole: toml::Table = text.parse().map_err(|error: toml::de::Error| refused(error.to_string()))?;
     for (field, value) in varied {
         let parsed = format!("value = {value}").parse::<toml::Table>().ok().and_then(|mut table| table.remove("value"));
         let value = parsed.unwrap_or_else(|| toml::Value::String(value.clone()));
@@ -107,12 +109,13 @@ fn changed(name: &str, text: &str, varied: &[(String, String)]) -> Result<Flown,
             }
             let room = at.entry(part).or_insert_with(|| toml::Value::Table(toml::Table::new()));
             let toml::Value::Table(inner) = room else {
-                return Err(format!("--vary {field}: found a field of `{part}`, allowed: fields of a scenario file"));
+                let (field, found) = (field.clone(), format!("a field of `{part}`"));
+                return Err(FlyError::Vary { field, found, allowed: "fields of a scenario file" });
             };
             at = inner;
         }
     }
-    let text = toml::to_string(&whole).map_err(|error| format!("{name}: {error}"))?;
+    let text = toml::to_string(&whole).map_err(|error| refused(error.to_string()))?;
     let values: Vec<String> = varied.iter().map(|(field, value)| format!("{field}={value}")).collect();
     read(&format!("{name} with {}", values.join(" ")), &text)
 }
@@ -123,7 +126,7 @@ fn changed(name: &str, text: &str, varied: &[(String, String)]) -> Result<Flown,
 pub fn fly_varied(varied: Vec<(String, String)>, flown: &Flown, told: &(dyn Fn() + Sync)) -> Flight {
     match flown.carries().and_then(|()| flown.fly_told(told)) {
         Ok(flight) => Flight { varied, results: results(flown, &flight), not_flown: None },
-        Err(why) => Flight { varied, results: None, not_flown: Some(why) },
+        Err(why) => Flight { varied, results: None, not_flown: Some(why.to_string()) },
     }
 }
 
@@ -147,9 +150,11 @@ mod tests {
 
     #[test]
     fn what_cannot_be_varied_is_named() {
-        let said = |text: &str| every("camera", "base = \"camera\"\n", &[text.parse().unwrap()]).unwrap_err();
+        let said =
+            |text: &str| every("camera", "base = \"camera\"\n", &[text.parse().unwrap()]).unwrap_err().to_string();
         let twice = every("camera", "base = \"camera\"\n", &["seed=1", "seed=2"].map(|text| text.parse().unwrap()))
-            .unwrap_err();
+            .unwrap_err()
+            .to_string();
         assert!(twice.starts_with("--vary seed: found twice"), "{twice}");
         assert!(said("tabel=nominal").contains("did you mean `table`?"), "{}", said("tabel=nominal"));
         assert!(said("table=best").contains("camera with table=best: table: found \"best\""), "{}", said("table=best"));

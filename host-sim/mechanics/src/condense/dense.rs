@@ -51,7 +51,7 @@ impl Kernels {
     }
 
     /// `y += sign A^T x` for a column-major matrix with `x.len()` rows.
-    pub fn multiply_transposed_add(self, a: &[f64], x: &[f64], sign: f64, y: &mut [f64]) {
+    pub(crate) fn multiply_transposed_add(self, a: &[f64], x: &[f64], sign: f64, y: &mut [f64]) {
         assert!(a.len() >= x.len() * y.len());
         self.0.dispatch(MultiplyTransposed { a, x, sign, y });
     }

@@ -91,7 +91,7 @@ impl Cell {
 
     /// Displacements of the flank nodes that no force acts on, from those of the other nodes and of the seat, in the
     /// frame.
-    pub fn free_flanks(&self, kernels: Kernels, body: &[f64], seat_mm: f64) -> Vec<f64> {
+    pub(crate) fn free_flanks(&self, kernels: Kernels, body: &[f64], seat_mm: f64) -> Vec<f64> {
         let mut flanks = vec![0.0; self.flank()];
         kernels.multiply_add(&self.flank_coupling, body, -1.0, &mut flanks);
         if seat_mm != 0.0 {

@@ -93,7 +93,7 @@ impl Skin {
     }
 
     /// A cell in the whole mesh.
-    pub fn cell_nodes(&self, whole: &WheelMesh, cell: usize, held: impl Fn(u32) -> bool) -> CellNodes {
+    pub(crate) fn cell_nodes(&self, whole: &WheelMesh, cell: usize, held: impl Fn(u32) -> bool) -> CellNodes {
         let per_sector = self.mesh.nodes_per_sector as u32;
         let original = |n: &u32| whole.node((n / per_sector) as isize, self.original[(n % per_sector) as usize]) as u32;
         let kept = self.cell(cell).iter().map(original).collect();

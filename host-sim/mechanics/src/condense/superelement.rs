@@ -132,13 +132,13 @@ impl Superelement {
     }
 
     /// Nodes that were condensed away, by number in the mesh, in the cell that was condensed; and their positions.
-    pub fn interior(&self) -> (&[u32], &[[f64; 2]]) {
+    pub(crate) fn interior(&self) -> (&[u32], &[[f64; 2]]) {
         (&self.interior, &self.interior_position)
     }
 
     /// Displacements of the interior nodes, in the frame of the cell, for displacements `kept` and a seat moved by
     /// `seat_mm`.
-    pub fn recover(&self, kept: &[f64], seat_mm: f64) -> Vec<f64> {
+    pub(crate) fn recover(&self, kept: &[f64], seat_mm: f64) -> Vec<f64> {
         let mut out: Vec<f64> = (0..self.recovery.nrows()).map(|i| seat_mm * self.seat_recovery[(i, 0)]).collect();
         for (j, x) in kept.iter().enumerate() {
             for (u, t) in out.iter_mut().zip(self.recovery.col(j).iter()) {

@@ -111,7 +111,7 @@ impl BoreContact {
     }
 
     /// [`BoreContact::evaluate`] that passes over edges that `open` knows to be open, and tells it of others.
-    pub fn evaluate_near(
+    pub(crate) fn evaluate_near(
         &self,
         law: BoreLaw,
         outline: &GeneratorOutline,

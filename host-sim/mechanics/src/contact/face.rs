@@ -119,7 +119,7 @@ fn place(k: usize) -> f64 {
 
 /// Load at a level: mean, its slope with the level times C (the share that bears), and the mean of load times place;
 /// means of place and of its square over what bears.
-struct Load {
+struct LevelLoad {
     mean: f64,
     share: f64,
     moment: f64,
@@ -129,7 +129,7 @@ struct Load {
 
 impl Across {
     /// How much nearer than the plane slice the face comes somewhere, mm.
-    pub fn early_mm(&self) -> f64 {
+    pub(crate) fn early_mm(&self) -> f64 {
         -self.lowest()
     }
 
@@ -143,8 +143,8 @@ impl Across {
         self.offsets.iter().copied().fold(f64::INFINITY, f64::min)
     }
 
-    fn load(&self, level: f64) -> Load {
-        let mut load = Load { mean: 0.0, share: 0.0, moment: 0.0, place: 0.0, square: 0.0 };
+    fn load(&self, level: f64) -> LevelLoad {
+        let mut load = LevelLoad { mean: 0.0, share: 0.0, moment: 0.0, place: 0.0, square: 0.0 };
         let part = 1.0 / (STATIONS - 1) as f64;
         for (k, pair) in self.offsets.windows(2).enumerate() {
             let [a, b] = [level - pair[0], level - pair[1]];
@@ -185,7 +185,7 @@ impl Across {
             return None;
         }
         // What later is: the difference of levels that the mean load leaves.
-        let later = |level: f64, load: &Load| (level - lowest) - self.compliance * load.mean;
+        let later = |level: f64, load: &LevelLoad| (level - lowest) - self.compliance * load.mean;
         // The face bears no more than what the plane slice has at its nearest.
         let mut low = lowest;
         let mut high =

@@ -278,7 +278,7 @@ impl<'a> FlankContact<'a> {
     }
 
     /// This contact with a law of the load along the face.
-    pub fn with_face(self, face: Option<FaceLaw>) -> Self {
+    pub(crate) fn with_face(self, face: Option<FaceLaw>) -> Self {
         FlankContact { face, ..self }
     }
 
@@ -719,7 +719,7 @@ impl<'a> FlankContact<'a> {
     }
 
     /// [`FlankContact::evaluate`], and the smallest gap of the points in `smallest_gap` (mm).
-    pub fn evaluate_with_gap(
+    pub(crate) fn evaluate_with_gap(
         &self,
         pair: FlankPair,
         at: Configuration,

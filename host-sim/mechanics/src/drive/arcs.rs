@@ -122,7 +122,7 @@ impl ArcChain {
     }
 
     /// This chain with a straight line of that length before it, tangent to it.
-    pub fn with_lead(self, length: f64) -> ArcChain {
+    pub(crate) fn with_lead(self, length: f64) -> ArcChain {
         let first = self.arcs[0];
         let start = [0, 1].map(|k| first.start[k] - length * first.tangent[k]);
         let lead = Arc { start, curvature: 0.0, from: 0.0, length, ..first };
@@ -131,7 +131,7 @@ impl ArcChain {
     }
 
     /// This chain with a straight line after it, tangent to it: its last direction goes on.
-    pub fn with_tail(mut self, length: f64) -> ArcChain {
+    pub(crate) fn with_tail(mut self, length: f64) -> ArcChain {
         let (end, from) = (self.length(), self.length());
         let (start, tangent) = (self.point(end), self.tangent(end));
         self.arcs.push(Arc { start, tangent, curvature: 0.0, from, length });
@@ -187,7 +187,7 @@ impl ArcChain {
 
     /// Arc length at a distance from the origin, for a chain on which that distance grows; where its ends going on do
     /// not reach so far, as near as they come.
-    pub fn arc_at_radius(&self, radius: f64) -> f64 {
+    pub(crate) fn arc_at_radius(&self, radius: f64) -> f64 {
         let within = |arc: &Arc| dot(arc.start, arc.start) <= radius * radius;
         let arc = &self.arcs[self.arcs.partition_point(within).saturating_sub(1)];
         let mut s = arc.from + 0.5 * arc.length;

@@ -170,7 +170,8 @@ pub struct DamagedTooth {
 
 impl AsBuilt {
     /// True if nothing of it acts.
-    pub fn is_ideal(&self) -> bool {
+    #[cfg(test)]
+    pub(crate) fn is_ideal(&self) -> bool {
         self.first_not_uniform().is_none()
             && self.flexspline_wear_um == 0.0
             && self.circular_spline_wear_um == 0.0
@@ -286,7 +287,7 @@ impl RimVariation {
     }
 
     /// After how many of `sectors` equal sectors the rim repeats: 1 for a rim of one thickness.
-    pub fn repeats_after(&self, sectors: usize) -> usize {
+    pub(crate) fn repeats_after(&self, sectors: usize) -> usize {
         let common = self.harmonics.iter().fold(sectors, |common, h| greatest_common_divisor(common, h.order as usize));
         if self.is_none() { 1 } else { sectors / common }
     }

@@ -1,6 +1,6 @@
 //! What is wrong with a drive: one message per problem, each with its place, field, value found and what is allowed.
 
-use crate::toml_file::Problem;
+use crate::toml_file::{Problem, lines};
 
 /// A drive that is refused. Its text is one line per problem.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -14,8 +14,4 @@ impl From<Problem> for DriveError {
     fn from(problem: Problem) -> Self {
         DriveError { problems: vec![problem] }
     }
-}
-
-fn lines(problems: &[Problem]) -> String {
-    problems.iter().map(Problem::to_string).collect::<Vec<_>>().join("\n")
 }

@@ -43,7 +43,7 @@ pub(super) enum Value {
 
 impl Value {
     /// True for zero, for an empty list, for a load that is even and for involutes.
-    pub fn is_zero(&self) -> bool {
+    pub(crate) fn is_zero(&self) -> bool {
         match self {
             Value::Number(number) => *number == 0.0,
             Value::Rigid => false,
@@ -201,7 +201,7 @@ impl Field {
 
     /// True if the file of this drive may leave it out: a stiffness that is not there is rigid, an imperfection that is
     /// not there is none, and of a sleeve only the sizes that it has are needed.
-    pub fn is_optional(&self, drive: &Drive) -> bool {
+    pub(crate) fn is_optional(&self, drive: &Drive) -> bool {
         let sleeve = &drive.sleeve;
         match self.path {
             "sleeve.wall_mm" => !sleeve.is_shell(),
@@ -217,22 +217,22 @@ impl Field {
     }
 
     /// True for what only a sleeve of shells has.
-    pub fn is_of_shells(&self) -> bool {
+    pub(crate) fn is_of_shells(&self) -> bool {
         self.split().0 == "sleeve" && !self.path.contains("stiffness")
     }
 
     /// True for what teeth that are straight along the face have not.
-    pub fn is_of_the_face(&self) -> bool {
+    pub(crate) fn is_of_the_face(&self) -> bool {
         matches!(self.path, "flexspline.face" | "flexspline.taper_mrad" | "flexspline.crowning_um")
     }
 
     /// True for what involutes without preload have not.
-    pub fn is_of_the_profile(&self) -> bool {
+    pub(crate) fn is_of_the_profile(&self) -> bool {
         matches!(self.path, "flexspline.profile" | "flanks.preload_um")
     }
 
     /// True for what an ideal drive has not.
-    pub fn is_imperfection(&self) -> bool {
+    pub(crate) fn is_imperfection(&self) -> bool {
         self.split().0 == "as_built"
     }
 

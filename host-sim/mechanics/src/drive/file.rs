@@ -37,7 +37,7 @@ impl Drive {
     /// Reads a drive file. Every unknown key, wrong type, value out of range and missing field of the file is
     /// reported; if there is none, the parts are fitted to one another ([`Drive::check`]).
     pub fn from_toml(file_name: &str, text: &str) -> Result<Drive, DriveError> {
-        let mut reader = Reader { file: TomlFile::new(file_name, text), lines: HashMap::new() };
+        let mut reader = DriveReader { file: TomlFile::new(file_name, text), lines: HashMap::new() };
         match reader.file.parse() {
             Some(table) => reader.read(&table),
             None => Err(reader.finish()),
@@ -216,13 +216,13 @@ fn array(entries: impl Iterator<Item = String>) -> String {
 }
 
 /// One pass over a file.
-struct Reader<'a> {
+struct DriveReader<'a> {
     file: TomlFile<'a>,
     /// line of every field that the file sets
     lines: HashMap<&'static str, usize>,
 }
 
-impl Reader<'_> {
+impl DriveReader<'_> {
     fn finish(self) -> DriveError {
         DriveError { problems: self.file.problems() }
     }

@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// Flank on the positive-angle side, with the rounding at the tip.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ActiveFlank {
-    curve: Curve,
+    curve: FlankCurve,
     /// Radius where the root fillet ends and the flank begins, mm.
     pub start_radius: f64,
     /// Radius where the flank ends and the rounding begins, mm.
@@ -30,7 +30,7 @@ pub struct ActiveFlank {
 }
 
 #[derive(Debug, Clone, PartialEq)]
-enum Curve {
+enum FlankCurve {
     Involute(Involute),
     /// In growing radius: material on the right of a tooth, on the left of a space.
     Chain(Arc<ArcChain>),
@@ -184,9 +184,9 @@ impl ActiveFlank {
                     facets: None,
                 };
                 involute.ends = [start_radius, junction_radius].map(|radius| involute.arc_at(radius));
-                Curve::Involute(involute)
+                FlankCurve::Involute(involute)
             }
-            FlankShape::Chain(chain) => Curve::Chain(Arc::clone(chain)),
+            FlankShape::Chain(chain) => FlankCurve::Chain(Arc::clone(chain)),
         };
         let mut found = ActiveFlank {
             curve,
@@ -204,12 +204,12 @@ impl ActiveFlank {
     }
 
     /// This flank with so many chords of equal length in its place: what contact on the edges of a mesh sees.
-    pub fn with_facets(mut self, facets: Option<u32>) -> ActiveFlank {
+    pub(crate) fn with_facets(mut self, facets: Option<u32>) -> ActiveFlank {
         let facets = facets.filter(|count| *count > 0);
         match (&mut self.curve, facets) {
-            (Curve::Involute(involute), _) => involute.facets = facets,
-            (Curve::Chain(_), None) => {}
-            (Curve::Chain(chain), Some(count)) => {
+            (FlankCurve::Involute(involute), _) => involute.facets = facets,
+            (FlankCurve::Chain(_), None) => {}
+            (FlankCurve::Chain(chain), Some(count)) => {
                 let [a, b] = [self.start_radius, self.junction_radius].map(|radius| chain.arc_at_radius(radius));
                 let (low, high) = (a.min(b), a.max(b));
                 let at = |k: u32| chain.point(low + (high - low) * f64::from(k) / f64::from(count));
@@ -221,42 +221,42 @@ impl ActiveFlank {
     }
 
     /// Whether both wheels have curved flanks that meet in their middle, not at their tips.
-    pub fn is_s_shaped(&self) -> bool {
-        matches!(self.curve, Curve::Chain(_))
+    pub(crate) fn is_s_shaped(&self) -> bool {
+        matches!(self.curve, FlankCurve::Chain(_))
     }
 
     /// Arc length of the flank at a radius, as [`Foot::arc`] counts it, mm.
-    pub fn arc_at(&self, radius: f64) -> f64 {
+    pub(crate) fn arc_at(&self, radius: f64) -> f64 {
         match &self.curve {
-            Curve::Involute(involute) => involute.arc_at(radius),
-            Curve::Chain(chain) => chain.arc_at_radius(radius),
+            FlankCurve::Involute(involute) => involute.arc_at(radius),
+            FlankCurve::Chain(chain) => chain.arc_at_radius(radius),
         }
     }
 
     /// The point of the flank in place of that of the curve at a radius: on its chord, where there are facets.
-    pub fn facet_point(&self, radius: f64) -> [f64; 2] {
+    pub(crate) fn facet_point(&self, radius: f64) -> [f64; 2] {
         match &self.curve {
-            Curve::Involute(involute) => involute.facet_point(radius),
-            Curve::Chain(_) => self.point(radius),
+            FlankCurve::Involute(involute) => involute.facet_point(radius),
+            FlankCurve::Chain(_) => self.point(radius),
         }
     }
 
     /// What facets add to the material of a space at most beyond the curve that [`ActiveFlank::least_distance`] is
     /// from, mm.
-    pub fn deepest_facet(&self) -> f64 {
+    pub(crate) fn deepest_facet(&self) -> f64 {
         match &self.curve {
-            Curve::Involute(involute) => involute
+            FlankCurve::Involute(involute) => involute
                 .facet(involute.ends[0].min(involute.ends[1]))
                 .map_or(0.0, |([a, b], curvature_radius)| 0.125 * (b - a) * (b - a) / curvature_radius),
-            Curve::Chain(_) => 0.0,
+            FlankCurve::Chain(_) => 0.0,
         }
     }
 
     /// Half angle of the flank at a radius (also beyond the junction), rad.
     pub fn half_angle(&self, radius: f64) -> f64 {
         match &self.curve {
-            Curve::Involute(involute) => involute.half_angle(radius),
-            Curve::Chain(_) => {
+            FlankCurve::Involute(involute) => involute.half_angle(radius),
+            FlankCurve::Chain(_) => {
                 let [x, y] = self.point(radius);
                 y.atan2(x)
             }
@@ -266,16 +266,16 @@ impl ActiveFlank {
     /// Point of the flank at a radius (also beyond the junction, up to the sharp tip corner).
     pub fn point(&self, radius: f64) -> [f64; 2] {
         match &self.curve {
-            Curve::Involute(involute) => involute.point(radius),
-            Curve::Chain(chain) => chain.point(chain.arc_at_radius(radius)),
+            FlankCurve::Involute(involute) => involute.point(radius),
+            FlankCurve::Chain(chain) => chain.point(chain.arc_at_radius(radius)),
         }
     }
 
     /// d(arc length)/d(radius) of the flank.
-    pub fn arc_rate(&self, radius: f64) -> f64 {
+    pub(crate) fn arc_rate(&self, radius: f64) -> f64 {
         match &self.curve {
-            Curve::Involute(involute) => radius / involute.base_radius,
-            Curve::Chain(chain) => {
+            FlankCurve::Involute(involute) => radius / involute.base_radius,
+            FlankCurve::Chain(chain) => {
                 let s = chain.arc_at_radius(radius);
                 let ([x, y], t) = (chain.point(s), chain.tangent(s));
                 x.hypot(y) / (x * t[0] + y * t[1])
@@ -290,7 +290,7 @@ impl ActiveFlank {
     }
 
     /// Point of the rounding at an angle from the junction towards the tip land (0 to `rounding_sweep`).
-    pub fn rounding_point(&self, angle: f64) -> [f64; 2] {
+    pub(crate) fn rounding_point(&self, angle: f64) -> [f64; 2] {
         let arm = [self.junction[0] - self.rounding_centre[0], self.junction[1] - self.rounding_centre[1]];
         // On the positive side the outline turns clockwise round the tip, of a tooth as of a space.
         let (s, c) = (-angle).sin_cos();
@@ -305,22 +305,22 @@ impl ActiveFlank {
     /// Signed distance of a point from the flank of a space continued beyond its ends. A tip rounding lies behind it:
     /// the distance to the flank with its rounding is at least this.
     #[inline]
-    pub fn least_distance(&self, p: [f64; 2]) -> f64 {
+    pub(crate) fn least_distance(&self, p: [f64; 2]) -> f64 {
         match &self.curve {
-            Curve::Involute(involute) => involute.distance(p).1,
-            Curve::Chain(chain) => -chain.foot(p).left,
+            FlankCurve::Involute(involute) => involute.distance(p).1,
+            FlankCurve::Chain(chain) => -chain.foot(p).left,
         }
     }
 
     /// Radius of the foot of a point on the flank of a space continued beyond its ends.
     #[inline]
-    pub fn foot_radius(&self, p: [f64; 2]) -> f64 {
+    pub(crate) fn foot_radius(&self, p: [f64; 2]) -> f64 {
         match &self.curve {
-            Curve::Involute(involute) => {
+            FlankCurve::Involute(involute) => {
                 let (along, distance) = involute.distance(p);
                 involute.base_radius.hypot(along + distance)
             }
-            Curve::Chain(chain) => {
+            FlankCurve::Chain(chain) => {
                 let [x, y] = chain.point(chain.foot(p).arc);
                 x.hypot(y)
             }
@@ -331,8 +331,8 @@ impl ActiveFlank {
     #[inline]
     pub fn foot_internal(&self, p: [f64; 2]) -> Foot {
         let on_flank = match &self.curve {
-            Curve::Involute(involute) => involute.foot_internal(p, self.junction_radius),
-            Curve::Chain(chain) => self.foot_on_chain(chain, p),
+            FlankCurve::Involute(involute) => involute.foot_internal(p, self.junction_radius),
+            FlankCurve::Chain(chain) => self.foot_on_chain(chain, p),
         };
         on_flank.unwrap_or_else(|| self.foot_on_rounding(p))
     }
@@ -400,8 +400,8 @@ mod tests {
 
     fn involute(flank: &ActiveFlank) -> &Involute {
         match &flank.curve {
-            Curve::Involute(involute) => involute,
-            Curve::Chain(_) => panic!("no involute"),
+            FlankCurve::Involute(involute) => involute,
+            FlankCurve::Chain(_) => panic!("no involute"),
         }
     }
 

@@ -91,12 +91,7 @@ fn piece_name<S: serde::Serializer>(piece: &PieceKind, serializer: S) -> Result<
     serializer.serialize_str(piece.name())
 }
 
-impl FlankGap {
-    /// Generator angle, rad, at which flexspline tooth `tooth` of `teeth` is in this position.
-    pub fn generator_angle_rad(&self, tooth: u32, teeth: u32) -> f64 {
-        TAU * f64::from(tooth) / f64::from(teeth) - self.material_angle_rad
-    }
-}
+impl FlankGap {}
 
 impl fmt::Display for FlankGap {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -127,7 +122,7 @@ pub struct Room {
 
 /// The least gap of a tooth at a place of the cycle, and how it changes.
 #[derive(Debug, Clone, Copy)]
-struct Nearest {
+struct LeastGap {
     gap_rad: f64,
     radius_mm: f64,
     /// Change of the gap (rad) with the distance of the tooth from the axis (mm): the flank of the space leans.
@@ -356,7 +351,7 @@ impl RigidMesh {
     }
 
     /// The least gaps of one flank over the cycle, from -pi/2 to pi/2.
-    fn cycle(&self, side: Side) -> Vec<Option<Nearest>> {
+    fn cycle(&self, side: Side) -> Vec<Option<LeastGap>> {
         /// Distance over which the lean of a flank is taken, mm.
         const NEAR_MM: f64 = 1e-4;
         (0..=CYCLE_STEPS)
@@ -368,7 +363,7 @@ impl RigidMesh {
                     [Some(inside), Some(outside)] => (outside - inside) / (2.0 * NEAR_MM),
                     _ => 0.0,
                 };
-                Some(Nearest { gap_rad: gap.gap_rad, radius_mm, by_radius })
+                Some(LeastGap { gap_rad: gap.gap_rad, radius_mm, by_radius })
             })
             .collect()
     }
@@ -380,12 +375,12 @@ impl RigidMesh {
 }
 
 /// A cycle between its places; none where the flank meets none there.
-fn at_phase(cycle: &[Option<Nearest>], phi: f64) -> Option<Nearest> {
+fn at_phase(cycle: &[Option<LeastGap>], phi: f64) -> Option<LeastGap> {
     let along = ((phi + FRAC_PI_2) / PI).clamp(0.0, 1.0) * CYCLE_STEPS as f64;
     let k = (along as usize).min(CYCLE_STEPS - 1);
     let (a, b, t) = (cycle[k]?, cycle[k + 1]?, along - k as f64);
     let mix = |a: f64, b: f64| a + (b - a) * t;
-    Some(Nearest {
+    Some(LeastGap {
         gap_rad: mix(a.gap_rad, b.gap_rad),
         radius_mm: mix(a.radius_mm, b.radius_mm),
         by_radius: mix(a.by_radius, b.by_radius),

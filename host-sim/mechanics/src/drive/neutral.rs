@@ -18,12 +18,12 @@ pub struct NeutralCurve {
     shape: RingShape,
     radius_mm: f64,
     constant_mm: f64,
-    parts: Vec<Part>,
+    parts: Vec<SmoothPart>,
 }
 
 /// Polar angle against material angle over one smooth part of `0..pi/2`, on equal cells of the material angle.
 #[derive(Debug, Clone)]
-struct Part {
+struct SmoothPart {
     start: f64,
     cell: f64,
     /// polar angle, first and second derivative by the cell coordinate
@@ -57,7 +57,7 @@ impl NeutralCurve {
                 }
                 nodes.push(curve.node(if k == CELLS { ab[1] } else { alpha }, cell));
             }
-            curve.parts.push(Part { start, cell, nodes });
+            curve.parts.push(SmoothPart { start, cell, nodes });
             start += length;
         }
         curve
@@ -101,13 +101,13 @@ impl NeutralCurve {
 
     /// [`NeutralCurve::polar`] at the angle of this sine and cosine.
     #[inline]
-    pub fn polar_at(&self, direction: (f64, f64)) -> [f64; 3] {
+    pub(crate) fn polar_at(&self, direction: (f64, f64)) -> [f64; 3] {
         let [w, dw, ddw] = self.shape.radial_at(direction);
         [self.radius_mm + self.constant_mm + w, dw, ddw]
     }
 
     /// Polar angle of the material point at undeformed angle `phi`.
-    pub fn polar_angle(&self, phi: f64) -> f64 {
+    pub(crate) fn polar_angle(&self, phi: f64) -> f64 {
         let turns = (phi / PI).round();
         let p = phi - PI * turns;
         let q = p.abs().min(FRAC_PI_2);

@@ -43,7 +43,7 @@ impl Placement {
 
     /// The point of the ideal part that is at `p`.
     #[inline]
-    pub fn recover(&self, p: [f64; 2]) -> [f64; 2] {
+    pub(crate) fn recover(&self, p: [f64; 2]) -> [f64; 2] {
         let (sin, cos) = self.turn;
         let d = [p[0] - self.translation[0], p[1] - self.translation[1]];
         [cos * d[0] + sin * d[1], cos * d[1] - sin * d[0]]

@@ -151,7 +151,8 @@ impl RingShape {
     }
 
     /// First-order eccentricity of a disc over `w0`; `None` for the other generators.
-    pub fn disc_eccentricity_ratio(&self) -> Option<f64> {
+    #[cfg(test)]
+    pub(crate) fn disc_eccentricity_ratio(&self) -> Option<f64> {
         match self.form {
             Form::Disc { e, .. } => Some(e),
             _ => None,
@@ -194,7 +195,7 @@ impl RingShape {
 
     /// [`RingShape::radial`] at the angle of this sine and cosine: for the cam without another look at them.
     #[inline]
-    pub fn radial_at(&self, (sin, cos): (f64, f64)) -> [f64; 3] {
+    pub(crate) fn radial_at(&self, (sin, cos): (f64, f64)) -> [f64; 3] {
         match self.form {
             Form::Cam => {
                 let w = self.amplitude * (cos - sin) * (cos + sin);

@@ -241,7 +241,7 @@ impl CircularSpline {
 
 impl Material {
     /// Shear modulus, MPa.
-    pub fn shear_modulus_mpa(&self) -> f64 {
+    pub(crate) fn shear_modulus_mpa(&self) -> f64 {
         self.youngs_modulus_mpa / (2.0 * (1.0 + self.poissons_ratio))
     }
 
@@ -410,7 +410,7 @@ impl Drive {
     /// clearance, and a quarter of all teeth in contact, as drives of the catalogue have. Root and tip circles are
     /// those of HHD-95; the pitch circle lies half way along the teeth that mesh. Of the preload it is only known that
     /// drives without play have some; 1 µm is a guess, and on a rigid generator that would be kilonewtons.
-    pub fn s_95() -> Drive {
+    pub(crate) fn s_95() -> Drive {
         let mut drive = Drive { name: "S-95".to_owned(), ..Drive::cup_95() }.with_s_teeth(1.0);
         drive.flexspline.tip_rounding_mm = 0.05;
         drive.circular_spline.tip_rounding_mm = 0.05;

@@ -63,11 +63,11 @@ impl PieceKind {
 pub struct OutlinePiece {
     /// What it is.
     pub kind: PieceKind,
-    curve: Curve,
+    curve: ToothCurve,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-enum Curve {
+enum ToothCurve {
     Arc {
         centre: [f64; 2],
         radius: f64,
@@ -93,12 +93,12 @@ impl OutlinePiece {
     /// Point, mm.
     pub fn point(&self, t: f64) -> [f64; 2] {
         match self.curve {
-            Curve::Chain { ref chain, from, to } => chain.point(from + t * (to - from)),
-            Curve::Arc { centre, radius, start, sweep } => {
+            ToothCurve::Chain { ref chain, from, to } => chain.point(from + t * (to - from)),
+            ToothCurve::Arc { centre, radius, start, sweep } => {
                 let (s, c) = (start + t * sweep).sin_cos();
                 [centre[0] + radius * c, centre[1] + radius * s]
             }
-            Curve::Involute { base_radius, half_base, .. } => {
+            ToothCurve::Involute { base_radius, half_base, .. } => {
                 let u = self.roll(t);
                 let (s, c) = (half_base - u).sin_cos();
                 [base_radius * (c - u * s), base_radius * (s + u * c)]
@@ -109,15 +109,15 @@ impl OutlinePiece {
     /// Unit tangent in the direction of growing `t`.
     pub fn tangent(&self, t: f64) -> [f64; 2] {
         match self.curve {
-            Curve::Chain { ref chain, from, to } => {
+            ToothCurve::Chain { ref chain, from, to } => {
                 chain.tangent(from + t * (to - from)).map(|x| (to - from).signum() * x)
             }
-            Curve::Arc { start, sweep, .. } => {
+            ToothCurve::Arc { start, sweep, .. } => {
                 let (s, c) = (start + t * sweep).sin_cos();
                 let sign = sweep.signum();
                 [-sign * s, sign * c]
             }
-            Curve::Involute { half_base, from, to, .. } => {
+            ToothCurve::Involute { half_base, from, to, .. } => {
                 let (s, c) = (half_base - self.roll(t)).sin_cos();
                 let sign = (to - from).signum();
                 [sign * c, sign * s]
@@ -134,25 +134,27 @@ impl OutlinePiece {
     /// Curvature, 1/mm, positive where the material is convex.
     pub fn curvature(&self, t: f64) -> f64 {
         match self.curve {
-            Curve::Chain { ref chain, from, to } => -(to - from).signum() * chain.curvature(from + t * (to - from)),
-            Curve::Arc { radius, sweep, .. } => -sweep.signum() / radius,
-            Curve::Involute { base_radius, from, to, .. } => (to - from).signum() / (base_radius * self.roll(t)),
+            ToothCurve::Chain { ref chain, from, to } => {
+                -(to - from).signum() * chain.curvature(from + t * (to - from))
+            }
+            ToothCurve::Arc { radius, sweep, .. } => -sweep.signum() / radius,
+            ToothCurve::Involute { base_radius, from, to, .. } => (to - from).signum() / (base_radius * self.roll(t)),
         }
     }
 
     /// Length, mm.
     pub fn length(&self) -> f64 {
         match self.curve {
-            Curve::Chain { from, to, .. } => (to - from).abs(),
-            Curve::Arc { radius, sweep, .. } => radius * sweep.abs(),
-            Curve::Involute { base_radius, from, to, .. } => 0.5 * base_radius * (to * to - from * from).abs(),
+            ToothCurve::Chain { from, to, .. } => (to - from).abs(),
+            ToothCurve::Arc { radius, sweep, .. } => radius * sweep.abs(),
+            ToothCurve::Involute { base_radius, from, to, .. } => 0.5 * base_radius * (to * to - from * from).abs(),
         }
     }
 
     fn roll(&self, t: f64) -> f64 {
         match self.curve {
-            Curve::Involute { from, to, .. } => (from * from + t * (to * to - from * from)).sqrt(),
-            Curve::Arc { .. } | Curve::Chain { .. } => 0.0,
+            ToothCurve::Involute { from, to, .. } => (from * from + t * (to * to - from * from)).sqrt(),
+            ToothCurve::Arc { .. } | ToothCurve::Chain { .. } => 0.0,
         }
     }
 }
@@ -180,7 +182,7 @@ impl ToothFlank {
                 FlankShape::Chain(Arc::new(chain.scaled(drive.thermal_state.flexspline_scale)))
             }
         };
-        Self::new(&Wheel {
+        Self::new(&WheelNumbers {
             section: "flexspline",
             internal: false,
             teeth: wheel.teeth,
@@ -203,7 +205,7 @@ impl ToothFlank {
                 FlankShape::Chain(Arc::new(chain.scaled(drive.thermal_state.circular_spline_scale)))
             }
         };
-        Self::new(&Wheel {
+        Self::new(&WheelNumbers {
             section: "circular_spline",
             internal: true,
             teeth: wheel.teeth,
@@ -215,8 +217,8 @@ impl ToothFlank {
         })
     }
 
-    fn new(wheel: &Wheel) -> Result<Self, DriveError> {
-        let &Wheel { internal, root_radius, tip_radius, fillet, rounding, .. } = wheel;
+    fn new(wheel: &WheelNumbers) -> Result<Self, DriveError> {
+        let &WheelNumbers { internal, root_radius, tip_radius, fillet, rounding, .. } = wheel;
         let half_pitch = PI / f64::from(wheel.teeth);
         // seen from the free side a fillet centre, from the material a rounding centre; both are one offset of the
         // involute and of a circle, on the higher-angle side (+1) or the lower one (-1)
@@ -256,12 +258,14 @@ impl ToothFlank {
         }
         let arc = |kind, centre, radius, start: f64, end: f64| OutlinePiece {
             kind,
-            curve: Curve::Arc { centre, radius, start, sweep: end - start },
+            curve: ToothCurve::Arc { centre, radius, start, sweep: end - start },
         };
         let (from, to) = (root.along, tip.along);
         let curve = match &wheel.shape {
-            &FlankShape::Involute { base_radius, half_base } => Curve::Involute { base_radius, half_base, from, to },
-            FlankShape::Chain(chain) => Curve::Chain { chain: Arc::clone(chain), from, to },
+            &FlankShape::Involute { base_radius, half_base } => {
+                ToothCurve::Involute { base_radius, half_base, from, to }
+            }
+            FlankShape::Chain(chain) => ToothCurve::Chain { chain: Arc::clone(chain), from, to },
         };
         let flank = OutlinePiece { kind: PieceKind::Flank, curve };
         let (root_beta, tip_beta) = (root.direction, tip.direction);
@@ -318,12 +322,12 @@ impl ToothFlank {
     }
 
     /// Radius, mm, of the root circle and of the tip circle.
-    pub fn root_and_tip_radius(&self) -> (f64, f64) {
+    pub(crate) fn root_and_tip_radius(&self) -> (f64, f64) {
         self.circles
     }
 
     /// Polar angle of the outline at `radius`, fillet and rounding included; `None` beyond root or tip circle.
-    pub fn angle_at_radius(&self, radius: f64) -> Option<f64> {
+    pub(crate) fn angle_at_radius(&self, radius: f64) -> Option<f64> {
         let (root, tip) = self.root_and_tip_radius();
         if radius < root.min(tip) || radius > root.max(tip) {
             return None;
@@ -337,15 +341,15 @@ impl ToothFlank {
             })
             .unwrap_or(&self.pieces[3]);
         Some(match piece.curve {
-            Curve::Chain { ref chain, .. } => {
+            ToothCurve::Chain { ref chain, .. } => {
                 let [x, y] = chain.point(chain.arc_at_radius(radius));
                 y.atan2(x)
             }
-            Curve::Involute { base_radius, half_base, .. } => {
+            ToothCurve::Involute { base_radius, half_base, .. } => {
                 let u = ((radius / base_radius).powi(2) - 1.0).max(0.0).sqrt();
                 half_base - (u - u.atan())
             }
-            Curve::Arc { centre: [x, y], radius: rho, .. } => {
+            ToothCurve::Arc { centre: [x, y], radius: rho, .. } => {
                 // the fillet of a tooth and the rounding of a space bulge toward lower angles
                 let lower = (piece.kind == PieceKind::RootFillet) != self.internal;
                 let c = x.hypot(y);
@@ -368,7 +372,7 @@ pub(super) enum FlankShape {
 }
 
 /// The numbers of one wheel that its outline needs.
-struct Wheel {
+struct WheelNumbers {
     section: &'static str,
     internal: bool,
     teeth: u32,
@@ -390,7 +394,7 @@ struct Corner {
     direction: f64,
 }
 
-impl Wheel {
+impl WheelNumbers {
     /// Corner arc of radius `rho` at the circle `radius`; its centre lies on the higher-angle side of the flank
     /// (`side` = 1) or on the lower (-1), and beyond the circle on the same count for an external root or an internal
     /// tip, within it for the others.

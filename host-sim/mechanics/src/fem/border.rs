@@ -95,7 +95,7 @@ impl BorderedSystem {
     }
     /// z alone, for f = 0, in place of g.
     #[must_use]
-    pub fn solve_border(&self, g: &mut [f64]) -> bool {
+    pub(crate) fn solve_border(&self, g: &mut [f64]) -> bool {
         solve_dense(&mut self.schur.clone(), g, self.border.width)
     }
 }

@@ -87,12 +87,12 @@ pub fn edge_shape(xi: f64) -> [f64; 3] {
 
 /// Derivatives of [`edge_shape`] with respect to `xi`.
 #[inline]
-pub fn edge_shape_derivative(xi: f64) -> [f64; 3] {
+pub(crate) fn edge_shape_derivative(xi: f64) -> [f64; 3] {
     [xi - 0.5, -2.0 * xi, xi + 0.5]
 }
 
 /// The four points of the 2 x 2 rule, all of weight 1.
-pub fn integration_points() -> [[f64; 2]; 4] {
+pub(crate) fn integration_points() -> [[f64; 2]; 4] {
     let a = 1.0 / 3.0_f64.sqrt();
     [[-a, -a], [a, -a], [a, a], [-a, a]]
 }

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use crate::suggest::did_you_mean;
+use crate::suggest::UnknownName;
 
 /// Elements of one half sector of a wheel, in each direction.
 ///
@@ -65,6 +65,8 @@ pub enum MeshLevel {
 impl MeshLevel {
     /// All levels, coarse to fine.
     pub const ALL: [MeshLevel; 3] = [MeshLevel::Coarse, MeshLevel::Standard, MeshLevel::Fine];
+    /// Their names.
+    pub const NAMES: [&'static str; 3] = ["coarse", "standard", "fine"];
 
     /// Density of the flexspline. Two rows at the root matter most: the rim bends between the teeth, and one row there
     /// is 0.4″ out in the wind-up of the four-roller drive at 50 N·m, columns and rim rows hardly count.
@@ -91,21 +93,15 @@ impl MeshLevel {
 
 impl fmt::Display for MeshLevel {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            MeshLevel::Coarse => "coarse",
-            MeshLevel::Standard => "standard",
-            MeshLevel::Fine => "fine",
-        })
+        f.write_str(Self::NAMES[*self as usize])
     }
 }
 
 impl FromStr for MeshLevel {
-    type Err = String;
+    type Err = UnknownName;
 
-    fn from_str(text: &str) -> Result<Self, String> {
-        MeshLevel::ALL.into_iter().find(|level| level.to_string() == text).ok_or_else(|| {
-            let hint = did_you_mean("; ", text, ["coarse", "standard", "fine"]);
-            format!("mesh level \"{text}\": allowed are coarse, standard, fine{hint}")
-        })
+    fn from_str(text: &str) -> Result<Self, UnknownName> {
+        let unknown = || UnknownName { what: "mesh level", found: text.to_owned(), known: &Self::NAMES };
+        Self::ALL.into_iter().find(|level| Self::NAMES[*level as usize] == text).ok_or_else(unknown)
     }
 }

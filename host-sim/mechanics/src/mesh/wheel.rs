@@ -113,7 +113,7 @@ impl WheelMesh {
     }
 
     /// Meshes the circular spline with so many elements.
-    pub fn circular_spline_as_fine_as(drive: &Drive, density: &MeshDensity) -> Result<WheelMesh, MeshError> {
+    pub(crate) fn circular_spline_as_fine_as(drive: &Drive, density: &MeshDensity) -> Result<WheelMesh, MeshError> {
         let wheel = &drive.circular_spline;
         let tooth_height = wheel.root_radius_mm - wheel.tip_radius_mm;
         let rim = wheel.outer_radius_mm - wheel.root_radius_mm;
@@ -293,12 +293,12 @@ impl WheelMesh {
     /// Sectors of the same class are congruent: one is the other turned by their distance around the ring. Classes
     /// count from 0 and sector `c` is of class `c`, so that each can be treated once, at its first sector.
     #[inline]
-    pub fn sector_class(&self, sector: usize) -> usize {
+    pub(crate) fn sector_class(&self, sector: usize) -> usize {
         sector % self.sector_classes()
     }
 
     /// How many classes of sectors there are: one, unless the rim varies.
-    pub fn sector_classes(&self) -> usize {
+    pub(crate) fn sector_classes(&self) -> usize {
         self.rim.repeats_after(self.teeth)
     }
 

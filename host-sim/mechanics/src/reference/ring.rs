@@ -46,17 +46,19 @@ impl RingBending {
     }
 
     /// Bending stiffness `E' I` per width, N·mm.
-    pub fn stiffness_n_mm(&self) -> f64 {
+    pub(crate) fn stiffness_n_mm(&self) -> f64 {
         self.modulus_mpa * self.thickness_mm.powi(3) / 12.0
     }
 
     /// Change of curvature `-(w + w'') / R²`, 1/mm, positive where the ring bends tighter.
-    pub fn curvature_change(&self, phi: f64) -> f64 {
+    #[cfg(test)]
+    pub(crate) fn curvature_change(&self, phi: f64) -> f64 {
         -self.shape.bending(phi) / (self.radius_mm * self.radius_mm)
     }
 
     /// Bending stress at the outer fibre, MPa, tension positive: `E' (s/2)` times the change of curvature.
-    pub fn outer_stress_mpa(&self, phi: f64) -> f64 {
+    #[cfg(test)]
+    pub(crate) fn outer_stress_mpa(&self, phi: f64) -> f64 {
         self.modulus_mpa * 0.5 * self.thickness_mm * self.curvature_change(phi)
     }
 

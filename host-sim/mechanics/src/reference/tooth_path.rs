@@ -29,9 +29,8 @@ pub struct ToothPath {
     shape: RingShape,
     /// `R`, mm
     neutral_radius: f64,
-    /// `r_a1`, `r_f1`, mm
+    /// `r_a1`, mm
     flexspline_tip: f64,
-    flexspline_root: f64,
     /// `r_a2`, `r_f2`, mm
     circular_spline_tip: f64,
     circular_spline_root: f64,
@@ -46,7 +45,6 @@ impl ToothPath {
             shape: drive.generator.shape(kind),
             neutral_radius: drive.flexspline.neutral_radius_mm(),
             flexspline_tip: drive.flexspline.tip_radius_mm,
-            flexspline_root: drive.flexspline.root_radius_mm,
             circular_spline_tip: drive.circular_spline.tip_radius_mm,
             circular_spline_root: drive.circular_spline.root_radius_mm,
             ratio: drive.ratio(),
@@ -76,11 +74,6 @@ impl ToothPath {
     /// Tip of the flexspline tooth on its axis, (7) and (9).
     pub fn flexspline_tip(&self, phi: f64) -> PathPoint {
         self.point_at(self.flexspline_tip, phi)
-    }
-
-    /// Root of the flexspline tooth on its axis, (8) and (10).
-    pub fn flexspline_root(&self, phi: f64) -> PathPoint {
-        self.point_at(self.flexspline_root, phi)
     }
 
     fn point_at(&self, radius: f64, phi: f64) -> PathPoint {
@@ -115,7 +108,6 @@ mod tests {
             // working depth 0.675, clearance to the root 0.125
             assert!((major.w_mm - path.circular_spline_tip().w_mm - 0.675).abs() < 0.007, "{kind}: {major:?}");
             assert!((path.circular_spline_root().w_mm - major.w_mm - 0.125).abs() < 0.007, "{kind}: {major:?}");
-            assert!((path.flexspline_tip(0.3).w_mm - path.flexspline_root(0.3).w_mm - 0.95).abs() < 1e-3);
         }
     }
 

@@ -35,7 +35,7 @@ pub struct Addition {
 
 impl Flexspline3d {
     /// What harmonic n (of 2 or more) adds to the plane slice.
-    pub fn addition(&self, n: u32) -> Addition {
+    pub(crate) fn addition(&self, n: u32) -> Addition {
         let whole = self.at(n).band_and_turn();
         let oval = [1.0, -1.0 / f64::from(n)];
         let force = self.rest(n, &whole).map(|row| row[0] * oval[0] + row[1] * oval[1]);

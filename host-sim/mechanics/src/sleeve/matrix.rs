@@ -27,7 +27,7 @@ impl Symmetric {
     }
 
     /// Adds the stiffness of an element, packed, whose displacements each follow unknowns here, by weights.
-    pub fn add_following(&mut self, stiffness: &[f64], follows: &[impl AsRef<[(usize, f64)]>]) {
+    pub(crate) fn add_following(&mut self, stiffness: &[f64], follows: &[impl AsRef<[(usize, f64)]>]) {
         for (i, row) in follows.iter().enumerate() {
             for (j, column) in follows.iter().enumerate() {
                 let value = stiffness[packed_index(i, j)];
@@ -41,7 +41,7 @@ impl Symmetric {
     }
 
     /// Adds a smaller matrix whose unknown k is `at[k]` here.
-    pub fn add_at<const N: usize>(&mut self, part: &[[f64; N]; N], at: [usize; N]) {
+    pub(crate) fn add_at<const N: usize>(&mut self, part: &[[f64; N]; N], at: [usize; N]) {
         for (row, &i) in part.iter().zip(&at) {
             for (value, &j) in row.iter().zip(&at) {
                 self.add(i, j, *value);
@@ -50,7 +50,7 @@ impl Symmetric {
     }
 
     /// The energy `½ x^T K x` in unknowns y with `x_i = sum_k basis[k][i] y_k`.
-    pub fn in_basis(&self, basis: &[Vec<f64>]) -> Symmetric {
+    pub(crate) fn in_basis(&self, basis: &[Vec<f64>]) -> Symmetric {
         let times = |x: &[f64]| -> Vec<f64> {
             self.entries.chunks_exact(self.size).map(|row| row.iter().zip(x).map(|(a, b)| a * b).sum()).collect()
         };
@@ -134,7 +134,7 @@ impl Symmetric {
     }
 
     /// Work `f^T K^-1 f` of a load, some unknowns held.
-    pub fn work_of(&self, load: &[f64], held: &[usize]) -> f64 {
+    pub(crate) fn work_of(&self, load: &[f64], held: &[usize]) -> f64 {
         // One unknown more, that carries the load: K x = f z with z = 1 leaves -f^T K^-1 f on its diagonal.
         let n = self.size;
         let mut bordered = Symmetric::zeros(n + 1);

@@ -27,5 +27,5 @@ pub use model::{Flexspline3d, Harmonic, Rollers};
 pub use plate::{Plate, PlateEdge};
 pub use shape::Station;
 pub use shell::{Ribs, Shell};
-pub use tooth::pair_compliance;
+pub(crate) use tooth::pair_compliance;
 pub use tube::{End, Tube};

@@ -71,7 +71,7 @@ impl Rim {
 
     /// Stiffness of the band in its W, tilt, mean V, and slope of V along the axis: loads around the rim are spread
     /// evenly over the lines.
-    pub fn band_and_turn(&self) -> Symmetric {
+    pub(crate) fn band_and_turn(&self) -> Symmetric {
         let of = |k: usize| self.lines.iter().map(move |first| first + k);
         let keep: Vec<usize> = of(W).chain(of(V)).collect();
         let none = vec![0.0; LINES];

@@ -23,7 +23,7 @@ pub struct Station {
 }
 
 /// All nodes along the axis, in one matrix.
-struct Axis {
+struct AxialNodes {
     matrix: Symmetric,
     /// First unknown and place of each node, of the rim and its tubes together, in order.
     nodes: Vec<(usize, f64)>,
@@ -64,7 +64,7 @@ impl Flexspline3d {
         axis.nodes.iter().map(station).collect()
     }
 
-    fn axis(&self, n: u32) -> Axis {
+    fn axis(&self, n: u32) -> AxialNodes {
         let half = 0.5 * self.width_mm;
         // Walls in order: tube to the flange, rim, tube to the bottom.
         let mut pieces: Vec<(Shell, Vec<f64>)> = Vec::new();
@@ -140,7 +140,7 @@ impl Flexspline3d {
             (*first, *x)
         };
         let lines = places.iter().map(line).collect();
-        Axis { matrix, nodes, lines, held }
+        AxialNodes { matrix, nodes, lines, held }
     }
 }
 

@@ -11,7 +11,7 @@ use crate::mesh::{MeshError, MeshLevel, WheelMesh, rotate};
 /// Plane FEM of one pitch of each wheel, all teeth loaded alike by a uniform pressure over the flank. What lies deeper
 /// than one tooth height below the root is held: that moves with the neighbouring slices. Twice that depth adds 6 % for
 /// HHD-95 (a test).
-pub fn pair_compliance(drive: &Drive) -> Result<f64, MeshError> {
+pub(crate) fn pair_compliance(drive: &Drive) -> Result<f64, MeshError> {
     let plain = Drive { as_built: Default::default(), ..drive.clone() };
     let material = PlaneStrain::new(drive.material.youngs_modulus_mpa, drive.material.poissons_ratio);
     let (f, c) = (&plain.flexspline, &plain.circular_spline);

@@ -34,7 +34,7 @@ pub struct CondensedDrive {
     pub circular_spline: CondensedWheel,
     /// Frames at rest of the flexspline cells and of the circular-spline cells.
     frames: [Vec<Turn>; 2],
-    faces: Vec<Face>,
+    faces: Vec<CellFace>,
 }
 
 /// Sine and cosine of an angle.
@@ -42,7 +42,7 @@ type Turn = (f64, f64);
 
 /// A face between two cells: its block, its unknowns, and its frame.
 #[derive(Debug, Clone)]
-struct Face {
+struct CellFace {
     block: usize,
     unknowns: Range<usize>,
     turn: Turn,
@@ -60,7 +60,7 @@ impl CondensedDrive {
         let first = 2 * flexspline.skin.mesh.nodes.len();
         let circular_spline = CondensedWheel::new(circular_spline, material, first, held);
         let (fs, cs) = (&flexspline.skin.mesh, &circular_spline.skin.mesh);
-        let face = |block: usize, first: usize, size: usize, angle: f64| Face {
+        let face = |block: usize, first: usize, size: usize, angle: f64| CellFace {
             block,
             unknowns: first..first + size,
             turn: angle.sin_cos(),

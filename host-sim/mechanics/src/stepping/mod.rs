@@ -1,7 +1,10 @@
 //! Quasi-static stepping of the whole drive: state, travelling-wave predictor, Newton, paths.
 
+mod continuation;
+mod convergence;
 mod error;
 mod fast;
+mod line_search;
 mod near;
 mod newton;
 mod passed;

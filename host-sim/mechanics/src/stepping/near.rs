@@ -57,12 +57,12 @@ impl NearPairs {
     }
 
     /// Takes no pair for open any more.
-    pub fn look_again(&mut self) {
+    pub(crate) fn look_again(&mut self) {
         self.pairs.values_mut().for_each(|near| near.open_until = 0.0);
     }
 
     /// Whether pairs that were out of reach may have come near.
-    pub fn must_search(&self) -> bool {
+    pub(crate) fn must_search(&self) -> bool {
         self.moved >= self.searched_until
     }
 
@@ -117,7 +117,7 @@ impl NearPairs {
     }
 
     /// Whether the corners of the spaces still face the places they were laid out for.
-    pub fn layouts_fit(&self, flanks: &FlankContact, at: Configuration) -> bool {
+    pub(crate) fn layouts_fit(&self, flanks: &FlankContact, at: Configuration) -> bool {
         let touching = self
             .pairs
             .iter()

@@ -4,22 +4,30 @@
 //! Lagrange multiplier when the sleeve is rigid), its lateral force, and those of its shells on waves of the bore. One
 //! increment:
 //!
-//! predict, lay out the contact; repeat { assemble; done? factorise; solve; update } until done.
+//! predict, lay out the contact; repeat { assemble; done? factorise; solve; go along the step } until done.
+//!
+//! [`Convergence`] says when it is done, [`LineSearch`] how far along a step it goes, [`Continuation`] by which parts
+//! of an increment, and a [`ContactStage`] how hard contact is.
 
 use std::collections::VecDeque;
 use std::rc::Rc;
 use std::time::{Duration, Instant};
 
-use crate::contact::{AlongFace, BoreLaw, Configuration, FlankContact, FlankLaw, FlankPair, Lean};
+use crate::contact::{AlongFace, Configuration, FlankContact, FlankLaw, FlankPair, Lean};
 use crate::fem::{Border, BorderedSystem};
 
+use super::continuation::{
+    ContactStage, Continuation, DEFORMING_SOFTNESS, JUMPING_SOFTNESS, LOADING_SOFTNESS, Sought, Way,
+};
+use super::convergence::{Convergence, WorkLimit};
 use super::error::SolveError;
 use super::fast::{CondensedWheels, Kept};
+use super::line_search::{LineSearch, MOST_TRIALS, Trial};
 use super::near::{NearPairs, configuration};
 use super::passed::Passed;
 use super::problem::Problem;
 use super::reference::SparseWheels;
-use super::slip::{Field, Slipping};
+use super::slip::{NodalField, Slipping};
 use super::state::State;
 use super::step::{ANCHORED, BORDERS, LATERAL, OUTPUT, Residual, SLEEVE, Step, improve};
 use super::wheels::Wheels;
@@ -31,61 +39,9 @@ const PATTERN_REACH: f64 = 0.04;
 pub(super) const ANCHOR: f64 = 1e5;
 /// Springs (N/mm per mm) that are tried in turn when the tangent is not positive definite.
 const GROUNDED_SPRINGS: [f64; 4] = [1e-3, 1e-1, 1e1, 1e3];
-/// Largest change of a displacement that an undamped Newton step may make, modules: a drive twice as large goes the
-/// same way.
-const LARGEST_STEP: f64 = 0.2;
-/// Largest first step of a changing load, N m.
-const LARGEST_LOAD_STEP: f64 = 100.0;
-/// Factors on the penalties while the way to a new load is found.
-const LOADING_SOFTNESS: [f64; 3] = [1e-3, 3e-2, 1.0];
-/// No way at all: contact as hard as it is.
-const DIRECTLY: [f64; 1] = [1.0];
-/// Factors on the penalties on the way to a far place: of 1, 0.1, 0.03, 0.01 and (0.001, 0.03) before 1 this takes the
-/// fewest iterations where most are needed (20 to 30; cam, 5 µm of eccentricity and pitch errors, 4 and 100 N·m).
-const JUMPING_SOFTNESS: [f64; 2] = [1e-2, 1.0];
-/// Relative residual at which a stage with soft contact is done: it only finds the way. Drives of all four generators
-/// to their rated load and over a tooth pitch (HHD-95, coarse) take 1002 iterations with the tolerance of the last
-/// stage, 877 with 1e-2, 825 with 1e-1, and end within 1e-5″ of one another.
-const FOUND_THE_WAY: f64 = 0.1;
-/// Share of the new load from which on the load that there is shows the way by itself, and contact need not be softened
-/// first: the same drives then take 716 iterations. A guess: between the loads of a data sheet it is 0.19 and more,
-/// from its light touch on 0.005.
-const SHOWS_THE_WAY: f64 = 0.03;
-/// Stiffness of the bore (N/mm³) below which it is not softened: the softest penalty on the way to a new load.
-const SOFTEST_BORE: f64 = 1e3;
-/// Soft stages of further ways to deform a drive whose usual way ends, each with patience. Rollers in a soft bearing
-/// creep: a CSG-32-120 with cup and balls and a rim of 1.05 mm takes 97 iterations, of 0.8 and 1.3 mm 34 and 43.
-const DEFORMING_SOFTNESS: [&[f64]; 3] = [&[1e-3, 1.0], &[1e-3, 3e-2, 1.0], &[1e-2, 1e-1, 1.0]];
-/// Iterations of one increment, all its parts and ways together, over those that Newton has before an increment is
-/// halved: so much work at most, whatever it leads to. A guess, far above what increments that converge take.
-const MOST_WORK: usize = 100;
 /// Share of the output's largest stiffness below which a load that finds no equilibrium is taken for one that the drive
 /// does not bear: it softens as teeth begin to climb over one another. A guess: half.
 const GIVES_WAY: f64 = 0.5;
-/// Iterations after which the next part of an increment may be twice as large.
-const EASY: usize = 10;
-/// Halvings after which Newton is given so many times the iterations. Heavily loaded rollers creep along their way, and
-/// halving does not shorten it: of nine drives that failed with 60 iterations at 63 % of their rated load and more,
-/// eight converge with 200, in less time than failing took.
-const PATIENT_AFTER: usize = 2;
-const PATIENCE: usize = 4;
-
-/// Share of the force along a step that may act back at its end. Where contact opens and closes with each step,
-/// iterations that give back nearly all they took go round in a circle: after so many they may give back less.
-/// (Straight teeth that wedge in a cup, loaded to 24 N·m.)
-const RETURNS: f64 = 0.9;
-const RETURNS_LITTLE: f64 = 0.3;
-const GOES_ROUND_AFTER: usize = 25;
-
-/// Halvings of a step after which the pairs that were open are looked at again before it is made shorter still: far
-/// from equilibrium a flank may come past the tip of a space, where its gap changes by more than it moves, and bear in
-/// a state that took it for open. Not while the drive is assembled: from so far off a step that took in all that bears
-/// may carry every flank out of reach, and then nothing holds an output without drag.
-const LOOKS_BACK_AT: usize = 5;
-
-/// Relative residual below which steps are taken whole: what is left is near round-off.
-const ROUND_OFF: f64 = 1e-6;
-
 /// Gain of an iteration after which the last factor serves again.
 const CHORD_GAIN: f64 = 0.2;
 /// Fraction of a pitch off which a tangent of an earlier pitch still serves, and the gain that each iteration must then
@@ -94,31 +50,18 @@ const RECALL_WITHIN: f64 = 0.06;
 const RECALL_GAIN: f64 = 0.3;
 /// A tangent made further from equilibrium than this (relative residual) knows the wrong contact.
 const KEEP_BELOW: f64 = 0.1;
-/// Layouts of the contact in one increment.
-const MOST_LAYOUTS: usize = 3;
-/// Halvings of a step along which forces turn round: it is taken then as it is.
-const MOST_TRIALS: usize = 10;
 /// Parts of one increment at most. *Guess*: a load of 100 kN m that comes on without a single easy part has 1000.
 const MOST_PARTS: usize = 10_000;
 /// Stiffness (N mm/mm per rad) of an output that nothing holds and nothing turns, so that the wheels have a step. Of
 /// any size: no torque acts on it.
 const HOLDS_A_FREE_OUTPUT: f64 = 1.0;
+/// Why a step cannot be had.
+const NOT_DEFINITE: &str = "the stiffness matrix is not positive definite";
 /// Why Newton finds no place for an output that nothing holds.
 const FLOATS: &str = "without load and without drag nothing holds the output within its clearance; give it a load, or \
                       output.drag_torque_n_m";
 /// Tangents remembered.
 const TANGENTS: usize = 12;
-
-/// How a new load is brought on.
-#[derive(Clone, Copy, PartialEq)]
-enum Way {
-    /// With contact as hard as it is.
-    Directly,
-    /// With soft contact first, which only finds the way.
-    Softly,
-    /// With soft contact first, each stage brought to its end.
-    Carefully,
-}
 
 /// A converged increment.
 #[derive(Debug, Clone)]
@@ -202,20 +145,11 @@ pub struct Solver<'p> {
     tangents: VecDeque<Tangent>,
     /// What the tangent leaves out.
     slipping: Slipping,
-    /// Factor on the penalties, below 1 only while the way to a new shape or load is found.
-    softening: f64,
-    /// While the drive is assembled its flanks slip freely.
-    assembling: bool,
-    /// Soft stages only find the way, and end early.
-    hurries: bool,
-    /// Newton has [`PATIENCE`].
-    patient: bool,
     /// The states passed in steady motion.
     passed: Passed,
     /// Motion of the ends of a face for displacements of 1 mm, at most.
     leans_within: f64,
-    /// Iterations of this increment so far, and the least compliance under load that was met, rad/(N m).
-    work: usize,
+    /// Least compliance under load that was met, rad/(N m).
     stiffest: f64,
     /// Time spent so far.
     pub effort: Effort,
@@ -248,13 +182,8 @@ impl<'p> Solver<'p> {
             made_at: f64::INFINITY,
             tangents: VecDeque::new(),
             slipping: Slipping::default(),
-            softening: 1.0,
-            assembling: false,
-            hurries: false,
-            patient: false,
             passed: Passed::default(),
             leans_within: problem.leans_within(),
-            work: 0,
             stiffest: f64::INFINITY,
             effort: Effort::default(),
         }
@@ -262,35 +191,18 @@ impl<'p> Solver<'p> {
 
     /// The flexspline deformed by the generator at `generator_rad`, without load.
     pub fn deform(&mut self, generator_rad: f64) -> Result<(State, Increment), SolveError> {
-        self.work = 0;
-        let first = self.deform_by(DEFORMING_SOFTNESS[0], generator_rad);
+        let mut work = WorkLimit::new(&self.problem.settings);
+        let shape = self.problem.starting_shape(generator_rad);
+        // All of a conforming generator touches at once; a soft contact first finds which part stays.
+        let stage = ContactStage { assembling: true, ..ContactStage::default() };
+        let sought = Sought { from: &shape, generator_rad, torque_n_m: 0.0, stage };
+        let first = self.newton_softly(sought, DEFORMING_SOFTNESS[0], &mut work);
         if !matches!(first, Err(SolveError::NotConverged { .. })) {
             return first;
         }
-        self.patient = true;
-        let found = DEFORMING_SOFTNESS.iter().find_map(|stages| self.deform_by(stages, generator_rad).ok());
-        self.patient = false;
+        let patiently = Sought { stage: ContactStage { patient: true, ..stage }, ..sought };
+        let found = DEFORMING_SOFTNESS.iter().find_map(|soft| self.newton_softly(patiently, soft, &mut work).ok());
         found.map_or(first, Ok)
-    }
-
-    /// The flexspline deformed with contact that is soft at first: factors on the penalties, the last of them 1.
-    fn deform_by(&mut self, stages: &[f64], generator_rad: f64) -> Result<(State, Increment), SolveError> {
-        let mut state = self.problem.starting_shape(generator_rad);
-        // All of a conforming generator touches at once; a soft contact first finds which part stays.
-        let mut iterations = 0;
-        for &softening in stages {
-            (self.softening, self.assembling) = (softening, true);
-            let solved = self.newton(&state, &state, generator_rad, 0.0);
-            (self.softening, self.assembling) = (1.0, false);
-            let (next, mut increment) = solved?;
-            iterations += increment.iterations;
-            increment.iterations = iterations;
-            state = next;
-            if softening == 1.0 {
-                return Ok((state, increment));
-            }
-        }
-        unreachable!("the last softening is 1")
     }
 
     /// Turns the generator to `generator_rad` and brings the load to `torque_n_m`, in one increment or, where Newton
@@ -301,87 +213,42 @@ impl<'p> Solver<'p> {
         generator_rad: f64,
         torque_n_m: f64,
     ) -> Result<(State, Increment), SolveError> {
-        self.work = 0;
-        let solved = self.in_parts(from, generator_rad, torque_n_m);
-        self.patient = false;
-        solved
-    }
-
-    fn in_parts(
-        &mut self,
-        from: &State,
-        generator_rad: f64,
-        torque_n_m: f64,
-    ) -> Result<(State, Increment), SolveError> {
+        let mut work = WorkLimit::new(&self.problem.settings);
+        let mut way = Continuation::new(from, generator_rad, torque_n_m);
         let mut state = from.clone();
-        let mut iterations = 0;
         let mut compliance = None;
-        let beyond = |error, reached: &State, softened_to| match error {
-            SolveError::NotConverged { generator_rad, torque_n_m, reason, history, .. } => SolveError::NotConverged {
-                generator_rad,
-                torque_n_m,
-                reached_n_m: reached.torque_n_m,
-                softened_to,
-                reason,
-                history,
-            },
-            error => error,
-        };
-        let (turn, load) = (generator_rad - from.generator_rad, torque_n_m - from.torque_n_m);
-        // A load that comes on from nothing is best brought on in a few steps.
-        let first = if load.abs() > LARGEST_LOAD_STEP { LARGEST_LOAD_STEP / load.abs() } else { 1.0 };
-        let (mut done, mut part, mut halvings) = (0.0_f64, first, 0_usize);
         for _ in 0..MOST_PARTS {
-            let to = (done + part).min(1.0);
-            match self.solve_part(&state, from.generator_rad + turn * to, from.torque_n_m + load * to) {
+            let stage = ContactStage { patient: way.patient, ..ContactStage::default() };
+            let [generator_rad, torque_n_m] = way.next();
+            match self.solve_part(Sought { from: &state, generator_rad, torque_n_m, stage }, &mut work) {
                 Ok((next, mut increment)) => {
-                    iterations += increment.iterations;
                     self.problem.check_range(&next)?;
                     state = next;
                     compliance = Some(increment.compliance_rad_per_n_m);
                     if state.torque_n_m != 0.0 {
                         self.stiffest = self.stiffest.min(increment.compliance_rad_per_n_m);
                     }
-                    done = to;
-                    if done >= 1.0 {
-                        increment.iterations = iterations;
+                    if way.advance(increment.iterations) {
+                        increment.iterations = way.iterations;
                         return Ok((state, increment));
                     }
-                    if increment.iterations <= EASY {
-                        part *= 2.0;
-                        halvings = halvings.saturating_sub(1);
+                }
+                Err(SolveError::NotConverged { history, .. }) if way.may_halve(self.problem) && work.is_left() => {
+                    way.halve(history.len());
+                }
+                Err(mut error) => {
+                    if let SolveError::NotConverged { reached_n_m, softened_to, .. } = &mut error {
+                        let left = compliance.map(|now| self.stiffest / now);
+                        *reached_n_m = state.torque_n_m;
+                        *softened_to = left.filter(|left| *left < GIVES_WAY && way.changes_load());
                     }
-                }
-                Err(SolveError::NotConverged { history, .. })
-                    if halvings < self.problem.settings.max_halvings
-                        && (turn != 0.0 || load != 0.0)
-                        && self.work < self.most_work() =>
-                {
-                    iterations += history.len();
-                    part *= 0.5;
-                    halvings += 1;
-                    self.patient = halvings >= PATIENT_AFTER;
-                }
-                Err(error) => {
-                    let softened_to = compliance.map(|now| self.stiffest / now).filter(|left| *left < GIVES_WAY);
-                    return Err(beyond(error, &state, softened_to.filter(|_| load != 0.0)));
+                    return Err(error);
                 }
             }
         }
         let reason = "the increment falls into too many parts";
-        Err(SolveError::NotConverged {
-            generator_rad,
-            torque_n_m,
-            reached_n_m: state.torque_n_m,
-            softened_to: None,
-            reason,
-            history: Vec::new(),
-        })
-    }
-
-    /// Iterations that one increment may take in all.
-    fn most_work(&self) -> usize {
-        MOST_WORK * self.problem.settings.max_iterations
+        let (reached_n_m, history) = (state.torque_n_m, Vec::new());
+        Err(SolveError::NotConverged { generator_rad, torque_n_m, reached_n_m, softened_to: None, reason, history })
     }
 
     /// Turns the generator on, by whole flexspline pitches and under the same load, to a place where an imperfect drive
@@ -390,237 +257,220 @@ impl<'p> Solver<'p> {
     pub fn jump(&mut self, from: &State, generator_rad: f64) -> Result<(State, Increment), SolveError> {
         // The output goes on at its mean rate, whatever it did last.
         let from = &State { output_rate: 1.0 / self.problem.drive.ratio(), ..from.clone() };
-        self.work = 0;
-        let solved = self.newton_softly(from, generator_rad, from.torque_n_m, &JUMPING_SOFTNESS)?;
+        let sought = Sought { from, generator_rad, torque_n_m: from.torque_n_m, stage: ContactStage::default() };
+        let solved = self.newton_softly(sought, &JUMPING_SOFTNESS, &mut WorkLimit::new(&self.problem.settings))?;
         self.problem.check_range(&solved.0)?;
         Ok(solved)
     }
 
-    /// One part of an increment. A load that changes has no predictor: unless the load that there is shows the way, a
-    /// soft contact finds it first. Where one does not lead there the other may: teeth that bind without load sink into
-    /// one another while they are soft, and wedge (two rollers in a hat, loaded to twice the drag). Last of all each
-    /// soft stage is brought to its end.
-    fn solve_part(
-        &mut self,
-        from: &State,
-        generator_rad: f64,
-        torque_n_m: f64,
-    ) -> Result<(State, Increment), SolveError> {
+    /// One part of an increment, by each of the ways to its load until one leads there.
+    fn solve_part(&mut self, sought: Sought<'_>, work: &mut WorkLimit) -> Result<(State, Increment), SolveError> {
+        let Sought { from, torque_n_m, stage, .. } = sought;
         if torque_n_m == from.torque_n_m {
-            let turned = self.newton(from, from, generator_rad, torque_n_m);
-            return match turned {
-                // Halved as often as this, the way is not too long but blocked: with two rollers in a hat, teeth that
-                // wedge.
-                Err(SolveError::NotConverged { .. }) if self.patient => {
-                    self.newton_softly(from, generator_rad, torque_n_m, &LOADING_SOFTNESS)
-                }
-                turned => turned,
-            };
+            let turned = self.newton(sought, from, work);
+            // Halved as often as this, the way is not too long but blocked: with two rollers in a hat, teeth that
+            // wedge.
+            let blocked = stage.patient && matches!(turned, Err(SolveError::NotConverged { .. }));
+            return if blocked { self.newton_softly(sought, &LOADING_SOFTNESS, work) } else { turned };
         }
-        let share = from.torque_n_m / torque_n_m;
-        let shows_the_way = (SHOWS_THE_WAY..=SHOWS_THE_WAY.recip()).contains(&share);
         let mut last = None;
-        let ways = if shows_the_way {
-            [Way::Directly, Way::Softly, Way::Carefully]
-        } else {
-            [Way::Softly, Way::Directly, Way::Carefully]
-        };
-        for way in ways {
-            self.hurries = way == Way::Softly;
-            let softness = if way == Way::Directly { &DIRECTLY[..] } else { &LOADING_SOFTNESS };
-            let solved = self.newton_softly(from, generator_rad, torque_n_m, softness);
-            self.hurries = false;
-            match solved {
-                Err(SolveError::NotConverged { .. }) => last = Some(solved),
+        for way in Way::to_load(from.torque_n_m, torque_n_m) {
+            let stage = ContactStage { hurries: way == Way::Softly, ..stage };
+            match self.newton_softly(Sought { stage, ..sought }, way.softness(), work) {
+                Err(error @ SolveError::NotConverged { .. }) => last = Some(error),
                 solved => return solved,
             }
         }
-        last.expect("there are three ways")
+        Err(last.expect("there are three ways"))
     }
 
-    /// Newton with contact that is soft at first: factors on the penalties in turn, the last of them 1.
+    /// Newton with contact that is soft at first: by these factors on the penalties in turn, then as hard as it is.
     fn newton_softly(
         &mut self,
-        from: &State,
-        generator_rad: f64,
-        torque_n_m: f64,
+        sought: Sought<'_>,
         softness: &[f64],
+        work: &mut WorkLimit,
     ) -> Result<(State, Increment), SolveError> {
-        let mut guess = from.clone();
+        let mut guess = sought.from.clone();
         let mut iterations = 0;
         for &softening in softness {
-            self.softening = softening;
-            let solved = self.newton(from, &guess, generator_rad, torque_n_m);
-            self.softening = 1.0;
-            let (state, mut increment) = solved?;
+            let stage = ContactStage { softening: Some(softening), ..sought.stage };
+            let (state, increment) = self.newton(sought.at(stage, &guess), &guess, work)?;
             iterations += increment.iterations;
-            if softening == 1.0 {
-                increment.iterations = iterations;
-                return Ok((state, increment));
-            }
             guess = state;
         }
-        unreachable!("the last softening is 1")
+        let (state, mut increment) = self.newton(sought.at(sought.stage, &guess), &guess, work)?;
+        increment.iterations += iterations;
+        Ok((state, increment))
     }
 
-    /// Equilibrium at this angle and load, looked for from `guess`; slip and drag are counted from the state `from`.
+    /// Equilibrium at this angle and load, looked for from `guess`.
     fn newton(
         &mut self,
-        from: &State,
+        sought: Sought<'_>,
         guess: &State,
-        generator_rad: f64,
-        torque_n_m: f64,
+        work: &mut WorkLimit,
     ) -> Result<(State, Increment), SolveError> {
-        let settings = self.problem.settings;
-        let largest_step = LARGEST_STEP * self.problem.drive.flexspline.module_mm;
-        let tolerance = if self.hurries && self.softening < 1.0 {
-            FOUND_THE_WAY.max(settings.tolerance)
-        } else {
-            settings.tolerance
-        };
-        let failed = |history: Vec<f64>, reason| SolveError::NotConverged {
+        let Sought { generator_rad, torque_n_m, stage, .. } = sought;
+        let settings = &self.problem.settings;
+        let mut convergence = Convergence::new(stage.tolerance(settings), stage.most_iterations(settings));
+        self.iterate(sought, guess, &mut convergence, work).map_err(|reason| SolveError::NotConverged {
             generator_rad,
             torque_n_m,
             reached_n_m: torque_n_m,
             softened_to: None,
             reason,
-            history,
-        };
-        let most_work = self.most_work();
+            history: convergence.history,
+        })
+    }
+
+    /// Newton's iterations, or why they lead nowhere.
+    fn iterate(
+        &mut self,
+        sought: Sought<'_>,
+        guess: &State,
+        convergence: &mut Convergence,
+        work: &mut WorkLimit,
+    ) -> Result<(State, Increment), &'static str> {
+        let Sought { from, generator_rad, torque_n_m, stage } = sought;
         let predicted = self.passed.predict(self.problem, guess, generator_rad, torque_n_m);
         let mut state = State { drag_anchor_rad: from.drag_anchor_rad, friction: from.friction.clone(), ..predicted };
         self.problem.lean(&mut state);
         let mut near = NearPairs::default();
-        self.balance_output(&mut state, from, torque_n_m, &mut near);
-        let mut residual = self.assemble(&mut state, from, torque_n_m, &mut near);
-        let mut history = Vec::new();
-        let mut last_length = 1.0;
-        let (mut looked_back, mut looked_at_all, mut held) = (false, false, false);
+        self.balance_output(&mut state, sought, &mut near);
+        let mut residual = self.assemble(&mut state, sought, &mut near);
+        let mut held = false;
         let mut chords: Vec<Step> = Vec::new();
-        let steady = self.softening == 1.0 && self.passed.go_on(guess, torque_n_m);
-        let mut recalled = steady && generator_rad != guess.generator_rad && self.recall(generator_rad);
-        // A new layout of the contact is a new start, up to a few times.
-        let most_iterations = settings.max_iterations * if self.patient { PATIENCE } else { 1 };
-        let (mut last_iteration, mut layouts) = (most_iterations, 0);
-        while history.len() <= last_iteration {
-            let relative = residual.relative();
-            history.push(relative);
-            self.work += 1;
-            if self.work > most_work {
-                return Err(failed(history, "the increment takes more work than it may"));
-            }
-            if !relative.is_finite() {
-                return Err(failed(history, "the residual is not finite"));
-            }
+        let mut search = LineSearch::new(self.problem, stage);
+        let steady = stage.softening.is_none() && self.passed.go_on(guess, torque_n_m);
+        search.recalled = steady && generator_rad != guess.generator_rad && self.recall(generator_rad);
+        while convergence.goes_on() {
+            convergence.push(residual.relative(), work)?;
             // While contact is soft it may touch nothing: that only shows the way.
-            if relative <= tolerance && (!residual.free_output || self.softening < 1.0) {
-                if !looked_at_all && near.missed(&self.flanks, configuration(&state)) {
-                    looked_at_all = true;
-                    near.look_again();
-                    residual = self.assemble(&mut state, from, torque_n_m, &mut near);
-                    continue;
+            if convergence.is_met() && (!residual.free_output || stage.softening.is_some()) {
+                if self.contact_stands(&state, &mut near, convergence) {
+                    return self.converged(state, sought, &near, &residual, convergence.history.len() - 1);
                 }
-                // The contact was laid out for the predicted state; where the corner of a space ended elsewhere, again.
-                if near.layouts_fit(&self.flanks, configuration(&state)) {
-                    let Some(compliance) = self.compliance(&residual) else {
-                        return Err(failed(history, "the stiffness matrix is not positive definite"));
-                    };
-                    let mut increment = self.report(&state, &residual, compliance, history.len() - 1);
-                    if self.softening == 1.0 {
-                        let (at, law) = (configuration(&state), self.flank_law());
-                        let modulus_mpa = self.problem.contact_modulus_mpa();
-                        increment.peak_pressure_mpa[0] = near.peak_pressure_mpa(&self.flanks, at, law, modulus_mpa);
-                    }
-                    self.wheels.complete(&mut state);
-                    self.finish(&mut state, from, &near);
-                    if generator_rad != from.generator_rad && self.softening == 1.0 {
-                        if !self.passed.remember(self.problem, &state) {
-                            self.tangents.clear();
-                        }
-                        self.keep_tangent(state.generator_rad);
-                    }
-                    return Ok((state, increment));
-                }
-                layouts += 1;
-                if layouts <= MOST_LAYOUTS {
-                    last_iteration = history.len() + most_iterations;
-                }
-                near.clear();
-                residual = self.assemble(&mut state, from, torque_n_m, &mut near);
+                residual = self.assemble(&mut state, sought, &mut near);
                 continue;
             }
             if residual.free_output && !held {
                 let stood = state.output_rad;
-                self.balance_output(&mut state, from, torque_n_m, &mut near);
-                residual = self.assemble(&mut state, from, torque_n_m, &mut near);
+                self.balance_output(&mut state, sought, &mut near);
+                residual = self.assemble(&mut state, sought, &mut near);
                 // No flank in reach, and no load that turns it: it stays while the wheels go on.
                 held = residual.free_output && state.output_rad == stood && residual.border[OUTPUT] == 0.0;
                 continue;
             }
             held = false;
             // While it makes good progress an old factor serves again: a step with it costs a tenth.
-            let gain = last_gain(&history);
-            recalled &= history.len() == 1 || gain < RECALL_GAIN;
-            let chord = recalled || gain < CHORD_GAIN;
-            let Some(mut step) = self.solve(&residual, chord) else {
-                return Err(failed(history, "the stiffness matrix is not positive definite"));
-            };
+            let gain = convergence.gain();
+            search.recalled &= convergence.history.len() == 1 || gain < RECALL_GAIN;
+            let chord = search.recalled || gain < CHORD_GAIN;
+            let mut step = self.solve(&residual, chord).ok_or(NOT_DEFINITE)?;
             if chord {
                 improve(&mut step, &chords);
             } else {
                 chords.clear();
-                self.made_at = relative;
+                self.made_at = convergence.relative();
             }
-            // The force along the step falls from `before` to nothing at the end of a perfect step; far beyond, halve
-            // it.
-            let before = step.work(&residual);
-            let mut length = (largest_step / step.largest()).min(1.0).min(8.0 * last_length);
-            let motion = self.motion(&step);
-            near.advance(length * motion);
-            let mut mistaken = false;
-            for trial in 0..=MOST_TRIALS {
-                // Teeth that come near from here on need their flanks in this state, too: the next candidate starts
-                // from it.
-                if near.must_search() {
-                    self.wheels.complete(&mut state);
+            search.begin(&step, &residual, convergence);
+            match self.go_along(&step, &mut state, sought, &mut near, &mut search) {
+                Some(at_its_end) => {
+                    residual = at_its_end;
+                    // A shortened step says nothing about the tangent.
+                    if search.length == 1.0 { chords.push(step) } else { chords.clear() }
                 }
-                let mut candidate = step.applied_to(&state, length);
-                self.wheels.follow(&mut candidate);
-                residual = self.assemble(&mut candidate, from, torque_n_m, &mut near);
-                let may_return = if history.len() > GOES_ROUND_AFTER { RETURNS_LITTLE } else { RETURNS };
-                let overshoot = before > 0.0 && step.work(&residual) < -may_return * before;
-                if !overshoot || relative < ROUND_OFF || trial == MOST_TRIALS {
-                    state = candidate;
-                    break;
-                }
-                if recalled || (trial == LOOKS_BACK_AT && !looked_back && !self.assembling) {
-                    mistaken = true;
-                    break;
-                }
-                length *= 0.5;
-                near.advance(length * motion);
-            }
-            if mistaken {
-                looked_back = !recalled;
-                recalled = false;
-                near.advance(length * motion);
-                if looked_back {
-                    near.look_again();
-                }
-                residual = self.assemble(&mut state, from, torque_n_m, &mut near);
-                continue;
-            }
-            looked_back = false;
-            last_length = length;
-            // A shortened step says nothing about the tangent.
-            if length == 1.0 {
-                chords.push(step);
-            } else {
-                chords.clear();
+                None => residual = self.assemble(&mut state, sought, &mut near),
             }
         }
         let floats = torque_n_m == 0.0 && self.problem.drag == 0.0;
-        Err(failed(history, if floats { FLOATS } else { "the iterations ran out" }))
+        Err(if floats { FLOATS } else { "the iterations ran out" })
+    }
+
+    /// Goes along a step as far as forces do not turn round; what is out of balance there, or nothing where the step
+    /// was mistaken.
+    fn go_along(
+        &mut self,
+        step: &Step,
+        state: &mut State,
+        sought: Sought<'_>,
+        near: &mut NearPairs,
+        search: &mut LineSearch,
+    ) -> Option<Residual> {
+        let motion = self.motion(step);
+        near.advance(search.length * motion);
+        for trial in 0..=MOST_TRIALS {
+            // Teeth that come near from here on need their flanks in this state, too: the next candidate starts from
+            // it.
+            if near.must_search() {
+                self.wheels.complete(state);
+            }
+            let mut candidate = step.applied_to(state, search.length);
+            self.wheels.follow(&mut candidate);
+            let residual = self.assemble(&mut candidate, sought, near);
+            match search.judge(trial, step, &residual) {
+                Trial::Taken => {
+                    *state = candidate;
+                    return Some(residual);
+                }
+                Trial::Halved => near.advance(search.length * motion),
+                Trial::Mistaken => {
+                    near.advance(search.length * motion);
+                    break;
+                }
+            }
+        }
+        if search.looked_back {
+            near.look_again();
+        }
+        None
+    }
+
+    /// Whether all that bears in this state was laid out for it; what was not is laid out anew.
+    fn contact_stands(&self, state: &State, near: &mut NearPairs, convergence: &mut Convergence) -> bool {
+        let at = configuration(state);
+        if !convergence.looked_at_all && near.missed(&self.flanks, at) {
+            convergence.looked_at_all = true;
+            near.look_again();
+            return false;
+        }
+        // The contact was laid out for the predicted state; where the corner of a space ended elsewhere, again.
+        let fits = near.layouts_fit(&self.flanks, at);
+        if !fits {
+            convergence.start_again();
+            near.clear();
+        }
+        fits
+    }
+
+    /// The end of an increment: what is told of it, and what is remembered.
+    fn converged(
+        &mut self,
+        mut state: State,
+        Sought { from, generator_rad, stage, .. }: Sought<'_>,
+        near: &NearPairs,
+        residual: &Residual,
+        iterations: usize,
+    ) -> Result<(State, Increment), &'static str> {
+        let compliance = self.compliance(residual).ok_or(NOT_DEFINITE)?;
+        let law = stage.flank_law(self.problem.flank_law);
+        let mut increment = self.report(&state, residual, compliance, iterations);
+        let hard = stage.softening.is_none();
+        if hard {
+            let modulus_mpa = self.problem.contact_modulus_mpa();
+            increment.peak_pressure_mpa[0] =
+                near.peak_pressure_mpa(&self.flanks, configuration(&state), law, modulus_mpa);
+        }
+        self.wheels.complete(&mut state);
+        self.finish(&mut state, from, near, law);
+        if hard && generator_rad != from.generator_rad {
+            if !self.passed.remember(self.problem, &state) {
+                self.tangents.clear();
+            }
+            self.keep_tangent(state.generator_rad);
+        }
+        Ok((state, increment))
     }
 
     /// Bound on the motion of flanks against one another in a step, mm. Nodal displacements bound those between them to
@@ -633,16 +483,16 @@ impl<'p> Solver<'p> {
     }
 
     /// Turns the output to where load, drag and flanks balance while the wheels keep their shape.
-    fn balance_output(&mut self, state: &mut State, from: &State, torque_n_m: f64, near: &mut NearPairs) {
+    fn balance_output(&mut self, state: &mut State, sought: Sought<'_>, near: &mut NearPairs) {
         let clock = Instant::now();
-        let load = self.problem.per_width(torque_n_m);
+        let load = self.problem.per_width(sought.torque_n_m);
         let anchor_rad = state.drag_anchor_rad;
         let others = |output_rad: f64| {
             let (drag, slope) = self.problem.drag_torque(output_rad - anchor_rad);
             (load + drag, -slope)
         };
-        self.look_around(state, from, near);
-        let law = FlankLaw { friction: 0.0, ..self.flank_law() };
+        self.look_around(state, sought.from, near);
+        let law = FlankLaw { friction: 0.0, ..sought.stage.flank_law(self.problem.flank_law) };
         let tolerance = 1e-3 * (load.abs() + self.problem.drag);
         if let Some(output_rad) = near.balance(&self.flanks, state, law, tolerance, others) {
             near.advance((output_rad - state.output_rad).abs() * self.problem.drive.circular_spline.root_radius_mm);
@@ -660,10 +510,10 @@ impl<'p> Solver<'p> {
     }
 
     /// Assembles the out-of-balance forces and the tangent.
-    fn assemble(&mut self, state: &mut State, from: &State, torque_n_m: f64, near: &mut NearPairs) -> Residual {
+    fn assemble(&mut self, state: &mut State, sought: Sought<'_>, near: &mut NearPairs) -> Residual {
         let clock = Instant::now();
         self.problem.lean(state);
-        self.look_around(state, from, near);
+        self.look_around(state, sought.from, near);
         self.effort.contact += clock.elapsed();
         self.make_room(configuration(state), near);
         let clock = Instant::now();
@@ -671,8 +521,8 @@ impl<'p> Solver<'p> {
         self.wheels.assemble(state, &mut residual.force);
         self.effort.assembly += clock.elapsed();
         let clock = Instant::now();
-        self.assemble_contact(state, near, &mut residual);
-        self.assemble_holding(state, torque_n_m, &mut residual);
+        self.assemble_contact(state, sought.stage, near, &mut residual);
+        self.assemble_holding(state, sought.torque_n_m, &mut residual);
         self.effort.contact += clock.elapsed();
         residual
     }
@@ -687,24 +537,9 @@ impl<'p> Solver<'p> {
         self.effort.analysis += clock.elapsed();
     }
 
-    fn bore_law(&self) -> BoreLaw {
-        let stiffness = self.problem.bore_law.stiffness;
-        // A bearing that yields is soft enough as it is.
-        BoreLaw { stiffness: stiffness.min((self.softening * stiffness).max(SOFTEST_BORE)) }
-    }
-
-    fn flank_law(&self) -> FlankLaw {
-        let law = self.problem.flank_law;
-        FlankLaw {
-            stiffness: self.softening * law.stiffness,
-            stick_stiffness: self.softening * law.stick_stiffness,
-            friction: if self.assembling { 0.0 } else { law.friction },
-        }
-    }
-
-    fn assemble_contact(&mut self, state: &State, near: &mut NearPairs, residual: &mut Residual) {
+    fn assemble_contact(&mut self, state: &State, stage: ContactStage, near: &mut NearPairs, residual: &mut Residual) {
         let problem = self.problem;
-        let (bore_law, flank_law) = (self.bore_law(), self.flank_law());
+        let (bore_law, flank_law) = (stage.bore_law(problem.bore_law), stage.flank_law(problem.flank_law));
         let bore_nodes = &problem.wheels().0.nodes;
         let major = [state.generator_rad.cos(), state.generator_rad.sin()];
         let wheels = self.wheels.as_mut();
@@ -844,11 +679,11 @@ impl<'p> Solver<'p> {
         }
         let clock = Instant::now();
         let slipping = std::mem::take(&mut self.slipping);
-        let forces = Field { free: residual.force.clone(), border: residual.border };
+        let forces = NodalField { free: residual.force.clone(), border: residual.border };
         let solved = slipping.solve(forces, |field| self.solve_symmetric(field));
         self.slipping = slipping;
         self.effort.solution += clock.elapsed();
-        let Field { free, border } = solved?;
+        let NodalField { free, border } = solved?;
         let (fs, _) = self.problem.wheels();
         let u = free[..2 * fs.nodes.len()].to_vec();
         let mut v = vec![0.0; 2 * self.cs_index.len()];
@@ -862,8 +697,8 @@ impl<'p> Solver<'p> {
     }
 
     /// Solves with the last factor, in place.
-    fn solve_symmetric(&mut self, field: &mut Field) -> Option<()> {
-        let Field { free, border } = field;
+    fn solve_symmetric(&mut self, field: &mut NodalField) -> Option<()> {
+        let NodalField { free, border } = field;
         self.turn(free, border, -self.turned);
         let solved = self.eliminated.as_ref()?.solve(self.wheels.as_mut(), free, &mut border[..self.border.width]);
         self.turn(free, border, self.turned);
@@ -922,7 +757,7 @@ impl<'p> Solver<'p> {
     }
 
     /// Carries the history over the end of an increment.
-    fn finish(&self, state: &mut State, from: &State, near: &NearPairs) {
+    fn finish(&self, state: &mut State, from: &State, near: &NearPairs, law: FlankLaw) {
         let problem = self.problem;
         let reach = problem.drag / problem.drag_stiffness;
         let stretched = state.output_rad - state.drag_anchor_rad;
@@ -934,7 +769,7 @@ impl<'p> Solver<'p> {
             state.travel = turn.signum();
         }
         if problem.flank_law.friction > 0.0 {
-            state.friction = near.friction(&self.flanks, configuration(state), self.flank_law());
+            state.friction = near.friction(&self.flanks, configuration(state), law);
         }
     }
 
@@ -1051,12 +886,4 @@ fn fixed_border(problem: &Problem, wheels: &dyn Wheels) -> Border {
         }
     }
     border
-}
-
-/// How far the last iteration brought the residual down.
-fn last_gain(history: &[f64]) -> f64 {
-    match history {
-        [.., before, after] => after / before,
-        _ => 1.0,
-    }
 }

@@ -34,7 +34,7 @@ impl Passed {
     }
 
     /// Remembers a state that was reached by turning; false, and all forgotten, when the motion is not steady.
-    pub fn remember(&mut self, problem: &Problem, state: &State) -> bool {
+    pub(crate) fn remember(&mut self, problem: &Problem, state: &State) -> bool {
         let steady = (state.output_rate * problem.drive.ratio() - 1.0).abs() < 0.2;
         let goes_on =
             self.states.back().is_none_or(|last| last.torque_n_m == state.torque_n_m && last.travel == state.travel);

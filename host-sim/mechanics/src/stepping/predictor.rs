@@ -7,7 +7,7 @@
 use crate::mesh::WheelMesh;
 
 /// Displacements of a wheel with the wave turned by `angle_rad` relative to the wheel.
-pub fn turn_field(mesh: &WheelMesh, field: &[f64], angle_rad: f64) -> Vec<f64> {
+pub(crate) fn turn_field(mesh: &WheelMesh, field: &[f64], angle_rad: f64) -> Vec<f64> {
     let shift = angle_rad / mesh.pitch();
     let whole = shift.floor();
     let weights = lagrange6(shift - whole);

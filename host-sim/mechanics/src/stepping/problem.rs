@@ -12,7 +12,7 @@ use crate::drive::{
 use crate::fem::material::PlaneStrain;
 use crate::mesh::{MeshLevel, WheelMesh};
 use crate::sleeve::pair_compliance;
-use crate::suggest::did_you_mean;
+use crate::suggest::UnknownName;
 
 use super::error::SolveError;
 use super::fast::CondensedDrive;
@@ -29,23 +29,24 @@ pub enum Method {
     Fast,
 }
 
+impl Method {
+    /// Names of the solvers.
+    pub const NAMES: [&'static str; 2] = ["reference", "fast"];
+}
+
 impl fmt::Display for Method {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Method::Reference => "reference",
-            Method::Fast => "fast",
-        })
+        f.write_str(Self::NAMES[*self as usize])
     }
 }
 
 impl FromStr for Method {
-    type Err = String;
+    type Err = UnknownName;
 
-    fn from_str(text: &str) -> Result<Self, String> {
-        [Method::Reference, Method::Fast].into_iter().find(|method| method.to_string() == text).ok_or_else(|| {
-            let hint = did_you_mean("; ", text, ["reference", "fast"]);
-            format!("solver \"{text}\": allowed are reference, fast{hint}")
-        })
+    fn from_str(text: &str) -> Result<Self, UnknownName> {
+        let unknown = || UnknownName { what: "solver", found: text.to_owned(), known: &Self::NAMES };
+        let methods = [Method::Reference, Method::Fast];
+        methods.into_iter().find(|method| Self::NAMES[*method as usize] == text).ok_or_else(unknown)
     }
 }
 

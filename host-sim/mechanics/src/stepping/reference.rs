@@ -22,11 +22,11 @@ pub(super) struct SparseWheels<'p> {
     free_nodes: usize,
     /// Small-strain stiffness of the circular-spline elements of sector 0.
     cs_template: Vec<[f64; PACKED]>,
-    system: Option<System>,
+    system: Option<SparseSystem>,
 }
 
 /// The sparse system for one set of flank pairs.
-struct System {
+struct SparseSystem {
     pairs: BTreeMap<FlankPair, PairPositions>,
     pattern: Pattern,
     fs_positions: Vec<ElementPositions>,
@@ -55,7 +55,7 @@ impl<'p> SparseWheels<'p> {
         SparseWheels { problem, cs_index: cs_index.to_vec(), free_nodes, cs_template, system: None }
     }
 
-    fn analyse(&self, pairs: &[FlankPair]) -> System {
+    fn analyse(&self, pairs: &[FlankPair]) -> SparseSystem {
         let problem = self.problem;
         let flanks = problem.flanks();
         let cs_nodes: Vec<[Option<u32>; 8]> =
@@ -99,7 +99,7 @@ impl<'p> SparseWheels<'p> {
             })
             .collect();
         let values = vec![0.0; pattern.stored()];
-        System { pairs, pattern, fs_positions, bore_positions, cs_values, factor, values }
+        SparseSystem { pairs, pattern, fs_positions, bore_positions, cs_values, factor, values }
     }
 
     /// The tangential unknown of a bore node at angle ~0.
@@ -107,7 +107,7 @@ impl<'p> SparseWheels<'p> {
         2 * self.problem.bore.edges[0][1] as usize + 1
     }
 
-    fn system(&mut self) -> &mut System {
+    fn system(&mut self) -> &mut SparseSystem {
         self.system.as_mut().expect("room was made for the pairs")
     }
 }
@@ -179,7 +179,7 @@ impl Wheels for SparseWheels<'_> {
 
     fn add_bore(&mut self, contact: &BorePressure) {
         let nodes = self.problem.bore.edges[contact.edge];
-        let System { pattern, bore_positions, values, .. } = self.system();
+        let SparseSystem { pattern, bore_positions, values, .. } = self.system();
         for (a, &n) in nodes.iter().enumerate() {
             let row_x = a * (2 * a + 1);
             let row_y = row_x + 2 * a + 1;
@@ -199,7 +199,7 @@ impl Wheels for SparseWheels<'_> {
     }
 
     fn add_flank(&mut self, pair: FlankPair, contact: &PairContribution) {
-        let System { pattern, pairs, values, .. } = self.system();
+        let SparseSystem { pattern, pairs, values, .. } = self.system();
         let positions = &pairs[&pair];
         let n = contact.force.len();
         for (a, &node) in positions.nodes.iter().enumerate() {
@@ -224,7 +224,7 @@ impl Wheels for SparseWheels<'_> {
 
     fn factorise(&mut self, spring: f64) -> bool {
         let anchored = self.anchored_unknown();
-        let System { pattern, values, factor, .. } = self.system();
+        let SparseSystem { pattern, values, factor, .. } = self.system();
         let mut stiffened = values.clone();
         stiffened[pattern.column_starts[anchored] as usize] += ANCHOR;
         if spring > 0.0 {

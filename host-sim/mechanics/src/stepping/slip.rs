@@ -27,7 +27,7 @@ const ENOUGH: f64 = 1e-2;
 
 /// Forces, or displacements, of all unknowns.
 #[derive(Clone)]
-pub(super) struct Field {
+pub(super) struct NodalField {
     pub free: Vec<f64>,
     pub border: [f64; BORDERS],
 }
@@ -53,7 +53,7 @@ impl Slipping {
     }
 
     /// G x: how the gaps change.
-    fn gaps(&self, x: &Field) -> Vec<f64> {
+    fn gaps(&self, x: &NodalField) -> Vec<f64> {
         let gap = |p: &SlipPoint| {
             let nodes: f64 = p.index.iter().zip(&p.gap).map(|(i, g)| g * x.free[*i]).sum();
             nodes + p.gap_by_output * x.border[OUTPUT]
@@ -62,7 +62,7 @@ impl Slipping {
     }
 
     /// S D y, times a factor, added to forces.
-    fn add_forces(&self, y: &[f64], factor: f64, to: &mut Field) {
+    fn add_forces(&self, y: &[f64], factor: f64, to: &mut NodalField) {
         for (p, y) in self.points.iter().zip(y) {
             let amount = factor * p.stiffness * y;
             for (i, s) in p.index.iter().zip(&p.slip) {
@@ -73,13 +73,13 @@ impl Slipping {
     }
 
     /// The step for the forces `r`, where `solve` solves with K in place; nothing where it cannot.
-    pub fn solve(&self, r: Field, mut solve: impl FnMut(&mut Field) -> Option<()>) -> Option<Field> {
+    pub fn solve(&self, r: NodalField, mut solve: impl FnMut(&mut NodalField) -> Option<()>) -> Option<NodalField> {
         let mut x = r.clone();
         solve(&mut x)?;
         if self.is_empty() {
             return Some(x);
         }
-        let none = Field { free: vec![0.0; r.free.len()], border: [0.0; BORDERS] };
+        let none = NodalField { free: vec![0.0; r.free.len()], border: [0.0; BORDERS] };
         let mut possible = true;
         let y = gmres(&self.gaps(&x), |y| {
             let mut response = none.clone();
@@ -183,8 +183,8 @@ mod tests {
         };
         unit(1.0, 0.7);
         unit(-0.5, 0.2);
-        let r = Field { free: vec![1.0, -2.0], border: [0.0; BORDERS] };
-        let solve = |x: &mut Field| {
+        let r = NodalField { free: vec![1.0, -2.0], border: [0.0; BORDERS] };
+        let solve = |x: &mut NodalField| {
             x.free.iter_mut().zip(springs).for_each(|(x, k)| *x /= k);
             Some(())
         };

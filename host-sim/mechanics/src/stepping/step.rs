@@ -105,7 +105,7 @@ impl Step {
         self.free.iter().fold(1e-30, |m, x| x.abs().max(m))
     }
 
-    pub fn applied_to(&self, state: &State, length: f64) -> State {
+    pub(crate) fn applied_to(&self, state: &State, length: f64) -> State {
         let mut next = state.clone();
         next.u.iter_mut().zip(&self.u).for_each(|(x, d)| *x += length * d);
         next.v.iter_mut().zip(&self.v).for_each(|(x, d)| *x += length * d);

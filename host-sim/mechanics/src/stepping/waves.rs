@@ -34,12 +34,12 @@ impl Wave {
     }
 
     /// Adds a force on the amplitude to forces on the nodes.
-    pub fn add_force(&self, force: f64, to: &mut [f64]) {
+    pub(crate) fn add_force(&self, force: f64, to: &mut [f64]) {
         self.weights.iter().for_each(|(i, w)| to[*i] += force * w);
     }
 
     /// Adds what an amplitude makes of the lean of all teeth.
-    pub fn add_lean(&self, amplitude: f64, to: &mut [Lean]) {
+    pub(crate) fn add_lean(&self, amplitude: f64, to: &mut [Lean]) {
         for (to, lean) in to.iter_mut().zip(&self.leans) {
             (to[0], to[1]) = (to[0] + amplitude * lean[0], to[1] + amplitude * lean[1]);
         }
@@ -51,7 +51,7 @@ impl Wave {
     }
 
     /// How far all leans may change with displacements of 1 mm.
-    pub fn largest_lean(&self) -> f64 {
+    pub(crate) fn largest_lean(&self) -> f64 {
         2.0 * self.leans.iter().map(|lean| lean[0].hypot(lean[1])).fold(0.0, f64::max)
     }
 }

@@ -1,6 +1,6 @@
 //! One joint of a flight, ticked from outside: what a simulator of something larger drives.
 
-use super::{COMPENSATED, Commanded, Controller, Lane, Made, Sensing, Unit, made};
+use super::{COMPENSATED, Commanded, FlightError, JointController, JointLane, LaneParts, Sensing, Unit, made};
 use crate::keep::{Kept, kept};
 use crate::on_board::{Given, Settings, Told};
 use crate::plant::Plant;
@@ -9,8 +9,8 @@ use flexspline::{Direction, JOINT_STATE_WORDS, JointState, Quality};
 
 /// A joint with mass, its servo, and what commands it; as [`super::fly`] flies it, tick by tick.
 pub struct OneJoint {
-    made: Made,
-    lane: Lane,
+    made: LaneParts,
+    lane: JointLane,
     started_j: f64,
 }
 
@@ -51,10 +51,15 @@ impl OneJoint {
     /// with none.
     ///
     /// # Errors
-    /// What cannot be flown, in words.
-    pub fn new(scenario: &Scenario, unit: &Unit, image: Option<Vec<u8>>, compensated: bool) -> Result<Self, String> {
+    /// [`FlightError`].
+    pub fn new(
+        scenario: &Scenario,
+        unit: &Unit,
+        image: Option<Vec<u8>>,
+        compensated: bool,
+    ) -> Result<Self, FlightError> {
         let made = made(scenario, unit, image)?;
-        let lane = Lane::new(&made, if compensated { COMPENSATED } else { 0 })?;
+        let lane = JointLane::new(&made, if compensated { COMPENSATED } else { 0 })?;
         let started_j = lane.plant.stored_j();
         Ok(Self { made, lane, started_j })
     }
@@ -92,7 +97,7 @@ impl OneJoint {
     /// What the core was told and gave in the last tick; `None` without it.
     pub fn on_board(&self) -> Option<&(Told, Given)> {
         match &self.lane.controller {
-            Controller::Core(core) => core.last.as_ref(),
+            JointController::Core(core) => core.last.as_ref(),
             _ => None,
         }
     }
@@ -125,7 +130,7 @@ impl Kept for OneJoint {
         self.lane.servo.keep(to);
         self.lane.sensing.keep(to);
         u32::from(self.lane.direction == Direction::Backward).keep(to);
-        if let Controller::Core(core) = &self.lane.controller {
+        if let JointController::Core(core) = &self.lane.controller {
             core.on_board.state.words()[..].keep(to);
             core.on_board.path.kept()[..].keep(to);
         }
@@ -138,7 +143,7 @@ impl Kept for OneJoint {
         let mut backward = 0_u32;
         backward.take(from)?;
         self.lane.direction = if backward == 0 { Direction::Forward } else { Direction::Backward };
-        if let Controller::Core(core) = &mut self.lane.controller {
+        if let JointController::Core(core) = &mut self.lane.controller {
             let mut words = [0_u32; JOINT_STATE_WORDS];
             words[..].take(from)?;
             core.on_board.state = JointState::of_words(&words)?;

@@ -107,7 +107,7 @@ struct Shown {
 }
 
 /// All that figures are drawn from.
-struct Known<'a> {
+struct DiagnosisKnown<'a> {
     sources: Sources<'a>,
     rows: Rows,
     clock: Clock,
@@ -146,7 +146,7 @@ pub fn page(mut sources: Sources<'_>) -> Page {
             Shown { picture: Picture::of(&sessions, &in_rad, &gear).ok(), level }
         })
         .collect();
-    Known { clock: Clock::new(&rows), rows, shown, sources }.page()
+    DiagnosisKnown { clock: Clock::new(&rows), rows, shown, sources }.page()
 }
 
 /// Every so many rows of a session.
@@ -177,7 +177,7 @@ fn table(caption: &str, header: &[&str], rows: Vec<Vec<Text>>) -> Block {
     Block::Table { choice: None, table: PageTable { caption: caption.into(), header, rows } }
 }
 
-impl Known<'_> {
+impl DiagnosisKnown<'_> {
     fn page(&self) -> Page {
         let Sources { recording, nominal, diagnosis, command, inputs, .. } = &self.sources;
         let (status, also) = self.status();

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::thin::{dots, medians, middle, peaks_kept, some_rows};
-use super::{Known, Shown, orders, words};
+use super::{DiagnosisKnown, Shown, orders, words};
 use crate::page::{
     Axis, Block, Detail, Field, Figure, FigureBody, Lines, Mark, Quantity, Section, Series, Table, Text, Upright,
     significant,
@@ -23,7 +23,7 @@ const CHANGES: f64 = 0.03;
 const FEWEST_IN_CELL: usize = 2;
 const DIRECTIONS: [(f64, &str); 2] = [(1.0, "forward"), (-1.0, "backward")];
 
-impl Known<'_> {
+impl DiagnosisKnown<'_> {
     pub(super) fn picture_sections(&self) -> Vec<Section> {
         vec![self.looks(), self.angles(), self.spectra(), self.drift()]
     }

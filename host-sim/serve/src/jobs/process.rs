@@ -89,7 +89,7 @@ impl Running {
         Ok(Running { child, begun: Instant::now(), told_to_end: None, talk, printed, readers })
     }
 
-    pub fn pid(&self) -> u32 {
+    pub(crate) fn pid(&self) -> u32 {
         self.child.id()
     }
 
@@ -197,7 +197,7 @@ fn listen(stderr: impl Read, talk: &Mutex<Talk>) {
 }
 
 /// Removes what a process that had no time to clear up has left in the folder of its results.
-pub fn clear_unfinished(folder: &Path, out: &str) {
+pub(crate) fn clear_unfinished(folder: &Path, out: &str) {
     let out = folder.join(out);
     let Ok(entries) = fs::read_dir(out) else { return };
     for entry in entries.flatten() {
@@ -209,7 +209,7 @@ pub fn clear_unfinished(folder: &Path, out: &str) {
 }
 
 /// Ends a process that an earlier server started and could not end: one with this number and these very words.
-pub fn end_orphan(pid: Option<u32>, arguments: &[String]) {
+pub(crate) fn end_orphan(pid: Option<u32>, arguments: &[String]) {
     let Some(pid) = pid else { return };
     #[cfg(unix)]
     {

@@ -100,7 +100,7 @@ impl JobRecord {
     }
 
     /// Whether it neither waits nor runs.
-    pub fn is_over(&self) -> bool {
+    pub(crate) fn is_over(&self) -> bool {
         !matches!(self.state, State::Waiting | State::Running)
     }
 }

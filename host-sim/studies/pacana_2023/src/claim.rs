@@ -162,7 +162,7 @@ impl Draft {
     }
 
     /// A number of ours for each of some generators; `of` goes behind their names.
-    pub fn ours_each(
+    pub(crate) fn ours_each(
         self,
         kinds: impl IntoIterator<Item = GeneratorKind>,
         of: &str,
@@ -202,7 +202,7 @@ impl Draft {
     }
 
     /// The paper's own numbers must keep these bounds.
-    pub fn paper_keeps(
+    pub(crate) fn paper_keeps(
         self,
         what: impl Into<String>,
         value: f64,

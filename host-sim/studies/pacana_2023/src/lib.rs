@@ -35,7 +35,7 @@ use rank::{Agreement, Measured, kendall_tau};
 use runs::{ProtocolRun, RunRecord, Runs, Variant};
 
 /// Version of the layout of `reproduce.json`.
-pub const REPRODUCE_SCHEMA: u32 = 1;
+pub(crate) const REPRODUCE_SCHEMA: u32 = 1;
 
 /// How thorough.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -10,40 +10,40 @@ use std::f64::consts::{FRAC_PI_2, PI};
 /// Gear ratio `i`: section 4, first paragraph on the angle of rotation.
 pub const RATIO: f64 = 95.0;
 /// Travel of the generator to the first reversal, rad: section 3, last paragraph.
-pub const TRAVEL_RAD: f64 = 1.0;
+pub(crate) const TRAVEL_RAD: f64 = 1.0;
 /// Largest error of the four-roller drive, rad: text of figure 13.
-pub const ERROR_FOUR_ROLLER_RAD: f64 = 0.006_224_7;
+pub(crate) const ERROR_FOUR_ROLLER_RAD: f64 = 0.006_224_7;
 /// Largest error of the four-roller drive as the paper converts it, arc-minutes.
-pub const ERROR_FOUR_ROLLER_ARCMIN: f64 = 21.0;
+pub(crate) const ERROR_FOUR_ROLLER_ARCMIN: f64 = 21.0;
 /// Largest error of the double-disc drive, rad: below figure 13; not converted there.
-pub const ERROR_DOUBLE_DISC_RAD: f64 = 0.004_134_4;
+pub(crate) const ERROR_DOUBLE_DISC_RAD: f64 = 0.004_134_4;
 /// Largest error of the cam drive, rad: below figure 13.
-pub const ERROR_CAM_RAD: f64 = 0.003;
+pub(crate) const ERROR_CAM_RAD: f64 = 0.003;
 /// Largest error of the cam drive as the paper converts it, arc-minutes ("about 4").
-pub const ERROR_CAM_ARCMIN: f64 = 4.0;
+pub(crate) const ERROR_CAM_ARCMIN: f64 = 4.0;
 /// Kinematic error that makers recommend, arc-minutes, least and most: below figure 13.
-pub const RECOMMENDED_ARCMIN: [f64; 2] = [1.0, 9.0];
+pub(crate) const RECOMMENDED_ARCMIN: [f64; 2] = [1.0, 9.0];
 /// Load of the circular spline, N m ("about"): before figure 14.
 pub const TORQUE_N_M: f64 = 200.0;
 /// Thickness of the plane model, mm ("unit thickness"): section 3, on the plane model.
-pub const MODEL_THICKNESS_MM: f64 = 1.0;
+pub(crate) const MODEL_THICKNESS_MM: f64 = 1.0;
 /// Face width of the toothed rim, mm: not given.
-pub const FACE_WIDTH_MM: Option<f64> = None;
+pub(crate) const FACE_WIDTH_MM: Option<f64> = None;
 /// How the curves of figures 14 and 15 are labelled: no load (black), load with the motion (green), against it (red).
-pub const LOAD_LABELS: [u32; 3] = [0, 2, 2];
+pub(crate) const LOAD_LABELS: [u32; 3] = [0, 2, 2];
 /// Whether the load matters for the accuracy: section 4, above figure 16 ("significant impact"), and section 5 ("no
 /// negative effect … regardless of its direction").
-pub const LOAD_MATTERS: [bool; 2] = [true, false];
+pub(crate) const LOAD_MATTERS: [bool; 2] = [true, false];
 /// Backlash of the double-disc drive, arc-minutes: below figure 17.
-pub const BACKLASH_DOUBLE_DISC_ARCMIN: f64 = 1.16;
+pub(crate) const BACKLASH_DOUBLE_DISC_ARCMIN: f64 = 1.16;
 /// Backlash of the cam drive, arc-minutes: below figure 17.
-pub const BACKLASH_CAM_ARCMIN: f64 = 0.98;
+pub(crate) const BACKLASH_CAM_ARCMIN: f64 = 0.98;
 /// Backlash that makers recommend for standard and for special drives, arc-minutes: below figure 17.
-pub const BACKLASH_LIMITS_ARCMIN: [f64; 2] = [2.5, 1.5];
+pub(crate) const BACKLASH_LIMITS_ARCMIN: [f64; 2] = [2.5, 1.5];
 /// `φ` at the moment `t = 0` by formula (5).
-pub const PHI_AT_START_BY_FORMULA: f64 = FRAC_PI_2;
+pub(crate) const PHI_AT_START_BY_FORMULA: f64 = FRAC_PI_2;
 /// `φ` at the "initial moment" by the text below figure 6.
-pub const PHI_AT_START_BY_TEXT: f64 = 0.0;
+pub(crate) const PHI_AT_START_BY_TEXT: f64 = 0.0;
 
 /// The errors of figure 13 that the text gives a number for, rad.
 pub fn error_rad(kind: GeneratorKind) -> Option<f64> {
@@ -57,7 +57,7 @@ pub fn error_rad(kind: GeneratorKind) -> Option<f64> {
 
 /// The order of the errors that the paper gives: the larger rank has the larger error; two-roller is "similar" to
 /// four-roller.
-pub const ERROR_RANK: [(GeneratorKind, u32); 4] = [
+pub(crate) const ERROR_RANK: [(GeneratorKind, u32); 4] = [
     (GeneratorKind::FourRoller, 2),
     (GeneratorKind::TwoRoller, 2),
     (GeneratorKind::DoubleDisc, 1),
@@ -65,12 +65,12 @@ pub const ERROR_RANK: [(GeneratorKind, u32); 4] = [
 ];
 
 /// Travel of the output while the generator turns by [`TRAVEL_RAD`], arc-minutes.
-pub fn output_travel_arcmin() -> f64 {
+pub(crate) fn output_travel_arcmin() -> f64 {
     TRAVEL_RAD / RATIO * ARCMIN_PER_RAD
 }
 
 /// An error of the paper as a share of what the output turns in all.
-pub fn share_of_travel(error_rad: f64) -> f64 {
+pub(crate) fn share_of_travel(error_rad: f64) -> f64 {
     error_rad * ARCMIN_PER_RAD / output_travel_arcmin()
 }
 
@@ -81,7 +81,7 @@ pub fn circular_spline_teeth() -> f64 {
 }
 
 /// Tangential force per mm of width that the load is in a model of a given thickness, at a radius, N/mm.
-pub fn line_load_n_per_mm(radius_mm: f64, width_mm: f64) -> f64 {
+pub(crate) fn line_load_n_per_mm(radius_mm: f64, width_mm: f64) -> f64 {
     1e3 * TORQUE_N_M / (radius_mm * width_mm)
 }
 

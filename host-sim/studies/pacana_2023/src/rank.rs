@@ -4,7 +4,7 @@
 use serde::Serialize;
 
 /// How many times the spread a gap must exceed.
-pub const SPREADS: f64 = 3.0;
+pub(crate) const SPREADS: f64 = 3.0;
 
 /// A number with what the discretisation does to it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -28,7 +28,7 @@ impl Measured {
     /// The gap to another over the spread of that gap, signed: above [`SPREADS`] this one is larger, below −[`SPREADS`]
     /// smaller. The spread is that of the difference in each variant, both being discretised alike: what moves both
     /// does not count.
-    pub fn gap_in_spreads(&self, other: &Measured) -> f64 {
+    pub(crate) fn gap_in_spreads(&self, other: &Measured) -> f64 {
         let gap = self.value - other.value;
         let paired = self.variants.iter().filter_map(|(name, value)| {
             let (_, theirs) = other.variants.iter().find(|(same, _)| same == name)?;
@@ -43,7 +43,7 @@ impl Measured {
 
 /// Kendall's rank correlation of two rankings over the pairs that the first one orders: concordant less discordant over
 /// all; a pair whose `ours` is closer than the spread allows counts as neither.
-pub fn kendall_tau(paper_ranks: &[u32], ours: &[Measured]) -> Agreement {
+pub(crate) fn kendall_tau(paper_ranks: &[u32], ours: &[Measured]) -> Agreement {
     let mut agreement = Agreement { concordant: 0, discordant: 0, undecided: 0, tau: f64::NAN };
     for i in 0..ours.len() {
         for j in 0..i {

@@ -199,7 +199,7 @@ impl Runs {
 }
 
 /// Loads at which a generator is run: the paper loads double disc and cam alone.
-pub fn torques_of(kind: GeneratorKind) -> &'static [f64] {
+pub(crate) fn torques_of(kind: GeneratorKind) -> &'static [f64] {
     match kind {
         GeneratorKind::TwoRoller | GeneratorKind::FourRoller => &[0.0],
         GeneratorKind::DoubleDisc | GeneratorKind::Cam => &[0.0, paper::TORQUE_N_M, -paper::TORQUE_N_M],

@@ -192,7 +192,6 @@ pub struct Compensated<'a> {
     images: Images<'a>,
     generator: GeneratorAngle,
     direction: Direction,
-    guarded: bool,
     /// The store of the tables.
     pub store: Store,
     /// The state of the joint.
@@ -226,7 +225,6 @@ impl<'a> Compensated<'a> {
             images,
             generator: GeneratorAngle::ZERO,
             direction: Direction::Forward,
-            guarded: true,
             store,
             state: JointState::new(),
             out: None,
@@ -247,13 +245,6 @@ impl<'a> Compensated<'a> {
         let _ = self.state.request(mode);
     }
 
-    /// Gives the core the target as it is, for comparison.
-    #[must_use]
-    pub fn unguarded(mut self) -> Self {
-        self.guarded = false;
-        self
-    }
-
     /// What the thermometer shows, °C.
     pub fn set_temperature(&mut self, temperature_c: f32) {
         self.store.set_temperature(&self.images, temperature_c);
@@ -272,7 +263,7 @@ impl<'a> Compensated<'a> {
         let now = self.joint.forward(&self.store, &mut play, self.generator, told.torque_n_m);
         let sign = self.direction.sign();
         let ahead = told.target.minus_rad(now.output) * sign;
-        if !self.guarded || now.quality == Quality::Disabled || !(-TOO_FAR_RAD..ON_ITS_WAY_RAD).contains(&ahead) {
+        if now.quality == Quality::Disabled || !(-TOO_FAR_RAD..ON_ITS_WAY_RAD).contains(&ahead) {
             return 0;
         }
         now.output.offset_rad(sign * ON_ITS_WAY_RAD).minus_counts(told.target)

@@ -62,7 +62,7 @@ pub struct Sensors {
 impl Sensors {
     /// Of the usual kind for a table up to this torque: 14 bits over ± the range, noise of one step, quarters of a
     /// degree.
-    pub fn for_range(largest_n_m: f64) -> Self {
+    pub(crate) fn for_range(largest_n_m: f64) -> Self {
         let step = 2.0 * largest_n_m / 16_384.0;
         Self {
             torque_step_n_m: step,

@@ -1,0 +1,73 @@
+//! Why there is no FMU.
+
+use std::io;
+use std::path::PathBuf;
+
+use flexspline::ImageError;
+use flexspline_fly::fly::FlyError;
+use flexspline_fmu::FmuError;
+use flexspline_motion::flight::FlightError;
+
+/// Tables, scenarios and libraries that make no FMU.
+#[derive(Debug, thiserror::Error)]
+pub enum FmuExportError {
+    /// The table.
+    #[error(transparent)]
+    Table(#[from] ImageError),
+    /// A joint turns the circular spline.
+    #[error("found a drive whose circular spline is fixed; allowed for a joint: the flexspline fixed")]
+    FixedMember,
+    /// The table does not reach the scenario's temperature.
+    #[error("temperature_c of the scenario: found {found_c}, allowed with this table: {coldest_c} to {warmest_c}")]
+    Temperature {
+        /// That of the scenario, °C.
+        found_c: f64,
+        /// Lower end of the table, °C.
+        coldest_c: f64,
+        /// Upper end of the table, °C.
+        warmest_c: f64,
+    },
+    /// A table without a value under load.
+    #[error("the table gives nothing")]
+    NoGear,
+    /// The scenario's unit.
+    #[error(transparent)]
+    Scenario(#[from] FlyError),
+    /// The scenario's table.
+    #[error(transparent)]
+    Flight(#[from] FlightError),
+    /// What the FMU itself would refuse.
+    #[error(transparent)]
+    Resources(#[from] FmuError),
+    /// A file that is no library of an FMU.
+    #[error("{}: {why}; allowed: a library that cargo built of flexspline-fmu", file.display())]
+    NoLibrary {
+        /// The file.
+        file: PathBuf,
+        /// What it is instead.
+        why: String,
+    },
+    /// Two libraries for one platform.
+    #[error("--library: found {} and {}, both for {folder}; allowed: one", files[0].display(), files[1].display())]
+    TwoLibraries {
+        /// Both files.
+        files: [PathBuf; 2],
+        /// The platform's folder in an FMU.
+        folder: &'static str,
+    },
+    /// No library was found.
+    #[error(
+        "found no library for an FMU; looked for {}. In a checkout run: cargo build --release -p flexspline-fmu, and \
+         give --library target/release/{built}",
+        looked.iter().map(|file| file.display().to_string()).collect::<Vec<_>>().join(", ")
+    )]
+    Missing {
+        /// Where it was looked for.
+        looked: Vec<PathBuf>,
+        /// The file that a build makes.
+        built: &'static str,
+    },
+    /// Where this program lies is not known.
+    #[error("this program: {0}")]
+    Program(#[source] io::Error),
+}

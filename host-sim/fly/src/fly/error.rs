@@ -1,0 +1,48 @@
+//! Why a joint with mass is not flown.
+
+use flexspline_base::toml_file::Problem;
+use flexspline_design::tables::TableError;
+use flexspline_mechanics::drive::GeneratorKind;
+use flexspline_motion::flight::FlightError;
+
+use crate::closed_loop::map::MapError;
+
+/// A scenario that is refused, or one that cannot be flown.
+#[derive(Debug, thiserror::Error)]
+pub enum FlyError {
+    /// The scenario's file: the first thing that is wrong with it.
+    #[error("{0}")]
+    Scenario(Problem),
+    /// `--vary` of a field.
+    #[error("--vary {field}: found {found}, allowed: {allowed}")]
+    Vary {
+        /// Which field.
+        field: String,
+        /// What was found.
+        found: String,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// `--vary` without a field and its values.
+    #[error("allowed: FIELD=VALUE,VALUE,... with a field of a scenario file (docs/explanation/motion.md)")]
+    VaryForm,
+    /// The generator does not carry the load.
+    #[error("load: found up to {largest_n_m:.1} N.m, allowed: {most_n_m} N.m with a {kind} generator")]
+    Load {
+        /// Largest load of the scenario, N·m.
+        largest_n_m: f64,
+        /// Rated torque of the drive, N·m.
+        most_n_m: f64,
+        /// Its generator.
+        kind: GeneratorKind,
+    },
+    /// The unit's map of the contact FEM.
+    #[error(transparent)]
+    Map(#[from] MapError),
+    /// The core does not know the drive's teeth.
+    #[error(transparent)]
+    Teeth(#[from] TableError),
+    /// The flight itself.
+    #[error(transparent)]
+    Flight(#[from] FlightError),
+}

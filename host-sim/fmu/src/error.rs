@@ -1,0 +1,86 @@
+//! What is wrong with an FMU's resources, with the values of its variables, or with a state to go on from.
+
+use std::path::PathBuf;
+
+use flexspline::{ActivateError, ImageError, SettingError};
+use flexspline_motion::flight::FlightError;
+
+use crate::resources::{MODEL_FILE, TABLE_FILE};
+
+/// Why an FMU cannot be made, stepped, or taken up again.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FmuError {
+    /// A line of `model.txt`.
+    #[error("{MODEL_FILE}:{line}: {what}")]
+    Line {
+        /// From 1.
+        line: usize,
+        /// What was found and what is allowed.
+        what: String,
+    },
+    /// A file of the resources.
+    #[error("{file}: {what}")]
+    File {
+        /// Its name or path.
+        file: String,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// The table.
+    #[error("{TABLE_FILE}: {0}")]
+    Table(#[from] ImageError),
+    /// The folder of the resources.
+    #[error("{}: {error}", folder.display())]
+    Folder {
+        /// Where it is.
+        folder: PathBuf,
+        /// What is wrong with it.
+        error: Box<FmuError>,
+    },
+    /// The resource location names no folder here.
+    #[error("resource location: found \"{uri}\"{why}, allowed: file:///folder")]
+    Location {
+        /// What was found.
+        uri: String,
+        /// Why it names none.
+        why: &'static str,
+    },
+    /// The description belongs to another FMU.
+    #[error("guid: found \"{found}\", allowed: {allowed}")]
+    Guid {
+        /// That of the description.
+        found: String,
+        /// That of the resources.
+        allowed: String,
+    },
+    /// The value of a variable.
+    #[error("{name}: found {found}, allowed: {allowed}")]
+    Value {
+        /// Which variable.
+        name: &'static str,
+        /// Its value.
+        found: f64,
+        /// What it may be.
+        allowed: &'static str,
+    },
+    /// A setting that the core refuses.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// The core does not take the table at this temperature.
+    #[error("temperature {temperature_c}: {error}")]
+    Activate {
+        /// °C.
+        temperature_c: f32,
+        /// Why not.
+        error: ActivateError,
+    },
+    /// The joint cannot be flown.
+    #[error(transparent)]
+    Flight(#[from] FlightError),
+    /// The numbers of the joint are no longer finite.
+    #[error("the joint runs away")]
+    RunsAway,
+    /// Bytes that are no state of this FMU, and what they are instead.
+    #[error("{0}")]
+    State(&'static str),
+}
