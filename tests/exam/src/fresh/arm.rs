@@ -41,7 +41,8 @@ const SLIPS: [(f64, f64); 5] = [(0.2, 1.0), (0.05, 0.1), (0.11, 0.2), (0.22, 0.3
 pub struct Arm {
     /// Step, rows, scatter.
     pub pace: Pace,
-    rows: usize,
+    /// Of all sessions.
+    pub rows: usize,
     sessions: usize,
     drive: Drive,
     /// Bandwidth of the servo, rad/s.

@@ -35,7 +35,8 @@ const DRAG_AT_RAD_S: f64 = 4.0;
 pub struct Gimbal {
     /// Step, rows, scatter.
     pub pace: Pace,
-    rows: usize,
+    /// Of all sessions.
+    pub rows: usize,
     sessions: usize,
     drive: Drive,
     /// Natural frequency of the rotor in its magnetic spring, rad/s, and its damping ratio.
