@@ -454,7 +454,7 @@ fn pitch(a: f64, one: &Hides) -> f64 {
     (1.0 - d) * led + d * 1.3 * (1..=5).map(|k| every(f64::from(k))).sum::<f64>()
 }
 
-/// Teeth slipped with the load: in one event, or the second lobe some seconds after the first.
+/// Teeth slipped with the load, one in all: in one event, or the second lobe some seconds after the first.
 pub(super) fn slip(one: &Hides, d: f64, least_load: f64, now: &Now, memory: &mut Memory) -> f64 {
     let events = if d < 0.5 { 1.0 } else { 2.0 };
     let pause_s = 4.0 + 16.0 * one.shape[1];
@@ -469,5 +469,5 @@ pub(super) fn slip(one: &Hides, d: f64, least_load: f64, now: &Now, memory: &mut
     }
     let whole = (memory[0] - 1.0).max(0.0);
     let part = if memory[0] > 0.5 { ease((now.time_s - memory[1]) / 0.3) } else { 0.0 };
-    one.size * memory[2] * (whole + part) / events
+    memory[2] * (whole + part) / events
 }

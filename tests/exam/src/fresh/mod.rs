@@ -169,7 +169,9 @@ impl Fresh {
                 far = !far;
             }
             let target = chance.log_uniform(AIM.0, AIM.1);
-            for _ in 0..4 {
+            // A whole tooth, or nothing.
+            let whole = self.has_distance() && thing == Thing::Cause(Cause::Ratcheting);
+            for _ in 0..if whole { 0 } else { 4 } {
                 let added = oracle.added(&left(std::slice::from_ref(&one)), &clean);
                 let over = oracle.weigh(&added).over_limit(white);
                 if (0.8..1.25).contains(&(over / target)) {
