@@ -46,7 +46,7 @@ impl Kind {
     }
 }
 
-/// Whose plant: three sets of laws for one plant, and three plants of their own.
+/// Whose plant: three sets of laws for one plant, and five plants of their own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, clap::ValueEnum)]
 pub enum Plant {
     /// The plainer textbook laws.
@@ -61,6 +61,10 @@ pub enum Plant {
     E,
     /// An acceptance rig: motor against load motor, counts over a bus.
     F,
+    /// A gimbal of a spacecraft: stepper motor, passes, chamber; laws near the textbook and far from it.
+    G,
+    /// An arm at work: servo, payloads, sensor of the joint's torque; laws near the textbook and far from it.
+    H,
 }
 
 impl Plant {
@@ -70,7 +74,7 @@ impl Plant {
             Self::A => Some(Family::A),
             Self::B => Some(Family::B),
             Self::C => Some(Family::C),
-            Self::D | Self::E | Self::F => None,
+            Self::D | Self::E | Self::F | Self::G | Self::H => None,
         }
     }
 }
@@ -82,7 +86,7 @@ pub struct Draw {
     #[arg(long, value_enum, ignore_case = true)]
     pub family: Option<Plant>,
     /// Cases of one kind alone [default: in 25 cases 5 nulls, 10 singles, 6 compounds, 4 outside the library; of
-    /// families D and E in 10 cases 2, 5, 1 and 2]
+    /// families D to F in 10 cases 2, 5, 1 and 2, of G and H 2, 4, 2 and 2]
     #[arg(long, value_enum)]
     pub kind: Option<Kind>,
     /// Singles of one cause alone

@@ -43,6 +43,9 @@ pub struct Judged {
     pub faults: Vec<String>,
     /// What is hidden, with the times over the limit.
     pub hidden: Vec<(String, f64)>,
+    /// Distance of each hidden law from the textbook's, where the family has one.
+    #[serde(default)]
+    pub distances: Vec<Option<f64>>,
     /// What was named.
     pub named: Vec<String>,
     /// Verdict, or what went wrong.
@@ -106,6 +109,7 @@ pub fn judge(truth: &Truth, answer: &Result<Answer, String>, seconds: f64) -> Ju
         bench: truth.bench.clone(),
         faults: Vec::new(),
         hidden: truth.hidden.iter().map(|hidden| (hidden.name.clone(), hidden.over_limit)).collect(),
+        distances: truth.hidden.iter().map(|hidden| hidden.numbers.get("distance").copied()).collect(),
         named: Vec::new(),
         verdict: String::new(),
         first: None,
@@ -319,10 +323,16 @@ impl Reliability {
 }
 
 /// What is told of each family.
-const OF_A_FAMILY: [&str; 14] = [
+const OF_A_FAMILY: [&str; 20] = [
     "first_name",
     "first_name_or_listed",
     "exact",
+    "exact_near",
+    "exact_far",
+    "listed_near",
+    "listed_far",
+    "found_near",
+    "found_far",
     "compound_exact",
     "two_exact",
     "false_name",
@@ -345,9 +355,21 @@ fn single(judged: &Judged) -> bool {
     judged.kind == "single"
 }
 
+/// A single whose law lies so far from the textbook's.
+fn single_at(judged: &Judged, from: f64, to: f64) -> bool {
+    single(judged) && judged.distances.iter().flatten().any(|distance| (from..to).contains(distance))
+}
+
 /// Rates over some cases, by name.
 fn rates_of(cases: &[&Judged]) -> Vec<(&'static str, Rate)> {
     let rate = |ask: &dyn Fn(&Judged) -> Option<bool>| Rate::over(cases.iter().map(|j| ask(j)));
+    let found = |from: f64, to: f64| {
+        let at = move |j: &Judged, name: &str| {
+            let place = j.hidden.iter().position(|(other, _)| other == name);
+            place.and_then(|place| *j.distances.get(place)?).is_some_and(|d| (from..to).contains(&d))
+        };
+        Rate::over(cases.iter().flat_map(|j| j.found.iter().map(move |(name, yes)| when(at(j, name), Some(*yes)))))
+    };
     vec![
         ("first_name", rate(&|j| when(single(j), j.first))),
         ("first_name_rich", rate(&|j| when(single(j) && j.poor.is_empty(), j.first))),
@@ -358,9 +380,17 @@ fn rates_of(cases: &[&Judged]) -> Vec<(&'static str, Rate)> {
         ("first_name_family_d", rate(&|j| when(single(j) && j.family == "D", j.first))),
         ("first_name_family_e", rate(&|j| when(single(j) && j.family == "E", j.first))),
         ("first_name_family_f", rate(&|j| when(single(j) && j.family == "F", j.first))),
+        ("first_name_family_g", rate(&|j| when(single(j) && j.family == "G", j.first))),
+        ("first_name_family_h", rate(&|j| when(single(j) && j.family == "H", j.first))),
         ("first_name_strict", rate(&|j| when(single(j), j.first_strict))),
         ("first_name_or_listed", rate(&|j| when(single(j), j.first_or_listed))),
         ("exact", rate(&|j| when(single(j), j.exact))),
+        ("exact_near", rate(&|j| when(single_at(j, 0.0, 0.5), j.exact))),
+        ("exact_far", rate(&|j| when(single_at(j, 0.5, 1.1), j.exact))),
+        ("listed_near", rate(&|j| when(single_at(j, 0.0, 0.5), j.first_or_listed))),
+        ("listed_far", rate(&|j| when(single_at(j, 0.5, 1.1), j.first_or_listed))),
+        ("found_near", found(0.0, 0.5)),
+        ("found_far", found(0.5, 1.1)),
         ("compound_first", rate(&|j| when(j.kind == "compound", j.first))),
         ("compound_exact", rate(&|j| when(j.kind == "compound", j.exact))),
         ("two_exact", rate(&|j| when(j.kind == "compound" && j.hidden.len() == 2, j.exact))),

@@ -37,6 +37,16 @@ strangers! {
     EncoderGear "encoder_driven_by_a_pinion",
     SlippingClamp "slipping_clamp",
     TorqueFilter "torque_behind_a_filter",
+    HarnessSnap "harness_that_snaps_over",
+    SunOnMount "sun_on_the_encoder_mount",
+    WheelHum "reaction_wheel_hum",
+    MountSettles "mount_settles_after_pauses",
+    LooseBolts "loose_flange_bolts",
+    BrakeReleasesLate "brake_releases_late",
+    TorqueSensorCreep "torque_sensor_creep",
+    NeighbourMachine "neighbouring_machine",
+    ScalePatch "patch_of_the_tape_scale",
+    ChainRolls "energy_chain_rolls",
 }
 
 impl Stranger {

@@ -1,13 +1,16 @@
-//! Families D, E and F, and perfect drives under faults of the logger: plants of their own that share nothing with
+//! Families D to H, and perfect drives under faults of the logger: plants of their own that share nothing with
 //! families A to C but the catalogue's drive, the noise of the sensors and the scores.
 
+pub mod arm;
 pub mod gear;
+pub mod gimbal;
 pub mod hides;
 pub mod joint;
 pub mod logger;
 pub mod metrology;
 pub mod oracle;
 pub mod rig;
+pub mod train;
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -21,6 +24,8 @@ use crate::motion::Motion;
 use crate::noise::{Sensors, csv};
 use crate::plant::Readings;
 use crate::truth::{Hidden, Truth, rounded};
+use arm::Arm;
+use gimbal::Gimbal;
 use hides::{Hides, Stranger, Thing};
 use joint::Joint;
 use logger::LoggerFault;
@@ -37,9 +42,13 @@ pub enum Stand {
     Bench(Metrology),
     /// Family F.
     Rig(Rig),
+    /// Family G.
+    Gimbal(Gimbal),
+    /// Family H.
+    Arm(Arm),
 }
 
-/// A case of family D, E or F, or a perfect drive under a fault of the logger.
+/// A case of families D to H, or a perfect drive under a fault of the logger.
 #[derive(Debug, Clone)]
 pub struct Fresh {
     seed: u64,
@@ -101,6 +110,13 @@ impl Fresh {
             sensors.generator_step_rad = step(15 + chance.below(3));
             sensors.output_step_rad = step(19 + chance.below(4));
             Stand::Rig(Rig::draw(&drive, &mut chance))
+        } else if plant == Plant::G {
+            sensors.white_arcsec *= 0.7;
+            Stand::Gimbal(Gimbal::draw(&drive, &mut chance))
+        } else if plant == Plant::H {
+            sensors.white_arcsec *= 0.6;
+            sensors.wander_arcsec *= 0.6;
+            Stand::Arm(Arm::draw(&drive, &mut chance))
         } else {
             let mut joint = Joint::draw(&drive, &mut chance);
             if let Some(fault) = fault {
@@ -132,6 +148,7 @@ impl Fresh {
         let jitter_s = match &self.stand {
             Stand::Joint(joint) => Some(joint.poll.jitter_s),
             Stand::Rig(rig) => Some(rig.jitter_s),
+            Stand::Gimbal(Gimbal { pace, .. }) | Stand::Arm(Arm { pace, .. }) => Some(pace.jitter_s),
             Stand::Bench(_) => None,
         };
         let zeroed = matches!(&self.stand, Stand::Bench(bench) if bench.zeroed || bench.restarted);
@@ -144,10 +161,17 @@ impl Fresh {
         };
         let white = self.sensors.white_arcsec;
         let mut hidden = Vec::new();
+        let mut far = chance.one_in(0.5);
         for thing in things {
             let mut one = Hides::draw(thing, &self.drive, chance);
+            if self.has_distance() {
+                one.shape[3] = if far { chance.uniform(0.7, 1.0) } else { chance.uniform(0.0, 0.3) };
+                far = !far;
+            }
             let target = chance.log_uniform(AIM.0, AIM.1);
-            for _ in 0..4 {
+            // A whole tooth, or nothing.
+            let whole = self.has_distance() && thing == Thing::Cause(Cause::Ratcheting);
+            for _ in 0..if whole { 0 } else { 4 } {
                 let added = oracle.added(&left(std::slice::from_ref(&one)), &clean);
                 let over = oracle.weigh(&added).over_limit(white);
                 if (0.8..1.25).contains(&(over / target)) {
@@ -168,7 +192,7 @@ impl Fresh {
             let over_limit = weight.over_limit(white);
             let own = if let Thing::Cause(cause) = one.thing { Some(cause) } else { None };
             let like = if over_limit >= 1.0 { oracle.look_alikes(&added, own, white) } else { Vec::new() };
-            let names = ["shape_1", "shape_2", "shape_3", "shape_4"];
+            let names = ["shape_1", "shape_2", "shape_3", if self.has_distance() { "distance" } else { "shape_4" }];
             let mut numbers: BTreeMap<String, f64> =
                 names.iter().zip(one.shape).map(|(name, value)| ((*name).to_owned(), value)).collect();
             numbers.insert(one.unit().to_owned(), one.size);
@@ -188,8 +212,18 @@ impl Fresh {
         (self.hidden, self.weighed) = (hidden, weighed);
     }
 
+    /// Whether the fourth number of a law is its distance from the textbook: near in half of what is hidden, far in the
+    /// other.
+    fn has_distance(&self) -> bool {
+        matches!(self.stand, Stand::Gimbal(_) | Stand::Arm(_))
+    }
+
     fn parameters(&self, one: &Hides) -> BTreeMap<String, f64> {
         let Thing::Cause(cause) = one.thing else { return BTreeMap::new() };
+        // Far from the textbook a size has more than one reading.
+        if self.has_distance() && (one.shape[3] > 0.5 || cause == Cause::RatioError) {
+            return BTreeMap::new();
+        }
         let joint = !matches!(self.stand, Stand::Bench(_));
         let named = match cause {
             Cause::StiffnessError => Some(("stiffness_ratio", self.unit.stiffness * (1.0 + one.size))),
@@ -214,6 +248,8 @@ impl Fresh {
             Stand::Joint(joint) => joint.run(&self.drive, &self.unit, hidden),
             Stand::Bench(bench) => bench.run(&self.drive, &self.unit, hidden),
             Stand::Rig(rig) => rig.run(&self.drive, &self.unit, hidden),
+            Stand::Gimbal(gimbal) => gimbal.run(&self.drive, &self.unit, hidden),
+            Stand::Arm(arm) => arm.run(&self.drive, &self.unit, hidden),
         }
     }
 
@@ -304,6 +340,8 @@ impl Fresh {
             (Stand::Joint(_), _) => "D",
             (Stand::Bench(_), _) => "E",
             (Stand::Rig(_), _) => "F",
+            (Stand::Gimbal(_), _) => "G",
+            (Stand::Arm(_), _) => "H",
         };
         Truth {
             name,
@@ -338,12 +376,17 @@ fn plan(
     let (causes, strangers) = match plant {
         Plant::E => (hides::OF_BENCHES, Stranger::OF_BENCHES),
         Plant::F => (Cause::ALL, Stranger::OF_RIGS),
+        Plant::G => (Cause::ALL, gimbal::STRANGERS),
+        Plant::H => (Cause::ALL, arm::STRANGERS),
         _ => (Cause::ALL, Stranger::OF_JOINTS),
     };
     let mut kinds = [Kind::Single; BLOCK as usize];
     kinds[..2].fill(Kind::Null);
     kinds[2..4].fill(Kind::Outside);
     kinds[4] = Kind::Compound;
+    if matches!(plant, Plant::G | Plant::H) {
+        kinds[5] = Kind::Compound;
+    }
     let (block, place) = (index / BLOCK, (index % BLOCK) as usize);
     Chance::new(seed, "fresh kinds", block).shuffle(&mut kinds);
     let mut kind = kinds[place];

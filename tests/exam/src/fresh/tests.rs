@@ -56,6 +56,152 @@ fn a_perfect_rig_returns_the_error_of_the_catalogue() {
     }
 }
 
+/// A gimbal and an arm whose readings are not scattered and whose gear is as warm as the column says.
+fn new_stands(drive: &Drive, chance: &mut Chance) -> [(&'static str, Stand); 2] {
+    let (mut gimbal, mut arm) = (Gimbal::draw(drive, chance), Arm::draw(drive, chance));
+    for pace in [&mut gimbal.pace, &mut arm.pace] {
+        (pace.jitter_s, pace.lags_s) = (0.0, [0.1, 0.2]);
+    }
+    [("gimbal", Stand::Gimbal(gimbal)), ("arm", Stand::Arm(arm))]
+}
+
+fn run_on(stand: &Stand, drive: &Drive, hidden: &[Hides]) -> (Motion, Readings) {
+    match stand {
+        Stand::Gimbal(gimbal) => gimbal.run(drive, &Unit::nominal(drive), hidden),
+        Stand::Arm(arm) => arm.run(drive, &Unit::nominal(drive), hidden),
+        _ => unreachable!("asked of families G and H"),
+    }
+}
+
+/// So do a perfect gimbal and a perfect arm, but for the rows in which the load crosses the clearance, and with enough
+/// of all that parts causes: turns, loads of both senses, both directions, temperatures.
+#[test]
+fn a_perfect_gimbal_and_a_perfect_arm_return_the_error_of_the_catalogue() {
+    for index in 0..4 {
+        let (drive, mut chance) = drive(index);
+        for (name, stand) in new_stands(&drive, &mut chance) {
+            let (motion, readings) = run_on(&stand, &drive, &[]);
+            let left = residual(&drive, &motion, &readings);
+            let [half, most, nearly_all] = quantiles(&left);
+            let share =
+                |is: &dyn Fn(usize) -> bool| (0..left.len()).filter(|at| is(*at)).count() as f64 / left.len() as f64;
+            let loads = [-1.0, 1.0].map(|sign| share(&|at| sign * motion.torque_n_m[at] > 0.3 * drive.rated_n_m));
+            let senses = [-1.0, 1.0].map(|sign| share(&|at| sign * motion.speed_rad_s[at] > 0.5));
+            let over = motion.torque_n_m.iter().fold(0.0, |most: f64, t| most.max(t.abs())) / drive.rated_n_m;
+            println!(
+                "{index} {name}: {half:.4} {most:.3} {nearly_all:.3} rms {:.3} turns {:.0} rows {} loads {loads:.2?} \
+                 senses {senses:.2?} over {over:.2}",
+                rms(&left),
+                motion.turns(),
+                left.len()
+            );
+            assert!(half < 0.01 && most < 0.5, "{name} {index}: {half} {most} arcsec");
+            assert!(left.iter().all(|x| x.abs() < 1.05 * drive.backlash_arcsec), "{name} {index}");
+            assert!(motion.turns() > 0.5 * drive.ratio().abs(), "half an output turn: {}", motion.turns());
+            assert!((25_000..45_000).contains(&left.len()), "{}", left.len());
+            assert!(loads.iter().chain(&senses).all(|share| *share > 0.06), "{loads:?} {senses:?}");
+            assert!(over < 2.2, "{over} times the rated torque");
+        }
+    }
+}
+
+/// Signs and units of the README, of each cause near the textbook whose column is plain to write down.
+#[test]
+fn causes_of_the_gimbal_and_the_arm_keep_signs_and_units() {
+    type Column = fn(&Drive, &Motion, &Readings, usize) -> f64;
+    let wound: Column = |drive, motion, _, at| drive.wind_up_arcsec(motion.torque_n_m[at]);
+    let flank: Column = |_, motion, _, at| motion.torque_n_m[at].signum();
+    let table: [(Cause, f64, Column, (f64, f64)); 13] = [
+        // A spring stiffer by a quarter winds up by a fifth less.
+        (Cause::StiffnessError, 0.25, wound, (-0.8, 0.02)),
+        (Cause::BacklashGrowth, 30.0, flank, (0.5, 0.02)),
+        (Cause::Wear, 60.0, |_, m, _, at| m.torque_n_m[at].signum() * at as f64 / m.time_s.len() as f64, (0.5, 0.12)),
+        (
+            Cause::ThermalClearance,
+            1.0,
+            |_, m, _, at| m.torque_n_m[at].signum() * (m.temperature_c[at] - 20.0),
+            (0.5, 0.1),
+        ),
+        (
+            Cause::ThermalStiffness,
+            -2e-3,
+            |d, m, _, at| d.wind_up_arcsec(m.torque_n_m[at]) * (m.temperature_c[at] - 20.0),
+            (-1.0, 0.2),
+        ),
+        (Cause::SensorLatency, 3e-3, |d, m, _, at| -m.speed_rad_s[at] / d.ratio() * crate::ARCSEC, (1.0, 0.15)),
+        (
+            Cause::RatioError,
+            1e-5,
+            |d, _, r, at| (r.generator_rad[at] - r.generator_rad[0]) / d.ratio() * crate::ARCSEC,
+            (1.0, 0.02),
+        ),
+        (Cause::OutputEncoderEccentricity, 20.0, |_, _, r, at| (r.output_rad[at] + 1.0).sin(), (1.0, 0.02)),
+        (Cause::GeneratorEncoderEccentricity, 10.0, |_, _, r, at| -(r.generator_rad[at] + 1.0).sin(), (1.0, 0.03)),
+        (
+            Cause::TorsionalHysteresis,
+            12.0,
+            |_, m, _, at| {
+                // A stop as wide as the spring's: the output stays behind a torque that changes.
+                let from = m
+                    .session_start
+                    .iter()
+                    .rev()
+                    .find(|from| **from <= at)
+                    .copied()
+                    .unwrap_or(0)
+                    .max(at.saturating_sub(600));
+                -(m.torque_n_m[at] - m.torque_n_m[from]).signum()
+            },
+            (0.5, 0.45),
+        ),
+        (Cause::CamFormError, 4.0, |d, _, r, at| (d.mesh_order() * r.generator_rad[at] + 1.0).sin(), (0.8, 0.25)),
+        (Cause::CircularSplineEccentricity, 20.0, flank, (-0.3, 0.28)),
+        (Cause::GeneratorEccentricity, 20.0, flank, (-0.3, 0.28)),
+    ];
+    let (drive, mut chance) = drive(3);
+    for (name, stand) in new_stands(&drive, &mut chance) {
+        let slope = |one: &Hides, column: &dyn Fn(&Motion, &Readings, usize) -> f64| {
+            let (motion, readings) = run_on(&stand, &drive, std::slice::from_ref(one));
+            let left = residual(&drive, &motion, &readings);
+            let (mut along, mut square) = (0.0, 0.0);
+            for at in (0..left.len()).filter(|at| motion.torque_n_m[*at].abs() > 3.0 * drive.friction_torque_n_m) {
+                let x = column(&motion, &readings, at);
+                along += left[at] * x;
+                square += x * x;
+            }
+            along / square / one.size
+        };
+        let phase = 1.0 / std::f64::consts::TAU;
+        let of = |cause, size| Hides { thing: Thing::Cause(cause), size, shape: [phase, 0.3, 0.4, 0.0] };
+        for (cause, size, column, (wanted, off)) in table {
+            let found = slope(&of(cause, size), &|m, r, at| column(&drive, m, r, at));
+            println!("{name} {:<32} {found:+.3}", cause.name());
+            assert!((found - wanted).abs() < off, "{name} {}: {found}, not {wanted}", cause.name());
+        }
+        // Wind-up by a little more torque.
+        let gives = |torque: f64| (drive.wind_up_arcsec(torque + 0.01) - drive.wind_up_arcsec(torque - 0.01)) / 0.02;
+        let hangs = slope(&of(Cause::GravityTorque, 0.01 * drive.rated_n_m), &|m, r, at| {
+            (r.output_rad[at] + m.orientation_rad[at] + 1.0).sin() * gives(m.torque_n_m[at])
+        });
+        assert!((hangs - 1.0).abs() < 0.05, "{name}: {hangs}");
+        let drags = slope(&of(Cause::LubricantViscosity, 0.005 * drive.rated_n_m), &|m, _, at| {
+            let (at_speed, thins) = if name == "arm" { (8.0, 0.035) } else { (4.0, 0.03) };
+            let speed = m.speed_rad_s[at] * drive.ratio().signum() / at_speed;
+            -speed * gives(m.torque_n_m[at]) * (-thins * (m.temperature_c[at] - 20.0)).exp().min(5.0)
+        });
+        println!("{name} hangs {hangs:.3} drags {drags:.3}");
+        assert!((drags - 1.0).abs() < 0.06, "{name}: {drags}");
+        // The output jumps by a tooth with the load.
+        let (motion, readings) = run_on(&stand, &drive, &[of(Cause::Ratcheting, 1.0)]);
+        let left = residual(&drive, &motion, &readings);
+        let pitch = std::f64::consts::TAU / drive.output_teeth() * crate::ARCSEC;
+        let jump = left[left.len() - 1].abs();
+        assert!((jump - pitch).abs() < 0.02 * pitch + drive.backlash_arcsec, "{name}: {jump}, not {pitch}");
+        let before = left.iter().position(|x| x.abs() > 0.5 * pitch).unwrap();
+        assert!(motion.torque_n_m[before] * left[left.len() - 1] > 0.0, "{name}: against the load");
+    }
+}
+
 #[test]
 fn a_perfect_bench_returns_the_error_of_the_catalogue() {
     for index in 0..6 {
@@ -112,10 +258,14 @@ fn every_effect_shows_and_vanishes_with_its_size() {
     let of_benches = things(hides::OF_BENCHES, Stranger::OF_BENCHES);
     let bench = Metrology::draw(&drive, &of_benches, &mut chance);
     let rig = Rig::draw(&drive, &mut chance);
+    let (mut gimbal, mut arm) = (Gimbal::draw(&drive, &mut chance), Arm::draw(&drive, &mut chance));
+    (gimbal.rows, arm.rows) = (14_000, 14_000);
     let stands = [
         (Stand::Joint(joint), things(Cause::ALL, Stranger::OF_JOINTS)),
         (Stand::Bench(bench), of_benches),
         (Stand::Rig(rig), things(Cause::ALL, Stranger::OF_RIGS)),
+        (Stand::Gimbal(gimbal), things(Cause::ALL, gimbal::STRANGERS)),
+        (Stand::Arm(arm), things(Cause::ALL, arm::STRANGERS)),
     ];
     for (stand, things) in stands {
         let run = |hidden: &[Hides]| {
@@ -123,6 +273,8 @@ fn every_effect_shows_and_vanishes_with_its_size() {
                 Stand::Joint(joint) => joint.run(&drive, &unit, hidden),
                 Stand::Bench(bench) => bench.run(&drive, &unit, hidden),
                 Stand::Rig(rig) => rig.run(&drive, &unit, hidden),
+                Stand::Gimbal(gimbal) => gimbal.run(&drive, &unit, hidden),
+                Stand::Arm(arm) => arm.run(&drive, &unit, hidden),
             };
             residual(&drive, &motion, &readings)
         };
@@ -160,7 +312,14 @@ fn a_seed_repeats_a_case_and_the_data_hold_no_truth() {
         #[command(flatten)]
         draw: Draw,
     }
-    for options in [["--family", "d"], ["--family", "e"], ["--family", "f"], ["--kind", "logger"]] {
+    for options in [
+        ["--family", "d"],
+        ["--family", "e"],
+        ["--family", "f"],
+        ["--family", "g"],
+        ["--family", "h"],
+        ["--kind", "logger"],
+    ] {
         let draw = Options::parse_from(["exam"].into_iter().chain(options)).draw;
         assert!(draw.is_fresh());
         for index in [3] {
@@ -197,7 +356,7 @@ fn each_fault_of_a_logger_leaves_a_mark() {
                 let poll = Poll { late_reads: 0.0, stalls_s: (0.0, 0.0), counted: None, ..EXACT(joint.poll) };
                 Fresh { fault: None, stand: Stand::Joint(joint.polled(poll)), ..case.clone() }
             }
-            Stand::Bench(_) | Stand::Rig(_) => unreachable!("faults of loggers are those of joints"),
+            _ => unreachable!("faults of loggers are those of joints"),
         };
         assert!(with != (clean.data(), clean.nominal_toml()), "{}", fault.name());
         assert_eq!(case.unit, Unit::nominal(&case.drive), "a perfect drive");
