@@ -155,13 +155,7 @@ impl Gimbal {
                     // The azimuth of what flies past: arc tangent of time.
                     1 => pass / (1.0 + ((t / lasts - 0.5) / 0.16).powi(2)),
                     // Two steps on, one back.
-                    2 => {
-                        if (t / 1.6).fract() < 0.5 {
-                            [step, step, -step][(t / 1.6) as usize % 3]
-                        } else {
-                            0.0
-                        }
-                    }
+                    2 if (t / 1.6).fract() < 0.5 => [step, step, -step][(t / 1.6) as usize % 3],
                     3 => scan * (TAU * t * (0.4 + 0.5 * 7.6 * t / lasts)).sin(),
                     4 => star,
                     _ => 0.0,

@@ -18,7 +18,7 @@ use std::fmt::Write;
 use crate::case::{Draw, Kind, Plant};
 use crate::cause::Cause;
 use crate::chance::Chance;
-use crate::drive::{Drive, Unit};
+use crate::drive::{Drive, Fixed, Unit};
 use crate::effect::Family;
 use crate::motion::Motion;
 use crate::noise::{Sensors, csv};
@@ -191,7 +191,12 @@ impl Fresh {
             let weight = oracle.weigh(&added);
             let over_limit = weight.over_limit(white);
             let own = if let Thing::Cause(cause) = one.thing { Some(cause) } else { None };
-            let like = if over_limit >= 1.0 { oracle.look_alikes(&added, own, white) } else { Vec::new() };
+            let mut like = if over_limit >= 1.0 { oracle.look_alikes(&added, own, white) } else { Vec::new() };
+            let same = own.filter(|_| over_limit >= 1.0 && self.has_distance());
+            let same = same.and_then(|cause| same_axis(cause, self.drive.fixed, &motion.orientation_rad));
+            if let Some(same) = same.filter(|same| like.iter().all(|(cause, _)| cause != same)) {
+                like.push((same, 0.0));
+            }
             let names = ["shape_1", "shape_2", "shape_3", if self.has_distance() { "distance" } else { "shape_4" }];
             let mut numbers: BTreeMap<String, f64> =
                 names.iter().zip(one.shape).map(|(name, value)| ((*name).to_owned(), value)).collect();
@@ -357,6 +362,20 @@ impl Fresh {
             white_arcsec: rounded(self.sensors.white_arcsec),
             turns: rounded(motion.turns()),
         }
+    }
+}
+
+/// What a displaced axis cannot be told from while the housing never turns: gravity holds it in the housing, as the
+/// wheel does that the housing holds. The oracle's linear span does not see it where zones share by a law of their own.
+fn same_axis(cause: Cause, fixed: Fixed, orientation_rad: &[f64]) -> Option<Cause> {
+    let held = if fixed == Fixed::Flexspline { Cause::FlexsplineRunout } else { Cause::CircularSplineEccentricity };
+    // Half a turn brings the one zone to the place of the other.
+    let turned = orientation_rad.iter().any(|angle| (angle - orientation_rad[0]).sin().abs() > 0.05);
+    match cause {
+        _ if turned => None,
+        Cause::GravitySideLoad => Some(held),
+        _ if cause == held => Some(Cause::GravitySideLoad),
+        _ => None,
     }
 }
 

@@ -202,6 +202,33 @@ fn causes_of_the_gimbal_and_the_arm_keep_signs_and_units() {
     }
 }
 
+/// What [`same_axis`] says of causes, said by the plants: the residuals of the two are one until the housing turns.
+#[test]
+fn a_push_of_gravity_is_an_axis_of_the_held_wheel_until_the_housing_turns() {
+    let (mut same, mut other) = (0, 0);
+    for index in 0..6 {
+        let (drive, mut chance) = drive(index);
+        let held =
+            if drive.fixed == Fixed::Flexspline { Cause::FlexsplineRunout } else { Cause::CircularSplineEccentricity };
+        for (name, stand) in new_stands(&drive, &mut chance) {
+            let of = |cause, p: f64| Hides {
+                thing: Thing::Cause(cause),
+                size: 15.0,
+                shape: [p.rem_euclid(1.0), 0.3, 0.4, 0.0],
+            };
+            let pushed = run_on(&stand, &drive, &[of(Cause::GravitySideLoad, 0.2)]);
+            let at = 0.2 - pushed.0.orientation_rad[0] / std::f64::consts::TAU;
+            let displaced = run_on(&stand, &drive, &[of(held, at)]);
+            let apart = crate::bench::difference(&pushed.1.error_arcsec, &displaced.1.error_arcsec);
+            let told = same_axis(Cause::GravitySideLoad, drive.fixed, &pushed.0.orientation_rad);
+            assert_eq!(told.is_some(), rms(&apart) < 0.05, "{name} {index}: {}", rms(&apart));
+            assert!(told.is_none_or(|cause| cause == held));
+            (same, other) = if told.is_some() { (same + 1, other) } else { (same, other + 1) };
+        }
+    }
+    assert!(same > 1 && other > 1, "{same} {other}");
+}
+
 #[test]
 fn a_perfect_bench_returns_the_error_of_the_catalogue() {
     for index in 0..6 {
