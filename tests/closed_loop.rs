@@ -5,10 +5,12 @@
 //! Short: four generators with five controllers over two minutes of antenna on the dense FEM map, the map against fresh
 //! FEM, and what can go wrong in a loop. `--ignored`: contact FEM itself in the loop.
 
+mod fem;
+mod single;
+
 use std::sync::LazyLock;
 
 use flexspline::{Direction, Flags, GeneratorAngle, JointState, Mode, Output, Overrun, PlayState, Quality, Table};
-use flexspline_sim::closed_loop::fem::{FemPlant, Windows};
 use flexspline_sim::closed_loop::flight::Plant;
 use flexspline_sim::closed_loop::flight::antenna::{COLUMNS, CONTROLLERS, CORE};
 use flexspline_sim::closed_loop::flight::controllers::{Compensated, LIMITS, Told};
@@ -16,12 +18,15 @@ use flexspline_sim::closed_loop::flight::gear::Gear;
 use flexspline_sim::closed_loop::flight::profile::{ANTENNA, BRIEF, Moment, Profile, TICK_S};
 use flexspline_sim::closed_loop::flight::score::{ARCSEC_PER_RAD, Scores};
 use flexspline_sim::closed_loop::flight::servo::SERVO;
+use flexspline_sim::closed_loop::fly;
 use flexspline_sim::closed_loop::map::DenseMap;
-use flexspline_sim::closed_loop::{Single, Step, fly};
 use flexspline_sim::drive::{Drive, GeneratorKind};
 use flexspline_sim::motion::Motion;
 use flexspline_sim::stepping::{Method, Problem, SolverSettings};
 use flexspline_sim::tables::{self, samples};
+
+use fem::{FemPlant, Windows};
+use single::{Single, Step};
 
 const FAST: fn() -> SolverSettings = || SolverSettings { method: Method::Fast, ..SolverSettings::default() };
 

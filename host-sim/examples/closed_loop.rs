@@ -11,17 +11,22 @@
 use std::error::Error;
 use std::path::Path;
 
-use flexspline_sim::closed_loop::flight::Plant;
 use flexspline_sim::closed_loop::flight::antenna::COLUMNS;
 use flexspline_sim::closed_loop::flight::gear::Gear;
 use flexspline_sim::closed_loop::flight::profile::{ANTENNA, BRIEF, Profile};
-use flexspline_sim::closed_loop::flight::rover::RoverJoint;
 use flexspline_sim::closed_loop::flight::servo::{SERVO, ServoSettings};
+use flexspline_sim::closed_loop::flight::{self, Plant};
 use flexspline_sim::closed_loop::map::DenseMap;
 use flexspline_sim::closed_loop::{fly, write_flight};
 use flexspline_sim::drive::{Drive, GeneratorKind};
 use flexspline_sim::output::write_whole;
 use flexspline_sim::stepping::{Method, SolverSettings};
+
+#[allow(dead_code)] // Only the target asks for the gain of a joint.
+#[path = "../../tests/firmware/src/rover.rs"]
+mod rover;
+
+use rover::RoverJoint;
 
 /// The order of the target's programs.
 const KINDS: [GeneratorKind; 4] =

@@ -114,16 +114,16 @@ impl OnBoard {
 /// or more for each. What comes a tick late is then less than 60° behind, and takes off more than it adds; faster ones
 /// excite the resonance.
 #[must_use]
-pub(crate) fn passes_slowly(drive: &Drive, rate_rad_s: f32, tick_s: f32) -> bool {
+pub fn passes_slowly(drive: &Drive, rate_rad_s: f32, tick_s: f32) -> bool {
     const TICKS: f32 = 6.0;
     let pitches = rate_rad_s.abs() * drive.ratio().abs() * f32::from(drive.ripple_order()) / core::f32::consts::TAU;
     pitches * tick_s * TICKS <= 1.0
 }
 
 /// Bytes of the settings, and of what a tick is told, on a tape.
-pub(crate) const SETTINGS_BYTES: usize = 4 * 15;
+pub const SETTINGS_BYTES: usize = 4 * 15;
 /// See there.
-pub(crate) const TOLD_BYTES: usize = 8 + 8 + 4 * 4 + 4;
+pub const TOLD_BYTES: usize = 8 + 8 + 4 * 4 + 4;
 
 impl Settings {
     /// For a tape, little endian.

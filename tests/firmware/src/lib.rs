@@ -10,6 +10,7 @@ pub mod flight;
 #[path = "../../../host-sim/motion/src/on_board.rs"]
 pub mod on_board;
 pub mod plant;
+pub mod rover;
 pub mod trajectory;
 
 use cortex_m_semihosting::debug;

@@ -1,15 +1,13 @@
 //! The core in a closed loop with the simulated drive: what it gains in pointing.
 //!
 //! The plant is contact FEM at points that made no table ([`map::DenseMap`]), read with a law of play of its own
-//! ([`flight::gear`]); the direct FEM ([`fem::FemPlant`]) flies the same loop as a check of it. What has mass is flown
-//! by
+//! ([`flight::gear`]); `tests/closed_loop/` flies the FEM itself, and joints that something goes wrong with. What has
+//! mass is flown by
 //! [`crate::fly`]. Everything that flies is in [`flight`], which `tests/firmware` compiles for the target as well: the
 //! joint's tick is the very same code in both.
 
-pub mod fem;
 pub mod flight;
 pub mod map;
-mod single;
 
 use std::path::Path;
 
@@ -21,8 +19,6 @@ use flight::Plant;
 use flight::antenna::{Antenna, CORE, Pointing};
 use flight::profile::{Moment, Profile};
 use flight::servo::ServoSettings;
-
-pub use single::{Single, Step};
 
 /// One tick of a flight, as a report draws it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

@@ -8,8 +8,8 @@
 use cortex_m_rt::entry;
 use flexspline_firmware::flight::gear::Gear;
 use flexspline_firmware::flight::profile::BRIEF;
-use flexspline_firmware::flight::rover::RoverJoint;
 use flexspline_firmware::plant::{Console, EMPTY, Room, read};
+use flexspline_firmware::rover::RoverJoint;
 use flexspline_firmware::{TABLES, finish};
 
 #[entry]

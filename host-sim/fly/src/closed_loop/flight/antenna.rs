@@ -17,13 +17,13 @@ pub const CONTROLLERS: [&str; 5] =
 pub const CORE: usize = 4;
 
 /// The target is given this much early, because the command takes about so long to be carried out, s.
-pub(crate) const LEAD_S: f64 = 0.0;
+pub const LEAD_S: f64 = 0.0;
 /// Time at the beginning that is not scored, s: all start where they are, the core off and without knowing its play.
 pub const START_UP_S: f64 = 0.25;
 /// Ticks for which the core stays off.
 const OFF_TICKS: u32 = 20;
 /// What the limiter holds back less than this is not worth mentioning, rad: 0.1″.
-pub(crate) const HELD_BACK_RAD: f32 = 5e-7;
+pub const HELD_BACK_RAD: f32 = 5e-7;
 
 /// Flags of the core, in the order in which they are counted.
 pub const FLAGS: [(&str, Flags); 7] = [
@@ -47,7 +47,7 @@ pub struct SlowGroups {
 
 impl SlowGroups {
     /// Every 100th and every 20th tick, for joint `number` of at most 20 in ticks of its own.
-    pub(crate) const fn staggered(number: u32) -> Option<Self> {
+    pub const fn staggered(number: u32) -> Option<Self> {
         match (RateGroup::new(100, 5 * number), RateGroup::new(20, number)) {
             (Some(thermometer), Some(images)) => Some(Self { thermometer, images }),
             _ => None,
@@ -117,7 +117,7 @@ impl<'a, P: Plant> Antenna<'a, P> {
 
     /// Other servos.
     #[must_use]
-    pub(crate) fn with_servo(mut self, settings: ServoSettings) -> Self {
+    pub fn with_servo(mut self, settings: ServoSettings) -> Self {
         for lane in &mut self.lanes {
             lane.servo = Servo::new(settings);
         }

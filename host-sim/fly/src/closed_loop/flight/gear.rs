@@ -82,7 +82,7 @@ pub fn parse(text: &str, planes: &mut [[f64; MOST]; 2]) -> Result<Header, usize>
 }
 
 /// Flank torque of node `k` of `n`, from 0, as a share of the largest.
-pub(crate) fn node_share(k: usize, n: usize) -> f64 {
+pub fn node_share(k: usize, n: usize) -> f64 {
     let part = (k + 1) as f64 / n as f64;
     part * part * part * part
 }
@@ -156,7 +156,7 @@ impl<'a> Gear<'a> {
     }
 
     /// Ends of the play at a generator angle under a load torque: error of the output moving forward and backward, rad.
-    pub(crate) fn ends_rad(&self, generator_rad: f64, torque_n_m: f64) -> [f64; 2] {
+    pub fn ends_rad(&self, generator_rad: f64, torque_n_m: f64) -> [f64; 2] {
         let drag = self.map.header.drag_n_m;
         // At the very edge the output still rests on the flank that it comes from.
         let behind = if torque_n_m - drag > 0.0 { 1.0 } else { -1.0 };

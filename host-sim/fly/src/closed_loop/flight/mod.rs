@@ -11,7 +11,6 @@ pub mod antenna;
 pub mod controllers;
 pub mod gear;
 pub mod profile;
-pub mod rover;
 pub mod score;
 pub mod servo;
 
@@ -62,7 +61,7 @@ pub struct Sensors {
 impl Sensors {
     /// Of the usual kind for a table up to this torque: 14 bits over ± the range, noise of one step, quarters of a
     /// degree.
-    pub(crate) fn for_range(largest_n_m: f64) -> Self {
+    pub fn for_range(largest_n_m: f64) -> Self {
         let step = 2.0 * largest_n_m / 16_384.0;
         Self {
             torque_step_n_m: step,

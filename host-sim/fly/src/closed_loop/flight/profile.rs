@@ -9,9 +9,9 @@ use core::f64::consts::TAU;
 /// Time from tick to tick, s.
 pub const TICK_S: f64 = 1e-3;
 /// Rate of the stars, rad/s.
-pub(crate) const SIDEREAL_RAD_S: f64 = 7.292_115e-5;
+pub const SIDEREAL_RAD_S: f64 = 7.292_115e-5;
 /// Faster than this is a slew, rad/s.
-pub(crate) const FASTEST_TRACKING_RAD_S: f64 = 6e-3;
+pub const FASTEST_TRACKING_RAD_S: f64 = 6e-3;
 /// A rate held for this long is steady tracking, s.
 const STEADY_AFTER_S: f64 = 0.5;
 

@@ -2,12 +2,12 @@
 
 use flexspline::{Drive, Mode, Output, Overrun};
 
-use super::flight::antenna::{HELD_BACK_RAD, START_UP_S, SlowGroups};
-use super::flight::controllers::{Compensated, StartError, Told};
-use super::flight::profile::Moment;
-use super::flight::score::Scores;
-use super::flight::servo::{SERVO, Servo};
-use super::flight::{Lane, Noise, Plant, Sensors, ahead};
+use flexspline_sim::closed_loop::flight::antenna::{HELD_BACK_RAD, START_UP_S, SlowGroups};
+use flexspline_sim::closed_loop::flight::controllers::{Compensated, StartError, Told};
+use flexspline_sim::closed_loop::flight::profile::Moment;
+use flexspline_sim::closed_loop::flight::score::Scores;
+use flexspline_sim::closed_loop::flight::servo::{SERVO, Servo};
+use flexspline_sim::closed_loop::flight::{Lane, Noise, Plant, Sensors, ahead};
 
 /// One tick of it.
 #[derive(Debug, Clone, Copy)]

@@ -5,12 +5,11 @@
 //! moves as the dense map does, set to the FEM at the last of them. How far the map had drifted from the FEM each time
 //! is kept: that is what the map misses, with its law of play.
 
-use flexspline_mechanics::drive::{Drive, GeneratorKind};
-use flexspline_mechanics::motion::Motion;
-use flexspline_mechanics::stepping::{Problem, SolveError, SolverSettings};
+use flexspline_sim::motion::Motion;
+use flexspline_sim::stepping::{Problem, SolveError};
 
-use super::flight::Plant;
-use super::flight::gear::{Gear, GearMap};
+use flexspline_sim::closed_loop::flight::Plant;
+use flexspline_sim::closed_loop::flight::gear::{Gear, GearMap};
 
 /// How far the FEM may lag behind.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,16 +57,6 @@ pub struct FemPlant<'p> {
     pub missed: Vec<Missed>,
     /// An increment that found no equilibrium; the map goes on alone from there.
     pub failed: Option<SolveError>,
-}
-
-/// The mechanical problem of the FEM in the loop; one temperature throughout.
-pub fn problem(
-    drive: &Drive,
-    kind: GeneratorKind,
-    temperature_c: f64,
-    settings: SolverSettings,
-) -> Result<Problem, SolveError> {
-    Problem::new(drive, kind, temperature_c, settings)
 }
 
 impl<'p> FemPlant<'p> {

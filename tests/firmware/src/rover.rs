@@ -1,16 +1,16 @@
 //! A rover of several joints in one loop: each with its table, motor and drive, in an order that never changes, the
-//! slow groups of each in ticks of their own.
+//! slow groups of each in ticks of their own. `host-sim/examples/closed_loop.rs` compiles it for the host as well.
 
 use core::fmt;
 
 use flexspline::{Mode, Overrun, Table};
 
-use super::antenna::{HELD_BACK_RAD, START_UP_S, SlowGroups};
-use super::controllers::{Compensated, Told, Uncompensated};
-use super::profile::Moment;
-use super::score::Scores;
-use super::servo::{SERVO, Servo};
-use super::{Lane, Noise, Plant, Sensors, ahead};
+use crate::flight::antenna::{HELD_BACK_RAD, START_UP_S, SlowGroups};
+use crate::flight::controllers::{Compensated, Told, Uncompensated};
+use crate::flight::profile::Moment;
+use crate::flight::score::Scores;
+use crate::flight::servo::{SERVO, Servo};
+use crate::flight::{Lane, Noise, Plant, Sensors, ahead};
 
 /// A joint: the core's motor and drive, and beside it one that turns at the nominal ratio.
 pub struct RoverJoint<'a, P> {
