@@ -68,7 +68,7 @@ const BOUNDED: &[(&str, &str, usize, Bound)] = &[
     ("mechanics/src/stepping/fast.rs", "low_rank", 1, Shrinks("columns that a matrix of this order lacks")),
     (
         "mechanics/src/stepping/newton.rs",
-        "newton",
+        "iterate",
         1,
         Shrinks("`max_iterations`, again for each of MOST_LAYOUTS layouts"),
     ),

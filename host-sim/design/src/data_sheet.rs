@@ -170,8 +170,8 @@ impl DataSheet {
             tilt_mrad,
             load_across_face_peak_over_mean,
             teeth_in_contact_percent,
-            last_stable_n_m,
             tips_bear_percent,
+            last_stable_n_m,
         ] = figures;
         DataSheet {
             rigid_gap_um,
@@ -235,8 +235,8 @@ pub const FIGURES: [FigureOf; 20] = [
     ("tilt_mrad", |s| s.tilt_mrad),
     ("load_across_face_peak_over_mean", |s| s.load_across_face_peak_over_mean),
     ("teeth_in_contact_percent", |s| s.teeth_in_contact_percent),
-    ("last_stable_n_m", |s| s.last_stable_n_m),
     ("tips_bear_percent", |s| s.tips_bear_percent),
+    ("last_stable_n_m", |s| s.last_stable_n_m),
 ];
 
 /// The sheet of a drive with one generator at a temperature. `positions` over the tooth pitch, 4 or more.
