@@ -143,7 +143,7 @@ pub fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
 }
 
 /// The quantile of a sorted sample, with the interval of its order statistics: ranks between which a binomial variable
-/// lies with probability [`CONFIDENCE`]. Points of a scrambled net scatter less than independent ones, so that it then
+/// lies with a probability of 0.95. Points of a scrambled net scatter less than independent ones, so that it then
 /// holds more often.
 pub fn quantile(sorted: &[f64], share: f64) -> Quantile {
     let n = sorted.len();

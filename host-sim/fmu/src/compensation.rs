@@ -94,7 +94,7 @@ pub fn initial(values: &mut [f64]) {
     values[QUALITY] = f64::from(quality(Quality::Disabled));
 }
 
-/// Its place in [`QUALITIES`].
+/// The number that stands for it.
 pub const fn quality(quality: Quality) -> u8 {
     match quality {
         Quality::InRange => 0,

@@ -52,7 +52,7 @@ pub type Gain = [f64; 2];
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Kernels {
-    /// [`KERNELS_SCHEMA`].
+    /// Version of this form.
     pub schema_version: u32,
     /// Which generator.
     #[serde(with = "kind_by_name")]

@@ -176,13 +176,20 @@ fn what_was_not_recorded_is_not_fitted() {
 
 #[test]
 fn a_sum_over_folds_is_the_fit_to_the_rows() {
-    let scales = Scales { torque_n_m: [0.0; 2], friction_n_m: 0.0, temperature_c: [20.0; 2], teeth: 200.0 };
+    let scales =
+        Scales { torque_n_m: [0.0; 2], friction_n_m: 0.0, temperature_c: [20.0; 2], teeth: 200.0, speed_rad_s: 0.0 };
     let rows: Vec<Row> = (0..200)
         .map(|k| {
-            let psi = 0.1 * f64::from(k);
-            let at =
-                State { generator_rad: psi, output_rad: psi / 101.0, torque_n_m: 0.0, temperature_c: 20.0, way: 1.0 };
-            Row { at, left_arcsec: 7.0 * psi.sin() + 3.0, zero: 0, fold: k as usize / 50 }
+            let psi = 0.1 * k as f64;
+            let at = State {
+                generator_rad: psi,
+                output_rad: psi / 101.0,
+                torque_n_m: 0.0,
+                temperature_c: 20.0,
+                way: 1.0,
+                speed_rad_s: 0.0,
+            };
+            Row { at, left_arcsec: 7.0 * psi.sin() + 3.0, zero: 0, fold: k / 50 }
         })
         .collect();
     let folds = Folds::new(&rows, &[PartName::GeneratorAngle], &scales, 1, false);
