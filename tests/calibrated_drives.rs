@@ -525,7 +525,8 @@ fn states(unit: &Unit<'_>, random: &mut fastrand::Rng) -> Vec<(State, f64)> {
             let flank = torque_n_m - DRAG_N_M * way;
             let error = unit.elastic(gear, generator_rad, flank, flank.signum());
             let output_rad = generator_rad / RATIO;
-            (State { generator_rad, output_rad, torque_n_m, temperature_c: *temperature_c, way }, error)
+            let temperature_c = *temperature_c;
+            (State { generator_rad, output_rad, torque_n_m, temperature_c, way, speed_rad_s: 0.0 }, error)
         })
         .collect()
 }
