@@ -104,7 +104,9 @@ fn a_delay_is_no_play_and_play_is_no_delay() {
         let c = &made.calibration;
         let told = c.notes.iter().find(|note| note.contains("is read"));
         assert_eq!(told.is_some(), delay_s > 0.0, "{delay_s} {play}: {:?}", c.notes);
-        assert!(told.is_none_or(|note| note.contains("output is read 5.0") || note.contains("output is read 4.9")));
+        let ms = told.map(|note| note.split(' ').nth(4).unwrap().parse::<f64>().unwrap());
+        // Beside play, which goes by direction as it does, it is known to a tenth.
+        assert!(ms.is_none_or(|ms| (ms - 5.0).abs() < 0.5), "{told:?}");
         assert_eq!(kept(c).contains(&"play"), play > 0.0, "{delay_s} {play}: {:?}", c.parts);
         assert!(c.core.rms_after_arcsec < 3.0, "{:?}", c.core);
     }

@@ -2,7 +2,7 @@
 //! its own unless the bench sets its zero anew in each. Which causes are fitted was chosen on all sessions.
 
 use super::model::{Fit, Problem, Scaffold, Term};
-use super::products::{Part, Set};
+use super::products::{RowsMet, Set};
 use super::report::{HeldOut, Unexplained};
 use super::rows::mean;
 use super::select::{self, Selected};
@@ -96,7 +96,7 @@ fn left_out(problem: &Problem<'_>, terms: &[&Term<'_>], anew: bool, zero: Zero) 
     let (mut sum, mut count) = (0.0, 0usize);
     for (k, block) in problem.blocks().iter().enumerate() {
         let without = |fit: &Fit, terms: &[&Term<'_>], moves: Option<&Set>| {
-            fit.without(&problem.gram(terms, moves, Part::Block(k)), problem.worth)
+            fit.without(&problem.gram(terms, moves, RowsMet::Block(k)), problem.worth)
         };
         let solution = without(&fit, terms, None)?;
         let mut best = (solution, None);

@@ -44,28 +44,28 @@ struct Met {
 }
 
 impl Met {
-    fn over(&self, part: Part) -> &[f64] {
+    fn over(&self, part: RowsMet) -> &[f64] {
         match part {
-            Part::All => &self.all,
-            Part::Block(k) => &self.blocks[k],
+            RowsMet::All => &self.all,
+            RowsMet::Block(k) => &self.blocks[k],
         }
     }
 }
 
 /// Which rows products are over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
+pub enum RowsMet {
     /// All of them.
     All,
     /// Those of one block.
     Block(usize),
 }
 
-/// Products that are kept at most: 256 MiB.
+/// Products that are kept at most: 256 MiB. *Guess*.
 const MOST_KEPT: usize = 32 << 20;
 
 #[derive(Default)]
-struct Kept {
+struct MetPairs {
     met: HashMap<(u64, u64), Arc<Met>>,
     values: usize,
 }
@@ -74,7 +74,7 @@ struct Kept {
 pub struct Products {
     /// Blocks that all rows are made of.
     pub blocks: Vec<Range<usize>>,
-    kept: RwLock<Kept>,
+    kept: RwLock<MetPairs>,
 }
 
 impl Products {
@@ -107,7 +107,7 @@ impl Products {
         let met = Arc::new(Met { all, blocks });
         let mut kept = self.kept.write().unwrap_or_else(PoisonError::into_inner);
         if kept.values + values > MOST_KEPT {
-            *kept = Kept::default();
+            *kept = MetPairs::default();
         }
         if kept.met.insert(key, met.clone()).is_none() {
             kept.values += values;
@@ -116,7 +116,7 @@ impl Products {
     }
 
     /// Puts the products of two sets where `put(i, j)` wants those of column `i` of the first and `j` of the second.
-    fn meet(&self, first: &Set, second: &Set, part: Part, mut put: impl FnMut(usize, usize, f64)) {
+    fn meet(&self, first: &Set, second: &Set, part: RowsMet, mut put: impl FnMut(usize, usize, f64)) {
         let swapped = first.id > second.id;
         let (older, newer) = if swapped { (second, first) } else { (first, second) };
         let met = self.between(older, newer);
@@ -127,7 +127,7 @@ impl Products {
     }
 
     /// Products of all columns of `sets`, set after set; the last one is the data.
-    pub fn gram(&self, sets: &[&Set], part: Part) -> Gram {
+    pub fn gram(&self, sets: &[&Set], part: RowsMet) -> Gram {
         let size = sets.iter().map(|set| set.len()).sum();
         let mut products = vec![0.0; size * size];
         let mut row = 0;
@@ -151,7 +151,7 @@ impl Products {
         let mut meeting = vec![vec![0.0; width + new.len()]; new.len()];
         let mut column = 0;
         for set in sets.iter().chain([&new]) {
-            self.meet(new, set, Part::All, |i, j, product| meeting[i][column + j] = product);
+            self.meet(new, set, RowsMet::All, |i, j, product| meeting[i][column + j] = product);
             column += set.len();
         }
         meeting
@@ -173,11 +173,11 @@ mod tests {
         let term = Set::new((3..6).map(column).collect());
         let sets = [&base, &term, &data];
         let columns: Vec<&[f64]> = sets.iter().flat_map(|set| set.iter()).map(Vec::as_slice).collect();
-        for (part, rows) in [(Part::All, 0..900), (Part::Block(1), 100..640)] {
+        for (part, rows) in [(RowsMet::All, 0..900), (RowsMet::Block(1), 100..640)] {
             assert_eq!(products.gram(&sets, part).products, Gram::of(&columns, rows).products);
         }
-        let alone = products.gram(&[&base, &data], Part::All);
+        let alone = products.gram(&[&base, &data], RowsMet::All);
         let with = alone.with(&products.meeting(&term, &[&base, &data]));
-        assert_eq!(with.products, products.gram(&sets, Part::All).products);
+        assert_eq!(with.products, products.gram(&sets, RowsMet::All).products);
     }
 }

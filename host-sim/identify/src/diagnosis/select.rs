@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::candidate::{Coefficients, Law, Role, Tolerance};
 use super::held_out::Zero;
 use super::model::{Fit, Problem, Scaffold, Term, among_each_other};
-use super::products::Part;
+use super::products::RowsMet;
 use super::thresholds::selection::*;
 use super::trace::{Gate, Judged, Stage, Trace, passed};
 use crate::causes::CauseName;
@@ -397,7 +397,7 @@ fn left_out_gain(problem: &Problem<'_>, terms: &[&Term<'_>], fewer: &[&Term<'_>]
         let fit = Scaffold::new(problem, terms.to_vec()).fit(None)?;
         let mut all = 0.0;
         for block in 0..problem.blocks().len() {
-            let inside = problem.gram(terms, None, Part::Block(block));
+            let inside = problem.gram(terms, None, RowsMet::Block(block));
             let solution = fit.without(&inside, problem.worth)?;
             let n = fit.priors.len();
             let c = &solution.coefficients;

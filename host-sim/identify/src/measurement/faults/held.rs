@@ -32,7 +32,11 @@ const WITHIN_THE_ROW: f64 = 0.5;
 /// Readings go on by so many counts from one to the next, at the median, where it is not the counts that make an angle
 /// stand. *Guess*.
 const COUNTS: f64 = 4.0;
+/// They are whole counts within this: an even motion goes by even steps, and not by the same to the last digit.
+/// *Guess*.
+const WHOLE: f64 = 2e-3;
 /// Two values of an angle that are this near each other are the same, against the largest: round-off of a sum.
+/// *Guess*.
 const SAME: f64 = 1e-13;
 
 /// Names channels that are repeated from row to row: a straight line takes the place of what is repeated of a torque,
@@ -80,7 +84,11 @@ fn check_angle(
     let of_counts = angles.iter().zip(&of).max_by_key(|(angle, _)| angle.len()).is_some_and(|(angle, runs)| {
         let mut steps: Vec<f64> =
             runs.windows(2).map(|pair| (angle[pair[1].start] - angle[pair[0].start]).abs()).collect();
-        lattice(angle).is_some_and(|count| median_of(&mut steps) < COUNTS * count)
+        lattice(angle).is_some_and(|count| {
+            let off = |step: &f64| (step / count - (step / count).round()).abs();
+            let whole = median_of(&mut steps.iter().map(off).collect::<Vec<f64>>()) < WHOLE;
+            whole && median_of(&mut steps) < COUNTS * count
+        })
     });
     let Some(mut fault) = fault(sessions, &of, channel, every).filter(|_| !of_counts) else { return };
     fault.treatment = Treatment::Masked;

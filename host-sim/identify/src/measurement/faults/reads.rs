@@ -73,7 +73,7 @@ const LONGEST_RUN: usize = 2;
 /// Scatter of the error against that of the generator's angle over the ratio is −1 within this, where it is that angle
 /// that is misread: what other noise of the angle and motion that is real leave of it. *Guess*.
 const MISREAD: f64 = 0.15;
-/// Share of the rows that decide it: those that are farthest off are something else.
+/// Share of the rows that decide it: those that are farthest off are something else. *Guess*.
 const NEAR: f64 = 0.99;
 /// Quantile of absolute numbers that a third of them, being far off, move little; and what it is of normal ones.
 const LOW: (f64, f64) = (0.15, 0.1891);
