@@ -106,7 +106,7 @@ const SLOWEST_GUST_HZ: f64 = 1e-3;
 /// Longest flight, s.
 const LONGEST_S: f64 = 3600.0;
 
-fn refused(file: &str, field: &str, what: String) -> FlyError {
+pub(super) fn refused(file: &str, field: &str, what: String) -> FlyError {
     FlyError::Scenario(Problem { place: file.to_owned(), field: field.to_owned(), what })
 }
 

@@ -5,8 +5,8 @@ use std::str::FromStr;
 
 use serde::Serialize;
 
+use super::file::refused;
 use super::{Flown, FlyError, Results, read, results};
-use flexspline_base::toml_file::Problem;
 
 /// A field of a scenario and the values that it gets, as a TOML file has them; a name needs no quotes.
 #[derive(Debug, Clone, PartialEq)]
@@ -95,8 +95,7 @@ fn changed(name: &str, text: &str, varied: &[(String, String)]) -> Result<Flown,
     }
     // What is wrong with the file itself is told with its own lines.
     read(name, text)?;
-    let refused = |what| FlyError::Scenario(Problem { place: name.to_owned(), field: String::new(), what });
-    let mut whole: toml::Table = text.parse().map_err(|error: toml::de::Error| refused(error.to_string()))?;
+    let mut whole: toml::Table = text.parse().map_err(|error: toml::de::Error| refused(name, "", error.to_string()))?;
     for (field, value) in varied {
         let parsed = format!("value = {value}").parse::<toml::Table>().ok().and_then(|mut table| table.remove("value"));
         let value = parsed.unwrap_or_else(|| toml::Value::String(value.clone()));
@@ -115,7 +114,7 @@ fn changed(name: &str, text: &str, varied: &[(String, String)]) -> Result<Flown,
             at = inner;
         }
     }
-    let text = toml::to_string(&whole).map_err(|error| refused(error.to_string()))?;
+    let text = toml::to_string(&whole).map_err(|error| refused(name, "", error.to_string()))?;
     let values: Vec<String> = varied.iter().map(|(field, value)| format!("{field}={value}")).collect();
     read(&format!("{name} with {}", values.join(" ")), &text)
 }
