@@ -370,7 +370,7 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
         files
     };
     prior.core_drive().map_err(CalibrationError::Known)?;
-    let doubt = check_ratio(files, prior)?;
+    let mut said: Vec<String> = check_ratio(files, prior)?.into_iter().collect();
     let mut recorded = Recorded::of(files, prior);
     let play_rad = prior.nominal.backlash_arcsec / flexspline_base::units::ARCSEC_PER_RAD;
     let mut rows = settled(files, prior, &recorded, play_rad);
@@ -381,12 +381,13 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
     } else {
         at_one_instant = files.iter().map(|file| without_delay(file, delay_s, prior.nominal.ratio)).collect();
         rows = settled(&at_one_instant, prior, &recorded, play_rad);
+        said.push(delayed(delay_s));
         &at_one_instant
     };
     if let Some(table) = prior.table {
         (rows, recorded.scales.friction_n_m) = dead_zone(rows, prior, table, &recorded);
     }
-    with_dead_zone(files, prior, (rows, recorded), doubt).map_err(|error| with_faults(error, files))
+    with_dead_zone(files, prior, (rows, recorded), said).map_err(|error| with_faults(error, files))
 }
 
 /// By how much the output is read after the generator, s, where that tells what was left out better than play and all
@@ -408,13 +409,17 @@ fn without_delay(file: &Recording, delay_s: f64, ratio: f64) -> Recording {
         let speeds: Vec<f64> = (0..session.len()).map(|k| rows::speed_rad_s(session, k, ratio)).collect();
         session.error_rad.iter_mut().zip(speeds).for_each(|(error, speed)| *error += delay_s * speed);
     }
+    file
+}
+
+/// What is said of a delay.
+fn delayed(delay_s: f64) -> String {
     let (late, early) = if delay_s > 0.0 { ("output", "generator") } else { ("generator", "output") };
-    file.notes.push(format!(
+    format!(
         "the {late} is read {:.2} ms after the {early}: what that does goes with the speed, which no table knows; it \
          was taken out of the rows. Read both at one instant, or tell the controller of the delay",
         1e3 * delay_s.abs()
-    ));
-    file
+    )
 }
 
 /// A file in pieces, each with one zero.
@@ -440,13 +445,13 @@ fn by_zeros(file: &Recording) -> Vec<Recording> {
     pieces
 }
 
-/// Calibrates from `rows` with the load that decides the flank as it stands in `recorded`; `doubt` is what is said of
-/// the ratio.
+/// Calibrates from `rows` with the load that decides the flank as it stands in `recorded`; `said` is what is noted of
+/// the ratio and of a delay.
 fn with_dead_zone(
     files: &[Recording],
     prior: &Prior<'_>,
     (rows, recorded): (Rows, Recorded),
-    doubt: Option<String>,
+    said: Vec<String>,
 ) -> Result<Calibrated, CalibrationError> {
     let prior = &Prior { least_friction_n_m: recorded.scales.friction_n_m, ..prior.clone() };
     let alignment = prior.table.map(|table| zero::align(table, &rows, recorded.scales.friction_n_m));
@@ -501,7 +506,7 @@ fn with_dead_zone(
     let core = by_core(files, &image, &recorded);
     let fitted_alone = fitted_alone(&rows, &folds, &model.chosen);
     let mut notes: Vec<String> = files.iter().flat_map(|file| file.notes.iter().cloned()).collect();
-    notes.extend(doubt);
+    notes.extend(said);
     notes.extend(remarks(prior, &recorded, (&model, &parts), (held_out, fitted_alone)));
     sizes(&rows, &model, &mut parts);
     let zero = |row: &folds::Row| row.left_arcsec - model.adds_arcsec(&row.at);

@@ -110,6 +110,10 @@ fn a_delay_is_no_play_and_play_is_no_delay() {
         assert_eq!(kept(c).contains(&"play"), play > 0.0, "{delay_s} {play}: {:?}", c.parts);
         assert!(c.core.rms_after_arcsec < 3.0, "{:?}", c.core);
     }
+    // Of several logs it is told once.
+    let files = [3, 4].map(|seed| at_paces(recording(seed, |psi, _, _, _| 25.0 * (2.0 * psi).sin()), 0.005));
+    let notes = calibrate(&files, &prior).unwrap().calibration.notes;
+    assert_eq!(notes.iter().filter(|note| note.contains("is read")).count(), 1, "{notes:?}");
 }
 
 #[test]
