@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use crate::measurement::{Session, quantile_of};
 use crate::nominal::{Fixed, Nominal};
+use crate::residual::sampled_twice;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// Four rows around one say where it was as long as they span no more than so many times what the inner two do.
@@ -200,8 +201,7 @@ impl Rows {
         let steps = self.sessions_used().flat_map(|session| {
             self.generator[session].windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect::<Vec<f64>>()
         });
-        let half = quantile_of(&mut steps.filter(|step| *step > 0.0).collect::<Vec<f64>>(), 0.5);
-        if half > 0.0 { std::f64::consts::PI / half } else { f64::INFINITY }
+        sampled_twice(&mut steps.filter(|step| *step > 0.0).collect::<Vec<f64>>(), 0.5)
     }
 
     /// Rows that are learnt from.

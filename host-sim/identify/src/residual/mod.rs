@@ -22,6 +22,7 @@ pub use noise::Noise;
 pub use orders::{Line, NamedOrder, Wheel, harmonics, named_orders};
 pub use pulses::Pulse;
 pub use rows::{Axis, Direction, SizeMismatch};
+pub(crate) use spectrum::sampled_twice;
 pub use spectrum::{OrderSpectrum, Peak, SpectrumSettings, order_spectrum};
 pub use time::{SessionDrift, Stretch};
 

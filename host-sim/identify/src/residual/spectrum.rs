@@ -130,6 +130,13 @@ impl OrderSpectrum {
     }
 }
 
+/// Highest order per turn of which a share of the steps (rad, which are reordered) sees each wave twice or more; no
+/// limit without steps.
+pub(crate) fn sampled_twice(steps: &mut [f64], share: f64) -> f64 {
+    let step = quantile_of(steps, share);
+    if step > 0.0 { PI / step } else { f64::INFINITY }
+}
+
 /// The spectrum of `value` (arcsec) along `angle` (rad), an `axis` of a drive with this ratio. Orders below one wave in
 /// the record are left out; a record that turns too little for any order gives an empty spectrum.
 pub fn order_spectrum(
@@ -145,11 +152,7 @@ pub fn order_spectrum(
     // Waves must be sampled twice, as rows follow each other or, to and fro, as they lie.
     let mut steps =
         sampled(&angle.windows(2).map(|x| (x[1] - x[0]).abs()).filter(|step| *step > 0.0).collect::<Vec<_>>());
-    let step = quantile_of(&mut steps, 0.75);
-    let mut highest = settings.highest_order;
-    if step > 0.0 {
-        highest = highest.min(PI / step);
-    }
+    let mut highest = settings.highest_order.min(sampled_twice(&mut steps, 0.75));
     let resolution = 1.0 / turns.max(1e-300);
     let transform = |highest: f64| OVERSAMPLING * turns * highest * CELLS_PER_WAVE;
     if transform(highest) > LARGEST as f64 {
