@@ -18,6 +18,7 @@
 //! | output or generator frozen | rows left out |
 //! | torque frozen | rows left out, or channel |
 //! | torque repeated, one value in so many rows | a straight line between the new ones |
+//! | angle repeated so | rows that repeat it left out |
 //! | temperature frozen | straight line, or channel left out |
 //! | torque in coarse steps | read off where it goes from one to the next |
 //! | single rows out | rows left out (torque, temperature: mended) |

@@ -364,7 +364,6 @@ impl Found {
         if let Some(Misread { noise, jitter_rows, .. }) = misread {
             return Found { late, told_late, told_jitter: true, noise: *noise, jitter_rows: *jitter_rows };
         }
-        let fast = fast.min(FOLLOWED_RAD / gear.ratio.abs());
         let (noise, jitter_rows, certain) = fit(&classes(reads, robust), tooth_speed);
         let scatter = jitter_rows * fast;
         let told_jitter = certain > CERTAIN && scatter > LEAST_RAD.max(LEAST_OF_NOISE * noise) && is_white(reads, fast);
@@ -382,17 +381,19 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
     let mut reads: Vec<Reads<'_>> =
         sessions.iter().filter(|session| session.len() > 8).map(|session| Reads::new(session, gear)).collect();
     let mut speeds: Vec<f64> = reads.iter().flat_map(|of| of.speed.iter().map(|speed| speed.abs())).collect();
-    let fast = quantile_of(&mut speeds, 0.95);
-    if fast == 0.0 {
+    let full = quantile_of(&mut speeds, 0.95);
+    if full == 0.0 {
         return;
     }
     // By what was measured alone: waves of a fast drive, once they are fitted, follow what its angle is misread by.
-    let misread = Misread::of(&reads, fast);
+    let misread = Misread::of(&reads, full);
     if misread.as_ref().is_some_and(|misread| is_of_counts(sessions, gear, misread.off)) {
         drop(reads);
         sessions.iter_mut().for_each(|session| session.loudness = Some(vec![1.0; session.len()]));
         return;
     }
+    // Nothing else is told at a speed that rows do not follow.
+    let fast = if misread.is_some() { full } else { full.min(FOLLOWED_RAD / gear.ratio.abs()) };
     let pitch = gear.tooth_pitch_rad.unwrap_or(std::f64::consts::PI / gear.ratio.abs());
     // A tooth of either wheel passes in a turn of the generator over its number: in a pitch of the output over the
     // ratio.
