@@ -138,11 +138,11 @@ pub struct DataSheet {
     pub load_across_face_peak_over_mean: Option<f64>,
     /// Teeth of the flexspline that carry the largest load, percent.
     pub teeth_in_contact_percent: Option<f64>,
-    /// Largest load at which equilibrium was found, N·m.
-    pub last_stable_n_m: Option<f64>,
     /// Share of the largest load that bears on tips outside the main zones, percent, at the worst position: 0 of a
     /// sound drive.
     pub tips_bear_percent: Option<f64>,
+    /// Largest load at which equilibrium was found, N·m.
+    pub last_stable_n_m: Option<f64>,
     /// What bears there; missing where nothing does, and where figures were estimated.
     #[serde(skip)]
     pub tip_contact: Option<TipContact>,
@@ -192,8 +192,8 @@ impl DataSheet {
             tilt_mrad,
             load_across_face_peak_over_mean,
             teeth_in_contact_percent,
-            last_stable_n_m,
             tips_bear_percent,
+            last_stable_n_m,
             tip_contact: None,
         }
     }
