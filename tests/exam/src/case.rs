@@ -46,7 +46,7 @@ impl Kind {
     }
 }
 
-/// Whose plant: three sets of laws for one plant, and five plants of their own.
+/// Whose plant: three sets of laws for one plant, and six plants of their own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, clap::ValueEnum)]
 pub enum Plant {
     /// The plainer textbook laws.
@@ -65,6 +65,9 @@ pub enum Plant {
     G,
     /// An arm at work: servo, payloads, sensor of the joint's torque; laws near the textbook and far from it.
     H,
+    /// Variants: forms of each cause as real units have them. For learning how far the textbook is from them; never
+    /// counted as an examination.
+    V,
 }
 
 impl Plant {
@@ -74,7 +77,7 @@ impl Plant {
             Self::A => Some(Family::A),
             Self::B => Some(Family::B),
             Self::C => Some(Family::C),
-            Self::D | Self::E | Self::F | Self::G | Self::H => None,
+            Self::D | Self::E | Self::F | Self::G | Self::H | Self::V => None,
         }
     }
 }
@@ -86,7 +89,7 @@ pub struct Draw {
     #[arg(long, value_enum, ignore_case = true)]
     pub family: Option<Plant>,
     /// Cases of one kind alone [default: in 25 cases 5 nulls, 10 singles, 6 compounds, 4 outside the library; of
-    /// families D to F in 10 cases 2, 5, 1 and 2, of G and H 2, 4, 2 and 2]
+    /// families D to F in 10 cases 2, 5, 1 and 2, of G and H 2, 4, 2 and 2, of V 1 and 9]
     #[arg(long, value_enum)]
     pub kind: Option<Kind>,
     /// Singles of one cause alone
@@ -110,6 +113,19 @@ impl Draw {
     /// Whether the cases come from the plants of [`crate::fresh`].
     pub fn is_fresh(&self) -> bool {
         self.kind == Some(Kind::Logger) || self.family.is_some_and(|family| family.laws().is_none())
+    }
+
+    /// What no plant can show.
+    ///
+    /// # Errors
+    /// Kinds of which family V has none.
+    pub fn check(&self) -> Result<(), String> {
+        match (self.family, self.kind) {
+            (Some(Plant::V), Some(kind @ (Kind::Outside | Kind::Fault | Kind::Logger))) => {
+                Err(format!("--kind {} with --family v: variants have null, single and compound", kind.name()))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// As it would be typed.

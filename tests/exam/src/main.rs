@@ -161,6 +161,7 @@ fn main() -> ExitCode {
 }
 
 fn run(options: Run) -> io::Result<bool> {
+    options.draw.check().map_err(io::Error::other)?;
     let mut program = vec![options.diagnoser];
     program.extend(options.diagnoser_arg);
     let settings = Settings {
@@ -226,6 +227,7 @@ fn gather(options: &Gather) -> io::Result<bool> {
 }
 
 fn one(options: &One) -> io::Result<()> {
+    options.draw.check().map_err(io::Error::other)?;
     fs::create_dir_all(&options.out)?;
     let write = |name: &str, text: String| fs::write(options.out.join(name), text);
     let question = Question::draw(options.seed, options.index, &options.draw);

@@ -9,7 +9,7 @@ use crate::truth::Truth;
 pub enum Question {
     /// Families A, B, C.
     Case(Case),
-    /// Families D to F, and faults of loggers, under the name that says nothing.
+    /// Families D to H and V, and faults of loggers, under the name that says nothing.
     Fresh(Fresh, String),
 }
 

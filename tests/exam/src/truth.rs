@@ -57,7 +57,7 @@ pub struct Truth {
     pub index: u64,
     /// null, single, compound, outside, fault, logger.
     pub kind: String,
-    /// A to H, or logger.
+    /// A to H, V, or logger.
     pub family: String,
     /// What the excitation lacks.
     pub poor: Vec<String>,

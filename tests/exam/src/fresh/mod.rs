@@ -1,4 +1,4 @@
-//! Families D to H, and perfect drives under faults of the logger: plants of their own that share nothing with
+//! Families D to H, variants, and perfect drives under faults of the logger: plants of their own that share nothing with
 //! families A to C but the catalogue's drive, the noise of the sensors and the scores.
 
 pub mod arm;
@@ -11,6 +11,7 @@ pub mod metrology;
 pub mod oracle;
 pub mod rig;
 pub mod train;
+pub mod variants;
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -32,6 +33,7 @@ use logger::LoggerFault;
 use metrology::Metrology;
 use oracle::{Oracle, residual};
 use rig::Rig;
+use variants::Variant;
 
 /// What the drive stands on.
 #[derive(Debug, Clone)]
@@ -46,9 +48,11 @@ pub enum Stand {
     Gimbal(Gimbal),
     /// Family H.
     Arm(Arm),
+    /// Family V.
+    Variant(Variant),
 }
 
-/// A case of families D to H, or a perfect drive under a fault of the logger.
+/// A case of families D to H or V, or a perfect drive under a fault of the logger.
 #[derive(Debug, Clone)]
 pub struct Fresh {
     seed: u64,
@@ -74,13 +78,16 @@ const AIM: (f64, f64, f64) = (2.0, 15.0, 1.3);
 /// Draws of a case before one that is too small is taken as it is; it then counts as below the limit.
 const DRAWS: u64 = 12;
 const BLOCK: u64 = 10;
+/// The same of variants: large causes show best how far a form is from the textbook's.
+const AIM_OF_VARIANTS: (f64, f64, f64) = (4.0, 30.0, 2.6);
 
 impl Fresh {
     /// Draws the case of this seed and index.
     pub fn draw(seed: u64, index: u64, draw: &Draw) -> Self {
         for attempt in 0.. {
             let case = Self::attempt(seed, index, attempt, draw);
-            if attempt + 1 == DRAWS || case.weighed.iter().all(|one| one.over_limit >= AIM.2) {
+            let least = case.aim().2;
+            if attempt + 1 == DRAWS || case.weighed.iter().all(|one| one.over_limit >= least) {
                 return case;
             }
         }
@@ -117,6 +124,10 @@ impl Fresh {
             sensors.white_arcsec *= 0.6;
             sensors.wander_arcsec *= 0.6;
             Stand::Arm(Arm::draw(&drive, &mut chance))
+        } else if plant == Plant::V {
+            sensors.white_arcsec *= 0.7;
+            sensors.wander_arcsec *= 0.7;
+            Stand::Variant(Variant::draw(&mut chance))
         } else {
             let mut joint = Joint::draw(&drive, &mut chance);
             if let Some(fault) = fault {
@@ -149,6 +160,7 @@ impl Fresh {
             Stand::Joint(joint) => Some(joint.poll.jitter_s),
             Stand::Rig(rig) => Some(rig.jitter_s),
             Stand::Gimbal(Gimbal { pace, .. }) | Stand::Arm(Arm { pace, .. }) => Some(pace.jitter_s),
+            Stand::Variant(variant) => Some(variant.pace.jitter_s),
             Stand::Bench(_) => None,
         };
         let zeroed = matches!(&self.stand, Stand::Bench(bench) if bench.zeroed || bench.restarted);
@@ -168,9 +180,14 @@ impl Fresh {
                 one.shape[3] = if far { chance.uniform(0.7, 1.0) } else { chance.uniform(0.0, 0.3) };
                 far = !far;
             }
-            let target = chance.log_uniform(AIM.0, AIM.1);
+            if let (Stand::Variant(_), Thing::Cause(cause)) = (&self.stand, thing) {
+                one.shape[3] = chance.below(variants::forms(cause).len()) as f64;
+            }
+            let aim = self.aim();
+            let target = chance.log_uniform(aim.0, aim.1);
             // A whole tooth, or nothing.
-            let whole = self.has_distance() && thing == Thing::Cause(Cause::Ratcheting);
+            let whole = (self.has_distance() || matches!(self.stand, Stand::Variant(_)))
+                && thing == Thing::Cause(Cause::Ratcheting);
             for _ in 0..if whole { 0 } else { 4 } {
                 let added = oracle.added(&left(std::slice::from_ref(&one)), &clean);
                 let over = oracle.weigh(&added).over_limit(white);
@@ -192,15 +209,25 @@ impl Fresh {
             let over_limit = weight.over_limit(white);
             let own = if let Thing::Cause(cause) = one.thing { Some(cause) } else { None };
             let mut like = if over_limit >= 1.0 { oracle.look_alikes(&added, own, white) } else { Vec::new() };
-            let same = own.filter(|_| over_limit >= 1.0 && self.has_distance());
+            let marches = self.has_distance() || matches!(self.stand, Stand::Variant(_));
+            let same = own.filter(|_| over_limit >= 1.0 && marches);
             let same = same.and_then(|cause| same_axis(cause, self.drive.fixed, &motion.orientation_rad));
             if let Some(same) = same.filter(|same| like.iter().all(|(cause, _)| cause != same)) {
                 like.push((same, 0.0));
             }
-            let names = ["shape_1", "shape_2", "shape_3", if self.has_distance() { "distance" } else { "shape_4" }];
+            let last = match &self.stand {
+                Stand::Gimbal(_) | Stand::Arm(_) => "distance",
+                Stand::Variant(_) => "form",
+                _ => "shape_4",
+            };
+            let names = ["shape_1", "shape_2", "shape_3", last];
             let mut numbers: BTreeMap<String, f64> =
                 names.iter().zip(one.shape).map(|(name, value)| ((*name).to_owned(), value)).collect();
             numbers.insert(one.unit().to_owned(), one.size);
+            if let Stand::Variant(variant) = &self.stand {
+                let drawn = variant.numbers(&self.drive, one).into_iter();
+                numbers.extend(drawn.map(|(name, value)| (name.to_owned(), value)));
+            }
             weighed.push(Hidden {
                 name: one.thing.name().to_owned(),
                 numbers,
@@ -217,6 +244,11 @@ impl Fresh {
         (self.hidden, self.weighed) = (hidden, weighed);
     }
 
+    /// So many times over the limit of detection an effect is aimed at, at least and at most, and drawn anew below.
+    fn aim(&self) -> (f64, f64, f64) {
+        if matches!(self.stand, Stand::Variant(_)) { AIM_OF_VARIANTS } else { AIM }
+    }
+
     /// Whether the fourth number of a law is its distance from the textbook: near in half of what is hidden, far in the
     /// other.
     fn has_distance(&self) -> bool {
@@ -226,6 +258,9 @@ impl Fresh {
     fn parameters(&self, one: &Hides) -> BTreeMap<String, f64> {
         let Thing::Cause(cause) = one.thing else { return BTreeMap::new() };
         // Far from the textbook a size has more than one reading.
+        if matches!(self.stand, Stand::Variant(_)) {
+            return BTreeMap::new();
+        }
         if self.has_distance() && (one.shape[3] > 0.5 || cause == Cause::RatioError) {
             return BTreeMap::new();
         }
@@ -255,6 +290,7 @@ impl Fresh {
             Stand::Rig(rig) => rig.run(&self.drive, &self.unit, hidden),
             Stand::Gimbal(gimbal) => gimbal.run(&self.drive, &self.unit, hidden),
             Stand::Arm(arm) => arm.run(&self.drive, &self.unit, hidden),
+            Stand::Variant(variant) => variant.run(&self.drive, &self.unit, hidden),
         }
     }
 
@@ -340,6 +376,16 @@ impl Fresh {
             let told = [(stand.zeroed, "zeroed"), (stand.restarted, "counter_restarted"), (stand.chamber, "chamber")];
             bench.extend(told.into_iter().filter(|(there, _)| *there).map(|(_, name)| name.to_owned()));
         }
+        if let Stand::Variant(variant) = &self.stand {
+            let causes = self.hidden.iter().filter_map(|one| match one.thing {
+                Thing::Cause(cause) => Some(format!("{}/{}", cause.name(), variants::name_of(cause, one))),
+                Thing::Stranger(_) => None,
+            });
+            bench.extend(causes);
+            if !self.hidden.is_empty() {
+                bench.push(format!("zones/{}", variant.sharing()));
+            }
+        }
         let told_family = match (&self.stand, self.kind) {
             (_, Kind::Logger) => "logger",
             (Stand::Joint(_), _) => "D",
@@ -347,6 +393,7 @@ impl Fresh {
             (Stand::Rig(_), _) => "F",
             (Stand::Gimbal(_), _) => "G",
             (Stand::Arm(_), _) => "H",
+            (Stand::Variant(_), _) => "V",
         };
         Truth {
             name,
@@ -400,9 +447,13 @@ fn plan(
         _ => (Cause::ALL, Stranger::OF_JOINTS),
     };
     let mut kinds = [Kind::Single; BLOCK as usize];
-    kinds[..2].fill(Kind::Null);
-    kinds[2..4].fill(Kind::Outside);
-    kinds[4] = Kind::Compound;
+    if plant == Plant::V {
+        kinds[0] = Kind::Null;
+    } else {
+        kinds[..2].fill(Kind::Null);
+        kinds[2..4].fill(Kind::Outside);
+        kinds[4] = Kind::Compound;
+    }
     if matches!(plant, Plant::G | Plant::H) {
         kinds[5] = Kind::Compound;
     }
