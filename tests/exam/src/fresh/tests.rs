@@ -302,6 +302,7 @@ fn every_effect_shows_and_vanishes_with_its_size() {
                 Stand::Rig(rig) => rig.run(&drive, &unit, hidden),
                 Stand::Gimbal(gimbal) => gimbal.run(&drive, &unit, hidden),
                 Stand::Arm(arm) => arm.run(&drive, &unit, hidden),
+                Stand::Variant(variant) => variant.run(&drive, &unit, hidden),
             };
             residual(&drive, &motion, &readings)
         };
