@@ -187,11 +187,6 @@ impl Variant {
         }
     }
 
-    /// Index of a form of this cause.
-    pub fn draw_form(cause: Cause, chance: &mut Chance) -> f64 {
-        chance.below(forms(cause).len()) as f64
-    }
-
     /// Name of the way in which two zones share the load.
     pub fn sharing(&self) -> &'static str {
         SHARINGS[self.sharing]
@@ -218,9 +213,8 @@ impl Variant {
         let steps = self.rows / self.sessions * self.pace.stride;
         // Every part at least once; each session begins with one and ends with another.
         let mut parts = vec![Part::Around, Part::Creep, Part::Points, Part::Scan, Part::Cruise, Part::Around];
-        while parts.len() < 2 * self.sessions {
-            parts.push(*chance.of(&[Part::Around, Part::Creep, Part::Points, Part::Scan, Part::Cruise]));
-        }
+        let more = [Part::Around, Part::Creep, Part::Points, Part::Scan, Part::Cruise];
+        parts.extend((parts.len()..2 * self.sessions).map(|_| *chance.of(&more)));
         chance.shuffle(&mut parts);
         let mut warmth: Vec<usize> = (0..self.sessions).collect();
         chance.shuffle(&mut warmth);
@@ -276,14 +270,19 @@ impl Part {
                 let turns_s = chance.uniform(4.0, 8.0);
                 speed.extend((0..count).map(|at| {
                     let s = t(at);
-                    if rests(s) { 0.0 } else { sense * slow * if (s / turns_s) as usize % 2 == 0 { 1.0 } else { -0.7 } }
+                    if rests(s) {
+                        0.0
+                    } else {
+                        sense * slow * if (s / turns_s).rem_euclid(2.0) < 1.0 { 1.0 } else { -0.7 }
+                    }
                 }));
                 let slowly = TAU * chance.uniform(0.08, 0.16);
                 load.extend((0..count).map(|at| most * (slowly * t(at) + phase).sin()));
             }
             Self::Points => {
                 let mut wishes = Vec::with_capacity(count);
-                while wishes.len() < count {
+                // A move and a stay are no shorter than a second and a half.
+                for _ in 0..=(count as f64 * STEP_S / 1.5) as usize {
                     let (moves, stays) = (chance.uniform(0.5, 1.5), chance.uniform(1.0, 3.0));
                     let fast = chance.sign() * chance.log_uniform(4.0, 20.0);
                     let steps = |seconds: f64| (seconds / STEP_S) as usize;

@@ -109,6 +109,14 @@ impl Numbers {
         value
     }
 
+    /// Draws that are not written down.
+    pub fn unwritten<T>(&mut self, draw: impl FnOnce(&mut Self) -> T) -> T {
+        let count = self.drawn.len();
+        let value = draw(self);
+        self.drawn.truncate(count);
+        value
+    }
+
     /// A phase that is not written down.
     pub fn any_phase(&mut self) -> f64 {
         self.chance.phase()

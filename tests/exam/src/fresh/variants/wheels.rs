@@ -130,7 +130,7 @@ fn cut(name: &str, n: &mut Numbers) -> Profile {
 /// Teeth out of their places on one wheel.
 pub fn pitch(cause: Cause, name: &'static str, n: &mut Numbers) -> Form {
     let shape = cut(name, n);
-    let other = cut("few_orders", n);
+    let other = n.unwritten(|n| cut("few_orders", n));
     let unlike = if name == "unlike_flanks" { n.flat("unlike", 0.15, 0.7) } else { 0.0 };
     let half = n.log("half_at_load", 0.3, 3.0);
     let wheel = usize::from(cause == Cause::CircularSplinePitchError);
