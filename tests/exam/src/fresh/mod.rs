@@ -1,5 +1,5 @@
-//! Families D to H, variants, and perfect drives under faults of the logger: plants of their own that share nothing with
-//! families A to C but the catalogue's drive, the noise of the sensors and the scores.
+//! Families D to H, variants, and perfect drives under faults of the logger: plants of their own that share nothing
+//! with families A to C but the catalogue's drive, the noise of the sensors and the scores.
 
 pub mod arm;
 pub mod gear;
@@ -50,6 +50,25 @@ pub enum Stand {
     Arm(Arm),
     /// Family V.
     Variant(Variant),
+}
+
+impl Stand {
+    /// Readings without noise, with these effects.
+    fn run(&self, drive: &Drive, unit: &Unit, hidden: &[Hides]) -> (Motion, Readings) {
+        match self {
+            Self::Joint(joint) => joint.run(drive, unit, hidden),
+            Self::Bench(bench) => bench.run(drive, unit, hidden),
+            Self::Rig(rig) => rig.run(drive, unit, hidden),
+            Self::Gimbal(gimbal) => gimbal.run(drive, unit, hidden),
+            Self::Arm(arm) => arm.run(drive, unit, hidden),
+            Self::Variant(variant) => variant.run(drive, unit, hidden),
+        }
+    }
+
+    /// Whether it is one of those that march in time as `train` does.
+    fn marches(&self) -> bool {
+        matches!(self, Self::Gimbal(_) | Self::Arm(_) | Self::Variant(_))
+    }
 }
 
 /// A case of families D to H or V, or a perfect drive under a fault of the logger.
@@ -186,8 +205,7 @@ impl Fresh {
             let aim = self.aim();
             let target = chance.log_uniform(aim.0, aim.1);
             // A whole tooth, or nothing.
-            let whole = (self.has_distance() || matches!(self.stand, Stand::Variant(_)))
-                && thing == Thing::Cause(Cause::Ratcheting);
+            let whole = self.stand.marches() && thing == Thing::Cause(Cause::Ratcheting);
             for _ in 0..if whole { 0 } else { 4 } {
                 let added = oracle.added(&left(std::slice::from_ref(&one)), &clean);
                 let over = oracle.weigh(&added).over_limit(white);
@@ -209,8 +227,7 @@ impl Fresh {
             let over_limit = weight.over_limit(white);
             let own = if let Thing::Cause(cause) = one.thing { Some(cause) } else { None };
             let mut like = if over_limit >= 1.0 { oracle.look_alikes(&added, own, white) } else { Vec::new() };
-            let marches = self.has_distance() || matches!(self.stand, Stand::Variant(_));
-            let same = own.filter(|_| over_limit >= 1.0 && marches);
+            let same = own.filter(|_| over_limit >= 1.0 && self.stand.marches());
             let same = same.and_then(|cause| same_axis(cause, self.drive.fixed, &motion.orientation_rad));
             if let Some(same) = same.filter(|same| like.iter().all(|(cause, _)| cause != same)) {
                 like.push((same, 0.0));
@@ -258,10 +275,8 @@ impl Fresh {
     fn parameters(&self, one: &Hides) -> BTreeMap<String, f64> {
         let Thing::Cause(cause) = one.thing else { return BTreeMap::new() };
         // Far from the textbook a size has more than one reading.
-        if matches!(self.stand, Stand::Variant(_)) {
-            return BTreeMap::new();
-        }
-        if self.has_distance() && (one.shape[3] > 0.5 || cause == Cause::RatioError) {
+        let far = self.has_distance() && (one.shape[3] > 0.5 || cause == Cause::RatioError);
+        if far || matches!(self.stand, Stand::Variant(_)) {
             return BTreeMap::new();
         }
         let joint = !matches!(self.stand, Stand::Bench(_));
@@ -284,14 +299,7 @@ impl Fresh {
 
     /// Readings without noise, with these effects.
     pub fn run(&self, hidden: &[Hides]) -> (Motion, Readings) {
-        match &self.stand {
-            Stand::Joint(joint) => joint.run(&self.drive, &self.unit, hidden),
-            Stand::Bench(bench) => bench.run(&self.drive, &self.unit, hidden),
-            Stand::Rig(rig) => rig.run(&self.drive, &self.unit, hidden),
-            Stand::Gimbal(gimbal) => gimbal.run(&self.drive, &self.unit, hidden),
-            Stand::Arm(arm) => arm.run(&self.drive, &self.unit, hidden),
-            Stand::Variant(variant) => variant.run(&self.drive, &self.unit, hidden),
-        }
+        self.stand.run(&self.drive, &self.unit, hidden)
     }
 
     /// `data.csv`.

@@ -66,11 +66,17 @@ fn new_stands(drive: &Drive, chance: &mut Chance) -> [(&'static str, Stand); 2] 
 }
 
 fn run_on(stand: &Stand, drive: &Drive, hidden: &[Hides]) -> (Motion, Readings) {
-    match stand {
-        Stand::Gimbal(gimbal) => gimbal.run(drive, &Unit::nominal(drive), hidden),
-        Stand::Arm(arm) => arm.run(drive, &Unit::nominal(drive), hidden),
-        _ => unreachable!("asked of families G and H"),
-    }
+    stand.run(drive, &Unit::nominal(drive), hidden)
+}
+
+/// Share of so many rows.
+fn share(rows: usize, is: impl Fn(usize) -> bool) -> f64 {
+    (0..rows).filter(|at| is(*at)).count() as f64 / rows as f64
+}
+
+/// The largest torque over the rated one.
+fn over_rated(motion: &Motion, drive: &Drive) -> f64 {
+    motion.torque_n_m.iter().fold(0.0, |most: f64, t| most.max(t.abs())) / drive.rated_n_m
 }
 
 /// So do a perfect gimbal and a perfect arm, but for the rows in which the load crosses the clearance, and with enough
@@ -83,11 +89,10 @@ fn a_perfect_gimbal_and_a_perfect_arm_return_the_error_of_the_catalogue() {
             let (motion, readings) = run_on(&stand, &drive, &[]);
             let left = residual(&drive, &motion, &readings);
             let [half, most, nearly_all] = quantiles(&left);
-            let share =
-                |is: &dyn Fn(usize) -> bool| (0..left.len()).filter(|at| is(*at)).count() as f64 / left.len() as f64;
-            let loads = [-1.0, 1.0].map(|sign| share(&|at| sign * motion.torque_n_m[at] > 0.3 * drive.rated_n_m));
-            let senses = [-1.0, 1.0].map(|sign| share(&|at| sign * motion.speed_rad_s[at] > 0.5));
-            let over = motion.torque_n_m.iter().fold(0.0, |most: f64, t| most.max(t.abs())) / drive.rated_n_m;
+            let loaded = |sign: f64| share(left.len(), |at| sign * motion.torque_n_m[at] > 0.3 * drive.rated_n_m);
+            let turning = |sign: f64| share(left.len(), |at| sign * motion.speed_rad_s[at] > 0.5);
+            let (loads, senses) = ([-1.0, 1.0].map(loaded), [-1.0, 1.0].map(turning));
+            let over = over_rated(&motion, &drive);
             println!(
                 "{index} {name}: {half:.4} {most:.3} {nearly_all:.3} rms {:.3} turns {:.0} rows {} loads {loads:.2?} \
                  senses {senses:.2?} over {over:.2}",
@@ -296,14 +301,7 @@ fn every_effect_shows_and_vanishes_with_its_size() {
     ];
     for (stand, things) in stands {
         let run = |hidden: &[Hides]| {
-            let (motion, readings) = match &stand {
-                Stand::Joint(joint) => joint.run(&drive, &unit, hidden),
-                Stand::Bench(bench) => bench.run(&drive, &unit, hidden),
-                Stand::Rig(rig) => rig.run(&drive, &unit, hidden),
-                Stand::Gimbal(gimbal) => gimbal.run(&drive, &unit, hidden),
-                Stand::Arm(arm) => arm.run(&drive, &unit, hidden),
-                Stand::Variant(variant) => variant.run(&drive, &unit, hidden),
-            };
+            let (motion, readings) = stand.run(&drive, &unit, hidden);
             residual(&drive, &motion, &readings)
         };
         let clean = run(&[]);
@@ -409,18 +407,17 @@ fn a_perfect_variant_returns_the_error_of_the_catalogue() {
         let (motion, readings) = variant(&mut chance).run(&drive, &Unit::nominal(&drive), &[]);
         let left = residual(&drive, &motion, &readings);
         let [half, most, nearly_all] = quantiles(&left);
-        let share =
-            |is: &dyn Fn(usize) -> bool| (0..left.len()).filter(|at| is(*at)).count() as f64 / left.len() as f64;
-        let loads = [-1.0, 1.0].map(|sign| share(&|at| sign * motion.torque_n_m[at] > 0.2 * drive.rated_n_m));
+        let loaded = |sign: f64| share(left.len(), |at| sign * motion.torque_n_m[at] > 0.2 * drive.rated_n_m);
+        let loads = [-1.0, 1.0].map(loaded);
         let speeds: [&dyn Fn(f64) -> bool; 4] =
             [&|v| v > 8.0, &|v| v < -8.0, &|v| v.abs() < 0.05, &|v| (0.1..2.0).contains(&v.abs())];
-        let speeds = speeds.map(|is| share(&|at| is(motion.speed_rad_s[at])));
-        let over = motion.torque_n_m.iter().fold(0.0, |most: f64, t| most.max(t.abs())) / drive.rated_n_m;
+        let speeds = speeds.map(|is| share(left.len(), |at| is(motion.speed_rad_s[at])));
+        let over = over_rated(&motion, &drive);
         let (cold, warm) =
             motion.temperature_c.iter().fold((99.0, -99.0), |(a, b): (f64, f64), t| (a.min(*t), b.max(*t)));
         println!(
-            "{index}: {half:.4} {most:.3} {nearly_all:.3} turns {:.0} rows {} loads {loads:.2?} speeds {speeds:.2?} over \
-             {over:.2} {cold:.0} to {warm:.0}",
+            "{index}: {half:.4} {most:.3} {nearly_all:.3} turns {:.0} rows {} loads {loads:.2?} speeds {speeds:.2?} \
+             over {over:.2} {cold:.0} to {warm:.0}",
             motion.turns(),
             left.len()
         );

@@ -55,31 +55,45 @@ enum Part {
     Cruise,
 }
 
-/// Names of the forms of a cause.
-pub fn forms(cause: Cause) -> &'static [&'static str] {
+/// Makes a form by its name, and draws its numbers.
+type Make = fn(Cause, &'static str, &mut Numbers, &Setting) -> Form;
+
+/// Names of the forms of a cause, and what makes them.
+fn kinds(cause: Cause) -> (&'static [&'static str], Make) {
     use Cause as C;
     match cause {
-        C::CircularSplineEccentricity | C::FlexsplineRunout | C::GravitySideLoad => wheels::DISPLACED,
-        C::CircularSplineOvality => wheels::OVAL,
-        C::FlexsplinePitchError | C::CircularSplinePitchError => wheels::PITCH,
-        C::GeneratorEccentricity => wheels::LOBES,
-        C::CamFormError => wheels::CAM,
-        C::DamagedTooth => wheels::TOOTH,
-        C::BacklashGrowth => clearance::GROWTH,
-        C::Wear => clearance::WEAR,
-        C::ThermalClearance => clearance::HEAT,
-        C::Ratcheting => clearance::RATCHETING,
-        C::StiffnessHardening => spring::HARDENING,
-        C::StiffnessError => spring::SOFT,
-        C::TorsionalHysteresis => spring::HYSTERESIS,
-        C::ThermalStiffness => spring::HEAT,
-        C::LubricantViscosity => loads::DRAG,
-        C::GravityTorque => loads::ARM,
-        C::TorsionalResonance => loads::RESONANCE,
-        C::OutputEncoderEccentricity | C::GeneratorEncoderEccentricity => readings::DISC,
-        C::SensorLatency => readings::LATENCY,
-        C::RatioError => readings::RATIO,
+        C::CircularSplineEccentricity | C::FlexsplineRunout | C::GravitySideLoad => {
+            (wheels::DISPLACED, |cause, name, n, _| wheels::displaced(cause, name, n))
+        }
+        C::CircularSplineOvality => (wheels::OVAL, |_, name, n, _| wheels::oval(name, n)),
+        C::FlexsplinePitchError | C::CircularSplinePitchError => {
+            (wheels::PITCH, |cause, name, n, _| wheels::pitch(cause, name, n))
+        }
+        C::GeneratorEccentricity => (wheels::LOBES, |_, name, n, _| wheels::lobes(name, n)),
+        C::CamFormError => (wheels::CAM, |_, name, n, setting| wheels::cam(name, n, setting)),
+        C::DamagedTooth => (wheels::TOOTH, |_, name, n, _| wheels::tooth(name, n)),
+        C::BacklashGrowth => (clearance::GROWTH, |_, name, n, _| clearance::growth(name, n)),
+        C::Wear => (clearance::WEAR, |_, name, n, setting| clearance::wear(name, n, setting)),
+        C::ThermalClearance => (clearance::HEAT, |_, name, n, _| clearance::heat(name, n)),
+        C::Ratcheting => (clearance::RATCHETING, |_, name, n, setting| clearance::ratcheting(name, n, setting)),
+        C::StiffnessHardening => (spring::HARDENING, |_, name, n, _| spring::hardening(name, n)),
+        C::StiffnessError => (spring::SOFT, |_, name, n, setting| spring::soft(name, n, setting)),
+        C::TorsionalHysteresis => (spring::HYSTERESIS, |_, name, n, setting| spring::hysteresis(name, n, setting)),
+        C::ThermalStiffness => (spring::HEAT, |_, name, n, setting| spring::heat(name, n, setting)),
+        C::LubricantViscosity => (loads::DRAG, |_, name, n, setting| loads::drag(name, n, setting)),
+        C::GravityTorque => (loads::ARM, |_, name, n, _| loads::arm(name, n)),
+        C::TorsionalResonance => (loads::RESONANCE, |_, name, n, _| loads::resonance(name, n)),
+        C::OutputEncoderEccentricity | C::GeneratorEncoderEccentricity => {
+            (readings::DISC, |cause, name, n, _| readings::disc(cause, name, n))
+        }
+        C::SensorLatency => (readings::LATENCY, |_, name, n, _| readings::latency(name, n)),
+        C::RatioError => (readings::RATIO, |_, name, n, setting| readings::ratio(name, n, setting)),
     }
+}
+
+/// Names of the forms of a cause.
+pub fn forms(cause: Cause) -> &'static [&'static str] {
+    kinds(cause).0
 }
 
 /// Name of the form that is hidden.
@@ -89,35 +103,10 @@ pub fn name_of(cause: Cause, one: &Hides) -> &'static str {
 
 /// The form of what is hidden. Its numbers follow from the first three of its shape.
 fn form_of(one: &Hides, setting: &Setting) -> Form {
-    use Cause as C;
     let Thing::Cause(cause) = one.thing else { unreachable!("variants hide causes alone") };
-    let name = name_of(cause, one);
     let mut numbers = Numbers::of(one);
-    let n = &mut numbers;
-    let mut form = match cause {
-        C::CircularSplineEccentricity | C::FlexsplineRunout | C::GravitySideLoad => wheels::displaced(cause, name, n),
-        C::CircularSplineOvality => wheels::oval(name, n),
-        C::FlexsplinePitchError | C::CircularSplinePitchError => wheels::pitch(cause, name, n),
-        C::GeneratorEccentricity => wheels::lobes(name, n),
-        C::CamFormError => wheels::cam(name, n, setting),
-        C::DamagedTooth => wheels::tooth(name, n),
-        C::BacklashGrowth => clearance::growth(name, n),
-        C::Wear => clearance::wear(name, n, setting),
-        C::ThermalClearance => clearance::heat(name, n),
-        C::Ratcheting => clearance::ratcheting(name, n, setting),
-        C::StiffnessHardening => spring::hardening(name, n),
-        C::StiffnessError => spring::soft(name, n, setting),
-        C::TorsionalHysteresis => spring::hysteresis(name, n, setting),
-        C::ThermalStiffness => spring::heat(name, n, setting),
-        C::LubricantViscosity => loads::drag(name, n, setting),
-        C::GravityTorque => loads::arm(name, n),
-        C::TorsionalResonance => loads::resonance(name, n),
-        C::OutputEncoderEccentricity | C::GeneratorEncoderEccentricity => readings::disc(cause, name, n),
-        C::SensorLatency => readings::latency(name, n),
-        C::RatioError => readings::ratio(name, n, setting),
-    };
-    form.numbers = numbers.drawn();
-    form
+    let form = kinds(cause).1(cause, name_of(cause, one), &mut numbers, setting);
+    Form { numbers: numbers.drawn(), ..form }
 }
 
 /// The bench with the forms that are hidden on it.
