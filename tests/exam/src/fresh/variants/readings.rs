@@ -69,8 +69,9 @@ pub fn latency(name: &'static str, n: &mut Numbers) -> Form {
             // Ornstein and Uhlenbeck's, by a draw of each step.
             "jittered" => {
                 let step = (now.time_s / now.step_s).round() as i64 as u64;
+                let normal = Chance::new(seed, "jitter", step).normal();
                 let kept = (-now.step_s / lasts).exp();
-                memory[0] = kept * memory[0] + (1.0 - kept * kept).sqrt() * unit_normal(seed ^ step);
+                memory[0] = kept * memory[0] + (1.0 - kept * kept).sqrt() * normal;
                 1.0 + 0.5 * share * memory[0]
             }
             // A loop that follows sooner the more edges it sees.
@@ -103,20 +104,6 @@ pub fn latency(name: &'static str, n: &mut Numbers) -> Form {
         };
         to.delay_s += size * factor;
     })
-}
-
-/// A normal number of a key, as the sum of uniform ones (Irwin and Hall).
-fn unit_normal(key: u64) -> f64 {
-    let mut x = key;
-    let mut sum = 0.0;
-    for _ in 0..4 {
-        // Steele, Lea and Flood's SplitMix64.
-        x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        sum += ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64;
-    }
-    (sum - 2.0) * 3.0_f64.sqrt()
 }
 
 /// The output goes further than the ratio by `size` of the way.
