@@ -377,7 +377,8 @@ static phases phases_at_output(const fxt_table *table, int64_t nominal)
 
 typedef struct {
     uint32_t row, torque_step, plane_step; /* half words */
-    int32_t shares[4];                     /* 2^-30 */
+    int32_t shares[2];                     /* of the records below and above the torque, 2^-30 */
+    int32_t hotter;                        /* of those at the hotter temperature, 2^-14 */
     int32_t mean, half_width, jump;        /* counts */
     bool finite, in_range, led_astray;
 } point;
@@ -422,7 +423,8 @@ static point locate(const fxt_table *table, float torque_n_m, float temperature_
     words_at(table, first + node_plane, 6, warmer);
     for (int i = 0; i < 6; i++) {
         const float value = float_of(words[i]);
-        here[i] = value + warm * (float_of(warmer[i]) - value);
+        /* The last bit of H is a mark, and of the others too small to matter: that of the colder. */
+        here[i] = float_of((bits_of(value + warm * (float_of(warmer[i]) - value)) & ~1u) | (words[i] & 1u));
     }
     const bool jump = (words[2] & 1u) != 0u;
     const float weight = (torque - low_torque) / width;
@@ -430,12 +432,11 @@ static point locate(const fxt_table *table, float torque_n_m, float temperature_
     const float rest = 1.0f - weight;
     float bend = weight * rest * (rest * (width * here[1] - rise) + weight * (rise - width * here[4]));
     bend = jump ? 0.0f : bend;
-    const int32_t t = to_i32(weight * 16384.0f), w = to_i32(warm * 16384.0f);
-    const int32_t both = shifted(mul(t, w), 14u);
-    const int32_t shares[4] = {add(sub(sub(16384, t), w), both), sub(t, both), sub(w, both), both};
-    for (int i = 0; i < 4; i++) {
+    const int32_t t = to_i32(weight * 16384.0f), shares[2] = {sub(16384, t), t};
+    for (int i = 0; i < 2; i++) {
         at.shares[i] = i32((uint32_t)shares[i] << 16);
     }
+    at.hotter = to_i32(warm * 16384.0f);
     const bool inside = (uint32_t)t - 1u < 16383u;
     at.jump = jump && inside ? to_i32(magnitude(rise) + magnitude(widening)) : 0;
     at.mean = to_i32(here[0] + weight * rise + bend);
@@ -471,17 +472,6 @@ static bool allows(const fxt_table *table, int32_t centre, int32_t half)
 static bool allows_error(const fxt_table *table, int32_t error)
 {
     return (uint32_t)error + (uint32_t)table->limit <= (uint32_t)table->limit * 2u;
-}
-
-/* Records around a point: two, or four where there are temperatures. */
-static inline uint32_t row_at(const point *at, uint32_t number)
-{
-    return at->row + ((number & 1u) != 0u ? at->torque_step : 0u) + ((number & 2u) != 0u ? at->plane_step : 0u);
-}
-
-static inline uint32_t rows_of(const point *at)
-{
-    return at->plane_step != 0u ? 4u : 2u;
 }
 
 /* Values of one direction in a record. */
@@ -538,17 +528,36 @@ static int32_t curves_at(const fxt_table *table, const phases *where)
     return sum;
 }
 
-/* Half words of the records: two in a word. */
-static inline void halves_at(const fxt_table *table, uint32_t at, uint32_t count, uint32_t *words)
+/* Between two temperatures, rounded. */
+static inline int32_t blended(const point *at, int32_t cold, int32_t hot)
 {
-    words_from(table->image, table->bytes, 2u * at, count, words);
+    return add(cold, shifted(add(mul(sub(hot, cold), at->hotter), 8192), 14u));
+}
+
+/* Numbers of one of the two records around a torque, two in a word of at most three; where there are temperatures blended to that of the point. */
+static inline void record_at(const fxt_table *table, const point *at, uint32_t above, uint32_t from, uint32_t words, int32_t *numbers)
+{
+    const uint32_t first = at->row + above * at->torque_step + from;
+    uint32_t cold[3], hot[3];
+    words_from(table->image, table->bytes, 2u * first, words, cold);
+    for (uint32_t i = 0u; i < words; i++) {
+        numbers[2u * i] = low(cold[i]);
+        numbers[2u * i + 1u] = high(cold[i]);
+    }
+    if (at->plane_step != 0u) {
+        words_from(table->image, table->bytes, 2u * (first + at->plane_step), words, hot);
+        for (uint32_t i = 0u; i < words; i++) {
+            numbers[2u * i] = blended(at, numbers[2u * i], low(hot[i]));
+            numbers[2u * i + 1u] = blended(at, numbers[2u * i + 1u], high(hot[i]));
+        }
+    }
 }
 
 /* The ripple of forward and of backward motion, counts. */
 static void ripple_at(const fxt_table *table, const point *at, uint32_t tooth, int32_t ripple[2])
 {
     const cell where = cell_at(table->ripple_nodes, tooth);
-    const uint32_t backward_row = ripple_row(table->ripple_nodes), rows = rows_of(at);
+    const uint32_t backward_row = ripple_row(table->ripple_nodes);
     int32_t weights[3];
     weights_q15(where, weights);
     for (int i = 0; i < 3; i++) {
@@ -556,12 +565,11 @@ static void ripple_at(const fxt_table *table, const point *at, uint32_t tooth, i
     }
     ripple[0] = 0;
     ripple[1] = 0;
-    for (uint32_t row = 0u; row < rows; row++) {
+    for (uint32_t row = 0u; row < 2u; row++) {
         for (uint32_t side = 0u; side < 2u; side++) {
-            uint32_t words[2];
-            halves_at(table, row_at(at, row) + where.node + (side != 0u ? backward_row : 0u), 2, words);
-            int32_t own = add(mul(low(words[0]), weights[0]), mul(high(words[0]), weights[1]));
-            own = add(own, mul(low(words[1]), weights[2]));
+            int32_t numbers[4];
+            record_at(table, at, row, where.node + (side != 0u ? backward_row : 0u), 2, numbers);
+            const int32_t own = add(add(mul(numbers[0], weights[0]), mul(numbers[1], weights[1])), mul(numbers[2], weights[2]));
             ripple[side] = add(ripple[side], mul_high(own, at->shares[row]));
         }
     }
@@ -593,17 +601,15 @@ static int32_t to_solution(const fxt_table *table, const point *at, uint32_t too
 {
     const cell guess = cell_at(table->ripple_nodes, tooth);
     const uint32_t node = guess.node == 0u ? table->ripple_nodes : guess.node;
-    const uint32_t first = node - 1u + (backward ? ripple_row(table->ripple_nodes) : 0u), rows = rows_of(at);
+    const uint32_t first = node - 1u + (backward ? ripple_row(table->ripple_nodes) : 0u);
     int32_t sums[5] = {0, 0, 0, 0, 0};
-    for (uint32_t row = 0u; row < rows; row++) {
-        uint32_t words[3];
+    for (uint32_t row = 0u; row < 2u; row++) {
+        int32_t numbers[6];
         const int32_t share = shifted(at->shares[row], 16u);
-        halves_at(table, row_at(at, row) + first, 3, words);
-        sums[0] = add(sums[0], mul(low(words[0]), share));
-        sums[1] = add(sums[1], mul(high(words[0]), share));
-        sums[2] = add(sums[2], mul(low(words[1]), share));
-        sums[3] = add(sums[3], mul(high(words[1]), share));
-        sums[4] = add(sums[4], mul(low(words[2]), share));
+        record_at(table, at, row, first, 3, numbers);
+        for (int i = 0; i < 5; i++) {
+            sums[i] = add(sums[i], mul(numbers[i], share));
+        }
     }
     for (int i = 0; i < 5; i++) {
         sums[i] = mul_high(sums[i], table->ripple_cells);

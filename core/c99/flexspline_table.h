@@ -229,9 +229,8 @@ void fxt_step(const fxt_table *table, fxt_play *play, int64_t measured, int64_t 
 bool fxt_steady_error(const fxt_table *table, int64_t generator, float torque_n_m, float temperature_c, fxt_direction direction,
                       float *error_rad);
 
-/* A joint: a step for every tick, with a limiter, modes and what is to be done where a sample, a tick or an answer is missing. With one
- * temperature node, or at a temperature of a node but the hottest, all bits are those of the core's `Joint` to which nothing is added; between
- * nodes the core blends its copies first, which differs by less than 0.004 arc-seconds.
+/* A joint: a step for every tick, with a limiter, modes and what is to be done where a sample, a tick or an answer is missing. At
+ * every temperature all bits are those of the core's `Joint` to which nothing is added.
  *
  *   static fxt_table table;
  *   static fxt_joint joint;

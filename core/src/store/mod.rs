@@ -93,6 +93,10 @@ impl Damaged {
 }
 
 /// Two copies of a table at the temperature of the drive: 8.1 KiB, and 0.3 KiB beside.
+///
+/// Joints of one table and temperature share a store: their ticks borrow it one after another, the slow group runs once
+/// for all. Each then takes a [`JointState`](crate::JointState) of 152 bytes, and its settings where they are not a
+/// constant.
 #[derive(Clone, Debug)]
 pub struct Store {
     first: Copied,
@@ -113,8 +117,6 @@ impl Default for Store {
 }
 
 impl Memory for Store {
-    const ROWS: usize = 2;
-
     #[inline(always)]
     fn plan(&self) -> &Plan {
         &self.source().plan
@@ -126,7 +128,7 @@ impl Memory for Store {
     }
 
     #[inline(always)]
-    fn halves<const N: usize>(&self, at: usize, doubt: &mut Doubt) -> [u32; N] {
+    fn halves<const N: usize>(&self, at: usize, _: (usize, i32), doubt: &mut Doubt) -> [u32; N] {
         agreed(self.first.halves(at), self.second.halves(at), doubt)
     }
 }
@@ -388,10 +390,10 @@ impl Store {
         let place = TorquePlace { weight: (torque - low) / width, width, jump: half.to_bits() & 1 != 0 };
         let around = [below, [a, b, c]];
         let first = (source.records_from as usize).wrapping_add(interval.wrapping_mul(source.record as usize));
-        let rows = [first, source.record as usize, 0].map(|words: usize| words.wrapping_mul(2));
+        let rows = [first, first.wrapping_add(source.record as usize)].map(|words: usize| words.wrapping_mul(2));
         let (active, in_range) = (source.marks & ACTIVE != 0, source.marks & IN_RANGE != 0);
         let marks = (num::finite(torque_n_m) & active, (torque == torque_n_m) & in_range);
-        OperatingPoint::new(place, around, 0.0, rows, marks, doubt).adjusted(&source.plan, mean, half_width)
+        OperatingPoint::new(place, around, rows, (0, 0), marks, doubt).adjusted(&source.plan, mean, half_width)
     }
 
     /// Images that are not to be used: not those that were activated, or both the same.

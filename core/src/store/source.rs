@@ -2,7 +2,9 @@
 
 use super::PAGE_WORDS;
 use crate::num;
-use crate::table::{NODE_WORDS, Plan, Table, Words, f32_at, grid, halves, ripple_row, word, word_at};
+use crate::table::{
+    NODE_WORDS, Plan, Table, Words, blend_halves, blend_number, f32_at, grid, halves, ripple_row, word, word_at,
+};
 use crate::whole::{pair, same, sums};
 
 /// A copy starts with the torque axis; what comes before it in an image is in the store otherwise.
@@ -242,21 +244,9 @@ impl Source {
         let usable = cold_usable & hot_usable;
 
         // Both are made every time: a branch would save one of them now and then.
-        let (f, g) = (f32::from_bits(cold), f32::from_bits(hot));
-        // The last bit of H is a mark, and of the others too small to matter.
-        let number = (f + self.warm * (g - f)).to_bits() & !1 | cold & 1;
-        let hotter = (self.warm * 16_384.0) as i32;
-        let colder = 16_384i32.wrapping_sub(hotter);
-        let blend = |cold: i32, hot: i32| {
-            let cold = (cold as i16 as i32).wrapping_mul(colder as i16 as i32);
-            let hot = (hot as i16 as i32).wrapping_mul(hotter as i16 as i32);
-            cold.wrapping_add(hot).wrapping_add(8192) >> 14
-        };
-        let low = blend(cold as i32, hot as i32) as u32 & 0xffff;
-        let pair = (blend(cold as i32 >> 16, hot as i32 >> 16) as u32) << 16 | low;
-        let mask = (is_number as u32).wrapping_neg();
-        let value = pair ^ (pair ^ number) & mask;
-
+        let number = blend_number(cold, hot, self.warm);
+        let pair = blend_halves(cold, hot, (self.warm * 16_384.0) as i32);
+        let value = pair ^ (pair ^ number) & (is_number as u32).wrapping_neg();
         Fresh { place: at as usize, value, usable }
     }
 }

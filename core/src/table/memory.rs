@@ -16,17 +16,16 @@ impl Doubt {
 
 /// The words of a table, in one copy or in two that are compared as they are read.
 pub(crate) trait Memory {
-    /// Records that are blended as they are read: 2, or 4 with two temperatures.
-    const ROWS: usize;
-
     /// Where things are.
     fn plan(&self) -> &Plan;
 
     /// `N` words from word `at`. What two copies disagree in is added to `doubt`.
     fn words<const N: usize>(&self, at: usize, doubt: &mut Doubt) -> [u32; N];
 
-    /// Half words from half word `at`: the first of `2·N` halves is the low one of the first word.
-    fn halves<const N: usize>(&self, at: usize, doubt: &mut Doubt) -> [u32; N];
+    /// Half words of records from half word `at`: the first of `2·N` halves is the low one of the first word. Where
+    /// there are temperatures, blended with those at the hotter one: how many half words further they are, and their
+    /// share in 2⁻¹⁴.
+    fn halves<const N: usize>(&self, at: usize, hotter: (usize, i32), doubt: &mut Doubt) -> [u32; N];
 }
 
 /// 2⁻²⁴ cells in one.

@@ -48,7 +48,7 @@ pub use model::{Approach, Command, Prediction};
 pub(crate) use model::{Estimate, Model, departure};
 pub(crate) use point::TorquePlace;
 pub use point::{OperatingPoint, Quality};
-pub(crate) use words::{Words, f32_at, halves, word_at, words_from};
+pub(crate) use words::{Words, blend_halves, blend_number, f32_at, halves, word_at, words_from};
 
 use crate::drive::Drive;
 use bounds::InverseBound;
@@ -128,8 +128,6 @@ pub struct Table<'a> {
 }
 
 impl Memory for Table<'_> {
-    const ROWS: usize = 4;
-
     #[inline(always)]
     fn plan(&self) -> &Plan {
         &self.plan
@@ -144,9 +142,12 @@ impl Memory for Table<'_> {
     }
 
     #[inline(always)]
-    fn halves<const N: usize>(&self, at: usize, _: &mut Doubt) -> [u32; N] {
+    fn halves<const N: usize>(&self, at: usize, (step, share): (usize, i32), _: &mut Doubt) -> [u32; N] {
         // Of the image: what is read beyond the last record are its checksums.
-        words_from(self.image, at.wrapping_mul(2))
+        let words = |at: usize| words_from(self.image, at.wrapping_mul(2));
+        let [mut here, hot]: [[u32; N]; 2] = [words(at), words(at.wrapping_add(step))];
+        here.iter_mut().zip(hot).for_each(|(word, hot)| *word = blend_halves(*word, hot, share));
+        here
     }
 }
 

@@ -24,10 +24,12 @@ pub enum Quality {
 /// tick share.
 #[derive(Clone, Copy, Debug)]
 pub struct OperatingPoint {
-    /// Half words: where the record below the torque starts, its torque step and its temperature step.
-    pub(super) rows: [usize; 3],
-    /// Their shares in 2⁻³⁰, to 2⁻¹⁴: low torque, high torque; the same at the higher temperature.
-    pub(super) shares: [i32; 4],
+    /// Half words: where the records below and above the torque start.
+    pub(super) rows: [usize; 2],
+    /// Their shares in 2⁻³⁰, to 2⁻¹⁴.
+    pub(super) shares: [i32; 2],
+    /// How many half words further they are at the hotter temperature, and its share in 2⁻¹⁴.
+    pub(super) hotter: (usize, i32),
     /// D and H there, counts.
     pub(crate) mean: i32,
     pub(crate) half_width: i32,
@@ -113,13 +115,13 @@ pub(crate) struct TorquePlace {
 }
 
 impl OperatingPoint {
-    /// From the nodes around the torque; `warm` is how far from the lower of two temperatures to the other, 0 to 1.
+    /// From the nodes around the torque, at one temperature.
     #[inline(always)]
     pub(crate) fn new(
         place: TorquePlace,
         [low, high]: [Node; 2],
-        warm: f32,
-        rows: [usize; 3],
+        rows: [usize; 2],
+        hotter: (usize, i32),
         (finite, in_range): (bool, bool),
         doubt: Doubt,
     ) -> Self {
@@ -128,17 +130,16 @@ impl OperatingPoint {
         let (rise, widening) = (mean_high - mean_low, half_high - half_low);
         let bend = windup::bend(weight, width, [rise, slope_low, slope_high]);
         let bend = if jump { 0.0 } else { bend };
-        let (t, w) = ((weight * 16_384.0) as i32, (warm * 16_384.0) as i32);
+        let t = (weight * 16_384.0) as i32;
         // A search that was led astray ends in an interval that does not hold the torque.
         let doubt = Doubt(doubt.0 | (t as u32 > 16_384) as u32);
         // In doubt strictly inside a jump.
         let inside = (t.wrapping_sub(1) as u32) < 16_383;
         let height = (rise.abs() + widening.abs()) as i32 & ((jump & inside) as i32).wrapping_neg();
-        let both = t.wrapping_mul(w) >> 14;
-        let rest = 16_384i32.wrapping_sub(t).wrapping_sub(w).wrapping_add(both);
         Self {
             rows,
-            shares: [rest, t.wrapping_sub(both), w.wrapping_sub(both), both].map(|share| share << 16),
+            shares: [16_384i32.wrapping_sub(t), t].map(|share| share << 16),
+            hotter,
             mean: (mean_low + weight * rise + bend) as i32,
             half_width: (half_low + weight * widening) as i32,
             added: [0; 2],

@@ -5,7 +5,7 @@ use super::grid::{self, Cell};
 use super::image::{NODE_WORDS, word};
 use super::memory::{CELL, Doubt, Memory};
 use super::point::{OperatingPoint, TorquePlace};
-use super::words::{f32_at, halves};
+use super::words::{blend_number, f32_at, halves};
 use crate::drive::Phases;
 use crate::num::{finite, sqrt, within};
 
@@ -54,10 +54,7 @@ pub(crate) fn locate(table: &Table<'_>, torque_n_m: f32, temperature_c: f32) -> 
     let here: [u32; 2 * NODE_WORDS] = table.words(at, &mut doubt);
     let there: [u32; 2 * NODE_WORDS] = table.words(at.wrapping_add(node_plane), &mut doubt);
     let [_, _, flagged, ..] = here;
-    let blend = |cold: u32, hot: u32| {
-        let (cold, hot) = (f32::from_bits(cold), f32::from_bits(hot));
-        cold + warm * (hot - cold)
-    };
+    let blend = |cold: u32, hot: u32| f32::from_bits(blend_number(cold, hot, warm));
     let [c0, c1, c2, c3, c4, c5] = here;
     let [h0, h1, h2, h3, h4, h5] = there;
     let around = [[blend(c0, h0), blend(c1, h1), blend(c2, h2)], [blend(c3, h3), blend(c4, h4), blend(c5, h5)]];
@@ -68,8 +65,9 @@ pub(crate) fn locate(table: &Table<'_>, torque_n_m: f32, temperature_c: f32) -> 
     let first_record =
         records.wrapping_add(plane.wrapping_mul(record_plane)).wrapping_add(interval.wrapping_mul(record_step));
     let marks = (finite(torque_n_m) & finite(temperature_c), (torque == torque_n_m) & (temperature == temperature_c));
-    let rows = [first_record, record_step, record_plane].map(|words: usize| words.wrapping_mul(2));
-    OperatingPoint::new(place, around, warm, rows, marks, doubt)
+    let rows = [first_record, first_record.wrapping_add(record_step)].map(|words: usize| words.wrapping_mul(2));
+    let hotter = (record_plane.wrapping_mul(2), (warm * 16_384.0) as i32);
+    OperatingPoint::new(place, around, rows, hotter, marks, doubt)
 }
 
 impl Table<'_> {
@@ -78,14 +76,6 @@ impl Table<'_> {
     pub fn at(&self, torque_n_m: f32, temperature_c: f32) -> Option<OperatingPoint> {
         Some(locate(self, torque_n_m, temperature_c)).filter(|point| point.finite)
     }
-}
-
-/// Where the records around a torque start, half words, and their shares in 2⁻³⁰.
-#[inline(always)]
-fn rows(point: &OperatingPoint) -> impl Iterator<Item = (usize, i32)> {
-    let [first, torque_step, plane_step] = point.rows;
-    let hot = first.wrapping_add(plane_step);
-    [first, first.wrapping_add(torque_step), hot, hot.wrapping_add(torque_step)].into_iter().zip(point.shares)
 }
 
 #[inline(always)]
@@ -123,10 +113,10 @@ fn ripple_at<M: Memory>(memory: &M, point: &OperatingPoint, tooth: u32, doubt: &
     let [before, at, after] = cell.weights_q15().map(|weight| weight as i16 as i32);
     let backward_row = plan.row();
     let (mut forward, mut backward) = (0i32, 0i32);
-    for (row, share) in rows(point).take(M::ROWS) {
+    for (row, share) in point.rows.into_iter().zip(point.shares) {
         let first = row.wrapping_add(cell.node);
         for (sum, place) in [(&mut forward, first), (&mut backward, first.wrapping_add(backward_row))] {
-            let [a, b] = memory.halves(place, doubt);
+            let [a, b] = memory.halves(place, point.hotter, doubt);
             // |Σ| ≤ 2¹⁵·2¹⁵: the weights add up to 2¹⁵; 2¹³ of it to a unit.
             let own = low(a).wrapping_mul(before).wrapping_add(high(a).wrapping_mul(at));
             let own = own.wrapping_add(low(b).wrapping_mul(after));
@@ -175,8 +165,8 @@ pub(crate) fn to_solution<M: Memory>(
     // Two nodes before and two after, which a stored ripple has for all but the first.
     let first = node.wrapping_sub(1).wrapping_add(row_of_side);
     let mut sums = [0i32; 5];
-    for (row, share) in rows(point).take(M::ROWS) {
-        let [a, b, c] = memory.halves(row.wrapping_add(first), doubt);
+    for (row, share) in point.rows.into_iter().zip(point.shares) {
+        let [a, b, c] = memory.halves(row.wrapping_add(first), point.hotter, doubt);
         for (sum, ripple) in sums.iter_mut().zip([low(a), high(a), low(b), high(b), low(c)]) {
             *sum = sum.wrapping_add(ripple.wrapping_mul(share >> 16));
         }
@@ -220,8 +210,6 @@ mod tests {
     }
 
     impl Memory for Record {
-        const ROWS: usize = 2;
-
         fn plan(&self) -> &Plan {
             &self.plan
         }
@@ -230,7 +218,7 @@ mod tests {
             [0; N]
         }
 
-        fn halves<const N: usize>(&self, at: usize, _: &mut Doubt) -> [u32; N] {
+        fn halves<const N: usize>(&self, at: usize, _: (usize, i32), _: &mut Doubt) -> [u32; N] {
             let half = |i: usize| self.halves.get(at + i).map_or(0, |half| *half as u16 as u32);
             core::array::from_fn(|i| half(2 * i) | half(2 * i + 1) << 16)
         }
@@ -282,7 +270,7 @@ mod tests {
             };
             let record = Record { halves, plan };
             let place_of = TorquePlace { weight, width: 1.0, jump: false };
-            let point = OperatingPoint::new(place_of, [[0.0; 3]; 2], 0.0, [0; 3], (true, true), Doubt(0));
+            let point = OperatingPoint::new(place_of, [[0.0; 3]; 2], [0; 2], (0, 0), (true, true), Doubt(0));
 
             // Where x + ripple(x) = place: by bisection.
             let place = place * n as f64;

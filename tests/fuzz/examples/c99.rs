@@ -261,8 +261,7 @@ impl<W: Write> Vectors<W> {
         }
         Ok(())
     }
-    /// Ticks of joints with this table, at temperatures where the copies of a store hold the words of the image: below
-    /// the axis, at any node but the last, or anywhere with a single one.
+    /// Ticks of joints with this table, at temperatures at nodes, beside, between and beyond them.
     fn joints(&mut self, image: &[u8], runs: usize, ticks: usize, mixed: &mut Mixed) -> std::io::Result<()> {
         let table = Table::check(image).expect("accepted");
         let nodes: Vec<f32> = table.temperature_nodes_c().collect();
@@ -270,10 +269,14 @@ impl<W: Write> Vectors<W> {
         let images = Images::new(image, &second);
         for run in 0..runs {
             let [least, most] = table.temperature_range_c();
-            let temperature = match (run % 4, nodes.len()) {
-                (0, _) => nodes[0] - 1.0,
-                (_, 1) => least + (most - least) * mixed.unit() as f32,
-                (_, count) => nodes[mixed.number() as usize % (count - 1)],
+            let bytes = mixed.bytes(16);
+            let axis = Some(tables::hostile_axis(&mut Choices::new(&bytes), &nodes)).filter(|found| found.is_finite());
+            let node = nodes[mixed.number() as usize % nodes.len()];
+            let temperature = match run % 4 {
+                0 => axis.unwrap_or(nodes[0] - 1.0),
+                1 => node,
+                2 => f32::from_bits(node.to_bits() ^ 1),
+                _ => least + (most - least) * mixed.unit() as f32,
             };
             let mut store = Store::new();
             // A table may be too large for a store.
@@ -510,6 +513,27 @@ fn moved(base: &[u8], [kind, split, sign]: [usize; 3], part: f64) -> Vec<u8> {
     image
 }
 
+/// A sound table whose last interval of torque is a jump, of no height.
+fn jump_at_the_end(base: &[u8]) -> Vec<u8> {
+    let mut image = base.to_vec();
+    let (torques, temperatures) = (usize::from(image[110]), usize::from(image[111]));
+    let nodes = 4 * usize::from(u16::from_le_bytes([image[164], image[165]]));
+    let number = |image: &[u8], at: usize| f32::from_le_bytes(image[at..at + 4].try_into().expect("four bytes"));
+    let last = 4 * (64 + torques - 1);
+    let [before, wide] = [number(&image, last - 4), number(&image, last - 4) - number(&image, last - 8)];
+    let end = (before + wide / 16.0).to_le_bytes();
+    // The last node, and the end of the range.
+    [last, 140].into_iter().for_each(|at| image[at..at + 4].copy_from_slice(&end));
+    for temperature in 1..=temperatures {
+        let last = nodes + 12 * (temperature * torques - 1);
+        image.copy_within(last - 12..last, last);
+        image[last - 4] |= 1;
+        image[last + 8] &= !1;
+    }
+    flexspline::reseal(&mut image);
+    image
+}
+
 /// The two images next to each other of which one is accepted and one is not; or the end of the change, if it is
 /// accepted too.
 fn at_the_limit(choices: &mut Choices<'_>) -> [Vec<u8>; 2] {
@@ -543,12 +567,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut mixed = Mixed(1);
     let mut sound: Vec<Vec<u8>> = named.iter().map(std::fs::read).collect::<Result<_, _>>()?;
     sound.extend(tables::BASES.iter().cloned());
+    sound.push(jump_at_the_end(&tables::BASES[2]));
     for image in &sound {
         vectors.image(image)?;
         let table = Table::check(image).map_err(|error| error.to_string())?;
         vectors.ticks(&table, ticks.div_ceil(sound.len()), &mut mixed)?;
         vectors.joints(image, 40, ticks.div_ceil(40 * sound.len()), &mut mixed)?;
     }
+    // A flexspline without teeth.
+    let mut toothless = tables::BASES[2].clone();
+    toothless[106..108].fill(0);
+    flexspline::reseal(&mut toothless);
+    vectors.image(&toothless)?;
     for _ in 0..ticks / 40 {
         vectors.encoder(40, &mut mixed)?;
     }
