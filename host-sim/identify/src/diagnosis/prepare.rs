@@ -170,10 +170,12 @@ pub fn uncertain(on: &Excitation<'_>, terms: &[Term<'_>], hung: &[bool]) -> Vec<
             *doubtful |= (begins - beside..over + beside).contains(time);
         }
     }
-    let mut with = uncertain.clone();
-    with.iter_mut().zip(hung).for_each(|(doubtful, hung)| *doubtful |= hung);
-    if few(&with) {
-        uncertain = with;
+    for others in [hung, &leaps_of_speed(on.rows)] {
+        let mut with = uncertain.clone();
+        with.iter_mut().zip(others).for_each(|(doubtful, other)| *doubtful |= other);
+        if few(&with) {
+            uncertain = with;
+        }
     }
     let without = uncertain.clone();
     for term in terms {
@@ -185,6 +187,48 @@ pub fn uncertain(on: &Excitation<'_>, terms: &[Term<'_>], hung: &[bool]) -> Vec<
     }
     if few(&uncertain) { uncertain } else { without }
 }
+
+/// Rows about a leap of the generator's speed, from one pace that is kept to another. What is read late, averaged or
+/// filtered on the way follows a kept pace as one delay, whatever its kind. How it gets over a leap is of its kind,
+/// which no law here tells: a few such rows, far from what a delay says, would decide against all others.
+fn leaps_of_speed(rows: &Rows) -> Vec<bool> {
+    let mut about = vec![false; rows.len()];
+    for session in rows.sessions.iter().filter(|session| rows.recorded.time && session.len() > 2 * KEPT) {
+        let pace: Vec<f64> = session.clone().skip(1).map(|k| pace_to(rows, k)).collect();
+        // The step in which it leaps may hold some of both paces.
+        for step in KEPT..pace.len() - KEPT {
+            let (before, after) = (&pace[step - KEPT..step], &pace[step + 1..=step + KEPT]);
+            let leap = after[0] - before[KEPT - 1];
+            let kept = |paces: &[f64]| paces.iter().all(|pace| (pace - paces[0]).abs() < EVEN * leap.abs());
+            let fastest = before[0].abs().max(after[0].abs());
+            if leap.abs() > LEAP * fastest && kept(before) && kept(after) {
+                let at = session.start + step;
+                let over = |k: &usize| rows.time[*k] - rows.time[at] <= SETTLES_S;
+                about[at..session.end]
+                    .iter_mut()
+                    .zip(at..)
+                    .take_while(|(_, k)| over(k))
+                    .for_each(|(row, _)| *row = true);
+            }
+        }
+    }
+    about
+}
+
+/// Speed of the generator from the row before to this one, rad/s.
+fn pace_to(rows: &Rows, k: usize) -> f64 {
+    let passed = rows.time[k] - rows.time[k - 1];
+    if passed > 0.0 { (rows.generator[k] - rows.generator[k - 1]) / passed } else { f64::NAN }
+}
+
+/// A pace is kept where so many steps one after another are it, … *Guess*.
+const KEPT: usize = 4;
+/// … each within this share of what it leaps by, … *Guess*.
+const EVEN: f64 = 0.1;
+/// … and a leap is a change by at least this share of the faster of the two. *Guess*: a ramp that rows resolve is none.
+const LEAP: f64 = 0.2;
+/// What is read has got over a leap after this time, s. *Guess*: six time constants of a filter of 10 ms.
+const SETTLES_S: f64 = 0.06;
 
 /// Where a drive is found sound, no more than this share of its rows may have been set aside. *Guess*: by definition
 /// most of them must count.

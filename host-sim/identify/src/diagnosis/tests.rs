@@ -129,6 +129,50 @@ fn slow_to_its_other_flank(nominal: &Nominal, lag_s: f64) -> Vec<Session> {
         .collect()
 }
 
+/// A perfect drive without clearance, to and fro at four paces, whose output is read through a low-pass of 5 ms.
+fn behind_a_low_pass(nominal: &Nominal) -> Vec<Session> {
+    let mut random = fastrand::Rng::with_seed(21);
+    // The filter runs twenty times a row.
+    let (row_s, step_s) = (1e-2, 5e-4);
+    [1.0, 2.0, 4.0, 8.0]
+        .into_iter()
+        .map(|pace| {
+            let mut session = Session { time_s: Some(Vec::new()), torque_n_m: Some(Vec::new()), ..Session::default() };
+            let mut read = None;
+            for step in 0..4000 * 20 {
+                let t = step_s * f64::from(step);
+                let psi = pace * (t - 2.0 * (t - 20.0).max(0.0));
+                let load = 20.0 * (1.3 * t + pace).sin();
+                let error = nominal.harmonics_arcsec(psi) + nominal.wind_up_arcsec(load);
+                let output = psi / nominal.ratio + error / ARCSEC_PER_RAD;
+                let reading = read.get_or_insert(output);
+                *reading += (output - *reading) * -f64::exp_m1(-step_s / 5e-3);
+                if step % 20 == 19 {
+                    let noise = (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;
+                    session.line.push(session.len() as u64 + 2);
+                    session.generator_rad.push(psi);
+                    session.error_rad.push(*reading - psi / nominal.ratio + noise / ARCSEC_PER_RAD);
+                    session.time_s.as_mut().unwrap().push(t + row_s + 600.0 * pace);
+                    session.torque_n_m.as_mut().unwrap().push(load);
+                }
+            }
+            session
+        })
+        .collect()
+}
+
+#[test]
+fn an_output_behind_a_low_pass_is_read_late_and_has_no_drag() {
+    let nominal = Nominal { backlash_arcsec: 0.0, ..catalogue_drive() };
+    let sessions = behind_a_low_pass(&nominal);
+    let diagnosis = diagnose(&sessions, &nominal, None, &Settings::default(), |_, _, _| {}).unwrap();
+    assert_eq!(names(&diagnosis), [CauseName::SensorLatency], "{}", diagnosis.text());
+    let said = diagnosis.causes[0].parameters["delay_s"];
+    // What such a filter is late by at a steady pace.
+    let late = 5e-4 / f64::exp_m1(0.1);
+    assert!((said.value - late).abs() < 0.02 * late, "{said:?}");
+}
+
 #[test]
 fn an_output_that_takes_milliseconds_to_its_other_flank_is_a_perfect_drive() {
     let nominal = catalogue_drive();
