@@ -312,6 +312,7 @@ fn every_command_prints_one_json_object_and_nothing_else() {
         "study --generator cam --vary generator.w0_mm=0.5 --positions 4",
         "look out/data.csv",
         "calibrate out/data.csv --model nominal.toml",
+        "fly camera --example",
         "fly camera --no-report",
         "campaign plan --example",
         "campaign plan tolerances.toml --drives 64 --shards 2 --out campaign",
@@ -323,8 +324,10 @@ fn every_command_prints_one_json_object_and_nothing_else() {
         // A table of few samples need not meet the FEM.
         assert!(run.code == 0 || (line.starts_with("validate") && run.code == 1), "{line}: {}", run.stderr);
         assert!(run.json().is_object(), "{line}: {:.80}", run.stdout);
-        // That the page of another command is kept is said beside it.
-        let said = run.stderr.lines().filter(|line| !(line.starts_with("remark: ") && line.contains("it is kept as")));
+        // That the page of another command is kept is said beside it, and on a slow machine that it still computes.
+        let beside =
+            |line: &&str| line.starts_with("remark: ") && line.contains("it is kept as") || line.contains(" s so far");
+        let said = run.stderr.lines().filter(|line| !beside(line));
         assert!(run.code == 1 || said.count() == 0, "{line}: {}", run.stderr);
     }
     for command in commands(&desk) {
