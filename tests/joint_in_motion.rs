@@ -182,6 +182,49 @@ fn a_servo_near_the_edge_of_instability_is_cautioned() {
     }
 }
 
+/// The drive that a table describes flies as the map of the contact FEM does of which neither it nor its samples are
+/// made; and what the core has is the file itself.
+#[test]
+fn the_drive_of_an_own_table_flies_as_its_contact_fem_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |line: &str| {
+        let done = Command::new(flexspline()).args(line.split(' ')).current_dir(folder.path()).output().unwrap();
+        assert!(done.status.success(), "{line}: {}", String::from_utf8_lossy(&done.stderr));
+        String::from_utf8(done.stdout).unwrap()
+    };
+    let samples = concat!(env!("CARGO_MANIFEST_DIR"), "/firmware/samples/cam.samples.csv");
+    run(&format!("tables -q --no-report --generator cam --from-samples {samples} --out ."));
+    let example = run("fly camera --example");
+    std::fs::write(folder.path().join("own.toml"), example.replace("\"calibrated\"", "\"nominal\"")).unwrap();
+    let flown = |more: &str| -> Value {
+        serde_json::from_str(&run(&format!("fly own.toml --json --no-report --out flown{more}"))).unwrap()
+    };
+    let (own, known) = (flown(" --tables cam.fxt"), flown(""));
+    let rms = |flight: &Value, controller: &str| flight["rms_arcsec"][controller].as_f64().unwrap();
+    for controller in ["none", "compensated", "ideal"] {
+        let [own, known] = [&own, &known].map(|flight| rms(flight, controller));
+        println!("{controller}: {own:.3} by the table, {known:.3} by the map");
+    }
+    // The table leaves of the FEM what its samples did not see: a hundredth of what is not compensated.
+    let apart = |controller: &str| (rms(&own, controller) - rms(&known, controller)).abs();
+    assert!(["none", "compensated", "ideal"].iter().all(|c| apart(c) < 0.01 * rms(&known, "none")));
+    assert_eq!((&own["generator"], &own["table"]), (&"cam".into(), &"nominal".into()));
+    assert_ne!(own["digest"], known["digest"]);
+    // What does not fit the table is told.
+    let refused = |line: &str| {
+        let done = Command::new(flexspline()).args(line.split(' ')).current_dir(folder.path()).output().unwrap();
+        assert_eq!(done.status.code(), Some(2), "{line}");
+        String::from_utf8(done.stderr).unwrap()
+    };
+    std::fs::write(folder.path().join("heavy.toml"), "base = \"camera\"\nload.bias_n_m = 180.0\n").unwrap();
+    let said = refused("fly heavy.toml --tables cam.fxt");
+    assert!(said.contains("N.m with this table"), "{said}");
+    let said = refused("fly camera --tables cam.fxt --vary generator=cam");
+    assert!(said.contains("--vary generator: found with --tables"), "{said}");
+    let said = refused("fly camera --tables own.toml");
+    assert!(said.contains("own.toml: "), "{said}");
+}
+
 #[test]
 fn the_command_prints_what_was_promised_and_names_a_scenario_that_is_not_there() {
     let folder = tempfile::tempdir().unwrap();

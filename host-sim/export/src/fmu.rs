@@ -14,13 +14,12 @@ use flexspline::Table;
 use flexspline_fmu::joint::starts_of;
 use flexspline_fmu::resources::{DESIGNED_FILE, DRIVE_FILE, MODEL_FILE, Resources, TABLE_FILE, drive_file};
 use flexspline_fmu::variables::ModelKind;
-use flexspline_motion::flight::{TABLE_DRAG_N_M, Unit, table_image};
+use flexspline_motion::flight::{Unit, table_image};
 use flexspline_motion::gear::Gear;
-use flexspline_motion::table::gear_of;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
-use flexspline_fly::fly::{Flown, unit};
+use flexspline_fly::fly::{Flown, gear_at, unit};
 
 pub use error::FmuExportError;
 pub use libraries::{Library, Platform, find_libraries};
@@ -60,15 +59,7 @@ pub fn joint(flown: &Flown, image: Option<Vec<u8>>) -> Result<Fmu, FmuExportErro
         return Fmu::new(ModelKind::Joint, &starts_of(scenario), image, Some([built, nominal]));
     };
     let table = Table::check(&image)?;
-    if table.drive().exact_ratio() < 0.0 {
-        return Err(FmuExportError::FixedMember);
-    }
-    let [coldest_c, warmest_c] = table.temperature_range_c().map(f64::from);
-    let found_c = scenario.temperature_c;
-    if !(found_c >= coldest_c && found_c <= warmest_c) {
-        return Err(FmuExportError::Temperature { found_c, coldest_c, warmest_c });
-    }
-    let gear = gear_of(&table, found_c, TABLE_DRAG_N_M).ok_or(FmuExportError::NoGear)?;
+    let gear = gear_at(&table, scenario.temperature_c)?;
     Fmu::new(ModelKind::Joint, &starts_of(scenario), image, Some([gear.clone(), gear]))
 }
 

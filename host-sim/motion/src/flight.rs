@@ -106,25 +106,31 @@ impl Unit {
     /// wheels), 6 % stiffer, and with 2″ more clearance. None of it is in the nominal table.
     pub fn of_spring(drive: Drive, spring: Sampled) -> Self {
         let ratio = drive.exact_ratio();
+        Self::of_gear(drive, Gear { ratio, lines: Vec::new(), spring: Spring::Sampled(Box::new(spring)) })
+    }
+
+    /// A unit of a drive as designed, with the same beside it: lines, stiffness and clearance.
+    pub fn of_gear(drive: Drive, nominal: Gear) -> Self {
         let line = |generator: f64, output: f64, arcsec: f64, phase_rad: f64| Line {
             generator,
             output,
             amplitude_rad: arcsec / ARCSEC_PER_RAD,
             phase_rad,
         };
-        let lines = vec![
+        let mut lines = nominal.lines.clone();
+        lines.extend([
             line(2.0, -2.0, 19.5, 0.9),
             line(4.0, -4.0, 3.9, 2.0),
             line(2.0, 0.0, 8.5, 0.3),
             line(1.0, 0.0, 3.0, 1.7),
             line(0.0, 1.0, 10.0, 0.5),
-        ];
-        let built = Spring::Sampled(Box::new(spring.as_built(1.06, 2.0 / ARCSEC_PER_RAD)));
-        Self {
-            drive,
-            nominal: Gear { ratio, lines: Vec::new(), spring: Spring::Sampled(Box::new(spring)) },
-            built: Gear { ratio, lines, spring: built },
-        }
+        ]);
+        let spring = match &nominal.spring {
+            Spring::Sampled(sampled) => Spring::Sampled(Box::new(sampled.as_built(1.06, 2.0 / ARCSEC_PER_RAD))),
+            cubic @ Spring::Cubic { .. } => cubic.clone(),
+        };
+        let built = Gear { ratio: nominal.ratio, lines, spring };
+        Self { drive, nominal, built }
     }
 
     /// Built without errors: no lines, no ripple of the tooth pitch. What ripples with it is encoder, servo, friction
@@ -310,15 +316,21 @@ pub enum FlightError {
 /// # Errors
 /// [`FlightError`].
 pub fn fly(scenario: &Scenario, unit: &Unit) -> Result<Flight, FlightError> {
-    fly_told(scenario, unit, &|| {})
+    fly_told(scenario, unit, None, &|| {})
 }
 
-/// Flies a scenario; `told` is called by each controller's joint for each second that it flew.
+/// Flies a scenario, with the image of a table that was made before, or one made for it; `told` is called by each
+/// controller's joint for each second that it flew.
 ///
 /// # Errors
 /// [`FlightError`].
-pub fn fly_told(scenario: &Scenario, unit: &Unit, told: &(dyn Fn() + Sync)) -> Result<Flight, FlightError> {
-    let made = made(scenario, unit, None)?;
+pub fn fly_told(
+    scenario: &Scenario,
+    unit: &Unit,
+    image: Option<Vec<u8>>,
+    told: &(dyn Fn() + Sync),
+) -> Result<Flight, FlightError> {
+    let made = made(scenario, unit, image)?;
     let flawless = LaneParts { unit: unit.flawless(), ..made.clone() };
     let (flown, flawless) = std::thread::scope(|threads| {
         let start = |made, kind| threads.spawn(move || lane(made, kind, told));

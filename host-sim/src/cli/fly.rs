@@ -1,19 +1,20 @@
 //! `flexspline fly`: a joint with mass in closed loop.
 
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::Args;
 use serde::Serialize;
 
-use super::context::Context;
+use super::context::{Context, image_file};
 use super::{Failure, report};
 use flexspline_base::output::Outputs;
 use flexspline_base::suggest::did_you_mean;
 use flexspline_fly::fly::{
-    ByController, Flown, FlyError, Results, SCENARIOS, VariedFlight, Vary, built_in, every, fly_varied, read, results,
+    ByController, Flown, FlyError, OwnTable, Results, SCENARIOS, VariedFlight, Vary, built_in, every, example,
+    fly_varied, read, results,
 };
 use flexspline_report::flight_report;
 
@@ -23,6 +24,9 @@ use flexspline_report::flight_report;
 /// built with errors; the table knows the drive as designed, with its diagnosed lines, or calibrated. Writes
 /// flight.json and report.html.
 ///
+/// With --tables FILE.fxt the drive of that table flies in the place of HHD-95: built with the same errors, and the
+/// core has the file itself where the scenario's table is "nominal".
+///
 /// With --vary, or for all scenarios, flights are put side by side: a row for each, to the screen and to flights.json.
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -31,7 +35,9 @@ Examples:
   flexspline fly camera --json
   flexspline fly all --vary table=nominal,extended,calibrated
   flexspline fly antenna --vary generator=cam,four-roller --vary torque=on_load,current
-  flexspline fly own.toml --out flight")]
+  flexspline fly antenna --example > own.toml
+  flexspline fly own.toml --out flight
+  flexspline fly camera --tables out/cam.fxt --vary table=nominal,calibrated")]
 pub(super) struct Fly {
     /// antenna, rover, camera, telescope, a TOML file, or all (those with a name)
     #[arg(value_name = "SCENARIO")]
@@ -40,6 +46,12 @@ pub(super) struct Fly {
     /// scenario has it]
     #[arg(long, value_name = "FIELD=VALUES", allow_hyphen_values = true)]
     vary: Vec<Vary>,
+    /// A table whose drive flies, as flexspline tables writes it [default: HHD-95 with the scenario's generator]
+    #[arg(long, value_name = "FILE")]
+    tables: Option<PathBuf>,
+    /// Print the scenario as a file with every field, what it is and what is allowed, and fly nothing
+    #[arg(long, conflicts_with_all = ["vary", "tables", "no_report"])]
+    example: bool,
     /// Write no report.html
     #[arg(long)]
     no_report: bool,
@@ -48,14 +60,20 @@ pub(super) struct Fly {
 impl Fly {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         if let Some(option) = context.changes_the_drive() {
-            let what = "a flight has the unit of its scenario; allowed: table, load, servo and more in a scenario \
-                        file (docs/explanation/motion.md)";
+            let what = "a flight has the drive of a table; allowed: --tables FILE.fxt, which `flexspline tables` \
+                        makes of a drive";
             return Err(Failure::BadInput(format!("{option}: {what}")));
+        }
+        if self.example {
+            let flown = scenario(self.named()?)?;
+            let base = built_in(&self.scenario).map_or(SCENARIOS[0], |_| &self.scenario);
+            let file = example(base, flown);
+            return context.print_data(&serde_json::json!({ "file": &file }), || file.clone());
         }
         if self.scenario == "all" || !self.vary.is_empty() {
             return self.side_by_side(context);
         }
-        let flown = scenario(&self.scenario)?;
+        let flown = self.on_its_drive(scenario(&self.scenario)?)?;
         flown.carries().map_err(|why| Failure::BadInput(format!("{}: {why}", self.scenario)))?;
         let out = context.out()?;
         if !self.no_report {
@@ -82,6 +100,31 @@ impl Fly {
     }
 }
 
+impl Fly {
+    /// One scenario, not all.
+    fn named(&self) -> Result<&str, Failure> {
+        if self.scenario == "all" {
+            return Err(Failure::BadInput(format!(
+                "scenario: found all, allowed for an example: {}",
+                SCENARIOS.join(", ")
+            )));
+        }
+        Ok(&self.scenario)
+    }
+
+    /// With the drive of the table that is given.
+    fn on_its_drive(&self, flown: Flown) -> Result<Flown, Failure> {
+        let Some(file) = &self.tables else { return Ok(flown) };
+        if self.vary.iter().any(|vary| vary.field == "generator") {
+            let what = "--vary generator: found with --tables, whose table has its generator; allowed: one of the two";
+            return Err(Failure::BadInput(what.to_owned()));
+        }
+        let bad = |error: FlyError| Failure::BadInput(format!("{}: {error}", file.display()));
+        let own = OwnTable::new(image_file(file)?).map_err(|error| bad(error.into()))?;
+        flown.with_table(own).map_err(bad)
+    }
+}
+
 /// Flights side by side.
 #[derive(Serialize)]
 struct Flights {
@@ -94,7 +137,9 @@ impl Fly {
         let names = if self.scenario == "all" { SCENARIOS.to_vec() } else { vec![self.scenario.as_str()] };
         let mut flights = Vec::new();
         for name in names {
-            flights.extend(every(name, &text_of(name)?, &self.vary).map_err(refused)?);
+            for (varied, flown) in every(name, &text_of(name)?, &self.vary).map_err(refused)? {
+                flights.push((varied, self.on_its_drive(flown)?));
+            }
         }
         let out = context.out()?;
         let (progress, done) = (Mutex::new(context.progress("fly")), AtomicUsize::new(0));

@@ -4,7 +4,7 @@ use std::io;
 use std::path::PathBuf;
 
 use flexspline::ImageError;
-use flexspline_fly::fly::FlyError;
+use flexspline_fly::fly::{FlyError, OwnTableError};
 use flexspline_fmu::FmuError;
 use flexspline_motion::flight::FlightError;
 
@@ -14,22 +14,9 @@ pub enum FmuExportError {
     /// The table.
     #[error(transparent)]
     Table(#[from] ImageError),
-    /// A joint turns the circular spline.
-    #[error("found a drive whose circular spline is fixed; allowed for a joint: the flexspline fixed")]
-    FixedMember,
-    /// The table does not reach the scenario's temperature.
-    #[error("temperature_c of the scenario: found {found_c}, allowed with this table: {coldest_c} to {warmest_c}")]
-    Temperature {
-        /// That of the scenario, °C.
-        found_c: f64,
-        /// Lower end of the table, °C.
-        coldest_c: f64,
-        /// Upper end of the table, °C.
-        warmest_c: f64,
-    },
-    /// A table without a value under load.
-    #[error("the table gives nothing")]
-    NoGear,
+    /// The drive that the table describes.
+    #[error(transparent)]
+    Drive(#[from] OwnTableError),
     /// The scenario's unit.
     #[error(transparent)]
     Scenario(#[from] FlyError),

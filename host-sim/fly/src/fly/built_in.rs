@@ -52,7 +52,7 @@ pub fn built_in(name: &str) -> Option<Flown> {
         table: TableKnown::Calibrated,
         seed: 1,
     };
-    let flown = |kind, scenario| Some(Flown { kind, scenario });
+    let flown = |kind, scenario| Some(Flown { kind, scenario, own: None });
     match name {
         // 0.001 to 1 °/s with reversals, a slow swing of the wind that crosses zero, gusts.
         "antenna" => {

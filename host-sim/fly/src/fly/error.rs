@@ -2,9 +2,9 @@
 
 use flexspline_base::toml_file::Problem;
 use flexspline_design::tables::TableError;
-use flexspline_mechanics::drive::GeneratorKind;
 use flexspline_motion::flight::FlightError;
 
+use super::OwnTableError;
 use crate::closed_loop::map::MapError;
 
 /// A scenario that is refused, or one that cannot be flown.
@@ -26,16 +26,19 @@ pub enum FlyError {
     /// `--vary` without a field and its values.
     #[error("allowed: FIELD=VALUE,VALUE,... with a field of a scenario file (docs/explanation/motion.md)")]
     VaryForm,
-    /// The generator does not carry the load.
-    #[error("load: found up to {largest_n_m:.1} N.m, allowed: {most_n_m} N.m with a {kind} generator")]
+    /// The drive does not carry the load.
+    #[error("load: found up to {largest_n_m:.1} N.m, allowed: {most_n_m} N.m with {of}")]
     Load {
         /// Largest load of the scenario, N·m.
         largest_n_m: f64,
-        /// Rated torque of the drive, N·m.
+        /// Rated torque of the drive, or the largest of the table, N·m.
         most_n_m: f64,
-        /// Its generator.
-        kind: GeneratorKind,
+        /// Which of them.
+        of: String,
     },
+    /// A table whose drive cannot be flown.
+    #[error(transparent)]
+    Table(#[from] OwnTableError),
     /// The unit's map of the contact FEM.
     #[error(transparent)]
     Map(#[from] MapError),

@@ -1,62 +1,24 @@
-//! A scenario from a file: a built-in one, and what is otherwise.
+//! A scenario from a file: a built-in one, and what is otherwise. And such a file, to start from.
 
+use std::fmt::Write as _;
+
+use flexspline_base::toml_file::{
+    Allowed, Problem, Refused, TomlFile, each_of, from, number, one_of, real, text, whole,
+};
 use flexspline_mechanics::drive::GeneratorKind;
-use flexspline_motion::scenario::{Leg, TableKnown, TorqueKnown};
-use serde::Deserialize;
+use flexspline_motion::scenario::{Leg, Scenario, TableKnown, TorqueKnown};
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
 
 use super::built_in::{SCENARIOS, built_in};
 use super::{Flown, FlyError};
-use flexspline_base::suggest::did_you_mean;
-use flexspline_base::toml_file::{Problem, TomlFile};
 
-/// What a file may say.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct File {
-    base: String,
-    name: Option<String>,
-    generator: Option<String>,
-    legs: Option<Vec<Vec<f64>>>,
-    acceleration_rad_s2: Option<f64>,
-    load_kg_m2: Option<f64>,
-    drag_n_m: Option<f64>,
-    damping: Option<f64>,
-    temperature_c: Option<f64>,
-    warming_k_s: Option<f64>,
-    friction: Option<f64>,
-    friction_known: Option<f64>,
-    load_fed_forward: Option<f64>,
-    torque: Option<String>,
-    torque_noise_n_m: Option<f64>,
-    table: Option<String>,
-    seed: Option<u32>,
-    load: Option<LoadFile>,
-    servo: Option<ServoFile>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct LoadFile {
-    bias_n_m: Option<f64>,
-    swing: Option<[f64; 2]>,
-    gust: Option<[f64; 2]>,
-    step: Option<[f64; 2]>,
-    gravity: Option<[f64; 2]>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ServoFile {
-    inertia_kg_m2: Option<f64>,
-    largest_n_m: Option<f64>,
-    position_hz: Option<f64>,
-    speed_hz: Option<f64>,
-    integral_hz: Option<f64>,
-    late_steps: Option<usize>,
-    encoder_bits: Option<u32>,
-    jitter_s: Option<f64>,
-}
-
+const GENERATORS: [(&str, GeneratorKind); 4] = [
+    ("two-roller", GeneratorKind::TwoRoller),
+    ("four-roller", GeneratorKind::FourRoller),
+    ("double-disc", GeneratorKind::DoubleDisc),
+    ("cam", GeneratorKind::Cam),
+];
 const TORQUES: [(&str, TorqueKnown); 4] = [
     ("on_load", TorqueKnown::OnLoad),
     ("in_mesh", TorqueKnown::InMesh),
@@ -68,215 +30,258 @@ const TABLES: [(&str, TableKnown); 3] =
 /// Temperatures of a flight, °C: what tables of HHD-95 have.
 const COLDEST_C: f64 = -60.0;
 const WARMEST_C: f64 = 80.0;
-/// Every key.
-const KEYS: [&str; 30] = [
-    "base",
-    "name",
-    "generator",
-    "legs",
-    "acceleration_rad_s2",
-    "load_kg_m2",
-    "drag_n_m",
-    "damping",
-    "temperature_c",
-    "warming_k_s",
-    "friction",
-    "friction_known",
-    "load_fed_forward",
-    "torque",
-    "torque_noise_n_m",
-    "table",
-    "seed",
-    "load.bias_n_m",
-    "load.swing",
-    "load.gust",
-    "load.step",
-    "load.gravity",
-    "servo.inertia_kg_m2",
-    "servo.largest_n_m",
-    "servo.position_hz",
-    "servo.speed_hz",
-    "servo.integral_hz",
-    "servo.late_steps",
-    "servo.encoder_bits",
-    "servo.jitter_s",
-];
 /// Slower gusts than this are none within a flight, Hz.
 const SLOWEST_GUST_HZ: f64 = 1e-3;
-/// Longest flight, s.
-const LONGEST_S: f64 = 3600.0;
+/// A flight lasts from the first to the second, s.
+const LASTS_S: [f64; 2] = [3.0, 3600.0];
+/// Torques on the load, N·m, and frequencies of them, Hz.
+const TORQUE: Allowed = from(-200.0, 200.0);
+const HZ: Allowed = from(0.0, 50.0);
 
-pub(super) fn refused(file: &str, field: &str, what: String) -> FlyError {
-    FlyError::Scenario(Problem { place: file.to_owned(), field: field.to_owned(), what })
+/// A field of a file: its path, what it is, and where its value goes.
+struct Field<'s> {
+    path: &'static str,
+    what: &'static str,
+    to: To<'s>,
 }
 
-/// Sets values that were given, within their bounds.
-struct Setter<'f> {
-    file: &'f str,
+/// Where a value goes, and which are allowed.
+enum To<'s> {
+    Name(&'s mut String),
+    Number(&'s mut f64, Allowed),
+    Pair(&'s mut [f64; 2], [Allowed; 2]),
+    Word(&'s mut u32, Allowed),
+    Count(&'s mut usize, Allowed),
+    Legs(&'s mut Vec<Leg>),
+    Generator(&'s mut GeneratorKind),
+    Torque(&'s mut TorqueKnown),
+    Table(&'s mut TableKnown),
 }
 
-impl Setter<'_> {
-    fn refused(&self, field: &str, found: impl std::fmt::Display, allowed: &str) -> FlyError {
-        refused(self.file, field, format!("found {found}, allowed: {allowed}"))
-    }
+/// Every field but `base`, in the order of a file.
+fn fields(flown: &mut Flown) -> Vec<Field<'_>> {
+    let Flown { kind, scenario, .. } = flown;
+    let Scenario { load, servo, .. } = scenario;
+    let most_late = servo.steps as f64;
+    let field = |path, what, to| Field { path, what, to };
+    let n = |path, what, to, low, high| Field { path, what, to: To::Number(to, from(low, high)) };
+    let accelerates = &mut scenario.acceleration_rad_s2;
+    let (told, known) = (&mut scenario.load_fed_forward, &mut scenario.friction_known);
+    let pulls = "weight times arm, N·m, and the output angle where it pulls forward most, rad";
+    let late = "fifths of a tick from a sample to the torque that it asks for";
+    vec![
+        field("name", "name in the results", To::Name(&mut scenario.name)),
+        field("generator", "wave generator of the drive", To::Generator(kind)),
+        field("legs", "legs: how long, s, and the rate of the output, rad/s", To::Legs(&mut scenario.legs)),
+        n("acceleration_rad_s2", "acceleration of the target between legs, rad/s²", accelerates, 1e-6, 10.0),
+        n("load_kg_m2", "inertia of the load, kg·m²", &mut scenario.load_kg_m2, 0.01, 1e3),
+        n("drag_n_m", "Coulomb drag of the output, N·m", &mut scenario.drag_n_m, 0.0, 10.0),
+        n("damping", "share of critical damping of the twist", &mut scenario.damping, 1e-4, 0.5),
+        n("temperature_c", "temperature at the beginning, °C", &mut scenario.temperature_c, COLDEST_C, WARMEST_C),
+        n("warming_k_s", "warming of the lubricant, K/s", &mut scenario.warming_k_s, -1.0, 1.0),
+        n("friction", "friction on the motor's side, times that of an eRob80", &mut scenario.friction, 0.0, 10.0),
+        n("friction_known", "share of that friction that the servo is told before", known, 0.0, 1.0),
+        n("load_fed_forward", "share of a torque known on the load that the servo is told before", told, 0.0, 1.0),
+        field("torque", "from what the torque is known in flight", To::Torque(&mut scenario.torque)),
+        n("torque_noise_n_m", "noise of that torque, N·m rms", &mut scenario.torque_noise_n_m, 0.0, 10.0),
+        field("table", "what the table knows of the unit", To::Table(&mut scenario.table)),
+        field("seed", "start of the random numbers", To::Word(&mut scenario.seed, from(0.0, f64::from(u32::MAX)))),
+        field("load.bias_n_m", "torque on the load that is always there, N·m", To::Number(&mut load.bias_n_m, TORQUE)),
+        field("load.swing", "slow swing: N·m, Hz", To::Pair(&mut load.swing, [TORQUE, HZ])),
+        field("load.gust", "gusts: N·m rms, corner in Hz", To::Pair(&mut load.gust, [from(0.0, 100.0), HZ])),
+        field("load.step", "steps up and down: N·m, period in s", To::Pair(&mut load.step, [TORQUE, from(0.0, 1e3)])),
+        field("load.gravity", pulls, To::Pair(&mut load.gravity, [TORQUE, from(-10.0, 10.0)])),
+        n("servo.inertia_kg_m2", "inertia of motor and generator, kg·m²", &mut servo.inertia_kg_m2, 1e-6, 1.0),
+        n("servo.largest_n_m", "largest torque of the motor, N·m", &mut servo.largest_n_m, 0.01, 100.0),
+        n("servo.position_hz", "bandwidth of the position loop, Hz", &mut servo.position_hz, 0.1, 100.0),
+        n("servo.speed_hz", "bandwidth of the speed loop, Hz", &mut servo.speed_hz, 0.1, 200.0),
+        n("servo.integral_hz", "corner of the integral of the speed loop, Hz", &mut servo.integral_hz, 0.0, 100.0),
+        n("servo.jitter_s", "the encoder is read up to so much too late, s", &mut servo.jitter_s, 0.0, 1e-3),
+        field("servo.late_steps", late, To::Count(&mut servo.late_steps, from(0.0, most_late))),
+        field("servo.encoder_bits", "bits in a turn of the motor", To::Word(&mut servo.encoder_bits, from(8.0, 30.0))),
+    ]
+}
 
-    fn number(&self, field: &str, to: &mut f64, found: Option<f64>, [least, most]: [f64; 2]) -> Result<(), FlyError> {
-        let Some(found) = found else { return Ok(()) };
-        if !(found >= least && found <= most) {
-            return Err(self.refused(field, found, &format!("{least} to {most}")));
+impl To<'_> {
+    /// Takes a value of a file.
+    fn take(self, value: &Spanned<DeValue<'_>>) -> Result<(), Refused> {
+        match self {
+            To::Name(to) => *to = text(value)?,
+            To::Number(to, allowed) => *to = real(&allowed, value)?,
+            To::Pair(to, allowed) => *to = pair(&allowed, value)?,
+            To::Word(to, allowed) => *to = whole(&allowed, value)?,
+            To::Count(to, allowed) => *to = whole(&allowed, value)? as usize,
+            To::Legs(to) => *to = each_of(value, "an array of [seconds, rad/s]", leg)?,
+            To::Generator(to) => *to = one_of(&GENERATORS, value)?,
+            To::Torque(to) => *to = one_of(&TORQUES, value)?,
+            To::Table(to) => *to = one_of(&TABLES, value)?,
         }
-        *to = found;
         Ok(())
     }
 
-    fn pair(
-        &self,
-        field: &str,
-        to: &mut [f64; 2],
-        found: Option<[f64; 2]>,
-        bounds: [[f64; 2]; 2],
-    ) -> Result<(), FlyError> {
-        let Some([a, b]) = found else { return Ok(()) };
-        self.number(&format!("{field}[0]"), &mut to[0], Some(a), bounds[0])?;
-        self.number(&format!("{field}[1]"), &mut to[1], Some(b), bounds[1])
+    /// The value as a file has it, and what is allowed.
+    fn shown(&self) -> (String, String) {
+        match self {
+            To::Name(name) => (format!("{name:?}"), "any text".to_owned()),
+            To::Number(value, allowed) => (format!("{value:?}"), allowed.to_string()),
+            To::Pair(values, [a, b]) => (format!("{values:?}"), format!("{a}; {b}")),
+            To::Word(value, allowed) => (value.to_string(), allowed.to_string()),
+            To::Count(value, allowed) => (value.to_string(), allowed.to_string()),
+            To::Legs(legs) => {
+                let legs: Vec<[f64; 2]> = legs.iter().map(|leg| [leg.seconds, leg.rate_rad_s]).collect();
+                (format!("{legs:?}"), format!("{} to {} s in all, -1 to 1 rad/s", LASTS_S[0], LASTS_S[1]))
+            }
+            To::Generator(kind) => named(&GENERATORS, **kind),
+            To::Torque(known) => named(&TORQUES, **known),
+            To::Table(known) => named(&TABLES, **known),
+        }
     }
+}
 
-    fn named<T: Copy>(
-        &self,
-        field: &str,
-        to: &mut T,
-        found: Option<&String>,
-        names: &[(&str, T)],
-    ) -> Result<(), FlyError> {
-        let Some(found) = found else { return Ok(()) };
-        let known = names.iter().find(|(name, _)| name == found);
-        let allowed: Vec<&str> = names.iter().map(|(name, _)| *name).collect();
-        let hint = || did_you_mean("; ", found, allowed.iter().copied());
-        *to = known.ok_or_else(|| self.refused(field, format!("{found:?}"), &(allowed.join(", ") + &hint())))?.1;
-        Ok(())
+fn named<T: PartialEq>(names: &[(&str, T)], found: T) -> (String, String) {
+    let all: Vec<&str> = names.iter().map(|(name, _)| *name).collect();
+    let name = names.iter().find(|(_, meant)| *meant == found).map_or("", |(name, _)| name);
+    (format!("{name:?}"), all.join(", "))
+}
+
+fn pair(allowed: &[Allowed; 2], value: &Spanned<DeValue<'_>>) -> Result<[f64; 2], Refused> {
+    let Some([a, b]) = value.get_ref().as_array().and_then(|array| array.get(..)) else {
+        return Err(Refused::found(value, "two numbers, [a, b]"));
+    };
+    let at = |k: usize, value| real(&allowed[k], value).map_err(|refused| refused.within(format!("[{k}]")));
+    Ok([at(0, a)?, at(1, b)?])
+}
+
+fn leg(value: &Spanned<DeValue<'_>>) -> Result<Leg, Refused> {
+    let array = value.get_ref().as_array();
+    let numbers: Vec<f64> =
+        array.into_iter().flatten().map(|value| number(value.get_ref()).unwrap_or(f64::NAN)).collect();
+    match numbers[..] {
+        [seconds, rate_rad_s] if seconds > 0.0 && rate_rad_s.abs() <= 1.0 => Ok(Leg { seconds, rate_rad_s }),
+        _ => {
+            let allowed = "[seconds, rad/s] with seconds above 0 and a rate of -1 to 1 rad/s";
+            Err(Refused::because(value, format!("found {numbers:?}, allowed: {allowed}")))
+        }
+    }
+}
+
+/// The value at a path of one or two keys.
+fn at<'t, 'i>(table: &'t DeTable<'i>, path: &str) -> Option<&'t Spanned<DeValue<'i>>> {
+    match path.split_once('.') {
+        Some((section, key)) => table.get(section)?.get_ref().as_table()?.get(key),
+        None => table.get(path),
     }
 }
 
 /// Reads a file.
 ///
 /// # Errors
-/// [`FlyError::Scenario`]: file, field, value found and what is allowed.
+/// [`FlyError::Scenario`]: file and line, field, value found and what is allowed.
 pub fn read(name: &str, text: &str) -> Result<Flown, FlyError> {
-    let mut whole = TomlFile::new(name, text);
-    if let Some(table) = whole.parse() {
-        whole.refuse_unknown_keys(&table, &KEYS, &[]);
+    let mut file = TomlFile::new(name, text);
+    let flown = file.parse().and_then(|table| read_table(&mut file, &table));
+    match (file.problems().into_iter().next(), flown) {
+        (None, Some(flown)) => Ok(flown),
+        (problem, _) => Err(FlyError::Scenario(problem.unwrap_or_else(|| Problem::of("", "no scenario")))),
     }
-    if let Some(problem) = whole.problems().into_iter().next() {
-        return Err(FlyError::Scenario(problem));
-    }
-    let file: File =
-        toml::from_str(text).map_err(|error| refused(name, "", error.to_string().trim_end().to_owned()))?;
-    let set = Setter { file: name };
-    let mut flown = built_in(&file.base).ok_or_else(|| {
-        let hint = did_you_mean("; ", &file.base, SCENARIOS);
-        set.refused("base", format!("{:?}", file.base), &(SCENARIOS.join(", ") + &hint))
-    })?;
-    if let Some(generator) = &file.generator {
-        let kind = generator.parse::<GeneratorKind>();
-        flown.kind = kind.map_err(|error| refused(name, "generator", error.to_string()))?;
-    }
-    let scenario = &mut flown.scenario;
-    if let Some(own) = &file.name {
-        scenario.name.clone_from(own);
-    }
-    if let Some(legs) = &file.legs {
-        scenario.legs.clear();
-        for (at, leg) in legs.iter().enumerate() {
-            match leg[..] {
-                [seconds, rate_rad_s] if seconds > 0.0 && rate_rad_s.abs() <= 1.0 => {
-                    scenario.legs.push(Leg { seconds, rate_rad_s });
-                }
-                _ => {
-                    let allowed = "[seconds, rad/s] with seconds above 0 and a rate of -1 to 1 rad/s";
-                    return Err(set.refused(&format!("legs[{at}]"), format!("{leg:?}"), allowed));
-                }
-            }
-        }
-        // No legs are 0 s, and not -0.
-        let seconds = scenario.seconds() + 0.0;
-        if !(3.0..=LONGEST_S).contains(&seconds) {
-            return Err(set.refused("legs", format!("{seconds} s in all"), &format!("3 to {LONGEST_S} s")));
+}
+
+fn read_table(file: &mut TomlFile<'_>, table: &DeTable<'_>) -> Option<Flown> {
+    let Some(base) = table.get("base") else {
+        file.refuse_whole("base", format!("missing; give one of {}", SCENARIOS.join(", ")));
+        return None;
+    };
+    let mut flown = file.take("base", one_of(&SCENARIOS.map(|name| (name, name)), base)).and_then(built_in)?;
+    let fields = fields(&mut flown);
+    let known: Vec<&str> = std::iter::once("base").chain(fields.iter().map(|field| field.path)).collect();
+    file.refuse_unknown_keys(table, &known, &[]);
+    for section in ["load", "servo"] {
+        if table.contains_key(section) {
+            file.section(table, section);
         }
     }
-    set.number("acceleration_rad_s2", &mut scenario.acceleration_rad_s2, file.acceleration_rad_s2, [1e-6, 10.0])?;
-    set.number("load_kg_m2", &mut scenario.load_kg_m2, file.load_kg_m2, [0.01, 1e3])?;
-    set.number("drag_n_m", &mut scenario.drag_n_m, file.drag_n_m, [0.0, 10.0])?;
-    set.number("damping", &mut scenario.damping, file.damping, [1e-4, 0.5])?;
-    set.number("temperature_c", &mut scenario.temperature_c, file.temperature_c, [COLDEST_C, WARMEST_C])?;
-    set.number("warming_k_s", &mut scenario.warming_k_s, file.warming_k_s, [-1.0, 1.0])?;
-    let ends_c = scenario.temperature_at_c(scenario.seconds());
+    for Field { path, to, .. } in fields {
+        if let Some(value) = at(table, path) {
+            file.take(path, to.take(value));
+        }
+    }
+    // What several fields decide together.
+    let scenario = &flown.scenario;
+    let mut refuse = |path: &str, what: String| match at(table, path) {
+        Some(value) => file.refuse(value.span(), path, what),
+        None => file.refuse_whole(path, what),
+    };
+    // No legs are 0 s, and not -0.
+    let seconds = scenario.seconds() + 0.0;
+    let [shortest, longest] = LASTS_S;
+    if !(shortest..=longest).contains(&seconds) {
+        refuse("legs", format!("found {seconds} s in all, allowed: {shortest} to {longest} s"));
+    }
+    let ends_c = scenario.temperature_at_c(seconds);
     if !(COLDEST_C..=WARMEST_C).contains(&ends_c) {
         let allowed = format!("a flight that ends at {COLDEST_C} to {WARMEST_C} °C");
-        return Err(set.refused("warming_k_s", format!("an end at {ends_c:.0} °C"), &allowed));
+        refuse("warming_k_s", format!("found an end at {ends_c:.0} °C, allowed: {allowed}"));
     }
-    set.number("friction", &mut scenario.friction, file.friction, [0.0, 10.0])?;
-    set.number("friction_known", &mut scenario.friction_known, file.friction_known, [0.0, 1.0])?;
-    set.number("load_fed_forward", &mut scenario.load_fed_forward, file.load_fed_forward, [0.0, 1.0])?;
-    set.number("torque_noise_n_m", &mut scenario.torque_noise_n_m, file.torque_noise_n_m, [0.0, 10.0])?;
-    set.named("torque", &mut scenario.torque, file.torque.as_ref(), &TORQUES)?;
-    set.named("table", &mut scenario.table, file.table.as_ref(), &TABLES)?;
-    scenario.seed = file.seed.unwrap_or(scenario.seed);
-    if let Some(load) = &file.load {
-        let to = &mut scenario.load;
-        let (torque, hz) = ([-200.0, 200.0], [0.0, 50.0]);
-        set.number("load.bias_n_m", &mut to.bias_n_m, load.bias_n_m, torque)?;
-        set.pair("load.swing", &mut to.swing, load.swing, [torque, hz])?;
-        set.pair("load.gust", &mut to.gust, load.gust, [[0.0, 100.0], hz])?;
-        if to.gust[0] > 0.0 && to.gust[1] < SLOWEST_GUST_HZ {
-            let allowed = format!("{SLOWEST_GUST_HZ} to 50 for gusts above 0 N.m");
-            return Err(set.refused("load.gust[1]", to.gust[1], &allowed));
-        }
-        set.pair("load.step", &mut to.step, load.step, [torque, [0.0, 1e3]])?;
-        set.pair("load.gravity", &mut to.gravity, load.gravity, [torque, [-10.0, 10.0]])?;
+    let [gust_n_m, gust_hz] = scenario.load.gust;
+    if gust_n_m > 0.0 && gust_hz < SLOWEST_GUST_HZ {
+        let allowed = format!("{SLOWEST_GUST_HZ} to 50 for gusts above 0 N.m");
+        refuse("load.gust", format!("found a corner of {gust_hz} Hz, allowed: {allowed}"));
     }
-    if let Some(servo) = &file.servo {
-        let to = &mut scenario.servo;
-        set.number("servo.inertia_kg_m2", &mut to.inertia_kg_m2, servo.inertia_kg_m2, [1e-6, 1.0])?;
-        set.number("servo.largest_n_m", &mut to.largest_n_m, servo.largest_n_m, [0.01, 100.0])?;
-        set.number("servo.position_hz", &mut to.position_hz, servo.position_hz, [0.1, 100.0])?;
-        set.number("servo.speed_hz", &mut to.speed_hz, servo.speed_hz, [0.1, 200.0])?;
-        set.number("servo.integral_hz", &mut to.integral_hz, servo.integral_hz, [0.0, 100.0])?;
-        set.number("servo.jitter_s", &mut to.jitter_s, servo.jitter_s, [0.0, 1e-3])?;
-        to.late_steps = servo.late_steps.unwrap_or(to.late_steps);
-        if to.late_steps > to.steps {
-            return Err(set.refused("servo.late_steps", to.late_steps, &format!("0 to {} fifths of a tick", to.steps)));
+    Some(flown)
+}
+
+/// A file that flies what is given, with every field, what it is and what is allowed.
+#[must_use]
+pub fn example(base: &str, mut flown: Flown) -> String {
+    let mut file = format!(
+        "# A scenario for `flexspline fly FILE`: {base}, with every field. A line that is left out is as in the \
+         scenario\n# that `base` names.\nbase = {base:?}  # {}\n",
+        SCENARIOS.join(", ")
+    );
+    let mut section = "";
+    for Field { path, what, to } in fields(&mut flown) {
+        let (of, key) = path.split_once('.').unwrap_or(("", path));
+        if of != section {
+            let _ = writeln!(file, "\n[{of}]");
+            section = of;
         }
-        to.encoder_bits = servo.encoder_bits.unwrap_or(to.encoder_bits);
-        if !(8..=30).contains(&to.encoder_bits) {
-            return Err(set.refused("servo.encoder_bits", to.encoder_bits, "8 to 30"));
-        }
+        let (value, allowed) = to.shown();
+        let _ = writeln!(file, "# {what}; allowed: {allowed}\n{key} = {value}");
     }
-    Ok(flown)
+    file
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// A key that is read and not in the list would be refused.
     #[test]
-    fn every_key_is_read() {
-        let value = |key: &str| match key {
-            "base" => "\"rover\"",
-            "name" => "\"own\"",
-            "generator" => "\"cam\"",
-            "torque" => "\"none\"",
-            "table" => "\"nominal\"",
-            "legs" => "[[2.0, 0.0], [2.0, 0.01]]",
-            "load.swing" | "load.gust" | "load.step" | "load.gravity" => "[1.0, 0.5]",
-            "seed" | "servo.late_steps" => "1",
-            "servo.encoder_bits" => "16",
-            "servo.jitter_s" | "warming_k_s" => "1e-3",
-            _ => "0.3",
-        };
-        let lines = KEYS.iter().map(|key| format!("{key} = {}\n", value(key)));
-        let found = read("own.toml", &lines.collect::<String>());
-        assert_eq!(found.unwrap().scenario.servo.speed_hz, 0.3);
+    fn an_example_is_the_scenario_and_each_of_its_lines_counts() {
+        for name in SCENARIOS {
+            let flown = built_in(name).unwrap();
+            let file = example(name, flown.clone());
+            assert_eq!(read("own.toml", &file).unwrap(), flown, "{file}");
+        }
+        let changed = example("camera", built_in("rover").unwrap());
+        let mut rover = built_in("rover").unwrap();
+        assert_eq!(read("own.toml", &changed).unwrap(), rover);
+        // No field but those listed: a scenario all of whose fields differ is told apart by its file.
+        for Field { path, to, .. } in fields(&mut rover) {
+            let before = example("rover", built_in("rover").unwrap());
+            match to {
+                To::Name(to) => to.push('2'),
+                To::Number(to, _) => *to *= 0.99,
+                To::Pair(to, _) => to[0] += 0.5,
+                To::Word(to, _) => *to += 1,
+                To::Count(to, _) => *to += 1,
+                To::Legs(to) => to[0].seconds += 1.0,
+                To::Generator(to) => *to = GeneratorKind::TwoRoller,
+                To::Torque(to) => *to = TorqueKnown::Not,
+                To::Table(to) => *to = TableKnown::Extended,
+            }
+            assert!(before.contains(&format!("{} = ", path.rsplit('.').next().unwrap())), "{path}");
+        }
+        assert_eq!(read("own.toml", &example("antenna", rover.clone())).unwrap(), rover);
     }
 
     #[test]
@@ -290,39 +295,48 @@ mod tests {
         for (text, begins) in [
             (
                 "base = \"anntena\"",
-                "own.toml: base: found \"anntena\", allowed: antenna, rover, camera, telescope; did you mean \
-                 `antenna`?",
+                "own.toml:1: base: found \"anntena\", allowed: \"antenna\", \"rover\", \"camera\", \"telescope\"; did \
+                 you mean `antenna`?",
             ),
-            ("base = \"rover\"\ndrag_n_m = -1.0", "own.toml: drag_n_m: found -1, allowed: 0 to 10"),
+            ("drag_n_m = 1.0", "own.toml: base: missing; give one of antenna, rover, camera, telescope"),
+            ("base = \"rover\"\ndrag_n_m = -1.0", "own.toml:2: drag_n_m: found -1, allowed: 0 to 10"),
+            ("base = \"rover\"\ndrag_n_m = true", "own.toml:2: drag_n_m: found true, allowed: 0 to 10"),
+            ("base = \"rover\"\nload = 3.0", "own.toml:2: load: found 3.0, allowed: a table [load]"),
+            ("base = \"rover\"\nload.swing = [1.0]", "own.toml:2: load.swing: found an array, allowed: two numbers"),
+            ("base = \"rover\"\nload.swing = [1.0, 90]", "own.toml:2: load.swing[1]: found 90, allowed: 0 to 50"),
             (
                 "base = \"rover\"\ntorque = \"mesh\"",
-                "own.toml: torque: found \"mesh\", allowed: on_load, in_mesh, current, none",
+                "own.toml:2: torque: found \"mesh\", allowed: \"on_load\", \"in_mesh\", \"current\", \"none\"",
             ),
             (
                 "base = \"rover\"\n[servo]\nencoder_bits = 40",
-                "own.toml: servo.encoder_bits: found 40, allowed: 8 to 30",
+                "own.toml:3: servo.encoder_bits: found 40, allowed: 8 to 30",
             ),
+            ("base = \"rover\"\n[servo]\nlate_steps = 6", "own.toml:3: servo.late_steps: found 6, allowed: 0 to 5"),
+            ("base = \"rover\"\nspeed = 1", "own.toml:2: speed: unknown key"),
         ] {
             let found = said(text);
             assert!(found.starts_with(begins), "{found}");
         }
-        assert!(said("base = \"rover\"\nspeed = 1").starts_with("own.toml:2: speed: "));
         let misspelt = said("base = \"rover\"\n[servo]\nencoder_bit = 20");
         assert!(misspelt.starts_with("own.toml:3: servo.encoder_bit: unknown key"), "{misspelt}");
         assert!(misspelt.contains("did you mean `servo.encoder_bits`?"), "{misspelt}");
         let hot = said("base = \"telescope\"\nwarming_k_s = 1.0");
+        assert!(hot.starts_with("own.toml:2: warming_k_s: found an end at 82 °C, allowed: "), "{hot}");
         for (text, begins) in [
             (
                 "legs = [[2.0, 0.0], [2.0, 0.0, 9.0]]",
-                "own.toml: legs[1]: found [2.0, 0.0, 9.0], allowed: [seconds, rad/s]",
+                "own.toml:2: legs[1]: found [2.0, 0.0, 9.0], allowed: [seconds, rad/s]",
             ),
-            ("legs = [[2.0, 0.0], [2.0, 1e6]]", "own.toml: legs[1]: found [2.0, 1000000.0], allowed: "),
-            ("legs = []", "own.toml: legs: found 0 s in all, allowed: 3 to 3600 s"),
-            ("load.gust = [1.0, 0.0]", "own.toml: load.gust[1]: found 0, allowed: 0.001 to 50 for gusts above 0 N.m"),
+            ("legs = [[2.0, 0.0], [2.0, 1e6]]", "own.toml:2: legs[1]: found [2.0, 1000000.0], allowed: "),
+            ("legs = []", "own.toml:2: legs: found 0 s in all, allowed: 3 to 3600 s"),
+            (
+                "load.gust = [1.0, 0.0]",
+                "own.toml:2: load.gust: found a corner of 0 Hz, allowed: 0.001 to 50 for gusts above 0 N.m",
+            ),
         ] {
             let found = said(&format!("base = \"camera\"\n{text}\n"));
             assert!(found.starts_with(begins), "{found}");
         }
-        assert!(hot.starts_with("own.toml: warming_k_s: found an end at 82 °C, allowed: "), "{hot}");
     }
 }

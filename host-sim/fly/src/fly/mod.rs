@@ -6,12 +6,13 @@
 mod built_in;
 mod error;
 mod file;
+mod own;
 mod results;
 mod varied;
 
 use flexspline_motion::flight::{Flight, JOINTS, Unit, fly_told};
 use flexspline_motion::gear::Sampled;
-use flexspline_motion::scenario::Scenario;
+use flexspline_motion::scenario::{Scenario, TableKnown};
 
 use crate::closed_loop::flight::gear::Gear;
 use crate::closed_loop::map::DenseMap;
@@ -20,7 +21,8 @@ use flexspline_mechanics::drive::{Drive, GeneratorKind};
 
 pub use built_in::{SCENARIOS, built_in};
 pub use error::FlyError;
-pub use file::read;
+pub use file::{example, read};
+pub use own::{OwnTable, OwnTableError, gear_at};
 pub use results::{ByController, LEAST_DISTANCE, LEAST_PHASE_MARGIN_DEG, Results, Row, results, spectrum};
 pub use varied::{Flight as VariedFlight, Vary, every, fly_varied};
 
@@ -31,6 +33,8 @@ pub struct Flown {
     pub kind: GeneratorKind,
     /// What is flown.
     pub scenario: Scenario,
+    /// The table whose drive is flown in the place of HHD-95.
+    pub own: Option<OwnTable>,
 }
 
 /// The maps of HHD-95 by contact FEM, at points that made no table (`examples/closed_loop.rs map`).
@@ -80,17 +84,39 @@ impl Flown {
     /// [`FlyError::Load`], [`FlyError::Flight`].
     pub fn fly_told(&self, told: &(dyn Fn() + Sync)) -> Result<Flight, FlyError> {
         self.carries()?;
-        Ok(fly_told(&self.scenario, &unit(self.kind, self.scenario.temperature_c)?, told)?)
+        let (scenario, known) = (&self.scenario, self.scenario.table);
+        let Some(own) = &self.own else {
+            return Ok(fly_told(scenario, &unit(self.kind, scenario.temperature_c)?, None, told)?);
+        };
+        let unit = own.unit(scenario.temperature_c)?;
+        // What else it may know is sampled from the unit.
+        let image = (known == TableKnown::Nominal).then(|| own.image().to_vec());
+        Ok(fly_told(scenario, &unit, image, told)?)
     }
 
-    /// Whether its generator carries its load.
+    /// The drive of this table in the place of HHD-95.
+    ///
+    /// # Errors
+    /// [`FlyError::Table`]: no gear at the scenario's temperature.
+    pub fn with_table(mut self, own: OwnTable) -> Result<Self, FlyError> {
+        own.unit(self.scenario.temperature_c)?;
+        self.kind = own.kind()?;
+        self.own = Some(own);
+        Ok(self)
+    }
+
+    /// Whether its drive carries its load.
     ///
     /// # Errors
     /// [`FlyError::Load`].
     pub fn carries(&self) -> Result<(), FlyError> {
-        let (largest_n_m, most_n_m) = (self.scenario.largest_n_m(), self.kind.rated_torque_n_m());
+        let largest_n_m = self.scenario.largest_n_m();
+        let (most_n_m, of) = match &self.own {
+            Some(own) => (own.largest_n_m()?, "this table".to_owned()),
+            None => (self.kind.rated_torque_n_m(), format!("a {} generator", self.kind)),
+        };
         if largest_n_m > most_n_m {
-            return Err(FlyError::Load { largest_n_m, most_n_m, kind: self.kind });
+            return Err(FlyError::Load { largest_n_m, most_n_m, of });
         }
         Ok(())
     }

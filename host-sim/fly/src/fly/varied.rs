@@ -3,9 +3,9 @@
 use std::fmt;
 use std::str::FromStr;
 
+use flexspline_base::toml_file::Problem;
 use serde::Serialize;
 
-use super::file::refused;
 use super::{Flown, FlyError, Results, read, results};
 
 /// A field of a scenario and the values that it gets, as a TOML file has them; a name needs no quotes.
@@ -95,7 +95,7 @@ fn changed(name: &str, text: &str, varied: &[(String, String)]) -> Result<Flown,
     }
     // What is wrong with the file itself is told with its own lines.
     read(name, text)?;
-    let mut whole: toml::Table = text.parse().map_err(|error: toml::de::Error| refused(name, "", error.to_string()))?;
+    let mut whole: toml::Table = text.parse().map_err(|error: toml::de::Error| not_toml(name, error.to_string()))?;
     for (field, value) in varied {
         let parsed = format!("value = {value}").parse::<toml::Table>().ok().and_then(|mut table| table.remove("value"));
         let value = parsed.unwrap_or_else(|| toml::Value::String(value.clone()));
@@ -114,9 +114,18 @@ fn changed(name: &str, text: &str, varied: &[(String, String)]) -> Result<Flown,
             at = inner;
         }
     }
-    let text = toml::to_string(&whole).map_err(|error| refused(name, "", error.to_string()))?;
+    let text = toml::to_string(&whole).map_err(|error| not_toml(name, error.to_string()))?;
     let values: Vec<String> = varied.iter().map(|(field, value)| format!("{field}={value}")).collect();
-    read(&format!("{name} with {}", values.join(" ")), &text)
+    let name = format!("{name} with {}", values.join(" "));
+    read(&name, &text).map_err(|error| match error {
+        // No line of this text is one that anybody wrote.
+        FlyError::Scenario(problem) => FlyError::Scenario(Problem { place: name, ..problem }),
+        other => other,
+    })
+}
+
+fn not_toml(name: &str, what: String) -> FlyError {
+    FlyError::Scenario(Problem { place: name.to_owned(), ..Problem::of("", what) })
 }
 
 /// Flies one of them; `told` is called for each second that one of its joints flew.
