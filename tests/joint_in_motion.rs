@@ -216,7 +216,11 @@ fn the_drive_of_an_own_table_flies_as_its_contact_fem_does() {
         assert_eq!(done.status.code(), Some(2), "{line}");
         String::from_utf8(done.stderr).unwrap()
     };
-    std::fs::write(folder.path().join("heavy.toml"), "base = \"camera\"\nload.bias_n_m = 180.0\n").unwrap();
+    std::fs::write(
+        folder.path().join("heavy.toml"),
+        "base = \"camera\"\n[load]\nbias_n_m = 200.0\nswing = [200.0, 0.1]\nstep = [200.0, 3.0]\n",
+    )
+    .unwrap();
     let said = refused("fly heavy.toml --tables cam.fxt");
     assert!(said.contains("N.m with this table"), "{said}");
     let said = refused("fly camera --tables cam.fxt --vary generator=cam");
