@@ -266,6 +266,51 @@ mod tests {
         state
     }
 
+    /// Before the first update nothing is said of a place; after it all is, of a play without width too.
+    #[test]
+    fn a_state_tells_its_place_from_the_first_update_on() {
+        for half in [0, 1, HALF] {
+            let mut state = PlayState::after_motion(Direction::Forward);
+            assert_eq!((state.nominal(), state.output(), state.offset_rad()), (None, None, 0.0));
+            state.shift(7);
+            assert_eq!(state, PlayState::after_motion(Direction::Forward), "nothing to be shifted yet");
+            let error = state.update(OutputAngle::from_counts(90), 40, half, true);
+            assert_eq!(error, 40 - half);
+            assert_eq!(state.nominal(), Some(OutputAngle::from_counts(90)));
+            assert_eq!(state.output(), Some(OutputAngle::from_counts(90 + 40 - half as i64)));
+            assert_eq!(state.offset_rad(), -half as f32 * RAD_PER_COUNT);
+            state.shift(7);
+            assert_eq!(state.output(), Some(OutputAngle::from_counts(90 + 40 - half as i64 + 7)));
+            assert_eq!((state.lower, state.upper), (-half, -half));
+        }
+    }
+
+    /// Without a sane half-width that of the last update holds, also where it was zero.
+    #[test]
+    fn a_play_without_width_keeps_none_through_updates_that_are_not_sane() {
+        let mut state = known();
+        let _ = state.update(OutputAngle::ZERO, 0, 0, true);
+        let error = state.update(OutputAngle::from_counts(500), 12, 34, false);
+        assert_eq!((error, state.half, state.lower, state.upper), (0, 0, 0, 0));
+    }
+
+    /// 0.05 rad and a 256th of it, twice the largest adjustment of 2²⁵ − 1 counts, and a play of 2²⁷: as in
+    /// core/c99/flexspline_table.c.
+    #[test]
+    fn a_state_is_made_of_parts_that_an_update_can_leave_alone() {
+        const MOST: i32 = 34_178_720 + 133_510 + 67_108_862 + 134_217_728;
+        let of = |error, lower, upper, half| PlayState::of(3, [error, lower, upper, half]);
+        for error in [MOST, -MOST] {
+            assert!(of(error, -HALF, HALF, HALF).is_some() && of(error + error.signum(), -HALF, HALF, HALF).is_none());
+        }
+        for side in [i32::MIN, i32::MAX] {
+            assert!(of(0, side, i32::MAX, -1).is_some() && of(0, side, i32::MAX, -2).is_none());
+        }
+        assert!(of(0, 5, i32::MAX, -1).is_none(), "no side");
+        assert!(of(0, -HALF - 1, HALF, HALF).is_none() && of(0, -HALF, HALF + 1, HALF).is_none());
+        assert!(of(0, 1, 0, HALF).is_none(), "no interval");
+    }
+
     #[test]
     fn steady_motion_lags_by_the_half_width() {
         let mut state = PlayState::unknown();

@@ -76,3 +76,17 @@ impl Bounds {
 crate::upset::upsets!(Bounds { error_rad, periodic_rad, slope, curve_slope, ripple_cells, rounding_rad });
 #[cfg(test)]
 crate::upset::upsets!(InverseBound { iterations, error_rad });
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Each iteration leaves nine tenths of the error: the eighth is the last.
+    #[test]
+    fn an_inverse_that_does_not_converge_ends_with_the_most_iterations() {
+        let slow = Bounds { periodic_rad: 1e-3, slope: 0.5, curve_slope: 0.45, ..Bounds::NONE };
+        let bound = slow.inverse(1.0);
+        assert_eq!(bound.iterations, MAX_INVERSE_ITERATIONS);
+        assert!((bound.error_rad / (1e-3 * 0.9f32.powi(8)) - 1.0).abs() < 1e-2, "{}", bound.error_rad);
+    }
+}

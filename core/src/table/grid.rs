@@ -279,6 +279,9 @@ mod tests {
         assert_eq!(jump_intervals(geometric.len(), |i| geometric[i]), 0);
         assert_eq!(jump_intervals(2, |i| geometric[i]), 0);
         assert_eq!(jump_intervals(1, |i| geometric[i]), 0);
+        // What lies beyond the last node is no interval, however narrow.
+        let beyond = [0.0, 10.0, 20.0, 20.1, 30.0];
+        assert!(!jump_at(2, 3, |i| beyond[i]) && jump_at(2, 5, |i| beyond[i]));
     }
 
     #[test]

@@ -98,3 +98,20 @@ crate::upset::upsets!(Plan {
     cell_width,
     play_ripple
 });
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plan_is_simple_with_a_ripple_one_iteration_and_no_curve() {
+        let simple = Plan { iterations: 1, ripple_nodes: 8, ..Plan::default() };
+        assert!(simple.is_simple());
+        for curve in 0..3 {
+            let mut plan = simple;
+            plan.curves[curve] = 4 << 16;
+            assert!(plan.has_curves() && !plan.is_simple());
+        }
+        assert!(!Plan { iterations: 2, ..simple }.is_simple() && !Plan { ripple_nodes: 0, ..simple }.is_simple());
+    }
+}

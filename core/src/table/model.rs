@@ -478,6 +478,21 @@ mod tests {
         assert!(!state.is_known());
     }
 
+    /// Between both flanks no answer is given where one of them is beyond the limit.
+    #[test]
+    fn the_middle_of_a_play_needs_both_flanks() {
+        let mut table = table();
+        let target = table.drive.nominal_output(angle(1.0));
+        let aim = |table: &Table<'_>, approach: Approach<'_>| table.inverse(target, 20.0, 20.0, approach);
+        let [forward, backward] = [Direction::Forward, Direction::Backward].map(Approach::Moving);
+        let [near, far] = [forward, backward].map(|to| (aim(&table, to).predicted_error_rad / RAD_PER_COUNT) as i32);
+        assert!(0 < near && near < far);
+        table.plan.limit = (near + far) / 2;
+        assert_ne!(aim(&table, forward).quality, Quality::Disabled);
+        assert_eq!(aim(&table, backward).quality, Quality::Disabled);
+        assert_eq!(aim(&table, Approach::From(&PlayState::unknown())).quality, Quality::Disabled);
+    }
+
     #[test]
     fn a_reversal_commands_the_whole_play_and_a_hold_nothing() {
         let table = table();

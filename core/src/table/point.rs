@@ -150,3 +150,39 @@ impl OperatingPoint {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(mean: f32, half_width: f32) -> OperatingPoint {
+        let place = TorquePlace { weight: 0.0, width: 1.0, jump: false };
+        OperatingPoint::new(place, [[mean, 0.0, half_width]; 2], [0; 2], (0, 0), (true, true), Doubt(0))
+    }
+
+    /// H is taken down to what the ripple needs, or not at all where it is there already; up by all of it.
+    #[test]
+    fn an_adjustment_takes_the_play_no_further_down_than_the_ripple_needs() {
+        let plan = Plan { play_ripple: 30, ..Plan::default() };
+        for (before, change, after) in [(100, -60, 40), (100, -90, 30), (20, -15, 20), (20, 5, 25), (100, 7, 107)] {
+            let adjusted = point(50.0, before as f32).adjusted(&plan, -8, change);
+            assert_eq!((adjusted.mean, adjusted.half_width), (42, after), "{before} {change}");
+        }
+    }
+
+    /// What was added is allowed on top of the table's limit: to the centre, and to the flank that is asked for.
+    #[test]
+    fn an_adjusted_point_allows_what_was_added_and_no_more() {
+        let plan = Plan { limit: 1000, ..Plan::default() };
+        let adjusted = point(0.0, 100.0).adjusted(&plan, 5, 7);
+        for (backward, least, most) in [(false, -1002, 998), (true, -988, 1012)] {
+            for (error, allowed) in [(least - 1, false), (least, true), (most, true), (most + 1, false)] {
+                assert_eq!(adjusted.allows_error(&plan, error, backward), allowed, "{error} {backward}");
+            }
+        }
+        for (centre, half, allowed) in [(605, 407, true), (605, 408, false), (-595, 407, true), (-596, 407, false)] {
+            assert_eq!(adjusted.allows(&plan, centre, half), allowed, "{centre} {half}");
+        }
+        assert_eq!(adjusted.most(&plan), 1012);
+    }
+}
