@@ -17,6 +17,7 @@ mod cli;
 mod cli_files;
 mod cli_terminal;
 mod closed_loop;
+mod completed_from_data_sheet;
 mod contact_patch;
 mod docs_commands;
 mod element_patch_and_rates;

@@ -1280,6 +1280,13 @@ enum FlexsplineStatus flexspline_image_report(const uint8_t *image,
                                               size_t image_bytes,
                                               struct FlexsplineImageReport *report);
 
+// How far units scatter about a table that a data sheet completed, as a share s of their stiffness: 0.3 of `+-30 %`; 0
+// of any other table. What the table says of wind-up may be off by s / (1 - s) of it, which no tick states. Checks the
+// image in full, as [`flexspline_image_report`] does.
+enum FlexsplineStatus flexspline_image_sheet_scatter(const uint8_t *image,
+                                                     size_t image_bytes,
+                                                     float *scatter);
+
 // Makes a learner of 1 to `FLEXSPLINE_LEARNER_COEFFICIENTS` coefficients that has learnt nothing yet and is off;
 // `FLEXSPLINE_STATUS_ARGUMENT` if a setting is out of its range. An update takes as long with one as with all.
 enum FlexsplineStatus flexspline_learner_init(struct FlexsplineLearner *learner,

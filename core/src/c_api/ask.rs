@@ -251,3 +251,22 @@ pub extern "C" fn flexspline_image_report(
     };
     status(tell())
 }
+
+/// How far units scatter about a table that a data sheet completed, as a share s of their stiffness: 0.3 of `+-30 %`; 0
+/// of any other table. What the table says of wind-up may be off by s / (1 - s) of it, which no tick states. Checks the
+/// image in full, as [`flexspline_image_report`] does.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_image_sheet_scatter(
+    image: *const u8,
+    image_bytes: usize,
+    scatter: *mut f32,
+) -> FlexsplineStatus {
+    let tell = || {
+        usable(scatter)?;
+        let read = bytes(image, image_bytes)?;
+        apart([(image as usize, image_bytes), span(scatter)])?;
+        let table = Table::check(read).map_err(image_status)?;
+        give(scatter, table.sheet_scatter().unwrap_or(0.0))
+    };
+    status(tell())
+}

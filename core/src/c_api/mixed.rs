@@ -413,6 +413,10 @@ fn an_image_tells_what_it_is() {
         assert_eq!(flexspline_image_report(image.as_ptr(), image.len(), inside), Overlap);
     }
     assert_eq!(flexspline_image_report(null(), 9, &mut report), Pointer);
+    let mut scatter = f32::NAN;
+    assert_eq!(flexspline_image_sheet_scatter(image.as_ptr(), image.len(), &mut scatter), Done);
+    assert_eq!(table.sheet_scatter().unwrap_or(0.0), scatter);
+    assert_eq!(flexspline_image_sheet_scatter(null(), 9, &mut scatter), Pointer);
     image[900] ^= 1;
     assert_eq!(flexspline_image_report(image.as_ptr(), image.len(), &mut report), FlexsplineStatus::Image);
 }

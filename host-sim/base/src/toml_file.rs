@@ -352,6 +352,11 @@ pub fn whole(allowed: &Allowed, value: &Spanned<DeValue>) -> Result<u32, Refused
     Ok(in_range(allowed, value, whole)? as u32)
 }
 
+/// True or false.
+pub fn yes_or_no(value: &Spanned<DeValue>) -> Result<bool, Refused> {
+    value.get_ref().as_bool().ok_or_else(|| Refused::found(value, "true or false"))
+}
+
 /// A word.
 pub fn text(value: &Spanned<DeValue>) -> Result<String, Refused> {
     value.get_ref().as_str().map(str::to_owned).ok_or_else(|| Refused::found(value, "a string"))

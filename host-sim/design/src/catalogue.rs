@@ -12,7 +12,7 @@ use crate::stated::Stated;
 /// One line for each size and ratio; an empty cell is not printed.
 const SIZES: &str = include_str!("catalogue.csv");
 /// How far single units are off the printed stiffness, ± percent.
-const UNIT_SCATTER_PERCENT: f64 = 30.0;
+pub(crate) const UNIT_SCATTER_PERCENT: f64 = 30.0;
 
 /// A series of cups.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -71,13 +71,7 @@ impl Stiffness {
         let largest_n_m = f64::from(table.torque_nodes_n_m().last()?);
         let loads = Loads::up_to(largest_n_m);
         let touch = touch_n_m(drive, loads);
-        let temperature = drive.temperature.reference_c as f32;
-        let torsion = |torque: f64| -> Option<f64> {
-            let at =
-                |direction| table.steady_error_rad(GeneratorAngle::default(), torque as f32, temperature, direction);
-            let [forward, backward] = [at(Direction::Forward)?, at(Direction::Backward)?];
-            Some(0.5 * (f64::from(forward) + f64::from(backward)))
-        };
+        let torsion = |torque: f64| torsion_rad(drive, table, torque);
         let secant = |from: f64, to: f64| Some((to - from) / (torsion(to)? - torsion(from)?)).filter(|k| k.is_finite());
         (touch < loads.t1_n_m).then_some(())?;
         Some(Stiffness {
@@ -87,6 +81,14 @@ impl Stiffness {
             k3_n_m_per_rad: secant(loads.t2_n_m, largest_n_m)?,
         })
     }
+}
+
+/// Torsion of the output by a table at reference temperature, rad: in the middle between both directions of motion.
+pub(crate) fn torsion_rad(drive: &Drive, table: &Table<'_>, torque_n_m: f64) -> Option<f64> {
+    let temperature = drive.temperature.reference_c as f32;
+    let at = |direction| table.steady_error_rad(GeneratorAngle::default(), torque_n_m as f32, temperature, direction);
+    let [forward, backward] = [at(Direction::Forward)?, at(Direction::Backward)?];
+    Some(0.5 * (f64::from(forward) + f64::from(backward)))
 }
 
 /// A light touch, N·m.

@@ -18,7 +18,7 @@
 use serde::Serialize;
 
 use crate::data_sheet::{DataSheet, Loads, data_sheet};
-use flexspline_base::toml_file::{Allowed, TomlFile, above, from, real, text};
+use flexspline_base::toml_file::{Allowed, TomlFile, above, from, real, text, yes_or_no};
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::drive::{Drive, DriveError, GeneratorKind};
 use flexspline_mechanics::motion::Motion;
@@ -37,7 +37,7 @@ const STEPS: u32 = 4;
 const STARTING_STEPS: usize = 6;
 
 /// Every key of `[data_sheet]`.
-pub const KEYS: [&str; 13] = [
+pub const KEYS: [&str; 14] = [
     "source",
     "rated_torque_n_m",
     "t1_n_m",
@@ -51,6 +51,7 @@ pub const KEYS: [&str; 13] = [
     "starting_torque_n_m",
     "accuracy_arcmin",
     "unit_scatter_percent",
+    "completes_model",
 ];
 
 /// The section as a comment, for files to be filled in.
@@ -70,6 +71,7 @@ pub const TEMPLATE: &str = "
 # starting_torque_n_m = 0.0
 # accuracy_arcmin = 0.0
 # unit_scatter_percent = 30.0  # how far units scatter about K1, K2, K3, if the catalogue says so
+# completes_model = true       # tables takes the compliance and loss that the FEM lacks from here
 ";
 
 /// What a data sheet says.
@@ -101,6 +103,9 @@ pub struct Stated {
     pub accuracy_arcmin: Option<f64>,
     /// How far units scatter about the stiffness and the torques of the sheet, ± percent.
     pub unit_scatter_percent: Option<f64>,
+    /// Whether tables take from here what the FEM lacks.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub completes_model: Option<bool>,
 }
 
 impl Stated {
@@ -152,8 +157,10 @@ impl Stated {
             starting_torque_n_m: number("starting_torque_n_m", &TORQUE),
             accuracy_arcmin: number("accuracy_arcmin", &ARCMIN),
             unit_scatter_percent: number("unit_scatter_percent", &PERCENT),
+            completes_model: None,
         };
         stated.source = section.given(file, "source", text);
+        stated.completes_model = section.given(file, "completes_model", yes_or_no);
         // The rated torque may be below T2: catalogues have it so for some sizes at ratio 50 (CSG-32-50 and CSG-40-50).
         for (name, above) in [("t2", stated.t2_n_m), ("rated_torque", stated.rated_torque_n_m)] {
             if let (Some(t1), Some(above)) = (stated.t1_n_m, above)

@@ -136,14 +136,18 @@ impl<'a> DriveKnown<'a> {
 
     /// The table against the frames of the animation, which made no table.
     fn check_fresh(&self) -> Option<[f64; 2]> {
-        let animation = self.subject.animation.as_ref().ok().filter(|_| self.is_fem())?;
+        // What a data sheet added is known from what made the table alone.
+        let is_bare = self.subject.info.is_some() || self.subject.table.sheet_scatter().is_none();
+        let animation = self.subject.animation.as_ref().ok().filter(|_| self.is_fem() && is_bare)?;
         let misses: Vec<f64> = animation
             .rows
             .iter()
             .map(|row| {
                 let table =
                     self.error(row.generator_rad, row.torque_n_m as f32, row.temperature_c as f32, Direction::Forward);
-                table - row.error_arcsec
+                let added = self.subject.info.and_then(|info| info.completed.as_ref());
+                let added_rad = added.map_or(0.0, |added| added.spring.torsion_rad(row.torque_n_m));
+                table - row.error_arcsec - added_rad * ARCSEC_PER_RAD
             })
             .collect();
         let rms = (misses.iter().map(|m| m * m).sum::<f64>() / misses.len() as f64).sqrt();

@@ -142,6 +142,40 @@ impl UnderLoad {
 }
 
 impl New {
+    /// The drive like a size of a catalogue, as its file would have it, with every `--set`, and its data sheet.
+    pub(super) fn like(
+        context: &Context,
+        name: &str,
+        generators: &[GeneratorKind],
+    ) -> Result<(Drive, Option<Stated>), Failure> {
+        let generator = if let [one] = generators { *one } else { GeneratorKind::Cam };
+        let new = New {
+            file: PathBuf::new(),
+            kind: Some(NewKind::Drive),
+            from: None,
+            teeth: None,
+            module: None,
+            ratio: None,
+            bore: None,
+            width: None,
+            generator,
+            like: Some(name.to_owned()),
+            force: false,
+            no_run: false,
+        };
+        let Some((name, few)) = new.few()? else { return Ok((context.drive()?, None)) };
+        let mut made = few.drive(&name).map_err(|error| refused(&error, true))?;
+        let sheet = new.sheet();
+        new.under_load(context, &mut made, sheet.as_ref())?;
+        Ok((context.with_sets(made.drive)?, sheet))
+    }
+
+    /// The data sheet of the size that the drive is like, or of the nearest ratio of that size.
+    fn sheet(&self) -> Option<Stated> {
+        let (series, size, ratio) = self.like.as_deref().and_then(size_and_ratio)?;
+        catalogue::nearest_sheet(series, size, ratio).map(|(stated, _)| stated)
+    }
+
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         let few = self.few()?;
         let made = match few {
@@ -157,9 +191,7 @@ impl New {
         };
         self.check()?;
         let kind = self.kind.unwrap_or_else(|| self.kind_by_name());
-        let sized = self.like.as_deref().and_then(size_and_ratio).filter(|_| kind == NewKind::Drive);
-        let data_sheet = sized.and_then(|(series, size, ratio)| catalogue::nearest_sheet(series, size, ratio));
-        let data_sheet = data_sheet.map(|(stated, _)| stated);
+        let data_sheet = self.sheet().filter(|_| kind == NewKind::Drive);
         let mut made = made;
         let under_load = match &mut made {
             Some(made) if kind == NewKind::Drive && !self.no_run => {

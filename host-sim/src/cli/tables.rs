@@ -12,18 +12,20 @@ use serde::Serialize;
 
 use super::context::{Context, quoted};
 use super::names::{self, Generators};
+use super::new::New;
 use super::simulate::{refused_or_failed, stress};
 use super::{Failure, report, say};
 use flexspline_base::output::Outputs;
 use flexspline_base::spent::Spent;
 use flexspline_base::units::ARCSEC_PER_RAD;
+use flexspline_design::catalogue;
 use flexspline_design::cautions::add_stress;
 use flexspline_design::simulate::{Path, PlaceStress, SimulationSettings, simulate};
-use flexspline_design::stated::{TWO_SETS_OF_K, beside};
+use flexspline_design::stated::{Stated, TWO_SETS_OF_K, beside};
 use flexspline_design::tables::sweep::SweepProgress;
 use flexspline_design::tables::{
-    MadeTable, MakeError, SampleOptions, Source, TableInfo, TableProgress, TableSettings, TorqueNodes, c_header,
-    from_samples, make, rust_source, samples,
+    CompletionError, MadeTable, MakeError, SampleOptions, SheetStiffness, Source, TableInfo, TableProgress,
+    TableSettings, TorqueNodes, c_header, from_samples, make, rust_source, samples,
 };
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
@@ -45,6 +47,7 @@ Examples:
   flexspline tables --generator cam --drive my-drive.toml --out tables
   flexspline tables --generator cam --from-samples bench.csv
   flexspline tables --generator cam --mesh coarse --stress
+  flexspline tables --generator cam --like CSF-25-100 --complete-from-data-sheet
   flexspline tables --generator double-disc --positions 12 --node-tolerance-arcsec 0.2
 
 Sample files have the columns generator_rad, torque_n_m, temperature_c, direction (1 or -1) and
@@ -94,10 +97,20 @@ pub(super) struct Tables {
     /// more pitch and three meshes for each generator
     #[arg(long, conflicts_with = "from_samples")]
     stress: bool,
+    /// Add to the FEM what it lacks of the stiffness in [data_sheet] (T1, T2, K1, K2, K3) as a spring in series, and of
+    /// the hysteresis loss as springs that slip; marked in all files, and drive-completed.toml written beside them
+    #[arg(long, conflicts_with = "from_samples")]
+    complete_from_data_sheet: bool,
+    /// Instead of --drive: a drive like a size of a catalogue, as `new --like` makes it, with its data sheet
+    #[arg(long, value_name = "NAME", requires = "complete_from_data_sheet")]
+    like: Option<String>,
     /// Do not write report.html, which takes a FEM run over one more tooth pitch for each generator
     #[arg(long)]
     no_report: bool,
 }
+
+/// The drive's file beside tables that a data sheet completed.
+const COMPLETED_DRIVE: &str = "drive-completed.toml";
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -114,14 +127,21 @@ struct TablesReport<'a> {
 
 impl Tables {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
-        let drive = context.drive()?;
         let generators = self.generator.0.as_slice();
+        let (drive, stated) = match &self.like {
+            Some(_) if context.has_drive() => {
+                return Err(Failure::BadInput("--like: found it beside --drive; give one of the two".to_owned()));
+            }
+            Some(name) => New::like(context, name, generators)?,
+            None => (context.drive()?, context.stated()?),
+        };
+        let sheet = self.sheet(stated.as_ref())?;
         if !self.no_report {
             report::before(context, context.out_path(), "tables", Some(&drive));
         }
         let tried = match &self.from_samples {
             Some(file) => vec![self.project(&drive, generators, file)],
-            None => self.sweep(context, &drive, generators)?,
+            None => self.sweep(context, &drive, generators, sheet.as_ref())?,
         };
         // One generator that fails takes no other's table away.
         let (mut made, mut failed) = (Vec::new(), Vec::new());
@@ -134,7 +154,6 @@ impl Tables {
         if made.is_empty() {
             return Err(failed.swap_remove(0).1);
         }
-        let stated = context.stated()?;
         if let (Some(stated), None) = (&stated, &self.from_samples) {
             let settings = SolverSettings { method: self.solver, mesh: self.mesh, ..SolverSettings::default() };
             let reference_c = drive.temperature.reference_c;
@@ -164,9 +183,15 @@ impl Tables {
             outputs.json(&path("json"), &table.info)?;
             outputs.file(&path("rs"), |file| file.write_all(rust_source(table).as_bytes()))?;
             outputs.file(&path("h"), |file| file.write_all(c_header(table).as_bytes()))?;
-            if let Some(samples) = &table.samples {
+            if let Some(samples) = &table.fem_samples() {
                 outputs.file(&path("samples.csv"), |file| file.write_all(samples::to_csv(samples).as_bytes()))?;
             }
+        }
+        let completed =
+            stated.as_ref().filter(|_| sheet.is_some()).map(|stated| completed_drive(&drive, stated, &made));
+        let completed_path = out.join(COMPLETED_DRIVE);
+        if let Some(text) = &completed {
+            outputs.file(&completed_path, |file| file.write_all(text.as_bytes()))?;
         }
         let page = if self.no_report { None } else { Some(self.page(context, &drive, &made)?) };
         if let Some(page) = &page {
@@ -186,7 +211,11 @@ impl Tables {
             let tables = quoted(&out.display().to_string());
             let next = format!("validate --tables {tables}");
             let next = if generators.len() == 1 { format!("{next} --generator {}", generators[0]) } else { next };
-            text(&report, out, page.is_some()) + &say::next(&[context.next(&next)])
+            let next = match &completed {
+                Some(_) => format!("flexspline {next} --drive {}", quoted(&completed_path.display().to_string())),
+                None => context.next(&next),
+            };
+            text(&report, out, page.is_some()) + &say::next(&[next])
         })?;
         if !failed.is_empty() {
             let why = |(kind, failure): &(&GeneratorKind, Failure)| match failure {
@@ -265,8 +294,25 @@ impl Tables {
         from_samples(drive, kind, &read, &name, &bytes, options).map_err(|e| bad(format!("{name}: {e}")))
     }
 
-    fn settings(&self, drive: &Drive, kind: GeneratorKind) -> Result<TableSettings, Failure> {
+    /// The data sheet that completes the tables, where it is asked for, here or in the drive's file.
+    fn sheet(&self, stated: Option<&Stated>) -> Result<Option<SheetStiffness>, Failure> {
+        let by_file = stated.is_some_and(|stated| stated.completes_model == Some(true));
+        if self.from_samples.is_some() || !(self.complete_from_data_sheet || by_file) {
+            return Ok(None);
+        }
+        let no_sheet = || CompletionError::NoSheet { sizes: catalogue::sizes_in_words() };
+        let sheet = stated.ok_or_else(no_sheet).and_then(SheetStiffness::of);
+        sheet.map(Some).map_err(|error| Failure::BadInput(error.to_string()))
+    }
+
+    fn settings(
+        &self,
+        drive: &Drive,
+        kind: GeneratorKind,
+        sheet: Option<&SheetStiffness>,
+    ) -> Result<TableSettings, Failure> {
         let mut settings = TableSettings::for_generator(drive, kind);
+        settings.sheet = sheet.cloned();
         settings.solver = SolverSettings { method: self.solver, mesh: self.mesh, ..settings.solver };
         settings.positions = usize::from(self.positions);
         if let TorqueNodes::Chosen(choice) = &mut settings.torque_nodes {
@@ -293,15 +339,24 @@ impl Tables {
         context: &Context,
         drive: &Drive,
         generators: &[GeneratorKind],
+        sheet: Option<&SheetStiffness>,
     ) -> Result<Vec<Result<MadeTable, Failure>>, Failure> {
         let wanted = generators
             .iter()
-            .map(|kind| Ok((*kind, self.settings(drive, *kind)?)))
+            .map(|kind| Ok((*kind, self.settings(drive, *kind, sheet)?)))
             .collect::<Result<Vec<_>, Failure>>()?;
         // Before there is much work.
         context.out()?;
         Ok(by_fem(context, drive, &wanted))
     }
+}
+
+/// The drive's file with the sheet that completed its tables, and what was added as comments: tables made of it are
+/// completed again.
+fn completed_drive(drive: &Drive, stated: &Stated, made: &[MadeTable]) -> String {
+    let stated = Stated { completes_model: Some(true), ..stated.clone() };
+    let added = made.iter().filter_map(|table| Some(table.info.completed.as_ref()?.to_toml(&table.info.generator)));
+    drive.to_toml() + &stated.to_toml() + &added.collect::<String>()
 }
 
 /// Tables by FEM, several at once, with one bar for all of them.

@@ -13,6 +13,7 @@ use super::context::{Context, image_file, quoted};
 use super::names::{self, Generators};
 use super::{Failure, report, say};
 use flexspline_base::output::Outputs;
+use flexspline_design::tables::MissingSpring;
 use flexspline_design::tables::validate::{
     MAX_BOUND_ARCSEC, RMS_BOUND_ARCSEC, ValidateError, Validation, ValidationSettings, check_drive, generator_of,
     validate,
@@ -28,7 +29,8 @@ use flexspline_report::{Sources, Subject, drive_report};
 /// Torques, temperatures, directions and positions are drawn between the nodes of each table. The FEM settles the drive
 /// there, and the table is read by the code that firmware links. One run is reversed through the backlash. Exit code 1
 /// if a table differs from the FEM by more than 0.5 arcsec rms or 2 arcsec at any point. The table of a drive with
-/// imperfections is checked over whole turns, and may differ in addition by 1.5 times its own stated error.
+/// imperfections is checked over whole turns, and may differ in addition by 1.5 times its own stated error. Of a table
+/// that a data sheet completed, what the sheet added is added to the FEM: its JSON says what.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -80,6 +82,22 @@ struct ValidationReport {
     tables: Vec<Validation>,
 }
 
+/// What a data sheet added to a table, which the FEM does not have: told in the JSON beside the image.
+fn added_spring(path: &Path, image: &[u8]) -> Result<Option<MissingSpring>, Failure> {
+    let Some(table) = Table::check(image).ok().filter(|table| table.sheet_scatter().is_some()) else { return Ok(None) };
+    let json = path.with_extension("json");
+    let told = std::fs::read(&json).ok().and_then(|bytes| serde_json::from_slice::<serde_json::Value>(&bytes).ok());
+    let told = told.filter(|told| told["table_id"] == table.id().to_string());
+    let spring = told.and_then(|mut told| serde_json::from_value(told["completed"]["spring"].take()).ok());
+    spring.map(Some).ok_or_else(|| {
+        let (path, json) = (path.display(), json.display());
+        Failure::BadInput(format!(
+            "{path}: a data sheet completed this table, and what it added is in {json}, which is missing or of another \
+             table; allowed: both files as `flexspline tables` wrote them"
+        ))
+    })
+}
+
 impl Validate {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         let drive = context.drive()?;
@@ -99,7 +117,9 @@ impl Validate {
             positions: usize::from(self.positions),
             seed: self.seed,
             solver: SolverSettings { method: self.solver, mesh: self.mesh, ..SolverSettings::default() },
+            spring: None,
         };
+        let springs = images.iter().map(|(path, image)| added_spring(path, image)).collect::<Result<Vec<_>, _>>()?;
         let progress = Mutex::new((context.progress("validate"), vec![(0, 0); images.len()]));
         let tables = images
             .par_iter()
@@ -107,6 +127,7 @@ impl Validate {
             .map(|(k, (path, image))| {
                 let refuse = |what: String| Failure::BadInput(format!("{}: {what}", path.display()));
                 let table = Table::check(image).map_err(|error| refuse(error.to_string()))?;
+                let settings = ValidationSettings { spring: springs[k], ..settings };
                 validate(&drive, &table, &settings, &mut |done, total| {
                     if let Ok(mut guard) = progress.lock() {
                         let (bar, counts) = &mut *guard;

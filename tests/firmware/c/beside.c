@@ -225,6 +225,10 @@ int beside(const FlexsplineImages *table, int ticks, uint32_t *found)
     FlexsplineImageReport image;
     if (flexspline_image_report(table->first, table->first_bytes, &image) || image.flexspline_teeth != 188)
         return 21;
+    // No data sheet completed this table.
+    float scatter = 1.0f;
+    if (flexspline_image_sheet_scatter(table->first, table->first_bytes, &scatter) || scatter != 0.0f)
+        return 21;
     if (flexspline_store_init(&store) || flexspline_joint_init(&joint, &settings) || flexspline_state_init(&state) ||
         flexspline_store_activate(&store, &joint, table, 20.0f) || flexspline_state_request(&state, FLEXSPLINE_MODE_TRACKING))
         return 22;

@@ -774,7 +774,12 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
                 let to = memory.answer(choices, &[]);
                 let image = &BASES[choices.below(3)];
                 let length = if choices.any() { image.len() } else { choices.below(image.len()) };
-                (c::flexspline_image_report(image.as_ptr(), length, to.pointer) as u32, to.usable, false)
+                let status = if choices.any() {
+                    c::flexspline_image_report(image.as_ptr(), length, to.pointer)
+                } else {
+                    c::flexspline_image_sheet_scatter(image.as_ptr(), length, to.pointer.cast())
+                };
+                (status as u32, to.usable, false)
             }
             _ => {
                 let (length, page) = (choices.below(8 * BUFFER_WORDS + 1), choices.below(40) as u8);

@@ -4,9 +4,13 @@ use super::layout::{
     BYTE_ORDER_MARK, FORMAT_VERSION, HEADER_BYTES, ID_OFFSET, MAGIC, PAGE_BYTES, RESERVED, TEXT_BYTES, image_bytes,
 };
 use super::sums::{page_intact, page_of};
+use crate::angle::RAD_PER_COUNT;
 use crate::drive::{Drive, FixedMember};
 use crate::error::{Field, ImageError};
 use crate::table::{Table, TableId};
+
+/// What the mesh level of a table that a data sheet completed ends with, before the percent that units scatter.
+const SHEET_MARK: &[u8] = b", sheet +-";
 
 /// Reads fields of the header; the offsets are all inside it.
 #[derive(Clone, Copy)]
@@ -90,6 +94,48 @@ impl<'a> Table<'a> {
     #[must_use]
     pub fn mesh_level(&self) -> &'a str {
         self.header().text(80, Field::MeshLevel).unwrap_or_default()
+    }
+
+    /// How far units scatter about a table that a data sheet completed, as a share of their stiffness: what ends its
+    /// [mesh level](Self::mesh_level), `, sheet +-30 %`, as 0.3. `None` of a table that holds what its samples had.
+    #[must_use]
+    pub fn sheet_scatter(&self) -> Option<f32> {
+        let text = self.mesh_level().as_bytes().strip_suffix(b" %")?;
+        let digits = text.iter().rev().take_while(|byte| byte.is_ascii_digit()).take(2).count();
+        let (mark, digits) = text.split_at_checked(text.len().saturating_sub(digits))?;
+        let percent = digits.iter().fold(0u8, |sum, byte| {
+            let digit = byte.saturating_sub(b'0');
+            sum.saturating_mul(10).saturating_add(digit)
+        });
+        (percent > 0 && mark.ends_with(SHEET_MARK)).then(|| 0.01 * f32::from(percent))
+    }
+
+    /// How far wind-up may be off at a torque and temperature where units scatter about a data sheet, ± rad: of a unit
+    /// that is softer by the [scatter](Self::sheet_scatter) `s`, the part `s / (1 - s)` of the wind-up from first
+    /// contact on. 0 of a table that no data sheet completed, or where torque or temperature are no numbers.
+    ///
+    /// Beside a tick, not in it: to be added to the uncertainty that a tick states.
+    #[must_use]
+    pub fn sheet_uncertainty_rad(&self, torque_n_m: f32, temperature_c: f32) -> f32 {
+        let scatter = self.sheet_scatter().unwrap_or(0.0);
+        let mean = |torque: f32| self.at(torque, temperature_c).map_or(0, |point| point.mean);
+        // What the mean jumps by is the play that a load takes up.
+        let touch = self.first_contact_n_m(torque_n_m);
+        let wind_up = mean(torque_n_m).saturating_sub(touch.map_or(0, mean));
+        scatter / (1.0 - scatter) * (wind_up as f32 * RAD_PER_COUNT).abs()
+    }
+
+    /// The torque node beyond the last jump on the way from zero to a torque: where the flanks touch. The torque itself
+    /// inside a jump about zero; `None` where there is no jump on the way.
+    fn first_contact_n_m(&self, torque_n_m: f32) -> Option<f32> {
+        let back = torque_n_m < 0.0;
+        let jumps = self.torque_nodes_n_m().zip(self.torque_nodes_n_m().skip(1)).enumerate();
+        let beyond = jumps.filter(|(node, _)| self.is_torque_jump(*node)).map(|(_, (low, high))| {
+            let far = if back { -low } else { high };
+            far.min(torque_n_m.abs())
+        });
+        let touch = beyond.filter(|far| *far > 0.0).fold(0.0, f32::max);
+        (touch > 0.0).then_some(if back { -touch } else { touch })
     }
 
     /// Relative residual the solver reached; 0 for measured samples.

@@ -466,6 +466,59 @@ fn short_axes_give_flat_tables() {
     }
 }
 
+/// Only the mark as the host writes it is one; what units are off their wind-up then is stated, at torques that are
+/// numbers, and of no other table.
+#[test]
+fn a_table_that_a_data_sheet_completed_says_how_far_units_scatter() {
+    let of = |mesh_level: &str| {
+        let image = write(&data(), &Provenance { mesh_level, ..provenance() }).unwrap();
+        let table = Table::check(&image).unwrap();
+        let wind_up = table.at(1.0, 40.0).unwrap().mean_rad().abs();
+        let not_finite = table.sheet_uncertainty_rad(f32::NAN, 20.0);
+        (table.sheet_scatter(), table.sheet_uncertainty_rad(1.0, 40.0), wind_up, not_finite)
+    };
+    for (mesh, scatter) in [("standard, sheet +-30 %", 0.3f32), ("fine, sheet +-5 %", 0.05)] {
+        let (found, uncertainty, wind_up, not_finite) = of(mesh);
+        assert!(found.is_some_and(|found| (found - scatter).abs() < 1e-6), "{found:?}");
+        // A unit that is softer by s winds up 1 / (1 - s) times as far.
+        assert!(wind_up > 1e-6 && (uncertainty - (1.0 / (1.0 - scatter) - 1.0) * wind_up).abs() < 1e-9);
+        assert_eq!(not_finite, 0.0);
+    }
+    // The play that a load takes up is no wind-up, on either side.
+    let jumps = TableData {
+        torque_nodes_n_m: &[-20.0, -2.01, -1.99, 1.99, 2.01, 20.0],
+        temperature_nodes_c: &[20.0],
+        ripple_nodes: 0,
+        mean_rad: &[-5e-4, -2e-4, 0.0, 0.0, 2e-4, 5e-4],
+        half_width_rad: &[1e-4; 6],
+        mean_ripple_rad: &[],
+        half_width_ripple_rad: &[],
+        generator_curve_rad: &[],
+        material_curve_rad: &[],
+        output_curve_rad: &[],
+        ..data()
+    };
+    let image = write(
+        &jumps,
+        &Provenance {
+            mesh_level: "coarse, sheet +-30 %",
+            torque_range_n_m: [-20.0, 20.0],
+            temperature_range_c: [20.0; 2],
+            ..provenance()
+        },
+    )
+    .unwrap();
+    let table = Table::check(&image).unwrap();
+    for (torque, wind_up) in [(20.0, 3e-4), (-20.0, 3e-4), (2.01, 0.0), (-1.5, 0.0), (0.0, 0.0)] {
+        let uncertainty = table.sheet_uncertainty_rad(torque, 20.0);
+        assert!((uncertainty - 0.3 / 0.7 * wind_up).abs() < 1e-8, "{torque}: {uncertainty}");
+    }
+    for mesh in ["standard", "", "sheet +-30 %", ", sheet +- %", ", sheet +-0 %", ", sheet +-130 %", "a, sheet +-30 %%"]
+    {
+        assert_eq!((of(mesh).0, of(mesh).1), (None, 0.0), "{mesh}");
+    }
+}
+
 #[test]
 fn the_writer_names_what_does_not_fit() {
     let mut small = [0; 300];

@@ -3,6 +3,7 @@
 use flexspline::make::Sample;
 use serde::Serialize;
 
+use super::complete::Completed;
 use crate::cautions::Caution;
 use crate::data_sheet::Stiffness;
 use crate::simulate::PlaceStress;
@@ -20,6 +21,17 @@ pub struct MadeTable {
     pub info: TableInfo,
     /// The samples of its sweep, if it was swept.
     pub samples: Option<Vec<Sample>>,
+}
+
+impl MadeTable {
+    /// The samples of its sweep as the FEM has them, without what a data sheet added.
+    pub fn fem_samples(&self) -> Option<Vec<Sample>> {
+        let mut samples = self.samples.clone()?;
+        if let Some(completed) = &self.info.completed {
+            samples.iter_mut().for_each(|s| s.output_rad -= completed.spring.torsion_rad(s.torque_n_m));
+        }
+        Some(samples)
+    }
 }
 
 /// What made a table, what is in it and how far it holds.
@@ -77,6 +89,9 @@ pub struct TableInfo {
     /// What the data sheet in the drive's file says, beside what is computed; left out where the file has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub data_sheet: Option<SheetBeside>,
+    /// What a data sheet added to it; left out where none did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub completed: Option<Completed>,
     /// Stress in root fillets, on bore and flanks under the largest load of the table, over three meshes; left out
     /// unless it was asked for.
     #[serde(skip_serializing_if = "Vec::is_empty")]

@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use thiserror::Error;
 
+use super::complete::{CompletionError, KNEE_NODES, SheetStiffness};
 use super::info::MadeTable;
 use super::project::{TableError, from_sweep};
 use super::sweep::{SweepError, SweepPlan, SweepProgress, planned_increments};
@@ -28,6 +29,8 @@ pub struct TableSettings {
     pub positions: usize,
     /// Numerical method of the FEM.
     pub solver: SolverSettings,
+    /// A data sheet that completes the table.
+    pub sheet: Option<SheetStiffness>,
 }
 
 /// The torque nodes of a table.
@@ -42,6 +45,9 @@ pub enum TorqueNodes {
 /// Torque nodes on each side at most, and the miss (arcsec) at which one is added: for a drive that repeats from tooth
 /// to tooth, and for one whose imperfections are sampled at every node and leave more than nodes do.
 const CHOICES: [(usize, f64); 2] = [(28, 0.6), (12, 2.0)];
+/// Torque nodes on each side that are the bound of what can be asked for: an axis has room for them, with the pair at
+/// the drag torque and the end.
+const MOST_NODES: usize = 30;
 /// The largest torque must be so many times the drag of the output, or there is no wind-up to sample.
 const LEAST_OVER_DRAG: f64 = 20.0;
 /// Largest torque, N m.
@@ -64,6 +70,7 @@ impl TableSettings {
             temperature_nodes_c: plan.temperature_nodes_c,
             positions: plan.positions,
             solver: SolverSettings { method: Method::Fast, ..SolverSettings::default() },
+            sheet: None,
         }
     }
 
@@ -134,6 +141,9 @@ pub enum MakeError {
     /// The samples make no table.
     #[error(transparent)]
     Table(#[from] TableError),
+    /// The data sheet does not complete the table.
+    #[error(transparent)]
+    Sheet(#[from] CompletionError),
 }
 
 impl MakeError {
@@ -146,7 +156,9 @@ impl MakeError {
     pub fn is_bad_input(&self) -> bool {
         matches!(
             self,
-            MakeError::Setting { .. } | MakeError::Sweep(SweepError::Solve(SolveError::Drive(_) | SolveError::Mesh(_)))
+            MakeError::Setting { .. }
+                | MakeError::Sheet(_)
+                | MakeError::Sweep(SweepError::Solve(SolveError::Drive(_) | SolveError::Mesh(_)))
         )
     }
 }
@@ -192,8 +204,14 @@ pub fn make(
     };
     let chosen = match &settings.torque_nodes {
         TorqueNodes::Chosen(choice) => {
-            let chosen = choose_torque_nodes(drive, kind, &plan, *choice, settings.solver, &tell)?;
-            plan.torque_nodes_n_m = chosen.torque_nodes_n_m.clone();
+            let mut choice = *choice;
+            if settings.sheet.is_some() {
+                // An axis has room for the most that can be asked for, not for more.
+                choice.most = choice.most.min(MOST_NODES - KNEE_NODES);
+            }
+            let chosen = choose_torque_nodes(drive, kind, &plan, choice, settings.solver, &tell)?;
+            let nodes = &chosen.torque_nodes_n_m;
+            plan.torque_nodes_n_m = settings.sheet.as_ref().map_or(nodes.clone(), |sheet| sheet.with_knees(nodes));
             let nodes = plan.torque_nodes_n_m.len() / 2;
             let left = over_turns + planned_increments(drive, &plan, nodes, chosen.known.len());
             expected.store(done.load(Ordering::Relaxed) + left, Ordering::Relaxed);
@@ -207,7 +225,20 @@ pub fn make(
         swept.work.add(chosen.work);
     }
     let peak_flank_pressure_mpa = swept.work.peak_flank_pressure_mpa;
-    let mut made = from_sweep(drive, &plan, swept, settings.solver, clock.elapsed().as_secs_f64())?;
+    let wall_s = || clock.elapsed().as_secs_f64();
+    let mut made = match &settings.sheet {
+        None => from_sweep(drive, &plan, swept, settings.solver, wall_s(), "")?,
+        Some(sheet) => {
+            let fem = from_sweep(drive, &plan, swept.clone(), settings.solver, wall_s(), "")?;
+            let table = flexspline::Table::check(&fem.image).map_err(|e| TableError::Project(e.into()))?;
+            let completed = sheet.completes(drive, &table)?;
+            swept.samples.iter_mut().for_each(|s| s.output_rad += completed.spring.torsion_rad(s.torque_n_m));
+            let mut made = from_sweep(drive, &plan, swept, settings.solver, wall_s(), &sheet.mark())?;
+            made.info.remarks.push(completed.in_words());
+            made.info.completed = Some(completed);
+            made
+        }
+    };
     made.info.torque_nodes_resolved = chosen.map(|chosen| chosen.resolved);
     let largest_n_m = plan.torque_nodes_n_m.iter().copied().map(f64::from).fold(0.0, f64::max);
     made.info.cautions = Looked {

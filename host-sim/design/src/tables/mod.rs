@@ -6,6 +6,7 @@
 //!                         another program, a bench                 +-> validate: against fresh FEM; replay: over measured rows
 //! ```
 
+mod complete;
 mod info;
 pub(crate) mod make;
 mod positions;
@@ -17,6 +18,7 @@ pub(crate) mod torque_nodes;
 pub(crate) mod turns;
 pub mod validate;
 
+pub use complete::{Completed, CompletionError, MissingSpring, SheetStiffness, SlipSpring};
 pub use info::{MadeTable, Source, TableInfo, TurnsAtTorque, TurnsInfo};
 pub use make::{MakeError, TableObserver, TableProgress, TableSettings, TorqueNodes, make};
 pub use positions::places_that_tell_apart;

@@ -69,13 +69,14 @@ impl Default for SampleOptions {
     }
 }
 
-/// The table of a FEM sweep.
+/// The table of a FEM sweep; its image says of the mesh what the solver had, and this mark.
 pub(crate) fn from_sweep(
     drive: &Drive,
     plan: &SweepPlan,
     sweep: Sweep,
     solver: SolverSettings,
     wall_s: f64,
+    mark: &str,
 ) -> Result<MadeTable, TableError> {
     let mesh = solver.mesh.to_string();
     let repeats = drive.as_built.first_not_uniform().is_none();
@@ -105,7 +106,7 @@ pub(crate) fn from_sweep(
         &core_plan,
         &sweep.samples,
         source,
-        &mesh,
+        &(mesh.clone() + mark),
         sweep.work.worst_residual,
     )?;
     if sweep.places > 0 {
@@ -310,6 +311,7 @@ fn make(
         stiffness: None,
         cautions: Looked { slope_bound: Some(f64::from(table.bounds().slope)), ..Looked::default() }.cautions(),
         data_sheet: None,
+        completed: None,
         stress: Vec::new(),
         no_stress: None,
         remarks: Vec::new(),

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use super::complete::SlipSpring;
 use super::info::MadeTable;
 use flexspline_mechanics::drive::GeneratorKind;
 
@@ -15,7 +16,24 @@ pub fn rust_source(table: &MadeTable) -> String {
     let _ = writeln!(text, "pub static {name}_TABLE: [u8; {}] = [", table.image.len());
     put_bytes(&mut text, &table.image);
     text.push_str("];\n");
+    if let [_, ..] = slip_of(table) {
+        let _ = writeln!(
+            text,
+            "\n/// Springs that slip, for the loss of the data sheet: width in N m and gain in rad/(N m), for \
+             `flexspline::SlipBank::of_torque`.\npub const {name}_SLIP: [(f32, f32); {}] = [",
+            slip_of(table).len()
+        );
+        slip_of(table).iter().for_each(|s| {
+            let _ = writeln!(text, "    ({:?}, {:?}),", s.width_n_m as f32, s.gain_rad_per_n_m as f32);
+        });
+        text.push_str("];\n");
+    }
     text
+}
+
+/// The springs that slip beside a table.
+fn slip_of(table: &MadeTable) -> &[SlipSpring] {
+    table.info.completed.as_ref().map_or(&[], |completed| &completed.slip)
 }
 
 /// The image as a C header.
@@ -31,7 +49,20 @@ pub fn c_header(table: &MadeTable) -> String {
     let _ = writeln!(text, "#define FLEXSPLINE_{name}_TABLE_BYTES {}u\n", table.image.len());
     let _ = writeln!(text, "static const uint8_t flexspline_{lower}_table[FLEXSPLINE_{name}_TABLE_BYTES] = {{");
     put_bytes(&mut text, &table.image);
-    text.push_str("};\n\n#endif\n");
+    text.push_str("};\n");
+    if let [_, ..] = slip_of(table) {
+        let _ = writeln!(
+            text,
+            "\n// Springs that slip, for the loss of the data sheet: width in N m and gain in rad/(N m), for \
+             flexspline_slip_set.\nstatic const float flexspline_{lower}_slip[{}][2] = {{",
+            slip_of(table).len()
+        );
+        slip_of(table).iter().for_each(|s| {
+            let _ = writeln!(text, "    {{{:?}f, {:?}f}},", s.width_n_m as f32, s.gain_rad_per_n_m as f32);
+        });
+        text.push_str("};\n");
+    }
+    text.push_str("\n#endif\n");
     text
 }
 
@@ -55,6 +86,9 @@ fn header_comment(table: &MadeTable, mark: &str) -> String {
         info.temperature_nodes_c[info.temperature_nodes_c.len() - 1],
         info.projection_worst_arcsec
     ));
+    if let Some(completed) = &info.completed {
+        line(format!("{}.", completed.in_words()));
+    }
     text
 }
 

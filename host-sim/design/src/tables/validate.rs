@@ -15,6 +15,7 @@ use flexspline::{Direction, GeneratorAngle, PlayState, Quality, Table};
 use serde::Serialize;
 use thiserror::Error;
 
+use super::complete::MissingSpring;
 use super::project::core_kind;
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
@@ -43,11 +44,20 @@ pub struct ValidationSettings {
     pub seed: u64,
     /// Numerical method of the fresh FEM.
     pub solver: SolverSettings,
+    /// What a data sheet added to the table: the FEM does not have it.
+    pub spring: Option<MissingSpring>,
 }
 
 impl Default for ValidationSettings {
     fn default() -> Self {
-        ValidationSettings { torques: 12, temperatures: 3, positions: 4, seed: 1, solver: SolverSettings::default() }
+        ValidationSettings {
+            torques: 12,
+            temperatures: 3,
+            positions: 4,
+            seed: 1,
+            solver: SolverSettings::default(),
+            spring: None,
+        }
     }
 }
 
@@ -172,7 +182,8 @@ pub fn validate(
     let mut random = fastrand::Rng::with_seed(settings.seed);
     let draws = draw(&mut random, drive, table, settings);
     let total = settings.torques * (settings.positions + 3) + settings.temperatures + REVERSAL_STEPS + 6;
-    let mut fresh = FreshRun { drive, table, observe, increments: 0, total, points: Vec::new() };
+    let mut fresh =
+        FreshRun { drive, table, spring: settings.spring, observe, increments: 0, total, points: Vec::new() };
     for (k, (temperature_c, torques)) in draws.iter().enumerate() {
         let problem = Problem::new(drive, kind, *temperature_c, settings.solver)?;
         let mut motion = Motion::deformed(&problem, random.f64() * if repeats { 1.0 } else { whole_turns })?;
@@ -230,6 +241,7 @@ const SETTLING_STEPS: f64 = 8.0;
 struct FreshRun<'a> {
     drive: &'a Drive,
     table: &'a Table<'a>,
+    spring: Option<MissingSpring>,
     observe: &'a mut dyn FnMut(usize, usize) -> ControlFlow<()>,
     increments: usize,
     total: usize,
@@ -314,13 +326,14 @@ impl FreshRun<'_> {
         if prediction.quality == Quality::Disabled {
             return Err(disabled);
         }
+        let added_rad = self.spring.map_or(0.0, |spring| spring.torsion_rad(state.torque_n_m));
         self.points.push(Point {
             kind,
             generator_rad: state.generator_rad,
             torque_n_m: state.torque_n_m,
             temperature_c,
             direction: if sign > 0.0 { 1 } else { -1 },
-            fem_arcsec: motion.error_arcsec(),
+            fem_arcsec: motion.error_arcsec() + added_rad * ARCSEC_PER_RAD,
             table_arcsec: f64::from(prediction.transmission_error_rad) * ARCSEC_PER_RAD,
         });
         Ok(())

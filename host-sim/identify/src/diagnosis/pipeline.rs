@@ -201,7 +201,9 @@ impl<'a> Subject<'a> {
 
     /// The mesh of FEM runs: the one asked for, or that of the table.
     fn mesh(&self, asked: Option<MeshLevel>) -> MeshLevel {
-        let of_table = || self.table.as_ref().and_then(|table| table.mesh_level().parse().ok());
+        // What a data sheet added is said after a comma.
+        let level = |table: &Table<'_>| table.mesh_level().split(',').next().and_then(|level| level.parse().ok());
+        let of_table = || self.table.as_ref().and_then(level);
         asked.or_else(of_table).unwrap_or(MeshLevel::Coarse)
     }
 }
