@@ -245,11 +245,44 @@ await check("the certificate is one page on paper", async () => {
   await page.waitForFunction(() => document.documentElement.dataset.ready === "certificate");
   assert(/\d″? ?″? for a degree|Steepest slope/.test(await page.locator("#steepest").textContent()), "no slope");
   assert(await page.locator("#turn canvas").count(), "no error over a turn");
+  const rate = () => page.locator("#slope-at-rate output").textContent();
+  const [slow] = (await rate()).split(" ");
+  await page.locator("#rate").fill("4");
+  const [fast] = (await rate()).split(" ");
+  assert(Math.abs(Number(fast) / Number(slow) - 4) < 0.05, `at 1 °/s ${slow}, at 4 °/s ${fast}`);
+  const orders = await page.locator("#orders-table tbody tr").allTextContents();
+  assert(
+    orders.length && orders.some((row) => /lobes|encoder|tooth mesh/.test(row)),
+    `orders are not named: ${orders.join("; ")}`,
+  );
   await sound(page, "certificate");
   const pdf = await page.pdf({ format: "A4", path: path.join(shots, "certificate.pdf") });
   const pages = (pdf.toString("latin1").match(/\/Type\s*\/Page[^s]/g) ?? []).length;
   assert(pages === 1, `${pages} pages`);
   assert(!noise.length, noise.join(" | "));
+  await close();
+});
+
+await check("two logs dropped at once are both judged, and compared", async () => {
+  const { page, noise, close } = await open("#log?file=error_vs_input.csv&ratio=100");
+  await until(page, "verdict");
+  // The second half of the same unit's log: another file, another verdict.
+  const lines = readFileSync(path.join(bench, "error_vs_input.csv"), "utf8").trim().split(/\r?\n/);
+  const second = path.join(folder, "second.csv");
+  writeFileSync(second, [lines[0], ...lines.slice(1 + Math.floor(lines.length / 2))].join("\n"));
+  const files = [path.join(bench, "error_vs_input.csv"), second];
+  await page.locator("#view .drop input[type=file]").first().setInputFiles(files);
+  await page.waitForFunction(() => document.querySelector("#verdict").textContent.includes("Say the ratio"));
+  await page.locator("#ratio").fill("100");
+  await page.locator("#ratio").press("Enter");
+  await until(page, "compared", (value) => value === "2");
+  const rows = await page.locator("#logs-table tbody tr").allTextContents();
+  assert(rows.length === 2 && !rows.some((row) => row.includes("waits")), rows.join("; "));
+  assert(await page.locator("#both-logs canvas").isVisible(), "no picture of both");
+  await page.getByLabel("With the log").selectOption("0");
+  await page.getByLabel("With the log").selectOption("1");
+  await sound(page, "two-logs");
+  assert(!(await problem(page)) && !noise.length, `${await problem(page)} ${noise.join(" | ")}`);
   await close();
 });
 
@@ -336,6 +369,29 @@ await check(
     await close();
   },
 );
+
+await check("a list is edited at its field, and a mistake in it stands there", async () => {
+  const { page, noise, close } = await open("#drive?drive=HHD-95&g=cam&torque=10");
+  await until(page, "coarse");
+  const field = page.locator("#f-as_built-damaged_teeth");
+  await field.evaluate((element) => element.closest("details").setAttribute("open", ""));
+  const wrong = () => page.locator("#f-as_built-damaged_teeth-wrong").textContent();
+  await field.fill('[{ wheel = "flexspline", tooth = 3, depth_um = 9000 }]');
+  await field.blur();
+  await page.waitForFunction(() =>
+    document.querySelector("#f-as_built-damaged_teeth-wrong").textContent.includes("allowed"),
+  );
+  assert((await field.getAttribute("aria-invalid")) === "true", "the field is not marked");
+  await field.fill('{ wheel = "flexspline", tooth = 3, depth_um = 4 }');
+  await field.blur();
+  await page.waitForFunction(() => !document.querySelector("#f-as_built-damaged_teeth-wrong").textContent);
+  assert(!(await wrong()) && page.url().includes("damaged_teeth"), page.url());
+  await until(page, "coarse", (value) => Number(value.split(" ")[0]) > 1);
+  const line = await page.locator("#pitch .command code").first().textContent();
+  assert(line.includes("damaged_teeth"), line);
+  assert(!noise.length, noise.join(" | "));
+  await close();
+});
 
 await check("a page closed and opened again finds its job; it is cancelled within a second", async () => {
   const first = await open("#drive?drive=HHD-95&set=generator.w0_mm%3D0.495&g=cam&torque=10");

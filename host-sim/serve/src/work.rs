@@ -158,6 +158,9 @@ pub enum WorkAsked {
         generator: GeneratorKind,
         /// How fine.
         mesh: MeshLevel,
+        /// Whether the data sheet of the drive's file completes them.
+        #[serde(default)]
+        complete: bool,
     },
     /// A table of samples of another program.
     Samples {
@@ -303,10 +306,13 @@ impl WorkAsked {
                 words.number("torque-n-m", *torque_n_m)?;
                 words.option("positions", 4);
             }
-            WorkAsked::Tables { drive, generator, mesh } => {
+            WorkAsked::Tables { drive, generator, mesh, complete } => {
                 words.drive(drive)?;
                 words.option("generator", generator);
                 words.option("mesh", mesh);
+                if *complete {
+                    words.word("--complete-from-data-sheet");
+                }
             }
             WorkAsked::Samples { file, drive, generator } => {
                 words.file_option("from-samples", file)?;

@@ -131,6 +131,16 @@ export async function driveBench(view, asked, bench) {
           { id, ...common },
         ),
       );
+    } else if (field.kind === "list") {
+      // The file's own list is not shown: one number for each tooth. What is written here stands in its place.
+      const text = el("textarea", { id, rows: 2, placeholder: "as the drive's file has it", ...common });
+      text.value = value ?? "";
+      text.addEventListener("change", () => {
+        remember();
+        const list = text.value.trim().replace(/\s+/g, " ");
+        set(field.path, list === "" ? original.get(field.path) : list.startsWith("[") ? list : `[${list}]`);
+      });
+      row.append(text);
     } else {
       const text = el("input", { type: "text", inputmode: "decimal", id, value, ...common });
       const [at, whole] = [Number(original.get(field.path)), field.kind === "count"];
@@ -242,7 +252,7 @@ export async function driveBench(view, asked, bench) {
     );
     main.replaceChildren(...listed.filter((f) => MAIN.includes(f.path)).map(fieldOf));
     const groups = Map.groupBy(
-      listed.filter((f) => !MAIN.includes(f.path) && f.kind !== "list"),
+      listed.filter((f) => !MAIN.includes(f.path)),
       (f) => f.path.split(".")[0],
     );
     rest.replaceChildren(
@@ -521,6 +531,7 @@ export async function driveBench(view, asked, bench) {
     if (making) return;
     const of = now.generators[0];
     const choice = select(GENERATORS, of, () => undefined, { id: "table-generator" });
+    const complete = el("input", { type: "checkbox", id: "complete" });
     const fineness = select(["coarse", "standard", "fine"], "standard", () => undefined, { id: "table-mesh" });
     const go = button(
       "Make the tables",
@@ -529,7 +540,7 @@ export async function driveBench(view, asked, bench) {
         const place = el("div", { role: "status" });
         makePlace.replaceChildren(place);
         try {
-          const job = await run({ work: "tables", drive, generator, mesh }, (j) => {
+          const job = await run({ work: "tables", drive, generator, mesh, complete: complete.checked }, (j) => {
             making = j.id;
             place.replaceChildren(progressOf(j));
           });
@@ -546,7 +557,17 @@ export async function driveBench(view, asked, bench) {
       el("p", {
         text: "Sweeps by contact FEM over torque and temperature, a minute or two; the page may be closed meanwhile.",
       }),
-      el("div", { class: "form" }, el("label", {}, "Generator", choice), el("label", {}, "Mesh", fineness), go),
+      el(
+        "div",
+        { class: "form" },
+        el("label", {}, "Generator", choice),
+        el("label", {}, "Mesh", fineness),
+        // A built-in drive has no file, and no sheet in it.
+        ...(now.drive.endsWith(".toml")
+          ? [el("label", { class: "line" }, complete, " the data sheet in its file completes the stiffness")]
+          : []),
+        go,
+      ),
     );
   }
   const again = () => button("Back", () => make());
@@ -566,6 +587,7 @@ export async function driveBench(view, asked, bench) {
     };
     makePlace.replaceChildren(
       el("p", { text: `Table ${info.table_id} of ${generator} is made.` }),
+      ...(info.remarks ?? []).map((remark) => el("p", { class: "line", text: remark })),
       downloads(job.out, [
         [`${generator}.fxt`, "the image that firmware reads"],
         [`${generator}.h`, "the same as a C header"],

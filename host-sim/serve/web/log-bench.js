@@ -96,6 +96,14 @@ export async function logBench(view, asked, bench) {
     "Amplitude of the residual at each order of the generator angle",
     "",
   );
+  const compared = el("div", { id: "compared" });
+  const both = liveChart(
+    "both-logs",
+    "Two logs",
+    "Residual of two logs over the generator angle",
+    "The residual of each over the generator angle, with the causes found in it, where there are any.",
+  );
+  both.figure.hidden = true;
   const added = liveChart("added", "What each cause adds", "The contribution of each cause over time", "");
   for (const { figure } of [residual, over, orders, added]) figure.hidden = true;
   view.append(
@@ -123,6 +131,8 @@ export async function logBench(view, asked, bench) {
         causes,
         over.figure,
         orders.figure,
+        compared,
+        both.figure,
       ),
       section("table-section", "Its table", calibrated),
     ),
@@ -390,6 +400,7 @@ backlash_arcsec = ${Number(now.backlash)}
     for (const id of running) cancel(id);
     running.clear();
     document.documentElement.dataset.verdict = "";
+    document.documentElement.dataset.compared = "";
     if (now.known === "ratio" && !Number(now.ratio)) {
       for (const to of [verdict, calibrated])
         to.replaceChildren(el("p", { text: "Say the ratio above: these rows do not tell it." }));
@@ -405,6 +416,59 @@ backlash_arcsec = ${Number(now.backlash)}
     await diagnose(at, reading, begun).catch(
       (error) => at === round && verdict.replaceChildren(el("p", { class: "wrong line", text: error.message })),
     );
+    if (at === round && now.files.length > 1) await others(at, reading).catch((error) => bench.complain(error));
+  }
+
+  /** The verdict of every other log in turn, and two of them over one another. */
+  async function others(at, reading) {
+    const known = await knownForVerdict();
+    const rows = new Map(now.files.map((name) => [name, [name, "waits", "–", "–", "–"]]));
+    const reports = new Map();
+    const names = () => [...reports.keys()];
+    const pair = [0, 1];
+    const overlay = async () => {
+      const [a, b] = pair.map((k) => reports.get(names()[k]));
+      if (a && b && a !== b)
+        await both.pair(a, b, names(), pair, "over-generator", "extended", "recalibrated", "nominal");
+    };
+    const draw = () => {
+      const menu = (k) =>
+        select(
+          names().map((name, j) => [String(j), name]),
+          String(pair[k]),
+          (chosen) => {
+            pair[k] = Number(chosen);
+            overlay();
+          },
+          { "aria-label": k ? "With the log" : "Compare the log" },
+        );
+      compared.replaceChildren(
+        table("Every log", ["Log", "Verdict", "Causes", "rms before", "rms with the causes"], [...rows.values()], {
+          id: "logs-table",
+        }),
+        ...(reports.size > 1 ? [el("div", { class: "form" }, "Compare ", menu(0), " with ", menu(1))] : []),
+      );
+    };
+    draw();
+    await Promise.all(
+      now.files.map(async (file) => {
+        const work = { work: "diagnose", file, reading, known, generator: "cam", without: [...now.without] };
+        const job = file === now.files[0] && firstJob ? firstJob : await mine(work, at, () => undefined);
+        if (!job || at !== round) return;
+        if (job.state !== "done") rows.set(file, [file, why(job), "–", "–", "–"]);
+        else {
+          const d = await fileJson(`${job.out}/diagnosis.json`);
+          const found = d.causes.map((c) => c.name.replaceAll("_", " ")).join(", ");
+          const { rms_before_arcsec: before, rms_after_arcsec: after } = d.residual;
+          rows.set(file, [file, d.finding.replaceAll("_", " "), found || "none", errorOf(before), errorOf(after)]);
+          reports.set(file, await readReport(`${job.out}/report.html`));
+        }
+        if (at === round) draw();
+      }),
+    );
+    if (at !== round) return;
+    await overlay();
+    document.documentElement.dataset.compared = String(reports.size);
   }
 
   async function calibrate(at, reading) {
@@ -477,16 +541,26 @@ backlash_arcsec = ${Number(now.backlash)}
     document.documentElement.dataset.calibrated = job.out;
   }
 
-  async function diagnose(at, reading, begun) {
+  /** What the verdict is against. */
+  async function knownForVerdict() {
     const [kind, name] = now.known.split(/:(.*)/s);
-    const known =
-      kind === "model" ? { model: name } : kind === "tables" ? { tables: name } : { model: await modelOfFigures() };
+    if (kind === "model") return { model: name };
+    return kind === "tables" ? { tables: name } : { model: await modelOfFigures() };
+  }
+
+  let firstJob = null;
+  async function diagnose(at, reading, begun) {
+    const known = await knownForVerdict();
     if (at !== round) return;
+    firstJob = null;
+    compared.replaceChildren();
+    both.figure.hidden = true;
     const work = { work: "diagnose", file: now.files[0], reading, known, generator: "cam", without: [...now.without] };
     const progress = el("div", { role: "status" });
     verdict.replaceChildren(progress);
     const job = await mine(work, at, (j) => progress.replaceChildren(progressOf(j)));
     if (!job) return;
+    firstJob = job;
     if (job.state !== "done") {
       verdict.replaceChildren(el("p", { class: "wrong line", text: why(job) }), commandLine(job.command));
       causes.replaceChildren();
@@ -527,7 +601,11 @@ backlash_arcsec = ${Number(now.backlash)}
       ),
       ...(d.next_experiment ? [el("p", { class: "line", text: `To record next: ${d.next_experiment}` })] : []),
       ...(now.files.length > 1
-        ? [el("p", { text: `Of ${now.files[0]}; the table takes all ${now.files.length} logs.` })]
+        ? [
+            el("p", {
+              text: `Of ${now.files[0]}; the others stand below. The table takes all ${now.files.length} logs.`,
+            }),
+          ]
         : []),
       commandLine(job.command),
       wholeReport(job.out),

@@ -81,6 +81,23 @@ export function liveChart(id, title, alt, words) {
       columns.forEach((column, c) => values.set(column, c * rows));
       return put(x, y, { series, ...more }, Promise.resolve({ values, shape: [columns.length, rows] }));
     },
+    /** The first line of the same figure of two reports, over one another: each at its own places. */
+    async pair(a, b, names, of, figureName, ...choices) {
+      const both = await Promise.all([a, b].map((report) => firstLine(report, figureName, choices)));
+      figure.hidden = both.some((one) => !one);
+      if (figure.hidden) return undefined;
+      // A chart has its places in order.
+      const rows = both.flatMap(({ x, y }, k) => Array.from(x, (at, j) => (k ? [at, NaN, y[j]] : [at, y[j], NaN])));
+      rows.sort((one, other) => one[0] - other[0]);
+      const series = both.map((one, k) => ({ ...one.line, name: names[of[k]], colour: k }));
+      const { x, y } = both[0].spec;
+      return this.columns(
+        x,
+        y,
+        series,
+        [0, 1, 2].map((column) => rows.map((row) => row[column])),
+      );
+    },
     /** A figure of lines of a report, as the first of these choices that it has shows it; hidden if there is none. */
     async of(report, name, ...choices) {
       const spec = report.json.figures[name];
@@ -90,6 +107,21 @@ export function liveChart(id, title, alt, words) {
       if (figure.hidden) return undefined;
       return put(spec.x, spec.y, spec.charts[key], unpacked(numbers));
     },
+  };
+}
+
+/** The first line of a figure of a report, as columns x and y, with its axes; nothing if it has none of these choices. */
+async function firstLine(report, name, choices) {
+  const spec = report.json.figures[name];
+  const key = choices.find((choice) => Object.hasOwn(spec?.charts ?? {}, choice));
+  const packed = key && report.packed.get(`${key}/${name}`);
+  if (!packed) return null;
+  const { values, shape } = await unpacked(packed);
+  return {
+    spec,
+    line: spec.charts[key].series[0],
+    x: values.slice(0, shape[1]),
+    y: values.slice(shape[1], 2 * shape[1]),
   };
 }
 

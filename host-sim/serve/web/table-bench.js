@@ -9,6 +9,8 @@ const GENERATORS = ["cam", "double-disc", "four-roller", "two-roller"];
 const MOST_POINTS = 4000;
 /** Points of an angle over a turn. */
 const FINE = 720;
+/** Amplitude below which an order is not named: a tenth of an arc-second, below what a table holds. */
+const NAMED_ARCSEC = 0.1;
 /** Orders of a spectrum that are shown. */
 const ORDERS = 12;
 
@@ -245,6 +247,16 @@ function amplitudes(values) {
   });
 }
 
+/** What an order of an angle usually is, as far as its number says it. */
+function orderInWords(of, order, teeth) {
+  if (of === "share_of_pitch_deg")
+    return `tooth mesh, ${order === 1 ? teeth : `${order} × ${teeth}`} in a turn of the generator`;
+  if (of === "output_deg")
+    return { 1: "output encoder or axis off centre", 2: "output encoder tilted, or an oval" }[order] ?? "output";
+  const two = { 1: "generator's encoder or bearing", 2: "two lobes: teeth off pitch, wheels out of round" }[order];
+  return two ?? (order % 2 ? "generator's encoder" : "two lobes, a harmonic of them");
+}
+
 /** How often an angle of the nodes turns in a turn of the output. Two waves: teeth of a held flexspline, or of a held ring. */
 function turnsOf(of, ratio) {
   const turns = Math.abs(ratio);
@@ -272,6 +284,7 @@ export async function certificate(view, asked) {
       const perOutput = turnsOf(of, c.ratio);
       const slopes = values.map((v, k) => ((values[(k + 1) % FINE] - v) / (360 / FINE)) * perOutput);
       return {
+        of,
         part: part.replaceAll("_", " "),
         angle: ofOutput ? "output" : of === "share_of_pitch_deg" ? "tooth pitch" : "generator",
         values,
@@ -281,13 +294,15 @@ export async function certificate(view, asked) {
         orders: amplitudes(values),
       };
     });
-  // What a screen can show apart: a wave of the tooth pitch would be a band.
+  // What a screen can show apart; a wave of the tooth pitch is a band about it.
   const shown = cyclic.filter((p) => p.perOutput <= MOST_POINTS / 8);
+  const bands = cyclic.filter((p) => p.perOutput > MOST_POINTS / 8);
+  const teeth = 2 * Math.abs(c.ratio > 0 ? c.ratio - 1 : c.ratio);
   const whole = liveChart(
     "whole",
     "Error that the table holds, over a whole turn of the output",
     "The sum of the parts of the table over a turn of the output, without load",
-    `Without load: ${shown.map((p) => p.part).join(", ") || "no part repeats"}${shown.length < cyclic.length ? "; the wave of the tooth pitch is in the table above alone" : ""}.`,
+    `Without load: ${shown.map((p) => p.part).join(", ") || "no part repeats"}${bands.length ? "; within the dashed lines the tooth wave goes to and fro" : ""}.`,
   );
   const turn = liveChart(
     "turn",
@@ -302,6 +317,18 @@ export async function certificate(view, asked) {
     "Orders of the angle that each part repeats over.",
   );
   const steepest = cyclic.reduce((sum, p) => sum + p.steepest, 0);
+  const atRate = el("output", { for: "rate" });
+  const rate = el("input", { type: "number", id: "rate", min: 0, step: "any", value: asked.get("rate") ?? "1" });
+  const told = () => (atRate.textContent = `${number(steepest * Number(rate.value))} ″/s`);
+  rate.addEventListener("input", told);
+  told();
+  const largest = cyclic.flatMap((p) =>
+    p.orders
+      .map((amplitude, k) => ({ p, amplitude, order: k + 1 }))
+      .sort((a, b) => b.amplitude - a.amplitude)
+      .slice(0, 2)
+      .filter(({ amplitude }) => amplitude >= NAMED_ARCSEC),
+  );
   view.append(
     el("h1", { text: "Certificate of a unit" }),
     el(
@@ -321,18 +348,32 @@ export async function certificate(view, asked) {
     ),
     table(
       "Parts of the table over an angle",
-      ["Part", "Peak to peak", "Steepest slope, ″ for a degree of the output", "Largest order"],
-      cyclic.map((p) => [
+      ["Part", "Peak to peak", "Steepest slope, ″ for a degree of the output"],
+      cyclic.map((p) => [p.part, errorOf(p.pp), number(p.steepest)]),
+    ),
+    table(
+      "Largest orders, by part",
+      ["Part", "Order", "Amplitude", "An order of"],
+      largest.map(({ p, amplitude, order }) => [
         p.part,
-        errorOf(p.pp),
-        number(p.steepest),
-        String(p.orders.indexOf(Math.max(...p.orders)) + 1),
+        String(order),
+        errorOf(amplitude),
+        orderInWords(p.of, order, teeth),
       ]),
+      { id: "orders-table" },
     ),
     el("p", {
       id: "steepest",
       text: `Steepest slope, all parts together at most: ${number(steepest)} ″ for a degree of the output.`,
     }),
+    el(
+      "p",
+      { id: "slope-at-rate" },
+      el("label", { for: "rate" }, "While the output turns at (°/s) ", rate),
+      " the error changes by up to ",
+      atRate,
+      ".",
+    ),
     whole.figure,
     el("div", { class: "two" }, turn.figure, spectrum.figure),
     el(
@@ -362,11 +403,18 @@ export async function certificate(view, asked) {
   if (shown.length) {
     const at = (p, output) => p.values[Math.floor(((output * p.perOutput) % 1) * FINE)];
     const sum = turns.map((output) => shown.reduce((all, p) => all + at(p, output), 0));
+    const beyond = (of) => bands.reduce((all, p) => all + of(...p.values), 0);
+    const [least, most] = [Math.min, Math.max].map((of) => sum.map((value) => value + beyond(of)));
+    const band = [least, most].map((_, k) => ({
+      name: `tooth wave, ${k ? "most" : "least"}`,
+      mark: "dashed",
+      colour: 1,
+    }));
     await whole.columns(
       { label: "Output", quantity: "turn" },
       { label: "Error", quantity: "error" },
-      [{ name: "held by the table", mark: "line", colour: 0 }],
-      [turns, sum],
+      [{ name: "held by the table", mark: "line", colour: 0 }, ...(bands.length ? band : [])],
+      [turns, sum, ...(bands.length ? [least, most] : [])],
     );
   }
   if (report?.json.figures["over-output"]) await turn.of(report, "over-output", "every");
