@@ -407,6 +407,7 @@ fn an_image_tells_what_it_is() {
     assert_eq!((report.flexspline_teeth, report.circular_spline_teeth, report.fixed_member), (188, 190, 0));
     assert_eq!(report.temperature_range_c, table.temperature_range_c());
     assert_eq!((report.error_limit_rad, report.generator), (table.error_limit_rad(), table.generator_kind().code()));
+    let sheet_scatter = table.sheet_scatter().unwrap_or(0.0);
     let inside = image.as_mut_ptr().cast::<FlexsplineImageReport>();
     let inside = if inside.is_aligned() { inside } else { image.as_mut_ptr().wrapping_add(4).cast() };
     if inside.is_aligned() {
@@ -415,7 +416,7 @@ fn an_image_tells_what_it_is() {
     assert_eq!(flexspline_image_report(null(), 9, &mut report), Pointer);
     let mut scatter = f32::NAN;
     assert_eq!(flexspline_image_sheet_scatter(image.as_ptr(), image.len(), &mut scatter), Done);
-    assert_eq!(table.sheet_scatter().unwrap_or(0.0), scatter);
+    assert_eq!(scatter, sheet_scatter);
     assert_eq!(flexspline_image_sheet_scatter(null(), 9, &mut scatter), Pointer);
     image[900] ^= 1;
     assert_eq!(flexspline_image_report(image.as_ptr(), image.len(), &mut report), FlexsplineStatus::Image);
