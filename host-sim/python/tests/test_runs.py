@@ -161,6 +161,25 @@ def test_calibrate_is_the_command(log_file: Path, tmp_path: Path) -> None:
     assert by_ratio.table.generator == "cam" and by_ratio.json["parts"][0]["name"]
     from_table = flexspline.calibrate(log_file, table=made.table)
     assert from_table.table.ratio == made.ratio
+    held = made.held_out
+    assert f"{held.rms_before_arcsec:.3g} -> {held.rms_after_arcsec:.3g} arcsec" in repr(made)
+
+
+def test_a_calibrator_fits_predicts_and_scores(log_file: Path) -> None:
+    frame = frame_of(log_file)
+    calibrator = flexspline.Calibrator(model=MODEL)
+    with pytest.raises(flexspline.BadInput, match="not fitted yet"):
+        calibrator.predict(frame)
+    made = calibrator.fit(frame).calibration_
+    replayed = made.table.replay(frame)
+    assert (calibrator.predict(frame) == replayed.predicted_arcsec).all()
+    left = replayed.summary.rms_residual_arcsec / replayed.summary.rms_measured_arcsec
+    assert calibrator.score(frame) == pytest.approx(1.0 - left**2, abs=1e-6)
+    assert 0.0 < calibrator.score(frame) <= 1.0
+    # A unit whose error has the opposite sign is worse off with this table than with none.
+    opposite = 2.0 * frame["generator_rad"] / made.ratio - frame["output_rad"]
+    assert calibrator.score(frame.assign(output_rad=opposite)) < 0.0
+    assert "arcsec rms where nothing was fitted" in repr(calibrator)
 
 
 def test_study_is_the_command(tmp_path: Path) -> None:

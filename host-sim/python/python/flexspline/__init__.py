@@ -14,6 +14,7 @@ from ._native import __version__
 from ._runs import (
     GENERATORS,
     Calibration,
+    Calibrator,
     Diagnosis,
     Simulation,
     Study,
@@ -32,6 +33,7 @@ __all__ = [
     "Answer",
     "BadInput",
     "Calibration",
+    "Calibrator",
     "Columns",
     "Command",
     "Diagnosis",

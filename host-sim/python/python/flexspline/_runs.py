@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -17,7 +18,7 @@ from ._errors import BadInput
 from ._fields import Fields, rows_html
 from ._inputs import PathLike, columns_option, log, names, numbers, path_text, spread, table_columns
 from ._progress import Progress, shown
-from ._table import Table
+from ._table import Replay, Table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -351,6 +352,11 @@ class Calibration(Fields):
 
         return _plots.calibration(self, ax)
 
+    def __repr__(self) -> str:
+        held = self.held_out
+        left = f"{held.rms_before_arcsec:.3g} -> {held.rms_after_arcsec:.3g} arcsec rms where nothing was fitted"
+        return f"Calibration({left}, held to +-{self.half_width_arcsec:.3g}, table {self.table.table_id})"
+
 
 def calibrate(
     logs: object,
@@ -387,7 +393,53 @@ def calibrate(
             threads=threads,
             progress=tell,
         )
-    return Calibration(text, Table._made(parts), Columns(rows))
+    made = Calibration(text, Table._made(parts), Columns(rows))
+    if made.half_width_arcsec > made.held_out.rms_before_arcsec:
+        warnings.warn(
+            f"calibrate: the table holds the error to +-{made.half_width_arcsec:.3g} arcsec, where {made.held_out.rms_before_arcsec:.3g} rms "
+            "were measured; more or calmer rows make it narrower",
+            stacklevel=2,
+        )
+    return made
+
+
+class Calibrator:
+    """`calibrate` and `Table.replay` in the form of scikit-learn's estimators, for those who have theirs in a pipeline.
+
+    >>> Calibrator(ratio=101).fit(monday).score(tuesday)  # doctest: +SKIP
+    """
+
+    calibration_: Calibration
+    """What `fit` found."""
+
+    def __init__(self, **options: Any) -> None:
+        """``options``: those of `calibrate`, as ``ratio``, ``model`` or ``table``."""
+        self.options = options
+
+    def fit(self, logs: object, y: object = None) -> Calibrator:
+        """Learns the table of a unit from its logs, as `calibrate` takes them; ``y`` is not read, as the error stands in the logs."""
+        self.calibration_ = calibrate(logs, **self.options)
+        return self
+
+    def predict(self, data: object) -> FloatArray:
+        """The output error that the table tells for each row, arcsec, rows in the order of one motion."""
+        return self._replayed(data).predicted_arcsec
+
+    def score(self, data: object, y: object = None) -> float:
+        """Share of the variance of the measured error that the table takes away: 1 is all of it, below 0 is worse than no table.
+
+        A variance, as the zero of an output encoder is no table's to know."""
+        rows = self._replayed(data)
+        return float(1.0 - np.var(rows.residual_arcsec) / np.var(rows.measured_arcsec))
+
+    def _replayed(self, data: object) -> Replay:
+        if not hasattr(self, "calibration_"):
+            raise BadInput("Calibrator: not fitted yet, allowed: fit(logs) first")
+        return self.calibration_.table.replay(data)
+
+    def __repr__(self) -> str:
+        options = ", ".join(f"{name}={value!r}" for name, value in self.options.items())
+        return f"Calibrator({options})" + (f" of {self.calibration_!r}" if hasattr(self, "calibration_") else "")
 
 
 class Diagnosis(Fields):
