@@ -85,10 +85,15 @@ impl Stiffness {
 
 /// Torsion of the output by a table at reference temperature, rad: in the middle between both directions of motion.
 pub(crate) fn torsion_rad(drive: &Drive, table: &Table<'_>, torque_n_m: f64) -> Option<f64> {
+    let [forward, backward] = either_way_rad(drive, table, torque_n_m)?;
+    Some(0.5 * (forward + backward))
+}
+
+/// Error by a table at reference temperature in forward and in backward motion, rad.
+pub(crate) fn either_way_rad(drive: &Drive, table: &Table<'_>, torque_n_m: f64) -> Option<[f64; 2]> {
     let temperature = drive.temperature.reference_c as f32;
     let at = |direction| table.steady_error_rad(GeneratorAngle::default(), torque_n_m as f32, temperature, direction);
-    let [forward, backward] = [at(Direction::Forward)?, at(Direction::Backward)?];
-    Some(0.5 * (f64::from(forward) + f64::from(backward)))
+    Some([at(Direction::Forward)?, at(Direction::Backward)?].map(f64::from))
 }
 
 /// A light touch, N·m.

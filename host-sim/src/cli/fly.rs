@@ -13,8 +13,8 @@ use super::{Failure, report};
 use flexspline_base::output::Outputs;
 use flexspline_base::suggest::did_you_mean;
 use flexspline_fly::fly::{
-    ByController, Flown, FlyError, OwnTable, Results, SCENARIOS, VariedFlight, Vary, built_in, every, example,
-    fly_varied, read, results,
+    ByController, Flown, FlyError, Results, SCENARIOS, VariedFlight, Vary, built_in, every, example, fly_varied, read,
+    results,
 };
 use flexspline_report::flight_report;
 
@@ -64,8 +64,12 @@ impl Fly {
                         makes of a drive";
             return Err(Failure::BadInput(format!("{option}: {what}")));
         }
+        if self.example && self.scenario == "all" {
+            let allowed = SCENARIOS.join(", ");
+            return Err(Failure::BadInput(format!("scenario: found all, allowed for an example: {allowed}")));
+        }
         if self.example {
-            let flown = scenario(self.named()?)?;
+            let flown = scenario(&self.scenario)?;
             let base = built_in(&self.scenario).map_or(SCENARIOS[0], |_| &self.scenario);
             let file = example(base, flown);
             return context.print_data(&serde_json::json!({ "file": &file }), || file.clone());
@@ -73,7 +77,7 @@ impl Fly {
         if self.scenario == "all" || !self.vary.is_empty() {
             return self.side_by_side(context);
         }
-        let flown = self.on_its_drive(scenario(&self.scenario)?)?;
+        let flown = on_its_drive(scenario(&self.scenario)?, self.table()?.as_ref())?;
         flown.carries().map_err(|why| Failure::BadInput(format!("{}: {why}", self.scenario)))?;
         let out = context.out()?;
         if !self.no_report {
@@ -98,31 +102,22 @@ impl Fly {
         outputs.finish()?;
         context.print(&results, || text(&results, out, !self.no_report))
     }
-}
 
-impl Fly {
-    /// One scenario, not all.
-    fn named(&self) -> Result<&str, Failure> {
-        if self.scenario == "all" {
-            return Err(Failure::BadInput(format!(
-                "scenario: found all, allowed for an example: {}",
-                SCENARIOS.join(", ")
-            )));
-        }
-        Ok(&self.scenario)
-    }
-
-    /// With the drive of the table that is given.
-    fn on_its_drive(&self, flown: Flown) -> Result<Flown, Failure> {
-        let Some(file) = &self.tables else { return Ok(flown) };
+    /// The table that is given: its file, and its bytes.
+    fn table(&self) -> Result<Option<(&Path, Vec<u8>)>, Failure> {
+        let Some(file) = &self.tables else { return Ok(None) };
         if self.vary.iter().any(|vary| vary.field == "generator") {
             let what = "--vary generator: found with --tables, whose table has its generator; allowed: one of the two";
             return Err(Failure::BadInput(what.to_owned()));
         }
-        let bad = |error: FlyError| Failure::BadInput(format!("{}: {error}", file.display()));
-        let own = OwnTable::new(image_file(file)?).map_err(|error| bad(error.into()))?;
-        flown.with_table(own).map_err(bad)
+        Ok(Some((file, image_file(file)?)))
     }
+}
+
+/// With the drive of the table that is given.
+fn on_its_drive(flown: Flown, table: Option<&(&Path, Vec<u8>)>) -> Result<Flown, Failure> {
+    let Some((file, image)) = table else { return Ok(flown) };
+    flown.with_table(image).map_err(|error| Failure::BadInput(format!("{}: {error}", file.display())))
 }
 
 /// Flights side by side.
@@ -135,10 +130,11 @@ impl Fly {
     /// Every combination of what varies, of one scenario or all.
     fn side_by_side(&self, context: &Context) -> Result<(), Failure> {
         let names = if self.scenario == "all" { SCENARIOS.to_vec() } else { vec![self.scenario.as_str()] };
+        let own = self.table()?;
         let mut flights = Vec::new();
         for name in names {
             for (varied, flown) in every(name, &text_of(name)?, &self.vary).map_err(refused)? {
-                flights.push((varied, self.on_its_drive(flown)?));
+                flights.push((varied, on_its_drive(flown, own.as_ref())?));
             }
         }
         let out = context.out()?;

@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::catalogue::UNIT_SCATTER_PERCENT;
-use crate::data_sheet::{Loads, torsion_rad, touch_n_m};
+use crate::data_sheet::{Loads, either_way_rad, torsion_rad, touch_n_m};
 use crate::stated::{Stated, short};
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::drive::Drive;
@@ -188,12 +188,8 @@ impl SheetStiffness {
 
 /// The clearance at no load, arcmin.
 fn backlash_arcmin(drive: &Drive, table: &Table<'_>) -> f64 {
-    use flexspline::{Direction, GeneratorAngle};
-    let at = |direction| {
-        let temperature = drive.temperature.reference_c as f32;
-        table.steady_error_rad(GeneratorAngle::default(), 0.0, temperature, direction).map_or(0.0, f64::from)
-    };
-    (at(Direction::Backward) - at(Direction::Forward)).abs() * ARCSEC_PER_RAD / 60.0
+    let between = |[forward, backward]: [f64; 2]| (backward - forward).abs() * ARCSEC_PER_RAD / 60.0;
+    either_way_rad(drive, table, 0.0).map_or(0.0, between)
 }
 
 /// A spring in series with the drive of the FEM, softer or stiffer by range of torque.

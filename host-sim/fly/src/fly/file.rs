@@ -13,12 +13,6 @@ use toml::de::{DeTable, DeValue};
 use super::built_in::{SCENARIOS, built_in};
 use super::{Flown, FlyError};
 
-const GENERATORS: [(&str, GeneratorKind); 4] = [
-    ("two-roller", GeneratorKind::TwoRoller),
-    ("four-roller", GeneratorKind::FourRoller),
-    ("double-disc", GeneratorKind::DoubleDisc),
-    ("cam", GeneratorKind::Cam),
-];
 const TORQUES: [(&str, TorqueKnown); 4] = [
     ("on_load", TorqueKnown::OnLoad),
     ("in_mesh", TorqueKnown::InMesh),
@@ -112,7 +106,7 @@ impl To<'_> {
             To::Word(to, allowed) => *to = whole(&allowed, value)?,
             To::Count(to, allowed) => *to = whole(&allowed, value)? as usize,
             To::Legs(to) => *to = each_of(value, "an array of [seconds, rad/s]", leg)?,
-            To::Generator(to) => *to = one_of(&GENERATORS, value)?,
+            To::Generator(to) => *to = one_of(&generators(), value)?,
             To::Torque(to) => *to = one_of(&TORQUES, value)?,
             To::Table(to) => *to = one_of(&TABLES, value)?,
         }
@@ -131,11 +125,15 @@ impl To<'_> {
                 let legs: Vec<[f64; 2]> = legs.iter().map(|leg| [leg.seconds, leg.rate_rad_s]).collect();
                 (format!("{legs:?}"), format!("{} to {} s in all, -1 to 1 rad/s", LASTS_S[0], LASTS_S[1]))
             }
-            To::Generator(kind) => named(&GENERATORS, **kind),
+            To::Generator(kind) => named(&generators(), **kind),
             To::Torque(known) => named(&TORQUES, **known),
             To::Table(known) => named(&TABLES, **known),
         }
     }
+}
+
+fn generators() -> [(&'static str, GeneratorKind); 4] {
+    GeneratorKind::ALL.map(|kind| (kind.name(), kind))
 }
 
 fn named<T: PartialEq>(names: &[(&str, T)], found: T) -> (String, String) {

@@ -22,7 +22,7 @@ use flexspline_mechanics::drive::{Drive, GeneratorKind};
 pub use built_in::{SCENARIOS, built_in};
 pub use error::FlyError;
 pub use file::{example, read};
-pub use own::{OwnTable, OwnTableError, gear_at};
+pub use own::{OwnDrive, OwnTableError, gear_at};
 pub use results::{ByController, LEAST_DISTANCE, LEAST_PHASE_MARGIN_DEG, Results, Row, results, spectrum};
 pub use varied::{Flight as VariedFlight, Vary, every, fly_varied};
 
@@ -33,8 +33,8 @@ pub struct Flown {
     pub kind: GeneratorKind,
     /// What is flown.
     pub scenario: Scenario,
-    /// The table whose drive is flown in the place of HHD-95.
-    pub own: Option<OwnTable>,
+    /// The drive of a table that is flown in the place of HHD-95.
+    pub own: Option<OwnDrive>,
 }
 
 /// The maps of HHD-95 by contact FEM, at points that made no table (`examples/closed_loop.rs map`).
@@ -88,21 +88,18 @@ impl Flown {
         let Some(own) = &self.own else {
             return Ok(fly_told(scenario, &unit(self.kind, scenario.temperature_c)?, None, told)?);
         };
-        let unit = own.unit(scenario.temperature_c)?;
         // What else it may know is sampled from the unit.
-        let image = (known == TableKnown::Nominal).then(|| own.image().to_vec());
-        Ok(fly_told(scenario, &unit, image, told)?)
+        let image = (known == TableKnown::Nominal).then(|| own.image.clone());
+        Ok(fly_told(scenario, &own.unit, image, told)?)
     }
 
-    /// The drive of this table in the place of HHD-95.
+    /// The drive of the table with these bytes in the place of HHD-95.
     ///
     /// # Errors
-    /// [`FlyError::Table`]: no gear at the scenario's temperature.
-    pub fn with_table(mut self, own: OwnTable) -> Result<Self, FlyError> {
-        own.unit(self.scenario.temperature_c)?;
-        self.kind = own.kind()?;
-        self.own = Some(own);
-        Ok(self)
+    /// [`FlyError::Table`]: no table, or no gear at the scenario's temperature.
+    pub fn with_table(self, image: &[u8]) -> Result<Self, FlyError> {
+        let own = OwnDrive::new(image, self.scenario.temperature_c)?;
+        Ok(Flown { kind: own.kind, own: Some(own), ..self })
     }
 
     /// Whether its drive carries its load.
@@ -112,7 +109,7 @@ impl Flown {
     pub fn carries(&self) -> Result<(), FlyError> {
         let largest_n_m = self.scenario.largest_n_m();
         let (most_n_m, of) = match &self.own {
-            Some(own) => (own.largest_n_m()?, "this table".to_owned()),
+            Some(own) => (own.largest_n_m, "this table".to_owned()),
             None => (self.kind.rated_torque_n_m(), format!("a {} generator", self.kind)),
         };
         if largest_n_m > most_n_m {

@@ -64,41 +64,27 @@ pub fn gear_at(table: &Table<'_>, temperature_c: f64) -> Result<Gear, OwnTableEr
     gear_of(table, temperature_c, TABLE_DRAG_N_M).ok_or(OwnTableError::NoGear)
 }
 
-/// The image of a table that was checked.
+/// What a table has for a flight at one temperature.
 #[derive(Debug, Clone, PartialEq)]
-pub struct OwnTable {
-    image: Vec<u8>,
+pub struct OwnDrive {
+    /// The bytes of the table.
+    pub(super) image: Vec<u8>,
+    /// The generator that it is of.
+    pub(super) kind: GeneratorKind,
+    /// As the table says, and built with the errors that every unit here has.
+    pub(super) unit: Unit,
+    /// Largest torque that the table has, N·m.
+    pub(super) largest_n_m: f64,
 }
 
-impl OwnTable {
-    /// Of the bytes of a table.
-    ///
-    /// # Errors
-    /// [`OwnTableError::Image`].
-    pub fn new(image: Vec<u8>) -> Result<Self, OwnTableError> {
-        Table::check(&image)?;
-        Ok(Self { image })
-    }
-
-    /// Its bytes.
-    #[must_use]
-    pub fn image(&self) -> &[u8] {
-        &self.image
-    }
-
-    /// A unit of its drive at a temperature: as the table says, and built with the errors that every unit here has.
-    pub(super) fn unit(&self, temperature_c: f64) -> Result<Unit, OwnTableError> {
-        let table = Table::check(&self.image)?;
-        Ok(Unit::of_gear(*table.drive(), gear_at(&table, temperature_c)?))
-    }
-
-    /// The generator that it is of.
-    pub(super) fn kind(&self) -> Result<GeneratorKind, OwnTableError> {
-        generator_of(&Table::check(&self.image)?).ok_or(OwnTableError::NoGear)
-    }
-
-    /// Largest torque that it has, N·m.
-    pub(super) fn largest_n_m(&self) -> Result<f64, OwnTableError> {
-        Ok(f64::from(Table::check(&self.image)?.torque_range_n_m()[1]))
+impl OwnDrive {
+    pub(super) fn new(image: &[u8], temperature_c: f64) -> Result<Self, OwnTableError> {
+        let table = Table::check(image)?;
+        Ok(Self {
+            image: image.to_vec(),
+            kind: generator_of(&table).ok_or(OwnTableError::NoGear)?,
+            unit: Unit::of_gear(*table.drive(), gear_at(&table, temperature_c)?),
+            largest_n_m: f64::from(table.torque_range_n_m()[1]),
+        })
     }
 }
