@@ -62,11 +62,14 @@ pub struct Examination {
 /// # Errors
 /// If files cannot be written.
 pub fn run(settings: &Settings) -> io::Result<Examination> {
-    let truths = in_parallel(settings.jobs, (0..settings.cases).collect(), |index| match &settings.revealed {
-        Some(dir) => Truth::read(&dir.join(format!("{}.json", Case::name(settings.seed, index)))),
-        None => Ok(Question::draw(settings.seed, index, &settings.draw).truth()),
+    let drawn = in_parallel(settings.jobs, (0..settings.cases).collect(), |index| match &settings.revealed {
+        Some(dir) => Ok((Truth::read(&dir.join(format!("{}.json", Case::name(settings.seed, index))))?, None)),
+        None => {
+            let question = Question::draw(settings.seed, index, &settings.draw);
+            Ok((question.truth(), question.kept()))
+        }
     });
-    let truths = truths.into_iter().collect::<io::Result<Vec<Truth>>>()?;
+    let (truths, kept): (Vec<Truth>, Vec<_>) = drawn.into_iter().collect::<io::Result<Vec<_>>>()?.into_iter().unzip();
     let commitment = commitment(&truths);
     println!("seed {}{}", settings.seed, settings.draw.options());
     println!("truth of {} cases, BLAKE3 {commitment}", truths.len());
@@ -79,7 +82,7 @@ pub fn run(settings: &Settings) -> io::Result<Examination> {
     // In the order of their names, which is no order.
     let mut order: Vec<usize> = (0..truths.len()).collect();
     order.sort_by(|a, b| truths[*a].name.cmp(&truths[*b].name));
-    let answers = in_parallel(settings.jobs, order, |at| (at, ask(settings, truths[at].index, &truths[at].name)));
+    let answers = in_parallel(settings.jobs, order, |at| (at, ask(settings, &truths[at], kept[at].as_ref())));
     let mut judged: Vec<Judged> = Vec::new();
     for (at, asked) in answers {
         let (answer, seconds) = asked?;
@@ -121,14 +124,16 @@ fn write_truths(dir: &Path, truths: &[Truth]) -> io::Result<()> {
     truths.iter().try_for_each(|truth| fs::write(dir.join(format!("{}.json", truth.name)), truth.json()))
 }
 
-/// Writes the data of a case and has it diagnosed.
-fn ask(settings: &Settings, index: u64, name: &str) -> io::Result<(Result<Answer, String>, f64)> {
+/// Writes the data of a case, drawn again where it was not kept, and has it diagnosed.
+fn ask(settings: &Settings, truth: &Truth, kept: Option<&Question>) -> io::Result<(Result<Answer, String>, f64)> {
+    let name = &truth.name;
     let given = settings.out.join("cases").join(name);
     let answered = settings.out.join("answers").join(name);
     fs::create_dir_all(&given)?;
     fs::create_dir_all(&answered)?;
     {
-        let question = Question::draw(settings.seed, index, &settings.draw);
+        let again = kept.is_none().then(|| Question::draw(settings.seed, truth.index, &settings.draw));
+        let question = kept.or(again.as_ref()).expect("one or the other");
         fs::write(given.join("data.csv"), question.data())?;
         fs::write(given.join("nominal.toml"), question.nominal_toml())?;
     }

@@ -23,6 +23,12 @@ impl Question {
         }
     }
 
+    /// What is small enough to be held until it is asked: a case of the first families holds its whole run, and is drawn
+    /// in a moment; one of the others takes a second or two, as the oracle has a hand in it.
+    pub fn kept(self) -> Option<Self> {
+        matches!(self, Self::Fresh(..)).then_some(self)
+    }
+
     /// The truth.
     pub fn truth(&self) -> Truth {
         match self {

@@ -83,10 +83,12 @@ fn faults_of_the_data_are_drawn_and_counted_when_asked_for() {
     let dir = tempfile::tempdir().unwrap();
     let open = dir.path().join("open").display().to_string();
     let knows = ["--manner", "truth", "--truth", &open];
-    let (exam, _) = examine(dir.path(), &knows, &["--cases", "50", "--kind", "fault", "--reveal", &open]);
+    // Each fault twice.
+    let faults = ["--cases", "12", "--kind", "fault"];
+    let (exam, _) = examine(dir.path(), &knows, &[&faults[..], &["--reveal", &open]].concat());
     all(&exam, "fault_named");
     none(&exam, "fault_blamed_on_a_cause");
-    let (exam, _) = examine(dir.path(), &["--manner", "always"], &["--cases", ALL_KINDS, "--kind", "fault"]);
+    let (exam, _) = examine(dir.path(), &["--manner", "always"], &[&faults[..], &["--revealed", &open]].concat());
     none(&exam, "fault_named");
     all(&exam, "fault_blamed_on_a_cause");
 }
@@ -111,7 +113,7 @@ fn a_plant_of_its_own_is_scored_by_the_same_rules() {
     let right = &levels[0]["right"];
     assert!(right["of"].as_u64().unwrap() >= 12 && right["of"] == right["right"], "{right}");
     assert_eq!(exam["scores"]["families"][0][0], "E");
-    let (exam, _) = examine(dir.path(), &["--manner", "always"], &bench);
+    let (exam, _) = examine(dir.path(), &["--manner", "always"], &[&bench[..], &["--revealed", &open]].concat());
     all(&exam, "null_named");
     all(&exam, "outside_named");
     assert!(exam["scores"]["reliability"]["levels"][0]["right"]["right"].as_u64().unwrap() < 5);
@@ -191,10 +193,8 @@ fn one_that_always_names_wear_is_right_on_wear_alone() {
             assert_eq!(strict, case["hidden"][0][0] == "wear", "{case}");
         }
     }
-    let (dir, case) = (
-        tempfile::tempdir().unwrap(),
-        ["--cases", ALL_KINDS, "--kind", "single", "--cause", "wear", "--clear", "--rich"],
-    );
+    let (dir, case) =
+        (tempfile::tempdir().unwrap(), ["--cases", "5", "--kind", "single", "--cause", "wear", "--clear", "--rich"]);
     let (exam, _) = examine(dir.path(), &["--manner", "always"], &case);
     all(&exam, "first_name");
 }
