@@ -241,7 +241,7 @@ fn a_run_that_does_not_converge_ends_with_1_and_touches_no_file() {
 fn a_load_beyond_the_last_stable_one_leaves_the_loads_before_it() {
     let desk = Desk::new();
     desk.line("new small.toml --teeth 60 --module 0.2 -q").done();
-    let base = "simulate --drive small.toml --generator cam --mesh coarse --path pitch --max-iterations 10";
+    let base = "simulate --drive small.toml --generator cam --mesh coarse --path pitch --max-iterations 5";
     let run = desk.line(&format!("{base} --torque-n-m 300"));
     assert_eq!(run.code, 1, "{}", run.stderr);
     assert_eq!(names(&desk.path("out")), ["results.partial.csv"]);

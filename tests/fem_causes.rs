@@ -28,6 +28,7 @@ use flexspline_sim::nominal::Nominal;
 use flexspline_sim::stepping::{Method, Problem, SolverSettings};
 use flexspline_sim::units::ARCSEC_PER_RAD;
 use flexspline_tests::command::Desk;
+use flexspline_tests::long;
 use rayon::prelude::*;
 
 const NOISE_ARCSEC: f64 = 0.5;
@@ -58,6 +59,8 @@ pub(crate) fn known() -> &'static (Vec<u8>, Arc<Kernels>) {
         let plan = KernelPlan {
             torques_n_m: vec![2.0, 10.0, 60.0],
             sizes_um: vec![5.5, 8.0, 12.0],
+            // The drives that are told by them are those of the long form.
+            directions: if long() { 19 } else { 10 },
             ..KernelPlan::for_generator(GeneratorKind::Cam)
         };
         let kernels = make(&Drive::hhd_95(), GeneratorKind::Cam, &plan, coarse(), &|_| ControlFlow::Continue(()));

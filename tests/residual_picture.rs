@@ -136,7 +136,7 @@ fn session(angle: Vec<f64>) -> Session {
 
 #[test]
 fn a_damaged_tooth_is_a_pulse_in_its_place_and_a_clean_drive_has_none() {
-    let (seeds, mut clean) = (seeds(20, 60), 0);
+    let (seeds, mut clean) = (seeds(8, 60), 0);
     for seed in 0..seeds {
         let mut random = fastrand::Rng::with_seed(seed);
         let angle = angles(12_000, 60.0, &mut random);

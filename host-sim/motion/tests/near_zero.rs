@@ -32,26 +32,33 @@ fn rms(scenario: &Scenario, unit: &Unit, kind: usize) -> f64 {
 const FLOATS_N_M: f64 = 0.06;
 
 /// What is left is the servo's, as it crosses the play at the reversals: the ideal has it too. A load that is as large
-/// as the drag floats from flank to flank, and there nothing knows where it is.
+/// as the drag floats from flank to flank, and there nothing knows where it is. In the short form each share of a drag
+/// stands for one of the drags; `FLEXSPLINE_LONG` flies all of them with all.
 #[test]
 fn about_zero_load_the_core_is_never_worse_than_no_compensation_and_near_the_ideal() {
     let unit = unit();
     let mut worst = [(0.0_f64, String::new()), (0.0, String::new())];
     let mut flights = 0;
-    for drag_n_m in [0.1, 0.5, 1.0] {
-        for share in [-1.5, -0.6, 0.0, 0.3, 0.9, 2.0] {
+    let long = std::env::var_os("FLEXSPLINE_LONG").is_some();
+    for (row, drag_n_m) in [0.1, 0.5, 1.0].into_iter().enumerate() {
+        for (column, share) in [-1.5, -0.6, 0.0, 0.3, 0.9, 2.0].into_iter().enumerate() {
+            if !long && (row + column) % 3 != 0 {
+                continue;
+            }
             let load_n_m = share * drag_n_m;
             let known = calm(load_n_m, drag_n_m, 0.0, TorqueKnown::OnLoad);
             let [none, ideal] = [0, IDEAL].map(|kind| rms(&known, &unit, kind));
-            for (torque, noise_n_m) in [
+            let kinds = [
                 (TorqueKnown::OnLoad, 0.05),
                 (TorqueKnown::OnLoad, 0.3),
                 (TorqueKnown::InMesh, 0.03),
                 (TorqueKnown::InMesh, 0.3),
                 (TorqueKnown::Current, 0.0),
-            ] {
+            ];
+            // The same noise in either form.
+            for (seed, (torque, noise_n_m)) in (1 + kinds.len() * (6 * row + column)..).zip(kinds) {
                 flights += 1;
-                let scenario = Scenario { seed: flights, ..calm(load_n_m, drag_n_m, noise_n_m, torque) };
+                let scenario = Scenario { seed: seed as u32, ..calm(load_n_m, drag_n_m, noise_n_m, torque) };
                 let core = rms(&scenario, &unit, COMPENSATED);
                 let what = format!(
                     "load {load_n_m:.2}, drag {drag_n_m}, noise {noise_n_m} N.m, {torque:?}: {none:.2} without, \

@@ -62,13 +62,14 @@ fn flights() -> Vec<(&'static str, Scenario)> {
 }
 
 /// Friction is known to 80 %, so below some newton metres the current does not tell the flank: the core then gains
-/// less, and never loses.
+/// less, and never loses. `FLEXSPLINE_LONG` draws the noise twice.
 #[test]
 fn the_bound_holds_and_the_core_gains_without_a_torque_sensor() {
     let unit = dish::unit(Drive::new(188, 190, FixedMember::Flexspline).unwrap());
+    let long = std::env::var_os("FLEXSPLINE_LONG").is_some();
     let mut least = 1.0_f64;
     for (name, scenario) in flights() {
-        for seed in [1, 2] {
+        for seed in if long { 1..=2 } else { 1..=1 } {
             let scenario = Scenario { seed, ..scenario.clone() };
             let [none, core] = [0, COMPENSATED].map(|kind| fly_one(&scenario, &unit, kind).unwrap());
             let [without, with] = [&none, &core].map(|flown| flown.error.rms());

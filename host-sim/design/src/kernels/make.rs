@@ -543,7 +543,7 @@ mod tests {
     fn a_pitch_error_and_an_oval_do_what_fem_says() {
         // 0.2 µm: at 2 N m a tooth gives way by no more. The kernel's harmonic is the mean over tooth phases, the run
         // is at one of them, which with the few teeth that carry 2 N m differs by 2 % at order 2 and 7 % at order 6.
-        let (places, size) = ([0.0, 20.0, 47.0, 70.0], 0.2);
+        let (places, size) = ([20.0, 47.0], 0.2);
         for torque in [2.0, 50.0, -50.0] {
             type Change = fn(&mut AsBuilt);
             let cases: [(&str, Change, super::super::Gain, f64, f64); 4] = [

@@ -948,7 +948,9 @@ mod tests {
         };
         let usual = of(1.0, 5e7);
         assert!((300.0..900.0).contains(&usual), "{usual}");
-        for (scale, penalty) in [(1.0, 5e6), (1.0, 5e8), (0.3, 5e7), (3.0, 5e7)] {
+        // A softer flank and a smaller drive; `FLEXSPLINE_LONG` has a stiffer one and a larger one too.
+        let count = if std::env::var_os("FLEXSPLINE_LONG").is_some() { 4 } else { 2 };
+        for (scale, penalty) in [(1.0, 5e6), (0.3, 5e7), (1.0, 5e8), (3.0, 5e7)].into_iter().take(count) {
             let other = of(scale, penalty);
             assert!((other / usual - 1.0).abs() < 0.05, "{scale} {penalty}: {other} {usual}");
         }
