@@ -1871,7 +1871,7 @@ static int32_t moved_by(fxt_joint *now, int32_t wanted, int32_t size)
     return now->correction;
 }
 
-/* Without a table or a joint: where the generator is. */
+/* Without a table or a joint: where the generator is by what there is; 0 where nothing is known. */
 static fxt_output standing(const fxt_input *input, int64_t generator)
 {
     fxt_output out = {0, 0, 0.0f, 0.05f, 0.0f, 0.0f, FXT_DISABLED, FXT_NOT_CORRECTED | FXT_NO_JOINT_OR_TABLE};
@@ -2036,6 +2036,34 @@ bool fxt_encoder_read(fxt_encoder *encoder, uint64_t reading, int64_t *angle)
     }
     *angle = encoder_angle(encoder);
     return true;
+}
+
+/* Whether three moves of a tick are less than half of what the register counts. */
+static bool tells_turns(const fxt_encoder *encoder, int32_t largest_move)
+{
+    const uint64_t counts = ((uint64_t)(uint32_t)largest_move * encoder->counts_per_turn >> 32) + 1u;
+    return counts * 6u < (encoder->wrap_bits > 0u ? most_of_bits(encoder->wrap_bits) : (uint64_t)encoder->counts_per_turn);
+}
+
+static uint64_t size_of(int64_t way)
+{
+    return way < 0 ? (uint64_t)0 - (uint64_t)way : (uint64_t)way;
+}
+
+bool fxt_joint_read(const fxt_joint *joint, fxt_encoder *encoder, uint64_t reading, int64_t *angle)
+{
+    if (angle == NULL || !is_made(joint) || !is_encoder(encoder) || !can_read(encoder, reading) ||
+        !tells_turns(encoder, joint->largest_move)) {
+        return false;
+    }
+    const int64_t since_zero = encoder_since_zero(encoder, joint->generator);
+    const uint64_t believed = encoder_register(encoder, plus(since_zero, encoder->zero_counts));
+    if (joint->sampled != 0u && encoder->started != 0u &&
+        size_of(encoder_way(encoder, believed, reading)) < size_of(encoder_way(encoder, encoder->reading, reading))) {
+        encoder->since_zero = since_zero;
+        encoder->reading = believed;
+    }
+    return fxt_encoder_read(encoder, reading, angle);
 }
 
 uint64_t fxt_encoder_reading(const fxt_encoder *encoder, int64_t angle)

@@ -241,7 +241,7 @@ bool fxt_steady_error(const fxt_table *table, int64_t generator, float torque_n_
  *       !fxt_encoder_init(&encoder, 65536, 16, false, 0) || !fxt_joint_request(&joint, FXT_TRACKING)) stop();
  *   // every tick:
  *   fxt_input in = {.target = wanted, .torque_n_m = torque_n_m, .temperature_c = temperature_c};
- *   in.has_generator = fxt_encoder_read(&encoder, timer_register(), &in.generator);
+ *   in.has_generator = fxt_joint_read(&joint, &encoder, timer_register(), &in.generator);
  *   move_generator_to(fxt_tick(&table, &joint, &in).command);
  */
 
@@ -284,7 +284,7 @@ typedef enum fxt_limit {
     FXT_NO_JOINT /**< the pointer to the joint is NULL */
 } fxt_limit;
 
-/** A joint: its limits, and what changes while it runs. Its fields are nobody else's, but for the play, which may be saved. Memory of zeros is no
+/** A joint: its limits, and what changes while it runs; one for each axis. Its fields are nobody else's, but for the play, which may be saved. Memory of zeros is no
  * joint: it corrects nothing. */
 typedef struct fxt_joint {
     fxt_play play;
@@ -313,13 +313,13 @@ typedef enum fxt_flag {
     FXT_LATE = 4,           /**< ticks were missed */
     FXT_HELD_BACK = 8,      /**< the limiter held the correction back */
     FXT_NOT_CORRECTED = 16, /**< no correction could be made; the last one is kept or fades out */
-    FXT_NO_JOINT_OR_TABLE = 128, /**< the joint was not made or the table was refused; the command is where the generator is */
+    FXT_NO_JOINT_OR_TABLE = 128, /**< the joint was not made or the table was refused; do not follow the command (fxt_tick) */
     FXT_IN_SAFE_MODE = 256
 } fxt_flag;
 
 /** One tick's results. */
 typedef struct fxt_output {
-    int64_t command, output;      /**< counts: the generator angle to command; where the output is */
+    int64_t command, output;      /**< counts: the generator angle to command, which leaps where the target leaps; where the output is */
     float transmission_error_rad; /**< now; 0 if disabled */
     float uncertainty_rad;        /**< it lies within this of it, as far as play and jumps go */
     float correction_rad;         /**< in the command: target less command over ratio */
@@ -336,12 +336,14 @@ bool fxt_joint_request(fxt_joint *joint, fxt_mode mode);
 fxt_mode fxt_joint_mode(const fxt_joint *joint);
 /** Which side of the play the drive rests on is not known any more, as after work on it. */
 void fxt_joint_forget_side(fxt_joint *joint);
-/** One tick: in the order of its calls the play follows the generator. The correction moves within rate and acceleration, and stays within the
- * error limit of the table (times 1.001, and 16 counts), whatever comes in. Without a joint, a table or an input the command is where the generator
- * is. It does not see that the memory of the table changed: fxt_page_intact. */
+/** One tick: in the order of its calls the play follows the generator. The command is the target times the ratio less a correction. The correction
+ * moves within rate and acceleration, and stays within the error limit of the table (times 1.001, and 16 counts), whatever comes in. The target is
+ * taken as it is: where it leaps the command leaps, without a flag, so its rate is yours to limit. Without a joint, a table or an input
+ * (FXT_NO_JOINT_OR_TABLE) the command is the sample of the input, not judged; without one the last that was believed; 0 if there was none: do not
+ * follow it. It does not see that the memory of the table changed: fxt_page_intact. */
 fxt_output fxt_tick(const fxt_table *table, fxt_joint *joint, const fxt_input *input);
 
-/** An encoder and where it is: from its register to an angle and back, as the core's; nothing drifts, also where the counts in a turn are no power
+/** An encoder and where it is, one for each axis: from its register to an angle and back, as the core's; nothing drifts, also where the counts in a turn are no power
  * of two. Its fields are nobody else's; memory of zeros is none. */
 typedef struct fxt_encoder {
     uint64_t reading;
@@ -354,11 +356,19 @@ typedef struct fxt_encoder {
  * signed one is taken by its bits); 0: after each turn. reversed: it counts up where the angle falls. zero_counts: what it reads at the angle 0,
  * -2^62 to 2^62. False, and no encoder, if one is out of its range. */
 bool fxt_encoder_init(fxt_encoder *encoder, uint32_t counts_per_turn, uint8_t wrap_bits, bool reversed, int64_t zero_counts);
-/** The first reading after a reset: of all angles with this reading the one nearest to near_counts (2^-32 turn), one that was saved. Without this
- * call the first reading is taken near 0. False if the register cannot read that. */
+/** The first reading after a reset, to be called before any other: of all angles with this reading the one nearest to near_counts (2^-32 turn), one
+ * that was saved. Without this call the first reading is taken nearest to 0: off by whole turns of the register where the generator is not there,
+ * and no flag says so. False if the register cannot read that. */
 bool fxt_encoder_start(fxt_encoder *encoder, uint64_t reading, int64_t near_counts);
-/** Takes a reading and tells the angle, counts of 2^-32 turn, to the nearest. Between two readings it moves by less than half of what the register
- * counts. False, and nothing changes, if the register cannot read that: give the tick no sample then. */
+/** Takes a reading of the encoder of a joint's generator and tells the angle to give to the next tick, counts of 2^-32 turn, to the nearest. A
+ * reading that the tick does not believe (FXT_GLITCH) moves no turn: the next is taken from the reading before or from the angle that was believed
+ * last, whichever is nearer. So the turns are right as soon as the readings are, if no more than `patience` in a row were wrong and the generator
+ * made less than a third of what the register counts meanwhile. False, and nothing changes: the register cannot read that; there is no joint or no
+ * encoder; or generator_rate_rad_s allows a sixth of what the register counts in a tick, so that motion hides a wrong bit. Give the tick no sample
+ * then. */
+bool fxt_joint_read(const fxt_joint *joint, fxt_encoder *encoder, uint64_t reading, int64_t *angle);
+/** The same for an encoder that no joint judges. Between two readings it moves by less than half of what the register counts; one wrong reading
+ * half of that away moves it by all that the register counts, for good. False, and nothing changes, if the register cannot read that. */
 bool fxt_encoder_read(fxt_encoder *encoder, uint64_t reading, int64_t *angle);
 /** What the register reads at an angle, to the nearest count: for a drive that is commanded in counts of its encoder. 0 without an encoder. */
 uint64_t fxt_encoder_reading(const fxt_encoder *encoder, int64_t angle);

@@ -35,7 +35,8 @@
 // The state was not whole, and was taken from its other copy; where neither was, the joint is safe.
 #define FLEXSPLINE_FLAG_STATE_TORN 64
 
-// The settings are not whole: `flexspline_joint_mend`, or make the joint anew.
+// The settings are not whole: `flexspline_joint_mend`, or make the joint anew. If no correction could be made either,
+// the command is the last sample that was believed (0 before the first): hold the generator.
 #define FLEXSPLINE_FLAG_JOINT_TORN 128
 
 // The joint is in mode safe.
@@ -485,7 +486,8 @@ typedef struct FlexsplineInput {
 
 // One tick's results. Angles are counts of 2^-32 turn.
 typedef struct FlexsplineOutput {
-  // Generator angle to command.
+  // Generator angle to command: the target times the ratio, as it is, less the correction. Where the target leaps
+  // this leaps, without a flag: its rate is the caller's to limit.
   int64_t command_counts;
   // Where the output is estimated to be.
   int64_t output_counts;
@@ -1131,10 +1133,25 @@ enum FlexsplineStatus flexspline_encoder_start(struct FlexsplineEncoder *encoder
                                                uint64_t reading,
                                                int64_t near_counts);
 
-// Takes a reading and tells the angle, counts of 2^-32 turn, to the nearest. Between two readings it may move by less
-// than half of what the register counts. `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that (give the tick
-// no sample then), `FLEXSPLINE_STATUS_NOT_INITIALISED` before `flexspline_encoder_start`, and after an upset of more
-// than a word (one word is mended): make it and start it again.
+// Takes a reading of the encoder of a joint's generator and tells the angle to give to its next tick, counts of 2^-32
+// turn, to the nearest. A reading that the tick does not believe (`FLEXSPLINE_FLAG_GLITCH`) moves no turn: the next is
+// taken from the reading before or from the angle that was believed last, whichever is nearer. So the turns are right
+// as soon as the readings are, if no more than `patience` in a row were wrong and the generator made less than a third
+// of what the register counts meanwhile. `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that (give the tick
+// no sample then), or if `generator_rate_rad_s` allows a sixth of what the register counts in a tick, so that motion
+// hides a wrong bit; `FLEXSPLINE_STATUS_NOT_INITIALISED` before `flexspline_encoder_start`, and where encoder or joint
+// are lost.
+enum FlexsplineStatus flexspline_joint_read(const struct FlexsplineJoint *joint,
+                                            const struct FlexsplineState *state,
+                                            struct FlexsplineEncoder *encoder,
+                                            uint64_t reading,
+                                            int64_t *angle_counts);
+
+// The same for an encoder that no joint judges: one wrong reading, half of what the register counts away, moves it by
+// all that it counts, for good. Takes a reading and tells the angle, counts of 2^-32 turn, to the nearest. Between two
+// readings it may move by less than half of what the register counts. `FLEXSPLINE_STATUS_ARGUMENT` if the register
+// cannot read that (give the tick no sample then), `FLEXSPLINE_STATUS_NOT_INITIALISED` before
+// `flexspline_encoder_start`, and after an upset of more than a word (one word is mended): make it and start it again.
 enum FlexsplineStatus flexspline_encoder_read(struct FlexsplineEncoder *encoder,
                                               uint64_t reading,
                                               int64_t *angle_counts);

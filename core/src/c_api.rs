@@ -102,7 +102,8 @@ pub const FLEXSPLINE_FLAG_NOT_CORRECTED: u16 = 16;
 pub const FLEXSPLINE_FLAG_TABLE_DOUBT: u16 = 32;
 /// The state was not whole, and was taken from its other copy; where neither was, the joint is safe.
 pub const FLEXSPLINE_FLAG_STATE_TORN: u16 = 64;
-/// The settings are not whole: `flexspline_joint_mend`, or make the joint anew.
+/// The settings are not whole: `flexspline_joint_mend`, or make the joint anew. If no correction could be made either,
+/// the command is the last sample that was believed (0 before the first): hold the generator.
 pub const FLEXSPLINE_FLAG_JOINT_TORN: u16 = 128;
 /// The joint is in mode safe.
 pub const FLEXSPLINE_FLAG_SAFE: u16 = 256;
@@ -230,7 +231,8 @@ pub struct FlexsplineInput {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FlexsplineOutput {
-    /// Generator angle to command.
+    /// Generator angle to command: the target times the ratio, as it is, less the correction. Where the target leaps
+    /// this leaps, without a flag: its rate is the caller's to limit.
     pub command_counts: i64,
     /// Where the output is estimated to be.
     pub output_counts: i64,

@@ -91,7 +91,7 @@ struct At {
 
 impl EncoderState {
     /// Nowhere: it is not whole.
-    #[cfg(feature = "c-api")]
+    #[cfg(any(test, feature = "c-api"))]
     pub(crate) const NOWHERE: Self = Self { at: Sealed::of([0; 4], 0) };
 
     fn of(At { reading, since_zero }: At) -> Self {
@@ -166,6 +166,9 @@ impl Encoder {
     /// Takes a reading: less than half of what the register counts since the one before, or half of it backward. False,
     /// and nothing has changed, if the register cannot read that, or settings or state are lost: give the tick no
     /// sample then.
+    ///
+    /// One wrong reading, half of the register away, moves it by all that the register counts, for good: the encoder of
+    /// a joint's generator is read by [`Joint::read`](crate::Joint::read), which sees to that.
     #[must_use]
     pub fn read(&self, state: &mut EncoderState, reading: u64) -> bool {
         let read = || {
@@ -176,6 +179,31 @@ impl Encoder {
         let next = read();
         *state = next.unwrap_or(*state);
         next.is_some()
+    }
+
+    /// As [`Self::read`], from the reading before or from the angle that was believed last, whichever is nearer, where
+    /// three moves of a tick are less than half of what the register counts: then one wrong reading that is not
+    /// believed moves no turn. The angle; `None`, and nothing has changed, as above.
+    pub(crate) fn read_near(
+        &self,
+        state: &mut EncoderState,
+        reading: u64,
+        believed: Option<i64>,
+        largest_move: i32,
+    ) -> Option<i64> {
+        let settings = self.settings().filter(|settings| settings.tells_turns(largest_move))?;
+        let at = state.open()?;
+        let last = (settings.way(at.reading, reading)?, at.since_zero);
+        let from = |believed| {
+            let since_zero = settings.since_zero(believed);
+            let way = settings.way(settings.register(since_zero.wrapping_add(settings.zero_counts)), reading);
+            way.map(|way| (way, since_zero))
+        };
+        let nearer = believed.and_then(from).filter(|(way, _)| way.unsigned_abs() < last.0.unsigned_abs());
+        let (way, from) = nearer.unwrap_or(last);
+        let since_zero = from.wrapping_add(way);
+        *state = EncoderState::of(At { reading, since_zero });
+        Some(settings.angle(since_zero))
     }
 
     /// The angle, 2⁻³² turn, to the nearest: for [`GeneratorAngle::from_counts`](crate::GeneratorAngle::from_counts) or
@@ -234,6 +262,16 @@ impl EncoderSettings {
             EncoderWrap::Turn => counts.checked_rem_euclid(self.counts_per_turn as i64).unwrap_or(0) as u64,
             EncoderWrap::Bits(bits) => counts as u64 & mask(bits),
         }
+    }
+
+    /// Whether three such moves, 2⁻³² turn, are less than half of what the register counts.
+    const fn tells_turns(&self, largest_move: i32) -> bool {
+        let counts = ((largest_move as u64).wrapping_mul(self.counts_per_turn as u64) >> 32).wrapping_add(1);
+        let most = match self.wrap {
+            EncoderWrap::Turn => self.counts_per_turn as u64,
+            EncoderWrap::Bits(bits) => mask(bits),
+        };
+        counts.wrapping_mul(6) < most
     }
 
     /// The shorter way from a reading to another; `None` if the register cannot read the other.

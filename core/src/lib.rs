@@ -56,10 +56,10 @@
 //! # assert!(reached.output.minus_rad(target).abs() < 2e-8, "{}", reached.output.minus_rad(target));
 //! ```
 //! What an encoder counts becomes an angle by [`Encoder`], and back: any counts in a turn, registers that begin anew,
-//! no drift. In a slow rate group ([`RateGroup`]) the firmware tells the temperature ([`Store::set_temperature`]) and
-//! lets a few words of the images be checked ([`Store::check_images`]). Where no loop runs, as on the host, [`Table`]
-//! alone answers: [`Table::forward`],
-//! [`Table::inverse`].
+//! no drift; that of the generator is read by [`Joint::read`], with which a wrong bit moves no turn. In a slow rate
+//! group ([`RateGroup`]) the firmware tells the temperature ([`Store::set_temperature`]) and lets a few words of the
+//! images be checked ([`Store::check_images`]). Where no loop runs, as on the host, [`Table`] alone answers:
+//! [`Table::forward`], [`Table::inverse`].
 //!
 //! # Beside the table
 //! What the drive does beyond its table goes into the [`Adjustment`] of the next tick, from whatever knows of it.

@@ -140,7 +140,7 @@ int main(void)
         int64_t generator;
         float torque;
         must(flexspline_encoder_reading(&encoder, command, &reading), "reading");
-        must(flexspline_encoder_read(&encoder, reading, &generator), "encoder");
+        must(flexspline_joint_read(&joint, &state, &encoder, reading, &generator), "encoder");
         must(flexspline_torque_tick(&path, FLEXSPLINE_TORQUE_ON_LOAD, load, forward ? 1 : -1, &torque), "torque");
 
         // Where the unit is.

@@ -305,6 +305,16 @@ static void call_encoder(fxt_encoder *encoder)
         same(fxt_encoder_reading(encoder, (int64_t)asked) == (uint64_t)told, "reading at an angle", 7);
 }
 
+static void read_by_joint(const fxt_joint *joint, fxt_encoder *encoder)
+{
+    const uint64_t asked = (uint64_t)angle();
+    const bool taken = byte() != 0u;
+    const int64_t told = angle();
+    int64_t found = 0;
+    same(fxt_joint_read(joint, encoder, asked, &found) == taken, "a reading for a joint or none", 8);
+    same(!taken || found == told, "angle of a reading for a joint", 8);
+}
+
 /* The memory of an accepted image changes after the check: whatever is read then lies in it, and an error is within the stated limit. */
 static void damage(const fxt_table *table, uint8_t *image)
 {
@@ -364,9 +374,11 @@ static int compare(void)
             make_encoder(&encoder);
         else if (record == 7)
             call_encoder(&encoder);
+        else if (record == 8)
+            read_by_joint(&joint, &encoder);
         else
             ended = record == 0;
-        if (record > 7)
+        if (record > 8)
             whole = false;
     }
     print_number(calls);

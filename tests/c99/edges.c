@@ -8,6 +8,7 @@
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #ifdef __SSE__
 #include <xmmintrin.h>
@@ -333,6 +334,20 @@ static int joints(void)
     EXPECT(fxt_tick(&table, &joint, NULL).command == 77 && fxt_tick(&refused, &joint, &blind).command == 77);
     out = fxt_tick(NULL, &joint, &input);
     EXPECT(out.command == 77 && out.quality == FXT_DISABLED && out.flags == ((uint32_t)FXT_NOT_CORRECTED | FXT_NO_JOINT_OR_TABLE));
+    /* A sample that is not there: the last that was believed, and 0 where none was. */
+    const fxt_input dark = {0, 0, 1.0f, 20.0f, 0, false};
+    joint.generator = 55;
+    EXPECT(fxt_tick(&refused, &joint, &dark).command == 55 && fxt_tick(&table, NULL, &dark).command == 0);
+    joint.generator = 0;
+    EXPECT(fxt_tick(&refused, &joint, &dark).command == 0);
+    /* A target that leaps leaps in the command; the correction does not. */
+    static fxt_joint leaping;
+    EXPECT(fxt_joint_init(&leaping, &usual) == FXT_LIMITS_OK && fxt_joint_request(&leaping, FXT_TRACKING));
+    fxt_input leap = {0, 0, 8.0f, 20.0f, 0, true};
+    const int64_t stands = fxt_tick(&table, &leaping, &leap).command;
+    leap.target = INT64_C(1) << 30;
+    const fxt_output leapt = fxt_tick(&table, &leaping, &leap);
+    EXPECT(leapt.command - stands > INT64_C(90) << 30 && fabsf(leapt.correction_rad) <= 5.0e-5f);
     /* Memory of zeros, and memory that changed, is no joint. */
     static fxt_joint zeros;
     EXPECT(fxt_tick(&table, &zeros, &input).command == 77 && fxt_joint_mode(&zeros) == FXT_SAFE);
@@ -378,8 +393,44 @@ static int joints(void)
     return 0;
 }
 
+/* Each bit of a reading wrong once, everywhere in the register and at every speed within the limit: what moves half of the register is not
+ * believed, and the turns are right with the next reading. An encoder alone loses them. */
+static int wrong_bits(void)
+{
+    const made of = plain();
+    const int64_t fastest = INT64_C(410000000);
+    fxt_table table;
+    int lost = 0;
+    EXPECT(fxt_open(&table, of.image, of.bytes).reason == FXT_OK);
+    for (int64_t i = 0; i < 16 * 16 * 9; i++) {
+        const int64_t bit = i % 16, start = (INT64_C(3) << 32) + i / 16 % 16 * (INT64_C(3) << 27), speed = (i / 256 - 4) * (fastest / 4);
+        fxt_joint joint;
+        fxt_encoder judged, alone;
+        int64_t now = 0, other = 0, last = start;
+        EXPECT(fxt_joint_init(&joint, &usual) == FXT_LIMITS_OK && fxt_encoder_init(&judged, 65536, 16, false, 77));
+        EXPECT(fxt_encoder_start(&judged, fxt_encoder_reading(&judged, start), start));
+        alone = judged;
+        for (int tick = 0; tick < 14; tick++) {
+            last = start + tick * speed;
+            const uint64_t good = fxt_encoder_reading(&judged, last), reading = tick == 4 ? good ^ (uint64_t)1 << bit : good;
+            fxt_input input = {0, 0, 5.0f, 20.0f, 0, fxt_joint_read(&joint, &judged, reading, &now)};
+            input.generator = now;
+            EXPECT(input.has_generator && fxt_encoder_read(&alone, reading, &other) && (tick == 4 || llabs(now - last) <= 1 << 15));
+            const fxt_output out = fxt_tick(&table, &joint, &input);
+            const bool told = (out.flags & FXT_GLITCH) != 0u;
+            EXPECT(told || llabs(joint.generator - last) <= 2 * fastest + (1 << 16));
+            EXPECT(tick < 11 || (!told && joint.generator == now));
+        }
+        lost += llabs(other - last) > INT64_C(1) << 31;
+    }
+    printf("%d of 2304 wrong bits move an encoder alone by a turn, none one that is read for a joint\n", lost);
+    EXPECT(lost > 0);
+    return 0;
+}
+
 static int encoders(void)
 {
+    fxt_joint joint;
     fxt_encoder encoder;
     int64_t angle = 7;
     EXPECT(!fxt_encoder_init(NULL, 4096, 0, false, 0) && !fxt_encoder_init(&encoder, 1, 0, false, 0));
@@ -399,6 +450,22 @@ static int encoders(void)
     /* Without a start: near 0. */
     EXPECT(fxt_encoder_init(&encoder, 4096, 16, true, 0) && fxt_encoder_read(&encoder, 65535, &angle) && angle == 1 << 20);
     EXPECT(!fxt_encoder_read(&encoder, 65536, &angle));
+    /* For a joint: whatever is missing, what the register cannot read, and a limit that hides a wrong bit; without a start near 0. */
+    fxt_limits limits = usual;
+    EXPECT(fxt_joint_init(&joint, &limits) == FXT_LIMITS_OK && fxt_encoder_init(&encoder, 4096, 0, false, 0));
+    angle = 7;
+    EXPECT(!fxt_joint_read(NULL, &encoder, 1, &angle) && !fxt_joint_read(&joint, NULL, 1, &angle) && !fxt_joint_read(&joint, &encoder, 1, NULL));
+    EXPECT(!fxt_joint_read(&joint, &encoder, 4096, &angle) && angle == 7);
+    joint.sampled = 1u;
+    joint.generator = INT64_C(3) << 32;
+    EXPECT(fxt_joint_read(&joint, &encoder, 1, &angle) && angle == 1 << 20 && fxt_joint_read(&joint, &encoder, 0, &angle) && angle == INT64_C(3) << 32);
+    for (int bits = 0; bits <= 64; bits += 13) {
+        EXPECT(fxt_encoder_init(&encoder, 4096, (uint8_t)bits, false, 0));
+        limits.generator_rate_rad_s = bits == 13 ? 2090.0f : 1040.0f;
+        EXPECT(fxt_joint_init(&joint, &limits) == FXT_LIMITS_OK && fxt_joint_read(&joint, &encoder, 1, &angle));
+        limits.generator_rate_rad_s = bits == 13 ? 2100.0f : 1050.0f;
+        EXPECT(fxt_joint_init(&joint, &limits) == FXT_LIMITS_OK && fxt_joint_read(&joint, &encoder, 1, &angle) == (bits > 13));
+    }
     return 0;
 }
 
@@ -418,7 +485,7 @@ static int radians(void)
 
 int main(void)
 {
-    const int wrong = images() + arithmetic() + plays() + changed() + joints() + encoders() + radians();
-    printf("%d of 7 groups of edges are wrong\n", wrong);
+    const int wrong = images() + arithmetic() + plays() + changed() + joints() + wrong_bits() + encoders() + radians();
+    printf("%d of 8 groups of edges are wrong\n", wrong);
     return wrong != 0;
 }

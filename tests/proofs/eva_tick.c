@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT OR Apache-2.0 */
 /** @file
- * Frama-C Eva: one tick of a joint with a shipped table, from any memory of the joint, for any input; and an encoder of any settings, read twice.
+ * Frama-C Eva: one tick of a joint with a shipped table, from any memory of the joint, for any input; and an encoder of any settings, read alone and for the joint.
  * TABLE is what dump.c wrote of the table; READER the reader, or one with a planted bug. */
 #include READER
 #include TABLE
@@ -31,6 +31,7 @@ int main(void)
     (void)fxt_joint_request(&joint, (fxt_mode)Frama_C_interval(0, 9));
     Frama_C_make_unknown((char *)&encoder, sizeof encoder);
     (void)fxt_encoder_read(&encoder, (uint64_t)any_angle(), &angle);
+    (void)fxt_joint_read(&joint, &encoder, (uint64_t)any_angle(), &angle);
     (void)fxt_encoder_init(&encoder, (uint32_t)any_angle(), (uint8_t)any_angle(), Frama_C_interval(0, 1) == 1, any_angle());
     (void)fxt_encoder_start(&encoder, (uint64_t)any_angle(), any_angle());
     const bool read = fxt_encoder_read(&encoder, (uint64_t)any_angle(), &angle);

@@ -1,7 +1,10 @@
 //! From the register of an encoder to an angle and back; angles in other units; rate groups.
 
-use super::{FlexsplineStatus, Marked, apart, copied, get, get_mut, give, put, span, status, usable};
-use crate::{Encoder, EncoderSettings, EncoderState, EncoderWrap, OutputAngle, RateGroup};
+use super::{
+    FlexsplineJoint, FlexsplineState, FlexsplineStatus, JOINT_MARK, Marked, STATE_MARK, apart, copied, get, get_mut,
+    give, put, span, status, usable,
+};
+use crate::{Encoder, EncoderSettings, EncoderState, EncoderWrap, Joint, JointState, OutputAngle, RateGroup};
 use core::mem::{MaybeUninit, align_of, size_of};
 
 /// Eight-byte words of a [`FlexsplineEncoder`].
@@ -86,10 +89,41 @@ pub extern "C" fn flexspline_encoder_start(
     status(start())
 }
 
-/// Takes a reading and tells the angle, counts of 2^-32 turn, to the nearest. Between two readings it may move by less
-/// than half of what the register counts. `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that (give the tick
-/// no sample then), `FLEXSPLINE_STATUS_NOT_INITIALISED` before `flexspline_encoder_start`, and after an upset of more
-/// than a word (one word is mended): make it and start it again.
+/// Takes a reading of the encoder of a joint's generator and tells the angle to give to its next tick, counts of 2^-32
+/// turn, to the nearest. A reading that the tick does not believe (`FLEXSPLINE_FLAG_GLITCH`) moves no turn: the next is
+/// taken from the reading before or from the angle that was believed last, whichever is nearer. So the turns are right
+/// as soon as the readings are, if no more than `patience` in a row were wrong and the generator made less than a third
+/// of what the register counts meanwhile. `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that (give the tick
+/// no sample then), or if `generator_rate_rad_s` allows a sixth of what the register counts in a tick, so that motion
+/// hides a wrong bit; `FLEXSPLINE_STATUS_NOT_INITIALISED` before `flexspline_encoder_start`, and where encoder or joint
+/// are lost.
+#[unsafe(no_mangle)]
+pub extern "C" fn flexspline_joint_read(
+    joint: *const FlexsplineJoint,
+    state: *const FlexsplineState,
+    encoder: *mut FlexsplineEncoder,
+    reading: u64,
+    angle_counts: *mut i64,
+) -> FlexsplineStatus {
+    let read = || {
+        apart([span(encoder), span(angle_counts), span(joint), span(state)])?;
+        usable(angle_counts)?;
+        let (joint, state): (&Joint, &JointState) = (get(joint, JOINT_MARK)?, get(state, STATE_MARK)?);
+        let Followed { encoder, at } = get_mut(encoder, ENCODER_MARK)?;
+        if !encoder.mend() || at.is_lost() || joint.is_lost() {
+            return Err(FlexsplineStatus::NotInitialised);
+        }
+        let angle = joint.read(state, encoder, at, reading).ok_or(FlexsplineStatus::Argument)?;
+        give(angle_counts, angle.counts())
+    };
+    status(read())
+}
+
+/// The same for an encoder that no joint judges: one wrong reading, half of what the register counts away, moves it by
+/// all that it counts, for good. Takes a reading and tells the angle, counts of 2^-32 turn, to the nearest. Between two
+/// readings it may move by less than half of what the register counts. `FLEXSPLINE_STATUS_ARGUMENT` if the register
+/// cannot read that (give the tick no sample then), `FLEXSPLINE_STATUS_NOT_INITIALISED` before
+/// `flexspline_encoder_start`, and after an upset of more than a word (one word is mended): make it and start it again.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_encoder_read(
     encoder: *mut FlexsplineEncoder,

@@ -14,9 +14,10 @@
 //! | an adjustment larger than any may be | takes the largest one | [`Flags::BOUNDED`] |
 //! | torque or temperature out of range | corrects with the value at the edge | [`Quality::Extrapolated`](crate::Quality::Extrapolated) |
 //! | a tick came late | by [`Overrun`] | [`Flags::OVERRUN`] |
+//! | a target that leaps | commands the leap: the correction alone is limited | |
 //! | a reversal, or anything else that wants a faster correction | the limiter holds it back; by how much is in [`Output::held_back_rad`] | [`Flags::HELD_BACK`] |
 //! | an upset in the state | takes the other copy; if that is not whole either, starts anew in safe mode | [`Flags::STATE_TORN`], [`Flags::SAFE`] |
-//! | an upset in the settings | takes the other copy; if that is not whole either, commands where the generator is | [`Flags::JOINT_TORN`] |
+//! | an upset in the settings | takes the other copy; if that is not whole either, commands the last sample believed, or 0 | [`Flags::JOINT_TORN`] |
 //! | an upset in the table or what is known of it | makes it anew and does the tick again; if that fails, does not use it | [`Flags::TABLE_DOUBT`] |
 //! | a target nearer than `hold_rad` | is reached on the flank that bears already | |
 //! | no sample since a reset | corrects nothing anew; one that is saved is what the first is held against | [`Flags::NOT_CORRECTED`] |
@@ -29,6 +30,7 @@ use super::signals::{Flags, Input, Output};
 use super::state::{FINE, FLANK, FLANK_BACKWARD, FLANK_FORWARD, Found, JointState, Kept, MENDED, MODE, SAMPLED, SEEN};
 use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT};
 use crate::drive::Drive;
+use crate::encoder::{Encoder, EncoderState};
 use crate::num;
 use crate::play::PlayState;
 use crate::store::{Images, Store, Told};
@@ -102,6 +104,12 @@ impl Joint {
         self.copies.iter().find(|settings| settings.is_whole())
     }
 
+    /// Whether the settings are lost: neither copy is whole, and it has to be made anew.
+    #[must_use]
+    pub fn is_lost(&self) -> bool {
+        self.sound().is_none()
+    }
+
     /// Makes a copy of the settings that is not whole anew from the other; false if neither is, and the joint has to be
     /// made anew. For a slow rate group, where the joint lies in memory.
     pub fn mend(&mut self) -> bool {
@@ -127,6 +135,29 @@ impl Joint {
     #[must_use]
     pub fn inverse(&self, store: &Store, target: OutputAngle, torque_n_m: f32, approach: Approach<'_>) -> Command {
         self.model(store).aim(&store.locate_whole(torque_n_m), target, approach)
+    }
+
+    /// The generator angle of a reading of its encoder, to give to the next [`Self::tick`].
+    ///
+    /// A reading that the tick does not believe ([`Flags::GLITCH`]) moves no turn: the next one is taken from the one
+    /// before or from the angle that was believed last, whichever is nearer. So the turns are right as soon as the
+    /// readings are, if no more than `patience` in a row were wrong and the generator made less than a third of what
+    /// the register counts meanwhile.
+    ///
+    /// `None`, and nothing has changed: the register cannot read that; joint, state or encoder are lost; or
+    /// `generator_rate_rad_s` allows a sixth of what the register counts in a tick, so that motion hides a wrong bit.
+    #[must_use]
+    pub fn read(
+        &self,
+        state: &JointState,
+        encoder: &Encoder,
+        at: &mut EncoderState,
+        reading: u64,
+    ) -> Option<GeneratorAngle> {
+        let (now, _) = state.open();
+        let believed = (now.seen() == SAMPLED).then(|| now.generator.counts());
+        let counts = encoder.read_near(at, reading, believed, self.sound()?.largest_move);
+        counts.map(GeneratorAngle::from_counts)
     }
 
     #[inline(always)]
@@ -471,6 +502,7 @@ crate::upset::upsets!(Settings {
 mod tests {
     use super::*;
     use crate::crc::crc32;
+    use crate::encoder::{EncoderSettings, EncoderWrap};
     use crate::fixture::{self, ARCSEC, LIMITS};
     use crate::joint::mode::ModeError;
     use crate::joint::state::{MOST_FINE, RestoreError, SAVED_JOINT_BYTES};
@@ -570,6 +602,39 @@ mod tests {
     }
 
     #[test]
+    fn a_target_that_leaps_is_commanded_and_the_correction_keeps_its_limits() {
+        let mut run = Loop::new(Overrun::SkipAndCount);
+        run.run(300, 1e-3, 1e-5);
+        // A radian of the output, 94 of the generator; `tick` asserts the limits of the correction.
+        let leap = Input { target: run.input(1.0).target, ..run.input(0.0) };
+        let out = run.tick(&leap);
+        let plain = fixture::drive().nominal_generator(leap.target);
+        let nominal = fixture::drive().ratio() as f64 * out.correction_rad as f64;
+        assert!((plain.minus_rad(out.command) as f64 - nominal).abs() < 1e-6 * nominal.abs() + 1e-6);
+        assert_eq!(out.flags.with(Flags::HELD_BACK, true), Flags::HELD_BACK);
+    }
+
+    /// Where nothing is whole and nothing was seen the command is no place to go to.
+    #[test]
+    fn without_settings_the_command_is_the_last_sample_or_zero() {
+        for ticks in [0, 30] {
+            let mut run = Loop::new(Overrun::SkipAndCount);
+            for i in 0..ticks {
+                let out = run.tick(&run.input(0.1 + 1e-5 * i as f64));
+                run.generator = out.command;
+            }
+            let last = run.state.open().0.generator;
+            for bit in [3, run.joint.bits() / 2 + 90] {
+                run.joint.flip(bit, &mut std::string::String::new());
+            }
+            let input = run.input(0.2);
+            let out = run.joint.tick(&images(), &mut run.store, &mut run.state, &input);
+            assert!(out.flags.contains(Flags::JOINT_TORN) && out.flags.contains(Flags::NOT_CORRECTED));
+            assert_eq!((out.command, out.command == GeneratorAngle::ZERO), (last, ticks == 0));
+        }
+    }
+
+    #[test]
     fn modes_change_only_as_they_may_and_never_jump() {
         let mut run = Loop::new(Overrun::SkipAndCount);
         let tracking = run.run(300, 1e-3, 1e-5);
@@ -622,6 +687,78 @@ mod tests {
         }
         assert!(before.quality == Quality::InRange);
         assert_eq!(run.tick(&run.input(4e-3)).quality, Quality::Uncertain);
+    }
+
+    /// Every bit of a reading, wrong once, at every speed that the limit allows and everywhere in the register; bits of
+    /// a register that is no power of two, too.
+    #[test]
+    fn a_wrong_bit_of_a_reading_moves_no_turn() {
+        let made = |counts_per_turn, wrap, reversed| {
+            Encoder::new(EncoderSettings { counts_per_turn, wrap, reversed, zero_counts: 1234 }).unwrap()
+        };
+        let encoders = [
+            (made(65_536, EncoderWrap::Turn, false), 16),
+            (made(20_000, EncoderWrap::Turn, true), 15),
+            (made(20_000, EncoderWrap::Bits(16), true), 16),
+            (made(4096, EncoderWrap::Bits(14), false), 14),
+        ];
+        // Nearly all of 700 rad/s.
+        let fastest = (0.11 * 4_294_967_296.0) as i64;
+        let (mut lost, mut hidden, mut trials) = (0, 0, 0);
+        for (encoder, bits) in encoders {
+            for (bit, place, speed) in (0..bits)
+                .flat_map(|bit| (0..8).map(move |place| (bit, place)))
+                .flat_map(|(bit, place)| (-4..=4).map(move |speed| (bit, place, speed * fastest / 4)))
+            {
+                let mut run = Loop::new(Overrun::SkipAndCount);
+                let at = |tick: i64| (3 << 32) + place * (7 << 29) + tick * speed;
+                let mut now = encoder.start(encoder.reading(at(0)), at(0)).unwrap();
+                let mut alone = now;
+                for tick in 0..14 {
+                    let good = encoder.reading(at(tick));
+                    let reading = if tick == 4 { good ^ 1 << bit } else { good };
+                    let generator = run.joint.read(&run.state, &encoder, &mut now, reading);
+                    let _ = encoder.read(&mut alone, reading);
+                    let off = generator.map_or(0, |found| found.counts() - at(tick)).abs();
+                    assert!(tick == 4 || generator.is_some() && off <= 1 << 21, "bit {bit}, {speed}: {off}");
+                    let out = run.tick(&Input { generator, torque_n_m: 5.0, ..run.input(0.0) });
+                    // Where the joint has it, but for what motion within the limit may be; or it does not believe it.
+                    let off = (run.state.open().0.generator.counts() - at(tick)).abs();
+                    let told = out.flags.contains(Flags::GLITCH) || out.flags.contains(Flags::SAMPLE_LOST);
+                    hidden += (off > 2 * fastest + (1 << 23) && !told) as u32;
+                    assert!(tick < 11 || off <= 1 << 21 && !told, "bit {bit}, {speed}, tick {tick}: {off}");
+                }
+                lost += ((encoder.angle_counts(&alone) - at(13)).abs() > 1 << 31) as u32;
+                trials += 1;
+            }
+        }
+        // An encoder that nobody judges loses turns.
+        assert_eq!((hidden, trials), (0, 61 * 8 * 9));
+        assert!(lost > 200, "{lost}");
+    }
+
+    /// Where motion is as large as what a wrong bit does, no reading is taken.
+    #[test]
+    fn a_limit_that_hides_a_wrong_bit_is_refused() {
+        let settings =
+            EncoderSettings { counts_per_turn: 4096, wrap: EncoderWrap::Turn, reversed: false, zero_counts: 0 };
+        let run = Loop::new(Overrun::SkipAndCount);
+        for (rate, wrap, taken) in [
+            (1040.0, EncoderWrap::Turn, true),
+            (1050.0, EncoderWrap::Turn, false),
+            (2090.0, EncoderWrap::Bits(13), true),
+            (2100.0, EncoderWrap::Bits(13), false),
+        ] {
+            let limits = Limits { generator_rate_rad_s: rate, ..LIMITS };
+            let joint = Joint::new(fixture::drive(), limits, Overrun::SkipAndCount).unwrap();
+            let encoder = Encoder::new(EncoderSettings { wrap, ..settings }).unwrap();
+            let mut at = encoder.start(0, 0).unwrap();
+            let before = at;
+            assert_eq!(joint.read(&run.state, &encoder, &mut at, 8).is_some(), taken, "{rate}");
+            assert_eq!(at != before, taken);
+        }
+        let mut nowhere = EncoderState::NOWHERE;
+        assert_eq!(run.joint.read(&run.state, &Encoder::new(settings).unwrap(), &mut nowhere, 8), None);
     }
 
     #[test]

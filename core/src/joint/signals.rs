@@ -44,8 +44,8 @@ impl Flags {
     /// [`Mode::Safe`](crate::Mode::Safe).
     pub const STATE_TORN: Self = Self(64);
     /// Settings of the joint in memory are not whole. Those of the other copy are used until the joint is made anew
-    /// ([`Joint::mend`](crate::Joint::mend)); if neither is whole the command is where the generator is, and nothing is
-    /// corrected.
+    /// ([`Joint::mend`](crate::Joint::mend)); if neither is whole the command is the last sample that was believed (0
+    /// before the first), and nothing is corrected.
     pub const JOINT_TORN: Self = Self(128);
     /// The joint is in [`Mode::Safe`](crate::Mode::Safe): no correction is made.
     pub const SAFE: Self = Self(256);
@@ -85,7 +85,8 @@ impl Flags {
 /// One tick's results.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Output {
-    /// Generator angle to command.
+    /// Generator angle to command: the target times the ratio, as it is, less the correction. The correction alone is
+    /// limited: where the target leaps this leaps, without a flag, so the rate of the target is the caller's to limit.
     pub command: GeneratorAngle,
     /// Where the output is estimated to be now.
     pub output: OutputAngle,

@@ -111,7 +111,7 @@ static AnyCall const volatile others[] = {
     (AnyCall)flexspline_slip_set,         (AnyCall)flexspline_state_forget_side, (AnyCall)flexspline_store_mend_page,
     (AnyCall)flexspline_nominal_generator, (AnyCall)flexspline_ratio,            (AnyCall)flexspline_encoder_reading,
     (AnyCall)flexspline_torque_set_sensor, (AnyCall)flexspline_implausible_name,
-    (AnyCall)flexspline_learner_bind,
+    (AnyCall)flexspline_learner_bind,     (AnyCall)flexspline_encoder_read,
 };
 
 // What a table says outside the tick.
@@ -252,7 +252,7 @@ int beside(const FlexsplineImages *table, int ticks, uint32_t *found)
         int64_t generator, nominal;
         float fresh, torque;
         uint8_t stale;
-        if (flexspline_encoder_read(&encoder, reading, &generator) ||
+        if (flexspline_joint_read(&joint, &state, &encoder, reading, &generator) ||
             flexspline_aged_tick(&aged, tick % 50 < 43, load, &fresh) || flexspline_aged_is_stale(&aged, &stale) ||
             flexspline_torque_tick(&path, FLEXSPLINE_TORQUE_ON_LOAD, fresh, direction, &torque) ||
             flexspline_nominal_output(&joint, generator, &nominal))

@@ -17,7 +17,8 @@ use std::io::{BufWriter, Write};
 /// Records: 1, an image: length, bytes, verdict and what is known of the table. 2, a call: kind, two angles, torque,
 /// temperature, what it gives, and the play after it. 3, a saved play: bytes, and whether they are restored. 4, the
 /// limits of a joint, and which of them is refused. 5, a tick: what is asked of the mode and whether it may be, the
-/// input, what the tick gives. 6, settings of an encoder, and whether they can be. 7, a call of it: kind, reading or
+/// input, what the tick gives. 6, settings of an encoder, and whether they can be. 8, what a joint makes of a
+/// reading of it, and whether it takes it. 7, a call of it: kind, reading or
 /// angle, whether it is taken, the angle or reading. 0, the end.
 struct Vectors<W> {
     out: W,
@@ -345,6 +346,8 @@ impl<W: Write> Vectors<W> {
         let mut state = JointState::new();
         let (mut torque, mut target, mut speed) = (0.0, mixed.number() as i64 >> 20, 0i64);
         let mut generator = table.drive().nominal_generator(OutputAngle::from_counts(target)).counts();
+        let encoder = self.settings(mixed)?;
+        let mut at = None;
         for tick in 0..ticks {
             let number = mixed.number();
             if tick == 0 || number.is_multiple_of(64) {
@@ -412,12 +415,25 @@ impl<W: Write> Vectors<W> {
             self.ticks += 1;
             // Where it was told to go, as long as that is not a leap.
             generator = found.command.counts();
+            let Some(encoder) = encoder.as_ref() else { continue };
+            let number = mixed.number();
+            let wrong = if number & 3 == 0 { 1 << (number >> 8 & 31) } else { 0 };
+            let reading = encoder.reading(generator) ^ wrong;
+            let started = at.or_else(|| encoder.start(reading, 0));
+            let mut now = started;
+            let read = now.as_mut().and_then(|now| joint.read(&state, encoder, now, reading));
+            // Without a start a reading that is not taken begins nothing.
+            at = read.and(now).or(at);
+            self.out.write_all(&[8])?;
+            self.angle(reading as i64)?;
+            self.out.write_all(&[read.is_some() as u8])?;
+            self.angle(read.map_or(0, GeneratorAngle::counts))?;
         }
         Ok(())
     }
 
-    /// An encoder of any settings, and calls of it.
-    fn encoder(&mut self, calls: usize, mixed: &mut Mixed) -> std::io::Result<()> {
+    /// Any settings of an encoder, and the encoder if they can be.
+    fn settings(&mut self, mixed: &mut Mixed) -> std::io::Result<Option<Encoder>> {
         let number = mixed.number();
         let bits = match number & 3 {
             0 => 0,
@@ -434,7 +450,12 @@ impl<W: Write> Vectors<W> {
         self.out.write_all(&[bits, reversed as u8])?;
         self.angle(zero_counts)?;
         self.out.write_all(&[made.is_ok() as u8])?;
-        let Ok(encoder) = made else { return Ok(()) };
+        Ok(made.ok())
+    }
+
+    /// An encoder of any settings, and calls of it.
+    fn encoder(&mut self, calls: usize, mixed: &mut Mixed) -> std::io::Result<()> {
+        let Some(encoder) = self.settings(mixed)? else { return Ok(()) };
         let mut state: Option<EncoderState> = None;
         let (mut at, mut speed) = ((mixed.number() as i64) >> 8, 0i64);
         for _ in 0..calls {

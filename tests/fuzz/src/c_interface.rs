@@ -567,7 +567,14 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
             let status = c::flexspline_encoder_start(encoder.pointer.cast(), reading, choices.any());
             (status as u32, encoder.usable, false)
         }
-        24 | 25 => {
+        24 => {
+            let to = memory.answer(choices, &[joint, state, encoder]);
+            let reading = if choices.any() { choices.any::<u16>().into() } else { choices.any() };
+            let (of, at) = ((joint.pointer.cast(), state.pointer.cast()), encoder.pointer.cast());
+            let status = c::flexspline_joint_read(of.0, of.1, at, reading, to.pointer);
+            (status as u32, all(&[joint, state, encoder]) && to.usable, to.overlaps)
+        }
+        25 => {
             let to = memory.answer(choices, &[encoder]);
             let reading = if choices.any() { choices.any::<u16>().into() } else { choices.any() };
             let status = c::flexspline_encoder_read(encoder.pointer.cast(), reading, to.pointer);

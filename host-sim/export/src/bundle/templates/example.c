@@ -33,7 +33,7 @@ int main(void)
     for (int tick = 0; tick <= 800; tick++) {
         const double wanted_rad = 1e-5 * (tick <= 400 ? tick : 800 - tick);
         fxt_input in = {.torque_n_m = 5.0f, .temperature_c = 20.0f};
-        in.has_generator = fxt_encoder_read(&encoder, reading, &in.generator);
+        in.has_generator = fxt_joint_read(&joint, &encoder, reading, &in.generator);
         if (!fxt_from_rad(wanted_rad, &in.target) || !fxt_page_intact(&table, (uint32_t)tick % fxt_page_count(&table))) {
             printf("the memory of the table changed\n");
             return 1;
