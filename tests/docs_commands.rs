@@ -245,6 +245,28 @@ fn every_command_of_a_page_runs() {
     run_pages(false);
 }
 
+/// The first commands that the README gives to each reader run as they stand after its block: they are spans in a
+/// table, of which [`commands_and_options_in_the_text_exist`] reads the names alone. What serves does not end: its
+/// options are parsed.
+#[test]
+fn first_commands_of_the_readme_run() {
+    let page = page(&root().join("README.md"));
+    let [copy, parser] = [false, true].map(Copy::new);
+    for block in page.shell() {
+        copy.run(&commands(&block.text).unwrap()).unwrap();
+    }
+    let lines = page.prose.iter().skip_while(|(_, line)| line != "## Who are you?").skip(1);
+    let rows = lines.take_while(|(_, line)| !line.starts_with('#')).filter(|(_, line)| line.starts_with('|'));
+    let mut ran = 0;
+    for (line, span) in rows.flat_map(|(line, text)| spans(text).map(move |span| (line, span))) {
+        let desk = if span.starts_with("flexspline serve") { &parser } else { &copy };
+        let done = commands(span).and_then(|commands| desk.run(&commands));
+        assert_eq!(done, Ok(()), "{}: `{span}`", page.at(*line));
+        ran += 1;
+    }
+    assert_eq!(ran, 6);
+}
+
 #[test]
 #[ignore = "minutes: the slow commands too"]
 fn slow_commands_run_too() {
