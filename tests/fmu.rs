@@ -466,7 +466,18 @@ fn a_joint_says_how_far_its_core_trusts_the_table_and_refuses_targets_that_no_an
     };
     let quiet = [("gravity_torque", 0.0), ("torque_noise", 0.0)];
     assert_eq!(quality(&quiet, 10.0), 0);
+    // Everywhere in the table (30 N·m were refused before, 200 is its range), and a little beyond.
+    for (load, expected) in [(30.0, 0), (-30.0, 0), (120.0, 0), (195.0, 0), (-195.0, 0), (220.0, 2)] {
+        assert_eq!(quality(&quiet, load), expected, "{load} N·m");
+    }
     assert_eq!(quality(&quiet, 5000.0), 3, "a reading that no sensor has");
+    let instance = fmu.ready("told", &quiet);
+    instance.set("load_torque", 5000.0);
+    for _ in 0..50 {
+        assert_eq!(instance.step(1e-3), OK);
+    }
+    let told = |entry: &&importer::Line| entry.message.contains("not corrected: the torque reads 5000");
+    assert_eq!(instance.log().iter().filter(told).count(), 1, "{:?}", instance.log());
     assert_eq!(quality(&[("compensate", 0.0)], 10.0), 3);
     assert_eq!(quality(&[("servo", 0.0)], 0.0), 3);
     for target in [1e30, -1e30, 1e9 * std::f64::consts::TAU] {

@@ -1,6 +1,6 @@
 //! A joint with mass: motor, servo, drive and load, as `flexspline fly` flies it.
 
-use flexspline::{GeneratorAngle, OutputAngle, Quality, Table};
+use flexspline::{GeneratorAngle, OutputAngle, Quality, Table, TorqueReading};
 use flexspline_motion::flight::{ARCSEC_PER_RAD, OneJoint, Ticked, Unit};
 use flexspline_motion::keep::Kept;
 use flexspline_motion::scenario::{Load, Moment, Scenario, TableKnown, TorqueKnown};
@@ -45,7 +45,7 @@ variables! {
     GRAVITY_ANGLE => Variable::parameter("gravity_angle", Kind::Real("rad"), 0.0, [-100.0, 100.0], "output angle at which the weight pulls forward most");
     FRICTION_KNOWN => Variable::parameter("friction_known", Kind::Real("1"), 0.8, [0.0, 1.0], "share of the motor's friction that the servo is told before");
     LOAD_FED_FORWARD => Variable::parameter("load_fed_forward", Kind::Real("1"), 1.0, [0.0, 1.0], "share of a torque known on the load that the servo is told before");
-    LOAD_MEAN => Variable::parameter("load_mean", Kind::Real("N.m"), 0.0, TORQUE, "load that is expected: its mean");
+    LOAD_MEAN => Variable::parameter("load_mean", Kind::Real("N.m"), 0.0, TORQUE, "mean of the load that is expected");
     LOAD_SWING => Variable::parameter("load_swing", Kind::Real("N.m"), 0.0, TORQUE, "load that is expected: amplitude of a slow swing");
     LOAD_SWING_FREQUENCY => Variable::parameter("load_swing_frequency", Kind::Real("Hz"), 0.0, NOT_NEGATIVE, "load that is expected: frequency of the swing");
     LOAD_GUST => Variable::parameter("load_gust", Kind::Real("N.m"), 0.0, NOT_NEGATIVE, "load that is expected: gusts, rms");
@@ -56,9 +56,9 @@ variables! {
     STEPS => Variable::parameter("steps", Kind::Integer, 5.0, [1.0, 1000.0], "steps of the plant in a tick");
     LATE_STEPS => Variable::parameter("late_steps", Kind::Integer, 1.0, [0.0, 1000.0], "steps of the plant from a sample to the torque that it asks for; at most steps");
     MOTOR_TORQUE_MOST => Variable::parameter("motor_torque_most", Kind::Real("N.m"), 4.0, POSITIVE, "largest torque of the servo's motor, at the motor");
-    POSITION_BANDWIDTH => Variable::parameter("position_bandwidth", Kind::Real("Hz"), 6.0, POSITIVE, "position loop of the servo");
-    SPEED_BANDWIDTH => Variable::parameter("speed_bandwidth", Kind::Real("Hz"), 50.0, POSITIVE, "speed loop of the servo");
-    INTEGRAL_BANDWIDTH => Variable::parameter("integral_bandwidth", Kind::Real("Hz"), 3.0, NOT_NEGATIVE, "corner of the integral part of the speed loop");
+    POSITION_BANDWIDTH => Variable::parameter("position_hz", Kind::Real("Hz"), 6.0, POSITIVE, "position loop of the servo");
+    SPEED_BANDWIDTH => Variable::parameter("speed_hz", Kind::Real("Hz"), 50.0, POSITIVE, "speed loop of the servo");
+    INTEGRAL_BANDWIDTH => Variable::parameter("integral_hz", Kind::Real("Hz"), 3.0, NOT_NEGATIVE, "corner of the integral part of the speed loop");
     ENCODER_BITS => Variable::parameter("encoder_bits", Kind::Integer, 17.0, [8.0, 30.0], "bits of the encoder in a motor turn");
     ENCODER_JITTER => Variable::parameter("encoder_jitter", Kind::Real("s"), 5e-6, [0.0, 1e-3], "the encoder is read up to so much too late");
     CURRENT_NOISE => Variable::parameter("current_noise", Kind::Real("N.m"), 1e-3, NOT_NEGATIVE, "noise of the torque told from the motor's current, at the motor, rms");
@@ -79,7 +79,7 @@ variables! {
     CORRECTION => Variable::output("correction", Kind::Real("arcsec"), "target less generator_command over the ratio: it is taken off the target");
     SATURATED => Variable::output("saturated", Kind::Boolean, "the servo's motor gives all it has");
     HELD_BACK => Variable::output("held_back", Kind::Boolean, "the limiter held the correction back");
-    NOT_CORRECTED => Variable::output("not_corrected", Kind::Boolean, "no correction could be made in the tick");
+    NOT_CORRECTED => Variable::output("not_corrected", Kind::Boolean, "no correction could be made in the tick, as where a torque is read beyond 1.5 times the table's range and beyond 3 times the load that is expected and 10 N.m more: no sensor shows it; the log says so");
     QUALITY => Variable::output("quality", Kind::Choice(&QUALITIES), "how far the core trusts its estimate and its correction; disabled where it does not correct");
     TEMPERATURE => Variable::constant("temperature", Kind::Real("degC"), "temperature of drive and lubricant");
     RATIO => Variable::constant("ratio", Kind::Real("rad/rad"), "generator over output");
@@ -181,7 +181,29 @@ pub fn initial(values: &mut [f64]) {
 }
 
 /// The joint in a simulation.
-pub struct MovingJoint(OneJoint);
+pub struct MovingJoint {
+    joint: OneJoint,
+    /// Whether the last tick was not corrected, which the log says once.
+    not_corrected: bool,
+}
+
+/// Why a tick was not corrected, as far as the reading of the torque tells.
+fn why_not(joint: &OneJoint) -> String {
+    let most = joint.on_board_settings().torque.largest_n_m;
+    let reading = joint.on_board().map(|(told, _)| told.reading);
+    match reading {
+        Some(TorqueReading::OnLoad(torque) | TorqueReading::InMesh(torque))
+            if torque.is_nan() || torque.abs() > most =>
+        {
+            format!(
+                "not corrected: the torque reads {torque:.1} N.m, and its sensor shows up to {most:.1} N.m; a larger \
+             {} or a table of a larger range widens it",
+                VARIABLES[LOAD_MEAN].name
+            )
+        }
+        _ => "not corrected: torque or table cannot be used in this tick".to_owned(),
+    }
+}
 
 impl MovingJoint {
     /// With the values of its parameters.
@@ -198,7 +220,8 @@ impl MovingJoint {
         let [built, nominal] = resources.gears.clone().ok_or_else(|| file_error(DRIVE_FILE, "missing"))?;
         let unit = Unit { drive: *table.drive(), nominal, built };
         let compensated = values[COMPENSATE] != 0.0;
-        Ok(Self(OneJoint::new(&scenario, &unit, Some(resources.image.clone()), compensated)?))
+        let joint = OneJoint::new(&scenario, &unit, Some(resources.image.clone()), compensated)?;
+        Ok(Self { joint, not_corrected: false })
     }
 }
 
@@ -207,8 +230,8 @@ impl Model for MovingJoint {
         values[TICK]
     }
 
-    fn tick(&mut self, at: &Inputs<'_>, outputs: &mut [f64], _: &mut dyn FnMut(String)) -> Result<(), FmuError> {
-        let joint = &mut self.0;
+    fn tick(&mut self, at: &Inputs<'_>, outputs: &mut [f64], says: &mut dyn FnMut(String)) -> Result<(), FmuError> {
+        let joint = &mut self.joint;
         let outside_n_m = [at.start(LOAD_TORQUE), at.end(LOAD_TORQUE)];
         let read = [TARGET, TARGET_RATE, TARGET_ACCELERATION, MOTOR_TORQUE, LOAD_TORQUE];
         if let Some(place) = read.into_iter().find(|&place| !at.start(place).is_finite()) {
@@ -238,6 +261,10 @@ impl Model for MovingJoint {
             joint.push(at.start(MOTOR_TORQUE), outside_n_m);
             Ticked::default()
         };
+        if ticked.not_corrected && !self.not_corrected {
+            says(why_not(joint));
+        }
+        self.not_corrected = ticked.not_corrected;
         let plant = joint.plant();
         let ratio = joint.ratio();
         let ([motor, output, _], [motor_rate, output_rate, _]) = (plant.angle_rad, plant.rate_rad_s);
@@ -268,10 +295,10 @@ impl Model for MovingJoint {
     }
 
     fn keep(&self, to: &mut Vec<u64>) {
-        self.0.keep(to);
+        self.joint.keep(to);
     }
 
     fn take(&mut self, from: &mut dyn Iterator<Item = u64>) -> Option<()> {
-        self.0.take(from)
+        self.joint.take(from)
     }
 }

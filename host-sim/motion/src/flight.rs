@@ -7,7 +7,7 @@ use std::thread::ScopedJoinHandle;
 use flexspline::make::ProjectError;
 use flexspline::{
     ActivateError, Approach, Direction, Drive, Flags, GeneratorAngle, Images, Limits, OutputAngle, Quality,
-    SettingError, Store, TorqueReading, TorqueSettings,
+    SettingError, Store, Table, TorqueReading, TorqueSettings,
 };
 
 use super::friction::Friction;
@@ -66,6 +66,9 @@ const SETTLES: f64 = 10.0;
 /// Range of the torque sensor: so many times the largest load that is to be expected, and so many N·m for what inertia
 /// and servo add. *Guess*.
 const SENSOR_RANGE: [f64; 2] = [3.0, 10.0];
+/// And no less than so many times the range of the table, so that no load in it is refused as a reading, and one beyond
+/// is told as such. *Guess*.
+const SENSOR_BEYOND_TABLE: f64 = 1.5;
 /// After a change of the target's rate the motor's current tells no torque for so long, s: friction builds up anew.
 const SETTLES_S: f64 = 0.3;
 /// A command that comes back by more than this has turned, rad: 0.5″.
@@ -242,6 +245,8 @@ struct LaneParts {
     unit: Unit,
     /// Twice, as a joint has it.
     image: [Vec<u8>; 2],
+    /// Largest torque of its table, N·m.
+    table_n_m: f64,
     masses: TwoMasses,
     /// Stiffness under a tenth of the largest load.
     soft_n_m_per_rad: f64,
@@ -280,7 +285,8 @@ impl LaneParts {
                 table_drag_n_m: TABLE_DRAG_N_M as f32,
                 hold_n_m: (3.0 * behind * scenario.torque_noise_n_m).max(passing) as f32,
                 settle_s: (SETTLES / (TAU * scenario.servo.position_hz)) as f32,
-                largest_n_m: (SENSOR_RANGE[0] * scenario.largest_n_m() + SENSOR_RANGE[1]) as f32,
+                largest_n_m: (SENSOR_RANGE[0] * scenario.largest_n_m() + SENSOR_RANGE[1])
+                    .max(SENSOR_BEYOND_TABLE * self.table_n_m) as f32,
             },
             expected_n_m: scenario.mean_n_m() as f32,
             ahead_s: AHEAD_S,
@@ -407,6 +413,10 @@ fn made(scenario: &Scenario, unit: &Unit, image: Option<Vec<u8>>) -> Result<Lane
     Ok(LaneParts {
         scenario: scenario.clone(),
         unit: unit.clone(),
+        table_n_m: Table::check(&image).map_or(0.0, |table| {
+            let [least, most] = table.torque_range_n_m();
+            f64::from(most.max(-least))
+        }),
         image: [image.clone(), image],
         masses,
         soft_n_m_per_rad: soft.stiffness,
