@@ -142,6 +142,7 @@ fn second(amplitude_um: f64, phase: f64) -> Vec<Harmonic> {
 }
 
 #[test]
+#[ignore = "40 s of a processor: no other cause is named on drives with one deviation, always asked"]
 fn an_ideal_drive_has_no_cause() {
     let diagnosis = diagnosed(|_| {}, 1);
     assert_eq!((diagnosis.verdict, diagnosis.causes.len()), (Verdict::None, 0), "{}", diagnosis.text());
