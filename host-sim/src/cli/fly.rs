@@ -12,8 +12,9 @@ use super::context::{Context, image_file};
 use super::{Failure, report};
 use flexspline_base::output::Outputs;
 use flexspline_base::suggest::did_you_mean;
+use flexspline_design::study::Vary;
 use flexspline_fly::fly::{
-    ByController, Flown, FlyError, Results, SCENARIOS, VariedFlight, Vary, built_in, every, example, fly_varied, read,
+    ByController, Flown, FlyError, Results, SCENARIOS, VariedFlight, built_in, every, example, fly_varied, read,
     results,
 };
 use flexspline_report::flight_report;
@@ -42,8 +43,8 @@ pub(super) struct Fly {
     /// antenna, rover, camera, telescope, a TOML file, or all (those with a name)
     #[arg(value_name = "SCENARIO")]
     scenario: String,
-    /// A field of the scenario file and its values: FIELD=VALUE,VALUE,...; repeat for more fields [default: as the
-    /// scenario has it]
+    /// A field of the scenario file and its values: FIELD=VALUE,VALUE,..., FIELD=FROM..TO (5 values) or
+    /// FIELD=FROM..TO:N; repeat for more fields [default: as the scenario has it]
     #[arg(long, value_name = "FIELD=VALUES", allow_hyphen_values = true)]
     vary: Vec<Vary>,
     /// A table whose drive flies, as flexspline tables writes it [default: HHD-95 with the scenario's generator]
@@ -106,7 +107,7 @@ impl Fly {
     /// The table that is given: its file, and its bytes.
     fn table(&self) -> Result<Option<(&Path, Vec<u8>)>, Failure> {
         let Some(file) = &self.tables else { return Ok(None) };
-        if self.vary.iter().any(|vary| vary.field == "generator") {
+        if self.vary.iter().any(|vary| vary.path == "generator") {
             let what = "--vary generator: found with --tables, whose table has its generator; allowed: one of the two";
             return Err(Failure::BadInput(what.to_owned()));
         }
@@ -258,6 +259,7 @@ fn text(results: &Results, out: &Path, report: bool) -> String {
     }
     let [margin, at_hz] = results.phase_margin_deg;
     let removed = match results.removed {
+        _ if !results.stable => "the servo swings: no figure above says what a correction is worth".to_owned(),
         Some(share) => format!("removed {:.1} % of what an ideal inverse removes", 100.0 * share),
         None => "an ideal inverse removes next to nothing here".to_owned(),
     };

@@ -28,7 +28,7 @@ pub use effects::{Effect, effects, is_idle};
 pub(crate) use estimate::computed_first;
 pub use judge::{Constraint, JudgeError, Sense, Target, figure};
 pub use trust::Trust;
-pub use vary::{Values, Vary, VaryError, is_error_of_making};
+pub use vary::{Values, Vary, VaryError, grid, is_error_of_making};
 
 /// Fields that vary at once, at most.
 pub(crate) const MOST_FIELDS: usize = 32;

@@ -9,7 +9,7 @@ const USUAL_VALUES: usize = 5;
 /// Values of a range, at most.
 const MOST_VALUES: usize = 1000;
 
-/// A field of the drive and the values it takes.
+/// A field of a file and the values it takes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Vary {
     /// Path of the field, such as `flexspline.rim_thickness_mm`.
@@ -76,7 +76,7 @@ impl FromStr for Vary {
                 Values::Range { from, to, count }
             }
             None => {
-                let list: Vec<String> = values.split(',').map(|value| value.trim().to_owned()).collect();
+                let list = apart(values);
                 if list.iter().any(String::is_empty) {
                     return Err(wrong("which has an empty value"));
                 }
@@ -85,6 +85,23 @@ impl FromStr for Vary {
         };
         Ok(Vary { path: path.to_owned(), values })
     }
+}
+
+/// Values at the commas that no bracket holds.
+fn apart(values: &str) -> Vec<String> {
+    let (mut found, mut depth) = (vec![String::new()], 0_usize);
+    for letter in values.chars() {
+        depth = match letter {
+            '[' => depth + 1,
+            ']' => depth.saturating_sub(1),
+            _ => depth,
+        };
+        match found.last_mut() {
+            Some(last) if letter != ',' || depth > 0 => last.push(letter),
+            _ => found.push(String::new()),
+        }
+    }
+    found.iter().map(|value| value.trim().to_owned()).collect()
 }
 
 /// Whether a field of the drive is an error of its making, and no choice of who designs it.

@@ -23,9 +23,6 @@ pub enum FlyError {
         /// What is allowed.
         allowed: &'static str,
     },
-    /// `--vary` without a field and its values.
-    #[error("allowed: FIELD=VALUE,VALUE,... with a field of a scenario file (docs/explanation/motion.md)")]
-    VaryForm,
     /// The drive does not carry the load.
     #[error("load: found up to {largest_n_m:.1} N.m, allowed: {most_n_m} N.m with {of}")]
     Load {

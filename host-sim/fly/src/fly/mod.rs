@@ -24,7 +24,7 @@ pub use error::FlyError;
 pub use file::{example, read};
 pub use own::{OwnDrive, OwnTableError, gear_at};
 pub use results::{ByController, LEAST_DISTANCE, LEAST_PHASE_MARGIN_DEG, Results, Row, results, spectrum};
-pub use varied::{Flight as VariedFlight, Vary, every, fly_varied};
+pub use varied::{Flight as VariedFlight, every, fly_varied};
 
 /// A scenario, and what flies it.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,57 +1,10 @@
 //! Flights side by side: every combination of some values of a scenario's fields.
 
-use std::fmt;
-use std::str::FromStr;
-
 use flexspline_base::toml_file::Problem;
+use flexspline_design::study::{Vary, grid};
 use serde::Serialize;
 
 use super::{Flown, FlyError, Results, read, results};
-
-/// A field of a scenario and the values that it gets, as a TOML file has them; a name needs no quotes.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Vary {
-    /// Such as `table` or `load.gust`.
-    pub field: String,
-    /// Its values.
-    pub values: Vec<String>,
-}
-
-impl fmt::Display for Vary {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}={}", self.field, self.values.join(","))
-    }
-}
-
-impl FromStr for Vary {
-    type Err = FlyError;
-
-    fn from_str(text: &str) -> Result<Self, FlyError> {
-        let (field, values) = text.split_once('=').unwrap_or((text, ""));
-        let values = apart(values);
-        if field.trim().is_empty() || values.iter().any(String::is_empty) {
-            return Err(FlyError::VaryForm);
-        }
-        Ok(Self { field: field.trim().to_owned(), values })
-    }
-}
-
-/// Values at the commas that no bracket holds.
-fn apart(values: &str) -> Vec<String> {
-    let (mut found, mut depth) = (vec![String::new()], 0_usize);
-    for letter in values.chars() {
-        depth = match letter {
-            '[' => depth + 1,
-            ']' => depth.saturating_sub(1),
-            _ => depth,
-        };
-        match found.last_mut() {
-            Some(last) if letter != ',' || depth > 0 => last.push(letter),
-            _ => found.push(String::new()),
-        }
-    }
-    found.iter().map(|value| value.trim().to_owned()).collect()
-}
 
 /// Fields of a scenario, each with the value it got.
 pub type Varied = Vec<(String, String)>;
@@ -72,20 +25,15 @@ pub struct Flight {
 /// # Errors
 /// [`FlyError::Scenario`], [`FlyError::Vary`]: file, field, value and what is allowed.
 pub fn every(name: &str, text: &str, vary: &[Vary]) -> Result<Vec<(Varied, Flown)>, FlyError> {
-    for (at, Vary { field, .. }) in vary.iter().enumerate() {
-        if vary[..at].iter().any(|before| before.field == *field) {
-            let (field, found) = (field.clone(), "twice".to_owned());
+    for (at, Vary { path, .. }) in vary.iter().enumerate() {
+        if vary[..at].iter().any(|before| before.path == *path) {
+            let (field, found) = (path.clone(), "twice".to_owned());
             return Err(FlyError::Vary { field, found, allowed: "once, its values with commas" });
         }
     }
-    let mut combinations: Vec<Varied> = vec![Vec::new()];
-    for Vary { field, values } in vary {
-        let with =
-            |before: &Varied, value: &String| before.iter().cloned().chain([(field.clone(), value.clone())]).collect();
-        combinations =
-            combinations.iter().flat_map(|before| values.iter().map(move |value| with(before, value))).collect();
-    }
-    combinations.into_iter().map(|varied| changed(name, text, &varied).map(|flown| (varied, flown))).collect()
+    let named = |values: Vec<String>| vary.iter().map(|vary| vary.path.clone()).zip(values).collect();
+    let flown = |varied: Varied| changed(name, text, &varied).map(|flown| (varied, flown));
+    grid(vary).into_iter().map(named).map(flown).collect()
 }
 
 /// A scenario's file with some values changed.
@@ -154,6 +102,8 @@ mod tests {
         assert_eq!(varied[0], ("table".to_owned(), "calibrated".to_owned()));
         assert_eq!((flown.scenario.legs.len(), flown.scenario.load.bias_n_m), (2, 2.0));
         assert_eq!(found[3].1.scenario.legs.len(), 1);
+        let range = every("camera", "base = \"camera\"\n", &["load.bias_n_m=1..2:3".parse().unwrap()]).unwrap();
+        assert_eq!(range.iter().map(|(_, flown)| flown.scenario.load.bias_n_m).collect::<Vec<_>>(), [1.0, 1.5, 2.0]);
     }
 
     #[test]
