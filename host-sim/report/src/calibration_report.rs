@@ -52,7 +52,7 @@ fn headline(c: &Calibration) -> Headline {
         .error(c.held_out.rms_after_arcsec, 3)
         .plain(" rms of ")
         .error(c.held_out.rms_before_arcsec, 3)
-        .plain("."),
+        .plain(if c.reading_delay.is_some() { ", the delay between the readings taken out." } else { "." }),
         number: Text::default().error(c.held_out.rms_after_arcsec, 3),
         number_is: format!("left, rms, in {} left out", c.left_out),
     }
@@ -61,16 +61,26 @@ fn headline(c: &Calibration) -> Headline {
 fn left(made: &Calibrated) -> Section {
     let c = &made.calibration;
     let row = |name: &str, arcsec: f64| vec![Text::new(name), Text::default().error(arcsec, 3)];
+    let measured = if c.reading_delay.is_some() { "As measured less the delay" } else { "As measured" };
+    let with_delay = c.reading_delay.iter().flat_map(|delay| {
+        [
+            row("As measured, with the delay, all rows", delay.rms_before_arcsec),
+            row("Left by the core, which does not know the delay, all rows", delay.rms_after_arcsec),
+        ]
+    });
     let table = Table {
         caption: "What is left, root mean square".to_owned(),
         header: vec!["Of".to_owned(), "Error".to_owned()],
-        rows: vec![
-            row("As measured, rows in steady motion", c.held_out.rms_before_arcsec),
+        rows: [
+            row(&format!("{measured}, rows in steady motion"), c.held_out.rms_before_arcsec),
             row("With what was known before, where nothing was fitted", c.held_out.rms_prior_arcsec),
             row("With the table, where nothing was fitted", c.held_out.rms_after_arcsec),
-            row("As measured, all rows", c.core.rms_before_arcsec),
+            row(&format!("{measured}, all rows"), c.core.rms_before_arcsec),
             row("Left by the core with this table, all rows", c.core.rms_after_arcsec),
-        ],
+        ]
+        .into_iter()
+        .chain(with_delay)
+        .collect(),
     };
     let every = made.shown.len().div_ceil(MOST_POINTS).max(1);
     let series = |name: &str, colour: usize, at: usize| {

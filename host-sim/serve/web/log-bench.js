@@ -495,7 +495,7 @@ backlash_arcsec = ${Number(now.backlash)}
         "p",
         { class: "verdict" },
         errorOf(c.held_out.rms_before_arcsec),
-        " rms as measured, ",
+        ` rms ${c.reading_delay ? "as measured less a reading delay" : "as measured"}, `,
         errorOf(c.held_out.rms_after_arcsec),
         ` with the table where nothing was fitted: ${number(gain, 3)} % less.`,
       ),

@@ -12,7 +12,7 @@ use super::{Failure, names, report, say};
 use flexspline_base::output::Outputs;
 use flexspline_design::tables::{c_header, rust_source};
 use flexspline_identify::calibrate::{
-    Bench, Calibrated, Calibration, CalibrationError, Planned, Prior, calibrate, plan,
+    Bench, Calibrated, Calibration, CalibrationError, MOST_ROWS, Planned, Prior, calibrate, plan,
 };
 use flexspline_identify::extension::Model;
 use flexspline_identify::measurement::read;
@@ -325,10 +325,11 @@ fn text(made: &Calibrated, out: &Path, with_page: bool) -> String {
     let Calibration { held_out, core, parts, .. } = &made.calibration;
     let c = &made.calibration;
     let mut text = format!(
-        "{}: {} rows, {} in steady motion; {} {} left out in turn\n",
+        "{}: {} rows, of which {} in steady motion are fitted{}; {} {} left out in turn\n",
         c.files.join(", "),
         c.rows,
         c.rows_fitted,
+        if c.rows > MOST_ROWS { " (every so many-th of a long log)" } else { "" },
         c.folds,
         c.left_out
     );
@@ -353,16 +354,17 @@ fn text(made: &Calibrated, out: &Path, with_page: bool) -> String {
             found.generator_zero_deg, found.generator_half_width_deg, found.repeats_deg, found.why
         );
     }
+    let as_measured = if c.reading_delay.is_some() { "as measured less the delay" } else { "as measured" };
     let removed = 100.0 * (1.0 - held_out.rms_after_arcsec / held_out.rms_before_arcsec);
     let _ = writeln!(
         text,
-        "where nothing was fitted, arcsec rms: {:.2} as measured, {:.2} with what was known, {:.2} with the table \
+        "where nothing was fitted, arcsec rms: {:.2} {as_measured}, {:.2} with what was known, {:.2} with the table \
          ({removed:.1} % less)",
         held_out.rms_before_arcsec, held_out.rms_prior_arcsec, held_out.rms_after_arcsec
     );
     let _ = writeln!(
         text,
-        "the core over all rows, reversals among them: {:.2} as measured, {:.2} with the table {}",
+        "the core over all rows, reversals among them: {:.2} {as_measured}, {:.2} with the table {}",
         core.rms_before_arcsec, core.rms_after_arcsec, c.table_id
     );
     let _ = writeln!(

@@ -148,6 +148,11 @@ impl Folds {
         Some((0..places.len()).map(|i| solved[(i, 0)]).collect())
     }
 
+    /// Coefficients of the parts chosen, fitted to all folds.
+    pub fn coefficients(&self, chosen: &[Chosen]) -> Option<Vec<f64>> {
+        Some(self.fit(&self.all(), chosen)?.split_off(self.begins[0]))
+    }
+
     /// Sum of squares, arcsec², that these coefficients leave in a fold.
     fn left(&self, fold: usize, chosen: &[Chosen], coefficients: &[f64]) -> f64 {
         let (places, width, sums) = (self.places(chosen), self.weights.len(), &self.sums[fold]);

@@ -320,6 +320,12 @@ impl Known {
         OF_95 * (self.noise.of_a_row() * variance(&self.covariance, &x) + pulled * pulled + beside * beside).sqrt()
     }
 
+    /// Standard deviation of a coefficient, arcsec.
+    pub(super) fn std_arcsec(&self, coefficient: usize) -> f64 {
+        let variance = self.noise.of_a_row() * self.covariance[(coefficient, coefficient)];
+        (variance + self.pulled[coefficient].powi(2)).sqrt()
+    }
+
     /// Every node of every part.
     pub(super) fn nodes(&self) -> Vec<Node> {
         let Model { chosen, scales, coefficients } = &self.model;

@@ -17,23 +17,31 @@ mod interval;
 mod parts;
 mod plan;
 mod prior;
+mod reading;
 mod rows;
 mod table;
+mod together;
 mod zero;
 
-use flexspline::Table;
+use flexspline::make::ProjectError;
+use flexspline::{ImageError, Table, WriteError};
 use serde::Serialize;
 
-use crate::extension::left_by_core;
 use crate::measurement::{Fault, FaultName, MeasuredError, Recording, least_and_most};
 use choose::{LEAST_GAIN, PENALTIES, best_penalty, nested, path, pruned};
+use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::{MadeTable, TableError, dead_zone_n_m};
 use folds::{Chosen, Folds};
+use interval::OF_95;
 pub use interval::{Known, Node, Noise};
 pub use parts::{PartName, Scales, State};
 pub use plan::{Bench, First, Pass, Planned, Wide, plan};
 pub use prior::Prior;
+pub use reading::{ByCore, Reading, ReadingDelay};
+use reading::{Delay, play_of_a_millisecond};
+pub use rows::MOST_ROWS;
 use rows::{FoldKind, Recorded, Rows, settled};
+use together::Agreement;
 pub use zero::{Alignment, OutputZero, ZeroCost, cost};
 
 /// The golden section: its multiples spread places over a turn and fold no order onto another.
@@ -57,9 +65,6 @@ const MOST_OF_A_TURN: f64 = 0.75;
 const HALF_A_TURN: f64 = 0.5;
 /// Rows that a tooth pitch needs for its curve.
 const ROWS_OF_A_PITCH: f64 = 6.0;
-/// Files do not share their zeros if fits to each alone leave less than this share of what the others leave in it. A
-/// guess.
-const ALONE: f64 = 0.3;
 /// Rows that the usual half width is taken of.
 const ROWS_OF_A_WIDTH: usize = 2000;
 /// Generator turns in steps that are short beside a pitch, at least.
@@ -101,6 +106,15 @@ pub enum CalibrationError {
 }
 
 impl CalibrationError {
+    /// Whether the error falls somewhere while the load grows.
+    fn is_of_a_fall(&self) -> bool {
+        let CalibrationError::Table(TableError::Project(ProjectError::Write(WriteError::Refused(refused)))) = self
+        else {
+            return false;
+        };
+        matches!(refused, ImageError::Falls { .. })
+    }
+
     /// Whether the input is to blame.
     #[must_use]
     pub fn is_bad_input(&self) -> bool {
@@ -150,6 +164,24 @@ impl Model {
         2.0 * [play[0] + play[2], play[0], play[0] + play[1]].into_iter().fold(0.0, f64::max)
     }
 
+    /// Refuses a torque by which the output gives way the wrong way: its sign is another.
+    fn gives_way_with_the_load(&self, prior: &Prior<'_>) -> Result<(), CalibrationError> {
+        let [low, high] = self.scales.torque_n_m;
+        let under = |torque_n_m: f64| {
+            let at = State { torque_n_m, temperature_c: prior.nominal.temperature_c, way: 1.0, ..State::default() };
+            prior.steady_arcsec(&at) + self.adds_arcsec(&at)
+        };
+        let by = under(high) - under(low);
+        if by >= 0.0 {
+            return Ok(());
+        }
+        Err(CalibrationError::Known(format!(
+            "torque: found {by:.1} arcsec of the output from {low:.2} to {high:.2} N.m; allowed: a torque that is \
+             positive where it turns the output forward, so that the error grows with it. --columns torque=NAME:-N.m \
+             turns its sign"
+        )))
+    }
+
     /// Whether the flanks keep their sides, with half the prior's play where no load decides. A lag that is negative by
     /// no more than noise is none.
     fn has_sound_flanks(&mut self, prior_half_arcsec: f64) -> bool {
@@ -195,26 +227,15 @@ pub struct PartSays {
     pub why: String,
 }
 
-/// Errors in folds that took no part.
+/// Errors in folds that took no part, rows in steady motion with both angles at one instant.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct HeldOut {
-    /// As measured, each file's zero taken out.
+    /// As measured, each file's zero taken out, and a [delay](ReadingDelay) between the readings.
     pub rms_before_arcsec: f64,
     /// With the nominal model or table alone.
     pub rms_prior_arcsec: f64,
     /// With the table made without them.
     pub rms_after_arcsec: f64,
-}
-
-/// The core with the finished table over the whole logs, reversals among them.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct ByCore {
-    /// As measured, each file's zero taken out.
-    pub rms_before_arcsec: f64,
-    /// What the core leaves.
-    pub rms_after_arcsec: f64,
-    /// Rows.
-    pub rows: usize,
 }
 
 /// `calibration.json`.
@@ -236,8 +257,17 @@ pub struct Calibration {
     pub folds: usize,
     /// Errors where nothing was fitted.
     pub held_out: HeldOut,
-    /// The core over all rows.
+    /// The core over all rows, both angles at one instant.
     pub core: ByCore,
+    /// The delay between the readings, if these logs tell one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reading_delay: Option<ReadingDelay>,
+    /// What a delay of a millisecond would pass for, arcsec of play, where the logs keep to one pace and cannot tell
+    /// the two apart.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub play_of_a_millisecond_arcsec: Option<f64>,
+    /// All that belongs to the reading.
+    pub readings: Vec<Reading>,
     /// The parts.
     pub parts: Vec<PartSays>,
     /// Every node of every part, with an interval.
@@ -370,56 +400,31 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
         files
     };
     prior.core_drive().map_err(CalibrationError::Known)?;
-    let mut said: Vec<String> = check_ratio(files, prior)?.into_iter().collect();
+    let said: Vec<String> = check_ratio(files, prior)?.into_iter().collect();
     let mut recorded = Recorded::of(files, prior);
-    let play_rad = prior.nominal.backlash_arcsec / flexspline_base::units::ARCSEC_PER_RAD;
+    let play_rad = prior.nominal.backlash_arcsec / ARCSEC_PER_RAD;
     let mut rows = settled(files, prior, &recorded, play_rad);
+    let delay = Delay::of(&rows, prior, &recorded)?;
     let at_one_instant: Vec<Recording>;
-    let delay_s = reading_delay_s(&rows, prior, &recorded)?;
-    let files = if delay_s == 0.0 {
-        files
-    } else {
-        at_one_instant = files.iter().map(|file| without_delay(file, delay_s, prior.nominal.ratio)).collect();
-        rows = settled(&at_one_instant, prior, &recorded, play_rad);
-        said.push(delayed(delay_s));
-        &at_one_instant
+    let logs = match delay {
+        Some(delay) => {
+            at_one_instant = delay.taken_out(files, prior.nominal.ratio);
+            rows = settled(&at_one_instant, prior, &recorded, play_rad);
+            Logs { measured: files, at_one_instant: &at_one_instant, delay: Some(delay) }
+        }
+        None => Logs { measured: files, at_one_instant: files, delay: None },
     };
     if let Some(table) = prior.table {
         (rows, recorded.scales.friction_n_m) = dead_zone(rows, prior, table, &recorded);
     }
-    with_dead_zone(files, prior, (rows, recorded), said).map_err(|error| with_faults(error, files))
+    with_dead_zone(&logs, prior, (rows, recorded), said).map_err(|error| with_faults(error, files))
 }
 
-/// By how much the output is read after the generator, s, where that tells what was left out better than play and all
-/// other parts do; 0 where it does not.
-fn reading_delay_s(rows: &Rows, prior: &Prior<'_>, recorded: &Recorded) -> Result<f64, CalibrationError> {
-    if recorded.lacks(PartName::ReadingDelay, prior).is_some() {
-        return Ok(0.0);
-    }
-    let rows = rows.clone().sure(recorded.scales.friction_n_m, recorded).less(prior);
-    let fitted = fit(rows, prior, recorded, PartName::ALL.into_iter().chain([PartName::ReadingDelay]))?;
-    let arcsec = fitted.model.of(PartName::ReadingDelay).map_or(0.0, |of| fitted.model.coefficients[of.start]);
-    Ok(-arcsec / flexspline_base::units::ARCSEC_PER_RAD / recorded.scales.speed_rad_s)
-}
-
-/// A file with both angles as they are at one instant.
-fn without_delay(file: &Recording, delay_s: f64, ratio: f64) -> Recording {
-    let mut file = file.clone();
-    for session in &mut file.sessions {
-        let speeds: Vec<f64> = (0..session.len()).map(|k| rows::speed_rad_s(session, k, ratio)).collect();
-        session.error_rad.iter_mut().zip(speeds).for_each(|(error, speed)| *error += delay_s * speed);
-    }
-    file
-}
-
-/// What is said of a delay.
-fn delayed(delay_s: f64) -> String {
-    let (late, early) = if delay_s > 0.0 { ("output", "generator") } else { ("generator", "output") };
-    format!(
-        "the {late} is read {:.2} ms after the {early}: what that does goes with the speed, which no table knows; it \
-         was taken out of the rows. Read both at one instant, or tell the controller of the delay",
-        1e3 * delay_s.abs()
-    )
+/// Logs with a delay between the readings, and without.
+struct Logs<'a> {
+    measured: &'a [Recording],
+    at_one_instant: &'a [Recording],
+    delay: Option<Delay>,
 }
 
 /// A file in pieces, each with one zero.
@@ -446,9 +451,9 @@ fn by_zeros(file: &Recording) -> Vec<Recording> {
 }
 
 /// Calibrates from `rows` with the load that decides the flank as it stands in `recorded`; `said` is what is noted of
-/// the ratio and of a delay.
+/// the ratio.
 fn with_dead_zone(
-    files: &[Recording],
+    logs: &Logs<'_>,
     prior: &Prior<'_>,
     (rows, recorded): (Rows, Recorded),
     said: Vec<String>,
@@ -462,52 +467,33 @@ fn with_dead_zone(
             .map_or(0.0, |found| found.generator_zero_deg.to_radians()),
         ..prior.clone()
     };
-    let prior = &aligned;
-    let mut fitted =
-        fit(rows.sure(recorded.scales.friction_n_m, &recorded).less(prior), prior, &recorded, PartName::ALL)?;
-    let found = fitted.model.play_arcsec() / flexspline_base::units::ARCSEC_PER_RAD;
-    if found > 0.0 {
-        // Now that the play is known, without the rows inside it.
-        let play_rad = prior.nominal.backlash_arcsec / flexspline_base::units::ARCSEC_PER_RAD + found;
-        fitted = fit(
-            settled(files, prior, &recorded, play_rad).sure(recorded.scales.friction_n_m, &recorded).less(prior),
-            prior,
-            &recorded,
-            PartName::ALL,
-        )?;
-    }
-    let Fitted { rows, folds, model, held_out, mut parts } = fitted;
-    // No table is the simplest of all; a prior that is wrong may leave more than that even with parts beside it.
-    let worthless = held_out.rms_after_arcsec >= held_out.rms_before_arcsec;
-    if worthless || (model.chosen.is_empty() && prior.is_empty()) {
-        let reasons: Vec<String> = parts.iter().map(|part| format!("{}: {}", part.name, part.why)).collect();
-        let what = if model.chosen.is_empty() {
-            "no part gains in what was left out"
-        } else {
-            "what was known before is further off than the parts mend in what was left out"
-        };
-        let alone = fitted_alone(&rows, &folds, &every_part(&folds));
-        let zeros = (alone < ALONE * held_out.rms_after_arcsec).then(|| {
-            format!(
-                "; each log alone is fitted to {alone:.2}: do they share their zeros? Home the encoders in the same \
-                 place before each log, or give one log alone"
-            )
-        });
-        return Err(CalibrationError::NothingGained(format!(
-            "{what}, so no table is better than none ({:.2} arcsec rms as measured, {:.2} with the table): {}{}",
-            held_out.rms_before_arcsec,
-            held_out.rms_after_arcsec,
-            reasons.join("; "),
-            zeros.unwrap_or_default()
-        )));
-    }
-    let made = table::make(prior, &model, &recorded)?;
+    let (prior, files) = (&aligned, logs.at_one_instant);
+    let fitted_without = |without: &[Without]| {
+        let fitted = fit_outside_play(files, prior, (rows.clone(), &recorded), without)?;
+        fitted.is_worth_a_table(prior, files).map(|()| fitted)
+    };
+    let fitted = fitted_without(&[])?;
+    let (fitted, made) = match table::make(prior, &fitted.model, &recorded) {
+        // A table has no wind-up that falls with the load.
+        Err(error) if error.is_of_a_fall() && fitted.model.of(PartName::WindUp).is_some() => {
+            fitted.model.gives_way_with_the_load(prior)?;
+            let why = "it would fall with the load somewhere, which no spring does";
+            let fitted = fitted_without(&[(PartName::WindUp, why)])?;
+            let made = table::make(prior, &fitted.model, &recorded)?;
+            (fitted, made)
+        }
+        made => (fitted, made?),
+    };
+    let Fitted { rows, folds, agreement, model, held_out, mut parts } = fitted;
     let image = Table::check(&made.image).map_err(|error| TableError::Project(error.into()))?;
-    let core = by_core(files, &image, &recorded);
-    let fitted_alone = fitted_alone(&rows, &folds, &model.chosen);
+    let core = ByCore::of(files, &image, &recorded);
+    let reading_delay = logs.delay.map(|delay| delay.shown(logs.measured, &image, &recorded));
+    let play_of_a_millisecond_arcsec = play_of_a_millisecond(&rows.rows, &recorded, prior);
     let mut notes: Vec<String> = files.iter().flat_map(|file| file.notes.iter().cloned()).collect();
     notes.extend(said);
-    notes.extend(remarks(prior, &recorded, (&model, &parts), (held_out, fitted_alone)));
+    notes.extend(reading_delay.as_ref().map(ReadingDelay::note));
+    notes.extend(agreement.and_then(|agreement| agreement.note(files)));
+    notes.extend(remarks(prior, &recorded, (&model, &parts), play_of_a_millisecond_arcsec));
     sizes(&rows, &model, &mut parts);
     let zero = |row: &folds::Row| row.left_arcsec - model.adds_arcsec(&row.at);
     let mean = rows.rows.iter().map(zero).sum::<f64>() / rows.rows.len() as f64;
@@ -523,6 +509,13 @@ fn with_dead_zone(
     let (count, squares) = half_widths
         .fold((0.0, 0.0), |(count, squares), row| (count + 1.0, squares + known.half_width_arcsec(&row.at).powi(2)));
     let output_zeros = output_zeros(files, &rows, &model, known.noise);
+    let offset = |zero: &OutputZero| Reading {
+        name: "offset",
+        file: Some(zero.file.clone()),
+        value: zero.arcsec,
+        std: zero.half_width_arcsec / OF_95,
+    };
+    let readings = logs.delay.map(Delay::reading).into_iter().chain(output_zeros.iter().map(offset)).collect();
     let calibration = Calibration {
         schema_version: 1,
         files: files.iter().map(|file| file.file.clone()).collect(),
@@ -537,6 +530,9 @@ fn with_dead_zone(
         folds: folds.all().len(),
         held_out,
         core,
+        reading_delay,
+        play_of_a_millisecond_arcsec,
+        readings,
         parts,
         nodes: known.nodes(),
         noise: known.noise,
@@ -555,20 +551,6 @@ fn with_dead_zone(
         command: String::new(),
     };
     Ok(Calibrated { calibration, table: made, known, rows, recorded, shown })
-}
-
-/// All parts that may be fitted.
-fn every_part(folds: &Folds) -> Vec<Chosen> {
-    folds.parts().iter().map(|part| Chosen { part: *part, penalty: PENALTIES[0] }).collect()
-}
-
-/// What fits of some parts to each file alone leave in it, arcsec rms; infinite where files are not what is left out.
-fn fitted_alone(rows: &Rows, folds: &Folds, chosen: &[Chosen]) -> f64 {
-    if rows.folds != FoldKind::Files {
-        return f64::INFINITY;
-    }
-    let squares: f64 = folds.all().into_iter().map(|fold| folds.left_in(fold, &[fold], chosen)).sum();
-    (squares / rows.rows.len() as f64).sqrt()
 }
 
 /// What keeps a table from being made, with what was noticed of the units and signs of the logs.
@@ -622,12 +604,58 @@ fn output_zeros(files: &[Recording], rows: &Rows, model: &Model, noise: Noise) -
     files.iter().zip(sums).zip(&rows.means_arcsec).map(zero).collect()
 }
 
+/// A part that is not fitted, and why.
+type Without = (PartName, &'static str);
+
 struct Fitted {
     rows: Rows,
     folds: Folds,
+    /// Of several logs.
+    agreement: Option<Agreement>,
     model: Model,
     held_out: HeldOut,
     parts: Vec<PartSays>,
+}
+
+impl Fitted {
+    /// No table is the simplest of all; a prior that is wrong may leave more than that even with parts beside it.
+    fn is_worth_a_table(&self, prior: &Prior<'_>, files: &[Recording]) -> Result<(), CalibrationError> {
+        let HeldOut { rms_before_arcsec, rms_after_arcsec, .. } = self.held_out;
+        let no_part = self.model.chosen.is_empty();
+        if rms_after_arcsec < rms_before_arcsec && !(no_part && prior.is_empty()) {
+            return Ok(());
+        }
+        let what = if no_part {
+            "no part gains in what was left out"
+        } else {
+            "what was known before is further off than the parts mend in what was left out"
+        };
+        let reasons: Vec<String> = self.parts.iter().map(|part| format!("{}: {}", part.name, part.why)).collect();
+        let apart = self.agreement.as_ref().and_then(|agreement| agreement.note(files));
+        Err(CalibrationError::NothingGained(format!(
+            "{what}, so no table is better than none ({rms_before_arcsec:.2} arcsec rms as measured, \
+             {rms_after_arcsec:.2} with the table): {}{}",
+            reasons.join("; "),
+            apart.map_or_else(String::new, |apart| format!("; {apart}"))
+        )))
+    }
+}
+
+/// Fits, and where a play was found, again without the rows inside it.
+fn fit_outside_play(
+    files: &[Recording],
+    prior: &Prior<'_>,
+    (rows, recorded): (Rows, &Recorded),
+    without: &[Without],
+) -> Result<Fitted, CalibrationError> {
+    let ready = |rows: Rows| rows.sure(recorded.scales.friction_n_m, recorded).less(prior);
+    let fitted = fit(ready(rows), prior, recorded, PartName::ALL, without)?;
+    let found_rad = fitted.model.play_arcsec() / ARCSEC_PER_RAD;
+    if found_rad <= 0.0 {
+        return Ok(fitted);
+    }
+    let play_rad = prior.nominal.backlash_arcsec / ARCSEC_PER_RAD + found_rad;
+    fit(ready(settled(files, prior, recorded, play_rad)), prior, recorded, PartName::ALL, without)
 }
 
 /// Chooses and fits parts to the rows that are outside of a play.
@@ -636,16 +664,19 @@ fn fit(
     prior: &Prior<'_>,
     recorded: &Recorded,
     parts: impl IntoIterator<Item = PartName>,
+    without: &[Without],
 ) -> Result<Fitted, CalibrationError> {
     if rows.rows.len() < FEWEST_ROWS {
         return Err(CalibrationError::TooFew(rows.rows.len()));
     }
+    let mut without = without.to_vec();
     let may = |part: &PartName| recorded.lacks(*part, prior).is_none();
-    let mut open: Vec<PartName> = parts.into_iter().filter(may).collect();
+    let parts: Vec<PartName> = parts.into_iter().filter(may).collect();
     let own_zero = rows.folds == FoldKind::Files;
-    let mut backwards = false;
     // Once more where the play has to go: without it the flanks are sound.
     loop {
+        let open: Vec<PartName> =
+            parts.iter().copied().filter(|part| without.iter().all(|(other, _)| other != part)).collect();
         let folds = Folds::new(&rows.rows, &open, &recorded.scales, rows.means_arcsec.len(), own_zero);
         let all = folds.all();
         let left = nested(&folds);
@@ -653,12 +684,10 @@ fn fit(
         // The fewest parts that leave least where neither choice nor fit was made.
         let most = (0..path.len()).min_by(|a, b| left[*a].total_cmp(&left[*b])).unwrap_or(0);
         let chosen = pruned(&folds, &all, path[most].clone());
-        let zeros = if own_zero { 0 } else { rows.means_arcsec.len() };
-        let coefficients = folds.fit(&all, &chosen).unwrap_or_default().split_off(zeros);
+        let coefficients = folds.coefficients(&chosen).unwrap_or_default();
         let mut model = Model { chosen, coefficients, scales: recorded.scales };
-        if !model.has_sound_flanks(0.5 * prior.nominal.backlash_arcsec) && !backwards {
-            open.retain(|part| *part != PartName::Play);
-            backwards = true;
+        if !model.has_sound_flanks(0.5 * prior.nominal.backlash_arcsec) && open.contains(&PartName::Play) {
+            without.push((PartName::Play, "it would put the flanks on the wrong sides"));
             continue;
         }
         let count = rows.rows.len() as f64;
@@ -668,13 +697,14 @@ fn fit(
             rms_prior_arcsec: rms(folds.left_out(&all, &[])),
             rms_after_arcsec: rms(left[most]),
         };
-        let parts = judged(&folds, &model, recorded, prior, backwards);
-        return Ok(Fitted { rows, folds, model, held_out, parts });
+        let parts = judged(&folds, &model, recorded, prior, &without);
+        let agreement = Agreement::of(&rows, &open, &recorded.scales);
+        return Ok(Fitted { rows, folds, agreement, model, held_out, parts });
     }
 }
 
 /// What is said of each part.
-fn judged(folds: &Folds, model: &Model, recorded: &Recorded, prior: &Prior<'_>, backwards: bool) -> Vec<PartSays> {
+fn judged(folds: &Folds, model: &Model, recorded: &Recorded, prior: &Prior<'_>, without: &[Without]) -> Vec<PartSays> {
     let all = folds.all();
     let before = folds.left_out(&all, &[]);
     let with = folds.left_out(&all, &model.chosen);
@@ -690,8 +720,8 @@ fn judged(folds: &Folds, model: &Model, recorded: &Recorded, prior: &Prior<'_>, 
         if let Some(why) = recorded.lacks(part, prior) {
             return refused(None, why);
         }
-        if part == PartName::Play && backwards {
-            return refused(None, "it would put the flanks on the wrong sides".to_owned());
+        if let Some((_, why)) = without.iter().find(|(other, _)| *other == part) {
+            return refused(None, (*why).to_owned());
         }
         if let Some(chosen) = model.chosen.iter().find(|chosen| chosen.part == part) {
             let others: Vec<Chosen> = model.chosen.iter().copied().filter(|other| other.part != part).collect();
@@ -740,34 +770,12 @@ fn sizes(rows: &Rows, model: &Model, parts: &mut [PartSays]) {
     }
 }
 
-/// The core over all rows of the logs.
-fn by_core(files: &[Recording], table: &Table<'_>, recorded: &Recorded) -> ByCore {
-    let (mut before, mut after, mut rows) = (0.0, 0.0, 0);
-    for file in files {
-        let about = |values: Vec<f64>| {
-            let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
-            values.iter().map(|value| (value - mean).powi(2)).sum::<f64>()
-        };
-        let measured: Vec<f64> = file
-            .sessions
-            .iter()
-            .flat_map(|session| session.error_rad.iter().map(|rad| rad * flexspline_base::units::ARCSEC_PER_RAD))
-            .collect();
-        let left = file.sessions.iter().flat_map(|session| left_by_core(table, session, recorded.temperature_c));
-        rows += measured.len();
-        before += about(measured);
-        after += about(left.collect());
-    }
-    let rms = |squares: f64| (squares / rows.max(1) as f64).sqrt();
-    ByCore { rms_before_arcsec: rms(before), rms_after_arcsec: rms(after), rows }
-}
-
 /// What whoever uses the table has to know.
 fn remarks(
     prior: &Prior<'_>,
     recorded: &Recorded,
     (model, parts): (&Model, &[PartSays]),
-    (held_out, fitted_alone): (HeldOut, f64),
+    play_of_a_millisecond_arcsec: Option<f64>,
 ) -> Vec<String> {
     let mut remarks = Vec::new();
     let has = |part: PartName| model.chosen.iter().any(|chosen| chosen.part == part);
@@ -795,12 +803,18 @@ fn remarks(
     if recorded.lacks(PartName::Play, prior).is_some() {
         remarks.push("one direction was recorded: after a reversal the table says nothing new of the play".to_owned());
     }
-    if fitted_alone < ALONE * held_out.rms_after_arcsec {
+    if let Some(arcsec) = play_of_a_millisecond_arcsec.filter(|_| has(PartName::Play)) {
         remarks.push(format!(
-            "each log alone is fitted to {fitted_alone:.2} arcsec, and left with {:.2} by the others: they do not \
-             seem to share their zeros; home the encoders in the same place before each log, or give one log alone",
-            held_out.rms_after_arcsec
+            "the generator keeps to one pace: if one angle is read a millisecond after the other, {arcsec:.1} arcsec \
+             of this play are the reading's; other paces tell, half as fast for one pass in five"
         ));
+    }
+    if !recorded.has_torque {
+        remarks.push(
+            "no torque was recorded: the table holds for no load alone, and at any other the core says that it is \
+             outside of the table"
+                .to_owned(),
+        );
     }
     if has(PartName::OutputAngle) && parts.iter().any(|part| part.name == "wind_up" && part.held_out_gain.is_some()) {
         remarks.push(

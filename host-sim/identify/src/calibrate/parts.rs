@@ -79,7 +79,7 @@ const WAVE_POWER: i32 = 3;
 const DEGREE_POWER: i32 = 4;
 
 /// Where the drive is, as the parts see it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct State {
     /// Generator angle, rad.
     pub generator_rad: f64,
@@ -167,7 +167,8 @@ pub(super) fn weights(part: PartName) -> Vec<f64> {
             (1..=WIND_UP_DEGREE).map(|k| (k as f64).powi(DEGREE_POWER)).chain(std::iter::once(1.0)).collect()
         }
         PartName::Play | PartName::Temperature => vec![1.0; 3],
-        PartName::ReadingDelay => vec![1.0],
+        // A number, and no curve that could have wrinkles.
+        PartName::ReadingDelay => vec![0.0],
         PartName::GeneratorAngle | PartName::MaterialAngle => of_waves(GENERATOR_ORDERS),
         PartName::ToothPitch => of_waves(TOOTH_ORDERS),
         PartName::OutputAngle => of_waves(OUTPUT_ORDERS),

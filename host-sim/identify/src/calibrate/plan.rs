@@ -34,6 +34,9 @@ const ASKED: usize = 1500;
 const ROWS_OF_A_PASS: usize = 500;
 /// A slower pass is not worth its own kind below this share of the speed.
 const SLOWER: f64 = 0.7;
+/// Speed of the slower passes over the whole travel, which tell a delay between the readings from play, of the fastest.
+/// *Guess*: far enough apart for rows of a tenth to tell it, and not twice as long and more for nothing.
+const OTHER_PACE_SHARE: f64 = 0.5;
 /// Slowest that a pass is made to spread its rows, of the fastest; speeds that are tried; and places of a turn that
 /// rows would come back to.
 const SLOWEST_TO_SPREAD: f64 = 0.9;
@@ -237,7 +240,7 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&First<'_>>) -> Resu
         friction_n_m: prior.friction_n_m().max(LEAST_FRICTION * torque[0].abs().max(torque[1].abs())),
         temperature_c: wide(bench.temperature_c, first.map(|first| first.scales.temperature_c)),
         teeth: prior.tooth_pitches(),
-        speed_rad_s: 0.0,
+        speed_rad_s: bench.speed_rpm / 60.0 * TAU / prior.nominal.ratio.abs(),
     };
     let ratio = prior.nominal.ratio;
     let (open, cannot) = open_parts(prior, bench, &scales);
@@ -264,12 +267,15 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&First<'_>>) -> Resu
     while taken.len() < MOST_PASSES {
         let uncertain = asked.mean_variance(&now);
         let mut best: Option<(f64, usize, Mat)> = None;
-        // Each load once before one is repeated: the parts do not know all that a load does.
-        let fresh = |c: &Candidate| taken.iter().all(|(_, pass): &(usize, Pass)| pass.torque_n_m != c.pass.torque_n_m);
+        // Each load and temperature once before one is repeated: the parts do not know all that they do.
+        let is_new =
+            |c: &Candidate, of: fn(&Pass) -> f64| taken.iter().all(|(_, pass): &(usize, Pass)| of(pass) != of(&c.pass));
+        let news = |c: &Candidate| {
+            usize::from(is_new(c, |pass| pass.torque_n_m)) + usize::from(is_new(c, |pass| pass.temperature_c))
+        };
         let fits = |c: &Candidate| c.pass.duration_s <= left_s;
-        let all_taken = !candidates.iter().any(|c| fits(c) && fresh(c));
-        let open = |c: &Candidate| fits(c) && (all_taken || fresh(c));
-        for (k, candidate) in candidates.iter().enumerate().filter(|(_, c)| open(c)) {
+        let most = candidates.iter().filter(|c| fits(c)).map(news).max();
+        for (k, candidate) in candidates.iter().enumerate().filter(|(_, c)| fits(c) && Some(news(c)) == most) {
             let mut with = known.clone();
             with[candidate.warmth].join(&candidate.tells);
             let then = of(&with)?;
@@ -438,7 +444,8 @@ fn open_parts(prior: &Prior<'_>, bench: &Bench, scales: &Scales) -> (Vec<PartNam
         }
         _ => None,
     };
-    let open = PartName::ALL.into_iter().filter(|part| lacks(*part).is_none()).collect();
+    let open =
+        PartName::ALL.into_iter().filter(|part| lacks(*part).is_none()).chain([PartName::ReadingDelay]).collect();
     let cannot = PartName::ALL
         .into_iter()
         .filter_map(|part| lacks(part).map(|why| format!("{}: {why}", part.as_str())))
@@ -501,7 +508,8 @@ fn candidates(prior: &Prior<'_>, bench: &Bench, scales: &Scales, chosen: &[Chose
     let slow_rpm = 60.0 * bench.rate_hz / (ROWS_OF_A_PITCH * scales.teeth);
     let slow = by_teeth && slow_rpm < SLOWER * bench.speed_rpm;
     let slow_deg = 360.0 * SLOW_TURNS / ratio.abs();
-    let mut ways = vec![(begin, end, spreading_rpm(bench.speed_rpm, bench.rate_hz))];
+    let paces = [1.0, OTHER_PACE_SHARE].map(|share| spreading_rpm(share * bench.speed_rpm, bench.rate_hz));
+    let mut ways = paces.map(|rpm| (begin, end, rpm)).to_vec();
     if slow && slow_deg < end - begin {
         let step = (end - begin - slow_deg) / (SLOW_PLACES - 1) as f64;
         ways.extend((0..SLOW_PLACES).map(|k| (begin + step * k as f64, begin + step * k as f64 + slow_deg, slow_rpm)));
@@ -513,6 +521,7 @@ fn candidates(prior: &Prior<'_>, bench: &Bench, scales: &Scales, chosen: &[Chose
                 let turns = (to - from) / 360.0 * ratio.abs();
                 let moving_s = 2.0 * turns / speed_rpm * 60.0;
                 let duration_s = moving_s + 2.0 * REST_S;
+                let speed_rad_s = speed_rpm / 60.0 * TAU / ratio.abs();
                 let weight = moving_s * bench.rate_fitted_hz() / ROWS_OF_A_PASS as f64;
                 let mut tells = Information::new(width_of(chosen));
                 for k in 0..ROWS_OF_A_PASS {
@@ -522,7 +531,14 @@ fn candidates(prior: &Prior<'_>, bench: &Bench, scales: &Scales, chosen: &[Chose
                     // Not all at one phase of generator and teeth.
                     let generator_rad = output_rad * ratio
                         + TAU * (k as f64 * GOLDEN).fract() * (ratio.abs() / ROWS_OF_A_PASS as f64).min(1.0);
-                    let at = State { generator_rad, output_rad, torque_n_m, temperature_c, way, speed_rad_s: 0.0 };
+                    let at = State {
+                        generator_rad,
+                        output_rad,
+                        torque_n_m,
+                        temperature_c,
+                        way,
+                        speed_rad_s: way * speed_rad_s,
+                    };
                     tells.add(&row(chosen, &at, scales), weight);
                 }
                 let pass = Pass {

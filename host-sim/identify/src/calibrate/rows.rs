@@ -16,7 +16,7 @@ const ENOUGH_SESSIONS: usize = 3;
 /// another record. A guess.
 const LARGEST_SESSION: f64 = 0.4;
 /// Rows that are fitted, at most; of longer records every so many-th.
-pub(super) const MOST_ROWS: usize = 40_000;
+pub const MOST_ROWS: usize = 40_000;
 /// A reversal is one if the generator goes back by this share of its usual step.
 const TURNED_ROUND: f64 = 0.5;
 /// The output has settled on a flank when the generator has turned by so many times the play.

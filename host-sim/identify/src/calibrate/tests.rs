@@ -4,6 +4,7 @@ use flexspline::Table;
 
 use super::folds::Row;
 use super::*;
+use crate::extension::left_by_core;
 use crate::measurement::Session;
 use crate::nominal::Harmonic;
 use flexspline_base::units::ARCSEC_PER_RAD;
@@ -102,11 +103,23 @@ fn a_delay_is_no_play_and_play_is_no_delay() {
         let law = |psi: f64, _: f64, _: f64, way: f64| 25.0 * (2.0 * psi).sin() - play * way;
         let made = calibrate(&[at_paces(recording(3, law), delay_s)], &prior).unwrap();
         let c = &made.calibration;
-        let told = c.notes.iter().find(|note| note.contains("is read"));
+        let told = c.notes.iter().find(|note| note.contains("the output is read"));
         assert_eq!(told.is_some(), delay_s > 0.0, "{delay_s} {play}: {:?}", c.notes);
-        let ms = told.map(|note| note.split(' ').nth(4).unwrap().parse::<f64>().unwrap());
-        // Beside play, which goes by direction as it does, it is known to a tenth.
-        assert!(ms.is_none_or(|ms| (ms - 5.0).abs() < 0.5), "{told:?}");
+        assert_eq!(c.reading_delay.is_some(), delay_s > 0.0);
+        if let Some(found) = c.reading_delay {
+            assert!((found.delay_s - delay_s).abs() < found.half_width_s && found.half_width_s < 3e-4, "{found:?}");
+            // The delay stays where nobody takes it out, and what is said of the rows as measured has it.
+            let behind = |rms: f64, without: f64| (rms * rms - without * without).sqrt();
+            let [before, after] = [
+                behind(found.rms_before_arcsec, c.core.rms_before_arcsec),
+                behind(found.rms_after_arcsec, c.core.rms_after_arcsec),
+            ];
+            let alone = 0.005 * 3.15 / RATIO * ARCSEC_PER_RAD;
+            assert!(after > 0.9 * alone && after < 1.2 * alone, "{after} of {alone}");
+            assert!(play > 0.0 || (before > 0.9 * alone && before < 1.2 * alone), "{before} of {alone}");
+            assert_eq!((c.readings[0].name, c.readings[0].value), ("delay", found.delay_s));
+        }
+        assert_eq!((c.readings.last().unwrap().name, c.play_of_a_millisecond_arcsec), ("offset", None));
         assert_eq!(kept(c).contains(&"play"), play > 0.0, "{delay_s} {play}: {:?}", c.parts);
         assert!(c.core.rms_after_arcsec < 3.0, "{:?}", c.core);
     }
@@ -114,6 +127,75 @@ fn a_delay_is_no_play_and_play_is_no_delay() {
     let files = [3, 4].map(|seed| at_paces(recording(seed, |psi, _, _, _| 25.0 * (2.0 * psi).sin()), 0.005));
     let notes = calibrate(&files, &prior).unwrap().calibration.notes;
     assert_eq!(notes.iter().filter(|note| note.contains("is read")).count(), 1, "{notes:?}");
+}
+
+/// At one pace nothing tells a delay from play; a plan has paces that do.
+#[test]
+fn one_pace_is_said_to_hide_a_delay_and_a_plan_has_others() {
+    let prior = Prior::of_ratio(RATIO, GeneratorKind::Cam);
+    let bench = Bench { minutes: 40.0, rate_hz: 5.0, torque_n_m: [-30.0, 30.0], ..Bench::default() };
+    let planned = plan(&prior, &bench, None).unwrap();
+    let law = |psi: f64, out: f64, torque: f64, _: f64| 18.0 * (2.0 * psi).sin() + 40.0 * out.cos() + 1.2 * torque;
+    let late = |planned: &Planned| {
+        let mut log = played(planned, 4, law);
+        let session = &mut log.sessions[0];
+        for k in 0..session.len() {
+            session.error_rad[k] -= 0.005 * rows::speed_rad_s(session, k, RATIO);
+        }
+        calibrate(&[log], &prior).unwrap().calibration
+    };
+    let c = late(&planned);
+    assert!(c.reading_delay.is_some_and(|found| (found.delay_s - 0.005).abs() < found.half_width_s), "{:?}", c.notes);
+    assert!(!kept(&c).contains(&"play") && c.core.rms_after_arcsec < 1.5, "{:?}", c.core);
+    // The same passes at one speed.
+    let fastest = planned.passes.iter().map(|pass| pass.speed_rpm).fold(0.0, f64::max);
+    let mut at_one = planned;
+    for pass in &mut at_one.passes {
+        pass.duration_s *= pass.speed_rpm / fastest;
+        pass.speed_rpm = fastest;
+    }
+    let c = late(&at_one);
+    let of_a_millisecond = 2e-3 * fastest / 60.0 * std::f64::consts::TAU / RATIO * ARCSEC_PER_RAD;
+    let said = c.play_of_a_millisecond_arcsec.unwrap();
+    assert!((said / of_a_millisecond - 1.0).abs() < 0.05, "{said} of {of_a_millisecond}");
+    assert!(kept(&c).contains(&"play") && c.reading_delay.is_none(), "{:?}", c.parts);
+    assert!(c.notes.iter().any(|note| note.contains("one pace") && note.contains("a millisecond")), "{:?}", c.notes);
+}
+
+#[test]
+fn logs_that_do_not_agree_are_told_and_the_odd_one_named() {
+    let law = |psi: f64, _: f64, torque: f64, _: f64| 25.0 * (2.0 * psi).sin() + 1.5 * torque;
+    let prior = Prior::of_ratio(RATIO, GeneratorKind::Cam);
+    let said = |files: &[Recording]| {
+        let notes =
+            calibrate(files, &prior).map_or_else(|error| vec![error.to_string()], |made| made.calibration.notes);
+        notes.into_iter().find(|note| note.contains("the logs do not agree"))
+    };
+    let agree: Vec<Recording> = (1..4).map(|seed| recording(seed, law)).collect();
+    assert_eq!((said(&agree), said(&agree[..2])), (None, None));
+    let turned = recording(5, |psi, out, torque, way| law(psi + 0.7, out, torque, way));
+    let sign = recording(6, |psi, out, torque, way| law(psi, out, -torque, way));
+    for odd in [turned, sign] {
+        assert!(said(&[agree[0].clone(), odd.clone()]).is_some());
+        let mut files = agree.clone();
+        files.push(odd);
+        let said = said(&files).unwrap();
+        assert!(said.contains(&format!(" in {},", files[3].file)), "{said}");
+    }
+}
+
+#[test]
+fn a_torque_of_the_wrong_sign_is_refused_and_a_wind_up_that_falls_is_no_part() {
+    let prior = Prior::of_ratio(RATIO, GeneratorKind::Cam);
+    let wrong = calibrate(&[recording(1, |psi, _, torque, _| 25.0 * (2.0 * psi).sin() - 1.5 * torque)], &prior);
+    let wrong = wrong.err().unwrap();
+    assert!(wrong.is_bad_input() && wrong.to_string().contains("torque=NAME:-N.m"), "{wrong}");
+    // It grows from end to end, and falls between.
+    let bent = |psi: f64, _: f64, torque: f64, _: f64| 25.0 * (2.0 * psi).sin() + 40.0 * (torque / 8.0).sin() + torque;
+    let c = calibrate(&[recording(1, bent)], &prior).unwrap().calibration;
+    let wind_up = c.parts.iter().find(|part| part.name == "wind_up").unwrap();
+    assert!(!wind_up.kept && wind_up.why.contains("fall"), "{wind_up:?}");
+    assert!(kept(&c).contains(&"generator_angle"));
 }
 
 #[test]
