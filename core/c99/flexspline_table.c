@@ -1905,7 +1905,12 @@ fxt_output fxt_tick(const fxt_table *table, fxt_joint *joint, const fxt_input *i
     const int32_t goal = goal_of(joint, late, hold ? add(from.ahead, is.error) : found, sane);
     const int32_t wanted = stoppable(joint->acceleration, sub(goal, joint->correction));
     const int32_t correction = moved_by(joint, wanted, mul(table->limit, FINE));
-    const int32_t held_back = sub(goal, correction), uncertainty = aimed > is.uncertainty ? aimed : is.uncertainty;
+    /* Of what the table wants, whoever holds it back. */
+    const int32_t asked = sane ? mul(hold ? add(from.ahead, is.error) : found, FINE) : goal, held_back = sub(asked, correction);
+    /* Where the generator is is not known in this tick: the error is any that the table gives. */
+    const bool unseen = sample.glitch || !input->has_generator;
+    const int32_t least = unseen ? add(table->limit, magnitude_of(is.error)) : 0, known = aimed > is.uncertainty ? aimed : is.uncertainty;
+    const int32_t uncertainty = known > least ? known : least;
     /* Nothing was seen of the generator yet. */
     joint->play = kept(joint->sampled != 0u ? &play : &unknown_state);
     joint->missed_ticks += input->missed_ticks;
@@ -1916,7 +1921,7 @@ fxt_output fxt_tick(const fxt_table *table, fxt_joint *joint, const fxt_input *i
     out.uncertainty_rad = (float)uncertainty * rad_per_count;
     out.correction_rad = (float)correction * (rad_per_count / (float)FINE);
     out.held_back_rad = (float)held_back * (rad_per_count / (float)FINE);
-    out.quality = quality_of(&at, sane, play.lower == play.upper);
+    out.quality = quality_of(&at, sane, play.lower == play.upper && !unseen);
     out.flags = (input->has_generator ? 0u : (uint32_t)FXT_SAMPLE_LOST) | (sample.glitch ? (uint32_t)FXT_GLITCH : 0u) |
                 (late ? (uint32_t)FXT_LATE : 0u) | (magnitude_of(held_back) >= FINE ? (uint32_t)FXT_HELD_BACK : 0u) |
                 (sane ? 0u : (uint32_t)FXT_NOT_CORRECTED) | (joint->mode == FXT_SAFE ? (uint32_t)FXT_IN_SAFE_MODE : 0u);

@@ -311,7 +311,7 @@ typedef enum fxt_flag {
     FXT_SAMPLE_LOST = 1,
     FXT_GLITCH = 2,         /**< the sample was not believed */
     FXT_LATE = 4,           /**< ticks were missed */
-    FXT_HELD_BACK = 8,      /**< the limiter held the correction back */
+    FXT_HELD_BACK = 8,      /**< the correction is not what the table wants: limiter, mode or overrun policy hold it back */
     FXT_NOT_CORRECTED = 16, /**< no correction could be made; the last one is kept or fades out */
     FXT_NO_JOINT_OR_TABLE = 128, /**< the joint was not made or the table was refused; do not follow the command (fxt_tick) */
     FXT_IN_SAFE_MODE = 256
@@ -321,9 +321,10 @@ typedef enum fxt_flag {
 typedef struct fxt_output {
     int64_t command, output;      /**< counts: the generator angle to command, which leaps where the target leaps; where the output is */
     float transmission_error_rad; /**< now; 0 if disabled */
-    float uncertainty_rad;        /**< it lies within this of it, as far as play and jumps go */
+    float uncertainty_rad;        /**< it lies within this of it, as far as play and jumps go, corrected or not; without a sample that is believed
+                                   * in this tick no less than the table's limit and the error told */
     float correction_rad;         /**< in the command: target less command over ratio */
-    float held_back_rad;          /**< what the limiter held back of it */
+    float held_back_rad;          /**< what it lacks of what the table wants: by limiter, mode or overrun policy */
     fxt_quality quality;
     uint32_t flags;
 } fxt_output;

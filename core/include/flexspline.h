@@ -23,7 +23,8 @@
 // The tick came late.
 #define FLEXSPLINE_FLAG_OVERRUN 4
 
-// The limiter held the correction back.
+// The correction is not what the table wants: the limiter, the mode (off, safe, hold) or the overrun policy holds it
+// back.
 #define FLEXSPLINE_FLAG_HELD_BACK 8
 
 // No correction could be made; the last one is kept or fades out.
@@ -493,12 +494,13 @@ typedef struct FlexsplineOutput {
   int64_t output_counts;
   // Transmission error now, rad.
   float transmission_error_rad;
-  // It lies within +- this, rad.
+  // It lies within +- this, rad. Of the estimate, whether it is corrected or not. Without a sample that is believed
+  // in this tick: no less than the table's limit and the error that is told.
   float uncertainty_rad;
   // Correction in the command, rad: target less command over ratio. It is taken off the target, and has the sign of
   // the error.
   float correction_rad;
-  // What the limiter held back, rad.
+  // What the correction lacks of what the table wants, rad: by the limiter, the mode or the overrun policy.
   float held_back_rad;
   // `FLEXSPLINE_QUALITY_...`.
   uint8_t quality;

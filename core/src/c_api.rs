@@ -94,7 +94,8 @@ pub const FLEXSPLINE_FLAG_SAMPLE_LOST: u16 = 1;
 pub const FLEXSPLINE_FLAG_GLITCH: u16 = 2;
 /// The tick came late.
 pub const FLEXSPLINE_FLAG_OVERRUN: u16 = 4;
-/// The limiter held the correction back.
+/// The correction is not what the table wants: the limiter, the mode (off, safe, hold) or the overrun policy holds it
+/// back.
 pub const FLEXSPLINE_FLAG_HELD_BACK: u16 = 8;
 /// No correction could be made; the last one is kept or fades out.
 pub const FLEXSPLINE_FLAG_NOT_CORRECTED: u16 = 16;
@@ -238,12 +239,13 @@ pub struct FlexsplineOutput {
     pub output_counts: i64,
     /// Transmission error now, rad.
     pub transmission_error_rad: f32,
-    /// It lies within +- this, rad.
+    /// It lies within +- this, rad. Of the estimate, whether it is corrected or not. Without a sample that is believed
+    /// in this tick: no less than the table's limit and the error that is told.
     pub uncertainty_rad: f32,
     /// Correction in the command, rad: target less command over ratio. It is taken off the target, and has the sign of
     /// the error.
     pub correction_rad: f32,
-    /// What the limiter held back, rad.
+    /// What the correction lacks of what the table wants, rad: by the limiter, the mode or the overrun policy.
     pub held_back_rad: f32,
     /// `FLEXSPLINE_QUALITY_...`.
     pub quality: u8,

@@ -348,6 +348,27 @@ static int joints(void)
     leap.target = INT64_C(1) << 30;
     const fxt_output leapt = fxt_tick(&table, &leaping, &leap);
     EXPECT(leapt.command - stands > INT64_C(90) << 30 && fabsf(leapt.correction_rad) <= 5.0e-5f);
+    /* Not seen, or not corrected: told as such. */
+    fxt_output told = {0};
+    for (int tick = 0; tick < 900; tick++) {
+        leap.generator += 1 << 20;
+        leap.target = leap.generator / 95;
+        told = fxt_tick(&table, &leaping, &leap);
+    }
+    EXPECT(told.quality == FXT_IN_RANGE && told.flags == 0u && told.uncertainty_rad < 1e-6f);
+    const float lacks = told.correction_rad, limit = fxt_tell(&table).error_limit_rad;
+    leap.has_generator = false;
+    told = fxt_tick(&table, &leaping, &leap);
+    EXPECT(told.quality == FXT_UNCERTAIN && told.uncertainty_rad >= 0.999f * (limit + fabsf(told.transmission_error_rad)));
+    leap.has_generator = true;
+    leap.generator += INT64_C(1) << 31;
+    told = fxt_tick(&table, &leaping, &leap);
+    EXPECT(told.flags == (uint32_t)FXT_GLITCH && told.quality == FXT_UNCERTAIN && told.uncertainty_rad >= 0.999f * limit);
+    leap.generator -= INT64_C(1) << 31;
+    EXPECT(fxt_joint_request(&leaping, FXT_OFF));
+    for (int tick = 0; tick < 400; tick++)
+        told = fxt_tick(&table, &leaping, &leap);
+    EXPECT(told.correction_rad == 0.0f && (told.flags & FXT_HELD_BACK) != 0u && fabsf(told.held_back_rad - lacks) < 1e-6f);
     /* Memory of zeros, and memory that changed, is no joint. */
     static fxt_joint zeros;
     EXPECT(fxt_tick(&table, &zeros, &input).command == 77 && fxt_joint_mode(&zeros) == FXT_SAFE);

@@ -8,13 +8,14 @@
 //!
 //! | what happens | what the joint does | flag |
 //! |---|---|---|
-//! | no sample | keeps the last generator angle: the play does not move | [`Flags::SAMPLE_LOST`] |
+//! | no sample | keeps the last angle and the play; the error is known to the table's limit | [`Flags::SAMPLE_LOST`] |
 //! | a sample further from the last one than a tick allows | takes it for a glitch, as no sample; if it stays for `patience` ticks, takes it as true, with the side of the play unknown | [`Flags::GLITCH`] |
 //! | torque or temperature not finite, or the table in doubt | keeps the last correction for `patience` ticks, then fades it out | [`Flags::NOT_CORRECTED`] |
 //! | an adjustment larger than any may be | takes the largest one | [`Flags::BOUNDED`] |
 //! | torque or temperature out of range | corrects with the value at the edge | [`Quality::Extrapolated`](crate::Quality::Extrapolated) |
 //! | a tick came late | by [`Overrun`] | [`Flags::OVERRUN`] |
 //! | a target that leaps | commands the leap: the correction alone is limited | |
+//! | a mode or a fade that does not follow the table | [`Output::held_back_rad`] | [`Flags::HELD_BACK`] |
 //! | a reversal, or anything else that wants a faster correction | the limiter holds it back; by how much is in [`Output::held_back_rad`] | [`Flags::HELD_BACK`] |
 //! | an upset in the state | takes the other copy; if that is not whole either, starts anew in safe mode | [`Flags::STATE_TORN`], [`Flags::SAFE`] |
 //! | an upset in the settings | takes the other copy; if that is not whole either, commands the last sample believed, or 0 | [`Flags::JOINT_TORN`] |
@@ -212,6 +213,8 @@ struct Judged {
     forgotten: bool,
     /// There was no sample that can be believed since the reset.
     blind: bool,
+    /// All ones if this tick's sample is believed, else 0.
+    good: u32,
 }
 
 impl Settings {
@@ -319,7 +322,7 @@ impl Settings {
         // An adjustment is learnt, not moved.
         now.play.shift(mean_counts.wrapping_sub(now.adjusted));
         now.adjusted = mean_counts;
-        let Judged { generator, flags, forgotten, blind } = self.judge(&mut now, input);
+        let Judged { generator, flags, forgotten, blind, good } = self.judge(&mut now, input);
         if forgotten {
             now.play = PlayState::unknown();
         }
@@ -341,10 +344,13 @@ impl Settings {
         let mask = (hold as i32).wrapping_neg();
         let wanted = found_there ^ (found_there ^ still) & mask;
         let open = from.guess ^ (from.guess ^ from.unknown) & mask;
-        let known = now.play.is_known() & (open <= 0);
+        // Where the generator is is not known in this tick: the error is any that the table gives.
+        let unseen = point.most(store.plan()).wrapping_add(error.wrapping_abs()) & !good as i32;
+        let known = now.play.is_known() & (open <= 0) & (unseen == 0);
         let aimed = open.wrapping_add(point.jump);
         let aimed = if sane { aimed } else { store.plan().limit };
         let uncertainty = if aimed > uncertainty { aimed } else { uncertainty };
+        let uncertainty = if unseen > uncertainty { unseen } else { uncertainty };
         // One bit for each flank.
         let flank = FLANK_FORWARD << backward as u32;
         let before = now.marks;
@@ -364,7 +370,9 @@ impl Settings {
             state.missed(input.missed_ticks);
         }
 
-        let held_back = goal.wrapping_sub(correction);
+        // Of what the table wants, whoever holds it back.
+        let wanted = if sane { wanted.wrapping_mul(FINE) } else { goal };
+        let held_back = wanted.wrapping_sub(correction);
         let flags = flags
             .with(Flags::OVERRUN, late)
             .with(Flags::HELD_BACK, held_back.wrapping_add(WITHIN) as u32 > (2 * WITHIN) as u32)
@@ -421,6 +429,7 @@ impl Settings {
             flags: Flags::default().with(Flags::SAMPLE_LOST, lost).with(Flags::GLITCH, glitch),
             forgotten: believed as u32 | sampled & late != 0,
             blind: seen_now != SAMPLED,
+            good,
         }
     }
 
@@ -665,6 +674,45 @@ mod tests {
         }
         assert_eq!(run.state.play(), &play);
         assert!(!run.tick(&run.input(4e-3)).flags.contains(Flags::SAMPLE_LOST));
+    }
+
+    /// No number and no flag says "perfect" where nothing is seen, or where nothing is corrected.
+    #[test]
+    fn what_is_not_seen_or_not_corrected_is_told() {
+        let follows = |out: &Output| out.quality == Quality::InRange && out.flags == Flags::default();
+        let mut run = Loop::new(Overrun::FadeOut { ticks: 400 });
+        let seen = run.run(300, 1e-3, 1e-5);
+        assert!(follows(&seen) && seen.uncertainty_rad < 1e-6);
+        let limit = crate::table::Table::check(&IMAGES[0]).unwrap().error_limit_rad();
+        // No sample, and one that is not believed: the error is any that the table gives.
+        for generator in [None, Some(run.generator.offset_rad(3.0))] {
+            for _ in 0..3 {
+                let out = run.tick(&Input { generator, ..run.input(4e-3) });
+                let most = limit + out.transmission_error_rad.abs();
+                assert!(out.quality == Quality::Uncertain && out.uncertainty_rad >= 0.999 * most, "{out:?}");
+            }
+        }
+        assert!(follows(&run.run(100, 4e-3, 1e-5)));
+        // What is left at the output while the mode, or a fade, does not follow the table.
+        let wanted = run.run(100, 5e-3, 1e-5).correction_rad;
+        let told = |out: &Output| {
+            let lacks = (out.held_back_rad + out.correction_rad - wanted).abs();
+            out.flags.contains(Flags::HELD_BACK) && out.quality == Quality::InRange && lacks < 0.1 * wanted.abs()
+        };
+        let _ = run.tick(&Input { missed_ticks: 1, ..run.input(6e-3) });
+        for tick in 1..790 {
+            let out = run.tick(&run.input(6e-3));
+            assert!(told(&out), "fade, tick {tick}: {out:?}");
+        }
+        assert!(follows(&run.run(100, 6e-3, 1e-5)));
+        run.state.request(Mode::Hold).unwrap();
+        let held = run.run(3, 7e-3, -1e-5);
+        assert!(held.flags.contains(Flags::HELD_BACK) && held.held_back_rad.abs() > 1e-5, "{held:?}");
+        run.state.request(Mode::Off).unwrap();
+        let off = run.run(300, 7e-3, 1e-5);
+        // Of the flank that leads from where the output is to the target, which is behind it now.
+        let lacks = off.held_back_rad.abs() > wanted.abs() && off.flags.contains(Flags::HELD_BACK);
+        assert!(off.correction_rad == 0.0 && lacks, "{off:?} {wanted}");
     }
 
     #[test]

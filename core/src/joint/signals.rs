@@ -31,7 +31,8 @@ impl Flags {
     pub const GLITCH: Self = Self(2);
     /// The tick came late.
     pub const OVERRUN: Self = Self(4);
-    /// The limiter held the correction back.
+    /// The correction is not what the table wants: the limiter, the mode (off, safe, hold) or the overrun policy holds
+    /// it back.
     pub const HELD_BACK: Self = Self(8);
     /// No correction could be made; the last one is kept or fades out.
     pub const NOT_CORRECTED: Self = Self(16);
@@ -92,12 +93,14 @@ pub struct Output {
     pub output: OutputAngle,
     /// The transmission error now, rad; 0 if disabled.
     pub transmission_error_rad: f32,
-    /// It lies within ± this, as far as play and jumps go, rad.
+    /// It lies within ± this, as far as play and jumps go, rad. Of the estimate, whether it is corrected or not: what
+    /// is left at the output is [`Self::output`] less the target. Without a sample that is believed in this tick: no
+    /// less than the table's limit and the error that is told, which is all that is known.
     pub uncertainty_rad: f32,
     /// The correction in the command: target − command/ratio, rad. It is taken off the target, and so has the sign of
     /// the transmission error that it takes out.
     pub correction_rad: f32,
-    /// What the limiter held back of the correction, rad.
+    /// What the correction lacks of what the table wants, rad: by the limiter, the mode or the overrun policy.
     pub held_back_rad: f32,
     /// How far to trust estimate and correction.
     pub quality: Quality,
