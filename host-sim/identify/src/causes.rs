@@ -96,7 +96,7 @@ causes! {
     GeneratorEncoderTilt = "generator_encoder_tilt",
     /// An encoder divides its periods unevenly: four and more waves around it.
     EncoderSubdivision = "encoder_subdivision",
-    /// The output is read later than the generator.
+    /// The output of a row is older than its generator.
     SensorLatency = "sensor_latency",
     /// The ratio is another one.
     RatioError = "ratio_error",

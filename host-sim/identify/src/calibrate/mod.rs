@@ -404,7 +404,7 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
     let mut recorded = Recorded::of(files, prior);
     let play_rad = prior.nominal.backlash_arcsec / ARCSEC_PER_RAD;
     let mut rows = settled(files, prior, &recorded, play_rad);
-    let delay = Delay::of(&rows, prior, &recorded)?;
+    let delay = Delay::of(files, prior, &recorded, play_rad);
     let at_one_instant: Vec<Recording>;
     let logs = match delay {
         Some(delay) => {
@@ -800,13 +800,21 @@ fn remarks(
             100.0 * recorded.output_share
         ));
     }
+    if recorded.each_keeps_to_one_load && recorded.has_torque {
+        remarks.push(
+            "each log keeps to one load: its wind-up is in the zero of the output, and the table has none; record \
+             several loads in one log"
+                .to_owned(),
+        );
+    }
     if recorded.lacks(PartName::Play, prior).is_some() {
         remarks.push("one direction was recorded: after a reversal the table says nothing new of the play".to_owned());
     }
-    if let Some(arcsec) = play_of_a_millisecond_arcsec.filter(|_| has(PartName::Play)) {
+    if let Some(arcsec) = play_of_a_millisecond_arcsec {
         remarks.push(format!(
-            "the generator keeps to one pace: if one angle is read a millisecond after the other, {arcsec:.1} arcsec \
-             of this play are the reading's; other paces tell, half as fast for one pass in five"
+            "the generator keeps to one pace: an output a millisecond older than the generator looks like {arcsec:.1} \
+             arcsec of play, and one as much newer takes them off it; other paces tell, half as fast for one pass in \
+             five"
         ));
     }
     if !recorded.has_torque {

@@ -15,7 +15,8 @@ use super::folds::{Chosen, Row};
 use super::interval::{Information, Node, Noise, OF_95, covariance, row, spread, width_of, widths};
 use super::parts::{PartName, Scales, State};
 use super::rows::MOST_ROWS;
-use super::{GOLDEN, LEAST_FRICTION, ONE_TEMPERATURE_K, PENALTY_OF_PLANS, Prior, ROWS_OF_A_PITCH};
+use super::{GOLDEN, LEAST_FRICTION, ONE_TEMPERATURE_K, OTHER_PACE, PENALTY_OF_PLANS, Prior, ROWS_OF_A_PITCH};
+use crate::measurement::least_and_most;
 
 /// Beyond what any bench or catalogue of these drives has, so a slip of the pen: generator, load and temperature.
 /// Guesses.
@@ -243,7 +244,7 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&First<'_>>) -> Resu
         speed_rad_s: bench.speed_rpm / 60.0 * TAU / prior.nominal.ratio.abs(),
     };
     let ratio = prior.nominal.ratio;
-    let (open, cannot) = open_parts(prior, bench, &scales);
+    let (open, mut cannot) = open_parts(prior, bench, &scales);
     let chosen: Vec<Chosen> = open.iter().map(|part| Chosen { part: *part, penalty: PENALTY_OF_PLANS }).collect();
     let candidates = candidates(prior, bench, &scales, &chosen);
     let noise = first.map_or_else(|| bench.noise(), |first| first.noise);
@@ -327,6 +328,11 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&First<'_>>) -> Resu
             .collect();
     }
     let passes = in_order(taken);
+    let paces = least_and_most(passes.iter().map(|pass| pass.speed_rpm));
+    if paces.1 < OTHER_PACE * paces.0 {
+        cannot
+            .push("reading_delay: the time is enough for one pace alone, at which a delay looks like play".to_owned());
+    }
     Ok(Planned {
         schema_version: 1,
         drive: prior.drive.clone(),

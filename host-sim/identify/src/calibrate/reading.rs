@@ -2,12 +2,12 @@
 
 use serde::Serialize;
 
-use super::choose::PENALTIES;
-use super::folds::{Chosen, Row};
+use super::choose::{LEAST_GAIN, PENALTIES, path, pruned};
+use super::folds::{Chosen, Folds, Row};
 use super::interval::{Known, OF_95};
 use super::parts::PartName;
-use super::rows::{Recorded, Rows, speed_rad_s};
-use super::{CalibrationError, Model, Prior, fit};
+use super::rows::{FoldKind, Recorded, Rows, settled, speed_rad_s};
+use super::{Model, Prior};
 use crate::extension::left_by_core;
 use crate::measurement::Recording;
 use flexspline::Table;
@@ -16,7 +16,7 @@ use flexspline_base::units::ARCSEC_PER_RAD;
 /// A number of the reading, fitted beside the parts of the table and not held by it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Reading {
-    /// `delay` (s, positive where the output is read after the generator) or `offset` (arcsec, of the output).
+    /// `delay` (s, positive where the output of a row is older than its generator) or `offset` (arcsec, of the output).
     pub name: &'static str,
     /// The log, of an offset.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -30,7 +30,7 @@ pub struct Reading {
 /// A delay between the readings of the two angles.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ReadingDelay {
-    /// By how much the output is read after the generator, s; negative where it is read before it.
+    /// By how much the output of a row is older than its generator, s; negative where the generator is the older.
     pub delay_s: f64,
     /// Half width of the interval that holds it with 95 %, s.
     pub half_width_s: f64,
@@ -48,24 +48,49 @@ pub(super) struct Delay {
 }
 
 impl Delay {
-    /// The delay that tells what was left out better than play and all other parts do; none where they do as well.
-    pub fn of(rows: &Rows, prior: &Prior<'_>, recorded: &Recorded) -> Result<Option<Delay>, CalibrationError> {
+    /// The delay, if it tells what was left out better than play and all other parts do; the rows lie outside of a play
+    /// of `play_rad`, and of what is found.
+    pub fn of(files: &[Recording], prior: &Prior<'_>, recorded: &Recorded, play_rad: f64) -> Option<Delay> {
         if recorded.lacks(PartName::ReadingDelay, prior).is_some() {
-            return Ok(None);
+            return None;
         }
-        let rows = rows.clone().sure(recorded.scales.friction_n_m, recorded).less(prior);
-        let fitted = fit(rows, prior, recorded, PartName::ALL.into_iter().chain([PartName::ReadingDelay]), &[])?;
-        let Some(of) = fitted.model.of(PartName::ReadingDelay) else { return Ok(None) };
-        // Play goes nearly as the delay does: as much of it as a penalty holds back, the delay would take up.
-        let chosen: Vec<Chosen> =
-            fitted.model.chosen.iter().map(|chosen| Chosen { penalty: PENALTIES[0], ..*chosen }).collect();
-        let Some(coefficients) = fitted.folds.coefficients(&chosen) else { return Ok(None) };
-        let model = Model { chosen, coefficients, ..fitted.model };
-        let known = Known::of(&fitted.rows.rows, &model, fitted.rows.means_arcsec.len());
+        let (found, model) = Delay::beside(settled(files, prior, recorded, play_rad), prior, recorded)?;
+        let further_rad = model.play_arcsec() / ARCSEC_PER_RAD;
+        if further_rad <= 0.0 {
+            return Some(found);
+        }
+        // Now that the play is known, without the rows inside it.
+        Delay::beside(settled(files, prior, recorded, play_rad + further_rad), prior, recorded).map(|(found, _)| found)
+    }
+
+    /// The delay beside the parts of these rows, with those parts.
+    fn beside(rows: Rows, prior: &Prior<'_>, recorded: &Recorded) -> Option<(Delay, Model)> {
+        let rows = rows.sure(recorded.scales.friction_n_m, recorded).less(prior);
+        let open = |part: &PartName| recorded.lacks(*part, prior).is_none();
+        let parts: Vec<PartName> = PartName::ALL.into_iter().chain([PartName::ReadingDelay]).filter(open).collect();
+        let (zeros, own_zero) = (rows.means_arcsec.len(), rows.folds == FoldKind::Files);
+        let folds = Folds::new(&rows.rows, &parts, &recorded.scales, zeros, own_zero);
+        let all = folds.all();
+        let chosen = pruned(&folds, &all, path(&folds, &all).pop()?);
+        // Play goes nearly as the delay does: it is there, or the delay would take it up, and where the two oppose each
+        // other neither gains alone. As much of it as a penalty holds back, the delay would take up as well.
+        let free = |part: PartName| Chosen { part, penalty: PENALTIES[0] };
+        let is_beside = |part: &PartName| {
+            *part == PartName::Play || *part != PartName::ReadingDelay && chosen.iter().any(|other| other.part == *part)
+        };
+        let mut chosen: Vec<Chosen> = parts.iter().copied().filter(is_beside).map(free).collect();
+        let without = folds.left_out(&all, &chosen);
+        chosen.push(free(PartName::ReadingDelay));
+        if folds.left_out(&all, &chosen) > without * (1.0 - LEAST_GAIN) {
+            return None;
+        }
+        let model = Model { coefficients: folds.coefficients(&chosen)?, chosen, scales: recorded.scales };
+        let of = model.of(PartName::ReadingDelay)?;
         // The column is the speed over its scale.
         let s_of_arcsec = 1.0 / ARCSEC_PER_RAD / recorded.scales.speed_rad_s;
-        let std = known.map_or(f64::INFINITY, |known| known.std_arcsec(of.start));
-        Ok(Some(Delay { by_s: -model.coefficients[of.start] * s_of_arcsec, std_s: std * s_of_arcsec }))
+        let std = Known::of(&rows.rows, &model, zeros)?.std_arcsec(of.start);
+        let delay = Delay { by_s: -model.coefficients[of.start] * s_of_arcsec, std_s: std * s_of_arcsec };
+        Some((delay, model))
     }
 
     /// Logs with both angles as they are at one instant.
@@ -93,11 +118,11 @@ impl ReadingDelay {
     /// What is said of it.
     #[must_use]
     pub fn note(&self) -> String {
-        let (late, early) = if self.delay_s > 0.0 { ("output", "generator") } else { ("generator", "output") };
+        let (old, new) = if self.delay_s > 0.0 { ("output", "generator") } else { ("generator", "output") };
         format!(
-            "the {late} is read {:.3} ± {:.3} ms after the {early}: what that does goes with the speed, which no table \
-             knows, so the table is fitted without it. Over all rows as measured {:.2} arcsec rms, {:.2} with the table \
-             and the delay still there; read both at one instant, or tell the controller of the delay",
+            "in each row the {old} is {:.3} ± {:.3} ms older than the {new}: what that does goes with the speed, which \
+             no table knows, so the table is fitted without it. Over all rows as measured {:.2} arcsec rms, {:.2} with \
+             the table and the delay still there; read both at one instant, or tell the controller of the delay",
             1e3 * self.delay_s.abs(),
             1e3 * self.half_width_s,
             self.rms_before_arcsec,

@@ -53,6 +53,8 @@ pub(super) struct Rows {
 pub(super) struct Recorded {
     pub scales: Scales,
     pub has_torque: bool,
+    /// Whether no log has two loads, though the logs together do: then a load is as good as a zero.
+    pub each_keeps_to_one_load: bool,
     pub has_temperature: bool,
     /// Shares of the turns of generator and output with rows in them.
     pub generator_share: f64,
@@ -102,6 +104,11 @@ impl Recorded {
         });
         let mut speeds = sampled(&speeds.filter(|speed| *speed > 0.0).collect::<Vec<f64>>());
         let [slow, fast] = [0.1, 0.9].map(|share| quantile_of(&mut speeds, share));
+        let keeps_to_one_load = |file: &Recording| {
+            let loads = file.sessions.iter().flat_map(|session| session.torque_n_m.iter().flatten().copied());
+            let (low, high) = least_and_most(loads);
+            high - low < super::LEAST_FRICTION * most
+        };
         let torque_noise_n_m = white_noise(sessions().filter_map(|session| session.torque_n_m.as_deref()));
         Recorded {
             torque_noise_n_m,
@@ -114,6 +121,7 @@ impl Recorded {
             },
             slow_rad_s: slow,
             has_torque,
+            each_keeps_to_one_load: files.len() > 1 && files.iter().all(keeps_to_one_load),
             has_temperature,
             generator_share: covered(angles(1.0), 24),
             output_share: covered(angles(1.0 / prior.nominal.ratio), 36),
@@ -134,6 +142,9 @@ impl Recorded {
             PartName::WindUp if !self.has_torque => Some("no torque was recorded".to_owned()),
             PartName::WindUp if high - low < super::SAME_TORQUE * low.abs().max(high.abs()) || high <= low => {
                 Some(format!("the torque keeps to {high:.3} N.m"))
+            }
+            PartName::WindUp if self.each_keeps_to_one_load => {
+                Some("each log keeps to one load, which is as good as a zero of the output".to_owned())
             }
             PartName::Play if !(super::BOTH_WAYS..=1.0 - super::BOTH_WAYS).contains(&self.backward_share) => {
                 Some(format!(

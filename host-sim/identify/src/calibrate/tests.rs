@@ -99,13 +99,15 @@ fn at_paces(mut recording: Recording, delay_s: f64) -> Recording {
 #[test]
 fn a_delay_is_no_play_and_play_is_no_delay() {
     let prior = Prior::of_ratio(RATIO, GeneratorKind::Cam);
-    for (delay_s, play) in [(0.005, 0.0), (0.0, 18.0), (0.005, 18.0)] {
+    // With the last, which oppose each other, neither gains alone.
+    for (delay_s, play) in [(0.005, 0.0), (0.0, 18.0), (0.005, 18.0), (-0.003, 18.0)] {
         let law = |psi: f64, _: f64, _: f64, way: f64| 25.0 * (2.0 * psi).sin() - play * way;
         let made = calibrate(&[at_paces(recording(3, law), delay_s)], &prior).unwrap();
         let c = &made.calibration;
-        let told = c.notes.iter().find(|note| note.contains("the output is read"));
-        assert_eq!(told.is_some(), delay_s > 0.0, "{delay_s} {play}: {:?}", c.notes);
-        assert_eq!(c.reading_delay.is_some(), delay_s > 0.0);
+        let old = if delay_s > 0.0 { "the output is" } else { "the generator is" };
+        let told = c.notes.iter().find(|note| note.contains(old) && note.contains("older than"));
+        assert_eq!(told.is_some(), delay_s != 0.0, "{delay_s} {play}: {:?}", c.notes);
+        assert_eq!(c.reading_delay.is_some(), delay_s != 0.0);
         if let Some(found) = c.reading_delay {
             assert!((found.delay_s - delay_s).abs() < found.half_width_s && found.half_width_s < 3e-4, "{found:?}");
             // The delay stays where nobody takes it out, and what is said of the rows as measured has it.
@@ -114,7 +116,7 @@ fn a_delay_is_no_play_and_play_is_no_delay() {
                 behind(found.rms_before_arcsec, c.core.rms_before_arcsec),
                 behind(found.rms_after_arcsec, c.core.rms_after_arcsec),
             ];
-            let alone = 0.005 * 3.15 / RATIO * ARCSEC_PER_RAD;
+            let alone = delay_s.abs() * 3.15 / RATIO * ARCSEC_PER_RAD;
             assert!(after > 0.9 * alone && after < 1.2 * alone, "{after} of {alone}");
             assert!(play > 0.0 || (before > 0.9 * alone && before < 1.2 * alone), "{before} of {alone}");
             assert_eq!((c.readings[0].name, c.readings[0].value), ("delay", found.delay_s));
@@ -126,7 +128,7 @@ fn a_delay_is_no_play_and_play_is_no_delay() {
     // Of several logs it is told once.
     let files = [3, 4].map(|seed| at_paces(recording(seed, |psi, _, _, _| 25.0 * (2.0 * psi).sin()), 0.005));
     let notes = calibrate(&files, &prior).unwrap().calibration.notes;
-    assert_eq!(notes.iter().filter(|note| note.contains("is read")).count(), 1, "{notes:?}");
+    assert_eq!(notes.iter().filter(|note| note.contains("older than")).count(), 1, "{notes:?}");
 }
 
 /// At one pace nothing tells a delay from play; a plan has paces that do.
@@ -160,6 +162,26 @@ fn one_pace_is_said_to_hide_a_delay_and_a_plan_has_others() {
     assert!((said / of_a_millisecond - 1.0).abs() < 0.05, "{said} of {of_a_millisecond}");
     assert!(kept(&c).contains(&"play") && c.reading_delay.is_none(), "{:?}", c.parts);
     assert!(c.notes.iter().any(|note| note.contains("one pace") && note.contains("a millisecond")), "{:?}", c.notes);
+    // A plan that has time for one pace says so.
+    let short = plan(&prior, &Bench { minutes: 8.0, ..bench }, None).unwrap();
+    assert!(short.cannot.iter().any(|why| why.starts_with("reading_delay")), "{:?}", short.cannot);
+}
+
+/// Logs at one load each, and each with a zero that is free, say nothing of the wind-up.
+#[test]
+fn logs_of_one_load_each_make_no_wind_up() {
+    let law = |psi: f64, _: f64, torque: f64, _: f64| 25.0 * (2.0 * psi).sin() + 1.5 * torque;
+    let files: Vec<Recording> = [-20.0, 0.0, 20.0]
+        .map(|load: f64| {
+            let mut log = recording((load + 30.0) as u64, |psi, out, _, way| law(psi, out, load, way));
+            log.sessions[0].torque_n_m.as_mut().unwrap().fill(load);
+            log
+        })
+        .to_vec();
+    let c = calibrate(&files, &Prior::of_ratio(RATIO, GeneratorKind::Cam)).unwrap().calibration;
+    let wind_up = c.parts.iter().find(|part| part.name == "wind_up").unwrap();
+    assert!(!wind_up.kept && wind_up.why.contains("one load"), "{wind_up:?}");
+    assert!(c.notes.iter().any(|note| note.contains("several loads in one log")), "{:?}", c.notes);
 }
 
 #[test]

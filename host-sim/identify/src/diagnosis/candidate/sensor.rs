@@ -117,7 +117,7 @@ pub(super) fn rate(on: &Excitation<'_>, values: &[f64]) -> Vec<f64> {
     rates
 }
 
-/// The output is read later than the generator.
+/// The output of a row is older than its generator.
 fn sensor_latency() -> Law {
     let mut law = Law::new(CauseName::SensorLatency, |on, _| {
         let per_s = flexspline_base::units::ARCSEC_PER_RAD / on.nominal.ratio;
