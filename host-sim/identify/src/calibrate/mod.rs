@@ -108,11 +108,10 @@ pub enum CalibrationError {
 impl CalibrationError {
     /// Whether the error falls somewhere while the load grows.
     fn is_of_a_fall(&self) -> bool {
-        let CalibrationError::Table(TableError::Project(ProjectError::Write(WriteError::Refused(refused)))) = self
-        else {
-            return false;
-        };
-        matches!(refused, ImageError::Falls { .. })
+        use ProjectError::Write;
+        use TableError::Project;
+        use WriteError::Refused;
+        matches!(self, CalibrationError::Table(Project(Write(Refused(ImageError::Falls { .. })))))
     }
 
     /// Whether the input is to blame.
@@ -404,16 +403,12 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
     let mut recorded = Recorded::of(files, prior);
     let play_rad = prior.nominal.backlash_arcsec / ARCSEC_PER_RAD;
     let mut rows = settled(files, prior, &recorded, play_rad);
-    let delay = Delay::of(files, prior, &recorded, play_rad);
-    let at_one_instant: Vec<Recording>;
-    let logs = match delay {
-        Some(delay) => {
-            at_one_instant = delay.taken_out(files, prior.nominal.ratio);
-            rows = settled(&at_one_instant, prior, &recorded, play_rad);
-            Logs { measured: files, at_one_instant: &at_one_instant, delay: Some(delay) }
-        }
-        None => Logs { measured: files, at_one_instant: files, delay: None },
-    };
+    let delay = Delay::of(files, &rows, prior, &recorded, play_rad);
+    let at_one_instant = delay.map(|delay| delay.taken_out(files, prior.nominal.ratio));
+    if let Some(files) = &at_one_instant {
+        rows = settled(files, prior, &recorded, play_rad);
+    }
+    let logs = Logs { measured: files, at_one_instant: at_one_instant.as_deref().unwrap_or(files), delay };
     if let Some(table) = prior.table {
         (rows, recorded.scales.friction_n_m) = dead_zone(rows, prior, table, &recorded);
     }
@@ -484,7 +479,8 @@ fn with_dead_zone(
         }
         made => (fitted, made?),
     };
-    let Fitted { rows, folds, agreement, model, held_out, mut parts } = fitted;
+    let agreement = fitted.agreement();
+    let Fitted { rows, folds, model, held_out, mut parts, .. } = fitted;
     let image = Table::check(&made.image).map_err(|error| TableError::Project(error.into()))?;
     let core = ByCore::of(files, &image, &recorded);
     let reading_delay = logs.delay.map(|delay| delay.shown(logs.measured, &image, &recorded));
@@ -527,7 +523,7 @@ fn with_dead_zone(
             FoldKind::Sessions => "sessions",
             FoldKind::Blocks => "blocks",
         },
-        folds: folds.all().len(),
+        folds,
         held_out,
         core,
         reading_delay,
@@ -609,15 +605,21 @@ type Without = (PartName, &'static str);
 
 struct Fitted {
     rows: Rows,
-    folds: Folds,
-    /// Of several logs.
-    agreement: Option<Agreement>,
+    /// How many.
+    folds: usize,
+    /// What could be chosen of.
+    open: Vec<PartName>,
     model: Model,
     held_out: HeldOut,
     parts: Vec<PartSays>,
 }
 
 impl Fitted {
+    /// Whether several logs agree.
+    fn agreement(&self) -> Option<Agreement> {
+        Agreement::of(&self.rows, &self.open, &self.model.scales)
+    }
+
     /// No table is the simplest of all; a prior that is wrong may leave more than that even with parts beside it.
     fn is_worth_a_table(&self, prior: &Prior<'_>, files: &[Recording]) -> Result<(), CalibrationError> {
         let HeldOut { rms_before_arcsec, rms_after_arcsec, .. } = self.held_out;
@@ -631,7 +633,7 @@ impl Fitted {
             "what was known before is further off than the parts mend in what was left out"
         };
         let reasons: Vec<String> = self.parts.iter().map(|part| format!("{}: {}", part.name, part.why)).collect();
-        let apart = self.agreement.as_ref().and_then(|agreement| agreement.note(files));
+        let apart = self.agreement().and_then(|agreement| agreement.note(files));
         Err(CalibrationError::NothingGained(format!(
             "{what}, so no table is better than none ({rms_before_arcsec:.2} arcsec rms as measured, \
              {rms_after_arcsec:.2} with the table): {}{}",
@@ -649,35 +651,26 @@ fn fit_outside_play(
     without: &[Without],
 ) -> Result<Fitted, CalibrationError> {
     let ready = |rows: Rows| rows.sure(recorded.scales.friction_n_m, recorded).less(prior);
-    let fitted = fit(ready(rows), prior, recorded, PartName::ALL, without)?;
+    let fitted = fit(ready(rows), prior, recorded, without)?;
     let found_rad = fitted.model.play_arcsec() / ARCSEC_PER_RAD;
     if found_rad <= 0.0 {
         return Ok(fitted);
     }
     let play_rad = prior.nominal.backlash_arcsec / ARCSEC_PER_RAD + found_rad;
-    fit(ready(settled(files, prior, recorded, play_rad)), prior, recorded, PartName::ALL, without)
+    fit(ready(settled(files, prior, recorded, play_rad)), prior, recorded, without)
 }
 
 /// Chooses and fits parts to the rows that are outside of a play.
-fn fit(
-    rows: Rows,
-    prior: &Prior<'_>,
-    recorded: &Recorded,
-    parts: impl IntoIterator<Item = PartName>,
-    without: &[Without],
-) -> Result<Fitted, CalibrationError> {
+fn fit(rows: Rows, prior: &Prior<'_>, recorded: &Recorded, without: &[Without]) -> Result<Fitted, CalibrationError> {
     if rows.rows.len() < FEWEST_ROWS {
         return Err(CalibrationError::TooFew(rows.rows.len()));
     }
     let mut without = without.to_vec();
-    let may = |part: &PartName| recorded.lacks(*part, prior).is_none();
-    let parts: Vec<PartName> = parts.into_iter().filter(may).collect();
-    let own_zero = rows.folds == FoldKind::Files;
     // Once more where the play has to go: without it the flanks are sound.
     loop {
-        let open: Vec<PartName> =
-            parts.iter().copied().filter(|part| without.iter().all(|(other, _)| other != part)).collect();
-        let folds = Folds::new(&rows.rows, &open, &recorded.scales, rows.means_arcsec.len(), own_zero);
+        let mut open = recorded.shown(PartName::ALL, prior);
+        open.retain(|part| without.iter().all(|(other, _)| other != part));
+        let folds = rows.folds_of(&open, &recorded.scales);
         let all = folds.all();
         let left = nested(&folds);
         let path = path(&folds, &all);
@@ -698,8 +691,7 @@ fn fit(
             rms_after_arcsec: rms(left[most]),
         };
         let parts = judged(&folds, &model, recorded, prior, &without);
-        let agreement = Agreement::of(&rows, &open, &recorded.scales);
-        return Ok(Fitted { rows, folds, agreement, model, held_out, parts });
+        return Ok(Fitted { rows, folds: all.len(), open, model, held_out, parts });
     }
 }
 
@@ -800,7 +792,7 @@ fn remarks(
             100.0 * recorded.output_share
         ));
     }
-    if recorded.each_keeps_to_one_load && recorded.has_torque {
+    if recorded.each_keeps_to_one_load {
         remarks.push(
             "each log keeps to one load: its wind-up is in the zero of the output, and the table has none; record \
              several loads in one log"

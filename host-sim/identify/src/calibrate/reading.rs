@@ -3,10 +3,10 @@
 use serde::Serialize;
 
 use super::choose::{LEAST_GAIN, PENALTIES, path, pruned};
-use super::folds::{Chosen, Folds, Row};
+use super::folds::{Chosen, Row};
 use super::interval::{Known, OF_95};
 use super::parts::PartName;
-use super::rows::{FoldKind, Recorded, Rows, settled, speed_rad_s};
+use super::rows::{Recorded, Rows, settled, speed_rad_s};
 use super::{Model, Prior};
 use crate::extension::left_by_core;
 use crate::measurement::Recording;
@@ -48,13 +48,19 @@ pub(super) struct Delay {
 }
 
 impl Delay {
-    /// The delay, if it tells what was left out better than play and all other parts do; the rows lie outside of a play
-    /// of `play_rad`, and of what is found.
-    pub fn of(files: &[Recording], prior: &Prior<'_>, recorded: &Recorded, play_rad: f64) -> Option<Delay> {
+    /// The delay, if it tells what was left out better than play and all other parts do; `rows` of the files
+    /// lie outside of a play of `play_rad`, and what tells the delay outside of that which is found, too.
+    pub fn of(
+        files: &[Recording],
+        rows: &Rows,
+        prior: &Prior<'_>,
+        recorded: &Recorded,
+        play_rad: f64,
+    ) -> Option<Delay> {
         if recorded.lacks(PartName::ReadingDelay, prior).is_some() {
             return None;
         }
-        let (found, model) = Delay::beside(settled(files, prior, recorded, play_rad), prior, recorded)?;
+        let (found, model) = Delay::beside(rows.clone(), prior, recorded)?;
         let further_rad = model.play_arcsec() / ARCSEC_PER_RAD;
         if further_rad <= 0.0 {
             return Some(found);
@@ -66,10 +72,8 @@ impl Delay {
     /// The delay beside the parts of these rows, with those parts.
     fn beside(rows: Rows, prior: &Prior<'_>, recorded: &Recorded) -> Option<(Delay, Model)> {
         let rows = rows.sure(recorded.scales.friction_n_m, recorded).less(prior);
-        let open = |part: &PartName| recorded.lacks(*part, prior).is_none();
-        let parts: Vec<PartName> = PartName::ALL.into_iter().chain([PartName::ReadingDelay]).filter(open).collect();
-        let (zeros, own_zero) = (rows.means_arcsec.len(), rows.folds == FoldKind::Files);
-        let folds = Folds::new(&rows.rows, &parts, &recorded.scales, zeros, own_zero);
+        let parts = recorded.shown(PartName::ALL.into_iter().chain([PartName::ReadingDelay]), prior);
+        let folds = rows.folds_of(&parts, &recorded.scales);
         let all = folds.all();
         let chosen = pruned(&folds, &all, path(&folds, &all).pop()?);
         // Play goes nearly as the delay does: it is there, or the delay would take it up, and where the two oppose each
@@ -88,7 +92,7 @@ impl Delay {
         let of = model.of(PartName::ReadingDelay)?;
         // The column is the speed over its scale.
         let s_of_arcsec = 1.0 / ARCSEC_PER_RAD / recorded.scales.speed_rad_s;
-        let std = Known::of(&rows.rows, &model, zeros)?.std_arcsec(of.start);
+        let std = Known::of(&rows.rows, &model, rows.means_arcsec.len())?.std_arcsec(of.start);
         let delay = Delay { by_s: -model.coefficients[of.start] * s_of_arcsec, std_s: std * s_of_arcsec };
         Some((delay, model))
     }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::folds::Row;
+use super::folds::{Folds, Row};
 use super::parts::{PartName, Scales, State};
 use super::prior::Prior;
 use crate::measurement::{Recording, Session, least_and_most, quantile_of, sampled, white_noise};
@@ -121,7 +121,7 @@ impl Recorded {
             },
             slow_rad_s: slow,
             has_torque,
-            each_keeps_to_one_load: files.len() > 1 && files.iter().all(keeps_to_one_load),
+            each_keeps_to_one_load: has_torque && files.len() > 1 && files.iter().all(keeps_to_one_load),
             has_temperature,
             generator_share: covered(angles(1.0), 24),
             output_share: covered(angles(1.0 / prior.nominal.ratio), 36),
@@ -131,6 +131,11 @@ impl Recorded {
             fine_turns,
             temperature_c: if has_temperature { f64::midpoint(temperature.0, temperature.1) } else { usual },
         }
+    }
+
+    /// Of some parts those that can be fitted to what was recorded.
+    pub fn shown(&self, parts: impl IntoIterator<Item = PartName>, prior: &Prior<'_>) -> Vec<PartName> {
+        parts.into_iter().filter(|part| self.lacks(*part, prior).is_none()).collect()
     }
 
     /// Why a part cannot be fitted to what was recorded, if it cannot.
@@ -269,6 +274,11 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
 }
 
 impl Rows {
+    /// Sums over their folds.
+    pub fn folds_of(&self, parts: &[PartName], scales: &Scales) -> Folds {
+        Folds::new(&self.rows, parts, scales, self.means_arcsec.len(), self.folds == FoldKind::Files)
+    }
+
     /// Whether the load of a row decides the flank or not, for all that its sensor's noise leaves open.
     fn is_sure(at: &State, friction_n_m: f64, recorded: &Recorded) -> bool {
         (at.torque_n_m.abs() - friction_n_m).abs() >= SURE * recorded.torque_noise_n_m
