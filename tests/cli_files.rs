@@ -116,14 +116,19 @@ fn a_drive_from_a_few_numbers_clears_its_teeth_and_says_how_it_was_made() {
         assert!(!bore || (wheel["root_radius_mm"].as_f64().unwrap() - rim_mm - 31.0).abs() < 1e-3, "{line}");
         assert_eq!(text.contains("as HHD-95\nrim_thickness_mm"), !bore && !line.contains("--set"), "{line}");
     }
-    // A size that is at hand brings its data sheet, and the command that adds guesses of what no catalogue prints.
+    // A size that is at hand brings its data sheet, and the command that adds guesses of what no catalogue prints, which
+    // the long form runs as it is told.
     let made = desk.line("new like.toml --like CSG-25-80 --json").done().json();
     assert_eq!(made["data_sheet"]["k2_n_m_per_rad"], 50e3);
     assert_eq!(made["left_out"].as_array().unwrap().len(), 4);
     assert_eq!(made["teeth"]["clear"].as_array().unwrap().len(), 4);
     assert!(desk.read("like.toml").contains("\nratcheting_torque_n_m = 880.0\n"), "{}", desk.read("like.toml"));
-    let guesses = made["next"][2].as_str().unwrap();
+    let guesses = made["next"][2].as_str().unwrap().strip_prefix("flexspline ").unwrap();
     assert!(guesses.contains("--like CSG-25-80"), "{guesses}");
+    if flexspline_tests::long() {
+        let with_cup = desk.line(&format!("{guesses} --json")).done().json();
+        assert_eq!(with_cup["left_out"].as_array().unwrap().len(), 2);
+    }
     // What was asked for stays in that command, and what was set is not guessed.
     let own =
         "new wide.toml --like CSG-25-80 --bore 62.4 --width 40 --set generator.bearing_stiffness_n_per_mm3=5000 --json";

@@ -543,7 +543,10 @@ mod tests {
     fn a_pitch_error_and_an_oval_do_what_fem_says() {
         // 0.2 µm: at 2 N m a tooth gives way by no more. The kernel's harmonic is the mean over tooth phases, the run
         // is at one of them, which with the few teeth that carry 2 N m differs by 2 % at order 2 and 7 % at order 6.
-        let (places, size) = ([20.0, 47.0], 0.2);
+        // `FLEXSPLINE_LONG` looks at four places of the turn.
+        let long = std::env::var_os("FLEXSPLINE_LONG").is_some();
+        let places: &[f64] = if long { &[0.0, 20.0, 47.0, 70.0] } else { &[20.0, 47.0] };
+        let size = 0.2;
         for torque in [2.0, 50.0, -50.0] {
             type Change = fn(&mut AsBuilt);
             let cases: [(&str, Change, super::super::Gain, f64, f64); 4] = [
@@ -572,7 +575,7 @@ mod tests {
             ];
             for (name, change, [c, s], order, per_turn) in cases {
                 let allowed = if torque.abs() < 10.0 { 0.1 } else { 0.03 };
-                let found = beyond_ideal(change, &places, torque);
+                let found = beyond_ideal(change, places, torque);
                 for (k, found) in places.iter().zip(found) {
                     let angle = order * per_turn * k * TAU / 188.0;
                     let expected = size * (c * angle.cos() - s * angle.sin());
