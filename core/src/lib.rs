@@ -172,8 +172,8 @@
 //! # Not in here
 //! Rate-dependent friction. The table is quasi-static; elastic oscillation is the [`Predictor`]'s.
 #![no_std]
-#![cfg_attr(not(feature = "c-api"), forbid(unsafe_code))]
-#![cfg_attr(feature = "c-api", deny(unsafe_code))]
+#![cfg_attr(not(any(test, feature = "c-api")), forbid(unsafe_code))]
+#![cfg_attr(any(test, feature = "c-api"), deny(unsafe_code))]
 #![cfg_attr(
     not(test),
     deny(
@@ -193,7 +193,7 @@
 extern crate std;
 
 mod angle;
-#[cfg(all(feature = "c-api", not(feature = "fuzzing")))]
+#[cfg(all(any(test, feature = "c-api"), not(feature = "fuzzing")))]
 mod c_api;
 #[cfg(all(feature = "c-api", feature = "fuzzing"))]
 #[doc(hidden)]

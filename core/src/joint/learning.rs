@@ -110,7 +110,7 @@ impl<const N: usize> Adapter<N> {
     }
 
     /// Whether it has another owner than `other`.
-    #[cfg(feature = "c-api")]
+    #[cfg(any(test, feature = "c-api"))]
     pub(crate) fn has_other_owner(&self, other: &Self) -> bool {
         self.adapter.kept().has_other_owner(other.adapter.kept())
     }

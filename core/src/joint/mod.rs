@@ -16,7 +16,7 @@ mod start_up;
 mod state;
 mod torque_path;
 
-#[cfg(feature = "c-api")]
+#[cfg(any(test, feature = "c-api"))]
 pub(crate) use adapt::NO_COEFFICIENT;
 pub use adapt::{
     AdaptCounters, AdaptError, AdaptRestoreError, AdaptSettings, Adapted, Coefficient, Learning, Seen, Term, Verdict,
@@ -39,7 +39,7 @@ pub use slip::{
     FittedSlip, LoadTorque, NominalOutput, Slip, SlipBank, SlipElement, SlipState, SlipVariable, TorqueSlipElement,
     saved_slip_bytes,
 };
-#[cfg(feature = "c-api")]
+#[cfg(any(test, feature = "c-api"))]
 pub(crate) use slip::{NOBODY, owner};
 pub use start_up::{Implausible, Readings, StartUp, StartUpSettings, StartUpStep};
 #[cfg(any(test, feature = "std"))]

@@ -72,7 +72,7 @@ impl Flags {
     }
 
     /// From bits, those of no flag left out.
-    #[cfg(feature = "c-api")]
+    #[cfg(any(test, feature = "c-api"))]
     pub(crate) const fn of_bits(bits: u16) -> Self {
         Self(bits & !Self::AGAIN.0)
     }

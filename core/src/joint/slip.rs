@@ -284,7 +284,7 @@ impl<const N: usize, V: SlipVariable> SlipBank<N, V> {
 
     /// A bank of the first so many springs: those after them, of no width and no gain, are in no sum and no saved
     /// state.
-    #[cfg(feature = "c-api")]
+    #[cfg(any(test, feature = "c-api"))]
     pub(crate) fn of_first(self, used: usize) -> Self {
         let Springs { widths, gains, .. } = *self.springs.kept();
         Self::of(widths, gains, used)

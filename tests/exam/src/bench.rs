@@ -1,8 +1,6 @@
 //! The oracle: what could be known at best from these data. It has the plant, the size of the noise and the spread of
 //! units, and asks how far an effect stands out once every base parameter has been allowed to float.
 
-use nalgebra::{DMatrix, DVector};
-
 use crate::drive::{
     BACKLASH_SPREAD, Drive, FRICTION_SPREAD, HARMONIC_SPREAD, PHASE_SPREAD_RAD, STIFFNESS_SPREAD, Unit,
 };
@@ -34,7 +32,9 @@ pub struct Bench<'a> {
 pub struct Scales {
     whitening: Whitening,
     nuisance: Vec<Vec<f64>>,
-    whitened: DMatrix<f64>,
+    whitened: Vec<Vec<f64>>,
+    /// Products of the whitened columns with one another, the prior on the diagonal.
+    gram: Vec<Vec<f64>>,
     /// Weight of the prior of each nuisance column.
     prior: Vec<f64>,
 }
@@ -189,8 +189,13 @@ impl Scales {
     /// Scales for noise of this kind, with columns that float and the weight of the prior of each.
     pub fn new(whitening: Whitening, floating: Vec<(Vec<f64>, f64)>) -> Self {
         let (nuisance, prior): (Vec<_>, Vec<_>) = floating.into_iter().unzip();
-        let whitened = columns(&nuisance.iter().map(|c| whitening.apply(c)).collect::<Vec<_>>());
-        Self { whitening, nuisance, whitened, prior }
+        let whitened: Vec<Vec<f64>> = nuisance.iter().map(|column: &Vec<f64>| whitening.apply(column)).collect();
+        let mut gram = vec![];
+        for (at, column) in whitened.iter().enumerate() {
+            gram.push(products(&whitened[..=at], column));
+            gram[at][at] += prior[at];
+        }
+        Self { whitening, nuisance, whitened, gram, prior }
     }
 
     /// Weighs a contribution against the base parameters.
@@ -201,31 +206,33 @@ impl Scales {
     /// The same with further columns that may take it up freely; also their coefficients. `damping` holds each against
     /// its scale.
     pub fn weigh_beside(&self, contribution: &[f64], beside: &[(Vec<f64>, f64)]) -> (Weight, Vec<f64>) {
-        let target = DVector::from_vec(self.whitening.apply(contribution));
-        let own = self.whitened.ncols();
-        let mut all = self.whitened.clone().resize_horizontally(own + beside.len(), 0.0);
-        for (at, (column, _)) in beside.iter().enumerate() {
-            all.column_mut(own + at).copy_from_slice(&self.whitening.apply(column));
+        let target = self.whitening.apply(contribution);
+        let own = self.whitened.len();
+        // Rows of the lower triangle.
+        let (mut gram, mut right) = (self.gram.clone(), products(&self.whitened, &target));
+        let mut added: Vec<Vec<f64>> = vec![];
+        for (column, damping) in beside {
+            added.push(self.whitening.apply(column));
+            let column = &added[added.len() - 1];
+            let mut row = products(&self.whitened, column);
+            row.extend(products(&added, column));
+            if let Some(diagonal) = row.last_mut() {
+                *diagonal += damping.max(1e-9 * *diagonal + 1e-12);
+            }
+            gram.push(row);
+            right.push(dot(column, &target));
         }
-        let mut gram = all.tr_mul(&all);
-        let right = all.tr_mul(&target);
-        for at in 0..own {
-            gram[(at, at)] += self.prior[at];
+        let scale: Vec<f64> = gram.iter().enumerate().map(|(at, row)| row[at].sqrt().recip()).collect();
+        for (i, row) in gram.iter_mut().enumerate() {
+            row.iter_mut().zip(&scale).for_each(|(value, s)| *value *= s * scale[i]);
+            row[i] += 1e-10;
         }
-        for (at, (_, damping)) in beside.iter().enumerate() {
-            let diagonal = &mut gram[(own + at, own + at)];
-            *diagonal += damping.max(1e-9 * *diagonal + 1e-12);
-        }
-        let scale: Vec<f64> = (0..gram.nrows()).map(|at| gram[(at, at)].sqrt().recip()).collect();
-        let scaled = DMatrix::from_fn(gram.nrows(), gram.nrows(), |i, j| {
-            gram[(i, j)] * scale[i] * scale[j] + if i == j { 1e-10 } else { 0.0 }
-        });
-        let right = DVector::from_fn(right.len(), |at, _| right[at] * scale[at]);
-        let Some(cholesky) = scaled.cholesky() else {
-            return (Weight { d: target.norm(), rms_arcsec: rms(contribution) }, vec![0.0; beside.len()]);
+        right.iter_mut().zip(&scale).for_each(|(value, s)| *value *= s);
+        let square = dot(&target, &target);
+        let Some(solution) = solved(gram, &right) else {
+            return (Weight { d: square.sqrt(), rms_arcsec: rms(contribution) }, vec![0.0; beside.len()]);
         };
-        let solution = cholesky.solve(&right);
-        let d = (target.norm_squared() - right.dot(&solution)).max(0.0).sqrt();
+        let d = (square - dot(&right, &solution)).max(0.0).sqrt();
         let coefficients: Vec<f64> = solution.iter().zip(&scale).map(|(x, s)| x * s).collect();
         // A unit beyond its spread is a discrepancy, though a recalibration would take it up.
         let within = coefficients.iter().zip(self.prior.iter().map(Some).chain(std::iter::repeat(None)));
@@ -268,7 +275,33 @@ pub fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-fn columns(list: &[Vec<f64>]) -> DMatrix<f64> {
-    let rows = list.first().map_or(0, Vec::len);
-    DMatrix::from_iterator(rows, list.len(), list.iter().flatten().copied())
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    // Eight sums beside each other, so that the processor has no need to wait for one.
+    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<8>(), b.as_chunks::<8>());
+    let mut sums = [0.0; 8];
+    for (a, b) in a.iter().zip(b) {
+        sums.iter_mut().zip(a.iter().zip(b)).for_each(|(sum, (a, b))| *sum += a * b);
+    }
+    sums.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>()
+}
+
+fn products(columns: &[Vec<f64>], with: &[f64]) -> Vec<f64> {
+    columns.iter().map(|column| dot(column, with)).collect()
+}
+
+/// `A⁻¹ b` of a symmetric matrix by the rows of its lower triangle; `None` if it is not positive definite.
+fn solved(mut lower: Vec<Vec<f64>>, right: &[f64]) -> Option<Vec<f64>> {
+    let mut x = right.to_vec();
+    for i in 0..lower.len() {
+        for j in 0..=i {
+            let left = lower[i][j] - dot(&lower[i][..j], &lower[j][..j]);
+            lower[i][j] = if i > j { left / lower[j][j] } else { Some(left.sqrt()).filter(|root| *root > 0.0)? };
+        }
+        x[i] = (x[i] - dot(&lower[i][..i], &x[..i])) / lower[i][i];
+    }
+    for i in (0..x.len()).rev() {
+        let below: f64 = (i + 1..x.len()).map(|k| lower[k][i] * x[k]).sum();
+        x[i] = (x[i] - below) / lower[i][i];
+    }
+    Some(x)
 }

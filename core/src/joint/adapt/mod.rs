@@ -131,7 +131,7 @@ pub const fn saved_adapt_bytes(coefficients: usize) -> usize {
 }
 
 /// Takes a place and adds nothing: the sine of no period is 0 at every angle.
-#[cfg(feature = "c-api")]
+#[cfg(any(test, feature = "c-api"))]
 pub(crate) const NO_COEFFICIENT: Coefficient = Coefficient { term: Term::Sin(0), limit: 1.0, initial_std: 1.0 };
 
 /// Weakest excitation that is used: all coefficients at their limits move the output by a tenth of the noise.
@@ -237,7 +237,7 @@ impl<const N: usize> Adapter<N> {
     }
 
     /// Whether it has another owner than `other`.
-    #[cfg(feature = "c-api")]
+    #[cfg(any(test, feature = "c-api"))]
     pub(crate) fn has_other_owner(&self, other: &Self) -> bool {
         self.owner != other.owner
     }
