@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use flexspline_sim::drive::{Drive, GeneratorKind};
+use flexspline_sim::drive::{Drive, FewNumbers, GeneratorKind};
 use flexspline_sim::export::STABILISING_TORSION;
 use flexspline_sim::mesh::MeshLevel;
 use flexspline_sim::stepping::{Method, Problem, SolverSettings};
@@ -29,6 +29,8 @@ const REPEAT: usize = 3;
 /// What is run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Case {
+    /// Teeth of a drive from a few numbers; without them HHD-95.
+    pub teeth: Option<u32>,
     /// The generator.
     pub generator: GeneratorKind,
     /// The mesh.
@@ -101,7 +103,28 @@ impl Case {
     /// A name for its folder and its lines.
     pub fn name(&self) -> String {
         let parts = if self.parts > 1 { format!("-in-{}", self.parts) } else { String::new() };
-        format!("{}-{}{parts}", self.generator, self.mesh)
+        let teeth = self.teeth.map_or(String::new(), |teeth| format!("{teeth}-teeth-"));
+        format!("{teeth}{}-{}{parts}", self.generator, self.mesh)
+    }
+
+    /// The drive of both programs.
+    fn drive(&self) -> Result<Drive, String> {
+        let made = self.teeth.map_or(Ok(Drive::hhd_95()), |teeth| {
+            // The module of HHD-95.
+            let module_mm = Drive::hhd_95().flexspline.module_mm;
+            let few = FewNumbers { teeth, module_mm, bore_mm: None, width_mm: None, generator: self.generator };
+            few.drive("SMALL").map(|made| made.drive)
+        });
+        made.and_then(|drive| drive.with_sets(AS_IN_THE_DECK)).map_err(|error| error.to_string())
+    }
+
+    /// Names drive, generator and mesh to the command.
+    fn told(&self, command: &mut Command, folder: &Path) -> Result<(), String> {
+        let file = folder.join("drive.toml");
+        std::fs::write(&file, self.drive()?.to_toml()).map_err(|error| format!("{}: {error}", file.display()))?;
+        command.arg("--drive").arg(file);
+        command.args(["--generator", self.generator.name(), "--mesh", &self.mesh.to_string()]);
+        Ok(())
     }
 
     /// The deck as the command writes it.
@@ -115,15 +138,14 @@ impl Case {
         ];
         let mut command = Command::new(flexspline);
         command.args(["export", "--format", "inp", "--quiet"]);
-        command.args(AS_IN_THE_DECK.iter().flat_map(|set| ["--set", set]));
-        command.args(["--generator", self.generator.name(), "--mesh", &self.mesh.to_string()]);
+        std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+        self.told(&mut command, folder)?;
         command.args(["--increments", &self.increments.to_string()]);
         for (option, value) in numbers {
             command.args([option, &value.to_string()]);
         }
         command.arg("--out").arg(folder);
         let limits = Limits { cpu_s: 60.0, memory_mb: 4000.0 };
-        std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
         run(&mut command, &folder.join("export.log"), None, limits)?;
         let deck = folder.join(format!("{}.inp", self.generator));
         if self.parts > 1 {
@@ -188,7 +210,7 @@ impl Case {
 
     /// Our model of the same drive.
     pub fn problem(&self, method: Method) -> Result<Problem, String> {
-        let drive = Drive::hhd_95().with_sets(AS_IN_THE_DECK).map_err(|error| error.to_string())?;
+        let drive = self.drive()?;
         let [bore_penalty, flank_penalty] = self.penalties;
         let settings = SolverSettings {
             method,
@@ -280,8 +302,7 @@ impl Case {
         std::fs::write(&path, format!("generator_rad,torque_n_m\n{rows}")).map_err(|error| error.to_string())?;
         let mut command = Command::new(flexspline);
         command.args(["simulate", "--quiet", "--solver", &solver.to_string()]);
-        command.args(AS_IN_THE_DECK.iter().flat_map(|set| ["--set", set]));
-        command.args(["--generator", self.generator.name(), "--mesh", &self.mesh.to_string()]);
+        self.told(&mut command, folder)?;
         for (option, value) in [("--bore-penalty", self.penalties[0]), ("--flank-penalty", self.penalties[1])] {
             command.args([option, &value.to_string()]);
         }

@@ -3,11 +3,11 @@
 //! For each case the command `flexspline export --format inp` writes a deck, `ccx` runs it on one thread, and each of
 //! our solvers goes the same way on the same mesh: deformed, loaded, turned in increments, and at the end brought to
 //! another load. Compared are the output angle, the wind-up between the two loads, the displacements of the bore, the
-//! stress along it, and what both cost. The short form is the cam on the coarse mesh; `--long` adds the standard mesh
-//! and what CalculiX itself leaves open (each increment in two parts). A cup and a closed sleeve in solid elements
-//! stand beside our shells, a fine mesh of one root fillet beside the stress that `simulate --stress` tells. A tooth
-//! slid along its space with friction stands beside our flank contact. Rollers are not compared: see the header of
-//! `export/inp.rs`.
+//! stress along it, and what both cost. The short form is a small drive with the cam on the coarse mesh; `--long` adds
+//! HHD-95, its standard mesh and what CalculiX itself leaves open (each increment in two parts). A cup and a closed
+//! sleeve in solid elements stand beside our shells, a fine mesh of one root fillet beside the stress that
+//! `simulate --stress` tells. A tooth slid along its space with friction stands beside our flank contact. Rollers are
+//! not compared: see the header of `export/inp.rs`.
 //!
 //! Prints what it finds, a line for each claim, and one line of ratios at the end; ends with 1 if a claim fails.
 
@@ -106,21 +106,26 @@ fn peers(options: &Options, claims: &mut Claims) -> Result<String, String> {
         None => std::env::current_exe().map_err(|error| error.to_string())?.with_file_name("flexspline"),
     };
     let flexspline = std::path::absolute(flexspline).map_err(|error| error.to_string())?;
-    let short = Case {
+    let hhd_95 = Case {
+        teeth: None,
         generator: GeneratorKind::Cam,
         mesh: MeshLevel::Coarse,
         torque_n_m: 50.0,
         last_torque_n_m: 25.0,
-        // An increment of CalculiX takes more than a minute: the short form turns once, and by a third of it.
-        increments: if options.long { 2 } else { 1 },
-        step_rad: if options.long { 0.01 } else { 0.003 },
+        increments: 2,
+        step_rad: 0.01,
         parts: 1,
         penalties: PENALTIES,
     };
+    // An increment of CalculiX takes more than a minute for HHD-95: the short form turns a drive of half of its
+    // teeth once, and by a third of the angle.
+    let short =
+        Case { teeth: Some(100), torque_n_m: 8.0, last_torque_n_m: 4.0, increments: 1, step_rad: 0.003, ..hhd_95 };
     let mut cases = vec![short];
     if options.long || options.case.is_some() {
-        cases.push(Case { mesh: MeshLevel::Standard, ..short });
-        cases.push(Case { parts: 2, ..short });
+        cases.push(hhd_95);
+        cases.push(Case { mesh: MeshLevel::Standard, ..hhd_95 });
+        cases.push(Case { parts: 2, ..hhd_95 });
     }
     if options.case.as_deref() == Some("root") {
         return root::fillets(&options.ccx, &options.out, claims);
@@ -145,7 +150,7 @@ fn peers(options: &Options, claims: &mut Claims) -> Result<String, String> {
     for case in cases {
         let (line, peer) = beside(&case, options, &flexspline, claims)?;
         lines.push(line);
-        if case == short {
+        if case == hhd_95 {
             whole = Some(peer.output_rad);
         } else if case.parts > 1
             && let Some(whole) = &whole
