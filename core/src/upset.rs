@@ -151,3 +151,18 @@ macro_rules! upsets {
     };
 }
 pub(crate) use upsets;
+
+macro_rules! matrices {
+    ($($matrix:ident),*) => {$(
+        impl Upset for nalgebra::$matrix<f32> {
+            fn bits(&self) -> usize {
+                32 * self.len()
+            }
+
+            fn flip(&mut self, bit: usize, path: &mut String) {
+                self.as_mut_slice()[bit / 32].flip(bit % 32, path);
+            }
+        }
+    )*};
+}
+matrices!(Matrix4, Matrix4x2, Vector4, RowVector4);

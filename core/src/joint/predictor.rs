@@ -33,8 +33,6 @@
 
 #![allow(clippy::arithmetic_side_effects)] // Matrices of floating-point numbers: nothing overflows.
 
-pub(super) mod matrix;
-
 use super::runtime::Joint;
 use crate::angle::{GeneratorAngle, OutputAngle};
 use crate::num::larger;
@@ -43,10 +41,7 @@ use crate::store::Store;
 use crate::table::{Prediction, Quality};
 use crate::whole::{Sealed, Words, words};
 use core::fmt;
-use matrix::Matrix;
-
-type Column<T> = Matrix<T, 4, 1>;
-type Square<T> = Matrix<T, 4, 4>;
+use nalgebra::{Matrix2, Matrix2x4, Matrix4, Matrix4x2, RowVector4, Vector2, Vector4};
 
 /// Two inertias, at the output.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,32 +88,37 @@ pub struct Predictor {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Model {
-    a: Square<f32>,
-    b: Column<f32>,
-    gain: Matrix<f32, 4, 2>,
+    a: Matrix4<f32>,
+    b: Vector4<f32>,
+    gain: Matrix4x2<f32>,
     /// What the load turns in a tick, of the state before it and of the motor torque in it.
-    turn: Matrix<f32, 1, 4>,
+    turn: RowVector4<f32>,
     turn_push: f32,
     stiffness: f32,
 }
 
 words!([] Model { a, b, gain, turn, turn_push, stiffness });
 
-impl<const ROWS: usize, const COLUMNS: usize> Words for Matrix<f32, ROWS, COLUMNS> {
-    #[inline(always)]
-    fn sum(&self, sum: u64) -> u64 {
-        self.0.sum(sum)
-    }
+macro_rules! words_of_matrices {
+    ($($matrix:ident),*) => {$(
+        impl Words for $matrix<f32> {
+            #[inline(always)]
+            fn sum(&self, sum: u64) -> u64 {
+                self.as_slice().iter().fold(sum, |sum, value| value.sum(sum))
+            }
 
-    fn each(&mut self, see: &mut dyn FnMut(u32) -> u32) {
-        self.0.each(see);
-    }
+            fn each(&mut self, see: &mut dyn FnMut(u32) -> u32) {
+                self.iter_mut().for_each(|value| value.each(see));
+            }
+        }
+    )*};
 }
+words_of_matrices!(Matrix4, Matrix4x2, Vector4, RowVector4);
 
 /// φ, ω_m, ω_l, τ as estimated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PredictorState {
-    x: Sealed<Column<f32>>,
+    x: Sealed<Vector4<f32>>,
 }
 
 /// How far what is measured and assumed can be off: bounds, each ±.
@@ -222,35 +222,39 @@ const ROUNDING: f32 = 1.2e-7;
 /// Terms of the exponential series, after the time is halved until it is short.
 const SERIES_TERMS: u32 = 12;
 
-/// What is measured of a state: ω_m, φ.
-const MEASURED: Matrix<f64, 2, 4> = Matrix([[0.0, 1.0], [1.0, 0.0], [0.0, 0.0], [0.0, 0.0]]);
-
 /// `exp(m)`, for matrices whose largest sum of a row is below 2¹⁵.
-fn exponential(m: Square<f64>) -> Square<f64> {
+fn exponential(m: Matrix4<f64>) -> Matrix4<f64> {
     let mut halvings = 0u32;
     let mut small = m;
-    while row_sum(small) > 0.5 && halvings < 16 {
-        small = small.times(0.5);
+    while row_sum(&small) > 0.5 && halvings < 16 {
+        small *= 0.5;
         halvings = halvings.saturating_add(1);
     }
-    let (mut sum, mut term) = (Matrix::diagonal([1.0; 4]), Matrix::diagonal([1.0; 4]));
+    let (mut sum, mut term) = (Matrix4::identity(), Matrix4::identity());
     for n in 1..=SERIES_TERMS {
-        term = (term * small).map(|part| part / n as f64);
-        sum = sum + term;
+        term = term * small / n as f64;
+        sum += term;
     }
     for _ in 0..halvings {
-        sum = sum * sum;
+        sum *= sum;
     }
     sum
 }
 
 /// Largest sum of the magnitudes of a row.
-fn row_sum(m: Square<f64>) -> f64 {
-    m.transpose().0.iter().fold(0.0, |largest, row| {
+fn row_sum(m: &Matrix4<f64>) -> f64 {
+    let mut largest = 0.0;
+    for row in m.row_iter() {
         let sum = row.iter().fold(0.0, |sum, value| sum + value.abs());
         // NaN is the largest of all.
-        if sum <= largest { largest } else { sum }
-    })
+        largest = if sum <= largest { largest } else { sum };
+    }
+    largest
+}
+
+/// What is measured of a state: ω_m, φ.
+fn measured_of(x: &Vector4<f32>) -> Vector2<f32> {
+    Vector2::new(x.y, x.x)
 }
 
 impl Predictor {
@@ -276,58 +280,53 @@ impl Predictor {
                 return Err(PredictorError::Setting { name, found });
             }
         }
-        let slope = Matrix([
-            [0.0, -1.0, 1.0, 0.0],
-            [k / jm, -d / jm, d / jm, 0.0],
-            [-k / jl, d / jl, -d / jl, 1.0 / jl],
-            [0.0, 0.0, 0.0, 0.0],
-        ])
-        .transpose();
-        let a = exponential(slope.times(tick_s));
+        #[rustfmt::skip]
+        let slope = Matrix4::new(
+            0.0, -1.0, 1.0, 0.0,
+            k / jm, -d / jm, d / jm, 0.0,
+            -k / jl, d / jl, -d / jl, 1.0 / jl,
+            0.0, 0.0, 0.0, 0.0,
+        );
+        let a = exponential(slope * tick_s);
         // ∫ exp(slope·t) dt and ∫ (tick − t)·exp(slope·t) dt, by the means of Gauss: exact to the seventh order.
-        let (mut integral, mut second) = (Matrix::zeros(), Matrix::zeros());
+        let (mut integral, mut second) = (Matrix4::zeros(), Matrix4::zeros());
         for (place, weight) in
             [(0.069_431_844_202_973_7, 0.173_927_422_568_727), (0.330_009_478_207_572, 0.326_072_577_431_273)]
         {
-            let [early, late] = [place, 1.0 - place].map(|part| exponential(slope.times(tick_s * part)));
-            integral = integral + (early + late).times(weight * tick_s);
-            second = second + (early.times(1.0 - place) + late.times(place)).times(weight * tick_s * tick_s);
+            let (early, late) = (exponential(slope * (tick_s * place)), exponential(slope * (tick_s * (1.0 - place))));
+            integral += (early + late) * (weight * tick_s);
+            second += (early * (1.0 - place) + late * place) * (weight * tick_s * tick_s);
         }
-        let push = Matrix([[0.0, 1.0 / jm, 0.0, 0.0]]);
+        let push = Vector4::new(0.0, 1.0 / jm, 0.0, 0.0);
         let b = integral * push;
 
         // The stationary Kalman observer, by iterating the covariance.
-        let c = MEASURED;
-        let used = noise.twist_rad.is_some();
+        let c = Matrix2x4::new(0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0);
+        let used = if noise.twist_rad.is_some() { 1.0 } else { 0.0 };
         let square = |value: f64| value * value;
-        let r = Matrix::diagonal([square(noise.speed_rad_s), square(twist_noise)]);
-        let q = (b * b.transpose()).times(square(noise.torque_n_m))
-            + Matrix::diagonal([0.0, 0.0, 0.0, square(noise.load_change_n_m)]);
-        let mut p = q + Matrix::diagonal([square(noise.speed_rad_s); 4]);
-        let mut gain = Matrix::zeros();
+        let r = Matrix2::new(square(noise.speed_rad_s), 0.0, 0.0, square(twist_noise));
+        let mut q = b * b.transpose() * square(noise.torque_n_m);
+        q += Matrix4::from_diagonal(&Vector4::new(0.0, 0.0, 0.0, square(noise.load_change_n_m)));
+        let mut p = q + Matrix4::identity() * square(noise.speed_rad_s);
+        let mut gain = Matrix4x2::zeros();
         for _ in 0..RICCATI_TICKS {
             p = a * p * a.transpose() + q;
-            let Matrix([[s11, s21], [s12, s22]]) = c * p * c.transpose() + r;
-            let determinant = s11 * s22 - s21 * s12;
+            let s = c * p * c.transpose() + r;
             // Without an encoder at the output its row is left out: its gain is zero, and the other's that of itself
             // alone.
-            let inverse = if used {
-                Matrix([[s22, -s21], [-s12, s11]]).map(|part| part / determinant)
-            } else {
-                Matrix::diagonal([1.0 / s11, 0.0])
-            };
+            let inverse =
+                if used > 0.0 { s.try_inverse().unwrap_or_default() } else { Matrix2::new(1.0 / s.m11, 0.0, 0.0, 0.0) };
             gain = p * c.transpose() * inverse;
-            p = p - gain * c * p;
-            p = (p + p.transpose()).times(0.5);
+            p -= gain * c * p;
+            p = (p + p.transpose()) * 0.5;
         }
-        let turn = Matrix([[0.0], [0.0], [1.0], [0.0]]) * integral;
-        let Matrix([[_, _, turn_push, _]]) = second * push;
+        let turn: RowVector4<f64> = integral.fixed_rows::<1>(2).into_owned();
         let model = Model {
-            a: a.map(|part| part as f32),
-            b: b.map(|part| part as f32),
-            gain: gain.map(|part| part as f32),
-            turn: turn.map(|part| part as f32),
-            turn_push: turn_push as f32,
+            a: a.cast(),
+            b: b.cast(),
+            gain: gain.cast(),
+            turn: turn.cast(),
+            turn_push: (second * push).z as f32,
             stiffness: k as f32,
         };
         model.checked()
@@ -363,10 +362,10 @@ impl Predictor {
     /// As [`Self::check`].
     pub fn from_parts(parts: &[f32; PREDICTOR_PARTS]) -> Result<Self, PredictorError> {
         let mut model = Model {
-            a: Matrix::zeros(),
-            b: Matrix::zeros(),
-            gain: Matrix::zeros(),
-            turn: Matrix::zeros(),
+            a: Matrix4::zeros(),
+            b: Vector4::zeros(),
+            gain: Matrix4x2::zeros(),
+            turn: RowVector4::zeros(),
             turn_push: 0.0,
             stiffness: 0.0,
         };
@@ -410,23 +409,26 @@ impl Predictor {
     #[must_use]
     pub fn state_bound(&self, disturbance: &Disturbance) -> [f32; 4] {
         let Some(model) = self.model.open() else { return [f32::INFINITY; 4] };
-        let (kept, gain) = model.kept_of_an_error();
-        let contract = kept * model.a.map(f64::from);
+        let c = Matrix2x4::new(0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0);
+        let gain: Matrix4x2<f64> = model.gain.cast();
+        let kept = Matrix4::identity() - gain * c;
+        let contract = kept * model.a.cast::<f64>();
         let Disturbance { torque_n_m, load_change_n_m, speed_rad_s, twist_rad } = *disturbance;
-        let (Matrix([pushed]), Matrix([.., drifted])) = (kept * model.b.map(f64::from), kept);
-        let Matrix([by_speed, by_twist]) = gain;
-        let sizes = [torque_n_m, load_change_n_m, speed_rad_s, twist_rad].map(f64::from);
         // What a disturbance of each kind leaves in the estimate after its tick: by columns.
-        let mut left = Matrix([pushed, drifted, by_speed, by_twist]) * Matrix::diagonal(sizes);
-        let mut bound: Column<f64> = Matrix::zeros();
+        let mut left = Matrix4::from_columns(&[
+            kept * model.b.cast::<f64>() * torque_n_m as f64,
+            kept.column(3) * load_change_n_m as f64,
+            gain.column(0) * speed_rad_s as f64,
+            gain.column(1) * twist_rad as f64,
+        ]);
+        let mut bound = Vector4::zeros();
         for _ in 0..SETTLED_TICKS {
-            for column in left.0 {
-                bound = bound.with(Matrix([column]), |bound, part| bound + part.abs());
+            for column in left.column_iter() {
+                bound += column.abs();
             }
             left = contract * left;
         }
-        let Matrix([bound]) = bound.map(|value| value as f32);
-        bound
+        bound.map(|value| value as f32).into()
     }
 
     /// What motor and load do in `ticks` more ticks with this motor torque, if the state differs from the truth by
@@ -445,45 +447,41 @@ impl Predictor {
         state_bound: [f32; 4],
         disturbance: &Disturbance,
     ) -> Ahead {
-        let off = Matrix([state_bound]);
+        let off = Vector4::from(state_bound);
         let Disturbance { torque_n_m: torque_off, load_change_n_m: load_off, .. } = *disturbance;
         let (Some(model), Some(start)) = (self.model.open(), state.x.open()) else { return Ahead::UNKNOWN };
-        let Matrix([[start_rad, ..]]) = start;
-        let (mut x, mut ahead) = (start, Ahead { twist_rad: start_rad, ..Ahead::default() });
+        let (mut x, mut ahead) = (start, Ahead::default());
         // Rows: load, motor and twist then, as they follow from a state so many ticks before.
-        let twist_now = Matrix([[1.0], [0.0], [0.0], [0.0]]);
-        let (mut load, mut twist) = (Matrix::zeros(), twist_now);
+        let twist_now = RowVector4::new(1.0, 0.0, 0.0, 0.0);
+        let (mut load, mut twist) = (RowVector4::zeros(), twist_now);
         let (mut load_pushed, mut motor_pushed, mut twist_pushed, mut turned) = (0.0f32, 0.0f32, 0.0f32, 0.0f32);
         // The farthest to both sides, and when.
         let (mut most, mut least) = ((0.0, 0u16), (0.0, 0u16));
         for tick in 1..=ticks {
             // What disturbs in the first of the remaining ticks.
-            let load_by_torque = load.dot(model.b) + model.turn_push;
-            let twist_by_torque = twist.dot(model.b);
-            let (Matrix([.., [load_by_load]]), Matrix([.., [twist_by_load]])) = (load, twist);
+            let load_by_torque = load.transpose().dot(&model.b) + model.turn_push;
+            let twist_by_torque = twist.transpose().dot(&model.b);
+            let (load_by_load, twist_by_load) = (load.w, twist.w);
             load_pushed += load_by_torque.abs() * torque_off + load_by_load.abs() * load_off;
             motor_pushed +=
                 (load_by_torque - twist_by_torque).abs() * torque_off + (load_by_load - twist_by_load).abs() * load_off;
             twist_pushed += twist_by_torque.abs() * torque_off + twist_by_load.abs() * load_off;
-            load = model.turn.plus(load, model.a);
-            twist = twist * model.a;
-            ahead.load_rad += model.turn.dot(x) + model.turn_push * torque_n_m;
-            x = model.b.times(torque_n_m).plus(model.a, x);
-            let Matrix([[twist_rad, ..]]) = x;
-            ahead.twist_rad = twist_rad;
-            let motor = ahead.load_rad - (twist_rad - start_rad);
+            load = load * model.a + model.turn;
+            twist *= model.a;
+            ahead.load_rad += model.turn.transpose().dot(&x) + model.turn_push * torque_n_m;
+            x = model.a * x + model.b * torque_n_m;
+            let motor = ahead.load_rad - (x.x - start.x);
             turned += (motor - ahead.motor_rad).abs();
             ahead.motor_rad = motor;
             most = if motor > most.0 { (motor, tick) } else { most };
             least = if motor < least.0 { (motor, tick) } else { least };
         }
         let rounding = ROUNDING * ticks as f32 * turned;
-        let through = |row: Matrix<f32, 1, 4>| row.map(f32::abs).dot(off);
+        let through = |row: RowVector4<f32>| row.abs().transpose().dot(&off);
         ahead.bound_rad = through(load) + load_pushed + rounding;
         ahead.motor_bound_rad = through(load - twist + twist_now) + motor_pushed + rounding;
-        ahead.twist_bound_rad =
-            through(twist) + twist_pushed + ROUNDING * ticks as f32 * (ahead.twist_rad.abs() + start_rad.abs());
-        [ahead.twist_now_bound_rad, ..] = state_bound;
+        ahead.twist_bound_rad = through(twist) + twist_pushed + ROUNDING * ticks as f32 * (x.x.abs() + start.x.abs());
+        (ahead.twist_rad, ahead.twist_now_bound_rad) = (x.x, off.x);
         ahead.turning_rad = if most.1 < least.1 { [most.0, least.0] } else { [least.0, most.0] };
         // What is no number in is none out.
         let known = [ahead.load_rad, ahead.motor_rad, ahead.twist_rad, ahead.bound_rad, ahead.motor_bound_rad];
@@ -512,10 +510,7 @@ impl Predictor {
             bound_rad: f32::INFINITY,
             quality: Quality::Disabled,
         };
-        let (Some(Model { stiffness, .. }), Some(Matrix([[twist_rad, ..]]))) = (self.model.open(), state.x.open())
-        else {
-            return unknown;
-        };
+        let (Some(Model { stiffness, .. }), Some(x)) = (self.model.open(), state.x.open()) else { return unknown };
         let measured_sound = now.measured.is_none() || now.measured_bound_rad.is_finite();
         if !(ahead.bound_rad.is_finite() && ahead.motor_bound_rad.is_finite() && measured_sound) {
             return unknown;
@@ -533,7 +528,7 @@ impl Predictor {
             joint.forward(store, &mut play, to_generator(ahead.motor_rad + motor_off), torque)
         };
         let resting = |torque_off: f32| -> Prediction {
-            let torque = stiffness * twist_rad + torque_off;
+            let torque = stiffness * x.x + torque_off;
             joint.forward(store, &mut now.play.clone(), now.generator, torque)
         };
         let spread = |middle: &Prediction, ends: [Prediction; 2]| {
@@ -569,7 +564,7 @@ fn allowed(found: f64) -> bool {
 const MOST: [f32; 4] = [1.0, 6.3e3, 6.3e3, 1e6];
 
 /// Whether all four are numbers, and not larger than any drive's.
-fn is_possible(Matrix([x]): Column<f32>) -> bool {
+fn is_possible(x: &Vector4<f32>) -> bool {
     x.iter().zip(MOST).fold(true, |possible, (value, most)| possible & (value.abs() <= most))
 }
 
@@ -593,42 +588,31 @@ impl Model {
     fn step(&self, state: &mut PredictorState, measured: &Measured) -> bool {
         let Some(x) = state.x.open() else { return false };
         // Without an encoder at the output whatever stands there for the twist is not read.
-        let Matrix([_, by_twist]) = self.gain;
-        let twist_used = by_twist.iter().any(|gain| *gain != 0.0);
+        let twist_used = self.gain.column(1).iter().any(|gain| *gain != 0.0);
         let Measured { torque_n_m, speed_rad_s, twist_rad } = *measured;
-        let expected = self.b.times(torque_n_m).plus(self.a, x);
-        let Matrix([[expected_rad, expected_rad_s, ..]]) = expected;
-        let twist_rad = if twist_used { twist_rad } else { expected_rad };
-        let missed = Matrix([[speed_rad_s - expected_rad_s, twist_rad - expected_rad]]);
-        let next = expected.plus(self.gain, missed);
-        let sound = is_possible(Matrix([[twist_rad, speed_rad_s, 0.0, torque_n_m]])) & is_possible(next);
+        let expected = self.a * x + self.b * torque_n_m;
+        let twist_rad = if twist_used { twist_rad } else { expected.x };
+        let missed = Vector2::new(speed_rad_s, twist_rad) - measured_of(&expected);
+        let next = expected + self.gain * missed;
+        let sound = is_possible(&Vector4::new(twist_rad, speed_rad_s, 0.0, torque_n_m)) & is_possible(&next);
         if sound {
             state.x.close(next);
         }
         sound
     }
 
-    /// What a measurement leaves of an error of the estimate, and the gains, in double precision.
-    fn kept_of_an_error(&self) -> (Square<f64>, Matrix<f64, 4, 2>) {
-        let gain = self.gain.map(f64::from);
-        // The gains times what is measured.
-        let Matrix([by_speed, by_twist]) = gain;
-        (Matrix::diagonal([1.0; 4]) - Matrix([by_twist, by_speed, [0.0; 4], [0.0; 4]]), gain)
-    }
-
     /// See [`Predictor::check`].
     fn checked(self) -> Result<Predictor, PredictorError> {
-        let (kept, _) = self.kept_of_an_error();
-        let mut error = kept * self.a.map(f64::from);
-        for _ in 0..SQUARINGS {
-            error = error * error;
-        }
+        let c = Matrix2x4::new(0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0);
+        let gain: Matrix4x2<f64> = self.gain.cast();
+        let mut error = (Matrix4::identity() - gain * c) * self.a.cast::<f64>();
         // Scaled to one tick's units, so that rows of different units are alike.
-        let scale = [1e4, 1e2, 1e2, 1e-1];
-        for (column, unit) in error.0.iter_mut().zip(scale) {
-            column.iter_mut().zip(scale).for_each(|(part, scale)| *part *= scale / unit);
+        let scale = Vector4::new(1e4, 1e2, 1e2, 1e-1);
+        error = Matrix4::from_diagonal(&scale) * error * Matrix4::from_diagonal(&scale.map(|s| 1.0 / s));
+        for _ in 0..SQUARINGS {
+            error *= error;
         }
-        let factor = row_sum(error) as f32;
+        let factor = row_sum(&error) as f32;
         if factor < 1.0 { Ok(Predictor { model: Sealed::new(self) }) } else { Err(PredictorError::Observer { factor }) }
     }
 }
@@ -647,11 +631,11 @@ impl PredictorState {
     }
 
     fn of(x: [f32; 4]) -> Self {
-        Self { x: Sealed::new(Matrix([x])) }
+        Self { x: Sealed::new(x.into()) }
     }
 
-    fn open(&self) -> [f32; 4] {
-        self.x.open().map_or([f32::NAN; 4], |Matrix([x])| x)
+    fn open(&self) -> Vector4<f32> {
+        self.x.open().unwrap_or(Vector4::repeat(f32::NAN))
     }
 
     /// Whether it is lost to an upset that cannot be mended: begin at rest again. Until then all that it says is NaN.
@@ -663,22 +647,19 @@ impl PredictorState {
     /// Twist: load ahead of the motor, rad.
     #[must_use]
     pub fn twist_rad(&self) -> f32 {
-        let [twist_rad, ..] = self.open();
-        twist_rad
+        self.open().x
     }
 
     /// Load speed, rad/s.
     #[must_use]
     pub fn load_speed_rad_s(&self) -> f32 {
-        let [_, _, speed_rad_s, _] = self.open();
-        speed_rad_s
+        self.open().z
     }
 
     /// Torque on the load, N·m: what the table is asked with where no sensor measures it.
     #[must_use]
     pub fn load_torque_n_m(&self) -> f32 {
-        let [.., torque_n_m] = self.open();
-        torque_n_m
+        self.open().w
     }
 }
 
@@ -688,16 +669,6 @@ crate::upset::upsets!(Predictor { model });
 crate::upset::upsets!(Model { a, b, gain, turn, turn_push, stiffness });
 #[cfg(test)]
 crate::upset::upsets!(PredictorState { x });
-#[cfg(test)]
-impl<const ROWS: usize, const COLUMNS: usize> crate::upset::Upset for Matrix<f32, ROWS, COLUMNS> {
-    fn bits(&self) -> usize {
-        self.0.bits()
-    }
-
-    fn flip(&mut self, bit: usize, path: &mut std::string::String) {
-        self.0.flip(bit, path);
-    }
-}
 
 #[cfg(test)]
 mod tests {
@@ -814,30 +785,28 @@ mod tests {
             let bound = predictor.state_bound(&off);
             let mut state = PredictorState::new();
             // The model itself is the truth, disturbed to one side, then at the pace of the spring.
-            let mut truth = [0.0f32; 4];
-            let mut farthest = [0.0f32; 4];
-            let Model { a, b, .. } = predictor.model.kept();
+            let mut truth = Vector4::zeros();
+            let mut farthest = Vector4::zeros();
             for tick in 0..20_000 {
                 let sign = if tick < 5000 { 1.0 } else { (tick as f32 * 0.2).sin().signum() };
-                Matrix([truth]) = *a * Matrix([truth]) + b.times(10.0 + sign * off.torque_n_m);
-                truth[3] += if tick % 2 == 0 { off.load_change_n_m } else { -off.load_change_n_m };
-                truth[3] = truth[3].clamp(-50.0, 50.0);
+                truth = predictor.model.kept().a * truth + predictor.model.kept().b * (10.0 + sign * off.torque_n_m);
+                truth.w += if tick % 2 == 0 { off.load_change_n_m } else { -off.load_change_n_m };
+                truth.w = truth.w.clamp(-50.0, 50.0);
                 let measured = Measured {
                     torque_n_m: 10.0,
-                    speed_rad_s: truth[1] - sign * off.speed_rad_s,
-                    twist_rad: truth[0] - sign * off.twist_rad,
+                    speed_rad_s: truth.y - sign * off.speed_rad_s,
+                    twist_rad: truth.x - sign * off.twist_rad,
                 };
                 predictor.step(&mut state, &measured);
-                let estimate = state.open();
+                let away = (truth - state.open()).abs();
                 // Speeds grow without end here; their rounding does too.
-                let rounding = [1e-9, 1e-6, 1e-6, 1e-4].map(|part| part * (1.0 + truth[1].abs()));
-                for k in 0..4 {
-                    let away = (truth[k] - estimate[k]).abs();
-                    assert!(away <= bound[k] + rounding[k], "{tick}: {away:e} {:e}", bound[k]);
-                    farthest[k] = farthest[k].max(away);
+                let rounding = Vector4::new(1e-9, 1e-6, 1e-6, 1e-4) * (1.0 + truth.y.abs());
+                for (away, (bound, rounding)) in away.iter().zip(bound.iter().zip(rounding.iter())) {
+                    assert!(*away <= bound + rounding, "{tick}: {away:e} {bound:e}");
                 }
+                farthest = farthest.zip_map(&away, f32::max);
             }
-            assert!((0..4).any(|k| farthest[k] > 0.3 * bound[k]), "{farthest:?} {bound:?}");
+            assert!(farthest.zip_map(&Vector4::from(bound), |f, b| f / b).max() > 0.3, "{farthest} {bound:?}");
         }
     }
 
@@ -1020,9 +989,9 @@ mod tests {
         }
         // One that was damaged on its way, or made for another machine.
         let good = *Predictor::new(INERTIAS, NOISE, TICK_S).unwrap().model.kept();
-        let wild = Model { gain: good.gain.times(-3.0), ..good };
+        let wild = Model { gain: good.gain * -3.0, ..good };
         assert!(matches!(wild.checked(), Err(PredictorError::Observer { factor }) if factor.is_nan() || factor > 1.0));
-        let undefined = Model { a: good.a.times(f32::NAN), ..good };
+        let undefined = Model { a: good.a * f32::NAN, ..good };
         assert!(undefined.checked().is_err());
     }
 }

@@ -1,5 +1,4 @@
 use super::*;
-use crate::joint::predictor::matrix::Matrix;
 use proptest::prelude::*;
 use std::vec::Vec;
 
@@ -357,30 +356,14 @@ fn inside_the_interval_nothing_is_said() {
     assert!(counters.quiet + counters.used == 2000 && counters.quiet > 1000, "{counters:?}");
 }
 
-fn covariance(state: &AdaptState<7>) -> Matrix<f64, 7, 7> {
-    // By columns: above the diagonal of column j is what the state has of it.
-    let mut u = Matrix::diagonal([1.0; 7]);
-    for j in 0..7 {
-        (0..j).for_each(|i| u.0[j][i] = state.u[j][i] as f64);
-    }
-    u * Matrix::diagonal(state.d.map(f64::from)) * u.transpose()
-}
-
-fn largest<const ROWS: usize, const COLUMNS: usize>(m: Matrix<f64, ROWS, COLUMNS>) -> f64 {
-    m.iter().fold(0.0, |largest, number| number.abs().max(largest))
-}
-
-/// Whether a symmetric matrix has no eigenvalue below this.
-fn eigenvalues_are_above(least: f64, matrix: Matrix<f64, 7, 7>) -> bool {
-    // What is left of each pivot when the rows before it are eliminated is positive.
-    let Matrix(mut m) = matrix - Matrix::diagonal([least; 7]);
-    (0..7).all(|k| {
-        for i in k + 1..7 {
-            let factor = m[i][k] / m[k][k];
-            (k..7).for_each(|j| m[i][j] -= factor * m[k][j]);
-        }
-        m[k][k] > 0.0
-    })
+fn covariance(state: &AdaptState<7>) -> nalgebra::SMatrix<f64, 7, 7> {
+    let d = nalgebra::SMatrix::<f64, 7, 7>::from_diagonal(&nalgebra::SVector::from(state.d.map(f64::from)));
+    let u = nalgebra::SMatrix::<f64, 7, 7>::from_fn(|i, j| match i.cmp(&j) {
+        core::cmp::Ordering::Less => state.u[j][i] as f64,
+        core::cmp::Ordering::Equal => 1.0,
+        core::cmp::Ordering::Greater => 0.0,
+    });
+    u * d * u.transpose()
 }
 
 /// Both updates of the factors are those of the matrix.
@@ -391,16 +374,17 @@ fn factors_are_updated_as_the_covariance_is() {
     for _ in 0..200 {
         let row: [f32; 7] = core::array::from_fn(|_| noise.next() as f32);
         let wander: [f32; 7] = core::array::from_fn(|_| 0.1 * noise.next() as f32);
-        let [h, w] = [row, wander].map(|column| Matrix([column.map(f64::from)]));
+        let h = nalgebra::SVector::from(row.map(f64::from));
+        let w = nalgebra::SVector::from(wander.map(f64::from));
         let mut p = covariance(&state) + w * w.transpose();
         wander_by(&mut state.d, &mut state.u, wander);
-        assert!(largest(covariance(&state) - p) < 1e-5 * largest(p));
-        let Matrix([[spread]]) = h.transpose() * p * h;
-        let gains = (p * h).times(1.0 / (spread + 1.5));
-        p = p - gains * h.transpose() * p;
+        assert!((covariance(&state) - p).amax() < 1e-5 * p.amax());
+        let spread = (h.transpose() * p * h).x + 1.5;
+        let gains = p * h / spread;
+        p -= gains * h.transpose() * p;
         let found = measure(&mut state.d, &mut state.u, &row, 1.5);
-        assert!(largest(covariance(&state) - p) < 1e-5 * largest(p));
-        assert!(largest(Matrix([found.map(f64::from)]) - gains) < 1e-5);
+        assert!((covariance(&state) - p).amax() < 1e-5 * p.amax());
+        assert!((nalgebra::SVector::from(found.map(f64::from)) - gains).amax() < 1e-5);
     }
 }
 
@@ -424,10 +408,10 @@ fn the_covariance_stays_positive_and_bounded_for_ten_million_updates() {
             let p = covariance(&state);
             assert!(state.is_sound());
             assert_eq!(p, p.transpose());
-            let variances: [f64; 7] = core::array::from_fn(|k| p.0[k][k]);
-            let scale = Matrix::diagonal(variances.map(|v| 1.0 / v.sqrt()));
-            assert!(eigenvalues_are_above(-1e-9, scale * p * scale), "{i}");
-            for (variance, first) in variances.iter().zip(adapter.first) {
+            let scale = nalgebra::SMatrix::<f64, 7, 7>::from_diagonal(&p.diagonal().map(|v| 1.0 / v.sqrt()));
+            let least = (scale * p * scale).symmetric_eigenvalues().min();
+            assert!(least > -1e-9, "{i}: {least:e}");
+            for (variance, first) in p.diagonal().iter().zip(adapter.first) {
                 assert!(*variance > 0.0 && *variance <= 1.001 * first as f64, "{i}: {variance:e}");
             }
         }
