@@ -4,9 +4,10 @@
 //! writes is what the command writes, it ends when it is told to, and nothing in a file that it reads can take the
 //! server with it.
 //!
-//! There are two lines, each with one process at a time unless more are asked for: short work, for which somebody waits
-//! with the page open, and long work. A job has a folder of its own, `bench/NAME-N`, with its results and `job.json`,
-//! the record: a server that starts finds what is finished, and marks as interrupted what was under way.
+//! There are two lines: short work, for which somebody waits with the page open, two processes at a time where there
+//! are two cores, and long work, one at a time; unless another number is asked for. A job has a folder of its own,
+//! `bench/NAME-N`, with its results and `job.json`, the record: a server that starts finds what is finished, and marks
+//! as interrupted what was under way.
 
 mod process;
 mod record;
@@ -34,6 +35,9 @@ const MOST_KEPT: usize = 500;
 /// Short jobs over that keep their folders (a guess); of older ones, which were looks and single pitches, they are
 /// cleared away.
 const SHORT_KEPT: usize = 100;
+/// Short jobs at a time, where there are so many cores: the first answer and the better one, of which each keeps one
+/// core busy (measured of a pitch of HHD-95, coarse and standard: 0.5 s and 1.5 s, as much of processor).
+const SHORT_AT_A_TIME: usize = 2;
 /// How often a running process is looked at.
 const LOOK_EVERY: Duration = Duration::from_millis(10);
 
@@ -103,8 +107,9 @@ fn now_s() -> u64 {
 }
 
 impl Jobs {
-    /// The jobs of a folder, those of earlier servers among them; `program` runs them, `at_a_time` of each line.
-    pub fn new(folder: Arc<Folder>, program: PathBuf, at_a_time: usize) -> Arc<Jobs> {
+    /// The jobs of a folder, those of earlier servers among them; `program` runs them, `at_a_time` of each line if that
+    /// is given.
+    pub fn new(folder: Arc<Folder>, program: PathBuf, at_a_time: Option<usize>) -> Arc<Jobs> {
         let mut inside = Inside { next: 1, ..Inside::default() };
         for mut job in record::all(&folder) {
             if matches!(job.state, State::Waiting | State::Running) {
@@ -125,8 +130,9 @@ impl Jobs {
             something: Condvar::new(),
             changes: watch::Sender::new(1),
         });
-        for line in [JobLine::Short, JobLine::Long] {
-            for _ in 0..at_a_time.max(1) {
+        let cores = thread::available_parallelism().map_or(1, std::num::NonZero::get);
+        for (line, usual) in [(JobLine::Short, SHORT_AT_A_TIME.min(cores)), (JobLine::Long, 1)] {
+            for _ in 0..at_a_time.unwrap_or(usual).max(1) {
                 let jobs = jobs.clone();
                 thread::spawn(move || jobs.work(line));
             }

@@ -40,8 +40,8 @@ pub struct Settings {
     pub port: u16,
     /// The program whose commands do the work.
     pub program: PathBuf,
-    /// Jobs of one line at a time, 1 or more.
-    pub jobs_at_a_time: usize,
+    /// Jobs of one line at a time, if not as many as is usual.
+    pub jobs_at_a_time: Option<usize>,
 }
 
 /// Why there is no server.

@@ -31,7 +31,7 @@ impl Bench {
         let program = place.path().join("flexspline.sh");
         fs::write(&program, "#!/bin/sh\necho '{}'\n").unwrap();
         fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
-        let settings = Settings { folder: place.path().to_owned(), port: 0, program, jobs_at_a_time: 1 };
+        let settings = Settings { folder: place.path().to_owned(), port: 0, program, jobs_at_a_time: None };
         let server = Server::new(settings).unwrap();
         let address = server.address();
         thread::spawn(move || server.run());

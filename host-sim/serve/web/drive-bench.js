@@ -171,6 +171,7 @@ export async function driveBench(view, asked, bench) {
           text.value = whole ? slider.value : shortly(slider.value);
           set(field.path, text.value);
         });
+        slider.addEventListener("pointerup", released);
         row.append(slider);
       }
       text.addEventListener("change", () => {
@@ -332,9 +333,19 @@ export async function driveBench(view, asked, bench) {
   /** What was found of this drive, by generator. */
   let found = new Map();
 
-  const rested = calm(REST_MS, () => compute().catch((error) => bench.complain(error)));
+  /** When something changed last, and whether the FEM has begun since. */
+  let [changedAt, begunFor] = [0, 0];
+  function begin() {
+    if (begunFor === round) return;
+    begunFor = round;
+    compute().catch((error) => bench.complain(error));
+  }
+  const rested = calm(REST_MS, begin);
+  /** A slider let go of need not rest: once its last value is set. */
+  const released = () => setTimeout(begin);
   async function changed() {
     round += 1;
+    changedAt = performance.now();
     live.textContent = "";
     figures.classList.add("waits");
     bench.keep("drive", entries());
@@ -345,12 +356,12 @@ export async function driveBench(view, asked, bench) {
     await draw();
   }
 
+  /** Notes a job of this round; one whose round is over when it is known is not wanted any more. */
+  const wantedBy = (mine) => (j) => (mine === round ? running.add(j.id) : cancel(j.id));
+
   async function pitch(drive, g, torque, mesh, mine) {
     const begun = performance.now();
-    const job = await run({ work: "simulate", drive, generator: g, torque_n_m: torque, mesh }, (j) => {
-      if (mine !== round) return;
-      running.add(j.id);
-    });
+    const job = await run({ work: "simulate", drive, generator: g, torque_n_m: torque, mesh }, wantedBy(mine));
     running.delete(job.id);
     if (mine !== round) return null;
     if (job.state !== "done") throw new Error(why(job));
@@ -359,10 +370,7 @@ export async function driveBench(view, asked, bench) {
   }
 
   async function sheet(drive, g, mine) {
-    const job = await run(
-      { work: "sheet", drive, generator: g, torque_n_m: null },
-      (j) => mine === round && running.add(j.id),
-    );
+    const job = await run({ work: "sheet", drive, generator: g, torque_n_m: null }, wantedBy(mine));
     running.delete(job.id);
     if (mine !== round || job.state !== "done") return null;
     const study = await fileJson(`${job.out}/study.json`);
@@ -370,26 +378,28 @@ export async function driveBench(view, asked, bench) {
   }
 
   async function compute() {
-    await draw(true);
+    const [mine, begun] = [round, changedAt];
+    await drawingNow;
+    if (mine !== round) return;
+    // The gaps of the teeth are looked for while the FEM runs.
+    const gapsSeen = draw(true);
     if (!whole) {
       live.textContent = "The FEM waits for a drive that is whole: see the fields marked above.";
-      return;
+      return gapsSeen;
     }
-    const mine = round;
     const [drive, torque, generators] = [request(), now.torque, [...now.generators]];
-    const begun = performance.now();
     found = new Map(generators.map((g) => [g, {}]));
-    for (const mesh of ["coarse", "standard"]) {
-      for (const g of generators) {
-        live.textContent = `${g}: contact FEM, ${mesh} mesh …`;
-        try {
-          const result = await pitch(drive, g, torque, mesh, mine);
-          if (!result) return;
-          Object.assign(found.get(g), result);
-        } catch (error) {
-          if (mine !== round) return;
-          found.get(g).failed = error.message;
-        }
+    // All of them at once, the coarse ones first: the server's line says how many run at a time.
+    const meshes = ["coarse", "standard"].map((mesh) => [
+      mesh,
+      generators.map((g) => pitch(drive, g, torque, mesh, mine).catch((error) => ({ failed: error.message }))),
+    ]);
+    for (const [mesh, runs] of meshes) {
+      for (const [k, run] of runs.entries()) {
+        live.textContent = `${generators[k]}: contact FEM, ${mesh} mesh …`;
+        const result = await run;
+        if (!result || mine !== round) return;
+        Object.assign(found.get(generators[k]), result);
         await present(mine);
         if (mine !== round) return;
       }

@@ -59,20 +59,20 @@ export async function logBench(view, asked, bench) {
     backlash: asked.get("backlash") ?? "30",
     without: new Set(asked.getAll("without")),
   };
-  const keep = () =>
-    bench.keep("log", [
-      ...now.files.map((name) => ["file", name]),
-      ...(now.columns ? [["columns", now.columns]] : []),
-      ...(now.ratio ? [["ratio", now.ratio]] : []),
-      ["known", now.known],
-      ...(now.known === "ratio"
-        ? [
-            ["stiffness", now.stiffness],
-            ["backlash", now.backlash],
-          ]
-        : []),
-      ...[...now.without].map((cause) => ["without", cause]),
-    ]);
+  const entries = () => [
+    ...now.files.map((name) => ["file", name]),
+    ...(now.columns ? [["columns", now.columns]] : []),
+    ...(now.ratio ? [["ratio", now.ratio]] : []),
+    ["known", now.known],
+    ...(now.known === "ratio"
+      ? [
+          ["stiffness", now.stiffness],
+          ["backlash", now.backlash],
+        ]
+      : []),
+    ...[...now.without].map((cause) => ["without", cause]),
+  ];
+  const keep = () => bench.keep("log", entries());
 
   const place = (id) => el("div", { id });
   const [reading, unit, verdict, causes, calibrated] = ["reading", "unit", "verdict-place", "causes", "calibrated"].map(
@@ -109,6 +109,12 @@ export async function logBench(view, asked, bench) {
   view.append(
     el("h1", { text: "A log" }),
     bench.dropZone("Drop logs of one unit here, or choose them:", (names) => {
+      if (!now.files.length) {
+        // There is no more than this yet: the address has all of it made.
+        now.files = names;
+        location.hash = `#log?${new URLSearchParams(entries())}`;
+        return;
+      }
       now.files = names;
       now.columns = null;
       now.ratio = "";
@@ -408,14 +414,13 @@ backlash_arcsec = ${Number(now.backlash)}
     }
     const reading = { columns: now.columns };
     const begun = performance.now();
-    // The table first: it is quicker.
-    await calibrate(at, reading).catch(
-      (error) => at === round && calibrated.replaceChildren(el("p", { class: "wrong line", text: error.message })),
-    );
-    if (at !== round) return;
-    await diagnose(at, reading, begun).catch(
-      (error) => at === round && verdict.replaceChildren(el("p", { class: "wrong line", text: error.message })),
-    );
+    // Both at once, where the server has two cores for them; the verdict is what one waits for.
+    const failed = (to) => (error) =>
+      at === round && to.replaceChildren(el("p", { class: "wrong line", text: error.message }));
+    await Promise.all([
+      diagnose(at, reading, begun).catch(failed(verdict)),
+      calibrate(at, reading).catch(failed(calibrated)),
+    ]);
     if (at === round && now.files.length > 1) await others(at, reading).catch((error) => bench.complain(error));
   }
 

@@ -43,9 +43,9 @@ pub(super) struct Serve {
     /// Open the address in the browser of this machine
     #[arg(long)]
     open: bool,
-    /// Jobs at a time, of short and of long ones each
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=16))]
-    jobs: u8,
+    /// Jobs at a time, of short and of long ones each [default: two short ones where there are two cores, one long one]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=16))]
+    jobs: Option<u8>,
 }
 
 /// What `--json` prints, once it listens.
@@ -64,8 +64,8 @@ impl Serve {
         }
         let program = std::env::current_exe()
             .map_err(|error| Failure::Failed(format!("cannot tell where this program is: {error}")))?;
-        let settings =
-            Settings { folder: self.folder.clone(), port: self.port, program, jobs_at_a_time: usize::from(self.jobs) };
+        let jobs_at_a_time = self.jobs.map(usize::from);
+        let settings = Settings { folder: self.folder.clone(), port: self.port, program, jobs_at_a_time };
         let server = Server::new(settings).map_err(|error| match error {
             ServeError::Folder(_) | ServeError::Port(..) => Failure::BadInput(error.to_string()),
             _ => Failure::Failed(error.to_string()),

@@ -16,6 +16,7 @@ tables) for word in "$@"; do case "$word" in --out=*) out=${word#--out=} ;; esac
     trap 'rm -f "$out/.part-x"; exit 1' TERM
     touch "$out/.part-x"; echo 'progress: 3/24 cam: turning' >&2; sleep 30 & wait ;;
 validate) trap '' TERM; sleep 30 ;;
+new) sleep 30 ;;
 *) echo 'error: no' >&2; exit 2 ;;
 esac
 "#;
@@ -40,7 +41,7 @@ impl Bench {
         let place = tempfile::tempdir().unwrap();
         fs::write(place.path().join("a.csv"), "x").unwrap();
         let folder = Arc::new(Folder::new(place.path()).unwrap());
-        let jobs = Jobs::new(folder.clone(), program(place.path()), 1);
+        let jobs = Jobs::new(folder.clone(), program(place.path()), Some(1));
         Bench { place, folder, jobs }
     }
 
@@ -89,6 +90,25 @@ fn a_command_that_fails_says_why() {
     let id = bench.jobs.add(work).unwrap().id;
     let job = bench.until(id, State::Failed);
     assert_eq!((job.exit_code, job.said.as_slice()), (Some(2), ["error: no".to_owned()].as_slice()));
+}
+
+#[test]
+fn two_short_jobs_and_one_long_one_run_at_a_time_where_there_are_two_cores() {
+    let Bench { place, folder, .. } = Bench::new();
+    let jobs = Jobs::new(folder.clone(), program(place.path()), None);
+    let short = |file: &str| {
+        serde_json::from_str(&format!(r#"{{"work":"new","file":"{file}","of":{{"like":"CSG-25-80"}}}}"#)).unwrap()
+    };
+    let ids = [short("a.toml"), short("b.toml"), short("c.toml"), long("tables"), long("tables")]
+        .map(|work| jobs.add(work).unwrap().id);
+    let cores = thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let expected = [true, cores > 1, false, true, false].map(|runs| if runs { State::Running } else { State::Waiting });
+    let bench = Bench { place, folder, jobs };
+    for (id, state) in ids.iter().zip(expected) {
+        bench.until(*id, state);
+    }
+    assert_eq!(ids.map(|id| bench.jobs.job(id).unwrap().state), expected);
+    bench.jobs.end();
 }
 
 /// Long work does not stand in the way of short work; of each line one runs at a time.
@@ -153,7 +173,7 @@ fn a_server_that_starts_again_finds_what_was_finished_and_ends_what_was_not() {
     thread::sleep(Duration::from_millis(300));
     let pid = bench.jobs.job(cut).unwrap().pid.unwrap();
     // The server is gone without a word: nothing of it is asked any more, and its records are as it left them.
-    let again = Jobs::new(bench.folder.clone(), program(bench.place.path()), 1);
+    let again = Jobs::new(bench.folder.clone(), program(bench.place.path()), Some(1));
     assert_eq!(again.job(done).unwrap().state, State::Done);
     let job = again.job(cut).unwrap();
     assert_eq!((job.state, job.said.len()), (State::Interrupted, 1));
@@ -183,7 +203,7 @@ fn records_that_are_not_of_this_folder_or_no_records_are_left_alone() {
     record("look-78", &text.replace(&job.out, "../elsewhere"));
     record("look-79", "{");
     std::os::unix::fs::symlink("/etc", bench.place.path().join("bench/look-80")).unwrap();
-    let again = Jobs::new(bench.folder.clone(), program(bench.place.path()), 1);
+    let again = Jobs::new(bench.folder.clone(), program(bench.place.path()), Some(1));
     assert_eq!(again.seen().jobs.len(), 1);
 }
 
