@@ -43,14 +43,18 @@ function assert(condition, message) {
 let server = null;
 async function serve() {
   server = spawn(program, ["serve", bench], { stdio: ["ignore", "pipe", "inherit"] });
+  return addressOf(server);
+}
+/** Where a server that was started listens. */
+function addressOf(started) {
   let said = "";
   return new Promise((resolve, reject) => {
-    server.stdout.on("data", (bytes) => {
+    started.stdout.on("data", (bytes) => {
       said += bytes;
       const address = /http:\S+/.exec(said)?.[0];
       if (address) resolve(address);
     });
-    server.on("exit", (code) => reject(new Error(`the server ended with ${code}: ${said}`)));
+    started.on("exit", (code) => reject(new Error(`the server ended with ${code}: ${said}`)));
   });
 }
 const ended = (child) =>
@@ -383,6 +387,47 @@ await check("a drive on paper: teeth while one drags, FEM when one stops, times 
   return `drawn ${drag} ms after the key; FEM after the slider was let go: coarse ${coarse} ms, standard ${standard} ms`;
 });
 
+/** The numbers of a figure, by the button beside it. */
+async function numbersOf(page, id) {
+  const [file] = await Promise.all([
+    page.waitForEvent("download"),
+    page
+      .locator(`#${id}`)
+      .getByRole("button", { name: /as CSV/ })
+      .click(),
+  ]);
+  const [, ...rows] = readFileSync(await file.path(), "utf8")
+    .trim()
+    .split("\n");
+  return rows.map((row) => row.split(",").map((cell) => (cell === "" ? NaN : Number(cell))));
+}
+
+await check("the bench shows what the page of the command shows: curve and picture of stress", async () => {
+  const { page, noise, close } = await open("#drive?drive=HHD-95&g=cam&torque=20");
+  await until(page, "sheet");
+  const out = /bench\/simulate-\d+/.exec(await page.locator("#pitch .command code").first().textContent())[0];
+  const report = await page.context().newPage();
+  await report.goto(`${new URL(address).origin}/files/${out}/report.html?page`);
+  await report.waitForFunction(() => document.querySelector("canvas.wheels")?.width);
+  // The page has every third state and both ends of the pitch; each takes the mean of its own states off.
+  const [ours, theirs] = [new Map(await numbersOf(page, "ripple")), await numbersOf(report, "ripple")];
+  const apart = theirs.slice(0, -1).map(([x, y]) => y - [...ours].find(([at]) => Math.abs(at - x) < 1e-5)?.[1]);
+  assert(ours.size === 24 && apart.length === 8, `${ours.size} and ${theirs.length} points`);
+  const spread = Math.max(...apart) - Math.min(...apart);
+  assert(spread < 1e-5 && Math.abs(apart[0]) < 0.01, `apart by ${apart.join(", ")}`);
+  const drawn = (of) => of.locator("canvas.wheels").evaluate((canvas) => canvas.toDataURL());
+  const size = (of) => of.locator("canvas.wheels").evaluate((canvas) => `${canvas.width} x ${canvas.height}`);
+  let same = false;
+  for (let k = 0; k < 50 && !same; k++) {
+    await page.waitForTimeout(100);
+    same = (await drawn(page)) === (await drawn(report));
+  }
+  assert(same, `another picture: ${await size(page)}, ${await size(report)}`);
+  assert(!noise.length, noise.join(" | "));
+  await close();
+  return `curve to ${spread.toExponential(0)} arcsec, picture alike to the pixel`;
+});
+
 await check(
   "the state is in the address, undo takes it back, a mistake stands at its field, variants are pinned",
   async () => {
@@ -533,6 +578,37 @@ await check("names and cells of hostile files stay text", async () => {
   assert(!(await page.locator("#view img, #view b, #view script").count()), "a cell became an element");
   assert(!noise.filter((line) => line.startsWith("dialog")).length, noise.join(" | "));
   await close();
+});
+
+await check("a folder that is full says so, and the bench goes on", async () => {
+  const small = path.join(folder, "small-folder");
+  rmSync(small, { recursive: true, force: true });
+  mkdirSync(small);
+  // No file beyond 256 blocks of 512 bytes (some shells: 1024): what is written of a larger one fails as on a full disk.
+  const limited = spawn("sh", ["-c", 'trap "" XFSZ; ulimit -f 256; exec "$0" serve "$1"', program, small], {
+    stdio: ["ignore", "pipe", "inherit"],
+  });
+  const before = address;
+  address = await addressOf(limited);
+  const { page, close } = await open();
+  const large = path.join(folder, "large.csv");
+  writeFileSync(large, `time_s,x\n${"0.001,2.5\n".repeat(100_000)}`);
+  await page.locator("#start-log input[type=file]").setInputFiles(large);
+  await page.waitForFunction(() => document.querySelector("#problem").textContent);
+  const said = await problem(page);
+  assert(said.includes("large.csv") && /os error/.test(said), said);
+  assert(!readdirSync(small).length, `left behind: ${readdirSync(small)}`);
+  await page
+    .locator("#start-log input[type=file]")
+    .setInputFiles(path.join(project, "examples/csf17_100/error_vs_input.csv"));
+  await page.locator("#first-rows").waitFor();
+  assert(!(await problem(page)), await problem(page));
+  await close();
+  limited.removeAllListeners("exit");
+  limited.kill("SIGINT");
+  await ended(limited);
+  address = before;
+  return said;
 });
 
 await check("every result says its command, and that command writes the same files", async () => {

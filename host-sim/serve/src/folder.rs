@@ -318,6 +318,17 @@ mod tests {
         assert!(matches!(folder.receive("c", b""), Err(FolderError::Full)));
     }
 
+    /// In the folder of a process nobody makes files, root neither.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_folder_where_nobody_may_write_is_an_error_that_names_the_file() {
+        let written = Folder::new(Path::new("/proc/self")).unwrap().receive("a.csv", b"one");
+        assert!(
+            matches!(&written, Err(FolderError::Output(error)) if error.to_string().contains("a.csv")),
+            "{written:?}"
+        );
+    }
+
     /// Who has the rights of root may write anywhere: there is nothing to see then.
     #[cfg(unix)]
     #[test]

@@ -158,6 +158,9 @@ pub enum WorkAsked {
         generator: GeneratorKind,
         /// How fine.
         mesh: MeshLevel,
+        /// Largest load, N·m, if not the usual one.
+        #[serde(default)]
+        torque_n_m: Option<f64>,
         /// Whether the data sheet of the drive's file completes them.
         #[serde(default)]
         complete: bool,
@@ -242,15 +245,7 @@ impl WorkAsked {
 
     /// Whether somebody waits for it with the page open: seconds, not minutes.
     pub fn is_short(&self) -> bool {
-        match self {
-            WorkAsked::Look { .. }
-            | WorkAsked::Simulate { .. }
-            | WorkAsked::Sheet { .. }
-            | WorkAsked::New { .. }
-            | WorkAsked::Replay { .. } => true,
-            WorkAsked::Diagnose { .. } | WorkAsked::Calibrate { .. } | WorkAsked::Samples { .. } => true,
-            WorkAsked::Tables { .. } | WorkAsked::Validate { .. } | WorkAsked::Bundle { .. } => false,
-        }
+        !matches!(self, WorkAsked::Tables { .. } | WorkAsked::Validate { .. } | WorkAsked::Bundle { .. })
     }
 
     /// Its words, results going to the folder `out`.
@@ -306,8 +301,9 @@ impl WorkAsked {
                 words.number("torque-n-m", *torque_n_m)?;
                 words.option("positions", 4);
             }
-            WorkAsked::Tables { drive, generator, mesh, complete } => {
+            WorkAsked::Tables { drive, generator, mesh, torque_n_m, complete } => {
                 words.drive(drive)?;
+                words.number("torque-n-m", *torque_n_m)?;
                 words.option("generator", generator);
                 words.option("mesh", mesh);
                 if *complete {

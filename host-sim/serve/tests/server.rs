@@ -266,6 +266,62 @@ fn many_requests_do_not_end_the_server() {
     assert_eq!(bench.ask("GET", "/api/state", "").status, 200);
 }
 
+/// 100 pages that each put a job in the line at once: each gets its job or is told that the line is full, and all are done.
+#[test]
+fn of_a_hundred_jobs_at_once_each_is_done_or_refused() {
+    let bench = Bench::new();
+    let answers: Vec<Answer> = thread::scope(|scope| {
+        let ask = || bench.ask("POST", "/api/jobs", r#"{"work":"look","files":["a.csv"]}"#);
+        let all: Vec<_> = (0..100).map(|_| scope.spawn(ask)).collect();
+        all.into_iter().map(|one| one.join().unwrap()).collect()
+    });
+    let taken = answers.iter().filter(|answer| answer.status == 202).count();
+    assert!(taken >= 32, "{taken}");
+    for refused in answers.iter().filter(|answer| answer.status != 202) {
+        assert!(refused.status == 429 && refused.body.contains("cancel one"), "{}", refused.body);
+    }
+    let done = |bench: &Bench| bench.ask("GET", "/api/jobs", "").body.matches(r#""state":"done""#).count();
+    let begun = std::time::Instant::now();
+    while done(&bench) < taken {
+        assert!(begun.elapsed() < Duration::from_secs(60), "{} of {taken}", done(&bench));
+        thread::sleep(Duration::from_millis(20));
+    }
+    // None shares its folder with another.
+    assert_eq!(fs::read_dir(bench.place.path().join("bench")).unwrap().count(), taken);
+    assert!((1..=taken).all(|id| bench.place.path().join(format!("bench/look-{id}/look.json")).is_file()));
+}
+
+/// Uploads that end early leave nothing; those of one name at once each get a name of their own.
+#[test]
+fn uploads_that_break_off_or_come_at_once_spoil_no_file() {
+    let bench = Bench::new();
+    let Bench { host, cookie, .. } = &bench;
+    let head = format!("HTTP/1.1\r\nHost: {host}\r\nCookie: {cookie}\r\nOrigin: http://{host}\r\n");
+    for _ in 0..4 {
+        let mut stream = TcpStream::connect(host).unwrap();
+        stream.write_all(format!("PUT /api/files/b.csv {head}Content-Length: 1000\r\n\r\nhalf").as_bytes()).unwrap();
+    }
+    thread::scope(|scope| {
+        for k in 0..20 {
+            let bench = &bench;
+            scope.spawn(move || assert_eq!(bench.ask("PUT", "/api/files/b.csv", &format!("of {k}\n")).status, 200));
+        }
+    });
+    let names =
+        fs::read_dir(bench.place.path()).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let mut received: Vec<String> = names
+        .filter(|name| name.starts_with("b"))
+        .map(|name| fs::read_to_string(bench.place.path().join(name)).unwrap())
+        .collect();
+    received.sort();
+    let mut sent: Vec<String> = (0..20).map(|k| format!("of {k}\n")).collect();
+    sent.sort();
+    assert_eq!(received, sent);
+    assert!(
+        !fs::read_dir(bench.place.path()).unwrap().any(|e| e.unwrap().file_name().to_string_lossy().contains("part"))
+    );
+}
+
 /// Connections that say half a line, more than there may be: they are closed, and others get their answer.
 #[test]
 fn connections_that_say_nothing_do_not_keep_others_out() {

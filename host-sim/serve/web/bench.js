@@ -2,7 +2,7 @@
 import { sendFile, state } from "./api.js";
 import { driveBench } from "./drive-bench.js";
 import { button, el, section, select } from "./elements.js";
-import { follow, run, show, why } from "./jobs.js";
+import { follow, progressOf, run, show, why } from "./jobs.js";
 import { logBench } from "./log-bench.js";
 import { setUnits } from "./quantities.js";
 import { certificate, tableBench } from "./table-bench.js";
@@ -82,10 +82,12 @@ async function start(view) {
   await bench.refresh();
   const like = el("input", { type: "text", id: "like", value: "CSG-25-80", pattern: "[A-Za-z]+-[0-9]+-[0-9]+" });
   const wrong = el("p", { class: "wrong", role: "alert" });
+  const progress = el("div", { role: "status" });
   async function make(work, file) {
     wrong.textContent = "";
     try {
-      const job = await run({ work: "new", file, of: work });
+      const job = await run({ work: "new", file, of: work }, (j) => progress.replaceChildren(progressOf(j)));
+      progress.replaceChildren();
       if (job.state !== "done") throw new Error(why(job));
       await bench.refresh();
       go(`#drive?${new URLSearchParams({ drive: file })}`);
@@ -121,13 +123,14 @@ async function start(view) {
   view.append(
     el("h1", { text: "What have you got?" }),
     wrong,
+    progress,
     el(
       "div",
       { class: "cards" },
       section(
         "start-paper",
         "A drive on paper",
-        el("p", { text: "Its teeth and its size make a drive whose teeth clear; then change what you like." }),
+        el("p", { text: "Give teeth and module: you get a complete drive whose teeth clear. Then change any field." }),
         el(
           "div",
           { class: "form" },
@@ -147,7 +150,7 @@ async function start(view) {
         "start-catalogue",
         "A drive from a catalogue",
         el("p", {
-          text: "Series, size and ratio, as Harmonic Drive names them: its figures stand beside those computed.",
+          text: "Series, size and ratio as Harmonic Drive names them. The data sheet is shown next to what is computed.",
         }),
         el(
           "div",
@@ -170,7 +173,7 @@ async function start(view) {
         "start-log",
         "A log",
         el("p", {
-          text: "Columns are taken for what they look like; mend a guess, see the cause and the table of the unit.",
+          text: "What a joint or test bench recorded. You get what is wrong with the unit, and its correction table.",
         }),
         dropZone("Drop logs here, or choose them:", (names) =>
           go(`#log?${new URLSearchParams(names.map((n) => ["file", n]))}`),
@@ -181,7 +184,7 @@ async function start(view) {
         "start-table",
         "A table",
         el("p", {
-          text: "An image (.fxt), or samples of another program (.samples.csv): what it leaves of a log, files for firmware.",
+          text: "A table image (.fxt), or samples of another program (.samples.csv). You get its residual on a log, and files for firmware.",
         }),
         dropZone("Drop a table or samples here:", (names) => go(asked("table", "table", names[0]))),
         files(/\.fxt$/, (name) => asked("table", "table", name), "In this folder"),

@@ -24,6 +24,7 @@ const REST_MS = 150;
 const GENERATORS = ["two-roller", "four-roller", "double-disc", "cam"];
 /** Variants that stand side by side at most: a chart has colours for so many. */
 const MOST_PINNED = 3;
+const UNITS = { um: "µm", deg: "°", mpa: "MPa", n_m: "N·m", k: "K", c: "°C" };
 const ARCSEC = (180 / Math.PI) * 3600;
 
 const shortly = (x) => String(Number(Number(x).toPrecision(5)));
@@ -73,6 +74,7 @@ export async function driveBench(view, asked, bench) {
 
   // ---- Frame
   const drawing = sketch();
+  const loadWords = el("span", { text: "Load, N·m" });
   const form = el("div", { class: "form" });
   const main = el("div", { class: "fields", id: "main-fields" });
   const rest = el("div", {});
@@ -116,7 +118,11 @@ export async function driveBench(view, asked, bench) {
       id: `${id}-about`,
       text: field.meaning + (field.range ? `; ${field.range[0]} to ${field.range[1]}` : ""),
     });
-    const name = field.path.split(".").join(": ").replaceAll("_", " ");
+    const name = field.path
+      .split(".")
+      .join(": ")
+      .replace(/_(mm|um|rad|mrad|deg|mpa|n_m|k|c)$/, (_, unit) => `, ${UNITS[unit] ?? unit}`)
+      .replaceAll("_", " ");
     const common = { "aria-describedby": `${id}-about ${id}-wrong` };
     const row = el("div", { class: "row" });
     if (field.kind === "word") {
@@ -234,7 +240,7 @@ export async function driveBench(view, asked, bench) {
       el(
         "label",
         {},
-        "Load, N·m",
+        loadWords,
         el("input", {
           type: "number",
           id: "torque",
@@ -273,6 +279,7 @@ export async function driveBench(view, asked, bench) {
 
   /** The fields of another drive. */
   async function fields() {
+    [hasSheet, largestLoad] = [false, null];
     const shown = await showDrive({ drive: now.drive, sets: {} }, now.generators[0]);
     listed = shown.fields;
     original.clear();
@@ -286,6 +293,8 @@ export async function driveBench(view, asked, bench) {
   let wanted = false;
   let gaps = false;
   let whole = false;
+  /** The load that is usual with the generator, N·m. */
+  let rated = null;
   /** Draws what there is now; with the gaps of the teeth when sliders rest. */
   async function draw(atRest = false) {
     gaps = atRest;
@@ -313,6 +322,8 @@ export async function driveBench(view, asked, bench) {
         wrong.replaceChildren(
           ...[...others, ...shown.cautions].map((words) => el("p", { class: "wrong", text: words })),
         );
+        rated = shown.rated_torque_n_m ?? rated;
+        loadWords.textContent = `Load, N·m (usual at most: ${number(rated)})`;
         if (shown.drawing) drawing.draw(shown.drawing);
       } while (wanted);
     })();
@@ -328,6 +339,10 @@ export async function driveBench(view, asked, bench) {
 
   // ---- When one stops: FEM
   let round = 0;
+  /** Whether the drive's file states the stiffness of a data sheet, as far as is known. */
+  let hasSheet = false;
+  /** The rated load of that data sheet, N·m. */
+  let largestLoad = null;
   let pinned = [];
   const running = new Set();
   /** What was found of this drive, by generator. */
@@ -400,6 +415,12 @@ export async function driveBench(view, asked, bench) {
         const result = await run;
         if (!result || mine !== round) return;
         Object.assign(found.get(generators[k]), result);
+        const sheetOf = result.summary?.data_sheet;
+        if (!hasSheet && sheetOf?.beside.some((b) => b.figure === "k1_n_m_per_rad")) {
+          hasSheet = true;
+          largestLoad = sheetOf.stated.rated_torque_n_m;
+          if (document.getElementById("make-tables")) make();
+        }
         await present(mine);
         if (mine !== round) return;
       }
@@ -442,6 +463,38 @@ export async function driveBench(view, asked, bench) {
     ["Mesh", (f) => f.mesh ?? (f.failed ? "failed" : "…")],
   ];
 
+  /** What the catalogue states, in words. */
+  const STATED = {
+    k1_n_m_per_rad: "K1, N·m/rad",
+    k2_n_m_per_rad: "K2, N·m/rad",
+    k3_n_m_per_rad: "K3, N·m/rad",
+    hysteresis_loss_arcmin: "Hysteresis loss, arcmin",
+    lost_motion_arcmin: "Lost motion, arcmin",
+    ratcheting_torque_n_m: "Ratcheting torque, N·m",
+    starting_torque_n_m: "Starting torque, N·m",
+    accuracy_arcmin: "Accuracy, arcmin",
+  };
+  /** Figures of the data sheet beside those computed; nothing of a drive that has none. */
+  function dataSheet(name, { summary }) {
+    const beside = summary?.data_sheet?.beside ?? [];
+    if (!beside.length) return [];
+    return [
+      table(
+        `${name}: the data sheet, and what is computed of the teeth alone`,
+        ["Figure", "Stated", "Computed", "Computed / stated", "Why they differ"],
+        beside.map((b) => [
+          STATED[b.figure] ?? b.figure,
+          number(b.stated, 4),
+          number(b.computed, 4),
+          number(b.ratio),
+          [b.words, b.reason].filter(Boolean).join("; "),
+        ]),
+        { class: "data-sheet" },
+      ),
+      el("p", {}, "A table for a real unit takes the missing compliance from the data sheet: see “Its tables” below."),
+    ];
+  }
+
   let seenStress = "";
   async function present(mine) {
     if (mine !== round) return;
@@ -454,6 +507,7 @@ export async function driveBench(view, asked, bench) {
         ["", ...shown.map(({ name }) => name)],
         FIGURES.map(([words, of]) => [words, ...shown.map((s) => of(s.of))]),
       ),
+      ...[...found].flatMap(([g, of]) => dataSheet(g, of)),
       ...failed.map(({ name, of }) => el("p", { class: "wrong line", text: `${name}: ${of.failed}` })),
       button("Pin these to compare", pin, {
         disabled: pinned.length >= MOST_PINNED || !shown.some(({ of }) => of.summary),
@@ -461,15 +515,18 @@ export async function driveBench(view, asked, bench) {
     );
     const lines = shown.filter(({ of }) => of.rows);
     if (lines.length) {
+      // Over the pitch as the report has it: from where a generator at angle 0 stands.
       const curve = ({ of }) => {
-        const mean = of.rows.error_arcsec.reduce((a, b) => a + b, 0) / of.rows.error_arcsec.length;
-        const from = of.rows.generator_rad[0];
-        return of.rows.generator_rad.map((x, k) => [((x - from) * 180) / Math.PI, of.rows.error_arcsec[k] - mean]);
+        const [at, error] = [of.rows.generator_rad, of.rows.error_arcsec];
+        const mean = error.reduce((a, b) => a + b, 0) / error.length;
+        const pitch = ((at.at(-1) - at[0]) * at.length) / (at.length - 1);
+        const place = (x) => Number((((((x / pitch) % 1) + 1 + 1e-9) % 1) * pitch * (180 / Math.PI)).toFixed(6));
+        return at.map((x, k) => [place(x), error[k] - mean]);
       };
       const curves = lines.map(curve);
-      const xs = [...new Set(curves.flat().map(([x]) => Number(x.toFixed(6))))].sort((a, b) => a - b);
+      const xs = [...new Set(curves.flat().map(([x]) => x))].sort((a, b) => a - b);
       const columns = curves.map((points) => {
-        const at = new Map(points.map(([x, y]) => [Number(x.toFixed(6)), y]));
+        const at = new Map(points);
         return xs.map((x) => at.get(x) ?? NaN);
       });
       await chart.columns(
@@ -541,7 +598,9 @@ export async function driveBench(view, asked, bench) {
     if (making) return;
     const of = now.generators[0];
     const choice = select(GENERATORS, of, () => undefined, { id: "table-generator" });
-    const complete = el("input", { type: "checkbox", id: "complete" });
+    const complete = el("input", { type: "checkbox", id: "complete", checked: hasSheet });
+    const largest = el("input", { type: "number", id: "table-torque", step: "any", min: 0, placeholder: "as usual" });
+    if (largestLoad) largest.value = largestLoad;
     const fineness = select(["coarse", "standard", "fine"], "standard", () => undefined, { id: "table-mesh" });
     const go = button(
       "Make the tables",
@@ -550,7 +609,9 @@ export async function driveBench(view, asked, bench) {
         const place = el("div", { role: "status" });
         makePlace.replaceChildren(place);
         try {
-          const job = await run({ work: "tables", drive, generator, mesh, complete: complete.checked }, (j) => {
+          const torque_n_m = largest.value === "" ? null : Number(largest.value);
+          const work = { work: "tables", drive, generator, mesh, torque_n_m, complete: complete.checked };
+          const job = await run(work, (j) => {
             making = j.id;
             place.replaceChildren(progressOf(j));
           });
@@ -568,13 +629,21 @@ export async function driveBench(view, asked, bench) {
         text: "Sweeps by contact FEM over torque and temperature, a minute or two; the page may be closed meanwhile.",
       }),
       el(
+        "p",
+        {},
+        "A table of the drawing corrects what the drawing has. A real unit has more, most of it its own: to point precisely, ",
+        el("a", { href: "#log", text: "calibrate it by a log" }),
+        ".",
+      ),
+      el(
         "div",
         { class: "form" },
         el("label", {}, "Generator", choice),
         el("label", {}, "Mesh", fineness),
+        el("label", {}, "Largest load, N·m", largest),
         // A built-in drive has no file, and no sheet in it.
         ...(now.drive.endsWith(".toml")
-          ? [el("label", { class: "line" }, complete, " the data sheet in its file completes the stiffness")]
+          ? [el("label", { class: "line" }, complete, " take the missing compliance from the data sheet in its file")]
           : []),
         go,
       ),

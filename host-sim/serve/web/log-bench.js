@@ -57,6 +57,7 @@ export async function logBench(view, asked, bench) {
     known: asked.get("known") ?? "ratio",
     stiffness: asked.get("stiffness") ?? "20000",
     backlash: asked.get("backlash") ?? "30",
+    teeth: asked.get("teeth") ?? "",
     without: new Set(asked.getAll("without")),
   };
   const entries = () => [
@@ -65,10 +66,7 @@ export async function logBench(view, asked, bench) {
     ...(now.ratio ? [["ratio", now.ratio]] : []),
     ["known", now.known],
     ...(now.known === "ratio"
-      ? [
-          ["stiffness", now.stiffness],
-          ["backlash", now.backlash],
-        ]
+      ? [["stiffness", now.stiffness], ["backlash", now.backlash], ...(now.teeth ? [["teeth", now.teeth]] : [])]
       : []),
     ...[...now.without].map((cause) => ["without", cause]),
   ];
@@ -128,20 +126,13 @@ export async function logBench(view, asked, bench) {
     el(
       "div",
       { class: "two" },
-      section(
-        "verdict",
-        "What is wrong with it",
-        verdict,
-        residual.figure,
-        added.figure,
-        causes,
-        over.figure,
-        orders.figure,
-        compared,
-        both.figure,
-      ),
+      section("verdict", "What is wrong with it", verdict, residual.figure, added.figure),
       section("table-section", "Its table", calibrated),
     ),
+    compared,
+    both.figure,
+    causes,
+    el("div", { class: "two" }, over.figure, orders.figure),
   );
 
   let looked = null;
@@ -170,7 +161,7 @@ export async function logBench(view, asked, bench) {
       if (!job) return;
       if (job.state !== "done") throw new Error(why(job));
       looked = await fileJson(`${job.out}/look.json`);
-      head = (await fileText(now.files[0], HEAD)).split(/\r?\n/).filter((line) => line && !line.startsWith("#"));
+      head = (await fileText(now.files[0], HEAD)).split(/\r\n|\r|\n/);
       const given = mapping(now.columns);
       chosen = looked.columns.map(
         (column, k) => given?.get(k) ?? { role: given ? "ignored" : roleOf(column), ...apart(column.unit) },
@@ -214,8 +205,14 @@ export async function logBench(view, asked, bench) {
   const rowsPlace = el("div");
   function rows() {
     const split = SEPARATORS[looked.separator] ?? /,/;
-    const from = looked.header_line ? 1 : 0;
-    const body = head.slice(from, from + ROWS_SHOWN).map((line) => line.trim().split(split));
+    const lines = head
+      .slice(looked.header_line ?? 0)
+      .filter((line) => line.trim() && !line.startsWith("#"))
+      .map((line) => line.replace(/^ +| +$/g, "").split(split));
+    // Units and other words may stand between the names and the rows.
+    const isRow = (line) => looked.columns.every((c, k) => !c.used || /^\W*\d/.test(line[k] ?? ""));
+    const from = Math.max(0, lines.findIndex(isRow));
+    const body = lines.slice(from, from + ROWS_SHOWN);
     const cell = (tag) => (text, k) =>
       el(tag, { class: `role-${chosen[k]?.role ?? "ignored"}`, ...(tag === "th" ? { scope: "col" } : {}) }, text);
     rowsPlace.replaceChildren(
@@ -361,6 +358,10 @@ export async function logBench(view, asked, bench) {
       input("ratio", "Ratio (negative: they turn opposite ways)", "ratio"),
       input("stiffness", "Stiffness of the catalogue, N·m/rad", "stiffness"),
       input("backlash", "Backlash, arcsec", "backlash"),
+      input("teeth", "Teeth of the flexspline, if known", "teeth"),
+      el("small", {
+        text: "Stiffness and backlash are guesses until you put in your catalogue's figures; they count where a torque was recorded. With the number of teeth (ratio 100: 200) causes in the teeth are considered too.",
+      }),
     );
     numbers.hidden = now.known !== "ratio";
     unit.replaceChildren(
@@ -390,9 +391,19 @@ export async function logBench(view, asked, bench) {
 
   /** The model of the figures, a file of the folder as any other. */
   async function modelOfFigures() {
-    const text = `# Written by the bench: a drive by its ratio and two figures of its catalogue.
+    const teeth = Number(now.teeth);
+    let drive = `ratio = ${Number(now.ratio)}`;
+    if (teeth) {
+      const fixed = { [-teeth / 2]: "circular_spline", [teeth / 2 + 1]: "flexspline" }[Number(now.ratio)];
+      if (!fixed)
+        throw new Error(
+          `${teeth} teeth make a ratio of ${-teeth / 2} with the circular spline fixed, or of ${teeth / 2 + 1} with the flexspline fixed; found ${now.ratio}. If only the sign differs, tick “reversed” at one of the angles above and change the sign of the ratio.`,
+        );
+      drive = `flexspline_teeth = ${teeth}\ncircular_spline_teeth = ${teeth + 2}\nfixed = "${fixed}"`;
+    }
+    const text = `# Written by the bench: a drive by its ratio or teeth and two figures of its catalogue.
 [drive]
-ratio = ${Number(now.ratio)}
+${drive}
 [nominal]
 stiffness_n_m_per_rad = ${Number(now.stiffness)}
 backlash_arcsec = ${Number(now.backlash)}
@@ -410,6 +421,7 @@ backlash_arcsec = ${Number(now.backlash)}
     if (now.known === "ratio" && !Number(now.ratio)) {
       for (const to of [verdict, calibrated])
         to.replaceChildren(el("p", { text: "Say the ratio above: these rows do not tell it." }));
+      document.getElementById("ratio").focus();
       return;
     }
     const reading = { columns: now.columns };
@@ -483,7 +495,9 @@ backlash_arcsec = ${Number(now.backlash)}
         ? { model: name }
         : kind === "tables"
           ? { tables: name }
-          : { ratio: Number(now.ratio) };
+          : Number(now.teeth)
+            ? { model: await modelOfFigures() }
+            : { ratio: Number(now.ratio) };
     const work = { work: "calibrate", files: now.files, reading, known, generator: "cam" };
     calibrated.classList.add("waits");
     const job = await mine(work, at, (j) => calibrated.replaceChildren(progressOf(j)));
@@ -604,6 +618,7 @@ backlash_arcsec = ${Number(now.backlash)}
       ...d.data_faults.map((f) =>
         el("p", { class: "line", text: `Fault of the data: ${f.what}. To change: ${f.advice}.` }),
       ),
+      ...unsure(d.finding),
       ...(d.next_experiment ? [el("p", { class: "line", text: `To record next: ${d.next_experiment}` })] : []),
       ...(now.files.length > 1
         ? [
@@ -621,6 +636,19 @@ backlash_arcsec = ${Number(now.backlash)}
     await orders.of(report, "orders-generator", "extended", "recalibrated", "nominal");
     await added.of(report, "added", "every");
     document.documentElement.dataset.verdict = `${d.finding} ${Math.round(performance.now() - begun)}`;
+  }
+
+  /** Columns that are guesses, where a wrong one would look like this verdict. */
+  function unsure(finding) {
+    const guesses = looked.columns.filter((c, k) => chosen[k].role !== "ignored" && c.used && c.confidence < CERTAIN);
+    if (!["not_understood", "data_unusable"].includes(finding) || !guesses.length) return [];
+    const names = guesses.map((c) => c.name).join(", ");
+    return [
+      el("p", {
+        class: "line",
+        text: `Check “How it is read” first: ${names} are guesses, and a wrong unit looks like this.`,
+      }),
+    ];
   }
 
   /** Every candidate: whether it is considered, what it adds, how far it came. */
@@ -674,7 +702,9 @@ backlash_arcsec = ${Number(now.backlash)}
     };
     causes.replaceChildren(
       el("h3", { text: "Every candidate cause" }),
-      el("p", { text: "Untick what you know is not there: the diagnosis is then made without it." }),
+      el("p", {
+        text: `Untick what you know is not there: the diagnosis is then made without it.${d.trace.some((s) => s.gate === "needs_teeth") ? " “Needs teeth”: say the number of teeth above." : ""}`,
+      }),
       table(
         "Candidate causes",
         ["Considered", "Verdict", "Contribution", "Evidence", "Sizes, or what it stopped at"],

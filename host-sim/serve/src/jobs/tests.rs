@@ -217,3 +217,15 @@ fn a_folder_that_cannot_be_written_to_takes_no_job() {
     fs::set_permissions(bench.place.path(), fs::Permissions::from_mode(0o755)).unwrap();
     assert!(may || matches!(added, Err(JobError::Folder(_))), "{added:?}");
 }
+
+/// In the folder of a process nobody makes files, root neither.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_folder_where_nobody_may_write_takes_no_job() {
+    let place = tempfile::tempdir().unwrap();
+    let jobs = Jobs::new(Arc::new(Folder::new(Path::new("/proc/self")).unwrap()), program(place.path()), None);
+    let work = WorkAsked::Look { files: vec!["status".to_owned()] };
+    let added = jobs.add(work);
+    assert!(matches!(&added, Err(JobError::Folder(why)) if why.contains("bench/look-1")), "{added:?}");
+    assert!(jobs.seen().jobs.is_empty());
+}
