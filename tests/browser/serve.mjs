@@ -242,6 +242,25 @@ await check("a guess is mended by one choice, a cause left out by one click, and
   await close();
 });
 
+await check(
+  "with the number of teeth causes in the teeth are considered, and a number that does not fit says what does",
+  async () => {
+    const { page, noise, close } = await open("#log?file=error_vs_input.csv&ratio=100&teeth=200");
+    await page.waitForFunction(() => /-100 .* 101 .*found 100/.test(document.querySelector("#verdict").textContent));
+    await page.locator("#ratio").fill("-100");
+    await page.locator("#ratio").press("Enter");
+    await until(page, "verdict");
+    const [model] = /nominal-bench[-0-9]*.toml/.exec(
+      await page.locator("#verdict .command code").first().textContent(),
+    );
+    assert(readFileSync(path.join(bench, model), "utf8").includes("flexspline_teeth = 200"), model);
+    const causes = await page.locator("#causes-table").textContent();
+    assert(!causes.includes("needs teeth") && causes.includes("flexspline pitch error"), causes);
+    assert(!noise.length, noise.join(" | "));
+    await close();
+  },
+);
+
 await check("the certificate is one page on paper", async () => {
   const { page, noise, close } = await open("#log?file=error_vs_input.csv&ratio=100");
   await until(page, "calibrated");
@@ -520,7 +539,16 @@ await check("a drive from a catalogue leads to a table that replay accepts", asy
   await page.locator("#start-catalogue button").click();
   await page.waitForFunction(() => document.documentElement.dataset.ready === "drive");
   assert(page.url().includes("csg-25-80.toml"), page.url());
+  await until(page, "coarse");
+  // What the teeth alone make stands next to what the catalogue states; the table takes what is missing from there.
+  const stated = await page.locator(".data-sheet tbody tr").allTextContents();
+  assert(
+    stated.some((row) => /^K1/.test(row)),
+    stated.join("; "),
+  );
   const said = await tablesOf(page, "catalogue.fxt");
+  const line = await page.locator("#make .command code").first().textContent();
+  assert(/--torque-n-m=\d/.test(line) && line.includes("--complete-from-data-sheet"), line);
   await close();
   return said;
 });
