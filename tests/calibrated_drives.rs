@@ -19,7 +19,7 @@ use std::f64::consts::{PI, TAU};
 
 use flexspline::{Direction, GeneratorAngle, PlayState, Table};
 use flexspline_sim::calibrate::{Bench, Calibrated, Planned, Prior, State, calibrate, plan};
-use flexspline_sim::closed_loop::flight::gear::Gear;
+use flexspline_sim::closed_loop::flight::gear::DenseGear;
 use flexspline_sim::closed_loop::map::DenseMap;
 use flexspline_sim::drive::{DamagedFlank, GeneratorKind, Wheel};
 use flexspline_sim::kernels::Kernels;
@@ -129,7 +129,7 @@ impl<'a> Unit<'a> {
     }
 
     /// Error with a flank torque, its sign that of the flank that bears, arcsec.
-    fn elastic(&self, gear: &Gear<'_>, generator: f64, flank_n_m: f64, sign: f64) -> f64 {
+    fn elastic(&self, gear: &DenseGear<'_>, generator: f64, flank_n_m: f64, sign: f64) -> f64 {
         let output = generator / RATIO;
         let load = sign * flank_n_m.abs().max(1e-4);
         let seen_from = |wheel: Wheel| if wheel == Wheel::Flexspline { generator } else { generator - output };
@@ -169,7 +169,7 @@ struct Run {
 impl Run {
     /// The drive goes through motion, loads and temperatures; the output rests where the drag holds it.
     fn drive(mut self, unit: &Unit<'_>) -> Run {
-        let mut gear = Gear::new(unit.map.view(), self.temperature[0]);
+        let mut gear = DenseGear::new(unit.map.view(), self.temperature[0]);
         let (mut error, mut last) = (0.0_f64, self.generator[0]);
         for k in 0..self.generator.len() {
             if k % 50 == 0 {
@@ -515,7 +515,7 @@ fn of_drive(seed: u64) -> Figures {
 fn states(unit: &Unit<'_>, random: &mut fastrand::Rng) -> Vec<(State, f64)> {
     const STATES: usize = 4000;
     let between = |[low, high]: [f64; 2], random: &mut fastrand::Rng| low + (high - low) * random.f64();
-    let gears = [12.0, 16.0, 20.0, 24.0, 28.0].map(|at| (at, Gear::new(unit.map.view(), at)));
+    let gears = [12.0, 16.0, 20.0, 24.0, 28.0].map(|at| (at, DenseGear::new(unit.map.view(), at)));
     (0..STATES)
         .map(|_| {
             let generator_rad = TAU * RATIO * random.f64();

@@ -11,13 +11,12 @@ mod single;
 use std::sync::LazyLock;
 
 use flexspline::{Direction, Flags, GeneratorAngle, JointState, Mode, Output, Overrun, PlayState, Quality, Table};
-use flexspline_sim::closed_loop::flight::Plant;
+use flexspline_sim::closed_loop::flight::RigidPlant;
 use flexspline_sim::closed_loop::flight::antenna::{COLUMNS, CONTROLLERS, CORE};
-use flexspline_sim::closed_loop::flight::controllers::{Compensated, LIMITS, Told};
-use flexspline_sim::closed_loop::flight::gear::Gear;
-use flexspline_sim::closed_loop::flight::profile::{ANTENNA, BRIEF, Moment, Profile, TICK_S};
+use flexspline_sim::closed_loop::flight::controllers::{ByCore, LIMITS, Wanted};
+use flexspline_sim::closed_loop::flight::gear::DenseGear;
+use flexspline_sim::closed_loop::flight::profile::{ANTENNA, BRIEF, Profile, ProfileMoment, TICK_S};
 use flexspline_sim::closed_loop::flight::score::{ARCSEC_PER_RAD, Scores};
-use flexspline_sim::closed_loop::flight::servo::SERVO;
 use flexspline_sim::closed_loop::fly;
 use flexspline_sim::closed_loop::map::DenseMap;
 use flexspline_sim::drive::{Drive, GeneratorKind};
@@ -47,10 +46,15 @@ pub(crate) fn image(kind: GeneratorKind) -> Vec<u8> {
 static CAM: LazyLock<(Vec<u8>, DenseMap)> = LazyLock::new(|| (image(GeneratorKind::Cam), map(GeneratorKind::Cam)));
 
 /// Errors of all controllers over a flight, and the lines that say so.
-fn flown<P: Plant + Clone>(kind: GeneratorKind, image: &[u8], plant: P, profile: &Profile) -> ([Scores; 5], String) {
+fn flown<P: RigidPlant + Clone>(
+    kind: GeneratorKind,
+    image: &[u8],
+    plant: P,
+    profile: &Profile,
+) -> ([Scores; 5], String) {
     let plants = std::array::from_fn(|_| plant.clone());
     let twin = image.to_vec();
-    let antenna = fly([image, &twin], plants, SERVO, profile, kind.rated_torque_n_m(), &mut |_| ()).unwrap();
+    let antenna = fly([image, &twin], plants, profile, kind.rated_torque_n_m(), &mut |_| ()).unwrap();
     let mut text = String::new();
     antenna.write(&kind.to_string(), &mut text).unwrap();
     (*antenna.scores(), text)
@@ -67,7 +71,7 @@ fn the_core_points_ten_times_better_than_the_ratio_and_three_times_than_the_sign
     println!("{COLUMNS}");
     for kind in GeneratorKind::ALL {
         let (image, map) = (image(kind), map(kind));
-        let (scores, text) = flown(kind, &image, Gear::new(map.view(), ANTENNA.temperature_c[0]), &ANTENNA);
+        let (scores, text) = flown(kind, &image, DenseGear::new(map.view(), ANTENNA.temperature_c[0]), &ANTENNA);
         print!("{text}");
         let [none, sign] = factors(&scores);
         println!("{kind}: {none:.1} times less than {}, {sign:.1} times less than {}", CONTROLLERS[0], CONTROLLERS[1]);
@@ -85,7 +89,7 @@ fn the_plant_is_what_contact_fem_says() {
         let (drive, map) = (Drive::hhd_95(), map(kind));
         let (temperature_c, pitch) = (29.0, std::f64::consts::TAU / 188.0);
         let problem = Problem::new(&drive, kind, temperature_c, FAST()).unwrap();
-        let mut gear = Gear::new(map.view(), temperature_c);
+        let mut gear = DenseGear::new(map.view(), temperature_c);
         let mut motion = Motion::deformed(&problem, 0.0).unwrap();
         let image = image(kind);
         let (table, mut play) = (Table::check(&image).unwrap(), PlayState::after_motion(Direction::Forward));
@@ -140,11 +144,11 @@ fn contact_fem_in_the_loop_gives_the_same_errors() {
     let drive = tables::core_drive(&Drive::hhd_95()).unwrap();
     let largest = kind.rated_torque_n_m();
     let mut by_fem = Single::new([image, &twin], drive, fem, largest, temperature_c, Overrun::SkipAndCount).unwrap();
-    let gear = Gear::new(map.view(), temperature_c);
+    let gear = DenseGear::new(map.view(), temperature_c);
     let mut by_map = Single::new([image, &twin], drive, gear, largest, temperature_c, Overrun::SkipAndCount).unwrap();
     let begun = std::time::Instant::now();
     for moment in profile.moments(largest) {
-        let undisturbed = |_: &mut Told, _: &mut Compensated<'_>| true;
+        let undisturbed = |_: &mut Wanted, _: &mut ByCore<'_>| true;
         by_fem.tick(&moment, undisturbed);
         by_map.tick(&moment, undisturbed);
     }
@@ -174,12 +178,12 @@ fn contact_fem_in_the_loop_gives_the_same_errors() {
 fn disturbed(
     overrun: Overrun,
     profile: &Profile,
-    mut disturb: impl FnMut(u32, &mut Told, &mut Compensated<'_>) -> bool,
-) -> Vec<(Moment, Step, JointState)> {
+    mut disturb: impl FnMut(u32, &mut Wanted, &mut ByCore<'_>) -> bool,
+) -> Vec<(ProfileMoment, Step, JointState)> {
     let (image, map) = &*CAM;
     let twin = image.clone();
     let drive = tables::core_drive(&Drive::hhd_95()).unwrap();
-    let gear = Gear::new(map.view(), profile.temperature_c[0]);
+    let gear = DenseGear::new(map.view(), profile.temperature_c[0]);
     let first_c = profile.temperature_c[0];
     let mut joint = Single::new([image, &twin], drive, gear, 200.0, first_c, overrun).unwrap();
     let [mut last, mut before] = [0.0_f64; 2];
@@ -210,12 +214,12 @@ fn disturbed(
     steps
 }
 
-fn out(steps: &[(Moment, Step, JointState)], tick: usize) -> Output {
+fn out(steps: &[(ProfileMoment, Step, JointState)], tick: usize) -> Output {
     steps[tick].1.out.unwrap()
 }
 
 /// Largest pointing error between two ticks, arcsec.
-fn worst(steps: &[(Moment, Step, JointState)], from: usize, to: usize) -> f64 {
+fn worst(steps: &[(ProfileMoment, Step, JointState)], from: usize, to: usize) -> f64 {
     steps[from..to].iter().fold(0.0, |most: f64, (_, step, _)| most.max(step.error_rad.abs() * ARCSEC_PER_RAD))
 }
 
@@ -334,7 +338,7 @@ fn out_of_range_the_edge_corrects_and_without_a_torque_the_last_correction_fades
 #[test]
 fn a_reset_in_the_middle_of_a_reversal_goes_on_or_starts_anew() {
     // The reversal in the calm: the play is being crossed some milliseconds after the target has turned around.
-    let reset_at = |steps: &[(Moment, Step, JointState)]| {
+    let reset_at = |steps: &[(ProfileMoment, Step, JointState)]| {
         let turned = steps.iter().position(|(moment, ..)| moment.time_s > 13.4 && moment.rate_rad_s > 0.0).unwrap();
         let crossing = |tick: &usize| out(steps, *tick).held_back_rad.abs() > 5e-5;
         (turned..turned + 100).find(crossing).unwrap()

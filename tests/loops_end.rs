@@ -74,7 +74,7 @@ const BOUNDED: &[(&str, &str, usize, Bound)] = &[
     ),
     ("mechanics/src/stepping/slip.rs", "gmres", 1, Most("MOST_VECTORS")),
     ("base/src/toml_file.rs", "refuse_unknown_keys_in", 1, Shrinks("tables within a table of a file")),
-    ("motion/src/scenario.rs", "next", 1, Shrinks("legs of a scenario; it ends where there is none")),
+    ("motion/src/legs.rs", "next", 1, Shrinks("legs of a flight; it ends where there is none")),
     ("serve/src/folder.rs", "collect", 1, Shrinks("how deep it still looks")),
     ("serve/src/jobs.rs", "next_of", 1, Shrinks("waits for a job, or for the server to end")),
     ("serve/src/jobs.rs", "run", 1, Shrinks("as long as a process runs, which whoever asked for it may end")),
@@ -92,7 +92,6 @@ const BOUNDED: &[(&str, &str, usize, Bound)] = &[
     ("src/cli/bundle.rs", "foreign", 1, Shrinks("folders within a folder")),
     ("src/cli/context.rs", "image_file", 1, Shrinks("bytes of an image that are not hashed")),
     ("src/cli/say.rs", "suggestions_styled", 1, Shrinks("the rest of a message")),
-    ("fly/src/closed_loop/flight/profile.rs", "next", 1, Shrinks("legs of a profile; it ends where there is none")),
     (
         "fly/src/closed_loop/map.rs",
         "plane",

@@ -12,10 +12,9 @@ use std::error::Error;
 use std::path::Path;
 
 use flexspline_sim::closed_loop::flight::antenna::COLUMNS;
-use flexspline_sim::closed_loop::flight::gear::Gear;
+use flexspline_sim::closed_loop::flight::gear::DenseGear;
 use flexspline_sim::closed_loop::flight::profile::{ANTENNA, BRIEF, Profile};
-use flexspline_sim::closed_loop::flight::servo::{SERVO, ServoSettings};
-use flexspline_sim::closed_loop::flight::{self, Plant};
+use flexspline_sim::closed_loop::flight::{self, RigidPlant};
 use flexspline_sim::closed_loop::map::DenseMap;
 use flexspline_sim::closed_loop::{fly, write_flight};
 use flexspline_sim::drive::{Drive, GeneratorKind};
@@ -49,8 +48,8 @@ fn main() -> Result<(), Box<dyn Error>> {
                 let map = DenseMap::parse(kind, &plant, &std::fs::read_to_string(&plant)?)?;
                 let image = std::fs::read(Path::new(tables).join(format!("{kind}.fxt")))?;
                 let out = out.first().map(Path::new);
-                let gear = Gear::new(map.view(), profile.temperature_c[0]);
-                run(kind, &image, gear, SERVO, &profile, out)?;
+                let gear = DenseGear::new(map.view(), profile.temperature_c[0]);
+                run(kind, &image, gear, &profile, out)?;
             }
             Ok(())
         }
@@ -68,18 +67,17 @@ fn make_maps(folder: &Path, kinds: &[&str]) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn run<P: Plant + Clone>(
+fn run<P: RigidPlant + Clone>(
     kind: GeneratorKind,
     image: &[u8],
     plant: P,
-    servo: ServoSettings,
     profile: &Profile,
     out: Option<&Path>,
 ) -> Result<(), Box<dyn Error>> {
     let mut rows = Vec::new();
     let plants = std::array::from_fn(|_| plant.clone());
     let twin = image.to_vec();
-    let antenna = fly([image, &twin], plants, servo, profile, kind.rated_torque_n_m(), &mut |row| rows.push(row))
+    let antenna = fly([image, &twin], plants, profile, kind.rated_torque_n_m(), &mut |row| rows.push(row))
         .ok_or_else(|| format!("{kind}: the table cannot be flown"))?;
     let mut text = String::new();
     antenna.write(&kind.to_string(), &mut text)?;
@@ -99,7 +97,7 @@ fn rover(tables: &Path) -> Result<(), Box<dyn Error>> {
         let image = std::fs::read(tables.join(format!("{kind}.fxt")))?;
         let twin = image.clone();
         let (name, largest) = (kind.to_string(), kind.rated_torque_n_m());
-        let gear = Gear::new(map.view(), first_c);
+        let gear = DenseGear::new(map.view(), first_c);
         let mut joint = RoverJoint::new(number as u32, &name, [&image, &twin], gear, largest, first_c)
             .ok_or_else(|| format!("{kind}: the table cannot be flown"))?;
         for (tick, moment) in BRIEF.moments(largest).enumerate() {

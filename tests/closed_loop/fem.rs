@@ -8,8 +8,8 @@
 use flexspline_sim::motion::Motion;
 use flexspline_sim::stepping::{Problem, SolveError};
 
-use flexspline_sim::closed_loop::flight::Plant;
-use flexspline_sim::closed_loop::flight::gear::{Gear, GearMap};
+use flexspline_sim::closed_loop::flight::RigidPlant;
+use flexspline_sim::closed_loop::flight::gear::{DenseGear, GearMap};
 
 /// How far the FEM may lag behind.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,7 +47,7 @@ pub struct Missed {
 /// The drive by FEM.
 pub struct FemPlant<'p> {
     motion: Motion<'p>,
-    gear: Gear<'p>,
+    gear: DenseGear<'p>,
     offset_rad: f64,
     /// Generator angle and load of the last two ticks.
     last: [(f64, f64); 2],
@@ -69,7 +69,7 @@ impl<'p> FemPlant<'p> {
     ) -> Result<Self, SolveError> {
         Ok(Self {
             motion: Motion::deformed(problem, 0.0)?,
-            gear: Gear::new(map, temperature_c),
+            gear: DenseGear::new(map, temperature_c),
             offset_rad: 0.0,
             last: [(0.0, 0.0); 2],
             drag_n_m: problem.drive.output.drag_torque_n_m,
@@ -102,7 +102,7 @@ impl<'p> FemPlant<'p> {
     }
 }
 
-impl Plant for FemPlant<'_> {
+impl RigidPlant for FemPlant<'_> {
     fn go(&mut self, generator_rad: f64, torque_n_m: f64) -> f64 {
         let [(before, _), (turned_at, load)] = self.last;
         let turned = (generator_rad - turned_at) * (turned_at - before) < 0.0;

@@ -3,11 +3,10 @@
 use flexspline::{Drive, Mode, Output, Overrun};
 
 use flexspline_sim::closed_loop::flight::antenna::{HELD_BACK_RAD, START_UP_S, SlowGroups};
-use flexspline_sim::closed_loop::flight::controllers::{Compensated, StartError, Told};
-use flexspline_sim::closed_loop::flight::profile::Moment;
+use flexspline_sim::closed_loop::flight::controllers::{ByCore, StartError, Wanted};
+use flexspline_sim::closed_loop::flight::profile::ProfileMoment;
 use flexspline_sim::closed_loop::flight::score::Scores;
-use flexspline_sim::closed_loop::flight::servo::{SERVO, Servo};
-use flexspline_sim::closed_loop::flight::{Lane, Noise, Plant, Sensors, ahead};
+use flexspline_sim::closed_loop::flight::{JointSensors, Lane, Noise, RigidPlant, ahead};
 
 /// One tick of it.
 #[derive(Debug, Clone, Copy)]
@@ -23,18 +22,18 @@ pub struct Single<'a, P> {
     /// Motor and drive.
     pub lane: Lane<P>,
     /// The core.
-    pub core: Compensated<'a>,
+    pub core: ByCore<'a>,
     /// Errors so far.
     pub scores: Scores,
     drive: Drive,
     groups: SlowGroups,
-    sensors: Sensors,
+    sensors: JointSensors,
     noise: Noise,
     tick: u32,
     command: flexspline::GeneratorAngle,
 }
 
-impl<'a, P: Plant> Single<'a, P> {
+impl<'a, P: RigidPlant> Single<'a, P> {
     /// At rest, tracking.
     ///
     /// # Errors
@@ -47,11 +46,11 @@ impl<'a, P: Plant> Single<'a, P> {
         first_c: f64,
         overrun: Overrun,
     ) -> Result<Self, StartError> {
-        let sensors = Sensors::for_range(largest_n_m);
-        let mut core = Compensated::new(images, drive, sensors.temperature(first_c), overrun)?;
+        let sensors = JointSensors::for_range(largest_n_m);
+        let mut core = ByCore::new(images, drive, sensors.temperature(first_c), overrun)?;
         core.request(Mode::Tracking);
         let groups = SlowGroups::staggered(0).unwrap_or_else(|| unreachable!("number 0 is below 20"));
-        let lane = Lane::new(plant, Servo::new(SERVO));
+        let lane = Lane::new(plant);
         let command = lane.encoder();
         Ok(Self {
             lane,
@@ -68,10 +67,10 @@ impl<'a, P: Plant> Single<'a, P> {
 
     /// One tick. `disturb` may change what the joint is told, and says whether it is called at all; if not, the last
     /// command stands.
-    pub fn tick(&mut self, now: &Moment, disturb: impl FnOnce(&mut Told, &mut Compensated<'a>) -> bool) -> Step {
+    pub fn tick(&mut self, now: &ProfileMoment, disturb: impl FnOnce(&mut Wanted, &mut ByCore<'a>) -> bool) -> Step {
         let error_rad = self.lane.output_rad() - now.target_rad;
         let shown_n_m = self.sensors.torque(self.noise.part(), now.torque_n_m);
-        let mut told = Told {
+        let mut told = Wanted {
             generator: Some(self.lane.encoder()),
             target: ahead(now, 0.0),
             rate_rad_s: now.rate_rad_s,

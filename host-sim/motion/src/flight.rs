@@ -12,19 +12,19 @@ use flexspline::{
 
 use super::friction::Friction;
 use super::gear::{Gear, Line, Sampled, Spring};
-use super::loops::{TorquePath as Path, TwoMasses};
+use super::loops::{LoopTorquePath as Path, TwoMasses};
+use super::noise::Noise;
 use super::on_board::{self, Given, OnBoard};
 use super::plant::{Plant, PlantSettings};
 use super::scenario::{Moment, Scenario, TableKnown, TorqueKnown};
-use super::servo::{Asked, Noise, Servo};
+pub use super::score::ARCSEC_PER_RAD;
+use super::score::Score;
+use super::servo::{Asked, Servo};
 use super::table::{Sampling, image};
 
 mod one;
 
 pub use one::{OneJoint, Ticked};
-
-/// Arc-seconds in a radian.
-pub const ARCSEC_PER_RAD: f64 = 206_264.806_247_096_36;
 
 /// Controllers, in the order of the results.
 pub const CONTROLLERS: [&str; 5] = ["none", "fourier", "fourier_by_direction", "compensated", "ideal"];
@@ -157,37 +157,6 @@ impl Unit {
             }
             TableKnown::Calibrated => self.built.clone(),
         }
-    }
-}
-
-/// Root mean square and largest.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Score {
-    squares: f64,
-    largest: f64,
-    count: u32,
-}
-
-impl Score {
-    fn add(&mut self, value: f64) {
-        self.squares += value * value;
-        self.largest = self.largest.max(value.abs());
-        self.count += 1;
-    }
-
-    /// Root mean square; 0 of none.
-    pub fn rms(&self) -> f64 {
-        if self.count == 0 { 0.0 } else { (self.squares / f64::from(self.count)).sqrt() }
-    }
-
-    /// Root mean square; not a number of none.
-    pub fn rms_if_any(&self) -> f64 {
-        if self.count == 0 { f64::NAN } else { self.rms() }
-    }
-
-    /// Largest.
-    pub fn largest(&self) -> f64 {
-        self.largest
     }
 }
 
@@ -900,7 +869,7 @@ impl JointLane {
 
     fn tick(&mut self, made: &LaneParts, now: &Moment) -> Commanded {
         let scenario = &made.scenario;
-        let generator = self.servo.read(&self.plant);
+        let generator = self.servo.read(self.plant.angle_rad[0], self.plant.rate_rad_s[0]);
         let reading = self.sensing.read(made, &self.plant, &mut self.servo, now);
         let stood = self.sensing.stood;
         self.sensing.stood = f64::from(u8::from(now.rate_rad_s == 0.0));
@@ -932,7 +901,7 @@ impl JointLane {
         }
         let [first, last] = now.outside_n_m;
         let tick_s = scenario.servo.tick_s;
-        self.servo.go(&mut self.plant, &asked, |time| first + (last - first) * time / tick_s);
+        self.plant.go(&mut self.servo, &asked, |time| first + (last - first) * time / tick_s);
         commanded
     }
 }
@@ -997,7 +966,7 @@ fn left_of_a_knock(made: &LaneParts, kind: usize) -> Result<f64, FlightError> {
             sum += lane.plant.rate_rad_s[1];
             tick += 1;
         }
-        let mean = sum / f64::from(left.count.max(1));
+        let mean = sum / f64::from(left.count().max(1));
         (left.rms() * left.rms() - mean * mean).max(0.0).sqrt()
     };
     // Until a slow low-pass follows, the motor creeps after the torque that it tells, and sticks and slips: that is no

@@ -93,7 +93,7 @@ impl Friction {
 
 /// Elastic hysteresis: a spring that slips where it carries too much (Jenkin, Maxwell slip), beside the wind-up.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SlipElement {
+pub struct HysteresisElement {
     /// Its stiffness, N·m/rad.
     pub stiffness: f64,
     /// What it carries at most, N·m.
@@ -101,6 +101,6 @@ pub struct SlipElement {
 }
 
 /// A slip element after a twist: its torque.
-pub fn slipped(element: &SlipElement, torque_n_m: f64, twisted_rad: f64) -> f64 {
+pub fn slipped(element: &HysteresisElement, torque_n_m: f64, twisted_rad: f64) -> f64 {
     (torque_n_m + element.stiffness * twisted_rad).clamp(-element.most_n_m, element.most_n_m)
 }

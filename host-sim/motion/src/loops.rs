@@ -74,7 +74,7 @@ pub struct TwoMasses {
 
 /// How a torque gets into the command.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TorquePath {
+pub struct LoopTorquePath {
     /// Share of the wind-up that is compensated; more than 1 where the table is softer than the drive.
     pub gain: f64,
     /// Corner of the low-pass of first order, Hz.
@@ -195,7 +195,7 @@ impl TwoMasses {
     }
 
     /// The loop of the mesh torque through the compensation, at an angular frequency.
-    fn returned(&self, servo: &ServoSettings, path: &TorquePath, w: f64) -> Complex {
+    fn returned(&self, servo: &ServoSettings, path: &LoopTorquePath, w: f64) -> Complex {
         let low_pass = Complex::ONE.over(Complex(1.0, w / (TAU * path.bandwidth_hz)));
         let h = self.follows(servo, path.rate_fed_forward, w);
         let late = Complex::late(w * (path.late_s + servo.tick_s));
@@ -203,7 +203,7 @@ impl TwoMasses {
     }
 
     /// Margin of the mesh torque's loop: its distance from +1, around a servo that is stable itself.
-    pub fn torque_loop(&self, servo: &ServoSettings, path: &TorquePath) -> Margin {
+    pub fn torque_loop(&self, servo: &ServoSettings, path: &LoopTorquePath) -> Margin {
         margin(servo, |w| Complex::ONE.plus(self.returned(servo, path, w).scaled(-1.0)))
     }
 
@@ -216,14 +216,15 @@ impl TwoMasses {
     pub fn widest_hz(
         &self,
         servo: &ServoSettings,
-        path: &TorquePath,
+        path: &LoopTorquePath,
         [distance, unknown]: [f64; 2],
         most_hz: f64,
     ) -> Option<f64> {
         let keeps = |bandwidth_hz: f64| {
             [1.0 - unknown, 1.0, 1.0 + unknown].iter().all(|wrong| {
                 let unit = TwoMasses { stiffness: self.stiffness * wrong, ..*self };
-                let margin = unit.torque_loop(servo, &TorquePath { bandwidth_hz, gain: path.gain * wrong, ..*path });
+                let margin =
+                    unit.torque_loop(servo, &LoopTorquePath { bandwidth_hz, gain: path.gain * wrong, ..*path });
                 margin.stable && margin.distance >= distance
             })
         };

@@ -11,9 +11,11 @@
 //! error by `(h·ω/2)²` each time, with the fastest resonance `ω`; with the spring between motor and load taken along to
 //! first order what is left is how much that spring changes over the step.
 
-use super::friction::{Friction, SlipElement, slipped};
+use super::friction::{Friction, HysteresisElement, slipped};
 use super::gear::{Gear, Meshed, Near};
-use super::keep::kept;
+use super::keep::{Kept, kept};
+use super::noise::Noise;
+use super::servo::{Asked, Servo, ServoSettings};
 
 /// Coordinates: motor, load, appendage.
 pub const PARTS: usize = 3;
@@ -55,7 +57,7 @@ pub struct PlantSettings {
     /// Coulomb drag of the output's bearing and seal, N·m.
     pub drag_n_m: f64,
     /// Hysteresis beside the wind-up.
-    pub slip: Vec<SlipElement>,
+    pub slip: Vec<HysteresisElement>,
     /// What swings on the load.
     pub appendage: Option<Appendage>,
     /// Weight times arm of the load, N·m, and the output angle at which it pulls forward most, rad.
@@ -103,6 +105,18 @@ kept!(Plant {
     angle_rad[..], rate_rad_s[..], energy, temperature_c, cold, slip_n_m[..], meshed, middle, mean[..], before[..]
 });
 
+impl Kept for Noise {
+    fn keep(&self, to: &mut Vec<u64>) {
+        self.0.keep(to);
+    }
+
+    fn take(&mut self, from: &mut dyn Iterator<Item = u64>) -> Option<()> {
+        self.0.take(from)
+    }
+}
+
+kept!(Servo { noise, torque_n_m, next_n_m, integral_n_m, shown, before });
+
 impl Plant {
     /// At rest with all angles zero.
     pub fn new(settings: PlantSettings, temperature_c: f64) -> Self {
@@ -134,6 +148,19 @@ impl Plant {
     pub fn set_temperature(&mut self, temperature_c: f64) {
         self.temperature_c = temperature_c;
         self.cold = self.settings.friction.cold(temperature_c);
+    }
+
+    /// One tick of the servo: the current is set, and the plant goes on under a torque from outside.
+    pub fn go(&mut self, servo: &mut Servo, asked: &Asked, outside_n_m: impl Fn(f64) -> f64) {
+        let ServoSettings { tick_s, steps, late_steps, .. } = servo.settings;
+        servo.control(asked);
+        let step_s = tick_s / steps as f64;
+        for step in 0..steps {
+            if step == late_steps {
+                servo.give();
+            }
+            self.step(step_s, servo.motor_n_m() * servo.ratio, outside_n_m((step as f64 + 0.5) * step_s));
+        }
     }
 
     /// Torque in the mesh now, with what the hysteresis carries, N·m.

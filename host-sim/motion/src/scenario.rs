@@ -2,16 +2,10 @@
 
 use core::f64::consts::TAU;
 
-use super::servo::{Noise, ServoSettings};
-
-/// A stretch of time in which the target goes to a rate and keeps it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Leg {
-    /// How long, s.
-    pub seconds: f64,
-    /// Rate of the target at the output, rad/s.
-    pub rate_rad_s: f64,
-}
+pub use super::legs::Leg;
+use super::legs::{Aim, Walk};
+use super::noise::Noise;
+use super::servo::ServoSettings;
 
 /// Torques on the load from outside, N·m.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -94,9 +88,6 @@ pub struct Scenario {
 
 /// Slowest low-pass of a torque known on the load, Hz (guess).
 const LEAST_HZ: f64 = 1.0;
-/// A rate held for this long is steady, s.
-const STEADY_S: f64 = 0.5;
-
 /// What is asked for at one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Moment {
@@ -186,12 +177,7 @@ impl Scenario {
             scenario: self,
             noise: Noise::new(self.seed ^ 0x5bd1),
             gust: 0.0,
-            leg: 0,
-            leg_ends: 0.0,
-            tick: 0,
-            target_rad: 0.0,
-            rate_rad_s: 0.0,
-            even_s: 0.0,
+            walk: Walk::default(),
             outside_n_m: self.load.bias_n_m,
         }
     }
@@ -203,21 +189,16 @@ pub struct Moments<'s> {
     scenario: &'s Scenario,
     noise: Noise,
     gust: f64,
-    leg: usize,
-    leg_ends: f64,
-    tick: u32,
-    target_rad: f64,
-    rate_rad_s: f64,
-    even_s: f64,
+    walk: Walk,
     outside_n_m: f64,
 }
 
 impl Moments<'_> {
-    /// Torque from outside a tick on.
+    /// Torque from outside at the end of the tick.
     fn outside(&mut self) -> f64 {
         let Load { bias_n_m, swing, gust, step, .. } = self.scenario.load;
         let tick_s = self.scenario.servo.tick_s;
-        let time_s = f64::from(self.tick + 1) * tick_s;
+        let time_s = f64::from(self.walk.tick) * tick_s;
         let share = 1.0 - libm::exp(-TAU * gust[1] * tick_s);
         // The noise behind the low-pass has the rms asked for.
         let drive = gust[0] * ((2.0 - share) / share).sqrt() * self.noise.normal();
@@ -237,29 +218,12 @@ impl Iterator for Moments<'_> {
     type Item = Moment;
 
     fn next(&mut self) -> Option<Moment> {
-        let tick_s = self.scenario.servo.tick_s;
-        let time_s = f64::from(self.tick) * tick_s;
-        while time_s >= self.leg_ends - 0.5 * tick_s {
-            self.leg_ends += self.scenario.legs.get(self.leg)?.seconds;
-            self.leg += 1;
-        }
-        let wanted = self.scenario.legs.get(self.leg - 1)?.rate_rad_s;
-        let most = self.scenario.acceleration_rad_s2 * tick_s;
-        let change = (wanted - self.rate_rad_s).clamp(-most, most);
+        let Scenario { legs, acceleration_rad_s2, servo, .. } = self.scenario;
+        let aim = self.walk.next(legs, *acceleration_rad_s2, servo.tick_s)?;
+        let Aim { time_s, target_rad, rate_rad_s, acceleration_rad_s2, steady } = aim;
         let before = self.outside_n_m;
         self.outside_n_m = self.outside();
-        let moment = Moment {
-            time_s,
-            target_rad: self.target_rad,
-            rate_rad_s: self.rate_rad_s,
-            acceleration_rad_s2: change / tick_s,
-            steady: self.rate_rad_s != 0.0 && self.even_s >= STEADY_S,
-            outside_n_m: [before, self.outside_n_m],
-        };
-        self.target_rad += (self.rate_rad_s + 0.5 * change) * tick_s;
-        self.rate_rad_s += change;
-        self.even_s = if change == 0.0 { self.even_s + tick_s } else { 0.0 };
-        self.tick += 1;
-        Some(moment)
+        let outside_n_m = [before, self.outside_n_m];
+        Some(Moment { time_s, target_rad, rate_rad_s, acceleration_rad_s2, steady, outside_n_m })
     }
 }

@@ -5,8 +5,7 @@ use core::f64::consts::TAU;
 
 use flexspline::GeneratorAngle;
 
-use super::keep::{Kept, kept};
-use super::plant::Plant;
+use crate::noise::Noise;
 
 /// What a servo is made of; bandwidths of a rigid motor alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,16 +55,14 @@ pub struct Asked {
 pub struct Servo {
     /// What it is made of.
     pub settings: ServoSettings,
-    ratio: f64,
-    noise: Noise,
-    torque_n_m: f64,
-    next_n_m: f64,
-    integral_n_m: f64,
-    shown: GeneratorAngle,
-    before: GeneratorAngle,
+    pub(crate) ratio: f64,
+    pub(crate) noise: Noise,
+    pub(crate) torque_n_m: f64,
+    pub(crate) next_n_m: f64,
+    pub(crate) integral_n_m: f64,
+    pub(crate) shown: GeneratorAngle,
+    pub(crate) before: GeneratorAngle,
 }
-
-kept!(Servo { noise, torque_n_m, next_n_m, integral_n_m, shown, before });
 
 impl Servo {
     /// At rest at zero, on a drive of a ratio.
@@ -82,20 +79,24 @@ impl Servo {
         }
     }
 
-    /// Reads the encoder: once in each tick, first of all.
-    pub fn read(&mut self, plant: &Plant) -> GeneratorAngle {
-        let ServoSettings { encoder_bits, jitter_s, .. } = self.settings;
-        let late = jitter_s * 0.5 * (1.0 + self.noise.part());
-        let angle = (plant.angle_rad[0] - late * plant.rate_rad_s[0]) * self.ratio;
-        let steps = f64::from(1u32 << encoder_bits);
-        let counts = libm::floor(angle * (steps / TAU) + 0.5) as i64;
+    /// What the encoder shows where the motor is, rad at the output.
+    pub fn encoder(&self, angle_rad: f64) -> GeneratorAngle {
+        let bits = self.settings.encoder_bits;
+        let steps = f64::from(1u32 << bits);
+        let counts = libm::floor(angle_rad * self.ratio * (steps / TAU) + 0.5) as i64;
+        GeneratorAngle::from_counts(counts << (32 - bits))
+    }
+
+    /// Reads the encoder where the motor is, rad at the output, at its speed, rad/s: once in each tick, first of all.
+    pub fn read(&mut self, angle_rad: f64, rate_rad_s: f64) -> GeneratorAngle {
+        let late = self.settings.jitter_s * 0.5 * (1.0 + self.noise.part());
         self.before = self.shown;
-        self.shown = GeneratorAngle::from_counts(counts << (32 - encoder_bits));
+        self.shown = self.encoder(angle_rad - late * rate_rad_s);
         self.shown
     }
 
     /// Motor torque times ratio as its current tells it, N·m at the output, of the tick before.
-    pub(crate) fn current_n_m(&mut self) -> f64 {
+    pub fn current_n_m(&mut self) -> f64 {
         self.ratio * (self.torque_n_m + self.settings.current_noise_n_m * self.noise.normal())
     }
 
@@ -114,20 +115,8 @@ impl Servo {
         self.next_n_m.abs() >= self.settings.largest_n_m
     }
 
-    /// One tick: the current is set, and the plant goes on under a torque from outside.
-    pub fn go(&mut self, plant: &mut Plant, asked: &Asked, outside_n_m: impl Fn(f64) -> f64) {
-        let ServoSettings { tick_s, steps, late_steps, .. } = self.settings;
-        self.control(asked);
-        let step_s = tick_s / steps as f64;
-        for step in 0..steps {
-            if step == late_steps {
-                self.torque_n_m = self.next_n_m;
-            }
-            plant.step(step_s, self.torque_n_m * self.ratio, outside_n_m((step as f64 + 0.5) * step_s));
-        }
-    }
-
-    fn control(&mut self, asked: &Asked) {
+    /// Asks for a current, from what the encoder showed last; it flows from [`Self::give`] on.
+    pub fn control(&mut self, asked: &Asked) {
         let ServoSettings { tick_s, inertia_kg_m2, largest_n_m, position_hz, speed_hz, integral_hz, .. } =
             self.settings;
         // What was asked for before and has not come is late by a tick.
@@ -147,45 +136,14 @@ impl Servo {
             self.integral_n_m += gain * TAU * integral_hz * tick_s * (wanted - speed);
         }
     }
+
+    /// The current that was asked for flows.
+    pub fn give(&mut self) {
+        self.torque_n_m = self.next_n_m;
+    }
 }
 
 /// Counts of an angle as radians.
-fn angle_rad(counts: i64) -> f64 {
+pub(crate) fn angle_rad(counts: i64) -> f64 {
     counts as f64 * (TAU / 4_294_967_296.0)
-}
-
-/// Numbers that look random, the same in every run.
-#[derive(Clone, Debug)]
-pub struct Noise(u32);
-
-impl Kept for Noise {
-    fn keep(&self, to: &mut Vec<u64>) {
-        self.0.keep(to);
-    }
-
-    fn take(&mut self, from: &mut dyn Iterator<Item = u64>) -> Option<()> {
-        self.0.take(from)
-    }
-}
-
-impl Noise {
-    /// From a seed.
-    pub fn new(seed: u32) -> Self {
-        Self(seed)
-    }
-
-    /// Evenly between −1 and 1.
-    pub fn part(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9);
-        let mut x = self.0;
-        x = (x ^ (x >> 16)).wrapping_mul(0x85eb_ca6b);
-        x = (x ^ (x >> 13)).wrapping_mul(0xc2b2_ae35);
-        f64::from(x ^ (x >> 16)) * (2.0 / 4_294_967_296.0) - 1.0
-    }
-
-    /// Nearly normal, of standard deviation 1: the sum of four.
-    pub fn normal(&mut self) -> f64 {
-        let sum = self.part() + self.part() + self.part() + self.part();
-        sum * (0.75_f64).sqrt()
-    }
 }

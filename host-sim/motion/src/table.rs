@@ -9,7 +9,7 @@ use flexspline::make::{
 use flexspline::{Direction, Drive, GeneratorAngle, GeneratorKind, MAX_ERROR_RAD, Provenance, Table};
 
 use super::gear::{Gear, Line, Sampled, Spring};
-use super::servo::Noise;
+use super::noise::Noise;
 
 /// Nodes on each side of the dead zone, and how they crowd towards it: node k of n at `(k/n)^CROWDING` of the way.
 const STEPS: usize = 12;

@@ -7,7 +7,7 @@ use flexspline::{
 };
 use flexspline_motion::flight::ARCSEC_PER_RAD;
 use flexspline_motion::gear::{Gear, Sampled, Spring};
-use flexspline_motion::servo::Noise;
+use flexspline_motion::noise::Noise;
 use flexspline_motion::table::{Sampling, image};
 
 /// Correction wanted by the noise and correction made, arcsec rms, of a joint at rest under a load.

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use flexspline_motion::friction::{Friction, SlipElement};
+use flexspline_motion::friction::{Friction, HysteresisElement};
 use flexspline_motion::gear::{Gear, Line, Spring};
 use flexspline_motion::plant::{Appendage, Plant, PlantSettings};
 
@@ -97,7 +97,10 @@ fn full() -> PlantSettings {
         damping_s: 5e-5,
         friction: Friction::EROB80_100,
         drag_n_m: 0.5,
-        slip: vec![SlipElement { stiffness: 2e4, most_n_m: 0.6 }, SlipElement { stiffness: 5e3, most_n_m: 0.5 }],
+        slip: vec![
+            HysteresisElement { stiffness: 2e4, most_n_m: 0.6 },
+            HysteresisElement { stiffness: 5e3, most_n_m: 0.5 },
+        ],
         appendage: Some(Appendage { inertia_kg_m2: 0.2, stiffness: 3e3, damping: 0.8 }),
         gravity: [6.0, 0.3],
         ..bare(spring(1.5e-4, 4e5, 2e12), lines())

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use flexspline::GeneratorAngle;
 use flexspline_motion::friction::Friction;
 use flexspline_motion::gear::{Gear, Spring};
-use flexspline_motion::loops::{TorquePath, TwoMasses};
+use flexspline_motion::loops::{LoopTorquePath, TwoMasses};
 use flexspline_motion::plant::{Plant, PlantSettings};
 use flexspline_motion::servo::{Asked, Servo, ServoSettings};
 
@@ -56,7 +56,7 @@ fn plant(joint: &TwoMasses) -> Plant {
 }
 
 /// What the motor is told: nothing, or the torque of the mesh through the compensation.
-fn told(path: Option<&TorquePath>, filtered: &mut f64, plant: &Plant) -> f64 {
+fn told(path: Option<&LoopTorquePath>, filtered: &mut f64, plant: &Plant) -> f64 {
     let Some(path) = path else { return 0.0 };
     let share = 1.0 - libm::exp(-TAU * path.bandwidth_hz * TICK_S);
     *filtered += share * (plant.mesh_n_m() - *filtered);
@@ -70,7 +70,13 @@ fn plant_stiffness(plant: &Plant) -> f64 {
 
 /// Largest speed of the load over each tenth of a second; `split` integrates the motor over a whole tick with the
 /// torque that the mesh had at its beginning, as the flights with an inert load did.
-fn knocked(joint: &TwoMasses, servo: &ServoSettings, path: Option<&TorquePath>, seconds: f64, split: bool) -> Vec<f64> {
+fn knocked(
+    joint: &TwoMasses,
+    servo: &ServoSettings,
+    path: Option<&LoopTorquePath>,
+    seconds: f64,
+    split: bool,
+) -> Vec<f64> {
     let mut plant = plant(joint);
     let mut servo = Servo::new(*servo, RATIO, 1);
     let (mut filtered, mut before) = (0.0, 0.0);
@@ -78,7 +84,7 @@ fn knocked(joint: &TwoMasses, servo: &ServoSettings, path: Option<&TorquePath>, 
     for _ in 0..(seconds / 0.1).round() as usize {
         let mut most = 0.0_f64;
         for _ in 0..100 {
-            servo.read(&plant);
+            servo.read(plant.angle_rad[0], plant.rate_rad_s[0]);
             let correction = told(path, &mut filtered, &plant) * RATIO;
             let fed = path.is_some_and(|path| path.rate_fed_forward);
             let asked = Asked {
@@ -92,7 +98,7 @@ fn knocked(joint: &TwoMasses, servo: &ServoSettings, path: Option<&TorquePath>, 
             if split {
                 split_tick(&mut plant, &mut servo, &asked);
             } else {
-                servo.go(&mut plant, &asked, |_| 0.0);
+                plant.go(&mut servo, &asked, |_| 0.0);
             }
             most = most.max(plant.rate_rad_s[1].abs());
             if most > 1e3 {
@@ -120,7 +126,7 @@ fn split_tick(plant: &mut Plant, servo: &mut Servo, asked: &Asked) {
     let tick = servo.settings;
     servo.settings.steps = 1;
     let mut pulled = servo.clone();
-    pulled.go(&mut alone, asked, |_| 0.0);
+    alone.go(&mut pulled, asked, |_| 0.0);
     *servo = pulled;
     servo.settings = tick;
     let acceleration = mesh / joint.0;
@@ -204,7 +210,7 @@ fn theory_says_which_loops_are_stable_and_motion_agrees() {
         }
         let bandwidth_hz = [2.0, 15.0, 80.0, 400.0][(k + k / 4) % 4];
         for rate_fed_forward in [false, true] {
-            let path = TorquePath { gain: 1.0, bandwidth_hz, late_s: 0.0, rate_fed_forward };
+            let path = LoopTorquePath { gain: 1.0, bandwidth_hz, late_s: 0.0, rate_fed_forward };
             let theory = joint.torque_loop(&servo, &path);
             count += 1;
             // On the limit itself 3 s tell nothing.
@@ -246,7 +252,7 @@ fn with_the_low_pass_that_keeps_the_margin_no_stable_loop_turns_unstable() {
             continue;
         }
         for (gain, late_s) in [(1.0, 0.0), (1.2, 0.0), (1.0, 2e-3)] {
-            let path = TorquePath { gain, bandwidth_hz: 0.0, late_s, rate_fed_forward: false };
+            let path = LoopTorquePath { gain, bandwidth_hz: 0.0, late_s, rate_fed_forward: false };
             let Some(bandwidth_hz) = joint.widest_hz(&servo, &path, [DISTANCE, 0.2], 50.0) else {
                 refused += 1;
                 continue;
@@ -260,7 +266,7 @@ fn with_the_low_pass_that_keeps_the_margin_no_stable_loop_turns_unstable() {
                     continue;
                 }
                 let gain = gain * wrong;
-                let margin = unit.torque_loop(&servo, &TorquePath { bandwidth_hz, gain, ..path });
+                let margin = unit.torque_loop(&servo, &LoopTorquePath { bandwidth_hz, gain, ..path });
                 checked += 1;
                 assert!(margin.stable, "{unit:?} {servo:?} {:?} {bandwidth_hz}", unit.servo(&servo));
                 if margin.distance < least.0 {
@@ -268,7 +274,7 @@ fn with_the_low_pass_that_keeps_the_margin_no_stable_loop_turns_unstable() {
                 }
             }
             if k % 7 == 0 && late_s == 0.0 {
-                let path = TorquePath { bandwidth_hz, ..path };
+                let path = LoopTorquePath { bandwidth_hz, ..path };
                 let swings = knocked(&joint, &servo, Some(&path), 3.0, false);
                 assert!(
                     !grows(&swings),

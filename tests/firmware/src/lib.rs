@@ -4,13 +4,25 @@
 
 pub mod count;
 /// Everything of the closed loop that flies, as the host has it.
-#[path = "../../../host-sim/fly/src/closed_loop/flight/mod.rs"]
+#[path = "../../../host-sim/motion/src/rigid/mod.rs"]
 pub mod flight;
+/// Its targets.
+#[path = "../../../host-sim/motion/src/legs.rs"]
+pub mod legs;
+/// Its sensors' noise.
+#[path = "../../../host-sim/motion/src/noise.rs"]
+pub mod noise;
 /// A tick of a joint, and what tapes of flights hold, as the host has it.
 #[path = "../../../host-sim/motion/src/on_board.rs"]
 pub mod on_board;
 pub mod plant;
 pub mod rover;
+/// What it misses.
+#[path = "../../../host-sim/motion/src/score.rs"]
+pub mod score;
+/// The servo of its motor.
+#[path = "../../../host-sim/motion/src/servo.rs"]
+pub mod servo;
 pub mod trajectory;
 
 use cortex_m_semihosting::debug;

@@ -6,21 +6,20 @@ use core::fmt;
 use flexspline::{Mode, Overrun, Table};
 
 use crate::flight::antenna::{HELD_BACK_RAD, START_UP_S, SlowGroups};
-use crate::flight::controllers::{Compensated, Told, Uncompensated};
-use crate::flight::profile::Moment;
+use crate::flight::controllers::{ByCore, Uncompensated, Wanted};
+use crate::flight::profile::ProfileMoment;
 use crate::flight::score::Scores;
-use crate::flight::servo::{SERVO, Servo};
-use crate::flight::{Lane, Noise, Plant, Sensors, ahead};
+use crate::flight::{JointSensors, Lane, Noise, RigidPlant, ahead};
 
 /// A joint: the core's motor and drive, and beside it one that turns at the nominal ratio.
 pub struct RoverJoint<'a, P> {
     name: &'a str,
-    core: Compensated<'a>,
+    core: ByCore<'a>,
     lane: Lane<P>,
     nominal: Uncompensated,
     nominal_lane: Lane<P>,
     groups: SlowGroups,
-    sensors: Sensors,
+    sensors: JointSensors,
     noise: Noise,
     ratio: f64,
     scores: Scores,
@@ -29,7 +28,7 @@ pub struct RoverJoint<'a, P> {
     readings: u32,
 }
 
-impl<'a, P: Plant + Clone> RoverJoint<'a, P> {
+impl<'a, P: RigidPlant + Clone> RoverJoint<'a, P> {
     /// Joint `number` at rest; `None` if its table cannot be flown.
     pub fn new(
         number: u32,
@@ -41,10 +40,10 @@ impl<'a, P: Plant + Clone> RoverJoint<'a, P> {
     ) -> Option<Self> {
         let [image, _] = images;
         let drive = *Table::check(image).ok()?.drive();
-        let sensors = Sensors::for_range(largest_n_m);
-        let mut core = Compensated::new(images, drive, sensors.temperature(first_c), Overrun::SkipAndCount).ok()?;
+        let sensors = JointSensors::for_range(largest_n_m);
+        let mut core = ByCore::new(images, drive, sensors.temperature(first_c), Overrun::SkipAndCount).ok()?;
         core.request(Mode::Tracking);
-        let lane = Lane::new(plant, Servo::new(SERVO));
+        let lane = Lane::new(plant);
         Some(Self {
             name,
             core,
@@ -63,13 +62,13 @@ impl<'a, P: Plant + Clone> RoverJoint<'a, P> {
     }
 
     /// One tick.
-    pub fn tick(&mut self, tick: u32, now: &Moment) {
+    pub fn tick(&mut self, tick: u32, now: &ProfileMoment) {
         let target = ahead(now, 0.0);
         let torque_n_m = self.sensors.torque(self.noise.part(), now.torque_n_m);
         let error_rad = self.lane.output_rad() - now.target_rad;
         let nominal_error_rad = self.nominal_lane.output_rad() - now.target_rad;
         let generator = Some(self.lane.encoder());
-        let told = Told { generator, target, rate_rad_s: now.rate_rad_s, torque_n_m, missed_ticks: 0 };
+        let told = Wanted { generator, target, rate_rad_s: now.rate_rad_s, torque_n_m, missed_ticks: 0 };
         let command = self.core.tick(&told);
         self.lane.go(command, torque_n_m, now.torque_n_m, self.ratio);
         self.nominal_lane.go(self.nominal.tick(&told), torque_n_m, now.torque_n_m, self.ratio);

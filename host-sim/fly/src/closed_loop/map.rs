@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use thiserror::Error;
 
-use super::flight::gear::{GearMap, Header, MOST, node_share, parse};
+use super::flight::gear::{GearMap, MOST, MapHeader, node_share, parse};
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::motion::Motion;
@@ -22,7 +22,7 @@ const LEAST_N_M: f64 = 1e-3;
 pub struct DenseMap {
     /// Which generator.
     pub kind: GeneratorKind,
-    header: Header,
+    header: MapHeader,
     planes: [Vec<f64>; 2],
 }
 
@@ -62,7 +62,7 @@ impl DenseMap {
         let [cold, warm] = TEMPERATURES_C;
         let at = |temperature_c| plane(drive, kind, largest_n_m, temperature_c, settings);
         let (cold, warm) = rayon::join(|| at(cold), || at(warm));
-        let header = Header {
+        let header = MapHeader {
             largest_n_m,
             drag_n_m: drive.output.drag_torque_n_m,
             teeth: f64::from(drive.flexspline.teeth),
@@ -82,7 +82,7 @@ impl DenseMap {
 
     /// As a file: errors in arc-seconds, one line for each temperature and flank torque.
     pub fn to_csv(&self) -> String {
-        let Header { largest_n_m, drag_n_m, teeth, ratio, phases, nodes, .. } = self.header;
+        let MapHeader { largest_n_m, drag_n_m, teeth, ratio, phases, nodes, .. } = self.header;
         let mut text = String::new();
         let _ = writeln!(text, "# drag_n_m={drag_n_m} teeth={teeth} ratio={ratio}");
         text.push_str("temperature_c,flank_torque_n_m");

@@ -6,8 +6,9 @@
 //! [`crate::fly`]. Everything that flies is in [`flight`], which `tests/firmware` compiles for the target as well: the
 //! joint's tick is the very same code in both.
 
-pub mod flight;
 pub mod map;
+
+pub use flexspline_motion::rigid as flight;
 
 use std::path::Path;
 
@@ -15,10 +16,9 @@ use serde::Serialize;
 
 use flexspline_base::output::{OutputError, write_csv};
 use flexspline_base::units::ARCSEC_PER_RAD;
-use flight::Plant;
+use flight::RigidPlant;
 use flight::antenna::{Antenna, CORE, Pointing};
-use flight::profile::{Moment, Profile};
-use flight::servo::ServoSettings;
+use flight::profile::{Profile, ProfileMoment};
 
 /// One tick of a flight, as a report draws it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -50,17 +50,15 @@ pub struct FlightRow {
 }
 
 /// Flies a profile to its end with every controller. `None` if the table cannot be flown; `observe` sees every tick.
-pub fn fly<'a, P: Plant>(
+pub fn fly<'a, P: RigidPlant>(
     images: [&'a [u8]; 2],
     plants: [P; 5],
-    servo: ServoSettings,
     profile: &Profile,
     largest_n_m: f64,
     observe: &mut dyn FnMut(FlightRow),
 ) -> Option<Antenna<'a, P>> {
     let [first_c, _] = profile.temperature_c;
-    let mut antenna =
-        Antenna::new(images, plants, largest_n_m, profile.mean_torque_n_m(largest_n_m), first_c)?.with_servo(servo);
+    let mut antenna = Antenna::new(images, plants, largest_n_m, profile.mean_torque_n_m(largest_n_m), first_c)?;
     for moment in profile.moments(largest_n_m) {
         let pointing = antenna.tick(&moment);
         observe(row(&moment, &pointing, &antenna));
@@ -68,7 +66,7 @@ pub fn fly<'a, P: Plant>(
     Some(antenna)
 }
 
-fn row<P: Plant>(moment: &Moment, pointing: &Pointing, antenna: &Antenna<'_, P>) -> FlightRow {
+fn row<P: RigidPlant>(moment: &ProfileMoment, pointing: &Pointing, antenna: &Antenna<'_, P>) -> FlightRow {
     let errors = pointing.errors_rad.map(|error| error * ARCSEC_PER_RAD);
     FlightRow {
         time_s: moment.time_s,

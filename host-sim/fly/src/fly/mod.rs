@@ -14,7 +14,7 @@ use flexspline_motion::flight::{Flight, JOINTS, Unit, fly_told};
 use flexspline_motion::gear::Sampled;
 use flexspline_motion::scenario::{Scenario, TableKnown};
 
-use crate::closed_loop::flight::gear::Gear;
+use crate::closed_loop::flight::gear::DenseGear;
 use crate::closed_loop::map::DenseMap;
 use flexspline_design::tables::core_drive;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
@@ -55,7 +55,7 @@ fn map(kind: GeneratorKind) -> &'static str {
 pub fn unit(kind: GeneratorKind, temperature_c: f64) -> Result<Unit, FlyError> {
     let name = format!("{kind}.csv");
     let map = DenseMap::parse(kind, &name, map(kind))?;
-    let gear = Gear::new(map.view(), temperature_c);
+    let gear = DenseGear::new(map.view(), temperature_c);
     let teeth = gear.map().header.teeth;
     let largest = gear.map().header.largest_n_m;
     let law = |phase: f64, flank: f64| gear.elastic_error_rad(phase * std::f64::consts::TAU / teeth, flank, 1.0);

@@ -14,8 +14,8 @@ use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
 use flexspline::{Flags, Mode, Predictor};
 use flexspline_firmware::flight::antenna::{Antenna, COLUMNS, CORE, Observer};
-use flexspline_firmware::flight::gear::Gear;
-use flexspline_firmware::flight::profile::{BRIEF, Moment};
+use flexspline_firmware::flight::gear::DenseGear;
+use flexspline_firmware::flight::profile::{BRIEF, ProfileMoment};
 use flexspline_firmware::flight::score::ARCSEC_PER_RAD;
 use flexspline_firmware::plant::{Console, EMPTY, Room, read};
 use flexspline_firmware::{MOTOR_PREDICTOR, TABLES, finish};
@@ -43,11 +43,11 @@ fn fly(generator: usize, room: &mut Room) -> Option<bool> {
     let (name, largest_n_m, map) = read(generator, room)?;
     let [first_c, _] = BRIEF.temperature_c;
     let mean_n_m = BRIEF.mean_torque_n_m(largest_n_m);
-    let gear = Gear::new(map, first_c);
+    let gear = DenseGear::new(map, first_c);
     let plants = core::array::from_fn(|_| gear.clone());
     let mut antenna = Antenna::new(images, plants, largest_n_m, mean_n_m, first_c)?;
     let mut observer = Observer::new(Predictor::from_parts(&MOTOR_PREDICTOR).ok()?);
-    let (mut last, mut missed_squares) = (Moment::default(), 0.0);
+    let (mut last, mut missed_squares) = (ProfileMoment::default(), 0.0);
     for moment in BRIEF.moments(largest_n_m) {
         antenna.tick(&moment);
         observer.tick(antenna.lane(CORE), map.header.ratio);

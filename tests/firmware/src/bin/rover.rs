@@ -6,7 +6,7 @@
 #![no_main]
 
 use cortex_m_rt::entry;
-use flexspline_firmware::flight::gear::Gear;
+use flexspline_firmware::flight::gear::DenseGear;
 use flexspline_firmware::flight::profile::BRIEF;
 use flexspline_firmware::plant::{Console, EMPTY, Room, read};
 use flexspline_firmware::rover::RoverJoint;
@@ -26,7 +26,7 @@ fn drive(rooms: &mut [Room; 4]) -> Option<bool> {
     let joint = |number: usize| {
         let (name, largest_n_m, map) = *maps.get(number)?;
         let (_, images) = *TABLES.get(number)?;
-        RoverJoint::new(number as u32, name, images, Gear::new(map, first_c), largest_n_m, first_c)
+        RoverJoint::new(number as u32, name, images, DenseGear::new(map, first_c), largest_n_m, first_c)
     };
     let mut joints = [joint(0)?, joint(1)?, joint(2)?, joint(3)?];
     let mut moments = maps.map(|(_, largest_n_m, _)| profile.moments(largest_n_m));

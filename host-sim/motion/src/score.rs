@@ -1,6 +1,9 @@
-//! How far the output was from its target.
+//! How far something was from where it should be.
 
-/// Root mean square and largest of some errors.
+/// Arc-seconds in a radian.
+pub const ARCSEC_PER_RAD: f64 = 206_264.806_247_096_36;
+
+/// Root mean square and largest.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Score {
     squares: f64,
@@ -8,26 +11,35 @@ pub struct Score {
     count: u32,
 }
 
-/// Arc-seconds in a radian.
-pub const ARCSEC_PER_RAD: f64 = 206_264.806_247_096_36;
-
 impl Score {
-    /// Takes one more error in, rad.
-    pub fn add(&mut self, error_rad: f64) {
-        self.squares += error_rad * error_rad;
-        let size = error_rad.abs();
-        if size > self.largest {
-            self.largest = size;
-        }
+    /// Takes one more in.
+    pub fn add(&mut self, value: f64) {
+        self.squares += value * value;
+        self.largest = self.largest.max(value.abs());
         self.count += 1;
     }
 
-    /// Root mean square, arcsec; 0 of none.
-    pub fn rms_arcsec(&self) -> f64 {
-        if self.count == 0 { 0.0 } else { libm::sqrt(self.squares / f64::from(self.count)) * ARCSEC_PER_RAD }
+    /// Root mean square; 0 of none.
+    pub fn rms(&self) -> f64 {
+        if self.count == 0 { 0.0 } else { libm::sqrt(self.squares / f64::from(self.count)) }
     }
 
-    /// Largest, arcsec.
+    /// Root mean square; not a number of none.
+    pub fn rms_if_any(&self) -> f64 {
+        if self.count == 0 { f64::NAN } else { self.rms() }
+    }
+
+    /// Largest.
+    pub fn largest(&self) -> f64 {
+        self.largest
+    }
+
+    /// Root mean square of errors in rad, arcsec.
+    pub fn rms_arcsec(&self) -> f64 {
+        self.rms() * ARCSEC_PER_RAD
+    }
+
+    /// Largest of errors in rad, arcsec.
     pub fn max_arcsec(&self) -> f64 {
         self.largest * ARCSEC_PER_RAD
     }

@@ -6,27 +6,18 @@
 
 use core::f64::consts::TAU;
 
+use crate::legs::{Aim, Leg, Walk};
+
 /// Time from tick to tick, s.
 pub const TICK_S: f64 = 1e-3;
 /// Rate of the stars, rad/s.
 pub const SIDEREAL_RAD_S: f64 = 7.292_115e-5;
 /// Faster than this is a slew, rad/s.
 pub const FASTEST_TRACKING_RAD_S: f64 = 6e-3;
-/// A rate held for this long is steady tracking, s.
-const STEADY_AFTER_S: f64 = 0.5;
-
-/// A part of the flight at one rate.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Leg {
-    /// How long, with the change of rate at its beginning, s.
-    pub seconds: f64,
-    /// Rate of the target at the output, rad/s.
-    pub rate_rad_s: f64,
-}
 
 /// A torque on the load, as shares of the largest torque of the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Load {
+pub struct Weather {
     /// What is always there.
     pub bias: f64,
     /// Amplitude of the swing.
@@ -49,7 +40,7 @@ pub struct Profile {
     /// Acceleration of the target between legs, rad/s².
     pub acceleration_rad_s2: f64,
     /// What pulls at the output.
-    pub load: Load,
+    pub load: Weather,
     /// Temperature at the beginning and at the end, °C.
     pub temperature_c: [f64; 2],
 }
@@ -82,7 +73,7 @@ pub const ANTENNA: Profile = Profile {
         leg(3.0, 0.0),
     ],
     acceleration_rad_s2: 0.05,
-    load: Load { bias: 0.1, swing: 0.65, swing_hz: 0.05, gust: 0.1, gust_hz: 0.7, calm_s: [77.0, 99.0] },
+    load: Weather { bias: 0.1, swing: 0.65, swing_hz: 0.05, gust: 0.1, gust_hz: 0.7, calm_s: [77.0, 99.0] },
     temperature_c: [0.0, 40.0],
 };
 
@@ -102,13 +93,13 @@ pub const BRIEF: Profile = Profile {
         leg(3.0, -SIDEREAL_RAD_S),
         leg(1.0, 0.0),
     ],
-    load: Load { swing_hz: 0.25, gust_hz: 2.0, calm_s: [11.5, 15.5], ..ANTENNA.load },
+    load: Weather { swing_hz: 0.25, gust_hz: 2.0, calm_s: [11.5, 15.5], ..ANTENNA.load },
     ..ANTENNA
 };
 
 /// What is asked for at one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Moment {
+pub struct ProfileMoment {
     /// Time, s.
     pub time_s: f64,
     /// Target of the output, rad.
@@ -137,8 +128,8 @@ impl Profile {
     }
 
     /// What is asked for at every tick, under loads up to `largest_n_m`.
-    pub fn moments(&self, largest_n_m: f64) -> Moments<'_> {
-        Moments { profile: self, largest_n_m, seconds: self.seconds(), tick: 0, leg: 0, leg_ends: 0.0, at: START }
+    pub fn moments(&self, largest_n_m: f64) -> ProfileMoments<'_> {
+        ProfileMoments { profile: self, largest_n_m, seconds: self.seconds(), walk: Walk::default() }
     }
 
     /// Mean of the torque over the flight, N·m.
@@ -152,7 +143,7 @@ impl Profile {
 
     /// Torque on the load as a share of the largest.
     fn load_share(&self, time_s: f64) -> f64 {
-        let Load { bias, swing, swing_hz, gust, gust_hz, calm_s: [begins, ends] } = self.load;
+        let Weather { bias, swing, swing_hz, gust, gust_hz, calm_s: [begins, ends] } = self.load;
         let outside = if time_s < begins { begins - time_s } else { time_s - ends };
         let strength = smooth(outside);
         strength * (bias + swing * libm::sin(TAU * swing_hz * time_s) + gust * libm::sin(TAU * gust_hz * time_s))
@@ -165,55 +156,30 @@ fn smooth(x: f64) -> f64 {
     x * x * (3.0 - 2.0 * x)
 }
 
-const START: State = State { target_rad: 0.0, rate_rad_s: 0.0, steady_s: 0.0 };
-
-#[derive(Clone, Copy, Debug)]
-struct State {
-    target_rad: f64,
-    rate_rad_s: f64,
-    /// For how long the rate has not changed.
-    steady_s: f64,
-}
-
 /// The moments of a flight, in order.
 #[derive(Clone, Debug)]
-pub struct Moments<'p> {
+pub struct ProfileMoments<'p> {
     profile: &'p Profile,
     largest_n_m: f64,
     seconds: f64,
-    tick: u32,
-    leg: usize,
-    leg_ends: f64,
-    at: State,
+    walk: Walk,
 }
 
-impl Iterator for Moments<'_> {
-    type Item = Moment;
+impl Iterator for ProfileMoments<'_> {
+    type Item = ProfileMoment;
 
-    fn next(&mut self) -> Option<Moment> {
-        let time_s = f64::from(self.tick) * TICK_S;
-        while time_s >= self.leg_ends {
-            self.leg_ends += self.profile.legs.get(self.leg)?.seconds;
-            self.leg += 1;
-        }
-        let wanted = self.profile.legs.get(self.leg - 1)?.rate_rad_s;
-        let most = self.profile.acceleration_rad_s2 * TICK_S;
-        let change = (wanted - self.at.rate_rad_s).clamp(-most, most);
-        let now = self.at;
-        self.at.rate_rad_s += change;
-        self.at.target_rad += (now.rate_rad_s + 0.5 * change) * TICK_S;
-        self.at.steady_s = if change == 0.0 { now.steady_s + TICK_S } else { 0.0 };
-        self.tick += 1;
-        let [first, last] = self.profile.temperature_c;
-        let slow = now.rate_rad_s.abs() <= FASTEST_TRACKING_RAD_S && now.rate_rad_s != 0.0;
-        Some(Moment {
+    fn next(&mut self) -> Option<ProfileMoment> {
+        let Profile { legs, acceleration_rad_s2, temperature_c: [first, last], .. } = *self.profile;
+        let aim = self.walk.next(legs, acceleration_rad_s2, TICK_S)?;
+        let Aim { time_s, target_rad, rate_rad_s, acceleration_rad_s2, steady } = aim;
+        Some(ProfileMoment {
             time_s,
-            target_rad: now.target_rad,
-            rate_rad_s: now.rate_rad_s,
-            acceleration_rad_s2: change / TICK_S,
+            target_rad,
+            rate_rad_s,
+            acceleration_rad_s2,
             torque_n_m: self.largest_n_m * self.profile.load_share(time_s),
             temperature_c: first + (last - first) * time_s / self.seconds,
-            steady: slow && now.steady_s >= STEADY_AFTER_S,
+            steady: steady && rate_rad_s.abs() <= FASTEST_TRACKING_RAD_S,
         })
     }
 }

@@ -8,7 +8,7 @@
 //! * [`ByTorque`]: the whole table of torque and temperature, again for the sign of the commanded velocity: without a
 //!   state of the play. No controller that we know does this; it tells apart what the torque gains and what the play
 //!   gains.
-//! * [`Compensated`]: the core.
+//! * [`ByCore`]: the core.
 
 use core::f64::consts::TAU;
 use flexspline::{
@@ -33,7 +33,7 @@ pub const LIMITS: Limits = Limits {
 
 /// What a controller is told in a tick.
 #[derive(Clone, Copy, Debug)]
-pub struct Told {
+pub struct Wanted {
     /// Generator angle of the encoder.
     pub generator: Option<GeneratorAngle>,
     /// Where the output shall be when the command has been carried out.
@@ -70,7 +70,7 @@ impl Uncompensated {
     }
 
     /// One tick.
-    pub fn tick(&mut self, told: &Told) -> GeneratorAngle {
+    pub fn tick(&mut self, told: &Wanted) -> GeneratorAngle {
         self.drive.nominal_generator(told.target)
     }
 }
@@ -130,7 +130,7 @@ impl BySign {
     }
 
     /// One tick.
-    pub fn tick(&mut self, told: &Told) -> GeneratorAngle {
+    pub fn tick(&mut self, told: &Wanted) -> GeneratorAngle {
         self.direction = direction_of(told.rate_rad_s, self.direction);
         let [forward, backward] = &self.curves;
         let curve = if self.direction == Direction::Forward { forward } else { backward };
@@ -167,7 +167,7 @@ impl<'a> ByTorque<'a> {
     }
 
     /// One tick.
-    pub fn tick(&mut self, told: &Told) -> GeneratorAngle {
+    pub fn tick(&mut self, told: &Wanted) -> GeneratorAngle {
         self.direction = direction_of(told.rate_rad_s, self.direction);
         let approach = Approach::Moving(self.direction);
         let command = self.table.inverse(told.target, told.torque_n_m, self.temperature_c, approach);
@@ -187,7 +187,7 @@ const TOO_FAR_RAD: f32 = 1e-4;
 /// tracks is now ahead, now behind, by less than an arc-second, and each time the whole play would be asked for. So the
 /// target that the core is given is at least 0.04″ ahead of the output in the direction of the commanded velocity, and
 /// what was added is taken off the command again.
-pub struct Compensated<'a> {
+pub struct ByCore<'a> {
     joint: Joint,
     images: Images<'a>,
     generator: GeneratorAngle,
@@ -209,7 +209,7 @@ pub enum StartError {
     Limits(SettingError),
 }
 
-impl<'a> Compensated<'a> {
+impl<'a> ByCore<'a> {
     /// With a table, twice, at its temperature, off.
     ///
     /// # Errors
@@ -256,7 +256,7 @@ impl<'a> Compensated<'a> {
     }
 
     /// How far the target is put ahead, counts of the output.
-    fn put_ahead(&mut self, told: &Told) -> i64 {
+    fn put_ahead(&mut self, told: &Wanted) -> i64 {
         self.direction = direction_of(told.rate_rad_s, self.direction);
         self.generator = told.generator.unwrap_or(self.generator);
         let mut play = *self.state.play();
@@ -270,7 +270,7 @@ impl<'a> Compensated<'a> {
     }
 
     /// One tick.
-    pub fn tick(&mut self, told: &Told) -> GeneratorAngle {
+    pub fn tick(&mut self, told: &Wanted) -> GeneratorAngle {
         let more = self.put_ahead(told);
         let input = Input {
             generator: told.generator,

@@ -4,11 +4,11 @@ use core::fmt;
 
 use flexspline::{Drive, Flags, Measured, Mode, Overrun, Predictor, PredictorState, RateGroup, Table};
 
-use super::controllers::{BySign, ByTorque, Compensated, Told, Uncompensated};
-use super::profile::{Moment, TICK_S};
+use super::controllers::{ByCore, BySign, ByTorque, Uncompensated, Wanted};
+use super::profile::{ProfileMoment, TICK_S};
 use super::score::Scores;
-use super::servo::{SERVO, Servo, ServoSettings};
-use super::{Lane, Noise, Plant, Sensors, ahead};
+use super::{JointSensors, Lane, RigidPlant, ahead};
+use crate::noise::Noise;
 
 /// Controllers, in the order of the results.
 pub const CONTROLLERS: [&str; 5] =
@@ -62,9 +62,9 @@ pub struct Antenna<'a, P> {
     by_sign: [BySign; 2],
     by_torque: ByTorque<'a>,
     /// The core.
-    pub core: Compensated<'a>,
+    pub core: ByCore<'a>,
     groups: SlowGroups,
-    sensors: Sensors,
+    sensors: JointSensors,
     noise: Noise,
     ratio: f64,
     tick: u32,
@@ -82,7 +82,7 @@ pub struct Pointing {
     pub held_back: bool,
 }
 
-impl<'a, P: Plant> Antenna<'a, P> {
+impl<'a, P: RigidPlant> Antenna<'a, P> {
     /// At rest with a table and a plant for each controller; `None` if the table cannot be flown. `mean_torque_n_m` is
     /// the mean of the load to come.
     pub fn new(
@@ -95,15 +95,15 @@ impl<'a, P: Plant> Antenna<'a, P> {
         let [image, _] = images;
         let table = Table::check(image).ok()?;
         let drive: Drive = *table.drive();
-        let sensors = Sensors::for_range(largest_n_m);
+        let sensors = JointSensors::for_range(largest_n_m);
         let overrun = Overrun::FadeOut { ticks: 50 };
         let sign = |torque: f64| BySign::new(&table, torque as f32, 20.0);
         Some(Self {
-            lanes: plants.map(|plant| Lane::new(plant, Servo::new(SERVO))),
+            lanes: plants.map(Lane::new),
             uncompensated: Uncompensated::new(drive),
             by_sign: [sign(0.0)?, sign(mean_torque_n_m)?],
             by_torque: ByTorque::new(table),
-            core: Compensated::new(images, drive, sensors.temperature(first_c), overrun).ok()?,
+            core: ByCore::new(images, drive, sensors.temperature(first_c), overrun).ok()?,
             groups: SlowGroups::staggered(0)?,
             sensors,
             noise: Noise::new(5),
@@ -115,24 +115,15 @@ impl<'a, P: Plant> Antenna<'a, P> {
         })
     }
 
-    /// Other servos.
-    #[must_use]
-    pub fn with_servo(mut self, settings: ServoSettings) -> Self {
-        for lane in &mut self.lanes {
-            lane.servo = Servo::new(settings);
-        }
-        self
-    }
-
     /// One tick: where all outputs are now, and on to the next.
-    pub fn tick(&mut self, now: &Moment) -> Pointing {
+    pub fn tick(&mut self, now: &ProfileMoment) -> Pointing {
         let errors_rad: [f64; 5] = core::array::from_fn(|k| self.lanes[k].output_rad() - now.target_rad);
         if self.tick == OFF_TICKS {
             self.core.request(Mode::Tracking);
         }
         let (target, noise) = (ahead(now, LEAD_S), self.noise.part());
         for (k, lane) in self.lanes.iter_mut().enumerate() {
-            let told = Told {
+            let told = Wanted {
                 generator: Some(lane.encoder()),
                 target,
                 rate_rad_s: now.rate_rad_s,
@@ -164,7 +155,7 @@ impl<'a, P: Plant> Antenna<'a, P> {
         Pointing { errors_rad, held_back }
     }
 
-    fn count(&mut self, now: &Moment, errors_rad: &[f64; 5], held_back: bool) {
+    fn count(&mut self, now: &ProfileMoment, errors_rad: &[f64; 5], held_back: bool) {
         for (count, (_, flag)) in self.flags.iter_mut().zip(FLAGS) {
             *count += u32::from(self.core.out.is_some_and(|out| out.flags.contains(flag)));
         }
@@ -229,8 +220,8 @@ impl Observer {
     /// One tick: the motor's torque and speed, carried to the output.
     pub fn tick<P>(&mut self, lane: &Lane<P>, ratio: f64) {
         let measured = Measured {
-            torque_n_m: (lane.servo.torque_n_m() * ratio) as f32,
-            speed_rad_s: (lane.servo.rate_rad_s() / ratio) as f32,
+            torque_n_m: (lane.motor.torque_n_m() * ratio) as f32,
+            speed_rad_s: (lane.motor.rate_rad_s() / ratio) as f32,
             twist_rad: 0.0,
         };
         self.predictor.step(&mut self.state, &measured);

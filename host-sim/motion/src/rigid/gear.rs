@@ -17,7 +17,7 @@ const WIDTH: usize = 6;
 
 /// Of which drive a map is, and how its numbers lie.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Header {
+pub struct MapHeader {
     /// Largest flank torque, N·m.
     pub largest_n_m: f64,
     /// Coulomb drag of the output, N·m.
@@ -38,7 +38,7 @@ pub struct Header {
 #[derive(Clone, Copy, Debug)]
 pub struct GearMap<'a> {
     /// Of which drive.
-    pub header: Header,
+    pub header: MapHeader,
     /// Error of the output under positive flank torque at each temperature, rad: by flank torque, then phase.
     pub planes: [&'a [f64]; 2],
 }
@@ -48,7 +48,7 @@ pub struct GearMap<'a> {
 ///
 /// # Errors
 /// The line, from 1, that is not so.
-pub fn parse(text: &str, planes: &mut [[f64; MOST]; 2]) -> Result<Header, usize> {
+pub fn parse(text: &str, planes: &mut [[f64; MOST]; 2]) -> Result<MapHeader, usize> {
     let mut lines = text.lines();
     let first = lines.next().ok_or(1_usize)?;
     let named = |name: &str| {
@@ -77,7 +77,7 @@ pub fn parse(text: &str, planes: &mut [[f64; MOST]; 2]) -> Result<Header, usize>
     }
     let [cold, warm] = nodes;
     let known = temperatures_c[0] < temperatures_c[1] && cold == warm && cold >= 4 && (8..=32).contains(&phases);
-    let header = Header { largest_n_m, drag_n_m, teeth, ratio, temperatures_c, phases, nodes: cold };
+    let header = MapHeader { largest_n_m, drag_n_m, teeth, ratio, temperatures_c, phases, nodes: cold };
     if known { Ok(header) } else { Err(3 + cold + warm) }
 }
 
@@ -89,7 +89,7 @@ pub fn node_share(k: usize, n: usize) -> f64 {
 
 /// A drive with its output resting somewhere.
 #[derive(Clone, Debug)]
-pub struct Gear<'a> {
+pub struct DenseGear<'a> {
     map: GearMap<'a>,
     /// The map at the temperature now; row 0 is `F = 0`.
     plane: [f64; MOST + 32],
@@ -97,7 +97,7 @@ pub struct Gear<'a> {
     error_rad: f64,
 }
 
-impl<'a> Gear<'a> {
+impl<'a> DenseGear<'a> {
     /// Unloaded at generator angle zero, in the middle of the clearance.
     pub fn new(map: GearMap<'a>, temperature_c: f64) -> Self {
         let mut gear = Self { map, plane: [0.0; MOST + 32], generator_rad: 0.0, error_rad: 0.0 };

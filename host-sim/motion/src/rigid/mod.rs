@@ -10,16 +10,18 @@
 pub mod antenna;
 pub mod controllers;
 pub mod gear;
+pub mod motor;
 pub mod profile;
-pub mod score;
-pub mod servo;
+
+pub use crate::noise::Noise;
+pub use crate::score;
 
 use flexspline::{GeneratorAngle, OutputAngle};
-use profile::{Moment, TICK_S};
-use servo::Servo;
+use motor::Motor;
+use profile::ProfileMoment;
 
 /// What the output is carried by.
-pub trait Plant {
+pub trait RigidPlant {
     /// The generator and the torque on the load go on by a tick; the output angle then, rad.
     fn go(&mut self, generator_rad: f64, torque_n_m: f64) -> f64;
 
@@ -30,9 +32,9 @@ pub trait Plant {
     fn set_temperature(&mut self, temperature_c: f64);
 }
 
-impl Plant for gear::Gear<'_> {
+impl RigidPlant for gear::DenseGear<'_> {
     fn go(&mut self, generator_rad: f64, torque_n_m: f64) -> f64 {
-        gear::Gear::go(self, generator_rad, torque_n_m)
+        gear::DenseGear::go(self, generator_rad, torque_n_m)
     }
 
     fn carried_n_m(&self, torque_n_m: f64) -> f64 {
@@ -40,13 +42,13 @@ impl Plant for gear::Gear<'_> {
     }
 
     fn set_temperature(&mut self, temperature_c: f64) {
-        gear::Gear::set_temperature(self, temperature_c);
+        gear::DenseGear::set_temperature(self, temperature_c);
     }
 }
 
 /// Torque sensor and thermometer.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sensors {
+pub struct JointSensors {
     /// Resolution of the torque sensor, N·m.
     pub torque_step_n_m: f64,
     /// Noise of the torque sensor: evenly between ± this, N·m.
@@ -58,7 +60,7 @@ pub struct Sensors {
     pub temperature_step_k: f64,
 }
 
-impl Sensors {
+impl JointSensors {
     /// Of the usual kind for a table up to this torque: 14 bits over ± the range, noise of one step, quarters of a
     /// degree.
     pub fn for_range(largest_n_m: f64) -> Self {
@@ -87,45 +89,20 @@ fn stepped(value: f64, step: f64) -> f64 {
     libm::floor(value / step + 0.5) * step
 }
 
-/// Numbers that look random, the same in every run.
-#[derive(Clone, Debug)]
-pub struct Noise(u32);
-
-impl Noise {
-    /// From a seed.
-    pub fn new(seed: u32) -> Self {
-        Self(seed)
-    }
-
-    /// 32 bits.
-    pub fn number(&mut self) -> u32 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9);
-        let mut x = self.0;
-        x = (x ^ (x >> 16)).wrapping_mul(0x85eb_ca6b);
-        x = (x ^ (x >> 13)).wrapping_mul(0xc2b2_ae35);
-        x ^ (x >> 16)
-    }
-
-    /// Between −1 and 1.
-    pub fn part(&mut self) -> f64 {
-        f64::from(self.number()) * (2.0 / 4_294_967_296.0) - 1.0
-    }
-}
-
 /// A drive with its motor, somewhere on its way.
 #[derive(Clone, Debug)]
 pub struct Lane<P> {
     /// The drive.
     pub plant: P,
     /// The motor.
-    pub servo: Servo,
+    pub motor: Motor,
     output_rad: f64,
 }
 
-impl<P: Plant> Lane<P> {
+impl<P: RigidPlant> Lane<P> {
     /// At rest at zero.
-    pub fn new(plant: P, servo: Servo) -> Self {
-        Self { plant, servo, output_rad: 0.0 }
+    pub fn new(plant: P) -> Self {
+        Self { plant, motor: Motor::default(), output_rad: 0.0 }
     }
 
     /// Where the output is, rad.
@@ -135,20 +112,20 @@ impl<P: Plant> Lane<P> {
 
     /// What the encoder shows.
     pub fn encoder(&self) -> GeneratorAngle {
-        self.servo.encoder()
+        self.motor.encoder()
     }
 
     /// To the next tick with this command; the torque sensor shows the one, at the end of the tick the load has the
     /// other.
     pub fn go(&mut self, command: GeneratorAngle, shown_n_m: f32, torque_n_m: f64, ratio: f64) {
-        self.servo.control(command, -f64::from(shown_n_m) / ratio);
-        self.servo.turn(TICK_S, self.plant.carried_n_m(torque_n_m) / ratio);
-        self.output_rad = self.plant.go(self.servo.angle_rad(), torque_n_m);
+        self.motor.control(command, -f64::from(shown_n_m) / ratio);
+        self.motor.turn(self.plant.carried_n_m(torque_n_m) / ratio);
+        self.output_rad = self.plant.go(self.motor.angle_rad(), torque_n_m);
     }
 }
 
 /// Where the output shall be this much later.
-pub fn ahead(moment: &Moment, seconds: f64) -> OutputAngle {
+pub fn ahead(moment: &ProfileMoment, seconds: f64) -> OutputAngle {
     let target = moment.target_rad + (moment.rate_rad_s + 0.5 * moment.acceleration_rad_s2 * seconds) * seconds;
     OutputAngle::from_rad(target).unwrap_or(OutputAngle::ZERO)
 }
