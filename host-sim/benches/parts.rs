@@ -23,8 +23,8 @@ use std::time::Duration;
 use criterion::measurement::Measurement;
 use criterion::{BenchmarkGroup, Criterion, criterion_group, criterion_main};
 use flexspline_sim::condense::{
-    Block, Cell, CellAt, CellState, CellTangent, Chain, CondensedWheel, Contribution, Geometric, Kernels, Local,
-    Placement, rotate_pairs,
+    Block, Cell, CellAt, CellPlacement, CellState, CellTangent, Chain, CondensedWheel, Contribution, DenseKernels,
+    Geometric, Local, rotate_pairs,
 };
 use flexspline_sim::contact::{BoreContact, BoreLaw, Configuration, FlankLaw};
 use flexspline_sim::drive::GeneratorKind;
@@ -186,7 +186,7 @@ fn fast<M: Measurement>(group: &mut BenchmarkGroup<'_, M>, problem: &Problem, st
 struct Placed<'m> {
     cell: &'m Cell,
     unknowns: &'m [u32],
-    place: Placement,
+    place: CellPlacement,
     /// In the flexspline.
     frame: Option<TurningFrame>,
 }
@@ -201,7 +201,7 @@ struct TurningFrame {
 
 /// The tangent of both wheels without contact; springs at the faces hold it.
 struct Tangent<'m> {
-    kernels: Kernels,
+    kernels: DenseKernels,
     cells: Vec<Placed<'m>>,
     blocks: Vec<Block>,
     reduced: Vec<CellTangent>,
@@ -212,7 +212,7 @@ struct Tangent<'m> {
 
 impl<'m> Tangent<'m> {
     fn new(model: &'m CondensedDrive, state: &State) -> Tangent<'m> {
-        let kernels = Kernels::default();
+        let kernels = DenseKernels::default();
         let (fs, cs) = (&model.flexspline, &model.circular_spline);
         let mut cells = Vec::new();
         for (wheel, first, turning) in [(fs, 0, true), (cs, fs.count(), false)] {
@@ -223,7 +223,7 @@ impl<'m> Tangent<'m> {
                 let (cell, unknowns) = wheel.cell(j, false);
                 let frame = turning.then(|| TurningFrame::new(kernels, cell, unknowns, middle, state));
                 let turn = frame.as_ref().map_or(0.0, |frame| frame.turn_rad);
-                let place = Placement {
+                let place = CellPlacement {
                     frame: middle + turn,
                     faces: [turn + 0.5 * mesh.pitch(), turn - 0.5 * mesh.pitch()],
                     blocks: [(first + j) as u32, (first + (j + 1) % wheel.count()) as u32],
@@ -289,7 +289,7 @@ impl<'m> Tangent<'m> {
 }
 
 impl TurningFrame {
-    fn new(kernels: Kernels, cell: &Cell, unknowns: &[u32], middle_rad: f64, state: &State) -> TurningFrame {
+    fn new(kernels: DenseKernels, cell: &Cell, unknowns: &[u32], middle_rad: f64, state: &State) -> TurningFrame {
         let mut d: Vec<f64> = unknowns.iter().map(|u| state.u[*u as usize]).collect();
         rotate_pairs(&mut d, (-middle_rad).sin_cos());
         let mut inner = CellState::default();

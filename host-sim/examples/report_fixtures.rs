@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use flexspline_sim::report::Packed;
 use flexspline_sim::report::page::{
-    Axis, Block, Choice, Detail, Field, Figure, FigureBody, Headline, Limit, Lines, Mark, Page, Quantity, Section,
+    Axis, Block, Choice, Detail, Field, Figure, FigureBody, Headline, Limit, Lines, Mark, Page, PageQuantity, Section,
     Series, Status, Table, Text, Upright,
 };
 use serde_json::{Map, Value, json};
@@ -110,17 +110,17 @@ fn hostile() -> Page {
                 figure(
                     "lines",
                     FigureBody::Lines {
-                        x: axis(Quantity::Degree),
-                        y: axis(Quantity::Error),
+                        x: axis(PageQuantity::Degree),
+                        y: axis(PageQuantity::Error),
                         charts: vec![(id.clone(), lines)],
                     },
                 ),
                 figure(
                     "field",
                     FigureBody::Field {
-                        x: axis(Quantity::Degree),
-                        y: axis(Quantity::Torque),
-                        z: axis(Quantity::Error),
+                        x: axis(PageQuantity::Degree),
+                        y: axis(PageQuantity::Torque),
+                        z: axis(PageQuantity::Error),
                         fields: vec![(id, field)],
                     },
                 ),

@@ -207,7 +207,7 @@ enum Bank {
 
 /// The first so many springs of a bank.
 #[derive(Clone, Copy)]
-struct Springs {
+struct CSprings {
     bank: Bank,
     used: u8,
 }
@@ -217,7 +217,7 @@ const SLIP_MARK: u32 = 0x7842_5446;
 
 const _: () = {
     assert!(size_of::<Marked<Learner>>() <= size_of::<FlexsplineLearner>() && align_of::<Marked<Learner>>() <= 8);
-    assert!(size_of::<Marked<Springs>>() <= size_of::<FlexsplineSlip>() && align_of::<Marked<Springs>>() <= 8);
+    assert!(size_of::<Marked<CSprings>>() <= size_of::<FlexsplineSlip>() && align_of::<Marked<CSprings>>() <= 8);
     assert!(FLEXSPLINE_SAVED_LEARNER_BYTES == saved_adapt_bytes(MOST));
     assert!(FLEXSPLINE_SAVED_SLIP_BYTES == saved_slip_bytes(SPRINGS));
 };
@@ -504,7 +504,7 @@ pub extern "C" fn flexspline_slip_init(
             }
             _ => None,
         };
-        put(slip, SLIP_MARK, Springs { bank: bank.ok_or(FlexsplineStatus::Argument)?, used: number })
+        put(slip, SLIP_MARK, CSprings { bank: bank.ok_or(FlexsplineStatus::Argument)?, used: number })
     };
     status(make())
 }
@@ -514,7 +514,7 @@ pub extern "C" fn flexspline_slip_init(
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_slip_set(slip: *mut FlexsplineSlip, is_relaxed: u8) -> FlexsplineStatus {
     let set = || {
-        let Springs { bank, .. } = get_mut(slip, SLIP_MARK)?;
+        let CSprings { bank, .. } = get_mut(slip, SLIP_MARK)?;
         if is_relaxed > 1 {
             return Err(FlexsplineStatus::Argument);
         }
@@ -553,7 +553,7 @@ pub extern "C" fn flexspline_slip_update(
     let update = || {
         apart([span(slip), span(report)])?;
         usable(report)?;
-        let Springs { bank: Bank::Output(bank, state), .. } = get_mut(slip, SLIP_MARK)? else {
+        let CSprings { bank: Bank::Output(bank, state), .. } = get_mut(slip, SLIP_MARK)? else {
             return Err(FlexsplineStatus::Argument);
         };
         if !bank.mend() {
@@ -576,7 +576,7 @@ pub extern "C" fn flexspline_slip_update_torque(
     let update = || {
         apart([span(slip), span(report)])?;
         usable(report)?;
-        let Springs { bank: Bank::Torque(bank, state), .. } = get_mut(slip, SLIP_MARK)? else {
+        let CSprings { bank: Bank::Torque(bank, state), .. } = get_mut(slip, SLIP_MARK)? else {
             return Err(FlexsplineStatus::Argument);
         };
         if !bank.mend() {
@@ -611,7 +611,7 @@ pub(super) fn save_slip(
 ) -> Result<(), FlexsplineStatus> {
     usable(written)?;
     apart([span(slip), (saved as usize, saved_bytes), span(written)])?;
-    let &Springs { ref bank, used } = get(slip, SLIP_MARK)?;
+    let &CSprings { ref bank, used } = get(slip, SLIP_MARK)?;
     let (room, used) = (bytes_mut(saved, saved_bytes)?, used as usize);
     let (took, is_lost) = match bank {
         Bank::Output(bank, state) => (bank.save_first(state, owner, used, room), bank.is_lost() || state.is_lost()),
@@ -647,7 +647,7 @@ pub(super) fn restore_slip(
 ) -> Result<(), FlexsplineStatus> {
     apart([span(slip), (saved as usize, saved_bytes)])?;
     let kept = bytes(saved, saved_bytes)?;
-    let Springs { bank, used } = get_mut(slip, SLIP_MARK)?;
+    let CSprings { bank, used } = get_mut(slip, SLIP_MARK)?;
     let used = *used as usize;
     match bank {
         Bank::Output(bank, state) => *state = bank.restore_first(owner, used, kept).map_err(restore_status)?,

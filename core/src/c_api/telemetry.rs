@@ -66,7 +66,7 @@ pub struct FlexsplineRecord {
 
 /// Which places of a list are filled, and how many records there were.
 #[derive(Clone, Copy)]
-struct Kept {
+struct KeptRing {
     group: RateGroup,
     places: u16,
     first: u16,
@@ -79,7 +79,7 @@ struct Kept {
 const RECORDER_MARK: u32 = 0x7852_5446;
 
 const _: () = {
-    assert!(size_of::<Marked<Kept>>() <= size_of::<FlexsplineRecorder>() && align_of::<Marked<Kept>>() <= 8);
+    assert!(size_of::<Marked<KeptRing>>() <= size_of::<FlexsplineRecorder>() && align_of::<Marked<KeptRing>>() <= 8);
 };
 
 fn told(record: &Record) -> FlexsplineRecord {
@@ -130,7 +130,7 @@ fn read(record: &FlexsplineRecord) -> Result<Record, FlexsplineStatus> {
     })
 }
 
-impl Kept {
+impl KeptRing {
     /// The place so many records behind the first.
     fn place(&self, behind: u16) -> u16 {
         let sum = (self.first as u32).wrapping_add(behind as u32);
@@ -187,7 +187,7 @@ pub extern "C" fn flexspline_recorder_init(
         if places == 0 {
             return Err(FlexsplineStatus::Argument);
         }
-        put(recorder, RECORDER_MARK, Kept { group, places, first: 0, filled: 0, number: 0, lost: 0, lose_new })
+        put(recorder, RECORDER_MARK, KeptRing { group, places, first: 0, filled: 0, number: 0, lost: 0, lose_new })
     };
     status(make())
 }
@@ -208,7 +208,7 @@ pub extern "C" fn flexspline_recorder_see(
         usable(records)?;
         let given = given(output)?;
         clear(span(recorder), [span(state), span(store), span(output)])?;
-        let kept: &mut Kept = get_mut(recorder, RECORDER_MARK)?;
+        let kept: &mut KeptRing = get_mut(recorder, RECORDER_MARK)?;
         let list = (records as usize, length(kept.places));
         clear(list, [span(recorder), span(state), span(store), span(output)])?;
         let state: &JointState = get(state, STATE_MARK)?;
@@ -240,7 +240,7 @@ pub extern "C" fn flexspline_recorder_take(
         usable(record)?;
         usable(is_taken)?;
         apart([span(recorder), span(record), span(is_taken)])?;
-        let kept: &mut Kept = get_mut(recorder, RECORDER_MARK)?;
+        let kept: &mut KeptRing = get_mut(recorder, RECORDER_MARK)?;
         let list = (records as usize, length(kept.places));
         clear(list, [span(recorder), span(record), span(is_taken)])?;
         let found = kept.take();

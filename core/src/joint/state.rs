@@ -18,13 +18,13 @@ pub(super) const MOST_FINE: u32 = MOST_ERROR_COUNTS * FINE as u32;
 /// the next tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointState {
-    copies: [Sealed; 2],
+    copies: [SealedState; 2],
     /// Told only.
     missed_ticks: u32,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Sealed {
+struct SealedState {
     kept: Kept,
     sums: [u32; 2],
 }
@@ -104,8 +104,8 @@ impl Kept {
     }
 
     #[inline(always)]
-    const fn sealed(self) -> Sealed {
-        Sealed { kept: self, sums: pair(self.sums()) }
+    const fn sealed(self) -> SealedState {
+        SealedState { kept: self, sums: pair(self.sums()) }
     }
 
     #[inline(always)]
@@ -120,7 +120,7 @@ impl Kept {
     }
 }
 
-impl Sealed {
+impl SealedState {
     #[inline(always)]
     const fn is_whole(&self) -> bool {
         same(pair(self.kept.sums()), self.sums)
@@ -183,7 +183,7 @@ impl Default for JointState {
 }
 
 impl JointState {
-    const NEW: [Sealed; 2] = [Kept::NEW.sealed(); 2];
+    const NEW: [SealedState; 2] = [Kept::NEW.sealed(); 2];
 
     /// After a reset: no correction, the side of the play unknown, off.
     #[must_use]
@@ -476,7 +476,7 @@ const _: () = assert!(size_of::<Kept>() == 64);
 #[cfg(test)]
 crate::upset::upsets!(JointState { copies, missed_ticks });
 #[cfg(test)]
-crate::upset::upsets!(Sealed { kept, sums });
+crate::upset::upsets!(SealedState { kept, sums });
 #[cfg(test)]
 crate::upset::upsets!(Kept {
     play,

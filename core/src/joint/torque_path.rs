@@ -71,11 +71,11 @@ pub struct TorqueSettings {
 /// Where an upset hit more of it than can be mended every tick gives NaN, until the path is made anew.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TorquePath {
-    path: Sealed<Path>,
+    path: Sealed<PathState>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Path {
+struct PathState {
     /// Bits of drag, drag of the table, hold, largest reading, the share of a reading that a tick believes, and the
     /// largest change from one reading to the next.
     set: [u32; 6],
@@ -93,7 +93,7 @@ struct Path {
     /// Readings in a row that were not believed, in the upper half; flags.
     marks: u32,
 }
-words!([] Path { set, behind, believed, doubted, settle, frozen, gap, marks });
+words!([] PathState { set, behind, believed, doubted, settle, frozen, gap, marks });
 
 /// Readings in a row near each other that are not believed where they begin too far from the last one: the third is. A
 /// spike of one or two ticks is none of the torque, and a step that is one comes two ticks late. A guess.
@@ -171,7 +171,7 @@ impl TorquePath {
         let none = f32::NAN.to_bits();
         // Long enough ago that the flank may change.
         let settle = halves(settle as u32, u32::MAX);
-        Ok(Path { set, behind: none, believed: none, doubted: none, settle, frozen: 0, gap: 0, marks: 0 }.sealed())
+        Ok(PathState { set, behind: none, believed: none, doubted: none, settle, frozen: 0, gap: 0, marks: 0 }.sealed())
     }
 
     /// With other limits of what a sensor can read: the largest change from one tick to the next, N·m (above 0; a
@@ -194,7 +194,7 @@ impl TorquePath {
     #[cfg(any(test, feature = "std"))]
     #[must_use]
     pub const fn kept(&self) -> [u32; 7] {
-        let Path { behind, believed, doubted, settle, frozen, gap, marks, .. } = *self.path.kept();
+        let PathState { behind, believed, doubted, settle, frozen, gap, marks, .. } = *self.path.kept();
         [behind, believed, doubted, upper(settle), upper(frozen), gap, marks]
     }
 
@@ -203,7 +203,7 @@ impl TorquePath {
     pub const fn go_on(&mut self, [behind, believed, doubted, since, same, gap, marks]: [u32; 7]) {
         let path = *self.path.kept();
         let (settle, frozen) = (halves(path.settle & FLAGS, since), halves(path.frozen & FLAGS, same));
-        *self = Path { behind, believed, doubted, settle, frozen, gap, marks, ..path }.sealed();
+        *self = PathState { behind, believed, doubted, settle, frozen, gap, marks, ..path }.sealed();
     }
 
     /// Whether an upset hit more of it than can be mended: make it anew.
@@ -227,7 +227,7 @@ impl TorquePath {
 /// Least size of the largest reading and of the largest change of one, N·m: what is below is no joint's. A guess.
 const LEAST_N_M: f64 = 1e-6;
 
-impl Path {
+impl PathState {
     const fn sealed(self) -> TorquePath {
         let Self { set: [a, b, c, d, e, f], behind, believed, doubted, settle, frozen, gap, marks } = self;
         TorquePath {
@@ -303,7 +303,7 @@ impl Path {
 #[cfg(test)]
 crate::upset::upsets!(TorquePath { path });
 #[cfg(test)]
-crate::upset::upsets!(Path { set, behind, believed, doubted, settle, frozen, gap, marks });
+crate::upset::upsets!(PathState { set, behind, believed, doubted, settle, frozen, gap, marks });
 
 #[cfg(test)]
 mod tests {

@@ -3,11 +3,11 @@
 use super::copies::{SLACK, STORE_WORDS};
 use super::health::{ActivateError, STORE_PAGES};
 use super::images::Images;
-use super::source::{ACTIVE, Source};
+use super::source::{ACTIVE, ImageSource};
 use super::{Damaged, Scrub, Store, Strangers};
 use crate::drive::Drive;
 use crate::error::ImageError;
-use crate::table::{Check, TableId, Words};
+use crate::table::{ImageCheck, TableId, Words};
 use crate::whole::{pair, same, sums};
 
 /// Words of the images that a step compares, and of the copies that it fills.
@@ -21,7 +21,7 @@ const OF_SECOND: u32 = 2;
 
 /// What a step does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Stage {
+enum ActivationStage {
     /// Whether both images are the same, words of them.
     Compare,
     /// The first image is checked, or the second.
@@ -35,7 +35,7 @@ enum Stage {
     Fill,
 }
 
-impl Stage {
+impl ActivationStage {
     const ALL: [Self; 7] =
         [Self::Compare, Self::First, Self::Second, Self::Refuse, Self::Confirm, Self::Clear, Self::Fill];
 }
@@ -73,7 +73,7 @@ pub struct Activation {
     /// Words compared; 1 after the last check of an image.
     at: usize,
     same: bool,
-    check: Check,
+    check: ImageCheck,
     /// The first image is no table.
     first_refused: bool,
     /// By the checks under way, and by those before.
@@ -85,7 +85,7 @@ pub struct Activation {
 /// sums.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Found {
-    source: Source,
+    source: ImageSource,
     id: TableId,
     /// 1 if the images are the same, and 2 if the second is the sound one.
     images: u32,
@@ -116,11 +116,11 @@ impl Activation {
         Self {
             drive,
             temperature: [temperature_c.to_bits(), !temperature_c.to_bits()],
-            stage: Stage::Compare as u32,
+            stage: ActivationStage::Compare as u32,
             taken: 0,
             at: 0,
             same: true,
-            check: Check::NEW,
+            check: ImageCheck::NEW,
             first_refused: false,
             found: None,
             confirmed: None,
@@ -136,50 +136,50 @@ impl Activation {
         let [first, second] = images.words;
         self.taken = self.taken.wrapping_add(1);
         let within = self.taken <= MOST_STEPS;
-        let stage = Stage::ALL.get(self.stage as usize).filter(|_| within).ok_or(ActivateError::Torn)?;
+        let stage = ActivationStage::ALL.get(self.stage as usize).filter(|_| within).ok_or(ActivateError::Torn)?;
         match *stage {
-            Stage::Compare => self.compare(first, second),
-            Stage::First => match self.check.step(first.as_flattened()) {
+            ActivationStage::Compare => self.compare(first, second),
+            ActivationStage::First => match self.check.step(first.as_flattened()) {
                 Ok(true) if self.at == 0 => self.at = 1,
                 // In a step of its own.
                 Ok(true) => {
                     self.found = Some(self.accept(images, first, 0)?);
-                    self.go_on(if self.same { Stage::Confirm } else { Stage::Second });
+                    self.go_on(if self.same { ActivationStage::Confirm } else { ActivationStage::Second });
                 }
                 Ok(false) => {}
                 Err(error) if self.same => return Err(ActivateError::Image(error)),
                 Err(_) => {
                     self.first_refused = true;
-                    self.go_on(Stage::Second);
+                    self.go_on(ActivationStage::Second);
                 }
             },
-            Stage::Second => match (self.check.step(second.as_flattened()), self.first_refused) {
+            ActivationStage::Second => match (self.check.step(second.as_flattened()), self.first_refused) {
                 (Ok(false), _) => {}
                 // Only where the images differ is the second a question.
                 (Ok(true), false) => return Err(ActivateError::TwoTables),
                 (Ok(true), true) if self.at == 0 => self.at = 1,
                 (Ok(true), true) => {
                     self.found = Some(self.accept(images, second, OF_SECOND)?);
-                    self.go_on(Stage::Confirm);
+                    self.go_on(ActivationStage::Confirm);
                 }
-                (Err(_), true) => self.go_on(Stage::Refuse),
-                (Err(_), false) => self.go_on(Stage::Confirm),
+                (Err(_), true) => self.go_on(ActivationStage::Refuse),
+                (Err(_), false) => self.go_on(ActivationStage::Confirm),
             },
-            Stage::Refuse => {
+            ActivationStage::Refuse => {
                 if self.check.step(first.as_flattened()).map_err(ActivateError::Image)? {
                     return Err(ActivateError::Torn);
                 }
             }
-            Stage::Confirm => self.confirm()?,
-            Stage::Clear | Stage::Fill => {
+            ActivationStage::Confirm => self.confirm()?,
+            ActivationStage::Clear | ActivationStage::Fill => {
                 return self.fill(*stage, store, first, second);
             }
         }
         Ok(Progress::Checking)
     }
 
-    fn go_on(&mut self, stage: Stage) {
-        (self.stage, self.at, self.check) = (stage as u32, 0, Check::NEW);
+    fn go_on(&mut self, stage: ActivationStage) {
+        (self.stage, self.at, self.check) = (stage as u32, 0, ImageCheck::NEW);
     }
 
     /// What was found stands if it was found before; else all is checked once more.
@@ -188,14 +188,14 @@ impl Activation {
         let Some(before) = &self.confirmed else {
             self.confirmed = self.found.take();
             (self.same, self.first_refused) = (true, false);
-            self.go_on(Stage::Compare);
+            self.go_on(ActivationStage::Compare);
             return Ok(());
         };
         // Both whole, so the same if the sums are.
         if !before.is_whole() || !same(before.sums, found.sums) {
             return Err(ActivateError::Torn);
         }
-        self.go_on(Stage::Clear);
+        self.go_on(ActivationStage::Clear);
         Ok(())
     }
 
@@ -205,7 +205,7 @@ impl Activation {
         self.same &= first.len() == second.len() && (self.at..end).all(|at| first.get(at) == second.get(at));
         self.at = end;
         if end >= first.len() {
-            self.go_on(Stage::First);
+            self.go_on(ActivationStage::First);
         }
     }
 
@@ -220,7 +220,7 @@ impl Activation {
         if *table.drive() != self.drive {
             return Err(ActivateError::OtherDrive);
         }
-        let source = Source::new(&table);
+        let source = ImageSource::new(&table);
         if source.used as usize > STORE_WORDS {
             return Err(ActivateError::TooLarge { needed: source.used as usize });
         }
@@ -242,15 +242,15 @@ impl Activation {
     /// use.
     fn fill(
         &mut self,
-        stage: Stage,
+        stage: ActivationStage,
         store: &mut Store,
         first: Words<'_>,
         second: Words<'_>,
     ) -> Result<Progress, ActivateError> {
         let found = self.found.as_mut().filter(|found| found.is_whole()).ok_or(ActivateError::Torn)?;
-        if stage == Stage::Clear {
-            store.know(&Source { marks: found.source.marks & !ACTIVE, ..found.source });
-            self.stage = Stage::Fill as u32;
+        if stage == ActivationStage::Clear {
+            store.know(&ImageSource { marks: found.source.marks & !ACTIVE, ..found.source });
+            self.stage = ActivationStage::Fill as u32;
             return Ok(Progress::Filling);
         }
         let images = [if found.images & OF_SECOND == 0 { first } else { second }; 2];

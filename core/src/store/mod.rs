@@ -37,7 +37,7 @@ use crate::table::{
 };
 use crate::whole::pair;
 use copies::{Copied, SLACK, agreed};
-use source::{ACTIVE, Fresh, IN_RANGE, Sealed, Source, Strangers, TORN};
+use source::{ACTIVE, Fresh, IN_RANGE, ImageSource, SealedSource, Strangers, TORN};
 
 /// Words of a page.
 const PAGE_WORDS: usize = PAGE_BYTES / 4;
@@ -101,7 +101,7 @@ impl Damaged {
 pub struct Store {
     first: Copied,
     second: Copied,
-    source: [Sealed; 2],
+    source: [SealedSource; 2],
     /// The word that is made anew next; any that is in use is as good.
     next: u32,
     scrub: Scrub,
@@ -143,7 +143,7 @@ impl Store {
         Self {
             first: Copied::EMPTY,
             second: Copied::EMPTY,
-            source: [Sealed::EMPTY; 2],
+            source: [SealedSource::EMPTY; 2],
             next: 0,
             scrub: Scrub::START,
             damaged: Damaged::NONE,
@@ -153,7 +153,7 @@ impl Store {
     }
 
     #[inline(always)]
-    const fn source(&self) -> &Source {
+    const fn source(&self) -> &ImageSource {
         let [first, _] = &self.source;
         &first.source
     }
@@ -201,7 +201,7 @@ impl Store {
     }
 
     /// Keeps both copies of what is known of a table.
-    fn know(&mut self, source: &Source) {
+    fn know(&mut self, source: &ImageSource) {
         let sums = pair(source.sums());
         for sealed in &mut self.source {
             sealed.source = *source;
@@ -234,7 +234,7 @@ impl Store {
             (true, true) if one.sums == other.sums => return false,
             (true, _) => [one; 2],
             (false, true) => [other; 2],
-            (false, false) => [Source { marks: TORN, ..Source::EMPTY }.sealed(); 2],
+            (false, false) => [ImageSource { marks: TORN, ..ImageSource::EMPTY }.sealed(); 2],
         };
         true
     }
@@ -243,7 +243,7 @@ impl Store {
     /// Whether anything was to be done.
     pub(crate) fn mend(&mut self, images: &Images<'_>, torque_n_m: f32) -> bool {
         let mut found = self.mend_source();
-        let Source { nodes_from, records_from, record, last_torque, torque_range, .. } = *self.source();
+        let ImageSource { nodes_from, records_from, record, last_torque, torque_range, .. } = *self.source();
         found |= self.mend_words(images, 0, nodes_from as usize);
         // The axis is whole now.
         let interval = self.interval(num::within(torque_n_m, torque_range), last_torque as usize);
@@ -399,7 +399,7 @@ impl Store {
     /// Images that are not to be used: not those that were activated, or both the same.
     #[inline(always)]
     fn strangers(&self, images: &Images<'_>) -> Strangers {
-        let Source { seal, seal_at, .. } = *self.source();
+        let ImageSource { seal, seal_at, .. } = *self.source();
         let [first, second] = images.at(seal_at as usize).map(|found| found != seal);
         let once = images.is_one();
         Strangers { any: first | second | once, all: first & second | once }

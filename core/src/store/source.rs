@@ -15,7 +15,7 @@ const FIRST: usize = word::TORQUE_NODES;
 /// A copy holds the words of an image from the torque axis on, but nodes and records at one temperature only.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
-pub(super) struct Source {
+pub(super) struct ImageSource {
     pub plan: Plan,
     pub torque_range: [f32; 2],
     /// The way from the lower temperature node to the next, 0 to 1.
@@ -60,7 +60,7 @@ pub(super) const ACTIVE: u16 = 2;
 /// What was known of the table was lost: neither copy of this was whole.
 pub(super) const TORN: u16 = 4;
 
-impl Source {
+impl ImageSource {
     /// Without a table.
     pub const EMPTY: Self = Self {
         plan: Plan {
@@ -152,8 +152,8 @@ impl Source {
         }
     }
 
-    pub const fn sealed(self) -> Sealed {
-        Sealed { source: self, sums: pair(self.sums()) }
+    pub const fn sealed(self) -> SealedSource {
+        SealedSource { source: self, sums: pair(self.sums()) }
     }
 
     /// Of an accepted table, without temperature.
@@ -212,7 +212,7 @@ impl Strangers {
     pub const NONE: Self = Self { any: false, all: false };
 }
 
-impl Source {
+impl ImageSource {
     /// A word of the images, and whether it can be used: both have it, or one has it in a page that is not known to be
     /// damaged.
     ///
@@ -253,14 +253,14 @@ impl Source {
 
 /// A source with its sums.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Sealed {
-    pub source: Source,
+pub(super) struct SealedSource {
+    pub source: ImageSource,
     pub sums: [u32; 2],
 }
 
-impl Sealed {
+impl SealedSource {
     /// Without a table: all zeros.
-    pub const EMPTY: Self = Self { source: Source::EMPTY, sums: [0; 2] };
+    pub const EMPTY: Self = Self { source: ImageSource::EMPTY, sums: [0; 2] };
 
     #[inline(always)]
     pub const fn is_whole(&self) -> bool {
@@ -269,7 +269,7 @@ impl Sealed {
 }
 
 #[cfg(test)]
-crate::upset::upsets!(Source {
+crate::upset::upsets!(ImageSource {
     plan,
     torque_range,
     warm,
@@ -289,4 +289,4 @@ crate::upset::upsets!(Source {
     drive,
 });
 #[cfg(test)]
-crate::upset::upsets!(Sealed { source, sums });
+crate::upset::upsets!(SealedSource { source, sums });

@@ -38,11 +38,11 @@ pub use bounds::{Bounds, INVERSE_TOLERANCE_RAD, MAX_INVERSE_ERROR_RAD, MAX_INVER
 pub use identity::{Identity, IdentityCheck};
 #[cfg(any(test, feature = "fuzzing"))]
 pub use image::reseal;
-pub(crate) use image::{Check, MAX_AXIS_VALUE, NODE_WORDS, counted, page_intact, ripple_row, word};
 pub use image::{
     FORMAT_VERSION, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES, PAGE_BYTES, Provenance, TEXT_BYTES,
     TableData, WriteError, image_bytes, write_image,
 };
+pub(crate) use image::{ImageCheck, MAX_AXIS_VALUE, NODE_WORDS, counted, page_intact, ripple_row, word};
 pub(crate) use memory::{Doubt, Memory, Plan};
 pub use model::{Approach, Command, Prediction};
 pub(crate) use model::{Estimate, Model, departure};

@@ -41,7 +41,7 @@ pub struct Caution {
 
 /// The figures that are looked at, those that are known.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Looked {
+pub struct LookedAt {
     /// Least gap of the rigid teeth of the drawing, µm.
     pub rigid_gap_um: Option<f64>,
     /// What rigid teeth as built leave the output to turn at the tightest place of its turn, arcsec; missing of a drive
@@ -61,7 +61,7 @@ pub struct Looked {
     pub slope_bound: Option<f64>,
 }
 
-impl Looked {
+impl LookedAt {
     /// What has to be said of them; nothing of a sound drive.
     pub fn cautions(&self) -> Vec<Caution> {
         let mut cautions = Vec::new();
@@ -169,7 +169,7 @@ mod tests {
 
     #[test]
     fn each_limit_is_said_and_nothing_within_them() {
-        let sound = Looked {
+        let sound = LookedAt {
             rigid_gap_um: Some(0.0),
             room_as_built_arcsec: Some(LEAST_ROOM_ARCSEC),
             max_von_mises_mpa: Some(YIELD_MPA),
@@ -179,12 +179,13 @@ mod tests {
             slope_bound: Some(MOST_SLOPE),
         };
         assert_eq!(sound.cautions(), []);
-        let figures = |looked: Looked| looked.cautions().into_iter().map(|caution| caution.figure).collect::<Vec<_>>();
-        assert_eq!(figures(Looked { rigid_gap_um: Some(-0.11), ..sound }), ["rigid_gap_um"]);
-        assert_eq!(figures(Looked { room_as_built_arcsec: Some(-301.0), ..sound }), ["room_as_built_arcsec"]);
-        assert_eq!(figures(Looked { max_von_mises_mpa: Some(f64::NAN), ..sound }), ["max_von_mises_mpa"]);
-        assert_eq!(figures(Looked { peak_flank_pressure_mpa: Some(3001.0), ..sound }), ["peak_flank_pressure_mpa"]);
-        assert_eq!(figures(Looked { slope_bound: Some(0.6), ..sound }), ["slope_bound"]);
+        let figures =
+            |looked: LookedAt| looked.cautions().into_iter().map(|caution| caution.figure).collect::<Vec<_>>();
+        assert_eq!(figures(LookedAt { rigid_gap_um: Some(-0.11), ..sound }), ["rigid_gap_um"]);
+        assert_eq!(figures(LookedAt { room_as_built_arcsec: Some(-301.0), ..sound }), ["room_as_built_arcsec"]);
+        assert_eq!(figures(LookedAt { max_von_mises_mpa: Some(f64::NAN), ..sound }), ["max_von_mises_mpa"]);
+        assert_eq!(figures(LookedAt { peak_flank_pressure_mpa: Some(3001.0), ..sound }), ["peak_flank_pressure_mpa"]);
+        assert_eq!(figures(LookedAt { slope_bound: Some(0.6), ..sound }), ["slope_bound"]);
     }
 
     /// A nodal value of 664 MPa beside 1204 in a root fillet: the drive is no sounder for it. The larger is told, once,
@@ -192,7 +193,7 @@ mod tests {
     #[test]
     fn stress_is_judged_by_the_larger_of_nodal_and_root_fillet() {
         let told = |nodal, fillet| {
-            let looked = Looked { max_von_mises_mpa: nodal, root_fillet_mpa: fillet, ..Looked::default() };
+            let looked = LookedAt { max_von_mises_mpa: nodal, root_fillet_mpa: fillet, ..LookedAt::default() };
             looked.cautions().into_iter().map(|caution| (caution.figure, caution.value)).collect::<Vec<_>>()
         };
         assert_eq!(told(Some(664.0), Some(1204.0)), [("root_fillet_mpa", 1204.0)]);
@@ -215,7 +216,7 @@ mod tests {
             tooth: 0,
         };
         let mut cautions =
-            Looked { root_fillet_mpa: Some(1010.0), slope_bound: Some(0.9), ..Looked::default() }.cautions();
+            LookedAt { root_fillet_mpa: Some(1010.0), slope_bound: Some(0.9), ..LookedAt::default() }.cautions();
         let before = cautions.clone();
         add_stress(&mut cautions, &[at(Place::RootFillet, 990.0), at(Place::Bore, 500.0)]);
         assert_eq!(cautions, before);
@@ -230,7 +231,7 @@ mod tests {
         let mut drive = Drive::hhd_95();
         assert!(rigid_gap_um(&drive, GeneratorKind::Cam).unwrap() > 0.0);
         drive.circular_spline.profile_shift -= 0.1;
-        let looked = Looked { rigid_gap_um: rigid_gap_um(&drive, GeneratorKind::Cam), ..Looked::default() };
+        let looked = LookedAt { rigid_gap_um: rigid_gap_um(&drive, GeneratorKind::Cam), ..LookedAt::default() };
         assert_eq!(looked.cautions()[0].figure, "rigid_gap_um");
     }
 
@@ -240,10 +241,10 @@ mod tests {
         let sound = Drive::hhd_95();
         assert_eq!(room_as_built_arcsec(&sound, GeneratorKind::Cam), None);
         let beside = sound.with_set("as_built.circular_spline_offset_um=60").unwrap();
-        let looked = |drive: &Drive| Looked {
+        let looked = |drive: &Drive| LookedAt {
             rigid_gap_um: rigid_gap_um(drive, GeneratorKind::Cam),
             room_as_built_arcsec: room_as_built_arcsec(drive, GeneratorKind::Cam),
-            ..Looked::default()
+            ..LookedAt::default()
         };
         assert_eq!(looked(&beside).cautions()[0].figure, "room_as_built_arcsec");
         assert_eq!(looked(&sound.with_set("as_built.circular_spline_offset_um=5").unwrap()).cautions(), []);

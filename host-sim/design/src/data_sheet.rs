@@ -10,7 +10,7 @@
 use flexspline::{Direction, GeneratorAngle, Table};
 use serde::Serialize;
 
-use crate::cautions::{Looked, rigid_gap_um, room_as_built_arcsec};
+use crate::cautions::{LookedAt, rigid_gap_um, room_as_built_arcsec};
 use crate::pitch_wave::peak_to_peak;
 use crate::simulate::{TipContact, peak_stress};
 use flexspline_base::units::ARCSEC_PER_RAD;
@@ -206,8 +206,8 @@ impl DataSheet {
     }
 
     /// What cautions look at.
-    pub fn looked(&self) -> Looked {
-        Looked {
+    pub fn looked(&self) -> LookedAt {
+        LookedAt {
             rigid_gap_um: self.rigid_gap_um,
             room_as_built_arcsec: self.room_as_built_arcsec,
             max_von_mises_mpa: self.max_von_mises_mpa,

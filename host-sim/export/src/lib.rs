@@ -12,5 +12,5 @@ pub use inp::{Deck, DeckError, DeckSettings, Equation, EquationTerm, Face, STABI
 
 pub use outlines::{OutlinePoint, outlines};
 pub use vtu::base64;
-pub use vtu::{Frame, write_pvd, write_vtu};
+pub use vtu::{VtuFrame, write_pvd, write_vtu};
 pub use vtu_whole::write_whole_flexspline;

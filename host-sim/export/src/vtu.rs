@@ -27,7 +27,7 @@ const VTK_QUADRATIC_QUAD: u8 = 23;
 
 /// A file of a series.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Frame {
+pub struct VtuFrame {
     /// Its place in the series.
     pub step: usize,
     /// File name, relative to the `.pvd`.
@@ -103,11 +103,11 @@ pub fn write_vtu(out: &mut dyn Write, problem: &Problem, state: &State) -> io::R
 
 /// Writes the list of a series. Its time is the step: the generator angle of a reversing run comes back to where it
 /// was.
-pub fn write_pvd(out: &mut dyn Write, frames: &[Frame]) -> io::Result<()> {
+pub fn write_pvd(out: &mut dyn Write, frames: &[VtuFrame]) -> io::Result<()> {
     writeln!(out, r#"<?xml version="1.0"?>"#)?;
     writeln!(out, r#"<VTKFile type="Collection" version="1.0" byte_order="LittleEndian">"#)?;
     writeln!(out, "<Collection>")?;
-    for Frame { step, file } in frames {
+    for VtuFrame { step, file } in frames {
         writeln!(out, r#"<DataSet timestep="{step}" part="0" file="{file}"/>"#)?;
     }
     writeln!(out, "</Collection>\n</VTKFile>")
@@ -311,7 +311,8 @@ mod tests {
 
     #[test]
     fn a_series_lists_its_frames_in_order() {
-        let frames: Vec<Frame> = (0..3).map(|step| Frame { step, file: format!("frame-{step:04}.vtu") }).collect();
+        let frames: Vec<VtuFrame> =
+            (0..3).map(|step| VtuFrame { step, file: format!("frame-{step:04}.vtu") }).collect();
         let mut file = Vec::new();
         write_pvd(&mut file, &frames).unwrap();
         let text = String::from_utf8(file).unwrap();

@@ -11,7 +11,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 
-use crate::instance::{Instance, Log, Status};
+use crate::instance::{FmiStatus, Instance, Log};
 use crate::resources::folder_of;
 use crate::variables::Kind;
 
@@ -41,9 +41,9 @@ pub struct Callbacks {
 }
 
 const CO_SIMULATION: c_int = 1;
-const OK: c_int = Status::Ok as c_int;
-const DISCARD: c_int = Status::Discard as c_int;
-const ERROR: c_int = Status::Error as c_int;
+const OK: c_int = FmiStatus::Ok as c_int;
+const DISCARD: c_int = FmiStatus::Discard as c_int;
+const ERROR: c_int = FmiStatus::Error as c_int;
 
 type Shared = Arc<Mutex<Instance>>;
 static INSTANCES: Mutex<BTreeMap<usize, Shared>> = Mutex::new(BTreeMap::new());
@@ -112,7 +112,7 @@ fn with(component: Component, call: impl FnOnce(&mut Instance) -> c_int) -> c_in
     done.unwrap_or(ERROR)
 }
 
-fn status(done: Result<(), Status>) -> c_int {
+fn status(done: Result<(), FmiStatus>) -> c_int {
     done.map_or_else(|status| status as c_int, |()| OK)
 }
 
@@ -194,7 +194,8 @@ pub unsafe extern "C" fn fmi2Instantiate(
         let callbacks = unsafe { *callbacks };
         let name = unsafe { text(instance_name) }.unwrap_or_default();
         let log = log_to(callbacks, CString::new(name).unwrap_or_default());
-        let refuse = |log: &Log, what: &str| log(Status::Error, "logStatusError", &format!("fmi2Instantiate: {what}"));
+        let refuse =
+            |log: &Log, what: &str| log(FmiStatus::Error, "logStatusError", &format!("fmi2Instantiate: {what}"));
         if name.is_empty() {
             refuse(&log, "found no instance name, allowed: one that is not empty");
             return None;

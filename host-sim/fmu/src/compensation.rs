@@ -123,7 +123,7 @@ const fn mode(code: u32) -> Mode {
 }
 
 /// The joint in a simulation.
-pub struct Compensation {
+pub struct CompensationModel {
     joint: Joint,
     image: [Vec<u8>; 2],
     store: Store,
@@ -136,7 +136,7 @@ pub struct Compensation {
     direction: Direction,
 }
 
-impl Compensation {
+impl CompensationModel {
     /// With the values of its parameters and its first inputs.
     ///
     /// # Errors
@@ -208,7 +208,7 @@ fn angle<T>(rad: f64, name: &'static str, of: impl Fn(f64) -> Option<T>) -> Resu
     of(rad).ok_or(FmuError::Value { name, found: rad, allowed: "a finite angle of less than 2e9 turns" })
 }
 
-impl Model for Compensation {
+impl Model for CompensationModel {
     fn tick_s(&self, values: &[f64]) -> f64 {
         values[TICK]
     }

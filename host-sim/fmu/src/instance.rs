@@ -13,7 +13,7 @@ use std::ffi::{CStr, CString};
 use std::path::Path;
 
 use crate::FmuError;
-use crate::compensation::{self, Compensation};
+use crate::compensation::{self, CompensationModel};
 use crate::joint::{self, MovingJoint};
 use crate::resources::Resources;
 use crate::variables::{Kind, ModelKind, Role, Variable};
@@ -21,7 +21,7 @@ use crate::variables::{Kind, ModelKind, Role, Variable};
 /// `fmi2Status`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(i32)]
-pub enum Status {
+pub enum FmiStatus {
     /// Done.
     Ok = 0,
     /// Done, with a remark in the log.
@@ -66,7 +66,7 @@ impl State {
 pub const CATEGORIES: [&str; 3] = ["logStatusError", "logStatusWarning", "logEvents"];
 
 /// Takes a line: status, category, text.
-pub type Log = Box<dyn Fn(Status, &str, &str) + Send>;
+pub type Log = Box<dyn Fn(FmiStatus, &str, &str) + Send>;
 
 /// The values of a tick.
 pub struct Inputs<'a> {
@@ -113,7 +113,7 @@ pub trait Model: Send {
 
 fn made(resources: &Resources, values: &[f64]) -> Result<Box<dyn Model>, FmuError> {
     Ok(match resources.kind {
-        ModelKind::Compensation => Box::new(Compensation::new(resources, values)?),
+        ModelKind::Compensation => Box::new(CompensationModel::new(resources, values)?),
         ModelKind::Joint => Box::new(MovingJoint::new(resources, values)?),
     })
 }
@@ -181,23 +181,23 @@ impl Instance {
     }
 
     /// Says in the log that something is refused.
-    pub fn refuse(&self, what: &str) -> Status {
-        (self.log)(Status::Error, CATEGORIES[0], what);
-        Status::Error
+    pub fn refuse(&self, what: &str) -> FmiStatus {
+        (self.log)(FmiStatus::Error, CATEGORIES[0], what);
+        FmiStatus::Error
     }
 
-    fn warn(&self, what: &str) -> Status {
-        (self.log)(Status::Warning, CATEGORIES[1], what);
-        Status::Warning
+    fn warn(&self, what: &str) -> FmiStatus {
+        (self.log)(FmiStatus::Warning, CATEGORIES[1], what);
+        FmiStatus::Warning
     }
 
     fn tell(&self, what: &str) {
         if self.logging[2] {
-            (self.log)(Status::Ok, CATEGORIES[2], what);
+            (self.log)(FmiStatus::Ok, CATEGORIES[2], what);
         }
     }
 
-    fn expect(&self, call: &str, allowed: &[State]) -> Result<(), Status> {
+    fn expect(&self, call: &str, allowed: &[State]) -> Result<(), FmiStatus> {
         if allowed.contains(&self.state) {
             return Ok(());
         }
@@ -209,7 +209,7 @@ impl Instance {
         )))
     }
 
-    fn variable(&self, call: &str, reference: u32) -> Result<&'static Variable, Status> {
+    fn variable(&self, call: &str, reference: u32) -> Result<&'static Variable, FmiStatus> {
         let variables = self.resources.kind.variables();
         variables.get(reference as usize).ok_or_else(|| {
             self.refuse(&format!("{call}: found value reference {reference}, allowed: 0 to {}", variables.len() - 1))
@@ -217,7 +217,7 @@ impl Instance {
     }
 
     /// `fmi2SetDebugLogging`: all categories, or those named.
-    pub(crate) fn set_logging(&mut self, on: bool, categories: &[&str]) -> Status {
+    pub(crate) fn set_logging(&mut self, on: bool, categories: &[&str]) -> FmiStatus {
         let unknown = categories.iter().find(|category| !CATEGORIES.contains(category));
         if let Some(unknown) = unknown {
             let allowed = CATEGORIES.join(", ");
@@ -228,11 +228,11 @@ impl Instance {
                 *logged = on;
             }
         }
-        Status::Ok
+        FmiStatus::Ok
     }
 
     /// `fmi2SetupExperiment`.
-    pub fn set_up(&mut self, start_s: f64, stop_s: Option<f64>) -> Result<(), Status> {
+    pub fn set_up(&mut self, start_s: f64, stop_s: Option<f64>) -> Result<(), FmiStatus> {
         self.expect("fmi2SetupExperiment", &[State::Instantiated])?;
         if !start_s.is_finite() || stop_s.is_some_and(|stop_s| !(stop_s >= start_s && stop_s.is_finite())) {
             let stop = stop_s.map_or(String::new(), |stop_s| format!(" to {stop_s}"));
@@ -246,7 +246,7 @@ impl Instance {
     }
 
     /// `fmi2EnterInitializationMode`.
-    pub(crate) fn enter_initialization(&mut self) -> Result<(), Status> {
+    pub(crate) fn enter_initialization(&mut self) -> Result<(), FmiStatus> {
         self.expect("fmi2EnterInitializationMode", &[State::Instantiated])?;
         self.state = State::Initializing;
         if self.set_up {
@@ -256,7 +256,7 @@ impl Instance {
     }
 
     /// `fmi2ExitInitializationMode`: the model is made of the parameters.
-    pub(crate) fn exit_initialization(&mut self) -> Result<(), Status> {
+    pub(crate) fn exit_initialization(&mut self) -> Result<(), FmiStatus> {
         self.expect("fmi2ExitInitializationMode", &[State::Initializing])?;
         self.model = Some(
             made(&self.resources, &self.values)
@@ -279,7 +279,7 @@ impl Instance {
     }
 
     /// `fmi2Terminate`.
-    pub(crate) fn terminate(&mut self) -> Result<(), Status> {
+    pub(crate) fn terminate(&mut self) -> Result<(), FmiStatus> {
         self.expect("fmi2Terminate", &[State::Stepping, State::Failed])?;
         self.state = State::Terminated;
         Ok(())
@@ -296,7 +296,7 @@ impl Instance {
     }
 
     /// Reads values of a type.
-    pub fn get(&mut self, call: &str, like: fn(Kind) -> bool, references: &[u32]) -> Result<Vec<f64>, Status> {
+    pub fn get(&mut self, call: &str, like: fn(Kind) -> bool, references: &[u32]) -> Result<Vec<f64>, FmiStatus> {
         self.expect(call, &[State::Initializing, State::Stepping, State::Failed, State::Terminated])?;
         if self.state == State::Initializing {
             self.start_outputs();
@@ -305,13 +305,13 @@ impl Instance {
     }
 
     /// Reads the only text that there is.
-    pub(crate) fn get_text(&self, call: &str, reference: u32) -> Result<&CStr, Status> {
+    pub(crate) fn get_text(&self, call: &str, reference: u32) -> Result<&CStr, FmiStatus> {
         self.expect(call, &[State::Initializing, State::Stepping, State::Failed, State::Terminated])?;
         self.place(call, |kind| kind == Kind::Text, reference).map(|_| self.table_id.as_c_str())
     }
 
     /// Sets values of a type: all of them, or none.
-    pub fn set(&mut self, call: &str, like: fn(Kind) -> bool, set: &[(u32, f64)]) -> Result<(), Status> {
+    pub fn set(&mut self, call: &str, like: fn(Kind) -> bool, set: &[(u32, f64)]) -> Result<(), FmiStatus> {
         self.expect(call, &[State::Instantiated, State::Initializing, State::Stepping])?;
         for &(reference, value) in set {
             let place = self.place(call, like, reference)?;
@@ -339,7 +339,7 @@ impl Instance {
         Ok(())
     }
 
-    fn place(&self, call: &str, like: fn(Kind) -> bool, reference: u32) -> Result<usize, Status> {
+    fn place(&self, call: &str, like: fn(Kind) -> bool, reference: u32) -> Result<usize, FmiStatus> {
         let variable = self.variable(call, reference)?;
         if like(variable.kind) {
             return Ok(reference as usize);
@@ -348,7 +348,7 @@ impl Instance {
     }
 
     /// `fmi2SetRealInputDerivatives`: of the first order, for the next step.
-    pub(crate) fn set_slopes(&mut self, set: &[(u32, i32, f64)]) -> Result<(), Status> {
+    pub(crate) fn set_slopes(&mut self, set: &[(u32, i32, f64)]) -> Result<(), FmiStatus> {
         let call = "fmi2SetRealInputDerivatives";
         self.expect(call, &[State::Instantiated, State::Initializing, State::Stepping])?;
         for &(reference, order, value) in set {
@@ -365,7 +365,7 @@ impl Instance {
     }
 
     /// `fmi2DoStep`: all ticks that end within it.
-    pub fn step(&mut self, from_s: f64, step_s: f64) -> Result<(), Status> {
+    pub fn step(&mut self, from_s: f64, step_s: f64) -> Result<(), FmiStatus> {
         let call = "fmi2DoStep";
         self.expect(call, &[State::Stepping])?;
         let Some(mut model) = self.model.take() else { return Err(self.refuse("fmi2DoStep: no model")) };
@@ -374,7 +374,7 @@ impl Instance {
         done
     }
 
-    fn ticked(&mut self, call: &str, model: &mut dyn Model, from_s: f64, step_s: f64) -> Result<(), Status> {
+    fn ticked(&mut self, call: &str, model: &mut dyn Model, from_s: f64, step_s: f64) -> Result<(), FmiStatus> {
         let tick_s = model.tick_s(&self.values);
         let slack_s = SLACK * tick_s + 1e-12 * from_s.abs();
         let to_s = from_s + step_s;

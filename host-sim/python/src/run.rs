@@ -25,7 +25,7 @@ const MOMENT: Duration = Duration::from_millis(400);
 
 /// How far the work is, and whether it should go on.
 #[derive(Clone, Default)]
-pub struct Watch {
+pub struct RunWatch {
     stop: Arc<AtomicBool>,
     told: Arc<Mutex<Option<(usize, usize, String)>>>,
 }
@@ -33,7 +33,7 @@ pub struct Watch {
 /// What unwinds from work that can stop in no other way.
 struct Stopped;
 
-impl Watch {
+impl RunWatch {
     /// `done` of `total` parts are done; breaks if the work is to stop.
     pub fn tell(&self, done: usize, total: usize, note: String) -> ControlFlow<()> {
         *self.told.lock().unwrap_or_else(PoisonError::into_inner) = Some((done, total, note));
@@ -58,7 +58,7 @@ pub fn run<R: Send + 'static>(
     py: Python<'_>,
     threads: Option<usize>,
     progress: Option<&Bound<'_, PyAny>>,
-    work: impl FnOnce(&Watch) -> Result<R, Failure> + Send + 'static,
+    work: impl FnOnce(&RunWatch) -> Result<R, Failure> + Send + 'static,
 ) -> PyResult<R> {
     if threads.is_some_and(|threads| !(1..=1024).contains(&threads)) {
         return Err(bad(format!("threads: found {}, allowed: 1 to 1024", threads.unwrap_or_default())));
@@ -67,7 +67,7 @@ pub fn run<R: Send + 'static>(
         .num_threads(threads.unwrap_or(0))
         .build()
         .map_err(|error| Failure::NotConverged(format!("cannot start threads: {error}")))?;
-    let watch = Watch::default();
+    let watch = RunWatch::default();
     let (send, receive) = channel::<Result<Result<R, Failure>, Box<dyn Any + Send>>>();
     let works = watch.clone();
     thread::spawn(move || {
@@ -98,7 +98,7 @@ pub fn run<R: Send + 'static>(
     }
 }
 
-fn tell(progress: Option<&Bound<'_, PyAny>>, watch: &Watch) -> PyResult<()> {
+fn tell(progress: Option<&Bound<'_, PyAny>>, watch: &RunWatch) -> PyResult<()> {
     if let (Some(progress), Some(now)) = (progress, watch.news()) {
         progress.call1(now)?;
     }

@@ -2,7 +2,7 @@
 
 use flexspline_sim::mesh::MeshLevel;
 use flexspline_sim::stepping::{Method, SolverSettings};
-use flexspline_sim::study::{Constraint, Sense, StudyError, StudySettings, Target, Vary, study as run_study};
+use flexspline_sim::study::{Constraint, Sense, StudyError, StudySettings, StudyTarget, Vary, study as run_study};
 use pyo3::prelude::*;
 
 use crate::drive::{Drive, generator};
@@ -38,8 +38,8 @@ pub fn study(
     if !(4..=32).contains(&positions) {
         return Err(bad(format!("positions: found {positions}, allowed: 4 to 32")));
     }
-    let least = least.iter().map(|name| Target::new(name, Sense::Least).map_err(bad));
-    let most = most.iter().map(|name| Target::new(name, Sense::Most).map_err(bad));
+    let least = least.iter().map(|name| StudyTarget::new(name, Sense::Least).map_err(bad));
+    let most = most.iter().map(|name| StudyTarget::new(name, Sense::Most).map_err(bad));
     let settings = StudySettings {
         vary: vary.iter().map(|text| text.parse::<Vary>().map_err(bad)).collect::<PyResult<_>>()?,
         spread: variants,

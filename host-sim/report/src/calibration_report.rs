@@ -3,7 +3,7 @@
 use serde_json::{Map, json};
 
 use super::page::{
-    Axis, Block, Choice, Detail, EVERY_CHOICE, Figure, FigureBody, Headline, Lines, Mark, Page, Quantity, Section,
+    Axis, Block, Choice, Detail, EVERY_CHOICE, Figure, FigureBody, Headline, Lines, Mark, Page, PageQuantity, Section,
     Series, Status, Table, Text,
 };
 use flexspline_identify::calibrate::{Calibrated, Calibration};
@@ -96,8 +96,8 @@ fn left(made: &Calibrated) -> Section {
         caption: Text::new("Rows in steady motion, before and after; here the table has seen all of them."),
         alt: "The measured error and what the table leaves of it, over turns of the output".to_owned(),
         body: FigureBody::Lines {
-            x: Axis::new("Output", Quantity::Turn),
-            y: Axis::new("Error", Quantity::Error),
+            x: Axis::new("Output", PageQuantity::Turn),
+            y: Axis::new("Error", PageQuantity::Error),
             charts: vec![(EVERY_CHOICE.to_owned(), lines)],
         },
     };

@@ -4,7 +4,7 @@
 use serde_json::{Map, json};
 
 use super::page::{
-    Axis, Block, Choice, Detail, Figure, FigureBody, Headline, Limit, Lines, Mark, Page, Quantity, Section, Series,
+    Axis, Block, Choice, Detail, Figure, FigureBody, Headline, Limit, Lines, Mark, Page, PageQuantity, Section, Series,
     Status, Table, Text, Upright, significant,
 };
 use super::study_report::{heading, value};
@@ -17,7 +17,7 @@ const CURVE: usize = 200;
 const WORST: usize = 20;
 
 /// What the page is made from.
-pub struct Sources<'a> {
+pub struct CampaignSources<'a> {
     /// The plan.
     pub plan: &'a Plan,
     /// The beginning of its hash.
@@ -31,8 +31,8 @@ pub struct Sources<'a> {
 }
 
 /// The page.
-pub fn page(of: Sources<'_>) -> Page {
-    let Sources { plan, campaign, .. } = of;
+pub fn page(of: CampaignSources<'_>) -> Page {
+    let CampaignSources { plan, campaign, .. } = of;
     let all = &campaign.generators;
     let mut remarks = Vec::new();
     if !campaign.missing.is_empty() {
@@ -130,7 +130,7 @@ fn headline(one: &OfGenerator) -> Headline {
 }
 
 /// A table for each generator.
-fn tables(of: &Sources<'_>, make: impl Fn(&OfGenerator) -> Table) -> Vec<Block> {
+fn tables(of: &CampaignSources<'_>, make: impl Fn(&OfGenerator) -> Table) -> Vec<Block> {
     let block = |one: &OfGenerator| Block::Table { choice: Some(one.generator.to_string()), table: make(one) };
     of.campaign
         .generators
@@ -157,7 +157,7 @@ fn percents(low: f64, high: f64) -> Text {
     Text::new(format!("{} to {}", percent(low), percent(high)))
 }
 
-fn scatter(of: &Sources<'_>) -> Section {
+fn scatter(of: &CampaignSources<'_>) -> Section {
     let charts = of
         .campaign
         .generators
@@ -183,8 +183,8 @@ fn scatter(of: &Sources<'_>) -> Section {
         caption: Text::new("Error under the load, peak to peak over a turn of the output."),
         alt: "Share of the drives over the error that they stay below".to_owned(),
         body: FigureBody::Lines {
-            x: Axis::new("error, peak to peak", Quantity::Error),
-            y: Axis::new("drives below, %", Quantity::Count),
+            x: Axis::new("error, peak to peak", PageQuantity::Error),
+            y: Axis::new("drives below, %", PageQuantity::Count),
             charts,
         },
     };
@@ -225,7 +225,7 @@ fn scatter(of: &Sources<'_>) -> Section {
     Section { id: "scatter".to_owned(), title: "How the drives scatter".to_owned(), detail: Detail::Summary, blocks }
 }
 
-fn left(of: &Sources<'_>) -> Section {
+fn left(of: &CampaignSources<'_>) -> Section {
     let blocks = tables(of, |one| {
         let rows = [
             ("no table", "no_table_rms_arcsec"),
@@ -248,7 +248,7 @@ fn left(of: &Sources<'_>) -> Section {
     Section { id: "left".to_owned(), title: "What tables leave".to_owned(), detail: Detail::Summary, blocks }
 }
 
-fn tighten(of: &Sources<'_>) -> Section {
+fn tighten(of: &CampaignSources<'_>) -> Section {
     let blocks = SHARED.iter().flat_map(|figure| tables(of, |one| ranking(of.plan, one, figure))).collect();
     Section { id: "tighten".to_owned(), title: "What to tighten first".to_owned(), detail: Detail::Summary, blocks }
 }
@@ -279,7 +279,7 @@ fn ranking(plan: &Plan, one: &OfGenerator, figure: &str) -> Table {
     }
 }
 
-fn shares(of: &Sources<'_>) -> Section {
+fn shares(of: &CampaignSources<'_>) -> Section {
     let mut blocks = Vec::new();
     for (k, figure) in SHARED.iter().enumerate() {
         blocks.extend(tables(of, |one| {
@@ -303,7 +303,7 @@ fn shares(of: &Sources<'_>) -> Section {
     Section { id: "shares".to_owned(), title: "What makes the scatter".to_owned(), detail: Detail::Summary, blocks }
 }
 
-fn by_fem(of: &Sources<'_>) -> Option<Section> {
+fn by_fem(of: &CampaignSources<'_>) -> Option<Section> {
     let all = &of.campaign.generators;
     if all.iter().all(|one| one.fem.is_none()) {
         return None;
@@ -330,8 +330,8 @@ fn by_fem(of: &Sources<'_>) -> Option<Section> {
         )),
         alt: "Error of drives by FEM over that by kernels".to_owned(),
         body: FigureBody::Lines {
-            x: Axis::new("by kernels", Quantity::Error),
-            y: Axis::new("by FEM", Quantity::Error),
+            x: Axis::new("by kernels", PageQuantity::Error),
+            y: Axis::new("by FEM", PageQuantity::Error),
             charts,
         },
     };
@@ -402,7 +402,7 @@ fn by_fem(of: &Sources<'_>) -> Option<Section> {
     Some(Section { id: "fem".to_owned(), title: "Kernels beside FEM".to_owned(), detail: Detail::Engineering, blocks })
 }
 
-fn worst(of: &Sources<'_>) -> Section {
+fn worst(of: &CampaignSources<'_>) -> Section {
     let blocks = tables(of, |one| {
         let header = ["Drive", "error", "file"].into_iter().map(str::to_owned);
         let rows = one.worst.iter().take(WORST).map(|w| {
@@ -423,7 +423,7 @@ fn worst(of: &Sources<'_>) -> Section {
     Section { id: "worst".to_owned(), title: "The worst drives".to_owned(), detail: Detail::Engineering, blocks }
 }
 
-fn tolerances(of: &Sources<'_>) -> Section {
+fn tolerances(of: &CampaignSources<'_>) -> Section {
     let row = |t: &flexspline_design::campaign::Tolerance| {
         vec![Text::new(t.name.clone()), Text::new(t.field.clone()), Text::new(t.distribution.to_string())]
     };

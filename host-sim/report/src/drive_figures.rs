@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use super::animation::{Animation, FRAMES};
 use super::page::{
-    Axis, Block, Detail, Figure, FigureBody, Lines, Mark, Quantity, Section, Series, Table as PageTable, Text,
+    Axis, Block, Detail, Figure, FigureBody, Lines, Mark, PageQuantity, Section, Series, Table as PageTable, Text,
     significant,
 };
 use flexspline_design::cautions::Caution;
@@ -128,7 +128,7 @@ pub(super) fn stress_figure(charts: Vec<(String, Lines)>) -> Figure {
         alt: "Curves of the largest stress and contact pressures over one tooth pitch".into(),
         body: FigureBody::Lines {
             x: Axis::linked("Generator from the beginning of a pitch"),
-            y: Axis::new("Stress, pressure", Quantity::Stress),
+            y: Axis::new("Stress, pressure", PageQuantity::Stress),
             charts,
         },
     }
@@ -166,8 +166,8 @@ pub(super) fn sharing_figure(charts: Vec<(String, Lines)>) -> Figure {
         ),
         alt: "Curves of the force on a tooth over its angle from the major axis".into(),
         body: FigureBody::Lines {
-            x: Axis::new("Tooth from the major axis", Quantity::Degree),
-            y: Axis::new("Force", Quantity::Force),
+            x: Axis::new("Tooth from the major axis", PageQuantity::Degree),
+            y: Axis::new("Force", PageQuantity::Force),
             charts,
         },
     }

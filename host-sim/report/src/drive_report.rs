@@ -12,7 +12,7 @@ use super::drive_figures::{
     stress_figure, stress_lines,
 };
 use super::page::{
-    Axis, Block, Choice, Detail, Field, Figure, FigureBody, Headline, Limit, Lines, Mark, Page, Quantity, Section,
+    Axis, Block, Choice, Detail, Field, Figure, FigureBody, Headline, Limit, Lines, Mark, Page, PageQuantity, Section,
     Series, Status, Table as PageTable, Text, significant,
 };
 use flexspline_base::units::ARCSEC_PER_RAD;
@@ -27,7 +27,7 @@ const POSITIONS: usize = 48;
 const BETWEEN_NODES: usize = 4;
 
 /// A table and what is known of it.
-pub struct Subject<'a> {
+pub struct DriveSubject<'a> {
     /// Which generator.
     pub kind: GeneratorKind,
     /// The table.
@@ -43,7 +43,7 @@ pub struct Subject<'a> {
 }
 
 /// What the page is made from.
-pub struct Sources<'a> {
+pub struct DriveSources<'a> {
     /// The drive.
     pub drive: &'a Drive,
     /// `tables` or `validate`.
@@ -53,7 +53,7 @@ pub struct Sources<'a> {
     /// What made it beside the drive: name and value.
     pub inputs: Vec<(String, String)>,
     /// The tables.
-    pub subjects: Vec<Subject<'a>>,
+    pub subjects: Vec<DriveSubject<'a>>,
 }
 
 /// The load at which a drive is shown in motion: half of what its table spans.
@@ -72,7 +72,7 @@ fn torque_text(torque_n_m: f32) -> String {
 
 /// A subject with what is derived from it.
 struct DriveKnown<'a> {
-    subject: Subject<'a>,
+    subject: DriveSubject<'a>,
     drive: &'a Drive,
     /// Temperature of curves, °C: the drive's reference, within the table's range.
     temperature: f32,
@@ -82,7 +82,7 @@ struct DriveKnown<'a> {
 }
 
 impl<'a> DriveKnown<'a> {
-    fn new(subject: Subject<'a>, drive: &'a Drive) -> DriveKnown<'a> {
+    fn new(subject: DriveSubject<'a>, drive: &'a Drive) -> DriveKnown<'a> {
         let [cold, warm] = subject.table.temperature_range_c();
         let temperature = (drive.temperature.reference_c as f32).clamp(cold, warm);
         let mut known = DriveKnown { subject, drive, temperature, fresh: None, largest_error: 0.0 };
@@ -348,8 +348,8 @@ fn reversal(v: &Validation) -> Lines {
 }
 
 /// The page.
-pub fn drive_report(sources: Sources<'_>) -> Page {
-    let Sources { drive, command_name, command, inputs, subjects } = sources;
+pub fn drive_report(sources: DriveSources<'_>) -> Page {
+    let DriveSources { drive, command_name, command, inputs, subjects } = sources;
     let known: Vec<DriveKnown<'_>> = subjects.into_iter().map(|subject| DriveKnown::new(subject, drive)).collect();
     let (status, remarks) = judge(&known);
     let validated = known.iter().any(|k| k.subject.validation.is_some());
@@ -608,7 +608,7 @@ fn comparison(known: &[DriveKnown<'_>], validated: bool) -> Section {
 /// The load, stretched about the drag, where the loaded flank changes.
 fn load_axis(known: &[DriveKnown<'_>]) -> Axis {
     let drag = known.first().map_or(0.02, |k| k.drive.output.drag_torque_n_m);
-    Axis::new("Load torque (stretched about zero)", Quantity::Torque).stretched(drag.max(1e-3))
+    Axis::new("Load torque (stretched about zero)", PageQuantity::Torque).stretched(drag.max(1e-3))
 }
 
 fn charts(known: &[DriveKnown<'_>], of: impl Fn(&DriveKnown<'_>) -> Option<Lines>) -> Vec<(String, Lines)> {
@@ -627,7 +627,7 @@ fn motion_section(known: &[DriveKnown<'_>]) -> Section {
         alt: "Curves of the output error over one tooth pitch of the generator".into(),
         body: FigureBody::Lines {
             x: Axis::linked("Generator from the beginning of a pitch"),
-            y: Axis::new("Output error less mean", Quantity::Error),
+            y: Axis::new("Output error less mean", PageQuantity::Error),
             charts: charts(known, |k| Some(k.ripple())),
         },
     };
@@ -641,8 +641,8 @@ fn motion_section(known: &[DriveKnown<'_>]) -> Section {
         ),
         alt: "Curves of the mean output error over the load torque, forward and backward".into(),
         body: FigureBody::Lines {
-            x: Axis::new("Load torque", Quantity::Torque),
-            y: Axis::new("Output error", Quantity::Error),
+            x: Axis::new("Load torque", PageQuantity::Torque),
+            y: Axis::new("Output error", PageQuantity::Error),
             charts: charts(known, |k| Some(k.wind_up())),
         },
     };
@@ -664,7 +664,7 @@ fn validation_section(known: &[DriveKnown<'_>]) -> Section {
             title: title.into(),
             caption: Text::new(caption),
             alt: title.into(),
-            body: FigureBody::Lines { x, y: Axis::new("Table less FEM", Quantity::Error), charts },
+            body: FigureBody::Lines { x, y: Axis::new("Table less FEM", PageQuantity::Error), charts },
         })
     };
     let mut blocks: Vec<Block> = known
@@ -700,7 +700,7 @@ fn validation_section(known: &[DriveKnown<'_>]) -> Section {
         "miss-temperature",
         "Table less fresh FEM, over the temperature",
         "The same points.",
-        Axis::new("Temperature", Quantity::Temperature),
+        Axis::new("Temperature", PageQuantity::Temperature),
         of("steady", |p| p.temperature_c),
     ));
     blocks.push(Block::Figure(Figure {
@@ -712,8 +712,8 @@ fn validation_section(known: &[DriveKnown<'_>]) -> Section {
         ),
         alt: "Output error while the generator reverses, by table and by FEM".into(),
         body: FigureBody::Lines {
-            x: Axis::new("Generator travel", Quantity::Degree),
-            y: Axis::new("Output error", Quantity::Error),
+            x: Axis::new("Generator travel", PageQuantity::Degree),
+            y: Axis::new("Output error", PageQuantity::Error),
             charts: charts(known, |k| k.subject.validation.map(reversal)),
         },
     }));
@@ -733,7 +733,7 @@ fn table_section(known: &[DriveKnown<'_>]) -> Section {
             alt: "Curves of the difference between backward and forward error over the load torque".into(),
             body: FigureBody::Lines {
                 x: load_axis(known),
-                y: Axis::new("Backward less forward", Quantity::Error),
+                y: Axis::new("Backward less forward", PageQuantity::Error),
                 charts: charts(known, |k| Some(k.play())),
             },
         }),
@@ -745,9 +745,9 @@ fn table_section(known: &[DriveKnown<'_>]) -> Section {
             ),
             alt: "Colour map of the output error over generator angle within a pitch and load torque".into(),
             body: FigureBody::Field {
-                x: Axis::new("Generator from the beginning of a pitch", Quantity::Degree),
-                y: Axis::new("Load torque", Quantity::Torque),
-                z: Axis::new("Output error less mean", Quantity::Error),
+                x: Axis::new("Generator from the beginning of a pitch", PageQuantity::Degree),
+                y: Axis::new("Load torque", PageQuantity::Torque),
+                z: Axis::new("Output error less mean", PageQuantity::Error),
                 fields: known.iter().map(|k| (k.id(), k.map())).collect(),
             },
         }),
@@ -764,7 +764,7 @@ fn table_section(known: &[DriveKnown<'_>]) -> Section {
             alt: "Points of the deviation of the table from its samples over the load torque".into(),
             body: FigureBody::Lines {
                 x: load_axis(known),
-                y: Axis::new("Table less sample", Quantity::Error),
+                y: Axis::new("Table less sample", PageQuantity::Error),
                 charts: residuals,
             },
         }));

@@ -7,7 +7,7 @@ use flexspline_motion::loops::OpenLoop;
 use serde_json::{Map, json};
 
 use super::page::{
-    Axis, Block, Choice, Detail, EVERY_CHOICE, Figure, FigureBody, Headline, Limit, Lines, Mark, Page, Quantity,
+    Axis, Block, Choice, Detail, EVERY_CHOICE, Figure, FigureBody, Headline, Limit, Lines, Mark, Page, PageQuantity,
     Section, Series, Status, Table, Text, Upright,
 };
 use flexspline_fly::fly::{ByController, Flown, LEAST_DISTANCE, LEAST_PHASE_MARGIN_DEG, Results, spectrum};
@@ -106,7 +106,7 @@ fn tracking(flight: &Flight, results: &Results) -> Section {
             caption: Text::new(caption),
             alt: format!("{title}, a curve to each controller"),
             body: FigureBody::Lines {
-                x: Axis::new("Time", Quantity::Second),
+                x: Axis::new("Time", PageQuantity::Second),
                 y,
                 charts: vec![(EVERY_CHOICE.to_owned(), Lines { series, ..Lines::default() })],
             },
@@ -122,14 +122,14 @@ fn tracking(flight: &Flight, results: &Results) -> Section {
                 "error",
                 "Error over time",
                 "Output less target. All controllers fly the same unit under the same sky.",
-                Axis::new("Error", Quantity::Error),
+                Axis::new("Error", PageQuantity::Error),
                 over_time(1),
             ),
             figure(
                 "mesh",
                 "Torque in the mesh",
                 "What the flanks carry: load, drag, and what inertia asks for.",
-                Axis::new("Torque", Quantity::Torque),
+                Axis::new("Torque", PageQuantity::Torque),
                 over_time(2),
             ),
         ],
@@ -177,8 +177,8 @@ fn details(flown: &Flown, flight: &Flight, results: &Results) -> Section {
         caption: Text::new("Amplitude of lines, from windows of 4 s."),
         alt: "Amplitude of the error over frequency, a curve to each controller".to_owned(),
         body: FigureBody::Lines {
-            x: Axis::new("Frequency, Hz", Quantity::Count),
-            y: Axis::new("Amplitude", Quantity::Error),
+            x: Axis::new("Frequency, Hz", PageQuantity::Count),
+            y: Axis::new("Amplitude", PageQuantity::Error),
             charts: vec![(EVERY_CHOICE.to_owned(), Lines { series, ..Lines::default() })],
         },
     };
@@ -229,7 +229,7 @@ fn servo(flown: &Flown, flight: &Flight, results: &Results) -> Section {
             caption: Text::new(caption),
             alt: format!("{title} over frequency, with its margins: {margin_in_words}"),
             body: FigureBody::Lines {
-                x: Axis::new("Frequency, Hz", Quantity::Count).stretched(1.0),
+                x: Axis::new("Frequency, Hz", PageQuantity::Count).stretched(1.0),
                 y,
                 charts: vec![(
                     EVERY_CHOICE.to_owned(),
@@ -275,8 +275,8 @@ fn servo(flown: &Flown, flight: &Flight, results: &Results) -> Section {
         ),
         alt: format!("The open loop beside the point −1; least distance {:.2}", results.servo_distance),
         body: FigureBody::Lines {
-            x: Axis::new("Real part", Quantity::Count),
-            y: Axis::new("Imaginary part", Quantity::Count),
+            x: Axis::new("Real part", PageQuantity::Count),
+            y: Axis::new("Imaginary part", PageQuantity::Count),
             charts: vec![(EVERY_CHOICE.to_owned(), Lines { series: in_plane, ..Lines::default() })],
         },
     });
@@ -290,7 +290,7 @@ fn servo(flown: &Flown, flight: &Flight, results: &Results) -> Section {
                 "Gain of the servo's open loop",
                 "Motor, load and servo with the delay of its ticks. Where the gain is 1 (0 dB) the phase margin is \
                  taken.",
-                Axis::new("Gain, dB", Quantity::Count),
+                Axis::new("Gain, dB", PageQuantity::Count),
                 line(|at| 20.0 * at.size().log10()),
                 vec![limit("0 dB", 0.0)],
             ),
@@ -298,7 +298,7 @@ fn servo(flown: &Flown, flight: &Flight, results: &Results) -> Section {
                 "bode-phase",
                 "Phase of the servo's open loop",
                 "The phase margin is what is left to −180° where the gain is 1.",
-                Axis::new("Phase", Quantity::Degree),
+                Axis::new("Phase", PageQuantity::Degree),
                 line(OpenLoop::phase_deg),
                 vec![limit("−180°", -180.0), limit(&format!("{LEAST_PHASE_MARGIN_DEG}° of margin"), sound_deg)],
             ),

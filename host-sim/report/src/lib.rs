@@ -24,6 +24,6 @@ pub mod study_report;
 mod svg;
 
 pub use animation::{Animation, AnimationError};
-pub use drive_report::{Sources, Subject, drive_report, shown_torque_n_m};
+pub use drive_report::{DriveSources, DriveSubject, drive_report, shown_torque_n_m};
 pub use pack::Packed;
 pub use simulation_report::{Seen, simulation_report};

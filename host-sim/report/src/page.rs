@@ -8,7 +8,7 @@
 //! - [`Section`]s hold text, tables and [`Figure`]s, at one of three levels of [`Detail`]. Figures are numbered in
 //!   their order.
 //! - Errors of the output are stored in arc-seconds and shown in the unit that the reader picks: give them as
-//!   [`Text::error`] in text, and as [`Quantity::Error`] on an axis.
+//!   [`Text::error`] in text, and as [`PageQuantity::Error`] on an axis.
 //! - A [`FigureBody::Drive`] shows the [`Animation`]s of the page. Charts whose x axis is marked [`Axis::linked`] turn
 //!   its generator, and are turned by it.
 
@@ -305,7 +305,7 @@ pub enum FigureBody {
 /// Kinds of values, which decide the unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Quantity {
+pub enum PageQuantity {
     /// Small angle at the output, stored in arcsec, shown in what the reader picks.
     Error,
     /// Angle, degrees.
@@ -330,20 +330,20 @@ pub enum Quantity {
     Whole,
 }
 
-impl Quantity {
+impl PageQuantity {
     /// Unit as stored, for headings of CSV columns and static pictures.
     pub(crate) fn stored_unit(self) -> &'static str {
         match self {
-            Quantity::Error => "arcsec",
-            Quantity::Degree => "°",
-            Quantity::Torque => "N·m",
-            Quantity::Stress => "MPa",
-            Quantity::Force => "N",
-            Quantity::Temperature => "°C",
-            Quantity::Second => "s",
-            Quantity::Turn => "turns",
-            Quantity::Speed => "rad/s",
-            Quantity::Count | Quantity::Whole => "",
+            PageQuantity::Error => "arcsec",
+            PageQuantity::Degree => "°",
+            PageQuantity::Torque => "N·m",
+            PageQuantity::Stress => "MPa",
+            PageQuantity::Force => "N",
+            PageQuantity::Temperature => "°C",
+            PageQuantity::Second => "s",
+            PageQuantity::Turn => "turns",
+            PageQuantity::Speed => "rad/s",
+            PageQuantity::Count | PageQuantity::Whole => "",
         }
     }
 }
@@ -354,7 +354,7 @@ pub struct Axis {
     /// Its title, without unit.
     pub label: String,
     /// What it measures.
-    pub quantity: Quantity,
+    pub quantity: PageQuantity,
     /// Whether it is the generator angle from a pitch's beginning, and linked with the drive.
     pub linked: bool,
     /// Linear between minus and plus this, logarithmic beyond, for what changes most around zero.
@@ -363,13 +363,13 @@ pub struct Axis {
 
 impl Axis {
     /// An axis of its own.
-    pub fn new(label: impl Into<String>, quantity: Quantity) -> Axis {
+    pub fn new(label: impl Into<String>, quantity: PageQuantity) -> Axis {
         Axis { label: label.into(), quantity, linked: false, stretched: None }
     }
 
     /// The generator angle over a pitch, degrees, linked with the drive.
     pub fn linked(label: impl Into<String>) -> Axis {
-        Axis { label: label.into(), quantity: Quantity::Degree, linked: true, stretched: None }
+        Axis { label: label.into(), quantity: PageQuantity::Degree, linked: true, stretched: None }
     }
 
     /// This axis, linear within `within` of zero and logarithmic beyond.
@@ -706,8 +706,8 @@ mod tests {
             caption: HOSTILE.into(),
             alt: HOSTILE.into(),
             body: FigureBody::Lines {
-                x: Axis::new(HOSTILE, Quantity::Torque).stretched(0.02),
-                y: Axis::new(HOSTILE, Quantity::Error),
+                x: Axis::new(HOSTILE, PageQuantity::Torque).stretched(0.02),
+                y: Axis::new(HOSTILE, PageQuantity::Error),
                 charts: vec![("one".into(), lines)],
             },
         };

@@ -12,7 +12,7 @@ use super::drive_figures::{
     sheet_section, sleeve_figure, stress_figure, stress_lines,
 };
 use super::page::{
-    Axis, Block, Choice, Detail, Field, Figure, FigureBody, Headline, Lines, Mark, Page, Quantity, Section, Series,
+    Axis, Block, Choice, Detail, Field, Figure, FigureBody, Headline, Lines, Mark, Page, PageQuantity, Section, Series,
     Status, Table, Text, significant,
 };
 use super::study_report::{heading, value};
@@ -235,7 +235,7 @@ impl RunKnown<'_> {
             alt: "Curve of the output error over one tooth pitch of the generator".into(),
             body: FigureBody::Lines {
                 x: Axis::linked("Generator from the beginning of a pitch"),
-                y: Axis::new("Output error less mean", Quantity::Error),
+                y: Axis::new("Output error less mean", PageQuantity::Error),
                 charts: self.chart(Lines { series: vec![series], ..Lines::default() }),
             },
         };
@@ -272,7 +272,11 @@ impl RunKnown<'_> {
                 title: title.into(),
                 caption: Text::new(caption),
                 alt: format!("Curves: {}", title.to_lowercase()),
-                body: FigureBody::Lines { x, y: Axis::new("Output error", Quantity::Error), charts: self.chart(lines) },
+                body: FigureBody::Lines {
+                    x,
+                    y: Axis::new("Output error", PageQuantity::Error),
+                    charts: self.chart(lines),
+                },
             })
         };
         let mut blocks = Vec::new();
@@ -287,7 +291,7 @@ impl RunKnown<'_> {
                 "Output angle less generator angle over the ratio; positive when the output leads. A line to each \
                  stretch in which the generator goes one way, as far as there are few. Where it turns back without \
                  load the output stands until the clearance is crossed.",
-                Axis::new("Generator", Quantity::Degree),
+                Axis::new("Generator", PageQuantity::Degree),
                 Lines { series, ..Lines::default() },
             ));
         }
@@ -301,7 +305,7 @@ impl RunKnown<'_> {
                 "The torsion of the output, its clearance included, as a torsion test draws it: the slope is the \
                  compliance, and what lies between growing and falling torque is lost to friction and drag. A \
                  positive torque turns the output forward.",
-                Axis::new("Load torque", Quantity::Torque),
+                Axis::new("Load torque", PageQuantity::Torque),
                 Lines { series, ..Lines::default() },
             ));
         }
@@ -337,14 +341,14 @@ impl RunKnown<'_> {
                 blocks.extend(self.map(&axis, &places).map(Block::Figure));
                 let caption = format!("Of every row. {STRESSES_ARE}");
                 let title = "Largest stress and pressures along the path";
-                let y = Axis::new("Stress, pressure", Quantity::Stress);
+                let y = Axis::new("Stress, pressure", PageQuantity::Stress);
                 blocks.push(curves("path-stress", title, &caption, y, &STRESSES));
             }
             blocks.push(curves(
                 "contacts",
                 "Flanks that carry load",
                 "Of both lobes together.",
-                Axis::new("Tooth flanks", Quantity::Whole),
+                Axis::new("Tooth flanks", PageQuantity::Whole),
                 &[("tooth flanks", |row| row.flank_contacts as f64)],
             ));
             blocks.push(curves(
@@ -352,7 +356,7 @@ impl RunKnown<'_> {
                 "Torque of the generator",
                 "On the flexspline, quasi-static: what is left of it beside the load over the ratio is friction and \
                  drag, and what the teeth store from place to place. Positive turns the generator forward.",
-                Axis::new("Torque of the generator", Quantity::Torque),
+                Axis::new("Torque of the generator", PageQuantity::Torque),
                 &[("generator", |row| row.generator_torque_n_m)],
             ));
         }
@@ -364,11 +368,11 @@ impl RunKnown<'_> {
     fn along(&self) -> (Axis, Vec<(f64, usize)>) {
         let goes_one_way = |of: fn(&Row) -> f64| matches!(one_way(self.rows, of).as_slice(), [(_, stretch)] if stretch.len() == self.rows.len());
         let (axis, of): (Axis, fn(&Row) -> f64) = if goes_one_way(|row| row.generator_rad) {
-            (Axis::new("Generator", Quantity::Degree), |row| row.generator_rad.to_degrees())
+            (Axis::new("Generator", PageQuantity::Degree), |row| row.generator_rad.to_degrees())
         } else if goes_one_way(|row| row.torque_n_m) {
-            (Axis::new("Load torque", Quantity::Torque), |row| row.torque_n_m)
+            (Axis::new("Load torque", PageQuantity::Torque), |row| row.torque_n_m)
         } else {
-            (Axis::new("Step, as in results.csv", Quantity::Whole), |row| row.step as f64)
+            (Axis::new("Step, as in results.csv", PageQuantity::Whole), |row| row.step as f64)
         };
         let mut places: Vec<(f64, usize)> = self.rows.iter().map(of).zip(0..).collect();
         places.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -432,8 +436,8 @@ impl RunKnown<'_> {
             )),
             alt: "Points of the force on every tooth over its angle from the major axis".into(),
             body: FigureBody::Lines {
-                x: Axis::new("Tooth from the major axis", Quantity::Degree),
-                y: Axis::new("Force", Quantity::Force),
+                x: Axis::new("Tooth from the major axis", PageQuantity::Degree),
+                y: Axis::new("Force", PageQuantity::Force),
                 charts: self.chart(lines),
             },
         }
@@ -484,8 +488,8 @@ impl RunKnown<'_> {
             alt: "Colour map of the force on the teeth over the path and their angle from the major axis".into(),
             body: FigureBody::Field {
                 x: axis.clone(),
-                y: Axis::new("Tooth from the major axis", Quantity::Degree),
-                z: Axis::new("Force on the tooth", Quantity::Force),
+                y: Axis::new("Tooth from the major axis", PageQuantity::Degree),
+                z: Axis::new("Force on the tooth", PageQuantity::Force),
                 fields: vec![(self.kind.to_string(), field)],
             },
         })

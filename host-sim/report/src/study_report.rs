@@ -3,12 +3,12 @@
 use serde_json::{Map, json};
 
 use super::page::{
-    Axis, Block, Choice, Detail, EVERY_CHOICE, Field, Figure, FigureBody, Headline, Limit, Lines, Mark, Page, Quantity,
-    Section, Series, Status, Table, Text, significant,
+    Axis, Block, Choice, Detail, EVERY_CHOICE, Field, Figure, FigureBody, Headline, Limit, Lines, Mark, Page,
+    PageQuantity, Section, Series, Status, Table, Text, significant,
 };
 use flexspline_design::data_sheet::{DataSheet, FIGURES, FigureOf};
 use flexspline_design::study::{
-    Asked, Basis, Effect, LAST_STABLE, Nearest, Run, RunStatus, Sense, Study, StudySettings, Trust, figure,
+    Asked, Basis, LAST_STABLE, Nearest, RunStatus, Sense, Study, StudyEffect, StudyRun, StudySettings, Trust, figure,
 };
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 
@@ -16,7 +16,7 @@ use flexspline_mechanics::drive::{Drive, GeneratorKind};
 const MOST_ROWS: usize = 25;
 
 /// What the page is made from.
-pub struct Sources<'a> {
+pub struct StudySources<'a> {
     /// The drive that was varied.
     pub drive: &'a Drive,
     /// The command line.
@@ -26,7 +26,7 @@ pub struct Sources<'a> {
     /// What came out.
     pub study: &'a Study,
     /// What the fields do.
-    pub effects: &'a [Effect],
+    pub effects: &'a [StudyEffect],
     /// What is asked, each alone.
     pub asked: &'a [Asked],
     /// What comes nearest, of generators where nothing meets.
@@ -36,8 +36,8 @@ pub struct Sources<'a> {
 }
 
 /// The page.
-pub fn page(of: Sources<'_>) -> Page {
-    let Sources { settings, study, .. } = of;
+pub fn page(of: StudySources<'_>) -> Page {
+    let StudySources { settings, study, .. } = of;
     let ended = |status| study.runs.iter().filter(|run| run.status == status).count();
     let (failed, refused) = (ended(RunStatus::Failed), ended(RunStatus::Refused));
     let interfere = study.runs.iter().filter(|run| run.sheet.rigid_gap_um.is_some_and(|gap| gap < 0.0)).count();
@@ -98,44 +98,44 @@ fn better(settings: &StudySettings) -> String {
 }
 
 /// Endings of names that say a unit, longest first, the unit, and what a page takes it for.
-const UNITS: [(&str, &str, Quantity); 16] = [
-    ("_n_m_per_rad", "N·m/rad", Quantity::Count),
-    ("_n_per_mm3", "N/mm³", Quantity::Count),
-    ("_n_per_mm", "N/mm", Quantity::Count),
-    ("_kg_m3", "kg/m³", Quantity::Count),
-    ("_percent", "%", Quantity::Count),
-    ("_arcsec", "arcsec", Quantity::Error),
-    ("_per_k", "1/K", Quantity::Count),
-    ("_mrad", "mrad", Quantity::Count),
-    ("_n_m", "N·m", Quantity::Torque),
-    ("_mpa", "MPa", Quantity::Stress),
-    ("_deg", "degrees", Quantity::Count),
-    ("_mm", "mm", Quantity::Count),
-    ("_um", "µm", Quantity::Count),
-    ("_n", "N", Quantity::Force),
-    ("_c", "°C", Quantity::Count),
-    ("_k", "K", Quantity::Count),
+const UNITS: [(&str, &str, PageQuantity); 16] = [
+    ("_n_m_per_rad", "N·m/rad", PageQuantity::Count),
+    ("_n_per_mm3", "N/mm³", PageQuantity::Count),
+    ("_n_per_mm", "N/mm", PageQuantity::Count),
+    ("_kg_m3", "kg/m³", PageQuantity::Count),
+    ("_percent", "%", PageQuantity::Count),
+    ("_arcsec", "arcsec", PageQuantity::Error),
+    ("_per_k", "1/K", PageQuantity::Count),
+    ("_mrad", "mrad", PageQuantity::Count),
+    ("_n_m", "N·m", PageQuantity::Torque),
+    ("_mpa", "MPa", PageQuantity::Stress),
+    ("_deg", "degrees", PageQuantity::Count),
+    ("_mm", "mm", PageQuantity::Count),
+    ("_um", "µm", PageQuantity::Count),
+    ("_n", "N", PageQuantity::Force),
+    ("_c", "°C", PageQuantity::Count),
+    ("_k", "K", PageQuantity::Count),
 ];
 
 /// A name in words, and its unit: that of its ending, or `modules` of a profile shift.
-fn in_words(name: &str) -> (String, Option<&'static str>, Quantity) {
+fn in_words(name: &str) -> (String, Option<&'static str>, PageQuantity) {
     let words = |stem: &str| stem.replace("_pp", " peak to peak").replace(['_', '.'], " ");
     if name.ends_with("profile_shift") {
-        return (words(name), Some("modules"), Quantity::Count);
+        return (words(name), Some("modules"), PageQuantity::Count);
     }
     let found = UNITS.iter().find_map(|(ending, unit, quantity)| Some((name.strip_suffix(ending)?, *unit, *quantity)));
     match found {
         Some((stem @ ("k1" | "k2" | "k3"), unit, quantity)) => (stem.to_uppercase(), Some(unit), quantity),
         Some((stem, unit, quantity)) => (words(stem), Some(unit), quantity),
-        None => (words(name), None, Quantity::Count),
+        None => (words(name), None, PageQuantity::Count),
     }
 }
 
 /// A figure as a reader takes it: what it is with its unit, and its quantity. A unit that the page adds or changes is
 /// left to it.
-fn shown(name: &str) -> (String, Quantity) {
+fn shown(name: &str) -> (String, PageQuantity) {
     match in_words(name) {
-        (words, Some(unit), Quantity::Count) => (format!("{words}, {unit}"), Quantity::Count),
+        (words, Some(unit), PageQuantity::Count) => (format!("{words}, {unit}"), PageQuantity::Count),
         (words, _, quantity) => (words, quantity),
     }
 }
@@ -143,7 +143,7 @@ fn shown(name: &str) -> (String, Quantity) {
 /// A figure or field at the head of a column. Errors have their unit in every cell, where the reader changes it.
 pub(super) fn heading(name: &str) -> String {
     match in_words(name) {
-        (words, _, Quantity::Error) => words,
+        (words, _, PageQuantity::Error) => words,
         (words, Some(unit), _) => format!("{words}, {unit}"),
         (words, None, _) => words,
     }
@@ -152,24 +152,24 @@ pub(super) fn heading(name: &str) -> String {
 pub(super) fn value(name: &str, value: Option<f64>) -> Text {
     match value {
         None => Text::new("–"),
-        Some(value) if shown(name).1 == Quantity::Error => Text::default().error(value, 3),
+        Some(value) if shown(name).1 == PageQuantity::Error => Text::default().error(value, 3),
         Some(value) => Text::new(significant(value, 3)),
     }
 }
 
 /// A figure of a run; a last stable load that is a bound says so.
-fn of_run(name: &str, of: fn(&DataSheet) -> Option<f64>, run: &Run) -> Text {
+fn of_run(name: &str, of: fn(&DataSheet) -> Option<f64>, run: &StudyRun) -> Text {
     match of(&run.sheet) {
         Some(load) if name == LAST_STABLE && run.bears_all() => Text::new(format!("≥ {}", significant(load, 3))),
         figure => value(name, figure),
     }
 }
 
-fn of_kind(study: &Study, kind: GeneratorKind) -> impl Iterator<Item = &Run> {
+fn of_kind(study: &Study, kind: GeneratorKind) -> impl Iterator<Item = &StudyRun> {
     study.runs.iter().filter(move |run| run.generator == kind)
 }
 
-fn headline(of: &Sources<'_>, kind: GeneratorKind) -> Headline {
+fn headline(of: &StudySources<'_>, kind: GeneratorKind) -> Headline {
     let count = of_kind(of.study, kind).count();
     let meet = of_kind(of.study, kind).filter(|run| run.meets).count();
     let name = of.settings.targets.first().map_or("kinematic_error_pp_arcsec", |target| target.figure);
@@ -194,7 +194,7 @@ fn headline(of: &Sources<'_>, kind: GeneratorKind) -> Headline {
 }
 
 /// Where no variant meets what has to be kept: the nearest one, and what it misses first.
-fn nothing_meets(of: &Sources<'_>, kind: GeneratorKind, count: usize) -> Headline {
+fn nothing_meets(of: &StudySources<'_>, kind: GeneratorKind, count: usize) -> Headline {
     let mut answer = Text::new(format!("None of {count} variants meets what has to be kept."));
     let (mut number, mut number_is) = (Text::new("–"), String::new());
     if let Some(nearest) = of.nearest.iter().find(|nearest| nearest.generator == kind) {
@@ -216,7 +216,7 @@ fn nothing_meets(of: &Sources<'_>, kind: GeneratorKind, count: usize) -> Headlin
 }
 
 /// What is asked, each thing alone, of every generator; nothing where nothing is asked and every variant is sound.
-fn asked(of: &Sources<'_>) -> Vec<Block> {
+fn asked(of: &StudySources<'_>) -> Vec<Block> {
     let lacking = |asked: &&Asked| asked.meet_alone < asked.of;
     if of.settings.constraints.is_empty() && !of.asked.iter().any(|asked| lacking(&asked)) {
         return Vec::new();
@@ -236,7 +236,7 @@ fn asked(of: &Sources<'_>) -> Vec<Block> {
     of.settings.generators.iter().map(block).collect()
 }
 
-fn best(of: &Sources<'_>) -> Section {
+fn best(of: &StudySources<'_>) -> Section {
     // What decides comes first: a phone shows three columns.
     let decides = |name: &str| of.settings.targets.iter().any(|target| target.figure == name);
     let (first, others): (Vec<FigureOf>, Vec<FigureOf>) = FIGURES.iter().copied().partition(|(name, _)| decides(name));
@@ -282,7 +282,7 @@ fn best(of: &Sources<'_>) -> Section {
 }
 
 /// What each field does to each figure, from its least value to its largest.
-fn does(of: &Sources<'_>) -> Option<Section> {
+fn does(of: &StudySources<'_>) -> Option<Section> {
     let header: Vec<String> = ["Figure".to_owned()]
         .into_iter()
         .chain(of.study.fields.iter().map(|path| heading(path)))
@@ -315,7 +315,7 @@ fn does(of: &Sources<'_>) -> Option<Section> {
 }
 
 /// What estimated figures are off by; nothing where all are computed.
-fn off(of: &Sources<'_>) -> Option<Section> {
+fn off(of: &StudySources<'_>) -> Option<Section> {
     let header = ["Figure", "off, median", "of how far variants differ, %", "ranks", "off, rms", "off, most"];
     let blocks: Vec<Block> = of
         .settings
@@ -349,15 +349,15 @@ fn off(of: &Sources<'_>) -> Option<Section> {
 }
 
 /// The first two targets against one another.
-fn trade(of: &Sources<'_>) -> Section {
+fn trade(of: &StudySources<'_>) -> Section {
     let [first, second] = match of.settings.targets.as_slice() {
         [first, second, ..] => [first.figure, second.figure],
         [only] if only.figure == "kinematic_error_pp_arcsec" => [only.figure, "k2_n_m_per_rad"],
         [only] => [only.figure, "kinematic_error_pp_arcsec"],
         [] => ["kinematic_error_pp_arcsec", "k2_n_m_per_rad"],
     };
-    let get = |name: &str, run: &Run| figure(name).ok().and_then(|(_, f)| f(&run.sheet));
-    let series = |kind: GeneratorKind, name: &str, colour: usize, mark: Mark, which: &dyn Fn(&Run) -> bool| {
+    let get = |name: &str, run: &StudyRun| figure(name).ok().and_then(|(_, f)| f(&run.sheet));
+    let series = |kind: GeneratorKind, name: &str, colour: usize, mark: Mark, which: &dyn Fn(&StudyRun) -> bool| {
         let mut points: Vec<[f64; 2]> = of_kind(of.study, kind)
             .filter(|run| which(run))
             .filter_map(|run| Some([get(first, run)?, get(second, run)?]))
@@ -401,7 +401,7 @@ fn trade(of: &Sources<'_>) -> Section {
 }
 
 /// Every figure over the fields: curves of one field, maps of two on a grid, points of more.
-fn curves(of: &Sources<'_>) -> Section {
+fn curves(of: &StudySources<'_>) -> Section {
     let grid = of.settings.spread.is_none();
     let blocks: Vec<Block> = FIGURES
         .iter()
@@ -416,12 +416,12 @@ fn curves(of: &Sources<'_>) -> Section {
     Section { id: "curves".to_owned(), title: "Figure by figure".to_owned(), detail: Detail::Engineering, blocks }
 }
 
-fn all_curves(of: &Sources<'_>, name: &'static str) -> Vec<Figure> {
+fn all_curves(of: &StudySources<'_>, name: &'static str) -> Vec<Figure> {
     (0..of.study.fields.len()).map(|field| curve(of, name, field, false)).collect()
 }
 
 /// Where a value of a field stands on an axis: its number, or for words its place among them.
-fn place(of: &Sources<'_>, field: usize, value: &str) -> f64 {
+fn place(of: &StudySources<'_>, field: usize, value: &str) -> f64 {
     value.parse().unwrap_or_else(|_| {
         let grid = of.settings.vary[field].grid();
         grid.iter().position(|word| word == value).map_or(f64::NAN, |k| k as f64)
@@ -429,7 +429,7 @@ fn place(of: &Sources<'_>, field: usize, value: &str) -> f64 {
 }
 
 /// What the data sheet says of a figure, where it was computed at the loads of the sheet.
-fn stated(of: &Sources<'_>, name: &str) -> Option<f64> {
+fn stated(of: &StudySources<'_>, name: &str) -> Option<f64> {
     let stated = of.settings.stated.as_ref().filter(|_| of.settings.torque_n_m.is_none())?;
     match name {
         "k1_n_m_per_rad" => stated.k1_n_m_per_rad,
@@ -439,7 +439,7 @@ fn stated(of: &Sources<'_>, name: &str) -> Option<f64> {
     }
 }
 
-fn curve(of: &Sources<'_>, name: &'static str, field: usize, alone: bool) -> Figure {
+fn curve(of: &StudySources<'_>, name: &'static str, field: usize, alone: bool) -> Figure {
     let figure = figure(name).ok().map(|(_, figure)| figure);
     let points = |kind: GeneratorKind| {
         let mut points: Vec<[f64; 2]> = of_kind(of.study, kind)
@@ -480,12 +480,12 @@ fn curve(of: &Sources<'_>, name: &'static str, field: usize, alone: bool) -> Fig
         title: format!("{words} over {over}"),
         caption: Text::default(),
         alt: format!("{words} of every variant over {over}"),
-        body: FigureBody::Lines { x: Axis::new(over, Quantity::Count), y: Axis::new(words, quantity), charts },
+        body: FigureBody::Lines { x: Axis::new(over, PageQuantity::Count), y: Axis::new(words, quantity), charts },
     }
 }
 
 /// A figure over a grid of two fields of numbers.
-fn map(of: &Sources<'_>, name: &'static str) -> Option<Figure> {
+fn map(of: &StudySources<'_>, name: &'static str) -> Option<Figure> {
     let (_, figure) = figure(name).ok()?;
     let axis = |field: usize| -> Option<Vec<f64>> {
         let values: Option<Vec<f64>> = of.settings.vary[field].grid().iter().map(|value| value.parse().ok()).collect();
@@ -516,7 +516,7 @@ fn map(of: &Sources<'_>, name: &'static str) -> Option<Figure> {
         })
         .collect();
     let (words, quantity) = shown(name);
-    let [across, up] = [0, 1].map(|field| Axis::new(heading(&of.study.fields[field]), Quantity::Count));
+    let [across, up] = [0, 1].map(|field| Axis::new(heading(&of.study.fields[field]), PageQuantity::Count));
     Some(Figure {
         id: name.replace('_', "-"),
         title: format!("{words} over both fields"),

@@ -219,7 +219,7 @@ fn outline(wheel: &WheelMotion) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::page::{Quantity, Series};
+    use crate::page::{PageQuantity, Series};
 
     /// One high point of a thousand, and one place where nothing is.
     #[test]
@@ -238,7 +238,7 @@ mod tests {
         let series =
             |name: &str, mark, colour| Series { name: name.into(), mark, colour, points: vec![[0.0, 0.0], [1.0, 1.0]] };
         let of = |series: Vec<Series>| {
-            let axis = Axis::new("x", Quantity::Count);
+            let axis = Axis::new("x", PageQuantity::Count);
             lines(&axis, &axis, &Lines { series, ..Lines::default() })
         };
         let both = of(vec![series("there & on", Mark::Line, 0), series("back", Mark::Dashed, 1)]);

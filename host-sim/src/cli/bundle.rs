@@ -12,7 +12,7 @@ use super::Failure;
 use super::context::{Context, image_file};
 use flexspline_base::output::{Outputs, WholeFolder, prepare_folder};
 use flexspline_base::suggest::{likeliest, question};
-use flexspline_export::bundle::libraries::{Library, LibraryError, Places, TARGETS};
+use flexspline_export::bundle::libraries::{BundleLibrary, LibraryError, Places, TARGETS};
 use flexspline_export::bundle::{Bundle, MANIFEST, Manifest, Table, TableEntry, tar_gz};
 
 /// Pack tables, a C99 reader, the core as static libraries, test vectors and build files into one firmware folder
@@ -121,7 +121,7 @@ impl BundleCommand {
     }
 
     /// The libraries that were asked for; without `--target` all that can be had, and what the others lack.
-    fn libraries(&self, context: &Context) -> Result<(Vec<Library>, Vec<Missing>), Failure> {
+    fn libraries(&self, context: &Context) -> Result<(Vec<BundleLibrary>, Vec<Missing>), Failure> {
         if self.no_core {
             return Ok((Vec::new(), Vec::new()));
         }

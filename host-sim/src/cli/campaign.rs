@@ -371,7 +371,7 @@ impl ReduceCommand {
             tolerances: &plan.tolerances,
             campaign: &campaign,
         };
-        let page = campaign_report::page(campaign_report::Sources {
+        let page = campaign_report::page(campaign_report::CampaignSources {
             plan: &plan,
             plan_hash: &told.plan_hash,
             drive: &drive,

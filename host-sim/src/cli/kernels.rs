@@ -7,7 +7,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::context::{Context, quoted};
-use super::names::{self, Generators};
+use super::names::{self, GeneratorNames};
 use super::{Failure, say};
 use flexspline_base::output::Outputs;
 use flexspline_design::kernels::{KernelError, KernelPlan, make};
@@ -30,7 +30,7 @@ Examples:
 pub(super) struct KernelsCommand {
     /// Wave generator: two-roller, four-roller, double-disc, cam, or all
     #[arg(short, long, value_name = "G", default_value = "all", value_parser = names::generators(), hide_possible_values = true)]
-    generator: Generators,
+    generator: GeneratorNames,
     /// Mesh: coarse, standard or fine
     #[arg(long, value_name = "LEVEL", default_value = "standard", value_parser = names::mesh(), hide_possible_values = true)]
     mesh: MeshLevel,

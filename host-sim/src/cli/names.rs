@@ -56,20 +56,20 @@ pub(super) fn solver() -> Named<Method> {
 
 /// One wave generator, or all of them.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Generators(pub(super) Vec<GeneratorKind>);
+pub(super) struct GeneratorNames(pub(super) Vec<GeneratorKind>);
 
 /// One wave generator, or `all`.
-pub(super) fn generators() -> Named<Generators> {
+pub(super) fn generators() -> Named<GeneratorNames> {
     let mut names = generator().names;
     names.push("all");
     Named { names, read: read_generators }
 }
 
-fn read_generators(name: &str) -> Result<Generators, BoxedError> {
+fn read_generators(name: &str) -> Result<GeneratorNames, BoxedError> {
     if name == "all" {
-        return Ok(Generators(GeneratorKind::ALL.to_vec()));
+        return Ok(GeneratorNames(GeneratorKind::ALL.to_vec()));
     }
-    name.parse().map(|kind| Generators(vec![kind])).map_err(|_| {
+    name.parse().map(|kind| GeneratorNames(vec![kind])).map_err(|_| {
         let known = GeneratorKind::ALL.map(GeneratorKind::name);
         let hint = did_you_mean("; ", name, known.into_iter().chain(["all"]));
         format!("generator {name:?} is not known; allowed: {}, all{hint}", known.join(", ")).into()

@@ -17,7 +17,7 @@ use flexspline_identify::nominal::Nominal;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::stepping::{Method, SolverSettings};
 use flexspline_report::animation::{Animation, AnimationError, animate};
-use flexspline_report::diagnosis_report::{self, Sources};
+use flexspline_report::diagnosis_report::{self, DiagnosisSources};
 use flexspline_report::page::{Page, Written};
 use flexspline_report::shown_torque_n_m;
 
@@ -75,7 +75,7 @@ pub(super) fn diagnosis<'p>(
     let series = extended.predict(&recording.sessions, nominal, table);
     let (levels, parts) = diagnosis_report::levels_and_parts(&series, extended, diagnosis);
     let command = &context.command;
-    diagnosis_report::page(Sources { recording, nominal, diagnosis, levels, parts, command, inputs })
+    diagnosis_report::page(DiagnosisSources { recording, nominal, diagnosis, levels, parts, command, inputs })
 }
 
 /// The page of every command.

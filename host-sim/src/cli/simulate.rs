@@ -15,7 +15,7 @@ use flexspline_design::simulate::{
     Summary, Told, read_path, simulate, stress_by_place,
 };
 use flexspline_design::stated::{SheetBeside, beside};
-use flexspline_export::{Frame, write_pvd, write_vtu};
+use flexspline_export::{VtuFrame, write_pvd, write_vtu};
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_mechanics::stepping::{Method, SolveError, SolverSettings};
@@ -326,7 +326,7 @@ fn line(now: &Observation) -> String {
 /// The folder of frames while it fills.
 struct Frames {
     folder: WholeFolder,
-    list: Vec<Frame>,
+    list: Vec<VtuFrame>,
 }
 
 impl Frames {
@@ -337,7 +337,7 @@ impl Frames {
     fn add(&mut self, step: usize, now: &Observation) -> Result<(), OutputError> {
         let file = format!("frame-{step:05}.vtu");
         write_whole(&self.folder.path().join(&file), |out| write_vtu(out, now.problem, now.state))?;
-        self.list.push(Frame { step, file });
+        self.list.push(VtuFrame { step, file });
         Ok(())
     }
 

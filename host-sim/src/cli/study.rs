@@ -8,14 +8,15 @@ use std::time::Instant;
 use clap::Args;
 use serde::Serialize;
 
-use super::names::{self, Generators};
+use super::names::{self, GeneratorNames};
 use super::{Context, Failure, report, say};
 use flexspline_base::output::Outputs;
 use flexspline_design::data_sheet::{FIGURES, FigureOf};
 use flexspline_design::stated::short;
 use flexspline_design::study::{
-    Asked, Basis, Constraint, Effect, LAST_STABLE, Nearest, Run, RunStatus, Sense, Study, StudyError, StudySettings,
-    Target, Trust, Vary, asked, effects, errors_of_making, figure, is_error_of_making, is_idle, nearest, study,
+    Asked, Basis, Constraint, LAST_STABLE, Nearest, RunStatus, Sense, Study, StudyEffect, StudyError, StudyRun,
+    StudySettings, StudyTarget, Trust, Vary, asked, effects, errors_of_making, figure, is_error_of_making, is_idle,
+    nearest, study,
 };
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
@@ -72,7 +73,7 @@ pub(super) struct StudyCommand {
     seed: u32,
     /// Wave generator: two-roller, four-roller, double-disc, cam, or all
     #[arg(short, long, value_name = "G", default_value = "all", value_parser = names::generators(), hide_possible_values = true)]
-    generator: Generators,
+    generator: GeneratorNames,
     /// Largest load, N.m [default: the rated torque of the drive's [data_sheet]; else what a table of that generator
     /// spans: 200; four-roller 100, two-roller 20; by the size of the drive]
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
@@ -126,7 +127,7 @@ struct StudyReport<'a> {
     nearest: &'a [Nearest],
     /// What else has to be known.
     remarks: &'a [String],
-    effects: &'a [Effect],
+    effects: &'a [StudyEffect],
     #[serde(flatten)]
     study: &'a Study,
     wall_s: f64,
@@ -161,7 +162,7 @@ impl StudyCommand {
         })?;
         drop(progress);
 
-        let fields_do: Vec<Effect> = settings
+        let fields_do: Vec<StudyEffect> = settings
             .generators
             .iter()
             .flat_map(|kind| FIGURES.iter().filter_map(|(name, _)| effects(&made, *kind, name)))
@@ -190,7 +191,7 @@ impl StudyCommand {
             study: &made,
             wall_s: clock.elapsed().as_secs_f64(),
         };
-        let page = study_report::page(study_report::Sources {
+        let page = study_report::page(study_report::StudySources {
             drive: &drive,
             command: &context.command,
             settings: &settings,
@@ -232,7 +233,9 @@ impl StudyCommand {
         let named = |option: &str, names: &[String], sense| {
             names
                 .iter()
-                .map(|name| Target::new(name, sense).map_err(|error| Failure::BadInput(format!("{option}: {error}"))))
+                .map(|name| {
+                    StudyTarget::new(name, sense).map_err(|error| Failure::BadInput(format!("{option}: {error}")))
+                })
                 .collect::<Result<Vec<_>, _>>()
         };
         let mut targets = named("--least", &self.least, Sense::Least)?;
@@ -244,7 +247,7 @@ impl StudyCommand {
             )));
         }
         if targets.is_empty() {
-            targets.extend(USUAL_TARGETS.iter().filter_map(|(name, sense)| Target::new(name, *sense).ok()));
+            targets.extend(USUAL_TARGETS.iter().filter_map(|(name, sense)| StudyTarget::new(name, *sense).ok()));
         }
         Ok(StudySettings {
             vary: self.vary.clone(),
@@ -304,7 +307,7 @@ fn csv(study: &Study) -> String {
     text
 }
 
-fn line(run: &Run) -> String {
+fn line(run: &StudyRun) -> String {
     let figures: Vec<String> =
         FIGURES.iter().filter_map(|(name, of)| of(&run.sheet).map(|value| format!("{name} {value:.4}"))).collect();
     format!(
@@ -364,7 +367,7 @@ fn text(told: &StudyReport<'_>, settings: &StudySettings) -> String {
 }
 
 /// The first variant that did not converge, and the first whose fields make no drive, each with its reason.
-fn firsts(runs: &[Run], kind: GeneratorKind) -> String {
+fn firsts(runs: &[StudyRun], kind: GeneratorKind) -> String {
     let first = |status, what: &str| {
         let run = runs.iter().find(|run| run.generator == kind && run.status == status)?;
         Some(format!("  {what}, variant {}: {}\n", run.variant, run.why.as_ref()?))
@@ -378,7 +381,7 @@ fn firsts(runs: &[Run], kind: GeneratorKind) -> String {
 
 /// What estimates of the targets are off by, and which rank nothing.
 fn how_far_to_trust(told: &StudyReport<'_>, settings: &StudySettings, kind: GeneratorKind) -> String {
-    let of = |target: &Target| {
+    let of = |target: &StudyTarget| {
         told.study.trust.iter().find(|trust| trust.generator == kind && trust.figure == target.figure)
     };
     let of_targets: Vec<&Trust> = settings.targets.iter().filter_map(of).collect();
@@ -402,7 +405,7 @@ fn how_far_to_trust(told: &StudyReport<'_>, settings: &StudySettings, kind: Gene
 }
 
 /// A figure of a run as it is told; a bound with its sign.
-fn figure_of(run: &Run, name: &str) -> String {
+fn figure_of(run: &StudyRun, name: &str) -> String {
     let value = figure(name).ok().and_then(|(_, of)| of(&run.sheet));
     let bound = if name == LAST_STABLE && run.bears_all() { ">= " } else { "" };
     value.map_or_else(|| "-".to_owned(), |value| format!("{bound}{}", short(value)))
@@ -484,7 +487,7 @@ fn remarks(drive: &Drive, settings: &StudySettings, study: &Study) -> Vec<String
 }
 
 /// How many of the variants that meet what has to be kept are not to be built for all that, and why.
-fn cautioned(runs: &[Run], kind: GeneratorKind) -> Option<String> {
+fn cautioned(runs: &[StudyRun], kind: GeneratorKind) -> Option<String> {
     let meet = || runs.iter().filter(|run| run.generator == kind && run.meets);
     let with = meet().filter(|run| !run.cautions.is_empty()).count();
     let mut counts: Vec<(&'static str, f64, usize)> = Vec::new();
@@ -545,16 +548,16 @@ fn best_next(context: &Context, drive: &Drive, settings: &StudySettings, study: 
 }
 
 /// The best variant to make tables of, and the fields that it sets.
-fn best<'a>(drive: &Drive, settings: &StudySettings, study: &'a Study) -> Option<(&'a Run, String)> {
+fn best<'a>(drive: &Drive, settings: &StudySettings, study: &'a Study) -> Option<(&'a StudyRun, String)> {
     let errors = errors_of_making(&study.fields);
-    let set = |run: &Run, k: usize| format!("{}={}", study.fields[k], run.values[k]);
-    let as_given = |run: &&Run| {
+    let set = |run: &StudyRun, k: usize| format!("{}={}", study.fields[k], run.values[k]);
+    let as_given = |run: &&StudyRun| {
         let sets: Vec<String> = errors.iter().map(|k| set(run, *k)).collect();
         drive.with_sets(sets.iter().map(String::as_str)).is_ok_and(|made| made.as_built == drive.as_built)
     };
-    let cost = |run: &Run| settings.targets.first().map_or(0.0, |first| first.cost(&run.sheet));
+    let cost = |run: &StudyRun| settings.targets.first().map_or(0.0, |first| first.cost(&run.sheet));
     let front = || study.runs.iter().filter(|run| run.front);
-    let cheapest = |a: &&Run, b: &&Run| cost(a).total_cmp(&cost(b));
+    let cheapest = |a: &&StudyRun, b: &&StudyRun| cost(a).total_cmp(&cost(b));
     let choices: Vec<usize> = (0..study.fields.len()).filter(|k| !errors.contains(k)).collect();
     // Where nothing but errors varies every variant is the same design.
     let any = || choices.is_empty().then(|| front().min_by(cheapest)).flatten();
@@ -569,13 +572,13 @@ mod tests {
     use flexspline_design::stated::Stated;
 
     /// A variant under the cam that meets all that is asked, with this stress in its root fillets.
-    pub(super) fn variant(number: usize, values: &[&str], root_fillet_mpa: f64) -> Run {
+    pub(super) fn variant(number: usize, values: &[&str], root_fillet_mpa: f64) -> StudyRun {
         let sheet = DataSheet {
             kinematic_error_pp_arcsec: Some(1.0),
             root_fillet_mpa: Some(root_fillet_mpa),
             ..DataSheet::default()
         };
-        Run {
+        StudyRun {
             variant: number,
             generator: GeneratorKind::Cam,
             values: values.iter().map(|value| (*value).to_owned()).collect(),
@@ -620,7 +623,7 @@ mod tests {
         assert!(USUAL_TARGETS.iter().all(|(name, _)| figure(name).is_ok()));
     }
 
-    fn studied(vary: &[&str], runs: Vec<Run>) -> (StudySettings, Study) {
+    fn studied(vary: &[&str], runs: Vec<StudyRun>) -> (StudySettings, Study) {
         let vary: Vec<Vary> = vary.iter().map(|text| text.parse().unwrap()).collect();
         let fields = vary.iter().map(|field| field.path.clone()).collect();
         let settings = StudySettings {
@@ -632,7 +635,7 @@ mod tests {
             stated: None,
             positions: 4,
             constraints: Vec::new(),
-            targets: vec![Target::new("root_fillet_mpa", Sense::Least).unwrap()],
+            targets: vec![StudyTarget::new("root_fillet_mpa", Sense::Least).unwrap()],
             compute_all: false,
             solver: SolverSettings::default(),
         };

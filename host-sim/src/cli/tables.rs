@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::context::{Context, quoted};
-use super::names::{self, Generators};
+use super::names::{self, GeneratorNames};
 use super::new::New;
 use super::simulate::{refused_or_failed, stress};
 use super::{Failure, report, say};
@@ -31,7 +31,7 @@ use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_mechanics::stepping::{Method, SolverSettings};
 use flexspline_report::page::Page;
-use flexspline_report::{Sources, Subject, drive_report};
+use flexspline_report::{DriveSources, DriveSubject, drive_report};
 
 /// Make compensation tables: from FEM sweeps of the drive, or from samples of another program or a bench
 ///
@@ -55,7 +55,7 @@ output_rad.")]
 pub(super) struct Tables {
     /// Wave generator: two-roller, four-roller, double-disc, cam, or all
     #[arg(short, long, value_name = "G", default_value = "all", value_parser = names::generators(), hide_possible_values = true)]
-    generator: Generators,
+    generator: GeneratorNames,
     /// Make the table from this file of samples instead of FEM; needs one --generator
     #[arg(long, value_name = "FILE.csv", value_hint = ValueHint::FilePath)]
     from_samples: Option<PathBuf>,
@@ -252,15 +252,16 @@ impl Tables {
             Source::File { name, blake3 } => Some((format!("BLAKE3 of {name}"), blake3.clone())),
             Source::Fem { .. } => None,
         });
-        let subjects = tables.into_iter().zip(made).zip(animations).map(|(((kind, table), made), animation)| Subject {
-            kind,
-            table,
-            info: Some(&made.info),
-            samples: made.samples.as_deref(),
-            validation: None,
-            animation,
-        });
-        let page = drive_report(Sources {
+        let subjects =
+            tables.into_iter().zip(made).zip(animations).map(|(((kind, table), made), animation)| DriveSubject {
+                kind,
+                table,
+                info: Some(&made.info),
+                samples: made.samples.as_deref(),
+                validation: None,
+                animation,
+            });
+        let page = drive_report(DriveSources {
             drive,
             command_name: "tables",
             command: &context.command,

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::context::{Context, image_file, quoted};
-use super::names::{self, Generators};
+use super::names::{self, GeneratorNames};
 use super::{Failure, report, say};
 use flexspline_base::output::Outputs;
 use flexspline_design::tables::MissingSpring;
@@ -22,7 +22,7 @@ use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_mechanics::stepping::{Method, SolverSettings};
 use flexspline_report::page::Page;
-use flexspline_report::{Sources, Subject, drive_report};
+use flexspline_report::{DriveSources, DriveSubject, drive_report};
 
 /// Compare tables with new FEM runs at points that were not used to make them
 ///
@@ -42,7 +42,7 @@ pub(super) struct Validate {
     tables: PathBuf,
     /// Wave generator: two-roller, four-roller, double-disc, cam, or all in the folder
     #[arg(short, long, value_name = "G", default_value = "all", value_parser = names::generators(), hide_possible_values = true)]
-    generator: Generators,
+    generator: GeneratorNames,
     /// Number of torques per table, 2 to 1000
     #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u16).range(2..=1000))]
     torques: u16,
@@ -212,9 +212,9 @@ impl Validate {
         let settings = SolverSettings { mesh: self.mesh, ..SolverSettings::default() };
         let animations = report::animations(context, drive, &tables, settings);
         let subjects = tables.into_iter().zip(&report.tables).zip(animations).map(|(((kind, table), v), animation)| {
-            Subject { kind, table, info: None, samples: None, validation: Some(v), animation }
+            DriveSubject { kind, table, info: None, samples: None, validation: Some(v), animation }
         });
-        let page = drive_report(Sources {
+        let page = drive_report(DriveSources {
             drive,
             command_name: "validate",
             command: &context.command,

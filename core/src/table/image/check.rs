@@ -2,7 +2,7 @@
 
 use super::header::{check_envelope, check_identity};
 use super::layout::{
-    CRC_BYTES, DERIVED_WORDS, Layout, MAX_AXIS_VALUE, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES,
+    CRC_BYTES, DERIVED_WORDS, ImageLayout, MAX_AXIS_VALUE, MAX_ERROR_RAD, MAX_RIPPLE_NODES, MAX_TEMPERATURE_NODES,
     NODE_WORDS, PAGE_BYTES, UNITS_PER_COUNT, cell_width, counted, image_bytes, limit_counts, word,
 };
 use super::sums::{page_of, page_sum};
@@ -82,7 +82,7 @@ const STEP_NODES: usize = 4;
 
 /// What a check finds next, in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Stage {
+enum CheckStage {
     Envelope,
     Crc,
     Identity,
@@ -108,7 +108,7 @@ enum Stage {
     Done,
 }
 
-impl Stage {
+impl CheckStage {
     const ALL: [Self; 21] = [
         Self::Envelope,
         Self::Crc,
@@ -136,7 +136,7 @@ impl Stage {
 
 /// What is known of an image once its sizes are.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Facts {
+pub(crate) struct ImageFacts {
     body_bytes: usize,
     drive: Drive,
     generator_kind: GeneratorKind,
@@ -146,7 +146,7 @@ pub(crate) struct Facts {
     /// Width of a cell of the ripple at the output, counts.
     cell_width: f32,
     curve_nodes: [usize; 3],
-    layout: Layout,
+    layout: ImageLayout,
     /// Intervals of the torque axis that are jumps.
     jumps: u64,
     bounds: Bounds,
@@ -159,14 +159,14 @@ pub(crate) struct Facts {
 ///
 /// A step takes at most 2000 instructions on a Cortex-M4F, held by `tests/run firmware`.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Check {
+pub(crate) struct ImageCheck {
     /// Number of the stage: an upset may leave one that there is not.
     stage: u32,
     /// Where in the stage, and where in the part that is looked at there.
     at: usize,
     within: usize,
     crc: u32,
-    facts: Facts,
+    facts: ImageFacts,
     /// Torque, D, slope of D and H of the node before.
     before: Option<[f32; 4]>,
     /// The largest D − H and D + H below the node.
@@ -177,13 +177,13 @@ pub(crate) struct Check {
     least: f32,
 }
 
-impl Check {
+impl ImageCheck {
     pub const NEW: Self = Self {
-        stage: Stage::Envelope as u32,
+        stage: CheckStage::Envelope as u32,
         at: 0,
         within: 0,
         crc: CRC_START,
-        facts: Facts::NONE,
+        facts: ImageFacts::NONE,
         before: None,
         highest: [f32::NEG_INFINITY; 2],
         most: [0.0; 3],
@@ -200,16 +200,16 @@ impl Check {
             return Ok(true);
         }
         let next = match self.stage() {
-            Stage::Envelope => {
+            CheckStage::Envelope => {
                 check_envelope(image)?;
-                Some(Stage::Crc)
+                Some(CheckStage::Crc)
             }
-            Stage::Crc => self.crc(image)?.then_some(Stage::Identity),
-            Stage::Identity => {
-                self.facts = Facts::of(image)?;
-                Some(Stage::Pages)
+            CheckStage::Crc => self.crc(image)?.then_some(CheckStage::Identity),
+            CheckStage::Identity => {
+                self.facts = ImageFacts::of(image)?;
+                Some(CheckStage::Pages)
             }
-            Stage::Pages => self.page(image)?.then_some(Stage::Places),
+            CheckStage::Pages => self.page(image)?.then_some(CheckStage::Places),
             _ => self.numbers(image)?,
         };
         if let Some(next) = next {
@@ -220,44 +220,44 @@ impl Check {
     }
 
     const fn is_done(&self) -> bool {
-        self.stage == Stage::Done as u32
+        self.stage == CheckStage::Done as u32
     }
 
     /// The stage; the first for one that there is not, and then the checksum does not match.
-    fn stage(&self) -> Stage {
-        Stage::ALL.get(self.stage as usize).copied().unwrap_or(Stage::Envelope)
+    fn stage(&self) -> CheckStage {
+        CheckStage::ALL.get(self.stage as usize).copied().unwrap_or(CheckStage::Envelope)
     }
 
     /// A step among the numbers; the next stage if this one has ended.
-    fn numbers(&mut self, image: &[u8]) -> Result<Option<Stage>, ImageError> {
+    fn numbers(&mut self, image: &[u8]) -> Result<Option<CheckStage>, ImageError> {
         let words = image.get(..self.facts.body_bytes).unwrap_or_default().as_chunks::<4>().0;
         let records = self.facts.torque_nodes.saturating_mul(self.facts.temperature_nodes);
         Ok(match self.stage() {
-            Stage::Places => {
+            CheckStage::Places => {
                 self.facts.check_places(image, words)?;
-                Some(Stage::TorqueAxis)
+                Some(CheckStage::TorqueAxis)
             }
-            Stage::TorqueAxis => {
+            CheckStage::TorqueAxis => {
                 let nodes = self.facts.torque_nodes;
                 self.axis(Field::TorqueNodes, words, word::TORQUE_NODES, nodes, MAX_CLAMPED_NODES)?
-                    .then_some(Stage::TemperatureAxis)
+                    .then_some(CheckStage::TemperatureAxis)
             }
-            Stage::TemperatureAxis => {
+            CheckStage::TemperatureAxis => {
                 let (nodes, slots) = (self.facts.temperature_nodes, MAX_TEMPERATURE_NODES);
                 let ended = self.axis(Field::TemperatureNodes, words, word::TEMPERATURE_NODES, nodes, slots)?;
                 if ended {
                     self.facts.check_ranges(image, words)?;
                 }
-                ended.then_some(Stage::Unit)
+                ended.then_some(CheckStage::Unit)
             }
-            Stage::Unit => {
+            CheckStage::Unit => {
                 // So that the ripple in cells, and in counts, fits the integers of a step.
                 let most = self.facts.cell_width.abs() * MAX_UNITS_PER_CELL;
                 let most = if self.facts.ripple.is_empty() || most > i32::MAX as f32 { i32::MAX as f32 } else { most };
                 in_range(Field::MeanRipple, 0, word_at(words, word::RIPPLE_UNIT) as f32, 0.0, most)?;
-                Some(Stage::Jumps)
+                Some(CheckStage::Jumps)
             }
-            Stage::Jumps => {
+            CheckStage::Jumps => {
                 let node = |i: usize| f32_at(words, word::TORQUE_NODES.saturating_add(i));
                 let part = STEP_NUMBERS;
                 let (from, to) = (self.at, self.at.saturating_add(part).min(self.facts.torque_nodes));
@@ -266,73 +266,77 @@ impl Check {
                     self.facts.jumps |= (jump as u64).wrapping_shl(i as u32);
                 }
                 self.at = to;
-                (to >= self.facts.torque_nodes).then_some(Stage::Nodes)
+                (to >= self.facts.torque_nodes).then_some(CheckStage::Nodes)
             }
-            Stage::Nodes => {
+            CheckStage::Nodes => {
                 for _ in 0..STEP_NODES {
                     if self.at < records {
                         self.node(words)?;
                         self.at = self.at.saturating_add(1);
                     }
                 }
-                (self.at >= records).then_some(if self.facts.ripple.is_empty() { Stage::Curves } else { Stage::Closed })
+                (self.at >= records).then_some(if self.facts.ripple.is_empty() {
+                    CheckStage::Curves
+                } else {
+                    CheckStage::Closed
+                })
             }
-            Stage::Closed => {
+            CheckStage::Closed => {
                 if self.closed(words)? {
-                    self.next_part(Stage::Narrowest);
+                    self.next_part(CheckStage::Narrowest);
                 }
                 None
             }
-            Stage::Narrowest => {
+            CheckStage::Narrowest => {
                 if self.narrowest(words)? {
-                    self.next_part(Stage::Forward);
+                    self.next_part(CheckStage::Forward);
                 }
                 None
             }
-            Stage::Forward => {
+            CheckStage::Forward => {
                 if self.ripple(words) {
-                    self.next_part(Stage::Backward);
+                    self.next_part(CheckStage::Backward);
                 }
                 None
             }
-            Stage::Backward => {
+            CheckStage::Backward => {
                 let ended = self.ripple(words);
                 if ended {
-                    self.next_part(Stage::Closed);
+                    self.next_part(CheckStage::Closed);
                     self.at = self.at.saturating_add(1);
                 }
-                (ended && self.at >= records).then_some(Stage::Curves)
+                (ended && self.at >= records).then_some(CheckStage::Curves)
             }
-            Stage::Curves => self.curve(words)?,
-            Stage::CurvesClosed => self.curve_closed(words)?,
-            Stage::Bounds => {
+            CheckStage::Curves => self.curve(words)?,
+            CheckStage::CurvesClosed => self.curve_closed(words)?,
+            CheckStage::Bounds => {
                 self.facts.check_bounds(image)?;
-                Some(Stage::Rise)
+                Some(CheckStage::Rise)
             }
-            Stage::Rise => {
+            CheckStage::Rise => {
                 for _ in 0..STEP_NODES {
                     if self.at < records {
                         self.rise(words)?;
                         self.at = self.at.saturating_add(1);
                     }
                 }
-                (self.at >= records).then_some(Stage::Inverse)
+                (self.at >= records).then_some(CheckStage::Inverse)
             }
-            Stage::Inverse => {
+            CheckStage::Inverse => {
                 self.facts.check_inverse()?;
-                Some(Stage::Derived)
+                Some(CheckStage::Derived)
             }
             _ => {
                 for (at, value) in DERIVED_WORDS.into_iter().zip(self.facts.derived()) {
                     derived_is(words, at, value)?;
                 }
-                Some(Stage::Done)
+                Some(CheckStage::Done)
             }
         })
     }
 
     /// Goes on with another part of the same record.
-    fn next_part(&mut self, stage: Stage) {
+    fn next_part(&mut self, stage: CheckStage) {
         self.stage = stage as u32;
         self.within = 0;
     }
@@ -548,8 +552,8 @@ impl Check {
     #[inline(never)]
     fn number(&self, words: Words<'_>, i: usize) -> f32 {
         let first = match self.stage() {
-            Stage::Forward => 0,
-            Stage::Backward => self.facts.layout.record,
+            CheckStage::Forward => 0,
+            CheckStage::Backward => self.facts.layout.record,
             _ => {
                 let at = self.facts.layout.curves.get(self.at).copied().unwrap_or(0);
                 return curve_rad(words, at.saturating_add(i));
@@ -585,22 +589,22 @@ impl Check {
     }
 
     /// Some numbers of one of A, B, C: in range; after the last its closing.
-    fn curve(&mut self, words: Words<'_>) -> Result<Option<Stage>, ImageError> {
-        let Some((field, at, stored)) = self.facts.curve(self.at) else { return Ok(Some(Stage::Bounds)) };
+    fn curve(&mut self, words: Words<'_>) -> Result<Option<CheckStage>, ImageError> {
+        let Some((field, at, stored)) = self.facts.curve(self.at) else { return Ok(Some(CheckStage::Bounds)) };
         let end = self.within.saturating_add(STEP_NUMBERS).min(stored);
         for index in self.within..end {
             in_range(field, index, curve_rad(words, at.saturating_add(index)), -MAX_ERROR_RAD, MAX_ERROR_RAD)?;
         }
         self.within = end;
         if end >= stored {
-            self.next_part(Stage::CurvesClosed);
+            self.next_part(CheckStage::CurvesClosed);
         }
         Ok(None)
     }
 
     /// Whether it is closed, and, some at a time, what it can give.
-    fn curve_closed(&mut self, words: Words<'_>) -> Result<Option<Stage>, ImageError> {
-        let Some((field, at, stored)) = self.facts.curve(self.at) else { return Ok(Some(Stage::Bounds)) };
+    fn curve_closed(&mut self, words: Words<'_>) -> Result<Option<CheckStage>, ImageError> {
+        let Some((field, at, stored)) = self.facts.curve(self.at) else { return Ok(Some(CheckStage::Bounds)) };
         let nodes = stored.saturating_sub(3);
         if self.within == 0 && stored > 0 {
             let curve = words.get(at..).unwrap_or_default();
@@ -614,7 +618,7 @@ impl Check {
         if self.extremes(words, stored) {
             self.facts.add_curve(self.at, self.most);
             self.most = [0.0; 3];
-            self.next_part(Stage::Curves);
+            self.next_part(CheckStage::Curves);
             self.at = self.at.saturating_add(1);
         }
         Ok(None)
@@ -626,7 +630,7 @@ fn curve_rad(words: Words<'_>, at: usize) -> f32 {
     rad(word_at(words, at) as i32 as f32 * 0.5)
 }
 
-impl Facts {
+impl ImageFacts {
     /// Nothing known yet.
     const NONE: Self = Self {
         body_bytes: 0,
@@ -637,7 +641,7 @@ impl Facts {
         ripple: PeriodicAxis::NONE,
         cell_width: 1.0,
         curve_nodes: [0; 3],
-        layout: Layout::NONE,
+        layout: ImageLayout::NONE,
         jumps: 0,
         bounds: Bounds::NONE,
         inverse: InverseBound::NONE,
@@ -666,7 +670,7 @@ impl Facts {
         if needed != image.len() {
             return Err(size);
         }
-        let layout = Layout::new(torque_nodes, temperature_nodes, ripple_nodes, curve_nodes);
+        let layout = ImageLayout::new(torque_nodes, temperature_nodes, ripple_nodes, curve_nodes);
         Ok(Self {
             body_bytes: layout.end.saturating_mul(4),
             drive,
@@ -801,7 +805,7 @@ impl Facts {
     }
 }
 
-impl Check {
+impl ImageCheck {
     /// The table of the image that was given with every step, once the last is done.
     pub fn table<'a>(&self, image: &'a [u8]) -> Option<Table<'a>> {
         self.is_done().then(|| self.facts.table(image))
@@ -826,16 +830,16 @@ impl<'a> Table<'a> {
     /// # Errors
     /// The first check that fails, in the order of [`ImageError`].
     pub fn check(image: &'a [u8]) -> Result<Self, ImageError> {
-        let mut check = Check::NEW;
+        let mut check = ImageCheck::NEW;
         while !check.step(image)? {}
         // What is done has found everything.
         check.table(image).ok_or(ImageError::Magic)
     }
 
     /// [`Self::check`] but for the words that follow from the bounds.
-    pub(super) fn found(image: &'a [u8]) -> Result<Facts, ImageError> {
-        let mut check = Check::NEW;
-        while check.stage() != Stage::Derived {
+    pub(super) fn found(image: &'a [u8]) -> Result<ImageFacts, ImageError> {
+        let mut check = ImageCheck::NEW;
+        while check.stage() != CheckStage::Derived {
             check.step(image)?;
         }
         Ok(check.facts)
@@ -843,9 +847,9 @@ impl<'a> Table<'a> {
 }
 
 #[cfg(test)]
-crate::upset::upsets!(Check { stage, at, within, crc, facts, before, highest, most, least });
+crate::upset::upsets!(ImageCheck { stage, at, within, crc, facts, before, highest, most, least });
 #[cfg(test)]
-crate::upset::upsets!(Facts {
+crate::upset::upsets!(ImageFacts {
     body_bytes,
     drive,
     generator_kind,
@@ -863,11 +867,11 @@ crate::upset::upsets!(Facts {
 
 #[cfg(test)]
 mod tests {
-    use super::Stage;
+    use super::CheckStage;
 
     #[test]
     fn stages_are_found_by_their_number() {
-        assert!((0..).zip(Stage::ALL).all(|(number, stage)| stage as u32 == number));
-        assert_eq!(Stage::ALL.last(), Some(&Stage::Done));
+        assert!((0..).zip(CheckStage::ALL).all(|(number, stage)| stage as u32 == number));
+        assert_eq!(CheckStage::ALL.last(), Some(&CheckStage::Done));
     }
 }

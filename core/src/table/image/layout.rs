@@ -59,7 +59,7 @@ pub const fn image_bytes(torque: usize, temperature: usize, ripple: usize, curve
 }
 
 const fn body_bytes(torque: usize, temperature: usize, ripple: usize, curves: [usize; 3]) -> usize {
-    Layout::new(torque, temperature, ripple, curves).end.saturating_mul(4)
+    ImageLayout::new(torque, temperature, ripple, curves).end.saturating_mul(4)
 }
 
 /// As [`PeriodicAxis::stored_len`](crate::grid::PeriodicAxis::stored_len), for any number.
@@ -74,7 +74,7 @@ pub(crate) const fn ripple_row(nodes: usize) -> usize {
 
 /// Where everything lies, in words.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Layout {
+pub(super) struct ImageLayout {
     pub curves: [usize; 3],
     pub nodes: usize,
     node_plane: usize,
@@ -83,7 +83,7 @@ pub(super) struct Layout {
     pub end: usize,
 }
 
-impl Layout {
+impl ImageLayout {
     pub const NONE: Self = Self { curves: [0; 3], nodes: 0, node_plane: 0, records: 0, record: 0, end: 0 };
 
     pub const fn new(torque: usize, temperature: usize, ripple: usize, [a, b, c]: [usize; 3]) -> Self {
@@ -116,7 +116,7 @@ impl Layout {
 }
 
 #[cfg(test)]
-crate::upset::upsets!(Layout { curves, nodes, node_plane, records, record, end });
+crate::upset::upsets!(ImageLayout { curves, nodes, node_plane, records, record, end });
 
 /// Width of a cell of the ripple at the output, counts.
 pub(super) fn cell_width(drive: &Drive, ripple_nodes: usize) -> f32 {

@@ -63,7 +63,7 @@ mod sums;
 mod tests;
 mod write;
 
-pub(crate) use check::Check;
+pub(crate) use check::ImageCheck;
 pub(crate) use header::Laid;
 pub(crate) use layout::ID_OFFSET;
 pub use layout::{

@@ -3,7 +3,7 @@
 #[cfg(any(test, feature = "fuzzing"))]
 use super::layout::word;
 use super::layout::{
-    AXIS_SLOTS, BYTE_ORDER_MARK, DERIVED_WORDS, FORMAT_VERSION, ID_OFFSET, Layout, MAGIC, MAX_RIPPLE_NODES,
+    AXIS_SLOTS, BYTE_ORDER_MARK, DERIVED_WORDS, FORMAT_VERSION, ID_OFFSET, ImageLayout, MAGIC, MAX_RIPPLE_NODES,
     MAX_TEMPERATURE_NODES, RESERVED, TEXT_BYTES, UNITS_PER_COUNT, cell_width, counted, image_bytes, limit_counts,
     ripple_row,
 };
@@ -127,12 +127,12 @@ impl From<ImageError> for WriteError {
 }
 
 /// Fills a buffer from the front; what does not fit is only counted.
-struct Writer<'o> {
+struct ImageWriter<'o> {
     rest: &'o mut [u8],
     needed: usize,
 }
 
-impl<'o> Writer<'o> {
+impl<'o> ImageWriter<'o> {
     fn put(&mut self, bytes: &[u8]) {
         self.needed = self.needed.saturating_add(bytes.len());
         let room = bytes.len().min(self.rest.len());
@@ -200,7 +200,7 @@ impl TableData<'_> {
         if unit > whole as f64 { whole.saturating_add(1) } else { whole }
     }
 
-    fn put_nodes(&self, out: &mut Writer<'_>) {
+    fn put_nodes(&self, out: &mut ImageWriter<'_>) {
         let slopes = &Slopes::new(self.torque_nodes_n_m);
         let nodes = self.torque_nodes_n_m;
         let jumps = grid::jump_intervals(nodes.len(), |i| nodes.get(i).copied().unwrap_or(0.0));
@@ -217,7 +217,7 @@ impl TableData<'_> {
         }
     }
 
-    fn put_records(&self, out: &mut Writer<'_>, unit: u32) {
+    fn put_records(&self, out: &mut ImageWriter<'_>, unit: u32) {
         let Some(axis) = PeriodicAxis::new(self.ripple_nodes).filter(|axis| !axis.is_empty()) else { return };
         let units = |rad: f64| if unit == 0 { 0 } else { quantise(num::counts(rad) * UNITS_PER_COUNT / unit as f64) };
         let mean_ripples = self.mean_ripple_rad.chunks_exact(axis.len());
@@ -266,9 +266,9 @@ pub fn write_image(
     let ripple_unit = data.ripple_unit();
     let nodes = (data.torque_nodes_n_m.len(), data.temperature_nodes_c.len(), data.ripple_nodes);
     let curve_nodes = curves.map(<[f32]>::len);
-    let layout = Layout::new(nodes.0, nodes.1, nodes.2, curve_nodes);
+    let layout = ImageLayout::new(nodes.0, nodes.1, nodes.2, curve_nodes);
 
-    let mut writer = Writer { rest: image, needed: 0 };
+    let mut writer = ImageWriter { rest: image, needed: 0 };
     writer.put(&MAGIC);
     writer.put(&FORMAT_VERSION.to_le_bytes());
     writer.put(&BYTE_ORDER_MARK.to_le_bytes());

@@ -3,7 +3,7 @@
 //! Sizes and phases are points of a Sobol sequence with Owen's scrambling (Burley 2020), two dimensions to a tolerance;
 //! errors of teeth are noise by a counter, so that tooth k of drive i needs no other tooth and no other drive.
 
-use super::tolerance::{Acts, Law, TeethError, Tolerance};
+use super::tolerance::{Law, TeethError, Tolerance, ToleranceActs};
 use flexspline_base::statistics::mean;
 use flexspline_mechanics::drive::{AsBuilt, Drive, DriveError, Harmonic, Wheel};
 
@@ -32,14 +32,14 @@ pub struct Drawn {
 
 /// A point that a drive is made of: two numbers of 0 to 1, neither, and a key of noise for each tolerance.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Point {
+pub(super) struct DrawnPoint {
     pub uniform: Vec<[f64; 2]>,
     pub keys: Vec<u64>,
 }
 
-impl Point {
+impl DrawnPoint {
     /// This point with one tolerance taken from another.
-    pub fn with(&self, tolerance: usize, from: &Point) -> Point {
+    pub fn with(&self, tolerance: usize, from: &DrawnPoint) -> DrawnPoint {
         let mut mixed = self.clone();
         mixed.uniform[tolerance] = from.uniform[tolerance];
         mixed.keys[tolerance] = from.keys[tolerance];
@@ -64,15 +64,15 @@ impl Draw {
     }
 
     /// The point of drive `i`.
-    pub(super) fn point(&self, tolerances: usize, i: u32) -> Point {
+    pub(super) fn point(&self, tolerances: usize, i: u32) -> DrawnPoint {
         self.point_from(tolerances, i, 0)
     }
 
     /// A point whose first dimension is `first` of the sequence.
-    pub(super) fn point_from(&self, tolerances: usize, i: u32, first: u32) -> Point {
+    pub(super) fn point_from(&self, tolerances: usize, i: u32, first: u32) -> DrawnPoint {
         let at = |dimension: u32| f64::from(sobol_burley::sample(i, dimension, self.seed)) + HALF_STEP;
         let counter = |t: usize| u64::from(i) << 16 | u64::from(first) << 8 | t as u64;
-        Point {
+        DrawnPoint {
             uniform: (0..tolerances as u32).map(|t| [at(first + 2 * t), at(first + 2 * t + 1)]).collect(),
             keys: (0..tolerances).map(|t| mixed(self.key ^ mixed(counter(t)))).collect(),
         }
@@ -98,16 +98,16 @@ fn noise(key: u64, k: u64) -> f64 {
 }
 
 /// The drive of a point; `teeth` are those of flexspline and circular spline.
-pub(super) fn drawn(tolerances: &[Tolerance], teeth: [u32; 2], point: &Point) -> Drawn {
+pub(super) fn drawn(tolerances: &[Tolerance], teeth: [u32; 2], point: &DrawnPoint) -> Drawn {
     let mut all = Drawn { values: Vec::new(), phases_deg: Vec::new(), teeth_um: Vec::new() };
     for ((tolerance, [size, place]), key) in tolerances.iter().zip(&point.uniform).zip(&point.keys) {
         let distribution = &tolerance.distribution;
         let mut errors = Vec::new();
         let (value, phase_deg) = match tolerance.acts {
-            Acts::Alike => (distribution.quantile(*size), 0.0),
-            Acts::Directed => (distribution.quantile(*size), 360.0 * place),
-            Acts::Harmonic { order, .. } => (distribution.quantile(*size), 360.0 * place / f64::from(order)),
-            Acts::Teeth { wheel, errors: of } => {
+            ToleranceActs::Alike => (distribution.quantile(*size), 0.0),
+            ToleranceActs::Directed => (distribution.quantile(*size), 360.0 * place),
+            ToleranceActs::Harmonic { order, .. } => (distribution.quantile(*size), 360.0 * place / f64::from(order)),
+            ToleranceActs::Teeth { wheel, errors: of } => {
                 let count = teeth[usize::from(wheel == Wheel::CircularSpline)];
                 errors = (0..u64::from(count)).map(|k| distribution.quantile(noise(*key, k))).collect();
                 if of == TeethError::Pitch {
@@ -146,8 +146,8 @@ impl Drawn {
         for (t, tolerance) in tolerances.iter().enumerate() {
             let (value, phase) = (self.values[t], self.phases_deg[t]);
             match tolerance.acts {
-                Acts::Alike => {}
-                Acts::Directed => {
+                ToleranceActs::Alike => {}
+                ToleranceActs::Directed => {
                     let (size, direction) = match tolerance.field.as_str() {
                         "as_built.circular_spline_eccentricity_um" => (
                             &mut built.circular_spline_eccentricity_um,
@@ -166,14 +166,14 @@ impl Drawn {
                     };
                     (*size, *direction) = (value, phase);
                 }
-                Acts::Harmonic { wheel, order } => {
+                ToleranceActs::Harmonic { wheel, order } => {
                     let list = match wheel {
                         Wheel::Flexspline => &mut built.flexspline_pitch_harmonics,
                         Wheel::CircularSpline => &mut built.circular_spline_pitch_harmonics,
                     };
                     list.push(Harmonic { order, amplitude_um: value, phase_deg: phase });
                 }
-                Acts::Teeth { wheel, .. } => {
+                ToleranceActs::Teeth { wheel, .. } => {
                     let list = match wheel {
                         Wheel::Flexspline => &mut built.flexspline_pitch_error_um,
                         Wheel::CircularSpline => &mut built.circular_spline_pitch_error_um,
@@ -189,7 +189,7 @@ impl Drawn {
     /// # Errors
     /// What was drawn makes no drive.
     pub fn drive(&self, drawn_as: &Drive, tolerances: &[Tolerance]) -> Result<Drive, DriveError> {
-        let alike = tolerances.iter().zip(&self.values).filter(|(tolerance, _)| tolerance.acts == Acts::Alike);
+        let alike = tolerances.iter().zip(&self.values).filter(|(tolerance, _)| tolerance.acts == ToleranceActs::Alike);
         let sets: Vec<String> = alike.map(|(tolerance, value)| format!("{}={value}", tolerance.field)).collect();
         let mut drive = drawn_as.with_sets(sets.iter().map(String::as_str))?;
         self.deviate(tolerances, &mut drive.as_built);
@@ -200,8 +200,8 @@ impl Drawn {
     /// The drive whose every tolerance has its middle value: nothing, of a size or an error of teeth.
     pub fn middle(tolerances: &[Tolerance]) -> Drawn {
         let of = |tolerance: &Tolerance| match (tolerance.acts, tolerance.distribution.law) {
-            (Acts::Alike, Law::Normal { mean, .. }) => mean,
-            (Acts::Alike, _) => tolerance.distribution.quantile(0.5),
+            (ToleranceActs::Alike, Law::Normal { mean, .. }) => mean,
+            (ToleranceActs::Alike, _) => tolerance.distribution.quantile(0.5),
             _ => 0.0,
         };
         Drawn {

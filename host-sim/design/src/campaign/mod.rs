@@ -33,7 +33,7 @@ pub use reduce::{
     Tightened, WorstDrive, reduce, worst_path,
 };
 pub use shard::{Became, Shard, ShardError, ShardState, look, run_shard};
-pub use tolerance::{Acts, Distribution, EXAMPLE, Law, TeethError, Tolerance, Tolerances};
+pub use tolerance::{Distribution, EXAMPLE, Law, TeethError, Tolerance, ToleranceActs, Tolerances};
 pub use variance::Share;
 
 #[cfg(test)]

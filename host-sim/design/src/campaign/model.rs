@@ -19,7 +19,7 @@ use std::f64::consts::TAU;
 use serde::{Deserialize, Serialize};
 
 use super::draw::Drawn;
-use super::tolerance::{Acts, Tolerance};
+use super::tolerance::{Tolerance, ToleranceActs};
 use crate::kernels::{EccentricField, Gain, Kernels, PlaceOfLoad};
 use crate::tables::places_that_tell_apart;
 use flexspline_base::units::ARCSEC_PER_RAD;
@@ -525,5 +525,5 @@ pub(super) fn spread(values: &[f64]) -> (f64, f64) {
 
 /// Whether a tolerance needs kernels of displaced axes.
 pub(crate) fn displaces(tolerance: &Tolerance) -> bool {
-    tolerance.acts == Acts::Directed && tolerance.field != "as_built.circular_spline_ovality_um"
+    tolerance.acts == ToleranceActs::Directed && tolerance.field != "as_built.circular_spline_ovality_um"
 }

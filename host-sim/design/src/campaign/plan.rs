@@ -12,7 +12,7 @@ use thiserror::Error;
 use super::by_fem::{Conditions, wave};
 use super::draw::{Drawn, MOST_DRIVES};
 use super::model::{Model, Parabola, Response, SHEET, displaces};
-use super::tolerance::{Acts, Tolerance, Tolerances};
+use super::tolerance::{Tolerance, ToleranceActs, Tolerances};
 use crate::data_sheet::{FIGURES, Loads, data_sheet};
 use crate::kernels::{KernelError, KernelPlan, Kernels, make};
 use flexspline_base::toml_file::{Problem, lines};
@@ -137,7 +137,7 @@ pub fn plan(of: &Tolerances, settings: PlanSettings, progress: &PlanProgress<'_>
     let torques_n_m = [of.torque_n_m, (LIGHT[0] * rated).min(LIGHT[1] * of.torque_n_m)];
     let solver = SolverSettings { method: Method::Fast, mesh: settings.mesh, ..SolverSettings::default() };
     let kernel_plan = |kind| kernel_plan(of, kind, torques_n_m);
-    let alike = of.list.iter().filter(|tolerance| tolerance.acts == Acts::Alike).count();
+    let alike = of.list.iter().filter(|tolerance| tolerance.acts == ToleranceActs::Alike).count();
     let steps: usize = of.generators.iter().map(|kind| kernel_plan(*kind).steps() + 1 + 2 * alike).sum();
     let mut before = 0;
     let mut generators = Vec::new();
@@ -178,7 +178,7 @@ pub fn plan(of: &Tolerances, settings: PlanSettings, progress: &PlanProgress<'_>
 fn with_alike(of: &Tolerances, drawn: &Drawn) -> Result<Drive, PlanError> {
     let nothing = vec![0.0; of.list.len()];
     let sizes = of.list.iter().zip(&drawn.values).zip(&nothing);
-    let values = sizes.map(|((t, value), none)| if t.acts == Acts::Alike { *value } else { *none }).collect();
+    let values = sizes.map(|((t, value), none)| if t.acts == ToleranceActs::Alike { *value } else { *none }).collect();
     let alone = Drawn { values, teeth_um: vec![Vec::new(); of.list.len()], ..drawn.clone() };
     let mut drive = alone.drive(&of.drive, &of.list).map_err(|error| PlanError::BadInput(error.to_string()))?;
     drive.as_built = drive.as_built.uniform_part();
@@ -232,7 +232,7 @@ fn response(
     told: &(dyn Fn(usize) + Sync),
 ) -> Result<Response, PlanError> {
     let mut jobs: Vec<Option<(usize, f64)>> = vec![None];
-    for (t, tolerance) in of.list.iter().enumerate().filter(|(_, tolerance)| tolerance.acts == Acts::Alike) {
+    for (t, tolerance) in of.list.iter().enumerate().filter(|(_, tolerance)| tolerance.acts == ToleranceActs::Alike) {
         jobs.extend([OUTER_SHARE, 1.0 - OUTER_SHARE].map(|share| Some((t, tolerance.distribution.quantile(share)))));
     }
     let done = AtomicUsize::new(0);

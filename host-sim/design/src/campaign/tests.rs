@@ -76,7 +76,7 @@ fn plan_of(text: &str, drives: u32, shards: u32) -> Plan {
         .list
         .iter()
         .enumerate()
-        .filter(|(_, t)| t.acts == Acts::Alike)
+        .filter(|(_, t)| t.acts == ToleranceActs::Alike)
         .map(|(tolerance, t)| Parabola {
             tolerance,
             at: [0.05, 0.5, 0.95].map(|share| t.distribution.quantile(share)),

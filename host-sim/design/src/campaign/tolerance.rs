@@ -57,7 +57,7 @@ pub struct Tolerance {
     /// The field of the drive, as `--set` takes it.
     pub field: String,
     /// What it does.
-    pub acts: Acts,
+    pub acts: ToleranceActs,
     /// How it scatters.
     pub distribution: Distribution,
 }
@@ -77,7 +77,7 @@ impl Tolerance {
 /// How a field acts, and by which kernels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
-pub enum Acts {
+pub enum ToleranceActs {
     /// It changes the drive everywhere alike: FEM of three drives gives a parabola of every figure.
     Alike,
     /// It displaces or deforms a part in a direction, which is random.
@@ -221,18 +221,23 @@ fn told(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
 }
 
-impl Acts {
+impl ToleranceActs {
     /// Whether a direction or a phase is drawn beside the size.
     pub(crate) fn has_phase(self) -> bool {
-        matches!(self, Acts::Directed | Acts::Harmonic { .. })
+        matches!(self, ToleranceActs::Directed | ToleranceActs::Harmonic { .. })
     }
 
     /// How the field `at` a place acts; `order` where one is given.
-    fn of(at: &Spanned<DeValue<'_>>, field: &str, order: Option<u32>, errors: TeethError) -> Result<Acts, Refused> {
+    fn of(
+        at: &Spanned<DeValue<'_>>,
+        field: &str,
+        order: Option<u32>,
+        errors: TeethError,
+    ) -> Result<ToleranceActs, Refused> {
         let refused = |what| Err(Refused::because(at, what));
         let section_key = field.strip_prefix("as_built.");
         let harmonic = |wheel| match order {
-            Some(order) => Ok(Acts::Harmonic { wheel, order }),
+            Some(order) => Ok(ToleranceActs::Harmonic { wheel, order }),
             None => refused("order: missing; give the waves around the wheel".to_owned()),
         };
         let acts = match section_key {
@@ -244,9 +249,9 @@ impl Acts {
                 | "circular_spline_offset_um"
                 | "flexspline_runout_um"
                 | "generator_eccentricity_um",
-            ) => Acts::Directed,
-            Some("flexspline_pitch_error_um") => Acts::Teeth { wheel: Wheel::Flexspline, errors },
-            Some("circular_spline_pitch_error_um") => Acts::Teeth { wheel: Wheel::CircularSpline, errors },
+            ) => ToleranceActs::Directed,
+            Some("flexspline_pitch_error_um") => ToleranceActs::Teeth { wheel: Wheel::Flexspline, errors },
+            Some("circular_spline_pitch_error_um") => ToleranceActs::Teeth { wheel: Wheel::CircularSpline, errors },
             Some(
                 "rim_thickness_harmonics" | "cam_form_harmonics" | "damaged_teeth" | "generator_lobe_asymmetry_um",
             ) => {
@@ -259,7 +264,7 @@ impl Acts {
             Some(phase) if phase.ends_with("_phase_deg") || phase.ends_with("_direction_deg") => {
                 return refused(format!("field: found {field:?}, which is drawn with its size; leave it out"));
             }
-            _ => Acts::Alike,
+            _ => ToleranceActs::Alike,
         };
         match order {
             Some(order) => {
@@ -401,7 +406,7 @@ fn limit_without_drive(drive: &Drive, list: &[Tolerance], k: usize) -> Option<St
     tolerance.distribution.limits.into_iter().find_map(|limit| {
         let mut drawn = Drawn::middle(list);
         drawn.values[k] = limit;
-        if let Acts::Teeth { wheel, .. } = tolerance.acts {
+        if let ToleranceActs::Teeth { wheel, .. } = tolerance.acts {
             drawn.teeth_um[k] = vec![limit; teeth[usize::from(wheel == Wheel::CircularSpline)] as usize];
         }
         let error = drawn.drive(drive, list).err()?;
@@ -440,13 +445,13 @@ fn tolerance(entry: &Spanned<DeValue<'_>>, drive: &Drive) -> Result<Tolerance, R
     let order = table.given("order", |value| whole(&ANY_ORDER, value))?;
     let errors = [("position", TeethError::Position), ("pitch", TeethError::Pitch)];
     let errors_given = table.given("errors", |value| one_of(&errors, value))?;
-    let acts = Acts::of(place("field"), &field, order, errors_given.unwrap_or(TeethError::Position))?;
-    if errors_given.is_some() && !matches!(acts, Acts::Teeth { .. }) {
+    let acts = ToleranceActs::of(place("field"), &field, order, errors_given.unwrap_or(TeethError::Position))?;
+    if errors_given.is_some() && !matches!(acts, ToleranceActs::Teeth { .. }) {
         let what = format!("errors: found it beside {field:?}, allowed: with errors of every tooth alone");
         return Err(Refused::because(place("errors"), what));
     }
     let nominal = match acts {
-        Acts::Alike => nominal(place("field"), drive, &field).map_err(|refused| refused.within(".field"))?,
+        ToleranceActs::Alike => nominal(place("field"), drive, &field).map_err(|refused| refused.within(".field"))?,
         _ => 0.0,
     };
     let laws = [("normal", LawName::Normal), ("uniform", LawName::Uniform), ("rayleigh", LawName::Rayleigh)];
@@ -464,7 +469,7 @@ fn tolerance(entry: &Spanned<DeValue<'_>>, drive: &Drive) -> Result<Tolerance, R
             _ => Err(Refused::found(value, TWO_LIMITS)),
         }
     })?;
-    let is_size = !matches!(acts, Acts::Alike | Acts::Teeth { .. });
+    let is_size = !matches!(acts, ToleranceActs::Alike | ToleranceActs::Teeth { .. });
     let beside = |key: &str, what: &str| Refused::because(place(key), format!("{key}: {what}"));
     if mean.is_some() && (law != LawName::Normal || is_size) {
         return Err(beside(
@@ -515,12 +520,12 @@ fn tolerance(entry: &Spanned<DeValue<'_>>, drive: &Drive) -> Result<Tolerance, R
     if most - least < LEAST_INSIDE {
         return Err(beside("limits", "found limits that the distribution hardly ever keeps, allowed: wider ones"));
     }
-    if let Some(what) = distribution.beside_drive(nominal).filter(|_| matches!(acts, Acts::Alike)) {
+    if let Some(what) = distribution.beside_drive(nominal).filter(|_| matches!(acts, ToleranceActs::Alike)) {
         let key = if mean.is_some() { "mean" } else { "limits" };
         return Err(beside(key, &format!("{field:?} is {nominal} in the drive, and {what}")));
     }
     let name = table.given("name", text)?.unwrap_or_else(|| match acts {
-        Acts::Harmonic { order, .. } => format!("{field}, order {order}"),
+        ToleranceActs::Harmonic { order, .. } => format!("{field}, order {order}"),
         _ => field.clone(),
     });
     Ok(Tolerance { name, field, acts, distribution })

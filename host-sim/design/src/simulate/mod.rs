@@ -20,7 +20,7 @@ use std::ops::ControlFlow;
 
 use thiserror::Error;
 
-use crate::cautions::{Looked, rigid_gap_um, room_as_built_arcsec};
+use crate::cautions::{LookedAt, rigid_gap_um, room_as_built_arcsec};
 use flexspline_base::spent::Stopwatch;
 use flexspline_mechanics::drive::{Drive, GeneratorKind, ThermalState};
 use flexspline_mechanics::motion::Motion;
@@ -695,7 +695,7 @@ impl<'a> RunState<'a> {
         let uneven = uneven.unwrap_or(Face::EVEN);
         let peak_flank_pressure_mpa = largest(rows, |row| row.peak_flank_pressure_mpa);
         let tip_contact = TipContact::worst(rows.iter().filter_map(|row| row.tips));
-        let looked = Looked {
+        let looked = LookedAt {
             rigid_gap_um: rigid_gap_um(self.drive, settings.generator),
             room_as_built_arcsec: room_as_built_arcsec(self.drive, settings.generator),
             max_von_mises_mpa: Some(peak.von_mises_mpa),

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::judge::{Constraint, clears};
-use super::{Run, RunStatus};
+use super::{RunStatus, StudyRun};
 use flexspline_base::robust::least_and_most;
 use flexspline_mechanics::drive::GeneratorKind;
 
@@ -54,9 +54,9 @@ impl Miss {
 }
 
 /// How many variants of a generator have each thing that is asked, alone.
-pub fn asked(runs: &[Run], constraints: &[Constraint], generator: GeneratorKind) -> Vec<Asked> {
-    let all: Vec<&Run> = runs.iter().filter(|run| run.generator == generator).collect();
-    let one = |what: String, found, has: &dyn Fn(&Run) -> bool| Asked {
+pub fn asked(runs: &[StudyRun], constraints: &[Constraint], generator: GeneratorKind) -> Vec<Asked> {
+    let all: Vec<&StudyRun> = runs.iter().filter(|run| run.generator == generator).collect();
+    let one = |what: String, found, has: &dyn Fn(&StudyRun) -> bool| Asked {
         generator,
         what,
         meet_alone: all.iter().filter(|run| has(run)).count(),
@@ -78,7 +78,7 @@ pub fn asked(runs: &[Run], constraints: &[Constraint], generator: GeneratorKind)
 /// the sum of what is missing, each over the range in which the figure was found. A figure that a variant does not
 /// have, or that is missed where it has no range, counts as missed by a whole one. None where there is no such variant,
 /// or where one meets.
-pub fn nearest(runs: &[Run], constraints: &[Constraint], generator: GeneratorKind) -> Option<Nearest> {
+pub fn nearest(runs: &[StudyRun], constraints: &[Constraint], generator: GeneratorKind) -> Option<Nearest> {
     let all = || runs.iter().filter(|run| run.generator == generator);
     if all().any(|run| run.meets) {
         return None;
@@ -91,7 +91,7 @@ pub fn nearest(runs: &[Run], constraints: &[Constraint], generator: GeneratorKin
             found.map_or(0.0, |[low, high]| if high > low { high - low } else { high.abs() })
         })
         .collect();
-    let distance = |run: &Run| -> f64 {
+    let distance = |run: &StudyRun| -> f64 {
         let each = constraints.iter().zip(&spans).map(|(constraint, span)| match constraint.lacks(&run.sheet) {
             Some(0.0) => 0.0,
             Some(lack) if *span > 0.0 => lack / span,

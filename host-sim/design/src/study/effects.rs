@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use flexspline_algebra::{Mat, cholesky};
 use serde::Serialize;
 
-use super::{Basis, Run, Study, figure};
+use super::{Basis, Study, StudyRun, figure};
 use crate::data_sheet::{DataSheet, FIGURES};
 use flexspline_mechanics::drive::GeneratorKind;
 
@@ -16,7 +16,7 @@ const NO_CHANGE: f64 = 1e-9;
 
 /// What the fields do to a figure, of one generator.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Effect {
+pub struct StudyEffect {
     /// The generator.
     pub generator: GeneratorKind,
     /// The figure.
@@ -30,9 +30,9 @@ pub struct Effect {
 
 /// The effects of all fields on a figure, by least squares over the variants that have it; none where these are too
 /// few.
-pub fn effects(study: &Study, generator: GeneratorKind, name: &'static str) -> Option<Effect> {
+pub fn effects(study: &Study, generator: GeneratorKind, name: &'static str) -> Option<StudyEffect> {
     let (_, of) = figure(name).ok()?;
-    let runs: Vec<(&Run, f64)> = study
+    let runs: Vec<(&StudyRun, f64)> = study
         .runs
         .iter()
         .filter(|run| run.generator == generator)
@@ -54,7 +54,7 @@ pub fn effects(study: &Study, generator: GeneratorKind, name: &'static str) -> O
     let (slopes, straight) = least_squares(&used, &y)?;
     let mut slopes = slopes.into_iter();
     let change = columns.iter().map(|column| column.as_ref().and_then(|_| slopes.next())).collect();
-    Some(Effect { generator, figure: name, change, straight })
+    Some(StudyEffect { generator, figure: name, change, straight })
 }
 
 /// Whether the field number `field` changes no figure of a generator: of computed runs that differ in this field alone,
@@ -62,25 +62,25 @@ pub fn effects(study: &Study, generator: GeneratorKind, name: &'static str) -> O
 /// all runs have to be the same. A slope would not do: a figure that is even in a field that varies about zero has
 /// none.
 pub fn is_idle(study: &Study, generator: GeneratorKind, field: usize) -> bool {
-    let computed = |run: &&Run| run.generator == generator && run.basis == Basis::Computed;
-    let runs: Vec<&Run> = study.runs.iter().filter(computed).collect();
-    let mut alike: BTreeMap<Vec<&str>, Vec<&Run>> = BTreeMap::new();
+    let computed = |run: &&StudyRun| run.generator == generator && run.basis == Basis::Computed;
+    let runs: Vec<&StudyRun> = study.runs.iter().filter(computed).collect();
+    let mut alike: BTreeMap<Vec<&str>, Vec<&StudyRun>> = BTreeMap::new();
     for run in &runs {
         let others = run.values.iter().enumerate().filter(|(k, _)| *k != field).map(|(_, value)| value.as_str());
         alike.entry(others.collect()).or_default().push(run);
     }
-    let mut groups: Vec<Vec<&Run>> = alike.into_values().filter(|group| group.len() > 1).collect();
+    let mut groups: Vec<Vec<&StudyRun>> = alike.into_values().filter(|group| group.len() > 1).collect();
     if groups.is_empty() {
         groups.push(runs);
     }
     // Runs without figures say nothing of what a field does.
-    let tells = |run: &&Run| FIGURES.iter().any(|(_, of)| of(&run.sheet).is_some());
+    let tells = |run: &&StudyRun| FIGURES.iter().any(|(_, of)| of(&run.sheet).is_some());
     groups.iter().any(|group| group.len() > 1 && group.iter().all(tells))
         && groups.iter().all(|group| are_the_same(group))
 }
 
 /// Whether all of these ended in the same way with the same figures.
-fn are_the_same(runs: &[&Run]) -> bool {
+fn are_the_same(runs: &[&StudyRun]) -> bool {
     let same = |of: fn(&DataSheet) -> Option<f64>| {
         let values: Vec<f64> = runs.iter().filter_map(|run| of(&run.sheet)).collect();
         let [low, high] = [

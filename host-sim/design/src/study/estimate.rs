@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 
 use super::surface::Surface;
 use super::trust::Trust;
-use super::{Basis, Job, Run, RunStatus, StudyError, StudySettings, Target, is_error_of_making, judge};
+use super::{Basis, Job, RunStatus, StudyError, StudyRun, StudySettings, StudyTarget, is_error_of_making, judge};
 use crate::data_sheet::{DataSheet, FIGURES};
 use flexspline_mechanics::drive::GeneratorKind;
 
@@ -44,7 +44,7 @@ pub(crate) fn computed_first(fields: usize) -> usize {
 
 /// Makes these runs, in their order, by contact FEM or by the drawing alone; it is told how many there will be in all,
 /// about.
-pub(super) type Make<'a> = dyn Fn(&[Job], usize, Basis) -> Result<Vec<Run>, StudyError> + 'a;
+pub(super) type Make<'a> = dyn Fn(&[Job], usize, Basis) -> Result<Vec<StudyRun>, StudyError> + 'a;
 
 /// All runs, in the order of `jobs`, as many of them computed as matter, and what the estimates are off by.
 pub(super) fn some_computed(
@@ -52,14 +52,14 @@ pub(super) fn some_computed(
     variants: &[Vec<String>],
     jobs: &[Job],
     make: &Make<'_>,
-) -> Result<(Vec<Run>, Vec<Trust>), StudyError> {
+) -> Result<(Vec<StudyRun>, Vec<Trust>), StudyError> {
     let StudySettings { generators, targets, .. } = settings;
     let places = places(variants);
     let errors: Vec<usize> = (0..settings.vary.len()).filter(|k| is_error_of_making(&settings.vary[*k].path)).collect();
     let first = computed_first(settings.vary.len());
     let expected = jobs.len() + generators.len() * (first + MOST_OF_FRONT);
     // Computes these, in their places.
-    let compute = |runs: &mut [Run], which: &[usize]| -> Result<(), StudyError> {
+    let compute = |runs: &mut [StudyRun], which: &[usize]| -> Result<(), StudyError> {
         let again: Vec<Job> = which.iter().map(|k| jobs[*k]).collect();
         let made = make(&again, expected, Basis::Computed)?;
         which.iter().zip(made).for_each(|(k, run)| runs[*k] = run);
@@ -98,11 +98,11 @@ pub(super) fn some_computed(
     Ok((runs, trust))
 }
 
-fn is_estimated(run: &Run) -> bool {
+fn is_estimated(run: &StudyRun) -> bool {
     run.basis == Basis::Estimated
 }
 
-fn is_known(run: &Run) -> bool {
+fn is_known(run: &StudyRun) -> bool {
     run.basis == Basis::Computed && run.status == RunStatus::Converged
 }
 
@@ -155,7 +155,7 @@ pub(super) fn furthest_first(places: &[Vec<f64>], count: usize) -> Vec<usize> {
 
 /// Whether that of the computed runs of the same generator which is nearest to run `k` found no equilibrium; or none
 /// was computed.
-fn nearest_failed(runs: &[Run], jobs: &[Job], places: &[Vec<f64>], computed: &[usize], k: usize) -> bool {
+fn nearest_failed(runs: &[StudyRun], jobs: &[Job], places: &[Vec<f64>], computed: &[usize], k: usize) -> bool {
     let apart = |other: usize| square(&places[jobs[other].0], &places[jobs[k].0]);
     let same = computed.iter().copied().filter(|other| runs[*other].generator == runs[k].generator);
     let nearest = same.min_by(|a, b| apart(*a).total_cmp(&apart(*b)));
@@ -163,7 +163,7 @@ fn nearest_failed(runs: &[Run], jobs: &[Job], places: &[Vec<f64>], computed: &[u
 }
 
 /// The best of these in each target, then the second in each, and so on.
-fn best_first(all: &[usize], runs: &[Run], targets: &[Target]) -> Vec<usize> {
+fn best_first(all: &[usize], runs: &[StudyRun], targets: &[StudyTarget]) -> Vec<usize> {
     let ranked = targets.iter().map(|target| {
         let mut order = all.to_vec();
         order.sort_by(|a, b| target.cost(&runs[*a].sheet).total_cmp(&target.cost(&runs[*b].sheet)));
@@ -190,7 +190,7 @@ fn thinned(known: Vec<usize>, jobs: &[Job], places: &[Vec<f64>]) -> Vec<usize> {
 }
 
 /// Fills in what is estimated; what that is off by.
-fn estimate(generators: &[GeneratorKind], runs: &mut [Run], jobs: &[Job], places: &[Vec<f64>]) -> Vec<Trust> {
+fn estimate(generators: &[GeneratorKind], runs: &mut [StudyRun], jobs: &[Job], places: &[Vec<f64>]) -> Vec<Trust> {
     let mut trust = Vec::new();
     for kind in generators {
         let known = (0..runs.len()).filter(|k| runs[*k].generator == *kind && is_known(&runs[*k])).collect();
@@ -205,7 +205,7 @@ fn estimate(generators: &[GeneratorKind], runs: &mut [Run], jobs: &[Job], places
             trust.push(Trust::new(*kind, name, &values, &surface.left_out));
             Some(surface)
         });
-        let estimated = |run: &Run| run.generator == *kind && is_estimated(run);
+        let estimated = |run: &StudyRun| run.generator == *kind && is_estimated(run);
         for (run, (variant, _)) in runs.iter_mut().zip(jobs).filter(|(run, _)| estimated(run)) {
             let drawn = run.sheet;
             let figure = |f: usize| match &surfaces[f] {
@@ -254,7 +254,7 @@ mod tests {
     fn beside_a_variant_that_failed_nothing_is_estimated() {
         let places = [0.0, 0.1, 0.9, 1.0].map(|x| vec![x]);
         let jobs: Vec<Job> = (0..4).map(|k| (k, GeneratorKind::Cam)).collect();
-        let mut runs: Vec<Run> = (0..4).map(|k| made_up(k, 0.0, 1.0, 1.0)).collect();
+        let mut runs: Vec<StudyRun> = (0..4).map(|k| made_up(k, 0.0, 1.0, 1.0)).collect();
         runs[3].status = RunStatus::Failed;
         let failed = |k: usize| nearest_failed(&runs, &jobs, &places, &[0, 3], k);
         assert!(!failed(1) && failed(2));
@@ -279,7 +279,7 @@ mod tests {
             let generators = vec![GeneratorKind::Cam, GeneratorKind::TwoRoller, GeneratorKind::DoubleDisc];
             let targets = ["kinematic_error_pp_arcsec", "max_von_mises_mpa"];
             let settings = StudySettings {
-                targets: targets.map(|name| Target::new(name, Sense::Least).unwrap()).to_vec(),
+                targets: targets.map(|name| StudyTarget::new(name, Sense::Least).unwrap()).to_vec(),
                 generators: generators.clone(),
                 ..settings(&["flexspline.rim_thickness_mm=0..1", "generator.w0_mm=0..1"])
             };
@@ -305,7 +305,7 @@ mod tests {
             generator == GeneratorKind::DoubleDisc && variant == SIDE * SIDE - 1
         }
 
-        fn make(&self, jobs: &[Job], basis: Basis) -> Vec<Run> {
+        fn make(&self, jobs: &[Job], basis: Basis) -> Vec<StudyRun> {
             let one = |job: &Job| {
                 let [error, stress] = MadeUp::figures(*job);
                 let mut run = made_up(job.0 + 1, 0.0, error, stress);
@@ -324,7 +324,7 @@ mod tests {
         }
 
         /// All runs, judged.
-        fn studied(&self) -> (Vec<Run>, Vec<Trust>) {
+        fn studied(&self) -> (Vec<StudyRun>, Vec<Trust>) {
             let make = |jobs: &[Job], _, basis| Ok(self.make(jobs, basis));
             let (mut runs, trust) = some_computed(&self.settings, &self.variants, &self.jobs, &make).unwrap();
             judge::judge(&mut runs, &[], &self.settings.targets, &[]);
@@ -363,7 +363,8 @@ mod tests {
         let best = |kind| {
             (0..SIDE * SIDE).min_by(|a, b| MadeUp::figures((*a, kind))[0].total_cmp(&MadeUp::figures((*b, kind))[0]))
         };
-        let front: Vec<&Run> = runs.iter().filter(|run| run.generator == GeneratorKind::Cam && run.front).collect();
+        let front: Vec<&StudyRun> =
+            runs.iter().filter(|run| run.generator == GeneratorKind::Cam && run.front).collect();
         assert!(front.len() == 1 && front[0].basis == Basis::Computed, "{front:?}");
         assert_eq!(Some(front[0].variant - 1), best(GeneratorKind::Cam));
         let after_the_first = computed(GeneratorKind::Cam) - computed_first(2);
@@ -396,7 +397,7 @@ mod tests {
         let places = places(&variants);
         let jobs: Vec<Job> = (0..500).map(|k| (k, GeneratorKind::Cam)).collect();
         let error = |k: usize| 2.0 + (0.01 * k as f64).sin();
-        let mut runs: Vec<Run> = (0..500).map(|k| made_up(k + 1, 0.0, error(k), 100.0)).collect();
+        let mut runs: Vec<StudyRun> = (0..500).map(|k| made_up(k + 1, 0.0, error(k), 100.0)).collect();
         // All variants between 100 and 199 are estimated: the surface has to come from both sides.
         for run in &mut runs[100..200] {
             (run.basis, run.sheet) = (Basis::Estimated, DataSheet::default());
@@ -410,11 +411,11 @@ mod tests {
 
     #[test]
     fn the_best_in_each_target_comes_before_the_second_in_any() {
-        let runs: Vec<Run> = [(1.0, 400.0), (2.0, 300.0), (3.0, 200.0), (4.0, 100.0)]
+        let runs: Vec<StudyRun> = [(1.0, 400.0), (2.0, 300.0), (3.0, 200.0), (4.0, 100.0)]
             .map(|(error, stress)| made_up(1, 0.0, error, stress))
             .to_vec();
-        let targets =
-            ["kinematic_error_pp_arcsec", "max_von_mises_mpa"].map(|name| Target::new(name, Sense::Least).unwrap());
+        let targets = ["kinematic_error_pp_arcsec", "max_von_mises_mpa"]
+            .map(|name| StudyTarget::new(name, Sense::Least).unwrap());
         assert_eq!(best_first(&[0, 1, 2, 3], &runs, &targets), [0, 3, 1, 2]);
         assert_eq!(best_first(&[2, 1], &runs, &targets), [1, 2]);
     }

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-use super::{Run, RunStatus};
+use super::{RunStatus, StudyRun};
 use crate::data_sheet::{DataSheet, FIGURES, FigureOf};
 use flexspline_base::suggest::did_you_mean;
 use flexspline_mechanics::drive::RigidMesh;
@@ -106,20 +106,20 @@ pub enum Sense {
 
 /// What makes a variant better.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Target {
+pub struct StudyTarget {
     /// The figure.
     pub figure: &'static str,
     /// Which way.
     pub sense: Sense,
 }
 
-impl Target {
+impl StudyTarget {
     /// A target by the name of its figure.
     ///
     /// # Errors
     /// There is no figure of that name.
-    pub fn new(name: &str, sense: Sense) -> Result<Target, JudgeError> {
-        Ok(Target { figure: figure(name)?.0, sense })
+    pub fn new(name: &str, sense: Sense) -> Result<StudyTarget, JudgeError> {
+        Ok(StudyTarget { figure: figure(name)?.0, sense })
     }
 
     /// The figure, turned so that less is better.
@@ -141,7 +141,7 @@ pub(super) fn clears(sheet: &DataSheet) -> bool {
 ///
 /// What converged bears the largest load of the study. That is where the search ends, known of every such run, and
 /// nothing to estimate.
-pub(super) fn judge(runs: &mut [Run], constraints: &[Constraint], targets: &[Target], errors: &[usize]) {
+pub(super) fn judge(runs: &mut [StudyRun], constraints: &[Constraint], targets: &[StudyTarget], errors: &[usize]) {
     for run in runs.iter_mut() {
         if let (true, Some(loads)) = (run.bears_all(), run.loads) {
             run.sheet.last_stable_n_m = Some(loads.largest_n_m);

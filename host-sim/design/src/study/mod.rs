@@ -24,11 +24,11 @@ use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::stepping::SolverSettings;
 
 pub use asked::{Asked, Miss, Nearest, asked, nearest};
-pub use effects::{Effect, effects, is_idle};
+pub use effects::{StudyEffect, effects, is_idle};
 pub(crate) use estimate::computed_first;
-pub use judge::{Constraint, JudgeError, Sense, Target, figure};
+pub use judge::{Constraint, JudgeError, Sense, StudyTarget, figure};
 pub use trust::Trust;
-pub use vary::{Values, Vary, VaryError, grid, is_error_of_making};
+pub use vary::{VariedValues, Vary, VaryError, grid, is_error_of_making};
 
 /// Fields that vary at once, at most.
 pub(crate) const MOST_FIELDS: usize = 32;
@@ -58,7 +58,7 @@ pub struct StudySettings {
     /// What a variant has to keep to.
     pub constraints: Vec<Constraint>,
     /// What makes a variant better than another.
-    pub targets: Vec<Target>,
+    pub targets: Vec<StudyTarget>,
     /// Every variant is computed, however many there are.
     pub compute_all: bool,
     /// The numerical method.
@@ -189,7 +189,7 @@ impl Basis {
 
 /// A variant with one generator.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Run {
+pub struct StudyRun {
     /// Number of the variant, from 1.
     pub variant: usize,
     /// The generator.
@@ -214,9 +214,9 @@ pub struct Run {
     pub front: bool,
 }
 
-impl Run {
+impl StudyRun {
     /// Whether another variant has the same errors of making, at these places among the values.
-    pub(crate) fn made_as(&self, other: &Run, errors: &[usize]) -> bool {
+    pub(crate) fn made_as(&self, other: &StudyRun, errors: &[usize]) -> bool {
         errors.iter().all(|k| self.values[*k] == other.values[*k])
     }
 
@@ -239,7 +239,7 @@ pub struct Study {
     /// The fields that vary.
     pub fields: Vec<String>,
     /// Every variant with every generator, by variant, then by generator.
-    pub runs: Vec<Run>,
+    pub runs: Vec<StudyRun>,
     /// How far estimated figures can be trusted, by generator and figure; nothing where all are computed.
     pub trust: Vec<Trust>,
 }
@@ -247,15 +247,16 @@ pub struct Study {
 impl Study {
     /// What nothing beats of a generator, best in the first target first. Where errors of making vary, those made as
     /// the first variant come first, then those made as the next: between them there is no better.
-    pub fn front(&self, generator: GeneratorKind, targets: &[Target]) -> Vec<&Run> {
-        let mut front: Vec<&Run> = self.runs.iter().filter(|run| run.generator == generator && run.front).collect();
+    pub fn front(&self, generator: GeneratorKind, targets: &[StudyTarget]) -> Vec<&StudyRun> {
+        let mut front: Vec<&StudyRun> =
+            self.runs.iter().filter(|run| run.generator == generator && run.front).collect();
         let errors = errors_of_making(&self.fields);
-        let made = |run: &Run| errors.iter().map(|k| run.values[*k].clone()).collect::<Vec<String>>();
+        let made = |run: &StudyRun| errors.iter().map(|k| run.values[*k].clone()).collect::<Vec<String>>();
         let mut first_made = HashMap::new();
         for (k, run) in self.runs.iter().enumerate() {
             first_made.entry(made(run)).or_insert(k);
         }
-        let cost = |run: &Run| targets.first().map_or(0.0, |first| first.cost(&run.sheet));
+        let cost = |run: &StudyRun| targets.first().map_or(0.0, |first| first.cost(&run.sheet));
         front.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
         front.sort_by_cached_key(|run| first_made.get(&made(run)));
         front
@@ -268,7 +269,7 @@ pub fn errors_of_making(fields: &[impl AsRef<str>]) -> Vec<usize> {
 }
 
 /// Told after every run: how many are done, of how many, and the last. May ask to stop.
-pub type Observer<'a> = dyn Fn(usize, usize, &Run) -> ControlFlow<()> + Sync + 'a;
+pub type Observer<'a> = dyn Fn(usize, usize, &StudyRun) -> ControlFlow<()> + Sync + 'a;
 
 /// Runs every variant of `drive` with every generator. The result does not depend on threads.
 ///
@@ -312,9 +313,9 @@ struct Several<'a> {
 
 impl Several<'_> {
     /// Runs these, in their order, as `one` does; the observer is told that there will be about `of` in all.
-    fn run(&self, jobs: &[Job], of: usize, one: fn(&Self, Job) -> Run) -> Result<Vec<Run>, StudyError> {
+    fn run(&self, jobs: &[Job], of: usize, one: fn(&Self, Job) -> StudyRun) -> Result<Vec<StudyRun>, StudyError> {
         let stopped = AtomicBool::new(false);
-        let runs: Vec<Run> = jobs
+        let runs: Vec<StudyRun> = jobs
             .par_iter()
             .with_max_len(1)
             .filter_map(|&job| {
@@ -333,10 +334,10 @@ impl Several<'_> {
     }
 
     /// A variant as its fields make it, or refused, without figures.
-    fn begun(&self, (variant, generator): Job) -> (Run, Option<Drive>) {
+    fn begun(&self, (variant, generator): Job) -> (StudyRun, Option<Drive>) {
         let values = &self.variants[variant];
         let made = varied(self.drive, self.paths, values);
-        let run = Run {
+        let run = StudyRun {
             variant: variant + 1,
             generator,
             values: values.clone(),
@@ -353,7 +354,7 @@ impl Several<'_> {
     }
 
     /// A variant by contact FEM.
-    fn computed(&self, job: Job) -> Run {
+    fn computed(&self, job: Job) -> StudyRun {
         let (mut run, drive) = self.begun(job);
         let (Some(drive), Some(loads)) = (drive, run.loads) else { return run };
         let StudySettings { positions, solver, .. } = *self.settings;
@@ -370,7 +371,7 @@ impl Several<'_> {
     }
 
     /// A variant by its drawing alone.
-    fn drawn(&self, job: Job) -> Run {
+    fn drawn(&self, job: Job) -> StudyRun {
         let (mut run, drive) = self.begun(job);
         if let Some(drive) = drive {
             (run.status, run.basis) = (RunStatus::Converged, Basis::Estimated);

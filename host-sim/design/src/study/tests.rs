@@ -13,7 +13,7 @@ pub(super) fn settings(vary: &[&str]) -> StudySettings {
         stated: None,
         positions: 4,
         constraints: Vec::new(),
-        targets: vec![Target::new("kinematic_error_pp_arcsec", Sense::Least).unwrap()],
+        targets: vec![StudyTarget::new("kinematic_error_pp_arcsec", Sense::Least).unwrap()],
         compute_all: false,
         solver: SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() },
     }
@@ -24,8 +24,8 @@ fn quietly(settings: &StudySettings) -> Result<Study, StudyError> {
 }
 
 /// A run with figures that were made up.
-pub(super) fn made_up(variant: usize, value: f64, error: f64, stress: f64) -> Run {
-    Run {
+pub(super) fn made_up(variant: usize, value: f64, error: f64, stress: f64) -> StudyRun {
+    StudyRun {
         variant,
         generator: GeneratorKind::Cam,
         values: vec![value.to_string()],
@@ -88,7 +88,7 @@ fn a_variant_that_makes_no_drive_is_refused_with_its_reason_and_the_rest_runs() 
 #[test]
 fn constraints_leave_out_and_the_front_is_what_nothing_beats() {
     let targets = [("kinematic_error_pp_arcsec", Sense::Least), ("max_von_mises_mpa", Sense::Least)]
-        .map(|(name, sense)| Target::new(name, sense).unwrap());
+        .map(|(name, sense)| StudyTarget::new(name, sense).unwrap());
     let mut runs = [(1.0, 300.0), (2.0, 200.0), (3.0, 250.0), (0.5, 500.0), (2.0, 200.0)]
         .map(|(e, s)| made_up(1, 1.0, e, s))
         .to_vec();
@@ -103,8 +103,8 @@ fn constraints_leave_out_and_the_front_is_what_nothing_beats() {
 /// comes first.
 #[test]
 fn variants_are_compared_with_those_made_alike() {
-    let targets = [Target::new("kinematic_error_pp_arcsec", Sense::Least).unwrap()];
-    let mut runs: Vec<Run> = Vec::new();
+    let targets = [StudyTarget::new("kinematic_error_pp_arcsec", Sense::Least).unwrap()];
+    let mut runs: Vec<StudyRun> = Vec::new();
     for (rim, off, error) in [("1.0", "0", 0.380), ("1.0", "10", 0.324), ("1.2", "0", 0.5), ("1.2", "10", 0.3)] {
         let mut run = made_up(runs.len() + 1, 1.0, error, 100.0);
         run.values = vec![rim.to_owned(), off.to_owned()];
@@ -138,7 +138,7 @@ fn a_constraint_that_cannot_be_read_says_what_is_allowed() {
 
 #[test]
 fn effects_are_the_slopes_of_what_is_straight() {
-    let runs: Vec<Run> = (0..6).map(|k| made_up(k, f64::from(k as u32), 10.0 - 1.5 * k as f64, 7.0)).collect();
+    let runs: Vec<StudyRun> = (0..6).map(|k| made_up(k, f64::from(k as u32), 10.0 - 1.5 * k as f64, 7.0)).collect();
     let study = Study { fields: vec!["a".into()], runs, trust: Vec::new() };
     let effect = effects(&study, GeneratorKind::Cam, "kinematic_error_pp_arcsec").unwrap();
     assert!((effect.change[0].unwrap() + 7.5).abs() < 1e-9 && (effect.straight - 1.0).abs() < 1e-12);
@@ -228,7 +228,7 @@ fn a_field_is_idle_where_no_figure_changes_with_it_and_not_where_a_line_has_no_s
         run
     };
     let places = [-5.0, 0.0, 5.0].into_iter().flat_map(|a| [1.0, 2.0, 3.0].map(|b| (a, b)));
-    let runs: Vec<Run> = places.enumerate().map(|(k, (a, b))| run(k + 1, a, b)).collect();
+    let runs: Vec<StudyRun> = places.enumerate().map(|(k, (a, b))| run(k + 1, a, b)).collect();
     let mut study = Study { fields: vec!["a".into(), "b".into()], runs, trust: Vec::new() };
     let slope = effects(&study, GeneratorKind::Cam, "max_von_mises_mpa").unwrap().change[0].unwrap();
     assert!(slope.abs() < 1e-9, "{slope}");

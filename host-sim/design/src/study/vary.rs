@@ -15,12 +15,12 @@ pub struct Vary {
     /// Path of the field, such as `flexspline.rim_thickness_mm`.
     pub path: String,
     /// Its values.
-    pub values: Values,
+    pub values: VariedValues,
 }
 
 /// Values of a field.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Values {
+pub enum VariedValues {
     /// From one end to the other.
     Range {
         /// First end.
@@ -73,14 +73,14 @@ impl FromStr for Vary {
                 if !(1..=MOST_VALUES).contains(&count) {
                     return Err(wrong("which asks for that many values"));
                 }
-                Values::Range { from, to, count }
+                VariedValues::Range { from, to, count }
             }
             None => {
                 let list = apart(values);
                 if list.iter().any(String::is_empty) {
                     return Err(wrong("which has an empty value"));
                 }
-                Values::List(list)
+                VariedValues::List(list)
             }
         };
         Ok(Vary { path: path.to_owned(), values })
@@ -113,21 +113,21 @@ impl Vary {
     /// Its values on a grid, as a drive file would have them.
     pub fn grid(&self) -> Vec<String> {
         match &self.values {
-            Values::Range { from, count: 1, .. } => vec![written(*from)],
-            Values::Range { from, to, count } => {
+            VariedValues::Range { from, count: 1, .. } => vec![written(*from)],
+            VariedValues::Range { from, to, count } => {
                 let at = |k: usize| from + (to - from) * k as f64 / (count - 1) as f64;
                 (0..*count).map(|k| written(at(k))).collect()
             }
-            Values::List(list) => list.clone(),
+            VariedValues::List(list) => list.clone(),
         }
     }
 
     /// A value that it takes more than once, as numbers are the same. A range that asks for one value has it once.
     pub fn repeated(&self) -> Option<String> {
         let values = match &self.values {
-            Values::Range { from, to, count } if from == to && *count > 1 => return Some(written(*from)),
-            Values::Range { .. } => return None,
-            Values::List(list) => list,
+            VariedValues::Range { from, to, count } if from == to && *count > 1 => return Some(written(*from)),
+            VariedValues::Range { .. } => return None,
+            VariedValues::List(list) => list,
         };
         let same = |a: &String, b: &String| match (a.parse::<f64>(), b.parse::<f64>()) {
             (Ok(a), Ok(b)) => a == b,
@@ -139,16 +139,16 @@ impl Vary {
     /// Whether it has one value alone, on a grid or spread.
     pub fn is_constant(&self, spread: bool) -> bool {
         match &self.values {
-            Values::Range { from, to, count } => *count == 1 && (!spread || from == to),
-            Values::List(list) => list.len() == 1,
+            VariedValues::Range { from, to, count } => *count == 1 && (!spread || from == to),
+            VariedValues::List(list) => list.len() == 1,
         }
     }
 
     /// Its value at a place of 0 (first) to 1 (excluded).
     pub fn at(&self, place: f64) -> String {
         match &self.values {
-            Values::Range { from, to, .. } => written(from + (to - from) * place),
-            Values::List(list) => list[((place * list.len() as f64) as usize).min(list.len() - 1)].clone(),
+            VariedValues::Range { from, to, .. } => written(from + (to - from) * place),
+            VariedValues::List(list) => list[((place * list.len() as f64) as usize).min(list.len() - 1)].clone(),
         }
     }
 }

@@ -12,7 +12,7 @@ use super::project::{TableError, from_sweep};
 use super::sweep::{SweepError, SweepPlan, SweepProgress, planned_increments};
 use super::torque_nodes::{NodeChoice, choose_torque_nodes};
 use super::turns::{deviation_increments, sweep_turns};
-use crate::cautions::{Looked, rigid_gap_um, room_as_built_arcsec};
+use crate::cautions::{LookedAt, rigid_gap_um, room_as_built_arcsec};
 use crate::data_sheet::Stiffness;
 use crate::relief::tips_that_bear;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
@@ -241,7 +241,7 @@ pub fn make(
     };
     made.info.torque_nodes_resolved = chosen.map(|chosen| chosen.resolved);
     let largest_n_m = plan.torque_nodes_n_m.iter().copied().map(f64::from).fold(0.0, f64::max);
-    made.info.cautions = Looked {
+    made.info.cautions = LookedAt {
         rigid_gap_um: rigid_gap_um(drive, kind),
         room_as_built_arcsec: room_as_built_arcsec(drive, kind),
         max_von_mises_mpa: None,

@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use super::info::{MadeTable, Source, TableInfo, TurnsAtTorque, TurnsInfo};
 use super::sweep::{KnownNode, Sweep, SweepPlan, mirror};
-use crate::cautions::Looked;
+use crate::cautions::LookedAt;
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::stepping::SolverSettings;
@@ -309,7 +309,7 @@ fn make(
         backlash_arcsec: backlash,
         wind_up_arcsec: [first, last].map(|t| 0.5 * at(t).iter().sum::<f64>()),
         stiffness: None,
-        cautions: Looked { slope_bound: Some(f64::from(table.bounds().slope)), ..Looked::default() }.cautions(),
+        cautions: LookedAt { slope_bound: Some(f64::from(table.bounds().slope)), ..LookedAt::default() }.cautions(),
         data_sheet: None,
         completed: None,
         stress: Vec::new(),

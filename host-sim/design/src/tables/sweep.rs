@@ -177,7 +177,7 @@ pub fn sweep(
             let problem = Problem::new(drive, kind, f64::from(temperature), settings)?;
             let mut motion = Motion::deformed(&problem, 0.0)?;
             let unloaded = motion.state().clone();
-            let mut chain = Chain::new(plan, f64::from(temperature), observe);
+            let mut chain = SweepChain::new(plan, f64::from(temperature), observe);
             for torques in half.chains(plan, drive.output.drag_torque_n_m) {
                 motion.go_back(unloaded.clone());
                 for torque in torques {
@@ -295,7 +295,7 @@ pub struct KnownNode {
 }
 
 /// Samples at one torque after the other, the drive moving on forward.
-pub struct Chain<'a> {
+pub struct SweepChain<'a> {
     plan: &'a SweepPlan,
     temperature_c: f64,
     observe: &'a Observer<'a>,
@@ -303,10 +303,10 @@ pub struct Chain<'a> {
     pub(super) work: Work,
 }
 
-impl<'a> Chain<'a> {
+impl<'a> SweepChain<'a> {
     /// A chain at one temperature.
     pub fn new(plan: &'a SweepPlan, temperature_c: f64, observe: &'a Observer<'a>) -> Self {
-        Chain { plan, temperature_c, observe, points: Vec::new(), work: Work::default() }
+        SweepChain { plan, temperature_c, observe, points: Vec::new(), work: Work::default() }
     }
 
     /// The points so far, which are then forgotten.

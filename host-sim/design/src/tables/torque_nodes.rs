@@ -9,7 +9,7 @@ use flexspline::make::ProjectError;
 use flexspline::{Direction, GeneratorAngle, ImageError, Table, WriteError};
 
 use super::project::{TableError, trial_table};
-use super::sweep::{Chain, Computed, KnownNode, Observer, SweepError, SweepPlan, Work, symmetric_nodes};
+use super::sweep::{Computed, KnownNode, Observer, SweepChain, SweepError, SweepPlan, Work, symmetric_nodes};
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::motion::Motion;
@@ -58,7 +58,7 @@ pub(crate) fn choose_torque_nodes(
     let problem = Problem::new(drive, kind, temperature_c, settings)?;
     let mut motion = Motion::deformed(&problem, 0.0)?;
     let unloaded = motion.state().clone();
-    let mut chain = Chain::new(plan, temperature_c, observe);
+    let mut chain = SweepChain::new(plan, temperature_c, observe);
     let all = symmetric_nodes(drive.output.drag_torque_n_m, choice.largest_n_m, FIRST_NODES);
     let nodes: Vec<f32> = all.into_iter().filter(|t| f64::from(*t) > drive.output.drag_torque_n_m).collect();
 

@@ -25,7 +25,7 @@ const ARCHIVE: &str = "libflexspline.a";
 
 /// A static library.
 #[derive(Debug)]
-pub struct Library {
+pub struct BundleLibrary {
     /// Its target.
     pub target: String,
     /// Its contents.
@@ -89,7 +89,7 @@ impl Places {
     ///
     /// # Errors
     /// It lies there and is none; it cannot be had at all.
-    pub fn find(&self, target: &str) -> Result<Option<Library>, LibraryError> {
+    pub fn find(&self, target: &str) -> Result<Option<BundleLibrary>, LibraryError> {
         let found = self.folders.iter().map(|folder| folder.join(target).join(ARCHIVE)).find(|path| path.exists());
         if let Some(path) = found {
             return read(target, &path).map(Some);
@@ -135,7 +135,7 @@ impl Places {
     ///
     /// # Errors
     /// What cargo says.
-    pub fn build(&self, target: &str) -> Result<Library, LibraryError> {
+    pub fn build(&self, target: &str) -> Result<BundleLibrary, LibraryError> {
         self.can_build(target)?;
         let checkout = self.checkout.as_deref().unwrap_or(Path::new("."));
         let folder =
@@ -170,7 +170,7 @@ fn is_checkout(folder: &Path) -> bool {
 }
 
 /// A file that is a static library of the core.
-fn read(target: &str, path: &Path) -> Result<Library, LibraryError> {
+fn read(target: &str, path: &Path) -> Result<BundleLibrary, LibraryError> {
     let wrong = |why: String| LibraryError::File { path: path.to_owned(), why };
     let archive = fs::read(path).map_err(|error| wrong(error.to_string()))?;
     if !archive.starts_with(b"!<arch>\n") {
@@ -180,5 +180,5 @@ fn read(target: &str, path: &Path) -> Result<Library, LibraryError> {
     if !archive.windows(symbol.len()).any(|window| window == symbol) {
         return Err(wrong("is not the core with its C interface: it has no flexspline_tick".to_owned()));
     }
-    Ok(Library { target: target.to_owned(), archive })
+    Ok(BundleLibrary { target: target.to_owned(), archive })
 }

@@ -1,7 +1,7 @@
 //! What firmware people add to a project: tables, a reader in C99, the core as static libraries, vectors, and what
 //! their build systems ask for.
 //!
-//! [`Table`]s and [`Library`]s to the files of a folder ([`Bundle::files`]); [`libraries`] finds or builds the
+//! [`Table`]s and [`BundleLibrary`]s to the files of a folder ([`Bundle::files`]); [`libraries`] finds or builds the
 //! libraries. The sources in C and what is the same in every bundle are in this program; names, versions and lists are
 //! put in where a template has `@NAME@`.
 
@@ -19,7 +19,7 @@ use thiserror::Error;
 pub use archive::tar_gz;
 use flexspline_design::tables::put_bytes;
 use flexspline_mechanics::drive::GeneratorKind;
-use libraries::Library;
+use libraries::BundleLibrary;
 
 /// Version of what is bundled: that of the workspace.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -212,7 +212,7 @@ pub struct FileEntry {
 #[derive(Debug)]
 pub struct Bundle {
     tables: Vec<Table>,
-    libraries: Vec<Library>,
+    libraries: Vec<BundleLibrary>,
 }
 
 impl Bundle {
@@ -235,7 +235,7 @@ impl Bundle {
 
     /// With static libraries.
     #[must_use]
-    pub fn with(self, libraries: Vec<Library>) -> Bundle {
+    pub fn with(self, libraries: Vec<BundleLibrary>) -> Bundle {
         Bundle { libraries, ..self }
     }
 

@@ -6,7 +6,7 @@
 //! unknowns the matrix is quasi-definite: their blocks are negative definite, those of the faces positive, and any
 //! order serves (Vanderbei 1995).
 
-use super::dense::Kernels;
+use super::dense::DenseKernels;
 
 /// A block of unknowns.
 #[derive(Debug, Clone, Copy)]
@@ -45,7 +45,7 @@ struct Panel {
 /// Factor of a block matrix.
 #[derive(Debug, Clone, Default)]
 pub struct Chain {
-    kernels: Kernels,
+    kernels: DenseKernels,
     panels: Vec<Panel>,
     values: Vec<f64>,
     /// First unknown of each block in a right-hand side.

@@ -136,7 +136,7 @@ mod tests {
     use crate::fem::material::PlaneStrain;
     use crate::mesh::{MeshLevel, WheelMesh};
 
-    use super::super::dense::Kernels;
+    use super::super::dense::DenseKernels;
     use super::super::model::{Cell, CondensedWheel};
 
     fn flexspline() -> CondensedWheel {
@@ -149,7 +149,7 @@ mod tests {
         let mut state = CellState::default();
         cell.frame.split(d, &mut state);
         let mut force = vec![0.0; d.len()];
-        Kernels::default().multiply_add(&cell.stiffness, &state.q, 1.0, &mut force);
+        DenseKernels::default().multiply_add(&cell.stiffness, &state.q, 1.0, &mut force);
         let energy = 0.5 * force.iter().zip(&state.q).map(|(f, q)| f * q).sum::<f64>();
         cell.frame.balance(&state, &mut force);
         for f in force.chunks_exact_mut(2) {
@@ -228,7 +228,7 @@ mod tests {
         let (cell, _) = wheel.cell(0, true);
         let d = deformed(cell);
         let n = d.len();
-        let kernels = Kernels::default();
+        let kernels = DenseKernels::default();
         let (_, _, state) = energy_and_force(cell, &d);
         let mut force = vec![0.0; n];
         kernels.multiply_add(&cell.stiffness, &state.q, 1.0, &mut force);

@@ -7,15 +7,15 @@ use pulp::{Arch, NullaryFnOnce};
 
 /// Kernels compiled for this machine.
 #[derive(Debug, Clone, Copy)]
-pub struct Kernels(Arch);
+pub struct DenseKernels(Arch);
 
-impl Default for Kernels {
+impl Default for DenseKernels {
     fn default() -> Self {
-        Kernels(Arch::new())
+        DenseKernels(Arch::new())
     }
 }
 
-impl Kernels {
+impl DenseKernels {
     /// Eliminates the first `p` unknowns of a symmetric m x m front whose pivot block has the given sign (+1 or −1
     /// definite):
     ///
@@ -38,7 +38,7 @@ impl Kernels {
         self.0.dispatch(Forward { panel, m, p, sign, x, rest });
     }
 
-    /// The other way: `x` (as [`Kernels::forward`] left it) becomes the solution, `rest` being solved.
+    /// The other way: `x` (as [`DenseKernels::forward`] left it) becomes the solution, `rest` being solved.
     pub fn backward(self, panel: &[f64], m: usize, p: usize, sign: f64, x: &mut [f64], rest: &[f64]) {
         assert!(panel.len() >= m * p && x.len() == p && rest.len() == m - p);
         self.0.dispatch(Backward { panel, m, p, sign, x, rest });
@@ -233,7 +233,7 @@ mod tests {
 
     #[test]
     fn elimination_and_solution_agree_with_the_product() {
-        let kernels = Kernels::default();
+        let kernels = DenseKernels::default();
         for (n, p, sign) in [(1, 1, 1.0), (7, 3, 1.0), (7, 3, -1.0), (67, 30, 1.0), (60, 18, 1.0), (44, 9, -1.0)] {
             let a = quasi_definite(n, p, sign);
             let b: Vec<f64> = (0..n).map(|i| (i as f64).sin()).collect();
@@ -260,7 +260,7 @@ mod tests {
 
     #[test]
     fn a_pivot_of_the_wrong_sign_is_refused() {
-        let kernels = Kernels::default();
+        let kernels = DenseKernels::default();
         assert!(!kernels.eliminate(&mut quasi_definite(9, 9, 1.0), 9, 9, -1.0));
         assert!(!kernels.eliminate(&mut quasi_definite(9, 4, -1.0), 9, 4, 1.0));
         assert!(!kernels.eliminate(&mut [f64::NAN; 4], 2, 2, 1.0));
@@ -268,7 +268,7 @@ mod tests {
 
     #[test]
     fn products_are_products() {
-        let kernels = Kernels::default();
+        let kernels = DenseKernels::default();
         let a: Vec<f64> = (0..13 * 5).map(|i| (i as f64 * 0.7).cos()).collect();
         let x: Vec<f64> = (0..5).map(f64::from).collect();
         let mut y = vec![1.0; 13];

@@ -7,7 +7,7 @@ use crate::fem::material::PlaneStrain;
 use crate::mesh::WheelMesh;
 
 use super::corotation::CoRotation;
-use super::dense::Kernels;
+use super::dense::DenseKernels;
 use super::skin::Skin;
 use super::superelement::Superelement;
 
@@ -28,7 +28,7 @@ pub struct Cell {
     pub flank_coupling: Vec<f64>,
     /// Stiffness of the other nodes while no force acts on the flanks, r x r.
     pub body: Vec<f64>,
-    /// Stiffness with the bore nodes eliminated, nothing touching them (see [`Kernels::eliminate`]).
+    /// Stiffness with the bore nodes eliminated, nothing touching them (see [`DenseKernels::eliminate`]).
     pub free_body: Vec<f64>,
 }
 
@@ -44,7 +44,7 @@ impl Cell {
         let columns = |m: MatRef<'_>| -> Vec<f64> { m.col_iter().flat_map(|c| c.iter().copied()).collect() };
         let body = columns(body.as_ref());
         let mut free_body = body.clone();
-        assert!(Kernels::default().eliminate(&mut free_body, r, b, 1.0), "a cell held at its faces is stiff");
+        assert!(DenseKernels::default().eliminate(&mut free_body, r, b, 1.0), "a cell held at its faces is stiff");
         Cell {
             unknowns: element.unknowns,
             frame: CoRotation::new(&element.position, (f + b) / 2),
@@ -61,7 +61,7 @@ impl Cell {
     fn without_flanks(&self) -> Cell {
         let [f, b, face] = self.unknowns;
         let mut seat = self.seat[f..].to_vec();
-        Kernels::default().multiply_transposed_add(&self.flank_coupling, &self.seat[..f], -1.0, &mut seat);
+        DenseKernels::default().multiply_transposed_add(&self.flank_coupling, &self.seat[..f], -1.0, &mut seat);
         Cell {
             unknowns: [0, b, face],
             frame: self.frame.without(f / 2),
@@ -91,7 +91,7 @@ impl Cell {
 
     /// Displacements of the flank nodes that no force acts on, from those of the other nodes and of the seat, in the
     /// frame.
-    pub(crate) fn free_flanks(&self, kernels: Kernels, body: &[f64], seat_mm: f64) -> Vec<f64> {
+    pub(crate) fn free_flanks(&self, kernels: DenseKernels, body: &[f64], seat_mm: f64) -> Vec<f64> {
         let mut flanks = vec![0.0; self.flank()];
         kernels.multiply_add(&self.flank_coupling, body, -1.0, &mut flanks);
         if seat_mm != 0.0 {
@@ -231,7 +231,7 @@ mod tests {
                 u[2 * node..2 * node + 2].copy_from_slice(x);
             }
             let mut f: Vec<f64> = cell.seat.iter().map(|s| s * seat_mm).collect();
-            Kernels::default().multiply_add(&cell.stiffness, &q, 1.0, &mut f);
+            DenseKernels::default().multiply_add(&cell.stiffness, &q, 1.0, &mut f);
             super::super::tangent::rotate_pairs(&mut f, angle(j).sin_cos());
             unknowns.iter().zip(&f).for_each(|(k, f)| expected[*k as usize] += f);
         }
@@ -276,7 +276,7 @@ mod tests {
         let mesh = WheelMesh::flexspline(&Drive::hhd_95(), MeshLevel::Coarse).unwrap();
         let wheel = CondensedWheel::new(&mesh, &steel(), 0, |_| false);
         let ((bare, _), (whole, _)) = (wheel.cell(0, false), wheel.cell(0, true));
-        let kernels = Kernels::default();
+        let kernels = DenseKernels::default();
         let body: Vec<f64> = (0..whole.bore() + 2 * whole.face()).map(|k| (k as f64).sin()).collect();
         let all: Vec<f64> = whole.free_flanks(kernels, &body, 0.0).into_iter().chain(body.iter().copied()).collect();
         let mut force = vec![0.0; all.len()];

@@ -19,7 +19,7 @@
 use crate::mesh::rotate;
 
 use super::chain::{Chain, Contribution};
-use super::dense::Kernels;
+use super::dense::DenseKernels;
 use super::model::Cell;
 
 /// Contact of a pair of flanks as this cell sees it: columns of G on its flank nodes, in its frame.
@@ -72,7 +72,7 @@ pub struct CellTangent {
 
 /// Where a cell stands.
 #[derive(Debug, Clone, Copy)]
-pub struct Placement {
+pub struct CellPlacement {
     /// Angle of its frame against the global one, rad.
     pub frame: f64,
     /// Of its frame against those of its two faces, rad.
@@ -96,7 +96,7 @@ pub struct Geometric<'a> {
 #[derive(Clone, Copy)]
 pub struct CellAt<'a> {
     /// The kernels.
-    pub kernels: Kernels,
+    pub kernels: DenseKernels,
     /// The cell.
     pub cell: &'a Cell,
     /// Its unknowns among those of both wheels.
@@ -119,9 +119,9 @@ impl CellTangent {
     /// the given order) and says whether it did.
     pub fn reduce(
         &mut self,
-        kernels: Kernels,
+        kernels: DenseKernels,
         cell: &Cell,
-        place: Placement,
+        place: CellPlacement,
         tractions: Vec<Traction>,
         geometric: Option<Geometric>,
         contact: impl FnOnce(&mut [f64], usize) -> bool,

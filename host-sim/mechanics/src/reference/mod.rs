@@ -7,4 +7,4 @@ mod tooth_path;
 
 pub use crate::drive::RingShape;
 pub use ring::{ContactLoads, RingBending};
-pub use tooth_path::{PathPoint, ToothPath};
+pub use tooth_path::{ToothPath, ToothPathPoint};

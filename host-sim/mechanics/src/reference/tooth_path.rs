@@ -16,7 +16,7 @@ use std::f64::consts::FRAC_PI_2;
 
 /// A point in the paper's frame, mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PathPoint {
+pub struct ToothPathPoint {
     /// Outward from the undeformed neutral radius.
     pub w_mm: f64,
     /// Circumferential, counter-clockwise.
@@ -52,13 +52,13 @@ impl ToothPath {
     }
 
     /// Tip of the circular-spline tooth, (1) and (3).
-    pub fn circular_spline_tip(&self) -> PathPoint {
-        PathPoint { w_mm: self.circular_spline_tip - self.neutral_radius, v_mm: 0.0 }
+    pub fn circular_spline_tip(&self) -> ToothPathPoint {
+        ToothPathPoint { w_mm: self.circular_spline_tip - self.neutral_radius, v_mm: 0.0 }
     }
 
     /// Root of the circular-spline tooth, (2) and (4).
-    pub fn circular_spline_root(&self) -> PathPoint {
-        PathPoint { w_mm: self.circular_spline_root - self.neutral_radius, v_mm: 0.0 }
+    pub fn circular_spline_root(&self) -> ToothPathPoint {
+        ToothPathPoint { w_mm: self.circular_spline_root - self.neutral_radius, v_mm: 0.0 }
     }
 
     /// Angle of the tooth from the major axis when the generator has turned by `turned_rad` from the minor axis, (5).
@@ -72,15 +72,15 @@ impl ToothPath {
     }
 
     /// Tip of the flexspline tooth on its axis, (7) and (9).
-    pub fn flexspline_tip(&self, phi: f64) -> PathPoint {
+    pub fn flexspline_tip(&self, phi: f64) -> ToothPathPoint {
         self.point_at(self.flexspline_tip, phi)
     }
 
-    fn point_at(&self, radius: f64, phi: f64) -> PathPoint {
+    fn point_at(&self, radius: f64, phi: f64) -> ToothPathPoint {
         let (w, v) = (self.shape.w(phi), self.shape.v(phi));
         let theta = self.shape.theta(phi, self.neutral_radius);
         let phi2 = self.output_angle(phi);
-        PathPoint {
+        ToothPathPoint {
             w_mm: (radius + w) * phi2.cos() - self.neutral_radius, // (7), (8)
             v_mm: v + (radius - self.neutral_radius) * theta - (radius + w) * phi2, // (9), (10)
         }

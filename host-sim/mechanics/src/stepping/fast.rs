@@ -10,8 +10,8 @@ use std::rc::Rc;
 use rayon::prelude::*;
 
 use crate::condense::{
-    Block, CellAt, CellState, CellTangent, Chain, CoRotation, CondensedWheel, Contribution, Geometric, Kernels, Local,
-    Placement, Traction, back, rotate_pairs,
+    Block, CellAt, CellPlacement, CellState, CellTangent, Chain, CoRotation, CondensedWheel, Contribution,
+    DenseKernels, Geometric, Local, Traction, back, rotate_pairs,
 };
 use crate::contact::{BorePressure, FlankPair, PairContribution};
 use crate::drive::Side;
@@ -181,7 +181,7 @@ pub(super) type Kept = Rc<Factorisation>;
 pub(super) struct CondensedWheels<'p> {
     problem: &'p Problem,
     model: &'p CondensedDrive,
-    kernels: Kernels,
+    kernels: DenseKernels,
     /// Cells with a flank that touches or may soon; the flank nodes of the others follow when all is done.
     live: Vec<bool>,
     /// Those whose flank nodes took part in the last solution.
@@ -208,7 +208,7 @@ impl<'p> CondensedWheels<'p> {
         CondensedWheels {
             problem,
             model,
-            kernels: Kernels::default(),
+            kernels: DenseKernels::default(),
             live: vec![false; cells],
             solved: vec![false; cells],
             states: vec![CellState::default(); teeth],
@@ -265,7 +265,7 @@ impl<'p> CondensedWheels<'p> {
         let mut turned = vec![0.0; quarter.len()];
         self.kernels.multiply_add(&cell.stiffness, &quarter, 1.0, &mut turned);
         let (g, c) = cell.frame.geometric(state, &self.forces[j], &turned);
-        let place = Placement {
+        let place = CellPlacement {
             frame: mesh.sector_angle(j) + state.turn,
             faces: [state.turn + 0.5 * mesh.pitch(), state.turn - 0.5 * mesh.pitch()],
             blocks: [j as u32, ((j + 1) % mesh.teeth) as u32],
@@ -327,7 +327,7 @@ impl<'p> CondensedWheels<'p> {
         tractions: Vec<Traction>,
     ) -> Option<Contribution> {
         let (first, mesh) = (self.model.fs_mesh().teeth, self.model.cs_mesh());
-        let place = Placement {
+        let place = CellPlacement {
             frame: cs_frame(mesh, t),
             faces: [0.5 * mesh.pitch(), -0.5 * mesh.pitch()],
             blocks: [(first + t) as u32, (first + (t + 1) % mesh.teeth) as u32],

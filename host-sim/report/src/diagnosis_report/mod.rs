@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
 use super::page::{
-    Axis, Block, Choice, Detail, EVERY_CHOICE, Figure, FigureBody, Headline, Lines, Mark, Page, Quantity, Section,
+    Axis, Block, Choice, Detail, EVERY_CHOICE, Figure, FigureBody, Headline, Lines, Mark, Page, PageQuantity, Section,
     Status, Table as PageTable, Text, significant,
 };
 use flexspline_base::units::ARCSEC_PER_RAD;
@@ -83,7 +83,7 @@ pub fn levels_and_parts(series: &[Series], extended: &Extended, diagnosis: &Diag
 }
 
 /// What the page is made from.
-pub struct Sources<'a> {
+pub struct DiagnosisSources<'a> {
     /// The data.
     pub recording: &'a Recording,
     /// The model.
@@ -108,14 +108,14 @@ struct Shown {
 
 /// All that figures are drawn from.
 struct DiagnosisKnown<'a> {
-    sources: Sources<'a>,
+    sources: DiagnosisSources<'a>,
     rows: Rows,
     clock: Clock,
     shown: Vec<Shown>,
 }
 
 /// The page of a diagnosis.
-pub fn page(mut sources: Sources<'_>) -> Page {
+pub fn page(mut sources: DiagnosisSources<'_>) -> Page {
     let (nominal, recording) = (sources.nominal, sources.recording);
     let mut rows = Rows::new(&recording.sessions, nominal);
     let mut sessions: Cow<'_, [Session]> = Cow::Borrowed(&recording.sessions);
@@ -179,7 +179,7 @@ fn table(caption: &str, header: &[&str], rows: Vec<Vec<Text>>) -> Block {
 
 impl DiagnosisKnown<'_> {
     fn page(&self) -> Page {
-        let Sources { recording, nominal, diagnosis, command, inputs, .. } = &self.sources;
+        let DiagnosisSources { recording, nominal, diagnosis, command, inputs, .. } = &self.sources;
         let (status, also) = self.status();
         let mut sections = vec![self.in_short()];
         sections.extend(self.picture_sections());
@@ -447,7 +447,7 @@ impl DiagnosisKnown<'_> {
             uprights: self.clock.borders(),
             ..Lines::default()
         };
-        let y = || Axis::new("Error less model", Quantity::Error);
+        let y = || Axis::new("Error less model", PageQuantity::Error);
         let figure = |id: &str, title: &str, caption: &str, x: Axis, lines: Lines| {
             Block::Figure(Figure {
                 id: id.into(),
@@ -473,7 +473,7 @@ impl DiagnosisKnown<'_> {
                 "What each model leaves, over the generator's turn",
                 "Medians of all rows, both directions together. What is flat here may still depend on load or \
                  direction: see the figures above, with the selector at the top.",
-                Axis::new("Generator angle in its turn", Quantity::Degree),
+                Axis::new("Generator angle in its turn", PageQuantity::Degree),
                 over_turn,
             ),
         ];
@@ -485,7 +485,7 @@ impl DiagnosisKnown<'_> {
                 alt: "Curves of what each cause adds to the predicted error over time".into(),
                 body: FigureBody::Lines {
                     x: self.time_axis(),
-                    y: Axis::new("Adds to the error", Quantity::Error),
+                    y: Axis::new("Adds to the error", PageQuantity::Error),
                     charts: vec![(EVERY_CHOICE.into(), added)],
                 },
             }));
@@ -495,9 +495,9 @@ impl DiagnosisKnown<'_> {
 
     fn time_axis(&self) -> Axis {
         if self.rows.recorded.time {
-            Axis::new("Time, breaks taken out", Quantity::Second)
+            Axis::new("Time, breaks taken out", PageQuantity::Second)
         } else {
-            Axis::new("Row", Quantity::Count)
+            Axis::new("Row", PageQuantity::Count)
         }
     }
 
@@ -894,7 +894,7 @@ mod tests {
         let (recording, nominal) = (recording(faults), catalogue_drive());
         let rows = Rows::new(&recording.sessions, &nominal);
         let level = Level { id: "nominal", name: "nominal", residual_arcsec: rows.error.clone() };
-        page(Sources {
+        page(DiagnosisSources {
             recording: &recording,
             nominal: &nominal,
             diagnosis,

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::thin::{dots, medians, middle, peaks_kept, some_rows};
 use super::{DiagnosisKnown, Shown, orders, words};
 use crate::page::{
-    Axis, Block, Detail, Field, Figure, FigureBody, Lines, Mark, Quantity, Section, Series, Table, Text, Upright,
+    Axis, Block, Detail, Field, Figure, FigureBody, Lines, Mark, PageQuantity, Section, Series, Table, Text, Upright,
     significant,
 };
 use flexspline_identify::nominal::Fixed;
@@ -51,7 +51,7 @@ impl DiagnosisKnown<'_> {
         of: impl Fn(&Shown) -> Option<Lines>,
     ) -> Option<Block> {
         let charts = self.charts(of);
-        let y = Axis::new("Error less model", Quantity::Error);
+        let y = Axis::new("Error less model", PageQuantity::Error);
         (!charts.is_empty()).then(|| self.figure(id, title, caption, FigureBody::Lines { x, y, charts }))
     }
 
@@ -97,7 +97,7 @@ impl DiagnosisKnown<'_> {
             "over-generator",
             "Over the generator angle",
             "Some rows of all, drawn evenly. This is measured error less what the model says, before anybody says why.",
-            Axis::new("Generator angle", Quantity::Turn),
+            Axis::new("Generator angle", PageQuantity::Turn),
             |shown| {
                 let mut lines = self.over(&turns, shown)?;
                 lines.series.retain(|series| series.mark == Mark::Dots);
@@ -113,9 +113,9 @@ impl DiagnosisKnown<'_> {
                 "Median of the rows in each cell; cells that were not visited are empty. What sits on the generator \
                  stands upright, what sits on the output lies flat, what sits on the wheel that turns runs aslant.",
                 FigureBody::Field {
-                    x: Axis::new("Generator angle ψ in its turn", Quantity::Degree),
-                    y: Axis::new("Output angle δ in its turn", Quantity::Degree),
-                    z: Axis::new("Error less model", Quantity::Error),
+                    x: Axis::new("Generator angle ψ in its turn", PageQuantity::Degree),
+                    y: Axis::new("Output angle δ in its turn", PageQuantity::Degree),
+                    z: Axis::new("Error less model", PageQuantity::Error),
                     fields: maps,
                 },
             ));
@@ -126,7 +126,7 @@ impl DiagnosisKnown<'_> {
                 "Over the load torque",
                 "Dots are some rows, lines medians of all. A slope is stiffness, a step at zero backlash, a loop \
                  hysteresis.",
-                Axis::new("Load torque", Quantity::Torque),
+                Axis::new("Load torque", PageQuantity::Torque),
                 |shown| self.over(&rows.torque, shown),
             ));
         }
@@ -135,7 +135,7 @@ impl DiagnosisKnown<'_> {
                 "over-temperature",
                 "Over the temperature",
                 "Dots are some rows, lines medians of all.",
-                Axis::new("Temperature", Quantity::Temperature),
+                Axis::new("Temperature", PageQuantity::Temperature),
                 |shown| self.over(&rows.temperature, shown),
             ));
         }
@@ -145,7 +145,7 @@ impl DiagnosisKnown<'_> {
                 "Over the generator speed",
                 "Dots are some rows, lines medians of all. Sensors read at different instants make a straight line \
                  through zero.",
-                Axis::new("Generator speed", Quantity::Speed),
+                Axis::new("Generator speed", PageQuantity::Speed),
                 |shown| self.over(&rows.speed, shown),
             ));
         }
@@ -154,7 +154,7 @@ impl DiagnosisKnown<'_> {
                 "over-session",
                 "By session",
                 "Median of each session, and the bounds between which nine rows of ten lie.",
-                Axis::new("Session", Quantity::Whole),
+                Axis::new("Session", PageQuantity::Whole),
                 |shown| {
                     let each: Vec<[f64; 3]> =
                         rows.sessions.iter().map(|s| middle(shown.level.residual_arcsec[s.clone()].to_vec())).collect();
@@ -222,7 +222,7 @@ impl DiagnosisKnown<'_> {
                 &format!("Over one turn of {symbol}: {wheel}"),
                 "Medians of bins of three degrees, by direction. A sound drive has what its nominal model has, and \
                  these are flat.",
-                Axis::new(format!("{symbol} in its turn"), Quantity::Degree),
+                Axis::new(format!("{symbol} in its turn"), PageQuantity::Degree),
                 |shown| {
                     let mut lines = Lines::default();
                     for map in shown.picture.as_ref()?.maps.iter().filter(|map| map.axis == angle) {
@@ -258,7 +258,7 @@ impl DiagnosisKnown<'_> {
                 &format!("orders-{id}"),
                 &format!("Orders in a turn of {symbol}"),
                 &caption,
-                Axis::new(format!("Waves in a turn of {symbol}"), Quantity::Count),
+                Axis::new(format!("Waves in a turn of {symbol}"), PageQuantity::Count),
                 |shown| {
                     let spectrum = shown.picture.as_ref()?.spectra.iter().find(|s| s.axis == angle)?;
                     if spectrum.orders.is_empty() {

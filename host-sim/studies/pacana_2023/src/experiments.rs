@@ -197,7 +197,7 @@ impl Change {
 
 /// What a change does to one drive; errors count from where the drive was deformed.
 #[derive(Debug, Clone, Serialize)]
-pub struct Effect {
+pub struct ExperimentEffect {
     /// Wave generator.
     pub generator: &'static str,
     /// `converged`, or why not.
@@ -223,7 +223,7 @@ pub struct Experiment {
     /// What is changed, exactly.
     pub what: String,
     /// By generator.
-    pub effects: Vec<Effect>,
+    pub effects: Vec<ExperimentEffect>,
     /// Mean of |ln(largest error / the paper's)| over the generators that the paper has a number for; 0 is the paper's
     /// size.
     pub distance: Option<f64>,
@@ -274,7 +274,7 @@ pub(super) fn conclude(results: Vec<Result<Solved, SimulateError>>, quick: bool)
     let mut results = results.into_iter();
     let mut experiments: Vec<Experiment> = Vec::new();
     for change in changes(quick) {
-        let effects: Vec<Effect> = if change == Change::StartUp {
+        let effects: Vec<ExperimentEffect> = if change == Change::StartUp {
             experiments[0].effects.iter().map(counted_from_the_other_flank).collect()
         } else {
             let suited = generators(quick).iter().filter(|kind| change.suits(**kind));
@@ -285,7 +285,7 @@ pub(super) fn conclude(results: Vec<Result<Solved, SimulateError>>, quick: bool)
     experiments
 }
 
-fn effect(kind: GeneratorKind, result: Result<Solved, SimulateError>) -> Effect {
+fn effect(kind: GeneratorKind, result: Result<Solved, SimulateError>) -> ExperimentEffect {
     let paper_arcmin = paper::error_rad(kind).map(|rad| rad * ARCMIN_PER_RAD);
     let (status, solved) = match result {
         Ok(solved) => ("converged".to_owned(), Some(solved)),
@@ -295,7 +295,7 @@ fn effect(kind: GeneratorKind, result: Result<Solved, SimulateError>) -> Effect 
     let start_arcsec = solved.as_ref().and_then(|s| s.rows.first()).map_or(0.0, |row| row.error_arcsec);
     let metrics = solved.map(|s| s.metrics);
     let largest_arcmin = metrics.as_ref().map(largest);
-    let effect = Effect { generator: kind.name(), status, metrics, largest_arcmin, paper_arcmin, curves };
+    let effect = ExperimentEffect { generator: kind.name(), status, metrics, largest_arcmin, paper_arcmin, curves };
     // A rim that is held aside of the axis stands turned from the start.
     shifted(effect, -start_arcsec)
 }
@@ -312,7 +312,7 @@ pub(crate) fn curves(rows: &[flexspline_design::simulate::Row]) -> [Vec<[f64; 2]
 }
 
 /// The motion of `base` with zero on the flank that the output leaves.
-fn counted_from_the_other_flank(base: &Effect) -> Effect {
+fn counted_from_the_other_flank(base: &ExperimentEffect) -> ExperimentEffect {
     let half = base.metrics.and_then(|metrics| metrics.half_width_arcsec).unwrap_or(0.0);
     let mut effect = shifted(base.clone(), -half);
     // It begins there.
@@ -323,7 +323,7 @@ fn counted_from_the_other_flank(base: &Effect) -> Effect {
 }
 
 /// `effect` with every error larger by `more_arcsec`.
-fn shifted(mut effect: Effect, more_arcsec: f64) -> Effect {
+fn shifted(mut effect: ExperimentEffect, more_arcsec: f64) -> ExperimentEffect {
     let Some(metrics) = &mut effect.metrics else { return effect };
     for curve in &mut effect.curves {
         curve.iter_mut().for_each(|point| point[1] += more_arcsec);
@@ -339,7 +339,7 @@ fn shifted(mut effect: Effect, more_arcsec: f64) -> Effect {
     effect
 }
 
-fn experiment(change: Change, effects: Vec<Effect>) -> Experiment {
+fn experiment(change: Change, effects: Vec<ExperimentEffect>) -> Experiment {
     let pairs: Vec<(f64, f64)> = effects.iter().filter_map(|e| e.largest_arcmin.zip(e.paper_arcmin)).collect();
     let all = pairs.len() == effects.iter().filter(|e| e.paper_arcmin.is_some()).count();
     let distance = (all && !pairs.is_empty())
@@ -369,7 +369,7 @@ fn experiment(change: Change, effects: Vec<Effect>) -> Experiment {
 }
 
 /// The size of an error in words: of a large one also where.
-fn size(effect: &Effect) -> String {
+fn size(effect: &ExperimentEffect) -> String {
     let name = effect.generator.replace("double-", "double ");
     match (effect.largest_arcmin, &effect.metrics) {
         (Some(largest), Some(m)) if largest > LARGE_ARCMIN => format!(
@@ -419,9 +419,9 @@ mod tests {
         }
     }
 
-    fn of(kind: GeneratorKind, largest_arcsec: f64) -> Effect {
+    fn of(kind: GeneratorKind, largest_arcsec: f64) -> ExperimentEffect {
         let metrics = metrics(largest_arcsec);
-        Effect {
+        ExperimentEffect {
             generator: kind.name(),
             status: "converged".into(),
             largest_arcmin: Some(largest(&metrics)),

@@ -98,7 +98,7 @@ pub struct Reproduction {
 
 /// The content of `reproduce.json`.
 #[derive(Serialize)]
-pub struct Record<'a> {
+pub struct PaperRecord<'a> {
     /// Layout of this object.
     pub schema_version: u32,
     /// Version of the program.
@@ -245,8 +245,8 @@ impl Reproduction {
     }
 
     /// What is written to `reproduce.json`.
-    pub fn record<'a>(&'a self, command: &'a str) -> Record<'a> {
-        Record {
+    pub fn record<'a>(&'a self, command: &'a str) -> PaperRecord<'a> {
+        PaperRecord {
             schema_version: REPRODUCE_SCHEMA,
             tool_version: env!("CARGO_PKG_VERSION"),
             command,

@@ -14,8 +14,8 @@ use flexspline_base::units::ARCMIN_PER_RAD;
 use flexspline_mechanics::drive::GeneratorKind;
 use flexspline_report::animation::{Animation, AnimationError, FRAMES};
 use flexspline_report::page::{
-    Axis, Block, Choice, Detail, EVERY_CHOICE, Figure, FigureBody, Headline, Lines, Page, Quantity, Section, Status,
-    Text,
+    Axis, Block, Choice, Detail, EVERY_CHOICE, Figure, FigureBody, Headline, Lines, Page, PageQuantity, Section,
+    Status, Text,
 };
 
 /// What the page is made from.
@@ -50,11 +50,11 @@ fn by_generator(of: impl Fn(GeneratorKind) -> Option<Lines>) -> Vec<(String, Lin
 }
 
 fn generator_axis() -> Axis {
-    Axis::new("Generator", Quantity::Degree)
+    Axis::new("Generator", PageQuantity::Degree)
 }
 
 fn error_axis() -> Axis {
-    Axis::new("Output error", Quantity::Error)
+    Axis::new("Output error", PageQuantity::Error)
 }
 
 /// The page.
@@ -247,7 +247,7 @@ fn motion(r: &Reproduction, animations: &[Animation]) -> Section {
         "The output angle of the selected generator with the nominal line, generator over 95. The error is a \
          seventieth of the travel and can hardly be seen: drag across to zoom, double-click to come back.",
         generator_axis(),
-        Axis::new("Output angle", Quantity::Error),
+        Axis::new("Output angle", PageQuantity::Error),
         by_generator(|kind| charts::travel(r, kind)),
     ));
     if animations.iter().any(|a| a.sleeve.is_some()) {
@@ -330,8 +330,8 @@ fn path_and_stress(r: &Reproduction) -> Section {
             "From the minor axis (right, below) into the space at the major axis (left, above), seen from the tooth \
              of the circular spline that is met at the minor axis: formulas (7) and (9), and the tips of the FEM, \
              deformed, no load, one dot to each tooth of a quarter.",
-            Axis::new("Around, v, mm", Quantity::Count),
-            Axis::new("Outward, w, mm", Quantity::Count),
+            Axis::new("Around, v, mm", PageQuantity::Count),
+            Axis::new("Outward, w, mm", PageQuantity::Count),
             by_generator(|kind| charts::tip_path(r, kind)),
         ),
         lines(
@@ -339,8 +339,8 @@ fn path_and_stress(r: &Reproduction) -> Section {
             "Formulas less FEM",
             "The formulas are of first order in the displacement. Outward they are off by the second-order shortening \
              of the rim, 5 µm and more; the flanks clear each other by 7 µm.",
-            Axis::new("Tooth from the major axis", Quantity::Degree),
-            Axis::new("Formula less FEM, µm", Quantity::Count),
+            Axis::new("Tooth from the major axis", PageQuantity::Degree),
+            Axis::new("Formula less FEM, µm", PageQuantity::Count),
             by_generator(|kind| charts::tip_difference(r, kind)),
         ),
         lines(
@@ -348,8 +348,8 @@ fn path_and_stress(r: &Reproduction) -> Section {
             "Largest stress in each tooth sector: the paper's figures 10 and 11",
             "Von Mises stress of the flexspline, deformed, no load, by angle from the major axis (D at 0°, M at \
              ±90°). Averaged at nodes; the notch at the tooth root is as sharp as the mesh.",
-            Axis::new("Sector from the major axis", Quantity::Degree),
-            Axis::new("Von Mises stress", Quantity::Stress),
+            Axis::new("Sector from the major axis", PageQuantity::Degree),
+            Axis::new("Von Mises stress", PageQuantity::Stress),
             every(charts::stress(r)),
         ),
     ];
