@@ -166,6 +166,10 @@ fn missed(generator: &[f64], stretch: &Range<usize>) -> f64 {
 /// A limit that the torque stands at: in so many rows of stretches as long as this, and this share of all.
 const AT_LIMIT_ROWS: usize = 3;
 const AT_LIMIT_SHARE: f64 = 0.005;
+/// Rows between the limits for each at one that tell whether the torque has noise there, and what of its range is noise
+/// and no round-off: loads that a bench holds exactly have a few rows between them, and none. *Guess*.
+const BETWEEN_LIMITS: f64 = 0.1;
+const ROUND_OFF: f64 = 1e-6;
 
 /// Leaves out rows in which the torque stands at its largest or its least value, though it has noise elsewhere: the
 /// sensor or its amplifier is at its end, and nobody knows the load.
@@ -179,7 +183,10 @@ fn saturated(sessions: &[Session], rows: usize, drop: &mut [Vec<bool>], findings
     let between: Vec<&[f64]> =
         torques.iter().flat_map(|torque| torque.split(at_end)).filter(|part| part.len() > 8).collect();
     let (noise, step) = noise_and_step(&between);
-    if most <= least || noise <= BLURRED * step || noise <= 0.0 {
+    let tell: usize = between.iter().map(|part| part.len()).sum();
+    let held: usize = torques.iter().copied().flatten().filter(|torque| at_end(torque)).count();
+    let few = (tell as f64) < BETWEEN_LIMITS * held as f64;
+    if few || most <= least || noise <= BLURRED * step || noise <= ROUND_OFF * (most - least) {
         return;
     }
     for limit in [least, most] {
@@ -299,5 +306,8 @@ mod tests {
         // Ramps between two loads that are held, as they were asked for.
         let ramps = |k: i32| (80.0 * ((0.002 * f64::from(k)).fract() - 0.5).abs() - 20.0).clamp(-10.0, 10.0);
         assert_eq!(left((0..4000).map(ramps)), (4000, vec![]));
+        // A log of two loads, and the nine rows from one to the other in digits.
+        let held = |k: i32| (-20.0 + 4.04040404 * f64::from(k - 1995)).clamp(-20.0, 20.0);
+        assert_eq!(left((0..4000).map(held)), (4000, vec![]));
     }
 }
