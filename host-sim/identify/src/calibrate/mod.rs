@@ -479,7 +479,9 @@ fn with_dead_zone(
         }
         made => (fitted, made?),
     };
-    let agreement = fitted.agreement();
+    let agreement = fitted.agreement().and_then(|agreement| agreement.note(files));
+    let turned = together::generators_turned(&fitted.rows, (&fitted.open, &fitted.model), prior, files);
+    let unlike = together::loads_unlike(&fitted.rows, &fitted.model, prior, files);
     let Fitted { rows, folds, model, held_out, mut parts, .. } = fitted;
     let image = Table::check(&made.image).map_err(|error| TableError::Project(error.into()))?;
     let core = ByCore::of(files, &image, &recorded);
@@ -488,7 +490,8 @@ fn with_dead_zone(
     let mut notes: Vec<String> = files.iter().flat_map(|file| file.notes.iter().cloned()).collect();
     notes.extend(said);
     notes.extend(reading_delay.as_ref().map(ReadingDelay::note));
-    notes.extend(agreement.and_then(|agreement| agreement.note(files)));
+    // What is known by its angle needs no guess.
+    notes.extend(turned.or(agreement).into_iter().chain(unlike));
     notes.extend(remarks(prior, &recorded, (&model, &parts), play_of_a_millisecond_arcsec));
     sizes(&rows, &model, &mut parts);
     let zero = |row: &folds::Row| row.left_arcsec - model.adds_arcsec(&row.at);

@@ -8,8 +8,13 @@ use super::prior::Prior;
 use crate::measurement::{Recording, Session, least_and_most, quantile_of, sampled, white_noise};
 use flexspline_base::units::ARCSEC_PER_RAD;
 
-/// Folds that one record is cut into: blocks of a tenth of it or so, which say what a table does beyond what it saw.
+/// Folds that records are cut into: blocks of a tenth of each or so, which say what a table does beyond what it saw.
 const BLOCKS: usize = 8;
+/// Times that they go round in a record whose loads take longer than a block: passes at one load each.
+const ROUNDS: usize = 4;
+/// What a fold was recorded at is within what the others were by this share of all loads: beyond it no table is asked.
+/// A guess.
+const BEYOND_OTHERS: f64 = 0.1;
 /// With so many files, or sessions, each is a fold.
 const ENOUGH_SESSIONS: usize = 3;
 /// Left-out sessions are folds if none of them holds more than this share of the rows: without a larger one the rest is
@@ -210,21 +215,16 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
     let sessions: usize = files.iter().map(|file| file.sessions.len()).sum();
     let largest = files.iter().flat_map(|file| &file.sessions).map(Session::len).max().unwrap_or(0);
     let by_sessions = sessions >= ENOUGH_SESSIONS && largest as f64 <= LARGEST_SESSION * total as f64;
-    let folds = match (files.len() >= ENOUGH_SESSIONS, by_sessions) {
-        (true, _) => FoldKind::Files,
-        (_, true) => FoldKind::Sessions,
-        _ => FoldKind::Blocks,
-    };
     let mut all = Rows {
         rows: Vec::new(),
         measured_arcsec: Vec::new(),
         measured_means_arcsec: Vec::new(),
         means_arcsec: Vec::new(),
-        folds,
+        folds: FoldKind::Blocks,
         of: total,
         unsettled: 0,
     };
-    let mut session_number = 0;
+    let (mut session_of, mut session_number) = (Vec::new(), 0);
     for (zero, file) in files.iter().enumerate() {
         let begin = all.rows.len();
         for session in &file.sessions {
@@ -251,29 +251,66 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
                     speed_rad_s: speed_rad_s(session, k, prior.nominal.ratio),
                 };
                 all.measured_arcsec.push(session.error_rad[k] * ARCSEC_PER_RAD);
-                all.rows.push(Row { at, left_arcsec: 0.0, zero, fold: session_number });
+                all.rows.push(Row { at, left_arcsec: 0.0, zero, fold: 0 });
+                session_of.push(session_number);
             }
             session_number += 1;
         }
         let rows = all.rows.len() - begin;
-        let blocks = (BLOCKS / files.len()).max(1);
-        for (k, row) in all.rows[begin..].iter_mut().enumerate() {
-            row.fold = match folds {
-                FoldKind::Files => zero % BLOCKS,
-                FoldKind::Sessions => row.fold % BLOCKS,
-                FoldKind::Blocks => zero * blocks + k * blocks / rows.max(1),
-            };
-        }
         // Zeros of encoders are large numbers that squares do not like.
         let measured = &mut all.measured_arcsec[begin..];
         let mean = measured.iter().sum::<f64>() / rows.max(1) as f64;
         measured.iter_mut().for_each(|value| *value -= mean);
         all.measured_means_arcsec.push(mean);
     }
+    let kinds = [(FoldKind::Files, files.len() >= ENOUGH_SESSIONS), (FoldKind::Sessions, by_sessions)];
+    let kinds = kinds.into_iter().filter(|(_, enough)| *enough).map(|(kind, _)| (kind, 1));
+    for (kind, rounds) in kinds.chain([(FoldKind::Blocks, 1), (FoldKind::Blocks, ROUNDS)]) {
+        all.fold(kind, rounds, &session_of);
+        if all.folds_are_within_each_other(&recorded.scales) {
+            break;
+        }
+    }
     all.less(prior)
 }
 
 impl Rows {
+    /// Makes folds: of files, of sessions, or of the blocks that each file is cut into, which go round so many times.
+    fn fold(&mut self, kind: FoldKind, rounds: usize, session_of: &[usize]) {
+        self.folds = kind;
+        let mut of_file = vec![0; self.measured_means_arcsec.len()];
+        self.rows.iter().for_each(|row| of_file[row.zero] += 1);
+        let mut before = vec![0; of_file.len()];
+        for (row, session) in self.rows.iter_mut().zip(session_of) {
+            let block = before[row.zero] * BLOCKS * rounds / of_file[row.zero];
+            before[row.zero] += 1;
+            let fold = match kind {
+                FoldKind::Files => row.zero,
+                FoldKind::Sessions => *session,
+                FoldKind::Blocks => block,
+            };
+            row.fold = fold % BLOCKS;
+        }
+    }
+
+    /// Whether each fold was recorded at loads that the others were recorded at, too, and those without any one of
+    /// them, as parts are chosen: what a fit says beyond is no measure of a table, which ends where the loads do.
+    fn folds_are_within_each_other(&self, scales: &Scales) -> bool {
+        let [low, high] = scales.torque_n_m;
+        let beyond = BEYOND_OTHERS * (high - low);
+        let loads =
+            |fold: usize| least_and_most(self.rows.iter().filter(|row| row.fold == fold).map(|row| row.at.torque_n_m));
+        let loads: Vec<(usize, (f64, f64))> =
+            (0..BLOCKS).map(|fold| (fold, loads(fold))).filter(|(_, (low, high))| low <= high).collect();
+        loads.iter().all(|(fold, own)| {
+            loads.iter().filter(|(without, _)| without != fold).all(|(without, _)| {
+                let rest = || loads.iter().filter(|(other, _)| other != fold && other != without);
+                own.0 >= rest().map(|(_, of)| of.0).fold(f64::INFINITY, f64::min) - beyond
+                    && own.1 <= rest().map(|(_, of)| of.1).fold(f64::NEG_INFINITY, f64::max) + beyond
+            })
+        })
+    }
+
     /// Sums over their folds.
     pub fn folds_of(&self, parts: &[PartName], scales: &Scales) -> Folds {
         Folds::new(&self.rows, parts, scales, self.means_arcsec.len(), self.folds == FoldKind::Files)

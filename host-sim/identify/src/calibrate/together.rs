@@ -2,9 +2,11 @@
 
 use super::choose::PENALTIES;
 use super::folds::{Chosen, Folds, Row};
-use super::parts::{PartName, Scales};
+use super::parts::{PartName, Scales, State};
+use super::prior::Prior;
 use super::rows::Rows;
-use crate::measurement::Recording;
+use super::{Model, SAME_TORQUE};
+use crate::measurement::{Recording, least_and_most};
 
 /// Logs do not agree if fits to each alone leave less than this share of what one fit to all leaves, rms. A guess.
 const ALONE: f64 = 0.3;
@@ -62,4 +64,111 @@ impl Agreement {
             )
         })
     }
+}
+
+/// The straight wind-up of one log is so many times that of another: beyond what a spring of teeth stiffens by from
+/// light loads to heavy ones, 1.8 times in the catalogue (K1 to K3 of CSF-25-100). A guess.
+const OTHER_SLOPE: f64 = 3.0;
+
+/// Says of logs whose loads wind the drive up unlike: one curve fits them all where their loads are others, as one is
+/// in another unit.
+pub(super) fn loads_unlike(rows: &Rows, model: &Model, prior: &Prior<'_>, files: &[Recording]) -> Option<String> {
+    let wind_up = |torque_n_m: f64| {
+        let at = State { torque_n_m, temperature_c: prior.nominal.temperature_c, way: 1.0, ..State::default() };
+        prior.steady_arcsec(&at) + model.adds_arcsec(&at)
+    };
+    let most = model.scales.torque_n_m.iter().fold(0.0, |most: f64, load| most.max(load.abs()));
+    let slopes = (0..files.len()).filter_map(|log| {
+        let of_log = rows.rows.iter().filter(|row| row.zero == log).map(|row| row.at.torque_n_m);
+        let (low, high) = least_and_most(of_log);
+        let slope = (wind_up(high) - wind_up(low)) / (high - low);
+        (high - low > SAME_TORQUE * most && slope > 0.0).then_some((log, slope))
+    });
+    let slopes: Vec<(usize, f64)> = slopes.collect();
+    let (soft, stiff) =
+        (slopes.iter().max_by(|a, b| a.1.total_cmp(&b.1))?, slopes.iter().min_by(|a, b| a.1.total_cmp(&b.1))?);
+    (soft.1 > OTHER_SLOPE * stiff.1).then(|| {
+        format!(
+            "the loads of the logs do not agree: {:.3} arcsec for a newton-metre in {}, {:.3} in {}, {:.1} times less; \
+             is the torque of one in another unit? See `flexspline look`, or give one log alone",
+            soft.1,
+            files[soft.0].file,
+            stiff.1,
+            files[stiff.0].file,
+            soft.1 / stiff.1
+        )
+    })
+}
+
+/// A generator that is turned back by what is found has to leave less than this share of the squares, and no more than
+/// this share of the rms of each log alone: else it is not the zero alone that differs. Guesses.
+const TURNED_BACK: f64 = 0.8;
+const AS_ALONE: f64 = 1.3;
+/// Times that the angle is looked for anew, as the curve that all logs share goes with it.
+const TURNS: usize = 4;
+/// Step of the generator that slopes are taken over, rad: a small part of a tooth pitch.
+const STEP_RAD: f64 = 1e-3;
+
+/// Says of logs whose generators have unlike zeros, and by how much.
+pub(super) fn generators_turned(
+    rows: &Rows,
+    (parts, model): (&[PartName], &Model),
+    prior: &Prior<'_>,
+    files: &[Recording],
+) -> Option<String> {
+    if files.len() < 2 {
+        return None;
+    }
+    let before = Agreement::of(rows, parts, &model.scales)?.together_arcsec;
+    let chosen: Vec<Chosen> = parts.iter().map(|part| Chosen { part: *part, penalty: PENALTIES[0] }).collect();
+    let (mut turned, mut rows) = (vec![0.0; files.len()], rows.clone());
+    for _ in 0..TURNS {
+        let folds = rows.folds_of(parts, &model.scales);
+        let coefficients = folds.coefficients(&chosen)?;
+        let fitted = Model { chosen: chosen.clone(), coefficients, scales: model.scales };
+        let by = angles_off(&rows, &fitted, prior, files.len());
+        turned.iter_mut().zip(&by).for_each(|(turned, by)| *turned += by);
+        for row in &mut rows.rows {
+            row.at.generator_rad -= by[row.zero];
+            row.at.output_rad -= by[row.zero] / prior.nominal.ratio;
+        }
+        rows = rows.less(prior);
+    }
+    let Agreement { alone_arcsec, together_arcsec: after, .. } = Agreement::of(&rows, parts, &model.scales)?;
+    let is_that = after * after < TURNED_BACK * before * before && after < AS_ALONE * alone_arcsec;
+    is_that.then(|| {
+        let of = |(file, turned): (&Recording, &f64)| format!("{:+.2} deg in {}", turned.to_degrees(), file.file);
+        let list: Vec<String> = files.iter().zip(&turned).skip(1).map(of).collect();
+        format!(
+            "the zero of the generator is not the same in all logs: against {} it reads {}; turned back they would \
+             leave {after:.2} arcsec rms instead of {before:.2}. Home it in the same place before each log, or give \
+             one log alone",
+            files[0].file,
+            list.join(", ")
+        )
+    })
+}
+
+/// By how much the generator of each log is turned against that of the first, rad, to first order.
+fn angles_off(rows: &Rows, model: &Model, prior: &Prior<'_>, logs: usize) -> Vec<f64> {
+    let says = |at: &State| prior.steady_arcsec(at) + model.adds_arcsec(at);
+    let turned = |at: &State, by: f64| State {
+        generator_rad: at.generator_rad + by,
+        output_rad: at.output_rad + by / prior.nominal.ratio,
+        ..*at
+    };
+    let mut sums = vec![[0.0; 5]; logs];
+    for row in &rows.rows {
+        let slope = (says(&turned(&row.at, STEP_RAD)) - says(&turned(&row.at, -STEP_RAD))) / (2.0 * STEP_RAD);
+        let left = row.left_arcsec - model.adds_arcsec(&row.at);
+        let of_row = [1.0, slope, left, slope * slope, slope * left];
+        sums[row.zero].iter_mut().zip(of_row).for_each(|(sum, of_row)| *sum += of_row);
+    }
+    // The slope of what is left over that of the curve, each less its mean over the log.
+    let off = |[rows, slope, left, square, product]: &[f64; 5]| {
+        let (variance, along) = (square - slope * slope / rows, product - slope * left / rows);
+        if variance > 0.0 { -along / variance } else { 0.0 }
+    };
+    let first = sums.first().map_or(0.0, off);
+    sums.iter().map(|sum| off(sum) - first).collect()
 }
