@@ -79,7 +79,7 @@ impl<'a> Explanation<'a> {
             in_place_of,
             record,
             evidence: last(&[Gate::Evidence]),
-            size_arcsec: last(&[Gate::Size, Gate::SizeIfClear, Gate::Named]),
+            size_arcsec: last(&[Gate::Size, Gate::SizeIfClear]),
             steps,
         }
     }

@@ -450,12 +450,6 @@ pub fn least_size(white: f64) -> f64 {
     LEAST_ARCSEC.max(LEAST_OF_NOISE * white)
 }
 
-/// Least size of a cause, arcsec, at this white noise, however clear.
-#[must_use]
-pub fn least_named(white: f64) -> f64 {
-    LEAST_IF_CLEAR * least_size(white)
-}
-
 /// Limits of what counts at this noise.
 pub(super) struct Limits {
     least: f64,

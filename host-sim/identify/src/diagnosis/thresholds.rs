@@ -102,34 +102,15 @@ pub mod verdict {
     pub const NO_WORSE: f64 = 1.001;
     /// What is left as a free function counts if it is larger than this against the strongest cause. *Chosen*.
     pub const LEAST_LEFT_OF_STRONGEST: f64 = 0.25;
-    /// Named causes that explain less than this share of what is explained at all are not named. *Guess*.
-    pub const LEAST_NAMED_SHARE: f64 = 0.6;
-    /// Beside a deviation that is described well though it has no name, causes that explain less than this share are
-    /// not named. *Chosen*.
-    pub const LEAST_BESIDE_DESCRIBED: f64 = 0.05;
-    /// Share of the square of what is beyond noise that may stay without any description where causes are
-    /// named. *Chosen*.
-    pub const MOST_UNEXPLAINED: f64 = 0.5;
     /// What is left of an explained error is no more than so many times the noise, wander with it. *Source*: where
     /// abstention begins in the method that `docs/explanation/theory.md` describes.
     pub const NEAR_NOISE: f64 = 1.6;
     /// Something without a name is large beside a cause from this share of its size on: what is not understood may
     /// reach into it. *Chosen*.
     pub const LARGE_BESIDE: f64 = 0.7;
-    /// A line of the output angle that is straight or of a whole order is told from a piece of a line of broken order
-    /// beside it where the misfit rises by this without it, that line being of any order: five standard deviations, as
-    /// between rivals. *Source*.
-    pub const NO_PIECE: f64 = super::rivals::TOLD_APART;
-    /// The order of a line is broken where a line of the nearest whole order raises the misfit by this: three standard
-    /// deviations. *Source*.
-    pub const BROKEN: f64 = 9.0;
     /// A line in time is near the frequency of a resonance within this share of it: neighbours of a spring with this
     /// much more or less mass. *Guess*.
     pub const SWINGS_NEAR: f64 = 0.2;
-    /// A resonance rings that may be damped by less than this, all of its interval considered. Beyond, a third (0.34)
-    /// of the swing or less is left after a period: it lags, and so does a flank or a reading that takes some
-    /// milliseconds. *Guess*: drives of the examinations have 0.01 to 0.15.
-    pub const RINGS: f64 = 0.17;
     /// A zero that moves from one session to the next by whole tooth pitches, but for this share of one, may be teeth
     /// that have skipped. *Guess*.
     pub const BESIDE_PITCHES: f64 = 0.02;

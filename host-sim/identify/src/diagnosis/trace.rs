@@ -116,21 +116,12 @@ pub enum Gate {
     Earns,
     /// With it sessions left out are predicted no worse than with no cause at all, arcsec rms.
     Predicts,
-    /// It is large enough to be named, arcsec.
-    Named,
-    /// What has no name is no larger than this against it.
-    BesideUnknown,
-    /// It is no piece of a line beside it whose order is not whole: without it, and with that line of any order, the
-    /// misfit rises by this much.
-    NoPiece,
     /// A line of the generator's angle does not grow with the speed.
     NoGrowthWithSpeed,
     /// A load that was not recorded may make it: no more is left than so many times the noise.
     LoadKnown,
     /// No line in time that has no name, near its frequency, is as large as this against it.
     NoLineBeside,
-    /// The lower end of its damping's interval is below this.
-    Rings,
     /// It is so many times its own uncertainty.
     KnownWell,
     /// The best known of its sizes is so many times its standard deviation.
@@ -141,12 +132,6 @@ pub enum Gate {
     ToldApart,
     /// As a rival it would lower the misfit against the cause that was named.
     AsRival,
-    /// The causes named are at least this share of what is there and not described.
-    ShareNamed,
-    /// The causes named are at least this share of what is there and described without a name.
-    ShareDescribed,
-    /// At most this share of what noise does not explain stays in the dark.
-    InTheDark,
     /// All causes together predict sessions left out no worse than the nominal model, arcsec rms.
     NoWorse,
 }
@@ -186,21 +171,14 @@ impl Gate {
             Gate::SamePlace => "same_place",
             Gate::Earns => "earns",
             Gate::Predicts => "predicts",
-            Gate::Named => "named",
-            Gate::BesideUnknown => "beside_unknown",
-            Gate::NoPiece => "no_piece",
             Gate::NoGrowthWithSpeed => "no_growth_with_speed",
             Gate::LoadKnown => "load_known",
             Gate::NoLineBeside => "no_line_beside",
-            Gate::Rings => "rings",
             Gate::KnownWell => "known_well",
             Gate::ToldFromZero => "told_from_zero",
             Gate::ToldBetter => "told_better",
             Gate::ToldApart => "told_apart",
             Gate::AsRival => "as_rival",
-            Gate::ShareNamed => "share_named",
-            Gate::ShareDescribed => "share_described",
-            Gate::InTheDark => "in_the_dark",
             Gate::NoWorse => "no_worse",
         }
     }
@@ -230,9 +208,6 @@ impl Gate {
             Gate::SamePlace => "tells the same as the cause in whose place it is tried (difference as a share of that)",
             Gate::Earns => "earns the place that it would take",
             Gate::Predicts => "keeps the causes together better than none in sessions left out (arcsec rms)",
-            Gate::Named => "is large enough to be named (arcsec rms)",
-            Gate::BesideUnknown => "is not hidden by what has no name (its size as a share of the cause)",
-            Gate::NoPiece => "is no piece of a line beside it whose order is not whole (rise of the misfit without it)",
             Gate::NoGrowthWithSpeed => {
                 "does not grow with the speed (growth of its amplitude, standard deviations; negative where it fades)"
             }
@@ -243,17 +218,11 @@ impl Gate {
                 "does not stand beside a line in time near its frequency that nothing in the drive drives (its size as \
                  a share of the cause)"
             }
-            Gate::Rings => "may ring (lower end of the interval of its damping ratio)",
             Gate::KnownWell => "is known well beside what has no name (times its own uncertainty)",
             Gate::ToldFromZero => "has a size that is told from zero (times its standard deviation)",
             Gate::ToldBetter => "is not told better by a rival (rise of the misfit with the rival in its place)",
             Gate::ToldApart => "is told apart from a rival (rise of the misfit with the rival in its place)",
             Gate::AsRival => "tells the data better in the place of a cause that was named (rise of the misfit)",
-            Gate::ShareNamed => "is, with the others named, most of what is there (share of the square)",
-            Gate::ShareDescribed => {
-                "is, with the others named, no small part beside what is described without a name (share of the square)"
-            }
-            Gate::InTheDark => "leaves little in the dark, with the others named (share of the square beyond noise)",
             Gate::NoWorse => "predicts sessions left out, with the others named (arcsec rms)",
         }
     }
@@ -266,12 +235,9 @@ impl Gate {
             | Gate::Room
             | Gate::SamePlace
             | Gate::Predicts
-            | Gate::BesideUnknown
             | Gate::LoadKnown
             | Gate::NoLineBeside
-            | Gate::Rings
             | Gate::NoGrowthWithSpeed
-            | Gate::InTheDark
             | Gate::NoWorse
             | Gate::AsRival => true,
             Gate::Needs(_)
@@ -289,14 +255,10 @@ impl Gate {
             | Gate::ClearBeside
             | Gate::Ahead
             | Gate::Earns
-            | Gate::Named
-            | Gate::NoPiece
             | Gate::KnownWell
             | Gate::ToldFromZero
             | Gate::ToldBetter
-            | Gate::ToldApart
-            | Gate::ShareNamed
-            | Gate::ShareDescribed => false,
+            | Gate::ToldApart => false,
         }
     }
 }

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use super::candidate::{Deviation, Label, Law, Per, follows_speed, line, standing_pitch_error};
+use super::candidate::{Deviation, Label, Law, Per, standing_pitch_error};
 use super::channels::{RatioProposal, proposed_ratio};
-use super::model::{Fit, Problem, Scaffold, Term};
+use super::model::{Fit, Problem, Term};
 use super::noise::Noise;
 use super::report::{Cause, Compensation, Diagnosis, Finding, HeldOut, Parameter, Residual, Unexplained, Verdict};
 use super::select::{self, Selected, Standing, fit, predicted, standings};
@@ -54,40 +54,32 @@ pub(super) fn conclude(
     let (rms_before, rms_after) = (problem.certain_rms(&before), problem.certain_rms(&after));
     let explainable = (rms_before * rms_before - floor * floor).max(0.0);
     let unexplained = (rms_after * rms_after - floor * floor).max(0.0);
-    let as_noise = rms_after <= NOISE_KNOWN_TO * floor;
 
     let known = known(problem, &selected, noise);
     let unnamed = Unnamed::beside(&selected, &standings, &left_over, hidden_lines);
     let left_of_noise = rms_after / floor.max(1e-30);
     let named = understood(problem, &selected, &standings, &known, &unnamed, [noise.white, left_of_noise], &mut trace);
-    let size = |k: &usize| standings[*k].size.powi(2);
-    let (by_name, without_name) = (
-        named.iter().map(size).sum::<f64>(),
-        (0..selected.terms.len())
-            .filter(|k| !named.contains(k) && !selected.terms[*k].law.is_zero_of_sessions())
-            .map(|k| size(&k))
-            .sum::<f64>(),
-    );
     // A zero of each session hides nothing of what goes on within one. One that may be teeth that have skipped is not
     // understood with nothing else found.
     let zeros_alone = named.is_empty() && all.iter().any(|term| term.law.is_zero_of_sessions() && !of_the_bench(term));
     let strongest = named.iter().map(|k| standings[*k].size).fold(0.0, f64::max);
     left_over.retain(|l| l.size_arcsec > LEAST_LEFT_OF_STRONGEST * strongest);
-    let described = without_name;
-    let without_name = without_name + left_over.iter().map(|l| l.size_arcsec.powi(2)).fold(0.0, f64::max);
-    let significant_left = without_name > 0.0 || zeros_alone;
+    let without_name = |k: usize| !named.contains(&k) && !selected.terms[k].law.is_zero_of_sessions();
+    let significant_left = !left_over.is_empty() || (0..selected.terms.len()).any(without_name) || zeros_alone;
     let held = held_out::evaluate(problem, &all);
-    let abstained = Abstention { by_name, without_name, described, unexplained, explainable, as_noise };
-    let gates = if named.is_empty() { Vec::new() } else { abstained.gates(significant_left, held.total) };
+    // What does not predict sessions it was not fitted to is no explanation.
+    let (before_out, after_out) = (held.total.rms_before_arcsec, held.total.rms_after_arcsec);
+    let most = NO_WORSE * before_out;
+    let no_worse = Judged::number(Gate::NoWorse, after_out, most, after_out <= most);
     let verdict = match (named.is_empty(), significant_left) {
         (true, false) => Verdict::None,
         (true, true) => Verdict::Unknown,
-        (false, _) if !passed(&gates) => Verdict::Unknown,
+        (false, _) if !no_worse.passed => Verdict::Unknown,
         (false, false) => Verdict::Explained,
         (false, true) => Verdict::PartlyExplained,
     };
     for k in &named {
-        trace.decided(Stage::Verdict, selected.terms[*k].law.label, None, gates.clone());
+        trace.decided(Stage::Verdict, selected.terms[*k].law.label, None, vec![no_worse]);
     }
     let mut causes = Vec::new();
     let mut next_experiment = None;
@@ -281,55 +273,11 @@ fn ratio_proposed(causes: &[Cause], nominal_ratio: f64) -> Option<RatioProposal>
     proposed_ratio(nominal_ratio, error.value)
 }
 
-/// What there is with a name and without, arcsec².
-struct Abstention {
-    /// Squares of the causes that may be named.
-    by_name: f64,
-    /// Squares of what has no name, described or not.
-    without_name: f64,
-    /// Those of it that are described by a law without a name.
-    described: f64,
-    /// Left unexplained beyond noise.
-    unexplained: f64,
-    /// Beyond noise at all.
-    explainable: f64,
-    /// What is left is noise, as well as that is known.
-    as_noise: bool,
-}
-
-impl Abstention {
-    /// What the causes have to pass together, or none of them is named.
-    fn gates(&self, significant_left: bool, held_out: HeldOut) -> Vec<Judged> {
-        let mut gates = Vec::new();
-        let share = |gate: Gate, all: f64, least: f64| {
-            Judged::number(gate, self.by_name / all, least, self.by_name >= least * all)
-        };
-        if significant_left {
-            // What is left without even a description may be what the cause was named for.
-            let not_described = self.by_name + self.without_name - self.described;
-            gates.push(share(Gate::ShareNamed, not_described, LEAST_NAMED_SHARE));
-            gates.push(share(Gate::ShareDescribed, self.by_name + self.described, LEAST_BESIDE_DESCRIBED));
-        }
-        // Names for a small part of what is there, with the rest in the dark, are no understanding.
-        let dark = !self.as_noise && self.unexplained > MOST_UNEXPLAINED * self.explainable;
-        let in_the_dark = if self.explainable > 0.0 { self.unexplained / self.explainable } else { 0.0 };
-        gates.push(Judged::number(Gate::InTheDark, in_the_dark, MOST_UNEXPLAINED, !dark));
-        // What does not predict sessions it was not fitted to is no explanation.
-        let (after, most) = (held_out.rms_after_arcsec, NO_WORSE * held_out.rms_before_arcsec);
-        let worse = after > most;
-        gates.push(Judged::number(Gate::NoWorse, after, most, !worse));
-        gates
-    }
-}
-
-/// Sizes of what has no name, arcsec: the largest at all, all together, the largest that follows the output angle, the
-/// largest that follows how fast the generator turns and which way, and lines in time with their frequencies, Hz. A
-/// zero that the bench sets in each session is none of it.
+/// Sizes of what has no name, arcsec: the largest, all together, and lines in time with their frequencies, Hz. A zero
+/// that the bench sets in each session is none of it.
 struct Unnamed {
     largest: f64,
     together: f64,
-    of_output: f64,
-    of_speed: f64,
     in_time: Vec<(f64, f64)>,
 }
 
@@ -340,30 +288,21 @@ impl Unnamed {
         left_over: &[Unexplained],
         hidden_lines: &[Label],
     ) -> Unnamed {
-        let terms = selected
-            .terms
-            .iter()
-            .zip(standings)
+        let terms = selected.terms.iter().zip(standings);
+        let terms = terms
             .filter(|(term, _)| !term.law.named() && !term.law.is_zero_of_sessions())
-            .map(|(term, standing)| (Some(term.law.label), term.law.label.to_string(), standing.size));
-        let left = left_over.iter().map(|left| {
-            let line = hidden_lines.iter().find(|line| line.to_string() == left.looks_like);
-            (line.copied(), left.looks_like.clone(), left.size_arcsec)
-        });
-        let all: Vec<(Option<Label>, String, f64)> = terms.chain(left).collect();
-        let largest = |of: &dyn Fn(&Option<Label>, &str) -> bool| {
-            all.iter().filter(|(label, called, _)| of(label, called)).map(|(.., size)| *size).fold(0.0, f64::max)
-        };
-        let in_time = |label: &Option<Label>| match label {
-            Some(Label::Deviation(Deviation::Line { per: Per::Second, order })) => Some(*order),
+            .map(|(term, standing)| (Some(term.law.label), standing.size));
+        let hidden = |called: &str| hidden_lines.iter().find(|line| line.to_string() == called).copied();
+        let left = left_over.iter().map(|left| (hidden(&left.looks_like), left.size_arcsec));
+        let all: Vec<(Option<Label>, f64)> = terms.chain(left).collect();
+        let in_time = |label: Option<Label>| match label {
+            Some(Label::Deviation(Deviation::Line { per: Per::Second, order })) => Some(order),
             _ => None,
         };
         Unnamed {
-            largest: largest(&|_, _| true),
-            together: all.iter().map(|(.., size)| *size).fold(0.0, f64::hypot),
-            of_output: largest(&|label, called| label.is_some_and(follows_output) || called == OF_OUTPUT_ANGLE),
-            of_speed: largest(&|_, called| follows_speed(called)),
-            in_time: all.iter().filter_map(|(label, _, size)| Some((in_time(label)?, *size))).collect(),
+            largest: all.iter().map(|(_, size)| *size).fold(0.0, f64::max),
+            together: all.iter().map(|(_, size)| *size).fold(0.0, f64::hypot),
+            in_time: all.iter().filter_map(|(label, size)| Some((in_time(*label)?, *size))).collect(),
         }
     }
 
@@ -388,39 +327,20 @@ fn understood(
     let mut named = Vec::new();
     for k in (0..selected.terms.len()).filter(is_named) {
         let size = standings[k].size;
-        let no_larger = |gate: Gate, unnamed: f64| {
-            Judged::number(gate, unnamed / size, LARGE_BESIDE, unnamed <= LARGE_BESIDE * size)
-        };
-        let beside = |unnamed: f64| no_larger(Gate::BesideUnknown, unnamed);
-        let well_known = Judged::above(Gate::KnownWell, known[k].times_its_doubt, KNOWN_BESIDE);
-        let hidden = beside(unnamed.largest);
-        let mut gates = vec![
-            Judged::above(Gate::Named, size, select::least_named(white)),
-            if hidden.passed { hidden } else { well_known },
-            Judged::above(Gate::ToldFromZero, known[k].told_from_zero, TOLD_FROM_ZERO),
-        ];
-        if of_output_angle(selected.terms[k].law, &known[k]) {
-            // However well it is known, what follows the same angle and has no name may be the whole of which it is a
-            // piece.
-            gates.push(beside(unnamed.of_output));
-            gates.extend(
-                rise_without_a_piece(problem, selected, k).map(|rise| Judged::above(Gate::NoPiece, rise, NO_PIECE)),
-            );
+        let mut gates = vec![Judged::above(Gate::ToldFromZero, known[k].told_from_zero, TOLD_FROM_ZERO)];
+        if unnamed.largest > LARGE_BESIDE * size {
+            gates.push(Judged::above(Gate::KnownWell, known[k].times_its_doubt, KNOWN_BESIDE));
         }
         if load_makes_it(selected.terms[k].law.cause(), problem) {
             let left = left_of_noise.hypot(unnamed.together / white);
             gates.push(Judged::number(Gate::LoadKnown, left, NEAR_NOISE, left <= NEAR_NOISE));
         }
-        if selected.terms[k].law.is(CauseName::SensorLatency) {
-            // It grows with the speed and does nothing else: so does a piece of whatever goes with the speed.
-            gates.push(beside(unnamed.of_speed));
-        }
         if let Some(frequency) = known[k].parameters.get(ParameterName::FrequencyHz.as_str()) {
             // What swings on at its own frequency, whatever the drive does, is driven by something else.
-            gates.push(no_larger(Gate::NoLineBeside, unnamed.swinging_near(frequency.value)));
+            let share = unnamed.swinging_near(frequency.value) / size;
+            gates.push(Judged::number(Gate::NoLineBeside, share, LARGE_BESIDE, share <= LARGE_BESIDE));
         }
         gates.extend(growth_with_speed(problem, selected, &known[k], k));
-        gates.extend(least_damping(&known[k]).map(|least| Judged::number(Gate::Rings, least, RINGS, least < RINGS)));
         if passed(&gates) {
             named.push(k);
         }
@@ -435,89 +355,6 @@ fn growth_with_speed(problem: &Problem<'_>, selected: &Selected<'_>, known: &Kno
     let order = waves_per_generator_turn(selected.terms[k].law.cause()?, known, problem.on.nominal)?;
     let growth = with_speed::with_speed(problem, selected, Some(k), order)?.grows_by();
     Some(Judged::number(Gate::NoGrowthWithSpeed, growth, with_speed::NO_GROWTH, growth <= with_speed::NO_GROWTH))
-}
-
-/// What a free function of the output angle that is left is called.
-const OF_OUTPUT_ANGLE: &str = "a function of the output angle";
-
-/// Whether what has no name follows the output angle: it is counted in turns of it, or in less than one wave to a turn
-/// of the generator, where nothing repeats that the generator does.
-fn follows_output(label: Label) -> bool {
-    match label {
-        Label::Deviation(Deviation::Line { per, order }) => waves_per_output_turn(per, order, 1.0).is_some(),
-        Label::Cause(_) | Label::Deviation(Deviation::Like(_)) => false,
-    }
-}
-
-/// Waves of a line in a turn of the output, if it follows the output angle.
-fn waves_per_output_turn(per: Per, order: f64, ratio: f64) -> Option<f64> {
-    match per {
-        Per::OutputTurn => Some(order),
-        Per::GeneratorTurn if order < 1.0 => Some(order * ratio.abs()),
-        Per::GeneratorTurn | Per::Second => None,
-    }
-}
-
-/// Farthest that the order of a line is looked for from where it was found, waves in a turn of the output: over less
-/// than a turn whole orders stand in for all between. Smallest order of a line, and steps at first; each time finer by
-/// this factor, so many times.
-const ORDERS: f64 = 1.0;
-const SLOWEST: f64 = 0.1;
-const ORDER_STEPS: usize = 20;
-const FINER: f64 = 4.0;
-const TIMES_FINER: usize = 5;
-
-/// Rise of the misfit where a cause is left out and a line of the output angle that was found beside it may have any
-/// order near its own: what is a piece of that line is not missed then. The least of all such lines whose order is not
-/// whole; nothing where there is none.
-fn rise_without_a_piece(problem: &Problem<'_>, selected: &Selected<'_>, k: usize) -> Option<f64> {
-    let at = |label: Label| match label {
-        Label::Deviation(Deviation::Line { per, order }) => waves_per_output_turn(per, order, problem.on.nominal.ratio),
-        Label::Cause(_) | Label::Deviation(Deviation::Like(_)) => None,
-    };
-    let of_line = |j: usize| -> Option<f64> {
-        let found = at(selected.terms[j].law.label)?;
-        let others = (0..selected.terms.len()).filter(|other| *other != j && *other != k);
-        let scaffold = Scaffold::new(problem, others.map(|other| &selected.terms[other]).collect());
-        let misfit = |order: f64| {
-            let law = line(Per::OutputTurn, order);
-            scaffold.fit(Some(&Term::new(problem, &law, Vec::new()))).map_or(f64::INFINITY, |fit| fit.solution.misfit)
-        };
-        let (order, least) = least_near(found, misfit);
-        let is_broken = misfit(order.round()) > least + BROKEN;
-        is_broken.then_some(least - selected.fit.solution.misfit)
-    };
-    (0..selected.terms.len()).filter(|j| *j != k).filter_map(of_line).reduce(f64::min)
-}
-
-/// The order near one at which the misfit is least, and that misfit.
-fn least_near(order: f64, misfit: impl Fn(f64) -> f64 + Sync) -> (f64, f64) {
-    let mut best = (order, misfit(order));
-    let mut reach = ORDERS;
-    for _ in 0..=TIMES_FINER {
-        let step = 2.0 * reach / ORDER_STEPS as f64;
-        let from = best.0 - reach;
-        let tried = (0..=ORDER_STEPS)
-            .into_par_iter()
-            .map(|k| (from + step * k as f64).max(SLOWEST))
-            .map(|order| (order, misfit(order)));
-        best = tried.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|tried| tried.1 < best.1).unwrap_or(best);
-        reach /= FINER;
-    }
-    best
-}
-
-/// The lower end of the interval of a damping ratio, of a cause that has one.
-fn least_damping(known: &Known) -> Option<f64> {
-    known.parameters.get(ParameterName::DampingRatio.as_str()).map(|damping| damping.value - INTERVAL * damping.std)
-}
-
-/// Whether a law is a line of the output angle and nothing else, straight or of a whole order: a piece of whatever
-/// bends, however well it is known.
-fn of_output_angle(law: &Law, known: &Known) -> bool {
-    law.is(CauseName::RatioError)
-        || law.is(CauseName::OutputEncoderTilt)
-        || is_subdivision_of_output(law.cause(), known)
 }
 
 fn is_subdivision_of_output(cause: Option<CauseName>, known: &Known) -> bool {
@@ -688,25 +525,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_left_is_in_the_dark_only_beyond_what_the_noise_is_known_to() {
-        let in_the_dark = |as_noise: bool| {
-            let of = Abstention {
-                by_name: 1.0,
-                without_name: 0.0,
-                described: 0.0,
-                unexplained: 2.0,
-                explainable: 3.0,
-                as_noise,
-            };
-            of.gates(false, HeldOut::default())
-                .into_iter()
-                .any(|judged| judged.gate == Gate::InTheDark && !judged.passed)
-        };
-        assert!(in_the_dark(false));
-        assert!(!in_the_dark(true));
-    }
-
-    #[test]
     fn a_zero_that_is_hardly_told_from_that_of_the_first_session_is_none() {
         let zeros = |values: [f64; 3]| values.map(|value| Parameter { value, std: 4.6 });
         assert!(!is_another_one(&zeros([0.0, -15.0, -15.5])));
@@ -721,37 +539,6 @@ mod tests {
     }
 
     #[test]
-    fn a_damping_whose_interval_reaches_below_what_rings_is_that_of_a_resonance() {
-        let known = |value: f64, std: f64| Known {
-            parameters: [(ParameterName::DampingRatio.as_str(), Parameter { value, std })].into(),
-            times_its_doubt: 9.0,
-            ..Known::default()
-        };
-        let rings = |known: &Known| least_damping(known).is_some_and(|least| least < RINGS);
-        assert!(rings(&known(0.18, 0.02)), "0.15, fitted as 0.18");
-        assert!(rings(&known(0.3, 0.1)));
-        assert!(!rings(&known(0.3, 0.02)));
-        assert_eq!(least_damping(&Known::default()), None);
-    }
-
-    #[test]
-    fn what_follows_the_output_is_counted_in_turns_of_it_or_slower_than_the_generator() {
-        let line = |per, order| follows_output(Label::Deviation(Deviation::Line { per, order }));
-        assert!(line(Per::OutputTurn, 3.0) && line(Per::GeneratorTurn, 0.028));
-        assert!(!line(Per::GeneratorTurn, 3.0) && !line(Per::Second, 0.3));
-        assert!(!follows_output("offset with time".into()) && !follows_output(CauseName::RatioError.into()));
-        assert_eq!(waves_per_output_turn(Per::GeneratorTurn, 0.03125, -100.0), Some(3.125));
-    }
-
-    #[test]
-    fn the_order_of_a_line_is_found_near_where_the_line_was() {
-        let (order, least) = least_near(3.0, |order| 7.0 + (order - 2.6183).powi(2));
-        assert!((order - 2.6183).abs() < 1e-3 && (least - 7.0).abs() < 1e-6, "{order}, {least}");
-        // Where nothing is better it stays.
-        assert_eq!(least_near(3.0, |order| (order - 3.0).abs()), (3.0, 0.0));
-    }
-
-    #[test]
     fn what_laws_leave_beyond_the_noise_widens_what_is_told_from_zero() {
         assert_eq!(beyond_noise(5.0, 4.5), 1.0);
         assert_eq!(beyond_noise(6.0, 4.0), 1.5);
@@ -759,13 +546,7 @@ mod tests {
 
     #[test]
     fn a_line_in_time_near_a_resonance_is_counted_against_it_and_one_elsewhere_is_not() {
-        let unnamed = Unnamed {
-            largest: 4.0,
-            together: 5.0,
-            of_output: 0.0,
-            of_speed: 0.0,
-            in_time: vec![(1.33, 4.0), (50.0, 3.0)],
-        };
+        let unnamed = Unnamed { largest: 4.0, together: 5.0, in_time: vec![(1.33, 4.0), (50.0, 3.0)] };
         assert_eq!(unnamed.swinging_near(1.37), 4.0);
         assert_eq!(unnamed.swinging_near(9.0), 0.0);
     }

@@ -17,20 +17,6 @@ const WITH_SPEED_SQUARED_BY_DIRECTION: &str = "offset with speed squared, by dir
 const BY_DIRECTION: &str = "offset by direction";
 const OF_SPEED: &str = "a function of speed";
 
-/// Whether what has no name, called so, follows how fast the generator turns and which way, and nothing else.
-#[must_use]
-pub fn follows_speed(called: &str) -> bool {
-    const ALL: [&str; 6] = [
-        LASH_BEFORE_THE_GENERATOR,
-        WITH_SPEED_MAGNITUDE,
-        WITH_SPEED_SQUARED,
-        WITH_SPEED_SQUARED_BY_DIRECTION,
-        BY_DIRECTION,
-        OF_SPEED,
-    ];
-    ALL.contains(&called)
-}
-
 fn law(name: &'static str, values: impl Fn(&Excitation<'_>, usize) -> f64 + Send + Sync + 'static) -> Law {
     Law::new(name, move |on, _| {
         let column = by_row(on, |k| values(on, k));

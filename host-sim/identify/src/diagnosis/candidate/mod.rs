@@ -33,7 +33,7 @@ use crate::nominal::Nominal;
 use flexspline_base::robust::least_and_most;
 
 pub use among::{Acting, Among, Zones, left_by, together};
-pub use generic::{follows_speed, line, maps, unnamed};
+pub use generic::{line, maps, unnamed};
 pub use geometry::standing_pitch_error;
 pub use label::{Deviation, Label, Per};
 pub use named::{Coefficients, Role, Shaped};
