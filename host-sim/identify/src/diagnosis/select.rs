@@ -471,32 +471,12 @@ impl Limits {
             gates.push(size);
         } else {
             let least = (LEAST_IF_CLEAR * self.least).max(LEAST_OF_STRONGEST * strongest);
-            gates.push(Judged::above(Gate::EvidenceIfSmall, standing.evidence, CLEAR_EVIDENCE));
             gates.push(Judged::above(Gate::SizeIfClear, standing.size, least));
         }
         gates.push(Judged::above(Gate::Alone, standing.alone, share * misfit));
         let left_out = standing.left_out > 0.0 || !law.wrong.foretells;
         gates.push(Judged::number(Gate::LeftOut, standing.left_out, 0.0, left_out));
         gates
-    }
-
-    /// Whether the last term is clear beside something without a name that tells the data better, and is too small to
-    /// count.
-    fn clear_beside(
-        &self,
-        problem: &Problem<'_>,
-        selected: &Selected<'_>,
-        standing: &Standing,
-        other: &Term<'_>,
-    ) -> Judged {
-        let Some((last, before)) = selected.terms.split_last() else { return Judged::plain(Gate::ClearBeside, true) };
-        let scaffold = Scaffold::new(problem, before.iter().chain([other]).collect());
-        let evidence = |term: Option<&Term<'_>>| scaffold.fit(term).map(|fit| fit.solution.evidence);
-        let needed = if standing.size > self.least { LEAST_EVIDENCE } else { CLEAR_EVIDENCE };
-        match (evidence(Some(last)), evidence(None)) {
-            (Some(with), Some(without)) => Judged::above(Gate::ClearBeside, with + last.occam - without, needed),
-            _ => Judged::plain(Gate::ClearBeside, false),
-        }
     }
 }
 
@@ -672,8 +652,6 @@ fn forward<'l>(
         standing_now.iter().zip(&selected.terms).map(|(s, t)| s.size * t.law.misfit_as(law)).fold(0.0, f64::max)
     };
     simplest_first(problem, selected, &mut grown);
-    // What tells the data better, only that it is too small.
-    let mut too_small: Vec<Term<'l>> = Vec::new();
     let mut grown = grown.into_iter();
     while let Some((gain, next)) = grown.next() {
         let term = next.newest();
@@ -684,16 +662,7 @@ fn forward<'l>(
         }
         let standing = standing(problem, &next, next.terms.len() - 1);
         let strongest = strongest(&selected.terms, &standing_now);
-        let mut gates = limits.gates(term.law, &standing, misfit_as(term.law), strongest);
-        if passed(&gates) && term.law.named() {
-            for other in &too_small {
-                let clear = limits.clear_beside(problem, &next, &standing, other);
-                gates.push(clear);
-                if !clear.passed {
-                    break;
-                }
-            }
-        }
+        let gates = limits.gates(term.law, &standing, misfit_as(term.law), strongest);
         let passes = passed(&gates);
         trace.judged(Stage::Forward, term.law, &values, gates);
         if passes {
@@ -707,9 +676,6 @@ fn forward<'l>(
                 trace.judged_against(Stage::Forward, law, &values, taken, gates);
             }
             return Some(next);
-        }
-        if standing.evidence > LEAST_EVIDENCE && standing.left_out > 0.0 && standing.size <= limits.least {
-            too_small.push(term.clone());
         }
     }
     for (gain, next) in grown {

@@ -25,9 +25,7 @@ pub mod selection {
     pub const LEAST_ARCSEC: f64 = 1.5;
     /// Least size in units of the white noise. *Guess*.
     pub const LEAST_OF_NOISE: f64 = 0.3;
-    /// Evidence beyond which a cause may be smaller than that. *Chosen*.
-    pub const CLEAR_EVIDENCE: f64 = 15.0;
-    /// Least size of a cause that is so clear, as a share of the least size of others. *Chosen*.
+    /// Least size of a cause, as a share of the least size of what has no name. *Chosen*.
     pub const LEAST_IF_CLEAR: f64 = 0.55;
     /// Least size of such a cause as a share of the strongest one. *Guess*.
     pub const LEAST_OF_STRONGEST: f64 = 0.1;
@@ -61,9 +59,8 @@ pub mod selection {
     /// Evidence by which a cause has to be ahead of another to take its place. *Chosen*.
     pub const AHEAD: f64 = 3.0;
     /// Evidence by which the second order and the subdivision of the generator's encoder have to be ahead of wheels,
-    /// which make the same waves and leave traces of the flank and of other orders besides: as clear as a cause that
-    /// may be small. *Guess*.
-    pub const AFTER_WHEELS: f64 = CLEAR_EVIDENCE;
+    /// which make the same waves and leave traces of the flank and of other orders besides. *Guess*.
+    pub const AFTER_WHEELS: f64 = 15.0;
     /// Evidence by which something unnamed has to be ahead of the best cause to be taken before it. *Guess*.
     pub const UNNAMED_AHEAD: f64 = 5.0;
 }

@@ -98,16 +98,12 @@ pub enum Gate {
     Evidence,
     /// It is large enough, arcsec.
     Size,
-    /// It gains so much evidence that it may be small.
-    EvidenceIfSmall,
     /// It is large enough for a cause that is clear, arcsec.
     SizeIfClear,
     /// What nothing else explains of it is larger than what the laws of the other causes may be wrong by, arcsec.
     Alone,
     /// It predicts sessions that it was not fitted to.
     LeftOut,
-    /// It stays clear beside something too small to name that tells the data better.
-    ClearBeside,
     /// In the place of another it gains evidence over that.
     Ahead,
     /// It tells the same as what it takes the place of: they differ by less than this share of that.
@@ -162,11 +158,9 @@ impl Gate {
             Gate::First => "first",
             Gate::Evidence => "evidence",
             Gate::Size => "size",
-            Gate::EvidenceIfSmall => "evidence_if_small",
             Gate::SizeIfClear => "size_if_clear",
             Gate::Alone => "alone",
             Gate::LeftOut => "left_out",
-            Gate::ClearBeside => "clear_beside",
             Gate::Ahead => "ahead",
             Gate::SamePlace => "same_place",
             Gate::Earns => "earns",
@@ -199,11 +193,9 @@ impl Gate {
             Gate::First => "gains more evidence than any other law",
             Gate::Evidence => "gains evidence over the model without it (natural logarithm)",
             Gate::Size => "is large enough (arcsec rms)",
-            Gate::EvidenceIfSmall => "is so clear that it may be small (evidence)",
             Gate::SizeIfClear => "is large enough for a cause that is clear (arcsec rms)",
             Gate::Alone => "is larger than what the laws of the other causes may be wrong by (arcsec rms)",
             Gate::LeftOut => "predicts sessions that it was not fitted to (gain)",
-            Gate::ClearBeside => "stays clear beside something smaller that tells the data better (evidence)",
             Gate::Ahead => "tells the data better than the cause in whose place it is tried (evidence)",
             Gate::SamePlace => "tells the same as the cause in whose place it is tried (difference as a share of that)",
             Gate::Earns => "earns the place that it would take",
@@ -248,11 +240,9 @@ impl Gate {
             | Gate::First
             | Gate::Evidence
             | Gate::Size
-            | Gate::EvidenceIfSmall
             | Gate::SizeIfClear
             | Gate::Alone
             | Gate::LeftOut
-            | Gate::ClearBeside
             | Gate::Ahead
             | Gate::Earns
             | Gate::KnownWell
