@@ -205,17 +205,6 @@ fn a_load_that_swings_with_much_damping_is_a_resonance() {
 }
 
 #[test]
-fn a_wheel_before_the_encoder_is_no_whole_order_of_it() {
-    let ratio = catalogue_drive().ratio;
-    for (order, phase) in [(2.8, 0.3), (3.3, 1.2), (3.5, 2.6)] {
-        let waves = |psi: f64, _: f64, _: usize| 12.0 * (order * psi / ratio + phase).sin();
-        let sessions = with_more(recorded(&[], 5, 3000, 100.0, 1.0, 51), waves);
-        let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
-        assert_eq!((diagnosis.verdict, names(&diagnosis)), (Verdict::Unknown, vec![]), "{order}: {}", diagnosis.text());
-    }
-}
-
-#[test]
 fn wear_goes_on_while_nobody_records() {
     let friction = catalogue_drive().friction_torque_n_m;
     let mut sessions = recorded(&[], 5, 3000, 100.0, 1.0, 71);
@@ -726,17 +715,6 @@ fn what_lags_behind_the_temperature_goes_on_between_sessions() {
     let found = &diagnosis.causes[0].parameters;
     assert!((found["clearance_arcsec_per_k"].value - per_k).abs() < 0.1, "{found:?}");
     assert!((found["lag_s"].value / lag_s - 1.0).abs() < 0.2, "{found:?}");
-}
-
-#[test]
-fn what_tells_the_data_worse_than_something_too_small_to_name_is_not_named_for_it() {
-    let effects = [
-        effect(CauseName::StiffnessHardening, 20.0, 0.0, 0.0),
-        effect(CauseName::GeneratorEncoderEccentricity, 1.6, 2.2, 0.0),
-    ];
-    let measured = recorded(&effects, 5, 6000, 100.0, 1.0, 6);
-    let diagnosis = diagnose(&measured, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
-    assert_eq!(names(&diagnosis), [CauseName::StiffnessHardening], "{}", diagnosis.text());
 }
 
 #[test]
