@@ -182,6 +182,7 @@ export function lineChart(place, id, spec) {
           ...(spec.x.stretched ? { distr: 4, asinh: spec.x.stretched, range: (u, low, high) => [low, high] } : {}),
         },
         y: {
+          ...(spec.y.stretched ? { distr: 4, asinh: spec.y.stretched * fy } : {}),
           range: (u, low, high) => {
             const levels = (description.limits ?? []).map((l) => l.y * fy);
             return uPlot.rangeNum(Math.min(low, ...levels), Math.max(high, ...levels), 0.08, true);
