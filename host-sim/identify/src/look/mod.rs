@@ -13,6 +13,7 @@ mod turns;
 mod words;
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use serde::Serialize;
 
@@ -185,6 +186,8 @@ struct Guess {
     used: bool,
     /// Numbers made continuous.
     values: Vec<f64>,
+    /// Of which file each is, from 0.
+    of_file: Arc<[f64]>,
 }
 
 impl Guess {
@@ -374,6 +377,7 @@ fn guess(files: &[RawFile], place: usize) -> Guess {
     let facts = Facts::of(&raw);
     let said = if files[0].has_names { words::said(&raw.name, raw.unit.as_deref()) } else { Said::default() };
     let values = unwrapped(&raw.values, facts.anew);
+    let of_file = files.iter().enumerate().flat_map(|(k, file)| vec![k as f64; file.columns[place].values.len()]);
     let mut guess = Guess {
         facts,
         said,
@@ -385,6 +389,7 @@ fn guess(files: &[RawFile], place: usize) -> Guess {
         why: Vec::new(),
         used: false,
         values,
+        of_file: of_file.collect(),
     };
     if raw.times > 0 && raw.times + raw.empty + raw.words >= raw.values.len() {
         (guess.role, guess.unit) = (Role::Time, Some(Unit::Iso));
@@ -556,7 +561,8 @@ fn error_rad(guesses: &[Guess], ratio: Option<f64>) -> Option<Vec<f64>> {
 /// Says which column without a role the error moves with, where none is called a torque.
 fn nameless_torque(guesses: &[Guess], error: &[f64], output: &[f64], notes: &mut Vec<String>) {
     let nameless = (0..guesses.len()).filter(|k| guesses[*k].role == Role::Unknown && guesses[*k].moves());
-    let says = nameless.filter_map(|k| Some((k + 1, torque_says(error, output, &guesses[k].values)?)));
+    let says =
+        nameless.filter_map(|k| Some((k + 1, torque_says(error, output, &guesses[k].values, &guesses[k].of_file)?)));
     let best = says.filter(|(_, says)| says.share > NAMELESS).max_by(|a, b| a.1.share.total_cmp(&b.1.share));
     if let Some((place, says)) = best {
         let sign = if says.slope < 0.0 { "-" } else { "" };
@@ -599,7 +605,11 @@ fn torque(guesses: &mut [Guess], error: Option<&[f64]>, notes: &mut Vec<String>)
     }
     let says: Vec<_> = candidates
         .iter()
-        .map(|k| error.zip(output.as_ref()).and_then(|(error, output)| torque_says(error, output, &guesses[*k].values)))
+        .map(|k| {
+            error
+                .zip(output.as_ref())
+                .and_then(|(error, output)| torque_says(error, output, &guesses[*k].values, &guesses[*k].of_file))
+        })
         .collect();
     for (k, says) in candidates.iter().zip(&says) {
         match says {

@@ -173,7 +173,7 @@ fn pairs(guesses: &[Guess]) -> Vec<Pair> {
             if generator == output || against || two_joints && shafts(g) && shafts(o) {
                 continue;
             }
-            let Some(line) = slope(&o.values, &g.values).filter(Slope::holds) else { continue };
+            let Some(line) = slope(&o.values, &g.values, &g.of_file).filter(Slope::holds) else { continue };
             let units = units_of_pair(g, o, 1.0 / line.slope);
             if units.is_empty() {
                 continue;

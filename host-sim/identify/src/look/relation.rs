@@ -38,16 +38,21 @@ pub(super) struct Slope {
     pub left: f64,
 }
 
-/// How the first column follows the second, if it does.
-pub(super) fn slope(first: &[f64], second: &[f64]) -> Option<Slope> {
-    let rows = rows(&[first, second]);
+/// How the first column follows the second, if it does; `of_file` says of which file each row is, as each has a zero of
+/// its own.
+pub(super) fn slope(first: &[f64], second: &[f64], of_file: &[f64]) -> Option<Slope> {
+    let mut rows = rows(&[first, second, of_file]);
     let n = rows.len() as f64;
     if rows.len() < 16 {
         return None;
     }
-    let mean = |at: usize| rows.iter().map(|row| row[at]).sum::<f64>() / n;
-    let (a, b) = (mean(0), mean(1));
-    let sum = |of: &dyn Fn(f64, f64) -> f64| rows.iter().map(|row| of(row[0] - a, row[1] - b)).sum::<f64>();
+    for of_one in rows.chunk_by_mut(|a, b| a[2] == b[2]) {
+        for at in [0, 1] {
+            let mean = of_one.iter().map(|row| row[at]).sum::<f64>() / of_one.len() as f64;
+            of_one.iter_mut().for_each(|row| row[at] -= mean);
+        }
+    }
+    let sum = |of: &dyn Fn(f64, f64) -> f64| rows.iter().map(|row| of(row[0], row[1])).sum::<f64>();
     let (xx, xy, yy) = (sum(&|y, _| y * y), sum(&|y, x| x * y), sum(&|_, x| x * x));
     if !(xx > 0.0 && yy > 0.0) {
         return None;
@@ -98,8 +103,10 @@ impl TorqueSays {
 
 /// How an error (rad) follows a torque beside what turns with the output (rad): an eccentric encoder and the weight of
 /// an arm look alike, so both may explain what one of them does.
-pub(super) fn torque_says(error: &[f64], output: &[f64], torque: &[f64]) -> Option<TorqueSays> {
-    let rows = rows(&[error, output, torque]);
+pub(super) fn torque_says(error: &[f64], output: &[f64], torque: &[f64], of_file: &[f64]) -> Option<TorqueSays> {
+    let rows = rows(&[error, output, torque, of_file]);
+    let mut files: Vec<f64> = rows.iter().map(|row| row[3]).collect();
+    files.dedup();
     let travel = least_and_most(rows.iter().map(|row| row[1]));
     let turns = (travel.1 - travel.0) / TAU;
     let scale = rows.iter().map(|row| row[2].abs()).fold(0.0, f64::max);
@@ -109,7 +116,7 @@ pub(super) fn torque_says(error: &[f64], output: &[f64], torque: &[f64]) -> Opti
     let columns = |with: bool| -> Vec<Vec<f64>> {
         rows.iter()
             .map(|row| {
-                let mut columns = vec![1.0];
+                let mut columns: Vec<f64> = files.iter().map(|file| f64::from(u8::from(row[3] == *file))).collect();
                 // Less than a third of a turn does not tell a sine from a straight line.
                 if turns > 0.33 {
                     columns.extend([row[1].sin(), row[1].cos()]);
@@ -161,14 +168,23 @@ mod tests {
     fn ratio_and_counts_come_out() {
         let motor: Vec<f64> = (0..3000).map(|k| 0.05 * f64::from(k)).collect();
         let out: Vec<f64> = motor.iter().map(|m| 65_536.0 / TAU * (m / 101.0 + 1e-3 * (m / 101.0).sin())).collect();
-        let found = slope(&out, &motor).unwrap();
+        let one = vec![0.0; 3000];
+        let found = slope(&out, &motor, &one).unwrap();
         assert!(found.holds());
+        // A second file, with zeros of its own.
+        let two: Vec<f64> = (0..3000).map(|k| f64::from(u8::from(k >= 1200))).collect();
+        let again =
+            |values: &[f64], by: f64| values.iter().zip(&two).map(|(v, two)| v + by * two).collect::<Vec<f64>>();
+        let (out_again, motor_again) = (again(&out, 90_000.0), again(&motor, -40.0));
+        assert!(!slope(&out_again, &motor_again, &one).unwrap().holds());
+        let found_again = slope(&out_again, &motor_again, &two).unwrap();
+        assert!(found_again.holds() && (found_again.slope / found.slope - 1.0).abs() < 1e-3, "{found_again:?}");
         let counts = |of: f64, round: bool| counts_of_a_turn(of / TAU, round).map(|(counts, _)| counts);
         assert_eq!(counts(-65_536.0, false), Some(65_536.0));
         assert_eq!((counts(20_000.1, false), counts(20_000.1, true)), (None, Some(20_000.0)));
         assert_eq!((counts(20_777.0, true), counts(2.7e8, true)), (None, None));
         let noise: Vec<f64> = (0..3000).map(|k| f64::from((k * 7919) % 3001)).collect();
-        assert!(!slope(&noise, &motor).unwrap().holds());
+        assert!(!slope(&noise, &motor, &one).unwrap().holds());
     }
 
     #[test]
@@ -176,7 +192,11 @@ mod tests {
         let out: Vec<f64> = (0..2000).map(|k| 2e-3 * f64::from(k)).collect();
         let torque: Vec<f64> = (0..2000).map(|k| 20.0 * (0.013 * f64::from(k)).sin()).collect();
         let error: Vec<f64> = out.iter().zip(&torque).map(|(o, t)| 1e-3 * o.sin() - t / 3e4).collect();
-        let says = torque_says(&error, &out, &torque).unwrap();
-        assert!(says.tells() && (says.slope * -3e4 - 1.0).abs() < 1e-6, "{says:?}");
+        let two: Vec<f64> = (0..2000).map(|k| f64::from(u8::from(k >= 700))).collect();
+        let other_zero: Vec<f64> = error.iter().zip(&two).map(|(e, two)| e + 0.5 * two).collect();
+        for (error, of_file) in [(&error, &vec![0.0; 2000]), (&other_zero, &two)] {
+            let says = torque_says(error, &out, &torque, of_file).unwrap();
+            assert!(says.tells() && (says.slope * -3e4 - 1.0).abs() < 1e-6, "{says:?}");
+        }
     }
 }

@@ -37,7 +37,9 @@ pub(super) fn units_of_counts(guesses: &mut [Guess]) {
             .collect();
         let mut best: Option<(bool, f64, usize, Unit, f64)> = None;
         for j in others {
-            let Some(line) = slope(&guesses[k].values, &guesses[j].values).filter(|line| line.left < SAME_SHAFT) else {
+            let Some(line) = slope(&guesses[k].values, &guesses[j].values, &guesses[k].of_file)
+                .filter(|line| line.left < SAME_SHAFT)
+            else {
                 continue;
             };
             let units = guesses[j].unit.map_or(vec![Unit::Radian, Unit::Degree, Unit::Turn], |unit| vec![unit]);
@@ -73,7 +75,7 @@ fn may_be_one_shaft(a: &Guess, b: &Guess) -> bool {
 
 /// Whether two columns show one shaft.
 pub(super) fn one_shaft(a: &Guess, b: &Guess) -> bool {
-    may_be_one_shaft(a, b) && slope(&a.values, &b.values).is_some_and(|line| line.left < SAME_SHAFT)
+    may_be_one_shaft(a, b) && slope(&a.values, &b.values, &a.of_file).is_some_and(|line| line.left < SAME_SHAFT)
 }
 
 /// The unit of an angle as it may be.
