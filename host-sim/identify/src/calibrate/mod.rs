@@ -163,14 +163,16 @@ impl Model {
         2.0 * [play[0] + play[2], play[0], play[0] + play[1]].into_iter().fold(0.0, f64::max)
     }
 
+    /// Error at rest in one place under a load, arcsec.
+    fn under_arcsec(&self, torque_n_m: f64, prior: &Prior<'_>) -> f64 {
+        let at = State { torque_n_m, temperature_c: prior.nominal.temperature_c, way: 1.0, ..State::default() };
+        prior.steady_arcsec(&at) + self.adds_arcsec(&at)
+    }
+
     /// Refuses a torque by which the output gives way the wrong way: its sign is another.
     fn gives_way_with_the_load(&self, prior: &Prior<'_>) -> Result<(), CalibrationError> {
         let [low, high] = self.scales.torque_n_m;
-        let under = |torque_n_m: f64| {
-            let at = State { torque_n_m, temperature_c: prior.nominal.temperature_c, way: 1.0, ..State::default() };
-            prior.steady_arcsec(&at) + self.adds_arcsec(&at)
-        };
-        let by = under(high) - under(low);
+        let by = self.under_arcsec(high, prior) - self.under_arcsec(low, prior);
         if by >= 0.0 {
             return Ok(());
         }
@@ -479,8 +481,10 @@ fn with_dead_zone(
         }
         made => (fitted, made?),
     };
-    let agreement = fitted.agreement().and_then(|agreement| agreement.note(files));
-    let turned = together::generators_turned(&fitted.rows, (&fitted.open, &fitted.model), prior, files);
+    let agreement = fitted.agreement();
+    let turned = agreement.as_ref().and_then(|agreement| {
+        together::generators_turned(agreement, &fitted.rows, (&fitted.open, &fitted.model), prior, files)
+    });
     let unlike = together::loads_unlike(&fitted.rows, &fitted.model, prior, files);
     let Fitted { rows, folds, model, held_out, mut parts, .. } = fitted;
     let image = Table::check(&made.image).map_err(|error| TableError::Project(error.into()))?;
@@ -491,7 +495,7 @@ fn with_dead_zone(
     notes.extend(said);
     notes.extend(reading_delay.as_ref().map(ReadingDelay::note));
     // What is known by its angle needs no guess.
-    notes.extend(turned.or(agreement).into_iter().chain(unlike));
+    notes.extend(turned.or_else(|| agreement?.note(files)).into_iter().chain(unlike));
     notes.extend(remarks(prior, &recorded, (&model, &parts), play_of_a_millisecond_arcsec));
     sizes(&rows, &model, &mut parts);
     let zero = |row: &folds::Row| row.left_arcsec - model.adds_arcsec(&row.at);

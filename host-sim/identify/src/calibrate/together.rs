@@ -73,15 +73,11 @@ const OTHER_SLOPE: f64 = 3.0;
 /// Says of logs whose loads wind the drive up unlike: one curve fits them all where their loads are others, as one is
 /// in another unit.
 pub(super) fn loads_unlike(rows: &Rows, model: &Model, prior: &Prior<'_>, files: &[Recording]) -> Option<String> {
-    let wind_up = |torque_n_m: f64| {
-        let at = State { torque_n_m, temperature_c: prior.nominal.temperature_c, way: 1.0, ..State::default() };
-        prior.steady_arcsec(&at) + model.adds_arcsec(&at)
-    };
     let most = model.scales.torque_n_m.iter().fold(0.0, |most: f64, load| most.max(load.abs()));
     let slopes = (0..files.len()).filter_map(|log| {
         let of_log = rows.rows.iter().filter(|row| row.zero == log).map(|row| row.at.torque_n_m);
         let (low, high) = least_and_most(of_log);
-        let slope = (wind_up(high) - wind_up(low)) / (high - low);
+        let slope = (model.under_arcsec(high, prior) - model.under_arcsec(low, prior)) / (high - low);
         (high - low > SAME_TORQUE * most && slope > 0.0).then_some((log, slope))
     });
     let slopes: Vec<(usize, f64)> = slopes.collect();
@@ -109,17 +105,19 @@ const TURNS: usize = 4;
 /// Step of the generator that slopes are taken over, rad: a small part of a tooth pitch.
 const STEP_RAD: f64 = 1e-3;
 
-/// Says of logs whose generators have unlike zeros, and by how much.
+/// Says of logs that agree so far as `agreement` says whose generators have unlike zeros, and by how much.
 pub(super) fn generators_turned(
+    agreement: &Agreement,
     rows: &Rows,
     (parts, model): (&[PartName], &Model),
     prior: &Prior<'_>,
     files: &[Recording],
 ) -> Option<String> {
-    if files.len() < 2 {
+    let before = agreement.together_arcsec;
+    // All together never leave less than each alone, whichever way they are turned.
+    if agreement.alone_arcsec.powi(2) >= TURNED_BACK * before * before {
         return None;
     }
-    let before = Agreement::of(rows, parts, &model.scales)?.together_arcsec;
     let chosen: Vec<Chosen> = parts.iter().map(|part| Chosen { part: *part, penalty: PENALTIES[0] }).collect();
     let (mut turned, mut rows) = (vec![0.0; files.len()], rows.clone());
     for _ in 0..TURNS {

@@ -255,7 +255,8 @@ pub fn look(files: &[RawFile]) -> Result<Looked, String> {
         }
     }
     let mut notes = reading_notes(files);
-    let mut guesses: Vec<Guess> = first.columns.iter().enumerate().map(|(place, _)| guess(files, place)).collect();
+    let of_file: Arc<[f64]> = files.iter().enumerate().flat_map(|(k, file)| vec![k as f64; file.rows]).collect();
+    let mut guesses: Vec<Guess> = (0..first.columns.len()).map(|place| guess(files, place, &of_file)).collect();
     time(&mut guesses, files);
     in_order(&mut guesses, files, &mut notes);
     units_of_counts(&mut guesses);
@@ -371,13 +372,12 @@ fn is_accepted(files: &[RawFile], guesses: &[Guess], columns: &str, notes: &mut 
 }
 
 /// What a column says by its name and by its numbers alone.
-fn guess(files: &[RawFile], place: usize) -> Guess {
+fn guess(files: &[RawFile], place: usize, of_file: &Arc<[f64]>) -> Guess {
     let mut raw = files[0].columns[place].clone();
     files[1..].iter().for_each(|file| raw.values.extend_from_slice(&file.columns[place].values));
     let facts = Facts::of(&raw);
     let said = if files[0].has_names { words::said(&raw.name, raw.unit.as_deref()) } else { Said::default() };
     let values = unwrapped(&raw.values, facts.anew);
-    let of_file = files.iter().enumerate().flat_map(|(k, file)| vec![k as f64; file.columns[place].values.len()]);
     let mut guess = Guess {
         facts,
         said,
@@ -389,7 +389,7 @@ fn guess(files: &[RawFile], place: usize) -> Guess {
         why: Vec::new(),
         used: false,
         values,
-        of_file: of_file.collect(),
+        of_file: of_file.clone(),
     };
     if raw.times > 0 && raw.times + raw.empty + raw.words >= raw.values.len() {
         (guess.role, guess.unit) = (Role::Time, Some(Unit::Iso));
