@@ -6,14 +6,17 @@
 
 mod importer;
 
-use std::ffi::{c_int, c_void};
+use std::ffi::{CStr, c_char, c_int, c_void};
 use std::ptr::null_mut;
 
 use flexspline::*;
 use flexspline_motion::flight::{COMPENSATED, START_UP_S, fly_one};
 use flexspline_sim::fly::{built_in, unit};
 use flexspline_tests::command::Desk;
-use importer::{DISCARD, ERROR, FUNCTIONS, Imported, Instance, OK, WARNING};
+use importer::{DISCARD, ERROR, FUNCTIONS, Imported, Instance, LogMessage, OK, WARNING};
+
+/// Versions of FMI.
+const VERSIONS: [&str; 2] = ["2.0", "3.0"];
 
 /// A desk with the table of the cam.
 fn desk() -> Desk {
@@ -27,10 +30,19 @@ fn desk() -> Desk {
 fn imported(desk: &Desk, options: &str) -> Imported {
     let exported = desk.line(&format!("export --format fmu --json --out fmu {options}")).done().json();
     let file = desk.path(exported["written"][0].as_str().unwrap());
-    let folder = desk.path(&format!("100 % {}", exported["model"].as_str().unwrap()));
+    let [model, fmi] = ["model", "fmi"].map(|name| exported[name].as_str().unwrap());
+    let folder = desk.path(&format!("100 % {model} {fmi}"));
     let imported = Imported::new(&file, &folder);
     assert_eq!(exported["guid"], imported.guid());
+    assert_eq!(exported["platforms"][0], if imported.three { "x86_64-linux" } else { "linux64" });
     imported
+}
+
+/// The FMU of the table in each version.
+fn in_each_version(desk: &Desk, check: impl Fn(&Imported)) {
+    for fmi in VERSIONS {
+        check(&imported(desk, &format!("--tables cam.fxt --fmi {fmi}")));
+    }
 }
 
 /// Target, rate, torque and temperature of a tick: slews both ways, a load that changes its sign, warming in steps.
@@ -40,15 +52,15 @@ fn asked(tick: u32) -> [f64; 4] {
     [swing, rate, 30.0 * (2.3 * time).sin(), 15.0 + f64::from(tick / 400)]
 }
 
-const NAMES: [&str; 4] = ["output_command", "output_command_rate", "torque", "temperature"];
+const NAMES: [&str; 4] = ["output_angle_command", "output_rate_command", "output_torque", "drive_temperature"];
 const OUTPUTS: [&str; 7] = [
-    "generator_command",
-    "generator_command_rate",
-    "correction",
-    "held_back",
-    "predicted_output",
-    "predicted_error",
-    "uncertainty",
+    "generator_angle_command",
+    "generator_rate_command",
+    "output_angle_correction",
+    "correction_held_back",
+    "output_angle_predicted",
+    "transmission_error_predicted",
+    "prediction_uncertainty",
 ];
 
 fn bits<const N: usize>(values: [f64; N]) -> [u64; N] {
@@ -61,19 +73,24 @@ fn ticked(instance: &Instance<'_>, tick: u32) -> ([u64; 7], [c_int; 4]) {
         instance.set(name, value);
     }
     assert_eq!(instance.step(1e-3), OK, "{:?}", instance.log());
-    (bits(instance.reals(OUTPUTS)), ["quality", "flags", "mode_now", "not_corrected"].map(|name| instance.number(name)))
+    (
+        bits(instance.reals(OUTPUTS)),
+        ["correction_quality", "tick_flags", "mode_active", "not_corrected"].map(|name| instance.number(name)),
+    )
 }
 
 #[test]
 fn the_fmu_of_a_table_gives_the_bits_of_the_core() {
     let desk = desk();
-    let fmu = imported(&desk, "--tables cam.fxt");
-    let instance = fmu.ready("one", &[("temperature", asked(0)[3])]);
+    let fmus = VERSIONS.map(|fmi| imported(&desk, &format!("--tables cam.fxt --fmi {fmi}")));
+    let instances = fmus.each_ref().map(|fmu| fmu.ready("one", &[("drive_temperature", asked(0)[3])]));
     let image = std::fs::read(desk.path("cam.fxt")).unwrap();
     let twin = image.clone();
     let images = Images::new(&image, &twin);
     let drive = *Table::check(&image).unwrap().drive();
-    assert_eq!(instance.text("table_id"), Table::check(&image).unwrap().id().to_string());
+    for instance in &instances {
+        assert_eq!(instance.text("table_id"), Table::check(&image).unwrap().id().to_string());
+    }
     let limits = Limits {
         tick_s: 1e-3,
         rate_rad_s: 0.05,
@@ -117,7 +134,10 @@ fn the_fmu_of_a_table_gives_the_bits_of_the_core() {
         ]);
         let not_corrected = out.flags.contains(Flags::NOT_CORRECTED);
         let numbers = [out.quality as c_int, c_int::from(out.flags.bits()), 1, c_int::from(not_corrected)];
-        assert_eq!(ticked(&instance, tick), (wanted, numbers), "tick {tick}");
+        for (instance, fmi) in instances.iter().zip(VERSIONS) {
+            assert_eq!(ticked(instance, tick), (wanted, numbers), "FMI {fmi}, tick {tick}");
+            assert_eq!(instance.reals(["time"]), [instance.time.get()]);
+        }
         corrected = corrected.max(arcsec(out.correction_rad).abs());
     }
     // It did correct, and the temperature did come through.
@@ -127,15 +147,19 @@ fn the_fmu_of_a_table_gives_the_bits_of_the_core() {
 #[test]
 fn a_state_goes_on_with_the_same_bits_here_and_in_another_instance() {
     let desk = desk();
-    for options in ["--tables cam.fxt", "--tables cam.fxt --model joint --scenario camera"] {
-        let fmu = imported(&desk, options);
+    let models = ["--tables cam.fxt", "--tables cam.fxt --model joint --scenario camera"];
+    let mut runs = Vec::new();
+    for (options, fmi) in models.into_iter().flat_map(|options| VERSIONS.map(|fmi| (options, fmi))) {
+        let fmu = imported(&desk, &format!("{options} --fmi {fmi}"));
         let joint = options.contains("joint");
         let run = |instance: &Instance<'_>, ticks: std::ops::Range<u32>| -> Vec<u64> {
             let mut all = Vec::new();
             for tick in ticks {
                 if joint {
                     let [target, rate, torque, _] = asked(tick);
-                    for (name, value) in [("target", target), ("target_rate", rate), ("load_torque", 0.2 * torque)] {
+                    for (name, value) in
+                        [("output_angle_command", target), ("output_rate_command", rate), ("load_torque", 0.2 * torque)]
+                    {
                         instance.set(name, value);
                     }
                     assert_eq!(instance.step(1e-3), OK, "{:?}", instance.log());
@@ -144,7 +168,7 @@ fn a_state_goes_on_with_the_same_bits_here_and_in_another_instance() {
                         "motor_rate",
                         "mesh_torque",
                         "energy_error",
-                        "correction",
+                        "output_angle_correction",
                     ])));
                 } else {
                     all.extend(ticked(instance, tick).0);
@@ -164,7 +188,7 @@ fn a_state_goes_on_with_the_same_bits_here_and_in_another_instance() {
         assert!(first == again, "{options}: the same instance");
         let bytes = instance.serialised(state);
         // Another one, in another state, with other parameters and nothing of the first.
-        let tick = if joint { ("load_inertia", 0.5) } else { ("rate_limit", 0.01) };
+        let tick = if joint { ("load_inertia", 0.5) } else { ("correction_rate_limit", 0.01) };
         let other = fmu.ready("other", &[tick]);
         run(&other, 0..50);
         let mut there = null_mut();
@@ -185,14 +209,20 @@ fn a_state_goes_on_with_the_same_bits_here_and_in_another_instance() {
         }
         assert_eq!(instance.deserialised(&bytes[..bytes.len() - 8], &mut state), ERROR);
         assert_eq!(instance.deserialised(&[], &mut state), ERROR);
+        runs.push(first);
     }
+    let [table, table_three, joint, joint_three] = &runs[..] else { panic!("{}", runs.len()) };
+    assert!(table == table_three && joint == joint_three, "both versions give the same bits");
 }
 
 #[test]
 fn steps_of_any_size_make_whole_ticks_and_carry_the_rest() {
     let desk = desk();
-    let fmu = imported(&desk, "--tables cam.fxt");
-    let inputs = [("output_command", 0.02), ("torque", 12.0)];
+    in_each_version(&desk, steps_make_whole_ticks);
+}
+
+fn steps_make_whole_ticks(fmu: &Imported) {
+    let inputs = [("output_angle_command", 0.02), ("output_torque", 12.0)];
     let after = |steps: &[f64]| {
         let instance = fmu.ready("one", &inputs);
         for step in steps {
@@ -210,8 +240,8 @@ fn steps_of_any_size_make_whole_ticks_and_carry_the_rest() {
     assert_eq!(after(&[0.1]), ticks(100));
 
     let instance = fmu.instance("stops");
-    assert_eq!((instance.set_up(Some(1.0)), instance.call("fmi2EnterInitializationMode")), (OK, OK));
-    assert_eq!(instance.call("fmi2ExitInitializationMode"), OK);
+    assert_eq!((instance.set_up(Some(1.0)), instance.enter()), (OK, OK));
+    assert_eq!(instance.call("ExitInitializationMode"), OK);
     for bad in [0.0, -1e-3, f64::NAN, f64::INFINITY, 1e9, 1.1] {
         assert_eq!(instance.step(bad), ERROR, "{bad}");
     }
@@ -227,7 +257,7 @@ fn instances_do_not_know_of_each_other() {
         let instance = fmu.ready("alone", &[]);
         (0..400).map(|tick| ticked(&instance, tick)).collect()
     };
-    let (one, two) = (fmu.ready("one", &[]), fmu.ready("two", &[("mode", 0.0), ("rate_limit", 0.001)]));
+    let (one, two) = (fmu.ready("one", &[]), fmu.ready("two", &[("mode", 0.0), ("correction_rate_limit", 0.001)]));
     for (tick, wanted) in (0..).zip(&alone) {
         assert_eq!(&ticked(&one, tick), wanted);
         assert_ne!(ticked(&two, tick).1, wanted.1);
@@ -266,9 +296,9 @@ fn the_joint_flies_as_fly_does() {
         }
         let [first, last] = moment.outside_n_m;
         let inputs = [
-            ("target", moment.target_rad),
-            ("target_rate", moment.rate_rad_s),
-            ("target_acceleration", moment.acceleration_rad_s2),
+            ("output_angle_command", moment.target_rad),
+            ("output_rate_command", moment.rate_rad_s),
+            ("output_acceleration_command", moment.acceleration_rad_s2),
             ("load_torque", first),
         ];
         for (name, value) in inputs {
@@ -290,7 +320,7 @@ fn the_joint_keeps_its_books_and_the_table_takes_its_error_out() {
     let fmu = imported(&desk, "--tables cam.fxt --model joint --scenario camera");
     let pushed = fmu.ready("pushed", &[("servo", 0.0), ("gravity_torque", 0.0), ("drag", 0.1)]);
     for tick in 0..5000 {
-        pushed.set("motor_torque", 0.4 * (0.01 * f64::from(tick)).sin());
+        pushed.set("motor_torque_command", 0.4 * (0.01 * f64::from(tick)).sin());
         pushed.set("load_torque", 4.0 * (0.017 * f64::from(tick)).cos());
         assert_eq!(pushed.step(1e-3), OK, "{:?}", pushed.log());
     }
@@ -305,8 +335,8 @@ fn the_joint_keeps_its_books_and_the_table_takes_its_error_out() {
         let (mut squares, mut count, mut target) = (0.0, 0.0, 0.0);
         let rate = 0.01;
         for tick in 0..6000 {
-            instance.set("target", target);
-            instance.set("target_rate", rate);
+            instance.set("output_angle_command", target);
+            instance.set("output_rate_command", rate);
             instance.set("load_torque", 10.0);
             assert_eq!(instance.step(1e-3), OK, "{:?}", instance.log());
             target += rate * 1e-3;
@@ -327,19 +357,28 @@ fn the_joint_keeps_its_books_and_the_table_takes_its_error_out() {
 #[test]
 fn calls_in_a_wrong_state_and_wrong_arguments_are_refused_with_a_line_in_the_log() {
     let desk = desk();
-    let fmu = imported(&desk, "--tables cam.fxt");
+    in_each_version(&desk, wrong_calls_are_refused);
+}
+
+fn wrong_calls_are_refused(fmu: &Imported) {
     // Nothing comes of the wrong model, description, kind or folder, and it is said why.
     let (guid, location) = (fmu.guid(), fmu.location());
+    let nowhere = if fmu.three { "/nowhere at 100%" } else { "file:///nowhere%20at%20100%25" };
+    // Of FMI 3.0 events, which stand here for another kind.
+    let (kind, said) = if fmu.three { (2, "eventModeUsed") } else { (0, "model exchange") };
     for (name, kind, guid, location, why) in [
-        ("one", 0, &*guid, &*location, "model exchange"),
+        ("one", kind, &*guid, &*location, said),
         ("one", 1, "{0}", &location, "guid"),
         ("", 1, &guid, &location, "instance name"),
-        ("one", 1, &guid, "file:///nowhere%20at%20100%25", "/nowhere at 100%/model.txt"),
+        ("one", 1, &guid, nowhere, "/nowhere at 100%/model.txt"),
         ("one", 1, &guid, "http://x/resources", "allowed: file:///folder"),
     ] {
         let Err(log) = fmu.instance_with(name, kind, guid, location) else { panic!("{why} was made") };
         let [line] = &log[..] else { panic!("{why}: {log:?}") };
-        assert!(line.message.contains(why) && line.status == ERROR && line.instance == name, "{why}: {line:?}");
+        assert!(
+            line.message.contains(why) && line.status == ERROR && (fmu.three || line.instance == name),
+            "{why}: {line:?}"
+        );
     }
 
     let instance = fmu.instance("one");
@@ -349,104 +388,188 @@ fn calls_in_a_wrong_state_and_wrong_arguments_are_refused_with_a_line_in_the_log
         assert!(log.last().is_some_and(|line| line.message.contains(why)), "{why}: {log:?}");
         assert_eq!(log.last().unwrap().category, "logStatusError");
     };
-    refused(&instance, instance.call("fmi2ExitInitializationMode"), "\"instantiated\"");
-    refused(&instance, instance.call("fmi2Terminate"), "fmi2Terminate");
-    refused(&instance, instance.step(1e-3), "fmi2DoStep");
-    refused(&instance, instance.get_reals(&[0], &mut [0.0]), "fmi2GetReal");
-    // Without an experiment it starts at 0, with a warning.
-    assert_eq!(instance.call("fmi2EnterInitializationMode"), WARNING);
-    refused(&instance, instance.set_up(None), "\"initialization mode\"");
-    refused(&instance, instance.step(1e-3), "fmi2DoStep");
-    instance.set("output_command", 0.1);
-    let [command, ratio] = instance.reals(["generator_command", "ratio"]);
+    refused(&instance, instance.call("ExitInitializationMode"), "\"instantiated\"");
+    refused(&instance, instance.call("Terminate"), "Terminate");
+    refused(&instance, instance.step(1e-3), "DoStep");
+    if fmu.three {
+        assert_eq!((instance.reals(["tick", "time"]), instance.enter()), ([1e-3, 0.0], OK));
+        refused(&instance, instance.enter(), "\"initialization mode\"");
+    } else {
+        refused(&instance, instance.get_reals(&[0], &mut [0.0]), "fmi2GetReal");
+        // Without an experiment it starts at 0, with a warning.
+        assert_eq!(instance.enter(), WARNING);
+        refused(&instance, instance.set_up(None), "\"initialization mode\"");
+    }
+    refused(&instance, instance.step(1e-3), "DoStep");
+    instance.set("output_angle_command", 0.1);
+    let [command, ratio] = instance.reals(["generator_angle_command", "ratio"]);
     assert_eq!((command, ratio), (0.1 * 95.0, 95.0));
-    assert_eq!(instance.call("fmi2ExitInitializationMode"), OK);
+    assert_eq!(instance.call("ExitInitializationMode"), OK);
     refused(&instance, instance.try_set("tick", 2e-3), "after the initialisation");
     refused(&instance, instance.try_set("ratio", 2e-3), "at all");
-    refused(&instance, instance.try_set("correction", 2e-3), "at all");
+    refused(&instance, instance.try_set("output_angle_correction", 2e-3), "at all");
     refused(&instance, instance.try_set("mode", 7.0), "mode: found 7, allowed: 0 to 3");
     refused(&instance, instance.get_reals(&[4_000_000_000], &mut [0.0]), "value reference 4000000000");
-    refused(&instance, instance.get_reals(&[fmu.reference("flags")], &mut [0.0]), "of another type");
+    refused(&instance, instance.get_reals(&[fmu.reference("tick_flags")], &mut [0.0]), "of another type");
+    refused(&instance, instance.try_set("time", 1.0), "time cannot be set at all");
     // A legal call is a mode that cannot follow: warned of, and the mode stays.
     instance.set("mode", 3.0);
     assert_eq!(instance.step(1e-3), OK);
     instance.set("mode", 1.0);
-    assert_eq!((instance.step(1e-3), instance.number("mode_now")), (OK, 3));
+    assert_eq!((instance.step(1e-3), instance.number("mode_active")), (OK, 3));
     assert_eq!(instance.log().last().unwrap().message, "mode: no transition from Safe to Tracking");
     // What is no angle ends the model, not the program; a reset begins anew.
-    instance.set("output_command", f64::NAN);
-    refused(&instance, instance.step(1e-3), "output_command: found NaN");
+    instance.set("output_angle_command", f64::NAN);
+    refused(&instance, instance.step(1e-3), "output_angle_command: found NaN");
     refused(&instance, instance.step(1e-3), "\"step failed\"");
-    assert_eq!(instance.call("fmi2Reset"), OK);
-    assert_eq!((instance.set_up(None), instance.call("fmi2EnterInitializationMode")), (OK, OK));
-    assert_eq!((instance.call("fmi2ExitInitializationMode"), instance.step_from(0.0, 1e-3)), (OK, OK));
-    assert_eq!(instance.call("fmi2Terminate"), OK);
-    refused(&instance, instance.call("fmi2EnterInitializationMode"), "\"terminated\"");
+    assert_eq!(instance.call("Reset"), OK);
+    assert_eq!((instance.set_up(None), instance.enter()), (OK, OK));
+    assert_eq!((instance.call("ExitInitializationMode"), instance.step_from(0.0, 1e-3)), (OK, OK));
+    assert_eq!(instance.call("Terminate"), OK);
+    refused(&instance, instance.enter(), "\"terminated\"");
 
     // Parameters that no joint can have.
     let odd = fmu.instance("odd");
     assert_eq!(odd.set_up(None), OK);
     odd.set("tick", 1e-6);
-    odd.set("rate_limit", 1e-9);
-    assert_eq!(odd.call("fmi2EnterInitializationMode"), OK);
-    refused(&odd, odd.call("fmi2ExitInitializationMode"), "rate_rad_s");
+    odd.set("correction_rate_limit", 1e-9);
+    assert_eq!(odd.enter(), OK);
+    refused(&odd, odd.call("ExitInitializationMode"), "rate_rad_s");
 }
 
 /// Every function with zeros and null pointers for all its arguments, in every state, on components that live, are
 /// null, were freed, or never were.
 #[test]
 fn no_function_falls_over_null_pointers_and_strange_components() {
-    type Any = unsafe extern "C" fn(*mut c_void, usize, usize, usize, usize, usize, usize) -> c_int;
     let desk = desk();
-    let fmu = imported(&desk, "--tables cam.fxt");
+    in_each_version(&desk, nothing_falls_over);
+}
+
+fn nothing_falls_over(fmu: &Imported) {
+    let version = if fmu.three { "fmi3" } else { "fmi2" };
+    let functions = || FUNCTIONS.into_iter().filter(|name| name.starts_with(version));
     let freed = fmu.instance("freed").component;
     let strange =
         [null_mut(), freed, std::ptr::without_provenance_mut(1), std::ptr::without_provenance_mut(usize::MAX)];
     // Without a component, or with real numbers, which go another way than pointers and counts.
-    let plain = ["fmi2GetTypesPlatform", "fmi2GetVersion", "fmi2Instantiate", "fmi2FreeInstance", "fmi2DoStep"];
-    for name in FUNCTIONS.into_iter().filter(|name| !plain.contains(name)) {
+    let plain = ["GetTypesPlatform", "GetVersion", "FreeInstance", "DoStep"];
+    let plain = |name: &str| plain.contains(&&name[4..]) || name.contains("Instantiate");
+    for name in functions().filter(|name| !plain(name)) {
         for component in strange {
-            assert_eq!(
-                unsafe { fmu.function::<Any>(name)(component, 0, 0, 0, 0, 0, 0) },
-                ERROR,
-                "{name} {component:?}"
-            );
+            let status = unsafe { fmu.any(name)(component, 0, 0, 0, 0, 0, 0) };
+            assert_eq!(status, ERROR, "{name} {component:?}");
         }
     }
     for component in strange {
-        unsafe { fmu.function::<unsafe extern "C" fn(*mut c_void)>("fmi2FreeInstance")(component) };
+        unsafe { fmu.function::<unsafe extern "C" fn(*mut c_void)>(["FreeInstance"; 2])(component) };
     }
     for ready in [false, true] {
         let instance = if ready { fmu.ready("one", &[]) } else { fmu.instance("one") };
-        for name in FUNCTIONS.into_iter().filter(|name| !plain.contains(name)) {
-            // The count is the third argument of what takes lists: null pointers to one value.
-            let status = unsafe { fmu.function::<Any>(name)(instance.component, 0, 1, 0, 0, 0, 0) };
+        for name in functions().filter(|name| !plain(name)) {
+            // The count is the third argument of what takes lists: null pointers to one value. FMI 3.0 has it twice.
+            let status = unsafe { fmu.any(name)(instance.component, 0, 1, 0, 1, 0, 0) };
             let fine = [
-                "fmi2EnterInitializationMode",
-                "fmi2ExitInitializationMode",
-                "fmi2SetupExperiment",
-                "fmi2Reset",
-                "fmi2FreeFMUstate",
-                "fmi2Terminate",
-                "fmi2SetTime",
+                "EnterInitializationMode",
+                "ExitInitializationMode",
+                "SetupExperiment",
+                "Reset",
+                "FreeFMUstate",
+                "FreeFMUState",
+                "Terminate",
+                "SetTime",
             ];
-            let other = [
-                "fmi2GetStatus",
-                "fmi2GetRealStatus",
-                "fmi2GetIntegerStatus",
-                "fmi2GetBooleanStatus",
-                "fmi2GetStringStatus",
-            ];
+            let other = ["GetStatus", "GetRealStatus", "GetIntegerStatus", "GetBooleanStatus", "GetStringStatus"];
             let wanted = match name {
-                name if other.contains(&name) => DISCARD,
-                name if fine.contains(&name) && status != ERROR => status,
+                name if other.contains(&&name[4..]) => DISCARD,
+                name if fine.contains(&&name[4..]) && status != ERROR => status,
                 _ => ERROR,
             };
             assert_eq!(status, wanted, "{name}");
         }
     }
-    let version = fmu.function::<unsafe extern "C" fn() -> *const std::ffi::c_char>("fmi2GetVersion");
-    assert_eq!(unsafe { std::ffi::CStr::from_ptr(version()) }, c"2.0");
+    let said = fmu.function::<unsafe extern "C" fn() -> *const c_char>(["GetVersion"; 2]);
+    assert_eq!(unsafe { CStr::from_ptr(said()) }, if fmu.three { c"3.0" } else { c"2.0" });
+}
+
+/// What FMI 3.0 has beyond FMI 2.0: counts of values, many types, places of a step, a log that is silent unless asked,
+/// other kinds of simulation.
+#[test]
+fn fmi_3_refuses_other_sizes_types_and_kinds() {
+    let desk = desk();
+    let fmu = imported(&desk, "--tables cam.fxt --fmi 3.0");
+    let instance = fmu.ready("one", &[]);
+    let refused = |status: c_int, why: &str| {
+        let log = instance.log();
+        assert_eq!((status, log.last().map(|line| line.message.contains(why))), (ERROR, Some(true)), "{why}: {log:?}");
+    };
+    refused(instance.get_reals(&[0, 1], &mut [0.0]), "found 2 value references, 1 values");
+    assert_eq!(instance.get_reals(&[], &mut []), OK);
+    // Each variable has one type, and is read and set by its functions alone.
+    let types =
+        ["Float32", "Float64", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Boolean"];
+    for (of, variable) in
+        [("Float64", "output_torque"), ("Int32", "patience"), ("Boolean", "generator_measured"), ("Int64", "mode")]
+    {
+        let (reference, mut room) = (fmu.reference(variable), [0_u8; 8]);
+        for (name, call) in types.iter().flat_map(|name| ["Get", "Set"].map(|call| (*name, call))) {
+            let function = fmu.any(&format!("fmi3{call}{name}"));
+            let at = (&raw const reference as usize, &raw mut room as usize);
+            let status = unsafe { function(instance.component, at.0, 1, at.1, 1, 0, 0) };
+            let parameter = call == "Set" && matches!(variable, "patience" | "generator_measured");
+            if name == of && !parameter {
+                assert_eq!(status, OK, "{variable} {call}{name}: {:?}", instance.log());
+            } else {
+                refused(status, if name == of { "after the initialisation" } else { "of another type" });
+            }
+        }
+    }
+    type Step = unsafe extern "C" fn(*mut c_void, f64, f64, u8, *mut u8, *mut u8, *mut u8, *mut f64) -> c_int;
+    let step = fmu.function::<Step>(["", "DoStep"]);
+    let [mut event, mut end, mut early] = [0; 3];
+    refused(unsafe { step(instance.component, 0.0, 1e-3, 1, &mut event, &mut end, &mut early, null_mut()) }, "null");
+    refused(unsafe { step(instance.component, 0.0, 1e-3, 1, &mut event, null_mut(), &mut early, &mut 0.0) }, "null");
+    assert_eq!(instance.step(1e-3), OK, "nothing was stepped before");
+
+    // A mode that cannot follow is warned of until that is switched off.
+    let warned = |instance: &Instance<'_>| {
+        instance.set("mode", 3.0);
+        assert_eq!(instance.step(1e-3), OK);
+        instance.set("mode", 1.0);
+        assert_eq!((instance.step(1e-3), instance.number("mode_active")), (OK, 3));
+        instance.log().iter().filter(|line| line.message.starts_with("mode: no transition")).count()
+    };
+    assert_eq!(warned(&instance), 1);
+    let category = c"logStatusWarning".as_ptr();
+    let quiet = fmu.any("fmi3SetDebugLogging");
+    assert_eq!(unsafe { quiet(instance.component, 0, 1, &raw const category as usize, 0, 0, 0) }, OK);
+    assert_eq!(warned(&instance), 1);
+
+    // No model of another kind, and it is said.
+    unsafe extern "C" fn said(environment: *mut c_void, status: c_int, _: *const c_char, message: *const c_char) {
+        let message = unsafe { CStr::from_ptr(message) }.to_str().unwrap().to_owned();
+        unsafe { &mut *environment.cast::<Vec<(c_int, String)>>() }.push((status, message));
+    }
+    type Other = unsafe extern "C" fn(
+        usize,
+        usize,
+        usize,
+        u8,
+        u8,
+        *mut c_void,
+        Option<LogMessage>,
+        usize,
+        usize,
+        usize,
+    ) -> *mut c_void;
+    let mut log: Vec<(c_int, String)> = Vec::new();
+    for kind in ["ModelExchange", "ScheduledExecution"] {
+        let name = format!("Instantiate{kind}");
+        let instantiate = fmu.function::<Other>(["", &name]);
+        let environment = (&raw mut log).cast();
+        assert!(unsafe { instantiate(0, 0, 0, 0, 0, environment, Some(said), 0, 0, 0) }.is_null());
+        assert_eq!(log.pop(), Some((ERROR, format!("fmi3{name}: not in this FMU, allowed: co-simulation"))));
+        assert!(unsafe { instantiate(0, 0, 0, 0, 0, null_mut(), None, 0, 0, 0) }.is_null());
+    }
 }
 
 #[test]
@@ -455,14 +578,14 @@ fn a_joint_says_how_far_its_core_trusts_the_table_and_refuses_targets_that_no_an
     let fmu = imported(&desk, "--tables cam.fxt --model joint --scenario camera");
     let quality = |set: &[(&str, f64)], load: f64| {
         let instance = fmu.ready("one", set);
-        assert_eq!(instance.number("quality"), 3, "disabled before the first tick");
+        assert_eq!(instance.number("correction_quality"), 3, "disabled before the first tick");
         for tick in 0..300 {
-            instance.set("target", 1e-5 * f64::from(tick));
-            instance.set("target_rate", 0.01);
+            instance.set("output_angle_command", 1e-5 * f64::from(tick));
+            instance.set("output_rate_command", 0.01);
             instance.set("load_torque", load);
             assert_eq!(instance.step(1e-3), OK, "{:?}", instance.log());
         }
-        instance.number("quality")
+        instance.number("correction_quality")
     };
     let quiet = [("gravity_torque", 0.0), ("torque_noise", 0.0)];
     assert_eq!(quality(&quiet, 10.0), 0);
@@ -482,12 +605,12 @@ fn a_joint_says_how_far_its_core_trusts_the_table_and_refuses_targets_that_no_an
     assert_eq!(quality(&[("servo", 0.0)], 0.0), 3);
     for target in [1e30, -1e30, 1e9 * std::f64::consts::TAU] {
         let instance = fmu.ready("far", &[]);
-        instance.set("target", target);
+        instance.set("output_angle_command", target);
         assert_eq!(instance.step(1e-3), ERROR, "{target}");
         let log = instance.log();
-        assert!(log.last().unwrap().message.contains("target: found"), "{log:?}");
+        assert!(log.last().unwrap().message.contains("output_angle_command: found"), "{log:?}");
     }
     let pushed = fmu.ready("pushed", &[("servo", 0.0)]);
-    pushed.set("target", 1e30);
+    pushed.set("output_angle_command", 1e30);
     assert_eq!(pushed.step(1e-3), OK, "not read: {:?}", pushed.log());
 }

@@ -1,9 +1,11 @@
-//! The functions of FMI 2.0 (section 2.1.1: a library exports them by these names), with our own declarations of its
-//! types.
+//! The C interfaces, [`fmi2`] and [`fmi3`]: lists of the functions of each standard, over calls that are here once.
 //!
 //! A component is a number that is looked up, and never a pointer that is followed: a call with one that was freed, or
-//! that never was, is refused. Pointers to arrays and strings are read as the standard says they are, null pointers are
+//! that never was, is refused. Pointers to arrays and strings are read as the standards say they are, null pointers are
 //! refused. No panic gets out.
+
+pub mod fmi2;
+pub mod fmi3;
 
 use std::collections::BTreeMap;
 use std::ffi::{CStr, CString, c_char, c_int, c_uint, c_void};
@@ -11,38 +13,19 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 
-use crate::instance::{FmiStatus, Instance, Log};
+use crate::FmiVersion;
+use crate::instance::{CATEGORIES, FmiStatus, Instance, Log};
 use crate::resources::folder_of;
 use crate::variables::Kind;
 
-/// `fmi2Component`.
+/// `fmi2Component`, `fmi3Instance`.
 pub type Component = *mut c_void;
-/// `fmi2FMUstate`.
+/// `fmi2FMUstate`, `fmi3FMUState`.
 pub type FmuState = *mut c_void;
+/// Value references.
+pub type References = *const c_uint;
 
-/// `fmi2CallbackLogger`: environment, name of the instance, status, category, message in the form of `printf`, its
-/// arguments.
-pub type Logger = unsafe extern "C" fn(*mut c_void, *const c_char, c_int, *const c_char, *const c_char, ...);
-
-/// `fmi2CallbackFunctions` (section 2.1.5).
-#[repr(C)]
-#[derive(Clone, Copy, Debug)]
-pub struct Callbacks {
-    /// Takes a line of the log.
-    pub logger: Option<Logger>,
-    /// Not used.
-    pub allocate_memory: Option<unsafe extern "C" fn(usize, usize) -> *mut c_void>,
-    /// Not used.
-    pub free_memory: Option<unsafe extern "C" fn(*mut c_void)>,
-    /// Not used: steps are done when the call returns.
-    pub step_finished: Option<unsafe extern "C" fn(*mut c_void, c_int)>,
-    /// Passed on to the logger.
-    pub environment: *mut c_void,
-}
-
-const CO_SIMULATION: c_int = 1;
 const OK: c_int = FmiStatus::Ok as c_int;
-const DISCARD: c_int = FmiStatus::Discard as c_int;
 const ERROR: c_int = FmiStatus::Error as c_int;
 
 type Shared = Arc<Mutex<Instance>>;
@@ -120,212 +103,186 @@ fn null(instance: &Instance, call: &str) -> c_int {
     instance.refuse(&format!("{call}: found a null pointer, allowed: an array of the length given")) as c_int
 }
 
+/// Functions that have a component and return a status, by name, arguments and what they do; `$call` is the name.
+macro_rules! functions {
+    ($component:ident, $call:ident; $($name:ident($($argument:ident: $of:ty),*) => $does:expr;)+) => {$(
+        #[doc = concat!("`", stringify!($name), "`.")]
+        ///
+        /// # Safety
+        /// Texts end with a zero byte, lists are as long as is said, and each place that is not null can be written to.
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $name($component: Component $(, $argument: $of)*) -> c_int {
+            // What a function does need neither tell its name nor follow a pointer.
+            #[allow(unused_variables)]
+            let $call = stringify!($name);
+            #[allow(unused_unsafe)]
+            unsafe { $does }
+        }
+    )+};
+}
+use functions;
+
 fn lacking(component: Component, call: &str) -> c_int {
-    with(component, |instance| {
-        instance.refuse(&format!("{call}: this FMU is for co-simulation and does not have it")) as c_int
-    })
+    let what = format!("{call}: not in this FMU: co-simulation without events, clocks, dependencies and derivatives");
+    with(component, |instance| instance.refuse(&what) as c_int)
 }
 
-/// `fmi2GetTypesPlatform`: the usual types.
-#[unsafe(no_mangle)]
-pub extern "C" fn fmi2GetTypesPlatform() -> *const c_char {
-    c"default".as_ptr()
+/// A call with neither pointers nor a result.
+fn plain(component: Component, call: impl FnOnce(&mut Instance) -> Result<(), FmiStatus>) -> c_int {
+    with(component, |instance| status(call(instance)))
 }
 
-/// `fmi2GetVersion`.
-#[unsafe(no_mangle)]
-pub extern "C" fn fmi2GetVersion() -> *const c_char {
-    c"2.0".as_ptr()
-}
-
-/// `fmi2SetDebugLogging`.
-///
-/// # Safety
-/// `categories` are so many strings.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetDebugLogging(
-    component: Component,
-    logging_on: c_int,
-    count: usize,
-    categories: *const *const c_char,
-) -> c_int {
-    with(component, |instance| {
-        let Some(pointers) = (unsafe { list(categories, count) }) else { return null(instance, "fmi2SetDebugLogging") };
-        let names: Option<Vec<&str>> = pointers.iter().map(|pointer| unsafe { text(*pointer) }).collect();
-        match names {
-            Some(names) => instance.set_logging(logging_on != 0, &names) as c_int,
-            None => null(instance, "fmi2SetDebugLogging"),
-        }
-    })
-}
-
-/// A log that goes to the importer, or nowhere. What means something to `printf`, or to the standard (section 2.1.5:
-/// `#` begins a reference to a variable), is doubled.
-fn log_to(Callbacks { logger, environment, .. }: Callbacks, name: CString) -> Log {
-    let environment = environment.expose_provenance();
+/// A log that goes to the importer. Characters that mean something to it are doubled.
+fn log_to(doubled: &'static [&'static str], send: impl Fn(FmiStatus, &CStr, &CStr) + Send + 'static) -> Log {
     Box::new(move |status, category, message| {
-        let Some(logger) = logger else { return };
-        let message = message.replace('\0', "").replace('%', "%%").replace('#', "##");
-        let (Ok(category), Ok(message)) = (CString::new(category), CString::new(message)) else { return };
-        let environment = std::ptr::with_exposed_provenance_mut(environment);
-        // The importer's function, with its own environment, as `fmi2Instantiate` was given them.
-        unsafe { logger(environment, name.as_ptr(), status as c_int, category.as_ptr(), message.as_ptr()) }
+        let message = message.replace('\0', "");
+        let message = doubled.iter().fold(message, |message, letter| message.replace(letter, &letter.repeat(2)));
+        if let (Ok(category), Ok(message)) = (CString::new(category), CString::new(message)) {
+            send(status, &category, &message);
+        }
     })
 }
 
-/// `fmi2Instantiate`: null if there is no such model, with a line in the log.
+/// An instance of name, GUID and resources; null with a line in the log if there is none such, or if what is asked for
+/// is refused.
 ///
 /// # Safety
-/// Strings end with a zero byte; `callbacks` are valid.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2Instantiate(
-    instance_name: *const c_char,
-    fmu_type: c_int,
-    guid: *const c_char,
-    resource_location: *const c_char,
-    callbacks: *const Callbacks,
-    _visible: c_int,
-    logging_on: c_int,
+/// Null, or strings that end with a zero byte.
+unsafe fn instantiate(
+    (version, call): (FmiVersion, &str),
+    texts: [*const c_char; 3],
+    (log, logging): (Log, bool),
+    refused: Option<&str>,
 ) -> Component {
-    let made = catch_unwind(|| {
-        if callbacks.is_null() {
-            return None;
-        }
-        let callbacks = unsafe { *callbacks };
-        let name = unsafe { text(instance_name) }.unwrap_or_default();
-        let log = log_to(callbacks, CString::new(name).unwrap_or_default());
-        let refuse =
-            |log: &Log, what: &str| log(FmiStatus::Error, "logStatusError", &format!("fmi2Instantiate: {what}"));
-        if name.is_empty() {
-            refuse(&log, "found no instance name, allowed: one that is not empty");
-            return None;
-        }
-        if fmu_type != CO_SIMULATION {
-            refuse(&log, "found model exchange, allowed: co-simulation");
-            return None;
-        }
-        let (Some(guid), Some(location)) = (unsafe { text(guid) }, unsafe { text(resource_location) }) else {
-            refuse(&log, "found no GUID or no resource location, allowed: both");
-            return None;
+    let made = catch_unwind(AssertUnwindSafe(|| {
+        let made = match (refused, texts.map(|pointer| unsafe { text(pointer) })) {
+            (Some(why), _) => Err((log, why.to_owned())),
+            (_, [None | Some(""), ..]) => Err((log, "found no instance name, allowed: not empty".to_owned())),
+            (_, [_, Some(guid), Some(location)]) => match folder_of(location) {
+                Ok(folder) => {
+                    Instance::new(&folder, guid, version, log, logging).map_err(|(log, error)| (log, error.to_string()))
+                }
+                Err(error) => Err((log, error.to_string())),
+            },
+            _ => Err((log, "found no GUID or token, or no place of the resources, allowed: both".to_owned())),
         };
-        let folder = match folder_of(location) {
-            Ok(folder) => folder,
-            Err(error) => {
-                refuse(&log, &error.to_string());
-                return None;
-            }
-        };
-        match Instance::new(&folder, guid, log, logging_on != 0) {
-            Ok(instance) => Some(instance),
-            Err((log, error)) => {
-                refuse(&log, &error.to_string());
-                None
-            }
-        }
-    });
+        made.map_err(|(log, why)| log(FmiStatus::Error, CATEGORIES[0], &format!("{call}: {why}"))).ok()
+    }));
     let Ok(Some(instance)) = made else { return std::ptr::null_mut() };
     let number = next_number();
     instances().insert(number, Arc::new(Mutex::new(instance)));
     std::ptr::without_provenance_mut(number)
 }
 
-/// `fmi2FreeInstance`: nothing happens to one that is not there.
-#[unsafe(no_mangle)]
-pub extern "C" fn fmi2FreeInstance(component: Component) {
+/// Nothing happens to one that is not there.
+fn free(component: Component) {
     let _ = catch_unwind(AssertUnwindSafe(|| {
         let freed = instances().remove(&component.addr());
         drop(freed);
     }));
 }
 
-/// `fmi2SetupExperiment`; a tolerance has no use where steps are fixed.
-#[unsafe(no_mangle)]
-pub extern "C" fn fmi2SetupExperiment(
+/// All categories of the log, or those named.
+unsafe fn set_logging(
     component: Component,
-    _tolerance_defined: c_int,
-    _tolerance: f64,
-    start_s: f64,
-    stop_defined: c_int,
-    stop_s: f64,
-) -> c_int {
-    with(component, |instance| status(instance.set_up(start_s, (stop_defined != 0).then_some(stop_s))))
-}
-
-/// `fmi2EnterInitializationMode`.
-#[unsafe(no_mangle)]
-pub extern "C" fn fmi2EnterInitializationMode(component: Component) -> c_int {
-    with(component, |instance| status(instance.enter_initialization()))
-}
-
-/// `fmi2ExitInitializationMode`.
-#[unsafe(no_mangle)]
-pub extern "C" fn fmi2ExitInitializationMode(component: Component) -> c_int {
-    with(component, |instance| status(instance.exit_initialization()))
-}
-
-/// `fmi2Terminate`.
-#[unsafe(no_mangle)]
-pub extern "C" fn fmi2Terminate(component: Component) -> c_int {
-    with(component, |instance| status(instance.terminate()))
-}
-
-/// `fmi2Reset`.
-#[unsafe(no_mangle)]
-pub extern "C" fn fmi2Reset(component: Component) -> c_int {
-    with(component, |instance| {
-        instance.reset();
-        OK
-    })
-}
-
-/// Reads numbers of a type.
-///
-/// # Safety
-/// So many references and values.
-unsafe fn read<T>(
-    component: Component,
-    call: &'static str,
-    like: fn(Kind) -> bool,
-    references: *const c_uint,
+    call: &str,
+    on: bool,
     count: usize,
-    values: *mut T,
-    from: fn(f64) -> T,
+    categories: *const *const c_char,
 ) -> c_int {
     with(component, |instance| {
-        let (Some(references), Some(values)) = (unsafe { list(references, count) }, unsafe { list_mut(values, count) })
-        else {
-            return null(instance, call);
-        };
-        match instance.get(call, like, references) {
-            Ok(found) => {
-                values.iter_mut().zip(found).for_each(|(to, value)| *to = from(value));
-                OK
-            }
-            Err(status) => status as c_int,
+        let Some(pointers) = (unsafe { list(categories, count) }) else { return null(instance, call) };
+        let names: Option<Vec<&str>> = pointers.iter().map(|pointer| unsafe { text(*pointer) }).collect();
+        match names {
+            Some(names) => instance.set_logging(call, on, &names) as c_int,
+            None => null(instance, call),
         }
     })
 }
 
-/// Sets numbers of a type.
-///
-/// # Safety
-/// So many references and values.
-unsafe fn write<T: Copy>(
+/// A number of C.
+trait Number: Copy {
+    fn of(value: f64) -> Self;
+    fn value(self) -> f64;
+}
+macro_rules! numbers {
+    ($($of:ty)+) => {$(
+        impl Number for $of {
+            fn of(value: f64) -> Self {
+                value as $of
+            }
+            fn value(self) -> f64 {
+                self as f64
+            }
+        }
+    )+};
+}
+numbers! { f32 f64 i8 u8 i16 u16 i32 u32 i64 u64 }
+
+/// References and as many values, or the refusal of the call.
+macro_rules! lists {
+    ($instance:ident, $call:ident, ($of:ident, $count:ident), $values:expr, $given:expr) => {{
+        if $count != $given {
+            let what = format!("{}: found {} value references, {} values, allowed: as many", $call, $count, $given);
+            return $instance.refuse(&what) as c_int;
+        }
+        let (Some(of), Some(values)) = (unsafe { (list($of, $count), $values) }) else { return null($instance, $call) };
+        (of, values)
+    }};
+}
+
+/// Reads numbers of a type.
+unsafe fn read<T: Number>(
     component: Component,
-    call: &'static str,
+    call: &str,
     like: fn(Kind) -> bool,
-    references: *const c_uint,
-    count: usize,
-    values: *const T,
-    to: fn(T) -> f64,
+    (of, count): (References, usize),
+    (to, given): (*mut T, usize),
 ) -> c_int {
     with(component, |instance| {
-        let (Some(references), Some(values)) = (unsafe { list(references, count) }, unsafe { list(values, count) })
-        else {
-            return null(instance, call);
-        };
-        let set: Vec<(u32, f64)> = references.iter().copied().zip(values.iter().map(|value| to(*value))).collect();
+        let (of, to) = lists!(instance, call, (of, count), list_mut(to, given), given);
+        status(instance.get(call, like, of).map(|found| {
+            to.iter_mut().zip(found).for_each(|(to, value)| *to = T::of(value));
+        }))
+    })
+}
+
+/// Sets numbers of a type; any number but 0 is true.
+unsafe fn write<T: Number>(
+    component: Component,
+    call: &str,
+    like: fn(Kind) -> bool,
+    (of, count): (References, usize),
+    (from, given): (*const T, usize),
+) -> c_int {
+    with(component, |instance| {
+        let (of, from) = lists!(instance, call, (of, count), list(from, given), given);
+        let truth = |value: f64| if like(Kind::Boolean) { f64::from(u8::from(value != 0.0)) } else { value };
+        let set: Vec<(u32, f64)> = of.iter().copied().zip(from.iter().map(|value| truth(value.value()))).collect();
         status(instance.set(call, like, &set))
+    })
+}
+
+/// Reads texts, valid until the instance is freed.
+unsafe fn read_texts(
+    component: Component,
+    call: &str,
+    (of, count): (References, usize),
+    (to, given): (*mut *const c_char, usize),
+) -> c_int {
+    with(component, |instance| {
+        let (of, to) = lists!(instance, call, (of, count), list_mut(to, given), given);
+        let mut texts = of.iter().zip(to);
+        status(texts.try_for_each(|(of, to)| instance.get_text(call, *of).map(|text| *to = text.as_ptr())))
+    })
+}
+
+/// No text can be set: constants are refused by the same rule as any other, whatever the value.
+unsafe fn write_texts(component: Component, call: &str, of: References, count: usize) -> c_int {
+    with(component, |instance| {
+        let Some(of) = (unsafe { list(of, count) }) else { return null(instance, call) };
+        let set: Vec<(u32, f64)> = of.iter().map(|of| (*of, 0.0)).collect();
+        status(instance.set(call, |kind| kind == Kind::Text, &set))
     })
 }
 
@@ -333,444 +290,89 @@ fn is_real(kind: Kind) -> bool {
     matches!(kind, Kind::Real(_))
 }
 
-/// An enumeration is read and set as an integer (section 2.1.7).
-fn is_integer(kind: Kind) -> bool {
-    matches!(kind, Kind::Integer | Kind::Choice(_))
-}
-
 fn is_boolean(kind: Kind) -> bool {
     kind == Kind::Boolean
-}
-
-/// `fmi2GetReal`.
-///
-/// # Safety
-/// So many references and values.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetReal(
-    component: Component,
-    references: *const c_uint,
-    count: usize,
-    values: *mut f64,
-) -> c_int {
-    unsafe { read(component, "fmi2GetReal", is_real, references, count, values, |value| value) }
-}
-
-/// `fmi2GetInteger`.
-///
-/// # Safety
-/// So many references and values.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetInteger(
-    component: Component,
-    references: *const c_uint,
-    count: usize,
-    values: *mut c_int,
-) -> c_int {
-    unsafe { read(component, "fmi2GetInteger", is_integer, references, count, values, |value| value as c_int) }
-}
-
-/// `fmi2GetBoolean`.
-///
-/// # Safety
-/// So many references and values.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetBoolean(
-    component: Component,
-    references: *const c_uint,
-    count: usize,
-    values: *mut c_int,
-) -> c_int {
-    unsafe {
-        read(component, "fmi2GetBoolean", is_boolean, references, count, values, |value| c_int::from(value != 0.0))
-    }
-}
-
-/// `fmi2GetString`: valid until the instance is freed.
-///
-/// # Safety
-/// So many references and values.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetString(
-    component: Component,
-    references: *const c_uint,
-    count: usize,
-    values: *mut *const c_char,
-) -> c_int {
-    let call = "fmi2GetString";
-    with(component, |instance| {
-        let (Some(references), Some(values)) = (unsafe { list(references, count) }, unsafe { list_mut(values, count) })
-        else {
-            return null(instance, call);
-        };
-        for (to, reference) in values.iter_mut().zip(references) {
-            match instance.get_text(call, *reference) {
-                Ok(text) => *to = text.as_ptr(),
-                Err(status) => return status as c_int,
-            }
-        }
-        OK
-    })
-}
-
-/// `fmi2SetReal`.
-///
-/// # Safety
-/// So many references and values.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetReal(
-    component: Component,
-    references: *const c_uint,
-    count: usize,
-    values: *const f64,
-) -> c_int {
-    unsafe { write(component, "fmi2SetReal", is_real, references, count, values, |value| value) }
-}
-
-/// `fmi2SetInteger`.
-///
-/// # Safety
-/// So many references and values.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetInteger(
-    component: Component,
-    references: *const c_uint,
-    count: usize,
-    values: *const c_int,
-) -> c_int {
-    unsafe { write(component, "fmi2SetInteger", is_integer, references, count, values, f64::from) }
-}
-
-/// `fmi2SetBoolean`.
-///
-/// # Safety
-/// So many references and values.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetBoolean(
-    component: Component,
-    references: *const c_uint,
-    count: usize,
-    values: *const c_int,
-) -> c_int {
-    // Any number but 0 is true.
-    let truth = |value: c_int| f64::from(u8::from(value != 0));
-    unsafe { write(component, "fmi2SetBoolean", is_boolean, references, count, values, truth) }
-}
-
-/// `fmi2SetString`: no text can be set.
-///
-/// # Safety
-/// So many references.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetString(
-    component: Component,
-    references: *const c_uint,
-    count: usize,
-    _values: *const *const c_char,
-) -> c_int {
-    // Constants are refused by the same rule as any other; their value does not matter.
-    let zeros = vec![0.0; if references.is_null() { 0 } else { count }];
-    let kind = |kind: Kind| kind == Kind::Text;
-    let zeros = if references.is_null() { std::ptr::null() } else { zeros.as_ptr() };
-    unsafe { write(component, "fmi2SetString", kind, references, count, zeros, |value: f64| value) }
-}
-
-/// `fmi2GetFMUstate`.
-///
-/// # Safety
-/// `state` is a place for it; what is there is null or a state of this instance.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetFMUstate(component: Component, state: *mut FmuState) -> c_int {
-    with(component, |instance| {
-        if state.is_null() {
-            return null(instance, "fmi2GetFMUstate");
-        }
-        let there = unsafe { *state }.addr();
-        let number = if instance.kept(there).is_some() { there } else { next_number() };
-        instance.keep(number);
-        unsafe { *state = std::ptr::without_provenance_mut(number) };
-        OK
-    })
 }
 
 fn unknown(instance: &Instance, call: &str) -> c_int {
     instance.refuse(&format!("{call}: found no state of this instance")) as c_int
 }
 
-/// `fmi2SetFMUstate`.
-#[unsafe(no_mangle)]
-pub extern "C" fn fmi2SetFMUstate(component: Component, state: FmuState) -> c_int {
+/// Keeps bytes in a place, over the state that is there if it is one of this instance.
+unsafe fn keep(instance: &mut Instance, state: *mut FmuState, bytes: Vec<u8>) -> c_int {
+    let there = unsafe { *state }.addr();
+    let number = if instance.kept(there).is_some() { there } else { next_number() };
+    instance.keep(number, bytes);
+    unsafe { *state = std::ptr::without_provenance_mut(number) };
+    OK
+}
+
+unsafe fn get_state(component: Component, call: &str, state: *mut FmuState) -> c_int {
     with(component, |instance| {
-        let Some(bytes) = instance.kept(state.addr()).cloned() else { return unknown(instance, "fmi2SetFMUstate") };
+        if state.is_null() {
+            return null(instance, call);
+        }
+        let bytes = instance.bytes();
+        unsafe { keep(instance, state, bytes) }
+    })
+}
+
+fn set_state(component: Component, call: &str, state: FmuState) -> c_int {
+    with(component, |instance| {
+        let Some(bytes) = instance.kept(state.addr()).cloned() else { return unknown(instance, call) };
         match instance.go_on_from(&bytes) {
             Ok(()) => OK,
-            Err(error) => instance.refuse(&format!("fmi2SetFMUstate: found {error}")) as c_int,
+            Err(error) => instance.refuse(&format!("{call}: found {error}")) as c_int,
         }
     })
 }
 
-/// `fmi2FreeFMUstate`: the place is null afterwards; null is left as it is.
-///
-/// # Safety
-/// Null, or a place with null or a state of this instance.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2FreeFMUstate(component: Component, state: *mut FmuState) -> c_int {
+/// The place is null afterwards; null is left as it is.
+unsafe fn free_state(component: Component, call: &str, state: *mut FmuState) -> c_int {
     with(component, |instance| {
         if state.is_null() || unsafe { *state }.is_null() {
             return OK;
         }
         if !instance.forget(unsafe { *state }.addr()) {
-            return unknown(instance, "fmi2FreeFMUstate");
+            return unknown(instance, call);
         }
         unsafe { *state = std::ptr::null_mut() };
         OK
     })
 }
 
-/// `fmi2SerializedFMUstateSize`.
-///
-/// # Safety
-/// `size` is a place for it.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SerializedFMUstateSize(component: Component, state: FmuState, size: *mut usize) -> c_int {
+unsafe fn state_size(component: Component, call: &str, state: FmuState, size: *mut usize) -> c_int {
     with(component, |instance| {
-        let Some(bytes) = instance.kept(state.addr()).map(Vec::len) else {
-            return unknown(instance, "fmi2SerializedFMUstateSize");
-        };
+        let Some(bytes) = instance.kept(state.addr()).map(Vec::len) else { return unknown(instance, call) };
         if size.is_null() {
-            return null(instance, "fmi2SerializedFMUstateSize");
+            return null(instance, call);
         }
         unsafe { *size = bytes };
         OK
     })
 }
 
-/// `fmi2SerializeFMUstate`.
-///
-/// # Safety
-/// So many bytes.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SerializeFMUstate(
-    component: Component,
-    state: FmuState,
-    serialized: *mut c_char,
-    size: usize,
-) -> c_int {
-    let call = "fmi2SerializeFMUstate";
+unsafe fn serialize(component: Component, call: &str, state: FmuState, to: *mut u8, size: usize) -> c_int {
     with(component, |instance| {
         let Some(bytes) = instance.kept(state.addr()) else { return unknown(instance, call) };
         if size < bytes.len() {
             let what = format!("{call}: found room for {size} bytes, allowed: {} at least", bytes.len());
             return instance.refuse(&what) as c_int;
         }
-        let Some(room) = (unsafe { list_mut(serialized.cast::<u8>(), bytes.len()) }) else {
-            return null(instance, call);
-        };
+        let Some(room) = (unsafe { list_mut(to, bytes.len()) }) else { return null(instance, call) };
         room.copy_from_slice(bytes);
         OK
     })
 }
 
-/// `fmi2DeSerializeFMUstate`.
-///
-/// # Safety
-/// So many bytes, and a place for the state; what is there is null or a state of this instance.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2DeSerializeFMUstate(
-    component: Component,
-    serialized: *const c_char,
-    size: usize,
-    state: *mut FmuState,
-) -> c_int {
-    let call = "fmi2DeSerializeFMUstate";
+unsafe fn deserialize(component: Component, call: &str, from: *const u8, size: usize, state: *mut FmuState) -> c_int {
     with(component, |instance| {
-        let Some(bytes) = (unsafe { list(serialized.cast::<u8>(), size) }).filter(|_| !state.is_null()) else {
+        let Some(bytes) = (unsafe { list(from, size) }).filter(|_| !state.is_null()) else {
             return null(instance, call);
         };
-        if let Err(error) = instance.check(bytes) {
-            return instance.refuse(&format!("{call}: found {error}")) as c_int;
+        match instance.check(bytes) {
+            Ok(()) => unsafe { keep(instance, state, bytes.to_vec()) },
+            Err(error) => instance.refuse(&format!("{call}: found {error}")) as c_int,
         }
-        let there = unsafe { *state }.addr();
-        let number = if instance.kept(there).is_some() { there } else { next_number() };
-        instance.keep_bytes(number, bytes.to_vec());
-        unsafe { *state = std::ptr::without_provenance_mut(number) };
-        OK
     })
-}
-
-/// `fmi2GetDirectionalDerivative`: not provided.
-#[unsafe(no_mangle)]
-pub extern "C" fn fmi2GetDirectionalDerivative(
-    component: Component,
-    _unknowns: *const c_uint,
-    _unknown_count: usize,
-    _knowns: *const c_uint,
-    _known_count: usize,
-    _known_changes: *const f64,
-    _unknown_changes: *mut f64,
-) -> c_int {
-    with(component, |instance| {
-        instance.refuse("fmi2GetDirectionalDerivative: providesDirectionalDerivative is false") as c_int
-    })
-}
-
-/// `fmi2SetRealInputDerivatives`.
-///
-/// # Safety
-/// So many references, orders and values.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetRealInputDerivatives(
-    component: Component,
-    references: *const c_uint,
-    count: usize,
-    orders: *const c_int,
-    values: *const f64,
-) -> c_int {
-    with(component, |instance| {
-        let lists = unsafe { (list(references, count), list(orders, count), list(values, count)) };
-        let (Some(references), Some(orders), Some(values)) = lists else {
-            return null(instance, "fmi2SetRealInputDerivatives");
-        };
-        let set: Vec<(u32, i32, f64)> = references
-            .iter()
-            .zip(orders)
-            .zip(values)
-            .map(|((reference, order), value)| (*reference, *order, *value))
-            .collect();
-        status(instance.set_slopes(&set))
-    })
-}
-
-/// `fmi2GetRealOutputDerivatives`: there are none.
-#[unsafe(no_mangle)]
-pub extern "C" fn fmi2GetRealOutputDerivatives(
-    component: Component,
-    _references: *const c_uint,
-    _count: usize,
-    _orders: *const c_int,
-    _values: *mut f64,
-) -> c_int {
-    with(component, |instance| instance.refuse("fmi2GetRealOutputDerivatives: maxOutputDerivativeOrder is 0") as c_int)
-}
-
-/// `fmi2DoStep`.
-#[unsafe(no_mangle)]
-pub extern "C" fn fmi2DoStep(component: Component, from_s: f64, step_s: f64, _no_set_prior: c_int) -> c_int {
-    with(component, |instance| status(instance.step(from_s, step_s)))
-}
-
-/// `fmi2CancelStep`: a step is done when its call returns.
-#[unsafe(no_mangle)]
-pub extern "C" fn fmi2CancelStep(component: Component) -> c_int {
-    with(component, |instance| {
-        instance.refuse("fmi2CancelStep: no step is under way; canRunAsynchronuously is false") as c_int
-    })
-}
-
-/// What is asked of `fmi2Get…Status` (section 4.2.3).
-const LAST_SUCCESSFUL_TIME: c_int = 2;
-const TERMINATED: c_int = 3;
-
-/// What is not there is discarded: steps are done when their call returns, and none is pending.
-fn not_there(component: Component) -> c_int {
-    with(component, |_| DISCARD)
-}
-
-/// `fmi2GetStatus`: nothing is pending.
-///
-/// # Safety
-/// A place for the value.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetStatus(component: Component, _kind: c_int, _value: *mut c_int) -> c_int {
-    not_there(component)
-}
-
-/// `fmi2GetRealStatus`: the end of the last step that succeeded.
-///
-/// # Safety
-/// A place for the value.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetRealStatus(component: Component, kind: c_int, value: *mut f64) -> c_int {
-    with(component, |instance| {
-        if value.is_null() {
-            return null(instance, "fmi2GetRealStatus");
-        }
-        if kind != LAST_SUCCESSFUL_TIME {
-            return DISCARD;
-        }
-        unsafe { *value = instance.time_s() };
-        OK
-    })
-}
-
-/// `fmi2GetIntegerStatus`: there is none.
-///
-/// # Safety
-/// A place for the value.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetIntegerStatus(component: Component, _kind: c_int, _value: *mut c_int) -> c_int {
-    not_there(component)
-}
-
-/// `fmi2GetBooleanStatus`: the model never ends by itself.
-///
-/// # Safety
-/// A place for the value.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetBooleanStatus(component: Component, kind: c_int, value: *mut c_int) -> c_int {
-    with(component, |instance| {
-        if value.is_null() {
-            return null(instance, "fmi2GetBooleanStatus");
-        }
-        if kind != TERMINATED {
-            return DISCARD;
-        }
-        unsafe { *value = 0 };
-        OK
-    })
-}
-
-/// `fmi2GetStringStatus`: there is none.
-///
-/// # Safety
-/// A place for the value.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetStringStatus(component: Component, _kind: c_int, _value: *mut *const c_char) -> c_int {
-    not_there(component)
-}
-
-/// `fmi2EventInfo` (section 3.2.2); nothing is written to it.
-#[repr(C)]
-#[derive(Debug)]
-pub struct EventInfo {
-    new_discrete_states_needed: c_int,
-    terminate_simulation: c_int,
-    nominals_of_continuous_states_changed: c_int,
-    values_of_continuous_states_changed: c_int,
-    next_event_time_defined: c_int,
-    next_event_time: f64,
-}
-
-/// Functions for model exchange (section 3.2), which this library does not have.
-macro_rules! lacking {
-    ($($name:ident($($argument:ident: $of:ty),*);)+) => {$(
-        #[doc = concat!("`", stringify!($name), "`: not for co-simulation.")]
-        #[unsafe(no_mangle)]
-        pub extern "C" fn $name(component: Component $(, $argument: $of)*) -> c_int {
-            $(let _ = $argument;)*
-            lacking(component, stringify!($name))
-        }
-    )+};
-}
-lacking! {
-    fmi2EnterEventMode();
-    fmi2NewDiscreteStates(info: *mut EventInfo);
-    fmi2EnterContinuousTimeMode();
-    fmi2CompletedIntegratorStep(no_set_prior: c_int, enter_event_mode: *mut c_int, terminate: *mut c_int);
-    fmi2SetTime(time_s: f64);
-    fmi2SetContinuousStates(states: *const f64, count: usize);
-    fmi2GetDerivatives(derivatives: *mut f64, count: usize);
-    fmi2GetEventIndicators(indicators: *mut f64, count: usize);
-    fmi2GetContinuousStates(states: *mut f64, count: usize);
-    fmi2GetNominalsOfContinuousStates(nominals: *mut f64, count: usize);
 }

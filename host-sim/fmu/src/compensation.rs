@@ -51,47 +51,59 @@ const NOT_NEGATIVE: [f64; 2] = [0.0, 1e9];
 const LARGEST_READING_N_M: f32 = 1e9;
 
 variables! {
-    OUTPUT_COMMAND => Variable::input("output_command", "rad", 0.0, "where the output shall be");
-    OUTPUT_COMMAND_RATE => Variable::input("output_command_rate", "rad/s", 0.0, "its rate, for generator_command_rate and the direction of the drag; 0 if not known");
-    GENERATOR_ANGLE => Variable::input("generator_angle", "rad", 0.0, "measured generator angle; read where generator_measured is set");
-    TORQUE => Variable::input("torque", "N.m", 0.0, "torque, positive where it turns the output forward; torque_is says which");
-    TEMPERATURE => Variable::input("temperature", "degC", 20.0, "temperature of the drive");
+    OUTPUT_ANGLE_COMMAND => Variable::input("output_angle_command", "rad", 0.0,
+        "commanded angle of the output, positive counter-clockwise; generator and output are seen from the same side");
+    OUTPUT_RATE_COMMAND => Variable::input("output_rate_command", "rad/s", 0.0,
+        "rate of output_angle_command, for generator_rate_command and the direction of the drag; 0 if not known");
+    GENERATOR_ANGLE_MEASURED => Variable::input("generator_angle_measured", "rad", 0.0,
+        "measured angle of the wave generator, positive counter-clockwise; read where generator_measured is set");
+    OUTPUT_TORQUE => Variable::input("output_torque", "N.m", 0.0,
+        "torque at the output, positive where it turns the output forward; torque_is says which torque");
+    DRIVE_TEMPERATURE => Variable::input("drive_temperature", "degC", 20.0, "temperature of the drive");
     MODE => Variable { name: "mode", kind: Kind::Choice(&MODES), role: Role::Tunable, start: 1.0, range: [0.0, 3.0], says: "mode asked for; a change that is not legal is logged, and the mode stays" };
-    GENERATOR_MEASURED => Variable::parameter("generator_measured", Kind::Boolean, 0.0, [0.0, 1.0], "the generator is where generator_angle says; else where it was commanded a tick before");
+    GENERATOR_MEASURED => Variable::parameter("generator_measured", Kind::Boolean, 0.0, [0.0, 1.0], "the generator is where generator_angle_measured says; else where it was commanded a tick before");
     TORQUE_IS => Variable::parameter("torque_is", Kind::Choice(&READINGS), 0.0, [0.0, 2.0], "which torque is given");
     TORQUE_BANDWIDTH => Variable::parameter("torque_bandwidth", Kind::Real("Hz"), 100.0, POSITIVE, "corner of the low-pass of a torque in the mesh or on the load");
     DRAG => Variable::parameter("drag", Kind::Real("N.m"), 0.0, NOT_NEGATIVE, "Coulomb drag of the output of this unit, taken off a torque on the load");
     TABLE_DRAG => Variable::parameter("table_drag", Kind::Real("N.m"), TABLE_DRAG_N_M, NOT_NEGATIVE, "Coulomb drag of the output that the table was made with");
     TORQUE_HOLD => Variable::parameter("torque_hold", Kind::Real("N.m"), 0.0, NOT_NEGATIVE, "a torque in the mesh below this does not change the flank");
     TICK => Variable::parameter("tick", Kind::Real("s"), 1e-3, [1e-6, 10.0], "time from tick to tick");
-    RATE_LIMIT => Variable::parameter("rate_limit", Kind::Real("rad/s"), 0.05, POSITIVE, "fastest correction at the output");
-    ACCELERATION_LIMIT => Variable::parameter("acceleration_limit", Kind::Real("rad/s2"), 5.0, POSITIVE, "largest acceleration of the correction at the output");
+    CORRECTION_RATE_LIMIT => Variable::parameter("correction_rate_limit", Kind::Real("rad/s"), 0.05, POSITIVE, "fastest correction at the output");
+    CORRECTION_ACCELERATION_LIMIT => Variable::parameter("correction_acceleration_limit", Kind::Real("rad/s2"), 5.0, POSITIVE, "largest acceleration of the correction at the output");
     GENERATOR_RATE_LIMIT => Variable::parameter("generator_rate_limit", Kind::Real("rad/s"), 600.0, POSITIVE, "a generator that moves faster from tick to tick is a glitch");
     PATIENCE => Variable::parameter("patience", Kind::Integer, 5.0, [0.0, 65_534.0], "ticks for which a glitch is not believed, and the last correction is kept where none can be made");
-    HOLD => Variable::parameter("hold", Kind::Real("rad"), 2.4e-6, [0.0, 0.05], "nearer targets keep the flank; 0 for none");
-    RATE_AHEAD => Variable::parameter("rate_ahead", Kind::Real("s"), 4e-3, [1e-6, 10.0], "generator_command_rate is the table's slope over this time");
-    GENERATOR_COMMAND => Variable::output("generator_command", Kind::Real("rad"), "where to turn the generator");
-    GENERATOR_COMMAND_RATE => Variable::output("generator_command_rate", Kind::Real("rad/s"), "its rate, to feed forward to a speed loop");
-    CORRECTION => Variable::output("correction", Kind::Real("arcsec"), "output_command less generator_command over the ratio");
-    HELD_BACK => Variable::output("held_back", Kind::Real("arcsec"), "what the limiter held back of the correction");
-    PREDICTED_OUTPUT => Variable::output("predicted_output", Kind::Real("rad"), "where the table says that the output is");
-    PREDICTED_ERROR => Variable::output("predicted_error", Kind::Real("arcsec"), "the transmission error there: output less generator over the ratio, positive where the output leads");
-    UNCERTAINTY => Variable::output("uncertainty", Kind::Real("arcsec"), "it lies within this either way, as far as play and jumps go");
-    QUALITY => Variable::output("quality", Kind::Choice(&QUALITIES), "how far estimate and correction can be trusted");
-    FLAGS => Variable::output("flags", Kind::Integer, "what happened in the tick, sum of: 1 no sample, 2 sample not believed, 8 held back, 16 not corrected, 32 table in doubt, 256 safe");
+    ANGLE_HOLD => Variable::parameter("angle_hold", Kind::Real("rad"), 2.4e-6, [0.0, 0.05], "commands nearer than this to the one before keep the flank; 0 for none");
+    RATE_AHEAD => Variable::parameter("rate_ahead", Kind::Real("s"), 4e-3, [1e-6, 10.0], "generator_rate_command is the slope of the table over this time");
+    GENERATOR_ANGLE_COMMAND => Variable::output("generator_angle_command", Kind::Real("rad"),
+        "where to turn the wave generator, positive counter-clockwise");
+    GENERATOR_RATE_COMMAND => Variable::output("generator_rate_command", Kind::Real("rad/s"),
+        "rate of generator_angle_command, to feed forward to a speed loop");
+    OUTPUT_ANGLE_CORRECTION => Variable::output("output_angle_correction", Kind::Real("arcsec"),
+        "output_angle_command less generator_angle_command over the ratio: has the sign of the error");
+    CORRECTION_HELD_BACK => Variable::output("correction_held_back", Kind::Real("arcsec"), "part of the correction that the limiter held back");
+    OUTPUT_ANGLE_PREDICTED => Variable::output("output_angle_predicted", Kind::Real("rad"),
+        "angle of the output by the table, positive counter-clockwise");
+    TRANSMISSION_ERROR_PREDICTED => Variable::output("transmission_error_predicted", Kind::Real("arcsec"),
+        "transmission error by the table: output less generator over the ratio, positive where the output leads");
+    PREDICTION_UNCERTAINTY => Variable::output("prediction_uncertainty", Kind::Real("arcsec"),
+        "the output lies within this of output_angle_predicted, either way, as far as play and jumps go");
+    CORRECTION_QUALITY => Variable::output("correction_quality", Kind::Choice(&QUALITIES), "how far prediction and correction can be trusted");
+    TICK_FLAGS => Variable::output("tick_flags", Kind::Integer,
+        "what happened in the tick, sum of: 1 no sample, 2 sample not believed, 8 held back, 16 not corrected, 32 table in doubt, 256 safe");
     NOT_CORRECTED => Variable::output("not_corrected", Kind::Boolean, "no correction could be made in the tick");
-    MODE_NOW => Variable::output("mode_now", Kind::Choice(&MODES), "mode of the joint");
+    MODE_ACTIVE => Variable::output("mode_active", Kind::Choice(&MODES), "mode of the joint");
     RATIO => Variable::constant("ratio", Kind::Real("rad/rad"), "generator over output");
     TABLE_ID => Variable::constant("table_id", Kind::Text, "id of the table");
     TORQUE_SETTLE => Variable::parameter("torque_settle", Kind::Real("s"), 0.25, NOT_NEGATIVE, "after a torque in the mesh has changed the flank it does not change it again for so long");
+    TIME => Variable::time();
 }
 
 /// The outputs before the first tick where they are not zero: the command without a correction.
 pub fn initial(values: &mut [f64]) {
-    values[GENERATOR_COMMAND] = values[OUTPUT_COMMAND] * values[RATIO];
-    values[GENERATOR_COMMAND_RATE] = values[OUTPUT_COMMAND_RATE] * values[RATIO];
-    values[PREDICTED_OUTPUT] = values[OUTPUT_COMMAND];
-    values[QUALITY] = f64::from(quality(Quality::Disabled));
+    values[GENERATOR_ANGLE_COMMAND] = values[OUTPUT_ANGLE_COMMAND] * values[RATIO];
+    values[GENERATOR_RATE_COMMAND] = values[OUTPUT_RATE_COMMAND] * values[RATIO];
+    values[OUTPUT_ANGLE_PREDICTED] = values[OUTPUT_ANGLE_COMMAND];
+    values[CORRECTION_QUALITY] = f64::from(quality(Quality::Disabled));
 }
 
 /// The number that stands for it.
@@ -145,11 +157,11 @@ impl CompensationModel {
         let table = Table::check(&resources.image)?;
         let limits = Limits {
             tick_s: values[TICK] as f32,
-            rate_rad_s: values[RATE_LIMIT] as f32,
-            acceleration_rad_s2: values[ACCELERATION_LIMIT] as f32,
+            rate_rad_s: values[CORRECTION_RATE_LIMIT] as f32,
+            acceleration_rad_s2: values[CORRECTION_ACCELERATION_LIMIT] as f32,
             generator_rate_rad_s: values[GENERATOR_RATE_LIMIT] as f32,
             patience: values[PATIENCE] as u16,
-            hold_rad: values[HOLD] as f32,
+            hold_rad: values[ANGLE_HOLD] as f32,
         };
         let joint = Joint::new(*table.drive(), limits, Overrun::SkipAndCount)?;
         let path = TorquePath::new(TorqueSettings {
@@ -163,10 +175,10 @@ impl CompensationModel {
         })?;
         let image = [resources.image.clone(), resources.image.clone()];
         let mut store = Store::new();
-        let temperature_c = values[TEMPERATURE] as f32;
+        let temperature_c = values[DRIVE_TEMPERATURE] as f32;
         let activated = store.activate(&Images::new(&image[0], &image[1]), joint.drive(), temperature_c);
         activated.map_err(|error| FmuError::Activate { temperature_c, error })?;
-        let target = angle(values[OUTPUT_COMMAND], "output_command", OutputAngle::from_rad)?;
+        let target = angle(values[OUTPUT_ANGLE_COMMAND], "output_angle_command", OutputAngle::from_rad)?;
         let command = joint.drive().nominal_generator(target);
         Ok(Self {
             joint,
@@ -214,8 +226,8 @@ impl Model for CompensationModel {
     }
 
     fn tick(&mut self, at: &Inputs<'_>, outputs: &mut [f64], says: &mut dyn FnMut(String)) -> Result<(), FmuError> {
-        let rate_rad_s = at.start(OUTPUT_COMMAND_RATE);
-        let target = angle(at.start(OUTPUT_COMMAND), "output_command", OutputAngle::from_rad)?;
+        let rate_rad_s = at.start(OUTPUT_RATE_COMMAND);
+        let target = angle(at.start(OUTPUT_ANGLE_COMMAND), "output_angle_command", OutputAngle::from_rad)?;
         let asked = at.start(MODE) as u32;
         if asked != self.asked {
             self.asked = asked;
@@ -223,15 +235,16 @@ impl Model for CompensationModel {
                 says(format!("mode: {error}"));
             }
         }
-        self.follow(at.start(TEMPERATURE) as f32);
+        self.follow(at.start(DRIVE_TEMPERATURE) as f32);
         let moved = if rate_rad_s == 0.0 { target.minus_counts(self.target) as f64 } else { rate_rad_s };
         if moved != 0.0 {
             self.direction = if moved > 0.0 { Direction::Forward } else { Direction::Backward };
         }
         self.target = target;
-        let torque_n_m = self.torque_n_m(at.start(TORQUE_IS), at.start(TORQUE) as f32);
+        let torque_n_m = self.torque_n_m(at.start(TORQUE_IS), at.start(OUTPUT_TORQUE) as f32);
         let measured = at.start(GENERATOR_MEASURED) != 0.0;
-        let generator = if measured { GeneratorAngle::from_rad(at.start(GENERATOR_ANGLE)) } else { Some(self.command) };
+        let generator =
+            if measured { GeneratorAngle::from_rad(at.start(GENERATOR_ANGLE_MEASURED)) } else { Some(self.command) };
         let input = Input { generator, target, torque_n_m, missed_ticks: 0, adjustment: Adjustment::default() };
         let ahead_s = at.start(RATE_AHEAD) as f32;
         let rate = self.joint.rate_ahead(&self.store, target, rate_rad_s as f32, torque_n_m, ahead_s);
@@ -241,17 +254,17 @@ impl Model for CompensationModel {
 
         let arcsec = |rad: f32| f64::from(rad) * ARCSEC_PER_RAD;
         let nominal = rate_rad_s * at.start(RATIO);
-        outputs[GENERATOR_COMMAND] = out.command.to_rad();
-        outputs[GENERATOR_COMMAND_RATE] = if rate_rad_s == 0.0 || rate.is_nan() { nominal } else { f64::from(rate) };
-        outputs[CORRECTION] = arcsec(out.correction_rad);
-        outputs[HELD_BACK] = arcsec(out.held_back_rad);
-        outputs[PREDICTED_OUTPUT] = out.output.to_rad();
-        outputs[PREDICTED_ERROR] = arcsec(out.transmission_error_rad);
-        outputs[UNCERTAINTY] = arcsec(out.uncertainty_rad);
-        outputs[QUALITY] = f64::from(quality(out.quality));
-        outputs[FLAGS] = f64::from(out.flags.bits());
+        outputs[GENERATOR_ANGLE_COMMAND] = out.command.to_rad();
+        outputs[GENERATOR_RATE_COMMAND] = if rate_rad_s == 0.0 || rate.is_nan() { nominal } else { f64::from(rate) };
+        outputs[OUTPUT_ANGLE_CORRECTION] = arcsec(out.correction_rad);
+        outputs[CORRECTION_HELD_BACK] = arcsec(out.held_back_rad);
+        outputs[OUTPUT_ANGLE_PREDICTED] = out.output.to_rad();
+        outputs[TRANSMISSION_ERROR_PREDICTED] = arcsec(out.transmission_error_rad);
+        outputs[PREDICTION_UNCERTAINTY] = arcsec(out.uncertainty_rad);
+        outputs[CORRECTION_QUALITY] = f64::from(quality(out.quality));
+        outputs[TICK_FLAGS] = f64::from(out.flags.bits());
         outputs[NOT_CORRECTED] = f64::from(u8::from(out.flags.contains(Flags::NOT_CORRECTED)));
-        outputs[MODE_NOW] = f64::from(code(self.state.mode()));
+        outputs[MODE_ACTIVE] = f64::from(code(self.state.mode()));
         Ok(())
     }
 

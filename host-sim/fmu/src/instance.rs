@@ -1,8 +1,8 @@
 //! One simulation: what an importer may call when, its values, its time, and its state as bytes.
 //!
-//! States and calls are those of sections 2.1.6 to 2.1.8 and 4.2.4 of the standard. A call that is not allowed is
-//! refused: it returns an error with a line in the log, and nothing changes. A model that cannot go on ends in
-//! [`State::Failed`].
+//! States and calls are those of sections 2.1.6 to 2.1.8 and 4.2.4 of FMI 2.0, of sections 2.3 and 4.2 of FMI 3.0. A call
+//! that is not allowed is refused: it returns an error with a line in the log, and nothing changes. A model that cannot
+//! go on ends in [`State::Failed`].
 //!
 //! A model has ticks of a fixed time. A communication step does all ticks that end within it; what is left of the step
 //! is carried over to the next. An input holds from the point at which it was set on, or changes with the derivative
@@ -12,13 +12,13 @@ use std::collections::BTreeMap;
 use std::ffi::{CStr, CString};
 use std::path::Path;
 
-use crate::FmuError;
 use crate::compensation::{self, CompensationModel};
 use crate::joint::{self, MovingJoint};
 use crate::resources::Resources;
 use crate::variables::{Kind, ModelKind, Role, Variable};
+use crate::{FmiVersion, FmuError};
 
-/// `fmi2Status`.
+/// `fmi2Status`, `fmi3Status`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(i32)]
 pub enum FmiStatus {
@@ -129,6 +129,7 @@ const STATE_MARK: u64 = u64::from_le_bytes(*b"FXS\0FMU\x01");
 /// One simulation.
 pub struct Instance {
     resources: Resources,
+    version: FmiVersion,
     log: Log,
     logging: [bool; CATEGORIES.len()],
     state: State,
@@ -149,24 +150,31 @@ impl Instance {
     ///
     /// # Errors
     /// What is wrong with the folder, or that the description belongs to another one.
-    pub fn new(folder: &Path, guid: &str, log: Log, logging: bool) -> Result<Self, (Log, FmuError)> {
+    pub fn new(
+        folder: &Path,
+        guid: &str,
+        version: FmiVersion,
+        log: Log,
+        logging: bool,
+    ) -> Result<Self, (Log, FmuError)> {
         match Resources::read(folder) {
             Err(error) => Err((log, error)),
             Ok(resources) if resources.guid != guid => {
                 Err((log, FmuError::Guid { found: guid.to_owned(), allowed: resources.guid }))
             }
-            Ok(resources) => Ok(Self::of(resources, log, logging)),
+            Ok(resources) => Ok(Self::of(resources, version, log, logging)),
         }
     }
 
-    /// Of resources.
-    pub fn of(resources: Resources, log: Log, logging: bool) -> Self {
+    /// Of resources, for calls of one version.
+    pub fn of(resources: Resources, version: FmiVersion, log: Log, logging: bool) -> Self {
         let values = resources.starts.clone();
         Self {
             slopes: vec![0.0; values.len()],
             values,
             table_id: CString::new(resources.table_id.to_string()).unwrap_or_default(),
             resources,
+            version,
             log,
             logging: [logging; CATEGORIES.len()],
             state: State::Instantiated,
@@ -187,7 +195,10 @@ impl Instance {
     }
 
     fn warn(&self, what: &str) -> FmiStatus {
-        (self.log)(FmiStatus::Warning, CATEGORIES[1], what);
+        // FMI 3.0 (section 2.3.1) logs nothing that is not asked for; errors are told by both.
+        if self.version == FmiVersion::Two || self.logging[1] {
+            (self.log)(FmiStatus::Warning, CATEGORIES[1], what);
+        }
         FmiStatus::Warning
     }
 
@@ -216,12 +227,12 @@ impl Instance {
         })
     }
 
-    /// `fmi2SetDebugLogging`: all categories, or those named.
-    pub(crate) fn set_logging(&mut self, on: bool, categories: &[&str]) -> FmiStatus {
+    /// All categories, or those named.
+    pub(crate) fn set_logging(&mut self, call: &str, on: bool, categories: &[&str]) -> FmiStatus {
         let unknown = categories.iter().find(|category| !CATEGORIES.contains(category));
         if let Some(unknown) = unknown {
             let allowed = CATEGORIES.join(", ");
-            return self.refuse(&format!("fmi2SetDebugLogging: found category \"{unknown}\", allowed: {allowed}"));
+            return self.refuse(&format!("{call}: found category \"{unknown}\", allowed: {allowed}"));
         }
         for (name, logged) in CATEGORIES.iter().zip(&mut self.logging) {
             if categories.is_empty() || categories.contains(name) {
@@ -231,37 +242,33 @@ impl Instance {
         FmiStatus::Ok
     }
 
-    /// `fmi2SetupExperiment`.
-    pub fn set_up(&mut self, start_s: f64, stop_s: Option<f64>) -> Result<(), FmiStatus> {
-        self.expect("fmi2SetupExperiment", &[State::Instantiated])?;
+    /// `fmi2SetupExperiment`, or what it does within `fmi3EnterInitializationMode`.
+    pub fn set_up(&mut self, call: &str, start_s: f64, stop_s: Option<f64>) -> Result<(), FmiStatus> {
+        self.expect(call, &[State::Instantiated])?;
         if !start_s.is_finite() || stop_s.is_some_and(|stop_s| !(stop_s >= start_s && stop_s.is_finite())) {
             let stop = stop_s.map_or(String::new(), |stop_s| format!(" to {stop_s}"));
-            return Err(
-                self.refuse(&format!("fmi2SetupExperiment: found {start_s}{stop} s, allowed: finite, in order"))
-            );
+            return Err(self.refuse(&format!("{call}: found {start_s}{stop} s, allowed: finite, in order")));
         }
         self.set_up = true;
         (self.start_s, self.stop_s, self.time_s) = (start_s, stop_s, start_s);
         Ok(())
     }
 
-    /// `fmi2EnterInitializationMode`.
-    pub(crate) fn enter_initialization(&mut self) -> Result<(), FmiStatus> {
-        self.expect("fmi2EnterInitializationMode", &[State::Instantiated])?;
+    /// Begins the initialisation.
+    pub(crate) fn enter_initialization(&mut self, call: &str) -> Result<(), FmiStatus> {
+        self.expect(call, &[State::Instantiated])?;
         self.state = State::Initializing;
         if self.set_up {
             return Ok(());
         }
-        Err(self.warn("fmi2EnterInitializationMode: fmi2SetupExperiment was not called; the start is at 0 s"))
+        Err(self.warn(&format!("{call}: fmi2SetupExperiment was not called; the start is at 0 s")))
     }
 
-    /// `fmi2ExitInitializationMode`: the model is made of the parameters.
-    pub(crate) fn exit_initialization(&mut self) -> Result<(), FmiStatus> {
-        self.expect("fmi2ExitInitializationMode", &[State::Initializing])?;
-        self.model = Some(
-            made(&self.resources, &self.values)
-                .map_err(|error| self.refuse(&format!("fmi2ExitInitializationMode: {error}")))?,
-        );
+    /// The model is made of the parameters.
+    pub(crate) fn exit_initialization(&mut self, call: &str) -> Result<(), FmiStatus> {
+        self.expect(call, &[State::Initializing])?;
+        self.model =
+            Some(made(&self.resources, &self.values).map_err(|error| self.refuse(&format!("{call}: {error}")))?);
         self.start_outputs();
         self.ticks = 0;
         self.state = State::Stepping;
@@ -278,14 +285,14 @@ impl Instance {
         }
     }
 
-    /// `fmi2Terminate`.
-    pub(crate) fn terminate(&mut self) -> Result<(), FmiStatus> {
-        self.expect("fmi2Terminate", &[State::Stepping, State::Failed])?;
+    /// Ends the simulation.
+    pub(crate) fn terminate(&mut self, call: &str) -> Result<(), FmiStatus> {
+        self.expect(call, &[State::Stepping, State::Failed])?;
         self.state = State::Terminated;
         Ok(())
     }
 
-    /// `fmi2Reset`: as after it was made, with all start values.
+    /// As after it was made, with all start values.
     pub fn reset(&mut self) {
         self.values.clone_from(&self.resources.starts);
         self.slopes.fill(0.0);
@@ -295,18 +302,29 @@ impl Instance {
         self.state = State::Instantiated;
     }
 
+    /// Refuses to read where it is not allowed; FMI 3.0 has start values to be read before the initialisation.
+    fn expect_readable(&self, call: &str) -> Result<(), FmiStatus> {
+        let after = usize::from(self.version == FmiVersion::Two);
+        let states = [State::Instantiated, State::Initializing, State::Stepping, State::Failed, State::Terminated];
+        self.expect(call, &states[after..])
+    }
+
     /// Reads values of a type.
     pub fn get(&mut self, call: &str, like: fn(Kind) -> bool, references: &[u32]) -> Result<Vec<f64>, FmiStatus> {
-        self.expect(call, &[State::Initializing, State::Stepping, State::Failed, State::Terminated])?;
-        if self.state == State::Initializing {
+        self.expect_readable(call)?;
+        if matches!(self.state, State::Instantiated | State::Initializing) {
             self.start_outputs();
         }
-        references.iter().map(|&reference| self.place(call, like, reference).map(|place| self.values[place])).collect()
+        let value = |place: usize| match self.resources.kind.variables()[place].role {
+            Role::Independent => self.time_s,
+            _ => self.values[place],
+        };
+        references.iter().map(|&reference| self.place(call, like, reference).map(value)).collect()
     }
 
     /// Reads the only text that there is.
     pub(crate) fn get_text(&self, call: &str, reference: u32) -> Result<&CStr, FmiStatus> {
-        self.expect(call, &[State::Initializing, State::Stepping, State::Failed, State::Terminated])?;
+        self.expect_readable(call)?;
         self.place(call, |kind| kind == Kind::Text, reference).map(|_| self.table_id.as_c_str())
     }
 
@@ -319,7 +337,7 @@ impl Instance {
             let now = match variable.role {
                 Role::Input | Role::Tunable => true,
                 Role::Parameter => self.state != State::Stepping,
-                Role::Output | Role::Motion | Role::Constant => false,
+                Role::Output | Role::Motion | Role::Constant | Role::Independent => false,
             };
             if !now {
                 let why = if variable.role == Role::Parameter { "after the initialisation" } else { "at all" };
@@ -348,8 +366,7 @@ impl Instance {
     }
 
     /// `fmi2SetRealInputDerivatives`: of the first order, for the next step.
-    pub(crate) fn set_slopes(&mut self, set: &[(u32, i32, f64)]) -> Result<(), FmiStatus> {
-        let call = "fmi2SetRealInputDerivatives";
+    pub(crate) fn set_slopes(&mut self, call: &str, set: &[(u32, i32, f64)]) -> Result<(), FmiStatus> {
         self.expect(call, &[State::Instantiated, State::Initializing, State::Stepping])?;
         for &(reference, order, value) in set {
             let variable = self.variable(call, reference)?;
@@ -364,11 +381,10 @@ impl Instance {
         Ok(())
     }
 
-    /// `fmi2DoStep`: all ticks that end within it.
-    pub fn step(&mut self, from_s: f64, step_s: f64) -> Result<(), FmiStatus> {
-        let call = "fmi2DoStep";
+    /// All ticks that end within it.
+    pub fn step(&mut self, call: &str, from_s: f64, step_s: f64) -> Result<(), FmiStatus> {
         self.expect(call, &[State::Stepping])?;
-        let Some(mut model) = self.model.take() else { return Err(self.refuse("fmi2DoStep: no model")) };
+        let Some(mut model) = self.model.take() else { return Err(self.refuse(&format!("{call}: no model"))) };
         let done = self.ticked(call, model.as_mut(), from_s, step_s);
         self.model = Some(model);
         done
@@ -512,14 +528,8 @@ impl Instance {
         Ok(model)
     }
 
-    /// Keeps its state under a name, over one that is there.
-    pub fn keep(&mut self, name: usize) {
-        let bytes = self.bytes();
-        self.states.insert(name, bytes);
-    }
-
-    /// Keeps bytes under a name.
-    pub(crate) fn keep_bytes(&mut self, name: usize, bytes: Vec<u8>) {
+    /// Keeps bytes of a state under a name, over those that are there.
+    pub(crate) fn keep(&mut self, name: usize, bytes: Vec<u8>) {
         self.states.insert(name, bytes);
     }
 

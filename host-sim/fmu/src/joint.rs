@@ -28,13 +28,18 @@ const NOT_NEGATIVE: [f64; 2] = [0.0, 1e9];
 const TORQUE: [f64; 2] = [-1e6, 1e6];
 
 variables! {
-    TARGET => Variable::input("target", "rad", 0.0, "where the output shall be; read where servo is set");
-    TARGET_RATE => Variable::input("target_rate", "rad/s", 0.0, "its rate, fed forward");
-    TARGET_ACCELERATION => Variable::input("target_acceleration", "rad/s2", 0.0, "its acceleration, fed forward");
-    MOTOR_TORQUE => Variable::input("motor_torque", "N.m", 0.0, "torque of the motor, at the motor; read where servo is not set");
-    LOAD_TORQUE => Variable::input("load_torque", "N.m", 0.0, "torque on the load from outside, gravity left out, positive where it turns the output forward");
-    SERVO => Variable::parameter("servo", Kind::Boolean, 1.0, [0.0, 1.0], "the servo follows target; else motor_torque turns the motor");
-    COMPENSATE => Variable::parameter("compensate", Kind::Boolean, 1.0, [0.0, 1.0], "the core corrects the target with the table; else the generator is told target times ratio");
+    OUTPUT_ANGLE_COMMAND => Variable::input("output_angle_command", "rad", 0.0,
+        "commanded angle of the output, positive counter-clockwise; generator and output are seen from the same side");
+    OUTPUT_RATE_COMMAND => Variable::input("output_rate_command", "rad/s", 0.0,
+        "rate of output_angle_command, fed forward");
+    OUTPUT_ACCELERATION_COMMAND => Variable::input("output_acceleration_command", "rad/s2", 0.0,
+        "acceleration of output_angle_command, fed forward");
+    MOTOR_TORQUE_COMMAND => Variable::input("motor_torque_command", "N.m", 0.0,
+        "torque of the motor, at the motor, positive where it turns it forward; read where servo is not set");
+    LOAD_TORQUE => Variable::input("load_torque", "N.m", 0.0,
+        "torque on the load from outside, without gravity, positive where it turns the output forward");
+    SERVO => Variable::parameter("servo", Kind::Boolean, 1.0, [0.0, 1.0], "the servo follows output_angle_command; else motor_torque_command turns the motor");
+    COMPENSATE => Variable::parameter("compensate", Kind::Boolean, 1.0, [0.0, 1.0], "the core corrects output_angle_command with the table; else the generator gets the command times the ratio");
     TORQUE_KNOWN => Variable::parameter("torque_known", Kind::Choice(&TORQUES), 0.0, [0.0, 3.0], "from what the compensation knows the torque");
     TORQUE_NOISE => Variable::parameter("torque_noise", Kind::Real("N.m"), 0.05, NOT_NEGATIVE, "noise of that torque, rms");
     LOAD_INERTIA => Variable::parameter("load_inertia", Kind::Real("kg.m2"), 3.0, POSITIVE, "inertia of the load");
@@ -51,7 +56,7 @@ variables! {
     LOAD_GUST => Variable::parameter("load_gust", Kind::Real("N.m"), 0.0, NOT_NEGATIVE, "load that is expected: gusts, rms");
     LOAD_GUST_FREQUENCY => Variable::parameter("load_gust_frequency", Kind::Real("Hz"), 0.0, NOT_NEGATIVE, "load that is expected: corner of the gusts' spectrum");
     LOAD_STEP => Variable::parameter("load_step", Kind::Real("N.m"), 0.0, TORQUE, "load that is expected: size of steps");
-    TARGET_ACCELERATION_MOST => Variable::parameter("target_acceleration_most", Kind::Real("rad/s2"), 0.05, POSITIVE, "largest acceleration of the target that is expected");
+    OUTPUT_ACCELERATION_MOST => Variable::parameter("output_acceleration_most", Kind::Real("rad/s2"), 0.05, POSITIVE, "largest acceleration of the command that is expected");
     TICK => Variable::parameter("tick", Kind::Real("s"), 1e-3, [1e-5, 0.1], "time from tick to tick of the servo");
     STEPS => Variable::parameter("steps", Kind::Integer, 5.0, [1.0, 1000.0], "steps of the plant in a tick");
     LATE_STEPS => Variable::parameter("late_steps", Kind::Integer, 1.0, [0.0, 1000.0], "steps of the plant from a sample to the torque that it asks for; at most steps");
@@ -63,27 +68,35 @@ variables! {
     ENCODER_JITTER => Variable::parameter("encoder_jitter", Kind::Real("s"), 5e-6, [0.0, 1e-3], "the encoder is read up to so much too late");
     CURRENT_NOISE => Variable::parameter("current_noise", Kind::Real("N.m"), 1e-3, NOT_NEGATIVE, "noise of the torque told from the motor's current, at the motor, rms");
     SEED => Variable::parameter("seed", Kind::Integer, 1.0, [0.0, 2_147_483_647.0], "start of the noises, which are the same in every run");
-    MOTOR_ANGLE => Variable::motion("motor_angle", "rad", "angle of motor and generator");
-    MOTOR_RATE => Variable::motion("motor_rate", "rad/s", "its rate");
-    OUTPUT_ANGLE => Variable::motion("output_angle", "rad", "angle of output and load");
-    OUTPUT_RATE => Variable::motion("output_rate", "rad/s", "its rate");
-    TRANSMISSION_ERROR => Variable::motion("transmission_error", "arcsec", "output less motor over the ratio, positive where the output leads");
-    MESH_TORQUE => Variable::motion("mesh_torque", "N.m", "torque in the mesh at the output, positive where it turns the motor forward and the load back");
-    MOTOR_TORQUE_NOW => Variable::motion("motor_torque_now", "N.m", "torque that turned the motor last, at the motor");
+    MOTOR_ANGLE => Variable::motion("motor_angle", "rad", "angle of motor and wave generator, positive counter-clockwise");
+    MOTOR_RATE => Variable::motion("motor_rate", "rad/s", "rate of motor_angle");
+    OUTPUT_ANGLE => Variable::motion("output_angle", "rad", "angle of output and load, positive counter-clockwise");
+    OUTPUT_RATE => Variable::motion("output_rate", "rad/s", "rate of output_angle");
+    TRANSMISSION_ERROR => Variable::motion("transmission_error", "arcsec",
+        "output_angle less motor_angle over the ratio, positive where the output leads");
+    MESH_TORQUE => Variable::motion("mesh_torque", "N.m",
+        "torque in the mesh at the output, positive where it turns the motor forward and the load back");
+    MOTOR_TORQUE => Variable::motion("motor_torque", "N.m",
+        "torque of the motor in the last tick, at the motor, positive where it turns the motor forward");
     STORED_ENERGY => Variable::motion("stored_energy", "J", "energy of motion and in the mesh");
     MOTOR_WORK => Variable::motion("motor_work", "J", "work of the motor since the start");
     LOAD_WORK => Variable::motion("load_work", "J", "work of load_torque and gravity since the start");
     HEAT => Variable::motion("heat", "J", "energy turned into heat since the start");
     ENERGY_ERROR => Variable::motion("energy_error", "J", "both works less heat less what is stored now beyond the start: rounding");
-    GENERATOR_COMMAND => Variable::output("generator_command", Kind::Real("rad"), "where the servo was told to turn the generator");
-    CORRECTION => Variable::output("correction", Kind::Real("arcsec"), "target less generator_command over the ratio: it is taken off the target");
-    SATURATED => Variable::output("saturated", Kind::Boolean, "the servo's motor gives all it has");
-    HELD_BACK => Variable::output("held_back", Kind::Boolean, "the limiter held the correction back");
-    NOT_CORRECTED => Variable::output("not_corrected", Kind::Boolean, "no correction could be made in the tick, as where a torque is read beyond 1.5 times the table's range and beyond 3 times the load that is expected and 10 N.m more: no sensor shows it; the log says so");
-    QUALITY => Variable::output("quality", Kind::Choice(&QUALITIES), "how far the core trusts its estimate and its correction; disabled where it does not correct");
-    TEMPERATURE => Variable::constant("temperature", Kind::Real("degC"), "temperature of drive and lubricant");
+    GENERATOR_ANGLE_COMMAND => Variable::output("generator_angle_command", Kind::Real("rad"),
+        "angle that the servo turned the wave generator to, positive counter-clockwise");
+    OUTPUT_ANGLE_CORRECTION => Variable::output("output_angle_correction", Kind::Real("arcsec"),
+        "output_angle_command less generator_angle_command over the ratio: has the sign of the error");
+    MOTOR_SATURATED => Variable::output("motor_saturated", Kind::Boolean, "the motor of the servo gives all it has");
+    CORRECTION_LIMITED => Variable::output("correction_limited", Kind::Boolean, "the limiter held the correction back");
+    NOT_CORRECTED => Variable::output("not_corrected", Kind::Boolean,
+        "no correction could be made in the tick, as where a torque is read beyond 1.5 times the table's range and beyond 3 times the load that is expected and 10 N.m more: no sensor shows it; the log says so");
+    CORRECTION_QUALITY => Variable::output("correction_quality", Kind::Choice(&QUALITIES),
+        "how far prediction and correction can be trusted; disabled where the core does not correct");
+    DRIVE_TEMPERATURE => Variable::constant("drive_temperature", Kind::Real("degC"), "temperature of drive and lubricant");
     RATIO => Variable::constant("ratio", Kind::Real("rad/rad"), "generator over output");
     TABLE_ID => Variable::constant("table_id", Kind::Text, "id of the table");
+    TIME => Variable::time();
 }
 
 /// Start values that differ from the usual for a scenario, by name.
@@ -112,7 +125,7 @@ pub fn starts_of(scenario: &Scenario) -> Vec<(&'static str, f64)> {
         (LOAD_GUST, load.gust[0]),
         (LOAD_GUST_FREQUENCY, load.gust[1]),
         (LOAD_STEP, load.step[0]),
-        (TARGET_ACCELERATION_MOST, scenario.acceleration_rad_s2),
+        (OUTPUT_ACCELERATION_MOST, scenario.acceleration_rad_s2),
         (TICK, servo.tick_s),
         (STEPS, servo.steps as f64),
         (LATE_STEPS, servo.late_steps as f64),
@@ -124,7 +137,7 @@ pub fn starts_of(scenario: &Scenario) -> Vec<(&'static str, f64)> {
         (ENCODER_JITTER, servo.jitter_s),
         (CURRENT_NOISE, servo.current_noise_n_m),
         (SEED, f64::from(scenario.seed)),
-        (TEMPERATURE, scenario.temperature_c),
+        (DRIVE_TEMPERATURE, scenario.temperature_c),
     ];
     places.map(|(place, start)| (VARIABLES[place].name, start)).to_vec()
 }
@@ -133,7 +146,7 @@ fn scenario_of(values: &[f64]) -> Scenario {
     Scenario {
         name: String::new(),
         legs: Vec::new(),
-        acceleration_rad_s2: values[TARGET_ACCELERATION_MOST],
+        acceleration_rad_s2: values[OUTPUT_ACCELERATION_MOST],
         load: Load {
             bias_n_m: values[LOAD_MEAN],
             swing: [values[LOAD_SWING], values[LOAD_SWING_FREQUENCY]],
@@ -144,7 +157,7 @@ fn scenario_of(values: &[f64]) -> Scenario {
         load_kg_m2: values[LOAD_INERTIA],
         drag_n_m: values[DRAG],
         damping: values[DAMPING],
-        temperature_c: values[TEMPERATURE],
+        temperature_c: values[DRIVE_TEMPERATURE],
         warming_k_s: 0.0,
         servo: ServoSettings {
             tick_s: values[TICK],
@@ -177,7 +190,7 @@ fn scenario_of(values: &[f64]) -> Scenario {
 
 /// The outputs before the first tick where they are not zero: all stands.
 pub fn initial(values: &mut [f64]) {
-    values[QUALITY] = f64::from(quality(Quality::Disabled));
+    values[CORRECTION_QUALITY] = f64::from(quality(Quality::Disabled));
 }
 
 /// The joint in a simulation.
@@ -233,17 +246,18 @@ impl Model for MovingJoint {
     fn tick(&mut self, at: &Inputs<'_>, outputs: &mut [f64], says: &mut dyn FnMut(String)) -> Result<(), FmuError> {
         let joint = &mut self.joint;
         let outside_n_m = [at.start(LOAD_TORQUE), at.end(LOAD_TORQUE)];
-        let read = [TARGET, TARGET_RATE, TARGET_ACCELERATION, MOTOR_TORQUE, LOAD_TORQUE];
+        let read =
+            [OUTPUT_ANGLE_COMMAND, OUTPUT_RATE_COMMAND, OUTPUT_ACCELERATION_COMMAND, MOTOR_TORQUE_COMMAND, LOAD_TORQUE];
         if let Some(place) = read.into_iter().find(|&place| !at.start(place).is_finite()) {
             let (name, found) = (VARIABLES[place].name, at.start(place));
             return Err(FmuError::Value { name, found, allowed: "a finite number" });
         }
         let servo = at.start(SERVO) != 0.0;
         if servo {
-            let target_rad = at.start(TARGET);
+            let target_rad = at.start(OUTPUT_ANGLE_COMMAND);
             let held = OutputAngle::from_rad(target_rad).and(GeneratorAngle::from_rad(target_rad * joint.ratio()));
             held.ok_or(FmuError::Value {
-                name: VARIABLES[TARGET].name,
+                name: VARIABLES[OUTPUT_ANGLE_COMMAND].name,
                 found: target_rad,
                 allowed: "an angle for which the generator makes less than 2e9 turns",
             })?;
@@ -251,14 +265,14 @@ impl Model for MovingJoint {
         let ticked = if servo {
             joint.tick(&Moment {
                 time_s: 0.0,
-                target_rad: at.start(TARGET),
-                rate_rad_s: at.start(TARGET_RATE),
-                acceleration_rad_s2: at.start(TARGET_ACCELERATION),
+                target_rad: at.start(OUTPUT_ANGLE_COMMAND),
+                rate_rad_s: at.start(OUTPUT_RATE_COMMAND),
+                acceleration_rad_s2: at.start(OUTPUT_ACCELERATION_COMMAND),
                 steady: false,
                 outside_n_m,
             })
         } else {
-            joint.push(at.start(MOTOR_TORQUE), outside_n_m);
+            joint.push(at.start(MOTOR_TORQUE_COMMAND), outside_n_m);
             Ticked::default()
         };
         if ticked.not_corrected && !self.not_corrected {
@@ -277,20 +291,22 @@ impl Model for MovingJoint {
         outputs[OUTPUT_RATE] = output_rate;
         outputs[TRANSMISSION_ERROR] = (output - motor) * ARCSEC_PER_RAD;
         outputs[MESH_TORQUE] = plant.mesh_n_m();
-        outputs[MOTOR_TORQUE_NOW] = if servo { joint.motor_n_m() } else { at.start(MOTOR_TORQUE) };
+        outputs[MOTOR_TORQUE] = if servo { joint.motor_n_m() } else { at.start(MOTOR_TORQUE_COMMAND) };
         outputs[STORED_ENERGY] = plant.stored_j();
         outputs[MOTOR_WORK] = plant.energy.motor;
         outputs[LOAD_WORK] = plant.energy.outside;
         outputs[HEAT] = plant.energy.heat;
         outputs[ENERGY_ERROR] = joint.missing_j();
-        outputs[GENERATOR_COMMAND] = ticked.command_rad;
-        outputs[CORRECTION] = ticked.correction_rad * ARCSEC_PER_RAD;
-        for (place, set) in
-            [(SATURATED, ticked.saturated), (HELD_BACK, ticked.held_back), (NOT_CORRECTED, ticked.not_corrected)]
-        {
+        outputs[GENERATOR_ANGLE_COMMAND] = ticked.command_rad;
+        outputs[OUTPUT_ANGLE_CORRECTION] = ticked.correction_rad * ARCSEC_PER_RAD;
+        for (place, set) in [
+            (MOTOR_SATURATED, ticked.saturated),
+            (CORRECTION_LIMITED, ticked.held_back),
+            (NOT_CORRECTED, ticked.not_corrected),
+        ] {
             outputs[place] = f64::from(u8::from(set));
         }
-        outputs[QUALITY] = f64::from(quality(ticked.quality.unwrap_or(Quality::Disabled)));
+        outputs[CORRECTION_QUALITY] = f64::from(quality(ticked.quality.unwrap_or(Quality::Disabled)));
         Ok(())
     }
 

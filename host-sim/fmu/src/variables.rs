@@ -55,6 +55,8 @@ pub enum Role {
     Motion,
     /// Never changes.
     Constant,
+    /// The time of the simulation.
+    Independent,
 }
 
 /// A variable; its value reference is its place in the list.
@@ -109,7 +111,13 @@ impl Variable {
         Variable { name, kind, role: Role::Constant, start: 0.0, range: ANY, says }
     }
 
-    /// Whether it is read only.
+    /// The time of the simulation: FMI 3.0 wants it among the variables.
+    pub const fn time() -> Variable {
+        let says = "time of the simulation";
+        Variable { name: "time", kind: Kind::Real("s"), role: Role::Independent, start: 0.0, range: ANY, says }
+    }
+
+    /// Whether it is an output.
     pub const fn is_output(&self) -> bool {
         matches!(self.role, Role::Output | Role::Motion)
     }

@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 
 use super::FmuExportError;
 
-/// A platform of FMI 2.0 (section 2.3): its folder, how its library ends and is called by cargo, and what such a file
-/// begins with.
+/// A platform (section 2.3 of FMI 2.0, 2.5.1.4 of FMI 3.0): its folders, how its library ends and is called by cargo,
+/// and what such a file begins with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Platform {
-    /// Folder of `binaries`.
-    pub folder: &'static str,
+    /// Folders of `binaries`, of FMI 2.0 and FMI 3.0.
+    pub folders: [&'static str; 2],
     /// Ending.
     pub extension: &'static str,
     /// As cargo calls it.
@@ -23,7 +23,7 @@ pub struct Platform {
 /// Those that a library may be for; all of 64 bits.
 const PLATFORMS: [Platform; 3] = [
     Platform {
-        folder: "linux64",
+        folders: ["linux64", "x86_64-linux"],
         extension: "so",
         file: "libflexspline_fmu.so",
         target: "x86_64-unknown-linux-gnu",
@@ -31,14 +31,14 @@ const PLATFORMS: [Platform; 3] = [
         magic: b"\x7fELF\x02\x01",
     },
     Platform {
-        folder: "win64",
+        folders: ["win64", "x86_64-windows"],
         extension: "dll",
         file: "flexspline_fmu.dll",
         target: "x86_64-pc-windows-gnu",
         magic: b"MZ",
     },
     Platform {
-        folder: "darwin64",
+        folders: ["darwin64", "x86_64-darwin"],
         extension: "dylib",
         file: "libflexspline_fmu.dylib",
         target: "x86_64-apple-darwin",
@@ -71,7 +71,7 @@ pub fn find_libraries(named: &[PathBuf]) -> Result<Vec<Library>, FmuExportError>
         let library = read(file)?;
         if let Some(other) = libraries.iter().find(|other| other.platform == library.platform) {
             let files = [other.file.clone(), file.clone()];
-            return Err(FmuExportError::TwoLibraries { files, folder: library.platform.folder });
+            return Err(FmuExportError::TwoLibraries { files, folder: library.platform.folders[0] });
         }
         libraries.push(library);
     }
@@ -94,7 +94,7 @@ pub fn find_libraries(named: &[PathBuf]) -> Result<Vec<Library>, FmuExportError>
 
 /// Where the library of a platform may lie, the likeliest to be new first.
 fn places(beside: &Path, platform: &Platform) -> Vec<PathBuf> {
-    let Platform { folder, file, target, .. } = platform;
+    let Platform { folders: [folder, _], file, target, .. } = platform;
     let mut places = vec![
         // Cargo has there what it built along with the program.
         beside.join("deps").join(file),
