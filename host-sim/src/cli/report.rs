@@ -95,12 +95,18 @@ fn fate(path: &Path, name: &str, drive: Option<&Drive>) -> Option<String> {
     let html = std::fs::read_to_string(path).ok()?;
     let found = path.display();
     let Some(written) = Written::of(&html) else {
-        return Some(format!("{found} is none of our pages; it is kept as {}", kept(path, None).display()));
+        return Some(format!(
+            "{found} is none of our pages; once there is a new one it is kept as {}",
+            kept(path, None).display()
+        ));
     };
     if written.command != name {
         let kept = kept(path, Some(&written));
         let Written { command, title, .. } = written;
-        return Some(format!("{found} is the page of `{command}` ({title}); it is kept as {}", kept.display()));
+        return Some(format!(
+            "{found} is the page of `{command}` ({title}); once there is a new one it is kept as {}",
+            kept.display()
+        ));
     }
     let other = drive.is_some_and(|drive| !written.names(&blake3::Hash::from(drive.hash()).to_hex()));
     other.then(|| {

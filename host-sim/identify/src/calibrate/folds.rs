@@ -118,8 +118,9 @@ impl Folds {
         places
     }
 
-    /// Coefficients of the zeros, then of each part chosen, fitted to some folds.
-    pub fn fit(&self, folds: &[usize], chosen: &[Chosen]) -> Option<Vec<f64>> {
+    /// Coefficients of the zeros, then of each part chosen, fitted to some folds; those in `held`, counted without the
+    /// zeros, keep the value given there, and the others are the best with them.
+    pub fn fit(&self, folds: &[usize], chosen: &[Chosen], held: &[(usize, f64)]) -> Option<Vec<f64>> {
         let places = self.places(chosen);
         if places.is_empty() {
             return Some(Vec::new());
@@ -144,13 +145,21 @@ impl Folds {
             gram[(i, i)] += (penalty + FLOOR) * rows;
             right[(i, 0)] = folds.iter().map(|fold| self.sums[*fold].right[*a]).sum();
         }
+        for &(coefficient, value) in held {
+            let of = self.begins[0] + coefficient;
+            for i in 0..places.len() {
+                right[(i, 0)] -= gram[(i, of)] * value;
+                (gram[(i, of)], gram[(of, i)]) = (0.0, 0.0);
+            }
+            (gram[(of, of)], right[(of, 0)]) = (1.0, value);
+        }
         let solved = cholesky(gram.as_ref()).ok()?.solve(right.as_ref());
         Some((0..places.len()).map(|i| solved[(i, 0)]).collect())
     }
 
-    /// Coefficients of the parts chosen, fitted to all folds.
-    pub fn coefficients(&self, chosen: &[Chosen]) -> Option<Vec<f64>> {
-        Some(self.fit(&self.all(), chosen)?.split_off(self.begins[0]))
+    /// Coefficients of the parts chosen, fitted to all folds, some of them held.
+    pub fn coefficients(&self, chosen: &[Chosen], held: &[(usize, f64)]) -> Option<Vec<f64>> {
+        Some(self.fit(&self.all(), chosen, held)?.split_off(self.begins[0]))
     }
 
     /// Sum of squares, arcsec², that these coefficients leave in a fold.
@@ -169,7 +178,7 @@ impl Folds {
 
     /// What a fit to `folds` leaves in another fold, arcsec².
     pub fn left_in(&self, fold: usize, folds: &[usize], chosen: &[Chosen]) -> f64 {
-        self.fit(folds, chosen).map_or(f64::INFINITY, |coefficients| self.left(fold, chosen, &coefficients))
+        self.fit(folds, chosen, &[]).map_or(f64::INFINITY, |coefficients| self.left(fold, chosen, &coefficients))
     }
 
     /// What fits to all of `folds` but one leave in that one, summed over all, arcsec².

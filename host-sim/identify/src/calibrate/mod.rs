@@ -74,9 +74,10 @@ const PENALTY_OF_PLANS: f64 = PENALTIES[0];
 /// A ratio is refused if another leaves less than this share of the squares. A guess: of what a wrong whole number
 /// does, nothing is left.
 const OTHER_RATIO: f64 = 0.25;
-/// A lag that is negative by no more than this, and this share of the largest number of the play, is noise: guesses.
-const NO_LAG_ARCSEC: f64 = 0.5;
-const NO_LAG_SHARE: f64 = 0.1;
+/// Arcsec that are taken for rounding.
+const ROUNDING_ARCSEC: f64 = 1e-6;
+/// Coefficients of the play, and so the times that one of them is put on its bound and the others fitted anew.
+const PLAY_COEFFICIENTS: usize = 3;
 /// Paces that tell a delay from play: the fastest is so many times the slowest. *Guess*.
 const OTHER_PACE: f64 = 1.25;
 /// Temperatures closer than this, K, are one.
@@ -160,7 +161,7 @@ impl Model {
     fn play_arcsec(&self) -> f64 {
         let Some(play) = self.of(PartName::Play).map(|play| &self.coefficients[play]) else { return 0.0 };
         // Without load both the lag and the flank go by direction; under load the lag alone.
-        2.0 * [play[0] + play[2], play[0], play[0] + play[1]].into_iter().fold(0.0, f64::max)
+        2.0 * [play[0] + play[2], play[0], play[1]].into_iter().fold(0.0, f64::max)
     }
 
     /// Error at rest in one place under a load, arcsec.
@@ -183,30 +184,24 @@ impl Model {
         )))
     }
 
-    /// Whether the flanks keep their sides, with half the prior's play where no load decides. A lag that is negative by
-    /// no more than noise is none.
-    fn has_sound_flanks(&mut self, prior_half_arcsec: f64) -> bool {
-        let mut least_lag = 0.0;
-        if let Some(play) = self.of(PartName::Play)
-            && let [lag, by_load, flank] = &mut self.coefficients[play]
-        {
-            let size = lag.abs().max(by_load.abs()).max(flank.abs());
-            let none = -(NO_LAG_ARCSEC + NO_LAG_SHARE * size);
-            if *lag < none || *lag + *by_load < none || *lag + *flank + prior_half_arcsec < none {
-                return false;
-            }
-            *lag = lag.max(0.0);
-            *by_load = by_load.max(-*lag);
-            *flank = flank.max(-*lag - prior_half_arcsec);
-            least_lag = lag.min(*lag + *by_load);
-        }
+    /// The first coefficient of the play that stands where none can, with the nearest that it may have: the output does
+    /// not lead (a delay between the readings does), and the error of neither direction falls where the load changes
+    /// the flank. `prior_half_arcsec` is half the play that the prior has.
+    fn out_of_bounds(&self, prior_half_arcsec: f64) -> Option<(usize, f64)> {
+        let least = [0.0, 0.0, -prior_half_arcsec];
+        let mut play = self.of(PartName::Play)?.zip(least);
+        play.find(|(place, least)| self.coefficients[*place] < least - ROUNDING_ARCSEC)
+    }
+
+    /// Takes no more of the lag by temperature than there is.
+    fn bound_warmth(&mut self) {
+        let lags = self.of(PartName::Play).map(|play| [0, 1].map(|k| self.coefficients[play.start + k]));
+        let least_lag = lags.map_or(0.0, |[idle, loaded]| idle.min(loaded).max(0.0));
         if let Some(temperature) = self.of(PartName::Temperature)
             && let [_, _, by_warmth] = &mut self.coefficients[temperature]
         {
-            // Nor does a temperature take more of the lag than there is.
             *by_warmth = by_warmth.clamp(-least_lag, least_lag);
         }
-        true
     }
 }
 
@@ -414,7 +409,9 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
     if let Some(table) = prior.table {
         (rows, recorded.scales.friction_n_m) = dead_zone(rows, prior, table, &recorded);
     }
-    with_dead_zone(&logs, prior, (rows, recorded), said).map_err(|error| with_faults(error, files))
+    let pace = play_of_a_millisecond(&rows.rows, &recorded, prior).map(note_of_one_pace);
+    let notes: Vec<String> = said.iter().cloned().chain(pace).collect();
+    with_dead_zone(&logs, prior, (rows, recorded), said).map_err(|error| with_faults(error, files, &notes))
 }
 
 /// Logs with a delay between the readings, and without.
@@ -471,13 +468,19 @@ fn with_dead_zone(
     };
     let fitted = fitted_without(&[])?;
     let (fitted, made) = match table::make(prior, &fitted.model, &recorded) {
-        // A table has no wind-up that falls with the load.
-        Err(error) if error.is_of_a_fall() && fitted.model.of(PartName::WindUp).is_some() => {
-            fitted.model.gives_way_with_the_load(prior)?;
-            let why = "it would fall with the load somewhere, which no spring does";
-            let fitted = fitted_without(&[(PartName::WindUp, why)])?;
-            let made = table::make(prior, &fitted.model, &recorded)?;
-            (fitted, made)
+        // A table has no wind-up that falls with the load, and none that the lag outruns.
+        Err(error) if error.is_of_a_fall() => {
+            if fitted.model.of(PartName::WindUp).is_some() {
+                fitted.model.gives_way_with_the_load(prior)?;
+            }
+            const WHY: &str = "it would fall with the load somewhere, which no spring does";
+            let (wind_up, play) = ((PartName::WindUp, WHY), (PartName::Play, WHY));
+            let tried = [vec![wind_up], vec![play], vec![wind_up, play]].into_iter().filter_map(|without| {
+                let fitted = fitted_without(&without).ok()?;
+                table::make(prior, &fitted.model, &recorded).ok().map(|made| (fitted, made))
+            });
+            let left = |(fitted, _): &(Fitted, MadeTable)| fitted.held_out.rms_after_arcsec;
+            tried.min_by(|a, b| left(a).total_cmp(&left(b))).ok_or(error)?
         }
         made => (fitted, made?),
     };
@@ -556,14 +559,22 @@ fn with_dead_zone(
     Ok(Calibrated { calibration, table: made, known, rows, recorded, shown })
 }
 
-/// What keeps a table from being made, with what was noticed of the units and signs of the logs.
-fn with_faults(error: CalibrationError, files: &[Recording]) -> CalibrationError {
+/// What keeps a table from being made, with what was noticed of the units and signs of the logs: before what it may be
+/// the cause of, a torque of another sign, and after all else.
+fn with_faults(error: CalibrationError, files: &[Recording], said: &[String]) -> CalibrationError {
     let faults = files.iter().flat_map(|file| &file.faults).filter(|fault| fault.name == FaultName::UnitMismatch);
-    let faults: Vec<&str> = faults.map(|fault| fault.what.as_str()).collect();
+    let faults = faults.map(|fault| format!("{}: see its unit and sign, and the sign of the ratio", fault.what));
+    let mut faults: Vec<String> = faults.collect();
+    faults.sort();
+    faults.dedup();
+    let after =
+        |error: String, notes: &[String]| notes.iter().fold(error, |text, note| format!("{text}\n  note: {note}"));
     match error {
-        CalibrationError::Table(error) if !faults.is_empty() => {
-            CalibrationError::Known(format!("{error}; of the logs: {}", faults.join("; ")))
+        CalibrationError::Known(error) if !faults.is_empty() => {
+            CalibrationError::Known(after(format!("{}\n  then {error}", faults.join("\n  ")), said))
         }
+        CalibrationError::Table(error) => CalibrationError::Known(after(error.to_string(), &[&faults, said].concat())),
+        CalibrationError::NothingGained(error) => CalibrationError::NothingGained(after(error, said)),
         other => other,
     }
 }
@@ -639,14 +650,18 @@ impl Fitted {
         } else {
             "what was known before is further off than the parts mend in what was left out"
         };
-        let reasons: Vec<String> = self.parts.iter().map(|part| format!("{}: {}", part.name, part.why)).collect();
         let apart = self.agreement().and_then(|agreement| agreement.note(files));
-        Err(CalibrationError::NothingGained(format!(
+        let recorded = |file: &Recording| file.sessions.iter().all(|session| session.torque_n_m.is_some());
+        let torque = (!files.iter().all(recorded)).then(|| {
+            "no torque was recorded: under loads that change, record it, as the wind-up is the largest part".to_owned()
+        });
+        let mut text = format!(
             "{what}, so no table is better than none ({rms_before_arcsec:.2} arcsec rms as measured, \
-             {rms_after_arcsec:.2} with the table): {}{}",
-            reasons.join("; "),
-            apart.map_or_else(String::new, |apart| format!("; {apart}"))
-        )))
+             {rms_after_arcsec:.2} with the table)"
+        );
+        apart.into_iter().chain(torque).for_each(|said| text += &format!("\n  {said}"));
+        self.parts.iter().for_each(|part| text += &format!("\n  {}: {}", part.name, part.why));
+        Err(CalibrationError::NothingGained(text))
     }
 }
 
@@ -684,12 +699,19 @@ fn fit(rows: Rows, prior: &Prior<'_>, recorded: &Recorded, without: &[Without]) 
         // The fewest parts that leave least where neither choice nor fit was made.
         let most = (0..path.len()).min_by(|a, b| left[*a].total_cmp(&left[*b])).unwrap_or(0);
         let chosen = pruned(&folds, &all, path[most].clone());
-        let coefficients = folds.coefficients(&chosen).unwrap_or_default();
+        let coefficients = folds.coefficients(&chosen, &[]).unwrap_or_default();
         let mut model = Model { chosen, coefficients, scales: recorded.scales };
-        if !model.has_sound_flanks(0.5 * prior.nominal.backlash_arcsec) && open.contains(&PartName::Play) {
-            without.push((PartName::Play, "it would put the flanks on the wrong sides"));
+        let prior_half_arcsec = 0.5 * prior.nominal.backlash_arcsec;
+        let mut held: Vec<(usize, f64)> = Vec::new();
+        while let Some(bound) = model.out_of_bounds(prior_half_arcsec).filter(|_| held.len() < PLAY_COEFFICIENTS) {
+            held.push(bound);
+            model.coefficients = folds.coefficients(&model.chosen, &held).unwrap_or_default();
+        }
+        if held.len() == PLAY_COEFFICIENTS && prior_half_arcsec == 0.0 {
+            without.push((PartName::Play, "the output would lead, or a flank bear on the wrong side"));
             continue;
         }
+        model.bound_warmth();
         let count = rows.rows.len() as f64;
         let rms = |squares: f64| (squares / count).sqrt();
         let held_out = HeldOut {
@@ -769,6 +791,15 @@ fn sizes(rows: &Rows, model: &Model, parts: &mut [PartSays]) {
     }
 }
 
+/// What is said of logs at one pace.
+fn note_of_one_pace(play_of_a_millisecond_arcsec: f64) -> String {
+    format!(
+        "the generator keeps to one pace: an output a millisecond older than the generator looks like \
+         {play_of_a_millisecond_arcsec:.1} arcsec of play, and one as much newer takes them off it; other paces tell, \
+         half as fast for one pass in five"
+    )
+}
+
 /// What whoever uses the table has to know.
 fn remarks(
     prior: &Prior<'_>,
@@ -809,13 +840,7 @@ fn remarks(
     if recorded.lacks(PartName::Play, prior).is_some() {
         remarks.push("one direction was recorded: after a reversal the table says nothing new of the play".to_owned());
     }
-    if let Some(arcsec) = play_of_a_millisecond_arcsec {
-        remarks.push(format!(
-            "the generator keeps to one pace: an output a millisecond older than the generator looks like {arcsec:.1} \
-             arcsec of play, and one as much newer takes them off it; other paces tell, half as fast for one pass in \
-             five"
-        ));
-    }
+    remarks.extend(play_of_a_millisecond_arcsec.map(note_of_one_pace));
     if !recorded.has_torque {
         remarks.push(
             "no torque was recorded: the table holds for no load alone, and at any other the core says that it is \

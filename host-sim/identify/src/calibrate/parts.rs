@@ -145,7 +145,8 @@ pub(super) fn columns(part: PartName, at: &State, scales: &Scales, to: &mut Vec<
         }
         PartName::Play => {
             let flank = if at.torque_n_m.abs() > scales.friction_n_m { at.torque_n_m.signum() } else { lag };
-            to.extend([lag, lag * load.abs(), flank]);
+            // The lag without load, the lag under the largest, and the flank: none of them is negative.
+            to.extend([lag * (1.0 - load.abs()), lag * load.abs(), flank]);
         }
         PartName::GeneratorAngle => waves(at.generator_rad, GENERATOR_ORDERS, to),
         PartName::MaterialAngle => waves(at.generator_rad - at.output_rad, GENERATOR_ORDERS, to),

@@ -88,7 +88,7 @@ impl Delay {
         if folds.left_out(&all, &chosen) > without * (1.0 - LEAST_GAIN) {
             return None;
         }
-        let model = Model { coefficients: folds.coefficients(&chosen)?, chosen, scales: recorded.scales };
+        let model = Model { coefficients: folds.coefficients(&chosen, &[])?, chosen, scales: recorded.scales };
         let of = model.of(PartName::ReadingDelay)?;
         // The column is the speed over its scale.
         let s_of_arcsec = 1.0 / ARCSEC_PER_RAD / recorded.scales.speed_rad_s;

@@ -350,7 +350,7 @@ fn a_sum_over_folds_is_the_fit_to_the_rows() {
     let folds = Folds::new(&rows, &[PartName::GeneratorAngle], &scales, 1, false);
     assert_eq!(path(&folds, &folds.all())[1][0].part, PartName::GeneratorAngle);
     let chosen = [Chosen { part: PartName::GeneratorAngle, penalty: 1e-9 }];
-    let fitted = folds.fit(&folds.all(), &chosen).unwrap();
+    let fitted = folds.fit(&folds.all(), &chosen, &[]).unwrap();
     assert!((fitted[0] - 3.0).abs() < 1e-4 && (fitted[1] - 7.0).abs() < 1e-4, "{fitted:?}");
     assert!(folds.left_out(&folds.all(), &chosen) < 1e-4);
     // Without the part its sine is left, about a zero that others found.

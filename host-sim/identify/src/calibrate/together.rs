@@ -122,7 +122,7 @@ pub(super) fn generators_turned(
     let (mut turned, mut rows) = (vec![0.0; files.len()], rows.clone());
     for _ in 0..TURNS {
         let folds = rows.folds_of(parts, &model.scales);
-        let coefficients = folds.coefficients(&chosen)?;
+        let coefficients = folds.coefficients(&chosen, &[])?;
         let fitted = Model { chosen: chosen.clone(), coefficients, scales: model.scales };
         let by = angles_off(&rows, &fitted, prior, files.len());
         turned.iter_mut().zip(&by).for_each(|(turned, by)| *turned += by);
