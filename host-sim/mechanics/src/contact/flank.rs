@@ -192,6 +192,8 @@ pub struct SlipPoint {
     pub slip_by_output: f64,
     /// Change of the force that resists the slip, of one sign or the other, over that of the gap (N/mm per mm).
     pub stiffness: f64,
+    /// How much the face gives way at all points of the pair as this gap closes by itself (mm/mm); 0 where it is even.
+    pub gives_way: f64,
 }
 
 /// Displacements and output angle at which contact is evaluated.
@@ -818,14 +820,17 @@ impl<'a> FlankContact<'a> {
                     row[index[j]] += kn * g[i] * g[j] + kt * s[i] * s[j];
                 }
             }
-            if stick == 0.0 && friction != 0.0 {
+            // Where the face is uneven, points that stick move it back as well.
+            let slips = stick == 0.0 && friction != 0.0;
+            if slips || (uneven.is_some() && law.friction > 0.0) {
                 out.slipping.push(SlipPoint {
                     index,
                     gap: g,
                     gap_by_output: g_output,
                     slip: s,
                     slip_by_output: s_output,
-                    stiffness: -friction / pressure * kn,
+                    stiffness: if slips { -friction / pressure * kn } else { 0.0 },
+                    gives_way: if uneven.is_some() { kn } else { 0.0 },
                 });
             }
             out.load += normal_load;
@@ -845,7 +850,8 @@ impl<'a> FlankContact<'a> {
             }
         }
         if let (Some(out), Some(bearing), Some(uneven)) = (&mut out, bearing, uneven) {
-            uneven.soften(out, bearing.softness);
+            let factor = uneven.soften(out, bearing.softness);
+            out.slipping.iter_mut().for_each(|point| point.gives_way *= factor);
             out.peak *= bearing.peak_over_mean;
             out.along_face = Some(AlongFace {
                 peak_over_mean: bearing.peak_over_mean,
@@ -883,11 +889,12 @@ impl MeanBearing {
         self.stiffness += stiffness;
     }
 
-    /// A mean load that grows by q moves the flank back by `softness * q`: one spring in series with all points.
-    fn soften(&self, out: &mut PairContribution, softness: f64) {
+    /// A mean load that grows by q moves the flank back by `softness * q`: one spring in series with all points. By how
+    /// much it moves back for what the gaps alone would add to the load (mm²/N).
+    fn soften(&self, out: &mut PairContribution, softness: f64) -> f64 {
         let factor = softness / (1.0 + softness * self.stiffness);
         if factor == 0.0 {
-            return;
+            return factor;
         }
         let n = self.by_node.len();
         for (i, a) in self.by_node.iter().enumerate().filter(|(_, a)| **a != 0.0) {
@@ -897,6 +904,7 @@ impl MeanBearing {
             }
         }
         out.corner -= factor * self.by_output * self.by_output;
+        factor
     }
 }
 

@@ -576,7 +576,7 @@ impl<'p> Solver<'p> {
         near.evaluate(&self.flanks, at, flank_law, |pair, contact| {
             let cs_node = |n: usize| self.cs_index[n].expect("flank nodes are free") as usize;
             let nodes: Vec<usize> = self.flanks.fs_nodes(pair).chain(self.flanks.cs_nodes(pair).map(cs_node)).collect();
-            contact.slipping.iter().for_each(|point| slipping.add(point, |i| 2 * nodes[i / 2] + i % 2));
+            slipping.add(&contact.slipping, |i| 2 * nodes[i / 2] + i % 2);
             let column = self.border.column_mut(OUTPUT);
             for (a, node) in nodes.iter().enumerate() {
                 for k in 0..2 {

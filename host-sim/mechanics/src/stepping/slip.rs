@@ -32,33 +32,46 @@ pub(super) struct NodalField {
     pub border: [f64; BORDERS],
 }
 
-/// Points that slip.
+/// Points that slip, pair by pair; of a pair whose face is uneven all that bear.
 #[derive(Default)]
 pub(super) struct Slipping {
     points: Vec<SlipPoint>,
+    /// How many each pair has.
+    of_pairs: Vec<usize>,
 }
 
 impl Slipping {
     pub fn clear(&mut self) {
         self.points.clear();
+        self.of_pairs.clear();
     }
 
     pub fn is_empty(&self) -> bool {
         self.points.is_empty()
     }
 
-    /// Adds a point whose local unknowns are numbered by `unknown`.
-    pub fn add(&mut self, point: &SlipPoint, unknown: impl Fn(usize) -> usize) {
-        self.points.push(SlipPoint { index: point.index.map(unknown), ..*point });
+    /// Adds the points of a pair whose local unknowns are numbered by `unknown`.
+    pub fn add(&mut self, points: &[SlipPoint], unknown: impl Fn(usize) -> usize) {
+        self.points.extend(points.iter().map(|point| SlipPoint { index: point.index.map(&unknown), ..*point }));
+        self.of_pairs.push(points.len());
     }
 
-    /// G x: how the gaps change.
+    /// G x: how the gaps change, less what an uneven face gives way.
     fn gaps(&self, x: &NodalField) -> Vec<f64> {
         let gap = |p: &SlipPoint| {
             let nodes: f64 = p.index.iter().zip(&p.gap).map(|(i, g)| g * x.free[*i]).sum();
             nodes + p.gap_by_output * x.border[OUTPUT]
         };
-        self.points.iter().map(gap).collect()
+        let mut gaps: Vec<f64> = self.points.iter().map(gap).collect();
+        let mut first = 0;
+        for count in &self.of_pairs {
+            let of_pair = first..first + count;
+            let later: f64 =
+                self.points[of_pair.clone()].iter().zip(&gaps[of_pair.clone()]).map(|(p, y)| p.gives_way * y).sum();
+            gaps[of_pair].iter_mut().for_each(|y| *y -= later);
+            first += count;
+        }
+        gaps
     }
 
     /// S D y, times a factor, added to forces.
@@ -179,7 +192,7 @@ mod tests {
             let mut point = SlipPoint { index: [0; 12], gap: [0.0; 12], slip: [0.0; 12], ..SlipPoint::default() };
             point.index[1] = 1;
             (point.gap[0], point.slip[1], point.stiffness) = (gap, slip, 2.0);
-            slipping.add(&point, |i| i);
+            slipping.add(&[point], |i| i);
         };
         unit(1.0, 0.7);
         unit(-0.5, 0.2);
@@ -196,5 +209,20 @@ mod tests {
             let off = left.free[k] - springs[k] * x.free[k];
             assert!(off.abs() < 1e-2, "unknown {k}: {off}");
         }
+    }
+
+    /// Points of an uneven face move back together; those of another pair stay.
+    #[test]
+    fn a_face_that_gives_way_takes_it_from_the_gaps_of_its_pair() {
+        let unit = |gives_way: f64| {
+            let mut point = SlipPoint { gives_way, ..SlipPoint::default() };
+            point.gap[0] = 1.0;
+            point
+        };
+        let mut slipping = Slipping::default();
+        slipping.add(&[unit(0.3), unit(0.2)], |i| i);
+        slipping.add(&[unit(0.0)], |i| i);
+        let gaps = slipping.gaps(&NodalField { free: vec![2.0; 12], border: [0.0; BORDERS] });
+        assert_eq!(gaps, [1.0, 1.0, 2.0]);
     }
 }
