@@ -19,7 +19,7 @@ pub struct SparseCholesky {
 
 impl SparseCholesky {
     /// Right-hand sides of one solve, at most.
-    pub const MOST_COLUMNS: usize = 8;
+    pub(crate) const MOST_COLUMNS: usize = 8;
 
     /// Orders and analyses the pattern; the factor itself comes from [`SparseCholesky::factorise`].
     ///

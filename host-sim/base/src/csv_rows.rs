@@ -101,7 +101,8 @@ impl<R: Read> CsvRows<R> {
     }
 
     /// Line of the header, from 1.
-    pub fn header_line(&self) -> u64 {
+    #[cfg(test)]
+    fn header_line(&self) -> u64 {
         self.header_line
     }
 
@@ -124,7 +125,7 @@ impl<R: Read> CsvRows<R> {
     }
 
     /// A column that is nearly called `name`.
-    pub fn like(&self, name: &str) -> Option<&str> {
+    pub(crate) fn like(&self, name: &str) -> Option<&str> {
         likeliest(name, self.header.iter().map(String::as_str))
     }
 

@@ -22,7 +22,7 @@ enum CupSeries {
 }
 
 /// What the catalogue prints of a size and ratio: none of a series, size or ratio that is not at hand.
-pub fn sheet(series: &str, size: f64, ratio: u32) -> Option<Stated> {
+pub(crate) fn sheet(series: &str, size: f64, ratio: u32) -> Option<Stated> {
     let which = match series.to_ascii_uppercase().as_str() {
         "CSF" => CupSeries::Csf,
         "CSG" => CupSeries::Csg,

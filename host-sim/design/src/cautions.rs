@@ -149,14 +149,14 @@ pub fn add_stress(cautions: &mut Vec<Caution>, stress: &[PlaceStress]) {
 
 /// Least gap between the rigid teeth of the drawing over a mesh cycle, µm; negative where they interfere. Missing where
 /// they never meet.
-pub fn rigid_gap_um(drive: &Drive, kind: GeneratorKind) -> Option<f64> {
+pub(crate) fn rigid_gap_um(drive: &Drive, kind: GeneratorKind) -> Option<f64> {
     let least = RigidMesh::new(drive, kind).ok()?.least()?;
     Some(1e3 * least.gap_mm)
 }
 
 /// What rigid teeth leave the output of a drive as built to turn at the tightest place of its turn, arcsec; negative
 /// where they bind. Missing of a drive that is as drawn: [`rigid_gap_um`] says all of it.
-pub fn room_as_built_arcsec(drive: &Drive, kind: GeneratorKind) -> Option<f64> {
+pub(crate) fn room_as_built_arcsec(drive: &Drive, kind: GeneratorKind) -> Option<f64> {
     drive.as_built.first_not_uniform()?;
     let room = RigidMesh::new(drive, kind).ok()?.room_as_built(drive, kind)?;
     Some(room.least_rad * ARCSEC_PER_RAD)

@@ -37,7 +37,7 @@ const STEPS: u32 = 4;
 const STARTING_STEPS: usize = 6;
 
 /// Every key of `[data_sheet]`.
-pub const KEYS: [&str; 14] = [
+pub(crate) const KEYS: [&str; 14] = [
     "source",
     "rated_torque_n_m",
     "t1_n_m",
@@ -174,7 +174,7 @@ impl Stated {
     }
 
     /// The loads of the sheet; what it does not say is in the usual proportion to what it says, or to `rated_n_m`.
-    pub fn loads(&self, rated_n_m: f64) -> Loads {
+    pub(crate) fn loads(&self, rated_n_m: f64) -> Loads {
         let usual = Loads::up_to(1.0);
         let by_t2 = self.t2_n_m.map(|t2| t2 / usual.t2_n_m);
         let by_t1 = self.t1_n_m.map(|t1| t1 / usual.t1_n_m);

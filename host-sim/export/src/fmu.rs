@@ -92,12 +92,6 @@ impl Fmu {
         &self.resources
     }
 
-    /// `modelDescription.xml`.
-    #[must_use]
-    pub fn description(&self) -> &str {
-        &self.description
-    }
-
     /// Writes it as a zip, the same bytes from the same parts.
     ///
     /// # Errors

@@ -104,42 +104,9 @@ causes! {
     Ratcheting = "ratcheting",
 }
 
-/// What kind of thing a cause is: the file of its law, and its place in lists.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Family {
-    /// Shape and place of the wheels and the generator.
-    Geometry,
-    /// What the torque does: springs and clearance.
-    Stiffness,
-    /// What the temperature does.
-    Thermal,
-    /// What moves the load.
-    Dynamic,
-    /// What the sensors do.
-    Sensor,
-}
-
-impl Family {
-    /// Every family.
-    pub const ALL: [Family; 5] =
-        [Family::Geometry, Family::Stiffness, Family::Thermal, Family::Dynamic, Family::Sensor];
-
-    /// As a heading.
-    #[must_use]
-    pub const fn words(self) -> &'static str {
-        match self {
-            Family::Geometry => "shape and place of the wheels and the generator",
-            Family::Stiffness => "springs and clearance",
-            Family::Thermal => "temperature and lubricant",
-            Family::Dynamic => "gravity and inertia",
-            Family::Sensor => "sensors and ratio",
-        }
-    }
-}
-
 /// What the misfit of a law may be taken for: most of all another law of its kin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kin {
+pub(crate) enum Kin {
     /// Shape and place of wheels and generator: waves of the generator angle.
     Shape,
     /// Follows the torque: springs.
@@ -161,7 +128,7 @@ pub enum Kin {
 impl Kin {
     /// Whether what one is wrong by may look like the other.
     #[must_use]
-    pub fn like(self, other: Kin) -> bool {
+    pub(crate) fn like(self, other: Kin) -> bool {
         match (self, other) {
             (_, Kin::Pulse) | (Kin::Pulse, Kin::Shape) => true,
             (Kin::Unlike, _) | (_, Kin::Unlike) => false,
@@ -227,7 +194,7 @@ impl Need {
 
     /// What would have to be recorded, or given; nothing that a new recording brings about at will.
     #[must_use]
-    pub const fn remedy(self) -> Option<&'static str> {
+    pub(crate) const fn remedy(self) -> Option<&'static str> {
         match self {
             Need::Teeth => Some("give the numbers of teeth in the nominal model"),
             Need::Turns => Some("record a dozen generator turns or more in one piece"),
@@ -277,7 +244,7 @@ pub enum Multiple {
 
 /// Whether a table can hold a cause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum InTable {
+pub(crate) enum InTable {
     /// It can.
     Yes,
     /// It can where the drive stays at one angle against gravity.
@@ -288,7 +255,7 @@ pub enum InTable {
 
 /// The field of a drive file that holds a cause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DriveField {
+pub(crate) enum DriveField {
     /// Eccentricity of the circular spline.
     CircularSplineEccentricity,
     /// Runout of the flexspline.
@@ -468,43 +435,9 @@ impl CauseName {
         }
     }
 
-    /// Its family.
-    #[must_use]
-    pub const fn family(self) -> Family {
-        match self {
-            CauseName::CircularSplineEccentricity
-            | CauseName::FlexsplineRunout
-            | CauseName::CircularSplineOvality
-            | CauseName::FlexsplinePitchError
-            | CauseName::CircularSplinePitchError
-            | CauseName::GeneratorEccentricity
-            | CauseName::CamFormError
-            | CauseName::DamagedTooth
-            | CauseName::GravitySideLoad => Family::Geometry,
-            CauseName::BacklashGrowth
-            | CauseName::Wear
-            | CauseName::StiffnessHardening
-            | CauseName::StiffnessError
-            | CauseName::TorsionalHysteresis
-            | CauseName::CrackedToothRoot
-            | CauseName::Ratcheting => Family::Stiffness,
-            CauseName::ThermalClearance | CauseName::ThermalStiffness | CauseName::LubricantViscosity => {
-                Family::Thermal
-            }
-            CauseName::GravityTorque | CauseName::TorsionalResonance => Family::Dynamic,
-            CauseName::OutputEncoderEccentricity
-            | CauseName::GeneratorEncoderEccentricity
-            | CauseName::OutputEncoderTilt
-            | CauseName::GeneratorEncoderTilt
-            | CauseName::EncoderSubdivision
-            | CauseName::SensorLatency
-            | CauseName::RatioError => Family::Sensor,
-        }
-    }
-
     /// What its misfit may be taken for.
     #[must_use]
-    pub const fn kin(self) -> Kin {
+    pub(crate) const fn kin(self) -> Kin {
         match self {
             CauseName::CircularSplineEccentricity
             | CauseName::FlexsplineRunout
@@ -538,7 +471,7 @@ impl CauseName {
 
     /// What data have to hold to speak of it.
     #[must_use]
-    pub const fn needs(self) -> &'static [Need] {
+    pub(crate) const fn needs(self) -> &'static [Need] {
         match self {
             CauseName::CircularSplineEccentricity
             | CauseName::FlexsplineRunout
@@ -617,14 +550,14 @@ impl CauseName {
     /// Whether something that is no cause of the library makes just the same, whatever is recorded: a shaft that is
     /// bent or misaligned before the encoder of the output, two waves in a turn like an encoder that is tilted.
     #[must_use]
-    pub const fn has_a_double_outside(self) -> bool {
+    pub(crate) const fn has_a_double_outside(self) -> bool {
         matches!(self, CauseName::OutputEncoderTilt)
     }
 
     /// Whether a load on the output makes much the same: an error that goes with the speed, the direction or the angle
     /// of the output.
     #[must_use]
-    pub const fn is_made_by_loads(self) -> bool {
+    pub(crate) const fn is_made_by_loads(self) -> bool {
         matches!(
             self,
             CauseName::SensorLatency
@@ -639,11 +572,11 @@ impl CauseName {
     }
 
     /// Why a table holds no error of the output's encoder.
-    pub const OF_THE_OUTPUT_ENCODER: &'static str = "the output's encoder is wrong here, not the joint";
+    pub(crate) const OF_THE_OUTPUT_ENCODER: &'static str = "the output's encoder is wrong here, not the joint";
 
     /// Whether a table can hold it.
     #[must_use]
-    pub const fn in_table(self) -> InTable {
+    pub(crate) const fn in_table(self) -> InTable {
         match self {
             CauseName::CircularSplineEccentricity
             | CauseName::FlexsplineRunout
@@ -683,7 +616,7 @@ impl CauseName {
 
     /// Why no table holds it, whatever the drive, if none does.
     #[must_use]
-    pub const fn no_place_in_a_table(self) -> Option<&'static str> {
+    pub(crate) const fn no_place_in_a_table(self) -> Option<&'static str> {
         match self.in_table() {
             InTable::No(why) => Some(why),
             InTable::Yes | InTable::AtOneOrientation => None,
@@ -692,7 +625,7 @@ impl CauseName {
 
     /// The field of a drive file that holds it, if one does.
     #[must_use]
-    pub const fn drive_field(self) -> Option<DriveField> {
+    pub(crate) const fn drive_field(self) -> Option<DriveField> {
         match self {
             CauseName::CircularSplineEccentricity => Some(DriveField::CircularSplineEccentricity),
             CauseName::FlexsplineRunout => Some(DriveField::FlexsplineRunout),
@@ -726,7 +659,7 @@ impl CauseName {
 
     /// Its parameters as they may be given, under the names that the diagnosis reports.
     #[must_use]
-    pub const fn parameters(self) -> &'static [Parameter] {
+    pub(crate) const fn parameters(self) -> &'static [Parameter] {
         use ParameterName as Name;
         match self {
             CauseName::CircularSplineEccentricity => {
@@ -949,7 +882,7 @@ impl CauseName {
 
     /// Two parameters that say the same, and the factor from the first to the second.
     #[must_use]
-    pub const fn twins(self) -> &'static [(ParameterName, ParameterName, Factor)] {
+    pub(crate) const fn twins(self) -> &'static [(ParameterName, ParameterName, Factor)] {
         use ParameterName as Name;
         match self {
             CauseName::CircularSplineEccentricity | CauseName::FlexsplineRunout | CauseName::GravitySideLoad => {

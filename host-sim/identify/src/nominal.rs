@@ -53,7 +53,7 @@ impl Teeth {
     ///
     /// # Errors
     /// No pair of wheels has these teeth.
-    pub fn core_drive(self) -> Result<flexspline::Drive, flexspline::DriveError> {
+    pub(crate) fn core_drive(self) -> Result<flexspline::Drive, flexspline::DriveError> {
         let fixed = match self.fixed {
             Fixed::Flexspline => FixedMember::Flexspline,
             Fixed::CircularSpline => FixedMember::CircularSpline,
@@ -63,8 +63,8 @@ impl Teeth {
     }
 
     /// Of the wheel that is the output.
-    #[must_use]
-    pub const fn of_output(self) -> u32 {
+    #[cfg(test)]
+    pub(crate) const fn of_output(self) -> u32 {
         match self.fixed {
             Fixed::Flexspline => self.circular_spline,
             Fixed::CircularSpline => self.flexspline,

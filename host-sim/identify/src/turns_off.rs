@@ -53,7 +53,7 @@ impl TurnsOff {
 /// Looks for the turn at which the table leaves least of the rows; `None` if that is the one in which they stand, or is
 /// not clear.
 #[must_use]
-pub fn turns_off(table: &Table<'_>, rows: &[MeasuredRow]) -> Option<TurnsOff> {
+pub(crate) fn turns_off(table: &Table<'_>, rows: &[MeasuredRow]) -> Option<TurnsOff> {
     let some: Vec<&MeasuredRow> = rows.iter().step_by(rows.len().div_ceil(LOOKED_AT).max(1)).collect();
     let left = |turns: i64| {
         let mut play = PlayState::unknown();

@@ -2,7 +2,7 @@
 
 /// Sums of the normal equations: a tridiagonal matrix, closed to a ring where the lookup wraps.
 #[derive(Debug, Clone)]
-pub struct Hats {
+pub(crate) struct Hats {
     from: f64,
     step: f64,
     ring: bool,
@@ -40,7 +40,7 @@ impl Hats {
     }
 
     /// The values at the nodes.
-    pub fn solve(&self) -> Vec<f64> {
+    pub(crate) fn solve(&self) -> Vec<f64> {
         let nodes = self.rows.len();
         let mean = self.rows.iter().map(|row| row[0]).sum::<f64>() / nodes as f64;
         let mut diagonal: Vec<f64> = self.rows.iter().map(|row| row[0] + RIDGE * mean).collect();

@@ -132,7 +132,7 @@ const AT_A_FRAME: f64 = 1e-6;
 
 /// A run that is watched for a pitch of steady motion: where its rows pass all frames one after the other, they are an
 /// animation.
-pub struct Passing {
+pub(crate) struct Passing {
     uniform: bool,
     taken: Option<Taken>,
     sleeve: Option<Result<Option<SleeveView>, MeshError>>,
@@ -383,7 +383,7 @@ fn round_up(x: f64) -> f64 {
 
 impl WheelMotion {
     /// Edges of sector 0 that belong to one element alone: start, middle, end, each as in [`WheelMotion::elements`].
-    pub fn outline(&self) -> Vec<[(usize, usize); 3]> {
+    pub(crate) fn outline(&self) -> Vec<[(usize, usize); 3]> {
         // An edge between two sectors appears once in sector 0 and once, a sector on, in its neighbour.
         let key = |a: (usize, usize), b: (usize, usize)| {
             let least = a.1.min(b.1);
@@ -417,7 +417,7 @@ impl WheelMotion {
 
 impl Animation {
     /// Its arrays for a page; names begin with the name of the generator.
-    pub fn pack(&self) -> Vec<Packed> {
+    pub(crate) fn pack(&self) -> Vec<Packed> {
         let kind = self.kind;
         let mut packed = self.flexspline.pack(&format!("{kind}.flexspline"), self.colour_end_mpa);
         packed.extend(self.circular_spline.pack(&format!("{kind}.circular-spline"), self.colour_end_mpa));

@@ -373,7 +373,7 @@ impl Axis {
     }
 
     /// This axis, linear within `within` of zero and logarithmic beyond.
-    pub fn stretched(self, within: f64) -> Axis {
+    pub(crate) fn stretched(self, within: f64) -> Axis {
         Axis { stretched: Some(within), ..self }
     }
 

@@ -7,7 +7,7 @@ use flexspline_mechanics::stepping::{Problem, SolveError, SolverSettings};
 
 /// What is to be computed of drives, and how.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Conditions {
+pub(crate) struct Conditions {
     /// The generator.
     pub kind: GeneratorKind,
     /// Temperature, °C.
@@ -22,7 +22,11 @@ pub struct Conditions {
 pub(crate) const FEM_FIGURES: [&str; 2] = ["fem_places_pp_arcsec", "fem_places_rms_arcsec"];
 
 /// Error of a drive deformed afresh at each generator angle and loaded: peak to peak and root mean square, arcsec.
-pub fn figures(drive: &Drive, at: Conditions, angles_rad: impl Iterator<Item = f64>) -> Result<[f64; 2], SolveError> {
+pub(crate) fn figures(
+    drive: &Drive,
+    at: Conditions,
+    angles_rad: impl Iterator<Item = f64>,
+) -> Result<[f64; 2], SolveError> {
     let problem = Problem::new(drive, at.kind, at.temperature_c, at.solver)?;
     let errors = angles_rad
         .map(|angle| {

@@ -14,14 +14,14 @@ const HALF_STEP: f64 = 1.0 / (1 << 25) as f64;
 
 /// A source of drives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Draw {
+pub(crate) struct Draw {
     seed: u32,
     key: u64,
 }
 
 /// What was drawn, in the order of the tolerances.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Drawn {
+pub(crate) struct Drawn {
     /// Value of the field; of errors of teeth their root mean square.
     pub values: Vec<f64>,
     /// Direction or phase, degrees; 0 where there is none.
@@ -49,7 +49,7 @@ impl DrawnPoint {
 
 impl Draw {
     /// The drives of a plan.
-    pub fn of_plan(hash: &[u8; 32]) -> Draw {
+    pub(crate) fn of_plan(hash: &[u8; 32]) -> Draw {
         Draw::stream(hash, 0)
     }
 

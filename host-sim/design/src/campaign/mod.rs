@@ -22,9 +22,7 @@ mod shard;
 mod tolerance;
 mod variance;
 
-pub use by_fem::Conditions;
-
-pub use draw::{Draw, Drawn};
+pub(crate) use draw::Drawn;
 pub use flexspline_base::statistics::{Exceeded, Interval, Quantile};
 pub use model::{FIGURES, Model, Parabola, Response};
 pub use plan::{OfOne, Plan, PlanError, PlanProgress, PlanSettings, plan};
@@ -34,7 +32,6 @@ pub use reduce::{
 };
 pub use shard::{Became, Shard, ShardError, ShardState, look, run_shard};
 pub use tolerance::{Distribution, EXAMPLE, Law, TeethError, Tolerance, ToleranceActs, Tolerances};
-pub use variance::Share;
 
 #[cfg(test)]
 mod tests;

@@ -56,7 +56,7 @@ pub(crate) const CLOSED: &str = "play_closed_percent";
 pub(crate) const SHEET: [&str; 6] =
     ["backlash_arcsec", "k1_n_m_per_rad", "k2_n_m_per_rad", "k3_n_m_per_rad", "wind_up_arcsec", "max_von_mises_mpa"];
 /// Samples of the wave over a tooth pitch.
-pub const WAVE: usize = 8;
+pub(crate) const WAVE: usize = 8;
 /// Numbers of the state of a drive that is alike everywhere: the wave under the load and under a light one, the sheet.
 pub(crate) const STATE: usize = 2 * WAVE + SHEET.len();
 /// Samples of a wheel's error over its pitch. Kernels have a multiple.
@@ -94,7 +94,7 @@ pub struct Parabola {
 
 impl Response {
     /// Whether its sizes are such that evaluation cannot fail.
-    pub fn fits(&self, tolerances: usize) -> bool {
+    pub(crate) fn fits(&self, tolerances: usize) -> bool {
         let all = self.parabolas.iter().flat_map(|p| [&p.below, &p.above]).chain([&self.middle]);
         all.into_iter().all(|list| list.len() == STATE) && self.parabolas.iter().all(|p| p.tolerance < tolerances)
     }
@@ -420,7 +420,7 @@ impl Model {
     }
 
     /// The figures of a drive, in the order of [`FIGURES`].
-    pub fn figures(&self, drawn: &Drawn) -> Vec<f64> {
+    pub(crate) fn figures(&self, drawn: &Drawn) -> Vec<f64> {
         let curves = self.curves(drawn);
         let errors: Vec<[f64; 4]> = self.places.iter().map(|place| self.errors(&curves, place)).collect();
         let loaded: Vec<f64> = errors.iter().map(|e| e[0]).collect();

@@ -349,7 +349,7 @@ impl Plan {
     }
 
     /// How drives are computed by FEM.
-    pub fn conditions(&self, generator: usize) -> Conditions {
+    pub(crate) fn conditions(&self, generator: usize) -> Conditions {
         let mesh = self.mesh.parse().unwrap_or(MeshLevel::Coarse);
         Conditions {
             kind: self.generators[generator].kernels.generator,

@@ -309,7 +309,7 @@ fn decode(plan: &Plan, hash: &[u8; 32], shard: u32, file: File) -> Result<ShardS
 }
 
 /// Files in the folder of shards that are none of this plan's.
-pub fn strangers(plan: &Plan, folder: &Path) -> Vec<PathBuf> {
+pub(crate) fn strangers(plan: &Plan, folder: &Path) -> Vec<PathBuf> {
     let Ok(entries) = fs::read_dir(folder.join("shards")) else { return Vec::new() };
     let known: Vec<PathBuf> = (0..plan.shards).map(|shard| path(folder, shard)).collect();
     let is_parquet = |path: &PathBuf| path.extension().is_some_and(|end| end == "parquet");

@@ -1,7 +1,7 @@
 use std::f64::consts::TAU;
 use std::fs;
 
-use super::draw::drawn;
+use super::draw::{Draw, drawn};
 use super::model::{STATE, WAVE};
 use super::reduce::comparison;
 use super::shard::path;

@@ -64,7 +64,7 @@ pub struct Tolerance {
 
 impl Tolerance {
     /// Its columns in a shard: what was drawn, and the phase.
-    pub fn columns(&self) -> impl Iterator<Item = String> {
+    pub(crate) fn columns(&self) -> impl Iterator<Item = String> {
         std::iter::once(self.name.clone()).chain(self.phase_column())
     }
 
@@ -152,7 +152,7 @@ impl Distribution {
     }
 
     /// The value that a share `u`, 0 to 1 and neither, lies below.
-    pub fn quantile(&self, u: f64) -> f64 {
+    pub(crate) fn quantile(&self, u: f64) -> f64 {
         let [low, high] = self.limits;
         let [least, most] = self.limits.map(|end| self.below(end));
         let share = least + u * (most - least);
@@ -188,7 +188,7 @@ impl Distribution {
 
     /// The same tolerance, half as wide: about the middle, and a size about nothing.
     #[must_use]
-    pub fn halved(&self) -> Distribution {
+    pub(crate) fn halved(&self) -> Distribution {
         let middle = match self.law {
             Law::Normal { mean, .. } => mean,
             Law::Uniform if self.limits[0] == 0.0 => 0.0,

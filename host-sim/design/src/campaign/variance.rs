@@ -26,7 +26,7 @@ pub struct Share {
 }
 
 /// Shares of each of some figures, in the order that `figures` gives them; `points` of every replicate.
-pub fn shares(
+pub(crate) fn shares(
     tolerances: &[Tolerance],
     teeth: [u32; 2],
     hash: &[u8; 32],

@@ -189,7 +189,7 @@ impl Kernels {
     /// Error (arcsec) for each µm that one tooth (or space) at `place_rad` from the major axis is displaced along the
     /// pitch.
     #[must_use]
-    pub fn displaced(&self, wheel: Wheel, place_rad: f64, torque_n_m: f64) -> f64 {
+    pub(crate) fn displaced(&self, wheel: Wheel, place_rad: f64, torque_n_m: f64) -> f64 {
         let at = |l: &LoadKernels, place: f64| self.at(&l.wheel(wheel).along, wheel, place);
         // Mirrored, place, displacement and error all change their sign.
         self.under(torque_n_m, |l| at(l, place_rad), |l| at(l, -place_rad))
@@ -403,7 +403,7 @@ mod kind_by_name {
     use super::GeneratorKind;
     use serde::{Deserialize, Deserializer, Serializer, de::Error};
 
-    pub fn serialize<S: Serializer>(kind: &GeneratorKind, to: S) -> Result<S::Ok, S::Error> {
+    pub(crate) fn serialize<S: Serializer>(kind: &GeneratorKind, to: S) -> Result<S::Ok, S::Error> {
         to.collect_str(kind)
     }
 

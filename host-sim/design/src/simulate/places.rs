@@ -44,7 +44,7 @@ pub enum Place {
 
 impl Place {
     /// All of them.
-    pub const ALL: [Place; 3] = [Place::RootFillet, Place::Bore, Place::Flank];
+    pub(crate) const ALL: [Place; 3] = [Place::RootFillet, Place::Bore, Place::Flank];
 
     /// As it is printed.
     pub fn in_words(self) -> &'static str {

@@ -153,7 +153,7 @@ impl TipContact {
     }
 
     /// The worst of some states: the one with the largest pressure on tips.
-    pub fn worst(all: impl Iterator<Item = TipContact>) -> Option<TipContact> {
+    pub(crate) fn worst(all: impl Iterator<Item = TipContact>) -> Option<TipContact> {
         all.max_by(|a, b| a.peak_mpa[0].total_cmp(&b.peak_mpa[0]))
     }
 

@@ -269,7 +269,7 @@ pub fn errors_of_making(fields: &[impl AsRef<str>]) -> Vec<usize> {
 }
 
 /// Told after every run: how many are done, of how many, and the last. May ask to stop.
-pub type Observer<'a> = dyn Fn(usize, usize, &StudyRun) -> ControlFlow<()> + Sync + 'a;
+pub(crate) type Observer<'a> = dyn Fn(usize, usize, &StudyRun) -> ControlFlow<()> + Sync + 'a;
 
 /// Runs every variant of `drive` with every generator. The result does not depend on threads.
 ///

@@ -19,7 +19,7 @@ const SWEEPS: usize = 2;
 const OWN_LENGTHS: usize = 8;
 
 /// A surface.
-pub struct Surface {
+pub(crate) struct Surface {
     points: Vec<Vec<f64>>,
     settings: SurfaceSettings,
     mean: f64,

@@ -77,11 +77,11 @@ pub struct SweepProgress {
 }
 
 /// Told of every increment, from any thread; may ask to stop.
-pub type Observer<'a> = dyn Fn(SweepProgress) -> ControlFlow<()> + Sync + 'a;
+pub(crate) type Observer<'a> = dyn Fn(SweepProgress) -> ControlFlow<()> + Sync + 'a;
 
 /// What solving took.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Work {
+pub(crate) struct Work {
     /// Increments solved by FEM.
     pub increments: usize,
     /// Newton iterations.
@@ -114,7 +114,7 @@ impl Work {
 
 /// Samples of a sweep and how they came about.
 #[derive(Debug, Clone)]
-pub struct Sweep {
+pub(crate) struct Sweep {
     /// Which generator.
     pub kind: GeneratorKind,
     /// Forward samples, computed, then backward samples, mirrored.
@@ -159,7 +159,7 @@ fn check_uniform(drive: &Drive) -> Result<(), SweepError> {
 
 /// Runs the sweep of one generator; torque of either sign is a chain of its own, from light to heavy. Nodes that are
 /// `known` are not computed again.
-pub fn sweep(
+pub(crate) fn sweep(
     drive: &Drive,
     kind: GeneratorKind,
     plan: &SweepPlan,
@@ -288,14 +288,14 @@ impl Computed {
 
 /// Points of one node that are there already.
 #[derive(Debug, Clone)]
-pub struct KnownNode {
+pub(crate) struct KnownNode {
     pub(crate) torque: f32,
     pub(crate) temperature: f32,
     pub(crate) points: Vec<Computed>,
 }
 
 /// Samples at one torque after the other, the drive moving on forward.
-pub struct SweepChain<'a> {
+pub(crate) struct SweepChain<'a> {
     plan: &'a SweepPlan,
     temperature_c: f64,
     observe: &'a Observer<'a>,

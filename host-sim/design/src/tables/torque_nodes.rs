@@ -28,7 +28,7 @@ pub struct NodeChoice {
 
 /// The nodes and what was computed to find them.
 #[derive(Debug, Clone)]
-pub struct ChosenNodes {
+pub(crate) struct ChosenNodes {
     /// Torque nodes, symmetric about zero, ascending, N m.
     pub torque_nodes_n_m: Vec<f32>,
     /// Points at these nodes.

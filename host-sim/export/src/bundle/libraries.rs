@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 use thiserror::Error;
 
 /// The C interface of the libraries.
-pub const HEADER: &str = include_str!("../../shipped/flexspline.h");
+pub(crate) const HEADER: &str = include_str!("../../shipped/flexspline.h");
 
 /// Targets of Rust that a bundle knows, and what they are.
 pub const TARGETS: [(&str, &str); 8] = [

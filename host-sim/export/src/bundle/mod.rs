@@ -22,7 +22,7 @@ use flexspline_mechanics::drive::GeneratorKind;
 use libraries::BundleLibrary;
 
 /// Version of what is bundled: that of the workspace.
-pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+pub(crate) const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// What tells a bundle from any other folder.
 pub const MANIFEST: &str = "manifest.json";
 /// Steps of each table in the vectors.

@@ -172,11 +172,6 @@ impl SleeveDeck {
         self.numbers.range((along, 0, 0)..(along + 1, 0, 0)).map(|(_, n)| *n).collect()
     }
 
-    /// Force on the first degree of freedom of `BAND`, N.
-    pub fn force_n(&self) -> f64 {
-        self.force_n
-    }
-
     /// Unknowns, before any is held.
     pub fn unknowns(&self) -> usize {
         3 * self.numbers.len()

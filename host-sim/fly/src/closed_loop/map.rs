@@ -12,7 +12,7 @@ use flexspline_mechanics::motion::Motion;
 use flexspline_mechanics::stepping::{Problem, SolveError, SolverSettings};
 
 /// Temperatures of the map, °C: the ends of the flight's; tables of HHD-95 have nodes at −60 and 80.
-pub const TEMPERATURES_C: [f64; 2] = [0.0, 40.0];
+pub(crate) const TEMPERATURES_C: [f64; 2] = [0.0, 40.0];
 /// Least flank torque that is solved for, N·m; below it the error runs on along the straight line through the first two
 /// nodes.
 const LEAST_N_M: f64 = 1e-3;

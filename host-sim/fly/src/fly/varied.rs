@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::{Flown, FlyError, Results, read, results};
 
 /// Fields of a scenario, each with the value it got.
-pub type Varied = Vec<(String, String)>;
+pub(crate) type Varied = Vec<(String, String)>;
 
 /// One of the flights.
 #[derive(Debug, Clone, Serialize)]

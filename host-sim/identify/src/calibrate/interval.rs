@@ -56,7 +56,7 @@ impl Information {
         self.square.iter_mut().zip(&other.square).for_each(|(a, b)| *a += b);
     }
 
-    pub fn rows(&self) -> f64 {
+    pub(crate) fn rows(&self) -> f64 {
         self.rows
     }
 
@@ -149,7 +149,7 @@ impl Noise {
     }
 
     /// Variance that stands for a row where many are fitted, arcsec².
-    pub fn of_a_row(&self) -> f64 {
+    pub(crate) fn of_a_row(&self) -> f64 {
         self.rms_arcsec * self.rms_arcsec * self.hangs_together
     }
 

@@ -42,7 +42,7 @@ use reading::{Delay, play_of_a_millisecond};
 pub use rows::MOST_ROWS;
 use rows::{FoldKind, Recorded, Rows, settled};
 use together::Agreement;
-pub use zero::{Alignment, OutputZero, ZeroCost, cost};
+pub(crate) use zero::{Alignment, OutputZero, ZeroCost, cost};
 
 /// The golden section: its multiples spread places over a turn and fold no order onto another.
 const GOLDEN: f64 = 0.618_033_988_749_895;

@@ -32,7 +32,7 @@ pub enum PartName {
 
 impl PartName {
     /// All that a table holds, in the order in which they are shown.
-    pub const ALL: [PartName; 7] = [
+    pub(crate) const ALL: [PartName; 7] = [
         PartName::WindUp,
         PartName::Play,
         PartName::GeneratorAngle,

@@ -88,7 +88,7 @@ impl<'a> Prior<'a> {
     ///
     /// # Errors
     /// No pair of wheels has this ratio.
-    pub fn core_drive(&self) -> Result<flexspline::Drive, String> {
+    pub(crate) fn core_drive(&self) -> Result<flexspline::Drive, String> {
         if let Some(table) = self.table {
             return Ok(*table.drive());
         }

@@ -98,7 +98,7 @@ impl Delay {
     }
 
     /// Logs with both angles as they are at one instant.
-    pub fn taken_out(self, files: &[Recording], ratio: f64) -> Vec<Recording> {
+    pub(crate) fn taken_out(self, files: &[Recording], ratio: f64) -> Vec<Recording> {
         let mut files = files.to_vec();
         for session in files.iter_mut().flat_map(|file| &mut file.sessions) {
             let speeds: Vec<f64> = (0..session.len()).map(|k| speed_rad_s(session, k, ratio)).collect();
@@ -112,7 +112,7 @@ impl Delay {
     }
 
     /// What it does to the rows of these logs, in which it is, beside this table.
-    pub fn shown(self, files: &[Recording], table: &Table<'_>, recorded: &Recorded) -> ReadingDelay {
+    pub(crate) fn shown(self, files: &[Recording], table: &Table<'_>, recorded: &Recorded) -> ReadingDelay {
         let ByCore { rms_before_arcsec, rms_after_arcsec, .. } = ByCore::of(files, table, recorded);
         ReadingDelay { delay_s: self.by_s, half_width_s: OF_95 * self.std_s, rms_before_arcsec, rms_after_arcsec }
     }
@@ -121,7 +121,7 @@ impl Delay {
 impl ReadingDelay {
     /// What is said of it.
     #[must_use]
-    pub fn note(&self) -> String {
+    pub(crate) fn note(&self) -> String {
         let (old, new) = if self.delay_s > 0.0 { ("output", "generator") } else { ("generator", "output") };
         format!(
             "in each row the {old} is {:.3} ± {:.3} ms older than the {new}: what that does goes with the speed, which \

@@ -139,12 +139,12 @@ impl Recorded {
     }
 
     /// Of some parts those that can be fitted to what was recorded.
-    pub fn shown(&self, parts: impl IntoIterator<Item = PartName>, prior: &Prior<'_>) -> Vec<PartName> {
+    pub(crate) fn shown(&self, parts: impl IntoIterator<Item = PartName>, prior: &Prior<'_>) -> Vec<PartName> {
         parts.into_iter().filter(|part| self.lacks(*part, prior).is_none()).collect()
     }
 
     /// Why a part cannot be fitted to what was recorded, if it cannot.
-    pub fn lacks(&self, part: PartName, prior: &Prior<'_>) -> Option<String> {
+    pub(crate) fn lacks(&self, part: PartName, prior: &Prior<'_>) -> Option<String> {
         let [low, high] = self.scales.torque_n_m;
         let [cold, warm] = self.scales.temperature_c;
         let turns_to_tell = super::turns_to_tell_wheels(prior.nominal.ratio);
@@ -312,7 +312,7 @@ impl Rows {
     }
 
     /// Sums over their folds.
-    pub fn folds_of(&self, parts: &[PartName], scales: &Scales) -> Folds {
+    pub(crate) fn folds_of(&self, parts: &[PartName], scales: &Scales) -> Folds {
         Folds::new(&self.rows, parts, scales, self.means_arcsec.len(), self.folds == FoldKind::Files)
     }
 
@@ -323,7 +323,7 @@ impl Rows {
 
     /// Without the rows of which the noise of the torque leaves open on which flank they lie, where loads from
     /// `friction_n_m` on decide it.
-    pub fn sure(mut self, friction_n_m: f64, recorded: &Recorded) -> Rows {
+    pub(crate) fn sure(mut self, friction_n_m: f64, recorded: &Recorded) -> Rows {
         let keep: Vec<bool> = self.rows.iter().map(|row| Self::is_sure(&row.at, friction_n_m, recorded)).collect();
         let mut kept = keep.iter();
         self.rows.retain(|_| *kept.next().unwrap_or(&true));

@@ -52,7 +52,7 @@ impl Agreement {
     }
 
     /// What is said where they do not.
-    pub fn note(&self, files: &[Recording]) -> Option<String> {
+    pub(crate) fn note(&self, files: &[Recording]) -> Option<String> {
         let odd = self.odd.and_then(|odd| files.get(odd));
         let odd = odd.map_or_else(String::new, |odd| format!(" in {}, without which the others agree", odd.file));
         (!self.agree()).then(|| {

@@ -18,7 +18,7 @@ const SLOW_SHARE: f64 = 0.98;
 
 /// Averages of so many neighbouring rows, with the nominal model over them.
 #[derive(Clone, Debug)]
-pub struct Averaged {
+pub(crate) struct Averaged {
     rows: Rows,
     base: Base,
     stride: usize,
@@ -57,19 +57,19 @@ impl Averaged {
 
     /// The excitation of the averages, with nothing that other causes change.
     #[must_use]
-    pub fn excitation<'a>(&'a self, on: &Excitation<'a>) -> Excitation<'a> {
+    pub(crate) fn excitation<'a>(&'a self, on: &Excitation<'a>) -> Excitation<'a> {
         Excitation { rows: &self.rows, base: &self.base, ..*on }
     }
 
     /// Rows to an average.
     #[must_use]
-    pub fn stride(&self) -> usize {
+    pub(crate) fn stride(&self) -> usize {
         self.stride
     }
 
     /// The averages that each group of rows consists of. Groups hold whole averages.
     #[must_use]
-    pub fn in_groups(&self, groups: &[Range<usize>]) -> Vec<Range<usize>> {
+    pub(crate) fn in_groups(&self, groups: &[Range<usize>]) -> Vec<Range<usize>> {
         let of = |group: &Range<usize>| {
             let session = self.firsts.partition_point(|(first, _)| *first <= group.start) - 1;
             let (row, average) = self.firsts[session];
@@ -80,7 +80,7 @@ impl Averaged {
 
     /// Means of a column of averages over groups of them.
     #[must_use]
-    pub fn means(&self, column: &[f64], groups: &[Range<usize>]) -> Vec<f64> {
+    pub(crate) fn means(&self, column: &[f64], groups: &[Range<usize>]) -> Vec<f64> {
         let of = |group: &Range<usize>| {
             if group.len() == 1 {
                 return column[group.start];
@@ -94,7 +94,7 @@ impl Averaged {
 
 /// What laws are evaluated on: smooth ones on averages, if there are any, all others on rows.
 #[derive(Clone, Debug, Default)]
-pub struct Grain {
+pub(crate) struct Grain {
     /// The averages, and those that each group of the whitener consists of.
     averaged: Option<(Arc<Averaged>, Vec<Range<usize>>)>,
 }
@@ -108,7 +108,7 @@ impl Grain {
 
     /// What a law is evaluated on.
     #[must_use]
-    pub fn excitation<'a>(&'a self, smooth: bool, on: &Excitation<'a>) -> Excitation<'a> {
+    pub(crate) fn excitation<'a>(&'a self, smooth: bool, on: &Excitation<'a>) -> Excitation<'a> {
         match &self.averaged {
             Some((averaged, _)) if smooth => averaged.excitation(on),
             _ => *on,
@@ -117,7 +117,7 @@ impl Grain {
 
     /// A column of a law, evaluated on what [`Grain::excitation`] gives, averaged over the groups of the whitener.
     #[must_use]
-    pub fn average(&self, smooth: bool, whitener: &Whitener, column: &[f64]) -> Vec<f64> {
+    pub(crate) fn average(&self, smooth: bool, whitener: &Whitener, column: &[f64]) -> Vec<f64> {
         match &self.averaged {
             Some((averaged, groups)) if smooth => averaged.means(column, groups),
             _ => whitener.average(column),

@@ -20,7 +20,7 @@ use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// How the flank changes where the torque is below friction.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum PlayLaw {
+pub(crate) enum PlayLaw {
     /// It stays as it was until the torque exceeds friction.
     Held,
     /// Friction holds the output until the generator pushes it.
@@ -33,7 +33,7 @@ pub enum PlayLaw {
 
 impl PlayLaw {
     /// All laws.
-    pub const ALL: [PlayLaw; 4] = [PlayLaw::Held, PlayLaw::Pushed, PlayLaw::Sign, PlayLaw::Smooth];
+    pub(crate) const ALL: [PlayLaw; 4] = [PlayLaw::Held, PlayLaw::Pushed, PlayLaw::Sign, PlayLaw::Smooth];
 
     /// Its name in a file.
     #[must_use]
@@ -48,7 +48,7 @@ impl PlayLaw {
 
     /// Which flank carries in each row, −1 to 1, under a torque.
     #[must_use]
-    pub fn flanks(self, rows: &Rows, torque: &[f64], nominal: &Nominal) -> Vec<f64> {
+    pub(crate) fn flanks(self, rows: &Rows, torque: &[f64], nominal: &Nominal) -> Vec<f64> {
         // Before the first load: where the friction of a moving output puts it.
         let begun = |first: usize| -rows.direction[first] * nominal.ratio.signum();
         self.flanks_from(begun, 1.0, rows, torque, nominal)
@@ -91,7 +91,7 @@ impl PlayLaw {
 
 /// A column that belongs to the nominal model and may float: coefficient 0 is nominal.
 #[derive(Clone, Debug)]
-pub struct Floating {
+pub(crate) struct Floating {
     /// What it is.
     pub name: String,
     /// Column, arcsec per unit of the coefficient.
@@ -104,7 +104,7 @@ type Pair = Arc<[Vec<f64>; 2]>;
 
 /// Cosines and sines of angles that many laws share, made when first asked for.
 #[derive(Clone, Debug, Default)]
-pub struct Waves(Arc<Mutex<HashMap<(i8, u64), Pair>>>);
+pub(crate) struct Waves(Arc<Mutex<HashMap<(i8, u64), Pair>>>);
 
 impl Waves {
     /// Cosine and sine of `order` times the angle called `which`.
@@ -122,7 +122,7 @@ impl Waves {
 
 /// Nominal prediction and tolerances.
 #[derive(Clone, Debug)]
-pub struct Base {
+pub(crate) struct Base {
     /// Prediction of the nominal model, arcsec.
     pub prediction: Vec<f64>,
     /// Which flank carries, −1 to 1.
@@ -175,7 +175,7 @@ impl Base {
 
     /// The base model with the law of the play known.
     #[must_use]
-    pub fn with_play(rows: &Rows, nominal: &Nominal, table: Option<&Table<'_>>, law: PlayLaw) -> Base {
+    pub(crate) fn with_play(rows: &Rows, nominal: &Nominal, table: Option<&Table<'_>>, law: PlayLaw) -> Base {
         Base::of_laws(rows, nominal, table, &[law])
     }
 

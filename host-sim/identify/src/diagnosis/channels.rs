@@ -442,7 +442,7 @@ const OFF: f64 = 2e-3;
 
 /// What the ratio may be meant to be, where it is off by `relative_error` (of the nominal output angle).
 #[must_use]
-pub fn proposed_ratio(nominal_ratio: f64, relative_error: f64) -> Option<RatioProposal> {
+pub(crate) fn proposed_ratio(nominal_ratio: f64, relative_error: f64) -> Option<RatioProposal> {
     let found = nominal_ratio / (1.0 + relative_error);
     let proposed = found.round();
     let other = proposed != nominal_ratio.round() && relative_error.abs() > OFF;

@@ -102,7 +102,7 @@ const ONE_SPEED: f64 = 1.5;
 
 /// What to record where no look-alike asks for a run: what the data lack, or the same again.
 #[must_use]
-pub fn anyhow(on: &Excitation<'_>, not_understood: bool) -> String {
+pub(crate) fn anyhow(on: &Excitation<'_>, not_understood: bool) -> String {
     let rows = on.rows;
     let speeds = |share: f64| quantile(rows.speed.iter().map(|speed| speed.abs()).filter(|speed| *speed > 0.0), share);
     let mut asked: Vec<&str> = Vec::new();
@@ -133,7 +133,7 @@ pub fn anyhow(on: &Excitation<'_>, not_understood: bool) -> String {
 /// What tells so many waves of the generator's encoder in a turn from those of a wheel or of the motor: half a period
 /// turns them over.
 #[must_use]
-pub fn turn_the_encoder(waves: f64) -> String {
+pub(crate) fn turn_the_encoder(waves: f64) -> String {
     format!(
         "the same run with the generator's encoder turned on its shaft by {:.1} degrees, or with another one: an \
          encoder's waves turn over with it, those of a wheel and of the motor stay",

@@ -86,7 +86,7 @@ impl<'a> Explanation<'a> {
 
     /// Why, in a sentence or two.
     #[must_use]
-    pub fn because(&self) -> String {
+    pub(crate) fn because(&self) -> String {
         if let Some(found) = self.named {
             let alike = if found.look_alikes.is_empty() { "" } else { "; these data do not tell it from others" };
             return format!("It is named, with a confidence of {:.0} %{alike}.", 100.0 * found.confidence);

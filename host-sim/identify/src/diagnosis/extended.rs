@@ -206,7 +206,7 @@ impl Extended {
     ///
     /// # Errors
     /// As [`super::diagnose`].
-    pub fn fit_to(
+    pub(crate) fn fit_to(
         sessions: &[Session],
         used: &[bool],
         nominal: &Nominal,
@@ -251,7 +251,7 @@ impl Extended {
     /// The model of the cause at `at` in [`Extended::causes`], fitted beside `nominal`, to be evaluated on other
     /// recordings.
     #[must_use]
-    pub fn fitted_law(&self, at: usize, nominal: &Nominal) -> Option<FittedLaw> {
+    pub(crate) fn fitted_law(&self, at: usize, nominal: &Nominal) -> Option<FittedLaw> {
         let cause = self.causes.get(at)?;
         Some(FittedLaw {
             variant: cause.law.variant.to_string(),

@@ -9,7 +9,7 @@ use super::select::{self, Selected};
 use super::trace::{Gate, Judged, Stage, Trace};
 
 /// Errors of prediction in blocks left out.
-pub struct Evaluated {
+pub(crate) struct Evaluated {
     /// All causes together.
     pub total: HeldOut,
     /// Share of the squared error before that each term removes.
@@ -36,7 +36,7 @@ pub fn evaluate(problem: &Problem<'_>, terms: &[&Term<'_>]) -> Evaluated {
 /// The terms that predict sessions they were not fitted to: while all together predict them worse than none, the one
 /// that harms most is set aside, as long as that helps and another is left. Also what was set aside.
 #[must_use]
-pub fn proved<'l>(
+pub(crate) fn proved<'l>(
     problem: &Problem<'_>,
     mut selected: Selected<'l>,
     trace: &mut Trace,
@@ -71,7 +71,7 @@ pub fn proved<'l>(
 
 /// Where the zero of a session left out comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Zero {
+pub(crate) enum Zero {
     /// It is that of the others.
     Shared,
     /// The bench sets it in each session: it is found in the session itself.

@@ -11,7 +11,7 @@ use pulp::{Arch, Simd, WithSimd};
 
 /// Symmetric products of columns, the data last.
 #[derive(Clone, Debug, Default)]
-pub struct Gram {
+pub(crate) struct Gram {
     /// Columns and the data.
     pub size: usize,
     /// Row by row.
@@ -114,7 +114,7 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
 /// Rows are taken in blocks that stay in the cache while all pairs meet, with the widest registers that the machine
 /// has.
 #[must_use]
-pub fn products(a: &[&[f64]], b: &[&[f64]], range: Range<usize>, lower: bool) -> Vec<f64> {
+pub(crate) fn products(a: &[&[f64]], b: &[&[f64]], range: Range<usize>, lower: bool) -> Vec<f64> {
     static ARCH: LazyLock<Arch> = LazyLock::new(Arch::new);
     let mut sums = vec![0.0; a.len() * b.len()];
     let mut from = range.start;
@@ -208,7 +208,7 @@ pub struct Prior {
 
 /// A solved problem.
 #[derive(Clone, Debug)]
-pub struct Solution {
+pub(crate) struct Solution {
     /// Coefficients.
     pub coefficients: Vec<f64>,
     /// Penalised misfit J.
@@ -226,7 +226,7 @@ pub struct Solution {
 impl Solution {
     /// Covariance of the coefficients, row by row.
     #[must_use]
-    pub fn covariance(&self) -> Vec<f64> {
+    pub(crate) fn covariance(&self) -> Vec<f64> {
         let n = self.scale.len();
         let mut covariance = vec![0.0; n * n];
         let mut unit = vec![0.0; n];
@@ -293,7 +293,7 @@ fn factor(mut a: Vec<f64>, n: usize) -> Option<Vec<f64>> {
 ///
 /// `None` if the products are not finite.
 #[must_use]
-pub fn solve(gram: &Gram, priors: &[Prior], worth: f64) -> Option<Solution> {
+pub(crate) fn solve(gram: &Gram, priors: &[Prior], worth: f64) -> Option<Solution> {
     let n = priors.len();
     debug_assert_eq!(gram.size, n + 1);
     // In units of the prior: diagonal at least 1, well scaled whatever the columns are.

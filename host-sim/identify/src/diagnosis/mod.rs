@@ -41,7 +41,7 @@ pub(crate) mod select;
 #[cfg(test)]
 mod tests;
 mod thinned;
-pub mod thresholds;
+pub(crate) mod thresholds;
 mod torque_zero;
 pub mod trace;
 mod uncertainty;
@@ -74,7 +74,7 @@ use resolution::{Resolution, resolution};
 use rows::Rows;
 use select::{Bests, Scope, Selected, fit, select};
 use thinned::{Sample, Thinned};
-pub use trace::{Gate, Judged, Stage, Step, Trace};
+pub(crate) use trace::{Gate, Judged, Stage, Trace};
 
 /// Why data cannot be diagnosed.
 #[derive(Debug, Error, PartialEq, Eq)]
@@ -176,7 +176,7 @@ pub fn diagnose(
 ///
 /// # Errors
 /// As [`diagnose`].
-pub fn diagnose_extended(
+pub(crate) fn diagnose_extended(
     sessions: &[Session],
     nominal: &Nominal,
     table: Option<&Table<'_>>,

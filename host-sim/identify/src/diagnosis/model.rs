@@ -17,7 +17,7 @@ use super::products::{Products, RowsMet, Set};
 use super::rows::{combined, rms};
 
 /// Data and nominal model, averaged and white.
-pub struct Problem<'a> {
+pub(crate) struct Problem<'a> {
     /// What laws are evaluated on.
     pub on: &'a Excitation<'a>,
     /// Rows whose flank is not known well.
@@ -90,13 +90,13 @@ impl<'a> Problem<'a> {
 
     /// Blocks of averages that are left out one at a time.
     #[must_use]
-    pub fn blocks(&self) -> &[Range<usize>] {
+    pub(crate) fn blocks(&self) -> &[Range<usize>] {
         &self.products.blocks
     }
 
     /// Products of base, terms, further columns and data.
     #[must_use]
-    pub fn gram(&self, terms: &[&Term<'_>], further: Option<&Set>, part: RowsMet) -> Gram {
+    pub(crate) fn gram(&self, terms: &[&Term<'_>], further: Option<&Set>, part: RowsMet) -> Gram {
         self.products.gram(&self.sets(terms, further), part)
     }
 
@@ -108,7 +108,7 @@ impl<'a> Problem<'a> {
 
     /// White columns of a model, the data last.
     #[must_use]
-    pub fn white_columns<'s>(&'s self, terms: &[&'s Term<'_>], further: Option<&'s Set>) -> Vec<&'s [f64]> {
+    pub(crate) fn white_columns<'s>(&'s self, terms: &[&'s Term<'_>], further: Option<&'s Set>) -> Vec<&'s [f64]> {
         self.sets(terms, further).into_iter().flat_map(|set| set.iter()).map(Vec::as_slice).collect()
     }
 
@@ -141,7 +141,7 @@ impl<'a> Problem<'a> {
 
     /// Root mean square over the averages without uncertain rows.
     #[must_use]
-    pub fn certain_rms(&self, averaged: &[f64]) -> f64 {
+    pub(crate) fn certain_rms(&self, averaged: &[f64]) -> f64 {
         let used: Vec<f64> = averaged.iter().zip(&self.certain).filter(|(_, c)| **c).map(|(v, _)| *v).collect();
         rms(&used)
     }
@@ -160,7 +160,7 @@ fn columns(law: &Law, extent: Extent, on: &Excitation<'_>, places: &[f64]) -> Ve
 
 /// Columns made white, and what their coefficients may be.
 #[derive(Clone, Debug)]
-pub struct White {
+pub(crate) struct White {
     /// Columns.
     columns: Set,
     /// What coefficients may be.
@@ -246,7 +246,7 @@ fn keep<T>(values: &mut Vec<T>, kept: &[bool]) {
 
 /// A law at given places of its shape parameters, with its columns.
 #[derive(Clone)]
-pub struct Term<'l> {
+pub(crate) struct Term<'l> {
     /// The law.
     pub law: &'l Law,
     /// Places of the shape parameters, 0 to 1.
@@ -305,13 +305,13 @@ impl<'l> Term<'l> {
 
     /// Coefficients of its columns by what the columns are.
     #[must_use]
-    pub fn by_role<'c>(&'c self, coefficients: &'c [f64]) -> Coefficients<'c> {
+    pub(crate) fn by_role<'c>(&'c self, coefficients: &'c [f64]) -> Coefficients<'c> {
         self.white.by_role(coefficients)
     }
 
     /// Only its main columns.
     #[must_use]
-    pub fn main_only(mut self) -> Term<'l> {
+    pub(crate) fn main_only(mut self) -> Term<'l> {
         self.averaged = Arc::new(kept(&self.averaged, &self.white.main()));
         self.white = self.white.main_only();
         self
@@ -325,7 +325,7 @@ impl<'l> Term<'l> {
 
     /// What the term adds to the error, averaged.
     #[must_use]
-    pub fn contribution(&self, coefficients: &[f64]) -> Vec<f64> {
+    pub(crate) fn contribution(&self, coefficients: &[f64]) -> Vec<f64> {
         let len = self.averaged.first().map_or(0, Vec::len);
         combined(len, self.averaged.iter().map(Vec::as_slice), coefficients)
     }
@@ -333,7 +333,7 @@ impl<'l> Term<'l> {
 
 /// Parameters of the nominal model are held within this many standard deviations between units: what is beyond is a
 /// discrepancy, however well the nominal model could follow it.
-pub const TOLERANCE: f64 = 3.3;
+pub(crate) const TOLERANCE: f64 = 3.3;
 /// Spread of a parameter that is held at its limit, in units of its tolerance.
 const HELD: f64 = 1e-3;
 
@@ -405,7 +405,7 @@ const STEPS: usize = 6;
 const MOVE: Prior = Prior { mean: 0.0, std: PLACE_SPREAD };
 
 /// Products of a fixed set of terms, to which others are added for a trial.
-pub struct Scaffold<'p, 'a, 't, 'l> {
+pub(crate) struct Scaffold<'p, 'a, 't, 'l> {
     problem: &'p Problem<'a>,
     terms: Vec<&'t Term<'l>>,
     gram: Gram,
@@ -417,13 +417,13 @@ pub struct Scaffold<'p, 'a, 't, 'l> {
 
 /// Terms of laws (index) at places of their shape parameters, each on what the others leave to it.
 #[must_use]
-pub fn terms_at<'l>(problem: &Problem<'_>, laws: &'l [Law], start: &[(usize, Vec<f64>)]) -> Vec<Term<'l>> {
+pub(crate) fn terms_at<'l>(problem: &Problem<'_>, laws: &'l [Law], start: &[(usize, Vec<f64>)]) -> Vec<Term<'l>> {
     among_each_other(problem, start.iter().map(|(k, p)| Term::new(problem, &laws[*k], p.clone())).collect())
 }
 
 /// The terms evaluated anew, each on what the others leave to it.
 #[must_use]
-pub fn among_each_other<'l>(problem: &Problem<'_>, mut terms: Vec<Term<'l>>) -> Vec<Term<'l>> {
+pub(crate) fn among_each_other<'l>(problem: &Problem<'_>, mut terms: Vec<Term<'l>>) -> Vec<Term<'l>> {
     let meet = |terms: &[Term<'l>]| terms.iter().any(|a| terms.iter().any(|b| a.law.acts_on(b.law)));
     // What acts on nothing here may still have been evaluated among what is no longer there.
     if !meet(&terms) && terms.iter().all(|t| t.among.is_none()) {
@@ -443,7 +443,7 @@ pub fn among_each_other<'l>(problem: &Problem<'_>, mut terms: Vec<Term<'l>>) -> 
 
 /// A solved set of terms.
 #[derive(Clone)]
-pub struct Fit {
+pub(crate) struct Fit {
     /// Coefficients, evidence, covariance.
     pub solution: Solution,
     /// Where each term's coefficients begin; base first.
@@ -514,20 +514,20 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     /// The solution with a law tried at some places: with its main columns alone, or where they mean nothing by
     /// themselves all of them.
     #[must_use]
-    pub fn trial(&self, law: &Law, places: &[f64]) -> Option<Solution> {
+    pub(crate) fn trial(&self, law: &Law, places: &[f64]) -> Option<Solution> {
         let extent = if law.search.whole { Extent::Whole } else { Extent::Bare };
         Some(self.fit_with(Some(&self.white(law, extent, places)), None)?.solution)
     }
 
     /// The solution with all columns of a law at some places.
     #[must_use]
-    pub fn whole_trial(&self, law: &Law, places: &[f64]) -> Option<Solution> {
+    pub(crate) fn whole_trial(&self, law: &Law, places: &[f64]) -> Option<Solution> {
         Some(self.fit_with(Some(&self.white(law, Extent::Whole, places)), None)?.solution)
     }
 
     /// Whether a law changes what some of the terms do, and they do not change it.
     #[must_use]
-    pub fn acted_on_by(&self, law: &Law) -> bool {
+    pub(crate) fn acted_on_by(&self, law: &Law) -> bool {
         self.terms.iter().any(|term| law.acts_on(term.law) && !law.meets(term.law))
     }
 
@@ -690,13 +690,13 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
 
     /// Moves the shape parameters of `term` to where the misfit is least, beside the terms of the scaffold.
     #[must_use]
-    pub fn refine<'n>(&self, term: Term<'n>) -> Option<(Term<'n>, Fit)> {
+    pub(crate) fn refine<'n>(&self, term: Term<'n>) -> Option<(Term<'n>, Fit)> {
         self.refine_towards(term, f64::NEG_INFINITY)
     }
 
     /// As [`Scaffold::refine`], but nothing where the first step shows that this evidence is out of reach.
     #[must_use]
-    pub fn refine_towards<'n>(&self, mut term: Term<'n>, least_evidence: f64) -> Option<(Term<'n>, Fit)> {
+    pub(crate) fn refine_towards<'n>(&self, mut term: Term<'n>, least_evidence: f64) -> Option<(Term<'n>, Fit)> {
         let mut fit = self.fit(Some(&term))?;
         if term.places.is_empty() {
             return Some((term, fit));
@@ -739,7 +739,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     /// The fit of the scaffold's terms with all their shape parameters free to first order: for uncertainties. Returns
     /// the fit, whose last coefficients are moves of the shape parameters, term after term.
     #[must_use]
-    pub fn linearised(&self) -> Option<(Fit, Set)> {
+    pub(crate) fn linearised(&self) -> Option<(Fit, Set)> {
         let fit = self.fit(None)?;
         let terms = self.terms.iter().enumerate();
         let moves = Set::new(terms.flat_map(|(k, term)| self.derivatives(term, fit.of(k))).collect());

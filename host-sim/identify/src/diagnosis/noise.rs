@@ -21,14 +21,14 @@ pub struct Noise {
 impl Noise {
     /// Both together, one standard deviation, arcsec.
     #[must_use]
-    pub fn floor(&self) -> f64 {
+    pub(crate) fn floor(&self) -> f64 {
         self.white.hypot(self.wander)
     }
 }
 
 /// Neighbouring rows averaged to one, and the averages made white.
 #[derive(Clone, Debug)]
-pub struct Whitener {
+pub(crate) struct Whitener {
     /// Averages: rows of each, none across sessions.
     groups: Vec<std::ops::Range<usize>>,
     /// Rows to an average; fewer at the end of a session.
@@ -108,7 +108,7 @@ impl Whitener {
 
     /// Blocks that are left out one at a time: sessions, or quarters of the data where there are fewer than three.
     #[must_use]
-    pub fn blocks(&self) -> Vec<std::ops::Range<usize>> {
+    pub(crate) fn blocks(&self) -> Vec<std::ops::Range<usize>> {
         let sessions = &self.sessions;
         if sessions.len() >= 3 {
             return sessions.clone();
@@ -126,13 +126,13 @@ impl Whitener {
 
     /// Rows of each average.
     #[must_use]
-    pub fn groups(&self) -> &[std::ops::Range<usize>] {
+    pub(crate) fn groups(&self) -> &[std::ops::Range<usize>] {
         &self.groups
     }
 
     /// Averages of a column.
     #[must_use]
-    pub fn average(&self, column: &[f64]) -> Vec<f64> {
+    pub(crate) fn average(&self, column: &[f64]) -> Vec<f64> {
         let mut means = Vec::with_capacity(self.groups.len());
         for session in self.sessions.iter().filter(|session| !session.is_empty()) {
             let rows = &column[self.groups[session.start].start..self.groups[session.end - 1].end];
@@ -150,19 +150,19 @@ impl Whitener {
 
     /// Whether averages take most of a column away.
     #[must_use]
-    pub fn hides(&self, column: &[f64]) -> bool {
+    pub(crate) fn hides(&self, column: &[f64]) -> bool {
         rms(&self.average(column)) < HIDDEN * rms(column)
     }
 
     /// Averages that no uncertain row is part of.
     #[must_use]
-    pub fn certain(&self, uncertain: &[bool]) -> Vec<bool> {
+    pub(crate) fn certain(&self, uncertain: &[bool]) -> Vec<bool> {
         self.groups.iter().map(|g| !uncertain[g.clone()].iter().any(|u| *u)).collect()
     }
 
     /// Values of averages back in the rows they are made of; 0 in rows of none.
     #[must_use]
-    pub fn in_rows(&self, averaged: &[f64], rows: usize) -> Vec<f64> {
+    pub(crate) fn in_rows(&self, averaged: &[f64], rows: usize) -> Vec<f64> {
         let mut values = vec![0.0; rows];
         for (group, value) in self.groups.iter().zip(averaged) {
             values[group.clone()].fill(*value);
@@ -172,7 +172,7 @@ impl Whitener {
 
     /// Innovations of averaged values, in units of their standard deviation.
     #[must_use]
-    pub fn whiten_averaged(&self, averaged: &[f64]) -> Vec<f64> {
+    pub(crate) fn whiten_averaged(&self, averaged: &[f64]) -> Vec<f64> {
         // Each session begins anew: nothing is kept past its last average.
         let mut expected = 0.0;
         let mut white = vec![0.0; averaged.len()];
@@ -186,7 +186,7 @@ impl Whitener {
     /// Innovations of several columns of averaged values. Each value waits for the one before it, so columns go side by
     /// side.
     #[must_use]
-    pub fn whiten_each(&self, averaged: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    pub(crate) fn whiten_each(&self, averaged: &[Vec<f64>]) -> Vec<Vec<f64>> {
         averaged.chunks(ABREAST).flat_map(|columns| self.whiten_abreast(columns)).collect()
     }
 
@@ -211,13 +211,13 @@ impl Whitener {
 
     /// Innovations of a column of rows.
     #[must_use]
-    pub fn whiten(&self, column: &[f64]) -> Vec<f64> {
+    pub(crate) fn whiten(&self, column: &[f64]) -> Vec<f64> {
         self.whiten_averaged(&self.average(column))
     }
 
     /// What the filter follows in averaged values: its estimate of the wander.
     #[must_use]
-    pub fn followed(&self, averaged: &[f64]) -> Vec<f64> {
+    pub(crate) fn followed(&self, averaged: &[f64]) -> Vec<f64> {
         let mut wander = vec![0.0; averaged.len()];
         for session in &self.sessions {
             let mut expected = 0.0;
@@ -232,7 +232,7 @@ impl Whitener {
 
     /// Sum of the logarithms of the innovations' standard deviations.
     #[must_use]
-    pub fn log_scale(&self) -> f64 {
+    pub(crate) fn log_scale(&self) -> f64 {
         self.scale.iter().map(|s| s.ln()).sum()
     }
 }
@@ -248,7 +248,7 @@ fn means_of<const N: usize>(values: &[f64], means: &mut Vec<f64>) {
 
 /// White noise of rows, arcsec: from second differences, which no slow process and no smooth model reaches.
 #[must_use]
-pub fn white_level(rows: &Rows, left: &[f64]) -> f64 {
+pub(crate) fn white_level(rows: &Rows, left: &[f64]) -> f64 {
     let mut differences = Vec::with_capacity(left.len());
     for session in rows.sessions_used() {
         for k in session.start + 2..session.end {

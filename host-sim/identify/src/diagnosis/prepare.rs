@@ -45,7 +45,7 @@ pub fn base(rows: &Rows, nominal: &Nominal, table: Option<&Table<'_>>) -> (Base,
 
 /// A change of the error to another level.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Jump {
+pub(crate) struct Jump {
     /// When it begins, has half its height, and is over, s.
     pub time_s: [f64; 3],
     /// Height, arcsec.
@@ -80,7 +80,7 @@ pub fn jumps(rows: &Rows, base: &Base, nominal: &Nominal) -> Vec<Jump> {
 
 /// How many pitches of either wheel a jump is, if it is a whole number of them.
 #[must_use]
-pub fn whole_pitches(nominal: &Nominal, height_arcsec: f64) -> Option<f64> {
+pub(crate) fn whole_pitches(nominal: &Nominal, height_arcsec: f64) -> Option<f64> {
     let teeth = nominal.teeth?;
     [teeth.circular_spline, teeth.flexspline].into_iter().find_map(|count| {
         let pitch = ARCSEC_PER_TURN / f64::from(count);
@@ -161,7 +161,7 @@ fn jumps_within(rows: &Rows, left: &[f64], turned_rad: f64, level_s: f64) -> Vec
 /// Rows whose flank is not known well, with what the causes chosen add to the load, and those in which the output
 /// `hung` in the clearance.
 #[must_use]
-pub fn uncertain(on: &Excitation<'_>, terms: &[Term<'_>], hung: &[bool]) -> Vec<bool> {
+pub(crate) fn uncertain(on: &Excitation<'_>, terms: &[Term<'_>], hung: &[bool]) -> Vec<bool> {
     let mut uncertain = on.base.uncertain.clone();
     // A jump passes over some rows, and the output swings out.
     for jump in &on.scales.jumps {
@@ -237,7 +237,7 @@ const MOST_SET_ASIDE: f64 = 0.5;
 /// Why the rows that count say nothing of the unit, if too few of them do. What was found in spite of that is the
 /// trouble itself, and stands as long as there are rows to judge it by.
 #[must_use]
-pub fn too_few_left(problem: &Problem<'_>, finding: Finding) -> Option<String> {
+pub(crate) fn too_few_left(problem: &Problem<'_>, finding: Finding) -> Option<String> {
     let rows = problem.on.rows;
     let used = rows.count_used();
     let left = rows.sessions_used().flatten().filter(|k| !problem.uncertain[*k]).count();
@@ -282,7 +282,7 @@ const NO_NOISE: f64 = 8.0;
 const RARE: f64 = 0.1;
 
 /// Everything that laws could explain, as free columns; of laws and rows alone, whatever is known of the noise.
-pub struct FreeColumns {
+pub(crate) struct FreeColumns {
     /// Averages of so many rows.
     stride: usize,
     /// Laws that they are of.
@@ -306,7 +306,7 @@ impl FreeColumns {
 
     /// Whether they are still those of the laws.
     #[must_use]
-    pub fn are_of(&self, laws: &[Law]) -> bool {
+    pub(crate) fn are_of(&self, laws: &[Law]) -> bool {
         self.laws == laws.len()
     }
 }

@@ -14,7 +14,7 @@ static SETS: AtomicU64 = AtomicU64::new(0);
 
 /// Columns that go together. A copy is the same set.
 #[derive(Clone, Debug)]
-pub struct Set {
+pub(crate) struct Set {
     id: u64,
     columns: Arc<Vec<Vec<f64>>>,
 }
@@ -54,7 +54,7 @@ impl Met {
 
 /// Which rows products are over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RowsMet {
+pub(crate) enum RowsMet {
     /// All of them.
     All,
     /// Those of one block.
@@ -71,7 +71,7 @@ struct MetPairs {
 }
 
 /// All that has met over the same rows.
-pub struct Products {
+pub(crate) struct Products {
     /// Blocks that all rows are made of.
     pub blocks: Vec<Range<usize>>,
     kept: RwLock<MetPairs>,
@@ -127,7 +127,7 @@ impl Products {
     }
 
     /// Products of all columns of `sets`, set after set; the last one is the data.
-    pub fn gram(&self, sets: &[&Set], part: RowsMet) -> Gram {
+    pub(crate) fn gram(&self, sets: &[&Set], part: RowsMet) -> Gram {
         let size = sets.iter().map(|set| set.len()).sum();
         let mut products = vec![0.0; size * size];
         let mut row = 0;
@@ -146,7 +146,7 @@ impl Products {
     }
 
     /// Products of each column of a new set with those of `sets`, set after set, and the others of its own.
-    pub fn meeting(&self, new: &Set, sets: &[&Set]) -> Vec<Vec<f64>> {
+    pub(crate) fn meeting(&self, new: &Set, sets: &[&Set]) -> Vec<Vec<f64>> {
         let width: usize = sets.iter().map(|set| set.len()).sum();
         let mut meeting = vec![vec![0.0; width + new.len()]; new.len()];
         let mut column = 0;

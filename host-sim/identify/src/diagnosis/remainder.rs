@@ -24,7 +24,7 @@ pub struct Line {
 
 /// What base and terms explain beside the nominal prediction, row by row, arcsec.
 #[must_use]
-pub fn explained(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<f64> {
+pub(crate) fn explained(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<f64> {
     let on = problem.on;
     let mut sum = vec![0.0; on.rows.len()];
     let mut take = |column: &[f64], c: f64| {
@@ -47,7 +47,7 @@ pub fn explained(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<f64> {
 
 /// Innovations of every row, in units of their standard deviation; 0 where the flank is uncertain.
 #[must_use]
-pub fn every_row(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Vec<f64> {
+pub(crate) fn every_row(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Vec<f64> {
     let on = problem.on;
     let explained = explained(problem, selected);
     let left: Vec<f64> = (0..on.rows.len()).map(|k| on.rows.error[k] - on.base.prediction[k] - explained[k]).collect();
@@ -64,7 +64,7 @@ pub fn every_row(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -
 /// Innovations are laid on an even grid of the angle (all sessions, both directions) or of time and transformed; a grid
 /// place that was visited often counts often, as in a periodogram at uneven places.
 #[must_use]
-pub fn lines(problem: &Problem<'_>, innovations: &[f64], highest_order: f64) -> Vec<Line> {
+pub(crate) fn lines(problem: &Problem<'_>, innovations: &[f64], highest_order: f64) -> Vec<Line> {
     let rows = problem.on.rows;
     let mut found = Vec::new();
     found.extend(
@@ -97,7 +97,7 @@ pub fn lines(problem: &Problem<'_>, innovations: &[f64], highest_order: f64) -> 
 
 /// Whether averaging the rows takes most of a line away.
 #[must_use]
-pub fn averaged_away(problem: &Problem<'_>, line: &Line) -> bool {
+pub(crate) fn averaged_away(problem: &Problem<'_>, line: &Line) -> bool {
     let rows = problem.on.rows;
     let angle: Vec<f64> = match line.per {
         Per::Second => rows.time.iter().map(|t| 2.0 * PI * line.order * t).collect(),
@@ -110,7 +110,7 @@ pub fn averaged_away(problem: &Problem<'_>, line: &Line) -> bool {
 
 /// What is left as a free function of what was measured, largest first.
 #[must_use]
-pub fn of_maps(problem: &Problem<'_>, selected: &Selected<'_>, maps: &[Law], white: f64) -> Vec<Unexplained> {
+pub(crate) fn of_maps(problem: &Problem<'_>, selected: &Selected<'_>, maps: &[Law], white: f64) -> Vec<Unexplained> {
     use rayon::prelude::*;
     let scaffold = Scaffold::new(problem, selected.terms.iter().collect());
     let mut found: Vec<Unexplained> = maps
@@ -137,7 +137,7 @@ pub fn of_maps(problem: &Problem<'_>, selected: &Selected<'_>, maps: &[Law], whi
 
 /// Slow motion that is too large for noise, or too orderly.
 #[must_use]
-pub fn beyond_noise(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Vec<Unexplained> {
+pub(crate) fn beyond_noise(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Vec<Unexplained> {
     let left = left(problem, selected);
     let wander = problem.whitener.followed(&left);
     let size = problem.certain_rms(&wander);
@@ -182,7 +182,7 @@ fn strongest(places: &[f64], values: &[f64], lowest: f64, highest: f64, cell: Op
 
 /// Power that a line of white noise reaches once in about 10⁵ spectra of so many rows.
 #[must_use]
-pub fn line_limit(rows: usize) -> f64 {
+pub(crate) fn line_limit(rows: usize) -> f64 {
     (rows as f64 * 4.0).ln() + 12.0
 }
 

@@ -19,7 +19,7 @@ const OUTLIER: f64 = 5.0;
 
 /// How finely the rows are looked at.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Resolution {
+pub(crate) struct Resolution {
     /// Rows to an average.
     pub stride: usize,
     /// What fast laws explain, row by row, arcsec; empty if none showed.
@@ -30,7 +30,7 @@ pub struct Resolution {
 /// hold. Rows marked uncertain are not looked at; `explained` is what is explained already, row by row, arcsec (nothing
 /// if it is empty).
 #[must_use]
-pub fn resolution(
+pub(crate) fn resolution(
     on: &Excitation<'_>,
     laws: &[Law],
     uncertain: &[bool],
@@ -57,7 +57,7 @@ pub fn resolution(
 
 /// Whether averages of `stride` rows hide any of these causes.
 #[must_use]
-pub fn averages_hide(
+pub(crate) fn averages_hide(
     on: &Excitation<'_>,
     laws: &[Law],
     causes: &[CauseName],

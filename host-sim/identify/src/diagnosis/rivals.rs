@@ -11,7 +11,7 @@ use crate::causes::CauseName;
 
 /// A rival in the place of a cause.
 #[derive(Clone, Debug)]
-pub struct Rival {
+pub(crate) struct Rival {
     /// Its name.
     pub cause: CauseName,
     /// Rise of the misfit, in units in which 25 is five standard deviations.
@@ -25,7 +25,7 @@ pub struct Rival {
 impl Rival {
     /// Whether a cause of this size holds against it: it is not told better by it, and is told apart from it.
     #[must_use]
-    pub fn judge(&self, size_arcsec: f64, out_of_tolerance: bool) -> Vec<Judged> {
+    pub(crate) fn judge(&self, size_arcsec: f64, out_of_tolerance: bool) -> Vec<Judged> {
         let least = if out_of_tolerance { OUT_OF_TOLERANCE_APART } else { TOLD_APART };
         vec![
             Judged::number(Gate::ToldBetter, self.misfit, TOLD_BETTER, !self.tells_better(size_arcsec)),
@@ -35,14 +35,14 @@ impl Rival {
 
     /// What it comes to in the place of a cause of this size.
     #[must_use]
-    pub fn in_its_place(&self, size_arcsec: f64) -> Vec<Judged> {
+    pub(crate) fn in_its_place(&self, size_arcsec: f64) -> Vec<Judged> {
         vec![Judged::number(Gate::AsRival, self.misfit, TOLD_BETTER, self.tells_better(size_arcsec))]
     }
 
     /// Whether it tells the data better than a cause of this size, and otherwise: not by telling what the laws of the
     /// other causes leave.
     #[must_use]
-    pub fn tells_better(&self, size_arcsec: f64) -> bool {
+    pub(crate) fn tells_better(&self, size_arcsec: f64) -> bool {
         !self.mops_up
             && self.misfit < TOLD_BETTER
             && self.apart_arcsec > SAME_ARCSEC.max(2.0 * SAME_SHARE * size_arcsec)
@@ -52,18 +52,18 @@ impl Rival {
     /// Whether the data cannot tell it from a cause of this size. With a base parameter `out_of_tolerance` any rival
     /// predicts the same, as the base takes its place: there the misfit alone decides, which has the tolerance in it.
     #[must_use]
-    pub fn looks_alike(&self, size_arcsec: f64, out_of_tolerance: bool) -> bool {
+    pub(crate) fn looks_alike(&self, size_arcsec: f64, out_of_tolerance: bool) -> bool {
         let same = self.apart_arcsec < SAME_ARCSEC.max(SAME_SHARE * size_arcsec);
         self.misfit < if out_of_tolerance { OUT_OF_TOLERANCE_APART } else { TOLD_APART } || (same && !out_of_tolerance)
     }
 }
 
 /// A sample of the rows on which rivals are looked at first, and its share of all rows.
-pub type OnSample<'p, 'a> = Option<(&'p Problem<'a>, f64)>;
+pub(crate) type OnSample<'p, 'a> = Option<(&'p Problem<'a>, f64)>;
 
 /// Rivals of term `k`, closest first. With a sample only those that are near there are refitted to all rows.
 #[must_use]
-pub fn rivals(
+pub(crate) fn rivals(
     problem: &Problem<'_>,
     sample: OnSample<'_, '_>,
     laws: &[Law],

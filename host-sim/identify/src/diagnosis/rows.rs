@@ -152,7 +152,7 @@ impl Rows {
 
     /// Learns from these sessions alone, as far as they have rows enough.
     #[must_use]
-    pub fn learning_from(mut self, used: &[bool]) -> Rows {
+    pub(crate) fn learning_from(mut self, used: &[bool]) -> Rows {
         for (k, session) in self.used.iter_mut().enumerate() {
             *session &= used.get(k).copied().unwrap_or(false);
         }
@@ -190,14 +190,14 @@ impl Rows {
     }
 
     /// Sessions that are learnt from.
-    pub fn sessions_used(&self) -> impl Iterator<Item = Range<usize>> + '_ {
+    pub(crate) fn sessions_used(&self) -> impl Iterator<Item = Range<usize>> + '_ {
         self.sessions.iter().zip(&self.used).filter(|(_, used)| **used).map(|(session, _)| session.clone())
     }
 
     /// Highest order per turn of the generator of which half of the rows that move see a period or more in two: beyond,
     /// a wave is on these rows what one of a lower order is, or a constant.
     #[must_use]
-    pub fn highest_order(&self) -> f64 {
+    pub(crate) fn highest_order(&self) -> f64 {
         let steps = self.sessions_used().flat_map(|session| {
             self.generator[session].windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect::<Vec<f64>>()
         });
@@ -206,7 +206,7 @@ impl Rows {
 
     /// Rows that are learnt from.
     #[must_use]
-    pub fn count_used(&self) -> usize {
+    pub(crate) fn count_used(&self) -> usize {
         self.sessions_used().map(|session| session.len()).sum()
     }
 
@@ -258,13 +258,13 @@ impl Rows {
 
     /// Noise of all rows together, root mean square, against that of a row of mean worth.
     #[must_use]
-    pub fn loudness_rms(&self) -> f64 {
+    pub(crate) fn loudness_rms(&self) -> f64 {
         if self.jitters { rms(&self.loudness) } else { 1.0 }
     }
 
     /// A high percentile of the torque's magnitude, N·m: the scale of the load.
     #[must_use]
-    pub fn load_scale(&self) -> f64 {
+    pub(crate) fn load_scale(&self) -> f64 {
         quantile(self.torque.iter().map(|t| t.abs()), 0.98)
     }
 }

@@ -32,7 +32,7 @@ const REFINED_AGAIN: usize = 4;
 
 /// A selection and its fit.
 #[derive(Clone)]
-pub struct Selected<'l> {
+pub(crate) struct Selected<'l> {
     /// Terms.
     pub terms: Vec<Term<'l>>,
     /// Their fit.
@@ -76,7 +76,7 @@ impl<'l> Selected<'l> {
 
 /// How a term stands in a selection.
 #[derive(Clone, Debug)]
-pub struct Standing {
+pub(crate) struct Standing {
     /// Gain of evidence over the selection without it.
     pub evidence: f64,
     /// Root mean square of what it adds, arcsec; for what is there at times only, the larger of that and 0.4 of its 97
@@ -168,7 +168,7 @@ pub(super) fn begun(law: &Law, mut tried: Vec<(f64, Vec<f64>)>) -> Vec<Vec<f64>>
 
 /// Which laws a search tries, and where.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scope {
+pub(crate) enum Scope {
     /// All of them, wherever they may begin.
     Everything,
     /// Those that came close on a sample of the rows, from where they were there.
@@ -177,7 +177,7 @@ pub enum Scope {
 
 /// What a search has found out about laws, whether it chose them or not.
 #[derive(Default)]
-pub struct Bests {
+pub(crate) struct Bests {
     /// Where they were at their best, each time that they were tried at all places.
     tried: HashMap<u64, Vec<Vec<f64>>>,
     /// Where those came to that were refined and came close, the latest first.
@@ -325,7 +325,7 @@ fn best_tried<'l>(
 
 /// What each term adds that the others cannot, and what it is worth on sessions left out.
 #[must_use]
-pub fn standings(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<Standing> {
+pub(crate) fn standings(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<Standing> {
     (0..selected.terms.len()).map(|k| standing(problem, selected, k)).collect()
 }
 
@@ -446,7 +446,7 @@ fn may_be_tried(problem: &Problem<'_>, fit: &Fit, law: &Law) -> bool {
 
 /// Least size of anything that counts, arcsec, at this white noise.
 #[must_use]
-pub fn least_size(white: f64) -> f64 {
+pub(crate) fn least_size(white: f64) -> f64 {
     LEAST_ARCSEC.max(LEAST_OF_NOISE * white)
 }
 
@@ -488,7 +488,7 @@ fn strongest(terms: &[Term<'_>], standings: &[Standing]) -> f64 {
 /// Chooses causes among `laws`.
 #[must_use]
 #[allow(clippy::too_many_arguments, reason = "all that a search remembers")]
-pub fn select<'l>(
+pub(crate) fn select<'l>(
     problem: &Problem<'_>,
     laws: &'l [Law],
     white: f64,

@@ -22,7 +22,7 @@ const STRETCH: usize = 96;
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// The sample, with the nominal model over it.
-pub struct Thinned {
+pub(crate) struct Thinned {
     rows: Rows,
     base: Base,
     /// Rows taken.
@@ -67,13 +67,13 @@ impl Thinned {
 
     /// The excitation of the sample, with nothing that other causes change.
     #[must_use]
-    pub fn excitation<'a>(&'a self, on: &Excitation<'a>) -> Excitation<'a> {
+    pub(crate) fn excitation<'a>(&'a self, on: &Excitation<'a>) -> Excitation<'a> {
         Excitation { rows: &self.rows, base: &self.base, ..*on }
     }
 }
 
 /// The sample as models are fitted to it.
-pub struct Sample<'a> {
+pub(crate) struct Sample<'a> {
     on: Excitation<'a>,
     uncertain: Vec<bool>,
     stride: usize,

@@ -288,7 +288,7 @@ impl Judged {
 
 /// Whether all gates let it through.
 #[must_use]
-pub fn passed(gates: &[Judged]) -> bool {
+pub(crate) fn passed(gates: &[Judged]) -> bool {
     gates.iter().all(|judged| judged.passed)
 }
 
@@ -349,7 +349,7 @@ impl fmt::Display for Step {
 
 /// What else a search comes upon, for who listens.
 #[derive(Clone, Debug)]
-pub enum Found<'a> {
+pub(crate) enum Found<'a> {
     /// Noise, and the information weight of the rows under it.
     Noise(Noise, f64),
     /// A line that no law had yet, of this size, arcsec.
@@ -501,7 +501,7 @@ impl Serialize for Entry<'_> {
 }
 
 /// Decisions as they stand in files: gate by gate.
-pub struct Entries<'a>(pub Vec<&'a Step>);
+pub(crate) struct Entries<'a>(pub Vec<&'a Step>);
 
 impl Serialize for Entries<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {

@@ -42,7 +42,7 @@ pub(super) struct WithSpeed {
 impl WithSpeed {
     /// By how many standard deviations the amplitude grows, negative where it fades; 0 where it changes by less than
     /// laws hold to.
-    pub fn grows_by(&self) -> f64 {
+    pub(crate) fn grows_by(&self) -> f64 {
         let [slow, fast] = self.amplitudes;
         let clear = slow.max(fast) > CLEARLY * slow.min(fast);
         if clear { (fast - slow) / self.stds[0].hypot(self.stds[1]).max(1e-30) } else { 0.0 }

@@ -68,7 +68,7 @@ impl Evaluation {
     ///
     /// # Errors
     /// The reason.
-    pub fn worth_writing(&self) -> Result<(), String> {
+    pub(crate) fn worth_writing(&self) -> Result<(), String> {
         if self.applied.is_empty() {
             return Err("no cause found has a place in a table".to_owned());
         }

@@ -39,7 +39,7 @@ const LARGEST_UM: f64 = 100.0;
 
 /// A cause that is in the drive.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Mapped {
+pub(crate) struct Mapped {
     /// The cause.
     pub cause: CauseName,
     /// The fields it set, `path = value`.
@@ -50,7 +50,7 @@ pub struct Mapped {
 
 /// A drive with the causes that are geometry, and the rest.
 #[derive(Clone, Debug)]
-pub struct FoundGeometry {
+pub(crate) struct FoundGeometry {
     /// The drive.
     pub drive: Drive,
     /// What is in it.
@@ -156,7 +156,7 @@ fn degrees(phase: f64) -> f64 {
 ///
 /// # Errors
 /// The drive that comes of it is none: sizes that do not fit.
-pub fn found_geometry(
+pub(crate) fn found_geometry(
     drive: &Drive,
     extended: &Extended,
     causes: &[CauseEntry],
@@ -399,7 +399,7 @@ const PITCHES_APART: u32 = 23;
 ///
 /// # Errors
 /// No convergence.
-pub fn check_by_fem(
+pub(crate) fn check_by_fem(
     (before, after): (&Drive, &FoundGeometry),
     kind: GeneratorKind,
     settings: SolverSettings,

@@ -16,6 +16,6 @@ mod sampled;
 pub use compensation::{
     Compensated, Evaluation, EvaluationError, LEAST_SHARE_IMPROVED, NotApplied, Remake, evaluate, left_by_core, split,
 };
-pub use geometry::{Agreement, FoundGeometry, Mapped, check_by_fem, found_geometry};
+pub(crate) use geometry::{Agreement, FoundGeometry, check_by_fem, found_geometry};
 pub use model::{CauseEntry, Model, causes_in, causes_to_toml};
-pub use sampled::{ExtendedTables, TableSubject};
+pub(crate) use sampled::{ExtendedTables, TableSubject};

@@ -78,7 +78,7 @@ impl Model {
 
     /// The nominal model recalibrated, with the causes of a diagnosis as they were fitted.
     #[must_use]
-    pub fn of_diagnosis(nominal: &Nominal, diagnosis: &Diagnosis, fitted: &Extended) -> Model {
+    pub(crate) fn of_diagnosis(nominal: &Nominal, diagnosis: &Diagnosis, fitted: &Extended) -> Model {
         let causes = diagnosis.causes.iter().map(|cause| CauseEntry::of(cause).fitted_by(fitted, nominal)).collect();
         let change = |name: &str| diagnosis.recalibrated.get(name).map_or(0.0, |p| p.value);
         let mut nominal = nominal.clone();
@@ -109,7 +109,7 @@ impl Model {
     ///
     /// # Errors
     /// A parameter that does not fit the sessions.
-    pub fn added_arcsec(&self, sessions: &[Session], sizes: Sizes) -> Result<Vec<Vec<f64>>, String> {
+    pub(crate) fn added_arcsec(&self, sessions: &[Session], sizes: Sizes) -> Result<Vec<Vec<f64>>, String> {
         let fitted: Vec<(CauseName, &FittedLaw)> =
             self.causes.iter().filter_map(|cause| Some((cause.name, cause.fit.as_ref()?))).collect();
         let by_fit = added_by(&fitted, sessions, &self.nominal);
@@ -336,14 +336,14 @@ impl CauseEntry {
 
     /// The cause with the model that was fitted to it, beside a nominal model.
     #[must_use]
-    pub fn fitted_by(self, extended: &Extended, nominal: &Nominal) -> CauseEntry {
+    pub(crate) fn fitted_by(self, extended: &Extended, nominal: &Nominal) -> CauseEntry {
         let at = extended.causes().iter().position(|cause| cause.name() == self.name);
         CauseEntry { fit: at.and_then(|at| extended.fitted_law(at, nominal)), ..self }
     }
 
     /// A cause as it was fitted.
     #[must_use]
-    pub fn of_fitted(cause: &FittedCause) -> CauseEntry {
+    pub(crate) fn of_fitted(cause: &FittedCause) -> CauseEntry {
         CauseEntry {
             name: cause.name(),
             parameters: cause.parameters.iter().map(|(name, p)| ((*name).to_owned(), p.value)).collect(),

@@ -99,7 +99,7 @@ pub struct ExtendedTables<'a> {
 impl ExtendedTables<'_> {
     /// Why a cause is not in a table of this drive, if it is not; `found` in data, if it was.
     #[must_use]
-    pub fn left_out(&self, cause: CauseName, found: Option<&FittedCause>) -> Option<&'static str> {
+    pub(crate) fn left_out(&self, cause: CauseName, found: Option<&FittedCause>) -> Option<&'static str> {
         let at_output = |found: &FittedCause| {
             found.parameters.get(ParameterName::Encoder.as_str()).is_some_and(|encoder| encoder.value == 1.0)
         };
@@ -126,7 +126,7 @@ impl ExtendedTables<'_> {
     ///
     /// # Errors
     /// The samples make no table.
-    pub fn extended(&self, extended: &Extended) -> Result<MadeTable, TableError> {
+    pub(crate) fn extended(&self, extended: &Extended) -> Result<MadeTable, TableError> {
         self.make(extended, true)
     }
 

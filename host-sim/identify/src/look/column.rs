@@ -60,7 +60,7 @@ impl Facts {
     }
 
     /// Whether it keeps one value.
-    pub fn constant(&self) -> bool {
+    pub(crate) fn constant(&self) -> bool {
         self.most <= self.least
     }
 }

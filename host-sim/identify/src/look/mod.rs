@@ -21,7 +21,7 @@ use crate::measurement::raw::RawFile;
 use crate::measurement::stamps;
 use crate::measurement::{SESSION_GAP_PERIODS, Unit, median_of, sampled};
 use column::{Facts, unwrapped};
-pub use coverage::Coverage;
+pub(crate) use coverage::Coverage;
 use pair::pair;
 pub use picture::text;
 use relation::torque_says;

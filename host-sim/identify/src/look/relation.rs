@@ -96,7 +96,7 @@ pub(super) struct TorqueSays {
 
 impl TorqueSays {
     /// Whether the sign can be told.
-    pub fn tells(&self) -> bool {
+    pub(crate) fn tells(&self) -> bool {
         self.share > TELLS
     }
 }

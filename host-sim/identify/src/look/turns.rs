@@ -147,7 +147,7 @@ impl Units {
     }
 
     /// Whether it is as likely as another reading, for all that the file says.
-    pub fn rivals(&self, other: &Units) -> bool {
+    pub(crate) fn rivals(&self, other: &Units) -> bool {
         self.level() == other.level() && [self.generator, self.output].iter().any(|reading| reading.by == By::Ratio)
     }
 }

@@ -5,7 +5,7 @@ use super::{Recording, Session};
 
 impl Recording {
     /// Averages neighbouring rows where there are more than `most`, and says so in the notes; sessions stay apart.
-    pub fn average_to(&mut self, most: usize) {
+    pub(crate) fn average_to(&mut self, most: usize) {
         let rows: usize = self.sessions.iter().map(Session::len).sum();
         let together = rows.div_ceil(most.max(1));
         if together <= 1 {

@@ -32,7 +32,7 @@ pub enum Quantity {
 
 impl Quantity {
     /// All of them.
-    pub const ALL: [Quantity; 7] = [
+    pub(crate) const ALL: [Quantity; 7] = [
         Quantity::Time,
         Quantity::Generator,
         Quantity::Output,
@@ -56,7 +56,7 @@ impl Quantity {
     }
 
     /// The column it has in a file without a mapping, and the unit there.
-    pub fn default_column(self) -> (&'static str, Unit) {
+    pub(crate) fn default_column(self) -> (&'static str, Unit) {
         match self {
             Quantity::Time => ("time_s", Unit::Second),
             Quantity::Generator => ("generator_rad", Unit::Radian),
@@ -69,7 +69,7 @@ impl Quantity {
     }
 
     /// The units it may have.
-    pub fn units(self) -> &'static [Unit] {
+    pub(crate) fn units(self) -> &'static [Unit] {
         match self {
             Quantity::Time => &Unit::OF_TIME,
             Quantity::Torque => &Unit::OF_TORQUE,
@@ -120,7 +120,7 @@ struct Given {
 
 /// A column in use.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Column {
+pub(crate) struct Column {
     /// What it holds.
     pub quantity: Quantity,
     /// Its name in the header.

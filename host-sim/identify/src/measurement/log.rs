@@ -58,27 +58,27 @@ impl Log {
     }
 
     /// The output angle, or the error where that was recorded.
-    pub fn output_or_error(&self) -> Quantity {
+    pub(crate) fn output_or_error(&self) -> Quantity {
         if self.columns[Quantity::Output as usize].is_some() { Quantity::Output } else { Quantity::Error }
     }
 
     /// Time of a row, s.
-    pub fn time_at(&self, row: usize) -> Option<f64> {
+    pub(crate) fn time_at(&self, row: usize) -> Option<f64> {
         self.get(Quantity::Time).map(|time| time[row]).filter(|time| time.is_finite())
     }
 
     /// Session of a row.
-    pub fn session_at(&self, row: usize) -> u32 {
+    pub(crate) fn session_at(&self, row: usize) -> u32 {
         self.session.get(row).copied().unwrap_or(0)
     }
 
     /// Whether a row goes on where the one before it ended.
-    pub fn continues(&self, row: usize) -> bool {
+    pub(crate) fn continues(&self, row: usize) -> bool {
         row > 0 && self.session_at(row) == self.session_at(row - 1)
     }
 
     /// Leaves out the rows for which `drop` is true.
-    pub fn leave_out(&mut self, drop: &[bool]) {
+    pub(crate) fn leave_out(&mut self, drop: &[bool]) {
         fn thin<T>(values: &mut Vec<T>, drop: &[bool]) {
             let mut row = 0;
             values.retain(|_| {

@@ -24,8 +24,7 @@ use std::path::Path;
 
 pub use columns::{ColumnMap, MappingError, Quantity, Reading, Unit};
 pub use fault::{Fault, FaultName, Measures, ToothStep, Treatment};
-pub use faults::clock::SESSION_GAP_PERIODS;
-pub use flexspline_base::csv_rows::{CsvRows, NotANumber, Row, TableProblem};
+pub(crate) use faults::clock::SESSION_GAP_PERIODS;
 pub use flexspline_base::robust::{
     MAD_TO_STD, least_and_most, median_and_std, median_of, quantile_of, sampled, white_noise,
 };

@@ -71,7 +71,7 @@ impl Unit {
     }
 
     /// Units of angle that one may take for another, the largest name first that a slip of the pen takes for another.
-    pub const ANGLES: [Unit; 5] = [Unit::Radian, Unit::Degree, Unit::Turn, Unit::Arcminute, Unit::Arcsecond];
+    pub(crate) const ANGLES: [Unit; 5] = [Unit::Radian, Unit::Degree, Unit::Turn, Unit::Arcminute, Unit::Arcsecond];
 
     /// Units of angle of a column.
     pub(super) const OF_ANGLES: [Unit; 7] =
@@ -137,7 +137,7 @@ impl Unit {
 
     /// One of it in the unit used inside: rad, s, N·m, °C. Of a count, an ampere and a volt what the gain makes of it:
     /// turns, N·m.
-    pub fn factor(self) -> f64 {
+    pub(crate) fn factor(self) -> f64 {
         use std::f64::consts::TAU;
         match self {
             Unit::Degree => TAU / 360.0,
@@ -168,7 +168,7 @@ impl Unit {
     }
 
     /// Its zero in the unit used inside.
-    pub fn zero(self) -> f64 {
+    pub(crate) fn zero(self) -> f64 {
         match self {
             Unit::Kelvin => -273.15,
             Unit::Fahrenheit => -160.0 / 9.0,
@@ -178,7 +178,7 @@ impl Unit {
 
     /// A unit as it stands in a line of units, with or without brackets.
     #[must_use]
-    pub fn in_brackets(field: &str) -> Option<Unit> {
+    pub(crate) fn in_brackets(field: &str) -> Option<Unit> {
         Unit::written(super::reader::unit_word(field))
     }
 
@@ -190,25 +190,25 @@ impl Unit {
 
     /// Whether it is one of angle.
     #[must_use]
-    pub fn is_of_angles(self) -> bool {
+    pub(crate) fn is_of_angles(self) -> bool {
         Unit::OF_ANGLES.contains(&self)
     }
 
     /// Whether it is one of time.
     #[must_use]
-    pub fn is_of_time(self) -> bool {
+    pub(crate) fn is_of_time(self) -> bool {
         Unit::OF_TIME.contains(&self)
     }
 
     /// Whether it is one of torque, or of what is proportional to it.
     #[must_use]
-    pub fn is_of_torque(self) -> bool {
+    pub(crate) fn is_of_torque(self) -> bool {
         Unit::OF_TORQUE.contains(&self)
     }
 
     /// Whether it is one of temperature.
     #[must_use]
-    pub fn is_of_temperature(self) -> bool {
+    pub(crate) fn is_of_temperature(self) -> bool {
         Unit::OF_TEMPERATURE.contains(&self)
     }
 
@@ -251,7 +251,7 @@ impl Unit {
 
     /// The unit that a column is in if its name says it: `wave_gen_turn`, `error_arcsec`, `Winkel [deg]`, `load (Nm)`.
     #[must_use]
-    pub fn in_name(column: &str) -> Option<Unit> {
+    pub(crate) fn in_name(column: &str) -> Option<Unit> {
         for (open, close) in [('[', ']'), ('(', ')')] {
             if let Some(inside) = column.trim_end().strip_suffix(close).and_then(|rest| rest.rsplit_once(open)) {
                 return Unit::written(inside.1.trim());

@@ -16,15 +16,15 @@ mod rows;
 mod spectrum;
 mod time;
 
-pub use groups::{Group, Grouping, Statistics};
+pub(crate) use groups::Grouping;
 pub use map::{AngleMap, Bin};
 pub use noise::Noise;
 pub use orders::{Line, NamedOrder, Wheel, harmonics, named_orders};
-pub use pulses::Pulse;
+pub(crate) use pulses::Pulse;
 pub use rows::{Axis, Direction, SizeMismatch};
 pub(crate) use spectrum::sampled_twice;
 pub use spectrum::{OrderSpectrum, Peak, SpectrumSettings, order_spectrum};
-pub use time::{SessionDrift, Stretch};
+pub(crate) use time::SessionDrift;
 
 use serde::Serialize;
 

@@ -25,7 +25,7 @@ pub enum Axis {
 
 impl Axis {
     /// All of them.
-    pub const ALL: [Axis; 3] = [Axis::Generator, Axis::GeneratorLessOutput, Axis::Output];
+    pub(crate) const ALL: [Axis; 3] = [Axis::Generator, Axis::GeneratorLessOutput, Axis::Output];
 
     /// Turns of it in a generator turn, for a drive with this ratio.
     pub fn turns_per_generator_turn(self, ratio: f64) -> f64 {
@@ -110,14 +110,14 @@ impl<'a> Rows<'a> {
     }
 
     /// The angle of an axis within a turn, 0 to 2π.
-    pub fn within_turn(&self, axis: Axis) -> Vec<f64> {
+    pub(crate) fn within_turn(&self, axis: Axis) -> Vec<f64> {
         let mut angle = self.angle(axis);
         angle.iter_mut().for_each(|angle| *angle = angle.rem_euclid(TAU));
         angle
     }
 
     /// The residual less its median in each direction.
-    pub fn centred_by_direction(&self) -> Vec<f64> {
+    pub(crate) fn centred_by_direction(&self) -> Vec<f64> {
         let median = |direction: bool| {
             let some: Vec<f64> = self
                 .value
@@ -133,7 +133,7 @@ impl<'a> Rows<'a> {
     }
 
     /// A column that all sessions have.
-    pub fn column(&self, of: impl Fn(&'a Session) -> Option<&'a Vec<f64>>) -> Option<Vec<f64>> {
+    pub(crate) fn column(&self, of: impl Fn(&'a Session) -> Option<&'a Vec<f64>>) -> Option<Vec<f64>> {
         let mut all = Vec::with_capacity(self.value.len());
         for session in self.sessions {
             all.extend_from_slice(of(session)?);

@@ -106,7 +106,7 @@ pub struct OrderSpectrum {
 
 impl OrderSpectrum {
     /// Its lines as sines of the axis' angle.
-    pub fn lines(&self) -> Vec<Line> {
+    pub(crate) fn lines(&self) -> Vec<Line> {
         let line = |peak: &Peak| Line {
             order: peak.order,
             amplitude: peak.amplitude_arcsec,

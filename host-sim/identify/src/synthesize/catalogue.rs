@@ -356,7 +356,7 @@ impl Setting<'_> {
         time.get((share * time.len() as f64) as usize).copied().unwrap_or(0.0)
     }
 
-    pub fn mean_speed_rad_s(&self) -> f64 {
+    pub(crate) fn mean_speed_rad_s(&self) -> f64 {
         let speeds = self.on.speeds();
         (speeds.iter().map(|w| w.abs()).sum::<f64>() / speeds.len().max(1) as f64).max(1e-9)
     }

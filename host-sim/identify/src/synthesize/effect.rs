@@ -21,7 +21,7 @@ const SIZES: Sizes = Sizes { pitch_radius_mm: 48.7, base_radius_mm: 44.6 };
 
 /// Effects that are in no library.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Strange {
+pub(crate) enum Strange {
     /// The zero of the output encoder follows the temperature.
     SensorOffsetWithTemperature,
     /// A line at an order that no part of the drive makes.
@@ -75,7 +75,7 @@ impl From<Strange> for What {
 
 /// An effect with its size and phase.
 #[derive(Clone, Debug)]
-pub struct Effect {
+pub(crate) struct Effect {
     /// What it is.
     pub what: What,
     /// Amplitude at the output, arcsec; for the rest what the name says.
@@ -188,7 +188,7 @@ impl Effect {
 
 /// Sessions of a drive with `effects`; `law` 0 or 1 picks the form of each law.
 #[must_use]
-pub fn measure(
+pub(crate) fn measure(
     nominal: &Nominal,
     effects: &[Effect],
     plan: &Plan,

@@ -275,7 +275,7 @@ impl Law {
     }
 
     /// When it acts.
-    pub fn stage(&self) -> Stage {
+    pub(crate) fn stage(&self) -> Stage {
         match self {
             Law::Resonance { .. } => Stage::Inertia,
             Law::Disc { .. } | Law::Unlike { .. } | Law::Latency { .. } | Law::Ratio { .. } => Stage::Reading,
@@ -284,7 +284,7 @@ impl Law {
     }
 
     /// Torque that the torque column does not hold.
-    pub fn add_torque(&self, nominal: &Nominal, on: &Excitation, torque: &mut [f64]) {
+    pub(crate) fn add_torque(&self, nominal: &Nominal, on: &Excitation, torque: &mut [f64]) {
         match *self {
             Law::Unbalance { torque_n_m, phase_rad } => {
                 for k in 0..torque.len() {
@@ -303,7 +303,7 @@ impl Law {
     }
 
     /// Adds to half the clearance, arcsec, row by row.
-    pub fn add_half_clearance(&self, nominal: &Nominal, on: &Excitation, changed: bool, half: &mut [f64]) {
+    pub(crate) fn add_half_clearance(&self, nominal: &Nominal, on: &Excitation, changed: bool, half: &mut [f64]) {
         let n = half.len();
         match *self {
             Law::Wider { growth } => half.iter_mut().for_each(|h| *h += 0.5 * growth),
@@ -341,7 +341,7 @@ impl Law {
     }
 
     /// Adds what it does to the error, arcsec.
-    pub fn add_error(&self, now: &Now<'_>, error: &mut [f64]) {
+    pub(crate) fn add_error(&self, now: &Now<'_>, error: &mut [f64]) {
         let n = error.len();
         let (on, torque, changed) = (now.on, now.torque, now.changed);
         match self {

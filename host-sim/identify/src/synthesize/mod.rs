@@ -21,7 +21,7 @@ mod plant;
 pub use catalogue::{Chosen, Definition, Hidden, effects, parse};
 pub use data_fault::to_csv;
 #[cfg(test)]
-pub use effect::{Effect, Strange, What, measure};
+pub(crate) use effect::{Effect, Strange, What, measure};
 pub use excitation::{Excitation, Plan, Richness};
 pub use plant::{Plant, Unit};
 
@@ -124,7 +124,12 @@ fn law_of(effect: &Chosen, setting: &Setting<'_>) -> Option<Law> {
 ///
 /// # Errors
 /// As [`synthesize`].
-pub fn added_arcsec(plant: &Plant<'_>, sizes: Sizes, chosen: &[Chosen], on: &Excitation) -> Result<Vec<f64>, String> {
+pub(crate) fn added_arcsec(
+    plant: &Plant<'_>,
+    sizes: Sizes,
+    chosen: &[Chosen],
+    on: &Excitation,
+) -> Result<Vec<f64>, String> {
     let setting = Setting { nominal: plant.nominal, sizes, on, load_n_m: law::largest(&on.torque) };
     let mut same = fastrand::Rng::with_seed(0);
     let effects = chosen.iter().map(|effect| effect.completed(&setting, &mut same)).collect::<Result<Vec<_>, _>>()?;

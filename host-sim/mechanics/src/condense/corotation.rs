@@ -102,12 +102,12 @@ impl CoRotation {
     }
 
     /// Positions of the nodes, from the middle of the faces.
-    pub fn positions(&self) -> &[[f64; 2]] {
+    pub(crate) fn positions(&self) -> &[[f64; 2]] {
         &self.position
     }
 
     /// Forces of the nodes on the cell in its turned frame: `F - (F . S q) a`, in place of F.
-    pub fn balance(&self, state: &CellState, force: &mut [f64]) {
+    pub(crate) fn balance(&self, state: &CellState, force: &mut [f64]) {
         let moment: f64 = force.chunks(2).zip(state.q.chunks(2)).map(|(f, q)| f[1] * q[0] - f[0] * q[1]).sum();
         for (f, a) in force[2 * self.first_face..].iter_mut().zip(&state.turn_rate) {
             *f -= moment * a;

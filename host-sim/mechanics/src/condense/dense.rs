@@ -26,7 +26,7 @@ impl DenseKernels {
     ///
     /// False when the pivot block does not have that sign.
     #[must_use]
-    pub fn eliminate(self, front: &mut [f64], m: usize, p: usize, sign: f64) -> bool {
+    pub(crate) fn eliminate(self, front: &mut [f64], m: usize, p: usize, sign: f64) -> bool {
         assert!(front.len() >= m * m && p <= m);
         self.0.dispatch(Eliminate { front, m, p, sign })
     }

@@ -18,6 +18,4 @@ pub use chain::{Block, Chain, Contribution};
 pub use corotation::{CellState, CoRotation};
 pub use dense::DenseKernels;
 pub use model::{Cell, CondensedWheel};
-pub use skin::Skin;
-pub use superelement::{CellNodes, Superelement};
 pub use tangent::{CellAt, CellPlacement, CellTangent, Geometric, Local, Traction, back, rotate_pairs};

@@ -75,17 +75,17 @@ impl Cell {
     }
 
     /// Unknowns on the flanks.
-    pub fn flank(&self) -> usize {
+    pub(crate) fn flank(&self) -> usize {
         self.unknowns[0]
     }
 
     /// Unknowns on the bore, between the faces.
-    pub fn bore(&self) -> usize {
+    pub(crate) fn bore(&self) -> usize {
         self.unknowns[1]
     }
 
     /// Unknowns on one face.
-    pub fn face(&self) -> usize {
+    pub(crate) fn face(&self) -> usize {
         self.unknowns[2]
     }
 

@@ -79,7 +79,7 @@ impl Skin {
     /// Kept nodes of a cell, by number in the skin, in the order of [`CellNodes::kept`].
     ///
     /// Cell j of the flexspline is sector j; cell t of the circular spline is the tooth between the spaces t and t + 1.
-    pub fn cell(&self, cell: usize) -> Vec<u32> {
+    pub(crate) fn cell(&self, cell: usize) -> Vec<u32> {
         let at = |sector: usize, n: &u32| self.mesh.node(sector as isize, *n) as u32;
         let minus = cell + usize::from(self.mesh.kind == WheelKind::CircularSpline);
         let [plus_flank, minus_flank] = &self.mesh.flanks;
@@ -119,11 +119,6 @@ impl Skin {
             elements,
             angle,
         }
-    }
-
-    /// Nodes of the faces: the first this many of every sector.
-    pub fn face(&self) -> usize {
-        self.face
     }
 }
 

@@ -40,7 +40,7 @@ pub struct Traction {
 
 impl Traction {
     /// Number of columns.
-    pub fn rank(&self) -> usize {
+    pub(crate) fn rank(&self) -> usize {
         self.columns.len() / self.length
     }
 

@@ -27,7 +27,7 @@ const LEVEL_FOUND: f64 = 1e-15;
 
 /// What decides the load along the face.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FaceLaw {
+pub(crate) struct FaceLaw {
     /// Face width, mm.
     pub width_mm: f64,
     /// How far both ends of the face stand back from a straight flank, mm; a parabola.
@@ -39,7 +39,7 @@ pub struct FaceLaw {
 }
 
 /// How a tooth leans: change of its displacement along the face, radial and around (rad).
-pub type Lean = [f64; 2];
+pub(crate) type Lean = [f64; 2];
 
 /// Offsets of one pair along its face, mm; positive: further apart.
 #[derive(Debug, Clone, Copy)]
@@ -51,7 +51,7 @@ pub struct Across {
 
 /// What one pair comes to along its face.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bearing {
+pub(crate) struct Bearing {
     /// By how much the plane slice meets the other flank later than where the face is nearest, mm.
     pub later_mm: f64,
     /// Change of that with the mean load, mm²/N; 0 or more.
@@ -72,7 +72,7 @@ pub struct Bearing {
 
 impl Bearing {
     /// An even load.
-    pub const EVEN: Bearing = Bearing {
+    pub(crate) const EVEN: Bearing = Bearing {
         later_mm: 0.0,
         softness: 0.0,
         peak_over_mean: 1.0,
@@ -99,7 +99,7 @@ impl FaceLaw {
     }
 
     /// The offsets of a flank of a tooth that leans; `None` where all are zero.
-    pub fn across(&self, lean: Lean, side: Side) -> Option<Across> {
+    pub(crate) fn across(&self, lean: Lean, side: Side) -> Option<Across> {
         let slope = self.slope(lean, side);
         if slope == 0.0 && self.crowning_mm == 0.0 {
             return None;
@@ -134,7 +134,7 @@ impl Across {
     }
 
     /// Load over its mean at equal steps along the face, at a bearing of this pair.
-    pub fn load_over_mean(&self, bearing: &Bearing) -> Vec<f64> {
+    pub(crate) fn load_over_mean(&self, bearing: &Bearing) -> Vec<f64> {
         let mean = self.load(bearing.level_mm).mean * self.compliance;
         self.offsets.iter().map(|offset| (bearing.level_mm - offset).max(0.0) / mean).collect()
     }
@@ -171,7 +171,7 @@ impl Across {
 
     /// The bearing of a pair whose points have these gaps where the face is nearest, with weights; `None` while nothing
     /// touches.
-    pub fn bearing(&self, law: FlankLaw, points: &[(f64, f64)]) -> Option<Bearing> {
+    pub(crate) fn bearing(&self, law: FlankLaw, points: &[(f64, f64)]) -> Option<Bearing> {
         // Load of the plane slice that meets the other flank later by so much.
         let plane = |later: f64| {
             points.iter().fold((0.0, 0.0), |(load, slope), (gap, weight)| {

@@ -560,7 +560,7 @@ impl<'a> FlankContact<'a> {
     }
 
     /// Radius on the tooth that faces the corner of the space in this configuration.
-    pub fn corner(&self, pair: FlankPair, at: Configuration) -> Option<f64> {
+    pub(crate) fn corner(&self, pair: FlankPair, at: Configuration) -> Option<f64> {
         self.radius_facing_corner(pair, &self.local_field(pair, at))
     }
 
@@ -621,7 +621,7 @@ impl<'a> FlankContact<'a> {
 
     /// Largest pressure of a pair, MPa, by its force and the shape of its gap ([`super::contact_modulus_mpa`]); where
     /// the load along the face is largest. Nothing of a pair that is open.
-    pub fn peak_pressure_mpa(
+    pub(crate) fn peak_pressure_mpa(
         &self,
         pair: FlankPair,
         at: Configuration,

@@ -34,7 +34,7 @@ pub(super) struct Place {
 }
 
 /// Modulus of two bodies of one material that touch, MPa.
-pub fn contact_modulus_mpa(youngs_modulus_mpa: f64, poissons_ratio: f64) -> f64 {
+pub(crate) fn contact_modulus_mpa(youngs_modulus_mpa: f64, poissons_ratio: f64) -> f64 {
     0.5 * youngs_modulus_mpa / (1.0 - poissons_ratio * poissons_ratio)
 }
 

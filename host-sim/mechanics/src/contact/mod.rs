@@ -16,10 +16,10 @@ mod hertz;
 mod quadrature;
 
 pub use bore::{BoreContact, BoreLaw, BorePressure, OpenEdges};
-pub use face::{Across, Bearing, FaceLaw, Lean};
+pub(crate) use face::{Across, Bearing, FaceLaw, Lean};
 pub use flank::{
     AlongFace, BearingPlace, Configuration, FlankContact, FlankLaw, FlankLayout, FlankPair, FlankPoint,
     FrictionHistory, PairContribution, SlipPoint,
 };
-pub use hertz::contact_modulus_mpa;
+pub(crate) use hertz::contact_modulus_mpa;
 pub use quadrature::gauss_legendre;

@@ -110,7 +110,7 @@ impl ArcChain {
     }
 
     /// Straight from point to point.
-    pub fn straight(points: &[[f64; 2]]) -> ArcChain {
+    pub(crate) fn straight(points: &[[f64; 2]]) -> ArcChain {
         let mut chain = ArcChain { arcs: Vec::new() };
         for pair in points.windows(2) {
             let d = minus(pair[1], pair[0]);
@@ -139,7 +139,7 @@ impl ArcChain {
     }
 
     /// All lengths times `factor`.
-    pub fn scaled(&self, factor: f64) -> ArcChain {
+    pub(crate) fn scaled(&self, factor: f64) -> ArcChain {
         let scaled = |arc: &Arc| Arc {
             start: arc.start.map(|x| factor * x),
             tangent: arc.tangent,
@@ -167,19 +167,19 @@ impl ArcChain {
     }
 
     /// Unit tangent at an arc length.
-    pub fn tangent(&self, s: f64) -> [f64; 2] {
+    pub(crate) fn tangent(&self, s: f64) -> [f64; 2] {
         let arc = self.arc(s);
         arc.tangent_at(s - arc.from)
     }
 
     /// Curvature at an arc length, 1/mm, positive where it turns left.
-    pub fn curvature(&self, s: f64) -> f64 {
+    pub(crate) fn curvature(&self, s: f64) -> f64 {
         self.arc(s).curvature
     }
 
     /// Foot of a point that is nearer to the chain than its radii of curvature: the first arc whose end the point does
     /// not lie beyond.
-    pub fn foot(&self, p: [f64; 2]) -> ChainFoot {
+    pub(crate) fn foot(&self, p: [f64; 2]) -> ChainFoot {
         let beyond = |arc: &Arc| dot(minus(p, arc.start), arc.tangent) > 0.0;
         let after = 1 + self.arcs[1..].partition_point(beyond);
         self.arcs[after - 1].foot(p)

@@ -277,7 +277,7 @@ impl RimVariation {
     }
 
     /// True for a rim of one thickness.
-    pub fn is_none(&self) -> bool {
+    pub(crate) fn is_none(&self) -> bool {
         self.harmonics.is_empty()
     }
 

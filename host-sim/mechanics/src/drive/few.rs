@@ -56,7 +56,7 @@ const HALVINGS: usize = 13;
 
 impl FewNumbers {
     /// Teeth of the flexspline that can be asked for.
-    pub const TEETH: [u32; 2] = [60, 800];
+    pub(crate) const TEETH: [u32; 2] = [60, 800];
 
     /// The drive.
     ///

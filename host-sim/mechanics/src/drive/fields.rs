@@ -185,7 +185,7 @@ impl Field {
     }
 
     /// Meaning, unit, sign and what is allowed, for the comment in a written file.
-    pub fn comment(&self) -> String {
+    pub(crate) fn comment(&self) -> String {
         let range = &self.range;
         let allowed = match self.slot(&mut Drive::hhd_95()) {
             Slot::Real(_) => range.to_string(),
@@ -236,7 +236,7 @@ impl Field {
         self.split().0 == "as_built"
     }
 
-    pub fn slot<'a>(&self, drive: &'a mut Drive) -> Slot<'a> {
+    pub(crate) fn slot<'a>(&self, drive: &'a mut Drive) -> Slot<'a> {
         (self.slot)(drive)
     }
 }

@@ -253,7 +253,7 @@ impl ActiveFlank {
     }
 
     /// Half angle of the flank at a radius (also beyond the junction), rad.
-    pub fn half_angle(&self, radius: f64) -> f64 {
+    pub(crate) fn half_angle(&self, radius: f64) -> f64 {
         match &self.curve {
             FlankCurve::Involute(involute) => involute.half_angle(radius),
             FlankCurve::Chain(_) => {
@@ -284,7 +284,7 @@ impl ActiveFlank {
     }
 
     /// Lever arm of the normal about the axis, half way up the flank, mm: of an involute everywhere, its base radius.
-    pub fn lever(&self) -> f64 {
+    pub(crate) fn lever(&self) -> f64 {
         let middle = 0.5 * (self.start_radius + self.junction_radius);
         middle / self.arc_rate(middle)
     }

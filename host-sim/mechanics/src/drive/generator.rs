@@ -140,7 +140,7 @@ impl GeneratorOutline {
     }
 
     /// Where the outline stands beside the axis it turns about, in the generator frame, mm.
-    pub fn centre(&self) -> [f64; 2] {
+    pub(crate) fn centre(&self) -> [f64; 2] {
         self.centre.map(|x| x * self.scale)
     }
 

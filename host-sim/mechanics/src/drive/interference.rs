@@ -179,7 +179,7 @@ impl RigidMesh {
 
     /// Least gap on one flank of the tooth at material angle `phi`; `None` where that flank does not reach past the
     /// tips of the circular spline.
-    pub fn gap(&self, phi: f64, side: Side) -> Option<FlankGap> {
+    pub(crate) fn gap(&self, phi: f64, side: Side) -> Option<FlankGap> {
         // the place of the tooth seen from the axis of its space
         let ([x, y], normal) = self.curve.position(phi);
         let space_axis = phi * self.flexspline_teeth / self.circular_spline_teeth;

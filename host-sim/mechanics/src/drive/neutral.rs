@@ -78,19 +78,9 @@ impl NeutralCurve {
         self.constant_mm
     }
 
-    /// First-order radial displacement, mm, outward +.
-    pub fn w(&self, phi: f64) -> f64 {
-        self.shape.w(phi)
-    }
-
     /// First-order circumferential displacement, mm, with `phi` +.
     pub fn v(&self, phi: f64) -> f64 {
         self.shape.v(phi)
-    }
-
-    /// First-order rotation of the normal, rad, with `phi` +.
-    pub fn theta(&self, phi: f64) -> f64 {
-        self.shape.theta(phi, self.radius_mm)
     }
 
     /// `[r, r', r'']` of the exact curve at polar angle `alpha`.
@@ -124,12 +114,6 @@ impl NeutralCurve {
         let alpha = self.polar_angle(phi);
         let [r, dr, _] = self.polar(alpha);
         ([r * alpha.cos(), r * alpha.sin()], alpha - dr.atan2(r))
-    }
-
-    /// Curvature at polar angle `alpha`, 1/mm, positive where convex outward.
-    pub fn curvature(&self, alpha: f64) -> f64 {
-        let [r, dr, ddr] = self.polar(alpha);
-        (r * r + 2.0 * dr * dr - r * ddr) / (r * r + dr * dr).powf(1.5)
     }
 
     fn speed(&self, alpha: f64) -> f64 {
@@ -251,7 +235,8 @@ mod tests {
                 // w0²/R is 5 µm; positions and rotation differ by a few of those
                 let alpha = y.atan2(x);
                 assert!((alpha * curve.radius_mm() - phi * curve.radius_mm() - curve.v(phi)).abs() < 0.012);
-                assert!((normal - phi - curve.theta(phi)).abs() < 6e-4, "{} {}", normal - phi, curve.theta(phi));
+                let theta = curve.shape.theta(phi, curve.radius_mm);
+                assert!((normal - phi - theta).abs() < 6e-4, "{} {theta}", normal - phi);
             }
         }
     }

@@ -20,11 +20,11 @@ pub struct Placement {
 
 impl Placement {
     /// Where the ideal part stands.
-    pub const NOMINAL: Placement = Placement { turn: (0.0, 1.0), translation: [0.0; 2] };
+    pub(crate) const NOMINAL: Placement = Placement { turn: (0.0, 1.0), translation: [0.0; 2] };
 
     /// This placement seen in the mirror `y -> -y`, in which flanks of the minus side are looked at.
     #[inline]
-    pub fn seen_from(self, side: Side) -> Placement {
+    pub(crate) fn seen_from(self, side: Side) -> Placement {
         match side {
             Side::Plus => self,
             Side::Minus => Placement {
@@ -51,7 +51,7 @@ impl Placement {
 
     /// A direction of the ideal part, turned with it.
     #[inline]
-    pub fn turned(&self, d: [f64; 2]) -> [f64; 2] {
+    pub(crate) fn turned(&self, d: [f64; 2]) -> [f64; 2] {
         let (sin, cos) = self.turn;
         [cos * d[0] - sin * d[1], sin * d[0] + cos * d[1]]
     }

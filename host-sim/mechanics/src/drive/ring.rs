@@ -107,18 +107,18 @@ enum Form {
 
 impl RingShape {
     /// The cam `w0 cos 2 phi`.
-    pub fn cam(w0_mm: f64) -> Self {
+    pub(crate) fn cam(w0_mm: f64) -> Self {
         RingShape { amplitude: w0_mm, form: Form::Cam }
     }
 
     /// Two opposite rollers.
-    pub fn two_roller(w0_mm: f64) -> Self {
+    pub(crate) fn two_roller(w0_mm: f64) -> Self {
         Self::four_roller(w0_mm, 0.0)
     }
 
     /// Four rollers with equal forces at `± angle_rad` from either end of the major axis (below 0.7 rad: near 41° the
     /// major axis stops moving).
-    pub fn four_roller(w0_mm: f64, angle_rad: f64) -> Self {
+    pub(crate) fn four_roller(w0_mm: f64, angle_rad: f64) -> Self {
         let b = angle_rad;
         let a_cos = b.sin() + (FRAC_PI_2 - b) * b.cos();
         let b_sin = b.cos() + b * b.sin();
@@ -126,7 +126,7 @@ impl RingShape {
     }
 
     /// Two discs, each touching over `± half_angle_rad`.
-    pub fn double_disc(w0_mm: f64, half_angle_rad: f64) -> Self {
+    pub(crate) fn double_disc(w0_mm: f64, half_angle_rad: f64) -> Self {
         let g = half_angle_rad;
         let (s, k) = g.sin_cos();
         let den = 8.0 * g * s + 2.0 * PI * g - 4.0 * PI * s + PI * (2.0 * g).sin() + 8.0 * k - PI * PI;
@@ -137,12 +137,12 @@ impl RingShape {
     }
 
     /// The deflection `w0` on the major axis, mm.
-    pub fn w0_mm(&self) -> f64 {
+    pub(crate) fn w0_mm(&self) -> f64 {
         self.amplitude
     }
 
     /// Angle in `0..pi/2` where the closed form changes; 0 where it does not.
-    pub fn break_angle(&self) -> f64 {
+    pub(crate) fn break_angle(&self) -> f64 {
         match self.form {
             Form::Cam => 0.0,
             Form::Rollers { b, .. } => b,
@@ -160,7 +160,7 @@ impl RingShape {
     }
 
     /// `[w, w', w'']` at `phi`, mm and mm/rad.
-    pub fn radial(&self, phi: f64) -> [f64; 3] {
+    pub(crate) fn radial(&self, phi: f64) -> [f64; 3] {
         let (p, sign) = fold(phi);
         let (s, k) = p.sin_cos();
         let x = FRAC_PI_2 - p;
@@ -231,7 +231,7 @@ impl RingShape {
     }
 
     /// `w + w''`, mm; the curvature of the ring grows by `-(w + w'') / R^2`.
-    pub fn bending(&self, phi: f64) -> f64 {
+    pub(crate) fn bending(&self, phi: f64) -> f64 {
         let [w, _, ddw] = self.radial(phi);
         w + ddw
     }

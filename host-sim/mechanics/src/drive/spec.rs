@@ -191,7 +191,7 @@ impl Default for ThermalState {
 
 impl Flexspline {
     /// Pressure angle of the basic rack, rad.
-    pub fn pressure_angle_rad(&self) -> f64 {
+    pub(crate) fn pressure_angle_rad(&self) -> f64 {
         self.pressure_angle_deg.to_radians()
     }
 
@@ -218,7 +218,7 @@ impl Flexspline {
 
 impl CircularSpline {
     /// Pressure angle of the basic rack, rad.
-    pub fn pressure_angle_rad(&self) -> f64 {
+    pub(crate) fn pressure_angle_rad(&self) -> f64 {
         self.pressure_angle_deg.to_radians()
     }
 

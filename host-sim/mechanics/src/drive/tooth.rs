@@ -107,7 +107,7 @@ impl OutlinePiece {
     }
 
     /// Unit tangent in the direction of growing `t`.
-    pub fn tangent(&self, t: f64) -> [f64; 2] {
+    pub(crate) fn tangent(&self, t: f64) -> [f64; 2] {
         match self.curve {
             ToothCurve::Chain { ref chain, from, to } => {
                 chain.tangent(from + t * (to - from)).map(|x| (to - from).signum() * x)
@@ -126,13 +126,13 @@ impl OutlinePiece {
     }
 
     /// Unit normal out of the material.
-    pub fn normal(&self, t: f64) -> [f64; 2] {
+    pub(crate) fn normal(&self, t: f64) -> [f64; 2] {
         let [x, y] = self.tangent(t);
         [-y, x]
     }
 
     /// Curvature, 1/mm, positive where the material is convex.
-    pub fn curvature(&self, t: f64) -> f64 {
+    pub(crate) fn curvature(&self, t: f64) -> f64 {
         match self.curve {
             ToothCurve::Chain { ref chain, from, to } => {
                 -(to - from).signum() * chain.curvature(from + t * (to - from))
@@ -302,7 +302,7 @@ impl ToothFlank {
     }
 
     /// The piece of one kind.
-    pub fn piece(&self, kind: PieceKind) -> &OutlinePiece {
+    pub(crate) fn piece(&self, kind: PieceKind) -> &OutlinePiece {
         &self.pieces[kind as usize]
     }
 
@@ -312,7 +312,7 @@ impl ToothFlank {
     }
 
     /// Half the angular pitch, `pi / z`, rad: the outline covers `0..=half_pitch`.
-    pub fn half_pitch(&self) -> f64 {
+    pub(crate) fn half_pitch(&self) -> f64 {
         PI / f64::from(self.teeth)
     }
 

@@ -36,7 +36,7 @@ impl Border {
     }
 
     /// Column k of B.
-    pub fn column_mut(&mut self, k: usize) -> &mut [f64] {
+    pub(crate) fn column_mut(&mut self, k: usize) -> &mut [f64] {
         let n = self.columns.len() / self.width;
         &mut self.columns[k * n..(k + 1) * n]
     }
@@ -77,7 +77,7 @@ impl BorderedSystem {
     /// Solves in place, with the factor it was made with: `f` becomes x, `g` becomes z. False when the small system is
     /// singular.
     #[must_use]
-    pub fn solve(&self, factor: &mut (impl Factor + ?Sized), f: &mut [f64], g: &mut [f64]) -> bool {
+    pub(crate) fn solve(&self, factor: &mut (impl Factor + ?Sized), f: &mut [f64], g: &mut [f64]) -> bool {
         let n = f.len();
         factor.solve(f, 1);
         for (i, gi) in g.iter_mut().enumerate() {

@@ -21,14 +21,14 @@ impl PlaneStrain {
     }
 
     /// Second Piola-Kirchhoff stress `[S11, S22, S12]` (MPa) of the Green-Lagrange strain `[E11, E22, E12]`.
-    pub fn stress(&self, strain: [f64; 3]) -> [f64; 3] {
+    pub(crate) fn stress(&self, strain: [f64; 3]) -> [f64; 3] {
         let [e11, e22, e12] = strain;
         let pressure = self.lambda * (e11 + e22);
         [pressure + 2.0 * self.mu * e11, pressure + 2.0 * self.mu * e22, 2.0 * self.mu * e12]
     }
 
     /// Poisson's ratio.
-    pub fn poissons_ratio(&self) -> f64 {
+    pub(crate) fn poissons_ratio(&self) -> f64 {
         self.lambda / (2.0 * (self.lambda + self.mu))
     }
 

@@ -114,7 +114,7 @@ impl Pattern {
     }
 
     /// Block of two different nodes, if they couple.
-    pub fn block(&self, a: u32, b: u32) -> Option<BlockPosition> {
+    pub(crate) fn block(&self, a: u32, b: u32) -> Option<BlockPosition> {
         let (low, high) = if a < b { (a, b) } else { (b, a) };
         let k = self.neighbours[low as usize].binary_search(&high).ok()? as u32;
         let first = self.column_starts[2 * low as usize] + 2 + 2 * k;
@@ -128,7 +128,7 @@ impl Pattern {
     }
 
     /// Positions of (x, x) and (y, y) of a node; (y, x) follows (x, x).
-    pub fn diagonal(&self, node: u32) -> [u32; 2] {
+    pub(crate) fn diagonal(&self, node: u32) -> [u32; 2] {
         [self.column_starts[2 * node as usize], self.column_starts[2 * node as usize + 1]]
     }
 
@@ -151,7 +151,8 @@ impl Pattern {
     }
 
     /// `y += A x` for the symmetric matrix with these values.
-    pub fn multiply_add(&self, values: &[f64], x: &[f64], y: &mut [f64]) {
+    #[cfg(test)]
+    pub(crate) fn multiply_add(&self, values: &[f64], x: &[f64], y: &mut [f64]) {
         for column in 0..self.unknowns() {
             let (start, end) = (self.column_starts[column] as usize, self.column_starts[column + 1] as usize);
             let mut sum = values[start] * x[column];

@@ -12,7 +12,7 @@ pub type Point = [f64; 2];
 
 /// The shape that a half sector is meshed from, in the frame whose +x axis is the tooth axis, the half sector lying on
 /// the side of positive angles. Radii in mm.
-pub struct HalfOutline<'a> {
+pub(crate) struct HalfOutline<'a> {
     /// Half the angular pitch: the angle of the space axis, rad.
     pub half_pitch: f64,
     /// Bore of an external wheel, outer radius of an internal one.
@@ -52,7 +52,7 @@ pub enum MeshError {
 
 /// What an element edge of the half sector lies on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum EdgeTag {
+pub(crate) enum EdgeTag {
     /// Bore or outer circle, numbered from the tooth axis.
     Base(usize),
     /// Flank, numbered from the root.
@@ -60,7 +60,7 @@ pub enum EdgeTag {
 }
 
 /// Elements of the half sector by the coordinates of their eight nodes.
-pub struct HalfSector {
+pub(crate) struct HalfSector {
     /// Node coordinates of each element.
     pub elements: Vec<[Point; 8]>,
     /// Tagged edges: element, local edge (from corner i to corner i+1), what it lies on.

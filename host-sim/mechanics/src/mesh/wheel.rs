@@ -50,7 +50,7 @@ impl FlankMesh {
     /// The edge that carries the flank point of radius `radius_mm` and its coordinate in [-1, 1]; points beyond an end
     /// are carried by the end itself.
     #[inline]
-    pub fn locate(&self, radius_mm: f64) -> (usize, f64) {
+    pub(crate) fn locate(&self, radius_mm: f64) -> (usize, f64) {
         let (first, last) = (self.radii[0], self.radii[self.radii.len() - 1]);
         let edges = self.edges();
         let along = ((radius_mm - first) / (last - first)).clamp(0.0, 1.0) * edges as f64;
@@ -128,7 +128,7 @@ impl WheelMesh {
 
     /// The mesh with a rim that varies: its base circle moved inward by the thickness added, what lies between it and
     /// `fixed_radius` by a part that falls linearly.
-    pub fn with_rim(mut self, rim: RimVariation, fixed_radius: f64) -> Result<WheelMesh, MeshError> {
+    pub(crate) fn with_rim(mut self, rim: RimVariation, fixed_radius: f64) -> Result<WheelMesh, MeshError> {
         if !rim.is_none() {
             for p in &mut self.nodes {
                 let r = p[0].hypot(p[1]);

@@ -67,7 +67,7 @@ impl ToothPath {
     }
 
     /// How far the circular-spline tooth has moved on from the flexspline tooth, rad, (6).
-    pub fn output_angle(&self, phi: f64) -> f64 {
+    pub(crate) fn output_angle(&self, phi: f64) -> f64 {
         (FRAC_PI_2 - phi) / self.ratio
     }
 

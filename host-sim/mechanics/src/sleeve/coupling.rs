@@ -18,7 +18,7 @@ use super::model::Flexspline3d;
 
 /// What one harmonic of the rim meets beside the plane slice.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Addition {
+pub(crate) struct Addition {
     /// Waves around the rim.
     pub n: u32,
     /// k, N/mm for the full circle: force on the amplitude a, over a.

@@ -65,7 +65,7 @@ impl Symmetric {
     }
 
     /// What is left for the unknowns `keep` where those of `fixed` are held and all others move freely.
-    pub fn condensed(&self, keep: &[usize], fixed: &[usize]) -> Symmetric {
+    pub(crate) fn condensed(&self, keep: &[usize], fixed: &[usize]) -> Symmetric {
         let n = self.size;
         let mut a = self.entries.clone();
         let mut active: Vec<usize> = (0..n).filter(|i| !fixed.contains(i)).collect();
@@ -97,7 +97,7 @@ impl Symmetric {
 
 impl Symmetric {
     /// All unknowns where some are known and no load acts on the others.
-    pub fn solved(&self, known: &[(usize, f64)]) -> Vec<f64> {
+    pub(crate) fn solved(&self, known: &[(usize, f64)]) -> Vec<f64> {
         let n = self.size;
         let mut x = vec![0.0; n];
         let mut is_known = vec![false; n];

@@ -22,10 +22,7 @@ mod shell;
 mod tooth;
 mod tube;
 
-pub use coupling::Addition;
+pub(crate) use coupling::Addition;
 pub use model::{Flexspline3d, Harmonic, Rollers};
-pub use plate::{Plate, PlateEdge};
 pub use shape::Station;
-pub use shell::{Ribs, Shell};
 pub(crate) use tooth::pair_compliance;
-pub use tube::{End, Tube};

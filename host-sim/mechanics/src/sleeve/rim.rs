@@ -64,7 +64,7 @@ impl Rim {
     }
 
     /// Stiffness of a band that moves outward by W at its middle and tilts by an angle, in these two.
-    pub fn band(&self) -> Symmetric {
+    pub(crate) fn band(&self) -> Symmetric {
         let keep: Vec<usize> = self.lines.iter().map(|first| first + W).collect();
         self.matrix.condensed(&keep, &[]).in_basis(&[vec![1.0; LINES], self.places.to_vec()])
     }

@@ -52,7 +52,7 @@ pub struct Ribs {
 
 impl Ribs {
     /// A smooth wall.
-    pub const NONE: Ribs = Ribs { membrane_axial: 1.0, bending_axial: 1.0, bending_around: 1.0 };
+    pub(crate) const NONE: Ribs = Ribs { membrane_axial: 1.0, bending_axial: 1.0, bending_around: 1.0 };
 }
 
 /// A cylindrical wall.

@@ -63,7 +63,7 @@ impl ContactStage {
         }
     }
 
-    pub fn tolerance(self, settings: &SolverSettings) -> f64 {
+    pub(crate) fn tolerance(self, settings: &SolverSettings) -> f64 {
         let finds_the_way = self.hurries && self.softening.is_some();
         if finds_the_way { FOUND_THE_WAY.max(settings.tolerance) } else { settings.tolerance }
     }
@@ -115,7 +115,7 @@ impl Way {
     }
 
     /// Factors on the penalties before contact is as hard as it is.
-    pub fn softness(self) -> &'static [f64] {
+    pub(crate) fn softness(self) -> &'static [f64] {
         if self == Way::Directly { &[] } else { &LOADING_SOFTNESS }
     }
 }
@@ -169,7 +169,7 @@ impl Continuation {
     }
 
     /// The next part takes half the way.
-    pub fn halve(&mut self, iterations: usize) {
+    pub(crate) fn halve(&mut self, iterations: usize) {
         self.iterations += iterations;
         self.part *= 0.5;
         self.halvings += 1;
@@ -177,7 +177,7 @@ impl Continuation {
     }
 
     /// Goes on from the end of a part; whether that is the end of the increment.
-    pub fn advance(&mut self, iterations: usize) -> bool {
+    pub(crate) fn advance(&mut self, iterations: usize) -> bool {
         self.iterations += iterations;
         self.done = self.next_share();
         if iterations <= EASY {

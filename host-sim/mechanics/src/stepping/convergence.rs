@@ -49,7 +49,7 @@ impl Convergence {
         }
     }
 
-    pub fn goes_on(&self) -> bool {
+    pub(crate) fn goes_on(&self) -> bool {
         self.history.len() <= self.last_iteration
     }
 
@@ -66,7 +66,7 @@ impl Convergence {
         if relative.is_finite() { Ok(()) } else { Err("the residual is not finite") }
     }
 
-    pub fn relative(&self) -> f64 {
+    pub(crate) fn relative(&self) -> f64 {
         self.history.last().copied().unwrap_or(f64::INFINITY)
     }
 

@@ -80,7 +80,7 @@ impl LineSearch {
     }
 
     /// What becomes of the step by what is out of balance at its end.
-    pub fn judge(&mut self, trial: usize, step: &Step, residual: &Residual) -> Trial {
+    pub(crate) fn judge(&mut self, trial: usize, step: &Step, residual: &Residual) -> Trial {
         let overshoot = self.before > 0.0 && step.work(residual) < self.least;
         if !overshoot || self.near_round_off || trial == MOST_TRIALS {
             self.last_length = self.length;

@@ -39,7 +39,7 @@ pub(super) struct NearPairs {
 
 impl NearPairs {
     /// The drive moves: no gap changes by more than `distance_mm`.
-    pub fn advance(&mut self, distance_mm: f64) {
+    pub(crate) fn advance(&mut self, distance_mm: f64) {
         self.moved += distance_mm;
         self.bore.moved += distance_mm;
     }
@@ -67,7 +67,7 @@ impl NearPairs {
     }
 
     /// Looks for pairs that may touch from here on. Friction begins where the pair stood in the state `from`.
-    pub fn search(&mut self, flanks: &FlankContact, at: Configuration, from: &State, friction: bool) {
+    pub(crate) fn search(&mut self, flanks: &FlankContact, at: Configuration, from: &State, friction: bool) {
         self.searched_until = self.moved + 0.5 * REACH;
         for pair in flanks.near_pairs(at, REACH) {
             if let Entry::Vacant(place) = self.pairs.entry(pair) {
@@ -83,12 +83,12 @@ impl NearPairs {
     }
 
     /// The pairs.
-    pub fn pairs(&self) -> impl Iterator<Item = FlankPair> + '_ {
+    pub(crate) fn pairs(&self) -> impl Iterator<Item = FlankPair> + '_ {
         self.pairs.keys().copied()
     }
 
     /// Forces and tangents of the pairs that touch.
-    pub fn evaluate(
+    pub(crate) fn evaluate(
         &mut self,
         flanks: &FlankContact,
         at: Configuration,
@@ -108,7 +108,13 @@ impl NearPairs {
     }
 
     /// Largest pressure between flanks, MPa, by the forces of a state and the shape of its gaps.
-    pub fn peak_pressure_mpa(&self, flanks: &FlankContact, at: Configuration, law: FlankLaw, modulus_mpa: f64) -> f64 {
+    pub(crate) fn peak_pressure_mpa(
+        &self,
+        flanks: &FlankContact,
+        at: Configuration,
+        law: FlankLaw,
+        modulus_mpa: f64,
+    ) -> f64 {
         let touching = self.pairs.iter().filter(|(_, near)| self.moved >= near.open_until);
         let peak = |(pair, near): (&FlankPair, &NearPair)| {
             flanks.peak_pressure_mpa(*pair, at, law, &near.layout.points, modulus_mpa)
@@ -132,7 +138,7 @@ impl NearPairs {
     }
 
     /// Tangential tractions at the end of an increment, pair by pair.
-    pub fn friction(
+    pub(crate) fn friction(
         &self,
         flanks: &FlankContact,
         at: Configuration,
@@ -149,7 +155,7 @@ impl NearPairs {
     /// while the wheels keep their shape; `None` when no flank is in reach.
     ///
     /// Gaps are linear in so small a turn: the points are looked at once, and again where the turn was not so small.
-    pub fn balance(
+    pub(crate) fn balance(
         &mut self,
         flanks: &FlankContact,
         state: &State,

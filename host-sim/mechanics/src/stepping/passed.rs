@@ -27,7 +27,7 @@ pub(super) struct Passed {
 
 impl Passed {
     /// Whether the motion goes on from here as it was.
-    pub fn go_on(&self, from: &State, torque_n_m: f64) -> bool {
+    pub(crate) fn go_on(&self, from: &State, torque_n_m: f64) -> bool {
         self.states.back().is_some_and(|last| {
             last.torque_n_m == torque_n_m && from.torque_n_m == torque_n_m && last.travel == from.travel
         })

@@ -41,7 +41,7 @@ pub(super) struct Residual {
 }
 
 impl Residual {
-    pub fn zero(unknowns: usize) -> Residual {
+    pub(crate) fn zero(unknowns: usize) -> Residual {
         Residual {
             force: vec![0.0; unknowns],
             border: [0.0; BORDERS],
@@ -63,7 +63,7 @@ impl Residual {
     }
 
     /// Relative to the contact forces; the torque, which everything serves, ten times as strictly.
-    pub fn relative(&self) -> f64 {
+    pub(crate) fn relative(&self) -> f64 {
         let force = self.force.iter().fold(0.0_f64, |m, x| m.max(x.abs())) / self.scale;
         let torque = (self.border[OUTPUT].abs() - self.torque_round_off).max(0.0);
         force.max(10.0 * torque / self.torque_scale)
@@ -80,7 +80,7 @@ pub(super) struct Step {
 
 impl Step {
     /// Work of the out-of-balance forces along the step.
-    pub fn work(&self, residual: &Residual) -> f64 {
+    pub(crate) fn work(&self, residual: &Residual) -> f64 {
         residual.force.iter().zip(&self.free).map(|(f, d)| f * d).sum::<f64>()
             + residual.border[OUTPUT] * self.border[OUTPUT]
     }

@@ -46,7 +46,7 @@ impl Wave {
     }
 
     /// How a tooth leans for an amplitude of 1 mm.
-    pub fn lean(&self, tooth: usize) -> Lean {
+    pub(crate) fn lean(&self, tooth: usize) -> Lean {
         self.leans[tooth]
     }
 
@@ -90,7 +90,7 @@ impl Third {
     }
 
     /// The waves on the bore of a mesh.
-    pub fn waves(&self, drive: &Drive, mesh: &WheelMesh, bore: &BoreContact) -> Vec<Wave> {
+    pub(crate) fn waves(&self, drive: &Drive, mesh: &WheelMesh, bore: &BoreContact) -> Vec<Wave> {
         self.additions
             .iter()
             .flat_map(|addition| [0, 1].map(|phase| wave(drive, mesh, bore, addition, phase)))

@@ -37,7 +37,7 @@ impl Clock {
     }
 
     /// Names of the sessions where they begin; of many, every so many.
-    pub fn borders(&self) -> Vec<Upright> {
+    pub(crate) fn borders(&self) -> Vec<Upright> {
         let every = self.begins.len().div_ceil(12);
         let named = |k: usize| if k.is_multiple_of(every) { format!("session {}", k + 1) } else { String::new() };
         let all = self.begins.iter().enumerate().map(|(k, x)| Upright { name: named(k), x: *x });

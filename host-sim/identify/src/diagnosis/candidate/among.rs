@@ -15,7 +15,7 @@ use crate::diagnosis::rows::{Rows, combined};
 
 /// How far causes bring one zone of teeth ahead of the other, row by row, arcsec.
 #[derive(Clone, Debug, Default)]
-pub struct Zones {
+pub(crate) struct Zones {
     /// On the flank that turns the output forward.
     pub upper: Vec<f64>,
     /// On the other one.
@@ -24,7 +24,7 @@ pub struct Zones {
 
 /// A cause as it was fitted.
 #[derive(Clone)]
-pub struct Acting<'l> {
+pub(crate) struct Acting<'l> {
     /// Its law.
     pub law: &'l Law,
     /// Shape parameters.
@@ -43,7 +43,7 @@ impl Acting<'_> {
 }
 
 /// What causes leave to another one.
-pub struct Among {
+pub(crate) struct Among {
     /// Under the load with what they add.
     loaded: Option<(Rows, Base)>,
     /// What they add to half the clearance, arcsec.
@@ -59,7 +59,7 @@ impl Law {
     /// Whether this cause changes what another one does. Two that meet in the zones act on each other: the order
     /// decides.
     #[must_use]
-    pub fn acts_on(&self, other: &Law) -> bool {
+    pub(crate) fn acts_on(&self, other: &Law) -> bool {
         // What a load winds up in a softer spring is in the load's law.
         self.is_load() && !other.is_load() && !other.is_spring()
             || self.is_spring() && other.is_load()
@@ -73,7 +73,7 @@ impl Law {
 
     /// Whether two act on each other.
     #[must_use]
-    pub fn meets(&self, other: &Law) -> bool {
+    pub(crate) fn meets(&self, other: &Law) -> bool {
         self.acts.meets_zones && other.acts.meets_zones
     }
 }
@@ -122,7 +122,7 @@ impl Among {
 
     /// The excitation as it is left.
     #[must_use]
-    pub fn excitation<'a>(&'a self, on: &Excitation<'a>) -> Excitation<'a> {
+    pub(crate) fn excitation<'a>(&'a self, on: &Excitation<'a>) -> Excitation<'a> {
         let (rows, base) = self.loaded.as_ref().map_or((on.rows, on.base), |(rows, base)| (rows, base));
         Excitation {
             rows,
@@ -137,7 +137,7 @@ impl Among {
 
 /// The excitation as others leave it, or as it was recorded.
 #[must_use]
-pub fn left_by<'a>(among: Option<&'a Among>, on: &Excitation<'a>) -> Excitation<'a> {
+pub(crate) fn left_by<'a>(among: Option<&'a Among>, on: &Excitation<'a>) -> Excitation<'a> {
     among.map_or(*on, |among| among.excitation(on))
 }
 
@@ -158,7 +158,7 @@ fn half_width(on: &Excitation<'_>, cause: &Acting<'_>) -> Vec<f64> {
 
 /// Columns of causes that are there together, in their order.
 #[must_use]
-pub fn together(on: &Excitation<'_>, causes: &[Acting<'_>]) -> Vec<Vec<super::Column>> {
+pub(crate) fn together(on: &Excitation<'_>, causes: &[Acting<'_>]) -> Vec<Vec<super::Column>> {
     (0..causes.len())
         .map(|k| {
             let others = causes.iter().enumerate().filter(|(j, other)| {

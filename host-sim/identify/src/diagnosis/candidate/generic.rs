@@ -112,7 +112,7 @@ pub fn line(per: Per, order: f64) -> Law {
 
 /// Everything without a name that is always tried.
 #[must_use]
-pub fn unnamed(on: &Excitation<'_>) -> Vec<Law> {
+pub(crate) fn unnamed(on: &Excitation<'_>) -> Vec<Law> {
     let rows = on.rows;
     let mut laws = Vec::new();
     if rows.recorded.temperature {
@@ -187,7 +187,7 @@ fn map(name: &'static str, grids: Vec<(Vec<f64>, usize)>) -> Law {
 /// What is left as a free function of what was measured: tried only when the causes are in, to see whether anything is
 /// left.
 #[must_use]
-pub fn maps(on: &Excitation<'_>) -> Vec<Law> {
+pub(crate) fn maps(on: &Excitation<'_>) -> Vec<Law> {
     let rows = on.rows;
     let turn = |angle: &[f64], of: f64| -> Vec<f64> { angle.iter().map(|a| a.rem_euclid(of)).collect() };
     let full = std::f64::consts::TAU;

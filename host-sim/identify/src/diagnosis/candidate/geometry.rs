@@ -238,7 +238,7 @@ fn is_standing(nominal: &Nominal, of: Angle) -> bool {
 
 /// The pitch error of the wheel that stands.
 #[must_use]
-pub fn standing_pitch_error(nominal: &Nominal) -> CauseName {
+pub(crate) fn standing_pitch_error(nominal: &Nominal) -> CauseName {
     if is_standing(nominal, Angle::Flexspline) {
         CauseName::FlexsplinePitchError
     } else {

@@ -32,10 +32,10 @@ use crate::causes::{CauseName, Kin, Need, ParameterName};
 use crate::nominal::Nominal;
 use flexspline_base::robust::least_and_most;
 
-pub use among::{Acting, Among, Zones, left_by, together};
-pub use generic::{line, maps, unnamed};
-pub use geometry::standing_pitch_error;
-pub use label::{Deviation, Label, Per};
+pub(crate) use among::{Acting, Among, Zones, left_by, together};
+pub(crate) use generic::{line, maps, unnamed};
+pub(crate) use geometry::standing_pitch_error;
+pub(crate) use label::{Deviation, Label, Per};
 pub use named::{Coefficients, Role, Shaped};
 
 /// What laws are evaluated on.
@@ -84,13 +84,13 @@ impl<'a> Excitation<'a> {
 
     /// Whether the output is not loaded beyond friction, which then says nothing of the flank that carries.
     #[must_use]
-    pub fn unloaded(&self) -> bool {
+    pub(crate) fn unloaded(&self) -> bool {
         self.scales.load < self.nominal.friction_torque_n_m
     }
 
     /// What these data lack to speak of a cause: the first of its needs that they do not meet.
     #[must_use]
-    pub fn lacks(&self, cause: CauseName) -> Option<Need> {
+    pub(crate) fn lacks(&self, cause: CauseName) -> Option<Need> {
         cause.needs().iter().copied().find(|need| !self.meets(*need))
     }
 
@@ -131,7 +131,7 @@ impl<'a> Excitation<'a> {
     }
 
     /// From the least output angle to the largest, rad.
-    pub fn output_span_rad(&self) -> f64 {
+    pub(crate) fn output_span_rad(&self) -> f64 {
         let (low, high) = least_and_most(self.rows.output.iter().copied());
         (high - low).max(0.0)
     }
@@ -209,7 +209,7 @@ impl Scales {
 
 /// A shape parameter.
 #[derive(Clone, Debug)]
-pub struct Shape {
+pub(crate) struct Shape {
     /// Its name.
     pub name: ParameterName,
     /// Least plausible value.
@@ -262,7 +262,7 @@ impl Shape {
 
 /// What the coefficient of a column may be.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Tolerance {
+pub(crate) enum Tolerance {
     /// A parameter of the law.
     Main(Prior),
     /// A deviation of the law: its size is of the order of this share of the main coefficients.
@@ -276,7 +276,7 @@ pub enum Tolerance {
 
 /// A column of a law.
 #[derive(Clone, Debug)]
-pub struct Column {
+pub(crate) struct Column {
     /// What it is, for what asks for its coefficient.
     pub role: Role,
     /// Arcsec per unit of the coefficient, row by row.
@@ -323,7 +323,7 @@ fn history(values: Vec<f64>, share: f64) -> Column {
 }
 
 /// A parameter for the report: name and value.
-pub type Named = (ParameterName, f64);
+pub(crate) type Named = (ParameterName, f64);
 
 type MakeColumns = Box<dyn Fn(&Excitation<'_>, Shaped<'_>) -> Vec<Column> + Send + Sync>;
 type MakeParameters = Box<dyn Fn(&Excitation<'_>, Shaped<'_>, Coefficients<'_>) -> Vec<Named> + Send + Sync>;
@@ -333,7 +333,7 @@ type Apart = Box<dyn Fn(&Excitation<'_>, Shaped<'_>, Coefficients<'_>) -> Zones 
 type Beginnings = Box<dyn Fn(Shaped<'_>, Coefficients<'_>) -> Vec<Vec<f64>> + Send + Sync>;
 
 /// A linear law close to a law that is none: its coefficients say where to begin with the shape parameters.
-pub struct Lead {
+pub(crate) struct Lead {
     columns: MakeColumns,
     beginnings: Beginnings,
     /// Only where the load leaves no doubt about the flank.
@@ -345,7 +345,7 @@ static LAWS: AtomicU64 = AtomicU64::new(0);
 
 /// One law of one cause: what it tells of, how it is evaluated, how it may be wrong, how it is looked for, and how it
 /// acts on others.
-pub struct Law {
+pub(crate) struct Law {
     id: u64,
     /// What it tells of.
     pub label: Label,
@@ -393,7 +393,7 @@ pub struct Wrong {
 
 /// How a law is looked for.
 #[derive(Default)]
-pub struct Search {
+pub(crate) struct Search {
     /// Where to begin.
     pub lead: Option<Lead>,
     /// With its nuisance columns, as its main ones mean nothing without them.
@@ -407,7 +407,7 @@ pub struct Search {
 
 /// What a law does to other causes, and they to it.
 #[derive(Default)]
-pub struct Acts {
+pub(crate) struct Acts {
     /// Load (N·m, row by row) that the cause adds beside the torque that was recorded.
     load: Option<AddedLoad>,
     /// How far it brings one zone of teeth ahead of the other.
@@ -468,7 +468,7 @@ impl Law {
     }
     /// The cause it tells of; none for a deviation without one.
     #[must_use]
-    pub const fn cause(&self) -> Option<CauseName> {
+    pub(crate) const fn cause(&self) -> Option<CauseName> {
         self.label.cause()
     }
     /// Whether it tells of a cause of the library.
@@ -479,7 +479,7 @@ impl Law {
     /// Whether it is the bench's zero in each session: what nobody can foretell of a session, and what says nothing of
     /// the drive.
     #[must_use]
-    pub const fn is_zero_of_sessions(&self) -> bool {
+    pub(crate) const fn is_zero_of_sessions(&self) -> bool {
         !self.wrong.foretells
     }
     /// Whether it tells of this cause.
@@ -522,7 +522,7 @@ impl Law {
     }
     /// Whether it changes little from one row to the next, so that averages of rows tell what it says of their average.
     #[must_use]
-    pub fn smooth(&self) -> bool {
+    pub(crate) fn smooth(&self) -> bool {
         self.evaluated.smooth
     }
     fn whole(mut self) -> Law {
@@ -577,13 +577,13 @@ impl Law {
 
     /// Columns at values of the shape parameters.
     #[must_use]
-    pub fn columns(&self, on: &Excitation<'_>, values: &[f64]) -> Vec<Column> {
+    pub(crate) fn columns(&self, on: &Excitation<'_>, values: &[f64]) -> Vec<Column> {
         (self.evaluated.columns)(on, self.shaped(values))
     }
 
     /// Columns of the lead at values of the shape parameters; those of the law where it has no lead.
     #[must_use]
-    pub fn lead_columns(&self, on: &Excitation<'_>, values: &[f64]) -> Vec<Column> {
+    pub(crate) fn lead_columns(&self, on: &Excitation<'_>, values: &[f64]) -> Vec<Column> {
         match &self.search.lead {
             Some(lead) => (lead.columns)(on, self.shaped(values)),
             None => self.columns(on, values),
@@ -593,20 +593,20 @@ impl Law {
     /// Values of the shape parameters to begin with, from those tried and the coefficients of the columns of the lead;
     /// nothing without a lead.
     #[must_use]
-    pub fn beginnings(&self, values: &[f64], coefficients: Coefficients<'_>) -> Vec<Vec<f64>> {
+    pub(crate) fn beginnings(&self, values: &[f64], coefficients: Coefficients<'_>) -> Vec<Vec<f64>> {
         let lead = self.search.lead.as_ref();
         lead.map_or_else(Vec::new, |lead| (lead.beginnings)(self.shaped(values), coefficients))
     }
 
     /// Parameters for the report.
     #[must_use]
-    pub fn parameters(&self, on: &Excitation<'_>, values: &[f64], coefficients: Coefficients<'_>) -> Vec<Named> {
+    pub(crate) fn parameters(&self, on: &Excitation<'_>, values: &[f64], coefficients: Coefficients<'_>) -> Vec<Named> {
         (self.evaluated.parameters)(on, self.shaped(values), coefficients)
     }
 
     /// Whether shape parameters and coefficients make sense, signs above all.
     #[must_use]
-    pub fn physical(&self, values: &[f64], coefficients: Coefficients<'_>) -> bool {
+    pub(crate) fn physical(&self, values: &[f64], coefficients: Coefficients<'_>) -> bool {
         (self.evaluated.physical)(self.shaped(values), coefficients)
     }
 
@@ -618,44 +618,44 @@ impl Law {
 
     /// Whether it adds a load.
     #[must_use]
-    pub fn is_load(&self) -> bool {
+    pub(crate) fn is_load(&self) -> bool {
         self.acts.load.is_some()
     }
 
     /// How far it brings one zone of teeth ahead of the other, if it does.
     #[must_use]
-    pub fn zones(&self, on: &Excitation<'_>, values: &[f64], coefficients: Coefficients<'_>) -> Option<Zones> {
+    pub(crate) fn zones(&self, on: &Excitation<'_>, values: &[f64], coefficients: Coefficients<'_>) -> Option<Zones> {
         self.acts.zones.as_ref().map(|apart| apart(on, self.shaped(values), coefficients))
     }
 
     /// Whether it brings one zone of teeth ahead of the other.
     #[must_use]
-    pub fn is_in_zones(&self) -> bool {
+    pub(crate) fn is_in_zones(&self) -> bool {
         self.acts.zones.is_some()
     }
 
     /// Which of the shape parameters has this name.
     #[must_use]
-    pub fn shape_at(&self, name: ParameterName) -> Option<usize> {
+    pub(crate) fn shape_at(&self, name: ParameterName) -> Option<usize> {
         self.shapes.iter().position(|shape| shape.name == name)
     }
 
     /// Which of the shape parameters are the direction and the size of a displacement, if it is one.
     #[must_use]
-    pub fn displacement_at(&self) -> Option<[usize; 2]> {
+    pub(crate) fn displacement_at(&self) -> Option<[usize; 2]> {
         Some([self.shape_at(ParameterName::PhaseRad)?, self.shape_at(ParameterName::SizeArcsec)?])
     }
 
     /// Places of the shape parameters as another law has those of the same name; in the middle where it has none.
     #[must_use]
-    pub fn places_like(&self, other: &Law, places: &[f64]) -> Vec<f64> {
+    pub(crate) fn places_like(&self, other: &Law, places: &[f64]) -> Vec<f64> {
         let of = |shape: &Shape| other.shape_at(shape.name).and_then(|at| places.get(at)).copied().unwrap_or(0.5);
         self.shapes.iter().map(of).collect()
     }
 
     /// How much of its size another law may be named for wrongly.
     #[must_use]
-    pub fn misfit_as(&self, other: &Law) -> f64 {
+    pub(crate) fn misfit_as(&self, other: &Law) -> f64 {
         if !other.named() {
             return self.wrong.misfit.max(self.wrong.misfit_unnamed);
         }
@@ -676,7 +676,7 @@ impl Law {
 
     /// All combinations of places tried first.
     #[must_use]
-    pub fn tried(&self) -> Vec<Vec<f64>> {
+    pub(crate) fn tried(&self) -> Vec<Vec<f64>> {
         let mut tried = vec![Vec::new()];
         for shape in &self.shapes {
             tried = tried
@@ -700,7 +700,7 @@ pub fn library(on: &Excitation<'_>) -> Vec<Law> {
 
 /// Every law of every cause, whether the data can speak about it or not: what was found in other data acts in these.
 #[must_use]
-pub fn whole_library(on: &Excitation<'_>) -> Vec<Law> {
+pub(crate) fn whole_library(on: &Excitation<'_>) -> Vec<Law> {
     let mut laws = geometry::laws(on);
     if let Some(kernels) = on.nominal.kernels.as_ref().filter(|_| on.nominal.teeth.is_some()) {
         let known = kernel::laws(on, kernels);

@@ -10,9 +10,9 @@ pub struct Role(pub &'static str);
 
 impl Role {
     /// A column whose coefficient nobody asks for.
-    pub const PLAIN: Role = Role("");
+    pub(crate) const PLAIN: Role = Role("");
     /// The law at its size: the only column that it has, or the one that all others are deviations of.
-    pub const SIZE: Role = Role("size");
+    pub(crate) const SIZE: Role = Role("size");
 }
 
 /// Coefficients with what their columns are.
@@ -32,7 +32,7 @@ impl<'c> Coefficients<'c> {
 
     /// With the root mean squares of the columns, as many as there are roles.
     #[must_use]
-    pub fn of_sizes(self, sizes: &'c [f64]) -> Coefficients<'c> {
+    pub(crate) fn of_sizes(self, sizes: &'c [f64]) -> Coefficients<'c> {
         Coefficients { sizes: Some(sizes), ..self }
     }
 
@@ -56,7 +56,7 @@ impl<'c> Coefficients<'c> {
     /// What the first column of a role adds, root mean square, without a sign: 0 where the law has no such column here.
     /// Where the columns are not known all are taken to be alike.
     #[must_use]
-    pub fn adds(self, role: Role) -> f64 {
+    pub(crate) fn adds(self, role: Role) -> f64 {
         let Some(at) = self.roles.iter().position(|of| *of == role) else { return 0.0 };
         let size = self.sizes.and_then(|sizes| sizes.get(at)).copied().unwrap_or(1.0);
         self.values.get(at).map_or(0.0, |coefficient| (coefficient * size).abs())

@@ -9,7 +9,7 @@ use crate::measurement::log::Log;
 use flexspline_base::robust::{least_and_most, median_and_std, median_of, quantile_of, sampled};
 
 /// A gap longer than so many sample periods starts a new session.
-pub const SESSION_GAP_PERIODS: f64 = 10.0;
+pub(crate) const SESSION_GAP_PERIODS: f64 = 10.0;
 /// A step of time above so many periods, jitter aside, has a row missing in it: half way between one lost row and none.
 const LOST_ROW_PERIODS: f64 = 1.5;
 /// A gap of up to so many periods that begins a session may be one of rows that were lost: where the motion goes on

@@ -85,7 +85,7 @@ impl<'a> State<'a> {
     }
 
     /// Whether the generator last moved forward (+1) or backward (-1).
-    pub fn flank(&self, session: usize, row: usize) -> f64 {
+    pub(crate) fn flank(&self, session: usize, row: usize) -> f64 {
         self.flank[session][row]
     }
 

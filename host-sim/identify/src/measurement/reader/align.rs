@@ -16,7 +16,7 @@ const AT_PACE: f64 = 0.25;
 const BEGINS_ANEW: f64 = 0.5;
 
 /// Whether two channels are hardly ever recorded in one row though either has values.
-pub fn apart(a: &[f64], b: &[f64]) -> bool {
+pub(crate) fn apart(a: &[f64], b: &[f64]) -> bool {
     let count = |values: &[f64]| values.iter().filter(|value| value.is_finite()).count();
     let rarer = count(a).min(count(b));
     let both = a.iter().zip(b).filter(|(a, b)| a.is_finite() && b.is_finite()).count();

@@ -69,7 +69,7 @@ pub struct FoundCell {
 
 /// A column of a [`Sheet`].
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Cells {
+pub(crate) struct Cells {
     /// Numbers, or seconds where times are written as text; NaN where there is neither.
     pub values: Vec<f64>,
     /// Times written as text, and the first of them.
@@ -97,7 +97,7 @@ pub struct Cells {
 
 /// Columns as they were read.
 #[derive(Debug, Default)]
-pub struct Columns {
+pub(crate) struct Columns {
     /// Those that were asked for.
     pub cells: Vec<Cells>,
     /// Line of each row.
@@ -164,13 +164,13 @@ impl Sheet {
 
     /// The fields of a row, as texts.
     #[must_use]
-    pub fn row(&self, row: usize) -> Vec<String> {
+    pub(crate) fn row(&self, row: usize) -> Vec<String> {
         self.fields(self.rows[row])
     }
 
     /// The text of a cell, if the row has it.
     #[must_use]
-    pub fn text_at(&self, row: usize, place: usize) -> Option<String> {
+    pub(crate) fn text_at(&self, row: usize, place: usize) -> Option<String> {
         self.fields(self.rows[row]).into_iter().nth(place)
     }
 
@@ -329,7 +329,7 @@ impl Sheet {
 
     /// Reads the columns at these places.
     #[must_use]
-    pub fn columns(&self, places: &[usize]) -> Columns {
+    pub(crate) fn columns(&self, places: &[usize]) -> Columns {
         if let Shape::OneValue { name, value, time } = self.layout.shape {
             return self.channels_as_columns(places, name, value, time);
         }
@@ -537,7 +537,7 @@ impl Cells {
 
     /// What is to be said of the cells that were beyond the range.
     #[must_use]
-    pub fn over_note(&self, name: &str) -> Option<String> {
+    pub(crate) fn over_note(&self, name: &str) -> Option<String> {
         let first = self.first_over.as_ref()?;
         Some(format!(
             "{name}: {} cell{} beyond the range of the instrument, the first in line {} (\"{}\"): nothing is taken to \

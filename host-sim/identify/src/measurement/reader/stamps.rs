@@ -46,7 +46,7 @@ pub fn order(time: &[f64]) -> Option<(Vec<usize>, String)> {
 }
 
 /// Which rows repeat the one before in all of these columns, where so many do that rows are written twice.
-pub fn twice(columns: &[&[f64]]) -> Option<(Vec<bool>, String)> {
+pub(crate) fn twice(columns: &[&[f64]]) -> Option<(Vec<bool>, String)> {
     let rows = columns.first()?.len();
     let same = |a: f64, b: f64| a == b || (a.is_nan() && b.is_nan());
     let repeats: Vec<bool> =
@@ -60,7 +60,7 @@ pub fn twice(columns: &[&[f64]]) -> Option<(Vec<bool>, String)> {
 }
 
 /// Makes the time of a clock on the wall continuous where it is set back by an hour in autumn, or forward in spring.
-pub fn daylight_saving(time: &mut [f64], notes: &mut Vec<String>) {
+pub(crate) fn daylight_saving(time: &mut [f64], notes: &mut Vec<String>) {
     let steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
     if steps.len() < FEWEST {
         return;
