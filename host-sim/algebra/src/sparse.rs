@@ -74,7 +74,7 @@ impl SparseCholesky {
     /// Solves in place, columns one after the other.
     ///
     /// # Panics
-    /// If there are more than [`SparseCholesky::MOST_COLUMNS`] of them.
+    /// If there are more than `SparseCholesky::MOST_COLUMNS` of them.
     pub fn solve(&mut self, right_hand_sides: &mut [f64], columns: usize) {
         assert!(columns <= Self::MOST_COLUMNS, "the work space is sized for {} right-hand sides", Self::MOST_COLUMNS);
         let rows = right_hand_sides.len() / columns;

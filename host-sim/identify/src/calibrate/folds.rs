@@ -158,7 +158,7 @@ impl Folds {
     }
 
     /// Coefficients of the parts chosen, fitted to all folds, some of them held.
-    pub fn coefficients(&self, chosen: &[Chosen], held: &[(usize, f64)]) -> Option<Vec<f64>> {
+    pub(crate) fn coefficients(&self, chosen: &[Chosen], held: &[(usize, f64)]) -> Option<Vec<f64>> {
         Some(self.fit(&self.all(), chosen, held)?.split_off(self.begins[0]))
     }
 
@@ -177,7 +177,7 @@ impl Folds {
     }
 
     /// What a fit to `folds` leaves in another fold, arcsec².
-    pub fn left_in(&self, fold: usize, folds: &[usize], chosen: &[Chosen]) -> f64 {
+    pub(crate) fn left_in(&self, fold: usize, folds: &[usize], chosen: &[Chosen]) -> f64 {
         self.fit(folds, chosen, &[]).map_or(f64::INFINITY, |coefficients| self.left(fold, chosen, &coefficients))
     }
 

@@ -2,9 +2,9 @@
 //!
 //! * [`Model`]: `drive-extended.toml` of a catalogue drive: the nominal model recalibrated, and `[[extension.cause]]`
 //!   entries.
-//! * [`FoundGeometry`]: causes that are geometry, as `[as_built]` of a drive that the FEM runs, checked against the
+//! * `FoundGeometry`: causes that are geometry, as `[as_built]` of a drive that the FEM runs, checked against the
 //!   FEM.
-//! * [`ExtendedTables`]: tables of the extended model, sampled in steady motion at the nodes of a table.
+//! * `ExtendedTables`: tables of the extended model, sampled in steady motion at the nodes of a table.
 //! * [`evaluate`]: what the core leaves of the error in sessions that took no part in the fit, without tables, with
 //!   nominal and with extended ones.
 

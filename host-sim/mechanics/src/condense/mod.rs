@@ -2,8 +2,8 @@
 //!
 //! A wheel is a ring of congruent cells: a flexspline tooth from one space axis to the next, a circular-spline tooth
 //! from one space axis to the next. Of each cell only the nodes on its two faces, on the bore and on the flanks are
-//! kept ([`Skin`]); the others follow from them, exactly, because a cell is linear in the frame that turns with it
-//! ([`Superelement`], computed once for all congruent cells). Large rotations of the flexspline are those of the frames
+//! kept (`Skin`); the others follow from them, exactly, because a cell is linear in the frame that turns with it
+//! (`Superelement`, computed once for all congruent cells). Large rotations of the flexspline are those of the frames
 //! ([`CoRotation`]).
 
 mod chain;

@@ -28,7 +28,7 @@ pub struct Cell {
     pub flank_coupling: Vec<f64>,
     /// Stiffness of the other nodes while no force acts on the flanks, r x r.
     pub body: Vec<f64>,
-    /// Stiffness with the bore nodes eliminated, nothing touching them (see [`DenseKernels::eliminate`]).
+    /// Stiffness with the bore nodes eliminated, nothing touching them (see `DenseKernels::eliminate`).
     pub free_body: Vec<f64>,
 }
 

@@ -149,7 +149,7 @@ struct BearingPoint {
 pub struct BearingPlace {
     /// Normal force of the pair, N for each mm of the face.
     pub load: f64,
-    /// Largest pressure, MPa ([`FlankContact::peak_pressure_mpa`]).
+    /// Largest pressure, MPa (`FlankContact::peak_pressure_mpa`).
     pub peak_mpa: f64,
     /// Share of the force on a tip: on its rounding, or within one rounding radius of where that begins; of the tooth
     /// of the flexspline, and of the teeth of the circular spline.
@@ -159,7 +159,7 @@ pub struct BearingPlace {
     pub reach_mm: f64,
 }
 
-/// How the load of a pair lies along the face, and what a slope s of its offsets ([`FaceLaw::slope`]) changes.
+/// How the load of a pair lies along the face, and what a slope s of its offsets (`FaceLaw::slope`) changes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AlongFace {
     /// Peak over mean.

@@ -15,7 +15,7 @@ use crate::units::ARCMIN_PER_RAD;
 /// The numbers that make a drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FewNumbers {
-    /// Teeth of the flexspline: even, [`FewNumbers::TEETH`].
+    /// Teeth of the flexspline: even, `FewNumbers::TEETH`.
     pub teeth: u32,
     /// Module, mm.
     pub module_mm: f64,

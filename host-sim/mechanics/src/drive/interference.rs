@@ -294,7 +294,7 @@ impl RigidMesh {
     ///
     /// Errors of teeth, spaces, axes, rim and generator move each tooth against its space, to first order: the least
     /// gap of the drawing,
-    /// [`RigidMesh::gap`], opens and closes by what the motion has along the normal of the flank. A turn of the output
+    /// `RigidMesh::gap`, opens and closes by what the motion has along the normal of the flank. A turn of the output
     /// is looked at in 1999 places. Missing where the teeth never meet.
     pub fn room_as_built(&self, drive: &Drive, generator: GeneratorKind) -> Option<Room> {
         let moved = FlankDeviations::new(drive);

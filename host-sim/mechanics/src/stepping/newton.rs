@@ -85,7 +85,7 @@ pub struct Increment {
     /// Force of the generator along its major axis on the half of the rim at 0°, outward, N.
     pub lobe_force_n: f64,
     /// Largest contact pressure on a flank and on the bore, MPa; on a flank that of two elastic bodies under its force,
-    /// where the load along the face is largest ([`FlankContact::peak_pressure_mpa`]); on the bore that of the penalty.
+    /// where the load along the face is largest (`FlankContact::peak_pressure_mpa`); on the bore that of the penalty.
     pub peak_pressure_mpa: [f64; 2],
     /// The teeth and the load along the face.
     pub face: Face,

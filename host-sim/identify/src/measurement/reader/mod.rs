@@ -1,6 +1,6 @@
 //! The one reader of other people's files: bytes to text, text to rows of one layout, cells to numbers.
 //!
-//! [`Sheet::read`] finds the layout and which lines are rows; [`Sheet::columns`] reads the columns that are asked for.
+//! [`Sheet::read`] finds the layout and which lines are rows; `Sheet::columns` reads the columns that are asked for.
 //! Whatever is left out or read otherwise than it stands is said in [`Sheet::notes`] with its line. `look` asks for all
 //! columns, `calibrate`, `diagnose` and `replay` for those of the mapping.
 
