@@ -208,6 +208,11 @@ fn table(flights: &[VariedFlight], out: &Path) -> String {
             }
         );
     }
+    for flight in flights {
+        for remark in flight.results.iter().flat_map(|results| &results.remarks) {
+            let _ = writeln!(text, "caution: {}: {remark}", label(flight));
+        }
+    }
     text + &format!("flights.json in {}", out.display())
 }
 

@@ -11,6 +11,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::built_in::{SCENARIOS, built_in};
+use super::results::PACES_HZ;
 use super::{Flown, FlyError};
 
 const TORQUES: [(&str, TorqueKnown); 4] = [
@@ -62,6 +63,8 @@ fn fields(flown: &mut Flown) -> Vec<Field<'_>> {
     let accelerates = &mut scenario.acceleration_rad_s2;
     let (told, known) = (&mut scenario.load_fed_forward, &mut scenario.friction_known);
     let pulls = "weight times arm, N·m, and the output angle where it pulls forward most, rad";
+    let [speed, position, integral] = PACES_HZ;
+    let corner = "corner of the integral of the speed loop, Hz";
     let late = "fifths of a tick from a sample to the torque that it asks for";
     vec![
         field("name", "name in the results", To::Name(&mut scenario.name)),
@@ -87,9 +90,9 @@ fn fields(flown: &mut Flown) -> Vec<Field<'_>> {
         field("load.gravity", pulls, To::Pair(&mut load.gravity, [TORQUE, from(-10.0, 10.0)])),
         n("servo.inertia_kg_m2", "inertia of motor and generator, kg·m²", &mut servo.inertia_kg_m2, 1e-6, 1.0),
         n("servo.largest_n_m", "largest torque of the motor, N·m", &mut servo.largest_n_m, 0.01, 100.0),
-        n("servo.position_hz", "bandwidth of the position loop, Hz", &mut servo.position_hz, 0.1, 100.0),
-        n("servo.speed_hz", "bandwidth of the speed loop, Hz", &mut servo.speed_hz, 0.1, 200.0),
-        n("servo.integral_hz", "corner of the integral of the speed loop, Hz", &mut servo.integral_hz, 0.0, 100.0),
+        n("servo.position_hz", "bandwidth of the position loop, Hz", &mut servo.position_hz, position[0], position[1]),
+        n("servo.speed_hz", "bandwidth of the speed loop, Hz", &mut servo.speed_hz, speed[0], speed[1]),
+        n("servo.integral_hz", corner, &mut servo.integral_hz, integral[0], integral[1]),
         n("servo.jitter_s", "the encoder is read up to so much too late, s", &mut servo.jitter_s, 0.0, 1e-3),
         field("servo.late_steps", late, To::Count(&mut servo.late_steps, from(0.0, most_late))),
         field("servo.encoder_bits", "bits in a turn of the motor", To::Word(&mut servo.encoder_bits, from(8.0, 30.0))),

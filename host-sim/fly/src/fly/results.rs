@@ -1,8 +1,10 @@
 //! A flight in numbers.
 
 use flexspline_motion::flight::{COMPENSATED, Flight, Flown, START_UP_S};
+use flexspline_motion::loops::TwoMasses;
 use flexspline_motion::scenario::Scenario;
 use flexspline_motion::servo::ServoSettings;
+use rayon::prelude::*;
 use serde::Serialize;
 
 use flexspline_algebra::spectrum as sums_of;
@@ -90,11 +92,14 @@ impl Results {
     /// Whether the servo is stable and a little more delay, gain or inertia would make it ring.
     #[must_use]
     pub fn servo_is_near_the_edge(&self) -> bool {
-        self.servo_distance > 0.0
-            && (self.servo_distance < LEAST_DISTANCE || self.phase_margin_deg[0] < LEAST_PHASE_MARGIN_DEG)
+        self.servo_distance > 0.0 && !self.servo_is_sound()
     }
 
-    /// What speaks against the flight, in sentences; `way_out` says with which pace the servo is sound.
+    fn servo_is_sound(&self) -> bool {
+        self.servo_distance >= LEAST_DISTANCE && self.phase_margin_deg[0] >= LEAST_PHASE_MARGIN_DEG
+    }
+
+    /// What speaks against the flight, in sentences; `way_out` says with which paces the servo is sound.
     fn against(&self, way_out: &str) -> Vec<String> {
         let servo_is_stable = self.servo_distance > 0.0;
         let [margin, at_hz] = self.phase_margin_deg;
@@ -116,7 +121,10 @@ impl Results {
                 servo_is_stable && !self.stable,
                 "With compensation the joint does not come to rest after a knock as it does without.".to_owned(),
             ),
-            (self.rms_arcsec.compensated > self.rms_arcsec.none, "Compensation makes this flight worse.".to_owned()),
+            (
+                self.stable && self.rms_arcsec.compensated > self.rms_arcsec.none,
+                "Compensation makes this flight worse.".to_owned(),
+            ),
         ];
         remarks.into_iter().filter(|(there, _)| *there).map(|(_, remark)| remark).collect()
     }
@@ -175,36 +183,66 @@ pub fn results(flown: &super::Flown, flight: &Flight) -> Option<Results> {
         torque_within_bound: current.then_some(core.told),
         digest: format!("{digest:016x}"),
     };
-    let way_out = match sound_pace(flight, &scenario.servo) {
-        Some((name, hz)) => format!("with servo.{name} = {hz:.3} it is sound"),
-        None => "no lower pace of one of its loops alone makes it sound: lower servo.speed_hz and servo.position_hz \
-                 together"
-            .to_owned(),
-    };
+    let way_out = if results.servo_is_sound() { String::new() } else { way_out(flight, scenario) };
     results.remarks = results.against(&way_out);
     Some(results)
 }
 
-/// The pace of the servo that has to be lowered least for a sound loop, and what it is then, Hz.
-fn sound_pace(flight: &Flight, servo: &ServoSettings) -> Option<(&'static str, f64)> {
-    // Shares of a twentieth: finer than a servo is tuned. A guess.
-    const STEPS: u32 = 20;
-    let lowered = |share: f64| {
-        let [position_hz, speed_hz, integral_hz] =
-            [servo.position_hz, servo.speed_hz, servo.integral_hz].map(|hz| share * hz);
-        [
-            ("speed_hz", speed_hz, ServoSettings { speed_hz, ..*servo }),
-            ("position_hz", position_hz, ServoSettings { position_hz, ..*servo }),
-            ("integral_hz", integral_hz, ServoSettings { integral_hz, ..*servo }),
-        ]
+/// A pace changes by a fifth a step, down to a tenth in the end; that of the speed loop as far up, too, where it is too
+/// slow for the others. A guess: finer than a servo is tuned, and further than one that is nearly right is changed.
+const STEP: f64 = 0.8;
+/// A guess, see [`STEP`].
+const MOST_STEPS: i32 = 10;
+/// Paces that a scenario may have, Hz: of speed, position and integral. A guess.
+pub(super) const PACES_HZ: [[f64; 2]; 3] = [[0.1, 200.0], [0.1, 100.0], [0.0, 100.0]];
+
+/// With which paces the servo is sound, or what keeps it from that.
+fn way_out(flight: &Flight, scenario: &Scenario) -> String {
+    const NAMES: [&str; 3] = ["speed_hz", "position_hz", "integral_hz"];
+    let servo = &scenario.servo;
+    let paces = [servo.speed_hz, servo.position_hz, servo.integral_hz];
+    if let Some(sound) = sound_paces(&flight.joint, servo) {
+        let changed = NAMES.iter().zip(sound).zip(paces).filter(|((_, to), from)| to != from);
+        let said: Vec<String> = changed.map(|((name, to), _)| format!("servo.{name} = {to}")).collect();
+        return format!("with {} it is sound, by the same margins", said.join(", "));
+    }
+    let [held_hz, free_hz] = flight.resonances_hz;
+    let (load_kg_m2, motor_kg_m2) = (scenario.load_kg_m2, flight.joint.motor_kg_m2);
+    format!(
+        "it is sound with no servo.speed_hz from a tenth to ten times this one, servo.position_hz and \
+         servo.integral_hz down to a tenth: the load has {:.0} times the inertia that the loops are tuned for \
+         ({load_kg_m2} of {motor_kg_m2:.2} kg·m² at the output), and swings on the drive's spring at {held_hz:.1} Hz \
+         with the motor held, at {free_hz:.1} Hz with it free",
+        load_kg_m2 / motor_kg_m2
+    )
+}
+
+/// Paces of speed, position and integral with which the servo's loop is sound: the fewest changed, and those least.
+fn sound_paces(joint: &TwoMasses, servo: &ServoSettings) -> Option<[f64; 3]> {
+    let paces = [servo.speed_hz, servo.position_hz, servo.integral_hz];
+    // What is printed is what is judged.
+    let changed = |hz: f64, steps: i32| match steps {
+        0 => hz,
+        _ => format!("{:.1e}", hz * STEP.powi(steps)).parse().unwrap_or(hz),
     };
-    let is_sound = |servo: &ServoSettings| {
-        let margin = flight.joint.servo(servo);
-        let [phase_margin_deg, _] = flight.joint.phase_margin_deg(servo);
-        margin.stable && margin.distance >= LEAST_DISTANCE && phase_margin_deg >= LEAST_PHASE_MARGIN_DEG
+    let lower = || 0..=MOST_STEPS;
+    let of_speed =
+        |speed: i32| lower().flat_map(move |position| lower().map(move |integral| [speed, position, integral]));
+    let mut all: Vec<[i32; 3]> = (-MOST_STEPS..=MOST_STEPS).flat_map(of_speed).collect();
+    all.sort_by_key(|steps| {
+        (steps.iter().filter(|steps| **steps != 0).count(), steps.iter().map(|n| n.abs()).sum::<i32>())
+    });
+    let is_sound = |paces: &[f64; 3]| {
+        let [speed_hz, position_hz, integral_hz] = *paces;
+        let servo = ServoSettings { speed_hz, position_hz, integral_hz, ..*servo };
+        let margin = joint.servo(&servo);
+        paces.iter().zip(PACES_HZ).all(|(hz, [low, high])| (low..=high).contains(hz))
+            && margin.stable
+            && margin.distance >= LEAST_DISTANCE
+            && joint.phase_margin_deg(&servo)[0] >= LEAST_PHASE_MARGIN_DEG
     };
-    let shares = (1..=STEPS).rev().map(|step| f64::from(step) / f64::from(STEPS));
-    shares.flat_map(lowered).find(|(.., servo)| is_sound(servo)).map(|(name, hz, _)| (name, hz))
+    let tried = all.into_par_iter().map(|steps| [0, 1, 2].map(|pace| changed(paces[pace], steps[pace])));
+    tried.find_first(is_sound)
 }
 
 /// `OnLoad` as `on_load`; what is not known is `none`.
