@@ -148,6 +148,11 @@ fn a_drive_like_a_catalogues_is_right_to_the_scatter_of_the_catalogue() {
     assert_eq!(refused.code, 2);
     assert!(refused.stderr.contains("a data sheet completed this table"), "{}", refused.stderr);
 
+    // Two rollers are softer than the sheet's cam: no table, and no scatter of units in its place.
+    let refused = desk.line(&format!("tables {} {sheet} --out soft", how.replace("cam", "two-roller")));
+    assert!(refused.code == 2 && refused.stderr.contains("and the FEM has"), "{}", refused.stderr);
+    assert!(!desk.path("soft/two-roller.fxt").exists());
+
     // A sheet without K3 completes nothing, and says what it lacks.
     desk.write("short.toml", &alone.replace("k3_n_m_per_rad", "# k3_n_m_per_rad"));
     let refused = desk.line(&format!("tables {how} --drive short.toml --complete-from-data-sheet"));

@@ -6,7 +6,8 @@
 //! ```
 //!
 //! Both K are secants over the same range: from first contact to T1, to T2, to the end of the table. Where the FEM is
-//! the softer of the two nothing is taken away. The sheet speaks of a series, a unit may be off by its scatter `s`: a
+//! the softer of the two no spring in series mends it, and no scatter of units is as large as the difference: such a
+//! drive is refused. The sheet speaks of a series, a unit may be off by its scatter `s`: a
 //! softer unit winds up `1 / (1 - s)` times as far, so that the table may be off by `s / (1 - s)` of its wind-up.
 //!
 //! The loss is the width of the loop at no load after the largest torque either way. What the clearance of the FEM does
@@ -26,6 +27,9 @@ use flexspline_mechanics::drive::Drive;
 /// Torques at which springs that slip do so, over the largest torque: all of them from end to end while it is taken
 /// off, as the loss is measured. How a loop opens is in no catalogue: a guess.
 const SLIP_SHARES: [f64; 3] = [0.125, 0.25, 0.5];
+
+/// Stiffnesses that differ by less are the same: what K of a completed table differs by from its sheet , as measured.
+const SAME: f64 = 0.01;
 
 /// Torque nodes at a knee, over its torque: a cubic through wide intervals rounds it off by seconds (2.9" of CSF-25-100
 /// between 14 and 30 N·m, with the knee alone for a node).
@@ -57,6 +61,23 @@ pub enum CompletionError {
         ends_n_m: f64,
         /// First contact.
         touch_n_m: f64,
+    },
+    /// A drive that is softer than its sheet.
+    #[error(
+        "data_sheet.k{}_n_m_per_rad: found {}, and the FEM has {} N.m/rad there, from {} to {} N.m: a spring in series \
+         makes no drive stiffer, and the table would be off by the difference beside what units scatter by; allowed: \
+         a drive that is as stiff as its sheet in all ranges (catalogues rate a cam), or tables without the sheet",
+        range + 1, short(*stated), short(*fem), short(between_n_m[0]), short(between_n_m[1])
+    )]
+    Softer {
+        /// Which of the three.
+        range: usize,
+        /// K as stated, N m/rad.
+        stated: f64,
+        /// K of the FEM.
+        fem: f64,
+        /// Torques between which, N m.
+        between_n_m: [f64; 2],
     },
     /// A loop that the wind-up has no room for.
     #[error(
@@ -135,18 +156,13 @@ impl SheetStiffness {
         if touch_n_m >= t1_n_m.min(ends_n_m) {
             return Err(CompletionError::TooShort { ends_n_m, touch_n_m });
         }
-        let ranges = [[touch_n_m, t1_n_m], [t1_n_m, t2_n_m], [t2_n_m, f64::INFINITY]];
-        let fem = ranges.map(|range| {
-            let [from, to] = range.map(|torque| torque.min(ends_n_m));
+        let ranges = [[touch_n_m, t1_n_m], [t1_n_m, t2_n_m], [t2_n_m, f64::INFINITY]]
+            .map(|range| range.map(|torque| torque.min(ends_n_m)));
+        let fem = ranges.map(|[from, to]| {
             let secant = (to - from) / (torsion_rad(drive, table, to)? - torsion_rad(drive, table, from)?);
             Some(secant).filter(|k| from < to && k.is_finite())
         });
-        let lacks = |range: usize| {
-            let by_fem = fem.get(range).copied().flatten()?;
-            Some((1.0 / self.k_n_m_per_rad.get(range)? - 1.0 / by_fem).max(0.0))
-        };
-        let spring =
-            MissingSpring { t1_n_m, t2_n_m, compliance_rad_per_n_m: [0, 1, 2].map(|k| lacks(k).unwrap_or(0.0)) };
+        let spring = self.spring(ranges, fem)?;
         let scatter = 1e-2 * self.scatter_percent;
         let by_fem = torsion_rad(drive, table, ends_n_m).zip(torsion_rad(drive, table, touch_n_m));
         let wind_up_rad = by_fem.map_or(0.0, |(end, touch)| end - touch) + spring.torsion_rad(ends_n_m);
@@ -160,6 +176,21 @@ impl SheetStiffness {
             uncertainty_arcsec: scatter / (1.0 - scatter) * wind_up_rad.abs() * ARCSEC_PER_RAD,
             slip: self.slip(ends_n_m, play_arcmin)?,
         })
+    }
+
+    /// The spring that makes stiffnesses of the FEM those of the sheet, by range; none beyond the end of the table.
+    fn spring(&self, ranges: [[f64; 2]; 3], fem: [Option<f64>; 3]) -> Result<MissingSpring, CompletionError> {
+        let mut compliance_rad_per_n_m = [0.0; 3];
+        let stated = self.k_n_m_per_rad.into_iter().zip(ranges).enumerate();
+        for ((lacks, by_fem), (range, (stated, between_n_m))) in compliance_rad_per_n_m.iter_mut().zip(fem).zip(stated)
+        {
+            let Some(fem) = by_fem else { continue };
+            if fem < (1.0 - SAME) * stated {
+                return Err(CompletionError::Softer { range, stated, fem, between_n_m });
+            }
+            *lacks = (1.0 / stated - 1.0 / fem).max(0.0);
+        }
+        Ok(MissingSpring { t1_n_m: self.t1_n_m, t2_n_m: self.t2_n_m, compliance_rad_per_n_m })
     }
 
     /// Springs that slip for the loss beyond a play; none where the play has all of it, or no loss is stated.
@@ -308,6 +339,20 @@ mod tests {
         let keys = vec!["t1_n_m", "k2_n_m_per_rad", "k3_n_m_per_rad"];
         assert_eq!(SheetStiffness::of(&stated), Err(CompletionError::Missing { keys }));
         assert_eq!(sheet(None).mark(), ", sheet +-30 %");
+    }
+
+    /// CSF-25-100 with two rollers: 14 300 N·m/rad where the sheet has 50 000. What is softer by less than a percent,
+    /// or beyond the table, is as good as the sheet.
+    #[test]
+    fn a_drive_that_is_softer_than_its_sheet_is_not_completed() {
+        let ranges = [[0.05, 14.0], [14.0, 48.0], [48.0, 62.0]];
+        let spring = |fem| sheet(None).spring(ranges, fem);
+        let why = spring([Some(62e3), Some(14.3e3), Some(60e3)]).unwrap_err();
+        assert_eq!(why, CompletionError::Softer { range: 1, stated: 50e3, fem: 14.3e3, between_n_m: [14.0, 48.0] });
+        let said = why.to_string();
+        assert!(said.starts_with("data_sheet.k2_n_m_per_rad: found 50000, and the FEM has 14300 N.m/rad"), "{said}");
+        assert_eq!(spring([Some(31e3), Some(49.6e3), None]).unwrap().compliance_rad_per_n_m, [0.0; 3]);
+        assert!((spring([Some(62e3), None, None]).unwrap().compliance_rad_per_n_m[0] - 1.0 / 62e3).abs() < 1e-12);
     }
 
     /// Knees become nodes, in their order, and not beside a node that is there.
