@@ -12,7 +12,7 @@ use serde_json::Value;
 use thiserror::Error;
 
 use crate::measurement::{MeasuredError, plain_rows};
-use crate::turns_off::{TurnsOff, about_mean, turns_off};
+use crate::turns_off::{TurnsOff, about_mean, torque_turned, turns_off};
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::generator_of;
 
@@ -73,6 +73,8 @@ pub struct ReplaySummary {
     pub rows_by_quality: [usize; 4],
     /// Whole turns of the motor by which the generator zero of the rows is off the table's, where the rows show that.
     pub generator_zero_off: Option<TurnsOff>,
+    /// What the table leaves with the torque's sign turned, arcsec rms, where the rows show that it is.
+    pub torque_turned_rms_arcsec: Option<f64>,
     /// Whose rows they are, where that is known.
     pub rows_of: Option<RowsOf>,
     /// What has to be known of them: that they are another drive's, or nobody's.
@@ -148,6 +150,13 @@ impl ReplaySummary {
     /// What has to be said where the table gains less than it could, or nothing.
     fn of_gain(&self) -> Option<String> {
         let (measured, left) = (self.rms_measured_arcsec, self.rms_residual_arcsec);
+        if let Some(turned) = self.torque_turned_rms_arcsec {
+            return Some(format!(
+                "the torque's sign is turned: the table leaves {left:.1} arcsec rms as the rows stand, and \
+                 {turned:.1} with the other sign; positive is what turns the output forward: --columns \
+                 torque=NAME:-N.m"
+            ));
+        }
         if let Some(off) = &self.generator_zero_off {
             return Some(off.text(left));
         }
@@ -194,6 +203,9 @@ pub fn parse(file: &str, bytes: &[u8], ratio: f64, temperature_c: f64) -> Result
         what: error.what,
     };
     let rows = plain_rows(file, bytes, ratio).map_err(refuse)?;
+    if let Some(what) = turns_otherwise(&rows.generator_rad, &rows.error_rad, ratio) {
+        return Err(MeasurementError { file: file.to_owned(), line: 1, what });
+    }
     let at = |values: &Option<Vec<f64>>, row: usize, usual: f64| values.as_ref().map_or(usual, |values| values[row]);
     Ok((0..rows.generator_rad.len())
         .map(|row| MeasuredRow {
@@ -203,6 +215,40 @@ pub fn parse(file: &str, bytes: &[u8], ratio: f64, temperature_c: f64) -> Result
             temperature_c: at(&rows.temperature_c, row, temperature_c),
         })
         .collect())
+}
+
+/// An error about its mean that is none of a gear, rad rms. A guess: one degree, where drives err by arc-minutes.
+const MOST_ERROR_RAD: f64 = 0.0175;
+/// How near to a unit or a sign the way of the output has to be to be taken for one. A guess.
+const NEAR: f64 = 0.05;
+
+/// That the output does not turn as the generator over the ratio, and what that looks like.
+fn turns_otherwise(generator_rad: &[f64], error_rad: &[f64], ratio: f64) -> Option<String> {
+    if about_mean(error_rad) < MOST_ERROR_RAD {
+        return None;
+    }
+    let count = generator_rad.len() as f64;
+    let mean = generator_rad.iter().sum::<f64>() / count;
+    let both = || generator_rad.iter().map(|at| at - mean).zip(error_rad);
+    let slope = both().map(|(at, error)| at * error).sum::<f64>() / both().map(|(at, _)| at * at).sum::<f64>();
+    let times = 1.0 + ratio * slope;
+    // What jumps is on no line.
+    let beside: Vec<f64> = both().map(|(at, error)| error - slope * at).collect();
+    let near = |other: f64| (times / other - 1.0).abs() < NEAR;
+    let degrees = 180.0 / std::f64::consts::PI;
+    let hint = match times {
+        _ if near(-1.0) => "; one of the two counts backward: --columns output=NAME:-rad turns it",
+        _ if near(degrees) || near(-degrees) => "; the output looks like degrees: --columns output=NAME:deg",
+        _ if near(1.0 / degrees) || near(-1.0 / degrees) => {
+            "; the generator looks like degrees: --columns generator=NAME:deg"
+        }
+        _ => "",
+    };
+    (about_mean(&beside) < MOST_ERROR_RAD * times.abs().max(1.0)).then(|| {
+        format!(
+            "output: turns {times:.4} times as far as the generator over the table's ratio {ratio}, allowed: 1{hint}"
+        )
+    })
 }
 
 /// Runs the core over the rows, from a state it does not know.
@@ -237,6 +283,7 @@ pub fn replay(table: &Table<'_>, rows: &[MeasuredRow]) -> (Vec<ReplayedRow>, Rep
     let about = |value: fn(&ReplayedRow) -> f64| about_mean(&replayed.iter().map(value).collect::<Vec<_>>());
     let count = replayed.len().max(1) as f64;
     let mean_residual = replayed.iter().map(|row| row.residual_arcsec).sum::<f64>() / count;
+    let turned = torque_turned(table, rows);
     let mut summary = ReplaySummary {
         schema_version: 1,
         status: if by_quality[2] + by_quality[3] == 0 { "in range" } else { "extrapolated" },
@@ -249,7 +296,8 @@ pub fn replay(table: &Table<'_>, rows: &[MeasuredRow]) -> (Vec<ReplayedRow>, Rep
             .fold(0.0, |m, row| f64::max(m, (row.residual_arcsec - mean_residual).abs())),
         mean_residual_arcsec: mean_residual,
         rows_by_quality: by_quality,
-        generator_zero_off: turns_off(table, rows),
+        generator_zero_off: if turned.is_none() { turns_off(table, rows) } else { None },
+        torque_turned_rms_arcsec: turned,
         rows_of: None,
         remarks: Vec::new(),
         command: String::new(),
@@ -289,6 +337,30 @@ mod tests {
         let by_output = parse("b.csv", text.as_bytes(), 95.0, 20.0).unwrap();
         assert!((by_error[0].error_arcsec - by_output[0].error_arcsec).abs() < 1e-9);
         assert_eq!((by_output[0].torque_n_m, by_output[0].temperature_c), (3.0, 20.0));
+    }
+
+    /// Three turns of a drive of ratio 95 whose columns are wrong; an encoder that jumps is no other unit.
+    #[test]
+    fn an_output_that_does_not_turn_with_the_generator_is_refused_with_what_it_looks_like() {
+        let read = |output: fn(f64, f64) -> f64| {
+            let row = |k: u32| {
+                let generator = 0.1 * f64::from(k);
+                format!("{generator},{}\n", output(generator, generator / 95.0 + 1e-3 * generator.sin()))
+            };
+            let rows: String = (0..190).map(row).collect();
+            parse("m.csv", format!("generator_rad,output_rad\n{rows}").as_bytes(), 95.0, 20.0)
+        };
+        assert!(read(|_, output| output).is_ok());
+        assert!(read(|generator, output| if generator > 17.0 { output + 0.1 } else { output }).is_ok());
+        for (output, hint) in [
+            ((|_, output| -output) as fn(f64, f64) -> f64, "one of the two counts backward"),
+            (|_, output| output.to_degrees(), "--columns output=NAME:deg"),
+            (|_, output| output.to_radians(), "--columns generator=NAME:deg"),
+            (|_, output| 95.0 / 61.0 * output, "turns 1.5"),
+        ] {
+            let said = read(output).unwrap_err().to_string();
+            assert!(said.contains(hint) && said.contains("the table's ratio 95, allowed: 1"), "{said}");
+        }
     }
 
     #[test]

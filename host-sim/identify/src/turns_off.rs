@@ -50,24 +50,39 @@ impl TurnsOff {
     }
 }
 
+/// Some of the rows, evenly.
+fn some(rows: &[MeasuredRow]) -> Vec<&MeasuredRow> {
+    rows.iter().step_by(rows.len().div_ceil(LOOKED_AT).max(1)).collect()
+}
+
+/// What the table leaves of rows about their mean, arcsec rms, with the generator's zero and the torque's sign changed.
+fn left(table: &Table<'_>, rows: &[&MeasuredRow], off_rad: f64, sign: f64) -> f64 {
+    let mut play = PlayState::unknown();
+    let residual = |row: &&MeasuredRow| {
+        let generator = GeneratorAngle::from_rad(row.generator_rad - off_rad).unwrap_or(GeneratorAngle::ZERO);
+        let torque_n_m = (sign * row.torque_n_m) as f32;
+        let said = table.forward(&mut play, generator, torque_n_m, row.temperature_c as f32);
+        row.error_arcsec - f64::from(said.transmission_error_rad) * ARCSEC_PER_RAD
+    };
+    about_mean(&rows.iter().map(residual).collect::<Vec<_>>())
+}
+
+/// What the table leaves of the rows with the torque's sign turned, arcsec rms; `None` unless that is clearly less than
+/// what it leaves of them as they stand, and than they have without it.
+#[must_use]
+pub(crate) fn torque_turned(table: &Table<'_>, rows: &[MeasuredRow]) -> Option<f64> {
+    let some = some(rows);
+    let measured: Vec<f64> = some.iter().map(|row| row.error_arcsec).collect();
+    let [stands, turned] = [1.0, -1.0].map(|sign| left(table, &some, 0.0, sign));
+    (turned < LEAVES * stands.min(about_mean(&measured))).then_some(turned)
+}
+
 /// Looks for the turn at which the table leaves least of the rows; `None` if that is the one in which they stand, or is
 /// not clear.
 #[must_use]
 pub(crate) fn turns_off(table: &Table<'_>, rows: &[MeasuredRow]) -> Option<TurnsOff> {
-    let some: Vec<&MeasuredRow> = rows.iter().step_by(rows.len().div_ceil(LOOKED_AT).max(1)).collect();
-    let left = |turns: i64| {
-        let mut play = PlayState::unknown();
-        let off_rad = std::f64::consts::TAU * turns as f64;
-        let residual: Vec<f64> = some
-            .iter()
-            .map(|row| {
-                let generator = GeneratorAngle::from_rad(row.generator_rad - off_rad).unwrap_or(GeneratorAngle::ZERO);
-                let said = table.forward(&mut play, generator, row.torque_n_m as f32, row.temperature_c as f32);
-                row.error_arcsec - f64::from(said.transmission_error_rad) * ARCSEC_PER_RAD
-            })
-            .collect();
-        about_mean(&residual)
-    };
+    let some = some(rows);
+    let left = |turns: i64| left(table, &some, std::f64::consts::TAU * turns as f64, 1.0);
     let measured: Vec<f64> = some.iter().map(|row| row.error_arcsec).collect();
     // A turn of the output later the table is the same.
     let half = (0.5 * table.drive().exact_ratio().abs()).ceil() as i64;
@@ -88,4 +103,35 @@ pub(super) fn about_mean(values: &[f64]) -> f64 {
     let count = values.len().max(1) as f64;
     let mean = values.iter().sum::<f64>() / count;
     (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flexspline_design::tables::{SampleOptions, from_samples, samples};
+    use flexspline_mechanics::drive::{Drive, GeneratorKind};
+
+    /// Rows of the drive of a table, loaded there and back, whose torque counts the other way; as it should; and none.
+    #[test]
+    fn a_torque_of_the_wrong_sign_is_reported_and_no_other() {
+        let bytes = include_bytes!("../../../tests/firmware/samples/cam.samples.csv");
+        let read = samples::parse("cam", bytes).unwrap();
+        let options = SampleOptions::default();
+        let made = from_samples(&Drive::hhd_95(), GeneratorKind::Cam, &read, "cam", bytes, options).unwrap();
+        let table = Table::check(&made.image).unwrap();
+        let rows = |load_n_m: f64, sign: f64| -> Vec<MeasuredRow> {
+            let mut play = PlayState::unknown();
+            let row = |k: u32| {
+                let (generator_rad, torque_n_m) = (0.3 * f64::from(k), load_n_m * (0.01 * f64::from(k)).sin());
+                let generator = GeneratorAngle::from_rad(generator_rad).unwrap();
+                let said = table.forward(&mut play, generator, torque_n_m as f32, 20.0);
+                let error_arcsec = f64::from(said.transmission_error_rad) * ARCSEC_PER_RAD;
+                MeasuredRow { generator_rad, error_arcsec, torque_n_m: sign * torque_n_m, temperature_c: 20.0 }
+            };
+            (0..1500).map(row).collect()
+        };
+        assert!(torque_turned(&table, &rows(100.0, -1.0)).is_some_and(|left| left < 1.0));
+        assert_eq!(torque_turned(&table, &rows(100.0, 1.0)), None);
+        assert_eq!(torque_turned(&table, &rows(0.0, -1.0)), None);
+    }
 }

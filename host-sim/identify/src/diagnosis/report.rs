@@ -69,12 +69,18 @@ pub struct Parameter {
     pub std: f64,
 }
 
+/// Writes a probability with what can be known of it.
+fn four_digits<S: serde::Serializer>(value: &f64, to: S) -> Result<S::Ok, S::Error> {
+    to.serialize_f64((1e4 * value).round() / 1e4)
+}
+
 /// A cause.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Cause {
     /// Its name.
     pub name: CauseName,
     /// Probability that it is this one and not the best rival, given that it is one of the library.
+    #[serde(serialize_with = "four_digits")]
     pub confidence: f64,
     /// Parameters; the unit is the end of the name.
     pub parameters: BTreeMap<&'static str, Parameter>,
@@ -291,6 +297,12 @@ impl Diagnosis {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_confidence_is_written_with_four_digits() {
+        let written = |value: f64| four_digits(&value, serde_json::value::Serializer).unwrap();
+        assert_eq!([0.989_999_997_9, 1.0 / 3.0].map(written), [0.99, 0.3333]);
+    }
 
     #[test]
     fn small_sizes_are_told_in_powers_of_ten() {
