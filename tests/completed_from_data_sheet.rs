@@ -89,7 +89,7 @@ fn flown(fem: &Table<'_>, completed: &Table<'_>, unit: [f64; 3]) -> ([f64; 3], f
 #[test]
 fn a_drive_like_a_catalogues_is_right_to_the_scatter_of_the_catalogue() {
     let desk = Desk::new();
-    let how = "--generator cam --mesh coarse --temperatures-c=20 --positions 6 --most-nodes 12 --no-report --json";
+    let how = "--generator cam --torque-n-m 62 --mesh coarse --temperatures-c=20 --positions 6 --most-nodes 12 --no-report --json";
     let sheet = "--like CSF-25-100 --complete-from-data-sheet";
     let told = desk.line(&format!("tables {how} {sheet} --out completed")).done().json();
     let drive = "--drive completed/drive-completed.toml";

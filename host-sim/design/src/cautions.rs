@@ -39,6 +39,21 @@ pub struct Caution {
     pub words: String,
 }
 
+/// Stress and pressure this many times above where caution begins are none of any steel: 3000 and 9000 MPa. A guess:
+/// the strongest maraging steels break at 2400 MPa (18Ni-350), and 9000 MPa indents bearing steel, whose hardness of
+/// 700 HV is 7000 MPa.
+const BEYOND_STEEL: f64 = 3.0;
+
+impl Caution {
+    /// Whether a drive or a load with this caution is none of which anybody wants a table: teeth that bind on the
+    /// drawing, tips that clash, forces that no steel bears.
+    pub fn rules_out_tables(&self) -> bool {
+        let is_of_strength = [NODAL, ROOT_FILLET, OVER_MESHES, FLANK_PRESSURE].contains(&self.figure);
+        let is_beyond = self.value.is_nan() || self.value > BEYOND_STEEL * self.limit;
+        [RIGID_GAP, TIP_CONTACT].contains(&self.figure) || is_of_strength && is_beyond
+    }
+}
+
 /// The figures that are looked at, those that are known.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LookedAt {
@@ -72,7 +87,7 @@ impl LookedAt {
                 cautions.push(Caution { figure, value, limit, words: words(value) });
             }
         };
-        say("rigid_gap_um", self.rigid_gap_um, -1.0, -1e3 * RigidMesh::TOUCHES_MM, |gap| {
+        say(RIGID_GAP, self.rigid_gap_um, -1.0, -1e3 * RigidMesh::TOUCHES_MM, |gap| {
             format!(
                 "the teeth of the drawing interfere by {:.1} um when rigid: such a drive binds; drive --check says \
                  where",
@@ -91,7 +106,7 @@ impl LookedAt {
         } else {
             say(place, stress, 1.0, YIELD_MPA, |stress| above_yield(stress, ""));
         }
-        say("peak_flank_pressure_mpa", self.peak_flank_pressure_mpa, 1.0, MOST_FLANK_PRESSURE_MPA, |pressure| {
+        say(FLANK_PRESSURE, self.peak_flank_pressure_mpa, 1.0, MOST_FLANK_PRESSURE_MPA, |pressure| {
             format!(
                 "a flank pressure of {pressure:.0} MPa is above {MOST_FLANK_PRESSURE_MPA} MPa, which no steel bears \
                  for long"
@@ -106,7 +121,7 @@ impl LookedAt {
         // What makes the others what they are comes first.
         if let Some(tips) = self.tip_contact.filter(TipContact::counts) {
             let (value, words) = (tips.share, tips.in_words());
-            cautions.insert(0, Caution { figure: "tip_contact", value, limit: MOST_TIP_SHARE, words });
+            cautions.insert(0, Caution { figure: TIP_CONTACT, value, limit: MOST_TIP_SHARE, words });
         }
         cautions
     }
@@ -121,6 +136,12 @@ impl LookedAt {
     }
 }
 
+/// Teeth of the drawing that interfere.
+const RIGID_GAP: &str = "rigid_gap_um";
+/// The figure of the pressure between flanks.
+const FLANK_PRESSURE: &str = "peak_flank_pressure_mpa";
+/// Tips that bear outside the mesh.
+const TIP_CONTACT: &str = "tip_contact";
 /// The figure of nodal stress.
 const NODAL: &str = "max_von_mises_mpa";
 /// The figure of stress by the strain of a surface.
@@ -186,6 +207,14 @@ mod tests {
         assert_eq!(figures(LookedAt { max_von_mises_mpa: Some(f64::NAN), ..sound }), ["max_von_mises_mpa"]);
         assert_eq!(figures(LookedAt { peak_flank_pressure_mpa: Some(3001.0), ..sound }), ["peak_flank_pressure_mpa"]);
         assert_eq!(figures(LookedAt { slope_bound: Some(0.6), ..sound }), ["slope_bound"]);
+        // What yields a little has a table yet; what binds, or what no steel bears, has none.
+        let none = |looked: LookedAt| looked.cautions().iter().any(Caution::rules_out_tables);
+        assert!(none(LookedAt { rigid_gap_um: Some(-0.11), ..sound }));
+        for (pressure, rules_out) in [(3001.0, false), (44_275.0, true), (f64::NAN, true)] {
+            assert_eq!(none(LookedAt { peak_flank_pressure_mpa: Some(pressure), ..sound }), rules_out, "{pressure}");
+        }
+        assert!(!none(LookedAt { max_von_mises_mpa: Some(1150.0), slope_bound: Some(0.9), ..sound }));
+        assert!(none(LookedAt { root_fillet_mpa: Some(3205.0), ..sound }));
     }
 
     /// A nodal value of 664 MPa beside 1204 in a root fillet: the drive is no sounder for it. The larger is told, once,

@@ -17,6 +17,7 @@
 
 use serde::Serialize;
 
+use crate::cautions::Caution;
 use crate::data_sheet::{DataSheet, Loads, data_sheet};
 use flexspline_base::toml_file::{Allowed, TomlFile, above, from, real, text, yes_or_no};
 use flexspline_base::units::ARCSEC_PER_RAD;
@@ -179,7 +180,9 @@ impl Stated {
         let by_t2 = self.t2_n_m.map(|t2| t2 / usual.t2_n_m);
         let by_t1 = self.t1_n_m.map(|t1| t1 / usual.t1_n_m);
         let rated = self.rated_torque_n_m.filter(|_| !self.is_rated_within_t2());
-        let largest_n_m = rated.or(by_t2).or(by_t1).unwrap_or(rated_n_m);
+        // As it is printed, so that who types it has the same load.
+        let printed = |load: f64| short(load).parse().unwrap_or(load);
+        let largest_n_m = rated.or(by_t2.or(by_t1).map(printed)).unwrap_or(rated_n_m);
         let t2_n_m = match (self.t2_n_m, self.t1_n_m) {
             (Some(t2), _) => t2,
             // What is stated stays: the other end is put where there is room.
@@ -191,6 +194,14 @@ impl Stated {
             if t1 < t2_n_m { t1 } else { usual.t1_n_m / usual.t2_n_m * t2_n_m }
         });
         Loads { t1_n_m, t2_n_m, largest_n_m }
+    }
+
+    /// The load that counts as rated of a drive with a sheet: the largest of [`Self::loads`], which is a cam's; with
+    /// another generator, or without a sheet, that of the drive's size.
+    pub fn rated_n_m(stated: Option<&Stated>, drive: &Drive, kind: GeneratorKind) -> f64 {
+        let by_size_n_m = drive.rated_torque_n_m(kind);
+        let stated = stated.filter(|_| kind == GeneratorKind::Cam);
+        stated.map_or(by_size_n_m, |stated| stated.loads(by_size_n_m).largest_n_m)
     }
 
     /// Whether the rated torque leaves no range above T2: K3 then takes a larger load.
@@ -455,6 +466,28 @@ impl SheetBeside {
         lines
     }
 
+    /// That stiffness is not that of the sheet's units, and what to do; nothing where it is within their scatter, or
+    /// where no scatter is stated.
+    pub fn caution(&self) -> Option<Caution> {
+        let off = || self.beside.iter().filter(|row| row.within_scatter == Some(false));
+        let ratios = || off().filter_map(|row| row.ratio);
+        let value = ratios().max_by(|a, b| a.ln().abs().total_cmp(&b.ln().abs()))?;
+        let each = off().zip(ratios()).map(|(row, ratio)| format!("{} {ratio:.2}", row.in_words().0));
+        let percent = self.stated.unit_scatter_percent.unwrap_or(0.0);
+        let way_out = if ratios().all(|ratio| ratio > 1.0) {
+            "; `new --like` prints the command that adds guesses of cup and balls, and tables \
+             --complete-from-data-sheet the rest"
+        } else {
+            ""
+        };
+        let words = format!(
+            "stiffness over that of the data sheet is {}, and its units scatter by {percent:.0} %: wind-up is not that \
+             of such a unit{way_out}",
+            each.collect::<Vec<_>>().join(", ")
+        );
+        Some(Caution { figure: "data_sheet", value, limit: 1.0 + 1e-2 * percent, words })
+    }
+
     /// The three loads in N·m, each that is not of the sheet marked as assumed.
     pub fn loads_in_words(&self) -> String {
         let Loads { t1_n_m, t2_n_m, largest_n_m } = self.loads;
@@ -585,6 +618,13 @@ mod tests {
         assert_eq!(Stated::default().loads(50.0), usual);
         let stated = Stated { t2_n_m: Some(36.0), ..Stated::default() };
         assert!((stated.loads(1.0).largest_n_m - 50.0).abs() < 1e-9);
+        // CSF-25-100: T2 is 48 N·m. What is rated is what is printed, and a cam's.
+        let stated = crate::catalogue::sheet("CSF", 25.0, 100).unwrap();
+        let drive = Drive::hhd_95();
+        let rated = |stated, kind| Stated::rated_n_m(stated, &drive, kind);
+        assert_eq!(rated(Some(&stated), GeneratorKind::Cam), 66.67);
+        assert_eq!(rated(Some(&stated), GeneratorKind::TwoRoller), 20.0);
+        assert_eq!(rated(None, GeneratorKind::Cam), 200.0);
     }
 
     /// Whatever is stated alone is used as it is, and each load is above the one before.
@@ -630,6 +670,33 @@ mod tests {
                 assert_eq!(k1.remark(&sheet).contains("at assumed loads"), given & 1 == 0);
             }
         }
+    }
+
+    /// A drive 7.7 times as stiff as its sheet is no good page; one within what units scatter is.
+    #[test]
+    fn stiffness_beyond_what_units_scatter_is_a_caution() {
+        let row = |figure, ratio: f64| Beside {
+            figure,
+            stated: 1e4,
+            computed: Some(1e4 * ratio),
+            ratio: Some(ratio),
+            within_scatter: Some((ratio - 1.0).abs() <= 0.3),
+            words: "secant",
+            reason: None,
+        };
+        let caution = |k1: f64, k2: f64| {
+            let stated = Stated { unit_scatter_percent: Some(30.0), ..Stated::default() };
+            let (loads, assumed, sheet) = (stated.loads(20.0), stated.assumed(), DataSheet::default());
+            let beside = vec![row("k1_n_m_per_rad", k1), row("k2_n_m_per_rad", k2)];
+            SheetBeside { generator: GeneratorKind::Cam, stated, loads, assumed, sheet, beside, why: None }.caution()
+        };
+        assert_eq!(caution(1.2, 0.8), None);
+        let stiff = caution(7.7, 1.2).unwrap();
+        assert!(stiff.value == 7.7 && stiff.words.starts_with("stiffness over that of the data sheet is K1 7.70, and"));
+        assert!(stiff.words.contains("30 %") && stiff.words.contains("--complete-from-data-sheet"), "{}", stiff.words);
+        // Softer is further off here, and no sheet completes it.
+        let soft = caution(1.5, 0.2).unwrap();
+        assert!(soft.value == 0.2 && soft.words.contains("K1 1.50, K2 0.20") && !soft.words.contains("--complete"));
     }
 
     /// What a drive lacks that a catalogue's has is said of its stiffness, and of nothing else.

@@ -318,9 +318,7 @@ impl New {
             return Ok(None);
         }
         let generator = self.generator;
-        // The sheet's rated torque is that of a cam.
-        let rated_n_m = sheet.and_then(|sheet| sheet.rated_torque_n_m).filter(|_| generator == GeneratorKind::Cam);
-        let torque_n_m = rated_n_m.unwrap_or_else(|| drive.rated_torque_n_m(generator));
+        let torque_n_m = Stated::rated_n_m(sheet, &drive, generator);
         let mut progress = context.progress("run under load");
         let mut runs = 0;
         let mut told = |what: &str| {

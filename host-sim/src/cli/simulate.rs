@@ -181,6 +181,8 @@ impl Simulate {
             let _bar = context.progress("figures of the data sheet");
             beside(&drive, settings.generator, temperature_c, &stated, settings.solver)
         });
+        let sheet = simulation.summary.data_sheet.as_ref();
+        simulation.summary.cautions.extend(sheet.and_then(SheetBeside::caution));
 
         // Data sheet and stress took their time, too.
         let spent = context.spent();
@@ -203,9 +205,12 @@ impl Simulate {
         // What an earlier run left when it ended on its way is not of this one.
         let _ = std::fs::remove_file(out.join(PARTIAL));
         context.print(&simulation.summary, || {
-            let next = format!("tables --generator {}", settings.generator);
-            text(&simulation.summary, out, has_frames, has_page).trim_end().to_owned()
-                + &say::next(&[context.next(&next)])
+            let next = if simulation.summary.cautions.iter().any(Caution::rules_out_tables) {
+                "\nno table is of use with these cautions: change the drive or the load first".to_owned()
+            } else {
+                say::next(&[context.next(&format!("tables --generator {}", settings.generator))])
+            };
+            text(&simulation.summary, out, has_frames, has_page).trim_end().to_owned() + &next
         })
     }
 

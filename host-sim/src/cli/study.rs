@@ -15,8 +15,8 @@ use flexspline_design::data_sheet::{FIGURES, FigureOf};
 use flexspline_design::stated::short;
 use flexspline_design::study::{
     Asked, Basis, Constraint, LAST_STABLE, Nearest, RunStatus, Sense, Study, StudyEffect, StudyError, StudyRun,
-    StudySettings, StudyTarget, Trust, Vary, asked, effects, errors_of_making, figure, is_error_of_making, is_idle,
-    nearest, study,
+    StudySettings, StudyTarget, Trust, VariedValues, Vary, asked, effects, errors_of_making, figure,
+    is_error_of_making, is_idle, nearest, study,
 };
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
@@ -481,9 +481,29 @@ fn remarks(drive: &Drive, settings: &StudySettings, study: &Study) -> Vec<String
         let idle: Vec<&str> = idle.map(|kind| kind.name()).collect();
         if !idle.is_empty() {
             remarks.push(format!("{} changes no figure with {}", field.path, idle.join(", ")));
+        } else {
+            remarks.extend(at_an_end(drive, settings, study, k));
         }
     }
     remarks
+}
+
+/// That the best variant has the first or last value of a range, beyond which a better one may be.
+fn at_an_end(drive: &Drive, settings: &StudySettings, study: &Study, k: usize) -> Option<String> {
+    let (field, (run, _)) = (&settings.vary[k], best(drive, settings, study)?);
+    let VariedValues::Range { .. } = field.values else { return None };
+    let value = |run: &StudyRun| run.values[k].parse::<f64>().ok();
+    let (at, all) = (value(run)?, || study.runs.iter().filter_map(value));
+    let is_choice = !is_error_of_making(&field.path);
+    let is_end = all().all(|other| other <= at) || all().all(|other| other >= at);
+    (is_choice && is_end).then(|| {
+        format!(
+            "the best variant, {}, is at the end of the range of {}, {}: a better one may be beyond",
+            run.variant,
+            field.path,
+            short(at)
+        )
+    })
 }
 
 /// How many of the variants that meet what has to be kept are not to be built for all that, and why.
@@ -668,13 +688,34 @@ mod tests {
         assert_eq!(as_made(&Drive::built_in("HHD-95-typical").unwrap(), &settings).len(), 1);
     }
 
+    /// The end of a range is no best; a value within it is, and so is the end of a list, which is all there is.
+    #[test]
+    fn a_best_variant_at_the_end_of_a_range_is_told() {
+        let told = |vary: &str, stresses: [f64; 3]| {
+            let values = ["0.9", "1.0", "1.1"].iter().zip(stresses).enumerate();
+            let runs = values.map(|(k, (value, stress))| variant(k + 1, &[value], stress)).collect();
+            let (settings, study) = studied(&[vary], runs);
+            remarks(&Drive::hhd_95(), &settings, &study).into_iter().find(|remark| remark.contains("at the end"))
+        };
+        let range = "flexspline.rim_thickness_mm=0.9..1.1:3";
+        let said = told(range, [330.0, 320.0, 310.0]).unwrap();
+        assert!(said.starts_with("the best variant, 3, is at the end of the range of flexspline.rim"), "{said}");
+        assert!(told(range, [310.0, 320.0, 330.0]).is_some_and(|said| said.contains("_mm, 0.9:")));
+        assert_eq!(told(range, [330.0, 310.0, 320.0]), None);
+        assert_eq!(told("flexspline.rim_thickness_mm=0.9,1.0,1.1", [330.0, 320.0, 310.0]), None);
+    }
+
     /// What a sheet loads beyond the span of a table is told with what was found there.
     #[test]
     fn loads_beyond_the_span_of_a_table_are_told_with_what_was_found() {
         let drive = Drive::hhd_95();
         let runs = vec![variant(1, &["1.0"], 300.0), variant(2, &["1.2"], 300.0)];
         let (mut settings, mut study) = studied(&["flexspline.rim_thickness_mm=1.0,1.2"], runs);
+        // The table of a cam spans what the sheet rates.
         settings.stated = Some(Stated { rated_torque_n_m: Some(250.0), ..Stated::default() });
+        assert_eq!(settings.sheet_beyond_table_n_m(&drive, GeneratorKind::Cam), None);
+        settings.generators = vec![GeneratorKind::FourRoller];
+        study.runs.iter_mut().for_each(|run| run.generator = GeneratorKind::FourRoller);
         let told = |study: &Study| remarks(&drive, &settings, study)[0].clone();
         let all = told(&study);
         assert!(all.contains("250 N.m") && all.contains("every variant computed bears it"), "{all}");

@@ -65,7 +65,8 @@ pub(super) struct Tables {
     /// How far, in arcsec, a sample of a file may lie from the table [default: 20]
     #[arg(long, value_name = "ARCSEC", requires = "from_samples", allow_negative_numbers = true)]
     deviation_arcsec: Option<f64>,
-    /// Largest torque, N.m [default: 200; four-roller 100, two-roller 20; by the size of the drive]
+    /// Largest torque, N.m [default: 200; four-roller 100, two-roller 20; by the size of the drive;
+    /// of a cam with a [data_sheet] the rated torque]
     #[arg(long, value_name = "T", conflicts_with = "from_samples", allow_negative_numbers = true)]
     torque_n_m: Option<f64>,
     /// Torque nodes on each side of zero, at most, beside the pair at the drag torque; 5 to 30
@@ -141,7 +142,7 @@ impl Tables {
         }
         let tried = match &self.from_samples {
             Some(file) => vec![self.project(&drive, generators, file)],
-            None => self.sweep(context, &drive, generators, sheet.as_ref())?,
+            None => self.sweep(context, &drive, generators, stated.as_ref(), sheet.as_ref())?,
         };
         // One generator that fails takes no other's table away.
         let (mut made, mut failed) = (Vec::new(), Vec::new());
@@ -158,7 +159,11 @@ impl Tables {
             let settings = SolverSettings { method: self.solver, mesh: self.mesh, ..SolverSettings::default() };
             let reference_c = drive.temperature.reference_c;
             made.par_iter_mut().for_each(|table| {
-                table.info.data_sheet = Some(beside(&drive, table.kind, reference_c, stated, settings));
+                let sheet = beside(&drive, table.kind, reference_c, stated, settings);
+                if table.info.completed.is_none() {
+                    table.info.cautions.extend(sheet.caution());
+                }
+                table.info.data_sheet = Some(sheet);
             });
         }
         if let Some(stated) = &stated {
@@ -310,6 +315,7 @@ impl Tables {
         &self,
         drive: &Drive,
         kind: GeneratorKind,
+        stated: Option<&Stated>,
         sheet: Option<&SheetStiffness>,
     ) -> Result<TableSettings, Failure> {
         let mut settings = TableSettings::for_generator(drive, kind);
@@ -317,7 +323,7 @@ impl Tables {
         settings.solver = SolverSettings { method: self.solver, mesh: self.mesh, ..settings.solver };
         settings.positions = usize::from(self.positions);
         if let TorqueNodes::Chosen(choice) = &mut settings.torque_nodes {
-            choice.largest_n_m = self.torque_n_m.unwrap_or(choice.largest_n_m);
+            choice.largest_n_m = self.torque_n_m.unwrap_or_else(|| Stated::rated_n_m(stated, drive, kind));
             choice.most = self.most_nodes.map_or(choice.most, usize::from);
             choice.tolerance_arcsec = self.node_tolerance_arcsec.unwrap_or(choice.tolerance_arcsec);
         }
@@ -340,11 +346,12 @@ impl Tables {
         context: &Context,
         drive: &Drive,
         generators: &[GeneratorKind],
+        stated: Option<&Stated>,
         sheet: Option<&SheetStiffness>,
     ) -> Result<Vec<Result<MadeTable, Failure>>, Failure> {
         let wanted = generators
             .iter()
-            .map(|kind| Ok((*kind, self.settings(drive, *kind, sheet)?)))
+            .map(|kind| Ok((*kind, self.settings(drive, *kind, stated, sheet)?)))
             .collect::<Result<Vec<_>, Failure>>()?;
         // Before there is much work.
         context.out()?;

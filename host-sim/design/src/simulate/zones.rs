@@ -10,7 +10,7 @@ use std::f64::consts::{PI, TAU};
 use serde::Serialize;
 
 use flexspline_mechanics::contact::{BearingPlace, Configuration, FlankLaw};
-use flexspline_mechanics::drive::Side;
+use flexspline_mechanics::drive::{Profile, Side};
 use flexspline_mechanics::stepping::{Problem, State};
 
 /// Pairs that are nearer than this are looked at, mm. A guess: a pair that bears has no gap.
@@ -68,7 +68,8 @@ pub struct TipContact {
     /// How far the teeth there reach past the tips of the circular spline, mm: tips that are lower by this do not bear
     /// at that place, but teeth nearer to the axis may.
     pub reach_mm: f64,
-    /// A step by which to lower them, mm.
+    /// A step by which to lower them, mm; 0 of S-shaped teeth, whose spaces are cut by the tips: where these are lower,
+    /// so is the room.
     pub relief_step_mm: f64,
 }
 
@@ -149,7 +150,9 @@ fn pairs(problem: &Problem, state: &State) -> Vec<BearingPair> {
 impl TipContact {
     /// What bears on tips in a state that has all nodes near the flanks.
     pub fn at(problem: &Problem, state: &State) -> Option<TipContact> {
-        TipContact::of(&zones(problem, state), problem.drive.flexspline.module_mm)
+        let flexspline = &problem.drive.flexspline;
+        let tips = TipContact::of(&zones(problem, state), flexspline.module_mm)?;
+        Some(if flexspline.profile == Profile::S { TipContact { relief_step_mm: 0.0, ..tips } } else { tips })
     }
 
     /// The worst of some states: the one with the largest pressure on tips.
@@ -168,11 +171,15 @@ impl TipContact {
         format!(
             "tips bear on one another {:.0} deg from the major axis, outside the teeth in mesh: {:.1} % of the load, \
              up to {tip_n:.0} N on a pair ({mesh_n:.0} N in mesh) at {tip_mpa:.0} MPa ({mesh_mpa:.0} MPa in mesh); \
-             kinematic error, stiffness and pressure are those of this contact: lower flexspline.tip_radius_mm, \
-             {:.3} mm at a time, until none bears",
+             kinematic error, stiffness and pressure are those of this contact: {}",
             self.at_deg.abs(),
             100.0 * self.share,
-            self.relief_step_mm,
+            match self.relief_step_mm {
+                0.0 => "lower flexspline tips do not help S-shaped teeth, whose spaces they cut; higher \
+                        circular_spline.tip_radius_mm and tip_rounding_mm ease it; of involutes `new` lowers the tips"
+                    .to_owned(),
+                step_mm => format!("lower flexspline.tip_radius_mm, {step_mm:.3} mm at a time, until none bears"),
+            }
         )
     }
 
@@ -215,6 +222,8 @@ mod tests {
         assert!((tips.at_deg + 51.0).abs() < 1e-9 && tips.share == 0.1 && tips.counts(), "{tips:?}");
         assert_eq!(tips.peak_mpa, [1e4, 6e3]);
         assert!(tips.in_words().contains("tips bear on one another 51 deg") && tips.in_words().contains("0.050 mm"));
+        let s_shaped = TipContact { relief_step_mm: 0.0, ..tips }.in_words();
+        assert!(s_shaped.contains("S-shaped teeth, whose spaces they cut") && !s_shaped.contains("until none bears"));
         assert!(!TipContact { share: 0.5 * MOST_TIP_SHARE, ..tips }.counts());
     }
 }

@@ -77,7 +77,7 @@ impl StudySettings {
     pub fn sheet_beyond_table_n_m(&self, drive: &Drive, kind: GeneratorKind) -> Option<f64> {
         let by_sheet = self.torque_n_m.is_none() && self.has_fixed_loads();
         let largest_n_m = self.loads(drive, kind).largest_n_m;
-        (by_sheet && largest_n_m > drive.rated_torque_n_m(kind)).then_some(largest_n_m)
+        (by_sheet && largest_n_m > Stated::rated_n_m(self.stated.as_ref(), drive, kind)).then_some(largest_n_m)
     }
 
     /// The loads of a variant.
