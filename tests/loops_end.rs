@@ -86,7 +86,14 @@ const BOUNDED: &[(&str, &str, usize, Bound)] = &[
     ("python/src/step.rs", "for_rows", 1, Shrinks("rows that are left")),
     ("identify/src/calibrate/choose.rs", "path", 1, Shrinks("parts that are not chosen")),
     ("identify/src/calibrate/choose.rs", "pruned", 1, Shrinks("parts from the place on")),
-    ("identify/src/calibrate/mod.rs", "fit", 1, Shrinks("a second round without the play, which ends")),
+    (
+        "identify/src/calibrate/mod.rs",
+        "fit",
+        2,
+        Shrinks(
+            "a second round without the play, which ends; coefficients of the play not yet held, PLAY_COEFFICIENTS",
+        ),
+    ),
     ("identify/src/calibrate/plan.rs", "plan", 1, Most("MOST_PASSES")),
     ("identify/src/calibrate/rows.rs", "settled", 1, Shrinks("rows of a session, 1 or more at a time")),
     ("src/cli/bundle.rs", "foreign", 1, Shrinks("folders within a folder")),
