@@ -526,7 +526,7 @@ fn states(unit: &Unit<'_>, random: &mut fastrand::Rng) -> Vec<(State, f64)> {
             let error = unit.elastic(gear, generator_rad, flank, flank.signum());
             let output_rad = generator_rad / RATIO;
             (
-                State { generator_rad, output_rad, torque_n_m, temperature_c: *temperature_c, way, speed_rad_s: 0.0 },
+                State { generator_rad, output_rad, torque_n_m, temperature_c: *temperature_c, way, ..State::default() },
                 error,
             )
         })

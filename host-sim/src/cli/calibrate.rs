@@ -310,15 +310,47 @@ fn planned_text(planned: &Planned, out: &Path) -> String {
             "error of the parts over all that the table is to hold, arcsec rms: {before:.2} after these logs"
         );
     }
+    let noise = if planned.noise.white_arcsec > 0.0 {
+        format!(
+            "{:.2} arcsec from row to row and {:.2} besides",
+            planned.noise.white_arcsec,
+            planned.noise.beside_white_arcsec()
+        )
+    } else {
+        format!(
+            "{:.2} arcsec (rows are too far apart to tell what of it changes from row to row)",
+            planned.noise.rms_arcsec
+        )
+    };
     let _ = writeln!(
         text,
-        "error of the parts to expect, arcsec rms: {:.2}, for a noise of {:.2} arcsec from row to row and {:.2} \
-         besides; what no part has, and an eccentric encoder at the output, come on top",
-        planned.expected_rms_arcsec,
-        planned.noise.white_arcsec,
-        planned.noise.beside_white_arcsec()
+        "error of the parts to expect, arcsec rms: {:.2}, for a noise of {noise}; what no part has, and an eccentric \
+         encoder at the output, come on top",
+        planned.expected_rms_arcsec
     );
     text + &format!("wrote to {}/: plan.csv, plan.json", out.display())
+}
+
+/// What a table holds its error to; what differs from the first figure by so much is said as well.
+fn held(c: &Calibration) -> String {
+    /// A guess.
+    const DIFFERS: f64 = 1.25;
+    let mut text = format!("the table holds the error to ±{:.2} arcsec (95 %)", c.half_width_arcsec);
+    if c.half_width_arcsec > DIFFERS * c.half_width_as_recorded_arcsec {
+        let _ = write!(
+            text,
+            " over all loads and angles between its ends, to ±{:.2} in states as they were recorded",
+            c.half_width_as_recorded_arcsec
+        );
+    }
+    if c.half_width_at_another_pace_arcsec > DIFFERS * c.half_width_arcsec {
+        let _ = write!(
+            text,
+            " at the pace recorded, to ±{:.2} at another, as a delay between the readings would look like play here",
+            c.half_width_at_another_pace_arcsec
+        );
+    }
+    text
 }
 
 fn text(made: &Calibrated, out: &Path, with_page: bool) -> String {
@@ -367,11 +399,18 @@ fn text(made: &Calibrated, out: &Path, with_page: bool) -> String {
         "the core over all rows, reversals among them: {:.2} {as_measured}, {:.2} with the table {}",
         core.rms_before_arcsec, core.rms_after_arcsec, c.table_id
     );
+    let width = c.play_width_arcsec;
     let _ = writeln!(
         text,
-        "the table holds the error to ±{:.2} arcsec (95 %, where it was recorded); a generator degree in its zero \
-         costs {:.2} arcsec rms",
-        c.half_width_arcsec, c.zero_cost.rms_arcsec_per_generator_deg
+        "whole play of the table, arcsec: {:.1} between the directions without load, {:.1} from {:.2} to {:.2} N.m in \
+         motion one way (both flanks, wind-up among them)",
+        width.between_directions_arcsec, width.between_flanks_arcsec, -width.within_n_m, width.within_n_m
+    );
+    let _ = writeln!(text, "{}", held(c));
+    let _ = writeln!(
+        text,
+        "a generator degree in its zero costs {:.2} arcsec rms",
+        c.zero_cost.rms_arcsec_per_generator_deg
     );
     let mut files = vec!["calibrated.fxt", "calibrated.h", "calibrated.rs", "calibration.json"];
     files.extend(with_page.then_some("report.html (for any browser)"));

@@ -1,10 +1,14 @@
 //! How well the fitted parts are known: the information matrix, the noise that the rows show, an interval for each
 //! node.
 //!
-//! The rows `x c + zero + noise` have the information `G = Σ x xᵀ`, the zero of each file taken out. With the penalty
-//! `Λ` of the fit the coefficients have the covariance `σ² κ (G + Λ)⁻¹`; `κ` says how much more the mean of many rows
-//! varies than white noise would let it (drift, jitter, what no part has). The penalty pulls the coefficients by
-//! `−(G + Λ)⁻¹ Λ c`; the square of that is added.
+//! The rows `x c + zero + noise` have the information `G = Σ x xᵀ`, the zero of each file taken out. With `P` for the
+//! covariance of `c` before the rows say anything, from the size that each part turned out to have, `c` has the
+//! covariance `V = σ² κ (G + σ² κ P⁻¹)⁻¹` after them, about a mean that is off the fit by `d = (G + σ² κ P⁻¹)⁻¹ (Xᵀ r −
+//! σ² κ P⁻¹ ĉ)` for what the fit `ĉ` leaves, `r`. An interval is that of `V + d dᵀ`. `κ` says how much more the mean of
+//! many rows varies than white noise would let it (drift, jitter, what no part has). Where rows tell, `P` does not
+//! matter; where they leave parts to be traded for one another (few loads, a load that goes with the angle), what is
+//! left open is as wide as `P`. The delay between the angles of each log is a column as well: it goes with play where
+//! the pace is one.
 
 use std::f64::consts::{PI, TAU};
 
@@ -12,8 +16,8 @@ use flexspline_algebra::{Mat, cholesky};
 use serde::Serialize;
 
 use super::Model;
-use super::folds::{Chosen, FLOOR, Row};
-use super::parts::{GENERATOR_ORDERS, PartName, Scales, State, columns, weights};
+use super::folds::{FLOOR, Row};
+use super::parts::{GENERATOR_ORDERS, PartName, Scales, State, columns, expected_arcsec, usual_arcsec, weights};
 use crate::measurement::{median_of, white_noise};
 
 /// Standard deviations of an interval that holds 95 %.
@@ -23,6 +27,8 @@ const CLOSE_RAD: f64 = PI / 4.0;
 /// Rows that hang together are looked for in stretches of these lengths, as long as there are so many stretches.
 const STRETCHES: [usize; 8] = [4, 8, 16, 32, 64, 128, 256, 512];
 const FEWEST_STRETCHES: usize = 20;
+/// A stretch over so many steps of a resolution averages them out. A guess.
+const STEPS_OF_A_STRETCH: f64 = 4.0;
 
 /// Sums over rows that share a zero.
 #[derive(Debug, Clone, Default)]
@@ -56,10 +62,6 @@ impl Information {
         self.square.iter_mut().zip(&other.square).for_each(|(a, b)| *a += b);
     }
 
-    pub(crate) fn rows(&self) -> f64 {
-        self.rows
-    }
-
     /// The information on the coefficients where the zero is not known.
     fn add_without_zero(&self, to: &mut Mat) {
         if self.rows <= 0.0 {
@@ -77,22 +79,42 @@ impl Information {
     }
 }
 
-/// The inverse of the information with the penalties, of noise one: covariance of the coefficients.
-pub(super) fn covariance(groups: &[Information], chosen: &[Chosen], rows: f64) -> Option<Mat> {
-    let penalties: Vec<f64> = chosen
-        .iter()
-        .flat_map(|c| weights(c.part).into_iter().map(|weight| (c.penalty * weight + FLOOR) * rows))
-        .collect();
-    let width = penalties.len();
+/// The information of all groups together, their zeros not known.
+fn gram(groups: &[Information], width: usize) -> Mat {
     let mut gram = Mat::zeros(width, width);
     groups.iter().for_each(|group| group.add_without_zero(&mut gram));
-    penalties.iter().enumerate().for_each(|(i, penalty)| gram[(i, i)] += penalty);
-    let mut one = Mat::zeros(width, width);
-    (0..width).for_each(|i| one[(i, i)] = 1.0);
+    gram
+}
+
+/// The inverse of a matrix with something on its diagonal.
+fn inverse(mut gram: Mat, diagonal: &[f64]) -> Option<Mat> {
+    diagonal.iter().enumerate().for_each(|(i, value)| gram[(i, i)] += value);
+    let mut one = Mat::zeros(diagonal.len(), diagonal.len());
+    (0..diagonal.len()).for_each(|i| one[(i, i)] = 1.0);
     Some(cholesky(gram.as_ref()).ok()?.solve(one.as_ref()))
 }
 
-/// Variance of `x c`, of noise one.
+/// Covariance of the coefficients of a drive that nobody has measured after these rows, arcsec², for the variance of a
+/// row.
+pub(super) fn planned_covariance(
+    groups: &[Information],
+    parts: &[PartName],
+    scales: &Scales,
+    of_a_row: f64,
+) -> Option<Mat> {
+    let known = |part: &PartName| {
+        let before = usual_arcsec(*part, scales).powi(2);
+        weights(*part).into_iter().map(move |weight| of_a_row * (weight / before + FLOOR))
+    };
+    let penalties: Vec<f64> = parts.iter().flat_map(known).collect();
+    let mut covariance = inverse(gram(groups, penalties.len()), &penalties)?;
+    for i in 0..penalties.len() {
+        (0..penalties.len()).for_each(|j| covariance[(i, j)] *= of_a_row);
+    }
+    Some(covariance)
+}
+
+/// Variance of `x c`.
 pub(super) fn variance(covariance: &Mat, x: &[f64]) -> f64 {
     let mut sum = 0.0;
     for (i, a) in x.iter().enumerate().filter(|(_, a)| **a != 0.0) {
@@ -102,14 +124,14 @@ pub(super) fn variance(covariance: &Mat, x: &[f64]) -> f64 {
 }
 
 /// How many columns some parts have.
-pub(super) fn width_of(chosen: &[Chosen]) -> usize {
-    chosen.iter().map(|chosen| weights(chosen.part).len()).sum()
+pub(super) fn width_of(parts: &[PartName]) -> usize {
+    parts.iter().map(|part| weights(*part).len()).sum()
 }
 
 /// All columns of some parts in a state.
-pub(super) fn row(chosen: &[Chosen], at: &State, scales: &Scales) -> Vec<f64> {
+pub(super) fn row(parts: &[PartName], at: &State, scales: &Scales) -> Vec<f64> {
     let mut x = Vec::new();
-    chosen.iter().for_each(|chosen| columns(chosen.part, at, scales, &mut x));
+    parts.iter().for_each(|part| columns(*part, at, scales, &mut x));
     x
 }
 
@@ -126,12 +148,16 @@ pub struct Noise {
 }
 
 impl Noise {
-    /// From what is left of the rows of each file, in order, and the generator's usual step between them.
-    pub fn of(left: &[Vec<f64>], coefficients: usize, step_rad: f64) -> Noise {
+    /// From what is left of the rows of each file, in order, and the generator's usual step between them;
+    /// `rows_of_a_step` of them pass while an angle stays within one step of its resolution.
+    pub fn of(left: &[Vec<f64>], coefficients: usize, step_rad: f64, rows_of_a_step: f64) -> Noise {
         let rows: usize = left.iter().map(Vec::len).sum();
         let squares: f64 = left.iter().flatten().map(|e| e * e).sum();
         let variance = squares / rows.saturating_sub(coefficients).max(1) as f64;
         let mut most = 1.0_f64;
+        // What neighbouring stretches have in common is no noise of single rows, nor of the steps of a resolution where
+        // they are longer than those; and it stays at its place.
+        let mut common = 0.0_f64;
         for length in STRETCHES {
             let means: Vec<f64> = left
                 .iter()
@@ -141,10 +167,15 @@ impl Noise {
             if means.len() >= FEWEST_STRETCHES && variance > 0.0 {
                 let of_means = means.iter().map(|mean| mean * mean).sum::<f64>() / means.len() as f64;
                 most = most.max(length as f64 * of_means / variance);
+                if length as f64 >= STEPS_OF_A_STRETCH * rows_of_a_step {
+                    let products = means.windows(2).map(|pair| pair[0] * pair[1]);
+                    common = common.max(products.sum::<f64>() / (means.len() - 1) as f64);
+                }
             }
         }
         let close = step_rad * f64::from(GENERATOR_ORDERS) <= CLOSE_RAD;
-        let white = if close { white_noise(left.iter().map(Vec::as_slice)).min(variance.sqrt()) } else { 0.0 };
+        let most_white = (variance - common).max(0.0).sqrt();
+        let white = if close { white_noise(left.iter().map(Vec::as_slice)).min(most_white) } else { 0.0 };
         Noise { rms_arcsec: variance.sqrt(), white_arcsec: white, hangs_together: most }
     }
 
@@ -185,7 +216,7 @@ pub(super) fn nodes_of(part: PartName, scales: &Scales) -> Vec<(&'static str, f6
         torque_n_m: 0.0,
         temperature_c: f64::midpoint(cold, warm),
         way: 1.0,
-        speed_rad_s: 0.0,
+        ..State::default()
     };
     let turn = |count: usize| (0..count).map(move |k| TAU * k as f64 / count as f64);
     let states: Vec<(&'static str, f64, State)> = match part {
@@ -219,7 +250,7 @@ pub(super) fn nodes_of(part: PartName, scales: &Scales) -> Vec<(&'static str, f6
                 ("temperature_c", temperature_c, State { temperature_c, torque_n_m, ..middle })
             })
             .collect(),
-        PartName::ReadingDelay => Vec::new(),
+        PartName::ReadingDelay(_) => Vec::new(),
     };
     states
         .into_iter()
@@ -235,25 +266,18 @@ pub(super) fn nodes_of(part: PartName, scales: &Scales) -> Vec<(&'static str, f6
         .collect()
 }
 
-/// The half widths of all nodes of some parts, from the covariance of noise one and the variance of a row; in the order
-/// of the parts.
-pub(super) fn widths(
-    chosen: &[Chosen],
-    scales: &Scales,
-    covariance: &Mat,
-    of_a_row: f64,
-    adds: &dyn Fn(&[f64]) -> f64,
-) -> Vec<Node> {
-    let all = width_of(chosen);
+/// The half widths of all nodes of some parts, from the covariance; in the order of the parts.
+pub(super) fn widths(parts: &[PartName], scales: &Scales, covariance: &Mat) -> Vec<Node> {
+    let all = width_of(parts);
     let mut begin = 0;
     let mut nodes = Vec::new();
-    for one in chosen {
-        let width = weights(one.part).len();
-        for (of, at, part) in nodes_of(one.part, scales) {
+    for one in parts {
+        let width = weights(*one).len();
+        for (of, at, part) in nodes_of(*one, scales) {
             let mut x = vec![0.0; all];
             x[begin..begin + width].copy_from_slice(&part);
-            let half = OF_95 * (of_a_row * variance(covariance, &x) + adds(&x).powi(2)).sqrt();
-            nodes.push(Node { part: one.part.as_str(), of, at, value_arcsec: None, half_width_arcsec: half });
+            let half = OF_95 * variance(covariance, &x).sqrt();
+            nodes.push(Node { part: one.as_str(), of, at, value_arcsec: None, half_width_arcsec: half });
         }
         begin += width;
     }
@@ -271,74 +295,101 @@ fn usual_step(rows: &[Row]) -> f64 {
 #[derive(Debug, Clone)]
 pub struct Known {
     model: Model,
+    /// The parts of the model, and the delay of each log.
+    parts: Vec<PartName>,
+    /// Of what the fit misses in their coefficients, arcsec².
     covariance: Mat,
-    /// How far the penalty pulls the coefficients.
-    pulled: Vec<f64>,
     /// What the rows show of noise.
     pub noise: Noise,
 }
 
 impl Known {
-    /// From the rows of the fit.
-    pub(super) fn of(rows: &[Row], model: &Model, files: usize) -> Option<Known> {
-        let width = model.coefficients.len();
-        let mut groups = vec![Information::new(width); files];
-        let mut left = vec![Vec::new(); files];
-        for at in rows {
-            groups[at.zero].add(&row(&model.chosen, &at.at, &model.scales), 1.0);
-            left[at.zero].push(at.left_arcsec - model.adds_arcsec(&at.at));
-        }
+    /// From the rows of the fit, of logs with these delays as numbers of their columns, which `rows` are without unless
+    /// the model has them; `coarse_rad` is the step of the resolution at the output.
+    pub(super) fn of(rows: &[Row], model: &Model, delays: &[f64], coarse_rad: f64) -> Option<Known> {
+        let (scales, logs) = (&model.scales, delays.len());
+        let mut left = vec![Vec::new(); logs];
+        rows.iter().for_each(|at| left[at.zero].push(at.left_arcsec - model.adds_arcsec(&at.at)));
         for file in &mut left {
             let mean = file.iter().sum::<f64>() / file.len().max(1) as f64;
             file.iter_mut().for_each(|value| *value -= mean);
         }
-        let count = rows.len() as f64;
-        let covariance = covariance(&groups, &model.chosen, count)?;
-        let weighted: Vec<f64> = model
-            .chosen
-            .iter()
-            .flat_map(|c| weights(c.part).into_iter().map(|weight| c.penalty * weight * count))
-            .zip(&model.coefficients)
-            .map(|(penalty, coefficient)| penalty * coefficient)
-            .collect();
-        let pulled = (0..width).map(|i| (0..width).map(|j| covariance[(i, j)] * weighted[j]).sum::<f64>()).collect();
-        Some(Known {
-            model: model.clone(),
-            covariance,
-            pulled,
-            noise: Noise::of(&left, width + files, usual_step(rows)),
-        })
+        let mut steps: Vec<f64> =
+            rows.windows(2).map(|pair| (pair[1].at.output_rad - pair[0].at.output_rad).abs()).collect();
+        let step_rad = if steps.is_empty() { 0.0 } else { median_of(&mut steps) };
+        let rows_of_a_step = if step_rad > 0.0 { coarse_rad / step_rad } else { 0.0 };
+        let noise = Noise::of(&left, model.coefficients.len() + logs, usual_step(rows), rows_of_a_step);
+
+        let in_table = model.chosen.iter().filter(|chosen| !matches!(chosen.part, PartName::ReadingDelay(_)));
+        let mut parts: Vec<PartName> = in_table.map(|chosen| chosen.part).collect();
+        let (mut fitted, mut before) = (Vec::new(), Vec::new());
+        for part in &parts {
+            let of_part = model.of(*part).map_or(&[][..], |of| &model.coefficients[of]);
+            let expected = expected_arcsec(*part, scales, of_part).powi(2).max(f64::MIN_POSITIVE);
+            fitted.extend(of_part);
+            before.extend(weights(*part).into_iter().map(|weight| weight / expected));
+        }
+        if scales.speed_rad_s > 0.0 {
+            for (log, delay) in delays.iter().enumerate() {
+                let part = PartName::ReadingDelay(log);
+                parts.push(part);
+                fitted.push(model.of(part).map_or(*delay, |of| model.coefficients[of.start]));
+                before.push(expected_arcsec(part, scales, &[]).powi(-2));
+            }
+        }
+        let width = fitted.len();
+        let of_a_row = noise.of_a_row();
+        let penalties: Vec<f64> = before.iter().map(|before| of_a_row * (before + FLOOR)).collect();
+        let mut groups = vec![Information::new(width); logs];
+        let mut right: Vec<f64> = penalties.iter().zip(&fitted).map(|(penalty, fitted)| -penalty * fitted).collect();
+        let mut of_logs: Vec<_> = left.iter().map(|left| left.iter()).collect();
+        for at in rows {
+            let x = row(&parts, &at.at, scales);
+            groups[at.zero].add(&x, 1.0);
+            let left = of_logs[at.zero].next().copied().unwrap_or_default();
+            right.iter_mut().zip(&x).for_each(|(right, x)| *right += x * left);
+        }
+        let mut covariance = inverse(gram(&groups, width), &penalties)?;
+        let of = |i: usize| right.iter().enumerate().map(|(j, right)| covariance[(i, j)] * right).sum::<f64>();
+        let off: Vec<f64> = (0..width).map(of).collect();
+        for i in 0..width {
+            (0..width).for_each(|j| covariance[(i, j)] = of_a_row * covariance[(i, j)] + off[i] * off[j]);
+        }
+        Some(Known { model: model.clone(), parts, covariance, noise })
     }
 
     /// Half width of the interval that holds, with 95 %, what the table has at a state against the true error there,
-    /// arcsec, but for one zero of all.
+    /// arcsec, but for one zero of all. At a speed the error is that of its log, which has a delay; without one, that
+    /// of both angles at one instant.
     #[must_use]
     pub fn half_width_arcsec(&self, at: &State) -> f64 {
-        let x = row(&self.model.chosen, at, &self.model.scales);
-        let pulled: f64 = x.iter().zip(&self.pulled).map(|(x, pulled)| x * pulled).sum();
-        let beside = self.noise.beside_white_arcsec();
-        OF_95 * (self.noise.of_a_row() * variance(&self.covariance, &x) + pulled * pulled + beside * beside).sqrt()
+        let x = row(&self.parts, at, &self.model.scales);
+        OF_95 * (variance(&self.covariance, &x) + self.noise.beside_white_arcsec().powi(2)).sqrt()
     }
 
-    /// Standard deviation of a coefficient, arcsec.
-    pub(super) fn std_arcsec(&self, coefficient: usize) -> f64 {
-        let variance = self.noise.of_a_row() * self.covariance[(coefficient, coefficient)];
-        (variance + self.pulled[coefficient].powi(2)).sqrt()
+    /// Mean square root of the half widths at some states, arcsec.
+    pub(super) fn mean_half_width_arcsec(&self, states: impl Iterator<Item = State>) -> f64 {
+        let (count, squares) = states
+            .fold((0.0, 0.0), |(count, squares), at| (count + 1.0, squares + self.half_width_arcsec(&at).powi(2)));
+        (squares / f64::max(count, 1.0)).sqrt()
+    }
+
+    /// Standard deviation of the delay of a log, as a number of its column.
+    pub(super) fn std_of_delay(&self, log: usize) -> Option<f64> {
+        let at = self.parts.iter().position(|part| *part == PartName::ReadingDelay(log))?;
+        let place = width_of(&self.parts[..at]);
+        Some(self.covariance[(place, place)].sqrt())
     }
 
     /// Every node of every part.
     pub(super) fn nodes(&self) -> Vec<Node> {
-        let Model { chosen, scales, coefficients } = &self.model;
-        let pulled = |x: &[f64]| x.iter().zip(&self.pulled).map(|(x, pulled)| x * pulled).sum::<f64>();
-        let mut nodes = widths(chosen, scales, &self.covariance, self.noise.of_a_row(), &pulled);
-        let mut begin = 0;
+        let Model { scales, coefficients, .. } = &self.model;
+        let mut nodes = widths(&self.parts, scales, &self.covariance);
         let mut values = Vec::new();
-        for one in chosen {
-            let width = weights(one.part).len();
-            for (_, _, x) in nodes_of(one.part, scales) {
-                values.push(x.iter().zip(&coefficients[begin..begin + width]).map(|(x, c)| x * c).sum::<f64>());
-            }
-            begin += width;
+        for one in &self.parts {
+            let of = self.model.of(*one).map_or(&[][..], |of| &coefficients[of]);
+            let value = |x: &[f64]| x.iter().zip(of).map(|(x, c)| x * c).sum::<f64>();
+            values.extend(nodes_of(*one, scales).iter().map(|(_, _, x)| value(x)));
         }
         nodes.iter_mut().zip(values).for_each(|(node, value)| node.value_arcsec = Some(value));
         nodes
@@ -361,7 +412,7 @@ pub(super) fn spread(scales: &Scales, ratio: f64, output_rad: [f64; 2], count: u
                 torque_n_m: between(scales.torque_n_m, share(k, 2)),
                 temperature_c: between(scales.temperature_c, share(k, 3)),
                 way: if k % 2 == 0 { 1.0 } else { -1.0 },
-                speed_rad_s: 0.0,
+                ..State::default()
             }
         })
         .collect()

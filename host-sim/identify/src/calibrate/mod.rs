@@ -28,7 +28,7 @@ use flexspline::{ImageError, Table, WriteError};
 use serde::Serialize;
 
 use crate::measurement::{Fault, FaultName, MeasuredError, Recording, least_and_most};
-use choose::{LEAST_GAIN, PENALTIES, best_penalty, nested, path, pruned};
+use choose::{LEAST_GAIN, best_penalty, nested, path, pruned};
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::{MadeTable, TableError, dead_zone_n_m};
 use folds::{Chosen, Folds};
@@ -38,7 +38,7 @@ pub use parts::{PartName, Scales, State};
 pub use plan::{Bench, First, Pass, Planned, Wide, plan};
 pub use prior::Prior;
 pub use reading::{ByCore, Reading, ReadingDelay};
-use reading::{Delay, play_of_a_millisecond};
+use reading::{Delays, play_of_a_millisecond};
 pub use rows::MOST_ROWS;
 use rows::{FoldKind, Recorded, Rows, settled};
 use together::Agreement;
@@ -69,8 +69,6 @@ const ROWS_OF_A_PITCH: f64 = 6.0;
 const ROWS_OF_A_WIDTH: usize = 2000;
 /// Generator turns in steps that are short beside a pitch, at least.
 const FINE_TURNS: f64 = 1.0;
-/// The penalty that a plan counts with: the least that a fit takes.
-const PENALTY_OF_PLANS: f64 = PENALTIES[0];
 /// A ratio is refused if another leaves less than this share of the squares. A guess: of what a wrong whole number
 /// does, nothing is left.
 const OTHER_RATIO: f64 = 0.25;
@@ -80,6 +78,9 @@ const ROUNDING_ARCSEC: f64 = 1e-6;
 const PLAY_COEFFICIENTS: usize = 3;
 /// Paces that tell a delay from play: the fastest is so many times the slowest. *Guess*.
 const OTHER_PACE: f64 = 1.25;
+/// Correlation of the load with waves of the output from which on they cannot be told apart well: half of the load's
+/// squares. *Guess*.
+const TURNS_WITH_THE_OUTPUT: f64 = 0.7;
 /// Temperatures closer than this, K, are one.
 const ONE_TEMPERATURE_K: f64 = 2.0;
 
@@ -234,6 +235,55 @@ pub struct HeldOut {
     pub rms_after_arcsec: f64,
 }
 
+/// What a table has where the load changes its sign, arcsec, prior and all parts together.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct PlayWidth {
+    /// Without load, from motion one way to motion the other.
+    pub between_directions_arcsec: f64,
+    /// In motion one way, from a load of `within_n_m` against the motion to one as large with it: both flanks and the
+    /// wind-up between, as these have no clear border.
+    pub between_flanks_arcsec: f64,
+    /// See above.
+    pub within_n_m: f64,
+}
+
+/// The whole play of what was fitted. One way, a light load either side of what decides the flank.
+fn play_width(model: &Model, prior: &Prior<'_>, recorded: &Recorded) -> PlayWidth {
+    let friction = recorded.scales.friction_n_m;
+    let within_n_m = recorded.scales.torque_n_m.iter().fold(2.0 * friction, |within, end| within.min(end.abs()));
+    let error = |torque_n_m: f64, way: f64| {
+        let at = State { torque_n_m, temperature_c: recorded.temperature_c, way, ..State::default() };
+        prior.steady_arcsec(&at) + model.adds_arcsec(&at)
+    };
+    PlayWidth {
+        between_directions_arcsec: error(0.0, -1.0) - error(0.0, 1.0),
+        between_flanks_arcsec: error(within_n_m, 1.0) - error(-within_n_m, 1.0),
+        within_n_m,
+    }
+}
+
+/// States spread over what the table of these rows is to hold.
+fn anywhere(rows: &Rows, recorded: &Recorded, prior: &Prior<'_>) -> impl Iterator<Item = State> {
+    let (from, to) = least_and_most(rows.rows.iter().map(|row| row.at.output_rad));
+    let pace = rows.rows.iter().map(|row| row.at.speed_rad_s.abs()).sum::<f64>() / rows.rows.len().max(1) as f64;
+    let states = interval::spread(&recorded.scales, prior.nominal.ratio, [from, to], ROWS_OF_A_WIDTH);
+    states.into_iter().map(move |at| State { speed_rad_s: at.way * pace, ..at })
+}
+
+/// Says so where the load goes with the output's angle.
+fn load_with_angle(rows: &Rows, known: &Known) -> Option<String> {
+    let correlation = rows.load_with_output_angle();
+    let ends = known.nodes().into_iter().filter(|node| node.part == PartName::WindUp.as_str());
+    let widest = ends.map(|node| node.half_width_arcsec).fold(0.0, f64::max);
+    (correlation > TURNS_WITH_THE_OUTPUT && widest > 0.0).then(|| {
+        format!(
+            "the load goes with the angle of the output (correlation {correlation:.2}), as the weight of an arm does: \
+             wind-up and waves of the output are one there, the wind-up alone is known to ±{widest:.0} arcsec, and \
+             under another load at the same angles the table is as far off; record the same angles under other loads"
+        )
+    })
+}
+
 /// `calibration.json`.
 #[derive(Debug, Clone, Serialize)]
 pub struct Calibration {
@@ -270,9 +320,15 @@ pub struct Calibration {
     pub nodes: Vec<Node>,
     /// What the rows show of noise.
     pub noise: Noise,
-    /// Half width of the interval that holds the table's error in a state with 95 %, mean square root over the rows,
-    /// arcsec.
+    /// Half width of the interval that holds the table's error in a state with 95 %, mean square root over all loads,
+    /// angles and temperatures between the least and the largest recorded, evenly, at the paces recorded; arcsec.
     pub half_width_arcsec: f64,
+    /// The same over the rows: in the states that were recorded.
+    pub half_width_as_recorded_arcsec: f64,
+    /// As the first, at any other pace and at rest: with all that a delay which these logs do not show may have done.
+    pub half_width_at_another_pace_arcsec: f64,
+    /// The whole play of the table, wind-up and all.
+    pub play_width_arcsec: PlayWidth,
     /// Phase of the table that was known before, if one was.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub alignment: Option<Alignment>,
@@ -322,6 +378,7 @@ impl Calibrated {
             rows: &self.rows.rows,
             files: self.calibration.files.len(),
             noise: self.known.noise,
+            nodes: &self.calibration.nodes,
             scales: self.recorded.scales,
         }
     }
@@ -400,12 +457,12 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
     let mut recorded = Recorded::of(files, prior);
     let play_rad = prior.nominal.backlash_arcsec / ARCSEC_PER_RAD;
     let mut rows = settled(files, prior, &recorded, play_rad);
-    let delay = Delay::of(files, &rows, prior, &recorded, play_rad);
-    let at_one_instant = delay.map(|delay| delay.taken_out(files, prior.nominal.ratio));
+    let delays = Delays::of(files, &rows, prior, &recorded, play_rad);
+    let at_one_instant = delays.as_ref().map(|delays| delays.taken_out(files, prior.nominal.ratio));
     if let Some(files) = &at_one_instant {
         rows = settled(files, prior, &recorded, play_rad);
     }
-    let logs = Logs { measured: files, at_one_instant: at_one_instant.as_deref().unwrap_or(files), delay };
+    let logs = Logs { measured: files, at_one_instant: at_one_instant.as_deref().unwrap_or(files), delays };
     if let Some(table) = prior.table {
         (rows, recorded.scales.friction_n_m) = dead_zone(rows, prior, table, &recorded);
     }
@@ -414,11 +471,11 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
     with_dead_zone(&logs, prior, (rows, recorded), said).map_err(|error| with_faults(error, files, &notes))
 }
 
-/// Logs with a delay between the readings, and without.
+/// Logs with delays between the readings, and without.
 struct Logs<'a> {
     measured: &'a [Recording],
     at_one_instant: &'a [Recording],
-    delay: Option<Delay>,
+    delays: Option<Delays>,
 }
 
 /// A file in pieces, each with one zero.
@@ -492,14 +549,15 @@ fn with_dead_zone(
     let Fitted { rows, folds, model, held_out, mut parts, .. } = fitted;
     let image = Table::check(&made.image).map_err(|error| TableError::Project(error.into()))?;
     let core = ByCore::of(files, &image, &recorded);
-    let reading_delay = logs.delay.map(|delay| delay.shown(logs.measured, &image, &recorded));
+    let reading_delay = logs.delays.as_ref().and_then(|delays| delays.shown(logs.measured, &image, &recorded));
+    let mut readings = logs.delays.as_ref().map_or_else(Vec::new, |delays| delays.readings(files));
     let play_of_a_millisecond_arcsec = play_of_a_millisecond(&rows.rows, &recorded, prior);
     let mut notes: Vec<String> = files.iter().flat_map(|file| file.notes.iter().cloned()).collect();
     notes.extend(said);
-    notes.extend(reading_delay.as_ref().map(ReadingDelay::note));
+    notes.extend(reading_delay.as_ref().map(|delay| delay.note(&readings, files.len())));
     // What is known by its angle needs no guess.
     notes.extend(turned.or_else(|| agreement?.note(files)).into_iter().chain(unlike));
-    notes.extend(remarks(prior, &recorded, (&model, &parts), play_of_a_millisecond_arcsec));
+    notes.extend(remarks(prior, &recorded, &model, play_of_a_millisecond_arcsec));
     sizes(&rows, &model, &mut parts);
     let zero = |row: &folds::Row| row.left_arcsec - model.adds_arcsec(&row.at);
     let mean = rows.rows.iter().map(zero).sum::<f64>() / rows.rows.len() as f64;
@@ -509,11 +567,21 @@ fn with_dead_zone(
         .zip(&rows.measured_arcsec)
         .map(|(row, measured)| [row.at.output_rad, *measured, zero(row) - mean])
         .collect();
-    let known = Known::of(&rows.rows, &model, files.len())
+    let none = || vec![0.0; files.len()];
+    let delays = logs.delays.as_ref().map_or_else(none, |delays| delays.of_columns(&recorded.scales));
+    let known = Known::of(&rows.rows, &model, &delays, recorded.coarse_rad)
         .ok_or_else(|| CalibrationError::Known("the information matrix of these rows is singular".to_owned()))?;
-    let half_widths = rows.rows.iter().step_by(rows.rows.len().div_ceil(ROWS_OF_A_WIDTH).max(1));
-    let (count, squares) = half_widths
-        .fold((0.0, 0.0), |(count, squares), row| (count + 1.0, squares + known.half_width_arcsec(&row.at).powi(2)));
+    // Where delays were found the table is fitted to both angles at one instant, as at rest; where none was, to the
+    // paces that were recorded.
+    let at_rest = |at: State| State { speed_rad_s: 0.0, ..at };
+    let as_fitted = |at: State| if logs.delays.is_some() { at_rest(at) } else { at };
+    let every = rows.rows.len().div_ceil(ROWS_OF_A_WIDTH).max(1);
+    let some_rows = || rows.rows.iter().step_by(every).map(|row| row.at);
+    let half_width_arcsec = known.mean_half_width_arcsec(anywhere(&rows, &recorded, prior).map(as_fitted));
+    let half_width_as_recorded_arcsec = known.mean_half_width_arcsec(some_rows().map(as_fitted));
+    let half_width_at_another_pace_arcsec =
+        known.mean_half_width_arcsec(anywhere(&rows, &recorded, prior).map(at_rest));
+    notes.extend(load_with_angle(&rows, &known));
     let output_zeros = output_zeros(files, &rows, &model, known.noise);
     let offset = |zero: &OutputZero| Reading {
         name: "offset",
@@ -521,7 +589,7 @@ fn with_dead_zone(
         value: zero.arcsec,
         std: zero.half_width_arcsec / OF_95,
     };
-    let readings = logs.delay.map(Delay::reading).into_iter().chain(output_zeros.iter().map(offset)).collect();
+    readings.extend(output_zeros.iter().map(offset));
     let calibration = Calibration {
         schema_version: 1,
         files: files.iter().map(|file| file.file.clone()).collect(),
@@ -542,7 +610,10 @@ fn with_dead_zone(
         parts,
         nodes: known.nodes(),
         noise: known.noise,
-        half_width_arcsec: (squares / count).sqrt(),
+        half_width_arcsec,
+        half_width_as_recorded_arcsec,
+        half_width_at_another_pace_arcsec,
+        play_width_arcsec: play_width(&model, prior, &recorded),
         alignment,
         output_zeros,
         zero_cost: cost(&image),
@@ -804,7 +875,7 @@ fn note_of_one_pace(play_of_a_millisecond_arcsec: f64) -> String {
 fn remarks(
     prior: &Prior<'_>,
     recorded: &Recorded,
-    (model, parts): (&Model, &[PartSays]),
+    model: &Model,
     play_of_a_millisecond_arcsec: Option<f64>,
 ) -> Vec<String> {
     let mut remarks = Vec::new();
@@ -845,13 +916,6 @@ fn remarks(
         remarks.push(
             "no torque was recorded: the table holds for no load alone, and at any other the core says that it is \
              outside of the table"
-                .to_owned(),
-        );
-    }
-    if has(PartName::OutputAngle) && parts.iter().any(|part| part.name == "wind_up" && part.held_out_gain.is_some()) {
-        remarks.push(
-            "a load that turns with the output (the weight of an arm) and an eccentric encoder look alike here: the \
-             table holds for the loads of these logs"
                 .to_owned(),
         );
     }

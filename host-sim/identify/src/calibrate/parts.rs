@@ -6,11 +6,11 @@
 
 use std::f64::consts::TAU;
 
+use flexspline_base::units::ARCSEC_PER_RAD;
 use serde::Serialize;
 
 /// Which part.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PartName {
     /// Wind-up by torque: a polynomial, and a bend at light loads.
     WindUp,
@@ -26,8 +26,15 @@ pub enum PartName {
     OutputAngle,
     /// What temperature changes: zero, wind-up and play.
     Temperature,
-    /// One angle is read after the other: what goes with the speed. It is the logger's, and no table holds it.
-    ReadingDelay,
+    /// One angle is read after the other in this log: what goes with the speed. It is the logger's, and no table holds
+    /// it.
+    ReadingDelay(usize),
+}
+
+impl Serialize for PartName {
+    fn serialize<S: serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_str(self.as_str())
+    }
 }
 
 impl PartName {
@@ -53,7 +60,7 @@ impl PartName {
             PartName::ToothPitch => "tooth_pitch",
             PartName::OutputAngle => "output_angle",
             PartName::Temperature => "temperature",
-            PartName::ReadingDelay => "reading_delay",
+            PartName::ReadingDelay(_) => "reading_delay",
         }
     }
 }
@@ -75,6 +82,9 @@ const LIGHT_LOAD: f64 = 0.05;
 /// How the weight of a wave rises with its order: between the energies of a slope (second power) and of a curvature
 /// (fourth). Chosen on halves of the record of `examples/csf17_100`.
 const WAVE_POWER: i32 = 3;
+/// Weight of the lag against that of the flank: what moves the output against the motion on one flank is the friction
+/// in the mesh, a third of the play. A guess.
+const LAG_WEIGHT: f64 = 9.0;
 /// How the weight of a degree of the wind-up rises with the degree: a guess.
 const DEGREE_POWER: i32 = 4;
 
@@ -93,6 +103,8 @@ pub struct State {
     pub way: f64,
     /// Speed of the output, rad/s; 0 of a table, which knows none.
     pub speed_rad_s: f64,
+    /// Which log has it: the delay between the angles is its own.
+    pub log: usize,
 }
 
 /// What the columns are made with.
@@ -108,6 +120,8 @@ pub struct Scales {
     pub teeth: f64,
     /// Speed of the output that a tenth of the rows exceed, rad/s; 0 where no time was recorded.
     pub speed_rad_s: f64,
+    /// Standard deviation of the delay between the two angles before anything says how large it is, s.
+    pub late_s: f64,
 }
 
 impl Scales {
@@ -156,7 +170,10 @@ pub(super) fn columns(part: PartName, at: &State, scales: &Scales, to: &mut Vec<
             let warm = scales.temperature_share(at.temperature_c);
             to.extend([warm, warm * load, warm * lag]);
         }
-        PartName::ReadingDelay => to.push(at.speed_rad_s / scales.speed_rad_s.max(f64::MIN_POSITIVE)),
+        PartName::ReadingDelay(log) if log == at.log => {
+            to.push(at.speed_rad_s / scales.speed_rad_s.max(f64::MIN_POSITIVE));
+        }
+        PartName::ReadingDelay(_) => to.push(0.0),
     }
 }
 
@@ -165,16 +182,54 @@ pub(super) fn weights(part: PartName) -> Vec<f64> {
     let of_waves = |orders: u16| (1..=orders).flat_map(|k| [f64::from(k).powi(WAVE_POWER); 2]).collect();
     match part {
         PartName::WindUp => {
-            (1..=WIND_UP_DEGREE).map(|k| (k as f64).powi(DEGREE_POWER)).chain(std::iter::once(1.0)).collect()
+            // A straight line is no wrinkle: where loads are few, what they leave open is straight.
+            let degrees = (2..=WIND_UP_DEGREE).map(|k| (k as f64).powi(DEGREE_POWER));
+            std::iter::once(0.0).chain(degrees).chain(std::iter::once(1.0)).collect()
         }
-        PartName::Play | PartName::Temperature => vec![1.0; 3],
-        // A number, and no curve that could have wrinkles.
-        PartName::ReadingDelay => vec![0.0],
+        PartName::Play => vec![LAG_WEIGHT, LAG_WEIGHT, 1.0],
+        PartName::Temperature => vec![1.0; 3],
+        PartName::ReadingDelay(_) => vec![1.0],
         PartName::GeneratorAngle | PartName::MaterialAngle => of_waves(GENERATOR_ORDERS),
         PartName::ToothPitch => of_waves(TOOTH_ORDERS),
         PartName::OutputAngle => of_waves(OUTPUT_ORDERS),
     }
 }
+
+/// How far from a straight line the wind-up is before loads between say it, of the straight part: a spring of the
+/// catalogue is softer at light loads by a tenth of all that it winds up (K1 to K3 of CSF-25-100), and half as much
+/// again stands for other drives. Partly a guess.
+const BENDS: f64 = 0.15;
+
+/// Standard deviation of a part's coefficients before the rows say anything, arcsec, of a column of weight one; of the
+/// straight part of the wind-up, that of any. `coefficients` are those found: a part is as large as its largest.
+pub(super) fn expected_arcsec(part: PartName, scales: &Scales, coefficients: &[f64]) -> f64 {
+    let sizes = coefficients.iter().zip(weights(part)).map(|(value, weight)| value.abs() * weight.sqrt());
+    let largest = sizes.fold(0.0, f64::max);
+    match part {
+        PartName::WindUp => largest.max(BENDS * coefficients.first().map_or(0.0, |straight| straight.abs())),
+        // Noise alone does not say how large it may be: a delay goes with it.
+        PartName::Play => largest.max(HALF_A_LOST_MOTION_ARCSEC),
+        PartName::ReadingDelay(_) => scales.late_s * scales.speed_rad_s * ARCSEC_PER_RAD,
+        _ => largest,
+    }
+}
+
+/// The same of a drive that nobody has measured. Wind-up: of 200 arcsec at either end of the loads, as a drive of the
+/// catalogue at its rated torque has. Play: its lost motion is less than an arc-minute. Waves: its transmission error
+/// is less than an arc-minute from peak to peak, of an encoder's mounting as much. *Guesses* in between.
+pub(super) fn usual_arcsec(part: PartName, scales: &Scales) -> f64 {
+    match part {
+        PartName::WindUp => BENDS * 200.0,
+        PartName::Play => HALF_A_LOST_MOTION_ARCSEC,
+        PartName::GeneratorAngle | PartName::MaterialAngle | PartName::OutputAngle => 15.0,
+        PartName::ToothPitch => 3.0,
+        PartName::Temperature => 10.0,
+        PartName::ReadingDelay(_) => expected_arcsec(part, scales, &[]),
+    }
+}
+
+/// Half of an arc-minute, which the lost motion of the catalogue's drives stays below.
+const HALF_A_LOST_MOTION_ARCSEC: f64 = 30.0;
 
 /// Sine and cosine of each order.
 fn waves(angle: f64, orders: u16, to: &mut Vec<f64>) {
@@ -207,6 +262,7 @@ mod tests {
             temperature_c: [10.0, 30.0],
             teeth: 200.0,
             speed_rad_s: 0.2,
+            late_s: 1e-3,
         };
         let at = State {
             generator_rad: 1.3,
@@ -215,13 +271,14 @@ mod tests {
             temperature_c: 20.0,
             way: 1.0,
             speed_rad_s: 0.1,
+            log: 0,
         };
         let of = |part, at: &State| {
             let mut to = Vec::new();
             columns(part, at, &scales, &mut to);
             to
         };
-        for part in PartName::ALL.into_iter().chain([PartName::ReadingDelay]) {
+        for part in PartName::ALL.into_iter().chain([PartName::ReadingDelay(0)]) {
             assert_eq!(of(part, &at).len(), weights(part).len(), "{}", part.as_str());
         }
         let same = |part, other: &State| of(part, &at).iter().zip(of(part, other)).all(|(a, b)| (a - b).abs() < 1e-9);

@@ -11,11 +11,11 @@ use std::f64::consts::TAU;
 use flexspline_algebra::Mat;
 use serde::Serialize;
 
-use super::folds::{Chosen, Row};
-use super::interval::{Information, Node, Noise, OF_95, covariance, row, spread, width_of, widths};
-use super::parts::{PartName, Scales, State};
-use super::rows::MOST_ROWS;
-use super::{GOLDEN, LEAST_FRICTION, ONE_TEMPERATURE_K, OTHER_PACE, PENALTY_OF_PLANS, Prior, ROWS_OF_A_PITCH};
+use super::folds::Row;
+use super::interval::{Information, Node, Noise, OF_95, planned_covariance, row, spread, width_of, widths};
+use super::parts::{PartName, Scales, State, weights};
+use super::rows::{MOST_ROWS, late_s};
+use super::{GOLDEN, LEAST_FRICTION, ONE_TEMPERATURE_K, OTHER_PACE, Prior, ROWS_OF_A_PITCH};
 use crate::measurement::least_and_most;
 
 /// Beyond what any bench or catalogue of these drives has, so a slip of the pen: generator, load and temperature.
@@ -214,6 +214,8 @@ pub struct First<'a> {
     pub(super) rows: &'a [Row],
     pub(super) files: usize,
     pub(super) noise: Noise,
+    /// How well its table is known.
+    pub(super) nodes: &'a [Node],
     /// Torques and temperatures that it has.
     pub(super) scales: Scales,
 }
@@ -242,25 +244,27 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&First<'_>>) -> Resu
         temperature_c: wide(bench.temperature_c, first.map(|first| first.scales.temperature_c)),
         teeth: prior.tooth_pitches(),
         speed_rad_s: bench.speed_rpm / 60.0 * TAU / prior.nominal.ratio.abs(),
+        late_s: late_s(1.0 / bench.rate_hz),
     };
     let ratio = prior.nominal.ratio;
-    let (open, mut cannot) = open_parts(prior, bench, &scales);
-    let chosen: Vec<Chosen> = open.iter().map(|part| Chosen { part: *part, penalty: PENALTY_OF_PLANS }).collect();
+    let (mut chosen, mut cannot) = open_parts(prior, bench, &scales);
+    let warmths = temperatures(bench).len();
+    chosen.extend((0..warmths + first.map_or(0, |first| first.files)).map(PartName::ReadingDelay));
     let candidates = candidates(prior, bench, &scales, &chosen);
     let noise = first.map_or_else(|| bench.noise(), |first| first.noise);
 
     let width = width_of(&chosen);
-    let warmths = temperatures(bench).len();
     let mut known = vec![Information::new(width); warmths + first.map_or(0, |first| first.files)];
     for at in first.iter().flat_map(|first| first.rows) {
-        known[warmths + at.zero].add(&row(&chosen, &at.at, &scales), 1.0);
+        let at_log = State { log: warmths + at.zero, ..at.at };
+        known[warmths + at.zero].add(&row(&chosen, &at_log, &scales), 1.0);
     }
-    let before: f64 = known.iter().map(Information::rows).sum();
-    let rows = before + 60.0 * bench.minutes * bench.rate_fitted_hz();
     let travel = bench.output_deg.map(f64::to_radians);
     let asked = Asked::of(&scales, ratio, travel, &chosen);
-    let of =
-        |known: &[Information]| covariance(known, &chosen, rows).ok_or("the information matrix is singular".to_owned());
+    let of = |known: &[Information]| {
+        let covariance = planned_covariance(known, &chosen, &scales, noise.of_a_row());
+        covariance.ok_or("the information matrix is singular".to_owned())
+    };
 
     let mut now = of(&known)?;
     let at_first = now.clone();
@@ -268,11 +272,14 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&First<'_>>) -> Resu
     while taken.len() < MOST_PASSES {
         let uncertain = asked.mean_variance(&now);
         let mut best: Option<(f64, usize, Mat)> = None;
-        // Each load and temperature once before one is repeated: the parts do not know all that they do.
+        // The ends of the loads first, as a table ends where they do; then each load and temperature once before one is
+        // repeated: the parts do not know all that they do.
         let is_new =
             |c: &Candidate, of: fn(&Pass) -> f64| taken.iter().all(|(_, pass): &(usize, Pass)| of(pass) != of(&c.pass));
         let news = |c: &Candidate| {
-            usize::from(is_new(c, |pass| pass.torque_n_m)) + usize::from(is_new(c, |pass| pass.temperature_c))
+            let new_load = is_new(c, |pass| pass.torque_n_m);
+            let new = usize::from(new_load) + usize::from(is_new(c, |pass| pass.temperature_c));
+            (new_load && bench.torque_n_m.contains(&c.pass.torque_n_m), new)
         };
         let fits = |c: &Candidate| c.pass.duration_s <= left_s;
         let most = candidates.iter().filter(|c| fits(c)).map(news).max();
@@ -307,12 +314,20 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&First<'_>>) -> Resu
             bench.minutes, bench.speed_rpm
         ));
     }
-    let none = |_: &[f64]| 0.0;
-    let nodes = widths(&chosen, &scales, &now, noise.of_a_row(), &none);
-    let rms = |covariance: &Mat| (noise.of_a_row() * asked.mean_variance(covariance)).sqrt();
+    let nodes = widths(&chosen, &scales, &now);
+    let rms = |covariance: &Mat| asked.mean_variance(covariance).sqrt();
     let mut widest = Vec::new();
-    if first.is_some() {
-        let then = widths(&chosen, &scales, &at_first, noise.of_a_row(), &none);
+    if let Some(first) = first {
+        let mut then = widths(&chosen, &scales, &at_first);
+        // What the calibration says of a node is said here as well.
+        let same = |node: &Node, other: &Node| {
+            node.part == other.part && node.of == other.of && (node.at - other.at).abs() <= 1e-6 * node.at.abs()
+        };
+        for node in &mut then {
+            if let Some(known) = first.nodes.iter().find(|known| same(node, known)) {
+                node.half_width_arcsec = known.half_width_arcsec;
+            }
+        }
         let mut order: Vec<usize> = (0..then.len()).collect();
         order.sort_by(|a, b| then[*b].half_width_arcsec.total_cmp(&then[*a].half_width_arcsec));
         widest = order
@@ -323,11 +338,26 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&First<'_>>) -> Resu
                 of: then[k].of,
                 at: then[k].at,
                 half_width_arcsec: Some(then[k].half_width_arcsec).filter(|half| *half < NOT_RECORDED_ARCSEC),
-                expected_arcsec: nodes[k].half_width_arcsec,
+                expected_arcsec: nodes[k].half_width_arcsec.min(then[k].half_width_arcsec),
             })
             .collect();
     }
     let passes = in_order(taken);
+    if chosen.contains(&PartName::WindUp) {
+        let mut loads: Vec<f64> = passes.iter().map(|pass| pass.torque_n_m).collect();
+        loads.extend(first.iter().flat_map(|first| first.scales.torque_n_m));
+        loads.sort_by(f64::total_cmp);
+        loads.dedup();
+        let wind_up = nodes.iter().filter(|node| node.part == PartName::WindUp.as_str());
+        let widest = wind_up.map(|node| node.half_width_arcsec).fold(0.0, f64::max);
+        if loads.len() < weights(PartName::WindUp).len() {
+            cannot.push(format!(
+                "wind_up: the time is enough for {} loads alone, and between them it is known to ±{widest:.0} arcsec; \
+                 give more minutes, a faster generator or less travel",
+                loads.len()
+            ));
+        }
+    }
     let paces = least_and_most(passes.iter().map(|pass| pass.speed_rpm));
     if paces.1 < OTHER_PACE * paces.0 {
         cannot
@@ -367,8 +397,8 @@ fn in_order(taken: Vec<(usize, Pass)>) -> Vec<Pass> {
 
 /// The column of the temperature that moves the zero alone, which logs of one temperature each cannot tell from the
 /// encoder's.
-fn column_of_zero(chosen: &[Chosen]) -> Option<usize> {
-    let at = chosen.iter().position(|chosen| chosen.part == PartName::Temperature)?;
+fn column_of_zero(chosen: &[PartName]) -> Option<usize> {
+    let at = chosen.iter().position(|part| *part == PartName::Temperature)?;
     Some(width_of(&chosen[..at]))
 }
 
@@ -379,7 +409,7 @@ struct Asked {
 }
 
 impl Asked {
-    fn of(scales: &Scales, ratio: f64, travel: [f64; 2], chosen: &[Chosen]) -> Asked {
+    fn of(scales: &Scales, ratio: f64, travel: [f64; 2], chosen: &[PartName]) -> Asked {
         let mut rows: Vec<Vec<f64>> =
             spread(scales, ratio, travel, ASKED).iter().map(|at| row(chosen, at, scales)).collect();
         if let Some(zero) = column_of_zero(chosen) {
@@ -411,15 +441,15 @@ impl Asked {
     }
 
     /// The part whose variance falls most.
-    fn tells_most(&self, chosen: &[Chosen], before: &Mat, after: &Mat) -> PartName {
+    fn tells_most(&self, chosen: &[PartName], before: &Mat, after: &Mat) -> PartName {
         let mut begin = 0;
         let mut best = (f64::NEG_INFINITY, PartName::OutputAngle);
         for one in chosen {
-            let columns = begin..begin + super::parts::weights(one.part).len();
+            let columns = begin..begin + weights(*one).len();
             begin = columns.end;
             let gain = self.variance_of(before, columns.clone()) - self.variance_of(after, columns);
             if gain > best.0 {
-                best = (gain, one.part);
+                best = (gain, *one);
             }
         }
         best.1
@@ -450,8 +480,7 @@ fn open_parts(prior: &Prior<'_>, bench: &Bench, scales: &Scales) -> (Vec<PartNam
         }
         _ => None,
     };
-    let open =
-        PartName::ALL.into_iter().filter(|part| lacks(*part).is_none()).chain([PartName::ReadingDelay]).collect();
+    let open = PartName::ALL.into_iter().filter(|part| lacks(*part).is_none()).collect();
     let cannot = PartName::ALL
         .into_iter()
         .filter_map(|part| lacks(part).map(|why| format!("{}: {why}", part.as_str())))
@@ -506,10 +535,10 @@ fn spreading_rpm(fastest: f64, rate_hz: f64) -> f64 {
 }
 
 /// The passes that may be made.
-fn candidates(prior: &Prior<'_>, bench: &Bench, scales: &Scales, chosen: &[Chosen]) -> Vec<Candidate> {
+fn candidates(prior: &Prior<'_>, bench: &Bench, scales: &Scales, chosen: &[PartName]) -> Vec<Candidate> {
     let ratio = prior.nominal.ratio;
     let [begin, end] = bench.output_deg;
-    let by_teeth = chosen.iter().any(|chosen| chosen.part == PartName::ToothPitch);
+    let by_teeth = chosen.contains(&PartName::ToothPitch);
     // So slow that the curve over a pitch has its rows.
     let slow_rpm = 60.0 * bench.rate_hz / (ROWS_OF_A_PITCH * scales.teeth);
     let slow = by_teeth && slow_rpm < SLOWER * bench.speed_rpm;
@@ -544,6 +573,7 @@ fn candidates(prior: &Prior<'_>, bench: &Bench, scales: &Scales, chosen: &[Chose
                         temperature_c,
                         way,
                         speed_rad_s: way * speed_rad_s,
+                        log: warmth,
                     };
                     tells.add(&row(chosen, &at, scales), weight);
                 }

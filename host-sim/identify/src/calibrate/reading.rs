@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::choose::{LEAST_GAIN, PENALTIES, path, pruned};
 use super::folds::{Chosen, Row};
 use super::interval::{Known, OF_95};
-use super::parts::PartName;
+use super::parts::{PartName, Scales, expected_arcsec};
 use super::rows::{Recorded, Rows, settled, speed_rad_s};
 use super::{Model, Prior};
 use crate::extension::left_by_core;
@@ -13,12 +13,15 @@ use crate::measurement::Recording;
 use flexspline::Table;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
+/// A delay is not told from play if its standard deviation is more than this share of that before the rows. *Guess*.
+const UNTOLD: f64 = 0.25;
+
 /// A number of the reading, fitted beside the parts of the table and not held by it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Reading {
     /// `delay` (s, positive where the output of a row is older than its generator) or `offset` (arcsec, of the output).
     pub name: &'static str,
-    /// The log, of an offset.
+    /// The log.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<String>,
     /// Value.
@@ -27,108 +30,175 @@ pub struct Reading {
     pub std: f64,
 }
 
-/// A delay between the readings of the two angles.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+/// A delay between the readings of the two angles: the largest of the logs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReadingDelay {
+    /// The log.
+    pub file: String,
     /// By how much the output of a row is older than its generator, s; negative where the generator is the older.
     pub delay_s: f64,
     /// Half width of the interval that holds it with 95 %, s.
     pub half_width_s: f64,
-    /// Error of all rows as measured, the delay among it, arcsec rms.
+    /// Error of all rows as measured, the delays among it, arcsec rms.
     pub rms_before_arcsec: f64,
-    /// What the core leaves of the rows as measured: it does not know the delay. Arcsec rms.
+    /// What the core leaves of the rows as measured: it does not know the delays. Arcsec rms.
     pub rms_after_arcsec: f64,
 }
 
-/// The delay with the standard deviation of it, s.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Delay {
-    pub by_s: f64,
-    std_s: f64,
-}
+/// The delay of each log with its standard deviation, s; `None` of a log that shows none.
+#[derive(Debug, Clone)]
+pub(super) struct Delays(Vec<Option<[f64; 2]>>);
 
-impl Delay {
-    /// The delay, if it tells what was left out better than play and all other parts do; `rows` of the files
-    /// lie outside of a play of `play_rad`, and what tells the delay outside of that which is found, too.
-    pub fn of(
+impl Delays {
+    /// The delays, if they tell what was left out better than play and all other parts do; `rows` of the files lie
+    /// outside of a play of `play_rad`, and what tells the delays outside of that which is found, too.
+    pub(crate) fn of(
         files: &[Recording],
         rows: &Rows,
         prior: &Prior<'_>,
         recorded: &Recorded,
         play_rad: f64,
-    ) -> Option<Delay> {
-        if recorded.lacks(PartName::ReadingDelay, prior).is_some() {
+    ) -> Option<Delays> {
+        if recorded.scales.speed_rad_s <= 0.0 {
             return None;
         }
-        let (found, model) = Delay::beside(rows.clone(), prior, recorded)?;
+        let (found, model) = Delays::beside(rows.clone(), prior, recorded)?;
         let further_rad = model.play_arcsec() / ARCSEC_PER_RAD;
         if further_rad <= 0.0 {
             return Some(found);
         }
         // Now that the play is known, without the rows inside it.
-        Delay::beside(settled(files, prior, recorded, play_rad + further_rad), prior, recorded).map(|(found, _)| found)
+        Delays::beside(settled(files, prior, recorded, play_rad + further_rad), prior, recorded).map(|(found, _)| found)
     }
 
-    /// The delay beside the parts of these rows, with those parts.
-    fn beside(rows: Rows, prior: &Prior<'_>, recorded: &Recorded) -> Option<(Delay, Model)> {
-        let rows = rows.sure(recorded.scales.friction_n_m, recorded).less(prior);
-        let parts = recorded.shown(PartName::ALL.into_iter().chain([PartName::ReadingDelay]), prior);
-        let folds = rows.folds_of(&parts, &recorded.scales);
+    /// The delays beside the parts of these rows, with those parts.
+    fn beside(rows: Rows, prior: &Prior<'_>, recorded: &Recorded) -> Option<(Delays, Model)> {
+        let rows = rows.sure(recorded.scales.friction_n_m, recorded).less(prior).in_blocks();
+        let (logs, scales) = (rows.means_arcsec.len(), recorded.scales);
+        let delays: Vec<PartName> = (0..logs).map(PartName::ReadingDelay).collect();
+        let parts = recorded.shown(PartName::ALL.into_iter().chain(delays.iter().copied()), prior);
+        let folds = rows.folds_of(&parts, &scales);
         let all = folds.all();
-        let chosen = pruned(&folds, &all, path(&folds, &all).pop()?);
-        // Play goes nearly as the delay does: it is there, or the delay would take it up, and where the two oppose each
-        // other neither gains alone. As much of it as a penalty holds back, the delay would take up as well.
-        let free = |part: PartName| Chosen { part, penalty: PENALTIES[0] };
-        let is_beside = |part: &PartName| {
-            *part == PartName::Play || *part != PartName::ReadingDelay && chosen.iter().any(|other| other.part == *part)
+        let gainful = pruned(&folds, &all, path(&folds, &all).pop()?);
+        // Play goes nearly as a delay does: it is there, or the delay would take it up, and where the two oppose each
+        // other neither gains alone. What rows do not tell apart is shared as either is to be expected. At one pace all
+        // is play, but an output that leads: no play does that.
+        let hidden = recorded.hides_a_delay();
+        let has = |part: &PartName| gainful.iter().any(|other| other.part == *part);
+        let in_table = |part: &PartName| match part {
+            PartName::Play => !hidden,
+            PartName::ReadingDelay(_) => false,
+            part => has(part),
         };
-        let mut chosen: Vec<Chosen> = parts.iter().copied().filter(is_beside).map(free).collect();
-        let without = folds.left_out(&all, &chosen);
-        chosen.push(free(PartName::ReadingDelay));
-        if folds.left_out(&all, &chosen) > without * (1.0 - LEAST_GAIN) {
+        let free = |part: PartName| Chosen { part, penalty: PENALTIES[0] };
+        let mut chosen: Vec<Chosen> = parts.iter().copied().filter(in_table).map(free).collect();
+        let parts_alone = chosen.len();
+        chosen.extend(delays.iter().copied().map(free));
+        let model = |chosen: &[Chosen]| {
+            Some(Model { coefficients: folds.coefficients(chosen, &[])?, chosen: chosen.to_vec(), scales })
+        };
+        let none = vec![0.0; logs];
+        let known = |model: &Model| Known::of(&rows.rows, model, &none, recorded.coarse_rad);
+        // Of noise as large as the delays make it they would be held back.
+        let of_a_row = known(&model(&chosen)?)?.noise.of_a_row() / rows.rows.len() as f64;
+        for chosen in &mut chosen {
+            if matches!(chosen.part, PartName::Play | PartName::ReadingDelay(_)) {
+                chosen.penalty = of_a_row / expected_arcsec(chosen.part, &scales, &[]).powi(2);
+            }
+        }
+        let with_all = model(&chosen)?;
+        let of_all = known(&with_all)?;
+        let left = folds.left_out(&all, &chosen);
+        let is_told = |delay: &Chosen| {
+            let PartName::ReadingDelay(log) = delay.part else { return true };
+            let (Some(of), Some(std)) = (with_all.of(delay.part), of_all.std_of_delay(log)) else { return false };
+            let value = with_all.coefficients[of.start];
+            let others: Vec<Chosen> = chosen.iter().copied().filter(|other| other != delay).collect();
+            // A share of a log in all rows is no larger the more logs there are.
+            let gains = left < folds.left_out(&all, &others) * (1.0 - LEAST_GAIN / logs as f64);
+            if hidden {
+                return gains && value > OF_95 * std;
+            }
+            let untold = std > UNTOLD * expected_arcsec(delay.part, &scales, &[]);
+            value.abs() > OF_95 * std && (gains || untold)
+        };
+        let chosen: Vec<Chosen> = chosen.iter().copied().filter(is_told).collect();
+        if chosen.len() == parts_alone {
             return None;
         }
-        let model = Model { coefficients: folds.coefficients(&chosen, &[])?, chosen, scales: recorded.scales };
-        let of = model.of(PartName::ReadingDelay)?;
+        let model = model(&chosen)?;
+        let known = known(&model)?;
         // The column is the speed over its scale.
-        let s_of_arcsec = 1.0 / ARCSEC_PER_RAD / recorded.scales.speed_rad_s;
-        let std = Known::of(&rows.rows, &model, rows.means_arcsec.len())?.std_arcsec(of.start);
-        let delay = Delay { by_s: -model.coefficients[of.start] * s_of_arcsec, std_s: std * s_of_arcsec };
-        Some((delay, model))
+        let s_of_arcsec = 1.0 / ARCSEC_PER_RAD / scales.speed_rad_s;
+        let found = delays.iter().enumerate().map(|(log, delay)| {
+            let by = -model.coefficients[model.of(*delay)?.start];
+            // At one pace it leads by no less, but any play may hide more of it.
+            let std_s = known.std_of_delay(log)? * s_of_arcsec;
+            Some([by * s_of_arcsec, if hidden { std_s.hypot(scales.late_s) } else { std_s }])
+        });
+        Some((Delays(found.collect()), model))
     }
 
     /// Logs with both angles as they are at one instant.
-    pub(crate) fn taken_out(self, files: &[Recording], ratio: f64) -> Vec<Recording> {
+    pub(crate) fn taken_out(&self, files: &[Recording], ratio: f64) -> Vec<Recording> {
         let mut files = files.to_vec();
-        for session in files.iter_mut().flat_map(|file| &mut file.sessions) {
-            let speeds: Vec<f64> = (0..session.len()).map(|k| speed_rad_s(session, k, ratio)).collect();
-            session.error_rad.iter_mut().zip(speeds).for_each(|(error, speed)| *error += self.by_s * speed);
+        for (file, delay) in files.iter_mut().zip(&self.0) {
+            let by_s = delay.map_or(0.0, |[by_s, _]| by_s);
+            for session in &mut file.sessions {
+                let speeds: Vec<f64> = (0..session.len()).map(|k| speed_rad_s(session, k, ratio)).collect();
+                session.error_rad.iter_mut().zip(speeds).for_each(|(error, speed)| *error += by_s * speed);
+            }
         }
         files
     }
 
-    pub fn reading(self) -> Reading {
-        Reading { name: "delay", file: None, value: self.by_s, std: self.std_s }
+    /// As numbers of their columns; 0 of a log that shows none.
+    pub(crate) fn of_columns(&self, scales: &Scales) -> Vec<f64> {
+        let column =
+            |delay: &Option<[f64; 2]>| delay.map_or(0.0, |[by_s, _]| -by_s * scales.speed_rad_s * ARCSEC_PER_RAD);
+        self.0.iter().map(column).collect()
     }
 
-    /// What it does to the rows of these logs, in which it is, beside this table.
-    pub(crate) fn shown(self, files: &[Recording], table: &Table<'_>, recorded: &Recorded) -> ReadingDelay {
+    /// Those of the logs that show one.
+    pub(crate) fn readings(&self, files: &[Recording]) -> Vec<Reading> {
+        let reading = |(file, delay): (&Recording, &Option<[f64; 2]>)| {
+            let [value, std] = (*delay)?;
+            Some(Reading { name: "delay", file: Some(file.file.clone()), value, std })
+        };
+        files.iter().zip(&self.0).filter_map(reading).collect()
+    }
+
+    /// What they do to the rows of these logs, in which they are, beside this table.
+    pub(crate) fn shown(&self, files: &[Recording], table: &Table<'_>, recorded: &Recorded) -> Option<ReadingDelay> {
         let ByCore { rms_before_arcsec, rms_after_arcsec, .. } = ByCore::of(files, table, recorded);
-        ReadingDelay { delay_s: self.by_s, half_width_s: OF_95 * self.std_s, rms_before_arcsec, rms_after_arcsec }
+        let largest = self.readings(files).into_iter().max_by(|a, b| a.value.abs().total_cmp(&b.value.abs()))?;
+        Some(ReadingDelay {
+            file: largest.file.unwrap_or_default(),
+            delay_s: largest.value,
+            half_width_s: OF_95 * largest.std,
+            rms_before_arcsec,
+            rms_after_arcsec,
+        })
     }
 }
 
 impl ReadingDelay {
-    /// What is said of it.
-    #[must_use]
-    pub(crate) fn note(&self) -> String {
-        let (old, new) = if self.delay_s > 0.0 { ("output", "generator") } else { ("generator", "output") };
+    /// What is said of the delays of logs, of which this is the largest.
+    pub(super) fn note(&self, readings: &[Reading], logs: usize) -> String {
+        let of_log = |reading: &Reading| {
+            let (old, new) = if reading.value > 0.0 { ("output", "generator") } else { ("generator", "output") };
+            let file = reading.file.as_deref().filter(|_| logs > 1).map_or(String::new(), |file| format!(" of {file}"));
+            format!(
+                "in each row{file} the {old} is {:.3} ± {:.3} ms older than the {new}",
+                1e3 * reading.value.abs(),
+                1e3 * OF_95 * reading.std
+            )
+        };
         format!(
-            "in each row the {old} is {:.3} ± {:.3} ms older than the {new}: what that does goes with the speed, which \
-             no table knows, so the table is fitted without it. Over all rows as measured {:.2} arcsec rms, {:.2} with \
-             the table and the delay still there; read both at one instant, or tell the controller of the delay",
-            1e3 * self.delay_s.abs(),
-            1e3 * self.half_width_s,
+            "{}: what that does goes with the speed, which no table knows, so the table is fitted without it. Over all \
+             rows as measured {:.2} arcsec rms, {:.2} with the table and the delay still there; read both at one \
+             instant, or tell the controller of the delay",
+            readings.iter().map(of_log).collect::<Vec<_>>().join("; "),
             self.rms_before_arcsec,
             self.rms_after_arcsec
         )
@@ -138,7 +208,7 @@ impl ReadingDelay {
 /// What a delay would do that these rows cannot tell from play, arcsec of play for a millisecond; none where they tell
 /// it, or have no time.
 pub(super) fn play_of_a_millisecond(rows: &[Row], recorded: &Recorded, prior: &Prior<'_>) -> Option<f64> {
-    let hidden = recorded.scales.speed_rad_s > 0.0 && recorded.lacks(PartName::ReadingDelay, prior).is_some();
+    let hidden = recorded.scales.speed_rad_s > 0.0 && recorded.hides_a_delay();
     if !hidden || recorded.lacks(PartName::Play, prior).is_some() {
         return None;
     }

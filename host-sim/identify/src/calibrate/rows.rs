@@ -2,10 +2,11 @@
 
 use std::f64::consts::TAU;
 
-use super::folds::{Folds, Row};
+use super::folds::{FLOOR, Folds, Row};
 use super::parts::{PartName, Scales, State};
 use super::prior::Prior;
 use crate::measurement::{Recording, Session, least_and_most, quantile_of, sampled, white_noise};
+use flexspline_algebra::{Mat, cholesky};
 use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// Folds that records are cut into: blocks of a tenth of each or so, which say what a table does beyond what it saw.
@@ -76,6 +77,17 @@ pub(super) struct Recorded {
     pub temperature_c: f64,
     /// Speed of the output that a tenth of the rows that move stay below, rad/s.
     pub slow_rad_s: f64,
+    /// Step of the resolution of both angles at the output, rad; 0 where noise blurs it.
+    pub coarse_rad: f64,
+}
+
+/// Standard deviation of the delay between two angles of which nothing is known, s: that of any two instants of the
+/// time between rows, or of the cycle of a slow controller's task, 10 ms, where rows are slower. A guess.
+pub(super) fn late_s(period_s: f64) -> f64 {
+    /// A guess.
+    const SLOW_TASK_S: f64 = 0.01;
+    let apart_s = if period_s > 0.0 { period_s.min(SLOW_TASK_S) } else { SLOW_TASK_S };
+    apart_s / 12.0_f64.sqrt()
 }
 
 impl Recorded {
@@ -109,6 +121,10 @@ impl Recorded {
         });
         let mut speeds = sampled(&speeds.filter(|speed| *speed > 0.0).collect::<Vec<f64>>());
         let [slow, fast] = [0.1, 0.9].map(|share| quantile_of(&mut speeds, share));
+        let mut periods: Vec<f64> =
+            sessions().filter_map(|s| s.time_s.as_ref()).flat_map(|t| t.windows(2).map(|p| p[1] - p[0])).collect();
+        periods = sampled(&periods);
+        let period_s = quantile_of(&mut periods, 0.5);
         let keeps_to_one_load = |file: &Recording| {
             let loads = file.sessions.iter().flat_map(|session| session.torque_n_m.iter().flatten().copied());
             let (low, high) = least_and_most(loads);
@@ -123,7 +139,9 @@ impl Recorded {
                 temperature_c: if has_temperature { [temperature.0, temperature.1] } else { [usual; 2] },
                 teeth: prior.tooth_pitches(),
                 speed_rad_s: fast,
+                late_s: late_s(period_s),
             },
+            coarse_rad: sessions().map(|session| session.coarse_rad).fold(0.0, f64::max),
             slow_rad_s: slow,
             has_torque,
             each_keeps_to_one_load: has_torque && files.len() > 1 && files.iter().all(keeps_to_one_load),
@@ -141,6 +159,11 @@ impl Recorded {
     /// Of some parts those that can be fitted to what was recorded.
     pub(crate) fn shown(&self, parts: impl IntoIterator<Item = PartName>, prior: &Prior<'_>) -> Vec<PartName> {
         parts.into_iter().filter(|part| self.lacks(*part, prior).is_none()).collect()
+    }
+
+    /// Whether the generator kept to one pace, or there is no time: there a delay and play are one.
+    pub(crate) fn hides_a_delay(&self) -> bool {
+        self.scales.speed_rad_s <= 0.0 || self.scales.speed_rad_s < super::OTHER_PACE * self.slow_rad_s
     }
 
     /// Why a part cannot be fitted to what was recorded, if it cannot.
@@ -181,10 +204,6 @@ impl Recorded {
             PartName::Temperature if !self.has_temperature => Some("no temperature was recorded".to_owned()),
             PartName::Temperature if warm - cold < super::ONE_TEMPERATURE_K => {
                 Some(format!("the temperature varies by {:.1} K", warm - cold))
-            }
-            PartName::ReadingDelay if self.scales.speed_rad_s <= 0.0 => Some("no time was recorded".to_owned()),
-            PartName::ReadingDelay if self.scales.speed_rad_s < super::OTHER_PACE * self.slow_rad_s => {
-                Some("the generator keeps to one pace: there a delay and play are one".to_owned())
             }
             _ => None,
         }
@@ -249,6 +268,7 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
                     temperature_c: at(&session.temperature_c, recorded.temperature_c),
                     way,
                     speed_rad_s: speed_rad_s(session, k, prior.nominal.ratio),
+                    log: zero,
                 };
                 all.measured_arcsec.push(session.error_rad[k] * ARCSEC_PER_RAD);
                 all.rows.push(Row { at, left_arcsec: 0.0, zero, fold: 0 });
@@ -309,6 +329,38 @@ impl Rows {
                     && own.1 <= rest().map(|(_, of)| of.1).fold(f64::NEG_INFINITY, f64::max) + beyond
             })
         })
+    }
+
+    /// Correlation of the load with what the first waves of the output make of it, 0 to 1.
+    pub(crate) fn load_with_output_angle(&self) -> f64 {
+        let count = self.rows.len().max(1) as f64;
+        let waves = |at: &State| [1.0, at.output_rad.sin(), at.output_rad.cos()];
+        let mut gram = Mat::zeros(3, 3);
+        let (mut right, mut square) = (Mat::zeros(3, 1), 0.0);
+        for Row { at, .. } in &self.rows {
+            let x = waves(at);
+            for i in 0..3 {
+                right[(i, 0)] += x[i] * at.torque_n_m;
+                (0..3).for_each(|j| gram[(i, j)] += x[i] * x[j]);
+            }
+            square += at.torque_n_m * at.torque_n_m;
+        }
+        let mean = right[(0, 0)] / count;
+        (0..3).for_each(|i| gram[(i, i)] += FLOOR * count);
+        let about = square - count * mean * mean;
+        let Ok(factor) = cholesky(gram.as_ref()) else { return 0.0 };
+        let found = factor.solve(right.as_ref());
+        let explained = (0..3).map(|i| found[(i, 0)] * right[(i, 0)]).sum::<f64>() - count * mean * mean;
+        if about > 0.0 { (explained / about).clamp(0.0, 1.0).sqrt() } else { 0.0 }
+    }
+
+    /// With blocks of each log for folds: what is a log's own is not seen in the others.
+    pub(crate) fn in_blocks(mut self) -> Rows {
+        if self.folds != FoldKind::Blocks {
+            let sessions = vec![0; self.rows.len()];
+            self.fold(FoldKind::Blocks, ROUNDS, &sessions);
+        }
+        self
     }
 
     /// Sums over their folds.

@@ -121,7 +121,7 @@ fn error_arcsec(
     let way = if direction == Direction::Forward { 1.0 } else { -1.0 };
     let (torque_n_m, temperature_c) = (f64::from(torque), f64::from(temperature));
     let output_rad = generator_rad / prior.nominal.ratio;
-    let at = State { generator_rad, output_rad, torque_n_m, temperature_c, way, speed_rad_s: 0.0 };
+    let at = State { generator_rad, output_rad, torque_n_m, temperature_c, way, ..State::default() };
     prior.steady_arcsec(&at) + model.adds_arcsec(&at)
 }
 

@@ -108,7 +108,7 @@ fn a_delay_is_no_play_and_play_is_no_delay() {
         let told = c.notes.iter().find(|note| note.contains(old) && note.contains("older than"));
         assert_eq!(told.is_some(), delay_s != 0.0, "{delay_s} {play}: {:?}", c.notes);
         assert_eq!(c.reading_delay.is_some(), delay_s != 0.0);
-        if let Some(found) = c.reading_delay {
+        if let Some(found) = &c.reading_delay {
             assert!((found.delay_s - delay_s).abs() < found.half_width_s && found.half_width_s < 3e-4, "{found:?}");
             // The delay stays where nobody takes it out, and what is said of the rows as measured has it.
             let behind = |rms: f64, without: f64| (rms * rms - without * without).sqrt();
@@ -125,6 +125,14 @@ fn a_delay_is_no_play_and_play_is_no_delay() {
         assert_eq!(kept(c).contains(&"play"), play > 0.0, "{delay_s} {play}: {:?}", c.parts);
         assert!(c.core.rms_after_arcsec < 3.0, "{:?}", c.core);
     }
+    // Each log has its own.
+    let of_logs = [(3, 0.004), (4, 0.0)].map(|(seed, delay_s)| {
+        at_paces(recording(seed, |psi, _, _, way| 25.0 * (2.0 * psi).sin() - 18.0 * way), delay_s)
+    });
+    let c = calibrate(&of_logs, &prior).unwrap().calibration;
+    let delays: Vec<&Reading> = c.readings.iter().filter(|reading| reading.name == "delay").collect();
+    assert!(delays.len() == 1 && delays[0].file == Some(of_logs[0].file.clone()), "{delays:?}");
+    assert!((delays[0].value - 0.004).abs() < OF_95 * delays[0].std && delays[0].std < 2e-4, "{delays:?}");
     // Of several logs it is told once.
     let files = [3, 4].map(|seed| at_paces(recording(seed, |psi, _, _, _| 25.0 * (2.0 * psi).sin()), 0.005));
     let notes = calibrate(&files, &prior).unwrap().calibration.notes;
@@ -147,7 +155,11 @@ fn one_pace_is_said_to_hide_a_delay_and_a_plan_has_others() {
         calibrate(&[log], &prior).unwrap().calibration
     };
     let c = late(&planned);
-    assert!(c.reading_delay.is_some_and(|found| (found.delay_s - 0.005).abs() < found.half_width_s), "{:?}", c.notes);
+    assert!(
+        c.reading_delay.as_ref().is_some_and(|found| (found.delay_s - 0.005).abs() < found.half_width_s),
+        "{:?}",
+        c.notes
+    );
     assert!(!kept(&c).contains(&"play") && c.core.rms_after_arcsec < 1.5, "{:?}", c.core);
     // The same passes at one speed.
     let fastest = planned.passes.iter().map(|pass| pass.speed_rpm).fold(0.0, f64::max);
@@ -162,6 +174,9 @@ fn one_pace_is_said_to_hide_a_delay_and_a_plan_has_others() {
     assert!((said / of_a_millisecond - 1.0).abs() < 0.05, "{said} of {of_a_millisecond}");
     assert!(kept(&c).contains(&"play") && c.reading_delay.is_none(), "{:?}", c.parts);
     assert!(c.notes.iter().any(|note| note.contains("one pace") && note.contains("a millisecond")), "{:?}", c.notes);
+    // The delay of 5 ms is in the table as play, and its interval at another pace has that.
+    let widths = [c.half_width_as_recorded_arcsec, c.half_width_at_another_pace_arcsec];
+    assert!(widths[0] < said && widths[1] > 2.5 * said, "{widths:?}, {said} of a millisecond");
     // A plan that has time for one pace says so.
     let short = plan(&prior, &Bench { minutes: 8.0, ..bench }, None).unwrap();
     assert!(short.cannot.iter().any(|why| why.starts_with("reading_delay")), "{:?}", short.cannot);
@@ -331,8 +346,14 @@ fn what_was_not_recorded_is_not_fitted() {
 
 #[test]
 fn a_sum_over_folds_is_the_fit_to_the_rows() {
-    let scales =
-        Scales { torque_n_m: [0.0; 2], friction_n_m: 0.0, temperature_c: [20.0; 2], teeth: 200.0, speed_rad_s: 0.0 };
+    let scales = Scales {
+        torque_n_m: [0.0; 2],
+        friction_n_m: 0.0,
+        temperature_c: [20.0; 2],
+        teeth: 200.0,
+        speed_rad_s: 0.0,
+        late_s: 1e-3,
+    };
     let rows: Vec<Row> = (0..200)
         .map(|k| {
             let psi = 0.1 * k as f64;
@@ -342,7 +363,7 @@ fn a_sum_over_folds_is_the_fit_to_the_rows() {
                 torque_n_m: 0.0,
                 temperature_c: 20.0,
                 way: 1.0,
-                speed_rad_s: 0.0,
+                ..State::default()
             };
             Row { at, left_arcsec: 7.0 * psi.sin() + 3.0, zero: 0, fold: k / 50 }
         })
@@ -434,6 +455,33 @@ fn a_plan_says_what_noise_leaves_and_its_intervals_hold() {
     // again.
     assert!(rms < 3.0 * expected && rms > 0.5 * expected, "{rms} of {expected}");
     assert!(inside / count > 0.9, "{}", inside / count);
+}
+
+/// Few loads leave a wind-up open between them: the plan takes the ends first and says so, and the interval has it.
+#[test]
+fn few_loads_leave_their_doubt_in_the_interval() {
+    let prior = Prior::of_ratio(RATIO, GeneratorKind::Cam);
+    let bench = Bench { minutes: 14.0, rate_hz: 5.0, torque_n_m: [-30.0, 30.0], ..Bench::default() };
+    let planned = plan(&prior, &bench, None).unwrap();
+    let mut first: Vec<f64> = planned.passes[..2].iter().map(|pass| pass.torque_n_m).collect();
+    first.sort_by(f64::total_cmp);
+    assert_eq!(first, [-30.0, 30.0]);
+    assert!(planned.cannot.iter().any(|why| why.starts_with("wind_up")), "{:?}", planned.cannot);
+    for (seed, bend) in [(1, 0.0), (2, 20.0), (3, -0.1), (4, 10.0)] {
+        let law = |psi: f64, out: f64, torque: f64, _: f64| {
+            let bent =
+                if bend < 0.0 { bend * torque * torque.abs() / 3.0 } else { bend * torque / (torque.abs() + 3.0) };
+            18.0 * (2.0 * psi).sin() + 40.0 * out.cos() + 8.0 * torque + bent
+        };
+        let made = calibrate(&[played(&planned, seed, law)], &prior).unwrap();
+        let nodes = made.calibration.nodes.iter().filter(|node| node.part == "wind_up" && node.at != 0.0);
+        let holds = |node: &&Node| {
+            let off = law(0.0, 0.0, node.at, 1.0) - law(0.0, 0.0, 0.0, 1.0) - node.value_arcsec.unwrap();
+            off.abs() < node.half_width_arcsec
+        };
+        let (inside, all) = (nodes.clone().filter(holds).count(), nodes.clone().count());
+        assert!(inside == all, "bend {bend}: {inside} of {all}: {:?}", nodes.collect::<Vec<_>>());
+    }
 }
 
 /// A first log at one load says nothing of the wind-up: the plan for more says so, and asks for other loads.

@@ -94,7 +94,7 @@ fn loaded(table: &Table<'_>, share: f32) -> State {
         torque_n_m: f64::from(share * torque),
         temperature_c: f64::from(f32::midpoint(low, high)),
         way: 1.0,
-        speed_rad_s: 0.0,
+        ..State::default()
     }
 }
 
