@@ -196,7 +196,7 @@ impl Stated {
         Loads { t1_n_m, t2_n_m, largest_n_m }
     }
 
-    /// The load that counts as rated of a drive with a sheet: the largest of [`Self::loads`], which is a cam's; with
+    /// The load that counts as rated of a drive with a sheet: the largest of `loads`, which is a cam's; with
     /// another generator, or without a sheet, that of the drive's size.
     pub fn rated_n_m(stated: Option<&Stated>, drive: &Drive, kind: GeneratorKind) -> f64 {
         let by_size_n_m = drive.rated_torque_n_m(kind);

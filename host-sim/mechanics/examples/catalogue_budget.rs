@@ -3,7 +3,7 @@
 //!
 //! Sizes 17, 25 and 40, i = 100 (Harmonic Drive CSF). Module and teeth follow from the catalogue's pitch diameter; rim,
 //! width, clearance and tooth form are those of HHD-95 in proportion, cup and balls are guesses in proportion
-//! ([`Guess`]): no maker publishes them. Nothing is fitted to the catalogue.
+//! (`Guess`): no maker publishes them. Nothing is fitted to the catalogue.
 //!
 //! Without a word: the same drive by contact FEM with one part more at a time: teeth, rim and cam alone; the cup; the
 //! balls of the generator bearing, each range of torque with the stiffness that the balls have under its mean load. A
@@ -11,7 +11,7 @@
 //! without preload, and bounds in closed form of what is not in the FEM (`race_on_bore`, `seal`).
 //!
 //! `cone`: everything at once, the teeth leaning with the cup (`flexspline.face = "slices"`). Involutes and S-shaped
-//! teeth, straight, crowned, and tapered for the cone, each drawn just free of play ([`free_of_play`]) or deeper, with
+//! teeth, straight, crowned, and tapered for the cone, each drawn just free of play (`free_of_play`) or deeper, with
 //! its loop and the torque that turns its generator without load.
 //!
 //! `map`: S-shaped crowned teeth free of play, one guess changed at a time.
