@@ -123,6 +123,33 @@ type Truths = *mut u8;
 /// Whole numbers of clocks.
 type Counts = *const u64;
 
+/// Functions that read and set numbers, by their type and what variables have it.
+macro_rules! typed {
+    ($($get:ident $set:ident $of:ty: $like:ident;)+) => {
+        functions! { component, call;
+            $(
+                $get(of: References, n: usize, to: *mut $of, m: usize) =>
+                    read(component, call, $like, (of, n), (to, m));
+                $set(of: References, n: usize, from: *const $of, m: usize) =>
+                    write(component, call, $like, (of, n), (from, m));
+            )+
+        }
+    };
+}
+typed! {
+    fmi3GetFloat32 fmi3SetFloat32 f32: none;
+    fmi3GetFloat64 fmi3SetFloat64 f64: is_real;
+    fmi3GetInt8 fmi3SetInt8 i8: none;
+    fmi3GetUInt8 fmi3SetUInt8 u8: none;
+    fmi3GetInt16 fmi3SetInt16 i16: none;
+    fmi3GetUInt16 fmi3SetUInt16 u16: none;
+    fmi3GetInt32 fmi3SetInt32 i32: is_integer;
+    fmi3GetUInt32 fmi3SetUInt32 u32: none;
+    fmi3GetInt64 fmi3SetInt64 i64: is_choice;
+    fmi3GetUInt64 fmi3SetUInt64 u64: none;
+    fmi3GetBoolean fmi3SetBoolean u8: is_boolean;
+}
+
 functions! { component, call;
     fmi3SetDebugLogging(on: u8, count: usize, categories: Strings) =>
         set_logging(component, call, on != 0, count, categories);
@@ -145,39 +172,8 @@ functions! { component, call;
             done
         });
 
-    fmi3GetFloat32(of: References, n: usize, to: *mut f32, m: usize) => read(component, call, none, (of, n), (to, m));
-    fmi3GetFloat64(of: References, n: usize, to: *mut f64, m: usize) =>
-        read(component, call, is_real, (of, n), (to, m));
-    fmi3GetInt8(of: References, n: usize, to: *mut i8, m: usize) => read(component, call, none, (of, n), (to, m));
-    fmi3GetUInt8(of: References, n: usize, to: *mut u8, m: usize) => read(component, call, none, (of, n), (to, m));
-    fmi3GetInt16(of: References, n: usize, to: *mut i16, m: usize) => read(component, call, none, (of, n), (to, m));
-    fmi3GetUInt16(of: References, n: usize, to: *mut u16, m: usize) => read(component, call, none, (of, n), (to, m));
-    fmi3GetInt32(of: References, n: usize, to: *mut i32, m: usize) =>
-        read(component, call, is_integer, (of, n), (to, m));
-    fmi3GetUInt32(of: References, n: usize, to: *mut u32, m: usize) => read(component, call, none, (of, n), (to, m));
-    fmi3GetInt64(of: References, n: usize, to: *mut i64, m: usize) =>
-        read(component, call, is_choice, (of, n), (to, m));
-    fmi3GetUInt64(of: References, n: usize, to: *mut u64, m: usize) => read(component, call, none, (of, n), (to, m));
-    fmi3GetBoolean(of: References, n: usize, to: Truths, m: usize) =>
-        read(component, call, is_boolean, (of, n), (to, m));
     fmi3GetString(of: References, n: usize, to: *mut *const c_char, m: usize) =>
         read_texts(component, call, (of, n), (to, m));
-    fmi3SetFloat32(of: References, n: usize, to: *const f32, m: usize) =>
-        write(component, call, none, (of, n), (to, m));
-    fmi3SetFloat64(of: References, n: usize, to: *const f64, m: usize) =>
-        write(component, call, is_real, (of, n), (to, m));
-    fmi3SetInt8(of: References, n: usize, to: *const i8, m: usize) => write(component, call, none, (of, n), (to, m));
-    fmi3SetUInt8(of: References, n: usize, to: *const u8, m: usize) => write(component, call, none, (of, n), (to, m));
-    fmi3SetInt16(of: References, n: usize, to: *const i16, m: usize) => write(component, call, none, (of, n), (to, m));
-    fmi3SetUInt16(of: References, n: usize, to: *const u16, m: usize) => write(component, call, none, (of, n), (to, m));
-    fmi3SetInt32(of: References, n: usize, to: *const i32, m: usize) =>
-        write(component, call, is_integer, (of, n), (to, m));
-    fmi3SetUInt32(of: References, n: usize, to: *const u32, m: usize) => write(component, call, none, (of, n), (to, m));
-    fmi3SetInt64(of: References, n: usize, to: *const i64, m: usize) =>
-        write(component, call, is_choice, (of, n), (to, m));
-    fmi3SetUInt64(of: References, n: usize, to: *const u64, m: usize) => write(component, call, none, (of, n), (to, m));
-    fmi3SetBoolean(of: References, n: usize, to: *const u8, m: usize) =>
-        write(component, call, is_boolean, (of, n), (to, m));
     fmi3SetString(of: References, n: usize, _to: Strings, _m: usize) => write_texts(component, call, of, n);
 
     fmi3GetFMUState(state: *mut FmuState) => get_state(component, call, state);
