@@ -89,9 +89,7 @@ fn gram(groups: &[Information], width: usize) -> Mat {
 /// The inverse of a matrix with something on its diagonal.
 fn inverse(mut gram: Mat, diagonal: &[f64]) -> Option<Mat> {
     diagonal.iter().enumerate().for_each(|(i, value)| gram[(i, i)] += value);
-    let mut one = Mat::zeros(diagonal.len(), diagonal.len());
-    (0..diagonal.len()).for_each(|i| one[(i, i)] = 1.0);
-    Some(cholesky(gram.as_ref()).ok()?.solve(one.as_ref()))
+    Some(cholesky(gram.as_ref()).ok()?.inverse())
 }
 
 /// Covariance of the coefficients of a drive that nobody has measured after these rows, arcsec², for the variance of a
@@ -284,10 +282,9 @@ pub(super) fn widths(parts: &[PartName], scales: &Scales, covariance: &Mat) -> V
     nodes
 }
 
-/// Usual step of the generator from row to row, rad.
-fn usual_step(rows: &[Row]) -> f64 {
-    let mut steps: Vec<f64> =
-        rows.windows(2).map(|pair| (pair[1].at.generator_rad - pair[0].at.generator_rad).abs()).collect();
+/// Usual step of an angle from row to row, rad.
+fn usual_step(rows: &[Row], angle: fn(&State) -> f64) -> f64 {
+    let mut steps: Vec<f64> = rows.windows(2).map(|pair| (angle(&pair[1].at) - angle(&pair[0].at)).abs()).collect();
     if steps.is_empty() { 0.0 } else { median_of(&mut steps) }
 }
 
@@ -314,11 +311,10 @@ impl Known {
             let mean = file.iter().sum::<f64>() / file.len().max(1) as f64;
             file.iter_mut().for_each(|value| *value -= mean);
         }
-        let mut steps: Vec<f64> =
-            rows.windows(2).map(|pair| (pair[1].at.output_rad - pair[0].at.output_rad).abs()).collect();
-        let step_rad = if steps.is_empty() { 0.0 } else { median_of(&mut steps) };
+        let step_rad = usual_step(rows, |at| at.output_rad);
         let rows_of_a_step = if step_rad > 0.0 { coarse_rad / step_rad } else { 0.0 };
-        let noise = Noise::of(&left, model.coefficients.len() + logs, usual_step(rows), rows_of_a_step);
+        let noise =
+            Noise::of(&left, model.coefficients.len() + logs, usual_step(rows, |at| at.generator_rad), rows_of_a_step);
 
         let in_table = model.chosen.iter().filter(|chosen| !matches!(chosen.part, PartName::ReadingDelay(_)));
         let mut parts: Vec<PartName> = in_table.map(|chosen| chosen.part).collect();

@@ -145,6 +145,11 @@ impl Model {
         columns.iter().zip(&self.coefficients).map(|(column, coefficient)| column * coefficient).sum()
     }
 
+    /// What the prior and the parts say, arcsec.
+    fn says_arcsec(&self, at: &State, prior: &Prior<'_>) -> f64 {
+        prior.steady_arcsec(at) + self.adds_arcsec(at)
+    }
+
     /// Where the coefficients of a part stand.
     fn of(&self, part: PartName) -> Option<std::ops::Range<usize>> {
         let mut begin = 0;
@@ -168,7 +173,7 @@ impl Model {
     /// Error at rest in one place under a load, arcsec.
     fn under_arcsec(&self, torque_n_m: f64, prior: &Prior<'_>) -> f64 {
         let at = State { torque_n_m, temperature_c: prior.nominal.temperature_c, way: 1.0, ..State::default() };
-        prior.steady_arcsec(&at) + self.adds_arcsec(&at)
+        self.says_arcsec(&at, prior)
     }
 
     /// Refuses a torque by which the output gives way the wrong way: its sign is another.
@@ -253,7 +258,7 @@ fn play_width(model: &Model, prior: &Prior<'_>, recorded: &Recorded) -> PlayWidt
     let within_n_m = recorded.scales.torque_n_m.iter().fold(2.0 * friction, |within, end| within.min(end.abs()));
     let error = |torque_n_m: f64, way: f64| {
         let at = State { torque_n_m, temperature_c: recorded.temperature_c, way, ..State::default() };
-        prior.steady_arcsec(&at) + model.adds_arcsec(&at)
+        model.says_arcsec(&at, prior)
     };
     PlayWidth {
         between_directions_arcsec: error(0.0, -1.0) - error(0.0, 1.0),
@@ -263,11 +268,11 @@ fn play_width(model: &Model, prior: &Prior<'_>, recorded: &Recorded) -> PlayWidt
 }
 
 /// States spread over what the table of these rows is to hold.
-fn anywhere(rows: &Rows, recorded: &Recorded, prior: &Prior<'_>) -> impl Iterator<Item = State> {
+fn anywhere(rows: &Rows, recorded: &Recorded, prior: &Prior<'_>) -> Vec<State> {
     let (from, to) = least_and_most(rows.rows.iter().map(|row| row.at.output_rad));
     let pace = rows.rows.iter().map(|row| row.at.speed_rad_s.abs()).sum::<f64>() / rows.rows.len().max(1) as f64;
     let states = interval::spread(&recorded.scales, prior.nominal.ratio, [from, to], ROWS_OF_A_WIDTH);
-    states.into_iter().map(move |at| State { speed_rad_s: at.way * pace, ..at })
+    states.into_iter().map(|at| State { speed_rad_s: at.way * pace, ..at }).collect()
 }
 
 /// Says so where the load goes with the output's angle.
@@ -577,10 +582,10 @@ fn with_dead_zone(
     let as_fitted = |at: State| if logs.delays.is_some() { at_rest(at) } else { at };
     let every = rows.rows.len().div_ceil(ROWS_OF_A_WIDTH).max(1);
     let some_rows = || rows.rows.iter().step_by(every).map(|row| row.at);
-    let half_width_arcsec = known.mean_half_width_arcsec(anywhere(&rows, &recorded, prior).map(as_fitted));
+    let anywhere = anywhere(&rows, &recorded, prior);
+    let half_width_arcsec = known.mean_half_width_arcsec(anywhere.iter().copied().map(as_fitted));
     let half_width_as_recorded_arcsec = known.mean_half_width_arcsec(some_rows().map(as_fitted));
-    let half_width_at_another_pace_arcsec =
-        known.mean_half_width_arcsec(anywhere(&rows, &recorded, prior).map(at_rest));
+    let half_width_at_another_pace_arcsec = known.mean_half_width_arcsec(anywhere.iter().copied().map(at_rest));
     notes.extend(load_with_angle(&rows, &known));
     let output_zeros = output_zeros(files, &rows, &model, known.noise);
     let offset = |zero: &OutputZero| Reading {

@@ -122,7 +122,7 @@ fn error_arcsec(
     let (torque_n_m, temperature_c) = (f64::from(torque), f64::from(temperature));
     let output_rad = generator_rad / prior.nominal.ratio;
     let at = State { generator_rad, output_rad, torque_n_m, temperature_c, way, ..State::default() };
-    prior.steady_arcsec(&at) + model.adds_arcsec(&at)
+    model.says_arcsec(&at, prior)
 }
 
 /// Nodes of temperature: what was recorded, or those of the table that was there before.

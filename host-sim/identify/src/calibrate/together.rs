@@ -158,7 +158,6 @@ pub(super) fn generators_turned(
 
 /// By how much the generator of each log is turned against that of the first, rad, to first order.
 fn angles_off(rows: &Rows, model: &Model, prior: &Prior<'_>, logs: usize) -> Vec<f64> {
-    let says = |at: &State| prior.steady_arcsec(at) + model.adds_arcsec(at);
     let turned = |at: &State, by: f64| State {
         generator_rad: at.generator_rad + by,
         output_rad: at.output_rad + by / prior.nominal.ratio,
@@ -166,7 +165,8 @@ fn angles_off(rows: &Rows, model: &Model, prior: &Prior<'_>, logs: usize) -> Vec
     };
     let mut sums = vec![[0.0; 5]; logs];
     for row in &rows.rows {
-        let slope = (says(&turned(&row.at, STEP_RAD)) - says(&turned(&row.at, -STEP_RAD))) / (2.0 * STEP_RAD);
+        let says = |by: f64| model.says_arcsec(&turned(&row.at, by), prior);
+        let slope = (says(STEP_RAD) - says(-STEP_RAD)) / (2.0 * STEP_RAD);
         let left = row.left_arcsec - model.adds_arcsec(&row.at);
         let of_row = [1.0, slope, left, slope * slope, slope * left];
         sums[row.zero].iter_mut().zip(of_row).for_each(|(sum, of_row)| *sum += of_row);
