@@ -28,7 +28,7 @@ use flexspline_mechanics::drive::Drive;
 /// off, as the loss is measured. How a loop opens is in no catalogue: a guess.
 const SLIP_SHARES: [f64; 3] = [0.125, 0.25, 0.5];
 
-/// Stiffnesses that differ by less are the same: what K of a completed table differs by from its sheet , as measured.
+/// Stiffnesses that differ by less are the same: what K of a completed table differs by from its sheet, as measured.
 const SAME: f64 = 0.01;
 
 /// Torque nodes at a knee, over its torque: a cubic through wide intervals rounds it off by seconds (2.9" of CSF-25-100
@@ -181,14 +181,12 @@ impl SheetStiffness {
     /// The spring that makes stiffnesses of the FEM those of the sheet, by range; none beyond the end of the table.
     fn spring(&self, ranges: [[f64; 2]; 3], fem: [Option<f64>; 3]) -> Result<MissingSpring, CompletionError> {
         let mut compliance_rad_per_n_m = [0.0; 3];
-        let stated = self.k_n_m_per_rad.into_iter().zip(ranges).enumerate();
-        for ((lacks, by_fem), (range, (stated, between_n_m))) in compliance_rad_per_n_m.iter_mut().zip(fem).zip(stated)
-        {
-            let Some(fem) = by_fem else { continue };
+        for range in 0..3 {
+            let (stated, Some(fem)) = (self.k_n_m_per_rad[range], fem[range]) else { continue };
             if fem < (1.0 - SAME) * stated {
-                return Err(CompletionError::Softer { range, stated, fem, between_n_m });
+                return Err(CompletionError::Softer { range, stated, fem, between_n_m: ranges[range] });
             }
-            *lacks = (1.0 / stated - 1.0 / fem).max(0.0);
+            compliance_rad_per_n_m[range] = (1.0 / stated - 1.0 / fem).max(0.0);
         }
         Ok(MissingSpring { t1_n_m: self.t1_n_m, t2_n_m: self.t2_n_m, compliance_rad_per_n_m })
     }

@@ -96,7 +96,7 @@ impl Results {
     }
 
     fn servo_is_sound(&self) -> bool {
-        self.servo_distance >= LEAST_DISTANCE && self.phase_margin_deg[0] >= LEAST_PHASE_MARGIN_DEG
+        is_sound(self.servo_distance, self.phase_margin_deg[0])
     }
 
     /// What speaks against the flight, in sentences; `way_out` says with which paces the servo is sound.
@@ -128,6 +128,11 @@ impl Results {
         ];
         remarks.into_iter().filter(|(there, _)| *there).map(|(_, remark)| remark).collect()
     }
+}
+
+/// Whether a loop at this distance from −1 has room for a little more delay, gain or inertia.
+fn is_sound(distance: f64, phase_margin_deg: f64) -> bool {
+    distance >= LEAST_DISTANCE && phase_margin_deg >= LEAST_PHASE_MARGIN_DEG
 }
 
 /// A point of a curve.
@@ -232,17 +237,16 @@ fn sound_paces(joint: &TwoMasses, servo: &ServoSettings) -> Option<[f64; 3]> {
     all.sort_by_key(|steps| {
         (steps.iter().filter(|steps| **steps != 0).count(), steps.iter().map(|n| n.abs()).sum::<i32>())
     });
-    let is_sound = |paces: &[f64; 3]| {
+    let found = |paces: &[f64; 3]| {
         let [speed_hz, position_hz, integral_hz] = *paces;
         let servo = ServoSettings { speed_hz, position_hz, integral_hz, ..*servo };
         let margin = joint.servo(&servo);
         paces.iter().zip(PACES_HZ).all(|(hz, [low, high])| (low..=high).contains(hz))
             && margin.stable
-            && margin.distance >= LEAST_DISTANCE
-            && joint.phase_margin_deg(&servo)[0] >= LEAST_PHASE_MARGIN_DEG
+            && is_sound(margin.distance, joint.phase_margin_deg(&servo)[0])
     };
     let tried = all.into_par_iter().map(|steps| [0, 1, 2].map(|pace| changed(paces[pace], steps[pace])));
-    tried.find_first(is_sound)
+    tried.find_first(found)
 }
 
 /// `OnLoad` as `on_load`; what is not known is `none`.
