@@ -535,7 +535,7 @@ fn data_that_the_playback_makes_worse_are_refused_and_say_whether_the_table_is_t
              {data} --out {out} --json {more}"
         ))
     };
-    // Both angles turned over, a generator zero a third of a turn off, another ratio, the error of a unit turned over.
+    // Both angles turned over, a generator zero a third of a turn off.
     desk.write(
         "turned.csv",
         &changed("run/data.csv", usize::MAX, |column, value| {
@@ -552,15 +552,7 @@ fn data_that_the_playback_makes_worse_are_refused_and_say_whether_the_table_is_t
             _ => {}
         }),
     );
-    desk.write(
-        "ratio.csv",
-        &changed("run/data.csv", usize::MAX, |column, value| {
-            if column == "generator_rad" {
-                *value *= 1.01;
-            }
-        }),
-    );
-    for data in ["turned.csv", "shifted.csv", "ratio.csv"] {
+    for data in ["turned.csv", "shifted.csv"] {
         let run = export(data, "", "worse");
         assert_eq!(run.code, 2, "{data}: {}", run.stdout);
         for reason in ["the unit's data", "more than 70 %", "the core leaves", "do not belong to this table", "--force"]
@@ -569,6 +561,20 @@ fn data_that_the_playback_makes_worse_are_refused_and_say_whether_the_table_is_t
         }
         let forced = export(data, "--force", &format!("forced_{data}")).done().json();
         assert!(forced["notes"].to_string().contains("written by --force. the unit's data"), "{forced}");
+    }
+    // No error of this drive at all: the reader says what turns otherwise, and --force does not help.
+    desk.write(
+        "ratio.csv",
+        &changed("run/data.csv", usize::MAX, |column, value| {
+            if column == "generator_rad" {
+                *value *= 1.01;
+            }
+        }),
+    );
+    for more in ["", "--force"] {
+        let run = export("ratio.csv", more, "worse");
+        assert_eq!(run.code, 2, "{}", run.stdout);
+        assert!(run.stderr.contains("turns 0.9901 times as far") && run.stderr.contains("ratio 95"), "{}", run.stderr);
     }
     assert!(!desk.path("worse").exists(), "nothing is written");
     // The error alone turned over: the other sign would do.

@@ -114,10 +114,11 @@ mod tests {
     /// Rows of the drive of a table, loaded there and back, whose torque counts the other way; as it should; and none.
     #[test]
     fn a_torque_of_the_wrong_sign_is_reported_and_no_other() {
-        let bytes = include_bytes!("../../../tests/firmware/samples/cam.samples.csv");
-        let read = samples::parse("cam", bytes).unwrap();
+        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/firmware/samples/cam.samples.csv");
+        let bytes = std::fs::read(file).unwrap();
+        let read = samples::parse("cam", &bytes).unwrap();
         let options = SampleOptions::default();
-        let made = from_samples(&Drive::hhd_95(), GeneratorKind::Cam, &read, "cam", bytes, options).unwrap();
+        let made = from_samples(&Drive::hhd_95(), GeneratorKind::Cam, &read, "cam", &bytes, options).unwrap();
         let table = Table::check(&made.image).unwrap();
         let rows = |load_n_m: f64, sign: f64| -> Vec<MeasuredRow> {
             let mut play = PlayState::unknown();
