@@ -100,6 +100,12 @@ impl Whitener {
         Whitener { groups, stride: stride.max(1), sessions, gain, scale, decay, filter }
     }
 
+    /// Rows to an average.
+    #[must_use]
+    pub(crate) fn stride(&self) -> usize {
+        self.stride
+    }
+
     /// Averages of `stride` rows under noise that is white alone, `white` arcsec in a row.
     #[must_use]
     pub fn plain(rows: &Rows, uncertain: &[bool], stride: usize, white: f64) -> Whitener {

@@ -175,10 +175,23 @@ fn strongest(places: &[f64], values: &[f64], lowest: f64, highest: f64, cell: Op
     let total: f64 = values.iter().map(|v| v * v).sum();
     let upto = ((highest * step * size as f64) as usize).min(size / 2);
     let from = ((lowest * step * size as f64).ceil() as usize).max(1);
-    (from..upto)
-        .map(|k| (k as f64 / (size as f64 * step), spectrum[k].norm_sqr() / total.max(1e-30)))
-        .max_by(|a, b| a.1.total_cmp(&b.1))
+    let best = (from..upto).max_by(|a, b| spectrum[*a].norm_sqr().total_cmp(&spectrum[*b].norm_sqr()))?;
+    // A line between two places of the spectrum, in cells that it turns through, is up to half as strong there.
+    let at_its_places = |part: i32| -> (f64, f64) {
+        let frequency = (best as f64 + f64::from(part) / f64::from(PARTS)) / (size as f64 * step);
+        let [mut cosine, mut sine] = [0.0; 2];
+        for (x, v) in places.iter().zip(values) {
+            let (s, c) = (2.0 * PI * frequency * (x - low)).sin_cos();
+            cosine += v * c;
+            sine += v * s;
+        }
+        (frequency, (cosine * cosine + sine * sine) / total.max(1e-30))
+    };
+    (-PARTS / 2..=PARTS / 2).map(at_its_places).max_by(|a, b| a.1.total_cmp(&b.1))
 }
+
+/// Frequencies tried between two of a spectrum.
+const PARTS: i32 = 8;
 
 /// Power that a line of white noise reaches once in about 10⁵ spectra of so many rows.
 #[must_use]

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::channels::RatioProposal;
 use super::trace::Trace;
-use crate::causes::CauseName;
+use crate::causes::{CauseName, ParameterName};
 
 /// What was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -93,6 +93,16 @@ pub struct Cause {
     pub look_alikes: Vec<CauseName>,
 }
 
+impl Cause {
+    /// What the log itself may have that no data of it can tell from this cause.
+    #[must_use]
+    pub fn or_the_log(&self) -> Option<String> {
+        let ratio = self.parameters.get(ParameterName::StiffnessRatio.as_str()).map(|ratio| ratio.value)?;
+        (self.name == CauseName::StiffnessError)
+            .then(|| format!("a torque that is recorded {ratio:.2} times as large as it is"))
+    }
+}
+
 /// Residual over all data used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Residual {
@@ -104,6 +114,8 @@ pub struct Residual {
     pub noise_floor_arcsec: f64,
     /// Share of the explainable squared error that is left.
     pub unexplained_fraction: f64,
+    /// Neighbouring rows of a long record whose mean counts as one, in all of these.
+    pub rows_averaged: usize,
 }
 
 /// Residual over sessions that took no part in the fit.
@@ -256,12 +268,10 @@ impl Diagnosis {
                 let [value, std] = digits(p);
                 let _ = writeln!(text, "    {name:<32} {value:>12} +- {std}");
             }
-            if !cause.look_alikes.is_empty() {
-                let _ = writeln!(
-                    text,
-                    "    cannot be told from: {}",
-                    cause.look_alikes.iter().map(|alike| alike.as_str()).collect::<Vec<_>>().join(", ")
-                );
+            let alike = cause.look_alikes.iter().map(|alike| alike.as_str().to_owned()).chain(cause.or_the_log());
+            let alike: Vec<String> = alike.collect();
+            if !alike.is_empty() {
+                let _ = writeln!(text, "    cannot be told from: {}", alike.join(", "));
             }
         }
         for left in &self.unexplained {
@@ -277,8 +287,11 @@ impl Diagnosis {
         );
         let _ = writeln!(
             text,
-            "  in the data it was fitted to: {:.2} -> {:.2}, of which {:.2} is noise",
-            r.rms_before_arcsec, r.rms_after_arcsec, r.noise_floor_arcsec
+            "  in the data it was fitted to{}: {:.2} -> {:.2}, of which {:.2} is noise",
+            if r.rows_averaged > 1 { format!(", means of {} rows", r.rows_averaged) } else { String::new() },
+            r.rms_before_arcsec,
+            r.rms_after_arcsec,
+            r.noise_floor_arcsec
         );
         if let Some(ratio) = self.ratio_proposed {
             let _ = writeln!(

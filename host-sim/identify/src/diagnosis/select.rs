@@ -103,6 +103,12 @@ fn same(apart: f64, size: f64) -> bool {
     apart < SAME_ARCSEC.min(SAME_SHARE * size)
 }
 
+/// Evidence by which something without a name has to be ahead of a cause, if there is one, where that gains so much: by
+/// more than its law may be wrong by.
+fn unnamed_ahead(cause: Option<&Law>, gain: f64) -> f64 {
+    UNNAMED_AHEAD.max(cause.map_or(0.0, |law| law.wrong.misfit.powi(2)) * gain)
+}
+
 /// Whether a fitted term makes sense.
 pub(super) fn sound(term: &Term<'_>, coefficients: &[f64]) -> bool {
     passed(&sense(term, coefficients))
@@ -512,7 +518,9 @@ pub(crate) fn select<'l>(
         selected = backward(problem, selected, &limits, trace)?;
     }
     for round in 0..MOST_ROUNDS {
-        let Some(next) = forward(problem, laws, &selected, &limits, bests, scope, trace) else { break };
+        let next = forward(problem, laws, &selected, &limits, bests, scope, trace)
+            .or_else(|| two_for_unnamed(problem, laws, &selected, &limits, &mut given, bests, scope, trace));
+        let Some(next) = next else { break };
         let taken = next.terms.len();
         selected = settle(problem, next)?;
         selected = backward(problem, selected, &limits, trace)?;
@@ -639,12 +647,11 @@ fn forward<'l>(
         }
     }
     contenders_settled(problem, &mut grown, before);
-    // Something with a name goes before something without unless that is clearly better: by more than the law may be
-    // wrong by.
+    // Something with a name goes before something without unless that is clearly better.
     let best_named = grown.iter().filter(|(_, next)| next.newest().law.named()).max_by(|a, b| a.0.total_cmp(&b.0));
-    let misfit = best_named.map_or(0.0, |(_, next)| next.newest().law.wrong.misfit);
+    let best_named = best_named.map(|(_, next)| next.newest().law);
     let ahead = |(gain, next): &(f64, Selected<'l>)| {
-        gain - if next.newest().law.named() { 0.0 } else { UNNAMED_AHEAD.max(misfit * misfit * gain) }
+        gain - if next.newest().law.named() { 0.0 } else { unnamed_ahead(best_named, *gain) }
     };
     grown.sort_by(|a, b| ahead(b).total_cmp(&ahead(a)));
     let standing_now = standings(problem, selected);
@@ -831,6 +838,102 @@ fn backward<'l>(
     Some(selected)
 }
 
+/// The strongest laws of `open` beside terms, refined, that make sense there.
+fn refined_beside<'l>(
+    problem: &Problem<'_>,
+    others: &[Term<'l>],
+    open: &[&'l Law],
+    bests: &Bests,
+    scope: Scope,
+) -> Vec<(Term<'l>, Fit)> {
+    let scaffold = Scaffold::new(problem, others.iter().collect());
+    let tried = match scope {
+        Scope::Everything => tried(&scaffold, open, |law| bests.begin(&scaffold, law)),
+        Scope::CameClose => tried(&scaffold, open, |law| bests.begin_close(law)),
+    };
+    let rivals = best_tried(&scaffold, open, tried, EXCHANGED).terms;
+    rivals
+        .into_par_iter()
+        .with_max_len(1)
+        .filter_map(|term| {
+            let (term, fit) = scaffold.refine(term)?;
+            sound(&term, fit.of(fit.starts.len() - 1)).then_some((term, fit))
+        })
+        .collect()
+}
+
+/// The cause of `open` that tells the data best beside terms, taken in with them and settled.
+fn with_best_cause<'l>(
+    problem: &Problem<'_>,
+    open: &[&'l Law],
+    others: Vec<Term<'l>>,
+    bests: &Bests,
+    scope: Scope,
+) -> Option<Selected<'l>> {
+    let beside = |law: &&Law| law.named() && others.iter().all(|t| t.law.label != law.label);
+    let open: Vec<&Law> = open.iter().copied().filter(beside).collect();
+    let refined = refined_beside(problem, &others, &open, bests, scope);
+    let evidence = |(term, fit): &(Term<'l>, Fit)| fit.solution.evidence + term.occam;
+    let (term, fit) = refined.into_iter().max_by(|a, b| evidence(a).total_cmp(&evidence(b)))?;
+    settle(problem, Selected { fit, terms: [others, vec![term]].concat() })
+}
+
+/// Replaces a deviation without a name by two causes that tell the data better and earn it: beside it each of them is
+/// held against all that it may be wrong by, so that none comes in.
+#[allow(clippy::too_many_arguments, reason = "all that a search remembers")]
+fn two_for_unnamed<'l>(
+    problem: &Problem<'_>,
+    laws: &'l [Law],
+    selected: &Selected<'l>,
+    limits: &Limits,
+    given: &mut HashSet<(u64, u64)>,
+    bests: &Bests,
+    scope: Scope,
+    trace: &mut Trace,
+) -> Option<Selected<'l>> {
+    if selected.terms.iter().filter(|t| t.law.named()).count() + 2 > MOST_CAUSES {
+        return None;
+    }
+    for (k, held) in selected.terms.iter().enumerate().filter(|(_, t)| !t.law.named()) {
+        let others: Vec<Term<'l>> = selected.without(problem, k).into_iter().map(Cow::into_owned).collect();
+        let without = fit(problem, &others)?;
+        let open: Vec<&Law> = laws
+            .iter()
+            .filter(|law| scope == Scope::Everything || bests.is_close(law))
+            .filter(|law| may_be_tried(problem, &without, law))
+            .filter(|law| !given.contains(&(held.law.id(), law.id())))
+            .collect();
+        let Some(one) = with_best_cause(problem, &open, others, bests, scope) else { continue };
+        let Some(two) = with_best_cause(problem, &open, one.terms, bests, scope) else { continue };
+        let both = two.terms.len() - 2..two.terms.len();
+        let occam: f64 = two.terms[both.clone()].iter().map(|t| t.occam).sum();
+        let ahead_by = two.fit.solution.evidence + occam - selected.fit.solution.evidence - held.occam;
+        let standings = standings(problem, &two);
+        let gates: Vec<Vec<Judged>> = both
+            .clone()
+            .map(|j| {
+                // They have names: it is enough not to be behind.
+                let mut gates = vec![Judged::above(Gate::Ahead, ahead_by, 0.0)];
+                gates.extend(earns(problem, &two, &standings, j, limits));
+                gates
+            })
+            .collect();
+        let taken = gates.iter().all(|gates| passed(gates));
+        for (term, gates) in two.terms[both].iter().zip(gates) {
+            trace.judged_against(Stage::Exchange, term.law, &term.values(), Some(held.law.label), gates);
+            if taken {
+                given.insert((held.law.id(), term.law.id()));
+            }
+        }
+        if taken {
+            let gates = vec![Judged::number(Gate::First, 0.0, ahead_by, false)];
+            trace.judged(Stage::Exchange, held.law, &held.values(), gates);
+            return Some(two);
+        }
+    }
+    None
+}
+
 /// Replaces a term, but for the one at `compared`, by another law where that tells the data better.
 #[allow(clippy::too_many_arguments, reason = "all that a search remembers")]
 fn exchange<'l>(
@@ -859,21 +962,7 @@ fn exchange<'l>(
             .filter(|law| may_be_tried(problem, &without, law))
             .filter(|law| !given.contains(&(held.id(), law.id())))
             .collect();
-        let scaffold = Scaffold::new(problem, others.iter().collect());
-        let tried = match scope {
-            Scope::Everything => tried(&scaffold, &open, |law| bests.begin(&scaffold, law)),
-            Scope::CameClose => tried(&scaffold, &open, |law| bests.begin_close(law)),
-        };
-        let rivals = best_tried(&scaffold, &open, tried, EXCHANGED).terms;
-        let refined: Vec<(Term<'l>, Fit)> = rivals
-            .into_par_iter()
-            .with_max_len(1)
-            .filter_map(|term| {
-                let (term, fit) = scaffold.refine(term)?;
-                let c = fit.of(fit.starts.len() - 1);
-                sound(&term, c).then_some((term, fit))
-            })
-            .collect();
+        let refined = refined_beside(problem, &others, &open, bests, scope);
         let now = selected.predicted(problem);
         let size = size_of(problem, &less(&now, &predicted(problem, &others.iter().collect::<Vec<_>>(), &without)));
         let evidence = selected.fit.solution.evidence + selected.terms[k].occam;
@@ -884,7 +973,9 @@ fn exchange<'l>(
         let judge = |term: &Term<'l>, fit: &Fit| -> Vec<Judged> {
             let then = predicted(problem, &others.iter().chain([term]).collect::<Vec<_>>(), fit);
             let apart = size_of(problem, &less(&then, &now));
-            let needed = if term.law.named() { AHEAD } else { UNNAMED_AHEAD };
+            let gain = evidence - without.solution.evidence;
+            let needed =
+                if term.law.named() { AHEAD } else { unnamed_ahead(Some(held).filter(|held| held.named()), gain) };
             let better = fit.solution.evidence + term.occam > evidence + needed;
             // What follows more does not take the place of what predicts the same.
             let no_simpler = !(same(apart, size) && simpler(&selected.terms[k], term));
@@ -910,8 +1001,7 @@ fn exchange<'l>(
         if let Some((term, fit, mut gates)) = best {
             let (law, values) = (term.law, term.values());
             let ahead_by = fit.solution.evidence + term.occam - evidence;
-            let mut terms = others;
-            terms.push(term);
+            let terms = [&others[..], &[term]].concat();
             let exchanged = settle(problem, Selected { fit, terms })?;
             // It has to earn the place that it takes.
             let last = exchanged.terms.len() - 1;

@@ -576,9 +576,26 @@ fn hysteresis_does_not_stand_in_for_a_spring_that_is_softer() {
 
 #[test]
 fn a_delay_is_seen_beside_a_spring_that_is_much_softer() {
-    let effects = [effect(CauseName::StiffnessError, 0.6, 0.0, 0.0), effect(CauseName::SensorLatency, 0.5, 0.0, 0.0)];
-    let diagnosis = diagnosed(&effects, 0, 42);
-    assert_eq!(names(&diagnosis), [CauseName::SensorLatency, CauseName::StiffnessError], "{}", diagnosis.text());
+    for delay_ms in [0.5, 2.0] {
+        let spring = effect(CauseName::StiffnessError, 0.6, 0.0, 0.0);
+        let diagnosis = diagnosed(&[spring, effect(CauseName::SensorLatency, delay_ms, 0.0, 0.0)], 0, 42);
+        assert_eq!(names(&diagnosis), [CauseName::SensorLatency, CauseName::StiffnessError], "{}", diagnosis.text());
+    }
+}
+
+/// 3 arcsec at order 45, of which means of three rows show a sixth: at one frequency between two of the spectrum too.
+#[test]
+fn a_line_too_fast_for_means_of_a_long_record_is_told_with_its_size() {
+    for order in [45.0, 44.997] {
+        let mut sessions = recorded(&[], 1, 36_000, 100.0, 1.0, 11);
+        let Session { generator_rad, error_rad, .. } = &mut sessions[0];
+        error_rad.iter_mut().zip(generator_rad).for_each(|(e, psi)| *e += 3.0 / 206_264.8 * (order * *psi).sin());
+        let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
+        let left = &diagnosis.unexplained;
+        let told = left.iter().find(|left| left.looks_like.contains("generator turn")).map(|left| left.size_arcsec);
+        assert!(told.is_some_and(|size| (1.9..2.4).contains(&size)), "{order}: {}", diagnosis.text());
+        assert_eq!(diagnosis.residual.rows_averaged, 3);
+    }
 }
 
 #[test]

@@ -190,6 +190,7 @@ pub(super) fn conclude(
             // left.
             noise_floor_arcsec: floor.min(rms_after),
             unexplained_fraction: if explainable > 0.0 { (unexplained / explainable).min(1.0) } else { 0.0 },
+            rows_averaged: problem.whitener.stride(),
         },
         held_out,
         compensation: compensation(problem, held_out.rms_after_arcsec),

@@ -23,7 +23,7 @@ use super::page::{
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_identify::causes::CauseName;
 use flexspline_identify::diagnosis::base::{BETWEEN_READINGS, CHANGE_OF_FLANK};
-use flexspline_identify::diagnosis::report::{Diagnosis, Finding, Parameter, Verdict};
+use flexspline_identify::diagnosis::report::{Cause, Diagnosis, Finding, Parameter, Verdict};
 use flexspline_identify::diagnosis::rows::Rows;
 use flexspline_identify::diagnosis::{Extended, Series};
 use flexspline_identify::measurement::{Gear, Recording, Session};
@@ -349,8 +349,11 @@ impl DiagnosisKnown<'_> {
                     .plain("."),
             ));
         }
-        for cause in diagnosis.causes.iter().filter(|cause| !cause.look_alikes.is_empty()) {
-            let alike: Vec<String> = cause.look_alikes.iter().map(|name| name.words().to_owned()).collect();
+        for cause in &diagnosis.causes {
+            let alike = alike(cause);
+            if alike.is_empty() {
+                continue;
+            }
             blocks.push(Block::paragraph(
                 Text::new("These data do not tell ")
                     .strong(cause.name.words())
@@ -510,7 +513,7 @@ impl DiagnosisKnown<'_> {
                 .causes
                 .iter()
                 .map(|cause| {
-                    let alike: Vec<String> = cause.look_alikes.iter().map(|name| name.words().to_owned()).collect();
+                    let alike = alike(cause);
                     vec![
                         Text::new(words::begun(cause.name.words())),
                         Text::new(words::percent(cause.confidence)),
@@ -591,7 +594,11 @@ impl DiagnosisKnown<'_> {
         );
         let noise = Block::paragraph(
             Text::new("Noise and wander of the measurement are ").error(residual.noise_floor_arcsec, 3).plain(format!(
-                " of it; {} of the squared error beyond that is left unexplained.",
+                " of it{}; {} of the squared error beyond that is left unexplained.",
+                match residual.rows_averaged {
+                    0 | 1 => String::new(),
+                    rows => format!(" in means of {rows} rows"),
+                },
                 words::percent(residual.unexplained_fraction)
             )),
         );
@@ -799,6 +806,11 @@ impl DiagnosisKnown<'_> {
     }
 }
 
+/// What these data do not tell from a cause, in words.
+fn alike(cause: &Cause) -> Vec<String> {
+    cause.look_alikes.iter().map(|name| name.words().to_owned()).chain(cause.or_the_log()).collect()
+}
+
 /// What floats in the nominal model, in its unit: the zero as an error, times in milliseconds, the rest as a share.
 fn recalibrated_value(name: &str, p: Parameter) -> Text {
     if name.starts_with("zero") {
@@ -874,6 +886,7 @@ mod tests {
                 rms_after_arcsec: 5.0,
                 noise_floor_arcsec: 5.0,
                 unexplained_fraction: 0.0,
+                rows_averaged: 1,
             },
             held_out: HeldOut { rms_before_arcsec: 10.0, rms_after_arcsec: 5.0 },
             compensation: Compensation::default(),

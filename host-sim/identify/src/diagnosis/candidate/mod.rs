@@ -420,9 +420,6 @@ pub(crate) struct Acts {
     pub tolerance_of: Option<&'static str>,
 }
 
-/// Share of a law's misfit that may look like a law that is no kin.
-const NO_KIN: f64 = 0.25;
-
 /// Size of all deviations over that of the law, at most: beyond, the law is there for its deviations.
 const MOST_NUISANCE: f64 = 0.9;
 /// Size of all deviations over that of the law, at most, for laws that are well known, and whose deviations are those
@@ -659,7 +656,7 @@ impl Law {
         if !other.named() {
             return self.wrong.misfit.max(self.wrong.misfit_unnamed);
         }
-        self.wrong.misfit * if self.wrong.kin.like(other.wrong.kin) { 1.0 } else { NO_KIN }
+        self.wrong.misfit * self.wrong.kin.share(other.wrong.kin)
     }
 
     /// Values of the shape parameters at places between 0 and 1.
