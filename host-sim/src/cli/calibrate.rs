@@ -12,7 +12,7 @@ use super::{Failure, names, report, say};
 use flexspline_base::output::Outputs;
 use flexspline_design::tables::{c_header, rust_source};
 use flexspline_identify::calibrate::{
-    Bench, Calibrated, Calibration, CalibrationError, MOST_ROWS, Planned, Prior, calibrate, plan,
+    Bench, Calibrated, Calibration, CalibrationError, Planned, Prior, calibrate, one_in, plan,
 };
 use flexspline_identify::extension::Model;
 use flexspline_identify::measurement::read;
@@ -356,12 +356,13 @@ fn held(c: &Calibration) -> String {
 fn text(made: &Calibrated, out: &Path, with_page: bool) -> String {
     let Calibration { held_out, core, parts, .. } = &made.calibration;
     let c = &made.calibration;
+    let every = one_in(c.rows);
     let mut text = format!(
         "{}: {} rows, of which {} in steady motion are fitted{}; {} {} left out in turn\n",
         c.files.join(", "),
         c.rows,
         c.rows_fitted,
-        if c.rows > MOST_ROWS { " (every so many-th of a long log)" } else { "" },
+        if every > 1.0 { format!(" (of a long log one in {every:.1})") } else { String::new() },
         c.folds,
         c.left_out
     );
@@ -375,7 +376,7 @@ fn text(made: &Calibrated, out: &Path, with_page: bool) -> String {
         let size = part.size_arcsec.map_or(String::new(), |size| format!(", {size:.1} arcsec"));
         let gain = part.held_out_gain.map_or("    –".to_owned(), |gain| format!("{:>5.1}", 100.0 * gain));
         let kept = if part.kept { "kept   " } else { "refused" };
-        let _ = writeln!(text, "  {:<16} {kept} {gain} %{size}  {}", part.name, part.why);
+        let _ = writeln!(text, "  {:<16} {kept} {gain} % of all{size}  {}", part.name, part.why);
     }
     if let Some(found) = &c.alignment {
         let used = if found.told { "used" } else { "not told by these logs, not used" };

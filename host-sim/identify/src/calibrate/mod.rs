@@ -39,7 +39,7 @@ pub use plan::{Bench, First, Pass, Planned, Wide, plan};
 pub use prior::Prior;
 pub use reading::{ByCore, Reading, ReadingDelay};
 use reading::{Delays, play_of_a_millisecond};
-pub use rows::MOST_ROWS;
+pub use rows::one_in;
 use rows::{FoldKind, Recorded, Rows, settled};
 use together::Agreement;
 pub(crate) use zero::{Alignment, OutputZero, ZeroCost, cost};
@@ -822,16 +822,19 @@ fn judged(folds: &Folds, model: &Model, recorded: &Recorded, prior: &Prior<'_>, 
         }
         if let Some(chosen) = model.chosen.iter().find(|chosen| chosen.part == part) {
             let others: Vec<Chosen> = model.chosen.iter().copied().filter(|other| other.part != part).collect();
-            let gain = (folds.left_out(&all, &others) - with) / before;
+            let without = folds.left_out(&all, &others);
             return PartSays {
                 name: part.as_str(),
                 kept: true,
-                held_out_gain: Some(gain),
+                held_out_gain: Some((without - with) / before),
                 penalty: Some(chosen.penalty),
                 size_arcsec: None,
                 why: format!(
-                    "without it the error where nothing was fitted is {:.2} times as large",
-                    ((gain * before + with) / with).sqrt()
+                    "it takes {:.1} % of the squares that the others leave ({:.0} % are asked for); without it the \
+                     error where nothing was fitted is {:.2} times as large",
+                    100.0 * (without - with) / without,
+                    100.0 * LEAST_GAIN,
+                    (without / with).sqrt()
                 ),
             };
         }

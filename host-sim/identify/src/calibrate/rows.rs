@@ -22,7 +22,7 @@ const ENOUGH_SESSIONS: usize = 3;
 /// another record. A guess.
 const LARGEST_SESSION: f64 = 0.4;
 /// Rows that are fitted, at most; of longer records every so many-th.
-pub const MOST_ROWS: usize = 40_000;
+pub(super) const MOST_ROWS: usize = 40_000;
 /// A reversal is one if the generator goes back by this share of its usual step.
 const TURNED_ROUND: f64 = 0.5;
 /// The output has settled on a flank when the generator has turned by so many times the play.
@@ -225,12 +225,17 @@ fn covered(angles: impl Iterator<Item = f64>, parts: usize) -> f64 {
     there.iter().filter(|there| **there).count() as f64 / parts as f64
 }
 
+/// Of how many rows one is fitted, of a record of `total`. No whole number: such rows may all lie at the same few
+/// angles.
+pub fn one_in(total: usize) -> f64 {
+    let every = total as f64 / MOST_ROWS as f64;
+    if every > 1.0 { every + super::GOLDEN } else { 1.0 }
+}
+
 /// The rows on which a steady model can be judged; `play_rad` is the whole play at the output.
 pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorded, play_rad: f64) -> Rows {
     let total: usize = files.iter().flat_map(|file| &file.sessions).map(Session::len).sum();
-    // Not every so many-th exactly: such rows may all lie at the same few angles.
-    let every = (total as f64 / MOST_ROWS as f64).max(1.0);
-    let every = if every > 1.0 { every + super::GOLDEN } else { 1.0 };
+    let every = one_in(total);
     let sessions: usize = files.iter().map(|file| file.sessions.len()).sum();
     let largest = files.iter().flat_map(|file| &file.sessions).map(Session::len).max().unwrap_or(0);
     let by_sessions = sessions >= ENOUGH_SESSIONS && largest as f64 <= LARGEST_SESSION * total as f64;
