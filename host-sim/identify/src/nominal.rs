@@ -276,6 +276,12 @@ harmonic = {harmonic:?}                 # of the harmonics, of their amplitude; 
 
     /// Reads a file that has been parsed; nothing where what is wrong with it leaves no model.
     fn of_file(file: &mut TomlFile<'_>, table: &DeTable<'_>) -> Option<Nominal> {
+        if table.contains_key("flexspline") && !table.contains_key("nominal") {
+            let what = "it is the file of a drive; allowed: a nominal model, with [drive] and [nominal]; a drive goes \
+                        with its table: --drive FILE --tables DIR, without --model";
+            file.refuse_whole("", what.to_owned());
+            return None;
+        }
         // What a diagnosis found stands in [extension], which `crate::extension` reads.
         file.refuse_unknown_keys(table, &KEYS, &["extension"]);
         if !file.is_sound() {
@@ -549,6 +555,11 @@ mod tests {
             let error = Nominal::from_toml("n.toml", &text).unwrap_err().to_string();
             assert!(error.starts_with(message), "{to}: {error}");
         }
+        let drive = Nominal::from_toml("d.toml", "[flexspline]\nteeth = 188\n[generator]\nw0 = 1\n").unwrap_err();
+        assert!(
+            drive.problems.len() == 1 && drive.to_string().contains("d.toml: it is the file of a drive"),
+            "{drive}"
+        );
         let two = TEXT.replace("friction_torque_n_m", "friction_torque").replace("phase_rad", "phase");
         assert_eq!(Nominal::from_toml("n.toml", &two).unwrap_err().problems.len(), 2);
     }

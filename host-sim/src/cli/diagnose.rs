@@ -27,9 +27,9 @@ use flexspline_mechanics::mesh::MeshLevel;
 ///
 /// Reads a CSV with a generator angle and an output angle (or error_arcsec), if wanted time_s, torque_n_m,
 /// temperature_c and orientation_rad; writes diagnosis.json. The nominal model is a catalogue's (--model) or that of a
-/// table (--tables). Where causes are found it writes drive-extended.toml, which `flexspline` loads again as --model
-/// or --drive, and where tables that hold the causes leave less error in sessions that took no part, <G>-extended.fxt,
-/// .json, .rs and .h.
+/// table (--tables). Where causes are found it writes drive-extended.toml, to be given again as the input was: with
+/// --model in the place of a nominal.toml, or with --drive beside --tables. Where tables that hold the causes leave
+/// less error in sessions that took no part, it writes <G>-extended.fxt, .json, .rs and .h.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
