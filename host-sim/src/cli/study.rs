@@ -572,7 +572,7 @@ fn best<'a>(drive: &Drive, settings: &StudySettings, study: &'a Study) -> Option
     let errors = errors_of_making(&study.fields);
     let set = |run: &StudyRun, k: usize| format!("{}={}", study.fields[k], run.values[k]);
     let as_given = |run: &&StudyRun| {
-        let sets: Vec<String> = errors.iter().map(|k| set(run, *k)).collect();
+        let sets: Vec<String> = (0..study.fields.len()).map(|k| set(run, k)).collect();
         drive.with_sets(sets.iter().map(String::as_str)).is_ok_and(|made| made.as_built == drive.as_built)
     };
     let cost = |run: &StudyRun| settings.targets.first().map_or(0.0, |first| first.cost(&run.sheet));

@@ -336,7 +336,7 @@ impl Several<'_> {
     /// A variant as its fields make it, or refused, without figures.
     fn begun(&self, (variant, generator): Job) -> (StudyRun, Option<Drive>) {
         let values = &self.variants[variant];
-        let made = varied(self.drive, self.paths, values);
+        let made = varied(self.drive, self.paths, values, generator);
         let run = StudyRun {
             variant: variant + 1,
             generator,
@@ -407,9 +407,14 @@ fn variants(drive: &Drive, settings: &StudySettings) -> Result<Vec<Vec<String>>,
     // A field that does not exist, or a range that makes no drive, is told before anything is computed. Fields may be
     // possible together that are not alone.
     let paths: Vec<&str> = vary.iter().map(|field| field.path.as_str()).collect();
-    if variants.iter().all(|values| varied(drive, &paths, values).is_err()) {
+    // With none of the generators.
+    let refused = |paths: &[&str], values: &[String]| {
+        let mut why = settings.generators.iter().map(|kind| varied(drive, paths, values, *kind).err());
+        why.try_fold(None, |first, why| why.map(|why| first.or(Some(why)))).flatten()
+    };
+    if variants.iter().all(|values| refused(&paths, values).is_some()) {
         for (k, path) in paths.iter().enumerate() {
-            let alone = |values: &Vec<String>| varied(drive, &paths[k..=k], &values[k..=k]).err();
+            let alone = |values: &Vec<String>| refused(&paths[k..=k], &values[k..=k]);
             if variants.iter().all(|values| alone(values).is_some()) {
                 let why = alone(&variants[0]).map_or_else(String::new, |error| error.to_string());
                 return Err(StudyError::NoDrive { path: (*path).to_owned(), why });
@@ -439,13 +444,19 @@ fn largest_of_all(
     if settings.has_fixed_loads() {
         return Some(largest_n_m(drive));
     }
-    let made = variants.par_iter().filter_map(|values| varied(drive, paths, values).ok());
+    let made = variants.par_iter().filter_map(|values| varied(drive, paths, values, kind).ok());
     made.map(|drive| largest_n_m(&drive)).reduce_with(f64::max)
 }
 
-fn varied(drive: &Drive, paths: &[&str], values: &[String]) -> Result<Drive, flexspline_mechanics::drive::DriveError> {
+/// A variant, as it has to be for one generator.
+fn varied(
+    drive: &Drive,
+    paths: &[&str],
+    values: &[String],
+    kind: GeneratorKind,
+) -> Result<Drive, flexspline_mechanics::drive::DriveError> {
     let sets: Vec<String> = paths.iter().zip(values).map(|(path, value)| format!("{path}={value}")).collect();
-    drive.with_sets(sets.iter().map(String::as_str))
+    drive.with_sets_for(&[kind], sets.iter().map(String::as_str))
 }
 
 #[cfg(test)]

@@ -85,6 +85,19 @@ fn a_variant_that_makes_no_drive_is_refused_with_its_reason_and_the_rest_runs() 
     );
 }
 
+/// Rollers that would overlap are refused of the generator that has them, and of no other.
+#[test]
+fn a_variant_has_to_suit_the_generator_that_it_runs_with_alone() {
+    let mut settings = settings(&["generator.roller_diameter_mm=40,41"]);
+    settings.generators = vec![GeneratorKind::Cam, GeneratorKind::FourRoller];
+    let study = quietly(&settings).unwrap();
+    let told: Vec<&str> = study.runs.iter().map(|run| run.status.name()).collect();
+    assert_eq!(told, ["converged", "refused", "converged", "refused"]);
+    assert!(study.runs[1].why.as_ref().unwrap().contains("too large for the four-roller generator"));
+    settings.generators = vec![GeneratorKind::FourRoller];
+    assert!(matches!(quietly(&settings), Err(StudyError::NoDrive { .. })));
+}
+
 #[test]
 fn constraints_leave_out_and_the_front_is_what_nothing_beats() {
     let targets = [("kinematic_error_pp_arcsec", Sense::Least), ("max_von_mises_mpa", Sense::Least)]

@@ -16,6 +16,7 @@
 use super::as_built::{DamagedFlank, DamagedTooth, Harmonic, Wheel};
 use super::error::DriveError;
 use super::fields::{self, DEPTH, Field, ORDER, PHASE, Slot, TOOTH, Value};
+use super::ring::GeneratorKind;
 use super::spec::{Drive, ThermalState};
 use crate::suggest::{did_you_mean, likeliest, likeliest_path, question};
 use crate::toml_file::{Entries, Problem, Refused, TomlFile, each_of, number, one_of, real, shown, text, whole};
@@ -52,6 +53,15 @@ impl Drive {
     /// This drive with several fields changed, checked once all of them are; one text may hold several, with commas
     /// between them.
     pub fn with_sets<'a>(&self, assignments: impl IntoIterator<Item = &'a str>) -> Result<Drive, DriveError> {
+        self.with_sets_for(&GeneratorKind::ALL, assignments)
+    }
+
+    /// The same for these generators alone, whatever the others lack.
+    pub fn with_sets_for<'a>(
+        &self,
+        kinds: &[GeneratorKind],
+        assignments: impl IntoIterator<Item = &'a str>,
+    ) -> Result<Drive, DriveError> {
         let mut drive = self.clone();
         let mut problems = Vec::new();
         for assignment in assignments.into_iter().flat_map(apart) {
@@ -62,7 +72,7 @@ impl Drive {
         if !problems.is_empty() {
             return Err(DriveError { problems });
         }
-        drive.check().map_err(|mut refused| {
+        drive.check_with(kinds).map_err(|mut refused| {
             for problem in &mut refused.problems {
                 problem.place = "--set".to_owned();
             }

@@ -579,6 +579,11 @@ impl Drive {
     /// Ranges of every field, then whether the parts fit one another. Every problem is reported, but parts are only
     /// fitted when all ranges hold.
     pub fn check(&self) -> Result<(), DriveError> {
+        self.check_with(&GeneratorKind::ALL)
+    }
+
+    /// The same with these generators alone: what the others lack room for is no problem.
+    pub(crate) fn check_with(&self, kinds: &[GeneratorKind]) -> Result<(), DriveError> {
         let mut problems = Vec::new();
         fields::for_each(self, |field, value| {
             for (at, number, range) in fields::ranged(field, value) {
@@ -588,13 +593,13 @@ impl Drive {
             }
         });
         if problems.is_empty() {
-            self.fit(&mut problems);
+            self.fit(kinds, &mut problems);
         }
         if problems.is_empty() { Ok(()) } else { Err(DriveError { problems }) }
     }
 
     /// The consistency of the parts, each finding with the field to change.
-    fn fit(&self, problems: &mut Vec<Problem>) {
+    fn fit(&self, kinds: &[GeneratorKind], problems: &mut Vec<Problem>) {
         let (f, c, g, t) = (&self.flexspline, &self.circular_spline, &self.generator, &self.temperature);
         let mut require = |holds: bool, field: &str, what: String| {
             if !holds {
@@ -705,7 +710,7 @@ impl Drive {
                 f.root_radius_mm + g.w0_mm
             ),
         );
-        for kind in GeneratorKind::ALL {
+        for &kind in kinds {
             let minor = f.tip_radius_mm + g.shape(kind).w(FRAC_PI_2);
             require(
                 minor < c.tip_radius_mm,
@@ -723,7 +728,7 @@ impl Drive {
                 refused.problems.into_iter().filter(|problem| !problems.contains(problem)).collect();
             problems.extend(new);
         }
-        for kind in GeneratorKind::ALL {
+        for &kind in kinds {
             if let Err(refused) = GeneratorOutline::new(self, kind) {
                 problems.extend(refused.problems);
             }

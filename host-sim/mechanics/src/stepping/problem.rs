@@ -199,7 +199,7 @@ impl Problem {
         temperature_c: f64,
         settings: SolverSettings,
     ) -> Result<Problem, SolveError> {
-        drive.check()?;
+        drive.check_with(&[kind])?;
         let drive = drive.at_temperature(temperature_c);
         let outline = GeneratorOutline::new(&drive, kind)?;
         let [of_flexspline, of_circular_spline] =
