@@ -636,6 +636,25 @@ fn loads_beside_the_section_and_what_was_left_out_are_said() {
     assert!((left_out - mean).abs() < 0.01 * mean.abs() && mean.abs() > 1.0, "{left_out}, {mean}");
 }
 
+/// A file for one load makes others worse: that is said, with the load, and not where none is worse.
+#[test]
+fn loads_that_a_file_makes_worse_are_named() {
+    let desk = &UNIT.desk;
+    let line = |more: &str| format!("export --format linuxcnc --tables cam.fxt --out worse --json {more}");
+    let said = desk.line(&line("")).done().json();
+    let (at, of) = (said["model"]["loads"].as_array().unwrap(), said["notes"].to_string());
+    let worse = |load: &&Value| number(load, "/rms_played_arcsec") > number(load, "/rms_uncorrected_arcsec");
+    assert!(at.iter().any(|load| worse(&load)) && at.iter().any(|load| !worse(&load)), "{at:?}");
+    for load in at {
+        let named = of.contains(&format!(" {} N.m (", load["torque_n_m"]).replace(".0 N", " N"));
+        assert_eq!(named, worse(&load), "{load} in {of}");
+    }
+    assert!(of.contains("--torque-n-m"), "{of}");
+    let near = export("moteus", "near_all");
+    let any = near["model"]["loads"].as_array().unwrap().iter().any(|load| worse(&load));
+    assert_eq!(near["notes"].to_string().contains("leaves more than none"), any, "{near}");
+}
+
 #[test]
 fn a_foreign_file_stays_and_the_program_writes_over_its_own() {
     let desk = &UNIT.desk;

@@ -229,6 +229,27 @@ pub struct ModelFigures {
     pub loads: Vec<LoadFigures>,
 }
 
+impl ModelFigures {
+    /// The loads of the table at which this file leaves more than none does.
+    pub fn note(&self) -> Option<String> {
+        let worse = self.loads.iter().filter(|load| load.rms_played_arcsec > load.rms_uncorrected_arcsec);
+        let at: Vec<String> = worse
+            .map(|load| {
+                let (played, none) = (load.rms_played_arcsec, load.rms_uncorrected_arcsec);
+                format!("{} N.m ({played:.1} arcsec, {none:.1} without)", load.torque_n_m)
+            })
+            .collect();
+        (!at.is_empty()).then(|| {
+            format!(
+                "made for {} N.m, this file leaves more than none at {}; a playback does not know the load: give \
+                 --torque-n-m the load that the joint has",
+                self.torque_n_m,
+                at.join(", ")
+            )
+        })
+    }
+}
+
 /// What is left on the data of a unit.
 #[derive(Debug, Clone, Serialize)]
 pub struct DataFigures {

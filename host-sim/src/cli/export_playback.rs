@@ -276,6 +276,7 @@ impl PlaybackOptions {
             worth_it(&section, &model, player)?;
         }
         let mut notes = made.notes;
+        notes.extend(model.note());
         let playback = match &self.data {
             Some(data) => self.judge(data, &table, [torque_n_m, temperature_c], player, &mut notes)?,
             None => None,
