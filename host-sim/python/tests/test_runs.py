@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import inspect
 import os
 import pickle
 import signal
@@ -17,11 +18,16 @@ import numpy as np
 import pandas
 import pyarrow
 import pytest
+from sklearn.base import clone
+from sklearn.model_selection import cross_val_score
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import FunctionTransformer
 
 import flexspline
 from conftest import MODEL, PROJECT, command, read_json, same_json
 from flexspline import BadInput, Drive, NotConverged, NothingGained, Table
 from flexspline._inputs import log
+from flexspline._runs import _OPTIONS
 
 
 def read_csv(path: Path) -> dict[str, list[str]]:
@@ -172,7 +178,11 @@ def test_a_calibrator_fits_predicts_and_scores(log_file: Path) -> None:
         calibrator.predict(frame)
     made = calibrator.fit(frame).calibration_
     replayed = made.table.replay(frame)
-    assert (calibrator.predict(frame) == replayed.predicted_arcsec).all()
+    unmeasured = frame.drop(columns="output_rad")
+    np.testing.assert_allclose(calibrator.predict(unmeasured), replayed.predicted_arcsec, atol=1e-3)
+    assert replayed.predicted_arcsec.std() > 1.0
+    with pytest.raises(flexspline.BadInput, match="generator_rad and one of"):
+        calibrator.score(unmeasured)
     left = replayed.summary.rms_residual_arcsec / replayed.summary.rms_measured_arcsec
     assert calibrator.score(frame) == pytest.approx(1.0 - left**2, abs=1e-6)
     assert 0.0 < calibrator.score(frame) <= 1.0
@@ -180,6 +190,36 @@ def test_a_calibrator_fits_predicts_and_scores(log_file: Path) -> None:
     opposite = 2.0 * frame["generator_rad"] / made.ratio - frame["output_rad"]
     assert calibrator.score(frame.assign(output_rad=opposite)) < 0.0
     assert "arcsec rms where nothing was fitted" in repr(calibrator)
+
+
+def test_a_calibrator_is_an_estimator_of_scikit_learn(log_file: Path) -> None:
+    frame = frame_of(log_file)
+    calibrator = flexspline.Calibrator(model=MODEL)
+    twin = clone(calibrator)
+    assert twin is not calibrator and twin.get_params() == {"model": MODEL}
+    assert twin.set_params(threads=1).get_params() == {"model": MODEL, "threads": 1} and calibrator.get_params() == {"model": MODEL}
+    with pytest.raises(flexspline.BadInput, match="found ratios, allowed: ratio, model"):
+        twin.set_params(ratios=101)
+    scores = cross_val_score(calibrator, frame, cv=3)
+    assert scores.shape == (3,) and (scores > 0.0).all()
+    piped = make_pipeline(FunctionTransformer(), calibrator).fit(frame)
+    assert piped.score(frame) == calibrator.score(frame)
+    assert set(inspect.signature(flexspline.calibrate).parameters) == {"logs", *_OPTIONS}
+
+
+def test_a_measurement_that_is_none_is_refused_and_never_scored(log_file: Path) -> None:
+    frame = frame_of(log_file).head(4000)
+    calibrator = flexspline.Calibrator(model=MODEL).fit(frame)
+    for name in ("output_rad", "error_arcsec"):
+        holed = frame.assign(error_arcsec=1.0) if name == "error_arcsec" else frame.copy()
+        holed = holed if name == "output_rad" else holed.drop(columns="output_rad")
+        holed.loc[100:110, name] = np.nan
+        for run in (calibrator.score, calibrator.calibration_.table.replay):
+            with pytest.raises(flexspline.BadInput, match=rf"{name}\[100\]: found nan and in 10 other rows"):
+                run(holed)
+    assert np.isfinite(calibrator.score(frame))
+    with pytest.raises(flexspline.BadInput, match="the same error in every row"):
+        calibrator.score(holed.dropna())
 
 
 def test_study_is_the_command(tmp_path: Path) -> None:

@@ -95,7 +95,8 @@ def diagnosis(found: Diagnosis, ax: Axes | None) -> Axes:
     timed = bool(np.isfinite(rows.time_s).all())
     x = rows.time_s if timed else np.arange(rows.rows)
     ax.plot(x, rows.error_arcsec - rows.recalibrated_arcsec, ".", markersize=2, label="left by the nominal model")
-    ax.plot(x, rows.error_arcsec - rows.extended_arcsec, ".", markersize=2, label="left with the causes")
+    if found.causes:
+        ax.plot(x, rows.error_arcsec - rows.extended_arcsec, ".", markersize=2, label="left with the causes")
     named = ", ".join(cause.name for cause in found.causes) or found.finding.replace("_", " ")
     return _labelled(ax, "time, s" if timed else "row", "error at the output, arcsec", named)
 

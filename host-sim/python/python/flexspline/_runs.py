@@ -18,7 +18,7 @@ from ._errors import BadInput
 from ._fields import Fields, rows_html
 from ._inputs import PathLike, columns_option, log, names, numbers, path_text, spread, table_columns
 from ._progress import Progress, shown
-from ._table import Replay, Table
+from ._table import Table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -403,8 +403,14 @@ def calibrate(
     return made
 
 
+_OPTIONS = ("ratio", "model", "table", "generator", "columns", "rate_hz", "torque_constant", "threads", "progress")
+"""What `calibrate` takes beside the logs."""
+
+
 class Calibrator:
-    """`calibrate` and `Table.replay` in the form of scikit-learn's estimators, for those who have theirs in a pipeline.
+    """`calibrate` and `Table.forward` as an estimator of scikit-learn, which need not be installed: clone, pipelines and cross_val_score take it.
+
+    Rows are one motion in their order: a cross validation has to leave out blocks (``KFold(3)``), not shuffled rows.
 
     >>> Calibrator(ratio=101).fit(monday).score(tuesday)  # doctest: +SKIP
     """
@@ -414,7 +420,20 @@ class Calibrator:
 
     def __init__(self, **options: Any) -> None:
         """``options``: those of `calibrate`, as ``ratio``, ``model`` or ``table``."""
-        self.options = options
+        self.options: dict[str, Any] = {}
+        self.set_params(**options)
+
+    def get_params(self, deep: bool = True) -> dict[str, Any]:
+        """The options that were given; ``deep`` changes nothing, as none is an estimator."""
+        return dict(self.options)
+
+    def set_params(self, **options: Any) -> Calibrator:
+        """Gives options another value; holds from the next `fit` on."""
+        for name in options:
+            if name not in _OPTIONS:
+                raise BadInput(f"Calibrator: found {name}, allowed: {', '.join(_OPTIONS)}")
+        self.options = {**self.options, **options}
+        return self
 
     def fit(self, logs: object, y: object = None) -> Calibrator:
         """Learns the table of a unit from its logs, as `calibrate` takes them; ``y`` is not read, as the error stands in the logs."""
@@ -422,20 +441,37 @@ class Calibrator:
         return self
 
     def predict(self, data: object) -> FloatArray:
-        """The output error that the table tells for each row, arcsec, rows in the order of one motion."""
-        return self._replayed(data).predicted_arcsec
+        """The output error that the table expects for each row, arcsec, rows in the order of one motion: of a table of columns with
+        ``generator_rad``, and where known ``torque_n_m`` and ``temperature_c``. No measured error is needed, and none is read."""
+        columns = table_columns(data)
+        if "generator_rad" not in columns:
+            raise BadInput(f"data: found columns {', '.join(columns)}, required: generator_rad; allowed too: torque_n_m, temperature_c")
+        load, temperature = columns.get("torque_n_m", 0.0), columns.get("temperature_c", 20.0)
+        return self._table().forward(columns["generator_rad"], load, temperature).error_arcsec
 
     def score(self, data: object, y: object = None) -> float:
         """Share of the variance of the measured error that the table takes away: 1 is all of it, below 0 is worse than no table.
+        ``data`` is what `Table.replay` takes; ``y`` is not read.
 
         A variance, as the zero of an output encoder is no table's to know."""
-        rows = self._replayed(data)
-        return float(1.0 - np.var(rows.residual_arcsec) / np.var(rows.measured_arcsec))
+        rows = self._table().replay(data)
+        measured = np.var(rows.measured_arcsec)
+        if measured == 0.0:
+            raise BadInput("data: found the same error in every row, allowed: errors that differ, as the score is a share of their variance")
+        return float(1.0 - np.var(rows.residual_arcsec) / measured)
 
-    def _replayed(self, data: object) -> Replay:
+    def _table(self) -> Table:
         if not hasattr(self, "calibration_"):
             raise BadInput("Calibrator: not fitted yet, allowed: fit(logs) first")
-        return self.calibration_.table.replay(data)
+        return self.calibration_.table
+
+    def __sklearn_is_fitted__(self) -> bool:
+        return hasattr(self, "calibration_")
+
+    def __sklearn_tags__(self) -> Any:
+        from sklearn.utils import RegressorTags, Tags, TargetTags
+
+        return Tags(estimator_type="regressor", target_tags=TargetTags(required=False), regressor_tags=RegressorTags())
 
     def __repr__(self) -> str:
         options = ", ".join(f"{name}={value!r}" for name, value in self.options.items())

@@ -384,6 +384,11 @@ class Table:
             error = (output_angle - generator / self.ratio) * ARCSEC_PER_RAD
         else:
             error = numbers("error_arcsec", 0.0 if error_arcsec is None else error_arcsec)
+        unknown = np.flatnonzero(~np.isfinite(error))
+        if unknown.size:
+            name = "error_arcsec" if output_rad is None else "output_rad"
+            others = f" and in {unknown.size - 1} other rows" if unknown.size > 1 else ""
+            raise BadInput(f"{name}[{unknown[0]}]: found {error[unknown[0]]:g}{others}, allowed: finite; leave out rows without a measurement")
         columns, summary = self._inner.replay(generator, error, torque, temperature)
         return Replay(columns, Fields(summary))
 
