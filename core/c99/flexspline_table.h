@@ -320,7 +320,8 @@ typedef enum fxt_flag {
 /** One tick's results. */
 typedef struct fxt_output {
     int64_t command, output;      /**< counts: the generator angle to command, which leaps where the target leaps; where the output is */
-    float transmission_error_rad; /**< now; 0 if disabled */
+    float transmission_error_rad; /**< now: output less the nominal one; 0 without a usable torque, temperature or table; before the first
+                                   * sample that of generator angle 0, known to uncertainty_rad */
     float uncertainty_rad;        /**< it lies within this of it, as far as play and jumps go, corrected or not; without a sample that is believed
                                    * in this tick no less than the table's limit and the error told */
     float correction_rad;         /**< in the command: target less command over ratio */

@@ -91,7 +91,8 @@ pub struct Output {
     pub command: GeneratorAngle,
     /// Where the output is estimated to be now.
     pub output: OutputAngle,
-    /// The transmission error now, rad; 0 if disabled.
+    /// The transmission error now, rad: the output less the nominal one; 0 without a usable torque, temperature or
+    /// table. Before the first sample that of generator angle 0, known to [`Self::uncertainty_rad`].
     pub transmission_error_rad: f32,
     /// It lies within ± this, as far as play and jumps go, rad. Of the estimate, whether it is corrected or not: what
     /// is left at the output is [`Self::output`] less the target. Without a sample that is believed in this tick: no
