@@ -20,6 +20,10 @@ pub(super) const RATIOS: [f64; 2] = [20.0, 400.0];
 /// A torque is believed to turn the error one way if it explains this share of what the turn of the output leaves.
 const TELLS: f64 = 0.05;
 
+/// … and has this share of itself beside what turns: a variance inflation of ten, beyond which coefficients are usually
+/// not believed (Kutner, Nachtsheim & Neter, Applied Linear Regression Models).
+const APART: f64 = 0.1;
+
 /// Rows in which all columns have a number, thinned.
 fn rows(columns: &[&[f64]]) -> Vec<Vec<f64>> {
     let count = columns.iter().map(|column| column.len()).min().unwrap_or(0);
@@ -92,19 +96,23 @@ pub(super) struct TorqueSays {
     pub slope: f64,
     /// Share of what the turns of the output leave of the error that it explains.
     pub share: f64,
+    /// Share of the torque that does not go with the turns of the output itself.
+    pub apart: f64,
 }
 
 impl TorqueSays {
     /// Whether the sign can be told.
     pub(crate) fn tells(&self) -> bool {
-        self.share > TELLS
+        self.share > TELLS && self.apart > APART
     }
 }
 
 /// How an error (rad) follows a torque beside what turns with the output (rad): an eccentric encoder and the weight of
 /// an arm look alike, so both may explain what one of them does.
 pub(super) fn torque_says(error: &[f64], output: &[f64], torque: &[f64], of_file: &[f64]) -> Option<TorqueSays> {
-    let rows = rows(&[error, output, torque, of_file]);
+    let mut rows = rows(&[error, output, torque, of_file]);
+    // Where it should be: where it is has the error in it, which a load that goes with the angle would then tell.
+    rows.iter_mut().for_each(|row| row[1] -= row[0]);
     let mut files: Vec<f64> = rows.iter().map(|row| row[3]).collect();
     files.dedup();
     let travel = least_and_most(rows.iter().map(|row| row[1]));
@@ -133,8 +141,15 @@ pub(super) fn torque_says(error: &[f64], output: &[f64], torque: &[f64], of_file
     let values: Vec<f64> = rows.iter().map(|row| row[0]).collect();
     let (_, without) = least_squares(&columns(false), &values)?;
     let (fitted, with) = least_squares(&columns(true), &values)?;
-    let slope = fitted.last()? / scale;
-    Some(TorqueSays { slope, share: 1.0 - with / without.max(f64::MIN_POSITIVE) })
+    let torque: Vec<f64> = rows.iter().map(|row| row[2]).collect();
+    let (_, apart) = least_squares(&columns(false), &torque)?;
+    let mean = torque.iter().sum::<f64>() / torque.len() as f64;
+    let all = torque.iter().map(|torque| (torque - mean).powi(2)).sum::<f64>();
+    Some(TorqueSays {
+        slope: fitted.last()? / scale,
+        share: 1.0 - with / without.max(f64::MIN_POSITIVE),
+        apart: apart / all.max(f64::MIN_POSITIVE),
+    })
 }
 
 /// Coefficients, and the sum of squares that they leave.
@@ -195,8 +210,16 @@ mod tests {
         let two: Vec<f64> = (0..2000).map(|k| f64::from(u8::from(k >= 700))).collect();
         let other_zero: Vec<f64> = error.iter().zip(&two).map(|(e, two)| e + 0.5 * two).collect();
         for (error, of_file) in [(&error, &vec![0.0; 2000]), (&other_zero, &two)] {
-            let says = torque_says(error, &out, &torque, of_file).unwrap();
+            let reached: Vec<f64> = out.iter().zip(error).map(|(o, e)| o + e).collect();
+            let says = torque_says(error, &reached, &torque, of_file).unwrap();
             assert!(says.tells() && (says.slope * -3e4 - 1.0).abs() < 1e-6, "{says:?}");
         }
+        // A ramp of the load goes with the output: what the wheels do on the way is as well the torque's.
+        let short: Vec<f64> = out[..300].to_vec();
+        let ramp: Vec<f64> = short.iter().map(|o| 50.0 * o - 10.0 + (9.0 * o).sin()).collect();
+        let error: Vec<f64> = short.iter().zip(&ramp).map(|(o, t)| t / 3e4 - 3e-4 * (9.0 * o).sin()).collect();
+        let reached: Vec<f64> = short.iter().zip(&error).map(|(o, e)| o + e).collect();
+        let says = torque_says(&error, &reached, &ramp, &vec![0.0; 300]).unwrap();
+        assert!(says.share > TELLS && !says.tells(), "{says:?}");
     }
 }
