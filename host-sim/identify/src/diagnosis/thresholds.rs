@@ -32,8 +32,8 @@ pub(crate) mod selection {
     /// Where much of a cause shows while the play is crossed, those rows count up to this many times what it adds
     /// elsewhere. *Chosen*.
     pub(crate) const IN_CROSSINGS: f64 = 3.0;
-    /// Least size against what the laws of the other terms may be wrong by. *Chosen*, with the shares of kin, on families
-    /// D, E, F and V (`docs/evidence/diagnosis.md`).
+    /// Least size against what the laws of the other terms may be wrong by. *Chosen*, with the shares of kin, on
+    /// families D, E, F and V (`docs/evidence/diagnosis.md`).
     pub(crate) const LEAST_OF_MISFIT: f64 = 2.0;
     /// Least size of a deviation without a name against what the laws of the other terms may be wrong by. *Chosen*.
     pub(crate) const LEAST_UNNAMED_OF_MISFIT: f64 = 1.5;

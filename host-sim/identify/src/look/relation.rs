@@ -20,8 +20,8 @@ pub(super) const RATIOS: [f64; 2] = [20.0, 400.0];
 /// A torque is believed to turn the error one way if it explains this share of what the turn of the output leaves.
 const TELLS: f64 = 0.05;
 
-/// … and has this share of itself beside what turns: a variance inflation of ten, beyond which coefficients are usually
-/// not believed (Kutner, Nachtsheim & Neter, Applied Linear Regression Models).
+/// … and has this share of itself beside what turns: a variance inflation of ten, beyond which coefficients are
+/// usually not believed (Kutner, Nachtsheim & Neter, Applied Linear Regression Models).
 const APART: f64 = 0.1;
 
 /// Rows in which all columns have a number, thinned.
