@@ -22,6 +22,26 @@ fn refused(desk: &Desk, line: &str, said: &str) -> String {
     run.stderr
 }
 
+/// The file keeps its content, and the message names it and what would have taken its place.
+#[test]
+fn no_command_replaces_a_file_that_it_reads() {
+    let desk = Desk::new();
+    fs::create_dir(desk.path("mine")).unwrap();
+    for (line, file) in [
+        ("replay mine/replay.csv --tables cam.fxt", "replay.csv"),
+        ("synthesize --effect backlash_growth --like mine/data.csv", "data.csv"),
+        ("simulate --generator cam --path=mine/results.csv", "results.csv"),
+        ("diagnose mine/diagnosis.json", "diagnosis.json"),
+        ("calibrate mine/../mine/calibration.json --ratio 50", "calibration.json"),
+    ] {
+        let file = format!("mine/{file}");
+        desk.write(&file, "generator_rad,output_rad\n0,0\n");
+        let said = refused(&desk, &format!("{line} --out mine"), "which this run reads; allowed: another --out");
+        assert_eq!(said.matches(file.trim_start_matches("mine")).count(), 2, "{line}: {said}");
+        assert_eq!(desk.read(&file), "generator_rad,output_rad\n0,0\n", "{line}");
+    }
+}
+
 #[test]
 fn wrong_drive_files_are_refused() {
     let desk = Desk::new();

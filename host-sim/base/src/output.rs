@@ -29,6 +29,25 @@ fn failed(path: &Path) -> impl FnOnce(io::Error) -> OutputError + '_ {
     |source| OutputError { path: path.to_owned(), source }
 }
 
+/// Files that this process reads, as they are called: no output takes their place.
+static READ: Mutex<Vec<(PathBuf, PathBuf)>> = Mutex::new(Vec::new());
+
+/// Keeps a file that this process reads: from now on no output takes its place.
+pub fn keep(path: &Path) {
+    if let Ok(place) = fs::canonicalize(path) {
+        READ.lock().unwrap_or_else(PoisonError::into_inner).push((place, path.to_owned()));
+    }
+}
+
+/// Refuses an output in the place of a file that is kept, or a folder in the place of one that holds such a file.
+pub fn replaces_none_kept(target: &Path) -> Result<(), OutputError> {
+    let Ok(place) = fs::canonicalize(target) else { return Ok(()) };
+    let read = READ.lock().unwrap_or_else(PoisonError::into_inner);
+    let Some((_, path)) = read.iter().find(|(read, _)| read.starts_with(&place)) else { return Ok(()) };
+    let what = format!("it would replace {}, which this run reads; allowed: another --out", path.display());
+    Err(failed(target)(io::Error::new(io::ErrorKind::InvalidInput, what)))
+}
+
 /// What is on disk and no output yet. Hidden files are made, and become outputs, while this is held.
 struct UnfinishedFiles {
     /// Hidden files and folders.
@@ -152,6 +171,7 @@ impl Outputs {
         path: &Path,
         content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> Result<(), OutputError> {
+        replaces_none_kept(path)?;
         self.files.push(HiddenFile::new(path, content).map_err(failed(path))?);
         Ok(())
     }
@@ -247,6 +267,7 @@ pub struct WholeFolder {
 impl WholeFolder {
     /// A folder that will stand at `target`, beside which it is filled.
     pub fn new(target: &Path) -> Result<WholeFolder, OutputError> {
+        replaces_none_kept(target)?;
         let mut unfinished = unfinished();
         let parts = tempfile::Builder::new().prefix(".part-").tempdir_in(parent_of(target)).map_err(failed(target))?;
         let path = HiddenPath::new(&mut unfinished, parts.path());
@@ -344,6 +365,22 @@ mod tests {
         assert_eq!(names(folder.path()), ["results.csv"]);
         write_whole(&path, |file| file.write_all(b"new")).unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"new");
+    }
+
+    #[test]
+    fn an_output_takes_the_place_of_no_file_that_is_read() {
+        let place = tempfile::tempdir().unwrap();
+        let (data, other) = (place.path().join("frames/data.csv"), place.path().join("frames/other.csv"));
+        fs::create_dir(place.path().join("frames")).unwrap();
+        fs::write(&data, "mine").unwrap();
+        keep(&data);
+        let again = place.path().join("frames/../frames/data.csv");
+        let error = write_whole(&again, |file| file.write_all(b"new")).unwrap_err();
+        assert_eq!(error.source.kind(), io::ErrorKind::InvalidInput);
+        assert!(error.to_string().contains(&data.display().to_string()), "{error}");
+        assert!(WholeFolder::new(&place.path().join("frames")).is_err());
+        assert_eq!(fs::read(&data).unwrap(), b"mine");
+        write_whole(&other, |file| file.write_all(b"new")).unwrap();
     }
 
     #[test]

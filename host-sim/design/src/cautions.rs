@@ -54,6 +54,29 @@ impl Caution {
     }
 }
 
+/// A load is beyond what drives bear from this many times the rated one on. A guess: a catalogue's momentary peak is
+/// three to five times the rated torque.
+const MOST_OF_RATED: f64 = 5.0;
+
+impl Caution {
+    /// That a load is far beyond the rated one, or above that at which teeth skip, where a data sheet has it.
+    pub fn of_load(load_n_m: f64, rated_n_m: f64, ratcheting_n_m: Option<f64>) -> Option<Caution> {
+        let (load, value) = (load_n_m.abs(), load_n_m.abs() / rated_n_m);
+        let skips = ratcheting_n_m.filter(|least| load > *least);
+        let above = skips.map_or_else(String::new, |least| {
+            format!(
+                ", above the ratcheting torque of the data sheet ({least} N.m): the teeth of such a drive have skipped"
+            )
+        });
+        (skips.is_some() || value > MOST_OF_RATED).then(|| Caution {
+            figure: "load",
+            value,
+            limit: skips.map_or(MOST_OF_RATED, |least| least / rated_n_m),
+            words: format!("the load of {load} N.m is {value:.1} times the rated torque of {rated_n_m} N.m{above}"),
+        })
+    }
+}
+
 /// The figures that are looked at, those that are known.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LookedAt {
@@ -207,6 +230,11 @@ mod tests {
         assert_eq!(figures(LookedAt { max_von_mises_mpa: Some(f64::NAN), ..sound }), ["max_von_mises_mpa"]);
         assert_eq!(figures(LookedAt { peak_flank_pressure_mpa: Some(3001.0), ..sound }), ["peak_flank_pressure_mpa"]);
         assert_eq!(figures(LookedAt { slope_bound: Some(0.6), ..sound }), ["slope_bound"]);
+        let load = |load, sheet| Caution::of_load(load, 82.0, sheet).map(|caution| (caution.value, caution.words));
+        assert_eq!((load(-400.0, None), load(82.0, Some(880.0))), (None, None));
+        assert!(load(-820.0, Some(880.0)).is_some_and(|(times, words)| times == 10.0 && !words.contains("ratchet")));
+        let (_, words) = load(8200.0, Some(880.0)).unwrap();
+        assert!(words.contains("100.0 times the rated torque of 82 N.m, above the ratcheting torque"), "{words}");
         // What yields a little has a table yet; what binds, or what no steel bears, has none.
         let none = |looked: LookedAt| looked.cautions().iter().any(Caution::rules_out_tables);
         assert!(none(LookedAt { rigid_gap_um: Some(-0.11), ..sound }));

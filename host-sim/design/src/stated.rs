@@ -174,6 +174,11 @@ impl Stated {
         Some(stated)
     }
 
+    /// That a load is far beyond the rated one, or above the ratcheting torque of the sheet.
+    pub fn load_caution(&self, drive: &Drive, kind: GeneratorKind, load_n_m: f64) -> Option<Caution> {
+        Caution::of_load(load_n_m, Stated::rated_n_m(Some(self), drive, kind), self.ratcheting_torque_n_m)
+    }
+
     /// The loads of the sheet; what it does not say is in the usual proportion to what it says, or to `rated_n_m`.
     pub(crate) fn loads(&self, rated_n_m: f64) -> Loads {
         let usual = Loads::up_to(1.0);

@@ -8,8 +8,8 @@ use serde::Serialize;
 use flexspline::{Identity, IdentityCheck, Table};
 
 use super::{Common, Failure, say};
-use flexspline_base::output::prepare_folder;
 pub(super) use flexspline_base::output::quoted;
+use flexspline_base::output::{keep, prepare_folder};
 use flexspline_base::progress::Progress;
 use flexspline_base::spent::{Spent, Stopwatch};
 use flexspline_base::suggest::{likeliest, question};
@@ -24,6 +24,7 @@ pub(super) struct Context {
     common: Common,
     /// The command line as it was given.
     pub(super) command: String,
+    args: Vec<OsString>,
     clock: Stopwatch,
 }
 
@@ -31,7 +32,19 @@ impl Context {
     pub(super) fn new(common: Common, args: &[OsString]) -> Context {
         let words = args.iter().skip(1).map(|arg| quoted(&arg.to_string_lossy()));
         let command = ["flexspline".to_owned()].into_iter().chain(words).collect::<Vec<_>>().join(" ");
-        Context { common, command, clock: Stopwatch::start() }
+        Context { common, command, args: args.to_vec(), clock: Stopwatch::start() }
+    }
+
+    /// Keeps the files that the command line names from being replaced.
+    pub(super) fn keep_files_named(&self) {
+        let words = self.args.iter().skip(1).map(|arg| arg.to_string_lossy());
+        for word in words {
+            let value = word.strip_prefix("--").and_then(|option| Some(option.split_once('=')?.1));
+            let path = Path::new(value.unwrap_or(&word));
+            if path.is_file() {
+                keep(path);
+            }
+        }
     }
 
     /// Runs `work` on as many threads as were asked for.
@@ -231,6 +244,7 @@ pub(super) fn image_file(path: &Path) -> Result<Vec<u8>, Failure> {
     if path.is_dir() {
         return Err(bad("found a folder; allowed: a table image, FILE.fxt".to_owned()));
     }
+    keep(path);
     let bytes = std::fs::read(path).map_err(|error| bad(error.to_string()))?;
     if let Ok(table) = Table::check(&bytes) {
         let mut check = IdentityCheck::new();

@@ -43,7 +43,7 @@ use std::process::ExitCode;
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueHint};
 
 use context::Context;
-use flexspline_base::output::{OutputError, remove_empty_folders};
+use flexspline_base::output::{OutputError, remove_empty_folders, replaces_none_kept};
 
 /// How a command ended; the number is the exit code of the process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -73,7 +73,11 @@ enum Failure {
 
 impl From<OutputError> for Failure {
     fn from(error: OutputError) -> Failure {
-        Failure::Failed(error.to_string())
+        match error.source.kind() {
+            // In the place of an input.
+            std::io::ErrorKind::InvalidInput => Failure::BadInput(error.to_string()),
+            _ => Failure::Failed(error.to_string()),
+        }
     }
 }
 
@@ -245,7 +249,7 @@ pub fn run(args: impl IntoIterator<Item = impl Into<OsString>>) -> Outcome {
     };
     let context = Context::new(cli.common, &args);
     stop::end_cleanly_on_signals();
-    match context.with_threads(|| cli.command.run(&context)) {
+    match context.with_threads(|| cli.command.keep_inputs(&context).and_then(|()| cli.command.run(&context))) {
         Ok(()) => Outcome::Done,
         Err(failure) => ended(failure),
     }
@@ -263,6 +267,30 @@ fn ended(failure: Failure) -> Outcome {
 }
 
 impl Command {
+    /// Keeps the files that the command line names from being replaced. What is known to be written in the place of one
+    /// is refused before any work is done, all else where it is written.
+    fn keep_inputs(&self, context: &Context) -> Result<(), Failure> {
+        if let Command::New(_) = self {
+            // It names the file that it writes.
+            return Ok(());
+        }
+        context.keep_files_named();
+        let places = self.writes().iter().map(|name| context.out_path().join(name));
+        places.map(|place| replaces_none_kept(&place)).collect::<Result<(), OutputError>>().map_err(Failure::from)
+    }
+
+    /// Files that it writes whatever is asked of it, of commands that may read one of such a name.
+    fn writes(&self) -> &'static [&'static str] {
+        match self {
+            Command::Simulate(_) => &["results.csv", "summary.json"],
+            Command::Calibrate(_) => &["calibrated.fxt", "calibration.json"],
+            Command::Diagnose(_) => &["diagnosis.json"],
+            Command::Replay(_) => &["replay.csv", "summary.json"],
+            Command::Synthesize(_) => &["data.csv", "truth.json"],
+            _ => &[],
+        }
+    }
+
     fn run(&self, context: &Context) -> Result<(), Failure> {
         match self {
             Command::Simulate(command) => command.run(context),

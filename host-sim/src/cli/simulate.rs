@@ -182,6 +182,11 @@ impl Simulate {
             beside(&drive, settings.generator, temperature_c, &stated, settings.solver)
         });
         let sheet = simulation.summary.data_sheet.as_ref();
+        let largest = simulation.rows.iter().map(|row| row.torque_n_m.abs()).fold(0.0, f64::max);
+        simulation
+            .summary
+            .cautions
+            .extend(context.stated()?.and_then(|of| of.load_caution(&drive, settings.generator, largest)));
         simulation.summary.cautions.extend(sheet.and_then(SheetBeside::caution));
 
         // Data sheet and stress took their time, too.

@@ -152,9 +152,15 @@ impl Tables {
                 Err(failure) => failed.push((kind, failure)),
             }
         }
+        let beyond = |kind| stated.as_ref().and_then(|of| of.load_caution(&drive, kind, self.torque_n_m?));
         if made.is_empty() {
-            return Err(failed.swap_remove(0).1);
+            let (kind, failure) = failed.swap_remove(0);
+            return Err(match (failure, beyond(*kind)) {
+                (Failure::Failed(why), Some(caution)) => Failure::Failed(format!("{why}; {}", caution.words)),
+                (failure, _) => failure,
+            });
         }
+        made.iter_mut().for_each(|table| table.info.cautions.extend(beyond(table.kind)));
         if let (Some(stated), None) = (&stated, &self.from_samples) {
             let settings = SolverSettings { method: self.solver, mesh: self.mesh, ..SolverSettings::default() };
             let reference_c = drive.temperature.reference_c;
