@@ -31,7 +31,7 @@ fn no_command_replaces_a_file_that_it_reads() {
         ("replay mine/replay.csv --tables cam.fxt", "replay.csv"),
         ("synthesize --effect backlash_growth --like mine/data.csv", "data.csv"),
         ("simulate --generator cam --path=mine/results.csv", "results.csv"),
-        ("diagnose mine/diagnosis.json", "diagnosis.json"),
+        ("diagnose mine/diagnosis.json --model model.toml", "diagnosis.json"),
         ("calibrate mine/../mine/calibration.json --ratio 50", "calibration.json"),
     ] {
         let file = format!("mine/{file}");

@@ -10,6 +10,7 @@ pub mod calibrate;
 pub mod causes;
 pub mod diagnosis;
 pub mod extension;
+pub mod known_rows;
 pub mod look;
 pub mod measurement;
 pub mod nominal;

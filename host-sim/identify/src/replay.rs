@@ -1,8 +1,7 @@
 //! The core run over measured rows, open loop: what it would have predicted, row by row.
 //!
-//! CSV with a header, columns in any order, further columns ignored, `#` lines comments. Needed are `generator_rad` and
-//! one of `output_rad` and `error_arcsec`; `torque_n_m` (else 0) and `temperature_c` (else that given) are used where
-//! present.
+//! The rows are read and checked as those of a calibration ([`crate::known_rows`]), and whatever was converted or left
+//! out is told. Without a torque the table is read at 0 N·m.
 
 use std::path::Path;
 
@@ -11,7 +10,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use thiserror::Error;
 
-use crate::measurement::{MeasuredError, plain_rows};
+use crate::calibrate::check_ratio;
+use crate::known_rows::parse_known;
+use crate::measurement::{ColumnMap, Fault, FaultName, Gear, MeasuredError, Quantity, Recording, Treatment, parse_few};
+use crate::nominal::Nominal;
 use crate::turns_off::{TurnsOff, about_mean, torque_turned, turns_off};
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::generator_of;
@@ -79,6 +81,10 @@ pub struct ReplaySummary {
     pub rows_of: Option<RowsOf>,
     /// What has to be known of them: that they are another drive's, or nobody's.
     pub remarks: Vec<String>,
+    /// Faults of the log.
+    pub data_faults: Vec<Fault>,
+    /// What was noticed in it.
+    pub notes: Vec<String>,
     /// Command line, once known.
     pub command: String,
 }
@@ -183,72 +189,76 @@ pub struct OtherRows {
     ratio: f64,
 }
 
-/// Rows that cannot be used.
-#[derive(Debug, Error, PartialEq, Eq)]
-#[error("{file}:{line}: {what}")]
-pub struct MeasurementError {
-    /// File.
-    pub file: String,
-    /// Line, from 1.
-    pub line: u64,
-    /// Field, value, what is allowed.
-    pub what: String,
+/// Rows of a log, with what was found in it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RowsRead {
+    /// The rows, what was converted as it is meant.
+    pub rows: Vec<MeasuredRow>,
+    /// Faults of the log.
+    pub faults: Vec<Fault>,
+    /// What was noticed.
+    pub notes: Vec<String>,
 }
 
-/// Reads measured rows; `temperature_c` stands where the file has no such column.
-pub fn parse(file: &str, bytes: &[u8], ratio: f64, temperature_c: f64) -> Result<Vec<MeasuredRow>, MeasurementError> {
-    let refuse = |error: MeasuredError| MeasurementError {
-        file: file.to_owned(),
-        line: error.line.unwrap_or(1),
-        what: error.what,
-    };
-    let rows = plain_rows(file, bytes, ratio).map_err(refuse)?;
-    if let Some(what) = turns_otherwise(&rows.generator_rad, &rows.error_rad, ratio) {
-        return Err(MeasurementError { file: file.to_owned(), line: 1, what });
-    }
-    let at = |values: &Option<Vec<f64>>, row: usize, usual: f64| values.as_ref().map_or(usual, |values| values[row]);
-    Ok((0..rows.generator_rad.len())
-        .map(|row| MeasuredRow {
-            generator_rad: rows.generator_rad[row],
-            error_arcsec: rows.error_rad[row] * ARCSEC_PER_RAD,
-            torque_n_m: at(&rows.torque_n_m, row, 0.0),
-            temperature_c: at(&rows.temperature_c, row, temperature_c),
-        })
-        .collect())
+/// Reads measured rows of the drive of a table; `temperature_c` stands where the file has no such column.
+///
+/// # Errors
+/// They cannot be read, their torque is in another unit, or they are of another ratio.
+pub fn read(
+    file: &str,
+    bytes: &[u8],
+    columns: &ColumnMap,
+    table: &Table<'_>,
+    temperature_c: f64,
+) -> Result<RowsRead, MeasuredError> {
+    let nominal = Nominal::of_table(table);
+    rows_of(parse_known(file, bytes, columns, &nominal, Some(table))?, nominal.ratio, temperature_c)
+}
+
+/// The same by the ratio alone, with this project's own columns.
+///
+/// # Errors
+/// As [`read`].
+pub fn parse(file: &str, bytes: &[u8], ratio: f64, temperature_c: f64) -> Result<Vec<MeasuredRow>, MeasuredError> {
+    let recording = parse_few(file, bytes, &ColumnMap::default(), &Gear::of_ratio(ratio))?;
+    rows_of(recording, ratio, temperature_c).map(|read| read.rows)
 }
 
 /// An error about its mean that is none of a gear, rad rms. A guess: one degree, where drives err by arc-minutes.
 const MOST_ERROR_RAD: f64 = 0.0175;
-/// How near to a unit or a sign the way of the output has to be to be taken for one. A guess.
-const NEAR: f64 = 0.05;
 
-/// That the output does not turn as the generator over the ratio, and what that looks like.
-fn turns_otherwise(generator_rad: &[f64], error_rad: &[f64], ratio: f64) -> Option<String> {
-    if about_mean(error_rad) < MOST_ERROR_RAD {
-        return None;
-    }
-    let count = generator_rad.len() as f64;
-    let mean = generator_rad.iter().sum::<f64>() / count;
-    let both = || generator_rad.iter().map(|at| at - mean).zip(error_rad);
-    let slope = both().map(|(at, error)| at * error).sum::<f64>() / both().map(|(at, _)| at * at).sum::<f64>();
-    let times = 1.0 + ratio * slope;
-    // What jumps is on no line.
-    let beside: Vec<f64> = both().map(|(at, error)| error - slope * at).collect();
-    let near = |other: f64| (times / other - 1.0).abs() < NEAR;
-    let degrees = 180.0 / std::f64::consts::PI;
-    let hint = match times {
-        _ if near(-1.0) => "; one of the two counts backward: --columns output=NAME:-rad turns it",
-        _ if near(degrees) || near(-degrees) => "; the output looks like degrees: --columns output=NAME:deg",
-        _ if near(1.0 / degrees) || near(-1.0 / degrees) => {
-            "; the generator looks like degrees: --columns generator=NAME:deg"
-        }
-        _ => "",
+/// The rows of a recording, if a table can be played over them.
+fn rows_of(mut recording: Recording, ratio: f64, temperature_c: f64) -> Result<RowsRead, MeasuredError> {
+    let refuse = |line: Option<u64>, what: String| MeasuredError { file: recording.file.clone(), line, what };
+    let in_other_unit = |fault: &&Fault| {
+        (fault.name, fault.channel, fault.treatment)
+            == (FaultName::UnitMismatch, Some(Quantity::Torque), Treatment::Masked)
     };
-    (about_mean(&beside) < MOST_ERROR_RAD * times.abs().max(1.0)).then(|| {
-        format!(
-            "output: turns {times:.4} times as far as the generator over the table's ratio {ratio}, allowed: 1{hint}"
-        )
-    })
+    // Without its torque the table would be read where the drive never was.
+    if let Some(fault) = recording.faults.iter().find(in_other_unit) {
+        return Err(refuse(Some(fault.first_line), fault.what.clone()));
+    }
+    let errors: Vec<f64> = recording.sessions.iter().flat_map(|session| session.error_rad.iter().copied()).collect();
+    let said = match check_ratio(std::slice::from_ref(&recording), ratio) {
+        Err(error) if about_mean(&errors) >= MOST_ERROR_RAD => return Err(refuse(None, error.to_string())),
+        // A load that grows over a few rows looks the same.
+        Err(error) => Some(error.to_string()),
+        Ok(said) => said,
+    };
+    recording.notes.extend(said);
+    if recording.sessions.iter().all(|session| session.torque_n_m.is_none()) {
+        recording.notes.push("no torque: the table is read at 0 N.m".to_owned());
+    }
+    let at = |column: &Option<Vec<f64>>, k: usize, usual: f64| column.as_ref().map_or(usual, |values| values[k]);
+    let rows = recording.sessions.iter().flat_map(|session| {
+        (0..session.len()).map(move |k| MeasuredRow {
+            generator_rad: session.generator_rad[k],
+            error_arcsec: session.error_rad[k] * ARCSEC_PER_RAD,
+            torque_n_m: at(&session.torque_n_m, k, 0.0),
+            temperature_c: at(&session.temperature_c, k, temperature_c),
+        })
+    });
+    Ok(RowsRead { rows: rows.collect(), faults: recording.faults, notes: recording.notes })
 }
 
 /// Runs the core over the rows, from a state it does not know.
@@ -300,6 +310,8 @@ pub fn replay(table: &Table<'_>, rows: &[MeasuredRow]) -> (Vec<ReplayedRow>, Rep
         torque_turned_rms_arcsec: turned,
         rows_of: None,
         remarks: Vec::new(),
+        data_faults: Vec::new(),
+        notes: Vec::new(),
         command: String::new(),
     };
     summary.of_rows(None, table);
@@ -331,17 +343,18 @@ mod tests {
 
     #[test]
     fn error_and_output_columns_say_the_same() {
-        let by_error = parse("a.csv", b"error_arcsec,generator_rad\n12.5,0.5\n", 95.0, 20.0).unwrap();
+        let by_error = parse("a.csv", b"error_arcsec,generator_rad\n12.5,0.5\n9,0.6\n", 95.0, 20.0).unwrap();
         let output = 0.5 / 95.0 + 12.5 / ARCSEC_PER_RAD;
-        let text = format!("generator_rad,output_rad,torque_n_m\n0.5,{output},3\n");
+        let next = 0.6 / 95.0 + 9.0 / ARCSEC_PER_RAD;
+        let text = format!("generator_rad,output_rad,torque_n_m\n0.5,{output},3\n0.6,{next},3\n");
         let by_output = parse("b.csv", text.as_bytes(), 95.0, 20.0).unwrap();
         assert!((by_error[0].error_arcsec - by_output[0].error_arcsec).abs() < 1e-9);
         assert_eq!((by_output[0].torque_n_m, by_output[0].temperature_c), (3.0, 20.0));
     }
 
-    /// Three turns of a drive of ratio 95 whose columns are wrong; an encoder that jumps is no other unit.
+    /// Three turns of a drive of ratio 95 whose columns are wrong: put right where the ratio proves it, else refused.
     #[test]
-    fn an_output_that_does_not_turn_with_the_generator_is_refused_with_what_it_looks_like() {
+    fn an_output_that_does_not_turn_with_the_generator_is_put_right_or_refused() {
         let read = |output: fn(f64, f64) -> f64| {
             let row = |k: u32| {
                 let generator = 0.1 * f64::from(k);
@@ -350,16 +363,35 @@ mod tests {
             let rows: String = (0..190).map(row).collect();
             parse("m.csv", format!("generator_rad,output_rad\n{rows}").as_bytes(), 95.0, 20.0)
         };
-        assert!(read(|_, output| output).is_ok());
-        assert!(read(|generator, output| if generator > 17.0 { output + 0.1 } else { output }).is_ok());
-        for (output, hint) in [
-            ((|_, output| -output) as fn(f64, f64) -> f64, "one of the two counts backward"),
-            (|_, output| output.to_degrees(), "--columns output=NAME:deg"),
-            (|_, output| output.to_radians(), "--columns generator=NAME:deg"),
-            (|_, output| 95.0 / 61.0 * output, "turns 1.5"),
-        ] {
-            let said = read(output).unwrap_err().to_string();
-            assert!(said.contains(hint) && said.contains("the table's ratio 95, allowed: 1"), "{said}");
+        let right = read(|_, output| output).unwrap();
+        for output in [(|_, output| -output) as fn(f64, f64) -> f64, |_, output| output.to_degrees()] {
+            let put_right = read(output).unwrap();
+            assert!(put_right.iter().zip(&right).all(|(a, b)| (a.error_arcsec - b.error_arcsec).abs() < 1e-6));
+        }
+        for (ratio, said) in [(61.0, "asks for 0.010526"), (101.0, "found 95, but the generator turns 101.0")] {
+            let row = |k: u32| format!("{},{}\n", 0.7 * f64::from(k), 0.7 * f64::from(k) / ratio);
+            let rows: String = (0..190).map(row).collect();
+            let text = format!("generator_rad,output_rad\n{rows}");
+            let refused = parse("m.csv", text.as_bytes(), 95.0, 20.0).unwrap_err().to_string();
+            assert!(refused.contains(said), "{refused}");
+        }
+    }
+
+    /// A torque that no drive bears is refused, a value that is missing is left out.
+    #[test]
+    fn a_torque_in_another_unit_is_refused_and_rows_without_a_value_are_left_out() {
+        let text = |torque: f64, cell: &str| {
+            let row = |k: u32| {
+                let psi = 0.3 * f64::from(k);
+                let output = if k == 40 { cell.to_owned() } else { (psi / 95.0 + 1e-5 * psi.sin()).to_string() };
+                format!("{psi},{output},{}\n", torque * (0.05 * f64::from(k)).sin())
+            };
+            "generator_rad,output_rad,torque_n_m\n".to_owned() + &(0..200).map(row).collect::<String>()
+        };
+        let refused = parse("m.csv", text(5e4, "0.126").as_bytes(), 95.0, 20.0).unwrap_err();
+        assert!(refused.line == Some(2) && refused.what.contains("10000 N.m is the most"), "{refused}");
+        for cell in ["", "1e400"] {
+            assert_eq!(parse("m.csv", text(5.0, cell).as_bytes(), 95.0, 20.0).unwrap().len(), 199, "{cell}");
         }
     }
 
@@ -371,8 +403,9 @@ mod tests {
             ("generator_rad,generator_rad,output_rad\n1,1,1\n", "generator_rad is there twice"),
             ("generator_rad,output_rad\n", "no rows"),
             ("generator_rad,output_rad\n1\n", "no rows after the header"),
+            ("generator_rad,output_rad\n1,0.01\n", "1 row after the header; at least 2 are needed"),
             ("generator_rad,output_rad\n1,abc\n", "output_rad: found \"abc\""),
-            ("generator_rad,output_rad\n1,nan\n", "output_rad: nothing is recorded"),
+            ("generator_rad,output_rad\n1,nan\n2,0\n", "1 rows have all that is needed"),
             ("generator_rad,output_rad\n1e12,0\n", "generator_rad: found \"1e12\""),
         ] {
             let error = parse("m.csv", text.as_bytes(), 95.0, 20.0).unwrap_err().to_string();

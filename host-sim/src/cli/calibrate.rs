@@ -15,7 +15,7 @@ use flexspline_identify::calibrate::{
     Bench, Calibrated, Calibration, CalibrationError, Planned, Prior, calibrate, one_in, plan,
 };
 use flexspline_identify::extension::Model;
-use flexspline_identify::measurement::read;
+use flexspline_identify::known_rows::read_known;
 use flexspline_mechanics::drive::GeneratorKind;
 use flexspline_report::calibration_report;
 
@@ -152,8 +152,11 @@ impl Calibrate {
         if let Some(option) = self.bench.said().filter(|_| !self.more) {
             return Err(Failure::BadInput(format!("{option}: allowed with --plan or --more")));
         }
-        let gear = prior.nominal.gear();
-        let files = self.logs.iter().map(|file| read(file, &map, &gear)).collect::<Result<Vec<_>, _>>();
+        let files = self
+            .logs
+            .iter()
+            .map(|file| read_known(file, &map, &prior.nominal, prior.table))
+            .collect::<Result<Vec<_>, _>>();
         let files = files.map_err(|error| Failure::BadInput(error.to_string()))?;
         let out = context.out()?;
         if !self.no_report {

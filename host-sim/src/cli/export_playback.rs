@@ -12,7 +12,7 @@ use super::logs::LogOptions;
 use super::replay::measured;
 use super::{Failure, say};
 use flexspline_base::output::Outputs;
-use flexspline_identify::replay::replay;
+use flexspline_identify::replay::{RowsRead, replay};
 use flexspline_playback::{
     BOTH, Cfs, Cnc, CompType, DataFigures, Eqmod, EqmodMount, FEWEST_ROWS, Fprime, LinuxCnc, MAX_TABLE_BYTES,
     MAX_TRIPLETS, ModelFigures, Moteus, Nc, OnStepX, Origin, Player, Refusal, Ros2, Section, Written, core_on_model,
@@ -315,7 +315,8 @@ impl PlaybackOptions {
         player: Option<&dyn Player>,
         notes: &mut Vec<String>,
     ) -> Result<Option<DataFigures>, Failure> {
-        let rows = measured(data, &self.logs, table, temperature_c)?;
+        let RowsRead { rows, faults, notes: noticed } = measured(data, &self.logs, table, temperature_c)?;
+        notes.extend(faults.into_iter().map(|fault| fault.what).chain(noticed));
         let (replayed, _) = replay(table, &rows);
         let figures = on_data(table, torque_n_m, &rows, &replayed, player)?;
         if figures.rows < FEWEST_ROWS {

@@ -54,9 +54,4 @@ impl LogOptions {
         ];
         given.into_iter().find(|(_, given)| *given).map(|(option, _)| option)
     }
-
-    /// Whether anything is said.
-    pub(super) fn said(&self) -> bool {
-        !self.columns.is_empty() || self.rate.is_some()
-    }
 }

@@ -275,8 +275,8 @@ impl Command {
             return Ok(());
         }
         context.keep_files_named();
-        let places = self.writes().iter().map(|name| context.out_path().join(name));
-        places.map(|place| replaces_none_kept(&place)).collect::<Result<(), OutputError>>().map_err(Failure::from)
+        let mut places = self.writes().iter().map(|name| context.out_path().join(name));
+        places.try_for_each(|place| replaces_none_kept(&place)).map_err(Failure::from)
     }
 
     /// Files that it writes whatever is asked of it, of commands that may read one of such a name.

@@ -9,10 +9,7 @@ use super::context::{Context, image_file, quoted};
 use super::logs::LogOptions;
 use super::{Failure, say};
 use flexspline_base::output::Outputs;
-use flexspline_base::units::ARCSEC_PER_RAD;
-use flexspline_identify::measurement::{self, ColumnMap};
-use flexspline_identify::nominal::Nominal;
-use flexspline_identify::replay::{MeasuredRow, ReplaySummary, RowsOf, parse, replay};
+use flexspline_identify::replay::{ReplaySummary, RowsOf, RowsRead, read, replay};
 use flexspline_mechanics::drive::GeneratorKind;
 
 /// Run the core over measured rows, open loop, and show the residual
@@ -57,8 +54,9 @@ impl Replay {
         self.check_rows(rows_of.as_ref(), &table)?;
         // Found out before the rows are read.
         context.out()?;
-        let rows = measured(&self.data, &self.logs, &table, self.temperature_c)?;
+        let RowsRead { rows, faults, notes } = measured(&self.data, &self.logs, &table, self.temperature_c)?;
         let (replayed, mut summary) = replay(&table, &rows);
+        (summary.data_faults, summary.notes) = (faults, notes);
         summary.command.clone_from(&context.command);
         summary.of_rows(rows_of, &table);
         let out = context.out()?;
@@ -94,39 +92,23 @@ impl Replay {
     }
 }
 
-/// The rows of a file with our own columns, or of a log whose columns are said.
+/// The rows of a log, checked as those of a diagnosis.
 pub(super) fn measured(
     data: &Path,
     logs: &LogOptions,
     table: &Table<'_>,
     temperature_c: f64,
-) -> Result<Vec<MeasuredRow>, Failure> {
-    if logs.said() {
-        return of_log(data, &logs.map()?, table, temperature_c);
-    }
+) -> Result<RowsRead, Failure> {
     let bytes = std::fs::read(data).map_err(|error| Failure::BadInput(format!("{}: {error}", data.display())))?;
-    parse(&data.display().to_string(), &bytes, table.drive().exact_ratio(), temperature_c)
+    read(&data.display().to_string(), &bytes, &logs.map()?, table, temperature_c)
         .map_err(|error| Failure::BadInput(error.to_string()))
 }
 
-/// The rows of a log with columns of its own, checked as those of a diagnosis.
-fn of_log(data: &Path, map: &ColumnMap, table: &Table<'_>, temperature_c: f64) -> Result<Vec<MeasuredRow>, Failure> {
-    let recording = measurement::read(data, map, &Nominal::of_table(table).gear())
-        .map_err(|error| Failure::BadInput(error.to_string()))?;
-    let at = |column: &Option<Vec<f64>>, k: usize, usual: f64| column.as_ref().map_or(usual, |values| values[k]);
-    let rows = recording.sessions.iter().flat_map(|session| {
-        (0..session.len()).map(move |k| MeasuredRow {
-            generator_rad: session.generator_rad[k],
-            error_arcsec: session.error_rad[k] * ARCSEC_PER_RAD,
-            torque_n_m: at(&session.torque_n_m, k, 0.0),
-            temperature_c: at(&session.temperature_c, k, temperature_c),
-        })
-    });
-    Ok(rows.collect())
-}
-
 fn text(summary: &ReplaySummary, out: &std::path::Path) -> String {
-    let remarks: String = summary.remarks.iter().map(|remark| format!("remark: {remark}\n")).collect();
+    let faults = summary.data_faults.iter().map(|fault| format!("data fault: {}\n", fault.what));
+    let notes = summary.notes.iter().map(|note| format!("note: {note}\n"));
+    let remarks = summary.remarks.iter().map(|remark| format!("remark: {remark}\n"));
+    let remarks: String = faults.chain(notes).chain(remarks).collect();
     format!(
         "table {}, {} rows, {}\n{remarks}  error as measured, rms              {:>12.3} arcsec\n  left by the table, \
          rms             {:>12.3} arcsec\n  left by the table, largest         {:>12.3} arcsec\n  zero of the output, \

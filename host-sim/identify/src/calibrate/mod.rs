@@ -390,8 +390,7 @@ impl Calibrated {
 }
 
 /// Refuses a ratio that the rows contradict; says where they doubt it.
-fn check_ratio(files: &[Recording], prior: &Prior<'_>) -> Result<Option<String>, CalibrationError> {
-    let ratio = prior.nominal.ratio;
+pub(crate) fn check_ratio(files: &[Recording], ratio: f64) -> Result<Option<String>, CalibrationError> {
     let (mut xx, mut xe, mut ee) = (0.0, 0.0, 0.0);
     for session in files.iter().flat_map(|file| &file.sessions) {
         let count = session.len().max(1) as f64;
@@ -458,7 +457,7 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
         files
     };
     prior.core_drive().map_err(CalibrationError::Known)?;
-    let said: Vec<String> = check_ratio(files, prior)?.into_iter().collect();
+    let said: Vec<String> = check_ratio(files, prior.nominal.ratio)?.into_iter().collect();
     let mut recorded = Recorded::of(files, prior);
     let play_rad = prior.nominal.backlash_arcsec / ARCSEC_PER_RAD;
     let mut rows = settled(files, prior, &recorded, play_rad);

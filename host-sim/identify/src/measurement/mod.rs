@@ -184,7 +184,17 @@ pub(crate) fn read_degrees(path: &Path, columns: &ColumnMap, gear: &Gear) -> Res
 
 /// Reads measured data from `source`, a file called `file`.
 pub fn parse(file: &str, source: impl Read, columns: &ColumnMap, gear: &Gear) -> Result<Recording, MeasuredError> {
-    parse_as(file, source, columns, gear, 1.0)
+    parse_as(file, source, columns, gear, (1.0, FEWEST_ROWS))
+}
+
+/// [`parse`] of two rows and more, for whoever plays a table over them.
+pub(crate) fn parse_few(
+    file: &str,
+    source: impl Read,
+    columns: &ColumnMap,
+    gear: &Gear,
+) -> Result<Recording, MeasuredError> {
+    parse_as(file, source, columns, gear, (1.0, 2))
 }
 
 /// [`parse`] as [`read_degrees`] reads.
@@ -194,22 +204,22 @@ pub(crate) fn parse_degrees(
     columns: &ColumnMap,
     gear: &Gear,
 ) -> Result<Recording, MeasuredError> {
-    parse_as(file, source, columns, gear, Unit::Degree.factor())
+    parse_as(file, source, columns, gear, (Unit::Degree.factor(), FEWEST_ROWS))
 }
 
-/// The same with both angles times `angle_scale`.
+/// The same with both angles times `angle_scale`, of at least `fewest` rows.
 fn parse_as(
     file: &str,
     source: impl Read,
     columns: &ColumnMap,
     gear: &Gear,
-    angle_scale: f64,
+    (angle_scale, fewest): (f64, usize),
 ) -> Result<Recording, MeasuredError> {
     let refuse = |what: String| MeasuredError { file: file.to_owned(), line: None, what };
     if gear.ratio == 0.0 || !gear.ratio.is_finite() {
         return Err(refuse(format!("ratio: found {}, allowed: a finite number other than zero", gear.ratio)));
     }
-    let (mut log, found) = log::read(file, source, columns, gear.ratio, FEWEST_ROWS)?;
+    let (mut log, found) = log::read(file, source, columns, gear.ratio, fewest)?;
     let rows = log.len();
     let mut findings = Findings { notes: found.notes, ..Findings::default() };
     if let Some(line) = found.broken_off {
@@ -251,7 +261,7 @@ fn parse_as(
     faults::clock::check(&mut log, &mut findings);
     let recorded = recorded(&log);
     faults::missing::leave_out(&mut log, &mut findings);
-    enough(&log, &recorded).map_err(refuse)?;
+    enough(&log, &recorded, fewest).map_err(refuse)?;
     faults::wrap::unwrap(&mut log, &found.columns, gear.ratio, &mut findings);
     faults::leaps::check(&mut log, gear, &mut findings);
     faults::units::check(&mut log, &found.columns, gear, &mut findings).map_err(refuse)?;
@@ -286,44 +296,6 @@ fn parse_as(
     Ok(Recording { file: file.to_owned(), rows, sessions, faults, tooth_steps, notes, unusable: None })
 }
 
-/// Rows as they stand in a file of this project's own columns, nothing corrected: for those who play a table over them.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct PlainRows {
-    pub generator_rad: Vec<f64>,
-    pub error_rad: Vec<f64>,
-    pub torque_n_m: Option<Vec<f64>>,
-    pub temperature_c: Option<Vec<f64>>,
-}
-
-/// Reads the rows of a file as they stand, by this project's own names.
-///
-/// # Errors
-/// It cannot be read, a column is missing or misspelt, or a row lacks a value.
-pub(crate) fn plain_rows(file: &str, source: impl Read, ratio: f64) -> Result<PlainRows, MeasuredError> {
-    let (mut log, found) = log::read(file, source, &ColumnMap::default(), ratio, 1)?;
-    let refuse = |line: u64, what: String| MeasuredError { file: file.to_owned(), line: Some(line), what };
-    for column in &found.columns {
-        let values = log.get(column.quantity).unwrap_or_default();
-        if let Some(row) = values.iter().position(|value| !value.is_finite()) {
-            let what = format!("{}: nothing is recorded, allowed: a finite number below 1e9", column.name);
-            return Err(refuse(log.line[row], what));
-        }
-    }
-    let generator_rad = log.take(Quantity::Generator).unwrap_or_default();
-    let error_rad = match log.take(Quantity::Output) {
-        Some(output) => {
-            output.iter().zip(&generator_rad).map(|(output, generator)| output - generator / ratio).collect()
-        }
-        None => log.take(Quantity::Error).unwrap_or_default(),
-    };
-    Ok(PlainRows {
-        generator_rad,
-        error_rad,
-        torque_n_m: log.take(Quantity::Torque),
-        temperature_c: log.take(Quantity::Temperature),
-    })
-}
-
 /// How many rows have the angles, for whoever finds none that has both.
 fn recorded(log: &Log) -> String {
     let follower = log.output_or_error();
@@ -339,9 +311,9 @@ fn recorded(log: &Log) -> String {
 }
 
 /// Whether enough rows are left, and anything moves in them.
-fn enough(log: &Log, recorded: &str) -> Result<(), String> {
-    if log.len() < FEWEST_ROWS {
-        return Err(format!("{} rows have all that is needed; at least {FEWEST_ROWS} must ({recorded})", log.len()));
+fn enough(log: &Log, recorded: &str, fewest: usize) -> Result<(), String> {
+    if log.len() < fewest {
+        return Err(format!("{} rows have all that is needed; at least {fewest} must ({recorded})", log.len()));
     }
     let constant = |channel| log.get(channel).is_some_and(|values| values.iter().all(|value| *value == values[0]));
     let follower = log.output_or_error();

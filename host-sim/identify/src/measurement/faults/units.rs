@@ -8,7 +8,7 @@ use super::{Findings, span};
 use crate::measurement::columns::{Column, Quantity, Reading, Unit};
 use crate::measurement::fault::{Fault, FaultName, Treatment};
 use crate::measurement::gear::Gear;
-use crate::measurement::log::Log;
+use crate::measurement::log::{FEWEST_ROWS, Log};
 use flexspline_base::robust::{least_and_most, median_of, quantile_of, sampled};
 
 /// The output must have turned by so much, by the generator or by itself, before the ratio is judged: twenty times two
@@ -293,6 +293,10 @@ fn error_size(log: &Log, columns: &[Column]) -> Result<(), String> {
     let (Some(error), Some(generator)) = (log.get(Quantity::Error), log.get(Quantity::Generator)) else {
         return Ok(());
     };
+    // Of fewer rows a straight line leaves nothing.
+    if error.len() < FEWEST_ROWS {
+        return Ok(());
+    }
     // Freed of a straight line in the generator angle, which a wrong ratio gives.
     let pairs: Vec<(f64, f64)> = generator.iter().copied().zip(error.iter().copied()).collect();
     let step = pairs.len().div_ceil(20_000);

@@ -75,7 +75,9 @@ pub(super) fn cell(bytes: &[u8], comma: bool) -> Cell {
         && let Ok(text) = std::str::from_utf8(bytes)
         && let Ok(value) = text.parse::<f64>()
     {
-        return of_value(value);
+        // A number that no float holds is none that is missing.
+        let beyond = value.is_infinite() && bytes.iter().any(u8::is_ascii_digit);
+        return if beyond { Cell::Over } else { of_value(value) };
     }
     let text = String::from_utf8_lossy(bytes);
     odd_cell(text.trim(), comma)
@@ -227,9 +229,20 @@ mod tests {
         for text in ["", " ", "NaN", "-nan", "inf", "N/A", "-", "null", "1.#QNAN"] {
             assert_eq!(cell(text.as_bytes(), false), Cell::Nothing, "{text}");
         }
-        for text in
-            ["OVER", "-Over", "+OL", "9.9E37", "+9.9E+37", "-9.9e37", "9.91E37", "3.4028235e38", "*****", "#NUM!"]
-        {
+        for text in [
+            "OVER",
+            "-Over",
+            "+OL",
+            "1e400",
+            "-1e999",
+            "9.9E37",
+            "+9.9E+37",
+            "-9.9e37",
+            "9.91E37",
+            "3.4028235e38",
+            "*****",
+            "#NUM!",
+        ] {
             assert_eq!(cell(text.as_bytes(), false), Cell::Over, "{text}");
         }
         for text in

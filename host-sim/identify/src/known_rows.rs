@@ -1,0 +1,119 @@
+//! Rows of a drive of which a model or a table is known, read with what the diagnosis says of their units and signs,
+//! which no ratio tells.
+
+use std::path::Path;
+
+use flexspline::Table;
+
+use crate::diagnosis::pipeline::{PipelineError, Subject, parse_rows};
+use crate::measurement::{
+    ColumnMap, FEWEST_ROWS, FaultName, MeasuredError, Quantity, Recording, Treatment, parse_degrees, parse_few,
+};
+use crate::nominal::Nominal;
+use flexspline_mechanics::drive::{Drive, GeneratorKind};
+
+/// Reads a file of rows of a drive with this model, and the table that takes its place where there is one.
+///
+/// # Errors
+/// It cannot be read.
+pub fn read_known(
+    path: &Path,
+    columns: &ColumnMap,
+    nominal: &Nominal,
+    table: Option<&Table<'_>>,
+) -> Result<Recording, MeasuredError> {
+    let file = path.display().to_string();
+    match std::fs::read(path) {
+        Ok(bytes) => parse_known(&file, &bytes, columns, nominal, table),
+        Err(error) => Err(MeasuredError { file, line: None, what: error.to_string() }),
+    }
+}
+
+/// The same of rows that stand in memory.
+///
+/// # Errors
+/// They cannot be read.
+pub fn parse_known(
+    file: &str,
+    bytes: &[u8],
+    columns: &ColumnMap,
+    nominal: &Nominal,
+    table: Option<&Table<'_>>,
+) -> Result<Recording, MeasuredError> {
+    let gear = nominal.gear();
+    let mut read = parse_few(file, bytes, columns, &gear)?;
+    let says_something = !nominal.harmonics.is_empty() || nominal.wind_up_arcsec(1.0) != 0.0;
+    if !says_something || read.rows < FEWEST_ROWS {
+        return Ok(read);
+    }
+    let (nominal, table) = (nominal.clone(), table.copied());
+    // Causes are asked of no drive here: any will do.
+    let (drive, kind) = (Drive::hhd_95(), GeneratorKind::Cam);
+    let asked = match parse_rows(file, bytes, columns, &Subject { nominal, table, model: None, drive, kind }) {
+        Ok(asked) => asked,
+        Err(PipelineError::Read(error)) => return Err(error),
+        Err(_) => return Ok(read),
+    };
+    let told: Vec<_> = asked.faults.into_iter().filter(|fault| !read.faults.contains(fault)).collect();
+    let of = |name: FaultName, channel: Option<Quantity>| {
+        told.iter()
+            .find(|fault| fault.name == name && fault.channel == channel && fault.treatment == Treatment::Repaired)
+    };
+    if of(FaultName::UnitMismatch, None).is_some() {
+        read = parse_degrees(file, bytes, columns, &gear)?;
+    }
+    if let Some(turned) = of(FaultName::TorqueSign, Some(Quantity::Torque)) {
+        let torques = read.sessions.iter_mut().filter_map(|session| session.torque_n_m.as_mut()).flatten();
+        torques.for_each(|torque| *torque = -*torque);
+        read.faults.push(turned.clone());
+    }
+    let unit = |name: FaultName| [FaultName::UnitMismatch, FaultName::TorqueScale].contains(&name);
+    let doubts = told.iter().filter(|fault| fault.channel == Some(Quantity::Torque) && unit(fault.name));
+    read.notes.extend(doubts.map(|fault| format!("`diagnose` doubts the torque, which stays here: {}", fault.what)));
+    Ok(read)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::synthesize::catalogue_drive;
+    use flexspline_base::units::ARCSEC_PER_RAD;
+
+    /// Angles in degrees and a torque that counts the other way are put right and told by a model, and not without one.
+    #[test]
+    fn both_angles_in_degrees_and_a_turned_torque_are_put_right() {
+        let nominal = catalogue_drive();
+        let log = |angle: f64, torque: f64| {
+            let mut random = fastrand::Rng::with_seed(3);
+            let mut flank = 1.0;
+            let mut text = "time_s,generator_rad,output_rad,torque_n_m\n".to_owned();
+            for k in 0..6000 {
+                let (t, psi) = (0.01 * f64::from(k), 0.05 * f64::from(k));
+                let load = 25.0 * (0.9 * t).sin() + 6.0 * (2.3 * t).cos();
+                if load.abs() > nominal.friction_torque_n_m {
+                    flank = load.signum();
+                }
+                let noise = 2.0 * ((0..12).map(|_| random.f64()).sum::<f64>() - 6.0);
+                let play = 0.5 * nominal.backlash_arcsec * flank;
+                let error = nominal.harmonics_arcsec(psi) + nominal.wind_up_arcsec(load) + play + noise;
+                let output = psi / nominal.ratio + error / ARCSEC_PER_RAD;
+                text += &format!("{t:.2},{},{},{}\n", angle * psi, angle * output, torque * load);
+            }
+            text
+        };
+        let map = ColumnMap::default();
+        let known = |log: String| parse_known("m.csv", log.as_bytes(), &map, &nominal, None).unwrap();
+        let right = known(log(1.0, 1.0));
+        assert_eq!(right.faults, []);
+        for (log, said) in [(log(1f64.to_degrees(), 1.0), "degrees"), (log(1.0, -1.0), "turned round")] {
+            let by_ratio = parse_few("m.csv", log.as_bytes(), &map, &nominal.gear()).unwrap();
+            assert_eq!(by_ratio.faults, []);
+            let read = known(log);
+            assert!(read.faults.len() == 1 && read.faults[0].what.contains(said), "{:?}", read.faults);
+            let (a, b) = (&read.sessions[0], &right.sessions[0]);
+            let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9);
+            assert!(near(&a.error_rad, &b.error_rad) && near(&a.generator_rad, &b.generator_rad));
+            assert_eq!(a.torque_n_m, b.torque_n_m);
+        }
+    }
+}
