@@ -376,6 +376,8 @@ fn lines_left(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> V
         .into_iter()
         .filter(|line| line.power > remainder::line_limit(rows))
         .map(|line| {
+            let fast = remainder::averaged_away(problem, &line);
+            let line = if fast { remainder::at_its_places(problem.on.rows, &every, &line) } else { line };
             // In innovations of variance v a line of amplitude a has the power n a² / 4 v.
             let size = noise.white * rows::rms(&every) * (2.0 * line.power / rows as f64).sqrt();
             (line, size)

@@ -1,5 +1,6 @@
 //! What is left when the causes are in: lines, steps and slow motion that noise does not make.
 
+use std::borrow::Cow;
 use std::f64::consts::PI;
 
 use flexspline_algebra::spectrum;
@@ -8,6 +9,7 @@ use super::candidate::{Acting, Law, Per, together};
 use super::model::{Problem, Scaffold, Term};
 use super::noise::{Noise, Whitener};
 use super::report::Unexplained;
+use super::rows::Rows;
 use super::select::Selected;
 use super::thresholds::remainder::*;
 
@@ -75,16 +77,7 @@ pub(crate) fn lines(problem: &Problem<'_>, innovations: &[f64], highest_order: f
         }),
     );
     if rows.recorded.time {
-        // Gaps between sessions would only make the transform long.
-        let mut time = rows.time.clone();
-        let mut shift = 0.0;
-        for session in &rows.sessions {
-            let (first, last) = (time[session.start], time[session.end - 1]);
-            for t in &mut time[session.clone()] {
-                *t += shift - first;
-            }
-            shift += last - first + 1.0;
-        }
+        let time = time_without_gaps(rows);
         let cell = Some(0.5 * rows.period);
         found.extend(strongest(&time, innovations, SLOWEST_LINE_HZ, 0.5 / rows.period, cell).map(|(f, power)| Line {
             per: Per::Second,
@@ -93,6 +86,48 @@ pub(crate) fn lines(problem: &Problem<'_>, innovations: &[f64], highest_order: f
         }));
     }
     found
+}
+
+/// Time of all sessions one after the other: gaps would only make a transform long.
+fn time_without_gaps(rows: &Rows) -> Vec<f64> {
+    let mut time = rows.time.clone();
+    let mut shift = 0.0;
+    for session in &rows.sessions {
+        let (first, last) = (time[session.start], time[session.end - 1]);
+        for t in &mut time[session.clone()] {
+            *t += shift - first;
+        }
+        shift += last - first + 1.0;
+    }
+    time
+}
+
+/// Frequencies tried between two of a spectrum.
+const PARTS: i32 = 8;
+
+/// A line as it is in each row: between two places of the spectrum, in cells that it turns through, it is up to half as
+/// strong there.
+#[must_use]
+pub(crate) fn at_its_places(rows: &Rows, innovations: &[f64], line: &Line) -> Line {
+    let (places, per) = match line.per {
+        Per::Second => (Cow::Owned(time_without_gaps(rows)), 1.0),
+        Per::GeneratorTurn => (Cow::Borrowed(&rows.generator), 2.0 * PI),
+        Per::OutputTurn => (Cow::Borrowed(&rows.output), 2.0 * PI),
+    };
+    let (low, high) = places.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+    let total: f64 = innovations.iter().map(|v| v * v).sum();
+    let at = |part: i32| -> Line {
+        // The spectrum has two places to a period over all rows.
+        let order = line.order + per * f64::from(part) / f64::from(PARTS) / (2.0 * (high - low).max(f64::MIN_POSITIVE));
+        let [mut cosine, mut sine] = [0.0; 2];
+        for (x, v) in places.iter().zip(innovations) {
+            let (s, c) = (2.0 * PI * order / per * (x - low)).sin_cos();
+            cosine += v * c;
+            sine += v * s;
+        }
+        Line { order, power: (cosine * cosine + sine * sine) / total.max(1e-30), ..line.clone() }
+    };
+    (-PARTS / 2..=PARTS / 2).map(at).max_by(|a, b| a.power.total_cmp(&b.power)).unwrap_or_else(|| line.clone())
 }
 
 /// Whether averaging the rows takes most of a line away.
@@ -175,23 +210,10 @@ fn strongest(places: &[f64], values: &[f64], lowest: f64, highest: f64, cell: Op
     let total: f64 = values.iter().map(|v| v * v).sum();
     let upto = ((highest * step * size as f64) as usize).min(size / 2);
     let from = ((lowest * step * size as f64).ceil() as usize).max(1);
-    let best = (from..upto).max_by(|a, b| spectrum[*a].norm_sqr().total_cmp(&spectrum[*b].norm_sqr()))?;
-    // A line between two places of the spectrum, in cells that it turns through, is up to half as strong there.
-    let at_its_places = |part: i32| -> (f64, f64) {
-        let frequency = (best as f64 + f64::from(part) / f64::from(PARTS)) / (size as f64 * step);
-        let [mut cosine, mut sine] = [0.0; 2];
-        for (x, v) in places.iter().zip(values) {
-            let (s, c) = (2.0 * PI * frequency * (x - low)).sin_cos();
-            cosine += v * c;
-            sine += v * s;
-        }
-        (frequency, (cosine * cosine + sine * sine) / total.max(1e-30))
-    };
-    (-PARTS / 2..=PARTS / 2).map(at_its_places).max_by(|a, b| a.1.total_cmp(&b.1))
+    (from..upto)
+        .map(|k| (k as f64 / (size as f64 * step), spectrum[k].norm_sqr() / total.max(1e-30)))
+        .max_by(|a, b| a.1.total_cmp(&b.1))
 }
-
-/// Frequencies tried between two of a spectrum.
-const PARTS: i32 = 8;
 
 /// Power that a line of white noise reaches once in about 10⁵ spectra of so many rows.
 #[must_use]
