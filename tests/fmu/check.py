@@ -111,11 +111,14 @@ def the_core_is_replayed():
     # Row 0 is before the first tick; row k has tick k, whose generator is where the tick before commanded it.
     with tempfile.TemporaryDirectory() as folder:
         rows = os.path.join(folder, "rows.csv")
+        noise = np.random.default_rng(1).normal(0.0, 1.0, len(result))
         with open(rows, "w", newline="") as file:
             writer = csv.writer(file)
             writer.writerow(["generator_rad", "torque_n_m", "temperature_c", "error_arcsec"])
             for k in range(1, len(result)):
-                writer.writerow([repr(float(result["generator_angle_command"][k - 1])), signals["output_torque"][k - 1], 20.0, 0.0])
+                # As a bench would read it: with noise.
+                error = float(result["transmission_error_predicted"][k]) + noise[k]
+                writer.writerow([repr(float(result["generator_angle_command"][k - 1])), signals["output_torque"][k - 1], 20.0, error])
         command = [FLEXSPLINE, "replay", "-q", "--tables", TABLE, rows, "--out", folder]
         subprocess.run(command, check=True)
         with open(os.path.join(folder, "replay.csv"), newline="") as file:
