@@ -114,7 +114,7 @@ pub(crate) fn at_its_places(rows: &Rows, innovations: &[f64], line: &Line) -> Li
         Per::GeneratorTurn => (Cow::Borrowed(&rows.generator), 2.0 * PI),
         Per::OutputTurn => (Cow::Borrowed(&rows.output), 2.0 * PI),
     };
-    let (low, high) = places.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+    let (low, high) = crate::measurement::least_and_most(places.iter().copied());
     let total: f64 = innovations.iter().map(|v| v * v).sum();
     let at = |part: i32| -> Line {
         // The spectrum has two places to a period over all rows.

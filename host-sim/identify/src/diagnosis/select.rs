@@ -875,10 +875,10 @@ fn with_best_cause<'l>(
     let refined = refined_beside(problem, &others, &open, bests, scope);
     let evidence = |(term, fit): &(Term<'l>, Fit)| fit.solution.evidence + term.occam;
     let (term, fit) = refined.into_iter().max_by(|a, b| evidence(a).total_cmp(&evidence(b)))?;
-    settle(problem, Selected { fit, terms: [others, vec![term]].concat() })
+    settle(problem, Selected { fit, terms: others.into_iter().chain([term]).collect() })
 }
 
-/// Replaces a deviation without a name by two causes that tell the data better and earn it: beside it each of them is
+/// Replaces a deviation without a name by two causes that tell the data no worse and earn it: beside it each of them is
 /// held against all that it may be wrong by, so that none comes in.
 #[allow(clippy::too_many_arguments, reason = "all that a search remembers")]
 fn two_for_unnamed<'l>(
@@ -1001,7 +1001,7 @@ fn exchange<'l>(
         if let Some((term, fit, mut gates)) = best {
             let (law, values) = (term.law, term.values());
             let ahead_by = fit.solution.evidence + term.occam - evidence;
-            let terms = [&others[..], &[term]].concat();
+            let terms = others.into_iter().chain([term]).collect();
             let exchanged = settle(problem, Selected { fit, terms })?;
             // It has to earn the place that it takes.
             let last = exchanged.terms.len() - 1;
