@@ -24,7 +24,7 @@ use criterion::measurement::Measurement;
 use criterion::{BenchmarkGroup, Criterion, criterion_group, criterion_main};
 use flexspline_sim::condense::{
     Block, Cell, CellAt, CellPlacement, CellState, CellTangent, Chain, CondensedWheel, Contribution, DenseKernels,
-    Geometric, Local, rotate_pairs,
+    Geometric, one, one_mut, rotate_pairs,
 };
 use flexspline_sim::contact::{BoreContact, BoreLaw, Configuration, FlankLaw};
 use flexspline_sim::drive::GeneratorKind;
@@ -207,7 +207,6 @@ struct Tangent<'m> {
     reduced: Vec<CellTangent>,
     contributions: Vec<Contribution>,
     chain: Chain,
-    local: Vec<Local>,
 }
 
 impl<'m> Tangent<'m> {
@@ -240,7 +239,6 @@ impl<'m> Tangent<'m> {
         Tangent {
             kernels,
             reduced: vec![CellTangent::default(); cells.len()],
-            local: vec![Local::default(); cells.len()],
             contributions: Vec::new(),
             chain: Chain::default(),
             cells,
@@ -275,15 +273,17 @@ impl<'m> Tangent<'m> {
     /// Forces on flanks and bores to the faces, around the rings, and back. (Forces on the faces themselves, which the
     /// solver adds in between, are left out.)
     fn solve(&mut self, x: &mut [f64]) {
-        let mut side = vec![0.0; self.chain.unknowns()];
+        let mut side = vec![[0.0]; self.chain.unknowns()];
+        let x = one_mut(x);
         let (kernels, order) = (self.kernels, &self.chain);
         let cells = || self.cells.iter().map(|p| CellAt { kernels, cell: p.cell, unknowns: p.unknowns, order });
-        for ((at, tangent), local) in cells().zip(&self.reduced).zip(&mut self.local) {
-            tangent.forward(at, x, &mut side, local);
+        let mut kept: Vec<Vec<[f64; 1]>> = cells().map(|at| vec![[0.0]; at.kept()]).collect();
+        for ((at, tangent), kept) in cells().zip(&self.reduced).zip(&mut kept) {
+            tangent.forward(at, x, &mut side, kept);
         }
         order.solve(&mut side);
-        for ((at, tangent), local) in cells().zip(&self.reduced).zip(&mut self.local) {
-            tangent.backward(at, x, &side, local);
+        for ((at, tangent), kept) in cells().zip(&self.reduced).zip(&mut kept) {
+            tangent.backward(at, x, &side, kept);
         }
     }
 }
@@ -297,7 +297,7 @@ impl TurningFrame {
         let quarter: Vec<f64> = inner.q.chunks_exact(2).flat_map(|q| [-q[1], q[0]]).collect();
         let [force, turned] = [&inner.q, &quarter].map(|q| {
             let mut product = vec![0.0; q.len()];
-            kernels.multiply_add(&cell.stiffness, q, 1.0, &mut product);
+            kernels.multiply_add(&cell.stiffness, one(q), 1.0, one_mut(&mut product));
             product
         });
         let (g, c) = cell.frame.geometric(&inner, &force, &turned);

@@ -137,39 +137,27 @@ impl Chain {
         self.offsets[block]
     }
 
-    /// Solves in place for right-hand sides, one after the other.
-    pub fn solve(&self, sides: &mut [f64]) {
-        if self.unknowns == 0 {
-            return;
-        }
-        assert_eq!(sides.len() % self.unknowns, 0);
+    /// Solves in place for W right-hand sides.
+    pub fn solve<const W: usize>(&self, x: &mut [[f64; W]]) {
+        assert_eq!(x.len(), self.unknowns);
         let end = |block: u32| self.offsets.get(block as usize + 1).copied().unwrap_or(self.unknowns);
         let range = |block: u32| self.offsets[block as usize]..end(block);
         let mut later = Vec::new();
-        let mut own = Vec::new();
         for panel in &self.panels {
-            for x in sides.chunks_exact_mut(self.unknowns) {
-                own.clear();
-                own.extend_from_slice(&x[range(panel.block)]);
-                later.clear();
-                later.resize(panel.order - panel.size, 0.0);
-                self.kernels.forward(self.values(panel), panel.order, panel.size, panel.sign, &mut own, &mut later);
-                x[range(panel.block)].copy_from_slice(&own);
-                let mut rest = later.as_slice();
-                for &b in &panel.later {
-                    let (part, others) = rest.split_at(range(b).len());
-                    x[range(b)].iter_mut().zip(part).for_each(|(x, g)| *x += g);
-                    rest = others;
-                }
+            later.clear();
+            later.resize(panel.order - panel.size, [0.0; W]);
+            let shape = [panel.order, panel.size];
+            self.kernels.forward(self.values(panel), shape, panel.sign, &mut x[range(panel.block)], &mut later);
+            let to = panel.later.iter().flat_map(|b| range(*b));
+            for (at, gained) in to.zip(&later) {
+                x[at].iter_mut().zip(gained).for_each(|(x, g)| *x += g);
             }
         }
         for panel in self.panels.iter().rev() {
-            for x in sides.chunks_exact_mut(self.unknowns) {
-                later.clear();
-                panel.later.iter().for_each(|b| later.extend_from_slice(&x[range(*b)]));
-                let own = &mut x[range(panel.block)];
-                self.kernels.backward(self.values(panel), panel.order, panel.size, panel.sign, own, &later);
-            }
+            later.clear();
+            panel.later.iter().for_each(|b| later.extend_from_slice(&x[range(*b)]));
+            let shape = [panel.order, panel.size];
+            self.kernels.backward(self.values(panel), shape, panel.sign, &mut x[range(panel.block)], &later);
         }
     }
 
@@ -213,6 +201,7 @@ fn add_block_matrix(front: &mut [f64], m: usize, source: &Contribution, blocks: 
 
 #[cfg(test)]
 mod tests {
+    use super::super::dense::one_mut;
     use super::*;
 
     /// A closed ring of blocks of both signs, every contribution over three neighbours.
@@ -247,7 +236,7 @@ mod tests {
         assert!(chain.factorise(&blocks, &contributions));
         let b: Vec<f64> = (0..chain.unknowns()).map(|i| (i as f64 * 1.7).sin()).collect();
         let mut x = b.clone();
-        chain.solve(&mut x);
+        chain.solve(one_mut(&mut x));
         let mut residual: Vec<f64> = b.iter().map(|b| -b).collect();
         for c in &contributions {
             let index: Vec<usize> =

@@ -32,39 +32,72 @@ impl DenseKernels {
     }
 
     /// Solves with an eliminated panel (the first p columns of the front): `x` becomes `L^-1 x`, `rest` loses
-    /// `sign P L^-1 x`.
-    pub fn forward(self, panel: &[f64], m: usize, p: usize, sign: f64, x: &mut [f64], rest: &mut [f64]) {
+    /// `sign P L^-1 x`. As everywhere below W right-hand sides lie beside one another: what is read of a matrix serves
+    /// for all of them.
+    pub fn forward<const W: usize>(
+        self,
+        panel: &[f64],
+        [m, p]: [usize; 2],
+        sign: f64,
+        x: &mut [[f64; W]],
+        rest: &mut [[f64; W]],
+    ) {
         assert!(panel.len() >= m * p && x.len() == p && rest.len() == m - p);
         self.0.dispatch(Forward { panel, m, p, sign, x, rest });
     }
 
     /// The other way: `x` (as [`DenseKernels::forward`] left it) becomes the solution, `rest` being solved.
-    pub fn backward(self, panel: &[f64], m: usize, p: usize, sign: f64, x: &mut [f64], rest: &[f64]) {
+    pub fn backward<const W: usize>(
+        self,
+        panel: &[f64],
+        [m, p]: [usize; 2],
+        sign: f64,
+        x: &mut [[f64; W]],
+        rest: &[[f64; W]],
+    ) {
         assert!(panel.len() >= m * p && x.len() == p && rest.len() == m - p);
         self.0.dispatch(Backward { panel, m, p, sign, x, rest });
     }
 
     /// `y += sign A x` for a column-major matrix with `y.len()` rows.
-    pub fn multiply_add(self, a: &[f64], x: &[f64], sign: f64, y: &mut [f64]) {
+    pub fn multiply_add<const W: usize>(self, a: &[f64], x: &[[f64; W]], sign: f64, y: &mut [[f64; W]]) {
         assert!(a.len() >= y.len() * x.len());
         self.0.dispatch(Multiply { a, x, sign, y });
     }
 
     /// `y += sign A^T x` for a column-major matrix with `x.len()` rows.
-    pub(crate) fn multiply_transposed_add(self, a: &[f64], x: &[f64], sign: f64, y: &mut [f64]) {
+    pub(crate) fn multiply_transposed_add<const W: usize>(
+        self,
+        a: &[f64],
+        x: &[[f64; W]],
+        sign: f64,
+        y: &mut [[f64; W]],
+    ) {
         assert!(a.len() >= x.len() * y.len());
         self.0.dispatch(MultiplyTransposed { a, x, sign, y });
     }
 }
 
+/// One right-hand side.
+#[inline]
+pub fn one(x: &[f64]) -> &[[f64; 1]] {
+    x.as_chunks().0
+}
+
+/// The same, to write.
+#[inline]
+pub fn one_mut(x: &mut [f64]) -> &mut [[f64; 1]] {
+    x.as_chunks_mut().0
+}
+
 /// A kernel as a value: the calls of a closure are not always inlined, and then not compiled for the vector unit.
 macro_rules! kernel {
-    ($name:ident { $($field:ident: $type:ty),* } -> $output:ty, $body:block) => {
-        struct $name<'a> {
+    ($name:ident $(<$sides:ident>)? { $($field:ident: $type:ty),* } -> $output:ty, $body:block) => {
+        struct $name<'a $(, const $sides: usize)?> {
             $($field: $type),*
         }
 
-        impl NullaryFnOnce for $name<'_> {
+        impl<$(const $sides: usize)?> NullaryFnOnce for $name<'_ $(, $sides)?> {
             type Output = $output;
 
             #[inline(always)]
@@ -78,35 +111,44 @@ macro_rules! kernel {
 
 kernel!(Eliminate { front: &'a mut [f64], m: usize, p: usize, sign: f64 } -> bool, { eliminate(front, m, p, sign) });
 
-kernel!(Forward { panel: &'a [f64], m: usize, p: usize, sign: f64, x: &'a mut [f64], rest: &'a mut [f64] } -> (), {
+kernel!(Forward<W> {
+    panel: &'a [f64], m: usize, p: usize, sign: f64, x: &'a mut [[f64; W]], rest: &'a mut [[f64; W]]
+} -> (), {
     for k in 0..p {
         let column = &panel[k * m..(k + 1) * m];
-        let y = x[k] / column[k];
+        let y = x[k].map(|x| x / column[k]);
         x[k] = y;
-        subtract(&mut x[k + 1..], &column[k + 1..p], y);
-        subtract(rest, &column[p..], sign * y);
+        subtract_sides(&mut x[k + 1..], &column[k + 1..p], y);
+        subtract_sides(rest, &column[p..], y.map(|y| sign * y));
     }
 });
 
-kernel!(Backward { panel: &'a [f64], m: usize, p: usize, sign: f64, x: &'a mut [f64], rest: &'a [f64] } -> (), {
+kernel!(Backward<W> {
+    panel: &'a [f64], m: usize, p: usize, sign: f64, x: &'a mut [[f64; W]], rest: &'a [[f64; W]]
+} -> (), {
     for k in (0..p).rev() {
         let column = &panel[k * m..(k + 1) * m];
-        let known = dot(&column[p..], rest);
+        let known = dot_sides(&column[p..], rest);
         // x holds the unsigned forward result from k up to here, the solution beyond.
-        let later = dot(&column[k + 1..p], &x[k + 1..]);
-        x[k] = (sign * (x[k] - known) - later) / column[k];
+        let later = dot_sides(&column[k + 1..p], &x[k + 1..]);
+        for w in 0..W {
+            x[k][w] = (sign * (x[k][w] - known[w]) - later[w]) / column[k];
+        }
     }
 });
 
-kernel!(Multiply { a: &'a [f64], x: &'a [f64], sign: f64, y: &'a mut [f64] } -> (), {
+kernel!(Multiply<W> { a: &'a [f64], x: &'a [[f64; W]], sign: f64, y: &'a mut [[f64; W]] } -> (), {
     for (column, x) in a.chunks_exact(y.len().max(1)).zip(x) {
-        subtract(y, column, -sign * x);
+        subtract_sides(y, column, x.map(|x| -sign * x));
     }
 });
 
-kernel!(MultiplyTransposed { a: &'a [f64], x: &'a [f64], sign: f64, y: &'a mut [f64] } -> (), {
+kernel!(MultiplyTransposed<W> { a: &'a [f64], x: &'a [[f64; W]], sign: f64, y: &'a mut [[f64; W]] } -> (), {
     for (column, y) in a.chunks_exact(x.len().max(1)).zip(y) {
-        *y += sign * dot(column, x);
+        let product = dot_sides(column, x);
+        for w in 0..W {
+            y[w] += sign * product[w];
+        }
     }
 });
 
@@ -117,18 +159,37 @@ fn subtract(y: &mut [f64], x: &[f64], factor: f64) {
     }
 }
 
-/// Dot product in eight strands, which a vector unit can keep apart.
 #[inline(always)]
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut strands = [0.0; 8];
+fn subtract_sides<const W: usize>(y: &mut [[f64; W]], x: &[f64], factor: [f64; W]) {
+    for (y, x) in y.iter_mut().zip(x) {
+        for w in 0..W {
+            y[w] = x.mul_add(-factor[w], y[w]);
+        }
+    }
+}
+
+/// Dot products of a column with W right-hand sides in eight strands, which a vector unit can keep apart.
+#[inline(always)]
+fn dot_sides<const W: usize>(a: &[f64], b: &[[f64; W]]) -> [f64; W] {
+    let mut strands = [[0.0; W]; 8];
     let (mut a8, mut b8) = (a.chunks_exact(8), b.chunks_exact(8));
     for (a, b) in (&mut a8).zip(&mut b8) {
         for i in 0..8 {
-            strands[i] = a[i].mul_add(b[i], strands[i]);
+            for w in 0..W {
+                strands[i][w] = a[i].mul_add(b[i][w], strands[i][w]);
+            }
         }
     }
-    let tail: f64 = a8.remainder().iter().zip(b8.remainder()).map(|(a, b)| a * b).sum();
-    strands.iter().sum::<f64>() + tail
+    let mut sum = [0.0; W];
+    for (a, b) in a8.remainder().iter().zip(b8.remainder()) {
+        for w in 0..W {
+            sum[w] += a * b[w];
+        }
+    }
+    for w in 0..W {
+        sum[w] += strands.iter().map(|strand| strand[w]).sum::<f64>();
+    }
+    sum
 }
 
 #[inline(always)]
@@ -240,16 +301,16 @@ mod tests {
             let mut front = a.clone();
             assert!(kernels.eliminate(&mut front, n, p, sign));
             let (mut first, mut rest) = (b[..p].to_vec(), b[p..].to_vec());
-            kernels.forward(&front, n, p, sign, &mut first, &mut rest);
+            kernels.forward(&front, [n, p], sign, one_mut(&mut first), one_mut(&mut rest));
             // What remains is a positive definite system of its own.
             let q = n - p;
             let mut c: Vec<f64> = (0..q * q).map(|k| front[p + k % q + (p + k / q) * n]).collect();
             if q > 0 {
                 assert!(kernels.eliminate(&mut c, q, q, 1.0));
-                kernels.forward(&c, q, q, 1.0, &mut rest, &mut []);
-                kernels.backward(&c, q, q, 1.0, &mut rest, &[]);
+                kernels.forward(&c, [q, q], 1.0, one_mut(&mut rest), &mut []);
+                kernels.backward(&c, [q, q], 1.0, one_mut(&mut rest), &[]);
             }
-            kernels.backward(&front, n, p, sign, &mut first, &rest);
+            kernels.backward(&front, [n, p], sign, one_mut(&mut first), one(&rest));
             let x: Vec<f64> = first.into_iter().chain(rest).collect();
             for i in 0..n {
                 let ax: f64 = (0..n).map(|j| a[i + j * n] * x[j]).sum();
@@ -272,9 +333,9 @@ mod tests {
         let a: Vec<f64> = (0..13 * 5).map(|i| (i as f64 * 0.7).cos()).collect();
         let x: Vec<f64> = (0..5).map(f64::from).collect();
         let mut y = vec![1.0; 13];
-        kernels.multiply_add(&a, &x, 2.0, &mut y);
+        kernels.multiply_add(&a, one(&x), 2.0, one_mut(&mut y));
         let mut z = vec![0.5; 5];
-        kernels.multiply_transposed_add(&a, &y, -1.0, &mut z);
+        kernels.multiply_transposed_add(&a, one(&y), -1.0, one_mut(&mut z));
         for i in 0..13 {
             let expected = 1.0 + 2.0 * (0..5).map(|j| a[i + 13 * j] * x[j]).sum::<f64>();
             assert!((y[i] - expected).abs() < 1e-13);

@@ -16,6 +16,6 @@ mod tangent;
 
 pub use chain::{Block, Chain, Contribution};
 pub use corotation::{CellState, CoRotation};
-pub use dense::DenseKernels;
+pub use dense::{DenseKernels, one, one_mut};
 pub use model::{Cell, CondensedWheel};
-pub use tangent::{CellAt, CellPlacement, CellTangent, Geometric, Local, Traction, back, rotate_pairs};
+pub use tangent::{CellAt, CellPlacement, CellTangent, Geometric, Traction, back, rotate_pairs, rotate_sides};

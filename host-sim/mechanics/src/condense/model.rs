@@ -7,7 +7,7 @@ use crate::fem::material::PlaneStrain;
 use crate::mesh::WheelMesh;
 
 use super::corotation::CoRotation;
-use super::dense::DenseKernels;
+use super::dense::{DenseKernels, one, one_mut};
 use super::skin::Skin;
 use super::superelement::Superelement;
 
@@ -61,7 +61,8 @@ impl Cell {
     fn without_flanks(&self) -> Cell {
         let [f, b, face] = self.unknowns;
         let mut seat = self.seat[f..].to_vec();
-        DenseKernels::default().multiply_transposed_add(&self.flank_coupling, &self.seat[..f], -1.0, &mut seat);
+        let flanks = one(&self.seat[..f]);
+        DenseKernels::default().multiply_transposed_add(&self.flank_coupling, flanks, -1.0, one_mut(&mut seat));
         Cell {
             unknowns: [0, b, face],
             frame: self.frame.without(f / 2),
@@ -93,9 +94,10 @@ impl Cell {
     /// frame.
     pub(crate) fn free_flanks(&self, kernels: DenseKernels, body: &[f64], seat_mm: f64) -> Vec<f64> {
         let mut flanks = vec![0.0; self.flank()];
-        kernels.multiply_add(&self.flank_coupling, body, -1.0, &mut flanks);
+        kernels.multiply_add(&self.flank_coupling, one(body), -1.0, one_mut(&mut flanks));
         if seat_mm != 0.0 {
-            kernels.multiply_add(&self.flank_flexibility, &self.seat[..self.flank()], -seat_mm, &mut flanks);
+            let seat = one(&self.seat[..self.flank()]);
+            kernels.multiply_add(&self.flank_flexibility, seat, -seat_mm, one_mut(&mut flanks));
         }
         flanks
     }
@@ -231,7 +233,7 @@ mod tests {
                 u[2 * node..2 * node + 2].copy_from_slice(x);
             }
             let mut f: Vec<f64> = cell.seat.iter().map(|s| s * seat_mm).collect();
-            DenseKernels::default().multiply_add(&cell.stiffness, &q, 1.0, &mut f);
+            DenseKernels::default().multiply_add(&cell.stiffness, one(&q), 1.0, one_mut(&mut f));
             super::super::tangent::rotate_pairs(&mut f, angle(j).sin_cos());
             unknowns.iter().zip(&f).for_each(|(k, f)| expected[*k as usize] += f);
         }
@@ -280,10 +282,10 @@ mod tests {
         let body: Vec<f64> = (0..whole.bore() + 2 * whole.face()).map(|k| (k as f64).sin()).collect();
         let all: Vec<f64> = whole.free_flanks(kernels, &body, 0.0).into_iter().chain(body.iter().copied()).collect();
         let mut force = vec![0.0; all.len()];
-        kernels.multiply_add(&whole.stiffness, &all, 1.0, &mut force);
+        kernels.multiply_add(&whole.stiffness, one(&all), 1.0, one_mut(&mut force));
         let mut expected = vec![0.0; whole.flank()];
         let mut on_body = vec![0.0; body.len()];
-        kernels.multiply_add(&bare.stiffness, &body, 1.0, &mut on_body);
+        kernels.multiply_add(&bare.stiffness, one(&body), 1.0, one_mut(&mut on_body));
         expected.extend(on_body);
         let scale = expected.iter().fold(0.0_f64, |m, f| m.max(f.abs()));
         assert!(force.iter().zip(&expected).all(|(f, e)| (f - e).abs() < 1e-9 * scale));

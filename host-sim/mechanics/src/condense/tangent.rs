@@ -19,7 +19,7 @@
 use crate::mesh::rotate;
 
 use super::chain::{Chain, Contribution};
-use super::dense::DenseKernels;
+use super::dense::{DenseKernels, one, one_mut};
 use super::model::Cell;
 
 /// Contact of a pair of flanks as this cell sees it: columns of G on its flank nodes, in its frame.
@@ -105,13 +105,18 @@ pub struct CellAt<'a> {
     pub order: &'a Chain,
 }
 
-/// Work space, and what the way forward leaves for the way back.
-#[derive(Debug, Clone, Default)]
-pub struct Local {
-    force: Vec<f64>,
-    body: Vec<f64>,
-    rest: Vec<f64>,
-    yielded: Vec<f64>,
+impl CellAt<'_> {
+    /// Values that the way forward leaves for the way back.
+    pub fn kept(&self) -> usize {
+        2 * (self.cell.flank() + self.cell.bore() + self.cell.face())
+    }
+
+    /// Those of forces, of bore and faces, and of what the flanks yield.
+    fn parts<'v, const W: usize>(&self, kept: &'v mut [[f64; W]]) -> [&'v mut [[f64; W]]; 3] {
+        let (force, others) = kept.split_at_mut(self.cell.flank() + self.cell.bore());
+        let (body, yielded) = others.split_at_mut(self.cell.bore() + 2 * self.cell.face());
+        [force, body, yielded]
+    }
 }
 
 impl CellTangent {
@@ -165,7 +170,7 @@ impl CellTangent {
             }
             yielded.fill(0.0);
             let flexibility = &cell.flank_flexibility[start * f..(start + column.len()) * f];
-            kernels.multiply_add(flexibility, column, 1.0, &mut yielded);
+            kernels.multiply_add(flexibility, one(column), 1.0, one_mut(&mut yielded));
             for (l, &(other, against)) in columns.iter().enumerate().skip(k) {
                 matrix[i + l + (i + k) * n] = -dot(against, &yielded[other..other + against.len()]);
             }
@@ -173,7 +178,7 @@ impl CellTangent {
                 geometric_tractions[k] = -dot(geometric_flank, &yielded);
             }
             let (bore, faces) = follow.split_at_mut(b);
-            kernels.forward(panel, r, b, 1.0, bore, faces);
+            kernels.forward(panel, [r, b], 1.0, one_mut(bore), one_mut(faces));
             for (l, earlier) in self.extra.chunks_exact(b.max(1)).enumerate() {
                 matrix[i + k + (i + l) * n] -= dot(earlier, bore);
             }
@@ -187,12 +192,12 @@ impl CellTangent {
         self.flank_geometric.clear();
         if let Some(Geometric { a, g, c }) = geometric {
             follow.copy_from_slice(&g[f..]);
-            kernels.multiply_transposed_add(&cell.flank_coupling, geometric_flank, -1.0, &mut follow);
+            kernels.multiply_transposed_add(&cell.flank_coupling, one(geometric_flank), -1.0, one_mut(&mut follow));
             yielded.fill(0.0);
-            kernels.multiply_add(&cell.flank_flexibility, geometric_flank, 1.0, &mut yielded);
+            kernels.multiply_add(&cell.flank_flexibility, one(geometric_flank), 1.0, one_mut(&mut yielded));
             let mut c = c - dot(geometric_flank, &yielded);
             let (bore, faces) = follow.split_at_mut(b);
-            kernels.forward(panel, r, b, 1.0, bore, faces);
+            kernels.forward(panel, [r, b], 1.0, one_mut(bore), one_mut(faces));
             for (x, earlier) in geometric_tractions.iter_mut().zip(self.extra.chunks_exact(b.max(1))) {
                 *x -= dot(earlier, bore);
             }
@@ -220,91 +225,111 @@ impl CellTangent {
         if self.panel.is_empty() { &cell.free_body } else { &self.panel }
     }
 
-    /// Brings the forces on flank and bore nodes (`unknowns` of `x`) to faces and tractions (`chain`).
-    pub fn forward(&self, at: CellAt, x: &[f64], chain: &mut [f64], local: &mut Local) {
+    /// Brings the forces on flank and bore nodes (`unknowns` of `x`) to faces and tractions (`chain`). What the way
+    /// back needs of it goes to `kept`, zeros before, [`CellAt::kept`] of them.
+    pub fn forward<const W: usize>(&self, at: CellAt, x: &[[f64; W]], chain: &mut [[f64; W]], kept: &mut [[f64; W]]) {
         let CellAt { kernels, cell, unknowns, order } = at;
         let (f, b, face) = (cell.flank(), cell.bore(), cell.face());
-        let Local { force, body, rest, yielded } = local;
-        force.clear();
-        force.extend(unknowns[..f + b].iter().map(|u| x[*u as usize]));
-        rotate_pairs(force, back(self.frame));
+        let [force, body, yielded] = at.parts(kept);
+        force.iter_mut().zip(unknowns).for_each(|(force, u)| *force = x[*u as usize]);
+        rotate_sides(force, back(self.frame));
         let (flank, bore) = force.split_at_mut(f);
-        body.clear();
-        body.extend_from_slice(bore);
-        body.resize(b + 2 * face, 0.0);
+        body[..b].copy_from_slice(bore);
         kernels.multiply_transposed_add(&cell.flank_coupling, flank, -1.0, body);
-        yielded.clear();
-        yielded.resize(f, 0.0);
         kernels.multiply_add(&cell.flank_flexibility, flank, 1.0, yielded);
         bore.copy_from_slice(&body[..b]);
         let faces = &mut body[b..];
-        kernels.forward(self.panel(cell), b + 2 * face, b, 1.0, bore, faces);
+        kernels.forward(self.panel(cell), [b + 2 * face, b], 1.0, bore, faces);
         // Rows of tractions and geometry.
-        rest.clear();
         let columns = self.tractions.iter().flat_map(|t| t.forces());
-        rest.extend(columns.map(|(start, column)| -dot(column, &yielded[start..start + column.len()])));
+        let on = |(start, column): (usize, &[f64])| dot_sides(column, &yielded[start..start + column.len()]);
+        let mut rest: Vec<[f64; W]> = columns.map(|column| on(column).map(|x| -x)).collect();
         if !self.turn_rate.is_empty() {
-            rest.push(-dot(&self.flank_geometric, yielded));
+            rest.push(dot_sides(&self.flank_geometric, yielded).map(|x| -x));
         }
         for (r, earlier) in rest.iter_mut().zip(self.extra.chunks_exact(b.max(1))) {
-            *r -= dot(earlier, bore);
+            add(r, -1.0, &dot_sides(earlier, bore));
         }
         if let (Some(folded), false) = (rest.last(), self.turn_rate.is_empty()) {
-            faces.iter_mut().zip(&self.turn_rate).for_each(|(x, a)| *x += folded * a);
+            faces.iter_mut().zip(&self.turn_rate).for_each(|(x, a)| add(x, *a, folded));
         }
         for (side, part) in faces.chunks_exact_mut(face).enumerate() {
-            rotate_pairs(part, self.faces[side]);
+            rotate_sides(part, self.faces[side]);
             let to = order.offset(self.blocks[side] as usize);
-            chain[to..to + face].iter_mut().zip(part.iter()).for_each(|(c, x)| *c += x);
+            chain[to..to + face].iter_mut().zip(part.iter()).for_each(|(c, x)| add(c, 1.0, x));
         }
         let mut rest = rest.as_slice();
         for traction in &self.tractions {
             let (own, others) = rest.split_at(traction.rank());
             let to = order.offset(traction.block as usize);
-            chain[to..to + own.len()].iter_mut().zip(own).for_each(|(c, x)| *c += x);
+            chain[to..to + own.len()].iter_mut().zip(own).for_each(|(c, x)| add(c, 1.0, x));
             rest = others;
         }
     }
 
-    /// Displacements of flank and bore nodes, faces and tractions being solved.
-    pub fn backward(&self, at: CellAt, x: &mut [f64], chain: &[f64], local: &mut Local) {
+    /// Displacements of flank and bore nodes, faces and tractions being solved; `kept` as the way forward left it.
+    pub fn backward<const W: usize>(&self, at: CellAt, x: &mut [[f64; W]], chain: &[[f64; W]], kept: &mut [[f64; W]]) {
         let CellAt { kernels, cell, unknowns, order } = at;
         let (f, b, face) = (cell.flank(), cell.bore(), cell.face());
-        let Local { force, body, rest, yielded } = local;
+        let [force, body, yielded] = at.parts(kept);
         for (side, part) in body[b..].chunks_exact_mut(face).enumerate() {
             let from = order.offset(self.blocks[side] as usize);
             part.copy_from_slice(&chain[from..from + face]);
-            rotate_pairs(part, back(self.faces[side]));
+            rotate_sides(part, back(self.faces[side]));
         }
-        rest.clear();
+        let mut rest = Vec::with_capacity(self.extra.len() / b.max(1));
         for traction in &self.tractions {
             let from = order.offset(traction.block as usize);
             rest.extend_from_slice(&chain[from..from + traction.rank()]);
         }
-        let turn = dot(&self.turn_rate, &body[b..b + self.turn_rate.len()]);
+        let turn = dot_sides(&self.turn_rate, &body[b..b + self.turn_rate.len()]);
         if !self.turn_rate.is_empty() {
             rest.push(turn);
         }
         let (flank, bore) = force.split_at_mut(f);
         for (value, earlier) in rest.iter().zip(self.extra.chunks_exact(b.max(1))) {
-            bore.iter_mut().zip(earlier).for_each(|(x, e)| *x -= value * e);
+            bore.iter_mut().zip(earlier).for_each(|(x, e)| add(x, -e, value));
         }
         let (bore_body, faces) = body.split_at_mut(b);
-        kernels.backward(self.panel(cell), b + 2 * face, b, 1.0, bore, faces);
+        kernels.backward(self.panel(cell), [b + 2 * face, b], 1.0, bore, faces);
         bore_body.copy_from_slice(bore);
         // Flanks: yielded - C (G lambda + g turn) - T body.
         flank.copy_from_slice(yielded);
-        yielded.fill(0.0);
-        yielded.iter_mut().zip(&self.flank_geometric).for_each(|(l, g)| *l = turn * g);
+        yielded.fill([0.0; W]);
+        yielded.iter_mut().zip(&self.flank_geometric).for_each(|(l, g)| add(l, *g, &turn));
         let columns = self.tractions.iter().flat_map(|t| t.forces());
         for ((start, column), traction) in columns.zip(rest.iter()) {
-            yielded[start..].iter_mut().zip(column).for_each(|(l, g)| *l += traction * g);
+            yielded[start..].iter_mut().zip(column).for_each(|(l, g)| add(l, *g, traction));
         }
         kernels.multiply_add(&cell.flank_flexibility, yielded, -1.0, flank);
         kernels.multiply_add(&cell.flank_coupling, body, -1.0, flank);
-        rotate_pairs(force, self.frame);
+        rotate_sides(force, self.frame);
         for (u, value) in unknowns.iter().zip(force.iter()) {
             x[*u as usize] = *value;
+        }
+    }
+}
+
+/// Dot products with W right-hand sides.
+#[inline]
+fn dot_sides<const W: usize>(a: &[f64], b: &[[f64; W]]) -> [f64; W] {
+    let mut sum = [0.0; W];
+    a.iter().zip(b).for_each(|(a, b)| add(&mut sum, *a, b));
+    sum
+}
+
+/// `x += factor y`.
+#[inline]
+fn add<const W: usize>(x: &mut [f64; W], factor: f64, y: &[f64; W]) {
+    x.iter_mut().zip(y).for_each(|(x, y)| *x += factor * y);
+}
+
+/// Rotates the vectors of W right-hand sides, x and y in turn.
+#[inline]
+pub fn rotate_sides<const W: usize>(x: &mut [[f64; W]], turn: Turn) {
+    for [x, y] in x.as_chunks_mut().0 {
+        for (x, y) in x.iter_mut().zip(y) {
+            [*x, *y] = rotate([*x, *y], turn);
         }
     }
 }

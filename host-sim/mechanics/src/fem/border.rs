@@ -57,29 +57,37 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 impl BorderedSystem {
-    /// Eliminates the sparse part.
-    pub fn new(factor: &mut (impl Factor + ?Sized), border: &Border) -> Self {
+    /// Eliminates the sparse part, and solves with it for `f` on the way: what a factor reads serves both. Beside the
+    /// system `A^-1 f`, which `complete` takes.
+    pub fn new(factor: &mut (impl Factor + ?Sized), border: &Border, f: &[f64]) -> (Self, Vec<f64>) {
         let m = border.width;
         let n = border.columns.len() / m;
-        let mut solved = border.columns.clone();
+        let mut solved = [&border.columns, f].concat();
         for columns in solved.chunks_mut(MOST_COLUMNS * n) {
             factor.solve(columns, columns.len() / n);
         }
+        let f = solved.split_off(m * n);
         let mut schur = border.corner.clone();
         for i in 0..m {
             for j in 0..m {
                 schur[i * m + j] -= dot(&border.columns[i * n..(i + 1) * n], &solved[j * n..(j + 1) * n]);
             }
         }
-        BorderedSystem { border: border.clone(), solved, schur }
+        (BorderedSystem { border: border.clone(), solved, schur }, f)
     }
 
     /// Solves in place, with the factor it was made with: `f` becomes x, `g` becomes z. False when the small system is
     /// singular.
     #[must_use]
     pub(crate) fn solve(&self, factor: &mut (impl Factor + ?Sized), f: &mut [f64], g: &mut [f64]) -> bool {
-        let n = f.len();
         factor.solve(f, 1);
+        self.complete(f, g)
+    }
+
+    /// Solves in place from `A^-1 f` in place of f.
+    #[must_use]
+    pub(crate) fn complete(&self, f: &mut [f64], g: &mut [f64]) -> bool {
+        let n = f.len();
         for (i, gi) in g.iter_mut().enumerate() {
             *gi -= dot(&self.border.columns[i * n..(i + 1) * n], f);
         }
@@ -93,6 +101,7 @@ impl BorderedSystem {
         }
         true
     }
+
     /// z alone, for f = 0, in place of g.
     #[must_use]
     pub(crate) fn solve_border(&self, g: &mut [f64]) -> bool {
@@ -163,8 +172,9 @@ mod tests {
         let f: Vec<f64> = (0..6).map(|i| f64::from(i) - 2.0).collect();
         let g = [0.7, -0.2];
         let (mut x, mut z) = (f.clone(), g);
-        let system = BorderedSystem::new(&mut factor, &border);
+        let (system, mut at_once) = BorderedSystem::new(&mut factor, &border, &f);
         assert!(system.solve(&mut factor, &mut x, &mut z));
+        assert!(system.complete(&mut at_once, &mut g.clone()) && at_once == x);
         let mut residual = f.iter().map(|v| -v).collect::<Vec<_>>();
         pattern.multiply_add(&values, &x, &mut residual);
         for k in 0..2 {

@@ -11,14 +11,14 @@ use rayon::prelude::*;
 
 use crate::condense::{
     Block, CellAt, CellPlacement, CellState, CellTangent, Chain, CoRotation, CondensedWheel, Contribution,
-    DenseKernels, Geometric, Local, Traction, back, rotate_pairs,
+    DenseKernels, Geometric, Traction, back, one, one_mut, rotate_pairs, rotate_sides,
 };
 use crate::contact::{BorePressure, FlankPair, PairContribution};
 use crate::drive::Side;
 use crate::fem::Factor;
 use crate::fem::element::packed_index;
 use crate::fem::material::PlaneStrain;
-use crate::mesh::{WheelMesh, rotate};
+use crate::mesh::WheelMesh;
 
 use super::newton::ANCHOR;
 use super::problem::Problem;
@@ -198,7 +198,6 @@ pub(super) struct CondensedWheels<'p> {
     factor: Kept,
     /// Pitches by which the state is turned against the one that the factor was made for.
     turned: isize,
-    locals: Vec<Local>,
 }
 
 impl<'p> CondensedWheels<'p> {
@@ -219,7 +218,6 @@ impl<'p> CondensedWheels<'p> {
             flanks: Vec::new(),
             factor: Rc::default(),
             turned: 0,
-            locals: Vec::new(),
         }
     }
 
@@ -263,7 +261,7 @@ impl<'p> CondensedWheels<'p> {
         let state = &self.states[j];
         let quarter: Vec<f64> = state.q.chunks_exact(2).flat_map(|q| [-q[1], q[0]]).collect();
         let mut turned = vec![0.0; quarter.len()];
-        self.kernels.multiply_add(&cell.stiffness, &quarter, 1.0, &mut turned);
+        self.kernels.multiply_add(&cell.stiffness, one(&quarter), 1.0, one_mut(&mut turned));
         let (g, c) = cell.frame.geometric(state, &self.forces[j], &turned);
         let place = CellPlacement {
             frame: mesh.sector_angle(j) + state.turn,
@@ -415,9 +413,25 @@ fn low_rank(stiffness: &[f64]) -> (usize, Vec<f64>) {
 
 impl Factor for CondensedWheels<'_> {
     fn solve(&mut self, columns: &mut [f64], count: usize) {
-        let n = columns.len() / count;
+        match count {
+            1 => self.solve_sides::<1>(columns),
+            2..=4 => self.solve_sides::<4>(columns),
+            _ => self.solve_sides::<8>(columns),
+        }
+    }
+}
+
+impl CondensedWheels<'_> {
+    /// Solves in place for at most W right-hand sides, which lie one after the other in `columns`; within they lie
+    /// beside one another.
+    fn solve_sides<const W: usize>(&mut self, columns: &mut [f64]) {
+        let n = self.unknowns();
+        let mut x = vec![[0.0; W]; n];
+        for (w, column) in columns.chunks_exact(n).enumerate() {
+            x.iter_mut().zip(column).for_each(|(x, value)| x[w] = *value);
+        }
         self.solved.clone_from(&self.live);
-        let CondensedWheels { model, kernels, factor, locals, live, turned, .. } = self;
+        let CondensedWheels { model, kernels, factor, live, turned, .. } = self;
         let factor = factor.as_ref();
         let (fs, cs) = (&model.flexspline, &model.circular_spline);
         // A cell that is near contact now has forces on its flanks, even if it had not where the factor was made.
@@ -428,37 +442,36 @@ impl Factor for CondensedWheels<'_> {
             .chain((0..cs.count()).map(|t| cs.cell(t, factor.live[fs.count() + t] || now(cs_live, t))))
             .map(|(cell, unknowns)| CellAt { kernels: *kernels, cell, unknowns, order: &factor.chain })
             .collect();
-        let unknowns = factor.chain.unknowns();
-        let mut chains = vec![0.0; unknowns * count];
-        locals.resize_with(cells.len() * count, Local::default);
-        for (c, (at, tangent)) in cells.iter().zip(&factor.cells).enumerate() {
-            let sides = columns.chunks_exact(n).zip(chains.chunks_exact_mut(unknowns));
-            for ((x, chain), local) in sides.zip(&mut locals[c * count..]) {
-                tangent.forward(*at, x, chain, local);
+        let mut chain = vec![[0.0; W]; factor.chain.unknowns()];
+        let mut kept = vec![[0.0; W]; cells.iter().map(CellAt::kept).sum()];
+        let mut left = kept.as_mut_slice();
+        for (at, tangent) in cells.iter().zip(&factor.cells) {
+            let (own, others) = left.split_at_mut(at.kept());
+            tangent.forward(*at, &x, &mut chain, own);
+            left = others;
+        }
+        for face in &model.faces {
+            let own = &mut x[face.unknowns.clone()];
+            rotate_sides(own, back(face.turn));
+            let to = &mut chain[factor.chain.offset(face.block)..];
+            for (to, own) in to.iter_mut().zip(own) {
+                to.iter_mut().zip(own).for_each(|(to, x)| *to += *x);
             }
         }
-        for (x, chain) in columns.chunks_exact(n).zip(chains.chunks_exact_mut(unknowns)) {
-            for face in &model.faces {
-                let to = &mut chain[factor.chain.offset(face.block)..];
-                for (c, own) in to.chunks_exact_mut(2).zip(x[face.unknowns.clone()].chunks_exact(2)) {
-                    let own = rotate([own[0], own[1]], back(face.turn));
-                    (c[0], c[1]) = (c[0] + own[0], c[1] + own[1]);
-                }
-            }
+        factor.chain.solve(&mut chain);
+        let mut left = kept.as_mut_slice();
+        for (at, tangent) in cells.iter().zip(&factor.cells) {
+            let (own, others) = left.split_at_mut(at.kept());
+            tangent.backward(*at, &mut x, &chain, own);
+            left = others;
         }
-        factor.chain.solve(&mut chains);
-        for (c, (at, tangent)) in cells.iter().zip(&factor.cells).enumerate() {
-            let sides = columns.chunks_exact_mut(n).zip(chains.chunks_exact(unknowns));
-            for ((x, chain), local) in sides.zip(&mut locals[c * count..]) {
-                tangent.backward(*at, x, chain, local);
-            }
+        for face in &model.faces {
+            let own = &mut x[face.unknowns.clone()];
+            own.copy_from_slice(&chain[factor.chain.offset(face.block)..][..own.len()]);
+            rotate_sides(own, face.turn);
         }
-        for (x, chain) in columns.chunks_exact_mut(n).zip(chains.chunks_exact(unknowns)) {
-            for face in &model.faces {
-                let own = &mut x[face.unknowns.clone()];
-                own.copy_from_slice(&chain[factor.chain.offset(face.block)..][..own.len()]);
-                rotate_pairs(own, face.turn);
-            }
+        for (w, column) in columns.chunks_exact_mut(n).enumerate() {
+            x.iter().zip(column).for_each(|(x, value)| *value = x[w]);
         }
     }
 }
@@ -499,7 +512,7 @@ impl Wheels for CondensedWheels<'_> {
             self.model.flexspline_cell(j, self.live[j], &state.u, &mut d, inner);
             f.clear();
             f.resize(d.len(), 0.0);
-            self.kernels.multiply_add(&cell.stiffness, &inner.q, 1.0, f);
+            self.kernels.multiply_add(&cell.stiffness, one(&inner.q), 1.0, one_mut(f));
             d.copy_from_slice(f);
             cell.frame.balance(inner, &mut d);
             rotate_pairs(&mut d, (fs.skin.mesh.sector_angle(j) + inner.turn).sin_cos());
@@ -515,7 +528,7 @@ impl Wheels for CondensedWheels<'_> {
             self.model.circular_spline_cell(t, live, &state.v, &mut d);
             f.clear();
             f.extend(cell.seat.iter().map(|s| s * self.problem.seat_displacement));
-            self.kernels.multiply_add(&cell.stiffness, &d, 1.0, &mut f);
+            self.kernels.multiply_add(&cell.stiffness, one(&d), 1.0, one_mut(&mut f));
             rotate_pairs(&mut f, self.model.frames[1][t]);
             for (u, f) in unknowns.iter().zip(&f) {
                 force[*u as usize] -= f;
@@ -608,6 +621,30 @@ mod tests {
     use crate::mesh::MeshLevel;
     use crate::stepping::near::configuration;
     use crate::stepping::{Method, SolverSettings};
+
+    /// Right-hand sides that are solved together have the solutions that each has alone.
+    #[test]
+    fn sides_solved_together_are_solved() {
+        let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
+        let problem = Problem::new(&Drive::hhd_95(), GeneratorKind::Cam, 20.0, settings).unwrap();
+        let mut wheels = CondensedWheels::new(&problem, problem.condensed.as_ref().unwrap());
+        let state = problem.starting_shape(0.0);
+        let near = problem.flanks().near_pairs(configuration(&state), 0.1);
+        wheels.prepare(&near, &Vec::new);
+        wheels.assemble(&state, &mut vec![0.0; wheels.unknowns()]);
+        assert!(wheels.factorise(1.0));
+        let n = wheels.unknowns();
+        let sides: Vec<f64> = (0..6 * n).map(|i| (0.7 * i as f64).sin()).collect();
+        let mut alone = sides.clone();
+        alone.chunks_exact_mut(n).for_each(|side| wheels.solve(side, 1));
+        let size = alone.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        for count in [2, 3, 6] {
+            let mut together = sides.clone();
+            together.chunks_exact_mut(count * n).for_each(|part| wheels.solve(part, count));
+            let off = together.iter().zip(&alone).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
+            assert!(size > 0.0 && off < 1e-9 * size, "{count} at once: {off} of {size}");
+        }
+    }
 
     /// A step that was solved without a tooth's flanks moves the tooth alone; following it, the flanks bear no force,
     /// as before.

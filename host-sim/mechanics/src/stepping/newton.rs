@@ -661,6 +661,8 @@ impl<'p> Solver<'p> {
     ///
     /// With `chord` the last tangent serves again.
     fn solve(&mut self, residual: &Residual, chord: bool) -> Option<Step> {
+        // What the forces do without the border, where it was solved with a new factor's own.
+        let mut begun = None;
         if !chord || self.eliminated.is_none() {
             let clock = Instant::now();
             self.eliminated = None;
@@ -673,14 +675,16 @@ impl<'p> Solver<'p> {
                 return None;
             }
             let clock = Instant::now();
-            self.eliminated = Some(Rc::new(BorderedSystem::new(self.wheels.as_mut(), &self.border)));
+            let (system, solved) = BorderedSystem::new(self.wheels.as_mut(), &self.border, &residual.force);
+            self.eliminated = Some(Rc::new(system));
+            begun = Some(solved);
             self.turned = 0;
             self.effort.solution += clock.elapsed();
         }
         let clock = Instant::now();
         let slipping = std::mem::take(&mut self.slipping);
         let forces = NodalField { free: residual.force.clone(), border: residual.border };
-        let solved = slipping.solve(forces, |field| self.solve_symmetric(field));
+        let solved = slipping.solve(forces, |field| self.solve_symmetric(field, begun.take()));
         self.slipping = slipping;
         self.effort.solution += clock.elapsed();
         let NodalField { free, border } = solved?;
@@ -696,11 +700,16 @@ impl<'p> Solver<'p> {
         Some(Step { free, u, v, border })
     }
 
-    /// Solves with the last factor, in place.
-    fn solve_symmetric(&mut self, field: &mut NodalField) -> Option<()> {
+    /// Solves with the last factor, in place; `begun` is what that factor did with the forces when it was made.
+    fn solve_symmetric(&mut self, field: &mut NodalField, begun: Option<Vec<f64>>) -> Option<()> {
         let NodalField { free, border } = field;
+        let system = self.eliminated.clone()?;
+        if let Some(begun) = begun {
+            *free = begun;
+            return system.complete(free, &mut border[..self.border.width]).then_some(());
+        }
         self.turn(free, border, -self.turned);
-        let solved = self.eliminated.as_ref()?.solve(self.wheels.as_mut(), free, &mut border[..self.border.width]);
+        let solved = system.solve(self.wheels.as_mut(), free, &mut border[..self.border.width]);
         self.turn(free, border, self.turned);
         solved.then_some(())
     }
