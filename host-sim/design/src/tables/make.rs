@@ -9,7 +9,7 @@ use thiserror::Error;
 use super::complete::{CompletionError, KNEE_NODES, SheetStiffness};
 use super::info::MadeTable;
 use super::project::{TableError, from_sweep};
-use super::sweep::{SweepError, SweepPlan, SweepProgress, planned_increments};
+use super::sweep::{Sampler, SweepError, SweepPlan, SweepProgress, planned_increments};
 use super::torque_nodes::{NodeChoice, choose_torque_nodes};
 use super::turns::{deviation_increments, sweep_turns};
 use crate::cautions::{LookedAt, rigid_gap_um, room_as_built_arcsec};
@@ -202,6 +202,9 @@ pub fn make(
         let expected = expected.load(Ordering::Relaxed).max(done);
         observe(TableProgress { done, expected, last })
     };
+    let repeating = Drive { as_built: drive.as_built.uniform_part(), ..drive.clone() };
+    let first = plan.temperature_nodes_c[0];
+    let sampler = Sampler::new(&repeating, kind, plan.positions, first, settings.solver, &tell)?;
     let chosen = match &settings.torque_nodes {
         TorqueNodes::Chosen(choice) => {
             let mut choice = *choice;
@@ -209,7 +212,7 @@ pub fn make(
                 // An axis has room for the most that can be asked for, not for more.
                 choice.most = choice.most.min(MOST_NODES - KNEE_NODES);
             }
-            let chosen = choose_torque_nodes(drive, kind, &plan, choice, settings.solver, &tell)?;
+            let chosen = choose_torque_nodes(&repeating, kind, &plan, choice, &sampler)?;
             let nodes = &chosen.torque_nodes_n_m;
             plan.torque_nodes_n_m = settings.sheet.as_ref().map_or(nodes.clone(), |sheet| sheet.with_knees(nodes));
             let nodes = plan.torque_nodes_n_m.len() / 2;
@@ -220,7 +223,7 @@ pub fn make(
         TorqueNodes::Given(_) => None,
     };
     let known = chosen.as_ref().map_or(&[][..], |chosen| &chosen.known);
-    let mut swept = sweep_turns(drive, kind, &plan, known, settings.solver, &tell)?;
+    let mut swept = sweep_turns(drive, kind, &plan, known, &sampler, settings.solver, &tell)?;
     if let Some(chosen) = &chosen {
         swept.work.add(chosen.work);
     }

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::motion::{Motion, settling_pitches};
-use flexspline_mechanics::stepping::{Increment, Problem, SolveError, SolverSettings};
+use flexspline_mechanics::stepping::{Increment, Problem, SolveError, SolverSettings, State};
 
 /// What to sample.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,6 +33,9 @@ pub struct SweepPlan {
 
 /// Share of the drag torque by which the nodes at either side of the jump lie away from it.
 const JUMP_HALF_WIDTH: f64 = 0.05;
+
+/// Share of the drag from which on it is at its limit: what is left is rounding.
+const AT_ITS_LIMIT: f64 = 1.0 - 1e-6;
 
 impl SweepPlan {
     /// The default: one pair of nodes at each end of the dead zone of the drag, from there nine steps to the rated
@@ -157,52 +160,176 @@ fn check_uniform(drive: &Drive) -> Result<(), SweepError> {
     drive.as_built.first_not_uniform().map_or(Ok(()), |field| Err(SweepError::NotUniform { field }))
 }
 
-/// Runs the sweep of one generator; torque of either sign is a chain of its own, from light to heavy. Nodes that are
-/// `known` are not computed again.
+/// Samples torque nodes of a drive that repeats from tooth to tooth, at one temperature. Each node goes its way alone,
+/// from a state under its load, so that they are computed side by side, and come out the same however many at once.
+pub(crate) struct Sampler<'a> {
+    positions: usize,
+    temperature_c: f64,
+    problem: Problem,
+    /// The drive without load.
+    pub unloaded: Loaded,
+    observe: &'a Observer<'a>,
+}
+
+/// The drive under a load, before it settles.
+#[derive(Debug, Clone)]
+pub(crate) struct Loaded {
+    pub torque: f32,
+    state: State,
+    last: Increment,
+}
+
+impl Loaded {
+    fn of(motion: &Motion<'_>, torque: f32) -> Loaded {
+        Loaded { torque, state: motion.state().clone(), last: motion.last().clone() }
+    }
+}
+
+/// A torque node at one temperature.
+#[derive(Debug, Clone)]
+pub(crate) struct KnownNode {
+    pub torque: f32,
+    pub points: Vec<Computed>,
+}
+
+impl<'a> Sampler<'a> {
+    /// A sampler at a temperature.
+    pub fn new(
+        drive: &Drive,
+        kind: GeneratorKind,
+        positions: usize,
+        temperature: f32,
+        settings: SolverSettings,
+        observe: &'a Observer<'a>,
+    ) -> Result<Sampler<'a>, SweepError> {
+        check_uniform(drive)?;
+        let temperature_c = f64::from(temperature);
+        let problem = Problem::new(drive, kind, temperature_c, settings)?;
+        let unloaded = Loaded::of(&Motion::deformed(&problem, 0.0)?, 0.0);
+        Ok(Sampler { positions, temperature_c, problem, unloaded, observe })
+    }
+
+    fn told(&self, motion: &Motion<'_>, work: &mut Work) -> Result<(), SweepError> {
+        let (iterations, torque_n_m) = (motion.last().iterations, motion.state().torque_n_m);
+        work.count(motion.last());
+        match (self.observe)(SweepProgress { iterations, torque_n_m, temperature_c: self.temperature_c }) {
+            ControlFlow::Continue(()) => Ok(()),
+            ControlFlow::Break(()) => Err(SweepError::Stopped),
+        }
+    }
+
+    fn goes_on(&self, from: &Loaded) -> Motion<'_> {
+        Motion::taken_over(&self.problem, from.state.clone(), from.last.clone())
+    }
+
+    /// Brings the load to a torque, from another.
+    pub fn load(&self, from: &Loaded, torque: f32, work: &mut Work) -> Result<Loaded, SweepError> {
+        let mut motion = self.goes_on(from);
+        motion.load(f64::from(torque))?;
+        self.told(&motion, work)?;
+        Ok(Loaded::of(&motion, torque))
+    }
+
+    /// Samples every other position of a pitch in steady motion; then, if what these say asks for it, those between, a
+    /// pitch further. Whether it did.
+    pub fn sample(
+        &self,
+        loaded: &Loaded,
+        asks: impl FnOnce(&[Computed]) -> bool,
+        work: &mut Work,
+    ) -> Result<(KnownNode, bool), SweepError> {
+        let mut motion = self.goes_on(loaded);
+        let step = motion.pitch() / self.positions as f64;
+        while !self.in_motion(motion.last()) && motion.settle_on(step)? {
+            self.told(&motion, work)?;
+        }
+        let others = self.positions.div_ceil(2);
+        let mut points = vec![self.computed(&motion)];
+        let mut asks = Some(asks);
+        for k in 1..self.positions {
+            if k == others && !asks.take().is_none_or(|asks| asks(&points)) {
+                return Ok((KnownNode { torque: loaded.torque, points }, false));
+            }
+            let steps = if k == others && self.positions.is_multiple_of(2) { 3.0 } else { 2.0 };
+            motion.turn(steps * step)?;
+            self.told(&motion, work)?;
+            points.push(self.computed(&motion));
+        }
+        Ok((KnownNode { torque: loaded.torque, points }, true))
+    }
+
+    /// Whether a load that came on has already left the drive as forward motion under it does: without friction only
+    /// the drag of the output remembers the way, and a load that turns the output forward leaves it at its limit.
+    fn in_motion(&self, last: &Increment) -> bool {
+        let drive = &self.problem.drive;
+        drive.flanks.friction_coefficient == 0.0 && last.drag_torque_n_m <= -AT_ITS_LIMIT * drive.output.drag_torque_n_m
+    }
+
+    fn computed(&self, motion: &Motion<'_>) -> Computed {
+        let State { generator_rad, torque_n_m, output_rad, .. } = *motion.state();
+        let (temperature_c, direction) = (self.temperature_c, Direction::Forward);
+        let sample = Sample { generator_rad, torque_n_m, temperature_c, direction, output_rad };
+        Computed { sample, compliance: motion.last().compliance_rad_per_n_m }
+    }
+
+    /// The drive under these loads, which are brought on one after the other.
+    pub fn loaded(&self, torques: &[f32], work: &mut Work) -> Result<Vec<Loaded>, SweepError> {
+        let mut from = self.unloaded.clone();
+        let on = |torque: &f32| {
+            from = self.load(&from, *torque, work)?;
+            Ok(from.clone())
+        };
+        torques.iter().map(on).collect()
+    }
+
+    /// The nodes of these loads.
+    pub fn nodes(&self, loaded: &[Loaded], work: &mut Work) -> Result<Vec<KnownNode>, SweepError> {
+        let sampled = |loaded: &Loaded| {
+            let mut work = Work::default();
+            let (node, _) = self.sample(loaded, |_| true, &mut work)?;
+            Ok((node, work))
+        };
+        let done = loaded.par_iter().with_max_len(1).map(sampled).collect::<Result<Vec<_>, SweepError>>()?;
+        done.iter().for_each(|(_, more)| work.add(*more));
+        Ok(done.into_iter().map(|(node, _)| node).collect())
+    }
+}
+
+/// Runs the sweep of one generator. Torque of either sign comes on from light to heavy. Nodes that are `known` at the
+/// first temperature, that of the `sampler`, are not computed again.
 pub(crate) fn sweep(
     drive: &Drive,
     kind: GeneratorKind,
     plan: &SweepPlan,
     known: &[KnownNode],
+    sampler: &Sampler<'_>,
     settings: SolverSettings,
-    observe: &Observer,
 ) -> Result<Sweep, SweepError> {
-    check_uniform(drive)?;
     let half = Half::of(drive);
+    let drag_n_m = drive.output.drag_torque_n_m;
+    let at = |sampler: &Sampler<'_>, known: &[KnownNode]| {
+        let (mut nodes, mut work) = (known.to_vec(), Work::default());
+        for mut torques in half.chains(plan, drag_n_m) {
+            torques.retain(|torque| known.iter().all(|node| node.torque != *torque));
+            let loaded = sampler.loaded(&torques, &mut work)?;
+            nodes.extend(sampler.nodes(&loaded, &mut work)?);
+        }
+        nodes.sort_by(|a, b| a.torque.total_cmp(&b.torque));
+        let points: Vec<Computed> = nodes.into_iter().flat_map(|node| node.points).collect();
+        Ok((half.complete(&points, drag_n_m), work))
+    };
     // Temperatures are independent of one another; they are put together in their order.
-    let parts = plan
-        .temperature_nodes_c
-        .par_iter()
-        .map(|&temperature| {
-            let problem = Problem::new(drive, kind, f64::from(temperature), settings)?;
-            let mut motion = Motion::deformed(&problem, 0.0)?;
-            let unloaded = motion.state().clone();
-            let mut chain = SweepChain::new(plan, f64::from(temperature), observe);
-            for torques in half.chains(plan, drive.output.drag_torque_n_m) {
-                motion.go_back(unloaded.clone());
-                for torque in torques {
-                    let reused = known.iter().find(|k| k.torque == torque && k.temperature == temperature);
-                    match reused {
-                        Some(known) => chain.points.extend(known.points.iter().copied()),
-                        None => chain.sample(&mut motion, torque)?,
-                    }
-                }
-            }
-            Ok(Sweep {
-                kind,
-                samples: half.complete(&chain.points, drive.output.drag_torque_n_m),
-                work: chain.work,
-                degrees_of_freedom: problem.degrees_of_freedom(),
-                places: 0,
-            })
-        })
-        .collect::<Result<Vec<Sweep>, SweepError>>()?;
-    let joined = parts.into_iter().reduce(|mut all, part| {
-        all.samples.extend(part.samples);
-        all.work.add(part.work);
-        all
-    });
-    Ok(joined.expect("a plan has temperatures"))
+    let of_temperature = |(k, temperature): (usize, &f32)| match k {
+        0 => at(sampler, known),
+        _ => at(&Sampler::new(drive, kind, plan.positions, *temperature, settings, sampler.observe)?, &[]),
+    };
+    let parts = plan.temperature_nodes_c.par_iter().enumerate().map(of_temperature);
+    let parts = parts.collect::<Result<Vec<_>, SweepError>>()?;
+    let mut work = Work::default();
+    parts.iter().for_each(|(_, more)| work.add(*more));
+    let degrees_of_freedom = sampler.problem.degrees_of_freedom();
+    let samples = parts.into_iter().flat_map(|(samples, _)| samples).collect();
+    Ok(Sweep { kind, samples, work, degrees_of_freedom, places: 0 })
 }
 
 /// Increments that a sweep over so many torque nodes on each side of zero takes, about, where so many are known at one
@@ -212,9 +339,9 @@ pub(super) fn planned_increments(drive: &Drive, plan: &SweepPlan, nodes: usize, 
         Half::Forward => 2,
         Half::ForwardLoaded => 1,
     };
-    let settling =
-        (settling_pitches(drive.flanks.friction_coefficient) * plan.positions as f64).ceil().max(1.0) as usize;
-    let at_a_node = 1 + settling + plan.positions;
+    let settling = settling_pitches(drive.flanks.friction_coefficient) * plan.positions as f64;
+    // The first position is where the drive has settled.
+    let at_a_node = settling.ceil() as usize + plan.positions;
     (sides * nodes * plan.temperature_nodes_c.len()).saturating_sub(known) * at_a_node
 }
 
@@ -286,68 +413,6 @@ impl Computed {
     }
 }
 
-/// Points of one node that are there already.
-#[derive(Debug, Clone)]
-pub(crate) struct KnownNode {
-    pub(crate) torque: f32,
-    pub(crate) temperature: f32,
-    pub(crate) points: Vec<Computed>,
-}
-
-/// Samples at one torque after the other, the drive moving on forward.
-pub(crate) struct SweepChain<'a> {
-    plan: &'a SweepPlan,
-    temperature_c: f64,
-    observe: &'a Observer<'a>,
-    points: Vec<Computed>,
-    pub(super) work: Work,
-}
-
-impl<'a> SweepChain<'a> {
-    /// A chain at one temperature.
-    pub fn new(plan: &'a SweepPlan, temperature_c: f64, observe: &'a Observer<'a>) -> Self {
-        SweepChain { plan, temperature_c, observe, points: Vec::new(), work: Work::default() }
-    }
-
-    /// The points so far, which are then forgotten.
-    pub(crate) fn take_points(&mut self) -> Vec<Computed> {
-        std::mem::take(&mut self.points)
-    }
-
-    fn told(&mut self, motion: &Motion<'_>) -> Result<(), SweepError> {
-        let (iterations, torque_n_m) = (motion.last().iterations, motion.state().torque_n_m);
-        self.work.count(motion.last());
-        match (self.observe)(SweepProgress { iterations, torque_n_m, temperature_c: self.temperature_c }) {
-            ControlFlow::Continue(()) => Ok(()),
-            ControlFlow::Break(()) => Err(SweepError::Stopped),
-        }
-    }
-
-    /// Brings the load on, settles, and samples one pitch.
-    pub fn sample(&mut self, motion: &mut Motion<'_>, torque: f32) -> Result<(), SweepError> {
-        let torque_n_m = f64::from(torque);
-        let step = motion.pitch() / self.plan.positions as f64;
-        motion.load(torque_n_m)?;
-        self.told(motion)?;
-        while motion.settle_on(step)? {
-            self.told(motion)?;
-        }
-        for _ in 0..self.plan.positions {
-            motion.turn(step)?;
-            self.told(motion)?;
-            let sample = Sample {
-                generator_rad: motion.state().generator_rad,
-                torque_n_m,
-                temperature_c: self.temperature_c,
-                direction: Direction::Forward,
-                output_rad: motion.state().output_rad,
-            };
-            self.points.push(Computed { sample, compliance: motion.last().compliance_rad_per_n_m });
-        }
-        Ok(())
-    }
-}
-
 /// The mirror image of a sample of a mirror-symmetric drive.
 pub(crate) fn mirror(sample: &Sample) -> Sample {
     Sample {
@@ -365,16 +430,75 @@ pub(crate) fn mirror(sample: &Sample) -> Sample {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use flexspline_mechanics::mesh::MeshLevel;
+    use flexspline_mechanics::stepping::Method;
 
     #[test]
     fn a_drive_that_does_not_repeat_is_not_swept() {
         let mut drive = Drive::hhd_95();
         drive.as_built.circular_spline_eccentricity_um = 1.0;
         let kind = GeneratorKind::Cam;
-        let plan = SweepPlan::for_generator(&drive, kind);
-        let swept = sweep(&drive, kind, &plan, &[], SolverSettings::default(), &|_| ControlFlow::Continue(()));
-        let message = swept.unwrap_err().to_string();
+        let settings = SolverSettings::default();
+        let sampler = Sampler::new(&drive, kind, 8, 20.0, settings, &|_| ControlFlow::Continue(()));
+        let message = sampler.err().unwrap().to_string();
         assert!(message.starts_with("as_built.circular_spline_eccentricity_um: "), "{message}");
+    }
+
+    fn coarse(drive: &Drive, kind: GeneratorKind, positions: usize) -> Sampler<'static> {
+        let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
+        Sampler::new(drive, kind, positions, 20.0, settings, &|_| ControlFlow::Continue(())).unwrap()
+    }
+
+    /// Where a load has come on a frictionless drive stands as it does whenever it passes there; one with friction does
+    /// not, and settles first.
+    #[test]
+    fn a_load_that_came_on_leaves_a_frictionless_drive_in_motion() {
+        for kind in [GeneratorKind::Cam, GeneratorKind::TwoRoller] {
+            let sampler = coarse(&Drive::hhd_95(), kind, 4);
+            let loaded = sampler.load(&sampler.unloaded, 5.0, &mut Work::default()).unwrap();
+            assert!(sampler.in_motion(&loaded.last));
+            let mut motion = sampler.goes_on(&loaded);
+            let at_once = motion.error_arcsec();
+            motion.turn_in(motion.pitch(), 4).unwrap();
+            let a_pitch_on = motion.error_arcsec();
+            println!("{kind}: {at_once:.5} and {a_pitch_on:.5}");
+            assert!((at_once - a_pitch_on).abs() < 1e-3, "{at_once} and {a_pitch_on}");
+        }
+        let mut rough = Drive::hhd_95();
+        rough.flanks.friction_coefficient = 0.08;
+        let sampler = coarse(&rough, GeneratorKind::Cam, 4);
+        assert!(!sampler.in_motion(&sampler.load(&sampler.unloaded, 5.0, &mut Work::default()).unwrap().last));
+    }
+
+    /// All phases of a pitch are sampled, once each, whether their number is even or odd; half of them if no more are
+    /// asked for.
+    #[test]
+    fn every_phase_is_sampled_once() {
+        for positions in [4, 5] {
+            let sampler = coarse(&Drive::hhd_95(), GeneratorKind::Cam, positions);
+            let loaded = sampler.load(&sampler.unloaded, 20.0, &mut Work::default()).unwrap();
+            let step = sampler.goes_on(&loaded).pitch() / positions as f64;
+            let phase = |point: &Computed| (point.sample.generator_rad / step).round() as usize % positions;
+            let (node, whole) = sampler.sample(&loaded, |_| true, &mut Work::default()).unwrap();
+            let mut phases: Vec<usize> = node.points.iter().map(phase).collect();
+            phases.sort_unstable();
+            assert!(whole && phases == (0..positions).collect::<Vec<_>>(), "{phases:?}");
+            let (node, whole) = sampler.sample(&loaded, |_| false, &mut Work::default()).unwrap();
+            let phases: Vec<usize> = node.points.iter().map(phase).collect();
+            assert!(!whole && phases == (0..positions).step_by(2).collect::<Vec<_>>(), "{phases:?}");
+        }
+    }
+
+    #[test]
+    fn nodes_are_the_same_however_many_are_computed_at_once() {
+        let sampler = coarse(&Drive::hhd_95(), GeneratorKind::Cam, 4);
+        let loaded = sampler.loaded(&[1.0, 20.0, 50.0], &mut Work::default()).unwrap();
+        let with = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let nodes = pool.install(|| sampler.nodes(&loaded, &mut Work::default())).unwrap();
+            nodes.into_iter().flat_map(|node| node.points).map(|point| point.sample.output_rad).collect::<Vec<f64>>()
+        };
+        assert_eq!(with(1), with(3));
     }
 
     #[test]

@@ -9,11 +9,11 @@ use flexspline::make::ProjectError;
 use flexspline::{Direction, GeneratorAngle, ImageError, Table, WriteError};
 
 use super::project::{TableError, trial_table};
-use super::sweep::{Computed, KnownNode, Observer, SweepChain, SweepError, SweepPlan, Work, symmetric_nodes};
+use rayon::prelude::*;
+
+use super::sweep::{Computed, KnownNode, Sampler, SweepError, SweepPlan, Work, symmetric_nodes};
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
-use flexspline_mechanics::motion::Motion;
-use flexspline_mechanics::stepping::{Problem, SolverSettings};
 
 /// How nodes are chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,7 +31,7 @@ pub struct NodeChoice {
 pub(crate) struct ChosenNodes {
     /// Torque nodes, symmetric about zero, ascending, N m.
     pub torque_nodes_n_m: Vec<f32>,
-    /// Points at these nodes.
+    /// Those that were sampled, at the first temperature.
     pub known: Vec<KnownNode>,
     /// Whether the table meets the tolerance at the middle of every interval; if not, the nodes ran out.
     pub resolved: bool,
@@ -42,44 +42,48 @@ pub(crate) struct ChosenNodes {
 /// Nodes on each side that the choice starts with.
 const FIRST_NODES: usize = 5;
 
-/// Chooses the torque nodes of a generator at the first temperature of the plan, whose other fields stay.
+/// Chooses the torque nodes of a generator at the first temperature of the plan, that of the `sampler`. The drive is
+/// without its imperfections: where wind-up bends is a matter of the rim and its support, and they do not move that.
 pub(crate) fn choose_torque_nodes(
     drive: &Drive,
     kind: GeneratorKind,
     plan: &SweepPlan,
     choice: NodeChoice,
-    settings: SolverSettings,
-    observe: &Observer,
+    sampler: &Sampler<'_>,
 ) -> Result<ChosenNodes, SweepError> {
-    // Where wind-up bends is a matter of the rim and its support; imperfections do not move that.
-    let drive = &Drive { as_built: drive.as_built.uniform_part(), ..drive.clone() };
-    let temperature = plan.temperature_nodes_c[0];
-    let temperature_c = f64::from(temperature);
-    let problem = Problem::new(drive, kind, temperature_c, settings)?;
-    let mut motion = Motion::deformed(&problem, 0.0)?;
-    let unloaded = motion.state().clone();
-    let mut chain = SweepChain::new(plan, temperature_c, observe);
     let all = symmetric_nodes(drive.output.drag_torque_n_m, choice.largest_n_m, FIRST_NODES);
     let nodes: Vec<f32> = all.into_iter().filter(|t| f64::from(*t) > drive.output.drag_torque_n_m).collect();
-
-    let mut sampled: Vec<KnownNode> = Vec::new();
-    for torque in &nodes {
-        chain.sample(&mut motion, *torque)?;
-        sampled.push(KnownNode { torque: *torque, temperature, points: chain.take_points() });
-    }
+    let mut work = Work::default();
+    let mut loaded = sampler.loaded(&nodes, &mut work)?;
+    let mut sampled = sampler.nodes(&loaded, &mut work)?;
     let open = nodes.windows(2).map(|w| [w[0], w[1]]).collect();
     let refined = refined(nodes, open, choice.most + 1, choice.tolerance_arcsec, |nodes, middles| {
         sampled.retain(|node| nodes.contains(&node.torque));
         let trial = accepted(trial_table(drive, kind, plan, nodes, &sampled))?;
-        motion.go_back(unloaded.clone());
-        let missed = |middle: &f32| {
-            chain.sample(&mut motion, *middle)?;
-            let points = chain.take_points();
-            let miss = trial.as_ref().map_or(f64::INFINITY, |image| ARCSEC_PER_RAD * worst_miss(image, &points));
-            sampled.push(KnownNode { torque: *middle, temperature, points });
-            Ok(miss)
+        let miss = |points: &[Computed]| {
+            trial.as_ref().map_or(f64::INFINITY, |image| ARCSEC_PER_RAD * worst_miss(image, points))
         };
-        middles.iter().map(missed).collect::<Result<Vec<f64>, SweepError>>()
+        // From the state of the nearest lighter load.
+        let asked = |middle: &f32| {
+            let mut work = Work::default();
+            let lighter = loaded.iter().filter(|state| state.torque < *middle);
+            let from = lighter.max_by(|a, b| a.torque.total_cmp(&b.torque)).unwrap_or(&sampler.unloaded);
+            let state = sampler.load(from, *middle, &mut work)?;
+            let missed = |points: &[Computed]| miss(points) > choice.tolerance_arcsec;
+            let (node, whole) = sampler.sample(&state, missed, &mut work)?;
+            Ok((state, node, whole, work))
+        };
+        let asked = middles.par_iter().with_max_len(1).map(asked).collect::<Result<Vec<_>, SweepError>>()?;
+        let mut misses = Vec::new();
+        for (state, node, whole, more) in asked {
+            work.add(more);
+            misses.push(miss(&node.points));
+            if whole {
+                loaded.push(state);
+                sampled.push(node);
+            }
+        }
+        Ok::<_, SweepError>(misses)
     })?;
     let nodes = refined.nodes;
     sampled.retain(|node| nodes.contains(&node.torque));
@@ -90,7 +94,7 @@ pub(crate) fn choose_torque_nodes(
         torque_nodes_n_m: positive.iter().rev().map(|t| -t).chain(positive.iter().copied()).collect(),
         known: sampled,
         resolved: refined.resolved,
-        work: chain.work,
+        work,
     })
 }
 

@@ -30,7 +30,7 @@ use flexspline_algebra::{Mat, cholesky, product};
 use rayon::prelude::*;
 
 use super::project::{GENERATOR_ORDERS, MATERIAL_ORDERS, OUTPUT_ORDERS};
-use super::sweep::{KnownNode, Observer, Sweep, SweepError, SweepPlan, SweepProgress, Work, sweep};
+use super::sweep::{KnownNode, Observer, Sampler, Sweep, SweepError, SweepPlan, SweepProgress, Work, sweep};
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::motion::Motion;
 use flexspline_mechanics::stepping::{Problem, SolveError, SolverSettings};
@@ -53,17 +53,18 @@ pub(crate) fn deviation_increments() -> usize {
 
 /// Runs the sweep of one generator at the torque and temperature nodes of the plan, for any drive: one that repeats
 /// from tooth to tooth is swept over one pitch ([`sweep`]), any other over whole turns of generator and output. Nodes
-/// that are `known` (of the drive without the imperfections) are not computed again.
+/// that are `known` are not computed again; they and the `sampler` are of the drive without the imperfections.
 pub(crate) fn sweep_turns(
     drive: &Drive,
     kind: GeneratorKind,
     plan: &SweepPlan,
     known: &[KnownNode],
+    sampler: &Sampler<'_>,
     settings: SolverSettings,
     observe: &Observer,
 ) -> Result<Sweep, SweepError> {
     let repeating = Drive { as_built: drive.as_built.uniform_part(), ..drive.clone() };
-    let mut whole = sweep(&repeating, kind, plan, known, settings, observe)?;
+    let mut whole = sweep(&repeating, kind, plan, known, sampler, settings)?;
     if drive.as_built.first_not_uniform().is_none() {
         return Ok(whole);
     }
