@@ -14,7 +14,7 @@ use crate::ours::{Journey, Stop, displacement, journey, run_cpu_s, stress};
 use crate::program::{Limits, Used, run};
 
 /// Arc-seconds in a radian.
-const ARCSEC: f64 = 180.0 * 3600.0 / PI;
+pub const ARCSEC: f64 = 180.0 * 3600.0 / PI;
 /// What a deck cannot say is taken out of the drive, for both programs: the drag of the output, and the rounding of the
 /// tips, which our contact knows and the mesh does not (0.03 mm of it softens the load curve by 0.1″).
 pub const AS_IN_THE_DECK: [&str; 3] =

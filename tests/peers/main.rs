@@ -6,8 +6,9 @@
 //! stress along it, and what both cost. The short form is a small drive with the cam on the coarse mesh; `--long` adds
 //! HHD-95, its standard mesh and what CalculiX itself leaves open (each increment in two parts). A cup and a closed
 //! sleeve in solid elements stand beside our shells, a fine mesh of one root fillet beside the stress that
-//! `simulate --stress` tells. A tooth slid along its space with friction stands beside our flank contact. Rollers are
-//! not compared: see the header of `export/inp.rs`.
+//! `simulate --stress` tells. A tooth slid along its space with friction stands beside our flank contact. Teeth that
+//! lean along their face are solved in three dimensions and by our slices. Rollers are not compared: see the header of
+//! `export/inp.rs`.
 //!
 //! Prints what it finds, a line for each claim, and one line of ratios at the end; ends with 1 if a claim fails.
 
@@ -18,6 +19,7 @@ mod ours;
 mod program;
 mod root;
 mod sleeve;
+mod slices;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -60,7 +62,8 @@ struct Options {
     /// Standard mesh and CalculiX's own scatter too
     #[arg(long)]
     long: bool,
-    /// Only this case, by its name; "root" for the root fillets, "friction" for the sliding tooth alone
+    /// Only this case, by its name; "root" for the root fillets, "friction" for the sliding tooth, "slices" for leaning
+    /// teeth alone
     #[arg(long)]
     case: Option<String>,
     /// Folder for decks and outputs
@@ -133,6 +136,9 @@ fn peers(options: &Options, claims: &mut Claims) -> Result<String, String> {
     if options.case.as_deref() == Some("friction") {
         return friction::friction(&options.ccx, &options.out, claims);
     }
+    if options.case.as_deref() == Some("slices") {
+        return slices::slices(&options.ccx, &options.out, options.long, claims);
+    }
     if let Some(name) = &options.case {
         let names: Vec<String> = cases.iter().map(Case::name).collect();
         cases.retain(|case| case.name() == *name);
@@ -145,6 +151,7 @@ fn peers(options: &Options, claims: &mut Claims) -> Result<String, String> {
         lines.push(sleeve::sleeves(&options.ccx, &flexspline, &options.out, claims)?);
         lines.push(root::fillets(&options.ccx, &options.out, claims)?);
         lines.push(friction::friction(&options.ccx, &options.out, claims)?);
+        lines.push(slices::slices(&options.ccx, &options.out, options.long, claims)?);
     }
     let mut whole: Option<Vec<f64>> = None;
     for case in cases {
