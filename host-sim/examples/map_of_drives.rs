@@ -1,9 +1,10 @@
-//! A map of drives that a designer may draw: `map_of_drives COUNT SEED FILE.csv [FIRST]`
+//! A map of drives that a designer may draw: `map_of_drives COUNT SEED FILE.csv [FIRST [slices]]`
 //!
 //! Drive i is a pure function of the seed and i: 60 to 400 teeth, a module of 0.1 to 1 mm, one of the four generators,
 //! a rim up to a quarter thinner or thicker than the proportions of HHD-95, no friction or up to 0.15, a load of 10 %
 //! of the rated one up to all of it, and what holds the rim: springs, nothing, a cup, a hat or a closed sleeve of usual
-//! proportions. For each it is told whether it
+//! proportions. With `slices` the teeth of those with shells lean with the rim (`flexspline.face`), straight, as they
+//! were drawn for no cone. For each it is told whether it
 //!
 //! - converged: the data sheet of the drive (`flexspline study`) is whole, and what it says can be true;
 //! - was cautioned: so, too, with something to know before it is built;
@@ -59,7 +60,7 @@ struct Row {
     seconds: f64,
 }
 
-fn drawn(seed: u64, number: usize) -> Drawn {
+fn drawn(seed: u64, number: usize, slices: bool) -> Drawn {
     let mut random = fastrand::Rng::with_seed(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ number as u64);
     let mut between = |[low, high]: [f64; 2]| low + (high - low) * random.f64();
     // Sizes are spread by their ratio: as many drives from 0.1 to 0.2 mm as from 0.5 to 1.
@@ -87,15 +88,18 @@ fn drawn(seed: u64, number: usize) -> Drawn {
         sets.push(format!("sleeve.bottom_side_mm={long}"));
         sets.push(format!("sleeve.bottom_thickness_mm={}", scaled(2.0)));
         sets.push(format!("sleeve.hub_radius_mm={}", scaled(20.0)));
+        if slices {
+            sets.push("flexspline.face=slices".to_owned());
+        }
     }
     let few = FewNumbers { teeth, module_mm, bore_mm: None, width_mm: None, generator: kind };
     Drawn { kind, load_share, sleeve, few, sets }
 }
 
-fn run(seed: u64, number: usize) -> Row {
+fn run(seed: u64, number: usize, slices: bool) -> Row {
     let clock = Instant::now();
     let mut row = Row {
-        drawn: drawn(seed, number),
+        drawn: drawn(seed, number, slices),
         verdict: "refused",
         why: String::new(),
         sheet: DataSheet::default(),
@@ -179,10 +183,11 @@ fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let numbers = || Some((arguments.first()?.parse().ok()?, arguments.get(1)?.parse().ok()?));
     let (Some((count, seed)), Some(file)): (Option<(usize, u64)>, _) = (numbers(), arguments.get(2)) else {
-        eprintln!("map_of_drives COUNT SEED FILE.csv [FIRST]");
+        eprintln!("map_of_drives COUNT SEED FILE.csv [FIRST [slices]]");
         return ExitCode::from(2);
     };
     let first: usize = arguments.get(3).and_then(|first| first.parse().ok()).unwrap_or(0);
+    let slices = arguments.get(4).is_some_and(|face| face == "slices");
     let out = match File::create(file).and_then(|mut out| writeln!(out, "{HEADER}").map(|()| out)) {
         Ok(out) => Mutex::new(out),
         Err(error) => {
@@ -195,7 +200,7 @@ fn main() -> ExitCode {
         .into_par_iter()
         .with_max_len(1)
         .map(|number| {
-            let row = run(seed, number);
+            let row = run(seed, number, slices);
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
             let mut out = out.lock().unwrap_or_else(PoisonError::into_inner);
             if let Err(error) = writeln!(out, "{}", line(number, &row)) {
