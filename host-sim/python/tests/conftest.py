@@ -1,6 +1,6 @@
 """What the tests share: the command and the Rust loop that they compare with, tables, a log.
 
-FLEXSPLINE_PROGRAMS is the folder of the programs (`target/checks`), FLEXSPLINE_PROJECT the top of the project; `tests/run python` sets both.
+FLEXSPLINE_PROGRAMS is the folder of the programs (`target/release`), FLEXSPLINE_PROJECT the top of the project; `tests/run python` sets both.
 """
 
 from __future__ import annotations
