@@ -8,11 +8,14 @@ use std::sync::OnceLock;
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// The command `flexspline`, built in the profile that the tests were built in (their folder `PROFILE/deps` has its
-/// name), and like them with the features that the whole workspace asks for: so nothing is built twice.
+/// The command `flexspline`: the one that `FLEXSPLINE_PROGRAM` names, or built in the profile that the tests were built
+/// in (their folder `PROFILE/deps` has its name), with the features that the whole workspace asks for.
 pub fn flexspline() -> &'static Path {
     static BINARY: OnceLock<PathBuf> = OnceLock::new();
     BINARY.get_or_init(|| {
+        if let Some(built) = std::env::var_os("FLEXSPLINE_PROGRAM") {
+            return built.into();
+        }
         let tests = std::env::current_exe().expect("the tests have a path");
         let profile = match tests.ancestors().nth(2).and_then(|folder| folder.file_name()?.to_str()) {
             Some("debug") | None => "dev",

@@ -484,7 +484,8 @@ mod tests {
             }
         });
         let (taken, number, lost) = total;
-        assert_eq!(taken + lost, number as u32 + 1);
+        // Numbers of records wrap, and a full queue is asked again many times on a busy machine.
+        assert_eq!((taken + lost) as u16, number.wrapping_add(1));
     }
 
     #[test]
