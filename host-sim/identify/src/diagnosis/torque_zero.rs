@@ -47,7 +47,7 @@ const RIVALS_LEAVE: f64 = 0.99;
 /// … and with it no less than this: else they are there.
 const BESIDE_IT_LEAVE: f64 = 0.95;
 /// In either case by this share of what the zero has taken away. *Chosen* between what they take of a zero in the tests
-/// below, at most 0.09, and of an unbalanced load there, 0.149; on the drives of `logger_faults` more is trifles.
+/// below, at most 0.09, and of an unbalanced load there, 0.149; on healthy drives more is trifles.
 const NO_TRIFLE: f64 = 0.12;
 /// A play that goes over smoothly is taken where it leaves less than this of the least that another law
 /// leaves. *Guess*: these are sums of magnitudes, so that it asks for more than where squares decide between the laws;
@@ -217,7 +217,7 @@ impl<'a> Held<'a> {
     }
 }
 
-/// Rounds of that search at most. It takes 6 to 40 on the drives of `logger_faults` and of the tests below.
+/// Rounds of that search at most. It takes 6 to 40 on healthy drives and those of the tests below.
 const MOST_ROUNDS: usize = 500;
 /// A residual of this much in each row is round-off, arcsec: angles of 1000 rad are known to 2e-8 arcsec.
 const ROUND_OFF_ARCSEC: f64 = 1e-6;
