@@ -273,20 +273,6 @@ fn slow_commands_run_too() {
     run_pages(true);
 }
 
-/// The check can fail: a command that nobody runs, an option that is none, a file that is not there.
-#[test]
-fn what_is_wrong_is_found() {
-    assert!(commands("make everything\n").is_err());
-    let one = |line: &str| commands(line).unwrap();
-    let [copy, parser] = [false, true].map(Copy::new);
-    assert!(parser.run(&one("flexspline tables --generator cam --mesh coarse")).is_ok());
-    for wrong in ["flexspline tables --generaltor cam", "flexspline tables --mesh corse", "flexspline tabels"] {
-        assert!(parser.run(&one(wrong)).is_err(), "{wrong}");
-    }
-    assert!(copy.run(&one("cargo run --release -- drive --check")).is_ok());
-    assert!(copy.run(&one("cargo run --release -- drive --check --drive absent.toml")).is_err());
-}
-
 /// `tests/run` with its parts.
 fn runner() -> String {
     let parts = fs::read_dir(root().join("tests/parts")).unwrap().map(|entry| entry.unwrap().path());
