@@ -4,7 +4,6 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 
-/// A stream of draws.
 #[derive(Debug, Clone)]
 pub struct Chance(Pcg64Mcg);
 
@@ -28,12 +27,10 @@ impl Chance {
         low + (high - low) * self.0.random::<f64>()
     }
 
-    /// Uniform in the logarithm.
     pub fn log_uniform(&mut self, low: f64, high: f64) -> f64 {
         self.uniform(low.ln(), high.ln()).exp()
     }
 
-    /// Standard normal.
     pub fn normal(&mut self) -> f64 {
         self.0.sample(StandardNormal)
     }
@@ -43,17 +40,14 @@ impl Chance {
         self.uniform(0.0, std::f64::consts::TAU)
     }
 
-    /// +1 or -1.
     pub fn sign(&mut self) -> f64 {
         if self.one_in(0.5) { 1.0 } else { -1.0 }
     }
 
-    /// True with this probability.
     pub fn one_in(&mut self, probability: f64) -> bool {
         self.0.random::<f64>() < probability
     }
 
-    /// An index below `count`.
     pub fn below(&mut self, count: usize) -> usize {
         self.0.random_range(0..count as u32) as usize
     }
@@ -63,28 +57,13 @@ impl Chance {
         self.0.random()
     }
 
-    /// One of these.
     pub fn of<'a, T>(&mut self, choices: &'a [T]) -> &'a T {
         &choices[self.below(choices.len())]
     }
 
-    /// Puts these in random order.
     pub fn shuffle<T>(&mut self, items: &mut [T]) {
         for last in (1..items.len()).rev() {
             items.swap(last, self.below(last + 1));
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_seed_repeats_and_a_purpose_separates() {
-        let draw = |seed, purpose, index| Chance::new(seed, purpose, index).number();
-        assert_eq!(draw(1, "unit", 2), draw(1, "unit", 2));
-        let others = [draw(2, "unit", 2), draw(1, "noise", 2), draw(1, "unit", 3)];
-        assert!(others.iter().all(|other| *other != draw(1, "unit", 2)));
     }
 }

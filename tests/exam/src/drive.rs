@@ -1,15 +1,12 @@
 //! The drive as its catalogue describes it, and the one on the bench: another unit of the same kind.
 
-use serde::Serialize;
 use std::fmt::Write;
 
 use crate::ARCSEC;
 use crate::chance::Chance;
-use crate::effect::Family;
 
 /// The wheel that the housing holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fixed {
     /// The circular spline turns with the output.
     Flexspline,
@@ -17,25 +14,24 @@ pub enum Fixed {
     CircularSpline,
 }
 
+/// Place of a wheel in pairs.
+pub const FLEXSPLINE: usize = 0;
+/// The same of the other wheel.
+pub const CIRCULAR_SPLINE: usize = 1;
+
 /// A line of the kinematic error over the generator angle.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Harmonic {
-    /// Per generator turn.
     pub order: f64,
-    /// At the output.
     pub amplitude_arcsec: f64,
-    /// Of the sine.
     pub phase_rad: f64,
 }
 
 /// What the diagnosis is told: the catalogue.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Drive {
-    /// Teeth of the flexspline.
     pub flexspline_teeth: u32,
-    /// Teeth of the circular spline.
     pub circular_spline_teeth: u32,
-    /// The wheel that stands still.
     pub fixed: Fixed,
     /// Torque from which each stiffness holds, N m, and the stiffness, N m/rad; the first torque is zero.
     pub stiffness: Vec<(f64, f64)>,
@@ -43,7 +39,6 @@ pub struct Drive {
     pub backlash_arcsec: f64,
     /// Load below which the output stays where it is inside the clearance, N m.
     pub friction_torque_n_m: f64,
-    /// Lines of the kinematic error.
     pub harmonics: Vec<Harmonic>,
     /// Largest torque of the runs, N m. Not told.
     pub rated_n_m: f64,
@@ -51,7 +46,6 @@ pub struct Drive {
 
 /// Relative spread of units, one standard deviation.
 pub const STIFFNESS_SPREAD: f64 = 0.03;
-/// Relative spread of the clearance.
 pub const BACKLASH_SPREAD: f64 = 0.05;
 /// Relative spread of the amplitude of each line.
 pub const HARMONIC_SPREAD: f64 = 0.20;
@@ -115,7 +109,6 @@ impl Drive {
         self.teeth_of(self.fixed)
     }
 
-    /// Teeth of the wheel at the output.
     pub fn output_teeth(&self) -> f64 {
         self.teeth_of(other(self.fixed))
     }
@@ -129,7 +122,22 @@ impl Drive {
         }
     }
 
-    /// Stiffness of small loads, N m/rad.
+    /// Angles of the first zone of contact on the flexspline and on the circular spline, rad.
+    pub fn wheels_rad(&self, generator_rad: f64, output_rad: f64) -> [f64; 2] {
+        let rest = generator_rad - output_rad;
+        if self.fixed == Fixed::Flexspline { [generator_rad, rest] } else { [rest, generator_rad] }
+    }
+
+    /// Motion of the teeth by the lines of a unit at a generator angle, arcsec.
+    pub fn lines_arcsec(&self, unit: &Unit, generator_rad: f64) -> f64 {
+        let lines = self.harmonics.iter().zip(&unit.harmonics);
+        lines
+            .map(|(h, (scale, shift))| {
+                h.amplitude_arcsec * scale * (h.order * generator_rad + h.phase_rad + shift).sin()
+            })
+            .sum()
+    }
+
     pub fn first_stiffness(&self) -> f64 {
         self.stiffness[0].1
     }
@@ -145,7 +153,6 @@ impl Drive {
         sum.copysign(load_n_m) * ARCSEC
     }
 
-    /// `nominal.toml`.
     pub fn nominal_toml(&self) -> String {
         let fixed = match self.fixed {
             Fixed::Flexspline => "flexspline",
@@ -187,26 +194,20 @@ fn other(wheel: Fixed) -> Fixed {
 }
 
 /// The drive on the bench, relative to its catalogue.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Unit {
-    /// Stiffness over nominal.
     pub stiffness: f64,
-    /// Clearance over nominal.
     pub backlash: f64,
     /// Friction in the clearance over nominal.
     pub friction: f64,
     /// Amplitude over nominal and shift of phase (rad) of each line.
     pub harmonics: Vec<(f64, f64)>,
-    /// Zero of the output encoder.
     pub offset_arcsec: f64,
     /// Stiffness of the teeth over that of the whole drive: what the two zones share by.
     pub tooth_stiffness: f64,
-    /// How zones share.
-    pub family: Family,
 }
 
 impl Unit {
-    /// A unit exactly as the catalogue says.
     pub fn nominal(drive: &Drive) -> Self {
         Self {
             stiffness: 1.0,
@@ -215,12 +216,10 @@ impl Unit {
             harmonics: vec![(1.0, 0.0); drive.harmonics.len()],
             offset_arcsec: 0.0,
             tooth_stiffness: 8.0,
-            family: Family::A,
         }
     }
 
-    /// A unit within the spread.
-    pub fn draw(drive: &Drive, family: Family, chance: &mut Chance) -> Self {
+    pub fn draw(drive: &Drive, chance: &mut Chance) -> Self {
         let mut spread = |relative: f64| relative * chance.normal().clamp(-2.5, 2.5);
         Self {
             stiffness: 1.0 + spread(STIFFNESS_SPREAD),
@@ -233,36 +232,6 @@ impl Unit {
                 .collect(),
             offset_arcsec: if chance.one_in(0.5) { 0.0 } else { chance.uniform(-60.0, 60.0) },
             tooth_stiffness: chance.uniform(6.0, 12.0),
-            family,
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ratios_and_piecewise_wind_up() {
-        let mut drive = Drive::draw(&mut Chance::new(1, "drive", 0));
-        (drive.flexspline_teeth, drive.circular_spline_teeth) = (188, 190);
-        drive.fixed = Fixed::Flexspline;
-        assert_eq!(drive.ratio(), 95.0);
-        drive.fixed = Fixed::CircularSpline;
-        assert_eq!(drive.ratio(), -94.0);
-        drive.stiffness = vec![(0.0, 1e4), (10.0, 2e4)];
-        assert!((drive.wind_up_arcsec(-30.0) / ARCSEC + 10.0 / 1e4 + 20.0 / 2e4).abs() < 1e-12);
-    }
-
-    #[test]
-    fn the_nominal_file_is_toml_that_says_the_same() {
-        for index in 0..20 {
-            let drive = Drive::draw(&mut Chance::new(3, "drive", index));
-            let read: toml::Table = drive.nominal_toml().parse().unwrap();
-            let nominal = read["nominal"].as_table().unwrap();
-            assert_eq!(nominal["backlash_arcsec"].as_float(), Some(drive.backlash_arcsec));
-            assert_eq!(nominal["harmonic"].as_array().unwrap().len(), drive.harmonics.len());
-            assert_eq!(nominal["harmonic"][0]["order_per_generator_turn"].as_float(), Some(drive.harmonics[0].order));
         }
     }
 }

@@ -13,47 +13,44 @@ use serde::{Deserialize, Serialize};
 
 use crate::answer::Answer;
 use crate::case::{Case, Draw};
-use crate::question::Question;
-use crate::score::{Judged, Scores, judge};
-use crate::truth::{Truth, commitment};
+use crate::chance::Chance;
+use crate::score::{Gathered, Judged, judge};
+use crate::truth::commitment;
+
+/// Longest diagnosis, s.
+const LIMIT_S: f64 = 300.0;
 
 /// How the examination runs.
-#[derive(Debug, Clone)]
+#[derive(clap::Args)]
 pub struct Settings {
-    /// Seed of all cases.
-    pub seed: u64,
-    /// How many.
+    /// How many cases
+    #[arg(long, default_value_t = 50)]
     pub cases: u64,
-    /// Which.
-    pub draw: Draw,
-    /// Program to examine and arguments before `diagnose`.
-    pub program: Vec<String>,
-    /// Diagnoses at a time.
+    /// Seed [default: fresh from the operating system, printed]
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// Program to examine
+    #[arg(long, default_value = "flexspline")]
+    pub diagnoser: String,
+    /// Diagnoses at a time
+    #[arg(long, default_value_t = 2)]
     pub jobs: usize,
-    /// Longest run of one, s.
-    pub limit_s: f64,
-    /// Where everything goes.
+    /// Directory for answers, and afterwards the truth and the scores
+    #[arg(long, default_value = "out/exam")]
     pub out: PathBuf,
-    /// Keep the data of cases that went wrong.
-    pub keep: bool,
-    /// Write the truth before the answers are there: for testing the examiner, never for examining.
-    pub reveal: Option<PathBuf>,
-    /// What the oracle said of these cases before, as `reveal` wrote it: for testing the examiner, never for examining.
-    pub revealed: Option<PathBuf>,
+    #[command(flatten)]
+    pub draw: Draw,
 }
 
 /// What came of it.
-#[derive(Debug, Serialize)]
+#[derive(Serialize)]
 pub struct Examination {
-    /// Of the cases.
     pub seed: u64,
     /// Options that draw the same cases.
     pub options: String,
     /// BLAKE3 of the truths, known before the answers.
     pub commitment: String,
-    /// Together.
-    pub scores: Scores,
-    /// One by one.
+    pub scores: Gathered,
     pub cases: Vec<Judged>,
 }
 
@@ -62,44 +59,29 @@ pub struct Examination {
 /// # Errors
 /// If files cannot be written.
 pub fn run(settings: &Settings) -> io::Result<Examination> {
-    let drawn = in_parallel(settings.jobs, (0..settings.cases).collect(), |index| match &settings.revealed {
-        Some(dir) => Ok((Truth::read(&dir.join(format!("{}.json", Case::name(settings.seed, index))))?, None)),
-        None => {
-            let question = Question::draw(settings.seed, index, &settings.draw);
-            Ok((question.truth(), question.kept()))
-        }
-    });
-    let (truths, kept): (Vec<Truth>, Vec<_>) = drawn.into_iter().collect::<io::Result<Vec<_>>>()?.into_iter().unzip();
+    let seed = settings.seed.unwrap_or_else(Chance::fresh_seed);
+    let options = settings.draw.options();
+    let draw = |index| {
+        let case = Case::draw(seed, index, &settings.draw);
+        (case.truth(), case)
+    };
+    let (truths, cases): (Vec<_>, Vec<_>) =
+        in_parallel(settings.jobs, (0..settings.cases).collect(), draw).into_iter().unzip();
     let commitment = commitment(&truths);
-    println!("seed {}{}", settings.seed, settings.draw.options());
+    println!("seed {seed}{options}");
     println!("truth of {} cases, BLAKE3 {commitment}", truths.len());
-    if let Some(dir) = settings.reveal.as_ref().or(settings.revealed.as_ref()) {
-        println!("NOT AN EXAMINATION: the truth lies open in {}", dir.display());
-    }
-    if let Some(dir) = &settings.reveal {
-        write_truths(dir, &truths)?;
-    }
     // In the order of their names, which is no order.
     let mut order: Vec<usize> = (0..truths.len()).collect();
     order.sort_by(|a, b| truths[*a].name.cmp(&truths[*b].name));
-    let answers = in_parallel(settings.jobs, order, |at| (at, ask(settings, &truths[at], kept[at].as_ref())));
-    let mut judged: Vec<Judged> = Vec::new();
-    for (at, asked) in answers {
-        let (answer, seconds) = asked?;
-        let one = judge(&truths[at], &answer, seconds);
-        if !(settings.keep && one.went_wrong()) {
-            let _ = fs::remove_dir_all(settings.out.join("cases").join(&truths[at].name));
-        }
-        judged.push(one);
-    }
-    write_truths(&settings.out.join("truth"), &truths)?;
-    let examination = Examination {
-        seed: settings.seed,
-        options: settings.draw.options(),
-        commitment,
-        scores: Scores::of(&judged),
-        cases: judged,
-    };
+    let judged = in_parallel(settings.jobs, order, |at| {
+        let (answer, seconds) = ask(settings, &cases[at], &truths[at].name)?;
+        Ok(judge(&truths[at], &answer, seconds))
+    });
+    let cases = judged.into_iter().collect::<io::Result<Vec<Judged>>>()?;
+    let folder = settings.out.join("truth");
+    fs::create_dir_all(&folder)?;
+    truths.iter().try_for_each(|truth| fs::write(folder.join(format!("{}.json", truth.name)), truth.json()))?;
+    let examination = Examination { seed, options, commitment, scores: Gathered::of(&cases), cases };
     fs::write(settings.out.join("exam.json"), serde_json::to_string_pretty(&examination)?)?;
     Ok(examination)
 }
@@ -113,33 +95,22 @@ pub fn cases(path: &Path) -> io::Result<Vec<Judged>> {
     struct Written {
         cases: Vec<Judged>,
     }
-    let text = fs::read_to_string(path).map_err(|error| io::Error::other(format!("{}: {error}", path.display())))?;
-    let written: Written =
-        serde_json::from_str(&text).map_err(|error| io::Error::other(format!("{}: {error}", path.display())))?;
+    let wrong = |error: &dyn std::fmt::Display| io::Error::other(format!("{}: {error}", path.display()));
+    let text = fs::read_to_string(path).map_err(|error| wrong(&error))?;
+    let written: Written = serde_json::from_str(&text).map_err(|error| wrong(&error))?;
     Ok(written.cases)
 }
 
-fn write_truths(dir: &Path, truths: &[Truth]) -> io::Result<()> {
-    fs::create_dir_all(dir)?;
-    truths.iter().try_for_each(|truth| fs::write(dir.join(format!("{}.json", truth.name)), truth.json()))
-}
-
-/// Writes the data of a case, drawn again where it was not kept, and has it diagnosed.
-fn ask(settings: &Settings, truth: &Truth, kept: Option<&Question>) -> io::Result<(Result<Answer, String>, f64)> {
-    let name = &truth.name;
+/// Writes the data of a case, has it diagnosed, and takes the data away.
+fn ask(settings: &Settings, case: &Case, name: &str) -> io::Result<(Result<Answer, String>, f64)> {
     let given = settings.out.join("cases").join(name);
     let answered = settings.out.join("answers").join(name);
     fs::create_dir_all(&given)?;
     fs::create_dir_all(&answered)?;
-    {
-        let again = kept.is_none().then(|| Question::draw(settings.seed, truth.index, &settings.draw));
-        let question = kept.or(again.as_ref()).expect("one or the other");
-        fs::write(given.join("data.csv"), question.data())?;
-        fs::write(given.join("nominal.toml"), question.nominal_toml())?;
-    }
-    let mut command = Command::new(&settings.program[0]);
+    fs::write(given.join("data.csv"), case.data())?;
+    fs::write(given.join("nominal.toml"), case.nominal_toml())?;
+    let mut command = Command::new(&settings.diagnoser);
     command
-        .args(&settings.program[1..])
         .arg("diagnose")
         .arg(given.join("data.csv"))
         .arg("--model")
@@ -150,16 +121,17 @@ fn ask(settings: &Settings, truth: &Truth, kept: Option<&Question>) -> io::Resul
         .stdout(Stdio::null())
         .stderr(fs::File::create(answered.join("stderr.txt"))?);
     let start = Instant::now();
-    let ended = wait(&mut command, settings.limit_s);
+    let ended = wait(&mut command);
     let seconds = start.elapsed().as_secs_f64();
     let answer = ended.and_then(|()| {
         let text = fs::read_to_string(answered.join("diagnosis.json")).map_err(|e| format!("diagnosis.json: {e}"))?;
         Answer::read(&text).map_err(|error| format!("diagnosis.json: {error}"))
     });
+    fs::remove_dir_all(&given)?;
     Ok((answer, seconds))
 }
 
-fn wait(command: &mut Command, limit_s: f64) -> Result<(), String> {
+fn wait(command: &mut Command) -> Result<(), String> {
     let name = command.get_program().to_string_lossy().into_owned();
     let mut child = command.spawn().map_err(|error| format!("{name}: {error}"))?;
     let start = Instant::now();
@@ -167,17 +139,17 @@ fn wait(command: &mut Command, limit_s: f64) -> Result<(), String> {
         match child.try_wait().map_err(|error| error.to_string())? {
             Some(status) if status.success() => return Ok(()),
             Some(status) => return Err(format!("{name}: {status}")),
-            None if start.elapsed().as_secs_f64() > limit_s => {
+            None if start.elapsed().as_secs_f64() > LIMIT_S => {
                 let _ = child.kill();
                 let _ = child.wait();
-                return Err(format!("{name}: not done after {limit_s} s"));
+                return Err(format!("{name}: not done after {LIMIT_S} s"));
             }
             None => thread::sleep(Duration::from_millis(10)),
         }
     }
 }
 
-/// Does these things on so many threads; results in the order of the things.
+/// Does the work on so many threads; results in the order of the things.
 fn in_parallel<T: Send, R: Send>(threads: usize, things: Vec<T>, work: impl Fn(T) -> R + Sync) -> Vec<R> {
     let results: Mutex<Vec<(usize, R)>> = Mutex::new(Vec::with_capacity(things.len()));
     let queue: Mutex<VecDeque<(usize, T)>> = Mutex::new(things.into_iter().enumerate().collect());

@@ -1,30 +1,23 @@
 //! The sensors: noise, slow wander, steps of both encoders; and the whitening that makes fits over such noise exact.
 
-use serde::Serialize;
 use std::fmt::Write;
 
 use crate::ARCSEC;
 use crate::chance::Chance;
 use crate::drive::Drive;
-use crate::motion::Motion;
-use crate::plant::Readings;
+use crate::record::Record;
 
 /// What the sensors add.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sensors {
     /// White noise of the output reading, standard deviation.
     pub white_arcsec: f64,
     /// Slow wander (Ornstein-Uhlenbeck), standard deviation.
     pub wander_arcsec: f64,
-    /// Its correlation time.
     pub wander_s: f64,
-    /// Step of the output encoder.
     pub output_step_rad: f64,
-    /// Step of the generator encoder.
     pub generator_step_rad: f64,
-    /// Noise of the torque reading.
     pub torque_n_m: f64,
-    /// Noise of the temperature reading.
     pub temperature_c: f64,
 }
 
@@ -53,51 +46,41 @@ impl Sensors {
         [self.white_arcsec, output, generator, torque].iter().map(|x| x * x).sum::<f64>().sqrt()
     }
 
-    /// White noise and wander together.
-    pub fn all_arcsec(&self, drive: &Drive) -> f64 {
-        self.floor_arcsec(drive).hypot(self.wander_arcsec)
-    }
-
     /// Rows as the sensors give them: time, generator, output, torque, temperature, orientation.
-    pub fn rows(&self, motion: &Motion, readings: &Readings, chance: &mut Chance) -> Vec<[f64; 6]> {
+    pub fn rows(&self, run: &Record, chance: &mut Chance) -> Vec<[f64; 6]> {
         let mut wander = self.wander_arcsec * chance.normal();
-        let row_s = motion.step_s * motion.stride as f64;
         let stepped = |value: f64, step: f64| (value / step).round() * step;
-        let mut last_s = motion.time_s[0];
-        let picks = motion.picks(motion.stride).into_iter().enumerate();
-        picks
-            .map(|(row, at)| {
-                let since = (motion.time_s[at] - last_s).max(row_s);
-                last_s = motion.time_s[at];
+        let mut last_s = run.time_s[0];
+        (0..run.time_s.len())
+            .map(|at| {
+                let since = (run.time_s[at] - last_s).max(run.step_s);
+                last_s = run.time_s[at];
                 let keeps = (-since / self.wander_s).exp();
                 wander = wander * keeps + self.wander_arcsec * (1.0 - keeps * keeps).sqrt() * chance.normal();
                 let noise = wander + self.white_arcsec * chance.normal();
                 [
-                    motion.time_s[at],
-                    stepped(readings.generator_rad[row], self.generator_step_rad),
-                    stepped(readings.output_rad[row] + noise / ARCSEC, self.output_step_rad),
-                    motion.torque_n_m[at] + self.torque_n_m * chance.normal(),
-                    motion.temperature_c[at] + self.temperature_c * chance.normal(),
-                    motion.orientation_rad[at],
+                    run.time_s[at],
+                    stepped(run.generator_read_rad[at], self.generator_step_rad),
+                    stepped(run.output_read_rad[at] + noise / ARCSEC, self.output_step_rad),
+                    run.torque_n_m[at] + self.torque_n_m * chance.normal(),
+                    run.temperature_c[at] + self.temperature_c * chance.normal(),
+                    run.orientation_rad[at],
                 ]
             })
             .collect()
     }
 }
 
-/// `data.csv`: a header and these rows; what is not finite stays empty.
+/// `data.csv`: a header and these rows.
 pub fn csv(rows: &[[f64; 6]], orientation_known: bool) -> String {
     let columns = ["time_s", "generator_rad", "output_rad", "torque_n_m", "temperature_c", "orientation_rad"];
-    let told = if orientation_known { 6 } else { 5 };
+    let columns_known = if orientation_known { 6 } else { 5 };
     let mut text = String::with_capacity(rows.len() * 64 + 100);
-    text.push_str(&columns[..told].join(","));
+    text.push_str(&columns[..columns_known].join(","));
     text.push('\n');
     for row in rows {
-        for (value, digits) in row[..told].iter().zip([5, 7, 10, 4, 2, 4]) {
-            if value.is_finite() {
-                let _ = write!(text, "{value:.digits$}");
-            }
-            text.push(',');
+        for (value, digits) in row[..columns_known].iter().zip([5, 7, 10, 4, 2, 4]) {
+            let _ = write!(text, "{value:.digits$},");
         }
         text.pop();
         text.push('\n');
@@ -116,8 +99,8 @@ pub struct Whitening {
 
 impl Whitening {
     /// For rows of a thinned run: white noise of `white` and wander of `wander`, correlated over `wander_s`.
-    pub fn new(motion: &Motion, white: f64, wander: f64, wander_s: f64) -> Self {
-        let keeps = (-motion.step_s / wander_s).exp();
+    pub fn new(run: &Record, white: f64, wander: f64, wander_s: f64) -> Self {
+        let keeps = (-run.step_s / wander_s).exp();
         let (r, q) = (white * white, wander * wander * (1.0 - keeps * keeps));
         // Steady variance of the predicted wander.
         let mut p = wander * wander;
@@ -128,7 +111,7 @@ impl Whitening {
             }
             p = next;
         }
-        Self { keeps, gain: p / (p + r), scale: 1.0 / (p + r).sqrt(), session_start: motion.session_start.clone() }
+        Self { keeps, gain: p / (p + r), scale: 1.0 / (p + r).sqrt(), session_start: run.session_start.clone() }
     }
 
     /// The innovations of a column.
@@ -147,32 +130,5 @@ impl Whitening {
                 new * self.scale
             })
             .collect()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn whitened_noise_is_white_and_of_variance_one() {
-        let motion = Motion { step_s: 0.01, session_start: vec![0], ..Motion::default() };
-        let whitening = Whitening::new(&motion, 2.0, 1.0, 3.0);
-        let mut chance = Chance::new(1, "noise", 0);
-        let keeps = (-0.01_f64 / 3.0).exp();
-        let mut wander = 0.0;
-        let column: Vec<f64> = (0..200_000)
-            .map(|_| {
-                wander = keeps * wander + (1.0 - keeps * keeps).sqrt() * chance.normal();
-                wander + 2.0 * chance.normal()
-            })
-            .collect();
-        let white = whitening.apply(&column);
-        let mean_of =
-            |lag: usize| white.iter().zip(&white[lag..]).map(|(a, b)| a * b).sum::<f64>() / white.len() as f64;
-        assert!((mean_of(0) - 1.0).abs() < 0.02, "{}", mean_of(0));
-        for lag in [1, 2, 10, 100] {
-            assert!(mean_of(lag).abs() < 0.012, "lag {lag}: {}", mean_of(lag));
-        }
     }
 }

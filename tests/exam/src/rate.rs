@@ -2,21 +2,16 @@
 
 use serde::Serialize;
 
-/// `right` of `of`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Rate {
-    /// Cases in which it holds.
     pub right: usize,
-    /// Cases in which it was asked.
     pub of: usize,
 }
 
 impl Rate {
-    /// Counts those that were asked.
-    pub fn over(answers: impl IntoIterator<Item = Option<bool>>) -> Self {
+    pub fn over(answers: impl IntoIterator<Item = bool>) -> Self {
         answers
             .into_iter()
-            .flatten()
             .fold(Self::default(), |rate, yes| Self { right: rate.right + usize::from(yes), of: rate.of + 1 })
     }
 
@@ -25,7 +20,6 @@ impl Rate {
         if self.of == 0 { 0.0 } else { self.right as f64 / self.of as f64 }
     }
 
-    /// Wilson's interval at 95 %.
     pub fn interval(self) -> (f64, f64) {
         if self.of == 0 {
             return (0.0, 1.0);

@@ -6,37 +6,29 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::hides::Hides;
 use crate::ARCSEC;
 use crate::chance::Chance;
-use crate::drive::{Drive, Fixed, Unit};
-use crate::motion::Motion;
-use crate::plant::Readings;
+use crate::drive::{Drive, Unit};
+use crate::hides::Hides;
+use crate::record::{Record, Row};
 
 /// What a law may ask of an instant.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Now {
-    /// Length of the step.
     pub step_s: f64,
     /// From the first session on, gaps included.
     pub time_s: f64,
-    /// From the start of the session.
     pub since_s: f64,
     /// Share of all rows that are over, 0 to 1.
     pub done: f64,
     /// Share of the generator's path, 0 to 1.
     pub path: f64,
-    /// Generator angle and speed.
     pub generator_rad: f64,
-    /// Its speed.
     pub speed_rad_s: f64,
     /// Its way in this step.
     pub moved_rad: f64,
-    /// Output, true.
     pub output_rad: f64,
-    /// Its speed.
     pub output_rad_s: f64,
-    /// Its acceleration, arcsec/s².
     pub output_arcsec_s2: f64,
     /// In the spring.
     pub torque_n_m: f64,
@@ -65,18 +57,14 @@ pub struct Adds {
     pub flanks: [f64; 2],
     /// Torque on the flange that the sensor does not hold, N m.
     pub unseen_n_m: f64,
-    /// In the reading of the output.
     pub output_arcsec: f64,
     /// In the reading of the generator, as an angle at the output.
     pub generator_arcsec: f64,
-    /// Age of the output's reading.
     pub delay_s: f64,
-    /// In the reading of the torque.
     pub torque_n_m: f64,
 }
 
 impl Adds {
-    /// A displacement of both flanks of a zone.
     pub fn both(&mut self, zone: usize, arcsec: f64) {
         self.zones[zone][0] += arcsec;
         self.zones[zone][1] += arcsec;
@@ -99,25 +87,20 @@ pub trait Laws {
     /// How much the nearer of two zones still carries alone: 1 without load, 0 once both bear alike. `over` is the
     /// deflection of one zone under the whole load over the distance between the two.
     fn alone(&self, over: f64) -> f64;
-    /// What an effect adds now.
     fn add(&self, one: &Hides, now: &Now, memory: &mut Memory, to: &mut Adds);
     /// What an effect adds to the wind-up, arcsec, under this torque, at which the unit alone winds up by `own`. The
     /// memory is a trial that is thrown away where the torque turns out otherwise.
     fn wind_up(&self, one: &Hides, own: f64, torque_n_m: f64, now: &Now, memory: &mut Memory) -> f64;
     /// One step of the generator's motor: `state` is angle and speed, `wanted` what is asked of it.
     fn turn(&self, wanted: [f64; 2], state: &mut [f64; 2], load: f64, step_s: f64);
-    /// Torque on the load from outside.
     fn load_n_m(&self, session: &Session, at: usize, now: &Now) -> f64;
 }
 
 /// One session: what is asked of the generator and what the world does, step by step.
 #[derive(Debug, Clone, Default)]
 pub struct Session {
-    /// Pause before it.
     pub pause_s: f64,
-    /// Generator's way in the pause.
     pub away_rad: f64,
-    /// Wanted speed of the generator.
     pub speed_rad_s: Vec<f64>,
     /// Torque from outside.
     pub load_n_m: Vec<f64>,
@@ -134,19 +117,14 @@ pub struct Session {
 /// Step, rows and what scatters.
 #[derive(Debug, Clone, Copy)]
 pub struct Pace {
-    /// Step of the march.
     pub step_s: f64,
-    /// Steps in a row.
     pub stride: usize,
     /// Scatter of the instants of reading.
     pub jitter_s: f64,
-    /// Damping of the load, rad/s.
     pub damping_rad_s: f64,
     /// Lag of the gear and of the housing behind the column.
     pub lags_s: [f64; 2],
-    /// Of what scatters.
     pub seed: u64,
-    /// Whether the log holds the orientation.
     pub orientation_known: bool,
 }
 
@@ -193,11 +171,7 @@ impl<L: Laws> Train<'_, L> {
     /// Where the teeth stop the hub backward and forward.
     fn limits(&self, now: &Now, adds: &Adds) -> (f64, f64) {
         let psi = now.generator_rad;
-        let lines = self.drive.harmonics.iter().zip(&self.unit.harmonics);
-        let lines: f64 = lines
-            .map(|(h, (scale, shift))| h.amplitude_arcsec * scale * (h.order * psi + h.phase_rad + shift).sin())
-            .sum();
-        let teeth = psi / self.drive.ratio() * ARCSEC + lines;
+        let teeth = psi / self.drive.ratio() * ARCSEC + self.drive.lines_arcsec(self.unit, psi);
         let half = 0.5 * self.drive.backlash_arcsec * self.unit.backlash;
         // One zone has half of the stiffness of the teeth.
         let zone = 2.0 * ARCSEC / (self.unit.tooth_stiffness * self.drive.first_stiffness());
@@ -223,17 +197,11 @@ pub fn run<L: Laws>(
     hidden: &[Hides],
     sessions: &[Session],
     pace: &Pace,
-) -> (Motion, Readings) {
+) -> Record {
     let dt = pace.step_s;
     let mut train = Train { laws, drive, unit, hidden, memory: [[0.0; 6]; MOST] };
     let mut chance = Chance::new(pace.seed, "instants", 0);
-    let mut motion = Motion {
-        step_s: dt * pace.stride as f64,
-        stride: 1,
-        orientation_known: pace.orientation_known,
-        ..Motion::default()
-    };
-    let mut readings = Readings { generator_rad: vec![], output_rad: vec![], error_arcsec: vec![] };
+    let mut record = Record::new(dt * pace.stride as f64, pace.orientation_known);
     let steps: usize = sessions.iter().map(|session| session.speed_rad_s.len()).sum();
     let way: f64 = sessions.iter().flat_map(|session| &session.speed_rad_s).map(|v| v.abs()).sum();
     let friction = drive.friction_torque_n_m * unit.friction;
@@ -242,7 +210,7 @@ pub fn run<L: Laws>(
     for session in sessions {
         start_s += session.pause_s;
         wanted += session.away_rad;
-        motion.session_start.push(motion.time_s.len());
+        record.begin_session();
         let settle = (SETTLE_S / dt) as usize;
         let mut state = [wanted, 0.0];
         (now.gear_c, now.housing_c) = (session.column_c[0], session.column_c[0]);
@@ -252,7 +220,7 @@ pub fn run<L: Laws>(
         let mut hub = wanted / drive.ratio() * ARCSEC;
         let (mut output, mut speed) = (hub + drive.wind_up_arcsec(now.torque_n_m), 0.0);
         let mut trace = Vec::with_capacity(settle + session.speed_rad_s.len());
-        let mut told: Vec<(usize, f64, f64)> = Vec::new();
+        let mut reads: Vec<(usize, f64, f64)> = Vec::new();
         for count in 0..settle + session.speed_rad_s.len() {
             let (at, runs) = (count.saturating_sub(settle), count >= settle);
             let asked = if runs { session.speed_rad_s[at] } else { 0.0 };
@@ -270,9 +238,7 @@ pub fn run<L: Laws>(
             now.gear_c += (now.column_c - now.gear_c) * dt / pace.lags_s[0];
             now.housing_c += (now.column_c - now.housing_c) * dt / pace.lags_s[1];
             (now.output_rad, now.output_rad_s) = (output / ARCSEC, speed / ARCSEC);
-            let rest = now.generator_rad - now.output_rad;
-            now.wheel_rad =
-                if drive.fixed == Fixed::Flexspline { [now.generator_rad, rest] } else { [rest, now.generator_rad] };
+            now.wheel_rad = drive.wheels_rad(now.generator_rad, now.output_rad);
 
             let mut adds = Adds::default();
             for (one, memory) in hidden.iter().zip(&mut train.memory) {
@@ -301,14 +267,16 @@ pub fn run<L: Laws>(
                 let scatter = [(); 2].map(|()| pace.jitter_s * chance.normal());
                 let read = now.generator_rad + scatter[0] * now.speed_rad_s;
                 let sense = adds.generator_arcsec / ARCSEC * drive.ratio();
-                motion.time_s.push(now.time_s);
-                motion.generator_rad.push(now.generator_rad);
-                motion.speed_rad_s.push(now.speed_rad_s);
-                motion.torque_n_m.push(torque - adds.unseen_n_m + adds.torque_n_m);
-                motion.temperature_c.push(now.column_c);
-                motion.orientation_rad.push(session.orientation_rad);
-                readings.generator_rad.push(read + sense);
-                told.push((count, scatter[1] - adds.delay_s, adds.output_arcsec));
+                record.push(&Row {
+                    time_s: now.time_s,
+                    generator_rad: now.generator_rad,
+                    speed_rad_s: now.speed_rad_s,
+                    torque_n_m: torque - adds.unseen_n_m + adds.torque_n_m,
+                    temperature_c: now.column_c,
+                    orientation_rad: session.orientation_rad,
+                });
+                record.generator_read_rad.push(read + sense);
+                reads.push((count, scatter[1] - adds.delay_s, adds.output_arcsec));
             }
             let outside = laws.load_n_m(session, at, &now);
             let drag = pace.damping_rad_s * speed;
@@ -318,15 +286,13 @@ pub fn run<L: Laws>(
         }
         wanted = state[0];
         start_s = now.time_s + dt;
-        for (count, later_s, adds) in told {
+        for (count, later_s, adds) in reads {
             let place = (count as f64 + later_s / dt).clamp(0.0, trace.len() as f64 - 1.001);
             let (from, part) = (place as usize, place.fract());
-            readings.output_rad.push((trace[from] + part * (trace[from + 1] - trace[from]) + adds) / ARCSEC);
+            record.output_read_rad.push((trace[from] + part * (trace[from + 1] - trace[from]) + adds) / ARCSEC);
         }
     }
-    let pairs = readings.output_rad.iter().zip(&readings.generator_rad);
-    readings.error_arcsec = pairs.map(|(out, psi)| (out - psi / drive.ratio()) * ARCSEC).collect();
-    (motion, readings)
+    record
 }
 
 /// Where contact zone `zone` stands on a wheel.

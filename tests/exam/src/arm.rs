@@ -7,15 +7,14 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use super::gimbal::{hardened, slip};
-use super::hides::{Hides, Stranger, Thing};
-use super::train::{self, Adds, Laws, Memory, Now, Pace, Session, eased, near_zero, place, stairs};
 use crate::ARCSEC;
 use crate::cause::Cause;
 use crate::chance::Chance;
 use crate::drive::{Drive, Unit};
-use crate::motion::Motion;
-use crate::plant::Readings;
+use crate::gimbal::{hardened, slip};
+use crate::hides::{Hides, Stranger, Thing};
+use crate::record::Record;
+use crate::train::{self, Adds, Laws, Memory, Now, Pace, Session, eased, near_zero, place, stairs};
 
 /// Effects outside the library that such an arm shows.
 pub const STRANGERS: &[Stranger] = &[
@@ -26,9 +25,7 @@ pub const STRANGERS: &[Stranger] = &[
     Stranger::ChainRolls,
 ];
 
-/// Of the march.
 const STEP_S: f64 = 5e-4;
-/// Pressure angle of the flanks.
 const PRESSURE_RAD: f64 = 0.44;
 /// Generator speed to which the drag of the grease is told, rad/s.
 const DRAG_AT_RAD_S: f64 = 8.0;
@@ -36,16 +33,13 @@ const DRAG_AT_RAD_S: f64 = 8.0;
 /// is the textbook's.
 const SLIPS: [(f64, f64); 5] = [(0.2, 1.0), (0.05, 0.1), (0.11, 0.2), (0.22, 0.3), (0.42, 0.4)];
 
-/// An arm with its run.
 #[derive(Debug, Clone)]
 pub struct Arm {
-    /// Step, rows, scatter.
     pub pace: Pace,
     /// Of all sessions.
     pub rows: usize,
     sessions: usize,
     drive: Drive,
-    /// Bandwidth of the servo, rad/s.
     servo_rad_s: f64,
     /// How far the rated load draws the motor from where it should be.
     drawn_rad: f64,
@@ -53,12 +47,10 @@ pub struct Arm {
     cogging: (f64, f64),
     /// Of the empty flange on the spring, Hz.
     load_hz: f64,
-    /// Turned between sessions.
     turned: bool,
 }
 
 impl Arm {
-    /// An arm for this drive.
     pub fn draw(drive: &Drive, chance: &mut Chance) -> Self {
         let orientation = chance.below(4);
         Self {
@@ -82,8 +74,7 @@ impl Arm {
         }
     }
 
-    /// Readings with these effects.
-    pub fn run(&self, drive: &Drive, unit: &Unit, hidden: &[Hides]) -> (Motion, Readings) {
+    pub fn run(&self, drive: &Drive, unit: &Unit, hidden: &[Hides]) -> Record {
         train::run(self, drive, unit, hidden, &self.plan(), &self.pace)
     }
 

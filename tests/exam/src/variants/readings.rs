@@ -1,10 +1,11 @@
 //! Forms of causes in what is read.
 
-use super::form::{Form, Numbers, Profile, Setting, wave};
+use super::form::{Form, Numbers, Setting, wave};
 use crate::ARCSEC;
 use crate::cause::Cause;
 use crate::chance::Chance;
-use crate::fresh::train::near_zero;
+use crate::profile::Profile;
+use crate::train::near_zero;
 
 /// Of an encoder out of centre.
 pub const DISC: &[&str] = &["overtones", "scratched", "two_heads", "breathing", "subdivided", "bearing"];

@@ -141,7 +141,7 @@ pub fn heat(name: &'static str, n: &mut Numbers, setting: &Setting) -> Form {
     let (middle, wide) = (n.flat("middle_c", -5.0, 35.0), n.log("width_k", 5.0, 25.0));
     let first = n.log("first_part", 0.15, 0.6);
     // Memory: the fifth number is the warmth of this step.
-    let add = move |_: f64, now: &crate::fresh::train::Now, memory: &mut crate::fresh::train::Memory, _: &mut _| {
+    let add = move |_: f64, now: &crate::train::Now, memory: &mut crate::train::Memory, _: &mut _| {
         memory[4] = warm(now, memory) - 20.0;
     };
     let winds = move |size: f64, own: f64, load: f64, memory: &[f64]| {

@@ -1,4 +1,4 @@
-//! What could be known at best of a case of families D and E: how far an effect stands out of the noise once the
+//! What could be known at best of a case: how far an effect stands out of the noise once the
 //! catalogue's parameters have floated, and which causes are like it on these rows.
 //!
 //! An effect is weighed by what it adds to the residual of the catalogue's model, read at the angles and the torque
@@ -9,14 +9,14 @@
 use std::f64::consts::TAU;
 
 use crate::ARCSEC;
-use crate::bench::{FREE, LEAST_D, SPREAD, Scales, Weight, difference, least_rms_arcsec};
 use crate::cause::Cause;
 use crate::drive::{
-    BACKLASH_SPREAD, Drive, FRICTION_SPREAD, Fixed, HARMONIC_SPREAD, PHASE_SPREAD_RAD, STIFFNESS_SPREAD, Unit,
+    BACKLASH_SPREAD, CIRCULAR_SPLINE, Drive, FLEXSPLINE, FRICTION_SPREAD, HARMONIC_SPREAD, PHASE_SPREAD_RAD,
+    STIFFNESS_SPREAD, Unit,
 };
-use crate::motion::Motion;
 use crate::noise::{Sensors, Whitening};
-use crate::plant::Readings;
+use crate::record::Record;
+use crate::scales::{FREE, LEAST_D, SPREAD, Scales, Weight, difference, least_rms_arcsec};
 
 /// Rows on which it works.
 const ROWS: usize = 8000;
@@ -30,11 +30,7 @@ pub fn nominal(drive: &Drive, unit: &Unit, generator_rad: &[f64], torque_n_m: &[
     let rows = generator_rad.iter().zip(torque_n_m);
     rows.map(|(psi, torque)| {
         let exact = psi / drive.ratio() * ARCSEC;
-        let lines = drive.harmonics.iter().zip(&unit.harmonics);
-        let lines: f64 = lines
-            .map(|(h, (scale, shift))| h.amplitude_arcsec * scale * (h.order * psi + h.phase_rad + shift).sin())
-            .sum();
-        let teeth = exact + lines;
+        let teeth = exact + drive.lines_arcsec(unit, *psi);
         let wanted = if torque.abs() > friction { teeth + half * torque.signum() } else { rest.unwrap_or(teeth) };
         let position = wanted.clamp(teeth - half, teeth + half);
         rest = Some(position);
@@ -45,9 +41,9 @@ pub fn nominal(drive: &Drive, unit: &Unit, generator_rad: &[f64], torque_n_m: &[
 }
 
 /// What the catalogue leaves of clean readings, arcsec.
-pub fn residual(drive: &Drive, motion: &Motion, readings: &Readings) -> Vec<f64> {
-    let model = nominal(drive, &Unit::nominal(drive), &readings.generator_rad, &motion.torque_n_m).0;
-    difference(&readings.error_arcsec, &model)
+pub fn residual(drive: &Drive, run: &Record) -> Vec<f64> {
+    let model = nominal(drive, &Unit::nominal(drive), &run.generator_read_rad, &run.torque_n_m).0;
+    difference(&run.error_arcsec(drive.ratio()), &model)
 }
 
 /// 1 where the load lies on a flank, 0 near the friction of the hub and for a tenth of a second after a change of
@@ -67,7 +63,7 @@ fn settled(drive: &Drive, torque_n_m: &[f64], flank: &[f64]) -> Vec<f64> {
 /// The rows of one case, ready to weigh effects on.
 pub struct Oracle<'a> {
     drive: &'a Drive,
-    thinned: Motion,
+    thinned: Record,
     /// Generator as read, at the thinned rows.
     generator_rad: Vec<f64>,
     output_rad: Vec<f64>,
@@ -86,25 +82,24 @@ impl<'a> Oracle<'a> {
     pub fn new(
         drive: &'a Drive,
         unit: &Unit,
-        motion: &Motion,
-        readings: &Readings,
+        run: &Record,
         sensors: &Sensors,
         jitter_s: Option<f64>,
         zeroed: bool,
     ) -> Self {
-        let thin = motion.time_s.len().div_ceil(ROWS);
-        let thinned = motion.every(thin);
-        let picks = motion.picks(thin);
+        let thin = run.time_s.len().div_ceil(ROWS);
+        let picks = run.picks(thin);
+        let thinned = run.thinned(thin, &picks);
         let pick = |values: &[f64]| -> Vec<f64> { picks.iter().map(|at| values[*at]).collect() };
-        let fast = motion.speed_rad_s.iter().map(|v| v * v).sum::<f64>() / motion.speed_rad_s.len() as f64;
+        let fast = run.speed_rad_s.iter().map(|v| v * v).sum::<f64>() / run.speed_rad_s.len() as f64;
         let blur = jitter_s.unwrap_or(0.0) * fast.sqrt() / drive.ratio().abs() * ARCSEC;
         let floor_arcsec = sensors.floor_arcsec(drive).hypot(blur);
         let whitening =
             Whitening::new(&thinned, floor_arcsec / (thin as f64).sqrt(), sensors.wander_arcsec, sensors.wander_s);
-        let model = |unit: &Unit| nominal(drive, unit, &readings.generator_rad, &motion.torque_n_m);
+        let model = |unit: &Unit| nominal(drive, unit, &run.generator_read_rad, &run.torque_n_m);
         let (at_unit, flank) = model(unit);
         let weighed: Vec<f64> = match jitter_s {
-            Some(_) => pick(&settled(drive, &motion.torque_n_m, &flank)),
+            Some(_) => pick(&settled(drive, &run.torque_n_m, &flank)),
             None => vec![1.0; picks.len()],
         };
         let mut floating = Vec::new();
@@ -133,8 +128,8 @@ impl<'a> Oracle<'a> {
         }
         Self {
             drive,
-            generator_rad: pick(&readings.generator_rad),
-            output_rad: pick(&readings.output_rad),
+            generator_rad: pick(&run.generator_read_rad),
+            output_rad: pick(&run.output_read_rad),
             flank: pick(&flank),
             thinned,
             picks,
@@ -149,7 +144,6 @@ impl<'a> Oracle<'a> {
         self.picks.iter().zip(&self.weighed).map(|(at, weight)| weight * (with[*at] - without[*at])).collect()
     }
 
-    /// How far it stands out.
     pub fn weigh(&self, added: &[f64]) -> Weight {
         self.scales.weigh(added)
     }
@@ -167,8 +161,8 @@ impl<'a> Oracle<'a> {
                 continue;
             }
             let weighed = |column: Vec<f64>| column.iter().zip(&self.weighed).map(|(x, weight)| x * weight).collect();
-            let span: Vec<_> = span.into_iter().map(|column| (weighed(column), 0.0)).collect();
-            let left = self.scales.weigh_beside(added, &span).0;
+            let span: Vec<_> = span.into_iter().map(weighed).collect();
+            let left = self.scales.weigh_with(added, &span);
             let least = left.rms_arcsec < least_rms_arcsec(white_arcsec) && left.d < whole / 6.0;
             if left.d < LEAST_D || least {
                 found.push((rival, left.d));
@@ -185,9 +179,7 @@ impl<'a> Oracle<'a> {
         let column = |f: &dyn Fn(usize) -> f64| -> Vec<f64> { (0..count).map(f).collect() };
         let psi = |at: usize| self.generator_rad[at];
         let out = |at: usize| self.output_rad[at];
-        let on_wheel = |at: usize, flexspline: bool| {
-            if flexspline == (self.drive.fixed == Fixed::Flexspline) { psi(at) } else { psi(at) - out(at) }
-        };
+        let on_wheel = |at: usize, wheel: usize| self.drive.wheels_rad(psi(at), out(at))[wheel];
         let torque = |at: usize| self.thinned.torque_n_m[at] / rated;
         let warmer = |at: usize| self.thinned.temperature_c[at] - 20.0;
         let speed = |at: usize| self.thinned.speed_rad_s[at];
@@ -210,18 +202,18 @@ impl<'a> Oracle<'a> {
         match cause {
             Cause::CircularSplineEccentricity | Cause::FlexsplineRunout | Cause::GravitySideLoad => {
                 let angle = |at: usize| match cause {
-                    Cause::FlexsplineRunout => on_wheel(at, true),
+                    Cause::FlexsplineRunout => on_wheel(at, FLEXSPLINE),
                     Cause::GravitySideLoad => psi(at) + world(at),
-                    _ => on_wheel(at, false),
+                    _ => on_wheel(at, CIRCULAR_SPLINE),
                 };
                 lines(&angle, &[2.0, 4.0, 6.0], &shared).into_iter().chain(widths()).collect()
             }
-            Cause::CircularSplineOvality => lines(&|at| on_wheel(at, false), &[2.0, 4.0], &[&one, &sign]),
-            Cause::FlexsplinePitchError => lines(&|at| on_wheel(at, true), &[1.0, 2.0, 4.0], &shared),
-            Cause::CircularSplinePitchError => lines(&|at| on_wheel(at, false), &[1.0, 2.0, 4.0], &shared),
+            Cause::CircularSplineOvality => lines(&|at| on_wheel(at, CIRCULAR_SPLINE), &[2.0, 4.0], &[&one, &sign]),
+            Cause::FlexsplinePitchError => lines(&|at| on_wheel(at, FLEXSPLINE), &[1.0, 2.0, 4.0], &shared),
+            Cause::CircularSplinePitchError => lines(&|at| on_wheel(at, CIRCULAR_SPLINE), &[1.0, 2.0, 4.0], &shared),
             Cause::GeneratorEccentricity => {
-                let mut all = lines(&|at| on_wheel(at, true), &[1.0], &shared);
-                all.extend(lines(&|at| on_wheel(at, false), &[1.0], &shared));
+                let mut all = lines(&|at| on_wheel(at, FLEXSPLINE), &[1.0], &shared);
+                all.extend(lines(&|at| on_wheel(at, CIRCULAR_SPLINE), &[1.0], &shared));
                 all.extend(widths());
                 all
             }
@@ -300,7 +292,6 @@ impl<'a> Oracle<'a> {
         }
     }
 
-    /// Share of the generator's path, row by row.
     fn travelled(&self) -> Vec<f64> {
         let mut path = 0.0;
         let mut last = self.generator_rad[0];

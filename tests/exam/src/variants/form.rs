@@ -5,8 +5,9 @@ use std::f64::consts::TAU;
 use crate::ARCSEC;
 use crate::chance::Chance;
 use crate::drive::Drive;
-use crate::fresh::hides::Hides;
-use crate::fresh::train::{Adds, Memory, Now};
+use crate::hides::Hides;
+use crate::profile::Profile;
+use crate::train::{Adds, Memory, Now};
 
 /// Adds to what is read and to where the teeth stand: size, instant, memory.
 pub type Add = Box<dyn Fn(f64, &Now, &mut Memory, &mut Adds)>;
@@ -17,9 +18,7 @@ pub type WindUp = Box<dyn Fn(f64, f64, f64, &Now, &mut Memory) -> f64>;
 pub struct Form {
     /// At each instant, before the teeth are placed.
     pub add: Add,
-    /// Of the spring.
     pub wind_up: WindUp,
-    /// As drawn.
     pub numbers: Vec<(&'static str, f64)>,
 }
 
@@ -44,23 +43,18 @@ pub struct Setting {
     pub mesh_order: f64,
     /// A tooth at the output.
     pub pitch_arcsec: f64,
-    /// Wind-up at the rated torque.
     pub rated_arcsec: f64,
-    /// Rated torque.
-    pub rated_n_m: f64,
     /// Path of the generator in all sessions.
     pub way_rad: f64,
 }
 
 impl Setting {
-    /// Of a drive and a run.
     pub fn of(drive: &Drive, way_rad: f64) -> Self {
         Self {
             ratio: drive.ratio(),
             mesh_order: drive.mesh_order(),
             pitch_arcsec: TAU / drive.output_teeth() * ARCSEC,
             rated_arcsec: drive.wind_up_arcsec(drive.rated_n_m),
-            rated_n_m: drive.rated_n_m,
             way_rad,
         }
     }
@@ -84,19 +78,16 @@ impl Numbers {
         value
     }
 
-    /// Uniform in the logarithm.
     pub fn log(&mut self, name: &'static str, low: f64, high: f64) -> f64 {
         let value = self.chance.log_uniform(low, high);
         self.note(name, value)
     }
 
-    /// Uniform.
     pub fn flat(&mut self, name: &'static str, low: f64, high: f64) -> f64 {
         let value = self.chance.uniform(low, high);
         self.note(name, value)
     }
 
-    /// An angle.
     pub fn phase(&mut self, name: &'static str) -> f64 {
         let value = self.chance.phase();
         self.note(name, value)
@@ -117,50 +108,16 @@ impl Numbers {
         value
     }
 
-    /// A phase that is not written down.
     pub fn any_phase(&mut self) -> f64 {
         self.chance.phase()
     }
 
-    /// A standard normal that is not written down.
     pub fn normal(&mut self) -> f64 {
         self.chance.normal()
     }
 
-    /// All that was written down.
     pub fn drawn(self) -> Vec<(&'static str, f64)> {
         self.drawn
-    }
-}
-
-/// A periodic error around a wheel.
-pub struct Profile(Vec<f64>);
-
-impl Profile {
-    /// Points of a turn.
-    const POINTS: usize = 1440;
-
-    /// Sum of sines: order, amplitude, phase.
-    pub fn of(lines: &[(f64, f64, f64)]) -> Self {
-        let at = |point: usize| {
-            let angle = point as f64 / Self::POINTS as f64 * TAU;
-            lines.iter().map(|(order, amplitude, phase)| amplitude * (order * angle + phase).sin()).sum()
-        };
-        Self((0..Self::POINTS).map(at).collect())
-    }
-
-    /// The same, as large as a sine of amplitude 1 in the mean square.
-    pub fn scaled(self) -> Self {
-        let square = self.0.iter().map(|x| x * x).sum::<f64>() / self.0.len() as f64;
-        let scale = (0.5 / square.max(1e-12)).sqrt();
-        Self(self.0.into_iter().map(|x| scale * x).collect())
-    }
-
-    /// At an angle.
-    pub fn at(&self, angle_rad: f64) -> f64 {
-        let place = (angle_rad / TAU).rem_euclid(1.0) * Self::POINTS as f64;
-        let (from, part) = (place as usize % Self::POINTS, place.fract());
-        self.0[from] + part * (self.0[(from + 1) % Self::POINTS] - self.0[from])
     }
 }
 

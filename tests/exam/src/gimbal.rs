@@ -6,34 +6,28 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use super::hides::{Hides, Stranger, Thing};
-use super::train::{self, Adds, Laws, Memory, Now, Pace, Session, ease, eased, near_zero, place, stairs};
 use crate::ARCSEC;
 use crate::cause::Cause;
 use crate::chance::Chance;
 use crate::drive::{Drive, Unit};
-use crate::motion::Motion;
-use crate::plant::Readings;
+use crate::hides::{Hides, Stranger, Thing};
+use crate::record::Record;
+use crate::train::{self, Adds, Laws, Memory, Now, Pace, Session, ease, eased, near_zero, place, stairs};
 
 /// Effects outside the library that such a gimbal shows.
 pub const STRANGERS: &[Stranger] =
     &[Stranger::HarnessSnap, Stranger::SunOnMount, Stranger::WheelHum, Stranger::MountSettles, Stranger::LooseBolts];
 
-/// Of the march.
 const STEP_S: f64 = 1e-3;
 /// Microsteps in a turn of the motor: 200 steps, 16 each.
 const MICROSTEPS: f64 = 3200.0;
-/// Pole pairs of the stepper.
 const POLES: f64 = 50.0;
-/// Pressure angle of the flanks.
 const PRESSURE_RAD: f64 = 0.38;
 /// Generator speed to which the drag of the grease is told, rad/s.
 const DRAG_AT_RAD_S: f64 = 4.0;
 
-/// A gimbal with its run.
 #[derive(Debug, Clone)]
 pub struct Gimbal {
-    /// Step, rows, scatter.
     pub pace: Pace,
     /// Of all sessions.
     pub rows: usize,
@@ -43,12 +37,10 @@ pub struct Gimbal {
     rotor: (f64, f64),
     /// Of the antenna's dummy on the spring, Hz.
     load_hz: f64,
-    /// Turned between sessions.
     turned: bool,
 }
 
 impl Gimbal {
-    /// A gimbal for this drive.
     pub fn draw(drive: &Drive, chance: &mut Chance) -> Self {
         let stride = *chance.of(&[20, 25]);
         let orientation = chance.below(4);
@@ -71,8 +63,7 @@ impl Gimbal {
         }
     }
 
-    /// Readings with these effects.
-    pub fn run(&self, drive: &Drive, unit: &Unit, hidden: &[Hides]) -> (Motion, Readings) {
+    pub fn run(&self, drive: &Drive, unit: &Unit, hidden: &[Hides]) -> Record {
         train::run(self, drive, unit, hidden, &self.plan(), &self.pace)
     }
 

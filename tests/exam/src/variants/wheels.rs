@@ -1,8 +1,9 @@
 //! Forms of causes in wheels, generator and teeth.
 
-use super::form::{Form, Numbers, Profile, Setting, fades, wave};
+use super::form::{Form, Numbers, Setting, fades, wave};
 use crate::cause::Cause;
-use crate::fresh::train::{Adds, Now, near_zero, place};
+use crate::profile::Profile;
+use crate::train::{Adds, Now, near_zero, place};
 
 /// Of an axis that is displaced: wheel or push of gravity.
 pub const DISPLACED: &[&str] =

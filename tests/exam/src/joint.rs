@@ -9,16 +9,14 @@
 use std::collections::VecDeque;
 use std::f64::consts::{PI, TAU};
 
-use super::gear::{Gear, Laws, Place};
-use super::hides::{Hides, Stranger, Thing};
 use crate::ARCSEC;
 use crate::cause::Cause;
 use crate::chance::Chance;
 use crate::drive::{Drive, Unit};
-use crate::motion::Motion;
-use crate::plant::Readings;
+use crate::gear::{Gear, Laws, Place};
+use crate::hides::{Hides, Stranger, Thing};
+use crate::record::{Record, Row};
 
-/// Step of the integration, s.
 pub const STEP_S: f64 = 1.25e-4;
 
 /// Steps that a late read may reach back: 64 ms.
@@ -63,7 +61,6 @@ struct Session {
 /// How the logger polls.
 #[derive(Debug, Clone, Copy)]
 pub struct Poll {
-    /// Between rows, s.
     pub row_s: f64,
     /// How late a row is, rms, s; its time stamp tells.
     pub late_s: f64,
@@ -83,43 +80,22 @@ pub struct Poll {
 #[derive(Debug, Clone)]
 pub struct Joint {
     sessions: Vec<Session>,
-    /// Logger.
     pub poll: Poll,
     /// Inertia of the motor with the generator, kg m².
     motor: f64,
-    /// Inertia of the load, kg m².
     load: f64,
     /// Dry friction of the motor, N m; its extra at rest; and the speed at which the viscous part is as large, rad/s.
     motor_friction: (f64, f64, f64),
     /// Dry and viscous friction of the load, N m and N m s.
     load_friction: (f64, f64),
-    /// Damping of the spring, N m s.
     damping: f64,
-    /// Weight of the arm, N m.
     arm: f64,
-    /// Bandwidth of the speed loop, rad/s.
     band: f64,
-    /// Whether the log tells the orientation.
     orientation_known: bool,
-    /// Stream of the instants at which the logger reads.
     polls: u64,
 }
 
-/// Work and energy of a run, J.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Energy {
-    /// Work of the motor and of the brake, each taken positive: a scale.
-    pub turned_over: f64,
-    /// Work put in.
-    pub put_in: f64,
-    /// Lost to friction and damping.
-    pub lost: f64,
-    /// Kinetic, elastic and of height, at the end less at the start.
-    pub stored: f64,
-}
-
 impl Joint {
-    /// Draws one for this drive.
     pub fn draw(drive: &Drive, chance: &mut Chance) -> Self {
         let rate_hz = *chance.of(&[100.0, 125.0, 150.0]);
         let count = 4 + chance.below(2);
@@ -195,35 +171,11 @@ impl Joint {
         }
     }
 
-    /// The same with another logger.
-    pub fn polled(&self, poll: Poll) -> Self {
-        Self { poll, ..self.clone() }
-    }
-
-    /// Two sessions of a third of the time: for tests that look at many effects.
-    #[cfg(test)]
-    pub fn short(&self) -> Self {
-        let mut short = self.clone();
-        short.sessions.truncate(2);
-        for session in &mut short.sessions {
-            session.seconds /= 3.0;
-            session.moves.iter_mut().for_each(|(lasts, _)| *lasts /= 3.0);
-        }
-        short
-    }
-
     /// What the encoders read, without noise, and what the torque sensor and the thermometer tell.
-    pub fn run(&self, drive: &Drive, unit: &Unit, hidden: &[Hides]) -> (Motion, Readings) {
-        let (motion, readings, _) = self.run_with_energy(drive, unit, hidden);
-        (motion, readings)
-    }
-
-    /// The same with the balance of energy.
-    pub fn run_with_energy(&self, drive: &Drive, unit: &Unit, hidden: &[Hides]) -> (Motion, Readings, Energy) {
+    pub fn run(&self, drive: &Drive, unit: &Unit, hidden: &[Hides]) -> Record {
         let gear = Gear::new(drive, unit, Laws::D, hidden);
         let ratio = drive.ratio();
         let mut log = Log::new(self, &gear);
-        let mut energy = Energy::default();
         let path: f64 =
             self.sessions.iter().map(|s| s.moves.iter().map(|(t, m)| t * m.mean_speed()).sum::<f64>()).sum();
         let mut path_done = 0.0;
@@ -238,7 +190,7 @@ impl Joint {
             let total = self.motor + self.load / (ratio * ratio);
             for at in 0..steps {
                 let t = at as f64 * STEP_S;
-                let (speed, _) = profile.step(session.wanted(t));
+                let speed = profile.step(session.wanted(t));
                 command_rad += speed * STEP_S;
                 let warm = 1.0 - (-t / session.settles_s).exp();
                 let slow = 1.0 - (-t / (4.0 * session.settles_s)).exp();
@@ -260,32 +212,15 @@ impl Joint {
                 let speed_off = 0.2 * self.band * off + speed - state.motor_speed;
                 state.integral += 0.2 * self.band * speed_off * STEP_S;
                 let motor_n_m = total * self.band * (speed_off + state.integral);
-                self.step(&gear, &place, &mut state, motor_n_m, external, &mut energy);
+                self.step(&gear, &place, &mut state, motor_n_m, external);
                 log.see(start_s + t + STEP_S, &state, &place, motor_n_m);
             }
             start_s += session.seconds + session.gap_s;
         }
-        energy.stored = self.held(&gear, &state) - self.held(&gear, &State::at_rest(drive, unit));
-        let (motion, readings) = log.finish(self.orientation_known, ratio);
-        (motion, readings, energy)
+        log.record
     }
 
-    /// Energy in inertias, spring and height. The spring of a drive without hidden effects.
-    fn held(&self, gear: &Gear, state: &State) -> f64 {
-        let place = Place { temperature_c: 20.0, housing_c: 20.0, ..Place::default() };
-        let x = state.output_arcsec() - state.hub_arcsec;
-        let parts = 400;
-        let spring: f64 =
-            (0..parts).map(|at| gear.torque(x * (f64::from(at) + 0.5) / f64::from(parts), &place)).sum::<f64>() * x
-                / f64::from(parts)
-                / ARCSEC;
-        0.5 * self.motor * state.motor_speed.powi(2)
-            + 0.5 * self.load * state.output_speed.powi(2)
-            + spring
-            + self.arm * (1.0 - state.output_rad.cos())
-    }
-
-    fn step(&self, gear: &Gear, place: &Place, state: &mut State, motor_n_m: f64, brake_n_m: f64, energy: &mut Energy) {
+    fn step(&self, gear: &Gear, place: &Place, state: &mut State, motor_n_m: f64, brake_n_m: f64) {
         let ratio = gear.drive.ratio();
         // The hub: free in the clearance, where it gives way until its friction holds the spring, or pushed by a flank.
         let before_arcsec = state.output_arcsec() - state.hub_arcsec;
@@ -336,14 +271,6 @@ impl Joint {
         state.coupling_n_m = -reaction + 0.5 * (motor_n_m + reaction);
         let share = gear.size_of(Thing::Cause(Cause::TorsionalResonance)).map_or(0.0, |one| one.size);
         state.sensor_n_m = sensor + share * self.load * acceleration;
-
-        let (w, v) = (0.5 * (before + state.motor_speed), 0.5 * (was + state.output_speed));
-        energy.put_in += (motor_n_m * w + brake_n_m * v) * STEP_S;
-        energy.turned_over += ((motor_n_m * w).abs() + (brake_n_m * v).abs()) * STEP_S;
-        let motor_loss = (motor_n_m + reaction) * w - self.motor * (state.motor_speed - before) / STEP_S * w;
-        let load_loss = (-sensor + brake_n_m + weight) * v - self.load * acceleration * v;
-        let in_hub = if pushed { hub_friction * hub_speed } else { spring * hub_speed };
-        energy.lost += (motor_loss + load_loss + in_hub + self.damping * (rate / ARCSEC).powi(2)) * STEP_S;
     }
 }
 
@@ -389,11 +316,10 @@ struct Setpoint {
 }
 
 impl Setpoint {
-    fn step(&mut self, wanted: f64) -> (f64, f64) {
+    fn step(&mut self, wanted: f64) -> f64 {
         self.limited += (wanted - self.limited).clamp(-40.0 * STEP_S, 40.0 * STEP_S);
-        let was = self.smooth;
         self.smooth += (self.limited - self.smooth) * STEP_S / 0.02;
-        (self.smooth, (self.smooth - was) / STEP_S)
+        self.smooth
     }
 }
 
@@ -435,13 +361,10 @@ struct State {
     generator_rad: f64,
     motor_speed: f64,
     integral: f64,
-    /// Hub, arcsec.
     hub_arcsec: f64,
-    /// A flank pushes it.
     pushed: bool,
     output_rad: f64,
     output_speed: f64,
-    /// Torque in the spring, N m.
     spring_n_m: f64,
     /// Part of it that slips.
     slipping_n_m: f64,
@@ -509,13 +432,10 @@ struct Log<'a> {
     number: usize,
     begun_s: f64,
     stalled_s: f64,
-    /// Time stamp of the row.
-    told_s: f64,
+    stamp_s: f64,
     /// The last instants with what the channels were: time, generator, output, torque.
     past: VecDeque<[f64; 4]>,
-    motion: Motion,
-    generator: Vec<f64>,
-    output: Vec<f64>,
+    record: Record,
 }
 
 /// A floor that swings at its own frequency, shaken at random.
@@ -553,11 +473,9 @@ impl<'a> Log<'a> {
             number: 0,
             begun_s: 0.0,
             stalled_s: 0.0,
-            told_s: 0.0,
+            stamp_s: 0.0,
             past: VecDeque::with_capacity(PAST),
-            motion: Motion { step_s: joint.poll.row_s, stride: 1, ..Motion::default() },
-            generator: Vec::new(),
-            output: Vec::new(),
+            record: Record::new(joint.poll.row_s, joint.orientation_known),
         }
     }
 
@@ -565,7 +483,7 @@ impl<'a> Log<'a> {
         self.begun_s = start_s + 0.02;
         self.number = 0;
         self.stalled_s = 0.0;
-        self.motion.session_start.push(self.motion.time_s.len());
+        self.record.begin_session();
         self.past.clear();
         self.schedule();
     }
@@ -576,7 +494,7 @@ impl<'a> Log<'a> {
             self.stalled_s += self.chance.uniform(self.poll.stalls_s.0, self.poll.stalls_s.1);
         }
         let stamp = self.begun_s + counted + self.stalled_s + self.poll.late_s * self.chance.normal().abs();
-        self.told_s = self.poll.counted.map_or(stamp, |factor| self.begun_s + factor * counted);
+        self.stamp_s = self.poll.counted.map_or(stamp, |factor| self.begun_s + factor * counted);
         let late = if self.chance.one_in(self.poll.late_reads) {
             (5e-4 * self.chance.uniform(1e-3, 1.0).powf(-0.65)).min(0.04)
         } else {
@@ -622,14 +540,16 @@ impl<'a> Log<'a> {
             self.taken[1] = true;
         }
         if self.taken == [true; 2] {
-            self.motion.time_s.push(self.told_s);
-            self.motion.generator_rad.push(self.at(self.due[0], 1));
-            self.motion.speed_rad_s.push(state.motor_speed);
-            self.motion.torque_n_m.push(self.row[2]);
-            self.motion.temperature_c.push(place.temperature_c);
-            self.motion.orientation_rad.push(place.orientation_rad);
-            self.generator.push(self.row[0]);
-            self.output.push(self.row[1]);
+            self.record.push(&Row {
+                time_s: self.stamp_s,
+                generator_rad: self.at(self.due[0], 1),
+                speed_rad_s: state.motor_speed,
+                torque_n_m: self.row[2],
+                temperature_c: place.temperature_c,
+                orientation_rad: place.orientation_rad,
+            });
+            self.record.generator_read_rad.push(self.row[0]);
+            self.record.output_read_rad.push(self.row[1]);
             self.schedule();
         }
     }
@@ -642,11 +562,5 @@ impl<'a> Log<'a> {
         let (later, earlier) =
             (self.past[newest - whole][channel], self.past[newest.saturating_sub(whole + 1)][channel]);
         later + part * (earlier - later)
-    }
-
-    fn finish(mut self, orientation_known: bool, ratio: f64) -> (Motion, Readings) {
-        self.motion.orientation_known = orientation_known;
-        let error = self.generator.iter().zip(&self.output).map(|(psi, out)| (out - psi / ratio) * ARCSEC).collect();
-        (self.motion, Readings { generator_rad: self.generator, output_rad: self.output, error_arcsec: error })
     }
 }

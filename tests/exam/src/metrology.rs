@@ -5,18 +5,15 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::gear::{Gear, Laws, Place};
-use super::hides::{Hides, Stranger, Thing};
 use crate::ARCSEC;
 use crate::cause::Cause;
 use crate::chance::Chance;
 use crate::drive::{Drive, Unit};
-use crate::motion::Motion;
-use crate::plant::Readings;
+use crate::gear::{Gear, Laws, Place};
+use crate::hides::{Hides, Stranger, Thing};
+use crate::record::{Record, Row};
 
-/// Between readings, s.
 pub const ROW_S: f64 = 0.125;
-/// Readings of one stop.
 const READS: usize = 7;
 /// Rows that the drive takes to move on: less than the ten that begin a session.
 const MOVES: usize = 6;
@@ -52,16 +49,12 @@ struct Session {
     restarted: f64,
 }
 
-/// A bench with its programme.
 #[derive(Debug, Clone)]
 pub struct Metrology {
     sessions: Vec<Session>,
     orientation_known: bool,
-    /// Whether the output is set to zero in each session.
     pub zeroed: bool,
-    /// Whether the motor's counter starts again.
     pub restarted: bool,
-    /// Whether the bench stands in a chamber.
     pub chamber: bool,
 }
 
@@ -110,30 +103,20 @@ impl Metrology {
         Self { sessions, orientation_known: turned, zeroed, restarted, chamber }
     }
 
-    /// The same in a room that does not drift.
-    #[cfg(test)]
-    pub fn steady(mut self) -> Self {
-        self.sessions.iter_mut().for_each(|session| session.bench.0 = 0.0);
-        self
-    }
-
     /// Shift of zero (rad) and of the counter (rad) in each session: what the bench adds to the readings.
     pub fn shifts(&self) -> Vec<(f64, f64)> {
         self.sessions.iter().map(|s| (s.zero_arcsec / ARCSEC, s.restarted * TAU)).collect()
     }
 
     /// What is read without noise, before the bench is set to zero.
-    pub fn run(&self, drive: &Drive, unit: &Unit, hidden: &[Hides]) -> (Motion, Readings) {
+    pub fn run(&self, drive: &Drive, unit: &Unit, hidden: &[Hides]) -> Record {
         let gear = Gear::new(drive, unit, Laws::E, hidden);
-        let ratio = drive.ratio();
-        let mut motion =
-            Motion { step_s: ROW_S, stride: 1, orientation_known: self.orientation_known, ..Motion::default() };
-        let mut readings = Readings { generator_rad: Vec::new(), output_rad: Vec::new(), error_arcsec: Vec::new() };
+        let mut record = Record::new(ROW_S, self.orientation_known);
         let mut state = Still::new(&gear);
         let rows: usize = self.sessions.iter().map(|s| s.rows).sum();
         let (mut start_s, mut generator, mut rows_done) = (0.0, 0.0, 0);
         for (number, session) in self.sessions.iter().enumerate() {
-            motion.session_start.push(motion.time_s.len());
+            record.begin_session();
             let mut programme = Programme::new(session, drive, state.output_rad);
             let mut t = 0.0;
             let mut read = 0;
@@ -175,16 +158,16 @@ impl Metrology {
                     let own = session.bench.0 * (1.0 - (-t / session.bench.1).exp());
                     let output =
                         gear.output_reading(state.output_rad) + (own + bench_adds(&gear, place, &stop, since)) / ARCSEC;
-                    let counter = gear.generator_reading(generator);
-                    motion.time_s.push(place.time_s);
-                    motion.generator_rad.push(generator);
-                    motion.speed_rad_s.push(stop.speed_rad_s);
-                    motion.torque_n_m.push(stop.torque_n_m);
-                    motion.temperature_c.push(place.temperature_c);
-                    motion.orientation_rad.push(place.orientation_rad);
-                    readings.generator_rad.push(counter);
-                    readings.output_rad.push(output);
-                    readings.error_arcsec.push((output - counter / ratio) * ARCSEC);
+                    record.push(&Row {
+                        time_s: place.time_s,
+                        generator_rad: generator,
+                        speed_rad_s: stop.speed_rad_s,
+                        torque_n_m: stop.torque_n_m,
+                        temperature_c: place.temperature_c,
+                        orientation_rad: place.orientation_rad,
+                    });
+                    record.generator_read_rad.push(gear.generator_reading(generator));
+                    record.output_read_rad.push(output);
                     read += 1;
                 }
             }
@@ -192,7 +175,7 @@ impl Metrology {
             start_s += t + session.gap_s;
             generator = state.generator_rad;
         }
-        (motion, readings)
+        record
     }
 }
 
@@ -219,7 +202,6 @@ fn bench_adds(gear: &Gear, place: Place, stop: &Stop, since_s: f64) -> f64 {
     sum
 }
 
-/// Where the programme goes next.
 #[derive(Debug, Clone, Copy, Default)]
 struct Stop {
     moves_s: f64,
@@ -293,7 +275,6 @@ impl Programme {
 
 /// Times in which what creeps follows the load, s.
 const CREEPS_S: [f64; 4] = [4.0, 25.0, 150.0, 900.0];
-/// Plays of the hysteresis.
 const PLAYS: usize = 12;
 
 /// The drive at rest: the hub in its clearance and what remembers the load.

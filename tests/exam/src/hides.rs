@@ -1,7 +1,5 @@
 //! What is hidden in a case of families D, E and F: a cause of the contract, or something that no cause of it is.
 
-use serde::{Serialize, Serializer};
-
 use crate::cause::Cause;
 use crate::chance::Chance;
 use crate::drive::Drive;
@@ -10,11 +8,9 @@ macro_rules! strangers {
     ($($variant:ident $name:literal),* $(,)?) => {
         /// An effect that is no cause of the contract.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-        #[allow(missing_docs, reason = "the names say it")]
         pub enum Stranger { $($variant),* }
 
         impl Stranger {
-            /// In truth files.
             pub fn name(self) -> &'static str {
                 match self { $(Self::$variant => $name),* }
             }
@@ -34,9 +30,6 @@ strangers! {
     IndexTable "index_table_error",
     SwingingWeight "swinging_weight",
     AirConditioning "air_conditioning",
-    EncoderGear "encoder_driven_by_a_pinion",
-    SlippingClamp "slipping_clamp",
-    TorqueFilter "torque_behind_a_filter",
     HarnessSnap "harness_that_snaps_over",
     SunOnMount "sun_on_the_encoder_mount",
     WheelHum "reaction_wheel_hum",
@@ -50,7 +43,6 @@ strangers! {
 }
 
 impl Stranger {
-    /// Those of a joint in motion.
     pub const OF_JOINTS: &[Self] = &[
         Self::MotorCoupling,
         Self::SpurStage,
@@ -59,9 +51,6 @@ impl Stranger {
         Self::FloorVibration,
         Self::TorqueFromCurrent,
     ];
-    /// Those of an acceptance rig.
-    pub const OF_RIGS: &[Self] = &[Self::EncoderGear, Self::SlippingClamp, Self::TorqueFilter, Self::CableSpring];
-    /// Those of a bench for metrology.
     pub const OF_BENCHES: &[Self] =
         &[Self::PolygonFaces, Self::SlowCreep, Self::IndexTable, Self::SwingingWeight, Self::AirConditioning];
 }
@@ -89,17 +78,13 @@ pub const OF_BENCHES: &[Cause] = &[
     Cause::Ratcheting,
 ];
 
-/// One or the other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Thing {
-    /// In the contract.
     Cause(Cause),
-    /// Not in it.
     Stranger(Stranger),
 }
 
 impl Thing {
-    /// The name, snake case.
     pub fn name(self) -> &'static str {
         match self {
             Self::Cause(cause) => cause.name(),
@@ -108,20 +93,12 @@ impl Thing {
     }
 }
 
-impl Serialize for Thing {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.name())
-    }
-}
-
 /// One hidden effect with its size and four numbers between 0 and 1 that its law takes for phases, places and seeds.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Hides {
-    /// Which.
     pub thing: Thing,
     /// In the unit of [`Hides::unit`].
     pub size: f64,
-    /// As its law takes them.
     pub shape: [f64; 4],
 }
 
@@ -155,7 +132,6 @@ impl Hides {
         Self { size: size.abs().clamp(0.05 * low, high).copysign(self.size), ..self.clone() }
     }
 
-    /// Unit of the size.
     pub fn unit(&self) -> &'static str {
         match self.thing {
             Thing::Cause(Cause::StiffnessError | Cause::RatioError) => "relative",
@@ -167,7 +143,6 @@ impl Hides {
             Thing::Cause(Cause::SensorLatency) => "delay_s",
             Thing::Cause(Cause::Ratcheting) => "teeth",
             Thing::Stranger(Stranger::TorqueFromCurrent) => "share",
-            Thing::Stranger(Stranger::TorqueFilter) => "delay_ms",
             _ => "amplitude_arcsec",
         }
     }
@@ -194,7 +169,6 @@ pub fn range(thing: Thing, drive: &Drive) -> (f64, f64) {
             _ => (1.0, 70.0),
         },
         Thing::Stranger(Stranger::TorqueFromCurrent) => (0.1, 1.0),
-        Thing::Stranger(Stranger::TorqueFilter) => (2.0, 300.0),
         Thing::Stranger(_) => (1.0, 40.0),
     }
 }

@@ -1,7 +1,7 @@
 //! Forms of causes that open the clearance, and teeth that skip.
 
 use super::form::{Form, Numbers, PATHS, Setting, fades, warmth};
-use crate::fresh::train::ease;
+use crate::train::ease;
 
 /// Of a clearance that has grown.
 pub const GROWTH: &[&str] = &["around_the_ring", "around_the_cup", "one_flank", "under_load", "one_zone"];

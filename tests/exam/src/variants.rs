@@ -14,22 +14,18 @@ pub mod wheels;
 use crate::cause::Cause;
 use crate::chance::Chance;
 use crate::drive::{Drive, Unit};
-use crate::fresh::hides::{Hides, Thing};
-use crate::fresh::train::{self, Adds, Laws, Memory, Now, Pace, Session, eased, stairs};
-use crate::motion::Motion;
-use crate::plant::Readings;
+use crate::hides::{Hides, Thing};
+use crate::record::Record;
+use crate::train::{self, Adds, Laws, Memory, Now, Pace, Session, eased, stairs};
 use form::{Form, Numbers, Setting};
 use std::f64::consts::{PI, TAU};
 
-/// Step of the march.
 const STEP_S: f64 = 1e-3;
 /// Names of the ways in which two zones share the load.
 const SHARINGS: [&str; 4] = ["springs", "exponential", "hertz", "arctangent"];
 
-/// The bench of a variant.
 #[derive(Debug, Clone)]
 pub struct Variant {
-    /// Steps and what scatters.
     pub pace: Pace,
     /// About so many, in all sessions.
     pub rows: usize,
@@ -91,12 +87,10 @@ fn kinds(cause: Cause) -> (&'static [&'static str], Make) {
     }
 }
 
-/// Names of the forms of a cause.
 pub fn forms(cause: Cause) -> &'static [&'static str] {
     kinds(cause).0
 }
 
-/// Name of the form that is hidden.
 pub fn name_of(cause: Cause, one: &Hides) -> &'static str {
     forms(cause)[one.shape[3] as usize]
 }
@@ -155,7 +149,6 @@ impl Laws for Bound<'_> {
 }
 
 impl Variant {
-    /// A bench for this drive.
     pub fn draw(chance: &mut Chance) -> Self {
         let load_hz = chance.uniform(14.0, 26.0);
         let stride = *chance.of(&[16, 20, 25]);
@@ -176,18 +169,15 @@ impl Variant {
         }
     }
 
-    /// Name of the way in which two zones share the load.
     pub fn sharing(&self) -> &'static str {
         SHARINGS[self.sharing]
     }
 
-    /// Numbers of a form, by name.
     pub fn numbers(&self, drive: &Drive, one: &Hides) -> Vec<(&'static str, f64)> {
         form_of(one, &Setting::of(drive, 1.0)).numbers
     }
 
-    /// Readings without noise.
-    pub fn run(&self, drive: &Drive, unit: &Unit, hidden: &[Hides]) -> (Motion, Readings) {
+    pub fn run(&self, drive: &Drive, unit: &Unit, hidden: &[Hides]) -> Record {
         let sessions = self.plan(drive, unit);
         let way = sessions.iter().flat_map(|session| &session.speed_rad_s).map(|v| v.abs() * STEP_S).sum();
         let setting = Setting::of(drive, way);

@@ -8,56 +8,45 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::hides::{Hides, Stranger, Thing};
 use crate::ARCSEC;
 use crate::cause::Cause;
 use crate::chance::Chance;
 use crate::drive::{Drive, Fixed, Unit};
-use crate::teeth::wrapped;
+use crate::hides::{Hides, Stranger, Thing};
+use crate::profile::Profile;
 
 /// Which laws.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Laws {
-    /// Of the joint in motion.
     D,
-    /// Of the bench for metrology.
     E,
 }
 
 /// The drive at one instant.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Place {
-    /// Time, s.
     pub time_s: f64,
     /// Share of the path of the generator that is done, 0..1.
     pub done: f64,
-    /// Sessions that are over.
     pub session: usize,
-    /// Generator angle, rad.
     pub generator_rad: f64,
-    /// Output angle, rad.
     pub output_rad: f64,
     /// Torque in the spring, N m, positive forward.
     pub torque_n_m: f64,
-    /// Of the teeth, °C.
     pub temperature_c: f64,
     /// Of the housing, which follows more slowly, °C.
     pub housing_c: f64,
-    /// Angle by which the housing is turned, rad.
     pub orientation_rad: f64,
 }
 
 /// The gear with what is hidden in it.
 pub struct Gear<'a> {
-    /// Catalogue.
     pub drive: &'a Drive,
-    /// Bench.
     pub unit: &'a Unit,
     laws: Laws,
-    /// What is hidden.
     pub hidden: &'a [Hides],
     /// Position error around a wheel, of each hidden effect that is one.
-    profiles: Vec<Vec<f64>>,
+    profiles: Vec<Profile>,
     /// Lines of the unit: order, amplitude, phase.
     lines: Vec<(f64, f64, f64)>,
     /// Deflection and torque at the corners of the catalogue's spring.
@@ -68,7 +57,6 @@ pub struct Gear<'a> {
 const PROFILE: usize = 2048;
 
 impl<'a> Gear<'a> {
-    /// Builds it.
     pub fn new(drive: &'a Drive, unit: &'a Unit, laws: Laws, hidden: &'a [Hides]) -> Self {
         let lines = drive.harmonics.iter().zip(&unit.harmonics);
         let lines =
@@ -91,12 +79,8 @@ impl<'a> Gear<'a> {
         let (mut middle, mut half) =
             (self.lines(at.generator_rad).0, 0.5 * self.drive.backlash_arcsec * self.unit.backlash);
         let (mut upper, mut lower) = ([0.0; 2], [0.0; 2]);
-        let held = self.drive.fixed;
-        let (on_flexspline, on_circular) = match held {
-            Fixed::Flexspline => (at.generator_rad, at.generator_rad - at.output_rad),
-            Fixed::CircularSpline => (at.generator_rad - at.output_rad, at.generator_rad),
-        };
-        let flank = if held == Fixed::Flexspline { 1.0 } else { -1.0 };
+        let [on_flexspline, on_circular] = self.drive.wheels_rad(at.generator_rad, at.output_rad);
+        let flank = if self.drive.fixed == Fixed::Flexspline { 1.0 } else { -1.0 };
         let rated = self.drive.rated_n_m;
         for (one, profile) in self.hidden.iter().zip(&self.profiles) {
             let (size, phase) = (one.size, one.phase(0));
@@ -132,7 +116,7 @@ impl<'a> Gear<'a> {
                     let flexspline = one.thing == Thing::Cause(Cause::FlexsplinePitchError);
                     let (x, sign) = if flexspline { (on_flexspline, 1.0) } else { (on_circular, -1.0) };
                     for (zone, x) in [x, x + PI].into_iter().enumerate() {
-                        let moved = sign * size * around(profile, x);
+                        let moved = sign * size * profile.at(x);
                         upper[zone] += moved;
                         lower[zone] += moved;
                     }
@@ -255,7 +239,6 @@ impl<'a> Gear<'a> {
         (torque + (x - from) / ARCSEC * self.drive.stiffness[part].1).copysign(deflection_arcsec)
     }
 
-    /// Deflection under a torque, arcsec.
     pub fn wind_up(&self, torque_n_m: f64, at: &Place) -> f64 {
         let mut x = self.drive.wind_up_arcsec(torque_n_m) / self.unit.stiffness;
         for _ in 0..30 {
@@ -297,7 +280,6 @@ impl<'a> Gear<'a> {
         sum
     }
 
-    /// Reading of the output's encoder at an output angle, rad.
     pub fn output_reading(&self, output_rad: f64) -> f64 {
         let mut reading = output_rad;
         for one in self.hidden {
@@ -324,7 +306,6 @@ impl<'a> Gear<'a> {
         reading
     }
 
-    /// Reading of the generator's encoder, rad.
     pub fn generator_reading(&self, generator_rad: f64) -> f64 {
         let mut reading = generator_rad;
         for one in self.hidden {
@@ -342,7 +323,6 @@ impl<'a> Gear<'a> {
         reading
     }
 
-    /// Size of a hidden effect, if it is there.
     pub fn size_of(&self, thing: Thing) -> Option<&Hides> {
         self.hidden.iter().find(|one| one.thing == thing)
     }
@@ -356,19 +336,17 @@ fn shared(limits: [f64; 2], press_arcsec: f64) -> f64 {
     least - spread * (0.5 * ((-(a - least) / spread).exp() + (-(b - least) / spread).exp())).ln()
 }
 
-fn around(profile: &[f64], angle_rad: f64) -> f64 {
-    let x = (angle_rad / TAU).rem_euclid(1.0) * PROFILE as f64;
-    let (at, part) = (x as usize % PROFILE, x.fract());
-    profile[at] + part * (profile[(at + 1) % PROFILE] - profile[at])
+/// The angle in -π..π.
+fn wrapped(angle_rad: f64) -> f64 {
+    angle_rad - TAU * (angle_rad / TAU).round()
 }
 
 /// Teeth out of place around a wheel, averaged over the engaged arc, for a size of one.
-fn profile(one: &Hides, laws: Laws) -> Vec<f64> {
+fn profile(one: &Hides, laws: Laws) -> Profile {
     if !matches!(one.thing, Thing::Cause(Cause::FlexsplinePitchError | Cause::CircularSplinePitchError)) {
-        return Vec::new();
+        return Profile::new(Vec::new());
     }
     let mut chance = Chance::new((1e9 * one.shape[1]) as u64, "teeth", 0);
-    let angle = |at: usize| TAU * at as f64 / PROFILE as f64;
     match laws {
         // Hobbed: two waves of the machine's table lead, the others fall as the square of their order.
         Laws::D => {
@@ -380,7 +358,7 @@ fn profile(one: &Hides, laws: Laws) -> Vec<f64> {
                     (k, own * arc.sin() / arc, chance.phase())
                 })
                 .collect();
-            (0..PROFILE).map(|at| lines.iter().map(|(k, a, p)| a * (k * angle(at) + p).sin()).sum()).collect()
+            Profile::sines(&lines, PROFILE)
         }
         // Cut in two passes by an indexing head that gained in each: a saw-tooth twice around, and one of another
         // height once.
@@ -393,7 +371,8 @@ fn profile(one: &Hides, laws: Laws) -> Vec<f64> {
                 })
                 .collect();
             let arc = PROFILE / 30;
-            (0..PROFILE).map(|at| (0..arc).map(|by| raw[(at + by) % PROFILE]).sum::<f64>() / arc as f64).collect()
+            let mean = |at: usize| (0..arc).map(|by| raw[(at + by) % PROFILE]).sum::<f64>() / arc as f64;
+            Profile::new((0..PROFILE).map(mean).collect())
         }
     }
 }

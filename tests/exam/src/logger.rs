@@ -1,34 +1,29 @@
 //! Faults of loggers and of those who set them up, on a drive that has nothing: it is exactly as its catalogue says. A
-//! name of a cause is wrong; the fault is to be told.
+//! name of a cause is wrong; the fault is to be reported.
 
-use serde::{Serialize, Serializer};
 use std::f64::consts::TAU;
 
-use super::joint::Poll;
 use crate::chance::Chance;
 use crate::drive::Drive;
+use crate::joint::Poll;
 
 macro_rules! faults {
-    ($($variant:ident $name:literal [$($told:literal),*]),* $(,)?) => {
-        /// One fault.
+    ($($variant:ident $name:literal [$($reported:literal),*]),* $(,)?) => {
         #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
         #[value(rename_all = "snake_case")]
-        #[allow(missing_docs, reason = "the names say it")]
         pub enum LoggerFault { $($variant),* }
 
         impl LoggerFault {
-            /// All.
             pub const ALL: &[Self] = &[$(Self::$variant),*];
 
-            /// In truth files.
             pub fn name(self) -> &'static str {
                 match self { $(Self::$variant => $name),* }
             }
 
-            /// Names in `diagnosis.json` that tell it, of faults and of causes that are the same thing; of none,
-            /// nothing in the angles is wrong, and silence is right.
-            pub fn told_by(self) -> &'static [&'static str] {
-                match self { $(Self::$variant => &[$($told),*]),* }
+            /// Names in `diagnosis.json` that report it, of faults and of causes that are the same thing. Where there are
+            /// none, nothing in the angles is wrong, and silence is right.
+            pub fn reported_as(self) -> &'static [&'static str] {
+                match self { $(Self::$variant => &[$($reported),*]),* }
             }
         }
     };
@@ -55,8 +50,8 @@ faults! {
 }
 
 impl LoggerFault {
-    /// Whether anything can be told: a clock that counts and rows that are left out harm no pair of angles.
-    pub fn is_to_be_told(self) -> bool {
+    /// Whether there is anything to report: a clock that counts and rows that are left out harm no pair of angles.
+    pub fn can_be_reported(self) -> bool {
         !matches!(self, Self::CountedClock | Self::DroppedRows)
     }
 
@@ -132,19 +127,13 @@ impl LoggerFault {
         }
     }
 
-    /// The catalogue that the diagnosis is told.
-    pub fn told(self, drive: &Drive) -> Drive {
-        let mut told = drive.clone();
+    /// The catalogue that the diagnosis is given.
+    pub fn catalogue(self, drive: &Drive) -> Drive {
+        let mut given = drive.clone();
         if self == Self::RatioOffByOne {
-            told.flexspline_teeth += 2;
-            told.circular_spline_teeth += 2;
+            given.flexspline_teeth += 2;
+            given.circular_spline_teeth += 2;
         }
-        told
-    }
-}
-
-impl Serialize for LoggerFault {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.name())
+        given
     }
 }

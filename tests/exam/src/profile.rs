@@ -1,0 +1,42 @@
+//! Errors around a wheel.
+
+use std::f64::consts::TAU;
+
+/// A periodic error around a wheel, by points of a turn between which it is straight.
+pub struct Profile(Vec<f64>);
+
+impl Profile {
+    /// By points of a turn.
+    pub fn new(points: Vec<f64>) -> Self {
+        Self(points)
+    }
+
+    /// Sum of sines at so many points: order, amplitude, phase.
+    pub fn sines(lines: &[(f64, f64, f64)], points: usize) -> Self {
+        let at = |point: usize| {
+            let angle = point as f64 / points as f64 * TAU;
+            lines.iter().map(|(order, amplitude, phase)| amplitude * (order * angle + phase).sin()).sum()
+        };
+        Self((0..points).map(at).collect())
+    }
+
+    /// Sum of sines at 1440 points.
+    pub fn of(lines: &[(f64, f64, f64)]) -> Self {
+        Self::sines(lines, 1440)
+    }
+
+    /// The same, as large as a sine of amplitude 1 in the mean square.
+    pub fn scaled(self) -> Self {
+        let square = self.0.iter().map(|x| x * x).sum::<f64>() / self.0.len() as f64;
+        let scale = (0.5 / square.max(1e-12)).sqrt();
+        Self(self.0.into_iter().map(|x| scale * x).collect())
+    }
+
+    /// At an angle.
+    pub fn at(&self, angle_rad: f64) -> f64 {
+        let points = self.0.len();
+        let place = (angle_rad / TAU).rem_euclid(1.0) * points as f64;
+        let (from, part) = (place as usize % points, place.fract());
+        self.0[from] + part * (self.0[(from + 1) % points] - self.0[from])
+    }
+}
