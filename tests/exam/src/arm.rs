@@ -27,7 +27,7 @@ pub const STRANGERS: &[Stranger] = &[
 
 const STEP_S: f64 = 5e-4;
 const PRESSURE_RAD: f64 = 0.44;
-/// Generator speed to which the drag of the grease is told, rad/s.
+/// Generator speed at which the size is the drag of the grease, rad/s.
 const DRAG_AT_RAD_S: f64 = 8.0;
 /// Torque, over the rated one, at which each part of the hysteresis slips, and its share once all slip; the first alone
 /// is the textbook's.
@@ -78,7 +78,7 @@ impl Arm {
         train::run(self, drive, unit, hidden, &self.plan(), &self.pace)
     }
 
-    /// What is asked and what the world does.
+    /// Commands and surroundings of each session.
     fn plan(&self) -> Vec<Session> {
         let mut chance = Chance::new(self.pace.seed, "arm", 0);
         let count = self.rows / self.sessions * self.pace.stride;
@@ -246,8 +246,7 @@ impl Laws for Arm {
             for zone in 0..2 {
                 let a = place(angle_rad, zone) - p - moved;
                 let sized = sized * if zone == 1 { 1.0 - 0.3 * d } else { 1.0 };
-                to.zones[zone][0] += sized * (a + PRESSURE_RAD).sin();
-                to.zones[zone][1] += sized * (a - PRESSURE_RAD).sin();
+                to.displaced(zone, sized, a, PRESSURE_RAD);
             }
         };
         match one.thing {
@@ -344,7 +343,7 @@ impl Laws for Arm {
                     let flow = (1.0 - 0.65 * d) * speed.clamp(-2.0, 2.0) + 0.65 * d * (speed / 0.2).tanh();
                     to.unseen_n_m -= size * thick * flow;
                 }
-                // The link hangs lower than it is told.
+                // The link hangs lower than its angle says.
                 Cause::GravityTorque => {
                     let a = now.output_rad + orientation + p;
                     to.unseen_n_m += size * (a + 0.45 * d * (a + q).sin()).sin();
@@ -409,7 +408,7 @@ impl Laws for Arm {
                     memory[0] += (now.load - memory[0]) * dt / (6.0 + 14.0 * one.shape[0]);
                     to.torque_n_m += self.torque_of(size) * (memory[0] - now.load);
                 }
-                // A press beside it strikes and the floor rings.
+                // A press next to it strikes and the floor rings.
                 Stranger::NeighbourMachine => {
                     let since = (now.time_s + 10.0 * one.shape[0]).rem_euclid(3.0 + 4.0 * one.shape[1]);
                     let rings = (TAU * (4.0 + 4.0 * one.shape[2]) * since).sin() * (-since / 0.6).exp();

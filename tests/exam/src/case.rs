@@ -21,7 +21,7 @@ use crate::record::Record;
 use crate::truth::{Hidden, Truth, rounded};
 use crate::variants::{self, Variant};
 
-/// What a case hides.
+/// Contents of a case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Kind {
     /// Nothing.
@@ -134,7 +134,7 @@ fn name_of(value: impl ValueEnum) -> String {
     value.to_possible_value().map_or(String::new(), |value| value.get_name().to_owned())
 }
 
-/// What the drive stands on.
+/// The bench of a drive.
 #[derive(Debug, Clone)]
 enum Stand {
     Joint(Joint),
@@ -453,7 +453,7 @@ impl Case {
     }
 }
 
-/// What a displaced axis cannot be told from while the housing never turns: gravity holds it in the housing, as the
+/// Cause that looks like a displaced axis while the housing never turns: gravity holds it in the housing, as the
 /// wheel does that the housing holds. The oracle's linear span does not see it where zones share by a law of their own.
 fn same_axis(cause: Cause, fixed: Fixed, orientation_rad: &[f64]) -> Option<Cause> {
     let held = if fixed == Fixed::Flexspline { Cause::FlexsplineRunout } else { Cause::CircularSplineEccentricity };

@@ -27,7 +27,7 @@ pub struct Harmonic {
     pub phase_rad: f64,
 }
 
-/// What the diagnosis is told: the catalogue.
+/// The catalogue: `nominal.toml` of the diagnosis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drive {
     pub flexspline_teeth: u32,
@@ -40,7 +40,7 @@ pub struct Drive {
     /// Load below which the output stays where it is inside the clearance, N m.
     pub friction_torque_n_m: f64,
     pub harmonics: Vec<Harmonic>,
-    /// Largest torque of the runs, N m. Not told.
+    /// Largest torque of the runs, N m. Not in `nominal.toml`.
     pub rated_n_m: f64,
 }
 
@@ -51,7 +51,7 @@ pub const BACKLASH_SPREAD: f64 = 0.05;
 pub const HARMONIC_SPREAD: f64 = 0.20;
 /// Spread of the phase of each line, rad.
 pub const PHASE_SPREAD_RAD: f64 = 0.05;
-/// Relative spread of the friction in the clearance. Not told: it moves single rows at a reversal.
+/// Relative spread of the friction in the clearance. Not in `nominal.toml`: it moves single rows at a reversal.
 pub const FRICTION_SPREAD: f64 = 0.02;
 
 impl Drive {
@@ -104,7 +104,7 @@ impl Drive {
         })
     }
 
-    /// Teeth of the wheel that stands still: the mesh repeats so many times per generator turn.
+    /// Teeth of the wheel that stands still: periods of the mesh per generator turn.
     pub fn mesh_order(&self) -> f64 {
         self.teeth_of(self.fixed)
     }

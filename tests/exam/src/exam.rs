@@ -42,7 +42,7 @@ pub struct Settings {
     pub draw: Draw,
 }
 
-/// What came of it.
+/// A run with its scores.
 #[derive(Serialize)]
 pub struct Examination {
     pub seed: u64,
@@ -149,7 +149,7 @@ fn wait(command: &mut Command) -> Result<(), String> {
     }
 }
 
-/// Does the work on so many threads; results in the order of the things.
+/// Does the work on these threads; results in the order of the things.
 fn in_parallel<T: Send, R: Send>(threads: usize, things: Vec<T>, work: impl Fn(T) -> R + Sync) -> Vec<R> {
     let results: Mutex<Vec<(usize, R)>> = Mutex::new(Vec::with_capacity(things.len()));
     let queue: Mutex<VecDeque<(usize, T)>> = Mutex::new(things.into_iter().enumerate().collect());

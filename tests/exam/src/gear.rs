@@ -66,7 +66,7 @@ impl<'a> Gear<'a> {
         Self { drive, unit, laws, hidden, profiles, lines, corners, ratio: drive.ratio() }
     }
 
-    /// Motion of the teeth beside the exact ratio that the catalogue's lines make, arcsec, and its slope, arcsec/rad.
+    /// Motion of the teeth by the catalogue's lines on top of the exact ratio, arcsec, and its slope, arcsec/rad.
     pub fn lines(&self, generator_rad: f64) -> (f64, f64) {
         self.lines.iter().fold((0.0, 0.0), |(sum, slope), (order, amplitude, phase)| {
             let (sin, cos) = (order * generator_rad + phase).sin_cos();
@@ -74,7 +74,7 @@ impl<'a> Gear<'a> {
         })
     }
 
-    /// Lowest and highest position of the hub beside generator angle over ratio, arcsec.
+    /// Lowest and highest position of the hub relative to generator angle over ratio, arcsec.
     pub fn limits(&self, at: &Place) -> (f64, f64) {
         let (mut middle, mut half) =
             (self.lines(at.generator_rad).0, 0.5 * self.drive.backlash_arcsec * self.unit.backlash);
@@ -252,7 +252,7 @@ impl<'a> Gear<'a> {
         x
     }
 
-    /// Torque on the flange before the sensor, that the sensor does not tell, N m.
+    /// Torque on the flange before the sensor, N m.
     pub fn unseen(&self, at: &Place, output_speed_rad_s: f64) -> f64 {
         let mut sum = 0.0;
         for one in self.hidden {
@@ -284,7 +284,7 @@ impl<'a> Gear<'a> {
         let mut reading = output_rad;
         for one in self.hidden {
             match one.thing {
-                // A disc whose centre is beside the axis, read by one head.
+                // A disc whose centre is off the axis, read by one head.
                 Thing::Cause(Cause::OutputEncoderEccentricity) => {
                     let e = one.size / ARCSEC;
                     let (sin, cos) = (output_rad + one.phase(0)).sin_cos();
@@ -328,7 +328,7 @@ impl<'a> Gear<'a> {
     }
 }
 
-/// Where the hub rests on two zones that stop it at these positions, beside half the clearance.
+/// Where the hub rests on two zones that stop it at these positions, without half the clearance.
 fn shared(limits: [f64; 2], press_arcsec: f64) -> f64 {
     let spread = 0.4 + 0.6 * press_arcsec;
     let [a, b] = limits;

@@ -23,7 +23,7 @@ const STEP_S: f64 = 1e-3;
 const MICROSTEPS: f64 = 3200.0;
 const POLES: f64 = 50.0;
 const PRESSURE_RAD: f64 = 0.38;
-/// Generator speed to which the drag of the grease is told, rad/s.
+/// Generator speed at which the size is the drag of the grease, rad/s.
 const DRAG_AT_RAD_S: f64 = 4.0;
 
 #[derive(Debug, Clone)]
@@ -67,7 +67,7 @@ impl Gimbal {
         train::run(self, drive, unit, hidden, &self.plan(), &self.pace)
     }
 
-    /// What is asked and what the world does.
+    /// Commands and surroundings of each session.
     fn plan(&self) -> Vec<Session> {
         let mut chance = Chance::new(self.pace.seed, "gimbal", 0);
         let count = self.rows / self.sessions * self.pace.stride;
@@ -231,8 +231,7 @@ impl Laws for Gimbal {
                     for zone in 0..2 {
                         let a = place(circular, zone) - p;
                         let sized = size / (1.0 + 0.8 * d * load);
-                        to.zones[zone][0] += sized * (a + PRESSURE_RAD).sin();
-                        to.zones[zone][1] += sized * (a - PRESSURE_RAD).sin();
+                        to.displaced(zone, sized, a, PRESSURE_RAD);
                         to.both(zone, 0.25 * d * size * (2.0 * a + q).sin());
                     }
                 }
@@ -240,8 +239,7 @@ impl Laws for Gimbal {
                 Cause::FlexsplineRunout => {
                     for zone in 0..2 {
                         let a = place(flexspline, zone) - p;
-                        to.zones[zone][0] += size * (a + PRESSURE_RAD).sin();
-                        to.zones[zone][1] += size * (a - PRESSURE_RAD).sin();
+                        to.displaced(zone, size, a, PRESSURE_RAD);
                         to.both(zone, d * size * (0.45 * (2.0 * a + q).sin() + 0.2 * (3.0 * a + r).sin()));
                     }
                 }
@@ -336,8 +334,7 @@ impl Laws for Gimbal {
                     for zone in 0..2 {
                         let a = place(now.generator_rad + now.orientation_rad, zone) - p;
                         let sized = size * (1.0 - 0.4 * d * load);
-                        to.zones[zone][0] += sized * (a + PRESSURE_RAD).sin();
-                        to.zones[zone][1] += sized * (a - PRESSURE_RAD).sin();
+                        to.displaced(zone, sized, a, PRESSURE_RAD);
                         to.both(zone, 0.3 * d * size * (2.0 * a + q).sin());
                     }
                 }
@@ -417,8 +414,8 @@ impl Laws for Gimbal {
     }
 }
 
-/// Wind-up that a spring of this factor of stiffness takes off `own`; the factor and its slope are told of the wind-up
-/// over that at the rated load.
+/// Wind-up that a spring of this factor of stiffness takes off `own`; the factor and its slope are functions of the
+/// wind-up over that at the rated load.
 pub(super) fn hardened(own: f64, rated: f64, stiffer: impl Fn(f64) -> (f64, f64)) -> f64 {
     let mut at = own.abs() / stiffer(own.abs() / rated).0.sqrt();
     for _ in 0..8 {

@@ -1,4 +1,4 @@
-//! What is hidden in a case of families D, E and F: a cause of the contract, or something that no cause of it is.
+//! Hidden effects: a cause of the contract, or a stranger to it.
 
 use crate::cause::Cause;
 use crate::chance::Chance;

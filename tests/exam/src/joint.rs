@@ -22,7 +22,7 @@ pub const STEP_S: f64 = 1.25e-4;
 /// Steps that a late read may reach back: 64 ms.
 const PAST: usize = 512;
 
-/// What the setpoint does for a while.
+/// A part of the setpoint.
 #[derive(Debug, Clone, Copy)]
 enum Move {
     /// Turns at a speed, rad/s.
@@ -33,7 +33,7 @@ enum Move {
     Swing(f64, f64),
 }
 
-/// What the brake does in a session.
+/// Brake in a session.
 #[derive(Debug, Clone, Copy)]
 enum Brake {
     /// One torque, as a share of the rated one.
@@ -62,17 +62,17 @@ struct Session {
 #[derive(Debug, Clone, Copy)]
 pub struct Poll {
     pub row_s: f64,
-    /// How late a row is, rms, s; its time stamp tells.
+    /// How late a row is, rms, s; the time stamp has it.
     pub late_s: f64,
-    /// The output is read so much later than the generator, s. The stamp does not tell.
+    /// The output is read so much later than the generator, s. The stamp does not have it.
     pub skew_s: f64,
-    /// Scatter of both instants, rms, s. The stamp does not tell.
+    /// Scatter of both instants, rms, s. The stamp does not have it.
     pub jitter_s: f64,
     /// Share of the rows whose output is read late, by half a millisecond and more with a heavy tail.
     pub late_reads: f64,
     /// Seconds by which the logger stands still after every fiftieth row, at least and at most.
     pub stalls_s: (f64, f64),
-    /// Time is the number of the row times so many periods, not a clock.
+    /// Time is the number of the row times this share of the period, not a clock.
     pub counted: Option<f64>,
 }
 
@@ -171,7 +171,7 @@ impl Joint {
         }
     }
 
-    /// What the encoders read, without noise, and what the torque sensor and the thermometer tell.
+    /// Readings without noise.
     pub fn run(&self, drive: &Drive, unit: &Unit, hidden: &[Hides]) -> Record {
         let gear = Gear::new(drive, unit, Laws::D, hidden);
         let ratio = drive.ratio();
@@ -232,7 +232,7 @@ impl Joint {
         let (low, high) = gear.limits(place);
         let teeth = state.generator_rad / ratio * ARCSEC;
         let hub = free.clamp(teeth + low, teeth + high);
-        // Spring and what slips beside it.
+        // Spring and the friction parallel to it.
         let x = state.output_arcsec() - hub;
         // Between the flanks the hub has neither mass nor speed of its own, so nothing for the damper to hold on to.
         let pushed = hub != free;
@@ -369,7 +369,7 @@ struct State {
     /// Part of it that slips.
     slipping_n_m: f64,
     deflection_arcsec: f64,
-    /// What the torque sensor feels, N m.
+    /// At the torque sensor, N m.
     sensor_n_m: f64,
     coupling_n_m: f64,
 }
@@ -397,7 +397,7 @@ impl State {
         self.output_rad * ARCSEC
     }
 
-    /// Solid friction beside the spring after Dahl (1968): it nears its limit as an exponential of the path.
+    /// Solid friction parallel to the spring after Dahl (1968): it nears its limit as an exponential of the path.
     fn slip(&mut self, gear: &Gear, x: f64) {
         let Some(one) = gear.size_of(Thing::Cause(Cause::TorsionalHysteresis)) else { return };
         let stiffness = gear.drive.first_stiffness() / ARCSEC;
@@ -554,7 +554,7 @@ impl<'a> Log<'a> {
         }
     }
 
-    /// What a channel was at an instant.
+    /// Value of a channel at an instant.
     fn at(&self, time_s: f64, channel: usize) -> f64 {
         let newest = self.past.len() - 1;
         let back = ((self.past[newest][0] - time_s) / STEP_S).clamp(0.0, newest as f64);

@@ -20,8 +20,8 @@ macro_rules! faults {
                 match self { $(Self::$variant => $name),* }
             }
 
-            /// Names in `diagnosis.json` that report it, of faults and of causes that are the same thing. Where there are
-            /// none, nothing in the angles is wrong, and silence is right.
+            /// Names in `diagnosis.json` that report it, of faults and of causes that are the same thing. Where there
+            /// are none, nothing in the angles is wrong, and silence is right.
             pub fn reported_as(self) -> &'static [&'static str] {
                 match self { $(Self::$variant => &[$($reported),*]),* }
             }
@@ -67,7 +67,7 @@ impl LoggerFault {
         }
     }
 
-    /// What it does to the rows: time, generator, output, torque, temperature, orientation.
+    /// Damages the rows: time, generator, output, torque, temperature, orientation.
     pub fn spoil(self, rows: &mut Vec<[f64; 6]>, session_start: &[usize], drive: &Drive, chance: &mut Chance) {
         match self {
             Self::TorqueSign => rows.iter_mut().for_each(|row| row[3] = -row[3]),

@@ -41,7 +41,7 @@ struct Session {
     drift_c: f64,
     settles_s: f64,
     orientation_rad: f64,
-    /// What the bench itself drifts by, arcsec, and its time constant, s.
+    /// Drift of the bench itself, arcsec, and its time constant, s.
     bench: (f64, f64),
     /// Set to zero anew: shift of the output's reading, arcsec.
     zero_arcsec: f64,
@@ -108,7 +108,7 @@ impl Metrology {
         self.sessions.iter().map(|s| (s.zero_arcsec / ARCSEC, s.restarted * TAU)).collect()
     }
 
-    /// What is read without noise, before the bench is set to zero.
+    /// Readings without noise, before the bench is set to zero.
     pub fn run(&self, drive: &Drive, unit: &Unit, hidden: &[Hides]) -> Record {
         let gear = Gear::new(drive, unit, Laws::E, hidden);
         let mut record = Record::new(ROW_S, self.orientation_known);
@@ -179,7 +179,7 @@ impl Metrology {
     }
 }
 
-/// Effects of the bench beside the drive, arcsec.
+/// Effects of the bench on the reading, arcsec.
 fn bench_adds(gear: &Gear, place: Place, stop: &Stop, since_s: f64) -> f64 {
     let mut sum = 0.0;
     for one in gear.hidden {

@@ -7,7 +7,7 @@ use crate::chance::Chance;
 use crate::drive::Drive;
 use crate::record::Record;
 
-/// What the sensors add.
+/// Noise and steps of the sensors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sensors {
     /// White noise of the output reading, standard deviation.

@@ -1,4 +1,4 @@
-//! What could be known at best of a case: how far an effect stands out of the noise once the
+//! Best knowledge that a case allows: how far an effect stands out of the noise once the
 //! catalogue's parameters have floated, and which causes are like it on these rows.
 //!
 //! An effect is weighed by what it adds to the residual of the catalogue's model, read at the angles and the torque
@@ -40,7 +40,7 @@ pub fn nominal(drive: &Drive, unit: &Unit, generator_rad: &[f64], torque_n_m: &[
     .unzip()
 }
 
-/// What the catalogue leaves of clean readings, arcsec.
+/// Residual of the catalogue's model at clean readings, arcsec.
 pub fn residual(drive: &Drive, run: &Record) -> Vec<f64> {
     let model = nominal(drive, &Unit::nominal(drive), &run.generator_read_rad, &run.torque_n_m).0;
     difference(&run.error_arcsec(drive.ratio()), &model)
@@ -139,7 +139,7 @@ impl<'a> Oracle<'a> {
         }
     }
 
-    /// What an effect adds, from the residuals with it and without it.
+    /// Contribution of an effect, from the residuals with it and without it.
     pub fn added(&self, with: &[f64], without: &[f64]) -> Vec<f64> {
         self.picks.iter().zip(&self.weighed).map(|(at, weight)| weight * (with[*at] - without[*at])).collect()
     }

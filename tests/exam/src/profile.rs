@@ -11,7 +11,7 @@ impl Profile {
         Self(points)
     }
 
-    /// Sum of sines at so many points: order, amplitude, phase.
+    /// Sum of sines at these points of a turn: order, amplitude, phase.
     pub fn sines(lines: &[(f64, f64, f64)], points: usize) -> Self {
         let at = |point: usize| {
             let angle = point as f64 / points as f64 * TAU;

@@ -1,4 +1,4 @@
-//! What a bench records, row by row, and what its sensors would read without noise.
+//! Rows of a bench with the readings of its encoders without noise.
 
 use std::f64::consts::TAU;
 

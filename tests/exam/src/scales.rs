@@ -2,7 +2,7 @@
 
 use crate::noise::Whitening;
 
-/// What contributions are weighed on: the noise, and what may float beside them.
+/// Scales for contributions: the noise, and the columns that may float.
 pub struct Scales {
     whitening: Whitening,
     nuisance: Vec<Vec<f64>>,
@@ -23,7 +23,7 @@ pub const FREE: f64 = 1e-9;
 pub struct Weight {
     /// Distance from the best fit without it, in standard deviations of the noise.
     pub d: f64,
-    /// What the base parameters do not take up within two standard deviations of their spread, rms.
+    /// Part that the base parameters do not take up within two standard deviations of their spread, rms.
     pub rms_arcsec: f64,
 }
 
@@ -110,7 +110,7 @@ pub fn rms(values: &[f64]) -> f64 {
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
-    // Eight sums beside each other, so that the processor has no need to wait for one.
+    // Eight sums in parallel, so that the processor has no need to wait for one.
     let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<8>(), b.as_chunks::<8>());
     let mut sums = [0.0; 8];
     for (a, b) in a.iter().zip(b) {

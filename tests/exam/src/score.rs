@@ -69,7 +69,7 @@ pub struct Judged {
     pub kind: String,
     pub family: String,
     pub bench: Vec<String>,
-    /// What is hidden, with the times over the limit.
+    /// Hidden effects with the times over the limit.
     pub hidden: Vec<(String, f64)>,
     /// Causes that were named.
     pub named: Vec<String>,
@@ -77,7 +77,7 @@ pub struct Judged {
     pub faults: Vec<String>,
     /// Verdict, or what went wrong.
     pub verdict: String,
-    /// What was asked of this case, by the name of its rate.
+    /// Answers to what is asked of this case, by the name of the rate.
     pub asked: Vec<(String, bool)>,
     pub said: Vec<Said>,
     /// Share of the removable variance that was removed.
@@ -178,7 +178,7 @@ pub fn judge(truth: &Truth, answer: &Result<Answer, String>, seconds: f64) -> Ju
     judged
 }
 
-/// What is asked where a cause that counts is hidden.
+/// Asks what a hidden cause that counts allows.
 fn judge_names(judged: &mut Judged, truth: &Truth, answer: &Answer) {
     let is_hidden = |name: &str| truth.hidden.iter().any(|hidden| hidden.is_called(name));
     let is = |name: &str| truth.hidden.iter().any(|hidden| hidden.name == name);
@@ -242,7 +242,7 @@ fn judge_names(judged: &mut Judged, truth: &Truth, answer: &Answer) {
     }
 }
 
-/// What came of the names that were said with a confidence.
+/// Names that were said with a confidence.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Level {
     /// Least confidence.

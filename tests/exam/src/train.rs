@@ -1,6 +1,6 @@
-//! What families G and H have in common: the march in time of a generator, teeth with clearance, a hub that the friction
-//! of the housing holds, a spring, a flange, a torque sensor and a load with inertia. The laws of what is hidden, the
-//! generator's motor, the run and the load are each family's own (`gimbal.rs`, `arm.rs`).
+//! The march in time that families G, H and V share: a generator, teeth with clearance, a hub that the friction of the
+//! housing holds, a spring, a flange, a torque sensor and a load with inertia. The models of hidden effects, the
+//! generator's motor, the run and the load are each family's own (`gimbal.rs`, `arm.rs`, `variants.rs`).
 //!
 //! Angles at the output are arcsec here. A torque is positive where it turns the output forward.
 
@@ -12,7 +12,7 @@ use crate::drive::{Drive, Unit};
 use crate::hides::Hides;
 use crate::record::{Record, Row};
 
-/// What a law may ask of an instant.
+/// The drive at one instant.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Now {
     pub step_s: f64,
@@ -34,7 +34,7 @@ pub struct Now {
     pub torque_n_m: f64,
     /// The same over the rated torque, signed.
     pub load: f64,
-    /// What the column says.
+    /// In the log.
     pub column_c: f64,
     /// The gear itself: behind the column by a lag.
     pub gear_c: f64,
@@ -48,7 +48,7 @@ pub struct Now {
     pub wheel_rad: [f64; 2],
 }
 
-/// What hidden effects add at an instant.
+/// Additions of hidden effects at an instant.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Adds {
     /// Places of the flanks that bear forward and backward load, in each of the two zones of contact.
@@ -70,25 +70,31 @@ impl Adds {
         self.zones[zone][1] += arcsec;
     }
 
-    /// More clearance, so much on the forward and on the backward side.
+    /// A displaced axis at an angle to a zone, which the two flanks feel in directions `pressure_rad` to either side.
+    pub fn displaced(&mut self, zone: usize, arcsec: f64, angle_rad: f64, pressure_rad: f64) {
+        self.zones[zone][0] += arcsec * (angle_rad + pressure_rad).sin();
+        self.zones[zone][1] += arcsec * (angle_rad - pressure_rad).sin();
+    }
+
+    /// More clearance on the forward and on the backward side.
     pub fn wider(&mut self, forward: f64, backward: f64) {
         self.flanks[0] += forward;
         self.flanks[1] -= backward;
     }
 }
 
-/// What a law remembers.
+/// Memory of a model.
 pub type Memory = [f64; 6];
 /// Hidden effects at a time, at most.
 const MOST: usize = 3;
 
-/// What each family has of its own.
+/// Models of a family.
 pub trait Laws {
     /// How much the nearer of two zones still carries alone: 1 without load, 0 once both bear alike. `over` is the
     /// deflection of one zone under the whole load over the distance between the two.
     fn alone(&self, over: f64) -> f64;
     fn add(&self, one: &Hides, now: &Now, memory: &mut Memory, to: &mut Adds);
-    /// What an effect adds to the wind-up, arcsec, under this torque, at which the unit alone winds up by `own`. The
+    /// Wind-up that an effect adds, arcsec, under this torque, at which the unit alone winds up by `own`. The
     /// memory is a trial that is thrown away where the torque turns out otherwise.
     fn wind_up(&self, one: &Hides, own: f64, torque_n_m: f64, now: &Now, memory: &mut Memory) -> f64;
     /// One step of the generator's motor: `state` is angle and speed, `wanted` what is asked of it.
@@ -108,7 +114,7 @@ pub struct Session {
     pub column_c: Vec<f64>,
     /// Of the housing about its axis.
     pub orientation_rad: f64,
-    /// What hangs on the output: torque and phase.
+    /// Torque and phase of the load that hangs on the output.
     pub hung: (f64, f64),
     /// Load and flange together.
     pub inertia_kg_m2: f64,

@@ -1,4 +1,4 @@
-//! What is true of a case, and what an oracle could know of it.
+//! The truth of a case with the verdict of the oracle.
 
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -10,7 +10,7 @@ pub struct Hidden {
     pub name: String,
     /// Size and shape, by name.
     pub numbers: BTreeMap<String, f64>,
-    /// What it adds to the error beyond what base parameters take up, rms, the others present.
+    /// Part of the error that base parameters do not take up, rms, the others present.
     pub rms_arcsec: f64,
     /// Distance from the best fit without it, standard deviations.
     pub d: f64,
@@ -47,7 +47,7 @@ pub struct Truth {
     pub family: String,
     /// No case lacks excitation any more; files keep the field.
     pub poor: [(); 0],
-    /// What the bench of family E does beyond the drive; form of each cause of family V.
+    /// Habits of the bench of family E; form of each cause of family V.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub bench: Vec<String>,
     pub hidden: Vec<Hidden>,

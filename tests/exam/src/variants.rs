@@ -27,7 +27,7 @@ const SHARINGS: [&str; 4] = ["springs", "exponential", "hertz", "arctangent"];
 #[derive(Debug, Clone)]
 pub struct Variant {
     pub pace: Pace,
-    /// About so many, in all sessions.
+    /// About as many in all sessions.
     pub rows: usize,
     /// How two zones share, of [`SHARINGS`].
     sharing: usize,
@@ -36,7 +36,7 @@ pub struct Variant {
     load_hz: f64,
 }
 
-/// What is asked of the generator in a part of a session.
+/// Part of a session.
 #[derive(Debug, Clone, Copy)]
 enum Part {
     /// On at one speed, for about an output turn.

@@ -1,4 +1,4 @@
-//! What forms are made of: numbers that are drawn and written down, profiles around a wheel, ways of warmth.
+//! Parts of forms: numbers that are drawn and written down, profiles around a wheel, ways of warmth.
 
 use std::f64::consts::TAU;
 
@@ -34,7 +34,7 @@ impl Form {
     }
 }
 
-/// What a form may know of drive and run.
+/// Drive and run of a form.
 #[derive(Debug, Clone, Copy)]
 pub struct Setting {
     /// Generator turns per output turn, signed.

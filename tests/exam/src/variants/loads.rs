@@ -13,7 +13,7 @@ pub const RESONANCE: &[&str] = &["quadratic", "dry", "play", "duffing", "two_mod
 
 /// Speed and temperature at which `size` is the drag.
 const DRAG_AT: (f64, f64) = (10.0, 20.0);
-/// The film does not get thicker than so many times what it is at 20 °C: starved.
+/// The film does not get thicker than this factor over 20 °C: starved.
 const THICKEST: f64 = 15.0;
 
 /// Drag `size` at 10 rad/s of the generator and 20 °C, against the motion.
@@ -56,7 +56,7 @@ pub fn drag(name: &'static str, n: &mut Numbers, setting: &Setting) -> Form {
     })
 }
 
-/// What hangs on the output: `size` is mass times lever.
+/// Load that hangs on the output: `size` is mass times lever.
 pub fn arm(name: &'static str, n: &mut Numbers) -> Form {
     let phase = n.phase("phase_rad");
     let sag = n.log("sag_rad", 0.05, 0.4);
@@ -70,7 +70,7 @@ pub fn arm(name: &'static str, n: &mut Numbers) -> Form {
         let torque = match name {
             // The lever bends towards the ground.
             "sagging" => (at - sag * hangs).sin(),
-            // A spring with its foot beside the axis takes a share of it.
+            // A spring with its foot off the axis takes a share of it.
             "spring_balanced" => {
                 let long = (1.0 + lever * lever + 2.0 * lever * at.cos()).max(0.16).sqrt();
                 hangs * (1.0 - share * (1.0 - 0.6 / long) / (1.0 - 0.6))
