@@ -307,7 +307,6 @@ fn every_command_prints_one_json_object_and_nothing_else() {
         "replay --tables out/cam.fxt measured.csv",
         "bundle --tables out --no-core --out bundle",
         "export --format fmu --tables out/cam.fxt",
-        "export --format fmu --tables out/cam.fxt --fmi 3.0",
         "export --format cfs --tables out/cam.fxt",
         "validate --tables out --mesh coarse --solver fast --torques 2 --positions 1 --temperatures 1 --no-report",
         "synthesize --list",

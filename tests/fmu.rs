@@ -13,10 +13,7 @@ use flexspline::*;
 use flexspline_motion::flight::{COMPENSATED, START_UP_S, fly_one};
 use flexspline_sim::fly::{built_in, unit};
 use flexspline_tests::command::Desk;
-use importer::{DISCARD, ERROR, FUNCTIONS, Imported, Instance, LogMessage, OK, WARNING};
-
-/// Versions of FMI.
-const VERSIONS: [&str; 2] = ["2.0", "3.0"];
+use importer::{DISCARD, ERROR, FUNCTIONS, Imported, Instance, OK, WARNING};
 
 /// A desk with the table of the cam.
 fn desk() -> Desk {
@@ -30,19 +27,11 @@ fn desk() -> Desk {
 fn imported(desk: &Desk, options: &str) -> Imported {
     let exported = desk.line(&format!("export --format fmu --json --out fmu {options}")).done().json();
     let file = desk.path(exported["written"][0].as_str().unwrap());
-    let [model, fmi] = ["model", "fmi"].map(|name| exported[name].as_str().unwrap());
-    let folder = desk.path(&format!("100 % {model} {fmi}"));
+    let folder = desk.path(&format!("100 % {}", exported["model"].as_str().unwrap()));
     let imported = Imported::new(&file, &folder);
     assert_eq!(exported["guid"], imported.guid());
-    assert_eq!(exported["platforms"][0], if imported.three { "x86_64-linux" } else { "linux64" });
+    assert_eq!((exported["platforms"][0].as_str(), exported["fmi"].as_str()), (Some("linux64"), Some("2.0")));
     imported
-}
-
-/// The FMU of the table in each version.
-fn in_each_version(desk: &Desk, check: impl Fn(&Imported)) {
-    for fmi in VERSIONS {
-        check(&imported(desk, &format!("--tables cam.fxt --fmi {fmi}")));
-    }
 }
 
 /// Target, rate, torque and temperature of a tick: slews both ways, a load that changes its sign, warming in steps.
@@ -82,15 +71,13 @@ fn ticked(instance: &Instance<'_>, tick: u32) -> ([u64; 7], [c_int; 4]) {
 #[test]
 fn the_fmu_of_a_table_gives_the_bits_of_the_core() {
     let desk = desk();
-    let fmus = VERSIONS.map(|fmi| imported(&desk, &format!("--tables cam.fxt --fmi {fmi}")));
-    let instances = fmus.each_ref().map(|fmu| fmu.ready("one", &[("drive_temperature", asked(0)[3])]));
+    let fmu = imported(&desk, "--tables cam.fxt");
+    let instance = fmu.ready("one", &[("drive_temperature", asked(0)[3])]);
     let image = std::fs::read(desk.path("cam.fxt")).unwrap();
     let twin = image.clone();
     let images = Images::new(&image, &twin);
     let drive = *Table::check(&image).unwrap().drive();
-    for instance in &instances {
-        assert_eq!(instance.text("table_id"), Table::check(&image).unwrap().id().to_string());
-    }
+    assert_eq!(instance.text("table_id"), Table::check(&image).unwrap().id().to_string());
     let limits = Limits {
         tick_s: 1e-3,
         rate_rad_s: 0.05,
@@ -134,10 +121,7 @@ fn the_fmu_of_a_table_gives_the_bits_of_the_core() {
         ]);
         let not_corrected = out.flags.contains(Flags::NOT_CORRECTED);
         let numbers = [out.quality as c_int, c_int::from(out.flags.bits()), 1, c_int::from(not_corrected)];
-        for (instance, fmi) in instances.iter().zip(VERSIONS) {
-            assert_eq!(ticked(instance, tick), (wanted, numbers), "FMI {fmi}, tick {tick}");
-            assert_eq!(instance.reals(["time"]), [instance.time.get()]);
-        }
+        assert_eq!(ticked(&instance, tick), (wanted, numbers), "tick {tick}");
         corrected = corrected.max(arcsec(out.correction_rad).abs());
     }
     // It did correct, and the temperature did come through.
@@ -148,9 +132,8 @@ fn the_fmu_of_a_table_gives_the_bits_of_the_core() {
 fn a_state_goes_on_with_the_same_bits_here_and_in_another_instance() {
     let desk = desk();
     let models = ["--tables cam.fxt", "--tables cam.fxt --model joint --scenario camera"];
-    let mut runs = Vec::new();
-    for (options, fmi) in models.into_iter().flat_map(|options| VERSIONS.map(|fmi| (options, fmi))) {
-        let fmu = imported(&desk, &format!("{options} --fmi {fmi}"));
+    for options in models {
+        let fmu = imported(&desk, options);
         let joint = options.contains("joint");
         let run = |instance: &Instance<'_>, ticks: std::ops::Range<u32>| -> Vec<u64> {
             let mut all = Vec::new();
@@ -209,19 +192,13 @@ fn a_state_goes_on_with_the_same_bits_here_and_in_another_instance() {
         }
         assert_eq!(instance.deserialised(&bytes[..bytes.len() - 8], &mut state), ERROR);
         assert_eq!(instance.deserialised(&[], &mut state), ERROR);
-        runs.push(first);
     }
-    let [table, table_three, joint, joint_three] = &runs[..] else { panic!("{}", runs.len()) };
-    assert!(table == table_three && joint == joint_three, "both versions give the same bits");
 }
 
 #[test]
 fn steps_of_any_size_make_whole_ticks_and_carry_the_rest() {
     let desk = desk();
-    in_each_version(&desk, steps_make_whole_ticks);
-}
-
-fn steps_make_whole_ticks(fmu: &Imported) {
+    let fmu = imported(&desk, "--tables cam.fxt");
     let inputs = [("output_angle_command", 0.02), ("output_torque", 12.0)];
     let after = |steps: &[f64]| {
         let instance = fmu.ready("one", &inputs);
@@ -357,28 +334,19 @@ fn the_joint_keeps_its_books_and_the_table_takes_its_error_out() {
 #[test]
 fn calls_in_a_wrong_state_and_wrong_arguments_are_refused_with_a_line_in_the_log() {
     let desk = desk();
-    in_each_version(&desk, wrong_calls_are_refused);
-}
-
-fn wrong_calls_are_refused(fmu: &Imported) {
+    let fmu = imported(&desk, "--tables cam.fxt");
     // Nothing comes of the wrong model, description, kind or folder, and it is said why.
     let (guid, location) = (fmu.guid(), fmu.location());
-    let nowhere = if fmu.three { "/nowhere at 100%" } else { "file:///nowhere%20at%20100%25" };
-    // Of FMI 3.0 events, which stand here for another kind.
-    let (kind, said) = if fmu.three { (2, "eventModeUsed") } else { (0, "model exchange") };
     for (name, kind, guid, location, why) in [
-        ("one", kind, &*guid, &*location, said),
+        ("one", 0, &*guid, &*location, "model exchange"),
         ("one", 1, "{0}", &location, "guid"),
         ("", 1, &guid, &location, "instance name"),
-        ("one", 1, &guid, nowhere, "/nowhere at 100%/model.txt"),
+        ("one", 1, &guid, "file:///nowhere%20at%20100%25", "/nowhere at 100%/model.txt"),
         ("one", 1, &guid, "http://x/resources", "allowed: file:///folder"),
     ] {
         let Err(log) = fmu.instance_with(name, kind, guid, location) else { panic!("{why} was made") };
         let [line] = &log[..] else { panic!("{why}: {log:?}") };
-        assert!(
-            line.message.contains(why) && line.status == ERROR && (fmu.three || line.instance == name),
-            "{why}: {line:?}"
-        );
+        assert!(line.message.contains(why) && line.status == ERROR && line.instance == name, "{why}: {line:?}");
     }
 
     let instance = fmu.instance("one");
@@ -391,15 +359,10 @@ fn wrong_calls_are_refused(fmu: &Imported) {
     refused(&instance, instance.call("ExitInitializationMode"), "\"instantiated\"");
     refused(&instance, instance.call("Terminate"), "Terminate");
     refused(&instance, instance.step(1e-3), "DoStep");
-    if fmu.three {
-        assert_eq!((instance.reals(["tick", "time"]), instance.enter()), ([1e-3, 0.0], OK));
-        refused(&instance, instance.enter(), "\"initialization mode\"");
-    } else {
-        refused(&instance, instance.get_reals(&[0], &mut [0.0]), "fmi2GetReal");
-        // Without an experiment it starts at 0, with a warning.
-        assert_eq!(instance.enter(), WARNING);
-        refused(&instance, instance.set_up(None), "\"initialization mode\"");
-    }
+    refused(&instance, instance.get_reals(&[0], &mut [0.0]), "fmi2GetReal");
+    // Without an experiment it starts at 0, with a warning.
+    assert_eq!(instance.enter(), WARNING);
+    refused(&instance, instance.set_up(None), "\"initialization mode\"");
     refused(&instance, instance.step(1e-3), "DoStep");
     instance.set("output_angle_command", 0.1);
     let [command, ratio] = instance.reals(["generator_angle_command", "ratio"]);
@@ -411,7 +374,6 @@ fn wrong_calls_are_refused(fmu: &Imported) {
     refused(&instance, instance.try_set("mode", 7.0), "mode: found 7, allowed: 0 to 3");
     refused(&instance, instance.get_reals(&[4_000_000_000], &mut [0.0]), "value reference 4000000000");
     refused(&instance, instance.get_reals(&[fmu.reference("tick_flags")], &mut [0.0]), "of another type");
-    refused(&instance, instance.try_set("time", 1.0), "time cannot be set at all");
     // A legal call is a mode that cannot follow: warned of, and the mode stays.
     instance.set("mode", 3.0);
     assert_eq!(instance.step(1e-3), OK);
@@ -442,39 +404,33 @@ fn wrong_calls_are_refused(fmu: &Imported) {
 #[test]
 fn no_function_falls_over_null_pointers_and_strange_components() {
     let desk = desk();
-    in_each_version(&desk, nothing_falls_over);
-}
-
-fn nothing_falls_over(fmu: &Imported) {
-    let version = if fmu.three { "fmi3" } else { "fmi2" };
-    let functions = || FUNCTIONS.into_iter().filter(|name| name.starts_with(version));
+    let fmu = imported(&desk, "--tables cam.fxt");
     let freed = fmu.instance("freed").component;
     let strange =
         [null_mut(), freed, std::ptr::without_provenance_mut(1), std::ptr::without_provenance_mut(usize::MAX)];
     // Without a component, or with real numbers, which go another way than pointers and counts.
     let plain = ["GetTypesPlatform", "GetVersion", "FreeInstance", "DoStep"];
     let plain = |name: &str| plain.contains(&&name[4..]) || name.contains("Instantiate");
-    for name in functions().filter(|name| !plain(name)) {
+    for name in FUNCTIONS.into_iter().filter(|name| !plain(name)) {
         for component in strange {
             let status = unsafe { fmu.any(name)(component, 0, 0, 0, 0, 0, 0) };
             assert_eq!(status, ERROR, "{name} {component:?}");
         }
     }
     for component in strange {
-        unsafe { fmu.function::<unsafe extern "C" fn(*mut c_void)>(["FreeInstance"; 2])(component) };
+        unsafe { fmu.function::<unsafe extern "C" fn(*mut c_void)>("FreeInstance")(component) };
     }
     for ready in [false, true] {
         let instance = if ready { fmu.ready("one", &[]) } else { fmu.instance("one") };
-        for name in functions().filter(|name| !plain(name)) {
-            // The count is the third argument of what takes lists: null pointers to one value. FMI 3.0 has it twice.
-            let status = unsafe { fmu.any(name)(instance.component, 0, 1, 0, 1, 0, 0) };
+        for name in FUNCTIONS.into_iter().filter(|name| !plain(name)) {
+            // The count is the third argument of what takes lists: null pointers to one value.
+            let status = unsafe { fmu.any(name)(instance.component, 0, 1, 0, 0, 0, 0) };
             let fine = [
                 "EnterInitializationMode",
                 "ExitInitializationMode",
                 "SetupExperiment",
                 "Reset",
                 "FreeFMUstate",
-                "FreeFMUState",
                 "Terminate",
                 "SetTime",
             ];
@@ -487,89 +443,17 @@ fn nothing_falls_over(fmu: &Imported) {
             assert_eq!(status, wanted, "{name}");
         }
     }
-    let said = fmu.function::<unsafe extern "C" fn() -> *const c_char>(["GetVersion"; 2]);
-    assert_eq!(unsafe { CStr::from_ptr(said()) }, if fmu.three { c"3.0" } else { c"2.0" });
+    let said = fmu.function::<unsafe extern "C" fn() -> *const c_char>("GetVersion");
+    assert_eq!(unsafe { CStr::from_ptr(said()) }, c"2.0");
 }
 
-/// What FMI 3.0 has beyond FMI 2.0: counts of values, many types, places of a step, a log that is silent unless asked,
-/// other kinds of simulation.
 #[test]
-fn fmi_3_refuses_other_sizes_types_and_kinds() {
+fn another_version_of_fmi_is_refused_by_name() {
     let desk = desk();
-    let fmu = imported(&desk, "--tables cam.fxt --fmi 3.0");
-    let instance = fmu.ready("one", &[]);
-    let refused = |status: c_int, why: &str| {
-        let log = instance.log();
-        assert_eq!((status, log.last().map(|line| line.message.contains(why))), (ERROR, Some(true)), "{why}: {log:?}");
-    };
-    refused(instance.get_reals(&[0, 1], &mut [0.0]), "found 2 value references, 1 values");
-    assert_eq!(instance.get_reals(&[], &mut []), OK);
-    // Each variable has one type, and is read and set by its functions alone.
-    let types =
-        ["Float32", "Float64", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Boolean"];
-    for (of, variable) in
-        [("Float64", "output_torque"), ("Int32", "patience"), ("Boolean", "generator_measured"), ("Int64", "mode")]
-    {
-        let (reference, mut room) = (fmu.reference(variable), [0_u8; 8]);
-        for (name, call) in types.iter().flat_map(|name| ["Get", "Set"].map(|call| (*name, call))) {
-            let function = fmu.any(&format!("fmi3{call}{name}"));
-            let at = (&raw const reference as usize, &raw mut room as usize);
-            let status = unsafe { function(instance.component, at.0, 1, at.1, 1, 0, 0) };
-            let parameter = call == "Set" && matches!(variable, "patience" | "generator_measured");
-            if name == of && !parameter {
-                assert_eq!(status, OK, "{variable} {call}{name}: {:?}", instance.log());
-            } else {
-                refused(status, if name == of { "after the initialisation" } else { "of another type" });
-            }
-        }
-    }
-    type Step = unsafe extern "C" fn(*mut c_void, f64, f64, u8, *mut u8, *mut u8, *mut u8, *mut f64) -> c_int;
-    let step = fmu.function::<Step>(["", "DoStep"]);
-    let [mut event, mut end, mut early] = [0; 3];
-    refused(unsafe { step(instance.component, 0.0, 1e-3, 1, &mut event, &mut end, &mut early, null_mut()) }, "null");
-    refused(unsafe { step(instance.component, 0.0, 1e-3, 1, &mut event, null_mut(), &mut early, &mut 0.0) }, "null");
-    assert_eq!(instance.step(1e-3), OK, "nothing was stepped before");
-
-    // A mode that cannot follow is warned of until that is switched off.
-    let warned = |instance: &Instance<'_>| {
-        instance.set("mode", 3.0);
-        assert_eq!(instance.step(1e-3), OK);
-        instance.set("mode", 1.0);
-        assert_eq!((instance.step(1e-3), instance.number("mode_active")), (OK, 3));
-        instance.log().iter().filter(|line| line.message.starts_with("mode: no transition")).count()
-    };
-    assert_eq!(warned(&instance), 1);
-    let category = c"logStatusWarning".as_ptr();
-    let quiet = fmu.any("fmi3SetDebugLogging");
-    assert_eq!(unsafe { quiet(instance.component, 0, 1, &raw const category as usize, 0, 0, 0) }, OK);
-    assert_eq!(warned(&instance), 1);
-
-    // No model of another kind, and it is said.
-    unsafe extern "C" fn said(environment: *mut c_void, status: c_int, _: *const c_char, message: *const c_char) {
-        let message = unsafe { CStr::from_ptr(message) }.to_str().unwrap().to_owned();
-        unsafe { &mut *environment.cast::<Vec<(c_int, String)>>() }.push((status, message));
-    }
-    type Other = unsafe extern "C" fn(
-        usize,
-        usize,
-        usize,
-        u8,
-        u8,
-        *mut c_void,
-        Option<LogMessage>,
-        usize,
-        usize,
-        usize,
-    ) -> *mut c_void;
-    let mut log: Vec<(c_int, String)> = Vec::new();
-    for kind in ["ModelExchange", "ScheduledExecution"] {
-        let name = format!("Instantiate{kind}");
-        let instantiate = fmu.function::<Other>(["", &name]);
-        let environment = (&raw mut log).cast();
-        assert!(unsafe { instantiate(0, 0, 0, 0, 0, environment, Some(said), 0, 0, 0) }.is_null());
-        assert_eq!(log.pop(), Some((ERROR, format!("fmi3{name}: not in this FMU, allowed: co-simulation"))));
-        assert!(unsafe { instantiate(0, 0, 0, 0, 0, null_mut(), None, 0, 0, 0) }.is_null());
-    }
+    let refused = desk.line("export --format fmu --tables cam.fxt --fmi 3.0 --out fmu");
+    assert_eq!(refused.code, 2);
+    assert!(refused.stderr.contains("--fmi: found 3.0, allowed: 2.0"), "{}", refused.stderr);
+    assert!(!desk.path("fmu").exists());
 }
 
 #[test]

@@ -1,6 +1,6 @@
-"""FMUs in FMPy, and beside `flexspline replay`:
+"""FMUs in FMPy, compared with `flexspline replay`:
 
-    check.py FLEXSPLINE TABLE COMPENSATION.fmu JOINT.fmu FLOWN.fmu COMPENSATION_FMI3.fmu JOINT_FMI3.fmu
+    check.py FLEXSPLINE TABLE COMPENSATION.fmu JOINT.fmu FLOWN.fmu
 
 Ends with "test result: ..." as cargo's tests do.
 """
@@ -16,12 +16,11 @@ import zipfile
 import fmpy
 import numpy as np
 from fmpy.fmi2 import FMU2Slave
-from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 from lxml import etree
 
-FLEXSPLINE, TABLE, COMPENSATION, JOINT, FLOWN, COMPENSATION_3, JOINT_3 = sys.argv[1:8]
-ALL = (COMPENSATION, JOINT, FLOWN, COMPENSATION_3, JOINT_3)
+FLEXSPLINE, TABLE, COMPENSATION, JOINT, FLOWN = sys.argv[1:6]
+ALL = (COMPENSATION, JOINT, FLOWN)
 TICK = 1e-3
 
 
@@ -33,10 +32,9 @@ def no_findings():
 
 def as_the_schema_says():
     """modelDescription.xml against the schema of the standard, as FMPy brings it; and a wrong one is refused."""
-    folder = os.path.join(os.path.dirname(fmpy.__file__), "schema")
+    folder = os.path.join(os.path.dirname(fmpy.__file__), "schema", "fmi2")
+    schema = etree.XMLSchema(etree.parse(os.path.join(folder, "fmi2ModelDescription.xsd")))
     for fmu in ALL:
-        version = "fmi3" if fmu in (COMPENSATION_3, JOINT_3) else "fmi2"
-        schema = etree.XMLSchema(etree.parse(os.path.join(folder, version, f"{version}ModelDescription.xsd")))
         with zipfile.ZipFile(fmu) as file:
             xml = file.read("modelDescription.xml")
             assert file.testzip() is None
@@ -44,28 +42,23 @@ def as_the_schema_says():
             names = file.namelist()
         schema.assertValid(etree.fromstring(xml))
         assert not schema.validate(etree.fromstring(xml.replace(b"causality", b"causalities", 1)))
-        library = "binaries/x86_64-linux/" if version == "fmi3" else "binaries/linux64/"
-        for wanted in ("documentation/index.html", "documentation/licenses/license.txt", "resources/table.fxt", library):
+        for wanted in ("documentation/index.html", "documentation/licenses/license.txt", "resources/table.fxt", "binaries/linux64/"):
             assert any(name.startswith(wanted) for name in names), names
 
 
 def ports_stand_alone():
-    """Each number has a unit that is defined, each port says what it is and, where it can be negative, which way; both versions say the same."""
-    for two, three in ((COMPENSATION, COMPENSATION_3), (JOINT, JOINT_3)):
-        lists = []
-        for fmu in (two, three):
-            description = fmpy.read_model_description(fmu)
-            units = {unit.name for unit in description.unitDefinitions}
-            for variable in description.modelVariables:
-                assert variable.type not in ("Real", "Float64") or variable.unit in units, variable.name
-            ports = [variable for variable in description.modelVariables if variable.causality in ("input", "output")]
-            for port in ports:
-                assert "_" in port.name or port.name == "heat", f"{port.name} is one word: of what?"
-                assert len(port.description) > 15 and not port.description.startswith("its "), port.name
-                quantity = port.unit in ("rad", "N.m") and "rate" not in port.name
-                assert not quantity or "positive" in port.description, port.name
-            lists.append([(v.name, v.valueReference, v.description, v.causality, v.unit, v.start) for v in description.modelVariables])
-        assert lists[0] == lists[1]
+    """Each number has a unit that is defined, each port says what it is and, where it can be negative, which way."""
+    for fmu in (COMPENSATION, JOINT):
+        description = fmpy.read_model_description(fmu)
+        units = {unit.name for unit in description.unitDefinitions}
+        for variable in description.modelVariables:
+            assert variable.type != "Real" or variable.unit in units, variable.name
+        ports = [variable for variable in description.modelVariables if variable.causality in ("input", "output")]
+        for port in ports:
+            assert "_" in port.name or port.name == "heat", f"{port.name} is one word: of what?"
+            assert len(port.description) > 15 and not port.description.startswith("its "), port.name
+            quantity = port.unit in ("rad", "N.m") and "rate" not in port.name
+            assert not quantity or "positive" in port.description, port.name
 
 
 def swept(rows=4000):
@@ -87,22 +80,6 @@ OUTPUTS = ["generator_angle_command", "transmission_error_predicted", "output_an
 def compensated():
     """The FMU over those inputs."""
     return fmpy.simulate_fmu(COMPENSATION, stop_time=4.0, step_size=TICK, output_interval=TICK, input=swept(), output=OUTPUTS)
-
-
-def versions_give_the_same_bits():
-    """FMI 3.0 over the inputs of FMI 2.0: compensation and joint."""
-    two = compensated()
-    three = fmpy.simulate_fmu(COMPENSATION_3, stop_time=4.0, step_size=TICK, output_interval=TICK, input=swept(), output=OUTPUTS)
-    assert len(two) == len(three) == 4001 and np.abs(two["output_angle_correction"]).max() > 10.0
-    assert all(two[name].tobytes() == three[name].tobytes() for name in ("time", *OUTPUTS) if name != "correction_quality")
-    assert (two["correction_quality"] == three["correction_quality"]).all()
-    runs = []
-    for fmu in (JOINT, JOINT_3):
-        one = Slave(fmu, "one")
-        one.read = ["output_angle", "motor_angle", "mesh_torque", "energy_error", "time"]
-        runs.append(one.run(500, moving))
-        one.free()
-    assert runs[0] == runs[1] and abs(runs[0][-1][0]) > 1e-3, runs[0][-1]
 
 
 def the_core_is_replayed():
@@ -155,26 +132,23 @@ class Slave:
         self.description = fmpy.read_model_description(self.folder.name)
         self.places = {v.name: v.valueReference for v in self.description.modelVariables}
         identifier = self.description.coSimulation.modelIdentifier
-        self.three = self.description.fmiVersion == "3.0"
-        self.slave = (FMU3Slave if self.three else FMU2Slave)(
+        self.slave = FMU2Slave(
             guid=self.description.guid, modelIdentifier=identifier, unzipDirectory=self.folder.name, instanceName=name
         )
         self.slave.instantiate()
-        if not self.three:
-            self.slave.setupExperiment(startTime=0.0)
+        self.slave.setupExperiment(startTime=0.0)
         self.slave.enterInitializationMode()
         self.slave.exitInitializationMode()
         self.time = 0.0
 
     def run(self, ticks, inputs):
         rows = []
-        put, get = (self.slave.setFloat64, self.slave.getFloat64) if self.three else (self.slave.setReal, self.slave.getReal)
         for k in range(ticks):
             for name, value in inputs(self.time).items():
-                put([self.places[name]], [value])
+                self.slave.setReal([self.places[name]], [value])
             self.slave.doStep(self.time, TICK)
             self.time += TICK
-            rows.append(tuple(get(list(self.places[name] for name in self.read))))
+            rows.append(tuple(self.slave.getReal(list(self.places[name] for name in self.read))))
         return rows
 
     def free(self):
@@ -189,35 +163,25 @@ def moving(time):
 
 def states():
     """A state that is serialised goes on with the same bits in another instance; two instances do not know of each other."""
-    for fmu in (JOINT, JOINT_3):
-        goes_on(fmu)
-
-
-def goes_on(fmu):
-    one, two = Slave(fmu, "one"), Slave(fmu, "two")
+    one, two = Slave(JOINT, "one"), Slave(JOINT, "two")
     one.read = two.read = ["output_angle", "motor_angle", "mesh_torque", "energy_error"]
     one.run(300, moving)
     two.run(20, moving)
-    # FMI 3.0 writes their names with other capitals.
-    def call(of, name, *what):
-        return getattr(of.slave, name.replace("state", "State").replace("deS", "des") if of.three else name)(*what)
-
-    state = call(one, "getFMUstate")
-    data = call(one, "serializeFMUstate", state)
+    state = one.slave.getFMUstate()
+    data = one.slave.serializeFMUstate(state)
     first = one.run(300, moving)
-    there = call(two, "deSerializeFMUstate", data)
-    call(two, "setFMUstate", there)
-    two.time = 0.3
+    there = two.slave.deSerializeFMUstate(data)
+    two.slave.setFMUstate(there)
     time = 0.0
     for _ in range(300):
         time += TICK
     two.time = time
     assert two.run(300, moving) == first
-    call(one, "setFMUstate", state)
+    one.slave.setFMUstate(state)
     one.time = time
     assert one.run(300, moving) == first
-    call(one, "freeFMUstate", state)
-    call(two, "freeFMUstate", there)
+    one.slave.freeFMUstate(state)
+    two.slave.freeFMUstate(there)
     one.free()
     two.free()
 
@@ -257,13 +221,8 @@ def the_table_helps_the_joint():
 
 def refusals():
     """A wrong call is an exception with a line in the log, and the instance goes on."""
-    for fmu in (COMPENSATION, COMPENSATION_3):
-        refused(fmu)
-
-
-def refused(fmu):
     said = []
-    one = Slave(fmu, "one")
+    one = Slave(COMPENSATION, "one")
     one.read = ["generator_angle_command"]
     one.slave.terminate()
     try:
@@ -271,8 +230,7 @@ def refused(fmu):
     except Exception as error:
         said.append(str(error))
     one.slave.reset()
-    if not one.three:
-        one.slave.setupExperiment(startTime=0.0)
+    one.slave.setupExperiment(startTime=0.0)
     one.slave.enterInitializationMode()
     one.slave.exitInitializationMode()
     assert len(one.run(5, lambda time: {"output_angle_command": 0.01})) == 5
@@ -287,7 +245,6 @@ def main():
         as_the_schema_says,
         ports_stand_alone,
         the_core_is_replayed,
-        versions_give_the_same_bits,
         steps_of_another_size,
         states,
         energy_is_conserved,

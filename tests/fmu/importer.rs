@@ -1,11 +1,10 @@
-//! A small importer of FMI 2.0 and FMI 3.0: unzips an FMU, loads its library for Linux, and calls it as C does, with declarations
-//! of its own.
+//! A small importer of FMI 2.0: unzips an FMU, loads its library for Linux, and calls it as C does, with declarations of
+//! its own.
 
 use std::cell::Cell;
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
-use std::ptr::null;
 use std::sync::Mutex;
 
 use libloading::{Library, Symbol};
@@ -16,8 +15,8 @@ pub const WARNING: c_int = 1;
 pub const DISCARD: c_int = 2;
 pub const ERROR: c_int = 3;
 
-/// All functions of both standards.
-pub const FUNCTIONS: [&str; 119] = [
+/// All functions of the standard.
+pub const FUNCTIONS: [&str; 44] = [
     "fmi2CancelStep",
     "fmi2CompletedIntegratorStep",
     "fmi2DeSerializeFMUstate",
@@ -62,87 +61,10 @@ pub const FUNCTIONS: [&str; 119] = [
     "fmi2SetTime",
     "fmi2SetupExperiment",
     "fmi2Terminate",
-    "fmi3ActivateModelPartition",
-    "fmi3CompletedIntegratorStep",
-    "fmi3DeserializeFMUState",
-    "fmi3DoStep",
-    "fmi3EnterConfigurationMode",
-    "fmi3EnterContinuousTimeMode",
-    "fmi3EnterEventMode",
-    "fmi3EnterInitializationMode",
-    "fmi3EnterStepMode",
-    "fmi3EvaluateDiscreteStates",
-    "fmi3ExitConfigurationMode",
-    "fmi3ExitInitializationMode",
-    "fmi3FreeFMUState",
-    "fmi3FreeInstance",
-    "fmi3GetAdjointDerivative",
-    "fmi3GetBinary",
-    "fmi3GetBoolean",
-    "fmi3GetClock",
-    "fmi3GetContinuousStateDerivatives",
-    "fmi3GetContinuousStates",
-    "fmi3GetDirectionalDerivative",
-    "fmi3GetEventIndicators",
-    "fmi3GetFMUState",
-    "fmi3GetFloat32",
-    "fmi3GetFloat64",
-    "fmi3GetInt16",
-    "fmi3GetInt32",
-    "fmi3GetInt64",
-    "fmi3GetInt8",
-    "fmi3GetIntervalDecimal",
-    "fmi3GetIntervalFraction",
-    "fmi3GetNominalsOfContinuousStates",
-    "fmi3GetNumberOfContinuousStates",
-    "fmi3GetNumberOfEventIndicators",
-    "fmi3GetNumberOfVariableDependencies",
-    "fmi3GetOutputDerivatives",
-    "fmi3GetShiftDecimal",
-    "fmi3GetShiftFraction",
-    "fmi3GetString",
-    "fmi3GetUInt16",
-    "fmi3GetUInt32",
-    "fmi3GetUInt64",
-    "fmi3GetUInt8",
-    "fmi3GetVariableDependencies",
-    "fmi3GetVersion",
-    "fmi3InstantiateCoSimulation",
-    "fmi3InstantiateModelExchange",
-    "fmi3InstantiateScheduledExecution",
-    "fmi3Reset",
-    "fmi3SerializeFMUState",
-    "fmi3SerializedFMUStateSize",
-    "fmi3SetBinary",
-    "fmi3SetBoolean",
-    "fmi3SetClock",
-    "fmi3SetContinuousStates",
-    "fmi3SetDebugLogging",
-    "fmi3SetFMUState",
-    "fmi3SetFloat32",
-    "fmi3SetFloat64",
-    "fmi3SetInt16",
-    "fmi3SetInt32",
-    "fmi3SetInt64",
-    "fmi3SetInt8",
-    "fmi3SetIntervalDecimal",
-    "fmi3SetIntervalFraction",
-    "fmi3SetShiftDecimal",
-    "fmi3SetShiftFraction",
-    "fmi3SetString",
-    "fmi3SetTime",
-    "fmi3SetUInt16",
-    "fmi3SetUInt32",
-    "fmi3SetUInt64",
-    "fmi3SetUInt8",
-    "fmi3Terminate",
-    "fmi3UpdateDiscreteStates",
 ];
 
 /// Any function with a component, as far as its arguments are no real numbers.
 pub type Any = unsafe extern "C" fn(*mut c_void, usize, usize, usize, usize, usize, usize) -> c_int;
-/// `fmi3LogMessageCallback`.
-pub type LogMessage = unsafe extern "C" fn(*mut c_void, c_int, *const c_char, *const c_char);
 
 /// `fmi2CallbackFunctions`.
 #[repr(C)]
@@ -181,25 +103,10 @@ unsafe extern "C" fn logger(
     unsafe { &*(environment as *const Mutex<Vec<Line>>) }.lock().unwrap().push(line);
 }
 
-/// `fmi3LogMessageCallback`: without name and `printf`.
-unsafe extern "C" fn log_message(
-    environment: *mut c_void,
-    status: c_int,
-    category: *const c_char,
-    message: *const c_char,
-) {
-    let text = |pointer| unsafe { CStr::from_ptr(pointer) }.to_str().unwrap().to_owned();
-    let line =
-        Line { instance: String::new(), status, category: text(category), message: text(message).replace("##", "#") };
-    unsafe { &*(environment as *const Mutex<Vec<Line>>) }.lock().unwrap().push(line);
-}
-
 /// An FMU, unzipped and loaded.
 pub struct Imported {
     pub folder: PathBuf,
     pub xml: String,
-    /// FMI 3.0.
-    pub three: bool,
     library: Library,
 }
 
@@ -210,16 +117,15 @@ impl Imported {
         zip.extract(folder).unwrap();
         let xml = fs::read_to_string(folder.join("modelDescription.xml")).unwrap();
         let identifier = attribute(&xml, "modelIdentifier");
-        let three = attribute(&xml, "fmiVersion") == "3.0";
-        let platform = if three { "x86_64-linux" } else { "linux64" };
-        let library = folder.join("binaries").join(platform).join(format!("{identifier}.so"));
+        assert_eq!(attribute(&xml, "fmiVersion"), "2.0");
+        let library = folder.join("binaries/linux64").join(format!("{identifier}.so"));
         let library = unsafe { Library::new(library) }.unwrap();
-        Imported { folder: folder.to_owned(), xml, three, library }
+        Imported { folder: folder.to_owned(), xml, library }
     }
 
-    /// A function by its name of FMI 2.0, without `fmi2`, or its name of FMI 3.0, without `fmi3`.
-    pub fn function<T>(&self, names: [&str; 2]) -> Symbol<'_, T> {
-        let name = format!("fmi{}{}", if self.three { 3 } else { 2 }, names[usize::from(self.three)]);
+    /// A function by its name without `fmi2`.
+    pub fn function<T>(&self, name: &str) -> Symbol<'_, T> {
+        let name = format!("fmi2{name}");
         unsafe { self.library.get(name.as_bytes()) }.unwrap_or_else(|error| panic!("{name}: {error}"))
     }
 
@@ -240,14 +146,11 @@ impl Imported {
     }
 
     pub fn guid(&self) -> String {
-        attribute(&self.xml, if self.three { "instantiationToken" } else { "guid" })
+        attribute(&self.xml, "guid")
     }
 
-    /// The resources: a URI, or a path.
+    /// The URI of the resources.
     pub fn location(&self) -> String {
-        if self.three {
-            return format!("{}/resources/", self.folder.display());
-        }
         format!("file://{}/resources", self.folder.display().to_string().replace('%', "%25").replace(' ', "%20"))
     }
 
@@ -277,35 +180,12 @@ impl Imported {
             c_int,
             c_int,
         ) -> *mut c_void;
-        type InstantiateThree = unsafe extern "C" fn(
-            *const c_char,
-            *const c_char,
-            *const c_char,
-            u8,
-            u8,
-            u8,
-            u8,
-            *const u32,
-            usize,
-            *const Mutex<Vec<Line>>,
-            LogMessage,
-            *const c_void,
-        ) -> *mut c_void;
-        let component = if self.three {
-            let instantiate = self.function::<InstantiateThree>(["", "InstantiateCoSimulation"]);
-            let environment = &raw const *log;
-            let [name, guid, location] = [&name, &guid, &location].map(|text| text.as_ptr());
-            // What is no kind of FMI 2.0 stands for events.
-            let events = u8::from(kind > 1);
-            unsafe { instantiate(name, guid, location, 0, 1, events, 1, null(), 0, environment, log_message, null()) }
-        } else {
-            let instantiate = self.function::<Instantiate>(["Instantiate", ""]);
-            unsafe { instantiate(name.as_ptr(), kind, guid.as_ptr(), location.as_ptr(), &callbacks, 0, 0) }
-        };
+        let instantiate = self.function::<Instantiate>("Instantiate");
+        let component = unsafe { instantiate(name.as_ptr(), kind, guid.as_ptr(), location.as_ptr(), &callbacks, 0, 0) };
         if component.is_null() {
             Err(log.into_inner().unwrap())
         } else {
-            Ok(Instance { of: self, component, log, time: Cell::new(0.0), stop: Cell::new(None) })
+            Ok(Instance { of: self, component, log, time: Cell::new(0.0) })
         }
     }
 
@@ -334,12 +214,11 @@ pub struct Instance<'a> {
     pub component: *mut c_void,
     log: Box<Mutex<Vec<Line>>>,
     pub time: Cell<f64>,
-    stop: Cell<Option<f64>>,
 }
 
 impl Drop for Instance<'_> {
     fn drop(&mut self) {
-        let free = self.of.function::<unsafe extern "C" fn(*mut c_void)>(["FreeInstance"; 2]);
+        let free = self.of.function::<unsafe extern "C" fn(*mut c_void)>("FreeInstance");
         unsafe { free(self.component) }
     }
 }
@@ -352,24 +231,17 @@ impl Instance<'_> {
 
     /// A function without arguments.
     pub fn call(&self, name: &str) -> c_int {
-        unsafe { self.of.function::<unsafe extern "C" fn(*mut c_void) -> c_int>([name; 2])(self.component) }
+        unsafe { self.of.function::<unsafe extern "C" fn(*mut c_void) -> c_int>(name)(self.component) }
     }
 
-    /// Begins the initialisation; FMI 3.0 takes the time of the experiment there.
+    /// Begins the initialisation.
     pub fn enter(&self) -> c_int {
-        type Enter = unsafe extern "C" fn(*mut c_void, u8, f64, f64, u8, f64) -> c_int;
-        let enter = self.of.function::<Enter>(["EnterInitializationMode"; 2]);
-        let stop = self.stop.get();
-        unsafe { enter(self.component, 0, 0.0, 0.0, stop.is_some().into(), stop.unwrap_or(0.0)) }
+        self.call("EnterInitializationMode")
     }
 
     pub fn set_up(&self, stop: Option<f64>) -> c_int {
-        self.stop.set(stop);
-        if self.of.three {
-            return OK;
-        }
         type SetUp = unsafe extern "C" fn(*mut c_void, c_int, f64, f64, c_int, f64) -> c_int;
-        let set_up = self.of.function::<SetUp>(["SetupExperiment", ""]);
+        let set_up = self.of.function::<SetUp>("SetupExperiment");
         unsafe { set_up(self.component, 0, 0.0, 0.0, stop.is_some().into(), stop.unwrap_or(0.0)) }
     }
 
@@ -380,28 +252,23 @@ impl Instance<'_> {
 
     pub fn try_set(&self, name: &str, value: f64) -> c_int {
         match self.of.line(name) {
-            line if line.contains("<Real") || line.contains("<Float64") => {
-                self.put(["SetReal", "SetFloat64"], name, value)
-            }
-            line if line.contains("<Boolean") && self.of.three => self.put(["", "SetBoolean"], name, value as u8),
-            line if line.contains("<Boolean") => self.put(["SetBoolean", ""], name, value as c_int),
-            line if line.contains("<Enumeration") && self.of.three => self.put(["", "SetInt64"], name, value as i64),
-            _ => self.put(["SetInteger", "SetInt32"], name, value as c_int),
+            line if line.contains("<Real") => self.put("SetReal", name, value),
+            line if line.contains("<Boolean") => self.put("SetBoolean", name, value as c_int),
+            _ => self.put("SetInteger", name, value as c_int),
         }
     }
 
-    /// A value of a type; FMI 2.0 does not look at the second count.
-    fn put<T>(&self, function: [&str; 2], name: &str, value: T) -> c_int {
-        type Set<T> = unsafe extern "C" fn(*mut c_void, *const u32, usize, *const T, usize) -> c_int;
+    /// Sets a value of a type.
+    fn put<T>(&self, function: &str, name: &str, value: T) -> c_int {
+        type Set<T> = unsafe extern "C" fn(*mut c_void, *const u32, usize, *const T) -> c_int;
         let reference = self.of.reference(name);
-        unsafe { self.of.function::<Set<T>>(function)(self.component, &reference, 1, &value, 1) }
+        unsafe { self.of.function::<Set<T>>(function)(self.component, &reference, 1, &value) }
     }
 
-    fn take<T: Default>(&self, function: [&str; 2], name: &str) -> T {
-        type Get<T> = unsafe extern "C" fn(*mut c_void, *const u32, usize, *mut T, usize) -> c_int;
+    fn take<T: Default>(&self, function: &str, name: &str) -> T {
+        type Get<T> = unsafe extern "C" fn(*mut c_void, *const u32, usize, *mut T) -> c_int;
         let (reference, mut value) = (self.of.reference(name), T::default());
-        let get = self.of.function::<Get<T>>(function);
-        let status = unsafe { get(self.component, &reference, 1, &mut value, 1) };
+        let status = unsafe { self.of.function::<Get<T>>(function)(self.component, &reference, 1, &mut value) };
         assert_eq!(status, OK, "{name}: {:?}", self.log());
         value
     }
@@ -415,30 +282,25 @@ impl Instance<'_> {
     }
 
     pub fn get_reals(&self, references: &[u32], values: &mut [f64]) -> c_int {
-        type Get = unsafe extern "C" fn(*mut c_void, *const u32, usize, *mut f64, usize) -> c_int;
-        let get = self.of.function::<Get>(["GetReal", "GetFloat64"]);
-        unsafe { get(self.component, references.as_ptr(), references.len(), values.as_mut_ptr(), values.len()) }
+        type Get = unsafe extern "C" fn(*mut c_void, *const u32, usize, *mut f64) -> c_int;
+        let get = self.of.function::<Get>("GetReal");
+        unsafe { get(self.component, references.as_ptr(), references.len(), values.as_mut_ptr()) }
     }
 
     /// Reads an integer, a choice or a truth.
     pub fn number(&self, name: &str) -> c_int {
-        match self.of.line(name) {
-            line if line.contains("<Boolean") && self.of.three => self.take::<u8>(["", "GetBoolean"], name).into(),
-            line if line.contains("<Boolean") => self.take(["GetBoolean", ""], name),
-            line if line.contains("<Enumeration") && self.of.three => self.take::<i64>(["", "GetInt64"], name) as c_int,
-            _ => self.take(["GetInteger", "GetInt32"], name),
-        }
+        self.take(if self.of.line(name).contains("<Boolean") { "GetBoolean" } else { "GetInteger" }, name)
     }
 
     pub fn text(&self, name: &str) -> String {
-        let value = self.take::<usize>(["GetString"; 2], name);
+        let value = self.take::<usize>("GetString", name);
         unsafe { CStr::from_ptr(std::ptr::with_exposed_provenance(value)) }.to_str().unwrap().to_owned()
     }
 
     /// The derivative of an input for the next step.
     pub fn slope(&self, name: &str, value: f64) {
         type Set = unsafe extern "C" fn(*mut c_void, *const u32, usize, *const c_int, *const f64) -> c_int;
-        let set = self.of.function::<Set>(["SetRealInputDerivatives", ""]);
+        let set = self.of.function::<Set>("SetRealInputDerivatives");
         let reference = self.of.reference(name);
         assert_eq!(unsafe { set(self.component, &reference, 1, &1, &value) }, OK, "{:?}", self.log());
     }
@@ -453,26 +315,19 @@ impl Instance<'_> {
     }
 
     pub fn step_from(&self, from: f64, seconds: f64) -> c_int {
-        type Step = unsafe extern "C" fn(*mut c_void, f64, f64, c_int, *mut u8, *mut u8, *mut u8, *mut f64) -> c_int;
-        let ([mut event, mut end, mut early], mut at) = ([2_u8; 3], f64::NAN);
-        let step = self.of.function::<Step>(["DoStep"; 2]);
-        let status = unsafe { step(self.component, from, seconds, 1, &mut event, &mut end, &mut early, &mut at) };
-        if self.of.three {
-            assert_eq!([event, end, early], [0; 3]);
-            assert!(at == if status == OK { from + seconds } else { self.time.get() }, "{at}");
-        }
-        status
+        type Step = unsafe extern "C" fn(*mut c_void, f64, f64, c_int) -> c_int;
+        unsafe { self.of.function::<Step>("DoStep")(self.component, from, seconds, 1) }
     }
 
     /// Its state, in a place that holds one already or null.
     pub fn state(&self, place: &mut *mut c_void) -> c_int {
         type Get = unsafe extern "C" fn(*mut c_void, *mut *mut c_void) -> c_int;
-        unsafe { self.of.function::<Get>(["GetFMUstate", "GetFMUState"])(self.component, place) }
+        unsafe { self.of.function::<Get>("GetFMUstate")(self.component, place) }
     }
 
     pub fn set_state(&self, state: *mut c_void) -> c_int {
         unsafe {
-            self.of.function::<unsafe extern "C" fn(*mut c_void, *mut c_void) -> c_int>(["SetFMUstate", "SetFMUState"])(
+            self.of.function::<unsafe extern "C" fn(*mut c_void, *mut c_void) -> c_int>("SetFMUstate")(
                 self.component,
                 state,
             )
@@ -481,7 +336,7 @@ impl Instance<'_> {
 
     pub fn free_state(&self, state: &mut *mut c_void) -> c_int {
         type Free = unsafe extern "C" fn(*mut c_void, *mut *mut c_void) -> c_int;
-        unsafe { self.of.function::<Free>(["FreeFMUstate", "FreeFMUState"])(self.component, state) }
+        unsafe { self.of.function::<Free>("FreeFMUstate")(self.component, state) }
     }
 
     pub fn serialised(&self, state: *mut c_void) -> Vec<u8> {
@@ -489,17 +344,11 @@ impl Instance<'_> {
         type Serialise = unsafe extern "C" fn(*mut c_void, *mut c_void, *mut u8, usize) -> c_int;
         let mut size = 0;
         assert_eq!(
-            unsafe {
-                self.of.function::<Size>(["SerializedFMUstateSize", "SerializedFMUStateSize"])(
-                    self.component,
-                    state,
-                    &mut size,
-                )
-            },
+            unsafe { self.of.function::<Size>("SerializedFMUstateSize")(self.component, state, &mut size,) },
             OK
         );
         let mut bytes = vec![0; size];
-        let serialise = self.of.function::<Serialise>(["SerializeFMUstate", "SerializeFMUState"]);
+        let serialise = self.of.function::<Serialise>("SerializeFMUstate");
         assert_eq!(unsafe { serialise(self.component, state, bytes.as_mut_ptr(), size - 1) }, ERROR);
         assert_eq!(unsafe { serialise(self.component, state, bytes.as_mut_ptr(), size) }, OK);
         bytes
@@ -507,7 +356,7 @@ impl Instance<'_> {
 
     pub fn deserialised(&self, bytes: &[u8], place: &mut *mut c_void) -> c_int {
         type DeSerialise = unsafe extern "C" fn(*mut c_void, *const u8, usize, *mut *mut c_void) -> c_int;
-        let function = self.of.function::<DeSerialise>(["DeSerializeFMUstate", "DeserializeFMUState"]);
+        let function = self.of.function::<DeSerialise>("DeSerializeFMUstate");
         unsafe { function(self.component, bytes.as_ptr(), bytes.len(), place) }
     }
 }

@@ -1,5 +1,4 @@
-//! FMUs for co-simulation with FMI 2.0 or FMI 3.0: description, resources, page and libraries in one zip (section 2.3
-//! of FMI 2.0, 2.5 of FMI 3.0).
+//! FMUs for co-simulation with FMI 2.0: description, resources, page and libraries in one zip (section 2.3).
 //!
 //! The libraries are those of `flexspline-fmu`, the same in every FMU. What is simulated is in the resources, so nobody
 //! needs a compiler.
@@ -22,7 +21,6 @@ use zip::{CompressionMethod, DateTime, ZipWriter};
 use flexspline_fly::fly::{Flown, gear_at, unit};
 
 pub use error::FmuExportError;
-pub use flexspline_fmu::FmiVersion;
 pub use libraries::{Library, Platform, find_libraries};
 
 /// Temperature at which an FMU starts, as far as its table goes, °C.
@@ -32,7 +30,6 @@ const USUAL_C: f64 = 20.0;
 #[derive(Debug, Clone)]
 pub struct Fmu {
     resources: Resources,
-    version: FmiVersion,
     description: String,
 }
 
@@ -40,35 +37,33 @@ pub struct Fmu {
 ///
 /// # Errors
 /// [`FmuExportError`].
-pub fn compensation(image: Vec<u8>, version: FmiVersion) -> Result<Fmu, FmuExportError> {
+pub fn compensation(image: Vec<u8>) -> Result<Fmu, FmuExportError> {
     let table = Table::check(&image)?;
     let [coldest, warmest] = table.temperature_range_c().map(f64::from);
-    Fmu::new((ModelKind::Compensation, version), &[("drive_temperature", USUAL_C.clamp(coldest, warmest))], image, None)
+    Fmu::new(ModelKind::Compensation, &[("drive_temperature", USUAL_C.clamp(coldest, warmest))], image, None)
 }
 
 /// A joint with mass: the drive that a table describes, compensated with that table; without one the scenario's unit
-/// and table, as
-/// [`flexspline_fly::fly`] flies them.
+/// and table, as [`flexspline_fly::fly`] flies them.
 ///
 /// # Errors
 /// [`FmuExportError`].
-pub fn joint(flown: &Flown, image: Option<Vec<u8>>, version: FmiVersion) -> Result<Fmu, FmuExportError> {
+pub fn joint(flown: &Flown, image: Option<Vec<u8>>) -> Result<Fmu, FmuExportError> {
     let scenario = &flown.scenario;
-    let model = (ModelKind::Joint, version);
     let Some(image) = image else {
         let unit = unit(flown.kind, scenario.temperature_c)?;
         let image = table_image(scenario, &unit, table_id)?;
         let Unit { built, nominal, .. } = unit;
-        return Fmu::new(model, &starts_of(scenario), image, Some([built, nominal]));
+        return Fmu::new(ModelKind::Joint, &starts_of(scenario), image, Some([built, nominal]));
     };
     let table = Table::check(&image)?;
     let gear = gear_at(&table, scenario.temperature_c)?;
-    Fmu::new(model, &starts_of(scenario), image, Some([gear.clone(), gear]))
+    Fmu::new(ModelKind::Joint, &starts_of(scenario), image, Some([gear.clone(), gear]))
 }
 
 impl Fmu {
     fn new(
-        (kind, version): (ModelKind, FmiVersion),
+        kind: ModelKind,
         starts: &[(&str, f64)],
         image: Vec<u8>,
         gears: Option<[Gear; 2]>,
@@ -81,12 +76,12 @@ impl Fmu {
         let drives = gears.as_ref().map(|gears| gears.each_ref().map(drive_file));
         let [built, designed] = drives.as_ref().map_or([None; 2], |[a, b]| [Some(&a[..]), Some(&b[..])]);
         let mut resources = Resources::parse(&model, image, [built, designed])?;
-        resources.guid = guid(&resources, version);
-        let description = description::xml(&resources, version);
-        Ok(Fmu { resources, version, description })
+        resources.guid = guid(&resources);
+        let description = description::xml(&resources);
+        Ok(Fmu { resources, description })
     }
 
-    /// What its libraries read.
+    /// The resources that its libraries read.
     #[must_use]
     pub fn resources(&self) -> &Resources {
         &self.resources
@@ -111,12 +106,11 @@ impl Fmu {
             file(&format!("resources/{name}"), &bytes)?;
         }
         for library in libraries {
-            let Platform { folders, extension, .. } = library.platform;
-            let folder = folders[self.version as usize];
+            let Platform { folder, extension, .. } = library.platform;
             let name = format!("binaries/{folder}/{}.{extension}", self.resources.kind.identifier());
             file(&name, &library.bytes)?;
         }
-        file("documentation/index.html", description::page(&self.resources, self.version).as_bytes())?;
+        file("documentation/index.html", description::page(&self.resources).as_bytes())?;
         for (name, text) in description::LICENCES {
             file(&format!("documentation/licenses/{name}"), text.as_bytes())?;
         }
@@ -139,10 +133,10 @@ impl Fmu {
 }
 
 /// Of all that the description and the resources say: the same for the same model, table and start values.
-fn guid(resources: &Resources, version: FmiVersion) -> String {
+fn guid(resources: &Resources) -> String {
     let mut hasher = blake3::Hasher::new();
     hasher.update(flexspline_fmu::MARK.as_bytes());
-    hasher.update(description::xml(resources, version).as_bytes());
+    hasher.update(description::xml(resources).as_bytes());
     hasher.update(&resources.image);
     for gear in resources.gears.iter().flatten() {
         hasher.update(&drive_file(gear));

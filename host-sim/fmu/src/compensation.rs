@@ -1,8 +1,8 @@
 //! The core's joint over its table: where to turn the generator so that the output comes to where it is wanted.
 
 use flexspline::{
-    Adjustment, Direction, Flags, GeneratorAngle, Images, Input, JOINT_STATE_WORDS, Joint, JointState, Limits, Mode,
-    OutputAngle, Overrun, Quality, Store, Table, TorquePath, TorqueReading, TorqueSettings,
+    Adjustment, Direction, Flags, GeneratorAngle, Images, Input, Joint, JointState, Limits, Mode, OutputAngle, Overrun,
+    Quality, Store, Table, TorquePath, TorqueReading, TorqueSettings,
 };
 use flexspline_motion::flight::{ARCSEC_PER_RAD, TABLE_DRAG_N_M};
 use flexspline_motion::keep::Kept;
@@ -10,9 +10,9 @@ use flexspline_motion::keep::Kept;
 use crate::FmuError;
 use crate::instance::{Inputs, Model};
 use crate::resources::Resources;
-use crate::variables::{Choices, Kind, Role, Variable, variables};
+use crate::variables::{Choices, Kind, NOT_NEGATIVE, POSITIVE, Role, Variable, variables};
 
-/// What a joint does with its correction.
+/// Modes of the correction, in the order of the core's `Mode`.
 pub(crate) static MODES: Choices = Choices {
     name: "Mode",
     items: &[
@@ -22,7 +22,7 @@ pub(crate) static MODES: Choices = Choices {
         ("safe", "no correction before off was asked for"),
     ],
 };
-/// How far an answer of the table can be trusted.
+/// How far an answer of the table can be trusted, in the order of the core's `Quality`.
 pub(crate) static QUALITIES: Choices = Choices {
     name: "Quality",
     items: &[
@@ -45,8 +45,6 @@ pub(crate) static READINGS: Choices = Choices {
     ],
 };
 
-const POSITIVE: [f64; 2] = [1e-9, 1e9];
-const NOT_NEGATIVE: [f64; 2] = [0.0, 1e9];
 /// A simulation's torque has no sensor whose range it could leave.
 const LARGEST_READING_N_M: f32 = 1e9;
 
@@ -60,42 +58,57 @@ variables! {
     OUTPUT_TORQUE => Variable::input("output_torque", "N.m", 0.0,
         "torque at the output, positive where it turns the output forward; torque_is says which torque");
     DRIVE_TEMPERATURE => Variable::input("drive_temperature", "degC", 20.0, "temperature of the drive");
-    MODE => Variable { name: "mode", kind: Kind::Choice(&MODES), role: Role::Tunable, start: 1.0, range: [0.0, 3.0], says: "mode asked for; a change that is not legal is logged, and the mode stays" };
-    GENERATOR_MEASURED => Variable::parameter("generator_measured", Kind::Boolean, 0.0, [0.0, 1.0], "the generator is where generator_angle_measured says; else where it was commanded a tick before");
-    TORQUE_IS => Variable::parameter("torque_is", Kind::Choice(&READINGS), 0.0, [0.0, 2.0], "which torque is given");
-    TORQUE_BANDWIDTH => Variable::parameter("torque_bandwidth", Kind::Real("Hz"), 100.0, POSITIVE, "corner of the low-pass of a torque in the mesh or on the load");
-    DRAG => Variable::parameter("drag", Kind::Real("N.m"), 0.0, NOT_NEGATIVE, "Coulomb drag of the output of this unit, taken off a torque on the load");
-    TABLE_DRAG => Variable::parameter("table_drag", Kind::Real("N.m"), TABLE_DRAG_N_M, NOT_NEGATIVE, "Coulomb drag of the output that the table was made with");
-    TORQUE_HOLD => Variable::parameter("torque_hold", Kind::Real("N.m"), 0.0, NOT_NEGATIVE, "a torque in the mesh below this does not change the flank");
-    TICK => Variable::parameter("tick", Kind::Real("s"), 1e-3, [1e-6, 10.0], "time from tick to tick");
-    CORRECTION_RATE_LIMIT => Variable::parameter("correction_rate_limit", Kind::Real("rad/s"), 0.05, POSITIVE, "fastest correction at the output");
-    CORRECTION_ACCELERATION_LIMIT => Variable::parameter("correction_acceleration_limit", Kind::Real("rad/s2"), 5.0, POSITIVE, "largest acceleration of the correction at the output");
-    GENERATOR_RATE_LIMIT => Variable::parameter("generator_rate_limit", Kind::Real("rad/s"), 600.0, POSITIVE, "a generator that moves faster from tick to tick is a glitch");
-    PATIENCE => Variable::parameter("patience", Kind::Integer, 5.0, [0.0, 65_534.0], "ticks for which a glitch is not believed, and the last correction is kept where none can be made");
-    ANGLE_HOLD => Variable::parameter("angle_hold", Kind::Real("rad"), 2.4e-6, [0.0, 0.05], "commands nearer than this to the one before keep the flank; 0 for none");
-    RATE_AHEAD => Variable::parameter("rate_ahead", Kind::Real("s"), 4e-3, [1e-6, 10.0], "generator_rate_command is the slope of the table over this time");
+    MODE => Variable::choice("mode", &MODES, Role::Tunable, 1.0,
+        "mode asked for; a change that is not legal is logged, and the mode stays");
+    GENERATOR_MEASURED => Variable::boolean("generator_measured", false,
+        "the generator is where generator_angle_measured says; else where it was commanded a tick before");
+    TORQUE_IS => Variable::choice("torque_is", &READINGS, Role::Parameter, 0.0, "which torque is given");
+    TORQUE_BANDWIDTH => Variable::real("torque_bandwidth", "Hz", 100.0, POSITIVE,
+        "corner of the low-pass of a torque in the mesh or on the load");
+    DRAG => Variable::real("drag", "N.m", 0.0, NOT_NEGATIVE,
+        "Coulomb drag of the output of this unit, taken off a torque on the load");
+    TABLE_DRAG => Variable::real("table_drag", "N.m", TABLE_DRAG_N_M, NOT_NEGATIVE,
+        "Coulomb drag of the output that the table was made with");
+    TORQUE_HOLD => Variable::real("torque_hold", "N.m", 0.0, NOT_NEGATIVE,
+        "a torque in the mesh below this does not change the flank");
+    TICK => Variable::real("tick", "s", 1e-3, [1e-6, 10.0], "time from tick to tick");
+    CORRECTION_RATE_LIMIT => Variable::real("correction_rate_limit", "rad/s", 0.05, POSITIVE,
+        "fastest correction at the output");
+    CORRECTION_ACCELERATION_LIMIT => Variable::real("correction_acceleration_limit", "rad/s2", 5.0, POSITIVE,
+        "largest acceleration of the correction at the output");
+    GENERATOR_RATE_LIMIT => Variable::real("generator_rate_limit", "rad/s", 600.0, POSITIVE,
+        "a generator that moves faster from tick to tick is a glitch");
+    PATIENCE => Variable::whole("patience", 5.0, [0.0, 65_534.0],
+        "ticks for which a glitch is not believed, and the last correction is kept where none can be made");
+    ANGLE_HOLD => Variable::real("angle_hold", "rad", 2.4e-6, [0.0, 0.05],
+        "commands nearer than this to the one before keep the flank; 0 for none");
+    RATE_AHEAD => Variable::real("rate_ahead", "s", 4e-3, [1e-6, 10.0],
+        "generator_rate_command is the slope of the table over this time");
     GENERATOR_ANGLE_COMMAND => Variable::output("generator_angle_command", Kind::Real("rad"),
         "where to turn the wave generator, positive counter-clockwise");
     GENERATOR_RATE_COMMAND => Variable::output("generator_rate_command", Kind::Real("rad/s"),
         "rate of generator_angle_command, to feed forward to a speed loop");
     OUTPUT_ANGLE_CORRECTION => Variable::output("output_angle_correction", Kind::Real("arcsec"),
         "output_angle_command less generator_angle_command over the ratio: has the sign of the error");
-    CORRECTION_HELD_BACK => Variable::output("correction_held_back", Kind::Real("arcsec"), "part of the correction that the limiter held back");
+    CORRECTION_HELD_BACK => Variable::output("correction_held_back", Kind::Real("arcsec"),
+        "part of the correction that the limiter held back");
     OUTPUT_ANGLE_PREDICTED => Variable::output("output_angle_predicted", Kind::Real("rad"),
         "angle of the output by the table, positive counter-clockwise");
     TRANSMISSION_ERROR_PREDICTED => Variable::output("transmission_error_predicted", Kind::Real("arcsec"),
         "transmission error by the table: output less generator over the ratio, positive where the output leads");
     PREDICTION_UNCERTAINTY => Variable::output("prediction_uncertainty", Kind::Real("arcsec"),
         "the output lies within this of output_angle_predicted, either way, as far as play and jumps go");
-    CORRECTION_QUALITY => Variable::output("correction_quality", Kind::Choice(&QUALITIES), "how far prediction and correction can be trusted");
+    CORRECTION_QUALITY => Variable::output("correction_quality", Kind::Choice(&QUALITIES),
+        "how far prediction and correction can be trusted");
     TICK_FLAGS => Variable::output("tick_flags", Kind::Integer,
-        "what happened in the tick, sum of: 1 no sample, 2 sample not believed, 8 held back, 16 not corrected, 32 table in doubt, 256 safe");
+        "what happened in the tick, sum of: 1 no sample, 2 sample not believed, 8 held back, 16 not corrected, \
+         32 table in doubt, 256 safe");
     NOT_CORRECTED => Variable::output("not_corrected", Kind::Boolean, "no correction could be made in the tick");
     MODE_ACTIVE => Variable::output("mode_active", Kind::Choice(&MODES), "mode of the joint");
     RATIO => Variable::constant("ratio", Kind::Real("rad/rad"), "generator over output");
     TABLE_ID => Variable::constant("table_id", Kind::Text, "id of the table");
-    TORQUE_SETTLE => Variable::parameter("torque_settle", Kind::Real("s"), 0.25, NOT_NEGATIVE, "after a torque in the mesh has changed the flank it does not change it again for so long");
-    TIME => Variable::time();
+    TORQUE_SETTLE => Variable::real("torque_settle", "s", 0.25, NOT_NEGATIVE,
+        "after a torque in the mesh has changed the flank it does not change it again for so long");
 }
 
 /// The outputs before the first tick where they are not zero: the command without a correction.
@@ -103,36 +116,11 @@ pub fn initial(values: &mut [f64]) {
     values[GENERATOR_ANGLE_COMMAND] = values[OUTPUT_ANGLE_COMMAND] * values[RATIO];
     values[GENERATOR_RATE_COMMAND] = values[OUTPUT_RATE_COMMAND] * values[RATIO];
     values[OUTPUT_ANGLE_PREDICTED] = values[OUTPUT_ANGLE_COMMAND];
-    values[CORRECTION_QUALITY] = f64::from(quality(Quality::Disabled));
+    values[CORRECTION_QUALITY] = f64::from(Quality::Disabled as u8);
 }
 
-/// The number that stands for it.
-pub const fn quality(quality: Quality) -> u8 {
-    match quality {
-        Quality::InRange => 0,
-        Quality::Uncertain => 1,
-        Quality::Extrapolated => 2,
-        Quality::Disabled => 3,
-    }
-}
-
-const fn code(mode: Mode) -> u8 {
-    match mode {
-        Mode::Off => 0,
-        Mode::Tracking => 1,
-        Mode::Hold => 2,
-        Mode::Safe => 3,
-    }
-}
-
-const fn mode(code: u32) -> Mode {
-    match code {
-        0 => Mode::Off,
-        1 => Mode::Tracking,
-        2 => Mode::Hold,
-        _ => Mode::Safe,
-    }
-}
+/// Modes in the order of [`MODES`].
+const MODE_OF: [Mode; 4] = [Mode::Off, Mode::Tracking, Mode::Hold, Mode::Safe];
 
 /// The joint in a simulation.
 pub struct CompensationModel {
@@ -231,7 +219,7 @@ impl Model for CompensationModel {
         let asked = at.start(MODE) as u32;
         if asked != self.asked {
             self.asked = asked;
-            if let Err(error) = self.state.request(mode(asked)) {
+            if let Err(error) = self.state.request(MODE_OF[asked.min(3) as usize]) {
                 says(format!("mode: {error}"));
             }
         }
@@ -261,30 +249,28 @@ impl Model for CompensationModel {
         outputs[OUTPUT_ANGLE_PREDICTED] = out.output.to_rad();
         outputs[TRANSMISSION_ERROR_PREDICTED] = arcsec(out.transmission_error_rad);
         outputs[PREDICTION_UNCERTAINTY] = arcsec(out.uncertainty_rad);
-        outputs[CORRECTION_QUALITY] = f64::from(quality(out.quality));
+        outputs[CORRECTION_QUALITY] = f64::from(out.quality as u8);
         outputs[TICK_FLAGS] = f64::from(out.flags.bits());
         outputs[NOT_CORRECTED] = f64::from(u8::from(out.flags.contains(Flags::NOT_CORRECTED)));
-        outputs[MODE_ACTIVE] = f64::from(code(self.state.mode()));
+        outputs[MODE_ACTIVE] = f64::from(self.state.mode() as u8);
         Ok(())
     }
+}
 
+impl Kept for CompensationModel {
     fn keep(&self, to: &mut Vec<u64>) {
-        self.state.words()[..].keep(to);
-        self.path.kept()[..].keep(to);
+        self.state.keep(to);
+        self.path.keep(to);
         self.temperature_c.to_bits().keep(to);
         self.asked.keep(to);
         self.command.keep(to);
         GeneratorAngle::from_counts(self.target.counts()).keep(to);
-        u32::from(self.direction == Direction::Backward).keep(to);
+        self.direction.keep(to);
     }
 
     fn take(&mut self, from: &mut dyn Iterator<Item = u64>) -> Option<()> {
-        let mut words = [0_u32; JOINT_STATE_WORDS];
-        words[..].take(from)?;
-        self.state = JointState::of_words(&words)?;
-        let mut bits = [0_u32; 7];
-        bits[..].take(from)?;
-        self.path.go_on(bits);
+        self.state.take(from)?;
+        self.path.take(from)?;
         let mut temperature = 0_u32;
         temperature.take(from)?;
         self.follow(f32::from_bits(temperature));
@@ -293,9 +279,6 @@ impl Model for CompensationModel {
         let mut target = GeneratorAngle::ZERO;
         target.take(from)?;
         self.target = OutputAngle::from_counts(target.counts());
-        let mut backward = 0_u32;
-        backward.take(from)?;
-        self.direction = if backward == 0 { Direction::Forward } else { Direction::Backward };
-        Some(())
+        self.direction.take(from)
     }
 }

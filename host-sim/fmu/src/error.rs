@@ -1,27 +1,17 @@
-//! What is wrong with an FMU's resources, with the values of its variables, or with a state to go on from.
-
-use std::path::PathBuf;
+//! Errors of an FMU's resources, of the values of its variables, and of a state to go on from.
 
 use flexspline::{ActivateError, ImageError, SettingError};
 use flexspline_motion::flight::FlightError;
 
-use crate::resources::{MODEL_FILE, TABLE_FILE};
+use crate::resources::TABLE_FILE;
 
 /// Why an FMU cannot be made, stepped, or taken up again.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FmuError {
-    /// A line of `model.txt`.
-    #[error("{MODEL_FILE}:{line}: {what}")]
-    Line {
-        /// From 1.
-        line: usize,
-        /// What was found and what is allowed.
-        what: String,
-    },
-    /// A file of the resources.
+    /// A file of the resources, or its folder.
     #[error("{file}: {what}")]
     File {
-        /// Its name or path.
+        /// Its name or path, of a text file with the line.
         file: String,
         /// What is wrong with it.
         what: String,
@@ -29,14 +19,6 @@ pub enum FmuError {
     /// The table.
     #[error("{TABLE_FILE}: {0}")]
     Table(#[from] ImageError),
-    /// The folder of the resources.
-    #[error("{}: {error}", folder.display())]
-    Folder {
-        /// Where it is.
-        folder: PathBuf,
-        /// What is wrong with it.
-        error: Box<FmuError>,
-    },
     /// The resource location names no folder here.
     #[error("resource location: found \"{uri}\"{why}, allowed: file:///folder")]
     Location {
@@ -80,7 +62,7 @@ pub enum FmuError {
     /// The numbers of the joint are no longer finite.
     #[error("the joint runs away")]
     RunsAway,
-    /// Bytes that are no state of this FMU, and what they are instead.
+    /// Bytes that are no state of this FMU: a state of another FMU, damaged, or none.
     #[error("{0}")]
     State(&'static str),
 }

@@ -1,24 +1,24 @@
 //! One simulation: what an importer may call when, its values, its time, and its state as bytes.
 //!
-//! States and calls are those of sections 2.1.6 to 2.1.8 and 4.2.4 of FMI 2.0, of sections 2.3 and 4.2 of FMI 3.0. A call
-//! that is not allowed is refused: it returns an error with a line in the log, and nothing changes. A model that cannot
-//! go on ends in [`State::Failed`].
+//! States and calls are those of sections 2.1.6 to 2.1.8 and 4.2.4 of FMI 2.0. A call that is not allowed is refused: it
+//! returns an error with a line in the log, and nothing changes. A model that cannot go on ends in [`State::Failed`].
 //!
-//! A model has ticks of a fixed time. A communication step does all ticks that end within it; what is left of the step
-//! is carried over to the next. An input holds from the point at which it was set on, or changes with the derivative
-//! that was given for the step.
+//! A model has ticks of a fixed time. A communication step does all ticks that end within it; the rest of the step is
+//! carried over to the next. An input holds from the point at which it was set on, or changes with the derivative that
+//! was given for the step.
 
 use std::collections::BTreeMap;
 use std::ffi::{CStr, CString};
-use std::path::Path;
 
+use flexspline_motion::keep::Kept;
+
+use crate::FmuError;
 use crate::compensation::{self, CompensationModel};
 use crate::joint::{self, MovingJoint};
 use crate::resources::Resources;
 use crate::variables::{Kind, ModelKind, Role, Variable};
-use crate::{FmiVersion, FmuError};
 
-/// `fmi2Status`, `fmi3Status`.
+/// `fmi2Status`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(i32)]
 pub enum FmiStatus {
@@ -93,8 +93,8 @@ impl Inputs<'_> {
     }
 }
 
-/// What is simulated.
-pub trait Model: Send {
+/// A model that is simulated.
+pub trait Model: Kept + Send {
     /// Time of a tick, s.
     fn tick_s(&self, values: &[f64]) -> f64;
 
@@ -103,12 +103,6 @@ pub trait Model: Send {
     /// # Errors
     /// Why the model cannot go on.
     fn tick(&mut self, at: &Inputs<'_>, outputs: &mut [f64], says: &mut dyn FnMut(String)) -> Result<(), FmuError>;
-
-    /// Adds all that changes.
-    fn keep(&self, to: &mut Vec<u64>);
-
-    /// Takes up what was kept by a model with the same parameters.
-    fn take(&mut self, from: &mut dyn Iterator<Item = u64>) -> Option<()>;
 }
 
 fn made(resources: &Resources, values: &[f64]) -> Result<Box<dyn Model>, FmuError> {
@@ -121,15 +115,14 @@ fn made(resources: &Resources, values: &[f64]) -> Result<Box<dyn Model>, FmuErro
 /// A tick that ends this part of a tick after the step still belongs to it: communication points are sums of rounded
 /// numbers.
 const SLACK: f64 = 1e-3;
-/// Most ticks in one communication step: a slip in the unit of time is told, and does not run for hours. *Guess*.
+/// Most ticks in one communication step: a slip in the unit of time is an error, and does not run for hours. *Guess*.
 const MOST_TICKS: f64 = 1e8;
 /// What the bytes of a state begin with; the last byte is the version.
-const STATE_MARK: u64 = u64::from_le_bytes(*b"FXS\0FMU\x01");
+const STATE_MARK: u64 = u64::from_le_bytes(*b"FXS\0FMU\x02");
 
 /// One simulation.
 pub struct Instance {
     resources: Resources,
-    version: FmiVersion,
     log: Log,
     logging: [bool; CATEGORIES.len()],
     state: State,
@@ -138,7 +131,8 @@ pub struct Instance {
     model: Option<Box<dyn Model>>,
     set_up: bool,
     start_s: f64,
-    stop_s: Option<f64>,
+    /// Infinity for none.
+    stop_s: f64,
     time_s: f64,
     ticks: u64,
     table_id: CString,
@@ -146,42 +140,21 @@ pub struct Instance {
 }
 
 impl Instance {
-    /// From the folder of resources, for the description with this GUID.
-    ///
-    /// # Errors
-    /// What is wrong with the folder, or that the description belongs to another one.
-    pub fn new(
-        folder: &Path,
-        guid: &str,
-        version: FmiVersion,
-        log: Log,
-        logging: bool,
-    ) -> Result<Self, (Log, FmuError)> {
-        match Resources::read(folder) {
-            Err(error) => Err((log, error)),
-            Ok(resources) if resources.guid != guid => {
-                Err((log, FmuError::Guid { found: guid.to_owned(), allowed: resources.guid }))
-            }
-            Ok(resources) => Ok(Self::of(resources, version, log, logging)),
-        }
-    }
-
-    /// Of resources, for calls of one version.
-    pub fn of(resources: Resources, version: FmiVersion, log: Log, logging: bool) -> Self {
+    /// Of resources; with `logging` all categories of the log are on.
+    pub fn new(resources: Resources, log: Log, logging: bool) -> Self {
         let values = resources.starts.clone();
         Self {
             slopes: vec![0.0; values.len()],
             values,
             table_id: CString::new(resources.table_id.to_string()).unwrap_or_default(),
             resources,
-            version,
             log,
             logging: [logging; CATEGORIES.len()],
             state: State::Instantiated,
             model: None,
             set_up: false,
             start_s: 0.0,
-            stop_s: None,
+            stop_s: f64::INFINITY,
             time_s: 0.0,
             ticks: 0,
             states: BTreeMap::new(),
@@ -195,17 +168,8 @@ impl Instance {
     }
 
     fn warn(&self, what: &str) -> FmiStatus {
-        // FMI 3.0 (section 2.3.1) logs nothing that is not asked for; errors are told by both.
-        if self.version == FmiVersion::Two || self.logging[1] {
-            (self.log)(FmiStatus::Warning, CATEGORIES[1], what);
-        }
+        (self.log)(FmiStatus::Warning, CATEGORIES[1], what);
         FmiStatus::Warning
-    }
-
-    fn tell(&self, what: &str) {
-        if self.logging[2] {
-            (self.log)(FmiStatus::Ok, CATEGORIES[2], what);
-        }
     }
 
     fn expect(&self, call: &str, allowed: &[State]) -> Result<(), FmiStatus> {
@@ -218,13 +182,6 @@ impl Instance {
             self.state.name(),
             names.join(", ")
         )))
-    }
-
-    fn variable(&self, call: &str, reference: u32) -> Result<&'static Variable, FmiStatus> {
-        let variables = self.resources.kind.variables();
-        variables.get(reference as usize).ok_or_else(|| {
-            self.refuse(&format!("{call}: found value reference {reference}, allowed: 0 to {}", variables.len() - 1))
-        })
     }
 
     /// All categories, or those named.
@@ -242,7 +199,7 @@ impl Instance {
         FmiStatus::Ok
     }
 
-    /// `fmi2SetupExperiment`, or what it does within `fmi3EnterInitializationMode`.
+    /// `fmi2SetupExperiment`.
     pub fn set_up(&mut self, call: &str, start_s: f64, stop_s: Option<f64>) -> Result<(), FmiStatus> {
         self.expect(call, &[State::Instantiated])?;
         if !start_s.is_finite() || stop_s.is_some_and(|stop_s| !(stop_s >= start_s && stop_s.is_finite())) {
@@ -250,7 +207,7 @@ impl Instance {
             return Err(self.refuse(&format!("{call}: found {start_s}{stop} s, allowed: finite, in order")));
         }
         self.set_up = true;
-        (self.start_s, self.stop_s, self.time_s) = (start_s, stop_s, start_s);
+        (self.start_s, self.stop_s, self.time_s) = (start_s, stop_s.unwrap_or(f64::INFINITY), start_s);
         Ok(())
     }
 
@@ -272,7 +229,9 @@ impl Instance {
         self.start_outputs();
         self.ticks = 0;
         self.state = State::Stepping;
-        self.tell(&format!("initialised; {}", crate::MARK));
+        if self.logging[2] {
+            (self.log)(FmiStatus::Ok, CATEGORIES[2], &format!("initialised; {}", crate::MARK));
+        }
         Ok(())
     }
 
@@ -298,46 +257,42 @@ impl Instance {
         self.slopes.fill(0.0);
         self.model = None;
         self.set_up = false;
-        (self.start_s, self.stop_s, self.time_s, self.ticks) = (0.0, None, 0.0, 0);
+        (self.start_s, self.stop_s, self.time_s, self.ticks) = (0.0, f64::INFINITY, 0.0, 0);
         self.state = State::Instantiated;
     }
 
-    /// Refuses to read where it is not allowed; FMI 3.0 has start values to be read before the initialisation.
+    /// Refuses to read before the initialisation.
     fn expect_readable(&self, call: &str) -> Result<(), FmiStatus> {
-        let after = usize::from(self.version == FmiVersion::Two);
-        let states = [State::Instantiated, State::Initializing, State::Stepping, State::Failed, State::Terminated];
-        self.expect(call, &states[after..])
+        self.expect(call, &State::ALL[1..])
     }
 
     /// Reads values of a type.
     pub fn get(&mut self, call: &str, like: fn(Kind) -> bool, references: &[u32]) -> Result<Vec<f64>, FmiStatus> {
         self.expect_readable(call)?;
-        if matches!(self.state, State::Instantiated | State::Initializing) {
+        if self.state == State::Initializing {
             self.start_outputs();
         }
-        let value = |place: usize| match self.resources.kind.variables()[place].role {
-            Role::Independent => self.time_s,
-            _ => self.values[place],
-        };
-        references.iter().map(|&reference| self.place(call, like, reference).map(value)).collect()
+        references
+            .iter()
+            .map(|&reference| self.variable(call, like, reference).map(|_| self.values[reference as usize]))
+            .collect()
     }
 
     /// Reads the only text that there is.
     pub(crate) fn get_text(&self, call: &str, reference: u32) -> Result<&CStr, FmiStatus> {
         self.expect_readable(call)?;
-        self.place(call, |kind| kind == Kind::Text, reference).map(|_| self.table_id.as_c_str())
+        self.variable(call, |kind| kind == Kind::Text, reference).map(|_| self.table_id.as_c_str())
     }
 
     /// Sets values of a type: all of them, or none.
     pub fn set(&mut self, call: &str, like: fn(Kind) -> bool, set: &[(u32, f64)]) -> Result<(), FmiStatus> {
         self.expect(call, &[State::Instantiated, State::Initializing, State::Stepping])?;
         for &(reference, value) in set {
-            let place = self.place(call, like, reference)?;
-            let variable = &self.resources.kind.variables()[place];
+            let variable = self.variable(call, like, reference)?;
             let now = match variable.role {
                 Role::Input | Role::Tunable => true,
                 Role::Parameter => self.state != State::Stepping,
-                Role::Output | Role::Motion | Role::Constant | Role::Independent => false,
+                Role::Output | Role::Motion | Role::Constant => false,
             };
             if !now {
                 let why = if variable.role == Role::Parameter { "after the initialisation" } else { "at all" };
@@ -357,19 +312,22 @@ impl Instance {
         Ok(())
     }
 
-    fn place(&self, call: &str, like: fn(Kind) -> bool, reference: u32) -> Result<usize, FmiStatus> {
-        let variable = self.variable(call, reference)?;
-        if like(variable.kind) {
-            return Ok(reference as usize);
-        }
-        Err(self.refuse(&format!("{call}: {} (value reference {reference}) is of another type", variable.name)))
+    /// A variable of a type.
+    fn variable(&self, call: &str, like: fn(Kind) -> bool, reference: u32) -> Result<&'static Variable, FmiStatus> {
+        let variables = self.resources.kind.variables();
+        let what = match variables.get(reference as usize) {
+            Some(variable) if like(variable.kind) => return Ok(variable),
+            Some(variable) => format!("{} (value reference {reference}) is of another type", variable.name),
+            None => format!("found value reference {reference}, allowed: 0 to {}", variables.len() - 1),
+        };
+        Err(self.refuse(&format!("{call}: {what}")))
     }
 
     /// `fmi2SetRealInputDerivatives`: of the first order, for the next step.
     pub(crate) fn set_slopes(&mut self, call: &str, set: &[(u32, i32, f64)]) -> Result<(), FmiStatus> {
         self.expect(call, &[State::Instantiated, State::Initializing, State::Stepping])?;
         for &(reference, order, value) in set {
-            let variable = self.variable(call, reference)?;
+            let variable = self.variable(call, |_| true, reference)?;
             if variable.role != Role::Input || order != 1 || !value.is_finite() {
                 let what = format!("{call}: {}: found order {order}, {value}, allowed: inputs, order 1", variable.name);
                 return Err(self.refuse(&what));
@@ -401,8 +359,8 @@ impl Instance {
             return Err(self.refuse(&format!("{call}: found a step from {from_s} s, allowed: from {} s", self.time_s)));
         }
         // Section 2.1.6: not beyond a stop time that was stated.
-        if let Some(stop_s) = self.stop_s.filter(|stop_s| to_s > stop_s + slack_s) {
-            return Err(self.refuse(&format!("{call}: found a step to {to_s} s, allowed: to {stop_s} s")));
+        if to_s > self.stop_s + slack_s {
+            return Err(self.refuse(&format!("{call}: found a step to {to_s} s, allowed: to {} s", self.stop_s)));
         }
         let due = ((to_s - self.start_s) / tick_s + SLACK).floor();
         if due - self.ticks as f64 > MOST_TICKS {
@@ -435,23 +393,12 @@ impl Instance {
         Ok(())
     }
 
-    /// End of the last step that succeeded, s.
-    pub fn time_s(&self) -> f64 {
-        self.time_s
-    }
-
-    /// Where in its life it is.
-    pub fn state(&self) -> State {
-        self.state
-    }
-
     /// All that changes, as bytes: for this description on any machine.
     pub fn bytes(&self) -> Vec<u8> {
         let mut words = vec![STATE_MARK, digest(self.resources.guid.bytes().map(u64::from)), self.state as u64];
-        words.extend([u64::from(self.set_up), self.start_s.to_bits()]);
-        words.extend([u64::from(self.stop_s.is_some()), self.stop_s.unwrap_or(0.0).to_bits()]);
-        words.extend([self.time_s.to_bits(), self.ticks, u64::from(self.model.is_some())]);
-        words.extend(self.values.iter().chain(&self.slopes).map(|value| value.to_bits()));
+        words.extend([u64::from(self.set_up), self.ticks, u64::from(self.model.is_some())]);
+        let numbers = [self.start_s, self.stop_s, self.time_s];
+        words.extend(numbers.iter().chain(&self.values).chain(&self.slopes).map(|number| number.to_bits()));
         if let Some(model) = &self.model {
             model.keep(&mut words);
         }
@@ -489,15 +436,18 @@ impl Instance {
     /// it has failed.
     pub(crate) fn go_on_from(&mut self, bytes: &[u8]) -> Result<(), FmuError> {
         let words = self.words(bytes)?;
-        let (&[state, set_up, start, stops, stop, time, ticks, has_model], rest) =
-            words.split_first_chunk::<8>().ok_or(FmuError::State("no state"))?;
+        let no_state = FmuError::State("no state");
         let count = self.values.len();
-        let (numbers, kept) = rest.split_at_checked(2 * count).ok_or(FmuError::State("no state"))?;
+        let Some((&[state, set_up, ticks, has_model], rest)) = words.split_first_chunk::<4>() else {
+            return Err(no_state);
+        };
+        let Some((numbers, kept)) = rest.split_at_checked(3 + 2 * count) else { return Err(no_state) };
         let numbers: Vec<f64> = numbers.iter().map(|word| f64::from_bits(*word)).collect();
+        let (times, numbers) = numbers.split_at(3);
         let (values, slopes) = numbers.split_at(count);
         let variables = self.resources.kind.variables();
         let sound = |(variable, value): (&Variable, &f64)| variable.is_output() || variable.allows(*value);
-        let state = State::ALL.into_iter().find(|known| *known as u64 == state).ok_or(FmuError::State("no state"))?;
+        let state = State::ALL.into_iter().find(|known| *known as u64 == state).ok_or(no_state)?;
         if !variables.iter().zip(values).all(sound) {
             return Err(FmuError::State("impossible values"));
         }
@@ -507,8 +457,7 @@ impl Instance {
         self.set_up = set_up != 0;
         self.values.copy_from_slice(values);
         self.slopes.copy_from_slice(slopes);
-        (self.start_s, self.time_s, self.ticks) = (f64::from_bits(start), f64::from_bits(time), ticks);
-        self.stop_s = (stops != 0).then_some(f64::from_bits(stop));
+        (self.start_s, self.stop_s, self.time_s, self.ticks) = (times[0], times[1], times[2], ticks);
         Ok(())
     }
 

@@ -1,16 +1,15 @@
-//! The compensation of a strain wave drive, and a joint with mass, behind the C interfaces of FMI 2.0 and FMI 3.0 for
-//! co-simulation.
+//! The compensation of a strain wave drive, and a joint with mass, behind the C interface of FMI 2.0 for co-simulation.
 //!
-//! The library is the same in every FMU. What it simulates, with which table and which start values, is in the FMU's
-//! resources ([`resources`]); which variables there are is in [`variables`], for the library and for who writes
+//! The library is the same in every FMU. The model, its table and its start values are in the FMU's resources
+//! ([`resources`]); the variables of each model are in [`variables`], for the library and for who writes
 //! `modelDescription.xml`.
-//! [`instance`] is the state machine of the standards, in safe code; [`abi`] is nothing but pointers.
+//! [`instance`] is the state machine of the standard, in safe code; [`abi`] is nothing but pointers.
 //!
-//! Facts about FMI are from "Functional Mock-up Interface for Model Exchange and Co-Simulation", version 2.0.4, and
-//! "Functional Mock-up Interface Specification", version 3.0.2; sections are named.
+//! Facts about FMI are from "Functional Mock-up Interface for Model Exchange and Co-Simulation", version 2.0.4;
+//! sections are named.
 #![deny(unsafe_code)]
 
-#[allow(unsafe_code, non_snake_case)] // Pointers from C, and the names of the standards.
+#[allow(unsafe_code, non_snake_case)] // Pointers from C, and the names of the standard.
 pub mod abi;
 pub mod compensation;
 mod error;
@@ -21,24 +20,5 @@ pub mod variables;
 
 pub use error::FmuError;
 
-/// What a library for the resources of this version has among its bytes.
+/// Text among the bytes of a library for the resources of this version.
 pub const MARK: &str = concat!("flexspline-fmu ", env!("CARGO_PKG_VERSION"), ", resources 2");
-
-/// A version of the standard: an FMU has one, a library both.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FmiVersion {
-    /// FMI 2.0.
-    Two,
-    /// FMI 3.0.
-    Three,
-}
-
-impl FmiVersion {
-    /// Its number.
-    pub const fn name(self) -> &'static str {
-        match self {
-            FmiVersion::Two => "2.0",
-            FmiVersion::Three => "3.0",
-        }
-    }
-}

@@ -1,4 +1,4 @@
-//! What lies in the folder `resources` of an FMU: `model.txt`, `table.fxt`, and for a joint `drive.bin` and
+//! The files in the folder `resources` of an FMU: `model.txt`, `table.fxt`, and for a joint `drive.bin` and
 //! `designed.bin`.
 //!
 //! `model.txt` has lines `name = value`: `model`, `guid`, and start values of variables that differ from the usual.
@@ -19,11 +19,10 @@ pub const MODEL_FILE: &str = "model.txt";
 pub const TABLE_FILE: &str = "table.fxt";
 /// Name of the drive's file.
 pub const DRIVE_FILE: &str = "drive.bin";
-
 /// Name of the file of the drive as designed.
 pub const DESIGNED_FILE: &str = "designed.bin";
 
-/// What an FMU brings along.
+/// The contents of that folder.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Resources {
     /// Which model.
@@ -62,7 +61,7 @@ impl Resources {
     /// # Errors
     /// File, line or field, value found and what is allowed.
     pub fn parse(model: &str, image: Vec<u8>, drives: [Option<&[u8]>; 2]) -> Result<Self, FmuError> {
-        let refuse = |line: usize, what: String| Err(FmuError::Line { line, what });
+        let refuse = |line: usize, what: String| Err(file_error(&format!("{MODEL_FILE}:{line}"), &what));
         let mut guid = None;
         let mut found = None;
         let mut starts = Vec::new();
@@ -116,11 +115,11 @@ impl Resources {
         Ok(Self { kind, guid, starts, image, table_id, gears })
     }
 
-    /// From the folder.
+    /// From the folder, for the description with this GUID.
     ///
     /// # Errors
-    /// As [`Self::parse`], with the folder.
-    pub fn read(folder: &Path) -> Result<Self, FmuError> {
+    /// As [`Self::parse`], with the folder; or that the description belongs to another FMU.
+    pub(crate) fn read(folder: &Path, guid: &str) -> Result<Self, FmuError> {
         let bytes = |name: &str| {
             let file = folder.join(name);
             std::fs::read(&file).map_err(|error| file_error(&file.display().to_string(), &error.to_string()))
@@ -128,7 +127,11 @@ impl Resources {
         let model = String::from_utf8(bytes(MODEL_FILE)?).map_err(|_| file_error(MODEL_FILE, "no UTF-8"))?;
         let drives = [DRIVE_FILE, DESIGNED_FILE].map(|name| bytes(name).ok());
         let read = Self::parse(&model, bytes(TABLE_FILE)?, drives.each_ref().map(Option::as_deref));
-        read.map_err(|error| FmuError::Folder { folder: folder.to_owned(), error: Box::new(error) })
+        let read = read.map_err(|error| file_error(&folder.display().to_string(), &error.to_string()))?;
+        if read.guid != guid {
+            return Err(FmuError::Guid { found: guid.to_owned(), allowed: read.guid });
+        }
+        Ok(read)
     }
 
     /// Start value of a variable of a name; not a number if there is none.

@@ -1,4 +1,4 @@
-//! Variables of a model: what its description says of them, and what an importer may do with them.
+//! Variables of a model: name, type, unit, range, and when an importer may set or read them.
 
 /// Units, by the symbol that is shown: exponents of kg, m, s, K, rad; factor and offset to them.
 pub const UNITS: [(&str, [i8; 5], f64, f64); 12] = [
@@ -24,6 +24,8 @@ pub struct Choices {
     /// Names, and what they mean.
     pub items: &'static [(&'static str, &'static str)],
 }
+
+type Text = &'static str;
 
 /// Type of a variable.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,8 +57,6 @@ pub enum Role {
     Motion,
     /// Never changes.
     Constant,
-    /// The time of the simulation.
-    Independent,
 }
 
 /// A variable; its value reference is its place in the list.
@@ -76,45 +76,53 @@ pub struct Variable {
     pub says: &'static str,
 }
 
+/// A positive number.
+pub(crate) const POSITIVE: [f64; 2] = [1e-9, 1e9];
+/// Zero or a positive number.
+pub(crate) const NOT_NEGATIVE: [f64; 2] = [0.0, 1e9];
 /// Any number.
-pub const ANY: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
+const ANY: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
 impl Variable {
-    /// A parameter within a range.
-    pub const fn parameter(
-        name: &'static str,
-        kind: Kind,
-        start: f64,
-        range: [f64; 2],
-        says: &'static str,
-    ) -> Variable {
-        Variable { name, kind, role: Role::Parameter, start, range, says }
+    /// A parameter: a number with a unit, within a range.
+    pub(crate) const fn real(name: Text, unit: Text, start: f64, range: [f64; 2], says: Text) -> Variable {
+        Variable { name, kind: Kind::Real(unit), role: Role::Parameter, start, range, says }
+    }
+
+    /// A parameter: a whole number within a range.
+    pub(crate) const fn whole(name: Text, start: f64, range: [f64; 2], says: Text) -> Variable {
+        Variable { name, kind: Kind::Integer, role: Role::Parameter, start, range, says }
+    }
+
+    /// A parameter: yes or no.
+    pub(crate) const fn boolean(name: Text, start: bool, says: Text) -> Variable {
+        let start = if start { 1.0 } else { 0.0 };
+        Variable { name, kind: Kind::Boolean, role: Role::Parameter, start, range: ANY, says }
+    }
+
+    /// One of a list.
+    pub(crate) const fn choice(name: Text, of: &'static Choices, role: Role, start: f64, says: Text) -> Variable {
+        Variable { name, kind: Kind::Choice(of), role, start, range: ANY, says }
     }
 
     /// An input.
-    pub const fn input(name: &'static str, unit: &'static str, start: f64, says: &'static str) -> Variable {
+    pub(crate) const fn input(name: Text, unit: Text, start: f64, says: Text) -> Variable {
         Variable { name, kind: Kind::Real(unit), role: Role::Input, start, range: ANY, says }
     }
 
     /// An output that changes in steps.
-    pub const fn output(name: &'static str, kind: Kind, says: &'static str) -> Variable {
+    pub(crate) const fn output(name: Text, kind: Kind, says: Text) -> Variable {
         Variable { name, kind, role: Role::Output, start: 0.0, range: ANY, says }
     }
 
     /// An output that changes all the time.
-    pub const fn motion(name: &'static str, unit: &'static str, says: &'static str) -> Variable {
+    pub(crate) const fn motion(name: Text, unit: Text, says: Text) -> Variable {
         Variable { name, kind: Kind::Real(unit), role: Role::Motion, start: 0.0, range: ANY, says }
     }
 
     /// A constant.
-    pub const fn constant(name: &'static str, kind: Kind, says: &'static str) -> Variable {
+    pub(crate) const fn constant(name: Text, kind: Kind, says: Text) -> Variable {
         Variable { name, kind, role: Role::Constant, start: 0.0, range: ANY, says }
-    }
-
-    /// The time of the simulation: FMI 3.0 wants it among the variables.
-    pub const fn time() -> Variable {
-        let says = "time of the simulation";
-        Variable { name: "time", kind: Kind::Real("s"), role: Role::Independent, start: 0.0, range: ANY, says }
     }
 
     /// Whether it is an output.
@@ -157,11 +165,8 @@ impl ModelKind {
     }
 
     /// Its name in an FMU: that of its library, too.
-    pub const fn identifier(self) -> &'static str {
-        match self {
-            ModelKind::Compensation => "flexspline_compensation",
-            ModelKind::Joint => "flexspline_joint",
-        }
+    pub fn identifier(self) -> String {
+        format!("flexspline_{}", self.name())
     }
 
     /// Its variables.

@@ -1,7 +1,6 @@
-//! What changes while something moves, as words of 64 bits: to go on from there later, or elsewhere, with the same
-//! bits.
+//! The state of a simulation as words of 64 bits: to go on from there later, or elsewhere, with the same bits.
 
-use flexspline::GeneratorAngle;
+use flexspline::{Direction, GeneratorAngle, JOINT_STATE_WORDS, JointState, TorquePath};
 
 /// Can be kept, and taken up again by one that is made of the same.
 pub trait Kept {
@@ -41,6 +40,45 @@ impl Kept for GeneratorAngle {
 
     fn take(&mut self, from: &mut dyn Iterator<Item = u64>) -> Option<()> {
         *self = GeneratorAngle::from_counts(from.next()? as i64);
+        Some(())
+    }
+}
+
+impl Kept for Direction {
+    fn keep(&self, to: &mut Vec<u64>) {
+        u32::from(*self == Direction::Backward).keep(to);
+    }
+
+    fn take(&mut self, from: &mut dyn Iterator<Item = u64>) -> Option<()> {
+        let mut backward = 0_u32;
+        backward.take(from)?;
+        *self = if backward == 0 { Direction::Forward } else { Direction::Backward };
+        Some(())
+    }
+}
+
+impl Kept for JointState {
+    fn keep(&self, to: &mut Vec<u64>) {
+        self.words()[..].keep(to);
+    }
+
+    fn take(&mut self, from: &mut dyn Iterator<Item = u64>) -> Option<()> {
+        let mut words = [0_u32; JOINT_STATE_WORDS];
+        words[..].take(from)?;
+        *self = JointState::of_words(&words)?;
+        Some(())
+    }
+}
+
+impl Kept for TorquePath {
+    fn keep(&self, to: &mut Vec<u64>) {
+        self.kept()[..].keep(to);
+    }
+
+    fn take(&mut self, from: &mut dyn Iterator<Item = u64>) -> Option<()> {
+        let mut bits = self.kept();
+        bits[..].take(from)?;
+        self.go_on(bits);
         Some(())
     }
 }

@@ -8,7 +8,7 @@ use super::noise::Noise;
 use super::servo::ServoSettings;
 
 /// Torques on the load from outside, N·m.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Load {
     /// What is always there.
     pub bias_n_m: f64,
@@ -23,9 +23,10 @@ pub struct Load {
 }
 
 /// From what the torque is known in flight.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TorqueKnown {
     /// On the load, from a model or a sensor there: with noise.
+    #[default]
     OnLoad,
     /// In the mesh, from a sensor between drive and load: with noise.
     InMesh,
@@ -36,9 +37,10 @@ pub enum TorqueKnown {
 }
 
 /// What the table of the joint knows of the unit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TableKnown {
     /// The drive as designed.
+    #[default]
     Nominal,
     /// The drive as designed, and the lines of the unit as a diagnosis tells them: 5 % too small (guess).
     Extended,
@@ -47,7 +49,7 @@ pub enum TableKnown {
 }
 
 /// Everything.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scenario {
     /// Its name.
     pub name: String,

@@ -8,7 +8,7 @@ use flexspline::GeneratorAngle;
 use crate::noise::Noise;
 
 /// What a servo is made of; bandwidths of a rigid motor alone.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ServoSettings {
     /// Time from tick to tick, s.
     pub tick_s: f64,

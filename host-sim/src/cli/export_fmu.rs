@@ -1,4 +1,4 @@
-//! `flexspline export --format fmu`: a table, or a joint with mass, for simulators that import FMI 2.0 or FMI 3.0.
+//! `flexspline export --format fmu`: a table, or a joint with mass, for simulators that import FMI 2.0.
 
 use std::path::{Path, PathBuf};
 
@@ -8,13 +8,13 @@ use serde::Serialize;
 use super::context::image_file;
 use super::{Context, Failure, fly};
 use flexspline_base::output::write_whole;
-use flexspline_export::fmu::{FmiVersion, Fmu, FmuExportError, compensation, find_libraries, joint};
+use flexspline_export::fmu::{Fmu, FmuExportError, compensation, find_libraries, joint};
 
 /// The scenario of a joint where none is named.
 const USUAL_SCENARIO: &str = "antenna";
 
-/// Versions of the standard.
-const FMI_VERSIONS: [&str; 2] = [FmiVersion::Two.name(), FmiVersion::Three.name()];
+/// The version of the standard.
+const FMI: &str = "2.0";
 
 /// Options of this format.
 #[derive(Debug, Args)]
@@ -23,8 +23,8 @@ pub(super) struct FmuOptions {
     /// compensation]
     #[arg(long, value_enum, value_name = "MODEL", help_heading = "FMU", hide_possible_values = true)]
     model: Option<FmuModel>,
-    /// Version of FMI, one for each FMU: 2.0 or 3.0 [default: 2.0]
-    #[arg(long, value_parser = FMI_VERSIONS, value_name = "VERSION", help_heading = "FMU", hide_possible_values = true)]
+    /// Version of FMI: 2.0 alone
+    #[arg(long, value_name = "VERSION", help_heading = "FMU", hide = true)]
     fmi: Option<String>,
     /// Masses, friction, servo and expected load of a joint: antenna, rover, camera, telescope, or a TOML file
     /// [default: antenna]
@@ -81,18 +81,18 @@ impl FmuOptions {
                 "{option}: an FMU has the drive of its table; allowed: --tables FILE.fxt"
             )));
         }
-        let newer = self.fmi.as_deref() == Some(FmiVersion::Three.name());
-        let version = if newer { FmiVersion::Three } else { FmiVersion::Two };
-        let fmu = self.fmu(tables, version)?;
+        if let Some(found) = self.fmi.as_deref().filter(|version| *version != FMI) {
+            return Err(Failure::BadInput(format!("--fmi: found {found}, allowed: {FMI}, the version of every FMU")));
+        }
+        let fmu = self.fmu(tables)?;
         let libraries = find_libraries(&self.library).map_err(|error| Failure::BadInput(error.to_string()))?;
         let resources = fmu.resources();
         let file = context.out()?.join(format!("{}.fmu", resources.kind.identifier()));
         write_whole(&file, |out| fmu.write(out, &libraries))?;
-        let platforms: Vec<&str> = libraries.iter().map(|library| library.platform.folders[version as usize]).collect();
+        let platforms: Vec<&str> = libraries.iter().map(|library| library.platform.folder).collect();
         let text = format!(
-            "wrote {}: FMI {}, {} with table {}, for {}",
+            "wrote {}: FMI {FMI}, {} with table {}, for {}",
             file.display(),
-            version.name(),
             resources.kind.name(),
             resources.table_id,
             platforms.join(", ")
@@ -101,7 +101,7 @@ impl FmuOptions {
             schema_version: 1,
             written: vec![file],
             model: resources.kind.name(),
-            fmi: version.name(),
+            fmi: FMI,
             guid: resources.guid.clone(),
             table_id: resources.table_id.to_string(),
             platforms,
@@ -109,7 +109,7 @@ impl FmuOptions {
         context.print(&exported, || text)
     }
 
-    fn fmu(&self, tables: Option<&Path>, version: FmiVersion) -> Result<Fmu, Failure> {
+    fn fmu(&self, tables: Option<&Path>) -> Result<Fmu, Failure> {
         let image = tables.map(image_file).transpose()?;
         let of_table = |error: FmuExportError| {
             let file = tables.map_or("scenario".to_owned(), |file| file.display().to_string());
@@ -122,10 +122,10 @@ impl FmuOptions {
             (FmuModel::Compensation, None) => Err(Failure::BadInput(
                 "--tables: missing; needed for the compensation: an image as flexspline tables writes it".to_owned(),
             )),
-            (FmuModel::Compensation, Some(image)) => compensation(image, version).map_err(of_table),
+            (FmuModel::Compensation, Some(image)) => compensation(image).map_err(of_table),
             (FmuModel::Joint, image) => {
                 let flown = fly::scenario(self.scenario.as_deref().unwrap_or(USUAL_SCENARIO))?;
-                joint(&flown, image, version).map_err(of_table)
+                joint(&flown, image).map_err(of_table)
             }
         }
     }

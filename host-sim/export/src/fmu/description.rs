@@ -1,14 +1,13 @@
-//! `modelDescription.xml` (section 2.2 of FMI 2.0, 2.4 of FMI 3.0) and the page of an FMU.
+//! `modelDescription.xml` (section 2.2) and the page of an FMU.
 
 use std::fmt::Write as _;
 
 use flexspline::Table;
-use flexspline_fmu::FmiVersion;
 use flexspline_fmu::instance::CATEGORIES;
 use flexspline_fmu::resources::Resources;
 use flexspline_fmu::variables::{Choices, Kind, ModelKind, Role, UNITS, Variable};
 
-/// Licences of what is in the library; `license.txt` is where readers begin.
+/// Licences of the library's parts; `license.txt` is where readers begin.
 pub(super) const LICENCES: [(&str, &str); 3] = [
     ("license.txt", "flexspline is licensed under MIT or Apache-2.0, at your choice: LICENSE-MIT, LICENSE-APACHE.\n"),
     ("LICENSE-MIT", include_str!("../../shipped/LICENSE-MIT")),
@@ -34,24 +33,21 @@ fn about(kind: ModelKind) -> &'static str {
     }
 }
 
-/// What a co-simulation of each version can do: a state is kept, read and set; steps are of any length.
-const ABILITIES: [&str; 2] = [
-    r#"canInterpolateInputs="true" canRunAsynchronuously="false" canNotUseMemoryManagementFunctions="true" canGetAndSetFMUstate="true" canSerializeFMUstate="true" providesDirectionalDerivative="false""#,
-    r#"providesIntermediateUpdate="false" mightReturnEarlyFromDoStep="false" hasEventMode="false" canGetAndSetFMUState="true" canSerializeFMUState="true" providesDirectionalDerivatives="false" providesAdjointDerivatives="false""#,
-];
-
-/// The whole file.
-pub(super) fn xml(resources: &Resources, fmi: FmiVersion) -> String {
+/// The whole file. A state is kept, read and set; steps are of any length.
+pub(super) fn xml(resources: &Resources) -> String {
     let kind = resources.kind;
     let tick_s = resources.start("tick");
-    let (token, more) = match fmi {
-        FmiVersion::Two => ("guid", " numberOfEventIndicators=\"0\""),
-        FmiVersion::Three => ("instantiationToken", ""),
-    };
     let mut xml = format!(
         r#"<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="{fmi}" modelName="flexspline {name}" {token}="{guid}" description="{about}" version="{version}" license="MIT OR Apache-2.0" generationTool="flexspline {version}" variableNamingConvention="flat"{more}>
-  <CoSimulation modelIdentifier="{identifier}" needsExecutionTool="false" canBeInstantiatedOnlyOncePerProcess="false" canHandleVariableCommunicationStepSize="true" maxOutputDerivativeOrder="0" {abilities}/>
+<fmiModelDescription fmiVersion="2.0" modelName="flexspline {name}" guid="{guid}"
+  description="{about}" version="{version}"
+  license="MIT OR Apache-2.0" generationTool="flexspline {version}" variableNamingConvention="flat"
+  numberOfEventIndicators="0">
+  <CoSimulation modelIdentifier="{identifier}" needsExecutionTool="false"
+    canBeInstantiatedOnlyOncePerProcess="false" canHandleVariableCommunicationStepSize="true"
+    maxOutputDerivativeOrder="0" canInterpolateInputs="true" canRunAsynchronuously="false"
+    canNotUseMemoryManagementFunctions="true" canGetAndSetFMUstate="true" canSerializeFMUstate="true"
+    providesDirectionalDerivative="false"/>
   <UnitDefinitions>
 "#,
         name = kind.name(),
@@ -59,8 +55,6 @@ pub(super) fn xml(resources: &Resources, fmi: FmiVersion) -> String {
         about = about(kind),
         version = env!("CARGO_PKG_VERSION"),
         identifier = kind.identifier(),
-        fmi = fmi.name(),
-        abilities = ABILITIES[fmi as usize],
     );
     for (name, exponents, factor, offset) in UNITS {
         let used = kind.variables().iter().any(|variable| variable.kind == Kind::Real(name));
@@ -70,17 +64,12 @@ pub(super) fn xml(resources: &Resources, fmi: FmiVersion) -> String {
     }
     xml += "  </UnitDefinitions>\n  <TypeDefinitions>\n";
     for choices in lists(kind) {
-        let (open, close) = match fmi {
-            FmiVersion::Two => ("SimpleType", "</Enumeration></SimpleType>"),
-            FmiVersion::Three => ("EnumerationType", "</EnumerationType>"),
-        };
-        let inner = if fmi == FmiVersion::Two { "<Enumeration>" } else { "" };
-        let _ = writeln!(xml, "    <{open} name=\"{}\">{inner}", choices.name);
+        let _ = writeln!(xml, "    <SimpleType name=\"{}\"><Enumeration>", choices.name);
         for (value, (name, says)) in choices.items.iter().enumerate() {
             let says = escaped(says);
             let _ = writeln!(xml, "      <Item name=\"{name}\" value=\"{value}\" description=\"{says}\"/>");
         }
-        let _ = writeln!(xml, "    {close}");
+        xml += "    </Enumeration></SimpleType>\n";
     }
     xml += "  </TypeDefinitions>\n  <LogCategories>\n";
     for category in CATEGORIES {
@@ -92,25 +81,17 @@ pub(super) fn xml(resources: &Resources, fmi: FmiVersion) -> String {
          <ModelVariables>\n"
     );
     for (place, variable) in kind.variables().iter().enumerate() {
-        xml += &described(place, variable, resources, fmi);
+        xml += &described(place, variable, resources);
     }
     xml += "  </ModelVariables>\n  <ModelStructure>\n";
     // Outputs change in steps alone, so none of them depends on an input at the same point.
-    for (group, depends) in [("Output", " dependencies=\"\""), ("InitialUnknown", "")] {
-        let outputs = kind.variables().iter().enumerate().filter(|(_, variable)| variable.is_output());
-        // Indices of FMI 2.0 count from one.
-        let unknowns: String = match fmi {
-            FmiVersion::Two => {
-                outputs.map(|(k, _)| format!("      <Unknown index=\"{}\"{depends}/>\n", k + 1)).collect()
-            }
-            FmiVersion::Three => {
-                outputs.map(|(k, _)| format!("    <{group} valueReference=\"{k}\"{depends}/>\n")).collect()
-            }
-        };
-        xml += &match fmi {
-            FmiVersion::Two => format!("    <{group}s>\n{unknowns}    </{group}s>\n"),
-            FmiVersion::Three => unknowns,
-        };
+    for (group, depends) in [("Outputs", " dependencies=\"\""), ("InitialUnknowns", "")] {
+        let _ = writeln!(xml, "    <{group}>");
+        // Indices count from one.
+        for (index, _) in (1..).zip(kind.variables()).filter(|(_, variable)| variable.is_output()) {
+            let _ = writeln!(xml, "      <Unknown index=\"{index}\"{depends}/>");
+        }
+        let _ = writeln!(xml, "    </{group}>");
     }
     xml + "  </ModelStructure>\n</fmiModelDescription>\n"
 }
@@ -152,13 +133,12 @@ fn attributes(variable: &Variable) -> [&'static str; 3] {
         Role::Output => ["output", "discrete", "calculated"],
         Role::Motion => ["output", "continuous", "calculated"],
         Role::Constant => ["local", "constant", "exact"],
-        Role::Independent => ["independent", "continuous", ""],
     }
 }
 
 fn start(place: usize, variable: &Variable, resources: &Resources) -> Option<String> {
     let value = resources.starts[place];
-    if variable.is_output() || variable.role == Role::Independent {
+    if variable.is_output() {
         return None;
     }
     Some(match variable.kind {
@@ -169,43 +149,33 @@ fn start(place: usize, variable: &Variable, resources: &Resources) -> Option<Str
 }
 
 /// The element of a variable.
-fn described(place: usize, variable: &Variable, resources: &Resources, fmi: FmiVersion) -> String {
+fn described(place: usize, variable: &Variable, resources: &Resources) -> String {
     let [causality, variability, initial] = attributes(variable);
-    let mut general = format!(
-        "name=\"{}\" valueReference=\"{place}\" description=\"{}\" causality=\"{causality}\" variability=\"{variability}\"",
-        variable.name,
-        escaped(variable.says)
-    );
+    let mut general =
+        format!("name=\"{}\" valueReference=\"{place}\" description=\"{}\"", variable.name, escaped(variable.says));
+    let _ = write!(general, " causality=\"{causality}\" variability=\"{variability}\"");
     if !initial.is_empty() {
         let _ = write!(general, " initial=\"{initial}\"");
     }
-    let (elements, mut own) = match variable.kind {
-        Kind::Real(unit) => (["Real", "Float64"], format!(" unit=\"{unit}\"")),
-        Kind::Integer => (["Integer", "Int32"], String::new()),
-        Kind::Boolean => (["Boolean"; 2], String::new()),
-        Kind::Choice(choices) => (["Enumeration"; 2], format!(" declaredType=\"{}\"", choices.name)),
-        Kind::Text => (["String"; 2], String::new()),
+    let (element, mut own) = match variable.kind {
+        Kind::Real(unit) => ("Real", format!(" unit=\"{unit}\"")),
+        Kind::Integer => ("Integer", String::new()),
+        Kind::Boolean => ("Boolean", String::new()),
+        Kind::Choice(choices) => ("Enumeration", format!(" declaredType=\"{}\"", choices.name)),
+        Kind::Text => ("String", String::new()),
     };
-    let element = elements[fmi as usize];
     let [least, most] = variable.range;
     if matches!(variable.kind, Kind::Real(_) | Kind::Integer) && least.is_finite() && most.is_finite() {
         let _ = write!(own, " min=\"{least}\" max=\"{most}\"");
     }
-    let start = start(place, variable, resources);
-    if let (Some(text), FmiVersion::Three, Kind::Text) = (&start, fmi, variable.kind) {
-        return format!("    <{element} {general}><Start value=\"{text}\"/></{element}>\n");
-    }
-    if let Some(start) = start {
+    if let Some(start) = start(place, variable, resources) {
         let _ = write!(own, " start=\"{start}\"");
     }
-    match fmi {
-        FmiVersion::Two => format!("    <ScalarVariable {general}><{element}{own}/></ScalarVariable>\n"),
-        FmiVersion::Three => format!("    <{element} {general}{own}/>\n"),
-    }
+    format!("    <ScalarVariable {general}><{element}{own}/></ScalarVariable>\n")
 }
 
 /// `documentation/index.html`.
-pub(super) fn page(resources: &Resources, fmi: FmiVersion) -> String {
+pub(super) fn page(resources: &Resources) -> String {
     let kind = resources.kind;
     let table = Table::check(&resources.image).ok();
     let range = table.map_or(String::new(), |table| {
@@ -218,14 +188,13 @@ pub(super) fn page(resources: &Resources, fmi: FmiVersion) -> String {
          1rem}}td,th{{text-align:left;padding:.15rem .6rem;vertical-align:top}}</style></head><body>\n<h1>flexspline \
          {name}</h1>\n<p>{about}. Ratio {ratio}, table <code>{id}</code>{range}.</p>\n<p>Angles are radians, positive \
          counter-clockwise for generator and output, seen from the same side. A positive torque turns the output \
-         forward. An error is output less generator over the ratio, positive where the output leads.</p>\n<p>FMI \
-         {fmi} for co-simulation. The model has ticks of <code>tick</code>. A communication step does all ticks that end \
-         within it, and carries what is left over to the \
+         forward. An error is output less generator over the ratio, positive where the output leads.</p>\n<p>FMI 2.0 \
+         for co-simulation. The model has ticks of <code>tick</code>. A communication step does all ticks that end \
+         within it, and carries the rest over to the \
          next.</p>\n<table><tr><th>variable<th>unit<th>is<th>start<th>what\n",
         name = kind.name(),
         about = about(kind),
         ratio = resources.start("ratio"),
-        fmi = fmi.name(),
         id = resources.table_id,
     );
     for (place, variable) in kind.variables().iter().enumerate() {

@@ -5,12 +5,11 @@ use std::path::{Path, PathBuf};
 
 use super::FmuExportError;
 
-/// A platform (section 2.3 of FMI 2.0, 2.5.1.4 of FMI 3.0): its folders, how its library ends and is called by cargo,
-/// and what such a file begins with.
+/// A platform (section 2.3): its folder, name and ending of its library, and the first bytes of such a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Platform {
-    /// Folders of `binaries`, of FMI 2.0 and FMI 3.0.
-    pub folders: [&'static str; 2],
+    /// Folder of `binaries`.
+    pub folder: &'static str,
     /// Ending.
     pub extension: &'static str,
     /// As cargo calls it.
@@ -23,7 +22,7 @@ pub struct Platform {
 /// Those that a library may be for; all of 64 bits.
 const PLATFORMS: [Platform; 3] = [
     Platform {
-        folders: ["linux64", "x86_64-linux"],
+        folder: "linux64",
         extension: "so",
         file: "libflexspline_fmu.so",
         target: "x86_64-unknown-linux-gnu",
@@ -31,14 +30,14 @@ const PLATFORMS: [Platform; 3] = [
         magic: b"\x7fELF\x02\x01",
     },
     Platform {
-        folders: ["win64", "x86_64-windows"],
+        folder: "win64",
         extension: "dll",
         file: "flexspline_fmu.dll",
         target: "x86_64-pc-windows-gnu",
         magic: b"MZ",
     },
     Platform {
-        folders: ["darwin64", "x86_64-darwin"],
+        folder: "darwin64",
         extension: "dylib",
         file: "libflexspline_fmu.dylib",
         target: "x86_64-apple-darwin",
@@ -49,7 +48,7 @@ const PLATFORMS: [Platform; 3] = [
 /// Machine of an ELF file: where it stands, and that of x86-64.
 const ELF_MACHINE: (usize, [u8; 2]) = (18, [62, 0]);
 
-/// A library and what it is for.
+/// A library and its platform.
 #[derive(Debug, Clone)]
 pub struct Library {
     /// Where it runs.
@@ -71,7 +70,7 @@ pub fn find_libraries(named: &[PathBuf]) -> Result<Vec<Library>, FmuExportError>
         let library = read(file)?;
         if let Some(other) = libraries.iter().find(|other| other.platform == library.platform) {
             let files = [other.file.clone(), file.clone()];
-            return Err(FmuExportError::TwoLibraries { files, folder: library.platform.folders[0] });
+            return Err(FmuExportError::TwoLibraries { files, folder: library.platform.folder });
         }
         libraries.push(library);
     }
@@ -94,7 +93,7 @@ pub fn find_libraries(named: &[PathBuf]) -> Result<Vec<Library>, FmuExportError>
 
 /// Where the library of a platform may lie, the likeliest to be new first.
 fn places(beside: &Path, platform: &Platform) -> Vec<PathBuf> {
-    let Platform { folders: [folder, _], file, target, .. } = platform;
+    let Platform { folder, file, target, .. } = platform;
     let mut places = vec![
         // Cargo has there what it built along with the program.
         beside.join("deps").join(file),

@@ -1,11 +1,11 @@
-//! One joint of a flight, ticked from outside: what a simulator of something larger drives.
+//! One joint of a flight, ticked from outside, by a simulator of something larger.
 
 use super::{COMPENSATED, Commanded, FlightError, JointController, JointLane, LaneParts, Sensing, Unit, made};
 use crate::keep::{Kept, kept};
 use crate::on_board::{Given, Settings, Told};
 use crate::plant::Plant;
 use crate::scenario::{Moment, Scenario};
-use flexspline::{Direction, JOINT_STATE_WORDS, JointState, Quality};
+use flexspline::Quality;
 
 /// A joint with mass, its servo, and what commands it; as [`super::fly`] flies it, tick by tick.
 pub struct OneJoint {
@@ -14,10 +14,10 @@ pub struct OneJoint {
     started_j: f64,
 }
 
-/// What a tick gave beside what moved.
+/// Command and flags of a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ticked {
-    /// Where the generator was told to be, rad.
+    /// Commanded generator angle, rad.
     pub command_rad: f64,
     /// The correction in it, rad at the output: target less command over ratio.
     pub correction_rad: f64,
@@ -94,7 +94,7 @@ impl OneJoint {
         self.made.on_board_settings()
     }
 
-    /// What the core was told and gave in the last tick; `None` without it.
+    /// Input and output of the core in the last tick; `None` without it.
     pub fn on_board(&self) -> Option<&(Told, Given)> {
         match &self.lane.controller {
             JointController::Core(core) => core.last.as_ref(),
@@ -129,10 +129,10 @@ impl Kept for OneJoint {
         self.lane.plant.keep(to);
         self.lane.servo.keep(to);
         self.lane.sensing.keep(to);
-        u32::from(self.lane.direction == Direction::Backward).keep(to);
+        self.lane.direction.keep(to);
         if let JointController::Core(core) = &self.lane.controller {
-            core.on_board.state.words()[..].keep(to);
-            core.on_board.path.kept()[..].keep(to);
+            core.on_board.state.keep(to);
+            core.on_board.path.keep(to);
         }
     }
 
@@ -140,16 +140,10 @@ impl Kept for OneJoint {
         self.lane.plant.take(from)?;
         self.lane.servo.take(from)?;
         self.lane.sensing.take(from)?;
-        let mut backward = 0_u32;
-        backward.take(from)?;
-        self.lane.direction = if backward == 0 { Direction::Forward } else { Direction::Backward };
+        self.lane.direction.take(from)?;
         if let JointController::Core(core) = &mut self.lane.controller {
-            let mut words = [0_u32; JOINT_STATE_WORDS];
-            words[..].take(from)?;
-            core.on_board.state = JointState::of_words(&words)?;
-            let mut bits = [0_u32; 7];
-            bits[..].take(from)?;
-            core.on_board.path.go_on(bits);
+            core.on_board.state.take(from)?;
+            core.on_board.path.take(from)?;
         }
         Some(())
     }
