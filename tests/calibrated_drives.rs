@@ -7,7 +7,7 @@
 //!                                                              +--> other days: true output less what the core says +
 //! ```
 //!
-//! HHD-95 with the cam. The plant is the dense map of contact FEM that the closed loop flies, at points that made no
+//! HHD-95 with the cam. The plant is the map of contact FEM that `fly` flies, at points that made no
 //! table, with its own law of play over the flank torque, and on top the influence kernels, which know load, flank and
 //! place: pitch errors of both wheels, an oval, three axes beside one another (one vector, as the contact sees it),
 //! damaged teeth, a malformed cam, wear, another stiffness. Nothing of it has the form of a table or of a part. Each
@@ -19,15 +19,14 @@ use std::f64::consts::{PI, TAU};
 
 use flexspline::{Direction, GeneratorAngle, PlayState, Table};
 use flexspline_sim::calibrate::{Bench, Calibrated, Planned, Prior, State, calibrate, plan};
-use flexspline_sim::closed_loop::flight::gear::DenseGear;
-use flexspline_sim::closed_loop::map::DenseMap;
 use flexspline_sim::drive::{DamagedFlank, GeneratorKind, Wheel};
 use flexspline_sim::kernels::Kernels;
 use flexspline_sim::measurement::{ColumnMap, Recording, parse};
+use flexspline_sim::plant_map::{GearMap, WindUp};
 use flexspline_sim::units::ARCSEC_PER_RAD;
 
-use crate::closed_loop::{image, map};
 use crate::fem_causes::known;
+use crate::plant_maps::{image, map};
 
 const RATIO: f64 = 95.0;
 const DRAG_N_M: f64 = 0.02;
@@ -105,13 +104,13 @@ impl ByLoad {
 struct Unit<'a> {
     errors: &'a Errors,
     kernels: &'a Kernels,
-    map: &'a DenseMap,
+    map: &'a GearMap,
     waves: Vec<(Wheel, Wave, ByLoad)>,
     cam: ByLoad,
 }
 
 impl<'a> Unit<'a> {
-    fn new(errors: &'a Errors, kernels: &'a Kernels, map: &'a DenseMap) -> Unit<'a> {
+    fn new(errors: &'a Errors, kernels: &'a Kernels, map: &'a GearMap) -> Unit<'a> {
         let mut waves = Vec::new();
         for (wheel, of) in [Wheel::Flexspline, Wheel::CircularSpline].into_iter().zip(&errors.pitch) {
             for wave in of {
@@ -129,7 +128,7 @@ impl<'a> Unit<'a> {
     }
 
     /// Error with a flank torque, its sign that of the flank that bears, arcsec.
-    fn elastic(&self, gear: &DenseGear<'_>, generator: f64, flank_n_m: f64, sign: f64) -> f64 {
+    fn elastic(&self, gear: &WindUp, generator: f64, flank_n_m: f64, sign: f64) -> f64 {
         let output = generator / RATIO;
         let load = sign * flank_n_m.abs().max(1e-4);
         let seen_from = |wheel: Wheel| if wheel == Wheel::Flexspline { generator } else { generator - output };
@@ -169,11 +168,11 @@ struct Run {
 impl Run {
     /// The drive goes through motion, loads and temperatures; the output rests where the drag holds it.
     fn drive(mut self, unit: &Unit<'_>) -> Run {
-        let mut gear = DenseGear::new(unit.map.view(), self.temperature[0]);
+        let mut gear = unit.map.at(self.temperature[0]);
         let (mut error, mut last) = (0.0_f64, self.generator[0]);
         for k in 0..self.generator.len() {
             if k % 50 == 0 {
-                gear.set_temperature(self.temperature[k]);
+                gear = unit.map.at(self.temperature[k]);
             }
             let (psi, torque) = (self.generator[k], self.torque[k]);
             let behind = if torque - DRAG_N_M > 0.0 { 1.0 } else { -1.0 };
@@ -515,7 +514,7 @@ fn of_drive(seed: u64) -> Figures {
 fn states(unit: &Unit<'_>, random: &mut fastrand::Rng) -> Vec<(State, f64)> {
     const STATES: usize = 4000;
     let between = |[low, high]: [f64; 2], random: &mut fastrand::Rng| low + (high - low) * random.f64();
-    let gears = [12.0, 16.0, 20.0, 24.0, 28.0].map(|at| (at, DenseGear::new(unit.map.view(), at)));
+    let gears = [12.0, 16.0, 20.0, 24.0, 28.0].map(|at| (at, unit.map.at(at)));
     (0..STATES)
         .map(|_| {
             let generator_rad = TAU * RATIO * random.f64();

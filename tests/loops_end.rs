@@ -99,12 +99,7 @@ const BOUNDED: &[(&str, &str, usize, Bound)] = &[
     ("src/cli/bundle.rs", "foreign", 1, Shrinks("folders within a folder")),
     ("src/cli/context.rs", "image_file", 1, Shrinks("bytes of an image that are not hashed")),
     ("src/cli/say.rs", "suggestions_styled", 1, Shrinks("the rest of a message")),
-    (
-        "fly/src/closed_loop/map.rs",
-        "plane",
-        1,
-        Shrinks("pitches until MOST_PITCHES, where `settle_on` ends with an error"),
-    ),
+    ("fly/src/plant_map.rs", "plane", 1, Shrinks("pitches until MOST_PITCHES, where `settle_on` ends with an error")),
     (
         "identify/src/diagnosis/blurred.rs",
         "find",

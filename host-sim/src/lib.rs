@@ -3,7 +3,7 @@
 //! ```text
 //! drive.toml -> drive -> mesh -> fem, contact -> stepping -> motion -> tables -> image (.fxt), read by the crate `flexspline`
 //!                                                              |
-//!                                   simulate, kernels, campaign, reproduce, closed_loop, fly
+//!                                   simulate, kernels, campaign, reproduce, fly
 //! measured.csv -> measurement -> residual -> diagnosis (beside a table, or nominal.toml) -> extension -> drive, tables
 //! ```
 //!
@@ -42,7 +42,7 @@ pub use flexspline_design::{
 };
 pub use flexspline_export as export;
 pub use flexspline_export::bundle;
-pub use flexspline_fly::{closed_loop, fly};
+pub use flexspline_fly::{fly, plant_map};
 pub use flexspline_identify::{
     calibrate, causes, diagnosis, extension, look, measurement, nominal, replay, residual, synthesize,
 };

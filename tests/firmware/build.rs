@@ -19,8 +19,7 @@ fn main() {
     println!("cargo:rustc-link-arg-bins=--sort-section=alignment");
     println!("cargo:rerun-if-changed=build.rs");
     write_full_table(&out.join("full.fxt"));
-    write_predictor(&out.join("predictor.rs"), Some(1e-6));
-    write_predictor(&out.join("motor_predictor.rs"), None);
+    write_predictor(&out.join("predictor.rs"));
     // The tables of the four generators, made by `flexspline tables`; tests/run does that.
     let tables =
         env::var("FLEXSPLINE_TABLES").expect("FLEXSPLINE_TABLES names the folder of the tables; see tests/run");
@@ -29,11 +28,11 @@ fn main() {
     println!("cargo:rerun-if-changed={tables}");
 }
 
-/// Two inertias at the output of HHD-95, discretised here, checked on board; with or without a measured twist.
-fn write_predictor(path: &Path, twist_rad: Option<f64>) {
+/// Two inertias at the output of HHD-95, discretised here, checked on board; with a measured twist.
+fn write_predictor(path: &Path) {
     let inertias =
         Inertias { motor_kg_m2: 1.0, load_kg_m2: 3.0, stiffness_n_m_per_rad: 3.0e4, damping_n_m_s_per_rad: 20.0 };
-    let noise = Noise { torque_n_m: 0.5, load_change_n_m: 0.2, speed_rad_s: 1e-4, twist_rad };
+    let noise = Noise { torque_n_m: 0.5, load_change_n_m: 0.2, speed_rad_s: 1e-4, twist_rad: Some(1e-6) };
     let predictor = Predictor::new(inertias, noise, 1e-3).expect("it contracts");
     fs::write(path, format!("{:?}", predictor.parts())).expect("OUT_DIR is writable");
 }

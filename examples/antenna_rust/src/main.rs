@@ -3,7 +3,7 @@
 //!
 //! Printed every 20 ms: time, load, what the drive is off by, and how far the output is from its target with the
 //! correction. There is no drive here: the motor is taken to stand where it was told to, and the output where the table
-//! says. `tests/firmware/src/bin/antenna.rs` flies the same calls against contact FEM.
+//! says. `flexspline fly` flies the same calls with motor, servo, drive and load.
 #![no_std]
 #![no_main]
 

@@ -1,5 +1,6 @@
-//! The core in the loop with a simulated joint: without mass ([`closed_loop`]) and with it ([`fly`]).
+//! The core in the loop with a simulated joint that has mass ([`fly`]), and the wind-up of its built-in drives
+//! ([`plant_map`]).
 #![forbid(unsafe_code)]
 
-pub mod closed_loop;
 pub mod fly;
+pub mod plant_map;

@@ -2,9 +2,8 @@
 //! machine.
 //!
 //! [`gear`] is the drive as a potential, [`plant`] what moves, [`friction`] what rubs, [`servo`] the motor's loops and
-//! what they measure, [`keep`] its state as words, [`loops`] the theory of the loops that close over all of it.
-//! [`rigid`] is the joint whose load has no mass: what it points at, its drive and its controllers. Servo, legs of the
-//! target, noise and score are those of the joint with mass; `tests/firmware` compiles them for the target with it.
+//! their sensors, [`keep`] its state as words, [`loops`] the theory of the loops that close over all of it.
+//! `tests/firmware` compiles [`on_board`] for the target, and flies there the tapes of flights on this machine.
 #![forbid(unsafe_code)]
 
 pub mod dish;
@@ -17,7 +16,6 @@ pub mod loops;
 pub mod noise;
 pub mod on_board;
 pub mod plant;
-pub mod rigid;
 pub mod scenario;
 pub mod score;
 pub mod servo;

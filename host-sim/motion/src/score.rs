@@ -34,47 +34,8 @@ impl Score {
         self.largest
     }
 
-    /// Root mean square of errors in rad, arcsec.
-    pub fn rms_arcsec(&self) -> f64 {
-        self.rms() * ARCSEC_PER_RAD
-    }
-
-    /// Largest of errors in rad, arcsec.
-    pub fn max_arcsec(&self) -> f64 {
-        self.largest * ARCSEC_PER_RAD
-    }
-
     /// How many.
     pub fn count(&self) -> u32 {
         self.count
-    }
-}
-
-/// Errors of one controller over a flight.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Scores {
-    /// All ticks.
-    pub whole: Score,
-    /// All ticks but those in which the core's limiter held its correction back.
-    pub free: Score,
-    /// Steady tracking.
-    pub steady: Score,
-    /// Steady tracking but those ticks.
-    pub steady_free: Score,
-}
-
-impl Scores {
-    /// Takes one more tick in.
-    pub fn add(&mut self, error_rad: f64, steady: bool, held_back: bool) {
-        self.whole.add(error_rad);
-        if !held_back {
-            self.free.add(error_rad);
-        }
-        if steady {
-            self.steady.add(error_rad);
-            if !held_back {
-                self.steady_free.add(error_rad);
-            }
-        }
     }
 }

@@ -12,8 +12,20 @@ use flexspline_motion::servo::{Asked, Servo, ServoSettings};
 const RATIO: f64 = 95.0;
 const TICK_S: f64 = 1e-3;
 
-/// That of the quasi-static flights, with steps for a plant with mass, and a finer encoder.
-const SERVO: ServoSettings = ServoSettings { steps: 20, encoder_bits: 30, ..flexspline_motion::rigid::motor::SERVO };
+/// A fast servo without delay, for a motor of the size that turns HHD-95.
+const SERVO: ServoSettings = ServoSettings {
+    tick_s: TICK_S,
+    steps: 20,
+    late_steps: 0,
+    inertia_kg_m2: 1.1e-4,
+    largest_n_m: 4.0,
+    position_hz: 25.0,
+    speed_hz: 100.0,
+    integral_hz: 10.0,
+    encoder_bits: 30,
+    jitter_s: 0.0,
+    current_noise_n_m: 0.0,
+};
 
 /// The cam under load: 70 N·m to 200 N·m in 29″ by its map.
 const CAM: TwoMasses = TwoMasses {

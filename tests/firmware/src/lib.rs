@@ -1,28 +1,11 @@
-//! What the programs share: exact instruction counts under QEMU's `-icount`, a trajectory, the tables, and how a
+//! Shared by the programs: exact instruction counts under QEMU's `-icount`, a trajectory, the tables, and how a
 //! program ends.
 #![no_std]
 
 pub mod count;
-/// Everything of the closed loop that flies, as the host has it.
-#[path = "../../../host-sim/motion/src/rigid/mod.rs"]
-pub mod flight;
-/// Its targets.
-#[path = "../../../host-sim/motion/src/legs.rs"]
-pub mod legs;
-/// Its sensors' noise.
-#[path = "../../../host-sim/motion/src/noise.rs"]
-pub mod noise;
-/// A tick of a joint, and what tapes of flights hold, as the host has it.
+/// A tick of a joint, and the tapes of flights, as the host has them.
 #[path = "../../../host-sim/motion/src/on_board.rs"]
 pub mod on_board;
-pub mod plant;
-pub mod rover;
-/// What it misses.
-#[path = "../../../host-sim/motion/src/score.rs"]
-pub mod score;
-/// The servo of its motor.
-#[path = "../../../host-sim/motion/src/servo.rs"]
-pub mod servo;
 pub mod trajectory;
 
 use cortex_m_semihosting::debug;
@@ -49,9 +32,15 @@ pub static TABLES: [(&str, [&[u8]; 2]); 4] = [
 /// Two inertias, discretised on the host.
 pub static PREDICTOR: [f32; flexspline::PREDICTOR_PARTS] = include!(concat!(env!("OUT_DIR"), "/predictor.rs"));
 
-/// The same for a joint without an encoder at its output.
-pub static MOTOR_PREDICTOR: [f32; flexspline::PREDICTOR_PARTS] =
-    include!(concat!(env!("OUT_DIR"), "/motor_predictor.rs"));
+/// Prints through semihosting, for a [`core::fmt::Write`].
+pub struct Console;
+
+impl core::fmt::Write for Console {
+    fn write_str(&mut self, text: &str) -> core::fmt::Result {
+        cortex_m_semihosting::hprint!("{}", text);
+        Ok(())
+    }
+}
 
 /// Ends the emulation: exit code 0 if all went well, else 1.
 pub fn finish(well: bool) -> ! {

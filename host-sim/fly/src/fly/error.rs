@@ -5,7 +5,7 @@ use flexspline_design::tables::TableError;
 use flexspline_motion::flight::FlightError;
 
 use super::OwnTableError;
-use crate::closed_loop::map::MapError;
+use crate::plant_map::MapError;
 
 /// A scenario that is refused, or one that cannot be flown.
 #[derive(Debug, thiserror::Error)]

@@ -14,8 +14,7 @@ use flexspline_motion::flight::{Flight, JOINTS, Unit, fly_told};
 use flexspline_motion::gear::Sampled;
 use flexspline_motion::scenario::{Scenario, TableKnown};
 
-use crate::closed_loop::flight::gear::DenseGear;
-use crate::closed_loop::map::DenseMap;
+use crate::plant_map::GearMap;
 use flexspline_design::tables::core_drive;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 
@@ -37,7 +36,7 @@ pub struct Flown {
     pub own: Option<OwnDrive>,
 }
 
-/// The maps of HHD-95 by contact FEM, at points that made no table (`examples/closed_loop.rs map`).
+/// The maps of HHD-95 by contact FEM, at points that made no table (`examples/plant_maps.rs`).
 fn map(kind: GeneratorKind) -> &'static str {
     match kind {
         GeneratorKind::TwoRoller => include_str!("../../plant/two-roller.csv"),
@@ -54,13 +53,11 @@ fn map(kind: GeneratorKind) -> &'static str {
 /// [`FlyError::Map`], [`FlyError::Teeth`].
 pub fn unit(kind: GeneratorKind, temperature_c: f64) -> Result<Unit, FlyError> {
     let name = format!("{kind}.csv");
-    let map = DenseMap::parse(kind, &name, map(kind))?;
-    let gear = DenseGear::new(map.view(), temperature_c);
-    let teeth = gear.map().header.teeth;
-    let largest = gear.map().header.largest_n_m;
-    let law = |phase: f64, flank: f64| gear.elastic_error_rad(phase * std::f64::consts::TAU / teeth, flank, 1.0);
+    let map = GearMap::parse(&name, map(kind))?;
+    let (teeth, wind_up) = (map.teeth, map.at(temperature_c));
+    let law = |phase: f64, flank: f64| wind_up.elastic_error_rad(phase * std::f64::consts::TAU / teeth, flank, 1.0);
     let drive = core_drive(&Drive::hhd_95())?;
-    Ok(Unit::of_spring(drive, Sampled::of_law(teeth, largest, law)))
+    Ok(Unit::of_spring(drive, Sampled::of_law(teeth, map.largest_n_m, law)))
 }
 
 impl Flown {

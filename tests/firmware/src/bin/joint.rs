@@ -8,8 +8,7 @@ use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
 use flexspline::{Images, Store, Table};
 use flexspline_firmware::on_board::{HASH_START, LINE_TICKS, OnBoard, Settings, Told, hashed, line};
-use flexspline_firmware::plant::Console;
-use flexspline_firmware::{finish, twice};
+use flexspline_firmware::{Console, finish, twice};
 
 static IMAGE: [&[u8]; 2] = twice!(concat!(env!("FLEXSPLINE_TABLES"), "/joint.fxt"));
 static TAPES: [(&str, &[u8]); 2] = [

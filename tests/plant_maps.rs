@@ -1,0 +1,67 @@
+//! The wind-up that `flexspline fly` gives its built-in drives is that of contact FEM at other torques, phases and
+//! another temperature than those of the map.
+
+use flexspline_sim::drive::{Drive, GeneratorKind};
+use flexspline_sim::motion::Motion;
+use flexspline_sim::plant_map::GearMap;
+use flexspline_sim::stepping::{Method, Problem, SolverSettings};
+use flexspline_sim::tables::{self, samples};
+use flexspline_sim::units::ARCSEC_PER_RAD;
+
+/// The map of a generator, by contact FEM.
+pub(crate) fn map(kind: GeneratorKind) -> GearMap {
+    let file = format!("{}/../host-sim/fly/plant/{kind}.csv", env!("CARGO_MANIFEST_DIR"));
+    GearMap::parse(&file, &std::fs::read_to_string(&file).unwrap()).unwrap()
+}
+
+/// Its table, of other contact FEM.
+pub(crate) fn image(kind: GeneratorKind) -> Vec<u8> {
+    let file = format!("{}/firmware/samples/{kind}.samples.csv", env!("CARGO_MANIFEST_DIR"));
+    let bytes = std::fs::read(&file).unwrap();
+    let samples = samples::parse(&file, &bytes).unwrap();
+    tables::from_samples(&Drive::hhd_95(), kind, &samples, &file, &bytes, Default::default()).unwrap().image
+}
+
+#[test]
+fn a_plant_map_is_what_contact_fem_says() {
+    let settings = SolverSettings { method: Method::Fast, ..SolverSettings::default() };
+    for (kind, torques, bound) in
+        [(GeneratorKind::Cam, [0.5, 7.0, 90.0], 0.1), (GeneratorKind::TwoRoller, [0.3, 1.1, 9.0], 0.3)]
+    {
+        let (drive, temperature_c) = (Drive::hhd_95(), 29.0);
+        let wind_up = map(kind).at(temperature_c);
+        let problem = Problem::new(&drive, kind, temperature_c, settings).unwrap();
+        let mut motion = Motion::deformed(&problem, 0.0).unwrap();
+        let mut worst = 0.0_f64;
+        for torque_n_m in torques {
+            motion.load(torque_n_m).unwrap();
+            while motion.settle_on(0.25 * motion.pitch()).unwrap() {}
+            for turn in [0.21, 0.33, 0.27] {
+                let angle = motion.state().generator_rad + turn * motion.pitch();
+                motion.turn_to(angle).unwrap();
+                // In forward motion the drag of the output is on the flanks, too.
+                let flank_n_m = torque_n_m - drive.output.drag_torque_n_m;
+                let by_map = wind_up.elastic_error_rad(angle, flank_n_m, 1.0);
+                worst = worst.max((by_map - motion.error_rad()).abs() * ARCSEC_PER_RAD);
+            }
+        }
+        println!("{kind}: the map misses fresh FEM by {worst:.3}\" at most");
+        assert!(worst < bound, "{kind}: {worst}");
+    }
+}
+
+#[test]
+fn a_plant_map_is_read_as_it_was_written_and_a_damaged_one_says_where() {
+    let cam = map(GeneratorKind::Cam);
+    let text = cam.to_csv();
+    // A file has three digits of an arc-second.
+    assert_eq!(GearMap::parse("cam.csv", &text).unwrap().to_csv(), text);
+    let damaged =
+        |from: &str, to: &str| GearMap::parse("cam.csv", &text.replacen(from, to, 1)).unwrap_err().to_string();
+    assert!(damaged("teeth=", "tooth=").starts_with("cam.csv: line 1: "));
+    assert!(damaged("\n0,", "\ncold,").starts_with("cam.csv: line 3: "));
+    let short = text.rsplit_once('\n').and_then(|(text, _)| text.rsplit_once('\n')).unwrap().0;
+    let lines = short.lines().count();
+    let said = GearMap::parse("cam.csv", short).unwrap_err().to_string();
+    assert!(said.starts_with(&format!("cam.csv: line {lines}: ")), "{said}");
+}
