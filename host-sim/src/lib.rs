@@ -1,7 +1,7 @@
 //! Contact FEM of strain wave (harmonic) drives, and the compensation tables made from it.
 //!
 //! ```text
-//! drive.toml -> drive -> mesh -> fem, contact -> stepping -> motion -> tables -> image (.fxt), read by the crate `flexspline`
+//! drive.toml -> drive -> mesh -> fem, contact -> stepping -> motion -> tables -> image (.fxt), read by `flexspline`
 //!                                                              |
 //!                                   simulate, kernels, campaign, reproduce, fly
 //! measured.csv -> measurement -> residual -> diagnosis (beside a table, or nominal.toml) -> extension -> drive, tables

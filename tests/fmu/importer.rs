@@ -1,5 +1,5 @@
-//! A small importer of FMI 2.0: unzips an FMU, loads its library for Linux, and calls it as C does, with declarations of
-//! its own.
+//! A small importer of FMI 2.0: unzips an FMU, loads its library for Linux, and calls it as C does, with its own
+//! declarations.
 
 use std::cell::Cell;
 use std::ffi::{CStr, CString, c_char, c_int, c_void};

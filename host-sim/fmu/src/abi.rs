@@ -188,8 +188,8 @@ unsafe fn write<T: Copy>(
 /// Keeps bytes in a place, over the state that is there if it is one of this instance; `None` for no place.
 unsafe fn keep(instance: &mut Instance, state: *mut FmuState, bytes: Vec<u8>) -> Option<c_int> {
     let place = unsafe { state.as_mut() }?;
-    let number = if instance.kept(place.addr()).is_some() { place.addr() } else { next_number() };
-    instance.keep(number, bytes);
+    let number = if instance.states.contains_key(&place.addr()) { place.addr() } else { next_number() };
+    instance.states.insert(number, bytes);
     *place = std::ptr::without_provenance_mut(number);
     Some(OK)
 }
@@ -340,7 +340,7 @@ functions! { component, call;
         keep(instance, state, bytes)
     });
     fmi2SetFMUstate(state: FmuState) => with(component, |instance| {
-        let Some(bytes) = instance.kept(state.addr()).cloned() else { return unknown(instance, call) };
+        let Some(bytes) = instance.states.get(&state.addr()).cloned() else { return unknown(instance, call) };
         match instance.go_on_from(&bytes) {
             Ok(()) => OK,
             Err(error) => instance.refuse(&format!("{call}: found {error}")) as c_int,
@@ -349,7 +349,7 @@ functions! { component, call;
     // The place is null afterwards; null is left as it is.
     fmi2FreeFMUstate(state: *mut FmuState) => with(component, |instance| match state.as_mut() {
         Some(place) if !place.is_null() => {
-            if !instance.forget(place.addr()) {
+            if instance.states.remove(&place.addr()).is_none() {
                 return unknown(instance, call);
             }
             *place = std::ptr::null_mut();
@@ -358,12 +358,12 @@ functions! { component, call;
         _ => OK,
     });
     fmi2SerializedFMUstateSize(state: FmuState, size: *mut usize) => pointed(component, call, |instance| {
-        let Some(bytes) = instance.kept(state.addr()).map(Vec::len) else { return Some(unknown(instance, call)) };
-        *size.as_mut()? = bytes;
+        let Some(bytes) = instance.states.get(&state.addr()) else { return Some(unknown(instance, call)) };
+        *size.as_mut()? = bytes.len();
         Some(OK)
     });
     fmi2SerializeFMUstate(state: FmuState, to: *mut u8, size: usize) => pointed(component, call, |instance| {
-        let Some(bytes) = instance.kept(state.addr()) else { return Some(unknown(instance, call)) };
+        let Some(bytes) = instance.states.get(&state.addr()) else { return Some(unknown(instance, call)) };
         if size < bytes.len() {
             let what = format!("{call}: found room for {size} bytes, allowed: {} at least", bytes.len());
             return Some(instance.refuse(&what) as c_int);
@@ -374,8 +374,8 @@ functions! { component, call;
     fmi2DeSerializeFMUstate(from: *const u8, size: usize, state: *mut FmuState) =>
         pointed(component, call, |instance| {
             let bytes = list(from, size).filter(|_| !state.is_null())?;
-            match instance.check(bytes) {
-                Ok(()) => keep(instance, state, bytes.to_vec()),
+            match instance.words(bytes) {
+                Ok(_) => keep(instance, state, bytes.to_vec()),
                 Err(error) => Some(instance.refuse(&format!("{call}: found {error}")) as c_int),
             }
         });
@@ -396,7 +396,8 @@ functions! { component, call;
     fmi2EnterEventMode() => lacking(component, call);
     fmi2NewDiscreteStates(_info: *mut c_void) => lacking(component, call);
     fmi2EnterContinuousTimeMode() => lacking(component, call);
-    fmi2CompletedIntegratorStep(_no_set_prior: c_int, _enter: *mut c_int, _end: *mut c_int) => lacking(component, call);
+    fmi2CompletedIntegratorStep(_no_set_prior: c_int, _enter: *mut c_int, _end: *mut c_int) =>
+        lacking(component, call);
     fmi2SetTime(_time_s: f64) => lacking(component, call);
     fmi2SetContinuousStates(_states: *const f64, _n: usize) => lacking(component, call);
     fmi2GetDerivatives(_to: *mut f64, _n: usize) => lacking(component, call);

@@ -1,7 +1,8 @@
 //! One simulation: what an importer may call when, its values, its time, and its state as bytes.
 //!
-//! States and calls are those of sections 2.1.6 to 2.1.8 and 4.2.4 of FMI 2.0. A call that is not allowed is refused: it
-//! returns an error with a line in the log, and nothing changes. A model that cannot go on ends in [`State::Failed`].
+//! States and calls are those of sections 2.1.6 to 2.1.8 and 4.2.4 of FMI 2.0. A call that is not allowed is refused:
+//! it returns an error with a line in the log, and nothing changes. A model that cannot go on ends in
+//! [`State::Failed`].
 //!
 //! A model has ticks of a fixed time. A communication step does all ticks that end within it; the rest of the step is
 //! carried over to the next. An input holds from the point at which it was set on, or changes with the derivative that
@@ -136,7 +137,8 @@ pub struct Instance {
     time_s: f64,
     ticks: u64,
     table_id: CString,
-    states: BTreeMap<usize, Vec<u8>>,
+    /// Bytes of the states that the importer keeps, by its number for them.
+    pub(crate) states: BTreeMap<usize, Vec<u8>>,
 }
 
 impl Instance {
@@ -299,11 +301,8 @@ impl Instance {
                 return Err(self.refuse(&format!("{call}: {} cannot be set {why}", variable.name)));
             }
             if !variable.allows(value) {
-                return Err(self.refuse(&format!(
-                    "{call}: {}: found {value}, allowed: {}",
-                    variable.name,
-                    allowed(variable)
-                )));
+                let (name, [least, most]) = (variable.name, variable.bounds());
+                return Err(self.refuse(&format!("{call}: {name}: found {value}, allowed: {least} to {most}")));
             }
         }
         for &(reference, value) in set {
@@ -406,16 +405,11 @@ impl Instance {
         words.into_iter().flat_map(u64::to_le_bytes).collect()
     }
 
-    /// Whether bytes are a whole state of this description.
+    /// The words of a state of this description but for mark, description and sum.
     ///
     /// # Errors
-    /// Why they are not.
-    pub fn check(&self, bytes: &[u8]) -> Result<(), FmuError> {
-        self.words(bytes).map(|_| ())
-    }
-
-    /// The words of a state but for mark, description and sum.
-    fn words(&self, bytes: &[u8]) -> Result<Vec<u64>, FmuError> {
+    /// Why the bytes are no such state.
+    pub(crate) fn words(&self, bytes: &[u8]) -> Result<Vec<u64>, FmuError> {
         let (words, left) = bytes.as_chunks::<8>();
         let mut words: Vec<u64> = words.iter().map(|bytes| u64::from_le_bytes(*bytes)).collect();
         let sum = words.pop().filter(|_| left.is_empty()).ok_or(FmuError::State("no state"))?;
@@ -477,32 +471,9 @@ impl Instance {
         Ok(model)
     }
 
-    /// Keeps bytes of a state under a name, over those that are there.
-    pub(crate) fn keep(&mut self, name: usize, bytes: Vec<u8>) {
-        self.states.insert(name, bytes);
-    }
-
-    /// What was kept under a name.
-    pub fn kept(&self, name: usize) -> Option<&Vec<u8>> {
-        self.states.get(&name)
-    }
-
-    /// Forgets what was kept under a name; false if nothing was.
-    pub fn forget(&mut self, name: usize) -> bool {
-        self.states.remove(&name).is_some()
-    }
-
     /// It cannot be trusted any more.
     pub fn fail(&mut self) {
         self.state = State::Failed;
-    }
-}
-
-fn allowed(variable: &Variable) -> String {
-    match (variable.kind, variable.range) {
-        (Kind::Boolean, _) => "0 or 1".to_owned(),
-        (Kind::Choice(choices), _) => format!("0 to {}", choices.items.len() - 1),
-        (_, [least, most]) => format!("{least} to {most}"),
     }
 }
 

@@ -130,13 +130,18 @@ impl Variable {
         matches!(self.role, Role::Output | Role::Motion)
     }
 
-    /// Whether an importer may set it to this value: a finite number in its range, whole where it has to be.
-    pub fn allows(&self, value: f64) -> bool {
-        let [least, most] = match self.kind {
+    /// Least and largest value that is taken.
+    pub(crate) fn bounds(&self) -> [f64; 2] {
+        match self.kind {
             Kind::Boolean => [0.0, 1.0],
             Kind::Choice(choices) => [0.0, choices.items.len() as f64 - 1.0],
             _ => self.range,
-        };
+        }
+    }
+
+    /// Whether an importer may set it to this value: a finite number in its range, whole where it has to be.
+    pub fn allows(&self, value: f64) -> bool {
+        let [least, most] = self.bounds();
         let whole = matches!(self.kind, Kind::Real(_)) || value == value.trunc();
         // What an input may not be is said when it is used: a sensor may fail.
         self.role == Role::Input || (value.is_finite() && value >= least && value <= most && whole)
