@@ -79,11 +79,6 @@ export function over(id, seen = () => undefined) {
 /** Ends a job; nothing is wrong if it is over. */
 export const cancel = (id) => cancelJob(id).catch(() => undefined);
 
-/** The last job whose request `fits` and that is done. */
-export function lastDone(fits) {
-  return [...jobs.values()].filter((job) => job.state === "done" && fits(job.asked)).sort((a, b) => b.id - a.id)[0];
-}
-
 /** Why a job has no result, in its own words. */
 export function why(job) {
   const words = job.said.map((line) => line.replace(/^error: /, ""));

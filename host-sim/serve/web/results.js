@@ -3,7 +3,6 @@ import { fileText } from "./api.js";
 import { lineChart } from "./charts.js";
 import { driveViewer } from "./drive.js";
 import { el } from "./elements.js";
-import { fieldMap } from "./fields.js";
 import { provide, unpack } from "./pack.js";
 
 /** A report that a command wrote: its JSON, and its packed numbers by name. Nothing else of it comes into this page. */
@@ -123,19 +122,6 @@ async function firstLine(report, name, choices) {
     x: values.slice(0, shape[1]),
     y: values.slice(shape[1], 2 * shape[1]),
   };
-}
-
-/** A map in colour of a report. */
-export function mapOf(report, name, id, words) {
-  const spec = report.json.figures[name];
-  const { figure, drawing } = frame(id, spec.title, spec.title, words);
-  for (const choice of spec.charts) hand(report, `${choice}/${name}`, `${id}-${choice}/${id}`);
-  const view = fieldMap(drawing, id, {
-    ...spec,
-    number: ++numbered,
-    charts: spec.charts.map((choice) => `${id}-${choice}`),
-  });
-  return { figure, choose: () => view.choose(`${id}-${spec.charts[0]}`) };
 }
 
 /** The drive in motion with its stress, made once; shows one report after another. */
