@@ -1,7 +1,7 @@
 // The drive, to scale and in motion: both wheels in colour, over them generator, forces and marks; controls and keyboard.
 import { onPointing, pointAt, watchWidth } from "./charts.js";
 import { modulo, motion, rotated } from "./motion.js";
-import { painter, rgb, toScreen } from "./paint.js";
+import { Painter, toScreen } from "./paint.js";
 import { onUnits, written } from "./quantities.js";
 import { colour, css, FONT, onTheme, strained } from "./theme.js";
 
@@ -52,10 +52,10 @@ export function driveViewer(place, animations) {
   for (const [name] of SPEEDS) speed.add(new Option(name, name));
   speed.value = "normal";
 
-  const paint = painter(find(".wheels"));
+  const paint = new Painter(find(".wheels"));
   const wheels = find(".wheels");
   const ctx = over.getContext("2d");
-  place.dataset.painter = paint.name;
+  place.dataset.painter = "canvas";
   let drive = null;
   let psi = 0;
   let factor = 1;
@@ -112,9 +112,9 @@ export function driveViewer(place, animations) {
     const { whole, close } = views();
     const count = drive.frames * drive.count(psi);
     const turns = [0, drive.output(psi)];
-    const line = rgb("edge");
+    const line = colour("edge");
     // In play the plain canvas draws the whole drive every other frame: what it then lags is far below a pixel.
-    const resting = playing && paint.name === "canvas" && frames % 2 === 1;
+    const resting = playing && frames % 2 === 1;
     paint.begin(...size, resting ? close : null);
     [drive.flexspline, drive.circularSpline].forEach((wheel, k) => {
       // The exaggerated flexspline passes through the circular spline, which then steps back.
@@ -132,8 +132,6 @@ export function driveViewer(place, animations) {
   function drawOver(whole, close, output) {
     ctx.setTransform(1, 0, 0, 1, 0, 0);
     ctx.clearRect(0, 0, ...size);
-    // On paper a WebGL canvas is blank.
-    if (document.documentElement.classList.contains("printing")) ctx.drawImage(wheels, 0, 0);
     for (const view of [whole, close]) {
       ctx.save();
       ctx.beginPath();
