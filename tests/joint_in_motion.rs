@@ -177,7 +177,7 @@ fn a_servo_near_the_edge_of_instability_is_cautioned() {
         "{said}"
     );
     assert!(page.contains("\"status\":\"caution\""));
-    for figure in ["bode-gain", "bode-phase", "nyquist"] {
+    for figure in ["bode-gain", "bode-phase"] {
         assert!(page.contains(&format!("id=\"{figure}\"")), "no {figure}");
     }
     assert!(said.contains("with servo.position_hz = "), "one pace alone is enough: {said}");

@@ -1,4 +1,4 @@
-//! What the browser tests read beside real reports: packed arrays with what they hold, and a page whose every text is
+//! Fixtures of the browser tests in addition to real reports: packed arrays with their values, and a page whose every text is
 //! hostile.
 //!
 //! `cargo run --release --example report_fixtures -- DIR`
@@ -47,8 +47,6 @@ fn packs() -> Vec<Value> {
     let ends = [f64::NAN, f64::INFINITY, -0.0, 1e-30, -3.5e20, 0.1];
     put(Packed::floats("floats", &[6], ends), &ends, 1e-7);
     put(Packed::floats("empty", &[0], []), &[], 0.0);
-    let levels: Vec<f64> = (0..4000).map(|k| 100.0 + 100.0 * (f64::from(k) * 0.37).sin()).collect();
-    put(Packed::levels("levels", &[4000], 200.0, &levels), &levels, 0.4);
     out
 }
 

@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 
 pub mod csv_rows;
+pub mod figures;
 pub mod output;
 pub mod progress;
 pub mod robust;

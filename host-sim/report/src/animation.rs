@@ -12,6 +12,8 @@
 //! whatever the angle: a whole turn, and more, from eight frames. Exact for drives that are alike from tooth to tooth;
 //! others are refused.
 
+use serde::Serialize;
+
 use super::pack::Packed;
 use super::sleeve_view::SleeveView;
 use flexspline_design::simulate::stress::nodal_von_mises;
@@ -31,31 +33,38 @@ const NEAR_MM: f64 = 0.01;
 /// Share of all nodal stresses that the colour scale spans; the few above it are at corners that bear.
 const COLOUR_SHARE: f64 = 0.9995;
 
-/// One wheel: its first sector, and what happens to the sector in the course of a wave.
-#[derive(Debug, Clone)]
+/// One wheel: its first sector, and what happens to the sector in the course of a wave. Its arrays are packed apart.
+#[derive(Debug, Clone, Serialize)]
 pub struct WheelMotion {
     /// Sectors around the wheel.
     pub sectors: usize,
     /// Samples to half a turn of phase (or to a whole one, where the teeth are odd): the period of the fields below.
     pub samples: usize,
     /// Undeformed nodes of sector 0, axis along +x, mm.
+    #[serde(skip)]
     pub nodes: Vec<[f64; 2]>,
     /// Elements: local node and sector (0 or 1) of eight nodes, corners first.
+    #[serde(skip)]
     pub elements: Vec<[(usize, usize); 8]>,
     /// Displacement in the frame of the sector, mm: `[node][x, y][sample]`.
+    #[serde(skip)]
     pub displacement_mm: Vec<f64>,
     /// Von Mises stress, MPa: `[node][sample]`.
+    #[serde(skip)]
     pub von_mises_mpa: Vec<f64>,
 }
 
 /// Rows of [`Animation::forces`].
 pub(crate) const FORCE_ROWS: usize = 10;
 
-/// A drive over one pitch of steady motion.
-#[derive(Debug, Clone)]
+/// A drive over one pitch of steady motion. Its arrays are packed apart.
+#[derive(Debug, Clone, Serialize)]
 pub struct Animation {
     /// Which generator.
+    #[serde(skip)]
     pub kind: GeneratorKind,
+    /// [`FRAMES`], for the page's script.
+    pub frames: usize,
     /// Load, N m.
     pub torque_n_m: f64,
     /// Temperature, °C.
@@ -67,9 +76,11 @@ pub struct Animation {
     /// The circular spline, in the frame that turns with the output.
     pub circular_spline: WheelMotion,
     /// Closed outlines of the generator at angle 0, mm.
+    #[serde(skip)]
     pub generator: Vec<Vec<[f64; 2]>>,
     /// Forces on a flexspline tooth in its frame, by sample: force x, y (N) and point x, y (mm) on its plus flank; the
     /// same of its minus flank; force x, y of the generator on its piece of the bore. `[row][sample]`.
+    #[serde(skip)]
     pub forces: Vec<f64>,
     /// Radius at which the generator bears, mm.
     pub bore_radius_mm: f64,
@@ -237,7 +248,7 @@ impl WheelMotion {
 
 /// Forces of the generator on the first teeth (N), added up over the piece of the bore under each, in the frame of the
 /// tooth.
-pub(super) fn bore_forces(problem: &Problem, state: &State, teeth: usize) -> Vec<[f64; 2]> {
+fn bore_forces(problem: &Problem, state: &State, teeth: usize) -> Vec<[f64; 2]> {
     let bore = BoreContact::new(problem.wheels().0, problem.settings.bore_points(problem.kind));
     let law =
         BoreLaw::new(problem.settings.bore_penalty(problem.kind), problem.drive.generator.bearing_stiffness_n_per_mm3);
@@ -305,6 +316,7 @@ impl Taken {
         let flexspline = WheelMotion::new(&problem.flexspline, both_even);
         let animation = Animation {
             kind: problem.kind,
+            frames: FRAMES,
             torque_n_m: 0.0,
             temperature_c: 0.0,
             ratio: problem.drive.ratio(),
@@ -405,12 +417,14 @@ impl WheelMotion {
         let elements = self.elements.iter().flatten().map(|(node, sector)| (node + sector * nodes) as f64);
         let outline: Vec<f64> =
             self.outline().iter().flatten().map(|(node, sector)| (node + sector * nodes) as f64).collect();
+        // Beyond the end of the colour scale all colours are alike.
+        let stress: Vec<f64> = self.von_mises_mpa.iter().map(|mpa| mpa.min(colour_end_mpa)).collect();
         vec![
             Packed::floats(name("nodes"), &[nodes, 2], self.nodes.iter().flatten().copied()),
             Packed::steps(name("elements"), &[self.elements.len(), 8], 1.0, &elements.collect::<Vec<_>>()),
             Packed::steps(name("outline"), &[self.outline().len(), 3], 1.0, &outline),
             Packed::steps(name("displacement"), &[nodes, 2, self.samples], DISPLACEMENT_STEP_MM, &self.displacement_mm),
-            Packed::levels(name("stress"), &[nodes, self.samples], colour_end_mpa, &self.von_mises_mpa),
+            Packed::steps(name("stress"), &[nodes, self.samples], colour_end_mpa / 255.0, &stress),
         ]
     }
 }

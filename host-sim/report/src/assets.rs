@@ -3,13 +3,8 @@
 //! The sources are plain ES modules that refer to one another; in a page they stand as one module, in the order below,
 //! so the lines that import and the words that export are left out. Names are therefore unique among the files, which a
 //! test holds them to.
-//!
-//! For work on a page: with the variable `FLEXSPLINE_WEB` a page takes the files of that folder (`host-sim/report/web`)
-//! in place of those that were compiled.
 
-use std::borrow::Cow;
 use std::fmt::Write as _;
-use std::path::Path;
 use std::sync::LazyLock;
 
 use sha2::{Digest, Sha256};
@@ -35,26 +30,17 @@ const UPLOT_LICENCE: &str = include_str!("../web/vendor/uPlot.LICENSE");
 const UPLOT_STYLE: &str = include_str!("../web/vendor/uPlot.min.css");
 const OWN_STYLE: &str = include_str!("../web/report.css");
 
-/// The style sheet, that of the chart library first.
-pub static STYLE: LazyLock<String> = LazyLock::new(|| format!("{UPLOT_STYLE}\n{}", edited("report.css", OWN_STYLE)));
+/// The style sheet, after the one of the chart library.
+pub static STYLE: LazyLock<String> = LazyLock::new(|| format!("{UPLOT_STYLE}\n{OWN_STYLE}"));
 
 /// The script, a module.
 pub(super) static SCRIPT: LazyLock<String> = LazyLock::new(|| {
     let mut script = format!("/*! uPlot 1.6.32\n{UPLOT_LICENCE}*/\n{UPLOT}\n");
     for (name, source) in MODULES {
-        let _ = writeln!(script, "// ---- {name}\n{}", without_linkage(&edited(name, source)));
+        let _ = writeln!(script, "// ---- {name}\n{}", without_linkage(source));
     }
     script
 });
-
-/// A file as it is in the folder that is worked on, if there is one.
-fn edited(name: &str, compiled: &'static str) -> Cow<'static, str> {
-    let Some(folder) = std::env::var_os("FLEXSPLINE_WEB") else { return Cow::Borrowed(compiled) };
-    let file = Path::new(&folder).join(name);
-    let text =
-        std::fs::read_to_string(&file).unwrap_or_else(|error| panic!("FLEXSPLINE_WEB: {}: {error}", file.display()));
-    Cow::Owned(text)
-}
 
 /// A module without its imports and the word `export`.
 fn without_linkage(source: &str) -> String {
@@ -123,8 +109,7 @@ mod tests {
         let in_style = ["@import", "url("];
         let in_script = ["fetch(", "xmlhttprequest", "import(", "websocket", "sendbeacon"];
         for (text, own) in [(STYLE.as_str(), &in_style[..]), (SCRIPT.as_str(), &in_script[..])] {
-            // The shader's texelFetch reads a texture.
-            let lower = text.to_ascii_lowercase().replace("texelfetch(", "");
+            let lower = text.to_ascii_lowercase();
             for bad in everywhere.iter().chain(own) {
                 assert!(!lower.contains(bad), "{bad}");
             }

@@ -5,8 +5,7 @@ use std::f64::consts::TAU;
 
 use super::animation::{Animation, FRAMES};
 use super::page::{
-    Axis, Block, Detail, Figure, FigureBody, Lines, Mark, PageQuantity, Section, Series, Table as PageTable, Text,
-    significant,
+    Axis, Block, Detail, Figure, FigureBody, Lines, Mark, PageQuantity, Section, Series, Text, significant,
 };
 use flexspline_design::cautions::Caution;
 use flexspline_design::simulate::Row;
@@ -21,7 +20,7 @@ pub(super) const STRESSES: [OfRow; 3] = [
     ("pressure between flanks", |row| row.peak_flank_pressure_mpa),
     ("pressure of generator on bore", |row| row.peak_generator_pressure_mpa),
 ];
-/// What they are, for their caption.
+/// Their definition, for captions.
 pub(super) const STRESSES_ARE: &str = "Von Mises stress is averaged at nodes; pressures are those of the contact. \
                                        Plane strain: no bending over the length of the sleeve, and no stress raiser \
                                        finer than the mesh.";
@@ -51,50 +50,49 @@ pub(super) fn caution_words(caution: &Caution) -> String {
     caution.words.replace(" um", " µm")
 }
 
+/// Mean error over the frames of a pitch, arcsec.
+pub(super) fn mean_arcsec(animation: &Animation) -> f64 {
+    animation.error_arcsec.iter().sum::<f64>() / FRAMES as f64
+}
+
 /// Error over the frames of a pitch, less its mean: degrees from the beginning of the pitch, arcsec.
 pub(super) fn less_mean(animation: &Animation) -> Vec<[f64; 2]> {
-    let e = &animation.error_arcsec;
-    let mean = e.iter().sum::<f64>() / e.len() as f64;
+    let (e, mean) = (&animation.error_arcsec, mean_arcsec(animation));
     (0..=FRAMES).map(|k| [degrees(animation, k as i64), e[k % FRAMES] - mean]).collect()
+}
+
+/// The generator angle over a pitch, linked with the drive.
+pub(super) fn over_pitch() -> Axis {
+    Axis::linked("Generator from the beginning of a pitch")
 }
 
 /// The drive to scale; `state` says under what load it turns, and which way.
 pub(super) fn drive_figure(state: &str) -> Figure {
-    Figure {
-        id: "drive".into(),
-        title: "The drive to scale".into(),
-        caption: Text::new(format!(
-            "Contact FEM, plane strain, {state}; both wheels meshed as computed. The flexspline stands and is \
+    let caption = format!(
+        "Contact FEM, plane strain, {state}; both wheels meshed as computed. The flexspline stands and is \
              deformed by the generator (grey); the circular spline turns: the red dot is on tooth 0, the blue one on \
              space 0, which meet on the major axis at generator angle 0. Arrows push on the flexspline: red from the \
              circular spline, at the flanks, blue from the generator. What is seen at one angle is seen again a tooth \
              pitch later, one tooth on; between computed positions, an eighth of a pitch apart, the picture \
              interpolates. Move along figure 2 to turn the generator.",
-        )),
-        alt: "Cross section of the drive: circular spline outside, deformed flexspline inside it, wave generator in \
-              the middle, coloured by von Mises stress, and an enlargement of the teeth at the major axis"
-            .into(),
-        body: FigureBody::Drive,
-    }
+    );
+    let alt = "Cross section of the drive: circular spline outside, deformed flexspline inside it, wave generator in \
+               the middle, coloured by von Mises stress, and an enlargement of the teeth at the major axis";
+    Figure { alt: alt.into(), ..Figure::of("drive", "The drive to scale", caption, FigureBody::Drive) }
 }
 
 /// The flexspline with its sleeve.
 pub fn sleeve_figure() -> Figure {
-    Figure {
-        id: "sleeve".into(),
-        title: "The flexspline in three dimensions".into(),
-        caption: Text::new(
-            "Its middle surface, the wave of the generator in the state of the figure above: each harmonic of the rim \
-             by contact FEM, extended along rim and tubes by the theory of shells. Displacements are drawn larger \
-             than they are, by the factor that is told; colours are their outward part as it is. The toothed rim is \
-             outlined. The sleeve stands, the wave turns with the generator. In the corner, where the drive is \
-             computed with face = \"slices\": how the load lies along the face of the flank that bears most.",
-        ),
-        alt: "The flexspline as a tube in perspective, deformed by the wave generator, coloured by its outward \
-              displacement"
-            .into(),
-        body: FigureBody::Sleeve,
-    }
+    let caption = "Its middle surface, the wave of the generator in the state of the figure above: each harmonic of \
+                   the rim by contact FEM, extended along rim and tubes by the theory of shells. Displacements are \
+                   drawn larger than they are, by the factor below; colours are their outward part as it is. The \
+                   toothed rim is outlined. The sleeve stands, the wave turns with the generator. In the corner, \
+                   where the drive is computed with face = \"slices\": how the load lies along the face of the flank \
+                   that bears most.";
+    let alt = "The flexspline as a tube in perspective, deformed by the wave generator, coloured by its outward \
+               displacement";
+    let figure = Figure::of("sleeve", "The flexspline in three dimensions", caption, FigureBody::Sleeve);
+    Figure { alt: alt.into(), ..figure }
 }
 
 /// Stress and pressures over a pitch.
@@ -105,36 +103,24 @@ pub(super) fn stress_lines(animation: &Animation) -> Lines {
     };
     let mut rows: Vec<(usize, &Row)> = animation.rows.iter().map(|row| (frame(row), row)).collect();
     rows.sort_by_key(|(frame, _)| *frame);
-    let series = |(colour, (name, of)): (usize, OfRow)| Series {
-        name: name.into(),
-        mark: Mark::Line,
-        colour,
-        points: (0..=FRAMES)
-            .filter_map(|k| {
-                let (_, row) = rows.iter().find(|(frame, _)| *frame == k % FRAMES)?;
-                Some([degrees(animation, k as i64), of(row)])
-            })
-            .collect(),
+    let series = |(colour, (name, of)): (usize, OfRow)| {
+        let point = |k: usize| {
+            let (_, row) = rows.iter().find(|(frame, _)| *frame == k % FRAMES)?;
+            Some([degrees(animation, k as i64), of(row)])
+        };
+        Series::new(name, Mark::Line, colour, (0..=FRAMES).filter_map(point).collect())
     };
-    Lines { series: STRESSES.into_iter().enumerate().map(series).collect(), ..Lines::default() }
+    Lines::of(STRESSES.into_iter().enumerate().map(series).collect())
 }
 
 /// Stress and pressures over a pitch, a chart to each choice.
 pub(super) fn stress_figure(charts: Vec<(String, Lines)>) -> Figure {
-    Figure {
-        id: "stress".into(),
-        title: "Largest stress and pressures over a pitch".into(),
-        caption: Text::new(format!("At the load of figure 1. {STRESSES_ARE}")),
-        alt: "Curves of the largest stress and contact pressures over one tooth pitch".into(),
-        body: FigureBody::Lines {
-            x: Axis::linked("Generator from the beginning of a pitch"),
-            y: Axis::new("Stress, pressure", PageQuantity::Stress),
-            charts,
-        },
-    }
+    let (x, y) = (over_pitch(), Axis::new("Stress, pressure", PageQuantity::Stress));
+    let caption = format!("At the load of figure 1. {STRESSES_ARE}");
+    Figure::of("stress", "Largest stress and pressures over a pitch", caption, FigureBody::Lines { x, y, charts })
 }
 
-/// What bears on a tooth, as a legend calls it: either flank, the generator.
+/// Names of the forces on a tooth in a legend: either flank, the generator.
 pub(super) const BEARS: [&str; 3] =
     ["flank towards growing angles", "flank towards falling angles", "generator on bore, per tooth"];
 
@@ -149,60 +135,42 @@ pub(super) fn sharing_lines(animation: &Animation) -> Lines {
     let series = |(colour, (mark, row)): (usize, (Mark, usize))| {
         let points =
             (-half..half).map(|k| [degrees(animation, k), force(row, k.rem_euclid(samples as i64) as usize)]).collect();
-        Series { name: BEARS[colour].into(), mark, colour, points }
+        Series::new(BEARS[colour], mark, colour, points)
     };
     let rows = [(Mark::Line, 0), (Mark::Line, 4), (Mark::Dashed, 8)];
-    Lines { series: rows.into_iter().enumerate().map(series).collect(), ..Lines::default() }
+    Lines::of(rows.into_iter().enumerate().map(series).collect())
+}
+
+/// The axes of [`sharing_figure`].
+pub(super) fn sharing_axes() -> [Axis; 2] {
+    [Axis::new("Tooth from the major axis", PageQuantity::Degree), Axis::new("Force", PageQuantity::Force)]
 }
 
 /// How the load is shared among the teeth, a chart to each choice.
 pub(super) fn sharing_figure(charts: Vec<(String, Lines)>) -> Figure {
-    Figure {
-        id: "sharing".into(),
-        title: "How the teeth share the load".into(),
-        caption: Text::new(
-            "Force on a flexspline tooth by its angle from the major axis, at the load of figure 1: of each flank, \
-             and of the generator on the piece of bore under the tooth. The other lobe carries the same.",
-        ),
-        alt: "Curves of the force on a tooth over its angle from the major axis".into(),
-        body: FigureBody::Lines {
-            x: Axis::new("Tooth from the major axis", PageQuantity::Degree),
-            y: Axis::new("Force", PageQuantity::Force),
-            charts,
-        },
-    }
+    let [x, y] = sharing_axes();
+    let caption = "Force on a flexspline tooth by its angle from the major axis, at the load of figure 1: of each \
+                   flank, and of the generator on the piece of bore under the tooth. The other lobe carries the same.";
+    Figure::of("sharing", "How the teeth share the load", caption, FigureBody::Lines { x, y, charts })
 }
 
-/// Data sheets beside what is computed, by choice; nothing where there is none.
+/// The data sheets and what is computed of them, by choice; nothing where there is none.
 pub(super) fn sheet_section(sheets: Vec<(String, SheetBeside)>) -> Option<Section> {
     let source = sheets.first()?.1.stated.source.clone().unwrap_or_else(|| "the data sheet".to_owned());
     let mut blocks = Vec::new();
     for (id, sheet) in sheets {
-        let number =
-            |value: Option<f64>| Text::new(value.map_or_else(|| "–".to_owned(), |value| significant(value, 3)));
+        let number = |value: Option<f64>| Text::new(value.map_or_else(|| "–".to_owned(), |v| significant(v, 3)));
         let row = |row: &Beside| {
             let (name, unit) = row.in_words();
-            let remark = Text::new(row.remark(&sheet));
-            vec![
-                Text::new(format!("{name}, {unit}")),
-                number(Some(row.stated)),
-                number(row.computed),
-                number(row.ratio),
-                remark,
-            ]
+            let numbers = [Some(row.stated), row.computed, row.ratio].map(number);
+            [vec![Text::new(format!("{name}, {unit}"))], numbers.into(), vec![Text::new(row.remark(&sheet))]].concat()
         };
         let caption = format!("{source} and contact FEM; {} N·m", sheet.loads_in_words());
-        let header = ["Figure", "stated", "computed", "ratio", "what is computed"].map(str::to_owned).into();
-        let table = PageTable { caption, header, rows: sheet.beside.iter().map(row).collect() };
-        blocks.push(Block::Table { choice: Some(id.clone()), table });
-        if let Some(what) = sheet.assumed_in_words() {
-            let text = Text::new(format!("Loads: {what}."));
-            blocks.push(Block::Paragraph { choice: Some(id.clone()), text });
-        }
-        if let Some(why) = &sheet.why {
-            let text = Text::new(format!("Not all of it was computed: {why}."));
-            blocks.push(Block::Paragraph { choice: Some(id), text });
-        }
+        let header = ["Figure", "stated", "computed", "ratio", "what is computed"];
+        let table = Block::table(caption, &header, sheet.beside.iter().map(row).collect());
+        let loads = sheet.assumed_in_words().map(|what| Block::paragraph(format!("Loads: {what}.")));
+        let why = sheet.why.as_ref().map(|why| Block::paragraph(format!("Not all of it was computed: {why}.")));
+        blocks.extend([Some(table), loads, why].into_iter().flatten().map(|block| block.of_choice(id.clone())));
     }
-    Some(Section { id: "data-sheet".into(), title: "Beside its data sheet".into(), detail: Detail::Summary, blocks })
+    Some(Section::new("data-sheet", "The data sheet and the model", Detail::Summary, blocks))
 }

@@ -2,18 +2,17 @@
 
 use std::f64::consts::TAU;
 
-use flexspline::make::Sample;
 use flexspline::{Direction, GeneratorAngle, Table};
 use serde_json::{Map, Value, json};
 
 use super::animation::{Animation, AnimationError, FRAMES};
 use super::drive_figures::{
-    apart, caution_words, drive_figure, less_mean, sharing_figure, sharing_lines, sheet_section, sleeve_figure,
-    stress_figure, stress_lines,
+    apart, caution_words, drive_figure, less_mean, mean_arcsec, over_pitch, sharing_figure, sharing_lines,
+    sheet_section, sleeve_figure, stress_figure, stress_lines,
 };
 use super::page::{
-    Axis, Block, Choice, Detail, Field, Figure, FigureBody, Headline, Limit, Lines, Mark, Page, PageQuantity, Section,
-    Series, Status, Table as PageTable, Text, significant,
+    Axis, Block, Choice, Detail, Headline, Limit, Lines, Mark, Page, PageQuantity, SIGNS, Section, Series, Status,
+    Text, made_of_drive, significant,
 };
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::stated::TWO_SETS_OF_K;
@@ -26,23 +25,25 @@ const POSITIONS: usize = 48;
 /// Torques between neighbouring nodes at which curves over the torque are read.
 const BETWEEN_NODES: usize = 4;
 
+/// Both ways of the generator: what a legend calls each, and how it is drawn.
+const WAYS: [(Direction, &str, Mark); 2] =
+    [(Direction::Forward, "forward", Mark::Line), (Direction::Backward, "backward", Mark::Dashed)];
+
 /// A table and what is known of it.
 pub struct DriveSubject<'a> {
     /// Which generator.
     pub kind: GeneratorKind,
     /// The table.
     pub table: Table<'a>,
-    /// What made it, if it was made just now.
+    /// Its record, if it was made just now.
     pub info: Option<&'a TableInfo>,
-    /// The samples it was made of, if they are FEM's and at hand.
-    pub samples: Option<&'a [Sample]>,
     /// How it did against fresh FEM.
     pub validation: Option<&'a Validation>,
     /// The drive in motion, by fresh FEM.
     pub animation: Result<Animation, AnimationError>,
 }
 
-/// What the page is made from.
+/// Inputs of the page.
 pub struct DriveSources<'a> {
     /// The drive.
     pub drive: &'a Drive,
@@ -50,7 +51,7 @@ pub struct DriveSources<'a> {
     pub command_name: &'static str,
     /// The command line.
     pub command: &'a str,
-    /// What made it beside the drive: name and value.
+    /// Further provenance: name and value.
     pub inputs: Vec<(String, String)>,
     /// The tables.
     pub subjects: Vec<DriveSubject<'a>>,
@@ -99,13 +100,14 @@ impl<'a> DriveKnown<'a> {
         self.subject.kind.to_string()
     }
 
-    fn pitch(&self) -> f64 {
-        TAU / f64::from(self.drive.flexspline.teeth)
-    }
-
     /// Of a table made from FEM: from elsewhere it need not agree with the FEM of this drive.
     fn is_fem(&self) -> bool {
         self.subject.info.is_none_or(|info| matches!(info.source, Source::Fem { .. }))
+    }
+
+    /// Generator angle of a position of a pitch, rad.
+    fn position(&self, k: usize) -> f64 {
+        TAU / f64::from(self.drive.flexspline.teeth) * k as f64 / POSITIONS as f64
     }
 
     /// Output error in steady motion by the table, arcsec; NaN where it gives none.
@@ -117,8 +119,8 @@ impl<'a> DriveKnown<'a> {
 
     /// The mean of it over a pitch.
     fn mean(&self, torque: f32, temperature: f32, direction: Direction) -> f64 {
-        let at = |k: usize| self.pitch() * k as f64 / POSITIONS as f64;
-        (0..POSITIONS).map(|k| self.error(at(k), torque, temperature, direction)).sum::<f64>() / POSITIONS as f64
+        let errors = (0..POSITIONS).map(|k| self.error(self.position(k), torque, temperature, direction));
+        errors.sum::<f64>() / POSITIONS as f64
     }
 
     /// Torques at which curves over the torque are read: the nodes and some between them.
@@ -156,47 +158,42 @@ impl<'a> DriveKnown<'a> {
 
     fn headline(&self) -> Headline {
         let name = self.subject.kind.in_words();
-        let choice = Some(self.id());
-        if let Some(v) = self.subject.validation {
-            return Headline {
-                choice,
-                answer: Text::new(format!("The {name} table misses fresh contact FEM by "))
-                    .error(v.rms_arcsec, 2)
-                    .plain(" rms, where the drive without a table is off by ")
-                    .error(v.uncompensated_rms_arcsec, 3)
-                    .plain("."),
-                number: Text::default().error(v.max_arcsec, 2),
-                number_is: format!("largest miss at {} points that made no table", v.points.len()),
-            };
-        }
-        let uncorrected = Text::new(format!("Uncorrected, the {name} drive is off by up to "))
-            .error(self.largest_error, 3)
-            .plain(format!(" at {} N·m; ", torque_text(self.subject.table.torque_range_n_m()[1])));
-        if let Some([_, worst]) = self.fresh {
-            let torque = torque_text(shown_torque_n_m(&self.subject.table) as f32);
-            return Headline {
-                choice,
-                answer: uncorrected
-                    .plain("its table predicts the output to within ")
-                    .error(worst, 2)
-                    .plain(" of fresh FEM."),
-                number: Text::default().error(worst, 2),
-                number_is: format!(
-                    "largest miss at {FRAMES} FEM points that made no table ({torque} N·m, {:.0} °C, forward)",
+        let uncorrected = format!(
+            "Uncorrected, the {name} drive is off by up to {{}} at {} N·m; ",
+            torque_text(self.subject.table.torque_range_n_m()[1])
+        );
+        let headline = if let Some(v) = self.subject.validation {
+            let answer = format!(
+                "The {name} table misses fresh contact FEM by {{}} rms, where the drive without a table is off by {{}}."
+            );
+            Headline::new(
+                Text::filled(&answer, &[(v.rms_arcsec, 2), (v.uncompensated_rms_arcsec, 3)]),
+                Text::arcsec(v.max_arcsec, 2),
+                format!("largest miss at {} points that made no table", v.points.len()),
+            )
+        } else if let Some([_, worst]) = self.fresh {
+            let answer = uncorrected + "its table predicts the output to within {} of fresh FEM.";
+            Headline::new(
+                Text::filled(&answer, &[(self.largest_error, 3), (worst, 2)]),
+                Text::arcsec(worst, 2),
+                format!(
+                    "largest miss at {FRAMES} FEM points that made no table ({} N·m, {:.0} °C, forward)",
+                    torque_text(shown_torque_n_m(&self.subject.table) as f32),
                     self.temperature
                 ),
-            };
-        }
-        let worst = f64::from(self.subject.table.projection_worst_rad()) * ARCSEC_PER_RAD;
-        Headline {
-            choice,
-            answer: uncorrected
-                .plain("what its table leaves is not measured here. It holds the samples that made it to ")
-                .error(worst, 2)
-                .plain(", which says nothing of other points."),
-            number: Text::default().error(self.largest_error, 3),
-            number_is: "largest error without a table; with one, see validate, or replay on rows that made none".into(),
-        }
+            )
+        } else {
+            let worst = f64::from(self.subject.table.projection_worst_rad()) * ARCSEC_PER_RAD;
+            let answer = uncorrected
+                + "the error with its table is not measured here. It holds the samples that made it to {}, which \
+                   says nothing of other points.";
+            Headline::new(
+                Text::filled(&answer, &[(self.largest_error, 3), (worst, 2)]),
+                Text::arcsec(self.largest_error, 3),
+                "largest error without a table; with one, see validate, or replay on rows that made none",
+            )
+        };
+        Headline { choice: Some(self.id()), ..headline }
     }
 
     /// Torques whose ripple is shown: the lightest load, what the animation has, the largest.
@@ -209,49 +206,40 @@ impl<'a> DriveKnown<'a> {
     fn ripple(&self) -> Lines {
         let mut lines = Lines::default();
         for (colour, torque) in self.shown_torques().into_iter().enumerate() {
-            for (direction, word, mark) in
-                [(Direction::Forward, "forward", Mark::Line), (Direction::Backward, "backward", Mark::Dashed)]
-            {
+            for (direction, word, mark) in WAYS {
                 let mean = self.mean(torque, self.temperature, direction);
                 let points = (0..=POSITIONS).map(|k| {
-                    let angle = self.pitch() * k as f64 / POSITIONS as f64;
+                    let angle = self.position(k);
                     [angle.to_degrees(), self.error(angle, torque, self.temperature, direction) - mean]
                 });
                 let name = format!("{} N·m {word}", torque_text(torque));
-                lines.series.push(Series { name, mark, colour, points: points.collect() });
+                lines.series.push(Series::new(name, mark, colour, points.collect()));
             }
         }
         if let Ok(animation) = &self.subject.animation {
-            lines.series.push(Series {
-                name: format!("{} N·m forward, fresh FEM", torque_text(animation.torque_n_m as f32)),
-                mark: Mark::Points,
-                colour: 1,
-                points: less_mean(animation),
-            });
+            let name = format!("{} N·m forward, fresh FEM", torque_text(animation.torque_n_m as f32));
+            lines.series.push(Series::new(name, Mark::Points, 1, less_mean(animation)));
         }
         lines
     }
 
     fn wind_up(&self) -> Lines {
-        let of = |direction| -> Vec<[f64; 2]> {
-            self.torques().into_iter().map(|t| [f64::from(t), self.mean(t, self.temperature, direction)]).collect()
+        let of = |(colour, (direction, name, mark)): (usize, (Direction, &str, Mark))| {
+            let mean = |t: f32| [f64::from(t), self.mean(t, self.temperature, direction)];
+            Series::new(name, mark, colour, self.torques().into_iter().map(mean).collect())
         };
-        let mut lines = Lines::default();
-        for (name, mark, colour, direction) in
-            [("forward", Mark::Line, 0, Direction::Forward), ("backward", Mark::Dashed, 1, Direction::Backward)]
-        {
-            lines.series.push(Series { name: name.into(), mark, colour, points: of(direction) });
-        }
+        let mut series: Vec<Series> = WAYS.into_iter().enumerate().map(of).collect();
         if let Ok(a) = &self.subject.animation {
-            let mean = a.error_arcsec.iter().sum::<f64>() / FRAMES as f64;
-            lines.series.push(Series {
-                name: "forward, fresh FEM".into(),
-                mark: Mark::Points,
-                colour: 2,
-                points: vec![[a.torque_n_m, mean]],
-            });
+            let point = vec![[a.torque_n_m, mean_arcsec(a)]];
+            series.push(Series::new("forward, fresh FEM", Mark::Points, 2, point));
         }
-        lines
+        Lines::of(series)
+    }
+
+    /// Backward less forward error, mean over a pitch, at a torque.
+    fn play_at(&self, torque: f32, temperature: f32) -> f64 {
+        let [forward, backward] = [Direction::Forward, Direction::Backward].map(|d| self.mean(torque, temperature, d));
+        backward - forward
     }
 
     fn play(&self) -> Lines {
@@ -259,68 +247,47 @@ impl<'a> DriveKnown<'a> {
         let mut temperatures = vec![cold, self.temperature, warm];
         temperatures.dedup();
         let series = temperatures.into_iter().enumerate().map(|(colour, temperature)| {
-            let points = self.torques().into_iter().map(|t| {
-                let [f, b] = [Direction::Forward, Direction::Backward].map(|d| self.mean(t, temperature, d));
-                [f64::from(t), b - f]
-            });
+            let points = self.torques().into_iter().map(|t| [f64::from(t), self.play_at(t, temperature)]);
             let mark = if colour == 1 { Mark::Line } else { Mark::Dashed };
-            Series { name: format!("{temperature:.0} °C"), mark, colour, points: points.collect() }
+            Series::new(format!("{temperature:.0} °C"), mark, colour, points.collect())
         });
-        Lines { series: series.collect(), ..Lines::default() }
+        Lines::of(series.collect())
     }
 
-    fn map(&self) -> Field {
-        let nodes: Vec<f32> = self.subject.table.torque_nodes_n_m().collect();
-        let angles: Vec<f64> = (0..POSITIONS).map(|k| self.pitch() * k as f64 / POSITIONS as f64).collect();
-        let z = nodes.iter().flat_map(|torque| {
-            let mean = self.mean(*torque, self.temperature, Direction::Forward);
-            angles.iter().map(move |a| self.error(*a, *torque, self.temperature, Direction::Forward) - mean)
-        });
-        Field {
-            x: angles.iter().map(|a| a.to_degrees()).collect(),
-            y: nodes.iter().map(|t| f64::from(*t)).collect(),
-            z: z.collect(),
-        }
-    }
-
-    /// The table against the samples it was made of.
-    fn residual(&self) -> Option<Lines> {
-        let samples = self.subject.samples?;
-        let ratio = self.drive.ratio();
-        let series = [(Direction::Forward, "forward"), (Direction::Backward, "backward")].into_iter().enumerate().map(
-            |(colour, (direction, name))| {
-                let mut points: Vec<[f64; 2]> = samples
-                    .iter()
-                    .filter(|s| s.direction == direction)
-                    .map(|s| {
-                        let fem = (s.output_rad - s.generator_rad / ratio) * ARCSEC_PER_RAD;
-                        let table = self.error(s.generator_rad, s.torque_n_m as f32, s.temperature_c as f32, direction);
-                        [s.torque_n_m, table - fem]
-                    })
-                    .collect();
-                // One dot to a torque and side: the largest miss either way. All are in the samples file.
-                points.sort_by(|a, b| a[0].total_cmp(&b[0]));
-                let worst = points.chunk_by(|a, b| a[0] == b[0]).map(|group| {
-                    *group.iter().max_by(|a, b| a[1].abs().total_cmp(&b[1].abs())).expect("groups are not empty")
-                });
-                Series { name: name.into(), mark: Mark::Points, colour, points: worst.collect() }
-            },
-        );
-        Some(Lines { series: series.collect(), ..Lines::default() })
+    /// A row of the comparison.
+    fn compared(&self) -> Vec<Text> {
+        let [_, highest] = self.subject.table.torque_range_n_m();
+        let middle = |torque: f32| {
+            let mean = |d| self.mean(torque, self.temperature, d);
+            0.5 * (mean(Direction::Forward) + mean(Direction::Backward))
+        };
+        let wind_up = middle(highest) - middle(self.shown_torques()[0]);
+        let at = |k: usize| self.error(self.position(k), 0.5 * highest, self.temperature, Direction::Forward);
+        let (low, high) =
+            (0..POSITIONS).map(at).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), e| (a.min(e), b.max(e)));
+        // Unloaded, the clearance is crossed within the drag torque: the table's widest play.
+        let plays = self.torques().into_iter().map(|t| self.play_at(t, self.temperature));
+        let left = self.subject.validation.map(|v| [v.rms_arcsec, v.max_arcsec]).or(self.fresh);
+        vec![
+            Text::new(self.subject.kind.in_words()),
+            Text::arcsec(self.largest_error, 3),
+            left.map_or("–".into(), |[rms, worst]| Text::arcsec(rms, 2).plain(" / ").error(worst, 2)),
+            Text::arcsec(plays.fold(0.0, f64::max), 3),
+            Text::arcsec(wind_up, 3),
+            Text::arcsec(high - low, 2),
+            Text::new(torque_text(highest)),
+            Text::new(self.subject.table.id().to_string()),
+        ]
     }
 }
 
 /// Points of a validation as series: misses of the table over something, by direction.
-fn misses(v: &Validation, kind: &str, over: fn(&Point) -> f64) -> Lines {
+fn misses(v: &Validation, over: fn(&Point) -> f64) -> Lines {
     let series = [(1, "forward"), (-1, "backward")].into_iter().enumerate().map(|(colour, (direction, name))| {
-        let mut points: Vec<[f64; 2]> = v
-            .points
-            .iter()
-            .filter(|p| p.kind == kind && p.direction == direction)
-            .map(|p| [over(p), p.table_arcsec - p.fem_arcsec])
-            .collect();
-        points.sort_by(|a, b| a[0].total_cmp(&b[0]));
-        Series { name: name.into(), mark: Mark::Points, colour, points: apart(points) }
+        let steady = v.points.iter().filter(|p| p.kind == "steady" && p.direction == direction);
+        let points = steady.map(|p| [over(p), p.table_arcsec - p.fem_arcsec]).collect();
+        let sorted = Series::sorted(name, Mark::Points, colour, points);
+        Series { points: apart(sorted.points), ..sorted }
     });
     let limits = [v.max_bound_arcsec, -v.max_bound_arcsec].map(|y| Limit { name: "bound of any point".into(), y });
     Lines { series: series.collect(), limits: limits.into(), ..Lines::default() }
@@ -330,21 +297,14 @@ fn misses(v: &Validation, kind: &str, over: fn(&Point) -> f64) -> Lines {
 fn reversal(v: &Validation) -> Lines {
     let points: Vec<&Point> = v.points.iter().filter(|p| p.kind == "reversal").collect();
     let first = points.first().map_or(0.0, |p| p.generator_rad);
-    let along = |of: fn(&Point) -> f64| {
-        let mut line: Vec<[f64; 2]> =
-            points.iter().map(|p| [(first - p.generator_rad).abs().to_degrees(), of(p)]).collect();
-        line.sort_by(|a, b| a[0].total_cmp(&b[0]));
-        line
+    let along = |name: &str, mark, colour, of: fn(&Point) -> f64| {
+        let points = points.iter().map(|p| [(first - p.generator_rad).abs().to_degrees(), of(p)]);
+        Series::sorted(name, mark, colour, points.collect())
     };
-    let table = along(|p| p.table_arcsec);
-    let fem = along(|p| p.fem_arcsec);
-    Lines {
-        series: vec![
-            Series { name: "table and play, as firmware has them".into(), mark: Mark::Line, colour: 0, points: table },
-            Series { name: "fresh FEM".into(), mark: Mark::Points, colour: 1, points: fem },
-        ],
-        ..Lines::default()
-    }
+    Lines::of(vec![
+        along("table and play, as firmware has them", Mark::Line, 0, |p| p.table_arcsec),
+        along("fresh FEM", Mark::Points, 1, |p| p.fem_arcsec),
+    ])
 }
 
 /// The page.
@@ -369,12 +329,7 @@ pub fn drive_report(sources: DriveSources<'_>) -> Page {
     sections.push(reading_section());
     let mut results = Map::new();
     results.insert("tables".into(), known.iter().map(result_of).collect());
-    let mut provenance = vec![
-        ("Command".to_owned(), command.to_owned()),
-        ("Program".to_owned(), format!("flexspline {}", env!("CARGO_PKG_VERSION"))),
-        ("Drive".to_owned(), drive.name.clone()),
-        ("BLAKE3 of the drive".to_owned(), blake3::Hash::from(drive.hash()).to_hex().to_string()),
-    ];
+    let mut provenance = made_of_drive(command, drive);
     provenance.extend(inputs);
     for k in &known {
         provenance.push((format!("table_id, {}", k.subject.kind.in_words()), k.subject.table.id().to_string()));
@@ -400,16 +355,14 @@ pub fn drive_report(sources: DriveSources<'_>) -> Page {
             ),
         ));
     }
-    let title = if validated {
-        format!("Tables of {} against fresh FEM", drive.name)
-    } else {
-        format!("Compensation tables of {}", drive.name)
-    };
     Page {
-        title,
+        title: if validated {
+            format!("Tables of {} against fresh FEM", drive.name)
+        } else {
+            format!("Compensation tables of {}", drive.name)
+        },
         command_name,
         status,
-        also: Vec::new(),
         remarks,
         choices: known.iter().map(|k| Choice { id: k.id(), name: k.subject.kind.in_words().to_owned() }).collect(),
         choice_is: "Generator",
@@ -418,6 +371,7 @@ pub fn drive_report(sources: DriveSources<'_>) -> Page {
         animations: known.into_iter().filter_map(|k| k.subject.animation.ok()).collect(),
         provenance,
         results,
+        ..Page::default()
     }
 }
 
@@ -425,54 +379,55 @@ pub fn drive_report(sources: DriveSources<'_>) -> Page {
 fn judge(known: &[DriveKnown<'_>]) -> (Status, Vec<String>) {
     let mut status = Status::Good;
     let mut remarks = Vec::new();
-    let mut remark = |worse: Status, words: String| {
-        status = status.max(worse);
-        remarks.push(words);
-    };
     for k in known {
-        let name = k.subject.kind.in_words();
-        if k.subject.info.is_some_and(|info| info.torque_nodes_resolved == Some(false)) {
-            let words = "the torque nodes ran out before the table met the FEM everywhere; see --most-nodes";
-            remark(Status::Remark, format!("{name}: {words}."));
-        }
-        for words in k.subject.info.iter().flat_map(|info| &info.remarks) {
-            remark(Status::Remark, format!("{name}: {}.", words.replace("N.m", "N·m")));
-        }
-        for caution in k.subject.info.iter().flat_map(|info| &info.cautions) {
-            remark(Status::Caution, format!("{name}: {}.", caution_words(caution)));
-        }
-        if let Some(why) = k.subject.info.and_then(|info| info.no_stress.as_ref()) {
-            remark(Status::Caution, format!("{name}: no stress over three meshes: {why}."));
-        }
-        if let Some(turns) = k.subject.info.and_then(|info| info.turns.as_ref()) {
-            remark(Status::Remark, format!("{name}: {}.", turns.remark.replace('"', "″")));
+        let mut remark = |worse: Status, words: String| {
+            status = status.max(worse);
+            remarks.push(format!("{}: {words}.", k.subject.kind.in_words()));
+        };
+        if let Some(info) = k.subject.info {
+            if info.torque_nodes_resolved == Some(false) {
+                let words = "the torque nodes ran out before the table met the FEM everywhere; see --most-nodes";
+                remark(Status::Remark, words.to_owned());
+            }
+            for words in &info.remarks {
+                remark(Status::Remark, words.replace("N.m", "N·m"));
+            }
+            for caution in &info.cautions {
+                remark(Status::Caution, caution_words(caution));
+            }
+            if let Some(why) = &info.no_stress {
+                remark(Status::Caution, format!("no stress over three meshes: {why}"));
+            }
+            if let Some(turns) = &info.turns {
+                remark(Status::Remark, turns.remark.replace('"', "″"));
+            }
         }
         match &k.subject.animation {
             Err(error @ AnimationError::NotPeriodic { .. }) => {
-                remark(Status::Remark, format!("{name}: not shown in motion: {error}."));
+                remark(Status::Remark, format!("not shown in motion: {error}"));
             }
             Err(error @ AnimationError::Simulate(_)) => {
                 // A table of measured samples does not depend on this run.
                 let status = if k.is_fem() { Status::NotConverged } else { Status::Remark };
-                remark(status, format!("{name}: the run that shows it in motion failed: {error}."));
+                remark(status, format!("the run that shows it in motion failed: {error}"));
             }
             Ok(_) => {}
         }
         if let Some([_, worst]) = k.fresh.filter(|[_, worst]| *worst > MAX_BOUND_ARCSEC) {
             let words = format!("the table misses fresh FEM by {worst:.2}″, more than {MAX_BOUND_ARCSEC}″");
-            remark(Status::BoundMissed, format!("{name}: {words}."));
+            remark(Status::BoundMissed, words);
         }
         if k.fresh.is_none() && k.subject.validation.is_none() {
-            let words = "nothing here measures what the table leaves: validate does against fresh FEM, replay against \
-                         measured rows that made no table";
-            remark(Status::Remark, format!("{name}: {words}."));
+            let words = "nothing here measures the error with the table: validate does against fresh FEM, replay \
+                         against measured rows that made no table";
+            remark(Status::Remark, words.to_owned());
         }
         if let Some(v) = k.subject.validation.filter(|v| v.status != "passed") {
             let words = format!(
                 "{:.2}″ rms and {:.2}″ at most; the bounds are {:.2}″ and {:.2}″",
                 v.rms_arcsec, v.max_arcsec, v.rms_bound_arcsec, v.max_bound_arcsec
             );
-            remark(Status::BoundMissed, format!("{name}: {words}."));
+            remark(Status::BoundMissed, words);
         }
     }
     (status, remarks)
@@ -509,100 +464,47 @@ fn result_of(k: &DriveKnown<'_>) -> Value {
 fn stress_section(known: &[DriveKnown<'_>]) -> Option<Section> {
     let block = |k: &DriveKnown<'_>| {
         let info = k.subject.info.filter(|info| !info.stress.is_empty())?;
-        let number = |value: f64| Text::new(significant(value, 3));
         let rows = info.stress.iter().map(|stress| {
             let [low, high] = stress.interval_mpa;
-            vec![Text::new(stress.place.in_words()), number(stress.von_mises_mpa), number(low), number(high)]
+            let numbers = [stress.von_mises_mpa, low, high].map(|value| Text::new(significant(value, 3)));
+            [vec![Text::new(stress.place.in_words())], numbers.into()].concat()
         });
         let [_, highest] = k.subject.table.torque_range_n_m();
-        let table = PageTable {
-            caption: format!("Largest von Mises stress under {} N·m, over three meshes", torque_text(highest)),
-            header: ["Place", "stress, MPa", "from, MPa", "to, MPa"].map(str::to_owned).into(),
-            rows: rows.collect(),
-        };
-        Some(Block::Table { choice: Some(k.id()), table })
+        let caption = format!("Largest von Mises stress under {} N·m, over three meshes", torque_text(highest));
+        let header = ["Place", "stress, MPa", "from, MPa", "to, MPa"];
+        Some(Block::table(caption, &header, rows.collect()).of_choice(k.id()))
     };
     let blocks: Vec<Block> = known.iter().filter_map(block).collect();
-    let (id, title) = ("stress-by-place".to_owned(), "Stress, over three meshes".to_owned());
-    (!blocks.is_empty()).then_some(Section { id, title, detail: Detail::Summary, blocks })
+    let title = "Stress, over three meshes";
+    (!blocks.is_empty()).then(|| Section::new("stress-by-place", title, Detail::Summary, blocks))
 }
 
 fn comparison(known: &[DriveKnown<'_>], validated: bool) -> Section {
-    let rows = known.iter().map(|k| {
-        let error = |arcsec: f64, digits| Text::default().error(arcsec, digits);
-        let [_, highest] = k.subject.table.torque_range_n_m();
-        let light = k.shown_torques()[0];
-        let mean = |d| k.mean(light, k.temperature, d);
-        let span = |direction| -> f64 {
-            let at =
-                |i: usize| k.error(k.pitch() * i as f64 / POSITIONS as f64, 0.5 * highest, k.temperature, direction);
-            let (low, high) =
-                (0..POSITIONS).map(at).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), e| (a.min(e), b.max(e)));
-            high - low
-        };
-        // Unloaded, the clearance is crossed within the drag torque: the table's widest play.
-        let backlash = k
-            .play()
-            .series
-            .iter()
-            .find(|s| s.mark == Mark::Line || s.colour == 0)
-            .map_or(0.0, |s| s.points.iter().fold(0.0, |widest: f64, p| widest.max(p[1])));
-        let wind_up = 0.5
-            * (k.mean(highest, k.temperature, Direction::Forward)
-                + k.mean(highest, k.temperature, Direction::Backward))
-            - 0.5 * (mean(Direction::Forward) + mean(Direction::Backward));
-        let left = match (k.subject.validation, k.fresh) {
-            (Some(v), _) => error(v.rms_arcsec, 2).plain(" / ").error(v.max_arcsec, 2),
-            (None, Some([rms, worst])) => error(rms, 2).plain(" / ").error(worst, 2),
-            (None, None) => Text::new("–"),
-        };
-        vec![
-            Text::new(k.subject.kind.in_words()),
-            error(k.largest_error, 3),
-            left,
-            error(backlash, 3),
-            error(wind_up, 3),
-            error(span(Direction::Forward), 2),
-            Text::new(torque_text(highest)),
-            Text::new(k.subject.table.id().to_string()),
-        ]
-    });
-    let left = if validated { "Left with table, rms / largest" } else { "Left with table, rms / largest*" };
     let header = [
-        // What a table is for comes first: a phone shows three columns.
+        // The purpose of a table comes first: a phone shows three columns.
         "Generator",
         "Largest error",
-        left,
+        if validated { "Left with table, rms / largest" } else { "Left with table, rms / largest*" },
         "Backlash",
         "Elastic wind-up",
         "Ripple at half load",
         "Load up to, N·m",
         "table_id",
     ];
-    let table = PageTable {
-        caption: "What each generator does to the output, and what its table leaves".into(),
-        header: header.map(str::to_owned).into(),
-        rows: rows.collect(),
-    };
+    let caption = "What each generator does to the output, and what its table leaves";
+    let table = Block::table(caption, &header, known.iter().map(DriveKnown::compared).collect());
+    let matches = "The table_id is what firmware returns for the table it carries: it matches this page with a device \
+                   in the field.";
     let words = if validated {
-        Text::new(
-            "The table_id is what firmware returns for the table it carries: it matches this page with a device in \
-             the field. Without a table the output is off by up to the second column; with it, by the third.",
-        )
+        format!("{matches} Without a table the output is off by up to the second column; with it, by the third.")
     } else {
-        Text::new(format!(
-            "The table_id is what firmware returns for the table it carries: it matches this page with a device in \
-             the field. * At {FRAMES} points over a pitch, at half load, forward, at {:.0} °C: few, but none of them \
+        format!(
+            "{matches} * At {FRAMES} points over a pitch, at half load, forward, at {:.0} °C: few, but none of them \
              made the table. The command validate draws many, at random loads and temperatures.",
             known.first().map_or(20.0, |k| k.temperature)
-        ))
+        )
     };
-    Section {
-        id: "comparison".into(),
-        title: "At a glance".into(),
-        detail: Detail::Summary,
-        blocks: vec![Block::Table { choice: None, table }, Block::Paragraph { choice: None, text: words }],
-    }
+    Section::new("comparison", "At a glance", Detail::Summary, vec![table, Block::paragraph(words)])
 }
 
 /// The load, stretched about the drag, where the loaded flank changes.
@@ -616,222 +518,125 @@ fn charts(known: &[DriveKnown<'_>], of: impl Fn(&DriveKnown<'_>) -> Option<Lines
 }
 
 fn motion_section(known: &[DriveKnown<'_>]) -> Section {
-    let ripple = Figure {
-        id: "ripple".into(),
-        title: "Error over one tooth pitch, less its mean".into(),
-        caption: Text::new(
+    let error = |label: &str| Axis::new(label, PageQuantity::Error);
+    let mut blocks = vec![
+        Block::Figure(drive_figure("at half the largest load of the table, turning forward")),
+        Block::lines(
+            "ripple",
+            "Error over one tooth pitch, less its mean",
             "Output angle less generator angle over the ratio, by the table, at three loads in both directions; dots \
              are fresh FEM, the states that figure 1 shows. It repeats with every pitch of the flexspline. The mean \
              is in figure 3.",
+            [over_pitch(), error("Output error less mean")],
+            charts(known, |k| Some(k.ripple())),
         ),
-        alt: "Curves of the output error over one tooth pitch of the generator".into(),
-        body: FigureBody::Lines {
-            x: Axis::linked("Generator from the beginning of a pitch"),
-            y: Axis::new("Output error less mean", PageQuantity::Error),
-            charts: charts(known, |k| Some(k.ripple())),
-        },
-    };
-    let wind_up = Figure {
-        id: "wind-up".into(),
-        title: "Error over the load".into(),
-        caption: Text::new(
+        Block::lines(
+            "wind-up",
+            "Error over the load",
             "Mean over a pitch, by the table, at the reference temperature: wind-up, and, where the load is too small \
              to hold the flanks together, the clearance. A positive load turns the output forward. Drag across to \
              zoom, double-click to come back.",
+            [Axis::new("Load torque", PageQuantity::Torque), error("Output error")],
+            charts(known, |k| Some(k.wind_up())),
         ),
-        alt: "Curves of the mean output error over the load torque, forward and backward".into(),
-        body: FigureBody::Lines {
-            x: Axis::new("Load torque", PageQuantity::Torque),
-            y: Axis::new("Output error", PageQuantity::Error),
-            charts: charts(known, |k| Some(k.wind_up())),
-        },
-    };
-    let drive = drive_figure("at half the largest load of the table, turning forward");
-    let mut blocks = vec![Block::Figure(drive), Block::Figure(ripple), Block::Figure(wind_up)];
+    ];
     if known.iter().any(|k| k.subject.animation.as_ref().is_ok_and(|a| a.sleeve.is_some())) {
         blocks.push(Block::Figure(sleeve_figure()));
     }
-    Section { id: "motion".into(), title: "The drive at work".into(), detail: Detail::Summary, blocks }
+    Section::new("motion", "The drive at work", Detail::Summary, blocks)
 }
 
 fn validation_section(known: &[DriveKnown<'_>]) -> Section {
-    let of = |kind: &'static str, over: fn(&Point) -> f64| {
-        charts(known, move |k| k.subject.validation.map(|v| misses(v, kind, over)))
+    let words = |k: &DriveKnown<'_>| {
+        let v = k.subject.validation?;
+        let (points, increments) = (v.points.len(), v.increments);
+        let words = format!(
+            "{points} points, {increments} increments of FEM. Root mean square {{}} (bound {{}}), largest {{}} (bound \
+             {{}}); in the reversal {{}} rms, {{}} at most. "
+        );
+        let bounded = [v.rms_arcsec, v.rms_bound_arcsec, v.max_arcsec, v.max_bound_arcsec];
+        let all = [&bounded[..], &[v.reversal_rms_arcsec, v.reversal_max_arcsec]].concat();
+        let text = Text::filled(&words, &all.iter().map(|arcsec| (*arcsec, 2)).collect::<Vec<_>>());
+        let text = text.strong(if v.status == "passed" { "Passed." } else { "Bound missed." });
+        Some(Block::paragraph(text).of_choice(k.id()))
     };
-    let figure = |id: &str, title: &str, caption: &str, x: Axis, charts| {
-        Block::Figure(Figure {
-            id: id.into(),
-            title: title.into(),
-            caption: Text::new(caption),
-            alt: title.into(),
-            body: FigureBody::Lines { x, y: Axis::new("Table less FEM", PageQuantity::Error), charts },
-        })
+    let mut blocks: Vec<Block> = known.iter().filter_map(words).collect();
+    let missed = |id, title, caption, x, over: fn(&Point) -> f64| {
+        let y = Axis::new("Table less FEM", PageQuantity::Error);
+        Block::lines(id, title, caption, [x, y], charts(known, |k| Some(misses(k.subject.validation?, over))))
     };
-    let mut blocks: Vec<Block> = known
-        .iter()
-        .filter_map(|k| {
-            let v = k.subject.validation?;
-            let text =
-                Text::new(format!("{} points, {} increments of FEM. Root mean square ", v.points.len(), v.increments))
-                    .error(v.rms_arcsec, 2)
-                    .plain(" (bound ")
-                    .error(v.rms_bound_arcsec, 2)
-                    .plain("), largest ")
-                    .error(v.max_arcsec, 2)
-                    .plain(" (bound ")
-                    .error(v.max_bound_arcsec, 2)
-                    .plain("); in the reversal ")
-                    .error(v.reversal_rms_arcsec, 2)
-                    .plain(" rms, ")
-                    .error(v.reversal_max_arcsec, 2)
-                    .plain(" at most. ")
-                    .strong(if v.status == "passed" { "Passed." } else { "Bound missed." });
-            Some(Block::Paragraph { choice: Some(k.id()), text })
-        })
-        .collect();
-    blocks.push(figure(
+    blocks.push(missed(
         "miss-torque",
         "Table less fresh FEM, over the load",
         "Loads, temperatures, directions and positions were drawn between the nodes of the table.",
         load_axis(known),
-        of("steady", |p| p.torque_n_m),
+        |p| p.torque_n_m,
     ));
-    blocks.push(figure(
+    blocks.push(missed(
         "miss-temperature",
         "Table less fresh FEM, over the temperature",
         "The same points.",
         Axis::new("Temperature", PageQuantity::Temperature),
-        of("steady", |p| p.temperature_c),
+        |p| p.temperature_c,
     ));
-    blocks.push(Block::Figure(Figure {
-        id: "reversal".into(),
-        title: "Through the clearance at a reversal".into(),
-        caption: Text::new(
-            "Without load the generator turns back: the output stands until the clearance is crossed, and the error \
-             grows with the generator. The line is what the core, with its play, gives from the same generator angles.",
-        ),
-        alt: "Output error while the generator reverses, by table and by FEM".into(),
-        body: FigureBody::Lines {
-            x: Axis::new("Generator travel", PageQuantity::Degree),
-            y: Axis::new("Output error", PageQuantity::Error),
-            charts: charts(known, |k| k.subject.validation.map(reversal)),
-        },
-    }));
-    Section { id: "validation".into(), title: "Against fresh FEM".into(), detail: Detail::Summary, blocks }
+    blocks.push(Block::lines(
+        "reversal",
+        "Through the clearance at a reversal",
+        "Without load the generator turns back: the output stands until the clearance is crossed, and the error grows \
+         with the generator. The line is what the core, with its play, gives from the same generator angles.",
+        [Axis::new("Generator travel", PageQuantity::Degree), Axis::new("Output error", PageQuantity::Error)],
+        charts(known, |k| k.subject.validation.map(reversal)),
+    ));
+    Section::new("validation", "Against fresh FEM", Detail::Summary, blocks)
 }
 
 fn table_section(known: &[DriveKnown<'_>]) -> Section {
-    let mut blocks = vec![
-        Block::Figure(Figure {
-            id: "play".into(),
-            title: "Play between the directions".into(),
-            caption: Text::new(
-                "Backward less forward error, mean over a pitch: both half-widths of the play. Below the drag of the \
-                 output nothing holds the flanks together and it is the backlash; beyond, what drag and friction \
-                 leave.",
-            ),
-            alt: "Curves of the difference between backward and forward error over the load torque".into(),
-            body: FigureBody::Lines {
-                x: load_axis(known),
-                y: Axis::new("Backward less forward", PageQuantity::Error),
-                charts: charts(known, |k| Some(k.play())),
-            },
-        }),
-        Block::Figure(Figure {
-            id: "map".into(),
-            title: "Error less its mean, over pitch and load".into(),
-            caption: Text::new(
-                "By the table, forward. One row to each torque node, equally high: they crowd where wind-up is steep.",
-            ),
-            alt: "Colour map of the output error over generator angle within a pitch and load torque".into(),
-            body: FigureBody::Field {
-                x: Axis::new("Generator from the beginning of a pitch", PageQuantity::Degree),
-                y: Axis::new("Load torque", PageQuantity::Torque),
-                z: Axis::new("Output error less mean", PageQuantity::Error),
-                fields: known.iter().map(|k| (k.id(), k.map())).collect(),
-            },
-        }),
-    ];
-    let residuals = charts(known, |k| k.residual());
-    if !residuals.is_empty() {
-        blocks.push(Block::Figure(Figure {
-            id: "residual".into(),
-            title: "Table less the samples that made it".into(),
-            caption: Text::new(
-                "The largest at each torque node, over positions and temperatures. This is what single precision and \
-                 the play as a single half-width leave; it says nothing of what lies between the nodes.",
-            ),
-            alt: "Points of the deviation of the table from its samples over the load torque".into(),
-            body: FigureBody::Lines {
-                x: load_axis(known),
-                y: Axis::new("Table less sample", PageQuantity::Error),
-                charts: residuals,
-            },
-        }));
-    }
+    let mut blocks = vec![Block::lines(
+        "play",
+        "Play between the directions",
+        "Backward less forward error, mean over a pitch: both half-widths of the play. Below the drag of the output \
+         nothing holds the flanks together and it is the backlash; beyond, what drag and friction leave.",
+        [load_axis(known), Axis::new("Backward less forward", PageQuantity::Error)],
+        charts(known, |k| Some(k.play())),
+    )];
     for k in known {
         let table = &k.subject.table;
         let [cold, warm] = table.temperature_range_c();
         let [low, high] = table.torque_range_n_m().map(torque_text);
+        let arcsec = |rad: f32| Text::arcsec(f64::from(rad) * ARCSEC_PER_RAD, 2);
         let mut rows = vec![
-            vec![Text::new("table_id"), Text::new(table.id().to_string())],
-            vec![Text::new("Range of the load"), Text::new(format!("{low} to {high} N·m"))],
-            vec![Text::new("Range of the temperature"), Text::new(format!("{cold} to {warm} °C"))],
-            vec![Text::new("Torque nodes"), Text::new(table.torque_nodes_n_m().len().to_string())],
-            vec![Text::new("Temperature nodes"), Text::new(table.temperature_nodes_c().len().to_string())],
-            vec![Text::new("Iterations of the inverse"), Text::new(table.inverse_iterations().to_string())],
-            vec![
-                Text::new("Error they leave, at most"),
-                Text::default().error(f64::from(table.inverse_error_bound_rad()) * ARCSEC_PER_RAD, 2),
-            ],
-            vec![
-                Text::new("Largest deviation from the samples"),
-                Text::default().error(f64::from(table.projection_worst_rad()) * ARCSEC_PER_RAD, 2),
-            ],
-            vec![Text::new("Bound of the slope |N de/dψ|"), Text::new(format!("{:.4}", table.bounds().slope))],
+            ("Range of the load", format!("{low} to {high} N·m").into()),
+            ("Range of the temperature", format!("{cold} to {warm} °C").into()),
+            ("Torque nodes", table.torque_nodes_n_m().len().to_string().into()),
+            ("Temperature nodes", table.temperature_nodes_c().len().to_string().into()),
+            ("Error of the inverse, at most", arcsec(table.inverse_error_bound_rad())),
+            ("Largest deviation from the samples", arcsec(table.projection_worst_rad())),
         ];
         if let Some(info) = k.subject.info {
-            rows.push(vec![Text::new("Image"), Text::new(format!("{} bytes", info.image_bytes))]);
-            rows.push(vec![Text::new("Samples"), Text::new(info.samples.to_string())]);
+            rows.push(("Image", format!("{} bytes", info.image_bytes).into()));
+            rows.push(("Samples", info.samples.to_string().into()));
         }
-        blocks.push(Block::Table {
-            choice: Some(k.id()),
-            table: PageTable {
-                caption: format!("The {} table", k.subject.kind.in_words()),
-                header: vec!["Property".into(), "Value".into()],
-                rows,
-            },
-        });
+        let rows = rows.into_iter().map(|(name, value)| vec![name.into(), value]).collect();
+        let caption = format!("The {} table", k.subject.kind.in_words());
+        blocks.push(Block::table(caption, &["Property", "Value"], rows).of_choice(k.id()));
     }
-    Section { id: "table".into(), title: "The table".into(), detail: Detail::Engineering, blocks }
+    Section::new("table", "The table", Detail::Engineering, blocks)
 }
 
 fn load_section(known: &[DriveKnown<'_>]) -> Section {
-    Section {
-        id: "load".into(),
-        title: "Load and stress".into(),
-        detail: Detail::Engineering,
-        blocks: vec![
-            Block::Figure(stress_figure(charts(known, |k| Some(stress_lines(k.subject.animation.as_ref().ok()?))))),
-            Block::Figure(sharing_figure(charts(known, |k| Some(sharing_lines(k.subject.animation.as_ref().ok()?))))),
-        ],
-    }
+    let of = |lines: fn(&Animation) -> Lines| charts(known, |k| k.subject.animation.as_ref().ok().map(lines));
+    let figures = [stress_figure(of(stress_lines)), sharing_figure(of(sharing_lines))];
+    Section::new("load", "Load and stress", Detail::Engineering, figures.map(Block::Figure).into())
 }
 
 fn reading_section() -> Section {
     Section::reading(vec![
-        Block::paragraph(
-            "Error: output angle less generator angle over the ratio; positive when the output leads. The flexspline \
-             is fixed, the circular spline is the output. Forward is growing generator angle.",
-        ),
+        Block::paragraph(format!("{SIGNS} The flexspline is fixed, the circular spline is the output.")),
         Block::paragraph(
             "Fresh FEM means runs that made none of the tables, by the same model: agreement says that the table \
              holds what the model says, not that the model holds what a real drive does. Plane strain, quasi-static: \
-             the cup of the flexspline, its skew, lubricant and speed are left out.",
-        ),
-        Block::paragraph(
-            "Figures zoom by dragging and come back by a double click. Pointing along figure 2 turns the drive of \
-             figure 1. Every figure has its numbers as a table and as CSV, in the unit that is selected.",
+             the cup of the flexspline, its skew, lubricant and speed are left out. Pointing along figure 2 turns the \
+             drive of figure 1.",
         ),
     ])
 }

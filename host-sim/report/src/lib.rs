@@ -21,7 +21,6 @@ pub mod page;
 mod simulation_report;
 mod sleeve_view;
 pub mod study_report;
-mod svg;
 
 pub use animation::{Animation, AnimationError};
 pub use drive_report::{DriveSources, DriveSubject, drive_report, shown_torque_n_m};

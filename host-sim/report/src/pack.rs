@@ -8,7 +8,6 @@
 //! |---|---|---|
 //! | [`Packed::floats`] | the bytes of `f32`, four planes | that of `f32` |
 //! | [`Packed::steps`] | multiples of `scale` from `offset`, 16 bits, zigzag differences, two planes | half of `scale` |
-//! | [`Packed::levels`] | multiples of `scale` from `offset`, 8 bits, zigzag differences | half of `scale` |
 
 use std::io::Write;
 
@@ -20,9 +19,9 @@ use flexspline_export::base64;
 /// An array as it stands in the page.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Packed {
-    /// What it is looked up by.
+    /// Its name, by which it is looked up.
     pub name: String,
-    /// `f32`, `i16` or `u8`.
+    /// `f32` or `i16`.
     pub kind: &'static str,
     /// Lengths of its axes, the last one running fastest.
     pub shape: Vec<usize>,
@@ -60,22 +59,6 @@ impl Packed {
             .collect();
         let planes = (0..2).flat_map(|plane| bytes.iter().map(move |b| b[plane])).collect();
         Packed::of(name.into(), "i16", shape, (scale, offset), bytes.len(), planes)
-    }
-
-    /// Values between 0 and `largest` in 255 levels; what lies outside is moved to the nearer end.
-    pub fn levels(name: impl Into<String>, shape: &[usize], largest: f64, values: &[f64]) -> Packed {
-        let scale = largest / 255.0;
-        let mut before = 0_u8;
-        let bytes: Vec<u8> = values
-            .iter()
-            .map(|x| {
-                let now = (x / scale).round() as u8;
-                let step = now.wrapping_sub(before) as i8;
-                before = now;
-                ((step << 1) ^ (step >> 7)) as u8
-            })
-            .collect();
-        Packed::of(name.into(), "u8", shape, (scale, 0.0), bytes.len(), bytes)
     }
 
     fn of(

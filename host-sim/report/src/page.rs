@@ -1,4 +1,4 @@
-//! What a page is made of. A command fills in a [`Page`] and writes [`Page::html`]; nothing here knows what a table or
+//! The parts of a page. A command fills in a [`Page`] and writes [`Page::html`]; nothing here knows what a table or
 //! a diagnosis is.
 //!
 //! - A page answers its reader's question first: a [`Headline`] of one sentence and one number, under a [`Status`] that
@@ -19,12 +19,14 @@ use serde_json::{Map, Value, json};
 use super::animation::Animation;
 use super::assets::{self, SCRIPT, STYLE};
 use super::pack::Packed;
-use super::svg;
+use flexspline_base::figures::NamedFigure;
+use flexspline_mechanics::drive::Drive;
 
 /// Whether what the page says can be relied on, best first; what is wrong is stamped on it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Status {
     /// Every check passed.
+    #[default]
     Good,
     /// Holds, with a remark that the reader has to know.
     Remark,
@@ -73,7 +75,7 @@ pub enum Span {
     Plain(String),
     /// Words that stand out.
     Strong(String),
-    /// An error in arc-seconds, with so many significant digits.
+    /// An error in arc-seconds, with its number of significant digits.
     Error {
         /// The value.
         arcsec: f64,
@@ -92,6 +94,18 @@ impl Text {
         Text(vec![Span::Plain(words.into())])
     }
 
+    /// Words in which each `{}` is an error of the output: its value, arcsec, and significant digits.
+    pub fn filled(words: &str, errors: &[(f64, usize)]) -> Text {
+        let mut parts = words.splitn(errors.len() + 1, "{}");
+        let begin = Text::new(parts.next().unwrap_or_default());
+        parts.zip(errors).fold(begin, |text, (words, (arcsec, digits))| text.error(*arcsec, *digits).plain(words))
+    }
+
+    /// An error of the output alone, arcsec, to `digits` significant digits.
+    pub fn arcsec(arcsec: f64, digits: usize) -> Text {
+        Text::default().error(arcsec, digits)
+    }
+
     /// Goes on with words.
     pub fn plain(mut self, words: impl Into<String>) -> Text {
         self.0.push(Span::Plain(words.into()));
@@ -104,7 +118,7 @@ impl Text {
         self
     }
 
-    /// Goes on with an error of the output, arcsec, to so many significant digits.
+    /// Goes on with an error of the output, arcsec, to `digits` significant digits.
     pub fn error(mut self, arcsec: f64, digits: usize) -> Text {
         self.0.push(Span::Error { arcsec, digits });
         self
@@ -140,6 +154,10 @@ impl Span {
     }
 }
 
+/// The error and its sign, for the section on how to read a page.
+pub const SIGNS: &str = "Error: output angle less generator angle over the ratio; positive when the output leads. \
+                         Forward is growing generator angle.";
+
 /// Stands for every choice where a figure is the same for all of them.
 pub const EVERY_CHOICE: &str = "every";
 
@@ -148,7 +166,7 @@ pub const EVERY_CHOICE: &str = "every";
 pub struct Choice {
     /// Looked up by; letters, digits and hyphens.
     pub id: String,
-    /// What the reader sees.
+    /// Name, as the reader sees it.
     pub name: String,
 }
 
@@ -161,8 +179,15 @@ pub struct Headline {
     pub answer: Text,
     /// The one number.
     pub number: Text,
-    /// What it is.
+    /// Its name, in a few words.
     pub number_is: String,
+}
+
+impl Headline {
+    /// An answer for all choices.
+    pub fn new(answer: Text, number: Text, number_is: impl Into<String>) -> Headline {
+        Headline { choice: None, answer, number, number_is: number_is.into() }
+    }
 }
 
 /// How much a reader wants to know.
@@ -196,7 +221,7 @@ pub struct Section {
     pub title: String,
     /// From which level of detail on it is open.
     pub detail: Detail,
-    /// What is in it.
+    /// Its text, tables and figures.
     pub blocks: Vec<Block>,
 }
 
@@ -224,7 +249,7 @@ pub enum Block {
 /// A table; the first cell of each row is its heading.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Table {
-    /// What it shows.
+    /// Its caption.
     pub caption: String,
     /// Headings of the columns.
     pub header: Vec<String>,
@@ -237,12 +262,73 @@ impl Block {
     pub fn paragraph(text: impl Into<Text>) -> Block {
         Block::Paragraph { choice: None, text: text.into() }
     }
+
+    /// A table, whatever is chosen.
+    pub fn table(caption: impl Into<String>, header: &[&str], rows: Vec<Vec<Text>>) -> Block {
+        let header = header.iter().map(|&cell| cell.to_owned()).collect();
+        Block::Table { choice: None, table: Table { caption: caption.into(), header, rows } }
+    }
+
+    /// The figures of a result, the list that the terminal prints, whatever is chosen.
+    pub fn figures(caption: impl Into<String>, figures: &[NamedFigure]) -> Block {
+        let row = |NamedFigure { name, value, unit, caveat, what, .. }: &NamedFigure| {
+            let number = match *unit {
+                "arcsec" => Text::arcsec(*value, 4),
+                "" => Text::new(significant(*value, 3)),
+                unit => {
+                    format!("{}\u{a0}{}", significant(*value, 4), unit.replace("N.m", "N·m").replace("deg", "°")).into()
+                }
+            };
+            let semicolon = if what.is_empty() || caveat.is_empty() { "" } else { "; " };
+            let mut name = name.clone();
+            name[..1].make_ascii_uppercase();
+            vec![name.into(), number, format!("{what}{semicolon}{caveat}").into()]
+        };
+        Block::table(caption, &["Figure", "Value", "What it is"], figures.iter().map(row).collect())
+    }
+
+    /// A figure of curves and points, a chart to each choice. Its title is also its alternative text.
+    pub fn lines(
+        id: impl Into<String>,
+        title: impl Into<String>,
+        caption: impl Into<Text>,
+        [x, y]: [Axis; 2],
+        charts: Vec<(String, Lines)>,
+    ) -> Block {
+        Block::Figure(Figure::of(id, title, caption, FigureBody::Lines { x, y, charts }))
+    }
+
+    /// This block, shown for one choice alone.
+    pub fn of_choice(self, id: impl Into<String>) -> Block {
+        match self {
+            Block::Paragraph { text, .. } => Block::Paragraph { choice: Some(id.into()), text },
+            Block::Table { table, .. } => Block::Table { choice: Some(id.into()), table },
+            figure @ Block::Figure(_) => figure,
+        }
+    }
+}
+
+impl Figure {
+    /// A figure whose title is also its alternative text.
+    pub fn of(id: impl Into<String>, title: impl Into<String>, caption: impl Into<Text>, body: FigureBody) -> Figure {
+        let title = title.into();
+        Figure { id: id.into(), alt: title.clone(), title, caption: caption.into(), body }
+    }
 }
 
 impl Section {
+    /// A section.
+    pub fn new(id: &str, title: impl Into<String>, detail: Detail, blocks: Vec<Block>) -> Section {
+        Section { id: id.into(), title: title.into(), detail, blocks }
+    }
+
     /// How to read the page: the last section, folded.
-    pub fn reading(blocks: Vec<Block>) -> Section {
-        Section { id: "reading".into(), title: "How to read this page".into(), detail: Detail::Full, blocks }
+    pub fn reading(mut blocks: Vec<Block>) -> Section {
+        blocks.push(Block::paragraph(
+            "Figures zoom by dragging and come back by a double click. Every figure has its numbers as a table and as \
+             CSV, in the unit that is selected: the points that are drawn.",
+        ));
+        Section::new("reading", "How to read this page", Detail::Full, blocks)
     }
 }
 
@@ -263,17 +349,17 @@ impl Table {
 pub struct Figure {
     /// Anchor; letters, digits and hyphens.
     pub id: String,
-    /// What it shows, in a few words.
+    /// Title, in a few words.
     pub title: String,
-    /// What there is to see.
+    /// Caption.
     pub caption: Text,
-    /// What it shows, for those who cannot see it.
+    /// Alternative text, for those who cannot see it.
     pub alt: String,
     /// The figure itself.
     pub body: FigureBody,
 }
 
-/// What is drawn.
+/// The drawing of a figure.
 #[derive(Debug, Clone)]
 pub enum FigureBody {
     /// The drive, to scale, in motion: the page's animations.
@@ -330,30 +416,12 @@ pub enum PageQuantity {
     Whole,
 }
 
-impl PageQuantity {
-    /// Unit as stored, for headings of CSV columns and static pictures.
-    pub(crate) fn stored_unit(self) -> &'static str {
-        match self {
-            PageQuantity::Error => "arcsec",
-            PageQuantity::Degree => "°",
-            PageQuantity::Torque => "N·m",
-            PageQuantity::Stress => "MPa",
-            PageQuantity::Force => "N",
-            PageQuantity::Temperature => "°C",
-            PageQuantity::Second => "s",
-            PageQuantity::Turn => "turns",
-            PageQuantity::Speed => "rad/s",
-            PageQuantity::Count | PageQuantity::Whole => "",
-        }
-    }
-}
-
 /// An axis.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Axis {
     /// Its title, without unit.
     pub label: String,
-    /// What it measures.
+    /// Its quantity.
     pub quantity: PageQuantity,
     /// Whether it is the generator angle from a pitch's beginning, and linked with the drive.
     pub linked: bool,
@@ -375,13 +443,6 @@ impl Axis {
     /// This axis, linear within `within` of zero and logarithmic beyond.
     pub(crate) fn stretched(self, within: f64) -> Axis {
         Axis { stretched: Some(within), ..self }
-    }
-
-    pub(crate) fn title(&self) -> String {
-        match self.quantity.stored_unit() {
-            "" => self.label.clone(),
-            unit => format!("{}, {unit}", self.label),
-        }
     }
 }
 
@@ -415,6 +476,19 @@ pub struct Series {
     pub points: Vec<[f64; 2]>,
 }
 
+impl Series {
+    /// A series.
+    pub fn new(name: impl Into<String>, mark: Mark, colour: usize, points: Vec<[f64; 2]>) -> Series {
+        Series { name: name.into(), mark, colour, points }
+    }
+
+    /// A series of points in any order.
+    pub fn sorted(name: impl Into<String>, mark: Mark, colour: usize, mut points: Vec<[f64; 2]>) -> Series {
+        points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        Series::new(name, mark, colour, points)
+    }
+}
+
 /// A level across a chart that has a name, such as a bound.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Limit {
@@ -445,6 +519,16 @@ pub struct Lines {
 }
 
 impl Lines {
+    /// A chart of these series alone.
+    pub fn of(series: Vec<Series>) -> Lines {
+        Lines { series, ..Lines::default() }
+    }
+
+    /// This chart, whatever is chosen.
+    pub fn for_every_choice(self) -> Vec<(String, Lines)> {
+        vec![(EVERY_CHOICE.to_owned(), self)]
+    }
+
     /// Columns: every x that occurs, then each series at it, NaN where it has no point.
     fn columns(&self) -> Vec<Vec<f64>> {
         let mut x: Vec<f64> = self.series.iter().flat_map(|s| s.points.iter().map(|p| p[0])).collect();
@@ -476,21 +560,21 @@ pub struct Field {
 }
 
 /// A report.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Page {
-    /// What it is about, for the browser's tab and the top of the page.
+    /// Title, for the browser's tab and the top of the page.
     pub title: String,
     /// Which command: `tables`, `validate`, …
     pub command_name: &'static str,
     /// Whether it can be relied on.
     pub status: Status,
-    /// What is stamped on it beside that.
+    /// Further stamps.
     pub also: Vec<Status>,
-    /// What makes the status what it is, a sentence each.
+    /// Reasons for the status, a sentence each.
     pub remarks: Vec<String>,
-    /// What can be selected, at least one.
+    /// The choices, at least one.
     pub choices: Vec<Choice>,
-    /// What the selector is of, in one word.
+    /// Label of the selector.
     pub choice_is: &'static str,
     /// Answers, one for all or one to each choice.
     pub headlines: Vec<Headline>,
@@ -498,7 +582,7 @@ pub struct Page {
     pub sections: Vec<Section>,
     /// Drives in motion.
     pub animations: Vec<Animation>,
-    /// What made the page: name and value.
+    /// Provenance of the page: name and value.
     pub provenance: Vec<(String, String)>,
     /// The results for programs, by name.
     pub results: Map<String, Value>,
@@ -507,15 +591,15 @@ pub struct Page {
 /// Version of the JSON block.
 pub(crate) const PAGE_SCHEMA: u32 = 1;
 
-/// What marks the JSON block of a page.
+/// Beginning of the JSON block of a page.
 const BLOCK: &str = "id=\"flexspline-report\">";
 
-/// What a page that was written says of itself.
+/// Command, title and provenance of a page that was written.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Written {
-    /// Which command wrote it.
+    /// The command that wrote it.
     pub command: String,
-    /// What it is about.
+    /// Its title.
     pub title: String,
     /// The values of what made it.
     provenance: Vec<String>,
@@ -539,6 +623,18 @@ impl Written {
     }
 }
 
+/// Provenance of a page of a drive: the command, this program, the drive and its hash.
+pub fn made_of_drive(command: &str, drive: &Drive) -> Vec<(String, String)> {
+    [
+        ("Command", command.to_owned()),
+        ("Program", format!("flexspline {}", env!("CARGO_PKG_VERSION"))),
+        ("Drive", drive.name.clone()),
+        ("BLAKE3 of the drive", blake3::Hash::from(drive.hash()).to_hex().to_string()),
+    ]
+    .map(|(name, value)| (name.to_owned(), value))
+    .into()
+}
+
 #[derive(Template)]
 #[template(path = "report.html")]
 struct PageTemplate<'a> {
@@ -555,23 +651,6 @@ struct PageTemplate<'a> {
 impl PageTemplate<'_> {
     fn number(&self, figure: &Figure) -> usize {
         self.numbered.iter().find(|(_, f)| f.id == figure.id).map_or(0, |(number, _)| *number)
-    }
-
-    /// Choice, its name and the sketch.
-    fn sketches(&self, figure: &Figure) -> Vec<(String, String, String)> {
-        let named = |choice: &str| {
-            self.page.choices.iter().find(|c| c.id == choice).map_or_else(String::new, |c| c.name.clone())
-        };
-        match &figure.body {
-            FigureBody::Lines { x, y, charts } => {
-                charts.iter().map(|(choice, chart)| (choice.clone(), named(choice), svg::lines(x, y, chart))).collect()
-            }
-            FigureBody::Drive => {
-                let of = |a: &Animation| (a.kind.name().to_owned(), named(a.kind.name()), svg::drive(a));
-                self.page.animations.iter().take(1).map(of).collect()
-            }
-            FigureBody::Field { .. } | FigureBody::Sleeve => Vec::new(),
-        }
     }
 }
 
@@ -591,8 +670,7 @@ impl Page {
             described.insert(figure.id.clone(), value);
             packed.extend(arrays);
         }
-        let animations: Map<String, Value> =
-            self.animations.iter().map(|a| (a.kind.to_string(), animation_json(a))).collect();
+        let animations: Map<String, Value> = self.animations.iter().map(|a| (a.kind.to_string(), json!(a))).collect();
         let json = json!({
             "schema_version": PAGE_SCHEMA,
             "report": self.command_name,
@@ -622,69 +700,38 @@ impl Page {
     }
 }
 
-/// What the script is told of a figure, and its numbers.
+/// The description of a figure for the page's script, and its numbers.
 fn describe(number: usize, figure: &Figure) -> (Value, Vec<Packed>) {
-    let name = |choice: &str| format!("{choice}/{}", figure.id);
-    match &figure.body {
-        FigureBody::Drive => (json!({ "number": number, "kind": "drive", "title": figure.title }), Vec::new()),
-        FigureBody::Sleeve => (json!({ "number": number, "kind": "sleeve", "title": figure.title }), Vec::new()),
+    let mut arrays = Vec::new();
+    let mut value = match &figure.body {
+        FigureBody::Drive => json!({ "kind": "drive" }),
+        FigureBody::Sleeve => json!({ "kind": "sleeve" }),
         FigureBody::Lines { x, y, charts } => {
-            let arrays = charts.iter().map(|(choice, chart)| {
+            for (choice, chart) in charts {
                 let columns = chart.columns();
                 let shape = [columns.len(), columns[0].len()];
-                Packed::floats(name(choice), &shape, columns.into_iter().flatten())
-            });
-            let by_choice: Map<String, Value> =
-                charts.iter().map(|(choice, chart)| (choice.clone(), json!(chart))).collect();
-            let value = json!({ "number": number, "kind": "lines", "title": figure.title, "x": x, "y": y, "charts": by_choice });
-            (value, arrays.collect())
+                let name = format!("{choice}/{}", figure.id);
+                arrays.push(Packed::floats(name, &shape, columns.into_iter().flatten()));
+            }
+            let charts: Map<String, Value> = charts.iter().map(|(id, chart)| (id.clone(), json!(chart))).collect();
+            json!({ "kind": "lines", "x": x, "y": y, "charts": charts })
         }
         FigureBody::Field { x, y, z, fields } => {
-            let arrays = fields.iter().flat_map(|(choice, field)| {
-                let part = |part: &str| format!("{}/{part}", name(choice));
-                [
-                    Packed::floats(part("x"), &[field.x.len()], field.x.iter().copied()),
-                    Packed::floats(part("y"), &[field.y.len()], field.y.iter().copied()),
-                    Packed::floats(part("z"), &[field.y.len(), field.x.len()], field.z.iter().copied()),
-                ]
-            });
-            let choices: Vec<&String> = fields.iter().map(|(choice, _)| choice).collect();
-            let value = json!({ "number": number, "kind": "field", "title": figure.title, "x": x, "y": y, "z": z, "charts": choices });
-            (value, arrays.collect())
+            for (choice, Field { x, y, z }) in fields {
+                for (part, shape, values) in
+                    [("x", vec![x.len()], x), ("y", vec![y.len()], y), ("z", vec![y.len(), x.len()], z)]
+                {
+                    let name = format!("{choice}/{}/{part}", figure.id);
+                    arrays.push(Packed::floats(name, &shape, values.iter().copied()));
+                }
+            }
+            let charts: Vec<&String> = fields.iter().map(|(choice, _)| choice).collect();
+            json!({ "kind": "field", "x": x, "y": y, "z": z, "charts": charts })
         }
-    }
-}
-
-fn animation_json(a: &Animation) -> Value {
-    let wheel = |w: &super::animation::WheelMotion| json!({ "sectors": w.sectors, "samples": w.samples });
-    let rows: Vec<Value> = a
-        .rows
-        .iter()
-        .map(|row| {
-            json!({
-                "generator_rad": row.generator_rad,
-                "error_arcsec": row.error_arcsec,
-                "flank_contacts": row.flank_contacts,
-                "max_von_mises_mpa": row.max_von_mises_mpa,
-                "peak_flank_pressure_mpa": row.peak_flank_pressure_mpa,
-                "peak_generator_pressure_mpa": row.peak_generator_pressure_mpa,
-            })
-        })
-        .collect();
-    json!({
-        "torque_n_m": a.torque_n_m,
-        "temperature_c": a.temperature_c,
-        "ratio": a.ratio,
-        "frames": super::animation::FRAMES,
-        "sleeve": a.sleeve,
-        "flexspline": wheel(&a.flexspline),
-        "circular_spline": wheel(&a.circular_spline),
-        "bore_radius_mm": a.bore_radius_mm,
-        "error_arcsec": a.error_arcsec,
-        "colour_end_mpa": a.colour_end_mpa,
-        "peak_mpa": a.peak_mpa,
-        "rows": rows,
-    })
+    };
+    value["number"] = number.into();
+    value["title"] = figure.title.as_str().into();
+    (value, arrays)
 }
 
 #[cfg(test)]

@@ -6,18 +6,16 @@ use std::ops::Range;
 
 use serde_json::{Map, json};
 
-use super::animation::{Animation, FRAMES, Passing, bore_forces, flank_forces};
+use super::animation::{Animation, Passing, flank_forces};
 use super::drive_figures::{
-    BEARS, OfRow, STRESSES, STRESSES_ARE, apart, caution_words, drive_figure, less_mean, sharing_figure, sharing_lines,
-    sheet_section, sleeve_figure, stress_figure, stress_lines,
+    BEARS, OfRow, STRESSES, STRESSES_ARE, apart, caution_words, drive_figure, less_mean, mean_arcsec, over_pitch,
+    sharing_axes, sharing_figure, sharing_lines, sheet_section, sleeve_figure, stress_figure, stress_lines,
 };
 use super::page::{
-    Axis, Block, Choice, Detail, Field, Figure, FigureBody, Headline, Lines, Mark, Page, PageQuantity, Section, Series,
-    Status, Table, Text, significant,
+    Axis, Block, Choice, Detail, Field, Figure, FigureBody, Headline, Lines, Mark, Page, PageQuantity, SIGNS, Section,
+    Series, Status, Text, made_of_drive,
 };
-use super::study_report::{heading, value};
-use flexspline_design::data_sheet::{FIGURES, FigureOf};
-use flexspline_design::simulate::{Observation, Row, Simulation, Summary, TipContact, Told};
+use flexspline_design::simulate::{Observation, Row, Simulation, Summary, TipContact};
 use flexspline_design::stated;
 use flexspline_mechanics::drive::{Drive, GeneratorKind, Side};
 use flexspline_mechanics::mesh::MeshError;
@@ -31,43 +29,35 @@ const ROWS_OF_A_MAP: usize = 4;
 /// Rows of one stretch of the torque from which it is drawn as a curve: fewer are a load that is changed, not a test of
 /// torsion.
 const ROWS_OF_A_LOOP: usize = 3;
-/// Teeth that a map shows beside the last that bears: that it ends there is then seen.
+/// Teeth that a map shows beyond the last that bears, so that its end is seen.
 const TEETH_BESIDE: usize = 2;
 
-/// What the page needs of a run beside its rows, gathered while it goes on.
+/// Forces and the drive in motion, which the page needs in addition to the rows, gathered while the run goes on.
 pub struct Seen {
     passing: Passing,
     teeth: Vec<[Vec<f64>; 2]>,
-    /// The row of the largest pressure between flanks so far: that pressure, the row's place, what the generator bears
-    /// on each tooth.
-    highest: (f64, usize, Vec<f64>),
 }
 
 impl Seen {
     /// Before the run.
     pub fn new(drive: &Drive) -> Seen {
-        Seen { passing: Passing::new(drive), teeth: Vec::new(), highest: (f64::NEG_INFINITY, 0, Vec::new()) }
+        Seen { passing: Passing::new(drive), teeth: Vec::new() }
     }
 
     /// Looks at an increment of the run.
     pub fn add(&mut self, now: &Observation<'_>) {
         self.passing.see(now);
-        let Some(row) = now.row else { return };
+        if now.row.is_none() {
+            return;
+        }
         let teeth = now.problem.flexspline.teeth;
         let mut flanks = [vec![0.0; teeth], vec![0.0; teeth]];
         for found in flank_forces(now.problem, now.state, |_| true) {
-            flanks[usize::from(found.side == Side::Minus)][found.tooth] += length(found.force_n);
-        }
-        if row.peak_flank_pressure_mpa > self.highest.0 {
-            let bore = bore_forces(now.problem, now.state, teeth).into_iter().map(length).collect();
-            self.highest = (row.peak_flank_pressure_mpa, self.teeth.len(), bore);
+            let [x, y] = found.force_n;
+            flanks[usize::from(found.side == Side::Minus)][found.tooth] += x.hypot(y);
         }
         self.teeth.push(flanks);
     }
-}
-
-fn length([x, y]: [f64; 2]) -> f64 {
-    x.hypot(y)
 }
 
 /// Four digits that count, as text has them.
@@ -82,7 +72,6 @@ struct RunKnown<'a> {
     summary: &'a Summary,
     rows: &'a [Row],
     teeth: &'a [[Vec<f64>; 2]],
-    highest: &'a (f64, usize, Vec<f64>),
     motion: Option<&'a Animation>,
 }
 
@@ -98,14 +87,10 @@ pub fn simulation_report(
 ) -> Result<Page, MeshError> {
     let Simulation { rows, summary } = simulation;
     let motion = seen.passing.finish()?;
-    let known =
-        RunKnown { drive, kind, summary, rows, teeth: &seen.teeth, highest: &seen.highest, motion: motion.as_ref() };
+    let known = RunKnown { drive, kind, summary, rows, teeth: &seen.teeth, motion: motion.as_ref() };
     let mut sections = vec![known.found()];
-    sections.extend(summary.data_sheet.as_ref().and_then(|sheet| {
-        let mut section = sheet_section(vec![(kind.to_string(), sheet.clone())])?;
-        section.blocks.push(known.computed_sheet());
-        Some(section)
-    }));
+    sections
+        .extend(summary.data_sheet.as_ref().and_then(|sheet| sheet_section(vec![(kind.to_string(), sheet.clone())])));
     sections.extend([known.in_motion(), known.along_path()].into_iter().flatten());
     sections.push(known.load());
     sections.push(known.reading());
@@ -114,7 +99,6 @@ pub fn simulation_report(
         title: format!("{} along a path", drive.name),
         command_name: "simulate",
         status: if remarks.is_empty() { Status::Good } else { Status::Caution },
-        also: Vec::new(),
         remarks,
         choices: vec![Choice { id: kind.to_string(), name: kind.in_words().to_owned() }],
         choice_is: "Generator",
@@ -123,131 +107,88 @@ pub fn simulation_report(
         provenance: known.provenance(),
         results: Map::from_iter([("simulate".to_owned(), json!(summary))]),
         animations: motion.into_iter().collect(),
+        ..Page::default()
     })
 }
 
 impl RunKnown<'_> {
     fn headline(&self) -> Headline {
         let (summary, name) = (self.summary, self.kind.in_words());
-        let ripples = |text: Text| match summary.kinematic_error_pp_arcsec {
-            Some(arcsec) => text.plain("; turning, its error ripples by ").error(arcsec, 3).plain(" peak to peak."),
-            None => text.plain("."),
-        };
-        let errors = || self.rows.iter().map(|row| row.error_arcsec);
         if let Some(tips) = summary.tip_contact.filter(TipContact::counts) {
-            return Headline {
-                choice: None,
-                answer: Text::new(format!("In the {name} drive {}.", tips.in_words().replace(" deg", "°"))),
-                number: Text::new(format!("{:.1} %", 100.0 * tips.share)),
-                number_is: "of the load on tips that should pass freely".into(),
-            };
+            let answer = Text::new(format!("In the {name} drive {}.", tips.in_words().replace(" deg", "°")));
+            let share = Text::new(format!("{:.1} %", 100.0 * tips.share));
+            return Headline::new(answer, share, "of the load on tips that should pass freely");
         }
-        let (answer, number, number_is) = if let Some(backlash) = summary.backlash_arcsec {
-            let answer = Text::new(format!("Without load the {name} drive has a backlash of ")).error(backlash, 3);
-            (ripples(answer), backlash, "backlash at the output")
+        let ripple = summary.kinematic_error_pp_arcsec;
+        let errors = || self.rows.iter().map(|row| row.error_arcsec);
+        let (low, high) = (errors().fold(f64::INFINITY, f64::min), errors().fold(f64::NEG_INFINITY, f64::max));
+        // The sentence, its errors, and which of them is the number.
+        let (mut words, mut found, number, number_is) = if let Some(backlash) = summary.backlash_arcsec {
+            let words = format!("Without load the {name} drive has a backlash of {{}}");
+            (words, vec![backlash], backlash, "backlash at the output")
         } else if let (Some(wind_up), Some(torque)) = (summary.wind_up_arcsec, summary.torque_n_m) {
-            let answer = Text::new(format!("Under {} N·m the {name} drive is wound up by ", plain(torque)))
-                .error(wind_up, 3)
-                .plain(" from the middle of its backlash");
-            let answer = match summary.wind_up_elastic_arcsec {
-                Some(elastic) => answer.plain(", ").error(elastic, 3).plain(" of it elastic"),
-                None => answer,
-            };
-            (ripples(answer), wind_up, "wind-up from mid-backlash")
-        } else if let Some(ripple) = summary.kinematic_error_pp_arcsec {
-            let answer = Text::new(format!("Turning one way, the error of the {name} drive ripples by "));
-            (answer.error(ripple, 3).plain(" peak to peak."), ripple, "kinematic error, peak to peak")
+            let elastic = summary.wind_up_elastic_arcsec;
+            let of_it = elastic.map_or("", |_| ", {} of it elastic");
+            let torque = plain(torque);
+            let words = format!(
+                "Under {torque} N·m the {name} drive is wound up by {{}} from the middle of its backlash{of_it}"
+            );
+            (words, [wind_up].into_iter().chain(elastic).collect(), wind_up, "wind-up from mid-backlash")
+        } else if let Some(ripple) = ripple {
+            let words = format!("Turning one way, the error of the {name} drive ripples by {{}} peak to peak");
+            (words, vec![ripple], ripple, "kinematic error, peak to peak")
         } else {
-            let (low, high) = (errors().fold(f64::INFINITY, f64::min), errors().fold(f64::NEG_INFINITY, f64::max));
-            let answer = Text::new(format!("Along the path the output of the {name} drive is off by ")).error(low, 3);
-            let answer = if low < high { answer.plain(" to ").error(high, 3) } else { answer };
-            (answer.plain("."), if high.abs() < low.abs() { low } else { high }, "largest error along the path")
+            let to = if low < high { " to {}" } else { "" };
+            let words = format!("Along the path the output of the {name} drive is off by {{}}{to}");
+            let largest = if high.abs() < low.abs() { low } else { high };
+            (words, vec![low, high], largest, "largest error along the path")
         };
-        let number = Text::default().error(number, 3);
-        Headline { choice: None, answer, number, number_is: number_is.into() }
+        if let Some(ripple) = ripple.filter(|ripple| found != [*ripple]) {
+            words += "; turning, its error ripples by {} peak to peak";
+            found.push(ripple);
+        }
+        let found: Vec<(f64, usize)> = found.into_iter().map(|arcsec| (arcsec, 3)).collect();
+        Headline::new(Text::filled(&(words + "."), &found), Text::arcsec(number, 3), number_is)
     }
 
     /// The figures of the summary.
     fn found(&self) -> Section {
-        let row = |told: Told| {
-            let unit = told.unit.replace("N.m", "N·m");
-            let number = match told.unit {
-                "arcsec" => Text::default().error(told.value, 4),
-                "" => Text::new(significant(told.value, 3)),
-                _ => Text::new(format!("{}\u{a0}{unit}", significant(told.value, 4))),
-            };
-            let comma = if told.caveat.is_empty() { "" } else { "; " };
-            let mut name = told.name;
-            name[..1].make_ascii_uppercase();
-            vec![Text::new(name), number, Text::new(format!("{}{comma}{}", told.what, told.caveat))]
-        };
         let load = match (self.summary.torque_n_m, self.summary.temperature_c) {
             (Some(torque), Some(celsius)) => format!("{} N·m, {} °C", plain(torque), plain(celsius)),
             (None, Some(celsius)) => format!("loads of the path, {} °C", plain(celsius)),
             (Some(torque), None) => format!("{} N·m, temperatures of the path", plain(torque)),
             (None, None) => "loads and temperatures of the path".to_owned(),
         };
-        let table = Table {
-            caption: format!("{} with {} generator: {load}", self.drive.name, self.kind.in_words()),
-            header: ["Figure", "Value", "What it is"].map(str::to_owned).into(),
-            rows: self.summary.told().into_iter().map(row).collect(),
-        };
-        Section {
-            id: "found".into(),
-            title: "What was found".into(),
-            detail: Detail::Summary,
-            blocks: vec![Block::Table { choice: None, table }],
-        }
-    }
-
-    /// All that a catalogue prints, computed at the loads of the drive's data sheet.
-    fn computed_sheet(&self) -> Block {
-        let sheet = self.summary.data_sheet.as_ref().map(|beside| beside.sheet).unwrap_or_default();
-        let row = |(name, of): &FigureOf| Some(vec![Text::new(heading(name)), value(name, Some(of(&sheet)?))]);
-        let table = Table {
-            caption: "What a catalogue prints, all that was computed, at the same loads".into(),
-            header: ["Figure", "computed"].map(str::to_owned).into(),
-            rows: FIGURES.iter().filter_map(row).collect(),
-        };
-        Block::Table { choice: None, table }
+        let caption = format!("{} with {} generator: {load}", self.drive.name, self.kind.in_words());
+        let table = Block::figures(caption, &self.summary.figures());
+        Section::new("found", "What was found", Detail::Summary, vec![table])
     }
 
     /// The drive in motion, where the path passes a whole pitch.
     fn in_motion(&self) -> Option<Section> {
         let motion = self.motion?;
         let way = if motion.rows[0].turn_rad > 0.0 { "forward" } else { "backward" };
-        let load = format!("under {} N·m, turning {way}", plain(motion.torque_n_m));
-        let series = Series {
-            name: format!("{} N·m {way}", plain(motion.torque_n_m)),
-            mark: Mark::Line,
-            colour: 0,
-            points: less_mean(motion),
-        };
-        let ripple = Figure {
-            id: "ripple".into(),
-            title: "Error over one tooth pitch, less its mean".into(),
-            caption: Text::new(
-                "Output angle less generator angle over the ratio, the states that figure 1 shows: it repeats with \
-                 every pitch of the flexspline. The mean is ",
-            )
-            .error(motion.error_arcsec.iter().sum::<f64>() / FRAMES as f64, 4)
-            .plain("."),
-            alt: "Curve of the output error over one tooth pitch of the generator".into(),
-            body: FigureBody::Lines {
-                x: Axis::linked("Generator from the beginning of a pitch"),
-                y: Axis::new("Output error less mean", PageQuantity::Error),
-                charts: self.chart(Lines { series: vec![series], ..Lines::default() }),
-            },
-        };
+        let load = plain(motion.torque_n_m);
+        let series = Series::new(format!("{load} N·m {way}"), Mark::Line, 0, less_mean(motion));
+        let caption = Text::new(
+            "Output angle less generator angle over the ratio, the states that figure 1 shows: it repeats with every \
+             pitch of the flexspline. The mean is ",
+        );
+        let ripple = Block::lines(
+            "ripple",
+            "Error over one tooth pitch, less its mean",
+            caption.error(mean_arcsec(motion), 4).plain("."),
+            [over_pitch(), Axis::new("Output error less mean", PageQuantity::Error)],
+            self.chart(Lines::of(vec![series])),
+        );
         let mut blocks = vec![
-            Block::Figure(drive_figure(&load)),
-            Block::Figure(ripple),
+            Block::Figure(drive_figure(&format!("under {load} N·m, turning {way}"))),
+            ripple,
             Block::Figure(stress_figure(self.chart(stress_lines(motion)))),
             Block::Figure(sharing_figure(self.chart(sharing_lines(motion)))),
         ];
         blocks.extend(motion.sleeve.as_ref().map(|_| Block::Figure(sleeve_figure())));
-        let (id, title) = ("motion".to_owned(), "The drive at work".to_owned());
-        Some(Section { id, title, detail: Detail::Summary, blocks })
+        Some(Section::new("motion", "The drive at work", Detail::Summary, blocks))
     }
 
     /// A chart of the one choice.
@@ -266,25 +207,14 @@ impl RunKnown<'_> {
     /// The error along the path: over the generator, and over the torque where that goes through a range.
     fn along_path(&self) -> Option<Section> {
         let error = |row: &Row| row.error_arcsec;
-        let figure = |id: &str, title: &str, caption: &str, x: Axis, lines: Lines| {
-            Block::Figure(Figure {
-                id: id.into(),
-                title: title.into(),
-                caption: Text::new(caption),
-                alt: format!("Curves: {}", title.to_lowercase()),
-                body: FigureBody::Lines {
-                    x,
-                    y: Axis::new("Output error", PageQuantity::Error),
-                    charts: self.chart(lines),
-                },
-            })
+        let figure = |id, title, caption, x, series| {
+            let y = Axis::new("Output error", PageQuantity::Error);
+            Block::lines(id, title, caption, [x, y], self.chart(Lines::of(series)))
         };
         let mut blocks = Vec::new();
         let turns = one_way(self.rows, |row| row.generator_rad);
         // Rows between those that are shown in motion say more of the ripple.
         if !turns.is_empty() && self.motion.is_none_or(|motion| motion.rows.len() < self.rows.len()) {
-            let series =
-                of_stretches(self.rows, &turns, |row| row.generator_rad.to_degrees(), error, ["forward", "backward"]);
             blocks.push(figure(
                 "error",
                 "Error over the generator angle",
@@ -292,13 +222,12 @@ impl RunKnown<'_> {
                  stretch in which the generator goes one way, as far as there are few. Where it turns back without \
                  load the output stands until the clearance is crossed.",
                 Axis::new("Generator", PageQuantity::Degree),
-                Lines { series, ..Lines::default() },
+                of_stretches(self.rows, &turns, |row| row.generator_rad.to_degrees(), error, ["forward", "backward"]),
             ));
         }
         let loads = one_way(self.rows, |row| row.torque_n_m);
         if loads.iter().any(|(_, stretch)| stretch.len() >= ROWS_OF_A_LOOP) {
             let words = ["torque growing", "torque falling"];
-            let series = of_stretches(self.rows, &loads, |row| row.torque_n_m, error, words);
             blocks.push(figure(
                 "torsion",
                 "Error over the torque",
@@ -306,39 +235,26 @@ impl RunKnown<'_> {
                  compliance, and what lies between growing and falling torque is lost to friction and drag. A \
                  positive torque turns the output forward.",
                 Axis::new("Load torque", PageQuantity::Torque),
-                Lines { series, ..Lines::default() },
+                of_stretches(self.rows, &loads, |row| row.torque_n_m, error, words),
             ));
         }
-        let (id, title) = ("path".to_owned(), "Along the path".to_owned());
-        (!blocks.is_empty()).then_some(Section { id, title, detail: Detail::Summary, blocks })
+        (!blocks.is_empty()).then(|| Section::new("path", "Along the path", Detail::Summary, blocks))
     }
 
     /// How the teeth share the load along the path, stress, pressures, contacts, the torque of the generator.
     fn load(&self) -> Section {
         let mut blocks = Vec::new();
-        if self.motion.is_none() {
-            blocks.push(Block::Figure(self.sharing_at_a_row()));
-        }
         if self.rows.len() > 1 {
             let (axis, places) = self.along();
-            let curves = |id: &str, title: &str, caption: &str, y: Axis, of: &[OfRow]| {
-                let series = of.iter().enumerate().map(|(colour, (name, of))| Series {
-                    name: (*name).to_owned(),
-                    mark: Mark::Line,
-                    colour,
-                    points: places.iter().map(|(x, k)| [*x, of(&self.rows[*k])]).collect(),
+            let curves = |id, title, caption: &str, y, of: &[OfRow]| {
+                let series = of.iter().enumerate().map(|(colour, (name, of))| {
+                    let points = places.iter().map(|(x, k)| [*x, of(&self.rows[*k])]).collect();
+                    Series::new(*name, Mark::Line, colour, points)
                 });
-                let charts = self.chart(Lines { series: series.collect(), ..Lines::default() });
-                Block::Figure(Figure {
-                    id: id.into(),
-                    title: title.into(),
-                    caption: Text::new(caption),
-                    alt: format!("Curves: {}", title.to_lowercase()),
-                    body: FigureBody::Lines { x: axis.clone(), y, charts },
-                })
+                Block::lines(id, title, caption, [axis.clone(), y], self.chart(Lines::of(series.collect())))
             };
             if !self.is_all_in_motion() {
-                blocks.extend(self.map(&axis, &places).map(Block::Figure));
+                blocks.extend(self.map(&axis, &places));
                 let caption = format!("Of every row. {STRESSES_ARE}");
                 let title = "Largest stress and pressures along the path";
                 let y = Axis::new("Stress, pressure", PageQuantity::Stress);
@@ -354,16 +270,16 @@ impl RunKnown<'_> {
             blocks.push(curves(
                 "generator-torque",
                 "Torque of the generator",
-                "On the flexspline, quasi-static: what is left of it beside the load over the ratio is friction and \
-                 drag, and what the teeth store from place to place. Positive turns the generator forward.",
+                "On the flexspline, quasi-static. Less the load over the ratio it is friction and drag, and what the \
+                 teeth store from place to place. Positive turns the generator forward.",
                 Axis::new("Torque of the generator", PageQuantity::Torque),
                 &[("generator", |row| row.generator_torque_n_m)],
             ));
         }
-        Section { id: "load".into(), title: "Load and stress".into(), detail: Detail::Engineering, blocks }
+        Section::new("load", "Load and stress", Detail::Engineering, blocks)
     }
 
-    /// What the rows are drawn over, and the places of the rows, ascending: generator or torque where that goes one way
+    /// The axis of figures along the path, and the places of the rows, ascending: generator or torque where that goes one way
     /// all along, else the step.
     fn along(&self) -> (Axis, Vec<(f64, usize)>) {
         let goes_one_way = |of: fn(&Row) -> f64| matches!(one_way(self.rows, of).as_slice(), [(_, stretch)] if stretch.len() == self.rows.len());
@@ -401,50 +317,11 @@ impl RunKnown<'_> {
             && circular_spline.teeth.is_multiple_of(2)
     }
 
-    /// What bears on every tooth at the row of the largest pressure between flanks.
-    fn sharing_at_a_row(&self) -> Figure {
-        let (_, at, bore) = self.highest;
-        let row = &self.rows[*at];
-        let places = self.around_major_axis(row);
-        let series = |colour: usize, mark, of: &dyn Fn(usize) -> f64| Series {
-            name: BEARS[colour].into(),
-            mark,
-            colour,
-            points: places.iter().map(|(x, tooth)| [*x, of(*tooth)]).collect(),
-        };
-        let flank = |side: usize| {
-            move |tooth: usize| Some(self.teeth[*at][side][tooth]).filter(|n| *n > 0.0).unwrap_or(f64::NAN)
-        };
-        let lines = Lines {
-            series: vec![
-                series(0, Mark::Points, &flank(0)),
-                series(1, Mark::Points, &flank(1)),
-                series(2, Mark::Dashed, &|tooth| bore[tooth]),
-            ],
-            ..Lines::default()
-        };
-        Figure {
-            id: "sharing".into(),
-            title: "How the teeth share the load".into(),
-            caption: Text::new(format!(
-                "Force on each flexspline tooth by its angle from the major axis, at step {}, where the pressure \
-                 between flanks is largest ({} N·m, generator at {}°): of each flank that bears, and of the generator \
-                 on the piece of bore under the tooth.",
-                row.step,
-                plain(row.torque_n_m),
-                plain(row.generator_rad.to_degrees()),
-            )),
-            alt: "Points of the force on every tooth over its angle from the major axis".into(),
-            body: FigureBody::Lines {
-                x: Axis::new("Tooth from the major axis", PageQuantity::Degree),
-                y: Axis::new("Force", PageQuantity::Force),
-                charts: self.chart(lines),
-            },
-        }
-    }
-
     /// The force on the teeth in colour along the path, where it is long enough and any tooth bears.
-    fn map(&self, axis: &Axis, places: &[(f64, usize)]) -> Option<Figure> {
+    fn map(&self, axis: &Axis, places: &[(f64, usize)]) -> Option<Block> {
+        if self.rows.len() < ROWS_OF_A_MAP {
+            return None;
+        }
         let groups: Vec<&[(f64, usize)]> = places.chunks(places.len().div_ceil(MOST_COLUMNS)).collect();
         let teeth = self.drive.flexspline.teeth as usize;
         let lines = if self.is_half_enough() { teeth / 2 } else { teeth };
@@ -477,22 +354,15 @@ impl RunKnown<'_> {
             String::new()
         };
         let lobes = if self.is_half_enough() { " The other lobe carries the same." } else { "" };
-        (self.rows.len() >= ROWS_OF_A_MAP).then(|| Figure {
-            id: "map".into(),
-            title: "Which teeth bear along the path".into(),
-            caption: Text::new(format!(
-                "Force on each flexspline tooth: positive on its {}, negative on its {}. Teeth that bear nothing are \
-                 left out; the angle is that from the major axis, to half a tooth.{most}{lobes}",
-                BEARS[0], BEARS[1]
-            )),
-            alt: "Colour map of the force on the teeth over the path and their angle from the major axis".into(),
-            body: FigureBody::Field {
-                x: axis.clone(),
-                y: Axis::new("Tooth from the major axis", PageQuantity::Degree),
-                z: Axis::new("Force on the tooth", PageQuantity::Force),
-                fields: vec![(self.kind.to_string(), field)],
-            },
-        })
+        let caption = format!(
+            "Force on each flexspline tooth: positive on its {}, negative on its {}. Teeth that bear nothing are left \
+             out; the angle is that from the major axis, to half a tooth.{most}{lobes}",
+            BEARS[0], BEARS[1]
+        );
+        let [y, z] = sharing_axes();
+        let (x, fields) = (axis.clone(), vec![(self.kind.to_string(), field)]);
+        let body = FigureBody::Field { x, y, z, fields };
+        Some(Block::Figure(Figure::of("map", "Which teeth bear along the path", caption, body)))
     }
 
     fn reading(&self) -> Section {
@@ -504,15 +374,11 @@ impl RunKnown<'_> {
              turn have, or the drive differs from tooth to tooth."
         };
         Section::reading(vec![
-            Block::paragraph(
-                "Error: output angle less generator angle over the ratio; positive when the output leads. The \
-                 flexspline is fixed, the circular spline is the output. Forward is growing generator angle. Every \
-                 row of the path is in results.csv.",
-            ),
-            Block::paragraph(
-                "Plane strain, quasi-static: no inertia, no lubricant, no speed. What is settled, and how means are \
-                 taken, is in summary.json's documentation: a figure that the path cannot give is left out.",
-            ),
+            Block::paragraph(format!(
+                "{SIGNS} The flexspline is fixed, the circular spline is the output. Every row of the path is in \
+                 results.csv; a figure that the path cannot give is left out. Plane strain, quasi-static: no inertia, \
+                 no lubricant, no speed."
+            )),
             Block::paragraph(motion),
         ])
     }
@@ -523,16 +389,10 @@ impl RunKnown<'_> {
             "{} solver, {} mesh, {} degrees of freedom, {} increments, residual at most {:.1e}",
             summary.solver, summary.mesh, summary.degrees_of_freedom, summary.increments, summary.residual_worst
         );
-        [
-            ("Command", summary.command.clone()),
-            ("Program", format!("flexspline {}", summary.tool_version)),
-            ("Drive", summary.drive.clone()),
-            ("BLAKE3 of the drive", summary.drive_hash.clone()),
-            ("Path", format!("{}, {} rows", summary.path, summary.rows)),
-            ("FEM", fem),
-        ]
-        .map(|(name, value)| (name.to_owned(), value))
-        .into()
+        let mut made = made_of_drive(&summary.command, self.drive);
+        made.push(("Path".to_owned(), format!("{}, {} rows", summary.path, summary.rows)));
+        made.push(("FEM".to_owned(), fem));
+        made
     }
 }
 
@@ -569,7 +429,7 @@ fn of_stretches(
         let of_way = |(colour, (name, way)): (usize, (&str, bool))| {
             let of_it = stretches.iter().filter(|(grows, _)| *grows == way);
             let points = apart(ascending(&mut of_it.flat_map(|(_, stretch)| &rows[stretch.clone()])));
-            Series { name: name.to_owned(), mark: Mark::Dots, colour, points }
+            Series::new(name, Mark::Dots, colour, points)
         };
         return [(growing, true), (falling, false)].into_iter().enumerate().map(of_way).collect();
     }
@@ -586,7 +446,7 @@ fn of_stretches(
             name += &format!(" ({})", namesakes + 1);
         }
         let mark = if *grows { Mark::Line } else { Mark::Dashed };
-        series.push(Series { name, mark, colour, points: ascending(&mut rows_of_it.iter()) });
+        series.push(Series::new(name, mark, colour, ascending(&mut rows_of_it.iter())));
     }
     series
 }

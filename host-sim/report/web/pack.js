@@ -20,16 +20,6 @@ async function inflate(text) {
 /** Undoes planes, zigzag and differences: values of one packed array as Float32Array. */
 export async function unpack({ kind, scale, offset, text }) {
   const bytes = await inflate(text);
-  if (kind === "u8") {
-    const values = new Float32Array(bytes.length);
-    let now = 0;
-    for (let i = 0; i < bytes.length; i++) {
-      const z = bytes[i];
-      now = (now + ((z >> 1) ^ -(z & 1))) & 0xff;
-      values[i] = now * scale + offset;
-    }
-    return values;
-  }
   if (kind === "i16") {
     const count = bytes.length / 2;
     const values = new Float32Array(count);

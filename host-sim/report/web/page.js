@@ -53,20 +53,10 @@ async function start() {
     root.dataset.ready = id;
   }
 
-  /** Paper holds every choice: words and tables under its name, and a sketch beside each chart that is drawn for another one. */
+  /** Paper holds the words and tables of every choice, each under its name; figures are those of the one that is shown. */
   function onPaper(printing) {
     for (const element of document.querySelectorAll("[data-choice]")) {
       element.hidden = !printing && element.dataset.choice !== root.dataset.chosen;
-    }
-    for (const box of document.querySelectorAll(".on-paper")) box.remove();
-    if (!printing) return;
-    for (const figure of document.querySelectorAll("figure")) {
-      const sketches = figure.querySelector("noscript");
-      const box = document.createElement("div");
-      box.className = "on-paper";
-      box.innerHTML = sketches.textContent;
-      for (const sketch of box.children) sketch.hidden = [root.dataset.chosen, EVERY].includes(sketch.dataset.sketch);
-      if ([...box.children].some((sketch) => !sketch.hidden)) sketches.before(box);
     }
   }
 

@@ -10,6 +10,7 @@ use serde::Serialize;
 
 use super::context::{Context, image_file};
 use super::{Failure, report};
+use flexspline_base::figures;
 use flexspline_base::output::Outputs;
 use flexspline_base::suggest::did_you_mean;
 use flexspline_design::study::Vary;
@@ -264,31 +265,14 @@ fn text(results: &Results, out: &Path, report: bool) -> String {
         let settles = settles.map_or_else(|| "–".to_owned(), |seconds| format!("{:.2}", seconds[k]));
         let _ = writeln!(text, "{:22}{rms:10.2}{max:10.2}{ripple:>14}{settles:>12}", name.replace('_', " "));
     }
-    let [margin, at_hz] = results.phase_margin_deg;
-    let removed = match results.removed {
-        _ if !results.stable => "the servo swings: no figure above says what a correction is worth".to_owned(),
-        Some(share) => format!("removed {:.1} % of what an ideal inverse removes", 100.0 * share),
-        None => "an ideal inverse removes next to nothing here".to_owned(),
+    text += &figures::lines(&results.figures());
+    let _ = match (results.stable, results.servo_is_near_the_edge()) {
+        (false, _) => {
+            writeln!(text, "NOT stable: the servo swings, and no figure above says what a correction is worth")
+        }
+        (true, true) => writeln!(text, "stable, but near the edge"),
+        (true, false) => writeln!(text, "stable"),
     };
-    let stable = match (results.stable, results.servo_is_near_the_edge()) {
-        (false, _) => "NOT stable",
-        (true, true) => "stable, but near the edge",
-        (true, false) => "stable",
-    };
-    // A servo that is not stable has no margin.
-    let margin = if results.servo_distance > 0.0 {
-        format!("; servo's phase margin {margin:.0}° at {at_hz:.0} Hz, distance to −1 {:.2}", results.servo_distance)
-    } else {
-        String::new()
-    };
-    let _ = writeln!(text, "{removed}; {stable}{margin}");
-    if let Some(share) = results.torque_within_bound {
-        let _ = writeln!(
-            text,
-            "the torque by the motor's current is within its bound in {:.1} % of the ticks",
-            100.0 * share
-        );
-    }
     for remark in &results.remarks {
         let _ = writeln!(text, "caution: {remark}");
     }

@@ -7,12 +7,13 @@ use std::path::Path as FilePath;
 use clap::{Args, ValueEnum, ValueHint};
 
 use super::{Context, Failure, names, report, say};
+use flexspline_base::figures;
 use flexspline_base::output::{OutputError, Outputs, WholeFolder, write_whole};
 use flexspline_base::progress::Progress;
 use flexspline_design::cautions::{Caution, add_stress};
 use flexspline_design::simulate::{
     Direction, Observation, Path, PathPoint, Phase, PlaceStress, SimulateError, Simulation, SimulationSettings,
-    Summary, Told, read_path, simulate, stress_by_place,
+    Summary, read_path, simulate, stress_by_place,
 };
 use flexspline_design::stated::{SheetBeside, beside};
 use flexspline_export::{VtuFrame, write_pvd, write_vtu};
@@ -369,10 +370,7 @@ fn text(summary: &Summary, out: &FilePath, has_frames: bool, has_page: bool) -> 
     for caution in summary.cautions.iter().filter(is_first) {
         let _ = writeln!(text, "caution: {}", caution.words);
     }
-    for Told { name, value, unit, decimals, caveat, .. } in summary.told() {
-        let comma = if unit.is_empty() || caveat.is_empty() { "" } else { ", " };
-        let _ = writeln!(text, "  {name:<36} {value:>12.decimals$} {unit}{comma}{caveat}");
-    }
+    text += &figures::lines(&summary.figures());
     text += &summary.data_sheet.as_ref().map(SheetBeside::text).unwrap_or_default();
     for caution in summary.cautions.iter().filter(|caution| !is_first(caution)) {
         let _ = writeln!(text, "caution: {}", caution.words);

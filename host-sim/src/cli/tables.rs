@@ -263,15 +263,9 @@ impl Tables {
             Source::File { name, blake3 } => Some((format!("BLAKE3 of {name}"), blake3.clone())),
             Source::Fem { .. } => None,
         });
-        let subjects =
-            tables.into_iter().zip(made).zip(animations).map(|(((kind, table), made), animation)| DriveSubject {
-                kind,
-                table,
-                info: Some(&made.info),
-                samples: made.samples.as_deref(),
-                validation: None,
-                animation,
-            });
+        let subjects = tables.into_iter().zip(made).zip(animations).map(|(((kind, table), made), animation)| {
+            DriveSubject { kind, table, info: Some(&made.info), validation: None, animation }
+        });
         let page = drive_report(DriveSources {
             drive,
             command_name: "tables",

@@ -212,7 +212,7 @@ impl Validate {
         let settings = SolverSettings { mesh: self.mesh, ..SolverSettings::default() };
         let animations = report::animations(context, drive, &tables, settings);
         let subjects = tables.into_iter().zip(&report.tables).zip(animations).map(|(((kind, table), v), animation)| {
-            DriveSubject { kind, table, info: None, samples: None, validation: Some(v), animation }
+            DriveSubject { kind, table, info: None, validation: Some(v), animation }
         });
         let page = drive_report(DriveSources {
             drive,

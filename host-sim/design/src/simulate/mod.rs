@@ -31,7 +31,7 @@ pub use places::{MESHES, Place, PlaceStress, SurfaceEdge, edge_stress, fillet_ed
 pub use row::Row;
 pub use stress::{PeakStress, peak_stress};
 pub(crate) use summary::SUMMARY_SCHEMA;
-pub use summary::{Summary, Told};
+pub use summary::Summary;
 pub use zones::{TipContact, Zone, zones};
 
 use path::LARGEST_TORQUE_N_M;

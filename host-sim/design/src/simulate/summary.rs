@@ -12,6 +12,7 @@ use super::zones::{TipContact, Zone};
 use crate::cautions::Caution;
 use crate::pitch_wave::peak_to_peak;
 use crate::stated::SheetBeside;
+use flexspline_base::figures::NamedFigure;
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::mesh::WheelKind;
 
@@ -172,31 +173,14 @@ pub struct Summary {
     pub processor_s: Option<f64>,
 }
 
-/// A figure of a run in words, as the terminal and the page tell it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Told {
-    /// Its name.
-    pub name: String,
-    /// Its value, in `unit`.
-    pub value: f64,
-    /// Its unit, `arcsec` or as the terminal prints it; empty of a number alone.
-    pub unit: &'static str,
-    /// Decimals that the terminal prints.
-    pub decimals: usize,
-    /// What has to be known where it is read; may be empty.
-    pub caveat: String,
-    /// What it is.
-    pub what: String,
-}
-
 impl Summary {
-    /// Its figures in words, in the order in which they are told; those that the path cannot give are left out.
-    pub fn told(&self) -> Vec<Told> {
+    /// Its figures in words, in their order; those that the path cannot give are left out.
+    pub fn figures(&self) -> Vec<NamedFigure> {
         let mut all = Vec::new();
         let mut put =
             |name: &str, value: Option<f64>, (unit, decimals): (&'static str, usize), caveat: &str, what: &str| {
                 let [name, caveat, what] = [name, caveat, what].map(str::to_owned);
-                all.extend(value.map(|value| Told { name, value, unit, decimals, caveat, what }));
+                all.extend(value.map(|value| NamedFigure { name, value, unit, decimals, caveat, what }));
             };
         let (arcsec, mpa) = (("arcsec", 3), ("MPa", 1));
         put("load torque", self.torque_n_m, ("N.m", 3), "", "on the output, positive turns it forward");

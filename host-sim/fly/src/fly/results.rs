@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use flexspline_algebra::spectrum as sums_of;
+use flexspline_base::figures::NamedFigure;
 
 /// Output less target within this of where it ends counts as settled, arcsec.
 const SETTLED_ARCSEC: f64 = 2.0;
@@ -89,6 +90,36 @@ pub struct Results {
 }
 
 impl Results {
+    /// Its loops and limits in words, in their order; those that this flight does not have are left out.
+    #[must_use]
+    pub fn figures(&self) -> Vec<NamedFigure> {
+        let [margin, at_hz] = self.phase_margin_deg;
+        let [held, free] = self.resonances_hz;
+        let [all, held_back, without] = self.limited_ticks.map(|ticks| Some(f64::from(ticks)));
+        // A servo that is not stable has no margin, and swings whatever is corrected.
+        let of_margin = |value: f64| (self.servo_distance > 0.0 && value.is_finite()).then_some(value);
+        let percent = |share: Option<f64>| share.map(|share| 100.0 * share);
+        let at = format!("at {at_hz:.0} Hz");
+        [
+            ("removed by the core", percent(self.removed.filter(|_| self.stable)), "%", 1, "of what an ideal removes"),
+            ("phase margin of the servo", of_margin(margin), "deg", 0, at.as_str()),
+            ("its least distance from -1", of_margin(self.servo_distance), "", 2, ""),
+            ("resonance of the held motor", Some(held), "Hz", 0, ""),
+            ("resonance of the free motor", Some(free), "Hz", 0, ""),
+            ("low-pass of the torque", Some(self.bandwidth_hz), "Hz", 2, ""),
+            ("ticks at the limit of the motor", all, "", 0, ""),
+            ("ticks in which the limiter held back", held_back, "", 0, ""),
+            ("ticks without a correction", without, "", 0, ""),
+            ("torque by the current within its bound", percent(self.torque_within_bound), "%", 1, "of the ticks"),
+        ]
+        .into_iter()
+        .filter_map(|(name, value, unit, decimals, caveat)| {
+            let [name, caveat] = [name, caveat].map(str::to_owned);
+            Some(NamedFigure { name, value: value?, unit, decimals, caveat, what: String::new() })
+        })
+        .collect()
+    }
+
     /// Whether the servo is stable and a little more delay, gain or inertia would make it ring.
     #[must_use]
     pub fn servo_is_near_the_edge(&self) -> bool {

@@ -199,14 +199,16 @@ pub struct Diagnosis {
     pub trace: Trace,
 }
 
-/// A value and its standard deviation as text: four decimals, or powers of ten where these would show nothing of
-/// either.
-fn digits(parameter: &Parameter) -> [String; 2] {
-    let all = [parameter.value, parameter.std];
-    if all.iter().any(|v| *v != 0.0 && v.abs() < 5e-4) {
-        all.map(|v| if v == 0.0 { "0".into() } else { format!("{v:.3e}") })
-    } else {
-        all.map(|v| format!("{v:.4}"))
+impl Parameter {
+    /// The value and its standard deviation as text: four decimals, or powers of ten where these would show nothing of
+    /// either.
+    pub fn digits(&self) -> [String; 2] {
+        let all = [self.value, self.std];
+        if all.iter().any(|v| *v != 0.0 && v.abs() < 5e-4) {
+            all.map(|v| if v == 0.0 { "0".into() } else { format!("{v:.3e}") })
+        } else {
+            all.map(|v| format!("{v:.4}"))
+        }
     }
 }
 
@@ -265,7 +267,7 @@ impl Diagnosis {
                 cause.size_arcsec
             );
             for (name, p) in &cause.parameters {
-                let [value, std] = digits(p);
+                let [value, std] = p.digits();
                 let _ = writeln!(text, "    {name:<32} {value:>12} +- {std}");
             }
             let alike = cause.look_alikes.iter().map(|alike| alike.as_str().to_owned()).chain(cause.or_the_log());
@@ -319,8 +321,8 @@ mod tests {
 
     #[test]
     fn small_sizes_are_told_in_powers_of_ten() {
-        assert_eq!(digits(&Parameter { value: -1.234e-5, std: 2e-7 }), ["-1.234e-5", "2.000e-7"]);
-        assert_eq!(digits(&Parameter { value: 1.0, std: 0.0 }), ["1.0000", "0.0000"]);
-        assert_eq!(digits(&Parameter { value: 3.25, std: 1e-4 }), ["3.250e0", "1.000e-4"]);
+        assert_eq!((Parameter { value: -1.234e-5, std: 2e-7 }).digits(), ["-1.234e-5", "2.000e-7"]);
+        assert_eq!((Parameter { value: 1.0, std: 0.0 }).digits(), ["1.0000", "0.0000"]);
+        assert_eq!((Parameter { value: 3.25, std: 1e-4 }).digits(), ["3.250e0", "1.000e-4"]);
     }
 }

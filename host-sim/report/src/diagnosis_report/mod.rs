@@ -1,9 +1,8 @@
 //! The page of a diagnosis: what an analyst with a log file sees.
 //!
-//! The answer first, in one sentence and one number; then the picture before the verdict, which nobody has to believe;
-//! then what explains it, what that gains, what is wrong with the data, and what to record next. Residuals come row by
-//! row in three levels (nominal, recalibrated, with the causes), and a selector shows the picture of each: what the
-//! causes explain is gone in the last.
+//! The answer first, in one sentence and one number; then the causes and what to record next; then the picture, the
+//! gain, and the faults of the data. Residuals come row by row in three levels (nominal, recalibrated, with the causes),
+//! and a selector shows the picture of each: the last is without what the causes explain.
 
 mod orders;
 mod picture;
@@ -14,49 +13,46 @@ mod words;
 use std::borrow::Cow;
 
 use rayon::prelude::*;
-use serde_json::{Map, Value, json};
+use serde_json::json;
 
 use super::page::{
-    Axis, Block, Choice, Detail, EVERY_CHOICE, Figure, FigureBody, Headline, Lines, Mark, Page, PageQuantity, Section,
-    Status, Table as PageTable, Text, significant,
+    Axis, Block, Choice, Detail, Headline, Lines, Page, PageQuantity, SIGNS, Section, Status, Text, significant,
 };
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_identify::causes::CauseName;
 use flexspline_identify::diagnosis::base::{BETWEEN_READINGS, CHANGE_OF_FLANK};
-use flexspline_identify::diagnosis::report::{Cause, Diagnosis, Finding, Parameter, Verdict};
+use flexspline_identify::diagnosis::report::{Cause, Diagnosis, Finding, Parameter, Unexplained, Verdict};
 use flexspline_identify::diagnosis::rows::Rows;
 use flexspline_identify::diagnosis::{Extended, Series};
-use flexspline_identify::measurement::{Gear, Recording, Session};
+use flexspline_identify::measurement::{Fault, Gear, Recording, Session, ToothStep};
 use flexspline_identify::nominal::Nominal;
 use flexspline_identify::residual::Picture;
 use thin::Clock;
 
-/// Rows of which a picture is made, at most: beyond, every so many are left out evenly.
-const MOST_ROWS: usize = 400_000;
-/// Bins of a turn.
-const TURN_BINS: usize = 72;
+/// Rows that a table of the data shows at most; the rest is in diagnosis.json.
+const MOST: usize = 60;
 
-/// What is left of the measured error by one model.
+/// The residual of one model.
 #[derive(Debug, Clone)]
 pub struct Level {
     /// Which model; letters.
     pub id: &'static str,
-    /// What the reader sees.
+    /// Name, as the reader sees it.
     pub name: &'static str,
     /// Measured error less the model, arcsec, a value for each row of all sessions.
     pub residual_arcsec: Vec<f64>,
 }
 
-/// What one cause adds.
+/// The contribution of one cause.
 #[derive(Debug, Clone)]
 pub struct Part {
     /// Its name.
     pub cause: CauseName,
-    /// What it adds to the prediction, arcsec, a value for each row of all sessions.
+    /// Its contribution to the prediction, arcsec, a value for each row of all sessions.
     pub adds_arcsec: Vec<f64>,
 }
 
-/// What each model leaves of the rows, and what each cause adds, from what the model that was found says of all
+/// The residual of each model and the contribution of each cause, from the predictions of the extended model for all
 /// sessions.
 pub fn levels_and_parts(series: &[Series], extended: &Extended, diagnosis: &Diagnosis) -> (Vec<Level>, Vec<Part>) {
     let joined = |of: &dyn Fn(&Series) -> Vec<f64>| series.iter().flat_map(of).collect::<Vec<f64>>();
@@ -82,21 +78,21 @@ pub fn levels_and_parts(series: &[Series], extended: &Extended, diagnosis: &Diag
     (levels, parts)
 }
 
-/// What the page is made from.
+/// Inputs of the page.
 pub struct DiagnosisSources<'a> {
     /// The data.
     pub recording: &'a Recording,
     /// The model.
     pub nominal: &'a Nominal,
-    /// What was found.
+    /// The diagnosis.
     pub diagnosis: &'a Diagnosis,
-    /// What each model leaves; the nominal model first.
+    /// The residual of each model; the nominal model first.
     pub levels: Vec<Level>,
-    /// What each cause adds.
+    /// The contribution of each cause.
     pub parts: Vec<Part>,
     /// The command line.
     pub command: &'a str,
-    /// What else made it: name and value.
+    /// Further provenance: name and value.
     pub inputs: Vec<(String, String)>,
 }
 
@@ -117,7 +113,7 @@ struct DiagnosisKnown<'a> {
 /// The page of a diagnosis.
 pub fn page(mut sources: DiagnosisSources<'_>) -> Page {
     let (nominal, recording) = (sources.nominal, sources.recording);
-    let mut rows = Rows::new(&recording.sessions, nominal);
+    let rows = Rows::new(&recording.sessions, nominal);
     let mut sessions: Cow<'_, [Session]> = Cow::Borrowed(&recording.sessions);
     if recording.sessions.iter().any(|session| session.len() <= 3) {
         sessions = recording.sessions.iter().filter(|session| session.len() > 3).cloned().collect();
@@ -125,15 +121,6 @@ pub fn page(mut sources: DiagnosisSources<'_>) -> Page {
     let mut levels = std::mem::take(&mut sources.levels);
     levels.retain(|level| level.residual_arcsec.len() == rows.len());
     sources.parts.retain(|part| part.adds_arcsec.len() == rows.len());
-    let every = rows.len().div_ceil(MOST_ROWS);
-    if every > 1 {
-        sessions = sessions.iter().map(|session| thinned(session, every)).collect();
-        let columns = levels.iter_mut().map(|level| &mut level.residual_arcsec);
-        for column in columns.chain(sources.parts.iter_mut().map(|part| &mut part.adds_arcsec)) {
-            *column = rows.sessions.iter().flat_map(|s| column[s.clone()].iter().step_by(every).copied()).collect();
-        }
-        rows = Rows::new(&sessions, nominal);
-    }
     let gear = Gear::of_ratio(nominal.ratio);
     let shown = levels
         .into_par_iter()
@@ -149,67 +136,37 @@ pub fn page(mut sources: DiagnosisSources<'_>) -> Page {
     DiagnosisKnown { clock: Clock::new(&rows), rows, shown, sources }.page()
 }
 
-/// Every so many rows of a session.
-fn thinned(session: &Session, every: usize) -> Session {
-    fn some<T: Copy>(values: &[T], every: usize) -> Vec<T> {
-        values.iter().step_by(every).copied().collect()
-    }
-    let column = |values: &Option<Vec<f64>>| values.as_ref().map(|values| some(values, every));
-    Session {
-        line: some(&session.line, every),
-        time_s: column(&session.time_s),
-        generator_rad: some(&session.generator_rad, every),
-        error_rad: some(&session.error_rad, every),
-        torque_n_m: column(&session.torque_n_m),
-        temperature_c: column(&session.temperature_c),
-        orientation_rad: column(&session.orientation_rad),
-        loudness: column(&session.loudness),
-        own_zero: session.own_zero,
-        zero_off_rad: session.zero_off_rad,
-        unsure_s: session.unsure_s,
-        coarse_rad: session.coarse_rad,
-        mean_over_s: session.mean_over_s,
-    }
-}
-
-fn table(caption: &str, header: &[&str], rows: Vec<Vec<Text>>) -> Block {
-    let header = header.iter().map(|&cell| cell.to_owned()).collect();
-    Block::Table { choice: None, table: PageTable { caption: caption.into(), header, rows } }
-}
-
 impl DiagnosisKnown<'_> {
     fn page(&self) -> Page {
         let DiagnosisSources { recording, nominal, diagnosis, command, inputs, .. } = &self.sources;
         let (status, also) = self.status();
-        let mut sections = vec![self.in_short()];
+        let mut sections: Vec<Section> = self.causes().into_iter().chain([self.next()]).collect();
         sections.extend(self.picture_sections());
         sections.push(self.before_and_after());
-        sections.extend(self.causes());
-        sections.push(why::in_short(self.sources.diagnosis));
-        sections.push(why::gate_by_gate(self.sources.diagnosis));
-        sections.push(self.gain());
-        sections.push(self.next());
-        sections.push(self.data());
-        sections.push(self.reading());
-        let mut provenance = vec![("Command".to_owned(), (*command).to_owned())];
-        provenance.push(("Version".into(), format!("flexspline {}", env!("CARGO_PKG_VERSION"))));
-        provenance.push(("Measured data".into(), recording.file.clone()));
-        provenance.push(("Rows".into(), recording.rows.to_string()));
+        sections.push(why::in_short(diagnosis));
+        sections.extend([self.gain(), self.data(), self.reading()]);
         let teeth = nominal
             .teeth
             .map_or_else(String::new, |teeth| format!(", {} and {} teeth", teeth.flexspline, teeth.circular_spline));
-        provenance.push(("Gear".into(), format!("ratio {}{teeth}", nominal.ratio)));
+        let mut provenance = vec![
+            ("Command".to_owned(), (*command).to_owned()),
+            ("Version".to_owned(), format!("flexspline {}", env!("CARGO_PKG_VERSION"))),
+            ("Measured data".to_owned(), recording.file.clone()),
+            ("Rows".to_owned(), recording.rows.to_string()),
+            ("Gear".to_owned(), format!("ratio {}{teeth}", nominal.ratio)),
+        ];
         provenance.extend(inputs.iter().cloned());
         let choices: Vec<Choice> = self
             .shown
             .iter()
             .map(|shown| Choice { id: shown.level.id.into(), name: shown.level.name.into() })
             .collect();
-        let mut results = Map::new();
-        results.insert("diagnosis".into(), serde_json::to_value(diagnosis).unwrap_or(Value::Null));
-        results.insert("data_faults".into(), json!(recording.faults));
-        results.insert("tooth_steps".into(), json!(recording.tooth_steps));
-        results.insert("notes".into(), json!(recording.notes));
+        let results = [
+            ("diagnosis", json!(diagnosis)),
+            ("data_faults", json!(recording.faults)),
+            ("tooth_steps", json!(recording.tooth_steps)),
+            ("notes", json!(recording.notes)),
+        ];
         let name = std::path::Path::new(&recording.file).file_name();
         let name = name.map_or_else(|| recording.file.clone(), |name| name.to_string_lossy().into_owned());
         Page {
@@ -222,9 +179,9 @@ impl DiagnosisKnown<'_> {
             choice_is: "Error less the model:",
             headlines: vec![self.headline()],
             sections,
-            animations: Vec::new(),
             provenance,
-            results,
+            results: results.map(|(name, value)| (name.to_owned(), value)).into_iter().collect(),
+            ..Page::default()
         }
     }
 
@@ -250,7 +207,7 @@ impl DiagnosisKnown<'_> {
         }
     }
 
-    /// What departs from the nominal model beyond noise, arcsec rms. Lines that averages hide are not in the residual:
+    /// Departure from the nominal model beyond noise, arcsec rms. Lines that averages hide are not in the residual:
     /// where that is no more than noise they are what departs. Otherwise what was found is part of it, and two parts
     /// may cancel one another.
     fn departure_arcsec(&self) -> f64 {
@@ -274,226 +231,93 @@ impl DiagnosisKnown<'_> {
             }
             text.plain(".")
         };
-        // Never a second percentage beside the confidence: what proves the causes is what they leave.
-        let fell = |from: f64, to: f64| Text::default().error(from, 2).plain(" → ").error(to, 2);
+        // No second percentage next to the confidence: the residuals prove the causes.
+        let fell = |from: f64, to: f64| Text::arcsec(from, 2).plain(" → ").error(to, 2);
         let (corrected, held) = (diagnosis.compensation, diagnosis.held_out);
         // A table cannot correct every cause: what a sensor reads wrong the output does not do.
         let corrects = corrected.rms_extended_tables_arcsec != corrected.rms_nominal_tables_arcsec;
         let (share, share_is) = if corrected.is_known() && corrects {
-            (
-                fell(corrected.rms_nominal_tables_arcsec, corrected.rms_extended_tables_arcsec),
-                "rms left after correction in {}, with the nominal table and with one that holds the causes",
-            )
+            let share = fell(corrected.rms_nominal_tables_arcsec, corrected.rms_extended_tables_arcsec);
+            (share, "left after correction, with the nominal table and with one that holds the causes")
         } else {
-            (fell(held.rms_before_arcsec, held.rms_after_arcsec), "rms in {}, without the causes and with them")
+            (fell(held.rms_before_arcsec, held.rms_after_arcsec), "without the causes and with them")
         };
-        let share_is = share_is.replace("{}", self.left_out());
+        let share_is = format!("rms in {}, {share_is}", self.left_out());
+        let departure = Text::arcsec(self.departure_arcsec(), 2);
         let (answer, number, number_is) = match diagnosis.verdict {
-            Verdict::Explained => (listed(Text::new("Explained by ")), share, share_is),
-            Verdict::PartlyExplained => (listed(Text::new("Partly explained by ")), share, share_is),
-            Verdict::Unknown if diagnosis.finding == Finding::DataUnusable => (
-                Text::new(format!(
-                    "Data not usable: {}.",
-                    self.sources.recording.unusable.as_deref().unwrap_or("their faults hide what the drive does")
-                )),
-                Text::default().error(self.departure_arcsec(), 2),
-                "rms beyond noise, of which nothing can be said".to_owned(),
-            ),
-            Verdict::Unknown => (
-                Text::new(
-                    "Unknown: the drive departs from the nominal model, and no cause in the library explains how.",
-                ),
-                Text::default().error(self.departure_arcsec(), 2),
-                "rms beyond noise, of unknown cause".to_owned(),
-            ),
-            Verdict::None => (
-                Text::new(
-                    "Nothing found: the drive does what the nominal model says, within noise and the spread between \
-                     units.",
-                ),
-                Text::default().error(diagnosis.residual.rms_before_arcsec, 3),
-                "rms error of the nominal model, recalibrated to this unit".to_owned(),
-            ),
-        };
-        Headline { choice: None, answer, number, number_is }
-    }
-
-    /// What the headline leaves out and a reader has to know.
-    fn in_short(&self) -> Section {
-        let diagnosis = self.sources.diagnosis;
-        let (held, left) = (diagnosis.held_out, diagnosis.residual);
-        let mut blocks = Vec::new();
-        if !diagnosis.causes.is_empty() {
-            blocks.push(Block::paragraph(
-                Text::new(
-                    "The model behind the tables is adapted to the zero, stiffness and backlash of these data, which \
-                     a table on board is not, and so leaves another error: ",
-                )
-                .error(held.rms_before_arcsec, 3)
-                .plain(" → ")
-                .error(held.rms_after_arcsec, 3)
-                .plain(format!(" rms in {}, without the causes and with them; ", self.left_out()))
-                .error(left.rms_before_arcsec, 3)
-                .plain(" → ")
-                .error(left.rms_after_arcsec, 3)
-                .plain(" in the data that it was fitted to. Noise and wander of the measurement are ")
-                .error(left.noise_floor_arcsec, 3)
-                .plain("."),
-            ));
-        } else {
-            blocks.push(Block::paragraph(
-                Text::new("The nominal model, recalibrated to this unit, leaves ")
-                    .error(left.rms_before_arcsec, 3)
-                    .plain(" rms. Noise and wander of the measurement are ")
-                    .error(left.noise_floor_arcsec, 3)
-                    .plain("."),
-            ));
-        }
-        for cause in &diagnosis.causes {
-            let alike = alike(cause);
-            if alike.is_empty() {
-                continue;
+            Verdict::Explained => (listed("Explained by ".into()), share, share_is.as_str()),
+            Verdict::PartlyExplained => (listed("Partly explained by ".into()), share, share_is.as_str()),
+            Verdict::Unknown if diagnosis.finding == Finding::DataUnusable => {
+                let why = self.sources.recording.unusable.as_deref();
+                let why = why.unwrap_or("their faults hide what the drive does");
+                let answer = format!("Data not usable: {why}.").into();
+                (answer, departure, "rms beyond noise, of which nothing can be said")
             }
-            blocks.push(Block::paragraph(
-                Text::new("These data do not tell ")
-                    .strong(cause.name.words())
-                    .plain(format!(" from {}.", words::listed(&alike))),
-            ));
-        }
-        if let Some(something) = diagnosis.unexplained.first() {
-            let more = diagnosis.unexplained.len() - 1;
-            let text = Text::new(if diagnosis.causes.is_empty() {
-                "What departs looks like "
-            } else {
-                "Without a known cause: "
-            })
-            .strong(something.looks_like.replace('_', " "))
-            .plain(", ")
-            .error(something.size_arcsec, 2)
-            .plain(if more > 0 {
-                format!(" rms, and {} more below.", words::counted(more))
-            } else {
-                " rms.".into()
-            });
-            blocks.push(Block::paragraph(text));
-        }
-        if let Some(next) = &diagnosis.next_experiment {
-            blocks.push(Block::paragraph(Text::new("To record next: ").plain(format!("{next}."))));
-        }
-        Section { id: "short".into(), title: "In short".into(), detail: Detail::Summary, blocks }
+            Verdict::Unknown => {
+                let answer =
+                    "Unknown: the drive departs from the nominal model, and no cause in the library explains how.";
+                (answer.into(), departure, "rms beyond noise, of unknown cause")
+            }
+            Verdict::None => {
+                let answer = "Nothing found: the drive does what the nominal model says, within noise and the spread \
+                              between units.";
+                let number = Text::arcsec(diagnosis.residual.rms_before_arcsec, 3);
+                (answer.into(), number, "rms error of the nominal model, recalibrated to this unit")
+            }
+        };
+        Headline::new(answer, number, number_is)
     }
 
-    /// Faults of the data, a sentence each, and what there is beside the causes.
+    /// Faults of the data, a sentence each, and steps of whole teeth.
     fn remarks(&self) -> Vec<String> {
-        const MOST: usize = 5;
+        const FIRST: usize = 5;
         let recording = self.sources.recording;
         let mut remarks: Vec<String> = recording
             .faults
             .iter()
-            .take(MOST)
-            .map(|fault| format!("Data fault: {}; {}.", words::fault(fault.name), fault.what.trim_end_matches('.')))
+            .take(FIRST)
+            .map(|fault| format!("Data fault: {}; {}.", words::of(&fault.name), fault.what.trim_end_matches('.')))
             .collect();
-        if recording.faults.len() > MOST {
-            remarks.push(format!("{} more data faults are in the table below.", recording.faults.len() - MOST));
+        if recording.faults.len() > FIRST {
+            remarks.push(format!("{} more data faults are in the table below.", recording.faults.len() - FIRST));
         }
         if !recording.tooth_steps.is_empty() {
-            let steps = words::counted(recording.tooth_steps.len());
             remarks.push(format!(
-                "The output is off by whole teeth after {steps} steps: the drive has ratcheted, or was re-assembled."
+                "The output is off by whole teeth after {} steps: the drive has ratcheted, or was re-assembled.",
+                recording.tooth_steps.len()
             ));
         }
         remarks
     }
 
     fn before_and_after(&self) -> Section {
-        let series = |k: usize, shown: &Shown| {
-            thin::envelope(&self.rows, &self.clock, &shown.level.residual_arcsec, shown.level.name, [5, 0, 1][k.min(2)])
+        let over_time = |id, title, caption, y, curves: &mut dyn Iterator<Item = (&'static str, &[f64], usize)>| {
+            let series = curves.map(|(name, of, colour)| thin::envelope(&self.rows, &self.clock, of, name, colour));
+            let chart = Lines { series: series.collect(), uprights: self.clock.borders(), ..Lines::default() };
+            let axes = [self.time_axis(), Axis::new(y, PageQuantity::Error)];
+            Block::lines(id, title, caption, axes, chart.for_every_choice())
         };
-        let over_time = Lines {
-            series: self.shown.iter().enumerate().map(|(k, shown)| series(k, shown)).collect(),
-            uprights: self.clock.borders(),
-            ..Lines::default()
-        };
-        let every: Vec<usize> = (0..self.rows.len()).collect();
-        let turn: Vec<f64> = self.rows.generator.iter().map(|psi| psi.to_degrees().rem_euclid(360.0)).collect();
-        let over_turn = Lines {
-            series: self
-                .shown
-                .iter()
-                .enumerate()
-                .map(|(k, shown)| {
-                    let colour = [5, 0, 1][k.min(2)];
-                    thin::medians(
-                        &turn,
-                        &shown.level.residual_arcsec,
-                        &every,
-                        TURN_BINS,
-                        shown.level.name,
-                        Mark::Line,
-                        colour,
-                    )
-                })
-                .collect(),
-            ..Lines::default()
-        };
-        let added = Lines {
-            series: self
-                .sources
-                .parts
-                .iter()
-                .enumerate()
-                .map(|(k, part)| {
-                    let name = part.cause.words();
-                    thin::envelope(&self.rows, &self.clock, &part.adds_arcsec, name, k)
-                })
-                .collect(),
-            uprights: self.clock.borders(),
-            ..Lines::default()
-        };
-        let y = || Axis::new("Error less model", PageQuantity::Error);
-        let figure = |id: &str, title: &str, caption: &str, x: Axis, lines: Lines| {
-            Block::Figure(Figure {
-                id: id.into(),
-                title: title.into(),
-                caption: Text::new(caption),
-                alt: title.into(),
-                body: FigureBody::Lines { x, y: y(), charts: vec![(EVERY_CHOICE.into(), lines)] },
-            })
-        };
-        let mut blocks = vec![
-            figure(
-                "over-time",
-                "What each model leaves, over time",
-                "Least and largest of each stretch of rows, so that single rows show. Nominal: the model as it was \
-                 given. Recalibrated: its zero, stiffness, backlash and harmonics as this unit has them, within the \
-                 spread between units. With the causes: what was named is in the model. Breaks between sessions are \
-                 taken out.",
-                self.time_axis(),
-                over_time,
-            ),
-            figure(
-                "over-turn",
-                "What each model leaves, over the generator's turn",
-                "Medians of all rows, both directions together. What is flat here may still depend on load or \
-                 direction: see the figures above, with the selector at the top.",
-                Axis::new("Generator angle in its turn", PageQuantity::Degree),
-                over_turn,
-            ),
-        ];
-        if !added.series.is_empty() {
-            blocks.push(Block::Figure(Figure {
-                id: "added".into(),
-                title: "What each cause adds, over time".into(),
-                caption: Text::new("Least and largest of each stretch of rows of what it adds to the prediction."),
-                alt: "Curves of what each cause adds to the predicted error over time".into(),
-                body: FigureBody::Lines {
-                    x: self.time_axis(),
-                    y: Axis::new("Adds to the error", PageQuantity::Error),
-                    charts: vec![(EVERY_CHOICE.into(), added)],
-                },
-            }));
+        let levels = self.shown.iter().map(|shown| &shown.level).zip([5, 0, 1]);
+        let mut blocks = vec![over_time(
+            "over-time",
+            "What each model leaves, over time",
+            "Least and largest of each stretch of rows, so that single rows show. Nominal: the model as it was given. \
+             Recalibrated: its zero, stiffness, backlash and harmonics as this unit has them, within the spread \
+             between units. With the causes: what was named is in the model. Breaks between sessions are taken out.",
+            "Error less model",
+            &mut levels.map(|(level, colour)| (level.name, level.residual_arcsec.as_slice(), colour)),
+        )];
+        if !self.sources.parts.is_empty() {
+            let parts = self.sources.parts.iter().enumerate();
+            blocks.push(over_time(
+                "added",
+                "What each cause adds, over time",
+                "Least and largest of each stretch of rows of what it adds to the prediction.",
+                "Adds to the error",
+                &mut parts.map(|(k, part)| (part.cause.words(), part.adds_arcsec.as_slice(), k)),
+            ));
         }
-        Section { id: "before-after".into(), title: "Before and after".into(), detail: Detail::Summary, blocks }
+        Section::new("before-after", "Before and after", Detail::Summary, blocks)
     }
 
     fn time_axis(&self) -> Axis {
@@ -504,63 +328,50 @@ impl DiagnosisKnown<'_> {
         }
     }
 
-    /// The causes and what is beside them.
+    /// The causes, and what has none.
     fn causes(&self) -> Option<Section> {
         let diagnosis = self.sources.diagnosis;
         let mut blocks = Vec::new();
         if !diagnosis.causes.is_empty() {
-            let rows = diagnosis
-                .causes
-                .iter()
-                .map(|cause| {
-                    let alike = alike(cause);
-                    vec![
-                        Text::new(words::begun(cause.name.words())),
-                        Text::new(words::percent(cause.confidence)),
-                        Text::default().error(cause.size_arcsec, 3),
-                        Text::new(words::percent(cause.held_out_gain)),
-                        Text::new(words::parameters(cause)),
-                        Text::new(if alike.is_empty() { "none".to_owned() } else { words::listed(&alike) }),
-                    ]
-                })
-                .collect();
-            blocks.push(table(
-                "Causes, strongest first",
-                &[
-                    "Cause",
-                    "Confidence",
-                    "Size, rms",
-                    "Gain left out",
-                    "Parameters ± one standard deviation",
-                    "Look-alikes",
-                ],
-                rows,
-            ));
+            let row = |cause: &Cause| {
+                let alike = alike(cause);
+                vec![
+                    words::begun(cause.name.words()).into(),
+                    words::percent(cause.confidence).into(),
+                    Text::arcsec(cause.size_arcsec, 3),
+                    words::percent(cause.held_out_gain).into(),
+                    words::parameters(cause).into(),
+                    if alike.is_empty() { "none".into() } else { words::listed(&alike).into() },
+                ]
+            };
+            let header = [
+                "Cause",
+                "Confidence",
+                "Size, rms",
+                "Gain left out",
+                "Parameters ± one standard deviation",
+                "Look-alikes",
+            ];
+            let rows = diagnosis.causes.iter().map(row).collect();
+            blocks.push(Block::table("Causes, strongest first", &header, rows));
             blocks.push(Block::paragraph(format!(
                 "Confidence: that it is this cause and not its best rival, given that it is one of the library. Gain: \
                  share of the squared error of the recalibrated nominal model that it removes in {}. Look-alikes: \
-                 causes that these data cannot tell from it. Parameters are of the law that was fitted; µm are \
-                 displacements on the pitch circle.",
+                 causes that these data cannot distinguish from it. Parameters are of the model that was fitted; µm \
+                 are displacements on the pitch circle.",
                 self.left_out()
             )));
-            for cause in &diagnosis.causes {
-                blocks.push(Block::paragraph(
-                    Text::default().strong(words::begun(cause.name.words())).plain(format!(": {}.", cause.name.does())),
-                ));
-            }
+            blocks.extend(diagnosis.causes.iter().map(|cause| {
+                let name = Text::default().strong(words::begun(cause.name.words()));
+                Block::paragraph(name.plain(format!(": {}.", cause.name.does())))
+            }));
         }
         if !diagnosis.unexplained.is_empty() {
-            let rows = diagnosis
-                .unexplained
-                .iter()
-                .map(|left| {
-                    vec![
-                        Text::new(words::begun(&left.looks_like.replace('_', " "))),
-                        Text::default().error(left.size_arcsec, 3),
-                    ]
-                })
-                .collect();
-            blocks.push(table("What is there and has no known cause", &["It looks like", "Size, rms"], rows));
+            let row = |left: &Unexplained| {
+                vec![words::begun(&left.looks_like.replace('_', " ")).into(), Text::arcsec(left.size_arcsec, 3)]
+            };
+            let rows = diagnosis.unexplained.iter().map(row).collect();
+            blocks.push(Block::table("The residual without a known cause", &["It looks like", "Size, rms"], rows));
             let sure = if diagnosis.verdict == Verdict::Unknown {
                 "Names of causes in this table say what the remainder resembles most; they are not a finding."
             } else {
@@ -568,51 +379,46 @@ impl DiagnosisKnown<'_> {
             };
             blocks.push(Block::paragraph(sure));
         }
-        (!blocks.is_empty()).then(|| Section {
-            id: "causes".into(),
-            title: "Causes".into(),
-            detail: Detail::Summary,
-            blocks,
-        })
+        (!blocks.is_empty()).then(|| Section::new("causes", "Causes", Detail::Summary, blocks))
     }
 
-    /// What the causes gain.
+    /// The gain of the causes.
     fn gain(&self) -> Section {
         let Diagnosis { residual, held_out, compensation, .. } = self.sources.diagnosis;
-        let error = |arcsec: f64| Text::default().error(arcsec, 3);
-        let row = |name: String, before: f64, after: f64| {
+        let row = |name: &str, before: f64, after: f64| {
             let change = if before > 0.0 { format!("{:+.0} %", 100.0 * (after / before - 1.0)) } else { "–".into() };
-            vec![Text::new(name), error(before), error(after), Text::new(change.replace('-', "−"))]
+            let [before, after] = [before, after].map(|arcsec| Text::arcsec(arcsec, 3));
+            vec![name.into(), before, after, change.replace('-', "−").into()]
         };
-        let all = table(
+        let all = Block::table(
             "Error of the prediction, rms",
             &["Over", "Recalibrated nominal", "With the causes", "Change"],
             vec![
-                row("all data".into(), residual.rms_before_arcsec, residual.rms_after_arcsec),
-                row(self.left_out().into(), held_out.rms_before_arcsec, held_out.rms_after_arcsec),
+                row("all data", residual.rms_before_arcsec, residual.rms_after_arcsec),
+                row(self.left_out(), held_out.rms_before_arcsec, held_out.rms_after_arcsec),
             ],
         );
-        let noise = Block::paragraph(
-            Text::new("Noise and wander of the measurement are ").error(residual.noise_floor_arcsec, 3).plain(format!(
-                " of it{}; {} of the squared error beyond that is left unexplained.",
-                match residual.rows_averaged {
-                    0 | 1 => String::new(),
-                    rows => format!(" in means of {rows} rows"),
-                },
-                words::percent(residual.unexplained_fraction)
-            )),
-        );
-        let rest = |arcsec: f64| {
-            let none = compensation.rms_uncompensated_arcsec;
-            let share = if none > 0.0 { format!("{:.0} %", 100.0 * arcsec / none) } else { "–".into() };
-            vec![error(arcsec), Text::new(share)]
+        let means = match residual.rows_averaged {
+            0 | 1 => String::new(),
+            rows => format!(" in means of {rows} rows"),
         };
-        let line = |name: &str, arcsec: f64| [vec![Text::new(name)], rest(arcsec)].concat();
-        let pointing = table(
+        let noise = format!(
+            "Noise and drift of the measurement are {{}} of it{means}; {} of the squared error beyond that is left \
+             unexplained. A table on board is not adapted to the zero, stiffness and backlash of these data, and so \
+             leaves another error.",
+            words::percent(residual.unexplained_fraction)
+        );
+        let noise = Block::paragraph(Text::filled(&noise, &[(residual.noise_floor_arcsec, 3)]));
+        let none = compensation.rms_uncompensated_arcsec;
+        let line = |name: &str, arcsec: f64| {
+            let share = if none > 0.0 { format!("{:.0} %", 100.0 * arcsec / none) } else { "–".into() };
+            vec![name.into(), Text::arcsec(arcsec, 3), share.into()]
+        };
+        let pointing = Block::table(
             "Pointing error with the output corrected, rms about the mean",
             &["Correction", "Left", "Of uncorrected"],
             vec![
-                line("none", compensation.rms_uncompensated_arcsec),
+                line("none", none),
                 line("nominal tables", compensation.rms_nominal_tables_arcsec),
                 line(&format!("extended tables, in {}", self.left_out()), compensation.rms_extended_tables_arcsec),
             ],
@@ -621,17 +427,18 @@ impl DiagnosisKnown<'_> {
         let mut blocks = vec![pointing, all, noise];
         let rows = self.recalibrated_rows();
         if !rows.is_empty() {
-            blocks.push(table("The nominal model as this unit has it", &["Parameter", "Against nominal"], rows));
+            let header = ["Parameter", "Against nominal"];
+            blocks.push(Block::table("The nominal model as this unit has it", &header, rows));
             blocks.push(Block::paragraph(
                 "Within the spread between units: wind-up and clearance by these shares of nominal, each harmonic by \
                  a share of its amplitude in phase with it and a quarter of a wave before it. The zero is that of the \
                  encoder.",
             ));
         }
-        Section { id: "gain".into(), title: "What it gains".into(), detail: Detail::Summary, blocks }
+        Section::new("gain", "What it gains", Detail::Summary, blocks)
     }
 
-    /// What floats in the nominal model, with its order where it is a harmonic.
+    /// The free parameters of the nominal model, with the order of a harmonic.
     fn recalibrated_rows(&self) -> Vec<Vec<Text>> {
         let recalibrated = &self.sources.diagnosis.recalibrated;
         // Harmonics are numbered by their place, two for each of the model.
@@ -666,125 +473,77 @@ impl DiagnosisKnown<'_> {
             Some(next) => Text::default().strong("Record next: ").plain(format!("{next}.")),
             None if self.sources.diagnosis.verdict == Verdict::Unknown => Text::new(
                 "The same motion again, on another day, shows whether the remainder is the drive's. Torque, \
-                 temperature and orientation, where they were not recorded, tell more causes apart.",
+                 temperature and orientation, where they were not recorded, distinguish more causes.",
             ),
-            None => Text::new("Nothing: no two causes that these data cannot tell apart explain them equally well."),
+            None => Text::new("Nothing: no two causes explain these data equally well."),
         };
-        Section {
-            id: "next".into(),
-            title: "What to record next".into(),
-            detail: Detail::Summary,
-            blocks: vec![Block::paragraph(text)],
-        }
+        Section::new("next", "What to record next", Detail::Summary, vec![Block::paragraph(text)])
     }
 
     /// The data: sessions, faults, notes.
     fn data(&self) -> Section {
-        const MOST: usize = 60;
         let recording = self.sources.recording;
         let mut blocks = Vec::new();
         if recording.faults.is_empty() {
             blocks.push(Block::paragraph("No faults were found in the data."));
         } else {
-            let rows = recording
-                .faults
-                .iter()
-                .take(MOST)
-                .map(|fault| {
-                    let when = match (fault.time_s, fault.until_s) {
-                        (Some(a), Some(b)) if b > a => format!("{} to {}", words::seconds(a), words::seconds(b)),
-                        (Some(a), _) => words::seconds(a),
-                        _ => "–".into(),
-                    };
-                    let lines = if fault.last_line > fault.first_line {
-                        format!("{} to {}", fault.first_line, fault.last_line)
-                    } else {
-                        fault.first_line.to_string()
-                    };
-                    vec![
-                        Text::new(words::begun(words::fault(fault.name))),
-                        Text::new(when),
-                        Text::new(lines),
-                        Text::new(fault.rows.to_string()),
-                        fault.size_arcsec.map_or_else(|| Text::new("–"), |size| Text::default().error(size, 3)),
-                        Text::new(words::treatment(fault.treatment)),
-                        Text::new(fault.what.clone()),
-                        Text::new(fault.advice),
-                    ]
-                })
-                .collect();
-            blocks.push(table(
-                "Faults of the data",
-                &["Fault", "When", "Lines of the file", "Rows", "Size", "Done", "What it is", "What to change"],
-                rows,
-            ));
-            if recording.faults.len() > MOST {
-                blocks.push(Block::paragraph(format!("{} more are in diagnosis.json.", recording.faults.len() - MOST)));
-            }
+            let row = |fault: &Fault| {
+                let when = match (fault.time_s, fault.until_s) {
+                    (Some(a), Some(b)) if b > a => format!("{} to {}", words::seconds(a), words::seconds(b)),
+                    (Some(a), _) => words::seconds(a),
+                    _ => "–".into(),
+                };
+                let lines = if fault.last_line > fault.first_line {
+                    format!("{} to {}", fault.first_line, fault.last_line)
+                } else {
+                    fault.first_line.to_string()
+                };
+                vec![
+                    words::begun(&words::of(&fault.name)).into(),
+                    when.into(),
+                    lines.into(),
+                    fault.rows.to_string().into(),
+                    fault.size_arcsec.map_or("–".into(), |size| Text::arcsec(size, 3)),
+                    words::of(&fault.treatment).into(),
+                    fault.what.clone().into(),
+                    fault.advice.into(),
+                ]
+            };
+            let header = ["Fault", "When", "Lines of the file", "Rows", "Size", "Done", "What it is", "What to change"];
+            blocks.extend(limited("Faults of the data", &header, &recording.faults, row));
         }
         if !recording.tooth_steps.is_empty() {
-            let rows = recording
-                .tooth_steps
-                .iter()
-                .take(MOST)
-                .map(|step| {
-                    vec![
-                        Text::new(step.time_s.map_or_else(|| format!("line {}", step.line), words::seconds)),
-                        Text::default().error(step.size_arcsec, 4),
-                        Text::new(step.pitches.to_string()),
-                    ]
-                })
-                .collect();
-            blocks.push(table("Steps of whole teeth", &["When", "Size", "Tooth pitches"], rows));
+            let row = |step: &ToothStep| {
+                let when = step.time_s.map_or_else(|| format!("line {}", step.line), words::seconds);
+                vec![when.into(), Text::arcsec(step.size_arcsec, 4), step.pitches.to_string().into()]
+            };
+            let header = ["When", "Size", "Tooth pitches"];
+            blocks.extend(limited("Steps of whole teeth", &header, &recording.tooth_steps, row));
         }
-        blocks.extend(
-            recording
-                .notes
-                .iter()
-                .map(|note| Block::paragraph(format!("{}.", words::begun(note.trim_end_matches('.'))))),
-        );
+        let note = |note: &String| Block::paragraph(format!("{}.", words::begun(note.trim_end_matches('.'))));
+        blocks.extend(recording.notes.iter().map(note));
         let range = |values: Option<&Vec<f64>>| {
-            let Some(values) = values else { return "–".to_owned() };
+            let Some(values) = values else { return Text::new("–") };
             let (low, high) =
                 values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
-            format!("{} to {}", significant(low, 3), significant(high, 3))
+            format!("{} to {}", significant(low, 3), significant(high, 3)).into()
         };
-        let rows = recording
-            .sessions
-            .iter()
-            .take(MOST)
-            .enumerate()
-            .map(|(k, session)| {
-                let turns = session.generator_rad.iter().map(|psi| psi / std::f64::consts::TAU).collect::<Vec<_>>();
-                let cells = [
-                    (k + 1).to_string(),
-                    session.len().to_string(),
-                    range(session.time_s.as_ref()),
-                    range(Some(&turns)),
-                    range(session.torque_n_m.as_ref()),
-                    range(session.temperature_c.as_ref()),
-                ];
-                cells.map(Text::from).into()
-            })
-            .collect();
-        blocks.push(table(
-            "Sessions",
-            &["Session", "Rows", "Time, s", "Generator, turns", "Torque, N·m", "Temperature, °C"],
-            rows,
-        ));
-        if recording.sessions.len() > MOST {
-            blocks.push(Block::paragraph(format!("{} more sessions.", recording.sessions.len() - MOST)));
-        }
+        let row = |(k, session): &(usize, &Session)| {
+            let turns = session.generator_rad.iter().map(|psi| psi / std::f64::consts::TAU).collect::<Vec<_>>();
+            let columns = [&session.time_s, &Some(turns), &session.torque_n_m, &session.temperature_c];
+            let counts = [k + 1, session.len()].map(|count| count.to_string().into());
+            counts.into_iter().chain(columns.map(|values| range(values.as_ref()))).collect()
+        };
+        let sessions: Vec<(usize, &Session)> = recording.sessions.iter().enumerate().collect();
+        let header = ["Session", "Rows", "Time, s", "Generator, turns", "Torque, N·m", "Temperature, °C"];
+        blocks.extend(limited("Sessions", &header, &sessions, row));
         let detail = if recording.faults.is_empty() { Detail::Engineering } else { Detail::Summary };
-        Section { id: "data".into(), title: "The data".into(), detail, blocks }
+        Section::new("data", "The data", detail, blocks)
     }
 
     fn reading(&self) -> Section {
         Section::reading(vec![
-            Block::paragraph(
-                "Error: output angle less generator angle over the ratio; positive when the output leads. ψ is the \
-                 angle of the generator, δ that of the output. Forward is growing generator angle.",
-            ),
+            Block::paragraph(format!("{SIGNS} ψ is the angle of the generator, δ that of the output.")),
             Block::paragraph(
                 "The selector shows the same figures of what the nominal model leaves, of what it leaves recalibrated \
                  to this unit, and of what is left with the causes that were named. A cause that is right takes its \
@@ -792,29 +551,31 @@ impl DiagnosisKnown<'_> {
             ),
             Block::paragraph(format!(
                 "A name is given only where a cause gains in {}, where no rival does as well, and where it is large \
-                 enough against noise and against how wrong its law may be. What does not meet that is described and \
-                 not named.",
+                 enough against noise and against how wrong its model may be. The rest is described and not named.",
                 self.left_out()
             )),
-            Block::paragraph(
-                "Figures zoom by dragging and come back by a double click. Every figure has its numbers as a table \
-                 and as CSV, in the unit that is selected; of many rows it holds what is drawn, which is a part of \
-                 them.",
-            ),
-            Block::paragraph(format!("Verdict: {}.", words::verdict(self.sources.diagnosis.verdict))),
         ])
     }
 }
 
-/// What these data do not tell from a cause, in words.
+/// A table of the first [`MOST`] items, and how many more there are.
+fn limited<T>(caption: &str, header: &[&str], items: &[T], row: impl Fn(&T) -> Vec<Text>) -> Vec<Block> {
+    let mut blocks = vec![Block::table(caption, header, items.iter().take(MOST).map(row).collect())];
+    if items.len() > MOST {
+        blocks.push(Block::paragraph(format!("{} more are left out here.", items.len() - MOST)));
+    }
+    blocks
+}
+
+/// The look-alikes of a cause, in words.
 fn alike(cause: &Cause) -> Vec<String> {
     cause.look_alikes.iter().map(|name| name.words().to_owned()).chain(cause.or_the_log()).collect()
 }
 
-/// What floats in the nominal model, in its unit: the zero as an error, times in milliseconds, the rest as a share.
+/// A free parameter of the nominal model, in its unit: the zero as an error, times in milliseconds, the rest as a share.
 fn recalibrated_value(name: &str, p: Parameter) -> Text {
     if name.starts_with("zero") {
-        return Text::default().error(p.value, 3).plain("\u{a0}±\u{a0}").error(p.std, 2);
+        return Text::arcsec(p.value, 3).plain("\u{a0}±\u{a0}").error(p.std, 2);
     }
     let words = if [BETWEEN_READINGS, CHANGE_OF_FLANK].contains(&name) {
         let ms = |seconds: f64| significant(1e3 * seconds, 2);
@@ -830,10 +591,10 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::*;
-    use crate::page::Span;
-    use flexspline_identify::diagnosis::report::{Cause, Compensation, HeldOut, Residual, Unexplained};
+    use crate::page::{FigureBody, Span};
+    use flexspline_identify::diagnosis::report::{Compensation, HeldOut, Residual};
     use flexspline_identify::diagnosis::trace::Trace;
-    use flexspline_identify::measurement::{Fault, FaultName, Measures, Treatment};
+    use flexspline_identify::measurement::{FaultName, Measures, Treatment};
     use flexspline_identify::synthesize::catalogue_drive;
 
     #[test]
@@ -965,12 +726,12 @@ mod tests {
             let headline = &page.headlines[0];
             assert!(words(&headline.answer).starts_with(begins), "{}", words(&headline.answer));
             assert_eq!(words(&headline.number), number);
-            // With a fault of the data a good page is stamped so, and any other beside what it is.
+            // With a fault of the data a good page is stamped so, and any other in addition to its own stamp.
             let faulty = page_of(&diagnosis(verdict, causes), vec![jump()]);
             let stamps: Vec<Status> = [faulty.status].into_iter().chain(faulty.also).collect();
             assert!(stamps.contains(&Status::DataFaults) && !stamps.contains(&Status::Good), "{stamps:?}");
             assert_eq!(stamps.contains(&status), status != Status::Good);
-            assert!(faulty.remarks[0].contains("index jump of an encoder; the output jumps."), "{:?}", faulty.remarks);
+            assert!(faulty.remarks[0].contains("encoder index jump; the output jumps."), "{:?}", faulty.remarks);
         }
         // What a joint would feel comes first where it was evaluated.
         let mut evaluated = diagnosis(Verdict::Explained, &[CauseName::Wear]);
@@ -983,7 +744,7 @@ mod tests {
     }
 
     #[test]
-    fn a_long_record_is_thinned_and_its_page_is_small() {
+    fn a_page_is_small_and_has_the_wave_in_its_spectrum() {
         let page = page_of(&diagnosis(Verdict::Explained, &[CauseName::Wear]), Vec::new());
         let html = page.html().unwrap();
         assert!(html.len() < 600_000, "{} bytes", html.len());
@@ -991,10 +752,6 @@ mod tests {
             html.contains("made &#60;up&#62;.csv") || html.contains("made &lt;up&gt;.csv"),
             "the name is not escaped"
         );
-        let session = &recording(Vec::new()).sessions[0];
-        let third = thinned(session, 3);
-        assert_eq!((third.len(), third.generator_rad[1]), (1000, session.generator_rad[3]));
-        assert_eq!(third.time_s.as_ref().unwrap()[999], session.time_s.as_ref().unwrap()[2997]);
         // The wave is in the spectrum of what was measured, at its order.
         let figure = |id: &str| {
             page.sections.iter().flat_map(|s| &s.blocks).find_map(|block| match block {

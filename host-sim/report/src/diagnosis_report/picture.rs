@@ -2,10 +2,10 @@
 
 use std::f64::consts::TAU;
 
-use super::thin::{dots, medians, middle, peaks_kept, some_rows};
+use super::thin::{dots, medians, peaks_kept, some_rows};
 use super::{DiagnosisKnown, Shown, orders, words};
 use crate::page::{
-    Axis, Block, Detail, Field, Figure, FigureBody, Lines, Mark, PageQuantity, Section, Series, Table, Text, Upright,
+    Axis, Block, Detail, Field, Figure, FigureBody, Lines, Mark, PageQuantity, Section, Series, Text, Upright,
     significant,
 };
 use flexspline_identify::nominal::Fixed;
@@ -28,20 +28,6 @@ impl DiagnosisKnown<'_> {
         vec![self.looks(), self.angles(), self.spectra(), self.drift()]
     }
 
-    fn figure(&self, id: &str, title: &str, caption: &str, body: FigureBody) -> Block {
-        Block::Figure(Figure {
-            id: id.into(),
-            title: title.into(),
-            caption: Text::new(caption),
-            alt: title.into(),
-            body,
-        })
-    }
-
-    fn charts(&self, of: impl Fn(&Shown) -> Option<Lines>) -> Vec<(String, Lines)> {
-        self.shown.iter().filter_map(|shown| Some((shown.level.id.to_owned(), of(shown)?))).collect()
-    }
-
     fn lines(
         &self,
         id: &str,
@@ -50,9 +36,10 @@ impl DiagnosisKnown<'_> {
         x: Axis,
         of: impl Fn(&Shown) -> Option<Lines>,
     ) -> Option<Block> {
-        let charts = self.charts(of);
-        let y = Axis::new("Error less model", PageQuantity::Error);
-        (!charts.is_empty()).then(|| self.figure(id, title, caption, FigureBody::Lines { x, y, charts }))
+        let chart = |shown: &Shown| Some((shown.level.id.to_owned(), of(shown)?));
+        let charts: Vec<_> = self.shown.iter().filter_map(chart).collect();
+        let axes = [x, Axis::new("Error less model", PageQuantity::Error)];
+        (!charts.is_empty()).then(|| Block::lines(id, title, caption, axes, charts))
     }
 
     /// Rows that move in a direction.
@@ -72,17 +59,9 @@ impl DiagnosisKnown<'_> {
             }
         }
         for (colour, (direction, name)) in DIRECTIONS.into_iter().enumerate() {
-            let median = medians(
-                quantity,
-                values,
-                &self.rows_in(direction),
-                MEDIANS,
-                &format!("{name}, median"),
-                Mark::Line,
-                2 + colour,
-            );
-            if median.points.len() > 1 {
-                lines.series.push(median);
+            let points = medians(quantity, values, &self.rows_in(direction), MEDIANS);
+            if points.len() > 1 {
+                lines.series.push(Series::new(format!("{name}, median"), Mark::Line, 2 + colour, points));
             }
         }
         (!lines.series.is_empty()).then_some(lines)
@@ -107,76 +86,51 @@ impl DiagnosisKnown<'_> {
         let maps: Vec<(String, Field)> =
             self.shown.iter().filter_map(|shown| Some((shown.level.id.to_owned(), self.map(shown)?))).collect();
         if !maps.is_empty() {
-            blocks.push(self.figure(
-                "map",
-                "Over one turn of generator and output",
-                "Median of the rows in each cell; cells that were not visited are empty. What sits on the generator \
-                 stands upright, what sits on the output lies flat, what sits on the wheel that turns runs aslant.",
-                FigureBody::Field {
-                    x: Axis::new("Generator angle ψ in its turn", PageQuantity::Degree),
-                    y: Axis::new("Output angle δ in its turn", PageQuantity::Degree),
-                    z: Axis::new("Error less model", PageQuantity::Error),
-                    fields: maps,
-                },
-            ));
+            let caption = "Median of the rows in each cell; cells that were not visited are empty. What sits on the \
+                           generator stands upright, what sits on the output lies flat, what sits on the wheel that \
+                           turns runs aslant.";
+            let body = FigureBody::Field {
+                x: Axis::new("Generator angle ψ in its turn", PageQuantity::Degree),
+                y: Axis::new("Output angle δ in its turn", PageQuantity::Degree),
+                z: Axis::new("Error less model", PageQuantity::Error),
+                fields: maps,
+            };
+            blocks.push(Block::Figure(Figure::of("map", "Over one turn of generator and output", caption, body)));
         }
-        if rows.recorded.torque && varies(&rows.torque) {
-            blocks.extend(self.lines(
-                "over-torque",
-                "Over the load torque",
-                "Dots are some rows, lines medians of all. A slope is stiffness, a step at zero backlash, a loop \
-                 hysteresis.",
+        for (recorded, values, id, over, axis, sees) in [
+            (
+                rows.recorded.torque,
+                &rows.torque,
+                "torque",
+                "load torque",
                 Axis::new("Load torque", PageQuantity::Torque),
-                |shown| self.over(&rows.torque, shown),
-            ));
-        }
-        if rows.recorded.temperature && varies(&rows.temperature) {
-            blocks.extend(self.lines(
-                "over-temperature",
-                "Over the temperature",
-                "Dots are some rows, lines medians of all.",
+                "A slope is stiffness, a step at zero backlash, a loop hysteresis.",
+            ),
+            (
+                rows.recorded.temperature,
+                &rows.temperature,
+                "temperature",
+                "temperature",
                 Axis::new("Temperature", PageQuantity::Temperature),
-                |shown| self.over(&rows.temperature, shown),
-            ));
-        }
-        if rows.recorded.time && varies(&rows.speed) {
-            blocks.extend(self.lines(
-                "over-speed",
-                "Over the generator speed",
-                "Dots are some rows, lines medians of all. Sensors read at different instants make a straight line \
-                 through zero.",
+                "A slope is stiffness or clearance that changes with the temperature.",
+            ),
+            (
+                rows.recorded.time,
+                &rows.speed,
+                "speed",
+                "generator speed",
                 Axis::new("Generator speed", PageQuantity::Speed),
-                |shown| self.over(&rows.speed, shown),
-            ));
+                "Sensors read at different instants make a straight line through zero.",
+            ),
+        ] {
+            if recorded && varies(values) {
+                let caption = format!("Dots are some rows, lines medians of all. {sees}");
+                let title = format!("Over the {over}");
+                let over = |shown: &Shown| self.over(values, shown);
+                blocks.extend(self.lines(&format!("over-{id}"), &title, &caption, axis, over));
+            }
         }
-        if rows.sessions.len() > 1 {
-            blocks.extend(self.lines(
-                "over-session",
-                "By session",
-                "Median of each session, and the bounds between which nine rows of ten lie.",
-                Axis::new("Session", PageQuantity::Whole),
-                |shown| {
-                    let each: Vec<[f64; 3]> =
-                        rows.sessions.iter().map(|s| middle(shown.level.residual_arcsec[s.clone()].to_vec())).collect();
-                    let series = |name: &str, part: usize, mark, colour| Series {
-                        name: name.into(),
-                        mark,
-                        colour,
-                        points: each.iter().enumerate().map(|(k, m)| [(k + 1) as f64, m[part]]).collect(),
-                    };
-                    Some(Lines {
-                        series: vec![
-                            series("a twentieth below", 1, Mark::Dashed, 5),
-                            series("median", 0, Mark::Points, 0),
-                            series("a twentieth above", 2, Mark::Dashed, 5),
-                        ],
-                        ..Lines::default()
-                    })
-                },
-            ));
-        }
-        blocks.extend(self.shown.iter().filter_map(group_table));
-        Section { id: "picture".into(), title: "What the error looks like".into(), detail: Detail::Summary, blocks }
+        Section::new("picture", "What the error looks like", Detail::Summary, blocks)
     }
 
     /// Medians over both turns.
@@ -201,7 +155,7 @@ impl DiagnosisKnown<'_> {
         })
     }
 
-    /// What an angle is called, and what sits on it.
+    /// The symbol of an angle, and the parts that turn with it.
     fn angle_name(&self, angle: Angle) -> (&'static str, &'static str) {
         let flexspline_turns = self.sources.nominal.teeth.is_some_and(|teeth| teeth.fixed == Fixed::CircularSpline);
         match angle {
@@ -226,22 +180,15 @@ impl DiagnosisKnown<'_> {
                 |shown| {
                     let mut lines = Lines::default();
                     for map in shown.picture.as_ref()?.maps.iter().filter(|map| map.axis == angle) {
-                        let forward = map.direction == Direction::Forward;
-                        let (name, colour) = if forward { ("forward", 0) } else { ("backward", 1) };
-                        let points =
-                            map.bins.iter().map(|bin| [bin.angle_rad.to_degrees(), bin.median_arcsec]).collect();
-                        lines.series.push(Series { name: name.into(), mark: Mark::Line, colour, points });
+                        let colour = usize::from(map.direction != Direction::Forward);
+                        let points = map.bins.iter().map(|bin| [bin.angle_rad.to_degrees(), bin.median_arcsec]);
+                        lines.series.push(Series::new(DIRECTIONS[colour].1, Mark::Line, colour, points.collect()));
                     }
                     (!lines.series.is_empty()).then_some(lines)
                 },
             ));
         }
-        Section {
-            id: "angles".into(),
-            title: "Over the angle of each wheel".into(),
-            detail: Detail::Engineering,
-            blocks,
-        }
+        Section::new("angles", "Over the angle of each wheel", Detail::Engineering, blocks)
     }
 
     fn spectra(&self) -> Section {
@@ -264,40 +211,18 @@ impl DiagnosisKnown<'_> {
                     if spectrum.orders.is_empty() {
                         return None;
                     }
-                    let curve = |name: &str, y: &[f64], mark, colour| Series {
-                        name: name.into(),
-                        mark,
-                        colour,
-                        points: peaks_kept(&spectrum.orders, y, SPECTRUM_POINTS),
-                    };
-                    let level = Series {
-                        name: "level of noise".into(),
-                        mark: Mark::Dashed,
-                        colour: 5,
-                        points: spectrum
-                            .orders
-                            .iter()
-                            .zip(&spectrum.level_arcsec)
-                            .step_by(spectrum.orders.len().div_ceil(150).max(1))
-                            .map(|(x, y)| [*x, *y])
-                            .collect(),
-                    };
-                    let mut peaks: Vec<[f64; 2]> =
-                        spectrum.peaks.iter().map(|peak| [peak.order, peak.amplitude_arcsec]).collect();
-                    peaks.sort_by(|a, b| a[0].total_cmp(&b[0]));
-                    let mut lines = Lines {
-                        series: vec![curve("amplitude", &spectrum.amplitude_arcsec, Mark::Line, 0), level],
-                        ..Lines::default()
-                    };
-                    if !peaks.is_empty() {
-                        lines.series.push(Series {
-                            name: "lines".into(),
-                            mark: Mark::Points,
-                            colour: 1,
-                            points: peaks,
-                        });
+                    let x = &spectrum.orders;
+                    let amplitude = peaks_kept(x, &spectrum.amplitude_arcsec, SPECTRUM_POINTS);
+                    let level = peaks_kept(x, &spectrum.level_arcsec, SPECTRUM_POINTS);
+                    let peaks = spectrum.peaks.iter().map(|peak| [peak.order, peak.amplitude_arcsec]).collect();
+                    let mut lines = Lines::of(vec![
+                        Series::new("amplitude", Mark::Line, 0, amplitude),
+                        Series::new("level of noise", Mark::Dashed, 5, level),
+                    ]);
+                    if !spectrum.peaks.is_empty() {
+                        lines.series.push(Series::sorted("lines", Mark::Points, 1, peaks));
                     }
-                    let (low, high) = (spectrum.orders[0], spectrum.orders[spectrum.orders.len() - 1]);
+                    let (low, high) = (x[0], x[x.len() - 1]);
                     for cause in causes {
                         let places =
                             orders::along(cause, angle, nominal).into_iter().filter(|x| (low..=high).contains(x));
@@ -316,7 +241,7 @@ impl DiagnosisKnown<'_> {
         if blocks.is_empty() {
             blocks.push(Block::paragraph("The drive turned too little for orders."));
         }
-        Section { id: "orders".into(), title: "Orders".into(), detail: Detail::Engineering, blocks }
+        Section::new("orders", "Orders", Detail::Engineering, blocks)
     }
 
     /// The lines of the spectra with the parts that have such orders.
@@ -341,21 +266,17 @@ impl DiagnosisKnown<'_> {
                 let parts = match parts.len() {
                     0 => "–".to_owned(),
                     1 => parts[0].clone(),
-                    _ => format!("not told apart: {}", words::listed(&parts)),
+                    _ => format!("not distinguished: {}", words::listed(&parts)),
                 };
                 rows.push(vec![
                     Text::new(format!("{} per turn of {symbol}", significant(peak.order, 5))),
-                    Text::default()
-                        .error(peak.amplitude_arcsec, 3)
-                        .plain("\u{a0}±\u{a0}")
-                        .error(peak.amplitude_std_arcsec, 2),
+                    plus_minus(peak.amplitude_arcsec, peak.amplitude_std_arcsec),
                     Text::new(parts),
                 ]);
             }
         }
-        let header = ["Order", "Amplitude", "Parts with such an order"].map(str::to_owned).into();
-        let table = Table { caption: "Lines above the noise, strongest first in each angle".into(), header, rows };
-        (!table.rows.is_empty()).then(|| Block::Table { choice: Some(shown.level.id.into()), table })
+        let header = ["Order", "Amplitude", "Parts with such an order"];
+        of_level(shown, "Lines above the noise, strongest first in each angle", &header, rows)
     }
 
     fn drift(&self) -> Section {
@@ -379,7 +300,7 @@ impl DiagnosisKnown<'_> {
                 }
             }
             let [median, above, below] = parts;
-            let series = |name: &str, colour, points| Series { name: name.into(), mark: Mark::Broken, colour, points };
+            let series = |name, colour, points| Series::new(name, Mark::Broken, colour, points);
             Some(Lines {
                 series: vec![series("median", 0, median), series("above", 5, above), series("below", 5, below)],
                 uprights: self.clock.borders(),
@@ -388,18 +309,16 @@ impl DiagnosisKnown<'_> {
         }));
         blocks.extend(self.shown.iter().filter_map(|shown| {
             let noise = shown.picture.as_ref()?.noise;
-            let text = Text::new("White noise of a row ")
-                .error(noise.white_arcsec, 2)
-                .plain("; what remembers, lines taken out, ")
-                .error(noise.correlated_arcsec, 2)
-                .plain(format!(
-                    ", over {} rows: the data are worth {} independent rows.",
-                    significant(noise.decorrelation_rows, 2),
-                    significant(noise.independent_rows, 2)
-                ));
-            Some(Block::Paragraph { choice: Some(shown.level.id.into()), text })
+            let words = format!(
+                "White noise of a row {{}}; correlated noise, lines taken out, {{}}, over {} rows: the data are worth {} \
+                 independent rows.",
+                significant(noise.decorrelation_rows, 2),
+                significant(noise.independent_rows, 2)
+            );
+            let text = Text::filled(&words, &[(noise.white_arcsec, 2), (noise.correlated_arcsec, 2)]);
+            Some(Block::paragraph(text).of_choice(shown.level.id))
         }));
-        Section { id: "drift-section".into(), title: "Drift and noise".into(), detail: Detail::Engineering, blocks }
+        Section::new("drift-section", "Drift and noise", Detail::Engineering, blocks)
     }
 }
 
@@ -409,51 +328,6 @@ const ANGLES: [(Angle, &str); 3] =
 fn varies(values: &[f64]) -> bool {
     let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
     high - low > CHANGES * high.abs().max(low.abs())
-}
-
-/// Statistics of the groups of a level.
-fn group_table(shown: &Shown) -> Option<Block> {
-    const MOST: usize = 40;
-    let picture = shown.picture.as_ref()?;
-    let by = |name: &str| match name {
-        "torque_n_m" => ("torque ", " N·m"),
-        "temperature_c" => ("temperature ", " °C"),
-        "generator_speed_rad_s" => ("speed ", " rad/s"),
-        _ => ("", ""),
-    };
-    let rows: Vec<Vec<Text>> = picture
-        .groups
-        .iter()
-        .filter(|grouping| match grouping.by {
-            "session" => grouping.groups.len() > 1,
-            // A speed that is the same throughout is parted by its noise.
-            _ => match (grouping.groups.first().and_then(|g| g.range), grouping.groups.last().and_then(|g| g.range)) {
-                (Some([low, _]), Some([_, high])) => varies(&[low, high]),
-                _ => true,
-            },
-        })
-        .flat_map(|grouping| grouping.groups.iter().map(|group| (by(grouping.by), group)))
-        .take(MOST)
-        .map(|((before, after), group)| {
-            let s = group.statistics;
-            let name = match group.range {
-                Some([from, to]) => format!("{before}{} to {}{after}", significant(from, 3), significant(to, 3)),
-                None => group.label.clone(),
-            };
-            let error = |arcsec: f64| Text::default().error(arcsec, 3);
-            vec![
-                Text::new(name),
-                Text::new(s.count.to_string()),
-                error(s.median_arcsec),
-                error(s.spread_arcsec),
-                error(s.rms_arcsec),
-                error(s.low_arcsec).plain(" to ").error(s.high_arcsec, 3),
-            ]
-        })
-        .collect();
-    let header = ["Rows", "Number", "Median", "Robust spread", "rms", "Nine of ten"].map(str::to_owned).into();
-    let table = Table { caption: "Error less the model, by what the drive did".into(), header, rows };
-    Some(Block::Table { choice: Some(shown.level.id.into()), table })
 }
 
 /// Pulses that stay in one position.
@@ -469,13 +343,21 @@ fn pulse_table(shown: &Shown) -> Option<Block> {
             };
             vec![
                 Text::new(format!("{angle} = {}°", significant(pulse.position_rad.to_degrees(), 3))),
-                Text::default().error(pulse.height_arcsec, 3).plain("\u{a0}±\u{a0}").error(pulse.height_std_arcsec, 2),
+                plus_minus(pulse.height_arcsec, pulse.height_std_arcsec),
                 Text::new(format!("{}°", significant(pulse.width_rad.to_degrees(), 2))),
                 Text::new(pulse.per_turn.to_string()),
             ]
         })
         .collect();
-    let header = ["Where", "Height", "Width", "In a turn"].map(str::to_owned).into();
-    let table = Table { caption: "Pulses that stay in one position".into(), header, rows };
-    (!table.rows.is_empty()).then(|| Block::Table { choice: Some(shown.level.id.into()), table })
+    of_level(shown, "Pulses that stay in one position", &["Where", "Height", "Width", "In a turn"], rows)
+}
+
+/// A value in arcsec with its standard deviation.
+fn plus_minus(value: f64, std: f64) -> Text {
+    Text::arcsec(value, 3).plain("\u{a0}±\u{a0}").error(std, 2)
+}
+
+/// A table of a level, where it has rows.
+fn of_level(shown: &Shown, caption: &str, header: &[&str], rows: Vec<Vec<Text>>) -> Option<Block> {
+    (!rows.is_empty()).then(|| Block::table(caption, header, rows).of_choice(shown.level.id))
 }

@@ -3,7 +3,7 @@
 
 use crate::page::{Mark, Series, Upright};
 use flexspline_identify::diagnosis::rows::Rows;
-use flexspline_identify::measurement::{median_of, quantile_of};
+use flexspline_identify::measurement::median_of;
 
 /// Stretches of a chart over time.
 const STRETCHES: usize = 500;
@@ -36,7 +36,7 @@ impl Clock {
         Clock { at, begins }
     }
 
-    /// Names of the sessions where they begin; of many, every so many.
+    /// Names of the sessions where they begin; of many, some.
     pub(crate) fn borders(&self) -> Vec<Upright> {
         let every = self.begins.len().div_ceil(12);
         let named = |k: usize| if k.is_multiple_of(every) { format!("session {}", k + 1) } else { String::new() };
@@ -80,7 +80,7 @@ pub(super) fn envelope(rows: &Rows, clock: &Clock, values: &[f64], name: &str, c
         points.push([clock.at[part.start], values[first]]);
         points.push([clock.at[part.start + part.len() / 2], values[second]]);
     }
-    Series { name: name.to_owned(), mark: Mark::Broken, colour, points }
+    Series::new(name, Mark::Broken, colour, points)
 }
 
 /// Which rows are shown as dots: one of each stretch of equally many, drawn, so that they fall in with no rhythm of the
@@ -98,29 +98,13 @@ pub(super) fn some_rows(rows: usize) -> Vec<usize> {
         .collect()
 }
 
-fn sorted(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
-    points.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    // One point of a series to a place: the column has room for one.
-    points.dedup_by(|a, b| a[0] == b[0]);
-    points
-}
-
 /// Some rows as dots.
 pub(super) fn dots(over: &[f64], values: &[f64], rows: &[usize], name: &str, colour: usize) -> Series {
-    let points = rows.iter().map(|k| [over[*k], values[*k]]).collect();
-    Series { name: name.to_owned(), mark: Mark::Dots, colour, points: sorted(points) }
+    Series::sorted(name, Mark::Dots, colour, rows.iter().map(|k| [over[*k], values[*k]]).collect())
 }
 
-/// Medians over so many bins of equal width of a quantity, where there are rows enough.
-pub(super) fn medians(
-    over: &[f64],
-    values: &[f64],
-    rows: &[usize],
-    count: usize,
-    name: &str,
-    mark: Mark,
-    colour: usize,
-) -> Series {
+/// Medians of `count` bins of equal width over a quantity, ascending, where a bin has rows enough.
+pub(super) fn medians(over: &[f64], values: &[f64], rows: &[usize], count: usize) -> Vec<[f64; 2]> {
     let finite = || rows.iter().map(|k| over[*k]).filter(|x| x.is_finite());
     let (low, high) = finite().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
     let mut bins: Vec<(Vec<f64>, f64)> = vec![(Vec::new(), 0.0); count];
@@ -132,21 +116,11 @@ pub(super) fn medians(
             bin.1 += over[*k];
         }
     }
-    let points = bins
-        .iter_mut()
-        .filter(|(values, _)| values.len() >= FEWEST_IN_BIN)
-        .map(|(values, sum)| [*sum / values.len() as f64, median_of(values)])
-        .collect();
-    Series { name: name.to_owned(), mark, colour, points: sorted(points) }
+    let enough = bins.iter_mut().filter(|(values, _)| values.len() >= FEWEST_IN_BIN);
+    enough.map(|(values, sum)| [*sum / values.len() as f64, median_of(values)]).collect()
 }
 
-/// Median and the bounds of nine tenths of some values.
-pub(super) fn middle(mut values: Vec<f64>) -> [f64; 3] {
-    let (low, high) = (quantile_of(&mut values, 0.05), quantile_of(&mut values, 0.95));
-    [median_of(&mut values), low, high]
-}
-
-/// A curve with at most so many points: of those left out the largest stand.
+/// A curve of at most `most` points: the largest of each group.
 pub(super) fn peaks_kept(x: &[f64], y: &[f64], most: usize) -> Vec<[f64; 2]> {
     let size = x.len().div_ceil(most).max(1);
     (0..x.len())
@@ -207,13 +181,10 @@ mod tests {
         assert_eq!(some_rows(3), [0, 1, 2]);
         let over: Vec<f64> = all.iter().map(|k| (*k % 100) as f64).collect();
         let values: Vec<f64> = over.iter().map(|x| 3.0 * x).collect();
-        let series = medians(&over, &values, &all, 24, "x", Mark::Line, 0);
-        assert_eq!(series.points.len(), 24);
-        assert!(series.points.iter().all(|[x, y]| (y - 3.0 * x).abs() < 3.0), "{:?}", series.points);
-        assert_eq!(
-            medians(&[1.0; 50], &[1.0; 50], &(0..50).collect::<Vec<_>>(), 9, "x", Mark::Line, 0).points,
-            [] as [[f64; 2]; 0]
-        );
+        let points = medians(&over, &values, &all, 24);
+        assert_eq!(points.len(), 24);
+        assert!(points.iter().all(|[x, y]| (y - 3.0 * x).abs() < 3.0), "{points:?}");
+        assert_eq!(medians(&[1.0; 50], &[1.0; 50], &(0..50).collect::<Vec<_>>(), 9), [] as [[f64; 2]; 0]);
     }
 
     #[test]
