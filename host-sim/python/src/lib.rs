@@ -11,7 +11,6 @@ mod measured;
 mod run;
 mod simulate;
 mod step;
-mod study;
 mod tables;
 
 /// The module, as Python loads it.
@@ -25,8 +24,6 @@ mod native {
     use super::simulate::simulate;
     #[pymodule_export]
     use super::step::{PlayState, Table};
-    #[pymodule_export]
-    use super::study::study;
     #[pymodule_export]
     use super::tables::{project, tables};
 

@@ -222,27 +222,6 @@ def test_a_measurement_that_is_none_is_refused_and_never_scored(log_file: Path) 
         calibrator.score(holed.dropna())
 
 
-def test_study_is_the_command(tmp_path: Path) -> None:
-    command("study", "--vary", "flexspline.rim_thickness_mm=1.4,1.6", "-g", "cam", "--positions", 4, "--out", tmp_path)
-    made = flexspline.study("HHD-95", {"flexspline.rim_thickness_mm": [1.4, 1.6]}, "cam", positions=4)
-    same_columns(made, read_csv(tmp_path / "study.csv"))
-    theirs = read_json(tmp_path / "study.json")
-    assert made.json["runs"] == theirs["runs"]
-    assert flexspline.study("HHD-95", {"generator.w0_mm": "0.47..0.48"}, "cam", positions=4, variants=1).rows == 1
-
-
-def test_a_study_takes_the_loads_of_the_data_sheet_as_the_command_does(tmp_path: Path) -> None:
-    file = tmp_path / "own.toml"
-    file.write_text('base = "HHD-95"\n[data_sheet]\nt1_n_m = 7.0\nt2_n_m = 25.0\nrated_torque_n_m = 40.0\n', encoding="utf-8")
-    vary = "generator.w0_mm=0.48"
-    command("study", "--drive", file, "--vary", vary, "-g", "cam", "--positions", 4, "--out", tmp_path)
-    theirs = read_json(tmp_path / "study.json")
-    assert theirs["runs"][0]["loads"] == {"t1_n_m": 7.0, "t2_n_m": 25.0, "largest_n_m": 40.0}
-    # The sheet stays with a drive that is changed, and with one that is sent to another process.
-    for drive in (Drive(file), pickle.loads(pickle.dumps(Drive(file).set("generator.w0_mm=0.48")))):
-        assert flexspline.study(drive, {"generator.w0_mm": [0.48]}, "cam", positions=4).json["runs"] == theirs["runs"]
-
-
 def test_a_drive_is_what_its_file_says(tmp_path: Path) -> None:
     drive = Drive("HHD-95")
     friction = [
@@ -274,8 +253,6 @@ WRONG: list[tuple[Any, str]] = [
     (lambda: flexspline.tables("HHD-95", []), "generators: found none"),
     (lambda: flexspline.tables("HHD-95", "cam", positions=2), "positions: found 2, allowed: 4 to 32"),
     (lambda: flexspline.tables("HHD-95", "cam", torque_n_m=-1), "torque_n_m: found -1; allowed: more than"),
-    (lambda: flexspline.study("HHD-95", {}), "vary: found 0 of them"),
-    (lambda: flexspline.study("HHD-95", {"generator.w0": [1]}), "vary generator.w0"),
     (lambda: flexspline.calibrate("absent.csv", ratio=101), "absent.csv: No such file"),
     (lambda: flexspline.calibrate([], ratio=101), "logs: found none"),
     (lambda: flexspline.calibrate("a.csv"), "found none of ratio, model, table, allowed: one of"),

@@ -94,7 +94,6 @@ def test_all_that_is_public_is_explained() -> None:
 
 def test_pictures_have_axes_with_units(table: Table, log_file: Path) -> None:
     run = flexspline.simulate("HHD-95", "cam", path="pitch", torque_n_m=20, mesh="coarse")
-    study = flexspline.study("HHD-95", {"generator.w0_mm": [0.48]}, "cam", positions=4)
     replayed = table.replay(generator_rad=np.linspace(0, 1, 100), error_arcsec=np.zeros(100))
     drawn = {
         "generator angle, rad / transmission error, arcsec": [run.plot()],
@@ -103,7 +102,6 @@ def test_pictures_have_axes_with_units(table: Table, log_file: Path) -> None:
         "generator angle, rad / error at the output, arcsec": [replayed.plot()],
         "output angle, deg / error at the output, arcsec": [flexspline.calibrate(log_file, model=MODEL).plot()],
         "time, s / error at the output, arcsec": [flexspline.diagnose(log_file, model=MODEL).plot()],
-        "generator.w0_mm / k2_n_m_per_rad": [study.plot("generator.w0_mm", "k2_n_m_per_rad")],
     }
     for labels, axes in drawn.items():
         for ax in axes:

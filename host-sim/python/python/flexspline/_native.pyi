@@ -4,7 +4,7 @@ from typing import Any, TypedDict, final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Drive", "PlayState", "Table", "__version__", "calibrate", "diagnose", "project", "simulate", "study", "tables"]
+__all__ = ["Drive", "PlayState", "Table", "__version__", "calibrate", "diagnose", "project", "simulate", "tables"]
 
 __version__: str
 
@@ -138,23 +138,6 @@ def project(
     half_width_arcsec: float | None,
     deviation_arcsec: float | None,
 ) -> _MadeTable: ...
-def study(
-    drive: Drive,
-    vary: list[str],
-    generators: list[str],
-    *,
-    variants: int | None,
-    seed: int,
-    torque_n_m: float | None,
-    keep: list[str],
-    least: list[str],
-    most: list[str],
-    positions: int,
-    compute_all: bool,
-    mesh: str,
-    threads: int | None,
-    progress: _Teller,
-) -> str: ...
 def calibrate(
     logs: list[_Log],
     known: float | str | bytes,

@@ -12,7 +12,7 @@ from ._errors import BadInput
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ._runs import Calibration, Diagnosis, Simulation, Study
+    from ._runs import Calibration, Diagnosis, Simulation
     from ._table import Replay, Table
 
 _CURVES = 5
@@ -99,14 +99,3 @@ def diagnosis(found: Diagnosis, ax: Axes | None) -> Axes:
         ax.plot(x, rows.error_arcsec - rows.extended_arcsec, ".", markersize=2, label="left with the causes")
     named = ", ".join(cause.name for cause in found.causes) or found.finding.replace("_", " ")
     return _labelled(ax, "time, s" if timed else "row", "error at the output, arcsec", named)
-
-
-def study(made: Study, x: str, y: str, ax: Axes | None) -> Axes:
-    ax = _axes(ax)
-    generators = np.array(made.generator)
-    for generator in dict.fromkeys(made.generator):
-        own = generators == generator
-        drawn = ax.plot(np.asarray(made[x])[own], np.asarray(made[y])[own], "o", alpha=0.4, label=generator)
-        best = own & made.front
-        ax.plot(np.asarray(made[x])[best], np.asarray(made[y])[best], "*", color=drawn[0].get_color(), markersize=12)
-    return _labelled(ax, x, y, "stars: what nothing beats")
