@@ -359,13 +359,13 @@ fn help_and_version_are_no_errors() {
     assert!(desk.line("--version").stdout.starts_with("flexspline "));
 }
 
-/// What a study says of a drive is what the table of that drive says, and what it cannot do it says in its rows.
+/// The data sheet of a sweep agrees with the table of the same drive, and a variant that makes no drive has its reason.
 #[test]
-fn a_study_agrees_with_the_table_of_the_same_drive_and_tells_every_variant() {
+fn a_sweep_agrees_with_the_table_of_the_same_drive_and_reports_every_variant() {
     let desk = Desk::new();
     let run = desk
         .line(
-            "study --generator cam --vary generator.w0_mm=0.5,-1 --torque-n-m 200 --keep backlash_arcsec=..100 --json",
+            "sweep --generator cam --vary generator.w0_mm=0.5,-1 --torque-n-m 200 --keep backlash_arcsec=..100 --json",
         )
         .done();
     let json = run.json();
@@ -373,39 +373,43 @@ fn a_study_agrees_with_the_table_of_the_same_drive_and_tells_every_variant() {
         (json["converged"].as_u64(), json["refused"].as_u64(), json["meet"].as_u64()),
         (Some(1), Some(1), Some(1))
     );
-    assert!(json["runs"][1]["why"].as_str().unwrap().contains("generator.w0_mm"));
-    assert_eq!(names(&desk.path("out")), ["report.html", "study.csv", "study.json"]);
-    let asked: Vec<_> = json["asked"].as_array().unwrap().iter().map(|asked| asked["meet_alone"].as_u64()).collect();
-    assert_eq!(asked, [Some(1); 3], "{}", json["asked"]);
-    let rows = desk.read("out/study.csv");
-    assert!(rows.contains(",200,at_least,converged,"), "{rows}");
+    let written = ["plan.csv", "plan.json", "report.html", "results", "sweep.csv", "sweep.json"];
+    assert_eq!(names(&desk.path("out")), written);
+    let asked = json["generators"][0]["asked"].as_array().unwrap();
+    let asked: Vec<_> = asked.iter().map(|asked| asked["meet_alone"].as_u64()).collect();
+    assert_eq!(asked, [Some(1); 3], "{}", json["generators"]);
+    let rows = desk.read("out/sweep.csv");
+    assert!(rows.contains(",200,converged,true,true,"), "{rows}");
     assert!(rows.starts_with("variant,generator,generator.w0_mm,t1_n_m,"), "{rows}");
     assert_eq!(rows.lines().count(), 3);
+    assert!(rows.lines().last().unwrap().contains("refused") && rows.matches("generator.w0_mm").count() > 1, "{rows}");
+    let cells: Vec<&str> = rows.lines().nth(1).unwrap().split(',').collect();
+    let sheet = |name: &str| -> f64 {
+        cells[rows.lines().next().unwrap().split(',').position(|column| column == name).unwrap()].parse().unwrap()
+    };
 
     let tables = desk.line("tables --generator cam --mesh coarse --no-report --json --out tables").done().json();
     let stiffness = &tables["tables"][0]["stiffness"];
     for name in ["k1_n_m_per_rad", "k2_n_m_per_rad", "k3_n_m_per_rad"] {
-        let (sheet, table) = (json["runs"][0]["sheet"][name].as_f64().unwrap(), stiffness[name].as_f64().unwrap());
+        let (sheet, table) = (sheet(name), stiffness[name].as_f64().unwrap());
         // One place of the generator there, the mean of a pitch and of both directions here.
-        assert!((sheet / table - 1.0).abs() < 0.04, "{name}: {sheet} in the study, {table} of the table");
+        assert!((sheet / table - 1.0).abs() < 0.04, "{name}: {sheet} in the sweep, {table} of the table");
     }
     let backlash = tables["tables"][0]["backlash_arcsec"].as_f64().unwrap();
-    assert!((json["runs"][0]["sheet"]["backlash_arcsec"].as_f64().unwrap() - backlash).abs() < 0.5);
+    assert!((sheet("backlash_arcsec") - backlash).abs() < 0.5);
 
     for (wrong, due) in [
-        ("study --vary generator.w0=0.5", "did you mean `generator.w0_mm`?"),
-        ("study --vary generator.w0_mm=0.5..x", "allowed: PATH=FROM..TO"),
-        ("study --vary generator.w0_mm=0.5 --keep backlash=..3", "did you mean `backlash_arcsec`?"),
-        ("study --vary generator.w0_mm=0.5 --least stress", "max_von_mises_mpa"),
-        ("study --vary generator.w0_mm=0.5 --torque-n-m -3", "allowed: above 0"),
+        ("sweep --vary generator.w0=0.5", "did you mean `generator.w0_mm`?"),
+        ("sweep --vary generator.w0_mm=0.5..x", "allowed: PATH=FROM..TO"),
+        ("sweep --vary generator.w0_mm=0.5 --keep backlash=..3", "did you mean `backlash_arcsec`?"),
+        ("sweep --vary generator.w0_mm=0.5 --least stress", "max_von_mises_mpa"),
+        ("sweep --vary generator.w0_mm=0.5 --torque-n-m -3", "allowed: above 0"),
         ("new own.toml --teeth 200 --module -0.32", "--module: found -0.32, allowed"),
-        ("study --vary generator.w0_mm=0.5,0.49,0.50", "found the value 0.50 twice"),
-        ("study --vary generator.w0_mm=0.5..0.5", "found the value 0.5 twice"),
-        ("study --vary generator.w0_mm=0.5 --least bore_mpa --most bore_mpa", "found bore_mpa twice"),
-        (
-            "study -g cam --vary generator.w0_mm=0.5 --keep last_stable_n_m=300..",
-            "with the cam generator is 200 N.m, where the search for it ends",
-        ),
+        ("sweep --vary generator.w0_mm=0.5,0.49,0.50", "found the value 0.50 twice"),
+        ("sweep --vary generator.w0_mm=0.5..0.5", "found the value 0.5 twice"),
+        ("sweep --vary generator.w0_mm=0.5 --least bore_mpa --most bore_mpa", "found bore_mpa twice"),
+        ("sweep --vary generator.w0_mm=0.5 --tolerances t.toml --draws 9", "cannot be used with"),
+        ("sweep", "--vary <PATH=VALUES>"),
     ] {
         let run = desk.line(&format!("{wrong} --out nothing"));
         assert!(run.code == 2 && run.stderr.contains(due), "{wrong}: {}", run.stderr);

@@ -291,7 +291,7 @@ fn every_command_prints_one_json_object_and_nothing_else() {
     desk.write("path.csv", "generator_rad\n0\n");
     desk.write("samples.csv", &samples());
     desk.write("measured.csv", "generator_rad,output_rad\n0,0\n1,0.0105\n2,0.021\n");
-    desk.write("tolerances.toml", include_str!("../examples/campaign/teeth.toml"));
+    desk.write("tolerances.toml", include_str!("../examples/sweep/teeth.toml"));
     let lines = [
         "new nominal.toml",
         "new drive.toml",
@@ -313,15 +313,15 @@ fn every_command_prints_one_json_object_and_nothing_else() {
         "synthesize --model nominal.toml --rows 300 --sessions 4 --seed 1",
         "diagnose out/data.csv --model nominal.toml --no-report",
         "sleeve --drive CUP-95",
-        "study --generator cam --vary generator.w0_mm=0.5 --positions 4",
+        "sweep --generator cam --vary generator.w0_mm=0.5 --positions 4 --out sheet",
         "look out/data.csv",
         "calibrate out/data.csv --model nominal.toml",
         "fly camera --example",
         "fly camera --no-report",
-        "campaign plan --example",
-        "campaign plan tolerances.toml --drives 64 --shards 2 --out campaign",
-        "campaign run campaign --shard all",
-        "campaign reduce campaign",
+        "sweep --example",
+        "sweep plan --tolerances tolerances.toml --draws 64 --out sweep",
+        "sweep run sweep",
+        "sweep reduce sweep",
     ];
     for line in lines {
         let run = desk.line(&format!("{line} --json"));

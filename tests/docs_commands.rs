@@ -43,7 +43,7 @@ const NOT_RUN: [(&str, &str); 12] = [
 /// Programs beside ours that a block may call.
 const HELPERS: [&str; 9] = ["cd", "cp", "cmp", "mkdir", "cat", "head", "awk", "ls", "rm"];
 /// Parts of `tests/run` that run blocks marked with their name.
-const PARTS: [&str; 6] = ["firmware", "bundle", "c_interface", "campaign", "fmu", "python"];
+const PARTS: [&str; 6] = ["firmware", "bundle", "c_interface", "sweep", "fmu", "python"];
 /// The page whose Python is run, by the tests of `host-sim/python`.
 const PYTHON: &str = "docs/how-to/python.md";
 /// Pictures of examples are small, bytes.
@@ -471,7 +471,7 @@ fn commands_and_options_in_the_text_exist() {
         known += &help(&[command]);
     }
     for step in ["plan", "run", "reduce"] {
-        known += &help(&["campaign", step]);
+        known += &help(&["sweep", step]);
     }
     let mut wrong = Vec::new();
     // What changed is not what is: the change log is history.

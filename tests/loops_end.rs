@@ -143,7 +143,8 @@ const BOUNDED: &[(&str, &str, usize, Bound)] = &[
         Shrinks("pitches until MOST_PITCHES, where `settle_on` ends with an error"),
     ),
     ("design/src/simulate/summary.rs", "stretches", 1, Shrinks("rows, from stretch to stretch")),
-    ("design/src/study/estimate.rs", "furthest_first", 1, Shrinks("places that are not chosen")),
+    ("design/src/sweep/run.rs", "take", 1, Shrinks("rows that wait for those before them")),
+    ("design/src/sweep/run.rs", "rows_of", 1, Shrinks("records of a file")),
     ("identify/src/synthesize/data_fault.rs", "average", 1, Shrinks("rows before the one that is made")),
     ("design/src/tables/positions.rs", "places_that_tell_apart", 1, Shrinks("divisors up to the root of a number")),
     (

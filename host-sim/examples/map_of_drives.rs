@@ -6,7 +6,7 @@
 //! proportions. With `slices` the teeth of those with shells lean with the rim (`flexspline.face`), straight, as they
 //! were drawn for no cone. For each it is told whether it
 //!
-//! - converged: the data sheet of the drive (`flexspline study`) is whole, and what it says can be true;
+//! - converged: the data sheet of the drive (`flexspline sweep`) is whole, and what it says can be true;
 //! - was cautioned: so, too, with something to know before it is built;
 //! - was refused before anything was computed, with the reason;
 //! - failed, with the reason and the last stable load;
@@ -34,7 +34,7 @@ const RIM: [f64; 2] = [0.75, 1.25];
 const MOST_FRICTION: f64 = 0.15;
 const LOADS: [f64; 2] = [0.1, 1.0];
 const SLEEVES: [&str; 5] = ["springs", "none", "cup", "hat", "hermetic"];
-/// Positions over a tooth pitch, as `study` has them.
+/// Positions over a tooth pitch, as in `sweep --vary`.
 const POSITIONS: usize = 6;
 /// Share of drives that may fail.
 const MAY_FAIL: f64 = 0.01;

@@ -3,7 +3,7 @@
 //! ```text
 //! drive.toml -> drive -> mesh -> fem, contact -> stepping -> motion -> tables -> image (.fxt), read by `flexspline`
 //!                                                              |
-//!                                   simulate, kernels, campaign, reproduce, fly
+//!                                   simulate, kernels, sweep, reproduce, fly
 //! measured.csv -> measurement -> residual -> diagnosis (beside a table, or nominal.toml) -> extension -> drive, tables
 //! ```
 //!
@@ -37,9 +37,7 @@
 #![forbid(unsafe_code)]
 
 pub use flexspline_base::{csv_rows, output, robust, statistics, suggest, toml_file, units};
-pub use flexspline_design::{
-    campaign, catalogue, cautions, data_sheet, kernels, pitch_wave, simulate, stated, study, tables,
-};
+pub use flexspline_design::{catalogue, cautions, data_sheet, kernels, pitch_wave, simulate, stated, sweep, tables};
 pub use flexspline_export as export;
 pub use flexspline_export::bundle;
 pub use flexspline_fly::{fly, plant_map};

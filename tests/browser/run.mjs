@@ -198,7 +198,7 @@ for (const file of [
   "explained/report.html",
   "faults/report.html",
   "reproduce/report.html",
-  "study/report.html",
+  "sweep/report.html",
   "simulate/report.html",
   "path/report.html",
   "hostile.html",
@@ -803,7 +803,7 @@ await check("a link opens its generator at its figure", async () => {
 // ---- Browsers that have less
 
 await check("a legend tells marks apart", async () => {
-  const { page, close } = await open("study/report.html");
+  const { page, close } = await open("sweep/report.html");
   await page.waitForSelector("#trade .u-legend .u-marker");
   const marks = await page.$$eval("#trade .u-legend .u-marker", (all) =>
     all.map((mark) => {

@@ -150,61 +150,12 @@ pub struct DataSheet {
     pub tips_bear_percent: Option<f64>,
     /// Largest load at which equilibrium was found, N·m.
     pub last_stable_n_m: Option<f64>,
-    /// What bears there; missing where nothing does, and where figures were estimated.
+    /// Contact at the tips; missing where there is none.
     #[serde(skip)]
     pub tip_contact: Option<TipContact>,
 }
 
 impl DataSheet {
-    /// A sheet of figures in the order of [`FIGURES`].
-    pub(crate) fn of_figures(figures: [Option<f64>; FIGURES.len()]) -> DataSheet {
-        let [
-            rigid_gap_um,
-            room_as_built_arcsec,
-            backlash_arcsec,
-            lost_motion_arcsec,
-            k1_n_m_per_rad,
-            k2_n_m_per_rad,
-            k3_n_m_per_rad,
-            wind_up_arcsec,
-            kinematic_error_pp_arcsec,
-            max_von_mises_mpa,
-            root_fillet_mpa,
-            bore_mpa,
-            peak_flank_pressure_mpa,
-            peak_generator_pressure_mpa,
-            lobe_force_n,
-            tilt_mrad,
-            load_across_face_peak_over_mean,
-            teeth_in_contact_percent,
-            tips_bear_percent,
-            last_stable_n_m,
-        ] = figures;
-        DataSheet {
-            rigid_gap_um,
-            room_as_built_arcsec,
-            backlash_arcsec,
-            lost_motion_arcsec,
-            k1_n_m_per_rad,
-            k2_n_m_per_rad,
-            k3_n_m_per_rad,
-            wind_up_arcsec,
-            kinematic_error_pp_arcsec,
-            max_von_mises_mpa,
-            root_fillet_mpa,
-            bore_mpa,
-            peak_flank_pressure_mpa,
-            peak_generator_pressure_mpa,
-            lobe_force_n,
-            tilt_mrad,
-            load_across_face_peak_over_mean,
-            teeth_in_contact_percent,
-            tips_bear_percent,
-            last_stable_n_m,
-            tip_contact: None,
-        }
-    }
-
     /// What cautions look at.
     pub fn looked(&self) -> LookedAt {
         LookedAt {
@@ -358,15 +309,5 @@ mod tests {
     fn cautions_look_at_the_stress_in_root_fillets_too() {
         let sheet = DataSheet { max_von_mises_mpa: Some(664.0), root_fillet_mpa: Some(1204.0), ..DataSheet::default() };
         assert_eq!(sheet.looked().cautions()[0].figure, "root_fillet_mpa");
-    }
-
-    #[test]
-    fn a_sheet_of_figures_has_each_under_its_name() {
-        let sheet = DataSheet::of_figures(std::array::from_fn(|k| Some(k as f64)));
-        for (k, (name, of)) in FIGURES.iter().enumerate() {
-            assert_eq!(of(&sheet), Some(k as f64), "{name}");
-            let told = serde_json::to_value(sheet).unwrap();
-            assert_eq!(told[name], k as f64, "{name}");
-        }
     }
 }

@@ -1,12 +1,11 @@
-//! A drive on paper: what contact FEM says of it.
+//! A drive on paper: simulation, tables, data sheet, sweeps over variants, by contact FEM.
 //!
 //! [`simulate`] runs one drive along one path, [`tables`] makes and validates the table that firmware reads,
-//! [`data_sheet`] gives the figures of a data sheet and [`stated`] compares them with those of a maker, [`study`]
-//! compares variants, [`campaign`] draws drives from tolerances, [`kernels`] holds what small deviations of the
-//! surfaces do to the error, [`relief`] lowers tips that clash under load.
+//! [`data_sheet`] gives the figures of a data sheet and [`stated`] compares them with those of a maker, [`sweep`]
+//! computes variants and drives drawn from tolerances, [`kernels`] is the response of the error to small deviations of
+//! the surfaces, [`relief`] lowers tips that clash under load.
 #![forbid(unsafe_code)]
 
-pub mod campaign;
 pub mod catalogue;
 pub mod cautions;
 pub mod data_sheet;
@@ -15,5 +14,5 @@ pub mod pitch_wave;
 pub mod relief;
 pub mod simulate;
 pub mod stated;
-pub mod study;
+pub mod sweep;
 pub mod tables;

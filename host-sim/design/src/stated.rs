@@ -30,7 +30,7 @@ const STIFFNESS: Allowed = above(0.0, 1e9);
 const ARCMIN: Allowed = from(0.0, 600.0);
 const PERCENT: Allowed = above(0.0, 99.0);
 const ARCMIN_PER_RAD: f64 = ARCSEC_PER_RAD / 60.0;
-/// Positions over the tooth pitch, as `study` has them.
+/// Positions over the tooth pitch, as in `sweep --vary`.
 const POSITIONS: usize = 6;
 /// Steps of the load on the way to the ratcheting torque, and of the unloading of a drive with friction. A guess.
 const STEPS: u32 = 4;
@@ -212,11 +212,6 @@ impl Stated {
     /// Whether the rated torque leaves no range above T2: K3 then takes a larger load.
     fn is_rated_within_t2(&self) -> bool {
         self.rated_torque_n_m.zip(self.t2_n_m).is_some_and(|(rated, t2)| rated <= t2)
-    }
-
-    /// Whether any of its loads is stated: the others then follow from it, whatever the size of the drive.
-    pub(crate) fn has_loads(&self) -> bool {
-        [self.t1_n_m, self.t2_n_m, self.rated_torque_n_m].iter().any(Option::is_some)
     }
 
     /// The loads that it does not state, by their keys; the rated torque, too, if it is not above T2 and the largest

@@ -2,16 +2,15 @@
 //!
 //! [`page`] holds what pages are made of, [`drive_report()`] fills one in for `tables` and `validate`,
 //! `diagnosis_report` for `diagnose`, `calibration_report` for `calibrate`, `reproduction_report` for `reproduce`,
-//! `simulation_report` for `simulate`, `study_report` for `study`, `campaign_report` for `campaign`; another command
-//! makes its own [`page::Page`] from the same parts, and writes [`page::Page::html`]. `animation` takes the drive down
-//! in motion, `pack` makes numbers small. The browser's half is in `web/`: `pack.js` undoes `pack`, `motion.js` places
-//! the drive of `animation`, `charts.js` and `fields.js` draw figures.
+//! `simulation_report` for `simulate`, `sweep_report` for `sweep`; another command makes its own [`page::Page`] from the
+//! same parts, and writes [`page::Page::html`]. `animation` takes the drive down in motion, `pack` makes numbers small.
+//! The browser's half is in `web/`: `pack.js` undoes `pack`, `motion.js` places the drive of `animation`, `charts.js`
+//! and `fields.js` draw figures.
 #![forbid(unsafe_code)]
 
 pub mod animation;
 pub mod assets;
 pub mod calibration_report;
-pub mod campaign_report;
 pub mod diagnosis_report;
 pub mod drive_figures;
 mod drive_report;
@@ -20,7 +19,7 @@ pub(crate) mod pack;
 pub mod page;
 mod simulation_report;
 mod sleeve_view;
-pub mod study_report;
+pub mod sweep_report;
 
 pub use animation::{Animation, AnimationError};
 pub use drive_report::{DriveSources, DriveSubject, drive_report, shown_torque_n_m};

@@ -211,7 +211,7 @@ impl Jobs {
 
     /// Folders of short work long over go; so does the view of what is older still.
     fn forget_the_oldest(&self, inside: &mut Inside) {
-        let passing = |job: &JobRecord| job.is_over() && matches!(job.work.as_str(), "look" | "simulate" | "study");
+        let passing = |job: &JobRecord| job.is_over() && matches!(job.work.as_str(), "look" | "simulate" | "sweep");
         let old: Vec<u64> = inside.jobs.values().rev().filter(|job| passing(job)).map(|job| job.id).collect();
         for id in old.into_iter().skip(SHORT_KEPT) {
             let Some(job) = inside.jobs.remove(&id) else { continue };

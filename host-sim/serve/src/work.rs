@@ -235,7 +235,7 @@ impl WorkAsked {
             WorkAsked::Diagnose { .. } => "diagnose",
             WorkAsked::Replay { .. } => "replay",
             WorkAsked::Simulate { .. } => "simulate",
-            WorkAsked::Sheet { .. } => "study",
+            WorkAsked::Sheet { .. } => "sweep",
             WorkAsked::Tables { .. } | WorkAsked::Samples { .. } => "tables",
             WorkAsked::Validate { .. } => "validate",
             WorkAsked::Bundle { .. } => "bundle",
@@ -473,7 +473,7 @@ impl CommandLine<'_> {
         }
     }
 
-    /// A study of one variant: one field "varies" over the value that it has.
+    /// A sweep of one variant: one field "varies" over the value that it has.
     fn sheet(&mut self, asked: &DriveAsked) -> Result<(), WorkError> {
         const FIELD: &str = "generator.w0_mm";
         let w0 = match asked.sets.get(FIELD) {
@@ -536,7 +536,7 @@ mod tests {
         .unwrap();
         assert_eq!(
             words.arguments.join(" "),
-            "study --vary=generator.w0_mm=0.49 --drive=HHD-95 --set=flexspline.width_mm=20 --generator=cam \
+            "sweep --vary=generator.w0_mm=0.49 --drive=HHD-95 --set=flexspline.width_mm=20 --generator=cam \
              --positions=4 --out=bench/x-1"
         );
     }

@@ -198,7 +198,7 @@ async function start(view) {
 /** What commands wrote, from the bench or a terminal. */
 function results() {
   const links = [];
-  for (const { name } of named(/(^|\/)(calibration|diagnosis|summary|study)\.json$|\.fxt$/).slice(0, 40)) {
+  for (const { name } of named(/(^|\/)(calibration|diagnosis|summary|sweep)\.json$|\.fxt$/).slice(0, 40)) {
     const folder = name.includes("/") ? name.slice(0, name.lastIndexOf("/")) : "";
     const file = name.split("/").at(-1);
     const words = file.endsWith(".fxt")
@@ -207,7 +207,7 @@ function results() {
           "calibration.json": "a calibration",
           "diagnosis.json": "a diagnosis",
           "summary.json": "a run",
-          "study.json": "a study",
+          "sweep.json": "a sweep",
         }[file];
     const hash = file.endsWith(".fxt")
       ? `#table?${new URLSearchParams({ table: name })}`

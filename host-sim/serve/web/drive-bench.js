@@ -388,8 +388,8 @@ export async function driveBench(view, asked, bench) {
     const job = await run({ work: "sheet", drive, generator: g, torque_n_m: null }, wantedBy(mine));
     running.delete(job.id);
     if (mine !== round || job.state !== "done") return null;
-    const study = await fileJson(`${job.out}/study.json`);
-    return { job, run: study.runs[0] };
+    const columns = Object.entries(csvColumns(await fileText(`${job.out}/sweep.csv`)));
+    return { job, figures: Object.fromEntries(columns.filter(([, [x]]) => Number.isFinite(x)).map(([name, [x]]) => [name, x])) };
   }
 
   async function compute() {
@@ -442,17 +442,17 @@ export async function driveBench(view, asked, bench) {
 
   const FIGURES = [
     ["Kinematic error, peak to peak", (f) => errorOf(f.summary?.kinematic_error_pp_arcsec)],
-    ["Backlash", (f) => errorOf(f.sheet?.run.sheet?.backlash_arcsec)],
+    ["Backlash", (f) => errorOf(f.sheet?.figures.backlash_arcsec)],
     ["Wind-up under the load, clearance included", (f) => errorOf(f.summary?.wind_up_arcsec)],
     ["of it elastic", (f) => errorOf(f.summary?.wind_up_elastic_arcsec)],
-    ["K1, N·m/rad", (f) => number(f.sheet?.run.sheet?.k1_n_m_per_rad, 4)],
-    ["K2, N·m/rad", (f) => number(f.sheet?.run.sheet?.k2_n_m_per_rad, 4)],
-    ["K3, N·m/rad", (f) => number(f.sheet?.run.sheet?.k3_n_m_per_rad, 4)],
+    ["K1, N·m/rad", (f) => number(f.sheet?.figures.k1_n_m_per_rad, 4)],
+    ["K2, N·m/rad", (f) => number(f.sheet?.figures.k2_n_m_per_rad, 4)],
+    ["K3, N·m/rad", (f) => number(f.sheet?.figures.k3_n_m_per_rad, 4)],
     [
       "T1, T2 and largest load, N·m",
       (f) =>
-        f.sheet?.run.loads
-          ? [f.sheet.run.loads.t1_n_m, f.sheet.run.loads.t2_n_m, f.sheet.run.loads.largest_n_m]
+        f.sheet?.figures.t1_n_m
+          ? [f.sheet.figures.t1_n_m, f.sheet.figures.t2_n_m, f.sheet.figures.largest_n_m]
               .map((t) => number(t))
               .join(", ")
           : "–",

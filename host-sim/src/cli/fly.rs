@@ -13,7 +13,7 @@ use super::{Failure, report};
 use flexspline_base::figures;
 use flexspline_base::output::Outputs;
 use flexspline_base::suggest::did_you_mean;
-use flexspline_design::study::Vary;
+use flexspline_design::sweep::Vary;
 use flexspline_fly::fly::{
     ByController, Flown, FlyError, Results, SCENARIOS, VariedFlight, built_in, every, example, fly_varied, read,
     results,

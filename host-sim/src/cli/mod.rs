@@ -5,7 +5,6 @@
 
 mod bundle;
 mod calibrate;
-mod campaign;
 mod completions;
 mod context;
 mod diagnose;
@@ -30,7 +29,7 @@ mod serve;
 mod simulate;
 mod sleeve;
 mod stop;
-mod study;
+mod sweep;
 mod synthesize;
 mod tables;
 mod validate;
@@ -40,6 +39,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use clap::error::{ContextKind, ContextValue};
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueHint};
 
 use context::Context;
@@ -104,8 +104,7 @@ const GROUPS: [(&str, &[(&str, &str)]); 4] = [
         &[
             ("simulate", "run the drive along a path: kinematic error, backlash, wind-up, stress"),
             ("sleeve", "the sleeve or cup in three dimensions: stiffness by harmonic, tilt, torsion"),
-            ("study", "vary fields of a drive: the catalogue figures of each variant"),
-            ("campaign", "tolerances: thousands of random drives, and what to tighten first"),
+            ("sweep", "many variants of a drive, or drives drawn from tolerances"),
             ("fly", "a joint with mass in closed loop, with and without compensation"),
             ("export", "the mesh, the outlines, a CalculiX deck or an FMU, for other programs"),
             ("reproduce", "the paper's protocol for all four generators, compared with its results"),
@@ -150,6 +149,9 @@ const USUAL_PATH: [(&str, &str); 3] = [
     ("flexspline validate --tables out --drive drive.toml", "compare them with new FEM runs"),
 ];
 
+/// Commands of former versions, and the command that does their work.
+const FORMER: [(&str, &str); 2] = [("study", "sweep"), ("campaign", "sweep")];
+
 /// The drive where none is named.
 const USUAL_DRIVE: &str = "HHD-95";
 
@@ -183,8 +185,7 @@ fn parse(args: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> Result<
 enum Command {
     Simulate(simulate::Simulate),
     Sleeve(sleeve::SleeveCommand),
-    Study(study::StudyCommand),
-    Campaign(campaign::CampaignCommand),
+    Sweep(Box<sweep::SweepCommand>),
     Drive(drive::DriveCommand),
     Fly(fly::Fly),
     Export(Box<export::Export>),
@@ -239,6 +240,11 @@ pub fn run(args: impl IntoIterator<Item = impl Into<OsString>>) -> Outcome {
     let cli = match parse(&args) {
         Ok(cli) => cli,
         Err(help_or_error) => {
+            if let Some(ContextValue::String(name)) = help_or_error.get(ContextKind::InvalidSubcommand)
+                && let Some((_, now)) = FORMER.iter().find(|(former, _)| former == name)
+            {
+                return ended(Failure::BadInput(format!("`{name}` is now `{now}`: flexspline {now} --help")));
+            }
             let printed = help_or_error.print();
             return match say::written(printed) {
                 _ if help_or_error.use_stderr() => Outcome::BadInput,
@@ -295,8 +301,7 @@ impl Command {
         match self {
             Command::Simulate(command) => command.run(context),
             Command::Sleeve(command) => command.run(context),
-            Command::Study(command) => command.run(context),
-            Command::Campaign(command) => command.run(context),
+            Command::Sweep(command) => command.run(context),
             Command::Drive(command) => command.run(context),
             Command::Fly(command) => command.run(context),
             Command::Export(command) => command.run(context),
@@ -375,6 +380,8 @@ mod tests {
                 // Without these there is no file, no limit, nothing to change.
                 let absent = [
                     "sets",
+                    "vary",
+                    "tolerances",
                     "effects",
                     "model",
                     "tables",

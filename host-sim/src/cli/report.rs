@@ -168,15 +168,15 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(PAGE);
         let (drive, other) = (Drive::hhd_95(), Drive::built_in("CUP-95").unwrap());
-        assert_eq!(fate(&path, "study", Some(&drive)), None);
-        std::fs::write(&path, of("study", &drive)).unwrap();
-        assert_eq!(fate(&path, "study", Some(&drive)), None);
-        assert_eq!(fate(&path, "study", None), None);
-        let replaced = fate(&path, "study", Some(&other)).unwrap();
+        assert_eq!(fate(&path, "sweep", Some(&drive)), None);
+        std::fs::write(&path, of("sweep", &drive)).unwrap();
+        assert_eq!(fate(&path, "sweep", Some(&drive)), None);
+        assert_eq!(fate(&path, "sweep", None), None);
+        let replaced = fate(&path, "sweep", Some(&other)).unwrap();
         assert!(replaced.contains("of another drive (Page of HHD-95); it is replaced"), "{replaced}");
         let kept = fate(&path, "simulate", Some(&drive)).unwrap();
-        assert!(kept.contains("the page of `study` (Page of HHD-95)") && kept.ends_with("report-study.html"), "{kept}");
+        assert!(kept.contains("the page of `sweep` (Page of HHD-95)") && kept.ends_with("report-sweep.html"), "{kept}");
         std::fs::write(&path, "<p>mine").unwrap();
-        assert!(fate(&path, "study", Some(&drive)).unwrap().ends_with("report-other.html"));
+        assert!(fate(&path, "sweep", Some(&drive)).unwrap().ends_with("report-other.html"));
     }
 }

@@ -1,7 +1,7 @@
 //! Flights side by side: every combination of some values of a scenario's fields.
 
 use flexspline_base::toml_file::Problem;
-use flexspline_design::study::{Vary, grid};
+use flexspline_design::sweep::{Vary, grid};
 use serde::Serialize;
 
 use super::{Flown, FlyError, Results, read, results};

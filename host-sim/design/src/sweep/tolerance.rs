@@ -1,16 +1,13 @@
-//! The file of tolerances: a drive, its load, and what its drawing allows.
+//! The file of tolerances: a drive, its load, and the tolerances of its drawing.
 
-use std::fmt::{self, Display};
+use std::fmt::Display;
 
-use serde::{Deserialize, Serialize};
 use toml::Spanned;
 use toml::de::DeValue;
 
-use super::by_fem::FEM_FIGURES;
-use super::draw::Drawn;
-use super::model::FIGURES;
-use super::plan::PlanError;
-use super::shard::OWN_COLUMNS;
+use super::SweepError;
+use super::draw::{Drawn, sets};
+use crate::stated::short;
 use flexspline_base::statistics::{normal_cdf, normal_quantile};
 use flexspline_base::suggest::likeliest_path;
 use flexspline_base::toml_file::{Allowed, Entries, Refused, TomlFile, above, any, each_of, from, one_of, text, whole};
@@ -19,19 +16,18 @@ use flexspline_mechanics::drive::{Drive, GeneratorKind, Wheel};
 /// A commented file of tolerances.
 pub const EXAMPLE: &str = include_str!("example.toml");
 
-/// Tolerances of a file, at most: each takes four dimensions of the Sobol sequence, which has 256, where its share is
-/// sought.
+/// Tolerances of a file, at most.
 const MOST_TOLERANCES: usize = 60;
-/// `plus_minus` of a normal distribution is so many standard deviations: the "natural tolerance" of quality control.
+/// Standard deviations in the `plus_minus` of a normal distribution: the "natural tolerance" of quality control.
 const SIGMAS: f64 = 3.0;
-/// Limits of a normal or Rayleigh law that is given none, standard deviations: one drive in millions lies outside.
+/// Default limits of a normal or Rayleigh distribution, standard deviations: one drive in millions lies outside.
 const FAR: f64 = 5.5;
 
-/// The middle of a tolerance is refused if it is more than so many standard deviations, and more than this share, away
-/// from the value of the drive: guesses beyond what any drawing means.
+/// The middle of a tolerance is refused if it is more standard deviations than the first number, and more than this
+/// share, away from the value of the drive: guesses beyond any drawing.
 const FAR_OFF: (f64, f64) = (10.0, 0.1);
 
-/// What a file of tolerances says.
+/// The contents of a file of tolerances.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tolerances {
     /// The drive as drawn.
@@ -42,50 +38,35 @@ pub struct Tolerances {
     pub torque_n_m: f64,
     /// Temperature, °C.
     pub temperature_c: f64,
-    /// Errors (peak to peak, arcsec) whose probability of being exceeded is told.
+    /// Errors (peak to peak, arcsec) whose probability of being exceeded is reported.
     pub exceed_arcsec: Vec<f64>,
     /// The tolerances.
     pub list: Vec<Tolerance>,
 }
 
 /// One tolerance.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Tolerance {
-    /// What results call it.
+    /// Its name in the results.
     pub name: String,
     /// The field of the drive, as `--set` takes it.
     pub field: String,
-    /// What it does.
+    /// How it acts.
     pub acts: ToleranceActs,
     /// How it scatters.
     pub distribution: Distribution,
 }
 
-impl Tolerance {
-    /// Its columns in a shard: what was drawn, and the phase.
-    pub(crate) fn columns(&self) -> impl Iterator<Item = String> {
-        std::iter::once(self.name.clone()).chain(self.phase_column())
-    }
-
-    /// The column of its phase.
-    pub(crate) fn phase_column(&self) -> Option<String> {
-        self.acts.has_phase().then(|| format!("{}, phase_deg", self.name))
-    }
-}
-
 /// How a field acts, and by which kernels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", tag = "kind")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ToleranceActs {
     /// It changes the drive everywhere alike: FEM of three drives gives a parabola of every figure.
     Alike,
-    /// It displaces or deforms a part in a direction, which is random.
+    /// It displaces or deforms a part in a random direction.
     Directed,
     /// A harmonic of the pitch of a wheel, its phase random.
     Harmonic {
         /// Of which wheel.
-        #[serde(with = "wheel_by_name")]
         wheel: Wheel,
         /// Waves around it.
         order: u32,
@@ -93,16 +74,14 @@ pub enum ToleranceActs {
     /// A random error of every tooth of a wheel.
     Teeth {
         /// Of which wheel.
-        #[serde(with = "wheel_by_name")]
         wheel: Wheel,
-        /// What the distribution is of.
+        /// The error that is distributed.
         errors: TeethError,
     },
 }
 
-/// What a random error of teeth is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+/// A random error of teeth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TeethError {
     /// Of the position of each tooth, independently.
     Position,
@@ -111,18 +90,16 @@ pub enum TeethError {
 }
 
 /// A distribution within limits.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Distribution {
-    /// Its law.
+    /// Its form.
     pub law: Law,
-    /// Least and largest value; what lies outside is never drawn (the law is truncated, not clipped).
+    /// Least and largest value; values outside are never drawn (truncated, not clipped).
     pub limits: [f64; 2],
 }
 
-/// A law of distribution.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+/// The form of a distribution.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Law {
     /// Gaussian.
     Normal {
@@ -164,10 +141,9 @@ impl Distribution {
         value.clamp(low, high)
     }
 
-    /// What is wrong with a distribution that scatters about another value than the drive has: nothing within so many
-    /// standard deviations, or so small a share of the value. Of a field that is 0 as drawn, such as a wear, nobody
-    /// knows.
-    fn beside_drive(&self, nominal: f64) -> Option<String> {
+    /// Why a distribution about another value than that of the drive is refused; none within [`FAR_OFF`], or where the
+    /// field is 0 as drawn, such as a wear.
+    fn far_from_drive(&self, nominal: f64) -> Option<String> {
         let [low, high] = self.limits;
         let (middle, std) = match self.law {
             Law::Normal { mean, std } => (mean, std),
@@ -179,54 +155,15 @@ impl Distribution {
             format!(
                 "the tolerance scatters about {}, {:.0} standard deviations of {} away; allowed: about the value of \
                  the drive, which its file or --set changes",
-                told(middle),
+                short(middle),
                 off / std,
-                told(std)
+                short(std)
             )
         })
     }
-
-    /// The same tolerance, half as wide: about the middle, and a size about nothing.
-    #[must_use]
-    pub(crate) fn halved(&self) -> Distribution {
-        let middle = match self.law {
-            Law::Normal { mean, .. } => mean,
-            Law::Uniform if self.limits[0] == 0.0 => 0.0,
-            Law::Uniform => 0.5 * (self.limits[0] + self.limits[1]),
-            Law::Rayleigh { .. } => 0.0,
-        };
-        let law = match self.law {
-            Law::Normal { mean, std } => Law::Normal { mean, std: 0.5 * std },
-            Law::Uniform => Law::Uniform,
-            Law::Rayleigh { std } => Law::Rayleigh { std: 0.5 * std },
-        };
-        Distribution { law, limits: self.limits.map(|end| middle + 0.5 * (end - middle)) }
-    }
-}
-
-impl fmt::Display for Distribution {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [low, high] = self.limits;
-        match self.law {
-            Law::Normal { mean, std } => write!(f, "normal, mean {}, std {}", told(mean), told(std))?,
-            Law::Uniform => return write!(f, "uniform, {} to {}", told(low), told(high)),
-            Law::Rayleigh { std } => write!(f, "rayleigh, std {}", told(std))?,
-        }
-        write!(f, ", within {} to {}", told(low), told(high))
-    }
-}
-
-/// A number with four digits, in as few characters as these take.
-fn told(value: f64) -> f64 {
-    format!("{value:.3e}").parse().unwrap_or(value)
 }
 
 impl ToleranceActs {
-    /// Whether a direction or a phase is drawn beside the size.
-    pub(crate) fn has_phase(self) -> bool {
-        matches!(self, ToleranceActs::Directed | ToleranceActs::Harmonic { .. })
-    }
-
     /// How the field `at` a place acts; `order` where one is given.
     fn of(
         at: &Spanned<DeValue<'_>>,
@@ -267,9 +204,7 @@ impl ToleranceActs {
             _ => ToleranceActs::Alike,
         };
         match order {
-            Some(order) => {
-                refused(format!("order: found {order} beside {field:?}, allowed: with pitch harmonics alone"))
-            }
+            Some(order) => refused(format!("order: found {order} with {field:?}, allowed: with pitch harmonics alone")),
             None => Ok(acts),
         }
     }
@@ -298,21 +233,21 @@ impl Tolerances {
         name: &str,
         file_text: &str,
         drive: impl FnOnce(&str) -> Result<Drive, E>,
-    ) -> Result<Tolerances, PlanError> {
+    ) -> Result<Tolerances, SweepError> {
         let mut file = TomlFile::new(name, file_text);
-        let told = |file: TomlFile<'_>| PlanError::Tolerances(file.problems());
-        let Some(table) = file.parse() else { return Err(told(file)) };
+        let refused = |file: TomlFile<'_>| SweepError::Tolerances(file.problems());
+        let Some(table) = file.parse() else { return Err(refused(file)) };
         let mut known: Vec<String> = KEYS.iter().map(|key| (*key).to_owned()).collect();
         known.extend(TOLERANCE_KEYS.iter().map(|key| format!("tolerance.{key}")));
         file.refuse_unknown_keys(&table, &known.iter().map(String::as_str).collect::<Vec<_>>(), &[]);
         let value = |key: &str| -> Option<&Spanned<DeValue<'_>>> { table.get(key) };
         let named = value("drive").map_or(Some("HHD-95".to_owned()), |value| file.take("drive", text(value)));
-        let Some(named) = named else { return Err(told(file)) };
+        let Some(named) = named else { return Err(refused(file)) };
         let drive = match drive(&named) {
             Ok(drive) => drive,
             Err(why) => {
                 file.refuse_whole("drive", why.to_string());
-                return Err(told(file));
+                return Err(refused(file));
             }
         };
         if let Some(field) = drive.as_built.first_not_uniform() {
@@ -364,7 +299,10 @@ impl Tolerances {
                     let what = format!("found {}, allowed: 1 to {MOST_TOLERANCES}", list.len());
                     file.refuse(value.span(), "tolerance", what);
                 }
-                let twice = |a: &Tolerance, b: &Tolerance| a.name == b.name || (a.field == b.field && a.acts == b.acts);
+                let twice = |a: &Tolerance, b: &Tolerance| {
+                    let are_harmonics = matches!(a.acts, ToleranceActs::Harmonic { .. });
+                    a.name == b.name || (a.field == b.field && (a.acts == b.acts || !are_harmonics))
+                };
                 if let Some((k, _)) = list.iter().enumerate().find(|(k, b)| list[..*k].iter().any(|a| twice(a, b))) {
                     let what = format!("found {:?} twice, allowed: once", list[k].name);
                     file.refuse(value.span(), &format!("tolerance[{k}]"), what);
@@ -372,10 +310,6 @@ impl Tolerances {
                 if file.is_sound() {
                     let spans = value.get_ref().as_array().into_iter().flatten().map(Spanned::span);
                     for (k, span) in spans.enumerate().take(list.len()) {
-                        if let Some(column) = column_taken(&list, k) {
-                            let what = format!("found {column:?}, which another column of the shards has; give a name");
-                            file.refuse(span.clone(), &format!("tolerance[{k}].name"), what);
-                        }
                         if let Some(what) = limit_without_drive(&drive, &list, k) {
                             file.refuse(span, &format!("tolerance[{k}]"), what);
                         }
@@ -386,35 +320,35 @@ impl Tolerances {
         if file.is_sound() {
             Ok(Tolerances { drive, generators, torque_n_m, temperature_c, exceed_arcsec, list })
         } else {
-            Err(told(file))
+            Err(refused(file))
         }
     }
 }
 
-/// A column of tolerance `k` that a shard has already.
-fn column_taken(list: &[Tolerance], k: usize) -> Option<String> {
-    let others = list.iter().enumerate().filter(|(other, _)| *other != k).flat_map(|(_, other)| other.columns());
-    let taken: Vec<String> = others.chain(OWN_COLUMNS.iter().map(|name| (*name).to_owned())).collect();
-    let figure = |name: &String| FIGURES.iter().chain(&FEM_FIGURES).any(|known| known == name);
-    list[k].columns().find(|column| taken.contains(column) || figure(column))
-}
-
-/// What is wrong where a tolerance at one of its limits, the others in their middle, makes no drive.
+/// Why a tolerance at one of its limits, the others in their middle, makes no drive; none where both limits do.
 fn limit_without_drive(drive: &Drive, list: &[Tolerance], k: usize) -> Option<String> {
-    let teeth = [drive.flexspline.teeth, drive.circular_spline.teeth];
     let tolerance = &list[k];
     tolerance.distribution.limits.into_iter().find_map(|limit| {
         let mut drawn = Drawn::middle(list);
-        drawn.values[k] = limit;
+        drawn[k].value = limit;
         if let ToleranceActs::Teeth { wheel, .. } = tolerance.acts {
-            drawn.teeth_um[k] = vec![limit; teeth[usize::from(wheel == Wheel::CircularSpline)] as usize];
+            drawn[k].teeth_um = vec![limit; teeth(drive, wheel)];
         }
-        let error = drawn.drive(drive, list).err()?;
+        let sets = sets(list, &drawn);
+        let error = drive.with_sets(sets.iter().map(String::as_str)).err()?;
         Some(format!("{:?} at its limit {limit} makes no drive: {error}", tolerance.name))
     })
 }
 
-/// Load where none is given, of the rated one: a guess at what a joint sees most.
+/// Teeth of a wheel.
+pub(super) fn teeth(drive: &Drive, wheel: Wheel) -> usize {
+    match wheel {
+        Wheel::Flexspline => drive.flexspline.teeth as usize,
+        Wheel::CircularSpline => drive.circular_spline.teeth as usize,
+    }
+}
+
+/// Default load over the rated one: a guess at the usual load of a joint.
 const RATED_SHARE: f64 = 0.25;
 
 fn generators(value: &Spanned<DeValue<'_>>) -> Result<Vec<GeneratorKind>, Refused> {
@@ -447,7 +381,7 @@ fn tolerance(entry: &Spanned<DeValue<'_>>, drive: &Drive) -> Result<Tolerance, R
     let errors_given = table.given("errors", |value| one_of(&errors, value))?;
     let acts = ToleranceActs::of(place("field"), &field, order, errors_given.unwrap_or(TeethError::Position))?;
     if errors_given.is_some() && !matches!(acts, ToleranceActs::Teeth { .. }) {
-        let what = format!("errors: found it beside {field:?}, allowed: with errors of every tooth alone");
+        let what = format!("errors: found it with {field:?}, allowed: with errors of every tooth alone");
         return Err(Refused::because(place("errors"), what));
     }
     let nominal = match acts {
@@ -470,15 +404,12 @@ fn tolerance(entry: &Spanned<DeValue<'_>>, drive: &Drive) -> Result<Tolerance, R
         }
     })?;
     let is_size = !matches!(acts, ToleranceActs::Alike | ToleranceActs::Teeth { .. });
-    let beside = |key: &str, what: &str| Refused::because(place(key), format!("{key}: {what}"));
+    let wrong = |key: &str, what: &str| Refused::because(place(key), format!("{key}: {what}"));
     if mean.is_some() && (law != LawName::Normal || is_size) {
-        return Err(beside(
-            "mean",
-            "allowed: with distribution = \"normal\" of a field that is no size in a direction",
-        ));
+        return Err(wrong("mean", "allowed: with distribution = \"normal\" of a field that is no size in a direction"));
     }
     if std.is_some() && (half.is_some() || law == LawName::Uniform) {
-        return Err(beside("std", "allowed: with normal or rayleigh, and without plus_minus"));
+        return Err(wrong("std", "allowed: with normal or rayleigh, and without plus_minus"));
     }
     let middle = mean.unwrap_or(nominal);
     let missing = |what: &str| Refused::because(entry, format!("found no {what}"));
@@ -512,17 +443,17 @@ fn tolerance(entry: &Spanned<DeValue<'_>>, drive: &Drive) -> Result<Tolerance, R
             Distribution { law: Law::Rayleigh { std }, limits: limits.unwrap_or([0.0, FAR * std]) }
         }
     };
-    // A size is never negative, and no law may have all of itself outside its limits.
+    // A size is never negative, and part of the distribution has to lie within the limits.
     if is_size && distribution.limits[0] < 0.0 {
-        return Err(beside("limits", "found a size below 0, allowed: 0 or more"));
+        return Err(wrong("limits", "found a size below 0, allowed: 0 or more"));
     }
     let [least, most] = distribution.limits.map(|end| distribution.below(end));
     if most - least < LEAST_INSIDE {
-        return Err(beside("limits", "found limits that the distribution hardly ever keeps, allowed: wider ones"));
+        return Err(wrong("limits", "found limits that the distribution hardly ever keeps, allowed: wider ones"));
     }
-    if let Some(what) = distribution.beside_drive(nominal).filter(|_| matches!(acts, ToleranceActs::Alike)) {
+    if let Some(what) = distribution.far_from_drive(nominal).filter(|_| matches!(acts, ToleranceActs::Alike)) {
         let key = if mean.is_some() { "mean" } else { "limits" };
-        return Err(beside(key, &format!("{field:?} is {nominal} in the drive, and {what}")));
+        return Err(wrong(key, &format!("{field:?} is {nominal} in the drive, and {what}")));
     }
     let name = table.given("name", text)?.unwrap_or_else(|| match acts {
         ToleranceActs::Harmonic { order, .. } => format!("{field}, order {order}"),
@@ -531,7 +462,7 @@ fn tolerance(entry: &Spanned<DeValue<'_>>, drive: &Drive) -> Result<Tolerance, R
     Ok(Tolerance { name, field, acts, distribution })
 }
 
-/// Share of a law that must lie within its limits: below it a quantile has no digits left.
+/// Share of a distribution that must lie within its limits: below it a quantile has no digits left.
 const LEAST_INSIDE: f64 = 1e-6;
 
 /// The number that a field of the drive, named `at` a place, holds.
@@ -563,24 +494,5 @@ fn nominal(at: &Spanned<DeValue<'_>>, drive: &Drive, field: &str) -> Result<f64,
                 likeliest_path(field, &known).map_or_else(String::new, |meant| format!("; did you mean `{meant}`?"));
             refused(format!("found {field:?}, allowed: a field of the drive, as --set takes it{hint}"))
         }
-    }
-}
-
-/// A wheel by its name.
-mod wheel_by_name {
-    use super::Wheel;
-    use serde::{Deserialize, Deserializer, Serializer, de::Error};
-
-    pub(super) fn serialize<S: Serializer>(wheel: &Wheel, to: S) -> Result<S::Ok, S::Error> {
-        to.serialize_str(wheel.name())
-    }
-
-    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Wheel, D::Error> {
-        let name = String::deserialize(from)?;
-        let known = [Wheel::Flexspline, Wheel::CircularSpline];
-        known
-            .into_iter()
-            .find(|wheel| wheel.name() == name)
-            .ok_or_else(|| D::Error::custom(format!("no wheel {name:?}")))
     }
 }

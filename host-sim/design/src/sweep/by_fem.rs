@@ -1,13 +1,13 @@
-//! A drive of a campaign by contact FEM.
+//! A drive drawn from tolerances by contact FEM.
 
 use super::model::{WAVE, spread};
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::motion::Motion;
 use flexspline_mechanics::stepping::{Problem, SolveError, SolverSettings};
 
-/// What is to be computed of drives, and how.
+/// Load, temperature and method of a computation.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Conditions {
+pub(super) struct Conditions {
     /// The generator.
     pub kind: GeneratorKind,
     /// Temperature, °C.
@@ -18,11 +18,11 @@ pub(crate) struct Conditions {
     pub solver: SolverSettings,
 }
 
-/// Figures of a drive by FEM, as columns of a shard have them.
-pub(crate) const FEM_FIGURES: [&str; 2] = ["fem_places_pp_arcsec", "fem_places_rms_arcsec"];
+/// Figures of a drive by FEM, in the order of the columns of results.
+pub(super) const FEM_FIGURES: [&str; 2] = ["fem_places_pp_arcsec", "fem_places_rms_arcsec"];
 
 /// Error of a drive deformed afresh at each generator angle and loaded: peak to peak and root mean square, arcsec.
-pub(crate) fn figures(
+pub(super) fn figures(
     drive: &Drive,
     at: Conditions,
     angles_rad: impl Iterator<Item = f64>,
@@ -40,7 +40,7 @@ pub(crate) fn figures(
 }
 
 /// Error in settled motion at even places over a tooth pitch, from whole pitches on, arcsec.
-pub fn wave(drive: &Drive, at: Conditions) -> Result<Vec<f64>, SolveError> {
+pub(super) fn wave(drive: &Drive, at: Conditions) -> Result<Vec<f64>, SolveError> {
     let problem = Problem::new(drive, at.kind, at.temperature_c, at.solver)?;
     let step = problem.flexspline.pitch() / WAVE as f64;
     let mut motion = Motion::deformed(&problem, -step)?;

@@ -1,7 +1,8 @@
-//! What varies in a study, and the variants that are drawn from it.
+//! Fields that vary, and the variants made of their values.
 
 use std::str::FromStr;
 
+use fastrand::Rng;
 use thiserror::Error;
 
 /// Values of a range where their number is not given.
@@ -87,7 +88,7 @@ impl FromStr for Vary {
     }
 }
 
-/// Values at the commas that no bracket holds.
+/// Splits at the commas outside brackets.
 fn apart(values: &str) -> Vec<String> {
     let (mut found, mut depth) = (vec![String::new()], 0_usize);
     for letter in values.chars() {
@@ -104,7 +105,7 @@ fn apart(values: &str) -> Vec<String> {
     found.iter().map(|value| value.trim().to_owned()).collect()
 }
 
-/// Whether a field of the drive is an error of its making, and no choice of who designs it.
+/// Whether a field of the drive is a manufacturing error, which nobody chooses.
 pub fn is_error_of_making(path: &str) -> bool {
     path.starts_with("as_built.")
 }
@@ -122,7 +123,7 @@ impl Vary {
         }
     }
 
-    /// A value that it takes more than once, as numbers are the same. A range that asks for one value has it once.
+    /// A value that it takes more than once; numbers are compared as numbers.
     pub fn repeated(&self) -> Option<String> {
         let values = match &self.values {
             VariedValues::Range { from, to, count } if from == to && *count > 1 => return Some(written(*from)),
@@ -136,16 +137,8 @@ impl Vary {
         (1..values.len()).find(|k| values[..*k].iter().any(|other| same(other, &values[*k]))).map(|k| values[k].clone())
     }
 
-    /// Whether it has one value alone, on a grid or spread.
-    pub fn is_constant(&self, spread: bool) -> bool {
-        match &self.values {
-            VariedValues::Range { from, to, count } => *count == 1 && (!spread || from == to),
-            VariedValues::List(list) => list.len() == 1,
-        }
-    }
-
     /// Its value at a place of 0 (first) to 1 (excluded).
-    pub fn at(&self, place: f64) -> String {
+    fn at(&self, place: f64) -> String {
         match &self.values {
             VariedValues::Range { from, to, .. } => written(from + (to - from) * place),
             VariedValues::List(list) => list[((place * list.len() as f64) as usize).min(list.len() - 1)].clone(),
@@ -171,12 +164,23 @@ pub fn grid(vary: &[Vary]) -> Vec<Vec<String>> {
     })
 }
 
-/// `count` variants spread evenly over all ranges at once: a Sobol sequence with Owen's scrambling (Burley 2020).
-/// Variant i does not depend on how many there are.
-pub fn spread(vary: &[Vary], count: u32, seed: u32) -> Vec<Vec<String>> {
-    (0..count)
-        .map(|i| (0..).zip(vary).map(|(d, field)| field.at(f64::from(sobol_burley::sample(i, d, seed)))).collect())
-        .collect()
+/// `count` variants that fill all ranges at once, a Latin hypercube.
+pub(crate) fn filling(vary: &[Vary], count: usize, seed: u64) -> Vec<Vec<String>> {
+    let points = latin(count, vary.len(), &mut Rng::with_seed(seed));
+    points.iter().map(|point| vary.iter().zip(point).map(|(field, place)| field.at(*place)).collect()).collect()
+}
+
+/// `count` points of a Latin hypercube in the open unit cube: each of `count` equal parts of every axis holds one.
+pub(crate) fn latin(count: usize, axes: usize, random: &mut Rng) -> Vec<Vec<f64>> {
+    let mut points = vec![Vec::with_capacity(axes); count];
+    for _ in 0..axes {
+        let mut parts: Vec<usize> = (0..count).collect();
+        random.shuffle(&mut parts);
+        for (point, part) in points.iter_mut().zip(parts) {
+            point.push((part as f64 + random.f64().max(f64::MIN_POSITIVE)) / count as f64);
+        }
+    }
+    points
 }
 
 #[cfg(test)]
@@ -224,11 +228,6 @@ mod tests {
         assert_eq!(repeated("a=cup,hat,cup").as_deref(), Some("cup"));
         assert_eq!((repeated("a=1..1:1"), repeated("a=1..1:2").as_deref()), (None, Some("1")));
         assert_eq!((repeated("a=1..2:9"), repeated("a=1,10"), repeated("a=cup")), (None, None, None));
-        let constant = |text: &str| [false, true].map(|spread| read(text).is_constant(spread));
-        assert_eq!(
-            (constant("a=1..2:1"), constant("a=1..1:1"), constant("a=cup"), constant("a=1,2")),
-            ([true, false], [true; 2], [true; 2], [false; 2])
-        );
     }
 
     #[test]
@@ -240,18 +239,18 @@ mod tests {
         assert_eq!(variants[5], ["2", "z"]);
     }
 
-    /// Sixteen points of a Sobol sequence have one in each sixteenth of every range, scrambled or not.
+    /// Sixteen points of a Latin hypercube have one in each sixteenth of every range.
     #[test]
-    fn spread_variants_fill_every_range_evenly_and_do_not_depend_on_their_number() {
+    fn drawn_variants_fill_every_range_evenly() {
         let vary = [read("a=0..16"), read("b=0..16"), read("c=p,q")];
-        let variants = spread(&vary, 16, 1);
+        let variants = filling(&vary, 16, 1);
         for field in 0..2 {
             let mut cells: Vec<usize> = variants.iter().map(|v| v[field].parse::<f64>().unwrap() as usize).collect();
             cells.sort_unstable();
             assert_eq!(cells, (0..16).collect::<Vec<_>>());
         }
         assert_eq!(variants.iter().filter(|v| v[2] == "p").count(), 8);
-        assert_eq!(spread(&vary, 5, 1), variants[..5]);
-        assert_ne!(spread(&vary, 5, 2), variants[..5]);
+        assert_eq!(filling(&vary, 16, 1), variants);
+        assert_ne!(filling(&vary, 16, 2), variants);
     }
 }

@@ -1,9 +1,9 @@
 //! The figures of a drive by kernels: linear in the errors of its teeth, by interpolation in how far its axes stand
-//! apart, by parabolas in what changes it everywhere alike.
+//! apart, by parabolas in uniform changes.
 //!
 //! Over a turn of the output, at [`places`](Model::places) evenly apart, with `ψ` the angle of the generator,
-//! `α = ψ (1 − 1/ratio)` that on the circular spline, and `s` the axis of the circular spline beside that of the
-//! flexspline, seen from the major axis:
+//! `α = ψ (1 − 1/ratio)` that on the circular spline, and `s` the displacement of the axis of the circular spline from
+//! that of the flexspline, seen from the major axis:
 //!
 //! ```text
 //! e(ψ, T) = wave(ψ, T) + Σ p_k w_F(2πk/z_F − ψ, T) + Σ p_k w_C(2πk/z_C − α, T) + oval(α, T) + d(s(ψ), T)
@@ -11,21 +11,20 @@
 //! ```
 //!
 //! `wave` is settled motion over a tooth pitch of the drive that is alike everywhere; `w`, `oval` and `d` are those of
-//! [`crate::kernels`]. That errors of teeth and displaced axes do not change each other's effect, and that what is
-//! alike everywhere does not change the kernels, is what a campaign assumes, and what its drives by FEM test.
+//! [`crate::kernels`]. Errors of teeth, displaced axes and uniform changes are assumed not to change each other's effect;
+//! the drives that a sweep also computes by FEM test that.
 
 use std::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
 
-use super::draw::Drawn;
 use super::tolerance::{Tolerance, ToleranceActs};
 use crate::kernels::{EccentricField, Gain, Kernels, PlaceOfLoad};
 use crate::tables::places_that_tell_apart;
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::drive::{AsBuilt, Wheel};
 
-/// The figures of a drive by kernels, as columns of a shard have them.
+/// The figures of a drive by kernels, in the order of the columns of results.
 pub const FIGURES: [&str; 21] = [
     "error_pp_arcsec",
     "error_rms_arcsec",
@@ -49,16 +48,15 @@ pub const FIGURES: [&str; 21] = [
     "places_rms_arcsec",
     CLOSED,
 ];
-/// Share of the places, %, where no play is left between the flanks: lost motion there is that of the elastic wind-up
-/// alone.
-pub(crate) const CLOSED: &str = "play_closed_percent";
-/// Figures of a data sheet that follow what is alike everywhere.
-pub(crate) const SHEET: [&str; 6] =
+/// Share of the places, %, without play between the flanks: lost motion there is the elastic wind-up alone.
+pub(super) const CLOSED: &str = "play_closed_percent";
+/// Figures of a data sheet that follow uniform changes.
+pub(super) const SHEET: [&str; 6] =
     ["backlash_arcsec", "k1_n_m_per_rad", "k2_n_m_per_rad", "k3_n_m_per_rad", "wind_up_arcsec", "max_von_mises_mpa"];
 /// Samples of the wave over a tooth pitch.
-pub(crate) const WAVE: usize = 8;
-/// Numbers of the state of a drive that is alike everywhere: the wave under the load and under a light one, the sheet.
-pub(crate) const STATE: usize = 2 * WAVE + SHEET.len();
+pub(super) const WAVE: usize = 8;
+/// Numbers of the state of a drive without deviations: the wave under the load and under a light one, the sheet.
+pub(super) const STATE: usize = 2 * WAVE + SHEET.len();
 /// Samples of a wheel's error over its pitch. Kernels have a multiple.
 const SAMPLES: usize = 4;
 /// Places over a turn of the output, at least and at most.
@@ -68,13 +66,13 @@ const TABLE_ORDERS: [usize; 3] = [8, 8, 6];
 /// How far apart orders stay where places fold them.
 const APART: f64 = 0.9;
 
-/// What the FEM says of drives that are alike everywhere.
+/// Response of the drive to uniform changes, by FEM.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Response {
-    /// State of the middle drive: the wave under the load, that under the light load, the sheet; arcsec, N·m/rad, MPa.
+    /// State of the middle drive: the wave under the load, the wave under the light load, the sheet; arcsec, N·m/rad, MPa.
     pub middle: Vec<f64>,
-    /// What each tolerance of something alike everywhere changes.
+    /// Effect of each field that changes the drive uniformly.
     pub parabolas: Vec<Parabola>,
 }
 
@@ -82,8 +80,8 @@ pub struct Response {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Parabola {
-    /// Which tolerance.
-    pub tolerance: usize,
+    /// The field.
+    pub field: String,
     /// Values of the field: below, of the middle drive, above.
     pub at: [f64; 3],
     /// Change of the state at the first.
@@ -94,9 +92,18 @@ pub struct Parabola {
 
 impl Response {
     /// Whether its sizes are such that evaluation cannot fail.
-    pub(crate) fn fits(&self, tolerances: usize) -> bool {
+    pub(super) fn fits(&self) -> bool {
         let all = self.parabolas.iter().flat_map(|p| [&p.below, &p.above]).chain([&self.middle]);
-        all.into_iter().all(|list| list.len() == STATE) && self.parabolas.iter().all(|p| p.tolerance < tolerances)
+        all.into_iter().all(|list| list.len() == STATE)
+    }
+
+    /// State of a drive whose fields of the parabolas have these values.
+    fn at(&self, values: &[f64]) -> Vec<f64> {
+        let mut state = self.middle.clone();
+        for (parabola, value) in self.parabolas.iter().zip(values) {
+            parabola.add(*value, &mut state);
+        }
+        state
     }
 }
 
@@ -240,8 +247,7 @@ struct Curves {
 }
 
 /// Evaluates drives with one generator.
-pub struct Model {
-    tolerances: Vec<Tolerance>,
+pub(super) struct Model {
     teeth: [u32; 2],
     ratio: f64,
     response: Response,
@@ -262,14 +268,8 @@ pub struct Model {
 const SIGNS: [(usize, bool); 4] = [(0, false), (0, true), (1, false), (1, true)];
 
 impl Model {
-    /// `torques_n_m`: the load, and the light one between which and its opposite lost motion is told.
-    pub fn new(
-        kernels: &Kernels,
-        response: Response,
-        tolerances: &[Tolerance],
-        torques_n_m: [f64; 2],
-        fem_places: usize,
-    ) -> Model {
+    /// `torques_n_m`: the load, and the light load of lost motion.
+    pub(super) fn new(kernels: &Kernels, response: Response, torques_n_m: [f64; 2], fem_places: usize) -> Model {
         let signed: Vec<f64> = SIGNS
             .iter()
             .map(|(load, negative)| if *negative { -torques_n_m[*load] } else { torques_n_m[*load] })
@@ -285,7 +285,6 @@ impl Model {
             (0..n).map(|j| DriveAngles::at(ratio * j as f64 / n as f64, ratio)).collect()
         };
         let mut model = Model {
-            tolerances: tolerances.to_vec(),
             teeth: kernels.teeth,
             ratio,
             response,
@@ -304,7 +303,7 @@ impl Model {
                 .collect(),
             nominal: Vec::new(),
         };
-        let middle = model.curves(&Drawn::middle(tolerances));
+        let middle = model.curves(&AsBuilt::default(), &model.response.middle);
         model.nominal = model
             .places
             .iter()
@@ -316,26 +315,14 @@ impl Model {
         model
     }
 
-    /// Places over a turn of the output.
-    pub fn places(&self) -> usize {
-        self.places.len()
-    }
-
     /// Generator angles of the drives by FEM, rad.
-    pub(crate) fn fem_angles_rad(&self) -> impl Iterator<Item = f64> {
+    pub(super) fn fem_angles_rad(&self) -> impl Iterator<Item = f64> {
         self.fem_places.iter().map(|place| TAU * place.generator)
     }
 
-    /// Teeth of flexspline and circular spline.
-    pub fn teeth(&self) -> [u32; 2] {
-        self.teeth
-    }
-
-    fn curves(&self, drawn: &Drawn) -> Curves {
-        let mut built = AsBuilt::default();
-        drawn.deviate(&self.tolerances, &mut built);
+    fn curves(&self, built: &AsBuilt, state: &[f64]) -> Curves {
         let wheels = [0, 1].map(|w| {
-            let positions = self.wheels[w].positions(&built)?;
+            let positions = self.wheels[w].positions(built)?;
             Some((0..SIGNS.len()).map(|load| self.wheels[w].field(load, &positions)).collect())
         });
         let oval = (built.circular_spline_ovality_um != 0.0)
@@ -349,7 +336,6 @@ impl Model {
             vector(built.circular_spline_eccentricity_um, built.circular_spline_eccentricity_phase_deg);
         let on_generator = vector(-built.generator_eccentricity_um, built.generator_eccentricity_phase_deg);
         let apart = [on_flexspline, on_circular_spline, on_generator];
-        let state = self.state(drawn);
         Curves {
             wheels,
             oval,
@@ -358,23 +344,14 @@ impl Model {
         }
     }
 
-    /// State of the drive that is alike everywhere.
-    fn state(&self, drawn: &Drawn) -> Vec<f64> {
-        let mut state = self.response.middle.clone();
-        for parabola in &self.response.parabolas {
-            parabola.add(drawn.values[parabola.tolerance], &mut state);
-        }
-        state
-    }
-
-    /// Axis of the circular spline beside that of the flexspline, seen from the major axis, µm.
+    /// Displacement of the axis of the circular spline from that of the flexspline, seen from the major axis, µm.
     fn apart_at(apart: &[[f64; 2]; 3], place: &DriveAngles) -> [f64; 2] {
         let [x, y] = turned(apart[0], place.flexspline_direction);
         let [u, v] = turned(apart[1], place.circular_spline_direction);
         [x + u + apart[2][0], y + v + apart[2][1]]
     }
 
-    /// Error of what is alike everywhere, arcsec.
+    /// Error of the drive without deviations, arcsec.
     fn wave_error(&self, curves: &Curves, place: &DriveAngles, load: usize) -> f64 {
         let (size, negative) = SIGNS[load];
         let in_pitch = place.generator * f64::from(self.teeth[0]);
@@ -419,12 +396,12 @@ impl Model {
         below + (at(above) - below) * (size_um - low) / (self.apart[above].0 - low)
     }
 
-    /// The figures of a drive, in the order of [`FIGURES`].
-    pub(crate) fn figures(&self, drawn: &Drawn) -> Vec<f64> {
-        let curves = self.curves(drawn);
+    /// The figures of a drive, in the order of [`FIGURES`]; `values` are those of the fields of the parabolas.
+    pub(super) fn figures(&self, built: &AsBuilt, values: &[f64]) -> Vec<f64> {
+        let state = self.response.at(values);
+        let curves = self.curves(built, &state);
         let errors: Vec<[f64; 4]> = self.places.iter().map(|place| self.errors(&curves, place)).collect();
         let loaded: Vec<f64> = errors.iter().map(|e| e[0]).collect();
-        let state = self.state(drawn);
         let wind_up = least_wind_up(&state, self.light_n_m);
         let by_kernels = errors.iter().map(|e| e[2] - e[3]);
         let closed = by_kernels.clone().filter(|lost| *lost < wind_up).count();
@@ -455,13 +432,13 @@ impl Model {
         all
     }
 
-    /// Amplitude of so many waves in a turn of the output, arcsec.
+    /// Amplitude of the order `waves` of the output, arcsec.
     fn amplitude(&self, errors: &[f64], waves: f64) -> f64 {
         let [c, s] = self.projected(errors, waves as usize);
         2.0 * (c * c + s * s).sqrt()
     }
 
-    /// Mean of a curve times cosine and sine of so many waves.
+    /// Mean of a curve times cosine and sine of the order `waves`.
     fn projected(&self, errors: &[f64], waves: usize) -> [f64; 2] {
         let n = errors.len();
         let (mut c, mut s, mut at, step) = (0.0, 0.0, 0, waves % n);
@@ -476,9 +453,9 @@ impl Model {
         [c / n as f64, s / n as f64]
     }
 
-    /// Root mean square over the turn and both signs of the load, arcsec, that is left without a table, with that of
-    /// the middle drive, and with one of this drive, whose curves have [`TABLE_ORDERS`]. The zero of the output is set
-    /// once for both signs.
+    /// Residual error, root mean square over the turn and both signs of the load, arcsec: without a table, with the
+    /// table of the middle drive, and with the table of this drive, whose curves have [`TABLE_ORDERS`]. The zero of the
+    /// output is set once for both signs.
     fn left(&self, curves: &Curves, errors: &[[f64; 4]]) -> [f64; 3] {
         let both = |of: &dyn Fn(usize, usize) -> f64| {
             let all: Vec<f64> = (0..errors.len()).flat_map(|j| [of(j, 0), of(j, 1)]).collect();
@@ -486,7 +463,7 @@ impl Model {
         };
         let no = both(&|j, load| errors[j][load]);
         let nominal = both(&|j, load| errors[j][load] - self.nominal[j][load]);
-        // A table of this drive has its wave and its mean under either load; the curves take what is in their orders.
+        // A table of this drive has its wave and its mean under either load; the curves take their orders.
         let mut rest = 0.0;
         for load in [0, 1] {
             let here = self.places.iter().zip(errors);
@@ -504,11 +481,10 @@ impl Model {
     }
 }
 
-/// Lost motion where there is no play, arcsec: what a drive as stiff as the stiffest of K1, K2 and K3 winds up between
-/// the light loads.
+/// Lost motion without play, arcsec: the wind-up between the light loads at the stiffest of K1, K2 and K3.
 ///
-/// Kernels add what each deviation takes of the play. Once it is used up flanks bear on both sides, and nothing is left
-/// to be taken.
+/// Kernels add up how far each deviation reduces the play. Without play flanks bear on both sides, and nothing is left
+/// to reduce.
 fn least_wind_up(state: &[f64], light_n_m: f64) -> f64 {
     let sheet = SHEET.iter().zip(&state[2 * WAVE..]);
     let stiffest = sheet.filter(|(name, _)| name.starts_with('k')).map(|(_, k)| *k).fold(0.0, f64::max);
@@ -524,6 +500,6 @@ pub(super) fn spread(values: &[f64]) -> (f64, f64) {
 }
 
 /// Whether a tolerance needs kernels of displaced axes.
-pub(crate) fn displaces(tolerance: &Tolerance) -> bool {
+pub(super) fn displaces(tolerance: &Tolerance) -> bool {
     tolerance.acts == ToleranceActs::Directed && tolerance.field != "as_built.circular_spline_ovality_um"
 }

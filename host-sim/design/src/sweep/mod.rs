@@ -1,0 +1,34 @@
+//! Variants of a drive: planned, computed on one machine or many, and reduced to answers.
+//!
+//! ```text
+//! PATH=FROM..TO -> vary       -> plan: plan.csv, one variant a line, and plan.json, how variants are computed
+//! TOL.toml      -> tolerance  -> draw, respond (kernels and responses by FEM) -> plan
+//! plan          -> run        -> results/*.csv, a row for each variant and generator, appended in their order
+//! results       -> reduce     -> judge: constraints, Pareto front; scatter, quantiles, rank correlations
+//! ```
+//!
+//! Variants of `--vary` have their data sheets computed by contact FEM, drives drawn from tolerances the error over a
+//! turn by kernels ([`crate::kernels`]). Nothing passes between shards, and nothing is kept outside files: any engine
+//! may run them in any order, more than once, and kill them. Elementary functions of kernels are those of `libm`, so
+//! that their figures have the same bits on every machine; figures of the FEM are the same on one kind of processor.
+
+mod by_fem;
+mod draw;
+mod judge;
+mod model;
+mod plan;
+mod reduce;
+mod respond;
+mod run;
+mod tolerance;
+mod vary;
+
+pub use judge::{Constraint, Judge, Sense};
+pub use plan::{Plan, PlanSettings, SweepError, SweepProgress};
+pub use reduce::{Asked, Compared, FigureSpread, OfGenerator, Rank, Sweep, reduce};
+pub use run::{Ran, Row, RunStatus, Shard, run};
+pub use tolerance::{Distribution, EXAMPLE, Law, TeethError, Tolerance, ToleranceActs, Tolerances};
+pub use vary::{VariedValues, Vary, VaryError, grid, is_error_of_making};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,434 @@
+//! The plan of a sweep: `plan.csv` holds the variants, one a line, and `plan.json` how they are computed.
+
+use std::fs;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::by_fem::{Conditions, FEM_FIGURES};
+use super::draw::{draw, sets};
+use super::model::{self, Response};
+use super::respond::{respond, torques_n_m};
+use super::tolerance::{ToleranceActs, Tolerances};
+use super::vary::{Vary, filling, grid};
+use crate::data_sheet::{self, Loads};
+use crate::kernels::Kernels;
+use crate::stated::Stated;
+use flexspline_base::output::{OutputError, Outputs};
+use flexspline_base::toml_file::{Problem, lines};
+use flexspline_mechanics::drive::{Drive, DriveError, GeneratorKind};
+use flexspline_mechanics::mesh::MeshLevel;
+use flexspline_mechanics::stepping::{Method, SolverSettings};
+
+/// Version of `plan.json`.
+const SCHEMA: u32 = 1;
+/// Fields that vary at once, at most.
+const MOST_FIELDS: usize = 32;
+/// Variants of a sweep, at most.
+const MOST_VARIANTS: usize = 100_000;
+/// Drives drawn from tolerances, at least.
+const LEAST_DRAWS: usize = 8;
+/// First column of `plan.csv`.
+const NUMBER: &str = "variant";
+/// Loads of a data sheet, the first columns of its results.
+const LOADS: [&str; 3] = ["t1_n_m", "t2_n_m", "largest_n_m"];
+
+/// Why a sweep is not planned, run or reduced.
+#[derive(Debug, Error)]
+pub enum SweepError {
+    /// All mistakes in a file of tolerances.
+    #[error("{}", lines(.0))]
+    Tolerances(Vec<Problem>),
+    /// The user has to change something.
+    #[error("{0}")]
+    BadInput(String),
+    /// The computation failed, or results are missing.
+    #[error("{0}")]
+    Failed(String),
+    /// A file cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+}
+
+/// Called with the steps done, all steps, and a note.
+pub type SweepProgress<'a> = dyn Fn(usize, usize, &str) + Sync + 'a;
+
+/// Options of both kinds of plans.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PlanSettings {
+    /// Variants drawn; without it every combination of the values.
+    pub draws: Option<usize>,
+    /// Random seed of what is drawn.
+    pub seed: u64,
+    /// Mesh of all FEM.
+    pub mesh: MeshLevel,
+}
+
+/// A plan.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// Everything but the variants.
+    recipe: Recipe,
+    /// The drive whose fields vary.
+    pub drive: Drive,
+    /// `[data_sheet]` of the drive.
+    stated: Option<Stated>,
+    /// The generators.
+    pub generators: Vec<GeneratorKind>,
+    /// Fields that each variant sets.
+    pub columns: Vec<String>,
+    /// Values of the fields, by variant.
+    pub variants: Vec<Vec<String>>,
+    /// BLAKE3 of both files, its first 16 digits.
+    pub hash: String,
+}
+
+/// `plan.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Recipe {
+    schema_version: u32,
+    /// Version of the program; another version computes other figures.
+    tool_version: String,
+    /// The drive as a file, with its `[data_sheet]`.
+    drive_toml: String,
+    generators: Vec<String>,
+    mesh: String,
+    /// Inputs of the variants, and their names in the results.
+    names: Vec<[String; 2]>,
+    by: By,
+}
+
+/// How a variant is computed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub(super) enum By {
+    /// Its data sheet, by contact FEM.
+    Sheet {
+        /// Largest load, N·m; by default that of the data sheet of the drive, or of its size.
+        torque_n_m: Option<f64>,
+        /// Positions over a tooth pitch.
+        positions: usize,
+    },
+    /// Its error over a turn of the output, by kernels.
+    Kernels {
+        temperature_c: f64,
+        /// The load, and the light load of lost motion, N·m.
+        torques_n_m: [f64; 2],
+        /// Errors whose probability of being exceeded is reported, arcsec.
+        exceed_arcsec: Vec<f64>,
+        /// Variants, from the first on, that are also computed by FEM.
+        fem_variants: usize,
+        /// Places over a turn of the output of that FEM.
+        fem_places: u32,
+        /// By generator.
+        of: Vec<OfOne>,
+    },
+}
+
+/// Kernels and response with one generator.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct OfOne {
+    pub kernels: Kernels,
+    pub response: Response,
+}
+
+impl Plan {
+    /// A plan of fields that vary; variants have their data sheets computed, up to `torque_n_m` if it is given.
+    ///
+    /// # Errors
+    /// No field, a field or a value twice, too many variants, or a field none of whose values makes a drive.
+    pub fn of_fields(
+        drive: &Drive,
+        stated: Option<&Stated>,
+        vary: &[Vary],
+        generators: &[GeneratorKind],
+        (torque_n_m, positions): (Option<f64>, usize),
+        settings: PlanSettings,
+    ) -> Result<Plan, SweepError> {
+        let wrong = |what: String| Err(SweepError::BadInput(what));
+        let fields =
+            |found: String| wrong(format!("--vary: found {found}, allowed: 1 to {MOST_FIELDS} different fields"));
+        if !(1..=MOST_FIELDS).contains(&vary.len()) {
+            return fields(format!("{} of them", vary.len()));
+        }
+        if let Some(k) = (1..vary.len()).find(|k| vary[..*k].iter().any(|b| vary[*k].path == b.path)) {
+            return fields(format!("{} twice", vary[k].path));
+        }
+        if let Some((Vary { path, .. }, value)) = vary.iter().find_map(|field| Some((field, field.repeated()?))) {
+            return wrong(format!(
+                "--vary {path}: found the value {value} twice, allowed: each once; a field that does not vary goes \
+                 with --set {path}={value}"
+            ));
+        }
+        let of_grid = || vary.iter().map(|field| field.grid().len()).fold(1, usize::saturating_mul);
+        let count = settings.draws.unwrap_or_else(of_grid);
+        if !(1..=MOST_VARIANTS).contains(&count) {
+            return wrong(format!(
+                "--vary: found {count} variants, allowed: 1 to {MOST_VARIANTS}; fewer values, or --draws N"
+            ));
+        }
+        let variants = settings.draws.map_or_else(|| grid(vary), |count| filling(vary, count, settings.seed));
+        let by = By::Sheet { torque_n_m, positions };
+        let columns = vary.iter().map(|field| field.path.clone()).collect();
+        let plan = Plan::new((drive, stated), generators, (columns, variants), (Vec::new(), by), settings.mesh);
+        plan.makes_drives()?;
+        Ok(plan)
+    }
+
+    /// A plan of drives drawn from tolerances: influence kernels and responses by FEM. `fem` is the number of variants
+    /// that are also computed by FEM, and at how many places.
+    ///
+    /// # Errors
+    /// An option is out of bounds, the middle of the tolerances makes no drive, or the FEM finds no equilibrium.
+    pub fn of_tolerances(
+        of: &Tolerances,
+        (fem_variants, fem_places): (usize, u32),
+        settings: PlanSettings,
+        progress: &SweepProgress<'_>,
+    ) -> Result<Plan, SweepError> {
+        let draws = settings.draws.unwrap_or_default();
+        for (option, found, least, most) in [
+            ("--draws", draws, LEAST_DRAWS, MOST_VARIANTS),
+            ("--fem", fem_variants, 0, draws),
+            ("--fem-places", fem_places as usize, 5, 999),
+        ] {
+            if !(least..=most).contains(&found) {
+                return Err(SweepError::BadInput(format!("{option}: found {found}, allowed: {least} to {most}")));
+            }
+        }
+        let drawn = draw(&of.list, &of.drive, draws, settings.seed);
+        let split = |set: String| set.split_once('=').map(|(path, value)| (path.to_owned(), value.to_owned()));
+        let lines = drawn.iter().map(|one| sets(&of.list, one).into_iter().filter_map(split).unzip());
+        let (columns, variants): (Vec<Vec<String>>, Vec<Vec<String>>) = lines.unzip();
+        let columns = columns.into_iter().next().unwrap_or_default();
+        let by = By::Kernels {
+            temperature_c: of.temperature_c,
+            torques_n_m: torques_n_m(of),
+            exceed_arcsec: of.exceed_arcsec.clone(),
+            fem_variants,
+            fem_places,
+            of: respond(of, solver(settings.mesh), progress)?,
+        };
+        let names = of.list.iter().map(|tolerance| {
+            let input = match tolerance.acts {
+                ToleranceActs::Harmonic { order, .. } => of_order(&tolerance.field, order),
+                _ => tolerance.field.clone(),
+            };
+            [input, tolerance.name.clone()]
+        });
+        let named = (names.collect(), by);
+        Ok(Plan::new((&of.drive, None), &of.generators, (columns, variants), named, settings.mesh))
+    }
+
+    pub(super) fn new(
+        (drive, stated): (&Drive, Option<&Stated>),
+        generators: &[GeneratorKind],
+        (columns, variants): (Vec<String>, Vec<Vec<String>>),
+        (names, by): (Vec<[String; 2]>, By),
+        mesh: MeshLevel,
+    ) -> Plan {
+        let recipe = Recipe {
+            schema_version: SCHEMA,
+            tool_version: env!("CARGO_PKG_VERSION").to_owned(),
+            drive_toml: drive.to_toml() + &stated.map_or_else(String::new, Stated::to_toml),
+            generators: generators.iter().map(ToString::to_string).collect(),
+            mesh: mesh.to_string(),
+            names,
+            by,
+        };
+        let (drive, stated, generators) = (drive.clone(), stated.cloned(), generators.to_vec());
+        Plan { recipe, drive, stated, generators, columns, variants, hash: String::new() }
+    }
+
+    /// Refuses, before anything is computed, fields that make no drive with any of their values.
+    fn makes_drives(&self) -> Result<(), SweepError> {
+        let jobs = || (0..self.variants.len()).flat_map(|k| self.generators.iter().map(move |kind| (k, *kind)));
+        match self.drive_of(0, self.generators[0]) {
+            Err(why) if jobs().all(|(k, kind)| self.drive_of(k, kind).is_err()) => {
+                Err(SweepError::BadInput(format!("--vary: no variant makes a drive; the first: {why}")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The assignments PATH=VALUE of variant `k`, from 0.
+    pub fn sets(&self, k: usize) -> Vec<String> {
+        self.columns.iter().zip(&self.variants[k]).map(|(path, value)| format!("{path}={value}")).collect()
+    }
+
+    /// Variant `k`, from 0, as a drive with this generator.
+    ///
+    /// # Errors
+    /// Its values make no drive.
+    pub(super) fn drive_of(&self, k: usize, kind: GeneratorKind) -> Result<Drive, DriveError> {
+        self.drive.with_sets_for(&[kind], self.sets(k).iter().map(String::as_str))
+    }
+
+    /// Names of the figures, in the order of the columns of results.
+    pub fn figures(&self) -> Vec<&'static str> {
+        match self.recipe.by {
+            By::Sheet { .. } => LOADS.into_iter().chain(data_sheet::FIGURES.iter().map(|(name, _)| *name)).collect(),
+            By::Kernels { .. } => model::FIGURES.into_iter().chain(FEM_FIGURES).collect(),
+        }
+    }
+
+    /// The place of a figure in a row.
+    pub fn figure(&self, name: &str) -> Option<usize> {
+        self.figures().iter().position(|known| *known == name)
+    }
+
+    /// Whether drives are drawn from tolerances.
+    pub fn is_of_tolerances(&self) -> bool {
+        matches!(self.recipe.by, By::Kernels { .. })
+    }
+
+    pub(super) fn by(&self) -> &By {
+        &self.recipe.by
+    }
+
+    /// The name of an input in the results.
+    pub(super) fn named(&self, input: &str) -> String {
+        let named = self.recipe.names.iter().find(|[known, _]| known == input);
+        named.map_or_else(|| input.to_owned(), |[_, name]| name.clone())
+    }
+
+    /// The loads of the data sheet of a variant.
+    pub(super) fn loads(&self, drive: &Drive, kind: GeneratorKind, torque_n_m: Option<f64>) -> Loads {
+        let spanned_n_m = drive.rated_torque_n_m(kind);
+        match (torque_n_m, &self.stated) {
+            (Some(largest_n_m), _) => Loads::up_to(largest_n_m),
+            (None, Some(stated)) => stated.loads(spanned_n_m),
+            (None, None) => Loads::up_to(spanned_n_m),
+        }
+    }
+
+    /// Settings of all FEM.
+    pub(super) fn solver(&self) -> SolverSettings {
+        solver(self.recipe.mesh.parse().unwrap_or(MeshLevel::Coarse))
+    }
+
+    /// Conditions of the drives that are also computed by FEM.
+    pub(super) fn conditions(&self, kind: GeneratorKind, temperature_c: f64, torque_n_m: f64) -> Conditions {
+        Conditions { kind, temperature_c, torque_n_m, solver: self.solver() }
+    }
+
+    fn texts(&self) -> Result<[Vec<u8>; 2], SweepError> {
+        let failed = |error: &dyn std::fmt::Display| SweepError::Failed(format!("plan: {error}"));
+        let mut json = serde_json::to_vec(&self.recipe).map_err(|error| failed(&error))?;
+        json.push(b'\n');
+        let mut csv = csv::Writer::from_writer(Vec::new());
+        let header = || [NUMBER].into_iter().chain(self.columns.iter().map(String::as_str));
+        csv.write_record(header()).map_err(|error| failed(&error))?;
+        for (k, values) in self.variants.iter().enumerate() {
+            let number = (k + 1).to_string();
+            let line = [number.as_str()].into_iter().chain(values.iter().map(String::as_str));
+            csv.write_record(line).map_err(|error| failed(&error))?;
+        }
+        Ok([csv.into_inner().map_err(|error| failed(&error))?, json])
+    }
+
+    /// Writes both files, and reads them as every shard will. A folder with results of another plan keeps them.
+    ///
+    /// # Errors
+    /// The folder holds results of another plan, or cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<Plan, SweepError> {
+        let paths = ["plan.csv", "plan.json"].map(|name| folder.join(name));
+        let texts = self.texts()?;
+        let is_same = paths.iter().zip(&texts).all(|(path, text)| fs::read(path).is_ok_and(|there| there == *text));
+        let count = fs::read_dir(folder.join("results")).map_or(0, Iterator::count);
+        if !is_same && count > 0 {
+            return Err(SweepError::BadInput(format!(
+                "--out: found {}, which holds {count} files of results of another plan; give another folder, or \
+                 remove it",
+                folder.display()
+            )));
+        }
+        let mut outputs = Outputs::new();
+        for (path, text) in paths.iter().zip(&texts) {
+            outputs.file(path, |file| file.write_all(text))?;
+        }
+        outputs.finish()?;
+        Plan::read(folder)
+    }
+
+    /// Reads the plan of a folder.
+    ///
+    /// # Errors
+    /// There is none, it is not sound, or another version of the program made it: file, line and what is wrong.
+    pub fn read(folder: &Path) -> Result<Plan, SweepError> {
+        let [csv, json] = ["plan.csv", "plan.json"].map(|name| folder.join(name));
+        let text_of = |path: &Path| {
+            let hint = "`flexspline sweep plan ... --out DIR` writes one";
+            fs::read_to_string(path)
+                .map_err(|error| SweepError::BadInput(format!("{}: {error}; {hint}", path.display())))
+        };
+        let (csv_text, json_text) = (text_of(&csv)?, text_of(&json)?);
+        let wrong = |what: String| SweepError::BadInput(format!("{}: {what}", json.display()));
+        let recipe: Recipe = serde_json::from_str(&json_text).map_err(|error| wrong(error.to_string()))?;
+        if (recipe.schema_version, recipe.tool_version.as_str()) != (SCHEMA, env!("CARGO_PKG_VERSION")) {
+            return Err(wrong(format!(
+                "made by version {}, allowed: {}, which is running; plan anew",
+                recipe.tool_version,
+                env!("CARGO_PKG_VERSION")
+            )));
+        }
+        let drive = Drive::from_toml("drive_toml", &recipe.drive_toml).map_err(|error| wrong(error.to_string()))?;
+        let stated = Stated::of_file("drive_toml", &recipe.drive_toml).map_err(|error| wrong(error.to_string()))?;
+        let kinds = recipe.generators.iter().map(|name| name.parse().map_err(|_| wrong(format!("generator {name:?}"))));
+        let generators = kinds.collect::<Result<Vec<GeneratorKind>, SweepError>>()?;
+        if let By::Kernels { of, .. } = &recipe.by {
+            for one in of {
+                one.kernels.check().map_err(|problem| wrong(problem.to_string()))?;
+            }
+            if of.len() != generators.len() || !of.iter().all(|one| one.response.fits()) {
+                return Err(wrong("kernels or responses are missing; plan anew".to_owned()));
+            }
+        }
+        let (columns, variants) =
+            variants_of(&csv_text).map_err(|what| SweepError::BadInput(format!("{}{what}", csv.display())))?;
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(json_text.as_bytes()).update(csv_text.as_bytes());
+        let hash = hasher.finalize().to_hex().as_str()[..16].to_owned();
+        Ok(Plan { recipe, drive, stated, generators, columns, variants, hash })
+    }
+}
+
+/// The input of one harmonic of a field.
+pub(super) fn of_order(field: &str, order: impl std::fmt::Display) -> String {
+    format!("{field}, order {order}")
+}
+
+fn solver(mesh: MeshLevel) -> SolverSettings {
+    SolverSettings { method: Method::Fast, mesh, ..SolverSettings::default() }
+}
+
+/// Columns and variants of `plan.csv`.
+type Variants = (Vec<String>, Vec<Vec<String>>);
+
+fn variants_of(text: &str) -> Result<Variants, String> {
+    let mut reader = csv::Reader::from_reader(text.as_bytes());
+    let header = reader.headers().map_err(|error| format!(": {error}"))?.clone();
+    if header.get(0) != Some(NUMBER) || header.len() < 2 {
+        return Err(format!(":1: found {:?}, allowed: {NUMBER}, then fields of the drive", header.as_slice()));
+    }
+    let mut variants = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(|error| format!(": {error}"))?;
+        let number = variants.len() + 1;
+        if record.get(0) != Some(number.to_string().as_str()) || number > MOST_VARIANTS {
+            let line = record.position().map_or(0, csv::Position::line);
+            return Err(format!(
+                ":{line}: {NUMBER}: found {:?}, allowed: 1, 2, 3 and so on, up to {MOST_VARIANTS}",
+                record.get(0).unwrap_or_default()
+            ));
+        }
+        variants.push(record.iter().skip(1).map(str::to_owned).collect());
+    }
+    if variants.is_empty() {
+        return Err(": found no variant, allowed: one a line".to_owned());
+    }
+    Ok((header.iter().skip(1).map(str::to_owned).collect(), variants))
+}

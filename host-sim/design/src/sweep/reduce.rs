@@ -1,0 +1,378 @@
+//! From results to answers: what meets the constraints, the Pareto front, scatter, and which input matters.
+
+use std::collections::{BTreeMap, HashMap};
+use std::fs;
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::by_fem::FEM_FIGURES;
+use super::judge::{Judge, clears, cost};
+use super::model::CLOSED;
+use super::plan::{By, Plan, SweepError, of_order};
+use super::run::{Row, RunStatus, rows_of};
+use flexspline_base::robust::least_and_most;
+use flexspline_base::statistics::{Exceeded, Quantile, correlation, exceeded, mean, quantile, std_dev};
+use flexspline_mechanics::drive::GeneratorKind;
+
+/// Shares of the variants whose quantiles are reported.
+const SHARES: [f64; 6] = [0.01, 0.05, 0.5, 0.9, 0.95, 0.99];
+/// Variants without results that are named.
+const MOST_NAMED: usize = 5;
+/// Figures that kernels and FEM both have.
+const COMPARED: [&str; 2] = ["places_pp_arcsec", "places_rms_arcsec"];
+
+/// A sweep, reduced: `sweep.json`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Sweep {
+    /// Version of this form.
+    pub schema_version: u32,
+    /// Version of the program.
+    pub tool_version: &'static str,
+    /// Hash of the plan.
+    pub plan: String,
+    /// The drive.
+    pub drive: String,
+    /// Variants of the plan.
+    pub variants: usize,
+    /// Runs without results; a run is a variant with a generator.
+    pub missing: usize,
+    /// Runs by how they ended.
+    pub converged: usize,
+    /// No equilibrium from some load on.
+    pub failed: usize,
+    /// Values that make no drive.
+    pub refused: usize,
+    /// Runs that meet every constraint.
+    pub meet: usize,
+    /// By generator.
+    pub generators: Vec<OfGenerator>,
+    /// Every row, whether it meets, and whether it is Pareto-optimal.
+    #[serde(skip)]
+    pub rows: Vec<(Row, bool, bool)>,
+}
+
+/// Results with one generator.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OfGenerator {
+    /// The generator.
+    pub generator: GeneratorKind,
+    /// The Pareto front, best in the first target first: numbers of variants, from 1.
+    pub front: Vec<usize>,
+    /// Each thing asked of a variant, alone.
+    pub asked: Vec<Asked>,
+    /// Scatter of the figures over the variants that converged.
+    pub figures: Vec<FigureSpread>,
+    /// Rank correlations of inputs and figures, the strongest of each figure first.
+    pub ranks: Vec<Rank>,
+    /// Share of the drives above each error of the tolerances.
+    pub exceeded: Vec<Exceeded>,
+    /// Kernels against FEM, figure by figure.
+    pub fem: Vec<Compared>,
+    /// Drives that the FEM could not deform or load.
+    pub fem_failed: usize,
+    /// Drives whose axes are further apart than the kernels reach: their errors are extrapolated.
+    pub beyond_kernels: usize,
+    /// Drives without play at some place: lost motion there is the wind-up alone.
+    pub play_closed: usize,
+}
+
+/// One thing asked of a variant.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Asked {
+    /// `converged`, `teeth clear`, or a constraint as `--keep` takes it.
+    pub what: String,
+    /// Variants that have it.
+    pub meet_alone: usize,
+    /// All variants.
+    pub of: usize,
+    /// Least and largest value of the figure; missing where there is none.
+    pub found: Option<[f64; 2]>,
+}
+
+/// Scatter of a figure.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FigureSpread {
+    /// The figure.
+    pub figure: &'static str,
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviation.
+    pub std: f64,
+    /// Quantiles.
+    pub quantiles: Vec<Quantile>,
+}
+
+/// Spearman's rank correlation.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Rank {
+    /// The figure.
+    pub figure: &'static str,
+    /// The field, or the name of its tolerance.
+    pub input: String,
+    /// −1 to 1.
+    pub correlation: f64,
+}
+
+/// A figure by kernels and by FEM, on the drives that have both.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Compared {
+    /// The figure.
+    pub figure: &'static str,
+    /// Drives.
+    pub drives: usize,
+    /// Correlation of both; missing where one does not scatter.
+    pub correlation: Option<f64>,
+    /// Kernels less FEM: mean, root mean square and largest, arcsec.
+    pub off_mean_arcsec: f64,
+    /// Root mean square.
+    pub off_rms_arcsec: f64,
+    /// Largest size.
+    pub off_most_arcsec: f64,
+}
+
+/// Reduces the results in the folder of a sweep; `partial` accepts missing ones.
+///
+/// # Errors
+/// Results are missing or damaged, or of another plan: the file, and the command that computes them.
+pub fn reduce(plan: &Plan, folder: &Path, judge: &Judge, partial: bool) -> Result<Sweep, SweepError> {
+    let (rows, missing) = gathered(plan, folder, partial)?;
+    let meet = judge.meet(plan, &rows);
+    let front = judge.front(plan, &rows, &meet);
+    let inputs = inputs(plan);
+    let generators = plan.generators.iter().map(|kind| {
+        let of_kind: Vec<usize> = (0..rows.len()).filter(|k| rows[*k].generator == *kind).collect();
+        let mut best: Vec<usize> = of_kind.iter().copied().filter(|k| front[*k]).collect();
+        if let Some((first, sense)) = judge.targets.first().and_then(|(name, sense)| Some((plan.figure(name)?, *sense)))
+        {
+            best.sort_by(|a, b| cost(rows[*a].figures[first], sense).total_cmp(&cost(rows[*b].figures[first], sense)));
+        }
+        let of_kind: Vec<&Row> = of_kind.into_iter().map(|k| &rows[k]).collect();
+        let front = best.into_iter().map(|k| rows[k].variant + 1).collect();
+        of_generator(plan, *kind, &of_kind, (front, judge), &inputs)
+    });
+    let generators = generators.collect();
+    let ended = |status| rows.iter().filter(|row| row.status == status).count();
+    let (converged, failed, refused) =
+        (ended(RunStatus::Converged), ended(RunStatus::Failed), ended(RunStatus::Refused));
+    let marked: Vec<(Row, bool, bool)> =
+        rows.into_iter().zip(meet).zip(front).map(|((row, meets), front)| (row, meets, front)).collect();
+    Ok(Sweep {
+        schema_version: 1,
+        tool_version: env!("CARGO_PKG_VERSION"),
+        plan: plan.hash.clone(),
+        drive: plan.drive.name.clone(),
+        variants: plan.variants.len(),
+        missing,
+        converged,
+        failed,
+        refused,
+        meet: marked.iter().filter(|(_, meets, _)| *meets).count(),
+        generators,
+        rows: marked,
+    })
+}
+
+/// Rows of all files of results, by variant, then by generator, and how many are missing.
+fn gathered(plan: &Plan, folder: &Path, partial: bool) -> Result<(Vec<Row>, usize), SweepError> {
+    let results = folder.join("results");
+    let entries = fs::read_dir(&results).map(|entries| entries.flatten().map(|entry| entry.path()).collect());
+    let mut paths: Vec<_> = entries.unwrap_or_else(|_| Vec::new());
+    paths.retain(|path| path.extension().is_some_and(|end| end == "csv"));
+    paths.sort();
+    let mut found = BTreeMap::new();
+    for path in &paths {
+        let text = fs::read(path).map_err(|error| SweepError::Failed(format!("{}: {error}", path.display())))?;
+        for row in rows_of(path, &text, plan)?.0 {
+            let g = plan.generators.iter().position(|kind| *kind == row.generator).unwrap_or_default();
+            found.entry((row.variant, g)).or_insert(row);
+        }
+    }
+    let all = (0..plan.variants.len()).flat_map(|k| (0..plan.generators.len()).map(move |g| (k, g)));
+    let missing: Vec<usize> = all.filter(|of| !found.contains_key(of)).map(|(k, _)| k + 1).collect();
+    if found.is_empty() || (!partial && !missing.is_empty()) {
+        let named: Vec<String> = missing.iter().take(MOST_NAMED).map(ToString::to_string).collect();
+        return Err(SweepError::Failed(format!(
+            "{}: {} of {} runs are missing, of the variants {}{}; `flexspline sweep run {}` computes them{}",
+            results.display(),
+            missing.len(),
+            plan.variants.len() * plan.generators.len(),
+            named.join(", "),
+            if missing.len() > named.len() { " and more" } else { "" },
+            folder.display(),
+            if found.is_empty() { "" } else { ", --partial reduces what is there" },
+        )));
+    }
+    Ok((found.into_values().collect(), missing.len()))
+}
+
+fn of_generator(
+    plan: &Plan,
+    generator: GeneratorKind,
+    rows: &[&Row],
+    (front, judge): (Vec<usize>, &Judge),
+    inputs: &[(String, Vec<f64>)],
+) -> OfGenerator {
+    let sound: Vec<&Row> = rows.iter().copied().filter(|row| row.status == RunStatus::Converged).collect();
+    let column = |name: &str| -> Vec<f64> {
+        plan.figure(name).map_or_else(Vec::new, |k| sound.iter().map(|row| row.figures[k]).collect())
+    };
+    let (mut figures, mut ranks) = (Vec::new(), Vec::new());
+    for figure in plan.figures() {
+        let values = column(figure);
+        let mut sorted: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
+        if sorted.is_empty() {
+            continue;
+        }
+        sorted.sort_by(f64::total_cmp);
+        let quantiles = SHARES.iter().map(|share| quantile(&sorted, *share)).collect();
+        figures.push(FigureSpread { figure, mean: mean(&sorted), std: std_dev(&sorted), quantiles });
+        let of_input = |(input, of): &(String, Vec<f64>)| {
+            let pairs = sound.iter().map(|row| of[row.variant]).zip(values.iter().copied());
+            let correlation = rank_correlation(pairs)?;
+            Some(Rank { figure, input: input.clone(), correlation })
+        };
+        let mut of_figure: Vec<Rank> = inputs.iter().filter_map(of_input).collect();
+        of_figure.sort_by(|a, b| b.correlation.abs().total_cmp(&a.correlation.abs()));
+        ranks.extend(of_figure);
+    }
+    let (mut above, mut fem_failed, mut beyond_kernels) = (Vec::new(), 0, 0);
+    if let By::Kernels { exceed_arcsec, fem_variants, of, .. } = plan.by() {
+        let errors = column("error_pp_arcsec");
+        above = exceed_arcsec.iter().filter(|_| !errors.is_empty()).map(|limit| exceeded(&errors, *limit)).collect();
+        let of_fem = |row: &&&Row| row.variant < *fem_variants;
+        let fem = plan.figure(FEM_FIGURES[0]).unwrap_or_default();
+        fem_failed = sound.iter().filter(of_fem).filter(|row| row.figures[fem].is_nan()).count();
+        let one = of.iter().find(|one| one.kernels.generator == generator);
+        let reach = one.and_then(|one| one.kernels.eccentric.sizes_um.last()).copied().unwrap_or_default();
+        beyond_kernels = column("axes_apart_um").iter().filter(|size| **size > reach).count();
+    }
+    let both = COMPARED.iter().zip(FEM_FIGURES);
+    OfGenerator {
+        generator,
+        front,
+        asked: asked(plan, judge, rows),
+        figures,
+        ranks,
+        exceeded: above,
+        fem: both.filter_map(|(figure, fem)| compared(figure, &column(figure), &column(fem))).collect(),
+        fem_failed,
+        beyond_kernels,
+        play_closed: column(CLOSED).iter().filter(|share| **share > 0.0).count(),
+    }
+}
+
+/// How many rows have each thing that is asked, alone.
+fn asked(plan: &Plan, judge: &Judge, rows: &[&Row]) -> Vec<Asked> {
+    let one = |what: String, found, has: &dyn Fn(&Row) -> bool| Asked {
+        what,
+        meet_alone: rows.iter().filter(|row| has(row)).count(),
+        of: rows.len(),
+        found,
+    };
+    let mut all = vec![one("converged".to_owned(), None, &|row| row.status == RunStatus::Converged)];
+    if plan.figure("rigid_gap_um").is_some() {
+        all.push(one("teeth clear".to_owned(), None, &|row| clears(plan, row)));
+    }
+    for kept in &judge.constraints {
+        let Some(k) = plan.figure(&kept.figure) else { continue };
+        let (low, high) = least_and_most(rows.iter().map(|row| row.figures[k]).filter(|x| x.is_finite()));
+        let found = (low <= high).then_some([low, high]);
+        all.push(one(kept.to_string(), found, &|row| (kept.least..=kept.most).contains(&row.figures[k])));
+    }
+    all
+}
+
+/// Kernels against FEM; none where no drive has both.
+fn compared(figure: &'static str, kernels: &[f64], fem: &[f64]) -> Option<Compared> {
+    let both = kernels.iter().zip(fem).filter(|(_, fem)| fem.is_finite());
+    let (kernels, fem): (Vec<f64>, Vec<f64>) = both.map(|(k, f)| (*k, *f)).unzip();
+    let off: Vec<f64> = kernels.iter().zip(&fem).map(|(kernels, fem)| kernels - fem).collect();
+    (!off.is_empty()).then(|| Compared {
+        figure,
+        drives: off.len(),
+        correlation: correlation(&kernels, &fem),
+        off_mean_arcsec: mean(&off),
+        off_rms_arcsec: mean(&off.iter().map(|x| x * x).collect::<Vec<f64>>()).sqrt(),
+        off_most_arcsec: off.iter().fold(0.0, |most, x| x.abs().max(most)),
+    })
+}
+
+/// Spearman's rank correlation of the pairs of numbers; none where one of both is the same in all pairs.
+fn rank_correlation(pairs: impl Iterator<Item = (f64, f64)>) -> Option<f64> {
+    let (a, b): (Vec<f64>, Vec<f64>) = pairs.filter(|(a, b)| a.is_finite() && b.is_finite()).unzip();
+    correlation(&ranks(&a), &ranks(&b))
+}
+
+/// Ranks of numbers; equal numbers share the mean of their ranks.
+fn ranks(values: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
+    let mut ranks = vec![0.0; values.len()];
+    let mut place = 0;
+    for equal in order.chunk_by(|a, b| values[*a] == values[*b]) {
+        let middle = place as f64 + 0.5 * (equal.len() - 1) as f64;
+        equal.iter().for_each(|k| ranks[*k] = middle);
+        place += equal.len();
+    }
+    ranks
+}
+
+/// Numbers that vary from variant to variant, by name: of a list of errors their root mean square, of harmonics the
+/// amplitude of each order. Directions, phases and words are none.
+fn inputs(plan: &Plan) -> Vec<(String, Vec<f64>)> {
+    let is_angle = |column: &String| column.ends_with("_phase_deg") || column.ends_with("_direction_deg");
+    let mut names: Vec<String> = Vec::new();
+    let mut found: HashMap<String, Vec<f64>> = HashMap::new();
+    for (k, column) in plan.columns.iter().enumerate().filter(|(_, column)| !is_angle(column)) {
+        for (variant, values) in plan.variants.iter().enumerate() {
+            for (order, value) in numbers(&values[k]) {
+                let name = order.map_or_else(|| column.clone(), |order| of_order(column, order));
+                let all = found.entry(name.clone()).or_insert_with(|| {
+                    names.push(name);
+                    vec![f64::NAN; plan.variants.len()]
+                });
+                all[variant] = value;
+            }
+        }
+    }
+    names.into_iter().filter_map(|name| Some((plan.named(&name), found.remove(&name)?))).collect()
+}
+
+/// Numbers of a cell of `plan.csv`, each with its order if it is a harmonic.
+fn numbers(cell: &str) -> Vec<(Option<i64>, f64)> {
+    if let Ok(number) = cell.parse() {
+        return vec![(None, number)];
+    }
+    let table = format!("cell = {cell}").parse::<toml::Table>();
+    let Some(list) = table.ok().and_then(|table| table.get("cell")?.as_array().cloned()) else { return Vec::new() };
+    let number = |value: &toml::Value| value.as_float().or_else(|| Some(value.as_integer()? as f64));
+    let harmonic = |value: &toml::Value| Some((value.get("order")?.as_integer(), number(value.get("amplitude_um")?)?));
+    let squares: Vec<f64> = list.iter().filter_map(number).map(|x| x * x).collect();
+    let rms = (!squares.is_empty()).then(|| (None, mean(&squares).sqrt()));
+    list.iter().filter_map(harmonic).chain(rms).collect()
+}
+
+impl Sweep {
+    /// `sweep.csv`: every run with the numbers and words that its variant sets, its figures and marks.
+    ///
+    /// # Errors
+    /// None but of memory.
+    pub fn csv(&self, plan: &Plan) -> Result<Vec<u8>, csv::Error> {
+        let is_short = |k: &usize| plan.variants.iter().all(|values| !values[*k].starts_with('['));
+        let fields: Vec<usize> = (0..plan.columns.len()).filter(is_short).collect();
+        let mut to = csv::Writer::from_writer(Vec::new());
+        let columns = fields.iter().map(|k| plan.columns[*k].as_str());
+        let end = ["status", "meets", "front", "why", "cautions"];
+        to.write_record(["variant", "generator"].into_iter().chain(columns).chain(plan.figures()).chain(end))?;
+        for (row, meets, front) in &self.rows {
+            let mut line = vec![(row.variant + 1).to_string(), row.generator.to_string()];
+            line.extend(fields.iter().map(|k| plan.variants[row.variant][*k].clone()));
+            line.extend(row.figures.iter().map(|x| if x.is_finite() { x.to_string() } else { String::new() }));
+            line.extend([row.status.name().to_owned(), meets.to_string(), front.to_string()]);
+            line.extend([row.why.clone(), row.cautions.clone()]);
+            to.write_record(line)?;
+        }
+        to.into_inner().map_err(|error| csv::Error::from(error.into_error()))
+    }
+}

@@ -1,0 +1,197 @@
+//! Response of a drive to its tolerances by contact FEM: kernels of what acts tooth by tooth and of displaced axes, and
+//! a parabola for each field that changes the drive uniformly.
+
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+
+use super::SweepError;
+use super::by_fem::{Conditions, wave};
+use super::draw::{Drawn, sets};
+use super::model::{Parabola, Response, SHEET, displaces};
+use super::plan::{OfOne, SweepProgress};
+use super::tolerance::{ToleranceActs, Tolerances};
+use crate::data_sheet::{FIGURES, Loads, data_sheet};
+use crate::kernels::{KernelError, KernelPlan, make};
+use flexspline_mechanics::drive::{Drive, GeneratorKind};
+use flexspline_mechanics::stepping::{SolveError, SolverSettings};
+
+/// The parabola of a uniform change is taken at the value that this share of the drives lies below, and at its mirror.
+const OUTER_SHARE: f64 = 0.05;
+/// Lost motion is measured between this share of the rated load either way, as in catalogues, and at most half of the
+/// load of the tolerances.
+const LIGHT: [f64; 2] = [0.04, 0.5];
+/// Positions over the tooth pitch of a data sheet.
+const SHEET_POSITIONS: usize = 4;
+/// Share of the drives whose displacements the kernels have to reach. Where teeth wedge further out, at limits that one
+/// drive in millions meets, kernels are extrapolated, and `reduce` counts the drives beyond.
+const NEARLY_ALL: f64 = 0.99;
+/// Displacement (µm for a millimetre of module) and directions of kernels that no tolerance asks for: the fewest.
+const UNUSED: (f64, usize) = (20.0, 4);
+
+/// The load and the light load of lost motion, N·m.
+pub(super) fn torques_n_m(of: &Tolerances) -> [f64; 2] {
+    let rated = of.generators.iter().map(|kind| of.drive.rated_torque_n_m(*kind)).fold(f64::INFINITY, f64::min);
+    [of.torque_n_m, (LIGHT[0] * rated).min(LIGHT[1] * of.torque_n_m)]
+}
+
+/// Kernels and responses with each generator.
+///
+/// # Errors
+/// The middle of the tolerances makes no drive, or the FEM finds no equilibrium.
+pub(super) fn respond(
+    of: &Tolerances,
+    solver: SolverSettings,
+    progress: &SweepProgress<'_>,
+) -> Result<Vec<OfOne>, SweepError> {
+    let middle = Drawn::middle(&of.list);
+    let drawn_as = uniform(of, &middle)?;
+    let torques_n_m = torques_n_m(of);
+    let alike = of.list.iter().filter(|tolerance| tolerance.acts == ToleranceActs::Alike).count();
+    let plans: Vec<KernelPlan> = of.generators.iter().map(|kind| kernel_plan(of, *kind, torques_n_m)).collect();
+    let steps: usize = plans.iter().map(|plan| plan.steps() + 1 + 2 * alike).sum();
+    let mut before = 0;
+    let mut generators = Vec::new();
+    for (kind, kernel_plan) in of.generators.iter().zip(&plans) {
+        let kernels = make(&drawn_as, *kind, kernel_plan, solver, &|done| {
+            progress(before + done, steps, &format!("kernels, {kind}"));
+            ControlFlow::Continue(())
+        })
+        .map_err(|error| kernels_failed(of, *kind, &error))?;
+        before += kernel_plan.steps();
+        let at = Conditions { kind: *kind, temperature_c: of.temperature_c, torque_n_m: torques_n_m[0], solver };
+        let told = |done| progress(before + done, steps, &format!("sheets, {kind}"));
+        let response = response(of, &middle, at, torques_n_m, &told)?;
+        before += 1 + 2 * alike;
+        generators.push(OfOne { kernels, response });
+    }
+    Ok(generators)
+}
+
+/// The drive with the uniform changes of `drawn` alone.
+fn uniform(of: &Tolerances, drawn: &[Drawn]) -> Result<Drive, SweepError> {
+    let sets = sets(&of.list, drawn);
+    let changed = of.drive.with_sets(sets.iter().map(String::as_str));
+    let mut drive = changed.map_err(|error| SweepError::BadInput(error.to_string()))?;
+    drive.as_built = drive.as_built.uniform_part();
+    Ok(drive)
+}
+
+/// Kernels at the loads of the tolerances, and displacements up to their limits.
+fn kernel_plan(of: &Tolerances, kind: GeneratorKind, [torque, light]: [f64; 2]) -> KernelPlan {
+    let usual = KernelPlan::for_drive(&of.drive, kind);
+    let displacing = || of.list.iter().filter(|t| displaces(t)).map(|t| t.distribution);
+    let reach: f64 = displacing().map(|distribution| distribution.limits[1]).sum();
+    let (sizes_um, directions) = if reach > 0.0 {
+        (usual.sizes_to(reach), usual.directions)
+    } else {
+        (vec![UNUSED.0 * of.drive.flexspline.module_mm], UNUSED.1)
+    };
+    KernelPlan {
+        torques_n_m: vec![light, torque],
+        sizes_um,
+        enough_um: Some(displacing().map(|distribution| distribution.quantile(NEARLY_ALL)).sum()),
+        directions,
+        temperature_c: Some(of.temperature_c),
+        ..usual
+    }
+}
+
+/// Why kernels failed: which tolerances ask for the displacement, and the remedy.
+fn kernels_failed(of: &Tolerances, kind: GeneratorKind, error: &KernelError) -> SweepError {
+    let KernelError::Displaced { reached_um, .. } = error else {
+        return SweepError::Failed(format!("{kind}: kernels of the drive as drawn: {error}"));
+    };
+    let displacing = of.list.iter().filter(|t| displaces(t)).map(|t| {
+        let most = t.distribution.quantile(NEARLY_ALL);
+        format!("{} (99 of 100 drives up to {most:.1} um)", t.field)
+    });
+    SweepError::Failed(format!(
+        "{kind}: {}: {error}. The teeth wedge: give narrower limits (limits = [0, {reached_um:.3}] together), or the \
+         drive more clearance (flanks.preload_um below 0), or a generator bearing that yields \
+         (generator.bearing_stiffness_n_per_mm3)",
+        displacing.collect::<Vec<_>>().join(" and ")
+    ))
+}
+
+/// State of the middle drive, and a parabola for each field that changes the drive uniformly.
+fn response(
+    of: &Tolerances,
+    middle: &[Drawn],
+    at: Conditions,
+    torques_n_m: [f64; 2],
+    told: &(dyn Fn(usize) + Sync),
+) -> Result<Response, SweepError> {
+    let alike = || of.list.iter().enumerate().filter(|(_, tolerance)| tolerance.acts == ToleranceActs::Alike);
+    let mut jobs: Vec<Option<(usize, f64)>> = vec![None];
+    for (t, tolerance) in alike() {
+        jobs.extend([OUTER_SHARE, 1.0 - OUTER_SHARE].map(|share| Some((t, tolerance.distribution.quantile(share)))));
+    }
+    let done = AtomicUsize::new(0);
+    let states = jobs
+        .par_iter()
+        .with_max_len(1)
+        .map(|job| {
+            let mut drawn = middle.to_vec();
+            if let Some((t, value)) = job {
+                drawn[*t].value = *value;
+            }
+            let state = state(&uniform(of, &drawn)?, at, torques_n_m).map_err(|error| {
+                let which = job.map_or("the middle drive".to_owned(), |(t, v)| format!("{} = {v}", of.list[t].field));
+                SweepError::Failed(format!("{}, {which}: {error}", at.kind))
+            })?;
+            told(done.fetch_add(1, Ordering::Relaxed) + 1);
+            Ok(state)
+        })
+        .collect::<Result<Vec<Vec<f64>>, SweepError>>()?;
+    let value = |k: usize| jobs[k].map_or(f64::NAN, |(_, value)| value);
+    let change = |k: usize| -> Vec<f64> { states[k].iter().zip(&states[0]).map(|(a, b)| a - b).collect() };
+    let parabolas = alike().enumerate().map(|(k, (t, tolerance))| {
+        let (low, high) = (1 + 2 * k, 2 + 2 * k);
+        let at = [value(low), middle[t].value, value(high)];
+        Parabola { field: tolerance.field.clone(), at, below: change(low), above: change(high) }
+    });
+    Ok(Response { middle: states[0].clone(), parabolas: parabolas.collect() })
+}
+
+fn state(drive: &Drive, at: Conditions, torques_n_m: [f64; 2]) -> Result<Vec<f64>, SolveError> {
+    let mut state = wave(drive, at)?;
+    state.extend(wave(drive, Conditions { torque_n_m: torques_n_m[1], ..at })?);
+    let loads = Loads::up_to(drive.rated_torque_n_m(at.kind));
+    let (sheet, done) = data_sheet(drive, at.kind, at.temperature_c, loads, SHEET_POSITIONS, at.solver);
+    done?;
+    let figure = |name: &str| FIGURES.iter().find(|(known, _)| *known == name).and_then(|(_, of)| of(&sheet));
+    state.extend(SHEET.iter().map(|name| figure(name).unwrap_or(f64::NAN)));
+    Ok(state)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The message names the tolerance that wedges the teeth, and how far it may go.
+    #[test]
+    fn kernels_that_fail_name_the_tolerance_and_how_far_it_may_go() {
+        let text = "drive = \"HHD-95\"\ngenerator = \"cam\"\ntorque_n_m = 5\n[[tolerance]]\nfield = \
+                    \"as_built.circular_spline_eccentricity_um\"\ndistribution = \"rayleigh\"\nstd = 5\n";
+        let of = Tolerances::read("t.toml", text, |name| Drive::built_in(name).ok_or("no drive")).unwrap();
+        let reason = SolveError::NotConverged {
+            generator_rad: 0.0,
+            torque_n_m: 0.0,
+            reached_n_m: 0.0,
+            softened_to: None,
+            reason: "the iterations ran out",
+            history: Vec::new(),
+        };
+        let error = KernelError::Displaced { size_um: 27.5, reached_um: 17.0, reason };
+        let said = kernels_failed(&of, GeneratorKind::Cam, &error).to_string();
+        for words in [
+            "as_built.circular_spline_eccentricity_um (99 of 100 drives up to 15.2 um)",
+            "limits = [0, 17",
+            "27.5 um beside its axis",
+        ] {
+            assert!(said.contains(words), "{words}: {said}");
+        }
+    }
+}

@@ -1,0 +1,378 @@
+//! The page of a sweep: the answer, one picture, the Pareto front, which input matters, scatter.
+
+use serde_json::{Map, json};
+
+use super::page::{
+    Axis, Block, Choice, Detail, Figure, FigureBody, Headline, Limit, Lines, Mark, Page, PageQuantity, Section, Series,
+    Status, Table, Text, Upright, significant,
+};
+use flexspline_design::sweep::{Judge, OfGenerator, Plan, Row, Sense, Sweep};
+
+/// Rows of the table of the Pareto front.
+const MOST_ROWS: usize = 25;
+/// Points of the curve of a distribution.
+const CURVE: usize = 200;
+/// Share of the drives whose error is the headline of drives drawn from tolerances.
+const JUDGED: f64 = 0.95;
+/// Quantiles of the table of scatter.
+const SHOWN: [f64; 4] = [0.05, 0.5, JUDGED, 0.99];
+/// The error of drives drawn from tolerances.
+const ERROR: &str = "error_pp_arcsec";
+
+/// The contents of the page.
+pub struct SweepSources<'a> {
+    /// The plan.
+    pub plan: &'a Plan,
+    /// The command line.
+    pub command: &'a str,
+    /// Constraints and targets.
+    pub judge: &'a Judge,
+    /// The results.
+    pub sweep: &'a Sweep,
+    /// Remarks on the results.
+    pub remarks: &'a [String],
+}
+
+/// The page.
+pub fn page(of: &SweepSources<'_>) -> Page {
+    let SweepSources { plan, sweep, .. } = of;
+    let mut results = Map::new();
+    results.insert("sweep".to_owned(), json!(sweep));
+    let mut sections = vec![picture(of)];
+    sections.extend(front(of));
+    sections.extend(
+        [
+            ("matters", "What matters", Detail::Summary, tables(of, ranks)),
+            ("scatter", "Scatter", Detail::Summary, tables(of, exceeded)),
+            ("figures", "Figure by figure", Detail::Engineering, tables(of, figures)),
+        ]
+        .into_iter()
+        .filter(|(.., blocks)| !blocks.is_empty())
+        .map(|(id, title, detail, blocks)| Section {
+            id: id.to_owned(),
+            title: title.to_owned(),
+            detail,
+            blocks,
+        }),
+    );
+    sections.push(Section::reading(vec![Block::paragraph(READING)]));
+    let choice = |one: &OfGenerator| Choice { id: one.generator.to_string(), name: one.generator.to_string() };
+    Page {
+        title: format!("Sweep of {}", sweep.drive),
+        command_name: "sweep",
+        status: if of.remarks.is_empty() { Status::Good } else { Status::Remark },
+        also: Vec::new(),
+        remarks: of.remarks.iter().map(|remark| format!("{remark}.")).collect(),
+        choices: sweep.generators.iter().map(choice).collect(),
+        choice_is: "Generator",
+        headlines: sweep.generators.iter().map(|one| headline(of, one)).collect(),
+        sections,
+        animations: Vec::new(),
+        provenance: vec![
+            ("command".to_owned(), of.command.to_owned()),
+            ("plan".to_owned(), plan.hash.clone()),
+            ("drive_hash".to_owned(), blake3::Hash::from_bytes(plan.drive.hash()).to_hex().to_string()),
+        ],
+        results,
+    }
+}
+
+const READING: &str = "A data sheet is computed by contact FEM: the drive is loaded from first contact with its \
+    generator held, and then turned by a tooth pitch under the largest load. K1 is the secant of its torsion up to \
+    T1, K2 from T1 to T2, K3 above. A drive drawn from tolerances is computed by influence kernels of the drive as \
+    drawn over a turn of the output: linear in the errors of single teeth, interpolated in the distance of the axes, \
+    a parabola in every other dimension, each as if the others were as drawn, without friction. A rank correlation \
+    (Spearman) of 1 or −1 says that the figure follows this input alone. Intervals hold with 95 %.";
+
+/// Endings of names that are a unit, longest first, the unit, and its quantity on a page.
+const UNITS: [(&str, &str, PageQuantity); 16] = [
+    ("_n_m_per_rad", "N·m/rad", PageQuantity::Count),
+    ("_n_per_mm3", "N/mm³", PageQuantity::Count),
+    ("_n_per_mm", "N/mm", PageQuantity::Count),
+    ("_kg_m3", "kg/m³", PageQuantity::Count),
+    ("_percent", "%", PageQuantity::Count),
+    ("_arcsec", "arcsec", PageQuantity::Error),
+    ("_per_k", "1/K", PageQuantity::Count),
+    ("_mrad", "mrad", PageQuantity::Count),
+    ("_n_m", "N·m", PageQuantity::Torque),
+    ("_mpa", "MPa", PageQuantity::Stress),
+    ("_deg", "degrees", PageQuantity::Count),
+    ("_mm", "mm", PageQuantity::Count),
+    ("_um", "µm", PageQuantity::Count),
+    ("_n", "N", PageQuantity::Force),
+    ("_c", "°C", PageQuantity::Count),
+    ("_k", "K", PageQuantity::Count),
+];
+
+/// A name in words, and its unit: that of its ending, or `modules` of a profile shift.
+fn in_words(name: &str) -> (String, Option<&'static str>, PageQuantity) {
+    let words = |stem: &str| stem.replace("_pp", " peak to peak").replace(['_', '.'], " ");
+    if name.ends_with("profile_shift") {
+        return (words(name), Some("modules"), PageQuantity::Count);
+    }
+    let found = UNITS.iter().find_map(|(ending, unit, quantity)| Some((name.strip_suffix(ending)?, *unit, *quantity)));
+    match found {
+        Some((stem @ ("k1" | "k2" | "k3"), unit, quantity)) => (stem.to_uppercase(), Some(unit), quantity),
+        Some((stem, unit, quantity)) => (words(stem), Some(unit), quantity),
+        None => (words(name), None, PageQuantity::Count),
+    }
+}
+
+/// A figure in words with its unit, and its quantity. Units of quantities are added by the page.
+fn shown(name: &str) -> (String, PageQuantity) {
+    match in_words(name) {
+        (words, Some(unit), PageQuantity::Count) => (format!("{words}, {unit}"), PageQuantity::Count),
+        (words, _, quantity) => (words, quantity),
+    }
+}
+
+/// Heading of a column of a figure or field. Errors have their unit in every cell, where the reader changes it.
+pub(super) fn heading(name: &str) -> String {
+    match in_words(name) {
+        (words, _, PageQuantity::Error) => words,
+        (words, Some(unit), _) => format!("{words}, {unit}"),
+        (words, None, _) => words,
+    }
+}
+
+pub(super) fn value(name: &str, value: Option<f64>) -> Text {
+    match value {
+        None => Text::new("–"),
+        Some(value) if shown(name).1 == PageQuantity::Error => Text::default().error(value, 3),
+        Some(value) => Text::new(significant(value, 3)),
+    }
+}
+
+/// A quantile of a figure.
+fn quantile(one: &OfGenerator, figure: &str, share: f64) -> Option<f64> {
+    let spread = one.figures.iter().find(|spread| spread.figure == figure)?;
+    spread.quantiles.iter().find(|quantile| quantile.share == share).map(|quantile| quantile.value)
+}
+
+/// Rows of a generator, whether they meet, and whether they are Pareto-optimal.
+fn rows<'a>(of: &'a SweepSources<'_>, one: &OfGenerator) -> impl Iterator<Item = &'a (Row, bool, bool)> {
+    let kind = one.generator;
+    of.sweep.rows.iter().filter(move |(row, ..)| row.generator == kind)
+}
+
+fn headline(of: &SweepSources<'_>, one: &OfGenerator) -> Headline {
+    let choice = Some(one.generator.to_string());
+    if of.plan.is_of_tolerances() {
+        let number = quantile(one, ERROR, JUDGED).unwrap_or(f64::NAN);
+        let first = one.ranks.iter().find(|rank| rank.figure == ERROR);
+        let answer = first.map_or_else(Text::default, |first| {
+            let by = significant(first.correlation, 2);
+            Text::new(format!("Tighten {} first: the error follows it most (rank correlation {by}). ", first.input))
+        });
+        let drives = rows(of, one).count();
+        return Headline {
+            choice,
+            answer: answer.plain(format!("Of {drives} drives 95 % stay below ")).error(number, 3).plain("."),
+            number: Text::default().error(number, 3),
+            number_is: "error peak to peak that 95 % of the drives stay below".to_owned(),
+        };
+    }
+    let count = rows(of, one).count();
+    let meet = rows(of, one).filter(|(_, meets, _)| *meets).count();
+    let target = of.judge.targets.first().map_or("", |(name, _)| name.as_str());
+    let best = rows(of, one).find(|(row, ..)| Some(&(row.variant + 1)) == one.front.first());
+    let best = best.and_then(|(row, ..)| Some(row.figures[of.plan.figure(target)?]));
+    let optimal = match one.front.len() {
+        0 => String::new(),
+        count => format!("; {count} of them are Pareto-optimal"),
+    };
+    Headline {
+        choice,
+        answer: Text::new(format!("{meet} of {count} variants meet the constraints{optimal}.")),
+        number: value(target, best),
+        number_is: format!("{}, of the best", heading(target)),
+    }
+}
+
+/// A table for each generator; none without rows.
+fn tables(of: &SweepSources<'_>, make: impl Fn(&OfGenerator) -> Table) -> Vec<Block> {
+    let table = |one: &OfGenerator| (Some(one.generator.to_string()), make(one));
+    let all = of.sweep.generators.iter().map(table).filter(|(_, table)| !table.rows.is_empty());
+    all.map(|(choice, table)| Block::Table { choice, table }).collect()
+}
+
+fn words(list: &[&str]) -> Vec<String> {
+    list.iter().map(|word| (*word).to_owned()).collect()
+}
+
+/// Variants by two targets; drives drawn from tolerances by how many stay below an error.
+fn picture(of: &SweepSources<'_>) -> Section {
+    let figure = if of.plan.is_of_tolerances() { distribution(of) } else { trade(of) };
+    let (id, title) = (figure.id.clone(), figure.title.clone());
+    Section { id, title, detail: Detail::Summary, blocks: vec![Block::Figure(figure)] }
+}
+
+fn trade(of: &SweepSources<'_>) -> Figure {
+    let target = |k: usize, other: &'static str| of.judge.targets.get(k).map_or(other, |(name, _)| name.as_str());
+    let first = target(0, "kinematic_error_pp_arcsec");
+    let second = target(1, if first == "k2_n_m_per_rad" { "kinematic_error_pp_arcsec" } else { "k2_n_m_per_rad" });
+    let (x, y) = (of.plan.figure(first).unwrap_or_default(), of.plan.figure(second).unwrap_or_default());
+    let chart = |one: &OfGenerator| {
+        let series = |name: &str, colour: usize, mark: Mark, which: &dyn Fn(bool, bool) -> bool| {
+            let chosen = rows(of, one).filter(|(_, meets, front)| which(*meets, *front));
+            let points = chosen.map(|(row, ..)| [row.figures[x], row.figures[y]]);
+            let mut points: Vec<[f64; 2]> = points.filter(|[x, y]| x.is_finite() && y.is_finite()).collect();
+            points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+            Series { name: name.to_owned(), mark, colour, points }
+        };
+        let series = vec![
+            series("does not meet", 5, Mark::Dots, &|meets, _| !meets),
+            series("meets", 0, Mark::Points, &|meets, front| meets && !front),
+            series("Pareto-optimal", 1, Mark::Points, &|_, front| front),
+        ];
+        (one.generator.to_string(), Lines { series, ..Lines::default() })
+    };
+    let axis = |name: &str| Axis::new(shown(name).0, shown(name).1);
+    Figure {
+        id: "trade".to_owned(),
+        title: format!("{} against {}", shown(second).0, shown(first).0),
+        caption: Text::new("Each point is a variant."),
+        alt: "Every variant by two of its figures; the Pareto-optimal ones stand out".to_owned(),
+        body: FigureBody::Lines {
+            x: axis(first),
+            y: axis(second),
+            charts: of.sweep.generators.iter().map(chart).collect(),
+        },
+    }
+}
+
+fn distribution(of: &SweepSources<'_>) -> Figure {
+    let error = of.plan.figure(ERROR).unwrap_or_default();
+    let chart = |one: &OfGenerator| {
+        let mut errors: Vec<f64> = rows(of, one).map(|(row, ..)| row.figures[error]).collect();
+        errors.retain(|error| error.is_finite());
+        errors.sort_by(f64::total_cmp);
+        let n = errors.len();
+        let ranks = (0..CURVE.min(n)).map(|k| k * (n - 1) / (CURVE.min(n) - 1).max(1));
+        let points = ranks.map(|rank| [errors[rank], 100.0 * (rank + 1) as f64 / n as f64]).collect();
+        let series = vec![Series { name: "drives below".to_owned(), mark: Mark::Line, colour: 0, points }];
+        let limits = vec![Limit { name: "95 %".to_owned(), y: 100.0 * JUDGED }];
+        let uprights = one.exceeded.iter().map(|e| Upright { name: format!("{}″", e.above), x: e.above }).collect();
+        (one.generator.to_string(), Lines { series, limits, uprights })
+    };
+    Figure {
+        id: "distribution".to_owned(),
+        title: "Drives that stay below an error".to_owned(),
+        caption: Text::new("Error under the load, peak to peak over a turn of the output."),
+        alt: "Share of the drives over the error that they stay below".to_owned(),
+        body: FigureBody::Lines {
+            x: Axis::new("error, peak to peak", PageQuantity::Error),
+            y: Axis::new("drives below, %", PageQuantity::Count),
+            charts: of.sweep.generators.iter().map(chart).collect(),
+        },
+    }
+}
+
+/// The Pareto front, the targets first.
+fn front(of: &SweepSources<'_>) -> Option<Section> {
+    let names = of.plan.figures();
+    let decides = |name: &&str| of.judge.targets.iter().any(|(target, _)| target == name);
+    let (first, others): (Vec<&str>, Vec<&str>) = names.iter().copied().partition(decides);
+    let header = |names: &[&str]| names.iter().map(|name| heading(name)).collect::<Vec<String>>();
+    let fields: Vec<&str> = of.plan.columns.iter().map(String::as_str).collect();
+    let header = [words(&["Variant"]), header(&first), header(&fields), header(&others)].concat();
+    let better =
+        of.judge.targets.iter().map(|(name, sense)| {
+            format!("{} {}", if *sense == Sense::Least { "least" } else { "most" }, heading(name))
+        });
+    let better = better.collect::<Vec<_>>().join(", ");
+    let blocks = tables(of, |one| {
+        let rows = one.front.iter().take(MOST_ROWS).filter_map(|number| {
+            let (row, ..) = rows(of, one).find(|(row, ..)| row.variant + 1 == *number)?;
+            let cells = |names: &[&str]| -> Vec<Text> {
+                names.iter().map(|name| value(name, of.plan.figure(name).map(|k| row.figures[k]))).collect()
+            };
+            let values = of.plan.variants[row.variant].iter().cloned().map(Text::new).collect();
+            Some([vec![Text::new(number.to_string())], cells(&first), values, cells(&others)].concat())
+        });
+        let caption = format!("Variants that no other beats in all of: {better}. All variants are in sweep.csv");
+        Table { caption, header: header.clone(), rows: rows.collect() }
+    });
+    let (id, title) = ("best".to_owned(), "The Pareto front".to_owned());
+    (!blocks.is_empty()).then_some(Section { id, title, detail: Detail::Summary, blocks })
+}
+
+/// Rank correlations, an input to a column.
+fn ranks(one: &OfGenerator) -> Table {
+    let mut inputs: Vec<&str> = Vec::new();
+    for rank in &one.ranks {
+        if !inputs.contains(&rank.input.as_str()) {
+            inputs.push(&rank.input);
+        }
+    }
+    let row = |figure: &'static str| {
+        let of = |input: &&str| one.ranks.iter().find(|rank| rank.figure == figure && rank.input == **input);
+        let cell = |input| Text::new(of(input).map_or("–".to_owned(), |rank| significant(rank.correlation, 2)));
+        let cells: Vec<Text> = inputs.iter().map(cell).collect();
+        [vec![Text::new(heading(figure))], cells].concat()
+    };
+    let has = |figure: &&str| one.ranks.iter().any(|rank| rank.figure == *figure);
+    Table {
+        caption: "Rank correlation of each figure with each input".to_owned(),
+        header: [words(&["Figure"]), inputs.iter().map(|input| heading(input)).collect()].concat(),
+        rows: one.figures.iter().map(|spread| spread.figure).filter(has).map(row).collect(),
+    }
+}
+
+fn percent(share: f64) -> String {
+    format!("{} %", significant(100.0 * share, 3))
+}
+
+fn exceeded(one: &OfGenerator) -> Table {
+    let rows = one.exceeded.iter().map(|e| {
+        let [share, low, high] = [e.of.value, e.of.low, e.of.high].map(|share| Text::new(percent(share)));
+        vec![Text::default().error(e.above, 3), share, low, high]
+    });
+    let caption = "Drives above an error, with a 95 % interval".to_owned();
+    Table { caption, header: words(&["Error above", "drives", "from", "to"]), rows: rows.collect() }
+}
+
+fn figures(one: &OfGenerator) -> Table {
+    let rows = one.figures.iter().map(|spread| {
+        let shown = SHOWN.map(|share| quantile(one, spread.figure, share));
+        let judged = spread.quantiles.iter().find(|quantile| quantile.share == JUDGED);
+        let ends = [judged.and_then(|q| q.low), judged.and_then(|q| q.high)];
+        let cells = [Some(spread.mean), Some(spread.std)].into_iter().chain(shown).chain(ends);
+        [Text::new(heading(spread.figure))].into_iter().chain(cells.map(|x| value(spread.figure, x))).collect()
+    });
+    Table {
+        caption: "Figures of the variants that converged; the interval is that of the 95 % value".to_owned(),
+        header: words(&["Figure", "mean", "std", "5 %", "50 %", "95 %", "99 %", "from", "to"]),
+        rows: rows.collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flexspline_design::data_sheet::FIGURES;
+
+    /// All figures but a ratio, and every field of a drive that ends in a unit, have it in the heading of a column.
+    #[test]
+    fn figures_and_fields_say_their_units() {
+        for (name, due) in [
+            ("k1_n_m_per_rad", "K1, N·m/rad"),
+            ("max_von_mises_mpa", "max von mises, MPa"),
+            ("kinematic_error_pp_arcsec", "kinematic error peak to peak"),
+            ("lobe_force_n", "lobe force, N"),
+            ("tilt_mrad", "tilt, mrad"),
+            ("last_stable_n_m", "last stable, N·m"),
+            ("teeth_in_contact_percent", "teeth in contact, %"),
+            ("load_across_face_peak_over_mean", "load across face peak over mean"),
+            ("flexspline.rim_thickness_mm", "flexspline rim thickness, mm"),
+            ("circular_spline.profile_shift", "circular spline profile shift, modules"),
+            ("generator.bearing_stiffness_n_per_mm3", "generator bearing stiffness, N/mm³"),
+            ("as_built.generator_warmer_k", "as built generator warmer, K"),
+        ] {
+            assert_eq!(heading(name), due);
+        }
+        let without: Vec<&str> =
+            FIGURES.iter().filter(|(name, _)| in_words(name).1.is_none()).map(|(name, _)| *name).collect();
+        assert_eq!(without, ["load_across_face_peak_over_mean"]);
+    }
+}

@@ -1,0 +1,438 @@
+//! `flexspline sweep`: variants of a drive, and drives drawn from tolerances.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+use clap::{ArgGroup, Args, Subcommand, ValueHint};
+use serde_json::json;
+
+use super::context::quoted;
+use super::names::{self, GeneratorNames};
+use super::{Context, Failure, report, say};
+use flexspline_base::output::Outputs;
+use flexspline_design::data_sheet::{FIGURES, FigureOf};
+use flexspline_design::stated::short;
+use flexspline_design::sweep::{
+    Constraint, EXAMPLE, Judge, OfGenerator, Plan, PlanSettings, Ran, Row, RunStatus, Sense, Shard, Sweep, SweepError,
+    Tolerances, Vary, is_error_of_making, reduce, run,
+};
+use flexspline_mechanics::drive::GeneratorKind;
+use flexspline_mechanics::mesh::MeshLevel;
+use flexspline_report::page::Page;
+use flexspline_report::sweep_report::{self, SweepSources};
+
+/// Variants of the Pareto front that are printed.
+const SHOWN: usize = 5;
+/// Figures of drives drawn from tolerances that are printed.
+const PRINTED: [&str; 5] = [
+    "error_pp_arcsec",
+    "lost_motion_arcsec",
+    "no_table_rms_arcsec",
+    "nominal_table_rms_arcsec",
+    "unit_table_rms_arcsec",
+];
+
+/// Compute many variants of a drive, or drives drawn from tolerances
+///
+/// With --vary each variant is deformed by each generator, loaded and turned by a tooth pitch, by contact FEM: backlash,
+/// lost motion, stiffness K1, K2, K3, wind-up, transmission error, stresses. A drive with imperfections is computed at
+/// one place of its turns. With --tolerances drives are drawn from a file of tolerances, and their error over a turn of
+/// the output is computed by influence kernels of the drive as drawn.
+///
+/// `plan` writes plan.csv (one variant a line) and plan.json. `run` computes a shard of the variants into results/: it
+/// can run anywhere, in any order and more than once, and goes on after the rows that are there. `reduce` reports
+/// the Pareto front, scatter, quantiles and rank correlations: sweep.csv, sweep.json and report.html. Without a step,
+/// all three are done in --out.
+#[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+#[command(after_help = format!("\
+Examples:
+  flexspline sweep -g cam --vary flexspline.rim_thickness_mm=1.2..2.6:8
+  flexspline sweep --vary generator.w0_mm=0.46..0.5 --draws 50 --keep backlash_arcsec=30..70
+  flexspline sweep --example > tolerances.toml
+  flexspline sweep plan --tolerances tolerances.toml --draws 10000 --out campaign
+  flexspline sweep run campaign --shard 3/20
+  flexspline sweep reduce campaign
+
+Figures of --vary:
+{}
+T1 and T2, where the ranges of stiffness end, are those of the drive's [data_sheet], or 21 and 72 %
+of the largest load. Figures of --tolerances are in the columns of results/.", figures()))]
+pub(super) struct SweepCommand {
+    #[command(subcommand)]
+    step: Option<SweepStep>,
+    #[command(flatten)]
+    plan: PlanCommand,
+    #[command(flatten)]
+    judged: Judged,
+}
+
+#[derive(Debug, Subcommand)]
+enum SweepStep {
+    Plan(PlanCommand),
+    Run(RunCommand),
+    Reduce(ReduceCommand),
+}
+
+/// Write plan.csv, one variant a line, and plan.json
+#[derive(Debug, Args)]
+#[command(group(ArgGroup::new("variants").required(true).args(["vary", "tolerances", "example"])))]
+struct PlanCommand {
+    /// A field and its values: PATH=FROM..TO (5 values), PATH=FROM..TO:N, or PATH=VALUE,VALUE,...; repeat for more
+    /// fields
+    #[arg(long, value_name = "PATH=VALUES", allow_hyphen_values = true)]
+    vary: Vec<Vary>,
+    /// File of tolerances, which drives are drawn from
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, requires = "draws")]
+    tolerances: Option<PathBuf>,
+    /// Print a commented file of tolerances
+    #[arg(long)]
+    example: bool,
+    /// Number of variants that are drawn, a Latin hypercube [default: every combination of the values of --vary]
+    #[arg(long, value_name = "N")]
+    draws: Option<usize>,
+    /// Random seed of what is drawn
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "draws")]
+    seed: u64,
+    /// Wave generator of --vary: two-roller, four-roller, double-disc, cam, or all
+    #[arg(short, long, value_name = "G", default_value = "all", value_parser = names::generators(), hide_possible_values = true, conflicts_with = "tolerances")]
+    generator: GeneratorNames,
+    /// Largest load of --vary, N.m [default: the rated torque of the drive's [data_sheet]; else the largest torque of a
+    /// table of that generator: 200; four-roller 100, two-roller 20; by the size of the drive]
+    #[arg(long, value_name = "T", allow_negative_numbers = true, conflicts_with = "tolerances")]
+    torque_n_m: Option<f64>,
+    /// Positions over the tooth pitch of --vary, 4 to 32: fewer take less time, and resolve less of the error
+    #[arg(long, value_name = "N", default_value_t = 24, value_parser = clap::value_parser!(u8).range(4..=32), conflicts_with = "tolerances")]
+    positions: u8,
+    /// Number of drives of --tolerances, from the first on, that are also computed by FEM to check the kernels
+    #[arg(long, value_name = "M", default_value_t = 0, conflicts_with = "vary")]
+    fem: usize,
+    /// Places over an output turn of that FEM
+    #[arg(long, value_name = "P", default_value_t = 23, conflicts_with = "vary")]
+    fem_places: u32,
+    /// Mesh: coarse, standard or fine
+    #[arg(long, value_name = "LEVEL", default_value = "coarse", value_parser = names::mesh(), hide_possible_values = true)]
+    mesh: MeshLevel,
+}
+
+/// Compute a shard of the variants of a plan
+#[derive(Debug, Args)]
+struct RunCommand {
+    /// Folder of the sweep
+    #[arg(value_name = "DIR", value_hint = ValueHint::DirPath)]
+    folder: PathBuf,
+    /// The shard I of N shards, I from 1 [default: all variants]
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
+}
+
+/// Reduce the results to sweep.csv, sweep.json and report.html
+#[derive(Debug, Args)]
+struct ReduceCommand {
+    /// Folder of the sweep
+    #[arg(value_name = "DIR", value_hint = ValueHint::DirPath)]
+    folder: PathBuf,
+    /// Accept missing results
+    #[arg(long)]
+    partial: bool,
+    #[command(flatten)]
+    judged: Judged,
+}
+
+#[derive(Debug, Args)]
+struct Judged {
+    /// A constraint, FIGURE=LEAST..MOST, either end may be left out [default: teeth that clear one another]
+    #[arg(long, value_name = "FIGURE=RANGE", allow_hyphen_values = true)]
+    keep: Vec<Constraint>,
+    /// A figure of which less is better [default: kinematic_error_pp_arcsec, root_fillet_mpa]
+    #[arg(long, value_name = "FIGURE")]
+    least: Vec<String>,
+    /// A figure of which more is better [default: k2_n_m_per_rad]
+    #[arg(long, value_name = "FIGURE")]
+    most: Vec<String>,
+}
+
+/// The names of the figures of a data sheet, three on a line.
+fn figures() -> String {
+    let line = |names: &[FigureOf]| names.iter().map(|(name, _)| format!("  {name:<32}")).collect::<String>();
+    FIGURES.chunks(3).map(|names| line(names).trim_end().to_owned()).collect::<Vec<_>>().join("\n")
+}
+
+fn failure(error: SweepError) -> Failure {
+    match error {
+        SweepError::Failed(what) => Failure::Failed(what),
+        SweepError::Output(error) => error.into(),
+        refused => Failure::BadInput(refused.to_string()),
+    }
+}
+
+impl SweepCommand {
+    pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
+        match &self.step {
+            Some(SweepStep::Plan(plan)) if !plan.example => plan.run(context),
+            Some(SweepStep::Run(step)) => step.run(context),
+            Some(SweepStep::Reduce(step)) => {
+                let plan = opened(context, &step.folder)?;
+                let judge = step.judged.judge(&plan)?;
+                reduced(context, &plan, &step.folder, &judge, Some(step.partial))
+            }
+            None if !self.plan.example => {
+                let plan = self.plan.made(context, Some(&self.judged))?;
+                let judge = self.judged.judge(&plan)?;
+                let out = context.out()?;
+                report::before(context, out, "sweep", Some(&plan.drive));
+                let plan = plan.write(out).map_err(failure)?;
+                computed(context, &plan, out, Shard::WHOLE)?;
+                reduced(context, &plan, out, &judge, None)
+            }
+            _ => {
+                let example = json!({ "schema_version": 1, "tolerances": EXAMPLE });
+                context.print_data(&example, || EXAMPLE.trim_end().to_owned())
+            }
+        }
+    }
+}
+
+impl PlanCommand {
+    fn run(&self, context: &Context) -> Result<(), Failure> {
+        let plan = self.made(context, None)?;
+        let out = context.out()?;
+        let plan = plan.write(out).map_err(failure)?;
+        let (variants, drive) = (plan.variants.len(), plan.drive.name.as_str());
+        let planned = json!({
+            "schema_version": 1, "plan": &plan.hash, "drive": drive, "variants": variants, "columns": &plan.columns,
+        });
+        context.print(&planned, || {
+            let folder = quoted(&out.display().to_string());
+            let what = format!(
+                "plan {}: {variants} variants of {drive}\nwrote plan.csv and plan.json to {}/ in {}",
+                plan.hash,
+                out.display(),
+                context.spent().in_words()
+            );
+            what + &say::next(&["run", "reduce"].map(|step| format!("flexspline sweep {step} {folder}")))
+        })
+    }
+
+    /// The plan; what `judged` asks for is checked before the FEM of a plan of tolerances.
+    fn made(&self, context: &Context, judged: Option<&Judged>) -> Result<Plan, Failure> {
+        let settings = PlanSettings { draws: self.draws, seed: self.seed, mesh: self.mesh };
+        let Some(file) = &self.tolerances else {
+            let drive = context.drive()?;
+            if let Some(torque) = self.torque_n_m.filter(|torque| !(*torque > 0.0 && torque.is_finite())) {
+                return Err(Failure::BadInput(format!("--torque-n-m: found {torque}, allowed: above 0")));
+            }
+            if let Some(field) = self.vary.iter().find(|field| context.sets_field(&field.path)) {
+                return Err(Failure::BadInput(format!(
+                    "--set {0}: found it with --vary {0}, which contradicts it; give one of the two",
+                    field.path
+                )));
+            }
+            let at = (self.torque_n_m, usize::from(self.positions));
+            let stated = context.stated()?;
+            return Plan::of_fields(&drive, stated.as_ref(), &self.vary, &self.generator.0, at, settings)
+                .map_err(failure);
+        };
+        if context.has_drive() {
+            return Err(Failure::BadInput("--drive: found it with a file of tolerances, which names the drive".into()));
+        }
+        if judged.is_some_and(|judged| !(judged.least.is_empty() && judged.most.is_empty())) {
+            return Err(Failure::BadInput("--least, --most: allowed with --vary alone".into()));
+        }
+        let name = file.display().to_string();
+        let text = std::fs::read_to_string(file).map_err(|error| Failure::BadInput(format!("{name}: {error}")))?;
+        let tolerances = Tolerances::read(&name, &text, |drive| {
+            let near = file.parent().unwrap_or(Path::new("")).join(drive);
+            let called = if near.is_file() { near.display().to_string() } else { drive.to_owned() };
+            context.drive_called("drive", &called).map_err(|failure| match failure {
+                Failure::BadInput(what) | Failure::Failed(what) => what.trim_start_matches("drive: ").to_owned(),
+            })
+        })
+        .map_err(failure)?;
+        let progress = Mutex::new(context.progress("plan"));
+        Plan::of_tolerances(&tolerances, (self.fem, self.fem_places), settings, &|done, of, what| {
+            if let Ok(mut bar) = progress.lock() {
+                bar.set(done, of, what);
+            }
+        })
+        .map_err(failure)
+    }
+}
+
+impl Judged {
+    fn judge(&self, plan: &Plan) -> Result<Judge, Failure> {
+        let named = |names: &[String], sense| names.iter().map(|name| (name.clone(), sense)).collect::<Vec<_>>();
+        let targets = [named(&self.least, Sense::Least), named(&self.most, Sense::Most)].concat();
+        Judge { constraints: self.keep.clone(), targets }.of(plan).map_err(failure)
+    }
+}
+
+impl RunCommand {
+    fn run(&self, context: &Context) -> Result<(), Failure> {
+        let plan = opened(context, &self.folder)?;
+        let ran = computed(context, &plan, &self.folder, self.shard.unwrap_or(Shard::WHOLE))?;
+        let Ran { there, computed } = ran;
+        let report = json!({ "schema_version": 1, "plan": &plan.hash, "there": there, "computed": computed });
+        context.print(&report, || {
+            format!(
+                "plan {}: {computed} runs computed, {there} there already, in {}",
+                plan.hash,
+                context.spent().in_words()
+            )
+        })
+    }
+}
+
+/// The plan of a folder, which has its own drive and output folder.
+fn opened(context: &Context, folder: &Path) -> Result<Plan, Failure> {
+    if let Some(option) = context.changes_the_drive().or(context.has_out().then_some("--out")) {
+        return Err(Failure::BadInput(format!("{option}: found it with a plan, which has its own; plan anew")));
+    }
+    Plan::read(folder).map_err(failure)
+}
+
+fn computed(context: &Context, plan: &Plan, folder: &Path, shard: Shard) -> Result<Ran, Failure> {
+    let progress = Mutex::new(context.progress("sweep"));
+    run(plan, folder, shard, &|done, of, row| {
+        if let Ok(mut bar) = progress.lock() {
+            let name = format!("variant {} {}", row.variant + 1, row.generator);
+            if context.verbose() {
+                bar.line(&format!("{name} [{}]: {}", plan.variants[row.variant].join(", "), row.status.name()));
+            }
+            bar.set(done, of, &name);
+        }
+    })
+    .map_err(failure)
+}
+
+/// Writes sweep.csv, sweep.json and report.html; `partial` of a plan that was read, which has a drive of its own.
+fn reduced(context: &Context, plan: &Plan, folder: &Path, judge: &Judge, partial: Option<bool>) -> Result<(), Failure> {
+    let sweep = reduce(plan, folder, judge, partial.unwrap_or(false)).map_err(failure)?;
+    let remarks = remarks(plan, &sweep);
+    let sources = SweepSources { plan, command: &context.command, judge, sweep: &sweep, remarks: &remarks };
+    let page = sweep_report::page(&sources);
+    let page = Page { title: context.titled(&page.title), ..page };
+    let csv = sweep.csv(plan).map_err(|error| Failure::Failed(format!("sweep.csv: {error}")))?;
+    let mut outputs = Outputs::new();
+    outputs.file(&folder.join("sweep.csv"), |file| file.write_all(&csv))?;
+    outputs.json(&folder.join("sweep.json"), &sweep)?;
+    report::write(&page, folder, &mut outputs)?;
+    outputs.finish()?;
+    context.print(&sweep, || {
+        let mut text = format!(
+            "{}: {} runs; {} converged, {} failed, {} refused; {} meet the constraints\n",
+            sweep.drive,
+            sweep.rows.len(),
+            sweep.converged,
+            sweep.failed,
+            sweep.refused,
+            sweep.meet
+        );
+        text.extend(remarks.iter().map(|remark| format!("remark: {remark}\n")));
+        text.extend(sweep.generators.iter().map(|of| lines(plan, &sweep, judge, of)));
+        let _ = write!(
+            text,
+            "wrote sweep.csv, sweep.json and report.html to {}/ in {}",
+            folder.display(),
+            context.spent().in_words()
+        );
+        let best = sweep.generators.iter().find_map(|of| Some((of.generator, *of.front.first()?)));
+        let next = best.map(|(kind, number)| {
+            let choices = plan.sets(number - 1).into_iter().filter(|set| !is_error_of_making(set));
+            let sets: String = choices.map(|set| format!(" --set {}", quoted(&set))).collect();
+            context.next(&format!("tables --generator {kind}{sets}"))
+        });
+        text + &say::next(&next.filter(|_| partial.is_none()).into_iter().collect::<Vec<_>>())
+    })?;
+    if sweep.converged == 0 {
+        let why = sweep.rows.iter().map(|(row, ..)| row.why.as_str()).find(|why| !why.is_empty()).unwrap_or_default();
+        return Err(Failure::Failed(format!("no variant converged; the first: {why}")));
+    }
+    Ok(())
+}
+
+/// Results of one generator in words.
+fn lines(plan: &Plan, sweep: &Sweep, judge: &Judge, of: &OfGenerator) -> String {
+    let mut text = format!("{}\n", of.generator);
+    let names = plan.figures();
+    for number in of.front.iter().take(SHOWN) {
+        let found = |(row, ..): &&(Row, bool, bool)| (row.variant + 1, row.generator) == (*number, of.generator);
+        let Some((row, ..)) = sweep.rows.iter().find(found) else { continue };
+        let targets = judge.targets.iter().filter_map(|(name, _)| {
+            let k = names.iter().position(|known| known == name)?;
+            Some(format!("{name} {}", short(row.figures[k])))
+        });
+        let (sets, targets) = (plan.sets(row.variant).join(" "), targets.collect::<Vec<_>>().join(", "));
+        let caution = if row.cautions.is_empty() { "" } else { " (caution)" };
+        let _ = writeln!(text, "  {number:>4}  {sets}: {targets}{caution}");
+    }
+    if of.front.len() > SHOWN {
+        let _ = writeln!(text, "  and {} more of the Pareto front in sweep.csv", of.front.len() - SHOWN);
+    }
+    for spread in of.figures.iter().filter(|spread| PRINTED.contains(&spread.figure) && plan.is_of_tolerances()) {
+        let at = |share: f64| spread.quantiles.iter().find(|q| q.share == share).map_or(f64::NAN, |q| q.value);
+        let first = of.ranks.iter().find(|rank| rank.figure == spread.figure);
+        let follows = first.map_or_else(String::new, |first| {
+            format!("; follows {} most (rank correlation {:.2})", first.input, first.correlation)
+        });
+        let _ = writeln!(text, "  {:<26} median {:.3}, 95 % below {:.3}{follows}", spread.figure, at(0.5), at(0.95));
+    }
+    for e in &of.exceeded {
+        let [value, low, high] = [e.of.value, e.of.low, e.of.high].map(|share| 100.0 * share);
+        let _ = writeln!(text, "  P(error > {}\") = {value:.3} % ({low:.3} to {high:.3})", e.above);
+    }
+    text
+}
+
+/// Remarks on the results.
+fn remarks(plan: &Plan, sweep: &Sweep) -> Vec<String> {
+    let mut remarks = Vec::new();
+    if sweep.missing > 0 {
+        remarks.push(format!("PARTIAL: {} of {} runs are missing", sweep.missing, sweep.missing + sweep.rows.len()));
+    }
+    for (status, what) in [(RunStatus::Failed, "did not converge"), (RunStatus::Refused, "make no drive")] {
+        let mut of_status = sweep.rows.iter().filter(|(row, ..)| row.status == status);
+        if let Some((first, ..)) = of_status.next() {
+            let (count, number) = (of_status.count() + 1, first.variant + 1);
+            remarks.push(format!("{count} runs {what}; the first, variant {number}: {}", first.why));
+        }
+    }
+    let errors: Vec<&str> = plan.columns.iter().map(String::as_str).filter(|path| is_error_of_making(path)).collect();
+    if !plan.is_of_tolerances() && !errors.is_empty() {
+        remarks.push(format!(
+            "{} is no choice: variants are compared with those that have the same manufacturing errors, at one place \
+             of a turn; --tolerances, and tables, take whole turns",
+            errors.join(", ")
+        ));
+    }
+    for of in &sweep.generators {
+        let kind = of.generator;
+        let mut count = |count: usize, what: &str| {
+            if count > 0 {
+                remarks.push(format!("{kind}: {count} {what}"));
+            }
+        };
+        let meet = sweep.rows.iter().filter(|(row, meets, _)| *meets && row.generator == kind);
+        count(meet.filter(|(row, ..)| !row.cautions.is_empty()).count(), "that meet the constraints have a caution");
+        count(
+            of.beyond_kernels,
+            "drives have axes further apart than the kernels reach; their errors are extrapolated",
+        );
+        count(of.play_closed, "drives have no play at some place; lost motion there is the wind-up alone");
+        count(of.fem_failed, "drives by FEM found no equilibrium");
+        for asked in of.asked.iter().filter(|asked| asked.meet_alone < asked.of) {
+            let found = asked.found.map(|[low, high]| format!("; found {} to {}", short(low), short(high)));
+            let (what, found) = (&asked.what, found.unwrap_or_default());
+            remarks.push(format!("{kind}: {what}: {} of {} variants{found}", asked.meet_alone, asked.of));
+        }
+        for fem in &of.fem {
+            let (off, most) = (short(fem.off_rms_arcsec), short(fem.off_most_arcsec));
+            remarks.push(format!(
+                "{kind}: {} by kernels is off by {off} arcsec rms, {most} at most, of {} drives by FEM",
+                fem.figure, fem.drives
+            ));
+        }
+    }
+    remarks
+}
