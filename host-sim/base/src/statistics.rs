@@ -143,7 +143,7 @@ pub fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
 }
 
 /// The quantile of a sorted sample, with the interval of its order statistics: ranks between which a binomial variable
-/// lies with a probability of 0.95. Points of a scrambled net scatter less than independent ones, so that it then
+/// lies with a probability of 0.95. Points of a Latin hypercube scatter less than independent ones, so that it then
 /// holds more often.
 pub fn quantile(sorted: &[f64], share: f64) -> Quantile {
     let n = sorted.len();
@@ -182,24 +182,6 @@ pub fn exceeded(values: &[f64], above: f64) -> Exceeded {
     Exceeded { above, of }
 }
 
-/// Mean of independent replicates, with the interval of Student's t.
-pub fn of_replicates(values: &[f64]) -> Interval {
-    let value = mean(values);
-    let half = student(values.len()) * std_dev(values) / (values.len() as f64).sqrt();
-    Interval { value, low: value - half, high: value + half }
-}
-
-/// Two-sided 95 % quantile of Student's t for the mean of `n` numbers.
-fn student(n: usize) -> f64 {
-    const T: [f64; 9] = [12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262];
-    let freedom = n.saturating_sub(1).max(1);
-    T.get(freedom - 1).copied().unwrap_or_else(|| {
-        // Cornish and Fisher, first two terms: 3e-3 at ten degrees, less beyond.
-        let v = freedom as f64;
-        Z + (Z.powi(3) + Z) / (4.0 * v) + (5.0 * Z.powi(5) + 16.0 * Z.powi(3) + 3.0 * Z) / (96.0 * v * v)
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -211,11 +193,6 @@ mod tests {
             assert!((back / p - 1.0).abs() < 1e-12 || (back - p).abs() < 1e-15, "{p}: {back}");
         }
         assert!((normal_quantile(0.975) - Z).abs() < 1e-14);
-    }
-
-    #[test]
-    fn the_tables_of_student_go_on_as_the_series() {
-        assert!((student(11) - 2.228).abs() < 3e-3 && (student(31) - 2.042).abs() < 1e-3 && student(8) == 2.365);
     }
 
     /// Ranks by hand: of 100 numbers the median lies between the 40th and the 61st (Conover, Practical Nonparametric

@@ -35,10 +35,10 @@ const PRINTED: [&str; 5] = [
 
 /// Compute many variants of a drive, or drives drawn from tolerances
 ///
-/// With --vary each variant is deformed by each generator, loaded and turned by a tooth pitch, by contact FEM: backlash,
-/// lost motion, stiffness K1, K2, K3, wind-up, transmission error, stresses. A drive with imperfections is computed at
-/// one place of its turns. With --tolerances drives are drawn from a file of tolerances, and their error over a turn of
-/// the output is computed by influence kernels of the drive as drawn.
+/// With --vary each variant is deformed by each generator, loaded and turned by a tooth pitch, by contact FEM:
+/// backlash, lost motion, stiffness K1, K2, K3, wind-up, transmission error, stresses. A drive with imperfections is
+/// computed at one place of its turns. With --tolerances drives are drawn from a file of tolerances, and their error
+/// over a turn of the output is computed by influence kernels of the drive as drawn.
 ///
 /// `plan` writes plan.csv (one variant a line) and plan.json. `run` computes a shard of the variants into results/: it
 /// can run anywhere, in any order and more than once, and goes on after the rows that are there. `reduce` reports
@@ -96,14 +96,16 @@ struct PlanCommand {
     #[arg(long, value_name = "N", default_value_t = 1, requires = "draws")]
     seed: u64,
     /// Wave generator of --vary: two-roller, four-roller, double-disc, cam, or all
-    #[arg(short, long, value_name = "G", default_value = "all", value_parser = names::generators(), hide_possible_values = true, conflicts_with = "tolerances")]
+    #[arg(short, long, value_name = "G", default_value = "all", value_parser = names::generators())]
+    #[arg(hide_possible_values = true, conflicts_with = "tolerances")]
     generator: GeneratorNames,
     /// Largest load of --vary, N.m [default: the rated torque of the drive's [data_sheet]; else the largest torque of a
     /// table of that generator: 200; four-roller 100, two-roller 20; by the size of the drive]
     #[arg(long, value_name = "T", allow_negative_numbers = true, conflicts_with = "tolerances")]
     torque_n_m: Option<f64>,
     /// Positions over the tooth pitch of --vary, 4 to 32: fewer take less time, and resolve less of the error
-    #[arg(long, value_name = "N", default_value_t = 24, value_parser = clap::value_parser!(u8).range(4..=32), conflicts_with = "tolerances")]
+    #[arg(long, value_name = "N", default_value_t = 24, value_parser = clap::value_parser!(u8).range(4..=32))]
+    #[arg(conflicts_with = "tolerances")]
     positions: u8,
     /// Number of drives of --tolerances, from the first on, that are also computed by FEM to check the kernels
     #[arg(long, value_name = "M", default_value_t = 0, conflicts_with = "vary")]
@@ -112,7 +114,8 @@ struct PlanCommand {
     #[arg(long, value_name = "P", default_value_t = 23, conflicts_with = "vary")]
     fem_places: u32,
     /// Mesh: coarse, standard or fine
-    #[arg(long, value_name = "LEVEL", default_value = "coarse", value_parser = names::mesh(), hide_possible_values = true)]
+    #[arg(long, value_name = "LEVEL", default_value = "coarse", value_parser = names::mesh())]
+    #[arg(hide_possible_values = true)]
     mesh: MeshLevel,
 }
 

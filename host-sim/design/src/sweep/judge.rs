@@ -73,7 +73,7 @@ impl Judge {
     /// The judge of a plan: with the default targets where none is given, of a plan of fields.
     ///
     /// # Errors
-    /// A figure that variants of the plan do not have, a target given twice, or targets of drives drawn from tolerances.
+    /// A figure that variants of the plan do not have, a target given twice, or targets of drives within tolerances.
     pub fn of(mut self, plan: &Plan) -> Result<Judge, SweepError> {
         let known = plan.figures();
         let targets = self.targets.iter().map(|(name, _)| ("--least, --most", name));

@@ -11,8 +11,8 @@
 //! ```
 //!
 //! `wave` is settled motion over a tooth pitch of the drive that is alike everywhere; `w`, `oval` and `d` are those of
-//! [`crate::kernels`]. Errors of teeth, displaced axes and uniform changes are assumed not to change each other's effect;
-//! the drives that a sweep also computes by FEM test that.
+//! [`crate::kernels`]. Errors of teeth, displaced axes and uniform changes are assumed not to change each other's
+//! effect; the drives that a sweep also computes by FEM test that.
 
 use std::f64::consts::TAU;
 
@@ -70,7 +70,8 @@ const APART: f64 = 0.9;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Response {
-    /// State of the middle drive: the wave under the load, the wave under the light load, the sheet; arcsec, N·m/rad, MPa.
+    /// State of the middle drive: the wave under the load, the wave under the light load, the sheet; arcsec, N·m/rad,
+    /// MPa.
     pub middle: Vec<f64>,
     /// Effect of each field that changes the drive uniformly.
     pub parabolas: Vec<Parabola>,

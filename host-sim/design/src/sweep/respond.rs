@@ -61,8 +61,8 @@ pub(super) fn respond(
         .map_err(|error| kernels_failed(of, *kind, &error))?;
         before += kernel_plan.steps();
         let at = Conditions { kind: *kind, temperature_c: of.temperature_c, torque_n_m: torques_n_m[0], solver };
-        let told = |done| progress(before + done, steps, &format!("sheets, {kind}"));
-        let response = response(of, &middle, at, torques_n_m, &told)?;
+        let step = |done| progress(before + done, steps, &format!("sheets, {kind}"));
+        let response = response(of, &middle, at, torques_n_m, &step)?;
         before += 1 + 2 * alike;
         generators.push(OfOne { kernels, response });
     }
@@ -121,7 +121,7 @@ fn response(
     middle: &[Drawn],
     at: Conditions,
     torques_n_m: [f64; 2],
-    told: &(dyn Fn(usize) + Sync),
+    step: &(dyn Fn(usize) + Sync),
 ) -> Result<Response, SweepError> {
     let alike = || of.list.iter().enumerate().filter(|(_, tolerance)| tolerance.acts == ToleranceActs::Alike);
     let mut jobs: Vec<Option<(usize, f64)>> = vec![None];
@@ -141,7 +141,7 @@ fn response(
                 let which = job.map_or("the middle drive".to_owned(), |(t, v)| format!("{} = {v}", of.list[t].field));
                 SweepError::Failed(format!("{}, {which}: {error}", at.kind))
             })?;
-            told(done.fetch_add(1, Ordering::Relaxed) + 1);
+            step(done.fetch_add(1, Ordering::Relaxed) + 1);
             Ok(state)
         })
         .collect::<Result<Vec<Vec<f64>>, SweepError>>()?;

@@ -276,7 +276,7 @@ pub struct Ran {
     pub computed: usize,
 }
 
-/// Computes what is missing of a shard; `told` is called with the rows done, all rows, and the last row.
+/// Computes what is missing of a shard; `done` is called with the rows done, all rows, and the last row.
 ///
 /// # Errors
 /// There are fewer variants than shards, the file holds rows of another plan, or it cannot be written.
@@ -284,7 +284,7 @@ pub fn run(
     plan: &Plan,
     folder: &Path,
     shard: Shard,
-    told: &(dyn Fn(usize, usize, &Row) + Sync),
+    done: &(dyn Fn(usize, usize, &Row) + Sync),
 ) -> Result<Ran, SweepError> {
     let (variants, generators) = (plan.variants.len(), plan.generators.len());
     if shard.of > variants {
@@ -298,7 +298,7 @@ pub fn run(
     fs::create_dir_all(folder.join("results")).map_err(failed)?;
     let open = || OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path);
     let mut file = open().map_err(failed)?;
-    // An engine that takes a worker for lost may run its shard twice at a time: the second waits, and has nothing to do.
+    // An engine may run the shard of a worker that only seems lost a second time: it waits, and has nothing to do.
     file.lock().map_err(failed)?;
     let mut text = Vec::new();
     file.read_to_end(&mut text).map_err(failed)?;
@@ -324,7 +324,7 @@ pub fn run(
     missing.par_bridge().try_for_each(|place| {
         let row = evaluator.row(jobs[place].0, jobs[place].1);
         let mut journal = journal.lock().unwrap_or_else(PoisonError::into_inner);
-        told(journal.next + journal.waiting.len() + 1, jobs.len(), &row);
+        done(journal.next + journal.waiting.len() + 1, jobs.len(), &row);
         journal.take(place, row).map_err(failed)
     })?;
     let journal = journal.into_inner().unwrap_or_else(PoisonError::into_inner);
