@@ -107,49 +107,7 @@ impl ParameterName {
             | ParameterName::Turns
             | ParameterName::Encoder
             | ParameterName::Channel => Kind::Count,
-            ParameterName::AmplitudeArcsec
-            | ParameterName::AmplitudeUm
-            | ParameterName::ArcsecPerHour
-            | ParameterName::BendPerK
-            | ParameterName::ClearanceArcsecPerK
-            | ParameterName::DampingRatio
-            | ParameterName::DeeperArcsec
-            | ParameterName::DelayS
-            | ParameterName::DepthUm
-            | ParameterName::DragBendPerK
-            | ParameterName::DragNM
-            | ParameterName::DurationS
-            | ParameterName::Exponent
-            | ParameterName::Factor
-            | ParameterName::FrequencyHz
-            | ParameterName::FullLoadNM
-            | ParameterName::Gain
-            | ParameterName::GeneratorAmplitudeArcsec
-            | ParameterName::GrowthArcsec
-            | ParameterName::HalfLashArcsec
-            | ParameterName::HalfLoadNM
-            | ParameterName::HalfWidthArcsec
-            | ParameterName::HardeningArcsec
-            | ParameterName::HardeningExponent
-            | ParameterName::JumpArcsec
-            | ParameterName::JitterMs
-            | ParameterName::LagS
-            | ParameterName::PerK
-            | ParameterName::PressedArcsec
-            | ParameterName::RatioRelativeError
-            | ParameterName::RelativeDragPerK
-            | ParameterName::Share
-            | ParameterName::SizeArcsec
-            | ParameterName::SizeUm
-            | ParameterName::SlipTorqueNM
-            | ParameterName::SpeedExponent
-            | ParameterName::StepArcsec
-            | ParameterName::StepS
-            | ParameterName::StiffnessRatio
-            | ParameterName::StiffnessRelativePerK
-            | ParameterName::TimeS
-            | ParameterName::TorqueNM
-            | ParameterName::WidthRad => Kind::Size,
+            _ => Kind::Size,
         }
     }
 }
@@ -188,7 +146,7 @@ pub enum Usual {
 pub struct Parameter {
     /// Name; the unit is its end.
     pub name: ParameterName,
-    /// What it is.
+    /// Its description.
     pub meaning: &'static str,
     /// Allowed values, both ends with them.
     pub range: [f64; 2],

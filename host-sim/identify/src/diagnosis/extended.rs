@@ -16,7 +16,7 @@ use super::noise::Whitener;
 use super::report::Parameter;
 use super::resolution::{Resolution, averages_hide, resolution};
 use super::rows::Rows;
-use super::select::{Selected, fit, fixed, settle_all};
+use super::select::{Selected, fit, fixed, less, settle_all};
 use super::thinned::{Sample, Thinned};
 use super::{DiagnosisError, Fineness, Settings, prepare, uncertainty};
 use crate::causes::CauseName;
@@ -172,10 +172,6 @@ impl Series {
     pub fn less_extended(&self) -> Vec<f64> {
         less(&self.measured_arcsec, &self.extended_arcsec)
     }
-}
-
-fn less(a: &[f64], b: &[f64]) -> Vec<f64> {
-    a.iter().zip(b).map(|(a, b)| a - b).collect()
 }
 
 /// How finely rows are to be looked at, and the noise in them.

@@ -331,7 +331,7 @@ fn what_a_load_makes_that_nobody_recorded_has_no_name() {
     let mut sessions = with_more_by_speed(recorded(&[], 5, 3000, 100.0, 1.5, 73), |_, speed| -12.0 * speed.signum());
     sessions.iter_mut().for_each(|session| session.torque_n_m = None);
     let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
-    assert!(names(&diagnosis).iter().all(|name| !name.is_made_by_loads()), "{}", diagnosis.text());
+    assert!(names(&diagnosis).iter().all(|name| !name.spec().made_by_loads), "{}", diagnosis.text());
 }
 
 /// The same sessions as a file in which a share of the rows is off, one by one: by far as a heavy tail has it, or to

@@ -40,38 +40,32 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// As it stands in files.
-    #[must_use]
-    pub const fn as_str(self) -> &'static str {
+    /// Its name in files, and its words for a reader.
+    const fn spec(self) -> (&'static str, &'static str) {
         match self {
-            Stage::Data => "data",
-            Stage::Tried => "tried",
-            Stage::Forward => "forward",
-            Stage::Backward => "backward",
-            Stage::Exchange => "exchange",
-            Stage::Settled => "settled",
-            Stage::HeldOut => "held_out",
-            Stage::Understood => "understood",
-            Stage::Rival => "rival",
-            Stage::Verdict => "verdict",
+            Stage::Data => ("data", "the data"),
+            Stage::Tried => ("tried", "tried at many places"),
+            Stage::Forward => ("forward", "refined beside the causes chosen before"),
+            Stage::Backward => ("backward", "held against what was chosen after it"),
+            Stage::Exchange => ("exchange", "tried in the place of another cause"),
+            Stage::Settled => ("settled", "at the end of the search"),
+            Stage::HeldOut => ("held_out", "in sessions left out of the fit"),
+            Stage::Understood => ("understood", "beside what has no name"),
+            Stage::Rival => ("rival", "against its rivals"),
+            Stage::Verdict => ("verdict", "the verdict"),
         }
     }
 
-    /// For a reader.
+    /// Its name in files.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        self.spec().0
+    }
+
+    /// Its words for a reader.
     #[must_use]
     pub const fn words(self) -> &'static str {
-        match self {
-            Stage::Data => "the data",
-            Stage::Tried => "tried at many places",
-            Stage::Forward => "refined beside the causes chosen before",
-            Stage::Backward => "held against what was chosen after it",
-            Stage::Exchange => "tried in the place of another cause",
-            Stage::Settled => "at the end of the search",
-            Stage::HeldOut => "in sessions left out of the fit",
-            Stage::Understood => "beside what has no name",
-            Stage::Rival => "against its rivals",
-            Stage::Verdict => "the verdict",
-        }
+        self.spec().1
     }
 }
 
@@ -82,7 +76,7 @@ pub enum Gate {
     Needs(Need),
     /// A parameter of the nominal model has left its tolerance, in standard deviations between units.
     Tolerance,
-    /// There is room: so many causes, or deviations, are chosen at most.
+    /// There is room: this many causes, or deviations, are chosen at most.
     Room,
     /// Tried at many places it gains as much evidence as the last law that was refined.
     Refined,
@@ -106,21 +100,19 @@ pub enum Gate {
     LeftOut,
     /// In the place of another it gains evidence over that.
     Ahead,
-    /// It tells the same as what it takes the place of: they differ by less than this share of that.
+    /// It explains the same as what it takes the place of: they differ by less than this share of that.
     SamePlace,
-    /// In the place of another it earns that place.
-    Earns,
     /// With it sessions left out are predicted no worse than with no cause at all, arcsec rms.
     Predicts,
     /// A line of the generator's angle does not grow with the speed.
     NoGrowthWithSpeed,
-    /// A load that was not recorded may make it: no more is left than so many times the noise.
+    /// A load that was not recorded may make it: no more is left than this many times the noise.
     LoadKnown,
     /// No line in time that has no name, near its frequency, is as large as this against it.
     NoLineBeside,
-    /// It is so many times its own uncertainty.
+    /// It is this many times its own uncertainty.
     KnownWell,
-    /// The best known of its sizes is so many times its standard deviation.
+    /// The best known of its sizes is this many times its standard deviation.
     ToldFromZero,
     /// No rival lowers the misfit by this much.
     ToldBetter,
@@ -163,7 +155,6 @@ impl Gate {
             Gate::LeftOut => "left_out",
             Gate::Ahead => "ahead",
             Gate::SamePlace => "same_place",
-            Gate::Earns => "earns",
             Gate::Predicts => "predicts",
             Gate::NoGrowthWithSpeed => "no_growth_with_speed",
             Gate::LoadKnown => "load_known",
@@ -198,7 +189,6 @@ impl Gate {
             Gate::LeftOut => "predicts sessions that it was not fitted to (gain)",
             Gate::Ahead => "tells the data better than the cause in whose place it is tried (evidence)",
             Gate::SamePlace => "tells the same as the cause in whose place it is tried (difference as a share of that)",
-            Gate::Earns => "earns the place that it would take",
             Gate::Predicts => "keeps the causes together better than none in sessions left out (arcsec rms)",
             Gate::NoGrowthWithSpeed => {
                 "does not grow with the speed (growth of its amplitude, standard deviations; negative where it fades)"
@@ -222,34 +212,18 @@ impl Gate {
     /// Whether a value passes below its limit, not above.
     #[must_use]
     pub const fn is_below(self) -> bool {
-        match self {
+        matches!(
+            self,
             Gate::Deviations
-            | Gate::Room
-            | Gate::SamePlace
-            | Gate::Predicts
-            | Gate::LoadKnown
-            | Gate::NoLineBeside
-            | Gate::NoGrowthWithSpeed
-            | Gate::NoWorse
-            | Gate::AsRival => true,
-            Gate::Needs(_)
-            | Gate::Tolerance
-            | Gate::Refined
-            | Gate::Sense
-            | Gate::Gain
-            | Gate::First
-            | Gate::Evidence
-            | Gate::Size
-            | Gate::SizeIfClear
-            | Gate::Alone
-            | Gate::LeftOut
-            | Gate::Ahead
-            | Gate::Earns
-            | Gate::KnownWell
-            | Gate::ToldFromZero
-            | Gate::ToldBetter
-            | Gate::ToldApart => false,
-        }
+                | Gate::Room
+                | Gate::SamePlace
+                | Gate::Predicts
+                | Gate::LoadKnown
+                | Gate::NoLineBeside
+                | Gate::NoGrowthWithSpeed
+                | Gate::NoWorse
+                | Gate::AsRival
+        )
     }
 }
 
@@ -258,9 +232,9 @@ impl Gate {
 pub struct Judged {
     /// The gate.
     pub gate: Gate,
-    /// What came to it, if it is a number.
+    /// The value, if it is a number.
     pub value: Option<f64>,
-    /// What it asks for.
+    /// The limit.
     pub limit: Option<f64>,
     /// Whether it let it through.
     pub passed: bool,
@@ -279,7 +253,7 @@ impl Judged {
         Judged::number(gate, value, limit, value > limit)
     }
 
-    /// What is no number.
+    /// A value that is no number.
     #[must_use]
     pub fn plain(gate: Gate, passed: bool) -> Judged {
         Judged { gate, value: None, limit: None, passed }
@@ -295,7 +269,7 @@ pub(crate) fn passed(gates: &[Judged]) -> bool {
 /// One judgement of one law.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Step {
-    /// What was judged.
+    /// The law that was judged.
     pub label: Label,
     /// Its shape parameters.
     pub shape: Vec<(ParameterName, f64)>,
@@ -454,7 +428,7 @@ impl Trace {
         let search = |step: &&Step| !matches!(step.stage, Stage::Exchange | Stage::Rival);
         let last = self.of(cause).rev().find(search)?;
         if last.passed() {
-            // It was let through by all but a rival that tells the data better.
+            // It was let through by all but a rival that explains the data better.
             return self.of(cause).find(|step| {
                 step.stage == Stage::Rival && step.gates.iter().any(|j| j.gate == Gate::ToldBetter && !j.passed)
             });
@@ -516,7 +490,7 @@ impl Serialize for Entries<'_> {
 }
 
 impl Serialize for Trace {
-    /// What tells of each cause, cause after cause.
+    /// The deciding gates of each cause, cause after cause.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         Entries(CauseName::ALL.iter().flat_map(|cause| self.telling(*cause)).collect()).serialize(serializer)
     }

@@ -100,7 +100,7 @@ pub(super) fn conclude(
                 trace.decided(Stage::Rival, rival.cause.into(), against(name), rival.in_its_place(size));
             }
             if rivals.iter().any(|r| r.tells_better(size)) {
-                // A rival that no other test lets through tells it better: neither is known.
+                // A rival that no other test lets through explains it better: neither is known.
                 told_better.push(k);
                 continue;
             }
@@ -375,7 +375,7 @@ fn known(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Vec<Kn
     uncertainty::known(problem, selected, beyond_noise(left, floor(problem, noise)))
 }
 
-/// The terms without those that hide others: where two causes do so nearly the same that the size of neither is told
+/// The terms without those that hide others: where two causes do so nearly the same that the size of neither is known
 /// from zero, and that of one is where the other is left out, the smaller is set aside. As often as not the smaller is
 /// what the law of the larger leaves; what else may stand in the place of the larger, rivals and look-alikes say. Also
 /// what was set aside, with as much of it as the others do not take over.
@@ -421,7 +421,7 @@ pub(super) fn told_apart<'l>(
 /// What the terms explain and fewer of them, fitted anew, do not, arcsec: what is left without the others.
 fn not_taken_over(problem: &Problem<'_>, all: &Selected<'_>, fewer: &Selected<'_>) -> f64 {
     let (left, then) = (remainder::left(problem, all), remainder::left(problem, fewer));
-    problem.certain_rms(&then.iter().zip(&left).map(|(then, left)| then - left).collect::<Vec<f64>>())
+    problem.certain_rms(&select::less(&then, &left))
 }
 
 /// By what noise counts more where more is left than that (Birge 1932): the laws are not right to the noise then.
@@ -448,7 +448,7 @@ fn has_a_double_outside(
         || name == CauseName::EncoderSubdivision
         || selected.others(k).iter().any(|other| other.law.is(standing));
     let line_of_generator = waves_per_generator_turn(name, known, nominal).is_some();
-    name.has_a_double_outside()
+    name.spec().double_outside
         || part_of_a_turn
         || load_makes_it(Some(name), problem)
         || line_of_generator && (name == standing || not_held_against_it)
@@ -476,11 +476,11 @@ fn waves_per_generator_turn(name: CauseName, known: &Known, nominal: &Nominal) -
 /// Whether a load that nobody recorded, a brake, a bearing, an arm, would make what a cause makes: an error that goes
 /// with speed, direction or the output's angle.
 fn load_makes_it(cause: Option<CauseName>, problem: &Problem<'_>) -> bool {
-    !problem.on.rows.recorded.torque && cause.is_some_and(CauseName::is_made_by_loads)
+    !problem.on.rows.recorded.torque && cause.is_some_and(|cause| cause.spec().made_by_loads)
 }
 
 /// Probability of a cause against its look-alikes, whose misfits are higher by these; if there is none, against the
-/// closest rival. Less where its size is told from zero by few standard deviations (`size_told`).
+/// closest rival. Less where its size is distinguished from zero by few standard deviations (`size_told`).
 fn confidence(alike: &[f64], double_outside: bool, closest: f64, size_told: f64) -> f64 {
     let odds = |misfit: f64| (-0.5 * misfit.clamp(0.0, 40.0)).exp();
     let among = if alike.is_empty() && !double_outside {

@@ -53,7 +53,7 @@ pub(crate) struct Mapped {
 pub(crate) struct FoundGeometry {
     /// The drive.
     pub drive: Drive,
-    /// What is in it.
+    /// Its contents.
     pub mapped: Vec<Mapped>,
     /// Causes that no field of a drive holds.
     pub rest: Vec<CauseEntry>,
@@ -168,6 +168,7 @@ pub(crate) fn found_geometry(
     let probe = Probe::new(extended, nominal, table, generator, orientation_rad.unwrap_or(0.0));
     let um = |arcsec: f64, radius_mm: f64| 1e3 * arcsec / ARCSEC_PER_RAD * radius_mm;
     let base_mm = drive.circular_spline.base_radius_mm();
+    let pitch_mm = drive.circular_spline.pitch_radius_mm();
     let flank_angle_rad = drive.circular_spline.bearing_flank_angle_rad();
     let mut found = drive.clone();
     let (mut mapped, mut rest) = (Vec::new(), Vec::new());
@@ -182,55 +183,33 @@ pub(crate) fn found_geometry(
             fields.push(format!("{field} = {slot}"));
         };
         let middle = |root: f64, tip: f64| 0.5 * (root + tip);
-        match (cause.name.drive_field(), place) {
+        match (cause.name.spec().drive_field, place) {
             (Some(DriveField::CircularSplineEccentricity), Some(k)) => {
                 let wave = displaced(probe.wave(k, true, 2.0), flank_angle_rad);
-                set(
-                    "as_built.circular_spline_eccentricity_um",
-                    &mut built.circular_spline_eccentricity_um,
-                    um(wave.size(), base_mm),
-                );
-                set(
-                    "as_built.circular_spline_eccentricity_phase_deg",
-                    &mut built.circular_spline_eccentricity_phase_deg,
-                    degrees(0.5 * wave.phase()),
-                );
+                let (size, phase) =
+                    (&mut built.circular_spline_eccentricity_um, &mut built.circular_spline_eccentricity_phase_deg);
+                set("as_built.circular_spline_eccentricity_um", size, um(wave.size(), base_mm));
+                set("as_built.circular_spline_eccentricity_phase_deg", phase, degrees(0.5 * wave.phase()));
             }
             (Some(DriveField::FlexsplineRunout), Some(k)) => {
                 let wave = displaced(probe.wave(k, false, 2.0), flank_angle_rad);
-                set("as_built.flexspline_runout_um", &mut built.flexspline_runout_um, um(wave.size(), base_mm));
-                set(
-                    "as_built.flexspline_runout_phase_deg",
-                    &mut built.flexspline_runout_phase_deg,
-                    degrees(0.5 * wave.phase()),
-                );
+                let (size, phase) = (&mut built.flexspline_runout_um, &mut built.flexspline_runout_phase_deg);
+                set("as_built.flexspline_runout_um", size, um(wave.size(), base_mm));
+                set("as_built.flexspline_runout_phase_deg", phase, degrees(0.5 * wave.phase()));
             }
             (Some(DriveField::CircularSplineOffset), Some(k)) if orientation_rad.is_some() => {
                 let wave = displaced(probe.wave(k, false, 2.0), flank_angle_rad);
-                set(
-                    "as_built.circular_spline_offset_um",
-                    &mut built.circular_spline_offset_um,
-                    um(wave.size(), base_mm),
-                );
-                set(
-                    "as_built.circular_spline_offset_direction_deg",
-                    &mut built.circular_spline_offset_direction_deg,
-                    degrees(0.5 * wave.phase()),
-                );
+                let (size, phase) =
+                    (&mut built.circular_spline_offset_um, &mut built.circular_spline_offset_direction_deg);
+                set("as_built.circular_spline_offset_um", size, um(wave.size(), base_mm));
+                set("as_built.circular_spline_offset_direction_deg", phase, degrees(0.5 * wave.phase()));
             }
             (Some(DriveField::CircularSplineOvality), Some(k)) => {
                 let wave = oval(probe.wave(k, true, 2.0), flank_angle_rad);
-                let radius = drive.circular_spline.pitch_radius_mm();
-                set(
-                    "as_built.circular_spline_ovality_um",
-                    &mut built.circular_spline_ovality_um,
-                    um(wave.size(), radius),
-                );
-                set(
-                    "as_built.circular_spline_ovality_phase_deg",
-                    &mut built.circular_spline_ovality_phase_deg,
-                    degrees(0.5 * wave.phase()),
-                );
+                let (size, phase) =
+                    (&mut built.circular_spline_ovality_um, &mut built.circular_spline_ovality_phase_deg);
+                set("as_built.circular_spline_ovality_um", size, um(wave.size(), pitch_mm));
+                set("as_built.circular_spline_ovality_phase_deg", phase, degrees(0.5 * wave.phase()));
             }
             (Some(DriveField::PitchHarmonics(wheel)), Some(k)) => {
                 let on_circular_spline = wheel == Wheel::CircularSpline;
@@ -345,18 +324,7 @@ pub(crate) fn found_geometry(
                 }
             }
             // No field holds it, the data do not show it, or it is no fixed direction.
-            (None, _)
-            | (
-                Some(
-                    DriveField::CircularSplineEccentricity
-                    | DriveField::FlexsplineRunout
-                    | DriveField::CircularSplineOffset
-                    | DriveField::CircularSplineOvality
-                    | DriveField::PitchHarmonics(_)
-                    | DriveField::DamagedTooth,
-                ),
-                _,
-            ) => {}
+            _ => {}
         }
         let b = &found.as_built;
         let largest = [

@@ -48,7 +48,7 @@ pub struct CauseEntry {
 pub struct Model {
     /// The nominal model.
     pub nominal: Nominal,
-    /// What was found beside it.
+    /// Findings beside it.
     pub causes: Vec<CauseEntry>,
 }
 
@@ -177,7 +177,7 @@ impl Model {
 /// The causes in the part `[extension]` of a file, a drive's or a model's.
 ///
 /// # Errors
-/// What is wrong, and in which line.
+/// An error and its line.
 pub fn causes_in(file_name: &str, text: &str) -> Result<Vec<CauseEntry>, DriveError> {
     let mut file = TomlFile::new(file_name, text);
     let causes = file.parse().map_or_else(Vec::new, |table| causes_of(&mut file, &table));
@@ -220,7 +220,7 @@ pub fn causes_to_toml(causes: &[CauseEntry]) -> String {
     text
 }
 
-/// What tells whether parameters are those of a fit.
+/// What decides whether parameters are those of a fit.
 fn fingerprint(parameters: &BTreeMap<String, f64>) -> String {
     let mut hash = blake3::Hasher::new();
     for (name, value) in parameters {
@@ -361,7 +361,7 @@ impl CauseEntry {
         let mut text = String::new();
         let twice = [Name::AmplitudeUm, Name::DepthUm, Name::Tooth, Name::GeneratorAmplitudeArcsec];
         let has = |name: Name| self.parameters.contains_key(name.as_str());
-        for parameter in self.name.parameters() {
+        for parameter in self.name.spec().parameters {
             let Some(&value) = self.parameters.get(parameter.name.as_str()) else { continue };
             // Of two forms of the same, the one in arc-seconds and radians.
             if twice.contains(&parameter.name) && (has(Name::AmplitudeArcsec) || has(Name::AngleRad)) {

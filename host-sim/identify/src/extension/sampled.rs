@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use flexspline::make::{Harmonics, MissingDirection, NODES_PER_PERIOD, Plan, Sample};
 use flexspline::{Direction, Table};
 
-use crate::causes::{CauseName, InTable, ParameterName};
+use crate::causes::{CauseName, InTable, OF_THE_OUTPUT_ENCODER, ParameterName};
 use crate::diagnosis::{Extended, FittedCause};
 use crate::measurement::Session;
 use crate::nominal::Nominal;
@@ -19,7 +19,7 @@ const LEAST_POSITIONS: usize = 151;
 const MOST_POSITIONS: usize = 1009;
 /// Orders that a model may have beside those fitted: of what is rectified by the clearance.
 const FURTHER_ORDERS: [u16; 3] = [8, 10, 12];
-/// Orders that are to be told apart stay apart by so much where the positions fold them.
+/// Orders that are to be distinguished stay apart by so much where the positions fold them.
 const APART: f64 = 0.9;
 /// Tooth meshes of higher order than this are none in the model.
 const MESHES: u16 = 4;
@@ -68,7 +68,7 @@ fn positions(ratio: f64, teeth: f64) -> usize {
     places_that_tell_apart(&orders, [LEAST_POSITIONS, MOST_POSITIONS], APART)
 }
 
-/// What a table is made for.
+/// The target of a table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TableSubject {
     /// Generator that names the file.
@@ -86,7 +86,7 @@ pub struct ExtendedTables<'a> {
     pub nominal: &'a Nominal,
     /// The table that takes its place, if there is one.
     pub table: Option<&'a Table<'a>>,
-    /// What the table is made for.
+    /// The target of the table.
     pub subject: &'a TableSubject,
     /// Torque, N·m, and temperatures, °C, of the data, where no table gives the axes.
     pub torque_n_m: f64,
@@ -103,8 +103,8 @@ impl ExtendedTables<'_> {
         let at_output = |found: &FittedCause| {
             found.parameters.get(ParameterName::Encoder.as_str()).is_some_and(|encoder| encoder.value == 1.0)
         };
-        match cause.in_table() {
-            InTable::Yes if found.is_some_and(at_output) => Some(CauseName::OF_THE_OUTPUT_ENCODER),
+        match cause.spec().in_table {
+            InTable::Yes if found.is_some_and(at_output) => Some(OF_THE_OUTPUT_ENCODER),
             InTable::Yes => None,
             InTable::AtOneOrientation => {
                 self.orientation_rad.is_none().then_some("the drive is turned against gravity")

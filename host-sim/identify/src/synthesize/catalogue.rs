@@ -12,13 +12,15 @@ use serde::ser::{SerializeMap, Serializer};
 use super::Sizes;
 use super::excitation::Excitation;
 use super::law::OVAL_FLANK_RAD;
-use crate::causes::{CauseName, Factor, Parameter, ParameterName, TIME, Usual, number};
+use crate::causes::{
+    CauseName, Factor, Parameter, ParameterName, ParameterName as Name, TIME, Usual, Usual::Value, number,
+};
 use crate::measurement::FaultName;
 use crate::nominal::{Fixed, Nominal};
 use flexspline_base::suggest::did_you_mean;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
-/// What may be hidden in data.
+/// An effect that can be hidden in data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Hidden {
     /// A cause of the library.
@@ -30,7 +32,7 @@ pub enum Hidden {
 /// An effect that can be asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Definition {
-    /// What it is.
+    /// Its description.
     pub what: Hidden,
     /// In words.
     pub meaning: &'static str,
@@ -56,137 +58,123 @@ impl Definition {
         matches!(self.what, Hidden::Fault(_))
     }
 
-    const fn of_cause(cause: CauseName) -> Definition {
+    fn of_cause(cause: CauseName) -> Definition {
         Definition {
             what: Hidden::Cause(cause),
-            meaning: cause.meaning(),
-            parameters: cause.parameters(),
-            twins: cause.twins(),
+            meaning: cause.spec().meaning,
+            parameters: cause.spec().parameters,
+            twins: cause.spec().twins,
         }
     }
 
-    const fn of_fault(fault: FaultName) -> Definition {
-        let (meaning, parameters) = fault_parameters(fault);
+    const fn of_fault(fault: FaultName, meaning: &'static str, parameters: &'static [Parameter]) -> Definition {
         Definition { what: Hidden::Fault(fault), meaning, parameters, twins: &[] }
     }
 }
 
 const CHANNELS: &[&str] = &["generator", "output", "torque", "temperature"];
 
-/// What a data fault is, and its parameters.
-const fn fault_parameters(fault: FaultName) -> (&'static str, &'static [Parameter]) {
-    use ParameterName as Name;
-    use Usual::Value;
-    match fault {
-        FaultName::EncoderIndexJump => (
-            "the count of the output encoder is off from an instant on",
-            const { &[number(Name::SizeArcsec, "of the jump", -1e5, 1e5, Value(60.0)), TIME] },
-        ),
-        FaultName::FrozenChannel => (
-            "a channel repeats one value",
-            const {
-                &[
-                    Parameter { words: CHANNELS, ..number(Name::Channel, "which one", 0.0, 3.0, Value(1.0)) },
-                    TIME,
-                    number(Name::DurationS, "how long", 0.0, 1e6, Value(3.0)),
-                ]
-            },
-        ),
-        FaultName::MissingSamples => {
-            ("rows without an output angle", const { &[number(Name::Share, "of the rows", 0.0, 0.5, Value(0.02))] })
-        }
-        FaultName::ClockError => {
-            ("time runs back", const { &[number(Name::StepS, "by which", 1e-4, 1e4, Value(0.5)), TIME] })
-        }
-        FaultName::Outliers => (
-            "single rows far off",
-            const {
-                &[
-                    number(Name::Share, "of the rows", 0.0, 0.1, Value(0.002)),
-                    number(Name::SizeArcsec, "of the largest", 0.0, 1e6, Value(600.0)),
-                ]
-            },
-        ),
-        FaultName::UnitMismatch => ("the output angle is in degrees and says radians", &[]),
-        FaultName::Quantisation => {
-            ("a coarse output encoder", const { &[number(Name::StepArcsec, "its step", 0.0, 1e5, Value(30.0))] })
-        }
-        FaultName::Drift => (
-            "a zero that moves with time",
-            const { &[number(Name::ArcsecPerHour, "how fast", -1e6, 1e6, Value(300.0))] },
-        ),
-        FaultName::ReadJitter => (
-            "the two angles are not read at one instant",
-            const { &[number(Name::JitterMs, "scatter of the time between them", 0.0, 100.0, Value(0.5))] },
-        ),
-        FaultName::Stalls => (
-            "the logger stands still now and then, and its time counts on",
-            const {
-                &[
-                    number(Name::EveryRows, "after so many rows", 2.0, 1e5, Value(50.0)),
-                    number(Name::DurationS, "for so long", 0.0, 1e3, Value(0.05)),
-                ]
-            },
-        ),
-        FaultName::CounterRestart => (
-            "the count of the generator begins anew in the sessions after the first",
-            const { &[number(Name::Turns, "off by", -1e5, 1e5, Value(7.0))] },
-        ),
-        FaultName::TorqueSign => ("the torque has the wrong sign", &[]),
-        FaultName::TorqueScale => (
-            "the torque is in another unit, or of another shaft",
-            const { &[number(Name::Factor, "of all values", -1e6, 1e6, Value(0.01))] },
-        ),
-        FaultName::TorqueZero => (
-            "the torque reads a load where there is none",
-            const { &[number(Name::TorqueNM, "what it reads then", -1e6, 1e6, Value(0.8))] },
-        ),
-        FaultName::PositionJump => (
-            "the generator's angle leaps by whole turns",
-            const { &[number(Name::Turns, "by how many", -1e5, 1e5, Value(16.0)), TIME] },
-        ),
-        FaultName::AveragedRows => (
-            "each row is the mean of those about it",
-            const { &[number(Name::DurationS, "over so long", 0.0, 10.0, Value(0.06))] },
-        ),
-    }
-}
+/// The faults of the data in the order of lists.
+const FAULTS: [Definition; 16] = [
+    Definition::of_fault(
+        FaultName::EncoderIndexJump,
+        "the count of the output encoder is off from an instant on",
+        &[number(Name::SizeArcsec, "of the jump", -1e5, 1e5, Value(60.0)), TIME],
+    ),
+    Definition::of_fault(
+        FaultName::FrozenChannel,
+        "a channel repeats one value",
+        &[
+            Parameter { words: CHANNELS, ..number(Name::Channel, "which one", 0.0, 3.0, Value(1.0)) },
+            TIME,
+            number(Name::DurationS, "how long", 0.0, 1e6, Value(3.0)),
+        ],
+    ),
+    Definition::of_fault(
+        FaultName::MissingSamples,
+        "rows without an output angle",
+        &[number(Name::Share, "of the rows", 0.0, 0.5, Value(0.02))],
+    ),
+    Definition::of_fault(
+        FaultName::ClockError,
+        "time runs back",
+        &[number(Name::StepS, "by which", 1e-4, 1e4, Value(0.5)), TIME],
+    ),
+    Definition::of_fault(
+        FaultName::Outliers,
+        "single rows far off",
+        &[
+            number(Name::Share, "of the rows", 0.0, 0.1, Value(0.002)),
+            number(Name::SizeArcsec, "of the largest", 0.0, 1e6, Value(600.0)),
+        ],
+    ),
+    Definition::of_fault(FaultName::UnitMismatch, "the output angle is in degrees and says radians", &[]),
+    Definition::of_fault(
+        FaultName::Quantisation,
+        "a coarse output encoder",
+        &[number(Name::StepArcsec, "its step", 0.0, 1e5, Value(30.0))],
+    ),
+    Definition::of_fault(
+        FaultName::Drift,
+        "a zero that moves with time",
+        &[number(Name::ArcsecPerHour, "how fast", -1e6, 1e6, Value(300.0))],
+    ),
+    Definition::of_fault(
+        FaultName::ReadJitter,
+        "the two angles are not read at one instant",
+        &[number(Name::JitterMs, "scatter of the time between them", 0.0, 100.0, Value(0.5))],
+    ),
+    Definition::of_fault(
+        FaultName::Stalls,
+        "the logger stands still now and then, and its time counts on",
+        &[
+            number(Name::EveryRows, "after so many rows", 2.0, 1e5, Value(50.0)),
+            number(Name::DurationS, "for so long", 0.0, 1e3, Value(0.05)),
+        ],
+    ),
+    Definition::of_fault(
+        FaultName::CounterRestart,
+        "the count of the generator begins anew in the sessions after the first",
+        &[number(Name::Turns, "off by", -1e5, 1e5, Value(7.0))],
+    ),
+    Definition::of_fault(FaultName::TorqueSign, "the torque has the wrong sign", &[]),
+    Definition::of_fault(
+        FaultName::TorqueScale,
+        "the torque is in another unit, or of another shaft",
+        &[number(Name::Factor, "of all values", -1e6, 1e6, Value(0.01))],
+    ),
+    Definition::of_fault(
+        FaultName::TorqueZero,
+        "the torque reads a load where there is none",
+        &[number(Name::TorqueNM, "what it reads then", -1e6, 1e6, Value(0.8))],
+    ),
+    Definition::of_fault(
+        FaultName::PositionJump,
+        "the generator's angle leaps by whole turns",
+        &[number(Name::Turns, "by how many", -1e5, 1e5, Value(16.0)), TIME],
+    ),
+    Definition::of_fault(
+        FaultName::AveragedRows,
+        "each row is the mean of those about it",
+        &[number(Name::DurationS, "over so long", 0.0, 10.0, Value(0.06))],
+    ),
+];
 
 /// Parameters that came to effects later, none of which is drawn: they take no number, so that a seed goes on making
 /// the same noise.
 const CAME_LATER: [ParameterName; 1] = [ParameterName::DeeperArcsec];
 
-/// Data faults in the order of lists.
-const FAULTS: [FaultName; 16] = [
-    FaultName::EncoderIndexJump,
-    FaultName::FrozenChannel,
-    FaultName::MissingSamples,
-    FaultName::ClockError,
-    FaultName::Outliers,
-    FaultName::UnitMismatch,
-    FaultName::Quantisation,
-    FaultName::Drift,
-    FaultName::ReadJitter,
-    FaultName::Stalls,
-    FaultName::CounterRestart,
-    FaultName::TorqueSign,
-    FaultName::TorqueScale,
-    FaultName::TorqueZero,
-    FaultName::PositionJump,
-    FaultName::AveragedRows,
-];
-
 /// Everything that can be asked for: the causes of the library, then data faults.
 #[must_use]
 pub fn effects() -> Vec<Definition> {
     let causes = CauseName::ALL.iter().map(|cause| Definition::of_cause(*cause));
-    causes.chain(FAULTS.map(Definition::of_fault)).collect()
+    causes.chain(FAULTS).collect()
 }
 
 /// An effect with the values of its parameters: those given, and once completed all.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chosen {
-    /// What it is.
+    /// Its description.
     pub definition: Definition,
     /// Value of each parameter.
     pub values: Vec<Option<f64>>,
@@ -335,7 +323,7 @@ impl Chosen {
     }
 }
 
-/// What parameters are completed by.
+/// Sources that complete parameters.
 pub(super) struct Setting<'a> {
     pub nominal: &'a Nominal,
     pub sizes: Sizes,

@@ -52,7 +52,7 @@ impl Strange {
     }
 }
 
-/// What is hidden.
+/// The hidden effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum What {
     /// A cause of the library.
@@ -76,7 +76,7 @@ impl From<Strange> for What {
 /// An effect with its size and phase.
 #[derive(Clone, Debug)]
 pub(crate) struct Effect {
-    /// What it is.
+    /// Its description.
     pub what: What,
     /// Amplitude at the output, arcsec; for the rest what the name says.
     pub size: f64,
@@ -167,12 +167,13 @@ impl Effect {
     fn as_asked_for(&self, cause: CauseName, plant: &Plant<'_>, on: &Excitation) -> Law {
         let mut chosen = parse(cause.as_str()).expect("a cause can be asked for");
         let size = cause
-            .parameters()
+            .spec()
+            .parameters
             .iter()
             .map(|parameter| parameter.name)
             .min_by_key(|name| *name != ParameterName::AmplitudeArcsec)
             .expect("a cause has a parameter");
-        for (parameter, value) in cause.parameters().iter().zip(&mut chosen.values) {
+        for (parameter, value) in cause.spec().parameters.iter().zip(&mut chosen.values) {
             *value = match parameter.name {
                 name if name == size => Some(self.size),
                 ParameterName::AngleRad | ParameterName::PhaseRad => Some(self.phase),

@@ -1,10 +1,10 @@
-//! What a law tells of: a cause of the library, or a deviation that has no name in it.
+//! The subject of a law: a cause of the library, or a deviation that has no name in it.
 
 use std::fmt;
 
 use crate::causes::{CauseName, Kin};
 
-/// What a law tells of.
+/// The subject of a law.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Label {
     /// A cause of the library.
@@ -102,9 +102,9 @@ impl Label {
     }
 
     /// What its misfit may be taken for.
-    pub(super) const fn kin(self) -> Kin {
+    pub(super) fn kin(self) -> Kin {
         match self {
-            Label::Cause(cause) => cause.kin(),
+            Label::Cause(cause) => cause.spec().kin,
             Label::Deviation(_) => Kin::Unlike,
         }
     }

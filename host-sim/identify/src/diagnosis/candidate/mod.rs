@@ -59,7 +59,7 @@ pub struct Excitation<'a> {
 
 /// Generator turns below which a pulse in one place is not told from a wave; as in the picture of a residual.
 const FEWEST_TURNS_OF_PULSES: f64 = 6.0;
-/// At temperatures closer to each other than this, and this close to the nominal one, K, nothing thermal can be told
+/// At temperatures closer to each other than this, and this close to the nominal one, K, nothing thermal can be seen
 /// from a changed constant.
 const LEAST_SPAN_K: f64 = 2.0;
 const LEAST_OFF_NOMINAL_K: f64 = 5.0;
@@ -70,7 +70,7 @@ const LEAST_OFF_NOMINAL_K: f64 = 5.0;
 const USED_TURNS: f64 = 20.0;
 const USED_S: f64 = 60.0;
 
-/// A load that nobody recorded on an unloaded drive may be so many times its friction, or wind it up by so much,
+/// A load that nobody recorded on an unloaded drive may be this many times its friction, or wind it up by so much,
 /// arcsec.
 const UNLOADED_FRICTIONS: f64 = 4.0;
 const UNLOADED_ARCSEC: f64 = 20.0;
@@ -91,7 +91,7 @@ impl<'a> Excitation<'a> {
     /// What these data lack to speak of a cause: the first of its needs that they do not meet.
     #[must_use]
     pub(crate) fn lacks(&self, cause: CauseName) -> Option<Need> {
-        cause.needs().iter().copied().find(|need| !self.meets(*need))
+        cause.spec().needs.iter().copied().find(|need| !self.meets(*need))
     }
 
     /// Whether these data speak of a cause.
@@ -108,10 +108,7 @@ impl<'a> Excitation<'a> {
             Need::Spring => self.nominal.wind_up_arcsec(1.0) > 0.0,
             Need::Temperature => rows.recorded.temperature,
             Need::TemperatureSpan => {
-                let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-                for t in &rows.temperature {
-                    (low, high) = (low.min(*t), high.max(*t));
-                }
+                let (low, high) = least_and_most(rows.temperature.iter().copied());
                 high - low > LEAST_SPAN_K || (low - self.nominal.temperature_c).abs() > LEAST_OFF_NOMINAL_K
             }
             Need::Time => rows.recorded.time,
@@ -343,11 +340,11 @@ pub(crate) struct Lead {
 /// Laws made so far: each has a number of its own.
 static LAWS: AtomicU64 = AtomicU64::new(0);
 
-/// One law of one cause: what it tells of, how it is evaluated, how it may be wrong, how it is looked for, and how it
+/// One law of one cause: what it is about, how it is evaluated, how it may be wrong, how it is looked for, and how it
 /// acts on others.
 pub(crate) struct Law {
     id: u64,
-    /// What it tells of.
+    /// Its subject.
     pub label: Label,
     /// Which of several models of one cause it is: a word that stays the same from one recording to the next.
     pub variant: Cow<'static, str>,
@@ -463,12 +460,12 @@ impl Law {
             acts: Acts::default(),
         }
     }
-    /// The cause it tells of; none for a deviation without one.
+    /// The cause it is about; none for a deviation without one.
     #[must_use]
     pub(crate) const fn cause(&self) -> Option<CauseName> {
         self.label.cause()
     }
-    /// Whether it tells of a cause of the library.
+    /// Whether it is about a cause of the library.
     #[must_use]
     pub const fn named(&self) -> bool {
         self.cause().is_some()
@@ -479,7 +476,7 @@ impl Law {
     pub(crate) const fn is_zero_of_sessions(&self) -> bool {
         !self.wrong.foretells
     }
-    /// Whether it tells of this cause.
+    /// Whether it is about this cause.
     #[must_use]
     pub fn is(&self, cause: CauseName) -> bool {
         self.cause() == Some(cause)
