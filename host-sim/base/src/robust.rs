@@ -11,6 +11,17 @@ pub fn least_and_most(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     values.into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), value| (a.min(value), b.max(value)))
 }
 
+/// Root mean square.
+pub fn rms(values: &[f64]) -> f64 {
+    // The sum of nothing is -0.
+    ((0.0 + values.iter().map(|v| v * v).sum::<f64>()) / values.len().max(1) as f64).sqrt()
+}
+
+/// Sum of the products of two series, in their order.
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
 /// The quantile `q` (0 to 1) of `values`, which are reordered; 0 of none.
 pub fn quantile_of(values: &mut [f64], q: f64) -> f64 {
     if values.is_empty() {
@@ -76,7 +87,7 @@ pub fn white_noise<'a>(series: impl IntoIterator<Item = &'a [f64]>) -> f64 {
             }
             let mut std = MAD_TO_STD * median_of(of_order);
             if std == 0.0 {
-                // More than half do not change at all: a coarse lattice. The mean square tells how often they do.
+                // More than half do not change at all: a coarse lattice. The mean square shows how often they do.
                 let most = of_order.len() * 99 / 100;
                 of_order.select_nth_unstable_by(most, f64::total_cmp);
                 std = (of_order[..most].iter().map(|d| d * d).sum::<f64>() / most.max(1) as f64).sqrt();

@@ -1,5 +1,5 @@
 //! Rows of a drive of which a model or a table is known, read with what the diagnosis says of their units and signs,
-//! which no ratio tells.
+//! which no ratio shows.
 
 use std::path::Path;
 
@@ -7,7 +7,8 @@ use flexspline::Table;
 
 use crate::diagnosis::pipeline::{PipelineError, Subject, parse_rows};
 use crate::measurement::{
-    ColumnMap, FEWEST_ROWS, FaultName, MeasuredError, Quantity, Recording, Treatment, parse_degrees, parse_few,
+    ColumnMap, FEW, FEWEST_ROWS, FaultName, IN_DEGREES, MeasuredError, Quantity, Recording, Treatment, bytes_of,
+    parse_as,
 };
 use crate::nominal::Nominal;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
@@ -22,11 +23,8 @@ pub fn read_known(
     nominal: &Nominal,
     table: Option<&Table<'_>>,
 ) -> Result<Recording, MeasuredError> {
-    let file = path.display().to_string();
-    match std::fs::read(path) {
-        Ok(bytes) => parse_known(&file, &bytes, columns, nominal, table),
-        Err(error) => Err(MeasuredError { file, line: None, what: error.to_string() }),
-    }
+    let (file, bytes) = bytes_of(path)?;
+    parse_known(&file, &bytes, columns, nominal, table)
 }
 
 /// The same of rows that stand in memory.
@@ -41,7 +39,7 @@ pub fn parse_known(
     table: Option<&Table<'_>>,
 ) -> Result<Recording, MeasuredError> {
     let gear = nominal.gear();
-    let mut read = parse_few(file, bytes, columns, &gear)?;
+    let mut read = parse_as(file, bytes, columns, &gear, FEW)?;
     let says_something = !nominal.harmonics.is_empty() || nominal.wind_up_arcsec(1.0) != 0.0;
     if !says_something || read.rows < FEWEST_ROWS {
         return Ok(read);
@@ -60,7 +58,7 @@ pub fn parse_known(
             .find(|fault| fault.name == name && fault.channel == channel && fault.treatment == Treatment::Repaired)
     };
     if of(FaultName::UnitMismatch, None).is_some() {
-        read = parse_degrees(file, bytes, columns, &gear)?;
+        read = parse_as(file, bytes, columns, &gear, IN_DEGREES)?;
     }
     if let Some(turned) = of(FaultName::TorqueSign, Some(Quantity::Torque)) {
         let torques = read.sessions.iter_mut().filter_map(|session| session.torque_n_m.as_mut()).flatten();
@@ -106,7 +104,7 @@ mod tests {
         let right = known(log(1.0, 1.0));
         assert_eq!(right.faults, []);
         for (log, said) in [(log(1f64.to_degrees(), 1.0), "degrees"), (log(1.0, -1.0), "turned round")] {
-            let by_ratio = parse_few("m.csv", log.as_bytes(), &map, &nominal.gear()).unwrap();
+            let by_ratio = parse_as("m.csv", log.as_bytes(), &map, &nominal.gear(), FEW).unwrap();
             assert_eq!(by_ratio.faults, []);
             let read = known(log);
             assert!(read.faults.len() == 1 && read.faults[0].what.contains(said), "{:?}", read.faults);

@@ -12,7 +12,9 @@ use thiserror::Error;
 
 use crate::calibrate::check_ratio;
 use crate::known_rows::parse_known;
-use crate::measurement::{ColumnMap, Fault, FaultName, Gear, MeasuredError, Quantity, Recording, Treatment, parse_few};
+use crate::measurement::{
+    ColumnMap, FEW, Fault, FaultName, Gear, MeasuredError, Quantity, Recording, Treatment, parse_as,
+};
 use crate::nominal::Nominal;
 use crate::turns_off::{TurnsOff, about_mean, torque_turned, turns_off};
 use flexspline_base::units::ARCSEC_PER_RAD;
@@ -196,7 +198,7 @@ pub struct RowsRead {
     pub rows: Vec<MeasuredRow>,
     /// Faults of the log.
     pub faults: Vec<Fault>,
-    /// What was noticed.
+    /// Notes.
     pub notes: Vec<String>,
 }
 
@@ -220,7 +222,7 @@ pub fn read(
 /// # Errors
 /// As [`read`].
 pub fn parse(file: &str, bytes: &[u8], ratio: f64, temperature_c: f64) -> Result<Vec<MeasuredRow>, MeasuredError> {
-    let recording = parse_few(file, bytes, &ColumnMap::default(), &Gear::of_ratio(ratio))?;
+    let recording = parse_as(file, bytes, &ColumnMap::default(), &Gear::of_ratio(ratio), FEW)?;
     rows_of(recording, ratio, temperature_c).map(|read| read.rows)
 }
 

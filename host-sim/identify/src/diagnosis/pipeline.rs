@@ -26,8 +26,8 @@ use crate::extension::{
     causes_to_toml, check_by_fem, evaluate, found_geometry,
 };
 use crate::measurement::{
-    ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Session, Treatment, parse, parse_degrees, read,
-    read_degrees,
+    ColumnMap, Fault, FaultName, IN_DEGREES, MeasuredError, Quantity, Recording, Session, Treatment, bytes_of, parse,
+    parse_as,
 };
 use crate::nominal::Nominal;
 use crate::synthesize::Sizes;
@@ -243,8 +243,8 @@ pub struct Diagnosed {
 /// # Errors
 /// The rows cannot be read, or do not fit what the model knows.
 pub fn read_rows(path: &Path, columns: &ColumnMap, subject: &Subject<'_>) -> Result<Recording, PipelineError> {
-    let gear = subject.nominal.gear();
-    rows_of(subject, || read(path, columns, &gear), || read_degrees(path, columns, &gear))
+    let (file, bytes) = bytes_of(path)?;
+    parse_rows(&file, &bytes, columns, subject)
 }
 
 /// The same of rows that stand in memory: `bytes` of a file called `file`.
@@ -258,21 +258,12 @@ pub fn parse_rows(
     subject: &Subject<'_>,
 ) -> Result<Recording, PipelineError> {
     let gear = subject.nominal.gear();
-    rows_of(subject, || parse(file, bytes, columns, &gear), || parse_degrees(file, bytes, columns, &gear))
-}
-
-/// Rows in radians, or the same in degrees where that is what they are.
-fn rows_of(
-    subject: &Subject<'_>,
-    in_radians: impl FnOnce() -> Result<Recording, MeasuredError>,
-    in_degrees: impl FnOnce() -> Result<Recording, MeasuredError>,
-) -> Result<Recording, PipelineError> {
-    let mut recording = in_radians()?;
+    let mut recording = parse(file, bytes, columns, &gear)?;
     subject.take_away_known(&mut recording)?;
     let (nominal, table) = subject.against();
     if channels::may_be_in_degrees(&recording, nominal, table) {
-        // What cannot be read in degrees is none.
-        if let Ok(mut converted) = in_degrees()
+        // Rows that cannot be read in degrees are in radians.
+        if let Ok(mut converted) = parse_as(file, bytes, columns, &gear, IN_DEGREES)
             && subject.take_away_known(&mut converted).is_ok()
             && channels::is_explained(&converted, nominal, table)
         {
@@ -300,7 +291,7 @@ fn without_torque(recording: &Recording) -> Option<String> {
 }
 
 /// Diagnoses rows, and says what the core leaves of their error with tables of what was found.
-/// `progress(done, of, what)` is told how far it is.
+/// `progress(done, of, what)` is called with how far it is.
 ///
 /// # Errors
 /// The rows cannot be diagnosed; a table that was to be made by FEM was not.
@@ -418,7 +409,7 @@ impl Diagnosed {
     }
 
     /// Makes the extended drive, and the extended tables if they are worth it; nothing where no cause was found.
-    /// `by_fem` is told before the FEM of the drive begins.
+    /// `by_fem` is called before the FEM of the drive begins.
     ///
     /// # Errors
     /// The causes make no drive; the FEM of it does not converge.
@@ -535,11 +526,7 @@ fn tables_of<'a>(subject: &'a Subject<'_>, of: &'a TableSubject, sessions: &[Ses
         subject: of,
         torque_n_m: torque[0].abs().max(torque[1].abs()),
         temperatures_c: temperature,
-        orientation_rad: match orientation {
-            Some([low, high]) if high - low > 1e-3 => None,
-            Some([low, _]) => Some(low),
-            None => None,
-        },
+        orientation_rad: orientation.filter(|[low, high]| high - low <= 1e-3).map(|[low, _]| low),
     }
 }
 

@@ -12,6 +12,7 @@ use super::report::Unexplained;
 use super::rows::Rows;
 use super::select::Selected;
 use super::thresholds::remainder::*;
+use crate::measurement::least_and_most;
 
 /// A line found in what is left.
 #[derive(Clone, Debug, PartialEq)]
@@ -114,7 +115,7 @@ pub(crate) fn at_its_places(rows: &Rows, innovations: &[f64], line: &Line) -> Li
         Per::GeneratorTurn => (Cow::Borrowed(&rows.generator), 2.0 * PI),
         Per::OutputTurn => (Cow::Borrowed(&rows.output), 2.0 * PI),
     };
-    let (low, high) = crate::measurement::least_and_most(places.iter().copied());
+    let (low, high) = least_and_most(places.iter().copied());
     let total: f64 = innovations.iter().map(|v| v * v).sum();
     let at = |part: i32| -> Line {
         // The spectrum has two places to a period over all rows.
@@ -192,7 +193,7 @@ const MOST_CELLS: usize = 1 << 18;
 /// Frequency (per unit of `places`) and power of the strongest line from `lowest` to `highest`. Places that are even
 /// are laid on a grid of this `cell` (a part of their distance), which loses nothing of what is fast.
 fn strongest(places: &[f64], values: &[f64], lowest: f64, highest: f64, cell: Option<f64>) -> Option<(f64, f64)> {
-    let (low, high) = places.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+    let (low, high) = least_and_most(places.iter().copied());
     let span = high - low;
     if !(span > 0.0 && highest > 0.0) {
         return None;
@@ -215,7 +216,7 @@ fn strongest(places: &[f64], values: &[f64], lowest: f64, highest: f64, cell: Op
         .max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Power that a line of white noise reaches once in about 10⁵ spectra of so many rows.
+/// Power that a line of white noise reaches once in about 10⁵ spectra of this many rows.
 #[must_use]
 pub(crate) fn line_limit(rows: usize) -> f64 {
     (rows as f64 * 4.0).ln() + 12.0

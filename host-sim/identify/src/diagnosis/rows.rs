@@ -3,12 +3,13 @@
 
 use std::ops::Range;
 
-use crate::measurement::{Session, quantile_of};
+pub(crate) use crate::measurement::rms;
+use crate::measurement::{Session, neighbours, quantile_of, rates};
 use crate::nominal::{Fixed, Nominal};
 use crate::residual::sampled_twice;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
-/// Four rows around one say where it was as long as they span no more than so many times what the inner two do.
+/// Four rows around one say where it was as long as they span no more than this many times what the inner two do.
 const FAR_APART: f64 = 4.0;
 
 /// Which columns were recorded.
@@ -213,15 +214,14 @@ impl Rows {
     fn derive(&mut self, nominal: &Nominal) {
         let n = self.len();
         let mut periods: Vec<f64> = Vec::with_capacity(n);
-        (self.speed, self.direction, self.travel) = (vec![0.0; n], vec![1.0; n], vec![0.0; n]);
+        self.speed = rates(&self.sessions, &self.time, &self.generator);
+        (self.direction, self.travel) = (vec![1.0; n], vec![0.0; n]);
         let mut travel = 0.0;
         for session in self.sessions.clone() {
             let mut direction = 0.0;
             for k in session.clone() {
-                let (a, b) = (k.max(session.start + 1) - 1, (k + 1).min(session.end - 1));
-                let dt = self.time[b] - self.time[a];
+                let [a, b] = neighbours(&session, k);
                 let turned = self.generator[b] - self.generator[a];
-                self.speed[k] = if dt > 0.0 { turned / dt } else { 0.0 };
                 if turned != 0.0 {
                     direction = turned.signum();
                 }
@@ -298,10 +298,4 @@ pub(crate) fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
 /// Standard deviation about zero that a few outliers do not move: half of normal numbers lie within 0.6745 of it.
 pub(crate) fn robust_std(values: impl Iterator<Item = f64>) -> f64 {
     quantile(values.map(f64::abs), 0.5) / 0.6745
-}
-
-/// Root mean square.
-pub(crate) fn rms(values: &[f64]) -> f64 {
-    // The sum of nothing is -0.
-    ((0.0 + values.iter().map(|v| v * v).sum::<f64>()) / values.len().max(1) as f64).sqrt()
 }

@@ -338,7 +338,7 @@ pub(super) fn check(recording: &mut Recording, nominal: &Nominal, table: Option<
     let found = if rows > FOLLOWED {
         let share = FOLLOWED as f64 / rows as f64;
         let sessions: Vec<Session> =
-            recording.sessions.iter().map(|s| s.beginning((share * s.len() as f64) as usize)).collect();
+            recording.sessions.iter().map(|s| s.part(0..(share * s.len() as f64) as usize)).collect();
         find(&sessions, nominal, table)
     } else {
         find(&recording.sessions, nominal, table)

@@ -1,16 +1,16 @@
-//! A bench that sets its zero anew in each session: told as a fault of the data, with what each session's zero is.
+//! A bench that sets its zero anew in each session: reported as a fault of the data, with what each session's zero is.
 
 use super::report::Parameter;
-use crate::measurement::{Fault, FaultName, Measures, Recording, Treatment};
+use crate::measurement::{Fault, FaultName, Recording, Treatment};
 use flexspline_base::units::ARCSEC_PER_RAD;
 
-/// What to change where the zero is set anew.
+/// The remedy where the zero is set anew.
 const ADVICE: &str = "home to one mark before each session, or log the offset that is set";
 /// Sessions whose zeros are said, at most.
 const SAID: usize = 12;
 
 /// Tells the `zeros` of sessions, each less that of the first, and has them count as zeros of their own from here on. A
-/// fault that was told of some of them when the rows were read gives way to this one, which has them all.
+/// fault that was reported for some of them when the rows were read gives way to this one, which has them all.
 pub(super) fn tell(recording: &mut Recording, zeros: &[Parameter]) {
     let of_some = |fault: &Fault| fault.name == FaultName::PositionJump && fault.measures.turns.is_none();
     let known = recording.faults.iter().any(of_some);
@@ -38,19 +38,16 @@ pub(super) fn tell(recording: &mut Recording, zeros: &[Parameter]) {
         session.own_zero = true;
     }
     let (first, end) = (&recording.sessions[1], &recording.sessions[last - 1]);
+    let lines = [first.line.first().copied().unwrap_or_default(), end.line.last().copied().unwrap_or_default()];
+    let rows = recording.sessions[1..].iter().map(|session| session.len() as u64).sum();
     recording.faults.push(Fault {
-        name: FaultName::PositionJump,
-        channel: None,
         time_s: first.time_s.as_ref().and_then(|time| time.first().copied()),
         until_s: end.time_s.as_ref().and_then(|time| time.last().copied()),
-        first_line: first.line.first().copied().unwrap_or_default(),
-        last_line: end.line.last().copied().unwrap_or_default(),
-        rows: recording.sessions[1..].iter().map(|session| session.len() as u64).sum(),
         size_arcsec: Some(largest),
         treatment: Treatment::Repaired,
         what,
         advice: ADVICE,
-        measures: Measures::default(),
+        ..Fault::new(FaultName::PositionJump, lines, rows)
     });
     recording.faults.sort_by_key(|fault| (fault.first_line, fault.name));
 }

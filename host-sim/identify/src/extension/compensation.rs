@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::sampled::ExtendedTables;
 use crate::causes::CauseName;
 use crate::diagnosis::{DiagnosisError, Extended, Settings};
-use crate::measurement::Session;
+use crate::measurement::{Session, rms};
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::TableError;
 
@@ -94,25 +94,10 @@ pub fn split(sessions: &[Session]) -> (Vec<Session>, Vec<bool>) {
     let (mut parts, mut used) = (Vec::new(), Vec::new());
     for session in sessions {
         let at = session.len() * 2 / 3;
-        let cut = |from: usize, to: usize| {
-            let of = |column: &Option<Vec<f64>>| column.as_ref().map(|values| values[from..to].to_vec());
-            Session {
-                line: session.line[from..to].to_vec(),
-                time_s: of(&session.time_s),
-                generator_rad: session.generator_rad[from..to].to_vec(),
-                error_rad: session.error_rad[from..to].to_vec(),
-                torque_n_m: of(&session.torque_n_m),
-                temperature_c: of(&session.temperature_c),
-                orientation_rad: of(&session.orientation_rad),
-                loudness: of(&session.loudness),
-                own_zero: session.own_zero && from == 0,
-                zero_off_rad: session.zero_off_rad,
-                unsure_s: session.unsure_s,
-                coarse_rad: session.coarse_rad,
-                mean_over_s: session.mean_over_s,
-            }
-        };
-        parts.extend([cut(0, at), cut(at, session.len())]);
+        parts.extend([
+            session.part(0..at),
+            Session { own_zero: session.own_zero && at == 0, ..session.part(at..session.len()) },
+        ]);
         used.extend([true, false]);
     }
     (parts, used)
@@ -237,10 +222,6 @@ fn without_zero(mut left: Vec<Vec<f64>>, used: &[bool], own: &[bool]) -> Vec<Vec
         left[sharing].iter_mut().flatten().for_each(|value| *value -= zero);
     }
     left
-}
-
-fn rms(values: &[f64]) -> f64 {
-    (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
 #[cfg(test)]

@@ -1,14 +1,14 @@
-//! What the numbers of a column show by themselves.
+//! Properties that the numbers of a column show by themselves.
 
 use std::f64::consts::TAU;
 
-use crate::measurement::raw::RawColumn;
+use crate::measurement::reader::Cells;
 use crate::measurement::{Anew, Unit, begins_anew, continued, least_and_most, median_of, registers, sampled};
 
 /// Values that are looked at for steps and resolution, at most.
 const LOOKED_AT: usize = 50_000;
 
-/// What a column shows.
+/// Properties of a column.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Facts {
     /// Numbers, without what is missing.
@@ -25,14 +25,14 @@ pub(super) struct Facts {
     pub repeats: f64,
     /// Median of the change from row to row over the range: small for what moves smoothly.
     pub roughness: f64,
-    /// One value in so many rows, where most are empty.
+    /// One value in this many rows, where most are empty.
     pub every: usize,
     /// The number after which it begins anew, if it does.
     pub anew: Option<Anew>,
 }
 
 impl Facts {
-    pub fn of(column: &RawColumn) -> Facts {
+    pub fn of(column: &Cells) -> Facts {
         let values: Vec<f64> = column.values.iter().copied().filter(|value| value.is_finite()).collect();
         let (least, most) = least_and_most(values.iter().copied());
         let some = &values[..values.len().min(LOOKED_AT)];
@@ -84,7 +84,7 @@ mod tests {
     use super::*;
 
     fn facts(values: impl IntoIterator<Item = f64>) -> Facts {
-        Facts::of(&RawColumn { values: values.into_iter().collect(), ..RawColumn::default() })
+        Facts::of(&Cells { values: values.into_iter().collect(), ..Cells::default() })
     }
 
     #[test]

@@ -19,7 +19,7 @@ use serde::Serialize;
 
 use crate::measurement::raw::RawFile;
 use crate::measurement::stamps;
-use crate::measurement::{SESSION_GAP_PERIODS, Unit, median_of, sampled};
+use crate::measurement::{Family, SESSION_GAP_PERIODS, Unit, median_of, sampled};
 use column::{Facts, unwrapped};
 pub(crate) use coverage::Coverage;
 use pair::pair;
@@ -31,7 +31,7 @@ use words::Said;
 /// Share of the error that a column without a name must explain to be offered as the torque: a guess.
 const NAMELESS: f64 = 0.3;
 
-/// What a column may hold, for all that can be told.
+/// What a column may hold, for all that can be decided.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
@@ -84,9 +84,9 @@ impl Role {
 pub struct Column {
     /// Its name, `#1` and so on where the file has none.
     pub name: String,
-    /// What it holds.
+    /// Its contents.
     pub role: Role,
-    /// Its unit, with sign and gain as a mapping takes it; `None` if it cannot be told.
+    /// Its unit, with sign and gain as a mapping takes it; `None` if it cannot be decided.
     pub unit: Option<String>,
     /// How sure role and unit are, 0 to 1: a judgement, not a probability.
     pub confidence: f64,
@@ -100,13 +100,13 @@ pub struct Column {
     pub step: f64,
     /// Rows without a number.
     pub missing: usize,
-    /// Counts of a turn, where they are counts and that can be told.
+    /// Counts of a turn, where they are counts and that can be decided.
     pub counts_per_turn: Option<f64>,
     /// Whether the proposed mapping uses it.
     pub used: bool,
 }
 
-/// What kind of time a log has.
+/// Kinds of time in a log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TimeKind {
@@ -118,7 +118,7 @@ pub enum TimeKind {
     None,
 }
 
-/// What is in the files.
+/// Contents of the files.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Looked {
     /// The files.
@@ -144,13 +144,13 @@ pub struct Looked {
     pub ratio_proposed: Option<f64>,
     /// Sessions: files, and their parts between gaps in time.
     pub sessions: usize,
-    /// What kind of time there is.
+    /// The kind of time.
     pub time: TimeKind,
     /// Median of the time from row to row, s, if a time was found.
     pub period_s: Option<f64>,
     /// What the rows go through.
     pub coverage: Option<Coverage>,
-    /// What to pass on with `--columns`; `None` if generator and output, or an error, cannot be told.
+    /// What to pass on with `--columns`; `None` if generator and output, or an error, cannot be decided.
     pub columns_option: Option<String>,
     /// What has to be decided by whoever knows the bench.
     pub notes: Vec<String>,
@@ -196,7 +196,7 @@ impl Guess {
         self.confidence = confidence;
     }
 
-    /// One of its numbers, rad, if that can be told.
+    /// One of its numbers, rad, if that can be decided.
     fn rad(&self) -> Option<f64> {
         match self.unit? {
             Unit::Count => self.counts.map(|counts| TAU / counts),
@@ -350,9 +350,9 @@ fn is_accepted(files: &[RawFile], guesses: &[Guess], columns: &str, notes: &mut 
     let mut refused = Vec::new();
     for file in files {
         for (guess, raw) in guesses.iter().zip(&file.columns).filter(|(guess, _)| guess.used) {
-            let times = raw.first_time.as_ref().filter(|_| guess.role != Role::Time);
-            if let Some(cell) = raw.first_word.iter().chain(times).min_by_key(|cell| cell.line) {
-                let others = (raw.words + times.map_or(0, |_| raw.times)).saturating_sub(1);
+            let times = raw.cells.first_time.as_ref().filter(|_| guess.role != Role::Time);
+            if let Some(cell) = raw.cells.first_word.iter().chain(times).min_by_key(|cell| cell.line) {
+                let others = (raw.cells.words + times.map_or(0, |_| raw.cells.times)).saturating_sub(1);
                 refused.push(format!(
                     "{}:{}: {}: found \"{}\"{}, which is no number",
                     file.file,
@@ -373,11 +373,12 @@ fn is_accepted(files: &[RawFile], guesses: &[Guess], columns: &str, notes: &mut 
 
 /// What a column says by its name and by its numbers alone.
 fn guess(files: &[RawFile], place: usize, of_file: &Arc<[f64]>) -> Guess {
-    let mut raw = files[0].columns[place].clone();
-    files[1..].iter().for_each(|file| raw.values.extend_from_slice(&file.columns[place].values));
-    let facts = Facts::of(&raw);
+    let raw = &files[0].columns[place];
+    let mut cells = raw.cells.clone();
+    files[1..].iter().for_each(|file| cells.values.extend_from_slice(&file.columns[place].cells.values));
+    let facts = Facts::of(&cells);
     let said = if files[0].has_names { words::said(&raw.name, raw.unit.as_deref()) } else { Said::default() };
-    let values = unwrapped(&raw.values, facts.anew);
+    let values = unwrapped(&cells.values, facts.anew);
     let mut guess = Guess {
         facts,
         said,
@@ -391,13 +392,13 @@ fn guess(files: &[RawFile], place: usize, of_file: &Arc<[f64]>) -> Guess {
         values,
         of_file: of_file.clone(),
     };
-    if raw.times > 0 && raw.times + raw.empty + raw.words >= raw.values.len() {
+    if cells.times > 0 && cells.times + cells.empty + cells.words >= cells.values.len() {
         (guess.role, guess.unit) = (Role::Time, Some(Unit::Iso));
         guess.because("times written as text", 0.95);
         return guess;
     }
     if guess.facts.finite == 0 {
-        guess.because(if raw.words > 0 { "words" } else { "empty" }, 0.9);
+        guess.because(if cells.words > 0 { "words" } else { "empty" }, 0.9);
         return guess;
     }
     if said.commanded && said.role != Some(Role::Torque) {
@@ -409,8 +410,8 @@ fn guess(files: &[RawFile], place: usize, of_file: &Arc<[f64]>) -> Guess {
     } else if said.angle {
         guess.because("its name: an angle", 0.5);
     }
-    if let Some(cell) = &raw.first_word {
-        let what = if raw.words == 1 { "1 cell is".to_owned() } else { format!("{} cells are", raw.words) };
+    if let Some(cell) = &cells.first_word {
+        let what = if cells.words == 1 { "1 cell is".to_owned() } else { format!("{} cells are", cells.words) };
         guess.why.push(format!("{what} no number: line {}, \"{}\"", cell.line, cell.text));
     }
     if guess.facts.constant() {
@@ -449,11 +450,11 @@ fn guess(files: &[RawFile], place: usize, of_file: &Arc<[f64]>) -> Guess {
 /// Whether a unit is one of the role.
 fn fits(role: Role, unit: Unit) -> bool {
     match role {
-        Role::Time => unit.is_of_time(),
-        Role::Torque => unit.is_of_torque(),
+        Role::Time => unit.family() == Family::Time,
+        Role::Torque => unit.family() == Family::Torque,
         Role::Current => matches!(unit, Unit::Ampere | Unit::Milliampere),
-        Role::Temperature => unit.is_of_temperature(),
-        Role::Generator | Role::Output | Role::Orientation | Role::Error => unit.is_of_angles(),
+        Role::Temperature => unit.family() == Family::Temperature,
+        Role::Generator | Role::Output | Role::Orientation | Role::Error => unit.family() == Family::Angle,
         Role::Speed => false,
         Role::Command | Role::Unknown => true,
     }
@@ -688,7 +689,7 @@ fn clock(guesses: &[Guess], files: &[RawFile]) -> (TimeKind, Option<f64>, Vec<us
     (kind, Some(period), starts)
 }
 
-/// The mapping, if generator and output or an error are told.
+/// The mapping, if generator and output or an error are known.
 fn option(guesses: &[Guess], names: &[String], notes: &mut Vec<String>) -> Option<String> {
     let used = |role: Role| guesses.iter().any(|guess| guess.used && guess.role == role && guess.written().is_some());
     if !(used(Role::Generator) && (used(Role::Output) || used(Role::Error))) {

@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 use super::relation::{Slope, slope};
 use super::turns::{Units, one_shaft, settle, units_of_pair};
 use super::{Guess, Rival, Role};
-use crate::measurement::{Unit, least_and_most};
+use crate::measurement::{Family, Unit, least_and_most};
 
 /// Rows in which a column is followed, at most.
 const FOLLOWED: usize = 4000;
@@ -158,7 +158,7 @@ pub(super) fn joints(guesses: &[Guess]) -> Vec<u32> {
 fn pairs(guesses: &[Guess]) -> Vec<Pair> {
     let angle = |guess: &Guess| {
         let role = matches!(guess.role, Role::Generator | Role::Output | Role::Unknown | Role::Command);
-        let unit = guess.unit.is_none_or(|unit| unit.is_of_angles());
+        let unit = guess.unit.is_none_or(|unit| unit.family() == Family::Angle);
         role && unit && !guess.said.aside && guess.moves() && guess.facts.every <= 1
     };
     let angles: Vec<usize> = (0..guesses.len()).filter(|k| angle(&guesses[*k])).collect();

@@ -1,7 +1,7 @@
-//! What the name of a column and its unit say of what it holds.
+//! The meaning of a column's name and unit.
 
 use super::Role;
-use crate::measurement::Unit;
+use crate::measurement::{Family, Unit};
 
 /// Words of names, in the order in which the first that fits decides: a joint's velocity is a velocity, a motor's
 /// temperature a temperature. English and German, as loggers, robots and controllers have them; the list is made by
@@ -111,10 +111,10 @@ const ASIDE: [&str; 12] = [
     "schleppfehler",
 ];
 
-/// What the name of a column and its unit say.
+/// The meaning of a column's name and unit.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Said {
-    /// What it holds.
+    /// Its contents.
     pub role: Option<Role>,
     /// Whether it is that of a command.
     pub commanded: bool,
@@ -177,7 +177,7 @@ fn kind_of_unit(name: &str, line: Option<&str>) -> Option<Kind> {
     });
     let Some(text) = line.or(bracketed) else {
         // A single letter at the end of a name is a letter more often than a unit: phase_A, sensor_C.
-        let unit = Unit::in_name(name).filter(|unit| unit.is_of_angles() || unit.is_of_torque());
+        let unit = Unit::in_name(name).filter(|unit| matches!(unit.family(), Family::Angle | Family::Torque));
         return unit.and_then(kind).filter(|kind| *kind != Kind::Current || name.ends_with("_mA"));
     };
     let text = text.trim().trim_matches(['[', ']', '(', ')']).trim();
@@ -194,11 +194,12 @@ fn kind(unit: Unit) -> Option<Kind> {
         Unit::Ampere | Unit::Milliampere => Some(Kind::Current),
         // A transducer of anything.
         Unit::Volt => None,
-        unit if unit.is_of_angles() => Some(Kind::Angle),
-        unit if unit.is_of_torque() => Some(Kind::Torque),
-        unit if unit.is_of_temperature() => Some(Kind::Temperature),
-        unit if unit.is_of_time() => Some(Kind::Time),
-        _ => None,
+        unit => Some(match unit.family() {
+            Family::Angle => Kind::Angle,
+            Family::Torque => Kind::Torque,
+            Family::Temperature => Kind::Temperature,
+            Family::Time => Kind::Time,
+        }),
     }
 }
 

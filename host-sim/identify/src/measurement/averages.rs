@@ -26,42 +26,12 @@ impl Recording {
 }
 
 impl Session {
-    /// Its first rows.
-    pub(crate) fn beginning(&self, rows: usize) -> Session {
-        let rows = rows.min(self.len());
-        let cut = |values: &Option<Vec<f64>>| values.as_ref().map(|values| values[..rows].to_vec());
-        Session {
-            line: self.line[..rows].to_vec(),
-            generator_rad: self.generator_rad[..rows].to_vec(),
-            error_rad: self.error_rad[..rows].to_vec(),
-            time_s: cut(&self.time_s),
-            torque_n_m: cut(&self.torque_n_m),
-            temperature_c: cut(&self.temperature_c),
-            orientation_rad: cut(&self.orientation_rad),
-            loudness: cut(&self.loudness),
-            own_zero: self.own_zero,
-            zero_off_rad: self.zero_off_rad,
-            unsure_s: self.unsure_s,
-            coarse_rad: self.coarse_rad,
-            mean_over_s: self.mean_over_s,
-        }
-    }
-
-    /// Takes the mean of every so many rows (at least one), of the rest at the end as well.
+    /// Takes the mean of each `together` rows (at least one), of the rest at the end as well.
     fn average(&mut self, together: usize) {
         let mean = |values: &mut Vec<f64>| {
             *values = values.chunks(together).map(|rows| rows.iter().sum::<f64>() / rows.len() as f64).collect();
         };
-        let beside = [
-            &mut self.time_s,
-            &mut self.torque_n_m,
-            &mut self.temperature_c,
-            &mut self.orientation_rad,
-            &mut self.loudness,
-        ];
-        beside.into_iter().flatten().for_each(mean);
-        mean(&mut self.generator_rad);
-        mean(&mut self.error_rad);
+        self.columns_mut().for_each(mean);
         self.line = self.line.iter().copied().step_by(together).collect();
     }
 }

@@ -5,12 +5,12 @@ use std::fmt;
 use thiserror::Error;
 
 use super::reader::{Layout, unit_word};
-use super::unit::Wrong;
+use super::unit::{Family, Wrong};
 pub use super::unit::{Reading, Unit};
 use flexspline_base::csv_rows::TableProblem;
 use flexspline_base::suggest::{did_you_mean, likeliest, question};
 
-/// What a column may hold.
+/// The quantities of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Quantity {
@@ -42,39 +42,37 @@ impl Quantity {
         Quantity::Orientation,
     ];
 
+    /// Its name in a mapping, the column it has in a file without a mapping, and the unit of that column.
+    fn spec(self) -> (&'static str, &'static str, Unit) {
+        match self {
+            Quantity::Time => ("time", "time_s", Unit::Second),
+            Quantity::Generator => ("generator", "generator_rad", Unit::Radian),
+            Quantity::Output => ("output", "output_rad", Unit::Radian),
+            Quantity::Error => ("error", "error_arcsec", Unit::Arcsecond),
+            Quantity::Torque => ("torque", "torque_n_m", Unit::NewtonMetre),
+            Quantity::Temperature => ("temperature", "temperature_c", Unit::Celsius),
+            Quantity::Orientation => ("orientation", "orientation_rad", Unit::Radian),
+        }
+    }
+
     /// Its name in a mapping.
     pub fn name(self) -> &'static str {
-        match self {
-            Quantity::Time => "time",
-            Quantity::Generator => "generator",
-            Quantity::Output => "output",
-            Quantity::Error => "error",
-            Quantity::Torque => "torque",
-            Quantity::Temperature => "temperature",
-            Quantity::Orientation => "orientation",
-        }
+        self.spec().0
     }
 
     /// The column it has in a file without a mapping, and the unit there.
     pub(crate) fn default_column(self) -> (&'static str, Unit) {
-        match self {
-            Quantity::Time => ("time_s", Unit::Second),
-            Quantity::Generator => ("generator_rad", Unit::Radian),
-            Quantity::Output => ("output_rad", Unit::Radian),
-            Quantity::Error => ("error_arcsec", Unit::Arcsecond),
-            Quantity::Torque => ("torque_n_m", Unit::NewtonMetre),
-            Quantity::Temperature => ("temperature_c", Unit::Celsius),
-            Quantity::Orientation => ("orientation_rad", Unit::Radian),
-        }
+        let (_, column, unit) = self.spec();
+        (column, unit)
     }
 
-    /// The units it may have.
-    pub(crate) fn units(self) -> &'static [Unit] {
+    /// The family of its units.
+    pub(crate) fn family(self) -> Family {
         match self {
-            Quantity::Time => &Unit::OF_TIME,
-            Quantity::Torque => &Unit::OF_TORQUE,
-            Quantity::Temperature => &Unit::OF_TEMPERATURE,
-            _ => &Unit::OF_ANGLES,
+            Quantity::Time => Family::Time,
+            Quantity::Torque => Family::Torque,
+            Quantity::Temperature => Family::Temperature,
+            _ => Family::Angle,
         }
     }
 
@@ -83,7 +81,6 @@ impl Quantity {
     pub(super) fn limit(self) -> f64 {
         match self {
             Quantity::Time => 1e11,
-            Quantity::Torque => 1e9,
             Quantity::Temperature => 1e6,
             _ => 1e9,
         }
@@ -121,7 +118,7 @@ struct Given {
 /// A column in use.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Column {
-    /// What it holds.
+    /// Its contents.
     pub quantity: Quantity,
     /// Its name in the header.
     pub name: String,
@@ -254,7 +251,7 @@ impl ColumnMap {
                 let (default, _) = quantity.default_column();
                 let name = likeliest(default, spare.iter().copied())?;
                 let unit =
-                    Unit::in_name(name).filter(|unit| quantity.units().contains(unit)).map_or("UNIT", Unit::name);
+                    Unit::in_name(name).filter(|unit| unit.family() == quantity.family()).map_or("UNIT", Unit::name);
                 Some(format!(
                     "column {name} is not used; if it is {default}, say so with --columns {quantity}={name}:{unit}"
                 ))
@@ -276,16 +273,16 @@ fn given(entry: &str, per_ampere: Option<f64>) -> Result<Given, MappingError> {
     })?;
     let (column, reading) = match column.rsplit_once(':') {
         None => {
-            let ending = Unit::in_name(column.trim()).filter(|unit| quantity.units().contains(unit));
-            let reading = ending.map(|unit| Reading::parse(unit.name(), quantity.units(), per_ampere));
+            let ending = Unit::in_name(column.trim()).filter(|unit| unit.family() == quantity.family());
+            let reading = ending.map(|unit| Reading::parse(unit.name(), quantity.family(), per_ampere));
             (column, reading.transpose())
         }
-        Some((column, unit)) => (column, Reading::parse(unit, quantity.units(), per_ampere).map(Some)),
+        Some((column, unit)) => (column, Reading::parse(unit, quantity.family(), per_ampere).map(Some)),
     };
     let reading = reading.map_err(|wrong| match wrong {
         Wrong::Text(what) => MappingError(format!("{name}: {what}")),
         Wrong::Unit(unit) => {
-            let units: Vec<_> = quantity.units().iter().map(|u| u.name()).collect();
+            let units: Vec<_> = quantity.family().units().map(Unit::name).collect();
             let hint = did_you_mean("; ", &unit, units.iter().copied());
             MappingError(format!("{name}: found the unit \"{unit}\", allowed: {}{hint}", units.join(", ")))
         }
@@ -308,8 +305,8 @@ fn unit_below(quantity: Quantity, place: usize, layout: Option<&Layout>) -> Resu
     let Some(word) = layout.and_then(|layout| layout.units.get(place)).map(|unit| unit_word(unit)) else {
         return Ok(None);
     };
-    let unit = Unit::written(word).filter(|unit| quantity.units().contains(unit));
-    let reading = unit.map(|unit| Reading::parse(unit.name(), quantity.units(), None)).transpose();
+    let unit = Unit::written(word).filter(|unit| unit.family() == quantity.family());
+    let reading = unit.map(|unit| Reading::parse(unit.name(), quantity.family(), None)).transpose();
     reading.map_err(|wrong| match wrong {
         Wrong::Unit(unit) | Wrong::Text(unit) => unit,
     })
@@ -320,7 +317,7 @@ fn meant(wanted: &str, names: &[String]) -> String {
     likeliest(wanted, names.iter().map(String::as_str)).map_or_else(String::new, |name| question(name) + " ")
 }
 
-/// What the header holds, and how to name it.
+/// The contents of the header, and how to name it.
 fn found(names: &[String], layout: Option<&Layout>) -> String {
     if names.iter().all(|name| name.is_empty()) {
         return "the file has no header".to_owned();
@@ -436,7 +433,7 @@ mod tests {
         let map = ColumnMap::parse("torque=load_nm:N.m").unwrap();
         let what = map.resolve(&names("generator_rad,output_rad,load_n_m"), 1, None).unwrap_err().what;
         assert!(what.contains("did you mean `load_n_m`?"), "{what}");
-        // One that may be missing is not asked for, but told.
+        // One that may be missing is not asked for, but reported.
         let noted = |header: &str| {
             let names = names(header);
             let map = ColumnMap::default();

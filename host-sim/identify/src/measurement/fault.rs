@@ -26,7 +26,7 @@ pub enum FaultName {
     Drift,
     /// The two angles are not read at one instant, and the time between them scatters.
     ReadJitter,
-    /// The logger stands still every so many rows, and its time counts on.
+    /// The logger stands still after each block of this many rows, and its time counts on.
     Stalls,
     /// The counter of an angle begins anew between sessions, whole turns of the motor off.
     CounterRestart,
@@ -104,7 +104,7 @@ impl FaultName {
     }
 }
 
-/// What was done about a fault.
+/// The remedy for a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Treatment {
@@ -139,7 +139,7 @@ pub struct Fault {
     /// Size at the output, arcsec: of a jump signed, else of the largest.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_arcsec: Option<f64>,
-    /// What was done.
+    /// The remedy that was applied.
     pub treatment: Treatment,
     /// One sentence for a reader.
     pub what: String,
@@ -148,6 +148,26 @@ pub struct Fault {
     /// Numbers of its own.
     #[serde(flatten)]
     pub measures: Measures,
+}
+
+impl Fault {
+    /// A fault of `rows` rows within two lines of the file, the values kept as they are; the rest is still to say.
+    pub(crate) fn new(name: FaultName, [first_line, last_line]: [u64; 2], rows: u64) -> Fault {
+        Fault {
+            name,
+            channel: None,
+            time_s: None,
+            until_s: None,
+            first_line,
+            last_line,
+            rows,
+            size_arcsec: None,
+            treatment: Treatment::Kept,
+            what: String::new(),
+            advice: name.advice(),
+            measures: Measures::default(),
+        }
+    }
 }
 
 /// Numbers that only some faults have.
@@ -159,8 +179,8 @@ pub struct Measures {
     /// Rows whose angles were read far apart, which are left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub late_rows: Option<u64>,
-    /// The logger stands still after every so many rows, none where it does so irregularly; or a channel has a new
-    /// value in one of so many rows.
+    /// The logger stands still after each block of this many rows, none where it does so irregularly; or a channel has
+    /// a new value in one row of this many.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub every_rows: Option<u64>,
     /// For so long (median), ms; or the time over which a row is a mean.

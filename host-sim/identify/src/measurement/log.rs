@@ -20,7 +20,7 @@ pub struct MeasuredError {
     pub file: String,
     /// Line, from 1, if one is to blame.
     pub line: Option<u64>,
-    /// What was found and what is allowed.
+    /// The found value and the allowed ones.
     pub what: String,
 }
 
@@ -79,24 +79,24 @@ impl Log {
 
     /// Leaves out the rows for which `drop` is true.
     pub(crate) fn leave_out(&mut self, drop: &[bool]) {
-        fn thin<T>(values: &mut Vec<T>, drop: &[bool]) {
-            let mut row = 0;
-            values.retain(|_| {
-                row += 1;
-                !drop[row - 1]
-            });
-        }
-        thin(&mut self.line, drop);
+        leave_out(&mut self.line, drop);
         if !self.session.is_empty() {
-            thin(&mut self.session, drop);
+            leave_out(&mut self.session, drop);
         }
-        for values in self.columns.iter_mut().flatten() {
-            thin(values, drop);
-        }
+        self.columns.iter_mut().flatten().for_each(|values| leave_out(values, drop));
     }
 }
 
-/// What reading found besides the rows.
+/// Leaves out the values for which `drop` is true.
+pub(super) fn leave_out<T>(values: &mut Vec<T>, drop: &[bool]) {
+    let mut row = 0;
+    values.retain(|_| {
+        row += 1;
+        !drop[row - 1]
+    });
+}
+
+/// The findings of the reader besides the rows.
 #[derive(Debug)]
 pub(super) struct Found {
     /// The columns in use.

@@ -18,21 +18,22 @@ pub mod reader;
 mod rollover;
 mod unit;
 
-use std::fs::File;
 use std::io::Read;
+use std::ops::Range;
 use std::path::Path;
 
 pub use columns::{ColumnMap, MappingError, Quantity, Reading, Unit};
 pub use fault::{Fault, FaultName, Measures, ToothStep, Treatment};
 pub(crate) use faults::clock::SESSION_GAP_PERIODS;
 pub use flexspline_base::robust::{
-    MAD_TO_STD, least_and_most, median_and_std, median_of, quantile_of, sampled, white_noise,
+    MAD_TO_STD, least_and_most, median_and_std, median_of, quantile_of, rms, sampled, white_noise,
 };
 pub use gear::Gear;
 pub use log::{FEWEST_ROWS, MeasuredError};
 pub(crate) use reader::stamps;
 pub use reader::{Layout, Separator, Sheet, raw};
 pub(crate) use rollover::{Anew, begins_anew, continued, registers};
+pub(crate) use unit::Family;
 
 use faults::Findings;
 use faults::drift::Stretches;
@@ -92,6 +93,16 @@ impl Session {
         self.generator_rad.iter().zip(&self.error_rad).map(|(generator, error)| generator / ratio + error).collect()
     }
 
+    /// The column of torque, temperature or orientation; nothing for another channel.
+    fn column_mut(&mut self, channel: Quantity) -> Option<&mut Option<Vec<f64>>> {
+        match channel {
+            Quantity::Torque => Some(&mut self.torque_n_m),
+            Quantity::Temperature => Some(&mut self.temperature_c),
+            Quantity::Orientation => Some(&mut self.orientation_rad),
+            _ => None,
+        }
+    }
+
     /// Torque, temperature or orientation, where recorded.
     fn beside(&self, channel: Quantity) -> Option<&[f64]> {
         match channel {
@@ -103,25 +114,15 @@ impl Session {
     }
 
     fn beside_mut(&mut self, channel: Quantity) -> Option<&mut Vec<f64>> {
-        match channel {
-            Quantity::Torque => self.torque_n_m.as_mut(),
-            Quantity::Temperature => self.temperature_c.as_mut(),
-            Quantity::Orientation => self.orientation_rad.as_mut(),
-            _ => None,
-        }
+        self.column_mut(channel)?.as_mut()
     }
 
     fn forget(&mut self, channel: Quantity) {
-        match channel {
-            Quantity::Torque => self.torque_n_m = None,
-            Quantity::Temperature => self.temperature_c = None,
-            Quantity::Orientation => self.orientation_rad = None,
-            _ => {}
-        }
+        self.column_mut(channel).into_iter().for_each(|column| *column = None);
     }
 
-    /// Leaves out the rows for which `drop` is true.
-    fn leave_out(&mut self, drop: &[bool]) {
+    /// Its columns of numbers: both angles, and each other column that was recorded.
+    fn columns_mut(&mut self) -> impl Iterator<Item = &mut Vec<f64>> {
         let others = [
             &mut self.time_s,
             &mut self.torque_n_m,
@@ -129,20 +130,64 @@ impl Session {
             &mut self.orientation_rad,
             &mut self.loudness,
         ];
-        let columns = [&mut self.generator_rad, &mut self.error_rad];
-        for values in columns.into_iter().chain(others.into_iter().flatten()) {
-            let mut row = 0;
-            values.retain(|_| {
-                row += 1;
-                !drop[row - 1]
-            });
-        }
-        let mut row = 0;
-        self.line.retain(|_| {
-            row += 1;
-            !drop[row - 1]
-        });
+        [&mut self.generator_rad, &mut self.error_rad].into_iter().chain(others.into_iter().flatten())
     }
+
+    /// Leaves out the rows for which `drop` is true.
+    fn leave_out(&mut self, drop: &[bool]) {
+        self.columns_mut().for_each(|values| log::leave_out(values, drop));
+        log::leave_out(&mut self.line, drop);
+    }
+
+    /// Some of its rows as a session.
+    #[must_use]
+    pub(crate) fn part(&self, rows: Range<usize>) -> Session {
+        let mut part = Session { line: self.line[rows.clone()].to_vec(), ..self.clone() };
+        part.columns_mut().for_each(|values| *values = values[rows.clone()].to_vec());
+        part
+    }
+}
+
+/// The generator must turn back by so much, rad, before the flank is taken to have changed: its noise does not.
+const TURNED_BACK_RAD: f64 = 0.02;
+
+/// +1 from where an angle last moved forward by more than its noise, -1 backward.
+pub(crate) fn directions(angle: &[f64]) -> Vec<f64> {
+    let Some(&start) = angle.first() else { return Vec::new() };
+    // The first clear motion also holds for what comes before it.
+    let first = angle.iter().map(|a| a - start).find(|moved| moved.abs() > TURNED_BACK_RAD);
+    let mut now = first.map_or(1.0, f64::signum);
+    let mut farthest = start;
+    angle
+        .iter()
+        .map(|a| {
+            if (a - farthest) * now > 0.0 {
+                farthest = *a;
+            } else if (farthest - a) * now > TURNED_BACK_RAD {
+                now = -now;
+                farthest = *a;
+            }
+            now
+        })
+        .collect()
+}
+
+/// The rows before and after row `k` of a session, or that row at its ends.
+pub(crate) fn neighbours(session: &Range<usize>, k: usize) -> [usize; 2] {
+    [k.max(session.start + 1) - 1, (k + 1).min(session.end - 1)]
+}
+
+/// Change of values per second, row by row, from the neighbours in a session; 0 where time stands.
+pub(crate) fn rates(sessions: &[Range<usize>], time: &[f64], values: &[f64]) -> Vec<f64> {
+    let mut rates = vec![0.0; values.len()];
+    for session in sessions {
+        for k in session.clone() {
+            let [a, b] = neighbours(session, k);
+            let passed = time[b] - time[a];
+            rates[k] = if passed > 0.0 { (values[b] - values[a]) / passed } else { 0.0 };
+        }
+    }
+    rates
 }
 
 /// A file of measured data, ready for use.
@@ -154,66 +199,52 @@ pub struct Recording {
     pub rows: usize,
     /// Sessions, none of them empty.
     pub sessions: Vec<Session>,
-    /// What is wrong with the data.
+    /// Faults of the data.
     pub faults: Vec<Fault>,
     /// Where the drive ratcheted; these steps are in the sessions still.
     pub tooth_steps: Vec<ToothStep>,
-    /// What was noticed and is no fault, one sentence each.
+    /// Notes that are no faults, one sentence each.
     pub notes: Vec<String>,
     /// Why nothing can be said of the drive from these rows, if so.
     pub unusable: Option<String>,
 }
 
-/// Reads a file of measured data of a drive with this `gear`.
-pub fn read(path: &Path, columns: &ColumnMap, gear: &Gear) -> Result<Recording, MeasuredError> {
+/// The name of a file in messages, and its bytes.
+pub(crate) fn bytes_of(path: &Path) -> Result<(String, Vec<u8>), MeasuredError> {
     let file = path.display().to_string();
-    match File::open(path) {
-        Ok(source) => parse(&file, source, columns, gear),
+    match std::fs::read(path) {
+        Ok(bytes) => Ok((file, bytes)),
         Err(error) => Err(MeasuredError { file, line: None, what: error.to_string() }),
     }
 }
 
-/// The same where both angles are in degrees though radians are said, which no ratio tells: a fault, and converted.
-pub(crate) fn read_degrees(path: &Path, columns: &ColumnMap, gear: &Gear) -> Result<Recording, MeasuredError> {
-    let file = path.display().to_string();
-    match File::open(path) {
-        Ok(source) => parse_degrees(&file, source, columns, gear),
-        Err(error) => Err(MeasuredError { file, line: None, what: error.to_string() }),
-    }
+/// Reads a file of measured data of a drive with this `gear`.
+pub fn read(path: &Path, columns: &ColumnMap, gear: &Gear) -> Result<Recording, MeasuredError> {
+    let (file, bytes) = bytes_of(path)?;
+    parse(&file, &bytes[..], columns, gear)
 }
 
 /// Reads measured data from `source`, a file called `file`.
 pub fn parse(file: &str, source: impl Read, columns: &ColumnMap, gear: &Gear) -> Result<Recording, MeasuredError> {
-    parse_as(file, source, columns, gear, (1.0, FEWEST_ROWS))
+    parse_as(file, source, columns, gear, USUAL)
 }
 
-/// [`parse`] of two rows and more, for whoever plays a table over them.
-pub(crate) fn parse_few(
+/// Settings for reading rows: whether both angles are in degrees though the columns say radians, a fault that no ratio
+/// shows, and the fewest rows.
+type Form = (bool, usize);
+const USUAL: Form = (false, FEWEST_ROWS);
+/// Two rows and more, for a table that is replayed over them.
+pub(crate) const FEW: Form = (false, 2);
+/// Both angles converted from degrees.
+pub(crate) const IN_DEGREES: Form = (true, FEWEST_ROWS);
+
+/// [`parse`] of rows in another form.
+pub(crate) fn parse_as(
     file: &str,
     source: impl Read,
     columns: &ColumnMap,
     gear: &Gear,
-) -> Result<Recording, MeasuredError> {
-    parse_as(file, source, columns, gear, (1.0, 2))
-}
-
-/// [`parse`] as [`read_degrees`] reads.
-pub(crate) fn parse_degrees(
-    file: &str,
-    source: impl Read,
-    columns: &ColumnMap,
-    gear: &Gear,
-) -> Result<Recording, MeasuredError> {
-    parse_as(file, source, columns, gear, (Unit::Degree.factor(), FEWEST_ROWS))
-}
-
-/// The same with both angles times `angle_scale`, of at least `fewest` rows.
-fn parse_as(
-    file: &str,
-    source: impl Read,
-    columns: &ColumnMap,
-    gear: &Gear,
-    (angle_scale, fewest): (f64, usize),
+    (in_degrees, fewest): Form,
 ) -> Result<Recording, MeasuredError> {
     let refuse = |what: String| MeasuredError { file: file.to_owned(), line: None, what };
     if gear.ratio == 0.0 || !gear.ratio.is_finite() {
@@ -223,39 +254,17 @@ fn parse_as(
     let rows = log.len();
     let mut findings = Findings { notes: found.notes, ..Findings::default() };
     if let Some(line) = found.broken_off {
-        findings.faults.push(Fault {
-            name: FaultName::MissingSamples,
-            channel: None,
-            time_s: None,
-            until_s: None,
-            first_line: line,
-            last_line: line,
-            rows: 1,
-            size_arcsec: None,
-            treatment: Treatment::Masked,
-            what: "the last line breaks off: it is left out".to_owned(),
-            advice: FaultName::MissingSamples.advice(),
-            measures: Measures::default(),
-        });
+        let what = "the last line breaks off: it is left out".to_owned();
+        let fault = Fault::new(FaultName::MissingSamples, [line; 2], 1);
+        findings.faults.push(Fault { treatment: Treatment::Masked, what, ..fault });
     }
     for what in found.order {
-        findings.faults.push(Fault {
-            name: FaultName::ClockError,
-            channel: Some(Quantity::Time),
-            time_s: None,
-            until_s: None,
-            first_line: log.line.iter().copied().min().unwrap_or(1),
-            last_line: log.line.iter().copied().max().unwrap_or(1),
-            rows: rows as u64,
-            size_arcsec: None,
-            treatment: Treatment::Repaired,
-            what,
-            advice: FaultName::ClockError.advice(),
-            measures: Measures::default(),
-        });
+        let lines = [log.line.iter().copied().min().unwrap_or(1), log.line.iter().copied().max().unwrap_or(1)];
+        let fault = Fault::new(FaultName::ClockError, lines, rows as u64);
+        findings.faults.push(Fault { channel: Some(Quantity::Time), treatment: Treatment::Repaired, what, ..fault });
     }
-    if angle_scale != 1.0 {
-        faults::units::both_in_degrees(&mut log, angle_scale, &mut findings);
+    if in_degrees {
+        faults::units::both_in_degrees(&mut log, Unit::Degree.factor(), &mut findings);
     }
     faults::missing::fill(&mut log, &mut findings);
     faults::clock::check(&mut log, &mut findings);
@@ -354,12 +363,7 @@ fn into_sessions(mut log: Log, ratio: f64) -> Vec<Session> {
         temperature_c: log.take(Quantity::Temperature),
         orientation_rad: log.take(Quantity::Orientation),
         line: std::mem::take(&mut log.line),
-        loudness: None,
-        own_zero: false,
-        zero_off_rad: 0.0,
-        unsure_s: 0.0,
-        coarse_rad: 0.0,
-        mean_over_s: 0.0,
+        ..Session::default()
     };
     let starts: Vec<usize> = (1..log.session.len()).filter(|row| log.session[*row] != log.session[*row - 1]).collect();
     // From the last session to the first, so that each is cut off the end.

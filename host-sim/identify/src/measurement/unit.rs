@@ -1,5 +1,6 @@
 //! Units of columns, and how a written value becomes one: `deg`, `-N.m`, `count/16777216`, `A*3.5`, `V*20-0.4`.
 
+use std::f64::consts::TAU;
 use std::fmt;
 
 /// Unit of a column.
@@ -64,107 +65,75 @@ pub enum Unit {
 /// The pound-force, N: 0.453 592 37 kg (1959) times the standard acceleration 9.806 65 m/s².
 const POUND_FORCE_N: f64 = 4.448_221_615_260_5;
 
-impl Unit {
-    fn all() -> impl Iterator<Item = Unit> {
-        let rest = Self::OF_TIME.into_iter().chain(Self::OF_TORQUE).chain(Self::OF_TEMPERATURE);
-        Self::OF_ANGLES.into_iter().chain(rest)
-    }
+/// The quantity that a unit measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Family {
+    /// An angle.
+    Angle,
+    /// A time.
+    Time,
+    /// A torque, or a signal in proportion to one.
+    Torque,
+    /// A temperature.
+    Temperature,
+}
 
+impl Family {
+    /// Its units.
+    pub(crate) fn units(self) -> impl Iterator<Item = Unit> {
+        UNITS.iter().filter(move |row| row.1 == self).map(|row| row.0)
+    }
+}
+
+/// Each unit in the order of [`Unit`], with its family, its name in a mapping and its size in the unit used inside
+/// (rad, s, N·m, °C). The size of a count, an ampere and a volt is that of the result of its gain: a turn, a N·m.
+const UNITS: [(Unit, Family, &str, f64); 27] = [
+    (Unit::Radian, Family::Angle, "rad", 1.0),
+    (Unit::Degree, Family::Angle, "deg", TAU / 360.0),
+    (Unit::Turn, Family::Angle, "turn", TAU),
+    (Unit::Arcminute, Family::Angle, "arcmin", TAU / 21_600.0),
+    (Unit::Arcsecond, Family::Angle, "arcsec", TAU / 1_296_000.0),
+    (Unit::Milliradian, Family::Angle, "mrad", 1e-3),
+    (Unit::Count, Family::Angle, "count", TAU),
+    (Unit::Second, Family::Time, "s", 1.0),
+    (Unit::Millisecond, Family::Time, "ms", 1e-3),
+    (Unit::Microsecond, Family::Time, "us", 1e-6),
+    (Unit::Nanosecond, Family::Time, "ns", 1e-9),
+    (Unit::Minute, Family::Time, "min", 60.0),
+    (Unit::Hour, Family::Time, "h", 3600.0),
+    (Unit::Day, Family::Time, "d", 86_400.0),
+    (Unit::Iso, Family::Time, "iso", 1.0),
+    (Unit::NewtonMetre, Family::Torque, "N.m", 1.0),
+    (Unit::NewtonCentimetre, Family::Torque, "N.cm", 1e-2),
+    (Unit::MillinewtonMetre, Family::Torque, "mN.m", 1e-3),
+    (Unit::KilonewtonMetre, Family::Torque, "kN.m", 1e3),
+    (Unit::PoundInch, Family::Torque, "lbf.in", POUND_FORCE_N * 0.0254),
+    (Unit::PoundFoot, Family::Torque, "lbf.ft", POUND_FORCE_N * 0.3048),
+    (Unit::Ampere, Family::Torque, "A", 1.0),
+    (Unit::Milliampere, Family::Torque, "mA", 1.0),
+    (Unit::Volt, Family::Torque, "V", 1.0),
+    (Unit::Celsius, Family::Temperature, "C", 1.0),
+    (Unit::Kelvin, Family::Temperature, "K", 1.0),
+    (Unit::Fahrenheit, Family::Temperature, "F", 5.0 / 9.0),
+];
+
+impl Unit {
     /// Units of angle that one may take for another, the largest name first that a slip of the pen takes for another.
     pub(crate) const ANGLES: [Unit; 5] = [Unit::Radian, Unit::Degree, Unit::Turn, Unit::Arcminute, Unit::Arcsecond];
 
-    /// Units of angle of a column.
-    pub(super) const OF_ANGLES: [Unit; 7] =
-        [Unit::Radian, Unit::Degree, Unit::Turn, Unit::Arcminute, Unit::Arcsecond, Unit::Milliradian, Unit::Count];
-    /// Units of time.
-    pub(super) const OF_TIME: [Unit; 8] = [
-        Unit::Second,
-        Unit::Millisecond,
-        Unit::Microsecond,
-        Unit::Nanosecond,
-        Unit::Minute,
-        Unit::Hour,
-        Unit::Day,
-        Unit::Iso,
-    ];
-    /// Units of torque, and of what is proportional to it.
-    pub(super) const OF_TORQUE: [Unit; 9] = [
-        Unit::NewtonMetre,
-        Unit::NewtonCentimetre,
-        Unit::MillinewtonMetre,
-        Unit::KilonewtonMetre,
-        Unit::PoundInch,
-        Unit::PoundFoot,
-        Unit::Ampere,
-        Unit::Milliampere,
-        Unit::Volt,
-    ];
-    /// Units of temperature.
-    pub(super) const OF_TEMPERATURE: [Unit; 3] = [Unit::Celsius, Unit::Kelvin, Unit::Fahrenheit];
-
     /// Its name in a mapping.
     pub fn name(self) -> &'static str {
-        match self {
-            Unit::Radian => "rad",
-            Unit::Degree => "deg",
-            Unit::Turn => "turn",
-            Unit::Arcminute => "arcmin",
-            Unit::Arcsecond => "arcsec",
-            Unit::Milliradian => "mrad",
-            Unit::Count => "count",
-            Unit::Second => "s",
-            Unit::Millisecond => "ms",
-            Unit::Microsecond => "us",
-            Unit::Nanosecond => "ns",
-            Unit::Minute => "min",
-            Unit::Hour => "h",
-            Unit::Day => "d",
-            Unit::Iso => "iso",
-            Unit::NewtonMetre => "N.m",
-            Unit::NewtonCentimetre => "N.cm",
-            Unit::MillinewtonMetre => "mN.m",
-            Unit::KilonewtonMetre => "kN.m",
-            Unit::PoundInch => "lbf.in",
-            Unit::PoundFoot => "lbf.ft",
-            Unit::Ampere => "A",
-            Unit::Milliampere => "mA",
-            Unit::Volt => "V",
-            Unit::Celsius => "C",
-            Unit::Kelvin => "K",
-            Unit::Fahrenheit => "F",
-        }
+        UNITS[self as usize].2
     }
 
-    /// One of it in the unit used inside: rad, s, N·m, °C. Of a count, an ampere and a volt what the gain makes of it:
-    /// turns, N·m.
+    /// Its size in the unit used inside: rad, s, N·m, °C.
     pub(crate) fn factor(self) -> f64 {
-        use std::f64::consts::TAU;
-        match self {
-            Unit::Degree => TAU / 360.0,
-            Unit::Turn | Unit::Count => TAU,
-            Unit::Arcminute => TAU / 21_600.0,
-            Unit::Arcsecond => TAU / 1_296_000.0,
-            Unit::Milliradian | Unit::Millisecond | Unit::MillinewtonMetre => 1e-3,
-            Unit::Microsecond => 1e-6,
-            Unit::Nanosecond => 1e-9,
-            Unit::Minute => 60.0,
-            Unit::Hour => 3600.0,
-            Unit::Day => 86_400.0,
-            Unit::NewtonCentimetre => 1e-2,
-            Unit::KilonewtonMetre => 1e3,
-            Unit::PoundInch => POUND_FORCE_N * 0.0254,
-            Unit::PoundFoot => POUND_FORCE_N * 0.3048,
-            Unit::Fahrenheit => 5.0 / 9.0,
-            Unit::Radian
-            | Unit::Second
-            | Unit::Iso
-            | Unit::NewtonMetre
-            | Unit::Ampere
-            | Unit::Milliampere
-            | Unit::Volt
-            | Unit::Celsius
-            | Unit::Kelvin => 1.0,
-        }
+        UNITS[self as usize].3
+    }
+
+    /// The quantity that it measures.
+    pub(crate) fn family(self) -> Family {
+        UNITS[self as usize].1
     }
 
     /// Its zero in the unit used inside.
@@ -182,37 +151,7 @@ impl Unit {
         Unit::written(super::reader::unit_word(field))
     }
 
-    /// What it is a unit of, as a number that units of the same quantity share.
-    pub(super) fn family(self) -> usize {
-        let families: [&[Unit]; 3] = [&Self::OF_ANGLES, &Self::OF_TIME, &Self::OF_TEMPERATURE];
-        families.iter().position(|units| units.contains(&self)).unwrap_or(families.len())
-    }
-
-    /// Whether it is one of angle.
-    #[must_use]
-    pub(crate) fn is_of_angles(self) -> bool {
-        Unit::OF_ANGLES.contains(&self)
-    }
-
-    /// Whether it is one of time.
-    #[must_use]
-    pub(crate) fn is_of_time(self) -> bool {
-        Unit::OF_TIME.contains(&self)
-    }
-
-    /// Whether it is one of torque, or of what is proportional to it.
-    #[must_use]
-    pub(crate) fn is_of_torque(self) -> bool {
-        Unit::OF_TORQUE.contains(&self)
-    }
-
-    /// Whether it is one of temperature.
-    #[must_use]
-    pub(crate) fn is_of_temperature(self) -> bool {
-        Unit::OF_TEMPERATURE.contains(&self)
-    }
-
-    /// What has to be said beside a unit that is none by itself.
+    /// The gain that has to be given with it, for a unit that has no size of its own.
     fn needs_gain(self) -> Option<&'static str> {
         match self {
             Unit::Count => Some("how many counts make a turn, for instance count/16777216"),
@@ -227,8 +166,8 @@ impl Unit {
 
     /// The unit that people write so, if it is one.
     pub(super) fn written(text: &str) -> Option<Unit> {
-        if let Some(unit) = Unit::all().find(|unit| unit.name() == text) {
-            return Some(unit);
+        if let Some(row) = UNITS.iter().find(|row| row.2 == text) {
+            return Some(row.0);
         }
         Some(match text {
             "°" => Unit::Degree,
@@ -330,16 +269,16 @@ impl Reading {
     ///
     /// # Errors
     /// What was found and what is allowed; the unit itself if it is not known or not one of `allowed`.
-    pub(super) fn parse(text: &str, allowed: &[Unit], torque_per_ampere: Option<f64>) -> Result<Reading, Wrong> {
+    pub(super) fn parse(text: &str, allowed: Family, torque_per_ampere: Option<f64>) -> Result<Reading, Wrong> {
         let text = text.trim();
-        if let Some(unit) = Unit::written(text).filter(|unit| allowed.contains(unit)) {
+        if let Some(unit) = Unit::written(text).filter(|unit| unit.family() == allowed) {
             return Reading::of(unit).complete(false, torque_per_ampere);
         }
         let (sign, rest) = text.strip_prefix('-').map_or((1.0, text), |rest| (-1.0, rest.trim_start()));
         let end = rest.find(['*', '/', '+', '-']).unwrap_or(rest.len());
         let word = rest[..end].trim();
         let unit =
-            Unit::written(word).filter(|unit| allowed.contains(unit)).ok_or_else(|| Wrong::Unit(word.to_owned()))?;
+            Unit::written(word).filter(|unit| unit.family() == allowed).ok_or_else(|| Wrong::Unit(word.to_owned()))?;
         let (mut gain, mut offset, mut scaled) = (sign, 0.0, false);
         let mut rest = rest[end..].trim_start();
         while let Some(operator) = rest.chars().next() {
@@ -381,7 +320,7 @@ impl Reading {
 pub(super) enum Wrong {
     /// This is no unit, or none of the column's.
     Unit(String),
-    /// What was found and what is allowed.
+    /// The found value and the allowed ones.
     Text(String),
 }
 
@@ -421,57 +360,57 @@ mod tests {
             assert!((unit.factor() * angle - std::f64::consts::TAU).abs() < 1e-12, "{unit}");
         }
         let read =
-            |text: &str, allowed: &[Unit], number: f64| Reading::parse(text, allowed, None).unwrap().value(number);
-        assert_eq!(read("K", &Unit::OF_TEMPERATURE, 300.0), 300.0 - 273.15);
-        assert!((read("F", &Unit::OF_TEMPERATURE, 212.0) - 100.0).abs() < 1e-12);
-        assert!((read("lbf.ft", &Unit::OF_TORQUE, 1.0) - 1.355_817_948_331_400_4).abs() < 1e-12);
-        assert!((read("min", &Unit::OF_TIME, 2.0) - 120.0).abs() < 1e-12);
-        for unit in Unit::all() {
+            |text: &str, allowed: Family, number: f64| Reading::parse(text, allowed, None).unwrap().value(number);
+        assert_eq!(read("K", Family::Temperature, 300.0), 300.0 - 273.15);
+        assert!((read("F", Family::Temperature, 212.0) - 100.0).abs() < 1e-12);
+        assert!((read("lbf.ft", Family::Torque, 1.0) - 1.355_817_948_331_400_4).abs() < 1e-12);
+        assert!((read("min", Family::Time, 2.0) - 120.0).abs() < 1e-12);
+        for (k, (unit, ..)) in UNITS.into_iter().enumerate() {
+            assert_eq!(unit as usize, k);
             assert_eq!(Unit::written(unit.name()), Some(unit));
         }
     }
 
     #[test]
     fn a_reading_has_a_sign_a_gain_and_an_offset() {
-        use std::f64::consts::TAU;
         for (text, allowed, number, due) in [
-            ("count/16777216", &Unit::OF_ANGLES[..], 4_194_304.0, TAU / 4.0),
-            ("-count/2^24", &Unit::OF_ANGLES, 4_194_304.0, -TAU / 4.0),
-            ("turn/100", &Unit::OF_ANGLES, 50.0, TAU / 2.0),
-            ("-deg", &Unit::OF_ANGLES, 90.0, -TAU / 4.0),
-            ("deg*2+10", &Unit::OF_ANGLES, 40.0, TAU / 4.0),
-            (" - mrad * 1e1 ", &Unit::OF_ANGLES, 100.0, -1.0),
-            ("Nm", &Unit::OF_TORQUE, 2.0, 2.0),
-            ("N.cm", &Unit::OF_TORQUE, 200.0, 2.0),
-            ("V*20-0.5", &Unit::OF_TORQUE, 0.1, 1.5),
-            ("mA*0.0035", &Unit::OF_TORQUE, 1000.0, 3.5),
-            ("N-m", &Unit::OF_TORQUE, 2.0, 2.0),
-            ("us", &Unit::OF_TIME, 2e6, 2.0),
+            ("count/16777216", Family::Angle, 4_194_304.0, TAU / 4.0),
+            ("-count/2^24", Family::Angle, 4_194_304.0, -TAU / 4.0),
+            ("turn/100", Family::Angle, 50.0, TAU / 2.0),
+            ("-deg", Family::Angle, 90.0, -TAU / 4.0),
+            ("deg*2+10", Family::Angle, 40.0, TAU / 4.0),
+            (" - mrad * 1e1 ", Family::Angle, 100.0, -1.0),
+            ("Nm", Family::Torque, 2.0, 2.0),
+            ("N.cm", Family::Torque, 200.0, 2.0),
+            ("V*20-0.5", Family::Torque, 0.1, 1.5),
+            ("mA*0.0035", Family::Torque, 1000.0, 3.5),
+            ("N-m", Family::Torque, 2.0, 2.0),
+            ("us", Family::Time, 2e6, 2.0),
         ] {
             let reading = Reading::parse(text, allowed, None).unwrap_or_else(|wrong| panic!("{text}: {wrong:?}"));
             assert!((reading.value(number) - due).abs() < 1e-9, "{text}: {}", reading.value(number));
         }
-        let amperes = Reading::parse("-mA", &Unit::OF_TORQUE, Some(3.5)).unwrap();
+        let amperes = Reading::parse("-mA", Family::Torque, Some(3.5)).unwrap();
         assert!((amperes.value(2000.0) + 7.0).abs() < 1e-9);
     }
 
     #[test]
     fn a_wrong_reading_says_what_is_missing() {
         for (text, allowed, said) in [
-            ("count", &Unit::OF_ANGLES[..], "counts make a turn"),
-            ("A", &Unit::OF_TORQUE, "--torque-constant"),
-            ("deg*", &Unit::OF_ANGLES, "found \"*\""),
-            ("deg*0", &Unit::OF_ANGLES, "not zero"),
-            ("deg/0", &Unit::OF_ANGLES, "finite"),
-            ("deg*2x", &Unit::OF_ANGLES, "after the unit"),
+            ("count", Family::Angle, "counts make a turn"),
+            ("A", Family::Torque, "--torque-constant"),
+            ("deg*", Family::Angle, "found \"*\""),
+            ("deg*0", Family::Angle, "not zero"),
+            ("deg/0", Family::Angle, "finite"),
+            ("deg*2x", Family::Angle, "after the unit"),
         ] {
             match Reading::parse(text, allowed, None) {
                 Err(Wrong::Text(what)) => assert!(what.contains(said), "{text}: {what}"),
                 other => panic!("{text}: {other:?}"),
             }
         }
-        assert_eq!(Reading::parse("grad", &Unit::OF_ANGLES, None), Err(Wrong::Unit("grad".to_owned())));
-        assert_eq!(Reading::parse("deg", &Unit::OF_TIME, None), Err(Wrong::Unit("deg".to_owned())));
+        assert_eq!(Reading::parse("grad", Family::Angle, None), Err(Wrong::Unit("grad".to_owned())));
+        assert_eq!(Reading::parse("deg", Family::Time, None), Err(Wrong::Unit("deg".to_owned())));
     }
 
     #[test]

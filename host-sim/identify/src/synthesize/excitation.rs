@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::measurement::Session;
+use crate::measurement::{Session, rates};
 
 /// How much the data can tell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,7 +34,7 @@ pub struct Plan {
     pub speed_rad_s: f64,
     /// Largest torque, N·m.
     pub torque_n_m: f64,
-    /// What is missing.
+    /// The missing conditions.
     pub richness: Richness,
 }
 
@@ -58,15 +58,7 @@ pub struct Excitation {
 impl Excitation {
     /// Generator speed in each row, rad/s.
     pub(super) fn speeds(&self) -> Vec<f64> {
-        let mut speeds = vec![0.0; self.time.len()];
-        for session in &self.sessions {
-            for k in session.clone() {
-                let (a, b) = (k.max(session.start + 1) - 1, (k + 1).min(session.end - 1));
-                let dt = self.time[b] - self.time[a];
-                speeds[k] = if dt > 0.0 { (self.generator[b] - self.generator[a]) / dt } else { 0.0 };
-            }
-        }
-        speeds
+        rates(&self.sessions, &self.time, &self.generator)
     }
 
     /// That of measured sessions. What was not recorded is taken as rows `1 / rate_hz` apart, no load, the nominal

@@ -9,7 +9,7 @@ use std::collections::HashSet;
 
 use super::lattice::lattice;
 use super::steps::largest_torque;
-use super::{Findings, of_rows};
+use super::{Findings, throughout};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{Fault, FaultName, Treatment};
@@ -27,13 +27,13 @@ const LEAST_CHANGES: usize = 12;
 /// Share of what the error changes by from step to step that it changes by in the very row where the load does so,
 /// too. *Guess*.
 const WITHIN_THE_ROW: f64 = 0.5;
-/// The error changes from step to step by so many standard deviations of the mean.
+/// The error changes from step to step by this many standard deviations of the mean.
 const CERTAIN: f64 = 4.0;
 /// A change by more steps than this is by more than one.
 const MORE_THAN_ONE: f64 = 1.5;
-/// Changes to and fro between the same two steps within so many rows are one, which noise has torn. *Guess*.
+/// Changes to and fro between the same two steps within this many rows are one, which noise has torn. *Guess*.
 const TORN_ROWS: f64 = 12.0;
-/// A step that lasts so many times as long as most says little of the load: its rows are left out. *Guess*.
+/// A step that lasts this many times as long as most says little of the load: its rows are left out. *Guess*.
 const LONG: f64 = 8.0;
 /// As long as this share of the rows stays.
 const STAYS: f64 = 0.5;
@@ -58,7 +58,7 @@ pub(in crate::measurement) fn check(sessions: &mut Vec<Session>, findings: &mut 
     let pairs = known.iter().flatten().flat_map(|known| known.windows(2));
     let mut lasting: Vec<f64> = pairs.map(|pair| pair[1].0 - pair[0].0).collect();
     let long = LONG * median_of(&mut lasting);
-    let Some(mut fault) = throughout(sessions) else { return };
+    let Some(mut fault) = coarse(sessions) else { return };
     let mut drop: Vec<Vec<bool>> = sessions.iter().map(|s| vec![s.torque_n_m.is_some(); s.len()]).collect();
     for ((session, known), drop) in sessions.iter_mut().zip(&known).zip(&mut drop) {
         if let Some(torque) = &mut session.torque_n_m {
@@ -83,16 +83,11 @@ pub(in crate::measurement) fn check(sessions: &mut Vec<Session>, findings: &mut 
 }
 
 /// A coarse torque in all rows.
-fn throughout(sessions: &[Session]) -> Option<Fault> {
-    let (first, last) = (sessions.first()?, sessions.last()?);
-    let mut fault = of_rows(first, FaultName::Quantisation, 0..first.len());
-    (fault.last_line, fault.rows) = (last.line[last.len() - 1], sessions.iter().map(|s| s.len() as u64).sum());
-    fault.until_s = last.time_s.as_ref().and_then(|time| time.last().copied());
-    fault.channel = Some(Quantity::Torque);
-    Some(fault)
+fn coarse(sessions: &[Session]) -> Option<Fault> {
+    Some(Fault { channel: Some(Quantity::Torque), ..throughout(sessions, FaultName::Quantisation)? })
 }
 
-/// Names steps of a sensor between which nothing tells where the load is.
+/// Names steps of a sensor between which nothing shows where the load is.
 fn kept(sessions: &[Session], step: f64) -> Option<Fault> {
     let torques = || sessions.iter().filter_map(|session| session.torque_n_m.as_deref());
     let runs: Vec<usize> = torques().flat_map(runs).map(|run| run.len()).collect();
@@ -101,7 +96,7 @@ fn kept(sessions: &[Session], step: f64) -> Option<Fault> {
     if steps.len() < MANY_STEPS || (torn as f64) < TORN * runs.len() as f64 {
         return None;
     }
-    let mut fault = throughout(sessions)?;
+    let mut fault = coarse(sessions)?;
     fault.what = format!(
         "the torque is written in steps of {step:.3} N·m: what the load does within a step is not seen, and nothing \
          in the rows tells it"

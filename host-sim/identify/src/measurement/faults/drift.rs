@@ -4,7 +4,7 @@
 //! encoder move it with the angle. Drift is named only where the data can tell it from them.
 
 use super::state::{Extra, State};
-use super::{ARCSEC, Findings, of_rows};
+use super::{ARCSEC, Findings, throughout};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Treatment};
@@ -14,7 +14,7 @@ use flexspline_base::statistics::correlation;
 
 /// Drift of less than this over the whole recording is not looked for, rad.
 const LEAST_RAD: f64 = 10.0 * ARCSEC;
-/// A trend is so many standard deviations, over stretches as long as the noise remembers.
+/// A trend is this many standard deviations, over stretches as long as the noise remembers.
 const CERTAIN: f64 = 6.0;
 /// Stretches of the recording that a trend is judged by.
 const STRETCHES: usize = 24;
@@ -31,7 +31,7 @@ const WITHIN: f64 = 0.5;
 const WITHIN_STDS: f64 = 3.0;
 /// Sessions whose zeros are free at once, at most.
 const MOST_ZEROS: usize = 64;
-/// Sessions in which a drift of this share would not show by so many standard deviations have to lie on its line, by
+/// Sessions in which a drift of this share would not show by this many standard deviations have to lie on its line, by
 /// [`OFF_THE_LINE`]. *Guess*.
 const SHOWS: f64 = 0.5;
 /// What is the same on both flanks: the part that differs is below this share.
@@ -48,12 +48,12 @@ const COUNTS_K: f64 = 2.0;
 /// Share of rows that each flank must have.
 const BOTH_FLANKS: f64 = 0.1;
 
-/// What moves by this within so many seconds, and by this share of the drift, is none: beyond any wind-up and
+/// What moves by this within this many seconds, and by this share of the drift, is none: beyond any wind-up and
 /// clearance.
 const LEAST_LEAP_RAD: f64 = 1200.0 * ARCSEC;
 const LEAP_S: f64 = 2.0;
 const LEAP_SHARE: f64 = 0.3;
-/// Nor what moves between two recordings by so many times what the drift gives in that time.
+/// Nor what moves between two recordings by this many times what the drift gives in that time.
 const GAP_SHARE: f64 = 2.0;
 /// Rows whose median is a level.
 const LEVEL_ROWS: usize = 12;
@@ -71,12 +71,7 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, cut: 
     let Some(last) = sessions.last().and_then(|s| s.time_s.as_ref()?.last().copied()) else { return };
     let first = sessions[0].time_s.as_ref().map_or(from_s, |time| time[0]);
     let total = per_s * (last - first);
-    let mut fault = of_rows(&sessions[0], FaultName::Drift, 0..sessions[0].len());
-    if let Some(session) = sessions.last() {
-        fault.last_line = session.line[session.len() - 1];
-    }
-    fault.until_s = Some(last);
-    fault.rows = sessions.iter().map(|session| session.len() as u64).sum();
+    let Some(mut fault) = throughout(sessions, FaultName::Drift) else { return };
     (fault.channel, fault.treatment) = (Some(Quantity::Error), Treatment::Repaired);
     fault.size_arcsec = Some(total / ARCSEC);
     let per_hour = 3600.0 * per_s / ARCSEC;
@@ -344,7 +339,7 @@ mod tests {
         sessions_apart(300.0, per_hour_arcsec, zeros)
     }
 
-    /// The same, once to twice so many seconds apart.
+    /// The same, once to twice this many seconds apart.
     fn sessions_apart(apart_s: f64, per_hour_arcsec: f64, zeros: &[f64]) -> Vec<Session> {
         let mut random = fastrand::Rng::with_seed(8);
         let mut begin = 0.0;

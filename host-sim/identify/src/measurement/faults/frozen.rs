@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use super::lattice::lattice;
-use super::steps::whole_pitches;
-use super::{ARCSEC, Findings, of_rows};
+use super::steps::WHOLE_PITCH;
+use super::{ARCSEC, Findings, of_rows, whole_pitches};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Treatment};
@@ -24,7 +24,7 @@ const NO_NOISE_RAD: f64 = 0.02 * ARCSEC;
 const DWELL_RAD: f64 = 600.0 * ARCSEC;
 /// No clearance is as wide as this.
 const LONG_DWELL_RAD: f64 = 1200.0 * ARCSEC;
-/// A channel without noise that is frozen catches up by so many of its usual largest steps.
+/// A channel without noise that is frozen catches up by this many of its usual largest steps.
 const CATCHES_UP: f64 = 10.0;
 
 /// Stretches of rows with one value, at least `shortest` rows long.
@@ -42,7 +42,7 @@ fn stretches(values: &[f64], shortest: usize, same: impl Fn(f64, f64) -> bool) -
     found
 }
 
-/// Length of a stretch that chance does not give in so many rows, of a channel that changes at every second row at
+/// Length of a stretch that chance does not give in this many rows, of a channel that changes at every second row at
 /// least.
 fn beyond_chance(rows: usize) -> usize {
     let length = (CHANCE / rows.max(1) as f64).ln() / 0.5_f64.ln();
@@ -55,7 +55,7 @@ fn slips_a_tooth(output: &[f64], stretch: &Range<usize>, gear: &Gear) -> bool {
     let angles = &output[stretch.clone()];
     let (first, last) = (angles[0], angles[angles.len() - 1]);
     let apart = (angles.len() / 4).max(1);
-    whole_pitches(last - first, gear)
+    whole_pitches(last - first, gear, WHOLE_PITCH)
         && angles.windows(apart + 1).any(|a| (a[apart] - a[0]).abs() > SUDDEN * (last - first).abs())
 }
 
@@ -163,7 +163,7 @@ fn missed(generator: &[f64], stretch: &Range<usize>) -> f64 {
     missed_by(generator, stretch)
 }
 
-/// A limit that the torque stands at: in so many rows of stretches as long as this, and this share of all.
+/// A limit that the torque stands at: in this many rows of stretches as long as this, and this share of all.
 const AT_LIMIT_ROWS: usize = 3;
 const AT_LIMIT_SHARE: f64 = 0.005;
 /// Rows between the limits for each at one that tell whether the torque has noise there, and what of its range is noise
@@ -235,7 +235,7 @@ fn beside(sessions: &mut [Session], channel: Quantity, rows: usize, drop: &mut [
             if values[stretch.start] == 0.0 || drop[number][stretch.start] {
                 continue;
             }
-            // Without this stretch the channel stands in so many of its steps.
+            // Without this stretch the channel stands in this many of its steps.
             let elsewhere = (standing + 1).saturating_sub(stretch.len()) as f64 / (rows - stretch.len()).max(1) as f64;
             let noisy = noise > BLURRED * step && noise > 0.0 && elsewhere < 0.5;
             let back = values.get(stretch.end).map_or(0.0, |next| (next - values[stretch.start]).abs());
@@ -279,7 +279,7 @@ fn beside(sessions: &mut [Session], channel: Quantity, rows: usize, drop: &mut [
 mod tests {
     use super::*;
 
-    /// Rows left of a torque, and what is told.
+    /// Rows left of a torque, and what is reported.
     fn left(torque: impl Iterator<Item = f64>) -> (usize, Vec<FaultName>) {
         let mut sessions = vec![Session {
             torque_n_m: Some(torque.collect()),

@@ -9,7 +9,7 @@
 use std::ops::Range;
 
 use super::lattice::lattice;
-use super::{Findings, of_rows};
+use super::{Findings, throughout};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{Fault, FaultName, Measures, Treatment};
@@ -62,14 +62,12 @@ fn rhythm(of: &[Vec<Range<usize>>]) -> Option<usize> {
 
 /// A fault of a channel with a new value in one of `every` rows, to be completed.
 fn fault(sessions: &[Session], of: &[Vec<Range<usize>>], channel: Quantity, every: usize) -> Option<Fault> {
-    let (first, last) = (sessions.first()?, sessions.last()?);
-    let mut fault = of_rows(first, FaultName::FrozenChannel, 0..first.len());
-    fault.last_line = last.line[last.len() - 1];
-    fault.until_s = last.time_s.as_ref().and_then(|time| time.last().copied());
-    fault.rows = of.iter().flatten().map(|run| run.len() as u64 - 1).sum();
-    fault.channel = Some(channel);
-    fault.measures = Measures { every_rows: Some(every as u64), ..Measures::default() };
-    Some(fault)
+    Some(Fault {
+        rows: of.iter().flatten().map(|run| run.len() as u64 - 1).sum(),
+        channel: Some(channel),
+        measures: Measures { every_rows: Some(every as u64), ..Measures::default() },
+        ..throughout(sessions, FaultName::FrozenChannel)?
+    })
 }
 
 fn check_angle(

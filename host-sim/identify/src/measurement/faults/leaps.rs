@@ -6,7 +6,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{ARCSEC, Findings, span};
+use super::{ARCSEC, Findings, span, whole_pitches};
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Measures, Treatment};
 use crate::measurement::gear::Gear;
@@ -137,7 +137,8 @@ pub(in crate::measurement) fn between_sessions(
         let turns = turns_without(jump);
         if near(turns) {
             restarts.push((start, turns.round()));
-        } else if slope == 0.0 && jump_beside_slope.abs() > OTHER_ZERO_RAD && !whole_pitches(jump, gear) {
+        } else if slope == 0.0 && jump_beside_slope.abs() > OTHER_ZERO_RAD && !whole_pitches(jump, gear, BESIDE_PITCHES)
+        {
             others.push((session + 1, start, jump));
         }
     }
@@ -240,14 +241,6 @@ fn slope(generator: &[f64], error: &[f64], bounds: &[usize]) -> f64 {
         .collect();
     let of_turns = generator.first().map_or(0.0, |_| median_of(&mut slopes));
     if of_turns.abs() > SLOPE / TAU / 10.0 { of_turns } else { 0.0 }
-}
-
-/// Whether a jump is of whole tooth pitches: the drive may have ratcheted.
-fn whole_pitches(jump: f64, gear: &Gear) -> bool {
-    gear.tooth_pitch_rad.is_some_and(|pitch| {
-        let pitches = (jump / pitch).round();
-        pitches != 0.0 && (jump - pitches * pitch).abs() < BESIDE_PITCHES * pitch
-    })
 }
 
 #[cfg(test)]

@@ -17,7 +17,7 @@
 //! | a torque or a temperature that cannot be in the unit given | left out, with the units that it may be in |
 //! | output or generator frozen | rows left out |
 //! | torque frozen | rows left out, or channel |
-//! | torque repeated, one value in so many rows | a straight line between the new ones |
+//! | torque repeated, one value in this many rows | a straight line between the new ones |
 //! | angle repeated so | rows that repeat it left out |
 //! | temperature frozen | straight line, or channel left out |
 //! | torque in coarse steps | read off where it goes from one to the next |
@@ -50,7 +50,8 @@ pub(super) mod wrap;
 use std::ops::Range;
 
 use super::Session;
-use super::fault::{Fault, FaultName, Measures, ToothStep, Treatment};
+use super::fault::{Fault, FaultName, ToothStep};
+use super::gear::Gear;
 use super::log::Log;
 
 /// An arc-second, rad.
@@ -67,18 +68,9 @@ pub(super) struct Findings {
 /// A fault from row `first` to row `last` of a log, to be completed.
 fn span(log: &Log, name: FaultName, first: usize, last: usize) -> Fault {
     Fault {
-        name,
-        channel: None,
         time_s: log.time_at(first),
         until_s: log.time_at(last),
-        first_line: log.line[first],
-        last_line: log.line[last],
-        rows: (last - first + 1) as u64,
-        size_arcsec: None,
-        treatment: Treatment::Kept,
-        what: String::new(),
-        advice: name.advice(),
-        measures: Measures::default(),
+        ..Fault::new(name, [log.line[first], log.line[last]], (last - first + 1) as u64)
     }
 }
 
@@ -87,17 +79,24 @@ fn of_rows(session: &Session, name: FaultName, rows: Range<usize>) -> Fault {
     let last = rows.end - 1;
     let time = |row: usize| session.time_s.as_ref().map(|time| time[row]);
     Fault {
-        name,
-        channel: None,
         time_s: time(rows.start),
         until_s: time(last),
-        first_line: session.line[rows.start],
-        last_line: session.line[last],
-        rows: rows.len() as u64,
-        size_arcsec: None,
-        treatment: Treatment::Kept,
-        what: String::new(),
-        advice: name.advice(),
-        measures: Measures::default(),
+        ..Fault::new(name, [session.line[rows.start], session.line[last]], rows.len() as u64)
     }
+}
+
+/// A fault of all rows, to be completed; nothing without rows.
+fn throughout(sessions: &[Session], name: FaultName) -> Option<Fault> {
+    let (first, last) = (sessions.first()?, sessions.last()?);
+    let whole = of_rows(last, name, 0..last.len());
+    let rows = sessions.iter().map(|session| session.len() as u64).sum();
+    Some(Fault { last_line: whole.last_line, until_s: whole.until_s, rows, ..of_rows(first, name, 0..first.len()) })
+}
+
+/// Whether an angle at the output is a whole number of tooth pitches, but for this share of a pitch.
+fn whole_pitches(angle_rad: f64, gear: &Gear, share: f64) -> bool {
+    gear.tooth_pitch_rad.is_some_and(|pitch| {
+        let pitches = (angle_rad / pitch).round();
+        pitches != 0.0 && (angle_rad - pitches * pitch).abs() < share * pitch
+    })
 }

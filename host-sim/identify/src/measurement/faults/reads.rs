@@ -16,7 +16,7 @@ use std::borrow::Cow;
 use super::outliers::repeat_with_position;
 use super::resolution::seen;
 use super::state::State;
-use super::{ARCSEC, Findings, of_rows};
+use super::{ARCSEC, Findings, throughout};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Measures, Treatment};
@@ -40,14 +40,14 @@ const LEAST_OF_NOISE: f64 = 0.3;
 const CERTAIN: f64 = 25.0;
 /// Classes are no better known than this share of their variance: steps and teeth are in it, too. *Guess*.
 const CLASS_DOUBT: f64 = 0.05;
-/// Ripple of the teeth is smooth in slow rows and scatter in fast ones: half of it where a tooth passes in so many
+/// Ripple of the teeth is smooth in slow rows and scatter in fast ones: half of it where a tooth passes in this many
 /// rows. *Guess*.
 const TOOTH_ROWS: f64 = 6.0;
-/// A row is read late if it is off by so many times what its speed lets expect.
+/// A row is read late if it is off by this many times what its speed lets expect.
 const LATE: f64 = 4.0;
 /// Late rows are told from this share of the rows that move on…
 const LATE_SHARE: f64 = 0.004;
-/// …and from so many on.
+/// …and from this many on.
 const LATE_ROWS: usize = 30;
 /// Of them this share is off to the same side, seen in the direction of motion.
 const ONE_SIDED: f64 = 0.8;
@@ -58,11 +58,11 @@ const IN_MOTION: f64 = 0.3;
 const AT_REST: f64 = 0.03;
 /// More late rows than this are no late rows.
 const MOST_LATE: f64 = 0.35;
-/// Rows that are late and not told from others are up to so many times those that are. *Guess*.
+/// Rows that are late and not told from others are up to this many times those that are. *Guess*.
 const UNTOLD: f64 = 2.0;
 /// Rows in which the generator turns by more do not follow the waves of a drive, rad. *Guess*.
 const FOLLOWED_RAD: f64 = 0.25;
-/// A step of the time by more than so many usual ones is a pause: rows on both sides of it, as of a bench that goes
+/// A step of the time by more than this many usual ones is a pause: rows on both sides of it, as of a bench that goes
 /// from stop to stop, tell nothing of how they are read. *Guess*: a missing row is a step of two.
 const PAUSE: f64 = 2.5;
 /// Scatter of readings is white: of the scatter of a row and of the next, -56/70 is common, within this. What swings
@@ -315,7 +315,7 @@ fn fit(classes: &[Class], tooth_speed: f64) -> (f64, f64, f64) {
     (values[0].max(0.0).sqrt(), values[1].max(0.0).sqrt() / least_speed, without - misfit)
 }
 
-/// What rows show of how they are read.
+/// Properties of the rows that show how they are read.
 struct Found {
     /// Rows that are off by far, with how far, session by session.
     late: Vec<Vec<(usize, f64)>>,
@@ -427,11 +427,8 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
     let late_rows_each = median_of(&mut late_s);
     let speed: Vec<Vec<f64>> = reads.into_iter().map(|of| of.speed).collect();
     let long: Vec<usize> = (0..sessions.len()).filter(|k| sessions[*k].len() > 8).collect();
-    let mut fault = of_rows(&sessions[0], FaultName::ReadJitter, 0..sessions[0].len());
-    let last = &sessions[sessions.len() - 1];
-    fault.last_line = last.line[last.len() - 1];
-    fault.until_s = last.time_s.as_ref().and_then(|time| time.last().copied());
-    (fault.rows, fault.treatment) = (rows as u64, Treatment::Masked);
+    let Some(mut fault) = throughout(sessions, FaultName::ReadJitter) else { return };
+    fault.treatment = Treatment::Masked;
     let late_rows: usize = if told_late { late.iter().map(Vec::len).sum() } else { 0 };
     let period_s = period_s(sessions);
     let jitter_ms = period_s.map(|period_s| 1e3 * period_s * jitter_rows).filter(|_| told_jitter);

@@ -6,23 +6,23 @@ use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Measures, Treatment};
 use crate::measurement::gear::Gear;
 use crate::measurement::log::Log;
-use flexspline_base::robust::{median_of, sampled};
+use flexspline_base::robust::{least_and_most, median_of, sampled};
 
 /// Rows before and after that must agree on the pace.
 const BESIDE: usize = 3;
 /// They agree within this share.
 const STEADY: f64 = 0.25;
-/// A leap is worth so many rows beyond what time says, at least…
+/// A leap is worth this many rows beyond what time says, at least…
 const EXTRA_ROWS: f64 = 0.8;
 /// …and the output takes part in it, within this share.
 const TOGETHER: f64 = 0.3;
-/// In one row the generator moves by so many times its own scatter, and in a leap both angles do.
+/// In one row the generator moves by this many times its own scatter, and in a leap both angles do.
 const OVER_NOISE: f64 = 8.0;
 /// So many leaps are stalls, at least…
 const FEWEST: usize = 8;
 /// …and no more than this share of the rows that tell.
 const MOST_SHARE: f64 = 0.2;
-/// They come every so many rows if this share of them does.
+/// They come after each block of this many rows if this share of them does.
 const REGULAR: f64 = 0.7;
 
 /// A row, and the time that is missing before it, s.
@@ -89,7 +89,7 @@ fn leaps(log: &Log, gear: &Gear) -> Option<(Vec<Leap>, usize, f64)> {
             |values: &[f64], k: usize| (values[k] - values[k - 1]) / (time[k] - time[k - 1]).max(1e-9 * period_s);
         let middle = |values: &[f64]| {
             let mut paces: Vec<f64> = near.clone().filter(|k| *k != row).map(|k| pace(values, k)).collect();
-            let even = paces.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(*p), b.max(*p)));
+            let even = least_and_most(paces.iter().copied());
             (median_of(&mut paces), even.1 - even.0)
         };
         let (usual, spread) = middle(generator);

@@ -8,19 +8,17 @@ use std::sync::OnceLock;
 
 use flexspline_algebra::{Mat, cholesky, lower_of_product, product};
 
-use crate::measurement::Session;
 use crate::measurement::gear::Gear;
+use crate::measurement::{Session, directions};
 use flexspline_base::robust::median_and_std;
 
 /// Rows that a fit uses at most, spread evenly.
 const FIT_ROWS: usize = 8000;
-/// The generator must turn back by so much, rad, before the flank is taken to have changed: its noise does not.
-const TURNED_BACK_RAD: f64 = 0.02;
 /// No clearance is wider, rad at the output: 10 arc-minutes.
 const CLEARANCE_RAD: f64 = 600.0 / 206_265.0;
 /// A reversal is noticed some rows late.
 const BEFORE: usize = 5;
-/// Weights fall from so many robust standard deviations on (Huber).
+/// Weights fall from this many robust standard deviations on (Huber).
 const HUBER: f64 = 2.5;
 
 /// Columns that depend on the state.
@@ -250,25 +248,4 @@ impl<'a> State<'a> {
         value.iter_mut().zip(&size).for_each(|(value, size)| *value /= size);
         Some(Fit { value, std, unit_std: sigma * (inflation / n as f64).sqrt(), misfit })
     }
-}
-
-/// +1 from where an angle last moved forward by more than its noise, -1 backward.
-pub(super) fn directions(angle: &[f64]) -> Vec<f64> {
-    let Some(&start) = angle.first() else { return Vec::new() };
-    // The first clear motion also holds for what comes before it.
-    let first = angle.iter().map(|a| a - start).find(|moved| moved.abs() > TURNED_BACK_RAD);
-    let mut now = first.map_or(1.0, f64::signum);
-    let mut farthest = start;
-    angle
-        .iter()
-        .map(|a| {
-            if (a - farthest) * now > 0.0 {
-                farthest = *a;
-            } else if (farthest - a) * now > TURNED_BACK_RAD {
-                now = -now;
-                farthest = *a;
-            }
-            now
-        })
-        .collect()
 }

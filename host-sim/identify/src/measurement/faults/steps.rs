@@ -6,7 +6,7 @@
 //! counts may be set right before the next session: then its steps stay until their session ends.
 
 use super::state::{Extra, Fit, State};
-use super::{ARCSEC, Findings, of_rows};
+use super::{ARCSEC, Findings, of_rows, whole_pitches};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, ToothStep, Treatment};
@@ -15,13 +15,13 @@ use flexspline_base::robust::{median_and_std, median_of, sampled, white_noise};
 
 /// A change in one row that is suspected exceeds the motion of the generator, over the ratio, by this factor…
 const FASTER_THAN_DWELL: f64 = 1.5;
-/// …and the robust spread of all such changes so many times.
+/// …and the robust spread of all such changes this many times.
 const SUDDEN: f64 = 10.0;
-/// Means over so many rows before and after are compared…
+/// Means over this many rows before and after are compared…
 const WINDOW: usize = 16;
-/// …and suspected from so many robust standard deviations of all such comparisons on.
+/// …and suspected from this many robust standard deviations of all such comparisons on.
 const STANDS_OUT: f64 = 8.0;
-/// The lasting part of a step is so many standard deviations.
+/// The lasting part of a step is this many standard deviations.
 const LASTS: f64 = 8.0;
 /// The lasting part and the sudden part agree within this share.
 const AGREES: f64 = 0.4;
@@ -33,7 +33,7 @@ const TAKEN_BACK_TOGETHER: f64 = 0.15;
 const ELSEWHERE: usize = 2;
 /// No step smaller than this is looked for, rad.
 const LEAST_RAD: f64 = 5.0 * ARCSEC;
-/// Nor one that is not seen from one row to the next: so many standard deviations of the white noise.
+/// Nor one that is not seen from one row to the next: this many standard deviations of the white noise.
 const SEEN: f64 = 6.0;
 /// Steps looked for at a time, and rounds of looking.
 const AT_ONCE: usize = 8;
@@ -41,7 +41,7 @@ const AT_ONCE: usize = 8;
 const AT_ONCE_IN_ALL: usize = 16;
 const ROUNDS: usize = 4;
 /// A step is that many whole tooth pitches if it differs by less than this share of one.
-const WHOLE_PITCH: f64 = 0.01;
+pub(super) const WHOLE_PITCH: f64 = 0.01;
 /// Load of this share of its largest holds the drive on one flank.
 pub(super) const HELD: f64 = 0.1;
 /// Wider than any traverse of the clearance, rad: such a step may follow a reversal.
@@ -50,17 +50,17 @@ const LONGEST_TRAVERSE_RAD: f64 = 1200.0 * ARCSEC;
 const WIDER_THAN_CLEARANCE_RAD: f64 = 180.0 * ARCSEC;
 /// A change of load by this share of its largest, near the step, may be wind-up.
 const LOAD_STEP: f64 = 0.03;
-/// Its noise alone changes it by no more than so many of its standard deviations.
+/// Its noise alone changes it by no more than this many of its standard deviations.
 const LOAD_NOISE: f64 = 8.0;
-/// And its usual pace no more than so many times.
+/// And its usual pace no more than this many times.
 const LOAD_PACE: f64 = 6.0;
 /// A step that leaves less than this share of the misfit of what it might be instead is told from it.
 const TELLS: f64 = 0.95;
 /// A step that leaves less than this share of the misfit of a change of flank in its place is none. *Guess*.
 const DECIDES: f64 = 0.05;
-/// Medians of six rows before and after differ by no more than so many standard deviations of the white noise.
+/// Medians of six rows before and after differ by no more than this many standard deviations of the white noise.
 const LOCAL_NOISE: f64 = 2.2;
-/// A jump stands alone: so many rows before and after it change the error by less than half as much.
+/// A jump stands alone: this many rows before and after it change the error by less than half as much.
 const APART: usize = 12;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -102,7 +102,7 @@ pub(in crate::measurement) enum Untold {
 }
 
 /// Finds lasting steps: index jumps are named and taken out, ratcheting is handed on. Gives where steps are that are
-/// not told apart.
+/// not distinguished.
 pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) -> Untold {
     let Some(Found { sure, doubtful, stays, .. }) = likelier(sessions, gear) else { return Untold::Nowhere };
     let untold = match doubtful.as_slice() {
@@ -161,7 +161,7 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
     untold
 }
 
-/// Whether so many rows of its session are before and after a row that means over them are compared.
+/// Whether this many rows of its session are before and after a row that means over them are compared.
 fn is_inside(session: &Session, row: usize) -> bool {
     row >= WINDOW && row + WINDOW <= session.len()
 }
@@ -214,6 +214,13 @@ fn may_let_go(session: &Session, row: usize, largest: f64) -> bool {
     session.torque_n_m.as_ref().is_some_and(|torque| torque[row].abs() < least_that_holds(torque, largest))
 }
 
+/// The fit of `columns` in the place of a step, beside the other steps.
+fn beside_others(state: &State, steps: &[Step], place: Place, columns: &[Extra]) -> Option<Fit> {
+    let others: Vec<_> = steps.iter().map(|(other, ..)| *other).filter(|other| *other != place).map(column).collect();
+    let extras: Vec<Extra> = others.iter().map(|column| column as Extra).chain(columns.iter().copied()).collect();
+    state.fit(&extras)
+}
+
 /// Whether a step leaves far less than a change of flank would that comes in its place, whatever the other steps are:
 /// the model without the step, to which the flank that the load holds is given instead.
 fn beyond_a_change_of_flank(sessions: &[Session], state: &State, steps: &[Step], place: Place) -> bool {
@@ -222,13 +229,8 @@ fn beyond_a_change_of_flank(sessions: &[Session], state: &State, steps: &[Step],
         return false;
     }
     let held_by: Vec<Vec<f64>> = sessions.iter().map(|session| held_flanks(session, largest)).collect();
-    let others: Vec<_> = steps.iter().map(|(other, ..)| *other).filter(|other| *other != place).map(column).collect();
-    let with = |this: Extra| {
-        let mut extras: Vec<Extra> = others.iter().map(|column| column as Extra).collect();
-        extras.push(this);
-        state.fit(&extras)
-    };
     let flank = |session: usize, row: usize| held_by[session][row];
+    let with = |this: Extra| beside_others(state, steps, place, &[this]);
     let (Some(step), Some(flank)) = (with(&column(place)), with(&flank)) else { return false };
     step.misfit < DECIDES * flank.misfit
 }
@@ -454,7 +456,7 @@ fn strength(
     let change = session.error_rad[place.row] - session.error_rad[place.row - 1];
     let motion = ((session.generator_rad[place.row] - session.generator_rad[place.row - 1]) / gear.ratio).abs();
     let agrees = (change - size).abs() < AGREES * size.abs() + 6.0 * noise + 0.5 * motion;
-    let loaded = load_changes(session, place.row, largest_torque(sessions)) && !whole_pitches(size, gear);
+    let loaded = load_changes(session, place.row, largest_torque(sessions)) && !whole_pitches(size, gear, WHOLE_PITCH);
     if !agrees || loaded || size.abs() < LEAST_RAD.max(SEEN * noise) {
         return 0.0;
     }
@@ -472,14 +474,6 @@ fn strength(
         return 0.0;
     }
     size.abs() / (LASTS * std).max(1e-300)
-}
-
-/// Whether an angle is one tooth pitch or several.
-pub(super) fn whole_pitches(size: f64, gear: &Gear) -> bool {
-    gear.tooth_pitch_rad.is_some_and(|pitch| {
-        let pitches = (size / pitch).round();
-        pitches != 0.0 && (size - pitches * pitch).abs() < WHOLE_PITCH * pitch
-    })
 }
 
 /// Largest torque of either sign, N·m; 0 where none was recorded.
@@ -552,13 +546,10 @@ fn lasts_under_load(sessions: &[Session], state: &State, steps: &[Step], place: 
     if held == 0.0 || loaded(place.session, place.row) {
         return true;
     }
-    let others: Vec<_> = steps.iter().map(|(other, ..)| *other).filter(|other| *other != place).map(column).collect();
-    let mut extras: Vec<Extra> = others.iter().map(|column| column as Extra).collect();
     let lasting = column(place);
     let under_load = |s: usize, r: usize| if loaded(s, r) { lasting(s, r) } else { 0.0 };
     let under_none = |s: usize, r: usize| if loaded(s, r) { 0.0 } else { lasting(s, r) };
-    extras.extend([&under_none as Extra, &under_load]);
-    let Some(fit) = state.fit(&extras) else { return false };
+    let Some(fit) = beside_others(state, steps, place, &[&under_none, &under_load]) else { return false };
     let seen = |k: usize| {
         let (value, std) = (fit.value[fit.value.len() - k], fit.std[fit.std.len() - k]);
         (value - size).abs() < AGREES * size.abs() && value.abs() > LASTS * std
@@ -594,14 +585,7 @@ fn no_flank_was_changed(sessions: &[Session], state: &State, steps: &[Step], pla
     if crossings >= 2 {
         let in_time = |s: usize, r: usize| place.reached(s, r);
         let in_angle = |s: usize, r: usize| f64::from(u8::from(sessions[s].generator_rad[r] >= here));
-        // The other steps are there in either case.
-        let others: Vec<_> =
-            steps.iter().map(|(other, ..)| *other).filter(|other| *other != place).map(column).collect();
-        let with = |this: Extra| {
-            let mut extras: Vec<Extra> = others.iter().map(|column| column as Extra).collect();
-            extras.push(this);
-            state.fit(&extras)
-        };
+        let with = |this: Extra| beside_others(state, steps, place, &[this]);
         let (Some(time), Some(angle)) = (with(&in_time), with(&in_angle)) else { return false };
         return time.misfit < TELLS * angle.misfit;
     }

@@ -9,6 +9,7 @@ use crate::measurement::columns::{Column, Quantity, Reading, Unit};
 use crate::measurement::fault::{Fault, FaultName, Treatment};
 use crate::measurement::gear::Gear;
 use crate::measurement::log::{FEWEST_ROWS, Log};
+use crate::measurement::unit::Family;
 use flexspline_base::robust::{least_and_most, median_of, quantile_of, sampled};
 
 /// The output must have turned by so much, by the generator or by itself, before the ratio is judged: twenty times two
@@ -31,7 +32,7 @@ const SPREADS_RAD: [f64; 2] = [0.174_5, 1e-3 / 206_265.0];
 /// Temperatures at which a drive exists, °C.
 const TEMPERATURES_C: [f64; 2] = [-180.0, 180.0];
 
-/// Finds and repairs units; an error says what cannot be told.
+/// Finds and repairs units; an error says what cannot be decided.
 pub(in crate::measurement) fn check(
     log: &mut Log,
     columns: &[Column],
@@ -69,10 +70,10 @@ fn unit(columns: &[Column], quantity: Quantity) -> Unit {
 }
 
 /// Units that have no gain to be said, in which a value of `unit` lies within `allowed`, with the value there.
-fn may_be(value: f64, unit: Unit, units: &[Unit], allowed: impl Fn(f64) -> bool) -> Vec<(Unit, f64)> {
+fn may_be(value: f64, unit: Unit, family: Family, allowed: impl Fn(f64) -> bool) -> Vec<(Unit, f64)> {
     let number = (value - unit.zero()) / unit.factor();
-    let plain = units.iter().filter(|other| !matches!(other, Unit::Ampere | Unit::Milliampere | Unit::Volt));
-    plain.map(|other| (*other, Reading::of(*other).value(number))).filter(|(_, value)| allowed(*value)).collect()
+    let plain = family.units().filter(|other| !matches!(other, Unit::Ampere | Unit::Milliampere | Unit::Volt));
+    plain.map(|other| (other, Reading::of(other).value(number))).filter(|(_, value)| allowed(*value)).collect()
 }
 
 /// How to say a unit that a column may have.
@@ -91,7 +92,7 @@ fn torque(log: &mut Log, columns: &[Column], gear: &Gear, findings: &mut Finding
     if size <= limit {
         return Ok(());
     }
-    let units = may_be(size, unit(columns, Quantity::Torque), Quantity::Torque.units(), |torque| torque <= limit);
+    let units = may_be(size, unit(columns, Quantity::Torque), Family::Torque, |torque| torque <= limit);
     if units.is_empty() {
         return Err(format!("torque: found {size:e} N.m in a twentieth of the rows, allowed: at most {limit:e} N.m"));
     }
@@ -112,7 +113,7 @@ fn temperature(log: &mut Log, columns: &[Column], findings: &mut Findings) {
     if exists(median) {
         return;
     }
-    let units = may_be(median, unit(columns, Quantity::Temperature), Quantity::Temperature.units(), exists);
+    let units = may_be(median, unit(columns, Quantity::Temperature), Family::Temperature, exists);
     let say_it = if units.is_empty() {
         String::new()
     } else {

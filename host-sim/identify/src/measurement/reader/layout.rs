@@ -6,7 +6,7 @@
 
 use std::collections::BTreeSet;
 
-use super::super::unit::Unit;
+use super::super::unit::{Family, Unit};
 use super::clock::{self, Order};
 use super::number::{self, Cell};
 
@@ -23,7 +23,7 @@ const ROWS_OF_A_NAME: usize = 4;
 /// Seconds since 1970 of the years 2001 to 2065.
 const EPOCH_S: std::ops::RangeInclusive<f64> = 1e9..=3e9;
 
-/// What stands between two fields.
+/// The separator of two fields.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Separator {
     /// `,`
@@ -158,11 +158,11 @@ pub struct Layout {
     pub(super) shape: Shape,
     /// Which number of a date is the day.
     pub(super) order: Order,
-    /// What was read otherwise than it stands.
+    /// Cells that were read otherwise than they stand.
     pub(super) notes: Vec<String>,
 }
 
-/// What a row is.
+/// Kinds of row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Shape {
     /// The values of an instant.
@@ -182,7 +182,7 @@ pub(super) enum StampParts {
     Seconds { whole: usize, part: usize, factor: f64 },
 }
 
-/// What a field holds.
+/// Kinds of field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Field {
     Number,
@@ -355,7 +355,7 @@ impl Layout {
         let Some(names) = lines.iter().copied().find(|k| 2 * distinct(*k) == width) else { return };
         let time_unit = lines.iter().find_map(|k| {
             let unit = Unit::in_name(&fields[*k][0])?;
-            (unit.is_of_time() && fields[*k][0].to_lowercase().contains("time")).then_some(unit)
+            (unit.family() == Family::Time && fields[*k][0].to_lowercase().contains("time")).then_some(unit)
         });
         self.names = fields[names].clone();
         self.units = vec![String::new(); width];

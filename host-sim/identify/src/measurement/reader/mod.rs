@@ -1,6 +1,6 @@
 //! The one reader of other people's files: bytes to text, text to rows of one layout, cells to numbers.
 //!
-//! [`Sheet::read`] finds the layout and which lines are rows; `Sheet::columns` reads the columns that are asked for.
+//! [`Sheet::of`] finds the layout and which lines are rows; `Sheet::columns` reads the columns that are asked for.
 //! Whatever is left out or read otherwise than it stands is said in [`Sheet::notes`] with its line. `look` asks for all
 //! columns, `calibrate`, `diagnose` and `replay` for those of the mapping.
 
@@ -14,7 +14,6 @@ pub(crate) mod stamps;
 mod text;
 
 use std::collections::HashMap;
-use std::io::Read;
 
 use rayon::prelude::*;
 
@@ -63,7 +62,7 @@ struct RowAt {
 pub struct FoundCell {
     /// Line of the file, from 1.
     pub line: u64,
-    /// What stands there.
+    /// The text there.
     pub text: String,
 }
 
@@ -109,21 +108,10 @@ pub(crate) struct Columns {
 }
 
 impl Sheet {
-    /// Reads a file; `known` are names of columns that are looked for.
+    /// Reads the bytes of a file; `known` are names of columns that are looked for.
     ///
     /// # Errors
-    /// It cannot be read, is no text, or changes its columns midway.
-    pub fn read(mut source: impl Read, known: &[&str]) -> Result<Sheet, TableProblem> {
-        let at_1 = |what: String| TableProblem { line: 1, what };
-        let mut bytes = Vec::new();
-        source.read_to_end(&mut bytes).map_err(|error| at_1(error.to_string()))?;
-        Sheet::of(bytes, known)
-    }
-
-    /// Reads the bytes of a file.
-    ///
-    /// # Errors
-    /// As [`Sheet::read`].
+    /// The file is no text, or changes its columns midway.
     pub fn of(bytes: Vec<u8>, known: &[&str]) -> Result<Sheet, TableProblem> {
         let text = text::of(bytes).map_err(|what| TableProblem { line: 1, what })?;
         let layout = Layout::of(&text.bytes, known);

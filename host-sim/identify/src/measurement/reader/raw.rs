@@ -1,13 +1,12 @@
 //! All columns of a file as they stand, for looking at it before anything is known of it.
 
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
 use super::super::log::{FEWEST_ROWS, MeasuredError};
-use super::super::phd2;
+use super::super::{bytes_of, phd2};
 use super::layout::{Separator, Shape};
-use super::{FoundCell, Sheet, align, shortened};
+use super::{Cells, FoundCell, Sheet, align, shortened};
 use flexspline_base::csv_rows::TableProblem;
 
 /// A file as it stands.
@@ -42,22 +41,8 @@ pub struct RawColumn {
     pub name: String,
     /// What a line of units, or the cells, say.
     pub unit: Option<String>,
-    /// Numbers, or seconds where times are written as text; NaN where there is neither.
-    pub values: Vec<f64>,
-    /// Fields that are times written as text.
-    pub times: usize,
-    /// The first of them.
-    pub first_time: Option<FoundCell>,
-    /// Whether a number is written with decimals.
-    pub decimals: bool,
-    /// Fields in which nothing was recorded.
-    pub empty: usize,
-    /// Fields beyond the range of the instrument.
-    pub over: usize,
-    /// Fields that are words.
-    pub words: usize,
-    /// The first of them.
-    pub first_word: Option<FoundCell>,
+    /// Its cells.
+    pub(crate) cells: Cells,
 }
 
 /// Reads a file of numbers.
@@ -65,11 +50,8 @@ pub struct RawColumn {
 /// # Errors
 /// The file cannot be read, is no text, or holds no rows of numbers.
 pub fn read(path: &Path) -> Result<RawFile, MeasuredError> {
-    let file = path.display().to_string();
-    match File::open(path) {
-        Ok(source) => parse(&file, source),
-        Err(error) => Err(MeasuredError { file, line: None, what: error.to_string() }),
-    }
+    let (file, bytes) = bytes_of(path)?;
+    parse(&file, &bytes[..])
 }
 
 /// Reads numbers from `source`, a file called `file`.
@@ -99,23 +81,16 @@ pub fn parse(file: &str, mut source: impl Read) -> Result<RawFile, MeasuredError
         columns.push(RawColumn {
             name,
             unit: sheet.layout.units.get(place).filter(|unit| !unit.is_empty()).cloned(),
-            values: cells.values,
-            times: cells.times,
-            first_time: cells.first_time,
-            decimals: cells.decimals,
-            empty: cells.empty,
-            over: cells.over,
-            words: cells.words,
-            first_word: cells.first_word,
+            cells,
         });
     }
     let rows = read.lines.len();
-    let numbers = columns.iter().any(|column| column.values.iter().any(|value| value.is_finite()));
+    let numbers = columns.iter().any(|column| column.cells.values.iter().any(|value| value.is_finite()));
     if rows < FEWEST_ROWS || !numbers {
         let what = if numbers {
             format!("{rows} row{}; at least {FEWEST_ROWS} are needed", if rows == 1 { "" } else { "s" })
         } else {
-            let first = columns.iter().find_map(|column| column.first_word.clone());
+            let first = columns.iter().find_map(|column| column.cells.first_word.clone());
             let found = first.map_or_else(String::new, |cell| {
                 format!("; found \"{}\" in line {}", shortened(&cell.text), cell.line)
             });
@@ -151,15 +126,15 @@ pub fn parse(file: &str, mut source: impl Read) -> Result<RawFile, MeasuredError
 impl RawFile {
     /// Channels with a time column each, laid on the instants of the first.
     fn align_pairs(&mut self) {
-        let own: Vec<Vec<f64>> = self.columns.iter().step_by(2).map(|column| column.values.clone()).collect();
-        if let Some(note) = align_pairs(&own, self.columns.iter_mut().map(|column| &mut column.values)) {
+        let own: Vec<Vec<f64>> = self.columns.iter().step_by(2).map(|column| column.cells.values.clone()).collect();
+        if let Some(note) = align_pairs(&own, self.columns.iter_mut().map(|column| &mut column.cells.values)) {
             self.notes.push(note);
         }
     }
 
     /// Channels that are never recorded in one row, laid on the rows of the one that has most.
     fn align_sparse(&mut self) {
-        let count = |column: &RawColumn| column.values.iter().filter(|value| value.is_finite()).count();
+        let count = |column: &RawColumn| column.cells.values.iter().filter(|value| value.is_finite()).count();
         let full = |column: &RawColumn| 10 * count(column) > 9 * self.rows;
         let sparse: Vec<usize> = (0..self.columns.len())
             .filter(|k| count(&self.columns[*k]) >= FEWEST_ROWS && !full(&self.columns[*k]))
@@ -167,21 +142,22 @@ impl RawFile {
         let Some(base) = sparse.iter().copied().max_by_key(|k| (count(&self.columns[*k]), usize::MAX - k)) else {
             return;
         };
-        let other =
-            sparse.iter().any(|k| *k != base && align::apart(&self.columns[base].values, &self.columns[*k].values));
+        let other = sparse
+            .iter()
+            .any(|k| *k != base && align::apart(&self.columns[base].cells.values, &self.columns[*k].cells.values));
         if !other {
             return;
         }
         let rows: Vec<f64> = (0..self.rows).map(|row| row as f64).collect();
-        let time = self.columns.iter().find(|column| full(column) && rises(&column.values));
-        let instants = time.map_or(rows, |column| column.values.clone());
-        let keep: Vec<usize> = (0..self.rows).filter(|row| self.columns[base].values[*row].is_finite()).collect();
+        let time = self.columns.iter().find(|column| full(column) && rises(&column.cells.values));
+        let instants = time.map_or(rows, |column| column.cells.values.clone());
+        let keep: Vec<usize> = (0..self.rows).filter(|row| self.columns[base].cells.values[*row].is_finite()).collect();
         let at: Vec<f64> = keep.iter().map(|row| instants[*row]).collect();
         for (k, column) in self.columns.iter_mut().enumerate() {
-            column.values = if sparse.contains(&k) && k != base {
-                align::at(&at, &instants, &column.values, false).0
+            column.cells.values = if sparse.contains(&k) && k != base {
+                align::at(&at, &instants, &column.cells.values, false).0
             } else {
-                keep.iter().map(|row| column.values[*row]).collect()
+                keep.iter().map(|row| column.cells.values[*row]).collect()
             };
         }
         self.notes.push(format!(
