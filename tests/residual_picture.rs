@@ -7,7 +7,7 @@ use cpu_time::ThreadTime;
 
 use crate::bench_data::{ARCSEC, Bench, RATIO, normal};
 use flexspline_sim::measurement::{Gear, Session};
-use flexspline_sim::residual::{Axis, OrderSpectrum, Picture, SpectrumSettings, Wheel, harmonics, order_spectrum};
+use flexspline_sim::residual::{Axis, OrderSpectrum, Picture, Wheel, harmonics, order_spectrum};
 use flexspline_tests::seeds;
 
 const CIRCULAR_SPLINE: f64 = 94.0 / 95.0;
@@ -18,7 +18,7 @@ fn angles(rows: usize, turns: f64, random: &mut fastrand::Rng) -> Vec<f64> {
 }
 
 fn spectrum(angle: &[f64], value: &[f64]) -> OrderSpectrum {
-    order_spectrum(Axis::Generator, angle, value, None, RATIO, &SpectrumSettings::default())
+    order_spectrum(Axis::Generator, angle, value, RATIO)
 }
 
 #[test]
@@ -249,5 +249,5 @@ fn little_data_gives_an_empty_picture_and_no_nonsense() {
     assert!(Picture::of(&still, &[vec![0.0; 100]], &Gear::of_ratio(RATIO)).unwrap().pulses.is_empty());
     let error = Picture::of(&still, &[vec![0.0; 99]], &Gear::of_ratio(RATIO)).unwrap_err();
     assert_eq!(error.to_string(), "session 0: 99 values of the residual for 100 rows");
-    assert_eq!(harmonics(&[], &[], None, &[2.0]), None);
+    assert_eq!(harmonics(&[], &[], &[2.0]), None);
 }

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::rows::Rows;
-use crate::measurement::{MAD_TO_STD, median_of, quantile_of, sampled};
+use crate::measurement::{least_and_most, median_and_std, quantile_of, sampled};
 
 /// Statistics of some rows, arcsec.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -33,13 +33,12 @@ impl Statistics {
         let n = values.len() as f64;
         let mut some = sampled(values);
         let (low, high) = (quantile_of(&mut some, 0.05), quantile_of(&mut some, 0.95));
-        let median = median_of(&mut some);
-        some.iter_mut().for_each(|value| *value = (*value - median).abs());
+        let (median_arcsec, spread_arcsec) = median_and_std(&mut some);
         Some(Statistics {
             count: values.len(),
-            median_arcsec: median,
+            median_arcsec,
             mean_arcsec: values.iter().sum::<f64>() / n,
-            spread_arcsec: MAD_TO_STD * median_of(&mut some),
+            spread_arcsec,
             rms_arcsec: (values.iter().map(|value| value * value).sum::<f64>() / n).sqrt(),
             low_arcsec: low,
             high_arcsec: high,
@@ -110,7 +109,7 @@ fn group(rows: &Rows, label: String, range: Option<[f64; 2]>, is_in: impl Fn(usi
 /// Parts with about as many rows each; fewer where values repeat.
 fn by_quantiles(rows: &Rows, column: &[f64], parts: usize) -> Vec<Group> {
     let mut some = sampled(column);
-    let (least, most) = column.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+    let (least, most) = least_and_most(column.iter().copied());
     let mut bounds = vec![least];
     for part in 1..parts {
         let bound = quantile_of(&mut some, part as f64 / parts as f64);

@@ -23,15 +23,15 @@ pub use orders::{Line, NamedOrder, Wheel, harmonics, named_orders};
 pub(crate) use pulses::Pulse;
 pub use rows::{Axis, Direction, SizeMismatch};
 pub(crate) use spectrum::sampled_twice;
-pub use spectrum::{OrderSpectrum, Peak, SpectrumSettings, order_spectrum};
+pub use spectrum::{OrderSpectrum, Peak, order_spectrum};
 pub(crate) use time::SessionDrift;
 
 use serde::Serialize;
 
-use crate::measurement::{Gear, Session};
+use crate::measurement::{Gear, Session, rms};
 use rows::Rows;
 
-/// What a residual looks like.
+/// The picture of a residual.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Picture {
     /// Rows.
@@ -61,16 +61,7 @@ impl Picture {
                 let centred = rows.centred_by_direction();
                 let spectra: Vec<OrderSpectrum> = Axis::ALL
                     .into_iter()
-                    .map(|axis| {
-                        order_spectrum(
-                            axis,
-                            &rows.angle(axis),
-                            &centred,
-                            None,
-                            gear.ratio,
-                            &SpectrumSettings::default(),
-                        )
-                    })
+                    .map(|axis| order_spectrum(axis, &rows.angle(axis), &centred, gear.ratio))
                     .collect();
                 let explained = spectra.first().map_or_else(Vec::new, |spectrum| spectrum.lines());
                 let noise = noise::of(&rows, &centred, &explained);
@@ -80,7 +71,6 @@ impl Picture {
         );
         let (groups, maps, drift) = rest;
         let count = rows.value.len();
-        let rms = (rows.value.iter().map(|value| value * value).sum::<f64>() / count.max(1) as f64).sqrt();
-        Ok(Picture { rows: count, rms_arcsec: rms, noise, groups, maps, spectra, pulses, drift })
+        Ok(Picture { rows: count, rms_arcsec: rms(&rows.value), noise, groups, maps, spectra, pulses, drift })
     }
 }

@@ -3,7 +3,7 @@
 use flexspline_algebra::{Mat, cholesky};
 use serde::Serialize;
 
-/// What an order is tied to.
+/// The axis of an order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Wheel {
@@ -55,16 +55,16 @@ pub struct Line {
     pub amplitude_std: f64,
 }
 
-/// A constant and sines of these orders that fit `y` over `angle` (rad) best, all together; weights are those of the
-/// squares. `None` if the data cannot tell the orders apart, or are too few.
-pub fn harmonics(angle: &[f64], y: &[f64], weight: Option<&[f64]>, orders: &[f64]) -> Option<(f64, Vec<Line>)> {
+/// A constant and sines of these orders that fit `y` over `angle` (rad) best, all together.
+/// `None` if the data cannot tell the orders apart, or are too few.
+pub fn harmonics(angle: &[f64], y: &[f64], orders: &[f64]) -> Option<(f64, Vec<Line>)> {
     let width = 1 + 2 * orders.len();
     let n = angle.len().min(y.len());
-    let fit = Normal::of(&angle[..n], y, weight, orders)?;
+    let fit = Normal::of(&angle[..n], y, orders)?;
     let Normal { inverse, right, yy, .. } = &fit;
     let value: Vec<f64> = (0..width).map(|a| (0..width).map(|b| inverse[(a, b)] * right[b]).sum()).collect();
     let said: f64 = value.iter().zip(right).map(|(value, right)| value * right).sum();
-    // Variance of the noise in a row of weight one.
+    // Variance of the noise in a row.
     let variance = (yy - said).max(0.0) / (n - width) as f64;
     let unit = fit.amplitude_stds();
     let lines = orders
@@ -81,8 +81,8 @@ pub fn harmonics(angle: &[f64], y: &[f64], weight: Option<&[f64]>, orders: &[f64
 
 /// Standard deviation of each amplitude for white noise of one, over that of a sine that stands alone in evenly spread
 /// rows: how much the orders and the places of the rows confuse each other. `None` as for [`harmonics`].
-pub(super) fn confusion(angle: &[f64], weight: Option<&[f64]>, orders: &[f64]) -> Option<Vec<f64>> {
-    let fit = Normal::of(angle, &[], weight, orders)?;
+pub(super) fn confusion(angle: &[f64], orders: &[f64]) -> Option<Vec<f64>> {
+    let fit = Normal::of(angle, &[], orders)?;
     Some(fit.amplitude_stds().into_iter().map(|std| std * (angle.len() as f64 / 2.0).sqrt()).collect())
 }
 
@@ -95,7 +95,7 @@ struct Normal {
 
 impl Normal {
     /// No values stand for zeros.
-    fn of(angle: &[f64], y: &[f64], weight: Option<&[f64]>, orders: &[f64]) -> Option<Normal> {
+    fn of(angle: &[f64], y: &[f64], orders: &[f64]) -> Option<Normal> {
         let (width, n) = (1 + 2 * orders.len(), angle.len());
         if n <= width {
             return None;
@@ -103,31 +103,28 @@ impl Normal {
         let mut normal = vec![0.0; width * width];
         let mut right = vec![0.0; width];
         let mut row = vec![1.0; width];
-        let (mut yy, mut total) = (0.0, 0.0);
+        let mut yy = 0.0;
         for k in 0..n {
-            let w = weight.map_or(1.0, |weight| weight[k]);
             let y = y.get(k).copied().unwrap_or(0.0);
             for (place, order) in orders.iter().enumerate() {
                 (row[1 + 2 * place], row[2 + 2 * place]) = (order * angle[k]).sin_cos();
             }
             for a in 0..width {
-                let wa = w * row[a];
-                right[a] += wa * y;
+                right[a] += row[a] * y;
                 for b in 0..=a {
-                    normal[a * width + b] += wa * row[b];
+                    normal[a * width + b] += row[a] * row[b];
                 }
             }
-            yy += w * y * y;
-            total += w;
+            yy += y * y;
         }
         let matrix = Mat::from_fn(width, width, |a, b| normal[a.max(b) * width + a.min(b)]);
         let inverse = cholesky(matrix.as_ref()).ok()?.inverse();
         // A variance grown a million times by the other columns is no answer.
-        let sound = |a: usize| inverse[(a, a)].is_finite() && inverse[(a, a)] * total < 1e6;
+        let sound = |a: usize| inverse[(a, a)].is_finite() && inverse[(a, a)] * (n as f64) < 1e6;
         (0..width).all(sound).then_some(Normal { inverse, right, yy })
     }
 
-    /// Standard deviation of each amplitude for a noise of one in a row of weight one.
+    /// Standard deviation of each amplitude for a noise of one in each row.
     fn amplitude_stds(&self) -> Vec<f64> {
         let waves = (self.right.len() - 1) / 2;
         (0..waves)
@@ -152,7 +149,7 @@ mod tests {
         let angle: Vec<f64> = (0..400).map(|k| f64::from(k) * 0.11).collect();
         let y: Vec<f64> =
             angle.iter().map(|x| 3.0 + 5.0 * (2.0 * x + 0.7).sin() + 1.5 * (3.3 * x - 2.0).sin()).collect();
-        let (constant, lines) = harmonics(&angle, &y, None, &[2.0, 3.3]).unwrap();
+        let (constant, lines) = harmonics(&angle, &y, &[2.0, 3.3]).unwrap();
         assert!((constant - 3.0).abs() < 1e-9);
         assert!((lines[0].amplitude - 5.0).abs() < 1e-9 && (lines[0].phase_rad - 0.7).abs() < 1e-9);
         assert!((lines[1].amplitude - 1.5).abs() < 1e-9 && (lines[1].phase_rad + 2.0).abs() < 1e-9);
@@ -162,8 +159,8 @@ mod tests {
     #[test]
     fn orders_that_the_data_cannot_tell_apart_are_refused() {
         let angle: Vec<f64> = (0..400).map(|k| f64::from(k) * 1e-4).collect();
-        assert_eq!(harmonics(&angle, &angle, None, &[2.0, 2.0 * 94.0 / 95.0]), None);
-        assert_eq!(harmonics(&angle[..3], &angle[..3], None, &[2.0]), None);
+        assert_eq!(harmonics(&angle, &angle, &[2.0, 2.0 * 94.0 / 95.0]), None);
+        assert_eq!(harmonics(&angle[..3], &angle[..3], &[2.0]), None);
     }
 
     #[test]
@@ -179,7 +176,7 @@ mod tests {
                 .zip(std::iter::repeat_with(noise))
                 .map(|(y, n)| y + n)
                 .collect();
-            let (_, lines) = harmonics(&angle, &y, None, &[2.0]).unwrap();
+            let (_, lines) = harmonics(&angle, &y, &[2.0]).unwrap();
             sum += (lines[0].amplitude - 10.0).powi(2);
             said += lines[0].amplitude_std / 300.0;
         }

@@ -6,7 +6,7 @@ use flexspline_algebra::{Mat, cholesky};
 use serde::Serialize;
 
 use super::rows::{Axis, Rows};
-use crate::measurement::median_and_std;
+use crate::measurement::{least_and_most, median_and_std};
 
 /// Bins of a turn: 2 degrees.
 const BINS: usize = 180;
@@ -51,7 +51,7 @@ pub(super) fn find(rows: &Rows) -> Vec<Pulse> {
 
 fn on(rows: &Rows, axis: Axis) -> Option<Pulse> {
     let angle = rows.angle(axis);
-    let (low, high) = angle.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+    let (low, high) = least_and_most(angle.iter().copied());
     if high - low < FEWEST_TURNS * TAU {
         return None;
     }

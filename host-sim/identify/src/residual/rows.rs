@@ -5,11 +5,8 @@ use std::f64::consts::TAU;
 use serde::Serialize;
 use thiserror::Error;
 
-use crate::measurement::{Session, median_of, sampled};
+use crate::measurement::{Session, directions, median_of, sampled};
 use flexspline_base::units::ARCSEC_PER_RAD;
-
-/// The generator must turn back by so much, rad, before the direction has changed: its noise does not.
-const TURNED_BACK_RAD: f64 = 0.02;
 
 /// An angle that something may be tied to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -92,7 +89,7 @@ impl<'a> Rows<'a> {
             rows.value.extend(residual_rad[number].iter().map(|value| value * ARCSEC_PER_RAD));
             rows.generator.extend_from_slice(&session.generator_rad);
             rows.output.extend(session.output_rad(ratio));
-            rows.forward.extend(forward(&session.generator_rad));
+            rows.forward.extend(directions(&session.generator_rad).into_iter().map(|way| way > 0.0));
             rows.starts.push(rows.value.len());
         }
         Ok(rows)
@@ -155,25 +152,4 @@ impl<'a> Rows<'a> {
         }
         (!all.is_empty()).then_some(all)
     }
-}
-
-/// Whether an angle last moved forward by more than its noise.
-fn forward(angle: &[f64]) -> Vec<bool> {
-    let Some(&start) = angle.first() else { return Vec::new() };
-    let first = angle.iter().map(|a| a - start).find(|moved| moved.abs() > TURNED_BACK_RAD);
-    let mut now = first.is_none_or(|moved| moved > 0.0);
-    let mut farthest = start;
-    angle
-        .iter()
-        .map(|a| {
-            let ahead = if now { a - farthest } else { farthest - a };
-            if ahead > 0.0 {
-                farthest = *a;
-            } else if -ahead > TURNED_BACK_RAD {
-                now = !now;
-                farthest = *a;
-            }
-            now
-        })
-        .collect()
 }

@@ -1,7 +1,7 @@
 //! Spectrum of orders: least squares of a sine and a floating mean at each order (generalised Lomb-Scargle; Zechmeister
 //! and Kürster, Astron. Astrophys. 496, 577, 2009), for rows that are not evenly spaced in the angle.
 //!
-//! The sums over rows that it needs are Fourier sums of the weights and of the weighted values. Rows are shared out
+//! The sums over rows that it needs are Fourier sums of ones and of the values. Rows are shared out
 //! linearly between the cells of a fine grid, the sums are taken by FFT, and the sharing is undone by its transform,
 //! sinc². Lines are then found one by one, the strongest first, taken out, and at last fitted all together to the rows
 //! themselves.
@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use super::orders::{Line, NamedOrder, confusion, harmonics, named_orders};
 use super::rows::Axis;
-use crate::measurement::{median_of, quantile_of, sampled};
+use crate::measurement::{least_and_most, median_of, quantile_of, sampled};
 
 /// Cells in the shortest wave.
 const CELLS_PER_WAVE: f64 = 10.0;
@@ -29,31 +29,21 @@ const AROUND: f64 = 1.6;
 /// …and by this many resolution widths on each side at least.
 const AROUND_WIDTHS: f64 = 20.0;
 
-/// Waves in the record below which a line is not told from wander.
+/// Waves in the record below which a line cannot be distinguished from wander.
 const FEWEST_WAVES: f64 = 1.5;
 /// Surrogates that noise with a memory is judged by.
 const SURROGATES: u32 = 16;
 /// Lines that are no lines lower the noise left over by up to this factor.
 const TAKEN: f64 = 2.0;
 
-/// What is asked of a spectrum.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SpectrumSettings {
-    /// Highest order; lower if rows are too far apart for it.
-    pub highest_order: f64,
-    /// Chance that noise alone gives a line.
-    pub false_alarm: f64,
-    /// Lines that are reported at most.
-    pub most_peaks: usize,
-    /// Points of the curve that are reported at most; of those left out the highest stand.
-    pub most_points: usize,
-}
-
-impl Default for SpectrumSettings {
-    fn default() -> Self {
-        SpectrumSettings { highest_order: 32.0, false_alarm: 1e-3, most_peaks: 12, most_points: 2000 }
-    }
-}
+/// Highest order; lower if rows are too far apart for it.
+const HIGHEST_ORDER: f64 = 32.0;
+/// Chance that noise alone gives a line.
+const FALSE_ALARM: f64 = 1e-3;
+/// Lines that are reported at most.
+const MOST_PEAKS: usize = 12;
+/// Points of the curve that are reported at most: of each stretch the highest.
+const MOST_POINTS: usize = 2000;
 
 /// A line of the spectrum.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -74,7 +64,7 @@ pub struct Peak {
     pub phase_std_rad: f64,
     /// Chance that noise gives such a line anywhere in the spectrum.
     pub false_alarm: f64,
-    /// Orders of the drive within the resolution; more than one: they cannot be told apart.
+    /// Orders of the drive within the resolution; more than one: they cannot be distinguished.
     pub named: Vec<NamedOrder>,
 }
 
@@ -92,7 +82,7 @@ pub struct OrderSpectrum {
     pub axis: Axis,
     /// Turns of that angle from the least to the largest.
     pub turns: f64,
-    /// Orders closer than this, 1/turns, are not told apart.
+    /// Orders closer than this, 1/turns, are not distinguished.
     pub resolution: f64,
     /// Orders of the curve.
     pub orders: Vec<f64>,
@@ -139,20 +129,13 @@ pub(crate) fn sampled_twice(steps: &mut [f64], share: f64) -> f64 {
 
 /// The spectrum of `value` (arcsec) along `angle` (rad), an `axis` of a drive with this ratio. Orders below one wave in
 /// the record are left out; a record that turns too little for any order gives an empty spectrum.
-pub fn order_spectrum(
-    axis: Axis,
-    angle: &[f64],
-    value: &[f64],
-    weight: Option<&[f64]>,
-    ratio: f64,
-    settings: &SpectrumSettings,
-) -> OrderSpectrum {
-    let (low, high) = angle.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+pub fn order_spectrum(axis: Axis, angle: &[f64], value: &[f64], ratio: f64) -> OrderSpectrum {
+    let (low, high) = least_and_most(angle.iter().copied());
     let turns = if high > low { (high - low) / TAU } else { 0.0 };
     // Waves must be sampled twice, as rows follow each other or, to and fro, as they lie.
     let mut steps =
         sampled(&angle.windows(2).map(|x| (x[1] - x[0]).abs()).filter(|step| *step > 0.0).collect::<Vec<_>>());
-    let mut highest = settings.highest_order.min(sampled_twice(&mut steps, 0.75));
+    let mut highest = HIGHEST_ORDER.min(sampled_twice(&mut steps, 0.75));
     let resolution = 1.0 / turns.max(1e-300);
     let transform = |highest: f64| OVERSAMPLING * turns * highest * CELLS_PER_WAVE;
     if transform(highest) > LARGEST as f64 {
@@ -161,15 +144,15 @@ pub fn order_spectrum(
     if angle.len() < 16 || !turns.is_finite() || highest < 2.0 * resolution {
         return OrderSpectrum::empty(axis, turns);
     }
-    let grid = Grid::new(angle, weight, low, turns, highest, resolution);
+    let grid = Grid::new(angle, low, turns, highest, resolution);
     let mut left = value.to_vec();
     let mut scan = grid.scan(&left);
     let (orders, first) = (grid.orders(), scan.clone());
     let waves = (highest - resolution) * turns;
-    let times = (MAXIMA * waves.max(1.0) / settings.false_alarm).ln();
+    let times = (MAXIMA * waves.max(1.0) / FALSE_ALARM).ln();
     let mut found: Vec<f64> = Vec::new();
     let mut noise = background(&orders, &scan, resolution);
-    while found.len() < settings.most_peaks {
+    while found.len() < MOST_PEAKS {
         let free = |k: &usize| found.iter().all(|order| (orders[*k] - order).abs() > resolution);
         let Some(best) =
             (0..orders.len()).filter(free).max_by(|a, b| (scan[*a] / noise[*a]).total_cmp(&(scan[*b] / noise[*b])))
@@ -186,11 +169,11 @@ pub fn order_spectrum(
                 if crowded(&found, k, resolution) {
                     let others: Vec<f64> =
                         found.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, order)| *order).collect();
-                    found[k] = placed(angle, value, weight, &others, found[k], resolution);
+                    found[k] = placed(angle, value, &others, found[k], resolution);
                 }
             }
         }
-        let Some((constant, lines)) = harmonics(angle, value, weight, &found) else {
+        let Some((constant, lines)) = harmonics(angle, value, &found) else {
             found.pop();
             break;
         };
@@ -205,7 +188,7 @@ pub fn order_spectrum(
     if !found.is_empty() {
         let red = grid.remembering(&left);
         noise.iter_mut().zip(&red).for_each(|(noise, red)| *noise = noise.max(*red));
-        if let Some((_, lines)) = harmonics(angle, value, weight, &found) {
+        if let Some((_, lines)) = harmonics(angle, value, &found) {
             let stands = |line: &Line| {
                 let at = orders.partition_point(|order| *order < line.order).min(orders.len() - 1);
                 line.amplitude.powi(2) > noise[at] * times && line.order >= FEWEST_WAVES * resolution
@@ -213,8 +196,8 @@ pub fn order_spectrum(
             found = lines.iter().filter(|line| stands(line)).map(|line| line.order).collect();
         }
     }
-    let peaks = peaks(axis, angle, value, weight, ratio, &found, &orders, &noise, waves, resolution);
-    let (orders, amplitude_arcsec, level_arcsec) = thinned(&orders, &first, &noise, times, settings.most_points);
+    let peaks = peaks(axis, angle, value, ratio, &found, &orders, &noise, waves, resolution);
+    let (orders, amplitude_arcsec, level_arcsec) = thinned(&orders, &first, &noise, times);
     OrderSpectrum { axis, turns, resolution, orders, amplitude_arcsec, level_arcsec, peaks }
 }
 
@@ -223,7 +206,6 @@ fn peaks(
     axis: Axis,
     angle: &[f64],
     value: &[f64],
-    weight: Option<&[f64]>,
     ratio: f64,
     found: &[f64],
     orders: &[f64],
@@ -231,8 +213,8 @@ fn peaks(
     waves: f64,
     resolution: f64,
 ) -> Vec<Peak> {
-    let Some((_, lines)) = harmonics(angle, value, weight, found) else { return Vec::new() };
-    let confused = confusion(angle, weight, found).unwrap_or_else(|| vec![1.0; found.len()]);
+    let Some((_, lines)) = harmonics(angle, value, found) else { return Vec::new() };
+    let confused = confusion(angle, found).unwrap_or_else(|| vec![1.0; found.len()]);
     let turns_of_axis = axis.turns_per_generator_turn(ratio).abs();
     let mut peaks: Vec<Peak> = lines
         .iter()
@@ -266,7 +248,6 @@ fn peaks(
 /// Rows shared out on a grid, and what of the spectrum depends on the angles alone.
 struct Grid<'a> {
     angle: &'a [f64],
-    weight: Option<&'a [f64]>,
     low: f64,
     /// Cells in a turn.
     per_turn: f64,
@@ -274,28 +255,18 @@ struct Grid<'a> {
     length: usize,
     /// Places of the transform that are looked at.
     places: std::ops::RangeInclusive<usize>,
-    /// Sum of the weights.
-    total: f64,
-    /// Transform of the weights over their sum.
+    /// Transform of ones.
     window: Vec<Complex<f64>>,
 }
 
 impl<'a> Grid<'a> {
-    fn new(
-        angle: &'a [f64],
-        weight: Option<&'a [f64]>,
-        low: f64,
-        turns: f64,
-        highest: f64,
-        resolution: f64,
-    ) -> Grid<'a> {
+    fn new(angle: &'a [f64], low: f64, turns: f64, highest: f64, resolution: f64) -> Grid<'a> {
         let per_turn = highest * CELLS_PER_WAVE;
         let length =
             ((OVERSAMPLING * turns * per_turn).max(turns * per_turn + 2.0) as usize).next_power_of_two().max(64);
         let place = |order: f64| order * length as f64 / per_turn;
         let places = place(resolution).ceil() as usize..=(place(highest) as usize).min(length / 2 - 1);
-        let total = weight.map_or(angle.len() as f64, |weight| weight.iter().sum());
-        let mut grid = Grid { angle, weight, low, per_turn, length, places, total, window: Vec::new() };
+        let mut grid = Grid { angle, low, per_turn, length, places, window: Vec::new() };
         grid.window = grid.transform(|_| 1.0);
         grid
     }
@@ -304,14 +275,14 @@ impl<'a> Grid<'a> {
         self.places.clone().map(|place| place as f64 * self.per_turn / self.length as f64).collect()
     }
 
-    /// Weighted mean of `value * exp(-i order (angle - low))` at each place of the transform.
+    /// Mean of `value * exp(-i order (angle - low))` at each place of the transform.
     fn transform(&self, value: impl Fn(usize) -> f64) -> Vec<Complex<f64>> {
         let mut cells = vec![0.0; self.length];
         for row in 0..self.angle.len() {
             let at = (self.angle[row] - self.low) / TAU * self.per_turn;
             let cell = at as usize;
             let part = at - cell as f64;
-            let w = self.weight.map_or(1.0, |weight| weight[row]) * value(row) / self.total;
+            let w = value(row) / self.angle.len() as f64;
             cells[cell] += w * (1.0 - part);
             cells[cell + 1] += w * part;
         }
@@ -326,8 +297,7 @@ impl<'a> Grid<'a> {
 
     /// Squared amplitude of a sine that explains as much of the variance as the best one of each order.
     fn scan(&self, value: &[f64]) -> Vec<f64> {
-        let weight = |row: usize| self.weight.map_or(1.0, |weight| weight[row]);
-        let mean = value.iter().enumerate().map(|(row, y)| weight(row) * y).sum::<f64>() / self.total;
+        let mean = value.iter().sum::<f64>() / self.angle.len() as f64;
         let sums = self.transform(|row| value[row] - mean);
         self.places
             .clone()
@@ -456,17 +426,16 @@ fn crowded(orders: &[f64], k: usize, resolution: f64) -> bool {
 }
 
 /// The order near `order` that, fitted together with others, explains most.
-fn placed(angle: &[f64], value: &[f64], weight: Option<&[f64]>, others: &[f64], order: f64, resolution: f64) -> f64 {
+fn placed(angle: &[f64], value: &[f64], others: &[f64], order: f64, resolution: f64) -> f64 {
     let step = angle.len().div_ceil(2500).max(1);
     let x: Vec<f64> = angle.iter().copied().step_by(step).collect();
     let y: Vec<f64> = value.iter().copied().step_by(step).collect();
-    let w: Option<Vec<f64>> = weight.map(|weight| weight.iter().copied().step_by(step).collect());
     let explained = |order: f64| {
         let mut orders = others.to_vec();
         orders.push(order);
-        harmonics(&x, &y, w.as_deref(), &orders).map_or(f64::NEG_INFINITY, |(constant, lines)| {
+        harmonics(&x, &y, &orders).map_or(f64::NEG_INFINITY, |(constant, lines)| {
             let left = |k: usize| y[k] - constant - lines.iter().map(|line| line.at(x[k])).sum::<f64>();
-            -(0..x.len()).map(|k| w.as_ref().map_or(1.0, |w| w[k]) * left(k).powi(2)).sum::<f64>()
+            -(0..x.len()).map(|k| left(k).powi(2)).sum::<f64>()
         })
     };
     // Golden section within half a width; the summit is that wide.
@@ -488,9 +457,9 @@ fn placed(angle: &[f64], value: &[f64], weight: Option<&[f64]>, others: &[f64], 
     0.5 * (a + b)
 }
 
-/// The curve with at most so many points; of those left out the highest stand.
-fn thinned(orders: &[f64], scan: &[f64], noise: &[f64], times: f64, most: usize) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
-    let step = orders.len().div_ceil(most.max(1)).max(1);
+/// The curve with at most this many points; of those left out the highest stand.
+fn thinned(orders: &[f64], scan: &[f64], noise: &[f64], times: f64) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+    let step = orders.len().div_ceil(MOST_POINTS).max(1);
     let highest = (0..orders.len())
         .step_by(step)
         .filter_map(|from| (from..(from + step).min(orders.len())).max_by(|a, b| scan[*a].total_cmp(&scan[*b])));

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::rows::Rows;
-use crate::measurement::{MAD_TO_STD, median_and_std, median_of};
+use crate::measurement::{median_and_std, median_of};
 
 /// Stretches that a session is parted into at most.
 const STRETCHES: usize = 24;
@@ -75,9 +75,7 @@ fn change(stretches: &[Stretch]) -> (f64, f64) {
     }
     let slope = median_of(&mut slopes);
     let mut left: Vec<f64> = stretches.iter().map(|s| s.median_arcsec - slope * s.at).collect();
-    let middle = median_of(&mut left);
-    left.iter_mut().for_each(|value| *value = (*value - middle).abs());
-    let scatter = MAD_TO_STD * median_of(&mut left);
+    let (_, scatter) = median_and_std(&mut left);
     let n = stretches.len() as f64;
     // Points evenly spread over a span s have a variance of s²/12.
     (slope * span, scatter * (12.0 / n).sqrt())
