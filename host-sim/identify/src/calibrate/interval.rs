@@ -24,10 +24,10 @@ use crate::measurement::{median_of, white_noise};
 pub(super) const OF_95: f64 = 1.96;
 /// Rows are close if the highest order turns by no more than this from one to the next: an eighth of its wave.
 const CLOSE_RAD: f64 = PI / 4.0;
-/// Rows that hang together are looked for in stretches of these lengths, as long as there are so many stretches.
+/// Rows that hang together are looked for in stretches of these lengths, as long as there are this many stretches.
 const STRETCHES: [usize; 8] = [4, 8, 16, 32, 64, 128, 256, 512];
 const FEWEST_STRETCHES: usize = 20;
-/// A stretch over so many steps of a resolution averages them out. A guess.
+/// A stretch over this many steps of a resolution averages them out. A guess.
 const STEPS_OF_A_STRETCH: f64 = 4.0;
 
 /// Sums over rows that share a zero.
@@ -208,14 +208,7 @@ pub struct Node {
 pub(super) fn nodes_of(part: PartName, scales: &Scales) -> Vec<(&'static str, f64, Vec<f64>)> {
     let [low, high] = scales.torque_n_m;
     let [cold, warm] = scales.temperature_c;
-    let middle = State {
-        generator_rad: 0.0,
-        output_rad: 0.0,
-        torque_n_m: 0.0,
-        temperature_c: f64::midpoint(cold, warm),
-        way: 1.0,
-        ..State::default()
-    };
+    let middle = State { temperature_c: f64::midpoint(cold, warm), way: 1.0, ..State::default() };
     let turn = |count: usize| (0..count).map(move |k| TAU * k as f64 / count as f64);
     let states: Vec<(&'static str, f64, State)> = match part {
         PartName::WindUp => (0..9)

@@ -1,10 +1,10 @@
 //! What is known of a unit before it is measured: a nominal model, a table, or the ratio alone.
 
-use flexspline::{Direction, GeneratorAngle, Table};
+use flexspline::Table;
 
 use super::parts::State;
+use super::zero::steady;
 use crate::nominal::{Nominal, Spread};
-use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::drive::GeneratorKind;
 
 /// Temperature of a drive that is known by its ratio alone, °C.
@@ -46,16 +46,9 @@ impl<'a> Prior<'a> {
             spread: none,
             kernels: None,
         };
-        let hash = *blake3::hash(format!("ratio {ratio}").as_bytes()).as_bytes();
-        Prior {
-            nominal,
-            table: None,
-            drive: format!("ratio {ratio}"),
-            hash,
-            kind,
-            zero_rad: 0.0,
-            least_friction_n_m: 0.0,
-        }
+        let drive = format!("ratio {ratio}");
+        let hash = *blake3::hash(drive.as_bytes()).as_bytes();
+        Prior { nominal, table: None, drive, hash, kind, zero_rad: 0.0, least_friction_n_m: 0.0 }
     }
 
     /// A drive known by a table.
@@ -63,15 +56,8 @@ impl<'a> Prior<'a> {
     pub fn of_table(table: &'a Table<'a>, kind: GeneratorKind) -> Prior<'a> {
         let hash = *blake3::hash(table.image()).as_bytes();
         let drive = format!("table {}", table.id());
-        Prior {
-            nominal: Nominal::of_table(table),
-            table: Some(table),
-            drive,
-            hash,
-            kind,
-            zero_rad: 0.0,
-            least_friction_n_m: 0.0,
-        }
+        let nominal = Nominal::of_table(table);
+        Prior { nominal, table: Some(table), drive, hash, kind, zero_rad: 0.0, least_friction_n_m: 0.0 }
     }
 
     /// Whether nothing but the ratio is known.
@@ -117,12 +103,9 @@ impl<'a> Prior<'a> {
     /// Error in steady motion, arcsec.
     pub(super) fn steady_arcsec(&self, at: &State) -> f64 {
         if let Some(table) = self.table {
-            let direction = if at.way < 0.0 { Direction::Backward } else { Direction::Forward };
-            let generator = GeneratorAngle::from_rad(at.generator_rad - self.zero_rad).unwrap_or(GeneratorAngle::ZERO);
             // Too small a load leaves the flank to the direction, as none does.
-            let torque = if at.torque_n_m.abs() < self.least_friction_n_m { 0.0 } else { at.torque_n_m };
-            let error = table.steady_error_rad(generator, torque as f32, at.temperature_c as f32, direction);
-            return error.map_or(0.0, |rad| f64::from(rad) * ARCSEC_PER_RAD);
+            let torque_n_m = if at.torque_n_m.abs() < self.least_friction_n_m { 0.0 } else { at.torque_n_m };
+            return steady(table, &State { torque_n_m, ..*at }, self.zero_rad);
         }
         let n = &self.nominal;
         let loaded = at.torque_n_m != 0.0 && at.torque_n_m.abs() > self.friction_n_m();

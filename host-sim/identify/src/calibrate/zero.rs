@@ -12,6 +12,7 @@ use serde::Serialize;
 use super::GOLDEN;
 use super::parts::State;
 use super::rows::Rows;
+use flexspline_base::robust::dot;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// Rows that a phase is looked for with, and found with.
@@ -24,7 +25,7 @@ const STEPS_OF_A_PITCH: usize = 24;
 const CLOSELY: usize = 4;
 /// A table repeats if its error does to this, arcsec.
 const REPEATS_ARCSEC: f64 = 0.05;
-/// The phase is told if the best leaves so much less than the usual one, and than the best of those elsewhere, of the
+/// The phase is known if the best leaves so much less than the usual one, and than the best of those elsewhere, of the
 /// squares. Guesses.
 const LEAST_GAIN: f64 = 0.02;
 const LEAST_BEFORE_SECOND: f64 = 0.005;
@@ -76,7 +77,7 @@ pub struct OutputZero {
 }
 
 /// Error of the table in steady motion, arcsec.
-fn steady(table: &Table<'_>, at: &State, zero_rad: f64) -> f64 {
+pub(super) fn steady(table: &Table<'_>, at: &State, zero_rad: f64) -> f64 {
     let direction = if at.way < 0.0 { Direction::Backward } else { Direction::Forward };
     let generator = GeneratorAngle::from_rad(at.generator_rad - zero_rad).unwrap_or(GeneratorAngle::ZERO);
     let error = table.steady_error_rad(generator, at.torque_n_m as f32, at.temperature_c as f32, direction);
@@ -89,8 +90,6 @@ fn loaded(table: &Table<'_>, share: f32) -> State {
     let [least, most] = table.torque_range_n_m();
     let torque = if most.abs() >= least.abs() { most } else { least };
     State {
-        generator_rad: 0.0,
-        output_rad: 0.0,
         torque_n_m: f64::from(share * torque),
         temperature_c: f64::from(f32::midpoint(low, high)),
         way: 1.0,
@@ -202,10 +201,6 @@ impl<'a> Projected<'a> {
         let left = self.left(zero_rad);
         dot(&left, &left)
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Where the parabola through three neighbours is least, in steps from the middle.

@@ -12,9 +12,9 @@ use std::borrow::Cow;
 use flexspline::Table;
 
 use super::base::PlayLaw;
-use super::channels::{fault_throughout, floating, sample, waves};
+use super::channels::{FreeSpan, fault_throughout, project_out, sample, unit, waves};
 use super::flank_lag::behind;
-use super::linear::{Gram, Prior, dot, solve};
+use super::linear::{Gram, Prior, solve};
 use super::rows::{Rows, combined, rms};
 use super::torque_zero::{by_block, is_certain, sum};
 use crate::measurement::{FaultName, Measures, Recording, Treatment};
@@ -25,7 +25,7 @@ use flexspline_base::units::ARCSEC_PER_RAD;
 const SAMPLE: usize = 8000;
 /// Fewest rows.
 const LEAST_ROWS: usize = 1000;
-/// Times that are tried, s: from the shortest to the longest, each so many times the one before. *Guess*.
+/// Times that are tried, s: from the shortest to the longest, each this many times the one before. *Guess*.
 const TIMES_S: [f64; 2] = [5e-3, 0.2];
 const LONGER: f64 = 1.19;
 /// And no shorter than this many periods of the rows.
@@ -43,7 +43,7 @@ const LEAVE: f64 = 0.92;
 /// … of what is left where flanks alone are round, and where waves alone fade, … *Chosen* on the same: of flanks alone
 /// 0.996 and more without means, 0.95 and less with them.
 const LEAVE_OF_EACH: f64 = 0.97;
-/// … for certain, by so many standard deviations of the blocks' means. *Guess*.
+/// … for certain, by this many standard deviations of the blocks' means. *Guess*.
 const CERTAIN: f64 = 3.0;
 
 /// How a row comes about.
@@ -51,15 +51,15 @@ const CERTAIN: f64 = 3.0;
 enum Read {
     /// At one instant.
     AtOnce,
-    /// The mean over so many seconds.
+    /// The mean over this many seconds.
     Mean(f64),
     /// The same of what follows the load alone.
     MeanOfLoad(f64),
     /// The same of the waves of the generator alone.
     MeanOfWaves(f64),
-    /// At one instant; flanks take so many seconds.
+    /// At one instant; flanks take this many seconds.
     Lag(f64),
-    /// The torque by so many seconds later than the angles.
+    /// The torque by this many seconds later than the angles.
     Late(f64),
 }
 
@@ -68,7 +68,7 @@ struct Held<'a> {
     rows: &'a Rows,
     nominal: &'a Nominal,
     places: Vec<usize>,
-    free: Vec<Vec<f64>>,
+    free: FreeSpan,
     error: Vec<f64>,
     /// Sine and cosine of each harmonic at the places.
     waves: Vec<Vec<f64>>,
@@ -78,34 +78,21 @@ impl<'a> Held<'a> {
     fn new(rows: &'a Rows, nominal: &'a Nominal) -> Held<'a> {
         let places = sample(rows, SAMPLE);
         let waves_at_places = waves_at(rows, nominal, &places);
-        let mut held = Held { rows, nominal, places, free: Vec::new(), error: Vec::new(), waves: waves_at_places };
-        let smooth = Nominal { harmonics: Vec::new(), ..nominal.clone() };
-        let mut columns = floating(rows, &smooth, &held.places);
-        for order in [1.0, 2.0] {
-            columns.extend(waves(order, &rows.on_flexspline, &held.places));
-            columns.extend(waves(order, &rows.on_circular_spline, &held.places));
-        }
         // The form of a generator repeats from tooth to tooth, another one on each flank, and is as large as what means
         // take.
+        let mut mesh_by_side = Vec::new();
         if let Some(teeth) = nominal.teeth {
-            let mesh = waves(f64::from(teeth.flexspline), &rows.on_flexspline, &held.places);
+            let mesh = waves(f64::from(teeth.flexspline), &rows.on_flexspline, &places);
             let by_side = |wave: &Vec<f64>| -> Vec<f64> {
-                wave.iter().zip(&held.places).map(|(v, k)| v * rows.torque[*k].signum()).collect()
+                wave.iter().zip(&places).map(|(v, k)| v * rows.torque[*k].signum()).collect()
             };
-            columns.extend(mesh.iter().map(by_side).collect::<Vec<_>>());
-            columns.extend(mesh);
+            mesh_by_side = mesh.iter().map(by_side).collect();
+            mesh_by_side.extend(mesh);
         }
-        for column in columns {
-            held.free.extend(unit(&column, held.freed(column.clone())));
-        }
-        held.error = held.freed(held.places.iter().map(|k| rows.error[*k]).collect());
-        held
-    }
-
-    /// What the free columns leave of a column at the places.
-    fn freed(&self, mut column: Vec<f64>) -> Vec<f64> {
-        self.free.iter().for_each(|free| take_away(&mut column, free));
-        column
+        let smooth = Nominal { harmonics: Vec::new(), ..nominal.clone() };
+        let free = FreeSpan::of(rows, &smooth, &places, mesh_by_side);
+        let error = free.freed(places.iter().map(|k| rows.error[*k]).collect());
+        Held { rows, nominal, places, free, error, waves: waves_at_places }
     }
 
     /// What the model says, column by column at some rows, arcsec: the waves of its harmonics (`waves` at these rows),
@@ -151,10 +138,10 @@ impl<'a> Held<'a> {
         let mut left = self.error.clone();
         let mut before: Vec<Vec<f64>> = Vec::new();
         for column in self.columns(law, read, &self.places, &self.waves) {
-            let mut rest = self.freed(column.clone());
-            before.iter().for_each(|before| take_away(&mut rest, before));
+            let mut rest = self.free.freed(column.clone());
+            before.iter().for_each(|before| project_out(&mut rest, before));
             if let Some(rest) = unit(&column, rest) {
-                take_away(&mut left, &rest);
+                project_out(&mut left, &rest);
                 before.push(rest);
             }
         }
@@ -168,7 +155,7 @@ impl<'a> Held<'a> {
         let waves = waves_at(self.rows, self.nominal, &all);
         let [means, at_once] = [Read::Mean(s), Read::AtOnce].map(|read| self.columns(law, read, &all, &waves));
         let freed: Vec<Vec<f64>> =
-            means.iter().map(|column| self.freed(self.places.iter().map(|k| column[*k]).collect())).collect();
+            means.iter().map(|column| self.free.freed(self.places.iter().map(|k| column[*k]).collect())).collect();
         let views: Vec<&[f64]> = freed.iter().chain([&self.error]).map(Vec::as_slice).collect();
         // Each column is as large as the model says: its size is about one.
         let priors = vec![Prior { mean: 0.0, std: 1e2 }; freed.len()];
@@ -180,20 +167,6 @@ impl<'a> Held<'a> {
             .collect();
         Some(combined(self.rows.len(), apart.iter().map(Vec::as_slice), &sizes))
     }
-}
-
-/// A column of unit length, unless it is round-off of what it was.
-fn unit(was: &[f64], mut column: Vec<f64>) -> Option<Vec<f64>> {
-    let norm = column.iter().map(|v| v * v).sum::<f64>().sqrt();
-    let is_any = norm > 1e-6 * rms(was) * (was.len() as f64).sqrt();
-    column.iter_mut().for_each(|v| *v /= norm);
-    is_any.then_some(column)
-}
-
-/// Takes from a column what it holds of a unit column.
-fn take_away(column: &mut [f64], unit: &[f64]) {
-    let share = dot(column, unit);
-    column.iter_mut().zip(unit).for_each(|(left, v)| *left -= share * v);
 }
 
 /// sin x / x.
@@ -210,7 +183,7 @@ fn waves_at(rows: &Rows, nominal: &Nominal, at: &[usize]) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// Means over so many seconds about some rows, which are in order, between rows by straight lines, at the ends of a
+/// Means over this many seconds about some rows, which are in order, between rows by straight lines, at the ends of a
 /// session of what there is.
 fn averaged(rows: &Rows, values: &[f64], s: f64, at: &[usize]) -> Vec<f64> {
     let wide = s / rows.period;
@@ -234,7 +207,7 @@ fn averaged(rows: &Rows, values: &[f64], s: f64, at: &[usize]) -> Vec<f64> {
     at.iter().map(mean).collect()
 }
 
-/// The torque of so many seconds later, held at the ends of a session.
+/// The torque of this many seconds later, held at the ends of a session.
 fn shifted(rows: &Rows, s: f64) -> Vec<f64> {
     let by = s / rows.period;
     let mut shifted = vec![0.0; rows.len()];

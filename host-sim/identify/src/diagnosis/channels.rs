@@ -1,5 +1,5 @@
 //! Channels held against the nominal model before any cause is asked: does the torque wind this drive up, with its sign
-//! and in its unit; are both angles in degrees, which no ratio tells?
+//! and in its unit; are both angles in degrees, which no ratio shows?
 //!
 //! What floats freely in every drive is taken out first: zeros, the ratio, first orders, the nominal harmonics, speed
 //! and the direction of motion. What is left of the error is then held against what the nominal model says of the
@@ -8,11 +8,12 @@
 use flexspline::Table;
 
 use super::base::{PlayLaw, predicted_by_table};
-use super::linear::{Gram, Prior, solve};
+use super::linear::{self, Gram, Prior, solve};
 use super::noise::white_level;
 use super::rows::{Rows, quantile, rms, robust_std};
-use crate::measurement::{Fault, FaultName, Measures, Quantity, Recording, Session, Treatment};
+use crate::measurement::{Fault, FaultName, Quantity, Recording, Session, Treatment};
 use crate::nominal::{Harmonic, Nominal};
+use flexspline_base::robust::dot;
 
 /// Rows that are looked at, about, spread evenly.
 const SAMPLE: usize = 6000;
@@ -21,15 +22,15 @@ const MOST_ZEROS: usize = 24;
 /// Blocks of rows that are left out one at a time, to know how certain a share is: loads repeat, rows do not count one
 /// by one.
 const BLOCKS: usize = 24;
-/// What the torque should do is seen from so many times the white noise on, and from so many arcsec. *Guess*.
+/// What the torque should do is seen from this many times the white noise on, and from this many arcsec. *Guess*.
 const SEEN_OF_NOISE: f64 = 3.0;
 const SEEN_ARCSEC: f64 = 8.0;
-/// A share of it is certain from so many of its standard deviations on. *Source*: by convention.
+/// A share of it is certain from this many of its standard deviations on. *Source*: by convention.
 const CERTAIN: f64 = 5.0;
 /// Shares that a drive may show of its nominal wind-up and clearance: springs are softer and harder than catalogues
 /// say. *Guess*.
 const OF_THIS_DRIVE: [f64; 2] = [0.4, 2.5];
-/// No drive winds up by so many times what its model says: a torque that asks for that is in another unit. *Guess*.
+/// No drive winds up by this many times what its model says: a torque that asks for that is in another unit. *Guess*.
 const FAR_TOO_SOFT: f64 = 8.0;
 /// A torque in another unit leaves less than this share of what is left as it stands, and without any torque. *Guess*.
 const EXPLAINS: f64 = 0.5;
@@ -37,7 +38,7 @@ const EXPLAINS: f64 = 0.5;
 const EXPLAINS_TURNED: f64 = 0.8;
 /// A torque of which the error shows no more than this is none of this output. *Guess*.
 const NO_EFFECT: f64 = 0.3;
-/// Both angles may be in degrees where radians leave so many times the white noise and more. *Guess*.
+/// Both angles may be in degrees where radians leave this many times the white noise and more. *Guess*.
 const FAR_FROM_NOISE: f64 = 4.0;
 /// They are where degrees leave this at most. *Guess*.
 const TO_THE_NOISE: f64 = 4.0;
@@ -49,13 +50,13 @@ const AS_NOMINAL: f64 = 0.35;
 const HARMONICS_AS_NOMINAL: [f64; 2] = [0.25, 4.0];
 /// What is left is next to nothing below this share of what the load does. *Guess*.
 const NEXT_TO_NOTHING: f64 = 0.1;
-/// Residuals farther out than so many standard deviations are cut there.
+/// Residuals farther out than this many standard deviations are cut there.
 const CUT: f64 = 5.0;
 /// The deviation is that of the block which this share of all does not exceed. *Guess*: two of [`BLOCKS`] may be full
 /// of bad rows.
 const MOST_GOES_ON: f64 = 0.9;
 
-/// Rows that are used, about so many, spread evenly.
+/// Rows that are used, about this many, spread evenly.
 pub(super) fn sample(rows: &Rows, count: usize) -> Vec<usize> {
     let used: Vec<usize> = rows.sessions_used().flatten().collect();
     used.iter().copied().step_by(used.len().div_ceil(count).max(1)).collect()
@@ -81,6 +82,45 @@ pub(super) fn floating(rows: &Rows, nominal: &Nominal, places: &[usize]) -> Vec<
         columns.extend(waves(order, &rows.output, places));
     }
     columns
+}
+
+/// An orthonormal basis of the smooth part of an error at some places, and of what else may take part in it.
+pub(super) struct FreeSpan(Vec<Vec<f64>>);
+
+impl FreeSpan {
+    /// Of the columns of [`floating`], the first two orders of both wheels, and `further` columns.
+    pub(super) fn of(rows: &Rows, nominal: &Nominal, places: &[usize], further: Vec<Vec<f64>>) -> FreeSpan {
+        let mut columns = floating(rows, nominal, places);
+        for order in [1.0, 2.0] {
+            columns.extend(waves(order, &rows.on_flexspline, places));
+            columns.extend(waves(order, &rows.on_circular_spline, places));
+        }
+        let mut free = FreeSpan(Vec::new());
+        for column in columns.into_iter().chain(further) {
+            free.0.extend(unit(&column, free.freed(column.clone())));
+        }
+        free
+    }
+
+    /// The part of a column at the places that is orthogonal to the basis.
+    pub(super) fn freed(&self, mut column: Vec<f64>) -> Vec<f64> {
+        self.0.iter().for_each(|free| project_out(&mut column, free));
+        column
+    }
+}
+
+/// A column of unit length, unless it is round-off of the column that it `was`.
+pub(super) fn unit(was: &[f64], mut column: Vec<f64>) -> Option<Vec<f64>> {
+    let norm = column.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let is_any = norm > 1e-6 * rms(was) * (was.len() as f64).sqrt();
+    column.iter_mut().for_each(|v| *v /= norm);
+    is_any.then_some(column)
+}
+
+/// Takes from a column its projection on a unit column.
+pub(super) fn project_out(column: &mut [f64], unit: &[f64]) {
+    let share = linear::dot(column, unit);
+    column.iter_mut().zip(unit).for_each(|(left, v)| *left -= share * v);
 }
 
 /// A sample of the rows with what floats freely taken out of their error.
@@ -207,11 +247,10 @@ impl Told {
 
 /// How much of `column` is in `of`, with `other` free.
 fn share_beside(of: &[f64], column: &[f64], other: &[f64]) -> f64 {
-    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let (cc, oo, co) = (product(column, column), product(other, other), product(column, other));
+    let (cc, oo, co) = (dot(column, column), dot(other, other), dot(column, other));
     // Where the sign never changes there is one flank, which is a zero.
     let (share, rest) = if oo > 1e-9 { (co / oo, cc - co * co / oo) } else { (0.0, cc) };
-    (product(of, column) - share * product(of, other)) / rest.max(1e-12)
+    (dot(of, column) - share * dot(of, other)) / rest.max(1e-12)
 }
 
 /// Factors by which a torque may be wrong: the other shaft, by this ratio, or another unit; and turned round.
@@ -356,19 +395,15 @@ pub(super) fn fault_throughout(
     let time = |session: Option<&Session>, last: bool| {
         session.and_then(|s| s.time_s.as_ref()).and_then(|t| if last { t.last() } else { t.first() }).copied()
     };
+    let rows = recording.sessions.iter().map(|session| session.len() as u64).sum();
     Fault {
-        name,
         channel: Some(Quantity::Torque),
         time_s: time(first, false),
         until_s: time(last, true),
-        first_line: line(first, false),
-        last_line: line(last, true),
-        rows: recording.sessions.iter().map(|session| session.len() as u64).sum(),
         size_arcsec: Some(size_arcsec),
         treatment,
         what,
-        advice: name.advice(),
-        measures: Measures::default(),
+        ..Fault::new(name, [line(first, false), line(last, true)], rows)
     }
 }
 

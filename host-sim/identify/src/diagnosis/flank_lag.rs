@@ -5,8 +5,9 @@ use std::ops::Range;
 
 use super::base::{FLANK_S, WIDER};
 use super::rows::Rows;
+use flexspline_base::robust::dot;
 
-/// Each lag that is tried is so many times the one before, from [`FLANK_S`] on.
+/// Each lag that is tried is this many times the one before, from [`FLANK_S`] on.
 const LONGER: f64 = std::f64::consts::SQRT_2;
 /// The longest lag that a change of flank has, s. *Guess*: a load behind a clearance takes some milliseconds, and what
 /// takes longer swings.
@@ -34,7 +35,7 @@ pub(super) fn flank_lag(rows: &Rows, left: &[f64], flank: &[f64], half_backlash:
     };
     let (usual, _) = gain(FLANK_S);
     let longer = std::iter::successors(Some(FLANK_S * LONGER), |lag| Some(lag * LONGER));
-    // One beyond the longest is tried as well: where that tells the rows best, what they show is no lag of a flank.
+    // One beyond the longest is tried as well: where that explains the rows best, what they show is no lag of a flank.
     let tried = longer.take_while(|lag| *lag <= LONGEST_S * LONGER).map(|lag| (lag, gain(lag)));
     let Some((lag_s, (best, way))) = tried.max_by(|a, b| a.1.0.total_cmp(&b.1.0)) else { return FLANK_S };
     // From row to row the lag hardly moves: there the noise is.
@@ -97,10 +98,6 @@ fn straight(values: &[f64]) -> Vec<f64> {
     let along: f64 = values.iter().enumerate().map(|(k, value)| at(k) * value).sum();
     let slope = if square > 0.0 { along / square } else { 0.0 };
     values.iter().enumerate().map(|(k, value)| value - mean - slope * at(k)).collect()
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 #[cfg(test)]

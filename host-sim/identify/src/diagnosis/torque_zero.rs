@@ -3,14 +3,14 @@
 //! explain a part of that, and none of it is there.
 //!
 //! The torque less a constant is tried, from a share of the load on either side: what the model leaves of the error
-//! then, with everything free that floats in any drive, tells the constant. It counts where neither an unbalanced load
+//! then, with everything free that floats in any drive, gives the constant. It counts where neither an unbalanced load
 //! nor a drag, all of their sizes and phases free, leaves as little, nor a spring that is stiffer one way than the
 //! other: a spring that stiffens makes of a zero just about that.
 
 use flexspline::Table;
 
 use super::base::{PlayLaw, predicted_by_table};
-use super::channels::{fault_throughout, floating, sample, waves};
+use super::channels::{FreeSpan, fault_throughout, sample};
 use super::linear::dot;
 use super::rows::{Rows, mean, rms};
 use crate::measurement::{FaultName, Measures, Recording, Session, Treatment};
@@ -38,9 +38,9 @@ const HALVINGS: u32 = 5;
 // 6.1 standard deviations) against 24 unbalanced loads and drags of the examination (share below 6 %, below 1.9).
 /// A zero takes this share of what is left without it, …
 const LEAST_GAIN: f64 = 0.03;
-/// … by so many standard deviations of the blocks' means, …
+/// … by this many standard deviations of the blocks' means, …
 const CERTAIN: f64 = 2.5;
-/// … and is so many of its own from none.
+/// … and is this many of its own from none.
 const TOLD_FROM_NONE: f64 = 4.0;
 /// Unbalanced loads and drags leave no less than this share of what it leaves, …
 const RIVALS_LEAVE: f64 = 0.99;
@@ -68,8 +68,8 @@ struct Held<'a> {
     places: Vec<usize>,
     /// The nominal harmonics there, arcsec.
     harmonics: Vec<f64>,
-    /// What floats in any drive: columns of unit length, each free of those before it.
-    free: Vec<Vec<f64>>,
+    /// The smooth part of the error of any drive.
+    free: FreeSpan,
     /// Whether the spring may be stiffer one way than the other.
     by_sign: bool,
 }
@@ -83,10 +83,8 @@ impl<'a> Held<'a> {
         let turned =
             rows.output.iter().zip(&rows.orientation).map(|(out, housing)| (out + housing).sin_cos()).collect();
         let harmonics = places.iter().map(|k| nominal.harmonics_arcsec(rows.generator[*k])).collect();
-        let (law, free, by_sign) = (PlayLaw::Held, Vec::new(), false);
-        let mut held = Held { rows, nominal, table, law, turned, places, harmonics, free, by_sign };
-        held.float();
-        held
+        let free = FreeSpan::of(&rows, nominal, &places, Vec::new());
+        Held { rows, nominal, table, law: PlayLaw::Held, turned, places, harmonics, free, by_sign: false }
     }
 
     /// Takes the law of the play that leaves least at any of some zeros, and gives what each of them leaves by it,
@@ -109,35 +107,6 @@ impl<'a> Held<'a> {
         };
         self.law = law;
         (tries, without)
-    }
-
-    /// Makes the columns of what floats.
-    fn float(&mut self) {
-        let rows = &self.rows;
-        let mut columns = floating(rows, self.nominal, &self.places);
-        for order in [1.0, 2.0] {
-            columns.extend(waves(order, &rows.on_flexspline, &self.places));
-            columns.extend(waves(order, &rows.on_circular_spline, &self.places));
-        }
-        for column in columns {
-            let size = rms(&column);
-            let mut left = self.freed(column);
-            // What the others hold already is round-off.
-            let norm = left.iter().map(|v| v * v).sum::<f64>().sqrt();
-            if norm > 1e-6 * size * (left.len() as f64).sqrt() {
-                left.iter_mut().for_each(|v| *v /= norm);
-                self.free.push(left);
-            }
-        }
-    }
-
-    /// What the free columns leave of a column.
-    fn freed(&self, mut column: Vec<f64>) -> Vec<f64> {
-        for free in &self.free {
-            let share = dot(free, &column);
-            column.iter_mut().zip(free).for_each(|(left, v)| *left -= share * v);
-        }
-        column
     }
 
     /// What is left of the error at the places with a load beside the torque, arcsec.
@@ -166,11 +135,11 @@ impl<'a> Held<'a> {
         };
         let left = self.places.iter().zip(&predicted).map(|(k, predicted)| rows.error[*k] - predicted).collect();
         // Stiffness and backlash float as well.
-        let mut left = self.freed(left);
+        let mut left = self.free.freed(left);
         let mut before: Vec<Vec<f64>> = Vec::new();
         let by_sign = self.by_sign.then(|| wind_up.iter().map(|arcsec| arcsec.abs()).collect());
         for column in [wind_up, flank].into_iter().chain(by_sign) {
-            let mut column = self.freed(column);
+            let mut column = self.free.freed(column);
             before.iter().for_each(|before| take_away(&mut column, before));
             take_away(&mut left, &column);
             before.push(column);
@@ -244,7 +213,7 @@ pub(super) fn sum(values: &[f64]) -> f64 {
     values.iter().sum()
 }
 
-/// Whether less is left in the second than in the first, by so many standard deviations of the blocks' mean.
+/// Whether less is left in the second than in the first, by this many standard deviations of the blocks' mean.
 pub(super) fn is_certain(first: &[f64], second: &[f64], stds: f64) -> bool {
     let gains: Vec<f64> = first.iter().zip(second).map(|(first, second)| first - second).collect();
     let (gain, blocks) = (mean(&gains), gains.len() as f64);
@@ -266,13 +235,13 @@ fn least(tries: &[Try], without: Option<usize>) -> f64 {
 struct Zero {
     n_m: f64,
     std: f64,
-    /// What it does to the error, arcsec rms.
+    /// Its effect on the error, arcsec rms.
     size_arcsec: f64,
     /// Whether an unbalanced load would do the same in these rows.
     may_be_unbalance: bool,
 }
 
-/// The zero of the torque, where it is told from none and from loads that follow the output or the motion.
+/// The zero of the torque, where it is distinguished from none and from loads that follow the output or the motion.
 fn find(sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> Option<Zero> {
     let rows = Rows::new(sessions, nominal);
     let load = rows.load_scale();
@@ -371,7 +340,7 @@ mod tests {
     use flexspline_base::units::ARCSEC_PER_RAD;
 
     /// A drive as its catalogue says that turns to and fro by so much from row to row under a load that swings, 2
-    /// arcsec of noise; with `unseen` N·m (of output angle and direction) beside what the column of torque tells.
+    /// arcsec of noise; with `unseen` N·m (of output angle and direction) beside what the column of torque says.
     fn recording(nominal: &Nominal, turned: f64, unseen: impl Fn(f64, f64) -> f64) -> Recording {
         with_spring(nominal, turned, unseen, |load| nominal.wind_up_arcsec(load))
     }

@@ -11,6 +11,7 @@ use super::rows::combined;
 use super::select::Selected;
 use super::thresholds::verdict::{INTERVAL, KNOWN_BESIDE};
 use crate::causes::{Kind, ParameterName};
+use flexspline_base::robust;
 
 /// Step of numerical derivatives, standard deviations.
 const STEP: f64 = 0.1;
@@ -18,7 +19,7 @@ const STEP: f64 = 0.1;
 /// A parameter is no longer determined where its standard deviation grows by this factor.
 const UNDETERMINED: f64 = 100.0;
 
-/// A block tells something of a parameter where leaving it out adds this share to the variance; a smaller one is
+/// A block says something of a parameter where leaving it out adds this share to the variance; a smaller one is
 /// round-off.
 const LEAST_TOLD: f64 = 1e-6;
 
@@ -75,7 +76,7 @@ pub struct Known {
     pub told_from_zero: f64,
 }
 
-/// Sizes by which causes are told; what else they have are places, shapes and the same in other units. The gain of a
+/// Sizes by which causes are judged; what else they have are places, shapes and the same in other units. The gain of a
 /// resonance is none: it trades with the damping, while what it adds is known.
 const SIZES: [ParameterName; 13] = [
     ParameterName::AmplitudeArcsec,
@@ -92,7 +93,7 @@ const SIZES: [ParameterName; 13] = [
     ParameterName::StiffnessRelativePerK,
     ParameterName::TorqueNM,
 ];
-/// A size that is known exactly counts as so many times its standard deviation.
+/// A size that is known exactly counts as this many times its standard deviation.
 const EXACTLY: f64 = 1e3;
 
 /// How far the coefficients and moves of one term may be off.
@@ -116,8 +117,8 @@ impl Spread {
     /// The same where the noise is `beyond` times what it was taken for. What blocks of the data tell of themselves
     /// holds as it is: they have what is beyond noise in them.
     fn beyond_noise(&self, form: &[f64], beyond: f64) -> f64 {
-        let laplace =
-            trace(form, &self.covariances[0]) + (beyond * beyond - 1.0) * trace(form, &self.by_noise).max(0.0);
+        let laplace = robust::dot(form, &self.covariances[0])
+            + (beyond * beyond - 1.0) * robust::dot(form, &self.by_noise).max(0.0);
         self.of(form).max(laplace)
     }
 
@@ -129,7 +130,7 @@ impl Spread {
 
     /// Variances: within the blocks, by the jackknife, and what Laplace's lacks.
     fn parts(&self, form: &[f64]) -> (f64, f64, f64) {
-        let trace = |covariance: &[f64]| trace(form, covariance);
+        let trace = |covariance: &[f64]| robust::dot(form, covariance);
         let [laplace, stretched] = &self.covariances;
         let within = trace(laplace).max(trace(stretched)).max(0.0);
         // A session without which the rest says nothing of it, such as the one after a jump, is no repetition.
@@ -142,7 +143,7 @@ impl Spread {
         let from_mean = |shift: &[f64]| -> Vec<f64> { shift.iter().zip(&mean).map(|(s, m)| s - m).collect() };
         let shifted: f64 = shifts.iter().map(|shift| trace(&outer(&from_mean(shift)))).sum();
         let jackknife = (count - 1.0) / count * shifted;
-        // Where one block tells more than the others, the rest is less sure without it, and may shift by as much as
+        // Where one block says more than the others, the rest is less sure without it, and may shift by as much as
         // that. What the blocks shift against what they may is what Laplace's variance lacks. Of blocks that were
         // driven alike it comes to the jackknife.
         let against: Vec<[f64; 2]> = repeated()
@@ -154,13 +155,8 @@ impl Spread {
     }
 }
 
-/// Variance of a quadratic form, row by row, under a covariance.
-fn trace(form: &[f64], covariance: &[f64]) -> f64 {
-    form.iter().zip(covariance).map(|(a, b)| a * b).sum()
-}
-
 /// By what factor squares of shifts are larger than they may be, from both of each block. The mean of the blocks' own
-/// factors: each is one draw of chance, and in the sums a block that tells most is the only one, which by chance may
+/// factors: each is one draw of chance, and in the sums a block that says most is the only one, which by chance may
 /// shift by next to nothing. That of the sums where it is larger.
 fn beyond_what_may(against: &[[f64; 2]]) -> f64 {
     let all = |of: usize| against.iter().map(|block| block[of]).sum::<f64>();
@@ -227,7 +223,7 @@ pub fn known(problem: &Problem<'_>, selected: &Selected<'_>, beyond: f64) -> Vec
         let products: Vec<f64> = index.iter().flat_map(|i| index.iter().map(|j| fit.gram.at(*i, *j))).collect();
         let mut adds = coefficients.to_vec();
         adds.resize(index.len(), 0.0);
-        let adds: f64 = outer(&adds).iter().zip(&products).map(|(a, b)| a * b).sum();
+        let adds: f64 = robust::dot(&outer(&adds), &products);
         let (parameters, size_told) = parameters(problem, term, coefficients, &spread, beyond);
         let times = |variance: f64| (adds / variance.max(1e-30)).sqrt();
         let all_told = times(spread.beyond_noise(&products, beyond));

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use super::geometry::TURNED_BACK;
-use super::{Coefficients, Excitation, Law, Role, Shape, Shaped, by_row, main, main_about};
+use super::{Coefficients, Column, Excitation, Law, Role, Shape, Shaped, by_row, main, main_about, of_both};
 use crate::causes::{CauseName, ParameterName as Name};
 use crate::diagnosis::base::PlayLaw;
 use crate::diagnosis::rows::quantile;
@@ -60,8 +60,17 @@ fn moment_that_turns_flanks(
     [best[0], best[1].rem_euclid(2.0 * PI)]
 }
 
+/// The columns of a load that the torque does not hold: its wind-up and the play that it moves by this law.
+pub(super) fn columns_of_load(on: &Excitation<'_>, added: &[f64], law: PlayLaw) -> Vec<Column> {
+    let torque = of_both(&on.rows.torque, added, |torque, added| torque + added);
+    let flank = law.flanks(on.rows, &torque, on.nominal);
+    let play = by_row(on, |k| on.base.half_backlash * (flank[k] - on.base.flank[k]));
+    let together = by_row(on, |k| on.wound_up(k, torque[k]) + play[k]);
+    vec![main_about(1.0, together, 0.02).called(Role::SIZE), main(play, 0.5)]
+}
+
 /// An unbalanced load, m g l sin of the output angle against gravity: adds to the torque, so it winds the drive up and
-/// moves the play. On a drive without load, `on_sample` tells where to begin.
+/// moves the play. On a drive without load, `on_sample` says where to begin.
 fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>, on_sample: &Excitation<'_>) -> Law {
     let scale = on.plausible_load();
     // Next to no moment of a law of another play is that play alone; with the play that is there it adds next to
@@ -74,54 +83,44 @@ fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>, on_sample: &Exc
     let of = |shape: Shaped<'_>| [shape.of(Name::TorqueNM), shape.of(Name::PhaseRad)];
     // Where nothing else loads the drive, its moment decides which flank carries, and no linear law is near.
     let by_flank = on.unloaded().then(|| moment_that_turns_flanks(on_sample, play, scale, load));
-    let mut law = Law::new(CauseName::GravityTorque, move |on, shape| {
-        let rows = on.rows;
-        let added = load(on, of(shape));
-        let torque: Vec<f64> = (0..rows.len()).map(|k| rows.torque[k] + added[k]).collect();
-        let flank = play.flanks(rows, &torque, on.nominal);
-        let half = on.base.half_backlash;
-        let wind = by_row(on, |k| on.wound_up(k, torque[k]));
-        let play = by_row(on, |k| half * (flank[k] - on.base.flank[k]));
-        let together = by_row(on, |k| wind[k] + play[k]);
-        vec![main_about(1.0, together, 0.02).called(Role::SIZE), main(play, 0.5)]
-    })
-    .shapes([
-        Shape::by_factors(Name::TorqueNM, 0.75 * least * scale, 2.0 * scale, 1),
-        Shape::angle(Name::PhaseRad, 2.0 * PI, 1),
-    ])
-    .parameters_by(|_, shape, c| {
-        let torque_n_m = shape.of(Name::TorqueNM) * c.of(Role::SIZE);
-        vec![(Name::TorqueNM, torque_n_m), (Name::PhaseRad, shape.of(Name::PhaseRad))]
-    })
-    .physical_if(move |shape, _| shape.of(Name::TorqueNM) > least * scale)
-    .evaluated_on_averages()
-    .adds_load(move |on, shape| load(on, of(shape)))
-    .led_by(
-        move |on, _| {
-            let rows = on.rows;
-            // Wind-up for 1 N·m more, at the load that is there.
-            let slope = |k: usize| {
-                let more = on.nominal.wind_up_arcsec(rows.torque[k] + 0.5);
-                on.softer * (more - on.nominal.wind_up_arcsec(rows.torque[k] - 0.5))
-            };
-            let at = |k: usize| rows.output[k] + sign * rows.orientation[k];
-            vec![
-                main(by_row(on, |k| slope(k) * at(k).sin()), 0.3 * scale).called(SINE),
-                main(by_row(on, |k| slope(k) * at(k).cos()), 0.3 * scale).called(COSINE),
-            ]
-        },
-        move |shape, c| {
-            // a sin(x) + b cos(x) = m sin(x + phase).
-            let (sin, cos) = (c.of(SINE), c.of(COSINE));
-            let by_wind_up = [sin.hypot(cos), cos.atan2(sin).rem_euclid(2.0 * PI)];
-            [by_wind_up]
-                .into_iter()
-                .chain(by_flank)
-                .map(|[moment, phase]| shape.with(&[(Name::TorqueNM, moment), (Name::PhaseRad, phase)]))
-                .collect()
-        },
-    )
-    .led_under_load_alone();
+    let mut law = Law::new(CauseName::GravityTorque, move |on, shape| columns_of_load(on, &load(on, of(shape)), play))
+        .shapes([
+            Shape::by_factors(Name::TorqueNM, 0.75 * least * scale, 2.0 * scale, 1),
+            Shape::angle(Name::PhaseRad, 2.0 * PI, 1),
+        ])
+        .parameters_by(|_, shape, c| {
+            let torque_n_m = shape.of(Name::TorqueNM) * c.of(Role::SIZE);
+            vec![(Name::TorqueNM, torque_n_m), (Name::PhaseRad, shape.of(Name::PhaseRad))]
+        })
+        .physical_if(move |shape, _| shape.of(Name::TorqueNM) > least * scale)
+        .evaluated_on_averages()
+        .adds_load(move |on, shape| load(on, of(shape)))
+        .led_by(
+            move |on, _| {
+                let rows = on.rows;
+                // Wind-up for 1 N·m more, at the load that is there.
+                let slope = |k: usize| {
+                    let more = on.nominal.wind_up_arcsec(rows.torque[k] + 0.5);
+                    on.softer * (more - on.nominal.wind_up_arcsec(rows.torque[k] - 0.5))
+                };
+                let at = |k: usize| rows.output[k] + sign * rows.orientation[k];
+                vec![
+                    main(by_row(on, |k| slope(k) * at(k).sin()), 0.3 * scale).called(SINE),
+                    main(by_row(on, |k| slope(k) * at(k).cos()), 0.3 * scale).called(COSINE),
+                ]
+            },
+            move |shape, c| {
+                // a sin(x) + b cos(x) = m sin(x + phase).
+                let (sin, cos) = (c.of(SINE), c.of(COSINE));
+                let by_wind_up = [sin.hypot(cos), cos.atan2(sin).rem_euclid(2.0 * PI)];
+                [by_wind_up]
+                    .into_iter()
+                    .chain(by_flank)
+                    .map(|[moment, phase]| shape.with(&[(Name::TorqueNM, moment), (Name::PhaseRad, phase)]))
+                    .collect()
+            },
+        )
+        .led_under_load_alone();
     law.acts.in_crossings = true;
     law
 }
@@ -150,7 +149,7 @@ const ON_THE_BOUND: f64 = 0.8;
 const SLIDING: f64 = 0.3;
 
 /// Speeds that are apart by this share make the waves of the drive sweep over frequencies; a load that changes by this
-/// share in so many seconds is a step. Guesses.
+/// share in this many seconds is a step. Guesses.
 const SPEEDS_APART: f64 = 0.2;
 const STEP_SHARE: f64 = 0.1;
 const STEP_S: f64 = 0.1;

@@ -5,69 +5,56 @@ use std::f64::consts::TAU;
 use super::geometry::{Angle, waves};
 use super::{Column, Excitation, Law, Named, Role, by_row, main, nuisance, polar};
 use crate::causes::{CauseName, ParameterName as Name};
+use crate::measurement::rates;
 
-/// The first order of an encoder.
+/// The line of an encoder.
 const WAVE: Role = Role("wave");
-
-fn encoder(cause: CauseName, angle: Angle, per_ratio: bool) -> Law {
-    Law::new(cause, move |on, _| {
-        let first = waves(on, angle, 1.0).map(|wave| main(wave, 30.0).called(WAVE));
-        first.into_iter().chain(waves(on, angle, 2.0).map(|wave| nuisance(wave, 0.15))).collect()
-    })
-    .parameters_by(move |on, _, c| {
-        // c cos(x) + s sin(x) = A sin(x + phase).
-        let [cos, sin] = c.wave(WAVE);
-        let (amplitude, phase) = polar(sin, cos);
-        let mut named = vec![(Name::AmplitudeArcsec, amplitude), (Name::PhaseRad, phase)];
-        if per_ratio {
-            named.push((Name::GeneratorAmplitudeArcsec, amplitude * on.nominal.ratio.abs()));
-        }
-        named
-    })
-}
 
 /// Share of a second order that its own first overtone may have, and a subdivision of its own: signals of unlike size
 /// make little of it. Guess.
 const OVERTONE: f64 = 0.15;
 
-/// A line of an encoder at `order` waves in a turn of it, with a little of its overtone. At the generator there is
-/// none: overtones are what tells a wheel.
-fn waves_of(
+/// A line at `order` waves in a turn of the encoder of the output or of the generator, arcsec of this `std`, with a
+/// little of its overtone or without. Its parameters are amplitude and phase, and `further` ones.
+fn encoder(
     cause: CauseName,
-    angle: Angle,
-    order: f64,
+    of_output: bool,
+    (order, std): (f64, f64),
     has_overtone: bool,
-    parameters: impl Fn(&Excitation<'_>, f64, f64) -> Vec<Named> + Send + Sync + 'static,
+    further: impl Fn() -> Vec<Named> + Send + Sync + 'static,
 ) -> Law {
+    let angle = if of_output { Angle::Output } else { Angle::Generator };
     Law::new(cause, move |on, _| {
-        let mut columns: Vec<Column> = waves(on, angle, order).map(|wave| main(wave, 15.0).called(WAVE)).into();
+        let mut columns: Vec<Column> = waves(on, angle, order).map(|wave| main(wave, std).called(WAVE)).into();
         if has_overtone {
             columns.extend(waves(on, angle, 2.0 * order).map(|wave| nuisance(wave, OVERTONE)));
         }
         columns
     })
     .parameters_by(move |on, _, c| {
+        // c cos(x) + s sin(x) = A sin(x + phase).
         let [cos, sin] = c.wave(WAVE);
         let (amplitude, phase) = polar(sin, cos);
-        parameters(on, amplitude, phase)
+        let mut named = vec![(Name::AmplitudeArcsec, amplitude), (Name::PhaseRad, phase)];
+        if !of_output {
+            named.push((Name::GeneratorAmplitudeArcsec, amplitude * on.nominal.ratio.abs()));
+        }
+        named.extend(further());
+        named
     })
 }
 
+/// The first order of an encoder: a disc off its axis.
+fn encoder_eccentricity() -> [Law; 2] {
+    [(CauseName::OutputEncoderEccentricity, true), (CauseName::GeneratorEncoderEccentricity, false)]
+        .map(|(cause, of_output)| encoder(cause, of_output, (1.0, 30.0), true, Vec::new))
+}
+
 /// The second order of an encoder: a disc or a magnet that is tilted, a ring that is not flat, two signals of unlike
-/// size in a magnetic one.
+/// size in a magnetic one. That of the generator has no overtone: overtones distinguish a wheel.
 fn encoder_tilt() -> [Law; 2] {
-    let at_output =
-        |_: &Excitation<'_>, amplitude, phase| vec![(Name::AmplitudeArcsec, amplitude), (Name::PhaseRad, phase)];
-    let at_generator = |on: &Excitation<'_>, amplitude: f64, phase| {
-        let generator_arcsec = amplitude * on.nominal.ratio.abs();
-        vec![
-            (Name::AmplitudeArcsec, amplitude),
-            (Name::GeneratorAmplitudeArcsec, generator_arcsec),
-            (Name::PhaseRad, phase),
-        ]
-    };
-    let of_generator = waves_of(CauseName::GeneratorEncoderTilt, Angle::Generator, 2.0, false, at_generator);
-    let of_output = waves_of(CauseName::OutputEncoderTilt, Angle::Output, 2.0, true, at_output);
+    let of_output = encoder(CauseName::OutputEncoderTilt, true, (2.0, 15.0), true, Vec::new);
+    let of_generator = encoder(CauseName::GeneratorEncoderTilt, false, (2.0, 15.0), false, Vec::new);
     [of_output.kin_of_shapes(), of_generator.after_wheels()]
 }
 
@@ -82,14 +69,8 @@ pub(super) fn is_subdivision(order: f64) -> bool {
 
 /// An encoder that divides the periods of its signals unevenly.
 fn encoder_subdivision(of_output: bool, order: f64) -> Law {
-    let angle = if of_output { Angle::Output } else { Angle::Generator };
-    let law = waves_of(CauseName::EncoderSubdivision, angle, order, of_output, move |on, amplitude, phase| {
-        let at_generator = (Name::GeneratorAmplitudeArcsec, amplitude * on.nominal.ratio.abs());
-        [(Name::AmplitudeArcsec, amplitude)]
-            .into_iter()
-            .chain((!of_output).then_some(at_generator))
-            .chain([(Name::Harmonic, order), (Name::Encoder, f64::from(u8::from(of_output))), (Name::PhaseRad, phase)])
-            .collect()
+    let law = encoder(CauseName::EncoderSubdivision, of_output, (order, 15.0), of_output, move || {
+        vec![(Name::Harmonic, order), (Name::Encoder, f64::from(u8::from(of_output)))]
     });
     let law = law.variant(format!("{} {order}", if of_output { "output" } else { "generator" }));
     if of_output { law } else { law.after_wheels() }
@@ -104,17 +85,9 @@ fn on_its_flank(on: &Excitation<'_>) -> Vec<f64> {
     on.base.prediction.iter().zip(&on.base.flank).map(of).collect()
 }
 
-/// Change in a second of a column, row by row; none over a break.
+/// Change of values per second, row by row, from the neighbours in a session.
 pub(super) fn rate(on: &Excitation<'_>, values: &[f64]) -> Vec<f64> {
-    let mut rates = vec![0.0; values.len()];
-    for session in &on.rows.sessions {
-        for k in session.clone() {
-            let (from, to) = (k.max(session.start + 1) - 1, (k + 1).min(session.end - 1));
-            let passed = on.rows.time[to] - on.rows.time[from];
-            rates[k] = if passed > 0.0 { (values[to] - values[from]) / passed } else { 0.0 };
-        }
-    }
-    rates
+    rates(&on.rows.sessions, &on.rows.time, values)
 }
 
 /// The output of a row is older than its generator.
@@ -165,15 +138,12 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
             .filter(move |order| seen(of_output, *order))
             .map(move |order| encoder_subdivision(of_output, order))
     });
-    [
-        encoder(CauseName::OutputEncoderEccentricity, Angle::Output, false),
-        encoder(CauseName::GeneratorEncoderEccentricity, Angle::Generator, true),
-        ratio_error(),
-        sensor_latency(),
-    ]
-    .into_iter()
-    .chain(encoder_tilt())
-    .chain(subdivisions)
-    .map(Law::exact)
-    .collect()
+    // The order of the library: eccentric encoders, ratio, latency, then the further lines of encoders.
+    encoder_eccentricity()
+        .into_iter()
+        .chain([ratio_error(), sensor_latency()])
+        .chain(encoder_tilt())
+        .chain(subdivisions)
+        .map(Law::exact)
+        .collect()
 }

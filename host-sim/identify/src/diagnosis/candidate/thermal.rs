@@ -1,5 +1,6 @@
 //! What the temperature does.
 
+use super::dynamic::columns_of_load;
 use super::{Excitation, Law, Named, Role, Shape, Shaped, by_row, lagged_through, main, main_about, nuisance};
 use crate::causes::{CauseName, ParameterName as Name};
 
@@ -182,30 +183,23 @@ fn lubricant_load(on: &Excitation<'_>) -> Law {
         let drag_n_m = shape.of(Name::DragNM);
         Drag::of(shape).share(on).into_iter().map(|share| drag_n_m * share).collect()
     };
-    let mut law = Law::new(CauseName::LubricantViscosity, move |on, shape| {
-        let rows = on.rows;
-        let added = load(on, shape);
-        let torque: Vec<f64> = (0..rows.len()).map(|k| rows.torque[k] + added[k]).collect();
-        let flank = on.base.law.flanks(rows, &torque, on.nominal);
-        let play = by_row(on, |k| on.base.half_backlash * (flank[k] - on.base.flank[k]));
-        let together = by_row(on, |k| on.wound_up(k, torque[k]) + play[k]);
-        vec![main_about(1.0, together, 0.02).called(Role::SIZE), main(play, 0.5)]
-    })
-    .shapes([
-        Shape::by_factors(Name::DragNM, 0.001 * scale, 1.0 * scale, 1),
-        Shape::evenly(Name::SpeedExponent, 0.25, 1.05, 2),
-        Shape::by_factors(Name::PerK, 0.008, 0.12, 3),
-        Shape::evenly(Name::BendPerK, 0.0, MOST_BEND, 1),
-    ])
-    .parameters_by(|_, shape, c| Drag::of(shape).named(shape.of(Name::DragNM) * c.of(Role::SIZE)))
-    .physical_if(|shape, c| c.of(Role::SIZE) > 0.0 && Drag::of(shape).is_viscous())
-    .evaluated_on_averages()
-    .adds_load(load)
-    .led_by(
-        |on, shape| vec![main(Drag::of(shape).wind_up(on), 10.0).called(Role::SIZE)],
-        |shape, c| vec![shape.with(&[(Name::DragNM, c.of(Role::SIZE).max(0.0))])],
-    )
-    .led_under_load_alone();
+    let mut law =
+        Law::new(CauseName::LubricantViscosity, move |on, shape| columns_of_load(on, &load(on, shape), on.base.law))
+            .shapes([
+                Shape::by_factors(Name::DragNM, 0.001 * scale, 1.0 * scale, 1),
+                Shape::evenly(Name::SpeedExponent, 0.25, 1.05, 2),
+                Shape::by_factors(Name::PerK, 0.008, 0.12, 3),
+                Shape::evenly(Name::BendPerK, 0.0, MOST_BEND, 1),
+            ])
+            .parameters_by(|_, shape, c| Drag::of(shape).named(shape.of(Name::DragNM) * c.of(Role::SIZE)))
+            .physical_if(|shape, c| c.of(Role::SIZE) > 0.0 && Drag::of(shape).is_viscous())
+            .evaluated_on_averages()
+            .adds_load(load)
+            .led_by(
+                |on, shape| vec![main(Drag::of(shape).wind_up(on), 10.0).called(Role::SIZE)],
+                |shape, c| vec![shape.with(&[(Name::DragNM, c.of(Role::SIZE).max(0.0))])],
+            )
+            .led_under_load_alone();
     law.acts.in_crossings = true;
     law
 }
