@@ -17,7 +17,6 @@ use flexspline_design::sweep::{
     Constraint, EXAMPLE, Judge, OfGenerator, Plan, PlanSettings, Ran, Row, RunStatus, Sense, Shard, Sweep, SweepError,
     Tolerances, Vary, is_error_of_making, reduce, run,
 };
-use flexspline_mechanics::drive::GeneratorKind;
 use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_report::page::Page;
 use flexspline_report::sweep_report::{self, SweepSources};
