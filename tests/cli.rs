@@ -197,9 +197,18 @@ fn bad_input_is_refused_with_its_place_and_leaves_nothing() {
         ("drive --drive HHD-96", "HHD-95, HHD-95-typical"),
         ("export --generator cam", "--format"),
         ("export --generator cam --format stl", "vtu, csv, inp"),
-        ("export --generator cam --format csv --increments 3", "--increments: only a deck has it"),
-        ("export --generator cam --format vtu --last-torque-n-m 3", "--last-torque-n-m: only a deck has it"),
-        ("export --generator cam --format inp --generator-rad 0.1", "--generator-rad: a deck starts at 0"),
+        (
+            "export --generator cam --format csv --increments 3",
+            "--increments: --format csv has no use for it; allowed with --format inp",
+        ),
+        (
+            "export --generator cam --format vtu --last-torque-n-m 3",
+            "--last-torque-n-m: --format vtu has no use for it; allowed with --format inp",
+        ),
+        (
+            "export --generator cam --format inp --generator-rad 0.1",
+            "--generator-rad: --format inp has no use for it; allowed with --format vtu",
+        ),
         ("export --generator cam --format inp --step-rad 0", "--step-rad: found 0"),
         ("export --generator cam --format inp --last-torque-n-m nan", "--last-torque-n-m: found NaN"),
         ("export --generator cam --format inp --mesh coarse", "output.drag_torque_n_m: found 0.02"),

@@ -28,7 +28,6 @@ const SOURCES: [&str; 15] = [
     "host-sim/design/src",
     "host-sim/identify/src",
     "host-sim/fly/src",
-    "host-sim/playback/src",
     "host-sim/export/src",
     "host-sim/report/src",
     "host-sim/serve/src",

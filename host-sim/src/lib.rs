@@ -46,5 +46,4 @@ pub use flexspline_identify::{
 };
 pub use flexspline_mechanics::{bearing, condense, contact, drive, fem, mesh, motion, reference, sleeve, stepping};
 pub use flexspline_pacana_2023 as reproduce;
-pub use flexspline_playback as playback;
 pub use flexspline_report as report;

@@ -5,6 +5,7 @@ pub mod bundle;
 pub mod fmu;
 mod inp;
 mod outlines;
+pub mod playback;
 mod vtu;
 mod vtu_whole;
 

@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use clap::{ArgGroup, Args, ValueHint};
 use flexspline::Table;
 
-use super::context::{Context, quoted, table_image};
+use super::context::{Context, quoted, table_image, table_of};
 use super::logs::LogOptions;
-use super::{Failure, names, report, say};
+use super::{Failure, bad_input, names, report, say};
 use flexspline_base::output::Outputs;
 use flexspline_design::tables::{c_header, rust_source};
 use flexspline_identify::calibrate::{
@@ -139,12 +139,7 @@ impl Calibrate {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         let map = self.columns.map()?;
         let image = self.tables.as_ref().map(|folder| table_image(folder, self.generator)).transpose()?;
-        let table = match &image {
-            Some((file, bytes)) => {
-                Some(Table::check(bytes).map_err(|error| Failure::BadInput(format!("{}: {error}", file.display())))?)
-            }
-            None => None,
-        };
+        let table = image.as_ref().map(|(file, bytes)| table_of(file, bytes)).transpose()?;
         let prior = self.prior(table.as_ref())?;
         if self.plan {
             return self.write_plan(context, &prior);
@@ -157,7 +152,7 @@ impl Calibrate {
             .iter()
             .map(|file| read_known(file, &map, &prior.nominal, prior.table))
             .collect::<Result<Vec<_>, _>>();
-        let files = files.map_err(|error| Failure::BadInput(error.to_string()))?;
+        let files = files.map_err(bad_input)?;
         let out = context.out()?;
         if !self.no_report {
             report::before(context, out, "calibrate", None);
@@ -224,7 +219,7 @@ impl Calibrate {
             return Ok(Prior::of_table(table, self.generator));
         }
         if let Some(path) = &self.model {
-            let model = Model::read(path).map_err(|error| Failure::BadInput(error.to_string()))?;
+            let model = Model::read(path).map_err(bad_input)?;
             if !model.causes.is_empty() {
                 let what = "found [[extension.cause]], allowed: a nominal model without causes; what they are is \
                             fitted here anew";

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use flexspline::{Identity, IdentityCheck, Table};
 
-use super::{Common, Failure, say};
+use super::{Common, Failure, bad_input, say};
 pub(super) use flexspline_base::output::quoted;
 use flexspline_base::output::{keep, prepare_folder};
 use flexspline_base::progress::Progress;
@@ -76,8 +76,8 @@ impl Context {
                          or one of the built-in drives {known}{hint}"
                     ))
                 })?;
-                let drive = Drive::from_toml(name, &text).map_err(|error| Failure::BadInput(error.to_string()))?;
-                Stated::of_file(name, &text).map_err(|error| Failure::BadInput(error.to_string()))?;
+                let drive = Drive::from_toml(name, &text).map_err(bad_input)?;
+                Stated::of_file(name, &text).map_err(bad_input)?;
                 drive
             }
         };
@@ -86,9 +86,7 @@ impl Context {
 
     /// A drive with every `--set`.
     pub(super) fn with_sets(&self, drive: Drive) -> Result<Drive, Failure> {
-        drive
-            .with_sets(self.common.sets.iter().map(String::as_str))
-            .map_err(|error| Failure::BadInput(error.to_string()))
+        drive.with_sets(self.common.sets.iter().map(String::as_str)).map_err(bad_input)
     }
 
     /// Whether a drive other than the usual one was asked for.
@@ -147,7 +145,7 @@ impl Context {
     /// What a data sheet says of the drive of `--drive`, where its file has it.
     pub(super) fn stated(&self) -> Result<Option<Stated>, Failure> {
         let Some((name, text)) = self.drive_file() else { return Ok(None) };
-        Stated::of_file(name, &text).map_err(|error| Failure::BadInput(error.to_string()))
+        Stated::of_file(name, &text).map_err(bad_input)
     }
 
     /// The output folder, which can be written to.
@@ -262,6 +260,11 @@ pub(super) fn image_file(path: &Path) -> Result<Vec<u8>, Failure> {
         }
     }
     Ok(bytes)
+}
+
+/// The table in the image of this file.
+pub(super) fn table_of<'a>(path: &Path, image: &'a [u8]) -> Result<Table<'a>, Failure> {
+    Table::check(image).map_err(|error| Failure::BadInput(format!("{}: {error}", path.display())))
 }
 
 /// A drive file beside the one that is not there, with a name like it.

@@ -8,7 +8,7 @@ use clap::{Args, ValueHint};
 use super::context::{Context, quoted, table_image};
 use super::logs::LogOptions;
 use super::tables::fresh_table;
-use super::{Failure, names, report, say};
+use super::{Failure, bad_input, names, report, say};
 use flexspline_base::output::Outputs;
 use flexspline_design::kernels::Kernels;
 use flexspline_design::tables::{c_header, rust_source};
@@ -174,7 +174,7 @@ impl Diagnose {
         let bad = |file: &Path, error: PipelineError| Failure::BadInput(format!("{}: {error}", file.display()));
         match (&self.model, image) {
             (Some(path), _) => {
-                let model = Model::read(path).map_err(|error| Failure::BadInput(error.to_string()))?;
+                let model = Model::read(path).map_err(bad_input)?;
                 Ok(Subject::of_model(model, drive, self.generator))
             }
             (None, Some(image)) => {

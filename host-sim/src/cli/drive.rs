@@ -6,7 +6,7 @@ use clap::Args;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{Context, Failure, say};
+use super::{Context, Failure, bad_input, say};
 use flexspline_base::units::{ARCMIN_PER_RAD, ARCSEC_PER_RAD};
 use flexspline_mechanics::drive::{Drive, GeneratorKind, MeshReport, RigidMesh};
 
@@ -75,7 +75,7 @@ fn mesh_reports(drive: &Drive) -> Result<Vec<MeshReport>, Failure> {
     GeneratorKind::ALL
         .into_par_iter()
         .map(|kind| {
-            let mesh = RigidMesh::new(drive, kind).map_err(|error| Failure::BadInput(error.to_string()))?;
+            let mesh = RigidMesh::new(drive, kind).map_err(bad_input)?;
             mesh.report(kind).ok_or_else(|| {
                 Failure::Failed(format!(
                     "the teeth never meet with the {kind} generator: the tip of the flexspline does not reach past \

@@ -9,9 +9,9 @@ use serde::Serialize;
 
 use super::context::quoted;
 use super::export_fmu::FmuOptions;
-use super::export_playback::{PlaybackFormat, PlaybackOptions};
+use super::export_playback::PlaybackOptions;
 use super::simulate::{ModelOptions, refused_or_failed, show};
-use super::{Context, Failure, say};
+use super::{Context, Failure, bad_input, say};
 use flexspline_base::output::{OutputError, write_csv, write_whole};
 use flexspline_design::simulate::{Observation, Path, PathPoint, simulate};
 use flexspline_export::{Deck, DeckSettings, SleeveDeck, outlines, write_vtu, write_whole_flexspline};
@@ -29,15 +29,16 @@ const LARGEST_STEP_RAD: f64 = 0.1;
 ///
 /// vtu: both wheels deformed and loaded at one generator angle, with displacement and von Mises stress, for ParaView;
 /// for a drive with a three-dimensional sleeve also the whole flexspline, <G>-3d.vtu.
-/// csv: the outlines of tooth, space and generator, undeformed, each in its own frame.
+/// csv: the outlines of tooth, space and generator, undeformed, each in its own frame; with --tables the playback of
+/// that table at one load, playback.csv: output angle and the correction to be added to it, for a controller's own
+/// lookup. The residual is reported on the table's own model and on the data of a unit (--data). Scripts make of it
+/// what LinuxCNC, Beckhoff, moteus, OnStepX and others read: docs/how-to/export_to_controllers.md.
 /// inp: the undeformed mesh with contact, holding and load as a deck for CalculiX and Abaqus, which deforms, loads and
 /// turns the drive; mm, N, MPa, a slice of 1 mm. For a drive with a three-dimensional sleeve (CUP-95): the flexspline
 /// alone, in solids, under w0.
 /// fmu: a table (--tables), or a joint with mass, for simulators that import FMI co-simulation, 2.0 or
 /// 3.0 (--fmi): docs/how-to/fmu.md.
-/// eqmod, onstepx, linuxcnc, beckhoff, moteus, odrive, ros2, cfs, fprime: a table (--tables) resampled for the lookup
-/// of that device. The lookup is simulated, and its residual reported on the table's own model and on the data of a
-/// unit (--data): docs/how-to/export_to_controllers.md.
+/// cfs, fprime: the image of a table (--tables) as a cFS table or as F Prime parameters, for the core to play.
 #[derive(Debug, Args)]
 #[command(
     mut_args(beside_tables),
@@ -47,8 +48,8 @@ Examples:
   flexspline export --format csv --generator double-disc --out drawings
   flexspline export --format fmu --tables out/cam.fxt
   flexspline export --format fmu --tables out/cam.fxt --model joint --scenario camera --fmi 3.0
-  flexspline export --format linuxcnc --tables out/cam.fxt --from-deg 0 --to-deg 20
-  flexspline export --format moteus --tables out/calibrated.fxt --torque-n-m 12 --data bench.csv
+  flexspline export --format csv --tables out/calibrated.fxt --torque-n-m 12 --data bench.csv
+  flexspline export --format cfs --tables out/cam.fxt --table-name JOINT.TABLE
   flexspline export --format inp --generator cam --torque-n-m 50 --set output.drag_torque_n_m=0
 
 The last one is run by: OMP_NUM_THREADS=1 ccx out/cam. It prints to out/cam.dat, at the end of each
@@ -61,8 +62,8 @@ pub(super) struct Export {
     /// What to write
     #[arg(long, value_enum)]
     format: Format,
-    /// Table image, for all formats but vtu, csv and inp; --torque-n-m and --temperature-c select the section of the
-    /// table [default: the middle of its range]
+    /// Table image: fmu, cfs, fprime, and csv for a playback; --torque-n-m and --temperature-c select the section of
+    /// the table [default: the middle of its range]
     #[arg(long, value_name = "FILE.fxt", value_hint = ValueHint::FilePath)]
     tables: Option<PathBuf>,
     #[command(flatten)]
@@ -83,10 +84,9 @@ pub(super) struct Export {
     last_torque_n_m: Option<f64>,
 }
 
-/// Formats of a drive's mesh, and those of a table.
-const OF_A_MESH: [&str; 3] = ["vtu", "csv", "inp"];
-const OF_A_TABLE: [&str; 10] =
-    ["fmu", "eqmod", "onstepx", "linuxcnc", "beckhoff", "moteus", "odrive", "ros2", "cfs", "fprime"];
+/// Formats of a drive's mesh alone, and of a table alone; csv is of either.
+const OF_A_MESH: [&str; 2] = ["vtu", "inp"];
+const OF_A_TABLE: [&str; 3] = ["fmu", "cfs", "fprime"];
 
 /// With a table or a scenario there is no mesh: what is of the mesh alone is refused, and no generator is asked for.
 fn beside_tables(arg: Arg) -> Arg {
@@ -95,39 +95,32 @@ fn beside_tables(arg: Arg) -> Arg {
         "generator" => arg
             .required(false)
             .required_if_eq_any(OF_A_MESH.map(|format| ("format", format)))
+            .default_value_if("tables", ArgPredicate::IsPresent, "cam")
             .default_value_ifs(OF_A_TABLE.map(|format| ("format", ArgPredicate::Equals(format.into()), Some("cam"))))
             .conflicts_with_all(others),
-        "mesh" | "solver" | "flank_penalty" | "bore_penalty" | "tolerance" | "max_iterations" | "generator_rad" => {
+        "columns" | "rate" | "torque_constant" => arg.requires("data"),
+        "mesh" | "solver" | "flank_penalty" | "bore_penalty" | "max_iterations" | "generator_rad" => {
             arg.conflicts_with_all(others)
         }
         _ => arg,
     }
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Format {
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Format {
     /// Deformed mesh: <G>.vtu, and <G>-3d.vtu of a sleeve in three dimensions
     Vtu,
-    /// Outlines: <G>-outlines.csv
+    /// Outlines: <G>-outlines.csv; of a table (--tables) its playback: playback.csv
     Csv,
+    /// The playback of a table: `csv` with `--tables`.
+    #[value(skip)]
+    #[serde(rename = "csv")]
+    Playback,
     /// CalculiX and Abaqus deck: <G>.inp, or sleeve.inp in three dimensions
     Inp,
     /// FMU for co-simulation: flexspline_compensation.fmu, or flexspline_joint.fmu
     Fmu,
-    /// EQMOD periodic error curve: eqmod_pec.txt
-    Eqmod,
-    /// OnStepX periodic error commands: onstepx_pec.txt
-    Onstepx,
-    /// LinuxCNC screw compensation: flexspline.comp
-    Linuxcnc,
-    /// Beckhoff position compensation: flexspline_compensation.TcGVL.st, or achskw.lis
-    Beckhoff,
-    /// moteus encoder compensation: moteus.cfg
-    Moteus,
-    /// ODrive: nothing fits, and why
-    Odrive,
-    /// ros2_control simple transmission: transmission.xml
-    Ros2,
     /// The core's image as a cFS table: flexspline.tbl and its sources
     Cfs,
     /// The core's image as F Prime parameters: flexspline_prm.json, flexspline.fpp
@@ -135,19 +128,11 @@ enum Format {
 }
 
 impl Format {
-    /// The formats of others' playback.
-    fn playback(self) -> Option<PlaybackFormat> {
-        match self {
-            Format::Vtu | Format::Csv | Format::Inp | Format::Fmu => None,
-            Format::Eqmod => Some(PlaybackFormat::Eqmod),
-            Format::Onstepx => Some(PlaybackFormat::Onstepx),
-            Format::Linuxcnc => Some(PlaybackFormat::Linuxcnc),
-            Format::Beckhoff => Some(PlaybackFormat::Beckhoff),
-            Format::Moteus => Some(PlaybackFormat::Moteus),
-            Format::Odrive => Some(PlaybackFormat::Odrive),
-            Format::Ros2 => Some(PlaybackFormat::Ros2),
-            Format::Cfs => Some(PlaybackFormat::Cfs),
-            Format::Fprime => Some(PlaybackFormat::Fprime),
+    /// As `--format` takes it.
+    fn name(self) -> String {
+        match self.to_possible_value() {
+            Some(value) => value.get_name().to_owned(),
+            None => "csv of a table".to_owned(),
         }
     }
 }
@@ -161,20 +146,24 @@ struct ExportReport {
 
 impl Export {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
-        self.check()?;
-        if let Some(format) = self.format.playback() {
-            let load = [self.model.torque_n_m, self.model.temperature_c];
-            return self.playback.run(context, format, self.tables.as_deref(), load);
-        }
-        let written = match self.format {
-            Format::Fmu => return self.fmu.run(context, self.tables.as_deref()),
+        let format = match self.format {
+            Format::Csv if self.tables.is_some() => Format::Playback,
+            format => format,
+        };
+        self.check(format)?;
+        let written = match format {
             Format::Vtu => self.mesh(context)?,
+            Format::Csv => vec![self.outlines(context)?],
             Format::Inp => vec![self.deck(context)?],
-            _ => vec![self.outlines(context)?],
+            Format::Fmu => return self.fmu.run(context, self.tables.as_deref()),
+            Format::Playback | Format::Cfs | Format::Fprime => {
+                let load = [self.model.torque_n_m, self.model.temperature_c];
+                return self.playback.run(context, format, self.tables.as_deref(), load);
+            }
         };
         let all: Vec<String> = written.iter().map(|file| file.display().to_string()).collect();
         let shown = quoted(&all[all.len() - 1]);
-        let next = match self.format {
+        let next = match format {
             Format::Vtu => vec![format!("paraview {shown}")],
             Format::Inp => vec![format!("OMP_NUM_THREADS=1 ccx {}", shown.trim_end_matches(".inp"))],
             _ => Vec::new(),
@@ -183,40 +172,28 @@ impl Export {
         context.print(&ExportReport { schema_version: 1, written }, || text)
     }
 
-    /// Refuses options that the format has no use for, and numbers that are none.
-    fn check(&self) -> Result<(), Failure> {
-        self.playback.check(self.format.playback())?;
-        if self.format == Format::Fmu {
-            self.fmu.refuse_loads([
-                ("--torque-n-m", self.model.torque_n_m.is_some()),
-                ("--temperature-c", self.model.temperature_c.is_some()),
-            ])?;
-        } else if let Some(option) = self.fmu.given() {
-            return Err(Failure::BadInput(format!("{option}: allowed with --format fmu")));
-        } else if self.tables.is_some() && self.format.playback().is_none() {
-            return Err(Failure::BadInput(
-                "--tables: vtu, csv and inp are made of the drive; allowed with the formats that take a table".into(),
-            ));
-        }
-        let of_decks = [
-            ("--increments", self.increments.is_some()),
-            ("--step-rad", self.step_rad.is_some()),
-            ("--last-torque-n-m", self.last_torque_n_m.is_some()),
+    /// Refuses options that the format has no use for, and numbers out of range.
+    fn check(&self, format: Format) -> Result<(), Failure> {
+        use Format::{Cfs, Fmu, Fprime, Inp, Playback, Vtu};
+        let loads: &[_] = &[Vtu, Inp, Playback, Cfs, Fprime];
+        let options = [
+            ("--tables", self.tables.is_some(), &[Playback, Fmu, Cfs, Fprime][..]),
+            ("--generator-rad", self.generator_rad.is_some(), &[Vtu]),
+            ("--torque-n-m", self.model.torque_n_m.is_some(), loads),
+            ("--temperature-c", self.model.temperature_c.is_some(), loads),
+            ("--increments", self.increments.is_some(), &[Inp]),
+            ("--step-rad", self.step_rad.is_some(), &[Inp]),
+            ("--last-torque-n-m", self.last_torque_n_m.is_some(), &[Inp]),
+            (self.fmu.given().unwrap_or_default(), self.fmu.given().is_some(), &[Fmu]),
         ];
-        if self.format != Format::Inp {
-            return match of_decks.into_iter().find(|(_, given)| *given) {
-                Some((option, _)) => {
-                    Err(Failure::BadInput(format!("{option}: only a deck has it; allowed with --format inp")))
-                }
-                None => Ok(()),
-            };
-        }
-        if self.generator_rad.is_some() {
-            return Err(Failure::BadInput(
-                "--generator-rad: a deck starts at 0 and turns by --increments of --step-rad; allowed with --format \
-                 vtu"
-                .into(),
-            ));
+        let mut options = options.into_iter().chain(self.playback.given());
+        if let Some((option, _, used)) = options.find(|(_, given, used)| *given && !used.contains(&format)) {
+            let used: Vec<String> = used.iter().map(|format| format.name()).collect();
+            return Err(Failure::BadInput(format!(
+                "{option}: --format {} has no use for it; allowed with --format {}",
+                self.format.name(),
+                used.join(", ")
+            )));
         }
         if let Some(step_rad) = self.step_rad.filter(|step| !(step.abs() > 0.0 && step.abs() <= LARGEST_STEP_RAD)) {
             return Err(Failure::BadInput(format!(
@@ -236,7 +213,7 @@ impl Export {
         let generator_rad = self.generator_rad.unwrap_or(0.0);
         let point = PathPoint { generator_rad, ..PathPoint::default() };
         let settings = self.model.settings(Path::Points(vec![point]));
-        settings.check(&drive).map_err(|error| Failure::BadInput(error.to_string()))?;
+        settings.check(&drive).map_err(bad_input)?;
         let file = context.out()?.join(format!("{}.vtu", self.model.generator));
         let whole = drive.sleeve.is_shell().then(|| file.with_file_name(format!("{}-3d.vtu", self.model.generator)));
         let write = |now: &Observation| -> Result<(), OutputError> {
@@ -269,17 +246,16 @@ impl Export {
             return self.sleeve_deck(context, &drive);
         }
         let settings = self.model.settings(Path::Points(vec![PathPoint::default()]));
-        settings.check(&drive).map_err(|error| Failure::BadInput(error.to_string()))?;
+        settings.check(&drive).map_err(bad_input)?;
         let temperature_c = settings.temperature_c.unwrap_or(drive.temperature.reference_c);
-        let problem = Problem::new(&drive, self.model.generator, temperature_c, settings.solver)
-            .map_err(|error| Failure::BadInput(error.to_string()))?;
+        let problem = Problem::new(&drive, self.model.generator, temperature_c, settings.solver).map_err(bad_input)?;
         let path = DeckSettings {
             torque_n_m: settings.torque_n_m,
             last_torque_n_m: self.last_torque_n_m,
             increments: self.increments.unwrap_or(10) as usize,
             step_rad: self.step_rad.unwrap_or(0.01),
         };
-        let deck = Deck::new(&problem, path).map_err(|error| Failure::BadInput(error.to_string()))?;
+        let deck = Deck::new(&problem, path).map_err(bad_input)?;
         let file = context.out()?.join(format!("{}.inp", self.model.generator));
         write_whole(&file, |out| deck.write(out))?;
         Ok(file)
@@ -300,26 +276,15 @@ impl Export {
                  sleeve.kind=springs)"
             )));
         }
-        let deck = SleeveDeck::new(drive).map_err(|error| Failure::BadInput(error.to_string()))?;
+        let deck = SleeveDeck::new(drive).map_err(bad_input)?;
         let file = context.out()?.join("sleeve.inp");
         write_whole(&file, |out| deck.write(out))?;
         Ok(file)
     }
 
     fn outlines(&self, context: &Context) -> Result<PathBuf, Failure> {
-        let loads = [
-            ("--generator-rad", self.generator_rad),
-            ("--torque-n-m", self.model.torque_n_m),
-            ("--temperature-c", self.model.temperature_c),
-        ];
-        if let Some((option, _)) = loads.into_iter().find(|(_, value)| value.is_some()) {
-            return Err(Failure::BadInput(format!(
-                "{option}: outlines are undeformed, at reference temperature; allowed with --format vtu"
-            )));
-        }
         let drive = context.drive()?;
-        let points = outlines(&drive, self.model.generator, POINTS_PER_PIECE)
-            .map_err(|error| Failure::BadInput(error.to_string()))?;
+        let points = outlines(&drive, self.model.generator, POINTS_PER_PIECE).map_err(bad_input)?;
         let file = context.out()?.join(format!("{}-outlines.csv", self.model.generator));
         write_csv(&file, &points)?;
         Ok(file)

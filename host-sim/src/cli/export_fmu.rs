@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum, ValueHint};
 use serde::Serialize;
 
 use super::context::image_file;
-use super::{Context, Failure, fly};
+use super::{Context, Failure, bad_input, fly};
 use flexspline_base::output::write_whole;
 use flexspline_export::fmu::{Fmu, FmuExportError, compensation, find_libraries, joint};
 
@@ -65,16 +65,6 @@ impl FmuOptions {
         given.into_iter().find(|(_, given)| *given).map(|(option, _)| option)
     }
 
-    /// Refuses loads: those of an FMU are its inputs.
-    pub(super) fn refuse_loads(&self, loads: [(&str, bool); 2]) -> Result<(), Failure> {
-        match loads.into_iter().find(|(_, given)| *given) {
-            Some((option, _)) => {
-                Err(Failure::BadInput(format!("{option}: loads and temperatures are inputs of an FMU")))
-            }
-            None => Ok(()),
-        }
-    }
-
     pub(super) fn run(&self, context: &Context, tables: Option<&Path>) -> Result<(), Failure> {
         if let Some(option) = context.changes_the_drive() {
             return Err(Failure::BadInput(format!(
@@ -85,7 +75,7 @@ impl FmuOptions {
             return Err(Failure::BadInput(format!("--fmi: found {found}, allowed: {FMI}, the version of every FMU")));
         }
         let fmu = self.fmu(tables)?;
-        let libraries = find_libraries(&self.library).map_err(|error| Failure::BadInput(error.to_string()))?;
+        let libraries = find_libraries(&self.library).map_err(bad_input)?;
         let resources = fmu.resources();
         let file = context.out()?.join(format!("{}.fmu", resources.kind.identifier()));
         write_whole(&file, |out| fmu.write(out, &libraries))?;

@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::Failure;
+use super::{Failure, bad_input};
 use flexspline_identify::measurement::ColumnMap;
 
 /// Columns, rate and torque constant.
@@ -36,22 +36,12 @@ impl LogOptions {
         } else {
             ColumnMap::with_torque_constant(&self.columns, self.torque_constant)
         };
-        let map = map.map_err(|error| Failure::BadInput(error.to_string()))?;
+        let map = map.map_err(bad_input)?;
         map.at_rate(self.rate).map_err(Failure::BadInput)
     }
 
     /// Rows in a second, if that is said.
     pub(super) fn rate_hz(&self) -> Option<f64> {
         self.rate
-    }
-
-    /// The first of its options that is given.
-    pub(super) fn given(&self) -> Option<&'static str> {
-        let given = [
-            ("--columns", !self.columns.is_empty()),
-            ("--rate", self.rate.is_some()),
-            ("--torque-constant", self.torque_constant.is_some()),
-        ];
-        given.into_iter().find(|(_, given)| *given).map(|(option, _)| option)
     }
 }

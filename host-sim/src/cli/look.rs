@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueHint};
 
 use super::context::{Context, quoted};
-use super::{Failure, say};
+use super::{Failure, bad_input, say};
 use flexspline_identify::look::{Looked, look, text};
 use flexspline_identify::measurement::raw;
 
@@ -27,7 +27,7 @@ pub(super) struct Look {
 impl Look {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         let files = self.files.iter().map(|file| raw::read(file)).collect::<Result<Vec<_>, _>>();
-        let files = files.map_err(|error| Failure::BadInput(error.to_string()))?;
+        let files = files.map_err(bad_input)?;
         let looked = look(&files).map_err(Failure::BadInput)?;
         context.print(&looked, || text(&looked) + &say::next(&self.next(&looked)))
     }

@@ -71,6 +71,11 @@ enum Failure {
     Failed(String),
 }
 
+/// Bad input as a library says it.
+fn bad_input(error: impl std::fmt::Display) -> Failure {
+    Failure::BadInput(error.to_string())
+}
+
 impl From<OutputError> for Failure {
     fn from(error: OutputError) -> Failure {
         match error.source.kind() {
@@ -149,11 +154,36 @@ const USUAL_PATH: [(&str, &str); 3] = [
     ("flexspline validate --tables out --drive drive.toml", "compare them with new FEM runs"),
 ];
 
-/// Commands of former versions, and the command that does their work.
-const FORMER: [(&str, &str); 2] = [("study", "sweep"), ("campaign", "sweep")];
-
 /// The drive where none is named.
 const USUAL_DRIVE: &str = "HHD-95";
+
+/// Names that left, as typed, and what to type now.
+const RENAMED: [(&str, &str); 9] = [
+    ("campaign", "flexspline sweep"),
+    ("study", "flexspline sweep"),
+    ("--format beckhoff", "--format csv --tables FILE.fxt, then examples/playback/beckhoff.py"),
+    ("--format eqmod", "--format csv --tables FILE.fxt, then examples/playback/eqmod.py"),
+    ("--format linuxcnc", "--format csv --tables FILE.fxt, then examples/playback/linuxcnc.py"),
+    ("--format moteus", "--format csv --tables FILE.fxt, then examples/playback/moteus.py"),
+    ("--format odrive", "--format csv --tables FILE.fxt, then examples/playback/odrive.py"),
+    ("--format onstepx", "--format csv --tables FILE.fxt, then examples/playback/onstepx.py"),
+    ("--format ros2", "--format csv --tables FILE.fxt, then examples/playback/ros2.py"),
+];
+
+/// One line for a name of [`RENAMED`] that the command line was refused for.
+fn renamed(error: &clap::Error) -> Option<String> {
+    let text = |kind: ContextKind| match error.get(kind) {
+        Some(ContextValue::String(text)) => Some(text.as_str()),
+        _ => None,
+    };
+    let typed = match text(ContextKind::InvalidSubcommand) {
+        Some(command) => command.to_owned(),
+        // The argument reads `--format <FORMAT>`.
+        None => format!("{} {}", text(ContextKind::InvalidArg)?.split(' ').next()?, text(ContextKind::InvalidValue)?),
+    };
+    let (old, new) = RENAMED.iter().find(|(old, _)| *old == typed)?;
+    Some(format!("{old} is no more; type {new}"))
+}
 
 /// The definition of the command line.
 fn command() -> clap::Command {
@@ -240,10 +270,8 @@ pub fn run(args: impl IntoIterator<Item = impl Into<OsString>>) -> Outcome {
     let cli = match parse(&args) {
         Ok(cli) => cli,
         Err(help_or_error) => {
-            if let Some(ContextValue::String(name)) = help_or_error.get(ContextKind::InvalidSubcommand)
-                && let Some((_, now)) = FORMER.iter().find(|(former, _)| former == name)
-            {
-                return ended(Failure::BadInput(format!("`{name}` is now `{now}`: flexspline {now} --help")));
+            if let Some(message) = renamed(&help_or_error) {
+                return ended(Failure::BadInput(message));
             }
             let printed = help_or_error.print();
             return match say::written(printed) {
@@ -331,6 +359,19 @@ mod tests {
     #[test]
     fn the_definition_of_the_command_line_is_consistent() {
         command().debug_assert();
+    }
+
+    #[test]
+    fn a_name_that_left_says_what_to_type() {
+        for (old, new) in RENAMED {
+            let line = if old.starts_with("--") { format!("export {old}") } else { old.to_owned() };
+            let error = parse(format!("flexspline {line}").split(' ')).unwrap_err();
+            let said = renamed(&error).unwrap_or_else(|| panic!("{old}: {error}"));
+            assert!(said.contains(old) && said.contains(new) && said.lines().count() == 1, "{said}");
+        }
+        for line in ["flexspline tabels", "flexspline export --format vtx", "flexspline export --formt odrive"] {
+            assert_eq!(renamed(&parse(line.split(' ')).unwrap_err()), None, "{line}");
+        }
     }
 
     /// Every command but `help`.

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueHint};
 use flexspline::Table;
 
-use super::context::{Context, image_file, quoted};
+use super::context::{Context, image_file, quoted, table_of};
 use super::logs::LogOptions;
-use super::{Failure, say};
+use super::{Failure, bad_input, say};
 use flexspline_base::output::Outputs;
 use flexspline_identify::replay::{ReplaySummary, RowsOf, RowsRead, read, replay};
 use flexspline_mechanics::drive::GeneratorKind;
@@ -46,8 +46,7 @@ pub(super) struct Replay {
 impl Replay {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         let image = image_file(&self.tables)?;
-        let table =
-            Table::check(&image).map_err(|error| Failure::BadInput(format!("{}: {error}", self.tables.display())))?;
+        let table = table_of(&self.tables, &image)?;
         let bytes = std::fs::read(&self.data)
             .map_err(|error| Failure::BadInput(format!("{}: {error}", self.data.display())))?;
         let rows_of = RowsOf::beside(&self.data, &bytes);
@@ -100,8 +99,7 @@ pub(super) fn measured(
     temperature_c: f64,
 ) -> Result<RowsRead, Failure> {
     let bytes = std::fs::read(data).map_err(|error| Failure::BadInput(format!("{}: {error}", data.display())))?;
-    read(&data.display().to_string(), &bytes, &logs.map()?, table, temperature_c)
-        .map_err(|error| Failure::BadInput(error.to_string()))
+    read(&data.display().to_string(), &bytes, &logs.map()?, table, temperature_c).map_err(bad_input)
 }
 
 fn text(summary: &ReplaySummary, out: &std::path::Path) -> String {

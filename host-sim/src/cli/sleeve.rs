@@ -6,7 +6,7 @@ use clap::Args;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{Context, Failure};
+use super::{Context, Failure, bad_input};
 use flexspline_mechanics::drive::{Drive, Sleeve, SleeveKind};
 use flexspline_mechanics::sleeve::{Flexspline3d, Harmonic, Rollers};
 
@@ -54,8 +54,7 @@ struct SleeveResult<'a> {
 impl SleeveCommand {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         let drive = context.drive()?;
-        let flexspline =
-            Flexspline3d::of(&drive, !self.no_teeth).map_err(|error| Failure::BadInput(error.to_string()))?;
+        let flexspline = Flexspline3d::of(&drive, !self.no_teeth).map_err(bad_input)?;
         let result = SleeveResult {
             schema_version: 1,
             drive_hash: blake3::Hash::from_bytes(drive.hash()).to_hex().to_string(),
