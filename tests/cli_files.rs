@@ -1,7 +1,6 @@
-//! Files to start from, what a shell and `man` need, suggestions, and `--json` of every command.
+//! Files to start from, suggestions, and `--json` of every command.
 
 use std::fs;
-use std::process::{Command, Stdio};
 
 use flexspline_tests::command::{Desk, Output, names};
 
@@ -17,15 +16,6 @@ fn samples() -> String {
         }
     }
     text
-}
-
-/// The program `name`, or nothing where it is not installed.
-fn installed(name: &str) -> Option<Command> {
-    let there = Command::new(name).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok();
-    if !there {
-        println!("{name} is not installed: this part is not tested");
-    }
-    there.then(|| Command::new(name))
 }
 
 /// The commands that a result says to type next.
@@ -130,8 +120,8 @@ fn a_drive_from_a_few_numbers_clears_its_teeth_and_says_how_it_was_made() {
         assert_eq!(with_cup["left_out"].as_array().unwrap().len(), 2);
     }
     // What was asked for stays in that command, and what was set is not guessed.
-    let own =
-        "new wide.toml --like CSG-25-80 --bore 62.4 --width 40 --set generator.bearing_stiffness_n_per_mm3=5000 --json";
+    let own = "new wide.toml --like CSG-25-80 --bore 62.4 --set flexspline.width_mm=40 --set \
+               generator.bearing_stiffness_n_per_mm3=5000 --json";
     let guesses = desk.line(own).done().json()["next"][2].as_str().unwrap().to_owned();
     let with_cup = desk.line(&format!("{} --json", guesses.strip_prefix("flexspline ").unwrap())).done().json();
     assert_eq!(with_cup["left_out"].as_array().unwrap().len(), 2, "{guesses}");
@@ -195,85 +185,6 @@ fn a_new_catalogue_model_is_read_and_the_commands_it_names_run() {
     assert_eq!(desk.line("new my-nominal.toml --kind drive --json").done().json()["kind"], "drive");
 }
 
-#[cfg(unix)]
-#[test]
-fn the_shell_completes_commands_options_and_names() {
-    let desk = Desk::new();
-    let script = desk.line("completions bash").done().stdout;
-    desk.write("flexspline.bash", &script);
-    let checked = Command::new("bash").arg("-n").arg(desk.path("flexspline.bash")).output().unwrap();
-    assert!(checked.status.success() && checked.stderr.is_empty(), "{}", String::from_utf8_lossy(&checked.stderr));
-    // As bash calls it: the words, which of them is being typed, and the two that matter.
-    let completed = |line: &str| -> Vec<String> {
-        let words: Vec<&str> = line.split(' ').collect();
-        let (last, before) = (words[words.len() - 1], words[words.len() - 2]);
-        let call = format!(
-            "source flexspline.bash; COMP_WORDS=({line}); COMP_CWORD={}; _flexspline flexspline '{last}' '{before}'; \
-             printf '%s\\n' \"${{COMPREPLY[@]}}\"",
-            words.len() - 1
-        );
-        let output = Command::new("bash").args(["--norc", "-c", &call]).current_dir(desk.path(".")).output().unwrap();
-        assert!(output.stderr.is_empty(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
-        String::from_utf8(output.stdout).unwrap().lines().map(str::to_owned).collect()
-    };
-    assert_eq!(completed("flexspline simu"), ["simulate"]);
-    assert_eq!(completed("flexspline dia"), ["diagnose"]);
-    assert_eq!(completed("flexspline simulate --generator dou"), ["double-disc"]);
-    assert_eq!(completed("flexspline tables -g a"), ["all"]);
-    assert_eq!(completed("flexspline validate --mesh c"), ["coarse"]);
-    assert_eq!(completed("flexspline tables --node-t"), ["--node-tolerance-arcsec"]);
-    assert_eq!(completed("flexspline completions fi"), ["fish"]);
-    for (shell, sign) in [
-        ("zsh", "#compdef flexspline"),
-        ("fish", "complete -c flexspline"),
-        ("powershell", "Register-ArgumentCompleter"),
-        ("elvish", "edit:completion:arg-completer[flexspline]"),
-    ] {
-        let script = desk.line(&format!("completions {shell}")).done().stdout;
-        assert!(script.contains(sign) && script.contains("double-disc"), "{shell}");
-    }
-    let wrong = desk.line("completions basch");
-    assert_eq!(wrong.code, 2);
-    assert!(wrong.stderr.contains("bash"), "{}", wrong.stderr);
-}
-
-#[test]
-fn manual_pages_are_whole_and_render_without_a_warning() {
-    let desk = Desk::new();
-    let run = desk.line("man --out pages").done();
-    assert!(run.stdout.contains("next: man -l pages/flexspline.1"), "{}", run.stdout);
-    let pages = names(&desk.path("pages"));
-    let commands = commands(&desk);
-    assert_eq!(pages.len(), commands.len() + 1, "{pages:?}");
-    for command in &commands {
-        assert!(pages.contains(&format!("flexspline-{command}.1")), "{command}");
-    }
-    for page in &pages {
-        let text = desk.read(&format!("pages/{page}"));
-        for part in [".TH flexspline", ".SH NAME", ".SH SYNOPSIS", ".SH DESCRIPTION", ".SH OPTIONS", ".nf\n", ".fi\n"] {
-            assert!(text.contains(part), "{page} has no {part}");
-        }
-        if let Some(mut groff) = installed("groff") {
-            let rendered =
-                groff.args(["-k", "-man", "-ww", "-Tutf8", page]).current_dir(desk.path("pages")).output().unwrap();
-            let said = String::from_utf8_lossy(&rendered.stderr);
-            assert!(rendered.status.success() && said.is_empty(), "{page}: {said}");
-            let read = String::from_utf8_lossy(&rendered.stdout);
-            let title = format!("{}(1)", page.trim_end_matches(".1"));
-            assert!(read.contains(&title) && read.contains(env!("CARGO_PKG_VERSION")), "{page}: {read:.200}");
-            let command = page.strip_prefix("flexspline-").map(|name| name.trim_end_matches(".1"));
-            let example = command.map_or("exit codes".to_owned(), |command| format!("flexspline {command}"));
-            assert!(read.to_lowercase().contains(&example), "{page} shows no {example}");
-        }
-    }
-    assert_eq!(desk.line("man").done().stdout.trim_end(), desk.read("pages/flexspline.1").trim_end());
-    let one = desk.line("man diagnose").done().stdout;
-    assert_eq!(one.trim_end(), desk.read("pages/flexspline-diagnose.1").trim_end());
-    let wrong = desk.line("man diagnos");
-    assert_eq!(wrong.code, 2);
-    assert!(wrong.stderr.contains("did you mean `diagnose`?"), "{}", wrong.stderr);
-}
-
 /// The names of the commands, from the first page of help.
 fn commands(desk: &Desk) -> Vec<String> {
     let page = desk.line("help").done().stdout;
@@ -297,10 +208,6 @@ fn every_command_prints_one_json_object_and_nothing_else() {
         "new drive.toml",
         "drive",
         "drive --check",
-        "completions bash",
-        "man",
-        "man tables",
-        "man --out pages",
         "simulate --generator cam --mesh coarse --path path.csv",
         "export --generator cam --format csv",
         "tables --generator cam --from-samples samples.csv --no-report",
@@ -308,6 +215,7 @@ fn every_command_prints_one_json_object_and_nothing_else() {
         "bundle --tables out --no-core --out bundle",
         "export --format fmu --tables out/cam.fxt",
         "export --format cfs --tables out/cam.fxt",
+        "export --format csv --tables out/cam.fxt",
         "validate --tables out --mesh coarse --solver fast --torques 2 --positions 1 --temperatures 1 --no-report",
         "synthesize --list",
         "synthesize --model nominal.toml --rows 300 --sessions 4 --seed 1",
@@ -336,7 +244,7 @@ fn every_command_prints_one_json_object_and_nothing_else() {
     }
     for command in commands(&desk) {
         // These take minutes, or go on until they are stopped: what they print is tested beside their code.
-        let long = ["kernels", "reproduce", "serve"].contains(&&*command);
+        let long = ["reproduce", "serve"].contains(&&*command);
         let tried = lines.iter().any(|line| line.split(' ').next() == Some(&command));
         assert!(tried != long, "{command} is not tried with --json");
     }

@@ -5,7 +5,6 @@
 
 mod bundle;
 mod calibrate;
-mod completions;
 mod context;
 mod diagnose;
 mod drive;
@@ -17,7 +16,6 @@ mod kernels;
 mod logs;
 mod look;
 mod made;
-mod man;
 mod names;
 mod new;
 mod replay;
@@ -118,10 +116,9 @@ const GROUPS: [(&str, &[(&str, &str)]); 4] = [
     (
         "Make tables",
         &[
-            ("tables", "compensation tables for firmware, from FEM or from samples"),
+            ("tables", "compensation tables for firmware, from FEM or from samples; kernels for diagnose"),
             ("validate", "compare tables with new FEM runs at other points"),
             ("bundle", "tables, a C99 reader and the core, for your firmware's build"),
-            ("kernels", "response of the output to a deviation of any tooth, for diagnose"),
         ],
     ),
     (
@@ -140,8 +137,6 @@ const GROUPS: [(&str, &[(&str, &str)]); 4] = [
             ("serve", "the bench in a browser: logs, drives and tables to look at and change"),
             ("new", "a commented drive file, or a catalogue model, to edit"),
             ("drive", "print a drive, or check its teeth for interference"),
-            ("completions", "let the shell complete commands, options and names"),
-            ("man", "manual pages"),
             ("help", "this page, or that of a command"),
         ],
     ),
@@ -158,9 +153,12 @@ const USUAL_PATH: [(&str, &str); 3] = [
 const USUAL_DRIVE: &str = "HHD-95";
 
 /// Names that left, as typed, and what to type now.
-const RENAMED: [(&str, &str); 9] = [
+const RENAMED: [(&str, &str); 12] = [
     ("campaign", "flexspline sweep"),
     ("study", "flexspline sweep"),
+    ("kernels", "flexspline tables --kernels"),
+    ("man", "flexspline help COMMAND"),
+    ("completions", "flexspline help COMMAND"),
     ("--format beckhoff", "--format csv --tables FILE.fxt, then examples/playback/beckhoff.py"),
     ("--format eqmod", "--format csv --tables FILE.fxt, then examples/playback/eqmod.py"),
     ("--format linuxcnc", "--format csv --tables FILE.fxt, then examples/playback/linuxcnc.py"),
@@ -220,7 +218,6 @@ enum Command {
     Fly(fly::Fly),
     Export(Box<export::Export>),
     Tables(tables::Tables),
-    Kernels(kernels::KernelsCommand),
     Validate(validate::Validate),
     Bundle(bundle::BundleCommand),
     Calibrate(calibrate::Calibrate),
@@ -232,8 +229,6 @@ enum Command {
     New(new::New),
     #[cfg(feature = "serve")]
     Serve(serve::Serve),
-    Completions(completions::Completions),
-    Man(man::ManPages),
 }
 
 /// Options of every command.
@@ -334,7 +329,6 @@ impl Command {
             Command::Fly(command) => command.run(context),
             Command::Export(command) => command.run(context),
             Command::Tables(command) => command.run(context),
-            Command::Kernels(command) => command.run(context),
             Command::Validate(command) => command.run(context),
             Command::Bundle(command) => command.run(context),
             Command::Calibrate(command) => command.run(context),
@@ -346,8 +340,6 @@ impl Command {
             Command::New(command) => command.run(context),
             #[cfg(feature = "serve")]
             Command::Serve(command) => command.run(context),
-            Command::Completions(command) => command.run(context),
-            Command::Man(command) => command.run(context),
         }
     }
 }

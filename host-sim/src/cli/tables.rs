@@ -14,7 +14,7 @@ use super::context::{Context, quoted};
 use super::names::{self, GeneratorNames};
 use super::new::New;
 use super::simulate::{refused_or_failed, stress};
-use super::{Failure, report, say};
+use super::{Failure, bad_input, kernels, report, say};
 use flexspline_base::output::Outputs;
 use flexspline_base::spent::Spent;
 use flexspline_base::units::ARCSEC_PER_RAD;
@@ -40,6 +40,11 @@ use flexspline_report::{DriveSources, DriveSubject, drive_report};
 /// projected onto the table by the code that also runs on board. Written are <G>.fxt (the image that firmware reads in
 /// place), <G>.json (what made it and how good it is), <G>.rs and <G>.h (the same bytes as source), and
 /// <G>.samples.csv; and report.html, a page with the drive in motion that any browser opens.
+///
+/// With --kernels, influence kernels in place of tables: the response of the output, by contact FEM of the ideal drive,
+/// to one micrometre on any flexspline tooth, any circular-spline space and any point of the generator, for loads up
+/// to the rated one, and to an eccentric circular spline. Written is <G>.kernels.json; `diagnose --tables` uses it for
+/// the signatures of geometric causes if it lies in the folder of the table.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -49,6 +54,7 @@ Examples:
   flexspline tables --generator cam --mesh coarse --stress
   flexspline tables --generator cam --like CSF-25-100 --complete-from-data-sheet
   flexspline tables --generator double-disc --positions 12 --node-tolerance-arcsec 0.2
+  flexspline tables --kernels --generator cam --mesh coarse
 
 Sample files have the columns generator_rad, torque_n_m, temperature_c, direction (1 or -1) and
 output_rad.")]
@@ -62,9 +68,6 @@ pub(super) struct Tables {
     /// Half-width of the play in arcsec where a sample file has one direction only
     #[arg(long, value_name = "ARCSEC", requires = "from_samples", allow_negative_numbers = true)]
     half_width_arcsec: Option<f64>,
-    /// How far, in arcsec, a sample of a file may lie from the table [default: 20]
-    #[arg(long, value_name = "ARCSEC", requires = "from_samples", allow_negative_numbers = true)]
-    deviation_arcsec: Option<f64>,
     /// Largest torque, N.m [default: 200; four-roller 100, two-roller 20; by the size of the drive;
     /// of a cam with a [data_sheet] the rated torque]
     #[arg(long, value_name = "T", conflicts_with = "from_samples", allow_negative_numbers = true)]
@@ -108,6 +111,9 @@ pub(super) struct Tables {
     /// Do not write report.html, which takes a FEM run over one more tooth pitch for each generator
     #[arg(long)]
     no_report: bool,
+    /// Influence kernels in place of tables, for diagnose; minutes for each generator
+    #[arg(long, conflicts_with_all = ["from_samples", "torque_n_m", "most_nodes", "node_tolerance_arcsec", "positions", "temperatures_c", "stress", "complete_from_data_sheet", "no_report"])]
+    kernels: bool,
 }
 
 /// The drive's file beside tables that a data sheet completed.
@@ -129,6 +135,10 @@ struct TablesReport<'a> {
 impl Tables {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         let generators = self.generator.0.as_slice();
+        if self.kernels {
+            let settings = SolverSettings { method: self.solver, mesh: self.mesh, ..SolverSettings::default() };
+            return kernels::run(context, generators, settings);
+        }
         let (drive, stated) = match &self.like {
             Some(_) if context.has_drive() => {
                 return Err(Failure::BadInput("--like: found it beside --drive; give one of the two".to_owned()));
@@ -282,16 +292,12 @@ impl Tables {
                 "--from-samples: a sample file is of one generator; name it with --generator".into(),
             ));
         };
-        let not_negative = |option: &str, value: Option<f64>| match value {
-            Some(v) if !(0.0..=3600.0).contains(&v) => {
-                Err(Failure::BadInput(format!("{option}: found {v}; allowed: 0 to 3600 arcsec")))
-            }
-            other => Ok(other.map(|v| v / ARCSEC_PER_RAD)),
-        };
+        if let Some(half) = self.half_width_arcsec.filter(|half| !(0.0..=3600.0).contains(half)) {
+            return Err(Failure::BadInput(format!("--half-width-arcsec: found {half}; allowed: 0 to 3600 arcsec")));
+        }
         let options = SampleOptions {
-            half_width_rad: not_negative("--half-width-arcsec", self.half_width_arcsec)?,
-            deviation_limit_rad: not_negative("--deviation-arcsec", self.deviation_arcsec)?
-                .unwrap_or(SampleOptions::default().deviation_limit_rad),
+            half_width_rad: self.half_width_arcsec.map(|half| half / ARCSEC_PER_RAD),
+            ..SampleOptions::default()
         };
         let bad = |message: String| Failure::BadInput(message);
         let read = samples::read(file).map_err(|e| bad(e.to_string()))?;
@@ -308,7 +314,7 @@ impl Tables {
         }
         let no_sheet = || CompletionError::NoSheet { sizes: catalogue::sizes_in_words() };
         let sheet = stated.ok_or_else(no_sheet).and_then(SheetStiffness::of);
-        sheet.map(Some).map_err(|error| Failure::BadInput(error.to_string()))
+        sheet.map(Some).map_err(bad_input)
     }
 
     fn settings(
