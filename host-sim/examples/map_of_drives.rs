@@ -92,7 +92,7 @@ fn drawn(seed: u64, number: usize, slices: bool) -> Drawn {
             sets.push("flexspline.face=slices".to_owned());
         }
     }
-    let few = FewNumbers { teeth, module_mm, bore_mm: None, width_mm: None, generator: kind };
+    let few = FewNumbers { teeth, module_mm, bore_mm: None, generator: kind };
     Drawn { kind, load_share, sleeve, few, sets }
 }
 

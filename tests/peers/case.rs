@@ -112,7 +112,7 @@ impl Case {
         let made = self.teeth.map_or(Ok(Drive::hhd_95()), |teeth| {
             // The module of HHD-95.
             let module_mm = Drive::hhd_95().flexspline.module_mm;
-            let few = FewNumbers { teeth, module_mm, bore_mm: None, width_mm: None, generator: self.generator };
+            let few = FewNumbers { teeth, module_mm, bore_mm: None, generator: self.generator };
             few.drive("SMALL").map(|made| made.drive)
         });
         made.and_then(|drive| drive.with_sets(AS_IN_THE_DECK)).map_err(|error| error.to_string())

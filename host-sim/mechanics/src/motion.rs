@@ -393,13 +393,8 @@ mod tests {
     /// a rim of 1.05 mm, where 0.8 and 1.3 mm take half of the iterations.
     #[test]
     fn a_drive_that_creeps_is_deformed_with_patience() {
-        let few = FewNumbers {
-            teeth: 240,
-            module_mm: 2.54 * 32.0 / 240.0,
-            bore_mm: None,
-            width_mm: None,
-            generator: GeneratorKind::Cam,
-        };
+        let few =
+            FewNumbers { teeth: 240, module_mm: 2.54 * 32.0 / 240.0, bore_mm: None, generator: GeneratorKind::Cam };
         let sets = [
             "sleeve.kind=cup",
             "sleeve.bottom=plate",
@@ -424,7 +419,7 @@ mod tests {
     #[test]
     fn teeth_that_bind_without_load_take_a_light_touch() {
         let kind = GeneratorKind::TwoRoller;
-        let few = FewNumbers { teeth: 164, module_mm: 0.186, bore_mm: None, width_mm: None, generator: kind };
+        let few = FewNumbers { teeth: 164, module_mm: 0.186, bore_mm: None, generator: kind };
         let sets = [
             "flexspline.rim_thickness_mm=0.2926",
             "sleeve.kind=hat",

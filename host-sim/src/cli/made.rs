@@ -194,7 +194,7 @@ mod tests {
     use flexspline_mechanics::drive::FewNumbers;
 
     fn made(teeth: u32, module_mm: f64) -> MadeDrive {
-        let few = FewNumbers { teeth, module_mm, bore_mm: None, width_mm: None, generator: GeneratorKind::Cam };
+        let few = FewNumbers { teeth, module_mm, bore_mm: None, generator: GeneratorKind::Cam };
         few.drive("d").unwrap()
     }
 

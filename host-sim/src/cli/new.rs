@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::context::quoted;
 use super::made::{Clearance, cup_and_balls, left_out, with_formulas, with_s_teeth};
-use super::{Context, Failure, names, say};
+use super::{Context, Failure, bad_input, names, say};
 use flexspline_base::output::write_whole;
 use flexspline_design::catalogue;
 use flexspline_design::relief::relieve_tips;
@@ -58,9 +58,6 @@ pub(super) struct New {
     /// Diameter of the flexspline's bore, undeformed, mm [default: 1.97 times the pitch radius]
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     bore: Option<f64>,
-    /// Face width, mm [default: 0.43 times the pitch radius]
-    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
-    width: Option<f64>,
     /// Generator under which the rigid backlash is made one arc-minute
     #[arg(long, value_name = "G", default_value = "cam", value_parser = names::generator(), hide_possible_values = true)]
     generator: GeneratorKind,
@@ -157,7 +154,6 @@ impl New {
             module: None,
             ratio: None,
             bore: None,
-            width: None,
             generator,
             like: Some(name.to_owned()),
             force: false,
@@ -212,7 +208,7 @@ impl New {
         let file = quoted(&shown);
         let own = made.as_ref().filter(|_| kind == NewKind::Drive);
         let teeth = own.map(|_| Clearance::of(&drive)).transpose();
-        let teeth = teeth.map_err(|error| Failure::BadInput(error.to_string()))?;
+        let teeth = teeth.map_err(bad_input)?;
         if let Some(teeth) = teeth.as_ref().filter(|_| drive.flexspline.profile == Profile::S) {
             teeth.check_s_teeth()?;
         }
@@ -239,8 +235,7 @@ impl New {
                 (Nominal::template(drive.flexspline.teeth, drive.circular_spline.teeth), None, next)
             }
         };
-        write_whole(&self.file, |out| out.write_all(text.as_bytes()))
-            .map_err(|error| Failure::BadInput(error.to_string()))?;
+        write_whole(&self.file, |out| out.write_all(text.as_bytes())).map_err(bad_input)?;
         let written = NewReport {
             schema_version: 1,
             kind,
@@ -309,9 +304,7 @@ impl New {
         if self.like.is_some() && !drive.sleeve.is_shell() {
             let guesses = cup_and_balls(&drive).into_iter().filter(|(path, _)| !context.sets_field(path));
             let sets: Vec<String> = guesses.map(|(path, value)| format!("{path}={value}")).collect();
-            drive = drive
-                .with_sets(sets.iter().map(String::as_str))
-                .map_err(|error| Failure::BadInput(error.to_string()))?;
+            drive = drive.with_sets(sets.iter().map(String::as_str)).map_err(bad_input)?;
         }
         let binds = |error: DriveError| Failure::BadInput(error.to_string());
         if !Clearance::of(&drive).map_err(binds)?.clear.contains(&self.generator) {
@@ -359,9 +352,7 @@ impl New {
     fn with_guesses(&self, context: &Context, file: &str, drive: &Drive) -> String {
         let name = self.like.as_deref().map_or_else(String::new, quoted);
         let mut words = format!("new {file} --force --like {name}");
-        for (option, size) in [("--bore", self.bore), ("--width", self.width)] {
-            words += &size.map_or_else(String::new, |size| format!(" {option} {size}"));
-        }
+        words += &self.bore.map_or_else(String::new, |bore| format!(" --bore {bore}"));
         if self.generator != GeneratorKind::Cam {
             words += &format!(" --generator {}", self.generator);
         }
@@ -389,13 +380,7 @@ impl New {
     /// Name and numbers of a drive of one's own, if it is asked for.
     fn few(&self) -> Result<Option<(String, FewNumbers)>, Failure> {
         let bad = |what: String| Err(Failure::BadInput(what));
-        let few = |teeth, module_mm| FewNumbers {
-            teeth,
-            module_mm,
-            bore_mm: self.bore,
-            width_mm: self.width,
-            generator: self.generator,
-        };
+        let few = |teeth, module_mm| FewNumbers { teeth, module_mm, bore_mm: self.bore, generator: self.generator };
         if let Some(name) = &self.like {
             let Some((_, size, ratio)) = size_and_ratio(name) else {
                 return bad(format!(
@@ -412,8 +397,8 @@ impl New {
             return Ok(Some((name.clone(), few(2 * ratio, CATALOGUE_MM_PER_SIZE * size / f64::from(2 * ratio)))));
         }
         let Some(module_mm) = self.module else {
-            if self.bore.is_some() || self.width.is_some() || self.ratio.is_some() {
-                return bad("--bore, --width, --ratio: found without a drive to make; add --module and --teeth or \
+            if self.bore.is_some() || self.ratio.is_some() {
+                return bad("--bore, --ratio: found without a drive to make; add --module and --teeth or \
                             --ratio, or --like"
                     .to_owned());
             }
@@ -532,8 +517,7 @@ mod tests {
     /// would fail.
     #[test]
     fn teeth_that_bind_under_every_generator_have_no_next_command() {
-        let few =
-            FewNumbers { teeth: 120, module_mm: 0.5, bore_mm: None, width_mm: None, generator: GeneratorKind::Cam };
+        let few = FewNumbers { teeth: 120, module_mm: 0.5, bore_mm: None, generator: GeneratorKind::Cam };
         let sound = few.drive("d").unwrap().drive;
         let thick = sound.with_set("flexspline.rim_thickness_mm=5").unwrap();
         let clearance = Clearance::of(&thick).unwrap();

@@ -6,7 +6,7 @@ use std::path::Path as FilePath;
 
 use clap::{Args, ValueEnum, ValueHint};
 
-use super::{Context, Failure, names, report, say};
+use super::{Context, Failure, bad_input, names, report, say};
 use flexspline_base::figures;
 use flexspline_base::output::{OutputError, Outputs, WholeFolder, write_whole};
 use flexspline_base::progress::Progress;
@@ -99,9 +99,6 @@ pub(super) struct ModelOptions {
     /// Contact penalty on the bore, N/mm^3 [default: 1e7 under rollers, 1e6 under discs and cam]
     #[arg(long, value_name = "K", allow_negative_numbers = true, help_heading = "Numerical method")]
     bore_penalty: Option<f64>,
-    /// Residual force, relative to the largest contact force, at which an increment is done
-    #[arg(long, value_name = "R", default_value_t = SolverSettings::default().tolerance, allow_negative_numbers = true, help_heading = "Numerical method")]
-    tolerance: f64,
     /// Newton iterations before an increment is halved
     #[arg(long, value_name = "N", default_value_t = SolverSettings::default().max_iterations, help_heading = "Numerical method")]
     max_iterations: usize,
@@ -118,7 +115,6 @@ impl ModelOptions {
                 mesh: self.mesh,
                 flank_penalty: self.flank_penalty,
                 bore_penalty: self.bore_penalty,
-                tolerance: self.tolerance,
                 max_iterations: self.max_iterations,
                 ..SolverSettings::default()
             },
@@ -137,7 +133,7 @@ impl Simulate {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         let drive = context.drive()?;
         let settings = self.settings(&drive)?;
-        settings.check(&drive).map_err(|error| Failure::BadInput(error.to_string()))?;
+        settings.check(&drive).map_err(bad_input)?;
         let out = context.out()?;
         if !self.no_report {
             report::before(context, out, "simulate", Some(&drive));
@@ -265,7 +261,7 @@ impl Simulate {
             ))
         })?;
         let temperatures_c = drive.temperature.minimum_c..=drive.temperature.maximum_c;
-        let points = read_path(name, &text, temperatures_c).map_err(|error| Failure::BadInput(error.to_string()))?;
+        let points = read_path(name, &text, temperatures_c).map_err(bad_input)?;
         let twice = [
             ("--torque-n-m", "torque_n_m", self.model.torque_n_m, points[0].torque_n_m),
             ("--temperature-c", "temperature_c", self.model.temperature_c, points[0].temperature_c),

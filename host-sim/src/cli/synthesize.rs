@@ -7,9 +7,9 @@ use clap::{Args, ValueHint};
 use flexspline::Table;
 use serde::Serialize;
 
-use super::context::{Context, quoted, table_image};
+use super::context::{Context, quoted, table_image, table_of};
 use super::tables::fresh_table;
-use super::{Failure, names, say};
+use super::{Failure, bad_input, names, say};
 use flexspline_base::output::Outputs;
 use flexspline_identify::causes::{Parameter, Usual};
 use flexspline_identify::extension::{self, CauseEntry};
@@ -20,6 +20,13 @@ use flexspline_identify::synthesize::{
 };
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
+
+/// Time scale of the drift, s.
+const WANDER_S: f64 = 12.0;
+/// Resolution of the output encoder, bits per turn.
+const ENCODER_BITS: u32 = 22;
+/// Rows per second.
+const RATE_HZ: f64 = 100.0;
 
 /// Make synthetic measurements: a simulated drive with effects, noise and sensors of your choice
 ///
@@ -61,27 +68,12 @@ pub(super) struct Synthesize {
     /// Slow drift of the output angle, arcsec rms
     #[arg(long, value_name = "ARCSEC", default_value_t = 0.8, allow_negative_numbers = true, help_heading = "Sensors")]
     wander_arcsec: f64,
-    /// Time scale of the drift, s
-    #[arg(long, value_name = "S", default_value_t = 12.0, allow_negative_numbers = true, help_heading = "Sensors")]
-    wander_s: f64,
-    /// Resolution of the output encoder, bits per turn
-    #[arg(long, value_name = "N", default_value_t = 22, value_parser = clap::value_parser!(u32).range(10..=40), help_heading = "Sensors")]
-    encoder_bits: u32,
     /// Number of sessions
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u16).range(1..=100), help_heading = "Excitation")]
     sessions: u16,
     /// Rows per session
     #[arg(long, value_name = "N", default_value_t = 3000, value_parser = clap::value_parser!(u32).range(50..=1_000_000), help_heading = "Excitation")]
     rows: u32,
-    /// Rows per second
-    #[arg(
-        long,
-        value_name = "HZ",
-        default_value_t = 100.0,
-        allow_negative_numbers = true,
-        help_heading = "Excitation"
-    )]
-    rate_hz: f64,
     /// Largest speed of the generator, rad/s
     #[arg(
         long,
@@ -179,7 +171,7 @@ impl Synthesize {
         let drive = context.drive()?;
         let mut known = Vec::new();
         if let Some((file, text)) = context.drive_file() {
-            known = extension::causes_in(file, &text).map_err(|error| Failure::BadInput(error.to_string()))?;
+            known = extension::causes_in(file, &text).map_err(bad_input)?;
         }
         // Before there is much work.
         context.out()?;
@@ -200,7 +192,7 @@ impl Synthesize {
             base_radius_mm: drive.circular_spline.base_radius_mm(),
         };
         let plant = Plant { nominal: &nominal, table: table.as_ref() };
-        let made = synthesize(&plant, sizes, &chosen, &on, (&sensors, self.encoder_bits), unit, &mut random)
+        let made = synthesize(&plant, sizes, &chosen, &on, (&sensors, ENCODER_BITS), unit, &mut random)
             .map_err(|what| Failure::BadInput(format!("--effect: {what}")))?;
         let csv = to_csv(&made.sessions, nominal.ratio, &made.effects, &mut random);
         let (data_faults, effects) = made.effects.into_iter().partition(|effect| effect.definition.is_fault());
@@ -218,7 +210,7 @@ impl Synthesize {
             },
             noise_arcsec: self.noise_arcsec,
             wander_arcsec: self.wander_arcsec,
-            encoder_bits: self.encoder_bits,
+            encoder_bits: ENCODER_BITS,
             sessions: made.sessions.len(),
             rows: made.sessions.iter().map(flexspline_identify::measurement::Session::len).sum(),
         };
@@ -239,7 +231,6 @@ impl Synthesize {
                 Err(Failure::BadInput(format!("{option}: found {found}; allowed: {low} to {high}")))
             }
         };
-        within("--rate-hz", self.rate_hz, 0.1, 1e5)?;
         within("--speed", self.speed, 1e-3, 1e3)?;
         within("--torque", self.torque, 1e-3, 1e5)?;
         let range: Vec<f64> = self.temperature_c.split(',').filter_map(|t| t.trim().parse().ok()).collect();
@@ -261,7 +252,7 @@ impl Synthesize {
             Sensors {
                 white_arcsec: within("--noise-arcsec", self.noise_arcsec, 0.0, 1e5)?,
                 wander_arcsec: within("--wander-arcsec", self.wander_arcsec, 0.0, 1e5)?,
-                wander_s: within("--wander-s", self.wander_s, 1e-2, 1e6)?,
+                wander_s: WANDER_S,
             },
             temperatures,
         ))
@@ -272,7 +263,7 @@ impl Synthesize {
             let plan = Plan {
                 sessions: usize::from(self.sessions),
                 rows: self.rows as usize,
-                rate_hz: self.rate_hz,
+                rate_hz: RATE_HZ,
                 speed_rad_s: self.speed,
                 torque_n_m: self.torque,
                 richness: Richness::Rich,
@@ -282,8 +273,8 @@ impl Synthesize {
         let map = if self.columns.is_empty() { Ok(ColumnMap::default()) } else { ColumnMap::parse(&self.columns) };
         let map = map.map_err(|error| Failure::BadInput(format!("--columns: {error}")))?;
         let gear = nominal.gear();
-        let recording = read(path, &map, &gear).map_err(|error| Failure::BadInput(error.to_string()))?;
-        Ok(Excitation::of_sessions(&recording.sessions, self.rate_hz, nominal.temperature_c))
+        let recording = read(path, &map, &gear).map_err(bad_input)?;
+        Ok(Excitation::of_sessions(&recording.sessions, RATE_HZ, nominal.temperature_c))
     }
 
     /// How to diagnose what was made.
@@ -311,7 +302,7 @@ impl Synthesize {
         drive: &Drive,
     ) -> Result<(Option<Vec<u8>>, Nominal, Vec<CauseEntry>, NominalSource), Failure> {
         if let Some(file) = &self.model {
-            let model = extension::Model::read(file).map_err(|error| Failure::BadInput(error.to_string()))?;
+            let model = extension::Model::read(file).map_err(bad_input)?;
             let source = NominalSource {
                 kind: "model",
                 file: Some(file.display().to_string()),
@@ -324,7 +315,7 @@ impl Synthesize {
         let (image, file) = match &self.tables {
             Some(folder) => {
                 let (path, image) = table_image(folder, self.generator)?;
-                Table::check(&image).map_err(|error| Failure::BadInput(format!("{}: {error}", path.display())))?;
+                table_of(&path, &image)?;
                 (image, Some(path.display().to_string()))
             }
             None => (fresh_table(context, drive, self.generator, MeshLevel::Coarse)?.image, None),

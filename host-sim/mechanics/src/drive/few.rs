@@ -1,4 +1,4 @@
-//! A drive from a few numbers: teeth, module, bore, width.
+//! A drive from a few numbers: teeth, module, bore.
 //!
 //! The rest is the toothing of [`Drive::hhd_95`] in modules, whose teeth clear one another from 90 to 800 teeth. Fewer
 //! teeth leave no room at the root of the circular spline, so they are made lower there. One number has no formula: the
@@ -22,8 +22,6 @@ pub struct FewNumbers {
     /// Diameter of the flexspline's bore, undeformed, mm; without it the rim is as thick for its radius as that of
     /// HHD-95.
     pub bore_mm: Option<f64>,
-    /// Face width, mm; without it as wide for its diameter as HHD-95.
-    pub width_mm: Option<f64>,
     /// Generator under which the backlash is set.
     pub generator: GeneratorKind,
 }
@@ -133,13 +131,8 @@ impl FewNumbers {
             return Err(Problem::of("bore", what).into());
         }
         put(&mut f.rim_thickness_mm, "flexspline.rim_thickness_mm", rim_mm, why);
-        match self.width_mm {
-            Some(width) => f.width_mm = width,
-            None => {
-                let width_mm = like.flexspline.width_mm * scale;
-                put(&mut f.width_mm, "flexspline.width_mm", width_mm, "0.4255 pitch radii, as HHD-95".to_owned());
-            }
-        }
+        let width_mm = like.flexspline.width_mm * scale;
+        put(&mut f.width_mm, "flexspline.width_mm", width_mm, "0.4255 pitch radii, as HHD-95".to_owned());
         put(&mut f.root_fillet_mm, "flexspline.root_fillet_mm", 0.24 * m, "0.24 modules".to_owned());
         put(&mut f.tip_rounding_mm, "flexspline.tip_rounding_mm", 0.06 * m, "0.06 modules".to_owned());
         let bore_radius_mm = f.bore_radius_mm();
@@ -248,7 +241,7 @@ mod tests {
     use super::*;
 
     fn few(teeth: u32, module_mm: f64) -> FewNumbers {
-        FewNumbers { teeth, module_mm, bore_mm: None, width_mm: None, generator: GeneratorKind::Cam }
+        FewNumbers { teeth, module_mm, bore_mm: None, generator: GeneratorKind::Cam }
     }
 
     /// Its own numbers make HHD-95 again, but for the shift, which was chosen for a little less backlash.
