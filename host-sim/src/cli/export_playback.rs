@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum, ValueHint};
+use clap::{Args, ValueHint};
 use flexspline::Table;
 use serde::Serialize;
 
@@ -19,16 +19,6 @@ use flexspline_identify::replay::{RowsRead, replay};
 const FEWEST_ROWS: usize = 32;
 /// A file that leaves more than this share of a unit's error is refused: a guess.
 const POINTLESS: f64 = 0.7;
-
-/// Directions of motion a curve is made for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Directions {
-    Both,
-    #[value(name = "+")]
-    Forward,
-    #[value(name = "-")]
-    Backward,
-}
 
 /// Options of these formats.
 #[derive(Debug, Args)]
@@ -47,8 +37,8 @@ pub(super) struct PlaybackOptions {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(8..=4096))]
     points_per_turn: Option<u32>,
     /// Directions of the output in the csv, each a column: both, + or - [default: both]
-    #[arg(long, value_enum, value_name = "D", hide_possible_values = true)]
-    direction: Option<Directions>,
+    #[arg(long, value_parser = ["both", "+", "-"], value_name = "D", hide_possible_values = true)]
+    direction: Option<String>,
     /// Full name of the table: cfs [default: FLEXSPLINE.TABLE]
     #[arg(long, value_name = "APP.TABLE")]
     table_name: Option<String>,
@@ -129,10 +119,10 @@ impl PlaybackOptions {
                 fprime(section, &image, component, self.part_bytes.unwrap_or(500))
             }
             _ => {
-                let directions = match self.direction {
-                    None | Some(Directions::Both) => &BOTH[..],
-                    Some(Directions::Forward) => &BOTH[..1],
-                    Some(Directions::Backward) => &BOTH[1..],
+                let directions = match self.direction.as_deref() {
+                    Some("+") => &BOTH[..1],
+                    Some("-") => &BOTH[1..],
+                    _ => &BOTH[..],
                 };
                 let made = Curve::new(section, self.points_per_turn.unwrap_or(32), directions);
                 Ok((vec![curve.insert(made).csv(section)], Vec::new()))
