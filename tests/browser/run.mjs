@@ -281,7 +281,7 @@ await check("the page of reproduce answers, shows each generator and turns the d
     answer.includes(`Of ${claims.length} claims`) && answer.includes(`paper ${counts.reproduced} are reproduced`),
     answer,
   );
-  const verdicts = await page.locator("#claims tbody tr td:nth-child(2)").allTextContents();
+  const verdicts = await page.locator("#claims tbody tr td:nth-child(3)").allTextContents();
   assert(verdicts.join() === claims.map((claim) => claim.verdict).join(), `verdicts ${verdicts}`);
   for (const choice of report.choices.map((c) => c.id)) {
     await page.locator(`input[name=choice][value=${choice}] + span`).click();

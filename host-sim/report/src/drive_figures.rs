@@ -56,7 +56,7 @@ pub(super) fn mean_arcsec(animation: &Animation) -> f64 {
 }
 
 /// Error over the frames of a pitch, less its mean: degrees from the beginning of the pitch, arcsec.
-pub(super) fn less_mean(animation: &Animation) -> Vec<[f64; 2]> {
+pub fn less_mean(animation: &Animation) -> Vec<[f64; 2]> {
     let (e, mean) = (&animation.error_arcsec, mean_arcsec(animation));
     (0..=FRAMES).map(|k| [degrees(animation, k as i64), e[k % FRAMES] - mean]).collect()
 }
@@ -67,7 +67,7 @@ pub(super) fn over_pitch() -> Axis {
 }
 
 /// The drive to scale; `state` says under what load it turns, and which way.
-pub(super) fn drive_figure(state: &str) -> Figure {
+pub fn drive_figure(state: &str) -> Figure {
     let caption = format!(
         "Contact FEM, plane strain, {state}; both wheels meshed as computed. The flexspline stands and is \
              deformed by the generator (grey); the circular spline turns: the red dot is on tooth 0, the blue one on \
