@@ -96,8 +96,6 @@ pub struct FlankContact<'a> {
     fs_turns: Vec<(f64, f64)>,
     cs_turns: Vec<(f64, f64)>,
     rule: Vec<(f64, f64)>,
-    /// What straight facets of the space add to it at most, mm; zero where it is smooth.
-    deepest_facet: f64,
     /// The load along the face, where it is not even.
     face: Option<FaceLaw>,
 }
@@ -263,20 +261,7 @@ impl<'a> FlankContact<'a> {
         let turns = |mesh: &WheelMesh| (0..mesh.teeth).map(|sector| mesh.sector_angle(sector).sin_cos()).collect();
         let (fs_turns, cs_turns) = (turns(fs_mesh), turns(cs_mesh));
         let rule = gauss_legendre(4);
-        let deepest_facet = space.deepest_facet();
-        FlankContact {
-            fs_mesh,
-            cs_mesh,
-            tooth,
-            space,
-            deviations,
-            coarse,
-            fs_turns,
-            cs_turns,
-            rule,
-            deepest_facet,
-            face: None,
-        }
+        FlankContact { fs_mesh, cs_mesh, tooth, space, deviations, coarse, fs_turns, cs_turns, rule, face: None }
     }
 
     /// This contact with a law of the load along the face.
@@ -363,7 +348,7 @@ impl<'a> FlankContact<'a> {
     /// spline brings the flank nearer than its own length.
     #[inline]
     fn least_distance(&self, field: &LocalField, x: [f64; 2]) -> f64 {
-        self.space.least_distance(field.space.recover(x)) + field.depth - field.largest_cs - self.deepest_facet
+        self.space.least_distance(field.space.recover(x)) + field.depth - field.largest_cs
     }
 
     fn local_field(&self, pair: FlankPair, at: Configuration) -> LocalField {
@@ -505,7 +490,7 @@ impl<'a> FlankContact<'a> {
                 let r = middle + half * xi;
                 let (edge, local) = flank.locate(r);
                 points.push(FlankPoint {
-                    position: self.tooth.facet_point(r),
+                    position: self.tooth.point(r),
                     edge,
                     shape: edge_shape(local),
                     weight: w * half * self.tooth.arc_rate(r),

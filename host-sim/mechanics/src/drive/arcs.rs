@@ -109,18 +109,6 @@ impl ArcChain {
         chain
     }
 
-    /// Straight from point to point.
-    pub(crate) fn straight(points: &[[f64; 2]]) -> ArcChain {
-        let mut chain = ArcChain { arcs: Vec::new() };
-        for pair in points.windows(2) {
-            let d = minus(pair[1], pair[0]);
-            let length = d[0].hypot(d[1]);
-            let tangent = d.map(|x| x / length);
-            chain.arcs.push(Arc { start: pair[0], tangent, curvature: 0.0, from: chain.length(), length });
-        }
-        chain
-    }
-
     /// This chain with a straight line of that length before it, tangent to it.
     pub(crate) fn with_lead(self, length: f64) -> ArcChain {
         let first = self.arcs[0];

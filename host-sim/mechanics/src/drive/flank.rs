@@ -45,10 +45,6 @@ struct Involute {
     /// Roll angle half way up the flank, tangent of the pressure angle there, and `half_base` plus that pressure angle.
     middle_roll: f64,
     half_base_and_middle: f64,
-    /// Arc lengths of both ends.
-    ends: [f64; 2],
-    /// Straight facets in place of the involute.
-    facets: Option<u32>,
 }
 
 /// Foot of a point on the flank.
@@ -75,10 +71,6 @@ impl Involute {
         0.5 * (radius * radius - self.base_radius * self.base_radius).max(0.0) / self.base_radius
     }
 
-    fn radius_at(&self, arc: f64) -> f64 {
-        (self.base_radius * (self.base_radius + 2.0 * arc)).sqrt()
-    }
-
     fn half_angle(&self, radius: f64) -> f64 {
         self.half_base - involute_function(radius / self.base_radius)
     }
@@ -86,34 +78,6 @@ impl Involute {
     fn point(&self, radius: f64) -> [f64; 2] {
         let (s, c) = self.half_angle(radius).sin_cos();
         [radius * c, radius * s]
-    }
-
-    /// The facet at an arc length, if there are facets and it lies on them: arc lengths of its ends, and the radius of
-    /// curvature of the involute half way.
-    fn facet(&self, arc: f64) -> Option<([f64; 2], f64)> {
-        let count = f64::from(self.facets?);
-        let [a, b] = self.ends;
-        let at = (arc - a) / (b - a) * count;
-        if !(0.0..=count).contains(&at) {
-            return None;
-        }
-        let k = at.floor().min(count - 1.0);
-        let ends = [a + (b - a) * k / count, a + (b - a) * (k + 1.0) / count];
-        Some((ends, (self.base_radius * (ends[0] + ends[1])).sqrt()))
-    }
-
-    /// How far the chord stands off the involute at an arc length, towards the centre of its curvature, and how that
-    /// changes along the arc. A parabola: within 2 % of the chord where one facet is the whole flank.
-    fn facet_depth(&self, arc: f64) -> (f64, f64) {
-        let Some(([a, b], curvature_radius)) = self.facet(arc) else { return (0.0, 0.0) };
-        (0.5 * (arc - a) * (b - arc) / curvature_radius, 0.5 * (a + b - 2.0 * arc) / curvature_radius)
-    }
-
-    fn facet_point(&self, radius: f64) -> [f64; 2] {
-        let arc = self.arc_at(radius);
-        let Some(([a, b], _)) = self.facet(arc) else { return self.point(radius) };
-        let (p, q, t) = (self.point(self.radius_at(a)), self.point(self.radius_at(b)), (arc - a) / (b - a));
-        [p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])]
     }
 
     /// Length of the tangent from a point to the base circle, and signed distance of the point from the involute
@@ -151,14 +115,7 @@ impl Involute {
         let normal = [-(sin * p[0] - cos * p[1]), -(sin * p[1] + cos * p[0])];
         let tangent = [cos * p[0] + sin * p[1], cos * p[1] - sin * p[0]];
         let arc = 0.5 * foot_along * foot_along / self.base_radius;
-        let mut foot = Foot { distance, normal, tangent, radius, radius_rate: self.base_radius / radius, arc };
-        if self.facets.is_some() {
-            // The chord stands in the space; the gradient of the distance turns with it.
-            let (depth, slope) = self.facet_depth(arc);
-            foot.distance -= depth;
-            foot.normal = [normal[0] - slope * tangent[0], normal[1] - slope * tangent[1]];
-        }
-        Some(foot)
+        Some(Foot { distance, normal, tangent, radius, radius_rate: self.base_radius / radius, arc })
     }
 }
 
@@ -175,16 +132,12 @@ impl ActiveFlank {
             &FlankShape::Involute { base_radius, half_base } => {
                 let middle = 0.5 * (start_radius + junction_radius) / base_radius;
                 let middle_roll = (middle * middle - 1.0).max(0.0).sqrt();
-                let mut involute = Involute {
+                FlankCurve::Involute(Involute {
                     base_radius,
                     half_base,
                     middle_roll,
                     half_base_and_middle: half_base + middle_roll.atan(),
-                    ends: [0.0; 2],
-                    facets: None,
-                };
-                involute.ends = [start_radius, junction_radius].map(|radius| involute.arc_at(radius));
-                FlankCurve::Involute(involute)
+                })
             }
             FlankShape::Chain(chain) => FlankCurve::Chain(Arc::clone(chain)),
         };
@@ -203,23 +156,6 @@ impl ActiveFlank {
         found
     }
 
-    /// This flank with so many chords of equal length in its place: what contact on the edges of a mesh sees.
-    pub(crate) fn with_facets(mut self, facets: Option<u32>) -> ActiveFlank {
-        let facets = facets.filter(|count| *count > 0);
-        match (&mut self.curve, facets) {
-            (FlankCurve::Involute(involute), _) => involute.facets = facets,
-            (FlankCurve::Chain(_), None) => {}
-            (FlankCurve::Chain(chain), Some(count)) => {
-                let [a, b] = [self.start_radius, self.junction_radius].map(|radius| chain.arc_at_radius(radius));
-                let (low, high) = (a.min(b), a.max(b));
-                let at = |k: u32| chain.point(low + (high - low) * f64::from(k) / f64::from(count));
-                *chain = Arc::new(ArcChain::straight(&(0..=count).map(at).collect::<Vec<_>>()));
-                self.junction_arc = chain.arc_at_radius(self.junction_radius);
-            }
-        }
-        self
-    }
-
     /// Whether both wheels have curved flanks that meet in their middle, not at their tips.
     pub(crate) fn is_s_shaped(&self) -> bool {
         matches!(self.curve, FlankCurve::Chain(_))
@@ -230,25 +166,6 @@ impl ActiveFlank {
         match &self.curve {
             FlankCurve::Involute(involute) => involute.arc_at(radius),
             FlankCurve::Chain(chain) => chain.arc_at_radius(radius),
-        }
-    }
-
-    /// The point of the flank in place of that of the curve at a radius: on its chord, where there are facets.
-    pub(crate) fn facet_point(&self, radius: f64) -> [f64; 2] {
-        match &self.curve {
-            FlankCurve::Involute(involute) => involute.facet_point(radius),
-            FlankCurve::Chain(_) => self.point(radius),
-        }
-    }
-
-    /// What facets add to the material of a space at most beyond the curve that [`ActiveFlank::least_distance`] is
-    /// from, mm.
-    pub(crate) fn deepest_facet(&self) -> f64 {
-        match &self.curve {
-            FlankCurve::Involute(involute) => involute
-                .facet(involute.ends[0].min(involute.ends[1]))
-                .map_or(0.0, |([a, b], curvature_radius)| 0.125 * (b - a) * (b - a) / curvature_radius),
-            FlankCurve::Chain(_) => 0.0,
         }
     }
 
@@ -468,54 +385,6 @@ mod tests {
             assert!((slope(0.0, h) - foot.normal[1]).abs() < 1e-6, "at {r}");
             assert!((foot.normal[0] * foot.tangent[0] + foot.normal[1] * foot.tangent[1]).abs() < 1e-12);
         }
-    }
-
-    /// The distance from chords is that of the polyline, found by brute force.
-    #[test]
-    fn facets_are_chords() {
-        let drive = Drive::hhd_95();
-        let (space, _) = space();
-        let tooth = ToothFlank::external(&drive).unwrap();
-        let tooth = ActiveFlank::new(&tooth);
-        for count in [1, 3] {
-            let (chords, smooth) = (space.clone().with_facets(Some(count)), &space);
-            let vertex = |flank: &ActiveFlank, k: u32| {
-                let (a, b) = (flank.arc_at(flank.start_radius), flank.arc_at(flank.junction_radius));
-                let arc = a + (b - a) * f64::from(k) / f64::from(count);
-                flank.point(involute(flank).radius_at(arc))
-            };
-            let ends: Vec<[f64; 2]> = (0..=count).map(|k| vertex(smooth, k)).collect();
-            let mut deepest = 0.0_f64;
-            for k in 1..40 {
-                let r = smooth.junction_radius + (smooth.start_radius - smooth.junction_radius) * f64::from(k) / 40.0;
-                let ([x, y], foot) = (smooth.point(r), smooth.foot_internal(smooth.point(r)));
-                let p = [x + 0.004 * foot.normal[0], y + 0.004 * foot.normal[1]];
-                let brute = ends
-                    .windows(2)
-                    .map(|ends| {
-                        let along = [ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]];
-                        let length = along[0].hypot(along[1]);
-                        let beside = [p[0] - ends[0][0], p[1] - ends[0][1]];
-                        let t = (along[0] * beside[0] + along[1] * beside[1]) / (length * length);
-                        let inside = (-1e-6..=1.0 + 1e-6).contains(&t);
-                        let across = (along[0] * beside[1] - along[1] * beside[0]).abs() / length;
-                        if inside { across } else { f64::INFINITY }
-                    })
-                    .fold(f64::INFINITY, f64::min);
-                // The space lies on the side of the normal and the chord stands in it.
-                let found = chords.foot_internal(p);
-                assert!((found.distance.abs() - brute).abs() < 5e-5, "{count} at {r}: {} {brute}", found.distance);
-                deepest = deepest.max(0.004 - found.distance);
-                let q = tooth.clone().with_facets(Some(count)).facet_point(48.0 + 0.02 * f64::from(k));
-                let material = tooth.half_angle(q[0].hypot(q[1])) - q[1].atan2(q[0]);
-                assert!(material >= -1e-12, "a facet of the tooth stands out of it");
-            }
-            assert!(deepest > 1e-4 && deepest <= chords.deepest_facet() * 1.1, "{deepest} {}", chords.deepest_facet());
-            assert!(
-                (chords.deepest_facet() / space.clone().with_facets(Some(2 * count)).deepest_facet() - 4.0).abs() < 0.3
-            );
-        }
-        assert_eq!((space.deepest_facet(), space.facet_point(48.9)), (0.0, space.point(48.9)));
     }
 
     #[test]

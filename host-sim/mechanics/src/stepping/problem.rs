@@ -84,9 +84,6 @@ pub struct SolverSettings {
     pub bore_points: Option<usize>,
     /// What holds the rotation of the flexspline.
     pub holding: Holding,
-    /// Straight facets in place of each flank of both wheels, as contact on the edges of a mesh has them; `None`: the
-    /// curve. To show what that does.
-    pub flank_facets: Option<u32>,
     /// Residual force, relative to the largest contact force, at which an increment is done.
     pub tolerance: f64,
     /// Newton iterations before an increment is halved.
@@ -125,7 +122,6 @@ impl Default for SolverSettings {
             flank_penalty: 5e7,
             bore_points: None,
             holding: Holding::default(),
-            flank_facets: None,
             tolerance: 1e-6,
             max_iterations: 60,
             max_halvings: 8,
@@ -204,7 +200,6 @@ impl Problem {
         let width = drive.flexspline.width_mm;
         let tooth = ActiveFlank::new(&ToothFlank::external(&drive)?);
         let space = ActiveFlank::new(&ToothFlank::internal(&drive)?);
-        let [tooth, space] = [tooth, space].map(|flank| flank.with_facets(settings.flank_facets));
         let deviations = FlankDeviations::new(&drive);
         let outer = drive.circular_spline.outer_radius_mm;
         let mut held: Vec<bool> = circular_spline.nodes.iter().map(|p| p[0].hypot(p[1]) > outer - 1e-6).collect();
