@@ -31,9 +31,9 @@
 //! # Ok::<(), flexspline_sim::stepping::SolveError>(())
 //! ```
 //!
-//! `examples/contact.rs` goes on to loads and a whole tooth pitch. Lengths are mm, forces N, torques N m, angles rad,
-//! temperatures °C, and a name carries any other unit. A positive load turns the output forward; the error is output
-//! angle minus generator angle over the ratio, positive when the output leads.
+//! Lengths are mm, forces N, torques N m, angles rad, temperatures °C, and a name carries any other unit. A positive
+//! load turns the output forward; the error is output angle minus generator angle over the ratio, positive when the
+//! output leads.
 #![forbid(unsafe_code)]
 
 pub use flexspline_base::{csv_rows, output, robust, statistics, suggest, toml_file, units};
