@@ -26,7 +26,6 @@ mod friction;
 mod fxt_format;
 mod independence;
 mod joint_in_motion;
-mod loops_end;
 mod measured_data;
 mod mirror_symmetry;
 mod one_pitch_periodicity;
