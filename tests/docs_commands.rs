@@ -26,13 +26,12 @@ use flexspline_sim::extension::Model;
 use flexspline_tests::command::flexspline;
 
 /// Commands that are not run from a page: how they begin, and why.
-const NOT_RUN: [(&str, &str); 12] = [
+const NOT_RUN: [(&str, &str); 11] = [
     ("tests/run", "runs this test; its parts are checked by name"),
     ("git clone", "needs the network"),
     ("rustup ", "changes the toolchains of whoever runs the tests"),
     ("cargo install ", "needs the network"),
     ("cargo test ", "is what runs this test"),
-    ("cargo bench ", "minutes of one processor that nothing else may use"),
     ("cargo doc ", "tests/run host builds the documentation"),
     ("cargo mutants ", "hours"),
     ("cargo build ", "tests/run builds what is built here"),

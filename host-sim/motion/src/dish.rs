@@ -55,15 +55,3 @@ pub fn scenario() -> Scenario {
         seed: 3,
     }
 }
-
-/// The dish to and fro for ten minutes, under gravity too: what the time of a flight is told of.
-pub fn ten_minutes() -> Scenario {
-    let scenario = scenario();
-    let legs = (0..60).map(|k| Leg { seconds: 10.0, rate_rad_s: if k % 2 == 0 { 2e-3 } else { -1e-4 } });
-    Scenario {
-        name: "ten minutes".to_owned(),
-        legs: legs.collect(),
-        load: Load { gravity: [2.0, 0.0], ..scenario.load },
-        ..scenario
-    }
-}

@@ -330,7 +330,7 @@ pub fn fly_told(
     })
 }
 
-/// Flies one controller alone: for benches.
+/// Flies one controller alone.
 ///
 /// # Errors
 /// As [`fly`].
