@@ -14,7 +14,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::stepping::{Effort, Increment, Problem, SolveError, Solver, State};
+use crate::stepping::{Increment, Problem, SolveError, Solver, State};
 use crate::units::ARCSEC_PER_RAD;
 
 /// Share of its nominal rate at which an output follows: it stands while clearance is crossed, then moves on at about
@@ -102,11 +102,6 @@ impl<'p> Motion<'p> {
     /// The mechanical problem.
     pub fn problem(&self) -> &'p Problem {
         self.problem
-    }
-
-    /// Time that solving took since this was last asked.
-    pub fn take_effort(&mut self) -> Effort {
-        std::mem::take(&mut self.solver.effort)
     }
 
     /// Where the drive stands.

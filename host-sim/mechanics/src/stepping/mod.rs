@@ -19,6 +19,6 @@ mod wheels;
 
 pub use error::SolveError;
 pub use fast::CondensedDrive;
-pub use newton::{Effort, Face, Increment, Solver};
+pub use newton::{Face, Increment, Solver};
 pub use problem::{Holding, Method, Problem, SolverSettings};
 pub use state::State;

@@ -11,7 +11,6 @@
 
 use std::collections::VecDeque;
 use std::rc::Rc;
-use std::time::{Duration, Instant};
 
 use crate::contact::{AlongFace, Configuration, FlankContact, FlankLaw, FlankPair, Lean};
 use crate::fem::{Border, BorderedSystem};
@@ -110,23 +109,6 @@ impl Face {
     pub const EVEN: Face = Face { tilt_rad: 0.0, skew_rad: 0.0, peak_over_mean: 1.0, share: 1.0 };
 }
 
-/// Time spent in the parts of the solver, by the clock.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Effort {
-    /// Element tangents, forces and their assembly.
-    pub assembly: Duration,
-    /// Contact search, forces and tangents.
-    pub contact: Duration,
-    /// Ordering and symbolic factorisation.
-    pub analysis: Duration,
-    /// Numerical factorisation.
-    pub factorisation: Duration,
-    /// Triangular solves.
-    pub solution: Duration,
-    /// Number of factorisations.
-    pub factorisations: usize,
-}
-
 /// Newton solver with its work space: one per thread.
 pub struct Solver<'p> {
     problem: &'p Problem,
@@ -151,8 +133,6 @@ pub struct Solver<'p> {
     leans_within: f64,
     /// Least compliance under load that was met, rad/(N m).
     stiffest: f64,
-    /// Time spent so far.
-    pub effort: Effort,
 }
 
 /// A tangent of steady motion: the drive passes through it again after every pitch.
@@ -185,7 +165,6 @@ impl<'p> Solver<'p> {
             passed: Passed::default(),
             leans_within: problem.leans_within(),
             stiffest: f64::INFINITY,
-            effort: Effort::default(),
         }
     }
 
@@ -484,7 +463,6 @@ impl<'p> Solver<'p> {
 
     /// Turns the output to where load, drag and flanks balance while the wheels keep their shape.
     fn balance_output(&mut self, state: &mut State, sought: Sought<'_>, near: &mut NearPairs) {
-        let clock = Instant::now();
         let load = self.problem.per_width(sought.torque_n_m);
         let anchor_rad = state.drag_anchor_rad;
         let others = |output_rad: f64| {
@@ -498,7 +476,6 @@ impl<'p> Solver<'p> {
             near.advance((output_rad - state.output_rad).abs() * self.problem.drive.circular_spline.root_radius_mm);
             state.output_rad = output_rad;
         }
-        self.effort.contact += clock.elapsed();
     }
 
     /// Looks for pairs that may have come near.
@@ -511,30 +488,22 @@ impl<'p> Solver<'p> {
 
     /// Assembles the out-of-balance forces and the tangent.
     fn assemble(&mut self, state: &mut State, sought: Sought<'_>, near: &mut NearPairs) -> Residual {
-        let clock = Instant::now();
         self.problem.lean(state);
         self.look_around(state, sought.from, near);
-        self.effort.contact += clock.elapsed();
         self.make_room(configuration(state), near);
-        let clock = Instant::now();
         let mut residual = Residual::zero(self.wheels.unknowns());
         self.wheels.assemble(state, &mut residual.force);
-        self.effort.assembly += clock.elapsed();
-        let clock = Instant::now();
         self.assemble_contact(state, sought.stage, near, &mut residual);
         self.assemble_holding(state, sought.torque_n_m, &mut residual);
-        self.effort.contact += clock.elapsed();
         residual
     }
 
     /// Makes sure that the tangent has room for these pairs.
     fn make_room(&mut self, at: Configuration, near: &NearPairs) {
-        let clock = Instant::now();
         let pairs: Vec<FlankPair> = near.pairs().collect();
         if self.wheels.prepare(&pairs, &|| self.flanks.near_pairs(at, PATTERN_REACH)) {
             self.eliminated = None;
         }
-        self.effort.analysis += clock.elapsed();
     }
 
     fn assemble_contact(&mut self, state: &State, stage: ContactStage, near: &mut NearPairs, residual: &mut Residual) {
@@ -664,29 +633,22 @@ impl<'p> Solver<'p> {
         // What the forces do without the border, where it was solved with a new factor's own.
         let mut begun = None;
         if !chord || self.eliminated.is_none() {
-            let clock = Instant::now();
             self.eliminated = None;
             // Far from equilibrium the rim may resist no sliding along the generator; a grounded spring at every node
             // then shortens the step and leaves its direction downhill.
             let definite = std::iter::once(0.0).chain(GROUNDED_SPRINGS).any(|spring| self.wheels.factorise(spring));
-            self.effort.factorisation += clock.elapsed();
-            self.effort.factorisations += 1;
             if !definite {
                 return None;
             }
-            let clock = Instant::now();
             let (system, solved) = BorderedSystem::new(self.wheels.as_mut(), &self.border, &residual.force);
             self.eliminated = Some(Rc::new(system));
             begun = Some(solved);
             self.turned = 0;
-            self.effort.solution += clock.elapsed();
         }
-        let clock = Instant::now();
         let slipping = std::mem::take(&mut self.slipping);
         let forces = NodalField { free: residual.force.clone(), border: residual.border };
         let solved = slipping.solve(forces, |field| self.solve_symmetric(field, begun.take()));
         self.slipping = slipping;
-        self.effort.solution += clock.elapsed();
         let NodalField { free, border } = solved?;
         let (fs, _) = self.problem.wheels();
         let u = free[..2 * fs.nodes.len()].to_vec();
