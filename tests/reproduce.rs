@@ -15,8 +15,6 @@
 //! rim along its circumference.
 
 use std::collections::BTreeSet;
-use std::fs;
-use std::path::Path;
 
 use flexspline_sim::drive::{Drive, GeneratorKind};
 use flexspline_tests::command::Desk;
@@ -66,14 +64,6 @@ fn the_paper_claim_by_claim() {
     the_error_repeats_and_is_half_the_clearance(&json);
     a_point_that_is_held_moves_the_output_by_what_it_moves(&json);
     the_page_is_self_contained(&desk, &json);
-    // Half a minute of two cores: `tests/run browser` looks at the same page.
-    if let Some(kept) = std::env::var_os("FLEXSPLINE_REPRODUCED") {
-        fs::create_dir_all(&kept).unwrap();
-        for entry in fs::read_dir(desk.path("made")).unwrap() {
-            let entry = entry.unwrap();
-            fs::copy(entry.path(), Path::new(&kept).join(entry.file_name())).unwrap();
-        }
-    }
 }
 
 fn claims_are_complete(json: &Value) {

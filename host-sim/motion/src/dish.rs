@@ -1,4 +1,4 @@
-//! A dish on a joint by a law: what tests, the bench and the example fly without a contact FEM.
+//! A dish on a joint by a law: what tests and the example fly without a contact FEM.
 
 use core::f64::consts::TAU;
 
