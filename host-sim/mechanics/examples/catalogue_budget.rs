@@ -259,12 +259,12 @@ fn row(what: &str, values: [f64; 3], unit: &str) {
 /// A drive as in the catalogue by its plane slice, and in its cup.
 fn plane_and_cup(entry: &Catalogue, guess: &Guess) -> Result<[Drive; 2], Box<dyn std::error::Error>> {
     let pitch_mm = 2.54 * f64::from(entry.size);
-    let mut numbers =
+    let numbers =
         FewNumbers { teeth: 200, module_mm: pitch_mm / 200.0, bore_mm: None, generator: GeneratorKind::Cam };
     let name = format!("size {}", entry.size);
-    let proportion_mm = numbers.drive(&name)?.drive.flexspline.width_mm;
-    numbers.width_mm = (guess.width != 1.0).then_some(guess.width * proportion_mm);
-    let plane = numbers.drive(&name)?.drive.with_set("sleeve.kind=none")?;
+    let drive = numbers.drive(&name)?.drive;
+    let width = format!("flexspline.width_mm={}", guess.width * drive.flexspline.width_mm);
+    let plane = drive.with_sets([width.as_str(), "sleeve.kind=none"])?;
     let wall_mm = guess.wall * pitch_mm;
     let [bottom, hub] = BOTTOM;
     let sets = [
