@@ -30,7 +30,8 @@
 // No correction could be made; the last one is kept or fades out.
 #define FLEXSPLINE_FLAG_NOT_CORRECTED 16
 
-// What was read of the table was not whole. It was mended and the tick done again, unless not corrected is set too.
+// The words read of the table differed between the copies. They were repaired and the tick repeated, unless not
+// corrected is set too.
 #define FLEXSPLINE_FLAG_TABLE_DOUBT 32
 
 // The state was not whole, and was taken from its other copy; where neither was, the joint is safe.
@@ -115,7 +116,7 @@
 // There is no table.
 #define FLEXSPLINE_HEALTH_EMPTY 3
 
-// What is known of the table is not whole: activate it again.
+// The store's data on the table is corrupt: activate it again.
 #define FLEXSPLINE_HEALTH_TORN 4
 
 // A tick that came late: the ticks missed are counted, nothing more.
@@ -205,7 +206,7 @@
 // The adjustment is zero; what was learnt is kept. The start.
 #define FLEXSPLINE_LEARNING_OFF 0
 
-// What was learnt is used and stays as it is.
+// The learnt coefficients are used and stay as they are.
 #define FLEXSPLINE_LEARNING_FROZEN 1
 
 // Measurements are used.
@@ -325,7 +326,7 @@
 // A reading came and went, or was no number.
 #define FLEXSPLINE_IMPLAUSIBLE_LOST 1024
 
-// What a call came to.
+// Status of a call.
 typedef enum FlexsplineStatus {
   // Done.
   FLEXSPLINE_STATUS_OK = 0,
@@ -362,7 +363,7 @@ typedef enum FlexsplineStatus {
   // The image is whole and its wind-up is none that a drive has: a flank falls while the load grows (the sign of the
   // torque?), or rises too fast.
   FLEXSPLINE_STATUS_IMPLAUSIBLE = 16,
-  // What was kept of an activation is not whole: begin again.
+  // The saved progress of an activation is corrupt: begin again.
   FLEXSPLINE_STATUS_TORN = 17,
   // The self-test gave another answer than it must: processor or program are not what they were.
   FLEXSPLINE_STATUS_SELF_TEST = 18,
@@ -406,7 +407,7 @@ typedef struct FlexsplineSettings {
   float hold_rad;
 } FlexsplineSettings;
 
-// What changes while a joint runs.
+// State of a running joint.
 typedef struct FlexsplineState {
   uint64_t opaque[FLEXSPLINE_STATE_WORDS];
 } FlexsplineState;
@@ -433,7 +434,7 @@ typedef struct FlexsplineIdentity {
   uint64_t opaque[FLEXSPLINE_IDENTITY_WORDS];
 } FlexsplineIdentity;
 
-// What is known of a store.
+// Report on a store.
 typedef struct FlexsplineStoreReport {
   // Id of the table in use; zeros if there is none.
   uint8_t table_id[8];
@@ -455,7 +456,7 @@ typedef struct FlexsplineStoreReport {
   uint8_t damaged_page;
 } FlexsplineStoreReport;
 
-// What is known of a state.
+// Report on a state.
 typedef struct FlexsplineStateReport {
   // Ticks missed since the start; wraps.
   uint32_t missed_ticks;
@@ -495,12 +496,12 @@ typedef struct FlexsplineOutput {
   // Transmission error now, rad.
   float transmission_error_rad;
   // It lies within +- this, rad. Of the estimate, whether it is corrected or not. Without a sample that is believed
-  // in this tick: no less than the table's limit and the error that is told.
+  // in this tick: no less than the table's limit and the reported uncertainty.
   float uncertainty_rad;
   // Correction in the command, rad: target less command over ratio. It is taken off the target, and has the sign of
   // the error.
   float correction_rad;
-  // What the correction lacks of what the table wants, rad: by the limiter, the mode or the overrun policy.
+  // Correction missing from the table's demand, rad: held back by the limiter, the mode or the overrun policy.
   float held_back_rad;
   // `FLEXSPLINE_QUALITY_...`.
   uint8_t quality;
@@ -515,7 +516,7 @@ typedef struct FlexsplineEncoder {
 
 // How an encoder counts.
 typedef struct FlexsplineEncoderSettings {
-  // What it reads at the angle 0, counts of the encoder: -2^62 to 2^62.
+  // Reading at the angle 0, counts of the encoder: -2^62 to 2^62.
   int64_t zero_counts;
   // Counts in a turn, 2 to 2^31: four times the lines of an incremental one.
   uint32_t counts_per_turn;
@@ -531,7 +532,7 @@ typedef struct FlexsplineTorquePath {
   uint64_t opaque[FLEXSPLINE_TORQUE_PATH_WORDS];
 } FlexsplineTorquePath;
 
-// What a reading of torque goes through.
+// Settings of the processing of a torque reading.
 typedef struct FlexsplineTorqueSettings {
   // Time from tick to tick, s.
   float tick_s;
@@ -559,7 +560,7 @@ typedef struct FlexsplineMotionAhead {
   float acceleration_rad_s2;
 } FlexsplineMotionAhead;
 
-// What the output is expected to do.
+// Expected motion of the output.
 typedef struct FlexsplinePrediction {
   // Output angle, counts of 2^-32 turn: nominal plus transmission error.
   int64_t output_counts;
@@ -573,7 +574,7 @@ typedef struct FlexsplinePrediction {
   uint8_t quality;
 } FlexsplinePrediction;
 
-// What to command for a wanted output angle.
+// Command for a wanted output angle.
 typedef struct FlexsplineCommand {
   // Generator angle to go to, counts of 2^-32 turn.
   int64_t generator_counts;
@@ -601,7 +602,7 @@ typedef struct FlexsplinePlay {
   uint8_t is_started;
 } FlexsplinePlay;
 
-// What an image says of itself.
+// Contents of an image's header.
 typedef struct FlexsplineImageReport {
   // Id of the table: the first 8 bytes of the BLAKE3 of its contents, as reports show them in hexadecimal digits.
   uint8_t table_id[8];
@@ -611,7 +612,7 @@ typedef struct FlexsplineImageReport {
   float temperature_range_c[2];
   // No error that it gives is larger, rad.
   float error_limit_rad;
-  // What it misses of the samples that it was made of at most, rad.
+  // Largest deviation from the samples that it was made of, rad.
   float projection_worst_rad;
   // Root of the mean square of that, rad.
   float projection_rms_rad;
@@ -659,7 +660,7 @@ typedef struct FlexsplineCoefficient {
   uint8_t order;
 } FlexsplineCoefficient;
 
-// What a learner adds in the next tick.
+// A learner's addition in the next tick.
 typedef struct FlexsplineAdapted {
   // For `FlexsplineInput` of the next tick: mean error, counts of 2^-32 turn at the output.
   int32_t mean_counts;
@@ -667,7 +668,7 @@ typedef struct FlexsplineAdapted {
   int32_t half_width_counts;
   // Standard deviation of what it adds to the error, rad.
   float uncertainty_rad;
-  // What became of the measurement: `FLEXSPLINE_VERDICT_...`.
+  // Verdict on the measurement: `FLEXSPLINE_VERDICT_...`.
   uint8_t verdict;
 } FlexsplineAdapted;
 
@@ -679,7 +680,7 @@ typedef struct FlexsplineLearnt {
   float std;
 } FlexsplineLearnt;
 
-// What became of measurements; counters stop at their largest value.
+// Counts of measurements by verdict; counters stop at their largest value.
 typedef struct FlexsplineLearnerReport {
   // Used.
   uint32_t used;
@@ -719,7 +720,7 @@ typedef struct FlexsplineSpring {
   float gain;
 } FlexsplineSpring;
 
-// What springs add.
+// Contribution of the springs.
 typedef struct FlexsplineSlipReport {
   // Error at the output, rad.
   float error_rad;
@@ -748,7 +749,7 @@ typedef struct FlexsplineRecord {
   float uncertainty_rad;
   // Correction, rad at the output: target less command over ratio.
   float correction_rad;
-  // What the limiter held back of it, rad.
+  // Part of it that the limiter held back, rad.
   float held_back_rad;
   // Number of the record; wraps.
   uint16_t number;
@@ -784,11 +785,11 @@ typedef struct FlexsplineWatch {
   uint64_t opaque[FLEXSPLINE_WATCH_WORDS];
 } FlexsplineWatch;
 
-// What changed in a tick.
+// Events of a tick.
 typedef struct FlexsplineEvents {
   // Ticks missed since the start.
   uint32_t missed_ticks;
-  // `FLEXSPLINE_EVENT_...`; what follows is only told with its event.
+  // `FLEXSPLINE_EVENT_...`; the fields below are only set with their event.
   uint16_t events;
   // `FLEXSPLINE_MODE_...`.
   uint8_t mode_before;
@@ -847,12 +848,12 @@ typedef struct FlexsplineDisturbance {
   float twist_rad;
 } FlexsplineDisturbance;
 
-// What an observer estimates.
+// State of an observer.
 typedef struct FlexsplineObserver {
   uint64_t opaque[FLEXSPLINE_OBSERVER_WORDS];
 } FlexsplineObserver;
 
-// What was measured in a tick, for the observer.
+// Measurements of a tick, for the observer.
 typedef struct FlexsplineMeasured {
   // Motor torque times the ratio in the tick before, N m.
   float torque_n_m;
@@ -862,7 +863,7 @@ typedef struct FlexsplineMeasured {
   float twist_rad;
 } FlexsplineMeasured;
 
-// What an observer estimates, to read.
+// Estimates of an observer, to read.
 typedef struct FlexsplineObserverReport {
   // Twist of the drive, rad.
   float twist_rad;
@@ -900,9 +901,9 @@ typedef struct FlexsplineAhead {
   int64_t output_counts;
   // It lies within +- this, rad.
   float bound_rad;
-  // What the load turns until then, rad.
+  // Turn of the load until then, rad.
   float load_rad;
-  // What the motor turns until then, over the ratio, rad.
+  // Turn of the motor until then, over the ratio, rad.
   float motor_rad;
   // Twist then, rad.
   float twist_rad;
@@ -920,7 +921,7 @@ typedef struct FlexsplineStartUpSettings {
   // Way of the generator, there and back, rad. At the output it must be ten times `output_error_rad` at least, and
   // half a turn at most.
   float way_rad;
-  // What the output may be off by in a way, rad: twice the error that the table states is enough.
+  // Error of the output in one move, rad: twice the error that the table states is enough.
   float output_error_rad;
   // Coulomb drag of the output that a torque in the mesh turns over by, N m; it may be wrong by three times. Above
   // 0.
@@ -929,7 +930,7 @@ typedef struct FlexsplineStartUpSettings {
   uint16_t ticks;
 } FlexsplineStartUpSettings;
 
-// What the sensors say in a tick of the test. Angles are counts of 2^-32 turn.
+// Sensor readings in a tick of the test. Angles are counts of 2^-32 turn.
 typedef struct FlexsplineReadings {
   // The generator's encoder.
   int64_t generator_counts;
@@ -945,7 +946,7 @@ typedef struct FlexsplineReadings {
   uint8_t has_torque;
 } FlexsplineReadings;
 
-// What to do in a tick of the test.
+// Command and result of a tick of the test.
 typedef struct FlexsplineStartUpStep {
   // Generator angle to command, counts of 2^-32 turn.
   int64_t command_counts;
@@ -1000,22 +1001,22 @@ enum FlexsplineStatus flexspline_identity_step(struct FlexsplineIdentity *identi
 // Known answers of what a tick is made of, for a slow rate group: `FLEXSPLINE_STATUS_SELF_TEST` if one is another.
 enum FlexsplineStatus flexspline_self_test(void);
 
-// Tells the temperature, degrees C: in a slow rate group.
+// Sets the temperature, degrees C: in a slow rate group.
 enum FlexsplineStatus flexspline_store_set_temperature(struct FlexsplineStore *store,
                                                        const struct FlexsplineImages *table,
                                                        float temperature_c);
 
-// Checks so many words of the images: in a slow rate group.
+// Checks the given number of words of the images: in a slow rate group.
 enum FlexsplineStatus flexspline_store_check_images(struct FlexsplineStore *store,
                                                     const struct FlexsplineImages *table,
                                                     uint16_t words);
 
-// Tells what is known of a store.
+// Writes the report on a store.
 enum FlexsplineStatus flexspline_store_report(const struct FlexsplineStore *store,
                                               struct FlexsplineStoreReport *report);
 
 // Writes a damaged page of an image in memory again from the other image, both whole images of `bytes` bytes, and
-// tells the store. What `flexspline_store_report` named is `image` and `page`.
+// notifies the store. What `flexspline_store_report` named is `image` and `page`.
 enum FlexsplineStatus flexspline_store_mend_page(struct FlexsplineStore *store,
                                                  uint8_t *damaged,
                                                  const uint8_t *good,
@@ -1035,7 +1036,7 @@ enum FlexsplineStatus flexspline_state_request(struct FlexsplineState *state,
 // On command: which side of the play the drive rests on is not known any more, as after work on it.
 enum FlexsplineStatus flexspline_state_forget_side(struct FlexsplineState *state);
 
-// Tells what is known of a state, as the last tick left it.
+// Writes the report on a state, as the last tick left it.
 enum FlexsplineStatus flexspline_state_report(const struct FlexsplineState *state,
                                               struct FlexsplineStateReport *report);
 
@@ -1075,7 +1076,7 @@ uint32_t flexspline_version_number(void);
 // Version of the table format that is read.
 uint16_t flexspline_format_version(void);
 
-// What a status says, in a few words.
+// Short text of a status.
 const char *flexspline_status_text(int status);
 
 // Name of a mode.
@@ -1135,14 +1136,14 @@ enum FlexsplineStatus flexspline_encoder_start(struct FlexsplineEncoder *encoder
                                                uint64_t reading,
                                                int64_t near_counts);
 
-// Takes a reading of the encoder of a joint's generator and tells the angle to give to its next tick, counts of 2^-32
-// turn, to the nearest. A reading that the tick does not believe (`FLEXSPLINE_FLAG_GLITCH`) moves no turn: the next is
-// taken from the reading before or from the angle that was believed last, whichever is nearer. So the turns are right
-// as soon as the readings are, if no more than `patience` in a row were wrong and the generator made less than a third
-// of what the register counts meanwhile. `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that (give the tick
-// no sample then), or if `generator_rate_rad_s` allows a sixth of what the register counts in a tick, so that motion
-// hides a wrong bit; `FLEXSPLINE_STATUS_NOT_INITIALISED` before `flexspline_encoder_start`, and where encoder or joint
-// are lost.
+// Takes a reading of the encoder of a joint's generator and reports the angle to give to its next tick, counts of
+// 2^-32 turn, to the nearest. A reading that the tick does not believe (`FLEXSPLINE_FLAG_GLITCH`) moves no turn: the
+// next is taken from the reading before or from the angle that was believed last, whichever is nearer. So the turns
+// are right as soon as the readings are, if no more than `patience` in a row were wrong and the generator made less
+// than a third of what the register counts meanwhile. `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that
+// (give the tick no sample then), or if `generator_rate_rad_s` allows a sixth of what the register counts in a tick,
+// so that motion hides a wrong bit; `FLEXSPLINE_STATUS_NOT_INITIALISED` before `flexspline_encoder_start`, and where
+// encoder or joint are lost.
 enum FlexsplineStatus flexspline_joint_read(const struct FlexsplineJoint *joint,
                                             const struct FlexsplineState *state,
                                             struct FlexsplineEncoder *encoder,
@@ -1150,15 +1151,15 @@ enum FlexsplineStatus flexspline_joint_read(const struct FlexsplineJoint *joint,
                                             int64_t *angle_counts);
 
 // The same for an encoder that no joint judges: one wrong reading, half of what the register counts away, moves it by
-// all that it counts, for good. Takes a reading and tells the angle, counts of 2^-32 turn, to the nearest. Between two
-// readings it may move by less than half of what the register counts. `FLEXSPLINE_STATUS_ARGUMENT` if the register
+// all that it counts, for good. Takes a reading and reports the angle, counts of 2^-32 turn, to the nearest. Between
+// two readings it may move by less than half of what the register counts. `FLEXSPLINE_STATUS_ARGUMENT` if the register
 // cannot read that (give the tick no sample then), `FLEXSPLINE_STATUS_NOT_INITIALISED` before
 // `flexspline_encoder_start`, and after an upset of more than a word (one word is mended): make it and start it again.
 enum FlexsplineStatus flexspline_encoder_read(struct FlexsplineEncoder *encoder,
                                               uint64_t reading,
                                               int64_t *angle_counts);
 
-// What the register reads at an angle, to the nearest count: for a drive that is commanded in counts of its encoder.
+// Register value at an angle, to the nearest count: for a drive that is commanded in counts of its encoder.
 enum FlexsplineStatus flexspline_encoder_reading(const struct FlexsplineEncoder *encoder,
                                                  int64_t angle_counts,
                                                  uint64_t *reading);
@@ -1289,11 +1290,11 @@ enum FlexsplineStatus flexspline_nominal_generator(const struct FlexsplineJoint 
 // Ratio of a joint's drive, signed: generator turns in a turn of the output.
 enum FlexsplineStatus flexspline_ratio(const struct FlexsplineJoint *joint, float *ratio);
 
-// Tells where a drive rests inside its play, as the last tick left it.
+// Reports the position of a drive inside its play, as the last tick left it.
 enum FlexsplineStatus flexspline_state_play(const struct FlexsplineState *state,
                                             struct FlexsplinePlay *play);
 
-// Checks one image in full, without a store, and tells what it says of itself. The work grows with the image: for
+// Checks one image in full, without a store, and reports its header. The work grows with the image: for
 // start-up, or the host.
 enum FlexsplineStatus flexspline_image_report(const uint8_t *image,
                                               size_t image_bytes,
@@ -1317,7 +1318,7 @@ enum FlexsplineStatus flexspline_learner_init(struct FlexsplineLearner *learner,
 enum FlexsplineStatus flexspline_learner_set(struct FlexsplineLearner *learner, uint8_t learning);
 
 // Says whose coefficients are learnt: of this joint with the table in use. Saved learners carry both, and are restored
-// only where they belong. `unit` tells joints with the same settings and the same table from each other, such as the
+// only where they belong. `unit` distinguishes joints with the same settings and the same table, such as the
 // wheels of a rover; 0 if there is one. After `flexspline_learner_init` and the table, before
 // `flexspline_learner_restore`; again after another table was activated: what was learnt for another owner is
 // forgotten. `FLEXSPLINE_STATUS_ARGUMENT` if no table is in use.
@@ -1331,8 +1332,8 @@ enum FlexsplineStatus flexspline_learner_bind(struct FlexsplineLearner *learner,
 enum FlexsplineStatus flexspline_learner_reset(struct FlexsplineLearner *learner);
 
 // One tick, every tick and in order, after `flexspline_tick` with what it was given and gave: learns from the output
-// angle measured at the same moment (`has_measured` 1, `measured_counts` of 2^-32 turn) if there is one, and tells
-// what to add in the next tick. Nothing that comes in can make that exceed the limits. `input` is that of the tick
+// angle measured at the same moment (`has_measured` 1, `measured_counts` of 2^-32 turn) if there is one, and reports
+// the addition in the next tick. Nothing that comes in can make that exceed the limits. `input` is that of the tick
 // with the learner's own adjustment alone: what springs or a model of yours added beside it counts as known then, and
 // is not learnt a second time.
 enum FlexsplineStatus flexspline_learner_update(struct FlexsplineLearner *learner,
@@ -1343,12 +1344,13 @@ enum FlexsplineStatus flexspline_learner_update(struct FlexsplineLearner *learne
                                                 int64_t measured_counts,
                                                 struct FlexsplineAdapted *adapted);
 
-// Tells a coefficient, by its place in the list that the learner was made of; `FLEXSPLINE_STATUS_ARGUMENT` beyond it.
+// Reports a coefficient, by its index in the list that the learner was made of; `FLEXSPLINE_STATUS_ARGUMENT` beyond
+// it.
 enum FlexsplineStatus flexspline_learner_coefficient(const struct FlexsplineLearner *learner,
                                                      uint8_t place,
                                                      struct FlexsplineLearnt *learnt);
 
-// Tells what became of measurements.
+// Reports the counts of measurements by verdict.
 enum FlexsplineStatus flexspline_learner_report(const struct FlexsplineLearner *learner,
                                                 struct FlexsplineLearnerReport *report);
 
@@ -1420,9 +1422,9 @@ enum FlexsplineStatus flexspline_input_add_rad(struct FlexsplineInput *input,
                                                float mean_rad,
                                                float half_width_rad);
 
-// Makes a recorder for a list of so many records (1 or more), which is the caller's and given with every call. It
-// keeps every `divisor`-th tick, from `offset` on; `full` (`FLEXSPLINE_FULL_...`) says what is lost where there is no
-// room.
+// Makes a recorder for a list of the given number of records (1 or more), which is the caller's and given with every
+// call. It keeps every `divisor`-th tick, from `offset` on; `full` (`FLEXSPLINE_FULL_...`) says what is lost where
+// there is no room.
 enum FlexsplineStatus flexspline_recorder_init(struct FlexsplineRecorder *recorder,
                                                uint16_t places,
                                                uint32_t divisor,
@@ -1456,8 +1458,8 @@ enum FlexsplineStatus flexspline_record_encode(const struct FlexsplineRecord *re
 enum FlexsplineStatus flexspline_record_decode(const uint8_t *first,
                                                struct FlexsplineRecord *record);
 
-// Begins to receive a table of so many bytes. The buffer is the caller's and is given with every call; it is no image
-// in use.
+// Begins to receive a table of the given length. The buffer is the caller's and is given with every call; it is no
+// image in use.
 enum FlexsplineStatus flexspline_upload_begin(struct FlexsplineUpload *upload,
                                               size_t announced);
 
@@ -1469,7 +1471,7 @@ enum FlexsplineStatus flexspline_upload_chunk(struct FlexsplineUpload *upload,
                                               const uint8_t *chunk,
                                               size_t chunk_bytes);
 
-// Checks a table of which all bytes came, in full, and tells its id; it can then be activated.
+// Checks a table of which all bytes came, in full, and reports its id; it can then be activated.
 enum FlexsplineStatus flexspline_upload_finish(const struct FlexsplineUpload *upload,
                                                const uint8_t *buffer,
                                                size_t buffer_bytes,
@@ -1478,7 +1480,7 @@ enum FlexsplineStatus flexspline_upload_finish(const struct FlexsplineUpload *up
 // Begins to watch for events: off, without a table.
 enum FlexsplineStatus flexspline_watch_init(struct FlexsplineWatch *watch);
 
-// Tells what changed, after `flexspline_tick`; `output` is what it gave.
+// Reports the changes, after `flexspline_tick`; `output` is that tick's output.
 enum FlexsplineStatus flexspline_watch_see(struct FlexsplineWatch *watch,
                                            const struct FlexsplineState *state,
                                            const struct FlexsplineStore *store,
@@ -1508,12 +1510,12 @@ enum FlexsplineStatus flexspline_predictor_of(struct FlexsplinePredictor *predic
                                               const struct FlexsplineNoise *noise,
                                               double tick_s);
 
-// Tells the numbers of a predictor, for `flexspline_predictor_init` of the firmware.
+// Reports the numbers of a predictor, for `flexspline_predictor_init` of the firmware.
 enum FlexsplineStatus flexspline_predictor_parts(const struct FlexsplinePredictor *predictor,
                                                  float (*parts)[FLEXSPLINE_PREDICTOR_PARTS]);
 
-// Tells what the observer can be off by while the disturbances stay within their bounds: twist rad, speeds of motor
-// and load rad/s, torque on the load N m; for `FlexsplineNow`. For the host or start-up: 10000 ticks in double
+// Reports the largest error of the observer while the disturbances stay within their bounds: twist rad, speeds of
+// motor and load rad/s, torque on the load N m; for `FlexsplineNow`. For the host or start-up: 10000 ticks in double
 // precision.
 enum FlexsplineStatus flexspline_predictor_state_bound(const struct FlexsplinePredictor *predictor,
                                                        const struct FlexsplineDisturbance *disturbance,
@@ -1524,16 +1526,16 @@ enum FlexsplineStatus flexspline_observer_init(struct FlexsplineObserver *observ
 
 // One tick of the observer. `FLEXSPLINE_STATUS_ARGUMENT` if a number that is used is not finite or beyond any drive,
 // and the estimate stays; `FLEXSPLINE_STATUS_NOT_INITIALISED` if an upset hit more than a word of observer or
-// predictor (one is mended): make them anew. What is told then is NaN.
+// predictor (one is mended): make them anew. The reported values are NaN then.
 enum FlexsplineStatus flexspline_observer_step(struct FlexsplineObserver *observer,
                                                const struct FlexsplinePredictor *predictor,
                                                const struct FlexsplineMeasured *measured);
 
-// Tells what an observer estimates.
+// Reports the estimates of an observer.
 enum FlexsplineStatus flexspline_observer_report(const struct FlexsplineObserver *observer,
                                                  struct FlexsplineObserverReport *report);
 
-// Tells where the output will be some ticks from now, with the table as the output map of the two inertias. The work
+// Predicts the output some ticks from now, with the table as the output map of the two inertias. The work
 // grows with the ticks; call it in a slow rate group. `FLEXSPLINE_STATUS_ARGUMENT` if a number of `now` is not finite.
 enum FlexsplineStatus flexspline_predict(const struct FlexsplinePredictor *predictor,
                                          const struct FlexsplineObserver *observer,
@@ -1544,7 +1546,8 @@ enum FlexsplineStatus flexspline_predict(const struct FlexsplinePredictor *predi
                                          struct FlexsplineAhead *ahead);
 
 // Begins a test of the sensors that moves the generator from where it is and back, before the first tick.
-// `FLEXSPLINE_STATUS_ARGUMENT` if a number is not finite, the way too short to tell or too long, or the ticks too few.
+// `FLEXSPLINE_STATUS_ARGUMENT` if a number is not finite, the way too short to decide or too long, or the ticks too
+// few.
 enum FlexsplineStatus flexspline_start_up_init(struct FlexsplineStartUp *start_up,
                                                const struct FlexsplineJoint *joint,
                                                int64_t generator_counts,

@@ -43,7 +43,7 @@ use core::mem::{MaybeUninit, align_of, size_of};
 #[cfg(all(target_os = "none", not(test)))]
 use panic_never as _;
 
-/// What a call came to.
+/// Status of a call.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FlexsplineStatus {
@@ -82,7 +82,7 @@ pub enum FlexsplineStatus {
     /// The image is whole and its wind-up is none that a drive has: a flank falls while the load grows (the sign of the
     /// torque?), or rises too fast.
     Implausible = 16,
-    /// What was kept of an activation is not whole: begin again.
+    /// The saved progress of an activation is corrupt: begin again.
     Torn = 17,
     /// The self-test gave another answer than it must: processor or program are not what they were.
     SelfTest = 18,
@@ -99,7 +99,8 @@ pub const FLEXSPLINE_FLAG_OVERRUN: u16 = 4;
 pub const FLEXSPLINE_FLAG_HELD_BACK: u16 = 8;
 /// No correction could be made; the last one is kept or fades out.
 pub const FLEXSPLINE_FLAG_NOT_CORRECTED: u16 = 16;
-/// What was read of the table was not whole. It was mended and the tick done again, unless not corrected is set too.
+/// The words read of the table differed between the copies. They were repaired and the tick repeated, unless not
+/// corrected is set too.
 pub const FLEXSPLINE_FLAG_TABLE_DOUBT: u16 = 32;
 /// The state was not whole, and was taken from its other copy; where neither was, the joint is safe.
 pub const FLEXSPLINE_FLAG_STATE_TORN: u16 = 64;
@@ -155,7 +156,7 @@ pub struct FlexsplineJoint {
     opaque: [MaybeUninit<u64>; FLEXSPLINE_JOINT_WORDS],
 }
 
-/// What changes while a joint runs.
+/// State of a running joint.
 #[repr(C)]
 #[derive(Debug)]
 pub struct FlexsplineState {
@@ -240,12 +241,12 @@ pub struct FlexsplineOutput {
     /// Transmission error now, rad.
     pub transmission_error_rad: f32,
     /// It lies within +- this, rad. Of the estimate, whether it is corrected or not. Without a sample that is believed
-    /// in this tick: no less than the table's limit and the error that is told.
+    /// in this tick: no less than the table's limit and the reported uncertainty.
     pub uncertainty_rad: f32,
     /// Correction in the command, rad: target less command over ratio. It is taken off the target, and has the sign of
     /// the error.
     pub correction_rad: f32,
-    /// What the correction lacks of what the table wants, rad: by the limiter, the mode or the overrun policy.
+    /// Correction missing from the table's demand, rad: held back by the limiter, the mode or the overrun policy.
     pub held_back_rad: f32,
     /// `FLEXSPLINE_QUALITY_...`.
     pub quality: u8,
@@ -253,7 +254,7 @@ pub struct FlexsplineOutput {
     pub flags: u16,
 }
 
-/// What is known of a store.
+/// Report on a store.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FlexsplineStoreReport {
@@ -277,7 +278,7 @@ pub struct FlexsplineStoreReport {
     pub damaged_page: u8,
 }
 
-/// What is known of a state.
+/// Report on a state.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FlexsplineStateReport {
@@ -289,7 +290,7 @@ pub struct FlexsplineStateReport {
     pub side_known: u8,
 }
 
-/// A value with a mark that tells that it was initialised.
+/// A value with a mark that shows that it was initialised.
 #[repr(C)]
 struct Marked<T> {
     mark: u32,
@@ -316,7 +317,7 @@ const _: () = {
     assert!(FLEXSPLINE_SAVED_BYTES == SAVED_JOINT_BYTES);
 };
 
-/// Marks as they are kept: any two differ in so many bits (a test counts them) that one bit of one may flip.
+/// Marks in memory: any two differ in enough bits (a test counts them) that one bit of one may flip.
 const fn spread(mark: u32) -> u32 {
     mark.wrapping_mul(0x9e37_79b1)
 }
@@ -411,7 +412,7 @@ fn bytes<'a>(first: *const u8, length: usize) -> Result<&'a [u8], FlexsplineStat
     if length > isize::MAX as usize {
         return Err(FlexsplineStatus::Argument);
     }
-    // SAFETY: not null; the caller says that so many bytes are there. Not kept beyond the call.
+    // SAFETY: not null; the caller guarantees this length. Not kept beyond the call.
     Ok(unsafe { core::slice::from_raw_parts(first, length) })
 }
 
@@ -438,7 +439,7 @@ fn bytes_mut<'a>(first: *mut u8, length: usize) -> Result<&'a mut [u8], Flexspli
     if length > isize::MAX as usize {
         return Err(FlexsplineStatus::Argument);
     }
-    // SAFETY: not null; the caller says that so many bytes are there, and they are its own. Not kept beyond the call.
+    // SAFETY: not null; the caller guarantees this length and owns the bytes. Not kept beyond the call.
     Ok(unsafe { core::slice::from_raw_parts_mut(first, length) })
 }
 
@@ -633,7 +634,7 @@ pub extern "C" fn flexspline_self_test() -> FlexsplineStatus {
     status(self_test().map_err(|_| FlexsplineStatus::SelfTest))
 }
 
-/// Tells the temperature, degrees C: in a slow rate group.
+/// Sets the temperature, degrees C: in a slow rate group.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_store_set_temperature(
     store: *mut FlexsplineStore,
@@ -648,7 +649,7 @@ pub extern "C" fn flexspline_store_set_temperature(
     status(set())
 }
 
-/// Checks so many words of the images: in a slow rate group.
+/// Checks the given number of words of the images: in a slow rate group.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_store_check_images(
     store: *mut FlexsplineStore,
@@ -664,19 +665,19 @@ pub extern "C" fn flexspline_store_check_images(
     status(check())
 }
 
-/// Tells what is known of a store.
+/// Writes the report on a store.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_store_report(
     store: *const FlexsplineStore,
     report: *mut FlexsplineStoreReport,
 ) -> FlexsplineStatus {
-    let tell = || {
+    let fill = || {
         apart([span(store), span(report)])?;
         usable(report)?;
         let store: &Store = get(store, STORE_MARK)?;
         let Counters { doubtful_ticks, words_mended, words_skipped, pages_damaged, passes } = store.counters();
         let (image, page) = store.damaged_page().unwrap_or((255, 0));
-        let told = FlexsplineStoreReport {
+        let filled = FlexsplineStoreReport {
             table_id: store.id().0,
             doubtful_ticks,
             words_mended,
@@ -688,14 +689,14 @@ pub extern "C" fn flexspline_store_report(
             damaged_page: page as u8,
         };
         // SAFETY: not null, aligned, apart from the store; the caller's.
-        unsafe { report.write(told) };
+        unsafe { report.write(filled) };
         Ok(())
     };
-    status(tell())
+    status(fill())
 }
 
 /// Writes a damaged page of an image in memory again from the other image, both whole images of `bytes` bytes, and
-/// tells the store. What `flexspline_store_report` named is `image` and `page`.
+/// notifies the store. What `flexspline_store_report` named is `image` and `page`.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_store_mend_page(
     store: *mut FlexsplineStore,
@@ -710,7 +711,7 @@ pub extern "C" fn flexspline_store_mend_page(
         let good_bytes = bytes(good, length)?;
         apart([span(store), (damaged as usize, length), (good as usize, length)])?;
         let store: &mut Store = get_mut(store, STORE_MARK)?;
-        // SAFETY: not null, apart from the other image and the store; the caller says that so many bytes are there, and
+        // SAFETY: not null, apart from the other image and the store; the caller guarantees this length, and
         // they are its own.
         let damaged = unsafe { core::slice::from_raw_parts_mut(damaged, length) };
         if image > 1 || !mend_page(damaged, good_bytes, page as usize) {
@@ -758,26 +759,26 @@ pub extern "C" fn flexspline_state_forget_side(state: *mut FlexsplineState) -> F
     status(forget())
 }
 
-/// Tells what is known of a state, as the last tick left it.
+/// Writes the report on a state, as the last tick left it.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_state_report(
     state: *const FlexsplineState,
     report: *mut FlexsplineStateReport,
 ) -> FlexsplineStatus {
-    let tell = || {
+    let fill = || {
         apart([span(state), span(report)])?;
         usable(report)?;
         let state: &JointState = get(state, STATE_MARK)?;
-        let told = FlexsplineStateReport {
+        let filled = FlexsplineStateReport {
             missed_ticks: state.missed_ticks(),
             mode: state.mode().code() as u8,
             side_known: state.play().is_known() as u8,
         };
         // SAFETY: not null, aligned, apart from the state; the caller's.
-        unsafe { report.write(told) };
+        unsafe { report.write(filled) };
         Ok(())
     };
-    status(tell())
+    status(fill())
 }
 
 /// Writes what must survive a reset: `FLEXSPLINE_SAVED_BYTES` bytes, with version, table and joint.
@@ -796,7 +797,7 @@ pub extern "C" fn flexspline_state_save(
         let joint: &Joint = get(joint, JOINT_MARK)?;
         let store: &Store = get(store, STORE_MARK)?;
         usable(saved)?;
-        // SAFETY: not null, apart from the state; the caller owns so many bytes.
+        // SAFETY: not null, apart from the state; the caller owns this length.
         unsafe { saved.write(state.save(joint, store)) };
         Ok(())
     };
@@ -833,9 +834,9 @@ fn restore_status(error: RestoreError) -> FlexsplineStatus {
     }
 }
 
-/// What a tick is given.
+/// Input of a tick, as the core takes it.
 #[inline(always)]
-fn told(input: &FlexsplineInput) -> Input {
+fn core_input(input: &FlexsplineInput) -> Input {
     let generator = GeneratorAngle::from_counts(input.generator_counts);
     Input {
         generator: if input.has_generator != 0 { Some(generator) } else { None },
@@ -865,7 +866,7 @@ pub extern "C" fn flexspline_tick(
         let joint: &Joint = get(joint, JOINT_MARK)?;
         let store: &mut Store = get_mut(store, STORE_MARK)?;
         let state: &mut JointState = get_mut(state, STATE_MARK)?;
-        let input = told(&input);
+        let input = core_input(&input);
         let found = joint.tick(&images, store, state, &input);
         let given = FlexsplineOutput {
             command_counts: found.command.counts(),
@@ -1059,8 +1060,8 @@ mod tests {
         assert_eq!(step(&mut *identity, inside, image.len(), inside), FlexsplineStatus::Overlap);
         let mut run = |image: &[u8]| {
             for _ in 0..5000 {
-                let told = step(&mut *identity, image.as_ptr(), image.len(), &mut found);
-                assert_eq!(told, FlexsplineStatus::Ok);
+                let status = step(&mut *identity, image.as_ptr(), image.len(), &mut found);
+                assert_eq!(status, FlexsplineStatus::Ok);
                 if found != 0 {
                     break;
                 }
@@ -1180,7 +1181,7 @@ mod tests {
         assert_eq!(tick(&mut o, &INPUT, &mut out), FlexsplineStatus::Ok);
         assert_eq!(out.quality, 3, "no table yet");
 
-        // An image, or what tells of it, inside what is written.
+        // An image, or the structure that points to it, inside the memory that is written.
         let store = &raw mut *o.store;
         let within = FlexsplineImages { second: store.cast_const().cast(), second_bytes: 100, ..table };
         assert_eq!(flexspline_store_activate(store, &o.joint, &within, 20.0), Overlap);
@@ -1190,13 +1191,13 @@ mod tests {
         let mut room = [table; 400];
         let inside = room.as_mut_ptr().cast::<FlexsplineStore>();
         assert_eq!(flexspline_store_init(inside), FlexsplineStatus::Ok);
-        let told = inside.cast::<FlexsplineImages>().wrapping_add(300);
+        let moved = inside.cast::<FlexsplineImages>().wrapping_add(300);
         // SAFETY: inside the room; the store holds nothing there yet that is read before the call refuses.
-        unsafe { told.write(table) };
-        assert_eq!(flexspline_store_check_images(inside, told, 9), FlexsplineStatus::Ok, "beyond the store");
-        let told = inside.cast::<FlexsplineImages>().wrapping_add(200);
-        unsafe { told.write(table) };
-        assert_eq!(flexspline_store_check_images(inside, told, 9), Overlap);
+        unsafe { moved.write(table) };
+        assert_eq!(flexspline_store_check_images(inside, moved, 9), FlexsplineStatus::Ok, "beyond the store");
+        let moved = inside.cast::<FlexsplineImages>().wrapping_add(200);
+        unsafe { moved.write(table) };
+        assert_eq!(flexspline_store_check_images(inside, moved, 9), Overlap);
     }
 
     #[test]

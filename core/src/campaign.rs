@@ -3,8 +3,8 @@
 //! Store, state and joint live on from tick to tick after the flip, and so does what feeds the tick: encoder, torque
 //! with its age, springs, learning, observer. The twin has its own and the same readings. A flip is *silent* if
 //! in any later tick the command is off by more than 0.1″ at the output (5″ where sensors feed the joint), and that
-//! tick tells nothing of it: no flag of doubt, no worse health, no object that says that it is lost or began anew, and
-//! bounds that do not hold the twin's. Told by what the limiter holds back alone is counted by itself.
+//! tick reports nothing: no flag of doubt, no worse health, no object that is lost or began anew, and
+//! bounds that do not hold the twin's. Errors that show only in what the limiter holds back are counted separately.
 
 use crate::fixture::{self, ARCSEC};
 use crate::store::{Health, Images, Store};
@@ -23,8 +23,8 @@ use std::vec::Vec;
 
 /// Off by more than this is wrong, rad at the output.
 const WRONG_RAD: f64 = 0.1 * ARCSEC;
-/// The same where encoder, torque and springs feed the joint: after a torque was missing (which is told) the low-pass
-/// is where it would be to less than this and not to the bit.
+/// The same where encoder, torque and springs feed the joint: after a torque was missing (which is reported) the
+/// low-pass is where it would be to less than this and not to the bit.
 const WRONG_FED_RAD: f64 = 5.0 * ARCSEC;
 const TICKS: usize = 450;
 
@@ -45,7 +45,7 @@ struct World {
 
 upsets!(World { joint, store, state, feed });
 
-/// What feeds the tick.
+/// Inputs of the tick.
 #[derive(Clone, Debug, PartialEq)]
 struct Feed {
     encoder: Encoder,
@@ -97,7 +97,7 @@ impl Upset for Firmware {
     fn flip(&mut self, _: usize, _: &mut String) {}
 }
 
-/// What the sensors say in a tick.
+/// Raw sensor readings of a tick.
 #[derive(Clone, Copy, Debug)]
 struct Raw {
     register: u64,
@@ -193,8 +193,8 @@ impl Feed {
         self.firmware.sum = torque_slip.added_to(slip.added_to(self.firmware.own));
     }
 
-    /// What it says of itself that the twin does not say: lost, begun anew, not known.
-    fn tells(&self, twin: &Self) -> bool {
+    /// Whether it reports a fault that the twin does not: lost, begun anew, not known.
+    fn reports(&self, twin: &Self) -> bool {
         let lost = self.encoder.is_lost()
             || self.at.is_lost()
             || self.path.is_damaged()
@@ -232,7 +232,7 @@ impl World {
     }
 }
 
-/// What goes on around the flip.
+/// Scenario around the flip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Story {
     Tracking,
@@ -270,7 +270,7 @@ impl Story {
         matches!(self, Self::Fed | Self::Observed)
     }
 
-    /// What the sensors say: the motor is where it was commanded.
+    /// Raw sensor readings: the motor is where it was commanded.
     fn raw(self, tick: usize, generator: GeneratorAngle, register: u64) -> Raw {
         let load = self.input(tick, generator).torque_n_m;
         let backward = (200..=320).contains(&tick);
@@ -291,7 +291,7 @@ impl Story {
         }
     }
 
-    /// What the firmware does before a tick.
+    /// Actions of the firmware before a tick.
     fn before(self, tick: usize, world: &mut World) {
         let request = match (self, tick) {
             (Self::Hold, 100) => Some(Mode::Hold),
@@ -347,13 +347,13 @@ impl Story {
 struct Twin {
     input: Input,
     raw: Raw,
-    /// What an encoder at the output says after it.
+    /// Reading of an encoder at the output after it.
     measured: OutputAngle,
     output: Output,
     health: Health,
     /// After it, if it is fed.
     feed: Option<Feed>,
-    /// What there is after some of the ticks.
+    /// Snapshot after some of the ticks.
     world: Option<World>,
 }
 
@@ -384,14 +384,14 @@ fn undisturbed(story: Story, at: &[usize]) -> (Vec<Twin>, Vec<World>) {
     (run, worlds)
 }
 
-/// How much was told, best first.
+/// How well the fault was reported, best first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Fate {
     /// Never off.
     Harmless,
     /// Flags, health or bounds say so.
-    Told,
-    /// The limiter tells that it is behind, and nothing else ever.
+    Reported,
+    /// Only the limiter reports that it is behind, and nothing else ever.
     HeldBack,
     Silent,
 }
@@ -401,8 +401,8 @@ fn output_rad(counts: i64) -> f64 {
     counts as f64 * TAU / 4_294_967_296.0 / fixture::drive().exact_ratio()
 }
 
-/// Whether a tick tells what the twin's does not.
-fn tells(found: &Output, world: &World, twin: &Twin) -> bool {
+/// Whether a tick reports something that the twin's does not.
+fn reports(found: &Output, world: &World, twin: &Twin) -> bool {
     let doubts = [
         Flags::SAMPLE_LOST,
         Flags::BOUNDED,
@@ -414,25 +414,25 @@ fn tells(found: &Output, world: &World, twin: &Twin) -> bool {
         Flags::OTHER_IMAGES,
     ];
     let flagged = doubts.into_iter().any(|flag| found.flags.contains(flag) && !twin.output.flags.contains(flag));
-    let fed = twin.feed.as_ref().is_some_and(|twin| world.feed.tells(twin));
+    let fed = twin.feed.as_ref().is_some_and(|twin| world.feed.reports(twin));
     flagged || world.store.health() != twin.health || fed
 }
 
-/// Whether a tick beside that of the twin is off, and tells; `told` is whether it or one before did.
-fn fate(found: &Output, told: bool, tells: bool, twin: &Twin) -> Fate {
+/// Whether a tick is off, compared with the twin's, and reports it; `reported` is whether it or an earlier one did.
+fn fate(found: &Output, reported: bool, reporting: bool, twin: &Twin) -> Fate {
     let expected = &twin.output;
     let away = output_rad(found.command.minus_counts(expected.command));
     let wrong = if twin.feed.is_some() { WRONG_FED_RAD } else { WRONG_RAD };
-    if away.abs() <= wrong || tells || found.quality == Quality::Disabled {
-        return if away.abs() <= wrong { Fate::Harmless } else { Fate::Told };
+    if away.abs() <= wrong || reporting || found.quality == Quality::Disabled {
+        return if away.abs() <= wrong { Fate::Harmless } else { Fate::Reported };
     }
     // What is wanted: the command with what was held back of it.
     let wanted = (away - f64::from(found.held_back_rad - expected.held_back_rad)).abs();
     if wanted <= wrong {
-        return if told { Fate::Told } else { Fate::HeldBack };
+        return if reported { Fate::Reported } else { Fate::HeldBack };
     }
     let bounded = found.quality != Quality::InRange && wanted <= f64::from(found.uncertainty_rad) + wrong;
-    if bounded { Fate::Told } else { Fate::Silent }
+    if bounded { Fate::Reported } else { Fate::Silent }
 }
 
 /// A tick of a hit world with what the twin was given.
@@ -446,12 +446,12 @@ fn go_on(world: &mut World, story: Story, tick: usize, twin: &Twin) -> Output {
 
 /// Lets a hit world live on beside the twin.
 fn live_on(mut world: World, story: Story, from: usize, run: &[Twin]) -> Fate {
-    let (mut worst, mut told) = (Fate::Harmless, false);
+    let (mut worst, mut reported) = (Fate::Harmless, false);
     for (tick, twin) in run.iter().enumerate().skip(from) {
         let found = go_on(&mut world, story, tick, twin);
-        let tells = tells(&found, &world, twin);
-        told |= tells;
-        let now = fate(&found, told, tells, twin);
+        let reporting = reports(&found, &world, twin);
+        reported |= reporting;
+        let now = fate(&found, reported, reporting, twin);
         worst = worst.max(now);
         // What is as if there had been no flip stays so.
         let healed = twin.world.as_ref().is_some_and(|twin| twin.is_like(&world));
@@ -477,7 +477,7 @@ impl Counts {
         sum
     }
 
-    /// By field, what is not told well first.
+    /// Counts by field, poorly reported faults first.
     fn print(&self, name: &str) {
         let all = |found: &[usize; 4]| found.iter().sum::<usize>();
         let mut fields: Vec<_> = self.0.iter().collect();
@@ -488,15 +488,15 @@ impl Counts {
             "flips",
             "silent",
             "held",
-            "told",
+            "reported",
             "none"
         );
         for (path, found) in fields {
-            let [none, told, held, silent] = found;
-            std::println!("{path:>50} {:>8} {silent:>8} {held:>8} {told:>8} {none:>8}", all(found));
+            let [none, reported, held, silent] = found;
+            std::println!("{path:>50} {:>8} {silent:>8} {held:>8} {reported:>8} {none:>8}", all(found));
         }
-        let [none, told, held, silent] = self.sum();
-        std::println!("{:>50} {:>8} {silent:>8} {held:>8} {told:>8} {none:>8}", "all", all(&self.sum()));
+        let [none, reported, held, silent] = self.sum();
+        std::println!("{:>50} {:>8} {silent:>8} {held:>8} {reported:>8} {none:>8}", "all", all(&self.sum()));
     }
 }
 
@@ -594,8 +594,8 @@ impl Mixed {
 }
 
 /// Flips at random over everything: single bits, pairs, bursts of neighbours, the same bit of words in a row, and bits
-/// that are turned again in every one of some ticks. What goes on after each is followed for so many ticks, until it is
-/// as if there had been none.
+/// that are turned again in every one of some ticks. What goes on after each is followed for that number of ticks,
+/// until it is as if there had been none.
 fn mixed(stories: &[(Story, &[usize])], trials: usize, seed: u64, follow: usize) -> Counts {
     let mut counts = Counts::default();
     let mut mixed = Mixed(seed);
@@ -628,16 +628,16 @@ fn mixed(stories: &[(Story, &[usize])], trials: usize, seed: u64, follow: usize)
             _ => std::vec![bit],
         };
         let times = if kind == "again and again" { 1 + mixed.below(30) } else { 1 };
-        let (mut worst, mut told) = (Fate::Harmless, false);
+        let (mut worst, mut reported) = (Fate::Harmless, false);
         for (tick, twin) in run.iter().enumerate().skip(from).take(follow) {
             if tick < from + times {
                 bits.iter().for_each(|&bit| hit.flip(bit, &mut String::new()));
                 done += bits.len();
             }
             let found = go_on(&mut hit, *story, tick, twin);
-            let tells = tells(&found, &hit, twin);
-            told |= tells;
-            worst = worst.max(fate(&found, told, tells, twin));
+            let reporting = reports(&found, &hit, twin);
+            reported |= reporting;
+            worst = worst.max(fate(&found, reported, reporting, twin));
             if tick >= from + times && twin.world.as_ref().is_some_and(|twin| twin.is_like(&hit)) {
                 break;
             }
@@ -686,8 +686,8 @@ fn no_mixed_flips_of_a_million_are_wrong_in_silence() {
     assert_eq!(silent, 0);
 }
 
-/// What is known of the table is checked after everything that a tick reads of it: a flip within the tick is found in
-/// it.
+/// The store's data on the table is checked after everything that a tick reads of it: a flip within the tick is found
+/// in it.
 #[test]
 fn a_flip_within_a_tick_is_found_in_it() {
     let world = World::new();
@@ -695,7 +695,7 @@ fn a_flip_within_a_tick_is_found_in_it() {
         let mut store = world.store.clone();
         let point = store.locate(5.0, 0, 0);
         store.flip_source(bit);
-        assert!(point.doubt.none() && !store.told(&images()).whole, "{bit}");
+        assert!(point.doubt.none() && !store.table_status(&images()).whole, "{bit}");
     }
 }
 

@@ -32,8 +32,8 @@ pub struct Drive {
     /// All ones if the circular spline is fixed, else 0.
     reversed: i32,
     /// |1/ratio| and |ratio|.
-    to_output: Factor,
-    to_generator: Factor,
+    to_output: ToothRatio,
+    to_generator: ToothRatio,
     /// Tooth pitches of the fixed member in one output turn.
     tooth_rate: Rate,
 }
@@ -57,9 +57,9 @@ impl Drive {
         flexspline_teeth: 1,
         circular_spline_teeth: 2,
         reversed: 0,
-        to_output: Factor::new(1, 2),
-        to_generator: Factor::new(2, 1),
-        tooth_rate: Rate::new(Factor::new(2, 1), 1, false),
+        to_output: ToothRatio::new(1, 2),
+        to_generator: ToothRatio::new(2, 1),
+        tooth_rate: Rate::new(ToothRatio::new(2, 1), 1, false),
     };
 
     /// A drive from its tooth counts.
@@ -82,7 +82,7 @@ impl Drive {
             FixedMember::Flexspline => (cs, fs, 0),
             FixedMember::CircularSpline => (fs, cs, -1),
         };
-        let (to_output, to_generator) = (Factor::new(waves, teeth), Factor::new(teeth, waves));
+        let (to_output, to_generator) = (ToothRatio::new(waves, teeth), ToothRatio::new(teeth, waves));
         Ok(Self {
             flexspline_teeth,
             circular_spline_teeth,
@@ -214,12 +214,12 @@ impl Drive {
 
 /// A ratio of tooth counts: a whole part and 64 fractional bits, the last 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Factor {
+struct ToothRatio {
     whole: u32,
     fraction: u64,
 }
 
-impl Factor {
+impl ToothRatio {
     /// `mul/div`, by long division in digits of 16 bits.
     const fn new(mul: u16, div: u16) -> Self {
         let divisor = div as u32;
@@ -268,8 +268,8 @@ struct Rate {
 }
 
 impl Rate {
-    /// So many times a factor.
-    const fn new(factor: Factor, times: u16, reversed: bool) -> Self {
+    /// N times a factor.
+    const fn new(factor: ToothRatio, times: u16, reversed: bool) -> Self {
         let times = times as u64;
         let low = (factor.fraction as u32 as u64).wrapping_mul(times);
         let whole = ((factor.whole as u64) << 32).wrapping_add(factor.fraction >> 32);
@@ -314,7 +314,7 @@ impl Drive {
 #[cfg(test)]
 crate::upset::upsets!(Drive { flexspline_teeth, circular_spline_teeth, reversed, to_output, to_generator, tooth_rate });
 #[cfg(test)]
-crate::upset::upsets!(Factor { whole, fraction });
+crate::upset::upsets!(ToothRatio { whole, fraction });
 #[cfg(test)]
 crate::upset::upsets!(Rate { periods, rest });
 
@@ -387,7 +387,7 @@ mod tests {
         #[test]
         fn scaling_is_division_to_about_a_count(counts in any::<i64>(), mul in 1u16.., div in 1u16..) {
             let exact = counts as i128 * mul as i128;
-                        let found = Factor::new(mul, div).of(counts) as i128;
+                        let found = ToothRatio::new(mul, div).of(counts) as i128;
             // Both modulo 2^64: the angles wrap.
             let off = (exact - found * div as i128).rem_euclid((div as i128) << 64);
             let off = off.min(((div as i128) << 64) - off);
@@ -395,7 +395,9 @@ mod tests {
         }
 
         #[test]
-        fn phases_at_the_output_are_those_of_the_generator(turns in -1_000_000i32..1_000_000, fraction in any::<u32>()) {
+        fn phases_at_the_output_are_those_of_the_generator(
+            turns in -1_000_000i32..1_000_000, fraction in any::<u32>(),
+        ) {
             let drives = [
                 (188, 190, FixedMember::Flexspline), (190, 192, FixedMember::CircularSpline),
                 (201, 203, FixedMember::CircularSpline), (200, 203, FixedMember::Flexspline),
@@ -406,7 +408,9 @@ mod tests {
                 let generator = drive.nominal_generator(nominal);
                 let (there, here) = (drive.phases(generator, nominal), drive.phases_at_output(nominal));
                 prop_assert_eq!(there.output, here.output);
-                for (a, b) in [(there.generator, here.generator), (there.tooth, here.tooth), (there.material, here.material)] {
+                for (a, b) in [
+                    (there.generator, here.generator), (there.tooth, here.tooth), (there.material, here.material),
+                ] {
                     // A count of the generator, which is rounded to 5/4, is as many counts of the tooth phase as there
                     // are teeth.
                     let off = (a.wrapping_sub(b) as i32).unsigned_abs();

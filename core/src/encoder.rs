@@ -1,10 +1,10 @@
 //! From the register of an encoder to an angle and back.
 //!
-//! A register counts so many steps in a turn and begins anew somewhere: after a turn (a single-turn encoder), or after
-//! 2ᴺ counts (a timer that counts edges, a multi-turn encoder). An [`Encoder`] says which; an [`EncoderState`] follows
-//! it. What is kept is the whole number of counts since the zero, and the angle is made anew of that each time, to the
-//! nearest 2⁻³² turn: nothing drifts however long a joint turns, also where the counts in a turn are no power of two,
-//! and a count more never is an angle less.
+//! A register counts a fixed number of steps in a turn and begins anew somewhere: after a turn (a single-turn encoder),
+//! or after 2ᴺ counts (a timer that counts edges, a multi-turn encoder). An [`Encoder`] says which; an [`EncoderState`]
+//! follows it. What is kept is the whole number of counts since the zero, and the angle is made anew of that each time,
+//! to the nearest 2⁻³² turn: nothing drifts however long a joint turns, also where the counts in a turn are no power of
+//! two, and a count more never is an angle less.
 //!
 //! Settings and state are kept as words under a sum ([`whole`](../whole.rs)): where one word was hit by an upset it is
 //! mended in the next call; what is lost gives no angle.
@@ -17,7 +17,7 @@ use core::fmt;
 pub enum EncoderWrap {
     /// After a turn: readings are 0 to the counts in a turn less one.
     Turn,
-    /// After 2ᴺ counts: readings have so many bits, 1 to 64. A signed register is taken by its bits.
+    /// After 2ᴺ counts: readings have N bits, 1 to 64. A signed register is taken by its bits.
     Bits(u8),
 }
 
@@ -30,7 +30,7 @@ pub struct EncoderSettings {
     pub wrap: EncoderWrap,
     /// Whether it counts up where the angle falls.
     pub reversed: bool,
-    /// What it reads at the angle 0, counts: -2⁶² to 2⁶².
+    /// Reading at the angle 0, counts: -2⁶² to 2⁶².
     pub zero_counts: i64,
 }
 
@@ -221,7 +221,7 @@ impl Encoder {
         Some(settings.angle(at.since_zero))
     }
 
-    /// What the register reads at an angle, to the nearest count: for a drive that is commanded in counts of its
+    /// Register value at an angle, to the nearest count: for a drive that is commanded in counts of its
     /// encoder. 0 if the settings are lost ([`Self::mend`]).
     #[must_use]
     pub fn reading(&self, angle_counts: i64) -> u64 {
@@ -233,7 +233,7 @@ impl Encoder {
 }
 
 impl EncoderSettings {
-    /// The angle of so many counts since the zero, 2⁻³² turn, to the nearest.
+    /// Angle of a number of counts since the zero, 2⁻³² turn, to the nearest.
     fn angle(&self, since_zero: i64) -> i64 {
         let per_turn = self.counts_per_turn;
         let counts = self.signed(since_zero);
@@ -256,7 +256,7 @@ impl EncoderSettings {
         if self.reversed { counts.wrapping_neg() } else { counts }
     }
 
-    /// What the register reads where it has counted so far.
+    /// Register value at the given total count.
     fn register(&self, counts: i64) -> u64 {
         match self.wrap {
             EncoderWrap::Turn => counts.checked_rem_euclid(self.counts_per_turn as i64).unwrap_or(0) as u64,
@@ -299,7 +299,7 @@ impl EncoderSettings {
     }
 }
 
-/// So many ones.
+/// A number with N ones as its lowest bits.
 const fn mask(bits: u8) -> u64 {
     u64::MAX.wrapping_shr(64u32.saturating_sub(bits as u32))
 }
@@ -393,7 +393,9 @@ mod tests {
     proptest! {
         /// Every count comes back from its angle, wherever it is.
         #[test]
-        fn counts_come_back(per_turn in 2u32..=1 << 31, counts in -(1i64 << 60)..1 << 60, bits in 32u8..=64, reversed in any::<bool>()) {
+        fn counts_come_back(
+            per_turn in 2u32..=1 << 31, counts in -(1i64 << 60)..1 << 60, bits in 32u8..=64, reversed in any::<bool>(),
+        ) {
             let counts = counts.clamp(-i64::from(per_turn) << 30, i64::from(per_turn) << 30);
             let wrap = EncoderWrap::Bits(bits);
             let encoder = made(EncoderSettings { counts_per_turn: per_turn, wrap, reversed, zero_counts: 0 });

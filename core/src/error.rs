@@ -1,4 +1,4 @@
-//! What can be wrong with a drive or an image, as small `Copy` values that name the field and what was found.
+//! Errors of a drive or an image, as small `Copy` values that name the field and the value found.
 
 use core::fmt;
 

@@ -2,7 +2,7 @@
 //!
 //! A table says how far the output of a drive is from `generator / ratio`, at every generator angle, torque and
 //! temperature, and on which side of its play it rests. This crate reads such a table in place, follows the play, and
-//! tells which generator angle brings the output where it is wanted.
+//! gives the generator angle that brings the output where it is wanted.
 //!
 //! # From `cargo add flexspline` to a compensated step
 //! `flexspline tables` makes `cam.fxt`; the firmware has it twice, at two places of its flash. Then:
@@ -11,7 +11,10 @@
 //!
 //! const JOINT: Joint = {
 //!     let Ok(drive) = Drive::new(188, 190, FixedMember::Flexspline) else { panic!() };
-//!     let limits = Limits { tick_s: 1e-3, rate_rad_s: 0.05, acceleration_rad_s2: 5.0, generator_rate_rad_s: 600.0, patience: 5, hold_rad: 1e-6 };
+//!     let limits = Limits {
+//!         tick_s: 1e-3, rate_rad_s: 0.05, acceleration_rad_s2: 5.0, generator_rate_rad_s: 600.0, patience: 5,
+//!         hold_rad: 1e-6,
+//!     };
 //!     let Ok(joint) = Joint::new(drive, limits, Overrun::FadeOut { ticks: 50 }) else { panic!() };
 //!     joint
 //! };
@@ -24,8 +27,12 @@
 //! }
 //!
 //! /// Every millisecond: what to command so that the output comes to `target`.
-//! fn tick(images: &Images, store: &mut Store, state: &mut JointState, measured: GeneratorAngle, target: OutputAngle) -> GeneratorAngle {
-//!     let input = Input { generator: Some(measured), target, torque_n_m: 12.0, missed_ticks: 0, adjustment: Adjustment::default() };
+//! fn tick(
+//!     images: &Images, store: &mut Store, state: &mut JointState, measured: GeneratorAngle, target: OutputAngle,
+//! ) -> GeneratorAngle {
+//!     let input = Input {
+//!         generator: Some(measured), target, torque_n_m: 12.0, missed_ticks: 0, adjustment: Adjustment::default(),
+//!     };
 //!     JOINT.tick(images, store, state, &input).command
 //! }
 //! # let data = TableData {
@@ -55,14 +62,14 @@
 //! # let reached = Table::check(&image).unwrap().forward(&mut state.play().clone(), command, 12.0, 20.0);
 //! # assert!(reached.output.minus_rad(target).abs() < 2e-8, "{}", reached.output.minus_rad(target));
 //! ```
-//! What an encoder counts becomes an angle by [`Encoder`], and back: any counts in a turn, registers that begin anew,
-//! no drift; that of the generator is read by [`Joint::read`], with which a wrong bit moves no turn. In a slow rate
-//! group ([`RateGroup`]) the firmware tells the temperature ([`Store::set_temperature`]) and lets a few words of the
-//! images be checked ([`Store::check_images`]). Where no loop runs, as on the host, [`Table`] alone answers:
+//! [`Encoder`] converts the counts of an encoder into an angle, and back: any counts in a turn, registers that begin
+//! anew, no drift; that of the generator is read by [`Joint::read`], with which a wrong bit moves no turn. In a slow
+//! rate group ([`RateGroup`]) the firmware sets the temperature ([`Store::set_temperature`]) and lets a few words of
+//! the images be checked ([`Store::check_images`]). Where no loop runs, as on the host, [`Table`] alone answers:
 //! [`Table::forward`], [`Table::inverse`].
 //!
 //! # Beside the table
-//! What the drive does beyond its table goes into the [`Adjustment`] of the next tick, from whatever knows of it.
+//! Motion of the drive beyond its table goes into the [`Adjustment`] of the next tick, from whatever knows of it.
 //!
 //! An encoder at the output, or a star or beacon now and then, teaches a few coefficients ([`Adapter`]):
 //! ```
@@ -71,7 +78,8 @@
 //! let mean = Coefficient { term: Term::Mean, limit: 2e-4, initial_std: 1e-4 };
 //! let half = Coefficient { term: Term::HalfWidth, limit: 5e-5, initial_std: 2e-5 };
 //! let adapter = Adapter::new(&AdaptSettings {
-//!     coefficients: [mean, half], noise_rad: 2e-6, memory_measurements: 1e4, gate: 5.0, settle_rad: 1e-5, torque_limit_n_m: 0.0,
+//!     coefficients: [mean, half], noise_rad: 2e-6, memory_measurements: 1e4, gate: 5.0, settle_rad: 1e-5,
+//!     torque_limit_n_m: 0.0,
 //! })?;
 //! let mut learnt = adapter.start();
 //! learnt.set_learning(Learning::On);
@@ -79,9 +87,13 @@
 //! let mut after_tick = |input: &Input, output: &Output, play: &PlayState, measured: Option<OutputAngle>| {
 //!     adapter.update(&mut learnt, &Seen { input, output, play, measured }).adjustment
 //! };
-//! # let output = Output { command: GeneratorAngle::ZERO, output: OutputAngle::ZERO, transmission_error_rad: 0.0, uncertainty_rad: 0.0,
+//! # let output = Output { command: GeneratorAngle::ZERO, output: OutputAngle::ZERO, transmission_error_rad: 0.0,
+//! #     uncertainty_rad: 0.0,
 //! #     correction_rad: 0.0, held_back_rad: 0.0, quality: Quality::InRange, flags: Flags::default() };
-//! # let input = Input { generator: Some(GeneratorAngle::ZERO), target: OutputAngle::ZERO, torque_n_m: 0.0, missed_ticks: 0, adjustment: Adjustment::default() };
+//! # let input = Input {
+//! #     generator: Some(GeneratorAngle::ZERO), target: OutputAngle::ZERO, torque_n_m: 0.0, missed_ticks: 0,
+//! #     adjustment: Adjustment::default(),
+//! # };
 //! # let next = after_tick(&input, &output, &PlayState::unknown(), Some(OutputAngle::ZERO.offset_rad(5e-4)));
 //! # assert!(next.mean_counts > 0);
 //! # Ok::<(), AdaptError>(())
@@ -104,13 +116,17 @@
 //! ```
 //! use flexspline::*;
 //!
-//! fn in_ten_ticks(joint: &Joint, store: &Store, predictor: &Predictor, state: &PredictorState, now: &Now) -> OutputAhead {
+//! fn in_ten_ticks(
+//!     joint: &Joint, store: &Store, predictor: &Predictor, state: &PredictorState, now: &Now,
+//! ) -> OutputAhead {
 //!     let off = Disturbance { torque_n_m: 0.5, load_change_n_m: 0.05, ..Disturbance::default() };
 //!     let state_bound = [2e-6, 1e-4, 1e-3, 0.5]; // from `Predictor::state_bound`, once
 //!     let ahead = predictor.ahead(state, 12.0, 10, state_bound, &off);
 //!     predictor.output_ahead(joint, store, state, &ahead, now)
 //! }
-//! let inertias = Inertias { motor_kg_m2: 1.0, load_kg_m2: 3.0, stiffness_n_m_per_rad: 3e4, damping_n_m_s_per_rad: 20.0 };
+//! let inertias = Inertias {
+//!     motor_kg_m2: 1.0, load_kg_m2: 3.0, stiffness_n_m_per_rad: 3e4, damping_n_m_s_per_rad: 20.0,
+//! };
 //! let noise = Noise { torque_n_m: 0.5, load_change_n_m: 0.2, speed_rad_s: 1e-4, twist_rad: None };
 //! let predictor = Predictor::new(inertias, noise, 1e-3)?;
 //! # let _ = (predictor, in_ten_ticks);
@@ -127,7 +143,8 @@
 //!     let events = watch.see(state, store, output); // with the feature `defmt`: events.log(tick)
 //!     for _event in events.iter() {}
 //! };
-//! # let output = Output { command: GeneratorAngle::ZERO, output: OutputAngle::ZERO, transmission_error_rad: 0.0, uncertainty_rad: 0.0,
+//! # let output = Output { command: GeneratorAngle::ZERO, output: OutputAngle::ZERO, transmission_error_rad: 0.0,
+//! #     uncertainty_rad: 0.0,
 //! #     correction_rad: 0.0, held_back_rad: 0.0, quality: Quality::InRange, flags: Flags::default() };
 //! # after_tick(0, &JointState::new(), &Store::new(), &output);
 //! // When there is time: bytes for the ground.

@@ -3,11 +3,11 @@
 use crate::drive::Drive;
 use crate::play::PlayState;
 use crate::store::Store;
-use crate::table::{Doubt, Model};
+use crate::table::{Doubt, TableModel};
 use crate::{GeneratorAngle, Joint, OperatingPoint, OutputAngle};
 
-fn model<'s>(drive: &'s Drive, store: &'s Store) -> Model<'s, Store> {
-    Model { memory: store, drive }
+fn model<'s>(drive: &'s Drive, store: &'s Store) -> TableModel<'s, Store> {
+    TableModel { memory: store, drive }
 }
 
 /// Locates a torque.

@@ -192,8 +192,8 @@ impl PlayState {
         self.error
     }
 
-    /// What is known of the centre changed, not where the drive rests in its play: the output is now estimated so much
-    /// further.
+    /// The estimate of the centre changed, not the position of the drive in its play: the estimated output moves as
+    /// far.
     #[inline(always)]
     pub(crate) const fn shift(&mut self, counts: i32) {
         self.error = self.error.wrapping_add(counts & !(self.half >> 31));
@@ -333,7 +333,7 @@ mod tests {
         assert!(!state.is_known());
         let x = run(&mut state, x, &[HALF]);
         assert_eq!((state.lower, state.upper), (-HALF, 0));
-        // Reversals inside the gap cannot tell more; a stroke through the whole play can.
+        // Reversals inside the gap add no information; a stroke through the whole play does.
         run(&mut state, x, &[-2 * HALF, 17, -5]);
         assert!(state.is_known());
         assert_eq!(state.uncertainty_rad(), 0.0);

@@ -10,7 +10,7 @@ use crate::whole::{SUMS_START, sums};
 use core::fmt;
 use core::hint::black_box;
 
-/// What gave another answer than it must.
+/// Part of the self-test with a wrong answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SelfTestError {
     /// The CRC-32 of records and images.
@@ -40,7 +40,7 @@ impl fmt::Display for SelfTestError {
 
 impl core::error::Error for SelfTestError {}
 
-/// What the parts gave.
+/// Answers of the parts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Answers {
     crc: u32,
@@ -135,8 +135,8 @@ impl Answers {
 /// joints, tables or state is touched.
 ///
 /// # Errors
-/// [`SelfTestError`]: the first part with another answer. Processor, registers or the program's memory are not what they were; no correction of
-/// this program can be trusted.
+/// [`SelfTestError`]: the first part with another answer. Processor, registers or the program's memory are not what
+/// they were; no correction of this program can be trusted.
 #[inline(never)]
 pub fn self_test() -> Result<(), SelfTestError> {
     Answers::now().judged()
@@ -152,7 +152,7 @@ mod tests {
         assert_eq!(self_test(), Ok(()));
     }
 
-    /// Each answer that is off is told by its part.
+    /// Each wrong answer is reported with its part.
     #[test]
     fn another_answer_is_told_by_its_part() {
         let sound = Answers::EXPECTED;

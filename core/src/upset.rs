@@ -100,7 +100,7 @@ impl<T> Upset for core::marker::PhantomData<T> {
     fn flip(&mut self, _: usize, _: &mut String) {}
 }
 
-/// Only told.
+/// Reported only.
 impl Upset for crate::GeneratorKind {
     fn bits(&self) -> usize {
         0

@@ -8,7 +8,7 @@
 //! below). Words that are all zeros, or all ones, do not pass where the sum begins with
 //! [`SUMS_START`]. A cyclic check of the same words would take six times the instructions.
 //!
-//! What is summed up is a call of its own for each structure: inlined, the compiler moves the words to the stack and
+//! The sum is a call of its own for each structure: inlined, the compiler moves the words to the stack and
 //! back.
 //!
 //! # One sum, and what it mends
@@ -26,7 +26,8 @@ macro_rules! sums {
         $(
             let word: u32 = $word;
             // Fits: (2³² − 1)² + 2·(2³² − 1) = 2⁶⁴ − 1. One instruction, umaal.
-            let next = (low as u64).wrapping_mul($crate::whole::FACTOR as u64).wrapping_add(high as u64).wrapping_add(word as u64);
+            let product = (low as u64).wrapping_mul($crate::whole::FACTOR as u64);
+            let next = product.wrapping_add(high as u64).wrapping_add(word as u64);
             (low, high) = (next as u32, (next >> 32) as u32);
         )*
         // The last word too goes through all columns.
@@ -200,7 +201,7 @@ impl<T> Sealed<T> {
         Self { kept, sums: pair(sum) }
     }
 
-    /// What is kept, checked or not.
+    /// The kept value, checked or not.
     pub(crate) const fn kept(&self) -> &T {
         &self.kept
     }
@@ -224,7 +225,7 @@ impl<T: Words> Sealed<T> {
         same(pair(Self::found(&self.kept)), self.sums)
     }
 
-    /// What is kept, mended if it has to be; `None` if it is lost.
+    /// The kept value, mended if it has to be; `None` if it is lost.
     #[inline(always)]
     pub(crate) fn open(&self) -> Option<T> {
         if self.is_whole() { Some(self.kept) } else { self.mended() }

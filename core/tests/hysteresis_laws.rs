@@ -102,8 +102,11 @@ proptest! {
         let top = start + sign * stroke;
         let at = follow(&mut state, [top]);
         let turning = state;
-        let strokes: Vec<i64> = shares.iter().scan(stroke, |left, share| { *left = *left * share / 100; Some(*left) }).collect();
-        let inner: Vec<i64> = strokes.iter().enumerate().map(|(i, s)| if i % 2 == 0 { -sign * s } else { sign * s }).collect();
+        let strokes: Vec<i64> = shares.iter().scan(
+            stroke, |left, share| { *left = *left * share / 100; Some(*left) },
+        ).collect();
+        let inner = strokes.iter().enumerate();
+        let inner: Vec<i64> = inner.map(|(i, s)| if i % 2 == 0 { -sign * s } else { sign * s }).collect();
         let out: Vec<i64> = inner.iter().rev().map(|step| -step).collect();
         let inside = positions(top, &inner);
         follow(&mut state, inside.iter().copied());
@@ -116,7 +119,9 @@ proptest! {
     /// Madelung's first rule: after a turn the way depends on the turning point and the memory there alone, not on how
     /// it was come to.
     #[test]
-    fn what_follows_a_turn_depends_on_the_turn(histories in prop::array::uniform2(prop::collection::vec(FAR, 0..6)), after in prop::collection::vec(FAR, 1..8)) {
+    fn what_follows_a_turn_depends_on_the_turn(
+        histories in prop::array::uniform2(prop::collection::vec(FAR, 0..6)), after in prop::collection::vec(FAR, 1..8),
+    ) {
         let mut ways = Vec::new();
         for history in &histories {
             let mut state = known();
@@ -133,7 +138,9 @@ proptest! {
 
     /// Wiping-out: of what came before only extremes that were not exceeded since are remembered.
     #[test]
-    fn a_larger_stroke_wipes_out_all_before(first in prop::collection::vec(FAR, 0..8), second in prop::collection::vec(FAR, 0..8)) {
+    fn a_larger_stroke_wipes_out_all_before(
+        first in prop::collection::vec(FAR, 0..8), second in prop::collection::vec(FAR, 0..8),
+    ) {
         let (mut one, mut other) = (known(), known());
         follow(&mut one, positions(0, &first));
         follow(&mut other, positions(0, &second));
@@ -147,7 +154,8 @@ proptest! {
     /// history.
     #[test]
     fn loops_between_the_same_extremes_are_congruent(
-        histories in prop::array::uniform2(prop::collection::vec(FAR, 0..8)), amplitude in 1..4 * HALF, part in 0i64..=100,
+        histories in prop::array::uniform2(prop::collection::vec(FAR, 0..8)), amplitude in 1..4 * HALF,
+        part in 0i64..=100,
     ) {
         let rises = histories.map(|history| {
             let mut state = known();

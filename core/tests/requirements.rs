@@ -33,7 +33,7 @@ fn tests() -> BTreeSet<String> {
     names
 }
 
-/// What is wrong with a page, given the tests and the checks that there are.
+/// Faults of a page, given the existing tests and checks.
 fn faults(page: &str, tests: &BTreeSet<String>, run: &str) -> Vec<String> {
     let (mut ids, mut faults) = (BTreeSet::new(), Vec::new());
     for row in page.lines().filter(|line| line.starts_with("| C-")) {
@@ -58,8 +58,8 @@ fn faults(page: &str, tests: &BTreeSet<String>, run: &str) -> Vec<String> {
             }
         }
     }
-    let told = page.lines().filter(|line| line.starts_with("| ") && line.matches('|').count() == 6);
-    for row in told.skip(1) {
+    let rows = page.lines().filter(|line| line.starts_with("| ") && line.matches('|').count() == 6);
+    for row in rows.skip(1) {
         let requirement = row.split('|').nth(4).expect("a column").trim();
         for id in requirement.split(", ").filter(|id| id.starts_with("C-")) {
             if !ids.contains(id) {

@@ -100,8 +100,10 @@ fn dictionary() -> String {
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
          <!-- A record of telemetry of the core. Made and checked by core/tests/telemetry_dictionary.rs. -->\n\
          <SpaceSystem xmlns=\"http://www.omg.org/spec/XTCE/20180204\" name=\"flexspline\">\n  <TelemetryMetaData>\n\
-         \x20   <ParameterTypeSet>\n{types}    </ParameterTypeSet>\n    <ParameterSet>\n{parameters}    </ParameterSet>\n\
-         \x20   <ContainerSet>\n      <SequenceContainer name=\"record\">\n        <EntryList>\n{entries}        </EntryList>\n\
+         \x20   <ParameterTypeSet>\n{types}    </ParameterTypeSet>\n\
+         \x20   <ParameterSet>\n{parameters}    </ParameterSet>\n\
+         \x20   <ContainerSet>\n      <SequenceContainer name=\"record\">\n\
+         \x20       <EntryList>\n{entries}        </EntryList>\n\
          \x20     </SequenceContainer>\n    </ContainerSet>\n  </TelemetryMetaData>\n</SpaceSystem>\n"
     )
 }
@@ -130,7 +132,7 @@ fn attribute<'t>(element: &'t str, name: &str) -> Option<&'t str> {
     element.split(&format!(" {name}=\"")).nth(1)?.split('"').next()
 }
 
-/// What the bytes mean by the file alone: values by name.
+/// Values of the bytes by name, decoded with the file alone.
 fn read(file: &str, bytes: &[u8]) -> BTreeMap<String, f64> {
     let line = |what: &str, name: &str, value: &str| {
         let found =
@@ -141,8 +143,9 @@ fn read(file: &str, bytes: &[u8]) -> BTreeMap<String, f64> {
     let mut at = 0;
     for entry in file.lines().filter(|line| line.contains("<ParameterRefEntry")) {
         let name = attribute(entry, "parameterRef").unwrap();
-        let told = line("Parameter ", "name", name);
-        let kind = file.lines().find(|line| attribute(line, "name") == attribute(&told, "parameterTypeRef")).unwrap();
+        let parameter = line("Parameter ", "name", name);
+        let kind =
+            file.lines().find(|line| attribute(line, "name") == attribute(&parameter, "parameterTypeRef")).unwrap();
         let encoding = kind.split("DataEncoding").nth(1).unwrap();
         let fixed = encoding.split("<FixedValue>").nth(1).and_then(|rest| rest.split('<').next());
         let bits: usize = attribute(encoding, "sizeInBits").or(fixed).unwrap().parse().unwrap();

@@ -1,4 +1,4 @@
-//! What a table says, outside a tick.
+//! Questions to a table outside a tick.
 
 use super::names::{FLEXSPLINE_FIXED_CIRCULAR_SPLINE, FLEXSPLINE_FIXED_FLEXSPLINE};
 use super::{
@@ -9,7 +9,7 @@ use crate::{
     Approach, Direction, FixedMember, GeneratorAngle, Joint, JointState, OutputAngle, PlayState, Store, Table,
 };
 
-/// What the output is expected to do.
+/// Expected motion of the output.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FlexsplinePrediction {
@@ -25,7 +25,7 @@ pub struct FlexsplinePrediction {
     pub quality: u8,
 }
 
-/// What to command for a wanted output angle.
+/// Command for a wanted output angle.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FlexsplineCommand {
@@ -57,7 +57,7 @@ pub struct FlexsplinePlay {
     pub is_started: u8,
 }
 
-/// What an image says of itself.
+/// Contents of an image's header.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FlexsplineImageReport {
@@ -69,7 +69,7 @@ pub struct FlexsplineImageReport {
     pub temperature_range_c: [f32; 2],
     /// No error that it gives is larger, rad.
     pub error_limit_rad: f32,
-    /// What it misses of the samples that it was made of at most, rad.
+    /// Largest deviation from the samples that it was made of, rad.
     pub projection_worst_rad: f32,
     /// Root of the mean square of that, rad.
     pub projection_rms_rad: f32,
@@ -194,10 +194,10 @@ pub extern "C" fn flexspline_ratio(joint: *const FlexsplineJoint, ratio: *mut f3
     status(ask())
 }
 
-/// Tells where a drive rests inside its play, as the last tick left it.
+/// Reports the position of a drive inside its play, as the last tick left it.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_state_play(state: *const FlexsplineState, play: *mut FlexsplinePlay) -> FlexsplineStatus {
-    let tell = || {
+    let fill = || {
         apart([span(state), span(play)])?;
         let state: &JointState = get(state, STATE_MARK)?;
         let found = state.play();
@@ -213,10 +213,10 @@ pub extern "C" fn flexspline_state_play(state: *const FlexsplineState, play: *mu
             },
         )
     };
-    status(tell())
+    status(fill())
 }
 
-/// Checks one image in full, without a store, and tells what it says of itself. The work grows with the image: for
+/// Checks one image in full, without a store, and reports its header. The work grows with the image: for
 /// start-up, or the host.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_image_report(
@@ -224,7 +224,7 @@ pub extern "C" fn flexspline_image_report(
     image_bytes: usize,
     report: *mut FlexsplineImageReport,
 ) -> FlexsplineStatus {
-    let tell = || {
+    let fill = || {
         usable(report)?;
         let read = bytes(image, image_bytes)?;
         apart([(image as usize, image_bytes), span(report)])?;
@@ -249,7 +249,7 @@ pub extern "C" fn flexspline_image_report(
             },
         )
     };
-    status(tell())
+    status(fill())
 }
 
 /// How far units scatter about a table that a data sheet completed, as a share s of their stiffness: 0.3 of `+-30 %`; 0
@@ -261,12 +261,12 @@ pub extern "C" fn flexspline_image_sheet_scatter(
     image_bytes: usize,
     scatter: *mut f32,
 ) -> FlexsplineStatus {
-    let tell = || {
+    let fill = || {
         usable(scatter)?;
         let read = bytes(image, image_bytes)?;
         apart([(image as usize, image_bytes), span(scatter)])?;
         let table = Table::check(read).map_err(image_status)?;
         give(scatter, table.sheet_scatter().unwrap_or(0.0))
     };
-    status(tell())
+    status(fill())
 }

@@ -1,4 +1,4 @@
-//! What goes on beside a tick: a table received in chunks, events, records for the ground, an observer and what lies
+//! Work next to the tick: a table received in chunks, events, records for the ground, an observer and what lies
 //! ahead.
 
 use super::names::*;
@@ -64,20 +64,20 @@ pub struct FlexsplinePredictor {
     pub(super) opaque: [MaybeUninit<u64>; FLEXSPLINE_PREDICTOR_WORDS],
 }
 
-/// What an observer estimates.
+/// State of an observer.
 #[repr(C)]
 #[derive(Debug)]
 pub struct FlexsplineObserver {
     pub(super) opaque: [MaybeUninit<u64>; FLEXSPLINE_OBSERVER_WORDS],
 }
 
-/// What changed in a tick.
+/// Events of a tick.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FlexsplineEvents {
     /// Ticks missed since the start.
     pub missed_ticks: u32,
-    /// `FLEXSPLINE_EVENT_...`; what follows is only told with its event.
+    /// `FLEXSPLINE_EVENT_...`; the fields below are only set with their event.
     pub events: u16,
     /// `FLEXSPLINE_MODE_...`.
     pub mode_before: u8,
@@ -93,7 +93,7 @@ pub struct FlexsplineEvents {
     pub damaged_page: u8,
 }
 
-/// What was measured in a tick, for the observer.
+/// Measurements of a tick, for the observer.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct FlexsplineMeasured {
@@ -105,7 +105,7 @@ pub struct FlexsplineMeasured {
     pub twist_rad: f32,
 }
 
-/// What an observer estimates, to read.
+/// Estimates of an observer, to read.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FlexsplineObserverReport {
@@ -149,9 +149,9 @@ pub struct FlexsplineAhead {
     pub output_counts: i64,
     /// It lies within +- this, rad.
     pub bound_rad: f32,
-    /// What the load turns until then, rad.
+    /// Turn of the load until then, rad.
     pub load_rad: f32,
-    /// What the motor turns until then, over the ratio, rad.
+    /// Turn of the motor until then, over the ratio, rad.
     pub motor_rad: f32,
     /// Twist then, rad.
     pub twist_rad: f32,
@@ -205,7 +205,7 @@ pub struct FlexsplineDisturbance {
 
 /// Announced and received bytes.
 #[derive(Clone, Copy)]
-struct Progress {
+struct ReceptionProgress {
     announced: usize,
     received: usize,
 }
@@ -216,7 +216,8 @@ const PREDICTOR_MARK: u32 = 0x7850_5446;
 const OBSERVER_MARK: u32 = 0x784f_5446;
 
 const _: () = {
-    assert!(size_of::<Marked<Progress>>() <= size_of::<FlexsplineUpload>() && align_of::<Marked<Progress>>() <= 8);
+    assert!(size_of::<Marked<ReceptionProgress>>() <= size_of::<FlexsplineUpload>());
+    assert!(align_of::<Marked<ReceptionProgress>>() <= 8);
     assert!(size_of::<Marked<Watch>>() <= size_of::<FlexsplineWatch>() && align_of::<Marked<Watch>>() <= 8);
     assert!(size_of::<Marked<Predictor>>() <= size_of::<FlexsplinePredictor>() && align_of::<Marked<Predictor>>() <= 8);
     assert!(
@@ -268,7 +269,7 @@ pub(super) const fn health_of(code: u8) -> Result<Health, FlexsplineStatus> {
     })
 }
 
-/// What a tick gave, back from C.
+/// Output of a tick, back from C.
 pub(super) fn given(output: *const FlexsplineOutput) -> Result<Output, FlexsplineStatus> {
     let found = copied(output)?;
     Ok(Output {
@@ -292,11 +293,11 @@ fn upload_status(error: UploadError) -> FlexsplineStatus {
     }
 }
 
-/// Begins to receive a table of so many bytes. The buffer is the caller's and is given with every call; it is no image
-/// in use.
+/// Begins to receive a table of the given length. The buffer is the caller's and is given with every call; it is no
+/// image in use.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_upload_begin(upload: *mut FlexsplineUpload, announced: usize) -> FlexsplineStatus {
-    status(put(upload, UPLOAD_MARK, Progress { announced, received: 0 }))
+    status(put(upload, UPLOAD_MARK, ReceptionProgress { announced, received: 0 }))
 }
 
 /// Takes the bytes from `offset` on: `FLEXSPLINE_STATUS_ORDER` if they are not the next ones, which can still come.
@@ -314,11 +315,11 @@ pub extern "C" fn flexspline_upload_chunk(
         let chunk_read = bytes(chunk, chunk_bytes)?;
         let (upload_span, buffer_span) = (span(upload), (buffer as usize, buffer_bytes));
         apart([upload_span, buffer_span, (chunk as usize, chunk_bytes)])?;
-        let progress: &mut Progress = get_mut(upload, UPLOAD_MARK)?;
+        let progress: &mut ReceptionProgress = get_mut(upload, UPLOAD_MARK)?;
         if buffer_bytes > isize::MAX as usize {
             return Err(FlexsplineStatus::Argument);
         }
-        // SAFETY: not null, apart from the other objects; the caller says that so many bytes are there, and they are
+        // SAFETY: not null, apart from the other objects; the caller guarantees this length, and the bytes are
         // its own.
         let buffer = unsafe { core::slice::from_raw_parts_mut(buffer, buffer_bytes) };
         let mut resumed = Upload::resume(buffer, progress.announced, progress.received).map_err(upload_status)?;
@@ -329,7 +330,7 @@ pub extern "C" fn flexspline_upload_chunk(
     status(take())
 }
 
-/// Checks a table of which all bytes came, in full, and tells its id; it can then be activated.
+/// Checks a table of which all bytes came, in full, and reports its id; it can then be activated.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_upload_finish(
     upload: *const FlexsplineUpload,
@@ -341,7 +342,7 @@ pub extern "C" fn flexspline_upload_finish(
         let image = bytes(buffer, buffer_bytes)?;
         apart([span(upload), (buffer as usize, buffer_bytes), span(table_id)])?;
         usable(table_id)?;
-        let &Progress { announced, received } = get(upload, UPLOAD_MARK)?;
+        let &ReceptionProgress { announced, received } = get(upload, UPLOAD_MARK)?;
         let id = Upload::check(image, announced, received).map_err(upload_status)?.id();
         // SAFETY: not null, apart from what is borrowed; the caller's.
         unsafe { table_id.write(id.0) };
@@ -356,7 +357,7 @@ pub extern "C" fn flexspline_watch_init(watch: *mut FlexsplineWatch) -> Flexspli
     status(put(watch, WATCH_MARK, Watch::new()))
 }
 
-/// Tells what changed, after `flexspline_tick`; `output` is what it gave.
+/// Reports the changes, after `flexspline_tick`; `output` is that tick's output.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_watch_see(
     watch: *mut FlexsplineWatch,
@@ -377,33 +378,33 @@ pub extern "C" fn flexspline_watch_see(
         let state: &JointState = get(state, STATE_MARK)?;
         let store: &Store = get(store, STORE_MARK)?;
         let watch: &mut Watch = get_mut(watch, WATCH_MARK)?;
-        let mut told = FlexsplineEvents::default();
+        let mut filled = FlexsplineEvents::default();
         for event in watch.see(state, store, &given).iter() {
-            told.events |= match event {
+            filled.events |= match event {
                 Event::Mode { from, to } => {
-                    (told.mode_before, told.mode) = (Mode::code(from) as u8, Mode::code(to) as u8);
+                    (filled.mode_before, filled.mode) = (Mode::code(from) as u8, Mode::code(to) as u8);
                     FLEXSPLINE_EVENT_MODE
                 }
                 Event::Health { from, to } => {
-                    (told.health_before, told.health) = (health_code(from), health_code(to));
+                    (filled.health_before, filled.health) = (health_code(from), health_code(to));
                     FLEXSPLINE_EVENT_HEALTH
                 }
                 Event::PageDamaged { image, page } => {
-                    (told.damaged_image, told.damaged_page) = (image as u8, page as u8);
+                    (filled.damaged_image, filled.damaged_page) = (image as u8, page as u8);
                     FLEXSPLINE_EVENT_PAGE_DAMAGED
                 }
                 Event::TableDoubt => FLEXSPLINE_EVENT_TABLE_DOUBT,
                 Event::Fallback => FLEXSPLINE_EVENT_FALLBACK,
                 Event::Recovered => FLEXSPLINE_EVENT_RECOVERED,
                 Event::Overrun { missed_ticks } => {
-                    told.missed_ticks = missed_ticks;
+                    filled.missed_ticks = missed_ticks;
                     FLEXSPLINE_EVENT_OVERRUN
                 }
                 Event::StateTorn => FLEXSPLINE_EVENT_STATE_TORN,
             };
         }
         // SAFETY: not null, aligned, apart from what is borrowed; the caller's.
-        unsafe { events.write(told) };
+        unsafe { events.write(filled) };
         Ok(())
     };
     status(see())
@@ -430,7 +431,7 @@ pub extern "C" fn flexspline_record(
         let state: &JointState = get(state, STATE_MARK)?;
         let store: &Store = get(store, STORE_MARK)?;
         let made = Record { number, lost, ..Record::of(tick, state, store, &given) };
-        // SAFETY: not null, apart from what is borrowed; the caller owns so many bytes.
+        // SAFETY: not null, apart from what is borrowed; the caller owns this length.
         unsafe { record.write(made.encode()) };
         Ok(())
     };
@@ -483,22 +484,22 @@ pub extern "C" fn flexspline_predictor_of(
     status(make())
 }
 
-/// Tells the numbers of a predictor, for `flexspline_predictor_init` of the firmware.
+/// Reports the numbers of a predictor, for `flexspline_predictor_init` of the firmware.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_predictor_parts(
     predictor: *const FlexsplinePredictor,
     parts: *mut [f32; FLEXSPLINE_PREDICTOR_PARTS],
 ) -> FlexsplineStatus {
-    let tell = || {
+    let fill = || {
         apart([span(predictor), span(parts)])?;
         let predictor: &Predictor = get(predictor, PREDICTOR_MARK)?;
         give(parts, predictor.parts())
     };
-    status(tell())
+    status(fill())
 }
 
-/// Tells what the observer can be off by while the disturbances stay within their bounds: twist rad, speeds of motor
-/// and load rad/s, torque on the load N m; for `FlexsplineNow`. For the host or start-up: 10000 ticks in double
+/// Reports the largest error of the observer while the disturbances stay within their bounds: twist rad, speeds of
+/// motor and load rad/s, torque on the load N m; for `FlexsplineNow`. For the host or start-up: 10000 ticks in double
 /// precision.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_predictor_state_bound(
@@ -506,7 +507,7 @@ pub extern "C" fn flexspline_predictor_state_bound(
     disturbance: *const FlexsplineDisturbance,
     bound: *mut [f32; 4],
 ) -> FlexsplineStatus {
-    let tell = || {
+    let fill = || {
         clear(span(bound), [span(predictor), span(disturbance)])?;
         usable(bound)?;
         let FlexsplineDisturbance { torque_n_m, load_change_n_m, speed_rad_s, twist_rad } = copied(disturbance)?;
@@ -514,7 +515,7 @@ pub extern "C" fn flexspline_predictor_state_bound(
         let disturbance = Disturbance { torque_n_m, load_change_n_m, speed_rad_s, twist_rad };
         give(bound, predictor.state_bound(&disturbance))
     };
-    status(tell())
+    status(fill())
 }
 
 /// Makes an observer at rest, without load.
@@ -525,7 +526,7 @@ pub extern "C" fn flexspline_observer_init(observer: *mut FlexsplineObserver) ->
 
 /// One tick of the observer. `FLEXSPLINE_STATUS_ARGUMENT` if a number that is used is not finite or beyond any drive,
 /// and the estimate stays; `FLEXSPLINE_STATUS_NOT_INITIALISED` if an upset hit more than a word of observer or
-/// predictor (one is mended): make them anew. What is told then is NaN.
+/// predictor (one is mended): make them anew. The reported values are NaN then.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_observer_step(
     observer: *mut FlexsplineObserver,
@@ -546,29 +547,29 @@ pub extern "C" fn flexspline_observer_step(
     status(step())
 }
 
-/// Tells what an observer estimates.
+/// Reports the estimates of an observer.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_observer_report(
     observer: *const FlexsplineObserver,
     report: *mut FlexsplineObserverReport,
 ) -> FlexsplineStatus {
-    let tell = || {
+    let fill = || {
         apart([span(observer), span(report)])?;
         usable(report)?;
         let observer: &PredictorState = get(observer, OBSERVER_MARK)?;
-        let told = FlexsplineObserverReport {
+        let filled = FlexsplineObserverReport {
             twist_rad: observer.twist_rad(),
             load_speed_rad_s: observer.load_speed_rad_s(),
             load_torque_n_m: observer.load_torque_n_m(),
         };
         // SAFETY: not null, aligned, apart from the observer; the caller's.
-        unsafe { report.write(told) };
+        unsafe { report.write(filled) };
         Ok(())
     };
-    status(tell())
+    status(fill())
 }
 
-/// Tells where the output will be some ticks from now, with the table as the output map of the two inertias. The work
+/// Predicts the output some ticks from now, with the table as the output map of the two inertias. The work
 /// grows with the ticks; call it in a slow rate group. `FLEXSPLINE_STATUS_ARGUMENT` if a number of `now` is not finite.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_predict(
@@ -612,7 +613,7 @@ pub extern "C" fn flexspline_predict(
             measured_bound_rad: from.measured_bound_rad,
         };
         let found = predictor.output_ahead(joint, store, observer, &turned, &now);
-        let told = FlexsplineAhead {
+        let filled = FlexsplineAhead {
             output_counts: found.output.counts(),
             bound_rad: found.bound_rad,
             load_rad: turned.load_rad,
@@ -621,7 +622,7 @@ pub extern "C" fn flexspline_predict(
             quality: quality_code(found.quality),
         };
         // SAFETY: not null, aligned, apart from what is borrowed; the caller's.
-        unsafe { ahead.write(told) };
+        unsafe { ahead.write(filled) };
         Ok(())
     };
     status(predict())

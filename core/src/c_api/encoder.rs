@@ -21,7 +21,7 @@ pub struct FlexsplineEncoder {
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct FlexsplineEncoderSettings {
-    /// What it reads at the angle 0, counts of the encoder: -2^62 to 2^62.
+    /// Reading at the angle 0, counts of the encoder: -2^62 to 2^62.
     pub zero_counts: i64,
     /// Counts in a turn, 2 to 2^31: four times the lines of an incremental one.
     pub counts_per_turn: u32,
@@ -32,7 +32,7 @@ pub struct FlexsplineEncoderSettings {
     pub reversed: u8,
 }
 
-/// What is kept of an encoder.
+/// Saved data of an encoder.
 #[derive(Clone, Copy)]
 struct Followed {
     encoder: Encoder,
@@ -89,14 +89,14 @@ pub extern "C" fn flexspline_encoder_start(
     status(start())
 }
 
-/// Takes a reading of the encoder of a joint's generator and tells the angle to give to its next tick, counts of 2^-32
-/// turn, to the nearest. A reading that the tick does not believe (`FLEXSPLINE_FLAG_GLITCH`) moves no turn: the next is
-/// taken from the reading before or from the angle that was believed last, whichever is nearer. So the turns are right
-/// as soon as the readings are, if no more than `patience` in a row were wrong and the generator made less than a third
-/// of what the register counts meanwhile. `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that (give the tick
-/// no sample then), or if `generator_rate_rad_s` allows a sixth of what the register counts in a tick, so that motion
-/// hides a wrong bit; `FLEXSPLINE_STATUS_NOT_INITIALISED` before `flexspline_encoder_start`, and where encoder or joint
-/// are lost.
+/// Takes a reading of the encoder of a joint's generator and reports the angle to give to its next tick, counts of
+/// 2^-32 turn, to the nearest. A reading that the tick does not believe (`FLEXSPLINE_FLAG_GLITCH`) moves no turn: the
+/// next is taken from the reading before or from the angle that was believed last, whichever is nearer. So the turns
+/// are right as soon as the readings are, if no more than `patience` in a row were wrong and the generator made less
+/// than a third of what the register counts meanwhile. `FLEXSPLINE_STATUS_ARGUMENT` if the register cannot read that
+/// (give the tick no sample then), or if `generator_rate_rad_s` allows a sixth of what the register counts in a tick,
+/// so that motion hides a wrong bit; `FLEXSPLINE_STATUS_NOT_INITIALISED` before `flexspline_encoder_start`, and where
+/// encoder or joint are lost.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_joint_read(
     joint: *const FlexsplineJoint,
@@ -120,8 +120,8 @@ pub extern "C" fn flexspline_joint_read(
 }
 
 /// The same for an encoder that no joint judges: one wrong reading, half of what the register counts away, moves it by
-/// all that it counts, for good. Takes a reading and tells the angle, counts of 2^-32 turn, to the nearest. Between two
-/// readings it may move by less than half of what the register counts. `FLEXSPLINE_STATUS_ARGUMENT` if the register
+/// all that it counts, for good. Takes a reading and reports the angle, counts of 2^-32 turn, to the nearest. Between
+/// two readings it may move by less than half of what the register counts. `FLEXSPLINE_STATUS_ARGUMENT` if the register
 /// cannot read that (give the tick no sample then), `FLEXSPLINE_STATUS_NOT_INITIALISED` before
 /// `flexspline_encoder_start`, and after an upset of more than a word (one word is mended): make it and start it again.
 #[unsafe(no_mangle)]
@@ -145,14 +145,14 @@ pub extern "C" fn flexspline_encoder_read(
     status(read())
 }
 
-/// What the register reads at an angle, to the nearest count: for a drive that is commanded in counts of its encoder.
+/// Register value at an angle, to the nearest count: for a drive that is commanded in counts of its encoder.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_encoder_reading(
     encoder: *const FlexsplineEncoder,
     angle_counts: i64,
     reading: *mut u64,
 ) -> FlexsplineStatus {
-    let tell = || {
+    let fill = || {
         apart([span(encoder), span(reading)])?;
         let followed: &Followed = get(encoder, ENCODER_MARK)?;
         if followed.encoder.is_lost() {
@@ -160,18 +160,18 @@ pub extern "C" fn flexspline_encoder_reading(
         }
         give(reading, followed.encoder.reading(angle_counts))
     };
-    status(tell())
+    status(fill())
 }
 
 /// Counts of 2^-32 turn of an angle in radians, to the nearest; `FLEXSPLINE_STATUS_ARGUMENT` if it is not finite or
 /// beyond 2^31 turns. For start-up and the host: in double precision.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_counts_from_rad(rad: f64, angle_counts: *mut i64) -> FlexsplineStatus {
-    let tell = || {
+    let fill = || {
         usable(angle_counts)?;
         give(angle_counts, OutputAngle::from_rad(rad).ok_or(FlexsplineStatus::Argument)?.counts())
     };
-    status(tell())
+    status(fill())
 }
 
 /// Radians of an angle in counts of 2^-32 turn. For start-up and the host: in double precision.

@@ -1,9 +1,9 @@
-//! What is added to the table: what measurements of the output teach, and springs that slip.
+//! Additions to the table: coefficients learnt from measurements of the output, and springs that slip.
 
 use super::{
     FlexsplineInput, FlexsplineJoint, FlexsplineOutput, FlexsplineState, FlexsplineStatus, FlexsplineStore, JOINT_MARK,
-    Marked, STATE_MARK, STORE_MARK, apart, bytes, bytes_mut, clear, copied, get, get_mut, give, given, list, put,
-    restore_status, span, status, told, usable,
+    Marked, STATE_MARK, STORE_MARK, apart, bytes, bytes_mut, clear, copied, core_input, get, get_mut, give, given,
+    list, put, restore_status, span, status, usable,
 };
 use crate::joint::{NO_COEFFICIENT, NOBODY};
 use crate::{
@@ -39,7 +39,7 @@ pub const FLEXSPLINE_TERM_SINE: u8 = 4;
 
 /// The adjustment is zero; what was learnt is kept. The start.
 pub const FLEXSPLINE_LEARNING_OFF: u8 = 0;
-/// What was learnt is used and stays as it is.
+/// The learnt coefficients are used and stay as they are.
 pub const FLEXSPLINE_LEARNING_FROZEN: u8 = 1;
 /// Measurements are used.
 pub const FLEXSPLINE_LEARNING_ON: u8 = 2;
@@ -110,7 +110,7 @@ pub struct FlexsplineLearnSettings {
     pub torque_limit_n_m: f32,
 }
 
-/// What a learner adds in the next tick.
+/// A learner's addition in the next tick.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FlexsplineAdapted {
@@ -120,11 +120,11 @@ pub struct FlexsplineAdapted {
     pub half_width_counts: i32,
     /// Standard deviation of what it adds to the error, rad.
     pub uncertainty_rad: f32,
-    /// What became of the measurement: `FLEXSPLINE_VERDICT_...`.
+    /// Verdict on the measurement: `FLEXSPLINE_VERDICT_...`.
     pub verdict: u8,
 }
 
-/// What became of measurements; counters stop at their largest value.
+/// Counts of measurements by verdict; counters stop at their largest value.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FlexsplineLearnerReport {
@@ -173,7 +173,7 @@ pub struct FlexsplineSpring {
     pub gain: f32,
 }
 
-/// What springs add.
+/// Contribution of the springs.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FlexsplineSlipReport {
@@ -190,7 +190,7 @@ pub struct FlexsplineSlipReport {
 const MOST: usize = FLEXSPLINE_LEARNER_COEFFICIENTS;
 const SPRINGS: usize = FLEXSPLINE_SLIP_SPRINGS;
 
-/// An adapter with what it has learnt, of the first so many coefficients.
+/// An adapter with its learnt state, for the first N coefficients.
 #[derive(Clone, Copy)]
 struct Learner {
     adapter: Adapter<MOST>,
@@ -205,7 +205,7 @@ enum Bank {
     Torque(SlipBank<SPRINGS, LoadTorque>, SlipState<SPRINGS, LoadTorque>),
 }
 
-/// The first so many springs of a bank.
+/// The first N springs of a bank.
 #[derive(Clone, Copy)]
 struct CSprings {
     bank: Bank,
@@ -282,7 +282,7 @@ pub extern "C" fn flexspline_learner_set(learner: *mut FlexsplineLearner, learni
 }
 
 /// Says whose coefficients are learnt: of this joint with the table in use. Saved learners carry both, and are restored
-/// only where they belong. `unit` tells joints with the same settings and the same table from each other, such as the
+/// only where they belong. `unit` distinguishes joints with the same settings and the same table, such as the
 /// wheels of a rover; 0 if there is one. After `flexspline_learner_init` and the table, before
 /// `flexspline_learner_restore`; again after another table was activated: what was learnt for another owner is
 /// forgotten. `FLEXSPLINE_STATUS_ARGUMENT` if no table is in use.
@@ -326,8 +326,8 @@ pub extern "C" fn flexspline_learner_reset(learner: *mut FlexsplineLearner) -> F
 }
 
 /// One tick, every tick and in order, after `flexspline_tick` with what it was given and gave: learns from the output
-/// angle measured at the same moment (`has_measured` 1, `measured_counts` of 2^-32 turn) if there is one, and tells
-/// what to add in the next tick. Nothing that comes in can make that exceed the limits. `input` is that of the tick
+/// angle measured at the same moment (`has_measured` 1, `measured_counts` of 2^-32 turn) if there is one, and reports
+/// the addition in the next tick. Nothing that comes in can make that exceed the limits. `input` is that of the tick
 /// with the learner's own adjustment alone: what springs or a model of yours added beside it counts as known then, and
 /// is not learnt a second time.
 #[unsafe(no_mangle)]
@@ -346,7 +346,7 @@ pub extern "C" fn flexspline_learner_update(
         }
         apart([span(learner), span(adapted)])?;
         usable(adapted)?;
-        let (input, output) = (told(&copied(input)?), given(output)?);
+        let (input, output) = (core_input(&copied(input)?), given(output)?);
         let state: &JointState = get(state, STATE_MARK)?;
         let learner: &mut Learner = get_mut(learner, LEARNER_MARK)?;
         let measured = (has_measured != 0).then_some(OutputAngle::from_counts(measured_counts));
@@ -373,14 +373,15 @@ pub extern "C" fn flexspline_learner_update(
     status(update())
 }
 
-/// Tells a coefficient, by its place in the list that the learner was made of; `FLEXSPLINE_STATUS_ARGUMENT` beyond it.
+/// Reports a coefficient, by its index in the list that the learner was made of; `FLEXSPLINE_STATUS_ARGUMENT` beyond
+/// it.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_learner_coefficient(
     learner: *const FlexsplineLearner,
     place: u8,
     learnt: *mut FlexsplineLearnt,
 ) -> FlexsplineStatus {
-    let tell = || {
+    let fill = || {
         apart([span(learner), span(learnt)])?;
         let learner: &Learner = get(learner, LEARNER_MARK)?;
         let found = learner.adapter.coefficients(&learner.state);
@@ -388,16 +389,16 @@ pub extern "C" fn flexspline_learner_coefficient(
         let &(value, std) = known.ok_or(FlexsplineStatus::Argument)?;
         give(learnt, FlexsplineLearnt { value, std })
     };
-    status(tell())
+    status(fill())
 }
 
-/// Tells what became of measurements.
+/// Reports the counts of measurements by verdict.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_learner_report(
     learner: *const FlexsplineLearner,
     report: *mut FlexsplineLearnerReport,
 ) -> FlexsplineStatus {
-    let tell = || {
+    let fill = || {
         apart([span(learner), span(report)])?;
         let learner: &Learner = get(learner, LEARNER_MARK)?;
         let AdaptCounters {
@@ -432,7 +433,7 @@ pub extern "C" fn flexspline_learner_report(
             },
         )
     };
-    status(tell())
+    status(fill())
 }
 
 /// Writes what was learnt, with a CRC-32, and how many bytes that took: `FLEXSPLINE_SAVED_LEARNER_BYTES` at most.

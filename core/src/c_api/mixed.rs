@@ -228,16 +228,17 @@ fn a_mixed_sequence_is_the_same_bits_from_c_and_from_rust() {
         used += u32::from(c_adapted.verdict == FLEXSPLINE_VERDICT_USED);
         assert_eq!(c_adapted.verdict == FLEXSPLINE_VERDICT_USED, adapted.verdict == Verdict::Used);
 
-        let (mut c_nominal, mut told, mut told_torque) =
+        let (mut c_nominal, mut c_slip_report, mut c_slip_report_torque) =
             (0, FlexsplineSlipReport::default(), FlexsplineSlipReport::default());
         assert_eq!(flexspline_nominal_output(&o.joint, c_angle, &mut c_nominal), Done);
-        assert_eq!(flexspline_slip_update(&mut c_slip, c_nominal, &mut told), Done);
-        assert_eq!(flexspline_slip_update_torque(&mut c_torque_slip, c_torque, &mut told_torque), Done);
+        assert_eq!(flexspline_slip_update(&mut c_slip, c_nominal, &mut c_slip_report), Done);
+        assert_eq!(flexspline_slip_update_torque(&mut c_torque_slip, c_torque, &mut c_slip_report_torque), Done);
         let slip = bank.update(&mut springs, joint.drive().nominal_output(generator));
         let slip_torque = torque_bank.update(&mut torque_springs, torque);
-        for (c, rust, known) in
-            [(&told, slip, springs.is_known()), (&told_torque, slip_torque, torque_springs.is_known())]
-        {
+        for (c, rust, known) in [
+            (&c_slip_report, slip, springs.is_known()),
+            (&c_slip_report_torque, slip_torque, torque_springs.is_known()),
+        ] {
             assert_eq!(
                 (c.error_rad.to_bits(), c.uncertainty_rad.to_bits()),
                 (rust.error_rad.to_bits(), rust.uncertainty_rad.to_bits())
@@ -246,7 +247,7 @@ fn a_mixed_sequence_is_the_same_bits_from_c_and_from_rust() {
         }
         let mut next = FlexsplineInput { mean_counts: c_adapted.mean_counts, ..c_input };
         next.half_width_counts = c_adapted.half_width_counts;
-        for mean_counts in [told.mean_counts, told_torque.mean_counts] {
+        for mean_counts in [c_slip_report.mean_counts, c_slip_report_torque.mean_counts] {
             assert_eq!(flexspline_input_add(&mut next, mean_counts, 0), Done);
         }
         (c_mean, c_half) = (next.mean_counts, next.half_width_counts);
@@ -347,7 +348,7 @@ fn a_mixed_sequence_is_the_same_bits_from_c_and_from_rust() {
     assert_eq!(bound, predictor.state_bound(&off));
 }
 
-/// What is asked of a table outside a tick.
+/// Queries of a table outside a tick.
 fn questions(
     o: &super::tests::Objects,
     joint: &Joint,

@@ -48,7 +48,7 @@ pub const FLEXSPLINE_HEALTH_ONE_IMAGE: u8 = 1;
 pub const FLEXSPLINE_HEALTH_LOST: u8 = 2;
 /// There is no table.
 pub const FLEXSPLINE_HEALTH_EMPTY: u8 = 3;
-/// What is known of the table is not whole: activate it again.
+/// The store's data on the table is corrupt: activate it again.
 pub const FLEXSPLINE_HEALTH_TORN: u8 = 4;
 
 /// A tick that came late: the ticks missed are counted, nothing more.
@@ -195,7 +195,7 @@ fn text(texts: &'static [&'static CStr], number: usize) -> *const c_char {
     texts.get(number).copied().unwrap_or(c"?").as_ptr()
 }
 
-/// What a status says, in a few words.
+/// Short text of a status.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_status_text(status: c_int) -> *const c_char {
     const TEXTS: [&CStr; 19] = [

@@ -1,4 +1,4 @@
-//! What keeps what feeds a tick safe: a test of the sensors at start-up, saved springs that belong to a joint, mending
+//! Protection of a tick's inputs: a test of the sensors at start-up, saved springs that belong to a joint, mending
 //! in a slow group.
 
 use super::learn::FlexsplineSlip;
@@ -49,7 +49,7 @@ pub struct FlexsplineStartUpSettings {
     /// Way of the generator, there and back, rad. At the output it must be ten times `output_error_rad` at least, and
     /// half a turn at most.
     pub way_rad: f32,
-    /// What the output may be off by in a way, rad: twice the error that the table states is enough.
+    /// Error of the output in one move, rad: twice the error that the table states is enough.
     pub output_error_rad: f32,
     /// Coulomb drag of the output that a torque in the mesh turns over by, N m; it may be wrong by three times. Above
     /// 0.
@@ -58,7 +58,7 @@ pub struct FlexsplineStartUpSettings {
     pub ticks: u16,
 }
 
-/// What the sensors say in a tick of the test. Angles are counts of 2^-32 turn.
+/// Sensor readings in a tick of the test. Angles are counts of 2^-32 turn.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FlexsplineReadings {
@@ -76,7 +76,7 @@ pub struct FlexsplineReadings {
     pub has_torque: u8,
 }
 
-/// What to do in a tick of the test.
+/// Command and result of a tick of the test.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FlexsplineStartUpStep {
@@ -95,7 +95,8 @@ const _: () = {
 };
 
 /// Begins a test of the sensors that moves the generator from where it is and back, before the first tick.
-/// `FLEXSPLINE_STATUS_ARGUMENT` if a number is not finite, the way too short to tell or too long, or the ticks too few.
+/// `FLEXSPLINE_STATUS_ARGUMENT` if a number is not finite, the way too short to decide or too long, or the ticks too
+/// few.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_start_up_init(
     start_up: *mut FlexsplineStartUp,

@@ -38,7 +38,7 @@ pub struct FlexsplineRecord {
     pub uncertainty_rad: f32,
     /// Correction, rad at the output: target less command over ratio.
     pub correction_rad: f32,
-    /// What the limiter held back of it, rad.
+    /// Part of it that the limiter held back, rad.
     pub held_back_rad: f32,
     /// Number of the record; wraps.
     pub number: u16,
@@ -82,7 +82,7 @@ const _: () = {
     assert!(size_of::<Marked<KeptRing>>() <= size_of::<FlexsplineRecorder>() && align_of::<Marked<KeptRing>>() <= 8);
 };
 
-fn told(record: &Record) -> FlexsplineRecord {
+fn c_record(record: &Record) -> FlexsplineRecord {
     FlexsplineRecord {
         output_counts: record.output_counts,
         tick: record.tick,
@@ -131,7 +131,7 @@ fn read(record: &FlexsplineRecord) -> Result<Record, FlexsplineStatus> {
 }
 
 impl KeptRing {
-    /// The place so many records behind the first.
+    /// Position N records behind the first.
     fn place(&self, behind: u16) -> u16 {
         let sum = (self.first as u32).wrapping_add(behind as u32);
         sum.checked_rem(self.places as u32).unwrap_or(0) as u16
@@ -166,9 +166,9 @@ fn length(places: u16) -> usize {
     size_of::<FlexsplineRecord>().saturating_mul(places as usize)
 }
 
-/// Makes a recorder for a list of so many records (1 or more), which is the caller's and given with every call. It
-/// keeps every `divisor`-th tick, from `offset` on; `full` (`FLEXSPLINE_FULL_...`) says what is lost where there is no
-/// room.
+/// Makes a recorder for a list of the given number of records (1 or more), which is the caller's and given with every
+/// call. It keeps every `divisor`-th tick, from `offset` on; `full` (`FLEXSPLINE_FULL_...`) says what is lost where
+/// there is no room.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_recorder_init(
     recorder: *mut FlexsplineRecorder,
@@ -217,7 +217,7 @@ pub extern "C" fn flexspline_recorder_see(
             return Ok(());
         }
         let (number, lost) = (kept.number, kept.lost);
-        let record = told(&Record { number, lost, ..Record::of(tick, state, store, &given) });
+        let record = c_record(&Record { number, lost, ..Record::of(tick, state, store, &given) });
         match kept.place_for_new() {
             Some(place) => give(records.wrapping_add(place as usize), record),
             None => Ok(()),
@@ -279,7 +279,7 @@ pub extern "C" fn flexspline_record_decode(first: *const u8, record: *mut Flexsp
             RecordError::Version { .. } => FlexsplineStatus::Argument,
             RecordError::Mark | RecordError::Crc { .. } | RecordError::Reserved => FlexsplineStatus::Saved,
         })?;
-        give(record, told(&found))
+        give(record, c_record(&found))
     };
     status(decode())
 }

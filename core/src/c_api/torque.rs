@@ -34,7 +34,7 @@ pub struct FlexsplineAged {
     pub(super) opaque: [MaybeUninit<u64>; FLEXSPLINE_AGED_WORDS],
 }
 
-/// What a reading of torque goes through.
+/// Settings of the processing of a torque reading.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct FlexsplineTorqueSettings {
@@ -70,7 +70,7 @@ fn direction_of(sign: i8) -> Result<Direction, FlexsplineStatus> {
     }
 }
 
-/// Largest reading that is believed where none is told, N m.
+/// Largest accepted reading where none is given, N m.
 const ANY_N_M: f32 = 1e9;
 
 /// Makes a path that has seen nothing yet; `FLEXSPLINE_STATUS_ARGUMENT` if a time or bandwidth is not finite and
@@ -194,12 +194,12 @@ pub extern "C" fn flexspline_aged_tick(
 /// 1 if there is no value that may be used, else 0: ask for the sensor.
 #[unsafe(no_mangle)]
 pub extern "C" fn flexspline_aged_is_stale(aged: *const FlexsplineAged, is_stale: *mut u8) -> FlexsplineStatus {
-    let tell = || {
+    let fill = || {
         apart([span(aged), span(is_stale)])?;
         let aged: &Aged = get(aged, AGED_MARK)?;
         give(is_stale, aged.is_stale() as u8)
     };
-    status(tell())
+    status(fill())
 }
 
 /// Rate at which the generator has to turn so that the output moves at `rate_rad_s`, rad/s: the nominal one and what
@@ -216,7 +216,7 @@ pub extern "C" fn flexspline_rate_ahead(
     ahead_s: f32,
     generator_rate_rad_s: *mut f32,
 ) -> FlexsplineStatus {
-    let tell = || {
+    let fill = || {
         clear(span(generator_rate_rad_s), [span(joint), span(store)])?;
         let joint: &Joint = get(joint, JOINT_MARK)?;
         let store: &Store = get(store, STORE_MARK)?;
@@ -226,7 +226,7 @@ pub extern "C" fn flexspline_rate_ahead(
         let target = OutputAngle::from_counts(target_counts);
         give(generator_rate_rad_s, joint.rate_ahead(store, target, rate_rad_s, torque_n_m, ahead_s))
     };
-    status(tell())
+    status(fill())
 }
 
 /// How the generator has to move so that the output moves as it shall.
@@ -254,7 +254,7 @@ pub extern "C" fn flexspline_motion_ahead(
     ahead_s: f32,
     ahead: *mut FlexsplineMotionAhead,
 ) -> FlexsplineStatus {
-    let tell = || {
+    let fill = || {
         clear(span(ahead), [span(joint), span(store)])?;
         let joint: &Joint = get(joint, JOINT_MARK)?;
         let store: &Store = get(store, STORE_MARK)?;
@@ -266,5 +266,5 @@ pub extern "C" fn flexspline_motion_ahead(
             joint.motion_ahead(store, target, [rate_rad_s, acceleration_rad_s2], torque_n_m, ahead_s);
         give(ahead, FlexsplineMotionAhead { rate_rad_s, acceleration_rad_s2 })
     };
-    status(tell())
+    status(fill())
 }

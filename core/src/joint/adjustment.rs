@@ -1,9 +1,9 @@
-//! What is added to the table in one tick.
+//! Addition to the table in one tick.
 
 use crate::angle::{RAD_PER_COUNT, counts_from_rad};
 use crate::play::MAX_ADDED_COUNTS;
 
-/// What is added to the table in one tick: what a friction model, or what was learnt on board, knows beyond it.
+/// Addition to the table in one tick, from a friction model or from coefficients learnt on board.
 ///
 /// Counts of 2⁻³² output turn. Each is taken within ±[`Adjustment::MAX_RAD`]. The half-width never falls below zero
 /// anywhere on the tooth pitch: a reduction is taken only that far. The error that a table may give

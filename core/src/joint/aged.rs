@@ -1,4 +1,4 @@
-//! What is measured more slowly than ticks: the last value, no older than so many ticks.
+//! Values measured more slowly than ticks: the last value, no older than a given number of ticks.
 
 /// A measurement with its age, kept twice.
 ///

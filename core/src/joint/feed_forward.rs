@@ -28,8 +28,8 @@ impl Joint {
     /// solutions.
     ///
     /// Inertia of motor and generator times this acceleration is the torque to feed forward to the motor's current.
-    /// What the load's inertia takes is its own times `acceleration_rad_s2` over the ratio: the output moves as the
-    /// target does. Both are NaN where the table gives nothing, or a number is not finite.
+    /// The torque for the load's inertia is that inertia times `acceleration_rad_s2` over the ratio: the output moves
+    /// as the target does. Both are NaN where the table gives nothing, or a number is not finite.
     #[must_use]
     pub fn motion_ahead(
         &self,
@@ -78,7 +78,7 @@ impl Joint {
     }
 
     /// Rate at which the generator has to turn so that the output moves at `rate_rad_s`, rad/s: the nominal rate and
-    /// what the error adds to it, by the table's slope along the way of the target (over `ahead_s`, some ticks).
+    /// the error's contribution, by the table's slope along the way of the target (over `ahead_s`, some ticks).
     ///
     /// Torque and flank are the same at both ends. So nothing that a torque does comes through here, and what is fed
     /// forward cannot feed back: the differences of the command itself do, and make a loop that compensates a torque in

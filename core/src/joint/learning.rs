@@ -17,7 +17,7 @@ pub struct Adapter<const N: usize> {
     adapter: Sealed<adapt::Adapter<N>>,
 }
 
-/// What is learnt.
+/// Learnt state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AdaptState<const N: usize> {
     learnt: Sealed<adapt::AdaptState<N>>,
@@ -32,7 +32,7 @@ impl<const N: usize> Adapter<N> {
         Self::of_first(settings, N)
     }
 
-    /// An adapter of the first so many coefficients: those after them (`NO_COEFFICIENT`) change no bit of what these
+    /// An adapter of the first N coefficients: those after them (`NO_COEFFICIENT`) change no bit of what these
     /// come to, and are in no sum and no saved state.
     pub(crate) fn of_first(settings: &AdaptSettings<N>, used: usize) -> Result<Self, AdaptError> {
         adapt::Adapter::of_first(settings, used).map(|adapter| Self { adapter: Sealed::new(adapter) })
@@ -62,7 +62,8 @@ impl<const N: usize> Adapter<N> {
         self.on(state, adapt::Adapter::reset);
     }
 
-    /// One tick: follows the play, learns from the measurement if there is one, and tells what to add in the next tick.
+    /// One tick: follows the play, learns from the measurement if there is one, and returns the addition in the next
+    /// tick.
     ///
     /// Call it every tick, in order, also without a measurement. Nothing that comes in can make the adjustment exceed
     /// the limits or be undefined. No search, no loop that depends on data: on a Cortex-M4F a tick with a measurement
@@ -101,7 +102,7 @@ impl<const N: usize> Adapter<N> {
     /// Says whose coefficients are learnt: of this joint, with the table that is in use now. Saved states carry both,
     /// and are restored only where they belong.
     ///
-    /// `unit` tells joints with the same settings and the same table from each other, such as the wheels of a rover; 0
+    /// `unit` distinguishes joints with the same settings and the same table, such as the wheels of a rover; 0
     /// if there is one.
     #[must_use]
     pub fn owned_by(self, joint: &Joint, store: &Store, unit: u32) -> Self {
@@ -133,7 +134,7 @@ impl<const N: usize> Adapter<N> {
         self.save_first(state, N, bytes)
     }
 
-    /// The same of the first so many coefficients.
+    /// The same for the first N coefficients.
     pub(crate) fn save_first(&self, state: &AdaptState<N>, used: usize, bytes: &mut [u8]) -> Option<usize> {
         let save = |adapter: &adapt::Adapter<N>| state.learnt.with(|learnt| adapter.save_first(learnt, used, bytes));
         self.adapter.with(save).flatten().flatten()
@@ -156,7 +157,7 @@ impl<const N: usize> Adapter<N> {
         self.restore_first(N, bytes)
     }
 
-    /// The same of the first so many coefficients.
+    /// The same for the first N coefficients.
     pub(crate) fn restore_first(&self, used: usize, bytes: &[u8]) -> Result<AdaptState<N>, AdaptRestoreError> {
         let found = self.adapter.with(|adapter| adapter.restore_first(used, bytes));
         let learnt = found.ok_or(AdaptRestoreError::OtherCoefficients)??;
@@ -176,7 +177,7 @@ impl<const N: usize> AdaptState<N> {
         let _ = self.learnt.change(|learnt| learnt.set_learning(learning));
     }
 
-    /// What became of the measurements; where the state is lost, a start anew and nothing else.
+    /// Counts of the measurements by verdict; where the state is lost, a start anew and nothing else.
     #[must_use]
     pub fn counters(&self) -> AdaptCounters {
         let lost = AdaptCounters { restarts: 1, ..AdaptCounters::default() };

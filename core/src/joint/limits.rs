@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-/// What a joint cannot be set to.
+/// A setting that a joint refuses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SettingError {
     /// Which setting.

@@ -1,8 +1,8 @@
-//! What a joint does with its correction: by its mode, and in a tick that came late.
+//! Use of the correction: by mode, and in a tick that came late.
 
 use core::fmt;
 
-/// What a joint does with its correction.
+/// Use of the correction by a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Mode {
     /// No correction: it is taken back within the limits. The start.
@@ -66,14 +66,14 @@ impl Mode {
     }
 }
 
-/// What a tick that came late does to the correction. Missed ticks are counted with each.
+/// Effect of a late tick on the correction. Missed ticks are counted with each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Overrun {
     /// Nothing more: the ticks missed are skipped.
     SkipAndCount,
     /// The correction stays as it is in this tick.
     HoldLast,
-    /// The correction fades to none within so many ticks, stays there as long, and comes back.
+    /// The correction fades to none within this number of ticks, stays there as long, and comes back.
     FadeOut {
         /// Ticks, at least 1.
         ticks: u16,

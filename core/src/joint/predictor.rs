@@ -69,7 +69,7 @@ pub struct Noise {
     pub twist_rad: Option<f64>,
 }
 
-/// What was measured in a tick.
+/// Measurements of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured {
     /// Motor torque times the ratio in the tick before, N·m.
@@ -83,21 +83,21 @@ pub struct Measured {
 /// A predictor: all that does not change while it runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Predictor {
-    model: Sealed<Model>,
+    model: Sealed<TwoMassModel>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Model {
+struct TwoMassModel {
     a: Matrix4<f32>,
     b: Vector4<f32>,
     gain: Matrix4x2<f32>,
-    /// What the load turns in a tick, of the state before it and of the motor torque in it.
+    /// Load rotation over one tick: row vector on the previous state, and gain on the motor torque.
     turn: RowVector4<f32>,
     turn_push: f32,
     stiffness: f32,
 }
 
-words!([] Model { a, b, gain, turn, turn_push, stiffness });
+words!([] TwoMassModel { a, b, gain, turn, turn_push, stiffness });
 
 macro_rules! words_of_matrices {
     ($($matrix:ident),*) => {$(
@@ -134,7 +134,7 @@ pub struct Disturbance {
     pub twist_rad: f32,
 }
 
-/// What motor and load will have done.
+/// Predicted motion of motor and load.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ahead {
     /// Angle that the load turns until then, rad.
@@ -149,7 +149,7 @@ pub struct Ahead {
     pub twist_rad: f32,
     /// It lies within ± this, rad.
     pub twist_bound_rad: f32,
-    /// The twist now lies within ± this of the estimate, rad: as told.
+    /// The twist now lies within ± this of the estimate, rad: as reported.
     pub twist_now_bound_rad: f32,
     /// The two farthest angles of the motor on the way, over the ratio, in the order in which they come, rad.
     pub turning_rad: [f32; 2],
@@ -252,7 +252,7 @@ fn row_sum(m: &Matrix4<f64>) -> f64 {
     largest
 }
 
-/// What is measured of a state: ω_m, φ.
+/// Measured part of a state: ω_m, φ.
 fn measured_of(x: &Vector4<f32>) -> Vector2<f32> {
     Vector2::new(x.y, x.x)
 }
@@ -321,7 +321,7 @@ impl Predictor {
             p = (p + p.transpose()) * 0.5;
         }
         let turn: RowVector4<f64> = integral.fixed_rows::<1>(2).into_owned();
-        let model = Model {
+        let model = TwoMassModel {
             a: a.cast(),
             b: b.cast(),
             gain: gain.cast(),
@@ -361,7 +361,7 @@ impl Predictor {
     /// # Errors
     /// As [`Self::check`].
     pub fn from_parts(parts: &[f32; PREDICTOR_PARTS]) -> Result<Self, PredictorError> {
-        let mut model = Model {
+        let mut model = TwoMassModel {
             a: Matrix4::zeros(),
             b: Vector4::zeros(),
             gain: Matrix4x2::zeros(),
@@ -403,7 +403,7 @@ impl Predictor {
         self.model.with(|model| model.step(state, measured)).unwrap_or(false)
     }
 
-    /// What the estimate can be off by when the disturbances stay within these bounds, once the start is forgotten: φ
+    /// Largest error of the estimate when the disturbances stay within these bounds, once the start is forgotten: φ
     /// rad, ω_m, ω_l rad/s, τ N·m. For start-up and the host: 10 000 ticks of the observer in double precision.
     /// Infinite where the model is lost.
     #[must_use]
@@ -431,7 +431,7 @@ impl Predictor {
         bound.map(|value| value as f32).into()
     }
 
-    /// What motor and load do in `ticks` more ticks with this motor torque, if the state differs from the truth by
+    /// Motion of motor and load in `ticks` more ticks with this motor torque, if the state differs from the truth by
     /// ± `state_bound` at most (φ rad, ω_m, ω_l rad/s, τ N·m) and torque and load from what is assumed (the load: that
     /// it stays) by `disturbance` (what is measured does not matter here).
     ///
@@ -451,7 +451,7 @@ impl Predictor {
         let Disturbance { torque_n_m: torque_off, load_change_n_m: load_off, .. } = *disturbance;
         let (Some(model), Some(start)) = (self.model.open(), state.x.open()) else { return Ahead::UNKNOWN };
         let (mut x, mut ahead) = (start, Ahead::default());
-        // Rows: load, motor and twist then, as they follow from a state so many ticks before.
+        // Rows: load, motor and twist then, as they follow from a state that number of ticks before.
         let twist_now = RowVector4::new(1.0, 0.0, 0.0, 0.0);
         let (mut load, mut twist) = (RowVector4::zeros(), twist_now);
         let (mut load_pushed, mut motor_pushed, mut twist_pushed, mut turned) = (0.0f32, 0.0f32, 0.0f32, 0.0f32);
@@ -510,7 +510,9 @@ impl Predictor {
             bound_rad: f32::INFINITY,
             quality: Quality::Disabled,
         };
-        let (Some(Model { stiffness, .. }), Some(x)) = (self.model.open(), state.x.open()) else { return unknown };
+        let (Some(TwoMassModel { stiffness, .. }), Some(x)) = (self.model.open(), state.x.open()) else {
+            return unknown;
+        };
         let measured_sound = now.measured.is_none() || now.measured_bound_rad.is_finite();
         if !(ahead.bound_rad.is_finite() && ahead.motor_bound_rad.is_finite() && measured_sound) {
             return unknown;
@@ -582,7 +584,7 @@ impl Ahead {
     };
 }
 
-impl Model {
+impl TwoMassModel {
     /// See [`Predictor::step`].
     #[inline(always)]
     fn step(&self, state: &mut PredictorState, measured: &Measured) -> bool {
@@ -666,7 +668,7 @@ impl PredictorState {
 #[cfg(test)]
 crate::upset::upsets!(Predictor { model });
 #[cfg(test)]
-crate::upset::upsets!(Model { a, b, gain, turn, turn_push, stiffness });
+crate::upset::upsets!(TwoMassModel { a, b, gain, turn, turn_push, stiffness });
 #[cfg(test)]
 crate::upset::upsets!(PredictorState { x });
 
@@ -938,7 +940,7 @@ mod tests {
         assert!(shares.iter().all(|&share| share > 0.05), "{shares:?}");
     }
 
-    /// What is not used may be anything; what is used must be a number, of a drive.
+    /// Unused values may be anything; used values must be finite numbers, of a drive.
     #[test]
     fn a_measurement_that_is_no_number_leaves_the_observer_as_it_was() {
         let good = Measured { torque_n_m: 12.0, speed_rad_s: 0.01, twist_rad: 4e-4 };
@@ -960,7 +962,7 @@ mod tests {
                 }
                 assert_eq!(state, twin);
             }
-            // Nor is anything told of what is no number.
+            // Nor is a value that is not finite reported.
             let ahead = predictor.ahead(&state, f32::NAN, 10, [0.0; 4], &Disturbance::default());
             assert!(ahead.bound_rad == f32::INFINITY && ahead.load_rad == 0.0);
         }
@@ -989,9 +991,9 @@ mod tests {
         }
         // One that was damaged on its way, or made for another machine.
         let good = *Predictor::new(INERTIAS, NOISE, TICK_S).unwrap().model.kept();
-        let wild = Model { gain: good.gain * -3.0, ..good };
+        let wild = TwoMassModel { gain: good.gain * -3.0, ..good };
         assert!(matches!(wild.checked(), Err(PredictorError::Observer { factor }) if factor.is_nan() || factor > 1.0));
-        let undefined = Model { a: good.a * f32::NAN, ..good };
+        let undefined = TwoMassModel { a: good.a * f32::NAN, ..good };
         assert!(undefined.checked().is_err());
     }
 }

@@ -9,33 +9,35 @@
 //! | what happens | what the joint does | flag |
 //! |---|---|---|
 //! | no sample | keeps the last angle and the play; the error is known to the table's limit | [`Flags::SAMPLE_LOST`] |
-//! | a sample further from the last one than a tick allows | takes it for a glitch, as no sample; if it stays for `patience` ticks, takes it as true, with the side of the play unknown | [`Flags::GLITCH`] |
-//! | torque or temperature not finite, or the table in doubt | keeps the last correction for `patience` ticks, then fades it out | [`Flags::NOT_CORRECTED`] |
+//! | a sample too far off | ignores it; after `patience` ticks accepts it, play side unknown | [`Flags::GLITCH`] |
+//! | an input not finite, table in doubt | keeps it for `patience` ticks, then fades it out | [`Flags::NOT_CORRECTED`] |
 //! | an adjustment larger than any may be | takes the largest one | [`Flags::BOUNDED`] |
-//! | torque or temperature out of range | corrects with the value at the edge | [`Quality::Extrapolated`](crate::Quality::Extrapolated) |
+//! | torque or temperature out of range | uses the value at the edge | [`Extrapolated`](crate::Quality::Extrapolated) |
 //! | a tick came late | by [`Overrun`] | [`Flags::OVERRUN`] |
 //! | a target that leaps | commands the leap: the correction alone is limited | |
 //! | a mode or a fade that does not follow the table | [`Output::held_back_rad`] | [`Flags::HELD_BACK`] |
-//! | a reversal, or anything else that wants a faster correction | the limiter holds it back; by how much is in [`Output::held_back_rad`] | [`Flags::HELD_BACK`] |
-//! | an upset in the state | takes the other copy; if that is not whole either, starts anew in safe mode | [`Flags::STATE_TORN`], [`Flags::SAFE`] |
-//! | an upset in the settings | takes the other copy; if that is not whole either, commands the last sample believed, or 0 | [`Flags::JOINT_TORN`] |
-//! | an upset in the table or what is known of it | makes it anew and does the tick again; if that fails, does not use it | [`Flags::TABLE_DOUBT`] |
+//! | a reversal, or another fast correction | limits the rate: [`Output::held_back_rad`] | [`Flags::HELD_BACK`] |
+//! | an upset in the state | takes the other copy, else safe mode | [`Flags::STATE_TORN`], [`Flags::SAFE`] |
+//! | an upset in the settings | takes the other copy, else commands the last sample or 0 | [`Flags::JOINT_TORN`] |
+//! | an upset in the table | repairs it and repeats the tick, else does not use it | [`Flags::TABLE_DOUBT`] |
 //! | a target nearer than `hold_rad` | is reached on the flank that bears already | |
-//! | no sample since a reset | corrects nothing anew; one that is saved is what the first is held against | [`Flags::NOT_CORRECTED`] |
-//! | reset | [`JointState::restore`] goes on where it was, [`JointState::new`] starts with no correction and the side of the play unknown; both within the limits | |
+//! | no sample since a reset | no new correction; the first is compared with a saved one | [`Flags::NOT_CORRECTED`] |
+//! | reset | [`JointState::restore`] goes on; [`JointState::new`] starts uncorrected, play side unknown | |
 
 use super::adjustment::{Adjustment, bounded};
 use super::limits::{LEAST_TICK_S, Limits, SettingError, checked};
 use super::mode::{Mode, Overrun};
 use super::signals::{Flags, Input, Output};
-use super::state::{FINE, FLANK, FLANK_BACKWARD, FLANK_FORWARD, Found, JointState, Kept, MENDED, MODE, SAMPLED, SEEN};
+use super::state::{
+    CopyStatus, FINE, FLANK, FLANK_BACKWARD, FLANK_FORWARD, JointState, Kept, MENDED, MODE, SAMPLED, SEEN,
+};
 use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT};
 use crate::drive::Drive;
 use crate::encoder::{Encoder, EncoderState};
 use crate::num;
 use crate::play::PlayState;
-use crate::store::{Images, Store, Told};
-use crate::table::{Approach, Command, Estimate, MAX_ERROR_RAD, Memory, Model, Prediction, Quality, departure};
+use crate::store::{Images, Store, TableStatus};
+use crate::table::{Approach, Command, Estimate, MAX_ERROR_RAD, Memory, Prediction, Quality, TableModel, departure};
 use crate::whole::{SUMS_START, pair, same, sums};
 use core::num::NonZeroU32;
 
@@ -46,12 +48,12 @@ const WITHIN: i32 = FINE - 1;
 /// of one of its two copies is noticed in the tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Joint {
-    copies: [Settings; 2],
+    copies: [JointSettings; 2],
 }
 
 /// The settings of a joint, with sums over all of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Settings {
+struct JointSettings {
     drive: Drive,
     /// All ones if a late tick keeps the correction, else 0.
     hold_late: u32,
@@ -78,11 +80,11 @@ impl Joint {
     /// A joint with this drive.
     ///
     /// # Errors
-    /// [`SettingError`]: a limit that is not finite and positive, or beyond 0.05 rad (rate, hold) or half a turn (generator) in a tick,
-    /// or a rate below 1.8e-10 rad in a tick, an acceleration below that in a tick more each tick, a fastest generator
-    /// below 1.5e-9 rad in a tick, a hold below that, or a tick below 1e-7 s.
+    /// [`SettingError`]: a limit that is not finite and positive, or beyond 0.05 rad (rate, hold) or half a turn
+    /// (generator) in a tick, or a rate below 1.8e-10 rad in a tick, an acceleration below that in a tick more each
+    /// tick, a fastest generator below 1.5e-9 rad in a tick, a hold below that, or a tick below 1e-7 s.
     pub const fn new(drive: Drive, limits: Limits, overrun: Overrun) -> Result<Self, SettingError> {
-        match Settings::new(drive, limits, overrun) {
+        match JointSettings::new(drive, limits, overrun) {
             Ok(settings) => Ok(Self { copies: [settings; 2] }),
             Err(error) => Err(error),
         }
@@ -95,13 +97,13 @@ impl Joint {
         &first.drive
     }
 
-    /// Sums over the settings: they tell this joint from others in what is saved.
+    /// Sums over the settings: they distinguish this joint from others in saved data.
     pub(super) fn sums(&self) -> [u32; 2] {
         self.sound().map_or([0; 2], |settings| settings.sums)
     }
 
     /// The settings that are whole.
-    fn sound(&self) -> Option<&Settings> {
+    fn sound(&self) -> Option<&JointSettings> {
         self.copies.iter().find(|settings| settings.is_whole())
     }
 
@@ -162,8 +164,8 @@ impl Joint {
     }
 
     #[inline(always)]
-    fn model<'s>(&'s self, store: &'s Store) -> Model<'s, Store> {
-        Model { memory: store, drive: self.drive() }
+    fn model<'s>(&'s self, store: &'s Store) -> TableModel<'s, Store> {
+        TableModel { memory: store, drive: self.drive() }
     }
 
     /// One tick.
@@ -186,7 +188,7 @@ impl Joint {
         let Some(settings) = self.sound() else {
             let (kept, found) = state.open();
             let flags =
-                Flags::NOT_CORRECTED.with(Flags::JOINT_TORN, true).with(Flags::STATE_TORN, found != Found::Whole);
+                Flags::NOT_CORRECTED.with(Flags::JOINT_TORN, true).with(Flags::STATE_TORN, found != CopyStatus::Whole);
             return Output {
                 command: kept.generator,
                 output: OutputAngle::ZERO,
@@ -206,7 +208,7 @@ impl Joint {
 }
 
 /// A sample, judged.
-struct Judged {
+struct CheckedSample {
     generator: GeneratorAngle,
     flags: Flags,
     /// The play is not where it was thought.
@@ -217,7 +219,7 @@ struct Judged {
     good: u32,
 }
 
-impl Settings {
+impl JointSettings {
     const fn new(drive: Drive, limits: Limits, overrun: Overrun) -> Result<Self, SettingError> {
         let Limits { tick_s, rate_rad_s, acceleration_rad_s2, generator_rate_rad_s, patience, hold_rad } = limits;
         let tick = tick_s as f64;
@@ -322,11 +324,11 @@ impl Settings {
         // An adjustment is learnt, not moved.
         now.play.shift(mean_counts.wrapping_sub(now.adjusted));
         now.adjusted = mean_counts;
-        let Judged { generator, flags, forgotten, blind, good } = self.judge(&mut now, input);
+        let CheckedSample { generator, flags, forgotten, blind, good } = self.judge(&mut now, input);
         if forgotten {
             now.play = PlayState::unknown();
         }
-        let model = Model { memory: store, drive: &self.drive };
+        let model = TableModel { memory: store, drive: &self.drive };
         let Estimate { output, error, mut doubt, uncertainty, sane, .. } =
             model.estimate(&point, &mut now.play, generator);
         let from = departure(store.plan(), &point, input.target, &now.play, output);
@@ -359,7 +361,7 @@ impl Settings {
 
         let (goal, late) = self.goal(&mut now, input, wanted, sane);
         let correction = self.limit(&mut now, goal, point.most(store.plan()).wrapping_mul(FINE));
-        let Told { whole, other_images } = store.told(images);
+        let TableStatus { whole, other_images } = store.table_status(images);
         let again = !(whole & self.is_whole() & doubt.none());
         if now.seen() == 0 {
             // Nothing was seen of the generator yet.
@@ -378,7 +380,7 @@ impl Settings {
             .with(Flags::HELD_BACK, held_back.wrapping_add(WITHIN) as u32 > (2 * WITHIN) as u32)
             .with(Flags::NOT_CORRECTED, !sane)
             .with(Flags::TABLE_DOUBT, !doubt.none() | store.is_for_another(&self.drive))
-            .with(Flags::STATE_TORN, (found != Found::Whole) | (before & MENDED != 0))
+            .with(Flags::STATE_TORN, (found != CopyStatus::Whole) | (before & MENDED != 0))
             .with(Flags::SAFE, now.marks & MODE == MODE)
             .with(Flags::OTHER_IMAGES, other_images)
             .with(Flags::BOUNDED, is_bounded)
@@ -396,9 +398,9 @@ impl Settings {
         }
     }
 
-    /// The generator angle to believe, and what it tells of the play.
+    /// The accepted generator angle, and its information on the play.
     #[inline(always)]
-    fn judge(&self, now: &mut Kept, input: &Input) -> Judged {
+    fn judge(&self, now: &mut Kept, input: &Input) -> CheckedSample {
         let (lost, sample) = match input.generator {
             Some(sample) => (false, sample),
             None => (true, now.generator),
@@ -420,11 +422,11 @@ impl Settings {
         let good = ((!lost & !glitch) as u32).wrapping_neg();
         let seen_now = seen ^ (seen ^ SAMPLED) & good;
         now.marks = now.marks & !SEEN | seen_now;
-        // After too long without an answer of the table nobody followed the play; of small numbers the sign tells which
+        // After too long without an answer of the table nobody followed the play; of small numbers the sign shows which
         // is larger.
         let late = patience.wrapping_sub(now.uncorrected as u32) >> 31;
         let sampled = seen >> SAMPLED.trailing_zeros();
-        Judged {
+        CheckedSample {
             generator,
             flags: Flags::default().with(Flags::SAMPLE_LOST, lost).with(Flags::GLITCH, glitch),
             forgotten: believed as u32 | sampled & late != 0,
@@ -460,10 +462,10 @@ impl Settings {
     /// Moves the correction towards the goal, and never beyond `most`, whatever state it is in.
     ///
     /// As fast as it can be stopped there in whole ticks, braking with half of the acceleration `b`: from a distance
-    /// `l` the speed is `(l + b·n(n + 1)/2)/(n + 1)`, with so many ticks `n` of braking as bring that between `n·b` and
-    /// `(n + 1)·b`. So it never leaves the range of the goals that it was given, and a goal that moves by less than `b`
-    /// in a tick is where it is. Braking with all of the acceleration takes a fifth less time, and lets slow noise out
-    /// 7 % larger than it came in.
+    /// `l` the speed is `(l + b·n(n + 1)/2)/(n + 1)`, with the number `n` of braking ticks that brings that between
+    /// `n·b` and `(n + 1)·b`. So it never leaves the range of the goals that it was given, and a goal that moves by
+    /// less than `b` in a tick is where it is. Braking with all of the acceleration takes a fifth less time, and lets
+    /// slow noise out 7 % larger than it came in.
     #[inline(always)]
     fn limit(&self, now: &mut Kept, goal: i32, most: i32) -> i32 {
         let before = now.correction;
@@ -494,7 +496,7 @@ impl Settings {
 #[cfg(test)]
 crate::upset::upsets!(Joint { copies });
 #[cfg(test)]
-crate::upset::upsets!(Settings {
+crate::upset::upsets!(JointSettings {
     drive,
     hold_late,
     rate,
@@ -567,12 +569,12 @@ mod tests {
         /// One tick; no correction may jump.
         fn tick(&mut self, input: &Input) -> Output {
             let out = self.joint.tick(&images(), &mut self.store, &mut self.state, input);
-            // As it is kept: what is told is rounded to 24 bits, and a large one to more than the change of a tick may
+            // As it is kept: the output is rounded to 24 bits, and a large one to more than the change of a tick may
             // be off.
             let now = self.state.open().0.correction as f64 * (RAD_PER_COUNT as f64 / FINE as f64);
             assert!(
                 (out.correction_rad as f64 - now).abs() <= f32::EPSILON as f64 * now.abs(),
-                "told {out:?}, kept {now}"
+                "reported {out:?}, kept {now}"
             );
             let [last, before] = self.before;
             assert!((now - last).abs() <= 1.0001 * RATE_RAD + 2e-9, "rate {}", now - last);
@@ -695,14 +697,14 @@ mod tests {
         assert!(follows(&run.run(100, 4e-3, 1e-5)));
         // What is left at the output while the mode, or a fade, does not follow the table.
         let wanted = run.run(100, 5e-3, 1e-5).correction_rad;
-        let told = |out: &Output| {
+        let reported = |out: &Output| {
             let lacks = (out.held_back_rad + out.correction_rad - wanted).abs();
             out.flags.contains(Flags::HELD_BACK) && out.quality == Quality::InRange && lacks < 0.1 * wanted.abs()
         };
         let _ = run.tick(&Input { missed_ticks: 1, ..run.input(6e-3) });
         for tick in 1..790 {
             let out = run.tick(&run.input(6e-3));
-            assert!(told(&out), "fade, tick {tick}: {out:?}");
+            assert!(reported(&out), "fade, tick {tick}: {out:?}");
         }
         assert!(follows(&run.run(100, 6e-3, 1e-5)));
         run.state.request(Mode::Hold).unwrap();
@@ -772,9 +774,9 @@ mod tests {
                     let out = run.tick(&Input { generator, torque_n_m: 5.0, ..run.input(0.0) });
                     // Where the joint has it, but for what motion within the limit may be; or it does not believe it.
                     let off = (run.state.open().0.generator.counts() - at(tick)).abs();
-                    let told = out.flags.contains(Flags::GLITCH) || out.flags.contains(Flags::SAMPLE_LOST);
-                    hidden += (off > 2 * fastest + (1 << 23) && !told) as u32;
-                    assert!(tick < 11 || off <= 1 << 21 && !told, "bit {bit}, {speed}, tick {tick}: {off}");
+                    let reported = out.flags.contains(Flags::GLITCH) || out.flags.contains(Flags::SAMPLE_LOST);
+                    hidden += (off > 2 * fastest + (1 << 23) && !reported) as u32;
+                    assert!(tick < 11 || off <= 1 << 21 && !reported, "bit {bit}, {speed}, tick {tick}: {off}");
                 }
                 lost += ((encoder.angle_counts(&alone) - at(13)).abs() > 1 << 31) as u32;
                 trials += 1;
@@ -892,7 +894,7 @@ mod tests {
         assert_eq!(run.run(600, 3.9e-3, -1e-5).uncertainty_rad, 0.0);
     }
 
-    /// Flips in what changes while running: told in the next tick, which is otherwise that without the flip.
+    /// Flips in what changes while running: reported in the next tick, which is otherwise that without the flip.
     #[test]
     fn an_upset_of_the_state_is_told_and_mended_in_the_next_tick() {
         let mut run = Loop::new(Overrun::SkipAndCount);
@@ -906,10 +908,10 @@ mod tests {
             let mut state = sound;
             state.flip(bit, &mut std::string::String::new());
             let found = run.joint.tick(&images(), &mut run.store.clone(), &mut state, &input);
-            let told = found.flags.contains(Flags::STATE_TORN);
-            noticed += usize::from(told);
+            let reported = found.flags.contains(Flags::STATE_TORN);
+            noticed += usize::from(reported);
             assert_eq!(
-                Output { flags: reference.flags.with(Flags::STATE_TORN, told), ..reference },
+                Output { flags: reference.flags.with(Flags::STATE_TORN, reported), ..reference },
                 found,
                 "bit {bit}"
             );
@@ -962,8 +964,8 @@ mod tests {
             let (mut joint, mut state) = (sound, run.state);
             joint.flip(bit, &mut std::string::String::new());
             let found = joint.tick(&images(), &mut run.store.clone(), &mut state, &input);
-            let told = bit < sound.bits() / 2;
-            let expected = Output { flags: reference.flags.with(Flags::JOINT_TORN, told), ..reference };
+            let reported = bit < sound.bits() / 2;
+            let expected = Output { flags: reference.flags.with(Flags::JOINT_TORN, reported), ..reference };
             assert_eq!(found, expected, "bit {bit}");
             assert!(joint.mend() && joint == sound);
         }
@@ -1070,7 +1072,7 @@ mod tests {
         assert_eq!(named(Limits { generator_rate_rad_s: f32::INFINITY, ..LIMITS }), "generator_rate_rad_s");
     }
 
-    /// What is left to go must not drown in the rounding of a large acceleration.
+    /// The remaining way must not drown in the rounding of a large acceleration.
     #[test]
     fn an_acceleration_beyond_need_does_not_make_the_correction_jitter() {
         for step in 0..60 {
@@ -1090,14 +1092,14 @@ mod tests {
 
     /// A limiter alone: fine counts in a tick and in a tick more each tick.
     struct Limited {
-        settings: Settings,
+        settings: JointSettings,
         now: Kept,
     }
 
     impl Limited {
         fn new(rate: i32, acceleration: i32) -> Self {
             let Joint { copies: [settings, _] } = Joint::new(fixture::drive(), LIMITS, Overrun::SkipAndCount).unwrap();
-            Self { settings: Settings { rate, acceleration, ..settings }, now: JointState::new().open().0 }
+            Self { settings: JointSettings { rate, acceleration, ..settings }, now: JointState::new().open().0 }
         }
 
         /// One tick; no limit is broken by a single count.
@@ -1232,7 +1234,9 @@ mod tests {
         /// Whatever comes in, the correction moves within its limits and stays within the table's.
         #[test]
         fn any_input_keeps_the_limits(
-            inputs in prop::collection::vec((any::<bool>(), -2e-3f64..2e-3, -0.1f64..0.1, any::<f32>(), 0u16..3), 1..200),
+            inputs in prop::collection::vec(
+                (any::<bool>(), -2e-3f64..2e-3, -0.1f64..0.1, any::<f32>(), 0u16..3), 1..200,
+            ),
             policy in 0u8..3, adjusted in any::<bool>(), mean_counts in any::<i32>(), half_width_counts in any::<i32>(),
         ) {
             let policies = [Overrun::SkipAndCount, Overrun::HoldLast, Overrun::FadeOut { ticks: 7 }];
@@ -1246,7 +1250,9 @@ mod tests {
                     (Adjustment::default(), 0.03)
                 };
                 let missed_ticks = missed / 2;
-                let input = Input { generator: sample, torque_n_m: torque, missed_ticks, adjustment, ..run.input(target) };
+                let input = Input {
+                    generator: sample, torque_n_m: torque, missed_ticks, adjustment, ..run.input(target)
+                };
                 let out = run.tick(&input);
                 prop_assert!(out.correction_rad.abs() <= most);
                 prop_assert!(out.uncertainty_rad.is_finite() && out.transmission_error_rad.is_finite());

@@ -1,4 +1,4 @@
-//! What a tick is given and what it gives.
+//! Input and output of a tick.
 
 use super::adjustment::Adjustment;
 use crate::angle::{GeneratorAngle, OutputAngle};
@@ -20,7 +20,7 @@ pub struct Input {
     pub adjustment: Adjustment,
 }
 
-/// What happened in a tick; a set of the constants.
+/// Events of a tick; a set of the constants.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Flags(u16);
 
@@ -36,7 +36,7 @@ impl Flags {
     pub const HELD_BACK: Self = Self(8);
     /// No correction could be made; the last one is kept or fades out.
     pub const NOT_CORRECTED: Self = Self(16);
-    /// What was read of the table was not the same in both copies, or what the store knows of it was not whole. It was
+    /// The words read of the table differed between the copies, or the store's data on it was corrupt. It was
     /// made anew and the tick done again, so the answer is sound, unless [`Self::NOT_CORRECTED`] is set too: then it
     /// could not be mended, and was not used. Also set, with that one, where the table is for another drive than the
     /// joint.
@@ -96,15 +96,15 @@ pub struct Output {
     pub transmission_error_rad: f32,
     /// It lies within ± this, as far as play and jumps go, rad. Of the estimate, whether it is corrected or not: what
     /// is left at the output is [`Self::output`] less the target. Without a sample that is believed in this tick: no
-    /// less than the table's limit and the error that is told, which is all that is known.
+    /// less than the table's limit and the reported uncertainty, which is all that is known.
     pub uncertainty_rad: f32,
     /// The correction in the command: target − command/ratio, rad. It is taken off the target, and so has the sign of
     /// the transmission error that it takes out.
     pub correction_rad: f32,
-    /// What the correction lacks of what the table wants, rad: by the limiter, the mode or the overrun policy.
+    /// Correction missing from the table's demand, rad: held back by the limiter, the mode or the overrun policy.
     pub held_back_rad: f32,
     /// How far to trust estimate and correction.
     pub quality: Quality,
-    /// What happened.
+    /// Events of the tick.
     pub flags: Flags,
 }

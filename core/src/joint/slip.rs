@@ -56,7 +56,7 @@ pub struct NominalOutput;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LoadTorque;
 
-/// What the deflections of a bank are counted in.
+/// Unit of the deflections of a bank.
 pub trait SlipVariable {
     /// Which, in the sum of the settings.
     const KIND: u32;
@@ -109,7 +109,7 @@ struct Deflections<const N: usize> {
 }
 words!([const N: usize] Deflections<N> { at, started, lower, upper });
 
-/// What a bank adds.
+/// Contribution of a bank.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slip {
     /// Error at the output, rad.
@@ -123,9 +123,9 @@ pub struct Slip {
 pub struct FittedSlip<const N: usize, V = NominalOutput> {
     /// The bank.
     pub bank: SlipBank<N, V>,
-    /// What the samples have beside it everywhere, rad.
+    /// Constant offset of the samples, rad.
     pub offset_rad: f64,
-    /// What is left of the samples, rad: root of the mean square.
+    /// Residual of the samples, rad: root of the mean square.
     pub rms_rad: f64,
     /// Samples used: those at which every deflection was known.
     pub used: usize,
@@ -221,7 +221,7 @@ pub const fn saved_slip_bytes(elements: usize) -> usize {
     elements.saturating_mul(8).saturating_add(36)
 }
 
-/// What a saved state begins with; the last byte is the version.
+/// First bytes of a saved state; the last byte is the version.
 const SAVED_MARK: [u8; 4] = *b"FXS\x02";
 /// Table and joint of a state that was saved without them.
 pub(crate) const NOBODY: [u32; 4] = [0; 4];
@@ -238,7 +238,7 @@ impl<const N: usize> Springs<N> {
         }
     }
 
-    fn told(&self, state: &Deflections<N>) -> Slip {
+    fn slip(&self, state: &Deflections<N>) -> Slip {
         let mut slip = Slip { error_rad: 0.0, uncertainty_rad: 0.0 };
         for ((lower, upper), (gain, &width)) in
             state.lower.iter().zip(&state.upper).zip(self.gains.iter().zip(&self.widths))
@@ -274,7 +274,7 @@ impl<const N: usize> Deflections<N> {
 }
 
 impl<const N: usize, V: SlipVariable> SlipBank<N, V> {
-    /// The sum is over the first so many springs.
+    /// The sum is over the first N springs.
     fn of(widths: [i32; N], gains: [f32; N], used: usize) -> Self {
         let gains_used = gains.into_iter().take(used).map(f32::to_le_bytes);
         let words = widths.into_iter().take(used).map(i32::to_le_bytes).chain(gains_used);
@@ -282,7 +282,7 @@ impl<const N: usize, V: SlipVariable> SlipBank<N, V> {
         Self { springs: Sealed::new(Springs { widths, gains, sum }), variable: PhantomData }
     }
 
-    /// A bank of the first so many springs: those after them, of no width and no gain, are in no sum and no saved
+    /// A bank of the first N springs: those after them, of no width and no gain, are in no sum and no saved
     /// state.
     #[cfg(any(test, feature = "c-api"))]
     pub(crate) fn of_first(self, used: usize) -> Self {
@@ -311,7 +311,7 @@ impl<const N: usize, V: SlipVariable> SlipBank<N, V> {
             if let Some(at) = at {
                 springs.follow(deflections, at);
             }
-            springs.told(deflections)
+            springs.slip(deflections)
         };
         let deflections = &mut state.deflections;
         let slip = match self.springs.is_whole() {
@@ -337,7 +337,7 @@ impl<const N: usize, V: SlipVariable> SlipBank<N, V> {
         self.save_first(state, owner(joint, store), N, bytes)
     }
 
-    /// The same of the first so many springs.
+    /// The same for the first N springs.
     pub(crate) fn save_first(
         &self,
         state: &SlipState<N, V>,
@@ -376,7 +376,7 @@ impl<const N: usize, V: SlipVariable> SlipBank<N, V> {
         self.restore_first(owner(joint, store), N, bytes)
     }
 
-    /// The same of the first so many springs.
+    /// The same for the first N springs.
     pub(crate) fn restore_first(
         &self,
         owner: [u32; 4],
@@ -684,7 +684,7 @@ mod tests {
             assert!((found.offset_rad - 3e-5).abs() < 20.0 * limit && found.rms_rad < 1e-7, "{found:?}");
             assert!(found.used > 300 && found.used <= samples.len());
         }
-        // One that never slips in the samples is not told from a slope; none at all tell nothing.
+        // A spring that never slips in the samples is not distinguishable from a slope; no samples say nothing.
         assert_eq!(SlipBank::fit_torque([1.0], SlipState::unknown(), [(0.0, 1e-5), (0.5, 1e-5)]), None);
         assert_eq!(SlipBank::fit([f32::NAN], SlipState::relaxed(), []), None);
         let mut state = SlipState::relaxed();
@@ -699,7 +699,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn only_the_turning_points_matter(path in prop::collection::vec(-2 * WIDTH..2 * WIDTH, 1..20), pieces in 1i32..7) {
+        fn only_the_turning_points_matter(
+            path in prop::collection::vec(-2 * WIDTH..2 * WIDTH, 1..20), pieces in 1i32..7,
+        ) {
             let cut: Vec<i32> = path
                 .iter()
                 .flat_map(|&step| {
@@ -714,7 +716,9 @@ mod tests {
         }
 
         #[test]
-        fn a_larger_stroke_wipes_out_a_smaller_one(small in 1..2 * WIDTH, extra in 0..2 * WIDTH, before in -WIDTH..WIDTH) {
+        fn a_larger_stroke_wipes_out_a_smaller_one(
+            small in 1..2 * WIDTH, extra in 0..2 * WIDTH, before in -WIDTH..WIDTH,
+        ) {
             let (mut with, mut without) = (known(), known());
             run(&mut with, 0, &[before, small, -small, small + extra]);
             run(&mut without, 0, &[before, small + extra]);
@@ -751,7 +755,8 @@ mod tests {
                     for i in 0..200 {
                         let piece = (step as i64 * (i + 1) / 200 - step as i64 * i / 200) as i32;
                         let (next, slip) = run(&mut state, x, &[piece]);
-                        work += if lap == 1 { 0.5 * (slip.error_rad + before.error_rad) as f64 * piece as f64 } else { 0.0 };
+                        let mean = 0.5 * (slip.error_rad + before.error_rad) as f64;
+                        work += if lap == 1 { mean * piece as f64 } else { 0.0 };
                         (x, before) = (next, slip);
                     }
                 }
@@ -776,7 +781,8 @@ mod tests {
             for share in &nested {
                 amplitudes.push((*amplitudes.last().unwrap() as i64 * *share as i64 / 100) as i32);
             }
-            let path: Vec<i32> = amplitudes[1..].iter().enumerate().map(|(i, a)| if i % 2 == 0 { -a } else { *a }).map(turned).collect();
+            let signed = amplitudes[1..].iter().enumerate().map(|(i, a)| if i % 2 == 0 { -a } else { *a });
+            let path: Vec<i32> = signed.map(turned).collect();
             let back: Vec<i32> = path.iter().rev().map(|step| -step).collect();
             let (x, _) = run(&mut state, x, &path);
             let (x, again) = run(&mut state, x, &back);

@@ -10,11 +10,16 @@
 //!
 //! # const JOINT: Joint = {
 //! #     let Ok(drive) = Drive::new(188, 190, FixedMember::Flexspline) else { panic!() };
-//! #     let limits = Limits { tick_s: 1e-3, rate_rad_s: 0.05, acceleration_rad_s2: 5.0, generator_rate_rad_s: 600.0, patience: 5, hold_rad: 1e-6 };
+//! #     let limits = Limits {
+//! #         tick_s: 1e-3, rate_rad_s: 0.05, acceleration_rad_s2: 5.0, generator_rate_rad_s: 600.0, patience: 5,
+//! #         hold_rad: 1e-6,
+//! #     };
 //! #     let Ok(joint) = Joint::new(drive, limits, Overrun::SkipAndCount) else { panic!() };
 //! #     joint
 //! # };
-//! let settings = StartUpSettings { way_rad: Degrees(1080.0).rad(), ticks: 1000, output_error_rad: 1e-3, drag_n_m: 1.5 };
+//! let settings = StartUpSettings {
+//!     way_rad: Degrees(1080.0).rad(), ticks: 1000, output_error_rad: 1e-3, drag_n_m: 1.5,
+//! };
 //! let mut start_up = StartUp::new(&JOINT, GeneratorAngle::ZERO, &settings)?;
 //! let mut generator = GeneratorAngle::ZERO; // what the encoder says
 //! let found = loop {
@@ -42,7 +47,7 @@ pub struct StartUpSettings {
     pub way_rad: f32,
     /// Ticks for each way, 8 or more; the last half of each is for the servo to settle.
     pub ticks: u16,
-    /// What the output may be off by in a way, rad: twice the error that the table states
+    /// Error of the output in one move, rad: twice the error that the table states
     /// ([`Table::error_limit_rad`](crate::Table::error_limit_rad)) is enough.
     pub output_error_rad: f32,
     /// Coulomb drag of the output that a torque in the mesh turns over by, N·m; it may be wrong by three times. Above
@@ -50,7 +55,7 @@ pub struct StartUpSettings {
     pub drag_n_m: f32,
 }
 
-/// What the sensors say in a tick; `None` for one that is not there.
+/// Sensor readings of a tick; `None` for a missing one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Readings {
     /// The generator's encoder.
@@ -61,7 +66,7 @@ pub struct Readings {
     pub torque_n_m: Option<f32>,
 }
 
-/// What sensors say that cannot be; a set of the constants.
+/// Implausible readings of the sensors; a set of the constants.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Implausible(u16);
 
@@ -112,7 +117,7 @@ impl Implausible {
     }
 }
 
-/// What to do in a tick of the test.
+/// Command and result of a tick of the test.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StartUpStep {
     /// The generator angle to command.
@@ -121,9 +126,9 @@ pub struct StartUpStep {
     pub found: Option<Implausible>,
 }
 
-/// What was seen at the end of a way.
+/// Readings at the end of a move.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Place {
+struct MoveEnd {
     generator: Option<GeneratorAngle>,
     output: Option<OutputAngle>,
     torque_n_m: Option<f32>,
@@ -140,7 +145,7 @@ pub struct StartUp {
     drag_n_m: f32,
     tick: u32,
     /// At the start, at the end of the way there, and of that back.
-    places: [Place; 3],
+    places: [MoveEnd; 3],
     /// Sum of the torques in the moving half of the way, and how many.
     torque: (f32, u16),
     lost: bool,
@@ -152,7 +157,7 @@ const WAY_SHARE: i64 = 10;
 const STILL_SHIFT: u32 = 8;
 /// Of the output's, beside the error that is stated: a hundredth.
 const RATIO_SHARE: i64 = 100;
-/// The torque turns over by this part of what the drag says, and by so many times, at least and at most; below a tenth
+/// The torque turns over by this part of what the drag says, and by these factors, at least and at most; below a tenth
 /// it does not change. Drag differs from unit to unit and with the temperature by two or three times
 /// ([motion.md](https://docs.rs/crate/flexspline)); the nearest unit is 8.9 times off (N·m and lbf·in).
 const DRAG_TIMES: f32 = 3.0;
@@ -162,7 +167,8 @@ impl StartUp {
     /// A test that moves the generator from where it is.
     ///
     /// # Errors
-    /// [`SettingError`]: a number that is not finite, a way that is too short or too long for what the output may be off by, too few ticks, a drag of 0.
+    /// [`SettingError`]: a number that is not finite, a way that is too short or too long for the error of the
+    /// output, too few ticks, a drag of 0.
     pub fn new(joint: &Joint, from: GeneratorAngle, settings: &StartUpSettings) -> Result<Self, SettingError> {
         let StartUpSettings { way_rad, ticks, output_error_rad, drag_n_m } = *settings;
         let error = checked("output_error_rad", output_error_rad, output_error_rad as f64, [1e-7, 0.1])?;
@@ -180,7 +186,7 @@ impl StartUp {
             output_error: counts(output_error_rad as f64),
             drag_n_m,
             tick: 0,
-            places: [Place::default(); 3],
+            places: [MoveEnd::default(); 3],
             torque: (0.0, 0),
             lost: false,
         })
@@ -194,7 +200,7 @@ impl StartUp {
         let moving = ticks >> 1;
         let (leg, within) = if tick < ticks { (0u8, tick) } else { (1, tick.wrapping_sub(ticks)) };
         let finite = readings.torque_n_m.is_none_or(f32::is_finite);
-        let Place { generator, output, torque_n_m } = self.places.first().copied().unwrap_or_default();
+        let MoveEnd { generator, output, torque_n_m } = self.places.first().copied().unwrap_or_default();
         let same = generator.is_some() == readings.generator.is_some()
             && output.is_some() == readings.output.is_some()
             && torque_n_m.is_some() == readings.torque_n_m.is_some();

@@ -1,4 +1,4 @@
-//! What changes while a joint runs, and what of it survives a reset.
+//! State of a running joint, and the part of it that survives a reset.
 
 use super::mode::{Mode, ModeError};
 use super::runtime::Joint;
@@ -14,12 +14,12 @@ pub(super) const FINE: i32 = 8;
 /// No table with its adjustment gives a larger correction, and no joint a faster one, fine counts.
 pub(super) const MOST_FINE: u32 = MOST_ERROR_COUNTS * FINE as u32;
 
-/// What changes while a joint runs: two copies with sums over each, so that an upset of one is noticed and mended in
+/// State of a running joint: two copies with sums over each, so that an upset of one is noticed and mended in
 /// the next tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointState {
     copies: [SealedState; 2],
-    /// Told only.
+    /// Reported in telemetry only; does not influence the tick.
     missed_ticks: u32,
 }
 
@@ -29,7 +29,7 @@ struct SealedState {
     sums: [u32; 2],
 }
 
-/// What a tick changes: 64 bytes, the most that is copied without a call.
+/// Values that a tick changes: 64 bytes, the most that is copied without a call.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Kept {
     pub play: PlayState,
@@ -39,9 +39,9 @@ pub(super) struct Kept {
     pub generator: GeneratorAngle,
     /// The correction, fine counts.
     pub correction: i32,
-    /// What is wanted of it.
+    /// Wanted correction.
     pub goal: i32,
-    /// What it moved by in the last tick.
+    /// Change of the correction in the last tick.
     pub speed: i32,
     /// Ticks in a row with a glitch, and without a correction.
     pub glitches: u16,
@@ -62,7 +62,7 @@ pub(super) const SAMPLED: u32 = 2 << 2;
 pub(super) const FLANK: u32 = 3 << 4;
 pub(super) const FLANK_FORWARD: u32 = 1 << 4;
 pub(super) const FLANK_BACKWARD: u32 = 2 << 4;
-/// The state was mended since the last tick, which the next has to tell.
+/// The state was mended since the last tick, which the next has to report.
 pub(super) const MENDED: u32 = 1 << 6;
 
 impl Kept {
@@ -129,7 +129,7 @@ impl SealedState {
 
 /// Size of a saved joint state.
 pub const SAVED_JOINT_BYTES: usize = 72;
-/// What it begins with; the last byte is the version.
+/// First bytes of a saved state; the last byte is the version.
 const SAVED_MARK: [u8; 4] = *b"FXJ\x01";
 
 /// Why saved bytes are no state of this joint with this table.
@@ -168,7 +168,7 @@ impl core::error::Error for RestoreError {}
 
 /// How a state was found.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Found {
+pub(super) enum CopyStatus {
     Whole,
     /// One copy was not whole; the other was taken.
     Mended,
@@ -191,12 +191,12 @@ impl JointState {
         Self { copies: Self::NEW, missed_ticks: 0 }
     }
 
-    /// What is kept, of the copy that is whole.
+    /// Values of the copy that is whole.
     #[inline(always)]
-    pub(super) fn open(&self) -> (Kept, Found) {
+    pub(super) fn open(&self) -> (Kept, CopyStatus) {
         let [first, _] = &self.copies;
         // Copied once.
-        let (mut kept, mut found) = (first.kept, Found::Whole);
+        let (mut kept, mut found) = (first.kept, CopyStatus::Whole);
         if !first.is_whole() {
             found = self.open_other(&mut kept);
         }
@@ -205,18 +205,18 @@ impl JointState {
 
     #[cold]
     #[inline(never)]
-    fn open_other(&self, kept: &mut Kept) -> Found {
+    fn open_other(&self, kept: &mut Kept) -> CopyStatus {
         let [first, second] = &self.copies;
         if second.is_whole() {
             *kept = second.kept;
-            return Found::Mended;
+            return CopyStatus::Mended;
         }
         let (one, other) = (first.kept.correction, second.kept.correction);
         // What both have is likely to be what is commanded, and taken back within the limits.
         let correction = if one == other && one.unsigned_abs() <= MOST_FINE { one } else { 0 };
         let marks = Mode::Safe.code();
         *kept = Kept { correction, goal: correction, marks, ..Kept::NEW };
-        Found::Lost
+        CopyStatus::Lost
     }
 
     /// Keeps what a tick leaves.
@@ -252,7 +252,7 @@ impl JointState {
         if !from.may_become(to) {
             return Err(ModeError { from, to });
         }
-        let mended = if found == Found::Whole { 0 } else { MENDED };
+        let mended = if found == CopyStatus::Whole { 0 } else { MENDED };
         kept.marks = kept.marks & !MODE | to.code() | mended;
         self.close(&kept);
         Ok(())
@@ -262,7 +262,7 @@ impl JointState {
     pub fn forget_side(&mut self) {
         let (mut kept, found) = self.open();
         kept.play = PlayState::unknown();
-        let mended = if found == Found::Whole { 0 } else { MENDED };
+        let mended = if found == CopyStatus::Whole { 0 } else { MENDED };
         kept.marks = kept.marks & !FLANK | mended;
         self.close(&kept);
     }
@@ -285,8 +285,8 @@ impl JointState {
         self.missed_ticks = self.missed_ticks.wrapping_add(ticks as u32);
     }
 
-    /// What must survive a reset: play, correction and the last sample, with version, table and joint, and a CRC-32
-    /// over all of it.
+    /// Data that must survive a reset: play, correction and the last sample, with version, table and joint, and a
+    /// CRC-32 over all of it.
     ///
     /// | offset | type | what |
     /// |---|---|---|
@@ -335,7 +335,7 @@ impl JointState {
         }
         if let Some((before, sum)) = bytes.split_last_chunk_mut::<4>() {
             // A state that is lost is not to come back as one that was saved.
-            let spoilt = if found == Found::Lost { u32::MAX } else { 0 };
+            let spoilt = if found == CopyStatus::Lost { u32::MAX } else { 0 };
             *sum = (crc32(before) ^ spoilt).to_le_bytes();
         }
         bytes

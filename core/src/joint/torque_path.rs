@@ -1,6 +1,6 @@
 //! Which torque a table is asked with, and how a reading becomes it.
 //!
-//! What twists a drive is the torque that its flanks carry, the torque *in the mesh*. A table is made in steady motion
+//! A drive is twisted by the torque that its flanks carry, the torque *in the mesh*. A table is made in steady motion
 //! under a torque on the load `T`, with the drag `d_t` that its drive had then: in the mesh was `T − d_t` moving
 //! forward, `T + d_t` backward. So a joint wants
 //! ```text
@@ -11,11 +11,11 @@
 //!
 //! | from | is | what it needs |
 //! |---|---|---|
-//! | a model of gravity and wind, a known load | on the load | drag; take inertia times the acceleration of the *target* off it |
-//! | a torque sensor between drive and load, twist of two encoders | in the mesh | drag, for where the motion turns back; a low-pass: below |
-//! | the motor's current times ratio, less friction, less inertia of the motor | in the mesh | likewise, and a model of the friction |
+//! | a model of gravity and wind, a known load | on the load | drag; less inertia times the *target*'s acceleration |
+//! | a torque sensor at the drive, twist of two encoders | in the mesh | drag, for reversals; a low-pass: below |
+//! | motor current times ratio, less friction and motor inertia | in the mesh | likewise, and a friction model |
 //!
-//! At a reversal the drag turns over, and the torque in the mesh leaps by twice of it. A sensor behind a low-pass tells
+//! At a reversal the drag turns over, and the torque in the mesh leaps by twice of it. A sensor behind a low-pass shows
 //! that late, and near zero load not at all, where the leap is below its noise: so what is behind the low-pass is the
 //! torque on the load, from either reading, and the drag comes off it by the direction.
 //!
@@ -44,7 +44,7 @@ pub enum TorqueReading {
     InMesh(f32),
 }
 
-/// What a reading goes through.
+/// Settings of the processing of a torque reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TorqueSettings {
     /// Time from tick to tick, s.
@@ -124,8 +124,9 @@ impl TorquePath {
     /// A path that has seen nothing yet.
     ///
     /// # Errors
-    /// [`SettingError`]: a time, bandwidth or largest reading that is not finite and positive, a drag, a hold or a time to settle that is not finite or
-    /// below 0; a bandwidth of which a tick sees less than 1e-7, or a largest reading below 1e-6 N·m.
+    /// [`SettingError`]: a time, bandwidth or largest reading that is not finite and positive, a drag, a hold or a
+    /// time to settle that is not finite or below 0; a bandwidth of which a tick sees less than 1e-7, or a
+    /// largest reading below 1e-6 N·m.
     pub const fn new(settings: TorqueSettings) -> Result<Self, SettingError> {
         let TorqueSettings { tick_s, bandwidth_hz, drag_n_m, table_drag_n_m, hold_n_m, settle_s, largest_n_m } =
             settings;
@@ -190,7 +191,7 @@ impl TorquePath {
         Ok(path.sealed())
     }
 
-    /// What changes from tick to tick, for a simulation that goes on from here.
+    /// Values that change from tick to tick, for a simulation that goes on from here.
     #[cfg(any(test, feature = "std"))]
     #[must_use]
     pub const fn kept(&self) -> [u32; 7] {
@@ -287,9 +288,9 @@ impl PathState {
         let mesh = behind - drag;
         let size = if mesh < 0.0 { -mesh } else { mesh };
         let carries = if mesh < 0.0 { -1.0 } else { 1.0 };
-        // Where the motion turns back the drag tells the flank, however small the torque.
-        let told = turned_back || (size >= hold_n_m && (!in_mesh || upper(self.settle) >= self.settle & FLAGS));
-        let changes = told && carries != flank;
+        // Where the motion turns back the drag decides the flank, however small the torque.
+        let decided = turned_back || (size >= hold_n_m && (!in_mesh || upper(self.settle) >= self.settle & FLAGS));
+        let changes = decided && carries != flank;
         let flank = if changes { carries } else { flank };
         let since = if changes && !turned_back { 0 } else { upper(self.settle).saturating_add(1) };
         self.settle = halves(self.settle & FLAGS, since);
@@ -390,7 +391,7 @@ mod tests {
         assert!(TorquePath::new(TorqueSettings { hold_n_m: 0.0, ..SETTINGS }).is_ok());
     }
 
-    /// What the correction's own way across the play makes of the torque does not turn it back; a reversal of the
+    /// The torque that the correction's own way across the play causes does not turn it back; a reversal of the
     /// motion does.
     #[test]
     fn a_flank_that_a_reading_changed_stays_until_its_correction_has_settled() {

@@ -5,8 +5,8 @@ use super::plan::{MissingDirection, Plan, Sample, direction_number};
 use crate::play::Direction;
 use core::f64::consts::TAU;
 
-/// A harmonic needs this part of its period, or of its beat with another, to be told apart. Below 1, because samples
-/// spread over a period end one step short of it.
+/// A harmonic needs this part of its period, or of its beat with another, to be distinguishable. Below 1, because
+/// samples spread over a period end one step short of it.
 const PERIOD_NEEDED: f64 = 0.95;
 /// A ripple coefficient is determined if its samples weigh at least this part of the average coefficient's.
 const WEIGHT_NEEDED: f64 = 0.15;

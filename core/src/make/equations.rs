@@ -7,7 +7,7 @@ use crate::table::windup::{self, STENCIL, Slopes};
 use core::f64::consts::TAU;
 
 /// One equation: its non-zero coefficients.
-pub(super) struct Row {
+pub(super) struct SampleRow {
     pub error_rad: f64,
     /// Unknowns of the ripple around the sample, and their weights.
     pub ripple: [(usize, f64); 12],
@@ -16,7 +16,7 @@ pub(super) struct Row {
     pub bend: Bend,
 }
 
-/// What the cubic of D adds to the straight line between two torque nodes, per unit of D.
+/// Contribution of the cubic of D on top of the straight line between two torque nodes, per unit of D.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Bend {
     /// The first torque node, and the weights from there on.
@@ -69,10 +69,10 @@ impl Plan<'_> {
         bend
     }
 
-    pub(super) fn row(&self, sample: &Sample, slopes: &Slopes) -> Row {
+    pub(super) fn row(&self, sample: &Sample, slopes: &Slopes) -> SampleRow {
         let generator = GeneratorAngle::from_rad(sample.generator_rad).unwrap_or_default();
         let phases = self.drive.phases(generator, self.drive.nominal_output(generator));
-        let mut row = Row {
+        let mut row = SampleRow {
             error_rad: self.error_rad(sample),
             ripple: [(0, 0.0); 12],
             harmonics: [0.0; 6 * MAX_HARMONICS],
@@ -104,7 +104,7 @@ impl Plan<'_> {
     }
 }
 
-pub(super) fn for_each_entry(plan: &Plan<'_>, row: &Row, mut visit: impl FnMut(usize, f64)) {
+pub(super) fn for_each_entry(plan: &Plan<'_>, row: &SampleRow, mut visit: impl FnMut(usize, f64)) {
     row.ripple.iter().filter(|(_, weight)| *weight != 0.0).for_each(|&(unknown, weight)| visit(unknown, weight));
     let first = 2 * plan.block();
     let count = 2 * plan.harmonics();

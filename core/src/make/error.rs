@@ -85,7 +85,7 @@ pub enum ProjectError {
         /// Nodes of the curve.
         nodes: usize,
     },
-    /// The samples span too few generator turns to tell the harmonics from each other and from a constant.
+    /// The samples span too few generator turns to distinguish the harmonics from each other and from a constant.
     Coverage {
         /// Generator turns needed; infinite if two harmonics are the same.
         needed_turns: f64,

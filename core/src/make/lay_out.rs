@@ -2,7 +2,7 @@
 
 use super::error::ProjectError;
 use super::plan::{Harmonics, Plan, take};
-use super::solve::{Sampled, dot};
+use super::solve::{SampledNodes, dot};
 use crate::play::Direction;
 use crate::table::TableData;
 use core::f64::consts::TAU;
@@ -23,7 +23,7 @@ pub(super) fn lay_out<'a>(
     let half_width_ripple_rad = take(&mut values, "values", ripples)?;
     let (both, harmonics) = solution.split_at_mut_checked(2 * plan.block()).unwrap_or_default();
     let (forward, backward) = both.split_at_mut_checked(plan.block()).unwrap_or_default();
-    let sampled = Sampled { records, marks };
+    let sampled = SampledNodes { records, marks };
     let one_sided = plan.missing_direction.half_width_rad();
     let means = mean_rad.iter_mut().zip(half_width_rad.iter_mut());
     for (record, (mean, half_width)) in means.enumerate() {

@@ -33,8 +33,8 @@
 //! [`make_image`] then reads the finished image with the code of the control step at every sample and records the worst
 //! and the rms deviation in it: that bound includes interpolation, quantisation and single precision.
 //!
-//! What samples cannot determine is an error that names the node, never a guess. Samples strictly inside a torque jump
-//! say nothing about either side of it; they are left out and counted.
+//! A node that the samples do not determine is an error that names it, never a guess. Samples strictly inside a torque
+//! jump say nothing about either side of it; they are left out and counted.
 //!
 //! ```
 //! use flexspline::make::{Harmonics, MissingDirection, Plan, Sample, Workspace, make_image};

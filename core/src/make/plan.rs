@@ -1,4 +1,4 @@
-//! What table to make, of which samples, and which node a sample tells of.
+//! Specification of the table to make, its samples, and the node that a sample belongs to.
 
 use super::error::ProjectError;
 use crate::angle::GeneratorAngle;
@@ -59,7 +59,7 @@ pub struct Harmonics<'a> {
     pub nodes: usize,
 }
 
-/// What table to make of the samples.
+/// Specification of the table to make of the samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan<'a> {
     /// Tooth counts and fixed member.
@@ -76,7 +76,7 @@ pub struct Plan<'a> {
     pub material: Harmonics<'a>,
     /// C over the output angle δ.
     pub output: Harmonics<'a>,
-    /// What to do where one direction was not sampled.
+    /// Treatment of a direction that was not sampled.
     pub missing_direction: MissingDirection,
     /// A half-width below zero by no more than this, rad, is noise and set to zero; more is an error.
     pub negative_half_width_tolerance_rad: f64,

@@ -24,18 +24,18 @@ pub(super) struct System<'w> {
     pub product: &'w mut [f64],
     /// D of each record.
     pub means: &'w mut [f64],
-    /// What each D gathers, before its coefficients share it.
+    /// Sum for each D, before its coefficients share it.
     pub pulls: &'w mut [f64],
 }
 
 /// Which directions were sampled at a record, from the marks of [`solve`].
 #[derive(Clone, Copy)]
-pub(super) struct Sampled<'m> {
+pub(super) struct SampledNodes<'m> {
     pub records: usize,
     pub marks: &'m [u64],
 }
 
-impl Sampled<'_> {
+impl SampledNodes<'_> {
     pub fn is(self, direction: Direction, record: usize) -> bool {
         self.marks.get(direction_number(direction) * self.records + record).is_some_and(|mark| *mark != 0)
     }
@@ -61,7 +61,7 @@ impl Plan<'_> {
     }
 
     /// D of each record, without the half-width given for missing directions.
-    fn gather_means(&self, sampled: Sampled<'_>, unknowns: &[f64], means: &mut [f64]) {
+    fn gather_means(&self, sampled: SampledNodes<'_>, unknowns: &[f64], means: &mut [f64]) {
         for (record, mean) in means.iter_mut().enumerate() {
             let average = |direction| {
                 let values = unknowns.get(self.range(direction, record)).unwrap_or_default();
@@ -72,7 +72,7 @@ impl Plan<'_> {
     }
 
     /// The transpose of [`Self::gather_means`].
-    fn spread_pulls(&self, sampled: Sampled<'_>, pulls: &[f64], unknowns: &mut [f64]) {
+    fn spread_pulls(&self, sampled: SampledNodes<'_>, pulls: &[f64], unknowns: &mut [f64]) {
         for (record, pull) in pulls.iter().enumerate() {
             for (direction, share) in sampled.shares(record).0 {
                 let part = share * pull / self.coefficients() as f64;
@@ -111,7 +111,7 @@ pub(super) fn solve(
         }
     }
     plan.check_positions(diagonal, marks)?;
-    let sampled = Sampled { records: plan.records(), marks };
+    let sampled = SampledNodes { records: plan.records(), marks };
 
     // What is known of D before: the half-width given for a missing direction.
     let given = plan.missing_direction.half_width_rad();

@@ -16,10 +16,10 @@ const FILLED: usize = 8;
 /// More steps than any activation takes: 512 records of 64 torques and 8 temperatures at 16 steps each, twice for each
 /// of two images. What goes on for longer was hit.
 const MOST_STEPS: u32 = 40_000;
-/// Of [`Found::images`].
+/// Of [`ActivatedTable::images`].
 const OF_SECOND: u32 = 2;
 
-/// What a step does.
+/// Work of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum ActivationStage {
     /// Whether both images are the same, words of them.
@@ -29,7 +29,7 @@ enum ActivationStage {
     Second,
     /// Neither is a table: the first is checked again, for what is wrong with it.
     Refuse,
-    /// What was found is compared with what was found before; if nothing was yet, all begins once more.
+    /// The result is compared with the previous one; if there was none yet, all begins once more.
     Confirm,
     Clear,
     Fill,
@@ -77,14 +77,14 @@ pub struct Activation {
     /// The first image is no table.
     first_refused: bool,
     /// By the checks under way, and by those before.
-    pub(super) found: Option<Found>,
-    confirmed: Option<Found>,
+    pub(super) found: Option<ActivatedTable>,
+    confirmed: Option<ActivatedTable>,
 }
 
-/// What the store will know of the table, and how much of it was filled: it lies in memory from step to step, so it has
+/// The store's future data on the table, and how much of it was filled: it lies in memory from step to step, so it has
 /// sums.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Found {
+pub(super) struct ActivatedTable {
     source: ImageSource,
     id: TableId,
     /// 1 if the images are the same, and 2 if the second is the sound one.
@@ -93,7 +93,7 @@ pub(super) struct Found {
     sums: [u32; 2],
 }
 
-impl Found {
+impl ActivatedTable {
     #[inline(never)]
     const fn sums(&self) -> u64 {
         let [a, b, c, d, e, f, g, h] = self.id.0;
@@ -182,7 +182,7 @@ impl Activation {
         (self.stage, self.at, self.check) = (stage as u32, 0, ImageCheck::NEW);
     }
 
-    /// What was found stands if it was found before; else all is checked once more.
+    /// A result stands if it was found before; else all is checked once more.
     fn confirm(&mut self) -> Result<(), ActivateError> {
         let found = self.found.as_ref().filter(|found| found.is_whole()).ok_or(ActivateError::Torn)?;
         let Some(before) = &self.confirmed else {
@@ -210,7 +210,7 @@ impl Activation {
     }
 
     /// Whether a table that passed can be taken.
-    fn accept(&self, images: &Images<'_>, words: Words<'_>, of_second: u32) -> Result<Found, ActivateError> {
+    fn accept(&self, images: &Images<'_>, words: Words<'_>, of_second: u32) -> Result<ActivatedTable, ActivateError> {
         let Some(table) = self.check.table(words.as_flattened()) else {
             return Err(ActivateError::Image(ImageError::Magic));
         };
@@ -233,7 +233,7 @@ impl Activation {
         }
         let source = source.at_temperature(words, f32::from_bits(bits));
         let images = of_second | self.same as u32;
-        let mut found = Found { source, id: table.id(), images, filled: 0, sums: [0; 2] };
+        let mut found = ActivatedTable { source, id: table.id(), images, filled: 0, sums: [0; 2] };
         found.sums = pair(found.sums());
         Ok(found)
     }
@@ -283,7 +283,7 @@ impl Activation {
 }
 
 #[cfg(test)]
-crate::upset::upsets!(Found { source, id, images, filled, sums });
+crate::upset::upsets!(ActivatedTable { source, id, images, filled, sums });
 #[cfg(test)]
 crate::upset::upsets!(Activation {
     drive,

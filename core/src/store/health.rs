@@ -7,7 +7,7 @@ use core::fmt;
 /// Most pages of an image that a [`Store`](crate::Store) takes, 8 KiB: one bit for each.
 pub const STORE_PAGES: usize = 32;
 
-/// What the store has seen since it was made; counters wrap.
+/// Counts of the store since it was made; they wrap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
     /// Ticks that were done again, as a step read words that differ between the copies or something else was not whole.
@@ -33,7 +33,7 @@ pub enum Health {
     Lost,
     /// No table was activated.
     Empty,
-    /// What the store knew of the table was hit in both its copies: nothing is corrected until the table is activated
+    /// The store's data on the table is corrupt in both copies: nothing is corrected until the table is activated
     /// again.
     Torn,
 }
@@ -48,7 +48,7 @@ pub enum ActivateError {
         /// Words needed; [`STORE_WORDS`] are there.
         needed: usize,
     },
-    /// The image has more pages than the store can tell apart.
+    /// The image has more pages than the store can distinguish.
     TooManyPages {
         /// Pages found; [`STORE_PAGES`] are allowed.
         found: usize,
@@ -64,7 +64,7 @@ pub enum ActivateError {
     },
     /// Both images lie at the same place, or overlap.
     SameImage,
-    /// What an [`Activation`](crate::Activation) keeps from step to step was hit: begin again.
+    /// The saved progress of an [`Activation`](crate::Activation) is corrupt: begin again.
     Torn,
 }
 

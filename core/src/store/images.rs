@@ -37,9 +37,9 @@ impl<'a> Images<'a> {
     }
 }
 
-/// Writes a page of `good` over the same page of `damaged`, and its checksum, and tells whether it did: not if the page
-/// of `good` is damaged too. Both are whole images of the same table. The page after the last is the CRC-32 of the
-/// whole image, by which a store knows it ([`Flags::OTHER_IMAGES`](crate::Flags::OTHER_IMAGES)). Then tell the store:
+/// Writes a page of `good` over the same page of `damaged`, and its checksum, and returns whether it did: not if the
+/// page of `good` is damaged too. Both are whole images of the same table. The page after the last is the CRC-32 of the
+/// whole image, by which a store knows it ([`Flags::OTHER_IMAGES`](crate::Flags::OTHER_IMAGES)). Then notify the store:
 /// [`Store::mended`](crate::Store::mended).
 #[must_use]
 pub fn mend_page(damaged: &mut [u8], good: &[u8], page: usize) -> bool {

@@ -33,7 +33,7 @@ use crate::crc::{CRC_START, crc_word};
 use crate::drive::Drive;
 use crate::num;
 use crate::table::{
-    Doubt, Memory, NODE_WORDS, OperatingPoint, PAGE_BYTES, Plan, TableId, TorquePlace, Words, grid, word_at,
+    Doubt, Memory, NODE_WORDS, OperatingPoint, PAGE_BYTES, PointPlan, TableId, TorquePlace, Words, grid, word_at,
 };
 use crate::whole::pair;
 use copies::{Copied, SLACK, agreed};
@@ -42,10 +42,10 @@ use source::{ACTIVE, Fresh, IN_RANGE, ImageSource, SealedSource, Strangers, TORN
 /// Words of a page.
 const PAGE_WORDS: usize = PAGE_BYTES / 4;
 
-/// What a tick has to say of the table.
+/// Status of the table for a tick.
 #[derive(Clone, Copy)]
-pub(crate) struct Told {
-    /// What is known of it is whole.
+pub(crate) struct TableStatus {
+    /// The store's data on the table is whole.
     pub whole: bool,
     /// An image is not the one that was activated.
     pub other_images: bool,
@@ -118,7 +118,7 @@ impl Default for Store {
 
 impl Memory for Store {
     #[inline(always)]
-    fn plan(&self) -> &Plan {
+    fn plan(&self) -> &PointPlan {
         &self.source().plan
     }
 
@@ -283,7 +283,7 @@ impl Store {
         found
     }
 
-    /// What was seen so far.
+    /// Counts so far.
     #[must_use]
     pub const fn counters(&self) -> Counters {
         self.counters
@@ -314,7 +314,7 @@ impl Store {
             .find_map(|(image, pages)| (pages != 0).then_some((image, pages.trailing_zeros() as usize)))
     }
 
-    /// To be told when [`mend_page`], or what writes flash in its place, has written this page of image 0 or 1 again
+    /// To be called when [`mend_page`], or what writes flash in its place, has written this page of image 0 or 1 again
     /// from an intact one. Without it the other image would be believed alone until the page is checked anew, also when
     /// it is hit itself.
     pub const fn mended(&mut self, image: usize, page: usize) {
@@ -405,12 +405,12 @@ impl Store {
         Strangers { any: first | second | once, all: first & second | once }
     }
 
-    /// What a tick was told, to be asked after everything that it read.
+    /// Table status of a tick, to be read after everything else that the tick reads.
     #[inline(always)]
-    pub(crate) fn told(&self, images: &Images<'_>) -> Told {
+    pub(crate) fn table_status(&self, images: &Images<'_>) -> TableStatus {
         let strangers = self.strangers(images);
         let [sealed, _] = &self.source;
-        Told { whole: sealed.is_whole(), other_images: self.is_active() & strangers.any }
+        TableStatus { whole: sealed.is_whole(), other_images: self.is_active() & strangers.any }
     }
 
     /// Makes a word of both copies anew from both images.
@@ -438,7 +438,7 @@ impl Store {
         *counter = counter.wrapping_add(1);
     }
 
-    /// Takes `words` words of the images into the CRC-32 of their pages: tells which of two images is damaged, and
+    /// Takes `words` words of the images into the CRC-32 of their pages: shows which of two images is damaged, and
     /// finds what both have. Makes as many words of the copies anew. Call it in a slow rate group, the same number each
     /// time: a word takes at most 733 instructions, and with 16 words every 100 ms the copies follow the temperature
     /// within 6 s.

@@ -1,22 +1,23 @@
-//! What a step needs of a table besides the copies, and where the words of the copies come from.
+//! Data of a table that a step needs in addition to the copies, and the source of the copies' words.
 
 use super::PAGE_WORDS;
 use crate::num;
 use crate::table::{
-    NODE_WORDS, Plan, Table, Words, blend_halves, blend_number, f32_at, grid, halves, ripple_row, word, word_at,
+    NODE_WORDS, PointPlan, Table, Words, blend_halves, blend_number, f32_at, grid, halves, ripple_row, word, word_at,
 };
 use crate::whole::{pair, same, sums};
 
 /// A copy starts with the torque axis; what comes before it in an image is in the store otherwise.
 const FIRST: usize = word::TORQUE_NODES;
 
-/// What a step needs besides the copies, and where the words of the copies come from: kept twice, with sums over each.
+/// Data that a step needs in addition to the copies, and the source of the copies' words: kept twice, with sums over
+/// each.
 ///
 /// A copy holds the words of an image from the torque axis on, but nodes and records at one temperature only.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub(super) struct ImageSource {
-    pub plan: Plan,
+    pub plan: PointPlan,
     pub torque_range: [f32; 2],
     /// The way from the lower temperature node to the next, 0 to 1.
     pub warm: f32,
@@ -57,13 +58,13 @@ pub(super) fn agree_on_temperature(first: Words<'_>, second: Words<'_>) -> bool 
 pub(super) const IN_RANGE: u16 = 1;
 /// A table was activated.
 pub(super) const ACTIVE: u16 = 2;
-/// What was known of the table was lost: neither copy of this was whole.
+/// The store's data on the table was lost: neither copy of this was whole.
 pub(super) const TORN: u16 = 4;
 
 impl ImageSource {
     /// Without a table.
     pub const EMPTY: Self = Self {
-        plan: Plan {
+        plan: PointPlan {
             ripple_nodes: 0,
             ripple_unit: 0,
             ripple_cells: 0,
@@ -95,8 +96,17 @@ impl ImageSource {
     /// Sums over all of it; of zeros they are zeros, so that a store without a table is all zeros.
     #[inline(never)]
     pub const fn sums(&self) -> u64 {
-        let Plan { ripple_nodes, ripple_unit, ripple_cells, curves, limit, iterations, hold, cell_width, play_ripple } =
-            self.plan;
+        let PointPlan {
+            ripple_nodes,
+            ripple_unit,
+            ripple_cells,
+            curves,
+            limit,
+            iterations,
+            hold,
+            cell_width,
+            play_ripple,
+        } = self.plan;
         let ([a, b, c], [least, most]) = (curves, self.torque_range);
         sums!(
             [0; 2];

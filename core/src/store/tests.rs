@@ -1,7 +1,7 @@
 use super::*;
 use crate::error::ImageError;
 use crate::fixture::{self, ARCSEC};
-use crate::table::Model;
+use crate::table::TableModel;
 use crate::upset::Upset;
 use crate::{
     Adjustment, FixedMember, Flags, GeneratorAngle, Input, Joint, JointState, Limits, Mode, Output, OutputAngle,
@@ -114,10 +114,10 @@ fn the_copies_say_what_the_table_says() {
             for backward in [false, true] {
                 let mut doubt = Doubt(0);
                 let point = store.locate(input.torque_n_m, 0, 0);
-                let copied = Model { memory: &store, drive: table.drive() };
+                let copied = TableModel { memory: &store, drive: table.drive() };
                 let copied = copied.solve(&point, input.target, backward, &mut doubt);
                 let point = table.at(input.torque_n_m, temperature).unwrap();
-                let read = Model { memory: &table, drive: table.drive() };
+                let read = TableModel { memory: &table, drive: table.drive() };
                 assert_eq!(copied, read.solve(&point, input.target, backward, &mut doubt), "at {temperature}");
             }
         }
@@ -169,8 +169,8 @@ fn joints_of_one_table_share_a_store() {
             }
             // Only what was hit and mended is reported, to the joint that found it.
             assert_eq!(Output { flags: expected.flags, ..found }, expected, "joint {number}, tick {tick}");
-            let told = |out: &Output| out.flags.bits() & !Flags::TABLE_DOUBT.bits();
-            assert_eq!(told(&found), told(&expected), "joint {number}, tick {tick}");
+            let reported = |out: &Output| out.flags.bits() & !Flags::TABLE_DOUBT.bits();
+            assert_eq!(reported(&found), reported(&expected), "joint {number}, tick {tick}");
             doubted += found.flags.contains(Flags::TABLE_DOUBT) as usize;
             corrected += !found.flags.contains(Flags::NOT_CORRECTED) as usize;
         }
@@ -185,7 +185,7 @@ fn joints_of_one_table_share_a_store() {
 #[test]
 fn a_state_shared_by_two_joints_is_told_where_they_are_apart() {
     let images = Images::new(&IMAGE, &TWIN);
-    for (apart_rad, told) in [(5.0, true), (1e-4, false)] {
+    for (apart_rad, reported) in [(5.0, true), (1e-4, false)] {
         let (mut store, mut state) = (active(20.0), JointState::new());
         let (mut motion, mut glitches) = (Motion::new(3), 0);
         for _ in 0..500 {
@@ -195,11 +195,11 @@ fn a_state_shared_by_two_joints_is_told_where_they_are_apart() {
             let found = joint().tick(&images, &mut store, &mut state, &Input { generator: beside, ..input });
             glitches += found.flags.contains(Flags::GLITCH) as usize;
         }
-        assert_eq!(glitches, if told { 500 } else { 0 }, "{apart_rad} rad apart");
+        assert_eq!(glitches, if reported { 500 } else { 0 }, "{apart_rad} rad apart");
     }
 }
 
-/// A caller's mistake: the table of another unit of the same teeth is a table of the drive. Its id alone tells.
+/// A caller's mistake: the table of another unit of the same teeth is a table of the drive. Only its id differs.
 #[test]
 fn another_table_of_the_same_drive_is_told_by_its_id_alone() {
     let other = fixture::image(false);
@@ -276,7 +276,7 @@ fn campaign(flips: usize, seed: u64) -> [usize; 4] {
             1 => (0..4).for_each(|i| hit.upset(mixed.below(2), (word + i) % used, mask.rotate_left(i as u32))),
             _ => hit.upset(mixed.below(2), word, mask),
         }
-        // The same bit of the same word in both copies at a time is what two copies cannot tell.
+        // The same bit of the same word in both copies at a time is the fault that two copies cannot detect.
         for word in 0..used {
             let [a, b, c] = [&hit.first, &hit.second, &sound.first].map(|copy| copy.words::<1>(word));
             if a == b && a != c {
@@ -439,7 +439,7 @@ fn beside_a_damaged_page_another_page_of_the_other_image_is_not_believed_alone()
     assert!(skipped > 0, "nothing was in question");
 }
 
-/// What is checked while a page is written again is not taken for the page.
+/// A page that is checked while it is written again is not taken for damaged.
 #[test]
 fn a_page_mended_while_it_is_checked_is_not_found_damaged() {
     let mut images = [IMAGE.clone(), IMAGE.clone()];
@@ -507,8 +507,8 @@ fn a_changed_plan_is_noticed_and_mended() {
         let mut store = sound.clone();
         store.source.flip(bit, &mut std::string::String::new());
         let found = joint().tick(&images, &mut store, &mut JointState::new(), &input);
-        let told = bit < sound.source.bits() / 2;
-        assert_eq!(found.flags, reference.flags.with(Flags::TABLE_DOUBT, told), "{bit}");
+        let reported = bit < sound.source.bits() / 2;
+        assert_eq!(found.flags, reference.flags.with(Flags::TABLE_DOUBT, reported), "{bit}");
         assert!(!unlike(&found, &reference) && found.quality == reference.quality, "{bit}");
         // A slow group finds the others.
         store.check_images(&images, 1);
@@ -556,24 +556,24 @@ fn images_replaced_under_the_store_are_told_and_not_used() {
     assert!(store.first == before && store.second == before);
 }
 
-/// The word by which a store knows an image is hit itself: told, mended like a page, and no word is made anew from what
-/// differs.
+/// The word by which a store knows an image is hit itself: reported, mended like a page, and no word is made anew from
+/// what differs.
 #[test]
 fn the_seal_of_an_image_is_mended_like_a_page() {
     let mut hit = IMAGE.clone();
     *hit.last_mut().unwrap() ^= 8;
     let (mut store, mut state) = (active(20.0), JointState::new());
-    let mut told = |images: &Images<'_>| {
+    let mut reported = |images: &Images<'_>| {
         let found = joint().tick(images, &mut store, &mut state, &Motion::new(1).next());
         found.flags.contains(Flags::OTHER_IMAGES)
     };
-    assert!(told(&Images::new(&hit, &IMAGE)) && told(&Images::new(&IMAGE, &hit)));
+    assert!(reported(&Images::new(&hit, &IMAGE)) && reported(&Images::new(&IMAGE, &hit)));
     let pages = Table::check(&IMAGE).unwrap().page_count();
     assert!(mend_page(&mut hit, &IMAGE, pages) && hit == *IMAGE);
     let mut bad = IMAGE.clone();
     bad[40] ^= 1;
     assert!(!mend_page(&mut hit, &bad, pages) && !mend_page(&mut hit, &IMAGE, pages + 1));
-    assert!(!told(&Images::new(&hit, &TWIN)));
+    assert!(!reported(&Images::new(&hit, &TWIN)));
 }
 
 #[test]
@@ -630,7 +630,7 @@ fn targets_are_met_as_by_the_table_in_place() {
             adjustment: Adjustment::default(),
         };
         let found = joint().tick(&images, &mut store, &mut state, &input);
-        // The generator goes where it is told; a while after a reversal the correction has caught up.
+        // The generator goes where it is commanded; a while after a reversal the correction has caught up.
         generator = found.command;
         if i > 200 && i % 4000 > 200 {
             let mut play = *state.play();
@@ -691,9 +691,9 @@ fn an_empty_store_is_all_zeros() {
         store.flip(bit, &mut std::string::String::new());
     }
     // Every bit was zero, so every one is set now.
-    let told = std::format!("{store:?}");
-    let numbers: Vec<&str> = told.split(|c: char| !c.is_ascii_alphanumeric() && c != '-').collect();
-    assert!(!numbers.iter().any(|number| number.parse() == Ok(0u32)), "a zero in {told:.400}");
+    let reported = std::format!("{store:?}");
+    let numbers: Vec<&str> = reported.split(|c: char| !c.is_ascii_alphanumeric() && c != '-').collect();
+    assert!(!numbers.iter().any(|number| number.parse() == Ok(0u32)), "a zero in {reported:.400}");
     let whole = Store::new();
     assert!(whole.source[0].is_whole() && whole.source[1].is_whole() && whole.damaged.pages() == [0; 2]);
 }
@@ -751,7 +751,7 @@ fn an_activation_in_steps_leaves_the_table_in_use_until_the_new_one_has_passed()
     assert!(store.is_like(&at_once));
 }
 
-/// What is refused is refused in every later step too, and the store is as it was.
+/// A refusal holds in every later step too, and the store is as it was.
 #[test]
 fn an_activation_that_fails_has_not_touched_the_store() {
     let other = fixture::image(false);

@@ -1,4 +1,4 @@
-//! What a table can give at most, and what the iterations of its inverse leave; how they converge is told in
+//! Largest values of a table, and the remaining error of its inverse's iterations; their convergence is described in
 //! [`model`](super::model).
 
 use crate::num::larger;
@@ -15,7 +15,7 @@ pub const MAX_INVERSE_ERROR_RAD: f32 = 1.0e-6;
 /// Targets this close to the output leave the generator where it is: the rounding of forward and inverse, counts.
 pub(crate) const HOLD_COUNTS: i32 = 8;
 
-/// What a table can give at most, from its coefficients.
+/// Largest values of a table, from its coefficients.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bounds {
     /// Largest |e|, rad.
@@ -28,12 +28,12 @@ pub struct Bounds {
     pub curve_slope: f32,
     /// Largest ripple, in cells of the ripple's axis: how far off a first guess of the inverse can be.
     pub ripple_cells: f32,
-    /// What the integers of a step round of A, B, C and the ripple, rad: the place in a cell and the weights have 15
+    /// Rounding error of a step in A, B, C and the ripple, rad: the place in a cell and the weights have 15
     /// bits.
     pub rounding_rad: f32,
 }
 
-/// What the iterations of the inverse leave.
+/// Remaining error of the inverse's iterations.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct InverseBound {
     pub iterations: u8,

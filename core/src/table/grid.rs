@@ -198,7 +198,7 @@ pub fn jump_intervals(len: usize, node: impl Fn(usize) -> f32) -> u64 {
     (0..intervals).fold(0, |jumps, i| jumps | (jump_at(i, len, &node) as u64).checked_shl(i as u32).unwrap_or(0))
 }
 
-/// Whether the interval above node `i` of so many is one of them.
+/// Whether the interval above node `i` of this number of nodes is one of them.
 pub(crate) fn jump_at(i: usize, len: usize, node: impl Fn(usize) -> f32) -> bool {
     let width = |i: usize| node(i.saturating_add(1)) - node(i);
     let intervals = len.saturating_sub(1).min(MAX_CLAMPED_NODES);
@@ -302,7 +302,9 @@ mod tests {
             let coarse = cell.weights_q15();
             prop_assert_eq!(coarse.iter().sum::<i32>(), 32_768);
             for (coarse, fine) in coarse.into_iter().zip(cell.weights()) {
-                prop_assert!(coarse >= 0 && (coarse as f32 - fine * 32_768.0).abs() <= 3.0, "{} {}", coarse, fine * 32_768.0);
+                prop_assert!(
+                    coarse >= 0 && (coarse as f32 - fine * 32_768.0).abs() <= 3.0, "{} {}", coarse, fine * 32_768.0,
+                );
             }
             prop_assert!(cell.weights().iter().all(|&w| (0.0..=0.75).contains(&w)), "{:?}", cell);
             prop_assert!((cell.weights().iter().sum::<f32>() - 1.0).abs() < 3e-7);

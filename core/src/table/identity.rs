@@ -1,6 +1,6 @@
 //! Whether an image is the one of its id: BLAKE3 of its body, in steps of one block.
 //!
-//! Checksums tell damage from chance; the id also tells an image that was changed and sealed again. BLAKE3 as its
+//! Checksums detect accidental damage; the id also detects an image that was changed and sealed again. BLAKE3 as its
 //! specification has it, without key, for at most [`MOST_CHUNKS`] chunks of 1024 bytes: what is finished is kept as a
 //! stack of roots of whole trees, one for each bit of their number.
 
@@ -26,7 +26,7 @@ const START: [u32; 8] =
 /// Where the words of a block go from round to round.
 const ORDER: [usize; 16] = [2, 6, 3, 10, 7, 0, 4, 13, 1, 11, 12, 5, 9, 14, 15, 8];
 
-/// What a step has found.
+/// Result of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Identity {
     /// There is more to take in.
@@ -226,7 +226,7 @@ mod tests {
         (0..5000).map(|_| check.step(image)).find(|found| *found != Identity::Hashing).unwrap()
     }
 
-    /// An image whose body says it is so many words long.
+    /// An image whose body states this length in words.
     fn sized(words: u32) -> Vec<u8> {
         let mut image: Vec<u8> = (0..4 * words + 100).map(|i| (i.wrapping_mul(i) / 7) as u8).collect();
         image[196..200].copy_from_slice(&words.to_le_bytes());

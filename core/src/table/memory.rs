@@ -2,7 +2,7 @@
 
 use super::bounds::MAX_INVERSE_ITERATIONS;
 
-/// What two copies of a table disagreed in while they were read.
+/// Words in which two copies of a table disagreed while they were read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Doubt(pub u32);
 
@@ -17,7 +17,7 @@ impl Doubt {
 /// The words of a table, in one copy or in two that are compared as they are read.
 pub(crate) trait Memory {
     /// Where things are.
-    fn plan(&self) -> &Plan;
+    fn plan(&self) -> &PointPlan;
 
     /// `N` words from word `at`. What two copies disagree in is added to `doubt`.
     fn words<const N: usize>(&self, at: usize, doubt: &mut Doubt) -> [u32; N];
@@ -33,7 +33,7 @@ pub(crate) const CELL: i32 = 1 << 24;
 
 /// Where the ripple and the curves of a table are, and what else a step needs of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Plan {
+pub(crate) struct PointPlan {
     pub ripple_nodes: u32,
     pub ripple_unit: u32,
     /// A sum of ripple units and weights, in 2⁻¹⁴, times this is 2⁻²⁴ cells of the ripple at the output, times 2³²;
@@ -52,7 +52,7 @@ pub(crate) struct Plan {
     pub play_ripple: i32,
 }
 
-impl Plan {
+impl PointPlan {
     /// Iterations of an inverse; whatever the memory that holds the table says, no more than the most allowed.
     #[inline(always)]
     pub const fn iterations(&self) -> u32 {
@@ -87,7 +87,7 @@ impl Plan {
 }
 
 #[cfg(test)]
-crate::upset::upsets!(Plan {
+crate::upset::upsets!(PointPlan {
     ripple_nodes,
     ripple_unit,
     ripple_cells,
@@ -105,13 +105,15 @@ mod tests {
 
     #[test]
     fn a_plan_is_simple_with_a_ripple_one_iteration_and_no_curve() {
-        let simple = Plan { iterations: 1, ripple_nodes: 8, ..Plan::default() };
+        let simple = PointPlan { iterations: 1, ripple_nodes: 8, ..PointPlan::default() };
         assert!(simple.is_simple());
         for curve in 0..3 {
             let mut plan = simple;
             plan.curves[curve] = 4 << 16;
             assert!(plan.has_curves() && !plan.is_simple());
         }
-        assert!(!Plan { iterations: 2, ..simple }.is_simple() && !Plan { ripple_nodes: 0, ..simple }.is_simple());
+        assert!(
+            !PointPlan { iterations: 2, ..simple }.is_simple() && !PointPlan { ripple_nodes: 0, ..simple }.is_simple()
+        );
     }
 }

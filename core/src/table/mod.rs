@@ -43,9 +43,9 @@ pub use image::{
     TableData, WriteError, image_bytes, write_image,
 };
 pub(crate) use image::{ImageCheck, MAX_AXIS_VALUE, NODE_WORDS, counted, page_intact, ripple_row, word};
-pub(crate) use memory::{Doubt, Memory, Plan};
+pub(crate) use memory::{Doubt, Memory, PointPlan};
 pub use model::{Approach, Command, Prediction};
-pub(crate) use model::{Estimate, Model, departure};
+pub(crate) use model::{Estimate, TableModel, departure};
 pub(crate) use point::TorquePlace;
 pub use point::{OperatingPoint, Quality};
 pub(crate) use words::{Words, blend_halves, blend_number, f32_at, halves, word_at, words_from};
@@ -120,7 +120,7 @@ pub struct Table<'a> {
     pub(crate) torque_nodes: usize,
     pub(crate) temperature_nodes: usize,
     pub(crate) ripple: PeriodicAxis,
-    pub(crate) plan: Plan,
+    pub(crate) plan: PointPlan,
     pub(crate) bounds: Bounds,
     pub(crate) inverse: InverseBound,
     /// How far the ripple takes the half-width of the play below H at most, counts, rounded up.
@@ -129,7 +129,7 @@ pub struct Table<'a> {
 
 impl Memory for Table<'_> {
     #[inline(always)]
-    fn plan(&self) -> &Plan {
+    fn plan(&self) -> &PointPlan {
         &self.plan
     }
 
@@ -177,11 +177,11 @@ impl<'a> Table<'a> {
     }
 
     /// From the words of an image.
-    pub(crate) fn plan_in(words: Words<'a>) -> Plan {
+    pub(crate) fn plan_in(words: Words<'a>) -> PointPlan {
         let at = |place: usize| word_at(words, place);
         let first = word::CELL_WIDTH;
         let (unit, width) = (at(word::RIPPLE_UNIT), f32_at(words, first));
-        Plan {
+        PointPlan {
             ripple_nodes: at(first.wrapping_add(4)) >> 16,
             ripple_unit: unit,
             ripple_cells: (unit as f32 * (8_388_608.0 / width)) as i32,

@@ -11,22 +11,22 @@
 //! On a known side of the play it solves `x + e(x) = target` for the nominal output `x`. At `xₖ = target − eₖ`, from
 //! `e₀ = D ∓ H`, it takes A, B, C as they are there and the ripple as what it is: a parabola in each of three cells,
 //! that of the node next to `xₖ` and its two neighbours. `x + ripple` grows steadily (its slope bound `L` is below 1),
-//! so the signs at the boundaries tell in which cell the solution lies, and the root of its parabola is the solution,
+//! so the signs at the boundaries show in which cell the solution lies, and the root of its parabola is the solution,
 //! exactly.
 //!
-//! What is left comes from A, B, C, with the slope bound `Lc`: `|eₖ₊₁ − e| ≤ Lc/(1 − L)·|eₖ − e|`. A ripple so large
-//! that the solution can lie beyond the three cells takes further iterations; each brings it a cell nearer at least.
-//! How many are needed is found from the coefficients, stands in the image and is found again when the table is
+//! The remaining error comes from A, B, C, with the slope bound `Lc`: `|eₖ₊₁ − e| ≤ Lc/(1 − L)·|eₖ − e|`. A ripple so
+//! large that the solution can lie beyond the three cells takes further iterations; each brings it a cell nearer at
+//! least. How many are needed is found from the coefficients, stands in the image and is found again when the table is
 //! accepted: one, without A, B, C and with a ripple below a cell.
 
-use super::memory::{Doubt, Memory, Plan};
+use super::memory::{Doubt, Memory, PointPlan};
 use super::point::{OperatingPoint, Quality};
 use super::{Table, read};
 use crate::angle::{GeneratorAngle, OutputAngle, RAD_PER_COUNT};
 use crate::drive::Drive;
 use crate::play::{Direction, PlayState};
 
-/// What the output is expected to do.
+/// Expected motion of the output.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prediction {
     /// Actual output angle: nominal plus transmission error.
@@ -42,7 +42,7 @@ pub struct Prediction {
     pub quality: Quality,
 }
 
-/// What to command for a wanted output angle.
+/// Command for a wanted output angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Command {
     /// Generator angle to go to.
@@ -70,12 +70,12 @@ pub enum Approach<'s> {
     From(&'s PlayState),
 }
 
-/// What a motion ends in: which side of the play, what is not known of it, and how far the target is.
+/// End state of a motion: side of the play, its uncertainty, and the distance to the target.
 #[derive(Clone, Copy)]
 pub(crate) struct Departure {
     /// Backward motion.
     pub backward: bool,
-    /// What is not known of where the output is, and of the side of the play on which the target will be reached,
+    /// Uncertainty of the output, and of the side of the play on which the target will be reached,
     /// counts.
     pub unknown: i32,
     pub guess: i32,
@@ -86,12 +86,12 @@ pub(crate) struct Departure {
 }
 
 /// Reads a table for a drive: one copy, or two that are compared.
-pub(crate) struct Model<'m, M> {
+pub(crate) struct TableModel<'m, M> {
     pub memory: &'m M,
     pub drive: &'m Drive,
 }
 
-/// What the output does now, counts.
+/// Present position of the output, counts.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Estimate {
     pub nominal: OutputAngle,
@@ -102,7 +102,7 @@ pub(crate) struct Estimate {
     pub doubt: Doubt,
 }
 
-impl<M: Memory> Model<'_, M> {
+impl<M: Memory> TableModel<'_, M> {
     /// Follows the generator; what is not sane leaves the correction out.
     #[inline(always)]
     pub fn follow(&self, point: &OperatingPoint, state: &mut PlayState, generator: GeneratorAngle) -> Prediction {
@@ -134,7 +134,7 @@ impl<M: Memory> Model<'_, M> {
         Estimate { nominal, output: nominal.offset_counts(error as i64), error, uncertainty, sane, doubt }
     }
 
-    /// What brings the output to `target`.
+    /// Command that brings the output to `target`.
     #[inline(always)]
     pub fn aim(&self, point: &OperatingPoint, target: OutputAngle, approach: Approach<'_>) -> Command {
         let mut doubt = point.doubt;
@@ -250,7 +250,7 @@ const fn minus(angle: OutputAngle, counts: i32) -> OutputAngle {
 /// Whether and to which side the play must be taken up on the way from where the output is to `target`.
 #[inline(always)]
 pub(crate) fn departure(
-    plan: &Plan,
+    plan: &PointPlan,
     point: &OperatingPoint,
     target: OutputAngle,
     state: &PlayState,
@@ -266,8 +266,8 @@ pub(crate) fn departure(
 }
 
 impl<'a> Table<'a> {
-    fn model(&self) -> Model<'_, Self> {
-        Model { memory: self, drive: &self.drive }
+    fn model(&self) -> TableModel<'_, Self> {
+        TableModel { memory: self, drive: &self.drive }
     }
 
     /// Output angle for a generator angle, with the play followed in `state`.
@@ -288,7 +288,7 @@ impl<'a> Table<'a> {
 
     /// Generator angle that brings the output to `target`.
     ///
-    /// How it is solved is told at the top of this module. If an input is not finite the ideal command is given and
+    /// The top of this module describes the method. If an input is not finite the ideal command is given and
     /// marked `Disabled`.
     #[must_use]
     pub fn inverse(&self, target: OutputAngle, torque_n_m: f32, temperature_c: f32, approach: Approach<'_>) -> Command {

@@ -1,7 +1,7 @@
 //! A torque and temperature, located in the table, and how far an answer there can be trusted.
 
 use super::image::NODE_WORDS;
-use super::memory::{Doubt, Plan};
+use super::memory::{Doubt, PointPlan};
 use super::windup;
 #[cfg(test)]
 use crate::angle::RAD_PER_COUNT;
@@ -33,14 +33,14 @@ pub struct OperatingPoint {
     /// D and H there, counts.
     pub(crate) mean: i32,
     pub(crate) half_width: i32,
-    /// What of them was added to the table's.
+    /// The part of them that was added to the table's.
     added: [i32; 2],
     /// Height of the jump the torque lies in, else 0, counts.
     pub(crate) jump: i32,
     /// All inputs are finite.
     pub(crate) finite: bool,
     in_range: bool,
-    /// What two copies of the table disagreed in while it was read.
+    /// Words in which two copies of the table disagreed while it was read.
     pub(crate) doubt: Doubt,
 }
 
@@ -56,7 +56,7 @@ impl OperatingPoint {
     /// The point with this added to D and H, each within ±2²⁵ counts. H stays where the ripple can take no play below
     /// zero, or where it is.
     #[inline(always)]
-    pub(crate) fn adjusted(mut self, plan: &Plan, mean: i32, half_width: i32) -> Self {
+    pub(crate) fn adjusted(mut self, plan: &PointPlan, mean: i32, half_width: i32) -> Self {
         let before = self.half_width;
         let least = if before < plan.play_ripple { before } else { plan.play_ripple };
         let half = before.wrapping_add(half_width);
@@ -69,7 +69,7 @@ impl OperatingPoint {
 
     /// Whether |centre| + |half| is within what an accepted table can give, and what was added to it.
     #[inline(always)]
-    pub(crate) const fn allows(&self, plan: &Plan, centre: i32, half: i32) -> bool {
+    pub(crate) const fn allows(&self, plan: &PointPlan, centre: i32, half: i32) -> bool {
         let [mean, half_width] = self.added;
         let (centre, half) = (centre.wrapping_sub(mean), half.wrapping_sub(half_width));
         // Negative numbers have room for every magnitude.
@@ -80,7 +80,7 @@ impl OperatingPoint {
 
     /// Whether an error on this side is.
     #[inline(always)]
-    pub(crate) const fn allows_error(&self, plan: &Plan, error: i32, backward: bool) -> bool {
+    pub(crate) const fn allows_error(&self, plan: &PointPlan, error: i32, backward: bool) -> bool {
         let [mean, half_width] = self.added;
         let mask = (backward as i32).wrapping_neg();
         let added = (half_width ^ !mask).wrapping_sub(!mask).wrapping_add(mean);
@@ -89,7 +89,7 @@ impl OperatingPoint {
 
     /// The largest error that the table may give with what was added to it, counts.
     #[inline(always)]
-    pub(crate) const fn most(&self, plan: &Plan) -> i32 {
+    pub(crate) const fn most(&self, plan: &PointPlan) -> i32 {
         let [mean, half_width] = self.added;
         plan.limit.wrapping_add(mean.saturating_abs()).wrapping_add(half_width.saturating_abs())
     }
@@ -163,17 +163,17 @@ mod tests {
     /// H is taken down to what the ripple needs, or not at all where it is there already; up by all of it.
     #[test]
     fn an_adjustment_takes_the_play_no_further_down_than_the_ripple_needs() {
-        let plan = Plan { play_ripple: 30, ..Plan::default() };
+        let plan = PointPlan { play_ripple: 30, ..PointPlan::default() };
         for (before, change, after) in [(100, -60, 40), (100, -90, 30), (20, -15, 20), (20, 5, 25), (100, 7, 107)] {
             let adjusted = point(50.0, before as f32).adjusted(&plan, -8, change);
             assert_eq!((adjusted.mean, adjusted.half_width), (42, after), "{before} {change}");
         }
     }
 
-    /// What was added is allowed on top of the table's limit: to the centre, and to the flank that is asked for.
+    /// An adjusted point allows the added amount on top of the table's limit: for the centre, and for the wanted flank.
     #[test]
     fn an_adjusted_point_allows_what_was_added_and_no_more() {
-        let plan = Plan { limit: 1000, ..Plan::default() };
+        let plan = PointPlan { limit: 1000, ..PointPlan::default() };
         let adjusted = point(0.0, 100.0).adjusted(&plan, 5, 7);
         for (backward, least, most) in [(false, -1002, 998), (true, -988, 1012)] {
             for (error, allowed) in [(least - 1, false), (least, true), (most, true), (most + 1, false)] {

@@ -1,4 +1,5 @@
-//! What a table says at a located point: its curves, its ripple, the play they make, and where an output is met.
+//! A table at a located point: its curves, its ripple, the play they make, and the generator angle that meets an
+//! output.
 
 use super::Table;
 use super::grid::{self, Cell};
@@ -59,7 +60,7 @@ pub(crate) fn locate(table: &Table<'_>, torque_n_m: f32, temperature_c: f32) -> 
     let [h0, h1, h2, h3, h4, h5] = there;
     let around = [[blend(c0, h0), blend(c1, h1), blend(c2, h2)], [blend(c3, h3), blend(c4, h4), blend(c5, h5)]];
     let width = high - low;
-    // 0 in the endless width that an axis of one node has. The last bit of H tells whether the interval above is a
+    // 0 in the endless width that an axis of one node has. The last bit of H shows whether the interval above is a
     // jump.
     let place = TorquePlace { weight: (torque - low) / width, width, jump: flagged & 1 != 0 };
     let first_record =
@@ -199,18 +200,18 @@ pub(crate) fn to_solution<M: Memory>(
 mod tests {
     use super::*;
     use crate::drive::{Drive, FixedMember};
-    use crate::table::{Plan, ripple_row};
+    use crate::table::{PointPlan, ripple_row};
     use proptest::prelude::*;
     use std::vec::Vec;
 
     /// A record of one ripple for both torques.
     struct Record {
         halves: Vec<i16>,
-        plan: Plan,
+        plan: PointPlan,
     }
 
     impl Memory for Record {
-        fn plan(&self) -> &Plan {
+        fn plan(&self) -> &PointPlan {
             &self.plan
         }
 
@@ -262,11 +263,11 @@ mod tests {
             };
             let mut halves = std::vec![0x7abc; row];
             halves.extend((0..row).map(half));
-            let plan = Plan {
+            let plan = PointPlan {
                 ripple_nodes: n as u32,
                 ripple_cells: (unit as f64 * 8_388_608.0 / width as f64) as i32,
                 cell_width: width,
-                ..Plan::default()
+                ..PointPlan::default()
             };
             let record = Record { halves, plan };
             let place_of = TorquePlace { weight, width: 1.0, jump: false };
@@ -290,7 +291,9 @@ mod tests {
                 let allowed = (largest / 16_000.0 + 2e-6) / slope + 1e-6;
                 prop_assert!((found - low).abs() < allowed, "{} {} of {}, {}", found, low, place, allowed);
             } else {
-                prop_assert!((found - low).abs() < off.abs() - 0.95 && (found - low) * off >= -1e-2, "{} {}", found - low, off);
+                prop_assert!(
+                    (found - low).abs() < off.abs() - 0.95 && (found - low) * off >= -1e-2, "{} {}", found - low, off,
+                );
             }
         }
     }

@@ -16,8 +16,8 @@ const ROOT_NODES: usize = STENCIL;
 /// Where the root is zero: this part of the first interval short of the piece.
 const ROOT_ORIGIN: f64 = 0.25;
 
-/// What a cubic adds to the straight line at `weight` of an interval of `width`, from its rise over the interval, its
-/// slope below and its slope above.
+/// Difference of a cubic from the straight line at `weight` of an interval of `width`, from its rise over the interval,
+/// its slope below and its slope above.
 #[inline(always)]
 pub(crate) fn bend(weight: f32, width: f32, [rise, below, above]: [f32; 3]) -> f32 {
     let rest = 1.0 - weight;
@@ -26,14 +26,14 @@ pub(crate) fn bend(weight: f32, width: f32, [rise, below, above]: [f32; 3]) -> f
 
 /// The slope at a node as a sum over neighbouring nodes.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Slope {
+pub(crate) struct NodeSlope {
     /// The first of the nodes.
     pub first: usize,
     /// Their weights, per N·m; 0 for those not needed.
     pub weights: [f64; STENCIL],
 }
 
-impl Slope {
+impl NodeSlope {
     /// The slope of `values`, one for each node of the axis.
     pub fn of(&self, values: &[f32]) -> f64 {
         self.weights.iter().zip(values.get(self.first..).unwrap_or_default()).map(|(w, value)| w * *value as f64).sum()
@@ -42,7 +42,7 @@ impl Slope {
 
 /// The slopes at all nodes of a torque axis.
 pub(crate) struct Slopes {
-    nodes: [Slope; MAX_CLAMPED_NODES],
+    nodes: [NodeSlope; MAX_CLAMPED_NODES],
 }
 
 impl Slopes {
@@ -50,7 +50,7 @@ impl Slopes {
     pub fn new(torque_nodes: &[f32]) -> Self {
         let axis = torque_nodes.get(..MAX_CLAMPED_NODES).unwrap_or(torque_nodes);
         let jumps = grid::jump_intervals(axis.len(), |i| axis.get(i).copied().unwrap_or(0.0));
-        let mut nodes = [Slope::default(); MAX_CLAMPED_NODES];
+        let mut nodes = [NodeSlope::default(); MAX_CLAMPED_NODES];
         let mut first = 0usize;
         let (mut left, mut out) = (axis, &mut nodes[..]);
         let mut after_jump = false;
@@ -68,17 +68,17 @@ impl Slopes {
     }
 
     /// The slope at a node.
-    pub fn at(&self, node: usize) -> Slope {
+    pub fn at(&self, node: usize) -> NodeSlope {
         self.nodes.get(node).copied().unwrap_or_default()
     }
 }
 
-/// Slopes at the nodes of one piece; `jumps` tells whether it ends at a jump below and above.
+/// Slopes at the nodes of one piece; `jumps` states whether it ends at a jump below and above.
 ///
 /// Of a polynomial through the nearest nodes. Wind-up starts steeply at a jump and flattens, with nodes closer together
 /// there; so in a piece of five nodes or more that has a jump at one end, it is a quartic in the root u of the distance
 /// from that end (plus a quarter of the first interval), which contains τ = u² and τ² = u⁴. Elsewhere a parabola in τ.
-fn slopes_of_piece(piece: &[f32], jumps: [bool; 2], out: &mut [Slope]) {
+fn slopes_of_piece(piece: &[f32], jumps: [bool; 2], out: &mut [NodeSlope]) {
     let torque = |node: usize| piece.get(node).copied().unwrap_or(0.0) as f64;
     let last = piece.len().saturating_sub(1);
     let near_end = match jumps {
@@ -104,7 +104,7 @@ fn slopes_of_piece(piece: &[f32], jumps: [bool; 2], out: &mut [Slope]) {
         places.iter_mut().take(count).zip(first..).for_each(|(place, node)| *place = variable(node).0 - here);
         let places = places.get(..count).unwrap_or_default();
         *slope =
-            Slope { first, weights: differentiate(places, node.saturating_sub(first)).map(|weight| weight * rate) };
+            NodeSlope { first, weights: differentiate(places, node.saturating_sub(first)).map(|weight| weight * rate) };
     }
 }
 
@@ -323,7 +323,7 @@ mod tests {
         let last = nodes.len() - 1;
         for node in 0..nodes.len() {
             let (here, there) = (slopes.at(node), slopes.at(last - node));
-            let along = |slope: Slope, other: usize| {
+            let along = |slope: NodeSlope, other: usize| {
                 other.checked_sub(slope.first).and_then(|i| slope.weights.get(i)).copied().unwrap_or(0.0)
             };
             for other in 0..nodes.len() {

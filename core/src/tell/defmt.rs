@@ -27,10 +27,17 @@ by_name! {
     Health { Sound "sound", OneImage "one image", Lost "lost", Empty "empty", Torn "torn" }
     Direction { Forward "forward", Backward "backward" }
     FixedMember { Flexspline "flexspline", CircularSpline "circular spline" }
-    GeneratorKind { Other "other", TwoRoller "two roller", FourRoller "four roller", DoubleDisc "double disc", Cam "cam" }
+    GeneratorKind {
+        Other "other", TwoRoller "two roller", FourRoller "four roller", DoubleDisc "double disc", Cam "cam",
+    }
     Field {
-        ToolVersion "tool version", MeshLevel "mesh level", TorqueNodes "torque nodes", TemperatureNodes "temperature nodes", RippleNodes "ripple nodes", GeneratorCurve "generator curve", MaterialCurve "material curve", OutputCurve "output curve", Mean "mean",
-        HalfWidth "half width", MeanSlope "mean slope", MeanRipple "mean ripple", HalfWidthRipple "half width ripple", SolverResidual "solver residual", ProjectionWorst "projection worst", ProjectionRms "projection rms", TorqueRange "torque range",
+        ToolVersion "tool version", MeshLevel "mesh level",
+        TorqueNodes "torque nodes", TemperatureNodes "temperature nodes",
+        RippleNodes "ripple nodes", GeneratorCurve "generator curve",
+        MaterialCurve "material curve", OutputCurve "output curve", Mean "mean",
+        HalfWidth "half width", MeanSlope "mean slope", MeanRipple "mean ripple", HalfWidthRipple "half width ripple",
+        SolverResidual "solver residual", ProjectionWorst "projection worst", ProjectionRms "projection rms",
+        TorqueRange "torque range",
         TemperatureRange "temperature range", ErrorLimit "error limit",
     }
 }

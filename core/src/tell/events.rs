@@ -1,4 +1,4 @@
-//! What changed from tick to tick and is worth a line in a log: modes, doubts about the table, pages, corrections that
+//! Changes from tick to tick that are worth a line in a log: modes, doubts about the table, pages, corrections that
 //! could not be made.
 //!
 //! [`Watch::see`] compares a tick with the one before; what it returns can be sent, counted, or, with the feature

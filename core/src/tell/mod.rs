@@ -1,4 +1,4 @@
-//! What a joint tells of itself: records for the ground, events for a log.
+//! Reports of a joint: records for the ground, events for a log.
 
 #[cfg(feature = "defmt")]
 mod defmt;

@@ -1,4 +1,4 @@
-//! What a joint did, as records of fixed size: into a bounded queue in the tick, out of it and to the ground when there
+//! Ticks of a joint, as records of fixed size: into a bounded queue in the tick, out of it and to the ground when there
 //! is time.
 //!
 //! [`Recorder::record`] is called each tick and keeps every n-th ([`RateGroup`]). It never waits. Where a record goes,
@@ -8,9 +8,9 @@
 //! |---|---|---|
 //! | [`Ring`] | together, or behind a lock of the caller's | the oldest record is lost: the end of a story is kept |
 //! | [`Queue`] | the same | the new record is lost: its beginning is kept |
-//! | [`Writer`], of [`Queue::split`] | apart: one in an interrupt, one in the background, without a lock | the new record is lost |
+//! | [`Writer`], of [`Queue::split`] | apart, without a lock: interrupt and background | the new record is lost |
 //!
-//! Each record tells how many were lost before it and has a number of its own, so a gap is seen at the other end.
+//! Each record states how many were lost before it and has a number of its own, so a gap is seen at the other end.
 //!
 //! # A record as bytes
 //! [`Record::encode`] and [`Record::decode`]; [`RECORD_BYTES`] bytes, little endian, CRC-32 (ISO-HDLC) at the end:
@@ -19,7 +19,8 @@
 //! |---|---|---|
 //! | 0 | 2 bytes | `FX` |
 //! | 2 | `u8` | version: 2 |
-//! | 3 | `u8` | bits 0–1 quality (in range, uncertain, extrapolated, disabled), 2–3 mode (off, tracking, hold, safe), 4–6 health of the table (sound, one image, lost, empty, torn), 7 zero |
+//! | 3 | `u8` | bits 0–1 quality (in range, uncertain, extrapolated, disabled), 2–3 mode (off, tracking, hold, safe), |
+//! | | | bits 4–6 health of the table (sound, one image, lost, empty, torn), 7 zero |
 //! | 4 | `u16` | number of the record; wraps |
 //! | 6 | `u16` | records lost since the start; wraps |
 //! | 8 | `u32` | number of the tick |
@@ -60,7 +61,7 @@ pub struct Record {
     pub tick: u32,
     /// How far estimate and correction can be trusted.
     pub quality: Quality,
-    /// What the joint does with its correction.
+    /// The joint's use of its correction.
     pub mode: Mode,
     /// How the table is.
     pub health: Health,
@@ -76,7 +77,7 @@ pub struct Record {
     pub uncertainty_rad: f32,
     /// Correction, rad at the output.
     pub correction_rad: f32,
-    /// What the limiter held back of it, rad.
+    /// Part of it that the limiter held back, rad.
     pub held_back_rad: f32,
     /// [`Counters::doubtful_ticks`].
     pub doubtful_ticks: u16,
@@ -124,7 +125,7 @@ impl fmt::Display for RecordError {
 impl core::error::Error for RecordError {}
 
 impl Record {
-    /// What a tick gave; number and losses are those of a [`Recorder`].
+    /// Record of a tick; number and losses are set by a [`Recorder`].
     #[must_use]
     pub fn of(tick: u32, state: &JointState, store: &Store, output: &Output) -> Self {
         let Counters { doubtful_ticks, words_mended, words_skipped, pages_damaged, .. } = store.counters();
@@ -453,7 +454,7 @@ mod tests {
         let kept: Vec<Record> = core::iter::from_fn(|| queue.sink().take()).collect();
         assert_eq!(kept.iter().map(|r| r.tick).collect::<Vec<_>>(), [0, 10, 20, 30, 40, 50, 60]);
         assert_eq!(queue.lost(), 13);
-        // What comes after the gap tells of it.
+        // The first record after the gap reports it.
         assert!(!queue.record_now(201, &JointState::new(), &Store::new(), &output(0.0)));
         let next = queue.sink().take().unwrap();
         assert_eq!((next.number, next.lost, next.tick), (20, 13, 201));
@@ -543,13 +544,16 @@ mod tests {
                 flags: numbers[2], missed_ticks: numbers[3], output_counts,
                 transmission_error_rad: values[0], uncertainty_rad: values[1], correction_rad: values[2],
                 held_back_rad: values[3],
-                doubtful_ticks: numbers[4], words_mended: numbers[5], words_skipped: numbers[6], pages_damaged: numbers[7],
+                doubtful_ticks: numbers[4], words_mended: numbers[5], words_skipped: numbers[6],
+                pages_damaged: numbers[7],
             };
             prop_assert_eq!(Record::decode(&record.encode()), Ok(record));
         }
 
         #[test]
-        fn any_bytes_are_a_record_or_an_error(half in prop::array::uniform32(any::<u8>()), other in prop::array::uniform20(any::<u8>())) {
+        fn any_bytes_are_a_record_or_an_error(
+            half in prop::array::uniform32(any::<u8>()), other in prop::array::uniform20(any::<u8>()),
+        ) {
             let mut bytes = [0; RECORD_BYTES];
             bytes[..32].copy_from_slice(&half);
             bytes[32..].copy_from_slice(&other);

@@ -76,23 +76,23 @@ fn events_and_records_are_those_of_rust() {
     assert_eq!(flexspline_watch_init(&mut watch), FlexsplineStatus::Ok);
     assert_eq!(flexspline_store_activate(&mut *o.store, &o.joint, &table, 20.0), FlexsplineStatus::Ok);
     assert_eq!(flexspline_state_request(&mut o.state, 1), FlexsplineStatus::Ok);
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     for (missed_ticks, torque_n_m) in [(0, 5.0), (0, f32::NAN), (2, 5.0), (0, 5.0)] {
         let input = FlexsplineInput { missed_ticks, torque_n_m, ..INPUT };
         let found = flexspline_tick(&o.joint, &table, &mut *o.store, &mut o.state, &input, &mut out);
         assert_eq!((found, see(&mut watch, &o, &out, &mut events)), (FlexsplineStatus::Ok, FlexsplineStatus::Ok));
-        told.push(events.events);
+        reported.push(events.events);
         if missed_ticks > 0 {
             assert_eq!(events.missed_ticks, 2);
         }
-        if told.len() == 1 {
+        if reported.len() == 1 {
             let changed = (events.mode_before, events.mode, events.health_before, events.health);
             assert_eq!(changed, (0, 1, 3, 0));
         }
     }
     let begun = FLEXSPLINE_EVENT_MODE | FLEXSPLINE_EVENT_HEALTH;
     let back = FLEXSPLINE_EVENT_RECOVERED | FLEXSPLINE_EVENT_OVERRUN;
-    assert_eq!(told, [begun, FLEXSPLINE_EVENT_FALLBACK, back, 0]);
+    assert_eq!(reported, [begun, FLEXSPLINE_EVENT_FALLBACK, back, 0]);
 
     let mut bytes = [0; FLEXSPLINE_RECORD_BYTES];
     let found = flexspline_record(77, 5, 1, &o.state, &*o.store, &out, &mut bytes);

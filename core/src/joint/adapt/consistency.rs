@@ -55,13 +55,13 @@ const MEAN_NOISE: f32 = 0.920_5;
 /// Evidence for a start anew in each measurement of a window, on average. At least 7 is what a contradicted one has, 16
 /// is usual.
 const EVIDENCE: f32 = 8.0;
-/// The noise adapts in so many windows: slower than what was learnt is found to be wrong, or that would be taken for
-/// noise. Guess.
+/// The noise adapts over this number of windows: slower than what was learnt is found to be wrong, or that would be
+/// taken for noise. Guess.
 const NOISE_WINDOWS: f32 = 10.0;
 /// Limits of the variance of the innovations over the expected one: up to ten times the stated noise. Guesses.
 const NOISE: [f32; 2] = [0.5, 100.0];
 
-/// What windows of measurements said.
+/// Statistics of windows of measurements.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Consistency {
     /// Variance of the innovations over the expected one.
@@ -81,7 +81,7 @@ crate::upset::upsets!(Consistency { noise, anew, worse, impossible });
 /// One measurement as both hypotheses see it: squares of innovations, and their expected spreads, in units of the
 /// stated noise.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Judged {
+pub(super) struct HypothesisErrors {
     pub with: f32,
     pub without: f32,
     /// The noise, of which this is stated.
@@ -92,12 +92,12 @@ pub(super) struct Judged {
     pub prior: f32,
 }
 
-/// What follows from a measurement.
+/// Consequence of a measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Finding {
     /// The sensor is not to be believed.
     Sensor,
-    /// What was learnt is not to be believed any more.
+    /// The learnt coefficients are no longer valid.
     Anew,
     /// Coefficients fade by this factor.
     Fade(f32),
@@ -138,13 +138,13 @@ impl Consistency {
         num::larger(self.noise, 1.0)
     }
 
-    /// What the stated variance is larger by, in units of the stated noise, where the prior has this one.
+    /// Increase of the stated variance, in units of the stated noise, for this prior.
     pub(super) fn doubt(&self, prior: f32) -> f32 {
         self.noise() - 1.0 + self.anew * prior
     }
 
     /// Judges one measurement. `gate` is the square of the setting.
-    pub(super) fn judge(&mut self, seen: &Judged, gate: f32, per_window: f32) -> Finding {
+    pub(super) fn judge(&mut self, seen: &HypothesisErrors, gate: f32, per_window: f32) -> Finding {
         let impossible = seen.without > gate * (seen.stated + seen.prior);
         self.impossible += (if impossible { 1.0 } else { 0.0 } - self.impossible) * per_window;
         if impossible || self.impossible > 0.5 {

@@ -10,9 +10,9 @@ use std::collections::VecDeque;
 
 pub(super) const ARCSEC: f64 = core::f64::consts::PI / 648_000.0;
 
-/// What is wrong.
+/// Kind of fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Fault {
+enum SensorFault {
     /// The output sensor is off, rad.
     Off(f64),
     /// It slides away, rad/s.
@@ -30,19 +30,19 @@ enum Fault {
 }
 
 /// Two joints on one unit: one learns, its twin does not.
-struct Pair {
+struct LearnerAndTwin {
     learns: Loop<7>,
     twin: Loop<7>,
     past: VecDeque<f64>,
     frozen: f64,
     tick: usize,
-    /// A measurement every so many ticks.
+    /// Ticks from one measurement to the next.
     every: usize,
     /// Speed of the swing, rad/s, and its amplitude at the generator, rad.
     swing: [f64; 2],
 }
 
-impl Pair {
+impl LearnerAndTwin {
     fn new(hidden: [f64; 7], seed: u64) -> Self {
         let [learns, mut twin] = [seed; 2].map(|seed| Loop::new(&SETTINGS, hidden, seed));
         twin.state.set_learning(Learning::Off);
@@ -50,11 +50,11 @@ impl Pair {
     }
 
     /// One tick; `since` counts from the beginning of the fault.
-    fn tick(&mut self, fault: Option<(Fault, usize)>) {
+    fn tick(&mut self, fault: Option<(SensorFault, usize)>) {
         let time = self.tick as f64 * 1e-3;
         let [speed, amplitude] = self.swing;
         let (generator, torque) = (amplitude * (speed * time).sin(), mixed(time));
-        let seen = if let Some((Fault::Torque(by), _)) = fault { by * torque } else { torque };
+        let seen = if let Some((SensorFault::Torque(by), _)) = fault { by * torque } else { torque };
         let (past, frozen) = (&mut self.past, &mut self.frozen);
         let measures = self.tick.is_multiple_of(self.every);
         self.learns.tick_as(generator, [torque, seen], |truth| {
@@ -65,13 +65,13 @@ impl Pair {
                 *frozen = truth;
             }
             measures.then_some(match fault {
-                Fault::Off(off) => truth + off,
-                Fault::Slide(rate) => truth + rate * since as f64 * 1e-3,
-                Fault::Jump(by, half) => truth + if since / half % 2 == 0 { by } else { -by },
-                Fault::Frozen => *frozen,
-                Fault::Late(by) => past.get(by).copied().unwrap_or(truth),
-                Fault::OtherSign => -truth,
-                Fault::Torque(_) => truth,
+                SensorFault::Off(off) => truth + off,
+                SensorFault::Slide(rate) => truth + rate * since as f64 * 1e-3,
+                SensorFault::Jump(by, half) => truth + if since / half % 2 == 0 { by } else { -by },
+                SensorFault::Frozen => *frozen,
+                SensorFault::Late(by) => past.get(by).copied().unwrap_or(truth),
+                SensorFault::OtherSign => -truth,
+                SensorFault::Torque(_) => truth,
             })
         });
         self.twin.tick_as(generator, [torque, seen], Some);
@@ -88,9 +88,9 @@ impl Pair {
     }
 }
 
-/// What a fault did.
+/// Effects of a fault.
 #[derive(Debug, Default)]
-struct Story {
+struct FaultEffects {
     /// Largest miss while it lasted, arcsec.
     during: f64,
     /// Longest spell after it in which learning was worse than none beyond what it states, measurements.
@@ -104,12 +104,12 @@ struct Story {
 /// half of the memory.
 const T: usize = 1000;
 
-/// A fault after so many good measurements, for so many; then 20 000 good ones.
-fn story(mut pair: Pair, before: usize, fault: Fault, lasts: usize) -> Story {
+/// A fault after this number of good measurements, and its length in measurements; then 20 000 good ones.
+fn story(mut pair: LearnerAndTwin, before: usize, fault: SensorFault, lasts: usize) -> FaultEffects {
     for _ in 0..before {
         pair.tick(None);
     }
-    let mut found = Story::default();
+    let mut found = FaultEffects::default();
     for since in 0..lasts {
         pair.tick(Some((fault, since)));
         found.during = found.during.max(pair.learns.missed.abs() / ARCSEC);
@@ -129,10 +129,10 @@ fn story(mut pair: Pair, before: usize, fault: Fault, lasts: usize) -> Story {
 
 /// The fault for 20 s, from the start and after 30 s of learning, on a unit that is its table and on one that is not.
 /// `left` is what may be left on the former, arcsec.
-fn recovers(fault: Fault, left: f64) {
+fn recovers(fault: SensorFault, left: f64) {
     for (hidden, left) in [([0.0; 7], left), (HIDDEN, f64::INFINITY)] {
         for before in [0, 30_000] {
-            let found = story(Pair::new(hidden, 1), before, fault, 20_000);
+            let found = story(LearnerAndTwin::new(hidden, 1), before, fault, 20_000);
             assert!(found.astray <= T && found.later < left, "{fault:?}, {before} before, {hidden:?}: {found:?}");
         }
     }
@@ -141,63 +141,63 @@ fn recovers(fault: Fault, left: f64) {
 #[test]
 fn a_sensor_that_was_off() {
     for off in [5.0, 10.0, 20.0, 30.0, -30.0] {
-        recovers(Fault::Off(off * ARCSEC), 2.0);
+        recovers(SensorFault::Off(off * ARCSEC), 2.0);
     }
 }
 
 #[test]
 fn a_sensor_that_slid_away() {
     for rate in [0.2, 1.0, 5.0, 50.0] {
-        recovers(Fault::Slide(rate * ARCSEC), 15.0);
+        recovers(SensorFault::Slide(rate * ARCSEC), 15.0);
     }
 }
 
 #[test]
 fn a_sensor_that_jumped() {
     for (by, half) in [(5.0, 300), (20.0, 300), (20.0, 50), (20.0, 3000), (100.0, 300)] {
-        recovers(Fault::Jump(by * ARCSEC, half), 15.0);
+        recovers(SensorFault::Jump(by * ARCSEC, half), 15.0);
     }
 }
 
 #[test]
 fn a_sensor_that_was_frozen() {
-    recovers(Fault::Frozen, 15.0);
+    recovers(SensorFault::Frozen, 15.0);
 }
 
 #[test]
 fn a_sensor_that_was_late() {
     for ticks in [1, 5, 20] {
-        recovers(Fault::Late(ticks), 15.0);
+        recovers(SensorFault::Late(ticks), 15.0);
     }
 }
 
 #[test]
 fn a_sensor_of_the_other_sign() {
-    recovers(Fault::OtherSign, 15.0);
+    recovers(SensorFault::OtherSign, 15.0);
 }
 
 #[test]
 fn a_load_sensor_with_another_gain() {
     for by in [1.3, 0.7, -1.0] {
-        recovers(Fault::Torque(by), 15.0);
+        recovers(SensorFault::Torque(by), 15.0);
     }
 }
 
 #[test]
 fn a_load_sensor_that_was_dead() {
-    recovers(Fault::Torque(0.0), 15.0);
+    recovers(SensorFault::Torque(0.0), 15.0);
 }
 
 prop_compose! {
-    fn any_fault()(kind in 0..7, size in -1.0f64..1.0, part in 0.0f64..1.0) -> Fault {
+    fn any_fault()(kind in 0..7, size in -1.0f64..1.0, part in 0.0f64..1.0) -> SensorFault {
         match kind {
-            0 => Fault::Off(size * 40.0 * ARCSEC),
-            1 => Fault::Slide(size * 10.0 * ARCSEC),
-            2 => Fault::Jump(size * 100.0 * ARCSEC, 10 + (part * 5000.0) as usize),
-            3 => Fault::Frozen,
-            4 => Fault::Late(1 + (part * 50.0) as usize),
-            5 => Fault::OtherSign,
-            _ => Fault::Torque(2.0 * size),
+            0 => SensorFault::Off(size * 40.0 * ARCSEC),
+            1 => SensorFault::Slide(size * 10.0 * ARCSEC),
+            2 => SensorFault::Jump(size * 100.0 * ARCSEC, 10 + (part * 5000.0) as usize),
+            3 => SensorFault::Frozen,
+            4 => SensorFault::Late(1 + (part * 50.0) as usize),
+            5 => SensorFault::OtherSign,
+            _ => SensorFault::Torque(2.0 * size),
         }
     }
 }
@@ -208,13 +208,14 @@ proptest! {
     /// Once the sensor is right, learning is worse than no learning beyond what it states for no longer than T.
     #[test]
     fn whatever_was_wrong_it_recovers(
-        fault in any_fault(), parts in prop::array::uniform7(-0.25f64..0.25), scale in 0.0f64..1.0, seed in any::<u64>(),
+        fault in any_fault(), parts in prop::array::uniform7(-0.25f64..0.25), scale in 0.0f64..1.0,
+        seed in any::<u64>(),
         before in 0usize..20_000, lasts in 100usize..20_000, every in prop::sample::select(&[1usize, 7][..]),
         speed in 0.3f64..2.0, amplitude in 3.0f64..30.0,
     ) {
         let mut hidden = parts;
         hidden.iter_mut().zip(SETTINGS.coefficients).for_each(|(h, of)| *h *= scale * of.limit as f64);
-        let pair = Pair { every, swing: [speed, amplitude], ..Pair::new(hidden, seed) };
+        let pair = LearnerAndTwin { every, swing: [speed, amplitude], ..LearnerAndTwin::new(hidden, seed) };
         let found = story(pair, before, fault, lasts);
         prop_assert!(found.astray <= T * every, "{:?}", found);
     }

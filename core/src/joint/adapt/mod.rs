@@ -1,4 +1,4 @@
-//! What measurements of the output teach beside the table: a few coefficients, by recursive least squares.
+//! Corrections of the table learnt from measurements of the output: a few coefficients, by recursive least squares.
 //!
 //! ```text
 //! y − ŷ = h·x + v,      error = table + m + g·τ + Σ (aₙ·cos nψ + bₙ·sin nψ) − s·w
@@ -25,7 +25,7 @@
 //!   nothing drifts there and no variance winds up; a correlation learnt long ago fades where only one of the two is
 //!   excited.
 //! * No variance grows beyond its first one.
-//! * An innovation beyond so many standard deviations is an outlier: counted, not used. So is every one while the
+//! * An innovation beyond the gate, in standard deviations, is an outlier: counted, not used. So is every one while the
 //!   sensor is impossible.
 //! * Where the error is known to within ± an interval only (side of the play unknown, torque inside a jump), that much
 //!   of an innovation says nothing: only what exceeds it is used (a dead zone), with the interval added to the noise.
@@ -70,31 +70,31 @@ use crate::num;
 use crate::play::PlayState;
 use crate::store::Store;
 use crate::table::Quality;
-use consistency::{Consistency, Finding, Judged, per_window};
+use consistency::{Consistency, Finding, HypothesisErrors, per_window};
 use factors::{dot, measure, spread_of, transform, wander_by};
 
 /// One tick as the adapter sees it.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen<'s> {
-    /// What the tick was given: generator, torque, and of the adjustment what this adapter said. What was added beside
+    /// Input of the tick: generator, torque, and this adapter's part of the adjustment. Any other addition
     /// it (springs that slip) is left out here and counts as known; left in, it is learnt a second time.
     pub input: &'s Input,
     /// The play after the tick.
     pub play: &'s PlayState,
-    /// What the tick gave.
+    /// Output of the tick.
     pub output: &'s Output,
     /// The output angle as measured at the same moment; `None` if there is no measurement.
     pub measured: Option<OutputAngle>,
 }
 
-/// What is to be added to the table in the next tick.
+/// Addition to the table in the next tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Adapted {
     /// For [`Input`](crate::Input) of the next tick.
     pub adjustment: Adjustment,
     /// Standard deviation of what it adds to the error, rad.
     pub uncertainty_rad: f32,
-    /// What became of the measurement.
+    /// Verdict on the measurement.
     pub verdict: Verdict,
 }
 
@@ -168,7 +168,7 @@ impl<const N: usize> Adapter<N> {
         Self::of_first(settings, N)
     }
 
-    /// An adapter of the first so many coefficients: those after them (`NO_COEFFICIENT`) change no bit of what these
+    /// An adapter of the first N coefficients: those after them (`NO_COEFFICIENT`) change no bit of what these
     /// come to, and are in no sum and no saved state.
     pub(crate) fn of_first(settings: &AdaptSettings<N>, used: usize) -> Result<Self, AdaptError> {
         let AdaptSettings { coefficients, noise_rad, memory_measurements, gate, settle_rad, torque_limit_n_m } =
@@ -227,7 +227,7 @@ impl<const N: usize> Adapter<N> {
     /// The same adapter of this joint with the table in use. Saved states carry both and are restored only where they
     /// belong.
     ///
-    /// `unit` tells joints with the same settings and the same table from each other, such as the wheels of a rover; 0
+    /// `unit` distinguishes joints with the same settings and the same table, such as the wheels of a rover; 0
     /// if there is one. Activate the table first; without one there is no owner. Make it anew after another table was
     /// activated, and [`Self::reset`] the state: what was learnt belongs to the table before.
     #[must_use]
@@ -277,7 +277,8 @@ impl<const N: usize> Adapter<N> {
         *state = AdaptState { learning, counters, ..self.start() };
     }
 
-    /// One tick: follows the play, learns from the measurement if there is one, and tells what to add in the next tick.
+    /// One tick: follows the play, learns from the measurement if there is one, and returns the addition in the next
+    /// tick.
     ///
     /// Call it every tick, in order, also without a measurement. Nothing that comes in can make the adjustment exceed
     /// the limits or be undefined. No search, no loop that depends on data: on a Cortex-M4F a tick with a measurement
@@ -392,7 +393,7 @@ impl<const N: usize> Adapter<N> {
         let scale = state.consistency.noise();
         let (stated, without) = (1.0 + open * open, beyond(missed));
         let noise = stated + (scale - 1.0);
-        let judged = Judged {
+        let judged = HypothesisErrors {
             with: excess * excess,
             without: without * without,
             noise,
@@ -498,7 +499,7 @@ impl<const N: usize> Adapter<N> {
         self.save_first(state, N, bytes)
     }
 
-    /// The same of the first so many coefficients.
+    /// The same for the first N coefficients.
     pub(crate) fn save_first(&self, state: &AdaptState<N>, used: usize, bytes: &mut [u8]) -> Option<usize> {
         let bytes = bytes.get_mut(..saved_adapt_bytes(used))?;
         let (contents, crc) = bytes.split_last_chunk_mut::<4>()?;
@@ -531,7 +532,7 @@ impl<const N: usize> Adapter<N> {
         self.restore_first(N, bytes)
     }
 
-    /// The same of the first so many coefficients.
+    /// The same for the first N coefficients.
     pub(crate) fn restore_first(&self, used: usize, bytes: &[u8]) -> Result<AdaptState<N>, AdaptRestoreError> {
         let needed = saved_adapt_bytes(used);
         let short = AdaptRestoreError::Short { found: bytes.len(), needed };
@@ -565,7 +566,7 @@ impl<const N: usize> Adapter<N> {
         if state.is_sound() { Ok(state) } else { Err(AdaptRestoreError::Impossible) }
     }
 
-    /// What a saved state begins with.
+    /// First words of a saved state.
     fn heading(&self) -> [u32; HEADING] {
         let Owner { table: [a, b], joint: [c, d], unit } = self.owner;
         [u32::from_le_bytes(SAVED_MARK), a, b, c, d, unit, self.sum]
@@ -574,7 +575,7 @@ impl<const N: usize> Adapter<N> {
 
 /// Words before the numbers of a saved state.
 const HEADING: usize = 7;
-/// What it begins with; the last byte is the version. Version 1 had no mark and no owner.
+/// First bytes of a saved state; the last byte is the version. Version 1 had no mark and no owner.
 const SAVED_MARK: [u8; 4] = *b"FXA\x02";
 
 /// Mark, table, joint with unit, and settings.

@@ -12,9 +12,9 @@ pub enum Term {
     WindUp,
     /// Half-width of the play, rad.
     HalfWidth,
-    /// Cosine of so many periods in a generator turn, rad.
+    /// Cosine with N periods in a generator turn, rad.
     Cos(u8),
-    /// Sine of so many periods in a generator turn, rad.
+    /// Sine with N periods in a generator turn, rad.
     Sin(u8),
 }
 
@@ -29,7 +29,7 @@ pub struct Coefficient {
     pub initial_std: f32,
 }
 
-/// What an [`Adapter`](crate::Adapter) is made of.
+/// Settings of an [`Adapter`](crate::Adapter).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AdaptSettings<const N: usize> {
     /// The coefficients.
@@ -69,7 +69,7 @@ impl core::error::Error for AdaptError {}
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AdaptRestoreError {
-    /// Fewer bytes than so many coefficients take.
+    /// Fewer bytes than this number of coefficients takes.
     Short {
         /// Bytes found.
         found: usize,

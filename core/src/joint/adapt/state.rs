@@ -1,4 +1,4 @@
-//! What is learnt, and what became of the measurements.
+//! Learnt state, and counts of the measurements.
 
 use super::consistency::Consistency;
 use crate::angle::{GeneratorAngle, OutputAngle};
@@ -10,13 +10,13 @@ pub enum Learning {
     /// The adjustment is zero; what was learnt is kept. The start.
     #[default]
     Off,
-    /// What was learnt is used and stays as it is.
+    /// The learnt coefficients are used and stay as they are.
     Frozen,
     /// Measurements are used.
     On,
 }
 
-/// What became of a measurement.
+/// Verdict on a measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Verdict {
@@ -62,7 +62,7 @@ pub struct AdaptCounters {
     pub restarts: u32,
 }
 
-/// What is learnt. Coefficients in units of their limits.
+/// Learnt state. Coefficients in units of their limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AdaptState<const N: usize> {
     pub(super) x: [f32; N],
@@ -95,7 +95,7 @@ impl<const N: usize> AdaptState<N> {
         self.learning = learning.code();
     }
 
-    /// What became of the measurements.
+    /// Counts of the measurements by verdict.
     #[must_use]
     pub const fn counters(&self) -> AdaptCounters {
         self.counters

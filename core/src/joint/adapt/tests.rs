@@ -60,7 +60,7 @@ pub(super) struct Loop<const N: usize> {
     plant: Plant,
     noise: Noise,
     applied: Adjustment,
-    /// What the adjusted table missed of the truth in the last tick, and what was stated of it, rad.
+    /// Error of the adjusted table in the last tick, and its stated bound, rad.
     pub(super) missed: f64,
     pub(super) stated: f32,
     last: Adapted,
@@ -233,7 +233,7 @@ fn outliers_and_what_is_no_number_change_nothing() {
     }
     run.uncertain_rad = None;
     assert_eq!(run.adapter.coefficients(&run.state), before);
-    // An offset that stays, beyond the gate, stays out, and is told.
+    // An offset that stays, beyond the gate, stays out, and is reported.
     for i in 0..3000 {
         run.tick(27.0 + 1e-2 * i as f64, 12.0, Some(1e-3));
     }
@@ -291,7 +291,7 @@ fn a_burst_of_bad_measurements_does_nothing() {
     assert!(counters.restarts == 0 && counters.outliers > 1000, "{counters:?}");
 }
 
-/// What the motion does not excite stays, whatever else moves.
+/// A coefficient that the motion does not excite stays, whatever else moves.
 #[test]
 fn what_is_not_excited_stays() {
     let mut run = Loop::new(&SETTINGS, HIDDEN, 4);
@@ -306,7 +306,7 @@ fn what_is_not_excited_stays() {
     assert!((after[0].0 - (8e-5 - 1e-4)).abs() < 2e-6, "{:e}", after[0].0);
     assert!((after[1].0 - learnt[1].0).abs() < 1e-7, "{:e} {:e}", after[1].0, learnt[1].0);
     assert!(after[1].1 <= SETTINGS.coefficients[1].initial_std);
-    // Forward only, at one torque: mean, wind-up and half-width cannot be told apart, and none runs away.
+    // Forward only, at one torque: mean, wind-up and half-width are not distinguishable, and none runs away.
     let mut x = 30.0;
     for _ in 0..1_000_000 {
         x += 0.02;
@@ -597,12 +597,16 @@ proptest! {
     /// Whatever comes in, the adjustment stays within the limits and the state sound.
     #[test]
     fn any_input_keeps_the_limits(
-        seen in prop::collection::vec((-1e3f64..1e3, any::<f32>(), any::<bool>(), any::<i64>(), any::<i32>(), -1e-3f64..1e-3), 1..300),
+        seen in prop::collection::vec(
+            (-1e3f64..1e3, any::<f32>(), any::<bool>(), any::<i64>(), any::<i32>(), -1e-3f64..1e-3), 1..300,
+        ),
     ) {
         let mut run = Loop::new(&SETTINGS, HIDDEN, 11);
         run.swing(300, mixed);
         for (generator, torque, wild, measured, applied, off) in seen {
-            run.applied = if wild { Adjustment { mean_counts: applied, half_width_counts: applied } } else { run.applied };
+            run.applied = if wild { Adjustment {
+                mean_counts: applied, half_width_counts: applied,
+            } } else { run.applied };
             if wild {
                 let angle = GeneratorAngle::from_counts(measured.rotate_left(13));
                 let output = Output {
@@ -659,8 +663,8 @@ fn fewer_coefficients_take_fewer_numbers() {
     assert_eq!(sizes, [40, 52, 68, 172]);
 }
 
-/// Found by chance: early on, coefficients that are not yet told apart swing beyond their limits and are held there.
-/// What was taken off them must widen what is thought of them, or every later measurement is an outlier.
+/// Found by chance: early on, coefficients that are not yet distinguishable swing beyond their limits and are held
+/// there. The amount taken off them must widen their uncertainty, or every later measurement is an outlier.
 #[test]
 fn what_is_held_at_a_limit_is_found_later() {
     let parts = [0.0, -0.210_628_3, 0.194_511_7, 0.0, 0.0, 0.073_871_1, 0.203_876_1];

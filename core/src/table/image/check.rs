@@ -80,7 +80,7 @@ const STEP_BYTES: usize = PAGE_BYTES / 2;
 const STEP_NUMBERS: usize = 12;
 const STEP_NODES: usize = 4;
 
-/// What a check finds next, in this order.
+/// Stages of a check, in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum CheckStage {
     Envelope,
@@ -134,7 +134,7 @@ impl CheckStage {
     ];
 }
 
-/// What is known of an image once its sizes are.
+/// Facts of an image once its sizes are known.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ImageFacts {
     body_bytes: usize,
@@ -151,7 +151,7 @@ pub(crate) struct ImageFacts {
     jumps: u64,
     bounds: Bounds,
     inverse: InverseBound,
-    /// What the ripple narrows the play by at most, twice, ripple units.
+    /// Largest narrowing of the play by the ripple, twice, ripple units.
     narrowest: i32,
 }
 
@@ -400,7 +400,7 @@ impl ImageCheck {
         Ok(end >= slots)
     }
 
-    /// What D and H can give at a node, and between it and the one before: linear interpolation between temperatures
+    /// Range of D and H at a node, and between it and the one before: linear interpolation between temperatures
     /// stays within them, a cubic within its Bernstein coefficients.
     #[inline(never)]
     fn node(&mut self, words: Words<'_>) -> Result<(), ImageError> {
@@ -562,8 +562,8 @@ impl ImageCheck {
         rad(half_at(self.facts.record(words, self.at), first.saturating_add(i)) as f32 * self.facts.unit(words))
     }
 
-    /// What a closed B-spline has at most: coefficient, slope per node spacing, value. Coefficients bound values too,
-    /// and are simpler to blend; values tell how far the curve really goes. Some of it; true after the last.
+    /// Largest values of a closed B-spline: coefficient, slope per node spacing, value. Coefficients bound values too,
+    /// and are simpler to blend; values show how far the curve really goes. Some of it; true after the last.
     #[inline(never)]
     fn extremes(&mut self, words: Words<'_>, stored: usize) -> bool {
         let last = stored.saturating_sub(2);
@@ -648,7 +648,7 @@ impl ImageFacts {
         narrowest: 0,
     };
 
-    /// What an image is for, and its sizes.
+    /// Target and sizes of an image.
     fn of(image: &[u8]) -> Result<Self, ImageError> {
         let header = check_envelope(image)?;
         let drive = check_identity(header)?;

@@ -9,14 +9,14 @@ use crate::drive::{Drive, FixedMember};
 use crate::error::{Field, ImageError};
 use crate::table::{Table, TableId};
 
-/// What the mesh level of a table that a data sheet completed ends with, before the percent that units scatter.
+/// End of the mesh level of a table that a data sheet completed, before the percent that units scatter.
 const SHEET_MARK: &[u8] = b", sheet +-";
 
 /// Reads fields of the header; the offsets are all inside it.
 #[derive(Clone, Copy)]
-pub(super) struct Header<'a>(&'a [u8; HEADER_BYTES]);
+pub(super) struct ImageHeader<'a>(&'a [u8; HEADER_BYTES]);
 
-impl<'a> Header<'a> {
+impl<'a> ImageHeader<'a> {
     fn bytes<const N: usize>(self, offset: usize) -> [u8; N] {
         self.0.get(offset..).and_then(|rest| rest.first_chunk::<N>()).copied().unwrap_or([0; N])
     }
@@ -51,8 +51,8 @@ impl<'a> Header<'a> {
 }
 
 impl<'a> Table<'a> {
-    fn header(&self) -> Header<'a> {
-        Header(self.image.first_chunk().unwrap_or(&[0; HEADER_BYTES]))
+    fn header(&self) -> ImageHeader<'a> {
+        ImageHeader(self.image.first_chunk().unwrap_or(&[0; HEADER_BYTES]))
     }
 
     /// The table id: printed by tools, matched with devices in the field.
@@ -61,7 +61,7 @@ impl<'a> Table<'a> {
         TableId(self.header().bytes(ID_OFFSET))
     }
 
-    /// What the [id](Self::id) is a hash of, one part after another: the body with zeros where the id is.
+    /// The bytes hashed into the [id](Self::id), one part after another: the body with zeros where the id is.
     ///
     /// [`IdentityCheck`](crate::IdentityCheck) hashes it on board; on the host any BLAKE3 takes these parts, and the
     /// first eight bytes are compared.
@@ -190,18 +190,18 @@ pub(crate) struct Laid<'a> {
 impl<'a> Laid<'a> {
     /// `None` if there is no header, or not the body that it states.
     pub fn of(image: &'a [u8]) -> Option<Self> {
-        let header = Header(image.first_chunk()?);
+        let header = ImageHeader(image.first_chunk()?);
         let body = image.get(..(header.u32(196) as usize).checked_mul(4)?)?;
         (body.len() >= HEADER_BYTES).then(|| Self { body, id: TableId(header.bytes(ID_OFFSET)) })
     }
 }
 
 /// Everything about an image that needs no knowledge of tables, but its checksum.
-pub(super) fn check_envelope(image: &[u8]) -> Result<Header<'_>, ImageError> {
+pub(super) fn check_envelope(image: &[u8]) -> Result<ImageHeader<'_>, ImageError> {
     let needed = image_bytes(1, 1, 0, [0; 3]);
     let found = image.len();
     let too_short = ImageError::TooShort { found, needed };
-    let header = Header(image.first_chunk().ok_or(too_short)?);
+    let header = ImageHeader(image.first_chunk().ok_or(too_short)?);
     if found < needed {
         return Err(too_short);
     }
@@ -223,7 +223,7 @@ pub(super) fn check_envelope(image: &[u8]) -> Result<Header<'_>, ImageError> {
 }
 
 /// Reserved bytes, texts, and the drive.
-pub(super) fn check_identity(header: Header<'_>) -> Result<Drive, ImageError> {
+pub(super) fn check_identity(header: ImageHeader<'_>) -> Result<Drive, ImageError> {
     let reserved = header.0.get(RESERVED).unwrap_or_default();
     if let Some(at) = reserved.iter().position(|byte| *byte != 0) {
         return Err(ImageError::Reserved { offset: at.saturating_add(RESERVED.start) });

@@ -33,7 +33,7 @@ pub(super) const RESERVED: core::ops::Range<usize> = 200..HEADER_BYTES;
 /// |torque| N·m and |temperature| °C of any node or range: keeps differences of nodes finite.
 pub(crate) const MAX_AXIS_VALUE: f32 = 1e6;
 
-/// Where a step finds things in an image, in words; the layout is told in [`image`](super).
+/// Where a step finds things in an image, in words; the layout is described in [`image`](super).
 pub(crate) mod word {
     /// Here two words: ripple unit, error limit.
     pub const RIPPLE_UNIT: usize = 29;

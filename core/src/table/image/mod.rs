@@ -35,10 +35,11 @@
 //! | 256 | 4 · 64 | torque nodes, N·m, padded with the largest number |
 //! | 512 | 4 · 8 | temperature nodes, °C, padded likewise |
 //! | 544 | | A, B, C: `i32` in half counts, stored closed |
-//! | | | nodes `[temperature][torque node]`: D, its slope over the torque, H (`f32` each; counts, counts/(N·m)); the last bit of |
-//! | | | H is set where the interval above is a jump; a node alone is stored twice |
-//! | | | records `[temperature][torque node]`: the ripple of forward motion, `R − h`, at each node, then that of backward |
-//! | | | motion, `R + h`, each stored closed as an even number of `i16`, ripple units |
+//! | | | nodes `[temperature][torque node]`: D, its slope over the torque, H |
+//! | | | (`f32` each; counts, counts/(N·m)); the last bit of H is set |
+//! | | | where the interval above is a jump; a node alone is stored twice |
+//! | | | records `[temperature][torque node]`: the ripple of forward motion, `R − h`, at each node, then that |
+//! | | | of backward motion, `R + h`, each stored closed as an even number of `i16`, ripple units |
 //! | | | end of the body |
 //! | | | CRC-32 of each 256-byte page of the body (the last may be shorter) |
 //! | | 4 | CRC-32 of everything before |
@@ -48,8 +49,8 @@
 //! around any place are then neighbours. A ripple goes on for one or two nodes more, n + 4 or n + 5 values: so are the
 //! five. CRC-32 is the one of ISO-HDLC (zlib).
 //!
-//! What follows from other numbers (offsets, units, the inverse) is stored so that a step finds all it needs in the
-//! image, where two copies are compared; [`Table::check`](super::Table::check) computes it again.
+//! Data that follow from other numbers (offsets, units, the inverse) are stored so that a step finds all it needs in
+//! the image, where two copies are compared; [`Table::check`](super::Table::check) computes it again.
 //!
 //! Size with 3 temperatures, 25 torques, 8 ripple nodes and 32 nodes each for A, B, C:
 //! 544 + 4·3·35 + 75·(12 + 48) = 5464, and 22 pages and the end 4·23 = 92: 5556 bytes. With 2 temperatures and 60

@@ -354,11 +354,15 @@ fn a_wind_up_that_no_drive_has_is_refused() {
         refused(&move |_| WindUp { torque: torque.clone(), mean: mean.clone(), half: half.clone() })
     };
     let falls = |found: Result<(), WriteError>, node| {
-        let named = matches!(found, Err(WriteError::Refused(ImageError::Falls { torque, temperature: 0, .. })) if torque == node);
+        let named = matches!(
+            found, Err(WriteError::Refused(ImageError::Falls { torque, temperature: 0, .. })) if torque == node,
+        );
         assert!(named, "{found:?}");
     };
     let steep = |found: Result<(), WriteError>, node| {
-        let named = matches!(found, Err(WriteError::Refused(ImageError::Steep { torque, temperature: 0, .. })) if torque == node);
+        let named = matches!(
+            found, Err(WriteError::Refused(ImageError::Steep { torque, temperature: 0, .. })) if torque == node,
+        );
         assert!(named, "{found:?}");
     };
     let axis = [-20.0, -5.0, 0.0, 5.0, 20.0];
@@ -599,7 +603,9 @@ proptest! {
             let mut state = crate::PlayState::unknown();
             let found = table.forward(&mut state, generator, torque, temperature);
             prop_assert!(found.transmission_error_rad.abs() <= 1.0001 * table.bounds().error_rad);
-            prop_assert_eq!(found.quality == crate::Quality::Disabled, !(torque.is_finite() && temperature.is_finite()));
+            prop_assert_eq!(
+                found.quality == crate::Quality::Disabled, !(torque.is_finite() && temperature.is_finite()),
+            );
         }
     }
 }

@@ -18,7 +18,7 @@ use crate::table::word_at;
 use crate::table::{GeneratorKind, Table};
 use core::fmt;
 
-/// What made a table and how far it holds.
+/// Origin of a table and its range of validity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Provenance<'a> {
     /// Kind of wave generator.
