@@ -9,19 +9,19 @@ use std::io::{BufRead, BufReader, Read};
 
 use crate::suggest::{likeliest, question};
 
-/// What is wrong, and in which line, from 1.
+/// A fault, with its line, from 1.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TableProblem {
     /// Line, from 1.
     pub line: u64,
-    /// What was found and what is allowed.
+    /// Value found and values allowed.
     pub what: String,
 }
 
 /// Why a field is no number.
 #[derive(Debug, Clone, PartialEq)]
 pub enum NotANumber {
-    /// The row ends before this field; it has so many.
+    /// The row ends before this field; it has this many fields.
     Absent(usize),
     /// This text.
     Text(String),
@@ -185,7 +185,7 @@ fn parser<R: Read>(source: BufReader<R>) -> csv::Reader<Ended<BufReader<R>>> {
         .from_reader(Ended { source, last: b'\n' })
 }
 
-/// What a file is that begins so, if it is a format that is known and no text.
+/// Name of the known binary format that begins with these bytes.
 pub fn known_format(start: &[u8]) -> Option<&'static str> {
     let kinds: [(&[u8], &str); 7] = [
         (b"\x1F\x8B", "a gzip archive; unpack it first"),
@@ -199,7 +199,7 @@ pub fn known_format(start: &[u8]) -> Option<&'static str> {
     kinds.iter().find(|(magic, _)| start.starts_with(magic)).map(|(_, kind)| *kind)
 }
 
-/// What a file is that begins so, if it is no CSV text in UTF-8.
+/// Name of the format of a file that is no CSV text in UTF-8, by its first bytes.
 fn not_csv(start: &[u8]) -> Option<&'static str> {
     let utf_16 = start.starts_with(b"\xFF\xFE") || start.starts_with(b"\xFE\xFF");
     let kind = known_format(start).or(utf_16.then_some("text in UTF-16; save it as UTF-8"));

@@ -1,4 +1,4 @@
-//! What every part computes and writes with: units, statistics, rows of CSV, TOML read with its lines, files written
+//! Helpers of every part: units, statistics, rows of CSV, TOML read with its lines, files written
 //! whole.
 #![forbid(unsafe_code)]
 

@@ -3,7 +3,7 @@
 //! A reader never sees a half-written file, and a run that fails or is stopped leaves the files of the run before it as
 //! they were. The files of one run appear together ([`Outputs`]).
 //!
-//! Whatever is on disk and no output yet is known in one place, so that a process that is told to end can clear up at
+//! Whatever is on disk and no output yet is known in one place, so that a process that is asked to end can clear up at
 //! once, wherever its threads are ([`abandon`]).
 
 use std::fs;
@@ -48,7 +48,7 @@ pub fn replaces_none_kept(target: &Path) -> Result<(), OutputError> {
     Err(failed(target)(io::Error::new(io::ErrorKind::InvalidInput, what)))
 }
 
-/// What is on disk and no output yet. Hidden files are made, and become outputs, while this is held.
+/// Files on disk that are no output yet. Hidden files are made, and become outputs, while this is held.
 struct UnfinishedFiles {
     /// Hidden files and folders.
     hidden: Vec<PathBuf>,

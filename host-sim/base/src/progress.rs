@@ -79,13 +79,13 @@ impl Progress {
         let (over, wait) = mpsc::channel();
         if !stderr().is_terminal() {
             let stand = Arc::new(Mutex::new(Stand::default()));
-            let (told, begun) = (stand.clone(), Instant::now());
+            let (shared, begun) = (stand.clone(), Instant::now());
             thread::spawn(move || {
                 while wait.recv_timeout(LINE_EVERY) == Err(mpsc::RecvTimeoutError::Timeout) {
                     if SILENT.load(Ordering::Relaxed) {
                         break;
                     }
-                    let line = told.lock().unwrap_or_else(PoisonError::into_inner).line(&title, begun.elapsed());
+                    let line = shared.lock().unwrap_or_else(PoisonError::into_inner).line(&title, begun.elapsed());
                     // A reader that has gone is no reason to fail.
                     let _ = writeln!(stderr(), "{line}");
                 }
@@ -151,7 +151,7 @@ pub fn read(line: &str) -> Option<(u64, u64, &str)> {
 }
 
 impl Stand {
-    /// As a line: how far, what just happened, how long so far and, where it can be told, how long from here.
+    /// As a line: how far, what just happened, how long so far and, where it is known, how long from here.
     fn line(&self, title: &str, elapsed: Duration) -> String {
         let Stand { done, total, note } = self;
         let far = if *total > 0 { format!(" {done}/{total}") } else { String::new() };
@@ -183,10 +183,10 @@ fn show(bar: &ProgressBar) {
 /// Parts of the work from which on what they took says what the rest will take; a few large ones are too unlike.
 const TELLING: u64 = 10;
 
-/// How long the work will take, or has taken where that cannot be told.
+/// How long the work will take, or has taken where that is not known.
 fn time_left(state: &ProgressState, to: &mut dyn std::fmt::Write) {
-    let tells = state.pos() > 0 && state.len() >= Some(TELLING);
-    let _ = if tells {
+    let talks = state.pos() > 0 && state.len() >= Some(TELLING);
+    let _ = if talks {
         write!(to, "{} left", HumanDuration(state.eta()))
     } else {
         write!(to, "{} so far", HumanDuration(state.elapsed()))

@@ -1,4 +1,4 @@
-//! What work takes: by the clock, and of the processor.
+//! Time of work: by the clock, and of the processor.
 //!
 //! The two differ by what waits (a shared machine) one way and by what works side by side the other way. Who wants to
 //! know how long the work will take elsewhere needs both.
@@ -14,7 +14,7 @@ pub struct Stopwatch {
     processor: Option<ProcessTime>,
 }
 
-/// What was taken.
+/// Time spent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spent {
     /// By the clock, s.

@@ -1,4 +1,4 @@
-//! What somebody who misspelt a name may have meant: one rule for keys, columns, effects, generators and units.
+//! Suggestions for misspelt names: one rule for keys, columns, effects, generators and units.
 //!
 //! Case and the signs between words do not count. A known name is suggested if it differs by at most one letter in
 //! three (Damerau and Levenshtein: letters changed, left out, put in, exchanged), has its words cut short, in another
@@ -14,7 +14,7 @@ use thiserror::Error;
     "{what} \"{found}\": allowed are {}{}", known.join(", "), did_you_mean("; ", found, known.iter().copied())
 )]
 pub struct UnknownName {
-    /// What has the name.
+    /// Kind of the named thing.
     pub what: &'static str,
     /// The name.
     pub found: String,
@@ -71,7 +71,7 @@ pub fn did_you_mean<'k>(before: &str, found: &str, known: impl IntoIterator<Item
     likeliest(found, known).map_or_else(String::new, |name| before.to_owned() + &question(name))
 }
 
-/// What a suggestion in a message begins and ends with.
+/// Begin and end of a suggestion in a message.
 pub const MARKS: [&str; 2] = ["did you mean `", "`?"];
 
 /// `` did you mean `name`? ``

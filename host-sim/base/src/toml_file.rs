@@ -99,7 +99,7 @@ pub struct TomlFile<'a> {
 }
 
 impl<'a> TomlFile<'a> {
-    /// The text of a file, with the name that problems are told with.
+    /// The text of a file, with the name under which problems are reported.
     pub fn new(name: &'a str, text: &'a str) -> Self {
         TomlFile { name, text, problems: Vec::new() }
     }
@@ -205,7 +205,7 @@ impl<'a> TomlFile<'a> {
     }
 }
 
-/// What to say of a key that is none of those known.
+/// Message for an unknown key.
 fn unknown_key(path: &str, known: &[&str]) -> String {
     let section = path.rsplit_once('.').map_or("", |(section, _)| section);
     let hint = likeliest_path(path, known).map_or_else(String::new, |path| format!("; {}", question(path)));
@@ -305,7 +305,7 @@ pub struct Refused {
     pub span: Range<usize>,
     /// Where within the value, `[1].order`; empty for the value itself.
     pub at: String,
-    /// What was found and what is allowed.
+    /// Value found and values allowed.
     pub what: String,
 }
 

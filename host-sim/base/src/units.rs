@@ -1,4 +1,4 @@
-//! Units of angle in which results are told. Everything inside is in radians, and in the units that a name carries.
+//! Units of angle in which results are reported. Everything inside is in radians, and in the units that a name carries.
 //!
 //! All of them are definitions: a turn is 2π rad and 360°, a degree 60′, an arc-minute 60″ (SI Brochure, 9th edition,
 //! table 8).

@@ -69,13 +69,13 @@ impl Lubricant {
 /// nu n below which the lubricant's part no longer falls, cSt/min.
 const SLOW: f64 = 2000.0;
 
-/// What the lubricant takes, N·mm; mean diameter of the bearing in mm, speed in turns a minute.
+/// Torque of the lubricant, N·mm; mean diameter of the bearing in mm, speed in turns a minute.
 pub fn lubricant_torque_n_mm(f0: f64, viscosity_cst: f64, speed_rpm: f64, mean_diameter_mm: f64) -> f64 {
     // 2000^(2/3) is 159: the two branches meet to 1 %.
     1e-7 * f0 * (viscosity_cst * speed_rpm).max(SLOW).powf(2.0 / 3.0) * mean_diameter_mm.powi(3)
 }
 
-/// What the load takes, N·mm; `load_n` is the sum of the loads of all balls.
+/// Torque of the load, N·mm; `load_n` is the sum of the loads of all balls.
 pub fn load_torque_n_mm(f1: f64, load_n: f64, mean_diameter_mm: f64) -> f64 {
     f1 * load_n * mean_diameter_mm
 }
@@ -84,7 +84,7 @@ pub fn load_torque_n_mm(f1: f64, load_n: f64, mean_diameter_mm: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// What the documentation of `HHD-95-typical` derives its bedding of 170 N/mm³ from: 10 µm and 4.4e4 N/mm at 300 N.
+    /// The documentation of `HHD-95-typical` derives its bedding of 170 N/mm³ from this: 10 µm and 4.4e4 N/mm at 300 N.
     #[test]
     fn balls_give_way_as_those_of_the_typical_drive() {
         let balls = Balls { count: 23, diameter_mm: 7.1 };

@@ -49,7 +49,7 @@ pub struct Place {
     pub generator_rad: f64,
     /// Output angle minus generator angle over the ratio, arc-seconds; positive when the output leads.
     pub error_arcsec: f64,
-    /// What the solver says of the increment that ended here.
+    /// The solver's report on the increment that ended here.
     pub increment: Increment,
 }
 

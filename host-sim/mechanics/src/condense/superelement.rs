@@ -7,7 +7,7 @@
 //!   [ K_ri  K_rr ] [ u_r ] = [ f_r ]        u_i = -K_ii^-1 K_ir u_r
 //! ```
 //!
-//! Nodes that the housing holds are displaced by what they are told; they push on the kept ones with a constant force.
+//! Nodes that the housing holds have prescribed displacements; they push on the kept ones with a constant force.
 
 use flexspline_algebra::{Mat, cholesky, product};
 

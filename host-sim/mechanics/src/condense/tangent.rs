@@ -81,7 +81,7 @@ pub struct CellPlacement {
     pub blocks: [u32; 2],
 }
 
-/// What a turning frame adds to the tangent: a on the faces; g on all nodes; c.
+/// Addition of a turning frame to the tangent: a on the faces; g on all nodes; c.
 #[derive(Debug, Clone, Copy)]
 pub struct Geometric<'a> {
     /// Derivative of the rotation.

@@ -35,8 +35,8 @@ pub struct BoreContact {
     points: Vec<(f64, [f64; 3])>,
 }
 
-/// What the gap along an edge of 0.4 mm may differ by from a quadratic, mm: of the distance from a circle of 13 mm the
-/// fourth order is 1e-7 mm.
+/// Largest deviation of the gap along an edge of 0.4 mm from a quadratic, mm: of the distance from a circle of 13 mm
+/// the fourth order is 1e-7 mm.
 const BORE_SMOOTHNESS: f64 = 1e-6;
 
 /// Edges known to be open, and for how long.
@@ -110,7 +110,7 @@ impl BoreContact {
         self.evaluate_near(law, outline, generator_rad, u, &mut OpenEdges::default(), report);
     }
 
-    /// [`BoreContact::evaluate`] that passes over edges that `open` knows to be open, and tells it of others.
+    /// [`BoreContact::evaluate`] that passes over edges that `open` knows to be open, and updates it for others.
     pub(crate) fn evaluate_near(
         &self,
         law: BoreLaw,

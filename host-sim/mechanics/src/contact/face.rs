@@ -25,7 +25,7 @@ const MOST_ITERATIONS: usize = 100;
 /// Step of a level, relative to its bracket, at which it is found.
 const LEVEL_FOUND: f64 = 1e-15;
 
-/// What decides the load along the face.
+/// Parameters of the load distribution along the face.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct FaceLaw {
     /// Face width, mm.
@@ -49,7 +49,7 @@ pub struct Across {
     compliance: f64,
 }
 
-/// What one pair comes to along its face.
+/// Load of one pair along its face.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Bearing {
     /// By how much the plane slice meets the other flank later than where the face is nearest, mm.
@@ -66,7 +66,7 @@ pub(crate) struct Bearing {
     pub later_by_slope: f64,
     /// How much less moment for that, N.
     pub moment_by_slope: f64,
-    /// What has an offset below this bears, mm.
+    /// A slice with an offset below this bears, mm.
     pub level_mm: f64,
 }
 

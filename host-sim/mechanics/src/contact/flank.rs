@@ -20,7 +20,7 @@ use crate::fem::element::edge_shape;
 use crate::mesh::{FlankMesh, WheelMesh, rotate};
 
 use super::face::{Across, Bearing, FaceLaw, Lean};
-use super::hertz::{Place, peak_pressure_mpa};
+use super::hertz::{FacePoint, peak_pressure_mpa};
 use super::quadrature::gauss_legendre;
 use crate::drive::{ActiveFlank, FlankDeviations, Foot, Placement, Side, golden};
 
@@ -107,7 +107,7 @@ struct CoarsePoint {
     shape: [f64; 3],
 }
 
-/// What one pair contributes. Local nodes: flexspline flank nodes, then circular-spline flank nodes; two unknowns each.
+/// Contribution of one pair. Local nodes: flexspline flank nodes, then circular-spline flank nodes; two unknowns each.
 #[derive(Debug, Clone)]
 pub struct PairContribution {
     /// Nodal forces on the wheels, global frame for the flexspline, turning frame for the circular spline (N/mm).
@@ -137,7 +137,7 @@ pub struct PairContribution {
 /// A point of a pair that bears: its place along the flank, and how far from the axis of the circular spline it and its
 /// foot stand, mm.
 struct BearingPoint {
-    place: Place,
+    place: FacePoint,
     radius: f64,
     foot_radius: f64,
 }
@@ -390,7 +390,7 @@ impl<'a> FlankContact<'a> {
         field.depth = deviations.tooth_depth[pair.tooth][side] + deviations.space_depth[pair.space][side] - early;
     }
 
-    /// What the faces are nearer somewhere at most, mm.
+    /// Largest reduction of the gap by the faces, mm.
     fn largest_offset(&self, at: Configuration) -> f64 {
         let Some(face) = self.face else { return 0.0 };
         0.5 * face.width_mm * at.leans.iter().map(|lean| lean[0].hypot(lean[1])).fold(0.0, f64::max)
@@ -633,7 +633,7 @@ impl<'a> FlankContact<'a> {
         // On the circular spline the tip lies inward.
         let space_tip_to = space.junction_radius + space.rounding_radius;
         let (mut load, mut on_tips, mut reach_mm) = (0.0, [0.0; 2], f64::NEG_INFINITY);
-        for BearingPoint { place: Place { arc, force, .. }, radius, foot_radius } in &touches {
+        for BearingPoint { place: FacePoint { arc, force, .. }, radius, foot_radius } in &touches {
             reach_mm = reach_mm.max(radius - space.tip_radius);
             load += force;
             on_tips[0] += if *arc >= tooth_tip_from { *force } else { 0.0 };
@@ -661,7 +661,7 @@ impl<'a> FlankContact<'a> {
             let x = self.seen_from_space(&field, point.position, point.edge, &point.shape);
             let foot = self.foot(pair, &field, x);
             let gap = foot.distance + bearing.later_mm;
-            let place = Place { arc: point.arc, gap, force: law.stiffness * point.weight * (-gap).max(0.0) };
+            let place = FacePoint { arc: point.arc, gap, force: law.stiffness * point.weight * (-gap).max(0.0) };
             BearingPoint { place, radius: x[0].hypot(x[1]), foot_radius: foot.radius }
         };
         let touches = points.iter().map(touch).collect();
@@ -669,7 +669,7 @@ impl<'a> FlankContact<'a> {
     }
 
     fn peak_of(&self, bearing: &Bearing, touches: &[BearingPoint], modulus_mpa: f64) -> f64 {
-        let places: Vec<Place> = touches.iter().map(|touch| touch.place).collect();
+        let places: Vec<FacePoint> = touches.iter().map(|touch| touch.place).collect();
         let least_radius = 1.0 / (1.0 / self.tooth.rounding_radius + 1.0 / self.space.rounding_radius);
         peak_pressure_mpa(&places, bearing.peak_over_mean, modulus_mpa, least_radius)
     }
@@ -950,7 +950,7 @@ mod tests {
         });
     }
 
-    /// What lets open points and far pairs be left without their foot never says more than the foot does.
+    /// The lower bound that lets open points and far pairs go without their foot never exceeds the gap at the foot.
     #[test]
     fn the_glance_is_a_lower_bound_of_the_gap() {
         with_flanks(|flanks, fs, cs| {

@@ -27,7 +27,7 @@ const MOST_DOUBLINGS: usize = 64;
 
 /// Gap of two flanks at a place along them, mm, and the force that they bear with there, N/mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Place {
+pub(super) struct FacePoint {
     pub arc: f64,
     pub gap: f64,
     pub force: f64,
@@ -38,12 +38,12 @@ pub(crate) fn contact_modulus_mpa(youngs_modulus_mpa: f64, poissons_ratio: f64) 
     0.5 * youngs_modulus_mpa / (1.0 - poissons_ratio * poissons_ratio)
 }
 
-/// Largest pressure of flanks that bear at these places, in growing arc, with so many times the force; MPa. Where they
-/// bear in several places, as at both of their tips, each is a contact of its own, up to where the gap between them is
-/// widest. `least_radius` (mm) is that of both roundings together, tip on tip: no gap is more curved, and no pressure
-/// larger than what Hertz has with it. It counts where flanks bear on a rounding beyond the last of the places, where a
-/// gap seems to end in an edge.
-pub(super) fn peak_pressure_mpa(places: &[Place], times: f64, modulus_mpa: f64, least_radius: f64) -> f64 {
+/// Largest pressure of flanks that bear at these places, in growing arc, with this multiple of the force; MPa. Where
+/// they bear in several places, as at both of their tips, each is a contact of its own, up to where the gap between
+/// them is widest. `least_radius` (mm) is that of both roundings together, tip on tip: no gap is more curved, and no
+/// pressure larger than what Hertz has with it. It counts where flanks bear on a rounding beyond the last of the
+/// places, where a gap seems to end in an edge.
+pub(super) fn peak_pressure_mpa(places: &[FacePoint], times: f64, modulus_mpa: f64, least_radius: f64) -> f64 {
     let bears = |k: usize| places[k].force > 0.0;
     // The first and the last place of each contact.
     let mut contacts: Vec<[usize; 2]> = Vec::new();
@@ -67,7 +67,7 @@ pub(super) fn peak_pressure_mpa(places: &[Place], times: f64, modulus_mpa: f64, 
 }
 
 /// Largest pressure of one contact, MPa.
-fn peak_of_one(places: &[Place], force: f64, modulus_mpa: f64) -> f64 {
+fn peak_of_one(places: &[FacePoint], force: f64, modulus_mpa: f64) -> f64 {
     let lowest = places.iter().map(|place| place.gap).fold(f64::INFINITY, f64::min);
     // Area between the gap and a level above its lowest, and half the width there.
     let below = |depth: f64| {
@@ -112,12 +112,12 @@ mod tests {
     const MODULUS: f64 = 113_187.0;
 
     /// Places along a gap, closer near 0, all of them that are below a level bearing alike.
-    fn places(gap: impl Fn(f64) -> f64, level: f64, force: f64) -> Vec<Place> {
+    fn places(gap: impl Fn(f64) -> f64, level: f64, force: f64) -> Vec<FacePoint> {
         let at = |k: i32| f64::from(k).powi(3) * 1e-8;
         let all: Vec<f64> = (-200..=200).map(at).collect();
         let bearing = all.iter().filter(|x| gap(**x) < level).count() as f64;
         let force = |x: f64| if gap(x) < level { force / bearing } else { 0.0 };
-        all.iter().map(|&arc| Place { arc, gap: gap(arc), force: force(arc) }).collect()
+        all.iter().map(|&arc| FacePoint { arc, gap: gap(arc), force: force(arc) }).collect()
     }
 
     #[test]
@@ -162,7 +162,7 @@ mod tests {
         let gap = |x: f64| ((x.abs() - half).powi(2)) / (2.0 * radius);
         let count = 3000;
         let arcs = (0..=count).map(|k| -0.08 + 0.16 * f64::from(k) / f64::from(count));
-        let mut places: Vec<Place> = arcs.map(|arc| Place { arc, gap: gap(arc), force: 0.0 }).collect();
+        let mut places: Vec<FacePoint> = arcs.map(|arc| FacePoint { arc, gap: gap(arc), force: 0.0 }).collect();
         for (place, force) in [(half, 10.0), (-half, 4.0)] {
             let nearest = places.iter_mut().min_by(|a, b| (a.arc - place).abs().total_cmp(&(b.arc - place).abs()));
             nearest.unwrap().force = force;

@@ -6,8 +6,8 @@
 //!
 //! Signs: `gap > 0` open; `pressure >= 0` compressive. A penalty law `pressure = stiffness * <-gap>` with a stiffness
 //! (N/mm³) so high that the answer does not depend on it; a generator bearing of finite stiffness acts in series. The
-//! pressure itself does depend on it where a corner bears: what is told of flanks is that of two elastic bodies under
-//! the force that was found (`hertz`).
+//! pressure itself does depend on it where a corner bears: the reported pressure of flanks is that of two elastic
+//! bodies under the force that was found (`hertz`).
 
 mod bore;
 mod face;

@@ -1,4 +1,4 @@
-//! What a real drive has that its drawing has not: errors of the size of micrometres, each zero in an ideal drive.
+//! Deviations of a real drive from its drawing: errors of the size of micrometres, each zero in an ideal drive.
 //!
 //! Conventions, the same for all:
 //!
@@ -204,7 +204,7 @@ impl AsBuilt {
         .find_map(|(acts, field)| acts.then_some(field))
     }
 
-    /// What is left without the fields that [`AsBuilt::first_not_uniform`] looks for.
+    /// The drive's errors without the fields that [`AsBuilt::first_not_uniform`] looks for.
     pub fn uniform_part(&self) -> AsBuilt {
         AsBuilt {
             flexspline_wear_um: self.flexspline_wear_um,
@@ -215,7 +215,7 @@ impl AsBuilt {
         }
     }
 
-    /// What does not fit the rest of the drive.
+    /// Reports values that do not fit the rest of the drive.
     pub(super) fn fit(&self, drive: &Drive, problems: &mut Vec<Problem>) {
         let (zf, zc) = (drive.flexspline.teeth, drive.circular_spline.teeth);
         for (key, list, teeth, of) in [

@@ -1,4 +1,4 @@
-//! What is wrong with a drive: one message per problem, each with its place, field, value found and what is allowed.
+//! Errors of a drive: one message per problem, each with its place, field, value found and allowed values.
 
 use crate::toml_file::{Problem, lines};
 

@@ -362,7 +362,7 @@ fn sections() -> impl Iterator<Item = &'static str> {
     })
 }
 
-/// What to say of a path that is no field.
+/// Message for a path that is no field.
 fn unknown_path(path: &str) -> String {
     let section = path.split_once('.').map_or("", |(section, _)| section);
     let paths: Vec<&str> = fields::ALL.iter().map(|field| field.path).collect();
@@ -477,7 +477,7 @@ mod tests {
         assert_eq!(count(&["generator.w0_mm=0.5,flexspline.rim_thickness_mm=1", pitch, "generator.w0_mm = 0.49"]), 3);
     }
 
-    /// Of the wrong number of teeth is told, and nothing of fillets, which the radii were not drawn for.
+    /// A wrong number of teeth is reported, and nothing of fillets, which the radii were not drawn for.
     #[test]
     fn teeth_that_are_not_two_apart_are_all_that_is_told() {
         let refused = Drive::hhd_95().with_set("flexspline.teeth=122").unwrap_err();

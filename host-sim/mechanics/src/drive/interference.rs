@@ -111,10 +111,10 @@ impl fmt::Display for FlankGap {
     }
 }
 
-/// What rigid teeth as built leave the output to turn, where they leave it least.
+/// Smallest free rotation of the output with rigid teeth as built.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Room {
-    /// What the output can turn, rad; negative where both flanks would have to give way.
+    /// Free rotation of the output, rad; negative where both flanks would have to give way.
     pub least_rad: f64,
     /// Generator angle at which that is, rad.
     pub generator_rad: f64,
@@ -139,14 +139,14 @@ pub struct RigidMesh {
     circular_spline_teeth: f64,
 }
 
-/// What [`RigidMesh::report`] finds.
+/// Result of [`RigidMesh::report`].
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MeshReport {
     /// The generator.
     pub generator: GeneratorKind,
     /// The least gap of all, over the whole cycle and both flanks.
     pub least: FlankGap,
-    /// What the circular spline turns between both flanks, rad, mean over one tooth pitch of generator angle;
+    /// Rotation of the circular spline between both flanks, rad, mean over one tooth pitch of generator angle;
     /// negative if the teeth bind.
     pub backlash_rad: f64,
     /// Change of the least gap of one flank over one tooth pitch, largest minus smallest, rad: the kinematic error of
@@ -290,7 +290,7 @@ impl RigidMesh {
         (total / PITCH_STEPS as f64, high - low)
     }
 
-    /// What the teeth as built leave the output to turn at the tightest place of a whole turn of it, the teeth rigid.
+    /// Free rotation of the output at the tightest place of a whole turn, with the teeth as built and rigid.
     ///
     /// Errors of teeth, spaces, axes, rim and generator move each tooth against its space, to first order: the least
     /// gap of the drawing,

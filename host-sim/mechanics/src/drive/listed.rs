@@ -10,11 +10,11 @@ use super::spec::Drive;
 pub struct ListedField {
     /// `section.key`, as `--set` takes it.
     pub path: &'static str,
-    /// What it is, its unit and sign.
+    /// Meaning, unit and sign.
     pub meaning: &'static str,
     /// Its value, as `--set` takes it; `None` of a list that is not one number.
     pub value: Option<String>,
-    /// What kind of value it has.
+    /// Kind of value.
     pub kind: FieldKind,
     /// Least and largest number allowed, in the unit of the key; of a number.
     pub range: Option<[f64; 2]>,
@@ -24,7 +24,7 @@ pub struct ListedField {
     pub is_imperfection: bool,
 }
 
-/// What kind of value a field has.
+/// Kind of value of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FieldKind {
@@ -77,7 +77,7 @@ impl Drive {
 mod tests {
     use super::*;
 
-    /// What is listed can be set again, and gives the same drive.
+    /// Every listed value can be set again, and gives the same drive.
     #[test]
     fn every_value_listed_is_one_that_can_be_set() {
         for name in Drive::BUILT_IN {

@@ -43,7 +43,7 @@ impl GeneratorKind {
         }
     }
 
-    /// What it is called in a sentence.
+    /// Name of the generator in a sentence.
     pub const fn in_words(self) -> &'static str {
         match self {
             Self::DoubleDisc => "double disc",
@@ -51,7 +51,7 @@ impl GeneratorKind {
         }
     }
 
-    /// Largest load (N m) that tables, kernels and closed loops are made for unless told otherwise: up to where the
+    /// Largest load (N m) that tables, kernels and closed loops are made for unless set otherwise: up to where the
     /// model holds with the rim of HHD-95. Rollers leave the rim unsupported: beyond these loads teeth slip or no
     /// equilibrium is found.
     pub const fn rated_torque_n_m(self) -> f64 {

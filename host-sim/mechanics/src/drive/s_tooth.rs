@@ -33,7 +33,7 @@ const LAST_THETA_DEG: f64 = 125.0;
 /// side the tooth stands behind.
 const CYCLE_DEG: [f64; 2] = [-10.0, 85.0];
 const CYCLE_STEPS: usize = 190;
-/// What the envelope is left before the tip of the tooth comes to its end, modules: there its direction is that of a
+/// Margin of the envelope before the tip of the tooth comes to its end, modules: there its direction is that of a
 /// corner.
 const BEFORE_THE_TIP: f64 = 0.02;
 

@@ -1,4 +1,4 @@
-//! What holds the rim of the flexspline: its sleeve or cup, or springs in its place.
+//! Support of the flexspline's rim: its sleeve or cup, or springs in its place.
 
 use serde::{Serialize, Serializer};
 
@@ -57,7 +57,7 @@ macro_rules! choice {
 }
 
 choice! {
-    /// What holds the rim.
+    /// Support of the rim.
     SleeveKind {
         /// The rim in the middle of a closed sleeve: a tube to the flange on one side, a tube with a bottom on the
         /// other.
@@ -105,7 +105,7 @@ choice! {
 }
 
 choice! {
-    /// What closes the other tube.
+    /// End of the other tube.
     Bottom {
         /// Held in its plane, free along the axis: a bottom that is stiff as a membrane and bends without force.
         Disc = "disc",
@@ -119,7 +119,7 @@ choice! {
 /// The sleeve of the flexspline.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Sleeve {
-    /// What holds the rim.
+    /// Support of the rim.
     pub kind: SleeveKind,
     /// Wall of the tubes, mm.
     pub wall_mm: f64,
@@ -129,7 +129,7 @@ pub struct Sleeve {
     pub bottom_side_mm: f64,
     /// How the tube stands on its flange.
     pub flange: Flange,
-    /// What closes the other tube.
+    /// End of the other tube.
     pub bottom: Bottom,
     /// Thickness of a bottom that is a plate, mm.
     pub bottom_thickness_mm: f64,

@@ -34,7 +34,7 @@ pub struct Drive {
     pub flanks: Flanks,
     /// How sizes and stiffness follow the temperature.
     pub temperature: Temperature,
-    /// What the drive as built has beside its nominal sizes; nothing in an ideal drive.
+    /// Deviations of the drive as built from its nominal sizes; nothing in an ideal drive.
     pub as_built: AsBuilt,
     /// The temperature the sizes above are given for; reference temperature unless [`Drive::at_temperature`] made it.
     #[serde(skip)]
@@ -444,7 +444,7 @@ impl Drive {
         }
     }
 
-    /// Largest load (N m) that tables and kernels are made for unless told otherwise: that of the generator in HHD-95,
+    /// Largest load (N m) that tables and kernels are made for unless set otherwise: that of the generator in HHD-95,
     /// with the square of the diameter and with the width, which leaves the stresses of a drive of like shape as they
     /// are; to two digits.
     pub fn rated_torque_n_m(&self, kind: GeneratorKind) -> f64 {

@@ -30,7 +30,7 @@ use crate::toml_file::Problem;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
 
-/// What a piece of the outline is.
+/// Kind of a piece of the outline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum PieceKind {
     /// Arc of the root circle.
@@ -61,7 +61,7 @@ impl PieceKind {
 /// One analytic piece; its parameter `t` runs over `0..=1` from the root side to the tip side, uniform in arc length.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OutlinePiece {
-    /// What it is.
+    /// Kind of the piece.
     pub kind: PieceKind,
     curve: ToothCurve,
 }

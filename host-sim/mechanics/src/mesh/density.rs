@@ -37,7 +37,7 @@ pub struct MeshDensity {
 }
 
 impl MeshDensity {
-    /// So many times the elements in each direction.
+    /// Multiple of the elements in each direction.
     pub fn times(self, factor: usize) -> MeshDensity {
         MeshDensity {
             tooth_columns: factor * self.tooth_columns,
@@ -56,7 +56,7 @@ impl MeshDensity {
 pub enum MeshLevel {
     /// For quick looks and tests.
     Coarse,
-    /// What ships: the output angle is within 0.1″ of the next level.
+    /// The default: the output angle is within 0.1″ of the next level.
     Standard,
     /// For refinement studies.
     Fine,

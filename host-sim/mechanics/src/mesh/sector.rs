@@ -50,7 +50,7 @@ pub enum MeshError {
     },
 }
 
-/// What an element edge of the half sector lies on.
+/// Boundary that an element edge of the half sector lies on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum EdgeTag {
     /// Bore or outer circle, numbered from the tooth axis.

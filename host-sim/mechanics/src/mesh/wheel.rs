@@ -92,8 +92,8 @@ impl WheelMesh {
         WheelMesh::flexspline_as_fine_as(drive, &level.flexspline())
     }
 
-    /// Meshes the flexspline with so many elements; meshes of which one has twice as many in each direction have the
-    /// coarser's nodes.
+    /// Meshes the flexspline with the given numbers of elements; meshes of which one has twice as many in each
+    /// direction have the coarser's nodes.
     pub fn flexspline_as_fine_as(drive: &Drive, density: &MeshDensity) -> Result<WheelMesh, MeshError> {
         let wheel = &drive.flexspline;
         let interface_radius = wheel.root_radius_mm - 0.3 * wheel.rim_thickness_mm;
@@ -112,7 +112,7 @@ impl WheelMesh {
         WheelMesh::circular_spline_as_fine_as(drive, &level.circular_spline())
     }
 
-    /// Meshes the circular spline with so many elements.
+    /// Meshes the circular spline with the given numbers of elements.
     pub(crate) fn circular_spline_as_fine_as(drive: &Drive, density: &MeshDensity) -> Result<WheelMesh, MeshError> {
         let wheel = &drive.circular_spline;
         let tooth_height = wheel.root_radius_mm - wheel.tip_radius_mm;

@@ -22,7 +22,7 @@ pub struct RingBending {
     modulus_mpa: f64,
 }
 
-/// What the generator pushes with, outward, per mm of width.
+/// Load of the generator, outward, per mm of width.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactLoads {
     /// Each concentrated radial force, N/mm: at the two rollers, the four rollers, or the four ends of the disc arcs.

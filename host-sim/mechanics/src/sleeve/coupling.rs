@@ -1,4 +1,4 @@
-//! What the third dimension adds to a plane slice of the rim.
+//! Contribution of the third dimension to a plane slice of the rim.
 //!
 //! A slice in plane strain has the ring of the rim already, over all its width. The rest is the stiffness of the whole
 //! flexspline less that of the same rim moved alike over all its width: a 2 x 2 matrix K in the amplitudes of
@@ -16,7 +16,7 @@ use std::f64::consts::PI;
 use super::matrix::Symmetric;
 use super::model::Flexspline3d;
 
-/// What one harmonic of the rim meets beside the plane slice.
+/// Stiffness that one harmonic of the rim has in addition to the plane slice.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Addition {
     /// Waves around the rim.
@@ -34,7 +34,7 @@ pub(crate) struct Addition {
 }
 
 impl Flexspline3d {
-    /// What harmonic n (of 2 or more) adds to the plane slice.
+    /// Addition of harmonic n (2 or more) to the plane slice.
     pub(crate) fn addition(&self, n: u32) -> Addition {
         let whole = self.at(n).band_and_turn();
         let oval = [1.0, -1.0 / f64::from(n)];

@@ -2,7 +2,7 @@
 
 use crate::fem::element::packed_index;
 
-/// What is left of a pivot, relative to its diagonal entry at the start, below which the unknown carries nothing: it
+/// Size of a pivot, relative to its diagonal entry at the start, below which the unknown carries nothing: it
 /// moves without force (a rigid body's motion). Round-off of a few hundred eliminations leaves 1e-13.
 const NO_STIFFNESS: f64 = 1e-11;
 
@@ -64,7 +64,7 @@ impl Symmetric {
         reduced
     }
 
-    /// What is left for the unknowns `keep` where those of `fixed` are held and all others move freely.
+    /// Condensed matrix of the unknowns `keep`, where those of `fixed` are held and all others move freely.
     pub(crate) fn condensed(&self, keep: &[usize], fixed: &[usize]) -> Symmetric {
         let n = self.size;
         let mut a = self.entries.clone();

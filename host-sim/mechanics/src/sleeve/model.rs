@@ -33,7 +33,7 @@ pub struct Flexspline3d {
     pub on_shaft: bool,
 }
 
-/// What one harmonic of a radial load meets. Stiffness is the amplitude of the reaction, full circle, over the
+/// Stiffness against one harmonic of a radial load. Stiffness is the amplitude of the reaction, full circle, over the
 /// amplitude of the displacement: twice the energy over the amplitude squared.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Harmonic {
@@ -47,7 +47,8 @@ pub struct Harmonic {
     pub tilt_rad_per_mm: f64,
 }
 
-/// What two rollers, pressing outward at 0° and 180°, make of the rim: radial displacement over that under the rollers.
+/// Deflection of the rim by two rollers that press outward at 0° and 180°: radial displacement over that under the
+/// rollers.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Rollers {
     /// At 45°.
@@ -116,7 +117,7 @@ impl Flexspline3d {
         if self.flange.is_none() && self.bottom.is_some() { -1.0 } else { 1.0 }
     }
 
-    /// What a radial load of n waves meets.
+    /// Stiffness against a radial load of n waves.
     pub fn harmonic(&self, n: u32) -> Harmonic {
         let rim = self.at(n);
         let band = rim.band();
@@ -278,7 +279,7 @@ mod tests {
         assert!(free.torsion_n_m_per_rad() < 1e-3 && free.lateral_n_per_mm() < 1e-3);
     }
 
-    /// What solid elements say of other ends, of K2: a bottom of 2 mm adds 1 to 1.5 %, a thin one takes 2 %; a flange
+    /// Solid elements give for other ends, of K2: a bottom of 2 mm adds 1 to 1.5 %, a thin one takes 2 %; a flange
     /// on a diaphragm takes 29 to 41 %, and nearly all of the lateral stiffness.
     #[test]
     fn other_ends_change_what_they_are_known_to() {

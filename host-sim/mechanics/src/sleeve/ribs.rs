@@ -1,5 +1,5 @@
-//! What the teeth add to the stiffness of the rim under them: along the axis they are ribs, around it they stiffen
-//! their roots.
+//! Contribution of the teeth to the stiffness of the rim under them: along the axis they are ribs, around it they
+//! stiffen their roots.
 
 use super::matrix::Symmetric;
 use super::shell::Ribs;

@@ -144,7 +144,7 @@ impl Flexspline3d {
     }
 }
 
-/// Places from one to another, both included, so many elements apart.
+/// N equal steps from one place to another, both ends included.
 fn spread(from: f64, to: f64, elements: usize) -> Vec<f64> {
     (0..=elements).map(|k| from + (to - from) * k as f64 / elements as f64).collect()
 }
@@ -171,7 +171,7 @@ mod tests {
         }
     }
 
-    /// What is known at the rim otherwise: amplitude 1 in its middle, tilt and skew of the addition; and the ends are
+    /// Known values at the rim otherwise: amplitude 1 in its middle, tilt and skew of the addition; and the ends are
     /// held.
     #[test]
     fn the_rim_of_the_whole_is_the_rim_that_is_coupled() {

@@ -38,8 +38,8 @@ pub(super) const NODE: usize = 6;
 const ELEMENTS_PER_DECAY: f64 = 4.0;
 const ELEMENTS_PER_WAVE: f64 = 2.0;
 
-/// What stiffens a wall beside its thickness: factors on the membrane stiffness along the axis, and on the bending
-/// stiffness along the axis and around it.
+/// Stiffening of a wall in addition to its thickness: factors on the membrane stiffness along the axis, and on the
+/// bending stiffness along the axis and around it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ribs {
     /// On C along the axis.
@@ -66,7 +66,7 @@ pub struct Shell {
     pub youngs_modulus_mpa: f64,
     /// Poisson's ratio.
     pub poissons_ratio: f64,
-    /// What stiffens it.
+    /// Stiffening of the wall.
     pub ribs: Ribs,
 }
 

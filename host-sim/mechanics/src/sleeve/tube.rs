@@ -7,7 +7,7 @@ use super::shell::{NODE, SLOPE, Shell, U, V, W};
 /// Stiffness of what hangs on an edge, in the edge's U, V, W and slope W' (N, mm; amplitudes of one harmonic).
 pub(super) type Edge = [[f64; 4]; 4];
 
-/// What holds the far end of a tube.
+/// Support of the far end of a tube.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum End {
     /// Nothing.
@@ -35,7 +35,7 @@ impl Tube {
         self.edge_with(self.shell.elements(self.length_mm, n), n, end)
     }
 
-    /// Stiffness of an edge of a tube of so many elements: they are eliminated one after the other, from the far end
+    /// Stiffness of an edge of a tube of N elements: they are eliminated one after the other, from the far end
     /// on.
     pub(super) fn edge_with(&self, elements: usize, n: u32, end: End) -> Edge {
         let element = self.shell.element(self.length_mm / elements as f64, n);

@@ -27,8 +27,8 @@ const SHOWS_THE_WAY: f64 = 0.03;
 const SOFTEST_BORE: f64 = 1e3;
 /// Iterations after which the next part of an increment may be twice as large.
 const EASY: usize = 10;
-/// Halvings after which Newton is given so many times the iterations. Heavily loaded rollers creep along their way, and
-/// halving does not shorten it: of nine drives that failed with 60 iterations at 63 % of their rated load and more,
+/// Halvings after which Newton is given this multiple of the iterations. Heavily loaded rollers creep along their way,
+/// and halving does not shorten it: of nine drives that failed with 60 iterations at 63 % of their rated load and more,
 /// eight converge with 200, in less time than failing took.
 const PATIENT_AFTER: usize = 2;
 const PATIENCE: usize = 4;

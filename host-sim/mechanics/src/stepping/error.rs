@@ -27,10 +27,11 @@ pub enum SolveError {
         torque_n_m: f64,
         /// The last load on the way for which there was an equilibrium, N m.
         reached_n_m: f64,
-        /// What is left of the output's stiffness at that last load, of the largest on the way, where it has fallen so
-        /// far that the drive itself gives way. Missing where the solver failed on a drive that may well stand.
+        /// Remaining stiffness of the output at that last load, as a share of the largest on the way, where it has
+        /// fallen so far that the drive itself gives way. Missing where the solver failed on a drive that may well
+        /// stand.
         softened_to: Option<f64>,
-        /// What stopped it.
+        /// Reason of the stop.
         reason: &'static str,
         /// Residual of each iteration relative to the contact forces.
         history: Vec<f64>,
@@ -71,7 +72,7 @@ const GIVES_WAY: &str = "the drive gives way: no equilibrium";
 /// How it begins where nothing is known of the drive.
 const UNSOLVED: &str = "not solved";
 
-/// What the failure says of the drive.
+/// Meaning of the failure for the drive.
 fn meaning(torque_n_m: f64, softened_to: Option<f64>) -> String {
     match softened_to {
         Some(left) => format!(", where {:.0} % of the output's stiffness is left", 100.0 * left),

@@ -3,10 +3,10 @@
 use super::continuation::ContactStage;
 use super::convergence::Convergence;
 use super::problem::Problem;
-use super::step::{Residual, Step};
+use super::step::{NewtonStep, Unbalance};
 
 /// Share of the force along a step that may act back at its end. Where contact opens and closes with each step,
-/// iterations that give back nearly all they took go round in a circle: after so many they may give back less.
+/// iterations that give back nearly all they took go round in a circle: after this number they may give back less.
 /// (Straight teeth that wedge in a cup, loaded to 24 N·m.)
 const RETURNS: f64 = 0.9;
 const RETURNS_LITTLE: f64 = 0.3;
@@ -47,7 +47,7 @@ pub(super) struct LineSearch {
     pub looked_back: bool,
 }
 
-/// What becomes of a step that was tried.
+/// Verdict on a step that was tried.
 pub(super) enum Trial {
     Taken,
     Halved,
@@ -71,7 +71,7 @@ impl LineSearch {
     }
 
     /// Begins with a step. The force along it falls to nothing at the end of a perfect one; far beyond, halve it.
-    pub fn begin(&mut self, step: &Step, residual: &Residual, convergence: &Convergence) {
+    pub fn begin(&mut self, step: &NewtonStep, residual: &Unbalance, convergence: &Convergence) {
         self.before = step.work(residual);
         let goes_round = convergence.history.len() > GOES_ROUND_AFTER;
         self.least = -(if goes_round { RETURNS_LITTLE } else { RETURNS }) * self.before;
@@ -79,8 +79,8 @@ impl LineSearch {
         self.length = (self.largest_mm / step.largest()).min(1.0).min(8.0 * self.last_length);
     }
 
-    /// What becomes of the step by what is out of balance at its end.
-    pub(crate) fn judge(&mut self, trial: usize, step: &Step, residual: &Residual) -> Trial {
+    /// Verdict on the step by the residual at its end.
+    pub(crate) fn judge(&mut self, trial: usize, step: &NewtonStep, residual: &Unbalance) -> Trial {
         let overshoot = self.before > 0.0 && step.work(residual) < self.least;
         if !overshoot || self.near_round_off || trial == MOST_TRIALS {
             self.last_length = self.length;

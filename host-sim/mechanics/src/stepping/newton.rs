@@ -28,7 +28,7 @@ use super::problem::Problem;
 use super::reference::SparseWheels;
 use super::slip::{NodalField, Slipping};
 use super::state::State;
-use super::step::{ANCHORED, BORDERS, LATERAL, OUTPUT, Residual, SLEEVE, Step, improve};
+use super::step::{ANCHORED, BORDERS, LATERAL, NewtonStep, OUTPUT, SLEEVE, Unbalance, improve};
 use super::wheels::Wheels;
 
 /// Pairs closer than this (mm) get a place in the sparsity pattern.
@@ -125,7 +125,7 @@ pub struct Solver<'p> {
     made_at: f64,
     /// Tangents of steady motion, oldest first.
     tangents: VecDeque<Tangent>,
-    /// What the tangent leaves out.
+    /// The part that the tangent leaves out.
     slipping: Slipping,
     /// The states passed in steady motion.
     passed: Passed,
@@ -319,7 +319,7 @@ impl<'p> Solver<'p> {
         self.balance_output(&mut state, sought, &mut near);
         let mut residual = self.assemble(&mut state, sought, &mut near);
         let mut held = false;
-        let mut chords: Vec<Step> = Vec::new();
+        let mut chords: Vec<NewtonStep> = Vec::new();
         let mut search = LineSearch::new(self.problem, stage);
         let steady = stage.softening.is_none() && self.passed.go_on(guess, torque_n_m);
         search.recalled = steady && generator_rad != guess.generator_rad && self.recall(generator_rad);
@@ -371,12 +371,12 @@ impl<'p> Solver<'p> {
     /// was mistaken.
     fn go_along(
         &mut self,
-        step: &Step,
+        step: &NewtonStep,
         state: &mut State,
         sought: Sought<'_>,
         near: &mut NearPairs,
         search: &mut LineSearch,
-    ) -> Option<Residual> {
+    ) -> Option<Unbalance> {
         let motion = self.motion(step);
         near.advance(search.length * motion);
         for trial in 0..=MOST_TRIALS {
@@ -423,13 +423,13 @@ impl<'p> Solver<'p> {
         fits
     }
 
-    /// The end of an increment: what is told of it, and what is remembered.
+    /// End of an increment: its report, and the values to remember.
     fn converged(
         &mut self,
         mut state: State,
         Sought { from, generator_rad, stage, .. }: Sought<'_>,
         near: &NearPairs,
-        residual: &Residual,
+        residual: &Unbalance,
         iterations: usize,
     ) -> Result<(State, Increment), &'static str> {
         let compliance = self.compliance(residual).ok_or(NOT_DEFINITE)?;
@@ -454,7 +454,7 @@ impl<'p> Solver<'p> {
 
     /// Bound on the motion of flanks against one another in a step, mm. Nodal displacements bound those between them to
     /// 1.25 (the Lebesgue constant of a quadratic).
-    fn motion(&self, step: &Step) -> f64 {
+    fn motion(&self, step: &NewtonStep) -> f64 {
         let largest = |x: &[f64]| x.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
         let nodes = largest(&step.u) + largest(&step.v);
         (1.25 + self.leans_within) * std::f64::consts::SQRT_2 * nodes
@@ -506,7 +506,7 @@ impl<'p> Solver<'p> {
         }
     }
 
-    fn assemble_contact(&mut self, state: &State, stage: ContactStage, near: &mut NearPairs, residual: &mut Residual) {
+    fn assemble_contact(&mut self, state: &State, stage: ContactStage, near: &mut NearPairs, residual: &mut Unbalance) {
         let problem = self.problem;
         let (bore_law, flank_law) = (stage.bore_law(problem.bore_law), stage.flank_law(problem.flank_law));
         let bore_nodes = &problem.wheels().0.nodes;
@@ -574,7 +574,7 @@ impl<'p> Solver<'p> {
     }
 
     /// Load and drag on the output, sleeve on the bore, and the anchor.
-    fn assemble_holding(&mut self, state: &State, torque_n_m: f64, residual: &mut Residual) {
+    fn assemble_holding(&mut self, state: &State, torque_n_m: f64, residual: &mut Unbalance) {
         let problem = self.problem;
         let width = self.border.width;
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
@@ -629,7 +629,7 @@ impl<'p> Solver<'p> {
     /// One Newton step, or nothing when the tangent is not positive definite.
     ///
     /// With `chord` the last tangent serves again.
-    fn solve(&mut self, residual: &Residual, chord: bool) -> Option<Step> {
+    fn solve(&mut self, residual: &Unbalance, chord: bool) -> Option<NewtonStep> {
         // What the forces do without the border, where it was solved with a new factor's own.
         let mut begun = None;
         if !chord || self.eliminated.is_none() {
@@ -659,7 +659,7 @@ impl<'p> Solver<'p> {
                 v[2 * n + 1] = free[2 * *free_node as usize + 1];
             }
         }
-        Some(Step { free, u, v, border })
+        Some(NewtonStep { free, u, v, border })
     }
 
     /// Solves with the last factor, in place; `begun` is what that factor did with the forces when it was made.
@@ -676,7 +676,7 @@ impl<'p> Solver<'p> {
         solved.then_some(())
     }
 
-    /// Turns forces or displacements by so many pitches.
+    /// Turns forces or displacements by a number of pitches.
     fn turn(&self, free: &mut [f64], border: &mut [f64; BORDERS], pitches: isize) {
         if pitches != 0 {
             self.wheels.turn(free, pitches);
@@ -717,7 +717,7 @@ impl<'p> Solver<'p> {
     }
 
     /// Turn of the output for a unit torque on it (rad mm / N mm), by the last tangent.
-    fn compliance(&mut self, residual: &Residual) -> Option<f64> {
+    fn compliance(&mut self, residual: &Unbalance) -> Option<f64> {
         if self.eliminated.is_none() {
             self.solve(residual, false)?;
         }
@@ -744,7 +744,7 @@ impl<'p> Solver<'p> {
         }
     }
 
-    fn report(&self, state: &State, residual: &Residual, compliance: f64, iterations: usize) -> Increment {
+    fn report(&self, state: &State, residual: &Unbalance, compliance: f64, iterations: usize) -> Increment {
         let to_n_m = self.problem.drive.flexspline.width_mm / 1e3;
         Increment {
             iterations,
@@ -763,7 +763,7 @@ impl<'p> Solver<'p> {
         }
     }
 
-    fn face(&self, state: &State, residual: &Residual) -> Face {
+    fn face(&self, state: &State, residual: &Unbalance) -> Face {
         // Without taper, and whether the load along the face is even or not.
         let mut leans: Vec<Lean> = vec![[0.0; 2]; self.problem.flexspline.teeth];
         self.problem.waves.iter().for_each(|wave| wave.add_lean(wave.amplitude(&state.u), &mut leans));
@@ -777,7 +777,7 @@ impl<'p> Solver<'p> {
     }
 }
 
-/// What leans the teeth does so by waves of the rim: a load at the end of a face works on their amplitudes.
+/// Lean of the teeth, by waves of the rim: a load at the end of a face works on their amplitudes.
 struct Leaning {
     /// Row of the first amplitude, if there are any.
     first: Option<usize>,
@@ -797,7 +797,7 @@ impl Leaning {
         Leaning { first, force: vec![0.0; count], tangent: vec![0.0; count * count], by_output: vec![0.0; count] }
     }
 
-    /// Adds a pair; `unknown` tells that of the system for each of its own.
+    /// Adds a pair; `unknown` gives that of the system for each of its own.
     fn add(
         &mut self,
         problem: &Problem,
@@ -824,7 +824,7 @@ impl Leaning {
     }
 
     /// Puts forces and tangent where they belong.
-    fn finish(self, problem: &Problem, border: &mut Border, residual: &mut Residual) {
+    fn finish(self, problem: &Problem, border: &mut Border, residual: &mut Unbalance) {
         let Some(first) = self.first else { return };
         let (width, count) = (border.width, self.force.len());
         for (k, wave) in problem.waves.iter().enumerate() {

@@ -167,7 +167,7 @@ fn phase_weights(pitches: &[f64]) -> Option<PhaseWeights> {
 mod tests {
     use super::*;
 
-    /// What the weights make of a function of the phase.
+    /// Prediction of a function of the phase by the weights.
     fn predicted(pitches: &[f64], function: impl Fn(f64) -> f64) -> f64 {
         let weights = phase_weights(pitches).unwrap();
         weights.states.iter().map(|(k, weight)| weight * function(pitches[*k] - pitches[*k].round())).sum()

@@ -17,7 +17,7 @@ use super::error::SolveError;
 use super::fast::CondensedDrive;
 use super::state::State;
 use super::step::LATERAL;
-use super::waves::{Third, Wave};
+use super::waves::{LeanWave, Third};
 
 /// Which solver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -49,7 +49,7 @@ impl FromStr for Method {
     }
 }
 
-/// What of the bore may not turn.
+/// Part of the bore that may not turn.
 ///
 /// A rim that is deformed by its generator turns locally by `v/R`, two waves around it: the mean of the whole bore does
 /// not see that, a single point carries it whole to the output.
@@ -69,7 +69,7 @@ pub struct SolverSettings {
     pub method: Method,
     /// Mesh of both wheels.
     pub mesh: MeshLevel,
-    /// So many times the elements of that mesh in each direction. A finer mesh of the same level has its nodes, and
+    /// Multiple of the elements of that mesh in each direction. A finer mesh of the same level has its nodes, and
     /// more: what the interval of a stress is taken from.
     pub refine: usize,
     /// Contact penalty on the bore, N/mm³; `None` chooses by generator: 1e7 under rollers, whose contact is narrow and
@@ -82,7 +82,7 @@ pub struct SolverSettings {
     /// Integration points in each bore edge; `None` chooses by generator: 48 under rollers (a point every 4 µm; 16
     /// leave 0.07″ of false ripple and a rim that may slip along the roller by steps), 8 under discs and cam.
     pub bore_points: Option<usize>,
-    /// What holds the rotation of the flexspline.
+    /// Constraint on the rotation of the flexspline.
     pub holding: Holding,
     /// Residual force, relative to the largest contact force, at which an increment is done.
     pub tolerance: f64,
@@ -165,10 +165,10 @@ pub struct Problem {
     pub(super) sleeve_compliance: f64,
     /// Lateral stiffness of the sleeve per mm of width (N/mm²).
     pub(super) lateral_stiffness: f64,
-    /// What shells in the third dimension add to the slice.
+    /// Stiffness that shells in the third dimension add to the slice.
     third: Third,
     /// The waves on the bore of the meshes of this problem.
-    pub(super) waves: Vec<Wave>,
+    pub(super) waves: Vec<LeanWave>,
     /// The load along the face, where it is not even.
     face: Option<FaceLaw>,
     /// Coulomb drag of the output per mm of width (N mm/mm).
@@ -317,7 +317,7 @@ impl Problem {
         if self.face.is_none() {
             return 0.0;
         }
-        0.5 * self.drive.flexspline.width_mm * self.waves.iter().map(Wave::largest_lean).sum::<f64>()
+        0.5 * self.drive.flexspline.width_mm * self.waves.iter().map(LeanWave::largest_lean).sum::<f64>()
     }
 
     /// Row of the border where the waves begin.

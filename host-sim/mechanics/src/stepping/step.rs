@@ -12,7 +12,7 @@ pub(super) const LATERAL: usize = 3;
 pub(super) const BORDERS: usize = LATERAL + 2 + 2 * MOST_WAVES;
 
 /// Out-of-balance forces at a configuration.
-pub(super) struct Residual {
+pub(super) struct Unbalance {
     /// On the free nodes.
     pub force: Vec<f64>,
     /// On the rows of the border; those of the waves are always in balance.
@@ -27,7 +27,7 @@ pub(super) struct Residual {
     pub lobe_force: f64,
     pub flank_torque: f64,
     pub drag_torque: f64,
-    /// What rounding of the output angle leaves of the torque at worst.
+    /// Largest error of the torque by rounding of the output angle.
     pub torque_round_off: f64,
     /// Largest pressure on the bore, MPa.
     pub bore_peak: f64,
@@ -40,9 +40,9 @@ pub(super) struct Residual {
     pub free_output: bool,
 }
 
-impl Residual {
-    pub(crate) fn zero(unknowns: usize) -> Residual {
-        Residual {
+impl Unbalance {
+    pub(crate) fn zero(unknowns: usize) -> Unbalance {
+        Unbalance {
             force: vec![0.0; unknowns],
             border: [0.0; BORDERS],
             scale: 1e-3,
@@ -71,28 +71,28 @@ impl Residual {
 }
 
 /// A Newton step in all unknowns.
-pub(super) struct Step {
+pub(super) struct NewtonStep {
     pub free: Vec<f64>,
     pub u: Vec<f64>,
     pub v: Vec<f64>,
     pub border: [f64; BORDERS],
 }
 
-impl Step {
+impl NewtonStep {
     /// Work of the out-of-balance forces along the step.
-    pub(crate) fn work(&self, residual: &Residual) -> f64 {
+    pub(crate) fn work(&self, residual: &Unbalance) -> f64 {
         residual.force.iter().zip(&self.free).map(|(f, d)| f * d).sum::<f64>()
             + residual.border[OUTPUT] * self.border[OUTPUT]
     }
 
     /// Scalar product of displacements (mm²), the turn of the output counted at a radius.
-    fn dot(&self, other: &Step) -> f64 {
+    fn dot(&self, other: &NewtonStep) -> f64 {
         const RADIUS: f64 = 50.0;
         let nodes = self.free.iter().zip(&other.free).map(|(a, b)| a * b).sum::<f64>();
         nodes + RADIUS * RADIUS * self.border[OUTPUT] * other.border[OUTPUT]
     }
 
-    fn add(&mut self, factor: f64, other: &Step) {
+    fn add(&mut self, factor: f64, other: &NewtonStep) {
         let add = |x: &mut [f64], y: &[f64]| x.iter_mut().zip(y).for_each(|(x, y)| *x += factor * y);
         add(&mut self.free, &other.free);
         add(&mut self.u, &other.u);
@@ -119,7 +119,7 @@ impl Step {
 
 /// Broyden's update of an old tangent by the steps that were taken with it (Kelley, Iterative Methods for Linear and
 /// Nonlinear Equations, 1995, section 7.3): `step` is the old tangent's.
-pub(super) fn improve(step: &mut Step, taken: &[Step]) {
+pub(super) fn improve(step: &mut NewtonStep, taken: &[NewtonStep]) {
     for pair in taken.windows(2) {
         let part = pair[0].dot(step) / pair[0].dot(&pair[0]);
         step.add(part, &pair[1]);
@@ -129,7 +129,7 @@ pub(super) fn improve(step: &mut Step, taken: &[Step]) {
         // Beyond this the secant says more about the contact than about the tangent.
         if part.abs() < 0.5 {
             let more = part / (1.0 - part);
-            let own = Step { free: step.free.clone(), u: step.u.clone(), v: step.v.clone(), border: step.border };
+            let own = NewtonStep { free: step.free.clone(), u: step.u.clone(), v: step.v.clone(), border: step.border };
             step.add(more, &own);
         }
     }

@@ -18,7 +18,7 @@ pub(super) const MOST_WAVES: usize = 2 * (HIGHEST as usize - 1);
 
 /// One phase of one harmonic.
 #[derive(Debug, Clone)]
-pub(super) struct Wave {
+pub(super) struct LeanWave {
     /// k per mm of width, N/mm².
     pub stiffness: f64,
     /// How each tooth leans along its face for a = 1 mm (rad/mm).
@@ -27,7 +27,7 @@ pub(super) struct Wave {
     weights: Vec<(usize, f64)>,
 }
 
-impl Wave {
+impl LeanWave {
     /// The amplitude a, mm.
     pub fn amplitude(&self, u: &[f64]) -> f64 {
         self.weights.iter().map(|(i, w)| w * u[*i]).sum()
@@ -68,7 +68,7 @@ pub(super) struct Third {
 }
 
 impl Third {
-    /// What the shells of a drive add to its plane slice; nothing where it has none. Odd harmonics are excited only
+    /// Contribution of a drive's shells to its plane slice; nothing where it has none. Odd harmonics are excited only
     /// where the drive is not the same on both lobes.
     pub fn of(drive: &Drive) -> Result<Third, MeshError> {
         let springs = &drive.sleeve;
@@ -90,7 +90,7 @@ impl Third {
     }
 
     /// The waves on the bore of a mesh.
-    pub(crate) fn waves(&self, drive: &Drive, mesh: &WheelMesh, bore: &BoreContact) -> Vec<Wave> {
+    pub(crate) fn waves(&self, drive: &Drive, mesh: &WheelMesh, bore: &BoreContact) -> Vec<LeanWave> {
         self.additions
             .iter()
             .flat_map(|addition| [0, 1].map(|phase| wave(drive, mesh, bore, addition, phase)))
@@ -99,7 +99,7 @@ impl Third {
 }
 
 /// Phase 0 is `w = W cos n theta, v = V sin n theta`, phase 1 the same turned by a quarter of a wave.
-fn wave(drive: &Drive, mesh: &WheelMesh, bore: &BoreContact, addition: &Addition, phase: usize) -> Wave {
+fn wave(drive: &Drive, mesh: &WheelMesh, bore: &BoreContact, addition: &Addition, phase: usize) -> LeanWave {
     let n = f64::from(addition.n);
     let radius = drive.flexspline.neutral_radius_mm();
     // Normals stay straight: V of the bore, h below the middle, is `V - h (V + n W)/R`.
@@ -120,7 +120,7 @@ fn wave(drive: &Drive, mesh: &WheelMesh, bore: &BoreContact, addition: &Addition
             *dense.entry(2 * k + 1).or_default() += along * s + across * c;
         }
     }
-    Wave {
+    LeanWave {
         stiffness: addition.stiffness_n_per_mm / drive.flexspline.width_mm,
         leans: leans(drive, mesh, addition, phase),
         weights: dense.into_iter().collect(),
@@ -242,7 +242,7 @@ mod tests {
         errs_by_the_opposite_when_mirrored(&Drive::hhd_95().with_set("sleeve.kind=hermetic").unwrap());
     }
 
-    /// A drive under the cam, loaded and settled; the places of two pitches, so many to each.
+    /// A drive under the cam, loaded and settled; two pitches, with the given number of places in each.
     fn two_pitches(drive: &Drive, torque_n_m: f64, places: usize) -> Vec<crate::motion::Place> {
         let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
         let problem = Problem::new(drive, GeneratorKind::Cam, 20.0, settings).unwrap();

@@ -1,4 +1,4 @@
-//! What a solver makes of the two wheels: forces of their deformation, and a factorised tangent.
+//! The two wheels as a solver sees them: forces of their deformation, and a factorised tangent.
 
 use crate::contact::{BorePressure, FlankPair, PairContribution};
 use crate::fem::Factor;
@@ -47,10 +47,10 @@ pub(super) trait Wheels: Factor {
         None
     }
 
-    /// Uses a kept factor in a state that is turned by so many flexspline pitches against its own: it solves in the
+    /// Uses a kept factor in a state that is turned by a number of flexspline pitches against its own: it solves in the
     /// numbering of its own state.
     fn recall(&mut self, _kept: &Kept, _pitches: isize) {}
 
-    /// Turns a vector of forces or displacements by so many pitches of each wheel.
+    /// Turns a vector of forces or displacements by a number of pitches of each wheel.
     fn turn(&self, _x: &mut [f64], _pitches: isize) {}
 }
