@@ -234,7 +234,7 @@ mod play;
 mod self_test;
 mod store;
 mod table;
-mod tell;
+mod telemetry;
 mod unit;
 #[cfg(test)]
 mod upset;
@@ -269,5 +269,7 @@ pub use table::{
     OperatingPoint, PAGE_BYTES, Prediction, Provenance, Quality, TEXT_BYTES, Table, TableData, TableId, WriteError,
     grid, image_bytes, write_image,
 };
-pub use tell::{Event, Events, Queue, RECORD_BYTES, Reader, Record, RecordError, Recorder, Ring, Sink, Watch, Writer};
+pub use telemetry::{
+    Event, Events, Queue, RECORD_BYTES, Reader, Record, RecordError, Recorder, Ring, Sink, Watch, Writer,
+};
 pub use unit::{Arcsec, Degrees, Rad};

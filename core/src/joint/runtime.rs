@@ -10,7 +10,7 @@
 //! |---|---|---|
 //! | no sample | keeps the last angle and the play; the error is known to the table's limit | [`Flags::SAMPLE_LOST`] |
 //! | a sample too far off | ignores it; after `patience` ticks accepts it, play side unknown | [`Flags::GLITCH`] |
-//! | an input not finite, table in doubt | keeps it for `patience` ticks, then fades it out | [`Flags::NOT_CORRECTED`] |
+//! | input not finite, table in doubt | keeps it for `patience` ticks, then fades it out | [`Flags::NOT_CORRECTED`] |
 //! | an adjustment larger than any may be | takes the largest one | [`Flags::BOUNDED`] |
 //! | torque or temperature out of range | uses the value at the edge | [`Extrapolated`](crate::Quality::Extrapolated) |
 //! | a tick came late | by [`Overrun`] | [`Flags::OVERRUN`] |

@@ -3,7 +3,7 @@
 #[cfg(feature = "defmt")]
 mod defmt;
 mod events;
-mod telemetry;
+mod records;
 
 pub use events::{Event, Events, Watch};
-pub use telemetry::{Queue, RECORD_BYTES, Reader, Record, RecordError, Recorder, Ring, Sink, Writer};
+pub use records::{Queue, RECORD_BYTES, Reader, Record, RecordError, Recorder, Ring, Sink, Writer};
