@@ -1,4 +1,4 @@
-//! What a catalogue prints of its sizes, for the `[data_sheet]` of a drive that is made like one of them.
+//! Catalogue values of a size, for the `[data_sheet]` of a drive that is made like one of them.
 //!
 //! The figures are those of Harmonic Drive's CSF and CSG cups (Harmonic Drive LLC, CSF/CSG catalogue, pages 14 and 49;
 //! Harmonic Drive AG, HFUS-2A 1019658, 11/2014): stiffness and its ranges, which both series share, ratcheting torque
@@ -21,7 +21,7 @@ enum CupSeries {
     Csg,
 }
 
-/// What the catalogue prints of a size and ratio: none of a series, size or ratio that is not at hand.
+/// Catalogue values of a size and ratio: none of a series, size or ratio that is not at hand.
 pub(crate) fn sheet(series: &str, size: f64, ratio: u32) -> Option<Stated> {
     let which = match series.to_ascii_uppercase().as_str() {
         "CSF" => CupSeries::Csf,
@@ -48,7 +48,7 @@ pub(crate) fn sheet(series: &str, size: f64, ratio: u32) -> Option<Stated> {
     })
 }
 
-/// What the catalogue prints of a size and ratio or, where that ratio is not at hand, of the nearest of the same size,
+/// Catalogue values of a size and ratio or, where that ratio is not at hand, of the nearest of the same size,
 /// whose source then says so. With it the ratio that the figures are of. A drive's load and stiffness hang on its size
 /// far more than on its ratio: from 80 to 160 the stiffness is printed as the same.
 pub fn nearest_sheet(series: &str, size: f64, ratio: u32) -> Option<(Stated, u32)> {
@@ -105,8 +105,8 @@ mod tests {
     #[test]
     fn a_size_has_its_own_figures() {
         let csg = sheet("CSG", 32.0, 80).unwrap();
-        let told = [csg.rated_torque_n_m, csg.t1_n_m, csg.t2_n_m, csg.k1_n_m_per_rad, csg.k2_n_m_per_rad];
-        assert_eq!(told, [153.0, 29.0, 108.0, 67e3, 110e3].map(Some));
+        let stated = [csg.rated_torque_n_m, csg.t1_n_m, csg.t2_n_m, csg.k1_n_m_per_rad, csg.k2_n_m_per_rad];
+        assert_eq!(stated, [153.0, 29.0, 108.0, 67e3, 110e3].map(Some));
         assert_eq!((csg.k3_n_m_per_rad, csg.ratcheting_torque_n_m), (Some(120e3), Some(1800.0)));
         let csf = sheet("csf", 32.0, 80).unwrap();
         assert_eq!((csf.rated_torque_n_m, csf.ratcheting_torque_n_m), (None, Some(1400.0)));

@@ -1,4 +1,4 @@
-//! What has to be said beside figures that converged as well as any: that they are not to be built, or not to be
+//! Cautions on figures that converged as well as any: that they are not to be built, or not to be
 //! believed.
 //!
 //! The model is elastic and plane and does not mind teeth that interfere on the drawing, steel that yields, or an error
@@ -35,7 +35,7 @@ pub struct Caution {
     pub value: f64,
     /// Where caution begins.
     pub limit: f64,
-    /// What it means, in words.
+    /// Meaning, in words.
     pub words: String,
 }
 
@@ -82,8 +82,8 @@ impl Caution {
 pub struct LookedAt {
     /// Least gap of the rigid teeth of the drawing, µm.
     pub rigid_gap_um: Option<f64>,
-    /// What rigid teeth as built leave the output to turn at the tightest place of its turn, arcsec; missing of a drive
-    /// that is as drawn.
+    /// Free rotation of the output with rigid teeth as built, at the tightest place of its turn, arcsec; missing of a
+    /// drive that is as drawn.
     pub room_as_built_arcsec: Option<f64>,
     /// Largest von Mises stress at a node, MPa.
     pub max_von_mises_mpa: Option<f64>,
@@ -93,14 +93,14 @@ pub struct LookedAt {
     pub root_fillet_mpa: Option<f64>,
     /// Largest pressure between flanks, MPa, as Hertz has it and the limit means it.
     pub peak_flank_pressure_mpa: Option<f64>,
-    /// What bears on tips outside the main zones.
+    /// Contact of tips outside the main zones.
     pub tip_contact: Option<TipContact>,
     /// Bound of the slope of the error over the generator's motion.
     pub slope_bound: Option<f64>,
 }
 
 impl LookedAt {
-    /// What has to be said of them; nothing of a sound drive.
+    /// Cautions on these figures; none for a sound drive.
     pub fn cautions(&self) -> Vec<Caution> {
         let mut cautions = Vec::new();
         let (stress, place) = self.largest_stress();
@@ -198,8 +198,8 @@ pub(crate) fn rigid_gap_um(drive: &Drive, kind: GeneratorKind) -> Option<f64> {
     Some(1e3 * least.gap_mm)
 }
 
-/// What rigid teeth leave the output of a drive as built to turn at the tightest place of its turn, arcsec; negative
-/// where they bind. Missing of a drive that is as drawn: [`rigid_gap_um`] says all of it.
+/// Free rotation of the output of a drive as built, with rigid teeth, at the tightest place of its turn, arcsec;
+/// negative where they bind. Missing of a drive that is as drawn: [`rigid_gap_um`] says all of it.
 pub(crate) fn room_as_built_arcsec(drive: &Drive, kind: GeneratorKind) -> Option<f64> {
     drive.as_built.first_not_uniform()?;
     let room = RigidMesh::new(drive, kind).ok()?.room_as_built(drive, kind)?;
@@ -245,24 +245,24 @@ mod tests {
         assert!(none(LookedAt { root_fillet_mpa: Some(3205.0), ..sound }));
     }
 
-    /// A nodal value of 664 MPa beside 1204 in a root fillet: the drive is no sounder for it. The larger is told, once,
-    /// under its name.
+    /// A nodal value of 664 MPa beside 1204 in a root fillet: the drive is no sounder for it. The larger is reported,
+    /// once, under its name.
     #[test]
     fn stress_is_judged_by_the_larger_of_nodal_and_root_fillet() {
-        let told = |nodal, fillet| {
+        let reported = |nodal, fillet| {
             let looked = LookedAt { max_von_mises_mpa: nodal, root_fillet_mpa: fillet, ..LookedAt::default() };
             looked.cautions().into_iter().map(|caution| (caution.figure, caution.value)).collect::<Vec<_>>()
         };
-        assert_eq!(told(Some(664.0), Some(1204.0)), [("root_fillet_mpa", 1204.0)]);
-        assert_eq!(told(Some(1300.0), Some(1204.0)), [("max_von_mises_mpa", 1300.0)]);
-        assert_eq!(told(Some(1300.0), None), [("max_von_mises_mpa", 1300.0)]);
-        assert_eq!(told(None, Some(1204.0)), [("root_fillet_mpa", 1204.0)]);
-        assert_eq!(told(Some(664.0), Some(900.0)), []);
-        assert_eq!(told(Some(664.0), Some(f64::NAN)).len(), 1);
-        assert_eq!(told(Some(f64::NAN), Some(900.0)).len(), 1);
+        assert_eq!(reported(Some(664.0), Some(1204.0)), [("root_fillet_mpa", 1204.0)]);
+        assert_eq!(reported(Some(1300.0), Some(1204.0)), [("max_von_mises_mpa", 1300.0)]);
+        assert_eq!(reported(Some(1300.0), None), [("max_von_mises_mpa", 1300.0)]);
+        assert_eq!(reported(None, Some(1204.0)), [("root_fillet_mpa", 1204.0)]);
+        assert_eq!(reported(Some(664.0), Some(900.0)), []);
+        assert_eq!(reported(Some(664.0), Some(f64::NAN)).len(), 1);
+        assert_eq!(reported(Some(f64::NAN), Some(900.0)).len(), 1);
     }
 
-    /// Three meshes say what one does not, and are told in its place.
+    /// Figures of three meshes replace those of one.
     #[test]
     fn stress_over_three_meshes_takes_the_place_of_that_of_one() {
         let at = |place, von_mises_mpa| PlaceStress {

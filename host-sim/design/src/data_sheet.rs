@@ -2,7 +2,7 @@
 //! motion, transmission error, stresses.
 //!
 //! The generator is held at angle 0, without load, and the output is loaded step by step to [`Loads::largest_n_m`];
-//! then the drive turns on by a tooth pitch under that load. Stiffness is told as catalogues tell it (Harmonic Drive,
+//! then the drive turns on by a tooth pitch under that load. Stiffness is defined as in catalogues (Harmonic Drive,
 //! CSF/CSG, "torsional stiffness"): K1 from the first contact to T1, K2 from T1 to T2, K3 above T2, secants of the
 //! torsion of the output. The clearance of the teeth is no part of it. An ideal drive is its own mirror image and is
 //! loaded one way; any other is loaded both ways where the clearance counts.
@@ -20,7 +20,7 @@ use flexspline_mechanics::stepping::{Problem, SolveError, SolverSettings};
 
 /// T1 and T2 over the largest load: of a CSF-25-100 they are 14 and 48 of 67 N·m.
 const RANGES: [f64; 2] = [0.21, 0.72];
-/// Share of the largest load, either way, between which lost motion is told (Harmonic Drive AG, glossary, "lost
+/// Share of the largest load, either way, between which lost motion is stated (Harmonic Drive AG, glossary, "lost
 /// motion").
 const LOST_MOTION_SHARE: f64 = 0.04;
 /// A light touch, over the largest load: it closes the clearance and winds nothing up.
@@ -28,10 +28,10 @@ const TOUCH_SHARE: f64 = 2e-4;
 /// An ideal drive whose output stands further than this (rad) from the middle when deformed has teeth that bind: it
 /// went to one side.
 const TO_ONE_SIDE_RAD: f64 = 1e-8;
-/// A touch overcomes the drag of the output so many times.
+/// A touch overcomes the drag of the output by this factor.
 const TOUCH_OVER_DRAG: f64 = 2.0;
 
-/// The torques that a sheet is told at, N·m, all positive.
+/// The torques at which a sheet states stiffness, N·m, all positive.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Loads {
     /// End of the first range of stiffness.
@@ -101,14 +101,14 @@ pub(crate) fn touch_n_m(drive: &Drive, loads: Loads) -> f64 {
     (TOUCH_SHARE * loads.largest_n_m).max(TOUCH_OVER_DRAG * drive.output.drag_torque_n_m)
 }
 
-/// What a catalogue prints. A figure is missing where the drive was not brought so far.
+/// Values of a catalogue. A figure is missing where the drive was not brought so far.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct DataSheet {
     /// Least gap between the rigid teeth of the drawing over a mesh cycle, µm; negative where they interfere. Missing
     /// where they never meet.
     pub rigid_gap_um: Option<f64>,
-    /// What rigid teeth as built leave the output to turn at the tightest place of its turn, arcsec; missing of a drive
-    /// as drawn.
+    /// Free rotation of the output with rigid teeth as built, at the tightest place of its turn, arcsec; missing of a
+    /// drive as drawn.
     pub room_as_built_arcsec: Option<f64>,
     /// Turn of the output between light touches either way, arcsec.
     pub backlash_arcsec: Option<f64>,

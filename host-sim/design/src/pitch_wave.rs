@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-/// Places between two samples at which the wave is looked at. The highest wave that samples tell goes up and down
+/// Places between two samples at which the wave is looked at. The highest wave that samples resolve goes up and down
 /// between two of them: its crest is then found to `1 - cos(pi / 64)`, a thousandth of it.
 const BETWEEN: usize = 32;
 

@@ -18,31 +18,31 @@ use crate::simulate::TipContact;
 const PLACES: usize = 6;
 /// Times that tips are lowered at most: the sizes of a catalogue take 2 to 4. A guess.
 const MOST_STEPS: usize = 6;
-/// What is taken off beyond what tips reach past one another, modules. A guess: half a tip rounding, for the places
+/// Extra relief beyond the overlap of the tips, modules. A guess: half a tip rounding, for the places
 /// between those that are looked at (a CSG-25-100 lowered by 0.006 more than needed at four places bears at a fifth).
 const MORE_MODULES: f64 = 0.03;
-/// What two runs together may say that is to be taken off, modules. A guess: the load on tips is not everywhere in
+/// Largest relief from two runs together, modules. A guess: the load on tips is not everywhere in
 /// proportion to what they reach (of a CSG-40-120 0.45 modules were taken off at once where 0.2 do).
 const MOST_AT_ONCE_MODULES: f64 = 0.1;
-/// What is taken off in all at most, modules. A guess: of the working depth of 1.35 modules it leaves more than half. A
+/// Largest relief in all, modules. A guess: of the working depth of 1.35 modules it leaves more than half. A
 /// CSG-20-160 takes 0.5, the most of 27 sizes.
 const MOST_MODULES: f64 = 0.6;
 
-/// What became of the tips of a drive.
+/// Result of the relief of a drive's tips.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Relief {
     /// The load, N·m.
     pub torque_n_m: f64,
     /// Radius of the flexspline's tip circle with which they were looked at last, mm.
     pub tip_radius_mm: f64,
-    /// What was taken off, mm; 0 where they passed freely as drawn.
+    /// Relief, mm; 0 where they passed freely as drawn.
     pub lowered_mm: f64,
-    /// What bears on tips yet.
+    /// Remaining contact of tips.
     pub left: Option<TipContact>,
 }
 
 /// Lowers the tips of a drive's flexspline until they pass those of the circular spline freely under a load; where
-/// `may_lower` is false, or teeth are S-shaped (their spaces are cut by the tips), they are only looked at. `told` is
+/// `may_lower` is false, or teeth are S-shaped (their spaces are cut by the tips), they are only looked at. `report` is
 /// called before each run with what is done.
 ///
 /// # Errors
@@ -52,7 +52,7 @@ pub fn relieve_tips(
     kind: GeneratorKind,
     torque_n_m: f64,
     may_lower: bool,
-    told: &mut dyn FnMut(&str),
+    report: &mut dyn FnMut(&str),
 ) -> Result<Relief, SolveError> {
     let may_lower = may_lower && drive.flexspline.profile != Profile::S;
     let module_mm = drive.flexspline.module_mm;
@@ -63,7 +63,7 @@ pub fn relieve_tips(
     let mut before: Option<(f64, f64)> = None;
     for step in 0..=MOST_STEPS {
         let tip_radius_mm = drive.flexspline.tip_radius_mm;
-        told(&format!("{torque_n_m} N.m, tips at {tip_radius_mm} mm"));
+        report(&format!("{torque_n_m} N.m, tips at {tip_radius_mm} mm"));
         left = tips_that_bear(&drive, kind, torque_n_m)?;
         let Some(tips) = left.filter(|_| may_lower && step < MOST_STEPS) else { break };
         // The share falls in proportion to what is taken off: two runs say where it ends.
@@ -83,7 +83,7 @@ pub fn relieve_tips(
     Ok(Relief { torque_n_m, tip_radius_mm, lowered_mm: drawn_mm - tip_radius_mm, left })
 }
 
-/// What bears on tips outside the teeth in mesh over a tooth pitch under a load, on a coarse mesh; the first place that
+/// Contact of tips outside the teeth in mesh over a tooth pitch under a load, on a coarse mesh; the first place that
 /// has it.
 ///
 /// # Errors
@@ -122,17 +122,17 @@ mod tests {
         assert_eq!((relief.lowered_mm, relief.left, runs), (0.0, None, 1));
     }
 
-    /// Tips that are a tenth of a module too high clash under a load; those that may not be lowered are told, others
-    /// are lowered until they pass.
+    /// Tips that are a tenth of a module too high clash under a load; those that may not be lowered are reported,
+    /// others are lowered until they pass.
     #[test]
     fn tips_that_clash_are_lowered_or_told() {
         let drive = Drive::cup_95().with_set("generator.bearing_stiffness_n_per_mm3=150").unwrap();
         let mut high = drive.clone();
         high.flexspline.tip_radius_mm += 0.1 * drive.flexspline.module_mm;
         let run = |may_lower| relieve_tips(&high, GeneratorKind::Cam, 200.0, may_lower, &mut |_| ()).unwrap();
-        let told = run(false);
-        println!("{told:?}");
-        assert!(told.lowered_mm == 0.0 && told.left.is_some_and(|tips| tips.share > 0.0 && tips.reach_mm > 0.0));
+        let relief = run(false);
+        println!("{relief:?}");
+        assert!(relief.lowered_mm == 0.0 && relief.left.is_some_and(|tips| tips.share > 0.0 && tips.reach_mm > 0.0));
         let lowered = run(true);
         println!("{lowered:?}");
         assert!(lowered.left.is_none() && lowered.lowered_mm > 0.0);

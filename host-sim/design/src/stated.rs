@@ -1,4 +1,4 @@
-//! What a data sheet says of a drive, read from `[data_sheet]` of its file, beside what contact FEM computes of it.
+//! Values of a data sheet, read from `[data_sheet]` of a drive's file, next to the contact FEM's values.
 //!
 //! ```toml
 //! [data_sheet]
@@ -75,7 +75,7 @@ pub const TEMPLATE: &str = "
 # completes_model = true       # tables takes the compliance and loss that the FEM lacks from here
 ";
 
-/// What a data sheet says.
+/// Values of a data sheet.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Stated {
     /// Which sheet.
@@ -234,10 +234,10 @@ pub struct Beside {
     pub computed: Option<f64>,
     /// Computed over stated; missing where either is missing or nothing is stated.
     pub ratio: Option<f64>,
-    /// Whether the ratio is within the scatter of units that the sheet tells; missing where it tells none of this
+    /// Whether the ratio is within the scatter of units that the sheet states; missing where it states none of this
     /// figure.
     pub within_scatter: Option<bool>,
-    /// What the computed figure is, and what it leaves out.
+    /// Meaning of the computed figure, and what it leaves out.
     pub words: &'static str,
     /// Why the drive is stiffer than stated; missing where it is not.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -425,7 +425,7 @@ fn starting_n_m(problem: &Problem) -> Result<f64, SolveError> {
     Ok(places.iter().map(|place| place.increment.generator_torque_n_m.abs()).fold(0.0, f64::max))
 }
 
-/// Why the stiffness of a table and that of a data sheet are told with other figures.
+/// Reason of the difference between the stiffness of a table and that of a data sheet.
 pub const TWO_SETS_OF_K: &str = "K of a table is read off its nodes, with ranges that end at 21, 72 and 100 % of its \
                                  largest torque, in the middle of both directions; K beside the data sheet is by \
                                  secants of the FEM to the torques of the sheet";
@@ -447,9 +447,9 @@ impl SheetBeside {
             let computed = row.computed.map_or_else(|| "-".to_owned(), short);
             // A ratio far below 1 is a number, too.
             let digits = |ratio: f64| if ratio.abs() < 0.1 { 4 } else { 2 };
-            let told =
+            let shown =
                 |ratio: f64| if ratio < 1e4 { format!("{ratio:.0$}", digits(ratio)) } else { format!("{ratio:.2e}") };
-            let ratio = row.ratio.map_or_else(|| "-".to_owned(), told);
+            let ratio = row.ratio.map_or_else(|| "-".to_owned(), shown);
             lines += &format!(
                 "  {:<24}{:>12}{computed:>12}{ratio:>11}  {}\n",
                 row.figure,
@@ -541,7 +541,7 @@ impl Beside {
         }
     }
 
-    /// What the figure is, whether it hangs on loads that are assumed, and whether it is within what units scatter.
+    /// Meaning of the figure, whether it depends on assumed loads, and whether it is within the scatter of units.
     pub fn remark(&self, of: &SheetBeside) -> String {
         let percent = of.stated.unit_scatter_percent.unwrap_or(0.0);
         let hangs_on = match self.figure {
@@ -699,7 +699,7 @@ mod tests {
         assert!(soft.value == 0.2 && soft.words.contains("K1 1.50, K2 0.20") && !soft.words.contains("--complete"));
     }
 
-    /// What a drive lacks that a catalogue's has is said of its stiffness, and of nothing else.
+    /// A feature that a catalogue's drive has and this one lacks is a remark on its stiffness only.
     #[test]
     fn the_reason_of_a_stiffness_is_what_the_drive_lacks() {
         let bare = Drive::hhd_95_plane();
@@ -720,18 +720,18 @@ mod tests {
         assert_eq!(stated.assumed(), ["rated_torque_n_m"]);
         let assumed = stated.assumed();
         let sheet = DataSheet::default();
-        let told =
+        let shown =
             SheetBeside { generator: GeneratorKind::Cam, stated, loads, assumed, sheet, beside: Vec::new(), why: None };
-        let text = told.text();
+        let text = shown.text();
         assert!(
             text.contains("T2 108 largest 150 (assumed) N.m")
                 && text.contains("rated torque of 99 N.m is not above T2, so the largest load, which K3 takes, is"),
             "{text}"
         );
-        let stated = Stated { t1_n_m: None, rated_torque_n_m: Some(108.0), ..told.stated };
+        let stated = Stated { t1_n_m: None, rated_torque_n_m: Some(108.0), ..shown.stated };
         let (loads, assumed) = (stated.loads(20.0), stated.assumed());
         assert_eq!((loads.largest_n_m, &assumed[..]), (150.0, &["t1_n_m", "rated_torque_n_m"][..]));
-        let said = SheetBeside { stated, loads, assumed, ..told }.assumed_in_words().unwrap();
+        let said = SheetBeside { stated, loads, assumed, ..shown }.assumed_in_words().unwrap();
         assert!(said.contains("108 N.m is not above T2, so t1_n_m, and the largest load"), "{said}");
     }
 
@@ -751,8 +751,8 @@ mod tests {
             reason: None,
         };
         let beside = vec![row(244_747.3), row(2.447e11), row(0.98)];
-        let told = SheetBeside { generator: GeneratorKind::Cam, stated, loads, assumed, sheet, beside, why: None };
-        let text = told.text();
+        let shown = SheetBeside { generator: GeneratorKind::Cam, stated, loads, assumed, sheet, beside, why: None };
+        let text = shown.text();
         let rows: Vec<Vec<&str>> =
             text.lines().filter(|line| line.contains("k1_")).map(|line| line.split_whitespace().collect()).collect();
         assert!(rows.iter().all(|row| row.len() >= 4 && row[1] == "3.1" && row[3].parse::<f64>().is_ok()), "{text}");

@@ -5,7 +5,7 @@
 //!
 //! | part | in the deck |
 //! |---|---|
-//! | wheels | our nodes and elements, `CPE8R`: the 8-node quadrilateral with 2 x 2 points that [`flexspline_mechanics::fem::element`] is |
+//! | wheels | our nodes and elements, `CPE8R`, 2 x 2 points, as [`flexspline_mechanics::fem::element`] |
 //! | material | `*ELASTIC` under `NLGEOM`: St Venant-Kirchhoff, as ours |
 //! | generator | bodies with the exact outline, every node prescribed ([`generator`]) |
 //! | contact | `SURFACE TO SURFACE`, linear penalty of our stiffness, `*FRICTION` if the drive has any |
@@ -16,7 +16,7 @@
 //! spline is turned against the teeth by a little more than the rigid clearance; `3` it is let go and the load comes
 //! on; then one for each rotation increment, and if wanted a last one to another load.
 //!
-//! What differs from our model:
+//! Differences from our model:
 //! * Flanks are the faces of the elements, parabolas through three points of the involute (1 nm off it on the standard
 //!   mesh), and tips are sharp: the rounding of a tip is in our contact but in no mesh. 0.03 mm of it is 0.05 to 0.08″
 //!   of output at 50 N·m, and all that CalculiX and we differ by beyond its own scatter.
@@ -73,7 +73,7 @@ const BEARING_TURN: f64 = 1.5;
 /// Steps in which a loaded roller drive stands, to pair its faces again.
 const STANDS: usize = 2;
 
-/// What the deck does after the generator has its form.
+/// Actions of the deck after the generator has its form.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeckSettings {
     /// Load torque on the output, N m, positive turns it forward.
@@ -114,7 +114,7 @@ pub enum DeckError {
         field: &'static str,
         /// Its value.
         found: &'static str,
-        /// What a deck has.
+        /// Allowed contents of a deck.
         allowed: &'static str,
     },
     /// An impossible mesh.

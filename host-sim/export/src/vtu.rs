@@ -6,7 +6,7 @@
 //!
 //! | field | on | what |
 //! |---|---|---|
-//! | `displacement` | points | from the undeformed wheel (turned with the output, for the circular spline) to here, mm |
+//! | `displacement` | points | from the undeformed wheel (circular spline: turned with the output), mm |
 //! | `von_mises` | points | averaged at nodes, MPa |
 //! | `wheel` | cells | 0 flexspline, 1 circular spline |
 //! | `sector` | cells | tooth of the flexspline, space of the circular spline |

@@ -8,7 +8,7 @@
 //!
 //! | field | on | what |
 //! |---|---|---|
-//! | `displacement` | points | from the undeformed flexspline to here, mm; z is the axis, from the flange to the bottom |
+//! | `displacement` | points | from the undeformed flexspline, mm; z is the axis, from the flange to the bottom |
 //! | `part` | cells | 0 toothed rim, 1 tube to the flange, 2 tube to the bottom |
 //!
 //! Points are deformed positions, mm; a filter such as ParaView's Warp By Vector makes more of them. Arrays as in

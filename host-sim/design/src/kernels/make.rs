@@ -15,7 +15,7 @@ use flexspline_mechanics::mesh::rotate;
 use flexspline_mechanics::motion::Motion;
 use flexspline_mechanics::stepping::{Problem, SolveError, Solver, SolverSettings, State};
 
-/// What to compute.
+/// Kernels to compute.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KernelPlan {
     /// Loads, N m, ascending.
@@ -88,7 +88,7 @@ impl KernelPlan {
     }
 }
 
-/// Told of every run that is done, from any thread; may ask to stop.
+/// Called after every run, from any thread; may ask to stop.
 pub type KernelProgress<'a> = dyn Fn(usize) -> ControlFlow<()> + Sync + 'a;
 
 /// Why there are no kernels.
@@ -113,7 +113,7 @@ pub enum KernelError {
         size_um: f64,
         /// The largest displacement with an equilibrium, µm.
         reached_um: f64,
-        /// What the solver says.
+        /// Reason given by the solver.
         reason: SolveError,
     },
     /// The observer asked for it.
@@ -155,7 +155,7 @@ pub fn make(
     let temperature_c = plan.temperature_c.unwrap_or(drive.temperature.reference_c);
     let problem = Problem::new(&smooth, kind, temperature_c, settings)?;
     let done = AtomicUsize::new(0);
-    let told = || match progress(done.fetch_add(1, Ordering::Relaxed) + 1) {
+    let report = || match progress(done.fetch_add(1, Ordering::Relaxed) + 1) {
         ControlFlow::Continue(()) => Ok(()),
         ControlFlow::Break(()) => Err(KernelError::Stopped),
     };
@@ -163,14 +163,14 @@ pub fn make(
     let repeats = if teeth.iter().all(|z| z.is_multiple_of(2)) { 2 } else { 1 };
 
     // First, since it is where a drive may have no equilibrium.
-    let eccentric = eccentric(&smooth, kind, plan, repeats, settings, &told)?;
+    let eccentric = eccentric(&smooth, kind, plan, repeats, settings, &report)?;
     let stepped: Vec<f64> =
         plan.torques_n_m.iter().flat_map(|t| [t * (1.0 - LOAD_STEP), t * (1.0 + LOAD_STEP)]).collect();
     let forces = stepped
         .par_iter()
         .map(|torque| {
             let forces = Forces::under(&problem, *torque, plan.positions)?;
-            told().map(|()| forces)
+            report().map(|()| forces)
         })
         .collect::<Result<Vec<_>, KernelError>>()?;
     let loads = plan
@@ -314,7 +314,7 @@ impl Forces {
 }
 
 /// The drive with its circular spline displaced, deformed afresh for each direction, whole flexspline pitches apart so
-/// that the teeth stand alike, and loaded step by step. What a displacement that is too large does is told before the
+/// that the teeth stand alike, and loaded step by step. A displacement that is too large is reported before the
 /// rest is computed.
 fn eccentric(
     drive: &Drive,
@@ -322,7 +322,7 @@ fn eccentric(
     plan: &KernelPlan,
     repeats: usize,
     settings: SolverSettings,
-    told: &(dyn Fn() -> Result<(), KernelError> + Sync),
+    report: &(dyn Fn() -> Result<(), KernelError> + Sync),
 ) -> Result<Eccentric, KernelError> {
     // On the circular spline whole pitches of the generator are whole pitches of its own.
     let pitches = f64::from(drive.circular_spline.teeth) / repeats as f64;
@@ -337,12 +337,12 @@ fn eccentric(
         torques_n_m: &plan.torques_n_m,
         problem: &problem,
         stands: AtomicUsize::new(plan.sizes_um.len()),
-        told,
+        report,
     };
     let problems = plan.sizes_um.iter().map(|size| problem(*size)).collect::<Result<Vec<_>, SolveError>>()?;
     // The ideal drive stands alike after whole pitches: once is enough.
     let ideal = loaded(Motion::deformed_or_turned_in(&problem(0.0)?, 0.0)?, &plan.torques_n_m)?;
-    told()?;
+    report()?;
     let enough = plan.sizes_um.iter().position(|size| plan.enough_um.is_some_and(|enough| *size >= enough));
     let least = enough.map_or(plan.sizes_um.len(), |k| k + 1);
     let towards = |direction: usize| {
@@ -385,9 +385,9 @@ struct Displaced<'a, P> {
     sizes_um: &'a [f64],
     torques_n_m: &'a [f64],
     problem: &'a P,
-    /// So many of the sizes have an equilibrium in the directions looked at so far.
+    /// Number of sizes with an equilibrium in the directions looked at so far.
     stands: AtomicUsize,
-    told: &'a (dyn Fn() -> Result<(), KernelError> + Sync),
+    report: &'a (dyn Fn() -> Result<(), KernelError> + Sync),
 }
 
 /// Errors of each size under each load, arcsec, and why there are no more.
@@ -425,7 +425,7 @@ impl<P: Fn(f64) -> Result<Problem, SolveError>> Displaced<'_, P> {
                     return Ok((errors, Some(reason)));
                 }
             }
-            (self.told)()?;
+            (self.report)()?;
         }
         Ok((errors, None))
     }
@@ -513,7 +513,7 @@ mod tests {
         Problem::new(&drive, GeneratorKind::Cam, drive.temperature.reference_c, coarse()).unwrap()
     }
 
-    /// What FEM says of a drive with a deviation, beyond the ideal one, at whole pitches under a load.
+    /// FEM result of a drive with a deviation, less the ideal one, at whole pitches under a load.
     fn beyond_ideal(change: impl Fn(&mut AsBuilt), pitches: &[f64], torque_n_m: f64) -> Vec<f64> {
         static IDEAL: LazyLock<Problem> = LazyLock::new(|| problem(|_| {}));
         let at = |problem: &Problem, k: f64| {
@@ -657,7 +657,7 @@ mod tests {
         assert!(sizes.windows(2).all(|w| w[0] < w[1] && w[1] < 2.5 * w[0]), "{sizes:?}");
     }
 
-    /// What is not found from nothing is reached from a smaller displacement: where both go they come to the same.
+    /// A displacement that has no equilibrium from zero is reached from a smaller one: where both go they agree.
     #[test]
     fn a_displacement_that_grows_comes_to_where_it_is_found_from_nothing() {
         let at = |size_um: f64| {
@@ -669,8 +669,13 @@ mod tests {
         let of = |motion: Motion<'_>| loaded(motion, &[5.0]).unwrap()[0];
         let from = Motion::deformed_or_turned_in(&small, 0.0).unwrap().state().clone();
         let directly = of(Motion::deformed_or_turned_in(&large, 0.0).unwrap());
-        let displaced =
-            Displaced { sizes_um: &[], torques_n_m: &[], problem: &at, stands: AtomicUsize::new(0), told: &|| Ok(()) };
+        let displaced = Displaced {
+            sizes_um: &[],
+            torques_n_m: &[],
+            problem: &at,
+            stands: AtomicUsize::new(0),
+            report: &|| Ok(()),
+        };
         let grown = of(displaced.grown(&large, 8.0, &(5.0, from)).unwrap());
         assert!((grown - directly).abs() < 0.01, "{grown} {directly}");
     }
@@ -694,7 +699,9 @@ mod tests {
         assert_eq!(of(&plan(Some(4.0))).unwrap(), [5.0]);
         let refused = of(&plan(None)).unwrap_err();
         assert!(
-            matches!(refused, KernelError::Displaced { size_um, reached_um, .. } if size_um == 100.0 && reached_um == 5.0),
+            matches!(
+                refused, KernelError::Displaced { size_um, reached_um, .. } if size_um == 100.0 && reached_um == 5.0,
+            ),
             "{refused}"
         );
     }

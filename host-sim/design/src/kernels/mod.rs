@@ -73,7 +73,7 @@ pub struct Kernels {
     pub repeats: usize,
     /// First-order kernels, lightest load first.
     pub loads: Vec<LoadKernels>,
-    /// What a displaced axis does.
+    /// Effect of a displaced axis.
     pub eccentric: Eccentric,
 }
 
@@ -377,7 +377,7 @@ impl LoadKernels {
     }
 }
 
-/// What can be mixed linearly.
+/// Values that can be mixed linearly.
 trait Blend {
     fn blend(self, other: Self, part: f64) -> Self;
 }

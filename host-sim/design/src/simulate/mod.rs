@@ -6,7 +6,7 @@
 //! 4. `pitch` and `turn`: move on until the drive has settled. No rows.
 //! 5. Follow the path, one row to each point.
 //!
-//! What comes out is quasi-static and two-dimensional: no inertia, no viscosity, no speed.
+//! The result is quasi-static and two-dimensional: no inertia, no viscosity, no speed.
 
 mod path;
 pub(crate) mod places;
@@ -52,7 +52,7 @@ const TOUCH_SHARES: [f64; 2] = [2e-5, 0.25];
 /// Halvings of a change of temperature before giving up.
 const TEMPERATURE_HALVINGS: usize = 5;
 /// Parts of what is tried again where the solver found no equilibrium on its own steps. A guess: steps that are eight
-/// times finer than the solver's own first ones, and a torsion curve of so many points where they do not help either.
+/// times finer than the solver's own first ones, and a torsion curve of this many points where they do not help either.
 const SECOND_TRY_PARTS: u32 = 8;
 
 /// Which way a one-way path goes.
@@ -74,7 +74,7 @@ impl Direction {
     }
 }
 
-/// What to simulate.
+/// Settings of a simulation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SimulationSettings {
     /// Which wave generator.
@@ -177,7 +177,7 @@ pub enum SimulateError {
         setting: &'static str,
         /// Its value.
         found: String,
-        /// What is allowed.
+        /// Allowed values.
         allowed: String,
     },
     /// The drive is impossible, or is not even deformed.
@@ -226,7 +226,7 @@ impl Unfinished {
 }
 
 impl SimulateError {
-    /// What the solver says, where it is the solver's.
+    /// The solver's own error, if it is one.
     pub fn of_solver(&self) -> Option<&SolveError> {
         match self {
             SimulateError::Solve(error) => Some(error),
@@ -241,7 +241,7 @@ impl SimulateError {
     }
 }
 
-/// What the run is doing.
+/// Phase of the run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
     /// The generator deforms the flexspline.
@@ -258,9 +258,9 @@ pub enum Phase {
     Following,
 }
 
-/// What the observer sees after every increment.
+/// Values passed to the observer after every increment.
 pub struct Observation<'a> {
-    /// What the run is doing.
+    /// Phase of the run.
     pub phase: Phase,
     /// Increments solved.
     pub done: usize,
@@ -276,7 +276,7 @@ pub struct Observation<'a> {
     pub state: &'a State,
 }
 
-/// What a run gives.
+/// Result of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Simulation {
     /// `results.csv`.
@@ -784,7 +784,7 @@ fn in_parts(motion: &mut Motion<'_>, generator_rad: f64, torque_n_m: f64) -> Res
     Ok(())
 }
 
-/// After so many of the parts of a second try; the end exactly.
+/// Cut by a number of parts for a second try; the end exactly.
 fn part_of_way(from: f64, to: f64, part: u32) -> f64 {
     if part == SECOND_TRY_PARTS { to } else { from + (to - from) * f64::from(part) / f64::from(SECOND_TRY_PARTS) }
 }
@@ -1022,7 +1022,7 @@ mod tests {
         let error = simulate(&Drive::hhd_95(), &settings, &mut |_| ControlFlow::Continue(())).unwrap_err();
         assert!(!error.is_bad_input());
         let SimulateError::Solve(of_solver) = error else { panic!("{error}") };
-        assert!(of_solver.residuals().is_some_and(|told| told.split(' ').count() > 1), "{of_solver}");
+        assert!(of_solver.residuals().is_some_and(|residuals| residuals.split(' ').count() > 1), "{of_solver}");
     }
 
     #[test]

@@ -177,7 +177,7 @@ pub fn stress_by_place(
     Ok(Place::ALL.into_iter().enumerate().map(of).collect())
 }
 
-/// What `look` finds of the drive at rest under a load on a coarse mesh with so many times the elements.
+/// Result of `look` for the drive at rest under a load on a coarse mesh, with this multiple of the elements.
 ///
 /// # Errors
 /// No equilibrium.

@@ -49,7 +49,7 @@ pub struct Row {
     /// Force of the generator along its major axis on the half of the rim at 0°, outward, N.
     #[serde(skip)]
     pub lobe_force_n: f64,
-    /// What bears on tips outside the main zones, under a load that exceeds the drag.
+    /// Contact of tips outside the main zones, under a load that exceeds the drag.
     #[serde(skip)]
     pub tips: Option<TipContact>,
     /// Generator travel of the increment, rad, signed.

@@ -1,4 +1,4 @@
-//! What a run comes to: the metrics of `summary.json`.
+//! Summary of a run: the metrics of `summary.json`.
 //!
 //! Each is taken where it means what its name says, and is `null` where the path cannot give it.
 
@@ -75,11 +75,11 @@ pub struct Summary {
     pub mean_error_forward_arcsec: Option<f64>,
     /// Mean error while it turns backward.
     pub mean_error_backward_arcsec: Option<f64>,
-    /// What the output has lost between turning forward and turning backward, at the first reversal and the same load:
+    /// Lost motion of the output between turning forward and turning backward, at the first reversal and the same load:
     /// mean error backward minus mean error forward. Without load it is the clearance of the mesh, pushed to either
     /// side by the drag on the output, so `null` when the load exceeds the drag.
     pub backlash_arcsec: Option<f64>,
-    /// What the output has lost at the first reversal under a load that exceeds the drag and keeps the flanks of one
+    /// Lost motion of the output at the first reversal under a load that exceeds the drag and keeps the flanks of one
     /// side together: what friction and the drag leave. `null` when the load does not exceed the drag.
     pub reversal_lost_motion_arcsec: Option<f64>,
     /// Generator travel from the first reversal during which the output stays within 0.05″ of where it stood. Between
@@ -125,7 +125,7 @@ pub struct Summary {
     pub peak_flank_pressure_mpa: f64,
     /// Where the teeth bear at the row of that pressure, the zones with the largest force first.
     pub zones: Vec<Zone>,
-    /// What bears on tips outside the main zones at the worst row; `null` where nothing does.
+    /// Contact of tips outside the main zones at the worst row; `null` where there is none.
     pub tip_contact: Option<TipContact>,
     /// Largest force of the generator along its major axis on one half of the rim, outward, N.
     pub lobe_force_n: f64,
@@ -142,7 +142,7 @@ pub struct Summary {
     pub peak_generator_pressure_mpa: f64,
     /// Mean torque of the generator over the first settled stretch.
     pub generator_torque_mean_n_m: Option<f64>,
-    /// What that mean is without friction, by virtual work: minus load and drag, over the ratio. Of a drive without
+    /// That mean without friction, by virtual work: minus load and drag, over the ratio. Of a drive without
     /// friction it is the better number: the mean of rows has what the rows miss between them.
     pub generator_torque_virtual_work_n_m: Option<f64>,
     /// Whether the flanks have no friction.
@@ -153,12 +153,12 @@ pub struct Summary {
     /// Largest residual of all rows, relative to the largest contact force.
     pub residual_worst: f64,
 
-    /// What rigid teeth as built leave the output to turn at the tightest place of its turn, arcsec; `null` of a drive
-    /// as drawn.
+    /// Free rotation of the output with rigid teeth as built, at the tightest place of its turn, arcsec; `null` of a
+    /// drive as drawn.
     pub room_as_built_arcsec: Option<f64>,
-    /// What has to be known before these figures are used; empty for a sound drive.
+    /// Cautions on these figures; empty for a sound drive.
     pub cautions: Vec<Caution>,
-    /// What the data sheet in the drive's file says, beside what is computed; left out where the file has none.
+    /// Values of the data sheet in the drive's file, next to the computed ones; left out where the file has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub data_sheet: Option<SheetBeside>,
 

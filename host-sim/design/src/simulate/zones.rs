@@ -22,7 +22,7 @@ const NEXT: usize = 2;
 /// does to an output that is wound up by minutes is some hundredths of an arc-second.
 pub(crate) const MOST_TIP_SHARE: f64 = 1e-3;
 
-/// What is taken off tips that clash at a time, modules. A guess: the sizes of a catalogue need 0.1 to 0.5 in all, more
+/// Relief of clashing tips in one step, modules. A guess: the sizes of a catalogue need 0.1 to 0.5 in all, more
 /// the larger their ratio, as what gives way is in proportion to the size and not to the module ([`crate::relief`]).
 const RELIEF_MODULES: f64 = 0.1;
 
@@ -54,7 +54,7 @@ pub struct Zone {
     pub reach_mm: f64,
 }
 
-/// What bears on tips outside the main zones.
+/// Contact of tips outside the main zones.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TipContact {
     /// Share of the load, of all teeth's normal forces.
@@ -148,7 +148,7 @@ fn pairs(problem: &Problem, state: &State) -> Vec<BearingPair> {
 }
 
 impl TipContact {
-    /// What bears on tips in a state that has all nodes near the flanks.
+    /// Contact of tips in a state that has all nodes near the flanks.
     pub fn at(problem: &Problem, state: &State) -> Option<TipContact> {
         let flexspline = &problem.drive.flexspline;
         let tips = TipContact::of(&zones(problem, state), flexspline.module_mm)?;
@@ -212,8 +212,8 @@ mod tests {
         Zone { is_main, side, from_deg, to_deg, teeth: 3, force_n, share, largest_n, peak_mpa, on_tips, reach_mm }
     }
 
-    /// What bears on flanks beside the main zone is a second place of contact, as four rollers have it; what bears on
-    /// tips is a clash, told with the angle that is nearer to the axis, from some share on.
+    /// Flank contact next to the main zone is a second place of contact, as four rollers have it; contact of
+    /// tips is a clash, reported with the angle that is nearer to the axis, from some share on.
     #[test]
     fn tips_outside_the_main_zone_clash_and_flanks_do_not() {
         let [main, flanks] = [zone(true, 0.9, 0.6, 0.0), zone(false, 0.1, 0.2, 30.0)];

@@ -1,4 +1,4 @@
-//! What a data sheet fills in: the compliance that the FEM of a drive lacks, as a spring of its own in series with it,
+//! Completion by a data sheet: the compliance that the FEM of a drive lacks, as a spring of its own in series with it,
 //! and the loss as springs that slip.
 //!
 //! ```text
@@ -87,12 +87,12 @@ pub enum CompletionError {
     LoopTooWide {
         /// As stated.
         loss_arcmin: f64,
-        /// What there is room for.
+        /// Largest value that fits.
         most_arcmin: f64,
     },
 }
 
-/// What a sheet says of a series, all that completes a table.
+/// Values of a series' sheet that complete a table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SheetStiffness {
     source: Option<String>,
@@ -148,7 +148,7 @@ impl SheetStiffness {
         nodes
     }
 
-    /// What the table of a drive's FEM lacks of this sheet.
+    /// The part of this sheet's stiffness that the table of a drive's FEM lacks.
     pub(super) fn completes(&self, drive: &Drive, table: &Table<'_>) -> Result<Completed, CompletionError> {
         let ends_n_m = f64::from(table.torque_range_n_m()[1]);
         let (t1_n_m, t2_n_m) = (self.t1_n_m, self.t2_n_m);
@@ -209,7 +209,7 @@ impl SheetStiffness {
         Ok(springs.to_vec())
     }
 
-    /// What the mesh level of the image ends with; firmware reads it by `Table::sheet_scatter`.
+    /// End of the image's mesh level; firmware reads it by `Table::sheet_scatter`.
     pub(super) fn mark(&self) -> String {
         format!(", sheet +-{} %", self.scatter_percent)
     }
@@ -233,7 +233,7 @@ pub struct MissingSpring {
 }
 
 impl MissingSpring {
-    /// What it turns the output by, rad, in the sense of the torque, N m.
+    /// Rotation of the output, rad, in the sense of the torque, N m.
     #[must_use]
     pub fn torsion_rad(&self, torque_n_m: f64) -> f64 {
         let load = torque_n_m.abs();
@@ -253,7 +253,7 @@ pub struct SlipSpring {
     pub gain_rad_per_n_m: f64,
 }
 
-/// What a data sheet added to a table.
+/// A data sheet's additions to a table.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Completed {
     /// Which sheet.
@@ -266,7 +266,7 @@ pub struct Completed {
     pub fem_n_m_per_rad: [Option<f64>; 3],
     /// The spring in series.
     pub spring: MissingSpring,
-    /// What the table may be off by at its largest torque where units scatter so far, ± arcsec: s / (1 - s) of wind-up.
+    /// Uncertainty of the table at its largest torque with this scatter of units, ± arcsec: s / (1 - s) of wind-up.
     pub uncertainty_arcsec: f64,
     /// Springs that slip, for the loss: settings of the core's `SlipBank`, beside the table. None where the sheet
     /// states no loss, or the clearance of the FEM has it all.

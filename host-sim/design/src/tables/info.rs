@@ -17,7 +17,7 @@ pub struct MadeTable {
     pub kind: GeneratorKind,
     /// The `.fxt` image.
     pub image: Vec<u8>,
-    /// What is said about it in JSON.
+    /// Its description in JSON.
     pub info: TableInfo,
     /// The samples of its sweep, if it was swept.
     pub samples: Option<Vec<Sample>>,
@@ -34,7 +34,7 @@ impl MadeTable {
     }
 }
 
-/// What made a table, what is in it and how far it holds.
+/// Origin of a table, its contents and range of validity.
 #[derive(Debug, Clone, Serialize)]
 pub struct TableInfo {
     /// Version of this object.
@@ -79,17 +79,17 @@ pub struct TableInfo {
     pub backlash_arcsec: f64,
     /// Error in the middle of the play at the ends of the torque axis, arcsec.
     pub wind_up_arcsec: [f64; 2],
-    /// Stiffness as catalogues tell it; null for a table that was not made by FEM of a drive.
+    /// Stiffness as defined in catalogues; null for a table that was not made by FEM of a drive.
     pub stiffness: Option<Stiffness>,
-    /// What has to be known before the table is used; empty for a sound drive.
+    /// Cautions on the table; empty for a sound drive.
     pub cautions: Vec<Caution>,
-    /// What else has to be known of it, in words; left out where there is nothing.
+    /// Further remarks, in words; left out where there are none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub remarks: Vec<String>,
-    /// What the data sheet in the drive's file says, beside what is computed; left out where the file has none.
+    /// Values of the data sheet in the drive's file, next to the computed ones; left out where the file has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub data_sheet: Option<SheetBeside>,
-    /// What a data sheet added to it; left out where none did.
+    /// A data sheet's additions; left out where none was used.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub completed: Option<Completed>,
     /// Stress in root fillets, on bore and flanks under the largest load of the table, over three meshes; left out
@@ -99,7 +99,7 @@ pub struct TableInfo {
     /// Why there is no stress although it was asked for; left out where there is, or where it was not.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub no_stress: Option<String>,
-    /// What is left over whole turns of a drive that does not repeat from tooth to tooth; null for one that does.
+    /// Residual over whole turns of a drive that does not repeat from tooth to tooth; null for one that does.
     pub turns: Option<TurnsInfo>,
     /// Command line, once known.
     pub command: String,
@@ -144,7 +144,7 @@ pub struct TurnsInfo {
     pub places: usize,
     /// Torque by torque, in the order of the nodes.
     pub by_torque: Vec<TurnsAtTorque>,
-    /// What is said of the torque nodes, in words.
+    /// Remark on the torque nodes.
     pub remark: String,
 }
 
@@ -156,7 +156,7 @@ pub struct TurnsAtTorque {
     /// Range of the drive's error over the places, the ripple within a pitch left out, arcsec. So few places see most,
     /// not all, of its transmission accuracy.
     pub drive_peak_to_peak_arcsec: f64,
-    /// What the table leaves of it, arcsec: root mean square.
+    /// Residual with the table, arcsec: root mean square.
     pub left_rms_arcsec: f64,
     /// Largest difference between table and samples, arcsec.
     pub left_worst_arcsec: f64,

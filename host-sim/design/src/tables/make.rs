@@ -48,7 +48,7 @@ const CHOICES: [(usize, f64); 2] = [(28, 0.6), (12, 2.0)];
 /// Torque nodes on each side that are the bound of what can be asked for: an axis has room for them, with the pair at
 /// the drag torque and the end.
 const MOST_NODES: usize = 30;
-/// The largest torque must be so many times the drag of the output, or there is no wind-up to sample.
+/// The largest torque must be this multiple of the drag of the output, or there is no wind-up to sample.
 const LEAST_OVER_DRAG: f64 = 20.0;
 /// Largest torque, N m.
 const MOST_TORQUE_N_M: f64 = 1e4;
@@ -56,7 +56,7 @@ const MOST_TORQUE_N_M: f64 = 1e4;
 const TOLERANCES_ARCSEC: [f64; 2] = [0.01, 60.0];
 
 impl TableSettings {
-    /// What a table is made with unless told otherwise: nodes as the FEM asks for them up to the generator's rated
+    /// Default settings of a table: nodes as the FEM asks for them up to the generator's rated
     /// torque, the ends of the operating temperatures, eight positions, the fast solver on the standard mesh.
     pub fn for_generator(drive: &Drive, kind: GeneratorKind) -> TableSettings {
         let plan = SweepPlan::for_generator(drive, kind);
@@ -132,7 +132,7 @@ pub enum MakeError {
         setting: &'static str,
         /// Its value.
         found: String,
-        /// What is allowed.
+        /// Allowed values.
         allowed: String,
     },
     /// The sweep ended early.
@@ -174,7 +174,7 @@ pub struct TableProgress {
     pub last: SweepProgress,
 }
 
-/// Told of every increment, from any thread; may ask to stop.
+/// Called after every increment, from any thread; may ask to stop.
 pub type TableObserver<'a> = dyn Fn(TableProgress) -> ControlFlow<()> + Sync + 'a;
 
 /// Makes the table of a drive with one generator by contact FEM.
@@ -197,14 +197,14 @@ pub fn make(
         TorqueNodes::Chosen(choice) => over_turns + planned_increments(drive, &plan, choice.most, 0) + choice.most,
         TorqueNodes::Given(nodes) => over_turns + planned_increments(drive, &plan, nodes.len() / 2, 0),
     });
-    let tell = |last: SweepProgress| {
+    let report = |last: SweepProgress| {
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
         let expected = expected.load(Ordering::Relaxed).max(done);
         observe(TableProgress { done, expected, last })
     };
     let repeating = Drive { as_built: drive.as_built.uniform_part(), ..drive.clone() };
     let first = plan.temperature_nodes_c[0];
-    let sampler = Sampler::new(&repeating, kind, plan.positions, first, settings.solver, &tell)?;
+    let sampler = Sampler::new(&repeating, kind, plan.positions, first, settings.solver, &report)?;
     let chosen = match &settings.torque_nodes {
         TorqueNodes::Chosen(choice) => {
             let mut choice = *choice;
@@ -223,7 +223,7 @@ pub fn make(
         TorqueNodes::Given(_) => None,
     };
     let known = chosen.as_ref().map_or(&[][..], |chosen| &chosen.known);
-    let mut swept = sweep_turns(drive, kind, &plan, known, &sampler, settings.solver, &tell)?;
+    let mut swept = sweep_turns(drive, kind, &plan, known, &sampler, settings.solver, &report)?;
     if let Some(chosen) = &chosen {
         swept.work.add(chosen.work);
     }

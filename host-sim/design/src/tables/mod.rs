@@ -3,7 +3,7 @@
 //! ```text
 //! drive -> torque_nodes -> sweep, turns -> samples -> project -> image (.fxt), info (.json), source_files (.rs, .h)
 //!                                             ^                    |
-//!                         another program, a bench                 +-> validate: against fresh FEM; replay: over measured rows
+//!                         another program, a bench                 +-> validate: fresh FEM; replay: measured rows
 //! ```
 
 mod complete;

@@ -1,7 +1,7 @@
 //! From samples to the table image that firmware reads.
 //!
 //! The projection itself is the core's ([`flexspline::make`]), the same code on the host and on board. Here its plan is
-//! laid: which nodes, which harmonics the samples can tell apart, and where the table came from.
+//! laid: which nodes, which harmonics the samples can distinguish, and where the table came from.
 
 use flexspline::make::{Harmonics, MissingDirection, Plan, ProjectError, Sample, Workspace, make_image};
 use flexspline::{FixedMember, MAX_RIPPLE_NODES, Provenance, Table};
@@ -155,7 +155,7 @@ pub(super) fn trial_table(
     make((&drive.name, drive.hash()), kind, &core_plan, &samples, source, "trial", 0.0).map(|table| table.image)
 }
 
-/// What a table of FEM samples is projected with.
+/// Plan of the projection of a table of FEM samples.
 fn fem_plan<'a>(drive: &Drive, plan: &'a SweepPlan) -> Result<Plan<'a>, TableError> {
     let repeats = drive.as_built.first_not_uniform().is_none();
     let harmonics = |orders| if repeats { Harmonics::default() } else { harmonics_of(orders) };
@@ -180,7 +180,8 @@ fn harmonics_of(orders: &'static [u16]) -> Harmonics<'static> {
 }
 
 /// The table of samples from elsewhere: every torque and temperature that occurs is a node, the ripple has as many
-/// nodes as every node has positions, and harmonics are fitted where the samples cover enough turns to tell them apart.
+/// nodes as every node has positions, and harmonics are fitted where the samples cover enough turns to distinguish
+/// them.
 pub fn from_samples(
     drive: &Drive,
     kind: GeneratorKind,

@@ -40,7 +40,7 @@ pub enum SampleError {
         file: String,
         /// The line of the header, from 1.
         line: u64,
-        /// What is wrong.
+        /// Description of the fault.
         what: String,
     },
     /// A row cannot be read.

@@ -4,7 +4,7 @@
 //! its own mirror image: backward motion under a torque T is the reflection of forward motion under −T, so only forward
 //! motion is computed, and `e_backward(-psi, -T) = -e_forward(psi, T)` gives the other direction.
 //!
-//! Frictionless flanks leave nothing but the drag of the output to tell the directions apart: the flanks carry `T - d`
+//! Frictionless flanks leave nothing but the drag of the output to distinguish the directions: the flanks carry `T - d`
 //! in forward and `T + d` in backward motion, and the state is an elastic one that depends on nothing else. So one
 //! torque sign is enough too: from a forward state under T the backward one follows by the compliance c of the output,
 //! `e_backward(psi, T) = e_forward(psi, T) + 2 d c`. The drag is small (0.02 N.m; the second order is below 0.05″).
@@ -20,7 +20,7 @@ use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::motion::{Motion, settling_pitches};
 use flexspline_mechanics::stepping::{Increment, Problem, SolveError, SolverSettings, State};
 
-/// What to sample.
+/// Samples to compute.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SweepPlan {
     /// Torque nodes, ascending, symmetric about zero, N m.
@@ -79,10 +79,10 @@ pub struct SweepProgress {
     pub temperature_c: f64,
 }
 
-/// Told of every increment, from any thread; may ask to stop.
+/// Called after every increment, from any thread; may ask to stop.
 pub(crate) type Observer<'a> = dyn Fn(SweepProgress) -> ControlFlow<()> + Sync + 'a;
 
-/// What solving took.
+/// Work of the solver.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct Work {
     /// Increments solved by FEM.
@@ -122,7 +122,7 @@ pub(crate) struct Sweep {
     pub kind: GeneratorKind,
     /// Forward samples, computed, then backward samples, mirrored.
     pub samples: Vec<Sample>,
-    /// What it took.
+    /// Work spent.
     pub work: Work,
     /// Unknowns of the model.
     pub degrees_of_freedom: usize,
@@ -209,7 +209,7 @@ impl<'a> Sampler<'a> {
         Ok(Sampler { positions, temperature_c, problem, unloaded, observe })
     }
 
-    fn told(&self, motion: &Motion<'_>, work: &mut Work) -> Result<(), SweepError> {
+    fn report(&self, motion: &Motion<'_>, work: &mut Work) -> Result<(), SweepError> {
         let (iterations, torque_n_m) = (motion.last().iterations, motion.state().torque_n_m);
         work.count(motion.last());
         match (self.observe)(SweepProgress { iterations, torque_n_m, temperature_c: self.temperature_c }) {
@@ -226,7 +226,7 @@ impl<'a> Sampler<'a> {
     pub fn load(&self, from: &Loaded, torque: f32, work: &mut Work) -> Result<Loaded, SweepError> {
         let mut motion = self.goes_on(from);
         motion.load(f64::from(torque))?;
-        self.told(&motion, work)?;
+        self.report(&motion, work)?;
         Ok(Loaded::of(&motion, torque))
     }
 
@@ -241,7 +241,7 @@ impl<'a> Sampler<'a> {
         let mut motion = self.goes_on(loaded);
         let step = motion.pitch() / self.positions as f64;
         while !self.in_motion(motion.last()) && motion.settle_on(step)? {
-            self.told(&motion, work)?;
+            self.report(&motion, work)?;
         }
         let others = self.positions.div_ceil(2);
         let mut points = vec![self.computed(&motion)];
@@ -252,7 +252,7 @@ impl<'a> Sampler<'a> {
             }
             let steps = if k == others && self.positions.is_multiple_of(2) { 3.0 } else { 2.0 };
             motion.turn(steps * step)?;
-            self.told(&motion, work)?;
+            self.report(&motion, work)?;
             points.push(self.computed(&motion));
         }
         Ok((KnownNode { torque: loaded.torque, points }, true))
@@ -332,7 +332,7 @@ pub(crate) fn sweep(
     Ok(Sweep { kind, samples, work, degrees_of_freedom, places: 0 })
 }
 
-/// Increments that a sweep over so many torque nodes on each side of zero takes, about, where so many are known at one
+/// Increments, about, that a sweep over N torque nodes on each side of zero takes, where so much is known at one
 /// temperature: at each of them the load comes on, the drive settles and is sampled.
 pub(super) fn planned_increments(drive: &Drive, plan: &SweepPlan, nodes: usize, known: usize) -> usize {
     let sides = match Half::of(drive) {

@@ -35,7 +35,7 @@ pub(crate) struct ChosenNodes {
     pub known: Vec<KnownNode>,
     /// Whether the table meets the tolerance at the middle of every interval; if not, the nodes ran out.
     pub resolved: bool,
-    /// What it took.
+    /// Work spent.
     pub work: Work,
 }
 

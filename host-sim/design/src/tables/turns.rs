@@ -1,9 +1,9 @@
 //! FEM sweeps of a drive that does not repeat from tooth to tooth: every imperfection of
 //! [`flexspline_mechanics::drive::AsBuilt`] but uniform wear and temperature.
 //!
-//! What such a drive does beyond the same drive without them depends on where generator and output stand in their
-//! turns. It is geometry: friction has little part in it, and without friction contact converges several times faster.
-//! So two sweeps are put together:
+//! The difference between such a drive and the same one without them depends on where generator and output stand in
+//! their turns. It is geometry: friction has little part in it, and without friction contact converges several times
+//! faster. So two sweeps are put together:
 //!
 //! * the drive without the imperfections, over one tooth pitch at every node, as [`crate::tables::sweep`] does it;
 //! * the *deviation*, the output with the imperfections less the output without, both frictionless, at a few loads of
@@ -129,7 +129,7 @@ struct Count<'a> {
 }
 
 impl Count<'_> {
-    fn told(&mut self, motion: &Motion<'_>) -> Result<(), SweepError> {
+    fn report(&mut self, motion: &Motion<'_>) -> Result<(), SweepError> {
         self.work.count(motion.last());
         let progress = SweepProgress {
             iterations: motion.last().iterations,
@@ -149,7 +149,7 @@ impl Count<'_> {
         let pitch = problem.flexspline.pitch();
         let mut motion = Motion::deformed(problem, first - pitch)?;
         motion.load(torque_n_m)?;
-        self.told(&motion)?;
+        self.report(&motion)?;
         let mut errors = Vec::with_capacity(places.len());
         for &place in places {
             match motion.jump(place) {
@@ -157,12 +157,12 @@ impl Count<'_> {
                 Err(SolveError::NotConverged { .. }) => {
                     motion.deform(place - pitch)?;
                     motion.load(torque_n_m)?;
-                    self.told(&motion)?;
+                    self.report(&motion)?;
                     motion.turn_to(place)?;
                 }
                 jumped => jumped?,
             }
-            self.told(&motion)?;
+            self.report(&motion)?;
             errors.push(motion.error_rad());
         }
         Ok(errors)
@@ -247,7 +247,7 @@ fn common_harmonics(drive: &Drive, signs: &[(Vec<f64>, Vec<[f64; LEVELS]>); 2]) 
         normal = Some(normal.map_or(part.clone(), |(matrix, right)| (matrix + &part.0, right + &part.1)));
     }
     let Some((matrix, right)) = normal else { return Vec::new() };
-    let factor = cholesky(matrix.as_ref()).expect("the places tell the harmonics apart");
+    let factor = cholesky(matrix.as_ref()).expect("the places distinguish the harmonics");
     let solution = factor.solve(right.as_ref());
     (0..solution.nrows()).map(|k| solution[(k, 0)]).collect()
 }

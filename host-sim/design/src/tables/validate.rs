@@ -22,7 +22,7 @@ use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::motion::Motion;
 use flexspline_mechanics::stepping::{Problem, SolveError, SolverSettings};
 
-/// What a table may miss fresh FEM by, arcsec: root mean square and largest.
+/// Allowed deviation of a table from fresh FEM, arcsec: root mean square and largest.
 pub const RMS_BOUND_ARCSEC: f64 = 0.5;
 /// Largest difference, arcsec.
 pub const MAX_BOUND_ARCSEC: f64 = 2.0;
@@ -44,7 +44,7 @@ pub struct ValidationSettings {
     pub seed: u64,
     /// Numerical method of the fresh FEM.
     pub solver: SolverSettings,
-    /// What a data sheet added to the table: the FEM does not have it.
+    /// A data sheet's addition to the table: the FEM does not have it.
     pub spring: Option<MissingSpring>,
 }
 
@@ -95,7 +95,7 @@ pub struct Validation {
     pub table_id: String,
     /// "passed" or "bound missed".
     pub status: &'static str,
-    /// What it may miss fresh FEM by, arcsec: root mean square. Of a drive that does not repeat from tooth to tooth
+    /// Allowed deviation from fresh FEM, arcsec: root mean square. Of a drive that does not repeat from tooth to tooth
     /// `RMS_BOUND_ARCSEC` and one and a half times what the table states itself.
     pub rms_bound_arcsec: f64,
     /// Largest, arcsec; likewise.
@@ -169,7 +169,7 @@ pub fn check_drive(drive: &Drive, table: &Table<'_>) -> Result<GeneratorKind, Va
     Ok(kind)
 }
 
-/// Compares a table with fresh FEM. `observe` is told the increments done and about how many there will be.
+/// Compares a table with fresh FEM. `observe` receives the increments done and about how many there will be.
 pub fn validate(
     drive: &Drive,
     table: &Table<'_>,
@@ -249,7 +249,7 @@ struct FreshRun<'a> {
 }
 
 impl FreshRun<'_> {
-    fn told(&mut self) -> Result<(), ValidateError> {
+    fn report(&mut self) -> Result<(), ValidateError> {
         self.increments += 1;
         match (self.observe)(self.increments, self.total.max(self.increments)) {
             ControlFlow::Continue(()) => Ok(()),
@@ -261,7 +261,7 @@ impl FreshRun<'_> {
     fn settle(&mut self, motion: &mut Motion<'_>, sign: f64) -> Result<(), ValidateError> {
         let step = sign * motion.pitch() / SETTLING_STEPS;
         while motion.settle_on(step)? {
-            self.told()?;
+            self.report()?;
         }
         Ok(())
     }
@@ -276,11 +276,11 @@ impl FreshRun<'_> {
     ) -> Result<(), ValidateError> {
         let sign = if random.bool() { 1.0 } else { -1.0 };
         motion.load(torque_n_m)?;
-        self.told()?;
+        self.report()?;
         self.settle(motion, sign)?;
         for _ in 0..positions {
             motion.turn(sign * motion.pitch() * (0.1 + 0.2 * random.f64()))?;
-            self.told()?;
+            self.report()?;
             let mut play = PlayState::after_motion(if sign > 0.0 { Direction::Forward } else { Direction::Backward });
             self.compare("steady", motion, temperature_c, sign, &mut play)?;
         }
@@ -305,7 +305,7 @@ impl FreshRun<'_> {
         let turn = -1.6 * backlash * self.drive.ratio() / REVERSAL_STEPS as f64;
         for _ in 0..REVERSAL_STEPS {
             motion.turn(turn)?;
-            self.told()?;
+            self.report()?;
             self.compare("reversal", motion, temperature_c, -1.0, &mut play)?;
         }
         Ok(())

@@ -40,7 +40,7 @@ pub enum LibraryError {
     File {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Description of the fault.
         why: String,
     },
     /// Nowhere to be found, and why it cannot be built.
@@ -48,7 +48,7 @@ pub enum LibraryError {
     Missing {
         /// The target.
         target: String,
-        /// What to do.
+        /// Remedy.
         why: String,
     },
     /// The build failed.
@@ -56,7 +56,7 @@ pub enum LibraryError {
     Build {
         /// The target.
         target: String,
-        /// What it said last.
+        /// Last output.
         log: String,
     },
 }
@@ -134,7 +134,7 @@ impl Places {
     /// Builds the library of a target from the checkout.
     ///
     /// # Errors
-    /// What cargo says.
+    /// Output of cargo.
     pub fn build(&self, target: &str) -> Result<BundleLibrary, LibraryError> {
         self.can_build(target)?;
         let checkout = self.checkout.as_deref().unwrap_or(Path::new("."));

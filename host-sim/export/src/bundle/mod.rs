@@ -1,5 +1,5 @@
-//! What firmware people add to a project: tables, a reader in C99, the core as static libraries, vectors, and what
-//! their build systems ask for.
+//! Files that firmware developers add to a project: tables, a reader in C99, the core as static libraries, vectors, and
+//! what their build systems ask for.
 //!
 //! [`Table`]s and [`BundleLibrary`]s to the files of a folder ([`Bundle::files`]); [`libraries`] finds or builds the
 //! libraries. The sources in C and what is the same in every bundle are in this program; names, versions and lists are
@@ -23,7 +23,7 @@ use libraries::BundleLibrary;
 
 /// Version of what is bundled: that of the workspace.
 pub(crate) const VERSION: &str = env!("CARGO_PKG_VERSION");
-/// What tells a bundle from any other folder.
+/// File that identifies a bundle's folder.
 pub const MANIFEST: &str = "manifest.json";
 /// Steps of each table in the vectors.
 const STEPS: usize = 400;
@@ -51,7 +51,7 @@ const TEMPLATES: [(&str, &str); 7] = [
     ("example.c", include_str!("templates/example.c")),
 ];
 
-/// What is wrong with the tables of a bundle.
+/// Faults of a bundle's tables.
 #[derive(Debug, Error)]
 pub enum BundleError {
     /// No table.
@@ -62,7 +62,7 @@ pub enum BundleError {
     Image {
         /// The file.
         file: String,
-        /// What the core says.
+        /// Error of the core.
         error: flexspline::ImageError,
     },
     /// Two files whose names are one in C.
@@ -90,7 +90,7 @@ impl Table {
     /// Of a file's name and contents.
     ///
     /// # Errors
-    /// What the core says of the image.
+    /// Checks the image with the core.
     pub fn new(file: &str, stem: &str, image: Vec<u8>) -> Result<Table, BundleError> {
         flexspline::Table::check(&image).map_err(|error| BundleError::Image { file: file.to_owned(), error })?;
         let letter = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '_' };
@@ -106,7 +106,7 @@ impl Table {
         format!("flexspline_{}_table", self.name)
     }
 
-    /// What it is, in one line.
+    /// Description, in one line.
     fn about(&self) -> String {
         let table = self.checked();
         let [torque_least, torque_most] = table.torque_range_n_m();

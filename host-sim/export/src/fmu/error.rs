@@ -23,7 +23,7 @@ pub enum FmuExportError {
     /// The scenario's table.
     #[error(transparent)]
     Flight(#[from] FlightError),
-    /// What the FMU itself would refuse.
+    /// The error of the FMU itself.
     #[error(transparent)]
     Resources(#[from] FmuError),
     /// A file that is no library of an FMU.
@@ -31,7 +31,7 @@ pub enum FmuExportError {
     NoLibrary {
         /// The file.
         file: PathBuf,
-        /// What it is instead.
+        /// Actual contents.
         why: String,
     },
     /// Two libraries for one platform.

@@ -22,7 +22,7 @@ use flexspline_mechanics::mesh::WheelMesh;
 const DEPTH: f64 = 1.0;
 /// Length of a face of a roller, mm.
 const ROLLER_FACE: f64 = 0.2;
-/// What lies between the generator before assembly and the bore, mm.
+/// Gap between the generator before assembly and the bore, mm.
 const CLEARANCE: f64 = 1e-4;
 
 /// The bodies of a generator. Node numbers count from 0.

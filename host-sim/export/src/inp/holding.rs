@@ -170,7 +170,7 @@ mod tests {
         }
     }
 
-    /// What our solver holds at zero, weighted in its own way, is zero in the deck's sums too.
+    /// A sum that our solver holds at zero, weighted in its own way, is zero in the deck's sums too.
     #[test]
     fn a_loaded_drive_of_ours_satisfies_the_equations() {
         let drive = Drive::hhd_95();

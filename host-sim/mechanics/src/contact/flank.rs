@@ -975,10 +975,7 @@ mod tests {
                     }
                 }
             }
-            assert!(
-                tightest < 5e-3 && rounded > 0,
-                "a bound that tells nothing: {tightest}, {rounded} on the rounding"
-            );
+            assert!(tightest < 5e-3 && rounded > 0, "a useless bound: {tightest}, {rounded} on the rounding");
         });
     }
 
