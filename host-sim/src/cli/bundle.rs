@@ -48,7 +48,7 @@ pub(super) struct BundleCommand {
 /// So that a line of them has some hundred characters.
 const TARGETS_A_LINE: usize = 4;
 
-/// What `--json` prints.
+/// Report that `--json` prints.
 #[derive(Debug, Serialize)]
 struct Bundled {
     folder: String,
@@ -210,7 +210,7 @@ fn may_be_replaced(out: &Path) -> Result<(), Failure> {
     }
 }
 
-/// What is first in a folder of a bundle, by name, and is none of the manifest's files as they were written.
+/// First file in a bundle's folder, by name, that is none of the manifest's files as they were written.
 fn foreign(top: &Path, folder: &Path, manifest: &Manifest) -> io::Result<Option<String>> {
     let mut entries = fs::read_dir(folder)?.collect::<io::Result<Vec<_>>>()?;
     entries.sort_by_key(fs::DirEntry::file_name);

@@ -57,7 +57,8 @@ pub(super) struct Calibrate {
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     ratio: Option<f64>,
     /// Wave generator recorded in the table: two-roller, four-roller, double-disc or cam
-    #[arg(long, value_name = "G", default_value = "cam", value_parser = names::generator(), hide_possible_values = true)]
+    #[arg(long, value_name = "G", default_value = "cam", value_parser = names::generator())]
+    #[arg(hide_possible_values = true)]
     generator: GeneratorKind,
     #[command(flatten)]
     columns: LogOptions,
@@ -193,7 +194,7 @@ impl Calibrate {
         context.print(&planned, || planned_text(&planned, out))
     }
 
-    /// What to add to the logs.
+    /// Plan of further logs.
     fn further(&self, context: &Context, prior: &Prior<'_>, made: &Calibrated) -> Result<Planned, Failure> {
         let first = made.first();
         let temperature =
@@ -204,7 +205,7 @@ impl Calibrate {
         Ok(planned)
     }
 
-    /// What went wrong, with the files where the error does not name one.
+    /// The failure, with the files where the error does not name one.
     fn failed(&self, error: &CalibrationError) -> Failure {
         let files: Vec<String> = self.logs.iter().map(|file| file.display().to_string()).collect();
         let what = match error {
@@ -245,7 +246,7 @@ impl Calibrate {
     }
 }
 
-/// What `--json` prints: the calibration, and what to add.
+/// Report that `--json` prints: the calibration, and the plan of further logs.
 #[derive(serde::Serialize)]
 struct CalibrationReport<'a> {
     #[serde(flatten)]
@@ -329,7 +330,7 @@ fn planned_text(planned: &Planned, out: &Path) -> String {
     text + &format!("wrote to {}/: plan.csv, plan.json", out.display())
 }
 
-/// What a table holds its error to; what differs from the first figure by so much is said as well.
+/// Error bound of a table; a figure that differs much from the first is printed as well.
 fn held(c: &Calibration) -> String {
     /// A guess.
     const DIFFERS: f64 = 1.25;

@@ -1,4 +1,4 @@
-//! What every command works with: the drive, the output folder, how to talk, when to stop.
+//! Context of every command: the drive, the output folder, the terminal, the request to stop.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -114,7 +114,7 @@ impl Context {
         self.set_to(path).is_some()
     }
 
-    /// What `--set` sets this field to, the last time it does.
+    /// The last value that `--set` gives to this field.
     pub(super) fn set_to(&self, path: &str) -> Option<&str> {
         let assignments = self.common.sets.iter().flat_map(|set| set.split(','));
         let values = assignments.filter_map(|set| set.split_once('=')).filter(|(set, _)| set.trim() == path);
@@ -142,7 +142,7 @@ impl Context {
         std::fs::read_to_string(name).ok().map(|text| (name, text))
     }
 
-    /// What a data sheet says of the drive of `--drive`, where its file has it.
+    /// Data sheet of the drive of `--drive`, where its file has one.
     pub(super) fn stated(&self) -> Result<Option<Stated>, Failure> {
         let Some((name, text)) = self.drive_file() else { return Ok(None) };
         Stated::of_file(name, &text).map_err(bad_input)
@@ -170,7 +170,7 @@ impl Context {
         Progress::new(title, self.common.quiet)
     }
 
-    /// What the command has taken so far.
+    /// Time and processor time of the command so far.
     pub(super) fn spent(&self) -> Spent {
         self.clock.spent()
     }
@@ -235,7 +235,7 @@ pub(super) fn table_image(folder: &Path, generator: GeneratorKind) -> Result<(Pa
     }))
 }
 
-/// The bytes of an image, sound or not; one that is sound but not of its id, as the identity is told in flight, is
+/// The bytes of an image, sound or not; one that is sound but not of its id, as the identity is found in flight, is
 /// refused here.
 pub(super) fn image_file(path: &Path) -> Result<Vec<u8>, Failure> {
     let bad = |what: String| Failure::BadInput(format!("{}: {what}", path.display()));

@@ -42,13 +42,15 @@ pub(super) struct Diagnose {
     #[arg(value_name = "DATA.csv", value_hint = ValueHint::FilePath)]
     data: PathBuf,
     /// Nominal model from the catalogue, or one that was extended before: then what is found is beyond it
-    #[arg(long, value_name = "nominal.toml", value_hint = ValueHint::FilePath, conflicts_with = "tables", required_unless_present = "tables")]
+    #[arg(long, value_name = "nominal.toml", value_hint = ValueHint::FilePath, conflicts_with = "tables")]
+    #[arg(required_unless_present = "tables")]
     model: Option<PathBuf>,
     /// Folder of tables made by `flexspline tables` from the drive of --drive
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     tables: Option<PathBuf>,
     /// Wave generator whose table is used, and that names the extended one: two-roller, four-roller, double-disc or cam
-    #[arg(long, value_name = "G", default_value = "cam", value_parser = names::generator(), hide_possible_values = true)]
+    #[arg(long, value_name = "G", default_value = "cam", value_parser = names::generator())]
+    #[arg(hide_possible_values = true)]
     generator: GeneratorKind,
     /// Make the extended tables by FEM from drive-extended.toml; without it they are sampled from the extended model
     #[arg(long, requires = "tables")]
@@ -95,7 +97,7 @@ impl Diagnose {
             Ok(made) => Ok(made),
         };
         let remake: Option<&MakeTable<'_>> = if self.remake_tables { Some(&by_fem) } else { None };
-        // What tells a cause from the strongest that was named is looked for of one.
+        // The data that would separate a cause from the strongest named one are looked for in one log only.
         let asked = explained.first().copied().filter(|_| explained.len() == 1);
         let options = Options { verbose: context.verbose(), asked, without: &without, remake, mesh: self.mesh };
         let mut progress = context.progress("diagnose");
@@ -138,7 +140,7 @@ impl Diagnose {
         })
     }
 
-    /// What went wrong, with the file where the error does not name it.
+    /// The failure, with the file where the error does not name it.
     fn failed(&self, error: &PipelineError) -> Failure {
         let what = match error {
             PipelineError::Known(_) | PipelineError::Diagnosis(_) => format!("{}: {error}", self.data.display()),

@@ -88,13 +88,14 @@ impl Fly {
             report::before(context, out, "fly", None);
         }
         let (progress, done) = (Mutex::new(context.progress("fly")), AtomicUsize::new(0));
-        let told = || {
+        let progress_line = || {
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
             if let Ok(mut bar) = progress.lock() {
                 bar.set(done, flown.seconds_of_all(), "seconds of all joints");
             }
         };
-        let flight = flown.fly_told(&told).map_err(|why| Failure::Failed(format!("{}: {why}", self.scenario)))?;
+        let flight =
+            flown.fly_told(&progress_line).map_err(|why| Failure::Failed(format!("{}: {why}", self.scenario)))?;
         drop(progress);
         let results = results(&flown, &flight).ok_or_else(|| Failure::Failed("a controller is missing".to_owned()))?;
         let mut outputs = Outputs::new();
@@ -144,14 +145,15 @@ impl Fly {
         let out = context.out()?;
         let (progress, done) = (Mutex::new(context.progress("fly")), AtomicUsize::new(0));
         let all = flights.iter().map(|(_, flown)| flown.seconds_of_all()).sum();
-        let told = || {
+        let progress_line = || {
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
             if let Ok(mut bar) = progress.lock() {
                 bar.set(done, all, "seconds of all joints");
             }
         };
-        let found =
-            Flights { flights: flights.into_iter().map(|(varied, flown)| fly_varied(varied, &flown, &told)).collect() };
+        let found = Flights {
+            flights: flights.into_iter().map(|(varied, flown)| fly_varied(varied, &flown, &progress_line)).collect(),
+        };
         drop(progress);
         if let [VariedFlight { not_flown: Some(reason), .. }] = &found.flights[..] {
             return Err(Failure::BadInput(format!("{}: {reason}", self.scenario)));

@@ -32,7 +32,7 @@ impl Look {
         context.print(&looked, || text(&looked) + &say::next(&self.next(&looked)))
     }
 
-    /// What to go on with.
+    /// Suggested next commands.
     fn next(&self, looked: &Looked) -> Vec<String> {
         let Some(columns) = &looked.columns_option else { return Vec::new() };
         let files: Vec<String> = self.files.iter().map(|file| quoted(&file.display().to_string())).collect();

@@ -87,7 +87,7 @@ pub(super) fn cup_and_balls(drive: &Drive) -> [(&'static str, String); 7] {
     ]
 }
 
-/// What a drive leaves out that catalogue drives have and do not print, a few words each.
+/// Features of catalogue drives that a drive leaves out and no catalogue prints, a few words each.
 pub(super) fn left_out(drive: &Drive) -> Vec<&'static str> {
     let plain = |left: bool, what: &'static str| left.then_some(what);
     [
@@ -198,7 +198,7 @@ mod tests {
         few.drive("d").unwrap()
     }
 
-    /// What is said of the teeth is what the rigid mesh has: the space of S-shaped teeth is cut for the cam.
+    /// The remarks on the teeth agree with the rigid mesh: the space of S-shaped teeth is cut for the cam.
     #[test]
     fn s_shaped_teeth_clear_under_the_cam_and_involutes_under_all() {
         let involutes = made(160, 0.254);

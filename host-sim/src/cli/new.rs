@@ -47,7 +47,8 @@ pub(super) struct New {
     #[arg(long, value_name = "FILE|NAME", value_hint = ValueHint::FilePath)]
     from: Option<String>,
     /// Teeth of the flexspline, even; the circular spline has two more
-    #[arg(long, value_name = "Z", requires = "module", allow_negative_numbers = true, conflicts_with_all = ["from", "like"])]
+    #[arg(long, value_name = "Z", requires = "module", allow_negative_numbers = true)]
+    #[arg(conflicts_with_all = ["from", "like"])]
     teeth: Option<u32>,
     /// Module, mm
     #[arg(long, value_name = "MM", allow_negative_numbers = true, conflicts_with_all = ["from", "like"])]
@@ -59,7 +60,8 @@ pub(super) struct New {
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     bore: Option<f64>,
     /// Generator under which the rigid backlash is made one arc-minute
-    #[arg(long, value_name = "G", default_value = "cam", value_parser = names::generator(), hide_possible_values = true)]
+    #[arg(long, value_name = "G", default_value = "cam", value_parser = names::generator())]
+    #[arg(hide_possible_values = true)]
     generator: GeneratorKind,
     /// Teeth and module as a catalogue's size has them: SERIES-SIZE-RATIO, with a pitch diameter of 2.54 mm a size
     /// (Harmonic Drive)
@@ -96,7 +98,7 @@ struct NewReport {
     teeth: Option<Clearance>,
     /// Of a drive of one's own: what catalogue drives have and do not print.
     left_out: Vec<&'static str>,
-    /// What the catalogue prints of a drive that is like one of its sizes, if it is at hand.
+    /// Catalogue values of a drive that is like one of its sizes, if at hand.
     #[serde(skip_serializing_if = "Option::is_none")]
     data_sheet: Option<Stated>,
     /// Of a drive of one's own: how its tips passed one another under its rated load, with cup and balls.
@@ -113,9 +115,9 @@ struct UnderLoad {
     torque_n_m: f64,
     /// The generator that it was run with.
     generator: GeneratorKind,
-    /// What was taken off the flexspline's tips so that they pass those of the circular spline freely, mm.
+    /// Relief of the flexspline's tips so that they pass those of the circular spline freely, mm.
     tips_lowered_mm: f64,
-    /// What bears on tips yet.
+    /// Remaining contact of tips.
     tip_contact: Option<TipContact>,
     /// Why the run gave no result.
     not_solved: Option<String>,
@@ -314,11 +316,11 @@ impl New {
         let torque_n_m = Stated::rated_n_m(sheet, &drive, generator);
         let mut progress = context.progress("run under load");
         let mut runs = 0;
-        let mut told = |what: &str| {
+        let mut report = |what: &str| {
             progress.set(runs, 0, what);
             runs += 1;
         };
-        let relief = relieve_tips(&drive, generator, torque_n_m, !context.sets_field(TIP_RADIUS), &mut told);
+        let relief = relieve_tips(&drive, generator, torque_n_m, !context.sets_field(TIP_RADIUS), &mut report);
         Ok(Some(match relief {
             Ok(relief) => {
                 if relief.lowered_mm > 0.0 {
@@ -461,7 +463,7 @@ const TIP_RADIUS: &str = "flexspline.tip_radius_mm";
 /// The field that says which teeth.
 const PROFILE: &str = "flexspline.profile";
 
-/// What a file begins with: how its teeth clear, and what it leaves out.
+/// Head of a file: how its teeth clear, and what it leaves out.
 fn head(teeth: Option<&Clearance>, left_out: &[&str]) -> String {
     let mut text: String = teeth.map(|teeth| format!("# As made here, {}.\n", teeth.text())).unwrap_or_default();
     if !left_out.is_empty() {
@@ -472,7 +474,7 @@ fn head(teeth: Option<&Clearance>, left_out: &[&str]) -> String {
     text
 }
 
-/// What to type next of a drive file: nothing that fails. Where teeth bind under a generator nobody wants its table,
+/// Next commands for a drive file: none that fails. Where teeth bind under a generator nobody wants its table,
 /// and where they bind under all of them nobody wants the drive.
 fn next_of(file: &str, teeth: Option<&Clearance>, drawn_for: GeneratorKind) -> Vec<String> {
     let tables = format!("flexspline tables --drive {file}");

@@ -90,7 +90,7 @@ pub(super) fn before(context: &Context, out: &Path, name: &str, drive: Option<&D
     }
 }
 
-/// What becomes of a page, where that has to be said.
+/// Note on the fate of a page, where one is needed.
 fn fate(path: &Path, name: &str, drive: Option<&Drive>) -> Option<String> {
     let html = std::fs::read_to_string(path).ok()?;
     let found = path.display();
@@ -159,7 +159,9 @@ mod tests {
     /// A page as far as it says whose it is.
     fn of(command: &str, drive: &Drive) -> String {
         let hash = blake3::Hash::from(drive.hash()).to_hex();
-        let json = serde_json::json!({ "report": command, "title": format!("Page of {}", drive.name), "provenance": { "drive_hash": *hash } });
+        let provenance = serde_json::json!({ "drive_hash": *hash });
+        let title = format!("Page of {}", drive.name);
+        let json = serde_json::json!({ "report": command, "title": title, "provenance": provenance });
         format!("<script type=\"application/json\" id=\"flexspline-report\">{json}</script>")
     }
 

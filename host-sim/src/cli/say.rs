@@ -1,4 +1,4 @@
-//! What goes to the terminal: data and results to stdout, talk to stderr, colour only where somebody looks.
+//! Output to the terminal: data and results to stdout, talk to stderr, colour only where somebody looks.
 //!
 //! Colour is for a terminal; `NO_COLOR` takes it away, `CLICOLOR_FORCE` puts it into a pipe too
 //! (<https://bixense.com/clicolors>). A reader that has gone, as behind `| head`, is no error; a full disk is.
@@ -39,13 +39,13 @@ pub(super) fn next(commands: &[String]) -> String {
 
 /// Says something on stderr beside the result.
 pub(super) fn talk(text: &str) {
-    // Nobody is left to tell if this fails.
+    // Nobody is left to inform if this fails.
     let _ = writeln!(anstream::stderr(), "{text}");
 }
 
 /// Says on stderr why the command ends.
 pub(super) fn error(message: &str) {
-    // Nobody is left to tell if this fails.
+    // Nobody is left to inform if this fails.
     let _ = writeln!(anstream::stderr(), "{ERROR}error:{ERROR:#} {}", suggestions_styled(message));
 }
 

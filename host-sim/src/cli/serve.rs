@@ -48,7 +48,7 @@ pub(super) struct Serve {
     jobs: Option<u8>,
 }
 
-/// What `--json` prints, once it listens.
+/// Report that `--json` prints, once it listens.
 #[derive(Serialize)]
 struct Listening<'a> {
     schema_version: u32,

@@ -20,7 +20,7 @@ pub(super) fn end_cleanly_on_signals() {
     WATCH.call_once(|| drop(listen(stop)));
 }
 
-/// What a command that runs until it is told to end does then: it is done, not stopped.
+/// End of a command that runs until it is asked to stop: it is done, not stopped.
 static ENDING: OnceLock<Box<dyn Fn() + Send + Sync>> = OnceLock::new();
 
 /// From now on a signal is how this command ends: `ending` clears up after it, and the exit code is that of a command

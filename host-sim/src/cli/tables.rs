@@ -60,7 +60,8 @@ Sample files have the columns generator_rad, torque_n_m, temperature_c, directio
 output_rad.")]
 pub(super) struct Tables {
     /// Wave generator: two-roller, four-roller, double-disc, cam, or all
-    #[arg(short, long, value_name = "G", default_value = "all", value_parser = names::generators(), hide_possible_values = true)]
+    #[arg(short, long, value_name = "G", default_value = "all", value_parser = names::generators())]
+    #[arg(hide_possible_values = true)]
     generator: GeneratorNames,
     /// Make the table from this file of samples instead of FEM; needs one --generator
     #[arg(long, value_name = "FILE.csv", value_hint = ValueHint::FilePath)]
@@ -74,13 +75,15 @@ pub(super) struct Tables {
     torque_n_m: Option<f64>,
     /// Torque nodes on each side of zero, at most, beside the pair at the drag torque; 5 to 30
     /// [default: 28; with imperfections 12]
-    #[arg(long, value_name = "N", conflicts_with = "from_samples", value_parser = clap::value_parser!(u8).range(5..=30))]
+    #[arg(long, value_name = "N", conflicts_with = "from_samples")]
+    #[arg(value_parser = clap::value_parser!(u8).range(5..=30))]
     most_nodes: Option<u8>,
     /// Add a torque node where the table misses the FEM by more than this, arcsec [default: 0.6; with imperfections 2]
     #[arg(long, value_name = "ARCSEC", conflicts_with = "from_samples", allow_negative_numbers = true)]
     node_tolerance_arcsec: Option<f64>,
     /// Samples over one tooth pitch, 4 to 32
-    #[arg(long, value_name = "N", default_value_t = 8, conflicts_with = "from_samples", value_parser = clap::value_parser!(u8).range(4..=32))]
+    #[arg(long, value_name = "N", default_value_t = 8, conflicts_with = "from_samples")]
+    #[arg(value_parser = clap::value_parser!(u8).range(4..=32))]
     positions: u8,
     /// Temperature nodes, degrees C [default: the ends of the operating range]
     #[arg(
@@ -92,10 +95,12 @@ pub(super) struct Tables {
     )]
     temperatures_c: Option<Vec<f64>>,
     /// Mesh: coarse, standard or fine
-    #[arg(long, value_name = "LEVEL", default_value = "standard", conflicts_with = "from_samples", value_parser = names::mesh(), hide_possible_values = true)]
+    #[arg(long, value_name = "LEVEL", default_value = "standard", conflicts_with = "from_samples")]
+    #[arg(value_parser = names::mesh(), hide_possible_values = true)]
     mesh: MeshLevel,
     /// Solver: fast or reference
-    #[arg(long, value_name = "SOLVER", default_value = "fast", conflicts_with = "from_samples", value_parser = names::solver(), hide_possible_values = true)]
+    #[arg(long, value_name = "SOLVER", default_value = "fast", conflicts_with = "from_samples")]
+    #[arg(value_parser = names::solver(), hide_possible_values = true)]
     solver: Method,
     /// Stress in root fillet, on bore and flank under the largest load, over three meshes, with its interval; takes one
     /// more pitch and three meshes for each generator
@@ -119,7 +124,7 @@ pub(super) struct Tables {
 /// The drive's file beside tables that a data sheet completed.
 const COMPLETED_DRIVE: &str = "drive-completed.toml";
 
-/// What `--json` prints.
+/// Report that `--json` prints.
 #[derive(Serialize)]
 struct TablesReport<'a> {
     schema_version: u32,
@@ -407,7 +412,7 @@ fn by_fem(
         .collect()
 }
 
-/// A table made by FEM now, as the command makes it if it is told no more than the mesh.
+/// A table made by FEM now, with the command's defaults except for the mesh.
 pub(super) fn fresh_table(
     context: &Context,
     drive: &Drive,

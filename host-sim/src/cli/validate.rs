@@ -41,7 +41,8 @@ pub(super) struct Validate {
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     tables: PathBuf,
     /// Wave generator: two-roller, four-roller, double-disc, cam, or all in the folder
-    #[arg(short, long, value_name = "G", default_value = "all", value_parser = names::generators(), hide_possible_values = true)]
+    #[arg(short, long, value_name = "G", default_value = "all", value_parser = names::generators())]
+    #[arg(hide_possible_values = true)]
     generator: GeneratorNames,
     /// Number of torques per table, 2 to 1000
     #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u16).range(2..=1000))]
@@ -56,10 +57,12 @@ pub(super) struct Validate {
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Mesh of the new FEM runs: coarse, standard or fine
-    #[arg(long, value_name = "LEVEL", default_value = "standard", value_parser = names::mesh(), hide_possible_values = true)]
+    #[arg(long, value_name = "LEVEL", default_value = "standard", value_parser = names::mesh())]
+    #[arg(hide_possible_values = true)]
     mesh: MeshLevel,
     /// Solver of the new FEM runs: reference or fast
-    #[arg(long, value_name = "SOLVER", default_value = "reference", value_parser = names::solver(), hide_possible_values = true)]
+    #[arg(long, value_name = "SOLVER", default_value = "reference", value_parser = names::solver())]
+    #[arg(hide_possible_values = true)]
     solver: Method,
     /// Do not write report.html (validation.html if the page of the tables is in the same folder), which takes a FEM
     /// run over one more tooth pitch for each generator
@@ -82,13 +85,13 @@ struct ValidationReport {
     tables: Vec<Validation>,
 }
 
-/// What a data sheet added to a table, which the FEM does not have: told in the JSON beside the image.
+/// A data sheet's addition to a table, which the FEM does not have: stated in the JSON next to the image.
 fn added_spring(path: &Path, image: &[u8]) -> Result<Option<MissingSpring>, Failure> {
     let Some(table) = Table::check(image).ok().filter(|table| table.sheet_scatter().is_some()) else { return Ok(None) };
     let json = path.with_extension("json");
-    let told = std::fs::read(&json).ok().and_then(|bytes| serde_json::from_slice::<serde_json::Value>(&bytes).ok());
-    let told = told.filter(|told| told["table_id"] == table.id().to_string());
-    let spring = told.and_then(|mut told| serde_json::from_value(told["completed"]["spring"].take()).ok());
+    let written = std::fs::read(&json).ok().and_then(|bytes| serde_json::from_slice::<serde_json::Value>(&bytes).ok());
+    let written = written.filter(|written| written["table_id"] == table.id().to_string());
+    let spring = written.and_then(|mut written| serde_json::from_value(written["completed"]["spring"].take()).ok());
     spring.map(Some).ok_or_else(|| {
         let (path, json) = (path.display(), json.display());
         Failure::BadInput(format!(
