@@ -1,4 +1,4 @@
-//! What a drive as built does to the output: each imperfection by the law it is known to follow.
+//! Effect of a drive as built on the output: each imperfection by the model it is known to follow.
 //!
 //! ```text
 //!   e ^   .--.        .--.        FS pitch, k = 2: order 2          CS pitch, k = 2: order 2 * 94/95

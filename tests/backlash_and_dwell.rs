@@ -64,7 +64,7 @@ fn two_roller() {
     agrees(GeneratorKind::TwoRoller, 0.920);
 }
 
-/// What the references are corrected for: how far rounded centres set the rollers back.
+/// Correction of the references: how far rounded centres set the rollers back.
 #[test]
 fn rounding_of_the_roller_centres() {
     let centre = |kind| GeneratorOutline::new(&Drive::hhd_95(), kind).unwrap().circle().unwrap().0;

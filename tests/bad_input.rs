@@ -163,7 +163,7 @@ fn wrong_table_images_are_refused() {
         refused(&desk, "validate --tables wrong --out nothing", "cam.fxt");
     }
     // Sound, but of another drive than the one given.
-    // Changed, and its sums made good: the id tells.
+    // Changed, with its sums corrected: the id detects it.
     let other = damage(&|image| {
         let body = 4 * u32::from_le_bytes(image[196..200].try_into().unwrap()) as usize;
         image[56] ^= 1;

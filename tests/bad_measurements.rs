@@ -63,14 +63,14 @@ fn scaled(values: &mut [f64], by: f64) {
     values.iter_mut().for_each(|value| *value *= by);
 }
 
-/// What a file must end in.
+/// Required end of a run over a file.
 #[derive(Clone, Copy, PartialEq)]
 enum Ends {
     /// One message that says all this; exit code 2, nothing written.
     Refused(&'static [&'static str]),
     /// These faults, in any order, no others, and no physics.
     Faults(&'static [&'static str]),
-    /// No fault can be told from the data alone: a discrepancy without a name.
+    /// The data alone do not identify a fault: a discrepancy without a name.
     Abstains,
     /// This fault, and nothing can be said of the unit.
     Unusable(&'static str),
@@ -79,7 +79,7 @@ enum Ends {
 }
 use Ends::{Abstains, Faults, LeftOut, Refused, Unusable};
 
-/// What is wrong with how a run ended, if anything.
+/// Fault of a run's end, if any.
 fn judged(desk: &Desk, options: &str, ends: &Ends, messages: &mut BTreeSet<String>) -> Result<(), String> {
     let out = desk.path("out");
     let _ = fs::remove_dir_all(&out);

@@ -1,7 +1,7 @@
 //! `flexspline bundle`: whole or not at all, over its own and nothing else; every file is the one of the manifest; a
 //! library that was asked for is there or the reason is said.
 //!
-//! What the bundle is worth to a compiler, to CMake and to others is checked by `tests/run bundle`.
+//! `tests/run bundle` checks the bundle with a compiler, CMake and others.
 
 use std::fs;
 
@@ -36,10 +36,10 @@ fn put(desk: &Desk, name: &str, text: &str) {
 #[test]
 fn every_file_is_the_one_of_the_manifest() {
     let desk = desk();
-    let told = desk.line("bundle --tables out --no-core --out made/bundle --archive --json").done().json();
+    let report = desk.line("bundle --tables out --no-core --out made/bundle --archive --json").done().json();
     let manifest: serde_json::Value = serde_json::from_str(&desk.read("made/bundle/manifest.json")).unwrap();
     let entries = manifest["files"].as_array().unwrap();
-    assert_eq!(told["files"].as_array().unwrap().len(), entries.len() + 1);
+    assert_eq!(report["files"].as_array().unwrap().len(), entries.len() + 1);
     for entry in entries {
         let bytes = fs::read(desk.path("made/bundle").join(entry["path"].as_str().unwrap())).unwrap();
         assert_eq!(entry["bytes"], bytes.len());
@@ -51,20 +51,20 @@ fn every_file_is_the_one_of_the_manifest() {
     let image = fs::read(desk.path("out/cam.fxt")).unwrap();
     let table = flexspline::Table::check(&image).unwrap();
     assert_eq!(fs::read(desk.path("made/bundle/tables/cam.fxt")).unwrap(), image);
-    for tables in [&told["tables"], &manifest["tables"]] {
+    for tables in [&report["tables"], &manifest["tables"]] {
         assert_eq!(tables[0]["table_id"], table.id().to_string());
         assert_eq!(tables[0]["array"], "flexspline_cam_table");
     }
     for path in ["include/flexspline_cam.h", "tables/flexspline_cam.c", "vectors/cam_vectors.h", "README.md"] {
         assert!(desk.read(&format!("made/bundle/{path}")).contains(&table.id().to_string()), "{path}");
     }
-    // The vectors tell the two directions apart, an unknown play, an extrapolation and what is not finite.
+    // The vectors distinguish the two directions, an unknown play, an extrapolation and values that are not finite.
     let csv = desk.read("made/bundle/vectors/cam.csv");
     let qualities: std::collections::BTreeSet<&str> =
         csv.lines().skip(1).filter_map(|line| line.split(',').nth(7)).collect();
     assert_eq!(qualities.into_iter().collect::<Vec<_>>(), ["0", "1", "2", "3"]);
     assert!(fs::read(desk.path("made/bundle.tar.gz")).unwrap().starts_with(&[0x1f, 0x8b]));
-    assert_eq!(told["targets"].as_array().map(Vec::len), Some(0));
+    assert_eq!(report["targets"].as_array().map(Vec::len), Some(0));
 }
 
 #[test]
@@ -171,7 +171,7 @@ fn libraries_are_taken_from_a_folder_and_those_that_lack_are_named() {
     assert_eq!(desk.read("made/lib/thumbv7m-none-eabi/libflexspline.a"), archive);
     assert!(desk.read("made/README.md").contains("`thumbv7m-none-eabi`"));
     let text = desk.line("bundle --tables out --libraries libraries --out made").done().stdout;
-    // One reason, told once.
+    // One reason, reported once.
     assert_eq!(text.matches("no core for").count(), 1, "{text}");
     assert!(text.contains("no core for 7 targets: no TARGET/libflexspline.a in libraries"), "{text}");
     assert!(TARGETS.iter().all(|(target, _)| text.contains(target)), "{text}");

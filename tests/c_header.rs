@@ -50,7 +50,7 @@ fn the_header_is_up_to_date() {
     );
 }
 
-/// What a program in C relies on, by name: functions with their parameters, structures with their fields, enumerations
+/// Names that a program in C relies on: functions with their parameters, structures with their fields, enumerations
 /// with their values, constants. The version is none of it.
 fn promises(header: &str) -> BTreeMap<String, String> {
     let body = header.split("#endif  /* FLEXSPLINE_H */").next().unwrap();
@@ -93,8 +93,8 @@ fn size(text: &str) -> Option<(&str, u64)> {
     Some((name, value.parse().ok()?)).filter(|_| is_size)
 }
 
-/// What of `before` is no longer so. An enumeration may go on, and an object may grow: its room is the caller's by the
-/// name of its size, and `flexspline_layout` finds a program that was compiled for the smaller one.
+/// Promises of `before` that are broken. An enumeration may go on, and an object may grow: its room is the caller's by
+/// the name of its size, and `flexspline_layout` finds a program that was compiled for the smaller one.
 fn broken(before: &BTreeMap<String, String>, now: &BTreeMap<String, String>) -> Vec<String> {
     let grew = |text: &str, now: &str| size(text).zip(size(now)).is_some_and(|(a, b)| a.0 == b.0 && a.1 <= b.1);
     let goes_on = |text: &str, now: &str| text.starts_with("enum ") && now.starts_with(text.trim_end_matches(" }"));

@@ -2,7 +2,7 @@
 //! other motions, under other loads, on other days; its intervals hold.
 //!
 //! ```text
-//!   errors of all kinds --kernels of the contact FEM--> as-built drive --sensors--> planned hour --> calibrate --> table
+//!   errors of all kinds --contact FEM kernels--> as-built drive --sensors--> planned hour --> calibrate --> table
 //!   dense FEM map, its law of play ---------------------^      |                                                    |
 //!                                                              +--> other days: true output less what the core says +
 //! ```
@@ -154,7 +154,7 @@ impl<'a> Unit<'a> {
     }
 }
 
-/// What was true and what the sensors read, row by row.
+/// True values and sensor readings of a run, row by row.
 #[derive(Default)]
 struct Run {
     time: Vec<f64>,
@@ -216,7 +216,7 @@ impl Sensors {
         }
     }
 
-    /// What the encoder at the output adds at an angle, arcsec.
+    /// Error of the encoder at the output at an angle, arcsec.
     fn adds(&self, output_rad: f64) -> f64 {
         let [(once, a), (twice, b)] = self.output_arcsec;
         once * (output_rad - a).sin() + twice * (2.0 * output_rad - b).sin()
@@ -229,7 +229,7 @@ impl Sensors {
         (read / TAU * 65536.0).round() / 65536.0 * TAU
     }
 
-    /// What a log says of a run.
+    /// Log of a run.
     fn log(&self, run: &Run, random: &mut fastrand::Rng) -> String {
         let mut text = "t;motor;joint;load;temp\n".to_owned();
         let mut wander = WANDER_ARCSEC * gauss(random);
@@ -335,8 +335,8 @@ impl Fourier {
     }
 }
 
-/// What no table can hold: the nominal one with all that a table has room for (curves over three angles, wind-up, play,
-/// temperature), fitted without sensors to the truth everywhere in the range of the bench.
+/// Error that no table can hold: the nominal one with all that a table has room for (curves over three angles, wind-up,
+/// play, temperature), fitted without sensors to the truth everywhere in the range of the bench.
 struct Best(Vec<f64>);
 
 impl Best {
@@ -441,7 +441,7 @@ fn recording(name: &str, text: &str, prior: &Prior<'_>) -> Recording {
     parse(name, text.as_bytes(), &ColumnMap::parse(COLUMNS).unwrap(), &prior.nominal.gear()).unwrap()
 }
 
-/// What the core leaves of a run, from what the sensors at the motor, at the load and at the drive read.
+/// Error that the core leaves in a run, from the readings of the sensors at the motor, at the load and at the drive.
 fn left_by(image: &[u8], run: &Run, sensors: &Sensors) -> Vec<f64> {
     let table = Table::check(image).unwrap();
     let mut play = PlayState::unknown();
@@ -541,7 +541,7 @@ fn steady(table: &Table<'_>, at: &State) -> f64 {
 }
 
 /// Share of states whose error the interval holds: of what a perfect reader of these encoders would see, since no log
-/// can tell an eccentric encoder from the drive.
+/// can distinguish an eccentric encoder from the drive.
 fn covered(made: &Calibrated, states: &[(State, f64)], sensors: &Sensors) -> f64 {
     let table = Table::check(&made.table.image).unwrap();
     let off: Vec<(f64, f64)> = states
@@ -559,7 +559,8 @@ fn covered(made: &Calibrated, states: &[(State, f64)], sensors: &Sensors) -> f64
 /// One table of figures, and what is asked of every drive.
 fn judged(seeds: impl Iterator<Item = u64>) {
     println!(
-        "drive  as measured  nominal table  Fourier  by direction  calibrated  best  removed %  covered %  half width  plan"
+        "drive  as measured  nominal table  Fourier  by direction  calibrated  best  removed %  covered %  \
+         half width  plan"
     );
     for seed in seeds {
         let f = of_drive(seed);

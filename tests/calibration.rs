@@ -26,7 +26,7 @@ fn half(second: bool) -> Recording {
     parse("half.csv", text.as_bytes(), &ColumnMap::parse(CSF17_COLUMNS).unwrap(), &Gear::of_ratio(100.0)).unwrap()
 }
 
-/// What the core leaves of the other half, as measured and with the table, arcsec rms about the mean.
+/// Error that the core leaves in the other half, as measured and with the table, arcsec rms about the mean.
 fn other_half(learnt: &Recording, other: &Recording) -> [f64; 2] {
     let made = calibrate(std::slice::from_ref(learnt), &Prior::of_ratio(100.0, GeneratorKind::Cam)).unwrap();
     let kept: Vec<&str> = made.calibration.parts.iter().filter(|part| part.kept).map(|part| part.name).collect();
@@ -123,7 +123,7 @@ fn the_command_writes_a_table_that_replay_reads() {
         assert!(run.code == 2 && run.stderr.contains(said), "{line}: {} {}", run.code, run.stderr);
         assert!(!desk.path("none").exists());
     }
-    // Half a turn of the output tells the wheels apart, whatever the ratio.
+    // Half a turn of the output distinguishes the wheels, whatever the ratio.
     let plan = desk.line("calibrate --plan --ratio 160 --travel-deg 0,150 --out plan").done();
     assert!(plan.stdout.contains("80 tell it from the generator angle"), "{}", plan.stdout);
 }

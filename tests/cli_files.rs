@@ -37,9 +37,9 @@ fn a_new_drive_file_is_the_drive_it_was_made_from_and_is_not_lost() {
         ("new d.toml --from c.toml", "--drive c.toml"),
     ] {
         let file = made.split(' ').nth(1).unwrap();
-        let told = hash(&format!("{made} --json"));
-        assert_eq!(hash(&format!("drive --drive {file} --json")), told, "{made}");
-        assert_eq!(hash(&format!("drive {same} --json")), told, "{made}");
+        let made_hash = hash(&format!("{made} --json"));
+        assert_eq!(hash(&format!("drive --drive {file} --json")), made_hash, "{made}");
+        assert_eq!(hash(&format!("drive {same} --json")), made_hash, "{made}");
         // It says of each field what it is and what is allowed: a range, or words.
         let text = desk.read(file);
         let shown = desk.line(&format!("drive --drive {file}")).done().stdout;
@@ -106,8 +106,8 @@ fn a_drive_from_a_few_numbers_clears_its_teeth_and_says_how_it_was_made() {
         assert!(!bore || (wheel["root_radius_mm"].as_f64().unwrap() - rim_mm - 31.0).abs() < 1e-3, "{line}");
         assert_eq!(text.contains("as HHD-95\nrim_thickness_mm"), !bore && !line.contains("--set"), "{line}");
     }
-    // A size that is at hand brings its data sheet, and the command that adds guesses of what no catalogue prints, which
-    // the long form runs as it is told.
+    // A size that is at hand brings its data sheet, and the command that adds guesses of what no catalogue prints,
+    // which the long form runs as given.
     let made = desk.line("new like.toml --like CSG-25-80 --json").done().json();
     assert_eq!(made["data_sheet"]["k2_n_m_per_rad"], 50e3);
     assert_eq!(made["left_out"].as_array().unwrap().len(), 4);

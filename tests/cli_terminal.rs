@@ -29,14 +29,14 @@ fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 
 /// Of the processor, by all its threads so far, to a hundredth of a second.
 fn processor_time(child: &Child) -> Duration {
-    let told = fs::read_to_string(format!("/proc/{}/stat", child.id())).unwrap();
+    let stat = fs::read_to_string(format!("/proc/{}/stat", child.id())).unwrap();
     // Fields 14 and 15, counted from the third, which follows the name of the program.
-    let fields: Vec<&str> = told[told.rfind(')').unwrap() + 2..].split(' ').collect();
+    let fields: Vec<&str> = stat[stat.rfind(')').unwrap() + 2..].split(' ').collect();
     let ticks: u64 = fields[11..13].iter().map(|field| field.parse::<u64>().unwrap()).sum();
     Duration::from_millis(10 * ticks)
 }
 
-/// What a command that says little leaves, and what it took of the processor, by all its threads.
+/// Output of a quiet command, and the processor time of all its threads.
 fn ended(mut child: Child) -> (Output, Duration) {
     let (mut stdout, mut stderr) = (Vec::new(), Vec::new());
     child.stdout.take().unwrap().read_to_end(&mut stdout).unwrap();
@@ -50,8 +50,8 @@ fn signal(child: &Child, name: &str) {
     assert!(sent.success(), "it had ended before it was sent {name}");
 }
 
-/// Starts a command, sends it a signal once it works, and checks that it soon works no more, by the processor, and leaves
-/// the folder as it found it.
+/// Starts a command, sends it a signal once it works, and checks that it soon works no more, by the processor, and
+/// leaves the folder as it found it.
 #[track_caller]
 fn stopped(desk: &Desk, line: &str, working: Duration, signals: &[&str]) {
     let before = contents(&desk.path("."));
@@ -269,7 +269,7 @@ fn colour_is_for_terminals_and_for_who_asks() {
     Output::of(json).json();
 }
 
-/// What the command shows on a terminal, or nothing where there is no `script` to make one.
+/// Terminal output of a command, or nothing where there is no `script` to make one.
 fn on_a_terminal(desk: &Desk, line: &str, variables: &[(&str, &str)]) -> Option<String> {
     let mut script = Command::new("script");
     script.args(["-qec", line, "/dev/null"]).current_dir(desk.path(".")).stdin(Stdio::null());

@@ -91,7 +91,7 @@ pub fn names(folder: &Path) -> Vec<String> {
     names
 }
 
-/// What a run of the command said and how it ended.
+/// Output of a run of the command, and its end.
 pub struct Output {
     /// Exit code.
     pub code: i32,

@@ -21,7 +21,7 @@ const T_N_M: [f64; 2] = [14.0, 48.0];
 const K_N_M_PER_RAD: [f64; 3] = [31e3, 50e3, 57e3];
 const SCATTER: f64 = 0.3;
 const LARGEST_N_M: f64 = 62.0;
-/// What a table may miss its samples' drive by between its nodes: the bound of `validate`.
+/// Allowed deviation of a table from its samples' drive between its nodes: the bound of `validate`.
 const MISS_ARCSEC: f64 = 2.0;
 const FIRST_CONTACT_N_M: f64 = 0.05;
 const TEMPERATURE_C: f32 = 20.0;
@@ -89,9 +89,10 @@ fn flown(fem: &Table<'_>, completed: &Table<'_>, unit: [f64; 3]) -> ([f64; 3], f
 #[test]
 fn a_drive_like_a_catalogues_is_right_to_the_scatter_of_the_catalogue() {
     let desk = Desk::new();
-    let how = "--generator cam --torque-n-m 62 --mesh coarse --temperatures-c=20 --positions 6 --most-nodes 12 --no-report --json";
+    let how = "--generator cam --torque-n-m 62 --mesh coarse --temperatures-c=20 --positions 6 \
+               --most-nodes 12 --no-report --json";
     let sheet = "--like CSF-25-100 --complete-from-data-sheet";
-    let told = desk.line(&format!("tables {how} {sheet} --out completed")).done().json();
+    let report = desk.line(&format!("tables {how} {sheet} --out completed")).done().json();
     let drive = "--drive completed/drive-completed.toml";
     // The file completes its tables; what it states of the sheet left out, the FEM stands alone.
     let alone = desk.read("completed/drive-completed.toml").replace("completes_model = true", "");
@@ -106,7 +107,7 @@ fn a_drive_like_a_catalogues_is_right_to_the_scatter_of_the_catalogue() {
     assert!(completed.sheet_scatter().is_some_and(|scatter| (f64::from(scatter) - SCATTER).abs() < 1e-6));
     assert_eq!(completed.mesh_level(), "coarse, sheet +-30 %");
     assert_eq!(bare["tables"][0]["completed"], Value::Null);
-    let of = &told["tables"][0]["completed"];
+    let of = &report["tables"][0]["completed"];
     assert_eq!(
         (of["scatter_percent"].as_f64(), &of["source"]),
         (Some(30.0), &Value::from("Harmonic Drive CSF-25-100"))
@@ -117,7 +118,7 @@ fn a_drive_like_a_catalogues_is_right_to_the_scatter_of_the_catalogue() {
     }
     assert!(desk.read("completed/drive-completed.toml").contains("\n# cam: added "));
     let again = desk.line(&format!("tables {how} {drive} --out again")).done().json();
-    assert_eq!(again["tables"][0]["table_id"], told["tables"][0]["table_id"]);
+    assert_eq!(again["tables"][0]["table_id"], report["tables"][0]["table_id"]);
 
     // K1, K2, K3 are those of the sheet.
     let (found, by_fem) = (secants(&completed), secants(&fem));

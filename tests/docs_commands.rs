@@ -1,4 +1,4 @@
-//! The documentation is true where a machine can tell: every command on its pages runs, every Rust block compiles,
+//! The documentation is true where a machine can check: every command on its pages runs, every Rust block compiles,
 //! every drive and nominal file in it is read, links and pictures exist, and so do the commands and options that the
 //! text names.
 //!
@@ -122,7 +122,7 @@ impl Page {
     }
 }
 
-/// What is done with a command of a page.
+/// Check of a page's command.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Kind {
     Ours,
@@ -217,8 +217,8 @@ impl Copy {
             .output()
             .unwrap();
         let said = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-        let told = || format!("{}\n{script}{}{}", output.status, said(&output.stdout), said(&output.stderr));
-        output.status.success().then_some(()).ok_or_else(told)
+        let ending = || format!("{}\n{script}{}{}", output.status, said(&output.stdout), said(&output.stderr));
+        output.status.success().then_some(()).ok_or_else(ending)
     }
 }
 

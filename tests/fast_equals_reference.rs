@@ -1,8 +1,8 @@
 //! The fast solver is the reference solver, quicker: same drive, same mesh, same path, same answer.
 //!
 //! ```text
-//!   reference:  every node, geometrically non-linear      fast:  +---+---+---+   teeth condensed, linear in frames that turn
-//!               one sparse matrix                                |_^_|_^_|_^_|   faces around the ring, flanks that touch
+//!   reference:  every node, geometrically non-linear      fast:  +---+---+---+   teeth condensed, in turning frames
+//!               one sparse matrix                                |_^_|_^_|_^_|   faces around ring, touching flanks
 //! ```
 //!
 //! HHD-95, every generator: deformed, loaded, turned forward and back through the clearance; with friction, a sleeve
@@ -26,7 +26,7 @@ const STRESS: f64 = 0.005;
 /// A place on the path: generator angle (rad) and load (N m).
 type Place = (f64, f64);
 
-/// What both solvers say of a place.
+/// Answer of both solvers at a place.
 struct Answer {
     output_rad: f64,
     error_arcsec: f64,

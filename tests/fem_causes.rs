@@ -2,7 +2,8 @@
 //! and kernels.
 //!
 //! ```text
-//!   as-built drive --FEM--> output at 40 generator angles, six loads each, + noise --> diagnose <-- table, kernels <--FEM-- ideal drive
+//!   as-built drive --FEM--> output at 40 generator angles, six loads each, + noise --> diagnose
+//!   ideal drive --FEM--> table, kernels --> diagnose
 //! ```
 //!
 //! HHD-95 with the cam, coarse mesh. The run is one that a bench can do: turn the generator to a place, step the load,
@@ -59,7 +60,7 @@ pub(crate) fn known() -> &'static (Vec<u8>, Arc<Kernels>) {
         let plan = KernelPlan {
             torques_n_m: vec![2.0, 10.0, 60.0],
             sizes_um: vec![5.5, 8.0, 12.0],
-            // The drives that are told by them are those of the long form.
+            // The drives that these names identify are those of the long form.
             directions: if long() { 19 } else { 10 },
             ..KernelPlan::for_generator(GeneratorKind::Cam)
         };
@@ -68,7 +69,7 @@ pub(crate) fn known() -> &'static (Vec<u8>, Arc<Kernels>) {
     })
 }
 
-/// What a bench would record of the drive with a deviation.
+/// Bench recording of the drive with a deviation.
 fn measured(change: impl Fn(&mut AsBuilt), seed: u64) -> Vec<Session> {
     let mut drive = Drive::hhd_95();
     change(&mut drive.as_built);
@@ -149,7 +150,7 @@ fn an_ideal_drive_has_no_cause() {
 }
 
 #[test]
-#[ignore = "a minute of a processor: a drive that does not repeat, by FEM; pitch errors and an oval are told always"]
+#[ignore = "a minute of a processor: a drive that does not repeat, by FEM; pitch errors and an oval are always reported"]
 fn an_eccentric_circular_spline_is_told_and_measured() {
     let eccentric = |b: &mut AsBuilt| {
         b.circular_spline_eccentricity_um = 8.0;
@@ -175,7 +176,7 @@ fn a_runout_of_the_flexspline_and_pitch_errors_of_the_circular_spline_are_told_a
     );
 }
 
-/// What is assumed of the two zones of teeth where no kernels are at hand, held against contact FEM: below the
+/// Assumption on the two zones of teeth where no kernels are at hand, compared with contact FEM: below the
 /// clearance and where both flanks bind (7 to 9 um here eat it up).
 #[test]
 #[ignore = "half a minute of a processor: two more drives by FEM"]

@@ -42,7 +42,7 @@ fn with_an_inert_load_the_core_removes_what_a_quasi_static_inverse_removes() {
     }
 }
 
-/// The low-pass of a torque in the mesh is wide on a stiff drive, and on a soft one so narrow that it tells little more
+/// The low-pass of a torque in the mesh is wide on a stiff drive, and on a soft one so narrow that it shows little more
 /// than a mean; both come to rest after a knock.
 #[test]
 fn a_torque_in_the_mesh_passes_only_as_far_as_its_loop_keeps_the_margin() {
@@ -138,7 +138,7 @@ fn the_bound_of_the_torque_holds_where_the_motor_sticks_and_in_the_cold() {
     }
 }
 
-/// Without a torque sensor: the motor's current tells a torque that lies within the bound that is stated with it.
+/// Without a torque sensor: the motor's current gives a torque that lies within the bound that is stated with it.
 #[test]
 fn the_bound_of_the_torque_by_the_motors_current_holds() {
     for kind in GeneratorKind::ALL {
@@ -148,7 +148,7 @@ fn the_bound_of_the_torque_by_the_motors_current_holds() {
     }
 }
 
-/// A servo that a little more delay makes ring is told as such, with its numbers, on the terminal and on the page,
+/// A servo that a little more delay makes ring is reported as such, with its numbers, on the terminal and on the page,
 /// where the loop is drawn with its margins; one that is sound is not.
 #[test]
 fn a_servo_near_the_edge_of_instability_is_cautioned() {
@@ -183,7 +183,7 @@ fn a_servo_near_the_edge_of_instability_is_cautioned() {
     assert!(said.contains("with servo.position_hz = "), "one pace alone is enough: {said}");
 }
 
-/// What is advised is sound when it is followed, whatever makes the servo ring; and where nothing helps, that is said,
+/// The advice is sound when it is followed, whatever makes the servo ring; and where nothing helps, that is said,
 /// with the resonance. A servo that swings has no word on compensation.
 #[test]
 fn the_paces_that_are_advised_are_sound_when_followed() {
@@ -257,7 +257,7 @@ fn the_drive_of_an_own_table_flies_as_its_contact_fem_does() {
     assert!(["none", "compensated", "ideal"].iter().all(|c| apart(c) < 0.01 * rms(&known, "none")));
     assert_eq!((&own["generator"], &own["table"]), (&"cam".into(), &"nominal".into()));
     assert_ne!(own["digest"], known["digest"]);
-    // What does not fit the table is told.
+    // A value that does not fit the table is reported.
     let refused = |line: &str| {
         let done = Command::new(flexspline()).args(line.split(' ')).current_dir(folder.path()).output().unwrap();
         assert_eq!(done.status.code(), Some(2), "{line}");

@@ -110,7 +110,7 @@ fn a_generator_that_stands_while_teeth_skip_is_not_frozen() {
     assert!(stands(110).contains(&FaultName::FrozenChannel), "{:?}", stands(110));
 }
 
-/// What a damaged file must end in.
+/// Required end of a run over a damaged file.
 enum Ends {
     /// An error that says all this.
     Error(&'static [&'static str]),

@@ -49,7 +49,7 @@ fn the_csf17_has_its_orders() {
     assert!((left(&lines, constant) - 4.57).abs() < 0.01, "{}", left(&lines, constant));
     let (constant, lines) = harmonics(&session.generator_rad, &error, &[2.0]).unwrap();
     assert!((left(&lines, constant) - 6.09).abs() < 0.01, "{}", left(&lines, constant));
-    // Without being told the orders: two waves a turn, and that the wheels cannot be told apart in 2.5 turns.
+    // Without given orders: two waves a turn, and that the wheels are not distinguishable in 2.5 turns.
     let residual = vec![session.error_rad.clone()];
     let picture = Picture::of(&[session], &residual, &Gear::of_teeth(200, 202, true)).unwrap();
     let spectrum = &picture.spectra[0];
@@ -126,7 +126,7 @@ fn least_squares(rows: &[(Vec<f64>, f64)]) -> Vec<f64> {
     (0..n).map(|i| m[i][n] / m[i][i]).collect()
 }
 
-/// What `flexspline diagnose` says of data; its `diagnosis.json`.
+/// The `diagnosis.json` that `flexspline diagnose` makes of data.
 fn diagnosed(desk: &Desk, line: &str) -> Value {
     let run = desk.line(&format!("diagnose {line} --out out")).done();
     println!("{}", run.stdout);
@@ -139,7 +139,7 @@ fn names(json: &Value) -> Vec<&str> {
 }
 
 /// Two waves a turn are not all: the gear has one, three and four as well, which is seen, and no cause is invented for
-/// what 2.5 turns in one direction cannot tell.
+/// what 2.5 turns in one direction cannot show.
 #[test]
 fn the_csf17_has_more_than_two_waves_and_nothing_is_invented_for_the_rest() {
     let example = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/csf17_100");

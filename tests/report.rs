@@ -58,7 +58,7 @@ fn the_page_of_a_settled_pitch_shows_its_rows_in_motion() {
     assert_eq!(json["provenance"]["BLAKE3 of the drive"], summary["drive_hash"]);
     let wind_up = summary["wind_up_arcsec"].as_f64().unwrap();
     assert!(html.contains(&format!("<strong><data class=\"error\" value=\"{wind_up}\"")), "no headline of {wind_up}");
-    // What the terminal tells is in the table, with its unit: a stress over three meshes, a torque.
+    // The terminal's figures are in the table, with their units: a stress over three meshes, a torque.
     let stress = summary["stress"][0]["von_mises_mpa"].as_f64().unwrap();
     assert!(html.contains(&format!("Stress, root fillet</th><td>{stress:.1}\u{a0}MPa</td>")), "no {stress} MPa");
     assert!(html.contains("<td>20.00\u{a0}N·m</td>") && html.contains("over three meshes"));
@@ -206,7 +206,7 @@ fn the_page_of_a_diagnosis_agrees_with_diagnosis_json() {
     assert_eq!(names(&desk.path("bare")), others);
 }
 
-/// A count that an encoder lost: found, put right, stamped, and told where and when.
+/// A count that an encoder lost: found, put right, stamped, and reported with place and time.
 #[test]
 fn faults_of_the_data_are_stamped_on_the_page_of_a_diagnosis() {
     let desk = Desk::new();

@@ -98,7 +98,8 @@ fn noise_shows_no_line_white_or_wandering() {
     let mut alarms = Vec::new();
     for seed in 0..seeds {
         let mut random = fastrand::Rng::with_seed(seed);
-        // At most 200 of the 3000 rows: what remembers a third of its record is not told from a slow wave by anybody.
+        // At most 200 of the 3000 rows: noise with a memory of a third of its record is not distinguishable from a slow
+        // wave.
         let memory = [0.0_f64, 0.9, 0.97, 0.99][seed as usize % 4];
         let turns = [2.5, 12.0, 60.0, 150.0][(seed / 4) as usize % 4];
         let back = seed % 3 == 0;

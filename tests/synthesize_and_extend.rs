@@ -98,8 +98,8 @@ fn an_effect_is_found_and_the_extended_tables_leave_less_of_it() {
     }
 }
 
-/// What is taken away in a second diagnosis is what was found in the first, not the textbook form of a cause of that
-/// name and size: the residual is the same, and nothing is found in the difference of two models.
+/// The contribution removed in a second diagnosis is the one found in the first, not the textbook form of a cause of
+/// that name and size: the residual is the same, and nothing is found in the difference of two models.
 #[test]
 fn a_drive_diagnosed_twice_has_nothing_more() {
     let desk = Desk::new();

@@ -30,7 +30,7 @@ fn tables_hold_between_their_nodes_and_across_a_reversal() {
         .collect();
     assert_eq!(names(&desk.path("made")), expected);
 
-    // The long form has the solver that the tables are not made by; `fast_equals_reference` holds one against the other.
+    // The long form has the solver that the tables are not made by; `fast_equals_reference` compares both.
     let solver = if long() { "reference" } else { "fast" };
     let points = "--temperatures 1 --torques 8 --positions 3";
     desk.line(&format!("validate --tables made --mesh coarse --solver {solver} {points} --out made")).done();

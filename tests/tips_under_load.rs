@@ -1,10 +1,11 @@
-//! Tips that clash under load: told by the run that has them, and not there in a drive that `new` makes.
+//! Tips that clash under load: reported by the run that has them, and not there in a drive that `new` makes.
 
 use flexspline_tests::command::Desk;
 
 /// A size of a catalogue whose teeth, as the proportions of HHD-95 have them, clear one another when rigid and clash
 /// under the rated load in a cup and on balls. `new` says so, lowers the tips, and what it proposes runs clean, with
-/// cup and balls from the command that it prints; with the tips as drawn `simulate` tells first of all where they bear.
+/// cup and balls from the command that it prints; with the tips as drawn `simulate` reports first of all where they
+/// bear.
 #[test]
 fn what_new_proposes_runs_without_tips_that_clash() {
     let desk = Desk::new();

@@ -31,7 +31,8 @@ pa.parquet.write_table(pa.table(series), "log.parquet")
 scipy.io.savemat("log.mat", {"bench": np.stack([time, motor, joint, load], axis=1), "name": "unit 7"})
 with nptdms.TdmsWriter("log.tdms") as writer:
     step = {"wf_increment": 0.02, "wf_start_offset": 0.0}
-    writer.write_segment([nptdms.ChannelObject("bench", name, series[name], properties=step) for name in ("motor", "joint", "load")])
+    writer.write_segment([nptdms.ChannelObject("bench", name, series[name], properties=step)
+                          for name in ("motor", "joint", "load")])
 with open("log.mcap", "wb") as file:
     writer = Writer(file)
     writer.start()

@@ -39,13 +39,13 @@ fn the_trace_names_the_gate_that_dropped_a_rival() {
     let named = judged.iter().filter(|cause| !cause.contains(' ')).count();
     assert!(named >= CauseName::ALL.len(), "{named} causes leave a trace: {judged:?}");
 
-    // What was named passed every gate of the verdict, against limits that it is told beside.
+    // What was named passed every gate of the verdict, against limits that are printed next to it.
     let verdict: Vec<_> = steps(&diagnosis, HIDDEN).into_iter().filter(|step| step["stage"] == "verdict").collect();
     assert!(!verdict.is_empty());
     assert!(verdict.iter().all(|step| step["passed"] == true), "{verdict:?}");
 
-    // A wheel pushed aside by gravity turns with another angle: refitted in the place of the cause, it tells the data
-    // far worse.
+    // A wheel pushed aside by gravity turns with another angle: refitted in the place of the cause, it explains the
+    // data far worse.
     let rival = steps(&diagnosis, "gravity_side_load").into_iter().find(|step| step["stage"] == "rival").unwrap();
     assert_eq!((&rival["gate"], &rival["against"]), (&Value::from("as_rival"), &Value::from(HIDDEN)), "{rival}");
     assert_eq!(rival["passed"], false, "{rival}");
@@ -84,7 +84,7 @@ fn a_cracked_root_is_told_from_a_damaged_tooth_and_the_gate_says_how() {
         assert!((value - wanted).abs() < 3.0 * std && std < 0.3 * value, "{name}: {value} +- {std}, hidden {wanted}");
     }
 
-    // Refitted in the place of the crack, a damaged tooth with its four sizes tells the data no better.
+    // Refitted in the place of the crack, a damaged tooth with its four sizes explains the data no better.
     let tried = steps(&found, "damaged_tooth");
     let rival = tried.iter().find(|step| step["gate"] == "as_rival").unwrap_or_else(|| panic!("{tried:?}"));
     assert!(rival["against"] == CRACK && rival["passed"] == false, "{rival}");

@@ -15,8 +15,8 @@ use crate::program::{Limits, Used, run};
 
 /// Arc-seconds in a radian.
 pub const ARCSEC: f64 = 180.0 * 3600.0 / PI;
-/// What a deck cannot say is taken out of the drive, for both programs: the drag of the output, and the rounding of the
-/// tips, which our contact knows and the mesh does not (0.03 mm of it softens the load curve by 0.1″).
+/// A feature that a deck cannot express is taken out of the drive, for both programs: the drag of the output, and the
+/// rounding of the tips, which our contact knows and the mesh does not (0.03 mm of it softens the load curve by 0.1″).
 pub const AS_IN_THE_DECK: [&str; 3] =
     ["output.drag_torque_n_m=0", "flexspline.tip_rounding_mm=0.002", "circular_spline.tip_rounding_mm=0.002"];
 /// The step of a deck that ends with the load on. One follows for each rotation increment, then one to the last load.
@@ -26,7 +26,7 @@ const RUN: usize = 100;
 /// Times that our solvers go through the path.
 const REPEAT: usize = 3;
 
-/// What is run.
+/// Case to run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Case {
     /// Teeth of a drive from a few numbers; without them HHD-95.
@@ -49,7 +49,7 @@ pub struct Case {
     pub penalties: [f64; 2],
 }
 
-/// What came out of CalculiX.
+/// Results of CalculiX.
 pub struct Peer {
     /// Output angle (rad) at the end of the load step, of each rotation step and of the last.
     pub output_rad: Vec<f64>,
@@ -119,7 +119,7 @@ impl Case {
     }
 
     /// Names drive, generator and mesh to the command.
-    fn told(&self, command: &mut Command, folder: &Path) -> Result<(), String> {
+    fn add_arguments(&self, command: &mut Command, folder: &Path) -> Result<(), String> {
         let file = folder.join("drive.toml");
         std::fs::write(&file, self.drive()?.to_toml()).map_err(|error| format!("{}: {error}", file.display()))?;
         command.arg("--drive").arg(file);
@@ -139,7 +139,7 @@ impl Case {
         let mut command = Command::new(flexspline);
         command.args(["export", "--format", "inp", "--quiet"]);
         std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
-        self.told(&mut command, folder)?;
+        self.add_arguments(&mut command, folder)?;
         command.args(["--increments", &self.increments.to_string()]);
         for (option, value) in numbers {
             command.args([option, &value.to_string()]);
@@ -302,7 +302,7 @@ impl Case {
         std::fs::write(&path, format!("generator_rad,torque_n_m\n{rows}")).map_err(|error| error.to_string())?;
         let mut command = Command::new(flexspline);
         command.args(["simulate", "--quiet", "--solver", &solver.to_string()]);
-        self.told(&mut command, folder)?;
+        self.add_arguments(&mut command, folder)?;
         for (option, value) in [("--bore-penalty", self.penalties[0]), ("--flank-penalty", self.penalties[1])] {
             command.args([option, &value.to_string()]);
         }

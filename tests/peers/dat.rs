@@ -1,4 +1,4 @@
-//! What CalculiX prints: tables of numbers under a line that says what they are, for which set and when.
+//! Output of CalculiX: tables of numbers under a line that says what they are, for which set and when.
 
 /// One table of a `.dat` file.
 #[derive(Debug, Clone, PartialEq)]

@@ -70,7 +70,7 @@ const STUCK: f64 = 0.999;
 const LIMITS: Limits = Limits { cpu_s: 60.0, memory_mb: 2000.0 };
 const PAIR: FlankPair = FlankPair { tooth: 0, space: 0, side: Side::Plus };
 
-/// What the space bears in a place of the path.
+/// Load of the space in a place of the path.
 #[derive(Debug, Clone, Copy)]
 struct Borne {
     /// Force on the space across the flank and along it, N/mm.
@@ -106,7 +106,7 @@ impl<'m> Cell<'m> {
         Cell { mesh, nodes: elements.iter().flatten().map(|n| (*n as usize, held(*n as usize))).collect() }
     }
 
-    /// Adds force and tangent of the elements; `row` tells the unknown of a degree of freedom, if it is free.
+    /// Adds force and tangent of the elements; `row` gives the unknown of a degree of freedom, if it is free.
     fn add(&self, material: &PlaneStrain, u: &[f64], row: impl Fn(usize) -> Option<usize>, system: &mut System) {
         let elements = self.mesh.elements[..self.mesh.elements_per_sector].iter();
         for (nodes, points) in elements.zip(&self.mesh.gauss) {
@@ -352,12 +352,12 @@ pub fn friction(ccx: &Path, out: &Path, claims: &mut Claims) -> Result<String, S
         let theirs = theirs(&folder.join("friction.dat"), &pressed, &held, coefficient)?;
         println!("== friction {coefficient} between a tooth and its space; CalculiX {:.1} s", used.cpu_s);
         let ours = pressed.ours(coefficient)?;
-        lines.push(told(coefficient, &ours, &theirs, claims));
+        lines.push(summary(coefficient, &ours, &theirs, claims));
     }
     Ok(lines.join(", "))
 }
 
-fn told(coefficient: f64, ours: &[Borne], theirs: &[Borne], claims: &mut Claims) -> String {
+fn summary(coefficient: f64, ours: &[Borne], theirs: &[Borne], claims: &mut Claims) -> String {
     for (slide, path) in SLIDES.iter().zip(ours.iter().zip(theirs)) {
         println!("  slid by {slide} coefficients of the press, ours and CalculiX:");
         for borne in [path.0, path.1] {
@@ -457,7 +457,7 @@ fn deck(pressed: &Pressed, drive: &Drive, friction: f64) -> (String, BTreeMap<us
     (text, space)
 }
 
-/// What the space bears in CalculiX: the forces that hold it.
+/// Load of the space in CalculiX: the forces that hold it.
 fn theirs(
     dat: &Path,
     pressed: &Pressed,

@@ -6,7 +6,7 @@
 //! stress along it, and what both cost. The short form is a small drive with the cam on the coarse mesh; `--long` adds
 //! HHD-95, its standard mesh and what CalculiX itself leaves open (each increment in two parts). A cup and a closed
 //! sleeve in solid elements stand beside our shells, a fine mesh of one root fillet beside the stress that
-//! `simulate --stress` tells. A tooth slid along its space with friction stands beside our flank contact. Teeth that
+//! `simulate --stress` reports. A tooth slid along its space with friction stands beside our flank contact. Teeth that
 //! lean along their face are solved in three dimensions and by our slices. Rollers are not compared: see the header of
 //! `export/inp.rs`.
 //!

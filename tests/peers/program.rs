@@ -12,7 +12,7 @@ use wait4::Wait4;
 /// How often a running child is looked at.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// What a child used.
+/// Resources that a child used.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Used {
     /// Processor time in user mode, s.

@@ -59,12 +59,12 @@ pub fn fillets(ccx: &Path, out: &Path, claims: &mut Claims) -> Result<String, St
         command.args(["-n", "15"]).arg(ccx).arg("root").current_dir(&folder).env("OMP_NUM_THREADS", "1");
         let used = run(&mut command, &folder.join("ccx.log"), None, LIMITS)?;
         let theirs = largest_in_fillet(&folder.join("root.dat"), &fine, ours.tooth, &numbers, &material)?;
-        lines.push(told(kind, torque_n_m, ours, theirs, used.cpu_s, claims));
+        lines.push(summary(kind, torque_n_m, ours, theirs, used.cpu_s, claims));
     }
     Ok(lines.join(", "))
 }
 
-fn told(
+fn summary(
     kind: GeneratorKind,
     torque_n_m: f64,
     ours: &PlaceStress,

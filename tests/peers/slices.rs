@@ -65,7 +65,7 @@ const ALONG_TAPERED: f64 = 0.16;
 /// Where a run stops being worth waiting for.
 const LIMITS: Limits = Limits { cpu_s: 900.0, memory_mb: 4000.0 };
 
-/// What happens along the axis.
+/// Ends along the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Ends {
     /// Nothing holds the ends of the face.
@@ -84,7 +84,7 @@ enum Face {
     Slices(f64),
 }
 
-/// What is solved. One tooth alone has its cut faces held right beside it, where the mean of the face has them.
+/// Problem to solve. One tooth alone has its cut faces held right beside it, where the mean of the face has them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Case {
     name: &'static str,
@@ -95,7 +95,7 @@ struct Case {
     ends: Ends,
 }
 
-/// What came out.
+/// Results.
 struct Found {
     /// Relative difference of the torque, CalculiX's over ours, at each load.
     torque: [f64; 2],
@@ -257,7 +257,7 @@ impl Loaded {
     }
 }
 
-/// What a case has of one wheel.
+/// Part of a case in one wheel.
 struct Part<'m> {
     mesh: &'m WheelMesh,
     sectors: Vec<usize>,
@@ -509,7 +509,7 @@ impl<'l> Deck<'l> {
         }
     }
 
-    /// What holds the circular spline, by number, with its place.
+    /// Held nodes of the circular spline, by number, with their places.
     fn space_held(&self) -> BTreeMap<usize, [f64; 2]> {
         let part = &self.parts[1];
         let held = part.numbers.iter().filter(|((n, ..), _)| part.held[n]);

@@ -77,7 +77,7 @@ impl Trajectory {
         }
     }
 
-    /// What the joint made of it.
+    /// Records the output of the joint.
     pub fn saw(&mut self, out: &Output) {
         self.output = out.output;
     }
@@ -95,7 +95,7 @@ pub fn hash(hash: u64, out: &Output) -> u64 {
     words.iter().fold(hash, |hash, word| (hash ^ word).wrapping_mul(0x0100_0000_01b3))
 }
 
-/// The hash after so many ticks with a table, given twice; 0 if the table is refused.
+/// The hash after a number of ticks with a table, given twice; 0 if the table is refused.
 pub fn run([first, second]: [&[u8]; 2], store: &mut Store, ticks: u32) -> u64 {
     let images = Images::new(first, second);
     if store.activate(&images, JOINT.drive(), 21.0).is_err() {

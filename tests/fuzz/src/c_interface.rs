@@ -325,7 +325,7 @@ fn any_images(choices: &mut Choices<'_>, kept: &mut Vec<Vec<u8>>) -> (Images, bo
     (images, first.2 && second.2)
 }
 
-/// What every call beside a tick may be given.
+/// Objects for every call next to a tick.
 struct Objects {
     store: Given,
     joint: Given,
@@ -385,7 +385,7 @@ fn is_text(text: *const std::ffi::c_char) -> bool {
     (1..60).contains(&text.to_bytes().len())
 }
 
-/// A call beside a tick: what it told, whether all it was given can be used, and whether something overlaps.
+/// A call next to a tick: its result, whether all its arguments can be used, and whether something overlaps.
 fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool, bool) {
     let [learner, slip, path, aged, encoder, recorder] = [0, 1, 2, 3, 4, 5].map(|kind| memory.beside(choices, kind));
     let [predictor, observer, upload, watch, activation, identity] =
@@ -416,7 +416,7 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
                 settle_rad: 1e-5,
                 torque_limit_n_m: if choices.below(4) == 0 { choices.wild() } else { 20.0 },
             }; 2];
-            let (settings, told) = plain(choices, &settings);
+            let (settings, plain_ok) = plain(choices, &settings);
             let mut list = [c::FlexsplineCoefficient { limit: 1e-4, initial_std: 1e-5, term: 0, order: 0 }; 16];
             for one in &mut list {
                 one.term = choices.below(6) as u8;
@@ -426,7 +426,7 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
                 }
             }
             let status = c::flexspline_learner_init(learner.pointer.cast(), settings, list.as_ptr(), number);
-            (status as u32, learner.usable && told, false)
+            (status as u32, learner.usable && plain_ok, false)
         }
         1 => (c::flexspline_learner_set(learner.pointer.cast(), choices.below(4) as u8) as u32, learner.usable, false),
         2 if choices.any() => (c::flexspline_learner_reset(learner.pointer.cast()) as u32, learner.usable, false),
@@ -445,7 +445,7 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
                 mean_counts: choices.any(),
                 half_width_counts: choices.any(),
             }; 2];
-            let (input, told) = plain(choices, &input);
+            let (input, plain_ok) = plain(choices, &input);
             let to = memory.answer::<c::FlexsplineAdapted>(choices, &[learner, state]);
             let (has, measured) = (choices.below(4) as u8, choices.any::<i32>().into());
             let (learner_at, state_at) = (learner.pointer.cast(), state.pointer.cast());
@@ -456,7 +456,7 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
                 assert!(found.mean_counts.abs() < most && found.half_width_counts.abs() < most, "{found:?}");
                 assert!(found.uncertainty_rad >= 0.0 && found.verdict <= 6, "{found:?}");
             }
-            (status as u32, all(&[learner, state]) && told && output_usable && to.usable, to.overlaps)
+            (status as u32, all(&[learner, state]) && plain_ok && output_usable && to.usable, to.overlaps)
         }
         7 => {
             let to = memory.answer(choices, &[learner]);
@@ -524,7 +524,7 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
                 table_drag_n_m: 0.1,
                 hold_n_m: 0.1,
             }; 2];
-            let (settings, told) = plain(choices, &settings);
+            let (settings, plain_ok) = plain(choices, &settings);
             let [settle, largest] =
                 [0.05, 100.0].map(|usual| if choices.below(4) == 0 { choices.wild() } else { usual });
             let made = if choices.below(2) == 0 {
@@ -532,7 +532,7 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
             } else {
                 c::flexspline_torque_init_sensor(path.pointer.cast(), settings, settle, largest)
             };
-            (made as u32, path.usable && told, false)
+            (made as u32, path.usable && plain_ok, false)
         }
         18 => {
             let to = memory.answer(choices, &[path]);
@@ -559,8 +559,8 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
                 wrap_bits: choices.below(70) as u8,
                 reversed: choices.below(3) as u8,
             }; 2];
-            let (settings, told) = plain(choices, &settings);
-            (c::flexspline_encoder_init(encoder.pointer.cast(), settings) as u32, encoder.usable && told, false)
+            let (settings, plain_ok) = plain(choices, &settings);
+            (c::flexspline_encoder_init(encoder.pointer.cast(), settings) as u32, encoder.usable && plain_ok, false)
         }
         23 => {
             let reading = if choices.any() { choices.any::<u16>().into() } else { choices.any() };
@@ -644,8 +644,8 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
             if choices.any() {
                 parts[0][choices.below(PARTS.len())] = choices.wild();
             }
-            let (parts, told) = plain(choices, &parts);
-            (c::flexspline_predictor_init(predictor.pointer.cast(), parts) as u32, predictor.usable && told, false)
+            let (parts, plain_ok) = plain(choices, &parts);
+            (c::flexspline_predictor_init(predictor.pointer.cast(), parts) as u32, predictor.usable && plain_ok, false)
         }
         35 => match choices.any() {
             true => (c::flexspline_observer_init(observer.pointer.cast()) as u32, observer.usable, false),
@@ -661,9 +661,9 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
                 speed_rad_s: choices.wild(),
                 twist_rad: choices.wild(),
             }; 2];
-            let (measured, told) = plain(choices, &measured);
+            let (measured, plain_ok) = plain(choices, &measured);
             let status = c::flexspline_observer_step(observer.pointer.cast(), predictor.pointer.cast(), measured);
-            (status as u32, all(&[observer, predictor]) && told, false)
+            (status as u32, all(&[observer, predictor]) && plain_ok, false)
         }
         37 => {
             let now = [c::FlexsplineNow {
@@ -677,7 +677,7 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
                 ticks: choices.below(30) as u16,
                 has_measured: choices.below(3) as u8,
             }; 2];
-            let (now, told) = plain(choices, &now);
+            let (now, plain_ok) = plain(choices, &now);
             let to = memory.answer(choices, &[predictor, observer, joint, store, state]);
             let status = c::flexspline_predict(
                 predictor.pointer.cast(),
@@ -688,7 +688,7 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
                 now,
                 to.pointer,
             );
-            (status as u32, all(&[predictor, observer, joint, store, state]) && told && to.usable, to.overlaps)
+            (status as u32, all(&[predictor, observer, joint, store, state]) && plain_ok && to.usable, to.overlaps)
         }
         38 => {
             let to = memory.answer(choices, &[predictor]);
@@ -804,10 +804,10 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
                 ticks: if choices.below(4) == 0 { choices.any() } else { 8 },
                 ..START_UP
             }; 2];
-            let (settings, told) = plain(choices, &settings);
+            let (settings, plain_ok) = plain(choices, &settings);
             let (at, from) = (start_up.pointer.cast(), choices.any());
             let status = c::flexspline_start_up_init(at, joint.pointer.cast(), from, settings);
-            (status as u32, all(&[start_up, joint]) && told, false)
+            (status as u32, all(&[start_up, joint]) && plain_ok, false)
         }
         46 => {
             let readings = [c::FlexsplineReadings {
@@ -818,10 +818,10 @@ fn beside(choices: &mut Choices<'_>, memory: &Memory, o: &Objects) -> (u32, bool
                 has_output: choices.below(3) as u8,
                 has_torque: choices.below(3) as u8,
             }; 2];
-            let (readings, told) = plain(choices, &readings);
+            let (readings, plain_ok) = plain(choices, &readings);
             let to = memory.answer::<c::FlexsplineStartUpStep>(choices, &[start_up]);
             let status = c::flexspline_start_up_step(start_up.pointer.cast(), readings, to.pointer);
-            (status as u32, start_up.usable && to.usable && told, to.overlaps)
+            (status as u32, start_up.usable && to.usable && plain_ok, to.overlaps)
         }
         47 => {
             let saved: *mut u8 = memory.at(PLACES.saved).cast();
@@ -958,7 +958,7 @@ pub fn run(data: &[u8]) {
         let joint = memory.object(&mut choices, PLACES.joints);
         let state = memory.object(&mut choices, PLACES.states);
         let tables = [table; 2];
-        let (tables, told) = plain(&mut choices, &tables);
+        let (tables, plain_ok) = plain(&mut choices, &tables);
         let before = memory.copy();
         let temperature = choices.wild();
         // SAFETY of the calls: every pointer that is aligned and not null points into the memory, or to what is kept.
@@ -967,22 +967,22 @@ pub fn run(data: &[u8]) {
             0 => (unsafe { flexspline_store_init(store.pointer) }, store.usable, false),
             1 => {
                 let settings = [any_settings(&mut choices); 2];
-                let (settings, told) = plain(&mut choices, &settings);
-                (unsafe { flexspline_joint_init(joint.pointer, settings) }, joint.usable && told, false)
+                let (settings, plain_ok) = plain(&mut choices, &settings);
+                (unsafe { flexspline_joint_init(joint.pointer, settings) }, joint.usable && plain_ok, false)
             }
             2 => (unsafe { flexspline_state_init(state.pointer) }, state.usable, false),
             3 | 4 => {
                 let status = unsafe { flexspline_store_activate(store.pointer, joint.pointer, tables, temperature) };
-                (status, store.usable && joint.usable && told && table_usable, false)
+                (status, store.usable && joint.usable && plain_ok && table_usable, false)
             }
             5 => {
                 let status = unsafe { flexspline_store_set_temperature(store.pointer, tables, temperature) };
-                (status, store.usable && told && table_usable, false)
+                (status, store.usable && plain_ok && table_usable, false)
             }
             6 => {
                 let status =
                     unsafe { flexspline_store_check_images(store.pointer, tables, choices.below(2000) as u16) };
-                (status, store.usable && told && table_usable, false)
+                (status, store.usable && plain_ok && table_usable, false)
             }
             7 => (unsafe { flexspline_state_request(state.pointer, choices.below(6) as u8) }, state.usable, false),
             8 => {
@@ -1013,7 +1013,7 @@ pub fn run(data: &[u8]) {
             }
             16 | 17 => {
                 loose = true;
-                let objects = Objects { store, joint, state, tables, tables_usable: told && table_usable };
+                let objects = Objects { store, joint, state, tables, tables_usable: plain_ok && table_usable };
                 beside(&mut choices, &memory, &objects)
             }
             _ => {
@@ -1050,7 +1050,7 @@ pub fn run(data: &[u8]) {
                         "{found:?}"
                     );
                 }
-                (status, objects && told && table_usable && given && usable, overlaps)
+                (status, objects && plain_ok && table_usable && given && usable, overlaps)
             }
         };
         assert!(status <= 18 || status == ENDED, "{status}");

@@ -127,7 +127,7 @@ pub fn change_numbers(image: &mut [u8], choices: &mut Choices<'_>) {
     flexspline::reseal(image);
 }
 
-/// What an accepted table says of itself holds for every input.
+/// The stated limits of an accepted table hold for every input.
 pub fn keeps_its_promises(table: &Table<'_>, choices: &mut Choices<'_>) {
     let bounds = table.bounds();
     assert!(bounds.slope >= 0.0 && bounds.slope < 1.0 && bounds.curve_slope <= bounds.slope, "{bounds:?}");
@@ -196,8 +196,8 @@ fn steady_motion(table: &Table<'_>, generator: GeneratorAngle, [torque, temperat
         let count = COUNT_RAD * (1.0 / table.drive().ratio().abs()).max(1.0);
         let (off, allowed) = (reached.output.minus_rad(target).abs(), table.inverse_error_bound_rad() + 8.0 * count);
         assert!(off <= allowed, "{off} rad off, at most {allowed}: {table:?}");
-        let told = OutputAngle::minus_rad(reached.nominal.offset_rad(command.predicted_error_rad), target).abs();
-        assert!(told <= allowed, "predicted {told} rad off, at most {allowed}: {table:?}");
+        let predicted = OutputAngle::minus_rad(reached.nominal.offset_rad(command.predicted_error_rad), target).abs();
+        assert!(predicted <= allowed, "predicted {predicted} rad off, at most {allowed}: {table:?}");
         error
     });
     assert!(ahead <= behind + 4.0 * COUNT_RAD, "a negative play: {ahead} {behind}");

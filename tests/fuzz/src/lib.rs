@@ -5,12 +5,12 @@
 //!
 //! | target | what is hostile | what must hold |
 //! |---|---|---|
-//! | [`image`] | the image: any bytes, and wrong numbers under right checksums | an error, or a table that keeps every bound it states |
+//! | [`image`] | the image: any bytes, wrong numbers under right checksums | an error, or a table as stated |
 //! | [`upload`] | chunks: lost, repeated, out of order, too long | nothing but the whole image is accepted |
-//! | [`store`] | bits of copies and images while ticks run | every output is that of a sound store, or says that it is none |
+//! | [`store`] | bits of copies and images while ticks run | every output is a sound store's, or is flagged |
 //! | [`c_interface`] | pointers, lengths, enumerations, order of calls | a status; what is not `Ok` changed nothing |
 //! | [`saved`] | saved states | `None`, or a state that keeps the limits from the first tick on |
-//! | [`runtime`] | settings, samples, torque, missed ticks, modes | rate and acceleration of the correction within their limits |
+//! | [`runtime`] | settings, samples, torque, missed ticks, modes | rate and acceleration within their limits |
 
 pub mod c_interface;
 pub mod image;

@@ -78,7 +78,7 @@ impl Watch {
         assert!(now.abs() <= 1.005 * f64::from(MAX_ERROR_RAD), "{out:?}");
         assert!(out.held_back_rad.is_finite() && out.transmission_error_rad.abs() <= 1.002 * MAX_ERROR_RAD, "{out:?}");
         assert!(out.uncertainty_rad >= 0.0 && out.uncertainty_rad.is_finite(), "{out:?}");
-        // Single precision of what is told, and the parts in which it is kept.
+        // Single precision of the output, and the parts in which it is kept.
         let rounding = 4.0 * FINE_RAD + 1.2e-7 * f64::from(MAX_ERROR_RAD);
         let [last, before] = self.last;
         if let Some(last) = last {

@@ -8,7 +8,7 @@ use flexspline::{
     Table, mend_page,
 };
 
-/// What flips.
+/// Object that flips.
 #[derive(Clone, Copy, PartialEq)]
 enum Flips {
     /// Bits of one copy and of one image.

@@ -23,7 +23,7 @@ impl Numbers {
     /// Their image.
     ///
     /// # Errors
-    /// What the writer says.
+    /// Result of the writer.
     pub fn image(&self) -> Result<Vec<u8>, WriteError> {
         let [generator, material, output] = &self.curves;
         let ends = |axis: &[f32]| [axis.first().copied().unwrap_or(0.0), axis.last().copied().unwrap_or(0.0)];

@@ -1,4 +1,4 @@
-//! What libFuzzer once found, and the seeds it starts from, played again.
+//! Findings of libFuzzer, and the seeds it starts from, played again.
 
 use std::fs;
 use std::path::Path;

@@ -1,5 +1,5 @@
-//! What flies, and nothing else: tables in flash, a store, a joint, its slow group. Linked with a panic handler that
-//! cannot be linked, so it has no panic path; its size is the size of the core, its call graph bounds the stack.
+//! The flight program, and nothing else: tables in flash, a store, a joint, its slow group. Linked with a panic handler
+//! that cannot be linked, so it has no panic path; its size is the size of the core, its call graph bounds the stack.
 //!
 //! With `--features deliberate-panic` it has one, and must not link.
 #![no_std]

@@ -1,6 +1,6 @@
-//! Flights of a joint with mass on board: what the core was told in them is on tapes that the host recorded
+//! Flights of a joint with mass on board: the inputs of the core in them are on tapes that the host recorded
 //! (`host-sim/motion/examples/tape.rs`), and every line printed is what the host's own flight had. As each command is
-//! the same, so would be the next that is told: the loop is.
+//! the same, so would be the next input: the loop is.
 #![no_std]
 #![no_main]
 

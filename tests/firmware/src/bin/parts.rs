@@ -1,4 +1,4 @@
-//! What a tick costs with a joint made at run time, and the parts beside it: the update of the coefficients, the slip
+//! Cost of a tick with a joint made at run time, and of the parts next to it: the update of the coefficients, the slip
 //! bank, the telemetry. With `--features flight` it counts nothing and shows that they link without a panic path.
 #![no_std]
 #![no_main]
@@ -45,7 +45,7 @@ fn tick_of(joint: &Joint, images: &Images<'_>, store: &mut Store, state: &mut Jo
     joint.tick(images, store, state, input)
 }
 
-/// What a start-up asks: the processor, and whether the table is the one of its id.
+/// Checks of a start-up: the processor, and whether the table is the one of its id.
 fn starts_well(image: &[u8]) -> bool {
     let mut check = IdentityCheck::new();
     loop {
