@@ -238,14 +238,14 @@ fn a_run_that_does_not_converge_ends_with_1_and_touches_no_file() {
     assert_eq!(run.stdout, "");
     assert!(run.stderr.starts_with("error: not solved at generator angle 0.000000 rad"), "{}", run.stderr);
     assert!(!run.stderr.contains("residual"), "{}", run.stderr);
-    let verbose = desk.line(&format!("{base} --max-iterations 2 -v"));
-    assert!(verbose.stderr.contains("relative residual by iteration: "), "{}", verbose.stderr);
+    let told = desk.line(&format!("{base} --max-iterations 2 -v"));
+    assert!(told.stderr.contains("relative residual by iteration: "), "{}", told.stderr);
     let after = (desk.read("out/results.csv"), desk.read("out/summary.json"), names(&desk.path("out/frames")));
     assert_eq!(before, after);
     assert_eq!(names(&desk.path("out")), ["frames", "report.html", "results.csv", "summary.json"]);
 }
 
-/// A drive of 12 mm under a load for one of 100 mm: how far it came is reported, and its rows until then are in a file.
+/// A drive of 12 mm under a load for one of 100 mm: how far it came is told, and what it did until then is in a file.
 #[test]
 fn a_load_beyond_the_last_stable_one_leaves_the_loads_before_it() {
     let desk = Desk::new();
@@ -274,7 +274,7 @@ fn a_load_beyond_the_last_stable_one_leaves_the_loads_before_it() {
     assert_eq!(names(&desk.path("out")), ["results.csv", "summary.json"]);
 }
 
-/// A drive that converges as well as any other, and is not to be built.
+/// What converges as well as any other drive, and is not to be built.
 #[test]
 fn teeth_that_interfere_and_stress_that_no_steel_bears_are_said() {
     let desk = Desk::new();

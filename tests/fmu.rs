@@ -478,13 +478,13 @@ fn a_joint_says_how_far_its_core_trusts_the_table_and_refuses_targets_that_no_an
         assert_eq!(quality(&quiet, load), expected, "{load} N·m");
     }
     assert_eq!(quality(&quiet, 5000.0), 3, "a reading that no sensor has");
-    let instance = fmu.ready("reported", &quiet);
+    let instance = fmu.ready("told", &quiet);
     instance.set("load_torque", 5000.0);
     for _ in 0..50 {
         assert_eq!(instance.step(1e-3), OK);
     }
-    let reported = |entry: &&importer::Line| entry.message.contains("not corrected: the torque reads 5000");
-    assert_eq!(instance.log().iter().filter(reported).count(), 1, "{:?}", instance.log());
+    let told = |entry: &&importer::Line| entry.message.contains("not corrected: the torque reads 5000");
+    assert_eq!(instance.log().iter().filter(told).count(), 1, "{:?}", instance.log());
     assert_eq!(quality(&[("compensate", 0.0)], 10.0), 3);
     assert_eq!(quality(&[("servo", 0.0)], 0.0), 3);
     for target in [1e30, -1e30, 1e9 * std::f64::consts::TAU] {

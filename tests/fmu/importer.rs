@@ -224,7 +224,7 @@ impl Drop for Instance<'_> {
 }
 
 impl Instance<'_> {
-    /// Log so far.
+    /// What was logged so far.
     pub fn log(&self) -> Vec<Line> {
         self.log.lock().unwrap().clone()
     }

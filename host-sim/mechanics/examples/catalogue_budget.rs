@@ -259,8 +259,7 @@ fn row(what: &str, values: [f64; 3], unit: &str) {
 /// A drive as in the catalogue by its plane slice, and in its cup.
 fn plane_and_cup(entry: &Catalogue, guess: &Guess) -> Result<[Drive; 2], Box<dyn std::error::Error>> {
     let pitch_mm = 2.54 * f64::from(entry.size);
-    let numbers =
-        FewNumbers { teeth: 200, module_mm: pitch_mm / 200.0, bore_mm: None, generator: GeneratorKind::Cam };
+    let numbers = FewNumbers { teeth: 200, module_mm: pitch_mm / 200.0, bore_mm: None, generator: GeneratorKind::Cam };
     let name = format!("size {}", entry.size);
     let drive = numbers.drive(&name)?.drive;
     let width = format!("flexspline.width_mm={}", guess.width * drive.flexspline.width_mm);

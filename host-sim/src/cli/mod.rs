@@ -1,6 +1,6 @@
 //! The command line: arguments to settings, results to files and to the terminal. One file for each command.
 //!
-//! The computation of a command is a library function without knowledge of the command line. Here options are read and
+//! What a command computes is a library function that knows nothing of the command line. Here options are read and
 //! checked, the function is called, and its result is written and shown. Data goes to stdout, talk to stderr.
 
 mod bundle;
@@ -97,7 +97,7 @@ struct Cli {
     #[command(flatten)]
     common: Common,
     #[command(subcommand)]
-    command: CliCommand,
+    command: Command,
 }
 
 /// Commands by what they are used for.
@@ -210,7 +210,7 @@ fn parse(args: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> Result<
 }
 
 #[derive(Debug, Subcommand)]
-enum CliCommand {
+enum Command {
     Simulate(simulate::Simulate),
     Sleeve(sleeve::SleeveCommand),
     Sweep(Box<sweep::SweepCommand>),
@@ -237,8 +237,7 @@ struct Common {
     /// Drive file, or the name of a built-in drive: HHD-95 (ideal), HHD-95-typical (friction, compliances,
     /// tolerances), CUP-95 (a cup), HHD-95-hermetic (a closed sleeve), HHD-95-plane (no third dimension), S-95
     /// (S-shaped teeth)
-    #[arg(long, global = true, value_name = "FILE|NAME", default_value = USUAL_DRIVE, value_hint = ValueHint::FilePath)]
-    #[arg(help_heading = "Common options")]
+    #[arg(long, global = true, value_name = "FILE|NAME", default_value = USUAL_DRIVE, value_hint = ValueHint::FilePath, help_heading = "Common options")]
     drive: String,
     /// Override fields of the drive, for instance flanks.friction_coefficient=0.08; several with commas, or repeated
     #[arg(long = "set", global = true, value_name = "PATH=VALUE", help_heading = "Common options")]
@@ -250,8 +249,7 @@ struct Common {
     #[arg(long, global = true, help_heading = "Common options")]
     json: bool,
     /// Threads to use; default: one for each core
-    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    #[arg(help_heading = "Common options")]
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Common options")]
     threads: Option<u16>,
     /// Print no progress and no summary
     #[arg(short, long, global = true, conflicts_with = "verbose", help_heading = "Common options")]
@@ -297,11 +295,11 @@ fn ended(failure: Failure) -> Outcome {
     outcome
 }
 
-impl CliCommand {
+impl Command {
     /// Keeps the files that the command line names from being replaced. What is known to be written in the place of one
     /// is refused before any work is done, all else where it is written.
     fn keep_inputs(&self, context: &Context) -> Result<(), Failure> {
-        if let CliCommand::New(_) = self {
+        if let Command::New(_) = self {
             // It names the file that it writes.
             return Ok(());
         }
@@ -313,11 +311,11 @@ impl CliCommand {
     /// Files that it writes whatever is asked of it, of commands that may read one of such a name.
     fn writes(&self) -> &'static [&'static str] {
         match self {
-            CliCommand::Simulate(_) => &["results.csv", "summary.json"],
-            CliCommand::Calibrate(_) => &["calibrated.fxt", "calibration.json"],
-            CliCommand::Diagnose(_) => &["diagnosis.json"],
-            CliCommand::Replay(_) => &["replay.csv", "summary.json"],
-            CliCommand::Synthesize(_) => &["data.csv", "truth.json"],
+            Command::Simulate(_) => &["results.csv", "summary.json"],
+            Command::Calibrate(_) => &["calibrated.fxt", "calibration.json"],
+            Command::Diagnose(_) => &["diagnosis.json"],
+            Command::Replay(_) => &["replay.csv", "summary.json"],
+            Command::Synthesize(_) => &["data.csv", "truth.json"],
             _ => &[],
         }
     }

@@ -54,8 +54,7 @@ pub(super) struct Synthesize {
     #[arg(long, value_name = "DIR", conflicts_with = "model", value_hint = ValueHint::DirPath)]
     tables: Option<PathBuf>,
     /// Wave generator of the drive: two-roller, four-roller, double-disc or cam
-    #[arg(long, value_name = "G", default_value = "cam", value_parser = names::generator())]
-    #[arg(hide_possible_values = true)]
+    #[arg(long, value_name = "G", default_value = "cam", value_parser = names::generator(), hide_possible_values = true)]
     generator: GeneratorKind,
     /// Nominal model from the catalogue, or one that `flexspline diagnose` has extended
     #[arg(long, value_name = "nominal.toml", value_hint = ValueHint::FilePath)]
@@ -70,12 +69,10 @@ pub(super) struct Synthesize {
     #[arg(long, value_name = "ARCSEC", default_value_t = 0.8, allow_negative_numbers = true, help_heading = "Sensors")]
     wander_arcsec: f64,
     /// Number of sessions
-    #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u16).range(1..=100))]
-    #[arg(help_heading = "Excitation")]
+    #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u16).range(1..=100), help_heading = "Excitation")]
     sessions: u16,
     /// Rows per session
-    #[arg(long, value_name = "N", default_value_t = 3000)]
-    #[arg(value_parser = clap::value_parser!(u32).range(50..=1_000_000), help_heading = "Excitation")]
+    #[arg(long, value_name = "N", default_value_t = 3000, value_parser = clap::value_parser!(u32).range(50..=1_000_000), help_heading = "Excitation")]
     rows: u32,
     /// Largest speed of the generator, rad/s
     #[arg(
@@ -122,7 +119,7 @@ pub(super) struct Synthesize {
     seed: Option<u64>,
 }
 
-/// Source of the drive's prediction.
+/// What the prediction of the drive comes from.
 #[derive(Debug, Serialize)]
 struct NominalSource {
     kind: &'static str,
@@ -398,7 +395,7 @@ impl Listed {
     }
 }
 
-/// Default of a parameter.
+/// What a parameter is if it is not given.
 fn usual(parameter: &Parameter) -> String {
     match parameter.usual {
         Usual::Value(value) => match parameter.words.get(value as usize) {

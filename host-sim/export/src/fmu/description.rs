@@ -49,7 +49,7 @@ pub(super) fn xml(resources: &Resources) -> String {
     canNotUseMemoryManagementFunctions="true" canGetAndSetFMUstate="true" canSerializeFMUstate="true"
     providesDirectionalDerivative="false"/>
   <UnitDefinitions>
-",
+"#,
         name = kind.name(),
         guid = resources.guid,
         about = about(kind),
