@@ -487,11 +487,11 @@ impl<'p> Solver<'p> {
     }
 
     /// Assembles the out-of-balance forces and the tangent.
-    fn assemble(&mut self, state: &mut State, sought: Sought<'_>, near: &mut NearPairs) -> Residual {
+    fn assemble(&mut self, state: &mut State, sought: Sought<'_>, near: &mut NearPairs) -> Unbalance {
         self.problem.lean(state);
         self.look_around(state, sought.from, near);
         self.make_room(configuration(state), near);
-        let mut residual = Residual::zero(self.wheels.unknowns());
+        let mut residual = Unbalance::zero(self.wheels.unknowns());
         self.wheels.assemble(state, &mut residual.force);
         self.assemble_contact(state, sought.stage, near, &mut residual);
         self.assemble_holding(state, sought.torque_n_m, &mut residual);
