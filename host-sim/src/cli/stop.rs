@@ -13,7 +13,7 @@ use flexspline_base::progress;
 
 /// From now on SIGINT, SIGTERM and SIGHUP end the process with exit code 1 and leave no unfinished file. A second one
 /// does not wait for the clearing up. Who started it with SIGHUP ignored, as `nohup` does, means it to go on without a
-/// terminal.
+/// terminal. On systems other than Unix no handler is installed.
 pub(super) fn end_cleanly_on_signals() {
     static WATCH: Once = Once::new();
     // Where the signals cannot be heard they end the process as the second would.
@@ -71,9 +71,10 @@ fn listen(heard: fn()) -> std::io::Result<()> {
     Ok(())
 }
 
+/// Elsewhere the system ends the process: files have their names only once they are whole.
 #[cfg(not(unix))]
-fn listen(heard: fn()) -> Result<(), ctrlc::Error> {
-    ctrlc::set_handler(heard)
+fn listen(_heard: fn()) -> std::io::Result<()> {
+    Ok(())
 }
 
 /// Whether the process was started with a signal ignored; where the system does not say so, it was not.
