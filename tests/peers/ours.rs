@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use cpu_time::ProcessTime;
 use flexspline_sim::fem::element::cauchy_stress;
 use flexspline_sim::motion::Motion;
 use flexspline_sim::stepping::{Method, Problem, State};
+use rustix::time::{ClockId, clock_gettime};
 
 /// Our solvers, the one that the others are measured against first.
 pub const SOLVERS: [Method; 2] = [Method::Reference, Method::Fast];
@@ -21,6 +21,11 @@ pub struct Journey {
     pub cpu: Vec<Duration>,
 }
 
+/// Processor time of all threads of this process so far.
+fn processor_time() -> Duration {
+    clock_gettime(ClockId::ProcessCPUTime).try_into().expect("a time that is not negative")
+}
+
 /// Takes the drive through the stops, `repeat` times over from a new start, for the sake of the time.
 pub fn journey(problem: &Problem, stops: &[Stop], repeat: usize) -> Result<Journey, String> {
     let mut states = Vec::new();
@@ -29,9 +34,9 @@ pub fn journey(problem: &Problem, stops: &[Stop], repeat: usize) -> Result<Journ
         states.clear();
         let mut motion = Motion::deformed(problem, stops[0].0).map_err(|error| error.to_string())?;
         for ((generator_rad, torque_n_m), cpu) in stops.iter().zip(&mut cpu) {
-            let clock = ProcessTime::now();
+            let begun = processor_time();
             motion.to(*generator_rad, *torque_n_m).map_err(|error| error.to_string())?;
-            cpu.push(clock.elapsed());
+            cpu.push(processor_time() - begun);
             states.push(problem.whole_state(motion.state()).into_owned());
         }
     }
@@ -47,9 +52,9 @@ pub fn journey(problem: &Problem, stops: &[Stop], repeat: usize) -> Result<Journ
 pub fn run_cpu_s(problem: &Problem, start: Stop, step_rad: f64, increments: usize) -> Result<f64, String> {
     let mut motion = Motion::deformed(problem, start.0).map_err(|error| error.to_string())?;
     motion.load(start.1).map_err(|error| error.to_string())?;
-    let clock = ProcessTime::now();
+    let begun = processor_time();
     motion.turn_in(step_rad * increments as f64, increments).map_err(|error| error.to_string())?;
-    Ok(clock.elapsed().as_secs_f64() / increments as f64)
+    Ok((processor_time() - begun).as_secs_f64() / increments as f64)
 }
 
 /// Displacement of a node of the flexspline, mm.
