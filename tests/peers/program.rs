@@ -1,12 +1,12 @@
 //! A program run as a child: its processor time, its memory, and a limit on both.
 
-use std::fs::File;
+use std::fs::{File, read_to_string};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
-use procfs::process::Process;
+use rustix::param::clock_ticks_per_second;
 use wait4::Wait4;
 
 /// How often a running child is looked at.
@@ -41,21 +41,21 @@ pub fn run(command: &mut Command, log: &Path, watched: Option<&Path>, limits: Li
     let errors = output.try_clone().map_err(|error| failed(&error))?;
     let mut child =
         command.stdin(Stdio::null()).stdout(output).stderr(errors).spawn().map_err(|error| failed(&error))?;
-    let process = Process::new(child.id() as i32).map_err(|error| failed(&error))?;
-    let tick_s = 1.0 / procfs::ticks_per_second() as f64;
+    let process = format!("/proc/{}", child.id());
     let mut cpu_at_line_s = Vec::new();
     // A process that has ended and is not yet waited for still says what it used.
     loop {
-        let stat = process.stat().map_err(|error| failed(&error))?;
-        let cpu_s = stat.utime as f64 * tick_s;
+        let stat = read_to_string(format!("{process}/stat")).map_err(|error| failed(&error))?;
+        let (state, cpu_s) = state(&stat).ok_or_else(|| failed(&format!("{process}/stat reads {stat}")))?;
         if let Some(watched) = watched {
-            let lines = std::fs::read_to_string(watched).map_or(0, |text| text.lines().count());
+            let lines = read_to_string(watched).map_or(0, |text| text.lines().count());
             cpu_at_line_s.resize(lines.max(cpu_at_line_s.len()), cpu_s);
         }
-        if stat.state == 'Z' {
+        if state == "Z" {
             break;
         }
-        let memory_mb = process.status().ok().and_then(|status| status.vmhwm).map_or(0.0, |kb| kb as f64 / 1024.0);
+        let memory_mb =
+            read_to_string(format!("{process}/status")).ok().and_then(|status| memory_mb(&status)).unwrap_or(0.0);
         let over = if cpu_s > limits.cpu_s {
             Some(format!("{cpu_s:.0} s of processor time, allowed {:.0}", limits.cpu_s))
         } else if memory_mb > limits.memory_mb {
@@ -75,6 +75,22 @@ pub fn run(command: &mut Command, log: &Path, watched: Option<&Path>, limits: Li
     }
     let megabytes = ended.rusage.maxrss as f64 / (1024.0 * 1024.0);
     Ok(Used { cpu_s: ended.rusage.utime.as_secs_f64(), memory_mb: megabytes, cpu_at_line_s })
+}
+
+/// State and processor time in user mode (s) from `/proc/PID/stat`.
+fn state(stat: &str) -> Option<(&str, f64)> {
+    // The name of the program, in brackets, may hold spaces and brackets.
+    let (_, fields) = stat.rsplit_once(") ")?;
+    let mut fields = fields.split(' ');
+    let state = fields.next()?;
+    let ticks: u64 = fields.nth(10)?.parse().ok()?;
+    Some((state, ticks as f64 / clock_ticks_per_second() as f64))
+}
+
+/// Largest resident memory (MB) from `/proc/PID/status`.
+fn memory_mb(status: &str) -> Option<f64> {
+    let kilobytes = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    Some(kilobytes.trim().strip_suffix(" kB")?.parse::<f64>().ok()? / 1024.0)
 }
 
 #[cfg(test)]
