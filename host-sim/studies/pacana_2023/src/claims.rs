@@ -143,7 +143,7 @@ pub struct Judged {
 /// All claims, judged.
 pub(crate) fn judged(drive: &Drive, runs: &[Run]) -> Vec<Judged> {
     let judge = |claim: &'static Claim| {
-        let evidence = (claim.numbers)(Evidence::new(drive, runs));
+        let evidence = (claim.numbers)(Evidence { drive, runs, paper: Vec::new(), ours: Vec::new() });
         Judged { claim, verdict: evidence.verdict(), paper: evidence.paper, ours: evidence.ours }
     };
     CLAIMS.iter().map(judge).collect()
@@ -181,10 +181,6 @@ struct Evidence<'a> {
 }
 
 impl<'a> Evidence<'a> {
-    fn new(drive: &'a Drive, runs: &'a [Run]) -> Evidence<'a> {
-        Evidence { drive, runs, paper: Vec::new(), ours: Vec::new() }
-    }
-
     fn paper(mut self, name: &str, value: f64, unit: &'static str, [at_least, at_most]: Bounds) -> Self {
         self.paper.push(Number { name: name.to_owned(), value, unit, at_least, at_most });
         self
@@ -436,9 +432,9 @@ const CLAIMS: &[Claim] = &[
         says: "With double disc and cam the curve is much closer to the nominal one than with rollers.",
         metric: LARGEST_ERROR,
         numbers: |e| {
-            let near = e.of(DoubleDisc, largest).max(e.of(Cam, largest));
             // Much: half as much again.
-            let ratio = |e: &Evidence<'_>, kind| e.of(kind, largest) / near;
+            let ratio =
+                |e: &Evidence<'_>, kind| e.of(kind, largest) / e.of(DoubleDisc, largest).max(e.of(Cam, largest));
             e.more([&ROLLERS, &LOADED], "′", 0.0, largest).each(ROLLERS, "of the others", at_least(1.5), ratio)
         },
     },
@@ -455,8 +451,8 @@ const CLAIMS: &[Claim] = &[
         says: "The largest error is that of the four-roller drive, 0.0062247 rad, 21′.",
         metric: LARGEST_ERROR,
         numbers: |e| {
-            let converted = ERROR_FOUR_ROLLER - 21.0;
-            e.paper("0.0062247 rad less 21′", converted, "′", ROUNDED).size(FourRoller, ERROR_FOUR_ROLLER, largest)
+            let e = e.paper("0.0062247 rad less 21′", ERROR_FOUR_ROLLER - 21.0, "′", ROUNDED);
+            e.size(FourRoller, ERROR_FOUR_ROLLER, largest)
         },
     },
     Claim {
@@ -545,7 +541,8 @@ const CLAIMS: &[Claim] = &[
     Claim {
         id: "load-parallel",
         place: "Figs. 14 and 15, text",
-        says: "On the way back the loaded curve is mostly parallel to the unloaded one; the deceleration does not grow.",
+        says: "On the way back the loaded curve is mostly parallel to the unloaded one; the deceleration does not \
+               grow.",
         metric: "Range over mean of the shift under −200 N·m on the way back, settled rows",
         numbers: |e| e.each(LOADED, "", at_most(0.05), |e, kind| e.shift(kind, -TORQUE_N_M, false)[1]),
     },
@@ -687,7 +684,7 @@ mod tests {
     static DRIVE: LazyLock<Drive> = LazyLock::new(Drive::hhd_95);
 
     fn ours(value: f64, bounds: Bounds) -> Evidence<'static> {
-        Evidence::new(&DRIVE, &[]).ours("x", value, "", bounds)
+        Evidence { drive: &DRIVE, runs: &[], paper: Vec::new(), ours: Vec::new() }.ours("x", value, "", bounds)
     }
 
     #[test]
