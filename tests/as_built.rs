@@ -386,6 +386,7 @@ fn a_thicker_rim_is_stiffer_by_the_cube_of_its_thickness() {
 /// The generator of a drive as imperfect as can be still takes just the torque that its output gives, and the work it
 /// puts in does not depend on the way: `d(M_g)/dT = -d(delta)/d(psi)`, both at their own axes.
 #[test]
+#[ignore = "long: tests/run slow"]
 fn with_every_imperfection_forces_balance_and_work_is_reciprocal() {
     // Where a point of the bore begins to bear under a roller within the step, the ideal drive too is out by up to
     // 0.005.
@@ -451,6 +452,7 @@ fn steady(checked: &Validation) -> (f64, f64) {
 /// and flank (the teeth that bear stand some degrees before the major axis with the one flank, behind it with the
 /// other): a table holds it but for that, at places and loads that made none of it.
 #[test]
+#[ignore = "long: tests/run slow"]
 fn a_table_over_whole_turns_holds_pitch_errors_of_both_wheels() {
     let (made, checked) = table_of(|drive| {
         drive.as_built.flexspline_pitch_harmonics = vec![Harmonic { order: 2, amplitude_um: 5.0, phase_deg: 70.0 }];

@@ -45,16 +45,19 @@ fn agrees(kind: GeneratorKind, reference_arcmin: f64) {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn cam() {
     agrees(GeneratorKind::Cam, 0.987);
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn double_disc() {
     agrees(GeneratorKind::DoubleDisc, 1.04);
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn four_roller() {
     agrees(GeneratorKind::FourRoller, 1.026);
 }

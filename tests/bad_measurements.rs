@@ -535,6 +535,7 @@ fn long(desk: &Desk, rows: usize) -> f64 {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn two_hundred_thousand_rows() {
     println!("{:.1} s", long(&Desk::new(), 200_000));
 }

@@ -103,6 +103,7 @@ fn a_result_file_is_a_path_that_gives_the_same_result() {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn both_solvers_write_the_same_files() {
     let desk = Desk::new();
     for solver in ["fast", "reference"] {
@@ -247,6 +248,7 @@ fn a_run_that_does_not_converge_ends_with_1_and_touches_no_file() {
 
 /// A drive of 12 mm under a load for one of 100 mm: how far it came is told, and what it did until then is in a file.
 #[test]
+#[ignore = "long: tests/run slow"]
 fn a_load_beyond_the_last_stable_one_leaves_the_loads_before_it() {
     let desk = Desk::new();
     desk.line("new small.toml --teeth 60 --module 0.2 -q").done();
@@ -276,6 +278,7 @@ fn a_load_beyond_the_last_stable_one_leaves_the_loads_before_it() {
 
 /// What converges as well as any other drive, and is not to be built.
 #[test]
+#[ignore = "long: tests/run slow"]
 fn teeth_that_interfere_and_stress_that_no_steel_bears_are_said() {
     let desk = Desk::new();
     let base = "simulate --generator cam --mesh coarse --path pitch --torque-n-m 20";

@@ -81,6 +81,7 @@ fn a_new_drive_file_is_the_drive_it_was_made_from_and_is_not_lost() {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn a_drive_from_a_few_numbers_clears_its_teeth_and_says_how_it_was_made() {
     let desk = Desk::new();
     for (line, teeth, module_mm) in [
@@ -197,6 +198,7 @@ fn commands(desk: &Desk) -> Vec<String> {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn every_command_prints_one_json_object_and_nothing_else() {
     let desk = Desk::new();
     desk.write("path.csv", "generator_rad\n0\n");

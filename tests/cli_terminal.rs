@@ -126,6 +126,7 @@ fn a_stopped_diagnosis_leaves_the_folder_as_it_was() {
 /// Ten minutes without a word look like a program that hangs: into a pipe goes a line every ten seconds, but none where
 /// quiet was asked for.
 #[test]
+#[ignore = "long: tests/run slow"]
 fn long_work_into_a_pipe_says_how_far_it_is() {
     let said = |quiet: &str| {
         let desk = Desk::new();
@@ -279,6 +280,7 @@ fn on_a_terminal(desk: &Desk, line: &str, variables: &[(&str, &str)]) -> Option<
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn a_terminal_sees_colour_and_how_long_it_will_take() {
     let desk = Desk::new();
     let program = flexspline().display();

@@ -87,6 +87,7 @@ fn flown(fem: &Table<'_>, completed: &Table<'_>, unit: [f64; 3]) -> ([f64; 3], f
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn a_drive_like_a_catalogues_is_right_to_the_scatter_of_the_catalogue() {
     let desk = Desk::new();
     let how = "--generator cam --torque-n-m 62 --mesh coarse --temperatures-c=20 --positions 6 \

@@ -197,6 +197,7 @@ struct Flank {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn flank_forces_are_derivatives_of_the_energy_and_balance() {
     flank_derivatives(&Drive::hhd_95(), 1e-5);
 }
@@ -204,6 +205,7 @@ fn flank_forces_are_derivatives_of_the_energy_and_balance() {
 /// Flanks displaced, turned and worn, on an axis beside that of the housing. The moment about the axis of the output is
 /// that of the forces where they act, 20 um beside the nodes that carry them: 4e-4 of 45 mm.
 #[test]
+#[ignore = "long: tests/run slow"]
 fn as_built_flank_forces_are_derivatives_of_the_energy_and_balance() {
     flank_derivatives(&imperfect(), 1e-3);
 }

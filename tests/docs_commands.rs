@@ -240,6 +240,7 @@ fn run_pages(slow: bool) {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn every_command_of_a_page_runs() {
     run_pages(false);
 }

@@ -134,6 +134,7 @@ fn on_the_mesh_that_ships(kinds: &[GeneratorKind]) {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn the_cam_on_the_mesh_that_ships() {
     on_the_mesh_that_ships(&[GeneratorKind::Cam]);
 }
@@ -145,6 +146,7 @@ fn the_other_generators_on_the_mesh_that_ships() {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn every_generator_there_and_back() {
     for kind in GeneratorKind::ALL {
         compare("there and back", &Drive::hhd_95(), kind, on(MeshLevel::Coarse), 20.0, &there_and_back(load(kind)));
@@ -157,6 +159,7 @@ fn of_all(half: [GeneratorKind; 2]) -> Vec<GeneratorKind> {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn friction_and_compliances_in_the_cold() {
     let mut drive = Drive::hhd_95();
     drive.flanks.friction_coefficient = 0.1;
@@ -172,6 +175,7 @@ fn friction_and_compliances_in_the_cold() {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn every_imperfection_at_once() {
     for kind in of_all([GeneratorKind::Cam, GeneratorKind::FourRoller]) {
         let path = there_and_back(0.5 * load(kind));

@@ -202,6 +202,7 @@ fn an_eccentric_circular_spline_is_told_without_kernels_before_and_after_its_fla
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn pitch_errors_of_the_flexspline_and_an_oval_are_told_apart_and_measured() {
     found(|b| b.flexspline_pitch_harmonics = second(4.0, 0.6), 4, "flexspline_pitch_error", [4.0, LINEAR], Some(0.6));
     let oval = |b: &mut AsBuilt| {

@@ -76,6 +76,7 @@ fn cam_makes_a_loop() {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn two_roller_makes_a_loop() {
     makes_a_loop(GeneratorKind::TwoRoller);
 }

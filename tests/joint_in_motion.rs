@@ -55,6 +55,7 @@ fn a_torque_in_the_mesh_passes_only_as_far_as_its_loop_keeps_the_margin() {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn scenarios_with_a_name_are_stable_and_lose_less_than_a_tenth_of_what_the_ideal_removes() {
     for name in SCENARIOS {
         let found = flight(&built_in(name).unwrap());
@@ -90,6 +91,7 @@ fn at_a_constant_rate_the_ripple_is_a_fifth_and_that_of_wind_stays() {
 
 /// Loads about zero, by the maps of all generators.
 #[test]
+#[ignore = "long: tests/run slow"]
 fn about_zero_load_the_core_gains_with_every_generator() {
     for kind in GeneratorKind::ALL {
         for (torque, noise, load) in [("on_load", 0.3, 0.3), ("in_mesh", 0.03, 0.0), ("current", 0.0, 0.0)] {
@@ -186,6 +188,7 @@ fn a_servo_near_the_edge_of_instability_is_cautioned() {
 /// The advice is sound when it is followed, whatever makes the servo ring; and where nothing helps, that is said,
 /// with the resonance. A servo that swings has no word on compensation.
 #[test]
+#[ignore = "long: tests/run slow"]
 fn the_paces_that_are_advised_are_sound_when_followed() {
     let folder = tempfile::tempdir().unwrap();
     let fly = |text: &str, more: &[&str]| {

@@ -17,6 +17,7 @@ fn page(desk: &Desk, name: &str) -> (String, Value) {
 const SHORT: &str = "--mesh coarse --temperatures-c 20 --most-nodes 14";
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn the_page_of_tables_agrees_with_their_files() {
     let desk = Desk::new();
     desk.line(&format!("tables --generator cam {SHORT} --out made")).done();
@@ -45,6 +46,7 @@ fn the_page_of_tables_agrees_with_their_files() {
 
 /// One pitch under load: the page has the figures of the summary, and the rows of the run are the drive in motion.
 #[test]
+#[ignore = "long: tests/run slow"]
 fn the_page_of_a_settled_pitch_shows_its_rows_in_motion() {
     let desk = Desk::new();
     let line = "simulate --generator cam --mesh coarse --path pitch --torque-n-m 20 --stress";

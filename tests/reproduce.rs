@@ -52,6 +52,7 @@ fn judged(claim: &Value) -> &'static str {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn the_paper_claim_by_claim() {
     let desk = Desk::new();
     let output = desk.line("reproduce --quick --json --out made").done();

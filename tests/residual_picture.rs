@@ -147,6 +147,7 @@ fn session(angle: Vec<f64>) -> Session {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn a_damaged_tooth_is_a_pulse_in_its_place_and_a_clean_drive_has_none() {
     let (seeds, mut clean) = (seeds(8, 60), 0);
     for seed in 0..seeds {

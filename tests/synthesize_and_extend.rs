@@ -38,6 +38,7 @@ fn compensation(diagnosis: &Value) -> [f64; 3] {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn an_effect_is_found_and_the_extended_tables_leave_less_of_it() {
     let desk = Desk::new();
     desk.write("nominal.toml", NOMINAL);
@@ -101,6 +102,7 @@ fn an_effect_is_found_and_the_extended_tables_leave_less_of_it() {
 /// The contribution removed in a second diagnosis is the one found in the first, not the textbook form of a cause of
 /// that name and size: the residual is the same, and nothing is found in the difference of two models.
 #[test]
+#[ignore = "long: tests/run slow"]
 fn a_drive_diagnosed_twice_has_nothing_more() {
     let desk = Desk::new();
     desk.write("nominal.toml", NOMINAL);
@@ -192,6 +194,7 @@ fn an_error_of_the_output_encoder_is_not_put_into_tables() {
 
 /// The drive of the FEM: made, diagnosed, written as a drive that the FEM runs, and its tables made again.
 #[test]
+#[ignore = "long: tests/run slow"]
 fn a_worn_drive_is_made_again_by_the_fem() {
     let desk = Desk::new();
     desk.line(

@@ -18,6 +18,7 @@ fn json(desk: &Desk, name: &str) -> Value {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn tables_hold_between_their_nodes_and_across_a_reversal() {
     let desk = Desk::new();
     for generator in ["cam", "double-disc"] {
@@ -113,6 +114,7 @@ fn tables_hold_between_their_nodes_and_across_a_reversal() {
 
 /// Work is shared out to threads by generator and temperature; what comes out does not know of it.
 #[test]
+#[ignore = "long: tests/run slow"]
 fn tables_do_not_depend_on_the_number_of_threads() {
     let desk = Desk::new();
     // Of half the teeth of HHD-95, in half the time.

@@ -87,6 +87,7 @@ fn right(recording: &Recording) {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn files_of_other_programs_are_read_through_the_converter() {
     let python = match python() {
         Ok(python) => python,

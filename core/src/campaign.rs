@@ -511,6 +511,7 @@ fn is_idle(story: Story, path: &str) -> bool {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn no_single_bit_of_what_lives_on_is_wrong_in_silence() {
     let mut counts = Counts::default();
     for (story, at) in STORIES {

@@ -760,6 +760,7 @@ mod tests {
     }
 
     #[test]
+    #[ignore = "long: tests/run slow"]
     fn the_loop_is_the_clearance_and_what_friction_adds() {
         let stated = Stated {
             rated_torque_n_m: Some(50.0),

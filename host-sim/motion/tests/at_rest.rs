@@ -15,6 +15,7 @@ fn unit(arcsec_n_m: f64) -> Unit {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn no_joint_is_kept_from_coming_to_rest() {
     let base = dish::scenario();
     let (mut joints, mut refused, mut slowest) = (0, 0, f64::INFINITY);

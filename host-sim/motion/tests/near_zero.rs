@@ -35,6 +35,7 @@ const FLOATS_N_M: f64 = 0.06;
 /// as the drag floats from flank to flank, and there nothing knows where it is. In the short form each share of a drag
 /// stands for one of the drags; `FLEXSPLINE_LONG` flies all of them with all.
 #[test]
+#[ignore = "long: tests/run slow"]
 fn about_zero_load_the_core_is_never_worse_than_no_compensation_and_near_the_ideal() {
     let unit = unit();
     let mut worst = [(0.0_f64, String::new()), (0.0, String::new())];

@@ -73,6 +73,7 @@ fn none(scores: &Gathered, names: &[&str]) {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn one_that_knows_the_truth_scores_everything() {
     let scores = scores(|truth| Ok(perfect(truth)));
     all(&scores, &["first_name", "first_name_strict", "exact", "exact_near", "exact_far", "found_near", "found_far"]);
@@ -87,6 +88,7 @@ fn one_that_knows_the_truth_scores_everything() {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn one_that_never_names_anything_finds_and_misnames_nothing() {
     let scores = scores(|_| Ok(answer("none", &[])));
     none(&scores, &["first_name", "exact", "compound_exact", "outside_unknown", "logger_told", "removed_half"]);
@@ -94,6 +96,7 @@ fn one_that_never_names_anything_finds_and_misnames_nothing() {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn one_that_always_names_wear_is_right_on_wear_alone() {
     let scores = scores(|_| Ok(answer("explained", &["wear"])));
     all(&scores, &["null_named", "null_not_none", "outside_named", "logger_named", "logger_misled"]);
@@ -114,6 +117,7 @@ fn a_fault_by_another_name_misleads_nobody() {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn one_that_crashes_fails_every_case() {
     let scores = scores(|_| Err("crashed".to_owned()));
     all(&scores, &["failed"]);
@@ -137,6 +141,7 @@ fn a_confidence_falls_into_one_level() {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn a_seed_repeats_a_case_and_the_data_hold_no_truth() {
     let family = |family| Draw { family: Some(family), ..Draw::default() };
     let draws = [Family::D, Family::E, Family::G, Family::H, Family::V].map(family);

@@ -527,6 +527,7 @@ mod tests {
     }
 
     #[test]
+    #[ignore = "long: tests/run slow"]
     fn shares_add_up_to_the_whole() {
         for torque in [2.0, 50.0, -50.0] {
             // Every tooth displaced alike turns the output by just that.
@@ -540,6 +541,7 @@ mod tests {
     }
 
     #[test]
+    #[ignore = "long: tests/run slow"]
     fn a_pitch_error_and_an_oval_do_what_fem_says() {
         // 0.2 µm: at 2 N m a tooth gives way by no more. The kernel's harmonic is the mean over tooth phases, the run
         // is at one of them, which with the few teeth that carry 2 N m differs by 2 % at order 2 and 7 % at order 6.
@@ -594,6 +596,7 @@ mod tests {
     }
 
     #[test]
+    #[ignore = "long: tests/run slow"]
     fn a_damaged_tooth_does_what_fem_says() {
         // Depths below what the tooth gives way by; see the other law for what is broken off.
         for (wheel, tooth, per_turn) in [(Wheel::Flexspline, 186, 1.0), (Wheel::Flexspline, 3_u32, 1.0)] {
@@ -615,6 +618,7 @@ mod tests {
     }
 
     #[test]
+    #[ignore = "long: tests/run slow"]
     fn an_eccentricity_between_the_samples_does_what_fem_says() {
         for (torque, phase) in [(2.0, 0.7), (2.0, 2.0), (-2.0, 0.7), (50.0, 0.7)] {
             let change = |b: &mut AsBuilt| {
@@ -629,6 +633,7 @@ mod tests {
     }
 
     #[test]
+    #[ignore = "long: tests/run slow"]
     fn kernels_are_written_and_read() {
         let text = serde_json::to_string(cam()).unwrap();
         let again = Kernels::from_json(&text).unwrap();
@@ -683,6 +688,7 @@ mod tests {
     /// Far beyond the clearance teeth reach the root of the other wheel, here 55 µm away, and no more is computed than
     /// stands.
     #[test]
+    #[ignore = "long: tests/run slow"]
     fn displacements_that_do_not_stand_are_left_out_or_told() {
         let plan = |enough_um| KernelPlan {
             torques_n_m: vec![5.0],

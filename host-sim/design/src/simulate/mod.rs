@@ -838,6 +838,7 @@ mod tests {
     }
 
     #[test]
+    #[ignore = "long: tests/run slow"]
     fn a_pitch_gives_settled_rows_either_way_and_mirror_images() {
         let forward = run(&coarse(Path::Pitch));
         let backward = run(&SimulationSettings { direction: Direction::Backward, ..coarse(Path::Pitch) });
@@ -867,6 +868,7 @@ mod tests {
     }
 
     #[test]
+    #[ignore = "long: tests/run slow"]
     fn wind_up_is_counted_from_the_middle_of_the_clearance() {
         let summary = run(&SimulationSettings { torque_n_m: 10.0, ..coarse(Path::Pitch) }).summary;
         // On the major axis the middle is there by symmetry.
@@ -919,6 +921,7 @@ mod tests {
     /// Angles are the same where lengths go with the scale, torques with its cube and penalties with its inverse: the
     /// bodies are the same.
     #[test]
+    #[ignore = "long: tests/run slow"]
     fn a_drive_a_tenth_as_large_winds_up_alike() {
         let of = |scale: f64| {
             let drive = at_scale(scale);

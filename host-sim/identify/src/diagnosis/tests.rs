@@ -50,6 +50,7 @@ fn nothing_is_named_on_a_drive_within_its_spread() {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn an_eccentric_circular_spline_is_told_from_a_runout_of_the_flexspline_and_measured() {
     for (name, other) in [
         (CauseName::CircularSplineEccentricity, CauseName::FlexsplineRunout),
@@ -67,6 +68,7 @@ fn an_eccentric_circular_spline_is_told_from_a_runout_of_the_flexspline_and_meas
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn sizes_come_with_intervals_that_hold_the_truth() {
     for (name, size, parameter, truth) in [
         (CauseName::SensorLatency, 2.0, "delay_s", 2e-3),
@@ -225,6 +227,7 @@ fn wear_goes_on_while_nobody_records() {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn what_swings_short_of_where_it_is_driven_is_no_resonance() {
     let nominal = catalogue_drive();
     for (gain, resonates) in [(0.6, true), (-0.6, false)] {
@@ -327,6 +330,7 @@ fn a_higher_harmonic_of_the_pitch_is_found_and_not_sure_where_the_wheel_stands()
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn what_a_load_makes_that_nobody_recorded_has_no_name() {
     let mut sessions = with_more_by_speed(recorded(&[], 5, 3000, 100.0, 1.5, 73), |_, speed| -12.0 * speed.signum());
     sessions.iter_mut().for_each(|session| session.torque_n_m = None);
@@ -356,6 +360,7 @@ fn with_bad_rows(sessions: &[Session], share: f64, one_sided: bool, seed: u64) -
 
 /// Bad rows, 15 % of all, against none: by how many of its standard deviations each line moves.
 #[test]
+#[ignore = "long: tests/run slow"]
 fn bad_rows_move_no_line_by_more_than_its_interval() {
     let mut moved = Vec::new();
     for (number, (cause, size, parameter)) in [
@@ -382,6 +387,7 @@ fn bad_rows_move_no_line_by_more_than_its_interval() {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn two_effects_at_once_are_both_named_or_said_to_look_alike() {
     let both = [CauseName::TorsionalHysteresis, CauseName::OutputEncoderEccentricity];
     let effects = [effect(both[0], 18.0, 0.0, 0.4), effect(both[1], 14.0, 2.0, 0.0)];
@@ -430,6 +436,7 @@ fn a_search_on_a_sample_comes_to_what_one_on_all_rows_comes_to() {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn what_no_cause_explains_is_not_named() {
     for (k, name) in
         [Strange::SensorOffsetWithTemperature, Strange::LineOfOrder10_37, Strange::Creep, Strange::TorqueCrossTalk]
@@ -979,6 +986,7 @@ fn every_cause_has_a_law_that_knows_its_own_columns_and_shape_parameters() {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn a_wheel_is_told_from_the_other_whichever_of_them_stands() {
     for fixed in ["flexspline", "circular_spline"] {
         let drive = Nominal::from_toml(
@@ -1272,6 +1280,7 @@ fn hanging(mut sessions: Vec<Session>, drive: &Nominal) -> Vec<Session> {
 }
 
 #[test]
+#[ignore = "long: tests/run slow"]
 fn an_output_that_hangs_in_the_clearance_is_no_cause() {
     let drive = catalogue_drive();
     let effects = [effect(CauseName::OutputEncoderEccentricity, 15.0, 0.7, 0.0)];

@@ -259,6 +259,7 @@ mod tests {
     /// Teeth that lean do work on the wave that leans them: without the force of the load's moment on it the generator
     /// would gain or lose what the flanks do. And the state repeats.
     #[test]
+    #[ignore = "long: tests/run slow"]
     fn leaning_teeth_lose_nothing() {
         // The ripple of a cup, which bears on single edges, is sampled less well: 5.5e-4 N.m by 8 places, 2e-4 by 16.
         for (drive, per_pitch, tilt, within) in [
@@ -283,6 +284,7 @@ mod tests {
     /// A taper against the cone levels the load along the face: best near the tilt of the rim where the teeth bear. The
     /// skew, which no taper meets, is left.
     #[test]
+    #[ignore = "long: tests/run slow"]
     fn a_taper_against_the_cone_levels_the_load() {
         let peak = |taper_mrad: f64| {
             let places = two_pitches(&sliced(Drive::hhd_95_hermetic(), taper_mrad), 50.0, 8);
@@ -323,6 +325,7 @@ mod tests {
     /// Where few teeth touch, lightly and by their ends, there is an equilibrium as well, and it is found as fast as
     /// any.
     #[test]
+    #[ignore = "long: tests/run slow"]
     fn leaning_teeth_that_hardly_touch_find_their_equilibrium() {
         let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
         for (drive, kind, taper_mrad) in [
@@ -398,6 +401,7 @@ mod tests {
 
     /// Both solvers have the slices from one contact law and the lean from one set of waves.
     #[test]
+    #[ignore = "long: tests/run slow"]
     fn both_solvers_agree_on_leaning_teeth() {
         let cases = [
             (Drive::hhd_95_hermetic(), GeneratorKind::FourRoller, 0.6),
@@ -446,6 +450,7 @@ mod tests {
     /// S-shaped teeth in the contact FEM: a pitch repeats, the generator takes what the load gives, and six times as
     /// many flanks bear as of involutes. Cam and disc; two outlines without corners.
     #[test]
+    #[ignore = "long: tests/run slow"]
     fn s_shaped_teeth_lose_nothing_and_a_quarter_of_them_bears() {
         let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
         for (kind, least, most) in [(GeneratorKind::Cam, 0.2, 0.5), (GeneratorKind::DoubleDisc, 0.1, 0.5)] {
@@ -473,6 +478,7 @@ mod tests {
     }
 
     #[test]
+    #[ignore = "long: tests/run slow"]
     fn both_solvers_agree_on_s_shaped_teeth_and_the_mirror_holds() {
         errs_by_the_opposite_when_mirrored(&Drive::s_95());
         let errors = [Method::Fast, Method::Reference].map(|method| {
