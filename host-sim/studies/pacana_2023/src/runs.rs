@@ -28,8 +28,11 @@ const STANDARD: &str = "standard";
 /// The run whose rim is kept from turning at one point of its bore instead of by the mean of the bore. Coarse mesh.
 pub(crate) const ONE_POINT: &str = "rim held at one point";
 
-/// Variants of a run: name, whether the quick form has it, change of the settings.
-const VARIANTS: [(&str, bool, fn(&mut SimulationSettings)); 7] = [
+/// A variant of a run: name, whether the quick form has it, change of the settings.
+type Variant = (&'static str, bool, fn(&mut SimulationSettings));
+
+/// All variants, the standard run first.
+const VARIANTS: [Variant; 7] = [
     (STANDARD, true, |_| {}),
     ("penalty times 2", true, |settings| stiffen(settings, 2.0)),
     ("penalty times 0.5", false, |settings| stiffen(settings, 0.5)),
@@ -238,7 +241,7 @@ fn lost_motion(out: &[Row], back: &[Row], pitch: f64) -> f64 {
         back.windows(2).find_map(|pair| {
             let t = (angle - pair[0].generator_rad) / (pair[1].generator_rad - pair[0].generator_rad);
             let [a, b] = [pair[0].error_arcsec, pair[1].error_arcsec];
-            (-1e-9..=1.0 + 1e-9).contains(&t).then(|| a + t * (b - a))
+            (-1e-9..=1.0 + 1e-9).contains(&t).then_some(a + t * (b - a))
         })
     };
     let steady = out.iter().filter(|row| between.contains(&row.generator_rad));
