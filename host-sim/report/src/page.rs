@@ -839,6 +839,29 @@ mod tests {
     }
 
     #[test]
+    fn words_are_filled_with_errors_and_what_is_left_of_the_words_stays() {
+        let text = Text::filled("from {} to {}, not {}", &[(1.5, 2), (-3.0, 3)]);
+        let due = Text::new("from ").error(1.5, 2).plain(" to ").error(-3.0, 3).plain(", not {}");
+        assert_eq!(text, due);
+    }
+
+    #[test]
+    fn figures_of_the_terminal_are_rows_with_their_unit() {
+        let figure = |name: &str, unit, caveat: &str| NamedFigure {
+            name: name.into(),
+            value: 23.456,
+            unit,
+            decimals: 1,
+            caveat: caveat.into(),
+            what: "what it is".into(),
+        };
+        let figures = [figure("backlash", "arcsec", ""), figure("torque", "N.m", "a remark")];
+        let Block::Table { table, .. } = Block::figures("caption", &figures) else { panic!("no table") };
+        assert_eq!(table.rows[0], ["Backlash".into(), Text::arcsec(23.456, 4), "what it is".into()]);
+        assert_eq!(table.rows[1], ["Torque", "23.46\u{a0}N·m", "what it is; a remark"].map(Text::from));
+    }
+
+    #[test]
     fn numbers_have_significant_digits() {
         for (value, digits, text) in
             [(0.0, 3, "0"), (12.345, 3, "12.3"), (-0.012345, 2, "−0.012"), (1234.5, 2, "1234"), (f64::NAN, 2, "–")]
