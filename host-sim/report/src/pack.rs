@@ -7,7 +7,7 @@
 //! | kind | stored | error at most |
 //! |---|---|---|
 //! | [`Packed::floats`] | the bytes of `f32`, four planes | that of `f32` |
-//! | [`Packed::steps`] | multiples of `scale` from `offset`, 16 bits, zigzag differences, two planes | half of `scale` |
+//! | [`Packed::steps`] | multiples of `scale` from `offset`, 16-bit zigzag differences, two planes | half of `scale` |
 
 use std::io::Write;
 

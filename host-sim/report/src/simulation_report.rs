@@ -279,10 +279,13 @@ impl RunKnown<'_> {
         Section::new("load", "Load and stress", Detail::Engineering, blocks)
     }
 
-    /// The axis of figures along the path, and the places of the rows, ascending: generator or torque where that goes one way
-    /// all along, else the step.
+    /// The axis of figures along the path, and the places of the rows, ascending: generator or torque where that goes
+    /// one way all along, else the step.
     fn along(&self) -> (Axis, Vec<(f64, usize)>) {
-        let goes_one_way = |of: fn(&Row) -> f64| matches!(one_way(self.rows, of).as_slice(), [(_, stretch)] if stretch.len() == self.rows.len());
+        let goes_one_way = |of: fn(&Row) -> f64| {
+            let all = self.rows.len();
+            matches!(one_way(self.rows, of).as_slice(), [(_, stretch)] if stretch.len() == all)
+        };
         let (axis, of): (Axis, fn(&Row) -> f64) = if goes_one_way(|row| row.generator_rad) {
             (Axis::new("Generator", PageQuantity::Degree), |row| row.generator_rad.to_degrees())
         } else if goes_one_way(|row| row.torque_n_m) {

@@ -1,8 +1,8 @@
 //! The page of a diagnosis: what an analyst with a log file sees.
 //!
 //! The answer first, in one sentence and one number; then the causes and what to record next; then the picture, the
-//! gain, and the faults of the data. Residuals come row by row in three levels (nominal, recalibrated, with the causes),
-//! and a selector shows the picture of each: the last is without what the causes explain.
+//! gain, and the faults of the data. Residuals come row by row in three levels (nominal, recalibrated, with the
+//! causes), and a selector shows the picture of each: the last is without what the causes explain.
 
 mod orders;
 mod picture;
@@ -572,7 +572,7 @@ fn alike(cause: &Cause) -> Vec<String> {
     cause.look_alikes.iter().map(|name| name.words().to_owned()).chain(cause.or_the_log()).collect()
 }
 
-/// A free parameter of the nominal model, in its unit: the zero as an error, times in milliseconds, the rest as a share.
+/// A free parameter of the nominal model: the zero as an error, times in milliseconds, the rest as a share.
 fn recalibrated_value(name: &str, p: Parameter) -> Text {
     if name.starts_with("zero") {
         return Text::arcsec(p.value, 3).plain("\u{a0}±\u{a0}").error(p.std, 2);

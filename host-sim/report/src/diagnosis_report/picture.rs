@@ -310,8 +310,8 @@ impl DiagnosisKnown<'_> {
         blocks.extend(self.shown.iter().filter_map(|shown| {
             let noise = shown.picture.as_ref()?.noise;
             let words = format!(
-                "White noise of a row {{}}; correlated noise, lines taken out, {{}}, over {} rows: the data are worth {} \
-                 independent rows.",
+                "White noise of a row {{}}; correlated noise, lines taken out, {{}}, over {} rows: the data are worth \
+                 {} independent rows.",
                 significant(noise.decorrelation_rows, 2),
                 significant(noise.independent_rows, 2)
             );
