@@ -6,7 +6,7 @@
 //!
 //! ```text
 //! sh             run, block after block, in a copy of the project of each page's own, by the program that was built
-//! sh slow        only parsed here; run by `cargo test -- --include-ignored` (`tests/run host --long`)
+//! sh slow        only parsed here; run by `cargo test -- --ignored` (`tests/run slow`)
 //! sh firmware    run by `tests/run firmware`, which has to name the page; likewise `sh PART` of a file of tests/parts
 //! python         run by the tests of `tests/run python`: only on its page
 //! rust           compiled and run as a documentation test: `tests/lib.rs` has to hold the page
@@ -32,7 +32,7 @@ const NOT_RUN: [(&str, &str); 11] = [
     ("rustup ", "changes the toolchains of whoever runs the tests"),
     ("cargo install ", "needs the network"),
     ("cargo test ", "is what runs this test"),
-    ("cargo doc ", "tests/run host builds the documentation"),
+    ("cargo doc ", "tests/run site builds the documentation"),
     ("cargo mutants ", "hours"),
     ("cargo build ", "tests/run builds what is built here"),
     ("flexspline-exam ", "minutes to hours: tests/run exam"),
@@ -291,7 +291,7 @@ fn every_block_says_what_it_is() {
             let said = match (block.language.as_str(), block.mark.as_str()) {
                 ("sh", "" | "slow") | ("text" | "math" | "json" | "c" | "csv" | "diff", "") => Ok(()),
                 ("sh", part) if PARTS.contains(&part) => {
-                    let runs = format!("page_commands {name} {part}");
+                    let runs = format!("page {name} {part}");
                     runner.contains(&runs).then_some(()).ok_or(format!("tests/run does not hold `{runs}`"))
                 }
                 ("rust", "") => {
@@ -310,7 +310,8 @@ fn every_block_says_what_it_is() {
                 let named = |(line, _): &(String, Kind)| line.starts_with("tests/run").then(|| line.clone());
                 for line in commands(&block.text).into_iter().flatten().filter_map(|command| named(&command)) {
                     for word in line.split(" #").next().unwrap().split(' ').skip(1).filter(|word| !word.is_empty()) {
-                        let part = runner.contains(&format!("part_{word}()")) || word == "--long";
+                        let part = root().join("tests/parts").join(word).is_file();
+                        let part = part || ["--long", "--changed", "nightly"].contains(&word);
                         if !part {
                             wrong.push(format!("{}: tests/run has no part {word}", page.at(block.line)));
                         }

@@ -150,7 +150,7 @@ fn an_ideal_drive_has_no_cause() {
 }
 
 #[test]
-#[ignore = "a minute of a processor: a drive that does not repeat, by FEM; pitch errors and an oval are always reported"]
+#[ignore = "a minute of a processor: a drive that does not repeat, by FEM"]
 fn an_eccentric_circular_spline_is_told_and_measured() {
     let eccentric = |b: &mut AsBuilt| {
         b.circular_spline_eccentricity_um = 8.0;

@@ -1,5 +1,5 @@
-//! Fixtures of the browser tests in addition to real reports: packed arrays with their values, and a page whose every text is
-//! hostile.
+//! Fixtures of the browser tests in addition to real reports: packed arrays with their values, and a page whose
+//! every text is hostile.
 //!
 //! `cargo run --release --example report_fixtures -- DIR`
 
@@ -12,7 +12,10 @@ use flexspline_sim::report::page::{
 };
 use serde_json::{Map, Value, json};
 
-const HOSTILE: &str = r#"</script></title></noscript>"><img src=x onerror="window.hacked=1"><script>window.hacked=1</script>&amp;'{{7*7}}<!--"#;
+const HOSTILE: &str = concat!(
+    r#"</script></title></noscript>"><img src=x onerror="window.hacked=1">"#,
+    "<script>window.hacked=1</script>&amp;'{{7*7}}<!--"
+);
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = PathBuf::from(std::env::args().nth(1).ok_or("usage: report_fixtures DIR")?);

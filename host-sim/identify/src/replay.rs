@@ -181,8 +181,8 @@ impl ReplaySummary {
 /// Rows and a table that do not belong together.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error(
-    "the rows are of the drive {} (BLAKE3 {}) under {}, says {} beside them; the table is of a drive with ratio {ratio} and BLAKE3 {hash} \
-     under {generator}", rows.drive, rows.drive_hash, rows.generator, RESULTS[1]
+    "the rows are of the drive {} (BLAKE3 {}) under {}, says {} beside them; the table is of a drive with ratio \
+     {ratio} and BLAKE3 {hash} under {generator}", rows.drive, rows.drive_hash, rows.generator, RESULTS[1]
 )]
 pub struct OtherRows {
     rows: RowsOf,

@@ -18,7 +18,10 @@ type Points<'py> = (PyReadonlyArray1<'py, f64>, Option<PyReadonlyArray1<'py, f64
 
 /// Runs a drive along a path; the columns of `results.csv` and the text of `summary.json`.
 #[pyfunction]
-#[pyo3(signature = (drive, generator_name, path, points, *, increment_rad, direction, torque_n_m, temperature_c, mesh, solver, threads, progress))]
+#[pyo3(signature = (
+    drive, generator_name, path, points, *, increment_rad, direction, torque_n_m, temperature_c,
+    mesh, solver, threads, progress
+))]
 #[expect(clippy::too_many_arguments, reason = "each is an option of the run")]
 pub fn simulate<'py>(
     py: Python<'py>,

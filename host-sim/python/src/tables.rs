@@ -28,7 +28,10 @@ pub fn parts<'py>(py: Python<'py>, made: &MadeTable) -> PyResult<Parts<'py>> {
 
 /// Makes the tables of a drive by contact FEM.
 #[pyfunction]
-#[pyo3(signature = (drive, generators, *, torque_n_m, most_nodes, node_tolerance_arcsec, positions, temperatures_c, mesh, solver, threads, progress))]
+#[pyo3(signature = (
+    drive, generators, *, torque_n_m, most_nodes, node_tolerance_arcsec, positions, temperatures_c,
+    mesh, solver, threads, progress
+))]
 #[expect(clippy::too_many_arguments, reason = "each is an option of the run")]
 pub fn tables<'py>(
     py: Python<'py>,

@@ -266,7 +266,7 @@ fn many_requests_do_not_end_the_server() {
     assert_eq!(bench.ask("GET", "/api/state", "").status, 200);
 }
 
-/// 100 pages that each put a job in the line at once: each gets its job or is told that the line is full, and all are done.
+/// 100 pages that each queue a job at once: each gets its job or the answer that the queue is full, and all are done.
 #[test]
 fn of_a_hundred_jobs_at_once_each_is_done_or_refused() {
     let bench = Bench::new();

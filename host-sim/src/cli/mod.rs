@@ -237,7 +237,10 @@ struct Common {
     /// Drive file, or the name of a built-in drive: HHD-95 (ideal), HHD-95-typical (friction, compliances,
     /// tolerances), CUP-95 (a cup), HHD-95-hermetic (a closed sleeve), HHD-95-plane (no third dimension), S-95
     /// (S-shaped teeth)
-    #[arg(long, global = true, value_name = "FILE|NAME", default_value = USUAL_DRIVE, value_hint = ValueHint::FilePath, help_heading = "Common options")]
+    #[arg(
+        long, global = true, value_name = "FILE|NAME", default_value = USUAL_DRIVE, value_hint = ValueHint::FilePath,
+        help_heading = "Common options"
+    )]
     drive: String,
     /// Override fields of the drive, for instance flanks.friction_coefficient=0.08; several with commas, or repeated
     #[arg(long = "set", global = true, value_name = "PATH=VALUE", help_heading = "Common options")]
@@ -249,7 +252,10 @@ struct Common {
     #[arg(long, global = true, help_heading = "Common options")]
     json: bool,
     /// Threads to use; default: one for each core
-    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Common options")]
+    #[arg(
+        long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024),
+        help_heading = "Common options"
+    )]
     threads: Option<u16>,
     /// Print no progress and no summary
     #[arg(short, long, global = true, conflicts_with = "verbose", help_heading = "Common options")]

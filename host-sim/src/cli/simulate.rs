@@ -86,21 +86,33 @@ pub(super) struct ModelOptions {
     #[arg(long, value_name = "C", allow_negative_numbers = true)]
     pub(super) temperature_c: Option<f64>,
     /// Mesh: coarse, standard or fine
-    #[arg(long, value_name = "LEVEL", default_value = "standard", value_parser = names::mesh(), hide_possible_values = true)]
+    #[arg(
+        long, value_name = "LEVEL", default_value = "standard", value_parser = names::mesh(),
+        hide_possible_values = true
+    )]
     pub(super) mesh: MeshLevel,
     /// Solver: fast condenses the teeth onto the nodes that touch something, reference keeps every node; they agree to
     /// 0.1 arcsec
-    #[arg(long, value_name = "SOLVER", default_value = "fast", value_parser = names::solver(), hide_possible_values = true)]
+    #[arg(
+        long, value_name = "SOLVER", default_value = "fast", value_parser = names::solver(),
+        hide_possible_values = true
+    )]
     pub(super) solver: Method,
     /// Contact penalty on the flanks, N/mm^3; the pressure that is told is found from the forces and does not hang on
     /// it
-    #[arg(long, value_name = "K", default_value_t = SolverSettings::default().flank_penalty, allow_negative_numbers = true, help_heading = "Numerical method")]
+    #[arg(
+        long, value_name = "K", default_value_t = SolverSettings::default().flank_penalty,
+        allow_negative_numbers = true, help_heading = "Numerical method"
+    )]
     flank_penalty: f64,
     /// Contact penalty on the bore, N/mm^3 [default: 1e7 under rollers, 1e6 under discs and cam]
     #[arg(long, value_name = "K", allow_negative_numbers = true, help_heading = "Numerical method")]
     bore_penalty: Option<f64>,
     /// Newton iterations before an increment is halved
-    #[arg(long, value_name = "N", default_value_t = SolverSettings::default().max_iterations, help_heading = "Numerical method")]
+    #[arg(
+        long, value_name = "N", default_value_t = SolverSettings::default().max_iterations,
+        help_heading = "Numerical method"
+    )]
     max_iterations: usize,
 }
 

@@ -54,7 +54,9 @@ pub(super) struct Synthesize {
     #[arg(long, value_name = "DIR", conflicts_with = "model", value_hint = ValueHint::DirPath)]
     tables: Option<PathBuf>,
     /// Wave generator of the drive: two-roller, four-roller, double-disc or cam
-    #[arg(long, value_name = "G", default_value = "cam", value_parser = names::generator(), hide_possible_values = true)]
+    #[arg(
+        long, value_name = "G", default_value = "cam", value_parser = names::generator(), hide_possible_values = true
+    )]
     generator: GeneratorKind,
     /// Nominal model from the catalogue, or one that `flexspline diagnose` has extended
     #[arg(long, value_name = "nominal.toml", value_hint = ValueHint::FilePath)]
@@ -69,10 +71,16 @@ pub(super) struct Synthesize {
     #[arg(long, value_name = "ARCSEC", default_value_t = 0.8, allow_negative_numbers = true, help_heading = "Sensors")]
     wander_arcsec: f64,
     /// Number of sessions
-    #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u16).range(1..=100), help_heading = "Excitation")]
+    #[arg(
+        long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u16).range(1..=100),
+        help_heading = "Excitation"
+    )]
     sessions: u16,
     /// Rows per session
-    #[arg(long, value_name = "N", default_value_t = 3000, value_parser = clap::value_parser!(u32).range(50..=1_000_000), help_heading = "Excitation")]
+    #[arg(
+        long, value_name = "N", default_value_t = 3000,
+        value_parser = clap::value_parser!(u32).range(50..=1_000_000), help_heading = "Excitation"
+    )]
     rows: u32,
     /// Largest speed of the generator, rad/s
     #[arg(

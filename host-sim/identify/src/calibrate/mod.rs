@@ -1,7 +1,8 @@
 //! Logs of one unit to its table, whatever the cause of its error.
 //!
 //! ```text
-//! logs -> measurement -> rows in steady motion, less the prior -> parts, chosen by folds left out -> samples -> table (.fxt) -> the core over the logs
+//! logs -> measurement -> rows in steady motion, less the prior -> parts, chosen by folds left out
+//!      -> samples -> table (.fxt) -> the core over the logs
 //! ```
 //!
 //! Physics first: the nominal model, or a table, is the prior, and is taken from what was measured. What remains is

@@ -5,7 +5,8 @@
 //!
 //! | found | done |
 //! |---|---|
-//! | no table, no such column, text for a number, a row too short or too long, under 16 rows, nothing moves, more than half frozen, units that cannot be told | error |
+//! | no table, no such column, text for a number, a row too short or too long | error |
+//! | under 16 rows, nothing moves, more than half frozen, units that are ambiguous | error |
 //! | torque, temperature, orientation or time missing in up to 10 rows in a row | filled by a straight line |
 //! | an angle missing, a longer hole, a last line that breaks off | rows left out |
 //! | a channel beside the angles missing in over half of the rows | channel left out |

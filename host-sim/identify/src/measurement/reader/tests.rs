@@ -119,8 +119,10 @@ fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
     let scope = |own: f64| {
         let above = "Name\tScope Project\nFile\tC:\\bench.svdx\nEndTime\t133000000300000000\t25 May 2025\n\n\
              Name\tMotor.ActPos\tName\tJoint.ActPos\tName\tJoint.Torque\n\
-             SymbolComment\t\tSymbolComment\t\tSymbolComment\t\nData-Type\tREAL64\tData-Type\tREAL64\tData-Type\tREAL64\n\
-             SampleTime[ms]\t50\tSampleTime[ms]\t50\tSampleTime[ms]\t50\nVariableSize\t8\tVariableSize\t8\tVariableSize\t8\n\
+             SymbolComment\t\tSymbolComment\t\tSymbolComment\t\n\
+             Data-Type\tREAL64\tData-Type\tREAL64\tData-Type\tREAL64\n\
+             SampleTime[ms]\t50\tSampleTime[ms]\t50\tSampleTime[ms]\t50\n\
+             VariableSize\t8\tVariableSize\t8\tVariableSize\t8\n\
              Offset\t0\tOffset\t0\tOffset\t0\n\n";
         file(above, "\t", move |k| {
             let t = STEP_S * k as f64;
