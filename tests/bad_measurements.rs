@@ -446,6 +446,7 @@ fn files_and_tables_that_are_not_what_they_are_taken_for_are_refused() {
     desk.write("nominal.toml", MODEL);
     fs::write(desk.path("binary.toml"), [0, 159, 146, 150]).unwrap();
     fs::create_dir(desk.path("folder")).unwrap();
+    fs::create_dir(desk.path("models")).unwrap();
     fs::create_dir(desk.path("damaged")).unwrap();
     fs::write(desk.path("damaged/cam.fxt"), b"no table").unwrap();
     let case =
@@ -454,7 +455,7 @@ fn files_and_tables_that_are_not_what_they_are_taken_for_are_refused() {
         case("no data", "missing.csv --model nominal.toml", &["missing.csv"]),
         case("a folder as data", "folder --model nominal.toml", &["folder"]),
         case("no model", "data.csv --model missing.toml", &["missing.toml"]),
-        case("a folder as model", "data.csv --model folder", &["folder: "]),
+        case("a folder as model", "data.csv --model models", &["models: "]),
         case("a binary model", "data.csv --model binary.toml", &["binary.toml"]),
         case("data as model", "data.csv --model data.csv", &["data.csv:1"]),
         case("neither model nor tables", "data.csv", &["--model"]),

@@ -213,7 +213,10 @@ fn bad_input_is_refused_with_its_place_and_leaves_nothing() {
         ("export --generator cam --format inp --step-rad 0", "--step-rad: found 0"),
         ("export --generator cam --format inp --last-torque-n-m nan", "--last-torque-n-m: found NaN"),
         ("export --generator cam --format inp --mesh coarse", "output.drag_torque_n_m: found 0.02"),
-        ("export --generator cam --format csv --generator-rad 1", "--generator-rad: outlines are undeformed"),
+        (
+            "export --generator cam --format csv --generator-rad 1",
+            "--generator-rad: --format csv has no use for it; allowed with --format vtu",
+        ),
         ("export --generator cam --format vtu --generator-rad inf", "generator angle: found inf"),
     ];
     let before = names(&desk.path("."));

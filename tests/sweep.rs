@@ -89,6 +89,10 @@ fn a_sweep_of_a_field_finds_the_known_optimum() {
     assert_eq!(desk.line(less).done().json()["generators"][0]["front"], serde_json::json!([1]));
     for former in ["study --vary generator.w0_mm=0.5", "campaign plan t.toml"] {
         let run = desk.line(former);
-        assert!(run.code == 2 && run.stderr.contains("`sweep`") && run.stderr.lines().count() == 1, "{}", run.stderr);
+        assert!(
+            run.code == 2 && run.stderr.contains("flexspline sweep") && run.stderr.lines().count() == 1,
+            "{}",
+            run.stderr
+        );
     }
 }

@@ -68,6 +68,9 @@
 // Bytes of a saved state.
 #define FLEXSPLINE_SAVED_BYTES 72
 
+// Size of a record as bytes.
+#define RECORD_BYTES 52
+
 // Version of this header: the first of three numbers.
 #define FLEXSPLINE_VERSION_MAJOR 0
 

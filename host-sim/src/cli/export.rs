@@ -36,8 +36,8 @@ const LARGEST_STEP_RAD: f64 = 0.1;
 /// inp: the undeformed mesh with contact, holding and load as a deck for CalculiX and Abaqus, which deforms, loads and
 /// turns the drive; mm, N, MPa, a slice of 1 mm. For a drive with a three-dimensional sleeve (CUP-95): the flexspline
 /// alone, in solids, under w0.
-/// fmu: a table (--tables), or a joint with mass, for simulators that import FMI co-simulation, 2.0 or
-/// 3.0 (--fmi): docs/how-to/fmu.md.
+/// fmu: a table (--tables), or a joint with mass, for simulators that import FMI 2.0 co-simulation:
+/// docs/how-to/fmu.md.
 /// cfs, fprime: the image of a table (--tables) as a cFS table or as F Prime parameters, for the core to play.
 #[derive(Debug, Args)]
 #[command(
@@ -47,7 +47,7 @@ Examples:
   flexspline export --format vtu --generator two-roller --torque-n-m 20
   flexspline export --format csv --generator double-disc --out drawings
   flexspline export --format fmu --tables out/cam.fxt
-  flexspline export --format fmu --tables out/cam.fxt --model joint --scenario camera --fmi 3.0
+  flexspline export --format fmu --tables out/cam.fxt --model joint --scenario camera
   flexspline export --format csv --tables out/calibrated.fxt --torque-n-m 12 --data bench.csv
   flexspline export --format cfs --tables out/cam.fxt --table-name JOINT.TABLE
   flexspline export --format inp --generator cam --torque-n-m 50 --set output.drag_torque_n_m=0

@@ -23,7 +23,7 @@ pub(super) struct FmuOptions {
     /// compensation]
     #[arg(long, value_enum, value_name = "MODEL", help_heading = "FMU", hide_possible_values = true)]
     model: Option<FmuModel>,
-    /// Version of FMI: 2.0 alone
+    /// Version of FMI [default: 2.0, the only one]
     #[arg(long, value_name = "VERSION", help_heading = "FMU", hide = true)]
     fmi: Option<String>,
     /// Masses, friction, servo and expected load of a joint: antenna, rover, camera, telescope, or a TOML file
