@@ -119,7 +119,8 @@ pub(super) struct Tables {
     /// Influence kernels in place of tables, for diagnose; minutes for each generator
     #[arg(
         long,
-        conflicts_with_all = ["from_samples", "torque_n_m", "most_nodes", "node_tolerance_arcsec", "positions", "temperatures_c", "stress", "complete_from_data_sheet", "no_report"]
+        conflicts_with_all = ["from_samples", "torque_n_m", "most_nodes", "node_tolerance_arcsec", "positions",
+            "temperatures_c", "stress", "complete_from_data_sheet", "no_report"]
     )]
     kernels: bool,
 }

@@ -97,7 +97,8 @@ const VALIDATE: &str = "\
 int32 FLEXSPLINE_ValidateTable(void *Table)
 {
     const uint8 *Image  = ((const FLEXSPLINE_Table_t *)Table)->Image;
-    uint32       Length = (uint32)Image[12] | (uint32)Image[13] << 8 | (uint32)Image[14] << 16 | (uint32)Image[15] << 24;
+    uint32       Length = (uint32)Image[12] | (uint32)Image[13] << 8 |
+                          (uint32)Image[14] << 16 | (uint32)Image[15] << 24;
     fxt_table    Opened;
 
     return Length > FLEXSPLINE_TABLE_BYTES ? -(int32)FXT_LENGTH : -(int32)fxt_open(&Opened, Image, Length).reason;
