@@ -389,7 +389,10 @@ export async function driveBench(view, asked, bench) {
     running.delete(job.id);
     if (mine !== round || job.state !== "done") return null;
     const columns = Object.entries(csvColumns(await fileText(`${job.out}/sweep.csv`)));
-    return { job, figures: Object.fromEntries(columns.filter(([, [x]]) => Number.isFinite(x)).map(([name, [x]]) => [name, x])) };
+    return {
+      job,
+      figures: Object.fromEntries(columns.filter(([, [x]]) => Number.isFinite(x)).map(([name, [x]]) => [name, x])),
+    };
   }
 
   async function compute() {

@@ -65,7 +65,9 @@ export async function tableBench(view, asked, bench) {
   // ---- What it leaves of a log
   const logs = bench.state.files
     .filter(
-      (f) => /\.(csv|log|txt|tsv|dat)$/i.test(f.name) && !/(samples|results|sweep|replay|plan|\d{4}-of-\d{4})\.csv$/.test(f.name),
+      (f) =>
+        /\.(csv|log|txt|tsv|dat)$/i.test(f.name) &&
+        !/(samples|results|sweep|replay|plan|\d{4}-of-\d{4})\.csv$/.test(f.name),
     )
     .map((f) => f.name);
   const place = el("div", { role: "status" });

@@ -1,7 +1,7 @@
 //! The claims of the paper in its order: text, its numbers, ours, bounds. A verdict follows from the numbers alone.
 //!
-//! Sizes are reproduced within [`SHARE`] of the paper's: it gives no tooth sizes, so nothing finer can be asked. A rank
-//! of two generators holds where the gap exceeds [`SPREADS`] times what mesh, increment and penalty move it by. Charts
+//! Sizes are reproduced within `SHARE` of the paper's: it gives no tooth sizes, so nothing finer can be asked. A rank
+//! of two generators holds where the gap exceeds `SPREADS` times what mesh, increment and penalty move it by. Charts
 //! without numbers in the text are not read off.
 
 use std::f64::consts::{FRAC_PI_2, PI};
