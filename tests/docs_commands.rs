@@ -40,7 +40,7 @@ const NOT_RUN: [(&str, &str); 11] = [
     ("prettier ", "tests/run browser checks what it would do"),
 ];
 /// Programs beside ours that a block may call.
-const HELPERS: [&str; 9] = ["cd", "cp", "cmp", "mkdir", "cat", "head", "awk", "ls", "rm"];
+const HELPERS: [&str; 10] = ["cd", "cp", "cmp", "mkdir", "cat", "head", "awk", "ls", "rm", "python3"];
 /// Parts of `tests/run` that run blocks marked with their name.
 const PARTS: [&str; 6] = ["firmware", "bundle", "c_interface", "sweep", "fmu", "python"];
 /// The page whose Python is run, by the tests of `host-sim/python`.
