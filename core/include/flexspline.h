@@ -68,9 +68,6 @@
 // Bytes of a saved state.
 #define FLEXSPLINE_SAVED_BYTES 72
 
-// Size of a record as bytes.
-#define RECORD_BYTES 52
-
 // Version of this header: the first of three numbers.
 #define FLEXSPLINE_VERSION_MAJOR 0
 
