@@ -10,7 +10,6 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use flexspline_tests::command::{Desk, Output, flexspline, names};
-use wait4::Wait4;
 
 /// Every file below a folder, hidden ones too, with its content; folders end in a slash.
 fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
@@ -41,8 +40,11 @@ fn ended(mut child: Child) -> (Output, Duration) {
     let (mut stdout, mut stderr) = (Vec::new(), Vec::new());
     child.stdout.take().unwrap().read_to_end(&mut stdout).unwrap();
     child.stderr.take().unwrap().read_to_end(&mut stderr).unwrap();
-    let wait4::ResUse { status, rusage } = child.wait4().unwrap();
-    (Output::of(std::process::Output { status, stdout, stderr }), rusage.utime + rusage.stime)
+    // It has closed its output; until it is waited for, its whole time stands in /proc.
+    sleep(Duration::from_millis(50));
+    let worked = processor_time(&child);
+    let status = child.wait().unwrap();
+    (Output::of(std::process::Output { status, stdout, stderr }), worked)
 }
 
 fn signal(child: &Child, name: &str) {

@@ -4,11 +4,13 @@
 use std::cell::Cell;
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::fs::{self, File};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
+use flate2::read::DeflateDecoder;
 use libloading::{Library, Symbol};
-use zip::ZipArchive;
+use rawzip::ZipArchive;
 
 pub const OK: c_int = 0;
 pub const WARNING: c_int = 1;
@@ -113,8 +115,16 @@ pub struct Imported {
 impl Imported {
     /// From a file, into a folder.
     pub fn new(fmu: &Path, folder: &Path) -> Imported {
-        let mut zip = ZipArchive::new(File::open(fmu).unwrap()).unwrap();
-        zip.extract(folder).unwrap();
+        let bytes = fs::read(fmu).unwrap();
+        let zip = ZipArchive::from_slice(&bytes).unwrap();
+        for entry in zip.entries() {
+            let entry = entry.unwrap();
+            let file = folder.join(entry.file_path().try_normalize().unwrap().as_ref());
+            let packed = zip.get_entry(entry.wayfinder()).unwrap();
+            fs::create_dir_all(file.parent().unwrap()).unwrap();
+            let mut content = packed.verifying_reader(DeflateDecoder::new(packed.data()));
+            io::copy(&mut content, &mut File::create(file).unwrap()).unwrap();
+        }
         let xml = fs::read_to_string(folder.join("modelDescription.xml")).unwrap();
         let identifier = attribute(&xml, "modelIdentifier");
         assert_eq!(attribute(&xml, "fmiVersion"), "2.0");

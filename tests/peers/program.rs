@@ -7,7 +7,6 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use rustix::param::clock_ticks_per_second;
-use wait4::Wait4;
 
 /// How often a running child is looked at.
 const LOOK: Duration = Duration::from_millis(50);
@@ -17,7 +16,7 @@ const LOOK: Duration = Duration::from_millis(50);
 pub struct Used {
     /// Processor time in user mode, s.
     pub cpu_s: f64,
-    /// Largest resident memory, MB.
+    /// Largest resident memory up to a look ago, MB.
     pub memory_mb: f64,
     /// Processor time (s) when the watched file had each of its lines, from the first.
     pub cpu_at_line_s: Vec<f64>,
@@ -42,24 +41,25 @@ pub fn run(command: &mut Command, log: &Path, watched: Option<&Path>, limits: Li
     let mut child =
         command.stdin(Stdio::null()).stdout(output).stderr(errors).spawn().map_err(|error| failed(&error))?;
     let process = format!("/proc/{}", child.id());
-    let mut cpu_at_line_s = Vec::new();
-    // A process that has ended and is not yet waited for still says what it used.
+    let mut used = Used { cpu_s: 0.0, memory_mb: 0.0, cpu_at_line_s: Vec::new() };
+    // A process that has ended and is not yet waited for still says how long it computed, but not its memory.
     loop {
         let stat = read_to_string(format!("{process}/stat")).map_err(|error| failed(&error))?;
         let (state, cpu_s) = state(&stat).ok_or_else(|| failed(&format!("{process}/stat reads {stat}")))?;
+        used.cpu_s = cpu_s;
         if let Some(watched) = watched {
             let lines = read_to_string(watched).map_or(0, |text| text.lines().count());
-            cpu_at_line_s.resize(lines.max(cpu_at_line_s.len()), cpu_s);
+            used.cpu_at_line_s.resize(lines.max(used.cpu_at_line_s.len()), cpu_s);
         }
         if state == "Z" {
             break;
         }
-        let memory_mb =
-            read_to_string(format!("{process}/status")).ok().and_then(|status| memory_mb(&status)).unwrap_or(0.0);
+        let status = read_to_string(format!("{process}/status"));
+        used.memory_mb = status.ok().and_then(|status| memory_mb(&status)).unwrap_or(0.0).max(used.memory_mb);
         let over = if cpu_s > limits.cpu_s {
             Some(format!("{cpu_s:.0} s of processor time, allowed {:.0}", limits.cpu_s))
-        } else if memory_mb > limits.memory_mb {
-            Some(format!("{memory_mb:.0} MB of memory, allowed {:.0}", limits.memory_mb))
+        } else if used.memory_mb > limits.memory_mb {
+            Some(format!("{:.0} MB of memory, allowed {:.0}", used.memory_mb, limits.memory_mb))
         } else {
             None
         };
@@ -69,12 +69,8 @@ pub fn run(command: &mut Command, log: &Path, watched: Option<&Path>, limits: Li
         }
         sleep(LOOK);
     }
-    let ended = child.wait4().map_err(|error| failed(&error))?;
-    if !ended.status.success() {
-        return Err(failed(&format!("ended with {}; see {}", ended.status, log.display())));
-    }
-    let megabytes = ended.rusage.maxrss as f64 / (1024.0 * 1024.0);
-    Ok(Used { cpu_s: ended.rusage.utime.as_secs_f64(), memory_mb: megabytes, cpu_at_line_s })
+    let ended = child.wait().map_err(|error| failed(&error))?;
+    if ended.success() { Ok(used) } else { Err(failed(&format!("ended with {ended}; see {}", log.display()))) }
 }
 
 /// State and processor time in user mode (s) from `/proc/PID/stat`.

@@ -7,16 +7,17 @@ mod description;
 mod error;
 mod libraries;
 
-use std::io::{self, Cursor, Write};
+use std::io::{self, Write};
 
+use flate2::Compression;
+use flate2::write::DeflateEncoder;
 use flexspline::Table;
 use flexspline_fmu::joint::starts_of;
 use flexspline_fmu::resources::{DESIGNED_FILE, DRIVE_FILE, MODEL_FILE, Resources, TABLE_FILE, drive_file};
 use flexspline_fmu::variables::ModelKind;
 use flexspline_motion::flight::{Unit, table_image};
 use flexspline_motion::gear::Gear;
-use zip::write::SimpleFileOptions;
-use zip::{CompressionMethod, DateTime, ZipWriter};
+use rawzip::{CompressionMethod, ZipArchiveWriter};
 
 use flexspline_fly::fly::{Flown, gear_at, unit};
 
@@ -92,14 +93,16 @@ impl Fmu {
     /// # Errors
     /// Of the writer.
     pub fn write(&self, out: &mut dyn Write, libraries: &[Library]) -> io::Result<()> {
-        let options = SimpleFileOptions::default()
-            .compression_method(CompressionMethod::Deflated)
-            .last_modified_time(DateTime::default())
-            .unix_permissions(0o644);
-        let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
+        let mut zip = ZipArchiveWriter::new(Vec::new());
         let mut file = |name: &str, bytes: &[u8]| -> io::Result<()> {
-            zip.start_file(name, options)?;
-            zip.write_all(bytes)
+            let file = zip.new_file(name).compression_method(CompressionMethod::DEFLATE).unix_permissions(0o644);
+            let (mut entry, config) = file.start().map_err(io::Error::other)?;
+            let mut content = config.wrap(DeflateEncoder::new(&mut entry, Compression::default()));
+            content.write_all(bytes)?;
+            let (encoder, check) = content.finish().map_err(io::Error::other)?;
+            encoder.finish()?;
+            entry.finish(check).map_err(io::Error::other)?;
+            Ok(())
         };
         file("modelDescription.xml", self.description.as_bytes())?;
         for (name, bytes) in self.resource_files() {
@@ -114,7 +117,7 @@ impl Fmu {
         for (name, text) in description::LICENCES {
             file(&format!("documentation/licenses/{name}"), text.as_bytes())?;
         }
-        out.write_all(&zip.finish()?.into_inner())
+        out.write_all(&zip.finish().map_err(io::Error::other)?)
     }
 
     /// The files of its resources, by name.
