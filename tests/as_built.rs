@@ -19,18 +19,18 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use flexspline_sim::contact::{BoreContact, BoreLaw};
+use flexspline_mechanics::contact::{BoreContact, BoreLaw};
 use std::ops::ControlFlow;
 
 use flexspline::Table;
-use flexspline_sim::drive::{DamagedFlank, DamagedTooth, Drive, GeneratorKind, Harmonic, Wheel};
-use flexspline_sim::mesh::MeshLevel;
-use flexspline_sim::motion::Motion;
-use flexspline_sim::stepping::{Increment, Problem, Solver, SolverSettings, State};
-use flexspline_sim::tables::symmetric_nodes;
-use flexspline_sim::tables::{MadeTable, TableSettings, TorqueNodes, make};
-use flexspline_sim::tables::{Validation, ValidationSettings, validate};
-use flexspline_sim::units::ARCSEC_PER_RAD;
+use flexspline_base::units::ARCSEC_PER_RAD;
+use flexspline_design::tables::symmetric_nodes;
+use flexspline_design::tables::{MadeTable, TableSettings, TorqueNodes, make};
+use flexspline_design::tables::{Validation, ValidationSettings, validate};
+use flexspline_mechanics::drive::{DamagedFlank, DamagedTooth, Drive, GeneratorKind, Harmonic, Wheel};
+use flexspline_mechanics::mesh::MeshLevel;
+use flexspline_mechanics::motion::Motion;
+use flexspline_mechanics::stepping::{Increment, Problem, Solver, SolverSettings, State};
 use flexspline_tests::command::Desk;
 use flexspline_tests::motion::{imperfect, on, problem};
 

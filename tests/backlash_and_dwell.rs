@@ -19,9 +19,9 @@
 //! Physics wrong if this fails: flank geometry, shape of the deformed rim, friction on the output, one-sidedness of
 //! contact.
 
-use flexspline_sim::drive::{Drive, GeneratorKind, GeneratorOutline};
-use flexspline_sim::mesh::MeshLevel;
-use flexspline_sim::units::{ARCMIN_PER_RAD, ARCSEC_PER_RAD};
+use flexspline_base::units::{ARCMIN_PER_RAD, ARCSEC_PER_RAD};
+use flexspline_mechanics::drive::{Drive, GeneratorKind, GeneratorOutline};
+use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_tests::motion::{deformed, hhd_95, mean_error, problem};
 
 const DRAG_N_M: f64 = 0.02;

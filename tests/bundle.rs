@@ -5,7 +5,7 @@
 
 use std::fs;
 
-use flexspline_sim::bundle::libraries::TARGETS;
+use flexspline_export::bundle::libraries::TARGETS;
 use flexspline_tests::command::Desk;
 
 /// A desk with the table `out/cam.fxt`.

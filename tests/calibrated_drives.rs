@@ -18,12 +18,12 @@
 use std::f64::consts::{PI, TAU};
 
 use flexspline::{Direction, GeneratorAngle, PlayState, Table};
-use flexspline_sim::calibrate::{Bench, Calibrated, Planned, Prior, State, calibrate, plan};
-use flexspline_sim::drive::{DamagedFlank, GeneratorKind, Wheel};
-use flexspline_sim::kernels::Kernels;
-use flexspline_sim::measurement::{ColumnMap, Recording, parse};
-use flexspline_sim::plant_map::{GearMap, WindUp};
-use flexspline_sim::units::ARCSEC_PER_RAD;
+use flexspline_base::units::ARCSEC_PER_RAD;
+use flexspline_design::kernels::Kernels;
+use flexspline_fly::plant_map::{GearMap, WindUp};
+use flexspline_identify::calibrate::{Bench, Calibrated, Planned, Prior, State, calibrate, plan};
+use flexspline_identify::measurement::{ColumnMap, Recording, parse};
+use flexspline_mechanics::drive::{DamagedFlank, GeneratorKind, Wheel};
 
 use crate::fem_causes::known;
 use crate::plant_maps::{image, map};

@@ -4,11 +4,11 @@
 use std::f64::consts::TAU;
 
 use flexspline::Table;
-use flexspline_sim::calibrate::{Calibration, Prior, calibrate};
-use flexspline_sim::drive::GeneratorKind;
-use flexspline_sim::extension::left_by_core;
-use flexspline_sim::look::{Role, TimeKind, look};
-use flexspline_sim::measurement::{ColumnMap, Gear, Recording, parse, raw};
+use flexspline_identify::calibrate::{Calibration, Prior, calibrate};
+use flexspline_identify::extension::left_by_core;
+use flexspline_identify::look::{Role, TimeKind, look};
+use flexspline_identify::measurement::{ColumnMap, Gear, Recording, parse, raw};
+use flexspline_mechanics::drive::GeneratorKind;
 use flexspline_tests::command::Desk;
 use serde_json::Value;
 
@@ -60,7 +60,7 @@ fn half_of_a_record_corrects_the_other_half() {
 fn a_robots_log_is_understood_and_calibrated() {
     let bytes = std::fs::read(LARA8).unwrap();
     let looked = look(&[raw::parse("joint3.csv", &bytes[..]).unwrap()]).unwrap();
-    println!("{}", flexspline_sim::look::text(&looked));
+    println!("{}", flexspline_identify::look::text(&looked));
     let used = |role: Role| looked.columns.iter().find(|column| column.used && column.role == role).unwrap();
     assert_eq!(
         (used(Role::Generator).name.as_str(), used(Role::Output).name.as_str()),

@@ -13,7 +13,7 @@
 //! is lost on the way to firmware, or a table that changes although nothing was asked for.
 
 use flexspline::{Direction, GeneratorAngle, PlayState, Quality, Table};
-use flexspline_sim::units::ARCSEC_PER_RAD;
+use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_tests::command::Desk;
 use serde_json::Value;
 

@@ -14,10 +14,10 @@
 //! direction or the point of attack of a contact force, weights of the integration, a moment that is not that of the
 //! forces.
 
-use flexspline_sim::contact::{BoreContact, BoreLaw, Configuration, FlankLaw, FlankPair, FlankPoint};
-use flexspline_sim::drive::{Drive, GeneratorKind, GeneratorOutline};
-use flexspline_sim::mesh::MeshLevel;
-use flexspline_sim::stepping::{Problem, Solver};
+use flexspline_mechanics::contact::{BoreContact, BoreLaw, Configuration, FlankLaw, FlankPair, FlankPoint};
+use flexspline_mechanics::drive::{Drive, GeneratorKind, GeneratorOutline};
+use flexspline_mechanics::mesh::MeshLevel;
+use flexspline_mechanics::stepping::{Problem, Solver};
 use flexspline_tests::motion::{imperfect, loaded, mean, problem, reference};
 
 /// Numbers in [-1, 1] that look random and are always the same.
@@ -162,7 +162,7 @@ fn a_ring_shrunk_on_a_round_generator_feels_lames_pressure() {
     drive.temperature.generator_expansion_per_k = 1e-6;
     let penalty = 1e4;
     let settings =
-        flexspline_sim::stepping::SolverSettings { bore_penalty: Some(penalty), ..reference(MeshLevel::Coarse) };
+        flexspline_mechanics::stepping::SolverSettings { bore_penalty: Some(penalty), ..reference(MeshLevel::Coarse) };
     let mut problem = Problem::smooth_ring(&drive, GeneratorKind::Cam, settings, 188, 2).unwrap();
     problem.outline = GeneratorOutline::new(&drive.at_temperature(26.0), GeneratorKind::Cam).unwrap();
     let mut solver = Solver::new(&problem);

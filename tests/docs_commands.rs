@@ -21,8 +21,8 @@ use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use flexspline_sim::drive::Drive;
-use flexspline_sim::extension::Model;
+use flexspline_identify::extension::Model;
+use flexspline_mechanics::drive::Drive;
 use flexspline_tests::command::flexspline;
 
 /// Commands that are not run from a page: how they begin, and why.

@@ -13,12 +13,12 @@
 //! Finite Element Method for Elliptic Problems, th. 3.2.5). Physics wrong if this fails: gradients, Jacobian,
 //! integration rule, a strain that does not vanish under rotation.
 
-use flexspline_sim::fem::element::{
+use flexspline_mechanics::fem::element::{
     GaussPoint, add_internal_force, cauchy_stress, gauss_points, linear_stiffness, shape,
 };
-use flexspline_sim::fem::element::{shape_gradient, strain_energy};
-use flexspline_sim::fem::material::PlaneStrain;
-use flexspline_sim::fem::{Cholesky, Factor, Pattern};
+use flexspline_mechanics::fem::element::{shape_gradient, strain_energy};
+use flexspline_mechanics::fem::material::PlaneStrain;
+use flexspline_mechanics::fem::{Cholesky, Factor, Pattern};
 
 type Point = [f64; 2];
 
@@ -123,7 +123,7 @@ impl Mesh {
 
     /// L2 norm of the error of the displacement, by the 4 x 4 rule.
     fn error(&self, u: &[f64], exact: impl Fn(Point) -> Point) -> f64 {
-        let rule = flexspline_sim::contact::gauss_legendre(4);
+        let rule = flexspline_mechanics::contact::gauss_legendre(4);
         let mut sum = 0.0;
         for (e, nodes) in self.elements.iter().enumerate() {
             let local = self.local(e, u);

@@ -11,11 +11,11 @@
 //! Physics wrong if this fails: a cell condensed wrongly, a frame that carries a moment, strain that a turning frame
 //! cannot hold, contact that one solver sees and the other does not.
 
-use flexspline_sim::drive::{DamagedFlank, DamagedTooth, Drive, GeneratorKind, Harmonic, Wheel};
-use flexspline_sim::mesh::MeshLevel;
-use flexspline_sim::simulate::peak_stress;
-use flexspline_sim::stepping::{Method, Problem, SolverSettings};
-use flexspline_sim::units::ARCSEC_PER_RAD;
+use flexspline_base::units::ARCSEC_PER_RAD;
+use flexspline_design::simulate::peak_stress;
+use flexspline_mechanics::drive::{DamagedFlank, DamagedTooth, Drive, GeneratorKind, Harmonic, Wheel};
+use flexspline_mechanics::mesh::MeshLevel;
+use flexspline_mechanics::stepping::{Method, Problem, SolverSettings};
 use flexspline_tests::long;
 use flexspline_tests::motion::{deformed, imperfect, on};
 

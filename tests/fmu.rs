@@ -10,8 +10,8 @@ use std::ffi::{CStr, c_char, c_int, c_void};
 use std::ptr::null_mut;
 
 use flexspline::*;
+use flexspline_fly::fly::{built_in, unit};
 use flexspline_motion::flight::{COMPENSATED, START_UP_S, fly_one};
-use flexspline_sim::fly::{built_in, unit};
 use flexspline_tests::command::Desk;
 use importer::{DISCARD, ERROR, FUNCTIONS, Imported, Instance, OK, WARNING};
 

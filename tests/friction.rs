@@ -12,10 +12,10 @@
 //! that generator and load do in a pitch is dissipated, and cannot be negative.
 //! Physics wrong if this fails: friction that pushes instead of holding back, history that is lost or kept wrongly.
 
-use flexspline_sim::drive::{Drive, GeneratorKind};
-use flexspline_sim::mesh::MeshLevel;
-use flexspline_sim::motion::Place;
-use flexspline_sim::stepping::SolverSettings;
+use flexspline_mechanics::drive::{Drive, GeneratorKind};
+use flexspline_mechanics::mesh::MeshLevel;
+use flexspline_mechanics::motion::Place;
+use flexspline_mechanics::stepping::SolverSettings;
 use flexspline_tests::motion::{loaded, mean, mean_error, mean_generator_torque, mean_iterations, on, problem};
 
 const TORQUE_N_M: f64 = 50.0;

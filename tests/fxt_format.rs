@@ -13,9 +13,9 @@ use flexspline::{
     Drive, FixedMember, GeneratorAngle, GeneratorKind, PlayState, Provenance, Quality, Table, TableData, image_bytes,
     write_image,
 };
-use flexspline_sim::drive::{Drive as HostDrive, GeneratorKind as HostKind};
-use flexspline_sim::tables::samples;
-use flexspline_sim::tables::{SampleOptions, from_samples};
+use flexspline_design::tables::samples;
+use flexspline_design::tables::{SampleOptions, from_samples};
+use flexspline_mechanics::drive::{Drive as HostDrive, GeneratorKind as HostKind};
 
 const PAGE: &str = include_str!("../docs/reference/fxt.md");
 /// Rad in a count.

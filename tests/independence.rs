@@ -11,9 +11,9 @@
 //! Reference: the same drive with the next finer choice. Physics wrong if this fails: something that sets the answer is
 //! not in drive.toml.
 
-use flexspline_sim::drive::{Drive, GeneratorKind};
-use flexspline_sim::mesh::MeshLevel;
-use flexspline_sim::stepping::SolverSettings;
+use flexspline_mechanics::drive::{Drive, GeneratorKind};
+use flexspline_mechanics::mesh::MeshLevel;
+use flexspline_mechanics::stepping::SolverSettings;
 use flexspline_tests::motion::{deformed, loaded, on, problem};
 
 const TORQUE_N_M: f64 = 50.0;

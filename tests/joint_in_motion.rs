@@ -3,8 +3,8 @@
 
 use std::process::Command;
 
-use flexspline_sim::drive::GeneratorKind;
-use flexspline_sim::fly::{Flown, Results, SCENARIOS, built_in, read, results};
+use flexspline_fly::fly::{Flown, Results, SCENARIOS, built_in, read, results};
+use flexspline_mechanics::drive::GeneratorKind;
 use flexspline_tests::command::flexspline;
 use serde_json::Value;
 

@@ -2,7 +2,7 @@
 //! what is physics is not taken for a fault.
 
 use crate::bench_data::{ARCSEC, Bench, RATIO, normal};
-use flexspline_sim::measurement::{ColumnMap, FaultName, Gear, MeasuredError, Recording, Treatment, parse};
+use flexspline_identify::measurement::{ColumnMap, FaultName, Gear, MeasuredError, Recording, Treatment, parse};
 use flexspline_tests::seeds;
 
 fn gear() -> Gear {
@@ -640,7 +640,8 @@ fn what_is_repaired_is_as_it_was_and_its_place_is_said() {
             // Digits of the file: 1e-9 rad of a generator angle in degrees.
             assert!((session.generator_rad[row] - clean.generator_rad[row]).abs() < 1e-6, "{name}");
             assert!((session.error_rad[row] - clean.error_rad[row]).abs() < 0.01 * ARCSEC, "{name}");
-            let warm = |session: &flexspline_sim::measurement::Session| session.temperature_c.as_ref().unwrap()[row];
+            let warm =
+                |session: &flexspline_identify::measurement::Session| session.temperature_c.as_ref().unwrap()[row];
             assert!((warm(session) - warm(clean)).abs() < 1e-4, "{name}");
         }
     }

@@ -13,9 +13,9 @@
 //! Physics wrong if this fails: flanks of the two sides treated differently, a sign, a mesh that is not its mirror
 //! image.
 
-use flexspline_sim::drive::GeneratorKind;
-use flexspline_sim::mesh::MeshLevel;
-use flexspline_sim::motion::Place;
+use flexspline_mechanics::drive::GeneratorKind;
+use flexspline_mechanics::mesh::MeshLevel;
+use flexspline_mechanics::motion::Place;
 use flexspline_tests::motion::{hhd_95, loaded};
 
 fn mirrors(kind: GeneratorKind) {

@@ -1,9 +1,9 @@
 //! Drives for the claims, and means over places on their way.
 
-use flexspline_sim::drive::{DamagedFlank, DamagedTooth, Drive, GeneratorKind, Harmonic, Wheel};
-use flexspline_sim::mesh::MeshLevel;
-use flexspline_sim::motion::{Motion, Place};
-use flexspline_sim::stepping::{Method, Problem, SolverSettings};
+use flexspline_mechanics::drive::{DamagedFlank, DamagedTooth, Drive, GeneratorKind, Harmonic, Wheel};
+use flexspline_mechanics::mesh::MeshLevel;
+use flexspline_mechanics::motion::{Motion, Place};
+use flexspline_mechanics::stepping::{Method, Problem, SolverSettings};
 
 /// Default settings on a mesh, with the solver that has every node of it.
 pub fn reference(mesh: MeshLevel) -> SolverSettings {

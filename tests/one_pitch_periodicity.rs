@@ -14,8 +14,8 @@
 //! Physics wrong if this fails: a mesh or contact that is not the same at every tooth, history that should not be
 //! there, or equilibrium that was not reached.
 
-use flexspline_sim::drive::GeneratorKind;
-use flexspline_sim::mesh::MeshLevel;
+use flexspline_mechanics::drive::GeneratorKind;
+use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_tests::motion::{hhd_95, loaded, range};
 
 /// Increments in a pitch.

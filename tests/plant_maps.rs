@@ -1,12 +1,12 @@
 //! The wind-up that `flexspline fly` gives its built-in drives is that of contact FEM at other torques, phases and
 //! another temperature than those of the map.
 
-use flexspline_sim::drive::{Drive, GeneratorKind};
-use flexspline_sim::motion::Motion;
-use flexspline_sim::plant_map::GearMap;
-use flexspline_sim::stepping::{Method, Problem, SolverSettings};
-use flexspline_sim::tables::{self, samples};
-use flexspline_sim::units::ARCSEC_PER_RAD;
+use flexspline_base::units::ARCSEC_PER_RAD;
+use flexspline_design::tables::{self, samples};
+use flexspline_fly::plant_map::GearMap;
+use flexspline_mechanics::drive::{Drive, GeneratorKind};
+use flexspline_mechanics::motion::Motion;
+use flexspline_mechanics::stepping::{Method, Problem, SolverSettings};
 
 /// The map of a generator, by contact FEM.
 pub(crate) fn map(kind: GeneratorKind) -> GearMap {

@@ -4,9 +4,9 @@
 use std::f64::consts::TAU;
 use std::path::PathBuf;
 
-use flexspline_sim::measurement::{ColumnMap, Gear, Session, parse, read};
-use flexspline_sim::nominal::Nominal;
-use flexspline_sim::residual::{Axis, Picture, harmonics};
+use flexspline_identify::measurement::{ColumnMap, Gear, Session, parse, read};
+use flexspline_identify::nominal::Nominal;
+use flexspline_identify::residual::{Axis, Picture, harmonics};
 use flexspline_tests::command::Desk;
 use serde_json::Value;
 
@@ -42,7 +42,7 @@ fn the_csf17_has_its_orders() {
     for (line, due) in lines.iter().zip([3.8, 21.3, 1.8, 4.1]) {
         assert!((line.amplitude - due).abs() < 0.13, "order {}: {}, due {due}", line.order, line.amplitude);
     }
-    let left = |lines: &[flexspline_sim::residual::Line], constant: f64| {
+    let left = |lines: &[flexspline_identify::residual::Line], constant: f64| {
         let said = |psi: f64| constant + lines.iter().map(|line| line.at(psi)).sum::<f64>();
         rms(session.generator_rad.iter().zip(&error).map(|(psi, error)| error - said(*psi)))
     };

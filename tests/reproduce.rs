@@ -16,7 +16,7 @@
 
 use std::collections::BTreeSet;
 
-use flexspline_sim::drive::{Drive, GeneratorKind};
+use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_tests::command::Desk;
 use serde_json::Value;
 

@@ -4,8 +4,8 @@
 use std::f64::consts::TAU;
 
 use crate::bench_data::{ARCSEC, Bench, RATIO, normal};
-use flexspline_sim::measurement::{Gear, Session};
-use flexspline_sim::residual::{Axis, OrderSpectrum, Picture, Wheel, harmonics, order_spectrum};
+use flexspline_identify::measurement::{Gear, Session};
+use flexspline_identify::residual::{Axis, OrderSpectrum, Picture, Wheel, harmonics, order_spectrum};
 use flexspline_tests::seeds;
 
 const CIRCULAR_SPLINE: f64 = 94.0 / 95.0;

@@ -15,11 +15,11 @@
 //! of the two-roller 13.443 E' I w0 / R^3.
 //! Physics wrong if this fails: bending stiffness of the element, place or size of a generator, large rotations.
 
-use flexspline_sim::contact::{BoreContact, BoreLaw};
-use flexspline_sim::drive::{Drive, GeneratorKind, NeutralCurve};
-use flexspline_sim::mesh::MeshLevel;
-use flexspline_sim::reference::RingBending;
-use flexspline_sim::stepping::{Problem, Solver, SolverSettings, State};
+use flexspline_mechanics::contact::{BoreContact, BoreLaw};
+use flexspline_mechanics::drive::{Drive, GeneratorKind, NeutralCurve};
+use flexspline_mechanics::mesh::MeshLevel;
+use flexspline_mechanics::reference::RingBending;
+use flexspline_mechanics::stepping::{Problem, Solver, SolverSettings, State};
 use flexspline_tests::motion::on;
 
 /// HHD-95 with other teeth on the circular spline, so that any small deflection is a possible drive; the ring does not

@@ -11,7 +11,7 @@
 //! or a phase lost on the way into a drive or a table; a table that was made with the sessions it is judged on; an
 //! extension of a drive that has nothing.
 
-use flexspline_sim::causes::CauseName;
+use flexspline_identify::causes::CauseName;
 use flexspline_tests::command::{Desk, names};
 use serde_json::Value;
 

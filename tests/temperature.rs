@@ -11,9 +11,9 @@
 //! Physics wrong if this fails: a length that does not expand, a generator fitted to the warm flexspline, thermal
 //! stress where there is none.
 
-use flexspline_sim::drive::{Drive, GeneratorKind};
-use flexspline_sim::mesh::MeshLevel;
-use flexspline_sim::stepping::{Problem, SolverSettings};
+use flexspline_mechanics::drive::{Drive, GeneratorKind};
+use flexspline_mechanics::mesh::MeshLevel;
+use flexspline_mechanics::stepping::{Problem, SolverSettings};
 use flexspline_tests::motion::{deformed, loaded, mean_error, on};
 
 fn similar(kind: GeneratorKind) {

@@ -7,7 +7,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use flexspline_sim::measurement::{ColumnMap, Gear, Recording, parse};
+use flexspline_identify::measurement::{ColumnMap, Gear, Recording, parse};
 use flexspline_tests::command::Desk;
 
 const RATIO: f64 = 101.0;

@@ -3,7 +3,7 @@
 //! Wrong if this fails: a cause that is dropped without a trace; a trace that names a gate which did not decide; an
 //! explanation that blames the drive where the data lack what the cause needs.
 
-use flexspline_sim::causes::CauseName;
+use flexspline_identify::causes::CauseName;
 use flexspline_tests::command::Desk;
 use serde_json::Value;
 

@@ -14,10 +14,10 @@
 //! The energy stored is the same after a pitch, so the work of the generator and of the load over the pitch cancel.
 //! Physics wrong if this fails: contact forces that do not follow from the gaps, moments that do not balance.
 
-use flexspline_sim::drive::GeneratorKind;
-use flexspline_sim::mesh::MeshLevel;
-use flexspline_sim::motion::Place;
-use flexspline_sim::units::ARCSEC_PER_RAD;
+use flexspline_base::units::ARCSEC_PER_RAD;
+use flexspline_mechanics::drive::GeneratorKind;
+use flexspline_mechanics::mesh::MeshLevel;
+use flexspline_mechanics::motion::Place;
 use flexspline_tests::motion::{hhd_95, loaded, mean_error, mean_generator_torque, range};
 
 const TORQUE_N_M: f64 = 50.0;

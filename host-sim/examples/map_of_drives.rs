@@ -22,10 +22,10 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-use flexspline_sim::data_sheet::{DataSheet, Loads, data_sheet};
-use flexspline_sim::drive::{Drive, FewNumbers, GeneratorKind};
-use flexspline_sim::mesh::MeshLevel;
-use flexspline_sim::stepping::{Method, SolverSettings};
+use flexspline_design::data_sheet::{DataSheet, Loads, data_sheet};
+use flexspline_mechanics::drive::{Drive, FewNumbers, GeneratorKind};
+use flexspline_mechanics::mesh::MeshLevel;
+use flexspline_mechanics::stepping::{Method, SolverSettings};
 use rayon::prelude::*;
 
 const TEETH: [f64; 2] = [60.0, 400.0];

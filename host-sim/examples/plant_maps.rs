@@ -7,10 +7,10 @@
 use std::error::Error;
 use std::path::Path;
 
-use flexspline_sim::drive::{Drive, GeneratorKind};
-use flexspline_sim::output::write_whole;
-use flexspline_sim::plant_map::GearMap;
-use flexspline_sim::stepping::{Method, SolverSettings};
+use flexspline_base::output::write_whole;
+use flexspline_fly::plant_map::GearMap;
+use flexspline_mechanics::drive::{Drive, GeneratorKind};
+use flexspline_mechanics::stepping::{Method, SolverSettings};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

@@ -5,8 +5,8 @@
 
 use std::path::PathBuf;
 
-use flexspline_sim::report::Packed;
-use flexspline_sim::report::page::{
+use flexspline_report::Packed;
+use flexspline_report::page::{
     Axis, Block, Choice, Detail, Field, Figure, FigureBody, Headline, Limit, Lines, Mark, Page, PageQuantity, Section,
     Series, Status, Table, Text, Upright,
 };

@@ -1,6 +1,6 @@
 //! Plane, cup and hermetic, with all four generators: `third_dimension [TORQUE_N_M [LEVEL]]`
 //!
-//! The figures of each drive as a catalogue would print them ([`flexspline_sim::data_sheet`]), one row for each drive
+//! The figures of each drive as a catalogue would print them ([`flexspline_design::data_sheet`]), one row for each drive
 //! and generator, with the load even along the face and with the face in slices, as a Markdown table. Torque 50 N·m and
 //! coarse mesh by default; a LEVEL is coarse, standard or fine. Where a drive finds no equilibrium its row has the
 //! figures until there, and it ends with 1.
@@ -8,10 +8,10 @@
 use std::process::ExitCode;
 use std::time::Instant;
 
-use flexspline_sim::data_sheet::{DataSheet, Loads, data_sheet};
-use flexspline_sim::drive::{Drive, GeneratorKind};
-use flexspline_sim::mesh::MeshLevel;
-use flexspline_sim::stepping::{Method, SolverSettings};
+use flexspline_design::data_sheet::{DataSheet, Loads, data_sheet};
+use flexspline_mechanics::drive::{Drive, GeneratorKind};
+use flexspline_mechanics::mesh::MeshLevel;
+use flexspline_mechanics::stepping::{Method, SolverSettings};
 use rayon::prelude::*;
 
 /// Torque of the docs, N·m.

@@ -4,10 +4,10 @@ use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use flexspline_sim::drive::{Drive, FewNumbers, GeneratorKind};
-use flexspline_sim::export::STABILISING_TORSION;
-use flexspline_sim::mesh::MeshLevel;
-use flexspline_sim::stepping::{Method, Problem, SolverSettings};
+use flexspline_export::STABILISING_TORSION;
+use flexspline_mechanics::drive::{Drive, FewNumbers, GeneratorKind};
+use flexspline_mechanics::mesh::MeshLevel;
+use flexspline_mechanics::stepping::{Method, Problem, SolverSettings};
 
 use crate::dat::{at_step, tables};
 use crate::ours::{Journey, Stop, displacement, journey, run_cpu_s, stress};

@@ -20,11 +20,13 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::process::Command;
 
-use flexspline_sim::contact::{Configuration, FlankContact, FlankLaw, FlankPair, FrictionHistory, PairContribution};
-use flexspline_sim::drive::{ActiveFlank, Drive, DriveError, FlankDeviations, Side, ToothFlank};
-use flexspline_sim::fem::element::{PACKED, add_tangent_and_force, packed_index};
-use flexspline_sim::fem::material::PlaneStrain;
-use flexspline_sim::mesh::{MeshLevel, WheelMesh};
+use flexspline_mechanics::contact::{
+    Configuration, FlankContact, FlankLaw, FlankPair, FrictionHistory, PairContribution,
+};
+use flexspline_mechanics::drive::{ActiveFlank, Drive, DriveError, FlankDeviations, Side, ToothFlank};
+use flexspline_mechanics::fem::element::{PACKED, add_tangent_and_force, packed_index};
+use flexspline_mechanics::fem::material::PlaneStrain;
+use flexspline_mechanics::mesh::{MeshLevel, WheelMesh};
 
 use crate::Claims;
 use crate::case::AS_IN_THE_DECK;

@@ -25,11 +25,11 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Parser;
-use flexspline_sim::drive::GeneratorKind;
-use flexspline_sim::mesh::MeshLevel;
+use flexspline_mechanics::drive::GeneratorKind;
+use flexspline_mechanics::mesh::MeshLevel;
 
 use case::{Case, Comparison, Peer};
-use flexspline_sim::stepping::Method;
+use flexspline_mechanics::stepping::Method;
 use ours::SOLVERS;
 use program::Limits;
 

@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use flexspline_sim::fem::element::cauchy_stress;
-use flexspline_sim::motion::Motion;
-use flexspline_sim::stepping::{Method, Problem, State};
+use flexspline_mechanics::fem::element::cauchy_stress;
+use flexspline_mechanics::motion::Motion;
+use flexspline_mechanics::stepping::{Method, Problem, State};
 use rustix::time::{ClockId, clock_gettime};
 
 /// Our solvers, the one that the others are measured against first.

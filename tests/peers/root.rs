@@ -11,13 +11,13 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::process::Command;
 
-use flexspline_sim::drive::{Drive, GeneratorKind};
-use flexspline_sim::fem::material::PlaneStrain;
-use flexspline_sim::mesh::{MeshLevel, WheelMesh};
-use flexspline_sim::simulate::{
+use flexspline_design::simulate::{
     MESHES, Place, PlaceStress, SurfaceEdge, edge_stress, fillet_edges, on_mesh, stress_by_place,
 };
-use flexspline_sim::stepping::{Problem, SolverSettings, State};
+use flexspline_mechanics::drive::{Drive, GeneratorKind};
+use flexspline_mechanics::fem::material::PlaneStrain;
+use flexspline_mechanics::mesh::{MeshLevel, WheelMesh};
+use flexspline_mechanics::stepping::{Problem, SolverSettings, State};
 
 use crate::Claims;
 use crate::dat::{at_step, tables};

@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::process::Command;
 
-use flexspline_sim::drive::Drive;
-use flexspline_sim::sleeve::Flexspline3d;
+use flexspline_mechanics::drive::Drive;
+use flexspline_mechanics::sleeve::Flexspline3d;
 
 use crate::Claims;
 use crate::dat::{at_step, tables};

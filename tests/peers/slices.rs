@@ -17,7 +17,7 @@
 //! prints no load by place: it is the penalty times the overclosure that its displacements give at our integration
 //! points, relative to its mean.
 //!
-//! [`FaceLoad::Slices`]: flexspline_sim::drive::FaceLoad
+//! [`FaceLoad::Slices`]: flexspline_mechanics::drive::FaceLoad
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -25,11 +25,11 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::process::Command;
 
-use flexspline_sim::contact::{Configuration, FlankContact, FlankLaw, FlankPair, gauss_legendre};
-use flexspline_sim::drive::{Drive, GeneratorKind, Side};
-use flexspline_sim::mesh::{MeshLevel, WheelMesh};
-use flexspline_sim::motion::Motion;
-use flexspline_sim::stepping::{Method, Problem, SolverSettings, State};
+use flexspline_mechanics::contact::{Configuration, FlankContact, FlankLaw, FlankPair, gauss_legendre};
+use flexspline_mechanics::drive::{Drive, GeneratorKind, Side};
+use flexspline_mechanics::mesh::{MeshLevel, WheelMesh};
+use flexspline_mechanics::motion::Motion;
+use flexspline_mechanics::stepping::{Method, Problem, SolverSettings, State};
 
 use crate::Claims;
 use crate::case::{ARCSEC, AS_IN_THE_DECK};

@@ -23,13 +23,13 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use flexspline::Table;
-use flexspline_sim::calibrate::{Prior, calibrate};
-use flexspline_sim::diagnosis::{Options, PipelineError, Subject, diagnose_rows, parse_rows};
-use flexspline_sim::drive::{Drive, GeneratorKind};
-use flexspline_sim::extension::Model;
-use flexspline_sim::look::look;
-use flexspline_sim::measurement::{ColumnMap, parse, raw};
-use flexspline_sim::replay::{parse as parse_measured, replay};
+use flexspline_identify::calibrate::{Prior, calibrate};
+use flexspline_identify::diagnosis::{Options, PipelineError, Subject, diagnose_rows, parse_rows};
+use flexspline_identify::extension::Model;
+use flexspline_identify::look::look;
+use flexspline_identify::measurement::{ColumnMap, parse, raw};
+use flexspline_identify::replay::{parse as parse_measured, replay};
+use flexspline_mechanics::drive::{Drive, GeneratorKind};
 
 use made::{MODEL, RATIO};
 

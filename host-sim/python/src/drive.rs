@@ -1,9 +1,9 @@
 //! A drive: built in, from a file, with fields set.
 
-use flexspline_sim::drive::{Drive as Inner, GeneratorKind};
-use flexspline_sim::mesh::MeshLevel;
-use flexspline_sim::stated::Stated;
-use flexspline_sim::stepping::Method;
+use flexspline_design::stated::Stated;
+use flexspline_mechanics::drive::{Drive as Inner, GeneratorKind};
+use flexspline_mechanics::mesh::MeshLevel;
+use flexspline_mechanics::stepping::Method;
 use pyo3::prelude::*;
 
 use crate::failure::{Failure, bad};

@@ -1,7 +1,7 @@
 //! The compiled half of the Python package `flexspline`: `flexspline._native`.
 //!
 //! The Python half (`python/flexspline/*.py`) has the interface that analysts see; this half runs the functions of
-//! `flexspline_sim` that the command runs, and the core's step over numpy arrays. Long runs are in `run`, which lets
+//! the crates that the command runs, and the core's step over numpy arrays. Long runs are in `run`, which lets
 //! Ctrl-C through; results go over as numpy columns (`columns`) and as the JSON that the command writes.
 
 mod columns;

@@ -3,16 +3,16 @@
 use std::path::{Path, PathBuf};
 
 use flexspline::Table;
-use flexspline_sim::calibrate::{CalibrationError, Prior, calibrate as fit};
-use flexspline_sim::causes::CauseName;
-use flexspline_sim::diagnosis::{
+use flexspline_base::units::ARCSEC_PER_RAD;
+use flexspline_design::kernels::Kernels;
+use flexspline_identify::calibrate::{CalibrationError, Prior, calibrate as fit};
+use flexspline_identify::causes::CauseName;
+use flexspline_identify::diagnosis::{
     Explanation, Options, PipelineError, Series, Subject, diagnose_rows, parse_rows, read_rows,
 };
-use flexspline_sim::drive::GeneratorKind;
-use flexspline_sim::extension::Model;
-use flexspline_sim::kernels::Kernels;
-use flexspline_sim::measurement::{ColumnMap, Session, parse, read};
-use flexspline_sim::units::ARCSEC_PER_RAD;
+use flexspline_identify::extension::Model;
+use flexspline_identify::measurement::{ColumnMap, Session, parse, read};
+use flexspline_mechanics::drive::GeneratorKind;
 use numpy::IntoPyArray;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;

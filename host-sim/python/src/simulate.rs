@@ -1,9 +1,9 @@
 //! A run along a generator path.
 
-use flexspline_sim::simulate::{
+use flexspline_design::simulate::{
     Direction, Path, PathPoint, SimulateError, SimulationSettings, Summary, read_path, simulate as run_along,
 };
-use flexspline_sim::stepping::SolverSettings;
+use flexspline_mechanics::stepping::SolverSettings;
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

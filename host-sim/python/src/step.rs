@@ -5,9 +5,9 @@ use std::sync::{Mutex, PoisonError};
 use flexspline::{
     Approach, Direction, GeneratorAngle, OutputAngle, PlayState as CoreState, SAVED_STATE_BYTES, Table as CoreTable,
 };
-use flexspline_sim::replay::{MeasuredRow, RowsOf, parse as parse_measured, replay};
-use flexspline_sim::tables::dead_zone_n_m;
-use flexspline_sim::units::ARCSEC_PER_RAD;
+use flexspline_base::units::ARCSEC_PER_RAD;
+use flexspline_design::tables::dead_zone_n_m;
+use flexspline_identify::replay::{MeasuredRow, RowsOf, parse as parse_measured, replay};
 use numpy::{IntoPyArray, PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -363,7 +363,7 @@ impl Table {
         let (replayed, mut summary) = py.detach(|| replay(self.table(), rows));
         summary.of_rows(rows_of, self.table());
         let columns = PyDict::new(py);
-        let numbers = |of: fn(&flexspline_sim::replay::ReplayedRow) -> f64| {
+        let numbers = |of: fn(&flexspline_identify::replay::ReplayedRow) -> f64| {
             replayed.iter().map(of).collect::<Vec<f64>>().into_pyarray(py)
         };
         columns.set_item("generator_rad", numbers(|row| row.generator_rad))?;

@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 use std::sync::Mutex;
 
-use flexspline_sim::stepping::SolverSettings;
-use flexspline_sim::tables::{
+use flexspline_base::units::ARCSEC_PER_RAD;
+use flexspline_design::tables::{
     MadeTable, MakeError, SampleOptions, TableSettings, TorqueNodes, c_header, from_samples, make, rust_source, samples,
 };
-use flexspline_sim::units::ARCSEC_PER_RAD;
+use flexspline_mechanics::stepping::SolverSettings;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use rayon::prelude::*;
