@@ -4,6 +4,16 @@
   picture.py page  REPORT.html[#ID] OUT.png [WIDTHxHEIGHT]   a report, from the top or from a part of it
   picture.py curve FILE.csv X Y[,Y...] OUT.png               columns of a CSV file as lines
   picture.py columns FILE.csv OUT.png                        all of them, over the first
+
+Those of the pages, from the top of the project, after the commands of each page:
+
+  examples/picture.py curve out/antenna_c.csv time_ms error_mas,missed_mas examples/antenna_c/antenna.png
+  examples/picture.py curve out/antenna.csv time_ms error_mas,missed_mas examples/antenna_rust/antenna.png
+  examples/picture.py page out/csf17/report.html examples/csf17_100/report.png 1000x1300
+  examples/picture.py page out/lara8/report.html examples/lara8/report.png 1000x1300
+  examples/picture.py curve out/learning_c.csv second missed_arcsec_rms,offset_arcsec examples/learning_c/learning.png
+  examples/picture.py curve out/sweep/replay.csv torque_n_m measured_arcsec,predicted_arcsec examples/other_program/sweep.png
+  examples/picture.py page out/own/report.html examples/own_drive/report.png 900x1000
 """
 
 import csv
