@@ -288,8 +288,8 @@ impl<'a> Table<'a> {
 
     /// Generator angle that brings the output to `target`.
     ///
-    /// The top of this module describes the method. If an input is not finite the ideal command is given and
-    /// marked `Disabled`.
+    /// The top of this module describes the method. If an input is not finite, or the error that it finds lies beyond
+    /// the table's limit, the ideal command is given and marked `Disabled`.
     #[must_use]
     pub fn inverse(&self, target: OutputAngle, torque_n_m: f32, temperature_c: f32, approach: Approach<'_>) -> Command {
         self.model().aim(&read::locate(self, torque_n_m, temperature_c), target, approach)

@@ -170,7 +170,10 @@ pub fn keeps_its_promises(table: &Table<'_>, choices: &mut Choices<'_>) {
             command.predicted_error_rad.abs() <= most + table.inverse_error_bound_rad(),
             "{command:?}, at most {most}"
         );
-        assert_eq!(command.quality == Quality::Disabled, !finite, "{command:?}");
+        // What the iterations leave may lie beyond a limit that is this close to the table's own errors.
+        let close = most + table.inverse_error_bound_rad() > table.error_limit_rad();
+        let disabled = command.quality == Quality::Disabled;
+        assert!(if finite { !disabled || close } else { disabled }, "{command:?}");
         if finite {
             steady_motion(table, generator, [torque, temperature], most);
         }
