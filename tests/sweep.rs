@@ -1,5 +1,5 @@
-//! A sweep of drives drawn from tolerances: shards that are killed and resumed give the bytes of one run, kernels agree
-//! with FEM, and the input that matters is found; a sweep of a field finds a known optimum.
+//! A sweep of drives drawn from tolerances: shards that are killed and resumed give the bytes of one run,
+//! and the input that matters is found; a sweep of a field finds a known optimum.
 //!
 //! References: the uninterrupted run; the FEM of drives with the same deviations; the influence kernels, by which a
 //! second harmonic of 4 µm outweighs one of 0.2 µm. Physics wrong if this fails: a sign, a phase, a wheel taken for the
@@ -15,8 +15,7 @@ fn sweep_shards_killed_and_resumed_have_the_bytes_of_one_run() {
     let desk = Desk::new();
     desk.write("teeth.toml", include_str!("../examples/sweep/teeth.toml"));
     for folder in ["one", "two"] {
-        desk.line(&format!("sweep plan --tolerances teeth.toml --draws 200 --fem 8 --fem-places 5 --out {folder}"))
-            .done();
+        desk.line(&format!("sweep plan --tolerances teeth.toml --draws 1000 --out {folder}")).done();
     }
     assert_eq!(desk.read("one/plan.csv"), desk.read("two/plan.csv"));
     desk.line("sweep run one").done();
@@ -32,7 +31,7 @@ fn sweep_shards_killed_and_resumed_have_the_bytes_of_one_run() {
     killed.kill().unwrap();
     assert!(!killed.wait().unwrap().success());
     let left = fs::read_to_string(&rows).unwrap();
-    assert!(left.ends_with('\n') && left.lines().count() < 101, "{} lines", left.lines().count());
+    assert!(left.ends_with('\n') && left.lines().count() < 501, "{} lines", left.lines().count());
     let again = desk.line("sweep run two --shard 1/2 --json").done().json();
     assert!(again["there"].as_u64().unwrap() > 0 && again["computed"].as_u64().unwrap() > 0, "{again}");
     for folder in ["one", "two"] {
@@ -44,18 +43,6 @@ fn sweep_shards_killed_and_resumed_have_the_bytes_of_one_run() {
     let second = desk.read("two/results/0002-of-0002.csv");
     let both = fs::read_to_string(&rows).unwrap() + second.split_once('\n').unwrap().1;
     assert_eq!(whole, both);
-
-    // Kernels and FEM on the same drives.
-    let reduced: serde_json::Value = serde_json::from_str(&desk.read("one/sweep.json")).unwrap();
-    let of = &reduced["generators"][0];
-    assert_eq!(of["fem_failed"].as_u64(), Some(0));
-    for figure in of["fem"].as_array().unwrap() {
-        println!("{figure}");
-        let number = |name: &str| figure[name].as_f64().unwrap();
-        assert!(figure["drives"] == 8 && number("correlation") > 0.99, "{figure}");
-        let spread = of["figures"].as_array().unwrap().iter().find(|spread| spread["figure"] == figure["figure"]);
-        assert!(number("off_mean_arcsec").abs() < 0.02 * spread.unwrap()["mean"].as_f64().unwrap(), "{figure}");
-    }
 }
 
 #[test]

@@ -4,20 +4,6 @@ use serde::Serialize;
 
 /// Intervals hold with this probability.
 pub(crate) const CONFIDENCE: f64 = 0.95;
-/// The normal quantile of [`CONFIDENCE`], two-sided.
-const Z: f64 = 1.959_963_984_540_054;
-
-/// A value with an interval that holds it with probability 95 %.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Interval {
-    /// The value.
-    pub value: f64,
-    /// Lower end.
-    pub low: f64,
-    /// Upper end.
-    pub high: f64,
-}
-
 /// A quantile.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Quantile {
@@ -31,16 +17,6 @@ pub struct Quantile {
     pub high: Option<f64>,
     /// Drives that have both ends.
     pub drives_for_both_ends: usize,
-}
-
-/// How often a figure is above a limit.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Exceeded {
-    /// The limit.
-    pub above: f64,
-    /// Share of the drives above; interval after Wilson.
-    #[serde(flatten)]
-    pub of: Interval,
 }
 
 /// Cumulative standard normal distribution.
@@ -171,17 +147,6 @@ pub fn quantile(sorted: &[f64], share: f64) -> Quantile {
     Quantile { share, value: sorted[rank.clamp(1, n) - 1], low: end(low), high: end(high), drives_for_both_ends }
 }
 
-/// Share of a sample above a limit, with Wilson's interval.
-pub fn exceeded(values: &[f64], above: f64) -> Exceeded {
-    let n = values.len() as f64;
-    let share = values.iter().filter(|x| **x > above).count() as f64 / n;
-    let z2 = Z * Z;
-    let middle = (share + 0.5 * z2 / n) / (1.0 + z2 / n);
-    let half = Z / (1.0 + z2 / n) * (share * (1.0 - share) / n + 0.25 * z2 / (n * n)).sqrt();
-    let of = Interval { value: share, low: (middle - half).clamp(0.0, share), high: (middle + half).clamp(share, 1.0) };
-    Exceeded { above, of }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -192,7 +157,7 @@ mod tests {
             let back = normal_cdf(normal_quantile(p));
             assert!((back / p - 1.0).abs() < 1e-12 || (back - p).abs() < 1e-15, "{p}: {back}");
         }
-        assert!((normal_quantile(0.975) - Z).abs() < 1e-14);
+        assert!((normal_quantile(0.975) - 1.959_963_984_540_054).abs() < 1e-14);
     }
 
     /// Ranks by hand: of 100 numbers the median lies between the 40th and the 61st (Conover, Practical Nonparametric
@@ -202,8 +167,6 @@ mod tests {
         let sorted: Vec<f64> = (1..=100).map(f64::from).collect();
         let median = quantile(&sorted, 0.5);
         assert_eq!((median.value, median.low, median.high), (50.0, Some(40.0), Some(61.0)));
-        let rare = exceeded(&sorted, 1000.0);
-        assert!(rare.of.low == 0.0 && (rare.of.high - 0.037).abs() < 1e-3);
     }
 
     /// The largest of n is above the 95 % value with 1 - 0.95^n: of 8 it bounds nothing, of 72 it does with 97.5 %.

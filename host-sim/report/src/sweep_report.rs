@@ -4,7 +4,7 @@ use serde_json::{Map, json};
 
 use super::page::{
     Axis, Block, Choice, Detail, Figure, FigureBody, Headline, Limit, Lines, Mark, Page, PageQuantity, Section, Series,
-    Status, Table, Text, Upright, significant,
+    Status, Table, Text, significant,
 };
 use flexspline_design::sweep::{Judge, OfGenerator, Plan, Row, Sense, Sweep};
 
@@ -43,7 +43,6 @@ pub fn page(of: &SweepSources<'_>) -> Page {
     sections.extend(
         [
             ("matters", "What matters", Detail::Summary, tables(of, ranks)),
-            ("scatter", "Scatter", Detail::Summary, tables(of, exceeded)),
             ("figures", "Figure by figure", Detail::Engineering, tables(of, figures)),
         ]
         .into_iter()
@@ -82,63 +81,18 @@ const READING: &str = "A data sheet is computed by contact FEM: the drive is loa
     T1, K2 from T1 to T2, K3 above. A drive drawn from tolerances is computed by influence kernels of the drive as \
     drawn over a turn of the output: linear in the errors of single teeth, interpolated in the distance of the axes, \
     a parabola in every other dimension, each as if the others were as drawn, without friction. A rank correlation \
-    (Spearman) of 1 or −1 says that the figure follows this input alone. Intervals hold with 95 %.";
+    (Spearman) of 1 or −1 says that the figure follows this input alone. Intervals hold with 95 %. Figures and \
+    fields have the names of the columns of sweep.csv, which end in their unit.";
 
-/// Endings of names that are a unit, longest first, the unit, and its quantity on a page.
-const UNITS: [(&str, &str, PageQuantity); 16] = [
-    ("_n_m_per_rad", "N·m/rad", PageQuantity::Count),
-    ("_n_per_mm3", "N/mm³", PageQuantity::Count),
-    ("_n_per_mm", "N/mm", PageQuantity::Count),
-    ("_kg_m3", "kg/m³", PageQuantity::Count),
-    ("_percent", "%", PageQuantity::Count),
-    ("_arcsec", "arcsec", PageQuantity::Error),
-    ("_per_k", "1/K", PageQuantity::Count),
-    ("_mrad", "mrad", PageQuantity::Count),
-    ("_n_m", "N·m", PageQuantity::Torque),
-    ("_mpa", "MPa", PageQuantity::Stress),
-    ("_deg", "degrees", PageQuantity::Count),
-    ("_mm", "mm", PageQuantity::Count),
-    ("_um", "µm", PageQuantity::Count),
-    ("_n", "N", PageQuantity::Force),
-    ("_c", "°C", PageQuantity::Count),
-    ("_k", "K", PageQuantity::Count),
-];
-
-/// A name in words, and its unit: that of its ending, or `modules` of a profile shift.
-fn in_words(name: &str) -> (String, Option<&'static str>, PageQuantity) {
-    let words = |stem: &str| stem.replace("_pp", " peak to peak").replace(['_', '.'], " ");
-    if name.ends_with("profile_shift") {
-        return (words(name), Some("modules"), PageQuantity::Count);
-    }
-    let found = UNITS.iter().find_map(|(ending, unit, quantity)| Some((name.strip_suffix(ending)?, *unit, *quantity)));
-    match found {
-        Some((stem @ ("k1" | "k2" | "k3"), unit, quantity)) => (stem.to_uppercase(), Some(unit), quantity),
-        Some((stem, unit, quantity)) => (words(stem), Some(unit), quantity),
-        None => (words(name), None, PageQuantity::Count),
-    }
+/// Quantity of a figure on the page, by the unit in its name.
+fn quantity(name: &str) -> PageQuantity {
+    if name.ends_with("_arcsec") { PageQuantity::Error } else { PageQuantity::Count }
 }
 
-/// A figure in words with its unit, and its quantity. Units of quantities are added by the page.
-fn shown(name: &str) -> (String, PageQuantity) {
-    match in_words(name) {
-        (words, Some(unit), PageQuantity::Count) => (format!("{words}, {unit}"), PageQuantity::Count),
-        (words, _, quantity) => (words, quantity),
-    }
-}
-
-/// Heading of a column of a figure or field. Errors have their unit in every cell, where the reader changes it.
-pub(super) fn heading(name: &str) -> String {
-    match in_words(name) {
-        (words, _, PageQuantity::Error) => words,
-        (words, Some(unit), _) => format!("{words}, {unit}"),
-        (words, None, _) => words,
-    }
-}
-
-pub(super) fn value(name: &str, value: Option<f64>) -> Text {
+fn value(name: &str, value: Option<f64>) -> Text {
     match value {
         None => Text::new("–"),
-        Some(value) if shown(name).1 == PageQuantity::Error => Text::default().error(value, 3),
+        Some(value) if quantity(name) == PageQuantity::Error => Text::default().error(value, 3),
         Some(value) => Text::new(significant(value, 3)),
     }
 }
@@ -185,7 +139,7 @@ fn headline(of: &SweepSources<'_>, one: &OfGenerator) -> Headline {
         choice,
         answer: Text::new(format!("{meet} of {count} variants meet the constraints{optimal}.")),
         number: value(target, best),
-        number_is: format!("{}, of the best", heading(target)),
+        number_is: format!("{target}, of the best"),
     }
 }
 
@@ -227,10 +181,10 @@ fn trade(of: &SweepSources<'_>) -> Figure {
         ];
         (one.generator.to_string(), Lines { series, ..Lines::default() })
     };
-    let axis = |name: &str| Axis::new(shown(name).0, shown(name).1);
+    let axis = |name: &str| Axis::new(name, quantity(name));
     Figure {
         id: "trade".to_owned(),
-        title: format!("{} against {}", shown(second).0, shown(first).0),
+        title: format!("{second} against {first}"),
         caption: Text::new("Each point is a variant."),
         alt: "Every variant by two of its figures; the Pareto-optimal ones stand out".to_owned(),
         body: FigureBody::Lines {
@@ -252,8 +206,7 @@ fn distribution(of: &SweepSources<'_>) -> Figure {
         let points = ranks.map(|rank| [errors[rank], 100.0 * (rank + 1) as f64 / n as f64]).collect();
         let series = vec![Series { name: "drives below".to_owned(), mark: Mark::Line, colour: 0, points }];
         let limits = vec![Limit { name: "95 %".to_owned(), y: 100.0 * JUDGED }];
-        let uprights = one.exceeded.iter().map(|e| Upright { name: format!("{}″", e.above), x: e.above }).collect();
-        (one.generator.to_string(), Lines { series, limits, uprights })
+        (one.generator.to_string(), Lines { series, limits, ..Lines::default() })
     };
     Figure {
         id: "distribution".to_owned(),
@@ -273,13 +226,13 @@ fn front(of: &SweepSources<'_>) -> Option<Section> {
     let names = of.plan.figures();
     let decides = |name: &&str| of.judge.targets.iter().any(|(target, _)| target == name);
     let (first, others): (Vec<&str>, Vec<&str>) = names.iter().copied().partition(decides);
-    let header = |names: &[&str]| names.iter().map(|name| heading(name)).collect::<Vec<String>>();
     let fields: Vec<&str> = of.plan.columns.iter().map(String::as_str).collect();
-    let header = [words(&["Variant"]), header(&first), header(&fields), header(&others)].concat();
-    let better =
-        of.judge.targets.iter().map(|(name, sense)| {
-            format!("{} {}", if *sense == Sense::Least { "least" } else { "most" }, heading(name))
-        });
+    let header = [words(&["Variant"]), words(&first), words(&fields), words(&others)].concat();
+    let better = of
+        .judge
+        .targets
+        .iter()
+        .map(|(name, sense)| format!("{} {name}", if *sense == Sense::Least { "least" } else { "most" }));
     let better = better.collect::<Vec<_>>().join(", ");
     let blocks = tables(of, |one| {
         let rows = one.front.iter().take(MOST_ROWS).filter_map(|number| {
@@ -309,27 +262,14 @@ fn ranks(one: &OfGenerator) -> Table {
         let of = |input: &&str| one.ranks.iter().find(|rank| rank.figure == figure && rank.input == **input);
         let cell = |input| Text::new(of(input).map_or("–".to_owned(), |rank| significant(rank.correlation, 2)));
         let cells: Vec<Text> = inputs.iter().map(cell).collect();
-        [vec![Text::new(heading(figure))], cells].concat()
+        [vec![Text::new(figure)], cells].concat()
     };
     let has = |figure: &&str| one.ranks.iter().any(|rank| rank.figure == *figure);
     Table {
         caption: "Rank correlation of each figure with each input".to_owned(),
-        header: [words(&["Figure"]), inputs.iter().map(|input| heading(input)).collect()].concat(),
+        header: [words(&["Figure"]), words(&inputs)].concat(),
         rows: one.figures.iter().map(|spread| spread.figure).filter(has).map(row).collect(),
     }
-}
-
-fn percent(share: f64) -> String {
-    format!("{} %", significant(100.0 * share, 3))
-}
-
-fn exceeded(one: &OfGenerator) -> Table {
-    let rows = one.exceeded.iter().map(|e| {
-        let [share, low, high] = [e.of.value, e.of.low, e.of.high].map(|share| Text::new(percent(share)));
-        vec![Text::default().error(e.above, 3), share, low, high]
-    });
-    let caption = "Drives above an error, with a 95 % interval".to_owned();
-    Table { caption, header: words(&["Error above", "drives", "from", "to"]), rows: rows.collect() }
 }
 
 fn figures(one: &OfGenerator) -> Table {
@@ -338,41 +278,11 @@ fn figures(one: &OfGenerator) -> Table {
         let judged = spread.quantiles.iter().find(|quantile| quantile.share == JUDGED);
         let ends = [judged.and_then(|q| q.low), judged.and_then(|q| q.high)];
         let cells = [Some(spread.mean), Some(spread.std)].into_iter().chain(shown).chain(ends);
-        [Text::new(heading(spread.figure))].into_iter().chain(cells.map(|x| value(spread.figure, x))).collect()
+        [Text::new(spread.figure)].into_iter().chain(cells.map(|x| value(spread.figure, x))).collect()
     });
     Table {
         caption: "Figures of the variants that converged; the interval is that of the 95 % value".to_owned(),
         header: words(&["Figure", "mean", "std", "5 %", "50 %", "95 %", "99 %", "from", "to"]),
         rows: rows.collect(),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use flexspline_design::data_sheet::FIGURES;
-
-    /// All figures but a ratio, and every field of a drive that ends in a unit, have it in the heading of a column.
-    #[test]
-    fn figures_and_fields_say_their_units() {
-        for (name, due) in [
-            ("k1_n_m_per_rad", "K1, N·m/rad"),
-            ("max_von_mises_mpa", "max von mises, MPa"),
-            ("kinematic_error_pp_arcsec", "kinematic error peak to peak"),
-            ("lobe_force_n", "lobe force, N"),
-            ("tilt_mrad", "tilt, mrad"),
-            ("last_stable_n_m", "last stable, N·m"),
-            ("teeth_in_contact_percent", "teeth in contact, %"),
-            ("load_across_face_peak_over_mean", "load across face peak over mean"),
-            ("flexspline.rim_thickness_mm", "flexspline rim thickness, mm"),
-            ("circular_spline.profile_shift", "circular spline profile shift, modules"),
-            ("generator.bearing_stiffness_n_per_mm3", "generator bearing stiffness, N/mm³"),
-            ("as_built.generator_warmer_k", "as built generator warmer, K"),
-        ] {
-            assert_eq!(heading(name), due);
-        }
-        let without: Vec<&str> =
-            FIGURES.iter().filter(|(name, _)| in_words(name).1.is_none()).map(|(name, _)| *name).collect();
-        assert_eq!(without, ["load_across_face_peak_over_mean"]);
     }
 }

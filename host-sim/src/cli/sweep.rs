@@ -24,13 +24,7 @@ use flexspline_report::sweep_report::{self, SweepSources};
 /// Variants of the Pareto front that are printed.
 const SHOWN: usize = 5;
 /// Figures of drives drawn from tolerances that are printed.
-const PRINTED: [&str; 5] = [
-    "error_pp_arcsec",
-    "lost_motion_arcsec",
-    "no_table_rms_arcsec",
-    "nominal_table_rms_arcsec",
-    "unit_table_rms_arcsec",
-];
+const PRINTED: [&str; 3] = ["error_pp_arcsec", "error_rms_arcsec", "lost_motion_arcsec"];
 
 /// Compute many variants of a drive, or drives drawn from tolerances
 ///
@@ -106,12 +100,6 @@ struct PlanCommand {
     #[arg(long, value_name = "N", default_value_t = 24, value_parser = clap::value_parser!(u8).range(4..=32))]
     #[arg(conflicts_with = "tolerances")]
     positions: u8,
-    /// Number of drives of --tolerances, from the first on, that are also computed by FEM to check the kernels
-    #[arg(long, value_name = "M", default_value_t = 0, conflicts_with = "vary")]
-    fem: usize,
-    /// Places over an output turn of that FEM
-    #[arg(long, value_name = "P", default_value_t = 23, conflicts_with = "vary")]
-    fem_places: u32,
     /// Mesh: coarse, standard or fine
     #[arg(long, value_name = "LEVEL", default_value = "coarse", value_parser = names::mesh())]
     #[arg(hide_possible_values = true)]
@@ -253,7 +241,7 @@ impl PlanCommand {
         })
         .map_err(failure)?;
         let progress = Mutex::new(context.progress("plan"));
-        Plan::of_tolerances(&tolerances, (self.fem, self.fem_places), settings, &|done, of, what| {
+        Plan::of_tolerances(&tolerances, settings, &|done, of, what| {
             if let Ok(mut bar) = progress.lock() {
                 bar.set(done, of, what);
             }
@@ -380,10 +368,6 @@ fn lines(plan: &Plan, sweep: &Sweep, judge: &Judge, of: &OfGenerator) -> String 
         });
         let _ = writeln!(text, "  {:<26} median {:.3}, 95 % below {:.3}{follows}", spread.figure, at(0.5), at(0.95));
     }
-    for e in &of.exceeded {
-        let [value, low, high] = [e.of.value, e.of.low, e.of.high].map(|share| 100.0 * share);
-        let _ = writeln!(text, "  P(error > {}\") = {value:.3} % ({low:.3} to {high:.3})", e.above);
-    }
     text
 }
 
@@ -422,18 +406,10 @@ fn remarks(plan: &Plan, sweep: &Sweep) -> Vec<String> {
             "drives have axes further apart than the kernels reach; their errors are extrapolated",
         );
         count(of.play_closed, "drives have no play at some place; lost motion there is the wind-up alone");
-        count(of.fem_failed, "drives by FEM found no equilibrium");
         for asked in of.asked.iter().filter(|asked| asked.meet_alone < asked.of) {
             let found = asked.found.map(|[low, high]| format!("; found {} to {}", short(low), short(high)));
             let (what, found) = (&asked.what, found.unwrap_or_default());
             remarks.push(format!("{kind}: {what}: {} of {} variants{found}", asked.meet_alone, asked.of));
-        }
-        for fem in &of.fem {
-            let (off, most) = (short(fem.off_rms_arcsec), short(fem.off_most_arcsec));
-            remarks.push(format!(
-                "{kind}: {} by kernels is off by {off} arcsec rms, {most} at most, of {} drives by FEM",
-                fem.figure, fem.drives
-            ));
         }
     }
     remarks

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use thiserror::Error;
+
 use super::plan::{Plan, SweepError};
 use super::run::{Row, RunStatus};
 use super::vary::is_error_of_making;
@@ -24,11 +26,16 @@ pub struct Constraint {
     pub most: f64,
 }
 
-impl FromStr for Constraint {
-    type Err = String;
+/// Text that is no constraint.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("found {0:?}, allowed: FIGURE=LEAST..MOST, either end may be left out")]
+pub struct ConstraintError(String);
 
-    fn from_str(text: &str) -> Result<Constraint, String> {
-        let wrong = || format!("found {text:?}, allowed: FIGURE=LEAST..MOST, either end may be left out");
+impl FromStr for Constraint {
+    type Err = ConstraintError;
+
+    fn from_str(text: &str) -> Result<Constraint, ConstraintError> {
+        let wrong = || ConstraintError(text.to_owned());
         let (name, range) = text.split_once('=').ok_or_else(wrong)?;
         let (least, most) = range.split_once("..").ok_or_else(wrong)?;
         let end = |text: &str, open: f64| match text.trim() {

@@ -23,9 +23,9 @@ mod run;
 mod tolerance;
 mod vary;
 
-pub use judge::{Constraint, Judge, Sense};
+pub use judge::{Constraint, ConstraintError, Judge, Sense};
 pub use plan::{Plan, PlanSettings, SweepError, SweepProgress};
-pub use reduce::{Asked, Compared, FigureSpread, OfGenerator, Rank, Sweep, reduce};
+pub use reduce::{Asked, FigureSpread, OfGenerator, Rank, Sweep, reduce};
 pub use run::{Ran, Row, RunStatus, Shard, run};
 pub use tolerance::{Distribution, EXAMPLE, Law, TeethError, Tolerance, ToleranceActs, Tolerances};
 pub use vary::{VariedValues, Vary, VaryError, grid, is_error_of_making};

@@ -12,7 +12,7 @@
 //!
 //! `wave` is settled motion over a tooth pitch of the drive that is alike everywhere; `w`, `oval` and `d` are those of
 //! [`crate::kernels`]. Errors of teeth, displaced axes and uniform changes are assumed not to change each other's
-//! effect; the drives that a sweep also computes by FEM test that.
+//! effect.
 
 use std::f64::consts::TAU;
 
@@ -25,18 +25,11 @@ use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::drive::{AsBuilt, Wheel};
 
 /// The figures of a drive by kernels, in the order of the columns of results.
-pub const FIGURES: [&str; 21] = [
+pub const FIGURES: [&str; 12] = [
     "error_pp_arcsec",
     "error_rms_arcsec",
-    "flexspline_order_2_arcsec",
-    "circular_spline_order_2_arcsec",
-    "flexspline_order_4_arcsec",
-    "circular_spline_order_4_arcsec",
     "lost_motion_arcsec",
     "most_lost_motion_arcsec",
-    "no_table_rms_arcsec",
-    "nominal_table_rms_arcsec",
-    "unit_table_rms_arcsec",
     "backlash_arcsec",
     "k1_n_m_per_rad",
     "k2_n_m_per_rad",
@@ -44,8 +37,6 @@ pub const FIGURES: [&str; 21] = [
     "wind_up_arcsec",
     "max_von_mises_mpa",
     "axes_apart_um",
-    "places_pp_arcsec",
-    "places_rms_arcsec",
     CLOSED,
 ];
 /// Share of the places, %, without play between the flanks: lost motion there is the elastic wind-up alone.
@@ -61,8 +52,8 @@ pub(super) const STATE: usize = 2 * WAVE + SHEET.len();
 const SAMPLES: usize = 4;
 /// Places over a turn of the output, at least and at most.
 const PLACES: [usize; 2] = [1009, 4001];
-/// Orders of a table's curves: over the turn of the generator, over that against the output, over that of the output.
-const TABLE_ORDERS: [usize; 3] = [8, 8, 6];
+/// Orders that the places keep apart: of the generator, of the generator on the circular spline, of the output.
+const ORDERS: [usize; 3] = [8, 8, 6];
 /// How far apart orders stay where places fold them.
 const APART: f64 = 0.9;
 
@@ -250,7 +241,6 @@ struct Curves {
 /// Evaluates drives with one generator.
 pub(super) struct Model {
     teeth: [u32; 2],
-    ratio: f64,
     response: Response,
     wheels: [WheelSums; 2],
     ovals: Vec<Gain>,
@@ -259,10 +249,6 @@ pub(super) struct Model {
     /// The light load, N·m.
     light_n_m: f64,
     places: Vec<DriveAngles>,
-    fem_places: Vec<DriveAngles>,
-    /// Cosine and sine of a turn in as many steps as there are places.
-    circle: Vec<[f64; 2]>,
-    nominal: Vec<[f64; 2]>,
 }
 
 /// Loads of the model: +T, −T, +t, −t.
@@ -270,55 +256,28 @@ const SIGNS: [(usize, bool); 4] = [(0, false), (0, true), (1, false), (1, true)]
 
 impl Model {
     /// `torques_n_m`: the load, and the light load of lost motion.
-    pub(super) fn new(kernels: &Kernels, response: Response, torques_n_m: [f64; 2], fem_places: usize) -> Model {
+    pub(super) fn new(kernels: &Kernels, response: Response, torques_n_m: [f64; 2]) -> Model {
         let signed: Vec<f64> = SIGNS
             .iter()
             .map(|(load, negative)| if *negative { -torques_n_m[*load] } else { torques_n_m[*load] })
             .collect();
         let ratio = kernels.ratio;
         let of_output = |waves: usize, per: f64| (1..=waves).map(move |k| k as f64 * per);
-        let orders: Vec<f64> = of_output(TABLE_ORDERS[0], ratio)
-            .chain(of_output(TABLE_ORDERS[1], ratio - 1.0))
-            .chain(of_output(TABLE_ORDERS[2], 1.0))
+        let orders: Vec<f64> = of_output(ORDERS[0], ratio)
+            .chain(of_output(ORDERS[1], ratio - 1.0))
+            .chain(of_output(ORDERS[2], 1.0))
             .collect();
         let count = places_that_tell_apart(&orders, PLACES, APART);
-        let even = |n: usize| -> Vec<DriveAngles> {
-            (0..n).map(|j| DriveAngles::at(ratio * j as f64 / n as f64, ratio)).collect()
-        };
-        let mut model = Model {
+        Model {
             teeth: kernels.teeth,
-            ratio,
             response,
             wheels: [Wheel::Flexspline, Wheel::CircularSpline].map(|wheel| WheelSums::new(kernels, wheel, &signed)),
             ovals: signed.iter().map(|torque| kernels.ovality(*torque)).collect(),
             apart: kernels.eccentric.sizes_um.iter().map(|size| (*size, kernels.eccentric_field(*size))).collect(),
             loads: torques_n_m.map(|torque| kernels.place_of_load(torque)),
             light_n_m: torques_n_m[1],
-            places: even(count),
-            fem_places: even(fem_places),
-            circle: (0..count)
-                .map(|j| {
-                    let angle = TAU * j as f64 / count as f64;
-                    [libm::cos(angle), libm::sin(angle)]
-                })
-                .collect(),
-            nominal: Vec::new(),
-        };
-        let middle = model.curves(&AsBuilt::default(), &model.response.middle);
-        model.nominal = model
-            .places
-            .iter()
-            .map(|place| {
-                let [plus, minus, ..] = model.errors(&middle, place);
-                [plus, minus]
-            })
-            .collect();
-        model
-    }
-
-    /// Generator angles of the drives by FEM, rad.
-    pub(super) fn fem_angles_rad(&self) -> impl Iterator<Item = f64> {
-        self.fem_places.iter().map(|place| TAU * place.generator)
+            places: (0..count).map(|j| DriveAngles::at(ratio * j as f64 / count as f64, ratio)).collect(),
+        }
     }
 
     fn curves(&self, built: &AsBuilt, state: &[f64]) -> Curves {
@@ -397,6 +356,13 @@ impl Model {
         below + (at(above) - below) * (size_um - low) / (self.apart[above].0 - low)
     }
 
+    /// Error of a drive without uniform changes under the load, at a place of the generator in turns, arcsec.
+    #[cfg(test)]
+    pub(super) fn error_at(&self, built: &AsBuilt, generator: f64, ratio: f64) -> f64 {
+        let curves = self.curves(built, &self.response.middle);
+        self.errors(&curves, &DriveAngles::at(generator, ratio))[0]
+    }
+
     /// The figures of a drive, in the order of [`FIGURES`]; `values` are those of the fields of the parabolas.
     pub(super) fn figures(&self, built: &AsBuilt, values: &[f64]) -> Vec<f64> {
         let state = self.response.at(values);
@@ -408,77 +374,18 @@ impl Model {
         let closed = by_kernels.clone().filter(|lost| *lost < wind_up).count();
         let lost: Vec<f64> = by_kernels.map(|lost| lost.max(wind_up)).collect();
         let (pp, rms) = spread(&loaded);
-        let order = |waves: f64| self.amplitude(&loaded, waves);
         let most = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let apart = curves.apart.map_or(0.0, |apart| {
-            most(
-                &self
-                    .places
-                    .iter()
-                    .map(|p| {
-                        let [x, y] = Model::apart_at(&apart, p);
-                        (x * x + y * y).sqrt()
-                    })
-                    .collect::<Vec<f64>>(),
-            )
+            let distance = |place| {
+                let [x, y] = Model::apart_at(&apart, place);
+                (x * x + y * y).sqrt()
+            };
+            most(&self.places.iter().map(distance).collect::<Vec<f64>>())
         });
-        let [no, nominal, unit] = self.left(&curves, &errors);
-        let at_places: Vec<f64> = self.fem_places.iter().map(|place| self.errors(&curves, place)[0]).collect();
-        let (places_pp, places_rms) = spread(&at_places);
-        let (r, c) = (self.ratio, self.ratio - 1.0);
-        let mut all = vec![pp, rms, order(2.0 * r), order(2.0 * c), order(4.0 * r), order(4.0 * c)];
-        all.extend([lost.iter().sum::<f64>() / lost.len() as f64, most(&lost), no, nominal, unit]);
+        let mut all = vec![pp, rms, lost.iter().sum::<f64>() / lost.len() as f64, most(&lost)];
         all.extend_from_slice(&state[2 * WAVE..]);
-        all.extend([apart, places_pp, places_rms, 100.0 * closed as f64 / lost.len() as f64]);
+        all.extend([apart, 100.0 * closed as f64 / lost.len() as f64]);
         all
-    }
-
-    /// Amplitude of the order `waves` of the output, arcsec.
-    fn amplitude(&self, errors: &[f64], waves: f64) -> f64 {
-        let [c, s] = self.projected(errors, waves as usize);
-        2.0 * (c * c + s * s).sqrt()
-    }
-
-    /// Mean of a curve times cosine and sine of the order `waves`.
-    fn projected(&self, errors: &[f64], waves: usize) -> [f64; 2] {
-        let n = errors.len();
-        let (mut c, mut s, mut at, step) = (0.0, 0.0, 0, waves % n);
-        for error in errors {
-            c += error * self.circle[at][0];
-            s += error * self.circle[at][1];
-            at += step;
-            if at >= n {
-                at -= n;
-            }
-        }
-        [c / n as f64, s / n as f64]
-    }
-
-    /// Residual error, root mean square over the turn and both signs of the load, arcsec: without a table, with the
-    /// table of the middle drive, and with the table of this drive, whose curves have [`TABLE_ORDERS`]. The zero of the
-    /// output is set once for both signs.
-    fn left(&self, curves: &Curves, errors: &[[f64; 4]]) -> [f64; 3] {
-        let both = |of: &dyn Fn(usize, usize) -> f64| {
-            let all: Vec<f64> = (0..errors.len()).flat_map(|j| [of(j, 0), of(j, 1)]).collect();
-            spread(&all).1
-        };
-        let no = both(&|j, load| errors[j][load]);
-        let nominal = both(&|j, load| errors[j][load] - self.nominal[j][load]);
-        // A table of this drive has its wave and its mean under either load; the curves take their orders.
-        let mut rest = 0.0;
-        for load in [0, 1] {
-            let here = self.places.iter().zip(errors);
-            let beyond: Vec<f64> = here.map(|(place, e)| e[load] - self.wave_error(curves, place, load)).collect();
-            let mut square = spread(&beyond).1.powi(2);
-            for (orders, per) in TABLE_ORDERS.into_iter().zip([self.ratio, self.ratio - 1.0, 1.0]) {
-                for k in 1..=orders {
-                    let [c, s] = self.projected(&beyond, (k as f64 * per) as usize);
-                    square -= 2.0 * (c * c + s * s);
-                }
-            }
-            rest += 0.5 * square.max(0.0);
-        }
-        [no, nominal, rest.sqrt()]
     }
 }
 
@@ -493,7 +400,7 @@ fn least_wind_up(state: &[f64], light_n_m: f64) -> f64 {
 }
 
 /// Peak to peak, and root mean square about the mean.
-pub(super) fn spread(values: &[f64]) -> (f64, f64) {
+fn spread(values: &[f64]) -> (f64, f64) {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), e| (l.min(*e), h.max(*e)));
     let square = values.iter().map(|e| (e - mean) * (e - mean)).sum::<f64>() / values.len() as f64;

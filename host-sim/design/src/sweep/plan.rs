@@ -6,7 +6,6 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::by_fem::{Conditions, FEM_FIGURES};
 use super::draw::{draw, sets};
 use super::model::{self, Response};
 use super::respond::{respond, torques_n_m};
@@ -113,15 +112,8 @@ pub(super) enum By {
     },
     /// Its error over a turn of the output, by kernels.
     Kernels {
-        temperature_c: f64,
         /// The load, and the light load of lost motion, N·m.
         torques_n_m: [f64; 2],
-        /// Errors whose probability of being exceeded is reported, arcsec.
-        exceed_arcsec: Vec<f64>,
-        /// Variants, from the first on, that are also computed by FEM.
-        fem_variants: usize,
-        /// Places over a turn of the output of that FEM.
-        fem_places: u32,
         /// By generator.
         of: Vec<OfOne>,
     },
@@ -178,40 +170,27 @@ impl Plan {
         Ok(plan)
     }
 
-    /// A plan of drives drawn from tolerances: influence kernels and responses by FEM. `fem` is the number of variants
-    /// that are also computed by FEM, and at how many places.
+    /// A plan of drives drawn from tolerances: influence kernels and responses by FEM.
     ///
     /// # Errors
     /// An option is out of bounds, the middle of the tolerances makes no drive, or the FEM finds no equilibrium.
     pub fn of_tolerances(
         of: &Tolerances,
-        (fem_variants, fem_places): (usize, u32),
         settings: PlanSettings,
         progress: &SweepProgress<'_>,
     ) -> Result<Plan, SweepError> {
         let draws = settings.draws.unwrap_or_default();
-        for (option, found, least, most) in [
-            ("--draws", draws, LEAST_DRAWS, MOST_VARIANTS),
-            ("--fem", fem_variants, 0, draws),
-            ("--fem-places", fem_places as usize, 5, 999),
-        ] {
-            if !(least..=most).contains(&found) {
-                return Err(SweepError::BadInput(format!("{option}: found {found}, allowed: {least} to {most}")));
-            }
+        if !(LEAST_DRAWS..=MOST_VARIANTS).contains(&draws) {
+            return Err(SweepError::BadInput(format!(
+                "--draws: found {draws}, allowed: {LEAST_DRAWS} to {MOST_VARIANTS}"
+            )));
         }
         let drawn = draw(&of.list, &of.drive, draws, settings.seed);
         let split = |set: String| set.split_once('=').map(|(path, value)| (path.to_owned(), value.to_owned()));
         let lines = drawn.iter().map(|one| sets(&of.list, one).into_iter().filter_map(split).unzip());
         let (columns, variants): (Vec<Vec<String>>, Vec<Vec<String>>) = lines.unzip();
         let columns = columns.into_iter().next().unwrap_or_default();
-        let by = By::Kernels {
-            temperature_c: of.temperature_c,
-            torques_n_m: torques_n_m(of),
-            exceed_arcsec: of.exceed_arcsec.clone(),
-            fem_variants,
-            fem_places,
-            of: respond(of, solver(settings.mesh), progress)?,
-        };
+        let by = By::Kernels { torques_n_m: torques_n_m(of), of: respond(of, solver(settings.mesh), progress)? };
         let names = of.list.iter().map(|tolerance| {
             let input = match tolerance.acts {
                 ToleranceActs::Harmonic { order, .. } => of_order(&tolerance.field, order),
@@ -271,7 +250,7 @@ impl Plan {
     pub fn figures(&self) -> Vec<&'static str> {
         match self.recipe.by {
             By::Sheet { .. } => LOADS.into_iter().chain(data_sheet::FIGURES.iter().map(|(name, _)| *name)).collect(),
-            By::Kernels { .. } => model::FIGURES.into_iter().chain(FEM_FIGURES).collect(),
+            By::Kernels { .. } => model::FIGURES.to_vec(),
         }
     }
 
@@ -283,6 +262,12 @@ impl Plan {
     /// Whether drives are drawn from tolerances.
     pub fn is_of_tolerances(&self) -> bool {
         matches!(self.recipe.by, By::Kernels { .. })
+    }
+
+    /// The kernels with a generator; none of a plan of fields.
+    pub(super) fn kernels(&self, kind: GeneratorKind) -> Option<&Kernels> {
+        let By::Kernels { of, .. } = &self.recipe.by else { return None };
+        of.iter().map(|one| &one.kernels).find(|kernels| kernels.generator == kind)
     }
 
     pub(super) fn by(&self) -> &By {
@@ -308,11 +293,6 @@ impl Plan {
     /// Settings of all FEM.
     pub(super) fn solver(&self) -> SolverSettings {
         solver(self.recipe.mesh.parse().unwrap_or(MeshLevel::Coarse))
-    }
-
-    /// Conditions of the drives that are also computed by FEM.
-    pub(super) fn conditions(&self, kind: GeneratorKind, temperature_c: f64, torque_n_m: f64) -> Conditions {
-        Conditions { kind, temperature_c, torque_n_m, solver: self.solver() }
     }
 
     fn texts(&self) -> Result<[Vec<u8>; 2], SweepError> {
@@ -388,7 +368,7 @@ impl Plan {
             }
         }
         let (columns, variants) =
-            variants_of(&csv_text).map_err(|what| SweepError::BadInput(format!("{}{what}", csv.display())))?;
+            variants_of(&csv_text).map_err(|error| SweepError::BadInput(format!("{}{error}", csv.display())))?;
         let mut hasher = blake3::Hasher::new();
         hasher.update(json_text.as_bytes()).update(csv_text.as_bytes());
         let hash = hasher.finalize().to_hex().as_str()[..16].to_owned();
@@ -408,27 +388,38 @@ fn solver(mesh: MeshLevel) -> SolverSettings {
 /// Columns and variants of `plan.csv`.
 type Variants = (Vec<String>, Vec<Vec<String>>);
 
-fn variants_of(text: &str) -> Result<Variants, String> {
+/// Why `plan.csv` is refused; begins with the line.
+#[derive(Debug, Error)]
+enum VariantsError {
+    #[error(": {0}")]
+    Csv(#[from] csv::Error),
+    #[error(":1: found {0:?}, allowed: {NUMBER}, then fields of the drive")]
+    Header(Vec<String>),
+    #[error(":{line}: {NUMBER}: found {found:?}, allowed: 1, 2, 3 and so on, up to {MOST_VARIANTS}")]
+    Number { line: u64, found: String },
+    #[error(": found no variant, allowed: one a line")]
+    Empty,
+}
+
+fn variants_of(text: &str) -> Result<Variants, VariantsError> {
     let mut reader = csv::Reader::from_reader(text.as_bytes());
-    let header = reader.headers().map_err(|error| format!(": {error}"))?.clone();
-    if header.get(0) != Some(NUMBER) || header.len() < 2 {
-        return Err(format!(":1: found {:?}, allowed: {NUMBER}, then fields of the drive", header.as_slice()));
+    let header: Vec<String> = reader.headers()?.iter().map(str::to_owned).collect();
+    if header.first().is_none_or(|first| first != NUMBER) || header.len() < 2 {
+        return Err(VariantsError::Header(header));
     }
     let mut variants = Vec::new();
     for record in reader.records() {
-        let record = record.map_err(|error| format!(": {error}"))?;
+        let record = record?;
         let number = variants.len() + 1;
-        if record.get(0) != Some(number.to_string().as_str()) || number > MOST_VARIANTS {
+        let found = record.get(0).unwrap_or_default();
+        if found != number.to_string() || number > MOST_VARIANTS {
             let line = record.position().map_or(0, csv::Position::line);
-            return Err(format!(
-                ":{line}: {NUMBER}: found {:?}, allowed: 1, 2, 3 and so on, up to {MOST_VARIANTS}",
-                record.get(0).unwrap_or_default()
-            ));
+            return Err(VariantsError::Number { line, found: found.to_owned() });
         }
         variants.push(record.iter().skip(1).map(str::to_owned).collect());
     }
     if variants.is_empty() {
-        return Err(": found no variant, allowed: one a line".to_owned());
+        return Err(VariantsError::Empty);
     }
-    Ok((header.iter().skip(1).map(str::to_owned).collect(), variants))
+    Ok((header[1..].to_vec(), variants))
 }

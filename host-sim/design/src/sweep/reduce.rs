@@ -6,21 +6,18 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::by_fem::FEM_FIGURES;
 use super::judge::{Judge, clears, cost};
 use super::model::CLOSED;
-use super::plan::{By, Plan, SweepError, of_order};
+use super::plan::{Plan, SweepError, of_order};
 use super::run::{Row, RunStatus, rows_of};
 use flexspline_base::robust::least_and_most;
-use flexspline_base::statistics::{Exceeded, Quantile, correlation, exceeded, mean, quantile, std_dev};
+use flexspline_base::statistics::{Quantile, correlation, mean, quantile, std_dev};
 use flexspline_mechanics::drive::GeneratorKind;
 
 /// Shares of the variants whose quantiles are reported.
 const SHARES: [f64; 6] = [0.01, 0.05, 0.5, 0.9, 0.95, 0.99];
 /// Variants without results that are named.
 const MOST_NAMED: usize = 5;
-/// Figures that kernels and FEM both have.
-const COMPARED: [&str; 2] = ["places_pp_arcsec", "places_rms_arcsec"];
 
 /// A sweep, reduced: `sweep.json`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -65,12 +62,6 @@ pub struct OfGenerator {
     pub figures: Vec<FigureSpread>,
     /// Rank correlations of inputs and figures, the strongest of each figure first.
     pub ranks: Vec<Rank>,
-    /// Share of the drives above each error of the tolerances.
-    pub exceeded: Vec<Exceeded>,
-    /// Kernels against FEM, figure by figure.
-    pub fem: Vec<Compared>,
-    /// Drives that the FEM could not deform or load.
-    pub fem_failed: usize,
     /// Drives whose axes are further apart than the kernels reach: their errors are extrapolated.
     pub beyond_kernels: usize,
     /// Drives without play at some place: lost motion there is the wind-up alone.
@@ -112,23 +103,6 @@ pub struct Rank {
     pub input: String,
     /// −1 to 1.
     pub correlation: f64,
-}
-
-/// A figure by kernels and by FEM, on the drives that have both.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Compared {
-    /// The figure.
-    pub figure: &'static str,
-    /// Drives.
-    pub drives: usize,
-    /// Correlation of both; missing where one does not scatter.
-    pub correlation: Option<f64>,
-    /// Kernels less FEM: mean, root mean square and largest, arcsec.
-    pub off_mean_arcsec: f64,
-    /// Root mean square.
-    pub off_rms_arcsec: f64,
-    /// Largest size.
-    pub off_most_arcsec: f64,
 }
 
 /// Reduces the results in the folder of a sweep; `partial` accepts missing ones.
@@ -236,28 +210,15 @@ fn of_generator(
         of_figure.sort_by(|a, b| b.correlation.abs().total_cmp(&a.correlation.abs()));
         ranks.extend(of_figure);
     }
-    let (mut above, mut fem_failed, mut beyond_kernels) = (Vec::new(), 0, 0);
-    if let By::Kernels { exceed_arcsec, fem_variants, of, .. } = plan.by() {
-        let errors = column("error_pp_arcsec");
-        above = exceed_arcsec.iter().filter(|_| !errors.is_empty()).map(|limit| exceeded(&errors, *limit)).collect();
-        let of_fem = |row: &&&Row| row.variant < *fem_variants;
-        let fem = plan.figure(FEM_FIGURES[0]).unwrap_or_default();
-        fem_failed = sound.iter().filter(of_fem).filter(|row| row.figures[fem].is_nan()).count();
-        let one = of.iter().find(|one| one.kernels.generator == generator);
-        let reach = one.and_then(|one| one.kernels.eccentric.sizes_um.last()).copied().unwrap_or_default();
-        beyond_kernels = column("axes_apart_um").iter().filter(|size| **size > reach).count();
-    }
-    let both = COMPARED.iter().zip(FEM_FIGURES);
+    let of_kernels = plan.kernels(generator);
+    let reach = of_kernels.and_then(|kernels| kernels.eccentric.sizes_um.last()).copied().unwrap_or(f64::INFINITY);
     OfGenerator {
         generator,
         front,
         asked: asked(plan, judge, rows),
         figures,
         ranks,
-        exceeded: above,
-        fem: both.filter_map(|(figure, fem)| compared(figure, &column(figure), &column(fem))).collect(),
-        fem_failed,
-        beyond_kernels,
+        beyond_kernels: column("axes_apart_um").iter().filter(|size| **size > reach).count(),
         play_closed: column(CLOSED).iter().filter(|share| **share > 0.0).count(),
     }
 }
@@ -281,21 +242,6 @@ fn asked(plan: &Plan, judge: &Judge, rows: &[&Row]) -> Vec<Asked> {
         all.push(one(kept.to_string(), found, &|row| (kept.least..=kept.most).contains(&row.figures[k])));
     }
     all
-}
-
-/// Kernels against FEM; none where no drive has both.
-fn compared(figure: &'static str, kernels: &[f64], fem: &[f64]) -> Option<Compared> {
-    let both = kernels.iter().zip(fem).filter(|(_, fem)| fem.is_finite());
-    let (kernels, fem): (Vec<f64>, Vec<f64>) = both.map(|(k, f)| (*k, *f)).unzip();
-    let off: Vec<f64> = kernels.iter().zip(&fem).map(|(kernels, fem)| kernels - fem).collect();
-    (!off.is_empty()).then(|| Compared {
-        figure,
-        drives: off.len(),
-        correlation: correlation(&kernels, &fem),
-        off_mean_arcsec: mean(&off),
-        off_rms_arcsec: mean(&off.iter().map(|x| x * x).collect::<Vec<f64>>()).sqrt(),
-        off_most_arcsec: off.iter().fold(0.0, |most, x| x.abs().max(most)),
-    })
 }
 
 /// Spearman's rank correlation of the pairs of numbers; none where one of both is the same in all pairs.

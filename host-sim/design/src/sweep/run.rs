@@ -14,8 +14,7 @@ use std::sync::{Mutex, PoisonError};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::by_fem::{self, FEM_FIGURES};
-use super::model::Model;
+use super::model::{Model, Response};
 use super::plan::{By, Plan, SweepError};
 use crate::data_sheet::{FIGURES, data_sheet};
 use flexspline_base::output::OutputError;
@@ -168,11 +167,8 @@ impl Evaluator<'_> {
     fn new(plan: &Plan) -> Evaluator<'_> {
         let models = match plan.by() {
             By::Sheet { .. } => Vec::new(),
-            By::Kernels { torques_n_m, fem_places, of, .. } => {
-                let model = |one: &super::plan::OfOne| {
-                    Model::new(&one.kernels, one.response.clone(), *torques_n_m, *fem_places as usize)
-                };
-                of.iter().map(model).collect()
+            By::Kernels { torques_n_m, of, .. } => {
+                of.iter().map(|one| Model::new(&one.kernels, one.response.clone(), *torques_n_m)).collect()
             }
         };
         Evaluator { plan, models }
@@ -186,10 +182,7 @@ impl Evaluator<'_> {
         match self.plan.drive_of(variant, generator) {
             Ok(drive) => match self.plan.by() {
                 By::Sheet { torque_n_m, positions } => self.sheet(&drive, *torque_n_m, *positions, &mut row),
-                By::Kernels { temperature_c, torques_n_m, fem_variants, .. } => {
-                    let by_fem = (variant < *fem_variants).then_some((*temperature_c, torques_n_m[0]));
-                    self.kernels(&drive, g, by_fem, &mut row);
-                }
+                By::Kernels { of, .. } => self.kernels(&drive, &of[g].response, &self.models[g], &mut row),
             },
             Err(error) => row.why = error.to_string(),
         }
@@ -217,11 +210,10 @@ impl Evaluator<'_> {
         row.figures = [loads.t1_n_m, loads.t2_n_m, loads.largest_n_m].into_iter().chain(figures).collect();
     }
 
-    fn kernels(&self, drive: &Drive, g: usize, by_fem: Option<(f64, f64)>, row: &mut Row) {
-        let By::Kernels { of, .. } = self.plan.by() else { return };
+    fn kernels(&self, drive: &Drive, response: &Response, model: &Model, row: &mut Row) {
         let column = |field: &str| self.plan.columns.iter().position(|column| column == field);
         let mut values = Vec::new();
-        for parabola in &of[g].response.parabolas {
+        for parabola in &response.parabolas {
             // A field that the plan no longer sets is that of the middle drive.
             let Some(k) = column(&parabola.field) else {
                 values.push(parabola.at[1]);
@@ -237,13 +229,7 @@ impl Evaluator<'_> {
             }
         }
         row.status = RunStatus::Converged;
-        row.figures = self.models[g].figures(&drive.as_built, &values);
-        // A drive that the FEM cannot deform or load is one without figures of it; `reduce` counts them.
-        let of_fem = by_fem.and_then(|(temperature_c, torque_n_m)| {
-            let at = self.plan.conditions(row.generator, temperature_c, torque_n_m);
-            by_fem::figures(drive, at, self.models[g].fem_angles_rad()).ok()
-        });
-        row.figures.extend(of_fem.unwrap_or([f64::NAN; FEM_FIGURES.len()]));
+        row.figures = model.figures(&drive.as_built, &values);
     }
 }
 

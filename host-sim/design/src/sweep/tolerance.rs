@@ -38,8 +38,6 @@ pub struct Tolerances {
     pub torque_n_m: f64,
     /// Temperature, °C.
     pub temperature_c: f64,
-    /// Errors (peak to peak, arcsec) whose probability of being exceeded is reported.
-    pub exceed_arcsec: Vec<f64>,
     /// The tolerances.
     pub list: Vec<Tolerance>,
 }
@@ -210,7 +208,7 @@ impl ToleranceActs {
     }
 }
 
-const KEYS: [&str; 6] = ["drive", "generator", "torque_n_m", "temperature_c", "exceed_arcsec", "tolerance"];
+const KEYS: [&str; 5] = ["drive", "generator", "torque_n_m", "temperature_c", "tolerance"];
 const TOLERANCE_KEYS: [&str; 9] =
     ["name", "field", "order", "errors", "distribution", "mean", "std", "limits", "plus_minus"];
 const TWO_LIMITS: &str = "two numbers, the least first, then a larger one";
@@ -281,14 +279,6 @@ impl Tolerances {
                 )
                 .unwrap_or(limits.reference_c),
         };
-        let exceed_arcsec = match value("exceed_arcsec") {
-            None => Vec::new(),
-            Some(value) => {
-                let each = |one: &Spanned<DeValue<'_>>| flexspline_base::toml_file::real(&POSITIVE, one);
-                file.take("exceed_arcsec", each_of(value, "an array of numbers above 0, arcsec", each))
-                    .unwrap_or_default()
-            }
-        };
         let mut list = Vec::new();
         match value("tolerance") {
             None => file.refuse_whole("tolerance", "missing; give at least one [[tolerance]]".to_owned()),
@@ -318,7 +308,7 @@ impl Tolerances {
             }
         }
         if file.is_sound() {
-            Ok(Tolerances { drive, generators, torque_n_m, temperature_c, exceed_arcsec, list })
+            Ok(Tolerances { drive, generators, torque_n_m, temperature_c, list })
         } else {
             Err(refused(file))
         }
