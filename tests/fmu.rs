@@ -1,8 +1,7 @@
 //! FMUs of `flexspline export --format fmu`, imported as a simulator does it: the zip, its description, and the library
 //! through `dlopen`.
 //!
-//! Wrong if these fail: an FMU that is not the core or not the flight, a state that is not all of it, an importer's
-//! mistake that ends its program.
+//! Wrong if these fail: an FMU that is not the core or not the flight, an importer's mistake that ends its program.
 
 mod importer;
 
@@ -126,73 +125,6 @@ fn the_fmu_of_a_table_gives_the_bits_of_the_core() {
     }
     // It did correct, and the temperature did come through.
     assert!(corrected > 20.0, "{corrected}");
-}
-
-#[test]
-fn a_state_goes_on_with_the_same_bits_here_and_in_another_instance() {
-    let desk = desk();
-    let models = ["--tables cam.fxt", "--tables cam.fxt --model joint --scenario camera"];
-    for options in models {
-        let fmu = imported(&desk, options);
-        let joint = options.contains("joint");
-        let run = |instance: &Instance<'_>, ticks: std::ops::Range<u32>| -> Vec<u64> {
-            let mut all = Vec::new();
-            for tick in ticks {
-                if joint {
-                    let [target, rate, torque, _] = asked(tick);
-                    for (name, value) in
-                        [("output_angle_command", target), ("output_rate_command", rate), ("load_torque", 0.2 * torque)]
-                    {
-                        instance.set(name, value);
-                    }
-                    assert_eq!(instance.step(1e-3), OK, "{:?}", instance.log());
-                    all.extend(bits(instance.reals([
-                        "output_angle",
-                        "motor_rate",
-                        "mesh_torque",
-                        "energy_error",
-                        "output_angle_correction",
-                    ])));
-                } else {
-                    all.extend(ticked(instance, tick).0);
-                }
-            }
-            all
-        };
-        let instance = fmu.ready("one", &[]);
-        run(&instance, 0..700);
-        let mut state = null_mut();
-        assert_eq!(instance.state(&mut state), OK);
-        let at = instance.time.get();
-        let first = run(&instance, 700..1400);
-        assert_eq!(instance.set_state(state), OK, "{:?}", instance.log());
-        instance.time.set(at);
-        let again = run(&instance, 700..1400);
-        assert!(first == again, "{options}: the same instance");
-        let bytes = instance.serialised(state);
-        // Another one, in another state, with other parameters and nothing of the first.
-        let tick = if joint { ("load_inertia", 0.5) } else { ("correction_rate_limit", 0.01) };
-        let other = fmu.ready("other", &[tick]);
-        run(&other, 0..50);
-        let mut there = null_mut();
-        assert_eq!(other.deserialised(&bytes, &mut there), OK, "{:?}", other.log());
-        assert_eq!(other.set_state(there), OK, "{:?}", other.log());
-        other.time.set(at);
-        assert!(first == run(&other, 700..1400), "{options}: another instance");
-        // A state that is kept again in the same place, freed, and damaged.
-        let place = state;
-        assert_eq!((instance.state(&mut state), state), (OK, place));
-        assert_eq!((instance.free_state(&mut state), state), (OK, null_mut()));
-        assert_eq!((instance.free_state(&mut state), instance.set_state(place)), (OK, ERROR));
-        assert_eq!(other.set_state(place), ERROR);
-        for at in [0, 9, 17, bytes.len() / 2, bytes.len() - 1] {
-            let mut damaged = bytes.clone();
-            damaged[at] ^= 4;
-            assert_eq!(instance.deserialised(&damaged, &mut state), ERROR, "{at}");
-        }
-        assert_eq!(instance.deserialised(&bytes[..bytes.len() - 8], &mut state), ERROR);
-        assert_eq!(instance.deserialised(&[], &mut state), ERROR);
-    }
 }
 
 #[test]
@@ -430,7 +362,6 @@ fn no_function_falls_over_null_pointers_and_strange_components() {
                 "ExitInitializationMode",
                 "SetupExperiment",
                 "Reset",
-                "FreeFMUstate",
                 "Terminate",
                 "SetTime",
             ];
@@ -445,15 +376,6 @@ fn no_function_falls_over_null_pointers_and_strange_components() {
     }
     let said = fmu.function::<unsafe extern "C" fn() -> *const c_char>("GetVersion");
     assert_eq!(unsafe { CStr::from_ptr(said()) }, c"2.0");
-}
-
-#[test]
-fn another_version_of_fmi_is_refused_by_name() {
-    let desk = desk();
-    let refused = desk.line("export --format fmu --tables cam.fxt --fmi 3.0 --out fmu");
-    assert_eq!(refused.code, 2);
-    assert!(refused.stderr.contains("--fmi: found 3.0, allowed: 2.0"), "{}", refused.stderr);
-    assert!(!desk.path("fmu").exists());
 }
 
 #[test]

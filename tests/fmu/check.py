@@ -161,31 +161,6 @@ def moving(time):
     return {"output_angle_command": 0.02 * np.sin(time), "output_rate_command": 0.02 * np.cos(time), "load_torque": 5.0 * np.sin(3.0 * time)}
 
 
-def states():
-    """A state that is serialised goes on with the same bits in another instance; two instances do not know of each other."""
-    one, two = Slave(JOINT, "one"), Slave(JOINT, "two")
-    one.read = two.read = ["output_angle", "motor_angle", "mesh_torque", "energy_error"]
-    one.run(300, moving)
-    two.run(20, moving)
-    state = one.slave.getFMUstate()
-    data = one.slave.serializeFMUstate(state)
-    first = one.run(300, moving)
-    there = two.slave.deSerializeFMUstate(data)
-    two.slave.setFMUstate(there)
-    time = 0.0
-    for _ in range(300):
-        time += TICK
-    two.time = time
-    assert two.run(300, moving) == first
-    one.slave.setFMUstate(state)
-    one.time = time
-    assert one.run(300, moving) == first
-    one.slave.freeFMUstate(state)
-    two.slave.freeFMUstate(there)
-    one.free()
-    two.free()
-
-
 def energy_is_conserved():
     """The motor pushes the joint of a scenario to and fro: what goes in is heat or stored."""
     time = TICK * np.arange(4000)
@@ -246,7 +221,6 @@ def main():
         ports_stand_alone,
         the_core_is_replayed,
         steps_of_another_size,
-        states,
         energy_is_conserved,
         the_table_helps_the_joint,
         refusals,

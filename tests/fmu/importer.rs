@@ -328,45 +328,4 @@ impl Instance<'_> {
         type Step = unsafe extern "C" fn(*mut c_void, f64, f64, c_int) -> c_int;
         unsafe { self.of.function::<Step>("DoStep")(self.component, from, seconds, 1) }
     }
-
-    /// Its state, in a place that holds one already or null.
-    pub fn state(&self, place: &mut *mut c_void) -> c_int {
-        type Get = unsafe extern "C" fn(*mut c_void, *mut *mut c_void) -> c_int;
-        unsafe { self.of.function::<Get>("GetFMUstate")(self.component, place) }
-    }
-
-    pub fn set_state(&self, state: *mut c_void) -> c_int {
-        unsafe {
-            self.of.function::<unsafe extern "C" fn(*mut c_void, *mut c_void) -> c_int>("SetFMUstate")(
-                self.component,
-                state,
-            )
-        }
-    }
-
-    pub fn free_state(&self, state: &mut *mut c_void) -> c_int {
-        type Free = unsafe extern "C" fn(*mut c_void, *mut *mut c_void) -> c_int;
-        unsafe { self.of.function::<Free>("FreeFMUstate")(self.component, state) }
-    }
-
-    pub fn serialised(&self, state: *mut c_void) -> Vec<u8> {
-        type Size = unsafe extern "C" fn(*mut c_void, *mut c_void, *mut usize) -> c_int;
-        type Serialise = unsafe extern "C" fn(*mut c_void, *mut c_void, *mut u8, usize) -> c_int;
-        let mut size = 0;
-        assert_eq!(
-            unsafe { self.of.function::<Size>("SerializedFMUstateSize")(self.component, state, &mut size,) },
-            OK
-        );
-        let mut bytes = vec![0; size];
-        let serialise = self.of.function::<Serialise>("SerializeFMUstate");
-        assert_eq!(unsafe { serialise(self.component, state, bytes.as_mut_ptr(), size - 1) }, ERROR);
-        assert_eq!(unsafe { serialise(self.component, state, bytes.as_mut_ptr(), size) }, OK);
-        bytes
-    }
-
-    pub fn deserialised(&self, bytes: &[u8], place: &mut *mut c_void) -> c_int {
-        type DeSerialise = unsafe extern "C" fn(*mut c_void, *const u8, usize, *mut *mut c_void) -> c_int;
-        let function = self.of.function::<DeSerialise>("DeSerializeFMUstate");
-        unsafe { function(self.component, bytes.as_ptr(), bytes.len(), place) }
-    }
 }

@@ -16,8 +16,6 @@ use crate::variables::Kind;
 
 /// `fmi2Component`.
 pub type Component = *mut c_void;
-/// `fmi2FMUstate`.
-pub type FmuState = *mut c_void;
 /// Value references.
 pub type References = *const c_uint;
 type Strings = *const *const c_char;
@@ -48,12 +46,8 @@ const CO_SIMULATION: c_int = 1;
 
 type Shared = Arc<Mutex<Instance>>;
 static INSTANCES: Mutex<BTreeMap<usize, Shared>> = Mutex::new(BTreeMap::new());
-/// The next number of a component or a state, spaced as pointers are.
+/// The next number of a component, spaced as pointers are.
 static NEXT: AtomicUsize = AtomicUsize::new(0x1000);
-
-fn next_number() -> usize {
-    NEXT.fetch_add(16, Ordering::Relaxed)
-}
 
 fn instances() -> std::sync::MutexGuard<'static, BTreeMap<usize, Shared>> {
     INSTANCES.lock().unwrap_or_else(PoisonError::into_inner)
@@ -133,12 +127,10 @@ fn pointed(component: Component, name: &str, call: impl FnOnce(&mut Instance) ->
 }
 
 fn lacking(component: Component, call: &str) -> c_int {
-    let what = format!("{call}: not in this FMU: co-simulation without events, dependencies and derivatives");
+    let what = format!(
+        "{call}: not in this FMU: co-simulation without events, states to go back to, dependencies and derivatives"
+    );
     with(component, |instance| instance.refuse(&what) as c_int)
-}
-
-fn unknown(instance: &Instance, call: &str) -> c_int {
-    instance.refuse(&format!("{call}: found no state of this instance")) as c_int
 }
 
 fn is_real(kind: Kind) -> bool {
@@ -183,15 +175,6 @@ unsafe fn write<T: Copy>(
         let set: Vec<(u32, f64)> = of.iter().copied().zip(from.iter().map(|number| value(*number))).collect();
         Some(status(instance.set(call, is, &set)))
     })
-}
-
-/// Keeps bytes in a place, over the state that is there if it is one of this instance; `None` for no place.
-unsafe fn keep(instance: &mut Instance, state: *mut FmuState, bytes: Vec<u8>) -> Option<c_int> {
-    let place = unsafe { state.as_mut() }?;
-    let number = if instance.states.contains_key(&place.addr()) { place.addr() } else { next_number() };
-    instance.states.insert(number, bytes);
-    *place = std::ptr::without_provenance_mut(number);
-    Some(OK)
 }
 
 /// `fmi2GetTypesPlatform`: the usual types.
@@ -244,7 +227,7 @@ pub unsafe extern "C" fn fmi2Instantiate(
         }
     }));
     let Ok(Some(instance)) = made else { return std::ptr::null_mut() };
-    let number = next_number();
+    let number = NEXT.fetch_add(16, Ordering::Relaxed);
     instances().insert(number, Arc::new(Mutex::new(instance)));
     std::ptr::without_provenance_mut(number)
 }
@@ -335,51 +318,6 @@ functions! { component, call;
     fmi2DoStep(from_s: f64, step_s: f64, _no_set_prior: c_int) =>
         plain(component, |instance| instance.step(call, from_s, step_s));
 
-    fmi2GetFMUstate(state: *mut FmuState) => pointed(component, call, |instance| {
-        let bytes = instance.bytes();
-        keep(instance, state, bytes)
-    });
-    fmi2SetFMUstate(state: FmuState) => with(component, |instance| {
-        let Some(bytes) = instance.states.get(&state.addr()).cloned() else { return unknown(instance, call) };
-        match instance.go_on_from(&bytes) {
-            Ok(()) => OK,
-            Err(error) => instance.refuse(&format!("{call}: found {error}")) as c_int,
-        }
-    });
-    // The place is null afterwards; null is left as it is.
-    fmi2FreeFMUstate(state: *mut FmuState) => with(component, |instance| match state.as_mut() {
-        Some(place) if !place.is_null() => {
-            if instance.states.remove(&place.addr()).is_none() {
-                return unknown(instance, call);
-            }
-            *place = std::ptr::null_mut();
-            OK
-        }
-        _ => OK,
-    });
-    fmi2SerializedFMUstateSize(state: FmuState, size: *mut usize) => pointed(component, call, |instance| {
-        let Some(bytes) = instance.states.get(&state.addr()) else { return Some(unknown(instance, call)) };
-        *size.as_mut()? = bytes.len();
-        Some(OK)
-    });
-    fmi2SerializeFMUstate(state: FmuState, to: *mut u8, size: usize) => pointed(component, call, |instance| {
-        let Some(bytes) = instance.states.get(&state.addr()) else { return Some(unknown(instance, call)) };
-        if size < bytes.len() {
-            let what = format!("{call}: found room for {size} bytes, allowed: {} at least", bytes.len());
-            return Some(instance.refuse(&what) as c_int);
-        }
-        list_mut(to, bytes.len())?.copy_from_slice(bytes);
-        Some(OK)
-    });
-    fmi2DeSerializeFMUstate(from: *const u8, size: usize, state: *mut FmuState) =>
-        pointed(component, call, |instance| {
-            let bytes = list(from, size).filter(|_| !state.is_null())?;
-            match instance.words(bytes) {
-                Ok(_) => keep(instance, state, bytes.to_vec()),
-                Err(error) => Some(instance.refuse(&format!("{call}: found {error}")) as c_int),
-            }
-        });
-
     // Section 4.2.3: asked after a step that is pending or discarded, and there is none; so no status is available.
     fmi2GetStatus(_kind: c_int, _to: *mut c_int) => with(component, |_| DISCARD);
     fmi2GetRealStatus(_kind: c_int, _to: *mut f64) => with(component, |_| DISCARD);
@@ -388,6 +326,12 @@ functions! { component, call;
     fmi2GetStringStatus(_kind: c_int, _to: *mut *const c_char) => with(component, |_| DISCARD);
 
     fmi2CancelStep() => lacking(component, call);
+    fmi2GetFMUstate(_state: *mut *mut c_void) => lacking(component, call);
+    fmi2SetFMUstate(_state: *mut c_void) => lacking(component, call);
+    fmi2FreeFMUstate(_state: *mut *mut c_void) => lacking(component, call);
+    fmi2SerializedFMUstateSize(_state: *mut c_void, _size: *mut usize) => lacking(component, call);
+    fmi2SerializeFMUstate(_state: *mut c_void, _to: *mut u8, _size: usize) => lacking(component, call);
+    fmi2DeSerializeFMUstate(_from: *const u8, _size: usize, _state: *mut *mut c_void) => lacking(component, call);
     fmi2GetDirectionalDerivative(_of: References, _n: usize, _by: References, _m: usize, _change: *const f64,
         _to: *mut f64) => lacking(component, call);
     fmi2GetRealOutputDerivatives(_of: References, _n: usize, _orders: *const c_int, _to: *mut f64) =>

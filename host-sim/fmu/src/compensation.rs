@@ -5,7 +5,6 @@ use flexspline::{
     Quality, Store, Table, TorquePath, TorqueReading, TorqueSettings,
 };
 use flexspline_motion::flight::{ARCSEC_PER_RAD, TABLE_DRAG_N_M};
-use flexspline_motion::keep::Kept;
 
 use crate::FmuError;
 use crate::instance::{Inputs, Model};
@@ -254,31 +253,5 @@ impl Model for CompensationModel {
         outputs[NOT_CORRECTED] = f64::from(u8::from(out.flags.contains(Flags::NOT_CORRECTED)));
         outputs[MODE_ACTIVE] = f64::from(self.state.mode() as u8);
         Ok(())
-    }
-}
-
-impl Kept for CompensationModel {
-    fn keep(&self, to: &mut Vec<u64>) {
-        self.state.keep(to);
-        self.path.keep(to);
-        self.temperature_c.to_bits().keep(to);
-        self.asked.keep(to);
-        self.command.keep(to);
-        GeneratorAngle::from_counts(self.target.counts()).keep(to);
-        self.direction.keep(to);
-    }
-
-    fn take(&mut self, from: &mut dyn Iterator<Item = u64>) -> Option<()> {
-        self.state.take(from)?;
-        self.path.take(from)?;
-        let mut temperature = 0_u32;
-        temperature.take(from)?;
-        self.follow(f32::from_bits(temperature));
-        self.asked.take(from)?;
-        self.command.take(from)?;
-        let mut target = GeneratorAngle::ZERO;
-        target.take(from)?;
-        self.target = OutputAngle::from_counts(target.counts());
-        self.direction.take(from)
     }
 }

@@ -62,7 +62,4 @@ pub enum FmuError {
     /// The numbers of the joint are no longer finite.
     #[error("the joint runs away")]
     RunsAway,
-    /// Bytes that are no state of this FMU: a state of another FMU, damaged, or none.
-    #[error("{0}")]
-    State(&'static str),
 }

@@ -1,4 +1,4 @@
-//! One simulation: what an importer may call when, its values, its time, and its state as bytes.
+//! One simulation: calls that an importer may make in each state, its values, its time.
 //!
 //! States and calls are those of sections 2.1.6 to 2.1.8 and 4.2.4 of FMI 2.0. A call that is not allowed is refused:
 //! it returns an error with a line in the log, and nothing changes. A model that cannot go on ends in
@@ -8,10 +8,7 @@
 //! carried over to the next. An input holds from the point at which it was set on, or changes with the derivative that
 //! was given for the step.
 
-use std::collections::BTreeMap;
 use std::ffi::{CStr, CString};
-
-use flexspline_motion::keep::Kept;
 
 use crate::FmuError;
 use crate::compensation::{self, CompensationModel};
@@ -42,7 +39,7 @@ pub enum State {
     Initializing,
     /// Ready for the next step.
     Stepping,
-    /// A step failed: only to be reset, set to another state, or freed.
+    /// A step failed: only to be reset or freed.
     Failed,
     /// At its end.
     Terminated,
@@ -95,7 +92,7 @@ impl Inputs<'_> {
 }
 
 /// A model that is simulated.
-pub trait Model: Kept + Send {
+pub trait Model: Send {
     /// Time of a tick, s.
     fn tick_s(&self, values: &[f64]) -> f64;
 
@@ -118,8 +115,6 @@ fn made(resources: &Resources, values: &[f64]) -> Result<Box<dyn Model>, FmuErro
 const SLACK: f64 = 1e-3;
 /// Most ticks in one communication step: a slip in the unit of time is an error, and does not run for hours. *Guess*.
 const MOST_TICKS: f64 = 1e8;
-/// What the bytes of a state begin with; the last byte is the version.
-const STATE_MARK: u64 = u64::from_le_bytes(*b"FXS\0FMU\x02");
 
 /// One simulation.
 pub struct Instance {
@@ -137,8 +132,6 @@ pub struct Instance {
     time_s: f64,
     ticks: u64,
     table_id: CString,
-    /// Bytes of the states that the importer keeps, by its number for them.
-    pub(crate) states: BTreeMap<usize, Vec<u8>>,
 }
 
 impl Instance {
@@ -159,7 +152,6 @@ impl Instance {
             stop_s: f64::INFINITY,
             time_s: 0.0,
             ticks: 0,
-            states: BTreeMap::new(),
         }
     }
 
@@ -392,94 +384,8 @@ impl Instance {
         Ok(())
     }
 
-    /// All that changes, as bytes: for this description on any machine.
-    pub fn bytes(&self) -> Vec<u8> {
-        let mut words = vec![STATE_MARK, digest(self.resources.guid.bytes().map(u64::from)), self.state as u64];
-        words.extend([u64::from(self.set_up), self.ticks, u64::from(self.model.is_some())]);
-        let numbers = [self.start_s, self.stop_s, self.time_s];
-        words.extend(numbers.iter().chain(&self.values).chain(&self.slopes).map(|number| number.to_bits()));
-        if let Some(model) = &self.model {
-            model.keep(&mut words);
-        }
-        words.push(digest(words.iter().copied()));
-        words.into_iter().flat_map(u64::to_le_bytes).collect()
-    }
-
-    /// The words of a state of this description but for mark, description and sum.
-    ///
-    /// # Errors
-    /// Why the bytes are no such state.
-    pub(crate) fn words(&self, bytes: &[u8]) -> Result<Vec<u64>, FmuError> {
-        let (words, left) = bytes.as_chunks::<8>();
-        let mut words: Vec<u64> = words.iter().map(|bytes| u64::from_le_bytes(*bytes)).collect();
-        let sum = words.pop().filter(|_| left.is_empty()).ok_or(FmuError::State("no state"))?;
-        if sum != digest(words.iter().copied()) {
-            return Err(FmuError::State("a damaged state"));
-        }
-        let of = digest(self.resources.guid.bytes().map(u64::from));
-        match words.split_first_chunk::<2>() {
-            Some((&[STATE_MARK, guid], rest)) if guid == of => Ok(rest.to_vec()),
-            _ => Err(FmuError::State("a state of another FMU")),
-        }
-    }
-
-    /// Goes on from bytes.
-    ///
-    /// # Errors
-    /// Why they are no state of this description; then nothing changes, or, where the model itself cannot take them up,
-    /// it has failed.
-    pub(crate) fn go_on_from(&mut self, bytes: &[u8]) -> Result<(), FmuError> {
-        let words = self.words(bytes)?;
-        let no_state = FmuError::State("no state");
-        let count = self.values.len();
-        let Some((&[state, set_up, ticks, has_model], rest)) = words.split_first_chunk::<4>() else {
-            return Err(no_state);
-        };
-        let Some((numbers, kept)) = rest.split_at_checked(3 + 2 * count) else { return Err(no_state) };
-        let numbers: Vec<f64> = numbers.iter().map(|word| f64::from_bits(*word)).collect();
-        let (times, numbers) = numbers.split_at(3);
-        let (values, slopes) = numbers.split_at(count);
-        let variables = self.resources.kind.variables();
-        let sound = |(variable, value): (&Variable, &f64)| variable.is_output() || variable.allows(*value);
-        let state = State::ALL.into_iter().find(|known| *known as u64 == state).ok_or(no_state)?;
-        if !variables.iter().zip(values).all(sound) {
-            return Err(FmuError::State("impossible values"));
-        }
-        let model = if has_model == 0 { None } else { Some(self.taken(values, kept)?) };
-        self.model = model;
-        self.state = state;
-        self.set_up = set_up != 0;
-        self.values.copy_from_slice(values);
-        self.slopes.copy_from_slice(slopes);
-        (self.start_s, self.stop_s, self.time_s, self.ticks) = (times[0], times[1], times[2], ticks);
-        Ok(())
-    }
-
-    /// The model of these values in a state that was kept: the one that there is, where its parameters are the same.
-    fn taken(&mut self, values: &[f64], kept: &[u64]) -> Result<Box<dyn Model>, FmuError> {
-        let variables = self.resources.kind.variables().iter();
-        let same = |((variable, a), b): ((&Variable, &f64), &f64)| variable.role != Role::Parameter || a == b;
-        let mut model = match self.model.take() {
-            Some(model) if variables.zip(&self.values).zip(values).all(same) => model,
-            _ => made(&self.resources, values)?,
-        };
-        let mut from = kept.iter().copied();
-        if model.take(&mut from).is_none() || from.next().is_some() {
-            self.state = State::Failed;
-            return Err(FmuError::State("a state that no model has"));
-        }
-        Ok(model)
-    }
-
     /// It cannot be trusted any more.
     pub fn fail(&mut self) {
         self.state = State::Failed;
     }
-}
-
-/// A hash of words (FNV-1a, 64 bits): against damage, not against intent.
-fn digest(words: impl Iterator<Item = u64>) -> u64 {
-    words.fold(0xcbf2_9ce4_8422_2325, |sum, word| {
-        word.to_le_bytes().iter().fold(sum, |sum, byte| (sum ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3))
-    })
 }

@@ -2,7 +2,6 @@
 
 use flexspline::{GeneratorAngle, OutputAngle, Quality, Table, TorqueReading};
 use flexspline_motion::flight::{ARCSEC_PER_RAD, OneJoint, Ticked, Unit};
-use flexspline_motion::keep::Kept;
 use flexspline_motion::scenario::{Moment, Scenario, TableKnown, TorqueKnown};
 
 use crate::FmuError;
@@ -296,15 +295,5 @@ impl Model for MovingJoint {
         }
         outputs[CORRECTION_QUALITY] = f64::from(ticked.quality.unwrap_or(Quality::Disabled) as u8);
         Ok(())
-    }
-}
-
-impl Kept for MovingJoint {
-    fn keep(&self, to: &mut Vec<u64>) {
-        self.joint.keep(to);
-    }
-
-    fn take(&mut self, from: &mut dyn Iterator<Item = u64>) -> Option<()> {
-        self.joint.take(from)
     }
 }

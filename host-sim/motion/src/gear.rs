@@ -12,8 +12,6 @@
 
 use core::f64::consts::TAU;
 
-use super::keep::kept;
-
 /// A line of the kinematic error: `amplitude·sin(generator·ψ + output·δ + phase)`, rad at the output.
 ///
 /// An error of the flexspline's teeth of order k has `generator = k`; one of the circular spline, which is met at ψ −
@@ -307,8 +305,6 @@ pub struct Meshed {
     /// Slope of the energy over generator/ratio, and over the output, N·m.
     pub energy_by: [f64; 2],
 }
-
-kept!(Meshed { energy_j, torque_n_m, stiffness, twist_rad, twist_by[..], energy_by[..] });
 
 impl Gear {
     /// The kinematic error, and its slopes over generator and output angle.

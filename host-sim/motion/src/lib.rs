@@ -2,7 +2,7 @@
 //! machine.
 //!
 //! [`gear`] is the drive as a potential, [`plant`] what moves, [`friction`] what rubs, [`servo`] the motor's loops and
-//! their sensors, [`keep`] its state as words, [`loops`] the theory of the loops that close over all of it.
+//! their sensors, [`loops`] the theory of the loops that close over all of it.
 //! `tests/firmware` compiles [`on_board`] for the target, and flies there the tapes of flights on this machine.
 #![forbid(unsafe_code)]
 
@@ -10,7 +10,6 @@ pub mod dish;
 pub mod flight;
 pub mod friction;
 pub mod gear;
-pub mod keep;
 pub mod legs;
 pub mod loops;
 pub mod noise;

@@ -13,8 +13,6 @@
 
 use super::friction::{Friction, HysteresisElement, slipped};
 use super::gear::{Gear, Meshed, Near};
-use super::keep::{Kept, kept};
-use super::noise::Noise;
 use super::servo::{Asked, Servo, ServoSettings};
 
 /// Coordinates: motor, load, appendage.
@@ -75,8 +73,6 @@ pub struct Energy {
     pub heat: f64,
 }
 
-kept!(Energy { motor, outside, heat });
-
 /// A plant in motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plant {
@@ -100,22 +96,6 @@ pub struct Plant {
     mean: [f64; PARTS],
     before: [f64; PARTS],
 }
-
-kept!(Plant {
-    angle_rad[..], rate_rad_s[..], energy, temperature_c, cold, slip_n_m[..], meshed, middle, mean[..], before[..]
-});
-
-impl Kept for Noise {
-    fn keep(&self, to: &mut Vec<u64>) {
-        self.0.keep(to);
-    }
-
-    fn take(&mut self, from: &mut dyn Iterator<Item = u64>) -> Option<()> {
-        self.0.take(from)
-    }
-}
-
-kept!(Servo { noise, torque_n_m, next_n_m, integral_n_m, shown, before });
 
 impl Plant {
     /// At rest with all angles zero.

@@ -23,9 +23,6 @@ pub(super) struct FmuOptions {
     /// compensation]
     #[arg(long, value_enum, value_name = "MODEL", help_heading = "FMU", hide_possible_values = true)]
     model: Option<FmuModel>,
-    /// Version of FMI [default: 2.0, the only one]
-    #[arg(long, value_name = "VERSION", help_heading = "FMU", hide = true)]
-    fmi: Option<String>,
     /// Masses, friction, servo and expected load of a joint: antenna, rover, camera, telescope, or a TOML file
     /// [default: antenna]
     #[arg(long, value_name = "SCENARIO", help_heading = "FMU", value_hint = ValueHint::FilePath)]
@@ -58,7 +55,6 @@ impl FmuOptions {
     pub(super) fn given(&self) -> Option<&'static str> {
         let given = [
             ("--model", self.model.is_some()),
-            ("--fmi", self.fmi.is_some()),
             ("--scenario", self.scenario.is_some()),
             ("--library", !self.library.is_empty()),
         ];
@@ -70,9 +66,6 @@ impl FmuOptions {
             return Err(Failure::BadInput(format!(
                 "{option}: an FMU has the drive of its table; allowed: --tables FILE.fxt"
             )));
-        }
-        if let Some(found) = self.fmi.as_deref().filter(|version| *version != FMI) {
-            return Err(Failure::BadInput(format!("--fmi: found {found}, allowed: {FMI}, the version of every FMU")));
         }
         let fmu = self.fmu(tables)?;
         let libraries = find_libraries(&self.library).map_err(bad_input)?;

@@ -46,7 +46,7 @@ pub(super) fn xml(resources: &Resources) -> String {
   <CoSimulation modelIdentifier="{identifier}" needsExecutionTool="false"
     canBeInstantiatedOnlyOncePerProcess="false" canHandleVariableCommunicationStepSize="true"
     maxOutputDerivativeOrder="0" canInterpolateInputs="true" canRunAsynchronuously="false"
-    canNotUseMemoryManagementFunctions="true" canGetAndSetFMUstate="true" canSerializeFMUstate="true"
+    canNotUseMemoryManagementFunctions="true" canGetAndSetFMUstate="false" canSerializeFMUstate="false"
     providesDirectionalDerivative="false"/>
   <UnitDefinitions>
 "#,

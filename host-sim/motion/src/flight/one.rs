@@ -1,7 +1,6 @@
 //! One joint of a flight, ticked from outside, by a simulator of something larger.
 
-use super::{COMPENSATED, Commanded, FlightError, JointController, JointLane, LaneParts, Sensing, Unit, made};
-use crate::keep::{Kept, kept};
+use super::{COMPENSATED, Commanded, FlightError, JointController, JointLane, LaneParts, Unit, made};
 use crate::on_board::{Given, Settings, Told};
 use crate::plant::Plant;
 use crate::scenario::{Moment, Scenario};
@@ -30,21 +29,6 @@ pub struct Ticked {
     /// How far the core trusts estimate and correction; none without the core.
     pub quality: Option<Quality>,
 }
-
-kept!(Sensing {
-    noise,
-    before_rad_s,
-    even_s,
-    likely_n_m[..],
-    spread[..],
-    told_n_m,
-    drag_n_m,
-    bound_n_m,
-    fed_n_m,
-    way,
-    stood,
-    furthest_rad
-});
 
 impl OneJoint {
     /// At rest at zero; with the image of a table that was made before, or one made for the scenario; with the core or
@@ -121,30 +105,5 @@ impl OneJoint {
     pub fn missing_j(&self) -> f64 {
         let energy = self.plant().energy;
         energy.motor + energy.outside - energy.heat - (self.plant().stored_j() - self.started_j)
-    }
-}
-
-impl Kept for OneJoint {
-    fn keep(&self, to: &mut Vec<u64>) {
-        self.lane.plant.keep(to);
-        self.lane.servo.keep(to);
-        self.lane.sensing.keep(to);
-        self.lane.direction.keep(to);
-        if let JointController::Core(core) = &self.lane.controller {
-            core.on_board.state.keep(to);
-            core.on_board.path.keep(to);
-        }
-    }
-
-    fn take(&mut self, from: &mut dyn Iterator<Item = u64>) -> Option<()> {
-        self.lane.plant.take(from)?;
-        self.lane.servo.take(from)?;
-        self.lane.sensing.take(from)?;
-        self.lane.direction.take(from)?;
-        if let JointController::Core(core) = &mut self.lane.controller {
-            core.on_board.state.take(from)?;
-            core.on_board.path.take(from)?;
-        }
-        Some(())
     }
 }
