@@ -6,8 +6,8 @@ use std::thread::ScopedJoinHandle;
 
 use flexspline::make::ProjectError;
 use flexspline::{
-    ActivateError, Approach, Direction, Drive, Flags, GeneratorAngle, Images, Limits, OutputAngle, Quality,
-    SettingError, Store, Table, TorqueReading, TorqueSettings,
+    ActivateError, Direction, Drive, Flags, GeneratorAngle, Images, Limits, OutputAngle, Quality, SettingError, Store,
+    Table, TorqueReading, TorqueSettings,
 };
 
 use super::friction::Friction;
@@ -35,10 +35,6 @@ pub const COMPENSATED: usize = 3;
 
 /// The ideal among them.
 pub const IDEAL: usize = 4;
-
-/// Beside those, for [`fly_one`]: the core's table, torque and rate, by the sign of the target's velocity instead of a
-/// play that is followed.
-pub const BY_TORQUE: usize = CONTROLLERS.len();
 
 /// Time at the beginning that is not scored, s: all start at rest without knowing where in their play.
 pub const START_UP_S: f64 = 2.0;
@@ -457,7 +453,6 @@ enum JointController {
     Fourier(Box<Fourier>),
     Ideal(Box<Ideal>),
     Core(Box<Core>),
-    ByTorque(Box<Core>, CorrectionLimiter),
 }
 
 /// A command, its rate and acceleration, and what the limiter and the table could not do.
@@ -558,12 +553,11 @@ impl JointController {
         Ok(match kind {
             0 => Self::Uncompensated,
             1 | 2 => Self::Fourier(Box::new(Fourier::new(made, kind == 2))),
-            COMPENSATED | BY_TORQUE => {
+            COMPENSATED => {
                 let on_board = OnBoard::new(unit.drive, &made.on_board_settings())?;
                 let mut store = Store::new();
                 store.activate(&made.images(), &unit.drive, scenario.temperature_c as f32)?;
-                let core = Box::new(Core { on_board, store, last: None });
-                if kind == BY_TORQUE { Self::ByTorque(core, CorrectionLimiter::default()) } else { Self::Core(core) }
+                Self::Core(Box::new(Core { on_board, store, last: None }))
             }
             _ => Self::Ideal(Box::new(Ideal { gear: unit.built.clone(), limiter: CorrectionLimiter::default() })),
         })
@@ -610,17 +604,6 @@ impl JointController {
                 corrected(times.map(at), &mut ideal.limiter)
             }
             Self::Core(core) => core.tick(made, told),
-            Self::ByTorque(core, limiter) => {
-                let told = told.on_board(made);
-                let torque_n_m = core.on_board.torque_n_m(&told);
-                let at = |time: f64| {
-                    let target = told.target.offset_rad((rate_rad_s * time) as f32);
-                    let approach = Approach::Moving(told.direction);
-                    let command = core.on_board.joint.inverse(&core.store, target, torque_n_m, approach);
-                    f64::from(command.predicted_error_rad)
-                };
-                corrected(times.map(at), limiter)
-            }
         }
     }
 }
@@ -918,8 +901,7 @@ fn lane(made: &LaneParts, kind: usize, told: &(dyn Fn() + Sync)) -> Result<Flown
         let ripple = (lane.plant.rate_rad_s[1] - now.rate_rad_s) * ARCSEC_PER_RAD;
         let mesh = lane.plant.mesh_n_m();
         if !error.is_finite() || error.abs() > 1e6 {
-            let controller = CONTROLLERS.get(kind).copied().unwrap_or("by_torque");
-            return Err(FlightError::RunsAway { controller, time_s: now.time_s });
+            return Err(FlightError::RunsAway { controller: CONTROLLERS[kind], time_s: now.time_s });
         }
         flown.digest = (flown.digest ^ error.to_bits()).wrapping_mul(0x0100_0000_01b3);
         if tick % second == second - 1 {

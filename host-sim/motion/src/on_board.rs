@@ -101,7 +101,7 @@ impl OnBoard {
 
     /// The torque that a table is asked with. A torque on the load has the load's inertia taken off, unless that is the
     /// larger of both: while a target speeds up the flank does not change, as the play is not crossed by then.
-    pub fn torque_n_m(&mut self, told: &Told) -> f32 {
+    fn torque_n_m(&mut self, told: &Told) -> f32 {
         let torque_n_m = self.path.tick(told.reading, told.direction);
         match told.reading {
             TorqueReading::OnLoad(_) if torque_n_m.abs() > told.inertia_n_m.abs() => torque_n_m - told.inertia_n_m,
