@@ -435,20 +435,20 @@ fn cfs_and_fprime_hold_the_image_itself() {
     assert_eq!(number(&said, "/playback/rms_played_arcsec"), core);
     validates_on_board();
 
-    let said = export("fprime --component Ref.joint --part-bytes 300", "fprime");
+    let said = export("fprime --component Ref.joint", "fprime");
     let json: Value = serde_json::from_str(&UNIT.desk.read("fprime/flexspline_prm.json")).unwrap();
     let parts = json["Ref.joint"].as_object().unwrap();
     let mut bytes = Vec::new();
     for k in 0..parts.len() {
         let part = parts[&format!("FLEXSPLINE_{k}")].as_array().unwrap();
-        assert_eq!(part.len(), 300);
+        assert_eq!(part.len(), 500);
         bytes.extend(part.iter().map(|byte| u8::try_from(byte.as_u64().unwrap()).unwrap()));
     }
     let length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
     assert!(
-        bytes[..length] == UNIT.image && bytes[length..].iter().all(|byte| *byte == 0) && bytes.len() - length < 300
+        bytes[..length] == UNIT.image && bytes[length..].iter().all(|byte| *byte == 0) && bytes.len() - length < 500
     );
-    assert!(UNIT.desk.read("fprime/flexspline.fpp").contains("array FlexsplinePart = [300] U8"));
+    assert!(UNIT.desk.read("fprime/flexspline.fpp").contains("array FlexsplinePart = [500] U8"));
     assert_eq!(number(&said, "/playback/rms_played_arcsec"), core);
 }
 
@@ -518,7 +518,6 @@ fn options_that_do_not_fit_and_old_formats_are_refused() {
         ("--format cfs".to_owned(), &["--tables"]),
         ("--tables cal/calibrated.fxt --format csv --torque-n-m 1e4".to_owned(), &["--torque-n-m", "10000"]),
         (format!("{unit} --format cfs --table-name TABLE"), &["APP.TABLE"]),
-        (format!("{unit} --format fprime --part-bytes 3"), &["--part-bytes", "65536"]),
         (format!("{unit} --format csv --columns generator=#1:rad"), &["--data"]),
         (format!("{unit} --format csv --rate 10"), &["--data"]),
     ] {

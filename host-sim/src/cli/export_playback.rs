@@ -6,11 +6,11 @@ use clap::{Args, ValueHint};
 use flexspline::Table;
 use serde::Serialize;
 
-use super::Failure;
 use super::context::{Context, image_file, table_of};
 use super::export::Format;
 use super::logs::LogOptions;
 use super::replay::measured;
+use super::{Failure, bad_input};
 use flexspline_base::output::Outputs;
 use flexspline_export::playback::{BOTH, Curve, MAX_TABLE_BYTES, Residual, Section, cfs, fprime};
 use flexspline_identify::replay::{RowsRead, replay};
@@ -51,9 +51,6 @@ pub(super) struct PlaybackOptions {
     /// Component instance that has the parameters: fprime [default: Ref.joint]
     #[arg(long, value_name = "NAME")]
     component: Option<String>,
-    /// Bytes of a parameter: fprime [default: 500]
-    #[arg(long, value_name = "N")]
-    part_bytes: Option<u32>,
 }
 
 /// Result with `--json`, and `playback.json`.
@@ -75,7 +72,7 @@ struct Played {
 
 impl PlaybackOptions {
     /// Its options, whether each is given, and the formats that have a use for it.
-    pub(super) fn given(&self) -> [(&'static str, bool, &'static [Format]); 9] {
+    pub(super) fn given(&self) -> [(&'static str, bool, &'static [Format]); 8] {
         const ALL: &[Format] = &[Format::Playback, Format::Cfs, Format::Fprime];
         [
             ("--data", self.data.is_some(), ALL),
@@ -86,7 +83,6 @@ impl PlaybackOptions {
             ("--spacecraft-id", self.spacecraft_id.is_some(), &[Format::Cfs]),
             ("--processor-id", self.processor_id.is_some(), &[Format::Cfs]),
             ("--component", self.component.is_some(), &[Format::Fprime]),
-            ("--part-bytes", self.part_bytes.is_some(), &[Format::Fprime]),
         ]
     }
 
@@ -104,19 +100,21 @@ impl PlaybackOptions {
         let table = table_of(tables, &image)?;
         let section = section_of(&table, load)?;
         let mut curve = None;
-        let made = match format {
-            Format::Cfs if image.len() > MAX_TABLE_BYTES && !self.force => Err(format!(
-                "the image has {} bytes, more than the default of CFE_PLATFORM_TBL_MAX_SNGL_TABLE_SIZE, \
-                 {MAX_TABLE_BYTES}; --force writes it all the same",
-                image.len()
-            )),
+        let (files, mut notes) = match format {
+            Format::Cfs if image.len() > MAX_TABLE_BYTES && !self.force => {
+                return Err(Failure::BadInput(format!(
+                    "the image has {} bytes, more than the default of CFE_PLATFORM_TBL_MAX_SNGL_TABLE_SIZE, \
+                     {MAX_TABLE_BYTES}; --force writes it all the same",
+                    image.len()
+                )));
+            }
             Format::Cfs => {
                 let ids = [self.spacecraft_id, self.processor_id].map(Option::unwrap_or_default);
-                cfs(section, &image, self.table_name.as_deref().unwrap_or("FLEXSPLINE.TABLE"), ids)
+                let name = self.table_name.as_deref().unwrap_or("FLEXSPLINE.TABLE");
+                cfs(section, &image, name, ids).map_err(bad_input)?
             }
             Format::Fprime => {
-                let component = self.component.as_deref().unwrap_or("Ref.joint");
-                fprime(section, &image, component, self.part_bytes.unwrap_or(500))
+                fprime(section, &image, self.component.as_deref().unwrap_or("Ref.joint")).map_err(bad_input)?
             }
             _ => {
                 let directions = match self.direction.as_deref() {
@@ -125,10 +123,9 @@ impl PlaybackOptions {
                     _ => &BOTH[..],
                 };
                 let made = Curve::new(section, self.points_per_turn.unwrap_or(32), directions);
-                Ok((vec![curve.insert(made).csv(section)], Vec::new()))
+                (vec![curve.insert(made).csv(section)], Vec::new())
             }
         };
-        let (files, mut notes) = made.map_err(Failure::BadInput)?;
         let curve = curve.as_ref();
         let playback = self.data.as_ref().map(|data| self.judge(data, section, curve, &mut notes)).transpose()?;
         let out = context.out()?;

@@ -4,6 +4,8 @@
 //! cFE file header (64 bytes) and table file header (52 bytes) big-endian, with the default lengths of names
 //! (`CFE_FS_HDR_DESC_MAX_LEN` 32, `CFE_MISSION_TBL_MAX_FULL_NAME_LEN` 40); then the image as it is.
 
+use thiserror::Error;
+
 use super::{Made, SIGN, Section, word};
 
 /// `CFE_FS_FILE_CONTENT_ID`: 'cFE1'.
@@ -21,21 +23,28 @@ const TABLE_NAME: usize = 16;
 /// Default of `CFE_PLATFORM_TBL_MAX_SNGL_TABLE_SIZE`.
 pub const MAX_TABLE_BYTES: usize = 16_384;
 
+/// A name that is none of a table.
+#[derive(Debug, Error)]
+#[error(
+    "--table-name: found {found}; allowed: APP.TABLE, letters, digits and _, at most {} and {} of them",
+    APP_NAME - 1,
+    TABLE_NAME - 1
+)]
+pub struct TableNameError {
+    found: String,
+}
+
 /// The table file, its sources, the function that the app registers to validate it, and the reader that this calls; of
 /// an accepted image, under a name `APP.TABLE`, for a spacecraft and a processor.
 ///
 /// # Errors
 /// The name is another one.
-pub fn cfs(section: Section<'_>, image: &[u8], full_name: &str, ids: [u32; 2]) -> Result<Made, String> {
+pub fn cfs(section: Section<'_>, image: &[u8], full_name: &str, ids: [u32; 2]) -> Result<Made, TableNameError> {
     let fits = |name: &str, field: usize| word(name) && name.len() < field;
     let Some((app, table)) =
         full_name.split_once('.').filter(|(app, table)| fits(app, APP_NAME) && fits(table, TABLE_NAME))
     else {
-        return Err(format!(
-            "--table-name: found {full_name}; allowed: APP.TABLE, letters, digits and _, at most {} and {} of them",
-            APP_NAME - 1,
-            TABLE_NAME - 1
-        ));
+        return Err(TableNameError { found: full_name.to_owned() });
     };
     let description = format!("flexspline {}", section.table.id());
     // Time is left at zero: the same table is the same file.

@@ -12,8 +12,8 @@ use std::fmt::Write;
 use flexspline::{Direction, GeneratorAngle, Table};
 use serde::Serialize;
 
-pub use cfs::{MAX_TABLE_BYTES, cfs};
-pub use fprime::fprime;
+pub use cfs::{MAX_TABLE_BYTES, TableNameError, cfs};
+pub use fprime::{ComponentError, fprime};
 
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_identify::replay::{MeasuredRow, ReplayedRow};
