@@ -29,12 +29,12 @@ fn a_new_drive_file_is_the_drive_it_was_made_from_and_is_not_lost() {
     let hash = |line: &str| desk.line(line).done().json()["drive_hash"].as_str().unwrap().to_owned();
     for (made, same) in [
         ("new a.toml", "--drive HHD-95"),
-        ("new b.toml --from HHD-95-typical", "--drive HHD-95-typical"),
+        ("new b.toml --drive HHD-95-typical", "--drive HHD-95-typical"),
         (
             "new c.toml --drive HHD-95-typical --set generator.w0_mm=0.49",
             "--drive HHD-95-typical --set generator.w0_mm=0.49",
         ),
-        ("new d.toml --from c.toml", "--drive c.toml"),
+        ("new d.toml --drive c.toml", "--drive c.toml"),
     ] {
         let file = made.split(' ').nth(1).unwrap();
         let made_hash = hash(&format!("{made} --json"));
@@ -68,8 +68,7 @@ fn a_new_drive_file_is_the_drive_it_was_made_from_and_is_not_lost() {
     for (line, said) in [
         ("new out.d/x.toml", "out.d/x.toml: there is no folder out.d"),
         ("new .", ".: is a folder"),
-        ("new x.toml --from HHD-9", "--from: found \"HHD-9\""),
-        ("new x.toml --from HHD-95 --drive a.toml", "give one of the two"),
+        ("new x.toml --drive HHD-9", "--drive: found \"HHD-9\""),
         ("new x.toml --set flanks.friction_coefficent=0.1", "did you mean `flanks.friction_coefficient`?"),
         ("new", "FILE"),
     ] {

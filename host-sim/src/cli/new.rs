@@ -34,7 +34,7 @@ Examples:
   flexspline new drive.toml --teeth 200 --module 0.32 --bore 62 --generator cam
   flexspline new drive.toml --like CSG-25-80
   flexspline new drive.toml --like CSG-25-80 --set flexspline.profile=s
-  flexspline new drive.toml --from HHD-95-typical --set generator.w0_mm=0.49
+  flexspline new drive.toml --drive HHD-95-typical --set generator.w0_mm=0.49
   flexspline new nominal.toml")]
 pub(super) struct New {
     /// The file to write
@@ -43,15 +43,12 @@ pub(super) struct New {
     /// What to write [default: nominal if the file is called so, else drive]
     #[arg(long, value_enum)]
     kind: Option<NewKind>,
-    /// The drive to start from, a built-in one or a file; the same as --drive [default: HHD-95]
-    #[arg(long, value_name = "FILE|NAME", value_hint = ValueHint::FilePath)]
-    from: Option<String>,
     /// Teeth of the flexspline, even; the circular spline has two more
     #[arg(long, value_name = "Z", requires = "module", allow_negative_numbers = true)]
-    #[arg(conflicts_with_all = ["from", "like"])]
+    #[arg(conflicts_with = "like")]
     teeth: Option<u32>,
     /// Module, mm
-    #[arg(long, value_name = "MM", allow_negative_numbers = true, conflicts_with_all = ["from", "like"])]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true, conflicts_with = "like")]
     module: Option<f64>,
     /// Ratio, instead of --teeth (twice the ratio: circular spline held) or to check them
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
@@ -65,7 +62,7 @@ pub(super) struct New {
     generator: GeneratorKind,
     /// Teeth and module as a catalogue's size has them: SERIES-SIZE-RATIO, with a pitch diameter of 2.54 mm a size
     /// (Harmonic Drive)
-    #[arg(long, value_name = "NAME", conflicts_with = "from")]
+    #[arg(long, value_name = "NAME")]
     like: Option<String>,
     /// Replace the file if it is there
     #[arg(long)]
@@ -151,7 +148,6 @@ impl New {
         let new = New {
             file: PathBuf::new(),
             kind: Some(NewKind::Drive),
-            from: None,
             teeth: None,
             module: None,
             ratio: None,
@@ -197,14 +193,9 @@ impl New {
             }
             _ => None,
         };
-        let drive = match (&made, &self.from) {
-            (Some(made), _) => context.with_sets(made.drive.clone())?,
-            (None, Some(name)) if context.has_drive() => {
-                let what = format!("--from: found {name:?} beside --drive, which says the same; give one of the two");
-                return Err(Failure::BadInput(what));
-            }
-            (None, Some(name)) => context.drive_called("--from", name)?,
-            (None, None) => context.drive()?,
+        let drive = match &made {
+            Some(made) => context.with_sets(made.drive.clone())?,
+            None => context.drive()?,
         };
         let shown = self.file.display().to_string();
         let file = quoted(&shown);
@@ -387,7 +378,7 @@ impl New {
             let Some((_, size, ratio)) = size_and_ratio(name) else {
                 return bad(format!(
                     "--like: found {name:?}, allowed: SERIES-SIZE-RATIO as CSF-25-100, size 5 to 100, ratio 30 to \
-                     320; a built-in drive goes with --from"
+                     320; a built-in drive goes with --drive"
                 ));
             };
             if self.ratio.is_some_and(|asked| asked.abs() != f64::from(ratio)) {
