@@ -14,7 +14,7 @@
 
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
-use flexspline_mechanics::motion::Place;
+use flexspline_mechanics::motion::SettledPlace;
 use flexspline_mechanics::stepping::SolverSettings;
 use flexspline_tests::motion::{loaded, mean, mean_error, mean_generator_torque, mean_iterations, on, problem};
 
@@ -32,7 +32,7 @@ fn loop_of(kind: GeneratorKind, friction: f64, increments: usize) -> [(f64, f64)
     let problem = problem(&drive, kind, settings);
     let mut run = loaded(&problem, TORQUE_N_M);
     let pitch = run.pitch();
-    let describe = |way: &str, places: &[Place]| {
+    let describe = |way: &str, places: &[SettledPlace]| {
         let (error, torque) = (mean_error(places), mean_generator_torque(places));
         println!(
             "{kind}, friction {friction}, {way}: e {error:.4}\", generator {torque:.5} N.m, {:.1} iterations, at most \

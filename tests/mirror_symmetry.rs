@@ -15,13 +15,13 @@
 
 use flexspline_mechanics::drive::GeneratorKind;
 use flexspline_mechanics::mesh::MeshLevel;
-use flexspline_mechanics::motion::Place;
+use flexspline_mechanics::motion::SettledPlace;
 use flexspline_tests::motion::{hhd_95, loaded};
 
 fn mirrors(kind: GeneratorKind) {
     let problem = hhd_95(kind, MeshLevel::Coarse);
     for torque_n_m in [0.0, 20.0] {
-        let go = |sense: f64| -> Vec<Place> {
+        let go = |sense: f64| -> Vec<SettledPlace> {
             let mut run = loaded(&problem, sense * torque_n_m);
             // Not commensurate with the pitch: every phase of the mesh cycle is met.
             run.turn_in(sense * 1.7 * run.pitch(), 6).unwrap()

@@ -2,7 +2,7 @@
 
 use flexspline_mechanics::drive::{DamagedFlank, DamagedTooth, Drive, GeneratorKind, Harmonic, Wheel};
 use flexspline_mechanics::mesh::MeshLevel;
-use flexspline_mechanics::motion::{Motion, Place};
+use flexspline_mechanics::motion::{Motion, SettledPlace};
 use flexspline_mechanics::stepping::{Method, Problem, SolverSettings};
 
 /// Default settings on a mesh, with the solver that has every node of it.
@@ -85,16 +85,16 @@ pub fn deformed(problem: &Problem) -> Motion<'_> {
 }
 
 /// Mean error of a stretch, arc-seconds.
-pub fn mean_error(places: &[Place]) -> f64 {
+pub fn mean_error(places: &[SettledPlace]) -> f64 {
     mean(places.iter().map(|place| place.error_arcsec))
 }
 
 /// Mean generator torque of a stretch, N m.
-pub fn mean_generator_torque(places: &[Place]) -> f64 {
+pub fn mean_generator_torque(places: &[SettledPlace]) -> f64 {
     mean(places.iter().map(|place| place.increment.generator_torque_n_m))
 }
 
 /// Mean Newton iterations of a stretch.
-pub fn mean_iterations(places: &[Place]) -> f64 {
+pub fn mean_iterations(places: &[SettledPlace]) -> f64 {
     mean(places.iter().map(|place| place.increment.iterations as f64))
 }

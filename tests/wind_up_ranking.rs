@@ -17,7 +17,7 @@
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::drive::GeneratorKind;
 use flexspline_mechanics::mesh::MeshLevel;
-use flexspline_mechanics::motion::Place;
+use flexspline_mechanics::motion::SettledPlace;
 use flexspline_tests::motion::{hhd_95, loaded, mean_error, mean_generator_torque, range};
 
 const TORQUE_N_M: f64 = 50.0;
@@ -32,7 +32,7 @@ fn increments(kind: GeneratorKind) -> usize {
 }
 
 /// A pitch under load, and how far the output came in it (rad).
-fn loaded_pitch(kind: GeneratorKind) -> (Vec<Place>, f64) {
+fn loaded_pitch(kind: GeneratorKind) -> (Vec<SettledPlace>, f64) {
     let problem = hhd_95(kind, MeshLevel::Standard);
     let mut run = loaded(&problem, TORQUE_N_M);
     let pitch = run.pitch();

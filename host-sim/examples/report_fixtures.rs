@@ -7,8 +7,8 @@ use std::path::PathBuf;
 
 use flexspline_report::Packed;
 use flexspline_report::page::{
-    Axis, Block, Choice, Detail, Field, Figure, FigureBody, Headline, Limit, Lines, Mark, Page, PageQuantity, Section,
-    Series, Status, Table, Text, Upright,
+    ChartAxis, ChartSeries, Choice, Detail, FieldMap, Figure, FigureBody, Headline, Limit, Lines, Mark, Page,
+    PageBlock, PageQuantity, PageSection, PageTable, RichText, Status, Upright,
 };
 use serde_json::{Map, Value, json};
 
@@ -55,15 +55,15 @@ fn packs() -> Vec<Value> {
 
 fn hostile() -> Page {
     let id = "cam".to_owned();
-    let series = |mark, colour| Series {
+    let series = |mark, colour| ChartSeries {
         name: HOSTILE.into(),
         mark,
         colour,
         points: (0..20).map(|k| [f64::from(k), f64::from(k * k)]).collect(),
     };
-    let axis = |quantity| Axis::new(HOSTILE, quantity);
+    let axis = |quantity| ChartAxis::new(HOSTILE, quantity);
     let figure = |id: &str, body| {
-        Block::Figure(Figure {
+        PageBlock::Figure(Figure {
             id: id.into(),
             title: HOSTILE.into(),
             caption: HOSTILE.into(),
@@ -76,11 +76,11 @@ fn hostile() -> Page {
         limits: vec![Limit { name: HOSTILE.into(), y: 100.0 }],
         uprights: vec![Upright { name: HOSTILE.into(), x: 10.0 }],
     };
-    let field = Field { x: vec![0.0, 1.0, 2.0], y: vec![0.0, 1.0], z: vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0] };
-    let table = Table {
+    let field = FieldMap { x: vec![0.0, 1.0, 2.0], y: vec![0.0, 1.0], z: vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0] };
+    let table = PageTable {
         caption: HOSTILE.into(),
         header: vec![HOSTILE.into(), "value".into()],
-        rows: vec![vec![HOSTILE.into(), Text::default().error(12.5, 3)]],
+        rows: vec![vec![HOSTILE.into(), RichText::default().error(12.5, 3)]],
     };
     let mut results = Map::new();
     results.insert(HOSTILE.into(), HOSTILE.into());
@@ -98,16 +98,16 @@ fn hostile() -> Page {
         headlines: vec![Headline {
             choice: None,
             answer: HOSTILE.into(),
-            number: Text::default().error(61.0, 3),
+            number: RichText::default().error(61.0, 3),
             number_is: HOSTILE.into(),
         }],
-        sections: vec![Section {
+        sections: vec![PageSection {
             id: "section".into(),
             title: HOSTILE.into(),
             detail: Detail::Summary,
             blocks: vec![
-                Block::Paragraph { choice: None, text: Text::new(HOSTILE).strong(HOSTILE) },
-                Block::Table { choice: None, table },
+                PageBlock::Paragraph { choice: None, text: RichText::new(HOSTILE).strong(HOSTILE) },
+                PageBlock::Table { choice: None, table },
                 figure(
                     "lines",
                     FigureBody::Lines {

@@ -175,7 +175,7 @@ pub use flexspline_design::simulate::{
     Path, PathPoint, SimulateError, Simulation, SimulationSettings, Summary, read_path, simulate,
 };
 pub use flexspline_design::sweep::{
-    Judge, Plan, PlanSettings, Shard, Sweep, Tolerances, Vary, reduce as reduce_sweep, run as run_sweep,
+    Judge, PlanSettings, ReducedSweep, Shard, Tolerances, VariantPlan, Vary, reduce as reduce_sweep, run as run_sweep,
 };
 pub use flexspline_pacana_2023::reproduce;
 

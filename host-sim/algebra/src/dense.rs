@@ -12,17 +12,17 @@ pub type Mat = faer::Mat<f64>;
 pub type MatRef<'a> = faer::MatRef<'a, f64>;
 
 /// `A = L Lᵀ` of a symmetric positive definite matrix.
-pub struct Factor(Llt<f64>);
+pub struct CholeskyFactor(Llt<f64>);
 
 /// Factor of a symmetric matrix, of which the lower triangle is read.
 ///
 /// # Errors
 /// If the matrix is not positive definite.
-pub fn cholesky(matrix: MatRef<'_>) -> Result<Factor, NotPositiveDefinite> {
-    matrix.llt(Side::Lower).map(Factor).map_err(|_| NotPositiveDefinite)
+pub fn cholesky(matrix: MatRef<'_>) -> Result<CholeskyFactor, NotPositiveDefinite> {
+    matrix.llt(Side::Lower).map(CholeskyFactor).map_err(|_| NotPositiveDefinite)
 }
 
-impl Factor {
+impl CholeskyFactor {
     /// The factor itself, lower triangular.
     #[must_use]
     pub fn lower(&self) -> MatRef<'_> {

@@ -15,7 +15,7 @@ use flexspline::Table;
 use flexspline_fmu::joint::starts_of;
 use flexspline_fmu::resources::{DESIGNED_FILE, DRIVE_FILE, MODEL_FILE, Resources, TABLE_FILE, drive_file};
 use flexspline_fmu::variables::ModelKind;
-use flexspline_motion::flight::{Unit, table_image};
+use flexspline_motion::flight::{JointUnit, table_image};
 use flexspline_motion::gear::Gear;
 use rawzip::{CompressionMethod, ZipArchiveWriter};
 
@@ -54,7 +54,7 @@ pub fn joint(flown: &Flown, image: Option<Vec<u8>>) -> Result<Fmu, FmuExportErro
     let Some(image) = image else {
         let unit = unit(flown.kind, scenario.temperature_c)?;
         let image = table_image(scenario, &unit, table_id)?;
-        let Unit { built, nominal, .. } = unit;
+        let JointUnit { built, nominal, .. } = unit;
         return Fmu::new(ModelKind::Joint, &starts_of(scenario), image, Some([built, nominal]));
     };
     let table = Table::check(&image)?;

@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 
 use crate::instance::{CATEGORIES, FmiStatus, Instance, Log};
 use crate::resources::{Resources, folder_of};
-use crate::variables::Kind;
+use crate::variables::FmiType;
 
 /// `fmi2Component`.
 pub type Component = *mut c_void;
@@ -133,17 +133,17 @@ fn lacking(component: Component, call: &str) -> c_int {
     with(component, |instance| instance.refuse(&what) as c_int)
 }
 
-fn is_real(kind: Kind) -> bool {
-    matches!(kind, Kind::Real(_))
+fn is_real(kind: FmiType) -> bool {
+    matches!(kind, FmiType::Real(_))
 }
 
 /// An enumeration is read and set as an integer (section 2.1.7).
-fn is_integer(kind: Kind) -> bool {
-    matches!(kind, Kind::Integer | Kind::Choice(_))
+fn is_integer(kind: FmiType) -> bool {
+    matches!(kind, FmiType::Integer | FmiType::Choice(_))
 }
 
-fn is_boolean(kind: Kind) -> bool {
-    kind == Kind::Boolean
+fn is_boolean(kind: FmiType) -> bool {
+    kind == FmiType::Boolean
 }
 
 /// Reads numbers: variables that are of the type `is`, as numbers of C.
@@ -151,7 +151,7 @@ unsafe fn read<T>(
     component: Component,
     call: &str,
     (of, n, to): (References, usize, *mut T),
-    is: fn(Kind) -> bool,
+    is: fn(FmiType) -> bool,
     number: fn(f64) -> T,
 ) -> c_int {
     pointed(component, call, |instance| {
@@ -167,7 +167,7 @@ unsafe fn write<T: Copy>(
     component: Component,
     call: &str,
     (of, n, from): (References, usize, *const T),
-    is: fn(Kind) -> bool,
+    is: fn(FmiType) -> bool,
     value: fn(T) -> f64,
 ) -> c_int {
     pointed(component, call, |instance| {
@@ -307,7 +307,7 @@ functions! { component, call;
     // No text can be set: constants are refused by the same rule as any other, whatever the value.
     fmi2SetString(of: References, n: usize, _from: Strings) => pointed(component, call, |instance| {
         let set: Vec<(u32, f64)> = list(of, n)?.iter().map(|of| (*of, 0.0)).collect();
-        Some(status(instance.set(call, |kind| kind == Kind::Text, &set)))
+        Some(status(instance.set(call, |kind| kind == FmiType::Text, &set)))
     });
     fmi2SetRealInputDerivatives(of: References, n: usize, orders: *const c_int, values: *const f64) =>
         pointed(component, call, |instance| {

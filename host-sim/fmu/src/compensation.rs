@@ -9,7 +9,7 @@ use flexspline_motion::flight::{ARCSEC_PER_RAD, TABLE_DRAG_N_M};
 use crate::FmuError;
 use crate::instance::{Inputs, Model};
 use crate::resources::Resources;
-use crate::variables::{Choices, Kind, NOT_NEGATIVE, POSITIVE, Role, Variable, variables};
+use crate::variables::{Choices, FmiRole, FmiType, NOT_NEGATIVE, POSITIVE, Variable, variables};
 
 /// Modes of the correction, in the order of the core's `Mode`.
 pub(crate) static MODES: Choices = Choices {
@@ -57,11 +57,11 @@ variables! {
     OUTPUT_TORQUE => Variable::input("output_torque", "N.m", 0.0,
         "torque at the output, positive where it turns the output forward; torque_is says which torque");
     DRIVE_TEMPERATURE => Variable::input("drive_temperature", "degC", 20.0, "temperature of the drive");
-    MODE => Variable::choice("mode", &MODES, Role::Tunable, 1.0,
+    MODE => Variable::choice("mode", &MODES, FmiRole::Tunable, 1.0,
         "mode asked for; a change that is not legal is logged, and the mode stays");
     GENERATOR_MEASURED => Variable::boolean("generator_measured", false,
         "the generator is where generator_angle_measured says; else where it was commanded a tick before");
-    TORQUE_IS => Variable::choice("torque_is", &READINGS, Role::Parameter, 0.0, "which torque is given");
+    TORQUE_IS => Variable::choice("torque_is", &READINGS, FmiRole::Parameter, 0.0, "which torque is given");
     TORQUE_BANDWIDTH => Variable::real("torque_bandwidth", "Hz", 100.0, POSITIVE,
         "corner of the low-pass of a torque in the mesh or on the load");
     DRAG => Variable::real("drag", "N.m", 0.0, NOT_NEGATIVE,
@@ -83,29 +83,29 @@ variables! {
         "commands nearer than this to the one before keep the flank; 0 for none");
     RATE_AHEAD => Variable::real("rate_ahead", "s", 4e-3, [1e-6, 10.0],
         "generator_rate_command is the slope of the table over this time");
-    GENERATOR_ANGLE_COMMAND => Variable::output("generator_angle_command", Kind::Real("rad"),
+    GENERATOR_ANGLE_COMMAND => Variable::output("generator_angle_command", FmiType::Real("rad"),
         "where to turn the wave generator, positive counter-clockwise");
-    GENERATOR_RATE_COMMAND => Variable::output("generator_rate_command", Kind::Real("rad/s"),
+    GENERATOR_RATE_COMMAND => Variable::output("generator_rate_command", FmiType::Real("rad/s"),
         "rate of generator_angle_command, to feed forward to a speed loop");
-    OUTPUT_ANGLE_CORRECTION => Variable::output("output_angle_correction", Kind::Real("arcsec"),
+    OUTPUT_ANGLE_CORRECTION => Variable::output("output_angle_correction", FmiType::Real("arcsec"),
         "output_angle_command less generator_angle_command over the ratio: has the sign of the error");
-    CORRECTION_HELD_BACK => Variable::output("correction_held_back", Kind::Real("arcsec"),
+    CORRECTION_HELD_BACK => Variable::output("correction_held_back", FmiType::Real("arcsec"),
         "part of the correction that the limiter held back");
-    OUTPUT_ANGLE_PREDICTED => Variable::output("output_angle_predicted", Kind::Real("rad"),
+    OUTPUT_ANGLE_PREDICTED => Variable::output("output_angle_predicted", FmiType::Real("rad"),
         "angle of the output by the table, positive counter-clockwise");
-    TRANSMISSION_ERROR_PREDICTED => Variable::output("transmission_error_predicted", Kind::Real("arcsec"),
+    TRANSMISSION_ERROR_PREDICTED => Variable::output("transmission_error_predicted", FmiType::Real("arcsec"),
         "transmission error by the table: output less generator over the ratio, positive where the output leads");
-    PREDICTION_UNCERTAINTY => Variable::output("prediction_uncertainty", Kind::Real("arcsec"),
+    PREDICTION_UNCERTAINTY => Variable::output("prediction_uncertainty", FmiType::Real("arcsec"),
         "the output lies within this of output_angle_predicted, either way, as far as play and jumps go");
-    CORRECTION_QUALITY => Variable::output("correction_quality", Kind::Choice(&QUALITIES),
+    CORRECTION_QUALITY => Variable::output("correction_quality", FmiType::Choice(&QUALITIES),
         "how far prediction and correction can be trusted");
-    TICK_FLAGS => Variable::output("tick_flags", Kind::Integer,
+    TICK_FLAGS => Variable::output("tick_flags", FmiType::Integer,
         "what happened in the tick, sum of: 1 no sample, 2 sample not believed, 8 held back, 16 not corrected, \
          32 table in doubt, 256 safe");
-    NOT_CORRECTED => Variable::output("not_corrected", Kind::Boolean, "no correction could be made in the tick");
-    MODE_ACTIVE => Variable::output("mode_active", Kind::Choice(&MODES), "mode of the joint");
-    RATIO => Variable::constant("ratio", Kind::Real("rad/rad"), "generator over output");
-    TABLE_ID => Variable::constant("table_id", Kind::Text, "id of the table");
+    NOT_CORRECTED => Variable::output("not_corrected", FmiType::Boolean, "no correction could be made in the tick");
+    MODE_ACTIVE => Variable::output("mode_active", FmiType::Choice(&MODES), "mode of the joint");
+    RATIO => Variable::constant("ratio", FmiType::Real("rad/rad"), "generator over output");
+    TABLE_ID => Variable::constant("table_id", FmiType::Text, "id of the table");
     TORQUE_SETTLE => Variable::real("torque_settle", "s", 0.25, NOT_NEGATIVE,
         "after a torque in the mesh has changed the flank it does not change it again for so long");
 }

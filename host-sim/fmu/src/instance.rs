@@ -2,7 +2,7 @@
 //!
 //! States and calls are those of sections 2.1.6 to 2.1.8 and 4.2.4 of FMI 2.0. A call that is not allowed is refused:
 //! it returns an error with a line in the log, and nothing changes. A model that cannot go on ends in
-//! [`State::Failed`].
+//! [`FmiState::Failed`].
 //!
 //! A model has ticks of a fixed time. A communication step does all ticks that end within it; the rest of the step is
 //! carried over to the next. An input holds from the point at which it was set on, or changes with the derivative that
@@ -14,7 +14,7 @@ use crate::FmuError;
 use crate::compensation::{self, CompensationModel};
 use crate::joint::{self, MovingJoint};
 use crate::resources::Resources;
-use crate::variables::{Kind, ModelKind, Role, Variable};
+use crate::variables::{FmiRole, FmiType, ModelKind, Variable};
 
 /// `fmi2Status`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -32,7 +32,7 @@ pub enum FmiStatus {
 
 /// Where in its life an instance is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum State {
+pub enum FmiState {
     /// Made, or reset.
     Instantiated,
     /// Between the calls that enter and exit the initialisation.
@@ -45,17 +45,17 @@ pub enum State {
     Terminated,
 }
 
-impl State {
-    const ALL: [State; 5] =
-        [State::Instantiated, State::Initializing, State::Stepping, State::Failed, State::Terminated];
+impl FmiState {
+    const ALL: [FmiState; 5] =
+        [FmiState::Instantiated, FmiState::Initializing, FmiState::Stepping, FmiState::Failed, FmiState::Terminated];
 
     const fn name(self) -> &'static str {
         match self {
-            State::Instantiated => "instantiated",
-            State::Initializing => "initialization mode",
-            State::Stepping => "step complete",
-            State::Failed => "step failed",
-            State::Terminated => "terminated",
+            FmiState::Instantiated => "instantiated",
+            FmiState::Initializing => "initialization mode",
+            FmiState::Stepping => "step complete",
+            FmiState::Failed => "step failed",
+            FmiState::Terminated => "terminated",
         }
     }
 }
@@ -121,7 +121,7 @@ pub struct Instance {
     resources: Resources,
     log: Log,
     logging: [bool; CATEGORIES.len()],
-    state: State,
+    state: FmiState,
     values: Vec<f64>,
     slopes: Vec<f64>,
     model: Option<Box<dyn Model>>,
@@ -145,7 +145,7 @@ impl Instance {
             resources,
             log,
             logging: [logging; CATEGORIES.len()],
-            state: State::Instantiated,
+            state: FmiState::Instantiated,
             model: None,
             set_up: false,
             start_s: 0.0,
@@ -166,7 +166,7 @@ impl Instance {
         FmiStatus::Warning
     }
 
-    fn expect(&self, call: &str, allowed: &[State]) -> Result<(), FmiStatus> {
+    fn expect(&self, call: &str, allowed: &[FmiState]) -> Result<(), FmiStatus> {
         if allowed.contains(&self.state) {
             return Ok(());
         }
@@ -195,7 +195,7 @@ impl Instance {
 
     /// `fmi2SetupExperiment`.
     pub fn set_up(&mut self, call: &str, start_s: f64, stop_s: Option<f64>) -> Result<(), FmiStatus> {
-        self.expect(call, &[State::Instantiated])?;
+        self.expect(call, &[FmiState::Instantiated])?;
         if !start_s.is_finite() || stop_s.is_some_and(|stop_s| !(stop_s >= start_s && stop_s.is_finite())) {
             let stop = stop_s.map_or(String::new(), |stop_s| format!(" to {stop_s}"));
             return Err(self.refuse(&format!("{call}: found {start_s}{stop} s, allowed: finite, in order")));
@@ -207,8 +207,8 @@ impl Instance {
 
     /// Begins the initialisation.
     pub(crate) fn enter_initialization(&mut self, call: &str) -> Result<(), FmiStatus> {
-        self.expect(call, &[State::Instantiated])?;
-        self.state = State::Initializing;
+        self.expect(call, &[FmiState::Instantiated])?;
+        self.state = FmiState::Initializing;
         if self.set_up {
             return Ok(());
         }
@@ -217,12 +217,12 @@ impl Instance {
 
     /// The model is made of the parameters.
     pub(crate) fn exit_initialization(&mut self, call: &str) -> Result<(), FmiStatus> {
-        self.expect(call, &[State::Initializing])?;
+        self.expect(call, &[FmiState::Initializing])?;
         self.model =
             Some(made(&self.resources, &self.values).map_err(|error| self.refuse(&format!("{call}: {error}")))?);
         self.start_outputs();
         self.ticks = 0;
-        self.state = State::Stepping;
+        self.state = FmiState::Stepping;
         if self.logging[2] {
             (self.log)(FmiStatus::Ok, CATEGORIES[2], &format!("initialised; {}", crate::MARK));
         }
@@ -240,8 +240,8 @@ impl Instance {
 
     /// Ends the simulation.
     pub(crate) fn terminate(&mut self, call: &str) -> Result<(), FmiStatus> {
-        self.expect(call, &[State::Stepping, State::Failed])?;
-        self.state = State::Terminated;
+        self.expect(call, &[FmiState::Stepping, FmiState::Failed])?;
+        self.state = FmiState::Terminated;
         Ok(())
     }
 
@@ -252,18 +252,18 @@ impl Instance {
         self.model = None;
         self.set_up = false;
         (self.start_s, self.stop_s, self.time_s, self.ticks) = (0.0, f64::INFINITY, 0.0, 0);
-        self.state = State::Instantiated;
+        self.state = FmiState::Instantiated;
     }
 
     /// Refuses to read before the initialisation.
     fn expect_readable(&self, call: &str) -> Result<(), FmiStatus> {
-        self.expect(call, &State::ALL[1..])
+        self.expect(call, &FmiState::ALL[1..])
     }
 
     /// Reads values of a type.
-    pub fn get(&mut self, call: &str, like: fn(Kind) -> bool, references: &[u32]) -> Result<Vec<f64>, FmiStatus> {
+    pub fn get(&mut self, call: &str, like: fn(FmiType) -> bool, references: &[u32]) -> Result<Vec<f64>, FmiStatus> {
         self.expect_readable(call)?;
-        if self.state == State::Initializing {
+        if self.state == FmiState::Initializing {
             self.start_outputs();
         }
         references
@@ -275,21 +275,21 @@ impl Instance {
     /// Reads the only text that there is.
     pub(crate) fn get_text(&self, call: &str, reference: u32) -> Result<&CStr, FmiStatus> {
         self.expect_readable(call)?;
-        self.variable(call, |kind| kind == Kind::Text, reference).map(|_| self.table_id.as_c_str())
+        self.variable(call, |kind| kind == FmiType::Text, reference).map(|_| self.table_id.as_c_str())
     }
 
     /// Sets values of a type: all of them, or none.
-    pub fn set(&mut self, call: &str, like: fn(Kind) -> bool, set: &[(u32, f64)]) -> Result<(), FmiStatus> {
-        self.expect(call, &[State::Instantiated, State::Initializing, State::Stepping])?;
+    pub fn set(&mut self, call: &str, like: fn(FmiType) -> bool, set: &[(u32, f64)]) -> Result<(), FmiStatus> {
+        self.expect(call, &[FmiState::Instantiated, FmiState::Initializing, FmiState::Stepping])?;
         for &(reference, value) in set {
             let variable = self.variable(call, like, reference)?;
             let now = match variable.role {
-                Role::Input | Role::Tunable => true,
-                Role::Parameter => self.state != State::Stepping,
-                Role::Output | Role::Motion | Role::Constant => false,
+                FmiRole::Input | FmiRole::Tunable => true,
+                FmiRole::Parameter => self.state != FmiState::Stepping,
+                FmiRole::Output | FmiRole::Motion | FmiRole::Constant => false,
             };
             if !now {
-                let why = if variable.role == Role::Parameter { "after the initialisation" } else { "at all" };
+                let why = if variable.role == FmiRole::Parameter { "after the initialisation" } else { "at all" };
                 return Err(self.refuse(&format!("{call}: {} cannot be set {why}", variable.name)));
             }
             if !variable.allows(value) {
@@ -304,7 +304,7 @@ impl Instance {
     }
 
     /// A variable of a type.
-    fn variable(&self, call: &str, like: fn(Kind) -> bool, reference: u32) -> Result<&'static Variable, FmiStatus> {
+    fn variable(&self, call: &str, like: fn(FmiType) -> bool, reference: u32) -> Result<&'static Variable, FmiStatus> {
         let variables = self.resources.kind.variables();
         let what = match variables.get(reference as usize) {
             Some(variable) if like(variable.kind) => return Ok(variable),
@@ -316,10 +316,10 @@ impl Instance {
 
     /// `fmi2SetRealInputDerivatives`: of the first order, for the next step.
     pub(crate) fn set_slopes(&mut self, call: &str, set: &[(u32, i32, f64)]) -> Result<(), FmiStatus> {
-        self.expect(call, &[State::Instantiated, State::Initializing, State::Stepping])?;
+        self.expect(call, &[FmiState::Instantiated, FmiState::Initializing, FmiState::Stepping])?;
         for &(reference, order, value) in set {
             let variable = self.variable(call, |_| true, reference)?;
-            if variable.role != Role::Input || order != 1 || !value.is_finite() {
+            if variable.role != FmiRole::Input || order != 1 || !value.is_finite() {
                 let what = format!("{call}: {}: found order {order}, {value}, allowed: inputs, order 1", variable.name);
                 return Err(self.refuse(&what));
             }
@@ -332,7 +332,7 @@ impl Instance {
 
     /// All ticks that end within it.
     pub fn step(&mut self, call: &str, from_s: f64, step_s: f64) -> Result<(), FmiStatus> {
-        self.expect(call, &[State::Stepping])?;
+        self.expect(call, &[FmiState::Stepping])?;
         let Some(mut model) = self.model.take() else { return Err(self.refuse(&format!("{call}: no model"))) };
         let done = self.ticked(call, model.as_mut(), from_s, step_s);
         self.model = Some(model);
@@ -374,7 +374,7 @@ impl Instance {
                 self.warn(&what);
             }
             if let Err(error) = ticked {
-                self.state = State::Failed;
+                self.state = FmiState::Failed;
                 return Err(self.refuse(&format!("{call}: at {:.6} s: {error}", from_s + begins_s)));
             }
             self.ticks += 1;
@@ -386,6 +386,6 @@ impl Instance {
 
     /// It cannot be trusted any more.
     pub fn fail(&mut self) {
-        self.state = State::Failed;
+        self.state = FmiState::Failed;
     }
 }

@@ -1,14 +1,14 @@
 //! A joint with mass: motor, servo, drive and load, as `flexspline fly` flies it.
 
 use flexspline::{GeneratorAngle, OutputAngle, Quality, Table, TorqueReading};
-use flexspline_motion::flight::{ARCSEC_PER_RAD, OneJoint, Ticked, Unit};
+use flexspline_motion::flight::{ARCSEC_PER_RAD, JointUnit, OneJoint, Ticked};
 use flexspline_motion::scenario::{Moment, Scenario, TableKnown, TorqueKnown};
 
 use crate::FmuError;
 use crate::compensation::QUALITIES;
 use crate::instance::{Inputs, Model};
 use crate::resources::{DRIVE_FILE, Resources, file_error};
-use crate::variables::{Choices, Kind, NOT_NEGATIVE, POSITIVE, Role, Variable, variables};
+use crate::variables::{Choices, FmiRole, FmiType, NOT_NEGATIVE, POSITIVE, Variable, variables};
 
 /// From what the torque is known.
 pub static TORQUES: Choices = Choices {
@@ -38,7 +38,7 @@ variables! {
         "the servo follows output_angle_command; else motor_torque_command turns the motor");
     COMPENSATE => Variable::boolean("compensate", true,
         "the core corrects output_angle_command with the table; else the generator gets the command times the ratio");
-    TORQUE_KNOWN => Variable::choice("torque_known", &TORQUES, Role::Parameter, 0.0,
+    TORQUE_KNOWN => Variable::choice("torque_known", &TORQUES, FmiRole::Parameter, 0.0,
         "from what the compensation knows the torque");
     TORQUE_NOISE => Variable::real("torque_noise", "N.m", 0.05, NOT_NEGATIVE, "noise of that torque, rms");
     LOAD_INERTIA => Variable::real("load_inertia", "kg.m2", 3.0, POSITIVE, "inertia of the load");
@@ -98,21 +98,22 @@ variables! {
     HEAT => Variable::motion("heat", "J", "energy turned into heat since the start");
     ENERGY_ERROR => Variable::motion("energy_error", "J",
         "both works less heat less what is stored now beyond the start: rounding");
-    GENERATOR_ANGLE_COMMAND => Variable::output("generator_angle_command", Kind::Real("rad"),
+    GENERATOR_ANGLE_COMMAND => Variable::output("generator_angle_command", FmiType::Real("rad"),
         "angle that the servo turned the wave generator to, positive counter-clockwise");
-    OUTPUT_ANGLE_CORRECTION => Variable::output("output_angle_correction", Kind::Real("arcsec"),
+    OUTPUT_ANGLE_CORRECTION => Variable::output("output_angle_correction", FmiType::Real("arcsec"),
         "output_angle_command less generator_angle_command over the ratio: has the sign of the error");
-    MOTOR_SATURATED => Variable::output("motor_saturated", Kind::Boolean, "the motor of the servo gives all it has");
-    CORRECTION_LIMITED => Variable::output("correction_limited", Kind::Boolean, "the limiter held the correction back");
-    NOT_CORRECTED => Variable::output("not_corrected", Kind::Boolean,
+    MOTOR_SATURATED => Variable::output("motor_saturated", FmiType::Boolean, "the motor of the servo gives all it has");
+    CORRECTION_LIMITED => Variable::output("correction_limited", FmiType::Boolean,
+        "the limiter held the correction back");
+    NOT_CORRECTED => Variable::output("not_corrected", FmiType::Boolean,
         "no correction could be made in the tick, as where a torque is read beyond 1.5 times the table's range and \
          beyond 3 times the load that is expected and 10 N.m more: no sensor shows it; the log says so");
-    CORRECTION_QUALITY => Variable::output("correction_quality", Kind::Choice(&QUALITIES),
+    CORRECTION_QUALITY => Variable::output("correction_quality", FmiType::Choice(&QUALITIES),
         "how far prediction and correction can be trusted; disabled where the core does not correct");
-    DRIVE_TEMPERATURE => Variable::constant("drive_temperature", Kind::Real("degC"),
+    DRIVE_TEMPERATURE => Variable::constant("drive_temperature", FmiType::Real("degC"),
         "temperature of drive and lubricant");
-    RATIO => Variable::constant("ratio", Kind::Real("rad/rad"), "generator over output");
-    TABLE_ID => Variable::constant("table_id", Kind::Text, "id of the table");
+    RATIO => Variable::constant("ratio", FmiType::Real("rad/rad"), "generator over output");
+    TABLE_ID => Variable::constant("table_id", FmiType::Text, "id of the table");
 }
 
 /// A number in a scenario.
@@ -218,7 +219,7 @@ impl MovingJoint {
         }
         let table = Table::check(&resources.image)?;
         let [built, nominal] = resources.gears.clone().ok_or_else(|| file_error(DRIVE_FILE, "missing"))?;
-        let unit = Unit { drive: *table.drive(), nominal, built };
+        let unit = JointUnit { drive: *table.drive(), nominal, built };
         let compensated = values[COMPENSATE] != 0.0;
         let joint = OneJoint::new(&scenario, &unit, Some(resources.image.clone()), compensated)?;
         Ok(Self { joint, not_corrected: false })

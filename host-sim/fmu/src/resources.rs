@@ -11,7 +11,7 @@ use flexspline::{Table, TableId};
 use flexspline_motion::gear::Gear;
 
 use crate::FmuError;
-use crate::variables::{Kind, ModelKind, Role};
+use crate::variables::{FmiRole, FmiType, ModelKind};
 
 /// Name of the file with model and start values.
 pub const MODEL_FILE: &str = "model.txt";
@@ -143,8 +143,8 @@ impl Resources {
     pub fn model_file(&self) -> String {
         let mut text = format!("model = {}\nguid = {}\n", self.kind.name(), self.guid);
         for (variable, start) in self.kind.variables().iter().zip(&self.starts) {
-            let said = !variable.is_output() && variable.kind != Kind::Text;
-            if said && (*start != variable.start || variable.role == Role::Constant) {
+            let said = !variable.is_output() && variable.kind != FmiType::Text;
+            if said && (*start != variable.start || variable.role == FmiRole::Constant) {
                 text += &format!("{} = {start}\n", variable.name);
             }
         }

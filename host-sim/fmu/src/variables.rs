@@ -29,7 +29,7 @@ type Text = &'static str;
 
 /// Type of a variable.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Kind {
+pub enum FmiType {
     /// A number with a unit.
     Real(&'static str),
     /// A whole number.
@@ -44,7 +44,7 @@ pub enum Kind {
 
 /// What a variable is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Role {
+pub enum FmiRole {
     /// Set before the initialisation ends.
     Parameter,
     /// Set at any communication point.
@@ -65,9 +65,9 @@ pub struct Variable {
     /// Its name.
     pub name: &'static str,
     /// Its type.
-    pub kind: Kind,
+    pub kind: FmiType,
     /// What it is for.
-    pub role: Role,
+    pub role: FmiRole,
     /// Where it starts, unless the resources say otherwise; integers, choices and yes (1) or no (0) as numbers.
     pub start: f64,
     /// Least and largest value that is taken, for parameters.
@@ -86,55 +86,55 @@ const ANY: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 impl Variable {
     /// A parameter: a number with a unit, within a range.
     pub(crate) const fn real(name: Text, unit: Text, start: f64, range: [f64; 2], says: Text) -> Variable {
-        Variable { name, kind: Kind::Real(unit), role: Role::Parameter, start, range, says }
+        Variable { name, kind: FmiType::Real(unit), role: FmiRole::Parameter, start, range, says }
     }
 
     /// A parameter: a whole number within a range.
     pub(crate) const fn whole(name: Text, start: f64, range: [f64; 2], says: Text) -> Variable {
-        Variable { name, kind: Kind::Integer, role: Role::Parameter, start, range, says }
+        Variable { name, kind: FmiType::Integer, role: FmiRole::Parameter, start, range, says }
     }
 
     /// A parameter: yes or no.
     pub(crate) const fn boolean(name: Text, start: bool, says: Text) -> Variable {
         let start = if start { 1.0 } else { 0.0 };
-        Variable { name, kind: Kind::Boolean, role: Role::Parameter, start, range: ANY, says }
+        Variable { name, kind: FmiType::Boolean, role: FmiRole::Parameter, start, range: ANY, says }
     }
 
     /// One of a list.
-    pub(crate) const fn choice(name: Text, of: &'static Choices, role: Role, start: f64, says: Text) -> Variable {
-        Variable { name, kind: Kind::Choice(of), role, start, range: ANY, says }
+    pub(crate) const fn choice(name: Text, of: &'static Choices, role: FmiRole, start: f64, says: Text) -> Variable {
+        Variable { name, kind: FmiType::Choice(of), role, start, range: ANY, says }
     }
 
     /// An input.
     pub(crate) const fn input(name: Text, unit: Text, start: f64, says: Text) -> Variable {
-        Variable { name, kind: Kind::Real(unit), role: Role::Input, start, range: ANY, says }
+        Variable { name, kind: FmiType::Real(unit), role: FmiRole::Input, start, range: ANY, says }
     }
 
     /// An output that changes in steps.
-    pub(crate) const fn output(name: Text, kind: Kind, says: Text) -> Variable {
-        Variable { name, kind, role: Role::Output, start: 0.0, range: ANY, says }
+    pub(crate) const fn output(name: Text, kind: FmiType, says: Text) -> Variable {
+        Variable { name, kind, role: FmiRole::Output, start: 0.0, range: ANY, says }
     }
 
     /// An output that changes all the time.
     pub(crate) const fn motion(name: Text, unit: Text, says: Text) -> Variable {
-        Variable { name, kind: Kind::Real(unit), role: Role::Motion, start: 0.0, range: ANY, says }
+        Variable { name, kind: FmiType::Real(unit), role: FmiRole::Motion, start: 0.0, range: ANY, says }
     }
 
     /// A constant.
-    pub(crate) const fn constant(name: Text, kind: Kind, says: Text) -> Variable {
-        Variable { name, kind, role: Role::Constant, start: 0.0, range: ANY, says }
+    pub(crate) const fn constant(name: Text, kind: FmiType, says: Text) -> Variable {
+        Variable { name, kind, role: FmiRole::Constant, start: 0.0, range: ANY, says }
     }
 
     /// Whether it is an output.
     pub const fn is_output(&self) -> bool {
-        matches!(self.role, Role::Output | Role::Motion)
+        matches!(self.role, FmiRole::Output | FmiRole::Motion)
     }
 
     /// Least and largest value that is taken.
     pub(crate) fn bounds(&self) -> [f64; 2] {
         match self.kind {
-            Kind::Boolean => [0.0, 1.0],
-            Kind::Choice(choices) => [0.0, choices.items.len() as f64 - 1.0],
+            FmiType::Boolean => [0.0, 1.0],
+            FmiType::Choice(choices) => [0.0, choices.items.len() as f64 - 1.0],
             _ => self.range,
         }
     }
@@ -142,9 +142,9 @@ impl Variable {
     /// Whether an importer may set it to this value: a finite number in its range, whole where it has to be.
     pub fn allows(&self, value: f64) -> bool {
         let [least, most] = self.bounds();
-        let whole = matches!(self.kind, Kind::Real(_)) || value == value.trunc();
+        let whole = matches!(self.kind, FmiType::Real(_)) || value == value.trunc();
         // What an input may not be is said when it is used: a sensor may fail.
-        self.role == Role::Input || (value.is_finite() && value >= least && value <= most && whole)
+        self.role == FmiRole::Input || (value.is_finite() && value >= least && value <= most && whole)
     }
 }
 
@@ -215,7 +215,7 @@ mod tests {
             for (place, variable) in kind.variables().iter().enumerate() {
                 assert_eq!(kind.place(variable.name), Some(place), "{}", variable.name);
                 assert!(variable.is_output() || variable.allows(variable.start), "{}", variable.name);
-                if let Kind::Real(unit) = variable.kind {
+                if let FmiType::Real(unit) = variable.kind {
                     assert!(UNITS.iter().any(|(name, ..)| *name == unit), "{}: {unit}", variable.name);
                 }
             }

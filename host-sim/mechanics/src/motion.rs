@@ -44,7 +44,7 @@ pub struct Motion<'p> {
 
 /// One place on the way.
 #[derive(Debug, Clone)]
-pub struct Place {
+pub struct SettledPlace {
     /// Generator angle, rad.
     pub generator_rad: f64,
     /// Output angle minus generator angle over the ratio, arc-seconds; positive when the output leads.
@@ -115,8 +115,8 @@ impl<'p> Motion<'p> {
     }
 
     /// Where the drive stands, as a place on its way.
-    pub fn place(&self) -> Place {
-        Place {
+    pub fn place(&self) -> SettledPlace {
+        SettledPlace {
             generator_rad: self.state.generator_rad,
             error_arcsec: self.error_arcsec(),
             increment: self.last.clone(),
@@ -210,7 +210,7 @@ impl<'p> Motion<'p> {
     ///
     /// # Errors
     /// No equilibrium.
-    pub fn turn_in(&mut self, turn_rad: f64, increments: usize) -> Result<Vec<Place>, SolveError> {
+    pub fn turn_in(&mut self, turn_rad: f64, increments: usize) -> Result<Vec<SettledPlace>, SolveError> {
         let start = self.state.generator_rad;
         let at = |k: usize| start + turn_rad * k as f64 / increments as f64;
         (1..=increments)
@@ -269,7 +269,7 @@ impl<'p> Motion<'p> {
     ///
     /// # Errors
     /// No equilibrium; or the drive does not settle.
-    pub fn settled_pitch(&mut self, sense: f64, increments: usize) -> Result<Vec<Place>, SolveError> {
+    pub fn settled_pitch(&mut self, sense: f64, increments: usize) -> Result<Vec<SettledPlace>, SolveError> {
         let turn = sense * self.pitch();
         self.settle(turn / increments as f64)?;
         self.turn_in(turn, increments)

@@ -4,18 +4,18 @@ use core::f64::consts::TAU;
 
 use flexspline::Drive;
 
-use super::flight::{ARCSEC_PER_RAD, Unit};
-use super::gear::Sampled;
+use super::flight::{ARCSEC_PER_RAD, JointUnit};
+use super::gear::SampledSpring;
 use super::scenario::{Leg, Load, Scenario, TableKnown, TorqueKnown};
 use super::servo::ServoSettings;
 
 /// A unit like HHD-95 with a double disc, with these tooth counts: 31″ of clearance to each side, wind-up that hardens,
 /// a ripple of the tooth pitch.
-pub fn unit(drive: Drive) -> Unit {
+pub fn unit(drive: Drive) -> JointUnit {
     let law = |phase: f64, flank: f64| {
         (31.0 + 1.1 * flank / (1.0 + 0.006 * flank) + 0.2 * libm::cos(TAU * phase)) / ARCSEC_PER_RAD
     };
-    Unit::of_spring(drive, Sampled::of_law(f64::from(drive.ripple_order()), 100.0, law))
+    JointUnit::of_spring(drive, SampledSpring::of_law(f64::from(drive.ripple_order()), 100.0, law))
 }
 
 /// A dish of 3 kg·m² under a load that swings and gusts, turned to and fro, quickly and slowly; the torque is known on

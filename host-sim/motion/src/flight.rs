@@ -11,15 +11,15 @@ use flexspline::{
 };
 
 use super::friction::Friction;
-use super::gear::{Gear, Line, Sampled, Spring};
+use super::gear::{Gear, GearLine, SampledSpring, Spring};
 use super::loops::{LoopTorquePath as Path, TwoMasses};
-use super::noise::Noise;
-use super::on_board::{self, Given, OnBoard};
-use super::plant::{Plant, PlantSettings};
+use super::noise::NoiseSource;
+use super::on_board::{self, OnBoard, OnBoardOutput};
+use super::plant::{JointPlant, PlantSettings};
 use super::scenario::{Moment, Scenario, TableKnown, TorqueKnown};
 pub use super::score::ARCSEC_PER_RAD;
 use super::score::Score;
-use super::servo::{Asked, Servo};
+use super::servo::{Servo, ServoCommand};
 use super::table::{Sampling, image};
 
 mod one;
@@ -90,7 +90,7 @@ const EXTENDED_SHARE: f64 = 0.95;
 
 /// A drive as designed and as built.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Unit {
+pub struct JointUnit {
     /// Tooth counts.
     pub drive: Drive,
     /// As designed.
@@ -99,18 +99,18 @@ pub struct Unit {
     pub built: Gear,
 }
 
-impl Unit {
+impl JointUnit {
     /// A unit of a drive whose nominal spring was sampled from a map: with the lines that wheels eccentric by 10 µm,
     /// pitch errors of 2 µm and an encoder eccentric by 2 µm make in HHD-95 (amplitudes by the closed forms of rigid
     /// wheels), 6 % stiffer, and with 2″ more clearance. None of it is in the nominal table.
-    pub fn of_spring(drive: Drive, spring: Sampled) -> Self {
+    pub fn of_spring(drive: Drive, spring: SampledSpring) -> Self {
         let ratio = drive.exact_ratio();
         Self::of_gear(drive, Gear { ratio, lines: Vec::new(), spring: Spring::Sampled(Box::new(spring)) })
     }
 
     /// A unit of a drive as designed, with the same beside it: lines, stiffness and clearance.
     pub fn of_gear(drive: Drive, nominal: Gear) -> Self {
-        let line = |generator: f64, output: f64, arcsec: f64, phase_rad: f64| Line {
+        let line = |generator: f64, output: f64, arcsec: f64, phase_rad: f64| GearLine {
             generator,
             output,
             amplitude_rad: arcsec / ARCSEC_PER_RAD,
@@ -148,7 +148,7 @@ impl Unit {
         match table {
             TableKnown::Nominal => self.nominal.clone(),
             TableKnown::Extended => {
-                let shrunk = |line: &Line| Line { amplitude_rad: EXTENDED_SHARE * line.amplitude_rad, ..*line };
+                let shrunk = |line: &GearLine| GearLine { amplitude_rad: EXTENDED_SHARE * line.amplitude_rad, ..*line };
                 Gear { lines: self.built.lines.iter().map(shrunk).collect(), ..self.nominal.clone() }
             }
             TableKnown::Calibrated => self.built.clone(),
@@ -207,7 +207,7 @@ pub struct Flight {
 #[derive(Clone)]
 struct LaneParts {
     scenario: Scenario,
-    unit: Unit,
+    unit: JointUnit,
     /// Twice, as a joint has it.
     image: [Vec<u8>; 2],
     /// Largest torque of its table, N·m.
@@ -226,7 +226,7 @@ impl LaneParts {
         Images::new(image, twin)
     }
 
-    fn on_board_settings(&self) -> on_board::Settings {
+    fn on_board_settings(&self) -> on_board::OnBoardSettings {
         let scenario = &self.scenario;
         let tick_s = scenario.servo.tick_s as f32;
         // What the low-pass leaves of white noise.
@@ -234,7 +234,7 @@ impl LaneParts {
         let behind = (turned / (2.0 + turned)).sqrt();
         let on_load = matches!(self.torque, TorqueKnown::OnLoad | TorqueKnown::Not);
         let passing = if on_load { 0.0 } else { HELD_OF_DRAG * scenario.drag_n_m };
-        on_board::Settings {
+        on_board::OnBoardSettings {
             limits: Limits {
                 tick_s,
                 rate_rad_s: RATE_RAD_S as f32,
@@ -286,7 +286,7 @@ pub enum FlightError {
 ///
 /// # Errors
 /// [`FlightError`].
-pub fn fly(scenario: &Scenario, unit: &Unit) -> Result<Flight, FlightError> {
+pub fn fly(scenario: &Scenario, unit: &JointUnit) -> Result<Flight, FlightError> {
     fly_told(scenario, unit, None, &|| {})
 }
 
@@ -297,7 +297,7 @@ pub fn fly(scenario: &Scenario, unit: &Unit) -> Result<Flight, FlightError> {
 /// [`FlightError`].
 pub fn fly_told(
     scenario: &Scenario,
-    unit: &Unit,
+    unit: &JointUnit,
     image: Option<Vec<u8>>,
     told: &(dyn Fn() + Sync),
 ) -> Result<Flight, FlightError> {
@@ -330,7 +330,7 @@ pub fn fly_told(
 ///
 /// # Errors
 /// As [`fly`].
-pub fn fly_one(scenario: &Scenario, unit: &Unit, controller: usize) -> Result<Flown, FlightError> {
+pub fn fly_one(scenario: &Scenario, unit: &JointUnit, controller: usize) -> Result<Flown, FlightError> {
     lane(&made(scenario, unit, None)?, controller, &|| {})
 }
 
@@ -340,7 +340,7 @@ pub fn fly_one(scenario: &Scenario, unit: &Unit, controller: usize) -> Result<Fl
 /// [`FlightError::Table`].
 pub fn table_image(
     scenario: &Scenario,
-    unit: &Unit,
+    unit: &JointUnit,
     id: impl FnOnce(&[u8]) -> [u8; 8],
 ) -> Result<Vec<u8>, FlightError> {
     let largest_n_m = 1.5 * scenario.largest_n_m() + 1.0;
@@ -350,7 +350,7 @@ pub fn table_image(
 }
 
 /// With the image of a table that was made before, or one made for the scenario.
-fn made(scenario: &Scenario, unit: &Unit, image: Option<Vec<u8>>) -> Result<LaneParts, FlightError> {
+fn made(scenario: &Scenario, unit: &JointUnit, image: Option<Vec<u8>>) -> Result<LaneParts, FlightError> {
     let image = image.map_or_else(|| table_image(scenario, unit, |_| [0; 8]), Ok)?;
     // The stiffest that the flight comes to: the loop of the mesh torque is judged by what the table says there.
     let stiffness = stiffness(&unit.nominal, scenario.largest_n_m());
@@ -396,18 +396,18 @@ fn stiffness(gear: &Gear, torque_n_m: f64) -> f64 {
     0.4 * torque_n_m.max(0.1) / (at(1.2) - at(0.8))
 }
 
-fn motor_kg_m2(scenario: &Scenario, unit: &Unit) -> f64 {
+fn motor_kg_m2(scenario: &Scenario, unit: &JointUnit) -> f64 {
     scenario.servo.inertia_kg_m2 * unit.nominal.ratio * unit.nominal.ratio
 }
 
 /// The damping's time from the part of critical damping at the stiffness of the largest load.
-fn damping_s(scenario: &Scenario, unit: &Unit) -> f64 {
+fn damping_s(scenario: &Scenario, unit: &JointUnit) -> f64 {
     let stiffness = stiffness(&unit.nominal, scenario.largest_n_m());
     let free = stiffness * (1.0 / motor_kg_m2(scenario, unit) + 1.0 / scenario.load_kg_m2);
     2.0 * scenario.damping / free.sqrt()
 }
 
-fn plant(made: &LaneParts) -> Plant {
+fn plant(made: &LaneParts) -> JointPlant {
     let LaneParts { scenario, unit, .. } = made;
     let settings = PlantSettings {
         motor_kg_m2: motor_kg_m2(scenario, unit),
@@ -420,11 +420,11 @@ fn plant(made: &LaneParts) -> Plant {
         appendage: None,
         gravity: scenario.load.gravity,
     };
-    Plant::new(settings, scenario.temperature_c)
+    JointPlant::new(settings, scenario.temperature_c)
 }
 
 /// What a controller is told in a tick.
-struct Told {
+struct TickInput {
     generator: GeneratorAngle,
     moment: Moment,
     direction: Direction,
@@ -433,10 +433,10 @@ struct Told {
     mesh_n_m: f64,
 }
 
-impl Told {
-    fn on_board(&self, made: &LaneParts) -> on_board::Told {
+impl TickInput {
+    fn on_board(&self, made: &LaneParts) -> on_board::OnBoardInput {
         let Moment { target_rad, rate_rad_s, acceleration_rad_s2, .. } = self.moment;
-        on_board::Told {
+        on_board::OnBoardInput {
             generator: self.generator,
             target: OutputAngle::from_rad(target_rad).unwrap_or(OutputAngle::ZERO),
             motion: [rate_rad_s, acceleration_rad_s2].map(|value| value as f32),
@@ -544,7 +544,7 @@ struct Core {
     on_board: OnBoard,
     store: Store,
     /// Of the last tick.
-    last: Option<(on_board::Told, Given)>,
+    last: Option<(on_board::OnBoardInput, OnBoardOutput)>,
 }
 
 impl JointController {
@@ -563,7 +563,7 @@ impl JointController {
         })
     }
 
-    fn tick(&mut self, made: &LaneParts, told: &Told) -> Commanded {
+    fn tick(&mut self, made: &LaneParts, told: &TickInput) -> Commanded {
         let Moment { target_rad, rate_rad_s, acceleration_rad_s2, .. } = told.moment;
         let (ratio, tick_s) = (made.unit.nominal.ratio, made.scenario.servo.tick_s);
         // A correction, and what it does along the way of the target.
@@ -609,12 +609,12 @@ impl JointController {
 }
 
 impl Core {
-    fn tick(&mut self, made: &LaneParts, told: &Told) -> Commanded {
+    fn tick(&mut self, made: &LaneParts, told: &TickInput) -> Commanded {
         let Moment { rate_rad_s, acceleration_rad_s2, .. } = told.moment;
         let told = told.on_board(made);
         let given = self.on_board.tick(&made.images(), &mut self.store, &told);
         self.last = Some((told, given));
-        let Given { out, ahead, .. } = given;
+        let OnBoardOutput { out, ahead, .. } = given;
         // Without a table as the ratio has it.
         let [rate, acceleration] = if ahead.rate_rad_s.is_nan() {
             [rate_rad_s, acceleration_rad_s2].map(|value| value * made.unit.nominal.ratio)
@@ -634,7 +634,7 @@ impl Core {
 
 /// What the joint knows of the torque in a tick.
 struct Sensing {
-    noise: Noise,
+    noise: NoiseSource,
     before_rad_s: f64,
     friction: Friction,
     even_s: f64,
@@ -663,7 +663,7 @@ impl Sensing {
         let friction = known_friction(scenario, scenario.temperature_c);
         let unknown = (1.0 - scenario.friction_known) * friction.level_n_m(0.0, 0.0);
         Self {
-            noise: Noise::new(scenario.seed ^ 0x9b1d),
+            noise: NoiseSource::new(scenario.seed ^ 0x9b1d),
             before_rad_s: 0.0,
             friction,
             even_s: 0.0,
@@ -679,7 +679,7 @@ impl Sensing {
         }
     }
 
-    fn read(&mut self, made: &LaneParts, plant: &Plant, servo: &mut Servo, now: &Moment) -> TorqueReading {
+    fn read(&mut self, made: &LaneParts, plant: &JointPlant, servo: &mut Servo, now: &Moment) -> TorqueReading {
         let scenario = &made.scenario;
         let noise = scenario.torque_noise_n_m * self.noise.normal();
         if scenario.warming_k_s != 0.0 {
@@ -831,7 +831,7 @@ fn on_load_n_m(scenario: &Scenario, now: &Moment) -> f64 {
 const ROWS: f64 = 4000.0;
 
 struct JointLane {
-    plant: Plant,
+    plant: JointPlant,
     servo: Servo,
     sensing: Sensing,
     controller: JointController,
@@ -864,13 +864,13 @@ impl JointLane {
         let inertia_n_m = scenario.load_kg_m2 * now.acceleration_rad_s2;
         let even_n_m = on_load_n_m(scenario, now) - way * scenario.drag_n_m;
         let mesh_n_m = if even_n_m.abs() > inertia_n_m.abs() { even_n_m - inertia_n_m } else { even_n_m };
-        let told = Told { generator, moment: *now, direction: self.direction, reading, mesh_n_m };
+        let told = TickInput { generator, moment: *now, direction: self.direction, reading, mesh_n_m };
         let commanded = self.controller.tick(made, &told);
         let command_rad = commanded.command.to_rad() / made.unit.nominal.ratio;
         let fed = made.torque == TorqueKnown::OnLoad && scenario.load_fed_forward > 0.0;
         // The load, which moves as the target does, has to be accelerated too.
         let load = scenario.load_kg_m2 / made.masses.motor_kg_m2 * made.unit.nominal.ratio;
-        let asked = Asked {
+        let asked = ServoCommand {
             command: commanded.command,
             rate_rad_s: commanded.rate_rad_s,
             acceleration_rad_s2: commanded.acceleration_rad_s2 + now.acceleration_rad_s2 * load,
@@ -980,7 +980,7 @@ const AT_REST_RAD_S: f64 = 2e-5;
 ///
 /// # Errors
 /// As [`fly`].
-pub fn comes_to_rest(scenario: &Scenario, unit: &Unit) -> Result<(bool, Option<f64>), FlightError> {
+pub fn comes_to_rest(scenario: &Scenario, unit: &JointUnit) -> Result<(bool, Option<f64>), FlightError> {
     let made = made(scenario, unit, None)?;
     let used = made.torque == scenario.torque;
     Ok((stable(&made)?, used.then_some(made.bandwidth_hz)))

@@ -17,7 +17,7 @@ use core::f64::consts::TAU;
 /// An error of the flexspline's teeth of order k has `generator = k`; one of the circular spline, which is met at ψ −
 /// δ, `k` and `−k`; of the encoder at the output, `0` and `k`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Line {
+pub struct GearLine {
     /// Periods in a generator turn, the output held.
     pub generator: f64,
     /// Periods in an output turn, the generator held.
@@ -28,7 +28,7 @@ pub struct Line {
     pub phase_rad: f64,
 }
 
-impl Line {
+impl GearLine {
     /// Sine and cosine at two angles.
     fn turned(&self, generator_rad: f64, output_rad: f64) -> (f64, f64) {
         libm::sincos(self.generator * generator_rad + self.output * output_rad + self.phase_rad)
@@ -86,7 +86,7 @@ struct Piece {
 
 /// A spring sampled from a map or a table: a cubic for each interval of the twist and each harmonic of the tooth pitch.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Sampled {
+pub struct SampledSpring {
     /// By interval, then curve.
     pieces: Vec<[Piece; CURVES]>,
     width_rad: f64,
@@ -106,7 +106,7 @@ pub enum Spring {
         hardening: f64,
     },
     /// From a map or a table.
-    Sampled(Box<Sampled>),
+    Sampled(Box<SampledSpring>),
 }
 
 /// What a spring does at a twist.
@@ -122,7 +122,7 @@ pub struct Sprung {
     pub by_generator: f64,
 }
 
-impl Sampled {
+impl SampledSpring {
     /// From an error law: `error(phase, flank)` is the error (rad) under a positive flank torque at a phase of the
     /// tooth pitch from 0 to 1, rising with the torque. Negative torques are its mirror image.
     pub fn of_law(teeth: f64, largest_n_m: f64, error: impl Fn(f64, f64) -> f64) -> Self {
@@ -261,7 +261,7 @@ fn pieces(nodes: &[[f64; CURVES]], width_rad: f64) -> Vec<[Piece; CURVES]> {
         Piece { energy: 0.0, torque: [a, u, 3.0 * (b - a) - 2.0 * u - v, 2.0 * (a - b) + u + v] }
     };
     let pieces = (0..nodes.len() - 1).map(|k| core::array::from_fn(|curve| piece(k, curve))).collect();
-    let mut sampled = Sampled { pieces, width_rad, teeth: 0.0 };
+    let mut sampled = SampledSpring { pieces, width_rad, teeth: 0.0 };
     sampled.sum_energies();
     sampled.pieces
 }
@@ -284,7 +284,7 @@ pub struct Gear {
     /// Generator over output.
     pub ratio: f64,
     /// Its kinematic error.
-    pub lines: Vec<Line>,
+    pub lines: Vec<GearLine>,
     /// Its wind-up and clearance.
     pub spring: Spring,
 }
@@ -315,7 +315,7 @@ impl Gear {
     /// Of sine and cosine of each line.
     fn summed(&self, turned: impl Iterator<Item = (f64, f64)>) -> [f64; 3] {
         let mut out = [0.0; 3];
-        for (Line { generator, output, amplitude_rad, .. }, (s, c)) in self.lines.iter().zip(turned) {
+        for (GearLine { generator, output, amplitude_rad, .. }, (s, c)) in self.lines.iter().zip(turned) {
             out[0] += amplitude_rad * s;
             out[1] += amplitude_rad * c * generator;
             out[2] += amplitude_rad * c * output;
@@ -326,7 +326,7 @@ impl Gear {
     /// All of it as numbers, for a file: ratio, how many lines, the lines, and the spring.
     pub fn numbers(&self) -> Vec<f64> {
         let mut numbers = vec![self.ratio, self.lines.len() as f64];
-        for Line { generator, output, amplitude_rad, phase_rad } in &self.lines {
+        for GearLine { generator, output, amplitude_rad, phase_rad } in &self.lines {
             numbers.extend([generator, output, amplitude_rad, phase_rad]);
         }
         match &self.spring {
@@ -352,7 +352,7 @@ impl Gear {
         let ([ratio, count], rest) = numbers.split_first_chunk::<2>()?;
         // More than there are numbers is refused by the split.
         let (lines, rest) = rest.split_at_checked((*count as usize).checked_mul(4)?)?;
-        let line = |&[generator, output, amplitude_rad, phase_rad]: &[f64; 4]| Line {
+        let line = |&[generator, output, amplitude_rad, phase_rad]: &[f64; 4]| GearLine {
             generator,
             output,
             amplitude_rad,
@@ -374,7 +374,7 @@ impl Gear {
                 Piece { energy: at(0), torque: [at(1), at(2), at(3), at(4)] }
             };
             let pieces = numbers.iter().map(|numbers| core::array::from_fn(|k| curve(numbers, k))).collect();
-            Spring::Sampled(Box::new(Sampled { pieces, width_rad, teeth }))
+            Spring::Sampled(Box::new(SampledSpring { pieces, width_rad, teeth }))
         };
         (*ratio != 0.0).then_some(Self { ratio: *ratio, lines, spring })
     }
@@ -438,7 +438,7 @@ impl Gear {
     pub(crate) fn at_near(&self, near: &Near, motor_by_rad: f64, output_by_rad: f64) -> Meshed {
         let (generator, output) = (motor_by_rad * self.ratio, output_by_rad);
         let turned =
-            |(line, at): (&Line, &(f64, f64))| turned_on(*at, line.generator * generator + line.output * output);
+            |(line, at): (&GearLine, &(f64, f64))| turned_on(*at, line.generator * generator + line.output * output);
         let error = self.summed(self.lines.iter().zip(&near.lines).map(turned));
         let pitch = match &self.spring {
             Spring::Cubic { .. } => near.pitch,
@@ -498,10 +498,10 @@ mod tests {
 
     fn gear() -> Gear {
         let lines = vec![
-            Line { generator: 2.0, output: 0.0, amplitude_rad: 1e-4, phase_rad: 0.3 },
-            Line { generator: 2.0, output: -2.0, amplitude_rad: 5e-5, phase_rad: 1.0 },
+            GearLine { generator: 2.0, output: 0.0, amplitude_rad: 1e-4, phase_rad: 0.3 },
+            GearLine { generator: 2.0, output: -2.0, amplitude_rad: 5e-5, phase_rad: 1.0 },
         ];
-        Gear { ratio: 95.0, lines, spring: Spring::Sampled(Box::new(Sampled::of_law(188.0, 50.0, law))) }
+        Gear { ratio: 95.0, lines, spring: Spring::Sampled(Box::new(SampledSpring::of_law(188.0, 50.0, law))) }
     }
 
     #[test]

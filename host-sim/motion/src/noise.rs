@@ -2,9 +2,9 @@
 
 /// Starts at a seed.
 #[derive(Clone, Debug)]
-pub struct Noise(pub(crate) u32);
+pub struct NoiseSource(pub(crate) u32);
 
-impl Noise {
+impl NoiseSource {
     /// From a seed.
     pub fn new(seed: u32) -> Self {
         Self(seed)

@@ -9,7 +9,7 @@ use flexspline::{
 
 /// Settings of a joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
+pub struct OnBoardSettings {
     /// Limits of the correction.
     pub limits: Limits,
     /// What a reading of the torque goes through.
@@ -24,7 +24,7 @@ pub struct Settings {
 
 /// What a tick is told.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Told {
+pub struct OnBoardInput {
     /// Generator as measured.
     pub generator: GeneratorAngle,
     /// Where the output shall be.
@@ -42,7 +42,7 @@ pub struct Told {
 
 /// What a tick gives.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Given {
+pub struct OnBoardOutput {
     /// Of the joint.
     pub out: Output,
     /// The torque that it was asked with, N·m.
@@ -69,7 +69,7 @@ impl OnBoard {
     ///
     /// # Errors
     /// [`SettingError`].
-    pub fn new(drive: Drive, settings: &Settings) -> Result<Self, SettingError> {
+    pub fn new(drive: Drive, settings: &OnBoardSettings) -> Result<Self, SettingError> {
         let mut path = TorquePath::new(settings.torque)?;
         // A low-pass that takes minutes starts from what is expected, not from a joint that carries nothing yet.
         let _ = path.tick(TorqueReading::OnLoad(settings.expected_n_m), Direction::Forward);
@@ -82,7 +82,7 @@ impl OnBoard {
 
     /// One tick.
     #[must_use]
-    pub fn tick(&mut self, images: &Images<'_>, store: &mut Store, told: &Told) -> Given {
+    pub fn tick(&mut self, images: &Images<'_>, store: &mut Store, told: &OnBoardInput) -> OnBoardOutput {
         let torque_n_m = self.torque_n_m(told);
         let mut ahead = self.joint.motion_ahead(store, told.target, told.motion, torque_n_m, self.ahead_s);
         let [rate, acceleration] = told.motion;
@@ -96,12 +96,12 @@ impl OnBoard {
             missed_ticks: 0,
             adjustment: Adjustment::default(),
         };
-        Given { out: self.joint.tick(images, store, &mut self.state, &input), torque_n_m, ahead }
+        OnBoardOutput { out: self.joint.tick(images, store, &mut self.state, &input), torque_n_m, ahead }
     }
 
     /// The torque that a table is asked with. A torque on the load has the load's inertia taken off, unless that is the
     /// larger of both: while a target speeds up the flank does not change, as the play is not crossed by then.
-    fn torque_n_m(&mut self, told: &Told) -> f32 {
+    fn torque_n_m(&mut self, told: &OnBoardInput) -> f32 {
         let torque_n_m = self.path.tick(told.reading, told.direction);
         match told.reading {
             TorqueReading::OnLoad(_) if torque_n_m.abs() > told.inertia_n_m.abs() => torque_n_m - told.inertia_n_m,
@@ -125,7 +125,7 @@ pub const SETTINGS_BYTES: usize = 4 * 15;
 /// See there.
 pub const TOLD_BYTES: usize = 8 + 8 + 4 * 4 + 4;
 
-impl Settings {
+impl OnBoardSettings {
     /// For a tape, little endian.
     #[must_use]
     pub fn to_bytes(&self) -> [u8; SETTINGS_BYTES] {
@@ -203,7 +203,7 @@ impl Settings {
     }
 }
 
-impl Told {
+impl OnBoardInput {
     /// For a tape, little endian.
     #[must_use]
     pub fn to_bytes(&self) -> [u8; TOLD_BYTES] {
@@ -248,8 +248,8 @@ impl Told {
 
 /// All bits of what a tick gives into a running hash (FNV-1a, by words).
 #[must_use]
-pub fn hashed(hash: u64, given: &Given) -> u64 {
-    let Given { out, torque_n_m, ahead } = given;
+pub fn hashed(hash: u64, given: &OnBoardOutput) -> u64 {
+    let OnBoardOutput { out, torque_n_m, ahead } = given;
     let words = [
         out.command.counts() as u64,
         out.output.counts() as u64,
@@ -270,7 +270,7 @@ pub const LINE_TICKS: usize = 500;
 ///
 /// # Errors
 /// Of what is written to.
-pub fn line(to: &mut impl core::fmt::Write, tick: usize, given: &Given, hash: u64) -> core::fmt::Result {
+pub fn line(to: &mut impl core::fmt::Write, tick: usize, given: &OnBoardOutput, hash: u64) -> core::fmt::Result {
     let MotionAhead { rate_rad_s, acceleration_rad_s2 } = given.ahead;
     writeln!(
         to,

@@ -13,7 +13,7 @@
 
 use super::friction::{Friction, HysteresisElement, slipped};
 use super::gear::{Gear, Meshed, Near};
-use super::servo::{Asked, Servo, ServoSettings};
+use super::servo::{Servo, ServoCommand, ServoSettings};
 
 /// Coordinates: motor, load, appendage.
 pub const PARTS: usize = 3;
@@ -75,7 +75,7 @@ pub struct Energy {
 
 /// A plant in motion.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Plant {
+pub struct JointPlant {
     /// What it is made of.
     pub settings: PlantSettings,
     /// Angles, rad.
@@ -97,7 +97,7 @@ pub struct Plant {
     before: [f64; PARTS],
 }
 
-impl Plant {
+impl JointPlant {
     /// At rest with all angles zero.
     pub fn new(settings: PlantSettings, temperature_c: f64) -> Self {
         let meshed = settings.gear.at(0.0, 0.0);
@@ -131,7 +131,7 @@ impl Plant {
     }
 
     /// One tick of the servo: the current is set, and the plant goes on under a torque from outside.
-    pub fn go(&mut self, servo: &mut Servo, asked: &Asked, outside_n_m: impl Fn(f64) -> f64) {
+    pub fn go(&mut self, servo: &mut Servo, asked: &ServoCommand, outside_n_m: impl Fn(f64) -> f64) {
         let ServoSettings { tick_s, steps, late_steps, .. } = servo.settings;
         servo.control(asked);
         let step_s = tick_s / steps as f64;

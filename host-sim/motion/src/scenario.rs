@@ -4,7 +4,7 @@ use core::f64::consts::TAU;
 
 pub use super::legs::Leg;
 use super::legs::{Aim, Walk};
-use super::noise::Noise;
+use super::noise::NoiseSource;
 use super::servo::ServoSettings;
 
 /// Torques on the load from outside, N·m.
@@ -177,7 +177,7 @@ impl Scenario {
     pub fn moments(&self) -> Moments<'_> {
         Moments {
             scenario: self,
-            noise: Noise::new(self.seed ^ 0x5bd1),
+            noise: NoiseSource::new(self.seed ^ 0x5bd1),
             gust: 0.0,
             walk: Walk::default(),
             outside_n_m: self.load.bias_n_m,
@@ -189,7 +189,7 @@ impl Scenario {
 #[derive(Clone, Debug)]
 pub struct Moments<'s> {
     scenario: &'s Scenario,
-    noise: Noise,
+    noise: NoiseSource,
     gust: f64,
     walk: Walk,
     outside_n_m: f64,

@@ -5,7 +5,7 @@ use core::f64::consts::TAU;
 
 use flexspline::GeneratorAngle;
 
-use crate::noise::Noise;
+use crate::noise::NoiseSource;
 
 /// What a servo is made of; bandwidths of a rigid motor alone.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -36,7 +36,7 @@ pub struct ServoSettings {
 
 /// What the servo is asked for in a tick.
 #[derive(Clone, Copy, Debug)]
-pub struct Asked {
+pub struct ServoCommand {
     /// Where the generator shall be.
     pub command: GeneratorAngle,
     /// Its rate, fed forward, rad/s of the generator.
@@ -56,7 +56,7 @@ pub struct Servo {
     /// What it is made of.
     pub settings: ServoSettings,
     pub(crate) ratio: f64,
-    pub(crate) noise: Noise,
+    pub(crate) noise: NoiseSource,
     pub(crate) torque_n_m: f64,
     pub(crate) next_n_m: f64,
     pub(crate) integral_n_m: f64,
@@ -70,7 +70,7 @@ impl Servo {
         Self {
             settings,
             ratio,
-            noise: Noise::new(seed),
+            noise: NoiseSource::new(seed),
             torque_n_m: 0.0,
             next_n_m: 0.0,
             integral_n_m: 0.0,
@@ -116,7 +116,7 @@ impl Servo {
     }
 
     /// Asks for a current, from what the encoder showed last; it flows from [`Self::give`] on.
-    pub fn control(&mut self, asked: &Asked) {
+    pub fn control(&mut self, asked: &ServoCommand) {
         let ServoSettings { tick_s, inertia_kg_m2, largest_n_m, position_hz, speed_hz, integral_hz, .. } =
             self.settings;
         // What was asked for before and has not come is late by a tick.

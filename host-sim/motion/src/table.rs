@@ -8,8 +8,8 @@ use flexspline::make::{
 };
 use flexspline::{Direction, Drive, GeneratorAngle, GeneratorKind, MAX_ERROR_RAD, Provenance, Table};
 
-use super::gear::{Gear, Line, Sampled, Spring};
-use super::noise::Noise;
+use super::gear::{Gear, GearLine, SampledSpring, Spring};
+use super::noise::NoiseSource;
 
 /// Nodes on each side of the dead zone, and how they crowd towards it: node k of n at `(k/n)^CROWDING` of the way.
 const STEPS: usize = 12;
@@ -124,13 +124,13 @@ pub fn gear_of(table: &Table<'_>, temperature_c: f64, drag_n_m: f64) -> Option<G
         let [of_lines, ..] = gear.error(generator_rad, generator_rad / ratio);
         at(generator_rad, flank_n_m).unwrap_or(0.0) - of_lines
     };
-    let spring = Spring::Sampled(Box::new(Sampled::of_law(teeth, largest, law)));
+    let spring = Spring::Sampled(Box::new(SampledSpring::of_law(teeth, largest, law)));
     gear.spring = spring;
     Some(gear)
 }
 
 /// Lines of an error over so many turns of the output that all orders are whole.
-fn lines(table: &Table<'_>, error: impl Fn(f64) -> f64) -> Vec<Line> {
+fn lines(table: &Table<'_>, error: impl Fn(f64) -> f64) -> Vec<GearLine> {
     let drive = table.drive();
     let ratio = drive.exact_ratio();
     let waves = i32::from(drive.circular_spline_teeth() - drive.flexspline_teeth());
@@ -150,7 +150,7 @@ fn lines(table: &Table<'_>, error: impl Fn(f64) -> f64) -> Vec<Line> {
         }
         let scale = 2.0 / f64::from(FOUND_PLACES);
         let amplitude_rad = scale * libm::hypot(sine, cosine);
-        Line { generator, output, amplitude_rad, phase_rad: libm::atan2(cosine, sine) }
+        GearLine { generator, output, amplitude_rad, phase_rad: libm::atan2(cosine, sine) }
     };
     orders.map(line).filter(|line| line.amplitude_rad > SMALLEST_LINE_RAD).collect()
 }
@@ -169,7 +169,7 @@ fn torques(sampling: &Sampling) -> Vec<f32> {
 
 /// Steady motion both ways: over a turn of the output at one node, at a few places at the others.
 fn samples(gear: &Gear, sampling: &Sampling, torques: &[f32]) -> Vec<Sample> {
-    let mut noise = Noise::new(77);
+    let mut noise = NoiseSource::new(77);
     let turn = TAU * gear.ratio;
     let whole = |k: usize| k as f64 * turn / PLACES_OF_A_TURN as f64;
     // Spread over the pitch and over the turn.
@@ -211,14 +211,15 @@ mod tests {
         let law = |phase: f64, flank: f64| {
             1.5e-4 + 3e-6 * flank + 4e-5 * flank / (1.0 + 0.2 * flank) + 2e-6 * libm::cos(TAU * phase + 0.3)
         };
-        let line = |generator: f64, output: f64, amplitude_rad: f64, phase_rad: f64| Line {
+        let line = |generator: f64, output: f64, amplitude_rad: f64, phase_rad: f64| GearLine {
             generator,
             output,
             amplitude_rad,
             phase_rad,
         };
         let lines = vec![line(2.0, 0.0, 4e-5, 0.3), line(4.0, -4.0, 2e-5, 1.0), line(0.0, 1.0, 5e-5, -2.0)];
-        let gear = Gear { ratio: 95.0, lines, spring: Spring::Sampled(Box::new(Sampled::of_law(188.0, 60.0, law))) };
+        let gear =
+            Gear { ratio: 95.0, lines, spring: Spring::Sampled(Box::new(SampledSpring::of_law(188.0, 60.0, law))) };
         let drive = Drive::new(188, 190, FixedMember::Flexspline).unwrap();
         let sampling = Sampling { largest_n_m: 50.0, drag_n_m: 0.02, temperature_c: 20.0, noise_rad: 0.0 };
         let image = image(&gear, drive, &sampling, |_| [0; 8]).unwrap();

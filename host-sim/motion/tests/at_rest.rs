@@ -3,15 +3,18 @@
 
 use flexspline::{Drive, FixedMember};
 use flexspline_motion::dish;
-use flexspline_motion::flight::{ARCSEC_PER_RAD, Unit, comes_to_rest};
-use flexspline_motion::gear::Sampled;
+use flexspline_motion::flight::{ARCSEC_PER_RAD, JointUnit, comes_to_rest};
+use flexspline_motion::gear::SampledSpring;
 use flexspline_motion::scenario::{Load, Scenario, TorqueKnown};
 use flexspline_motion::servo::ServoSettings;
 
 /// With a wind-up that begins with so many arcsec for each N·m.
-fn unit(arcsec_n_m: f64) -> Unit {
+fn unit(arcsec_n_m: f64) -> JointUnit {
     let law = |_: f64, flank: f64| (30.0 + arcsec_n_m * flank / (1.0 + 0.01 * flank)) / ARCSEC_PER_RAD;
-    Unit::of_spring(Drive::new(188, 190, FixedMember::Flexspline).unwrap(), Sampled::of_law(188.0, 100.0, law))
+    JointUnit::of_spring(
+        Drive::new(188, 190, FixedMember::Flexspline).unwrap(),
+        SampledSpring::of_law(188.0, 100.0, law),
+    )
 }
 
 #[test]

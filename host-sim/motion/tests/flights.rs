@@ -2,10 +2,10 @@
 
 use flexspline::{Drive, FixedMember};
 use flexspline_motion::dish::{self, scenario};
-use flexspline_motion::flight::{COMPENSATED, CONTROLLERS, Flight, Flown, Unit, fly, fly_one};
+use flexspline_motion::flight::{COMPENSATED, CONTROLLERS, Flight, Flown, JointUnit, fly, fly_one};
 use flexspline_motion::scenario::{Leg, Load, Scenario, TableKnown, TorqueKnown};
 
-fn unit() -> Unit {
+fn unit() -> JointUnit {
     dish::unit(Drive::new(188, 190, FixedMember::Flexspline).unwrap())
 }
 

@@ -3,10 +3,10 @@
 
 use flexspline::{Drive, FixedMember};
 use flexspline_motion::dish;
-use flexspline_motion::flight::{COMPENSATED, IDEAL, Unit, fly_one};
+use flexspline_motion::flight::{COMPENSATED, IDEAL, JointUnit, fly_one};
 use flexspline_motion::scenario::{Leg, Load, Scenario, TorqueKnown};
 
-fn unit() -> Unit {
+fn unit() -> JointUnit {
     dish::unit(Drive::new(188, 190, FixedMember::Flexspline).unwrap())
 }
 
@@ -24,7 +24,7 @@ fn calm(load_n_m: f64, drag_n_m: f64, noise_n_m: f64, torque: TorqueKnown) -> Sc
     }
 }
 
-fn rms(scenario: &Scenario, unit: &Unit, kind: usize) -> f64 {
+fn rms(scenario: &Scenario, unit: &JointUnit, kind: usize) -> f64 {
     fly_one(scenario, unit, kind).unwrap().error.rms()
 }
 

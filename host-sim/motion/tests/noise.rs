@@ -6,8 +6,8 @@ use flexspline::{
     Overrun, Store, TorquePath, TorqueReading, TorqueSettings,
 };
 use flexspline_motion::flight::ARCSEC_PER_RAD;
-use flexspline_motion::gear::{Gear, Sampled, Spring};
-use flexspline_motion::noise::Noise;
+use flexspline_motion::gear::{Gear, SampledSpring, Spring};
+use flexspline_motion::noise::NoiseSource;
 use flexspline_motion::table::{Sampling, image};
 
 /// Correction wanted by the noise and correction made, arcsec rms, of a joint at rest under a load.
@@ -15,7 +15,7 @@ fn through(acceleration_rad_s2: f32, bandwidth_hz: Option<f32>) -> [f64; 2] {
     let drive = Drive::new(188, 190, FixedMember::Flexspline).unwrap();
     // 55″ for each N·m, as a two-roller drive at light load.
     let law = |_: f64, flank: f64| (30.0 + 55.0 * flank) / ARCSEC_PER_RAD;
-    let spring = Spring::Sampled(Box::new(Sampled::of_law(188.0, 20.0, law)));
+    let spring = Spring::Sampled(Box::new(SampledSpring::of_law(188.0, 20.0, law)));
     let gear = Gear { ratio: drive.exact_ratio(), lines: Vec::new(), spring };
     let sampling = Sampling { largest_n_m: 10.0, drag_n_m: 0.02, temperature_c: 20.0, noise_rad: 0.0 };
     let made = image(&gear, drive, &sampling, |_| [0; 8]).unwrap();
@@ -46,7 +46,7 @@ fn through(acceleration_rad_s2: f32, bandwidth_hz: Option<f32>) -> [f64; 2] {
         };
         TorquePath::new(settings).unwrap()
     });
-    let mut noise = Noise::new(11);
+    let mut noise = NoiseSource::new(11);
     let mut generator = GeneratorAngle::ZERO;
     let (mut wanted, mut made) = ([0.0; 2], [0.0; 2]);
     let mut count = 0.0;

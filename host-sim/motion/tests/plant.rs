@@ -3,8 +3,8 @@
 use std::f64::consts::{PI, TAU};
 
 use flexspline_motion::friction::{Friction, HysteresisElement};
-use flexspline_motion::gear::{Gear, Line, Spring};
-use flexspline_motion::plant::{Appendage, Plant, PlantSettings};
+use flexspline_motion::gear::{Gear, GearLine, Spring};
+use flexspline_motion::plant::{Appendage, JointPlant, PlantSettings};
 
 const RATIO: f64 = 95.0;
 
@@ -13,7 +13,7 @@ fn spring(half_clearance_rad: f64, stiffness: f64, hardening: f64) -> Spring {
 }
 
 /// Motor 1 kg·m² at the output, load 3 kg·m², nothing that rubs.
-fn bare(spring: Spring, lines: Vec<Line>) -> PlantSettings {
+fn bare(spring: Spring, lines: Vec<GearLine>) -> PlantSettings {
     PlantSettings {
         motor_kg_m2: 1.0,
         load_kg_m2: 3.0,
@@ -28,7 +28,7 @@ fn bare(spring: Spring, lines: Vec<Line>) -> PlantSettings {
 }
 
 /// Times at which the twist crosses zero upward, by straight lines between steps.
-fn crossings(plant: &mut Plant, step_s: f64, seconds: f64) -> Vec<f64> {
+fn crossings(plant: &mut JointPlant, step_s: f64, seconds: f64) -> Vec<f64> {
     let mut times = Vec::new();
     let mut before = plant.meshed().twist_rad;
     for k in 1..=(seconds / step_s).round() as usize {
@@ -49,7 +49,7 @@ fn period(times: &[f64]) -> f64 {
 #[test]
 fn two_masses_swing_at_their_frequency_and_the_middle_goes_straight_on() {
     let stiffness = 7e5;
-    let mut plant = Plant::new(bare(spring(0.0, stiffness, 0.0), Vec::new()), 20.0);
+    let mut plant = JointPlant::new(bare(spring(0.0, stiffness, 0.0), Vec::new()), 20.0);
     plant.set_motion([0.0; 3], [0.3, 0.02, 0.0]);
     let found = period(&crossings(&mut plant, 1e-5, 10.0));
     let theory = TAU / (stiffness * (1.0 / 1.0 + 1.0 / 3.0)).sqrt();
@@ -71,7 +71,7 @@ fn elliptic(m: f64) -> f64 {
 #[test]
 fn a_hardening_spring_swings_with_the_period_of_duffing() {
     let (stiffness, hardening, amplitude) = (2e5, 6e12, 3e-4);
-    let mut plant = Plant::new(bare(spring(0.0, stiffness, hardening), Vec::new()), 20.0);
+    let mut plant = JointPlant::new(bare(spring(0.0, stiffness, hardening), Vec::new()), 20.0);
     // Twisted by the amplitude, with no momentum.
     plant.set_motion([-amplitude * 0.75, amplitude * 0.25, 0.0], [0.0; 3]);
     let found = period(&crossings(&mut plant, 1e-5, 5.0));
@@ -83,11 +83,11 @@ fn a_hardening_spring_swings_with_the_period_of_duffing() {
     assert!((found / theory - 1.0).abs() < 2e-5, "{found} {theory}");
 }
 
-fn lines() -> Vec<Line> {
+fn lines() -> Vec<GearLine> {
     vec![
-        Line { generator: 2.0, output: 0.0, amplitude_rad: 1.0e-4, phase_rad: 0.4 },
-        Line { generator: 2.0, output: -2.0, amplitude_rad: 0.7e-4, phase_rad: 1.4 },
-        Line { generator: 0.0, output: 1.0, amplitude_rad: 1.0e-4, phase_rad: 0.1 },
+        GearLine { generator: 2.0, output: 0.0, amplitude_rad: 1.0e-4, phase_rad: 0.4 },
+        GearLine { generator: 2.0, output: -2.0, amplitude_rad: 0.7e-4, phase_rad: 1.4 },
+        GearLine { generator: 0.0, output: 1.0, amplitude_rad: 1.0e-4, phase_rad: 0.1 },
     ]
 }
 
@@ -109,7 +109,7 @@ fn full() -> PlantSettings {
 
 #[test]
 fn energy_balances_to_a_millionth_over_minutes() {
-    let mut plant = Plant::new(full(), 5.0);
+    let mut plant = JointPlant::new(full(), 5.0);
     let step = 1e-4;
     let mut moved = 0.0;
     for k in 0..1_800_000 {
@@ -168,7 +168,7 @@ fn the_plant_is_where_an_integrator_of_small_steps_has_it() {
     let start = [[0.0, 2.0e-4], [0.05, 0.07]];
     let seconds = 0.2;
     let far = |step: f64| {
-        let mut plant = Plant::new(settings.clone(), 20.0);
+        let mut plant = JointPlant::new(settings.clone(), 20.0);
         let [[m, l], [v, w]] = start;
         plant.set_motion([m, l, 0.0], [v, w, 0.0]);
         for _ in 0..(seconds / step).round() as usize {
@@ -199,7 +199,7 @@ fn without_the_factor_that_the_generator_feels_a_drive_makes_energy() {
 #[test]
 fn order_two_resonates_where_and_as_much_as_theory_says() {
     let (stiffness, damping_s, load, amplitude) = (4e5, 1e-4, 3.0, 2e-6);
-    let lines = vec![Line { generator: 2.0, output: 0.0, amplitude_rad: amplitude, phase_rad: 0.0 }];
+    let lines = vec![GearLine { generator: 2.0, output: 0.0, amplitude_rad: amplitude, phase_rad: 0.0 }];
     // A motor so heavy that nothing disturbs it.
     let settings =
         PlantSettings { motor_kg_m2: 1e9, damping_s, load_kg_m2: load, ..bare(spring(0.0, stiffness, 0.0), lines) };
@@ -207,7 +207,7 @@ fn order_two_resonates_where_and_as_much_as_theory_says() {
     for part in [0.5, 0.9, 0.97, 1.0, 1.03, 1.1, 1.6] {
         let order_two = part * natural;
         let speed = order_two / 2.0 / RATIO;
-        let mut plant = Plant::new(settings.clone(), 20.0);
+        let mut plant = JointPlant::new(settings.clone(), 20.0);
         plant.set_motion([0.0; 3], [speed, speed, 0.0]);
         let step = 2e-5;
         let (mut sine, mut cosine, mut count) = (0.0, 0.0, 0.0);
@@ -237,7 +237,7 @@ fn order_two_resonates_where_and_as_much_as_theory_says() {
 
 #[test]
 fn a_joint_at_rest_under_less_than_its_drag_stays_there() {
-    let mut plant = Plant::new(full(), 20.0);
+    let mut plant = JointPlant::new(full(), 20.0);
     plant.settings.gravity = [0.0; 2];
     for _ in 0..20_000 {
         plant.step(1e-4, 3.0, 0.4);
@@ -265,7 +265,7 @@ fn friction_by_load_neither_damps_nor_drives_a_swing_whatever_the_step() {
     };
     let decay = 0.5 * damping * (1.0 / load + 1.0 / motor);
     for (step_s, way) in [(2e-4, -1.0), (2e-4, 1.0), (2e-5, -1.0)] {
-        let mut plant = Plant::new(settings.clone(), 20.0);
+        let mut plant = JointPlant::new(settings.clone(), 20.0);
         let (still, swing) = (load_n_m / stiffness, 1e-5);
         plant.set_motion([0.0, still + swing, 0.0], [0.1 * way, 0.1 * way, 0.0]);
         let steps = |seconds: f64| (seconds / step_s).round() as usize;

@@ -6,8 +6,8 @@ use flexspline::GeneratorAngle;
 use flexspline_motion::friction::Friction;
 use flexspline_motion::gear::{Gear, Spring};
 use flexspline_motion::loops::{LoopTorquePath, TwoMasses};
-use flexspline_motion::plant::{Plant, PlantSettings};
-use flexspline_motion::servo::{Asked, Servo, ServoSettings};
+use flexspline_motion::plant::{JointPlant, PlantSettings};
+use flexspline_motion::servo::{Servo, ServoCommand, ServoSettings};
 
 const RATIO: f64 = 95.0;
 const TICK_S: f64 = 1e-3;
@@ -36,7 +36,7 @@ const CAM: TwoMasses = TwoMasses {
     ratio: RATIO,
 };
 
-fn plant(joint: &TwoMasses) -> Plant {
+fn plant(joint: &TwoMasses) -> JointPlant {
     let spring = Spring::Cubic { half_clearance_rad: 0.0, stiffness: joint.stiffness, hardening: 0.0 };
     let settings = PlantSettings {
         motor_kg_m2: joint.motor_kg_m2,
@@ -49,21 +49,21 @@ fn plant(joint: &TwoMasses) -> Plant {
         appendage: None,
         gravity: [0.0; 2],
     };
-    let mut plant = Plant::new(settings, 20.0);
+    let mut plant = JointPlant::new(settings, 20.0);
     // A knock on the load.
     plant.set_motion([0.0; 3], [0.0, 1e-4, 0.0]);
     plant
 }
 
 /// What the motor is told: nothing, or the torque of the mesh through the compensation.
-fn told(path: Option<&LoopTorquePath>, filtered: &mut f64, plant: &Plant) -> f64 {
+fn told(path: Option<&LoopTorquePath>, filtered: &mut f64, plant: &JointPlant) -> f64 {
     let Some(path) = path else { return 0.0 };
     let share = 1.0 - libm::exp(-TAU * path.bandwidth_hz * TICK_S);
     *filtered += share * (plant.mesh_n_m() - *filtered);
     -path.gain * *filtered / plant_stiffness(plant)
 }
 
-fn plant_stiffness(plant: &Plant) -> f64 {
+fn plant_stiffness(plant: &JointPlant) -> f64 {
     let Spring::Cubic { stiffness, .. } = plant.settings.gear.spring else { unreachable!() };
     stiffness
 }
@@ -87,7 +87,7 @@ fn knocked(
             servo.read(plant.angle_rad[0], plant.rate_rad_s[0]);
             let correction = told(path, &mut filtered, &plant) * RATIO;
             let fed = path.is_some_and(|path| path.rate_fed_forward);
-            let asked = Asked {
+            let asked = ServoCommand {
                 command: GeneratorAngle::from_rad(correction).unwrap(),
                 rate_rad_s: if fed { (correction - before) / TICK_S } else { 0.0 },
                 acceleration_rad_s2: 0.0,
@@ -112,7 +112,7 @@ fn knocked(
 }
 
 /// The motor goes on for a tick with the mesh's torque of its beginning, then the load follows on the motor's way.
-fn split_tick(plant: &mut Plant, servo: &mut Servo, asked: &Asked) {
+fn split_tick(plant: &mut JointPlant, servo: &mut Servo, asked: &ServoCommand) {
     let joint = (plant.settings.motor_kg_m2, plant.settings.load_kg_m2);
     let mesh = plant.mesh_n_m();
     let [from, mut load, _] = plant.angle_rad;

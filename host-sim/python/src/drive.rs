@@ -6,7 +6,7 @@ use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_mechanics::stepping::Method;
 use pyo3::prelude::*;
 
-use crate::failure::{Failure, bad};
+use crate::failure::{PythonFailure, bad};
 
 /// A drive that has passed every check, and what the `[data_sheet]` of its file says.
 #[pyclass(frozen, module = "flexspline._native")]
@@ -62,11 +62,11 @@ impl Drive {
 }
 
 /// The generator of that name.
-pub fn generator(name: &str) -> Result<GeneratorKind, Failure> {
-    name.parse::<GeneratorKind>().map_err(|error| Failure::bad(format!("generator: {error}")))
+pub fn generator(name: &str) -> Result<GeneratorKind, PythonFailure> {
+    name.parse::<GeneratorKind>().map_err(|error| PythonFailure::bad(format!("generator: {error}")))
 }
 
 /// Mesh and solver of those names.
-pub fn method(mesh: &str, solver: &str) -> Result<(MeshLevel, Method), Failure> {
-    Ok((mesh.parse().map_err(Failure::bad)?, solver.parse().map_err(Failure::bad)?))
+pub fn method(mesh: &str, solver: &str) -> Result<(MeshLevel, Method), PythonFailure> {
+    Ok((mesh.parse().map_err(PythonFailure::bad)?, solver.parse().map_err(PythonFailure::bad)?))
 }

@@ -12,7 +12,7 @@ mod exceptions {
 }
 
 /// Why there is no result.
-pub enum Failure {
+pub enum PythonFailure {
     /// The input is to blame.
     BadInput(String),
     /// The run is.
@@ -21,24 +21,24 @@ pub enum Failure {
     NothingGained(String),
 }
 
-impl Failure {
+impl PythonFailure {
     /// What is wrong with the input.
-    pub fn bad(what: impl Display) -> Failure {
-        Failure::BadInput(what.to_string())
+    pub fn bad(what: impl Display) -> PythonFailure {
+        PythonFailure::BadInput(what.to_string())
     }
 
     /// A run that failed, or its input.
-    pub fn of(what: impl Display, is_bad_input: bool) -> Failure {
-        if is_bad_input { Failure::bad(what) } else { Failure::NotConverged(what.to_string()) }
+    pub fn of(what: impl Display, is_bad_input: bool) -> PythonFailure {
+        if is_bad_input { PythonFailure::bad(what) } else { PythonFailure::NotConverged(what.to_string()) }
     }
 }
 
-impl From<Failure> for PyErr {
-    fn from(failure: Failure) -> PyErr {
+impl From<PythonFailure> for PyErr {
+    fn from(failure: PythonFailure) -> PyErr {
         match failure {
-            Failure::BadInput(what) => exceptions::BadInput::new_err(with_arguments(&what)),
-            Failure::NotConverged(what) => exceptions::NotConverged::new_err(with_arguments(&what)),
-            Failure::NothingGained(what) => exceptions::NothingGained::new_err(with_arguments(&what)),
+            PythonFailure::BadInput(what) => exceptions::BadInput::new_err(with_arguments(&what)),
+            PythonFailure::NotConverged(what) => exceptions::NotConverged::new_err(with_arguments(&what)),
+            PythonFailure::NothingGained(what) => exceptions::NothingGained::new_err(with_arguments(&what)),
         }
     }
 }
@@ -64,5 +64,5 @@ fn with_arguments(message: &str) -> String {
 
 /// An exception about the input.
 pub fn bad(what: impl Display) -> PyErr {
-    Failure::bad(what).into()
+    PythonFailure::bad(what).into()
 }

@@ -19,7 +19,7 @@ use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::PyDict;
 
 use crate::drive::{Drive, generator};
-use crate::failure::{Failure, bad};
+use crate::failure::{PythonFailure, bad};
 use crate::run::run;
 use crate::tables::{Parts, parts};
 
@@ -44,17 +44,17 @@ impl LogFrom {
 /// How the columns of logs are read: mapping, rows in a second, torque of an ampere.
 type Reading = (String, Option<f64>, Option<f64>);
 
-fn column_map((columns, rate_hz, torque_constant): &Reading) -> Result<ColumnMap, Failure> {
+fn column_map((columns, rate_hz, torque_constant): &Reading) -> Result<ColumnMap, PythonFailure> {
     if let Some(constant) = torque_constant.filter(|constant| !(constant.is_finite() && *constant != 0.0)) {
         let what = format!("torque_constant: found {constant}, allowed: a number other than zero, N.m for an ampere");
-        return Err(Failure::bad(what));
+        return Err(PythonFailure::bad(what));
     }
     let map = if columns.is_empty() {
         ColumnMap::default()
     } else {
-        ColumnMap::with_torque_constant(columns, *torque_constant).map_err(Failure::bad)?
+        ColumnMap::with_torque_constant(columns, *torque_constant).map_err(PythonFailure::bad)?
     };
-    map.at_rate(*rate_hz).map_err(Failure::bad)
+    map.at_rate(*rate_hz).map_err(PythonFailure::bad)
 }
 
 /// What is known of the drive before.
@@ -85,13 +85,16 @@ pub fn calibrate<'py>(
     let kind = generator(generator_name)?;
     let map = column_map(&reading)?;
     let made = run(py, threads, progress, move |watch| {
-        let image =
-            if let KnownFrom::Image(image) = &known { Some(Table::check(image).map_err(Failure::bad)?) } else { None };
+        let image = if let KnownFrom::Image(image) = &known {
+            Some(Table::check(image).map_err(PythonFailure::bad)?)
+        } else {
+            None
+        };
         let prior = match (&image, &known) {
             (Some(table), _) => Prior::of_table(table, kind),
             (None, KnownFrom::Model(path)) => prior_of_model(path, kind)?,
             (None, KnownFrom::Ratio(ratio)) => prior_of_ratio(*ratio, kind)?,
-            (None, KnownFrom::Image(_)) => return Err(Failure::bad("table: no image")),
+            (None, KnownFrom::Image(_)) => return Err(PythonFailure::bad("table: no image")),
         };
         let gear = prior.nominal.gear();
         let one = |(k, log): (usize, &LogFrom)| {
@@ -100,9 +103,9 @@ pub fn calibrate<'py>(
                 LogFrom::File(path) => read(path, &map, &gear),
                 LogFrom::Memory((name, bytes)) => parse(name, &bytes[..], &map, &gear),
             }
-            .map_err(Failure::bad)
+            .map_err(PythonFailure::bad)
         };
-        let files = logs.iter().enumerate().map(one).collect::<Result<Vec<_>, Failure>>()?;
+        let files = logs.iter().enumerate().map(one).collect::<Result<Vec<_>, PythonFailure>>()?;
         watch.tell_or_unwind(logs.len(), logs.len() + 1, "fitting".to_owned());
         let made = fit(&files, &prior).map_err(|error| calibration_failure(&error, &logs))?;
         watch.tell_or_unwind(logs.len() + 1, logs.len() + 1, "done".to_owned());
@@ -117,35 +120,35 @@ pub fn calibrate<'py>(
     Ok((serde_json::to_string(&calibration).map_err(bad)?, parts(py, &table)?, rows))
 }
 
-fn prior_of_model(path: &Path, kind: GeneratorKind) -> Result<Prior<'static>, Failure> {
-    let model = Model::read(path).map_err(Failure::bad)?;
+fn prior_of_model(path: &Path, kind: GeneratorKind) -> Result<Prior<'static>, PythonFailure> {
+    let model = Model::read(path).map_err(PythonFailure::bad)?;
     if !model.causes.is_empty() {
         let what =
             "found [[extension.cause]], allowed: a nominal model without causes; what they are is fitted here anew";
-        return Err(Failure::bad(format!("{}: {what}", path.display())));
+        return Err(PythonFailure::bad(format!("{}: {what}", path.display())));
     }
-    let bytes = std::fs::read(path).map_err(|error| Failure::bad(format!("{}: {error}", path.display())))?;
+    let bytes = std::fs::read(path).map_err(|error| PythonFailure::bad(format!("{}: {error}", path.display())))?;
     let (drive, hash) = (path.display().to_string(), *blake3::hash(&bytes).as_bytes());
     let known = Prior::of_ratio(model.nominal.ratio, kind);
     Ok(Prior { nominal: model.nominal, drive, hash, ..known })
 }
 
-fn prior_of_ratio(ratio: f64, kind: GeneratorKind) -> Result<Prior<'static>, Failure> {
+fn prior_of_ratio(ratio: f64, kind: GeneratorKind) -> Result<Prior<'static>, PythonFailure> {
     if !(ratio.is_finite() && ratio.abs() >= 2.0 && ratio.abs() <= 1e4) {
-        return Err(Failure::bad(format!("ratio: found {ratio}, allowed: 2 to 10000, or negative")));
+        return Err(PythonFailure::bad(format!("ratio: found {ratio}, allowed: 2 to 10000, or negative")));
     }
     Ok(Prior::of_ratio(ratio, kind))
 }
 
-fn calibration_failure(error: &CalibrationError, logs: &[LogFrom]) -> Failure {
+fn calibration_failure(error: &CalibrationError, logs: &[LogFrom]) -> PythonFailure {
     let names: Vec<String> = logs.iter().map(LogFrom::name).collect();
     let what = match error {
         CalibrationError::Measured(_) | CalibrationError::Known(_) => error.to_string(),
         _ => format!("{}: {error}", names.join(", ")),
     };
     match error {
-        CalibrationError::NothingGained(_) => Failure::NothingGained(what),
-        _ => Failure::of(what, error.is_bad_input()),
+        CalibrationError::NothingGained(_) => PythonFailure::NothingGained(what),
+        _ => PythonFailure::of(what, error.is_bad_input()),
     }
 }
 
@@ -179,12 +182,14 @@ pub fn diagnose<'py>(
                 PipelineError::Known(_) | PipelineError::Diagnosis(_) => format!("{}: {error}", log.name()),
                 _ => error.to_string(),
             };
-            Failure::of(what, error.is_bad_input())
+            PythonFailure::of(what, error.is_bad_input())
         };
         let subject = match &known {
-            KnownFrom::Model(path) => Subject::of_model(Model::read(path).map_err(Failure::bad)?, drive.clone(), kind),
-            KnownFrom::Image(image) => Subject::of_table(image, drive.clone(), kind).map_err(Failure::bad)?,
-            KnownFrom::Ratio(_) => return Err(Failure::bad("expected model or table")),
+            KnownFrom::Model(path) => {
+                Subject::of_model(Model::read(path).map_err(PythonFailure::bad)?, drive.clone(), kind)
+            }
+            KnownFrom::Image(image) => Subject::of_table(image, drive.clone(), kind).map_err(PythonFailure::bad)?,
+            KnownFrom::Ratio(_) => return Err(PythonFailure::bad("expected model or table")),
         };
         let subject = match &kernels {
             Some(path) => with_kernels(subject, path)?,
@@ -206,10 +211,13 @@ pub fn diagnose<'py>(
                 .files
                 .extend(["fxt", "json", "rs", "h"].map(|ending| format!("{}-extended.{ending}", table.kind)));
         }
-        let json = serde_json::to_string(&done.file(&extension, "")).map_err(Failure::bad)?;
+        let json = serde_json::to_string(&done.file(&extension, "")).map_err(PythonFailure::bad)?;
         let explanation = asked.map(|cause| {
             let explanation = Explanation::of(&done.diagnosis, cause);
-            Ok((explanation.text().trim_end().to_owned(), serde_json::to_string(&explanation).map_err(Failure::bad)?))
+            Ok((
+                explanation.text().trim_end().to_owned(),
+                serde_json::to_string(&explanation).map_err(PythonFailure::bad)?,
+            ))
         });
         let series = done.extended.predict(&done.recording.sessions, &subject.nominal, subject.table.as_ref());
         let rows = Rows::of(&done.recording.sessions, &series);
@@ -221,8 +229,8 @@ pub fn diagnose<'py>(
 }
 
 /// A subject with the influence kernels of a file.
-fn with_kernels<'a>(subject: Subject<'a>, path: &Path) -> Result<Subject<'a>, Failure> {
-    let named = |what: String| Failure::bad(format!("{}: {what}", path.display()));
+fn with_kernels<'a>(subject: Subject<'a>, path: &Path) -> Result<Subject<'a>, PythonFailure> {
+    let named = |what: String| PythonFailure::bad(format!("{}: {what}", path.display()));
     let text = std::fs::read_to_string(path).map_err(|error| named(error.to_string()))?;
     let kernels = Kernels::from_json(&text).map_err(|problem| named(problem.to_string()))?;
     subject.with_kernels(kernels).map_err(|error| named(error.to_string()))

@@ -16,7 +16,7 @@ use std::time::Duration;
 
 use pyo3::prelude::*;
 
-use crate::failure::{Failure, bad};
+use crate::failure::{PythonFailure, bad};
 
 /// How often signals are looked for.
 const TICK: Duration = Duration::from_millis(50);
@@ -58,7 +58,7 @@ pub fn run<R: Send + 'static>(
     py: Python<'_>,
     threads: Option<usize>,
     progress: Option<&Bound<'_, PyAny>>,
-    work: impl FnOnce(&RunWatch) -> Result<R, Failure> + Send + 'static,
+    work: impl FnOnce(&RunWatch) -> Result<R, PythonFailure> + Send + 'static,
 ) -> PyResult<R> {
     if threads.is_some_and(|threads| !(1..=1024).contains(&threads)) {
         return Err(bad(format!("threads: found {}, allowed: 1 to 1024", threads.unwrap_or_default())));
@@ -66,9 +66,9 @@ pub fn run<R: Send + 'static>(
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads.unwrap_or(0))
         .build()
-        .map_err(|error| Failure::NotConverged(format!("cannot start threads: {error}")))?;
+        .map_err(|error| PythonFailure::NotConverged(format!("cannot start threads: {error}")))?;
     let watch = RunWatch::default();
-    let (send, receive) = channel::<Result<Result<R, Failure>, Box<dyn Any + Send>>>();
+    let (send, receive) = channel::<Result<Result<R, PythonFailure>, Box<dyn Any + Send>>>();
     let works = watch.clone();
     thread::spawn(move || {
         let done = catch_unwind(AssertUnwindSafe(|| pool.install(|| work(&works))));
@@ -86,7 +86,7 @@ pub fn run<R: Send + 'static>(
             }
             Ok(Err(panic)) => resume_unwind(panic),
             Err(RecvTimeoutError::Disconnected) => {
-                return Err(Failure::NotConverged("the run ended without a result".to_owned()).into());
+                return Err(PythonFailure::NotConverged("the run ended without a result".to_owned()).into());
             }
             Err(RecvTimeoutError::Timeout) => {}
         }

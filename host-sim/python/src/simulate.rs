@@ -10,7 +10,7 @@ use pyo3::types::PyDict;
 
 use crate::columns::columns;
 use crate::drive::{Drive, generator, method};
-use crate::failure::{Failure, bad};
+use crate::failure::{PythonFailure, bad};
 use crate::run::run;
 
 /// Points of a path: generator angle, and where wanted torque and temperature.
@@ -80,7 +80,7 @@ pub fn simulate<'py>(
         run_along(&drive, &settings, &mut |now| {
             watch.tell(now.done, now.total, format!("{} iterations", now.iterations))
         })
-        .map_err(|error: SimulateError| Failure::of(&error, error.is_bad_input()))
+        .map_err(|error: SimulateError| PythonFailure::of(&error, error.is_bad_input()))
     })?;
     Ok((columns(py, &simulation.rows)?, summary_json(&simulation.summary)?))
 }

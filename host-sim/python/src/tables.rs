@@ -13,7 +13,7 @@ use pyo3::types::PyBytes;
 use rayon::prelude::*;
 
 use crate::drive::{Drive, generator, method};
-use crate::failure::{Failure, bad};
+use crate::failure::{PythonFailure, bad};
 use crate::run::run;
 
 /// A finished table as Python takes it: generator, image, text of its JSON, Rust source, C header, samples as CSV.
@@ -74,8 +74,8 @@ pub fn tables<'py>(
         let counts = Mutex::new(vec![[0; 2]; wanted.len()]);
         let one = |(k, (kind, settings)): (usize, &(_, TableSettings))| {
             let failed = |error: MakeError| match error.is_bad_input() {
-                true => Failure::bad(error),
-                false => Failure::NotConverged(format!("{kind}: {error}")),
+                true => PythonFailure::bad(error),
+                false => PythonFailure::NotConverged(format!("{kind}: {error}")),
             };
             make(&drive, *kind, settings, &|now| {
                 let Ok(mut counts) = counts.lock() else { return std::ops::ControlFlow::Continue(()) };
@@ -89,7 +89,7 @@ pub fn tables<'py>(
             })
             .map_err(failed)
         };
-        wanted.par_iter().enumerate().map(one).collect::<Result<Vec<MadeTable>, Failure>>()
+        wanted.par_iter().enumerate().map(one).collect::<Result<Vec<MadeTable>, PythonFailure>>()
     })?;
     made.iter().map(|made| parts(py, made)).collect()
 }

@@ -3,7 +3,8 @@
 use serde_json::{Map, json};
 
 use super::page::{
-    Axis, Block, Choice, Detail, Headline, Lines, Mark, Page, PageQuantity, Section, Series, Status, Text,
+    ChartAxis, ChartSeries, Choice, Detail, Headline, Lines, Mark, Page, PageBlock, PageQuantity, PageSection,
+    RichText, Status,
 };
 use flexspline_identify::calibrate::{Calibrated, Calibration, PartSays};
 
@@ -43,15 +44,15 @@ fn headline(c: &Calibration) -> Headline {
         if c.reading_delay.is_some() { ", the delay between the readings taken out" } else { "" }
     );
     Headline::new(
-        Text::filled(&words, &[(c.held_out.rms_after_arcsec, 3), (c.held_out.rms_before_arcsec, 3)]),
-        Text::arcsec(c.held_out.rms_after_arcsec, 3),
+        RichText::filled(&words, &[(c.held_out.rms_after_arcsec, 3), (c.held_out.rms_before_arcsec, 3)]),
+        RichText::arcsec(c.held_out.rms_after_arcsec, 3),
         format!("left, rms, in {} left out", c.left_out),
     )
 }
 
-fn left(made: &Calibrated) -> Section {
+fn left(made: &Calibrated) -> PageSection {
     let c = &made.calibration;
-    let row = |name: &str, arcsec: f64| vec![Text::new(name), Text::arcsec(arcsec, 3)];
+    let row = |name: &str, arcsec: f64| vec![RichText::new(name), RichText::arcsec(arcsec, 3)];
     let measured = if c.reading_delay.is_some() { "As measured less the delay" } else { "As measured" };
     let mut rows = vec![
         row(&format!("{measured}, rows in steady motion"), c.held_out.rms_before_arcsec),
@@ -67,39 +68,39 @@ fn left(made: &Calibrated) -> Section {
     let every = made.shown.len().div_ceil(MOST_POINTS).max(1);
     let series = |name, colour, at: usize| {
         let points = made.shown.iter().step_by(every).map(|row| [row[0] / std::f64::consts::TAU, row[at]]);
-        Series::sorted(name, Mark::Dots, colour, points.collect())
+        ChartSeries::sorted(name, Mark::Dots, colour, points.collect())
     };
-    let figure = Block::lines(
+    let figure = PageBlock::lines(
         "over-output",
         "Error over the output angle",
         "Rows in steady motion, before and after; here the table has seen all of them.",
-        [Axis::new("Output", PageQuantity::Turn), Axis::new("Error", PageQuantity::Error)],
+        [ChartAxis::new("Output", PageQuantity::Turn), ChartAxis::new("Error", PageQuantity::Error)],
         Lines::of(vec![series("measured", 0, 1), series("left by the table", 1, 2)]).for_every_choice(),
     );
-    let table = Block::table("What is left, root mean square", &["Of", "Error"], rows);
-    Section::new("left", "What is left", Detail::Summary, vec![table, figure])
+    let table = PageBlock::table("What is left, root mean square", &["Of", "Error"], rows);
+    PageSection::new("left", "What is left", Detail::Summary, vec![table, figure])
 }
 
-fn parts(c: &Calibration) -> Section {
+fn parts(c: &Calibration) -> PageSection {
     let row = |part: &PartSays| {
         let gain = part.held_out_gain.map_or("–".to_owned(), |gain| format!("{:.1} %", 100.0 * gain));
         vec![
             part.name.replace('_', " ").into(),
             if part.kept { "kept" } else { "refused" }.into(),
             gain.into(),
-            part.size_arcsec.map_or("–".into(), |size| Text::arcsec(size, 3)),
+            part.size_arcsec.map_or("–".into(), |size| RichText::arcsec(size, 3)),
             part.why.clone().into(),
         ]
     };
     let caption = "Parts; the gain is the share of the squares before that a part takes where nothing was fitted, the \
                    size half of peak to peak";
     let header = ["Part", "Verdict", "Gain", "Size", "Why"];
-    let table = Block::table(caption, &header, c.parts.iter().map(row).collect());
-    Section::new("parts", "Its parts", Detail::Summary, vec![table])
+    let table = PageBlock::table(caption, &header, c.parts.iter().map(row).collect());
+    PageSection::new("parts", "Its parts", Detail::Summary, vec![table])
 }
 
-fn reading() -> Section {
-    Section::reading(vec![Block::paragraph(
+fn reading() -> PageSection {
+    PageSection::reading(vec![PageBlock::paragraph(
         "A table of one unit says what its error is, not why: two causes that look alike in these logs are one part \
          here. It holds for the torques, temperatures and angles recorded. The figures where nothing was fitted leave \
          out each file, session or block in turn; which parts there are, how smooth they are and their coefficients \

@@ -5,7 +5,8 @@ use std::f64::consts::TAU;
 
 use super::animation::{Animation, FRAMES};
 use super::page::{
-    Axis, Block, Detail, Figure, FigureBody, Lines, Mark, PageQuantity, Section, Series, Text, significant,
+    ChartAxis, ChartSeries, Detail, Figure, FigureBody, Lines, Mark, PageBlock, PageQuantity, PageSection, RichText,
+    significant,
 };
 use flexspline_design::cautions::Caution;
 use flexspline_design::simulate::Row;
@@ -62,8 +63,8 @@ pub fn less_mean(animation: &Animation) -> Vec<[f64; 2]> {
 }
 
 /// The generator angle over a pitch, linked with the drive.
-pub(super) fn over_pitch() -> Axis {
-    Axis::linked("Generator from the beginning of a pitch")
+pub(super) fn over_pitch() -> ChartAxis {
+    ChartAxis::linked("Generator from the beginning of a pitch")
 }
 
 /// The drive to scale; `state` says under what load it turns, and which way.
@@ -108,14 +109,14 @@ pub(super) fn stress_lines(animation: &Animation) -> Lines {
             let (_, row) = rows.iter().find(|(frame, _)| *frame == k % FRAMES)?;
             Some([degrees(animation, k as i64), of(row)])
         };
-        Series::new(name, Mark::Line, colour, (0..=FRAMES).filter_map(point).collect())
+        ChartSeries::new(name, Mark::Line, colour, (0..=FRAMES).filter_map(point).collect())
     };
     Lines::of(STRESSES.into_iter().enumerate().map(series).collect())
 }
 
 /// Stress and pressures over a pitch, a chart to each choice.
 pub(super) fn stress_figure(charts: Vec<(String, Lines)>) -> Figure {
-    let (x, y) = (over_pitch(), Axis::new("Stress, pressure", PageQuantity::Stress));
+    let (x, y) = (over_pitch(), ChartAxis::new("Stress, pressure", PageQuantity::Stress));
     let caption = format!("At the load of figure 1. {STRESSES_ARE}");
     Figure::of("stress", "Largest stress and pressures over a pitch", caption, FigureBody::Lines { x, y, charts })
 }
@@ -135,15 +136,15 @@ pub(super) fn sharing_lines(animation: &Animation) -> Lines {
     let series = |(colour, (mark, row)): (usize, (Mark, usize))| {
         let points =
             (-half..half).map(|k| [degrees(animation, k), force(row, k.rem_euclid(samples as i64) as usize)]).collect();
-        Series::new(BEARS[colour], mark, colour, points)
+        ChartSeries::new(BEARS[colour], mark, colour, points)
     };
     let rows = [(Mark::Line, 0), (Mark::Line, 4), (Mark::Dashed, 8)];
     Lines::of(rows.into_iter().enumerate().map(series).collect())
 }
 
 /// The axes of [`sharing_figure`].
-pub(super) fn sharing_axes() -> [Axis; 2] {
-    [Axis::new("Tooth from the major axis", PageQuantity::Degree), Axis::new("Force", PageQuantity::Force)]
+pub(super) fn sharing_axes() -> [ChartAxis; 2] {
+    [ChartAxis::new("Tooth from the major axis", PageQuantity::Degree), ChartAxis::new("Force", PageQuantity::Force)]
 }
 
 /// How the load is shared among the teeth, a chart to each choice.
@@ -155,22 +156,23 @@ pub(super) fn sharing_figure(charts: Vec<(String, Lines)>) -> Figure {
 }
 
 /// The data sheets and what is computed of them, by choice; nothing where there is none.
-pub(super) fn sheet_section(sheets: Vec<(String, SheetBeside)>) -> Option<Section> {
+pub(super) fn sheet_section(sheets: Vec<(String, SheetBeside)>) -> Option<PageSection> {
     let source = sheets.first()?.1.stated.source.clone().unwrap_or_else(|| "the data sheet".to_owned());
     let mut blocks = Vec::new();
     for (id, sheet) in sheets {
-        let number = |value: Option<f64>| Text::new(value.map_or_else(|| "–".to_owned(), |v| significant(v, 3)));
+        let number = |value: Option<f64>| RichText::new(value.map_or_else(|| "–".to_owned(), |v| significant(v, 3)));
         let row = |row: &Beside| {
             let (name, unit) = row.in_words();
             let numbers = [Some(row.stated), row.computed, row.ratio].map(number);
-            [vec![Text::new(format!("{name}, {unit}"))], numbers.into(), vec![Text::new(row.remark(&sheet))]].concat()
+            [vec![RichText::new(format!("{name}, {unit}"))], numbers.into(), vec![RichText::new(row.remark(&sheet))]]
+                .concat()
         };
         let caption = format!("{source} and contact FEM; {} N·m", sheet.loads_in_words());
         let header = ["Figure", "stated", "computed", "ratio", "what is computed"];
-        let table = Block::table(caption, &header, sheet.beside.iter().map(row).collect());
-        let loads = sheet.assumed_in_words().map(|what| Block::paragraph(format!("Loads: {what}.")));
-        let why = sheet.why.as_ref().map(|why| Block::paragraph(format!("Not all of it was computed: {why}.")));
+        let table = PageBlock::table(caption, &header, sheet.beside.iter().map(row).collect());
+        let loads = sheet.assumed_in_words().map(|what| PageBlock::paragraph(format!("Loads: {what}.")));
+        let why = sheet.why.as_ref().map(|why| PageBlock::paragraph(format!("Not all of it was computed: {why}.")));
         blocks.extend([Some(table), loads, why].into_iter().flatten().map(|block| block.of_choice(id.clone())));
     }
-    Some(Section::new("data-sheet", "The data sheet and the model", Detail::Summary, blocks))
+    Some(PageSection::new("data-sheet", "The data sheet and the model", Detail::Summary, blocks))
 }

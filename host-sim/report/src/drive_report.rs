@@ -11,8 +11,8 @@ use super::drive_figures::{
     sheet_section, sleeve_figure, stress_figure, stress_lines,
 };
 use super::page::{
-    Axis, Block, Choice, Detail, Headline, Limit, Lines, Mark, Page, PageQuantity, SIGNS, Section, Series, Status,
-    Text, made_of_drive, significant,
+    ChartAxis, ChartSeries, Choice, Detail, Headline, Limit, Lines, Mark, Page, PageBlock, PageQuantity, PageSection,
+    RichText, SIGNS, Status, made_of_drive, significant,
 };
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::stated::TWO_SETS_OF_K;
@@ -167,15 +167,15 @@ impl<'a> DriveKnown<'a> {
                 "The {name} table misses fresh contact FEM by {{}} rms, where the drive without a table is off by {{}}."
             );
             Headline::new(
-                Text::filled(&answer, &[(v.rms_arcsec, 2), (v.uncompensated_rms_arcsec, 3)]),
-                Text::arcsec(v.max_arcsec, 2),
+                RichText::filled(&answer, &[(v.rms_arcsec, 2), (v.uncompensated_rms_arcsec, 3)]),
+                RichText::arcsec(v.max_arcsec, 2),
                 format!("largest miss at {} points that made no table", v.points.len()),
             )
         } else if let Some([_, worst]) = self.fresh {
             let answer = uncorrected + "its table predicts the output to within {} of fresh FEM.";
             Headline::new(
-                Text::filled(&answer, &[(self.largest_error, 3), (worst, 2)]),
-                Text::arcsec(worst, 2),
+                RichText::filled(&answer, &[(self.largest_error, 3), (worst, 2)]),
+                RichText::arcsec(worst, 2),
                 format!(
                     "largest miss at {FRAMES} FEM points that made no table ({} N·m, {:.0} °C, forward)",
                     torque_text(shown_torque_n_m(&self.subject.table) as f32),
@@ -188,8 +188,8 @@ impl<'a> DriveKnown<'a> {
                 + "the error with its table is not measured here. It holds the samples that made it to {}, which \
                    says nothing of other points.";
             Headline::new(
-                Text::filled(&answer, &[(self.largest_error, 3), (worst, 2)]),
-                Text::arcsec(self.largest_error, 3),
+                RichText::filled(&answer, &[(self.largest_error, 3), (worst, 2)]),
+                RichText::arcsec(self.largest_error, 3),
                 "largest error without a table; with one, see validate, or replay on rows that made none",
             )
         };
@@ -213,12 +213,12 @@ impl<'a> DriveKnown<'a> {
                     [angle.to_degrees(), self.error(angle, torque, self.temperature, direction) - mean]
                 });
                 let name = format!("{} N·m {word}", torque_text(torque));
-                lines.series.push(Series::new(name, mark, colour, points.collect()));
+                lines.series.push(ChartSeries::new(name, mark, colour, points.collect()));
             }
         }
         if let Ok(animation) = &self.subject.animation {
             let name = format!("{} N·m forward, fresh FEM", torque_text(animation.torque_n_m as f32));
-            lines.series.push(Series::new(name, Mark::Points, 1, less_mean(animation)));
+            lines.series.push(ChartSeries::new(name, Mark::Points, 1, less_mean(animation)));
         }
         lines
     }
@@ -226,12 +226,12 @@ impl<'a> DriveKnown<'a> {
     fn wind_up(&self) -> Lines {
         let of = |(colour, (direction, name, mark)): (usize, (Direction, &str, Mark))| {
             let mean = |t: f32| [f64::from(t), self.mean(t, self.temperature, direction)];
-            Series::new(name, mark, colour, self.torques().into_iter().map(mean).collect())
+            ChartSeries::new(name, mark, colour, self.torques().into_iter().map(mean).collect())
         };
-        let mut series: Vec<Series> = WAYS.into_iter().enumerate().map(of).collect();
+        let mut series: Vec<ChartSeries> = WAYS.into_iter().enumerate().map(of).collect();
         if let Ok(a) = &self.subject.animation {
             let point = vec![[a.torque_n_m, mean_arcsec(a)]];
-            series.push(Series::new("forward, fresh FEM", Mark::Points, 2, point));
+            series.push(ChartSeries::new("forward, fresh FEM", Mark::Points, 2, point));
         }
         Lines::of(series)
     }
@@ -249,13 +249,13 @@ impl<'a> DriveKnown<'a> {
         let series = temperatures.into_iter().enumerate().map(|(colour, temperature)| {
             let points = self.torques().into_iter().map(|t| [f64::from(t), self.play_at(t, temperature)]);
             let mark = if colour == 1 { Mark::Line } else { Mark::Dashed };
-            Series::new(format!("{temperature:.0} °C"), mark, colour, points.collect())
+            ChartSeries::new(format!("{temperature:.0} °C"), mark, colour, points.collect())
         });
         Lines::of(series.collect())
     }
 
     /// A row of the comparison.
-    fn compared(&self) -> Vec<Text> {
+    fn compared(&self) -> Vec<RichText> {
         let [_, highest] = self.subject.table.torque_range_n_m();
         let middle = |torque: f32| {
             let mean = |d| self.mean(torque, self.temperature, d);
@@ -269,14 +269,14 @@ impl<'a> DriveKnown<'a> {
         let plays = self.torques().into_iter().map(|t| self.play_at(t, self.temperature));
         let left = self.subject.validation.map(|v| [v.rms_arcsec, v.max_arcsec]).or(self.fresh);
         vec![
-            Text::new(self.subject.kind.in_words()),
-            Text::arcsec(self.largest_error, 3),
-            left.map_or("–".into(), |[rms, worst]| Text::arcsec(rms, 2).plain(" / ").error(worst, 2)),
-            Text::arcsec(plays.fold(0.0, f64::max), 3),
-            Text::arcsec(wind_up, 3),
-            Text::arcsec(high - low, 2),
-            Text::new(torque_text(highest)),
-            Text::new(self.subject.table.id().to_string()),
+            RichText::new(self.subject.kind.in_words()),
+            RichText::arcsec(self.largest_error, 3),
+            left.map_or("–".into(), |[rms, worst]| RichText::arcsec(rms, 2).plain(" / ").error(worst, 2)),
+            RichText::arcsec(plays.fold(0.0, f64::max), 3),
+            RichText::arcsec(wind_up, 3),
+            RichText::arcsec(high - low, 2),
+            RichText::new(torque_text(highest)),
+            RichText::new(self.subject.table.id().to_string()),
         ]
     }
 }
@@ -286,8 +286,8 @@ fn misses(v: &Validation, over: fn(&Point) -> f64) -> Lines {
     let series = [(1, "forward"), (-1, "backward")].into_iter().enumerate().map(|(colour, (direction, name))| {
         let steady = v.points.iter().filter(|p| p.kind == "steady" && p.direction == direction);
         let points = steady.map(|p| [over(p), p.table_arcsec - p.fem_arcsec]).collect();
-        let sorted = Series::sorted(name, Mark::Points, colour, points);
-        Series { points: apart(sorted.points), ..sorted }
+        let sorted = ChartSeries::sorted(name, Mark::Points, colour, points);
+        ChartSeries { points: apart(sorted.points), ..sorted }
     });
     let limits = [v.max_bound_arcsec, -v.max_bound_arcsec].map(|y| Limit { name: "bound of any point".into(), y });
     Lines { series: series.collect(), limits: limits.into(), ..Lines::default() }
@@ -299,7 +299,7 @@ fn reversal(v: &Validation) -> Lines {
     let first = points.first().map_or(0.0, |p| p.generator_rad);
     let along = |name: &str, mark, colour, of: fn(&Point) -> f64| {
         let points = points.iter().map(|p| [(first - p.generator_rad).abs().to_degrees(), of(p)]);
-        Series::sorted(name, mark, colour, points.collect())
+        ChartSeries::sorted(name, mark, colour, points.collect())
     };
     Lines::of(vec![
         along("table and play, as firmware has them", Mark::Line, 0, |p| p.table_arcsec),
@@ -320,7 +320,7 @@ pub fn drive_report(sources: DriveSources<'_>) -> Page {
     let sheet = |k: &DriveKnown<'_>| k.subject.info.and_then(|info| Some((k.id(), info.data_sheet.clone()?)));
     let mut sheets = sheet_section(known.iter().filter_map(sheet).collect());
     if let Some(section) = &mut sheets {
-        section.blocks.push(Block::paragraph(format!("The JSON of a table has stiffness, too: {TWO_SETS_OF_K}.")));
+        section.blocks.push(PageBlock::paragraph(format!("The JSON of a table has stiffness, too: {TWO_SETS_OF_K}.")));
     }
     sections.extend(sheets);
     sections.extend(stress_section(&known));
@@ -461,25 +461,25 @@ fn result_of(k: &DriveKnown<'_>) -> Value {
 }
 
 /// Stress over three meshes, where it was asked for.
-fn stress_section(known: &[DriveKnown<'_>]) -> Option<Section> {
+fn stress_section(known: &[DriveKnown<'_>]) -> Option<PageSection> {
     let block = |k: &DriveKnown<'_>| {
         let info = k.subject.info.filter(|info| !info.stress.is_empty())?;
         let rows = info.stress.iter().map(|stress| {
             let [low, high] = stress.interval_mpa;
-            let numbers = [stress.von_mises_mpa, low, high].map(|value| Text::new(significant(value, 3)));
-            [vec![Text::new(stress.place.in_words())], numbers.into()].concat()
+            let numbers = [stress.von_mises_mpa, low, high].map(|value| RichText::new(significant(value, 3)));
+            [vec![RichText::new(stress.place.in_words())], numbers.into()].concat()
         });
         let [_, highest] = k.subject.table.torque_range_n_m();
         let caption = format!("Largest von Mises stress under {} N·m, over three meshes", torque_text(highest));
         let header = ["Place", "stress, MPa", "from, MPa", "to, MPa"];
-        Some(Block::table(caption, &header, rows.collect()).of_choice(k.id()))
+        Some(PageBlock::table(caption, &header, rows.collect()).of_choice(k.id()))
     };
-    let blocks: Vec<Block> = known.iter().filter_map(block).collect();
+    let blocks: Vec<PageBlock> = known.iter().filter_map(block).collect();
     let title = "Stress, over three meshes";
-    (!blocks.is_empty()).then(|| Section::new("stress-by-place", title, Detail::Summary, blocks))
+    (!blocks.is_empty()).then(|| PageSection::new("stress-by-place", title, Detail::Summary, blocks))
 }
 
-fn comparison(known: &[DriveKnown<'_>], validated: bool) -> Section {
+fn comparison(known: &[DriveKnown<'_>], validated: bool) -> PageSection {
     let header = [
         // The purpose of a table comes first: a phone shows three columns.
         "Generator",
@@ -492,7 +492,7 @@ fn comparison(known: &[DriveKnown<'_>], validated: bool) -> Section {
         "table_id",
     ];
     let caption = "What each generator does to the output, and what its table leaves";
-    let table = Block::table(caption, &header, known.iter().map(DriveKnown::compared).collect());
+    let table = PageBlock::table(caption, &header, known.iter().map(DriveKnown::compared).collect());
     let matches = "The table_id is what firmware returns for the table it carries: it matches this page with a device \
                    in the field.";
     let words = if validated {
@@ -504,24 +504,24 @@ fn comparison(known: &[DriveKnown<'_>], validated: bool) -> Section {
             known.first().map_or(20.0, |k| k.temperature)
         )
     };
-    Section::new("comparison", "At a glance", Detail::Summary, vec![table, Block::paragraph(words)])
+    PageSection::new("comparison", "At a glance", Detail::Summary, vec![table, PageBlock::paragraph(words)])
 }
 
 /// The load, stretched about the drag, where the loaded flank changes.
-fn load_axis(known: &[DriveKnown<'_>]) -> Axis {
+fn load_axis(known: &[DriveKnown<'_>]) -> ChartAxis {
     let drag = known.first().map_or(0.02, |k| k.drive.output.drag_torque_n_m);
-    Axis::new("Load torque (stretched about zero)", PageQuantity::Torque).stretched(drag.max(1e-3))
+    ChartAxis::new("Load torque (stretched about zero)", PageQuantity::Torque).stretched(drag.max(1e-3))
 }
 
 fn charts(known: &[DriveKnown<'_>], of: impl Fn(&DriveKnown<'_>) -> Option<Lines>) -> Vec<(String, Lines)> {
     known.iter().filter_map(|k| Some((k.id(), of(k)?))).collect()
 }
 
-fn motion_section(known: &[DriveKnown<'_>]) -> Section {
-    let error = |label: &str| Axis::new(label, PageQuantity::Error);
+fn motion_section(known: &[DriveKnown<'_>]) -> PageSection {
+    let error = |label: &str| ChartAxis::new(label, PageQuantity::Error);
     let mut blocks = vec![
-        Block::Figure(drive_figure("at half the largest load of the table, turning forward")),
-        Block::lines(
+        PageBlock::Figure(drive_figure("at half the largest load of the table, turning forward")),
+        PageBlock::lines(
             "ripple",
             "Error over one tooth pitch, less its mean",
             "Output angle less generator angle over the ratio, by the table, at three loads in both directions; dots \
@@ -530,23 +530,23 @@ fn motion_section(known: &[DriveKnown<'_>]) -> Section {
             [over_pitch(), error("Output error less mean")],
             charts(known, |k| Some(k.ripple())),
         ),
-        Block::lines(
+        PageBlock::lines(
             "wind-up",
             "Error over the load",
             "Mean over a pitch, by the table, at the reference temperature: wind-up, and, where the load is too small \
              to hold the flanks together, the clearance. A positive load turns the output forward. Drag across to \
              zoom, double-click to come back.",
-            [Axis::new("Load torque", PageQuantity::Torque), error("Output error")],
+            [ChartAxis::new("Load torque", PageQuantity::Torque), error("Output error")],
             charts(known, |k| Some(k.wind_up())),
         ),
     ];
     if known.iter().any(|k| k.subject.animation.as_ref().is_ok_and(|a| a.sleeve.is_some())) {
-        blocks.push(Block::Figure(sleeve_figure()));
+        blocks.push(PageBlock::Figure(sleeve_figure()));
     }
-    Section::new("motion", "The drive at work", Detail::Summary, blocks)
+    PageSection::new("motion", "The drive at work", Detail::Summary, blocks)
 }
 
-fn validation_section(known: &[DriveKnown<'_>]) -> Section {
+fn validation_section(known: &[DriveKnown<'_>]) -> PageSection {
     let words = |k: &DriveKnown<'_>| {
         let v = k.subject.validation?;
         let (points, increments) = (v.points.len(), v.increments);
@@ -556,14 +556,14 @@ fn validation_section(known: &[DriveKnown<'_>]) -> Section {
         );
         let bounded = [v.rms_arcsec, v.rms_bound_arcsec, v.max_arcsec, v.max_bound_arcsec];
         let all = [&bounded[..], &[v.reversal_rms_arcsec, v.reversal_max_arcsec]].concat();
-        let text = Text::filled(&words, &all.iter().map(|arcsec| (*arcsec, 2)).collect::<Vec<_>>());
+        let text = RichText::filled(&words, &all.iter().map(|arcsec| (*arcsec, 2)).collect::<Vec<_>>());
         let text = text.strong(if v.status == "passed" { "Passed." } else { "Bound missed." });
-        Some(Block::paragraph(text).of_choice(k.id()))
+        Some(PageBlock::paragraph(text).of_choice(k.id()))
     };
-    let mut blocks: Vec<Block> = known.iter().filter_map(words).collect();
+    let mut blocks: Vec<PageBlock> = known.iter().filter_map(words).collect();
     let missed = |id, title, caption, x, over: fn(&Point) -> f64| {
-        let y = Axis::new("Table less FEM", PageQuantity::Error);
-        Block::lines(id, title, caption, [x, y], charts(known, |k| Some(misses(k.subject.validation?, over))))
+        let y = ChartAxis::new("Table less FEM", PageQuantity::Error);
+        PageBlock::lines(id, title, caption, [x, y], charts(known, |k| Some(misses(k.subject.validation?, over))))
     };
     blocks.push(missed(
         "miss-torque",
@@ -576,34 +576,34 @@ fn validation_section(known: &[DriveKnown<'_>]) -> Section {
         "miss-temperature",
         "Table less fresh FEM, over the temperature",
         "The same points.",
-        Axis::new("Temperature", PageQuantity::Temperature),
+        ChartAxis::new("Temperature", PageQuantity::Temperature),
         |p| p.temperature_c,
     ));
-    blocks.push(Block::lines(
+    blocks.push(PageBlock::lines(
         "reversal",
         "Through the clearance at a reversal",
         "Without load the generator turns back: the output stands until the clearance is crossed, and the error grows \
          with the generator. The line is what the core, with its play, gives from the same generator angles.",
-        [Axis::new("Generator travel", PageQuantity::Degree), Axis::new("Output error", PageQuantity::Error)],
+        [ChartAxis::new("Generator travel", PageQuantity::Degree), ChartAxis::new("Output error", PageQuantity::Error)],
         charts(known, |k| k.subject.validation.map(reversal)),
     ));
-    Section::new("validation", "Against fresh FEM", Detail::Summary, blocks)
+    PageSection::new("validation", "Against fresh FEM", Detail::Summary, blocks)
 }
 
-fn table_section(known: &[DriveKnown<'_>]) -> Section {
-    let mut blocks = vec![Block::lines(
+fn table_section(known: &[DriveKnown<'_>]) -> PageSection {
+    let mut blocks = vec![PageBlock::lines(
         "play",
         "Play between the directions",
         "Backward less forward error, mean over a pitch: both half-widths of the play. Below the drag of the output \
          nothing holds the flanks together and it is the backlash; beyond, what drag and friction leave.",
-        [load_axis(known), Axis::new("Backward less forward", PageQuantity::Error)],
+        [load_axis(known), ChartAxis::new("Backward less forward", PageQuantity::Error)],
         charts(known, |k| Some(k.play())),
     )];
     for k in known {
         let table = &k.subject.table;
         let [cold, warm] = table.temperature_range_c();
         let [low, high] = table.torque_range_n_m().map(torque_text);
-        let arcsec = |rad: f32| Text::arcsec(f64::from(rad) * ARCSEC_PER_RAD, 2);
+        let arcsec = |rad: f32| RichText::arcsec(f64::from(rad) * ARCSEC_PER_RAD, 2);
         let mut rows = vec![
             ("Range of the load", format!("{low} to {high} N·m").into()),
             ("Range of the temperature", format!("{cold} to {warm} °C").into()),
@@ -618,21 +618,21 @@ fn table_section(known: &[DriveKnown<'_>]) -> Section {
         }
         let rows = rows.into_iter().map(|(name, value)| vec![name.into(), value]).collect();
         let caption = format!("The {} table", k.subject.kind.in_words());
-        blocks.push(Block::table(caption, &["Property", "Value"], rows).of_choice(k.id()));
+        blocks.push(PageBlock::table(caption, &["Property", "Value"], rows).of_choice(k.id()));
     }
-    Section::new("table", "The table", Detail::Engineering, blocks)
+    PageSection::new("table", "The table", Detail::Engineering, blocks)
 }
 
-fn load_section(known: &[DriveKnown<'_>]) -> Section {
+fn load_section(known: &[DriveKnown<'_>]) -> PageSection {
     let of = |lines: fn(&Animation) -> Lines| charts(known, |k| k.subject.animation.as_ref().ok().map(lines));
     let figures = [stress_figure(of(stress_lines)), sharing_figure(of(sharing_lines))];
-    Section::new("load", "Load and stress", Detail::Engineering, figures.map(Block::Figure).into())
+    PageSection::new("load", "Load and stress", Detail::Engineering, figures.map(PageBlock::Figure).into())
 }
 
-fn reading_section() -> Section {
-    Section::reading(vec![
-        Block::paragraph(format!("{SIGNS} The flexspline is fixed, the circular spline is the output.")),
-        Block::paragraph(
+fn reading_section() -> PageSection {
+    PageSection::reading(vec![
+        PageBlock::paragraph(format!("{SIGNS} The flexspline is fixed, the circular spline is the output.")),
+        PageBlock::paragraph(
             "Fresh FEM means runs that made none of the tables, by the same model: agreement says that the table \
              holds what the model says, not that the model holds what a real drive does. Plane strain, quasi-static: \
              the cup of the flexspline, its skew, lubricant and speed are left out. Pointing along figure 2 turns the \

@@ -5,8 +5,8 @@ use flexspline_motion::loops::OpenLoop;
 use serde_json::{Map, json};
 
 use super::page::{
-    Axis, Block, Choice, Detail, Headline, Limit, Lines, Mark, Page, PageQuantity, Section, Series, Status, Text,
-    Upright,
+    ChartAxis, ChartSeries, Choice, Detail, Headline, Limit, Lines, Mark, Page, PageBlock, PageQuantity, PageSection,
+    RichText, Status, Upright,
 };
 use flexspline_fly::fly::{ByController, Flown, LEAST_PHASE_MARGIN_DEG, Results, spectrum};
 
@@ -48,8 +48,9 @@ fn headline(results: &Results) -> Headline {
     let rms = &results.rms_arcsec;
     let words = "The compensated joint points to {} rms, where it leaves {} without compensation and {} with an error \
                  map by angle and direction.";
-    let answer = Text::filled(words, &[rms.compensated, rms.none, rms.fourier_by_direction].map(|arcsec| (arcsec, 3)));
-    Headline::new(answer, Text::arcsec(rms.compensated, 3), "output less target, rms")
+    let answer =
+        RichText::filled(words, &[rms.compensated, rms.none, rms.fourier_by_direction].map(|arcsec| (arcsec, 3)));
+    Headline::new(answer, RichText::arcsec(rms.compensated, 3), "output less target, rms")
 }
 
 fn cells(of: &ByController<f64>) -> [f64; 5] {
@@ -60,22 +61,22 @@ fn cells(of: &ByController<f64>) -> [f64; 5] {
 const FAINT_ARCSEC: f64 = 0.01;
 
 /// A curve to each controller, that of the core over all others: an ideal lies close to it.
-fn drawn(points: impl Fn(usize) -> Vec<[f64; 2]>) -> Vec<Series> {
+fn drawn(points: impl Fn(usize) -> Vec<[f64; 2]>) -> Vec<ChartSeries> {
     let mut order: Vec<usize> = (0..CONTROLLERS.len()).collect();
     order.sort_by_key(|k| *k == COMPENSATED);
-    let series = |k: usize| Series::new(CONTROLLERS[k].replace('_', " "), Mark::Line, k, points(k));
+    let series = |k: usize| ChartSeries::new(CONTROLLERS[k].replace('_', " "), Mark::Line, k, points(k));
     order.into_iter().map(series).collect()
 }
 
-fn tracking(flight: &Flight, results: &Results) -> Section {
+fn tracking(flight: &Flight, results: &Results) -> PageSection {
     let columns = [&results.rms_arcsec, &results.max_arcsec, &results.velocity_ripple].map(cells);
     let settles = results.settle_s.as_ref().map(cells);
     let row = |(k, name): (usize, &&str)| {
         let [rms, largest, ripple] = columns.map(|column| column[k]);
         vec![
             name.replace('_', " ").into(),
-            Text::arcsec(rms, 3),
-            Text::arcsec(largest, 3),
+            RichText::arcsec(rms, 3),
+            RichText::arcsec(largest, 3),
             if ripple.is_finite() { format!("{ripple:.1} ″/s").into() } else { "–".into() },
             settles.map_or("–".into(), |seconds| format!("{:.2} s", seconds[k]).into()),
         ]
@@ -83,51 +84,51 @@ fn tracking(flight: &Flight, results: &Results) -> Section {
     let caption = "Output less target; speed of the output less the target's while that is even; time to settle after \
                    a slew";
     let header = ["Controller", "rms", "largest", "velocity ripple", "settles in"];
-    let table = Block::table(caption, &header, CONTROLLERS.iter().enumerate().map(row).collect());
+    let table = PageBlock::table(caption, &header, CONTROLLERS.iter().enumerate().map(row).collect());
     let over_time = |id, title, caption, y, column: usize| {
         let series = drawn(|k| flight.flown[k].rows.iter().map(|row| [row[0], row[column]]).collect());
-        let x = Axis::new("Time", PageQuantity::Second);
-        Block::lines(id, title, caption, [x, y], Lines::of(series).for_every_choice())
+        let x = ChartAxis::new("Time", PageQuantity::Second);
+        PageBlock::lines(id, title, caption, [x, y], Lines::of(series).for_every_choice())
     };
     let error = over_time(
         "error",
         "Error over time",
         "Output less target. All controllers fly the same unit under the same sky.",
-        Axis::new("Error", PageQuantity::Error),
+        ChartAxis::new("Error", PageQuantity::Error),
         1,
     );
     let mesh = over_time(
         "mesh",
         "Torque in the mesh",
         "The torque that the flanks carry: load, drag and inertia.",
-        Axis::new("Torque", PageQuantity::Torque),
+        ChartAxis::new("Torque", PageQuantity::Torque),
         2,
     );
-    Section::new("tracking", "Tracking", Detail::Summary, vec![table, error, mesh])
+    PageSection::new("tracking", "Tracking", Detail::Summary, vec![table, error, mesh])
 }
 
-fn over_frequency() -> Axis {
-    Axis::new("Frequency, Hz", PageQuantity::Count).stretched(1.0)
+fn over_frequency() -> ChartAxis {
+    ChartAxis::new("Frequency, Hz", PageQuantity::Count).stretched(1.0)
 }
 
-fn details(flown: &Flown, flight: &Flight, results: &Results) -> Section {
-    let spectrum = Block::lines(
+fn details(flown: &Flown, flight: &Flight, results: &Results) -> PageSection {
+    let spectrum = PageBlock::lines(
         "spectrum",
         "Spectrum of the error",
         "Amplitude of lines, from windows of 4 s.",
-        [over_frequency(), Axis::new("Amplitude", PageQuantity::Error).stretched(FAINT_ARCSEC)],
+        [over_frequency(), ChartAxis::new("Amplitude", PageQuantity::Error).stretched(FAINT_ARCSEC)],
         Lines::of(drawn(|k| spectrum(&flown.scenario, &flight.flown[k]))).for_every_choice(),
     );
     let stable = if results.stable { "stable" } else { "not stable" };
-    let table = Block::figures(format!("Loops and limits; {stable} after a knock"), &results.figures());
-    Section::new("loops", "Spectrum, loops and limits", Detail::Summary, vec![spectrum, table])
+    let table = PageBlock::figures(format!("Loops and limits; {stable} after a knock"), &results.figures());
+    PageSection::new("loops", "Spectrum, loops and limits", Detail::Summary, vec![spectrum, table])
 }
 
 /// Sizes of the open loop that the pictures show. A guess: what is far from 1 says nothing about margins.
 const SIZES: [f64; 2] = [1e-2, 1e2];
 
 /// The servo's open loop over the frequency, with the margins in it.
-fn servo(flown: &Flown, flight: &Flight, results: &Results) -> Section {
+fn servo(flown: &Flown, flight: &Flight, results: &Results) -> PageSection {
     let open: Vec<OpenLoop> = flight.joint.servo_loop(&flown.scenario.servo).collect();
     let from_edge = |at: &OpenLoop| (at.real + 1.0).hypot(at.imaginary);
     let nearest = open.iter().min_by(|a, b| from_edge(a).total_cmp(&from_edge(b)));
@@ -139,16 +140,16 @@ fn servo(flown: &Flown, flight: &Flight, results: &Results) -> Section {
     let bode = |id, title, caption, y, value: fn(&OpenLoop) -> f64, limits: Vec<Limit>| {
         let shown = open.iter().filter(|at| (SIZES[0]..=SIZES[1]).contains(&at.size()));
         let points = shown.map(|at| [at.hz, value(at)]).collect();
-        let series = vec![Series::new("open loop", Mark::Line, 0, points)];
+        let series = vec![ChartSeries::new("open loop", Mark::Line, 0, points)];
         let chart = Lines { series, limits, uprights: uprights.clone() };
-        Block::lines(id, title, caption, [over_frequency(), y], chart.for_every_choice())
+        PageBlock::lines(id, title, caption, [over_frequency(), y], chart.for_every_choice())
     };
     let limit = |name: String, y: f64| Limit { name, y };
     let gain = bode(
         "bode-gain",
         "Gain of the servo's open loop",
         "Motor, load and servo with the delay of its ticks. Where the gain is 1 (0 dB) the phase margin is taken.",
-        Axis::new("Gain, dB", PageQuantity::Count),
+        ChartAxis::new("Gain, dB", PageQuantity::Count),
         |at| 20.0 * at.size().log10(),
         vec![limit("0 dB".to_owned(), 0.0)],
     );
@@ -157,15 +158,15 @@ fn servo(flown: &Flown, flight: &Flight, results: &Results) -> Section {
         "bode-phase",
         "Phase of the servo's open loop",
         "The phase margin is the distance to −180° where the gain is 1.",
-        Axis::new("Phase", PageQuantity::Degree),
+        ChartAxis::new("Phase", PageQuantity::Degree),
         OpenLoop::phase_deg,
         vec![limit("−180°".to_owned(), -180.0), sound],
     );
-    Section::new("servo", "The servo and its margins", Detail::Summary, vec![gain, phase])
+    PageSection::new("servo", "The servo and its margins", Detail::Summary, vec![gain, phase])
 }
 
-fn reading() -> Section {
-    Section::reading(vec![Block::paragraph(
+fn reading() -> PageSection {
+    PageSection::reading(vec![PageBlock::paragraph(
         "The unit has wind-up, clearance and tooth ripple of the contact FEM of HHD-95, is 6 % stiffer with 2″ more \
          clearance, and has lines of eccentric wheels, pitch errors and an eccentric encoder that the nominal table \
          does not know. The two error maps hold the unit's own error over the angles, recorded without noise at the \

@@ -24,4 +24,4 @@ pub mod sweep_report;
 pub use animation::{Animation, AnimationError};
 pub use drive_report::{DriveSources, DriveSubject, drive_report, shown_torque_n_m};
 pub use pack::Packed;
-pub use simulation_report::{Seen, simulation_report};
+pub use simulation_report::{MotionSeen, simulation_report};

@@ -5,12 +5,12 @@
 //!   also stands in the page's JSON block and decides the command's exit code.
 //! - It may speak of several *choices* (the four generators): a selector shows one at a time. Text and tables marked
 //!   with a choice, and every figure, follow it. A page of one thing has one choice and no selector.
-//! - [`Section`]s hold text, tables and [`Figure`]s, at one of three levels of [`Detail`]. Figures are numbered in
+//! - [`PageSection`]s hold text, tables and [`Figure`]s, at one of three levels of [`Detail`]. Figures are numbered in
 //!   their order.
 //! - Errors of the output are stored in arc-seconds and shown in the unit that the reader picks: give them as
-//!   [`Text::error`] in text, and as [`PageQuantity::Error`] on an axis.
-//! - A [`FigureBody::Drive`] shows the [`Animation`]s of the page. Charts whose x axis is marked [`Axis::linked`] turn
-//!   its generator, and are turned by it.
+//!   [`RichText::error`] in text, and as [`PageQuantity::Error`] on an axis.
+//! - A [`FigureBody::Drive`] shows the [`Animation`]s of the page. Charts whose x axis is marked [`ChartAxis::linked`]
+//!   turn its generator, and are turned by it.
 
 use askama::Template;
 use serde::Serialize;
@@ -86,54 +86,54 @@ pub enum Span {
 
 /// Text of [`Span`]s.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Text(pub Vec<Span>);
+pub struct RichText(pub Vec<Span>);
 
-impl Text {
+impl RichText {
     /// Text that begins with these words.
-    pub fn new(words: impl Into<String>) -> Text {
-        Text(vec![Span::Plain(words.into())])
+    pub fn new(words: impl Into<String>) -> RichText {
+        RichText(vec![Span::Plain(words.into())])
     }
 
     /// Words in which each `{}` is an error of the output: its value, arcsec, and significant digits.
-    pub fn filled(words: &str, errors: &[(f64, usize)]) -> Text {
+    pub fn filled(words: &str, errors: &[(f64, usize)]) -> RichText {
         let mut parts = words.splitn(errors.len() + 1, "{}");
-        let begin = Text::new(parts.next().unwrap_or_default());
+        let begin = RichText::new(parts.next().unwrap_or_default());
         parts.zip(errors).fold(begin, |text, (words, (arcsec, digits))| text.error(*arcsec, *digits).plain(words))
     }
 
     /// An error of the output alone, arcsec, to `digits` significant digits.
-    pub fn arcsec(arcsec: f64, digits: usize) -> Text {
-        Text::default().error(arcsec, digits)
+    pub fn arcsec(arcsec: f64, digits: usize) -> RichText {
+        RichText::default().error(arcsec, digits)
     }
 
     /// Goes on with words.
-    pub fn plain(mut self, words: impl Into<String>) -> Text {
+    pub fn plain(mut self, words: impl Into<String>) -> RichText {
         self.0.push(Span::Plain(words.into()));
         self
     }
 
     /// Goes on with words that stand out.
-    pub fn strong(mut self, words: impl Into<String>) -> Text {
+    pub fn strong(mut self, words: impl Into<String>) -> RichText {
         self.0.push(Span::Strong(words.into()));
         self
     }
 
     /// Goes on with an error of the output, arcsec, to `digits` significant digits.
-    pub fn error(mut self, arcsec: f64, digits: usize) -> Text {
+    pub fn error(mut self, arcsec: f64, digits: usize) -> RichText {
         self.0.push(Span::Error { arcsec, digits });
         self
     }
 }
 
-impl From<&str> for Text {
-    fn from(words: &str) -> Text {
-        Text::new(words)
+impl From<&str> for RichText {
+    fn from(words: &str) -> RichText {
+        RichText::new(words)
     }
 }
 
-impl From<String> for Text {
-    fn from(words: String) -> Text {
-        Text::new(words)
+impl From<String> for RichText {
+    fn from(words: String) -> RichText {
+        RichText::new(words)
     }
 }
 
@@ -176,16 +176,16 @@ pub struct Headline {
     /// Of which choice; `None` for all.
     pub choice: Option<String>,
     /// One sentence.
-    pub answer: Text,
+    pub answer: RichText,
     /// The one number.
-    pub number: Text,
+    pub number: RichText,
     /// Its name, in a few words.
     pub number_is: String,
 }
 
 impl Headline {
     /// An answer for all choices.
-    pub fn new(answer: Text, number: Text, number_is: impl Into<String>) -> Headline {
+    pub fn new(answer: RichText, number: RichText, number_is: impl Into<String>) -> Headline {
         Headline { choice: None, answer, number, number_is: number_is.into() }
     }
 }
@@ -214,7 +214,7 @@ impl Detail {
 
 /// A part of the page under a title.
 #[derive(Debug, Clone)]
-pub struct Section {
+pub struct PageSection {
     /// Anchor; letters, digits and hyphens.
     pub id: String,
     /// Title.
@@ -222,25 +222,25 @@ pub struct Section {
     /// From which level of detail on it is open.
     pub detail: Detail,
     /// Its text, tables and figures.
-    pub blocks: Vec<Block>,
+    pub blocks: Vec<PageBlock>,
 }
 
 /// A piece of a section.
 #[derive(Debug, Clone)]
-pub enum Block {
+pub enum PageBlock {
     /// A paragraph.
     Paragraph {
         /// Of which choice; `None` for all.
         choice: Option<String>,
         /// The words.
-        text: Text,
+        text: RichText,
     },
     /// A table.
     Table {
         /// Of which choice; `None` for all.
         choice: Option<String>,
         /// The table.
-        table: Table,
+        table: PageTable,
     },
     /// A figure.
     Figure(Figure),
@@ -248,33 +248,33 @@ pub enum Block {
 
 /// A table; the first cell of each row is its heading.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Table {
+pub struct PageTable {
     /// Its caption.
     pub caption: String,
     /// Headings of the columns.
     pub header: Vec<String>,
     /// Rows, as long as the header.
-    pub rows: Vec<Vec<Text>>,
+    pub rows: Vec<Vec<RichText>>,
 }
 
-impl Block {
+impl PageBlock {
     /// Words, whatever is chosen.
-    pub fn paragraph(text: impl Into<Text>) -> Block {
-        Block::Paragraph { choice: None, text: text.into() }
+    pub fn paragraph(text: impl Into<RichText>) -> PageBlock {
+        PageBlock::Paragraph { choice: None, text: text.into() }
     }
 
     /// A table, whatever is chosen.
-    pub fn table(caption: impl Into<String>, header: &[&str], rows: Vec<Vec<Text>>) -> Block {
+    pub fn table(caption: impl Into<String>, header: &[&str], rows: Vec<Vec<RichText>>) -> PageBlock {
         let header = header.iter().map(|&cell| cell.to_owned()).collect();
-        Block::Table { choice: None, table: Table { caption: caption.into(), header, rows } }
+        PageBlock::Table { choice: None, table: PageTable { caption: caption.into(), header, rows } }
     }
 
     /// The figures of a result, the list that the terminal prints, whatever is chosen.
-    pub fn figures(caption: impl Into<String>, figures: &[NamedFigure]) -> Block {
+    pub fn figures(caption: impl Into<String>, figures: &[NamedFigure]) -> PageBlock {
         let row = |NamedFigure { name, value, unit, caveat, what, .. }: &NamedFigure| {
             let number = match *unit {
-                "arcsec" => Text::arcsec(*value, 4),
-                "" => Text::new(significant(*value, 3)),
+                "arcsec" => RichText::arcsec(*value, 4),
+                "" => RichText::new(significant(*value, 3)),
                 unit => {
                     format!("{}\u{a0}{}", significant(*value, 4), unit.replace("N.m", "N·m").replace("deg", "°")).into()
                 }
@@ -284,55 +284,60 @@ impl Block {
             name[..1].make_ascii_uppercase();
             vec![name.into(), number, format!("{what}{semicolon}{caveat}").into()]
         };
-        Block::table(caption, &["Figure", "Value", "What it is"], figures.iter().map(row).collect())
+        PageBlock::table(caption, &["Figure", "Value", "What it is"], figures.iter().map(row).collect())
     }
 
     /// A figure of curves and points, a chart to each choice. Its title is also its alternative text.
     pub fn lines(
         id: impl Into<String>,
         title: impl Into<String>,
-        caption: impl Into<Text>,
-        [x, y]: [Axis; 2],
+        caption: impl Into<RichText>,
+        [x, y]: [ChartAxis; 2],
         charts: Vec<(String, Lines)>,
-    ) -> Block {
-        Block::Figure(Figure::of(id, title, caption, FigureBody::Lines { x, y, charts }))
+    ) -> PageBlock {
+        PageBlock::Figure(Figure::of(id, title, caption, FigureBody::Lines { x, y, charts }))
     }
 
     /// This block, shown for one choice alone.
-    pub fn of_choice(self, id: impl Into<String>) -> Block {
+    pub fn of_choice(self, id: impl Into<String>) -> PageBlock {
         match self {
-            Block::Paragraph { text, .. } => Block::Paragraph { choice: Some(id.into()), text },
-            Block::Table { table, .. } => Block::Table { choice: Some(id.into()), table },
-            figure @ Block::Figure(_) => figure,
+            PageBlock::Paragraph { text, .. } => PageBlock::Paragraph { choice: Some(id.into()), text },
+            PageBlock::Table { table, .. } => PageBlock::Table { choice: Some(id.into()), table },
+            figure @ PageBlock::Figure(_) => figure,
         }
     }
 }
 
 impl Figure {
     /// A figure whose title is also its alternative text.
-    pub fn of(id: impl Into<String>, title: impl Into<String>, caption: impl Into<Text>, body: FigureBody) -> Figure {
+    pub fn of(
+        id: impl Into<String>,
+        title: impl Into<String>,
+        caption: impl Into<RichText>,
+        body: FigureBody,
+    ) -> Figure {
         let title = title.into();
         Figure { id: id.into(), alt: title.clone(), title, caption: caption.into(), body }
     }
 }
 
-impl Section {
+impl PageSection {
     /// A section.
-    pub fn new(id: &str, title: impl Into<String>, detail: Detail, blocks: Vec<Block>) -> Section {
-        Section { id: id.into(), title: title.into(), detail, blocks }
+    pub fn new(id: &str, title: impl Into<String>, detail: Detail, blocks: Vec<PageBlock>) -> PageSection {
+        PageSection { id: id.into(), title: title.into(), detail, blocks }
     }
 
     /// How to read the page: the last section, folded.
-    pub fn reading(mut blocks: Vec<Block>) -> Section {
-        blocks.push(Block::paragraph(
+    pub fn reading(mut blocks: Vec<PageBlock>) -> PageSection {
+        blocks.push(PageBlock::paragraph(
             "Figures zoom by dragging and come back by a double click. Every figure has its numbers as a table and as \
              CSV, in the unit that is selected: the points that are drawn.",
         ));
-        Section::new("reading", "How to read this page", Detail::Full, blocks)
+        PageSection::new("reading", "How to read this page", Detail::Full, blocks)
     }
 }
 
-impl Table {
+impl PageTable {
     /// Whether a column holds words and no numbers: those stand to the left.
     fn is_words(&self, column: &usize) -> bool {
         let cells = || self.rows.iter().filter_map(|row| row.get(*column)).filter_map(|text| text.0.first());
@@ -352,7 +357,7 @@ pub struct Figure {
     /// Title, in a few words.
     pub title: String,
     /// Caption.
-    pub caption: Text,
+    pub caption: RichText,
     /// Alternative text, for those who cannot see it.
     pub alt: String,
     /// The figure itself.
@@ -369,22 +374,22 @@ pub enum FigureBody {
     /// Curves and points over an axis, one chart to each choice.
     Lines {
         /// Across.
-        x: Axis,
+        x: ChartAxis,
         /// Up.
-        y: Axis,
+        y: ChartAxis,
         /// By choice.
         charts: Vec<(String, Lines)>,
     },
     /// A field over two axes in colour, one to each choice.
     Field {
         /// Across.
-        x: Axis,
+        x: ChartAxis,
         /// Up.
-        y: Axis,
+        y: ChartAxis,
         /// In colour.
-        z: Axis,
+        z: ChartAxis,
         /// By choice.
-        fields: Vec<(String, Field)>,
+        fields: Vec<(String, FieldMap)>,
     },
 }
 
@@ -418,7 +423,7 @@ pub enum PageQuantity {
 
 /// An axis.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Axis {
+pub struct ChartAxis {
     /// Its title, without unit.
     pub label: String,
     /// Its quantity.
@@ -429,20 +434,20 @@ pub struct Axis {
     pub stretched: Option<f64>,
 }
 
-impl Axis {
+impl ChartAxis {
     /// An axis of its own.
-    pub fn new(label: impl Into<String>, quantity: PageQuantity) -> Axis {
-        Axis { label: label.into(), quantity, linked: false, stretched: None }
+    pub fn new(label: impl Into<String>, quantity: PageQuantity) -> ChartAxis {
+        ChartAxis { label: label.into(), quantity, linked: false, stretched: None }
     }
 
     /// The generator angle over a pitch, degrees, linked with the drive.
-    pub fn linked(label: impl Into<String>) -> Axis {
-        Axis { label: label.into(), quantity: PageQuantity::Degree, linked: true, stretched: None }
+    pub fn linked(label: impl Into<String>) -> ChartAxis {
+        ChartAxis { label: label.into(), quantity: PageQuantity::Degree, linked: true, stretched: None }
     }
 
     /// This axis, linear within `within` of zero and logarithmic beyond.
-    pub(crate) fn stretched(self, within: f64) -> Axis {
-        Axis { stretched: Some(within), ..self }
+    pub(crate) fn stretched(self, within: f64) -> ChartAxis {
+        ChartAxis { stretched: Some(within), ..self }
     }
 }
 
@@ -464,7 +469,7 @@ pub enum Mark {
 
 /// Points of a chart that belong together.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Series {
+pub struct ChartSeries {
     /// In the legend.
     pub name: String,
     /// How it is drawn.
@@ -476,16 +481,16 @@ pub struct Series {
     pub points: Vec<[f64; 2]>,
 }
 
-impl Series {
+impl ChartSeries {
     /// A series.
-    pub fn new(name: impl Into<String>, mark: Mark, colour: usize, points: Vec<[f64; 2]>) -> Series {
-        Series { name: name.into(), mark, colour, points }
+    pub fn new(name: impl Into<String>, mark: Mark, colour: usize, points: Vec<[f64; 2]>) -> ChartSeries {
+        ChartSeries { name: name.into(), mark, colour, points }
     }
 
     /// A series of points in any order.
-    pub fn sorted(name: impl Into<String>, mark: Mark, colour: usize, mut points: Vec<[f64; 2]>) -> Series {
+    pub fn sorted(name: impl Into<String>, mark: Mark, colour: usize, mut points: Vec<[f64; 2]>) -> ChartSeries {
         points.sort_by(|a, b| a[0].total_cmp(&b[0]));
-        Series::new(name, mark, colour, points)
+        ChartSeries::new(name, mark, colour, points)
     }
 }
 
@@ -511,7 +516,7 @@ pub struct Upright {
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]
 pub struct Lines {
     /// Curves and points.
-    pub series: Vec<Series>,
+    pub series: Vec<ChartSeries>,
     /// Named levels.
     pub limits: Vec<Limit>,
     /// Named places.
@@ -520,7 +525,7 @@ pub struct Lines {
 
 impl Lines {
     /// A chart of these series alone.
-    pub fn of(series: Vec<Series>) -> Lines {
+    pub fn of(series: Vec<ChartSeries>) -> Lines {
         Lines { series, ..Lines::default() }
     }
 
@@ -550,7 +555,7 @@ impl Lines {
 
 /// A field over a grid.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Field {
+pub struct FieldMap {
     /// Nodes across, ascending.
     pub x: Vec<f64>,
     /// Nodes up, ascending.
@@ -579,7 +584,7 @@ pub struct Page {
     /// Answers, one for all or one to each choice.
     pub headlines: Vec<Headline>,
     /// Sections.
-    pub sections: Vec<Section>,
+    pub sections: Vec<PageSection>,
     /// Drives in motion.
     pub animations: Vec<Animation>,
     /// Provenance of the page: name and value.
@@ -596,7 +601,7 @@ const BLOCK: &str = "id=\"flexspline-report\">";
 
 /// Command, title and provenance of a page that was written.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Written {
+pub struct WrittenPage {
     /// The command that wrote it.
     pub command: String,
     /// Its title.
@@ -605,16 +610,16 @@ pub struct Written {
     provenance: Vec<String>,
 }
 
-impl Written {
+impl WrittenPage {
     /// Of the text of a page; nothing of what is none of ours.
-    pub fn of(html: &str) -> Option<Written> {
+    pub fn of(html: &str) -> Option<WrittenPage> {
         let (_, block) = html.split_once(BLOCK)?;
         let json: Value = serde_json::from_str(block.split_once("</script")?.0).ok()?;
         let word = |name: &str| json[name].as_str().map(str::to_owned);
         let command = word("report").filter(|name| name.bytes().all(|letter| letter.is_ascii_lowercase()))?;
         let provenance = json["provenance"].as_object()?.values();
         let provenance = provenance.filter_map(|value| value.as_str().map(str::to_owned)).collect();
-        Some(Written { command, title: word("title")?, provenance })
+        Some(WrittenPage { command, title: word("title")?, provenance })
     }
 
     /// Whether a value is among what made it, such as the hash of a drive.
@@ -659,7 +664,7 @@ impl Page {
     pub fn html(&self) -> Result<String, askama::Error> {
         let figures = || {
             self.sections.iter().flat_map(|section| &section.blocks).filter_map(|block| match block {
-                Block::Figure(figure) => Some(figure),
+                PageBlock::Figure(figure) => Some(figure),
                 _ => None,
             })
         };
@@ -717,7 +722,7 @@ fn describe(number: usize, figure: &Figure) -> (Value, Vec<Packed>) {
             json!({ "kind": "lines", "x": x, "y": y, "charts": charts })
         }
         FigureBody::Field { x, y, z, fields } => {
-            for (choice, Field { x, y, z }) in fields {
+            for (choice, FieldMap { x, y, z }) in fields {
                 for (part, shape, values) in
                     [("x", vec![x.len()], x), ("y", vec![y.len()], y), ("z", vec![y.len(), x.len()], z)]
                 {
@@ -741,7 +746,8 @@ mod tests {
     const HOSTILE: &str = r#"</script><script>alert(1)</script>"'&{{1}}<!--"#;
 
     fn page(status: Status) -> Page {
-        let series = Series { name: HOSTILE.into(), mark: Mark::Line, colour: 0, points: vec![[0.0, 1.0], [1.0, 3.0]] };
+        let series =
+            ChartSeries { name: HOSTILE.into(), mark: Mark::Line, colour: 0, points: vec![[0.0, 1.0], [1.0, 3.0]] };
         let lines = Lines {
             series: vec![series],
             limits: vec![Limit { name: HOSTILE.into(), y: 2.0 }],
@@ -753,8 +759,8 @@ mod tests {
             caption: HOSTILE.into(),
             alt: HOSTILE.into(),
             body: FigureBody::Lines {
-                x: Axis::new(HOSTILE, PageQuantity::Torque).stretched(0.02),
-                y: Axis::new(HOSTILE, PageQuantity::Error),
+                x: ChartAxis::new(HOSTILE, PageQuantity::Torque).stretched(0.02),
+                y: ChartAxis::new(HOSTILE, PageQuantity::Error),
                 charts: vec![("one".into(), lines)],
             },
         };
@@ -768,15 +774,15 @@ mod tests {
             choice_is: "Generator",
             headlines: vec![Headline {
                 choice: Some("one".into()),
-                answer: Text::new(HOSTILE).error(-12.345, 3),
-                number: Text::default().error(0.5, 2),
+                answer: RichText::new(HOSTILE).error(-12.345, 3),
+                number: RichText::default().error(0.5, 2),
                 number_is: HOSTILE.into(),
             }],
-            sections: vec![Section {
+            sections: vec![PageSection {
                 id: "section".into(),
                 title: HOSTILE.into(),
                 detail: Detail::Summary,
-                blocks: vec![Block::Figure(figure)],
+                blocks: vec![PageBlock::Figure(figure)],
             }],
             animations: Vec::new(),
             provenance: vec![(HOSTILE.into(), HOSTILE.into())],
@@ -805,11 +811,11 @@ mod tests {
 
     #[test]
     fn a_page_says_of_itself_which_command_wrote_it_and_of_what() {
-        let written = Written::of(&page(Status::Good).html().unwrap()).unwrap();
+        let written = WrittenPage::of(&page(Status::Good).html().unwrap()).unwrap();
         assert_eq!((written.command.as_str(), written.title.as_str()), ("tables", HOSTILE));
         assert!(written.names(HOSTILE) && !written.names("tables"));
-        assert_eq!(Written::of("<!doctype html><p>another page"), None);
-        assert_eq!(Written::of("id=\"flexspline-report\">{\"report\":\"../x\"}</script>"), None);
+        assert_eq!(WrittenPage::of("<!doctype html><p>another page"), None);
+        assert_eq!(WrittenPage::of("id=\"flexspline-report\">{\"report\":\"../x\"}</script>"), None);
     }
 
     #[test]
@@ -840,8 +846,8 @@ mod tests {
 
     #[test]
     fn words_are_filled_with_errors_and_what_is_left_of_the_words_stays() {
-        let text = Text::filled("from {} to {}, not {}", &[(1.5, 2), (-3.0, 3)]);
-        let due = Text::new("from ").error(1.5, 2).plain(" to ").error(-3.0, 3).plain(", not {}");
+        let text = RichText::filled("from {} to {}, not {}", &[(1.5, 2), (-3.0, 3)]);
+        let due = RichText::new("from ").error(1.5, 2).plain(" to ").error(-3.0, 3).plain(", not {}");
         assert_eq!(text, due);
     }
 
@@ -856,9 +862,9 @@ mod tests {
             what: "what it is".into(),
         };
         let figures = [figure("backlash", "arcsec", ""), figure("torque", "N.m", "a remark")];
-        let Block::Table { table, .. } = Block::figures("caption", &figures) else { panic!("no table") };
-        assert_eq!(table.rows[0], ["Backlash".into(), Text::arcsec(23.456, 4), "what it is".into()]);
-        assert_eq!(table.rows[1], ["Torque", "23.46\u{a0}N·m", "what it is; a remark"].map(Text::from));
+        let PageBlock::Table { table, .. } = PageBlock::figures("caption", &figures) else { panic!("no table") };
+        assert_eq!(table.rows[0], ["Backlash".into(), RichText::arcsec(23.456, 4), "what it is".into()]);
+        assert_eq!(table.rows[1], ["Torque", "23.46\u{a0}N·m", "what it is; a remark"].map(RichText::from));
     }
 
     #[test]
@@ -872,8 +878,12 @@ mod tests {
 
     #[test]
     fn series_of_different_points_share_their_axis() {
-        let of =
-            |points: &[[f64; 2]]| Series { name: String::new(), mark: Mark::Line, colour: 0, points: points.into() };
+        let of = |points: &[[f64; 2]]| ChartSeries {
+            name: String::new(),
+            mark: Mark::Line,
+            colour: 0,
+            points: points.into(),
+        };
         let lines = Lines { series: vec![of(&[[0.0, 1.0], [2.0, 3.0]]), of(&[[1.0, 5.0]])], ..Lines::default() };
         let columns = lines.columns();
         assert_eq!(columns[0], [0.0, 1.0, 2.0]);

@@ -12,8 +12,8 @@ use super::drive_figures::{
     sharing_axes, sharing_figure, sharing_lines, sheet_section, sleeve_figure, stress_figure, stress_lines,
 };
 use super::page::{
-    Axis, Block, Choice, Detail, Field, Figure, FigureBody, Headline, Lines, Mark, Page, PageQuantity, SIGNS, Section,
-    Series, Status, Text, made_of_drive,
+    ChartAxis, ChartSeries, Choice, Detail, FieldMap, Figure, FigureBody, Headline, Lines, Mark, Page, PageBlock,
+    PageQuantity, PageSection, RichText, SIGNS, Status, made_of_drive,
 };
 use flexspline_design::simulate::{Observation, Row, Simulation, Summary, TipContact};
 use flexspline_design::stated;
@@ -33,15 +33,15 @@ const ROWS_OF_A_LOOP: usize = 3;
 const TEETH_BESIDE: usize = 2;
 
 /// Forces and the drive in motion, which the page needs in addition to the rows, gathered while the run goes on.
-pub struct Seen {
+pub struct MotionSeen {
     passing: Passing,
     teeth: Vec<[Vec<f64>; 2]>,
 }
 
-impl Seen {
+impl MotionSeen {
     /// Before the run.
-    pub fn new(drive: &Drive) -> Seen {
-        Seen { passing: Passing::new(drive), teeth: Vec::new() }
+    pub fn new(drive: &Drive) -> MotionSeen {
+        MotionSeen { passing: Passing::new(drive), teeth: Vec::new() }
     }
 
     /// Looks at an increment of the run.
@@ -83,7 +83,7 @@ pub fn simulation_report(
     drive: &Drive,
     kind: GeneratorKind,
     simulation: &Simulation,
-    seen: Seen,
+    seen: MotionSeen,
 ) -> Result<Page, MeshError> {
     let Simulation { rows, summary } = simulation;
     let motion = seen.passing.finish()?;
@@ -115,8 +115,8 @@ impl RunKnown<'_> {
     fn headline(&self) -> Headline {
         let (summary, name) = (self.summary, self.kind.in_words());
         if let Some(tips) = summary.tip_contact.filter(TipContact::counts) {
-            let answer = Text::new(format!("In the {name} drive {}.", tips.in_words().replace(" deg", "°")));
-            let share = Text::new(format!("{:.1} %", 100.0 * tips.share));
+            let answer = RichText::new(format!("In the {name} drive {}.", tips.in_words().replace(" deg", "°")));
+            let share = RichText::new(format!("{:.1} %", 100.0 * tips.share));
             return Headline::new(answer, share, "of the load on tips that should pass freely");
         }
         let ripple = summary.kinematic_error_pp_arcsec;
@@ -148,11 +148,11 @@ impl RunKnown<'_> {
             found.push(ripple);
         }
         let found: Vec<(f64, usize)> = found.into_iter().map(|arcsec| (arcsec, 3)).collect();
-        Headline::new(Text::filled(&(words + "."), &found), Text::arcsec(number, 3), number_is)
+        Headline::new(RichText::filled(&(words + "."), &found), RichText::arcsec(number, 3), number_is)
     }
 
     /// The figures of the summary.
-    fn found(&self) -> Section {
+    fn found(&self) -> PageSection {
         let load = match (self.summary.torque_n_m, self.summary.temperature_c) {
             (Some(torque), Some(celsius)) => format!("{} N·m, {} °C", plain(torque), plain(celsius)),
             (None, Some(celsius)) => format!("loads of the path, {} °C", plain(celsius)),
@@ -160,35 +160,35 @@ impl RunKnown<'_> {
             (None, None) => "loads and temperatures of the path".to_owned(),
         };
         let caption = format!("{} with {} generator: {load}", self.drive.name, self.kind.in_words());
-        let table = Block::figures(caption, &self.summary.figures());
-        Section::new("found", "What was found", Detail::Summary, vec![table])
+        let table = PageBlock::figures(caption, &self.summary.figures());
+        PageSection::new("found", "What was found", Detail::Summary, vec![table])
     }
 
     /// The drive in motion, where the path passes a whole pitch.
-    fn in_motion(&self) -> Option<Section> {
+    fn in_motion(&self) -> Option<PageSection> {
         let motion = self.motion?;
         let way = if motion.rows[0].turn_rad > 0.0 { "forward" } else { "backward" };
         let load = plain(motion.torque_n_m);
-        let series = Series::new(format!("{load} N·m {way}"), Mark::Line, 0, less_mean(motion));
-        let caption = Text::new(
+        let series = ChartSeries::new(format!("{load} N·m {way}"), Mark::Line, 0, less_mean(motion));
+        let caption = RichText::new(
             "Output angle less generator angle over the ratio, the states that figure 1 shows: it repeats with every \
              pitch of the flexspline. The mean is ",
         );
-        let ripple = Block::lines(
+        let ripple = PageBlock::lines(
             "ripple",
             "Error over one tooth pitch, less its mean",
             caption.error(mean_arcsec(motion), 4).plain("."),
-            [over_pitch(), Axis::new("Output error less mean", PageQuantity::Error)],
+            [over_pitch(), ChartAxis::new("Output error less mean", PageQuantity::Error)],
             self.chart(Lines::of(vec![series])),
         );
         let mut blocks = vec![
-            Block::Figure(drive_figure(&format!("under {load} N·m, turning {way}"))),
+            PageBlock::Figure(drive_figure(&format!("under {load} N·m, turning {way}"))),
             ripple,
-            Block::Figure(stress_figure(self.chart(stress_lines(motion)))),
-            Block::Figure(sharing_figure(self.chart(sharing_lines(motion)))),
+            PageBlock::Figure(stress_figure(self.chart(stress_lines(motion)))),
+            PageBlock::Figure(sharing_figure(self.chart(sharing_lines(motion)))),
         ];
-        blocks.extend(motion.sleeve.as_ref().map(|_| Block::Figure(sleeve_figure())));
-        Some(Section::new("motion", "The drive at work", Detail::Summary, blocks))
+        blocks.extend(motion.sleeve.as_ref().map(|_| PageBlock::Figure(sleeve_figure())));
+        Some(PageSection::new("motion", "The drive at work", Detail::Summary, blocks))
     }
 
     /// A chart of the one choice.
@@ -205,11 +205,11 @@ impl RunKnown<'_> {
     }
 
     /// The error along the path: over the generator, and over the torque where that goes through a range.
-    fn along_path(&self) -> Option<Section> {
+    fn along_path(&self) -> Option<PageSection> {
         let error = |row: &Row| row.error_arcsec;
         let figure = |id, title, caption, x, series| {
-            let y = Axis::new("Output error", PageQuantity::Error);
-            Block::lines(id, title, caption, [x, y], self.chart(Lines::of(series)))
+            let y = ChartAxis::new("Output error", PageQuantity::Error);
+            PageBlock::lines(id, title, caption, [x, y], self.chart(Lines::of(series)))
         };
         let mut blocks = Vec::new();
         let turns = one_way(self.rows, |row| row.generator_rad);
@@ -221,7 +221,7 @@ impl RunKnown<'_> {
                 "Output angle less generator angle over the ratio; positive when the output leads. A line to each \
                  stretch in which the generator goes one way, as far as there are few. Where it turns back without \
                  load the output stands until the clearance is crossed.",
-                Axis::new("Generator", PageQuantity::Degree),
+                ChartAxis::new("Generator", PageQuantity::Degree),
                 of_stretches(self.rows, &turns, |row| row.generator_rad.to_degrees(), error, ["forward", "backward"]),
             ));
         }
@@ -234,37 +234,37 @@ impl RunKnown<'_> {
                 "The torsion of the output, its clearance included, as a torsion test draws it: the slope is the \
                  compliance, and what lies between growing and falling torque is lost to friction and drag. A \
                  positive torque turns the output forward.",
-                Axis::new("Load torque", PageQuantity::Torque),
+                ChartAxis::new("Load torque", PageQuantity::Torque),
                 of_stretches(self.rows, &loads, |row| row.torque_n_m, error, words),
             ));
         }
-        (!blocks.is_empty()).then(|| Section::new("path", "Along the path", Detail::Summary, blocks))
+        (!blocks.is_empty()).then(|| PageSection::new("path", "Along the path", Detail::Summary, blocks))
     }
 
     /// How the teeth share the load along the path, stress, pressures, contacts, the torque of the generator.
-    fn load(&self) -> Section {
+    fn load(&self) -> PageSection {
         let mut blocks = Vec::new();
         if self.rows.len() > 1 {
             let (axis, places) = self.along();
             let curves = |id, title, caption: &str, y, of: &[OfRow]| {
                 let series = of.iter().enumerate().map(|(colour, (name, of))| {
                     let points = places.iter().map(|(x, k)| [*x, of(&self.rows[*k])]).collect();
-                    Series::new(*name, Mark::Line, colour, points)
+                    ChartSeries::new(*name, Mark::Line, colour, points)
                 });
-                Block::lines(id, title, caption, [axis.clone(), y], self.chart(Lines::of(series.collect())))
+                PageBlock::lines(id, title, caption, [axis.clone(), y], self.chart(Lines::of(series.collect())))
             };
             if !self.is_all_in_motion() {
                 blocks.extend(self.map(&axis, &places));
                 let caption = format!("Of every row. {STRESSES_ARE}");
                 let title = "Largest stress and pressures along the path";
-                let y = Axis::new("Stress, pressure", PageQuantity::Stress);
+                let y = ChartAxis::new("Stress, pressure", PageQuantity::Stress);
                 blocks.push(curves("path-stress", title, &caption, y, &STRESSES));
             }
             blocks.push(curves(
                 "contacts",
                 "Flanks that carry load",
                 "Of both lobes together.",
-                Axis::new("Tooth flanks", PageQuantity::Whole),
+                ChartAxis::new("Tooth flanks", PageQuantity::Whole),
                 &[("tooth flanks", |row| row.flank_contacts as f64)],
             ));
             blocks.push(curves(
@@ -272,26 +272,26 @@ impl RunKnown<'_> {
                 "Torque of the generator",
                 "On the flexspline, quasi-static. Less the load over the ratio it is friction and drag, and what the \
                  teeth store from place to place. Positive turns the generator forward.",
-                Axis::new("Torque of the generator", PageQuantity::Torque),
+                ChartAxis::new("Torque of the generator", PageQuantity::Torque),
                 &[("generator", |row| row.generator_torque_n_m)],
             ));
         }
-        Section::new("load", "Load and stress", Detail::Engineering, blocks)
+        PageSection::new("load", "Load and stress", Detail::Engineering, blocks)
     }
 
     /// The axis of figures along the path, and the places of the rows, ascending: generator or torque where that goes
     /// one way all along, else the step.
-    fn along(&self) -> (Axis, Vec<(f64, usize)>) {
+    fn along(&self) -> (ChartAxis, Vec<(f64, usize)>) {
         let goes_one_way = |of: fn(&Row) -> f64| {
             let all = self.rows.len();
             matches!(one_way(self.rows, of).as_slice(), [(_, stretch)] if stretch.len() == all)
         };
-        let (axis, of): (Axis, fn(&Row) -> f64) = if goes_one_way(|row| row.generator_rad) {
-            (Axis::new("Generator", PageQuantity::Degree), |row| row.generator_rad.to_degrees())
+        let (axis, of): (ChartAxis, fn(&Row) -> f64) = if goes_one_way(|row| row.generator_rad) {
+            (ChartAxis::new("Generator", PageQuantity::Degree), |row| row.generator_rad.to_degrees())
         } else if goes_one_way(|row| row.torque_n_m) {
-            (Axis::new("Load torque", PageQuantity::Torque), |row| row.torque_n_m)
+            (ChartAxis::new("Load torque", PageQuantity::Torque), |row| row.torque_n_m)
         } else {
-            (Axis::new("Step, as in results.csv", PageQuantity::Whole), |row| row.step as f64)
+            (ChartAxis::new("Step, as in results.csv", PageQuantity::Whole), |row| row.step as f64)
         };
         let mut places: Vec<(f64, usize)> = self.rows.iter().map(of).zip(0..).collect();
         places.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -321,7 +321,7 @@ impl RunKnown<'_> {
     }
 
     /// The force on the teeth in colour along the path, where it is long enough and any tooth bears.
-    fn map(&self, axis: &Axis, places: &[(f64, usize)]) -> Option<Block> {
+    fn map(&self, axis: &ChartAxis, places: &[(f64, usize)]) -> Option<PageBlock> {
         if self.rows.len() < ROWS_OF_A_MAP {
             return None;
         }
@@ -346,7 +346,7 @@ impl RunKnown<'_> {
         let first = forces.iter().position(bears)?.saturating_sub(TEETH_BESIDE);
         let last = (forces.iter().rposition(bears)? + TEETH_BESIDE).min(lines - 1);
         let angle = |line: usize| 360.0 / teeth as f64 * (line as f64 - (teeth / 4) as f64);
-        let field = Field {
+        let field = FieldMap {
             x: groups.iter().map(|group| group[group.len() / 2].0).collect(),
             y: (first..=last).map(angle).collect(),
             z: forces[first..=last].concat(),
@@ -365,10 +365,10 @@ impl RunKnown<'_> {
         let [y, z] = sharing_axes();
         let (x, fields) = (axis.clone(), vec![(self.kind.to_string(), field)]);
         let body = FigureBody::Field { x, y, z, fields };
-        Some(Block::Figure(Figure::of("map", "Which teeth bear along the path", caption, body)))
+        Some(PageBlock::Figure(Figure::of("map", "Which teeth bear along the path", caption, body)))
     }
 
-    fn reading(&self) -> Section {
+    fn reading(&self) -> PageSection {
         let motion = if self.motion.is_some() {
             "The drive in motion is made of the first tooth pitch of the path on which it had settled under one load, \
              at eighths of the pitch."
@@ -376,13 +376,13 @@ impl RunKnown<'_> {
             "There is no drive in motion: the path has no settled tooth pitch with rows at its eighths, as pitch and \
              turn have, or the drive differs from tooth to tooth."
         };
-        Section::reading(vec![
-            Block::paragraph(format!(
+        PageSection::reading(vec![
+            PageBlock::paragraph(format!(
                 "{SIGNS} The flexspline is fixed, the circular spline is the output. Every row of the path is in \
                  results.csv; a figure that the path cannot give is left out. Plane strain, quasi-static: no inertia, \
                  no lubricant, no speed."
             )),
-            Block::paragraph(motion),
+            PageBlock::paragraph(motion),
         ])
     }
 
@@ -421,7 +421,7 @@ fn of_stretches(
     x: impl Fn(&Row) -> f64,
     y: impl Fn(&Row) -> f64,
     [growing, falling]: [&str; 2],
-) -> Vec<Series> {
+) -> Vec<ChartSeries> {
     let ascending = |rows: &mut dyn Iterator<Item = &Row>| {
         // Two ways pass the same places but for rounding; a page has them in single precision, where they are one.
         let mut points: Vec<[f64; 2]> = rows.map(|row| [f64::from(x(row) as f32), y(row)]).collect();
@@ -432,12 +432,12 @@ fn of_stretches(
         let of_way = |(colour, (name, way)): (usize, (&str, bool))| {
             let of_it = stretches.iter().filter(|(grows, _)| *grows == way);
             let points = apart(ascending(&mut of_it.flat_map(|(_, stretch)| &rows[stretch.clone()])));
-            Series::new(name, Mark::Dots, colour, points)
+            ChartSeries::new(name, Mark::Dots, colour, points)
         };
         return [(growing, true), (falling, false)].into_iter().enumerate().map(of_way).collect();
     }
     let one_load = |rows: &[Row]| rows.iter().all(|row| row.torque_n_m == rows[0].torque_n_m);
-    let mut series: Vec<Series> = Vec::new();
+    let mut series: Vec<ChartSeries> = Vec::new();
     for (colour, (grows, stretch)) in stretches.iter().enumerate() {
         let rows_of_it = &rows[stretch.clone()];
         let mut name = (if *grows { growing } else { falling }).to_owned();
@@ -449,7 +449,7 @@ fn of_stretches(
             name += &format!(" ({})", namesakes + 1);
         }
         let mark = if *grows { Mark::Line } else { Mark::Dashed };
-        series.push(Series::new(name, mark, colour, ascending(&mut rows_of_it.iter())));
+        series.push(ChartSeries::new(name, mark, colour, ascending(&mut rows_of_it.iter())));
     }
     series
 }
@@ -478,7 +478,7 @@ mod tests {
         let path = Path::Points(points.iter().map(point).collect());
         let solver = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
         let settings = SimulationSettings { solver, ..SimulationSettings::new(GeneratorKind::Cam, path) };
-        let mut seen = Seen::new(&drive);
+        let mut seen = MotionSeen::new(&drive);
         let run = simulate(&drive, &settings, &mut |now| {
             seen.add(now);
             ControlFlow::Continue(())
@@ -511,7 +511,7 @@ mod tests {
         let page = simulation_report(&drive, GeneratorKind::Cam, &run, seen).unwrap();
         let figure = |id: &str| {
             page.sections.iter().flat_map(|section| &section.blocks).find_map(|block| match block {
-                Block::Figure(figure) if figure.id == id => Some(&figure.body),
+                PageBlock::Figure(figure) if figure.id == id => Some(&figure.body),
                 _ => None,
             })
         };

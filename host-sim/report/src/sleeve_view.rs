@@ -20,7 +20,7 @@ const NEAR_MM: f64 = 0.01;
 
 /// A harmonic of the rim, in the frame of the generator.
 #[derive(Debug, Clone, Serialize)]
-pub struct Wave {
+pub struct DrawnWave {
     /// Its number around.
     pub n: u32,
     /// Amplitudes of `cos n theta` and of `sin n theta` in the middle of the rim, mm.
@@ -48,7 +48,7 @@ pub struct SleeveView {
     /// What stands at the first and at the last station: `flange`, `bottom`, or `open`.
     pub ends: [&'static str; 2],
     /// Harmonics.
-    pub waves: Vec<Wave>,
+    pub waves: Vec<DrawnWave>,
     /// Largest tilt and skew of a tooth along its face, mrad.
     pub tilt_mrad: f64,
     /// See `tilt_mrad`.
@@ -77,7 +77,7 @@ impl SleeveView {
                 let read =
                     |of: fn(&Station) -> f64| stations_mm.iter().map(|x| rounded(between(&shape, *x, of))).collect();
                 let (sin, cos) = (f64::from(n) * state.generator_rad).sin_cos();
-                Wave {
+                DrawnWave {
                     n,
                     // theta = angle - generator
                     amplitudes_mm: [a * cos + b * sin, b * cos - a * sin].map(rounded),

@@ -3,10 +3,10 @@
 use serde_json::{Map, json};
 
 use super::page::{
-    Axis, Block, Choice, Detail, Figure, FigureBody, Headline, Limit, Lines, Mark, Page, PageQuantity, Section, Series,
-    Status, Table, Text, significant,
+    ChartAxis, ChartSeries, Choice, Detail, Figure, FigureBody, Headline, Limit, Lines, Mark, Page, PageBlock,
+    PageQuantity, PageSection, PageTable, RichText, Status, significant,
 };
-use flexspline_design::sweep::{Judge, OfGenerator, Plan, Row, Sense, Sweep};
+use flexspline_design::sweep::{Judge, OfGenerator, ReducedSweep, Sense, VariantPlan, VariantRow};
 
 /// Rows of the table of the Pareto front.
 const MOST_ROWS: usize = 25;
@@ -22,13 +22,13 @@ const ERROR: &str = "error_pp_arcsec";
 /// The contents of the page.
 pub struct SweepSources<'a> {
     /// The plan.
-    pub plan: &'a Plan,
+    pub plan: &'a VariantPlan,
     /// The command line.
     pub command: &'a str,
     /// Constraints and targets.
     pub judge: &'a Judge,
     /// The results.
-    pub sweep: &'a Sweep,
+    pub sweep: &'a ReducedSweep,
     /// Remarks on the results.
     pub remarks: &'a [String],
 }
@@ -47,14 +47,14 @@ pub fn page(of: &SweepSources<'_>) -> Page {
         ]
         .into_iter()
         .filter(|(.., blocks)| !blocks.is_empty())
-        .map(|(id, title, detail, blocks)| Section {
+        .map(|(id, title, detail, blocks)| PageSection {
             id: id.to_owned(),
             title: title.to_owned(),
             detail,
             blocks,
         }),
     );
-    sections.push(Section::reading(vec![Block::paragraph(READING)]));
+    sections.push(PageSection::reading(vec![PageBlock::paragraph(READING)]));
     let choice = |one: &OfGenerator| Choice { id: one.generator.to_string(), name: one.generator.to_string() };
     Page {
         title: format!("Sweep of {}", sweep.drive),
@@ -89,11 +89,11 @@ fn quantity(name: &str) -> PageQuantity {
     if name.ends_with("_arcsec") { PageQuantity::Error } else { PageQuantity::Count }
 }
 
-fn value(name: &str, value: Option<f64>) -> Text {
+fn value(name: &str, value: Option<f64>) -> RichText {
     match value {
-        None => Text::new("–"),
-        Some(value) if quantity(name) == PageQuantity::Error => Text::default().error(value, 3),
-        Some(value) => Text::new(significant(value, 3)),
+        None => RichText::new("–"),
+        Some(value) if quantity(name) == PageQuantity::Error => RichText::default().error(value, 3),
+        Some(value) => RichText::new(significant(value, 3)),
     }
 }
 
@@ -104,7 +104,7 @@ fn quantile(one: &OfGenerator, figure: &str, share: f64) -> Option<f64> {
 }
 
 /// Rows of a generator, whether they meet, and whether they are Pareto-optimal.
-fn rows<'a>(of: &'a SweepSources<'_>, one: &OfGenerator) -> impl Iterator<Item = &'a (Row, bool, bool)> {
+fn rows<'a>(of: &'a SweepSources<'_>, one: &OfGenerator) -> impl Iterator<Item = &'a (VariantRow, bool, bool)> {
     let kind = one.generator;
     of.sweep.rows.iter().filter(move |(row, ..)| row.generator == kind)
 }
@@ -114,15 +114,15 @@ fn headline(of: &SweepSources<'_>, one: &OfGenerator) -> Headline {
     if of.plan.is_of_tolerances() {
         let number = quantile(one, ERROR, JUDGED).unwrap_or(f64::NAN);
         let first = one.ranks.iter().find(|rank| rank.figure == ERROR);
-        let answer = first.map_or_else(Text::default, |first| {
+        let answer = first.map_or_else(RichText::default, |first| {
             let by = significant(first.correlation, 2);
-            Text::new(format!("Tighten {} first: the error follows it most (rank correlation {by}). ", first.input))
+            RichText::new(format!("Tighten {} first: the error follows it most (rank correlation {by}). ", first.input))
         });
         let drives = rows(of, one).count();
         return Headline {
             choice,
             answer: answer.plain(format!("Of {drives} drives 95 % stay below ")).error(number, 3).plain("."),
-            number: Text::default().error(number, 3),
+            number: RichText::default().error(number, 3),
             number_is: "error peak to peak that 95 % of the drives stay below".to_owned(),
         };
     }
@@ -137,17 +137,17 @@ fn headline(of: &SweepSources<'_>, one: &OfGenerator) -> Headline {
     };
     Headline {
         choice,
-        answer: Text::new(format!("{meet} of {count} variants meet the constraints{optimal}.")),
+        answer: RichText::new(format!("{meet} of {count} variants meet the constraints{optimal}.")),
         number: value(target, best),
         number_is: format!("{target}, of the best"),
     }
 }
 
 /// A table for each generator; none without rows.
-fn tables(of: &SweepSources<'_>, make: impl Fn(&OfGenerator) -> Table) -> Vec<Block> {
+fn tables(of: &SweepSources<'_>, make: impl Fn(&OfGenerator) -> PageTable) -> Vec<PageBlock> {
     let table = |one: &OfGenerator| (Some(one.generator.to_string()), make(one));
     let all = of.sweep.generators.iter().map(table).filter(|(_, table)| !table.rows.is_empty());
-    all.map(|(choice, table)| Block::Table { choice, table }).collect()
+    all.map(|(choice, table)| PageBlock::Table { choice, table }).collect()
 }
 
 fn words(list: &[&str]) -> Vec<String> {
@@ -155,10 +155,10 @@ fn words(list: &[&str]) -> Vec<String> {
 }
 
 /// Variants by two targets; drives drawn from tolerances by how many stay below an error.
-fn picture(of: &SweepSources<'_>) -> Section {
+fn picture(of: &SweepSources<'_>) -> PageSection {
     let figure = if of.plan.is_of_tolerances() { distribution(of) } else { trade(of) };
     let (id, title) = (figure.id.clone(), figure.title.clone());
-    Section { id, title, detail: Detail::Summary, blocks: vec![Block::Figure(figure)] }
+    PageSection { id, title, detail: Detail::Summary, blocks: vec![PageBlock::Figure(figure)] }
 }
 
 fn trade(of: &SweepSources<'_>) -> Figure {
@@ -172,7 +172,7 @@ fn trade(of: &SweepSources<'_>) -> Figure {
             let points = chosen.map(|(row, ..)| [row.figures[x], row.figures[y]]);
             let mut points: Vec<[f64; 2]> = points.filter(|[x, y]| x.is_finite() && y.is_finite()).collect();
             points.sort_by(|a, b| a[0].total_cmp(&b[0]));
-            Series { name: name.to_owned(), mark, colour, points }
+            ChartSeries { name: name.to_owned(), mark, colour, points }
         };
         let series = vec![
             series("does not meet", 5, Mark::Dots, &|meets, _| !meets),
@@ -181,11 +181,11 @@ fn trade(of: &SweepSources<'_>) -> Figure {
         ];
         (one.generator.to_string(), Lines { series, ..Lines::default() })
     };
-    let axis = |name: &str| Axis::new(name, quantity(name));
+    let axis = |name: &str| ChartAxis::new(name, quantity(name));
     Figure {
         id: "trade".to_owned(),
         title: format!("{second} against {first}"),
-        caption: Text::new("Each point is a variant."),
+        caption: RichText::new("Each point is a variant."),
         alt: "Every variant by two of its figures; the Pareto-optimal ones stand out".to_owned(),
         body: FigureBody::Lines {
             x: axis(first),
@@ -204,25 +204,25 @@ fn distribution(of: &SweepSources<'_>) -> Figure {
         let n = errors.len();
         let ranks = (0..CURVE.min(n)).map(|k| k * (n - 1) / (CURVE.min(n) - 1).max(1));
         let points = ranks.map(|rank| [errors[rank], 100.0 * (rank + 1) as f64 / n as f64]).collect();
-        let series = vec![Series { name: "drives below".to_owned(), mark: Mark::Line, colour: 0, points }];
+        let series = vec![ChartSeries { name: "drives below".to_owned(), mark: Mark::Line, colour: 0, points }];
         let limits = vec![Limit { name: "95 %".to_owned(), y: 100.0 * JUDGED }];
         (one.generator.to_string(), Lines { series, limits, ..Lines::default() })
     };
     Figure {
         id: "distribution".to_owned(),
         title: "Drives that stay below an error".to_owned(),
-        caption: Text::new("Error under the load, peak to peak over a turn of the output."),
+        caption: RichText::new("Error under the load, peak to peak over a turn of the output."),
         alt: "Share of the drives over the error that they stay below".to_owned(),
         body: FigureBody::Lines {
-            x: Axis::new("error, peak to peak", PageQuantity::Error),
-            y: Axis::new("drives below, %", PageQuantity::Count),
+            x: ChartAxis::new("error, peak to peak", PageQuantity::Error),
+            y: ChartAxis::new("drives below, %", PageQuantity::Count),
             charts: of.sweep.generators.iter().map(chart).collect(),
         },
     }
 }
 
 /// The Pareto front, the targets first.
-fn front(of: &SweepSources<'_>) -> Option<Section> {
+fn front(of: &SweepSources<'_>) -> Option<PageSection> {
     let names = of.plan.figures();
     let decides = |name: &&str| of.judge.targets.iter().any(|(target, _)| target == name);
     let (first, others): (Vec<&str>, Vec<&str>) = names.iter().copied().partition(decides);
@@ -237,21 +237,21 @@ fn front(of: &SweepSources<'_>) -> Option<Section> {
     let blocks = tables(of, |one| {
         let rows = one.front.iter().take(MOST_ROWS).filter_map(|number| {
             let (row, ..) = rows(of, one).find(|(row, ..)| row.variant + 1 == *number)?;
-            let cells = |names: &[&str]| -> Vec<Text> {
+            let cells = |names: &[&str]| -> Vec<RichText> {
                 names.iter().map(|name| value(name, of.plan.figure(name).map(|k| row.figures[k]))).collect()
             };
-            let values = of.plan.variants[row.variant].iter().cloned().map(Text::new).collect();
-            Some([vec![Text::new(number.to_string())], cells(&first), values, cells(&others)].concat())
+            let values = of.plan.variants[row.variant].iter().cloned().map(RichText::new).collect();
+            Some([vec![RichText::new(number.to_string())], cells(&first), values, cells(&others)].concat())
         });
         let caption = format!("Variants that no other beats in all of: {better}. All variants are in sweep.csv");
-        Table { caption, header: header.clone(), rows: rows.collect() }
+        PageTable { caption, header: header.clone(), rows: rows.collect() }
     });
     let (id, title) = ("best".to_owned(), "The Pareto front".to_owned());
-    (!blocks.is_empty()).then_some(Section { id, title, detail: Detail::Summary, blocks })
+    (!blocks.is_empty()).then_some(PageSection { id, title, detail: Detail::Summary, blocks })
 }
 
 /// Rank correlations, an input to a column.
-fn ranks(one: &OfGenerator) -> Table {
+fn ranks(one: &OfGenerator) -> PageTable {
     let mut inputs: Vec<&str> = Vec::new();
     for rank in &one.ranks {
         if !inputs.contains(&rank.input.as_str()) {
@@ -260,27 +260,27 @@ fn ranks(one: &OfGenerator) -> Table {
     }
     let row = |figure: &'static str| {
         let of = |input: &&str| one.ranks.iter().find(|rank| rank.figure == figure && rank.input == **input);
-        let cell = |input| Text::new(of(input).map_or("–".to_owned(), |rank| significant(rank.correlation, 2)));
-        let cells: Vec<Text> = inputs.iter().map(cell).collect();
-        [vec![Text::new(figure)], cells].concat()
+        let cell = |input| RichText::new(of(input).map_or("–".to_owned(), |rank| significant(rank.correlation, 2)));
+        let cells: Vec<RichText> = inputs.iter().map(cell).collect();
+        [vec![RichText::new(figure)], cells].concat()
     };
     let has = |figure: &&str| one.ranks.iter().any(|rank| rank.figure == *figure);
-    Table {
+    PageTable {
         caption: "Rank correlation of each figure with each input".to_owned(),
         header: [words(&["Figure"]), words(&inputs)].concat(),
         rows: one.figures.iter().map(|spread| spread.figure).filter(has).map(row).collect(),
     }
 }
 
-fn figures(one: &OfGenerator) -> Table {
+fn figures(one: &OfGenerator) -> PageTable {
     let rows = one.figures.iter().map(|spread| {
         let shown = SHOWN.map(|share| quantile(one, spread.figure, share));
         let judged = spread.quantiles.iter().find(|quantile| quantile.share == JUDGED);
         let ends = [judged.and_then(|q| q.low), judged.and_then(|q| q.high)];
         let cells = [Some(spread.mean), Some(spread.std)].into_iter().chain(shown).chain(ends);
-        [Text::new(spread.figure)].into_iter().chain(cells.map(|x| value(spread.figure, x))).collect()
+        [RichText::new(spread.figure)].into_iter().chain(cells.map(|x| value(spread.figure, x))).collect()
     });
-    Table {
+    PageTable {
         caption: "Figures of the variants that converged; the interval is that of the 95 % value".to_owned(),
         header: words(&["Figure", "mean", "std", "5 %", "50 %", "95 %", "99 %", "from", "to"]),
         rows: rows.collect(),

@@ -24,7 +24,7 @@ use tokio::time::{Instant, Sleep, sleep};
 
 use crate::Shared;
 use crate::drive::{self, ReadError};
-use crate::folder::{Entry, Folder, FolderError, LARGEST_FILE};
+use crate::folder::{Folder, FolderEntry, FolderError, LARGEST_FILE};
 use crate::guard::{FILE_POLICY, NoEntry, PAGE_POLICY, RESULT_POLICY, harden, refusal};
 use crate::jobs::JobError;
 use crate::work::{DriveAsked, WorkAsked};
@@ -176,7 +176,7 @@ struct Begin {
     folder: String,
     built_in: &'static [&'static str],
     generators: Vec<&'static str>,
-    files: Vec<Entry>,
+    files: Vec<FolderEntry>,
     largest_file: u64,
 }
 

@@ -40,7 +40,7 @@ pub fn read(folder: &Folder, name: &str) -> Result<Drive, ReadError> {
 
 /// One thing that is wrong.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Wrong {
+pub struct RefusedField {
     /// The field, or nothing if none is to blame.
     pub field: String,
     /// The value found and what is allowed.
@@ -59,7 +59,7 @@ pub struct DriveShown {
     /// Its fields.
     pub fields: Vec<ListedField>,
     /// What is wrong with it; nothing of a drive that is whole.
-    pub problems: Vec<Wrong>,
+    pub problems: Vec<RefusedField>,
     /// What to know of a drive that is whole.
     pub cautions: Vec<String>,
     /// Its drawing; none of a drive that is not whole.
@@ -114,13 +114,13 @@ pub fn show(folder: &Folder, asked: &DriveAsked, kind: GeneratorKind, gaps: bool
             Ok(()) => good.push(set.as_str()),
             // Two fields that fit one another alone, as teeth of both wheels do.
             Err(_) if from.with_sets(sets.iter().map(String::as_str)).is_ok() => good.push(set.as_str()),
-            Err(what) => problems.push(Wrong { field: path.clone(), what }),
+            Err(what) => problems.push(RefusedField { field: path.clone(), what }),
         }
     }
     let drive = match from.with_sets(good.iter().copied()) {
         Ok(drive) => Some(drive),
         Err(error) => {
-            problems.extend(error.problems.into_iter().map(|p| Wrong { field: p.field, what: p.what }));
+            problems.extend(error.problems.into_iter().map(|p| RefusedField { field: p.field, what: p.what }));
             None
         }
     };
@@ -130,11 +130,11 @@ pub fn show(folder: &Folder, asked: &DriveAsked, kind: GeneratorKind, gaps: bool
     let drawing = match drawn {
         Some(Ok(Ok(drawing))) => Some(drawing),
         Some(Ok(Err(error))) => {
-            problems.extend(error.problems.into_iter().map(|p| Wrong { field: p.field, what: p.what }));
+            problems.extend(error.problems.into_iter().map(|p| RefusedField { field: p.field, what: p.what }));
             None
         }
         Some(Err(_)) => {
-            problems.push(Wrong { field: String::new(), what: "these sizes make no drawing".to_owned() });
+            problems.push(RefusedField { field: String::new(), what: "these sizes make no drawing".to_owned() });
             None
         }
         None => None,

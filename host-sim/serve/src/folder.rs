@@ -76,7 +76,7 @@ pub struct Folder {
 
 /// A file of the folder.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Entry {
+pub struct FolderEntry {
     /// Its name, from the folder on.
     pub name: String,
     /// Bytes.
@@ -216,14 +216,14 @@ impl Folder {
 
     /// What is in the folder: its files and those of the folders in it, by name. Hidden ones, links and names that are
     /// no plain words are left out.
-    pub fn entries(&self) -> Vec<Entry> {
+    pub fn entries(&self) -> Vec<FolderEntry> {
         let mut found = Vec::new();
         self.collect("", 3, &mut found);
         found.sort_by(|a, b| a.name.cmp(&b.name));
         found
     }
 
-    fn collect(&self, under: &str, deep: usize, found: &mut Vec<Entry>) {
+    fn collect(&self, under: &str, deep: usize, found: &mut Vec<FolderEntry>) {
         let Ok(entries) = fs::read_dir(self.path.join(under)) else { return };
         for entry in entries.take(MOST_ENTRIES).flatten() {
             let Ok(word) = entry.file_name().into_string() else { continue };
@@ -237,7 +237,7 @@ impl Folder {
                 self.collect(&name, deep - 1, found);
             } else if about.is_file() {
                 let changed = about.modified().ok().and_then(|at| at.duration_since(UNIX_EPOCH).ok());
-                found.push(Entry { name, bytes: about.len(), changed_s: changed.map_or(0, |at| at.as_secs()) });
+                found.push(FolderEntry { name, bytes: about.len(), changed_s: changed.map_or(0, |at| at.as_secs()) });
             }
         }
     }

@@ -26,7 +26,7 @@ use tokio::sync::watch;
 use crate::folder::{Folder, JOBS};
 use crate::work::{WorkAsked, WorkError, shown};
 use process::{ProcessEnd, Running};
-pub use record::{JobRecord, Progress, State};
+pub use record::{JobProgress, JobRecord, JobStatus};
 
 /// Jobs that wait, at most: a guess; a person does not queue more.
 pub(crate) const MOST_WAITING: usize = 32;
@@ -94,7 +94,7 @@ pub struct Jobs {
 
 /// What a page sees of all jobs.
 #[derive(Debug, Serialize)]
-pub struct Seen {
+pub struct JobsSeen {
     /// Counts changes.
     pub revision: u64,
     /// The jobs, the newest first.
@@ -112,9 +112,9 @@ impl Jobs {
     pub fn new(folder: Arc<Folder>, program: PathBuf, at_a_time: Option<usize>) -> Arc<Jobs> {
         let mut inside = Inside { next: 1, ..Inside::default() };
         for mut job in record::all(&folder) {
-            if matches!(job.state, State::Waiting | State::Running) {
+            if matches!(job.state, JobStatus::Waiting | JobStatus::Running) {
                 process::end_orphan(job.pid, &job.arguments);
-                (job.state, job.pid, job.progress) = (State::Interrupted, None, None);
+                (job.state, job.pid, job.progress) = (JobStatus::Interrupted, None, None);
                 job.ended_s = Some(now_s());
                 job.say("the server ended before this job did");
                 // A folder that cannot be written to has a record that is behind; what is shown is right.
@@ -154,9 +154,9 @@ impl Jobs {
     }
 
     /// What there is.
-    pub fn seen(&self) -> Seen {
+    pub fn seen(&self) -> JobsSeen {
         let revision = *self.changes.borrow();
-        Seen { revision, jobs: self.lock().jobs.values().rev().cloned().collect() }
+        JobsSeen { revision, jobs: self.lock().jobs.values().rev().cloned().collect() }
     }
 
     /// One job.
@@ -185,7 +185,7 @@ impl Jobs {
             arguments: words.arguments,
             printed_to: words.printed_to.map(str::to_owned),
             out,
-            state: State::Waiting,
+            state: JobStatus::Waiting,
             short: line == JobLine::Short,
             begun_s: None,
             ended_s: None,
@@ -236,7 +236,7 @@ impl Jobs {
             inside.short.retain(|other| *other != id);
             inside.long.retain(|other| *other != id);
             if let Some(job) = inside.jobs.get_mut(&id) {
-                (job.state, job.ended_s) = (State::Cancelled, Some(now_s()));
+                (job.state, job.ended_s) = (JobStatus::Cancelled, Some(now_s()));
                 let _ = record::write(&self.folder, job);
             }
         }
@@ -253,7 +253,7 @@ impl Jobs {
         for (id, running) in &mut inside.running {
             running.kill();
             if let Some(job) = inside.jobs.get_mut(id) {
-                (job.state, job.pid, job.ended_s) = (State::Interrupted, None, Some(now_s()));
+                (job.state, job.pid, job.ended_s) = (JobStatus::Interrupted, None, Some(now_s()));
                 job.say("the server ended before this job did");
                 let _ = record::write(&self.folder, job);
             }
@@ -315,23 +315,23 @@ impl Jobs {
     fn begin(&self, id: u64) -> bool {
         let mut inside = self.lock();
         let inside = &mut *inside;
-        let Some(job) = inside.jobs.get_mut(&id).filter(|job| job.state == State::Waiting) else { return false };
+        let Some(job) = inside.jobs.get_mut(&id).filter(|job| job.state == JobStatus::Waiting) else { return false };
         if inside.over {
             return false;
         }
         job.begun_s = Some(now_s());
         match Running::start(&self.program, &job.arguments, self.folder.path()) {
             Ok(running) => {
-                (job.state, job.pid) = (State::Running, Some(running.pid()));
+                (job.state, job.pid) = (JobStatus::Running, Some(running.pid()));
                 inside.running.insert(id, running);
             }
             Err(error) => {
-                (job.state, job.ended_s) = (State::Failed, Some(now_s()));
+                (job.state, job.ended_s) = (JobStatus::Failed, Some(now_s()));
                 job.say(&format!("cannot start {}: {error}", self.program.display()));
             }
         }
         let _ = record::write(&self.folder, job);
-        job.state == State::Running
+        job.state == JobStatus::Running
     }
 
     fn finish(&self, id: u64, ended: ProcessEnd) {
@@ -341,22 +341,22 @@ impl Jobs {
         job.wall_ms = Some(ended.wall_ms);
         job.exit_code = ended.code;
         job.state = match ended.code {
-            _ if ended.cancelled => State::Cancelled,
-            Some(0) => State::Done,
-            _ => State::Failed,
+            _ if ended.cancelled => JobStatus::Cancelled,
+            Some(0) => JobStatus::Done,
+            _ => JobStatus::Failed,
         };
         for line in &ended.said {
             job.say(line);
         }
         match &job.printed_to {
-            Some(file) if job.state == State::Done => {
+            Some(file) if job.state == JobStatus::Done => {
                 let path = self.folder.place(&format!("{}/{file}", job.out));
                 let written = path.map_err(|error| error.to_string()).and_then(|path| {
                     flexspline_base::output::write_whole(&path, |to| to.write_all(&ended.printed))
                         .map_err(|error| error.to_string())
                 });
                 if let Err(error) = written {
-                    job.state = State::Failed;
+                    job.state = JobStatus::Failed;
                     job.say(&error);
                 }
             }

@@ -60,7 +60,7 @@ pub struct DriveAsked {
 /// How the columns of logs are read.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Reading {
+pub struct ColumnReading {
     /// `--columns`.
     #[serde(default)]
     pub columns: Option<String>,
@@ -75,7 +75,7 @@ pub struct Reading {
 /// What is known of a unit before it is measured: one of them.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Known {
+pub struct KnownOfUnit {
     /// The ratio alone.
     #[serde(default)]
     pub ratio: Option<f64>,
@@ -101,9 +101,9 @@ pub enum WorkAsked {
         /// The logs.
         files: Vec<String>,
         /// How they are read.
-        reading: Reading,
+        reading: ColumnReading,
         /// What is known of the unit.
-        known: Known,
+        known: KnownOfUnit,
         /// The generator that the table is marked with.
         generator: GeneratorKind,
     },
@@ -112,9 +112,9 @@ pub enum WorkAsked {
         /// The log.
         file: String,
         /// How it is read.
-        reading: Reading,
+        reading: ColumnReading,
         /// What is known of the unit: a model or tables.
-        known: Known,
+        known: KnownOfUnit,
         /// The generator of the tables.
         generator: GeneratorKind,
         /// Causes that are not considered.
@@ -126,7 +126,7 @@ pub enum WorkAsked {
         /// The log.
         file: String,
         /// How it is read.
-        reading: Reading,
+        reading: ColumnReading,
         /// The table image.
         table: String,
     },
@@ -416,13 +416,13 @@ impl CommandLine<'_> {
         files.iter().try_for_each(|file| self.file("file", file))
     }
 
-    fn known(&mut self, known: &Known, ratio_will_do: bool) -> Result<(), WorkError> {
+    fn known(&mut self, known: &KnownOfUnit, ratio_will_do: bool) -> Result<(), WorkError> {
         match known {
-            Known { ratio: Some(ratio), model: None, tables: None } if ratio_will_do => {
+            KnownOfUnit { ratio: Some(ratio), model: None, tables: None } if ratio_will_do => {
                 self.number("ratio", Some(*ratio))
             }
-            Known { ratio: None, model: Some(model), tables: None } => self.file_option("model", model),
-            Known { ratio: None, model: None, tables: Some(tables) } => self.folder_option("tables", tables),
+            KnownOfUnit { ratio: None, model: Some(model), tables: None } => self.file_option("model", model),
+            KnownOfUnit { ratio: None, model: None, tables: Some(tables) } => self.folder_option("tables", tables),
             _ => refuse(
                 "known",
                 "none, or several",
@@ -431,7 +431,7 @@ impl CommandLine<'_> {
         }
     }
 
-    fn reading(&mut self, reading: &Reading) -> Result<(), WorkError> {
+    fn reading(&mut self, reading: &ColumnReading) -> Result<(), WorkError> {
         if let Some(columns) = reading.columns.as_deref().filter(|columns| !columns.is_empty()) {
             self.text("columns", columns)?;
         }

@@ -13,7 +13,7 @@ use super::context::{Context, image_file};
 use flexspline_base::output::{Outputs, WholeFolder, prepare_folder};
 use flexspline_base::suggest::{likeliest, question};
 use flexspline_export::bundle::libraries::{BundleLibrary, LibraryError, Places, TARGETS};
-use flexspline_export::bundle::{Bundle, MANIFEST, Manifest, Table, TableEntry, tar_gz};
+use flexspline_export::bundle::{Bundle, BundledTable, MANIFEST, Manifest, TableEntry, tar_gz};
 
 /// Pack tables, a C99 reader, the core as static libraries, test vectors and build files into one firmware folder
 ///
@@ -102,7 +102,7 @@ impl BundleCommand {
         Ok(out)
     }
 
-    fn read_tables(&self) -> Result<Vec<Table>, Failure> {
+    fn read_tables(&self) -> Result<Vec<BundledTable>, Failure> {
         let place = &self.tables;
         let unreadable = |path: &Path, error| Failure::BadInput(format!("{}: {error}", path.display()));
         let mut paths = vec![place.clone()];
@@ -115,7 +115,7 @@ impl BundleCommand {
         let table = |path: PathBuf| {
             let image = image_file(&path)?;
             let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-            Table::new(&path.display().to_string(), &stem, image).map_err(bad_input)
+            BundledTable::new(&path.display().to_string(), &stem, image).map_err(bad_input)
         };
         paths.into_iter().map(table).collect()
     }

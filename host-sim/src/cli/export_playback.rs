@@ -12,7 +12,7 @@ use super::logs::LogOptions;
 use super::replay::measured;
 use super::{Failure, bad_input};
 use flexspline_base::output::Outputs;
-use flexspline_export::playback::{BOTH, Curve, MAX_TABLE_BYTES, Residual, Section, cfs, fprime};
+use flexspline_export::playback::{BOTH, Curve, MAX_TABLE_BYTES, PlaybackResidual, TableSection, cfs, fprime};
 use flexspline_identify::replay::{RowsRead, replay};
 
 /// Data with fewer rows are not judged: a guess, some rows to each half wave of order 2 over a few generator turns.
@@ -64,9 +64,9 @@ struct Played {
     torque_n_m: f64,
     temperature_c: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
-    model: Option<Residual>,
+    model: Option<PlaybackResidual>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    playback: Option<Residual>,
+    playback: Option<PlaybackResidual>,
     notes: Vec<String>,
 }
 
@@ -156,10 +156,10 @@ impl PlaybackOptions {
     fn judge(
         &self,
         data: &Path,
-        section: Section<'_>,
+        section: TableSection<'_>,
         curve: Option<&Curve>,
         notes: &mut Vec<String>,
-    ) -> Result<Residual, Failure> {
+    ) -> Result<PlaybackResidual, Failure> {
         let RowsRead { rows, faults, notes: noticed } =
             measured(data, &self.logs, section.table, section.temperature_c)?;
         let (replayed, summary) = replay(section.table, &rows);
@@ -169,7 +169,7 @@ impl PlaybackOptions {
             let all = rows.len();
             notes.push(format!("{extrapolated} of {all} rows lie beyond the loads or temperatures of the table"));
         }
-        let residual = Residual::on_data(section, &rows, &replayed, curve);
+        let residual = PlaybackResidual::on_data(section, &rows, &replayed, curve);
         if residual.rows < FEWEST_ROWS {
             let what = format!("found {} rows in the directions of the curve", residual.rows);
             return Err(Failure::BadInput(format!("--data: {what}; allowed: at least {FEWEST_ROWS}")));
@@ -216,7 +216,7 @@ impl PlaybackOptions {
 }
 
 /// The section at the load and temperature given, within the table's ranges, or in the middle of these.
-fn section_of<'a>(table: &'a Table<'a>, load: [Option<f64>; 2]) -> Result<Section<'a>, Failure> {
+fn section_of<'a>(table: &'a Table<'a>, load: [Option<f64>; 2]) -> Result<TableSection<'a>, Failure> {
     let within = |option: &str, value: Option<f64>, range: [f32; 2]| {
         let [least, most] = range.map(f64::from);
         let value = value.unwrap_or(0.5 * (least + most));
@@ -226,7 +226,7 @@ fn section_of<'a>(table: &'a Table<'a>, load: [Option<f64>; 2]) -> Result<Sectio
         let range = format!("{least} to {most}, the range of the table");
         Err(Failure::BadInput(format!("{option}: found {value}; allowed: {range}")))
     };
-    Ok(Section {
+    Ok(TableSection {
         table,
         torque_n_m: within("--torque-n-m", load[0], table.torque_range_n_m())?,
         temperature_c: within("--temperature-c", load[1], table.temperature_range_c())?,

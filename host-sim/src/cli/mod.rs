@@ -97,7 +97,7 @@ struct Cli {
     #[command(flatten)]
     common: Common,
     #[command(subcommand)]
-    command: Command,
+    command: CliCommand,
 }
 
 /// Commands by what they are used for.
@@ -210,7 +210,7 @@ fn parse(args: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> Result<
 }
 
 #[derive(Debug, Subcommand)]
-enum Command {
+enum CliCommand {
     Simulate(simulate::Simulate),
     Sleeve(sleeve::SleeveCommand),
     Sweep(Box<sweep::SweepCommand>),
@@ -301,11 +301,11 @@ fn ended(failure: Failure) -> Outcome {
     outcome
 }
 
-impl Command {
+impl CliCommand {
     /// Keeps the files that the command line names from being replaced. What is known to be written in the place of one
     /// is refused before any work is done, all else where it is written.
     fn keep_inputs(&self, context: &Context) -> Result<(), Failure> {
-        if let Command::New(_) = self {
+        if let CliCommand::New(_) = self {
             // It names the file that it writes.
             return Ok(());
         }
@@ -317,35 +317,35 @@ impl Command {
     /// Files that it writes whatever is asked of it, of commands that may read one of such a name.
     fn writes(&self) -> &'static [&'static str] {
         match self {
-            Command::Simulate(_) => &["results.csv", "summary.json"],
-            Command::Calibrate(_) => &["calibrated.fxt", "calibration.json"],
-            Command::Diagnose(_) => &["diagnosis.json"],
-            Command::Replay(_) => &["replay.csv", "summary.json"],
-            Command::Synthesize(_) => &["data.csv", "truth.json"],
+            CliCommand::Simulate(_) => &["results.csv", "summary.json"],
+            CliCommand::Calibrate(_) => &["calibrated.fxt", "calibration.json"],
+            CliCommand::Diagnose(_) => &["diagnosis.json"],
+            CliCommand::Replay(_) => &["replay.csv", "summary.json"],
+            CliCommand::Synthesize(_) => &["data.csv", "truth.json"],
             _ => &[],
         }
     }
 
     fn run(&self, context: &Context) -> Result<(), Failure> {
         match self {
-            Command::Simulate(command) => command.run(context),
-            Command::Sleeve(command) => command.run(context),
-            Command::Sweep(command) => command.run(context),
-            Command::Drive(command) => command.run(context),
-            Command::Fly(command) => command.run(context),
-            Command::Export(command) => command.run(context),
-            Command::Tables(command) => command.run(context),
-            Command::Validate(command) => command.run(context),
-            Command::Bundle(command) => command.run(context),
-            Command::Calibrate(command) => command.run(context),
-            Command::Replay(command) => command.run(context),
-            Command::Synthesize(command) => command.run(context),
-            Command::Look(command) => command.run(context),
-            Command::Diagnose(command) => command.run(context),
-            Command::Reproduce(command) => command.run(context),
-            Command::New(command) => command.run(context),
+            CliCommand::Simulate(command) => command.run(context),
+            CliCommand::Sleeve(command) => command.run(context),
+            CliCommand::Sweep(command) => command.run(context),
+            CliCommand::Drive(command) => command.run(context),
+            CliCommand::Fly(command) => command.run(context),
+            CliCommand::Export(command) => command.run(context),
+            CliCommand::Tables(command) => command.run(context),
+            CliCommand::Validate(command) => command.run(context),
+            CliCommand::Bundle(command) => command.run(context),
+            CliCommand::Calibrate(command) => command.run(context),
+            CliCommand::Replay(command) => command.run(context),
+            CliCommand::Synthesize(command) => command.run(context),
+            CliCommand::Look(command) => command.run(context),
+            CliCommand::Diagnose(command) => command.run(context),
+            CliCommand::Reproduce(command) => command.run(context),
+            CliCommand::New(command) => command.run(context),
             #[cfg(feature = "serve")]
-            Command::Serve(command) => command.run(context),
+            CliCommand::Serve(command) => command.run(context),
         }
     }
 }

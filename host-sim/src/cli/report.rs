@@ -18,7 +18,7 @@ use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::stepping::{Method, SolverSettings};
 use flexspline_report::animation::{Animation, AnimationError, animate};
 use flexspline_report::diagnosis_report::{self, DiagnosisSources};
-use flexspline_report::page::{Page, Written};
+use flexspline_report::page::{Page, WrittenPage};
 use flexspline_report::shown_torque_n_m;
 
 /// The drives of tables in motion, each at half of what its table spans.
@@ -94,7 +94,7 @@ pub(super) fn before(context: &Context, out: &Path, name: &str, drive: Option<&D
 fn fate(path: &Path, name: &str, drive: Option<&Drive>) -> Option<String> {
     let html = std::fs::read_to_string(path).ok()?;
     let found = path.display();
-    let Some(written) = Written::of(&html) else {
+    let Some(written) = WrittenPage::of(&html) else {
         return Some(format!(
             "{found} is none of our pages; once there is a new one it is kept as {}",
             kept(path, None).display()
@@ -102,7 +102,7 @@ fn fate(path: &Path, name: &str, drive: Option<&Drive>) -> Option<String> {
     };
     if written.command != name {
         let kept = kept(path, Some(&written));
-        let Written { command, title, .. } = written;
+        let WrittenPage { command, title, .. } = written;
         return Some(format!(
             "{found} is the page of `{command}` ({title}); once there is a new one it is kept as {}",
             kept.display()
@@ -115,7 +115,7 @@ fn fate(path: &Path, name: &str, drive: Option<&Drive>) -> Option<String> {
 }
 
 /// Where the page of another command, or a page that is none of ours, is kept.
-fn kept(path: &Path, written: Option<&Written>) -> PathBuf {
+fn kept(path: &Path, written: Option<&WrittenPage>) -> PathBuf {
     let of = written.map_or("other", |written| written.command.as_str());
     let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or("report");
     path.with_file_name(format!("{stem}-{of}.html"))
@@ -130,7 +130,7 @@ pub(super) fn write(page: &Page, out: &Path, outputs: &mut Outputs) -> Result<()
 pub(super) fn write_to(page: &Page, path: &Path, outputs: &mut Outputs) -> Result<(), Failure> {
     let html = page.html().map_err(|error| Failure::Failed(format!("{}: {error}", path.display())))?;
     if let Ok(standing) = std::fs::read(path) {
-        let written = Written::of(&String::from_utf8_lossy(&standing));
+        let written = WrittenPage::of(&String::from_utf8_lossy(&standing));
         if written.as_ref().is_none_or(|written| written.command != page.command_name) {
             outputs.file(&kept(path, written.as_ref()), |file| file.write_all(&standing))?;
         }

@@ -10,7 +10,7 @@ use flexspline_base::output::Outputs;
 use flexspline_mechanics::drive::GeneratorKind;
 use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_mechanics::stepping::SolverSettings;
-use flexspline_pacana_2023::claims::{Judged, Verdict};
+use flexspline_pacana_2023::claims::{ClaimVerdict, JudgedClaim};
 use flexspline_pacana_2023::{Reproduction, page, reproduce};
 
 /// Run the protocol of the paper with all four generators and compare with the paper's results
@@ -73,11 +73,11 @@ impl Reproduce {
 /// The verdicts for reading.
 fn text(result: &Reproduction, out: &std::path::Path) -> String {
     let mut text = String::new();
-    for Judged { claim, verdict, .. } in &result.claims {
+    for JudgedClaim { claim, verdict, .. } in &result.claims {
         let verdict: &str = (*verdict).into();
         text.push_str(&format!("{verdict:<26} {:<22} {}\n", claim.id, claim.place));
     }
-    let counts: Vec<String> = Verdict::ALL
+    let counts: Vec<String> = ClaimVerdict::ALL
         .into_iter()
         .map(<&str>::from)
         .map(|verdict| format!("{} {verdict}", result.counts[verdict]))

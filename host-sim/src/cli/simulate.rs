@@ -21,7 +21,7 @@ use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_mechanics::stepping::{Method, SolveError, SolverSettings};
 use flexspline_report::page::Page;
-use flexspline_report::{Seen, simulation_report};
+use flexspline_report::{MotionSeen, simulation_report};
 
 /// The rows of a run that ended on its way.
 const PARTIAL: &str = "results.partial.csv";
@@ -154,7 +154,7 @@ impl Simulate {
         let mut frames = if self.frames { Some(Frames::new(&out.join("frames"))?) } else { None };
         let mut progress = context.progress(settings.generator.name());
         let mut lost: Option<OutputError> = None;
-        let mut seen = (!self.no_report).then(|| Seen::new(&drive));
+        let mut seen = (!self.no_report).then(|| MotionSeen::new(&drive));
         let run = simulate(&drive, &settings, &mut |now| {
             if context.verbose() {
                 progress.line(&line(now));

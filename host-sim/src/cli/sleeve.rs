@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::{Context, Failure, bad_input};
 use flexspline_mechanics::drive::{Drive, Sleeve, SleeveKind};
-use flexspline_mechanics::sleeve::{Flexspline3d, Harmonic, Rollers};
+use flexspline_mechanics::sleeve::{Flexspline3d, RimHarmonic, Rollers};
 
 /// The even harmonics of two waves that a sleeve of ordinary length still feels.
 const HARMONICS: [u32; 6] = [2, 4, 6, 8, 10, 12];
@@ -45,7 +45,7 @@ struct SleeveResult<'a> {
     teeth: bool,
     /// Width of the band under the generator.
     band_mm: f64,
-    harmonics: Vec<Harmonic>,
+    harmonics: Vec<RimHarmonic>,
     torsion_n_m_per_rad: f64,
     lateral_n_per_mm: f64,
     two_rollers: Rollers,

@@ -14,8 +14,8 @@ use flexspline_base::output::Outputs;
 use flexspline_design::data_sheet::{FIGURES, FigureOf};
 use flexspline_design::stated::short;
 use flexspline_design::sweep::{
-    Constraint, EXAMPLE, Judge, OfGenerator, Plan, PlanSettings, Ran, Row, RunStatus, Sense, Shard, Sweep, SweepError,
-    Tolerances, Vary, is_error_of_making, reduce, run,
+    Constraint, EXAMPLE, Judge, OfGenerator, PlanError, PlanSettings, Ran, ReducedSweep, RunStatus, Sense, Shard,
+    Tolerances, VariantPlan, VariantRow, Vary, is_error_of_making, reduce, run,
 };
 use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_report::page::Page;
@@ -58,7 +58,7 @@ pub(super) struct SweepCommand {
     #[command(flatten)]
     plan: PlanCommand,
     #[command(flatten)]
-    judged: Judged,
+    judged: JudgeOptions,
 }
 
 #[derive(Debug, Subcommand)]
@@ -127,11 +127,11 @@ struct ReduceCommand {
     #[arg(long)]
     partial: bool,
     #[command(flatten)]
-    judged: Judged,
+    judged: JudgeOptions,
 }
 
 #[derive(Debug, Args)]
-struct Judged {
+struct JudgeOptions {
     /// A constraint, FIGURE=LEAST..MOST, either end may be left out [default: teeth that clear one another]
     #[arg(long, value_name = "FIGURE=RANGE", allow_hyphen_values = true)]
     keep: Vec<Constraint>,
@@ -149,10 +149,10 @@ fn figures() -> String {
     FIGURES.chunks(3).map(|names| line(names).trim_end().to_owned()).collect::<Vec<_>>().join("\n")
 }
 
-fn failure(error: SweepError) -> Failure {
+fn failure(error: PlanError) -> Failure {
     match error {
-        SweepError::Failed(what) => Failure::Failed(what),
-        SweepError::Output(error) => error.into(),
+        PlanError::Failed(what) => Failure::Failed(what),
+        PlanError::Output(error) => error.into(),
         refused => Failure::BadInput(refused.to_string()),
     }
 }
@@ -206,7 +206,7 @@ impl PlanCommand {
     }
 
     /// The plan; what `judged` asks for is checked before the FEM of a plan of tolerances.
-    fn made(&self, context: &Context, judged: Option<&Judged>) -> Result<Plan, Failure> {
+    fn made(&self, context: &Context, judged: Option<&JudgeOptions>) -> Result<VariantPlan, Failure> {
         let settings = PlanSettings { draws: self.draws, seed: self.seed, mesh: self.mesh };
         let Some(file) = &self.tolerances else {
             let drive = context.drive()?;
@@ -221,7 +221,7 @@ impl PlanCommand {
             }
             let at = (self.torque_n_m, usize::from(self.positions));
             let stated = context.stated()?;
-            return Plan::of_fields(&drive, stated.as_ref(), &self.vary, &self.generator.0, at, settings)
+            return VariantPlan::of_fields(&drive, stated.as_ref(), &self.vary, &self.generator.0, at, settings)
                 .map_err(failure);
         };
         if context.has_drive() {
@@ -241,7 +241,7 @@ impl PlanCommand {
         })
         .map_err(failure)?;
         let progress = Mutex::new(context.progress("plan"));
-        Plan::of_tolerances(&tolerances, settings, &|done, of, what| {
+        VariantPlan::of_tolerances(&tolerances, settings, &|done, of, what| {
             if let Ok(mut bar) = progress.lock() {
                 bar.set(done, of, what);
             }
@@ -250,8 +250,8 @@ impl PlanCommand {
     }
 }
 
-impl Judged {
-    fn judge(&self, plan: &Plan) -> Result<Judge, Failure> {
+impl JudgeOptions {
+    fn judge(&self, plan: &VariantPlan) -> Result<Judge, Failure> {
         let named = |names: &[String], sense| names.iter().map(|name| (name.clone(), sense)).collect::<Vec<_>>();
         let targets = [named(&self.least, Sense::Least), named(&self.most, Sense::Most)].concat();
         Judge { constraints: self.keep.clone(), targets }.of(plan).map_err(failure)
@@ -275,14 +275,14 @@ impl RunCommand {
 }
 
 /// The plan of a folder, which has its own drive and output folder.
-fn opened(context: &Context, folder: &Path) -> Result<Plan, Failure> {
+fn opened(context: &Context, folder: &Path) -> Result<VariantPlan, Failure> {
     if let Some(option) = context.changes_the_drive().or(context.has_out().then_some("--out")) {
         return Err(Failure::BadInput(format!("{option}: found it with a plan, which has its own; plan anew")));
     }
-    Plan::read(folder).map_err(failure)
+    VariantPlan::read(folder).map_err(failure)
 }
 
-fn computed(context: &Context, plan: &Plan, folder: &Path, shard: Shard) -> Result<Ran, Failure> {
+fn computed(context: &Context, plan: &VariantPlan, folder: &Path, shard: Shard) -> Result<Ran, Failure> {
     let progress = Mutex::new(context.progress("sweep"));
     run(plan, folder, shard, &|done, of, row| {
         if let Ok(mut bar) = progress.lock() {
@@ -297,7 +297,13 @@ fn computed(context: &Context, plan: &Plan, folder: &Path, shard: Shard) -> Resu
 }
 
 /// Writes sweep.csv, sweep.json and report.html; `partial` of a plan that was read, which has a drive of its own.
-fn reduced(context: &Context, plan: &Plan, folder: &Path, judge: &Judge, partial: Option<bool>) -> Result<(), Failure> {
+fn reduced(
+    context: &Context,
+    plan: &VariantPlan,
+    folder: &Path,
+    judge: &Judge,
+    partial: Option<bool>,
+) -> Result<(), Failure> {
     let sweep = reduce(plan, folder, judge, partial.unwrap_or(false)).map_err(failure)?;
     let remarks = remarks(plan, &sweep);
     let sources = SweepSources { plan, command: &context.command, judge, sweep: &sweep, remarks: &remarks };
@@ -343,11 +349,11 @@ fn reduced(context: &Context, plan: &Plan, folder: &Path, judge: &Judge, partial
 }
 
 /// Results of one generator in words.
-fn lines(plan: &Plan, sweep: &Sweep, judge: &Judge, of: &OfGenerator) -> String {
+fn lines(plan: &VariantPlan, sweep: &ReducedSweep, judge: &Judge, of: &OfGenerator) -> String {
     let mut text = format!("{}\n", of.generator);
     let names = plan.figures();
     for number in of.front.iter().take(SHOWN) {
-        let found = |(row, ..): &&(Row, bool, bool)| (row.variant + 1, row.generator) == (*number, of.generator);
+        let found = |(row, ..): &&(VariantRow, bool, bool)| (row.variant + 1, row.generator) == (*number, of.generator);
         let Some((row, ..)) = sweep.rows.iter().find(found) else { continue };
         let targets = judge.targets.iter().filter_map(|(name, _)| {
             let k = names.iter().position(|known| known == name)?;
@@ -372,7 +378,7 @@ fn lines(plan: &Plan, sweep: &Sweep, judge: &Judge, of: &OfGenerator) -> String 
 }
 
 /// Remarks on the results.
-fn remarks(plan: &Plan, sweep: &Sweep) -> Vec<String> {
+fn remarks(plan: &VariantPlan, sweep: &ReducedSweep) -> Vec<String> {
     let mut remarks = Vec::new();
     if sweep.missing > 0 {
         remarks.push(format!("PARTIAL: {} of {} runs are missing", sweep.missing, sweep.missing + sweep.rows.len()));

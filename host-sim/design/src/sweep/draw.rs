@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use fastrand::Rng;
 
-use super::tolerance::{Law, TeethError, Tolerance, ToleranceActs, teeth};
+use super::tolerance::{DistributionForm, FieldTolerance, TeethError, ToleranceActs, teeth};
 use super::vary::latin;
 use flexspline_base::statistics::mean;
 use flexspline_mechanics::drive::Drive;
@@ -22,9 +22,9 @@ pub(super) struct Drawn {
 
 impl Drawn {
     /// The middle of every tolerance: 0 for a size or an error of teeth.
-    pub(super) fn middle(tolerances: &[Tolerance]) -> Vec<Drawn> {
-        let of = |tolerance: &Tolerance| match (tolerance.acts, tolerance.distribution.law) {
-            (ToleranceActs::Alike, Law::Normal { mean, .. }) => mean,
+    pub(super) fn middle(tolerances: &[FieldTolerance]) -> Vec<Drawn> {
+        let of = |tolerance: &FieldTolerance| match (tolerance.acts, tolerance.distribution.law) {
+            (ToleranceActs::Alike, DistributionForm::Normal { mean, .. }) => mean,
             (ToleranceActs::Alike, _) => tolerance.distribution.quantile(0.5),
             _ => 0.0,
         };
@@ -33,10 +33,10 @@ impl Drawn {
 }
 
 /// `count` drives: sizes and phases are a Latin hypercube, errors of single teeth are independent.
-pub(super) fn draw(tolerances: &[Tolerance], drive: &Drive, count: usize, seed: u64) -> Vec<Vec<Drawn>> {
+pub(super) fn draw(tolerances: &[FieldTolerance], drive: &Drive, count: usize, seed: u64) -> Vec<Vec<Drawn>> {
     let mut random = Rng::with_seed(seed);
     let points = latin(count, 2 * tolerances.len(), &mut random);
-    let mut one = |tolerance: &Tolerance, place: &[f64]| {
+    let mut one = |tolerance: &FieldTolerance, place: &[f64]| {
         let of = &tolerance.distribution;
         let (mut value, mut phase_deg, mut teeth_um) = (of.quantile(place[0]), 0.0, Vec::new());
         match tolerance.acts {
@@ -78,7 +78,7 @@ fn added_up(pitches: &[f64]) -> Vec<f64> {
 }
 
 /// A drawn drive as assignments PATH=VALUE, each path once.
-pub(super) fn sets(tolerances: &[Tolerance], drawn: &[Drawn]) -> Vec<String> {
+pub(super) fn sets(tolerances: &[FieldTolerance], drawn: &[Drawn]) -> Vec<String> {
     let mut sets: Vec<String> = Vec::new();
     for (tolerance, Drawn { value, phase_deg, teeth_um }) in tolerances.iter().zip(drawn) {
         let field = &tolerance.field;

@@ -5,8 +5,8 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-use super::plan::{Plan, SweepError};
-use super::run::{Row, RunStatus};
+use super::plan::{PlanError, VariantPlan};
+use super::run::{RunStatus, VariantRow};
 use super::vary::is_error_of_making;
 use flexspline_base::suggest::did_you_mean;
 use flexspline_mechanics::drive::RigidMesh;
@@ -81,12 +81,12 @@ impl Judge {
     ///
     /// # Errors
     /// A figure that variants of the plan do not have, a target given twice, or targets of drives within tolerances.
-    pub fn of(mut self, plan: &Plan) -> Result<Judge, SweepError> {
+    pub fn of(mut self, plan: &VariantPlan) -> Result<Judge, PlanError> {
         let known = plan.figures();
         let targets = self.targets.iter().map(|(name, _)| ("--least, --most", name));
         for (option, name) in self.constraints.iter().map(|kept| ("--keep", &kept.figure)).chain(targets) {
             if !known.contains(&name.as_str()) {
-                return Err(SweepError::BadInput(format!(
+                return Err(PlanError::BadInput(format!(
                     "{option}: figure {name:?} is not known; allowed: {}{}",
                     known.join(", "),
                     did_you_mean("; ", name, known.iter().copied())
@@ -95,14 +95,14 @@ impl Judge {
         }
         let is_twice = |k: &usize| self.targets[..*k].iter().any(|(name, _)| *name == self.targets[*k].0);
         if let Some(k) = (1..self.targets.len()).find(is_twice) {
-            return Err(SweepError::BadInput(format!(
+            return Err(PlanError::BadInput(format!(
                 "--least, --most: found {} twice, allowed: each figure once",
                 self.targets[k].0
             )));
         }
         if plan.is_of_tolerances() && !self.targets.is_empty() {
             let what = "--least, --most: allowed with --vary; nobody chooses among drives drawn from tolerances";
-            return Err(SweepError::BadInput(what.to_owned()));
+            return Err(PlanError::BadInput(what.to_owned()));
         }
         if !plan.is_of_tolerances() && self.targets.is_empty() {
             self.targets = USUAL.map(|(name, sense)| (name.to_owned(), sense)).to_vec();
@@ -111,25 +111,25 @@ impl Judge {
     }
 
     /// Whether each row converged, has rigid teeth that clear one another, and meets every constraint.
-    pub(super) fn meet(&self, plan: &Plan, rows: &[Row]) -> Vec<bool> {
+    pub(super) fn meet(&self, plan: &VariantPlan, rows: &[VariantRow]) -> Vec<bool> {
         let kept: Vec<(Option<usize>, &Constraint)> =
             self.constraints.iter().map(|kept| (plan.figure(&kept.figure), kept)).collect();
-        let keeps = |row: &Row, (figure, kept): &(Option<usize>, &Constraint)| {
+        let keeps = |row: &VariantRow, (figure, kept): &(Option<usize>, &Constraint)| {
             figure.is_some_and(|figure| (kept.least..=kept.most).contains(&row.figures[figure]))
         };
-        let is_sound = |row: &Row| row.status == RunStatus::Converged && clears(plan, row);
+        let is_sound = |row: &VariantRow| row.status == RunStatus::Converged && clears(plan, row);
         rows.iter().map(|row| is_sound(row) && kept.iter().all(|kept| keeps(row, kept))).collect()
     }
 
     /// The Pareto front of each generator: rows that meet, and that no other row that meets beats. Rows are compared
     /// with those that have the same manufacturing errors, which nobody chooses.
-    pub(super) fn front(&self, plan: &Plan, rows: &[Row], meet: &[bool]) -> Vec<bool> {
+    pub(super) fn front(&self, plan: &VariantPlan, rows: &[VariantRow], meet: &[bool]) -> Vec<bool> {
         let errors: Vec<usize> = (0..plan.columns.len()).filter(|k| is_error_of_making(&plan.columns[*k])).collect();
-        let made = |row: &Row| errors.iter().map(|k| &plan.variants[row.variant][*k]).collect::<Vec<_>>();
-        let alike = |a: &Row, b: &Row| a.generator == b.generator && made(a) == made(b);
+        let made = |row: &VariantRow| errors.iter().map(|k| &plan.variants[row.variant][*k]).collect::<Vec<_>>();
+        let alike = |a: &VariantRow, b: &VariantRow| a.generator == b.generator && made(a) == made(b);
         let targets: Vec<(usize, Sense)> =
             self.targets.iter().filter_map(|(name, sense)| Some((plan.figure(name)?, *sense))).collect();
-        let costs = |row: &Row| targets.iter().map(|(k, sense)| cost(row.figures[*k], *sense)).collect();
+        let costs = |row: &VariantRow| targets.iter().map(|(k, sense)| cost(row.figures[*k], *sense)).collect();
         let costs: Vec<Vec<f64>> = rows.iter().map(costs).collect();
         let beats = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| a <= b) && a.iter().zip(b).any(|(a, b)| a < b);
         let beaten =
@@ -148,6 +148,6 @@ pub(super) fn cost(value: f64, sense: Sense) -> f64 {
 }
 
 /// Whether the rigid teeth clear one another, where that was looked at.
-pub(super) fn clears(plan: &Plan, row: &Row) -> bool {
+pub(super) fn clears(plan: &VariantPlan, row: &VariantRow) -> bool {
     plan.figure("rigid_gap_um").is_none_or(|gap| row.figures[gap] >= -1e3 * RigidMesh::TOUCHES_MM)
 }

@@ -24,10 +24,10 @@ mod tolerance;
 mod vary;
 
 pub use judge::{Constraint, ConstraintError, Judge, Sense};
-pub use plan::{Plan, PlanSettings, SweepError, SweepProgress};
-pub use reduce::{Asked, FigureSpread, OfGenerator, Rank, Sweep, reduce};
-pub use run::{Ran, Row, RunStatus, Shard, run};
-pub use tolerance::{Distribution, EXAMPLE, Law, TeethError, Tolerance, ToleranceActs, Tolerances};
+pub use plan::{PlanError, PlanSettings, SweepProgress, VariantPlan};
+pub use reduce::{FigureSpread, OfGenerator, RankCorrelation, ReducedSweep, RequirementMet, reduce};
+pub use run::{Ran, RunStatus, Shard, VariantRow, run};
+pub use tolerance::{Distribution, DistributionForm, EXAMPLE, FieldTolerance, TeethError, ToleranceActs, Tolerances};
 pub use vary::{VariedValues, Vary, VaryError, grid, is_error_of_making};
 
 #[cfg(test)]

@@ -18,7 +18,7 @@ use std::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
 
-use super::tolerance::{Tolerance, ToleranceActs};
+use super::tolerance::{FieldTolerance, ToleranceActs};
 use crate::kernels::{EccentricField, Gain, Kernels, PlaceOfLoad};
 use crate::tables::places_that_tell_apart;
 use flexspline_base::units::ARCSEC_PER_RAD;
@@ -239,7 +239,7 @@ struct Curves {
 }
 
 /// Evaluates drives with one generator.
-pub(super) struct Model {
+pub(super) struct KernelModel {
     teeth: [u32; 2],
     response: Response,
     wheels: [WheelSums; 2],
@@ -254,9 +254,9 @@ pub(super) struct Model {
 /// Loads of the model: +T, −T, +t, −t.
 const SIGNS: [(usize, bool); 4] = [(0, false), (0, true), (1, false), (1, true)];
 
-impl Model {
+impl KernelModel {
     /// `torques_n_m`: the load, and the light load of lost motion.
-    pub(super) fn new(kernels: &Kernels, response: Response, torques_n_m: [f64; 2]) -> Model {
+    pub(super) fn new(kernels: &Kernels, response: Response, torques_n_m: [f64; 2]) -> KernelModel {
         let signed: Vec<f64> = SIGNS
             .iter()
             .map(|(load, negative)| if *negative { -torques_n_m[*load] } else { torques_n_m[*load] })
@@ -268,7 +268,7 @@ impl Model {
             .chain(of_output(ORDERS[2], 1.0))
             .collect();
         let count = places_that_tell_apart(&orders, PLACES, APART);
-        Model {
+        KernelModel {
             teeth: kernels.teeth,
             response,
             wheels: [Wheel::Flexspline, Wheel::CircularSpline].map(|wheel| WheelSums::new(kernels, wheel, &signed)),
@@ -339,7 +339,7 @@ impl Model {
             }
         }
         if let Some(apart) = &curves.apart {
-            let [x, y] = Model::apart_at(apart, place);
+            let [x, y] = KernelModel::apart_at(apart, place);
             let (distance, direction) = ((x * x + y * y).sqrt(), libm::atan2(y, x));
             for (error, (size, negative)) in errors.iter_mut().zip(SIGNS) {
                 *error += self.eccentric(distance, direction, negative, self.loads[size]);
@@ -377,7 +377,7 @@ impl Model {
         let most = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let apart = curves.apart.map_or(0.0, |apart| {
             let distance = |place| {
-                let [x, y] = Model::apart_at(&apart, place);
+                let [x, y] = KernelModel::apart_at(&apart, place);
                 (x * x + y * y).sqrt()
             };
             most(&self.places.iter().map(distance).collect::<Vec<f64>>())
@@ -408,6 +408,6 @@ fn spread(values: &[f64]) -> (f64, f64) {
 }
 
 /// Whether a tolerance needs kernels of displaced axes.
-pub(super) fn displaces(tolerance: &Tolerance) -> bool {
+pub(super) fn displaces(tolerance: &FieldTolerance) -> bool {
     tolerance.acts == ToleranceActs::Directed && tolerance.field != "as_built.circular_spline_ovality_um"
 }

@@ -35,7 +35,7 @@ const LOADS: [&str; 3] = ["t1_n_m", "t2_n_m", "largest_n_m"];
 
 /// Why a sweep is not planned, run or reduced.
 #[derive(Debug, Error)]
-pub enum SweepError {
+pub enum PlanError {
     /// All mistakes in a file of tolerances.
     #[error("{}", lines(.0))]
     Tolerances(Vec<Problem>),
@@ -66,7 +66,7 @@ pub struct PlanSettings {
 
 /// A plan.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Plan {
+pub struct VariantPlan {
     /// Everything but the variants.
     recipe: Recipe,
     /// The drive whose fields vary.
@@ -96,13 +96,13 @@ struct Recipe {
     mesh: String,
     /// Inputs of the variants, and their names in the results.
     names: Vec<[String; 2]>,
-    by: By,
+    by: HowComputed,
 }
 
 /// How a variant is computed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub(super) enum By {
+pub(super) enum HowComputed {
     /// Its data sheet, by contact FEM.
     Sheet {
         /// Largest load, N·m; by default that of the data sheet of the drive, or of its size.
@@ -127,7 +127,7 @@ pub(super) struct OfOne {
     pub response: Response,
 }
 
-impl Plan {
+impl VariantPlan {
     /// A plan of fields that vary; variants have their data sheets computed, up to `torque_n_m` if it is given.
     ///
     /// # Errors
@@ -139,8 +139,8 @@ impl Plan {
         generators: &[GeneratorKind],
         (torque_n_m, positions): (Option<f64>, usize),
         settings: PlanSettings,
-    ) -> Result<Plan, SweepError> {
-        let wrong = |what: String| Err(SweepError::BadInput(what));
+    ) -> Result<VariantPlan, PlanError> {
+        let wrong = |what: String| Err(PlanError::BadInput(what));
         let fields =
             |found: String| wrong(format!("--vary: found {found}, allowed: 1 to {MOST_FIELDS} different fields"));
         if !(1..=MOST_FIELDS).contains(&vary.len()) {
@@ -163,9 +163,9 @@ impl Plan {
             ));
         }
         let variants = settings.draws.map_or_else(|| grid(vary), |count| filling(vary, count, settings.seed));
-        let by = By::Sheet { torque_n_m, positions };
+        let by = HowComputed::Sheet { torque_n_m, positions };
         let columns = vary.iter().map(|field| field.path.clone()).collect();
-        let plan = Plan::new((drive, stated), generators, (columns, variants), (Vec::new(), by), settings.mesh);
+        let plan = VariantPlan::new((drive, stated), generators, (columns, variants), (Vec::new(), by), settings.mesh);
         plan.makes_drives()?;
         Ok(plan)
     }
@@ -178,10 +178,10 @@ impl Plan {
         of: &Tolerances,
         settings: PlanSettings,
         progress: &SweepProgress<'_>,
-    ) -> Result<Plan, SweepError> {
+    ) -> Result<VariantPlan, PlanError> {
         let draws = settings.draws.unwrap_or_default();
         if !(LEAST_DRAWS..=MOST_VARIANTS).contains(&draws) {
-            return Err(SweepError::BadInput(format!(
+            return Err(PlanError::BadInput(format!(
                 "--draws: found {draws}, allowed: {LEAST_DRAWS} to {MOST_VARIANTS}"
             )));
         }
@@ -190,7 +190,8 @@ impl Plan {
         let lines = drawn.iter().map(|one| sets(&of.list, one).into_iter().filter_map(split).unzip());
         let (columns, variants): (Vec<Vec<String>>, Vec<Vec<String>>) = lines.unzip();
         let columns = columns.into_iter().next().unwrap_or_default();
-        let by = By::Kernels { torques_n_m: torques_n_m(of), of: respond(of, solver(settings.mesh), progress)? };
+        let by =
+            HowComputed::Kernels { torques_n_m: torques_n_m(of), of: respond(of, solver(settings.mesh), progress)? };
         let names = of.list.iter().map(|tolerance| {
             let input = match tolerance.acts {
                 ToleranceActs::Harmonic { order, .. } => of_order(&tolerance.field, order),
@@ -199,16 +200,16 @@ impl Plan {
             [input, tolerance.name.clone()]
         });
         let named = (names.collect(), by);
-        Ok(Plan::new((&of.drive, None), &of.generators, (columns, variants), named, settings.mesh))
+        Ok(VariantPlan::new((&of.drive, None), &of.generators, (columns, variants), named, settings.mesh))
     }
 
     pub(super) fn new(
         (drive, stated): (&Drive, Option<&Stated>),
         generators: &[GeneratorKind],
         (columns, variants): (Vec<String>, Vec<Vec<String>>),
-        (names, by): (Vec<[String; 2]>, By),
+        (names, by): (Vec<[String; 2]>, HowComputed),
         mesh: MeshLevel,
-    ) -> Plan {
+    ) -> VariantPlan {
         let recipe = Recipe {
             schema_version: SCHEMA,
             tool_version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -219,15 +220,15 @@ impl Plan {
             by,
         };
         let (drive, stated, generators) = (drive.clone(), stated.cloned(), generators.to_vec());
-        Plan { recipe, drive, stated, generators, columns, variants, hash: String::new() }
+        VariantPlan { recipe, drive, stated, generators, columns, variants, hash: String::new() }
     }
 
     /// Refuses, before anything is computed, fields that make no drive with any of their values.
-    fn makes_drives(&self) -> Result<(), SweepError> {
+    fn makes_drives(&self) -> Result<(), PlanError> {
         let jobs = || (0..self.variants.len()).flat_map(|k| self.generators.iter().map(move |kind| (k, *kind)));
         match self.drive_of(0, self.generators[0]) {
             Err(why) if jobs().all(|(k, kind)| self.drive_of(k, kind).is_err()) => {
-                Err(SweepError::BadInput(format!("--vary: no variant makes a drive; the first: {why}")))
+                Err(PlanError::BadInput(format!("--vary: no variant makes a drive; the first: {why}")))
             }
             _ => Ok(()),
         }
@@ -249,8 +250,10 @@ impl Plan {
     /// Names of the figures, in the order of the columns of results.
     pub fn figures(&self) -> Vec<&'static str> {
         match self.recipe.by {
-            By::Sheet { .. } => LOADS.into_iter().chain(data_sheet::FIGURES.iter().map(|(name, _)| *name)).collect(),
-            By::Kernels { .. } => model::FIGURES.to_vec(),
+            HowComputed::Sheet { .. } => {
+                LOADS.into_iter().chain(data_sheet::FIGURES.iter().map(|(name, _)| *name)).collect()
+            }
+            HowComputed::Kernels { .. } => model::FIGURES.to_vec(),
         }
     }
 
@@ -261,16 +264,16 @@ impl Plan {
 
     /// Whether drives are drawn from tolerances.
     pub fn is_of_tolerances(&self) -> bool {
-        matches!(self.recipe.by, By::Kernels { .. })
+        matches!(self.recipe.by, HowComputed::Kernels { .. })
     }
 
     /// The kernels with a generator; none of a plan of fields.
     pub(super) fn kernels(&self, kind: GeneratorKind) -> Option<&Kernels> {
-        let By::Kernels { of, .. } = &self.recipe.by else { return None };
+        let HowComputed::Kernels { of, .. } = &self.recipe.by else { return None };
         of.iter().map(|one| &one.kernels).find(|kernels| kernels.generator == kind)
     }
 
-    pub(super) fn by(&self) -> &By {
+    pub(super) fn by(&self) -> &HowComputed {
         &self.recipe.by
     }
 
@@ -295,8 +298,8 @@ impl Plan {
         solver(self.recipe.mesh.parse().unwrap_or(MeshLevel::Coarse))
     }
 
-    fn texts(&self) -> Result<[Vec<u8>; 2], SweepError> {
-        let failed = |error: &dyn std::fmt::Display| SweepError::Failed(format!("plan: {error}"));
+    fn texts(&self) -> Result<[Vec<u8>; 2], PlanError> {
+        let failed = |error: &dyn std::fmt::Display| PlanError::Failed(format!("plan: {error}"));
         let mut json = serde_json::to_vec(&self.recipe).map_err(|error| failed(&error))?;
         json.push(b'\n');
         let mut csv = csv::Writer::from_writer(Vec::new());
@@ -314,13 +317,13 @@ impl Plan {
     ///
     /// # Errors
     /// The folder holds results of another plan, or cannot be written.
-    pub fn write(&self, folder: &Path) -> Result<Plan, SweepError> {
+    pub fn write(&self, folder: &Path) -> Result<VariantPlan, PlanError> {
         let paths = ["plan.csv", "plan.json"].map(|name| folder.join(name));
         let texts = self.texts()?;
         let is_same = paths.iter().zip(&texts).all(|(path, text)| fs::read(path).is_ok_and(|there| there == *text));
         let count = fs::read_dir(folder.join("results")).map_or(0, Iterator::count);
         if !is_same && count > 0 {
-            return Err(SweepError::BadInput(format!(
+            return Err(PlanError::BadInput(format!(
                 "--out: found {}, which holds {count} files of results of another plan; give another folder, or \
                  remove it",
                 folder.display()
@@ -331,22 +334,22 @@ impl Plan {
             outputs.file(path, |file| file.write_all(text))?;
         }
         outputs.finish()?;
-        Plan::read(folder)
+        VariantPlan::read(folder)
     }
 
     /// Reads the plan of a folder.
     ///
     /// # Errors
     /// There is none, it is not sound, or another version of the program made it: file, line and what is wrong.
-    pub fn read(folder: &Path) -> Result<Plan, SweepError> {
+    pub fn read(folder: &Path) -> Result<VariantPlan, PlanError> {
         let [csv, json] = ["plan.csv", "plan.json"].map(|name| folder.join(name));
         let text_of = |path: &Path| {
             let hint = "`flexspline sweep plan ... --out DIR` writes one";
             fs::read_to_string(path)
-                .map_err(|error| SweepError::BadInput(format!("{}: {error}; {hint}", path.display())))
+                .map_err(|error| PlanError::BadInput(format!("{}: {error}; {hint}", path.display())))
         };
         let (csv_text, json_text) = (text_of(&csv)?, text_of(&json)?);
-        let wrong = |what: String| SweepError::BadInput(format!("{}: {what}", json.display()));
+        let wrong = |what: String| PlanError::BadInput(format!("{}: {what}", json.display()));
         let recipe: Recipe = serde_json::from_str(&json_text).map_err(|error| wrong(error.to_string()))?;
         if (recipe.schema_version, recipe.tool_version.as_str()) != (SCHEMA, env!("CARGO_PKG_VERSION")) {
             return Err(wrong(format!(
@@ -358,8 +361,8 @@ impl Plan {
         let drive = Drive::from_toml("drive_toml", &recipe.drive_toml).map_err(|error| wrong(error.to_string()))?;
         let stated = Stated::of_file("drive_toml", &recipe.drive_toml).map_err(|error| wrong(error.to_string()))?;
         let kinds = recipe.generators.iter().map(|name| name.parse().map_err(|_| wrong(format!("generator {name:?}"))));
-        let generators = kinds.collect::<Result<Vec<GeneratorKind>, SweepError>>()?;
-        if let By::Kernels { of, .. } = &recipe.by {
+        let generators = kinds.collect::<Result<Vec<GeneratorKind>, PlanError>>()?;
+        if let HowComputed::Kernels { of, .. } = &recipe.by {
             for one in of {
                 one.kernels.check().map_err(|problem| wrong(problem.to_string()))?;
             }
@@ -368,11 +371,11 @@ impl Plan {
             }
         }
         let (columns, variants) =
-            variants_of(&csv_text).map_err(|error| SweepError::BadInput(format!("{}{error}", csv.display())))?;
+            variants_of(&csv_text).map_err(|error| PlanError::BadInput(format!("{}{error}", csv.display())))?;
         let mut hasher = blake3::Hasher::new();
         hasher.update(json_text.as_bytes()).update(csv_text.as_bytes());
         let hash = hasher.finalize().to_hex().as_str()[..16].to_owned();
-        Ok(Plan { recipe, drive, stated, generators, columns, variants, hash })
+        Ok(VariantPlan { recipe, drive, stated, generators, columns, variants, hash })
     }
 }
 

@@ -8,8 +8,8 @@ use serde::Serialize;
 
 use super::judge::{Judge, clears, cost};
 use super::model::CLOSED;
-use super::plan::{Plan, SweepError, of_order};
-use super::run::{Row, RunStatus, rows_of};
+use super::plan::{PlanError, VariantPlan, of_order};
+use super::run::{RunStatus, VariantRow, rows_of};
 use flexspline_base::robust::least_and_most;
 use flexspline_base::statistics::{Quantile, correlation, mean, quantile, std_dev};
 use flexspline_mechanics::drive::GeneratorKind;
@@ -21,7 +21,7 @@ const MOST_NAMED: usize = 5;
 
 /// A sweep, reduced: `sweep.json`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Sweep {
+pub struct ReducedSweep {
     /// Version of this form.
     pub schema_version: u32,
     /// Version of the program.
@@ -46,7 +46,7 @@ pub struct Sweep {
     pub generators: Vec<OfGenerator>,
     /// Every row, whether it meets, and whether it is Pareto-optimal.
     #[serde(skip)]
-    pub rows: Vec<(Row, bool, bool)>,
+    pub rows: Vec<(VariantRow, bool, bool)>,
 }
 
 /// Results with one generator.
@@ -57,11 +57,11 @@ pub struct OfGenerator {
     /// The Pareto front, best in the first target first: numbers of variants, from 1.
     pub front: Vec<usize>,
     /// Each thing asked of a variant, alone.
-    pub asked: Vec<Asked>,
+    pub asked: Vec<RequirementMet>,
     /// Scatter of the figures over the variants that converged.
     pub figures: Vec<FigureSpread>,
     /// Rank correlations of inputs and figures, the strongest of each figure first.
-    pub ranks: Vec<Rank>,
+    pub ranks: Vec<RankCorrelation>,
     /// Drives whose axes are further apart than the kernels reach: their errors are extrapolated.
     pub beyond_kernels: usize,
     /// Drives without play at some place: lost motion there is the wind-up alone.
@@ -70,7 +70,7 @@ pub struct OfGenerator {
 
 /// One thing asked of a variant.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Asked {
+pub struct RequirementMet {
     /// `converged`, `teeth clear`, or a constraint as `--keep` takes it.
     pub what: String,
     /// Variants that have it.
@@ -96,7 +96,7 @@ pub struct FigureSpread {
 
 /// Spearman's rank correlation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Rank {
+pub struct RankCorrelation {
     /// The figure.
     pub figure: &'static str,
     /// The field, or the name of its tolerance.
@@ -109,7 +109,7 @@ pub struct Rank {
 ///
 /// # Errors
 /// Results are missing or damaged, or of another plan: the file, and the command that computes them.
-pub fn reduce(plan: &Plan, folder: &Path, judge: &Judge, partial: bool) -> Result<Sweep, SweepError> {
+pub fn reduce(plan: &VariantPlan, folder: &Path, judge: &Judge, partial: bool) -> Result<ReducedSweep, PlanError> {
     let (rows, missing) = gathered(plan, folder, partial)?;
     let meet = judge.meet(plan, &rows);
     let front = judge.front(plan, &rows, &meet);
@@ -121,7 +121,7 @@ pub fn reduce(plan: &Plan, folder: &Path, judge: &Judge, partial: bool) -> Resul
         {
             best.sort_by(|a, b| cost(rows[*a].figures[first], sense).total_cmp(&cost(rows[*b].figures[first], sense)));
         }
-        let of_kind: Vec<&Row> = of_kind.into_iter().map(|k| &rows[k]).collect();
+        let of_kind: Vec<&VariantRow> = of_kind.into_iter().map(|k| &rows[k]).collect();
         let front = best.into_iter().map(|k| rows[k].variant + 1).collect();
         of_generator(plan, *kind, &of_kind, (front, judge), &inputs)
     });
@@ -129,9 +129,9 @@ pub fn reduce(plan: &Plan, folder: &Path, judge: &Judge, partial: bool) -> Resul
     let ended = |status| rows.iter().filter(|row| row.status == status).count();
     let (converged, failed, refused) =
         (ended(RunStatus::Converged), ended(RunStatus::Failed), ended(RunStatus::Refused));
-    let marked: Vec<(Row, bool, bool)> =
+    let marked: Vec<(VariantRow, bool, bool)> =
         rows.into_iter().zip(meet).zip(front).map(|((row, meets), front)| (row, meets, front)).collect();
-    Ok(Sweep {
+    Ok(ReducedSweep {
         schema_version: 1,
         tool_version: env!("CARGO_PKG_VERSION"),
         plan: plan.hash.clone(),
@@ -148,7 +148,7 @@ pub fn reduce(plan: &Plan, folder: &Path, judge: &Judge, partial: bool) -> Resul
 }
 
 /// Rows of all files of results, by variant, then by generator, and how many are missing.
-fn gathered(plan: &Plan, folder: &Path, partial: bool) -> Result<(Vec<Row>, usize), SweepError> {
+fn gathered(plan: &VariantPlan, folder: &Path, partial: bool) -> Result<(Vec<VariantRow>, usize), PlanError> {
     let results = folder.join("results");
     let entries = fs::read_dir(&results).map(|entries| entries.flatten().map(|entry| entry.path()).collect());
     let mut paths: Vec<_> = entries.unwrap_or_else(|_| Vec::new());
@@ -156,7 +156,7 @@ fn gathered(plan: &Plan, folder: &Path, partial: bool) -> Result<(Vec<Row>, usiz
     paths.sort();
     let mut found = BTreeMap::new();
     for path in &paths {
-        let text = fs::read(path).map_err(|error| SweepError::Failed(format!("{}: {error}", path.display())))?;
+        let text = fs::read(path).map_err(|error| PlanError::Failed(format!("{}: {error}", path.display())))?;
         for row in rows_of(path, &text, plan)?.0 {
             let g = plan.generators.iter().position(|kind| *kind == row.generator).unwrap_or_default();
             found.entry((row.variant, g)).or_insert(row);
@@ -166,7 +166,7 @@ fn gathered(plan: &Plan, folder: &Path, partial: bool) -> Result<(Vec<Row>, usiz
     let missing: Vec<usize> = all.filter(|of| !found.contains_key(of)).map(|(k, _)| k + 1).collect();
     if found.is_empty() || (!partial && !missing.is_empty()) {
         let named: Vec<String> = missing.iter().take(MOST_NAMED).map(ToString::to_string).collect();
-        return Err(SweepError::Failed(format!(
+        return Err(PlanError::Failed(format!(
             "{}: {} of {} runs are missing, of the variants {}{}; `flexspline sweep run {}` computes them{}",
             results.display(),
             missing.len(),
@@ -181,13 +181,13 @@ fn gathered(plan: &Plan, folder: &Path, partial: bool) -> Result<(Vec<Row>, usiz
 }
 
 fn of_generator(
-    plan: &Plan,
+    plan: &VariantPlan,
     generator: GeneratorKind,
-    rows: &[&Row],
+    rows: &[&VariantRow],
     (front, judge): (Vec<usize>, &Judge),
     inputs: &[(String, Vec<f64>)],
 ) -> OfGenerator {
-    let sound: Vec<&Row> = rows.iter().copied().filter(|row| row.status == RunStatus::Converged).collect();
+    let sound: Vec<&VariantRow> = rows.iter().copied().filter(|row| row.status == RunStatus::Converged).collect();
     let column = |name: &str| -> Vec<f64> {
         plan.figure(name).map_or_else(Vec::new, |k| sound.iter().map(|row| row.figures[k]).collect())
     };
@@ -204,9 +204,9 @@ fn of_generator(
         let of_input = |(input, of): &(String, Vec<f64>)| {
             let pairs = sound.iter().map(|row| of[row.variant]).zip(values.iter().copied());
             let correlation = rank_correlation(pairs)?;
-            Some(Rank { figure, input: input.clone(), correlation })
+            Some(RankCorrelation { figure, input: input.clone(), correlation })
         };
-        let mut of_figure: Vec<Rank> = inputs.iter().filter_map(of_input).collect();
+        let mut of_figure: Vec<RankCorrelation> = inputs.iter().filter_map(of_input).collect();
         of_figure.sort_by(|a, b| b.correlation.abs().total_cmp(&a.correlation.abs()));
         ranks.extend(of_figure);
     }
@@ -224,8 +224,8 @@ fn of_generator(
 }
 
 /// How many rows have each thing that is asked, alone.
-fn asked(plan: &Plan, judge: &Judge, rows: &[&Row]) -> Vec<Asked> {
-    let one = |what: String, found, has: &dyn Fn(&Row) -> bool| Asked {
+fn asked(plan: &VariantPlan, judge: &Judge, rows: &[&VariantRow]) -> Vec<RequirementMet> {
+    let one = |what: String, found, has: &dyn Fn(&VariantRow) -> bool| RequirementMet {
         what,
         meet_alone: rows.iter().filter(|row| has(row)).count(),
         of: rows.len(),
@@ -266,7 +266,7 @@ fn ranks(values: &[f64]) -> Vec<f64> {
 
 /// Numbers that vary from variant to variant, by name: of a list of errors their root mean square, of harmonics the
 /// amplitude of each order. Directions, phases and words are none.
-fn inputs(plan: &Plan) -> Vec<(String, Vec<f64>)> {
+fn inputs(plan: &VariantPlan) -> Vec<(String, Vec<f64>)> {
     let is_angle = |column: &String| column.ends_with("_phase_deg") || column.ends_with("_direction_deg");
     let mut names: Vec<String> = Vec::new();
     let mut found: HashMap<String, Vec<f64>> = HashMap::new();
@@ -299,12 +299,12 @@ fn numbers(cell: &str) -> Vec<(Option<i64>, f64)> {
     list.iter().filter_map(harmonic).chain(rms).collect()
 }
 
-impl Sweep {
+impl ReducedSweep {
     /// `sweep.csv`: every run with the numbers and words that its variant sets, its figures and marks.
     ///
     /// # Errors
     /// None but of memory.
-    pub fn csv(&self, plan: &Plan) -> Result<Vec<u8>, csv::Error> {
+    pub fn csv(&self, plan: &VariantPlan) -> Result<Vec<u8>, csv::Error> {
         let is_short = |k: &usize| plan.variants.iter().all(|values| !values[*k].starts_with('['));
         let fields: Vec<usize> = (0..plan.columns.len()).filter(is_short).collect();
         let mut to = csv::Writer::from_writer(Vec::new());

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
-use super::SweepError;
+use super::PlanError;
 use super::by_fem::{Conditions, wave};
 use super::draw::{Drawn, sets};
 use super::model::{Parabola, Response, SHEET, displaces};
@@ -44,7 +44,7 @@ pub(super) fn respond(
     of: &Tolerances,
     solver: SolverSettings,
     progress: &SweepProgress<'_>,
-) -> Result<Vec<OfOne>, SweepError> {
+) -> Result<Vec<OfOne>, PlanError> {
     let middle = Drawn::middle(&of.list);
     let drawn_as = uniform(of, &middle)?;
     let torques_n_m = torques_n_m(of);
@@ -70,10 +70,10 @@ pub(super) fn respond(
 }
 
 /// The drive with the uniform changes of `drawn` alone.
-fn uniform(of: &Tolerances, drawn: &[Drawn]) -> Result<Drive, SweepError> {
+fn uniform(of: &Tolerances, drawn: &[Drawn]) -> Result<Drive, PlanError> {
     let sets = sets(&of.list, drawn);
     let changed = of.drive.with_sets(sets.iter().map(String::as_str));
-    let mut drive = changed.map_err(|error| SweepError::BadInput(error.to_string()))?;
+    let mut drive = changed.map_err(|error| PlanError::BadInput(error.to_string()))?;
     drive.as_built = drive.as_built.uniform_part();
     Ok(drive)
 }
@@ -99,15 +99,15 @@ fn kernel_plan(of: &Tolerances, kind: GeneratorKind, [torque, light]: [f64; 2]) 
 }
 
 /// Why kernels failed: which tolerances ask for the displacement, and the remedy.
-fn kernels_failed(of: &Tolerances, kind: GeneratorKind, error: &KernelError) -> SweepError {
+fn kernels_failed(of: &Tolerances, kind: GeneratorKind, error: &KernelError) -> PlanError {
     let KernelError::Displaced { reached_um, .. } = error else {
-        return SweepError::Failed(format!("{kind}: kernels of the drive as drawn: {error}"));
+        return PlanError::Failed(format!("{kind}: kernels of the drive as drawn: {error}"));
     };
     let displacing = of.list.iter().filter(|t| displaces(t)).map(|t| {
         let most = t.distribution.quantile(NEARLY_ALL);
         format!("{} (99 of 100 drives up to {most:.1} um)", t.field)
     });
-    SweepError::Failed(format!(
+    PlanError::Failed(format!(
         "{kind}: {}: {error}. The teeth wedge: give narrower limits (limits = [0, {reached_um:.3}] together), or the \
          drive more clearance (flanks.preload_um below 0), or a generator bearing that yields \
          (generator.bearing_stiffness_n_per_mm3)",
@@ -122,7 +122,7 @@ fn response(
     at: Conditions,
     torques_n_m: [f64; 2],
     step: &(dyn Fn(usize) + Sync),
-) -> Result<Response, SweepError> {
+) -> Result<Response, PlanError> {
     let alike = || of.list.iter().enumerate().filter(|(_, tolerance)| tolerance.acts == ToleranceActs::Alike);
     let mut jobs: Vec<Option<(usize, f64)>> = vec![None];
     for (t, tolerance) in alike() {
@@ -139,12 +139,12 @@ fn response(
             }
             let state = state(&uniform(of, &drawn)?, at, torques_n_m).map_err(|error| {
                 let which = job.map_or("the middle drive".to_owned(), |(t, v)| format!("{} = {v}", of.list[t].field));
-                SweepError::Failed(format!("{}, {which}: {error}", at.kind))
+                PlanError::Failed(format!("{}, {which}: {error}", at.kind))
             })?;
             step(done.fetch_add(1, Ordering::Relaxed) + 1);
             Ok(state)
         })
-        .collect::<Result<Vec<Vec<f64>>, SweepError>>()?;
+        .collect::<Result<Vec<Vec<f64>>, PlanError>>()?;
     let value = |k: usize| jobs[k].map_or(f64::NAN, |(_, value)| value);
     let change = |k: usize| -> Vec<f64> { states[k].iter().zip(&states[0]).map(|(a, b)| a - b).collect() };
     let parabolas = alike().enumerate().map(|(k, (t, tolerance))| {

@@ -14,8 +14,8 @@ use std::sync::{Mutex, PoisonError};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::model::{Model, Response};
-use super::plan::{By, Plan, SweepError};
+use super::model::{KernelModel, Response};
+use super::plan::{HowComputed, PlanError, VariantPlan};
 use crate::data_sheet::{FIGURES, data_sheet};
 use flexspline_base::output::OutputError;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
@@ -81,14 +81,14 @@ impl RunStatus {
 
 /// A variant with a generator, computed.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Row {
+pub struct VariantRow {
     /// The variant, from 0.
     pub variant: usize,
     /// The generator.
     pub generator: GeneratorKind,
     /// How the computation ended.
     pub status: RunStatus,
-    /// Figures in the order of [`Plan::figures`]; not a number where missing.
+    /// Figures in the order of [`VariantPlan::figures`]; not a number where missing.
     pub figures: Vec<f64>,
     /// The reason where it did not converge.
     pub why: String,
@@ -96,8 +96,8 @@ pub struct Row {
     pub cautions: String,
 }
 
-impl Row {
-    fn line(&self, plan: &Plan) -> io::Result<Vec<u8>> {
+impl VariantRow {
+    fn line(&self, plan: &VariantPlan) -> io::Result<Vec<u8>> {
         let head = [plan.hash.clone(), (self.variant + 1).to_string(), self.generator.to_string()];
         let figures = self.figures.iter().map(|x| if x.is_finite() { x.to_string() } else { String::new() });
         let tail = [&self.why, &self.cautions].map(|words| words.replace(['\n', '\r'], " "));
@@ -108,7 +108,7 @@ impl Row {
     }
 
     /// Reads a row; none where it is not whole.
-    fn read(record: &csv::StringRecord, plan: &Plan) -> Option<Row> {
+    fn read(record: &csv::StringRecord, plan: &VariantPlan) -> Option<VariantRow> {
         let cell = |k: usize| record.get(k);
         let variant = cell(1)?.parse::<usize>().ok()?.checked_sub(1).filter(|k| *k < plan.variants.len())?;
         let generator = cell(2)?.parse().ok().filter(|kind| plan.generators.contains(kind))?;
@@ -118,7 +118,7 @@ impl Row {
         let figures: Option<Vec<f64>> = record.iter().skip(BEFORE.len()).take(count).map(number).collect();
         let [why, cautions] = [0, 1].map(|k| cell(BEFORE.len() + count + k).unwrap_or_default().to_owned());
         let figures = figures.filter(|figures| figures.len() == plan.figures().len())?;
-        Some(Row { variant, generator, status, figures, why, cautions })
+        Some(VariantRow { variant, generator, status, figures, why, cautions })
     }
 }
 
@@ -126,9 +126,9 @@ impl Row {
 ///
 /// # Errors
 /// It holds rows of another plan, or is no file of results.
-pub(super) fn rows_of(path: &Path, text: &[u8], plan: &Plan) -> Result<(Vec<Row>, u64), SweepError> {
+pub(super) fn rows_of(path: &Path, text: &[u8], plan: &VariantPlan) -> Result<(Vec<VariantRow>, u64), PlanError> {
     let foreign = |what: &str| {
-        SweepError::BadInput(format!("{}: {what}; remove it, or run the sweep in another folder", path.display()))
+        PlanError::BadInput(format!("{}: {what}; remove it, or run the sweep in another folder", path.display()))
     };
     // What follows the last end of a line was cut off.
     let whole = text.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1);
@@ -144,7 +144,7 @@ pub(super) fn rows_of(path: &Path, text: &[u8], plan: &Plan) -> Result<(Vec<Row>
             let theirs = record.get(0).unwrap_or_default();
             return Err(foreign(&format!("results of the plan {theirs:.16}, and this one is {}", plan.hash)));
         } else {
-            let Some(row) = Row::read(&record, plan) else { break };
+            let Some(row) = VariantRow::read(&record, plan) else { break };
             rows.push(row);
         }
         end = reader.position().byte();
@@ -153,43 +153,43 @@ pub(super) fn rows_of(path: &Path, text: &[u8], plan: &Plan) -> Result<(Vec<Row>
 }
 
 /// Columns of a file of results.
-fn header(plan: &Plan) -> Vec<&'static str> {
+fn header(plan: &VariantPlan) -> Vec<&'static str> {
     BEFORE.into_iter().chain(plan.figures()).chain(AFTER).collect()
 }
 
 /// Computes variants of a plan.
 struct Evaluator<'a> {
-    plan: &'a Plan,
-    models: Vec<Model>,
+    plan: &'a VariantPlan,
+    models: Vec<KernelModel>,
 }
 
 impl Evaluator<'_> {
-    fn new(plan: &Plan) -> Evaluator<'_> {
+    fn new(plan: &VariantPlan) -> Evaluator<'_> {
         let models = match plan.by() {
-            By::Sheet { .. } => Vec::new(),
-            By::Kernels { torques_n_m, of, .. } => {
-                of.iter().map(|one| Model::new(&one.kernels, one.response.clone(), *torques_n_m)).collect()
+            HowComputed::Sheet { .. } => Vec::new(),
+            HowComputed::Kernels { torques_n_m, of, .. } => {
+                of.iter().map(|one| KernelModel::new(&one.kernels, one.response.clone(), *torques_n_m)).collect()
             }
         };
         Evaluator { plan, models }
     }
 
-    fn row(&self, variant: usize, g: usize) -> Row {
+    fn row(&self, variant: usize, g: usize) -> VariantRow {
         let generator = self.plan.generators[g];
         let figures = vec![f64::NAN; self.plan.figures().len()];
         let (why, cautions) = (String::new(), String::new());
-        let mut row = Row { variant, generator, status: RunStatus::Refused, figures, why, cautions };
+        let mut row = VariantRow { variant, generator, status: RunStatus::Refused, figures, why, cautions };
         match self.plan.drive_of(variant, generator) {
             Ok(drive) => match self.plan.by() {
-                By::Sheet { torque_n_m, positions } => self.sheet(&drive, *torque_n_m, *positions, &mut row),
-                By::Kernels { of, .. } => self.kernels(&drive, &of[g].response, &self.models[g], &mut row),
+                HowComputed::Sheet { torque_n_m, positions } => self.sheet(&drive, *torque_n_m, *positions, &mut row),
+                HowComputed::Kernels { of, .. } => self.kernels(&drive, &of[g].response, &self.models[g], &mut row),
             },
             Err(error) => row.why = error.to_string(),
         }
         row
     }
 
-    fn sheet(&self, drive: &Drive, torque_n_m: Option<f64>, positions: usize, row: &mut Row) {
+    fn sheet(&self, drive: &Drive, torque_n_m: Option<f64>, positions: usize, row: &mut VariantRow) {
         let loads = self.plan.loads(drive, row.generator, torque_n_m);
         let temperature_c = drive.temperature.reference_c;
         let (mut sheet, done) = data_sheet(drive, row.generator, temperature_c, loads, positions, self.plan.solver());
@@ -210,7 +210,7 @@ impl Evaluator<'_> {
         row.figures = [loads.t1_n_m, loads.t2_n_m, loads.largest_n_m].into_iter().chain(figures).collect();
     }
 
-    fn kernels(&self, drive: &Drive, response: &Response, model: &Model, row: &mut Row) {
+    fn kernels(&self, drive: &Drive, response: &Response, model: &KernelModel, row: &mut VariantRow) {
         let column = |field: &str| self.plan.columns.iter().position(|column| column == field);
         let mut values = Vec::new();
         for parabola in &response.parabolas {
@@ -235,15 +235,15 @@ impl Evaluator<'_> {
 
 /// A file of results that rows are appended to, in their order.
 struct Journal<'a> {
-    plan: &'a Plan,
+    plan: &'a VariantPlan,
     file: File,
     next: usize,
-    waiting: BTreeMap<usize, Row>,
+    waiting: BTreeMap<usize, VariantRow>,
 }
 
 impl Journal<'_> {
     /// Takes a row, and writes all that are next.
-    fn take(&mut self, place: usize, row: Row) -> io::Result<()> {
+    fn take(&mut self, place: usize, row: VariantRow) -> io::Result<()> {
         self.waiting.insert(place, row);
         while let Some(row) = self.waiting.remove(&self.next) {
             self.file.write_all(&row.line(self.plan)?)?;
@@ -267,20 +267,20 @@ pub struct Ran {
 /// # Errors
 /// There are fewer variants than shards, the file holds rows of another plan, or it cannot be written.
 pub fn run(
-    plan: &Plan,
+    plan: &VariantPlan,
     folder: &Path,
     shard: Shard,
-    done: &(dyn Fn(usize, usize, &Row) + Sync),
-) -> Result<Ran, SweepError> {
+    done: &(dyn Fn(usize, usize, &VariantRow) + Sync),
+) -> Result<Ran, PlanError> {
     let (variants, generators) = (plan.variants.len(), plan.generators.len());
     if shard.of > variants {
-        return Err(SweepError::BadInput(format!(
+        return Err(PlanError::BadInput(format!(
             "--shard: found {} shards, allowed: up to {variants}, the number of variants",
             shard.of
         )));
     }
     let path = shard.path(folder);
-    let failed = |source: io::Error| SweepError::Output(OutputError { path: path.clone(), source });
+    let failed = |source: io::Error| PlanError::Output(OutputError { path: path.clone(), source });
     fs::create_dir_all(folder.join("results")).map_err(failed)?;
     let open = || OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path);
     let mut file = open().map_err(failed)?;
@@ -293,10 +293,10 @@ pub fn run(
         .collect();
     let (rows, mut end) = rows_of(&path, &text, plan)?;
     let expected =
-        |row: &Row, (variant, g): (usize, usize)| (row.variant, row.generator) == (variant, plan.generators[g]);
+        |row: &VariantRow, (variant, g): (usize, usize)| (row.variant, row.generator) == (variant, plan.generators[g]);
     let there = rows.len();
     if there > jobs.len() || rows.iter().zip(&jobs).any(|(row, job)| !expected(row, *job)) {
-        return Err(SweepError::BadInput(format!("{}: not the rows of this shard; remove it", path.display())));
+        return Err(PlanError::BadInput(format!("{}: not the rows of this shard; remove it", path.display())));
     }
     if end == 0 {
         let line = header(plan).join(",") + "\n";

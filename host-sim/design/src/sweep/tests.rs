@@ -3,7 +3,7 @@ use std::fs;
 
 use super::draw::{Drawn, draw, sets};
 use super::model::{FIGURES, Parabola, Response, SHEET, STATE, WAVE};
-use super::plan::{By, OfOne};
+use super::plan::{HowComputed, OfOne};
 use super::*;
 use crate::kernels::{Eccentric, KERNELS_SCHEMA, Kernels, LoadKernels, WheelKernels};
 use crate::stated::Stated;
@@ -73,7 +73,7 @@ const THICK: &str =
     "[[tolerance]]\nfield = \"flexspline.rim_thickness_mm\"\ndistribution = \"normal\"\nplus_minus = 0.03\n";
 
 /// A plan of test kernels.
-fn plan_of(text: &str, draws: usize) -> Plan {
+fn plan_of(text: &str, draws: usize) -> VariantPlan {
     let of = tolerances(text);
     let alike = of.list.iter().filter(|t| t.acts == ToleranceActs::Alike);
     let parabolas = alike.map(|t| Parabola {
@@ -86,7 +86,7 @@ fn plan_of(text: &str, draws: usize) -> Plan {
     planned(&of, response, draws)
 }
 
-fn planned(of: &Tolerances, response: Response, draws: usize) -> Plan {
+fn planned(of: &Tolerances, response: Response, draws: usize) -> VariantPlan {
     let split = |set: String| set.split_once('=').map(|(path, value)| (path.to_owned(), value.to_owned())).unwrap();
     let lines: Vec<Vec<(String, String)>> = draw(&of.list, &of.drive, draws, 1)
         .iter()
@@ -94,20 +94,20 @@ fn planned(of: &Tolerances, response: Response, draws: usize) -> Plan {
         .collect();
     let columns = lines[0].iter().map(|(path, _)| path.clone()).collect();
     let variants = lines.into_iter().map(|line| line.into_iter().map(|(_, value)| value).collect()).collect();
-    let by = By::Kernels { torques_n_m: [10.0, 1.0], of: vec![OfOne { kernels: kernels(), response }] };
+    let by = HowComputed::Kernels { torques_n_m: [10.0, 1.0], of: vec![OfOne { kernels: kernels(), response }] };
     let named = (Vec::new(), by);
-    Plan::new((&of.drive, None), &[GeneratorKind::Cam], (columns, variants), named, MeshLevel::Coarse)
+    VariantPlan::new((&of.drive, None), &[GeneratorKind::Cam], (columns, variants), named, MeshLevel::Coarse)
 }
 
 /// A plan of the data sheets of fields that vary.
-fn of_fields(vary: &[&str], generators: &[GeneratorKind]) -> Result<Plan, SweepError> {
+fn of_fields(vary: &[&str], generators: &[GeneratorKind]) -> Result<VariantPlan, PlanError> {
     let vary: Vec<Vary> = vary.iter().map(|text| text.parse().unwrap()).collect();
     let settings = PlanSettings { draws: None, seed: 1, mesh: MeshLevel::Coarse };
-    Plan::of_fields(&Drive::hhd_95(), None, &vary, generators, (None, 4), settings)
+    VariantPlan::of_fields(&Drive::hhd_95(), None, &vary, generators, (None, 4), settings)
 }
 
 /// The sweep of a plan, by one shard.
-fn swept(plan: &Plan, judge: Judge) -> Sweep {
+fn swept(plan: &VariantPlan, judge: Judge) -> ReducedSweep {
     let folder = tempfile::tempdir().unwrap();
     let plan = plan.write(folder.path()).unwrap();
     run(&plan, folder.path(), Shard::WHOLE, &|_, _, _| ()).unwrap();
@@ -115,13 +115,13 @@ fn swept(plan: &Plan, judge: Judge) -> Sweep {
 }
 
 /// A row with figures that were made up.
-fn row(plan: &Plan, variant: usize, figures: &[(&str, f64)]) -> Row {
+fn row(plan: &VariantPlan, variant: usize, figures: &[(&str, f64)]) -> VariantRow {
     let mut all = vec![f64::NAN; plan.figures().len()];
     for (name, value) in [("rigid_gap_um", 1.0), ("largest_n_m", 200.0)].iter().chain(figures) {
         all[plan.figure(name).unwrap()] = *value;
     }
     let (why, cautions) = (String::new(), String::new());
-    Row { variant, generator: GeneratorKind::Cam, status: RunStatus::Converged, figures: all, why, cautions }
+    VariantRow { variant, generator: GeneratorKind::Cam, status: RunStatus::Converged, figures: all, why, cautions }
 }
 
 #[test]
@@ -197,11 +197,11 @@ fn the_example_is_read_and_mistakes_are_named_by_line_field_value_and_what_is_al
 
 #[test]
 fn a_distribution_is_truncated_at_its_limits() {
-    let within = Distribution { law: Law::Normal { mean: 5.0, std: 1.0 }, limits: [5.0, 6.0] };
+    let within = Distribution { law: DistributionForm::Normal { mean: 5.0, std: 1.0 }, limits: [5.0, 6.0] };
     // Half of those between 0 and 1 standard deviation lie below 0.4419 (tables: 0.5 + 0.3413 / 2).
     assert!((within.quantile(0.5) - 5.4419).abs() < 1e-3);
     assert!((within.quantile(1e-9) - 5.0).abs() < 1e-6 && (within.quantile(1.0 - 1e-9) - 6.0).abs() < 1e-6);
-    let size = Distribution { law: Law::Rayleigh { std: 2.0 }, limits: [0.0, 11.0] };
+    let size = Distribution { law: DistributionForm::Rayleigh { std: 2.0 }, limits: [0.0, 11.0] };
     assert!((size.quantile(0.95) - 2.0 * (-2.0 * 0.05f64.ln()).sqrt()).abs() < 1e-4);
 }
 
@@ -256,7 +256,7 @@ fn errors_of_single_pitches_add_up_and_close() {
 /// Figures by test kernels of a drive with these fields.
 fn figures(of: &OfOne, sets: &[&str]) -> Vec<f64> {
     let built = Drive::hhd_95().with_sets(sets.iter().copied()).unwrap().as_built;
-    model::Model::new(&of.kernels, of.response.clone(), [10.0, 1.0]).figures(&built, &[])
+    model::KernelModel::new(&of.kernels, of.response.clone(), [10.0, 1.0]).figures(&built, &[])
 }
 
 /// A harmonic of the pitch and a displaced axis do what their kernels say, whichever way they are summed.
@@ -283,9 +283,9 @@ fn the_model_is_that_of_the_kernels() {
 fn kernels_agree_with_fem() {
     let of = tolerances(include_str!("../../../../examples/sweep/teeth.toml"));
     let settings = PlanSettings { draws: Some(8), seed: 1, mesh: MeshLevel::Coarse };
-    let plan = Plan::of_tolerances(&of, settings, &|_, _, _| ()).unwrap();
-    let By::Kernels { torques_n_m, of: kinds } = plan.by() else { panic!("no kernels") };
-    let model = model::Model::new(&kinds[0].kernels, kinds[0].response.clone(), *torques_n_m);
+    let plan = VariantPlan::of_tolerances(&of, settings, &|_, _, _| ()).unwrap();
+    let HowComputed::Kernels { torques_n_m, of: kinds } = plan.by() else { panic!("no kernels") };
+    let model = model::KernelModel::new(&kinds[0].kernels, kinds[0].response.clone(), *torques_n_m);
     let places: Vec<f64> = (0..5).map(|j| 95.0 * f64::from(j) / 5.0).collect();
     let by_fem = |drive: &Drive| -> Vec<f64> {
         let problem = Problem::new(drive, GeneratorKind::Cam, of.temperature_c, plan.solver()).unwrap();
@@ -342,7 +342,7 @@ fn flanks_do_not_overlap() {
 fn rank_correlation_finds_the_tolerance_that_matters() {
     let sweep = swept(&plan_of(&format!("{THICK}{ECCENTRIC}"), 200), Judge::default());
     let of = &sweep.generators[0];
-    let ranks: Vec<&Rank> = of.ranks.iter().filter(|rank| rank.figure == "error_pp_arcsec").collect();
+    let ranks: Vec<&RankCorrelation> = of.ranks.iter().filter(|rank| rank.figure == "error_pp_arcsec").collect();
     assert_eq!(ranks[0].input, "as_built.circular_spline_eccentricity_um");
     assert!(ranks[0].correlation > 0.99 && ranks[1].correlation.abs() < 0.2, "{ranks:?}");
     // Closed form: twice a size of Rayleigh's distribution; the rim adds 0.1 arcsec at most, the same everywhere.
@@ -409,11 +409,11 @@ fn missing_results_are_named_and_those_of_another_plan_refused() {
 fn a_plan_is_read_as_it_was_written_and_its_lines_may_be_edited() {
     let folder = tempfile::tempdir().unwrap();
     let plan = plan_of(&format!("{ECCENTRIC}{THICK}"), 8).write(folder.path()).unwrap();
-    assert_eq!(Plan::read(folder.path()).unwrap(), plan);
+    assert_eq!(VariantPlan::read(folder.path()).unwrap(), plan);
     let csv = folder.path().join("plan.csv");
     let text = fs::read_to_string(&csv).unwrap();
     fs::write(&csv, format!("{text}9,1.5,0,2.1\n10,1.5,0,thick\n")).unwrap();
-    let edited = Plan::read(folder.path()).unwrap();
+    let edited = VariantPlan::read(folder.path()).unwrap();
     assert!(edited.variants.len() == 10 && edited.hash != plan.hash);
     run(&edited, folder.path(), Shard::WHOLE, &|_, _, _| ()).unwrap();
     let sweep = reduce(&edited, folder.path(), &Judge::default(), false).unwrap();
@@ -425,13 +425,13 @@ fn a_plan_is_read_as_it_was_written_and_its_lines_may_be_edited() {
         ("variant,a\n1,2,3\n".to_owned(), "plan.csv: CSV error"),
     ] {
         fs::write(&csv, wrong).unwrap();
-        let said = Plan::read(folder.path()).unwrap_err().to_string();
+        let said = VariantPlan::read(folder.path()).unwrap_err().to_string();
         assert!(said.contains(due), "{said}");
     }
     fs::write(&csv, &text).unwrap();
     let json = fs::read_to_string(folder.path().join("plan.json")).unwrap();
     fs::write(folder.path().join("plan.json"), json.replacen(env!("CARGO_PKG_VERSION"), "0.0.1", 1)).unwrap();
-    assert!(Plan::read(folder.path()).unwrap_err().to_string().contains("plan anew"));
+    assert!(VariantPlan::read(folder.path()).unwrap_err().to_string().contains("plan anew"));
 }
 
 /// A thicker rim is stiffer under two rollers, which bend it most, and presses on them harder. Rollers that would
@@ -470,7 +470,7 @@ fn fields_that_make_no_drive_are_refused_before_anything_runs() {
 #[test]
 fn constraints_leave_out_and_the_front_is_pareto_optimal() {
     let plan = of_fields(&["generator.w0_mm=0.46..0.5:5"], &[GeneratorKind::Cam]).unwrap();
-    let mut rows: Vec<Row> = [(1.0, 300.0), (2.0, 200.0), (3.0, 250.0), (0.5, 500.0), (2.0, 200.0)]
+    let mut rows: Vec<VariantRow> = [(1.0, 300.0), (2.0, 200.0), (3.0, 250.0), (0.5, 500.0), (2.0, 200.0)]
         .iter()
         .enumerate()
         .map(|(k, (e, s))| row(&plan, k, &[("kinematic_error_pp_arcsec", *e), ("max_von_mises_mpa", *s)]))
@@ -492,7 +492,7 @@ fn variants_are_compared_with_those_made_alike() {
     let vary = ["flexspline.rim_thickness_mm=1.0,1.2", "as_built.circular_spline_eccentricity_um=0,10"];
     let plan = of_fields(&vary, &[GeneratorKind::Cam]).unwrap();
     let errors = [0.380, 0.324, 0.5, 0.3].iter().enumerate();
-    let rows: Vec<Row> = errors.map(|(k, e)| row(&plan, k, &[("kinematic_error_pp_arcsec", *e)])).collect();
+    let rows: Vec<VariantRow> = errors.map(|(k, e)| row(&plan, k, &[("kinematic_error_pp_arcsec", *e)])).collect();
     let targets = vec![("kinematic_error_pp_arcsec".to_owned(), Sense::Least)];
     let judge = Judge { constraints: Vec::new(), targets };
     assert_eq!(judge.front(&plan, &rows, &[true; 4]), [true, false, false, true]);
@@ -520,7 +520,7 @@ fn the_loads_are_those_of_the_data_sheet() {
     let stated = Stated { t1_n_m, t2_n_m, rated_torque_n_m: Some(153.0), ..Stated::default() };
     let settings = PlanSettings { draws: None, seed: 1, mesh: MeshLevel::Coarse };
     let vary = ["generator.w0_mm=0.5".parse().unwrap()];
-    let plan = Plan::of_fields(&drive, Some(&stated), &vary, &[kind], (None, 4), settings).unwrap();
+    let plan = VariantPlan::of_fields(&drive, Some(&stated), &vary, &[kind], (None, 4), settings).unwrap();
     let folder = tempfile::tempdir().unwrap();
     for plan in [&plan, &plan.write(folder.path()).unwrap()] {
         let of = plan.loads(&drive, kind, None);

@@ -5,7 +5,7 @@ use std::fmt::Display;
 use toml::Spanned;
 use toml::de::DeValue;
 
-use super::SweepError;
+use super::PlanError;
 use super::draw::{Drawn, sets};
 use crate::stated::short;
 use flexspline_base::statistics::{normal_cdf, normal_quantile};
@@ -39,12 +39,12 @@ pub struct Tolerances {
     /// Temperature, °C.
     pub temperature_c: f64,
     /// The tolerances.
-    pub list: Vec<Tolerance>,
+    pub list: Vec<FieldTolerance>,
 }
 
 /// One tolerance.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Tolerance {
+pub struct FieldTolerance {
     /// Its name in the results.
     pub name: String,
     /// The field of the drive, as `--set` takes it.
@@ -91,14 +91,14 @@ pub enum TeethError {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Distribution {
     /// Its form.
-    pub law: Law,
+    pub law: DistributionForm,
     /// Least and largest value; values outside are never drawn (truncated, not clipped).
     pub limits: [f64; 2],
 }
 
 /// The form of a distribution.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Law {
+pub enum DistributionForm {
     /// Gaussian.
     Normal {
         /// Mean.
@@ -119,10 +119,10 @@ impl Distribution {
     /// Share below `x`, without limits.
     fn below(&self, x: f64) -> f64 {
         match self.law {
-            Law::Normal { mean, std } => normal_cdf((x - mean) / std),
-            Law::Uniform => ((x - self.limits[0]) / (self.limits[1] - self.limits[0])).clamp(0.0, 1.0),
-            Law::Rayleigh { std } if x > 0.0 => -libm::expm1(-0.5 * (x / std) * (x / std)),
-            Law::Rayleigh { .. } => 0.0,
+            DistributionForm::Normal { mean, std } => normal_cdf((x - mean) / std),
+            DistributionForm::Uniform => ((x - self.limits[0]) / (self.limits[1] - self.limits[0])).clamp(0.0, 1.0),
+            DistributionForm::Rayleigh { std } if x > 0.0 => -libm::expm1(-0.5 * (x / std) * (x / std)),
+            DistributionForm::Rayleigh { .. } => 0.0,
         }
     }
 
@@ -132,9 +132,9 @@ impl Distribution {
         let [least, most] = self.limits.map(|end| self.below(end));
         let share = least + u * (most - least);
         let value = match self.law {
-            Law::Normal { mean, std } => mean + std * normal_quantile(share),
-            Law::Uniform => low + u * (high - low),
-            Law::Rayleigh { std } => std * (-2.0 * libm::log1p(-share)).sqrt(),
+            DistributionForm::Normal { mean, std } => mean + std * normal_quantile(share),
+            DistributionForm::Uniform => low + u * (high - low),
+            DistributionForm::Rayleigh { std } => std * (-2.0 * libm::log1p(-share)).sqrt(),
         };
         value.clamp(low, high)
     }
@@ -144,9 +144,9 @@ impl Distribution {
     fn far_from_drive(&self, nominal: f64) -> Option<String> {
         let [low, high] = self.limits;
         let (middle, std) = match self.law {
-            Law::Normal { mean, std } => (mean, std),
-            Law::Uniform => (0.5 * (low + high), (high - low) / 12f64.sqrt()),
-            Law::Rayleigh { .. } => return None,
+            DistributionForm::Normal { mean, std } => (mean, std),
+            DistributionForm::Uniform => (0.5 * (low + high), (high - low) / 12f64.sqrt()),
+            DistributionForm::Rayleigh { .. } => return None,
         };
         let off = (middle - nominal).abs();
         (nominal != 0.0 && off > FAR_OFF.0 * std && off > FAR_OFF.1 * nominal.abs()).then(|| {
@@ -231,9 +231,9 @@ impl Tolerances {
         name: &str,
         file_text: &str,
         drive: impl FnOnce(&str) -> Result<Drive, E>,
-    ) -> Result<Tolerances, SweepError> {
+    ) -> Result<Tolerances, PlanError> {
         let mut file = TomlFile::new(name, file_text);
-        let refused = |file: TomlFile<'_>| SweepError::Tolerances(file.problems());
+        let refused = |file: TomlFile<'_>| PlanError::Tolerances(file.problems());
         let Some(table) = file.parse() else { return Err(refused(file)) };
         let mut known: Vec<String> = KEYS.iter().map(|key| (*key).to_owned()).collect();
         known.extend(TOLERANCE_KEYS.iter().map(|key| format!("tolerance.{key}")));
@@ -289,7 +289,7 @@ impl Tolerances {
                     let what = format!("found {}, allowed: 1 to {MOST_TOLERANCES}", list.len());
                     file.refuse(value.span(), "tolerance", what);
                 }
-                let twice = |a: &Tolerance, b: &Tolerance| {
+                let twice = |a: &FieldTolerance, b: &FieldTolerance| {
                     let are_harmonics = matches!(a.acts, ToleranceActs::Harmonic { .. });
                     a.name == b.name || (a.field == b.field && (a.acts == b.acts || !are_harmonics))
                 };
@@ -316,7 +316,7 @@ impl Tolerances {
 }
 
 /// Why a tolerance at one of its limits, the others in their middle, makes no drive; none where both limits do.
-fn limit_without_drive(drive: &Drive, list: &[Tolerance], k: usize) -> Option<String> {
+fn limit_without_drive(drive: &Drive, list: &[FieldTolerance], k: usize) -> Option<String> {
     let tolerance = &list[k];
     tolerance.distribution.limits.into_iter().find_map(|limit| {
         let mut drawn = Drawn::middle(list);
@@ -362,7 +362,7 @@ fn generators(value: &Spanned<DeValue<'_>>) -> Result<Vec<GeneratorKind>, Refuse
 }
 
 /// One `[[tolerance]]`.
-fn tolerance(entry: &Spanned<DeValue<'_>>, drive: &Drive) -> Result<Tolerance, Refused> {
+fn tolerance(entry: &Spanned<DeValue<'_>>, drive: &Drive) -> Result<FieldTolerance, Refused> {
     let table = Entries::of(entry, &TOLERANCE_KEYS)?;
     let field = table.needed("field", text)?;
     let place = |key: &str| -> &Spanned<DeValue<'_>> { table.table.get(key).unwrap_or(entry) };
@@ -414,12 +414,12 @@ fn tolerance(entry: &Spanned<DeValue<'_>>, drive: &Drive) -> Result<Tolerance, R
         LawName::Normal => {
             let std = std.or(half.map(|h| h / SIGMAS)).ok_or_else(|| missing("std, nor plus_minus (3 std)"))?;
             let within = half.map_or([middle - FAR * std, middle + FAR * std], |h| [middle - h, middle + h]);
-            Distribution { law: Law::Normal { mean: middle, std }, limits: limits.unwrap_or(within) }
+            Distribution { law: DistributionForm::Normal { mean: middle, std }, limits: limits.unwrap_or(within) }
         }
         LawName::Uniform => {
             let around = half.map(|h| if is_size { [0.0, h] } else { [middle - h, middle + h] });
             let limits = limits.or(around).ok_or_else(|| missing("limits, nor plus_minus"))?;
-            Distribution { law: Law::Uniform, limits }
+            Distribution { law: DistributionForm::Uniform, limits }
         }
         LawName::Rayleigh if !is_size => {
             let what = format!(
@@ -430,7 +430,7 @@ fn tolerance(entry: &Spanned<DeValue<'_>>, drive: &Drive) -> Result<Tolerance, R
         }
         LawName::Rayleigh => {
             let std = std.ok_or_else(|| missing("std (of each component)"))?;
-            Distribution { law: Law::Rayleigh { std }, limits: limits.unwrap_or([0.0, FAR * std]) }
+            Distribution { law: DistributionForm::Rayleigh { std }, limits: limits.unwrap_or([0.0, FAR * std]) }
         }
     };
     // A size is never negative, and part of the distribution has to lie within the limits.
@@ -449,7 +449,7 @@ fn tolerance(entry: &Spanned<DeValue<'_>>, drive: &Drive) -> Result<Tolerance, R
         ToleranceActs::Harmonic { order, .. } => format!("{field}, order {order}"),
         _ => field.clone(),
     });
-    Ok(Tolerance { name, field, acts, distribution })
+    Ok(FieldTolerance { name, field, acts, distribution })
 }
 
 /// Share of a distribution that must lie within its limits: below it a quantile has no digits left.

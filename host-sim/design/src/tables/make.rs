@@ -9,7 +9,7 @@ use thiserror::Error;
 use super::complete::{CompletionError, KNEE_NODES, SheetStiffness};
 use super::info::MadeTable;
 use super::project::{TableError, from_sweep};
-use super::sweep::{Sampler, SweepError, SweepPlan, SweepProgress, planned_increments};
+use super::sweep::{Sampler, SweepPlan, SweepProgress, TorqueSweepError, planned_increments};
 use super::torque_nodes::{NodeChoice, choose_torque_nodes};
 use super::turns::{deviation_increments, sweep_turns};
 use crate::cautions::{LookedAt, rigid_gap_um, room_as_built_arcsec};
@@ -137,7 +137,7 @@ pub enum MakeError {
     },
     /// The sweep ended early.
     #[error(transparent)]
-    Sweep(#[from] SweepError),
+    Sweep(#[from] TorqueSweepError),
     /// The samples make no table.
     #[error(transparent)]
     Table(#[from] TableError),
@@ -149,7 +149,7 @@ pub enum MakeError {
 impl MakeError {
     /// Whether the observer asked to stop.
     pub fn is_stopped(&self) -> bool {
-        matches!(self, MakeError::Sweep(SweepError::Stopped))
+        matches!(self, MakeError::Sweep(TorqueSweepError::Stopped))
     }
 
     /// Whether the input is to blame, not the run.
@@ -158,7 +158,7 @@ impl MakeError {
             self,
             MakeError::Setting { .. }
                 | MakeError::Sheet(_)
-                | MakeError::Sweep(SweepError::Solve(SolveError::Drive(_) | SolveError::Mesh(_)))
+                | MakeError::Sweep(TorqueSweepError::Solve(SolveError::Drive(_) | SolveError::Mesh(_)))
         )
     }
 }

@@ -26,7 +26,7 @@ pub use project::from_plan;
 pub use project::{SampleOptions, TableError, core_drive, core_kind, from_samples};
 pub use source_files::put_bytes;
 pub use source_files::{c_header, rust_source};
-pub use sweep::{SweepError, SweepPlan, SweepProgress, symmetric_nodes};
+pub use sweep::{SweepPlan, SweepProgress, TorqueSweepError, symmetric_nodes};
 pub use torque_nodes::NodeChoice;
 pub use torque_nodes::{Refined, accepted, refined};
 pub use validate::{ValidateError, Validation, ValidationSettings, generator_of, validate};

@@ -8,7 +8,7 @@ use flexspline::{FixedMember, MAX_RIPPLE_NODES, Provenance, Table};
 use thiserror::Error;
 
 use super::info::{MadeTable, Source, TableInfo, TurnsAtTorque, TurnsInfo};
-use super::sweep::{KnownNode, Sweep, SweepPlan, mirror};
+use super::sweep::{KnownNode, SweepPlan, TorqueSweep, mirror};
 use crate::cautions::LookedAt;
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
@@ -73,7 +73,7 @@ impl Default for SampleOptions {
 pub(crate) fn from_sweep(
     drive: &Drive,
     plan: &SweepPlan,
-    sweep: Sweep,
+    sweep: TorqueSweep,
     solver: SolverSettings,
     wall_s: f64,
     mark: &str,
@@ -323,7 +323,7 @@ fn make(
 }
 
 /// The finished table, read by the core, against the samples over whole turns.
-fn turns_info(drive: &Drive, plan: &SweepPlan, sweep: &Sweep, table: &Table<'_>) -> TurnsInfo {
+fn turns_info(drive: &Drive, plan: &SweepPlan, sweep: &TorqueSweep, table: &Table<'_>) -> TurnsInfo {
     let error = |s: &Sample| (s.output_rad - s.generator_rad / drive.ratio()) * ARCSEC_PER_RAD;
     let left = |s: &Sample| {
         let said = flexspline::GeneratorAngle::from_rad(s.generator_rad)

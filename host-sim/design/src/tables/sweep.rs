@@ -117,7 +117,7 @@ impl Work {
 
 /// Samples of a sweep and how they came about.
 #[derive(Debug, Clone)]
-pub(crate) struct Sweep {
+pub(crate) struct TorqueSweep {
     /// Which generator.
     pub kind: GeneratorKind,
     /// Forward samples, computed, then backward samples, mirrored.
@@ -133,7 +133,7 @@ pub(crate) struct Sweep {
 
 /// Why a sweep ended early.
 #[derive(Debug, thiserror::Error)]
-pub enum SweepError {
+pub enum TorqueSweepError {
     /// The FEM failed, or the drive did not settle.
     #[error(transparent)]
     Solve(#[from] SolveError),
@@ -156,8 +156,8 @@ pub enum SweepError {
 }
 
 /// Refuses a drive of which a sweep would see a part.
-fn check_uniform(drive: &Drive) -> Result<(), SweepError> {
-    drive.as_built.first_not_uniform().map_or(Ok(()), |field| Err(SweepError::NotUniform { field }))
+fn check_uniform(drive: &Drive) -> Result<(), TorqueSweepError> {
+    drive.as_built.first_not_uniform().map_or(Ok(()), |field| Err(TorqueSweepError::NotUniform { field }))
 }
 
 /// Samples torque nodes of a drive that repeats from tooth to tooth, at one temperature. Each node goes its way alone,
@@ -201,7 +201,7 @@ impl<'a> Sampler<'a> {
         temperature: f32,
         settings: SolverSettings,
         observe: &'a Observer<'a>,
-    ) -> Result<Sampler<'a>, SweepError> {
+    ) -> Result<Sampler<'a>, TorqueSweepError> {
         check_uniform(drive)?;
         let temperature_c = f64::from(temperature);
         let problem = Problem::new(drive, kind, temperature_c, settings)?;
@@ -209,12 +209,12 @@ impl<'a> Sampler<'a> {
         Ok(Sampler { positions, temperature_c, problem, unloaded, observe })
     }
 
-    fn report(&self, motion: &Motion<'_>, work: &mut Work) -> Result<(), SweepError> {
+    fn report(&self, motion: &Motion<'_>, work: &mut Work) -> Result<(), TorqueSweepError> {
         let (iterations, torque_n_m) = (motion.last().iterations, motion.state().torque_n_m);
         work.count(motion.last());
         match (self.observe)(SweepProgress { iterations, torque_n_m, temperature_c: self.temperature_c }) {
             ControlFlow::Continue(()) => Ok(()),
-            ControlFlow::Break(()) => Err(SweepError::Stopped),
+            ControlFlow::Break(()) => Err(TorqueSweepError::Stopped),
         }
     }
 
@@ -223,7 +223,7 @@ impl<'a> Sampler<'a> {
     }
 
     /// Brings the load to a torque, from another.
-    pub fn load(&self, from: &Loaded, torque: f32, work: &mut Work) -> Result<Loaded, SweepError> {
+    pub fn load(&self, from: &Loaded, torque: f32, work: &mut Work) -> Result<Loaded, TorqueSweepError> {
         let mut motion = self.goes_on(from);
         motion.load(f64::from(torque))?;
         self.report(&motion, work)?;
@@ -237,7 +237,7 @@ impl<'a> Sampler<'a> {
         loaded: &Loaded,
         asks: impl FnOnce(&[Computed]) -> bool,
         work: &mut Work,
-    ) -> Result<(KnownNode, bool), SweepError> {
+    ) -> Result<(KnownNode, bool), TorqueSweepError> {
         let mut motion = self.goes_on(loaded);
         let step = motion.pitch() / self.positions as f64;
         while !self.in_motion(motion.last()) && motion.settle_on(step)? {
@@ -273,7 +273,7 @@ impl<'a> Sampler<'a> {
     }
 
     /// The drive under these loads, which are brought on one after the other.
-    pub fn loaded(&self, torques: &[f32], work: &mut Work) -> Result<Vec<Loaded>, SweepError> {
+    pub fn loaded(&self, torques: &[f32], work: &mut Work) -> Result<Vec<Loaded>, TorqueSweepError> {
         let mut from = self.unloaded.clone();
         let on = |torque: &f32| {
             from = self.load(&from, *torque, work)?;
@@ -283,13 +283,13 @@ impl<'a> Sampler<'a> {
     }
 
     /// The nodes of these loads.
-    pub fn nodes(&self, loaded: &[Loaded], work: &mut Work) -> Result<Vec<KnownNode>, SweepError> {
+    pub fn nodes(&self, loaded: &[Loaded], work: &mut Work) -> Result<Vec<KnownNode>, TorqueSweepError> {
         let sampled = |loaded: &Loaded| {
             let mut work = Work::default();
             let (node, _) = self.sample(loaded, |_| true, &mut work)?;
             Ok((node, work))
         };
-        let done = loaded.par_iter().with_max_len(1).map(sampled).collect::<Result<Vec<_>, SweepError>>()?;
+        let done = loaded.par_iter().with_max_len(1).map(sampled).collect::<Result<Vec<_>, TorqueSweepError>>()?;
         done.iter().for_each(|(_, more)| work.add(*more));
         Ok(done.into_iter().map(|(node, _)| node).collect())
     }
@@ -304,7 +304,7 @@ pub(crate) fn sweep(
     known: &[KnownNode],
     sampler: &Sampler<'_>,
     settings: SolverSettings,
-) -> Result<Sweep, SweepError> {
+) -> Result<TorqueSweep, TorqueSweepError> {
     let half = Half::of(drive);
     let drag_n_m = drive.output.drag_torque_n_m;
     let at = |sampler: &Sampler<'_>, known: &[KnownNode]| {
@@ -324,12 +324,12 @@ pub(crate) fn sweep(
         _ => at(&Sampler::new(drive, kind, plan.positions, *temperature, settings, sampler.observe)?, &[]),
     };
     let parts = plan.temperature_nodes_c.par_iter().enumerate().map(of_temperature);
-    let parts = parts.collect::<Result<Vec<_>, SweepError>>()?;
+    let parts = parts.collect::<Result<Vec<_>, TorqueSweepError>>()?;
     let mut work = Work::default();
     parts.iter().for_each(|(_, more)| work.add(*more));
     let degrees_of_freedom = sampler.problem.degrees_of_freedom();
     let samples = parts.into_iter().flat_map(|(samples, _)| samples).collect();
-    Ok(Sweep { kind, samples, work, degrees_of_freedom, places: 0 })
+    Ok(TorqueSweep { kind, samples, work, degrees_of_freedom, places: 0 })
 }
 
 /// Increments, about, that a sweep over N torque nodes on each side of zero takes, where so much is known at one

@@ -11,7 +11,7 @@ use flexspline::{Direction, GeneratorAngle, ImageError, Table, WriteError};
 use super::project::{TableError, trial_table};
 use rayon::prelude::*;
 
-use super::sweep::{Computed, KnownNode, Sampler, SweepError, SweepPlan, Work, symmetric_nodes};
+use super::sweep::{Computed, KnownNode, Sampler, SweepPlan, TorqueSweepError, Work, symmetric_nodes};
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 
@@ -50,7 +50,7 @@ pub(crate) fn choose_torque_nodes(
     plan: &SweepPlan,
     choice: NodeChoice,
     sampler: &Sampler<'_>,
-) -> Result<ChosenNodes, SweepError> {
+) -> Result<ChosenNodes, TorqueSweepError> {
     let all = symmetric_nodes(drive.output.drag_torque_n_m, choice.largest_n_m, FIRST_NODES);
     let nodes: Vec<f32> = all.into_iter().filter(|t| f64::from(*t) > drive.output.drag_torque_n_m).collect();
     let mut work = Work::default();
@@ -73,7 +73,7 @@ pub(crate) fn choose_torque_nodes(
             let (node, whole) = sampler.sample(&state, missed, &mut work)?;
             Ok((state, node, whole, work))
         };
-        let asked = middles.par_iter().with_max_len(1).map(asked).collect::<Result<Vec<_>, SweepError>>()?;
+        let asked = middles.par_iter().with_max_len(1).map(asked).collect::<Result<Vec<_>, TorqueSweepError>>()?;
         let mut misses = Vec::new();
         for (state, node, whole, more) in asked {
             work.add(more);
@@ -83,7 +83,7 @@ pub(crate) fn choose_torque_nodes(
                 sampled.push(node);
             }
         }
-        Ok::<_, SweepError>(misses)
+        Ok::<_, TorqueSweepError>(misses)
     })?;
     let nodes = refined.nodes;
     sampled.retain(|node| nodes.contains(&node.torque));

@@ -30,7 +30,9 @@ use flexspline_algebra::{Mat, cholesky, product};
 use rayon::prelude::*;
 
 use super::project::{GENERATOR_ORDERS, MATERIAL_ORDERS, OUTPUT_ORDERS};
-use super::sweep::{KnownNode, Observer, Sampler, Sweep, SweepError, SweepPlan, SweepProgress, Work, sweep};
+use super::sweep::{
+    KnownNode, Observer, Sampler, SweepPlan, SweepProgress, TorqueSweep, TorqueSweepError, Work, sweep,
+};
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::motion::Motion;
 use flexspline_mechanics::stepping::{Problem, SolveError, SolverSettings};
@@ -62,7 +64,7 @@ pub(crate) fn sweep_turns(
     sampler: &Sampler<'_>,
     settings: SolverSettings,
     observe: &Observer,
-) -> Result<Sweep, SweepError> {
+) -> Result<TorqueSweep, TorqueSweepError> {
     let repeating = Drive { as_built: drive.as_built.uniform_part(), ..drive.clone() };
     let mut whole = sweep(&repeating, kind, plan, known, sampler, settings)?;
     if drive.as_built.first_not_uniform().is_none() {
@@ -92,7 +94,7 @@ pub(crate) fn sweep_turns(
             let run = TurnRun { level, sign, deviation };
             Ok((run, count.work))
         })
-        .collect::<Result<Vec<_>, SweepError>>()?;
+        .collect::<Result<Vec<_>, TorqueSweepError>>()?;
     done.iter().for_each(|(_, work)| whole.work.add(*work));
     let deviations = Deviations::new(drive, levels, done.into_iter().map(|(run, _)| run).collect());
     whole.samples = whole.samples.iter().flat_map(|sample| deviations.spread(drive, sample)).collect();
@@ -129,7 +131,7 @@ struct Count<'a> {
 }
 
 impl Count<'_> {
-    fn report(&mut self, motion: &Motion<'_>) -> Result<(), SweepError> {
+    fn report(&mut self, motion: &Motion<'_>) -> Result<(), TorqueSweepError> {
         self.work.count(motion.last());
         let progress = SweepProgress {
             iterations: motion.last().iterations,
@@ -138,12 +140,12 @@ impl Count<'_> {
         };
         match (self.observe)(progress) {
             ControlFlow::Continue(()) => Ok(()),
-            ControlFlow::Break(()) => Err(SweepError::Stopped),
+            ControlFlow::Break(()) => Err(TorqueSweepError::Stopped),
         }
     }
 
     /// The transmission error at places in ascending order, under one load.
-    fn errors(&mut self, problem: &Problem, places: &[f64], torque_n_m: f64) -> Result<Vec<f64>, SweepError> {
+    fn errors(&mut self, problem: &Problem, places: &[f64], torque_n_m: f64) -> Result<Vec<f64>, TorqueSweepError> {
         let Some(first) = places.first() else { return Ok(Vec::new()) };
         // Loaded one pitch before a place, so that the drive arrives there moving forward.
         let pitch = problem.flexspline.pitch();

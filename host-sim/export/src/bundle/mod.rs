@@ -1,9 +1,9 @@
 //! Files that firmware developers add to a project: tables, a reader in C99, the core as static libraries, vectors, and
 //! what their build systems ask for.
 //!
-//! [`Table`]s and [`BundleLibrary`]s to the files of a folder ([`Bundle::files`]); [`libraries`] finds or builds the
-//! libraries. The sources in C and what is the same in every bundle are in this program; names, versions and lists are
-//! put in where a template has `@NAME@`.
+//! [`BundledTable`]s and [`BundleLibrary`]s to the files of a folder ([`Bundle::files`]); [`libraries`] finds or builds
+//! the libraries. The sources in C and what is the same in every bundle are in this program; names, versions and lists
+//! are put in where a template has `@NAME@`.
 
 mod archive;
 pub mod libraries;
@@ -79,22 +79,22 @@ pub enum BundleError {
 
 /// A table to be bundled: checked.
 #[derive(Debug)]
-pub struct Table {
+pub struct BundledTable {
     /// Name of its file without `.fxt`, and what it is in C: `two_roller`.
     stem: String,
     name: String,
     image: Vec<u8>,
 }
 
-impl Table {
+impl BundledTable {
     /// Of a file's name and contents.
     ///
     /// # Errors
     /// Checks the image with the core.
-    pub fn new(file: &str, stem: &str, image: Vec<u8>) -> Result<Table, BundleError> {
+    pub fn new(file: &str, stem: &str, image: Vec<u8>) -> Result<BundledTable, BundleError> {
         flexspline::Table::check(&image).map_err(|error| BundleError::Image { file: file.to_owned(), error })?;
         let letter = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '_' };
-        Ok(Table { stem: stem.to_owned(), name: stem.chars().map(letter).collect(), image })
+        Ok(BundledTable { stem: stem.to_owned(), name: stem.chars().map(letter).collect(), image })
     }
 
     /// The table in it.
@@ -211,7 +211,7 @@ pub struct FileEntry {
 /// Tables and libraries.
 #[derive(Debug)]
 pub struct Bundle {
-    tables: Vec<Table>,
+    tables: Vec<BundledTable>,
     libraries: Vec<BundleLibrary>,
 }
 
@@ -220,7 +220,7 @@ impl Bundle {
     ///
     /// # Errors
     /// No table, or two of one name.
-    pub fn new(tables: Vec<Table>, place: &str) -> Result<Bundle, BundleError> {
+    pub fn new(tables: Vec<BundledTable>, place: &str) -> Result<Bundle, BundleError> {
         if tables.is_empty() {
             return Err(BundleError::NoTable(place.to_owned()));
         }
@@ -252,7 +252,7 @@ impl Bundle {
         put("src/flexspline_table.h".to_owned(), "#include \"../c99/flexspline_table.h\"\n".into());
         put("src/flexspline_reader.c".to_owned(), "#include \"../c99/flexspline_table.c\"\n".into());
         for table in &self.tables {
-            let Table { stem, name, image } = table;
+            let BundledTable { stem, name, image } = table;
             let checked = table.checked();
             put(format!("include/flexspline_{name}.h"), table.header().into());
             put(format!("src/flexspline_{name}.h"), format!("#include \"../include/flexspline_{name}.h\"\n").into());
@@ -276,7 +276,7 @@ impl Bundle {
     }
 
     fn manifest(&self, files: &BTreeMap<String, Vec<u8>>) -> Manifest {
-        let table = |table: &Table| {
+        let table = |table: &BundledTable| {
             let checked = table.checked();
             TableEntry {
                 file: format!("tables/{}.fxt", table.stem),

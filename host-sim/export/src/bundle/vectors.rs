@@ -107,7 +107,7 @@ pub(super) fn array(name: &str, table: &Table<'_>, count: usize) -> String {
 }
 
 /// Definition of a vector, and all vectors of a bundle.
-pub(super) fn header(tables: &[super::Table]) -> String {
+pub(super) fn header(tables: &[super::BundledTable]) -> String {
     let mut text = "\
 /* What the core says of steps with each table: made with the tables, so a port that gives the same bits is right. */
 #ifndef FLEXSPLINE_VECTORS_H

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use flexspline::Table;
 use flexspline_fmu::instance::CATEGORIES;
 use flexspline_fmu::resources::Resources;
-use flexspline_fmu::variables::{Choices, Kind, ModelKind, Role, UNITS, Variable};
+use flexspline_fmu::variables::{Choices, FmiRole, FmiType, ModelKind, UNITS, Variable};
 
 /// Licences of the library's parts; `license.txt` is where readers begin.
 pub(super) const LICENCES: [(&str, &str); 3] = [
@@ -57,7 +57,7 @@ pub(super) fn xml(resources: &Resources) -> String {
         identifier = kind.identifier(),
     );
     for (name, exponents, factor, offset) in UNITS {
-        let used = kind.variables().iter().any(|variable| variable.kind == Kind::Real(name));
+        let used = kind.variables().iter().any(|variable| variable.kind == FmiType::Real(name));
         if used {
             let _ = writeln!(xml, "    <Unit name=\"{name}\">{}</Unit>", base_unit(exponents, factor, offset));
         }
@@ -114,7 +114,7 @@ fn base_unit(exponents: [i8; 5], factor: f64, offset: f64) -> String {
 fn lists(kind: ModelKind) -> Vec<&'static Choices> {
     let mut lists: Vec<&Choices> = Vec::new();
     for variable in kind.variables() {
-        if let Kind::Choice(choices) = variable.kind
+        if let FmiType::Choice(choices) = variable.kind
             && !lists.contains(&choices)
         {
             lists.push(choices);
@@ -125,14 +125,14 @@ fn lists(kind: ModelKind) -> Vec<&'static Choices> {
 
 /// Causality, variability and initial (section 2.2.7).
 fn attributes(variable: &Variable) -> [&'static str; 3] {
-    let real = matches!(variable.kind, Kind::Real(_));
+    let real = matches!(variable.kind, FmiType::Real(_));
     match variable.role {
-        Role::Parameter => ["parameter", "fixed", "exact"],
-        Role::Tunable => ["parameter", "tunable", "exact"],
-        Role::Input => ["input", if real { "continuous" } else { "discrete" }, ""],
-        Role::Output => ["output", "discrete", "calculated"],
-        Role::Motion => ["output", "continuous", "calculated"],
-        Role::Constant => ["local", "constant", "exact"],
+        FmiRole::Parameter => ["parameter", "fixed", "exact"],
+        FmiRole::Tunable => ["parameter", "tunable", "exact"],
+        FmiRole::Input => ["input", if real { "continuous" } else { "discrete" }, ""],
+        FmiRole::Output => ["output", "discrete", "calculated"],
+        FmiRole::Motion => ["output", "continuous", "calculated"],
+        FmiRole::Constant => ["local", "constant", "exact"],
     }
 }
 
@@ -142,9 +142,9 @@ fn start(place: usize, variable: &Variable, resources: &Resources) -> Option<Str
         return None;
     }
     Some(match variable.kind {
-        Kind::Text => resources.table_id.to_string(),
-        Kind::Boolean => (value != 0.0).to_string(),
-        Kind::Real(_) | Kind::Integer | Kind::Choice(_) => value.to_string(),
+        FmiType::Text => resources.table_id.to_string(),
+        FmiType::Boolean => (value != 0.0).to_string(),
+        FmiType::Real(_) | FmiType::Integer | FmiType::Choice(_) => value.to_string(),
     })
 }
 
@@ -158,14 +158,14 @@ fn described(place: usize, variable: &Variable, resources: &Resources) -> String
         let _ = write!(general, " initial=\"{initial}\"");
     }
     let (element, mut own) = match variable.kind {
-        Kind::Real(unit) => ("Real", format!(" unit=\"{unit}\"")),
-        Kind::Integer => ("Integer", String::new()),
-        Kind::Boolean => ("Boolean", String::new()),
-        Kind::Choice(choices) => ("Enumeration", format!(" declaredType=\"{}\"", choices.name)),
-        Kind::Text => ("String", String::new()),
+        FmiType::Real(unit) => ("Real", format!(" unit=\"{unit}\"")),
+        FmiType::Integer => ("Integer", String::new()),
+        FmiType::Boolean => ("Boolean", String::new()),
+        FmiType::Choice(choices) => ("Enumeration", format!(" declaredType=\"{}\"", choices.name)),
+        FmiType::Text => ("String", String::new()),
     };
     let [least, most] = variable.range;
-    if matches!(variable.kind, Kind::Real(_) | Kind::Integer) && least.is_finite() && most.is_finite() {
+    if matches!(variable.kind, FmiType::Real(_) | FmiType::Integer) && least.is_finite() && most.is_finite() {
         let _ = write!(own, " min=\"{least}\" max=\"{most}\"");
     }
     if let Some(start) = start(place, variable, resources) {
@@ -199,16 +199,16 @@ pub(super) fn page(resources: &Resources) -> String {
     );
     for (place, variable) in kind.variables().iter().enumerate() {
         let unit = match variable.kind {
-            Kind::Real(unit) => unit.to_owned(),
-            Kind::Choice(choices) => {
+            FmiType::Real(unit) => unit.to_owned(),
+            FmiType::Choice(choices) => {
                 let items: Vec<String> =
                     choices.items.iter().enumerate().map(|(k, (name, _))| format!("{k} {name}")).collect();
                 items.join(", ")
             }
-            Kind::Integer | Kind::Boolean | Kind::Text => String::new(),
+            FmiType::Integer | FmiType::Boolean | FmiType::Text => String::new(),
         };
         let [causality, variability, _] = attributes(variable);
-        let is = if variable.role == Role::Tunable { variability } else { causality };
+        let is = if variable.role == FmiRole::Tunable { variability } else { causality };
         let start = start(place, variable, resources).unwrap_or_default();
         let _ = writeln!(page, "<tr><td>{}<td>{unit}<td>{is}<td>{start}<td>{}", variable.name, escaped(variable.says));
     }

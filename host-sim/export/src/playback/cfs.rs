@@ -6,7 +6,7 @@
 
 use thiserror::Error;
 
-use super::{Made, SIGN, Section, word};
+use super::{Made, SIGN, TableSection, word};
 
 /// `CFE_FS_FILE_CONTENT_ID`: 'cFE1'.
 const CONTENT: u32 = 0x6346_4531;
@@ -39,7 +39,7 @@ pub struct TableNameError {
 ///
 /// # Errors
 /// The name is another one.
-pub fn cfs(section: Section<'_>, image: &[u8], full_name: &str, ids: [u32; 2]) -> Result<Made, TableNameError> {
+pub fn cfs(section: TableSection<'_>, image: &[u8], full_name: &str, ids: [u32; 2]) -> Result<Made, TableNameError> {
     let fits = |name: &str, field: usize| word(name) && name.len() < field;
     let Some((app, table)) =
         full_name.split_once('.').filter(|(app, table)| fits(app, APP_NAME) && fits(table, TABLE_NAME))

@@ -5,7 +5,7 @@
 
 use thiserror::Error;
 
-use super::{Made, SIGN, Section, word};
+use super::{Made, SIGN, TableSection, word};
 
 /// Default of `PRMDB_NUM_DB_ENTRIES`.
 const DATABASE: usize = 25;
@@ -21,7 +21,7 @@ pub struct ComponentError(String);
 ///
 /// # Errors
 /// The name is another one.
-pub fn fprime(section: Section<'_>, image: &[u8], component: &str) -> Result<Made, ComponentError> {
+pub fn fprime(section: TableSection<'_>, image: &[u8], component: &str) -> Result<Made, ComponentError> {
     if !component.split('.').all(word) {
         return Err(ComponentError(component.to_owned()));
     }

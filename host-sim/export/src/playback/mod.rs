@@ -33,7 +33,7 @@ pub type Made = (Vec<(&'static str, Vec<u8>)>, Vec<String>);
 
 /// A table at one load and temperature.
 #[derive(Clone, Copy)]
-pub struct Section<'a> {
+pub struct TableSection<'a> {
     /// The table.
     pub table: &'a Table<'a>,
     /// Load, N·m, finite.
@@ -43,7 +43,7 @@ pub struct Section<'a> {
 }
 
 /// A point of a section in steady motion.
-struct Sample {
+struct SectionSample {
     /// Output angle that the generator leads to through the ratio, rad.
     led_rad: f64,
     direction: Direction,
@@ -51,13 +51,13 @@ struct Sample {
     error_rad: f64,
 }
 
-impl Section<'_> {
-    fn sample(&self, led_rad: f64, direction: Direction) -> Sample {
+impl TableSection<'_> {
+    fn sample(&self, led_rad: f64, direction: Direction) -> SectionSample {
         let generator = led_rad * self.table.drive().exact_ratio();
         let generator = GeneratorAngle::from_rad(generator).unwrap_or(GeneratorAngle::ZERO);
         let [torque, temperature] = [self.torque_n_m, self.temperature_c].map(|value| value as f32);
         let error = self.table.steady_error_rad(generator, torque, temperature, direction);
-        Sample { led_rad, direction, error_rad: f64::from(error.unwrap_or(0.0)) }
+        SectionSample { led_rad, direction, error_rad: f64::from(error.unwrap_or(0.0)) }
     }
 
     /// Output turns after which the error repeats: those that take a whole number of generator turns.
@@ -68,7 +68,7 @@ impl Section<'_> {
     }
 
     /// Evenly spaced points over the whole period, in each of the directions.
-    fn samples(&self, directions: &[Direction]) -> Vec<Sample> {
+    fn samples(&self, directions: &[Direction]) -> Vec<SectionSample> {
         let step = TAU * f64::from(self.period_turns()) / f64::from(JUDGE_POINTS);
         let of = |direction: &Direction| {
             let direction = *direction;
@@ -114,7 +114,7 @@ pub struct Curve {
 
 impl Curve {
     /// Corrections that bring the output to where it was asked for, with this number of points to a generator turn.
-    pub fn new(section: Section<'_>, points_per_turn: u32, directions: &[Direction]) -> Curve {
+    pub fn new(section: TableSection<'_>, points_per_turn: u32, directions: &[Direction]) -> Curve {
         let turns = f64::from(section.period_turns());
         let points = (section.table.drive().exact_ratio().abs() * turns).round() as u32 * points_per_turn;
         let step_rad = TAU * turns / f64::from(points);
@@ -143,19 +143,19 @@ impl Curve {
     }
 
     /// Residual on the table's own model: steady motion at the section's load. The core's is the bound of its inverse.
-    pub fn on_model(&self, section: Section<'_>) -> Residual {
+    pub fn on_model(&self, section: TableSection<'_>) -> PlaybackResidual {
         let bound = f64::from(section.table.inverse_error_bound_rad()) * ARCSEC_PER_RAD;
-        let point = |sample: Sample| {
+        let point = |sample: SectionSample| {
             let error = sample.error_rad * ARCSEC_PER_RAD;
             let played = self.played_arcsec(sample.led_rad, sample.direction).unwrap_or(0.0);
             [error, error + played, 0.0]
         };
         let points: Vec<[f64; 3]> = section.samples(&self.directions).into_iter().map(point).collect();
-        Residual { rms_core_arcsec: bound, ..Residual::new(&points) }
+        PlaybackResidual { rms_core_arcsec: bound, ..PlaybackResidual::new(&points) }
     }
 
     /// The CSV: output asked for, generator angle before the correction (rad), corrections to be added (arcsec).
-    pub fn csv(&self, section: Section<'_>) -> (&'static str, Vec<u8>) {
+    pub fn csv(&self, section: TableSection<'_>) -> (&'static str, Vec<u8>) {
         let ratio = section.table.drive().exact_ratio();
         let mut text = section.comment("# ", "the correction is added to the output angle asked for");
         let _ = writeln!(text, "# ratio {ratio}\n# mean_error_arcsec {:.4}", self.mean_arcsec);
@@ -185,7 +185,7 @@ fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
 
 /// Errors with and without a playback, arcsec.
 #[derive(Debug, Clone, Serialize)]
-pub struct Residual {
+pub struct PlaybackResidual {
     /// Points or rows.
     pub rows: usize,
     /// Mean error, left out of all that follows.
@@ -200,13 +200,13 @@ pub struct Residual {
     pub rms_core_arcsec: f64,
 }
 
-impl Residual {
+impl PlaybackResidual {
     /// Of points with error, residual and residual of the core, arcsec.
-    fn new(points: &[[f64; 3]]) -> Residual {
+    fn new(points: &[[f64; 3]]) -> PlaybackResidual {
         let means: [f64; 3] = std::array::from_fn(|k| mean(points.iter().map(|point| point[k])));
         let off = |k: usize| points.iter().map(move |point| point[k] - means[k]);
         let rms = |k: usize| mean(off(k).map(|value| value * value)).sqrt();
-        Residual {
+        PlaybackResidual {
             rows: points.len(),
             mean_left_out_arcsec: means[0],
             rms_uncorrected_arcsec: rms(0),
@@ -219,11 +219,11 @@ impl Residual {
     /// On measured rows, and what the core left of them; without a curve the core plays. Rows in a direction that the
     /// curve was not made for are left out.
     pub fn on_data(
-        section: Section<'_>,
+        section: TableSection<'_>,
         rows: &[MeasuredRow],
         replayed: &[ReplayedRow],
         curve: Option<&Curve>,
-    ) -> Residual {
+    ) -> PlaybackResidual {
         let ratio = section.table.drive().exact_ratio();
         let point = |((row, core), direction): ((&MeasuredRow, &ReplayedRow), Direction)| {
             let played = match curve {
@@ -233,7 +233,7 @@ impl Residual {
             Some([row.error_arcsec, played, core.residual_arcsec])
         };
         let rows = rows.iter().zip(replayed).zip(directions_of(rows, ratio));
-        Residual::new(&rows.filter_map(point).collect::<Vec<_>>())
+        PlaybackResidual::new(&rows.filter_map(point).collect::<Vec<_>>())
     }
 }
 

@@ -10,8 +10,8 @@ mod own;
 mod results;
 mod varied;
 
-use flexspline_motion::flight::{Flight, JOINTS, Unit, fly_told};
-use flexspline_motion::gear::Sampled;
+use flexspline_motion::flight::{Flight, JOINTS, JointUnit, fly_told};
+use flexspline_motion::gear::SampledSpring;
 use flexspline_motion::scenario::{Scenario, TableKnown};
 
 use crate::plant_map::GearMap;
@@ -51,13 +51,13 @@ fn map(kind: GeneratorKind) -> &'static str {
 ///
 /// # Errors
 /// [`FlyError::Map`], [`FlyError::Teeth`].
-pub fn unit(kind: GeneratorKind, temperature_c: f64) -> Result<Unit, FlyError> {
+pub fn unit(kind: GeneratorKind, temperature_c: f64) -> Result<JointUnit, FlyError> {
     let name = format!("{kind}.csv");
     let map = GearMap::parse(&name, map(kind))?;
     let (teeth, wind_up) = (map.teeth, map.at(temperature_c));
     let law = |phase: f64, flank: f64| wind_up.elastic_error_rad(phase * std::f64::consts::TAU / teeth, flank, 1.0);
     let drive = core_drive(&Drive::hhd_95())?;
-    Ok(Unit::of_spring(drive, Sampled::of_law(teeth, map.largest_n_m, law)))
+    Ok(JointUnit::of_spring(drive, SampledSpring::of_law(teeth, map.largest_n_m, law)))
 }
 
 impl Flown {

@@ -3,7 +3,7 @@
 use flexspline::{Direction, GeneratorAngle, ImageError, Table};
 use flexspline_design::tables::generator_of;
 use flexspline_mechanics::drive::GeneratorKind;
-use flexspline_motion::flight::{TABLE_DRAG_N_M, Unit};
+use flexspline_motion::flight::{JointUnit, TABLE_DRAG_N_M};
 use flexspline_motion::gear::Gear;
 use flexspline_motion::table::gear_of;
 
@@ -72,7 +72,7 @@ pub struct OwnDrive {
     /// The generator that it is of.
     pub(super) kind: GeneratorKind,
     /// As the table says, and built with the errors that every unit here has.
-    pub(super) unit: Unit,
+    pub(super) unit: JointUnit,
     /// Largest torque that the table has, N·m.
     pub(super) largest_n_m: f64,
 }
@@ -83,7 +83,7 @@ impl OwnDrive {
         Ok(Self {
             image: image.to_vec(),
             kind: generator_of(&table).ok_or(OwnTableError::NoGear)?,
-            unit: Unit::of_gear(*table.drive(), gear_at(&table, temperature_c)?),
+            unit: JointUnit::of_gear(*table.drive(), gear_at(&table, temperature_c)?),
             largest_n_m: f64::from(table.torque_range_n_m()[1]),
         })
     }

@@ -10,7 +10,7 @@ use super::dense::DenseKernels;
 
 /// A block of unknowns.
 #[derive(Debug, Clone, Copy)]
-pub struct Block {
+pub struct ChainBlock {
     /// Number of unknowns.
     pub size: usize,
     /// +1 for displacements, −1 for tractions.
@@ -58,7 +58,7 @@ pub struct Chain {
 impl Chain {
     /// Factorises the sum of the contributions; false when a block has not its sign.
     #[must_use]
-    pub fn factorise(&mut self, blocks: &[Block], contributions: &[Contribution]) -> bool {
+    pub fn factorise(&mut self, blocks: &[ChainBlock], contributions: &[Contribution]) -> bool {
         self.panels.clear();
         self.values.clear();
         self.offsets.clear();
@@ -102,7 +102,7 @@ impl Chain {
             for source in sources {
                 add_block_matrix(&mut self.front, m, source, blocks, &offset);
             }
-            let Block { size, sign, .. } = blocks[block as usize];
+            let ChainBlock { size, sign, .. } = blocks[block as usize];
             if !self.kernels.eliminate(&mut self.front, m, size, sign) {
                 return false;
             }
@@ -167,7 +167,7 @@ impl Chain {
 }
 
 /// Adds the lower triangle of a contribution to that of a front.
-fn add_block_matrix(front: &mut [f64], m: usize, source: &Contribution, blocks: &[Block], offset: &[usize]) {
+fn add_block_matrix(front: &mut [f64], m: usize, source: &Contribution, blocks: &[ChainBlock], offset: &[usize]) {
     let n: usize = source.blocks.iter().map(|b| blocks[*b as usize].size).sum();
     let mut column = 0;
     for (jb, &b) in source.blocks.iter().enumerate() {
@@ -209,10 +209,14 @@ mod tests {
     fn a_closed_ring_is_solved() {
         let sizes = [4, 2, 3, 5, 1, 4, 2, 3, 0, 4];
         let count = sizes.len();
-        let blocks: Vec<Block> = sizes
+        let blocks: Vec<ChainBlock> = sizes
             .iter()
             .enumerate()
-            .map(|(k, &size)| Block { size, sign: if k % 4 == 1 { -1.0 } else { 1.0 }, key: ((k * 7) % count) as f64 })
+            .map(|(k, &size)| ChainBlock {
+                size,
+                sign: if k % 4 == 1 { -1.0 } else { 1.0 },
+                key: ((k * 7) % count) as f64,
+            })
             .collect();
         let mut rng = fastrand::Rng::with_seed(3);
         let contributions: Vec<Contribution> = (0..count)

@@ -23,6 +23,6 @@ mod tooth;
 mod tube;
 
 pub(crate) use coupling::Addition;
-pub use model::{Flexspline3d, Harmonic, Rollers};
+pub use model::{Flexspline3d, RimHarmonic, Rollers};
 pub use shape::Station;
 pub(crate) use tooth::pair_compliance;

@@ -36,7 +36,7 @@ pub struct Flexspline3d {
 /// Stiffness against one harmonic of a radial load. Stiffness is the amplitude of the reaction, full circle, over the
 /// amplitude of the displacement: twice the energy over the amplitude squared.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Harmonic {
+pub struct RimHarmonic {
     /// Waves around the rim.
     pub n: u32,
     /// Of a load on the middle line of the rim, N/mm.
@@ -118,11 +118,11 @@ impl Flexspline3d {
     }
 
     /// Stiffness against a radial load of n waves.
-    pub fn harmonic(&self, n: u32) -> Harmonic {
+    pub fn harmonic(&self, n: u32) -> RimHarmonic {
         let rim = self.at(n);
         let band = rim.band();
         let tilts = band.at(1, 1) > 0.0;
-        Harmonic {
+        RimHarmonic {
             n,
             k_line_n_per_mm: rim.middle(&[W]).at(0, 0),
             k_band_n_per_mm: band.condensed(&[0], &[]).at(0, 0),

@@ -10,7 +10,7 @@ use std::rc::Rc;
 use rayon::prelude::*;
 
 use crate::condense::{
-    Block, CellAt, CellPlacement, CellState, CellTangent, Chain, CoRotation, CondensedWheel, Contribution,
+    CellAt, CellPlacement, CellState, CellTangent, Chain, ChainBlock, CoRotation, CondensedWheel, Contribution,
     DenseKernels, Geometric, Traction, back, one, one_mut, rotate_pairs, rotate_sides,
 };
 use crate::contact::{BorePressure, FlankPair, PairContribution};
@@ -356,15 +356,15 @@ impl<'p> CondensedWheels<'p> {
     }
 
     /// Blocks around the rings, ordered by their angle from the minor axis of the generator, where no flanks touch.
-    fn blocks(&self, ranks: &[(FlankPair, usize)]) -> Vec<Block> {
+    fn blocks(&self, ranks: &[(FlankPair, usize)]) -> Vec<ChainBlock> {
         let cut = self.generator_rad + FRAC_PI_2;
         let from_cut = |angle: f64| (angle - cut).rem_euclid(TAU);
         let (fs, cs) = (self.model.fs_mesh(), self.model.cs_mesh());
-        let block = |size, angle| Block { size, sign: 1.0, key: from_cut(angle) };
+        let block = |size, angle| ChainBlock { size, sign: 1.0, key: from_cut(angle) };
         let (fs_size, cs_size) = (self.model.flexspline.face(), self.model.circular_spline.face());
         let fs_blocks = (0..fs.teeth).map(|j| block(fs_size, (j as f64 - 0.5) * fs.pitch()));
         let cs_blocks = (0..cs.teeth).map(|t| block(cs_size, t as f64 * cs.pitch() + self.output_rad));
-        let mut blocks: Vec<Block> = fs_blocks.chain(cs_blocks).collect();
+        let mut blocks: Vec<ChainBlock> = fs_blocks.chain(cs_blocks).collect();
         // The first face of each ring closes it.
         for ring in [0..fs.teeth, fs.teeth..fs.teeth + cs.teeth] {
             if let Some(first) = ring.min_by(|a, b| blocks[*a].key.total_cmp(&blocks[*b].key)) {
@@ -373,7 +373,7 @@ impl<'p> CondensedWheels<'p> {
         }
         blocks.extend(ranks.iter().map(|(pair, rank)| {
             let angle = (pair.tooth as f64 + 0.25 * pair.side.sign()) * fs.pitch();
-            Block { sign: -1.0, ..block(*rank, angle) }
+            ChainBlock { sign: -1.0, ..block(*rank, angle) }
         }));
         blocks
     }

@@ -243,7 +243,7 @@ mod tests {
     }
 
     /// A drive under the cam, loaded and settled; two pitches, with the given number of places in each.
-    fn two_pitches(drive: &Drive, torque_n_m: f64, places: usize) -> Vec<crate::motion::Place> {
+    fn two_pitches(drive: &Drive, torque_n_m: f64, places: usize) -> Vec<crate::motion::SettledPlace> {
         let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
         let problem = Problem::new(drive, GeneratorKind::Cam, 20.0, settings).unwrap();
         let mut motion = Motion::deformed(&problem, 0.0).unwrap();

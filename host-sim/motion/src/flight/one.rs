@@ -1,8 +1,8 @@
 //! One joint of a flight, ticked from outside, by a simulator of something larger.
 
-use super::{COMPENSATED, Commanded, FlightError, JointController, JointLane, LaneParts, Unit, made};
-use crate::on_board::{Given, Settings, Told};
-use crate::plant::Plant;
+use super::{COMPENSATED, Commanded, FlightError, JointController, JointLane, JointUnit, LaneParts, made};
+use crate::on_board::{OnBoardInput, OnBoardOutput, OnBoardSettings};
+use crate::plant::JointPlant;
 use crate::scenario::{Moment, Scenario};
 use flexspline::Quality;
 
@@ -38,7 +38,7 @@ impl OneJoint {
     /// [`FlightError`].
     pub fn new(
         scenario: &Scenario,
-        unit: &Unit,
+        unit: &JointUnit,
         image: Option<Vec<u8>>,
         compensated: bool,
     ) -> Result<Self, FlightError> {
@@ -74,12 +74,12 @@ impl OneJoint {
     }
 
     /// Settings that the core has, or would have.
-    pub fn on_board_settings(&self) -> Settings {
+    pub fn on_board_settings(&self) -> OnBoardSettings {
         self.made.on_board_settings()
     }
 
     /// Input and output of the core in the last tick; `None` without it.
-    pub fn on_board(&self) -> Option<&(Told, Given)> {
+    pub fn on_board(&self) -> Option<&(OnBoardInput, OnBoardOutput)> {
         match &self.lane.controller {
             JointController::Core(core) => core.last.as_ref(),
             _ => None,
@@ -87,7 +87,7 @@ impl OneJoint {
     }
 
     /// Motor, drive and load.
-    pub fn plant(&self) -> &Plant {
+    pub fn plant(&self) -> &JointPlant {
         &self.lane.plant
     }
 

@@ -16,7 +16,8 @@ use rayon::prelude::*;
 use serde_json::json;
 
 use super::page::{
-    Axis, Block, Choice, Detail, Headline, Lines, Page, PageQuantity, SIGNS, Section, Status, Text, significant,
+    ChartAxis, Choice, Detail, Headline, Lines, Page, PageBlock, PageQuantity, PageSection, RichText, SIGNS, Status,
+    significant,
 };
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_identify::causes::CauseName;
@@ -140,7 +141,7 @@ impl DiagnosisKnown<'_> {
     fn page(&self) -> Page {
         let DiagnosisSources { recording, nominal, diagnosis, command, inputs, .. } = &self.sources;
         let (status, also) = self.status();
-        let mut sections: Vec<Section> = self.causes().into_iter().chain([self.next()]).collect();
+        let mut sections: Vec<PageSection> = self.causes().into_iter().chain([self.next()]).collect();
         sections.extend(self.picture_sections());
         sections.push(self.before_and_after());
         sections.push(why::in_short(diagnosis));
@@ -220,7 +221,7 @@ impl DiagnosisKnown<'_> {
     fn headline(&self) -> Headline {
         let diagnosis = self.sources.diagnosis;
         let causes = &diagnosis.causes;
-        let listed = |mut text: Text| {
+        let listed = |mut text: RichText| {
             for (k, cause) in causes.iter().enumerate() {
                 let between = match k {
                     0 => "",
@@ -232,7 +233,7 @@ impl DiagnosisKnown<'_> {
             text.plain(".")
         };
         // No second percentage next to the confidence: the residuals prove the causes.
-        let fell = |from: f64, to: f64| Text::arcsec(from, 2).plain(" → ").error(to, 2);
+        let fell = |from: f64, to: f64| RichText::arcsec(from, 2).plain(" → ").error(to, 2);
         let (corrected, held) = (diagnosis.compensation, diagnosis.held_out);
         // A table cannot correct every cause: what a sensor reads wrong the output does not do.
         let corrects = corrected.rms_extended_tables_arcsec != corrected.rms_nominal_tables_arcsec;
@@ -243,7 +244,7 @@ impl DiagnosisKnown<'_> {
             (fell(held.rms_before_arcsec, held.rms_after_arcsec), "without the causes and with them")
         };
         let share_is = format!("rms in {}, {share_is}", self.left_out());
-        let departure = Text::arcsec(self.departure_arcsec(), 2);
+        let departure = RichText::arcsec(self.departure_arcsec(), 2);
         let (answer, number, number_is) = match diagnosis.verdict {
             Verdict::Explained => (listed("Explained by ".into()), share, share_is.as_str()),
             Verdict::PartlyExplained => (listed("Partly explained by ".into()), share, share_is.as_str()),
@@ -261,7 +262,7 @@ impl DiagnosisKnown<'_> {
             Verdict::None => {
                 let answer = "Nothing found: the drive does what the nominal model says, within noise and the spread \
                               between units.";
-                let number = Text::arcsec(diagnosis.residual.rms_before_arcsec, 3);
+                let number = RichText::arcsec(diagnosis.residual.rms_before_arcsec, 3);
                 (answer.into(), number, "rms error of the nominal model, recalibrated to this unit")
             }
         };
@@ -290,12 +291,12 @@ impl DiagnosisKnown<'_> {
         remarks
     }
 
-    fn before_and_after(&self) -> Section {
+    fn before_and_after(&self) -> PageSection {
         let over_time = |id, title, caption, y, curves: &mut dyn Iterator<Item = (&'static str, &[f64], usize)>| {
             let series = curves.map(|(name, of, colour)| thin::envelope(&self.rows, &self.clock, of, name, colour));
             let chart = Lines { series: series.collect(), uprights: self.clock.borders(), ..Lines::default() };
-            let axes = [self.time_axis(), Axis::new(y, PageQuantity::Error)];
-            Block::lines(id, title, caption, axes, chart.for_every_choice())
+            let axes = [self.time_axis(), ChartAxis::new(y, PageQuantity::Error)];
+            PageBlock::lines(id, title, caption, axes, chart.for_every_choice())
         };
         let levels = self.shown.iter().map(|shown| &shown.level).zip([5, 0, 1]);
         let mut blocks = vec![over_time(
@@ -317,19 +318,19 @@ impl DiagnosisKnown<'_> {
                 &mut parts.map(|(k, part)| (part.cause.words(), part.adds_arcsec.as_slice(), k)),
             ));
         }
-        Section::new("before-after", "Before and after", Detail::Summary, blocks)
+        PageSection::new("before-after", "Before and after", Detail::Summary, blocks)
     }
 
-    fn time_axis(&self) -> Axis {
+    fn time_axis(&self) -> ChartAxis {
         if self.rows.recorded.time {
-            Axis::new("Time, breaks taken out", PageQuantity::Second)
+            ChartAxis::new("Time, breaks taken out", PageQuantity::Second)
         } else {
-            Axis::new("Row", PageQuantity::Count)
+            ChartAxis::new("Row", PageQuantity::Count)
         }
     }
 
     /// The causes, and what has none.
-    fn causes(&self) -> Option<Section> {
+    fn causes(&self) -> Option<PageSection> {
         let diagnosis = self.sources.diagnosis;
         let mut blocks = Vec::new();
         if !diagnosis.causes.is_empty() {
@@ -338,7 +339,7 @@ impl DiagnosisKnown<'_> {
                 vec![
                     words::begun(cause.name.words()).into(),
                     words::percent(cause.confidence).into(),
-                    Text::arcsec(cause.size_arcsec, 3),
+                    RichText::arcsec(cause.size_arcsec, 3),
                     words::percent(cause.held_out_gain).into(),
                     words::parameters(cause).into(),
                     if alike.is_empty() { "none".into() } else { words::listed(&alike).into() },
@@ -353,8 +354,8 @@ impl DiagnosisKnown<'_> {
                 "Look-alikes",
             ];
             let rows = diagnosis.causes.iter().map(row).collect();
-            blocks.push(Block::table("Causes, strongest first", &header, rows));
-            blocks.push(Block::paragraph(format!(
+            blocks.push(PageBlock::table("Causes, strongest first", &header, rows));
+            blocks.push(PageBlock::paragraph(format!(
                 "Confidence: that it is this cause and not its best rival, given that it is one of the library. Gain: \
                  share of the squared error of the recalibrated nominal model that it removes in {}. Look-alikes: \
                  causes that these data cannot distinguish from it. Parameters are of the model that was fitted; µm \
@@ -362,35 +363,35 @@ impl DiagnosisKnown<'_> {
                 self.left_out()
             )));
             blocks.extend(diagnosis.causes.iter().map(|cause| {
-                let name = Text::default().strong(words::begun(cause.name.words()));
-                Block::paragraph(name.plain(format!(": {}.", cause.name.does())))
+                let name = RichText::default().strong(words::begun(cause.name.words()));
+                PageBlock::paragraph(name.plain(format!(": {}.", cause.name.does())))
             }));
         }
         if !diagnosis.unexplained.is_empty() {
             let row = |left: &Unexplained| {
-                vec![words::begun(&left.looks_like.replace('_', " ")).into(), Text::arcsec(left.size_arcsec, 3)]
+                vec![words::begun(&left.looks_like.replace('_', " ")).into(), RichText::arcsec(left.size_arcsec, 3)]
             };
             let rows = diagnosis.unexplained.iter().map(row).collect();
-            blocks.push(Block::table("The residual without a known cause", &["It looks like", "Size, rms"], rows));
+            blocks.push(PageBlock::table("The residual without a known cause", &["It looks like", "Size, rms"], rows));
             let sure = if diagnosis.verdict == Verdict::Unknown {
                 "Names of causes in this table say what the remainder resembles most; they are not a finding."
             } else {
                 "These describe the remainder; they are no causes, and nothing of them is in the extended model."
             };
-            blocks.push(Block::paragraph(sure));
+            blocks.push(PageBlock::paragraph(sure));
         }
-        (!blocks.is_empty()).then(|| Section::new("causes", "Causes", Detail::Summary, blocks))
+        (!blocks.is_empty()).then(|| PageSection::new("causes", "Causes", Detail::Summary, blocks))
     }
 
     /// The gain of the causes.
-    fn gain(&self) -> Section {
+    fn gain(&self) -> PageSection {
         let Diagnosis { residual, held_out, compensation, .. } = self.sources.diagnosis;
         let row = |name: &str, before: f64, after: f64| {
             let change = if before > 0.0 { format!("{:+.0} %", 100.0 * (after / before - 1.0)) } else { "–".into() };
-            let [before, after] = [before, after].map(|arcsec| Text::arcsec(arcsec, 3));
+            let [before, after] = [before, after].map(|arcsec| RichText::arcsec(arcsec, 3));
             vec![name.into(), before, after, change.replace('-', "−").into()]
         };
-        let all = Block::table(
+        let all = PageBlock::table(
             "Error of the prediction, rms",
             &["Over", "Recalibrated nominal", "With the causes", "Change"],
             vec![
@@ -408,13 +409,13 @@ impl DiagnosisKnown<'_> {
              leaves another error.",
             words::percent(residual.unexplained_fraction)
         );
-        let noise = Block::paragraph(Text::filled(&noise, &[(residual.noise_floor_arcsec, 3)]));
+        let noise = PageBlock::paragraph(RichText::filled(&noise, &[(residual.noise_floor_arcsec, 3)]));
         let none = compensation.rms_uncompensated_arcsec;
         let line = |name: &str, arcsec: f64| {
             let share = if none > 0.0 { format!("{:.0} %", 100.0 * arcsec / none) } else { "–".into() };
-            vec![name.into(), Text::arcsec(arcsec, 3), share.into()]
+            vec![name.into(), RichText::arcsec(arcsec, 3), share.into()]
         };
-        let pointing = Block::table(
+        let pointing = PageBlock::table(
             "Pointing error with the output corrected, rms about the mean",
             &["Correction", "Left", "Of uncorrected"],
             vec![
@@ -428,18 +429,18 @@ impl DiagnosisKnown<'_> {
         let rows = self.recalibrated_rows();
         if !rows.is_empty() {
             let header = ["Parameter", "Against nominal"];
-            blocks.push(Block::table("The nominal model as this unit has it", &header, rows));
-            blocks.push(Block::paragraph(
+            blocks.push(PageBlock::table("The nominal model as this unit has it", &header, rows));
+            blocks.push(PageBlock::paragraph(
                 "Within the spread between units: wind-up and clearance by these shares of nominal, each harmonic by \
                  a share of its amplitude in phase with it and a quarter of a wave before it. The zero is that of the \
                  encoder.",
             ));
         }
-        Section::new("gain", "What it gains", Detail::Summary, blocks)
+        PageSection::new("gain", "What it gains", Detail::Summary, blocks)
     }
 
     /// The free parameters of the nominal model, with the order of a harmonic.
-    fn recalibrated_rows(&self) -> Vec<Vec<Text>> {
+    fn recalibrated_rows(&self) -> Vec<Vec<RichText>> {
         let recalibrated = &self.sources.diagnosis.recalibrated;
         // Harmonics are numbered by their place, two for each of the model.
         let mut waves: Vec<(usize, &String)> = recalibrated
@@ -455,37 +456,37 @@ impl DiagnosisKnown<'_> {
             let phase = if place % 2 == 0 { "in phase" } else { "a quarter before" };
             Some((place, format!("Harmonic of order {}, {phase}", words::order(order))))
         };
-        let mut rows: Vec<(usize, Vec<Text>)> = recalibrated
+        let mut rows: Vec<(usize, Vec<RichText>)> = recalibrated
             .iter()
             .map(|(name, p)| {
                 let value = recalibrated_value(name, *p);
                 let plain = if name == "stiffness" { "wind-up".to_owned() } else { name.replace('_', " ") };
                 let (place, name) = wave(name).map_or((0, words::begun(&plain)), |(place, text)| (1 + place, text));
-                (place, vec![Text::new(name), value])
+                (place, vec![RichText::new(name), value])
             })
             .collect();
         rows.sort_by_key(|(place, _)| *place);
         rows.into_iter().map(|(_, row)| row).collect()
     }
 
-    fn next(&self) -> Section {
+    fn next(&self) -> PageSection {
         let text = match &self.sources.diagnosis.next_experiment {
-            Some(next) => Text::default().strong("Record next: ").plain(format!("{next}.")),
-            None if self.sources.diagnosis.verdict == Verdict::Unknown => Text::new(
+            Some(next) => RichText::default().strong("Record next: ").plain(format!("{next}.")),
+            None if self.sources.diagnosis.verdict == Verdict::Unknown => RichText::new(
                 "The same motion again, on another day, shows whether the remainder is the drive's. Torque, \
                  temperature and orientation, where they were not recorded, distinguish more causes.",
             ),
-            None => Text::new("Nothing: no two causes explain these data equally well."),
+            None => RichText::new("Nothing: no two causes explain these data equally well."),
         };
-        Section::new("next", "What to record next", Detail::Summary, vec![Block::paragraph(text)])
+        PageSection::new("next", "What to record next", Detail::Summary, vec![PageBlock::paragraph(text)])
     }
 
     /// The data: sessions, faults, notes.
-    fn data(&self) -> Section {
+    fn data(&self) -> PageSection {
         let recording = self.sources.recording;
         let mut blocks = Vec::new();
         if recording.faults.is_empty() {
-            blocks.push(Block::paragraph("No faults were found in the data."));
+            blocks.push(PageBlock::paragraph("No faults were found in the data."));
         } else {
             let row = |fault: &Fault| {
                 let when = match (fault.time_s, fault.until_s) {
@@ -503,7 +504,7 @@ impl DiagnosisKnown<'_> {
                     when.into(),
                     lines.into(),
                     fault.rows.to_string().into(),
-                    fault.size_arcsec.map_or("–".into(), |size| Text::arcsec(size, 3)),
+                    fault.size_arcsec.map_or("–".into(), |size| RichText::arcsec(size, 3)),
                     words::of(&fault.treatment).into(),
                     fault.what.clone().into(),
                     fault.advice.into(),
@@ -515,15 +516,15 @@ impl DiagnosisKnown<'_> {
         if !recording.tooth_steps.is_empty() {
             let row = |step: &ToothStep| {
                 let when = step.time_s.map_or_else(|| format!("line {}", step.line), words::seconds);
-                vec![when.into(), Text::arcsec(step.size_arcsec, 4), step.pitches.to_string().into()]
+                vec![when.into(), RichText::arcsec(step.size_arcsec, 4), step.pitches.to_string().into()]
             };
             let header = ["When", "Size", "Tooth pitches"];
             blocks.extend(limited("Steps of whole teeth", &header, &recording.tooth_steps, row));
         }
-        let note = |note: &String| Block::paragraph(format!("{}.", words::begun(note.trim_end_matches('.'))));
+        let note = |note: &String| PageBlock::paragraph(format!("{}.", words::begun(note.trim_end_matches('.'))));
         blocks.extend(recording.notes.iter().map(note));
         let range = |values: Option<&Vec<f64>>| {
-            let Some(values) = values else { return Text::new("–") };
+            let Some(values) = values else { return RichText::new("–") };
             let (low, high) =
                 values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
             format!("{} to {}", significant(low, 3), significant(high, 3)).into()
@@ -538,18 +539,18 @@ impl DiagnosisKnown<'_> {
         let header = ["Session", "Rows", "Time, s", "Generator, turns", "Torque, N·m", "Temperature, °C"];
         blocks.extend(limited("Sessions", &header, &sessions, row));
         let detail = if recording.faults.is_empty() { Detail::Engineering } else { Detail::Summary };
-        Section::new("data", "The data", detail, blocks)
+        PageSection::new("data", "The data", detail, blocks)
     }
 
-    fn reading(&self) -> Section {
-        Section::reading(vec![
-            Block::paragraph(format!("{SIGNS} ψ is the angle of the generator, δ that of the output.")),
-            Block::paragraph(
+    fn reading(&self) -> PageSection {
+        PageSection::reading(vec![
+            PageBlock::paragraph(format!("{SIGNS} ψ is the angle of the generator, δ that of the output.")),
+            PageBlock::paragraph(
                 "The selector shows the same figures of what the nominal model leaves, of what it leaves recalibrated \
                  to this unit, and of what is left with the causes that were named. A cause that is right takes its \
                  marks away in the last without putting others in their place.",
             ),
-            Block::paragraph(format!(
+            PageBlock::paragraph(format!(
                 "A name is given only where a cause gains in {}, where no rival does as well, and where it is large \
                  enough against noise and against how wrong its model may be. The rest is described and not named.",
                 self.left_out()
@@ -559,10 +560,10 @@ impl DiagnosisKnown<'_> {
 }
 
 /// A table of the first [`MOST`] items, and how many more there are.
-fn limited<T>(caption: &str, header: &[&str], items: &[T], row: impl Fn(&T) -> Vec<Text>) -> Vec<Block> {
-    let mut blocks = vec![Block::table(caption, header, items.iter().take(MOST).map(row).collect())];
+fn limited<T>(caption: &str, header: &[&str], items: &[T], row: impl Fn(&T) -> Vec<RichText>) -> Vec<PageBlock> {
+    let mut blocks = vec![PageBlock::table(caption, header, items.iter().take(MOST).map(row).collect())];
     if items.len() > MOST {
-        blocks.push(Block::paragraph(format!("{} more are left out here.", items.len() - MOST)));
+        blocks.push(PageBlock::paragraph(format!("{} more are left out here.", items.len() - MOST)));
     }
     blocks
 }
@@ -573,9 +574,9 @@ fn alike(cause: &Cause) -> Vec<String> {
 }
 
 /// A free parameter of the nominal model: the zero as an error, times in milliseconds, the rest as a share.
-fn recalibrated_value(name: &str, p: Parameter) -> Text {
+fn recalibrated_value(name: &str, p: Parameter) -> RichText {
     if name.starts_with("zero") {
-        return Text::arcsec(p.value, 3).plain("\u{a0}±\u{a0}").error(p.std, 2);
+        return RichText::arcsec(p.value, 3).plain("\u{a0}±\u{a0}").error(p.std, 2);
     }
     let words = if [BETWEEN_READINGS, CHANGE_OF_FLANK].contains(&name) {
         let ms = |seconds: f64| significant(1e3 * seconds, 2);
@@ -583,7 +584,7 @@ fn recalibrated_value(name: &str, p: Parameter) -> Text {
     } else {
         format!("{:+.1}\u{a0}±\u{a0}{:.1}\u{a0}%", 100.0 * p.value, 100.0 * p.std)
     };
-    Text::new(words.replace('-', "−"))
+    RichText::new(words.replace('-', "−"))
 }
 
 #[cfg(test)]
@@ -600,9 +601,9 @@ mod tests {
     #[test]
     fn times_that_float_are_shown_in_milliseconds_and_the_rest_as_shares() {
         let shown = |name: &str| recalibrated_value(name, Parameter { value: -4.2e-3, std: 1.1e-3 });
-        assert_eq!(shown(CHANGE_OF_FLANK), Text::new("−4.2\u{a0}±\u{a0}1.1\u{a0}ms"));
+        assert_eq!(shown(CHANGE_OF_FLANK), RichText::new("−4.2\u{a0}±\u{a0}1.1\u{a0}ms"));
         assert_eq!(shown(BETWEEN_READINGS), shown(CHANGE_OF_FLANK));
-        assert_eq!(shown("backlash"), Text::new("−0.4\u{a0}±\u{a0}0.1\u{a0}%"));
+        assert_eq!(shown("backlash"), RichText::new("−0.4\u{a0}±\u{a0}0.1\u{a0}%"));
     }
 
     /// Two short sessions with an error of one wave in a generator turn.
@@ -679,7 +680,7 @@ mod tests {
         })
     }
 
-    fn words(text: &Text) -> String {
+    fn words(text: &RichText) -> String {
         let word = |span: &Span| match span {
             Span::Plain(words) | Span::Strong(words) => words.clone(),
             Span::Error { arcsec, .. } => format!("{arcsec:.0}″"),
@@ -755,7 +756,7 @@ mod tests {
         // The wave is in the spectrum of what was measured, at its order.
         let figure = |id: &str| {
             page.sections.iter().flat_map(|s| &s.blocks).find_map(|block| match block {
-                Block::Figure(figure) if figure.id == id => Some(figure.clone()),
+                PageBlock::Figure(figure) if figure.id == id => Some(figure.clone()),
                 _ => None,
             })
         };

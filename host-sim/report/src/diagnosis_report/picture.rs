@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use super::thin::{dots, medians, peaks_kept, some_rows};
 use super::{DiagnosisKnown, Shown, orders, words};
 use crate::page::{
-    Axis, Block, Detail, Field, Figure, FigureBody, Lines, Mark, PageQuantity, Section, Series, Text, Upright,
-    significant,
+    ChartAxis, ChartSeries, Detail, FieldMap, Figure, FigureBody, Lines, Mark, PageBlock, PageQuantity, PageSection,
+    RichText, Upright, significant,
 };
 use flexspline_identify::nominal::Fixed;
 use flexspline_identify::residual::{Axis as Angle, Direction, Wheel};
@@ -24,7 +24,7 @@ const FEWEST_IN_CELL: usize = 2;
 const DIRECTIONS: [(f64, &str); 2] = [(1.0, "forward"), (-1.0, "backward")];
 
 impl DiagnosisKnown<'_> {
-    pub(super) fn picture_sections(&self) -> Vec<Section> {
+    pub(super) fn picture_sections(&self) -> Vec<PageSection> {
         vec![self.looks(), self.angles(), self.spectra(), self.drift()]
     }
 
@@ -33,13 +33,13 @@ impl DiagnosisKnown<'_> {
         id: &str,
         title: &str,
         caption: &str,
-        x: Axis,
+        x: ChartAxis,
         of: impl Fn(&Shown) -> Option<Lines>,
-    ) -> Option<Block> {
+    ) -> Option<PageBlock> {
         let chart = |shown: &Shown| Some((shown.level.id.to_owned(), of(shown)?));
         let charts: Vec<_> = self.shown.iter().filter_map(chart).collect();
-        let axes = [x, Axis::new("Error less model", PageQuantity::Error)];
-        (!charts.is_empty()).then(|| Block::lines(id, title, caption, axes, charts))
+        let axes = [x, ChartAxis::new("Error less model", PageQuantity::Error)];
+        (!charts.is_empty()).then(|| PageBlock::lines(id, title, caption, axes, charts))
     }
 
     /// Rows that move in a direction.
@@ -61,14 +61,14 @@ impl DiagnosisKnown<'_> {
         for (colour, (direction, name)) in DIRECTIONS.into_iter().enumerate() {
             let points = medians(quantity, values, &self.rows_in(direction), MEDIANS);
             if points.len() > 1 {
-                lines.series.push(Series::new(format!("{name}, median"), Mark::Line, 2 + colour, points));
+                lines.series.push(ChartSeries::new(format!("{name}, median"), Mark::Line, 2 + colour, points));
             }
         }
         (!lines.series.is_empty()).then_some(lines)
     }
 
     /// By generator angle, torque, temperature, speed, session.
-    fn looks(&self) -> Section {
+    fn looks(&self) -> PageSection {
         let rows = &self.rows;
         let mut blocks = Vec::new();
         let turns: Vec<f64> = rows.generator.iter().map(|psi| psi / TAU).collect();
@@ -76,26 +76,26 @@ impl DiagnosisKnown<'_> {
             "over-generator",
             "Over the generator angle",
             "Some rows of all, drawn evenly. This is measured error less what the model says, before anybody says why.",
-            Axis::new("Generator angle", PageQuantity::Turn),
+            ChartAxis::new("Generator angle", PageQuantity::Turn),
             |shown| {
                 let mut lines = self.over(&turns, shown)?;
                 lines.series.retain(|series| series.mark == Mark::Dots);
                 Some(lines)
             },
         ));
-        let maps: Vec<(String, Field)> =
+        let maps: Vec<(String, FieldMap)> =
             self.shown.iter().filter_map(|shown| Some((shown.level.id.to_owned(), self.map(shown)?))).collect();
         if !maps.is_empty() {
             let caption = "Median of the rows in each cell; cells that were not visited are empty. What sits on the \
                            generator stands upright, what sits on the output lies flat, what sits on the wheel that \
                            turns runs aslant.";
             let body = FigureBody::Field {
-                x: Axis::new("Generator angle ψ in its turn", PageQuantity::Degree),
-                y: Axis::new("Output angle δ in its turn", PageQuantity::Degree),
-                z: Axis::new("Error less model", PageQuantity::Error),
+                x: ChartAxis::new("Generator angle ψ in its turn", PageQuantity::Degree),
+                y: ChartAxis::new("Output angle δ in its turn", PageQuantity::Degree),
+                z: ChartAxis::new("Error less model", PageQuantity::Error),
                 fields: maps,
             };
-            blocks.push(Block::Figure(Figure::of("map", "Over one turn of generator and output", caption, body)));
+            blocks.push(PageBlock::Figure(Figure::of("map", "Over one turn of generator and output", caption, body)));
         }
         for (recorded, values, id, over, axis, sees) in [
             (
@@ -103,7 +103,7 @@ impl DiagnosisKnown<'_> {
                 &rows.torque,
                 "torque",
                 "load torque",
-                Axis::new("Load torque", PageQuantity::Torque),
+                ChartAxis::new("Load torque", PageQuantity::Torque),
                 "A slope is stiffness, a step at zero backlash, a loop hysteresis.",
             ),
             (
@@ -111,7 +111,7 @@ impl DiagnosisKnown<'_> {
                 &rows.temperature,
                 "temperature",
                 "temperature",
-                Axis::new("Temperature", PageQuantity::Temperature),
+                ChartAxis::new("Temperature", PageQuantity::Temperature),
                 "A slope is stiffness or clearance that changes with the temperature.",
             ),
             (
@@ -119,7 +119,7 @@ impl DiagnosisKnown<'_> {
                 &rows.speed,
                 "speed",
                 "generator speed",
-                Axis::new("Generator speed", PageQuantity::Speed),
+                ChartAxis::new("Generator speed", PageQuantity::Speed),
                 "Sensors read at different instants make a straight line through zero.",
             ),
         ] {
@@ -130,11 +130,11 @@ impl DiagnosisKnown<'_> {
                 blocks.extend(self.lines(&format!("over-{id}"), &title, &caption, axis, over));
             }
         }
-        Section::new("picture", "What the error looks like", Detail::Summary, blocks)
+        PageSection::new("picture", "What the error looks like", Detail::Summary, blocks)
     }
 
     /// Medians over both turns.
-    fn map(&self, shown: &Shown) -> Option<Field> {
+    fn map(&self, shown: &Shown) -> Option<FieldMap> {
         let [across, up] = MAP;
         let place = |angle: f64, of: usize| ((angle.rem_euclid(TAU) / TAU * of as f64) as usize).min(of - 1);
         let mut cells: Vec<Vec<f64>> = vec![Vec::new(); across * up];
@@ -148,7 +148,7 @@ impl DiagnosisKnown<'_> {
             .collect();
         // Of an output that hardly turned there is no map.
         let visited = z.iter().filter(|value| value.is_finite()).count();
-        (visited * 6 >= z.len()).then(|| Field {
+        (visited * 6 >= z.len()).then(|| FieldMap {
             x: (0..across).map(|k| middle(k, across)).collect(),
             y: (0..up).map(|k| middle(k, up)).collect(),
             z,
@@ -167,7 +167,7 @@ impl DiagnosisKnown<'_> {
         }
     }
 
-    fn angles(&self) -> Section {
+    fn angles(&self) -> PageSection {
         let mut blocks = Vec::new();
         for (angle, id) in ANGLES {
             let (symbol, wheel) = self.angle_name(angle);
@@ -176,22 +176,22 @@ impl DiagnosisKnown<'_> {
                 &format!("Over one turn of {symbol}: {wheel}"),
                 "Medians of bins of three degrees, by direction. A sound drive has what its nominal model has, and \
                  these are flat.",
-                Axis::new(format!("{symbol} in its turn"), PageQuantity::Degree),
+                ChartAxis::new(format!("{symbol} in its turn"), PageQuantity::Degree),
                 |shown| {
                     let mut lines = Lines::default();
                     for map in shown.picture.as_ref()?.maps.iter().filter(|map| map.axis == angle) {
                         let colour = usize::from(map.direction != Direction::Forward);
                         let points = map.bins.iter().map(|bin| [bin.angle_rad.to_degrees(), bin.median_arcsec]);
-                        lines.series.push(Series::new(DIRECTIONS[colour].1, Mark::Line, colour, points.collect()));
+                        lines.series.push(ChartSeries::new(DIRECTIONS[colour].1, Mark::Line, colour, points.collect()));
                     }
                     (!lines.series.is_empty()).then_some(lines)
                 },
             ));
         }
-        Section::new("angles", "Over the angle of each wheel", Detail::Engineering, blocks)
+        PageSection::new("angles", "Over the angle of each wheel", Detail::Engineering, blocks)
     }
 
-    fn spectra(&self) -> Section {
+    fn spectra(&self) -> PageSection {
         let (nominal, causes) = (self.sources.nominal, &self.sources.diagnosis.causes);
         let mut blocks = Vec::new();
         for (angle, id) in ANGLES {
@@ -205,7 +205,7 @@ impl DiagnosisKnown<'_> {
                 &format!("orders-{id}"),
                 &format!("Orders in a turn of {symbol}"),
                 &caption,
-                Axis::new(format!("Waves in a turn of {symbol}"), PageQuantity::Count),
+                ChartAxis::new(format!("Waves in a turn of {symbol}"), PageQuantity::Count),
                 |shown| {
                     let spectrum = shown.picture.as_ref()?.spectra.iter().find(|s| s.axis == angle)?;
                     if spectrum.orders.is_empty() {
@@ -216,11 +216,11 @@ impl DiagnosisKnown<'_> {
                     let level = peaks_kept(x, &spectrum.level_arcsec, SPECTRUM_POINTS);
                     let peaks = spectrum.peaks.iter().map(|peak| [peak.order, peak.amplitude_arcsec]).collect();
                     let mut lines = Lines::of(vec![
-                        Series::new("amplitude", Mark::Line, 0, amplitude),
-                        Series::new("level of noise", Mark::Dashed, 5, level),
+                        ChartSeries::new("amplitude", Mark::Line, 0, amplitude),
+                        ChartSeries::new("level of noise", Mark::Dashed, 5, level),
                     ]);
                     if !spectrum.peaks.is_empty() {
-                        lines.series.push(Series::sorted("lines", Mark::Points, 1, peaks));
+                        lines.series.push(ChartSeries::sorted("lines", Mark::Points, 1, peaks));
                     }
                     let (low, high) = (x[0], x[x.len() - 1]);
                     for cause in causes {
@@ -239,13 +239,13 @@ impl DiagnosisKnown<'_> {
         blocks.extend(self.shown.iter().filter_map(|shown| self.peak_table(shown)));
         blocks.extend(self.shown.iter().filter_map(pulse_table));
         if blocks.is_empty() {
-            blocks.push(Block::paragraph("The drive turned too little for orders."));
+            blocks.push(PageBlock::paragraph("The drive turned too little for orders."));
         }
-        Section::new("orders", "Orders", Detail::Engineering, blocks)
+        PageSection::new("orders", "Orders", Detail::Engineering, blocks)
     }
 
     /// The lines of the spectra with the parts that have such orders.
-    fn peak_table(&self, shown: &Shown) -> Option<Block> {
+    fn peak_table(&self, shown: &Shown) -> Option<PageBlock> {
         let mut rows = Vec::new();
         for (angle, _) in ANGLES {
             let (symbol, _) = self.angle_name(angle);
@@ -269,9 +269,9 @@ impl DiagnosisKnown<'_> {
                     _ => format!("not distinguished: {}", words::listed(&parts)),
                 };
                 rows.push(vec![
-                    Text::new(format!("{} per turn of {symbol}", significant(peak.order, 5))),
+                    RichText::new(format!("{} per turn of {symbol}", significant(peak.order, 5))),
                     plus_minus(peak.amplitude_arcsec, peak.amplitude_std_arcsec),
-                    Text::new(parts),
+                    RichText::new(parts),
                 ]);
             }
         }
@@ -279,7 +279,7 @@ impl DiagnosisKnown<'_> {
         of_level(shown, "Lines above the noise, strongest first in each angle", &header, rows)
     }
 
-    fn drift(&self) -> Section {
+    fn drift(&self) -> PageSection {
         let rows = &self.rows;
         let mut blocks = Vec::new();
         let caption = "Medians of up to 24 stretches of each session, a standard deviation on either side; breaks \
@@ -300,7 +300,7 @@ impl DiagnosisKnown<'_> {
                 }
             }
             let [median, above, below] = parts;
-            let series = |name, colour, points| Series::new(name, Mark::Broken, colour, points);
+            let series = |name, colour, points| ChartSeries::new(name, Mark::Broken, colour, points);
             Some(Lines {
                 series: vec![series("median", 0, median), series("above", 5, above), series("below", 5, below)],
                 uprights: self.clock.borders(),
@@ -315,10 +315,10 @@ impl DiagnosisKnown<'_> {
                 significant(noise.decorrelation_rows, 2),
                 significant(noise.independent_rows, 2)
             );
-            let text = Text::filled(&words, &[(noise.white_arcsec, 2), (noise.correlated_arcsec, 2)]);
-            Some(Block::paragraph(text).of_choice(shown.level.id))
+            let text = RichText::filled(&words, &[(noise.white_arcsec, 2), (noise.correlated_arcsec, 2)]);
+            Some(PageBlock::paragraph(text).of_choice(shown.level.id))
         }));
-        Section::new("drift-section", "Drift and noise", Detail::Engineering, blocks)
+        PageSection::new("drift-section", "Drift and noise", Detail::Engineering, blocks)
     }
 }
 
@@ -331,9 +331,9 @@ fn varies(values: &[f64]) -> bool {
 }
 
 /// Pulses that stay in one position.
-fn pulse_table(shown: &Shown) -> Option<Block> {
+fn pulse_table(shown: &Shown) -> Option<PageBlock> {
     let pulses = &shown.picture.as_ref()?.pulses;
-    let rows: Vec<Vec<Text>> = pulses
+    let rows: Vec<Vec<RichText>> = pulses
         .iter()
         .map(|pulse| {
             let angle = match pulse.axis {
@@ -342,10 +342,10 @@ fn pulse_table(shown: &Shown) -> Option<Block> {
                 Angle::Output => "δ",
             };
             vec![
-                Text::new(format!("{angle} = {}°", significant(pulse.position_rad.to_degrees(), 3))),
+                RichText::new(format!("{angle} = {}°", significant(pulse.position_rad.to_degrees(), 3))),
                 plus_minus(pulse.height_arcsec, pulse.height_std_arcsec),
-                Text::new(format!("{}°", significant(pulse.width_rad.to_degrees(), 2))),
-                Text::new(pulse.per_turn.to_string()),
+                RichText::new(format!("{}°", significant(pulse.width_rad.to_degrees(), 2))),
+                RichText::new(pulse.per_turn.to_string()),
             ]
         })
         .collect();
@@ -353,11 +353,11 @@ fn pulse_table(shown: &Shown) -> Option<Block> {
 }
 
 /// A value in arcsec with its standard deviation.
-fn plus_minus(value: f64, std: f64) -> Text {
-    Text::arcsec(value, 3).plain("\u{a0}±\u{a0}").error(std, 2)
+fn plus_minus(value: f64, std: f64) -> RichText {
+    RichText::arcsec(value, 3).plain("\u{a0}±\u{a0}").error(std, 2)
 }
 
 /// A table of a level, where it has rows.
-fn of_level(shown: &Shown, caption: &str, header: &[&str], rows: Vec<Vec<Text>>) -> Option<Block> {
-    (!rows.is_empty()).then(|| Block::table(caption, header, rows).of_choice(shown.level.id))
+fn of_level(shown: &Shown, caption: &str, header: &[&str], rows: Vec<Vec<RichText>>) -> Option<PageBlock> {
+    (!rows.is_empty()).then(|| PageBlock::table(caption, header, rows).of_choice(shown.level.id))
 }

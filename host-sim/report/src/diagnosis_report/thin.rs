@@ -1,7 +1,7 @@
 //! Forty thousand rows to what a chart can show: the least and the largest of each stretch, medians of bins, some rows
 //! of all.
 
-use crate::page::{Mark, Series, Upright};
+use crate::page::{ChartSeries, Mark, Upright};
 use flexspline_identify::diagnosis::rows::Rows;
 use flexspline_identify::measurement::median_of;
 
@@ -61,7 +61,7 @@ fn stretches(rows: &Rows) -> Vec<std::ops::Range<usize>> {
 }
 
 /// Least and largest value of each stretch, so that nothing that stands out is lost; the line breaks between sessions.
-pub(super) fn envelope(rows: &Rows, clock: &Clock, values: &[f64], name: &str, colour: usize) -> Series {
+pub(super) fn envelope(rows: &Rows, clock: &Clock, values: &[f64], name: &str, colour: usize) -> ChartSeries {
     let mut points: Vec<[f64; 2]> = Vec::new();
     for part in stretches(rows) {
         if part.start > 0 && rows.sessions.iter().any(|s| s.start == part.start) {
@@ -80,7 +80,7 @@ pub(super) fn envelope(rows: &Rows, clock: &Clock, values: &[f64], name: &str, c
         points.push([clock.at[part.start], values[first]]);
         points.push([clock.at[part.start + part.len() / 2], values[second]]);
     }
-    Series::new(name, Mark::Broken, colour, points)
+    ChartSeries::new(name, Mark::Broken, colour, points)
 }
 
 /// Which rows are shown as dots: one of each stretch of equally many, drawn, so that they fall in with no rhythm of the
@@ -99,8 +99,8 @@ pub(super) fn some_rows(rows: usize) -> Vec<usize> {
 }
 
 /// Some rows as dots.
-pub(super) fn dots(over: &[f64], values: &[f64], rows: &[usize], name: &str, colour: usize) -> Series {
-    Series::sorted(name, Mark::Dots, colour, rows.iter().map(|k| [over[*k], values[*k]]).collect())
+pub(super) fn dots(over: &[f64], values: &[f64], rows: &[usize], name: &str, colour: usize) -> ChartSeries {
+    ChartSeries::sorted(name, Mark::Dots, colour, rows.iter().map(|k| [over[*k], values[*k]]).collect())
 }
 
 /// Medians of `count` bins of equal width over a quantity, ascending, where a bin has rows enough.

@@ -2,29 +2,29 @@
 //! diagnosis.json, and `diagnose --explain` prints it.
 
 use super::words;
-use crate::page::{Block, Detail, Section, Text, significant};
+use crate::page::{Detail, PageBlock, PageSection, RichText, significant};
 use flexspline_identify::causes::CauseName;
 use flexspline_identify::diagnosis::explain::Explanation;
 use flexspline_identify::diagnosis::report::Diagnosis;
 use flexspline_identify::diagnosis::trace::{Gate, Judged, Stage, Step};
 
 /// The gate that decided for each cause.
-pub(super) fn in_short(diagnosis: &Diagnosis) -> Section {
+pub(super) fn in_short(diagnosis: &Diagnosis) -> PageSection {
     let rows = CauseName::ALL.iter().map(|cause| decided(diagnosis, *cause)).collect();
     let header = ["Cause", "Named", "What decided", "Found", "Asked for"];
     let blocks = vec![
-        Block::paragraph(
+        PageBlock::paragraph(
             "Every cause of the library comes to the same gates; a name needs all of them. For each cause this is the \
              gate that decided: for one that is not named the one that it did not pass. diagnose --explain CAUSE \
              prints all gates of a cause.",
         ),
-        Block::table("The gate that decided for each cause", &header, rows),
+        PageBlock::table("The gate that decided for each cause", &header, rows),
     ];
-    Section::new("why", "Why these causes, and not others", Detail::Engineering, blocks)
+    PageSection::new("why", "Why these causes, and not others", Detail::Engineering, blocks)
 }
 
 /// Cause, whether it is named, what decided, found, asked for.
-fn decided(diagnosis: &Diagnosis, cause: CauseName) -> Vec<Text> {
+fn decided(diagnosis: &Diagnosis, cause: CauseName) -> Vec<RichText> {
     let explanation = Explanation::of(diagnosis, cause);
     let named = if explanation.named.is_some() { "yes" } else { "no" };
     let settled = || diagnosis.trace.of(cause).rev().find(|step| step.stage == Stage::Settled);
@@ -36,19 +36,19 @@ fn decided(diagnosis: &Diagnosis, cause: CauseName) -> Vec<Text> {
         Some(judged) => format!("it does not hold that it {}", judged.gate.asks()),
         None => "the search did not come to it".to_owned(),
     };
-    let mut cells = vec![Text::new(words::begun(cause.words())), Text::new(named), Text::new(what)];
+    let mut cells = vec![RichText::new(words::begun(cause.words())), RichText::new(named), RichText::new(what)];
     cells.extend(numbers(judged.filter(|judged| !judged.passed)));
     cells
 }
 
 /// The value found, and the limit.
-fn numbers(judged: Option<&Judged>) -> [Text; 2] {
+fn numbers(judged: Option<&Judged>) -> [RichText; 2] {
     let number = |value: f64| significant(value, 3).replace('-', "−");
     match judged.map(|judged| (judged.gate, judged.value, judged.limit)) {
         Some((gate, Some(value), Some(limit))) => {
             let more = if gate.is_below() { "less than" } else { "more than" };
-            [Text::new(number(value)), Text::new(format!("{more} {}", number(limit)))]
+            [RichText::new(number(value)), RichText::new(format!("{more} {}", number(limit)))]
         }
-        _ => [Text::new("–"), Text::new("–")],
+        _ => [RichText::new("–"), RichText::new("–")],
     }
 }

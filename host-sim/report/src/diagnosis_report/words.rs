@@ -3,7 +3,7 @@
 use serde::Serialize;
 use serde_json::json;
 
-use crate::page::{Text, significant};
+use crate::page::{RichText, significant};
 use flexspline_identify::diagnosis::report::{Cause, Parameter};
 
 /// The first letter made large.
@@ -41,7 +41,7 @@ pub(super) fn parameters(cause: &Cause) -> String {
 }
 
 /// A cause with its confidence and size: `eccentricity of the circular spline (97 %, 12″ rms)`.
-pub(super) fn named(text: Text, cause: &Cause) -> Text {
+pub(super) fn named(text: RichText, cause: &Cause) -> RichText {
     text.plain(format!("{} ({}, ", cause.name.words(), percent(cause.confidence)))
         .error(cause.size_arcsec, 2)
         .plain(" rms)")

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use super::record::Progress;
+use super::record::JobProgress;
 use flexspline_base::progress;
 
 /// How long a process has to clear up when it is told to end.
@@ -25,7 +25,7 @@ const DRAIN: Duration = Duration::from_millis(500);
 /// What a process says on stderr.
 #[derive(Debug, Default)]
 struct Talk {
-    progress: Option<Progress>,
+    progress: Option<JobProgress>,
     lines: Vec<String>,
 }
 
@@ -94,7 +94,7 @@ impl Running {
     }
 
     /// How far it says that it is.
-    pub fn progress(&self) -> Option<Progress> {
+    pub fn progress(&self) -> Option<JobProgress> {
         lock(&self.talk).progress.clone()
     }
 
@@ -184,7 +184,7 @@ fn listen(stderr: impl Read, talk: &Mutex<Talk>) {
         let line = line.trim_end();
         let mut talk = lock(talk);
         match progress::read(line) {
-            Some((done, of, note)) => talk.progress = Some(Progress { done, of, note: note.to_owned() }),
+            Some((done, of, note)) => talk.progress = Some(JobProgress { done, of, note: note.to_owned() }),
             None if line.is_empty() => {}
             None => {
                 if talk.lines.len() >= MOST_LINES {

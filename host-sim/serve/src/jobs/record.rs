@@ -23,7 +23,7 @@ const MOST_FOLDERS: usize = 10_000;
 /// How far a job is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum State {
+pub enum JobStatus {
     /// In its line.
     Waiting,
     /// Its process runs.
@@ -40,7 +40,7 @@ pub enum State {
 
 /// How far a process says that it is.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Progress {
+pub struct JobProgress {
     /// Parts done.
     pub done: u64,
     /// Of so many.
@@ -68,7 +68,7 @@ pub struct JobRecord {
     /// Folder of its results.
     pub out: String,
     /// How far it is.
-    pub state: State,
+    pub state: JobStatus,
     /// Whether it stands in the line of short work.
     pub short: bool,
     /// When it began, seconds since 1970.
@@ -80,7 +80,7 @@ pub struct JobRecord {
     /// What its process ended with; none if it was ended.
     pub exit_code: Option<i32>,
     /// How far its process says that it is.
-    pub progress: Option<Progress>,
+    pub progress: Option<JobProgress>,
     /// What it said beside its results.
     pub said: Vec<String>,
     /// What it printed, where that goes to no file.
@@ -101,7 +101,7 @@ impl JobRecord {
 
     /// Whether it neither waits nor runs.
     pub(crate) fn is_over(&self) -> bool {
-        !matches!(self.state, State::Waiting | State::Running)
+        !matches!(self.state, JobStatus::Waiting | JobStatus::Running)
     }
 }
 

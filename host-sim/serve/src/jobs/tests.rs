@@ -45,7 +45,7 @@ impl Bench {
         Bench { place, folder, jobs }
     }
 
-    fn until(&self, id: u64, state: State) -> JobRecord {
+    fn until(&self, id: u64, state: JobStatus) -> JobRecord {
         let from = Instant::now();
         loop {
             let job = self.jobs.job(id).unwrap();
@@ -75,7 +75,7 @@ fn long(work: &str) -> WorkAsked {
 fn what_a_command_prints_and_says_is_kept() {
     let bench = Bench::new();
     let id = bench.jobs.add(look()).unwrap().id;
-    let job = bench.until(id, State::Done);
+    let job = bench.until(id, JobStatus::Done);
     assert_eq!(bench.folder.read(&format!("{}/look.json", job.out), None).unwrap(), b"{\"rows\": 3}\n");
     assert_eq!(job.said, ["note: three rows"]);
     assert_eq!(job.command, format!("flexspline look a.csv --json > bench/look-{id}/look.json"));
@@ -85,10 +85,13 @@ fn what_a_command_prints_and_says_is_kept() {
 #[test]
 fn a_command_that_fails_says_why() {
     let bench = Bench::new();
-    let work =
-        WorkAsked::Replay { file: "a.csv".into(), reading: crate::work::Reading::default(), table: "a.csv".into() };
+    let work = WorkAsked::Replay {
+        file: "a.csv".into(),
+        reading: crate::work::ColumnReading::default(),
+        table: "a.csv".into(),
+    };
     let id = bench.jobs.add(work).unwrap().id;
-    let job = bench.until(id, State::Failed);
+    let job = bench.until(id, JobStatus::Failed);
     assert_eq!((job.exit_code, job.said.as_slice()), (Some(2), ["error: no".to_owned()].as_slice()));
 }
 
@@ -102,7 +105,8 @@ fn two_short_jobs_and_one_long_one_run_at_a_time_where_there_are_two_cores() {
     let ids = [short("a.toml"), short("b.toml"), short("c.toml"), long("tables"), long("tables")]
         .map(|work| jobs.add(work).unwrap().id);
     let cores = thread::available_parallelism().map_or(1, std::num::NonZero::get);
-    let expected = [true, cores > 1, false, true, false].map(|runs| if runs { State::Running } else { State::Waiting });
+    let expected =
+        [true, cores > 1, false, true, false].map(|runs| if runs { JobStatus::Running } else { JobStatus::Waiting });
     let bench = Bench { place, folder, jobs };
     for (id, state) in ids.iter().zip(expected) {
         bench.until(*id, state);
@@ -117,12 +121,12 @@ fn one_of_each_line_runs_at_a_time_and_says_how_far_it_is() {
     let bench = Bench::new();
     let first = bench.jobs.add(long("tables")).unwrap().id;
     let second = bench.jobs.add(long("tables")).unwrap().id;
-    bench.until(first, State::Running);
+    bench.until(first, JobStatus::Running);
     let quick = bench.jobs.add(look()).unwrap().id;
-    bench.until(quick, State::Done);
-    assert_eq!(bench.jobs.job(second).unwrap().state, State::Waiting);
+    bench.until(quick, JobStatus::Done);
+    assert_eq!(bench.jobs.job(second).unwrap().state, JobStatus::Waiting);
     let from = Instant::now();
-    let wanted = Progress { done: 3, of: 24, note: "cam: turning".to_owned() };
+    let wanted = JobProgress { done: 3, of: 24, note: "cam: turning".to_owned() };
     while bench.jobs.job(first).unwrap().progress.as_ref() != Some(&wanted) {
         assert!(from.elapsed() < Duration::from_secs(20));
         thread::sleep(Duration::from_millis(5));
@@ -136,15 +140,15 @@ fn a_job_ends_within_a_second_wherever_it_is_and_leaves_nothing_unfinished() {
     for work in ["tables", "validate"] {
         let id = bench.jobs.add(long(work)).unwrap().id;
         let behind = bench.jobs.add(long(work)).unwrap().id;
-        bench.until(id, State::Running);
+        bench.until(id, JobStatus::Running);
         // It has set its trap.
         thread::sleep(Duration::from_millis(300));
         let pid = bench.jobs.job(id).unwrap().pid.unwrap();
         assert!(bench.jobs.cancel(behind));
-        assert_eq!(bench.jobs.job(behind).unwrap().state, State::Cancelled);
+        assert_eq!(bench.jobs.job(behind).unwrap().state, JobStatus::Cancelled);
         let from = Instant::now();
         assert!(bench.jobs.cancel(id));
-        let job = bench.until(id, State::Cancelled);
+        let job = bench.until(id, JobStatus::Cancelled);
         assert!(from.elapsed() < Duration::from_secs(1), "{work}: {:?}", from.elapsed());
         assert!(!Path::new(&format!("/proc/{pid}")).exists(), "{work} goes on");
         assert!(!bench.place.path().join(&job.out).join(".part-x").exists());
@@ -156,7 +160,7 @@ fn a_job_ends_within_a_second_wherever_it_is_and_leaves_nothing_unfinished() {
 fn only_so_many_wait() {
     let bench = Bench::new();
     let first = bench.jobs.add(long("tables")).unwrap().id;
-    bench.until(first, State::Running);
+    bench.until(first, JobStatus::Running);
     let added: Vec<_> = (0..100).map(|_| bench.jobs.add(long("tables"))).collect();
     assert_eq!(added.iter().filter(|added| added.is_ok()).count(), MOST_WAITING);
     assert!(matches!(added.last(), Some(Err(JobError::Full))));
@@ -167,16 +171,16 @@ fn only_so_many_wait() {
 fn a_server_that_starts_again_finds_what_was_finished_and_ends_what_was_not() {
     let bench = Bench::new();
     let done = bench.jobs.add(look()).unwrap().id;
-    bench.until(done, State::Done);
+    bench.until(done, JobStatus::Done);
     let cut = bench.jobs.add(long("tables")).unwrap().id;
-    bench.until(cut, State::Running);
+    bench.until(cut, JobStatus::Running);
     thread::sleep(Duration::from_millis(300));
     let pid = bench.jobs.job(cut).unwrap().pid.unwrap();
     // The server is gone without a word: nothing of it is asked any more, and its records are as it left them.
     let again = Jobs::new(bench.folder.clone(), program(bench.place.path()), Some(1));
-    assert_eq!(again.job(done).unwrap().state, State::Done);
+    assert_eq!(again.job(done).unwrap().state, JobStatus::Done);
     let job = again.job(cut).unwrap();
-    assert_eq!((job.state, job.said.len()), (State::Interrupted, 1));
+    assert_eq!((job.state, job.said.len()), (JobStatus::Interrupted, 1));
     let from = Instant::now();
     // A process that has ended is a zombie of this one until it is waited for.
     let runs = || fs::read_to_string(format!("/proc/{pid}/stat")).is_ok_and(|stat| !stat.contains(") Z "));
@@ -192,7 +196,7 @@ fn a_server_that_starts_again_finds_what_was_finished_and_ends_what_was_not() {
 fn records_that_are_not_of_this_folder_or_no_records_are_left_alone() {
     let bench = Bench::new();
     let done = bench.jobs.add(look()).unwrap().id;
-    let job = bench.until(done, State::Done);
+    let job = bench.until(done, JobStatus::Done);
     let record = |out: &str, text: &str| {
         let place = bench.place.path().join("bench").join(out);
         fs::create_dir_all(&place).unwrap();

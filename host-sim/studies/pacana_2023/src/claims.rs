@@ -8,8 +8,8 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use serde::Serialize;
 
-use crate::runs::{Metrics, ONE_POINT, Run, standard};
-use Verdict::{Inconsistent, NotReproduced, NotTestable, Reproduced};
+use crate::runs::{ONE_POINT, PaperRun, RunMetrics, standard};
+use ClaimVerdict::{Inconsistent, NotReproduced, NotTestable, Reproduced};
 use flexspline_base::units::ARCMIN_PER_RAD;
 use flexspline_design::simulate::Row;
 use flexspline_mechanics::drive::GeneratorKind::{self, Cam, DoubleDisc, FourRoller, TwoRoller};
@@ -62,7 +62,7 @@ const fn within(paper: f64, share: f64) -> Bounds {
 /// Outcome of a claim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(into = "&'static str")]
-pub enum Verdict {
+pub enum ClaimVerdict {
     /// Every number keeps its bounds.
     Reproduced,
     /// A number of ours is out of its bounds.
@@ -73,13 +73,13 @@ pub enum Verdict {
     NotTestable,
 }
 
-impl Verdict {
+impl ClaimVerdict {
     /// All of them.
-    pub const ALL: [Verdict; 4] = [Reproduced, NotReproduced, Inconsistent, NotTestable];
+    pub const ALL: [ClaimVerdict; 4] = [Reproduced, NotReproduced, Inconsistent, NotTestable];
 }
 
-impl From<Verdict> for &'static str {
-    fn from(verdict: Verdict) -> &'static str {
+impl From<ClaimVerdict> for &'static str {
+    fn from(verdict: ClaimVerdict) -> &'static str {
         match verdict {
             Reproduced => "reproduced",
             NotReproduced => "not reproduced",
@@ -128,7 +128,7 @@ pub struct Claim {
 
 /// A claim, its numbers and its verdict.
 #[derive(Debug, Serialize)]
-pub struct Judged {
+pub struct JudgedClaim {
     /// The claim.
     #[serde(flatten)]
     pub claim: &'static Claim,
@@ -137,45 +137,45 @@ pub struct Judged {
     /// Ours.
     pub ours: Vec<Number>,
     /// The verdict.
-    pub verdict: Verdict,
+    pub verdict: ClaimVerdict,
 }
 
 /// All claims, judged.
-pub(crate) fn judged(drive: &Drive, runs: &[Run]) -> Vec<Judged> {
+pub(crate) fn judged(drive: &Drive, runs: &[PaperRun]) -> Vec<JudgedClaim> {
     let judge = |claim: &'static Claim| {
         let evidence = (claim.numbers)(Evidence { drive, runs, paper: Vec::new(), ours: Vec::new() });
-        Judged { claim, verdict: evidence.verdict(), paper: evidence.paper, ours: evidence.ours }
+        JudgedClaim { claim, verdict: evidence.verdict(), paper: evidence.paper, ours: evidence.ours }
     };
     CLAIMS.iter().map(judge).collect()
 }
 
 /// A number of a run.
-type Metric = fn(&Metrics) -> f64;
+type Metric = fn(&RunMetrics) -> f64;
 
 /// Arc-minutes.
-pub(crate) fn largest(m: &Metrics) -> f64 {
+pub(crate) fn largest(m: &RunMetrics) -> f64 {
     m.largest_out_arcsec.max(m.largest_back_arcsec) / 60.0
 }
 
 /// Arc-minutes.
-fn backlash(m: &Metrics) -> f64 {
+fn backlash(m: &RunMetrics) -> f64 {
     2.0 * m.half_width_arcsec / 60.0
 }
 
 /// Arc-minutes.
-fn lag(m: &Metrics) -> f64 {
+fn lag(m: &RunMetrics) -> f64 {
     m.lag_forward_arcsec / 60.0
 }
 
 /// Degrees.
-fn dwell(m: &Metrics) -> f64 {
+fn dwell(m: &RunMetrics) -> f64 {
     m.dwell_rad.to_degrees()
 }
 
 /// The runs that claims are judged by, and the numbers of one claim.
 struct Evidence<'a> {
     drive: &'a Drive,
-    runs: &'a [Run],
+    runs: &'a [PaperRun],
     paper: Vec<Number>,
     ours: Vec<Number>,
 }
@@ -228,7 +228,7 @@ impl<'a> Evidence<'a> {
 
     /// A number of the paper out of bounds is an inconsistency; without bounds, or with a number that no run gave, a
     /// claim is untestable; else our numbers decide.
-    fn verdict(&self) -> Verdict {
+    fn verdict(&self) -> ClaimVerdict {
         if !self.paper.iter().all(Number::passes) {
             return Inconsistent;
         }
@@ -709,7 +709,7 @@ mod tests {
         assert_eq!(ours(f64::NAN, at_most(1.0)).verdict(), NotTestable);
         let runs = crate::runs::planned(flexspline_mechanics::mesh::MeshLevel::Coarse, true);
         let of_the_drive = ["no-interference", "ratio"];
-        for Judged { claim, verdict, .. } in judged(&DRIVE, &runs) {
+        for JudgedClaim { claim, verdict, .. } in judged(&DRIVE, &runs) {
             let expected = if of_the_drive.contains(&claim.id) { [Reproduced; 2] } else { [NotTestable, Inconsistent] };
             assert!(expected.contains(&verdict), "{}: {verdict:?}", claim.id);
         }

@@ -19,12 +19,12 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use claims::{Judged, Verdict, judged};
+use claims::{ClaimVerdict, JudgedClaim, judged};
 use flexspline_design::simulate::SimulateError;
 use flexspline_mechanics::drive::Drive;
 use flexspline_mechanics::mesh::MeshLevel;
 pub use page::page;
-pub use runs::{Metrics, Observe, Run};
+pub use runs::{Observe, PaperRun, RunMetrics};
 
 /// Version of the layout of `reproduce.json`.
 const REPRODUCE_SCHEMA: u32 = 2;
@@ -51,9 +51,9 @@ pub struct Reproduction {
     /// Number of claims by verdict.
     pub counts: BTreeMap<&'static str, usize>,
     /// The claims.
-    pub claims: Vec<Judged>,
+    pub claims: Vec<JudgedClaim>,
     /// Every run of the protocol.
-    pub runs: Vec<Run>,
+    pub runs: Vec<PaperRun>,
     /// Runs of the unchanged drive that found no equilibrium.
     pub not_converged: Vec<String>,
     /// Time, s.
@@ -75,7 +75,7 @@ pub fn reproduce(
     let runs = runs::run_all(drive, mesh, quick, observe)?;
     let claims = judged(drive, &runs);
     let count = |verdict| claims.iter().filter(|claim| claim.verdict == verdict).count();
-    let counts = Verdict::ALL.map(|verdict| (verdict.into(), count(verdict))).into();
+    let counts = ClaimVerdict::ALL.map(|verdict| (verdict.into(), count(verdict))).into();
     // A changed model needs no equilibrium: its status says so.
     let failed = runs.iter().filter(|run| run.metrics.is_none() && run.variant != runs::ONE_POINT);
     let not_converged: Vec<String> = failed

@@ -3,15 +3,15 @@
 use serde_json::{Map, json};
 
 use crate::Reproduction;
-use crate::claims::{ERROR_CAM, ERROR_DOUBLE_DISC, ERROR_FOUR_ROLLER, Judged, Number, Verdict, largest};
+use crate::claims::{ClaimVerdict, ERROR_CAM, ERROR_DOUBLE_DISC, ERROR_FOUR_ROLLER, JudgedClaim, Number, largest};
 use crate::runs::{ONE_POINT, both_ways, standard};
 use flexspline_design::simulate::Row;
 use flexspline_mechanics::drive::GeneratorKind;
 use flexspline_report::animation::{Animation, AnimationError};
 use flexspline_report::drive_figures::{drive_figure, less_mean, sleeve_figure};
 use flexspline_report::page::{
-    Axis, Block, Choice, Detail, EVERY_CHOICE, Figure, FigureBody, Headline, Lines, Mark, Page, PageQuantity, Section,
-    Series, Status, Table, Text, significant,
+    ChartAxis, ChartSeries, Choice, Detail, EVERY_CHOICE, Figure, FigureBody, Headline, Lines, Mark, Page, PageBlock,
+    PageQuantity, PageSection, PageTable, RichText, Status, significant,
 };
 
 /// The page; `animations` are the drives in motion, without load.
@@ -62,18 +62,18 @@ fn judge(r: &Reproduction, animations: &[Result<Animation, AnimationError>]) -> 
 }
 
 fn headline(r: &Reproduction) -> Headline {
-    let [reproduced, not, inconsistent, untestable] = Verdict::ALL.map(|verdict| r.counts[verdict.into()]);
+    let [reproduced, not, inconsistent, untestable] = ClaimVerdict::ALL.map(|verdict| r.counts[verdict.into()]);
     let unloaded = GeneratorKind::ALL.into_iter().filter_map(|kind| standard(&r.runs, kind, 0.0)?.metrics.as_ref());
     let largest_arcmin = unloaded.map(largest).fold(0.0, f64::max);
     Headline {
         choice: None,
-        answer: Text::new(format!(
+        answer: RichText::new(format!(
             "Of {} claims of the paper {reproduced} are reproduced, {not} are not, {inconsistent} contradict the paper \
              itself and {untestable} cannot be tested: unloaded, a sound drive is off by half its clearance, \
              {largest_arcmin:.1}′, not by {ERROR_CAM:.0}′ to {ERROR_FOUR_ROLLER:.0}′.",
             r.claims.len()
         )),
-        number: Text::default().error(60.0 * largest_arcmin, 3),
+        number: RichText::default().error(60.0 * largest_arcmin, 3),
         number_is: format!(
             "largest error of any of the four drives without load; the paper has up to {ERROR_FOUR_ROLLER:.1}′"
         ),
@@ -81,56 +81,56 @@ fn headline(r: &Reproduction) -> Headline {
 }
 
 /// Numbers with their bounds.
-fn numbers(of: &[Number]) -> Text {
+fn numbers(of: &[Number]) -> RichText {
     let words = |number: &Number| {
         let value = |value| format!("{} {}", significant(value, 3), number.unit);
         let low = number.at_least.map_or_else(String::new, |bound| format!(", at least {}", value(bound)));
         let high = number.at_most.map_or_else(String::new, |bound| format!(", at most {}", value(bound)));
         format!("{} {}{low}{high}{}", number.name, value(number.value), if number.passes() { "" } else { ": fails" })
     };
-    Text::new(of.iter().map(words).collect::<Vec<_>>().join("; "))
+    RichText::new(of.iter().map(words).collect::<Vec<_>>().join("; "))
 }
 
-fn claims(r: &Reproduction) -> Section {
-    let row = |Judged { claim, paper, ours, verdict }: &Judged| {
+fn claims(r: &Reproduction) -> PageSection {
+    let row = |JudgedClaim { claim, paper, ours, verdict }: &JudgedClaim| {
         vec![
-            Text::new(claim.id),
-            Text::new(format!("{} [{}]", claim.says, claim.place)),
-            Text::default().strong(<&str>::from(*verdict)),
+            RichText::new(claim.id),
+            RichText::new(format!("{} [{}]", claim.says, claim.place)),
+            RichText::default().strong(<&str>::from(*verdict)),
             numbers(paper),
             numbers(ours),
-            Text::new(claim.metric),
+            RichText::new(claim.metric),
         ]
     };
     let header = ["Claim", "The paper", "Verdict", "Its numbers", "Our numbers", "Metric"];
-    let table = Table {
+    let table = PageTable {
         caption: "Claims of the paper in its order".into(),
         header: header.map(str::to_owned).into(),
         rows: r.claims.iter().map(row).collect(),
     };
     let blocks = vec![
-        Block::paragraph(
+        PageBlock::paragraph(
             "The verdict follows from the bounds alone. The paper gives no tooth sizes: sizes count as reproduced \
              within a quarter, ranks where the gap exceeds three times what mesh, increment and penalty move it by. A \
              number of the paper out of its bounds is an inconsistency.",
         ),
-        Block::Table { choice: None, table },
-        Block::paragraph(
+        PageBlock::Table { choice: None, table },
+        PageBlock::paragraph(
             "A sound drive repeats its error with every tooth pitch and loses half its clearance, whatever deforms the \
              rim. The clearance of HHD-95 was chosen to give the cam a backlash near 1′: that its size is the paper's \
              is no evidence, the difference of the generators is.",
         ),
     ];
-    Section { id: "claims".into(), title: "Claim by claim".into(), detail: Detail::Summary, blocks }
+    PageSection { id: "claims".into(), title: "Claim by claim".into(), detail: Detail::Summary, blocks }
 }
 
-fn error_figure(id: &str, title: &str, caption: &str, x: Axis, charts: Vec<(String, Lines)>) -> Block {
-    Block::Figure(Figure {
+fn error_figure(id: &str, title: &str, caption: &str, x: ChartAxis, charts: Vec<(String, Lines)>) -> PageBlock {
+    PageBlock::Figure(Figure {
         id: id.into(),
         title: title.into(),
-        caption: Text::new(caption),
+        caption: RichText::new(caption),
         alt: title.into(),
-        body: FigureBody::Lines { x, y: Axis::new("Output error", PageQuantity::Error), charts },
+        body: FigureBody::Lines { x, y: ChartAxis::new("Output error", PageQuantity::Error), charts },
     })
 }
 
@@ -143,27 +143,28 @@ fn along(r: &Reproduction) -> Lines {
             let point = |row: &Row| [row.generator_rad.to_degrees(), row.error_arcsec];
             let mut points: Vec<[f64; 2]> = rows.iter().map(point).collect();
             points.sort_by(|a, b| a[0].total_cmp(&b[0]));
-            lines.series.push(Series { name: format!("{}, {way}", kind.in_words()), mark, colour, points });
+            lines.series.push(ChartSeries { name: format!("{}, {way}", kind.in_words()), mark, colour, points });
         }
     }
     lines.series.retain(|series| !series.points.is_empty());
     lines
 }
 
-fn errors(r: &Reproduction, animations: &[Animation]) -> Section {
+fn errors(r: &Reproduction, animations: &[Animation]) -> PageSection {
     let mut blocks = Vec::new();
     if !animations.is_empty() {
         let ripple = |a: &Animation| {
-            let series = Series { name: "no load, forward".into(), mark: Mark::Line, colour: 0, points: less_mean(a) };
+            let series =
+                ChartSeries { name: "no load, forward".into(), mark: Mark::Line, colour: 0, points: less_mean(a) };
             (a.kind.to_string(), Lines { series: vec![series], ..Lines::default() })
         };
-        blocks.push(Block::Figure(drive_figure("no load, turning forward")));
+        blocks.push(PageBlock::Figure(drive_figure("no load, turning forward")));
         blocks.push(error_figure(
             "ripple",
             "Error over one tooth pitch, less its mean",
             "The states of figure 1, after start-up. This repeats with every tooth pitch, 59.8 times in the paper's 2 \
              rad.",
-            Axis::linked("Generator from the beginning of a pitch"),
+            ChartAxis::linked("Generator from the beginning of a pitch"),
             animations.iter().map(ripple).collect(),
         ));
     }
@@ -175,21 +176,21 @@ fn errors(r: &Reproduction, animations: &[Animation]) -> Section {
              in the middle of its clearance: forward to +1 rad, then back to −1 rad (dashed). The paper has \
              {ERROR_CAM:.1}′ (cam), {ERROR_DOUBLE_DISC:.1}′ (double disc), {ERROR_FOUR_ROLLER:.1}′ (four-roller).",
         ),
-        Axis::new("Generator", PageQuantity::Degree),
+        ChartAxis::new("Generator", PageQuantity::Degree),
         vec![(EVERY_CHOICE.to_owned(), along(r))],
     ));
-    blocks.extend(animations.iter().any(|a| a.sleeve.is_some()).then(|| Block::Figure(sleeve_figure())));
+    blocks.extend(animations.iter().any(|a| a.sleeve.is_some()).then(|| PageBlock::Figure(sleeve_figure())));
     let held = r
         .runs
         .iter()
         .filter(|run| run.variant == ONE_POINT)
         .filter_map(|run| Some(format!("{} {:.1}′", run.generator.in_words(), largest(run.metrics.as_ref()?))));
-    blocks.push(Block::paragraph(format!(
+    blocks.push(PageBlock::paragraph(format!(
         "A rim that is kept from turning at one point of its bore has errors of the paper's size: {}. The deformed rim \
          moves along its circumference twice in each turn of the generator; the mean of the bore does not move, one \
          point does. The paper says that rotation of the flexspline “was blocked” by “rigid links”, not at which \
          nodes: that its errors come from there is a suspicion.",
         held.collect::<Vec<_>>().join(", ")
     )));
-    Section { id: "errors-of-generators".into(), title: "The errors".into(), detail: Detail::Summary, blocks }
+    PageSection { id: "errors-of-generators".into(), title: "The errors".into(), detail: Detail::Summary, blocks }
 }

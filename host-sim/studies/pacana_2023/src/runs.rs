@@ -53,7 +53,7 @@ fn stiffen(settings: &mut SimulationSettings, factor: f64) {
 
 /// Metrics of a run; NaN, in JSON `null`, where the run does not give one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Metrics {
+pub struct RunMetrics {
     /// Largest |error| from the start to +1 rad. The error is zero where the drive was deformed, the output in the
     /// middle of its clearance.
     pub largest_out_arcsec: f64,
@@ -81,7 +81,7 @@ pub struct Metrics {
 
 /// A run of the protocol.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Run {
+pub struct PaperRun {
     /// Wave generator.
     pub generator: GeneratorKind,
     /// Load, N·m.
@@ -91,7 +91,7 @@ pub struct Run {
     /// `converged`, or why not.
     pub status: String,
     /// Metrics of a run that converged.
-    pub metrics: Option<Metrics>,
+    pub metrics: Option<RunMetrics>,
     /// Its rows.
     #[serde(skip)]
     pub rows: Vec<Row>,
@@ -104,14 +104,14 @@ pub struct Run {
 }
 
 /// The standard run with a generator under a load (N·m).
-pub(crate) fn standard(runs: &[Run], kind: GeneratorKind, torque_n_m: f64) -> Option<&Run> {
-    let is_it = |run: &&Run| run.generator == kind && run.torque_n_m == torque_n_m && run.variant == STANDARD;
+pub(crate) fn standard(runs: &[PaperRun], kind: GeneratorKind, torque_n_m: f64) -> Option<&PaperRun> {
+    let is_it = |run: &&PaperRun| run.generator == kind && run.torque_n_m == torque_n_m && run.variant == STANDARD;
     runs.iter().find(is_it)
 }
 
 /// The runs to make, before they are solved.
-pub(crate) fn planned(mesh: MeshLevel, quick: bool) -> Vec<Run> {
-    let mut planned: Vec<Run> = Vec::new();
+pub(crate) fn planned(mesh: MeshLevel, quick: bool) -> Vec<PaperRun> {
+    let mut planned: Vec<PaperRun> = Vec::new();
     let same = format!("{mesh} mesh");
     for (variant, _, change) in
         VARIANTS.into_iter().filter(|(name, in_quick, _)| (*in_quick || !quick) && *name != same)
@@ -131,7 +131,7 @@ pub(crate) fn planned(mesh: MeshLevel, quick: bool) -> Vec<Run> {
                 settings.solver = SolverSettings { method: Method::Fast, mesh, ..SolverSettings::default() };
                 change(&mut settings);
                 let (status, metrics, rows, tip_path) = Default::default();
-                planned.push(Run { generator, torque_n_m, variant, status, metrics, rows, tip_path, settings });
+                planned.push(PaperRun { generator, torque_n_m, variant, status, metrics, rows, tip_path, settings });
             }
         }
     }
@@ -144,7 +144,7 @@ pub(crate) fn run_all(
     mesh: MeshLevel,
     quick: bool,
     observe: &Observe<'_>,
-) -> Result<Vec<Run>, SimulateError> {
+) -> Result<Vec<PaperRun>, SimulateError> {
     let mut runs = planned(mesh, quick);
     // A run that ends early leaves its increments undone.
     let total = runs.iter().map(|run| if run.settings.increment_rad.is_some() { 602 } else { 302 }).sum();
@@ -161,7 +161,7 @@ pub(crate) fn run_all(
     Ok(runs)
 }
 
-fn solve(drive: &Drive, run: &mut Run, tick: &dyn Fn()) -> Result<(), SimulateError> {
+fn solve(drive: &Drive, run: &mut PaperRun, tick: &dyn Fn()) -> Result<(), SimulateError> {
     let found = simulate(drive, &run.settings, &mut |now| {
         if now.row.is_some_and(|row| row.step == 0) {
             run.tip_path = tip_path(now);
@@ -169,7 +169,7 @@ fn solve(drive: &Drive, run: &mut Run, tick: &dyn Fn()) -> Result<(), SimulateEr
         tick();
         ControlFlow::Continue(())
     })?;
-    run.metrics = Some(Metrics::new(&found, TAU / f64::from(drive.flexspline.teeth)));
+    run.metrics = Some(RunMetrics::new(&found, TAU / f64::from(drive.flexspline.teeth)));
     run.rows = found.rows;
     Ok(())
 }
@@ -206,9 +206,9 @@ pub(crate) fn both_ways(rows: &[Row]) -> (&[Row], &[Row]) {
     rows.split_at(farthest.map_or(0, |(at, _)| at + 1))
 }
 
-impl Metrics {
+impl RunMetrics {
     /// Of a run along the paper's path; `pitch` is that of the flexspline, rad.
-    fn new(run: &Simulation, pitch: f64) -> Metrics {
+    fn new(run: &Simulation, pitch: f64) -> RunMetrics {
         let (rows, summary) = (&run.rows, &run.summary);
         let (out, back) = both_ways(rows);
         let largest = |rows: &[Row]| rows.iter().map(|row| row.error_arcsec.abs()).fold(0.0, f64::max);
@@ -218,7 +218,7 @@ impl Metrics {
         let [x, y] = summary.max_von_mises_position_mm;
         let at_peak = rows.iter().find(|row| row.step == summary.max_von_mises_step);
         let generator = at_peak.map_or(0.0, |row| row.generator_rad);
-        Metrics {
+        RunMetrics {
             largest_out_arcsec: largest(out),
             largest_back_arcsec: largest(back),
             lag_forward_arcsec: forward,

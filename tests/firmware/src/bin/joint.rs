@@ -7,7 +7,7 @@
 use cortex_m_rt::entry;
 use cortex_m_semihosting::hprintln;
 use flexspline::{Images, Store, Table};
-use flexspline_firmware::on_board::{HASH_START, LINE_TICKS, OnBoard, Settings, Told, hashed, line};
+use flexspline_firmware::on_board::{HASH_START, LINE_TICKS, OnBoard, OnBoardInput, OnBoardSettings, hashed, line};
 use flexspline_firmware::{Console, finish, twice};
 
 static IMAGE: [&[u8]; 2] = twice!(concat!(env!("FLEXSPLINE_TABLES"), "/joint.fxt"));
@@ -32,7 +32,7 @@ fn main() -> ! {
 fn fly(tape: &[u8], store: &mut Store) -> Option<()> {
     let [image, twin] = IMAGE;
     let (settings, ticks) = tape.split_first_chunk()?;
-    let settings = Settings::of_bytes(settings);
+    let settings = OnBoardSettings::of_bytes(settings);
     let drive = *Table::check(image).ok()?.drive();
     let images = Images::new(image, twin);
     *store = Store::new();
@@ -40,7 +40,7 @@ fn fly(tape: &[u8], store: &mut Store) -> Option<()> {
     let mut on_board = OnBoard::new(drive, &settings).ok()?;
     let mut hash = HASH_START;
     for (tick, bytes) in ticks.as_chunks().0.iter().enumerate() {
-        let given = on_board.tick(&images, store, &Told::of_bytes(bytes));
+        let given = on_board.tick(&images, store, &OnBoardInput::of_bytes(bytes));
         hash = hashed(hash, &given);
         if tick % LINE_TICKS == LINE_TICKS - 1 {
             line(&mut Console, tick, &given, hash).ok()?;
