@@ -226,10 +226,6 @@ fn the_paces_that_are_advised_are_sound_when_followed() {
     }
     let said = fly("load_kg_m2 = 1000.0\nacceleration_rad_s2 = 0.1\n", &[]);
     assert!(paces(&said).is_none() && said.contains("(1000 of ") && said.contains("motor held"), "{said}");
-    // Side by side each keeps its own.
-    let said = fly("", &["--vary", "servo.speed_hz=40.0,80.0"]);
-    assert!(said.contains("barely") && said.matches("caution: camera 80.0: The servo").count() == 1, "{said}");
-    assert!(paces(&said).is_some() && !said.contains("camera 40.0: The servo"), "{said}");
 }
 
 /// The drive that a table describes flies as the map of the contact FEM does of which neither it nor its samples are
@@ -273,8 +269,6 @@ fn the_drive_of_an_own_table_flies_as_its_contact_fem_does() {
     .unwrap();
     let said = refused("fly heavy.toml --tables cam.fxt");
     assert!(said.contains("N.m with this table"), "{said}");
-    let said = refused("fly camera --tables cam.fxt --vary generator=cam");
-    assert!(said.contains("--vary generator: found with --tables"), "{said}");
     let said = refused("fly camera --tables own.toml");
     assert!(said.contains("own.toml: "), "{said}");
 }
@@ -295,18 +289,6 @@ fn the_command_prints_what_was_promised_and_names_a_scenario_that_is_not_there()
         }
     }
     assert!(json["stable"].is_boolean() && out.join("report.html").is_file() && out.join("flight.json").is_file());
-    let vary = ["--vary", "table=nominal,calibrated", "--vary", "load.bias_n_m=0.0,500.0"].map(str::to_owned);
-    let args = ["fly", file.to_str().unwrap(), "--json", "--out", out.to_str().unwrap()].map(str::to_owned);
-    let done = Command::new(flexspline()).args(args.iter().chain(&vary)).output().unwrap();
-    assert_eq!(done.status.code(), Some(2), "500 N.m is beyond what a file may say");
-    let vary = ["--vary", "table=nominal,calibrated", "--vary", "load.bias_n_m=0.0,199.0"].map(str::to_owned);
-    let done = Command::new(flexspline()).args(args.iter().chain(&vary)).output().unwrap();
-    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
-    let json: Value = serde_json::from_slice(&done.stdout).unwrap();
-    let flights = json["flights"].as_array().unwrap();
-    assert_eq!(flights.len(), 4);
-    assert!(flights[0]["results"]["rms_arcsec"]["compensated"].is_f64() && out.join("flights.json").is_file());
-    assert!(flights[1]["not_flown"].as_str().unwrap().contains("allowed"), "{}", flights[1]);
     let wrong = Command::new(flexspline()).args(["fly", "anntena"]).output().unwrap();
     assert_eq!(wrong.status.code(), Some(2));
     let said = String::from_utf8_lossy(&wrong.stderr).to_string();

@@ -6,18 +6,13 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::Args;
-use serde::Serialize;
 
 use super::context::{Context, image_file};
 use super::{Failure, report};
 use flexspline_base::figures;
 use flexspline_base::output::Outputs;
 use flexspline_base::suggest::did_you_mean;
-use flexspline_design::sweep::Vary;
-use flexspline_fly::fly::{
-    ByController, Flown, FlyError, Results, SCENARIOS, VariedFlight, built_in, every, example, fly_varied, read,
-    results,
-};
+use flexspline_fly::fly::{ByController, Flown, FlyError, Results, SCENARIOS, built_in, example, read, results};
 use flexspline_report::flight_report;
 
 /// Fly a joint with mass in closed loop: motor, servo, drive, friction, load and wind; with and without compensation
@@ -30,31 +25,23 @@ use flexspline_report::flight_report;
 /// core has the file itself where the scenario's table is "nominal".
 ///
 /// A servo that is not stable is a result, and no failed run: exit code 0, `stable` is false.
-///
-/// With --vary, or for all scenarios, flights are put side by side: a row for each, to the screen and to flights.json.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   flexspline fly antenna
   flexspline fly camera --json
-  flexspline fly all --vary table=nominal,extended,calibrated
-  flexspline fly antenna --vary generator=cam,four-roller --vary torque=on_load,current
   flexspline fly antenna --example > own.toml
   flexspline fly own.toml --out flight
-  flexspline fly camera --tables out/cam.fxt --vary table=nominal,calibrated")]
+  flexspline fly camera --tables out/cam.fxt")]
 pub(super) struct Fly {
-    /// antenna, rover, camera, telescope, a TOML file, or all (those with a name)
+    /// antenna, rover, camera, telescope, or a TOML file
     #[arg(value_name = "SCENARIO")]
     scenario: String,
-    /// A field of the scenario file and its values: FIELD=VALUE,VALUE,..., FIELD=FROM..TO (5 values) or
-    /// FIELD=FROM..TO:N; repeat for more fields [default: as the scenario has it]
-    #[arg(long, value_name = "FIELD=VALUES", allow_hyphen_values = true)]
-    vary: Vec<Vary>,
     /// A table whose drive flies, as flexspline tables writes it [default: HHD-95 with the scenario's generator]
     #[arg(long, value_name = "FILE")]
     tables: Option<PathBuf>,
     /// Print the scenario as a file with every field, what it is and what is allowed, and fly nothing
-    #[arg(long, conflicts_with_all = ["vary", "tables", "no_report"])]
+    #[arg(long, conflicts_with_all = ["tables", "no_report"])]
     example: bool,
     /// Write no report.html
     #[arg(long)]
@@ -68,18 +55,11 @@ impl Fly {
                         makes of a drive";
             return Err(Failure::BadInput(format!("{option}: {what}")));
         }
-        if self.example && self.scenario == "all" {
-            let allowed = SCENARIOS.join(", ");
-            return Err(Failure::BadInput(format!("scenario: found all, allowed for an example: {allowed}")));
-        }
         if self.example {
             let flown = scenario(&self.scenario)?;
             let base = built_in(&self.scenario).map_or(SCENARIOS[0], |_| &self.scenario);
             let file = example(base, flown);
             return context.print_data(&serde_json::json!({ "file": &file }), || file.clone());
-        }
-        if self.scenario == "all" || !self.vary.is_empty() {
-            return self.side_by_side(context);
         }
         let flown = on_its_drive(scenario(&self.scenario)?, self.table()?.as_ref())?;
         flown.carries().map_err(|why| Failure::BadInput(format!("{}: {why}", self.scenario)))?;
@@ -111,10 +91,6 @@ impl Fly {
     /// The table that is given: its file, and its bytes.
     fn table(&self) -> Result<Option<(&Path, Vec<u8>)>, Failure> {
         let Some(file) = &self.tables else { return Ok(None) };
-        if self.vary.iter().any(|vary| vary.path == "generator") {
-            let what = "--vary generator: found with --tables, whose table has its generator; allowed: one of the two";
-            return Err(Failure::BadInput(what.to_owned()));
-        }
         Ok(Some((file, image_file(file)?)))
     }
 }
@@ -123,102 +99,6 @@ impl Fly {
 fn on_its_drive(flown: Flown, table: Option<&(&Path, Vec<u8>)>) -> Result<Flown, Failure> {
     let Some((file, image)) = table else { return Ok(flown) };
     flown.with_table(image).map_err(|error| Failure::BadInput(format!("{}: {error}", file.display())))
-}
-
-/// Flights side by side.
-#[derive(Serialize)]
-struct Flights {
-    flights: Vec<VariedFlight>,
-}
-
-impl Fly {
-    /// Every combination of what varies, of one scenario or all.
-    fn side_by_side(&self, context: &Context) -> Result<(), Failure> {
-        let names = if self.scenario == "all" { SCENARIOS.to_vec() } else { vec![self.scenario.as_str()] };
-        let own = self.table()?;
-        let mut flights = Vec::new();
-        for name in names {
-            for (varied, flown) in every(name, &text_of(name)?, &self.vary).map_err(refused)? {
-                flights.push((varied, on_its_drive(flown, own.as_ref())?));
-            }
-        }
-        let out = context.out()?;
-        let (progress, done) = (Mutex::new(context.progress("fly")), AtomicUsize::new(0));
-        let all = flights.iter().map(|(_, flown)| flown.seconds_of_all()).sum();
-        let progress_line = || {
-            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-            if let Ok(mut bar) = progress.lock() {
-                bar.set(done, all, "seconds of all joints");
-            }
-        };
-        let found = Flights {
-            flights: flights.into_iter().map(|(varied, flown)| fly_varied(varied, &flown, &progress_line)).collect(),
-        };
-        drop(progress);
-        if let [VariedFlight { not_flown: Some(reason), .. }] = &found.flights[..] {
-            return Err(Failure::BadInput(format!("{}: {reason}", self.scenario)));
-        }
-        let mut outputs = Outputs::new();
-        outputs.json(&out.join("flights.json"), &found)?;
-        outputs.finish()?;
-        context.print(&found, || table(&found.flights, out))
-    }
-}
-
-/// A row for each flight.
-fn table(flights: &[VariedFlight], out: &Path) -> String {
-    let label = |flight: &VariedFlight| {
-        let scenario = flight.results.iter().map(|results| results.scenario.clone());
-        scenario.chain(flight.varied.iter().map(|(_, value)| value.clone())).collect::<Vec<_>>().join(" ")
-    };
-    let width = flights.iter().map(|flight| label(flight).chars().count()).max().unwrap_or(0).max(8);
-    let mut text = format!(
-        "{:width$}  rms ″: none  angle  by way   core  ideal  removed  ripple ″/s: none   core  ideal  floor  settles \
-         s: none  core  bound holds  stable\n",
-        "scenario"
-    );
-    let part = |share: Option<f64>| share.map_or("–".to_owned(), |share| format!("{:.1} %", 100.0 * share));
-    let number = |value: f64| if value.is_finite() { format!("{value:.1}") } else { "–".to_owned() };
-    for flight in flights {
-        let Some(results) = &flight.results else {
-            let _ =
-                writeln!(text, "{:width$}  not flown: {}", label(flight), flight.not_flown.as_deref().unwrap_or(""));
-            continue;
-        };
-        let (rms, ripple) = (&results.rms_arcsec, &results.velocity_ripple);
-        let settles = results.settle_s.as_ref();
-        let settles = |of: fn(&ByController<f64>) -> f64| settles.map_or("–".to_owned(), |s| format!("{:.2}", of(s)));
-        let _ = writeln!(
-            text,
-            "{:width$} {:>12.2} {:>6.2} {:>7.2} {:>6.2} {:>6.2} {:>8} {:>17} {:>6} {:>6} {:>6} {:>16} {:>5} {:>12} \
-             {:>7}",
-            label(flight),
-            rms.none,
-            rms.fourier,
-            rms.fourier_by_direction,
-            rms.compensated,
-            rms.ideal,
-            part(results.removed),
-            number(ripple.none),
-            number(ripple.compensated),
-            number(ripple.ideal),
-            number(results.velocity_ripple_floor),
-            settles(|s| s.none),
-            settles(|s| s.compensated),
-            part(results.torque_within_bound),
-            match (results.stable, results.servo_is_near_the_edge()) {
-                (false, _) => "NO",
-                (true, true) => "barely",
-                (true, false) => "yes",
-            }
-        );
-    }
-    for flight in flights {
-        for remark in flight.results.iter().flat_map(|results| &results.remarks) {
-            let _ = writeln!(text, "caution: {}: {remark}", label(flight));
-        }
-    }
-    text + &format!("flights.json in {}", out.display())
 }
 
 /// The scenario of a name, or of a file.

@@ -13,16 +13,6 @@ pub enum FlyError {
     /// The scenario's file: the first thing that is wrong with it.
     #[error("{0}")]
     Scenario(Problem),
-    /// `--vary` of a field.
-    #[error("--vary {field}: found {found}, allowed: {allowed}")]
-    Vary {
-        /// Which field.
-        field: String,
-        /// What was found.
-        found: String,
-        /// What is allowed.
-        allowed: &'static str,
-    },
     /// The drive does not carry the load.
     #[error("load: found up to {largest_n_m:.1} N.m, allowed: {most_n_m} N.m with {of}")]
     Load {

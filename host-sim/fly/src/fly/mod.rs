@@ -8,7 +8,6 @@ mod error;
 mod file;
 mod own;
 mod results;
-mod varied;
 
 use flexspline_motion::flight::{Flight, JOINTS, JointUnit, fly_told};
 use flexspline_motion::gear::SampledSpring;
@@ -23,7 +22,6 @@ pub use error::FlyError;
 pub use file::{example, read};
 pub use own::{OwnDrive, OwnTableError, gear_at};
 pub use results::{ByController, LEAST_DISTANCE, LEAST_PHASE_MARGIN_DEG, Results, Row, results, spectrum};
-pub use varied::{Flight as VariedFlight, every, fly_varied};
 
 /// A scenario, and what flies it.
 #[derive(Debug, Clone, PartialEq)]
