@@ -269,7 +269,7 @@ impl Model for MovingJoint {
         self.not_corrected = ticked.not_corrected;
         let plant = joint.plant();
         let ratio = joint.ratio();
-        let ([motor, output, _], [motor_rate, output_rate, _]) = (plant.angle_rad, plant.rate_rad_s);
+        let ([motor, output], [motor_rate, output_rate]) = (plant.angle_rad, plant.rate_rad_s);
         if !(motor.is_finite() && output.is_finite()) {
             return Err(FmuError::RunsAway);
         }

@@ -416,8 +416,6 @@ fn plant(made: &LaneParts) -> JointPlant {
         damping_s: damping_s(scenario, unit),
         friction: Friction::EROB80_100.times(scenario.friction),
         drag_n_m: scenario.drag_n_m,
-        slip: Vec::new(),
-        appendage: None,
         gravity: scenario.load.gravity,
     };
     JointPlant::new(settings, scenario.temperature_c)

@@ -90,17 +90,3 @@ impl Friction {
         [self.base_n_m + slow * self.stribeck_n_m, self.load_base + slow * self.load_stribeck]
     }
 }
-
-/// Elastic hysteresis: a spring that slips where it carries too much (Jenkin, Maxwell slip), beside the wind-up.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HysteresisElement {
-    /// Its stiffness, N·m/rad.
-    pub stiffness: f64,
-    /// What it carries at most, N·m.
-    pub most_n_m: f64,
-}
-
-/// A slip element after a twist: its torque.
-pub fn slipped(element: &HysteresisElement, torque_n_m: f64, twisted_rad: f64) -> f64 {
-    (torque_n_m + element.stiffness * twisted_rad).clamp(-element.most_n_m, element.most_n_m)
-}

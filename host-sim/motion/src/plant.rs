@@ -1,6 +1,6 @@
 //! Motor, drive and load in motion: a fixed step that keeps the books of energy to rounding.
 //!
-//! All at the output: `q` is generator/ratio, output, and what hangs elastically on the output. A step solves
+//! All at the output: `q` is generator/ratio and output. A step solves
 //! ```text
 //! q' = q + h·v,   J·(w' − w) = h·(τ − ∇̄V − friction),   v = (w + w')/2
 //! ```
@@ -11,12 +11,12 @@
 //! error by `(h·ω/2)²` each time, with the fastest resonance `ω`; with the spring between motor and load taken along to
 //! first order what is left is how much that spring changes over the step.
 
-use super::friction::{Friction, HysteresisElement, slipped};
+use super::friction::Friction;
 use super::gear::{Gear, Meshed, Near};
 use super::servo::{Servo, ServoCommand, ServoSettings};
 
-/// Coordinates: motor, load, appendage.
-pub const PARTS: usize = 3;
+/// Coordinates: motor, load.
+pub const PARTS: usize = 2;
 /// Most repetitions in a step; four are usual.
 const REPETITIONS: usize = 40;
 /// After so many the spring is no longer taken along: where flanks touch and part in one step the plain repetition ends
@@ -26,17 +26,6 @@ const TAKEN_ALONG: usize = 8;
 const SAME: [f64; 2] = [1e-11, 1e-16];
 /// Over shorter ways than this the slope at the middle is exact to rounding, rad.
 const SHORT_RAD: f64 = 1e-9;
-
-/// What swings on the load: a mast, a feed, a panel.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Appendage {
-    /// Inertia, kg·m².
-    pub inertia_kg_m2: f64,
-    /// Stiffness of its root, N·m/rad.
-    pub stiffness: f64,
-    /// Damping, N·m·s/rad.
-    pub damping: f64,
-}
 
 /// What the plant is made of; all at the output.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,10 +43,6 @@ pub struct PlantSettings {
     pub friction: Friction,
     /// Coulomb drag of the output's bearing and seal, N·m.
     pub drag_n_m: f64,
-    /// Hysteresis beside the wind-up.
-    pub slip: Vec<HysteresisElement>,
-    /// What swings on the load.
-    pub appendage: Option<Appendage>,
     /// Weight times arm of the load, N·m, and the output angle at which it pulls forward most, rad.
     pub gravity: [f64; 2],
 }
@@ -87,7 +72,6 @@ pub struct JointPlant {
     /// Temperature of the drive, °C.
     temperature_c: f64,
     cold: f64,
-    slip_n_m: Vec<f64>,
     meshed: Meshed,
     middle: Meshed,
     /// Where the step began.
@@ -103,7 +87,6 @@ impl JointPlant {
         let meshed = settings.gear.at(0.0, 0.0);
         Self {
             cold: settings.friction.cold(temperature_c),
-            slip_n_m: vec![0.0; settings.slip.len()],
             meshed,
             middle: meshed,
             near: Near::default(),
@@ -143,9 +126,9 @@ impl JointPlant {
         }
     }
 
-    /// Torque in the mesh now, with what the hysteresis carries, N·m.
+    /// Torque in the mesh now, N·m.
     pub fn mesh_n_m(&self) -> f64 {
-        self.meshed.torque_n_m + self.slip_n_m.iter().sum::<f64>()
+        self.meshed.torque_n_m
     }
 
     /// What the drive does now.
@@ -153,19 +136,14 @@ impl JointPlant {
         &self.meshed
     }
 
-    /// Energy that can come back, J: of motion, in the mesh, in the hysteresis, in the appendage.
+    /// Energy that can come back, J: of motion and in the mesh.
     pub fn stored_j(&self) -> f64 {
-        let PlantSettings { slip, appendage, .. } = &self.settings;
         let moving: f64 = self.inertias().iter().zip(&self.rate_rad_s).map(|(j, w)| 0.5 * j * w * w).sum();
-        let slips: f64 = slip.iter().zip(&self.slip_n_m).map(|(element, f)| 0.5 * f * f / element.stiffness).sum();
-        let bent = self.angle_rad[2] - self.angle_rad[1];
-        let hanging = appendage.map_or(0.0, |appendage| 0.5 * appendage.stiffness * bent * bent);
-        moving + self.meshed.energy_j + slips + hanging
+        moving + self.meshed.energy_j
     }
 
     fn inertias(&self) -> [f64; PARTS] {
-        let PlantSettings { motor_kg_m2, load_kg_m2, appendage, .. } = &self.settings;
-        [*motor_kg_m2, *load_kg_m2, appendage.map_or(1.0, |appendage| appendage.inertia_kg_m2)]
+        [self.settings.motor_kg_m2, self.settings.load_kg_m2]
     }
 
     /// One step: motor torque times ratio, and torque on the load from outside but for gravity, N·m.
@@ -187,9 +165,9 @@ impl JointPlant {
             let gear = &self.settings.gear;
             end = gear.at_near(&self.near, way[0], way[1]);
             self.middle = gear.at_near(&self.near, 0.5 * way[0], 0.5 * way[1]);
-            let mut push = [motor_n_m, 0.0, 0.0];
+            let mut push = [motor_n_m, 0.0];
             let twist_by = self.sloped(&end, &way, &mut push);
-            let lost = self.damped(&twist_by, &end, &way, h, &mut push);
+            let lost = self.damped(&twist_by, &end, h, &mut push);
             let [weight_n_m, most_at] = self.settings.gravity;
             outside = outside_n_m + weight_n_m * libm::cos(start[1] + 0.5 * way[1] - most_at);
             push[1] += outside;
@@ -205,10 +183,6 @@ impl JointPlant {
             }
         }
         let way: [f64; PARTS] = core::array::from_fn(|k| h * mean[k]);
-        let twisted = end.twist_rad - self.meshed.twist_rad;
-        for (element, torque) in self.settings.slip.iter().zip(&mut self.slip_n_m) {
-            *torque = slipped(element, *torque, twisted);
-        }
         for k in 0..PARTS {
             let rate = self.rate_rad_s[k];
             // What friction holds has stopped: else its speed would turn over in each step, and nothing would move.
@@ -243,29 +217,13 @@ impl JointPlant {
         twist_by
     }
 
-    /// Damping of the twist, hysteresis and the appendage; gives the heat.
-    fn damped(&self, twist_by: &[f64; 2], end: &Meshed, way: &[f64; PARTS], h: f64, push: &mut [f64; PARTS]) -> f64 {
-        let PlantSettings { damping_s, slip, appendage, .. } = &self.settings;
+    /// Damping of the twist; gives the heat.
+    fn damped(&self, twist_by: &[f64; 2], end: &Meshed, h: f64, push: &mut [f64; PARTS]) -> f64 {
         let twisted = end.twist_rad - self.meshed.twist_rad;
-        let mut across = damping_s * self.middle.stiffness * twisted / h;
-        let mut heat = across * twisted;
-        for (element, before) in slip.iter().zip(&self.slip_n_m) {
-            let after = slipped(element, *before, twisted);
-            let mean = 0.5 * (before + after);
-            heat += mean * (twisted - (after - before) / element.stiffness);
-            across += mean;
-        }
+        let across = self.settings.damping_s * self.middle.stiffness * twisted / h;
         push[0] -= across * twist_by[0];
         push[1] -= across * twist_by[1];
-        if let Some(Appendage { stiffness, damping, .. }) = appendage {
-            let bending = way[2] - way[1];
-            let bent = self.angle_rad[2] - self.angle_rad[1] + 0.5 * bending;
-            let root = stiffness * bent + damping * bending / h;
-            heat += damping * bending / h * bending;
-            push[1] += root;
-            push[2] -= root;
-        }
-        heat
+        across * twisted
     }
 
     /// The mean speed that the next repetition begins with: where this one would go on to, if the spring between motor
@@ -280,14 +238,14 @@ impl JointPlant {
         let stiff = self.middle.stiffness * (0.5 * h + damping_s);
         let off = twist_by[0] * (next[0] - mean[0]) + twist_by[1] * (next[1] - mean[1]);
         let across = stiff * off / (1.0 + stiff * (lever[0] * twist_by[0] + lever[1] * twist_by[1]));
-        [next[0] - lever[0] * across, next[1] - lever[1] * across, next[2]]
+        [next[0] - lever[0] * across, next[1] - lever[1] * across]
     }
 
     /// The mean speed that the push gives against friction, and the heat of it.
     fn rubbed(&self, h: f64, inertias: &[f64; PARTS], push: &[f64; PARTS], rubbing_n_m: f64) -> ([f64; PARTS], f64) {
         let PlantSettings { friction, drag_n_m, .. } = &self.settings;
-        let rubbing = [rubbing_n_m, *drag_n_m, 0.0];
-        let viscous = [self.cold * friction.viscous_n_m_s, 0.0, 0.0];
+        let rubbing = [rubbing_n_m, *drag_n_m];
+        let viscous = [self.cold * friction.viscous_n_m_s, 0.0];
         let mut heat = 0.0;
         let next = core::array::from_fn(|k| {
             let half = 0.5 * h / inertias[k];

@@ -45,13 +45,11 @@ fn plant(joint: &TwoMasses) -> JointPlant {
         damping_s: joint.damping_s,
         friction: Friction::NONE,
         drag_n_m: 0.0,
-        slip: Vec::new(),
-        appendage: None,
         gravity: [0.0; 2],
     };
     let mut plant = JointPlant::new(settings, 20.0);
     // A knock on the load.
-    plant.set_motion([0.0; 3], [0.0, 1e-4, 0.0]);
+    plant.set_motion([0.0; 2], [0.0, 1e-4]);
     plant
 }
 
@@ -115,12 +113,12 @@ fn knocked(
 fn split_tick(plant: &mut JointPlant, servo: &mut Servo, asked: &ServoCommand) {
     let joint = (plant.settings.motor_kg_m2, plant.settings.load_kg_m2);
     let mesh = plant.mesh_n_m();
-    let [from, mut load, _] = plant.angle_rad;
-    let [rate, mut load_rate, _] = plant.rate_rad_s;
+    let [from, mut load] = plant.angle_rad;
+    let [rate, mut load_rate] = plant.rate_rad_s;
     let mut alone = plant.clone();
     alone.settings.load_kg_m2 = 1e12;
     alone.settings.gear.spring = Spring::Cubic { half_clearance_rad: 1e3, stiffness: 0.0, hardening: 0.0 };
-    alone.set_motion([from, 0.0, 0.0], [rate, 0.0, 0.0]);
+    alone.set_motion([from, 0.0], [rate, 0.0]);
     alone.settings.gravity = [0.0; 2];
     // What pulls at the motor is held.
     let tick = servo.settings;
@@ -142,7 +140,7 @@ fn split_tick(plant: &mut JointPlant, servo: &mut Servo, asked: &ServoCommand) {
         load_rate -= across / joint.1 * dt;
         load += load_rate * dt;
     }
-    plant.set_motion([motor, load, 0.0], [motor_rate, load_rate, 0.0]);
+    plant.set_motion([motor, load], [motor_rate, load_rate]);
 }
 
 /// The two-mass resonance of the cam with 3 kg·m² is where the ringing was. The servo itself is stable around it; what
