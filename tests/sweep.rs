@@ -50,7 +50,7 @@ fn the_rank_correlation_of_a_sweep_finds_the_tolerance_that_matters() {
     let desk = Desk::new();
     let harmonic = |of: &str, limit: f64| {
         format!(
-            "[[tolerance]]\nname = \"{of}\"\nfield = \"as_built.{of}_pitch_harmonics\"\norder = 2\n\
+            "[[tolerance]]\nfield = \"as_built.{of}_pitch_harmonics\"\norder = 2\n\
              distribution = \"uniform\"\nlimits = [0.0, {limit}]\n"
         )
     };
@@ -60,7 +60,7 @@ fn the_rank_correlation_of_a_sweep_finds_the_tolerance_that_matters() {
     let ranks = swept["generators"][0]["ranks"].as_array().unwrap();
     let of_error: Vec<_> = ranks.iter().filter(|rank| rank["figure"] == "error_pp_arcsec").collect();
     println!("{of_error:?}");
-    assert_eq!(of_error[0]["input"], "circular_spline");
+    assert_eq!(of_error[0]["input"], "as_built.circular_spline_pitch_harmonics, order 2");
     assert!(of_error[0]["correlation"].as_f64().unwrap() > 0.95 && of_error[1]["correlation"].as_f64().unwrap() < 0.5);
 }
 

@@ -412,11 +412,6 @@ fn remarks(plan: &VariantPlan, sweep: &ReducedSweep) -> Vec<String> {
             "drives have axes further apart than the kernels reach; their errors are extrapolated",
         );
         count(of.play_closed, "drives have no play at some place; lost motion there is the wind-up alone");
-        for asked in of.asked.iter().filter(|asked| asked.meet_alone < asked.of) {
-            let found = asked.found.map(|[low, high]| format!("; found {} to {}", short(low), short(high)));
-            let (what, found) = (&asked.what, found.unwrap_or_default());
-            remarks.push(format!("{kind}: {what}: {} of {} variants{found}", asked.meet_alone, asked.of));
-        }
     }
     remarks
 }

@@ -148,6 +148,6 @@ pub(super) fn cost(value: f64, sense: Sense) -> f64 {
 }
 
 /// Whether the rigid teeth clear one another, where that was looked at.
-pub(super) fn clears(plan: &VariantPlan, row: &VariantRow) -> bool {
+fn clears(plan: &VariantPlan, row: &VariantRow) -> bool {
     plan.figure("rigid_gap_um").is_none_or(|gap| row.figures[gap] >= -1e3 * RigidMesh::TOUCHES_MM)
 }

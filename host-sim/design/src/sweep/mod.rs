@@ -25,7 +25,7 @@ mod vary;
 
 pub use judge::{Constraint, ConstraintError, Judge, Sense};
 pub use plan::{PlanError, PlanSettings, SweepProgress, VariantPlan};
-pub use reduce::{FigureSpread, OfGenerator, RankCorrelation, ReducedSweep, RequirementMet, reduce};
+pub use reduce::{FigureSpread, OfGenerator, RankCorrelation, ReducedSweep, reduce};
 pub use run::{Ran, RunStatus, Shard, VariantRow, run};
 pub use tolerance::{Distribution, DistributionForm, EXAMPLE, FieldTolerance, TeethError, ToleranceActs, Tolerances};
 pub use vary::{VariedValues, Vary, VaryError, grid, is_error_of_making};

@@ -9,7 +9,7 @@ use thiserror::Error;
 use super::draw::{draw, sets};
 use super::model::{self, Response};
 use super::respond::{respond, torques_n_m};
-use super::tolerance::{ToleranceActs, Tolerances};
+use super::tolerance::Tolerances;
 use super::vary::{Vary, filling, grid};
 use crate::data_sheet::{self, Loads};
 use crate::kernels::Kernels;
@@ -94,8 +94,6 @@ struct Recipe {
     drive_toml: String,
     generators: Vec<String>,
     mesh: String,
-    /// Inputs of the variants, and their names in the results.
-    names: Vec<[String; 2]>,
     by: HowComputed,
 }
 
@@ -165,7 +163,7 @@ impl VariantPlan {
         let variants = settings.draws.map_or_else(|| grid(vary), |count| filling(vary, count, settings.seed));
         let by = HowComputed::Sheet { torque_n_m, positions };
         let columns = vary.iter().map(|field| field.path.clone()).collect();
-        let plan = VariantPlan::new((drive, stated), generators, (columns, variants), (Vec::new(), by), settings.mesh);
+        let plan = VariantPlan::new((drive, stated), generators, (columns, variants), by, settings.mesh);
         plan.makes_drives()?;
         Ok(plan)
     }
@@ -192,22 +190,14 @@ impl VariantPlan {
         let columns = columns.into_iter().next().unwrap_or_default();
         let by =
             HowComputed::Kernels { torques_n_m: torques_n_m(of), of: respond(of, solver(settings.mesh), progress)? };
-        let names = of.list.iter().map(|tolerance| {
-            let input = match tolerance.acts {
-                ToleranceActs::Harmonic { order, .. } => of_order(&tolerance.field, order),
-                _ => tolerance.field.clone(),
-            };
-            [input, tolerance.name.clone()]
-        });
-        let named = (names.collect(), by);
-        Ok(VariantPlan::new((&of.drive, None), &of.generators, (columns, variants), named, settings.mesh))
+        Ok(VariantPlan::new((&of.drive, None), &of.generators, (columns, variants), by, settings.mesh))
     }
 
     pub(super) fn new(
         (drive, stated): (&Drive, Option<&Stated>),
         generators: &[GeneratorKind],
         (columns, variants): (Vec<String>, Vec<Vec<String>>),
-        (names, by): (Vec<[String; 2]>, HowComputed),
+        by: HowComputed,
         mesh: MeshLevel,
     ) -> VariantPlan {
         let recipe = Recipe {
@@ -216,7 +206,6 @@ impl VariantPlan {
             drive_toml: drive.to_toml() + &stated.map_or_else(String::new, Stated::to_toml),
             generators: generators.iter().map(ToString::to_string).collect(),
             mesh: mesh.to_string(),
-            names,
             by,
         };
         let (drive, stated, generators) = (drive.clone(), stated.cloned(), generators.to_vec());
@@ -275,12 +264,6 @@ impl VariantPlan {
 
     pub(super) fn by(&self) -> &HowComputed {
         &self.recipe.by
-    }
-
-    /// The name of an input in the results.
-    pub(super) fn named(&self, input: &str) -> String {
-        let named = self.recipe.names.iter().find(|[known, _]| known == input);
-        named.map_or_else(|| input.to_owned(), |[_, name]| name.clone())
     }
 
     /// The loads of the data sheet of a variant.

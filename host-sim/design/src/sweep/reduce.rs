@@ -6,11 +6,10 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::judge::{Judge, clears, cost};
+use super::judge::{Judge, cost};
 use super::model::CLOSED;
 use super::plan::{PlanError, VariantPlan, of_order};
 use super::run::{RunStatus, VariantRow, rows_of};
-use flexspline_base::robust::least_and_most;
 use flexspline_base::statistics::{Quantile, correlation, mean, quantile, std_dev};
 use flexspline_mechanics::drive::GeneratorKind;
 
@@ -56,8 +55,6 @@ pub struct OfGenerator {
     pub generator: GeneratorKind,
     /// The Pareto front, best in the first target first: numbers of variants, from 1.
     pub front: Vec<usize>,
-    /// Each thing asked of a variant, alone.
-    pub asked: Vec<RequirementMet>,
     /// Scatter of the figures over the variants that converged.
     pub figures: Vec<FigureSpread>,
     /// Rank correlations of inputs and figures, the strongest of each figure first.
@@ -66,19 +63,6 @@ pub struct OfGenerator {
     pub beyond_kernels: usize,
     /// Drives without play at some place: lost motion there is the wind-up alone.
     pub play_closed: usize,
-}
-
-/// One thing asked of a variant.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct RequirementMet {
-    /// `converged`, `teeth clear`, or a constraint as `--keep` takes it.
-    pub what: String,
-    /// Variants that have it.
-    pub meet_alone: usize,
-    /// All variants.
-    pub of: usize,
-    /// Least and largest value of the figure; missing where there is none.
-    pub found: Option<[f64; 2]>,
 }
 
 /// Scatter of a figure.
@@ -99,7 +83,7 @@ pub struct FigureSpread {
 pub struct RankCorrelation {
     /// The figure.
     pub figure: &'static str,
-    /// The field, or the name of its tolerance.
+    /// The field; of a harmonic with its order.
     pub input: String,
     /// −1 to 1.
     pub correlation: f64,
@@ -123,7 +107,7 @@ pub fn reduce(plan: &VariantPlan, folder: &Path, judge: &Judge, partial: bool) -
         }
         let of_kind: Vec<&VariantRow> = of_kind.into_iter().map(|k| &rows[k]).collect();
         let front = best.into_iter().map(|k| rows[k].variant + 1).collect();
-        of_generator(plan, *kind, &of_kind, (front, judge), &inputs)
+        of_generator(plan, *kind, &of_kind, front, &inputs)
     });
     let generators = generators.collect();
     let ended = |status| rows.iter().filter(|row| row.status == status).count();
@@ -184,7 +168,7 @@ fn of_generator(
     plan: &VariantPlan,
     generator: GeneratorKind,
     rows: &[&VariantRow],
-    (front, judge): (Vec<usize>, &Judge),
+    front: Vec<usize>,
     inputs: &[(String, Vec<f64>)],
 ) -> OfGenerator {
     let sound: Vec<&VariantRow> = rows.iter().copied().filter(|row| row.status == RunStatus::Converged).collect();
@@ -215,33 +199,11 @@ fn of_generator(
     OfGenerator {
         generator,
         front,
-        asked: asked(plan, judge, rows),
         figures,
         ranks,
         beyond_kernels: column("axes_apart_um").iter().filter(|size| **size > reach).count(),
         play_closed: column(CLOSED).iter().filter(|share| **share > 0.0).count(),
     }
-}
-
-/// How many rows have each thing that is asked, alone.
-fn asked(plan: &VariantPlan, judge: &Judge, rows: &[&VariantRow]) -> Vec<RequirementMet> {
-    let one = |what: String, found, has: &dyn Fn(&VariantRow) -> bool| RequirementMet {
-        what,
-        meet_alone: rows.iter().filter(|row| has(row)).count(),
-        of: rows.len(),
-        found,
-    };
-    let mut all = vec![one("converged".to_owned(), None, &|row| row.status == RunStatus::Converged)];
-    if plan.figure("rigid_gap_um").is_some() {
-        all.push(one("teeth clear".to_owned(), None, &|row| clears(plan, row)));
-    }
-    for kept in &judge.constraints {
-        let Some(k) = plan.figure(&kept.figure) else { continue };
-        let (low, high) = least_and_most(rows.iter().map(|row| row.figures[k]).filter(|x| x.is_finite()));
-        let found = (low <= high).then_some([low, high]);
-        all.push(one(kept.to_string(), found, &|row| (kept.least..=kept.most).contains(&row.figures[k])));
-    }
-    all
 }
 
 /// Spearman's rank correlation of the pairs of numbers; none where one of both is the same in all pairs.
@@ -282,7 +244,7 @@ fn inputs(plan: &VariantPlan) -> Vec<(String, Vec<f64>)> {
             }
         }
     }
-    names.into_iter().filter_map(|name| Some((plan.named(&name), found.remove(&name)?))).collect()
+    names.into_iter().filter_map(|name| found.remove_entry(&name)).collect()
 }
 
 /// Numbers of a cell of `plan.csv`, each with its order if it is a harmonic.

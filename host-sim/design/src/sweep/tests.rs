@@ -95,8 +95,7 @@ fn planned(of: &Tolerances, response: Response, draws: usize) -> VariantPlan {
     let columns = lines[0].iter().map(|(path, _)| path.clone()).collect();
     let variants = lines.into_iter().map(|line| line.into_iter().map(|(_, value)| value).collect()).collect();
     let by = HowComputed::Kernels { torques_n_m: [10.0, 1.0], of: vec![OfOne { kernels: kernels(), response }] };
-    let named = (Vec::new(), by);
-    VariantPlan::new((&of.drive, None), &[GeneratorKind::Cam], (columns, variants), named, MeshLevel::Coarse)
+    VariantPlan::new((&of.drive, None), &[GeneratorKind::Cam], (columns, variants), by, MeshLevel::Coarse)
 }
 
 /// A plan of the data sheets of fields that vary.

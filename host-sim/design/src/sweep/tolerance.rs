@@ -45,8 +45,6 @@ pub struct Tolerances {
 /// One tolerance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FieldTolerance {
-    /// Its name in the results.
-    pub name: String,
     /// The field of the drive, as `--set` takes it.
     pub field: String,
     /// How it acts.
@@ -209,8 +207,7 @@ impl ToleranceActs {
 }
 
 const KEYS: [&str; 5] = ["drive", "generator", "torque_n_m", "temperature_c", "tolerance"];
-const TOLERANCE_KEYS: [&str; 9] =
-    ["name", "field", "order", "errors", "distribution", "mean", "std", "limits", "plus_minus"];
+const TOLERANCE_KEYS: [&str; 8] = ["field", "order", "errors", "distribution", "mean", "std", "limits", "plus_minus"];
 const TWO_LIMITS: &str = "two numbers, the least first, then a larger one";
 const ANY_ORDER: Allowed = from(1.0, 1000.0);
 const POSITIVE: Allowed = above(0.0, 1e9);
@@ -291,10 +288,10 @@ impl Tolerances {
                 }
                 let twice = |a: &FieldTolerance, b: &FieldTolerance| {
                     let are_harmonics = matches!(a.acts, ToleranceActs::Harmonic { .. });
-                    a.name == b.name || (a.field == b.field && (a.acts == b.acts || !are_harmonics))
+                    a.field == b.field && (a.acts == b.acts || !are_harmonics)
                 };
                 if let Some((k, _)) = list.iter().enumerate().find(|(k, b)| list[..*k].iter().any(|a| twice(a, b))) {
-                    let what = format!("found {:?} twice, allowed: once", list[k].name);
+                    let what = format!("found {:?} twice, allowed: once", list[k].field);
                     file.refuse(value.span(), &format!("tolerance[{k}]"), what);
                 }
                 if file.is_sound() {
@@ -326,7 +323,7 @@ fn limit_without_drive(drive: &Drive, list: &[FieldTolerance], k: usize) -> Opti
         }
         let sets = sets(list, &drawn);
         let error = drive.with_sets(sets.iter().map(String::as_str)).err()?;
-        Some(format!("{:?} at its limit {limit} makes no drive: {error}", tolerance.name))
+        Some(format!("{:?} at its limit {limit} makes no drive: {error}", tolerance.field))
     })
 }
 
@@ -445,11 +442,7 @@ fn tolerance(entry: &Spanned<DeValue<'_>>, drive: &Drive) -> Result<FieldToleran
         let key = if mean.is_some() { "mean" } else { "limits" };
         return Err(wrong(key, &format!("{field:?} is {nominal} in the drive, and {what}")));
     }
-    let name = table.given("name", text)?.unwrap_or_else(|| match acts {
-        ToleranceActs::Harmonic { order, .. } => format!("{field}, order {order}"),
-        _ => field.clone(),
-    });
-    Ok(FieldTolerance { name, field, acts, distribution })
+    Ok(FieldTolerance { field, acts, distribution })
 }
 
 /// Share of a distribution that must lie within its limits: below it a quantile has no digits left.
