@@ -63,7 +63,7 @@ enum Outlet {
     /// A line every ten seconds, of what stands here.
     Lines(Arc<Mutex<Stand>>),
     /// Lines for another program: their title, and when the last one was written.
-    Program(String, Option<Instant>),
+    Program(String, Mutex<Option<Instant>>),
 }
 
 impl Progress {
@@ -74,7 +74,7 @@ impl Progress {
             return Progress { shown: Outlet::Nothing, _over: None };
         }
         if std::env::var_os(LINES).is_some() {
-            return Progress { shown: Outlet::Program(title, None), _over: None };
+            return Progress { shown: Outlet::Program(title, Mutex::new(None)), _over: None };
         }
         let (over, wait) = mpsc::channel();
         if !stderr().is_terminal() {
@@ -103,8 +103,8 @@ impl Progress {
     }
 
     /// `done` of `total` parts are done; `note` says what just happened.
-    pub fn set(&mut self, done: usize, total: usize, note: &str) {
-        match &mut self.shown {
+    pub fn set(&self, done: usize, total: usize, note: &str) {
+        match &self.shown {
             Outlet::Nothing => {}
             Outlet::Bar(bar) => {
                 if !SILENT.load(Ordering::Relaxed) {
@@ -119,6 +119,7 @@ impl Progress {
                 note.clone_into(&mut stand.note);
             }
             Outlet::Program(title, last) => {
+                let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
                 if done == total || last.is_none_or(|last| last.elapsed() >= PROGRAM_LINE_EVERY) {
                     *last = Some(Instant::now());
                     // A reader that has gone is no reason to fail.

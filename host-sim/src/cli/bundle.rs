@@ -146,7 +146,7 @@ impl BundleCommand {
                 Err(error) => return Err(Failure::BadInput(format!("--target: {error}"))),
             }
         }
-        let mut progress = context.progress("libraries");
+        let progress = context.progress("libraries");
         for (done, target) in to_build.iter().enumerate() {
             progress.set(done, to_build.len(), target);
             libraries.push(places.build(target).map_err(|error| Failure::Failed(error.to_string()))?);

@@ -100,7 +100,7 @@ impl Diagnose {
         // The data that would separate a cause from the strongest named one are looked for in one log only.
         let asked = explained.first().copied().filter(|_| explained.len() == 1);
         let options = Options { verbose: context.verbose(), asked, without: &without, remake, mesh: self.mesh };
-        let mut progress = context.progress("diagnose");
+        let progress = context.progress("diagnose");
         let done = diagnose_rows(recording, &subject, &options, |done, of, what| progress.set(done, of, what))
             .map_err(failed)?;
         drop(progress);

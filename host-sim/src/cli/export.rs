@@ -221,10 +221,10 @@ impl Export {
             let Some(whole) = &whole else { return Ok(()) };
             write_whole(whole, |out| write_whole_flexspline(out, now.problem, now.state))
         };
-        let mut progress = context.progress(self.model.generator.name());
+        let progress = context.progress(self.model.generator.name());
         let mut lost: Option<OutputError> = None;
         let run = simulate(&drive, &settings, &mut |now| {
-            show(&mut progress, now);
+            show(&progress, now);
             if now.row.is_some()
                 && let Err(error) = write(now)
             {

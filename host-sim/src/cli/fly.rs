@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clap::Args;
@@ -67,12 +66,10 @@ impl Fly {
         if !self.no_report {
             report::before(context, out, "fly", None);
         }
-        let (progress, done) = (Mutex::new(context.progress("fly")), AtomicUsize::new(0));
+        let (progress, done) = (context.progress("fly"), AtomicUsize::new(0));
         let progress_line = || {
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-            if let Ok(mut bar) = progress.lock() {
-                bar.set(done, flown.seconds_of_all(), "seconds of all joints");
-            }
+            progress.set(done, flown.seconds_of_all(), "seconds of all joints");
         };
         let flight =
             flown.fly_told(&progress_line).map_err(|why| Failure::Failed(format!("{}: {why}", self.scenario)))?;

@@ -1,7 +1,6 @@
 //! `flexspline tables --kernels`: response of the output to a deviation of a tooth, of the generator or of an axis.
 
 use std::ops::ControlFlow;
-use std::sync::Mutex;
 
 use serde::Serialize;
 
@@ -42,7 +41,7 @@ struct GeneratorReport {
 pub(super) fn run(context: &Context, kinds: &[GeneratorKind], settings: SolverSettings) -> Result<(), Failure> {
     let drive = context.drive()?;
     let out = context.out()?;
-    let progress = Mutex::new(context.progress("kernels"));
+    let progress = context.progress("kernels");
     let plans: Vec<KernelPlan> = kinds.iter().map(|kind| KernelPlan::for_drive(&drive, *kind)).collect();
     let steps: usize = plans.iter().map(KernelPlan::steps).sum();
     let mut before = 0;
@@ -50,9 +49,7 @@ pub(super) fn run(context: &Context, kinds: &[GeneratorKind], settings: SolverSe
     let mut outputs = Outputs::new();
     for (&kind, plan) in kinds.iter().zip(&plans) {
         let kernels = make(&drive, kind, plan, settings, &|done| {
-            if let Ok(mut bar) = progress.lock() {
-                bar.set(before + done, steps, &kind.to_string());
-            }
+            progress.set(before + done, steps, &kind.to_string());
             ControlFlow::Continue(())
         })
         .map_err(|error| match error {

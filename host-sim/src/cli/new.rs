@@ -305,7 +305,7 @@ impl New {
         }
         let generator = self.generator;
         let torque_n_m = Stated::rated_n_m(sheet, &drive, generator);
-        let mut progress = context.progress("run under load");
+        let progress = context.progress("run under load");
         let mut runs = 0;
         let mut report = |what: &str| {
             progress.set(runs, 0, what);

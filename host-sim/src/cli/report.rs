@@ -3,7 +3,7 @@
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use flexspline::Table;
 use rayon::prelude::*;
@@ -40,17 +40,14 @@ pub(super) fn in_motion(
     shown: &[(GeneratorKind, f64)],
     settings: SolverSettings,
 ) -> Vec<Result<Animation, AnimationError>> {
-    let progress = Mutex::new((context.progress("report"), 0));
+    let (progress, done) = (context.progress("report"), AtomicUsize::new(0));
     let solver = SolverSettings { method: Method::Fast, ..settings };
     shown
         .par_iter()
         .map(|(kind, torque_n_m)| {
             let made = animate(drive, *kind, *torque_n_m, solver, &mut || ControlFlow::Continue(()));
-            if let Ok(mut guard) = progress.lock() {
-                guard.1 += 1;
-                let done = guard.1;
-                guard.0.set(done, shown.len(), &format!("{kind} in motion"));
-            }
+            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            progress.set(done, shown.len(), &format!("{kind} in motion"));
             made
         })
         .collect()

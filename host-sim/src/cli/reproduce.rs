@@ -1,7 +1,5 @@
 //! `flexspline reproduce`: the paper's protocol, and its claims judged.
 
-use std::sync::Mutex;
-
 use clap::Args;
 
 use super::simulate::refused_or_failed;
@@ -43,11 +41,9 @@ impl Reproduce {
         let out = context.out()?;
         report::before(context, out, "reproduce", Some(&drive));
         let mesh = if self.quick { MeshLevel::Coarse } else { self.mesh.unwrap_or(MeshLevel::Standard) };
-        let progress = Mutex::new(context.progress("reproduce"));
+        let progress = context.progress("reproduce");
         let result = reproduce(&drive, mesh, self.quick, &context.command, &|done, total, note| {
-            if let Ok(mut bar) = progress.lock() {
-                bar.set(done, total, note);
-            }
+            progress.set(done, total, note);
         })
         .map_err(refused_or_failed)?;
         drop(progress);

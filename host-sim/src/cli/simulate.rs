@@ -152,14 +152,14 @@ impl Simulate {
         }
 
         let mut frames = if self.frames { Some(Frames::new(&out.join("frames"))?) } else { None };
-        let mut progress = context.progress(settings.generator.name());
+        let progress = context.progress(settings.generator.name());
         let mut lost: Option<OutputError> = None;
         let mut seen = (!self.no_report).then(|| MotionSeen::new(&drive));
         let run = simulate(&drive, &settings, &mut |now| {
             if context.verbose() {
                 progress.line(&line(now));
             }
-            show(&mut progress, now);
+            show(&progress, now);
             if let Some(seen) = &mut seen {
                 seen.add(now);
             }
@@ -312,7 +312,7 @@ pub(super) fn refused_or_failed(error: SimulateError) -> Failure {
 }
 
 /// Moves the progress bar.
-pub(super) fn show(progress: &mut Progress, now: &Observation) {
+pub(super) fn show(progress: &Progress, now: &Observation) {
     progress.set(now.done, now.total, &format!("{}, {} iterations", phase(now.phase), now.iterations));
 }
 

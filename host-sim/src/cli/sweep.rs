@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 
 use clap::{ArgGroup, Args, Subcommand, ValueHint};
 use serde_json::json;
@@ -240,13 +239,9 @@ impl PlanCommand {
             })
         })
         .map_err(failure)?;
-        let progress = Mutex::new(context.progress("plan"));
-        VariantPlan::of_tolerances(&tolerances, settings, &|done, of, what| {
-            if let Ok(mut bar) = progress.lock() {
-                bar.set(done, of, what);
-            }
-        })
-        .map_err(failure)
+        let progress = context.progress("plan");
+        VariantPlan::of_tolerances(&tolerances, settings, &|done, of, what| progress.set(done, of, what))
+            .map_err(failure)
     }
 }
 
@@ -283,15 +278,13 @@ fn opened(context: &Context, folder: &Path) -> Result<VariantPlan, Failure> {
 }
 
 fn computed(context: &Context, plan: &VariantPlan, folder: &Path, shard: Shard) -> Result<Ran, Failure> {
-    let progress = Mutex::new(context.progress("sweep"));
+    let progress = context.progress("sweep");
     run(plan, folder, shard, &|done, of, row| {
-        if let Ok(mut bar) = progress.lock() {
-            let name = format!("variant {} {}", row.variant + 1, row.generator);
-            if context.verbose() {
-                bar.line(&format!("{name} [{}]: {}", plan.variants[row.variant].join(", "), row.status.name()));
-            }
-            bar.set(done, of, &name);
+        let name = format!("variant {} {}", row.variant + 1, row.generator);
+        if context.verbose() {
+            progress.line(&format!("{name} [{}]: {}", plan.variants[row.variant].join(", "), row.status.name()));
         }
+        progress.set(done, of, &name);
     })
     .map_err(failure)
 }
