@@ -279,7 +279,7 @@ fn a_load_beyond_the_last_stable_one_leaves_the_loads_before_it() {
     assert_eq!(names(&desk.path("out")), ["results.csv", "summary.json"]);
 }
 
-/// What converges as well as any other drive, and is not to be built.
+/// A drive that converges as well as any other, and is not to be built.
 #[test]
 #[ignore = "long: tests/run slow"]
 fn teeth_that_interfere_and_stress_that_no_steel_bears_are_said() {

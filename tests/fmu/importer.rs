@@ -234,7 +234,7 @@ impl Drop for Instance<'_> {
 }
 
 impl Instance<'_> {
-    /// What was logged so far.
+    /// Messages so far.
     pub fn log(&self) -> Vec<Line> {
         self.log.lock().unwrap().clone()
     }

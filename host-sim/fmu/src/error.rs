@@ -13,7 +13,7 @@ pub enum FmuError {
     File {
         /// Its name or path, of a text file with the line.
         file: String,
-        /// What is wrong with it.
+        /// The fault.
         what: String,
     },
     /// The table.
@@ -22,7 +22,7 @@ pub enum FmuError {
     /// The resource location names no folder here.
     #[error("resource location: found \"{uri}\"{why}, allowed: file:///folder")]
     Location {
-        /// What was found.
+        /// The value found.
         uri: String,
         /// Why it names none.
         why: &'static str,
@@ -42,7 +42,7 @@ pub enum FmuError {
         name: &'static str,
         /// Its value.
         found: f64,
-        /// What it may be.
+        /// The values allowed.
         allowed: &'static str,
     },
     /// A setting that the core refuses.

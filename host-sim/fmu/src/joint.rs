@@ -51,9 +51,9 @@ variables! {
     GRAVITY_ANGLE => Variable::real("gravity_angle", "rad", 0.0, [-100.0, 100.0],
         "output angle at which the weight pulls forward most");
     FRICTION_KNOWN => Variable::real("friction_known", "1", 0.8, [0.0, 1.0],
-        "share of the motor's friction that the servo is told before");
+        "share of the motor's friction fed forward to the servo");
     LOAD_FED_FORWARD => Variable::real("load_fed_forward", "1", 1.0, [0.0, 1.0],
-        "share of a torque known on the load that the servo is told before");
+        "share of a torque known on the load fed forward to the servo");
     LOAD_MEAN => Variable::real("load_mean", "N.m", 0.0, TORQUE, "mean of the load that is expected");
     LOAD_SWING => Variable::real("load_swing", "N.m", 0.0, TORQUE, "load that is expected: amplitude of a slow swing");
     LOAD_SWING_FREQUENCY => Variable::real("load_swing_frequency", "Hz", 0.0, NOT_NEGATIVE,
@@ -78,7 +78,7 @@ variables! {
     ENCODER_JITTER => Variable::real("encoder_jitter", "s", 5e-6, [0.0, 1e-3],
         "the encoder is read up to so much too late");
     CURRENT_NOISE => Variable::real("current_noise", "N.m", 1e-3, NOT_NEGATIVE,
-        "noise of the torque told from the motor's current, at the motor, rms");
+        "noise of the torque from the motor's current, at the motor, rms");
     SEED => Variable::whole("seed", 1.0, [0.0, 2_147_483_647.0],
         "start of the noises, which are the same in every run");
     MOTOR_ANGLE => Variable::motion("motor_angle", "rad",
@@ -188,10 +188,10 @@ pub struct MovingJoint {
     not_corrected: bool,
 }
 
-/// Why a tick was not corrected, as far as the reading of the torque tells.
+/// Why a tick was not corrected, as far as the reading of the torque shows.
 fn why_not(joint: &OneJoint) -> String {
     let most = joint.on_board_settings().torque.largest_n_m;
-    let reading = joint.on_board().map(|(told, _)| told.reading);
+    let reading = joint.on_board().map(|(input, _)| input.reading);
     match reading {
         Some(TorqueReading::OnLoad(torque) | TorqueReading::InMesh(torque))
             if torque.is_nan() || torque.abs() > most =>

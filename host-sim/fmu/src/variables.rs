@@ -42,7 +42,7 @@ pub enum FmiType {
     Text,
 }
 
-/// What a variable is for.
+/// Role of a variable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FmiRole {
     /// Set before the initialisation ends.
@@ -66,13 +66,13 @@ pub struct Variable {
     pub name: &'static str,
     /// Its type.
     pub kind: FmiType,
-    /// What it is for.
+    /// Its role.
     pub role: FmiRole,
     /// Where it starts, unless the resources say otherwise; integers, choices and yes (1) or no (0) as numbers.
     pub start: f64,
     /// Least and largest value that is taken, for parameters.
     pub range: [f64; 2],
-    /// What it is, with its sign.
+    /// Description, with its sign.
     pub says: &'static str,
 }
 

@@ -1,4 +1,4 @@
-//! Flights of a joint with mass, and what its core was told in every tick as tapes for the emulated target:
+//! Flights of a joint with mass, and the inputs of its core in every tick as tapes for the emulated target:
 //! `tape FOLDER` writes `joint.fxt`, `on_load.tape` and `in_mesh.tape` there, and prints what the core gave.
 
 use std::path::PathBuf;
@@ -23,8 +23,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         lines += &format!("{name}\n");
         for (tick, moment) in scenario.moments().enumerate() {
             joint.tick(&moment);
-            let (told, given) = joint.on_board().ok_or("a joint without the core")?;
-            tape.extend(told.to_bytes());
+            let (input, given) = joint.on_board().ok_or("a joint without the core")?;
+            tape.extend(input.to_bytes());
             hash = hashed(hash, given);
             if tick % LINE_TICKS == LINE_TICKS - 1 {
                 line(&mut lines, tick, given, hash)?;

@@ -63,9 +63,9 @@ const SETTLES: f64 = 10.0;
 /// and servo add. *Guess*.
 const SENSOR_RANGE: [f64; 2] = [3.0, 10.0];
 /// And no less than so many times the range of the table, so that no load in it is refused as a reading, and one beyond
-/// is told as such. *Guess*.
+/// is reported as such. *Guess*.
 const SENSOR_BEYOND_TABLE: f64 = 1.5;
-/// After a change of the target's rate the motor's current tells no torque for so long, s: friction builds up anew.
+/// After a change of the target's rate the motor's current gives no torque for this time, s: friction builds up anew.
 const SETTLES_S: f64 = 0.3;
 /// A command that comes back by more than this has turned, rad: 0.5″.
 const TURNED_RAD: f64 = HOLD_RAD as f64;
@@ -76,9 +76,9 @@ const TURNS_S: f64 = 1.0;
 /// A bound is this many standard deviations: what is heard is not normal where the motor sticks and slips, and 2.5 hold
 /// in 94.6 % of the ticks of the antenna with a cam, whose servo has a phase margin of 16° alone.
 const SURE: f64 = 3.0;
-/// Noise of the torque that the current tells, behind its low-pass, for its bound, N·m.
+/// Noise of the torque from the current, behind its low-pass, for its bound, N·m.
 const CURRENT_SURE_N_M: f64 = 0.5;
-/// Low-pass of the torque told by the motor's current, Hz: the motor's own acceleration is told by two differences of
+/// Low-pass of the torque from the motor's current, Hz: the motor's own acceleration comes from two differences of
 /// the encoder.
 const CURRENT_HZ: f64 = 2.0;
 /// Noise of the samples of a calibrated table, rad: a reading has 1″, and a hundred of them, a tenth of a second at 1
@@ -143,7 +143,7 @@ impl JointUnit {
         Self { built: Gear { lines: Vec::new(), spring, ..self.built }, ..self.clone() }
     }
 
-    /// What a table is sampled from.
+    /// Source of a table's samples.
     fn known(&self, table: TableKnown) -> Gear {
         match table {
             TableKnown::Nominal => self.nominal.clone(),
@@ -156,7 +156,7 @@ impl JointUnit {
     }
 }
 
-/// What one controller's joint did.
+/// Flight of one controller's joint.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Flown {
     /// Output less target, arcsec.
@@ -171,8 +171,8 @@ pub struct Flown {
     pub rows: Vec<[f64; 3]>,
     /// Errors of every tick, arcsec, for a spectrum.
     pub errors: Vec<f32>,
-    /// Share of ticks in which the torque that the current told lay within the bound that was stated with it.
-    pub told: f64,
+    /// Share of ticks in which the torque from the current lay within the bound that was stated with it.
+    pub within_bound: f64,
     /// All bits of all errors.
     pub digest: u64,
 }
@@ -203,7 +203,7 @@ pub struct Flight {
     pub resonances_hz: [f64; 2],
 }
 
-/// What every lane is made of.
+/// Parts that every lane has.
 #[derive(Clone)]
 struct LaneParts {
     scenario: Scenario,
@@ -275,7 +275,7 @@ pub enum FlightError {
     /// The load is further from its target than any joint that is controlled.
     #[error("{controller}: the joint runs away at {time_s:.2} s")]
     RunsAway {
-        /// What commands it, one of [`CONTROLLERS`] or "by_torque".
+        /// Its controller, one of [`CONTROLLERS`] or "by_torque".
         controller: &'static str,
         /// Time since the start, s.
         time_s: f64,
@@ -287,24 +287,24 @@ pub enum FlightError {
 /// # Errors
 /// [`FlightError`].
 pub fn fly(scenario: &Scenario, unit: &JointUnit) -> Result<Flight, FlightError> {
-    fly_told(scenario, unit, None, &|| {})
+    fly_watched(scenario, unit, None, &|| {})
 }
 
-/// Flies a scenario, with the image of a table that was made before, or one made for it; `told` is called by each
+/// Flies a scenario, with the image of a table that was made before, or one made for it; `each_second` is called by each
 /// controller's joint for each second that it flew.
 ///
 /// # Errors
 /// [`FlightError`].
-pub fn fly_told(
+pub fn fly_watched(
     scenario: &Scenario,
     unit: &JointUnit,
     image: Option<Vec<u8>>,
-    told: &(dyn Fn() + Sync),
+    each_second: &(dyn Fn() + Sync),
 ) -> Result<Flight, FlightError> {
     let made = made(scenario, unit, image)?;
     let flawless = LaneParts { unit: unit.flawless(), ..made.clone() };
     let (flown, flawless) = std::thread::scope(|threads| {
-        let start = |made, kind| threads.spawn(move || lane(made, kind, told));
+        let start = |made, kind| threads.spawn(move || lane(made, kind, each_second));
         let flying: Vec<_> = (0..CONTROLLERS.len()).map(|kind| start(&made, kind)).collect();
         let flawless = start(&flawless, 0);
         let landed = |lane: ScopedJoinHandle<'_, _>| lane.join().unwrap_or_else(|panic| resume_unwind(panic));
@@ -364,7 +364,7 @@ fn made(scenario: &Scenario, unit: &JointUnit, image: Option<Vec<u8>>) -> Result
     // At light load the drive is softer: the low-pass has to do for both.
     let soft = TwoMasses { stiffness: self::stiffness(&unit.nominal, 0.1 * scenario.largest_n_m()), ..masses };
     // No loop limits what is known on the load.
-    let known_hz = scenario.told_best_hz(WIDEST_HZ);
+    let known_hz = scenario.best_low_pass_hz(WIDEST_HZ);
     let path = Path { gain: 1.0, bandwidth_hz: 0.0, late_s: 0.0, rate_fed_forward: false };
     let widest = |masses: &TwoMasses| masses.widest_hz(&scenario.servo, &path, DISTANCE, WIDEST_HZ);
     let both = widest(&masses).zip(widest(&soft)).map(|(a, b)| a.min(b));
@@ -421,13 +421,13 @@ fn plant(made: &LaneParts) -> JointPlant {
     JointPlant::new(settings, scenario.temperature_c)
 }
 
-/// What a controller is told in a tick.
+/// Inputs of a controller in a tick.
 struct TickInput {
     generator: GeneratorAngle,
     moment: Moment,
     direction: Direction,
     reading: TorqueReading,
-    /// What only the ideal is told: the torque in the mesh if the load were at rest, N·m.
+    /// For the ideal alone: the torque in the mesh if the load were at rest, N·m.
     mesh_n_m: f64,
 }
 
@@ -561,8 +561,8 @@ impl JointController {
         })
     }
 
-    fn tick(&mut self, made: &LaneParts, told: &TickInput) -> Commanded {
-        let Moment { target_rad, rate_rad_s, acceleration_rad_s2, .. } = told.moment;
+    fn tick(&mut self, made: &LaneParts, input: &TickInput) -> Commanded {
+        let Moment { target_rad, rate_rad_s, acceleration_rad_s2, .. } = input.moment;
         let (ratio, tick_s) = (made.unit.nominal.ratio, made.scenario.servo.tick_s);
         // A correction, and what it does along the way of the target.
         let corrected = |[before, goal, after]: [f64; 3], limiter: &mut CorrectionLimiter| {
@@ -586,32 +586,32 @@ impl JointController {
         match self {
             Self::Uncompensated => corrected([0.0; 3], &mut CorrectionLimiter::default()),
             Self::Fourier(fourier) => {
-                let at = |time: f64| fourier.error(target_rad + rate_rad_s * time, told.direction);
+                let at = |time: f64| fourier.error(target_rad + rate_rad_s * time, input.direction);
                 corrected(times.map(at), &mut fourier.limiter)
             }
             Self::Ideal(ideal) => {
-                let way = if told.direction == Direction::Forward { -1.0 } else { 1.0 };
+                let way = if input.direction == Direction::Forward { -1.0 } else { 1.0 };
                 let at = |time: f64| {
                     let target = target_rad + rate_rad_s * time;
                     let mut error = 0.0;
                     for _ in 0..2 {
-                        error = ideal.gear.error_under_rad((target - error) * ratio, told.mesh_n_m, way);
+                        error = ideal.gear.error_under_rad((target - error) * ratio, input.mesh_n_m, way);
                     }
                     error
                 };
                 corrected(times.map(at), &mut ideal.limiter)
             }
-            Self::Core(core) => core.tick(made, told),
+            Self::Core(core) => core.tick(made, input),
         }
     }
 }
 
 impl Core {
-    fn tick(&mut self, made: &LaneParts, told: &TickInput) -> Commanded {
-        let Moment { rate_rad_s, acceleration_rad_s2, .. } = told.moment;
-        let told = told.on_board(made);
-        let given = self.on_board.tick(&made.images(), &mut self.store, &told);
-        self.last = Some((told, given));
+    fn tick(&mut self, made: &LaneParts, input: &TickInput) -> Commanded {
+        let Moment { rate_rad_s, acceleration_rad_s2, .. } = input.moment;
+        let board = input.on_board(made);
+        let given = self.on_board.tick(&made.images(), &mut self.store, &board);
+        self.last = Some((board, given));
         let OnBoardOutput { out, ahead, .. } = given;
         // Without a table as the ratio has it.
         let [rate, acceleration] = if ahead.rate_rad_s.is_nan() {
@@ -630,13 +630,13 @@ impl Core {
     }
 }
 
-/// What the joint knows of the torque in a tick.
+/// The torque as the joint knows it in a tick.
 struct Sensing {
     noise: NoiseSource,
     before_rad_s: f64,
     friction: Friction,
     even_s: f64,
-    /// Torque on the load and friction beyond what is known, as the motor's current tells them, N·m.
+    /// Torque on the load and friction beyond what is known, from the motor's current, N·m.
     likely_n_m: [f64; 2],
     /// Their variances, and between them what they share, N²·m².
     spread: [f64; 3],
@@ -648,11 +648,11 @@ struct Sensing {
     bound_n_m: f64,
     /// Torque known on the load behind its low-pass, for the servo, N·m; NaN before the first.
     fed_n_m: f64,
-    /// The way in which the motor was told to move last: 1, −1, or 0 before it was.
+    /// The way in which the motor was last commanded: 1, −1, or 0 before it was.
     way: f64,
     /// Whether the target stood in the tick before: 1 or 0.
     stood: f64,
-    /// How far it was told to go that way, rad at the output.
+    /// Distance commanded that way, rad at the output.
     furthest_rad: f64,
 }
 
@@ -719,7 +719,7 @@ impl Sensing {
         let turned = weight * now.rate_rad_s;
         *load = (*load + tick_s * (wanders + turned * turned * TURNS_S)).min(most);
         let pulls_n_m = self.drag_n_m - servo.current_n_m();
-        // The encoder tells which way the motor slides, and whether it does.
+        // The encoder shows which way the motor slides, and whether it does.
         if rate * before > 0.0 && self.even_s >= SETTLES_S {
             self.heard_sliding(made, rate, pulls_n_m + made.masses.motor_kg_m2 * (rate - before) / tick_s);
         } else if rate == 0.0 && before == 0.0 {
@@ -734,14 +734,14 @@ impl Sensing {
         let turning = scenario.load_kg_m2 * now.acceleration_rad_s2.abs();
         let [load, ..] = self.spread;
         let held_back = (likely - self.told_n_m).abs();
-        // What of the friction grows with the load and is not known moves with it, and is told from it by no reversal.
+        // What of the friction grows with the load and is not known moves with it, and no reversal separates the two.
         let [_, by_load] = self.friction.parts(now.rate_rad_s);
         let rubs = (1.0 - scenario.friction_known) * by_load * likely.abs();
         self.bound_n_m = SURE * load.sqrt() + unknown + turning + held_back + rubs + CURRENT_SURE_N_M;
     }
 
     /// A motor that slides at a rate: what pulls at it less the friction, by a Kalman filter. The friction turns over
-    /// where the motor turns back, and the load does not, so that one motion to and fro tells them apart.
+    /// where the motor turns back, and the load does not, so that one motion to and fro separates them.
     fn heard_sliding(&mut self, made: &LaneParts, rate_rad_s: f64, pulls_n_m: f64) {
         let scenario = &made.scenario;
         let way = libm::copysign(1.0, rate_rad_s);
@@ -775,13 +775,13 @@ impl Sensing {
         *shared *= less.sqrt();
     }
 
-    /// What of the load the motor has to hold, N·m at the output: of a torque known on the load, less the drag of the
+    /// Part of the load that the motor has to hold, N·m at the output: of a torque known on the load, less the drag of the
     /// last motion. Its inertia is fed forward as the target's acceleration.
     fn held_n_m(&self, scenario: &Scenario, way: f64) -> f64 {
         if self.fed_n_m.is_finite() { self.fed_n_m - way * scenario.drag_n_m } else { 0.0 }
     }
 
-    /// Friction that the servo is told before, N·m at the output: against the way in which the motor moves, and where
+    /// Friction fed forward to the servo, N·m at the output: against the way in which the motor moves, and where
     /// the target stands, moved last or was corrected to.
     ///
     /// At rest it stays. Taken off there, the integral part would hold the friction instead, and as the target moves on
@@ -813,13 +813,13 @@ impl Sensing {
     }
 }
 
-/// Friction that is known of the motor's side: at the temperature that a sensor on the drive tells.
+/// Friction that is known of the motor's side: at the temperature of a sensor on the drive.
 fn known_friction(scenario: &Scenario, temperature_c: f64) -> Friction {
     let friction = Friction::EROB80_100.times(scenario.friction);
     friction.times(friction.cold(temperature_c))
 }
 
-/// What gravity and wind do to the load, N·m.
+/// Torque of gravity and wind on the load, N·m.
 fn on_load_n_m(scenario: &Scenario, now: &Moment) -> f64 {
     let [weight, most_at] = scenario.load.gravity;
     now.outside_n_m[0] + weight * libm::cos(now.target_rad - most_at)
@@ -862,8 +862,8 @@ impl JointLane {
         let inertia_n_m = scenario.load_kg_m2 * now.acceleration_rad_s2;
         let even_n_m = on_load_n_m(scenario, now) - way * scenario.drag_n_m;
         let mesh_n_m = if even_n_m.abs() > inertia_n_m.abs() { even_n_m - inertia_n_m } else { even_n_m };
-        let told = TickInput { generator, moment: *now, direction: self.direction, reading, mesh_n_m };
-        let commanded = self.controller.tick(made, &told);
+        let input = TickInput { generator, moment: *now, direction: self.direction, reading, mesh_n_m };
+        let commanded = self.controller.tick(made, &input);
         let command_rad = commanded.command.to_rad() / made.unit.nominal.ratio;
         let fed = made.torque == TorqueKnown::OnLoad && scenario.load_fed_forward > 0.0;
         // The load, which moves as the target does, has to be accelerated too.
@@ -887,7 +887,7 @@ impl JointLane {
     }
 }
 
-fn lane(made: &LaneParts, kind: usize, told: &(dyn Fn() + Sync)) -> Result<Flown, FlightError> {
+fn lane(made: &LaneParts, kind: usize, each_second: &(dyn Fn() + Sync)) -> Result<Flown, FlightError> {
     let scenario = &made.scenario;
     let mut lane = JointLane::new(made, kind)?;
     let every = (scenario.seconds() / scenario.servo.tick_s / ROWS).ceil().max(1.0) as usize;
@@ -903,7 +903,7 @@ fn lane(made: &LaneParts, kind: usize, told: &(dyn Fn() + Sync)) -> Result<Flown
         }
         flown.digest = (flown.digest ^ error.to_bits()).wrapping_mul(0x0100_0000_01b3);
         if tick % second == second - 1 {
-            told();
+            each_second();
         }
         let commanded = lane.tick(made, &now);
         if now.time_s >= START_UP_S {
@@ -922,7 +922,7 @@ fn lane(made: &LaneParts, kind: usize, told: &(dyn Fn() + Sync)) -> Result<Flown
             flown.rows.push([now.time_s, error, mesh]);
         }
     }
-    flown.told = f64::from(within) / flown.errors.len().max(1) as f64;
+    flown.within_bound = f64::from(within) / flown.errors.len().max(1) as f64;
     Ok(flown)
 }
 
@@ -949,7 +949,7 @@ fn left_of_a_knock(made: &LaneParts, kind: usize) -> Result<f64, FlightError> {
         let mean = sum / f64::from(left.count().max(1));
         (left.rms() * left.rms() - mean * mean).max(0.0).sqrt()
     };
-    // Until a slow low-pass follows, the motor creeps after the torque that it tells, and sticks and slips: that is no
+    // Until a slow low-pass follows, the motor creeps after the torque that it reports, and sticks and slips: that is no
     // ringing.
     fly(&mut lane, ticks(1.0 + TIME_CONSTANTS / (TAU * made.bandwidth_hz)));
     let mut rates = lane.plant.rate_rad_s;

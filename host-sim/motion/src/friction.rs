@@ -14,9 +14,9 @@ pub struct Friction {
     pub base_n_m: f64,
     /// Coulomb part for each N·m in the mesh.
     pub load_base: f64,
-    /// What sticking adds, N·m.
+    /// Stiction above sliding friction, N·m.
     pub stribeck_n_m: f64,
-    /// What sticking adds for each N·m in the mesh.
+    /// Stiction above sliding friction for each N·m in the mesh.
     pub load_stribeck: f64,
     /// Speed over which sticking ends, rad/s.
     pub stribeck_rad_s: f64,
@@ -61,7 +61,7 @@ impl Friction {
         ..Friction::NONE
     };
 
-    /// So many times as much at every speed and load.
+    /// Factor on the friction at every speed and load.
     pub fn times(&self, share: f64) -> Self {
         Self {
             base_n_m: share * self.base_n_m,
@@ -73,7 +73,7 @@ impl Friction {
         }
     }
 
-    /// What the cold does, as a factor.
+    /// Factor of the cold.
     pub fn cold(&self, temperature_c: f64) -> f64 {
         libm::exp((self.reference_c - temperature_c) / self.cold_k)
     }

@@ -109,7 +109,7 @@ pub enum Spring {
     Sampled(Box<SampledSpring>),
 }
 
-/// What a spring does at a twist.
+/// Torque and stiffness of a spring at a twist.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sprung {
     /// Energy stored, J.
@@ -289,7 +289,7 @@ pub struct Gear {
     pub spring: Spring,
 }
 
-/// What a drive does at a generator and an output angle.
+/// Torques of a drive at a generator and an output angle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Meshed {
     /// Energy stored, J.
@@ -416,7 +416,7 @@ impl Gear {
         }
     }
 
-    /// What it does at a generator angle over the ratio, and an output angle.
+    /// Its torques at a generator angle over the ratio, and an output angle.
     pub fn at(&self, motor_rad: f64, output_rad: f64) -> Meshed {
         let generator_rad = motor_rad * self.ratio;
         let error = self.error(generator_rad, output_rad);

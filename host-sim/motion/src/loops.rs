@@ -11,7 +11,7 @@
 //! ```
 //! The mesh carries what the load's inertia asks for, the compensation turns the motor by torque/K to make up for the
 //! wind-up, and that asks the inertia for more: above `√(K/J_l)` the mesh torque is in phase with the motor's own
-//! swing. Whatever is told by a torque *on* the load instead (wind, gravity, a model) has no such loop.
+//! swing. Whatever comes from a torque *on* the load instead (wind, gravity, a model) has no such loop.
 
 use core::f64::consts::{PI, TAU};
 

@@ -1,5 +1,5 @@
-//! What firmware does in a tick of a joint, from reading to command: the torque's path, rate and acceleration ahead,
-//! the joint. And a flight as a tape of what firmware was told, so that it can be flown again where nothing else runs.
+//! A tick of a joint in firmware, from reading to command: the torque's path, rate and acceleration ahead,
+//! the joint. And a flight as a tape of the inputs of firmware, so that it can be flown again where nothing else runs.
 //! `no_std`: the firmware of `tests/firmware` is made of this file.
 
 use flexspline::{
@@ -12,7 +12,7 @@ use flexspline::{
 pub struct OnBoardSettings {
     /// Limits of the correction.
     pub limits: Limits,
-    /// What a reading of the torque goes through.
+    /// Path of a torque reading.
     pub torque: TorqueSettings,
     /// Torque on the load that is expected at the beginning, N·m.
     pub expected_n_m: f32,
@@ -22,7 +22,7 @@ pub struct OnBoardSettings {
     pub temperature_c: f32,
 }
 
-/// What a tick is told.
+/// Inputs of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OnBoardInput {
     /// Generator as measured.
@@ -35,12 +35,12 @@ pub struct OnBoardInput {
     pub direction: Direction,
     /// Torque as it was read.
     pub reading: TorqueReading,
-    /// What the load's inertia asks for on the way of the target, N·m: inertia times its acceleration. A torque in the
+    /// Torque for the load's inertia along the target, N·m: inertia times its acceleration. A torque in the
     /// mesh has it in it.
     pub inertia_n_m: f32,
 }
 
-/// What a tick gives.
+/// Outputs of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OnBoardOutput {
     /// Of the joint.
@@ -56,7 +56,7 @@ pub struct OnBoardOutput {
 pub struct OnBoard {
     /// Its settings.
     pub joint: Joint,
-    /// What changes.
+    /// State.
     pub state: JointState,
     /// The torque's way in.
     pub path: TorquePath,
@@ -82,16 +82,16 @@ impl OnBoard {
 
     /// One tick.
     #[must_use]
-    pub fn tick(&mut self, images: &Images<'_>, store: &mut Store, told: &OnBoardInput) -> OnBoardOutput {
-        let torque_n_m = self.torque_n_m(told);
-        let mut ahead = self.joint.motion_ahead(store, told.target, told.motion, torque_n_m, self.ahead_s);
-        let [rate, acceleration] = told.motion;
+    pub fn tick(&mut self, images: &Images<'_>, store: &mut Store, input: &OnBoardInput) -> OnBoardOutput {
+        let torque_n_m = self.torque_n_m(input);
+        let mut ahead = self.joint.motion_ahead(store, input.target, input.motion, torque_n_m, self.ahead_s);
+        let [rate, acceleration] = input.motion;
         if !passes_slowly(self.joint.drive(), rate, self.tick_s) {
             ahead.acceleration_rad_s2 = ahead.rate_rad_s / rate * acceleration;
         }
         let input = Input {
-            generator: Some(told.generator),
-            target: told.target,
+            generator: Some(input.generator),
+            target: input.target,
             torque_n_m,
             missed_ticks: 0,
             adjustment: Adjustment::default(),
@@ -101,10 +101,10 @@ impl OnBoard {
 
     /// The torque that a table is asked with. A torque on the load has the load's inertia taken off, unless that is the
     /// larger of both: while a target speeds up the flank does not change, as the play is not crossed by then.
-    fn torque_n_m(&mut self, told: &OnBoardInput) -> f32 {
-        let torque_n_m = self.path.tick(told.reading, told.direction);
-        match told.reading {
-            TorqueReading::OnLoad(_) if torque_n_m.abs() > told.inertia_n_m.abs() => torque_n_m - told.inertia_n_m,
+    fn torque_n_m(&mut self, input: &OnBoardInput) -> f32 {
+        let torque_n_m = self.path.tick(input.reading, input.direction);
+        match input.reading {
+            TorqueReading::OnLoad(_) if torque_n_m.abs() > input.inertia_n_m.abs() => torque_n_m - input.inertia_n_m,
             _ => torque_n_m,
         }
     }
@@ -120,7 +120,7 @@ pub fn passes_slowly(drive: &Drive, rate_rad_s: f32, tick_s: f32) -> bool {
     pitches * tick_s * TICKS <= 1.0
 }
 
-/// Bytes of the settings, and of what a tick is told, on a tape.
+/// Bytes of the settings, and of a tick's inputs, on a tape.
 pub const SETTINGS_BYTES: usize = 4 * 15;
 /// See there.
 pub const TOLD_BYTES: usize = 8 + 8 + 4 * 4 + 4;

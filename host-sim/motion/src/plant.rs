@@ -19,7 +19,7 @@ use super::servo::{Servo, ServoCommand, ServoSettings};
 pub const PARTS: usize = 2;
 /// Most repetitions in a step; four are usual.
 const REPETITIONS: usize = 40;
-/// After so many the spring is no longer taken along: where flanks touch and part in one step the plain repetition ends
+/// Repetitions after which the spring is no longer taken along: where flanks touch and part in one step the plain repetition ends
 /// surely.
 const TAKEN_ALONG: usize = 8;
 /// Two speeds are the same if they differ by no more than this part of themselves, and this much, rad/s.
@@ -27,7 +27,7 @@ const SAME: [f64; 2] = [1e-11, 1e-16];
 /// Over shorter ways than this the slope at the middle is exact to rounding, rad.
 const SHORT_RAD: f64 = 1e-9;
 
-/// What the plant is made of; all at the output.
+/// Parameters of the plant; all at the output.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlantSettings {
     /// Motor and generator times the square of the ratio, kg·m².
@@ -61,7 +61,7 @@ pub struct Energy {
 /// A plant in motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointPlant {
-    /// What it is made of.
+    /// Its parameters.
     pub settings: PlantSettings,
     /// Angles, rad.
     pub angle_rad: [f64; PARTS],
@@ -131,7 +131,7 @@ impl JointPlant {
         self.meshed.torque_n_m
     }
 
-    /// What the drive does now.
+    /// Torques of the drive now.
     pub fn meshed(&self) -> &Meshed {
         &self.meshed
     }

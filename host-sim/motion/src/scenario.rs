@@ -1,4 +1,4 @@
-//! What a joint is asked to do, what does it, and what is known of it.
+//! Task of a joint, its parts, and the knowledge of them.
 
 use core::f64::consts::TAU;
 
@@ -10,7 +10,7 @@ use super::servo::ServoSettings;
 /// Torques on the load from outside, N·m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Load {
-    /// What is always there.
+    /// Constant part, N·m.
     pub bias_n_m: f64,
     /// A slow swing: amplitude, and Hz.
     pub swing: [f64; 2],
@@ -36,13 +36,13 @@ pub enum TorqueKnown {
     Not,
 }
 
-/// What the table of the joint knows of the unit.
+/// Knowledge of the unit in the table of the joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TableKnown {
     /// The drive as designed.
     #[default]
     Nominal,
-    /// The drive as designed, and the lines of the unit as a diagnosis tells them: 5 % too small (guess).
+    /// The drive as designed, and the lines of the unit as a diagnosis finds them: 5 % too small (guess).
     Extended,
     /// The unit, sampled at rest with noise.
     Calibrated,
@@ -57,7 +57,7 @@ pub struct Scenario {
     pub legs: Vec<Leg>,
     /// Acceleration between legs, rad/s².
     pub acceleration_rad_s2: f64,
-    /// What pulls at the load.
+    /// Torque on the load.
     pub load: Load,
     /// Inertia of the load, kg·m².
     pub load_kg_m2: f64,
@@ -67,22 +67,22 @@ pub struct Scenario {
     pub damping: f64,
     /// Temperature of the drive at the beginning, °C.
     pub temperature_c: f64,
-    /// What its lubricant warms by, K/s: the friction on the motor's side goes with it.
+    /// Warming of its lubricant, K/s: the friction on the motor's side goes with it.
     pub warming_k_s: f64,
     /// The servo.
     pub servo: ServoSettings,
     /// Times the friction of eRob80 that there is on the motor's side; 0 for none.
     pub friction: f64,
-    /// Share of the friction on the motor's side that the servo is told before, by the sign of the target's rate.
+    /// Share of the friction on the motor's side fed forward to the servo, by the sign of the target's rate.
     pub friction_known: f64,
-    /// Share of a torque known on the load that the servo is told before: what weight and wind will ask of the motor.
-    /// No other torque is told to it, as that would close a loop.
+    /// Share of a torque known on the load fed forward to the servo: what weight and wind will ask of the motor.
+    /// No other torque is fed forward, as that would close a loop.
     pub load_fed_forward: f64,
     /// From what the torque is known.
     pub torque: TorqueKnown,
     /// Noise of the torque, N·m rms.
     pub torque_noise_n_m: f64,
-    /// What the table knows.
+    /// Knowledge of the table.
     pub table: TableKnown,
     /// Start of the numbers that look random.
     pub seed: u32,
@@ -90,7 +90,7 @@ pub struct Scenario {
 
 /// Slowest low-pass of a torque known on the load, Hz (guess).
 const LEAST_HZ: f64 = 1.0;
-/// What is asked for at one tick.
+/// Target at one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Moment {
     /// Time, s.
@@ -129,14 +129,14 @@ impl Scenario {
             + self.load_kg_m2 * self.acceleration_rad_s2
     }
 
-    /// Corner of the low-pass with which a torque known on the load is told best, Hz: between what is late behind it
+    /// Corner of the low-pass with which a torque known on the load is best fed forward, Hz: between what is late behind it
     /// and the noise that passes it.
     ///
     /// Gusts, and steps for which chance is taken, wander: their mean square change in a tick against the noise gives
     /// the gain of a stationary Kalman filter (R. E. Kalman, "A new approach to linear filtering and prediction
     /// problems", J. Basic Eng. 82, 1960). What swings changes evenly: there the corner is where the lag is as large as
     /// the noise. 1 Hz at least, as weather changes, and `widest_hz` at most.
-    pub fn told_best_hz(&self, widest_hz: f64) -> f64 {
+    pub fn best_low_pass_hz(&self, widest_hz: f64) -> f64 {
         let Load { swing, gust, step, gravity, .. } = self.load;
         let tick_s = self.servo.tick_s;
         let noise = self.torque_noise_n_m;
@@ -173,7 +173,7 @@ impl Scenario {
         self.load.bias_n_m
     }
 
-    /// What is asked for at every tick.
+    /// Target at every tick.
     pub fn moments(&self) -> Moments<'_> {
         Moments {
             scenario: self,

@@ -7,7 +7,7 @@ use flexspline::GeneratorAngle;
 
 use crate::noise::NoiseSource;
 
-/// What a servo is made of; bandwidths of a rigid motor alone.
+/// Parameters of a servo; bandwidths of a rigid motor alone.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ServoSettings {
     /// Time from tick to tick, s.
@@ -30,11 +30,11 @@ pub struct ServoSettings {
     pub encoder_bits: u32,
     /// The encoder is read up to so much too late, evenly spread, s.
     pub jitter_s: f64,
-    /// Noise of the torque told from the motor's current, N·m at the motor, rms.
+    /// Noise of the torque from the motor's current, N·m at the motor, rms.
     pub current_noise_n_m: f64,
 }
 
-/// What the servo is asked for in a tick.
+/// Target of the servo in a tick.
 #[derive(Clone, Copy, Debug)]
 pub struct ServoCommand {
     /// Where the generator shall be.
@@ -53,7 +53,7 @@ pub struct ServoCommand {
 /// A motor with its servo and its encoder.
 #[derive(Clone, Debug)]
 pub struct Servo {
-    /// What it is made of.
+    /// Its parameters.
     pub settings: ServoSettings,
     pub(crate) ratio: f64,
     pub(crate) noise: NoiseSource,
@@ -79,7 +79,7 @@ impl Servo {
         }
     }
 
-    /// What the encoder shows where the motor is, rad at the output.
+    /// Reading of the encoder, rad at the output.
     pub fn encoder(&self, angle_rad: f64) -> GeneratorAngle {
         let bits = self.settings.encoder_bits;
         let steps = f64::from(1u32 << bits);
@@ -95,7 +95,7 @@ impl Servo {
         self.shown
     }
 
-    /// Motor torque times ratio as its current tells it, N·m at the output, of the tick before.
+    /// Motor torque times ratio from its current, N·m at the output, of the tick before.
     pub fn current_n_m(&mut self) -> f64 {
         self.ratio * (self.torque_n_m + self.settings.current_noise_n_m * self.noise.normal())
     }

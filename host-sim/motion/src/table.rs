@@ -33,7 +33,7 @@ const FOUND_PLACES: i32 = 8009;
 /// Smaller lines than this are rounding of the table, rad: 0.002″.
 const SMALLEST_LINE_RAD: f64 = 1e-8;
 
-/// What is sampled.
+/// The sampled drive.
 #[derive(Clone, Copy, Debug)]
 pub struct Sampling {
     /// Largest torque on the load, N·m.
@@ -129,7 +129,7 @@ pub fn gear_of(table: &Table<'_>, temperature_c: f64, drag_n_m: f64) -> Option<G
     Some(gear)
 }
 
-/// Lines of an error over so many turns of the output that all orders are whole.
+/// Lines of an error over as many turns of the output as make all orders whole.
 fn lines(table: &Table<'_>, error: impl Fn(f64) -> f64) -> Vec<GearLine> {
     let drive = table.drive();
     let ratio = drive.exact_ratio();

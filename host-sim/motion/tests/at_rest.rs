@@ -8,7 +8,7 @@ use flexspline_motion::gear::SampledSpring;
 use flexspline_motion::scenario::{Load, Scenario, TorqueKnown};
 use flexspline_motion::servo::ServoSettings;
 
-/// With a wind-up that begins with so many arcsec for each N·m.
+/// With a wind-up that begins with this compliance, arcsec for each N·m.
 fn unit(arcsec_n_m: f64) -> JointUnit {
     let law = |_: f64, flank: f64| (30.0 + arcsec_n_m * flank / (1.0 + 0.01 * flank)) / ARCSEC_PER_RAD;
     JointUnit::of_spring(

@@ -16,12 +16,12 @@ fn show(what: &str, flight: &Flight) {
     );
     for (name, flown) in CONTROLLERS.iter().zip(&flight.flown) {
         println!(
-            "  {name:20} {:8.2}\" rms {:8.2}\" max {:9.1} \"/s ripple, limits {:?}, told {:.3}",
+            "  {name:20} {:8.2}\" rms {:8.2}\" max {:9.1} \"/s ripple, limits {:?}, within bound {:.3}",
             flown.error.rms(),
             flown.error.largest(),
             flown.ripple.rms(),
             flown.limits,
-            flown.told
+            flown.within_bound
         );
     }
 }
@@ -47,7 +47,7 @@ fn the_core_removes_what_a_quasi_static_inverse_removes() {
         left.push((none - core) / (none - ideal));
         if torque == TorqueKnown::Current {
             // The bound that is stated with the torque.
-            assert!(flight.flown[COMPENSATED].told > 0.95, "{}", flight.flown[COMPENSATED].told);
+            assert!(flight.flown[COMPENSATED].within_bound > 0.95, "{}", flight.flown[COMPENSATED].within_bound);
         }
     }
     println!("removed of what the ideal removes, torque on load, in mesh, by current, unknown: {left:.3?}");

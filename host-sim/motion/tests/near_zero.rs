@@ -31,7 +31,7 @@ fn rms(scenario: &Scenario, unit: &JointUnit, kind: usize) -> f64 {
 /// Drag and load differ by no more than this: the load floats in the play while it moves one way, N·m.
 const FLOATS_N_M: f64 = 0.06;
 
-/// What is left is the servo's, as it crosses the play at the reversals: the ideal has it too. A load that is as large
+/// The residual is the servo's, as it crosses the play at the reversals: the ideal has it too. A load that is as large
 /// as the drag floats from flank to flank, and there nothing knows where it is. In the short form each share of a drag
 /// stands for one of the drags; `FLEXSPLINE_LONG` flies all of them with all.
 #[test]
@@ -66,7 +66,7 @@ fn about_zero_load_the_core_is_never_worse_than_no_compensation_and_near_the_ide
                      {core:.2} core, {ideal:.2} ideal"
                 );
                 println!("{what}");
-                // A noise far above the drag tells no flank either, and the motor's current knows it by friction.
+                // A noise far above the drag shows no flank either, and the motor's current knows it by friction.
                 let unknown = (load_n_m.abs() - drag_n_m).abs() <= FLOATS_N_M
                     || noise_n_m > 2.0 * drag_n_m
                     || torque == TorqueKnown::Current;
@@ -83,7 +83,7 @@ fn about_zero_load_the_core_is_never_worse_than_no_compensation_and_near_the_ide
             }
         }
     }
-    // 2.1 where a load beyond the drag never leaves its flank: what is left are 1.9", the servo's, which is told no
+    // 2.1 where a load beyond the drag never leaves its flank: what is left are 1.9", the servo's, which is given no
     // torque in the mesh.
     println!("{flights} flights; most of none and of the ideal: {worst:#?}");
     assert!(worst[0].0 < 1.0 && worst[1].0 < 2.2, "{worst:?}");

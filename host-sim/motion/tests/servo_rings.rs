@@ -53,8 +53,8 @@ fn plant(joint: &TwoMasses) -> JointPlant {
     plant
 }
 
-/// What the motor is told: nothing, or the torque of the mesh through the compensation.
-fn told(path: Option<&LoopTorquePath>, filtered: &mut f64, plant: &JointPlant) -> f64 {
+/// Torque given to the motor: none, or the torque of the mesh through the compensation.
+fn fed_back(path: Option<&LoopTorquePath>, filtered: &mut f64, plant: &JointPlant) -> f64 {
     let Some(path) = path else { return 0.0 };
     let share = 1.0 - libm::exp(-TAU * path.bandwidth_hz * TICK_S);
     *filtered += share * (plant.mesh_n_m() - *filtered);
@@ -83,7 +83,7 @@ fn knocked(
         let mut most = 0.0_f64;
         for _ in 0..100 {
             servo.read(plant.angle_rad[0], plant.rate_rad_s[0]);
-            let correction = told(path, &mut filtered, &plant) * RATIO;
+            let correction = fed_back(path, &mut filtered, &plant) * RATIO;
             let fed = path.is_some_and(|path| path.rate_fed_forward);
             let asked = ServoCommand {
                 command: GeneratorAngle::from_rad(correction).unwrap(),

@@ -22,7 +22,7 @@ pub enum PythonFailure {
 }
 
 impl PythonFailure {
-    /// What is wrong with the input.
+    /// The fault of the input.
     pub fn bad(what: impl Display) -> PythonFailure {
         PythonFailure::BadInput(what.to_string())
     }

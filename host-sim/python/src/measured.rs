@@ -57,7 +57,7 @@ fn column_map((columns, rate_hz, torque_constant): &Reading) -> Result<ColumnMap
     map.at_rate(*rate_hz).map_err(PythonFailure::bad)
 }
 
-/// What is known of the drive before.
+/// The drive as it is known before.
 #[derive(FromPyObject)]
 pub enum KnownFrom {
     #[pyo3(transparent)]
@@ -152,7 +152,7 @@ fn calibration_failure(error: &CalibrationError, logs: &[LogFrom]) -> PythonFail
     }
 }
 
-/// What a diagnosis gives: text of the JSON, drive-extended.toml, extended table, why a cause was named or not,
+/// Results of a diagnosis: text of the JSON, drive-extended.toml, extended table, why a cause was named or not,
 /// columns.
 type Diagnosed<'py> = (String, Option<String>, Option<Parts<'py>>, Option<(String, String)>, Bound<'py, PyDict>);
 

@@ -30,7 +30,7 @@ pub struct RunWatch {
     told: Arc<Mutex<Option<(usize, usize, String)>>>,
 }
 
-/// What unwinds from work that can stop in no other way.
+/// Payload that unwinds from work that can stop in no other way.
 struct Stopped;
 
 impl RunWatch {

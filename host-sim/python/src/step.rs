@@ -185,7 +185,7 @@ impl Table {
         PyBytes::new(py, self.0.borrow_owner())
     }
 
-    /// What stands in the header: for `flexspline.Table`.
+    /// The header, for `flexspline.Table`.
     fn header<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let table = self.table();
         let drive = table.drive();

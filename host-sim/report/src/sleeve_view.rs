@@ -143,6 +143,6 @@ fn load_across_face(problem: &Problem, state: &State) -> Vec<f64> {
     });
     let most = loads.max_by(|a, b| a.0.total_cmp(&b.0));
     let along = most.map_or_else(Vec::new, |(_, along)| along.into_iter().map(rounded).collect::<Vec<_>>());
-    // The face is told from where the flexspline is held: of a cup that is its bottom, at the far end of the axis.
+    // The face follows from where the flexspline is held: of a cup that is its bottom, at the far end of the axis.
     if problem.drive.sleeve.has_flange() { along } else { along.into_iter().rev().collect() }
 }

@@ -44,7 +44,7 @@ const LARGEST_REQUEST: usize = 256 << 10;
 const MOST_RECEIVING: usize = 2;
 /// How long a connection may be open with nothing passing: longer than a page waits for a change.
 const LONGEST_IDLE: Duration = Duration::from_secs(40);
-/// How long a page waits for a change, until it is told that there was none.
+/// How long a page waits for a change, until it is answered that there was none.
 const LONGEST_WAIT: Duration = Duration::from_secs(20);
 
 /// The page, its style and its modules.
@@ -169,7 +169,7 @@ async fn module(Path(name): Path<String>) -> Answer {
     }
 }
 
-/// What a page begins with.
+/// Head of a page.
 #[derive(Serialize)]
 struct Begin {
     version: &'static str,
@@ -277,7 +277,7 @@ async fn receive(shared: Arc<Shared>, receiving: Arc<Semaphore>, name: String, r
     .await
 }
 
-/// What a query says of a name; nothing of one that is there alone.
+/// Value of a name in a query; none of a name alone.
 fn value<'q>(query: Option<&'q str>, name: &str) -> Option<&'q str> {
     let mut parts = query?.split('&').map(|part| part.split_once('=').unwrap_or((part, "")));
     parts.find_map(|(of, value)| (of == name).then_some(value))
@@ -313,7 +313,7 @@ fn sent(folder: &Folder, name: &str, head: Option<u64>, download: bool, page: bo
     answer
 }
 
-/// A listener with so many connections at a time.
+/// A listener with a limit on connections at a time.
 pub(crate) struct FewConnections {
     listener: TcpListener,
     open: Arc<Semaphore>,

@@ -24,7 +24,7 @@ pub enum ReadError {
     /// No such file.
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// What is wrong with it.
+    /// The fault.
     #[error(transparent)]
     Drive(#[from] DriveError),
 }
@@ -58,9 +58,9 @@ pub struct DriveShown {
     pub rated_torque_n_m: Option<f64>,
     /// Its fields.
     pub fields: Vec<ListedField>,
-    /// What is wrong with it; nothing of a drive that is whole.
+    /// Its faults; none of a drive that is whole.
     pub problems: Vec<RefusedField>,
-    /// What to know of a drive that is whole.
+    /// Cautions on a drive that is whole.
     pub cautions: Vec<String>,
     /// Its drawing; none of a drive that is not whole.
     pub drawing: Option<Drawing>,
@@ -156,7 +156,7 @@ pub fn show(folder: &Folder, asked: &DriveAsked, kind: GeneratorKind, gaps: bool
     })
 }
 
-/// What is wrong with one field; of a whole drive that does not fit, all of it.
+/// Fault of one field; of a whole drive that does not fit, all of it.
 fn words(error: &DriveError, path: &str) -> String {
     let of = |p: &flexspline_mechanics::drive::Problem| {
         if p.field.is_empty() || p.field == path { p.what.clone() } else { format!("{}: {}", p.field, p.what) }

@@ -214,7 +214,7 @@ impl Folder {
         Err(FolderError::Full)
     }
 
-    /// What is in the folder: its files and those of the folders in it, by name. Hidden ones, links and names that are
+    /// Contents of the folder: its files and those of the folders in it, by name. Hidden ones, links and names that are
     /// no plain words are left out.
     pub fn entries(&self) -> Vec<FolderEntry> {
         let mut found = Vec::new();

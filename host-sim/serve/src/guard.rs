@@ -16,15 +16,15 @@ use axum::http::{Method, Response, StatusCode};
 /// Bytes of a token: 128 bits, which nobody guesses.
 const TOKEN_BYTES: usize = 16;
 
-/// What a page of this server may load and ask: itself, and pictures that it made.
+/// Policy for a page of this server: it may load and ask for itself, and pictures that it made.
 pub const PAGE_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; \
                                connect-src 'self'; frame-src 'self'; base-uri 'none'; form-action 'none'; \
                                frame-ancestors 'none'";
-/// What a page of a result may: run its own scripts in an origin that is nobody's, and ask for nothing.
+/// Policy for the page of a result: run its own scripts in an origin that is nobody's, and ask for nothing.
 pub const RESULT_POLICY: &str = "sandbox allow-scripts allow-downloads allow-modals; default-src 'none'; script-src \
                                  'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; frame-ancestors \
                                  'self'";
-/// What any other file may: nothing.
+/// Policy for any other file: nothing.
 pub(crate) const FILE_POLICY: &str = "sandbox; default-src 'none'";
 
 /// The token of one run, and where the server listens.
@@ -146,7 +146,7 @@ pub fn refusal(refusal: NoEntry) -> Response<Body> {
     answer
 }
 
-/// Puts on an answer what every answer has: nothing is kept, guessed, framed or told to others.
+/// Puts on an answer what every answer has: nothing is kept, guessed, framed or passed to others.
 pub(crate) fn harden(headers: &mut HeaderMap) {
     let every = [
         (header::CACHE_CONTROL, "no-store"),
@@ -170,7 +170,7 @@ mod tests {
         Guard { token: "0123456789abcdef0123456789abcdef".to_owned(), port: 4000 }
     }
 
-    /// What is asked, by whom, and what becomes of it.
+    /// Request, origin, and answer.
     type Case<'a> = (&'a Method, &'a [(&'a str, &'a str)], Result<(), NoEntry>);
 
     /// Headers, those of one name beside one another.

@@ -1,7 +1,7 @@
 //! Jobs: commands that wait, run one at a time, and are over.
 //!
 //! A job is a process of this very program with the words that its page shows, in the folder of the bench. So what it
-//! writes is what the command writes, it ends when it is told to, and nothing in a file that it reads can take the
+//! writes is what the command writes, it ends when it is asked to, and nothing in a file that it reads can take the
 //! server with it.
 //!
 //! There are two lines: short work, for which somebody waits with the page open, two processes at a time where there
@@ -35,7 +35,7 @@ const MOST_KEPT: usize = 500;
 /// Short jobs over that keep their folders (a guess); of older ones, which were looks and single pitches, they are
 /// cleared away.
 const SHORT_KEPT: usize = 100;
-/// Short jobs at a time, where there are so many cores: the first answer and the better one, of which each keeps one
+/// Short jobs at a time, where there are as many cores: the first answer and the better one, of which each keeps one
 /// core busy (measured of a pitch of HHD-95, coarse and standard: 0.5 s and 1.5 s, as much of processor).
 const SHORT_AT_A_TIME: usize = 2;
 /// How often a running process is looked at.
@@ -92,7 +92,7 @@ pub struct Jobs {
     changes: watch::Sender<u64>,
 }
 
-/// What a page sees of all jobs.
+/// List of all jobs for a page.
 #[derive(Debug, Serialize)]
 pub struct JobsSeen {
     /// Counts changes.
@@ -153,7 +153,7 @@ impl Jobs {
         self.changes.subscribe()
     }
 
-    /// What there is.
+    /// The jobs.
     pub fn seen(&self) -> JobsSeen {
         let revision = *self.changes.borrow();
         JobsSeen { revision, jobs: self.lock().jobs.values().rev().cloned().collect() }

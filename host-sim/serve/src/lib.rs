@@ -67,7 +67,7 @@ pub struct Server {
     shared: Arc<Shared>,
 }
 
-/// What answers are made of.
+/// State behind the answers.
 struct Shared {
     folder: Arc<Folder>,
     guard: Guard,

@@ -1,4 +1,4 @@
-//! What a page may ask for: one command of `flexspline` each, whose words are made here.
+//! Requests of a page: one command of `flexspline` each, whose words are made here.
 //!
 //! A page sends numbers and names; the words of the command line are put together from them, each option and its value
 //! as one word (`--set=generator.w0_mm=0.5`), with no shell. A value so cannot become an option, nor one word two.
@@ -36,7 +36,7 @@ pub enum WorkError {
         what: &'static str,
         /// It.
         found: String,
-        /// What it may be.
+        /// The values allowed.
         allowed: String,
     },
 }
@@ -72,7 +72,7 @@ pub struct ColumnReading {
     pub torque_constant: Option<f64>,
 }
 
-/// What is known of a unit before it is measured: one of them.
+/// Knowledge of a unit before it is measured: one of them.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct KnownOfUnit {
@@ -91,7 +91,7 @@ pub struct KnownOfUnit {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "work", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum WorkAsked {
-    /// What is in log files.
+    /// Contents of log files.
     Look {
         /// The logs.
         files: Vec<String>,
@@ -102,18 +102,18 @@ pub enum WorkAsked {
         files: Vec<String>,
         /// How they are read.
         reading: ColumnReading,
-        /// What is known of the unit.
+        /// Knowledge of the unit.
         known: KnownOfUnit,
         /// The generator that the table is marked with.
         generator: GeneratorKind,
     },
-    /// What a log says that the simulation does not, and why.
+    /// Difference of a log from the simulation, and its causes.
     Diagnose {
         /// The log.
         file: String,
         /// How it is read.
         reading: ColumnReading,
-        /// What is known of the unit: a model or tables.
+        /// Knowledge of the unit: a model or tables.
         known: KnownOfUnit,
         /// The generator of the tables.
         generator: GeneratorKind,
@@ -121,7 +121,7 @@ pub enum WorkAsked {
         #[serde(default)]
         without: Vec<String>,
     },
-    /// What a table leaves of a log.
+    /// Residual of a log with a table.
     Replay {
         /// The log.
         file: String,
@@ -141,7 +141,7 @@ pub enum WorkAsked {
         /// How fine.
         mesh: MeshLevel,
     },
-    /// What a catalogue would print: backlash, K1 to K3, stresses.
+    /// Figures of a catalogue: backlash, K1 to K3, stresses.
     Sheet {
         /// The drive.
         drive: DriveAsked,
@@ -192,12 +192,12 @@ pub enum WorkAsked {
     New {
         /// The file, which is not there yet.
         file: String,
-        /// What it is of.
+        /// Its subject.
         of: NewOf,
     },
 }
 
-/// What a new drive is made of.
+/// Inputs of a new drive.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum NewOf {
@@ -220,7 +220,7 @@ pub enum NewOf {
 /// A command, ready to run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Words {
-    /// What follows the name of the program.
+    /// Arguments of the program.
     pub arguments: Vec<String>,
     /// The file in the job's folder that takes what the command prints, if it is to be kept.
     pub printed_to: Option<&'static str>,

@@ -69,7 +69,7 @@ pub(super) struct Calibrate {
     no_report: bool,
 }
 
-/// What the bench can do, for --plan and --more.
+/// Abilities of the bench, for --plan and --more.
 #[derive(Debug, Args)]
 struct BenchOptions {
     /// Time on the bench for --plan or --more, minutes [default: 60, with --more 10]

@@ -72,7 +72,7 @@ impl Fly {
             progress.set(done, flown.seconds_of_all(), "seconds of all joints");
         };
         let flight =
-            flown.fly_told(&progress_line).map_err(|why| Failure::Failed(format!("{}: {why}", self.scenario)))?;
+            flown.fly_watched(&progress_line).map_err(|why| Failure::Failed(format!("{}: {why}", self.scenario)))?;
         drop(progress);
         let results = results(&flown, &flight).ok_or_else(|| Failure::Failed("a controller is missing".to_owned()))?;
         let mut outputs = Outputs::new();

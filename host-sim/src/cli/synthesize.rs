@@ -127,7 +127,7 @@ pub(super) struct Synthesize {
     seed: Option<u64>,
 }
 
-/// What the prediction of the drive comes from.
+/// Source of the drive's prediction.
 #[derive(Debug, Serialize)]
 struct NominalSource {
     kind: &'static str,
@@ -403,7 +403,7 @@ impl Listed {
     }
 }
 
-/// What a parameter is if it is not given.
+/// Default of a parameter.
 fn usual(parameter: &Parameter) -> String {
     match parameter.usual {
         Usual::Value(value) => match parameter.words.get(value as usize) {

@@ -1,4 +1,4 @@
-//! What the core says of tables and of hostile images, for `tests/c99/driver.c` to find again with the reader in C.
+//! Answers of the core for tables and hostile images, for `tests/c99/driver.c` to find again with the reader in C.
 //!
 //! ```sh
 //! c99 OUT TICKS IMAGES TABLE.fxt...

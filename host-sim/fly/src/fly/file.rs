@@ -61,7 +61,7 @@ fn fields(flown: &mut Flown) -> Vec<Field<'_>> {
     let field = |path, what, to| Field { path, what, to };
     let n = |path, what, to, low, high| Field { path, what, to: To::Number(to, from(low, high)) };
     let accelerates = &mut scenario.acceleration_rad_s2;
-    let (told, known) = (&mut scenario.load_fed_forward, &mut scenario.friction_known);
+    let (fed, known) = (&mut scenario.load_fed_forward, &mut scenario.friction_known);
     let pulls = "weight times arm, N·m, and the output angle where it pulls forward most, rad";
     let [speed, position, integral] = PACES_HZ;
     let corner = "corner of the integral of the speed loop, Hz";
@@ -77,8 +77,8 @@ fn fields(flown: &mut Flown) -> Vec<Field<'_>> {
         n("temperature_c", "temperature at the beginning, °C", &mut scenario.temperature_c, COLDEST_C, WARMEST_C),
         n("warming_k_s", "warming of the lubricant, K/s", &mut scenario.warming_k_s, -1.0, 1.0),
         n("friction", "friction on the motor's side, times that of an eRob80", &mut scenario.friction, 0.0, 10.0),
-        n("friction_known", "share of that friction that the servo is told before", known, 0.0, 1.0),
-        n("load_fed_forward", "share of a torque known on the load that the servo is told before", told, 0.0, 1.0),
+        n("friction_known", "share of that friction fed forward to the servo", known, 0.0, 1.0),
+        n("load_fed_forward", "share of a torque known on the load fed forward to the servo", fed, 0.0, 1.0),
         field("torque", "from what the torque is known in flight", To::Torque(&mut scenario.torque)),
         n("torque_noise_n_m", "noise of that torque, N·m rms", &mut scenario.torque_noise_n_m, 0.0, 10.0),
         field("table", "what the table knows of the unit", To::Table(&mut scenario.table)),
@@ -266,7 +266,7 @@ mod tests {
         let changed = example("camera", built_in("rover").unwrap());
         let mut rover = built_in("rover").unwrap();
         assert_eq!(read("own.toml", &changed).unwrap(), rover);
-        // No field but those listed: a scenario all of whose fields differ is told apart by its file.
+        // No field but those listed: a scenario all of whose fields differ is recognised by its file.
         for Field { path, to, .. } in fields(&mut rover) {
             let before = example("rover", built_in("rover").unwrap());
             match to {

@@ -1,7 +1,7 @@
 //! Flights of a joint with mass: scenarios with a name or from a file, on units built from the contact FEM of the four
 //! generators.
 //!
-//! What moves is in `flexspline-motion`; here scenarios are read, units made, and results put into numbers.
+//! The moving parts are in `flexspline-motion`; here scenarios are read, units made, and results put into numbers.
 
 mod built_in;
 mod error;
@@ -9,7 +9,7 @@ mod file;
 mod own;
 mod results;
 
-use flexspline_motion::flight::{Flight, JOINTS, JointUnit, fly_told};
+use flexspline_motion::flight::{Flight, JOINTS, JointUnit, fly_watched};
 use flexspline_motion::gear::SampledSpring;
 use flexspline_motion::scenario::{Scenario, TableKnown};
 
@@ -28,7 +28,7 @@ pub use results::{ByController, LEAST_DISTANCE, LEAST_PHASE_MARGIN_DEG, Results,
 pub struct Flown {
     /// Which generator the drive has.
     pub kind: GeneratorKind,
-    /// What is flown.
+    /// The scenario.
     pub scenario: Scenario,
     /// The drive of a table that is flown in the place of HHD-95.
     pub own: Option<OwnDrive>,
@@ -64,7 +64,7 @@ impl Flown {
     /// # Errors
     /// [`FlyError::Load`], [`FlyError::Flight`].
     pub fn fly(&self) -> Result<Flight, FlyError> {
-        self.fly_told(&|| {})
+        self.fly_watched(&|| {})
     }
 
     /// Seconds that all its joints fly, together.
@@ -73,19 +73,19 @@ impl Flown {
         JOINTS * self.scenario.seconds() as usize
     }
 
-    /// Flies it; `told` is called for each second that one of its joints flew.
+    /// Flies it; `each_second` is called for each second that one of its joints flew.
     ///
     /// # Errors
     /// [`FlyError::Load`], [`FlyError::Flight`].
-    pub fn fly_told(&self, told: &(dyn Fn() + Sync)) -> Result<Flight, FlyError> {
+    pub fn fly_watched(&self, each_second: &(dyn Fn() + Sync)) -> Result<Flight, FlyError> {
         self.carries()?;
         let (scenario, known) = (&self.scenario, self.scenario.table);
         let Some(own) = &self.own else {
-            return Ok(fly_told(scenario, &unit(self.kind, scenario.temperature_c)?, None, told)?);
+            return Ok(fly_watched(scenario, &unit(self.kind, scenario.temperature_c)?, None, each_second)?);
         };
         // What else it may know is sampled from the unit.
         let image = (known == TableKnown::Nominal).then(|| own.image.clone());
-        Ok(fly_told(scenario, &own.unit, image, told)?)
+        Ok(fly_watched(scenario, &own.unit, image, each_second)?)
     }
 
     /// The drive of the table with these bytes in the place of HHD-95.

@@ -64,7 +64,7 @@ pub fn gear_at(table: &Table<'_>, temperature_c: f64) -> Result<Gear, OwnTableEr
     gear_of(table, temperature_c, TABLE_DRAG_N_M).ok_or(OwnTableError::NoGear)
 }
 
-/// What a table has for a flight at one temperature.
+/// Drive of a table at one temperature, for a flight.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OwnDrive {
     /// The bytes of the table.

@@ -36,7 +36,7 @@ pub struct ByController<T> {
     pub ideal: T,
 }
 
-/// What `flexspline fly` gives.
+/// Results of `flexspline fly`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Results {
     /// Name of the scenario.
@@ -79,11 +79,11 @@ pub struct Results {
     pub servo_distance: f64,
     /// Resonances with motor held and free, Hz.
     pub resonances_hz: [f64; 2],
-    /// What speaks against the flight, in sentences; empty of a sound one.
+    /// Objections to the flight, in sentences; empty if it is sound.
     pub remarks: Vec<String>,
     /// Ticks in which the motor gave all it has, the limiter held back, nothing was corrected, with the core.
     pub limited_ticks: [u32; 3],
-    /// Share of ticks in which the torque told by the motor's current lay within its bound; none where another is used.
+    /// Share of ticks in which the torque from the motor's current lay within its bound; none where another is used.
     pub torque_within_bound: Option<f64>,
     /// All bits of all errors of all controllers.
     pub digest: String,
@@ -130,7 +130,7 @@ impl Results {
         is_sound(self.servo_distance, self.phase_margin_deg[0])
     }
 
-    /// What speaks against the flight, in sentences; `way_out` says with which paces the servo is sound.
+    /// Objections to the flight, in sentences; `way_out` says with which paces the servo is sound.
     fn against(&self, way_out: &str) -> Vec<String> {
         let servo_is_stable = self.servo_distance > 0.0;
         let [margin, at_hz] = self.phase_margin_deg;
@@ -169,7 +169,7 @@ fn is_sound(distance: f64, phase_margin_deg: f64) -> bool {
 /// A point of a curve.
 pub type Row = [f64; 2];
 
-/// Where an ideal leaves more than this of the error, no share of what it removes is told. *Guess*.
+/// Where an ideal leaves more than this of the error, no share of what it removes is given. *Guess*.
 const IDEAL_REMOVES: f64 = 0.98;
 
 fn by_controller<T>(flight: &Flight, value: impl Fn(&Flown) -> T) -> Option<ByController<T>> {
@@ -216,7 +216,7 @@ pub fn results(flown: &super::Flown, flight: &Flight) -> Option<Results> {
         resonances_hz: flight.resonances_hz,
         remarks: Vec::new(),
         limited_ticks: core.limits,
-        torque_within_bound: current.then_some(core.told),
+        torque_within_bound: current.then_some(core.within_bound),
         digest: format!("{digest:016x}"),
     };
     let way_out = if results.servo_is_sound() { String::new() } else { way_out(flight, scenario) };

@@ -101,7 +101,7 @@ impl OneJoint {
         self.made.unit.nominal.ratio
     }
 
-    /// What was put in less what became heat and what is stored, J since the start: 0 but for rounding.
+    /// Energy put in less heat and energy stored, J since the start: 0 but for rounding.
     pub fn missing_j(&self) -> f64 {
         let energy = self.plant().energy;
         energy.motor + energy.outside - energy.heat - (self.plant().stored_j() - self.started_j)

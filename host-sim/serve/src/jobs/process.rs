@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use super::record::JobProgress;
 use flexspline_base::progress;
 
-/// How long a process has to clear up when it is told to end.
+/// How long a process has to clear up when it is asked to end.
 const GRACE: Duration = Duration::from_millis(500);
 /// Bytes of what a process prints that are kept: a guess; what `look` prints of fifty columns has 50 kB.
 const MOST_PRINTED: u64 = 8 << 20;
@@ -22,7 +22,7 @@ const LONGEST_LINE: u64 = 4000;
 /// How long the threads that read a process that has ended have to come to its end.
 const DRAIN: Duration = Duration::from_millis(500);
 
-/// What a process says on stderr.
+/// A line of a process on stderr.
 #[derive(Debug, Default)]
 struct Talk {
     progress: Option<JobProgress>,
@@ -36,9 +36,9 @@ pub struct ProcessEnd {
     pub code: Option<i32>,
     /// Whether it was cancelled.
     pub cancelled: bool,
-    /// What it said beside its results.
+    /// Its messages.
     pub said: Vec<String>,
-    /// What it printed.
+    /// Its output.
     pub printed: Vec<u8>,
     /// How long it ran, ms.
     pub wall_ms: u64,
@@ -102,7 +102,7 @@ impl Running {
     pub fn cancel(&mut self) {
         if self.told_to_end.is_none() {
             self.told_to_end = Some(Instant::now());
-            tell(&mut self.child, false);
+            signal(&mut self.child, false);
         }
     }
 
@@ -116,17 +116,17 @@ impl Running {
             }
             thread::sleep(Duration::from_millis(10));
         }
-        tell(&mut self.child, true);
+        signal(&mut self.child, true);
         let _ = self.child.wait();
     }
 
-    /// How it ended, if it has; one that was told to end and does not is ended.
+    /// How it ended, if it has; one that was asked to end and does not is ended.
     pub fn ended(&mut self) -> Option<ProcessEnd> {
         let status = match self.child.try_wait() {
             Ok(Some(status)) => status.code(),
             Ok(None) => {
                 if self.told_to_end.is_some_and(|at| at.elapsed() > GRACE) {
-                    tell(&mut self.child, true);
+                    signal(&mut self.child, true);
                 }
                 return None;
             }
@@ -149,7 +149,7 @@ impl Running {
 
 /// Tells a process that was not waited for yet, and so still has its number, to end, with all that it has started.
 #[cfg(unix)]
-fn tell(child: &mut Child, at_once: bool) {
+fn signal(child: &mut Child, at_once: bool) {
     use rustix::process::{Pid, Signal, kill_process_group};
     let signal = if at_once { Signal::KILL } else { Signal::TERM };
     let group = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
@@ -159,7 +159,7 @@ fn tell(child: &mut Child, at_once: bool) {
 }
 
 #[cfg(not(unix))]
-fn tell(child: &mut Child, _at_once: bool) {
+fn signal(child: &mut Child, _at_once: bool) {
     let _ = child.kill();
 }
 

@@ -1,4 +1,4 @@
-//! What is known of a job: a file in its folder, `job.json`.
+//! Record of a job: a file in its folder, `job.json`.
 
 use std::fs;
 use std::path::Path;
@@ -43,9 +43,9 @@ pub enum JobStatus {
 pub struct JobProgress {
     /// Parts done.
     pub done: u64,
-    /// Of so many.
+    /// Steps in all.
     pub of: u64,
-    /// What it is at.
+    /// Steps done.
     pub note: String,
 }
 
@@ -56,11 +56,11 @@ pub struct JobRecord {
     pub id: u64,
     /// The command.
     pub work: String,
-    /// What the page asked for.
+    /// Request of the page.
     pub asked: Value,
     /// The command for a terminal in the folder, which makes the same files.
     pub command: String,
-    /// What follows the name of the program.
+    /// Arguments of the program.
     pub arguments: Vec<String>,
     /// The file that takes what it prints.
     #[serde(default)]
@@ -77,13 +77,13 @@ pub struct JobRecord {
     pub ended_s: Option<u64>,
     /// How long its process ran, ms.
     pub wall_ms: Option<u64>,
-    /// What its process ended with; none if it was ended.
+    /// Exit code of its process; none if it was ended.
     pub exit_code: Option<i32>,
     /// How far its process says that it is.
     pub progress: Option<JobProgress>,
-    /// What it said beside its results.
+    /// Its messages.
     pub said: Vec<String>,
-    /// What it printed, where that goes to no file.
+    /// Its output, where that goes to no file.
     #[serde(default)]
     pub printed: String,
     /// Its process.

@@ -8,7 +8,7 @@ use std::time::Instant;
 use super::*;
 
 /// `look` prints and says something; `tables` says how far it is, makes an unfinished file, and clears it away when it
-/// is told to end; `validate` takes no notice of that.
+/// is asked to end; `validate` takes no notice of that.
 const PROGRAM: &str = r#"#!/bin/sh
 case "$1" in
 look) echo '{"rows": 3}'; echo 'note: three rows' >&2 ;;

@@ -44,7 +44,7 @@ type Bounds = [Option<f64>; 2];
 
 /// Any number.
 const ANY: Bounds = [None, None];
-/// What a conversion loses by rounding, arc-minutes.
+/// Rounding of a conversion, arc-minutes.
 const ROUNDED: Bounds = [Some(-0.5), Some(0.5)];
 
 const fn at_least(bound: f64) -> Bounds {
@@ -120,7 +120,7 @@ pub struct Claim {
     pub place: &'static str,
     /// The claim.
     pub says: &'static str,
-    /// What our numbers measure.
+    /// Definition of our numbers.
     pub metric: &'static str,
     #[serde(skip)]
     numbers: for<'a> fn(Evidence<'a>) -> Evidence<'a>,

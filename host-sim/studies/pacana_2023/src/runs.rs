@@ -86,7 +86,7 @@ pub struct PaperRun {
     pub generator: GeneratorKind,
     /// Load, N·m.
     pub torque_n_m: f64,
-    /// What is changed.
+    /// The change.
     pub variant: &'static str,
     /// `converged`, or why not.
     pub status: String,
