@@ -53,7 +53,8 @@ impl Facts {
             every: if values.is_empty() {
                 0
             } else {
-                (column.values.len() as f64 / values.len() as f64).round() as usize
+                // Cells that are words hold something, though no number.
+                (column.values.len() as f64 / (values.len() + column.words.count) as f64).round() as usize
             },
             anew: begins_anew(&column.values, &turns().collect::<Vec<_>>(), whole, None),
         }

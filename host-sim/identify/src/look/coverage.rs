@@ -4,8 +4,7 @@ use std::f64::consts::TAU;
 
 use serde::Serialize;
 
-use super::{Guess, Role};
-use crate::measurement::{Unit, least_and_most, quantile_of, sampled};
+use crate::measurement::{Quantity, Rows, least_and_most, quantile_of, sampled};
 
 /// Parts of a turn of the output that are counted.
 const PARTS: usize = 36;
@@ -31,25 +30,34 @@ pub struct Coverage {
     pub speed_rpm: Option<[f64; 2]>,
 }
 
-/// What the rows go through, if a generator angle is known.
-pub(super) fn of(guesses: &[Guess], ratio: Option<f64>, starts: &[usize]) -> Option<Coverage> {
-    let used = |role: Role| guesses.iter().find(|guess| guess.used && guess.role == role);
-    let generator = used(Role::Generator)?;
-    let generator: Vec<f64> =
-        generator.values.iter().map(|value| value * generator.rad().unwrap_or(f64::NAN)).collect();
-    let output: Vec<f64> = match (used(Role::Output).and_then(|guess| guess.rad().zip(Some(guess))), ratio) {
-        (Some((rad, guess)), _) => guess.values.iter().map(|value| rad * value).collect(),
-        (None, Some(ratio)) => generator.iter().map(|angle| angle / ratio).collect(),
-        // The ratio of an error alone is not known; one turn of the output is that of the generator at most.
-        (None, None) => generator.iter().map(|_| f64::NAN).collect(),
+/// What the rows go through, if they have a generator angle.
+pub(super) fn of(read: &[Rows]) -> Option<Coverage> {
+    let column = |quantity: Quantity| -> Vec<f64> {
+        read.iter().filter_map(|rows| rows.log.get(quantity)).flatten().copied().collect()
     };
+    let (generator, output) = (column(Quantity::Generator), column(Quantity::Output));
+    if generator.is_empty() {
+        return None;
+    }
     let range = |values: &[f64]| least_and_most(values.iter().copied().filter(|value| value.is_finite()));
     let turns = |values: &[f64]| ((range(values).1 - range(values).0) / TAU).max(0.0);
-    let moved: Vec<(usize, f64)> = (1..generator.len())
-        .filter(|row| !starts.contains(row))
-        .map(|row| (row, generator[row] - generator[row - 1]))
-        .filter(|(_, step)| step.is_finite())
-        .collect();
+    let mut moved: Vec<(usize, f64)> = Vec::new();
+    let mut speeds = Vec::new();
+    let mut before = 0;
+    for rows in read {
+        let (Some(generator), time) = (rows.log.get(Quantity::Generator), rows.log.get(Quantity::Time)) else {
+            continue;
+        };
+        for row in (1..generator.len()).filter(|row| rows.log.continues(*row)) {
+            let step = generator[row] - generator[row - 1];
+            moved.push((before + row, step));
+            let passed = time.map_or(0.0, |time| time[row] - time[row - 1]);
+            if passed > 0.0 {
+                speeds.push(step.abs() / passed * 60.0 / TAU);
+            }
+        }
+        before += generator.len();
+    }
     // What stands moves by less than a hundredth of what moves usually.
     let mut steps: Vec<f64> = sampled(&moved.iter().map(|(_, step)| step.abs()).collect::<Vec<_>>());
     let still = 0.01 * quantile_of(&mut steps, 0.9);
@@ -58,38 +66,25 @@ pub(super) fn of(guesses: &[Guess], ratio: Option<f64>, starts: &[usize]) -> Opt
     for (row, step) in &moved {
         let way = usize::from(*step < -still) + 2 * usize::from(step.abs() <= still);
         directions[way] += 1.0 / moved.len() as f64;
-        if output[*row].is_finite() && way < 2 {
-            let part = ((output[*row] / TAU).rem_euclid(1.0) * PARTS as f64) as usize % PARTS;
+        if let Some(output) = output.get(*row).filter(|_| way < 2) {
+            let part = ((output / TAU).rem_euclid(1.0) * PARTS as f64) as usize % PARTS;
             if way == 0 { forward[part] += 1 } else { backward[part] += 1 }
         }
     }
-    let limits = |role: Role| {
-        let guess = guesses.iter().find(|guess| guess.used && (guess.role == role))?;
-        let unit = guess.unit?;
-        let sign = if guess.negative { -1.0 } else { 1.0 };
-        let read = |value: f64| sign * value * unit.factor() + unit.zero();
-        let ends = [read(guess.facts.least), read(guess.facts.most)];
-        Some([ends[0].min(ends[1]), ends[0].max(ends[1])])
+    let limits = |quantity: Quantity| {
+        let values = column(quantity);
+        (!values.is_empty()).then(|| range(&values)).map(|(least, most)| [least, most])
     };
-    let speed_rpm = used(Role::Time).and_then(|time| {
-        let factor = time.unit.map_or(1.0, Unit::factor);
-        let mut speeds: Vec<f64> = moved
-            .iter()
-            .map(|(row, step)| (step.abs(), factor * (time.values[*row] - time.values[row - 1])))
-            .filter(|(_, time)| *time > 0.0)
-            .map(|(step, time)| step / time * 60.0 / TAU)
-            .collect();
-        speeds = sampled(&speeds);
-        (!speeds.is_empty()).then(|| [quantile_of(&mut speeds, 0.5), quantile_of(&mut speeds, 0.99)])
-    });
+    speeds = sampled(&speeds);
+    let speed_rpm = (!speeds.is_empty()).then(|| [quantile_of(&mut speeds, 0.5), quantile_of(&mut speeds, 0.99)]);
     Some(Coverage {
         generator_turns: turns(&generator),
         output_turns: turns(&output),
         rows_forward: forward,
         rows_backward: backward,
         directions,
-        torque_n_m: limits(Role::Torque),
-        temperature_c: limits(Role::Temperature),
+        torque_n_m: limits(Quantity::Torque),
+        temperature_c: limits(Quantity::Temperature),
         speed_rpm,
     })
 }

@@ -18,8 +18,7 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use crate::measurement::raw::RawFile;
-use crate::measurement::stamps;
-use crate::measurement::{Family, SESSION_GAP_PERIODS, Unit, median_of, sampled};
+use crate::measurement::{APART, Column as Mapped, Quantity, Reading, Rows, Unit, median_of, sampled};
 use column::{Facts, unwrapped};
 pub(crate) use coverage::Coverage;
 use pair::pair;
@@ -60,16 +59,16 @@ pub enum Role {
 }
 
 impl Role {
-    /// Its name in a mapping, if it has a place there.
-    fn in_mapping(self) -> Option<&'static str> {
+    /// Its place in a mapping, if it has one.
+    fn in_mapping(self) -> Option<Quantity> {
         match self {
-            Role::Time => Some("time"),
-            Role::Generator => Some("generator"),
-            Role::Output => Some("output"),
-            Role::Error => Some("error"),
-            Role::Torque | Role::Current => Some("torque"),
-            Role::Temperature => Some("temperature"),
-            Role::Orientation => Some("orientation"),
+            Role::Time => Some(Quantity::Time),
+            Role::Generator => Some(Quantity::Generator),
+            Role::Output => Some(Quantity::Output),
+            Role::Error => Some(Quantity::Error),
+            Role::Torque | Role::Current => Some(Quantity::Torque),
+            Role::Temperature => Some(Quantity::Temperature),
+            Role::Orientation => Some(Quantity::Orientation),
             Role::Speed | Role::Command | Role::Unknown => None,
         }
     }
@@ -223,6 +222,30 @@ impl Guess {
         joints.is_empty() || self.said.joint.is_none_or(|joint| joints.contains(&joint))
     }
 
+    /// The column of the reader by the mapping, if it is in use.
+    fn mapped(&self, place: usize, names: &[String]) -> Option<Mapped> {
+        let quantity = self.role.in_mapping().filter(|_| self.used)?;
+        let reading = Reading::parse(&self.written()?, quantity.family(), None).ok()?;
+        Some(Mapped { quantity, name: names[place].clone(), place, unit: reading.plain_unit(), reading })
+    }
+
+    /// What is said of it.
+    fn column(self, name: &str) -> Column {
+        Column {
+            name: name.to_owned(),
+            role: self.role,
+            unit: self.written(),
+            confidence: self.confidence,
+            least: self.facts.least,
+            most: self.facts.most,
+            step: self.facts.step,
+            missing: self.values.len() - self.facts.finite,
+            counts_per_turn: self.counts,
+            used: self.used,
+            why: self.why,
+        }
+    }
+
     /// The unit as a mapping takes it.
     fn written(&self) -> Option<String> {
         let unit = self.unit?;
@@ -235,33 +258,39 @@ impl Guess {
     }
 }
 
-/// Looks at files of one bench, read as they stand.
+/// Looks at files of one bench.
 ///
 /// # Errors
 /// The files do not have the same columns.
 pub fn look(files: &[RawFile]) -> Result<Looked, String> {
     let Some(first) = files.first() else { return Err("no file".to_owned()) };
-    let names: Vec<&str> = first.columns.iter().map(|column| column.name.as_str()).collect();
+    let layout = &first.sheet.layout;
     for other in &files[1..] {
-        let theirs: Vec<&str> = other.columns.iter().map(|column| column.name.as_str()).collect();
-        if theirs != names {
+        let theirs = &other.sheet.layout.names;
+        if *theirs != layout.names {
             return Err(format!(
                 "{} has the columns {}, but {} has {}; allowed: logs of one form together",
                 other.file,
                 theirs.join(", "),
                 first.file,
-                names.join(", ")
+                layout.names.join(", ")
             ));
         }
     }
-    let mut notes = reading_notes(files);
-    let of_file: Arc<[f64]> = files.iter().enumerate().flat_map(|(k, file)| vec![k as f64; file.rows]).collect();
-    let mut guesses: Vec<Guess> = (0..first.columns.len()).map(|place| guess(files, place, &of_file)).collect();
-    time(&mut guesses, files);
-    in_order(&mut guesses, files, &mut notes);
+    let of_file = |file: &RawFile, note: String| if files.len() > 1 { format!("{}: {note}", file.file) } else { note };
+    let mut notes: Vec<String> = Vec::new();
+    for file in files {
+        let said = file.sheet.notes.iter().chain(&file.columns.notes).cloned();
+        notes.extend(said.map(|note| of_file(file, note)));
+    }
+    let rows: Arc<[f64]> =
+        files.iter().enumerate().flat_map(|(k, file)| vec![k as f64; file.columns.lines.len()]).collect();
+    let mut guesses: Vec<Guess> = (0..layout.names.len()).map(|place| guess(files, place, &rows)).collect();
+    time(&mut guesses, first.columns.lines.len());
     units_of_counts(&mut guesses);
-    let names: Vec<String> = (0..guesses.len()).map(|place| name_in_mapping(first, place)).collect();
+    let names: Vec<String> = (0..guesses.len()).map(|place| name_in_mapping(&layout.names, place)).collect();
     let (ratio, rivals) = pair(&mut guesses, &names, &mut notes);
+    notes.extend(apart(&guesses).filter(|_| ratio.is_none()));
     settle(&mut guesses, &mut notes);
     let proposed = ratio.map(proposed_ratio);
     let error = error_rad(&guesses, proposed);
@@ -271,113 +300,50 @@ pub fn look(files: &[RawFile]) -> Result<Looked, String> {
             "ratios are whole numbers but for wheels with an odd number of teeth: {half} is nearest to these rows"
         ));
     }
-    let (kind, period_s, starts) = clock(&guesses, files);
-    let columns_option =
-        option(&guesses, &names, &mut notes).filter(|columns| is_accepted(files, &guesses, columns, &mut notes));
-    let coverage = coverage::of(&guesses, ratio, &starts);
-    let columns = guesses
-        .into_iter()
-        .zip(&first.columns)
-        .map(|(guess, raw)| Column {
-            name: raw.name.clone(),
-            role: guess.role,
-            unit: guess.written(),
-            confidence: guess.confidence,
-            least: guess.facts.least,
-            most: guess.facts.most,
-            step: guess.facts.step,
-            missing: guess.values.len() - guess.facts.finite,
-            counts_per_turn: guess.counts,
-            used: guess.used,
-            why: guess.why,
-        })
-        .collect();
+    let mut columns_option = option(&guesses, &names, &mut notes);
+    // From here on the rows are those that `calibrate` and `diagnose` have by this mapping.
+    let columns: Vec<Mapped> = guesses.iter().enumerate().filter_map(|(k, guess)| guess.mapped(k, &names)).collect();
+    let mut read = Vec::new();
+    for file in files {
+        let (mut rows, refused) = Rows::of_raw(file, &columns, ratio);
+        notes.extend(rows.notes.drain(..).map(|note| of_file(file, note)));
+        read.push(rows);
+        // A cell in use that is no number, or a row of another width, is for people to mend.
+        if let Some(refused) = refused {
+            let then = columns_option.as_ref().map_or(String::new(), |columns| format!("; then --columns {columns}"));
+            notes.push(format!("{refused}: mend it or take it out{then}"));
+            columns_option = None;
+        }
+    }
+    let (time, period_s) = clock(&read);
     Ok(Looked {
         files: files.iter().map(|file| file.file.clone()).collect(),
-        rows: files.iter().map(|file| file.rows).sum(),
-        odd_rows: files.iter().map(|file| file.odd_rows).sum(),
-        separator: first.separator.name(),
-        decimal_comma: first.decimal_comma,
-        header_line: first.has_names.then_some(first.header_line),
-        columns,
+        rows: rows.len(),
+        odd_rows: files.iter().map(|file| file.columns.short.len() + file.columns.wide.len()).sum(),
+        separator: layout.separator.name(),
+        decimal_comma: layout.decimal_comma,
+        header_line: layout.has_names.then_some(layout.header_line),
         rivals,
         ratio_found: ratio,
         ratio_proposed: proposed,
-        sessions: starts.len(),
-        time: kind,
+        sessions: read.iter().map(Rows::sessions).sum(),
+        time,
         period_s,
-        coverage,
+        coverage: coverage::of(&read),
         columns_option,
+        columns: guesses.into_iter().zip(&layout.names).map(|(guess, name)| guess.column(name)).collect(),
         notes,
     })
 }
 
-/// What the reader says of the files, each sentence once; of several files with the name of the file.
-fn reading_notes(files: &[RawFile]) -> Vec<String> {
-    let named =
-        |file: &RawFile, note: &String| if files.len() > 1 { format!("{}: {note}", file.file) } else { note.clone() };
-    files.iter().flat_map(|file| file.notes.iter().map(move |note| named(file, note))).collect()
-}
-
-/// Rows in the order of their time, file by file.
-fn in_order(guesses: &mut [Guess], files: &[RawFile], notes: &mut Vec<String>) {
-    let Some(time) = guesses.iter().find(|guess| guess.used && guess.role == Role::Time) else { return };
-    let mut order: Vec<usize> = Vec::with_capacity(time.values.len());
-    let mut begins = 0;
-    let before = notes.len();
-    for file in files {
-        let rows = begins..begins + file.rows;
-        match stamps::order(&time.values[rows.clone()]) {
-            Some((sorted, note)) => {
-                order.extend(sorted.iter().map(|row| begins + row));
-                notes.push(note);
-            }
-            None => order.extend(rows),
-        }
-        begins += file.rows;
-    }
-    // A row without a time has no place among sorted rows.
-    if notes.len() > before && order.len() == begins {
-        for guess in guesses {
-            guess.values = order.iter().map(|row| guess.values[*row]).collect();
-        }
-    }
-}
-
-/// Whether the reader takes the files by this mapping: a cell in use that is no number, or a row of another width, is
-/// for people to mend.
-fn is_accepted(files: &[RawFile], guesses: &[Guess], columns: &str, notes: &mut Vec<String>) -> bool {
-    let mut refused = Vec::new();
-    for file in files {
-        for (guess, raw) in guesses.iter().zip(&file.columns).filter(|(guess, _)| guess.used) {
-            let times = raw.cells.first_time.as_ref().filter(|_| guess.role != Role::Time);
-            if let Some(cell) = raw.cells.first_word.iter().chain(times).min_by_key(|cell| cell.line) {
-                let others = (raw.cells.words + times.map_or(0, |_| raw.cells.times)).saturating_sub(1);
-                refused.push(format!(
-                    "{}:{}: {}: found \"{}\"{}, which is no number",
-                    file.file,
-                    cell.line,
-                    raw.name,
-                    cell.text,
-                    if others == 0 { String::new() } else { format!(" ({others} more in this column)") }
-                ));
-            }
-        }
-        refused.extend(file.refused.iter().map(|row| format!("{}:{}: {}", file.file, row.line, row.text)));
-    }
-    for what in &refused {
-        notes.push(format!("{what}: mend it or take it out; then --columns {columns}"));
-    }
-    refused.is_empty()
-}
-
 /// What a column says by its name and by its numbers alone.
 fn guess(files: &[RawFile], place: usize, of_file: &Arc<[f64]>) -> Guess {
-    let raw = &files[0].columns[place];
-    let mut cells = raw.cells.clone();
-    files[1..].iter().for_each(|file| cells.values.extend_from_slice(&file.columns[place].cells.values));
+    let layout = &files[0].sheet.layout;
+    let (name, unit) = (&layout.names[place], layout.units.get(place).filter(|unit| !unit.is_empty()));
+    let mut cells = files[0].columns.cells[place].clone();
+    files[1..].iter().for_each(|file| cells.values.extend_from_slice(&file.columns.cells[place].values));
     let facts = Facts::of(&cells);
-    let said = if files[0].has_names { words::said(&raw.name, raw.unit.as_deref()) } else { Said::default() };
+    let said = if layout.has_names { words::said(name, unit.map(String::as_str)) } else { Said::default() };
     let values = unwrapped(&cells.values, facts.anew);
     let mut guess = Guess {
         facts,
@@ -392,13 +358,13 @@ fn guess(files: &[RawFile], place: usize, of_file: &Arc<[f64]>) -> Guess {
         values,
         of_file: of_file.clone(),
     };
-    if cells.times > 0 && cells.times + cells.empty + cells.words >= cells.values.len() {
+    if cells.times.count > 0 && cells.times.count + cells.empty + cells.words.count >= cells.values.len() {
         (guess.role, guess.unit) = (Role::Time, Some(Unit::Iso));
         guess.because("times written as text", 0.95);
         return guess;
     }
     if guess.facts.finite == 0 {
-        guess.because(if cells.words > 0 { "words" } else { "empty" }, 0.9);
+        guess.because(if cells.words.count > 0 { "words" } else { "empty" }, 0.9);
         return guess;
     }
     if said.commanded && said.role != Some(Role::Torque) {
@@ -410,8 +376,9 @@ fn guess(files: &[RawFile], place: usize, of_file: &Arc<[f64]>) -> Guess {
     } else if said.angle {
         guess.because("its name: an angle", 0.5);
     }
-    if let Some(cell) = &cells.first_word {
-        let what = if cells.words == 1 { "1 cell is".to_owned() } else { format!("{} cells are", cells.words) };
+    if let Some(cell) = &cells.words.first {
+        let words = cells.words.count;
+        let what = if words == 1 { "1 cell is".to_owned() } else { format!("{words} cells are") };
         guess.why.push(format!("{what} no number: line {}, \"{}\"", cell.line, cell.text));
     }
     if guess.facts.constant() {
@@ -428,12 +395,13 @@ fn guess(files: &[RawFile], place: usize, of_file: &Arc<[f64]>) -> Guess {
     if let Some(anew) = guess.facts.anew {
         guess.why.push(anew.text(""));
     }
-    let unit = raw.unit.as_deref().and_then(Unit::in_brackets).or_else(|| Unit::in_name(&raw.name));
+    let by = if unit.is_some() { "line of units" } else { "name" };
+    let unit = unit.and_then(|unit| Unit::in_brackets(unit)).or_else(|| Unit::in_name(name));
     if let Some(unit) = unit.filter(|unit| fits(guess.role, *unit)) {
         guess.unit = Some(unit);
-        guess.why.push(format!("{unit} by its {}", if raw.unit.is_some() { "line of units" } else { "name" }));
+        guess.why.push(format!("{unit} by its {by}"));
     } else if guess.role.is_angle() || matches!(guess.role, Role::Unknown | Role::Command) {
-        unit_of_numbers(&mut guess, &raw.name);
+        unit_of_numbers(&mut guess, name);
     } else if guess.role == Role::Torque {
         guess.unit = Some(Unit::NewtonMetre);
         guess.because("N.m, for want of a unit", 0.5);
@@ -450,13 +418,9 @@ fn guess(files: &[RawFile], place: usize, of_file: &Arc<[f64]>) -> Guess {
 /// Whether a unit is one of the role.
 fn fits(role: Role, unit: Unit) -> bool {
     match role {
-        Role::Time => unit.family() == Family::Time,
-        Role::Torque => unit.family() == Family::Torque,
         Role::Current => matches!(unit, Unit::Ampere | Unit::Milliampere),
-        Role::Temperature => unit.family() == Family::Temperature,
-        Role::Generator | Role::Output | Role::Orientation | Role::Error => unit.family() == Family::Angle,
         Role::Speed => false,
-        Role::Command | Role::Unknown => true,
+        _ => role.in_mapping().is_none_or(|quantity| quantity.family() == unit.family()),
     }
 }
 
@@ -474,9 +438,17 @@ fn unit_of_numbers(guess: &mut Guess, name: &str) {
     }
 }
 
+/// A sentence on generator and output if no row has both.
+fn apart(guesses: &[Guess]) -> Option<String> {
+    let of = |role: Role| guesses.iter().position(|guess| guess.role == role && guess.moves());
+    let (generator, output) = (of(Role::Generator)?, of(Role::Output)?);
+    let mut both = guesses[generator].values.iter().zip(&guesses[output].values);
+    let apart = both.all(|(generator, output)| generator.is_nan() || output.is_nan());
+    apart.then(|| format!("columns {} and {}{APART}", generator + 1, output + 1))
+}
+
 /// The column of time: by name, or the one that rises evenly.
-fn time(guesses: &mut [Guess], files: &[RawFile]) {
-    let first_file = files[0].rows;
+fn time(guesses: &mut [Guess], first_file: usize) {
     if guesses.iter().all(|guess| guess.role != Role::Time) {
         let evenly = |guess: &Guess| {
             let steps: Vec<f64> = guess.values[..first_file].windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -655,38 +627,21 @@ fn torque(guesses: &mut [Guess], error: Option<&[f64]>, notes: &mut Vec<String>)
     }
 }
 
-/// Kind of time, median step (s), and the first row of each session.
-fn clock(guesses: &[Guess], files: &[RawFile]) -> (TimeKind, Option<f64>, Vec<usize>) {
-    let mut starts: Vec<usize> = files
-        .iter()
-        .scan(0, |row, file| {
-            let start = *row;
-            *row += file.rows;
-            Some(start)
-        })
-        .collect();
-    let Some(time) = guesses.iter().find(|guess| guess.used && guess.role == Role::Time) else {
-        return (TimeKind::None, None, starts);
-    };
-    let factor = time.unit.map_or(1.0, Unit::factor);
-    let steps: Vec<f64> = time.values.windows(2).map(|pair| factor * (pair[1] - pair[0])).collect();
-    let forward: Vec<f64> = steps.iter().copied().filter(|step| *step > 0.0).collect();
+/// Kind of time and median step, s.
+fn clock(read: &[Rows]) -> (TimeKind, Option<f64>) {
+    let steps = || read.iter().flat_map(|rows| rows.stamps_s.windows(2).map(|pair| pair[1] - pair[0]));
+    let forward: Vec<f64> = steps().filter(|step| *step > 0.0).collect();
     if forward.is_empty() {
-        return (TimeKind::None, None, starts);
+        return (TimeKind::None, None);
     }
     let period = median_of(&mut sampled(&forward));
-    for (row, step) in steps.iter().enumerate() {
-        if *step > SESSION_GAP_PERIODS * period || *step < -SESSION_GAP_PERIODS * period {
-            starts.push(row + 1);
-        }
-    }
-    starts.sort_unstable();
-    starts.dedup();
     // Stamps of a clock differ by more than they are rounded to.
-    let rounded = 1.01 * (factor * time.facts.step).min(period) * 1e-3 + 1e-9 * factor * time.facts.most.abs();
+    let finest = steps().map(f64::abs).filter(|step| *step > 0.0).fold(period, f64::min);
+    let latest = read.iter().flat_map(|rows| &rows.stamps_s).fold(0.0, |most: f64, at| most.max(at.abs()));
+    let rounded = 1.01e-3 * finest + 1e-9 * latest;
     let even = forward.iter().filter(|step| (*step - period).abs() <= rounded.max(1e-4 * period)).count();
     let kind = if even as f64 > 0.98 * forward.len() as f64 { TimeKind::Counted } else { TimeKind::Measured };
-    (kind, Some(period), starts)
+    (kind, Some(period))
 }
 
 /// The mapping, if generator and output or an error are known.
@@ -697,12 +652,15 @@ fn option(guesses: &[Guess], names: &[String], notes: &mut Vec<String>) -> Optio
         if let Some(count) = guesses.iter().filter(open).count().checked_sub(1) {
             let angles = guesses.iter().zip(names).filter(|(guess, _)| guess.used && guess.role.is_angle());
             let entries = angles.filter_map(|(guess, name)| {
-                let unit = guess.written().unwrap_or_else(|| "count/COUNTS".to_owned());
+                let open = if guess.unit.is_some() { "count/COUNTS" } else { "UNIT" };
+                let unit = guess.written().unwrap_or_else(|| open.to_owned());
                 Some(format!("{}={name}:{unit}", guess.role.in_mapping()?))
             });
             let entries = entries.collect::<Vec<_>>().join(",");
             let which = if count == 0 { "that column" } else { "these columns" };
-            notes.push(format!("give the counts of a turn of {which} in place of COUNTS: --columns {entries}"));
+            let what = if entries.contains("UNIT") { "unit" } else { "counts of a turn" };
+            let word = if entries.contains("UNIT") { "UNIT" } else { "COUNTS" };
+            notes.push(format!("give the {what} of {which} in place of {word}: --columns {entries}"));
             return None;
         }
         let what = match (used(Role::Generator), used(Role::Output) || used(Role::Error)) {
@@ -721,9 +679,9 @@ fn option(guesses: &[Guess], names: &[String], notes: &mut Vec<String>) -> Optio
 
 /// A column as a mapping names it: names with signs of the mapping in them, and names that are there twice, go by
 /// number.
-fn name_in_mapping(file: &RawFile, place: usize) -> String {
-    let name = &file.columns[place].name;
-    let twice = file.columns.iter().filter(|column| column.name == *name).count() > 1;
+fn name_in_mapping(names: &[String], place: usize) -> String {
+    let name = &names[place];
+    let twice = names.iter().filter(|other| *other == name).count() > 1;
     let plain = !twice && !name.is_empty() && !name.contains([',', ':', '=', '"', '\'']);
     if plain { name.clone() } else { format!("#{}", place + 1) }
 }

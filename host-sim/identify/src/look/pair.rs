@@ -78,13 +78,25 @@ pub(super) fn pair(guesses: &mut [Guess], names: &[String], notes: &mut Vec<Stri
     let Some((best, others)) = pairs.split_first() else { return (None, Vec::new()) };
     let (g, o) = (best.generator, best.output);
     let units = best.units[0];
-    let mut rivals: Vec<Rival> = best.units[1..]
-        .iter()
-        .filter(|other| units.rivals(other))
-        .map(|units| {
-            rival(best, units, names, "its ratio is nearer to those of catalogues, or to a whole number".to_owned())
-        })
-        .collect();
+    // Where the file does not say the unit and several fit, it is asked.
+    let asked = best.units.len() > 1;
+    let mut rivals: Vec<Rival> = Vec::new();
+    if asked {
+        let why = "the file does not say in which units they are, or how many counts make a turn".to_owned();
+        rivals.extend(best.units.iter().map(|units| rival(best, units, names, why.clone())));
+        let options = rivals.iter().map(|rival| {
+            let columns = rival.columns_option.clone().unwrap_or_default();
+            format!("--columns {columns} makes the ratio {:.2}", rival.ratio)
+        });
+        let options: Vec<String> = options.collect();
+        notes.push(format!(
+            "columns {} and {} turn together, but {}: {}",
+            g + 1,
+            o + 1,
+            rivals[0].why,
+            options.join("; ")
+        ));
+    }
     let counts = rivals.len();
     for other in others {
         let level = (other.rank.measured, other.rank.names) == (best.rank.measured, best.rank.names);
@@ -95,48 +107,47 @@ pub(super) fn pair(guesses: &mut [Guess], names: &[String], notes: &mut Vec<Stri
         }
     }
     let unsure = rivals.len() > counts;
-    for (k, role, other) in [(g, Role::Generator, o), (o, Role::Output, g)] {
+    let each = [(g, Role::Generator, o, units.generator), (o, Role::Output, g, units.output)];
+    for (k, role, other, reading) in each {
         let by_name = guesses[k].role == role;
         if guesses[k].role == Role::Command {
             notes.push(format!("column {} is a command, which stands for the angle of the generator", k + 1));
         }
-        settle(&mut guesses[k], k, &units, role == Role::Generator, notes);
         guesses[k].role = role;
         guesses[k].used = true;
-        let sure = match (unsure, by_name, counts > 0) {
+        let sure = match (unsure, by_name, asked) {
             (true, ..) => 0.5,
             (_, true, false) => 0.9,
             _ => 0.6,
         };
-        guesses[k].because(format!("turns with column {}, {:.3} to 1", other + 1, units.ratio), sure);
+        let together = if asked {
+            format!("turns with column {}", other + 1)
+        } else {
+            settle(&mut guesses[k], k, &reading, units.ratio, notes);
+            format!("turns with column {}, {:.3} to 1", other + 1, units.ratio)
+        };
+        guesses[k].because(together, sure);
         if let Some(first) = rivals.get(counts) {
             guesses[k].why.push(format!("{} and {} may be meant as well", first.generator, first.output));
         }
     }
-    for rival in rivals.iter().take(counts + SAID) {
+    for rival in rivals.iter().skip(counts).take(SAID) {
         let pass_on = rival.columns_option.as_ref().map_or(String::new(), |columns| format!(", --columns {columns}"));
-        notes.push(if (rival.generator.as_str(), rival.output.as_str()) == (names[g].as_str(), names[o].as_str()) {
-            format!(
-                "the ratio may be {:.2} as well{pass_on}: the file does not say how many counts make a turn",
-                rival.ratio
-            )
-        } else {
-            format!(
-                "columns {} and {} may be generator and output as well, {:.2} to 1{pass_on}; columns {} and {} are \
-                 proposed because {}",
-                rival.generator,
-                rival.output,
-                rival.ratio,
-                g + 1,
-                o + 1,
-                rival.why
-            )
-        });
+        notes.push(format!(
+            "columns {} and {} may be generator and output as well, {:.2} to 1{pass_on}; columns {} and {} are \
+             proposed because {}",
+            rival.generator,
+            rival.output,
+            rival.ratio,
+            g + 1,
+            o + 1,
+            rival.why
+        ));
     }
     if let Some(more) = rivals.len().checked_sub(counts + SAID).filter(|more| *more > 0) {
         notes.push(format!("{more} more pairs of columns may be generator and output: --json lists them"));
     }
-    (Some(units.ratio), rivals)
+    (Some(units.ratio).filter(|_| !asked), rivals)
 }
 
 fn rival(pair: &Pair, units: &Units, names: &[String], why: String) -> Rival {

@@ -1,4 +1,4 @@
-//! Units of angles that a file does not say: counts of a turn by another column, and by the ratio that wheels can have.
+//! Units of angles that a file does not say: counts of a turn by another column, else open.
 
 use std::f64::consts::TAU;
 
@@ -10,11 +10,10 @@ use crate::measurement::{Unit, registers};
 const CLOSE_TO_HALF: f64 = 0.1;
 /// A ratio is whole to this: clearance and the error of the ratio that few turns leave. *Guess*.
 const WHOLE: f64 = 0.005;
-/// Ratios of catalogues with the flexspline's wheel fixed; with the other wheel fixed they are one larger. *Source*:
-/// the series CSF, CSG and SHF of Harmonic Drive.
-const CATALOGUE: [f64; 6] = [30.0, 50.0, 80.0, 100.0, 120.0, 160.0];
 /// Counts of a turn that are tried, powers of two.
 const POWERS: std::ops::RangeInclusive<i32> = 6..=28;
+/// Two columns show one shaft if a straight line leaves less than this share of the range.
+const SAME_SHAFT: f64 = 1e-4;
 
 /// The ratio that wheels can have: a whole number, or a half that the rows are close to.
 pub(super) fn proposed_ratio(found: f64) -> f64 {
@@ -62,9 +61,6 @@ pub(super) fn units_of_counts(guesses: &mut [Guess]) {
     }
 }
 
-/// Two columns show one shaft if a straight line leaves less than this share of the range.
-const SAME_SHAFT: f64 = 1e-4;
-
 /// Whether names let two columns show one shaft: not those of motor and output, or of two joints.
 fn may_be_one_shaft(a: &Guess, b: &Guess) -> bool {
     let shafts = [a.role, b.role];
@@ -98,10 +94,10 @@ pub(super) enum By {
     Anew,
     /// The other encoder has these counts.
     Other,
-    /// It makes the ratio one of a strain wave gear, and for counts nearly whole.
-    Ratio,
     /// Nothing: radians, or counts that nobody says.
     Nothing,
+    /// It makes the ratio one of a strain wave gear, and for counts nearly whole: to be asked where several do.
+    Ratio,
 }
 
 impl Reading {
@@ -130,96 +126,64 @@ pub(super) struct Units {
 }
 
 impl Units {
-    /// How sure the less sure of the two units is, how usual they are, and how sure the other one is.
-    fn level(&self) -> (By, usize, By) {
-        let by = [self.generator.by, self.output.by];
-        let usual = |unit: Unit| Unit::ANGLES.iter().position(|usual| *usual == unit).unwrap_or(0);
-        (by[0].max(by[1]), usual(self.generator.unit) + usual(self.output.unit), by[0].min(by[1]))
-    }
-
-    /// The surest first; then ratios of catalogues, usual units, and ratios that are nearest to a whole number.
-    fn rank(&self) -> (By, bool, usize, By, f64) {
-        let whole = self.ratio.abs().round();
-        let off = (self.ratio.abs() / whole - 1.0).abs();
-        let listed = CATALOGUE.iter().any(|ratio| whole == *ratio || whole == ratio + 1.0);
-        let (surest, usual, other) = self.level();
-        (surest, !listed, usual, other, off)
-    }
-
-    /// Whether it is as likely as another reading, for all that the file says.
-    pub(crate) fn rivals(&self, other: &Units) -> bool {
-        self.level() == other.level() && [self.generator, self.output].iter().any(|reading| reading.by == By::Ratio)
+    /// How sure the less sure of the two units is.
+    fn by(&self) -> By {
+        self.generator.by.max(self.output.by)
     }
 }
 
-/// The units that two columns may have as generator and output, the likeliest first; `raw` is the change of the
-/// generator's number for one of the output's. None if no unit makes it the ratio of a strain wave gear.
+/// The units that two columns may have as generator and output, as sure as any; `raw` is the change of the generator's
+/// number for one of the output's. None if no unit makes it the ratio of a strain wave gear.
 pub(super) fn units_of_pair(generator: &Guess, output: &Guess, raw: f64) -> Vec<Units> {
-    let within = |ratio: f64| (RATIOS[0]..=RATIOS[1]).contains(&ratio.abs());
-    let nameless = |guess: &Guess| guess.rad().is_none();
-    if nameless(generator) && nameless(output) && generator.unit == output.unit {
-        // The same unit on both sides, as far as can be told; two counters may each begin anew after its turn.
-        let by_turns = (anew(generator), anew(output));
-        let units = match by_turns {
-            (Some(g), Some(o)) => Units { generator: g, output: o, ratio: raw * g.rad() / o.rad() },
-            _ => {
-                let unit = generator.unit.unwrap_or(Unit::Radian);
-                let open = Reading { unit, counts: None, by: By::Nothing };
-                Units { generator: open, output: open, ratio: raw }
-            }
-        };
-        return Some(units).filter(|units| within(units.ratio)).into_iter().collect();
-    }
-    let mut all = Vec::new();
+    let mut all: Vec<Units> = Vec::new();
     for g in readings(generator, output) {
         for o in readings(output, generator) {
             let ratio = raw * g.rad() / o.rad();
             let whole = (ratio - ratio.round()).abs() < WHOLE * ratio.abs();
             let by_ratio =
                 |reading: &Reading| reading.unit == Unit::Count && matches!(reading.by, By::Ratio | By::Other);
-            if within(ratio) && (whole || !(by_ratio(&g) || by_ratio(&o))) {
+            let within = (RATIOS[0]..=RATIOS[1]).contains(&ratio.abs());
+            if within && (whole || !(by_ratio(&g) || by_ratio(&o))) {
                 all.push(Units { generator: g, output: o, ratio });
             }
         }
     }
-    // Of units of angle the first that fits, of counts what is likeliest.
-    all.sort_by(|a, b| a.rank().partial_cmp(&b.rank()).unwrap_or(std::cmp::Ordering::Equal));
-    let mut seen: Vec<Units> = Vec::new();
-    for units in all {
-        if seen.iter().all(|other| other.ratio != units.ratio) {
-            seen.push(units);
-        }
-    }
-    seen
+    let surest = all.iter().map(Units::by).min();
+    all.retain(|units| Some(units.by()) == surest);
+    all
 }
 
 /// Counts of a turn as those after which a register begins anew.
 fn anew(guess: &Guess) -> Option<Reading> {
     let span = guess.facts.anew.map(|anew| anew.span).filter(|_| guess.unit == Some(Unit::Count))?;
-    registers().any(|register| register == span).then_some(Reading {
-        unit: Unit::Count,
-        counts: Some(span),
-        by: By::Anew,
-    })
+    let reading = Reading { unit: Unit::Count, counts: Some(span), by: By::Anew };
+    registers().any(|register| register == span).then_some(reading)
 }
 
-/// The units that a column may have beside another one.
+/// The units that a column may have beside another one; the same as the other one, where nothing is known of either.
 fn readings(guess: &Guess, other: &Guess) -> Vec<Reading> {
+    let open = |guess: &Guess| guess.rad().is_none() && anew(guess).is_none();
+    let unit = guess.unit.unwrap_or(Unit::Radian);
     match (guess.unit, guess.counts) {
+        _ if open(guess) && open(other) && guess.unit == other.unit => {
+            vec![Reading { unit, counts: None, by: By::Nothing }]
+        }
         (Some(Unit::Count), None) => {
             let beside = other.counts.or_else(|| anew(other).and_then(|reading| reading.counts));
-            let beside = beside.map(|counts| Reading { unit: Unit::Count, counts: Some(counts), by: By::Other });
-            let powers = POWERS.map(|bits| Reading { unit: Unit::Count, counts: Some(2f64.powi(bits)), by: By::Ratio });
+            let beside = beside.map(|counts| Reading { unit, counts: Some(counts), by: By::Other });
+            let powers = POWERS.map(|bits| Reading { unit, counts: Some(2f64.powi(bits)), by: By::Ratio });
             anew(guess).into_iter().chain(beside).chain(powers).collect()
         }
-        (Some(unit), counts) => vec![Reading { unit, counts, by: By::Known }],
+        (None, _) if other.unit == Some(Unit::Count) && other.counts.is_none() => {
+            vec![Reading { unit, counts: None, by: By::Nothing }]
+        }
         (None, _) => Unit::ANGLES.map(|unit| Reading { unit, counts: None, by: By::Ratio }).to_vec(),
+        (Some(unit), counts) => vec![Reading { unit, counts, by: By::Known }],
     }
 }
 
 /// Gives a column of a pair its unit, with why; `place` is its place in the file, from 0.
-pub(super) fn settle(guess: &mut Guess, place: usize, units: &Units, generator: bool, notes: &mut Vec<String>) {
-    let reading = if generator { units.generator } else { units.output };
+pub(super) fn settle(guess: &mut Guess, place: usize, reading: &Reading, ratio: f64, notes: &mut Vec<String>) {
     let open = guess.rad().is_none();
     (guess.unit, guess.counts) = (Some(reading.unit), reading.counts);
     if !open {
@@ -240,7 +204,7 @@ pub(super) fn settle(guess: &mut Guess, place: usize, units: &Units, generator: 
             return;
         }
         (unit, _, By::Nothing) => format!("{unit}, for want of a unit"),
-        (unit, ..) => format!("{unit} makes the ratio {:.2}", units.ratio),
+        (unit, ..) => format!("{unit} makes the ratio {ratio:.2}"),
     };
     guess.why.push(why);
 }

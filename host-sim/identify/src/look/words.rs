@@ -5,111 +5,36 @@ use crate::measurement::{Family, Unit};
 
 /// Words of names, in the order in which the first that fits decides: a joint's velocity is a velocity, a motor's
 /// temperature a temperature. English and German, as loggers, robots and controllers have them; the list is made by
-/// hand from the logs at hand.
+/// hand from the logs at hand. A word of four letters and more also counts inside of another.
 const WORDS: [(Role, &[&str]); 9] = [
     (
         Role::Speed,
         &[
-            "vel",
-            "velo",
-            "velocity",
-            "speed",
-            "spd",
-            "rpm",
-            "omega",
-            "dq",
-            "qd",
-            "qdot",
-            "dtheta",
-            "drehzahl",
-            "geschwindigkeit",
-            "acc",
-            "accel",
-            "jerk",
+            "vel", "velo", "speed", "spd", "rpm", "omega", "dq", "qd", "qdot", "dtheta", "drehzahl", "geschwin", "acc",
+            "accel", "jerk",
         ],
     ),
-    (Role::Temperature, &["temp", "temperature", "temperatur", "thermo", "degc"]),
-    (
-        Role::Torque,
-        &["torque", "trq", "tau", "effort", "moment", "drehmoment", "mom", "tq", "load_cell", "nm", "lastmoment"],
-    ),
-    (Role::Current, &["current", "curr", "cur", "amp", "amps", "iq", "strom"]),
-    (Role::Error, &["error", "err", "deviation", "abweichung", "fehler", "te"]),
-    (Role::Time, &["time", "timestamp", "zeit", "t", "date", "datetime", "clock", "epoch", "uhrzeit", "stamp"]),
-    (Role::Orientation, &["orientation", "gravity", "tilt", "roll"]),
-    (
-        Role::Generator,
-        &[
-            "generator",
-            "gen",
-            "wave",
-            "wavegen",
-            "wg",
-            "motor",
-            "mot",
-            "motorinc",
-            "rotor",
-            "input",
-            "inp",
-            "antrieb",
-            "psi",
-        ],
-    ),
-    (Role::Output, &["output", "out", "load", "loadinc", "link", "joint", "abtrieb", "arm", "last", "delta"]),
+    (Role::Temperature, &["temp", "thermo", "degc"]),
+    (Role::Torque, &["torque", "trq", "tau", "effort", "moment", "mom", "tq", "nm"]),
+    (Role::Current, &["curr", "cur", "amp", "amps", "iq", "strom"]),
+    (Role::Error, &["error", "err", "deviatio", "abweich", "fehler", "te"]),
+    (Role::Time, &["time", "zeit", "t", "date", "clock", "epoch", "stamp"]),
+    (Role::Orientation, &["orientat", "gravity", "tilt", "roll"]),
+    (Role::Generator, &["generato", "gen", "wave", "wg", "motor", "mot", "rotor", "input", "inp", "antrieb", "psi"]),
+    (Role::Output, &["output", "out", "load", "link", "joint", "abtrieb", "arm", "last", "delta"]),
 ];
 
 /// Words of an angle, of whatever shaft.
-const ANGLES: [&str; 13] = [
-    "position",
-    "pos",
-    "actpos",
-    "angle",
-    "winkel",
-    "theta",
-    "phi",
-    "q",
-    "encoder",
-    "enc",
-    "inc",
-    "rotation",
-    "drehwinkel",
-];
+const ANGLES: [&str; 12] =
+    ["position", "pos", "actpos", "angle", "winkel", "theta", "phi", "q", "encoder", "enc", "inc", "rotation"];
 /// Words of what was wanted, not measured.
-const COMMANDED: [&str; 18] = [
-    "cmd",
-    "target",
-    "command",
-    "setpoint",
-    "soll",
-    "sollwert",
-    "ref",
-    "desired",
-    "commanded",
-    "demand",
-    "goal",
-    "set",
-    "setpos",
-    "des",
-    "d",
-    "planned",
-    "request",
-    "requested",
+const COMMANDED: [&str; 15] = [
+    "cmd", "target", "command", "setpoint", "soll", "ref", "desired", "demand", "goal", "set", "setpos", "des", "d",
+    "planned", "request",
 ];
 /// Words of what is a scatter or a quality of something else, or what a controller has not reached yet.
-const ASIDE: [&str; 12] = [
-    "sd",
-    "std",
-    "sigma",
-    "quality",
-    "status",
-    "flag",
-    "seq",
-    "sequence",
-    "crc",
-    "following",
-    "tracking",
-    "schleppfehler",
-];
+const ASIDE: [&str; 11] =
+    ["sd", "std", "sigma", "quality", "status", "flag", "seq", "sequence", "crc", "tracking", "schlepp"];
 
 /// The meaning of a column's name and unit.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -135,7 +60,7 @@ pub(super) fn said(name: &str, unit: Option<&str>) -> Said {
     let holds = |known: &str| is(known) || words.iter().any(|word| known.len() >= 4 && word.contains(known));
     let any = |known: &[&str]| known.iter().any(|known| holds(known));
     let joint = joint(name);
-    if ASIDE.iter().any(|known| is(known)) {
+    if any(&ASIDE) || is("following") {
         return Said { aside: true, joint, ..Said::default() };
     }
     let by_unit = kind_of_unit(name, unit);

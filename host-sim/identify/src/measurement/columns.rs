@@ -206,7 +206,7 @@ impl ColumnMap {
                 if given.is_none() {
                     continue;
                 }
-                let hint = meant(name, names);
+                let hint = [separator(names), &meant(name, names)].concat();
                 let mut what = format!("column {name} is missing, which --columns gives for {quantity}; {hint}");
                 what.push_str(&found(names, layout));
                 return Err(problem(what));

@@ -22,15 +22,15 @@ use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
 
+pub(crate) use columns::Column;
 pub use columns::{ColumnMap, MappingError, Quantity, Reading, Unit};
 pub use fault::{Fault, FaultName, Measures, ToothStep, Treatment};
-pub(crate) use faults::clock::SESSION_GAP_PERIODS;
+use faults::clock::SESSION_GAP_PERIODS;
 pub use flexspline_base::robust::{
     MAD_TO_STD, least_and_most, median_and_std, median_of, quantile_of, rms, sampled, white_noise,
 };
 pub use gear::Gear;
 pub use log::{FEWEST_ROWS, MeasuredError};
-pub(crate) use reader::stamps;
 pub use reader::{Layout, Separator, Sheet, raw};
 pub(crate) use rollover::{Anew, begins_anew, continued, registers};
 pub(crate) use unit::Family;
@@ -38,10 +38,15 @@ pub(crate) use unit::Family;
 use faults::Findings;
 use faults::drift::Stretches;
 use faults::steps::Untold;
-use log::Log;
+use log::{Found, Log};
+use raw::RawFile;
 
 /// More sessions than a person makes. *Guess*.
 const MANY_SESSIONS: usize = 50;
+
+/// What to do with a file of which each channel has rows of its own.
+pub(crate) const APART: &str = ": they are never recorded in one row; allowed: both in a row, in pandas: df[OUTPUT] = \
+                                df.set_index(TIME)[OUTPUT].interpolate(\"index\").values";
 
 /// Rows without a gap, in order of time.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -142,9 +147,18 @@ impl Session {
     /// Some of its rows as a session.
     #[must_use]
     pub(crate) fn part(&self, rows: Range<usize>) -> Session {
-        let mut part = Session { line: self.line[rows.clone()].to_vec(), ..self.clone() };
-        part.columns_mut().for_each(|values| *values = values[rows.clone()].to_vec());
-        part
+        let cut = |values: &Option<Vec<f64>>| values.as_ref().map(|values| values[rows.clone()].to_vec());
+        Session {
+            line: self.line[rows.clone()].to_vec(),
+            generator_rad: self.generator_rad[rows.clone()].to_vec(),
+            error_rad: self.error_rad[rows.clone()].to_vec(),
+            time_s: cut(&self.time_s),
+            torque_n_m: cut(&self.torque_n_m),
+            temperature_c: cut(&self.temperature_c),
+            orientation_rad: cut(&self.orientation_rad),
+            loudness: cut(&self.loudness),
+            ..*self
+        }
     }
 }
 
@@ -252,24 +266,11 @@ pub(crate) fn parse_as(
     }
     let (mut log, found) = log::read(file, source, columns, gear.ratio, fewest)?;
     let rows = log.len();
-    let mut findings = Findings { notes: found.notes, ..Findings::default() };
-    if let Some(line) = found.broken_off {
-        let what = "the last line breaks off: it is left out".to_owned();
-        let fault = Fault::new(FaultName::MissingSamples, [line; 2], 1);
-        findings.faults.push(Fault { treatment: Treatment::Masked, what, ..fault });
-    }
-    for what in found.order {
-        let lines = [log.line.iter().copied().min().unwrap_or(1), log.line.iter().copied().max().unwrap_or(1)];
-        let fault = Fault::new(FaultName::ClockError, lines, rows as u64);
-        findings.faults.push(Fault { channel: Some(Quantity::Time), treatment: Treatment::Repaired, what, ..fault });
-    }
+    let mut findings = Findings::default();
     if in_degrees {
         faults::units::both_in_degrees(&mut log, Unit::Degree.factor(), &mut findings);
     }
-    faults::missing::fill(&mut log, &mut findings);
-    faults::clock::check(&mut log, &mut findings);
-    let recorded = recorded(&log);
-    faults::missing::leave_out(&mut log, &mut findings);
+    let recorded = in_order(&mut log, &found, &mut findings);
     enough(&log, &recorded, fewest).map_err(refuse)?;
     faults::wrap::unwrap(&mut log, &found.columns, gear.ratio, &mut findings);
     faults::leaps::check(&mut log, gear, &mut findings);
@@ -305,18 +306,81 @@ pub(crate) fn parse_as(
     Ok(Recording { file: file.to_owned(), rows, sessions, faults, tooth_steps, notes, unusable: None })
 }
 
+/// Mends clock and holes of a log and leaves out the rows without an angle; how many had which angle.
+fn in_order(log: &mut Log, found: &Found, findings: &mut Findings) -> String {
+    findings.notes.extend(found.notes.iter().cloned());
+    if let Some(line) = found.broken_off {
+        let what = "the last line breaks off: it is left out".to_owned();
+        let fault = Fault::new(FaultName::MissingSamples, [line; 2], 1);
+        findings.faults.push(Fault { treatment: Treatment::Masked, what, ..fault });
+    }
+    for what in found.order.iter().cloned() {
+        let lines = [log.line.iter().copied().min().unwrap_or(1), log.line.iter().copied().max().unwrap_or(1)];
+        let fault = Fault::new(FaultName::ClockError, lines, log.len() as u64);
+        findings.faults.push(Fault { channel: Some(Quantity::Time), treatment: Treatment::Repaired, what, ..fault });
+    }
+    faults::missing::fill(log, findings);
+    faults::clock::check(log, findings);
+    let recorded = recorded(log);
+    faults::missing::leave_out(log, findings);
+    recorded
+}
+
+/// The rows of a file as they are before anything is asked of the drive.
+pub(crate) struct Rows {
+    pub(crate) log: Log,
+    /// Times as they are written, s; none without a time.
+    pub(crate) stamps_s: Vec<f64>,
+    /// What was converted, mended or left out.
+    pub(crate) notes: Vec<String>,
+}
+
+impl Rows {
+    /// The rows of a file by these columns, and why the reader refuses them, if it does: then what is no number is
+    /// missing. `ratio` as far as it is known.
+    pub(crate) fn of_raw(file: &RawFile, columns: &[Column], ratio: Option<f64>) -> (Rows, Option<MeasuredError>) {
+        let made = |odd: bool| {
+            let cells = |column: &Column| file.columns.cells[column.place].clone();
+            let mut read = file.columns.with_cells(columns.iter().map(cells).collect());
+            if !odd {
+                read.forget_what_is_odd();
+            }
+            log::of_columns(&file.sheet.layout, read, columns.to_vec(), None, 0)
+        };
+        let (made, refused) = match made(true) {
+            Ok(made) => (Some(made), None),
+            Err(problem) => (made(false).ok(), Some(MeasuredError::at(&file.file, problem))),
+        };
+        let mut rows = Rows { log: Log::default(), stamps_s: Vec::new(), notes: Vec::new() };
+        if let Some((mut log, found)) = made {
+            rows.stamps_s = log.get(Quantity::Time).map_or_else(Vec::new, <[f64]>::to_vec);
+            let mut findings = Findings::default();
+            in_order(&mut log, &found, &mut findings);
+            if log.len() > 1 {
+                faults::wrap::unwrap(&mut log, columns, ratio.unwrap_or(1.0), &mut findings);
+            }
+            rows.log = log;
+            rows.notes = findings.notes;
+            rows.notes.extend(findings.faults.into_iter().map(|fault| fault.what));
+        }
+        (rows, refused)
+    }
+
+    /// Sessions, one at least.
+    pub(crate) fn sessions(&self) -> usize {
+        (0..self.log.len()).filter(|row| !self.log.continues(*row)).count().max(1)
+    }
+}
+
 /// How many rows have the angles, for whoever finds none that has both.
 fn recorded(log: &Log) -> String {
     let follower = log.output_or_error();
     let has = |channel: Quantity, row: usize| log.get(channel).is_some_and(|values| values[row].is_finite());
     let count = |of: &dyn Fn(usize) -> bool| (0..log.len()).filter(|row| of(*row)).count();
-    format!(
-        "of {} rows {} have the generator, {} the {follower}, {} both",
-        log.len(),
-        count(&|row| has(Quantity::Generator, row)),
-        count(&|row| has(follower, row)),
-        count(&|row| has(Quantity::Generator, row) && has(follower, row))
-    )
+    let (ours, theirs) = (count(&|row| has(Quantity::Generator, row)), count(&|row| has(follower, row)));
+    let both = count(&|row| has(Quantity::Generator, row) && has(follower, row));
+    let apart = if both == 0 && ours > 0 && theirs > 0 { APART } else { "" };
+    format!("of {} rows {ours} have the generator, {theirs} the {follower}, {both} both{apart}", log.len())
 }
 
 /// Whether enough rows are left, and anything moves in them.
@@ -355,7 +419,7 @@ fn into_sessions(mut log: Log, ratio: f64) -> Vec<Session> {
         }
         None => log.take(Quantity::Error).unwrap_or_default(),
     };
-    let mut whole = Session {
+    let whole = Session {
         generator_rad: generator,
         error_rad: error,
         time_s: log.take(Quantity::Time),
@@ -365,26 +429,9 @@ fn into_sessions(mut log: Log, ratio: f64) -> Vec<Session> {
         line: std::mem::take(&mut log.line),
         ..Session::default()
     };
-    let starts: Vec<usize> = (1..log.session.len()).filter(|row| log.session[*row] != log.session[*row - 1]).collect();
-    // From the last session to the first, so that each is cut off the end.
-    let mut sessions: Vec<Session> = starts
-        .iter()
-        .rev()
-        .map(|start| {
-            let cut = |values: &mut Option<Vec<f64>>| values.as_mut().map(|values| values.split_off(*start));
-            Session {
-                line: whole.line.split_off(*start),
-                generator_rad: whole.generator_rad.split_off(*start),
-                error_rad: whole.error_rad.split_off(*start),
-                time_s: cut(&mut whole.time_s),
-                torque_n_m: cut(&mut whole.torque_n_m),
-                temperature_c: cut(&mut whole.temperature_c),
-                orientation_rad: cut(&mut whole.orientation_rad),
-                ..Session::default()
-            }
-        })
-        .collect();
-    sessions.push(whole);
-    sessions.reverse();
-    sessions
+    let starts: Vec<usize> = (0..=whole.len()).filter(|row| *row == whole.len() || !log.continues(*row)).collect();
+    if starts.len() <= 2 {
+        return vec![whole];
+    }
+    starts.windows(2).map(|ends| whole.part(ends[0]..ends[1])).collect()
 }

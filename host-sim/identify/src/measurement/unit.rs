@@ -85,37 +85,47 @@ impl Family {
     }
 }
 
-/// Each unit in the order of [`Unit`], with its family, its name in a mapping and its size in the unit used inside
-/// (rad, s, N·m, °C). The size of a count, an ampere and a volt is that of the result of its gain: a turn, a N·m.
-const UNITS: [(Unit, Family, &str, f64); 27] = [
-    (Unit::Radian, Family::Angle, "rad", 1.0),
-    (Unit::Degree, Family::Angle, "deg", TAU / 360.0),
-    (Unit::Turn, Family::Angle, "turn", TAU),
-    (Unit::Arcminute, Family::Angle, "arcmin", TAU / 21_600.0),
-    (Unit::Arcsecond, Family::Angle, "arcsec", TAU / 1_296_000.0),
-    (Unit::Milliradian, Family::Angle, "mrad", 1e-3),
-    (Unit::Count, Family::Angle, "count", TAU),
-    (Unit::Second, Family::Time, "s", 1.0),
-    (Unit::Millisecond, Family::Time, "ms", 1e-3),
-    (Unit::Microsecond, Family::Time, "us", 1e-6),
-    (Unit::Nanosecond, Family::Time, "ns", 1e-9),
-    (Unit::Minute, Family::Time, "min", 60.0),
-    (Unit::Hour, Family::Time, "h", 3600.0),
-    (Unit::Day, Family::Time, "d", 86_400.0),
-    (Unit::Iso, Family::Time, "iso", 1.0),
-    (Unit::NewtonMetre, Family::Torque, "N.m", 1.0),
-    (Unit::NewtonCentimetre, Family::Torque, "N.cm", 1e-2),
-    (Unit::MillinewtonMetre, Family::Torque, "mN.m", 1e-3),
-    (Unit::KilonewtonMetre, Family::Torque, "kN.m", 1e3),
-    (Unit::PoundInch, Family::Torque, "lbf.in", POUND_FORCE_N * 0.0254),
-    (Unit::PoundFoot, Family::Torque, "lbf.ft", POUND_FORCE_N * 0.3048),
-    (Unit::Ampere, Family::Torque, "A", 1.0),
-    (Unit::Milliampere, Family::Torque, "mA", 1.0),
-    (Unit::Volt, Family::Torque, "V", 1.0),
-    (Unit::Celsius, Family::Temperature, "C", 1.0),
-    (Unit::Kelvin, Family::Temperature, "K", 1.0),
-    (Unit::Fahrenheit, Family::Temperature, "F", 5.0 / 9.0),
+/// A row of [`UNITS`].
+type Row = (Unit, Family, &'static [&'static str], f64);
+
+/// Each unit in the order of [`Unit`], with its family, how people write it (its name in a mapping first) and its size
+/// in the unit used inside (rad, s, N·m, °C). The size of a count, an ampere and a volt is that of the result of its
+/// gain: a turn, a N·m.
+const UNITS: [Row; 27] = [
+    (Unit::Radian, Family::Angle, &["rad"], 1.0),
+    (Unit::Degree, Family::Angle, &["deg", "°"], TAU / 360.0),
+    (Unit::Turn, Family::Angle, &["turn", "turns", "rev", "revs"], TAU),
+    (Unit::Arcminute, Family::Angle, &["arcmin"], TAU / 21_600.0),
+    (Unit::Arcsecond, Family::Angle, &["arcsec"], TAU / 1_296_000.0),
+    (Unit::Milliradian, Family::Angle, &["mrad"], 1e-3),
+    (Unit::Count, Family::Angle, &["count", "counts", "cnt", "inc", "incs", "tick", "ticks"], TAU),
+    (Unit::Second, Family::Time, &["s", "sec", "seconds"], 1.0),
+    (Unit::Millisecond, Family::Time, &["ms"], 1e-3),
+    (Unit::Microsecond, Family::Time, &["us", "µs", "μs"], 1e-6),
+    (Unit::Nanosecond, Family::Time, &["ns"], 1e-9),
+    (Unit::Minute, Family::Time, &["min"], 60.0),
+    (Unit::Hour, Family::Time, &["h"], 3600.0),
+    (Unit::Day, Family::Time, &["d", "days", "day"], 86_400.0),
+    (Unit::Iso, Family::Time, &["iso"], 1.0),
+    (Unit::NewtonMetre, Family::Torque, &["N.m", "Nm", "N·m", "N*m", "N-m", "N m"], 1.0),
+    (Unit::NewtonCentimetre, Family::Torque, &["N.cm", "Ncm", "N·cm"], 1e-2),
+    (Unit::MillinewtonMetre, Family::Torque, &["mN.m", "mNm", "mN·m"], 1e-3),
+    (Unit::KilonewtonMetre, Family::Torque, &["kN.m", "kNm", "kN·m"], 1e3),
+    (Unit::PoundInch, Family::Torque, &["lbf.in", "in.lbf", "in-lb", "lb-in", "lbf-in"], POUND_FORCE_N * 0.0254),
+    (Unit::PoundFoot, Family::Torque, &["lbf.ft", "ft.lbf", "ft-lb", "lb-ft", "lbf-ft"], POUND_FORCE_N * 0.3048),
+    (Unit::Ampere, Family::Torque, &["A"], 1.0),
+    (Unit::Milliampere, Family::Torque, &["mA"], 1.0),
+    (Unit::Volt, Family::Torque, &["V"], 1.0),
+    (Unit::Celsius, Family::Temperature, &["C", "°C", "degC"], 1.0),
+    (Unit::Kelvin, Family::Temperature, &["K"], 1.0),
+    (Unit::Fahrenheit, Family::Temperature, &["F", "°F", "degF"], 5.0 / 9.0),
 ];
+
+/// Units at the end of a name that are written otherwise there.
+const IN_NAMES: [(&str, Unit); 4] =
+    [("_n_m", Unit::NewtonMetre), ("_nm", Unit::NewtonMetre), ("_c", Unit::Celsius), ("_k", Unit::Kelvin)];
+/// Words at the end of a name that are more often something else: `torque_min`, `q_d`.
+const NOT_IN_NAMES: [&str; 6] = ["min", "h", "d", "F", "day", "iso"];
 
 impl Unit {
     /// Units of angle that one may take for another, the largest name first that a slip of the pen takes for another.
@@ -123,7 +133,7 @@ impl Unit {
 
     /// Its name in a mapping.
     pub fn name(self) -> &'static str {
-        UNITS[self as usize].2
+        UNITS[self as usize].2[0]
     }
 
     /// Its size in the unit used inside: rad, s, N·m, °C.
@@ -166,26 +176,7 @@ impl Unit {
 
     /// The unit that people write so, if it is one.
     pub(super) fn written(text: &str) -> Option<Unit> {
-        if let Some(row) = UNITS.iter().find(|row| row.2 == text) {
-            return Some(row.0);
-        }
-        Some(match text {
-            "°" => Unit::Degree,
-            "turns" | "rev" | "revs" => Unit::Turn,
-            "counts" | "cnt" | "inc" | "incs" | "tick" | "ticks" => Unit::Count,
-            "sec" | "seconds" => Unit::Second,
-            "days" | "day" => Unit::Day,
-            "µs" | "μs" => Unit::Microsecond,
-            "Nm" | "N·m" | "N*m" | "N-m" | "N m" => Unit::NewtonMetre,
-            "Ncm" | "N·cm" => Unit::NewtonCentimetre,
-            "mNm" | "mN·m" => Unit::MillinewtonMetre,
-            "kNm" | "kN·m" => Unit::KilonewtonMetre,
-            "in.lbf" | "in-lb" | "lb-in" | "lbf-in" => Unit::PoundInch,
-            "ft.lbf" | "ft-lb" | "lb-ft" | "lbf-ft" => Unit::PoundFoot,
-            "°C" | "degC" => Unit::Celsius,
-            "°F" | "degF" => Unit::Fahrenheit,
-            _ => return None,
-        })
+        UNITS.iter().find(|row| row.2.contains(&text)).map(|row| row.0)
     }
 
     /// The unit that a column is in if its name says it: `wave_gen_turn`, `error_arcsec`, `Winkel [deg]`, `load (Nm)`.
@@ -196,36 +187,11 @@ impl Unit {
                 return Unit::written(inside.1.trim());
             }
         }
-        let endings = [
-            ("_rad", Unit::Radian),
-            ("_mrad", Unit::Milliradian),
-            ("_deg", Unit::Degree),
-            ("_turn", Unit::Turn),
-            ("_turns", Unit::Turn),
-            ("_rev", Unit::Turn),
-            ("_arcmin", Unit::Arcminute),
-            ("_arcsec", Unit::Arcsecond),
-            ("_counts", Unit::Count),
-            ("_count", Unit::Count),
-            ("_s", Unit::Second),
-            ("_ms", Unit::Millisecond),
-            ("_us", Unit::Microsecond),
-            ("_ns", Unit::Nanosecond),
-            ("_n_m", Unit::NewtonMetre),
-            ("_Nm", Unit::NewtonMetre),
-            ("_nm", Unit::NewtonMetre),
-            ("_mNm", Unit::MillinewtonMetre),
-            ("_Ncm", Unit::NewtonCentimetre),
-            ("_mA", Unit::Milliampere),
-            ("_A", Unit::Ampere),
-            ("_V", Unit::Volt),
-            ("_c", Unit::Celsius),
-            ("_C", Unit::Celsius),
-            ("_degC", Unit::Celsius),
-            ("_k", Unit::Kelvin),
-            ("_K", Unit::Kelvin),
-        ];
-        endings.iter().find(|(end, _)| column.ends_with(end)).map(|(_, unit)| *unit)
+        if let Some((_, unit)) = IN_NAMES.iter().find(|(end, _)| column.ends_with(end)) {
+            return Some(*unit);
+        }
+        let (_, word) = column.rsplit_once('_')?;
+        Unit::written(word).filter(|_| !NOT_IN_NAMES.contains(&word))
     }
 }
 
@@ -260,7 +226,7 @@ impl Reading {
     }
 
     /// The unit in which faults are looked for: a count divided is a turn.
-    pub(super) fn plain_unit(&self) -> Unit {
+    pub(crate) fn plain_unit(&self) -> Unit {
         if self.unit == Unit::Count { Unit::Turn } else { self.unit }
     }
 
@@ -269,7 +235,7 @@ impl Reading {
     ///
     /// # Errors
     /// What was found and what is allowed; the unit itself if it is not known or not one of `allowed`.
-    pub(super) fn parse(text: &str, allowed: Family, torque_per_ampere: Option<f64>) -> Result<Reading, Wrong> {
+    pub(crate) fn parse(text: &str, allowed: Family, torque_per_ampere: Option<f64>) -> Result<Reading, Wrong> {
         let text = text.trim();
         if let Some(unit) = Unit::written(text).filter(|unit| unit.family() == allowed) {
             return Reading::of(unit).complete(false, torque_per_ampere);
@@ -317,7 +283,7 @@ impl Reading {
 
 /// Why a reading is none.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Wrong {
+pub(crate) enum Wrong {
     /// This is no unit, or none of the column's.
     Unit(String),
     /// The found value and the allowed ones.

@@ -1,5 +1,4 @@
-//! The order of rows by their stamps: newest first, unsorted, written twice, a clock on the wall that is set for
-//! summer.
+//! The order of rows by their stamps: newest first, unsorted, written twice.
 
 use flexspline_base::robust::{median_of, sampled};
 
@@ -16,9 +15,6 @@ const EVEN: f64 = 0.8;
 const TWICE: f64 = 0.1;
 /// Fewest steps that show an order.
 const FEWEST: usize = 8;
-/// By what clocks are set forward and back, s, and the time of the day at which they jump over an hour in spring, s.
-const HOUR_S: f64 = 3600.0;
-const SPRING_S: f64 = 2.0 * HOUR_S;
 
 /// The order of the rows by their stamps where they do not stand in it, and what is to be said of that.
 pub fn order(time: &[f64]) -> Option<(Vec<usize>, String)> {
@@ -59,34 +55,6 @@ pub(crate) fn twice(columns: &[&[f64]]) -> Option<(Vec<bool>, String)> {
     })
 }
 
-/// Makes the time of a clock on the wall continuous where it is set back by an hour in autumn, or forward in spring.
-pub(crate) fn daylight_saving(time: &mut [f64], notes: &mut Vec<String>) {
-    let steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
-    if steps.len() < FEWEST {
-        return;
-    }
-    let period = median_of(&mut sampled(&steps));
-    let near = |step: f64, hour: f64| (step - hour).abs() <= (10.0 * period).min(0.1 * HOUR_S);
-    let (mut ahead, mut changes) = (0.0, 0);
-    for row in 1..time.len() {
-        let before = time[row - 1] - ahead;
-        let step = time[row] - before;
-        let of_day = before.rem_euclid(super::clock::DAY_S);
-        if near(step, -HOUR_S) {
-            (ahead, changes) = (ahead + HOUR_S, changes + 1);
-        } else if near(step, HOUR_S) && near(of_day, SPRING_S) {
-            (ahead, changes) = (ahead - HOUR_S, changes + 1);
-        }
-        time[row] += ahead;
-    }
-    if changes > 0 {
-        notes.push(format!(
-            "the clock is set by an hour {changes} time{}, as for summer: time goes on there",
-            if changes == 1 { "" } else { "s" }
-        ));
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -115,22 +83,5 @@ mod tests {
         assert_eq!(twice(&[&doubled]).unwrap().0.iter().filter(|drop| **drop).count(), 50);
         assert_eq!(twice(&[&doubled, &other]), None);
         assert_eq!(twice(&[&other]), None);
-    }
-
-    #[test]
-    fn an_hour_in_spring_and_autumn() {
-        let run = |jump: f64, at: f64| -> Vec<f64> {
-            (0..200).map(|k| at + 0.1 * f64::from(k) + if k >= 100 { jump } else { 0.0 }).collect()
-        };
-        for (jump, at, changes) in
-            [(-3600.0, 3.0 * HOUR_S, 1), (3600.0, SPRING_S - 10.0, 1), (3600.0, 5e4, 0), (-60.0, 5e4, 0)]
-        {
-            let mut time = run(jump, at);
-            let mut notes = Vec::new();
-            daylight_saving(&mut time, &mut notes);
-            assert_eq!(notes.len(), changes);
-            let expected = if changes == 1 { run(0.0, at) } else { run(jump, at) };
-            assert!(time.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-6), "{jump} {at}");
-        }
     }
 }
