@@ -82,7 +82,7 @@ impl Bench {
         };
         let looked = match look(&[file]) {
             Ok(looked) => looked,
-            Err(what) => return (2, what),
+            Err(error) => return (2, error.to_string()),
         };
         if let Some(columns) = &looked.columns_option {
             // What is proposed is understood.

@@ -37,7 +37,7 @@ impl LogOptions {
             ColumnMap::with_torque_constant(&self.columns, self.torque_constant)
         };
         let map = map.map_err(bad_input)?;
-        map.at_rate(self.rate).map_err(Failure::BadInput)
+        map.at_rate(self.rate).map_err(bad_input)
     }
 
     /// Rows in a second, if that is said.

@@ -28,7 +28,7 @@ impl Look {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         let files = self.files.iter().map(|file| raw::read(file)).collect::<Result<Vec<_>, _>>();
         let files = files.map_err(bad_input)?;
-        let looked = look(&files).map_err(Failure::BadInput)?;
+        let looked = look(&files).map_err(bad_input)?;
         context.print(&looked, || text(&looked) + &say::next(&self.next(&looked)))
     }
 

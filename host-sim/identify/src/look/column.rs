@@ -72,8 +72,7 @@ fn turns() -> impl Iterator<Item = f64> {
 }
 
 /// Values made continuous where they begin anew; what is missing stays so.
-pub(super) fn unwrapped(values: &[f64], anew: Option<Anew>) -> Vec<f64> {
-    let mut values = values.to_vec();
+pub(super) fn unwrapped(mut values: Vec<f64>, anew: Option<Anew>) -> Vec<f64> {
     if let Some(anew) = anew {
         continued(&mut values, anew.span);
     }
@@ -94,7 +93,7 @@ mod tests {
             let wrapped: Vec<f64> = (0..500).map(|k| (0.031 * turn * f64::from(k)).rem_euclid(turn)).collect();
             let anew = facts(wrapped.clone()).anew;
             assert!((anew.unwrap().span / turn - 1.0).abs() < 1e-12, "{anew:?}");
-            let whole = unwrapped(&wrapped, anew);
+            let whole = unwrapped(wrapped, anew);
             assert!((whole[499] - 0.031 * turn * 499.0).abs() < 1e-6 * turn);
         }
         assert_eq!(facts((0..500).map(f64::from)).anew, None);

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use serde::Serialize;
 
-use crate::measurement::{Quantity, Rows, least_and_most, quantile_of, sampled};
+use crate::measurement::{Quantity, ReadRows, least_and_most, quantile_of, sampled};
 
 /// Parts of a turn of the output that are counted.
 const PARTS: usize = 36;
@@ -31,7 +31,7 @@ pub struct Coverage {
 }
 
 /// What the rows go through, if they have a generator angle.
-pub(super) fn of(read: &[Rows]) -> Option<Coverage> {
+pub(super) fn of(read: &[ReadRows]) -> Option<Coverage> {
     let column = |quantity: Quantity| -> Vec<f64> {
         read.iter().filter_map(|rows| rows.log.get(quantity)).flatten().copied().collect()
     };

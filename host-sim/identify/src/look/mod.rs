@@ -16,9 +16,10 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use serde::Serialize;
+use thiserror::Error;
 
 use crate::measurement::raw::RawFile;
-use crate::measurement::{APART, Column as Mapped, Quantity, Reading, Rows, Unit, median_of, sampled};
+use crate::measurement::{APART, MappedColumn, Quantity, ReadRows, Reading, Unit, median_of, sampled};
 use column::{Facts, unwrapped};
 pub(crate) use coverage::Coverage;
 use pair::pair;
@@ -223,10 +224,10 @@ impl Guess {
     }
 
     /// The column of the reader by the mapping, if it is in use.
-    fn mapped(&self, place: usize, names: &[String]) -> Option<Mapped> {
+    fn mapped(&self, place: usize, names: &[String]) -> Option<MappedColumn> {
         let quantity = self.role.in_mapping().filter(|_| self.used)?;
         let reading = Reading::parse(&self.written()?, quantity.family(), None).ok()?;
-        Some(Mapped { quantity, name: names[place].clone(), place, unit: reading.plain_unit(), reading })
+        Some(MappedColumn { quantity, name: names[place].clone(), place, unit: reading.plain_unit(), reading })
     }
 
     /// What is said of it.
@@ -258,24 +259,35 @@ impl Guess {
     }
 }
 
+/// Why files cannot be looked at together.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum LookError {
+    /// There is none.
+    #[error("no file")]
+    NoFile,
+    /// Names of two files, each with the names of its columns.
+    #[error(
+        "{} has the columns {}, but {} has {}; allowed: logs of one form together",
+        .other.0, .other.1, .first.0, .first.1
+    )]
+    OtherColumns {
+        /// The first file.
+        first: (String, String),
+        /// One with other columns.
+        other: (String, String),
+    },
+}
+
 /// Looks at files of one bench.
 ///
 /// # Errors
 /// The files do not have the same columns.
-pub fn look(files: &[RawFile]) -> Result<Looked, String> {
-    let Some(first) = files.first() else { return Err("no file".to_owned()) };
+pub fn look(files: &[RawFile]) -> Result<Looked, LookError> {
+    let first = files.first().ok_or(LookError::NoFile)?;
     let layout = &first.sheet.layout;
-    for other in &files[1..] {
-        let theirs = &other.sheet.layout.names;
-        if *theirs != layout.names {
-            return Err(format!(
-                "{} has the columns {}, but {} has {}; allowed: logs of one form together",
-                other.file,
-                theirs.join(", "),
-                first.file,
-                layout.names.join(", ")
-            ));
-        }
+    if let Some(other) = files.iter().find(|other| other.sheet.layout.names != layout.names) {
+        let of = |file: &RawFile| (file.file.clone(), file.sheet.layout.names.join(", "));
+        return Err(LookError::OtherColumns { first: of(first), other: of(other) });
     }
     let of_file = |file: &RawFile, note: String| if files.len() > 1 { format!("{}: {note}", file.file) } else { note };
     let mut notes: Vec<String> = Vec::new();
@@ -302,10 +314,11 @@ pub fn look(files: &[RawFile]) -> Result<Looked, String> {
     }
     let mut columns_option = option(&guesses, &names, &mut notes);
     // From here on the rows are those that `calibrate` and `diagnose` have by this mapping.
-    let columns: Vec<Mapped> = guesses.iter().enumerate().filter_map(|(k, guess)| guess.mapped(k, &names)).collect();
+    let columns: Vec<MappedColumn> =
+        guesses.iter().enumerate().filter_map(|(k, guess)| guess.mapped(k, &names)).collect();
     let mut read = Vec::new();
     for file in files {
-        let (mut rows, refused) = Rows::of_raw(file, &columns, ratio);
+        let (mut rows, refused) = ReadRows::of_raw(file, &columns, ratio);
         notes.extend(rows.notes.drain(..).map(|note| of_file(file, note)));
         read.push(rows);
         // A cell in use that is no number, or a row of another width, is for people to mend.
@@ -326,7 +339,7 @@ pub fn look(files: &[RawFile]) -> Result<Looked, String> {
         rivals,
         ratio_found: ratio,
         ratio_proposed: proposed,
-        sessions: read.iter().map(Rows::sessions).sum(),
+        sessions: read.iter().map(ReadRows::sessions).sum(),
         time,
         period_s,
         coverage: coverage::of(&read),
@@ -344,7 +357,7 @@ fn guess(files: &[RawFile], place: usize, of_file: &Arc<[f64]>) -> Guess {
     files[1..].iter().for_each(|file| cells.values.extend_from_slice(&file.columns.cells[place].values));
     let facts = Facts::of(&cells);
     let said = if layout.has_names { words::said(name, unit.map(String::as_str)) } else { Said::default() };
-    let values = unwrapped(&cells.values, facts.anew);
+    let values = unwrapped(std::mem::take(&mut cells.values), facts.anew);
     let mut guess = Guess {
         facts,
         said,
@@ -358,7 +371,7 @@ fn guess(files: &[RawFile], place: usize, of_file: &Arc<[f64]>) -> Guess {
         values,
         of_file: of_file.clone(),
     };
-    if cells.times.count > 0 && cells.times.count + cells.empty + cells.words.count >= cells.values.len() {
+    if cells.times.count > 0 && cells.times.count + cells.empty + cells.words.count >= guess.values.len() {
         (guess.role, guess.unit) = (Role::Time, Some(Unit::Iso));
         guess.because("times written as text", 0.95);
         return guess;
@@ -628,7 +641,7 @@ fn torque(guesses: &mut [Guess], error: Option<&[f64]>, notes: &mut Vec<String>)
 }
 
 /// Kind of time and median step, s.
-fn clock(read: &[Rows]) -> (TimeKind, Option<f64>) {
+fn clock(read: &[ReadRows]) -> (TimeKind, Option<f64>) {
     let steps = || read.iter().flat_map(|rows| rows.stamps_s.windows(2).map(|pair| pair[1] - pair[0]));
     let forward: Vec<f64> = steps().filter(|step| *step > 0.0).collect();
     if forward.is_empty() {

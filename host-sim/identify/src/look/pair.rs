@@ -27,12 +27,12 @@ struct Pair {
     output: usize,
     /// As they may be, the likeliest first; at least one.
     units: Vec<Units>,
-    rank: Rank,
+    rank: PairRank,
 }
 
 /// What speaks for a pair, the first that differs decides.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Rank {
+struct PairRank {
     /// Neither is a command.
     measured: bool,
     /// What names say: 2 for a shaft, 1 for an angle.
@@ -47,15 +47,15 @@ struct Rank {
     straight: f64,
 }
 
-impl Rank {
-    fn cmp(&self, other: &Rank) -> Ordering {
+impl PairRank {
+    fn cmp(&self, other: &PairRank) -> Ordering {
         let key =
-            |rank: &Rank| (rank.measured, rank.names, rank.joint, rank.turns_on, rank.two_sensors, rank.same_unit);
+            |rank: &PairRank| (rank.measured, rank.names, rank.joint, rank.turns_on, rank.two_sensors, rank.same_unit);
         key(self).cmp(&key(other)).then(self.straight.total_cmp(&other.straight))
     }
 
     /// Why this one goes before another.
-    fn before(&self, other: &Rank) -> &'static str {
+    fn before(&self, other: &PairRank) -> &'static str {
         match () {
             () if self.measured != other.measured => "they are measured, no command",
             () if self.names != other.names => "their names say so",
@@ -190,7 +190,7 @@ fn pairs(guesses: &[Guess]) -> Vec<Pair> {
                 continue;
             }
             let named = |guess: &Guess| 2 * u8::from(shafts(guess)) + u8::from(guess.said.angle);
-            let rank = Rank {
+            let rank = PairRank {
                 measured: g.role != Role::Command,
                 names: named(g) + named(o),
                 joint: joints.map_or(1, |_| 2 * u8::from(!two_joints)),

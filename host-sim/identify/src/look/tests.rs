@@ -366,7 +366,7 @@ fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
 
 fn looked_at(bytes: &[u8]) -> Result<Looked, String> {
     let raw = raw::parse("log.txt", bytes).map_err(|error| error.to_string())?;
-    look(&[raw])
+    look(&[raw]).map_err(|error| error.to_string())
 }
 
 fn read(bytes: &[u8], columns: &str) -> Result<Recording, String> {
@@ -541,7 +541,7 @@ fn what_is_found_is_said() {
     let two = look(&[raw.clone(), raw::RawFile { file: "b.csv".to_owned(), ..raw.clone() }]).unwrap();
     assert_eq!((two.sessions, two.time, two.rows), (2, TimeKind::Counted, 2 * ROWS));
     let other = raw::parse("c.csv", file("time,motor,load,x\n", ",", plain).as_bytes()).unwrap();
-    assert!(look(&[raw, other]).unwrap_err().contains("logs of one form"));
+    assert!(look(&[raw, other]).unwrap_err().to_string().contains("logs of one form"));
 }
 
 /// A file of columns that are called so, each a function of the bench and the row.

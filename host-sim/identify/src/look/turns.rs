@@ -76,18 +76,18 @@ pub(super) fn one_shaft(a: &Guess, b: &Guess) -> bool {
 
 /// The unit of an angle as it may be.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Reading {
+pub(super) struct UnitReading {
     /// Unit.
     pub unit: Unit,
     /// Counts of a turn, where it is counts and that can be told.
     pub counts: Option<f64>,
     /// Where it comes from.
-    pub by: By,
+    pub by: UnitFrom,
 }
 
 /// Where a unit comes from, the surest first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum By {
+pub(super) enum UnitFrom {
     /// It was known before.
     Known,
     /// The number after which the column begins anew.
@@ -100,7 +100,7 @@ pub(super) enum By {
     Ratio,
 }
 
-impl Reading {
+impl UnitReading {
     fn rad(&self) -> f64 {
         match self.unit {
             Unit::Count => TAU / self.counts.unwrap_or(1.0),
@@ -120,14 +120,14 @@ impl Reading {
 /// Units of generator and output, and the ratio that they give.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Units {
-    pub generator: Reading,
-    pub output: Reading,
+    pub generator: UnitReading,
+    pub output: UnitReading,
     pub ratio: f64,
 }
 
 impl Units {
     /// How sure the less sure of the two units is.
-    fn by(&self) -> By {
+    fn by(&self) -> UnitFrom {
         self.generator.by.max(self.output.by)
     }
 }
@@ -140,8 +140,9 @@ pub(super) fn units_of_pair(generator: &Guess, output: &Guess, raw: f64) -> Vec<
         for o in readings(output, generator) {
             let ratio = raw * g.rad() / o.rad();
             let whole = (ratio - ratio.round()).abs() < WHOLE * ratio.abs();
-            let by_ratio =
-                |reading: &Reading| reading.unit == Unit::Count && matches!(reading.by, By::Ratio | By::Other);
+            let by_ratio = |reading: &UnitReading| {
+                reading.unit == Unit::Count && matches!(reading.by, UnitFrom::Ratio | UnitFrom::Other)
+            };
             let within = (RATIOS[0]..=RATIOS[1]).contains(&ratio.abs());
             if within && (whole || !(by_ratio(&g) || by_ratio(&o))) {
                 all.push(Units { generator: g, output: o, ratio });
@@ -154,36 +155,36 @@ pub(super) fn units_of_pair(generator: &Guess, output: &Guess, raw: f64) -> Vec<
 }
 
 /// Counts of a turn as those after which a register begins anew.
-fn anew(guess: &Guess) -> Option<Reading> {
+fn anew(guess: &Guess) -> Option<UnitReading> {
     let span = guess.facts.anew.map(|anew| anew.span).filter(|_| guess.unit == Some(Unit::Count))?;
-    let reading = Reading { unit: Unit::Count, counts: Some(span), by: By::Anew };
+    let reading = UnitReading { unit: Unit::Count, counts: Some(span), by: UnitFrom::Anew };
     registers().any(|register| register == span).then_some(reading)
 }
 
 /// The units that a column may have beside another one; the same as the other one, where nothing is known of either.
-fn readings(guess: &Guess, other: &Guess) -> Vec<Reading> {
+fn readings(guess: &Guess, other: &Guess) -> Vec<UnitReading> {
     let open = |guess: &Guess| guess.rad().is_none() && anew(guess).is_none();
     let unit = guess.unit.unwrap_or(Unit::Radian);
     match (guess.unit, guess.counts) {
         _ if open(guess) && open(other) && guess.unit == other.unit => {
-            vec![Reading { unit, counts: None, by: By::Nothing }]
+            vec![UnitReading { unit, counts: None, by: UnitFrom::Nothing }]
         }
         (Some(Unit::Count), None) => {
             let beside = other.counts.or_else(|| anew(other).and_then(|reading| reading.counts));
-            let beside = beside.map(|counts| Reading { unit, counts: Some(counts), by: By::Other });
-            let powers = POWERS.map(|bits| Reading { unit, counts: Some(2f64.powi(bits)), by: By::Ratio });
+            let beside = beside.map(|counts| UnitReading { unit, counts: Some(counts), by: UnitFrom::Other });
+            let powers = POWERS.map(|bits| UnitReading { unit, counts: Some(2f64.powi(bits)), by: UnitFrom::Ratio });
             anew(guess).into_iter().chain(beside).chain(powers).collect()
         }
         (None, _) if other.unit == Some(Unit::Count) && other.counts.is_none() => {
-            vec![Reading { unit, counts: None, by: By::Nothing }]
+            vec![UnitReading { unit, counts: None, by: UnitFrom::Nothing }]
         }
-        (None, _) => Unit::ANGLES.map(|unit| Reading { unit, counts: None, by: By::Ratio }).to_vec(),
-        (Some(unit), counts) => vec![Reading { unit, counts, by: By::Known }],
+        (None, _) => Unit::ANGLES.map(|unit| UnitReading { unit, counts: None, by: UnitFrom::Ratio }).to_vec(),
+        (Some(unit), counts) => vec![UnitReading { unit, counts, by: UnitFrom::Known }],
     }
 }
 
 /// Gives a column of a pair its unit, with why; `place` is its place in the file, from 0.
-pub(super) fn settle(guess: &mut Guess, place: usize, reading: &Reading, ratio: f64, notes: &mut Vec<String>) {
+pub(super) fn settle(guess: &mut Guess, place: usize, reading: &UnitReading, ratio: f64, notes: &mut Vec<String>) {
     let open = guess.rad().is_none();
     (guess.unit, guess.counts) = (Some(reading.unit), reading.counts);
     if !open {
@@ -192,8 +193,8 @@ pub(super) fn settle(guess: &mut Guess, place: usize, reading: &Reading, ratio: 
     let why = match (reading.unit, reading.counts, reading.by) {
         (Unit::Count, Some(counts), by) => {
             let why = match by {
-                By::Anew => "after which it begins anew",
-                By::Other => "as the other encoder has",
+                UnitFrom::Anew => "after which it begins anew",
+                UnitFrom::Other => "as the other encoder has",
                 _ => "which makes the ratio nearly whole",
             };
             notes.push(format!("column {}: {counts} counts a turn, {why}: check it", place + 1));
@@ -203,7 +204,7 @@ pub(super) fn settle(guess: &mut Guess, place: usize, reading: &Reading, ratio: 
             notes.push(format!("how many counts make a turn of column {} is not in the file", place + 1));
             return;
         }
-        (unit, _, By::Nothing) => format!("{unit}, for want of a unit"),
+        (unit, _, UnitFrom::Nothing) => format!("{unit}, for want of a unit"),
         (unit, ..) => format!("{unit} makes the ratio {ratio:.2}"),
     };
     guess.why.push(why);

@@ -64,21 +64,21 @@ pub(super) fn said(name: &str, unit: Option<&str>) -> Said {
         return Said { aside: true, joint, ..Said::default() };
     }
     let by_unit = kind_of_unit(name, unit);
-    let angle = by_unit.map_or_else(|| any(&ANGLES), |kind| kind == Kind::Angle);
+    let angle = by_unit.map_or_else(|| any(&ANGLES), |kind| kind == UnitKind::Angle);
     let fits = |role: Role| match by_unit {
-        Some(Kind::Angle) => matches!(role, Role::Error | Role::Orientation | Role::Generator | Role::Output),
+        Some(UnitKind::Angle) => matches!(role, Role::Error | Role::Orientation | Role::Generator | Role::Output),
         // A drive's "current position" is not one in amperes.
         None => !(role == Role::Current && angle),
         _ => true,
     };
     let by_words = WORDS.iter().find(|(role, known)| fits(*role) && any(known)).map(|(role, _)| *role);
     let role = match by_unit {
-        Some(Kind::Speed) => Some(Role::Speed),
-        Some(Kind::Temperature) => Some(Role::Temperature),
-        Some(Kind::Torque) => Some(Role::Torque),
-        Some(Kind::Current) => by_words.filter(|role| *role == Role::Torque).or(Some(Role::Current)),
-        Some(Kind::Time) => by_words.or(Some(Role::Time)),
-        Some(Kind::Angle) | None => by_words,
+        Some(UnitKind::Speed) => Some(Role::Speed),
+        Some(UnitKind::Temperature) => Some(Role::Temperature),
+        Some(UnitKind::Torque) => Some(Role::Torque),
+        Some(UnitKind::Current) => by_words.filter(|role| *role == Role::Torque).or(Some(Role::Current)),
+        Some(UnitKind::Time) => by_words.or(Some(Role::Time)),
+        Some(UnitKind::Angle) | None => by_words,
     };
     let angle = angle && role.is_none_or(|role| role.is_angle());
     Said { role, commanded: any(&COMMANDED), angle, aside: false, joint }
@@ -86,7 +86,7 @@ pub(super) fn said(name: &str, unit: Option<&str>) -> Said {
 
 /// What a unit is one of, as far as a role follows from it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum UnitKind {
     Angle,
     Torque,
     Current,
@@ -96,34 +96,34 @@ enum Kind {
 }
 
 /// What the unit of a line of its own, in brackets, or at the end of a name is one of.
-fn kind_of_unit(name: &str, line: Option<&str>) -> Option<Kind> {
+fn kind_of_unit(name: &str, line: Option<&str>) -> Option<UnitKind> {
     let bracketed = [('[', ']'), ('(', ')')].into_iter().find_map(|(open, close)| {
         name.trim_end().strip_suffix(close).and_then(|rest| rest.rsplit_once(open)).map(|(_, unit)| unit)
     });
     let Some(text) = line.or(bracketed) else {
         // A single letter at the end of a name is a letter more often than a unit: phase_A, sensor_C.
         let unit = Unit::in_name(name).filter(|unit| matches!(unit.family(), Family::Angle | Family::Torque));
-        return unit.and_then(kind).filter(|kind| *kind != Kind::Current || name.ends_with("_mA"));
+        return unit.and_then(kind).filter(|kind| *kind != UnitKind::Current || name.ends_with("_mA"));
     };
     let text = text.trim().trim_matches(['[', ']', '(', ')']).trim();
     let lower = text.to_lowercase();
     let per_time = ["/s", "/min", "/sec", "/h", "s^-1", "s-1"].iter().any(|end| lower.contains(end));
     if per_time || ["rpm", "1/min", "u/min", "min-1"].contains(&lower.as_str()) {
-        return Some(Kind::Speed);
+        return Some(UnitKind::Speed);
     }
     Unit::in_brackets(text).and_then(kind)
 }
 
-fn kind(unit: Unit) -> Option<Kind> {
+fn kind(unit: Unit) -> Option<UnitKind> {
     match unit {
-        Unit::Ampere | Unit::Milliampere => Some(Kind::Current),
+        Unit::Ampere | Unit::Milliampere => Some(UnitKind::Current),
         // A transducer of anything.
         Unit::Volt => None,
         unit => Some(match unit.family() {
-            Family::Angle => Kind::Angle,
-            Family::Torque => Kind::Torque,
-            Family::Temperature => Kind::Temperature,
-            Family::Time => Kind::Time,
+            Family::Angle => UnitKind::Angle,
+            Family::Torque => UnitKind::Torque,
+            Family::Temperature => UnitKind::Temperature,
+            Family::Time => UnitKind::Time,
         }),
     }
 }

@@ -5,7 +5,7 @@ use std::fmt;
 use thiserror::Error;
 
 use super::reader::{Layout, unit_word};
-use super::unit::{Family, Wrong};
+use super::unit::{Family, WrongReading};
 pub use super::unit::{Reading, Unit};
 use flexspline_base::csv_rows::TableProblem;
 use flexspline_base::suggest::{did_you_mean, likeliest, question};
@@ -98,17 +98,22 @@ impl fmt::Display for Quantity {
 #[error("--columns: {0}; for instance --columns generator=wave_gen_turns:turn,error=error_arcsec:arcsec")]
 pub struct MappingError(String);
 
+/// A rate of rows that is none.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[error("--rate: found {0}, allowed: a rate above zero, Hz")]
+pub struct RateError(f64);
+
 /// Names and units of columns where they differ from
 /// `time_s, generator_rad, output_rad, error_arcsec, torque_n_m, temperature_c, orientation_rad`.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ColumnMap {
-    given: Vec<Given>,
+    given: Vec<GivenColumn>,
     rate_hz: Option<f64>,
 }
 
 /// A column that was named.
 #[derive(Debug, Clone, PartialEq)]
-struct Given {
+struct GivenColumn {
     quantity: Quantity,
     column: String,
     /// `None` where neither the mapping nor the name says a unit.
@@ -117,7 +122,7 @@ struct Given {
 
 /// A column in use.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Column {
+pub(crate) struct MappedColumn {
     /// Its contents.
     pub quantity: Quantity,
     /// Its name in the header.
@@ -162,11 +167,9 @@ impl ColumnMap {
     ///
     /// # Errors
     /// It is not above zero, or not finite.
-    pub fn at_rate(self, rate_hz: Option<f64>) -> Result<ColumnMap, String> {
+    pub fn at_rate(self, rate_hz: Option<f64>) -> Result<ColumnMap, RateError> {
         match rate_hz {
-            Some(rate) if !(rate.is_finite() && rate > 0.0) => {
-                Err(format!("--rate: found {rate}, allowed: a rate above zero, Hz"))
-            }
+            Some(rate) if !(rate.is_finite() && rate > 0.0) => Err(RateError(rate)),
             _ => Ok(ColumnMap { rate_hz, ..self }),
         }
     }
@@ -189,7 +192,7 @@ impl ColumnMap {
         names: &[String],
         line: u64,
         layout: Option<&Layout>,
-    ) -> Result<Vec<Column>, TableProblem> {
+    ) -> Result<Vec<MappedColumn>, TableProblem> {
         let problem = |what: String| TableProblem { line, what };
         let mut columns = Vec::new();
         for quantity in Quantity::ALL {
@@ -217,9 +220,9 @@ impl ColumnMap {
                     .map_err(|what| problem(format!("column {name}: {what}")))?
                     .unwrap_or(Reading::of(default.1)),
             };
-            columns.push(Column { quantity, name: name.to_owned(), place, unit: reading.plain_unit(), reading });
+            columns.push(MappedColumn { quantity, name: name.to_owned(), place, unit: reading.plain_unit(), reading });
         }
-        let has = |columns: &[Column], quantity| columns.iter().any(|c| c.quantity == quantity);
+        let has = |columns: &[MappedColumn], quantity| columns.iter().any(|c| c.quantity == quantity);
         let mapped = |quantity| self.given.iter().any(|given| given.quantity == quantity);
         if has(&columns, Quantity::Output) && has(&columns, Quantity::Error) {
             let spare =
@@ -240,7 +243,7 @@ impl ColumnMap {
     }
 
     /// What to say of columns that are not among the `used` ones, though they are nearly called as one that is missing.
-    pub(super) fn misspelt(&self, names: &[String], used: &[Column]) -> Vec<String> {
+    pub(super) fn misspelt(&self, names: &[String], used: &[MappedColumn]) -> Vec<String> {
         let spare: Vec<&str> =
             names.iter().map(String::as_str).filter(|name| used.iter().all(|column| column.name != *name)).collect();
         let missing = Quantity::ALL.into_iter().filter(|q| used.iter().all(|column| column.quantity != *q));
@@ -261,7 +264,7 @@ impl ColumnMap {
 }
 
 /// One entry of a mapping.
-fn given(entry: &str, per_ampere: Option<f64>) -> Result<Given, MappingError> {
+fn given(entry: &str, per_ampere: Option<f64>) -> Result<GivenColumn, MappingError> {
     let (name, column) = entry
         .split_once('=')
         .ok_or_else(|| MappingError(format!("found \"{entry}\", allowed: name=column:unit, separated by commas")))?;
@@ -280,8 +283,8 @@ fn given(entry: &str, per_ampere: Option<f64>) -> Result<Given, MappingError> {
         Some((column, unit)) => (column, Reading::parse(unit, quantity.family(), per_ampere).map(Some)),
     };
     let reading = reading.map_err(|wrong| match wrong {
-        Wrong::Text(what) => MappingError(format!("{name}: {what}")),
-        Wrong::Unit(unit) => {
+        WrongReading::Text(what) => MappingError(format!("{name}: {what}")),
+        WrongReading::Unit(unit) => {
             let units: Vec<_> = quantity.family().units().map(Unit::name).collect();
             let hint = did_you_mean("; ", &unit, units.iter().copied());
             MappingError(format!("{name}: found the unit \"{unit}\", allowed: {}{hint}", units.join(", ")))
@@ -291,7 +294,7 @@ fn given(entry: &str, per_ampere: Option<f64>) -> Result<Given, MappingError> {
     if column.is_empty() {
         return Err(MappingError(format!("{name}: found no column, allowed: the name of a column of the file")));
     }
-    Ok(Given { quantity, column, reading })
+    Ok(GivenColumn { quantity, column, reading })
 }
 
 /// The place that `#3`, or `3` where no column is called so, stands for.
@@ -308,7 +311,7 @@ fn unit_below(quantity: Quantity, place: usize, layout: Option<&Layout>) -> Resu
     let unit = Unit::written(word).filter(|unit| unit.family() == quantity.family());
     let reading = unit.map(|unit| Reading::parse(unit.name(), quantity.family(), None)).transpose();
     reading.map_err(|wrong| match wrong {
-        Wrong::Unit(unit) | Wrong::Text(unit) => unit,
+        WrongReading::Unit(unit) | WrongReading::Text(unit) => unit,
     })
 }
 

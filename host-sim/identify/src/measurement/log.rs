@@ -4,7 +4,7 @@ use std::io::{Cursor, Read};
 
 use thiserror::Error;
 
-use super::columns::{Column, ColumnMap, Quantity};
+use super::columns::{ColumnMap, MappedColumn, Quantity};
 use super::reader::{Cells, Columns, Layout, Sheet, clock, slower, stamps};
 use super::{phd2, rollover};
 use flexspline_base::csv_rows::TableProblem;
@@ -103,9 +103,9 @@ pub(super) fn leave_out<T>(values: &mut Vec<T>, drop: &[bool]) {
 
 /// The findings of the reader besides the rows.
 #[derive(Debug)]
-pub(crate) struct Found {
+pub(crate) struct LogFindings {
     /// The columns in use.
-    pub columns: Vec<Column>,
+    pub columns: Vec<MappedColumn>,
     /// The last line, if it broke off.
     pub broken_off: Option<u64>,
     /// What is wrong with the order of the rows, which was mended.
@@ -124,7 +124,7 @@ pub(super) fn read(
     map: &ColumnMap,
     ratio: f64,
     fewest: usize,
-) -> Result<(Log, Found), MeasuredError> {
+) -> Result<(Log, LogFindings), MeasuredError> {
     let refuse = |problem: TableProblem| MeasuredError::at(file, problem);
     let mut bytes = Vec::new();
     let begun = source.read_to_end(&mut bytes);
@@ -142,7 +142,7 @@ pub(super) fn read(
     let made = of_columns(layout, read, columns, map.rate_hz(), fewest);
     let (log, mut found) = made.map_err(refuse)?;
     notes.append(&mut found.notes);
-    Ok((log, Found { notes, ..found }))
+    Ok((log, LogFindings { notes, ..found }))
 }
 
 /// The log of `read`, which has the columns in use in their order; `rate_hz` if the file has no time.
@@ -152,10 +152,10 @@ pub(super) fn read(
 pub(crate) fn of_columns(
     layout: &Layout,
     mut read: Columns,
-    columns: Vec<Column>,
+    columns: Vec<MappedColumn>,
     rate_hz: Option<f64>,
     fewest: usize,
-) -> Result<(Log, Found), TableProblem> {
+) -> Result<(Log, LogFindings), TableProblem> {
     let last = columns.iter().map(|column| column.place).max().unwrap_or(0);
     let broken_off = read.without_broken_end(last);
     check_rows(layout, &read, &columns)?;
@@ -186,16 +186,20 @@ pub(crate) fn of_columns(
         return Err(refuse(format!("{rows} after the header; at least {fewest} {are} needed")));
     }
     if let Some(rate_hz) = rate_hz {
-        count_time(&mut log, rate_hz, &mut notes).map_err(refuse)?;
+        if log.get(Quantity::Time).is_some() {
+            return Err(refuse("the file has a column of time; allowed with it: no --rate".to_owned()));
+        }
+        log.put(Quantity::Time, (0..log.len()).map(|row| row as f64 / rate_hz).collect());
+        notes.push(format!("time is counted, {rate_hz} rows in a second: rows that are lost cannot be seen"));
     }
     let mut order = Vec::new();
     in_order(&mut log, &mut order);
     rollover::undo(&mut log, &columns, &mut notes);
     slower::fill(&mut log, &mut notes);
-    Ok((log, Found { columns, broken_off, order, notes, own_zeros: false }))
+    Ok((log, LogFindings { columns, broken_off, order, notes, own_zeros: false }))
 }
 
-fn guide_log(bytes: Vec<u8>, map: &ColumnMap, ratio: f64) -> Result<(Log, Found), TableProblem> {
+fn guide_log(bytes: Vec<u8>, map: &ColumnMap, ratio: f64) -> Result<(Log, LogFindings), TableProblem> {
     if *map != ColumnMap::default() {
         let what = "a guide log of PHD2 has columns and times of its own, found --columns or --rate; allowed: neither"
             .to_owned();
@@ -206,11 +210,11 @@ fn guide_log(bytes: Vec<u8>, map: &ColumnMap, ratio: f64) -> Result<(Log, Found)
         let what = format!("{} guided frames with a star; at least {FEWEST_ROWS} are needed", log.len());
         return Err(TableProblem { line: 1, what });
     }
-    Ok((log, Found { columns: phd2::columns(), broken_off: None, order: Vec::new(), notes, own_zeros: true }))
+    Ok((log, LogFindings { columns: phd2::columns(), broken_off: None, order: Vec::new(), notes, own_zeros: true }))
 }
 
 /// Refuses rows that end before a column in use, or have more fields than names.
-fn check_rows(layout: &Layout, read: &Columns, columns: &[Column]) -> Result<(), TableProblem> {
+fn check_rows(layout: &Layout, read: &Columns, columns: &[MappedColumn]) -> Result<(), TableProblem> {
     let beyond = |fields: usize| columns.iter().find(|column| column.place >= fields);
     let short = read.short.iter().filter(|(_, fields)| beyond(*fields).is_some());
     let Some((line, fields)) = short.chain(&read.wide).min().copied() else { return Ok(()) };
@@ -226,7 +230,7 @@ fn check_rows(layout: &Layout, read: &Columns, columns: &[Column]) -> Result<(),
 }
 
 /// Refuses what is neither a number nor nothing, and times elsewhere than in the column of time.
-fn check_cells(column: &Column, cells: &Cells) -> Result<(), TableProblem> {
+fn check_cells(column: &MappedColumn, cells: &Cells) -> Result<(), TableProblem> {
     let times = cells.times.first.as_ref().filter(|_| column.quantity != Quantity::Time);
     let Some(cell) = cells.words.first.iter().chain(times).min_by_key(|cell| cell.line) else { return Ok(()) };
     let more = cells.words.count.saturating_sub(1);
@@ -239,7 +243,7 @@ fn check_cells(column: &Column, cells: &Cells) -> Result<(), TableProblem> {
 }
 
 /// Refuses numbers that nothing of the kind has.
-fn within_limits(column: &Column, numbers: &[f64], lines: &[u64]) -> Result<(), TableProblem> {
+fn within_limits(column: &MappedColumn, numbers: &[f64], lines: &[u64]) -> Result<(), TableProblem> {
     let limit = column.quantity.limit();
     let Some(row) = numbers.iter().position(|number| column.reading.value(*number).abs() > limit) else {
         return Ok(());
@@ -269,16 +273,6 @@ fn in_order(log: &mut Log, said: &mut Vec<String>) {
         log.leave_out(&drop);
         said.push(note);
     }
-}
-
-/// The time of rows that were recorded at a rate, where the file has none.
-fn count_time(log: &mut Log, rate_hz: f64, notes: &mut Vec<String>) -> Result<(), String> {
-    if log.get(Quantity::Time).is_some() {
-        return Err("the file has a column of time; allowed with it: no --rate".to_owned());
-    }
-    log.put(Quantity::Time, (0..log.len()).map(|row| row as f64 / rate_hz).collect());
-    notes.push(format!("time is counted, {rate_hz} rows in a second: rows that are lost cannot be seen"));
-    Ok(())
 }
 
 /// A time of day goes on where a day ends.

@@ -15,6 +15,7 @@ mod gear;
 mod log;
 mod phd2;
 pub mod reader;
+mod refusal;
 mod rollover;
 mod unit;
 
@@ -22,7 +23,7 @@ use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
 
-pub(crate) use columns::Column;
+pub(crate) use columns::MappedColumn;
 pub use columns::{ColumnMap, MappingError, Quantity, Reading, Unit};
 pub use fault::{Fault, FaultName, Measures, ToothStep, Treatment};
 use faults::clock::SESSION_GAP_PERIODS;
@@ -38,8 +39,9 @@ pub(crate) use unit::Family;
 use faults::Findings;
 use faults::drift::Stretches;
 use faults::steps::Untold;
-use log::{Found, Log};
+use log::{Log, LogFindings};
 use raw::RawFile;
+use refusal::Refusal;
 
 /// More sessions than a person makes. *Guess*.
 const MANY_SESSIONS: usize = 50;
@@ -260,9 +262,9 @@ pub(crate) fn parse_as(
     gear: &Gear,
     (in_degrees, fewest): Form,
 ) -> Result<Recording, MeasuredError> {
-    let refuse = |what: String| MeasuredError { file: file.to_owned(), line: None, what };
+    let refuse = |why: Refusal| MeasuredError { file: file.to_owned(), line: None, what: why.to_string() };
     if gear.ratio == 0.0 || !gear.ratio.is_finite() {
-        return Err(refuse(format!("ratio: found {}, allowed: a finite number other than zero", gear.ratio)));
+        return Err(refuse(Refusal::NoRatio(gear.ratio)));
     }
     let (mut log, found) = log::read(file, source, columns, gear.ratio, fewest)?;
     let rows = log.len();
@@ -271,7 +273,7 @@ pub(crate) fn parse_as(
         faults::units::both_in_degrees(&mut log, Unit::Degree.factor(), &mut findings);
     }
     let recorded = in_order(&mut log, &found, &mut findings);
-    enough(&log, &recorded, fewest).map_err(refuse)?;
+    enough(&log, recorded, fewest).map_err(refuse)?;
     faults::wrap::unwrap(&mut log, &found.columns, gear.ratio, &mut findings);
     faults::leaps::check(&mut log, gear, &mut findings);
     faults::units::check(&mut log, &found.columns, gear, &mut findings).map_err(refuse)?;
@@ -307,7 +309,7 @@ pub(crate) fn parse_as(
 }
 
 /// Mends clock and holes of a log and leaves out the rows without an angle; how many had which angle.
-fn in_order(log: &mut Log, found: &Found, findings: &mut Findings) -> String {
+fn in_order(log: &mut Log, found: &LogFindings, findings: &mut Findings) -> String {
     findings.notes.extend(found.notes.iter().cloned());
     if let Some(line) = found.broken_off {
         let what = "the last line breaks off: it is left out".to_owned();
@@ -327,7 +329,7 @@ fn in_order(log: &mut Log, found: &Found, findings: &mut Findings) -> String {
 }
 
 /// The rows of a file as they are before anything is asked of the drive.
-pub(crate) struct Rows {
+pub(crate) struct ReadRows {
     pub(crate) log: Log,
     /// Times as they are written, s; none without a time.
     pub(crate) stamps_s: Vec<f64>,
@@ -335,12 +337,16 @@ pub(crate) struct Rows {
     pub(crate) notes: Vec<String>,
 }
 
-impl Rows {
+impl ReadRows {
     /// The rows of a file by these columns, and why the reader refuses them, if it does: then what is no number is
     /// missing. `ratio` as far as it is known.
-    pub(crate) fn of_raw(file: &RawFile, columns: &[Column], ratio: Option<f64>) -> (Rows, Option<MeasuredError>) {
+    pub(crate) fn of_raw(
+        file: &RawFile,
+        columns: &[MappedColumn],
+        ratio: Option<f64>,
+    ) -> (ReadRows, Option<MeasuredError>) {
         let made = |odd: bool| {
-            let cells = |column: &Column| file.columns.cells[column.place].clone();
+            let cells = |column: &MappedColumn| file.columns.cells[column.place].clone();
             let mut read = file.columns.with_cells(columns.iter().map(cells).collect());
             if !odd {
                 read.forget_what_is_odd();
@@ -351,7 +357,7 @@ impl Rows {
             Ok(made) => (Some(made), None),
             Err(problem) => (made(false).ok(), Some(MeasuredError::at(&file.file, problem))),
         };
-        let mut rows = Rows { log: Log::default(), stamps_s: Vec::new(), notes: Vec::new() };
+        let mut rows = ReadRows { log: Log::default(), stamps_s: Vec::new(), notes: Vec::new() };
         if let Some((mut log, found)) = made {
             rows.stamps_s = log.get(Quantity::Time).map_or_else(Vec::new, <[f64]>::to_vec);
             let mut findings = Findings::default();
@@ -384,14 +390,14 @@ fn recorded(log: &Log) -> String {
 }
 
 /// Whether enough rows are left, and anything moves in them.
-fn enough(log: &Log, recorded: &str, fewest: usize) -> Result<(), String> {
+fn enough(log: &Log, recorded: String, fewest: usize) -> Result<(), Refusal> {
     if log.len() < fewest {
-        return Err(format!("{} rows have all that is needed; at least {fewest} must ({recorded})", log.len()));
+        return Err(Refusal::TooFew { rows: log.len(), fewest, recorded });
     }
     let constant = |channel| log.get(channel).is_some_and(|values| values.iter().all(|value| *value == values[0]));
     let follower = log.output_or_error();
     if constant(Quantity::Generator) && constant(follower) {
-        return Err(format!("generator and {follower} keep one value throughout; at least one of them must change"));
+        return Err(Refusal::NothingMoves(follower));
     }
     Ok(())
 }

@@ -6,7 +6,7 @@
 //! begin anew with [`begins_anew`]; [`undo`] makes the counters of a log continuous. A single turn in radians is left
 //! to the check of wrapped angles, which the other angle helps.
 
-use super::columns::{Column, Quantity, Unit};
+use super::columns::{MappedColumn, Quantity, Unit};
 use super::log::Log;
 use flexspline_base::robust::{least_and_most, median_of};
 
@@ -90,7 +90,7 @@ pub(crate) fn begins_anew(values: &[f64], spans: &[f64], counts: bool, along: Op
         (times > 0).then_some(Anew { span, times, or, ambiguous })
     };
     let whole = counts && steps().all(|step| (step - step.round()).abs() <= 1e-6 * (1.0 + step.abs()));
-    let measured = Measured::of(values, &rows, &leaps, whole, along);
+    let measured = MeasuredSpan::of(values, &rows, &leaps, whole, along);
     let near =
         |span: f64| measured.is_none_or(|seen| (seen.span - span).abs() <= (NEARLY * span).max(EXCLUDED * seen.std));
     let known = spans.iter().copied().find(|span| stays_within(range, *span, COVERED) && near(*span));
@@ -114,7 +114,7 @@ pub(crate) fn begins_anew(values: &[f64], spans: &[f64], counts: bool, along: Op
 
 /// The span as the leaps show it.
 #[derive(Debug, Clone, Copy)]
-struct Measured {
+struct MeasuredSpan {
     /// In the unit of the values.
     span: f64,
     /// Its standard deviation.
@@ -125,9 +125,9 @@ struct Measured {
     agree: bool,
 }
 
-impl Measured {
+impl MeasuredSpan {
     /// The mean over the leaps of the step that makes the values beside it go on in one straight line.
-    fn of(values: &[f64], rows: &[usize], leaps: &[usize], whole: bool, along: Option<&[f64]>) -> Option<Measured> {
+    fn of(values: &[f64], rows: &[usize], leaps: &[usize], whole: bool, along: Option<&[f64]>) -> Option<MeasuredSpan> {
         let rounded = if whole { ROUNDED } else { 0.0 };
         let mut seen: Vec<Leap> = Vec::new();
         for (k, at) in leaps.iter().enumerate() {
@@ -163,7 +163,7 @@ impl Measured {
         });
         let agree =
             kept.len() as f64 >= AGREE * leaps.len() as f64 && kept.iter().all(|leap| leap.against) && at_one_place;
-        Some(Measured { span, std: (scatter / sum).sqrt(), leaps: kept.len(), agree })
+        Some(MeasuredSpan { span, std: (scatter / sum).sqrt(), leaps: kept.len(), agree })
     }
 
     /// Whether it can speak against what registers have.
@@ -241,7 +241,7 @@ pub(crate) fn continued(values: &mut [f64], span: f64) {
 }
 
 /// Makes counters of angles continuous where they begin anew and the steps between leave no doubt.
-pub(super) fn undo(log: &mut Log, columns: &[Column], notes: &mut Vec<String>) {
+pub(super) fn undo(log: &mut Log, columns: &[MappedColumn], notes: &mut Vec<String>) {
     let registers: Vec<f64> = registers().collect();
     for column in columns {
         let angle = matches!(column.quantity, Quantity::Generator | Quantity::Output | Quantity::Orientation);

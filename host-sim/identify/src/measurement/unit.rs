@@ -235,7 +235,7 @@ impl Reading {
     ///
     /// # Errors
     /// What was found and what is allowed; the unit itself if it is not known or not one of `allowed`.
-    pub(crate) fn parse(text: &str, allowed: Family, torque_per_ampere: Option<f64>) -> Result<Reading, Wrong> {
+    pub(crate) fn parse(text: &str, allowed: Family, torque_per_ampere: Option<f64>) -> Result<Reading, WrongReading> {
         let text = text.trim();
         if let Some(unit) = Unit::written(text).filter(|unit| unit.family() == allowed) {
             return Reading::of(unit).complete(false, torque_per_ampere);
@@ -243,13 +243,14 @@ impl Reading {
         let (sign, rest) = text.strip_prefix('-').map_or((1.0, text), |rest| (-1.0, rest.trim_start()));
         let end = rest.find(['*', '/', '+', '-']).unwrap_or(rest.len());
         let word = rest[..end].trim();
-        let unit =
-            Unit::written(word).filter(|unit| unit.family() == allowed).ok_or_else(|| Wrong::Unit(word.to_owned()))?;
+        let unit = Unit::written(word)
+            .filter(|unit| unit.family() == allowed)
+            .ok_or_else(|| WrongReading::Unit(word.to_owned()))?;
         let (mut gain, mut offset, mut scaled) = (sign, 0.0, false);
         let mut rest = rest[end..].trim_start();
         while let Some(operator) = rest.chars().next() {
             let (number, after) = leading_number(rest[1..].trim_start()).ok_or_else(|| {
-                Wrong::Text(format!(
+                WrongReading::Text(format!(
                     "found \"{rest}\" after the unit, allowed: *, /, + or - and a number, for instance count/16777216 \
                      or V*20-0.4"
                 ))
@@ -263,27 +264,27 @@ impl Reading {
             rest = after.trim_start();
         }
         if !(gain.is_finite() && offset.is_finite() && gain != 0.0) {
-            return Err(Wrong::Text(format!("found \"{text}\", allowed: a gain that is finite and not zero")));
+            return Err(WrongReading::Text(format!("found \"{text}\", allowed: a gain that is finite and not zero")));
         }
         Reading { unit, gain, offset }.complete(scaled, torque_per_ampere)
     }
 
     /// With the gain that a current has without being told, or the error that one is missing.
-    fn complete(mut self, scaled: bool, torque_per_ampere: Option<f64>) -> Result<Reading, Wrong> {
+    fn complete(mut self, scaled: bool, torque_per_ampere: Option<f64>) -> Result<Reading, WrongReading> {
         let Some(needs) = self.unit.needs_gain().filter(|_| !scaled) else { return Ok(self) };
         let ampere = match self.unit {
             Unit::Ampere => torque_per_ampere,
             Unit::Milliampere => torque_per_ampere.map(|torque| 1e-3 * torque),
             _ => None,
         };
-        self.gain *= ampere.ok_or_else(|| Wrong::Text(format!("{} needs a number: {needs}", self.unit)))?;
+        self.gain *= ampere.ok_or_else(|| WrongReading::Text(format!("{} needs a number: {needs}", self.unit)))?;
         Ok(self)
     }
 }
 
 /// Why a reading is none.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Wrong {
+pub(crate) enum WrongReading {
     /// This is no unit, or none of the column's.
     Unit(String),
     /// The found value and the allowed ones.
@@ -371,12 +372,12 @@ mod tests {
             ("deg*2x", Family::Angle, "after the unit"),
         ] {
             match Reading::parse(text, allowed, None) {
-                Err(Wrong::Text(what)) => assert!(what.contains(said), "{text}: {what}"),
+                Err(WrongReading::Text(what)) => assert!(what.contains(said), "{text}: {what}"),
                 other => panic!("{text}: {other:?}"),
             }
         }
-        assert_eq!(Reading::parse("grad", Family::Angle, None), Err(Wrong::Unit("grad".to_owned())));
-        assert_eq!(Reading::parse("deg", Family::Time, None), Err(Wrong::Unit("deg".to_owned())));
+        assert_eq!(Reading::parse("grad", Family::Angle, None), Err(WrongReading::Unit("grad".to_owned())));
+        assert_eq!(Reading::parse("deg", Family::Time, None), Err(WrongReading::Unit("deg".to_owned())));
     }
 
     #[test]

@@ -9,6 +9,7 @@ use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
+use crate::measurement::refusal::Refusal;
 use flexspline_base::robust::{least_and_most, quantile_of, sampled, white_noise};
 
 /// Chance of one false alarm in a file, for a channel with noise.
@@ -68,7 +69,7 @@ pub(in crate::measurement) fn check(
     gear: &Gear,
     error_recorded: bool,
     findings: &mut Findings,
-) -> Result<(), String> {
+) -> Result<(), Refusal> {
     let rows: usize = sessions.iter().map(Session::len).sum();
     let outputs: Vec<Vec<f64>> = sessions.iter().map(|session| session.output_rad(gear.ratio)).collect();
     let (noise, step) = noise_and_step(&outputs.iter().map(Vec::as_slice).collect::<Vec<_>>());
@@ -130,11 +131,8 @@ pub(in crate::measurement) fn check(
     let left: usize = drop.iter().flatten().filter(|dropped| !**dropped).count();
     if 2 * left < rows {
         let fault = findings.faults.iter().find(|fault| fault.name == FaultName::FrozenChannel);
-        let channel = fault.and_then(|fault| fault.channel).map_or("output", Quantity::name);
-        return Err(format!(
-            "the {channel} keeps one value over {} of {rows} rows; allowed: at most half of them",
-            rows - left
-        ));
+        let channel = fault.and_then(|fault| fault.channel).unwrap_or(Quantity::Output);
+        return Err(Refusal::Frozen { channel, frozen: rows - left, rows });
     }
     saturated(sessions, rows, &mut drop, findings);
     beside(sessions, Quantity::Torque, rows, &mut drop, findings);

@@ -5,10 +5,11 @@
 //! does not say in which: it is left out, with the units that it may have and how to say them.
 
 use super::{Findings, span};
-use crate::measurement::columns::{Column, Quantity, Reading, Unit};
+use crate::measurement::columns::{MappedColumn, Quantity, Reading, Unit};
 use crate::measurement::fault::{Fault, FaultName, Treatment};
 use crate::measurement::gear::Gear;
 use crate::measurement::log::{FEWEST_ROWS, Log};
+use crate::measurement::refusal::Refusal;
 use crate::measurement::unit::Family;
 use flexspline_base::robust::{least_and_most, median_of, quantile_of, sampled};
 
@@ -35,10 +36,10 @@ const TEMPERATURES_C: [f64; 2] = [-180.0, 180.0];
 /// Finds and repairs units; an error says what cannot be decided.
 pub(in crate::measurement) fn check(
     log: &mut Log,
-    columns: &[Column],
+    columns: &[MappedColumn],
     gear: &Gear,
     findings: &mut Findings,
-) -> Result<(), String> {
+) -> Result<(), Refusal> {
     torque(log, columns, gear, findings)?;
     temperature(log, columns, findings);
     if log.output_or_error() == Quantity::Output {
@@ -61,11 +62,11 @@ pub(in crate::measurement) fn both_in_degrees(log: &mut Log, scale: f64, finding
     findings.faults.push(fault);
 }
 
-fn name(columns: &[Column], quantity: Quantity) -> &str {
+fn name(columns: &[MappedColumn], quantity: Quantity) -> &str {
     columns.iter().find(|column| column.quantity == quantity).map_or(quantity.name(), |column| &column.name)
 }
 
-fn unit(columns: &[Column], quantity: Quantity) -> Unit {
+fn unit(columns: &[MappedColumn], quantity: Quantity) -> Unit {
     columns.iter().find(|column| column.quantity == quantity).map_or(quantity.default_column().1, |column| column.unit)
 }
 
@@ -84,7 +85,7 @@ fn say_it(quantity: Quantity, column: &str, may_be: &[(Unit, f64)], inside: &str
 }
 
 /// A torque beyond what a drive bears is in another unit, and is not used.
-fn torque(log: &mut Log, columns: &[Column], gear: &Gear, findings: &mut Findings) -> Result<(), String> {
+fn torque(log: &mut Log, columns: &[MappedColumn], gear: &Gear, findings: &mut Findings) -> Result<(), Refusal> {
     let limit = gear.largest_torque_n_m;
     let Some(values) = log.get(Quantity::Torque) else { return Ok(()) };
     let mut sizes: Vec<f64> = sampled(values).into_iter().filter(|t| t.is_finite()).map(f64::abs).collect();
@@ -94,7 +95,7 @@ fn torque(log: &mut Log, columns: &[Column], gear: &Gear, findings: &mut Finding
     }
     let units = may_be(size, unit(columns, Quantity::Torque), Family::Torque, |torque| torque <= limit);
     if units.is_empty() {
-        return Err(format!("torque: found {size:e} N.m in a twentieth of the rows, allowed: at most {limit:e} N.m"));
+        return Err(Refusal::Torque { size, limit });
     }
     let say_it = say_it(Quantity::Torque, name(columns, Quantity::Torque), &units, "N.m");
     let what = format!(
@@ -105,7 +106,7 @@ fn torque(log: &mut Log, columns: &[Column], gear: &Gear, findings: &mut Finding
 }
 
 /// A temperature at which no drive exists is in another unit, and is not used.
-fn temperature(log: &mut Log, columns: &[Column], findings: &mut Findings) {
+fn temperature(log: &mut Log, columns: &[MappedColumn], findings: &mut Findings) {
     let Some(values) = log.get(Quantity::Temperature) else { return };
     let mut some: Vec<f64> = sampled(values).into_iter().filter(|t| t.is_finite()).collect();
     let median = median_of(&mut some);
@@ -180,7 +181,7 @@ fn typical_slope(mut pieces: Vec<(f64, f64)>) -> f64 {
     middle.map_or(0.0, |(psi, delta)| delta / psi)
 }
 
-fn ratio(log: &mut Log, columns: &[Column], gear: &Gear, findings: &mut Findings) -> Result<(), String> {
+fn ratio(log: &mut Log, columns: &[MappedColumn], gear: &Gear, findings: &mut Findings) -> Result<(), Refusal> {
     let Some((slope, psi, travel)) = slope(log) else {
         findings.notes.push("the generator stands still: nothing that turns with it can be seen".to_owned());
         return Ok(());
@@ -213,10 +214,7 @@ fn ratio(log: &mut Log, columns: &[Column], gear: &Gear, findings: &mut Findings
         && travel > TELLS_WHEELS_APART_RAD
         && (slope * other - 1.0).abs() <= OTHER_WHEEL
     {
-        return Err(format!(
-            "{seen}: that is the ratio {other} of the same teeth with the other wheel fixed; allowed: the wheel that \
-             is fixed in the drive measured"
-        ));
+        return Err(Refusal::OtherWheel { seen, ratio: other });
     }
     if (found + 1.0).abs() <= 0.1 {
         fault.channel = Some(Quantity::Output);
@@ -251,10 +249,7 @@ fn ratio(log: &mut Log, columns: &[Column], gear: &Gear, findings: &mut Findings
         }
         [_, _, ..] => {
             let say = fits.iter().map(|(channel, unit, _)| format!("{channel}={}:{unit}", name(columns, *channel)));
-            let say = say.collect::<Vec<_>>().join(", or ");
-            return Err(format!(
-                "{seen}: one of the two is in another unit, and the ratio does not say which; allowed: --columns {say}"
-            ));
+            return Err(Refusal::OneOfTwoUnits { seen, readings: say.collect() });
         }
         [] => {}
     }
@@ -264,18 +259,11 @@ fn ratio(log: &mut Log, columns: &[Column], gear: &Gear, findings: &mut Findings
         exchange(log, fault, &seen, findings);
         return Ok(());
     }
-    let units = Unit::ANGLES.map(Unit::name).join(", ");
     Err(if slope == 0.0 || (found.abs() < 0.05 && travel < ENOUGH_MOTION_RAD) {
-        format!(
-            "{output} does not follow: {generator} turns by {psi:.3} rad, {output} by {travel:.6} rad; allowed: an \
-             output that turns"
-        )
+        let (generator, output) = (generator.to_owned(), output.to_owned());
+        Refusal::OutputStands { generator, output, turned: psi, followed: travel }
     } else {
-        format!(
-            "{seen}; allowed: within a factor of {} of it. Are columns, units ({units}) and ratio right? They are \
-             mapped with --columns generator=NAME:UNIT,output=NAME:UNIT",
-            RATIO_ERROR[1]
-        )
+        Refusal::OtherRatio { seen, factor: RATIO_ERROR[1] }
     })
 }
 
@@ -290,7 +278,7 @@ fn exchange(log: &mut Log, mut fault: Fault, seen: &str, findings: &mut Findings
 }
 
 /// Whether recorded errors have the size of errors.
-fn error_size(log: &Log, columns: &[Column]) -> Result<(), String> {
+fn error_size(log: &Log, columns: &[MappedColumn]) -> Result<(), Refusal> {
     let (Some(error), Some(generator)) = (log.get(Quantity::Error), log.get(Quantity::Generator)) else {
         return Ok(());
     };
@@ -312,13 +300,8 @@ fn error_size(log: &Log, columns: &[Column]) -> Result<(), String> {
     let mut left: Vec<f64> = some.iter().map(|p| (p.1 - mean.1 - slope * (p.0 - mean.0)).abs()).collect();
     let spread = quantile_of(&mut left, 0.75);
     let (column, given) = (name(columns, Quantity::Error), unit(columns, Quantity::Error));
-    let units = Unit::ANGLES.map(Unit::name).join(", ");
     if spread > SPREADS_RAD[0] || (spread > 0.0 && spread < SPREADS_RAD[1]) {
-        let found = spread / given.factor();
-        return Err(format!(
-            "{column}: found errors of {found:e} {given}, allowed: between a thousandth of an arc-second and ten \
-             degrees. Is its unit ({units}) right? It is mapped with --columns error=NAME:UNIT"
-        ));
+        return Err(Refusal::SizeOfErrors { column: column.to_owned(), found: spread / given.factor(), unit: given });
     }
     Ok(())
 }

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::{Findings, span};
-use crate::measurement::columns::{Column, Quantity, Unit};
+use crate::measurement::columns::{MappedColumn, Quantity, Unit};
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::log::Log;
 use crate::measurement::rollover::{COVERED, LEAPS, UNAMBIGUOUS, stays_within};
@@ -22,7 +22,7 @@ const GOES_ON: f64 = 0.25;
 const MOST_SKIPPED: f64 = 3.5;
 
 /// Finds wrapped angles (also in a unit other than the one given, which is a fault) and unwraps them.
-pub(in crate::measurement) fn unwrap(log: &mut Log, columns: &[Column], ratio: f64, findings: &mut Findings) {
+pub(in crate::measurement) fn unwrap(log: &mut Log, columns: &[MappedColumn], ratio: f64, findings: &mut Findings) {
     // The output first: it is slow, and shows how far a fast generator has turned.
     for channel in [Quantity::Output, Quantity::Orientation, Quantity::Generator] {
         let Some(column) = columns.iter().find(|column| column.quantity == channel) else { continue };

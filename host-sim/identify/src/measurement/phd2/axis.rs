@@ -10,7 +10,7 @@
 //! is. A slew is another target, with the hour angles of its own sections.
 
 use super::SIDEREAL_DAY_S;
-use super::text::Written;
+use super::text::WrittenNumber;
 
 /// Hours to a turn.
 const HOURS: f64 = 24.0;
@@ -24,7 +24,7 @@ pub(super) struct Pointing {
     /// When it begins, s.
     pub begins_s: f64,
     /// Hours.
-    pub hour_angle: Option<Written>,
+    pub hour_angle: Option<WrittenNumber>,
     /// Whether the tube is west of the pier.
     pub west: bool,
 }
@@ -47,7 +47,7 @@ pub(super) fn stands(sections: &[Pointing], ratio: f64) -> (Vec<f64>, Vec<String
     let mut targets: Vec<Target> = Vec::new();
     let mut of: Vec<Option<(usize, f64)>> = Vec::new();
     for section in sections {
-        let Some(Written { value, decimals }) = section.hour_angle else {
+        let Some(WrittenNumber { value, decimals }) = section.hour_angle else {
             of.push(None);
             continue;
         };
@@ -107,7 +107,7 @@ mod tests {
     use super::*;
 
     fn at(begins_s: f64, hours: Option<f64>, west: bool) -> Pointing {
-        Pointing { begins_s, hour_angle: hours.map(|value| Written { value, decimals: 2 }), west }
+        Pointing { begins_s, hour_angle: hours.map(|value| WrittenNumber { value, decimals: 2 }), west }
     }
 
     fn turns(sections: &[Pointing]) -> Vec<f64> {

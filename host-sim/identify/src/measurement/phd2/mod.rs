@@ -26,7 +26,7 @@ use super::reader::clock;
 use axis::Pointing;
 use flexspline_base::csv_rows::TableProblem;
 use flexspline_base::units::ARCSEC_PER_RAD;
-use text::{Header, Written, number, said, word_of};
+use text::{Header, WrittenNumber, number, said, word_of};
 
 /// A turn of the sky, s.
 const SIDEREAL_DAY_S: f64 = 86_164.090_5;
@@ -47,7 +47,7 @@ pub(super) fn is_one(head: &[u8]) -> bool {
 
 /// A section: what it says of itself, and its rows.
 #[derive(Default)]
-struct Section {
+struct GuideSection {
     /// Its first line.
     line: u64,
     pointing: Pointing,
@@ -81,7 +81,7 @@ struct Frame {
     sent: f64,
 }
 
-impl Section {
+impl GuideSection {
     /// When the last row of it was recorded, s.
     fn ends_s(&self) -> f64 {
         self.pointing.begins_s + self.frames.last().map_or(0.0, |frame| frame.time_s)
@@ -95,7 +95,7 @@ impl Section {
         self.declination_deg = value("Dec = ", &["deg"]).or(self.declination_deg);
         self.x_rate = positive("xRate = ").or(self.x_rate);
         self.guide_speed = positive("RA Guide Speed = ").or(self.guide_speed);
-        let hours = said(line, "Hour angle = ", &["h"]).filter(|hours: &Written| hours.value.abs() <= 24.0);
+        let hours = said(line, "Hour angle = ", &["h"]).filter(|hours: &WrittenNumber| hours.value.abs() <= 24.0);
         self.pointing.hour_angle = hours.or(self.pointing.hour_angle);
         if let Some(side) = word_of(line, "Pier side = ") {
             self.pointing.west = side.eq_ignore_ascii_case("west");
@@ -159,7 +159,7 @@ impl Section {
 
 /// Reads a guide log of an axis with this ratio; the rows and what is to be said of them.
 pub(super) fn read(source: impl Read, ratio: f64) -> Result<(Log, Vec<String>), TableProblem> {
-    let mut sections: Vec<Section> = Vec::new();
+    let mut sections: Vec<GuideSection> = Vec::new();
     let (mut guiding, mut session) = (false, 0_u32);
     for (line, number) in BufReader::new(source).split(b'\n').zip(1_u64..) {
         let line = line.map_err(|error| TableProblem { line: number, what: error.to_string() })?;
@@ -170,7 +170,7 @@ pub(super) fn read(source: impl Read, ratio: f64) -> Result<(Log, Vec<String>), 
             guiding = true;
             let begins_s = clock::seconds(at.trim_end_matches([',', ';', '\t', '"', ' '])).unwrap_or(0.0);
             let pointing = Pointing { begins_s, ..Pointing::default() };
-            sections.push(Section { line: number, pointing, ..Section::default() });
+            sections.push(GuideSection { line: number, pointing, ..GuideSection::default() });
             continue;
         }
         if line.starts_with("Guiding Ends") || line.starts_with("Calibration Begins") {
@@ -210,7 +210,7 @@ pub(super) fn read(source: impl Read, ratio: f64) -> Result<(Log, Vec<String>), 
 }
 
 /// Sets the clock forward where it was set back within the night; says where.
-fn clock_runs_on(sections: &mut [Section]) -> Option<String> {
+fn clock_runs_on(sections: &mut [GuideSection]) -> Option<String> {
     let (mut ahead_s, mut last_s, mut first) = (0.0, f64::NEG_INFINITY, None);
     for section in sections {
         section.pointing.begins_s += ahead_s;
@@ -230,8 +230,8 @@ fn clock_runs_on(sections: &mut [Section]) -> Option<String> {
 }
 
 /// The rows of all sections as one log.
-fn of_sections(sections: &[Section], stands: &[f64], ratio: f64, further: Vec<String>) -> (Log, Vec<String>) {
-    let total = |of: fn(&Section) -> i64| sections.iter().map(of).sum::<i64>();
+fn of_sections(sections: &[GuideSection], stands: &[f64], ratio: f64, further: Vec<String>) -> (Log, Vec<String>) {
+    let total = |of: fn(&GuideSection) -> i64| sections.iter().map(of).sum::<i64>();
     let pulses = total(|section| section.pulses.into());
     let lost = total(|section| section.lost.into());
     // A star is followed by a pulse west where the axis lags.
@@ -255,7 +255,7 @@ fn of_sections(sections: &[Section], stands: &[f64], ratio: f64, further: Vec<St
         let of = sections.iter().zip(stands);
         of.flat_map(|(section, stands)| section.frames.iter().map(move |frame| (section, *stands, frame)))
     };
-    let column = |of: &dyn Fn(&Section, f64, &Frame) -> f64| -> Vec<f64> {
+    let column = |of: &dyn Fn(&GuideSection, f64, &Frame) -> f64| -> Vec<f64> {
         frames().map(|(section, stands, frame)| of(section, stands, frame)).collect()
     };
     let mut log = Log::default();
@@ -268,11 +268,11 @@ fn of_sections(sections: &[Section], stands: &[f64], ratio: f64, further: Vec<St
 }
 
 /// The columns of such a log as if they had been mapped.
-pub(super) fn columns() -> Vec<super::columns::Column> {
+pub(super) fn columns() -> Vec<super::columns::MappedColumn> {
     [(Quantity::Time, Unit::Second), (Quantity::Generator, Unit::Radian), (Quantity::Error, Unit::Radian)]
         .into_iter()
         .enumerate()
-        .map(|(place, (quantity, unit))| super::columns::Column {
+        .map(|(place, (quantity, unit))| super::columns::MappedColumn {
             quantity,
             name: COLUMNS[[0, 0, 2][place]].to_owned(),
             place,

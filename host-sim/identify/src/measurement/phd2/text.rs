@@ -11,7 +11,7 @@ const SEPARATORS: [char; 3] = [',', ';', '\t'];
 
 /// A number, with how many decimals it is written.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Written {
+pub(super) struct WrittenNumber {
     pub value: f64,
     pub decimals: i32,
 }
@@ -19,7 +19,7 @@ pub(super) struct Written {
 /// The number behind `word`, which begins a line or stands behind a comma or a semicolon: `Dec = ` is none in
 /// `Cal Dec = 5.0`. Nothing where another unit than one of `units` follows (`Dec = 6.8"/s` is a rate); no units are
 /// any.
-pub(super) fn said(line: &str, word: &str, units: &[&str]) -> Option<Written> {
+pub(super) fn said(line: &str, word: &str, units: &[&str]) -> Option<WrittenNumber> {
     let begins = |at: &usize| {
         let before = line[..*at].trim_end().chars().next_back();
         before.is_none_or(|c| SEPARATORS.contains(&c) || c == '"')
@@ -38,7 +38,7 @@ pub(super) fn said(line: &str, word: &str, units: &[&str]) -> Option<Written> {
         return None;
     }
     let decimals = rest[..end].find(['.', ',']).map_or(0, |point| end - point - 1);
-    Some(Written { value: number(&rest[..end])?, decimals: decimals as i32 })
+    Some(WrittenNumber { value: number(&rest[..end])?, decimals: decimals as i32 })
 }
 
 /// The word behind `word`.
@@ -134,7 +134,7 @@ mod tests {
             assert_eq!(deg(none), None, "{none}");
         }
         let hours = said("Dec = 69,0 deg, Hour angle = -3,84 hr", "Hour angle = ", &["hr"]);
-        assert_eq!(hours, Some(Written { value: -3.84, decimals: 2 }));
+        assert_eq!(hours, Some(WrittenNumber { value: -3.84, decimals: 2 }));
         assert_eq!(said("Hour angle = N/A hr", "Hour angle = ", &["hr"]), None);
         assert_eq!(said("Pixel scale = 1.50 arc-sec/px, Binning = 1", "Pixel scale = ", &[]).unwrap().value, 1.5);
         assert_eq!(word_of("Hour angle = 1 hr, Pier side = West, Alt", "Pier side = "), Some("West"));

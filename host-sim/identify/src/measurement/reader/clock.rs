@@ -23,7 +23,7 @@ const FORMS: [&str; 9] = [
 
 /// The form of a column of times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Form {
+pub(super) enum TimeForm {
     /// ISO 8601.
     Iso,
     /// As `strptime` reads it.
@@ -41,16 +41,16 @@ pub(super) struct Stamp {
 
 /// A time in ISO 8601, s: since 1970 where a date is said, else since midnight. `None` if it is none.
 pub(in crate::measurement) fn seconds(text: &str) -> Option<f64> {
-    Form::Iso.read(text).map(|stamp| stamp.seconds)
+    TimeForm::Iso.read(text).map(|stamp| stamp.seconds)
 }
 
 /// The form in which all of these texts, at least one, are times.
-pub(super) fn form<'a>(texts: impl Iterator<Item = &'a str> + Clone) -> Option<Form> {
+pub(super) fn form<'a>(texts: impl Iterator<Item = &'a str> + Clone) -> Option<TimeForm> {
     let timely = |text: &str| text.contains([':', 'T']) && text.starts_with(|c: char| c.is_ascii_digit());
     if !texts.clone().next().is_some_and(timely) {
         return None;
     }
-    let forms = std::iter::once(Form::Iso).chain(FORMS.into_iter().map(Form::Written));
+    let forms = std::iter::once(TimeForm::Iso).chain(FORMS.into_iter().map(TimeForm::Written));
     forms.into_iter().find(|form| texts.clone().all(|text| form.read(text).is_some()))
 }
 
@@ -59,13 +59,13 @@ pub(super) fn is_date(text: &str) -> bool {
     text.starts_with(|c: char| c.is_ascii_digit()) && form([format!("{text} 00:00:00").as_str()].into_iter()).is_some()
 }
 
-impl Form {
+impl TimeForm {
     /// A time in this form.
     pub fn read(self, text: &str) -> Option<Stamp> {
         // A comma before decimals is one of ISO 8601 as well, but not of `strptime`.
         match self {
-            Form::Iso => iso(text),
-            Form::Written(form) => {
+            TimeForm::Iso => iso(text),
+            TimeForm::Written(form) => {
                 let read = strtime::parse(form, text.replace(',', ".")).ok()?;
                 match read.to_datetime() {
                     Ok(at) => Some(Stamp { seconds: since_1970(at), has_date: true }),

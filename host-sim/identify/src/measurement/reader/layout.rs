@@ -7,8 +7,8 @@
 use std::collections::BTreeSet;
 
 use super::super::unit::Unit;
-use super::clock::{self, Form};
-use super::number::{self, Cell};
+use super::clock::{self, TimeForm};
+use super::number::{self, CellValue};
 use flexspline_base::csv_rows::TableProblem;
 
 /// Bytes of a file that its layout is found from.
@@ -125,9 +125,9 @@ pub struct Layout {
     /// The line from which rows are read.
     pub(super) first_row_line: u64,
     /// The kind of most cells of a column.
-    pub(super) kinds: Vec<Field>,
+    pub(super) kinds: Vec<CellKind>,
     /// The form of the times of a column.
-    pub(super) forms: Vec<Option<Form>>,
+    pub(super) forms: Vec<Option<TimeForm>>,
     /// How a time is put together of several columns.
     pub(super) stamp: Option<Joined>,
 }
@@ -144,7 +144,7 @@ pub(super) enum Joined {
 
 /// Kinds of field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Field {
+pub(super) enum CellKind {
     Number,
     Time,
     Date,
@@ -152,32 +152,32 @@ pub(super) enum Field {
     Nothing,
 }
 
-impl Field {
-    fn of(text: &str, comma: bool) -> Field {
+impl CellKind {
+    fn of(text: &str, comma: bool) -> CellKind {
         match number::cell(text.as_bytes(), comma) {
-            Cell::Number(_) => Field::Number,
-            Cell::Nothing | Cell::Over => Field::Nothing,
-            Cell::Word if clock::form([text].into_iter()).is_some() => Field::Time,
-            Cell::Word if clock::is_date(text) => Field::Date,
-            Cell::Word => Field::Text,
+            CellValue::Number(_) => CellKind::Number,
+            CellValue::Nothing | CellValue::Over => CellKind::Nothing,
+            CellValue::Word if clock::form([text].into_iter()).is_some() => CellKind::Time,
+            CellValue::Word if clock::is_date(text) => CellKind::Date,
+            CellValue::Word => CellKind::Text,
         }
     }
 }
 
 /// A line of the head of a file.
-struct Line {
+struct HeadLine {
     /// From 1.
     number: u64,
     fields: Vec<String>,
 }
 
 /// The head of a file as one separator gives it.
-struct Guess {
+struct HeadGuess {
     separator: Separator,
-    lines: Vec<Line>,
+    lines: Vec<HeadLine>,
     width: usize,
     comma: bool,
-    kinds: Vec<Field>,
+    kinds: Vec<CellKind>,
 }
 
 impl Layout {
@@ -192,7 +192,7 @@ impl Layout {
         // Names that are looked for, in the first line with commas, are a header whatever stands below: what does not
         // fit is for the reader to refuse.
         let first = lines(head, Separator::Comma).into_iter().next();
-        let first = first.unwrap_or(Line { number: 1, fields: Vec::new() });
+        let first = first.unwrap_or(HeadLine { number: 1, fields: Vec::new() });
         let own = first.fields.len() > 1 && first.fields.iter().any(|name| known.contains(&name.as_str()));
         let guessed = guess(head).map(|guess| Layout::guessed(head, guess, known, notes)).transpose()?;
         Ok(match guessed {
@@ -204,7 +204,7 @@ impl Layout {
                 units: Vec::new(),
                 header_line: first.number,
                 first_row_line: first.number + 1,
-                kinds: vec![Field::Number; first.fields.len()],
+                kinds: vec![CellKind::Number; first.fields.len()],
                 forms: vec![None; first.fields.len()],
                 stamp: None,
                 names: first.fields,
@@ -212,12 +212,12 @@ impl Layout {
         })
     }
 
-    fn guessed(head: &[u8], guess: Guess, known: &[&str], notes: &mut Vec<String>) -> Result<Layout, TableProblem> {
-        let Guess { separator, lines, width, comma, kinds } = guess;
-        let row = |line: &Line| is_row(&line.fields, comma) && !begins_with_a_word(&line.fields, &kinds);
+    fn guessed(head: &[u8], guess: HeadGuess, known: &[&str], notes: &mut Vec<String>) -> Result<Layout, TableProblem> {
+        let HeadGuess { separator, lines, width, comma, kinds } = guess;
+        let row = |line: &HeadLine| is_row(&line.fields, comma) && !begins_with_a_word(&line.fields, &kinds);
         let full = lines.iter().position(|line| line.fields.len() >= width && row(line)).unwrap_or(0);
         // Rows of fewer fields above the first of the usual width are rows as well.
-        let shorter = |line: &&Line| line.fields.len() > 1 && row(line) && !has_a_word(&line.fields, comma);
+        let shorter = |line: &&HeadLine| line.fields.len() > 1 && row(line) && !has_a_word(&line.fields, comma);
         let rows_from = full - lines[..full].iter().rev().take_while(shorter).count();
         let begins = lines[rows_from].number;
         let mut layout = Layout {
@@ -239,7 +239,7 @@ impl Layout {
             (layout.has_names, layout.header_line, layout.names) = (true, line, names);
         }
         layout.enough_names(rows)?;
-        layout.kinds.resize(layout.names.len().max(width), Field::Nothing);
+        layout.kinds.resize(layout.names.len().max(width), CellKind::Nothing);
         layout.find_times(rows, notes);
         layout.one_instant_a_line(rows)?;
         Ok(layout)
@@ -248,7 +248,7 @@ impl Layout {
     /// The names of the columns above the rows, and the units below them.
     fn find_names(
         &mut self,
-        above: &[Line],
+        above: &[HeadLine],
         width: usize,
         known: &[&str],
         notes: &mut Vec<String>,
@@ -260,13 +260,14 @@ impl Layout {
         };
         let Some(block) = (0..above.len()).rev().take_while(|k| fits(*k)).last() else { return Ok(None) };
         let block = &above[block..];
-        let candidates: Vec<&Line> = block.iter().filter(|line| looks_like_names(&line.fields)).collect();
+        let candidates: Vec<&HeadLine> = block.iter().filter(|line| looks_like_names(&line.fields)).collect();
         let units = candidates.iter().find(|line| looks_like_units(&line.fields)).filter(|_| candidates.len() > 1);
         let units_line = units.map_or(0, |line| line.number);
         // Names differ from one another; a line that has one word for all columns is something else.
-        let distinct = |line: &Line| line.fields.iter().filter(|name| !name.is_empty()).collect::<BTreeSet<_>>().len();
-        let of_known = |line: &Line| line.fields.iter().filter(|name| known.contains(&name.as_str())).count();
-        let best = |among: &dyn Fn(&Line) -> bool| {
+        let distinct =
+            |line: &HeadLine| line.fields.iter().filter(|name| !name.is_empty()).collect::<BTreeSet<_>>().len();
+        let of_known = |line: &HeadLine| line.fields.iter().filter(|name| known.contains(&name.as_str())).count();
+        let best = |among: &dyn Fn(&HeadLine) -> bool| {
             let some = candidates.iter().filter(|line| line.number != units_line && among(line));
             some.max_by_key(|line| (of_known(line), distinct(line), line.number))
         };
@@ -279,7 +280,7 @@ impl Layout {
             return Err(own_times(keyed.number, &keyed.fields));
         }
         self.units = units.map_or_else(Vec::new, |line| line.fields.clone());
-        let others: Vec<&Line> =
+        let others: Vec<&HeadLine> =
             block.iter().filter(|line| line.number != names.number && line.number != units_line).collect();
         if let (Some(first), Some(last)) = (others.first(), others.last()) {
             let which = if first.number == last.number {
@@ -295,13 +296,13 @@ impl Layout {
     }
 
     /// Refuses rows that have more fields than there are names: it is not known which names are whose.
-    fn enough_names(&self, rows: &[Line]) -> Result<(), TableProblem> {
-        let used = 1 + self.kinds.iter().rposition(|kind| *kind != Field::Nothing).unwrap_or(0);
+    fn enough_names(&self, rows: &[HeadLine]) -> Result<(), TableProblem> {
+        let used = 1 + self.kinds.iter().rposition(|kind| *kind != CellKind::Nothing).unwrap_or(0);
         if !self.has_names || used <= self.names.len() {
             return Ok(());
         }
         let wide = rows.iter().find(|line| line.fields.len() > self.names.len());
-        let Some(Line { number, fields }) = wide else { return Ok(()) };
+        let Some(HeadLine { number, fields }) = wide else { return Ok(()) };
         let whole = |text: &String| {
             let digits = text.trim_start_matches(['-', '+']);
             !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit())
@@ -313,15 +314,15 @@ impl Layout {
     }
 
     /// Finds the forms of times, and times that stand in several columns.
-    fn find_times(&mut self, rows: &[Line], notes: &mut Vec<String>) {
+    fn find_times(&mut self, rows: &[HeadLine], notes: &mut Vec<String>) {
         let width = self.kinds.len();
         let column = |k: usize| rows.iter().filter_map(move |row| row.fields.get(k)).map(String::as_str);
-        let kind = |k: usize| self.kinds.get(k).copied().unwrap_or(Field::Nothing);
-        let timed = |k: usize| column(k).filter(|text| Field::of(text, self.decimal_comma) == Field::Time);
-        self.forms = (0..width).map(|k| if kind(k) == Field::Time { clock::form(timed(k)) } else { None }).collect();
-        if let Some(date) = (0..width).find(|k| kind(*k) == Field::Date && kind(k + 1) == Field::Time) {
+        let kind = |k: usize| self.kinds.get(k).copied().unwrap_or(CellKind::Nothing);
+        let timed = |k: usize| column(k).filter(|text| CellKind::of(text, self.decimal_comma) == CellKind::Time);
+        self.forms = (0..width).map(|k| if kind(k) == CellKind::Time { clock::form(timed(k)) } else { None }).collect();
+        if let Some(date) = (0..width).find(|k| kind(*k) == CellKind::Date && kind(k + 1) == CellKind::Time) {
             let half = |text: &str| text.eq_ignore_ascii_case("am") || text.eq_ignore_ascii_case("pm");
-            let joined = Joined::Texts { date, three: kind(date + 2) == Field::Text && column(date + 2).all(half) };
+            let joined = Joined::Texts { date, three: kind(date + 2) == CellKind::Text && column(date + 2).all(half) };
             let whole: Vec<String> = rows
                 .iter()
                 .filter_map(|row| joined.text(date + 1, |k| row.fields.get(k).map(String::as_str)))
@@ -351,7 +352,7 @@ impl Layout {
     }
 
     /// Refuses rows that do not hold the values of one instant, with the line of pandas that makes such rows of them.
-    fn one_instant_a_line(&self, rows: &[Line]) -> Result<(), TableProblem> {
+    fn one_instant_a_line(&self, rows: &[HeadLine]) -> Result<(), TableProblem> {
         let timely = |name: &String| {
             let word = name.to_lowercase();
             let word = word.split(['[', '(', '_', ' ', '.']).next().unwrap_or_default();
@@ -363,12 +364,12 @@ impl Layout {
         if in_pairs && self.names.iter().enumerate().all(|(k, name)| timely(name) == k.is_multiple_of(2)) {
             return Err(own_times(self.header_line, &self.names));
         }
-        let of_kind = |kind: Field| (0..self.kinds.len()).filter(|k| self.kinds[*k] == kind).collect::<Vec<_>>();
-        let (numbers, times) = (of_kind(Field::Number), of_kind(Field::Time));
+        let of_kind = |kind: CellKind| (0..self.kinds.len()).filter(|k| self.kinds[*k] == kind).collect::<Vec<_>>();
+        let (numbers, times) = (of_kind(CellKind::Number), of_kind(CellKind::Time));
         if !matches!((numbers.len(), times.len()), (1, 1) | (2, 0)) {
             return Ok(());
         }
-        for k in of_kind(Field::Text) {
+        for k in of_kind(CellKind::Text) {
             let names: BTreeSet<&str> = rows.iter().filter_map(|row| row.fields.get(k)).map(String::as_str).collect();
             if NAMES_OF_VALUES.contains(&names.len()) && ROWS_OF_A_NAME * names.len() <= rows.len() {
                 let what = format!(
@@ -428,7 +429,7 @@ fn own_times(line: u64, names: &[String]) -> TableProblem {
 }
 
 /// The lines of the head that are neither blank nor comments.
-fn lines(head: &[u8], separator: Separator) -> Vec<Line> {
+fn lines(head: &[u8], separator: Separator) -> Vec<HeadLine> {
     let spread;
     let head = if separator == Separator::Blanks {
         spread = with_tabs(head);
@@ -441,7 +442,7 @@ fn lines(head: &[u8], separator: Separator) -> Vec<Line> {
     let mut lines = Vec::new();
     while let Ok(true) = records.read_byte_record(&mut record) {
         // The head ends with the end of a line.
-        let line = Line { number: records.position().line() - 1, fields: texts(&record) };
+        let line = HeadLine { number: records.position().line() - 1, fields: texts(&record) };
         let said = !is_comment(&record) && line.fields.iter().any(|field| !field.is_empty());
         lines.extend(Some(line).filter(|_| said));
     }
@@ -449,8 +450,8 @@ fn lines(head: &[u8], separator: Separator) -> Vec<Line> {
 }
 
 /// The separator with which most fields are numbers, and what it makes of the head.
-fn guess(head: &[u8]) -> Option<Guess> {
-    let mut best: Option<(f64, Guess)> = None;
+fn guess(head: &[u8]) -> Option<HeadGuess> {
+    let mut best: Option<(f64, HeadGuess)> = None;
     for separator in Separator::ALL {
         let lines = lines(head, separator);
         // Behind a preamble, if there is one.
@@ -458,55 +459,59 @@ fn guess(head: &[u8]) -> Option<Guess> {
         let mut widths: Vec<usize> = some.iter().map(|line| line.fields.len()).collect();
         widths.sort_unstable();
         let Some(width) = widths.get(widths.len() / 2).copied().filter(|width| *width > 1) else { continue };
-        let even: Vec<&Line> = some.iter().filter(|line| line.fields.len() == width).collect();
+        let even: Vec<&HeadLine> = some.iter().filter(|line| line.fields.len() == width).collect();
         if (even.len() as f64) < SAME_WIDTH * some.len() as f64 {
             continue;
         }
         let fields = || even.iter().flat_map(|line| &line.fields);
         let says = |comma: bool| separator != Separator::Comma && fields().any(|f| number::decimals(f) == Some(comma));
         let comma = says(true) && !says(false);
-        let kinds: Vec<Vec<Field>> =
-            (0..width).map(|k| even.iter().map(|line| Field::of(&line.fields[k], comma)).collect()).collect();
-        let count = |of: &dyn Fn(Field) -> bool| kinds.iter().flatten().filter(|kind| of(**kind)).count();
-        let numbers = count(&|kind| kind != Field::Text) as f64 / (width * even.len()) as f64;
-        let some = count(&|kind| kind == Field::Number) > 0;
+        let kinds: Vec<Vec<CellKind>> =
+            (0..width).map(|k| even.iter().map(|line| CellKind::of(&line.fields[k], comma)).collect()).collect();
+        let count = |of: &dyn Fn(CellKind) -> bool| kinds.iter().flatten().filter(|kind| of(**kind)).count();
+        let numbers = count(&|kind| kind != CellKind::Text) as f64 / (width * even.len()) as f64;
+        let some = count(&|kind| kind == CellKind::Number) > 0;
         if some && numbers >= NUMBERS && best.as_ref().is_none_or(|(share, _)| numbers > share + 1e-9) {
             let kinds = kinds.iter().map(|kinds| majority(kinds)).collect();
-            best = Some((numbers, Guess { separator, lines, width, comma, kinds }));
+            best = Some((numbers, HeadGuess { separator, lines, width, comma, kinds }));
         }
     }
     best.map(|(_, guess)| guess)
 }
 
 /// The kind of most cells, of those that hold anything.
-fn majority(kinds: &[Field]) -> Field {
-    let count = |kind: Field| kinds.iter().filter(|other| **other == kind).count();
-    let some = [Field::Number, Field::Time, Field::Date, Field::Text].into_iter().map(|kind| (count(kind), kind));
+fn majority(kinds: &[CellKind]) -> CellKind {
+    let count = |kind: CellKind| kinds.iter().filter(|other| **other == kind).count();
+    let some =
+        [CellKind::Number, CellKind::Time, CellKind::Date, CellKind::Text].into_iter().map(|kind| (count(kind), kind));
     // The first of those that are as many.
-    some.rev().max_by_key(|(count, _)| *count).filter(|(count, _)| *count > 0).map_or(Field::Nothing, |(_, kind)| kind)
+    some.rev()
+        .max_by_key(|(count, _)| *count)
+        .filter(|(count, _)| *count > 0)
+        .map_or(CellKind::Nothing, |(_, kind)| kind)
 }
 
 /// Whether fields are those of a row of numbers.
 fn is_row(fields: &[String], comma: bool) -> bool {
-    let kinds: Vec<Field> = fields.iter().map(|field| Field::of(field, comma)).collect();
-    let text = kinds.iter().filter(|kind| **kind == Field::Text).count();
-    (kinds.contains(&Field::Number) || kinds.contains(&Field::Time)) && 2 * text <= kinds.len()
+    let kinds: Vec<CellKind> = fields.iter().map(|field| CellKind::of(field, comma)).collect();
+    let text = kinds.iter().filter(|kind| **kind == CellKind::Text).count();
+    (kinds.contains(&CellKind::Number) || kinds.contains(&CellKind::Time)) && 2 * text <= kinds.len()
 }
 
 fn has_a_word(fields: &[String], comma: bool) -> bool {
-    fields.iter().any(|field| Field::of(field, comma) == Field::Text)
+    fields.iter().any(|field| CellKind::of(field, comma) == CellKind::Text)
 }
 
 /// Whether a line begins with a word where most have a number or a time.
-pub(super) fn begins_with_a_word(fields: &[String], kinds: &[Field]) -> bool {
-    let numbers = matches!(kinds.first(), Some(Field::Number | Field::Time | Field::Date));
+pub(super) fn begins_with_a_word(fields: &[String], kinds: &[CellKind]) -> bool {
+    let numbers = matches!(kinds.first(), Some(CellKind::Number | CellKind::Time | CellKind::Date));
     let word = |field: &String| field.starts_with(|c: char| c.is_alphabetic() || c == '[' || c == '%' || c == '_');
-    numbers && fields.first().is_some_and(|field| word(field) && Field::of(field, false) == Field::Text)
+    numbers && fields.first().is_some_and(|field| word(field) && CellKind::of(field, false) == CellKind::Text)
 }
 
 /// Whether fields may be names: none is a number, and some are words.
 pub(super) fn looks_like_names(fields: &[String]) -> bool {
-    let number = |field: &String| [false, true].into_iter().any(|comma| Field::of(field, comma) == Field::Number);
+    let number = |field: &String| [false, true].into_iter().any(|comma| CellKind::of(field, comma) == CellKind::Number);
     !fields.iter().any(number) && fields.iter().any(|field| field.chars().any(char::is_alphabetic))
 }
 

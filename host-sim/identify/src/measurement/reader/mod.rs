@@ -18,7 +18,7 @@ use flexspline_base::csv_rows::TableProblem;
 pub(super) use layout::unit_word;
 use layout::{Joined, begins_with_a_word, is_comment, looks_like_names, plain, shortened, texts, with_tabs};
 pub use layout::{Layout, Separator};
-use number::Cell;
+use number::CellValue;
 
 /// Bytes that one thread reads at a time, about.
 const CHUNK: usize = 1 << 20;
@@ -46,13 +46,13 @@ pub struct FoundCell {
 
 /// Cells of one kind: how many, and the first of them.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Counted {
+pub(crate) struct CellCount {
     pub count: usize,
     pub first: Option<FoundCell>,
 }
 
-impl Counted {
-    fn take(&mut self, more: Counted) {
+impl CellCount {
+    fn take(&mut self, more: CellCount) {
         self.count += more.count;
         self.first = self.first.take().into_iter().chain(more.first).min_by_key(|cell| cell.line);
     }
@@ -60,7 +60,7 @@ impl Counted {
     fn one(&mut self, field: &[u8], line: u64) {
         let first = self.count == 0;
         let text = || String::from_utf8_lossy(field).into_owned();
-        self.take(Counted { count: 1, first: first.then(|| FoundCell { line, text: text() }) });
+        self.take(CellCount { count: 1, first: first.then(|| FoundCell { line, text: text() }) });
     }
 }
 
@@ -70,7 +70,7 @@ pub(crate) struct Cells {
     /// Numbers, or seconds where times are written as text; NaN where there is neither.
     pub values: Vec<f64>,
     /// Times written as text.
-    pub times: Counted,
+    pub times: CellCount,
     /// Whether a time has no date.
     pub time_of_day: bool,
     /// Whether a number is written with decimals: then they are no counts, though all may be whole.
@@ -78,9 +78,9 @@ pub(crate) struct Cells {
     /// Cells in which nothing was recorded.
     pub empty: usize,
     /// Cells that say that the value was beyond the range.
-    pub over: Counted,
+    pub over: CellCount,
     /// Cells that are words.
-    pub words: Counted,
+    pub words: CellCount,
 }
 
 /// Columns as they were read.
@@ -100,7 +100,7 @@ pub(crate) struct Columns {
 
 /// Some rows, with lines that begin with a word where most have a number, which may be none.
 #[derive(Default)]
-struct Part {
+struct RowsPart {
     read: Columns,
     /// Their row, line and fields; the row is empty so far.
     wordy: Vec<(usize, u64, csv::ByteRecord)>,
@@ -168,7 +168,7 @@ impl Sheet {
     fn rows(&self, places: &[usize]) -> Result<Columns, TableProblem> {
         let odd = [0, b'"'].map(|byte| memchr::memchr(byte, &self.text).is_some());
         let parts = self.parts();
-        let parts: Vec<Part> =
+        let parts: Vec<RowsPart> =
             parts.par_iter().map(|(before, text)| self.part(places, *before, text, odd)).collect::<Result<_, _>>()?;
         let mut all = Columns { cells: vec![Cells::default(); places.len()], ..Columns::default() };
         let (mut wordy, mut holes) = (Vec::new(), Vec::new());
@@ -205,9 +205,9 @@ impl Sheet {
         before: u64,
         text: &[u8],
         [zeros, quotes]: [bool; 2],
-    ) -> Result<Part, TableProblem> {
+    ) -> Result<RowsPart, TableProblem> {
         let empty = Columns { cells: vec![Cells::default(); places.len()], ..Columns::default() };
-        let mut part = Part { read: empty, ..Part::default() };
+        let mut part = RowsPart { read: empty, ..RowsPart::default() };
         let mut records = self.layout.separator.records(text);
         let mut record = csv::ByteRecord::new();
         loop {
@@ -268,13 +268,13 @@ impl Sheet {
     /// The value of one cell of the column at `place`.
     fn cell(&self, cells: &mut Cells, place: usize, field: &[u8], record: &csv::ByteRecord, line: u64) -> f64 {
         match number::cell(field, self.layout.decimal_comma) {
-            Cell::Number(value) => {
+            CellValue::Number(value) => {
                 cells.decimals = cells.decimals || field.iter().any(|byte| matches!(byte, b'.' | b','));
                 return value;
             }
-            Cell::Nothing => cells.empty += 1,
-            Cell::Over => cells.over.one(field, line),
-            Cell::Word => {
+            CellValue::Nothing => cells.empty += 1,
+            CellValue::Over => cells.over.one(field, line),
+            CellValue::Word => {
                 if let Some(stamp) = self.time(place, field, record) {
                     cells.times.one(field, line);
                     cells.time_of_day |= !stamp.has_date;
@@ -370,7 +370,7 @@ impl Columns {
     /// Takes cells that are no numbers for missing ones, and rows of another width for sound ones.
     pub(super) fn forget_what_is_odd(&mut self) {
         (self.short, self.wide) = (Vec::new(), Vec::new());
-        self.cells.iter_mut().for_each(|cells| cells.words = Counted::default());
+        self.cells.iter_mut().for_each(|cells| cells.words = CellCount::default());
     }
 
     /// Leaves out the last row if it breaks off before the field at `place`; its line.
@@ -382,7 +382,7 @@ impl Columns {
         for cells in &mut self.cells {
             cells.values.pop();
             if cells.words.first.as_ref().is_some_and(|word| word.line == line) {
-                cells.words = Counted::default();
+                cells.words = CellCount::default();
             }
         }
         Some(line)

@@ -2,7 +2,7 @@
 
 /// What a cell holds.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Cell {
+pub(super) enum CellValue {
     /// A number.
     Number(f64),
     /// Nothing was recorded.
@@ -24,10 +24,10 @@ const OVER_BEGINS: [&str; 3] = ["ov", "under", "1.#inf"];
 const OVER_NUMBERS: [(f64, f64); 2] = [(9.89e36, 1.0e38), (3.402e38, 3.404e38)];
 
 /// What a cell holds; its decimals follow a comma if `comma`.
-pub(super) fn cell(bytes: &[u8], comma: bool) -> Cell {
-    let Ok(text) = std::str::from_utf8(bytes) else { return Cell::Word };
+pub(super) fn cell(bytes: &[u8], comma: bool) -> CellValue {
+    let Ok(text) = std::str::from_utf8(bytes) else { return CellValue::Word };
     if text.is_empty() {
-        return Cell::Nothing;
+        return CellValue::Nothing;
     }
     let parsed = match comma && text.contains([',', '.']) {
         true if text.contains('.') => None,
@@ -35,33 +35,33 @@ pub(super) fn cell(bytes: &[u8], comma: bool) -> Cell {
         false => text.parse::<f64>().ok(),
     };
     match parsed {
-        Some(value) if OVER_NUMBERS.iter().any(|(from, to)| (*from..=*to).contains(&value.abs())) => Cell::Over,
-        Some(value) if value.is_finite() => Cell::Number(value),
+        Some(value) if OVER_NUMBERS.iter().any(|(from, to)| (*from..=*to).contains(&value.abs())) => CellValue::Over,
+        Some(value) if value.is_finite() => CellValue::Number(value),
         // A number that no float holds is none that is missing.
-        Some(value) if value.is_infinite() && bytes.iter().any(u8::is_ascii_digit) => Cell::Over,
-        Some(_) => Cell::Nothing,
+        Some(value) if value.is_infinite() && bytes.iter().any(u8::is_ascii_digit) => CellValue::Over,
+        Some(_) => CellValue::Nothing,
         None => mark(text),
     }
 }
 
 /// A text that is no number.
-fn mark(text: &str) -> Cell {
+fn mark(text: &str) -> CellValue {
     let lower = text.to_ascii_lowercase();
     let unsigned = lower.trim_start_matches(['+', '-']);
     let filled = text.len() > 2 && ['*', '#'].iter().any(|fill| text.chars().all(|c| c == *fill));
     if filled || OVER.contains(&unsigned) || OVER_BEGINS.iter().any(|begin| unsigned.starts_with(begin)) {
-        Cell::Over
+        CellValue::Over
     } else if MISSING.contains(&lower.as_str()) || unsigned.starts_with("nan") || unsigned.starts_with("1.#") {
-        Cell::Nothing
+        CellValue::Nothing
     } else {
-        Cell::Word
+        CellValue::Word
     }
 }
 
 /// What a cell says of how decimals are written: `Some(true)` behind a comma, `Some(false)` behind a point, `None`
 /// nothing.
 pub(super) fn decimals(text: &str) -> Option<bool> {
-    let number = |comma: bool| matches!(cell(text.as_bytes(), comma), Cell::Number(_));
+    let number = |comma: bool| matches!(cell(text.as_bytes(), comma), CellValue::Number(_));
     text.contains([',', '.']).then(|| (number(true), number(false))).and_then(|says| match says {
         (true, false) => Some(true),
         (false, true) => Some(false),
@@ -84,14 +84,14 @@ mod tests {
             ("5.", false, 5.0),
             ("1e300", false, 1e300),
         ] {
-            assert_eq!(cell(text.as_bytes(), comma), Cell::Number(value), "{text}");
+            assert_eq!(cell(text.as_bytes(), comma), CellValue::Number(value), "{text}");
         }
     }
 
     #[test]
     fn what_is_no_number_says_what_it_is() {
         for text in ["", "NaN", "-nan", "inf", "N/A", "-", "null", "1.#QNAN", "-nan(ind)"] {
-            assert_eq!(cell(text.as_bytes(), false), Cell::Nothing, "{text}");
+            assert_eq!(cell(text.as_bytes(), false), CellValue::Nothing, "{text}");
         }
         for text in [
             "OVER",
@@ -107,7 +107,7 @@ mod tests {
             "*****",
             "#NUM!",
         ] {
-            assert_eq!(cell(text.as_bytes(), false), Cell::Over, "{text}");
+            assert_eq!(cell(text.as_bytes(), false), CellValue::Over, "{text}");
         }
         for (text, comma) in [
             ("high", false),
@@ -121,7 +121,7 @@ mod tests {
             ("1.0D+02", false),
             ("1'008", false),
         ] {
-            assert_eq!(cell(text.as_bytes(), comma), Cell::Word, "{text}");
+            assert_eq!(cell(text.as_bytes(), comma), CellValue::Word, "{text}");
         }
     }
 

@@ -522,7 +522,8 @@ fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
 }
 
 fn looked_at(bytes: &[u8]) -> Result<Looked, String> {
-    look(&[raw::parse("log.txt", bytes).map_err(|error| error.to_string())?])
+    let file = raw::parse("log.txt", bytes).map_err(|error| error.to_string())?;
+    look(&[file]).map_err(|error| error.to_string())
 }
 
 fn read(bytes: &[u8], columns: &str) -> Result<Recording, String> {
