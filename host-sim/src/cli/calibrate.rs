@@ -196,11 +196,10 @@ impl Calibrate {
 
     /// Plan of further logs.
     fn further(&self, context: &Context, prior: &Prior<'_>, made: &Calibrated) -> Result<Planned, Failure> {
-        let first = made.first();
         let temperature =
             f64::midpoint(f64::from(made.calibration.temperature_c[0]), f64::from(made.calibration.temperature_c[1]));
         let bench = self.bench.bench(MINUTES[1], self.columns.rate_hz(), temperature)?;
-        let mut planned = plan(prior, &bench, Some(&first)).map_err(Failure::BadInput)?;
+        let mut planned = plan(prior, &bench, Some(made)).map_err(Failure::BadInput)?;
         planned.command.clone_from(&context.command);
         Ok(planned)
     }

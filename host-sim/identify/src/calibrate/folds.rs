@@ -9,10 +9,11 @@ use super::parts::{PartName, Scales, State, columns, weights};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Row {
     pub at: State,
-    /// What the prior leaves, arcsec.
+    /// What was measured, the mean of its log taken out, arcsec.
+    pub measured_arcsec: f64,
+    /// What the prior leaves of that, arcsec.
     pub left_arcsec: f64,
-    /// Which encoder zero, and which fold it belongs to.
-    pub zero: usize,
+    /// Which fold it belongs to.
     pub fold: usize,
 }
 
@@ -23,12 +24,70 @@ pub(super) struct Chosen {
     pub penalty: f64,
 }
 
-/// Sums over the rows of a fold.
-struct Sums {
+/// Sums over the rows of a fold, or of a log.
+#[derive(Debug, Clone)]
+pub(super) struct Sums {
+    /// Rows by their weights.
+    rows: f64,
+    /// Columns, and what the prior leaves.
+    columns: Vec<f64>,
+    left: f64,
+    /// Products of columns with each other (lower triangle), of each with what is left, and the square of that.
     gram: Vec<f64>,
     right: Vec<f64>,
     square: f64,
-    rows: f64,
+}
+
+impl Sums {
+    pub fn new(width: usize) -> Sums {
+        let (columns, right, gram) = (vec![0.0; width], vec![0.0; width], vec![0.0; width * width]);
+        Sums { rows: 0.0, columns, left: 0.0, gram, right, square: 0.0 }
+    }
+
+    /// Adds a row that counts `weight` times.
+    pub fn add(&mut self, x: &[f64], left: f64, weight: f64) {
+        for (i, a) in x.iter().enumerate() {
+            let a = weight * a;
+            self.columns[i] += a;
+            self.right[i] += a * left;
+            let row = &mut self.gram[i * x.len()..];
+            row.iter_mut().zip(&x[..=i]).for_each(|(sum, b)| *sum += a * b);
+        }
+        self.rows += weight;
+        self.left += weight * left;
+        self.square += weight * left * left;
+    }
+
+    /// Adds rows with the same zero.
+    pub fn join(&mut self, other: &Sums) {
+        let of = [(&mut self.columns, &other.columns), (&mut self.gram, &other.gram), (&mut self.right, &other.right)];
+        of.into_iter().flat_map(|(a, b)| a.iter_mut().zip(b)).for_each(|(a, b)| *a += b);
+        self.rows += other.rows;
+        self.left += other.left;
+        self.square += other.square;
+    }
+
+    /// The same where the zero is found in these rows.
+    fn with_own_zero(mut self) -> Sums {
+        let width = self.columns.len();
+        for i in (0..width).filter(|_| self.rows > 0.0) {
+            self.right[i] -= self.columns[i] * self.left / self.rows;
+            for j in 0..=i {
+                self.gram[i * width + j] -= self.columns[i] * self.columns[j] / self.rows;
+            }
+        }
+        self.square -= if self.rows > 0.0 { self.left * self.left / self.rows } else { 0.0 };
+        self
+    }
+
+    /// Adds the information on the coefficients, the zero of the rows not known.
+    pub fn add_information(&self, to: &mut Mat) {
+        let own = self.clone().with_own_zero();
+        for (i, j) in (0..self.columns.len()).flat_map(|i| (0..=i).map(move |j| (i, j))) {
+            to[(i, j)] += own.gram[i * self.columns.len() + j];
+            to[(j, i)] = to[(i, j)];
+        }
+    }
 }
 
 /// All folds.
@@ -56,39 +115,19 @@ impl Folds {
         begins.push(all.len());
         let width = all.len();
         let folds = rows.iter().map(|row| row.fold + 1).max().unwrap_or(0);
-        let empty = || Sums { gram: vec![0.0; width * width], right: vec![0.0; width], square: 0.0, rows: 0.0 };
-        let mut sums: Vec<Sums> = (0..folds).map(|_| empty()).collect();
-        let mut means = vec![(vec![0.0; width], 0.0); folds];
+        let mut sums = vec![Sums::new(width); folds];
         let mut x = Vec::with_capacity(width);
         for row in rows {
             x.clear();
             x.resize(zeros, 0.0);
             if zeros > 0 {
-                x[row.zero] = 1.0;
+                x[row.at.log] = 1.0;
             }
             parts.iter().for_each(|part| columns(*part, &row.at, scales, &mut x));
-            let (sum, (mean, left)) = (&mut sums[row.fold], &mut means[row.fold]);
-            for (i, a) in x.iter().enumerate() {
-                sum.right[i] += a * row.left_arcsec;
-                mean[i] += a;
-                for (j, b) in x.iter().enumerate().take(i + 1) {
-                    sum.gram[i * width + j] += a * b;
-                }
-            }
-            sum.square += row.left_arcsec * row.left_arcsec;
-            *left += row.left_arcsec;
-            sum.rows += 1.0;
+            sums[row.fold].add(&x, row.left_arcsec, 1.0);
         }
         if own_zero {
-            for (sum, (mean, left)) in sums.iter_mut().zip(&means).filter(|(sum, _)| sum.rows > 0.0) {
-                for (i, a) in mean.iter().enumerate() {
-                    sum.right[i] -= a * left / sum.rows;
-                    for (j, b) in mean.iter().enumerate().take(i + 1) {
-                        sum.gram[i * width + j] -= a * b / sum.rows;
-                    }
-                }
-                sum.square -= left * left / sum.rows;
-            }
+            sums = sums.into_iter().map(Sums::with_own_zero).collect();
         }
         Folds { parts: parts.to_vec(), begins, weights: all, sums }
     }

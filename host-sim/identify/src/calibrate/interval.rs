@@ -16,9 +16,10 @@ use flexspline_algebra::{Mat, cholesky};
 use serde::Serialize;
 
 use super::Model;
-use super::folds::{FLOOR, Row};
+use super::folds::{FLOOR, Row, Sums};
 use super::parts::{GENERATOR_ORDERS, PartName, Scales, State, columns, expected_arcsec, usual_arcsec, weights};
 use crate::measurement::{median_of, white_noise};
+use flexspline_base::robust::dot;
 
 /// Standard deviations of an interval that holds 95 %.
 pub(super) const OF_95: f64 = 1.96;
@@ -30,59 +31,10 @@ const FEWEST_STRETCHES: usize = 20;
 /// A stretch over this many steps of a resolution averages them out. A guess.
 const STEPS_OF_A_STRETCH: f64 = 4.0;
 
-/// Sums over rows that share a zero.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Information {
-    width: usize,
-    rows: f64,
-    sum: Vec<f64>,
-    square: Vec<f64>,
-}
-
-impl Information {
-    pub fn new(width: usize) -> Information {
-        Information { width, rows: 0.0, sum: vec![0.0; width], square: vec![0.0; width * width] }
-    }
-
-    /// Adds a row that counts `weight` times.
-    pub fn add(&mut self, x: &[f64], weight: f64) {
-        self.rows += weight;
-        for (i, a) in x.iter().enumerate() {
-            self.sum[i] += weight * a;
-            for (j, b) in x.iter().enumerate().take(i + 1) {
-                self.square[i * self.width + j] += weight * a * b;
-            }
-        }
-    }
-
-    /// Adds rows with the same zero.
-    pub fn join(&mut self, other: &Information) {
-        self.rows += other.rows;
-        self.sum.iter_mut().zip(&other.sum).for_each(|(a, b)| *a += b);
-        self.square.iter_mut().zip(&other.square).for_each(|(a, b)| *a += b);
-    }
-
-    /// The information on the coefficients where the zero is not known.
-    fn add_without_zero(&self, to: &mut Mat) {
-        if self.rows <= 0.0 {
-            return;
-        }
-        for i in 0..self.width {
-            for j in 0..=i {
-                let value = self.square[i * self.width + j] - self.sum[i] * self.sum[j] / self.rows;
-                to[(i, j)] += value;
-                if i != j {
-                    to[(j, i)] += value;
-                }
-            }
-        }
-    }
-}
-
 /// The information of all groups together, their zeros not known.
-fn gram(groups: &[Information], width: usize) -> Mat {
+fn gram(groups: &[Sums], width: usize) -> Mat {
     let mut gram = Mat::zeros(width, width);
-    groups.iter().for_each(|group| group.add_without_zero(&mut gram));
+    groups.iter().for_each(|group| group.add_information(&mut gram));
     gram
 }
 
@@ -94,12 +46,7 @@ fn inverse(mut gram: Mat, diagonal: &[f64]) -> Option<Mat> {
 
 /// Covariance of the coefficients of a drive that nobody has measured after these rows, arcsec², for the variance of a
 /// row.
-pub(super) fn planned_covariance(
-    groups: &[Information],
-    parts: &[PartName],
-    scales: &Scales,
-    of_a_row: f64,
-) -> Option<Mat> {
+pub(super) fn planned_covariance(groups: &[Sums], parts: &[PartName], scales: &Scales, of_a_row: f64) -> Option<Mat> {
     let known = |part: &PartName| {
         let before = usual_arcsec(*part, scales).powi(2);
         weights(*part).into_iter().map(move |weight| of_a_row * (weight / before + FLOOR))
@@ -209,56 +156,42 @@ pub(super) fn nodes_of(part: PartName, scales: &Scales) -> Vec<(&'static str, f6
     let [low, high] = scales.torque_n_m;
     let [cold, warm] = scales.temperature_c;
     let middle = State { temperature_c: f64::midpoint(cold, warm), way: 1.0, ..State::default() };
-    let turn = |count: usize| (0..count).map(move |k| TAU * k as f64 / count as f64);
-    let states: Vec<(&'static str, f64, State)> = match part {
-        PartName::WindUp => (0..9)
-            .map(|k| low + (high - low) * f64::from(k) / 8.0)
-            .map(|torque| ("torque_n_m", torque, State { torque_n_m: torque, ..middle }))
-            .collect(),
-        PartName::Play => [low, 0.0, high]
-            .into_iter()
-            .map(|torque| ("torque_n_m", torque, State { torque_n_m: torque, ..middle }))
-            .collect(),
-        PartName::GeneratorAngle => {
-            turn(16).map(|psi| ("generator_deg", psi.to_degrees(), State { generator_rad: psi, ..middle })).collect()
-        }
-        PartName::MaterialAngle => turn(16)
-            .map(|psi| ("generator_against_output_deg", psi.to_degrees(), State { generator_rad: psi, ..middle }))
-            .collect(),
-        PartName::ToothPitch => turn(8)
-            .map(|phase| {
-                ("share_of_pitch_deg", phase.to_degrees(), State { generator_rad: phase / scales.teeth, ..middle })
-            })
-            .collect(),
-        PartName::OutputAngle => {
-            turn(24).map(|out| ("output_deg", out.to_degrees(), State { output_rad: out, ..middle })).collect()
-        }
-        // Under the largest load: without one a temperature moves little but the zero.
-        PartName::Temperature => [cold, warm]
-            .into_iter()
-            .map(|temperature_c| {
-                let torque_n_m = if high.abs() >= low.abs() { high } else { low };
-                ("temperature_c", temperature_c, State { temperature_c, torque_n_m, ..middle })
-            })
-            .collect(),
-        PartName::ReadingDelay(_) => Vec::new(),
+    let turn = |count: usize| (0..count).map(|k| TAU * k as f64 / count as f64).collect();
+    let (of, values): (&'static str, Vec<f64>) = match part {
+        PartName::WindUp => ("torque_n_m", (0..9).map(|k| low + (high - low) * f64::from(k) / 8.0).collect()),
+        PartName::Play => ("torque_n_m", vec![low, 0.0, high]),
+        PartName::GeneratorAngle => ("generator_deg", turn(16)),
+        PartName::MaterialAngle => ("generator_against_output_deg", turn(16)),
+        PartName::ToothPitch => ("share_of_pitch_deg", turn(8)),
+        PartName::OutputAngle => ("output_deg", turn(24)),
+        PartName::Temperature => ("temperature_c", vec![cold, warm]),
+        PartName::ReadingDelay(_) => return Vec::new(),
     };
-    states
-        .into_iter()
-        .map(|(of, at, state)| {
-            let mut x = Vec::new();
-            columns(part, &state, scales, &mut x);
-            if part == PartName::Temperature {
-                // The zero is the encoder's as much as the drive's.
-                x[0] = 0.0;
-            }
-            (of, at, x)
-        })
-        .collect()
+    let state = |value: f64| match part {
+        PartName::GeneratorAngle | PartName::MaterialAngle => State { generator_rad: value, ..middle },
+        PartName::ToothPitch => State { generator_rad: value / scales.teeth, ..middle },
+        PartName::OutputAngle => State { output_rad: value, ..middle },
+        // Under the largest load: without one a temperature moves little but the zero.
+        PartName::Temperature => {
+            let torque_n_m = if high.abs() >= low.abs() { high } else { low };
+            State { temperature_c: value, torque_n_m, ..middle }
+        }
+        _ => State { torque_n_m: value, ..middle },
+    };
+    let node = |value: f64| {
+        let mut x = Vec::new();
+        columns(part, &state(value), scales, &mut x);
+        if part == PartName::Temperature {
+            // The zero is the encoder's as much as the drive's.
+            x[0] = 0.0;
+        }
+        (of, if of.ends_with("_deg") { value.to_degrees() } else { value }, x)
+    };
+    values.into_iter().map(node).collect()
 }
 
 /// The half widths of all nodes of some parts, from the covariance; in the order of the parts.
-pub(super) fn widths(parts: &[PartName], scales: &Scales, covariance: &Mat) -> Vec<Node> {
+pub(super) fn widths(parts: &[PartName], scales: &Scales, covariance: &Mat, model: Option<&Model>) -> Vec<Node> {
     let all = width_of(parts);
     let mut begin = 0;
     let mut nodes = Vec::new();
@@ -268,7 +201,9 @@ pub(super) fn widths(parts: &[PartName], scales: &Scales, covariance: &Mat) -> V
             let mut x = vec![0.0; all];
             x[begin..begin + width].copy_from_slice(&part);
             let half = OF_95 * variance(covariance, &x).sqrt();
-            nodes.push(Node { part: one.as_str(), of, at, value_arcsec: None, half_width_arcsec: half });
+            let value_arcsec =
+                model.map(|model| dot(&part, model.of(*one).map_or(&[][..], |of| &model.coefficients[of])));
+            nodes.push(Node { part: one.as_str(), of, at, value_arcsec, half_width_arcsec: half });
         }
         begin += width;
     }
@@ -299,7 +234,7 @@ impl Known {
     pub(super) fn of(rows: &[Row], model: &Model, delays: &[f64], coarse_rad: f64) -> Option<Known> {
         let (scales, logs) = (&model.scales, delays.len());
         let mut left = vec![Vec::new(); logs];
-        rows.iter().for_each(|at| left[at.zero].push(at.left_arcsec - model.adds_arcsec(&at.at)));
+        rows.iter().for_each(|at| left[at.at.log].push(at.left_arcsec - model.adds_arcsec(&at.at)));
         for file in &mut left {
             let mean = file.iter().sum::<f64>() / file.len().max(1) as f64;
             file.iter_mut().for_each(|value| *value -= mean);
@@ -329,13 +264,13 @@ impl Known {
         let width = fitted.len();
         let of_a_row = noise.of_a_row();
         let penalties: Vec<f64> = before.iter().map(|before| of_a_row * (before + FLOOR)).collect();
-        let mut groups = vec![Information::new(width); logs];
+        let mut groups = vec![Sums::new(width); logs];
         let mut right: Vec<f64> = penalties.iter().zip(&fitted).map(|(penalty, fitted)| -penalty * fitted).collect();
         let mut of_logs: Vec<_> = left.iter().map(|left| left.iter()).collect();
         for at in rows {
             let x = row(&parts, &at.at, scales);
-            groups[at.zero].add(&x, 1.0);
-            let left = of_logs[at.zero].next().copied().unwrap_or_default();
+            groups[at.at.log].add(&x, at.left_arcsec, 1.0);
+            let left = of_logs[at.at.log].next().copied().unwrap_or_default();
             right.iter_mut().zip(&x).for_each(|(right, x)| *right += x * left);
         }
         let mut covariance = inverse(gram(&groups, width), &penalties)?;
@@ -372,16 +307,7 @@ impl Known {
 
     /// Every node of every part.
     pub(super) fn nodes(&self) -> Vec<Node> {
-        let Model { scales, coefficients, .. } = &self.model;
-        let mut nodes = widths(&self.parts, scales, &self.covariance);
-        let mut values = Vec::new();
-        for one in &self.parts {
-            let of = self.model.of(*one).map_or(&[][..], |of| &coefficients[of]);
-            let value = |x: &[f64]| x.iter().zip(of).map(|(x, c)| x * c).sum::<f64>();
-            values.extend(nodes_of(*one, scales).iter().map(|(_, _, x)| value(x)));
-        }
-        nodes.iter_mut().zip(values).for_each(|(node, value)| node.value_arcsec = Some(value));
-        nodes
+        widths(&self.parts, &self.model.scales, &self.covariance, Some(&self.model))
     }
 }
 

@@ -36,7 +36,7 @@ use folds::{Chosen, Folds};
 use interval::OF_95;
 pub use interval::{Known, Node, Noise};
 pub use parts::{PartName, Scales, State};
-pub use plan::{Bench, First, Pass, Planned, Wide, plan};
+pub use plan::{Bench, Pass, Planned, Wide, plan};
 pub use prior::Prior;
 pub use reading::{ByCore, Reading, ReadingDelay};
 use reading::{Delays, play_of_a_millisecond};
@@ -376,20 +376,6 @@ pub struct Calibrated {
     pub shown: Vec<[f64; 3]>,
 }
 
-impl Calibrated {
-    /// What these logs have shown, for a plan of what to add.
-    #[must_use]
-    pub fn first(&self) -> First<'_> {
-        First {
-            rows: &self.rows.rows,
-            files: self.calibration.files.len(),
-            noise: self.known.noise,
-            nodes: &self.calibration.nodes,
-            scales: self.recorded.scales,
-        }
-    }
-}
-
 /// Refuses a ratio that the rows contradict; says where they doubt it.
 pub(crate) fn check_ratio(files: &[Recording], ratio: f64) -> Result<Option<String>, CalibrationError> {
     let (mut xx, mut xe, mut ee) = (0.0, 0.0, 0.0);
@@ -566,12 +552,7 @@ fn with_dead_zone(
     sizes(&rows, &model, &mut parts);
     let zero = |row: &folds::Row| row.left_arcsec - model.adds_arcsec(&row.at);
     let mean = rows.rows.iter().map(zero).sum::<f64>() / rows.rows.len() as f64;
-    let shown = rows
-        .rows
-        .iter()
-        .zip(&rows.measured_arcsec)
-        .map(|(row, measured)| [row.at.output_rad, *measured, zero(row) - mean])
-        .collect();
+    let shown = rows.rows.iter().map(|row| [row.at.output_rad, row.measured_arcsec, zero(row) - mean]).collect();
     let none = || vec![0.0; files.len()];
     let delays = logs.delays.as_ref().map_or_else(none, |delays| delays.of_columns(&recorded.scales));
     let known = Known::of(&rows.rows, &model, &delays, recorded.coarse_rad)
@@ -683,8 +664,8 @@ fn dead_zone(rows: Rows, prior: &Prior<'_>, table: &Table<'_>, recorded: &Record
 fn output_zeros(files: &[Recording], rows: &Rows, model: &Model, noise: Noise) -> Vec<OutputZero> {
     let mut sums = vec![(0.0, 0.0); files.len()];
     for row in &rows.rows {
-        sums[row.zero].0 += row.left_arcsec - model.adds_arcsec(&row.at);
-        sums[row.zero].1 += 1.0;
+        sums[row.at.log].0 += row.left_arcsec - model.adds_arcsec(&row.at);
+        sums[row.at.log].1 += 1.0;
     }
     let zero = |((file, (sum, count)), mean): ((&Recording, (f64, f64)), &f64)| OutputZero {
         file: file.file.clone(),
@@ -791,7 +772,7 @@ fn fit(rows: Rows, prior: &Prior<'_>, recorded: &Recorded, without: &[Without]) 
         let count = rows.rows.len() as f64;
         let rms = |squares: f64| (squares / count).sqrt();
         let held_out = HeldOut {
-            rms_before_arcsec: rms(rows.measured_arcsec.iter().map(|e| e * e).sum()),
+            rms_before_arcsec: rms(rows.rows.iter().map(|row| row.measured_arcsec * row.measured_arcsec).sum()),
             rms_prior_arcsec: rms(folds.left_out(&all, &[])),
             rms_after_arcsec: rms(left[most]),
         };

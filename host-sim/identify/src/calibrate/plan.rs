@@ -11,11 +11,11 @@ use std::f64::consts::TAU;
 use flexspline_algebra::Mat;
 use serde::Serialize;
 
-use super::folds::Row;
-use super::interval::{Information, Node, Noise, OF_95, planned_covariance, row, spread, width_of, widths};
+use super::folds::Sums;
+use super::interval::{Node, Noise, OF_95, planned_covariance, row, spread, width_of, widths};
 use super::parts::{PartName, Scales, State, weights};
 use super::rows::{MOST_ROWS, late_s};
-use super::{GOLDEN, LEAST_FRICTION, ONE_TEMPERATURE_K, OTHER_PACE, Prior, ROWS_OF_A_PITCH};
+use super::{Calibrated, GOLDEN, LEAST_FRICTION, ONE_TEMPERATURE_K, OTHER_PACE, Prior, ROWS_OF_A_PITCH};
 use crate::measurement::least_and_most;
 
 /// Beyond what any bench or catalogue of these drives has, so a slip of the pen: generator, load and temperature.
@@ -209,39 +209,28 @@ pub struct Wide {
     pub expected_arcsec: f64,
 }
 
-/// What a first log has shown.
-pub struct First<'a> {
-    pub(super) rows: &'a [Row],
-    pub(super) files: usize,
-    pub(super) noise: Noise,
-    /// How well its table is known.
-    pub(super) nodes: &'a [Node],
-    /// Torques and temperatures that it has.
-    pub(super) scales: Scales,
-}
-
 /// A pass that may be made.
 struct Candidate {
     pass: Pass,
     warmth: usize,
-    tells: Information,
+    tells: Sums,
 }
 
 /// Plans what to record of a drive, after a first log if there is one.
 ///
 /// # Errors
 /// A bench with numbers out of range, or with no time for a single pass.
-pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&First<'_>>) -> Result<Planned, String> {
+pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Result<Planned, String> {
     prior.core_drive()?;
     if let Some(problem) = bench.problem() {
         return Err(problem);
     }
     let wide = |[a, b]: [f64; 2], other: Option<[f64; 2]>| other.map_or([a, b], |[c, d]| [a.min(c), b.max(d)]);
-    let torque = wide(bench.torque_n_m, first.map(|first| first.scales.torque_n_m));
+    let torque = wide(bench.torque_n_m, first.map(|first| first.recorded.scales.torque_n_m));
     let scales = Scales {
         torque_n_m: torque,
         friction_n_m: prior.friction_n_m().max(LEAST_FRICTION * torque[0].abs().max(torque[1].abs())),
-        temperature_c: wide(bench.temperature_c, first.map(|first| first.scales.temperature_c)),
+        temperature_c: wide(bench.temperature_c, first.map(|first| first.recorded.scales.temperature_c)),
         teeth: prior.tooth_pitches(),
         speed_rad_s: bench.speed_rpm / 60.0 * TAU / prior.nominal.ratio.abs(),
         late_s: late_s(1.0 / bench.rate_hz),
@@ -249,19 +238,20 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&First<'_>>) -> Resu
     let ratio = prior.nominal.ratio;
     let (mut chosen, mut cannot) = open_parts(prior, bench, &scales);
     let warmths = temperatures(bench).len();
-    chosen.extend((0..warmths + first.map_or(0, |first| first.files)).map(PartName::ReadingDelay));
+    let files = first.map_or(0, |first| first.calibration.files.len());
+    chosen.extend((0..warmths + files).map(PartName::ReadingDelay));
     let candidates = candidates(prior, bench, &scales, &chosen);
-    let noise = first.map_or_else(|| bench.noise(), |first| first.noise);
+    let noise = first.map_or_else(|| bench.noise(), |first| first.known.noise);
 
     let width = width_of(&chosen);
-    let mut known = vec![Information::new(width); warmths + first.map_or(0, |first| first.files)];
-    for at in first.iter().flat_map(|first| first.rows) {
-        let at_log = State { log: warmths + at.zero, ..at.at };
-        known[warmths + at.zero].add(&row(&chosen, &at_log, &scales), 1.0);
+    let mut known = vec![Sums::new(width); warmths + files];
+    for at in first.iter().flat_map(|first| &first.rows.rows) {
+        let at_log = State { log: warmths + at.at.log, ..at.at };
+        known[warmths + at.at.log].add(&row(&chosen, &at_log, &scales), 0.0, 1.0);
     }
     let travel = bench.output_deg.map(f64::to_radians);
     let asked = Asked::of(&scales, ratio, travel, &chosen);
-    let of = |known: &[Information]| {
+    let of = |known: &[Sums]| {
         let covariance = planned_covariance(known, &chosen, &scales, noise.of_a_row());
         covariance.ok_or("the information matrix is singular".to_owned())
     };
@@ -314,17 +304,17 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&First<'_>>) -> Resu
             bench.minutes, bench.speed_rpm
         ));
     }
-    let nodes = widths(&chosen, &scales, &now);
+    let nodes = widths(&chosen, &scales, &now, None);
     let rms = |covariance: &Mat| asked.mean_variance(covariance).sqrt();
     let mut widest = Vec::new();
     if let Some(first) = first {
-        let mut then = widths(&chosen, &scales, &at_first);
+        let mut then = widths(&chosen, &scales, &at_first, None);
         // What the calibration says of a node is said here as well.
         let same = |node: &Node, other: &Node| {
             node.part == other.part && node.of == other.of && (node.at - other.at).abs() <= 1e-6 * node.at.abs()
         };
         for node in &mut then {
-            if let Some(known) = first.nodes.iter().find(|known| same(node, known)) {
+            if let Some(known) = first.calibration.nodes.iter().find(|known| same(node, known)) {
                 node.half_width_arcsec = known.half_width_arcsec;
             }
         }
@@ -345,7 +335,7 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&First<'_>>) -> Resu
     let passes = in_order(taken);
     if chosen.contains(&PartName::WindUp) {
         let mut loads: Vec<f64> = passes.iter().map(|pass| pass.torque_n_m).collect();
-        loads.extend(first.iter().flat_map(|first| first.scales.torque_n_m));
+        loads.extend(first.iter().flat_map(|first| first.recorded.scales.torque_n_m));
         loads.sort_by(f64::total_cmp);
         loads.dedup();
         let wind_up = nodes.iter().filter(|node| node.part == PartName::WindUp.as_str());
@@ -558,7 +548,7 @@ fn candidates(prior: &Prior<'_>, bench: &Bench, scales: &Scales, chosen: &[PartN
                 let duration_s = moving_s + 2.0 * REST_S;
                 let speed_rad_s = speed_rpm / 60.0 * TAU / ratio.abs();
                 let weight = moving_s * bench.rate_fitted_hz() / ROWS_OF_A_PASS as f64;
-                let mut tells = Information::new(width_of(chosen));
+                let mut tells = Sums::new(width_of(chosen));
                 for k in 0..ROWS_OF_A_PASS {
                     let way = if k % 2 == 0 { 1.0 } else { -1.0 };
                     let share = (k as f64 + 0.5) / ROWS_OF_A_PASS as f64;
@@ -575,7 +565,7 @@ fn candidates(prior: &Prior<'_>, bench: &Bench, scales: &Scales, chosen: &[PartN
                         speed_rad_s: way * speed_rad_s,
                         log: warmth,
                     };
-                    tells.add(&row(chosen, &at, scales), weight);
+                    tells.add(&row(chosen, &at, scales), 0.0, weight);
                 }
                 let pass = Pass {
                     log: warmth + 1,

@@ -2,11 +2,11 @@
 
 use std::f64::consts::TAU;
 
-use super::folds::{FLOOR, Folds, Row};
+use super::folds::{Folds, Row};
 use super::parts::{PartName, Scales, State};
 use super::prior::Prior;
 use crate::measurement::{Recording, Session, least_and_most, quantile_of, sampled, white_noise};
-use flexspline_algebra::{Mat, cholesky};
+use crate::residual::Normal;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// Folds that records are cut into: blocks of a tenth of each or so, which say what a table does beyond what it saw.
@@ -43,9 +43,7 @@ pub(super) enum FoldKind {
 #[derive(Clone)]
 pub(super) struct Rows {
     pub rows: Vec<Row>,
-    /// What was measured in each, arcsec, its file's mean taken out.
-    pub measured_arcsec: Vec<f64>,
-    /// What was taken off `measured_arcsec` and off `left_arcsec` of each file, arcsec.
+    /// What was taken off what was measured and off what is left of each file, arcsec.
     measured_means_arcsec: Vec<f64>,
     pub means_arcsec: Vec<f64>,
     pub folds: FoldKind,
@@ -241,7 +239,6 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
     let by_sessions = sessions >= ENOUGH_SESSIONS && largest as f64 <= LARGEST_SESSION * total as f64;
     let mut all = Rows {
         rows: Vec::new(),
-        measured_arcsec: Vec::new(),
         measured_means_arcsec: Vec::new(),
         means_arcsec: Vec::new(),
         folds: FoldKind::Blocks,
@@ -275,17 +272,16 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
                     speed_rad_s: speed_rad_s(session, k, prior.nominal.ratio),
                     log: zero,
                 };
-                all.measured_arcsec.push(session.error_rad[k] * ARCSEC_PER_RAD);
-                all.rows.push(Row { at, left_arcsec: 0.0, zero, fold: 0 });
+                let measured_arcsec = session.error_rad[k] * ARCSEC_PER_RAD;
+                all.rows.push(Row { at, measured_arcsec, left_arcsec: 0.0, fold: 0 });
                 session_of.push(session_number);
             }
             session_number += 1;
         }
-        let rows = all.rows.len() - begin;
         // Zeros of encoders are large numbers that squares do not like.
-        let measured = &mut all.measured_arcsec[begin..];
-        let mean = measured.iter().sum::<f64>() / rows.max(1) as f64;
-        measured.iter_mut().for_each(|value| *value -= mean);
+        let of_file = &mut all.rows[begin..];
+        let mean = of_file.iter().map(|row| row.measured_arcsec).sum::<f64>() / of_file.len().max(1) as f64;
+        of_file.iter_mut().for_each(|row| row.measured_arcsec -= mean);
         all.measured_means_arcsec.push(mean);
     }
     let kinds = [(FoldKind::Files, files.len() >= ENOUGH_SESSIONS), (FoldKind::Sessions, by_sessions)];
@@ -304,13 +300,13 @@ impl Rows {
     fn fold(&mut self, kind: FoldKind, rounds: usize, session_of: &[usize]) {
         self.folds = kind;
         let mut of_file = vec![0; self.measured_means_arcsec.len()];
-        self.rows.iter().for_each(|row| of_file[row.zero] += 1);
+        self.rows.iter().for_each(|row| of_file[row.at.log] += 1);
         let mut before = vec![0; of_file.len()];
         for (row, session) in self.rows.iter_mut().zip(session_of) {
-            let block = before[row.zero] * BLOCKS * rounds / of_file[row.zero];
-            before[row.zero] += 1;
+            let block = before[row.at.log] * BLOCKS * rounds / of_file[row.at.log];
+            before[row.at.log] += 1;
             let fold = match kind {
-                FoldKind::Files => row.zero,
+                FoldKind::Files => row.at.log,
                 FoldKind::Sessions => *session,
                 FoldKind::Blocks => block,
             };
@@ -339,23 +335,13 @@ impl Rows {
     /// Correlation of the load with what the first waves of the output make of it, 0 to 1.
     pub(crate) fn load_with_output_angle(&self) -> f64 {
         let count = self.rows.len().max(1) as f64;
-        let waves = |at: &State| [1.0, at.output_rad.sin(), at.output_rad.cos()];
-        let mut gram = Mat::zeros(3, 3);
-        let (mut right, mut square) = (Mat::zeros(3, 1), 0.0);
-        for Row { at, .. } in &self.rows {
-            let x = waves(at);
-            for i in 0..3 {
-                right[(i, 0)] += x[i] * at.torque_n_m;
-                (0..3).for_each(|j| gram[(i, j)] += x[i] * x[j]);
-            }
-            square += at.torque_n_m * at.torque_n_m;
-        }
-        let mean = right[(0, 0)] / count;
-        (0..3).for_each(|i| gram[(i, i)] += FLOOR * count);
-        let about = square - count * mean * mean;
-        let Ok(factor) = cholesky(gram.as_ref()) else { return 0.0 };
-        let found = factor.solve(right.as_ref());
-        let explained = (0..3).map(|i| found[(i, 0)] * right[(i, 0)]).sum::<f64>() - count * mean * mean;
+        let fit = Normal::of(3, self.rows.len(), |k, row| {
+            (row[1], row[2]) = self.rows[k].at.output_rad.sin_cos();
+            (self.rows[k].at.torque_n_m, 1.0)
+        });
+        let Some(fit) = fit.and_then(|fit| fit.sound(self.rows.len())) else { return 0.0 };
+        let about = fit.square - fit.right[0] * fit.right[0] / count;
+        let explained = about - fit.misfit();
         if about > 0.0 { (explained / about).clamp(0.0, 1.0).sqrt() } else { 0.0 }
     }
 
@@ -373,33 +359,25 @@ impl Rows {
         Folds::new(&self.rows, parts, scales, self.means_arcsec.len(), self.folds == FoldKind::Files)
     }
 
-    /// Whether the load of a row decides the flank or not, for all that its sensor's noise leaves open.
-    fn is_sure(at: &State, friction_n_m: f64, recorded: &Recorded) -> bool {
-        (at.torque_n_m.abs() - friction_n_m).abs() >= SURE * recorded.torque_noise_n_m
-    }
-
     /// Without the rows of which the noise of the torque leaves open on which flank they lie, where loads from
     /// `friction_n_m` on decide it.
     pub(crate) fn sure(mut self, friction_n_m: f64, recorded: &Recorded) -> Rows {
-        let keep: Vec<bool> = self.rows.iter().map(|row| Self::is_sure(&row.at, friction_n_m, recorded)).collect();
-        let mut kept = keep.iter();
-        self.rows.retain(|_| *kept.next().unwrap_or(&true));
-        let mut kept = keep.iter();
-        self.measured_arcsec.retain(|_| *kept.next().unwrap_or(&true));
-        self.unsettled += keep.iter().filter(|keep| !**keep).count();
+        let all = self.rows.len();
+        self.rows.retain(|row| (row.at.torque_n_m.abs() - friction_n_m).abs() >= SURE * recorded.torque_noise_n_m);
+        self.unsettled += all - self.rows.len();
         self
     }
 
     /// With what a prior says taken off what was measured, and the mean of each file off that.
     pub fn less(mut self, prior: &Prior<'_>) -> Rows {
         let mut sums = vec![(0.0, 0.0); self.measured_means_arcsec.len()];
-        for (row, measured) in self.rows.iter_mut().zip(&self.measured_arcsec) {
-            row.left_arcsec = measured - prior.steady_arcsec(&row.at);
-            let (sum, count) = &mut sums[row.zero];
+        for row in &mut self.rows {
+            row.left_arcsec = row.measured_arcsec - prior.steady_arcsec(&row.at);
+            let (sum, count) = &mut sums[row.at.log];
             (*sum, *count) = (*sum + row.left_arcsec, *count + 1.0);
         }
         let means: Vec<f64> = sums.iter().map(|(sum, count)| sum / f64::max(*count, 1.0)).collect();
-        self.rows.iter_mut().for_each(|row| row.left_arcsec -= means[row.zero]);
+        self.rows.iter_mut().for_each(|row| row.left_arcsec -= means[row.at.log]);
         self.means_arcsec = self.measured_means_arcsec.iter().zip(&means).map(|(a, b)| a + b).collect();
         self
     }

@@ -365,7 +365,7 @@ fn a_sum_over_folds_is_the_fit_to_the_rows() {
                 way: 1.0,
                 ..State::default()
             };
-            Row { at, left_arcsec: 7.0 * psi.sin() + 3.0, zero: 0, fold: k / 50 }
+            Row { at, measured_arcsec: 0.0, left_arcsec: 7.0 * psi.sin() + 3.0, fold: k / 50 }
         })
         .collect();
     let folds = Folds::new(&rows, &[PartName::GeneratorAngle], &scales, 1, false);
@@ -493,7 +493,7 @@ fn what_a_first_log_lacks_is_asked_for_next() {
     let first = plan(&prior, &bench, None).unwrap();
     assert!(first.cannot.iter().any(|why| why.starts_with("wind_up")), "{:?}", first.cannot);
     let made = calibrate(&[played(&first, 1, law)], &prior).unwrap();
-    let further = plan(&prior, &Bench { torque_n_m: [-30.0, 30.0], ..bench }, Some(&made.first())).unwrap();
+    let further = plan(&prior, &Bench { torque_n_m: [-30.0, 30.0], ..bench }, Some(&made)).unwrap();
     assert!(further.widest.iter().all(|wide| wide.part == "wind_up" || wide.part == "play"), "{:?}", further.widest);
     assert!(further.passes.iter().all(|pass| (pass.torque_n_m - 10.0).abs() > 1.0), "{:?}", further.passes);
     let wide = &further.widest[0];

@@ -24,7 +24,7 @@ pub(super) struct Agreement {
 impl Agreement {
     /// Of two and more logs.
     pub fn of(rows: &Rows, parts: &[PartName], scales: &Scales) -> Option<Agreement> {
-        let by_log: Vec<Row> = rows.rows.iter().map(|row| Row { fold: row.zero, ..*row }).collect();
+        let by_log: Vec<Row> = rows.rows.iter().map(|row| Row { fold: row.at.log, ..*row }).collect();
         let folds = Folds::new(&by_log, parts, scales, rows.means_arcsec.len(), true);
         let all = folds.all();
         let chosen: Vec<Chosen> = parts.iter().map(|part| Chosen { part: *part, penalty: PENALTIES[0] }).collect();
@@ -75,7 +75,7 @@ const OTHER_SLOPE: f64 = 3.0;
 pub(super) fn loads_unlike(rows: &Rows, model: &Model, prior: &Prior<'_>, files: &[Recording]) -> Option<String> {
     let most = model.scales.torque_n_m.iter().fold(0.0, |most: f64, load| most.max(load.abs()));
     let slopes = (0..files.len()).filter_map(|log| {
-        let of_log = rows.rows.iter().filter(|row| row.zero == log).map(|row| row.at.torque_n_m);
+        let of_log = rows.rows.iter().filter(|row| row.at.log == log).map(|row| row.at.torque_n_m);
         let (low, high) = least_and_most(of_log);
         let slope = (model.under_arcsec(high, prior) - model.under_arcsec(low, prior)) / (high - low);
         (high - low > SAME_TORQUE * most && slope > 0.0).then_some((log, slope))
@@ -128,8 +128,8 @@ pub(super) fn generators_turned(
         let by = angles_off(&rows, &fitted, prior, files.len());
         turned.iter_mut().zip(&by).for_each(|(turned, by)| *turned += by);
         for row in &mut rows.rows {
-            row.at.generator_rad -= by[row.zero];
-            row.at.output_rad -= by[row.zero] / prior.nominal.ratio;
+            row.at.generator_rad -= by[row.at.log];
+            row.at.output_rad -= by[row.at.log] / prior.nominal.ratio;
         }
         rows = rows.less(prior);
     }
@@ -169,7 +169,7 @@ fn angles_off(rows: &Rows, model: &Model, prior: &Prior<'_>, logs: usize) -> Vec
         let slope = (says(STEP_RAD) - says(-STEP_RAD)) / (2.0 * STEP_RAD);
         let left = row.left_arcsec - model.adds_arcsec(&row.at);
         let of_row = [1.0, slope, left, slope * slope, slope * left];
-        sums[row.zero].iter_mut().zip(of_row).for_each(|(sum, of_row)| *sum += of_row);
+        sums[row.at.log].iter_mut().zip(of_row).for_each(|(sum, of_row)| *sum += of_row);
     }
     // The slope of what is left over that of the curve, each less its mean over the log.
     let off = |[rows, slope, left, square, product]: &[f64; 5]| {

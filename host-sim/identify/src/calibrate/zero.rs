@@ -12,6 +12,7 @@ use serde::Serialize;
 use super::GOLDEN;
 use super::parts::State;
 use super::rows::Rows;
+use crate::diagnosis::channels::{FreeSpan, jackknife};
 use flexspline_base::robust::dot;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
@@ -148,7 +149,7 @@ struct Projected<'a> {
     table: &'a Table<'a>,
     at: Vec<State>,
     measured: Vec<f64>,
-    basis: Vec<Vec<f64>>,
+    basis: FreeSpan,
 }
 
 impl<'a> Projected<'a> {
@@ -156,45 +157,24 @@ impl<'a> Projected<'a> {
         let every = rows.rows.len().div_ceil(most).max(1);
         let places: Vec<usize> = (0..rows.rows.len()).step_by(every).collect();
         let at: Vec<State> = places.iter().map(|k| rows.rows[*k].at).collect();
-        let measured = places.iter().map(|k| rows.measured_arcsec[*k]).collect();
-        let files = rows.rows.iter().map(|row| row.zero + 1).max().unwrap_or(0);
+        let measured = places.iter().map(|k| rows.rows[*k].measured_arcsec).collect();
+        let files = rows.rows.iter().map(|row| row.at.log + 1).max().unwrap_or(0);
         let heaviest = at.iter().map(|at| at.torque_n_m.abs()).fold(1e-9, f64::max);
         let mut columns: Vec<Vec<f64>> =
-            (0..files).map(|file| places.iter().map(|k| f64::from(rows.rows[*k].zero == file)).collect()).collect();
+            (0..files).map(|file| places.iter().map(|k| f64::from(rows.rows[*k].at.log == file)).collect()).collect();
         columns.push(at.iter().map(|at| at.torque_n_m / heaviest).collect());
         columns.push(at.iter().map(|at| (at.torque_n_m / heaviest).powi(3)).collect());
         columns.push(at.iter().map(|at| at.way).collect());
         let flank = |at: &State| if at.torque_n_m.abs() > friction_n_m { at.torque_n_m.signum() } else { -at.way };
         columns.push(at.iter().map(flank).collect());
-        let mut basis: Vec<Vec<f64>> = Vec::new();
-        for mut column in columns {
-            let before = dot(&column, &column);
-            for other in &basis {
-                let along = dot(&column, other);
-                column.iter_mut().zip(other).for_each(|(a, b)| *a -= along * b);
-            }
-            let size = dot(&column, &column);
-            if size > 1e-8 * before && size > 0.0 {
-                column.iter_mut().for_each(|a| *a /= size.sqrt());
-                basis.push(column);
-            }
-        }
+        let basis = FreeSpan::default().beyond(columns);
         Projected { table, at, measured, basis }
     }
 
     /// What is left with a phase, arcsec.
     fn left(&self, zero_rad: f64) -> Vec<f64> {
-        let mut left: Vec<f64> = self
-            .at
-            .iter()
-            .zip(&self.measured)
-            .map(|(at, measured)| measured - steady(self.table, at, zero_rad))
-            .collect();
-        for column in &self.basis {
-            let along = dot(&left, column);
-            left.iter_mut().zip(column).for_each(|(a, b)| *a -= along * b);
-        }
-        left
+        let left = |(at, measured): (&State, &f64)| measured - steady(self.table, at, zero_rad);
+        self.basis.freed(self.at.iter().zip(&self.measured).map(left).collect())
     }
 
     fn squares(&self, zero_rad: f64) -> f64 {
@@ -258,9 +238,7 @@ pub(super) fn align(table: &Table<'_>, rows: &Rows, friction_n_m: f64) -> Alignm
             vertex(three.each_ref().map(|left| dot(left, left) - dot(&left[begin..end], &left[begin..end])))
         })
         .collect();
-    let count = without.len() as f64;
-    let mean = without.iter().sum::<f64>() / count;
-    let spread = ((count - 1.0) / count * without.iter().map(|v| (v - mean).powi(2)).sum::<f64>()).sqrt();
+    let spread = jackknife(&without);
     let zero = best + whole * step;
     let half = OF_95_OF_BLOCKS * spread * step;
     let rms = |zero: f64| (all.squares(zero) / three[0].len() as f64).sqrt();

@@ -12,7 +12,7 @@ use std::borrow::Cow;
 use flexspline::Table;
 
 use super::base::PlayLaw;
-use super::channels::{FreeSpan, fault_throughout, project_out, sample, unit, waves};
+use super::channels::{FreeSpan, fault_throughout, sample, waves};
 use super::flank_lag::behind;
 use super::linear::{Gram, Prior, solve};
 use super::rows::{Rows, combined, rms};
@@ -135,17 +135,8 @@ impl<'a> Held<'a> {
 
     /// How much is left, block by block: the sum of the magnitudes.
     fn left(&self, law: PlayLaw, read: Read) -> Vec<f64> {
-        let mut left = self.error.clone();
-        let mut before: Vec<Vec<f64>> = Vec::new();
-        for column in self.columns(law, read, &self.places, &self.waves) {
-            let mut rest = self.free.freed(column.clone());
-            before.iter().for_each(|before| project_out(&mut rest, before));
-            if let Some(rest) = unit(&column, rest) {
-                project_out(&mut left, &rest);
-                before.push(rest);
-            }
-        }
-        by_block(&left)
+        let said = self.free.beyond(self.columns(law, read, &self.places, &self.waves));
+        by_block(&said.freed(self.error.clone()))
     }
 
     /// What means over `s` seconds take of what the model says, in all rows, arcsec; sizes are those that the rows

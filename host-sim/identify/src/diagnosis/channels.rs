@@ -8,9 +8,9 @@
 use flexspline::Table;
 
 use super::base::{PlayLaw, predicted_by_table};
-use super::linear::{self, Gram, Prior, solve};
+use super::linear;
 use super::noise::white_level;
-use super::rows::{Rows, quantile, rms, robust_std};
+use super::rows::{Rows, mean, quantile, rms, robust_std};
 use crate::measurement::{Fault, FaultName, Quantity, Recording, Session, Treatment};
 use crate::nominal::{Harmonic, Nominal};
 use flexspline_base::robust::dot;
@@ -85,7 +85,8 @@ pub(super) fn floating(rows: &Rows, nominal: &Nominal, places: &[usize]) -> Vec<
 }
 
 /// An orthonormal basis of the smooth part of an error at some places, and of what else may take part in it.
-pub(super) struct FreeSpan(Vec<Vec<f64>>);
+#[derive(Default)]
+pub(crate) struct FreeSpan(Vec<Vec<f64>>);
 
 impl FreeSpan {
     /// Of the columns of [`floating`], the first two orders of both wheels, and `further` columns.
@@ -95,38 +96,38 @@ impl FreeSpan {
             columns.extend(waves(order, &rows.on_flexspline, places));
             columns.extend(waves(order, &rows.on_circular_spline, places));
         }
-        let mut free = FreeSpan(Vec::new());
-        for column in columns.into_iter().chain(further) {
-            free.0.extend(unit(&column, free.freed(column.clone())));
+        columns.extend(further);
+        FreeSpan::default().beyond(columns)
+    }
+
+    /// An orthonormal basis of what columns have beyond this one.
+    pub(crate) fn beyond(&self, columns: impl IntoIterator<Item = Vec<f64>>) -> FreeSpan {
+        let mut span = FreeSpan::default();
+        for column in columns {
+            let free = span.freed(self.freed(column.clone()));
+            let norm = free.iter().map(|v| v * v).sum::<f64>().sqrt();
+            // Else it is round-off of the column.
+            if norm > 1e-6 * rms(&column) * (column.len() as f64).sqrt() {
+                span.0.push(free.into_iter().map(|v| v / norm).collect());
+            }
         }
-        free
+        span
     }
 
     /// The part of a column at the places that is orthogonal to the basis.
-    pub(super) fn freed(&self, mut column: Vec<f64>) -> Vec<f64> {
-        self.0.iter().for_each(|free| project_out(&mut column, free));
+    pub(crate) fn freed(&self, mut column: Vec<f64>) -> Vec<f64> {
+        for free in &self.0 {
+            let share = linear::dot(&column, free);
+            column.iter_mut().zip(free).for_each(|(left, v)| *left -= share * v);
+        }
         column
     }
-}
-
-/// A column of unit length, unless it is round-off of the column that it `was`.
-pub(super) fn unit(was: &[f64], mut column: Vec<f64>) -> Option<Vec<f64>> {
-    let norm = column.iter().map(|v| v * v).sum::<f64>().sqrt();
-    let is_any = norm > 1e-6 * rms(was) * (was.len() as f64).sqrt();
-    column.iter_mut().for_each(|v| *v /= norm);
-    is_any.then_some(column)
-}
-
-/// Takes from a column its projection on a unit column.
-pub(super) fn project_out(column: &mut [f64], unit: &[f64]) {
-    let share = linear::dot(column, unit);
-    column.iter_mut().zip(unit).for_each(|(left, v)| *left -= share * v);
 }
 
 /// A sample of the rows with what floats freely taken out of their error.
 struct Freed {
     places: Vec<usize>,
-    columns: Vec<Vec<f64>>,
+    span: FreeSpan,
     error: Vec<f64>,
 }
 
@@ -138,51 +139,35 @@ fn spread(error: &[f64]) -> f64 {
 }
 
 impl Freed {
-    fn new(rows: &Rows, nominal: &Nominal) -> Freed {
+    /// Without the wave of the generator of this order, if one is given, among what floats.
+    fn new(rows: &Rows, nominal: &Nominal, but: Option<f64>) -> Freed {
         let places = sample(rows, SAMPLE);
-        let mut columns = floating(rows, nominal, &places);
-        columns.extend(waves(1.0, &rows.generator, &places));
-        let mut freed = Freed { error: Vec::new(), columns, places };
+        let floats = |harmonic: &&Harmonic| Some(harmonic.order_per_generator_turn) != but;
+        let others =
+            Nominal { harmonics: nominal.harmonics.iter().filter(floats).cloned().collect(), ..nominal.clone() };
+        let mut columns = floating(rows, &others, &places);
+        columns.extend(waves(1.0, &rows.generator, &places).into_iter().filter(|_| but != Some(1.0)));
+        let span = FreeSpan::default().beyond(columns);
+        let mut freed = Freed { error: Vec::new(), span, places };
         freed.error = freed.freed(&rows.error);
         let spread = spread(&freed.error);
         freed.error.iter_mut().for_each(|error| *error = error.clamp(-CUT * spread, CUT * spread));
         freed
     }
 
-    /// What the free columns leave of a column of all rows, at the places.
+    /// The part of a column of all rows that is orthogonal to what floats freely, at the places.
     fn freed(&self, column: &[f64]) -> Vec<f64> {
-        self.freed_with(column).0
-    }
-
-    /// The same, and how much of each free column was in it.
-    fn freed_with(&self, column: &[f64]) -> (Vec<f64>, Vec<f64>) {
-        let mut left: Vec<f64> = self.places.iter().map(|k| column[*k]).collect();
-        let size = rms(&left).max(1e-9);
-        let priors: Vec<Prior> =
-            self.columns.iter().map(|c| Prior { mean: 0.0, std: 1e4 * size / rms(c).max(1e-9) }).collect();
-        let views: Vec<&[f64]> = self.columns.iter().map(Vec::as_slice).chain([left.as_slice()]).collect();
-        let Some(solution) = solve(&Gram::of(&views, 0..left.len()), &priors, 1.0 / (size * size)) else {
-            return (left, vec![0.0; self.columns.len()]);
-        };
-        for (column, c) in self.columns.iter().zip(&solution.coefficients) {
-            left.iter_mut().zip(column).for_each(|(left, value)| *left -= c * value);
-        }
-        (left, solution.coefficients)
+        self.span.freed(self.places.iter().map(|k| column[*k]).collect())
     }
 }
 
-impl Freed {
-    /// Amplitude of the wave of this order of the generator, which floats freely, in the error less what is `said` of
-    /// the load, arcsec.
-    fn amplitude(&self, rows: &Rows, said: &[f64], order: f64) -> f64 {
-        let [sine, cosine] = waves(order, &rows.generator, &self.places);
-        let unsaid: Vec<f64> = rows.error.iter().zip(said).map(|(error, said)| error - said).collect();
-        let (_, coefficients) = self.freed_with(&unsaid);
-        let of = |wave: &[f64]| {
-            self.columns.iter().position(|column| column == wave).map_or(0.0, |place| coefficients[place])
-        };
-        of(&sine).hypot(of(&cosine))
-    }
+/// Amplitude of the wave of this order of the generator in the error less what is `said` of the load, arcsec.
+fn amplitude(rows: &Rows, nominal: &Nominal, said: &[f64], order: f64) -> f64 {
+    let freed = Freed::new(rows, nominal, Some(order));
+    let unsaid: Vec<f64> = rows.error.iter().zip(said).map(|(error, said)| error - said).collect();
+    let [sine, cosine] = waves(order, &rows.generator, &freed.places).map(|wave| freed.span.freed(wave));
+    let unsaid = freed.freed(&unsaid);
+    share_beside(&unsaid, &sine, &cosine).hypot(share_beside(&unsaid, &cosine, &sine))
 }
 
 /// How the error stands to what a torque should do.
@@ -232,17 +217,19 @@ impl Told {
         let all = products.iter().fold([0.0; 2], |sum, of| [sum[0] + of[0], sum[1] + of[1]]);
         let share = all[1] / all[0].max(1e-12);
         let without: Vec<f64> = products.iter().map(|of| (all[1] - of[1]) / (all[0] - of[0]).max(1e-12)).collect();
-        // Jackknife.
-        let blocks = products.len() as f64;
-        let mean = without.iter().sum::<f64>() / blocks;
-        let variance = (blocks - 1.0) / blocks * without.iter().map(|share| (share - mean).powi(2)).sum::<f64>();
         let left = robust_std(error.iter().zip(&should).map(|(error, should)| error - should));
-        Told { size: rms(&should), share, std: variance.sqrt(), left, wind_up, clearance, left_free }
+        Told { size: rms(&should), share, std: jackknife(&without), left, wind_up, clearance, left_free }
     }
 
     fn is_certain(&self) -> bool {
         self.share.abs() > CERTAIN * self.std
     }
+}
+
+/// Standard deviation of a value, from the values without one block of the rows at a time (jackknife).
+pub(crate) fn jackknife(without: &[f64]) -> f64 {
+    let (blocks, middle) = (without.len() as f64, mean(without));
+    ((blocks - 1.0) / blocks * without.iter().map(|value| (value - middle).powi(2)).sum::<f64>()).sqrt()
 }
 
 /// How much of `column` is in `of`, with `other` free.
@@ -277,7 +264,7 @@ pub(super) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: 
     if !rows.recorded.torque || rows.torque.iter().all(|torque| *torque == 0.0) || nominal.wind_up_arcsec(1.0) == 0.0 {
         return None;
     }
-    let freed = Freed::new(&rows, nominal);
+    let freed = Freed::new(&rows, nominal, None);
     let plain: Vec<f64> = (0..rows.len()).map(|k| rows.error[k] - nominal.wind_up_arcsec(rows.torque[k])).collect();
     let white = white_level(&rows, &rows.error).min(white_level(&rows, &plain));
     let seen = |told: &Told| told.size > SEEN_ARCSEC.max(SEEN_OF_NOISE * white);
@@ -444,7 +431,7 @@ struct Rough {
 impl Rough {
     fn of(sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> Rough {
         let rows = Rows::new(sessions, nominal);
-        let freed = Freed::new(&rows, nominal);
+        let freed = Freed::new(&rows, nominal, None);
         let told = Told::by(&rows, (nominal, table), &freed, 1.0);
         let white = white_level(&rows, &rows.error);
         let by_size = |a: &&Harmonic, b: &&Harmonic| a.amplitude_arcsec.total_cmp(&b.amplitude_arcsec);
@@ -455,7 +442,7 @@ impl Rough {
             let said: Vec<f64> = (rows.torque.iter().zip(&flank))
                 .map(|(torque, flank)| told.wind_up * nominal.wind_up_arcsec(*torque) + told.clearance * flank)
                 .collect();
-            freed.amplitude(&rows, &said, of.order_per_generator_turn) / of.amplitude_arcsec
+            amplitude(&rows, nominal, &said, of.order_per_generator_turn) / of.amplitude_arcsec
         });
         Rough { told, left: told.left_free / white, white, harmonics }
     }

@@ -10,7 +10,7 @@ use super::base::Base;
 use super::candidate::{Excitation, Law};
 use super::model::{Problem, Scaffold, Term};
 use super::noise::{Noise, Whitener};
-use super::rows::{Rows, quantile};
+use super::rows::{Rows, add_scaled, quantile};
 use crate::measurement::Session;
 
 /// One run: text, and session by session how it is driven at `share` (0 to 1) of its time.
@@ -191,9 +191,7 @@ fn least_apart(
     {
         let imagined = Excitation { rows: &rows, base: &base, ..*on };
         for (column, c) in term.law.columns(&imagined, &term.values()).iter().zip(coefficients) {
-            for (t, v) in truth.iter_mut().zip(&column.values) {
-                *t += c * v;
-            }
+            add_scaled(&mut truth, &column.values, *c);
         }
     }
     rows.error = truth;
@@ -207,7 +205,7 @@ fn least_apart(
             .begin(law)
             .into_iter()
             .filter_map(|places| {
-                let trial = Term::new(&problem, law, places.clone()).main_only();
+                let trial = Term::bare(&problem, law, places.clone());
                 Some((scaffold.fit(Some(&trial))?.solution.misfit, places))
             })
             .min_by(|a, b| a.0.total_cmp(&b.0))?;

@@ -15,8 +15,8 @@ use super::model::{Problem, Scaffold, terms_at};
 use super::noise::Whitener;
 use super::report::Parameter;
 use super::resolution::{Resolution, averages_hide, resolution};
-use super::rows::Rows;
-use super::select::{Selected, fit, fixed, less, settle_all};
+use super::rows::{Rows, add_scaled};
+use super::select::{Selected, fixed, less, settle_all};
 use super::thinned::{Sample, Thinned};
 use super::{DiagnosisError, Fineness, Settings, prepare, uncertainty};
 use crate::causes::CauseName;
@@ -117,12 +117,6 @@ fn add_part(sum: &mut [f64], columns: &[Column], coefficients: &[f64]) {
     let predicts = |column: &Column| !matches!(column.tolerance, Tolerance::History(_));
     for (column, c) in columns.iter().zip(coefficients).filter(|(column, _)| predicts(column)) {
         add_scaled(sum, &column.values, *c);
-    }
-}
-
-fn add_scaled(sum: &mut [f64], column: &[f64], c: f64) {
-    for (s, v) in sum.iter_mut().zip(column) {
-        *s += c * v;
     }
 }
 
@@ -229,7 +223,7 @@ impl Extended {
                 let sample = Sample::new(&on, &thinned, &uncertain, stride);
                 let terms = super::remembered(&laws, &fixed(&sample.problem(noise, worth), &laws, causes));
                 let terms = terms_at(&problem, &laws, &terms);
-                let selected = Selected { fit: fit(&problem, &terms).ok_or(DiagnosisError::NotFinite)?, terms };
+                let selected = Selected::of(&problem, terms).ok_or(DiagnosisError::NotFinite)?;
                 super::remembered(&laws, &settle_all(&problem, selected).ok_or(DiagnosisError::NotFinite)?.terms)
             }
             None => super::remembered(&laws, &fixed(&problem, &laws, causes)),
@@ -332,7 +326,7 @@ impl Found {
     pub(super) fn of(problem: &Problem<'_>, laws: &[Law], start: &[(usize, Vec<f64>)]) -> Option<Found> {
         let terms = terms_at(problem, laws, start);
         let alone = Scaffold::new(problem, Vec::new()).fit(None)?;
-        let selected = Selected { fit: fit(problem, &terms)?, terms };
+        let selected = Selected::of(problem, terms)?;
         let known = uncertainty::known(problem, &selected, 1.0);
         Some(Found {
             recalibrated: alone.solution.coefficients,

@@ -60,11 +60,11 @@ pub(crate) fn proved<'l>(
         let mut terms = selected.terms.clone();
         let gone = terms.remove(k);
         let looks_like = gone.law.label.to_string();
-        let Some(fit) = select::fit(problem, &terms) else { break };
+        let Some(fewer) = Selected::of(problem, terms) else { break };
         let predicts = Judged::number(Gate::Predicts, all.sqrt(), none.sqrt(), false);
-        trace.judged(Stage::HeldOut, gone.law, &gone.values(), vec![predicts]);
+        trace.judged(Stage::HeldOut, gone.law, &gone.places, None, vec![predicts]);
         aside.push(Unexplained { looks_like, size_arcsec });
-        selected = Selected { terms, fit };
+        selected = fewer;
     }
     (selected, aside)
 }

@@ -49,6 +49,7 @@ mod verdict;
 mod with_speed;
 mod zeros;
 
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use flexspline::Table;
@@ -72,7 +73,7 @@ use prepare::FreeColumns;
 pub use report::{Cause, Compensation, Diagnosis, HeldOut, Parameter, Residual, Unexplained, Verdict};
 use resolution::{Resolution, resolution};
 use rows::Rows;
-use select::{Bests, Scope, Selected, fit, select};
+use select::{Bests, Chooser, Scope, Selected};
 use thinned::{Sample, Thinned};
 pub(crate) use trace::{Gate, Judged, Stage, Trace};
 
@@ -194,7 +195,7 @@ pub(crate) fn diagnose_extended(
     progress(2, 4, "rivals");
     let Search { laws, problem, noise, stride, thinned, start, bests, fast, mut trace } = search;
     let terms = terms_at(&problem, &laws, &start);
-    let selected = Selected { fit: fit(&problem, &terms).ok_or(DiagnosisError::NotFinite)?, terms };
+    let selected = Selected::of(&problem, terms).ok_or(DiagnosisError::NotFinite)?;
     let (selected, mut unproved) = held_out::proved(&problem, selected, &mut trace);
     let (selected, hides) = verdict::told_apart(&problem, selected, noise, &mut trace);
     unproved.extend(hides);
@@ -206,10 +207,11 @@ pub(crate) fn diagnose_extended(
     left.extend(fast.filter(|line| line.size_arcsec > select::least_size(noise.white)));
     left.extend(remainder::beyond_noise(&problem, &selected, noise));
     for (k, term) in selected.terms.iter().enumerate() {
-        trace.say(&trace::Found::Parts(term.law.label, select::parts(term, selected.fit.of(k))));
+        let (label, [main, nuisance, beside]) = (term.law.label, select::parts(term, selected.fit.of(k)));
+        trace.say(&format_args!("{label}: law {main:.2}, deviations {nuisance:.2}, beside {beside:.2} arcsec"));
     }
     for something in &left {
-        trace.say(&trace::Found::Left(&something.looks_like, something.size_arcsec));
+        trace.say(&format_args!("left: {}, {:.2} arcsec", something.looks_like, something.size_arcsec));
     }
     left.append(&mut unproved);
     let fineness = Fineness { stride, noise, worth: problem.worth };
@@ -273,7 +275,7 @@ impl<'a> Search<'a> {
         let mut averaged = Averaged::of(on, stride).map(Arc::new);
         let mut free = FreeColumns::of(on, &laws, averaged.clone());
         let (mut noise, mut worth) = prepare::noise(on, &free, &at_first, &uncertain, None);
-        trace.say(&trace::Found::Noise(noise, worth));
+        say_noise(&trace, noise, worth);
         let mut problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth, averaged.clone());
         let mut fast: Vec<(Label, f64)> = Vec::new();
         let mut start: Vec<(usize, Vec<f64>)> = Vec::new();
@@ -287,13 +289,12 @@ impl<'a> Search<'a> {
                 let sample = Sample::new(on, thinned, &uncertain, stride);
                 let problem = sample.problem(noise, worth);
                 let terms = terms_at(&problem, &laws, &start);
-                let selected = select(&problem, &laws, noise.white, terms, &mut bests, scope, &mut trace);
-                start = remembered(&laws, &selected.ok_or(DiagnosisError::NotFinite)?.terms);
+                let selected = choose(&problem, &laws, noise, terms, (&mut bests, scope, &mut trace))?;
+                start = remembered(&laws, &selected.terms);
                 scope = Scope::CameClose;
             }
             let terms = terms_at(&problem, &laws, &start);
-            let selected = select(&problem, &laws, noise.white, terms, &mut bests, scope, &mut trace)
-                .ok_or(DiagnosisError::NotFinite)?;
+            let selected = choose(&problem, &laws, noise, terms, (&mut bests, scope, &mut trace))?;
             start = remembered(&laws, &selected.terms);
             if round == MOST_ROUNDS {
                 break;
@@ -304,7 +305,7 @@ impl<'a> Search<'a> {
             for (line, size) in found {
                 let label = Label::Deviation(Deviation::Line { per: line.per, order: line.order });
                 if fast.iter().all(|(known, _)| known.to_string() != label.to_string()) {
-                    trace.say(&trace::Found::FastLine(label, size));
+                    trace.say(&format_args!("{label}: {size:.2} arcsec, too fast for averages"));
                     fast.push((label, size));
                 }
             }
@@ -321,7 +322,7 @@ impl<'a> Search<'a> {
             for (found, size) in slow {
                 let law = line(found.per, found.order);
                 if laws.iter().all(|l| l.label != law.label) {
-                    trace.say(&trace::Found::Line(law.label, size));
+                    trace.say(&format_args!("{}: {size:.2} arcsec", law.label));
                     laws.push(law);
                 }
             }
@@ -353,11 +354,31 @@ impl<'a> Search<'a> {
                 start.clear();
             }
             (noise, worth) = (again, worth_again);
-            trace.say(&trace::Found::Noise(noise, worth));
+            say_noise(&trace, noise, worth);
             problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth, averaged.clone());
         }
         Ok(Search { laws, problem, noise, stride, thinned, start, bests, fast, trace })
     }
+}
+
+/// Chooses causes among laws, beginning with some terms.
+fn choose<'l>(
+    problem: &Problem<'_>,
+    laws: &'l [Law],
+    noise: Noise,
+    start: Vec<Term<'l>>,
+    (bests, scope, trace): (&mut Bests, Scope, &mut Trace),
+) -> Result<Selected<'l>, DiagnosisError> {
+    let least = select::least_size(noise.white);
+    let chooser = Chooser { problem, laws, least, bests, scope, trace, given: HashSet::new() };
+    chooser.select(start).ok_or(DiagnosisError::NotFinite)
+}
+
+/// Says which noise was found, and the information weight of the rows under it.
+fn say_noise(trace: &Trace, Noise { white, wander, correlation_s }: Noise, weight: f64) {
+    trace.say(&format_args!(
+        "noise: white {white:.3}, drift {wander:.3} arcsec over {correlation_s:.1} s; information weight {weight:.2}"
+    ));
 }
 
 /// Which laws were selected, and where.

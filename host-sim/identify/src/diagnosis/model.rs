@@ -194,21 +194,6 @@ impl White {
         Coefficients::new(&self.roles, coefficients).of_sizes(&self.size)
     }
 
-    /// Which columns are main ones.
-    fn main(&self) -> Vec<bool> {
-        self.tolerances.iter().map(|t| matches!(t, Tolerance::Main(_))).collect()
-    }
-
-    /// Only the main columns.
-    fn main_only(mut self) -> White {
-        let main = self.main();
-        self.columns = Set::new(kept(&self.columns, &main));
-        keep(&mut self.size, &main);
-        keep(&mut self.roles, &main);
-        keep(&mut self.tolerances, &main);
-        self
-    }
-
     /// Priors, nuisance scaled to what the main columns explain with `coefficients`.
     fn priors(&self, coefficients: Option<&[f64]>) -> Vec<Prior> {
         let explained: f64 = match coefficients {
@@ -233,17 +218,6 @@ impl White {
     }
 }
 
-/// Those columns that are told to be kept.
-fn kept(columns: &[Vec<f64>], kept: &[bool]) -> Vec<Vec<f64>> {
-    columns.iter().zip(kept).filter(|(_, kept)| **kept).map(|(column, _)| column.clone()).collect()
-}
-
-/// Keeps those values that are told to be kept.
-fn keep<T>(values: &mut Vec<T>, kept: &[bool]) {
-    let mut kept = kept.iter();
-    values.retain(|_| *kept.next().unwrap_or(&true));
-}
-
 /// A law at given places of its shape parameters, with its columns.
 #[derive(Clone)]
 pub(crate) struct Term<'l> {
@@ -266,14 +240,32 @@ impl<'l> Term<'l> {
     /// Evaluates a law by itself.
     #[must_use]
     pub fn new(problem: &Problem<'_>, law: &'l Law, places: Vec<f64>) -> Term<'l> {
-        Term::among(problem, law, places, None)
+        Term::among(problem, law, places, None, Extent::Whole)
+    }
+
+    /// Evaluates the main columns of a law by itself.
+    #[must_use]
+    pub(crate) fn bare(problem: &Problem<'_>, law: &'l Law, places: Vec<f64>) -> Term<'l> {
+        Term::among(problem, law, places, None, Extent::Bare)
+    }
+
+    /// Only its main columns.
+    #[must_use]
+    pub(crate) fn main_only(&self, problem: &Problem<'_>) -> Term<'l> {
+        Term::among(problem, self.law, self.places.clone(), self.among.clone(), Extent::Bare)
     }
 
     /// Evaluates a law on what other causes leave.
-    fn among(problem: &Problem<'_>, law: &'l Law, places: Vec<f64>, among: Option<Arc<Among>>) -> Term<'l> {
+    fn among(
+        problem: &Problem<'_>,
+        law: &'l Law,
+        places: Vec<f64>,
+        among: Option<Arc<Among>>,
+        extent: Extent,
+    ) -> Term<'l> {
         let recorded = problem.excitation(law);
         let on = left_by(among.as_deref(), &recorded);
-        let (averaged, white) = White::of(problem, law, columns(law, Extent::Whole, &on, &places));
+        let (averaged, white) = White::of(problem, law, columns(law, extent, &on, &places));
         Term { law, places, averaged: Arc::new(averaged), white, occam: -law.search.odds_against, among }
     }
 
@@ -284,7 +276,7 @@ impl<'l> Term<'l> {
             let moved = place + by(k).clamp(-FARTHEST, FARTHEST);
             if shape.cyclic { moved.rem_euclid(1.0) } else { moved.clamp(0.0, 1.0) }
         });
-        Term::among(problem, self.law, places.collect(), self.among.clone())
+        Term::among(problem, self.law, places.collect(), self.among.clone(), Extent::Whole)
     }
 
     /// Values of the shape parameters.
@@ -307,14 +299,6 @@ impl<'l> Term<'l> {
     #[must_use]
     pub(crate) fn by_role<'c>(&'c self, coefficients: &'c [f64]) -> Coefficients<'c> {
         self.white.by_role(coefficients)
-    }
-
-    /// Only its main columns.
-    #[must_use]
-    pub(crate) fn main_only(mut self) -> Term<'l> {
-        self.averaged = Arc::new(kept(&self.averaged, &self.white.main()));
-        self.white = self.white.main_only();
-        self
     }
 
     /// Columns.
@@ -434,7 +418,7 @@ pub(crate) fn among_each_other<'l>(problem: &Problem<'_>, mut terms: Vec<Term<'l
         let scaffold = Scaffold::new(problem, others).ahead(k);
         let (left, occam) = (scaffold.left_to(terms[k].law), terms[k].occam);
         if left.is_some() || terms[k].among.is_some() {
-            let term = Term::among(problem, terms[k].law, terms[k].places.clone(), left);
+            let term = Term::among(problem, terms[k].law, terms[k].places.clone(), left, Extent::Whole);
             terms[k] = Term { occam, ..term };
         }
     }
@@ -460,6 +444,12 @@ impl Fit {
     pub fn of(&self, k: usize) -> &[f64] {
         let end = self.starts.get(k + 1).copied().unwrap_or(self.solution.coefficients.len());
         &self.solution.coefficients[self.starts[k]..end]
+    }
+
+    /// Coefficients of the last term.
+    #[must_use]
+    pub fn last(&self) -> &[f64] {
+        self.of(self.starts.len() - 1)
     }
 
     /// These columns and priors fitted without a block of the data, whose products are `inside`.
@@ -496,7 +486,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     /// A law among the terms.
     #[must_use]
     pub fn term<'n>(&self, law: &'n Law, places: Vec<f64>) -> Term<'n> {
-        Term::among(self.problem, law, places, self.left_to(law))
+        Term::among(self.problem, law, places, self.left_to(law), Extent::Whole)
     }
 
     /// White columns of a law among the terms.

@@ -35,13 +35,7 @@ pub(crate) struct Whitener {
     stride: usize,
     /// Averages of each session.
     pub sessions: Vec<std::ops::Range<usize>>,
-    /// Filter gain at each average.
-    gain: Vec<f64>,
-    /// Standard deviation of the innovation.
-    scale: Vec<f64>,
-    /// Decay of the wander to the next average.
-    decay: Vec<f64>,
-    /// Gain, scale and decay, ready for use.
+    /// The filter at each average.
     filter: Vec<Step>,
 }
 
@@ -52,6 +46,10 @@ struct Step {
     take: f64,
     /// Inverse standard deviation of the innovation.
     worth: f64,
+    /// Standard deviation of the innovation, gain, and decay of the wander to the next average.
+    scale: f64,
+    gain: f64,
+    decay: f64,
 }
 
 /// Columns that are made white side by side.
@@ -71,8 +69,7 @@ impl Whitener {
             groups.extend(parts(&session, stride));
             sessions.push(from..groups.len());
         }
-        let count = groups.len();
-        let (mut gain, mut scale, mut decay) = (vec![0.0; count], vec![1.0; count], vec![0.0; count]);
+        let mut filter = Vec::with_capacity(groups.len());
         let power = noise.wander * noise.wander;
         for session in &sessions {
             let mut variance = power;
@@ -83,21 +80,18 @@ impl Whitener {
                 let loud = if rows.jitters { rms(&rows.loudness[rows_in.clone()]) } else { 1.0 };
                 let white = (white * loud).powi(2) / rows_in.len() as f64;
                 let innovation = variance + white;
-                gain[g] = variance / innovation;
-                scale[g] = innovation.sqrt();
-                let after = variance * (1.0 - gain[g]);
+                let (gain, scale, mut decay) = (variance / innovation, innovation.sqrt(), 0.0);
+                let after = variance * (1.0 - gain);
                 if g + 1 < session.end {
                     let dt = rows.time[groups[g + 1].start] - rows.time[rows_in.start];
-                    let keep = (-dt / noise.correlation_s).exp();
-                    decay[g] = keep;
-                    variance = keep * keep * after + power * (1.0 - keep * keep);
+                    decay = (-dt / noise.correlation_s).exp();
+                    variance = decay * decay * after + power * (1.0 - decay * decay);
                 }
+                let (keep, take) = (decay * (1.0 - gain), decay * gain);
+                filter.push(Step { keep, take, worth: 1.0 / scale, scale, gain, decay });
             }
         }
-        let filter = (0..count)
-            .map(|g| Step { keep: decay[g] * (1.0 - gain[g]), take: decay[g] * gain[g], worth: 1.0 / scale[g] })
-            .collect();
-        Whitener { groups, stride: stride.max(1), sessions, gain, scale, decay, filter }
+        Whitener { groups, stride: stride.max(1), sessions, filter }
     }
 
     /// Rows to an average.
@@ -228,9 +222,9 @@ impl Whitener {
         for session in &self.sessions {
             let mut expected = 0.0;
             for g in session.clone() {
-                let now = expected + self.gain[g] * (averaged[g] - expected);
-                wander[g] = now;
-                expected = self.decay[g] * now;
+                let Step { gain, decay, .. } = self.filter[g];
+                wander[g] = expected + gain * (averaged[g] - expected);
+                expected = decay * wander[g];
             }
         }
         wander
@@ -239,7 +233,7 @@ impl Whitener {
     /// Sum of the logarithms of the innovations' standard deviations.
     #[must_use]
     pub(crate) fn log_scale(&self) -> f64 {
-        self.scale.iter().map(|s| s.ln()).sum()
+        self.filter.iter().map(|step| step.scale.ln()).sum()
     }
 }
 

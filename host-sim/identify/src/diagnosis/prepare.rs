@@ -14,7 +14,7 @@ use super::linear::{Gram, Prior, solve};
 use super::model::{Problem, Term};
 use super::noise::{Noise, Whitener, white_level};
 use super::report::Finding;
-use super::rows::{Rows, quantile, rms, robust_std};
+use super::rows::{Rows, add_scaled, quantile, rms, robust_std};
 use crate::nominal::Nominal;
 use flexspline_base::units::ARCSEC_PER_TURN;
 
@@ -329,12 +329,13 @@ pub fn noise(
     let white = white_level(rows, &left);
     let stride = columns.stride;
     let plain = Whitener::plain(rows, uncertain, stride, white);
-    let free = Free { columns: &columns.columns, priors: &columns.priors, data: plain.average(&left) };
+    let data = plain.average(&left);
+    let judge_under = |whitener: Whitener| columns.judge(&data, whitener);
     let unit = if rows.recorded.time { 1.0 } else { 100.0 * rows.period };
     let hypotheses = hypotheses(white, unit);
     // Rows that a flank turned over too early or a ringing throws out are no noise: they would make a fast wander of
     // it.
-    let uncertain = match free.judge(plain) {
+    let uncertain = match judge_under(plain) {
         Some(judged) => thrown_out(&judged, uncertain),
         None => uncertain.to_vec(),
     };
@@ -348,7 +349,7 @@ pub fn noise(
     };
     // From a few up the evidence, until all beside the best have been judged.
     while !next.is_empty() {
-        let judge = |k: &usize| (*k, free.judge(Whitener::new(rows, &uncertain, stride, hypotheses[*k])));
+        let judge = |k: &usize| (*k, judge_under(Whitener::new(rows, &uncertain, stride, hypotheses[*k])));
         for (k, of) in next.par_iter().map(judge).collect::<Vec<_>>() {
             judged[k] = of;
             asked[k] = true;
@@ -373,7 +374,7 @@ pub fn noise(
         && hypotheses[best].correlation_s <= FASTEST_S * unit;
     if restless {
         best = hypotheses.len() - 1;
-        judged[best] = free.judge(Whitener::new(rows, &uncertain, stride, hypotheses[best]));
+        judged[best] = judge_under(Whitener::new(rows, &uncertain, stride, hypotheses[best]));
     }
     let worth = judged[best].as_ref().map_or(1.0, |judged| worth_of(&judged.innovations, &judged.whitener));
     (hypotheses[best], worth)
@@ -440,13 +441,6 @@ fn free_columns(on: &Excitation<'_>, laws: &[Law], plain: &Whitener, grain: &Gra
     columns
 }
 
-/// Everything a law could explain, and what there is to explain.
-struct Free<'c> {
-    columns: &'c [Vec<f64>],
-    priors: &'c [Prior],
-    data: Vec<f64>,
-}
-
 /// How well a hypothesis of the noise tells what is left.
 struct Judged {
     evidence: f64,
@@ -454,19 +448,15 @@ struct Judged {
     whitener: Whitener,
 }
 
-impl Free<'_> {
-    fn judge(&self, whitener: Whitener) -> Option<Judged> {
-        let mut all = whitener.whiten_each(self.columns);
-        all.push(whitener.whiten_averaged(&self.data));
+impl FreeColumns {
+    /// How well a hypothesis of the noise explains averaged data.
+    fn judge(&self, data: &[f64], whitener: Whitener) -> Option<Judged> {
+        let mut all = whitener.whiten_each(&self.columns);
+        all.push(whitener.whiten_averaged(data));
         let views: Vec<&[f64]> = all.iter().map(Vec::as_slice).collect();
-        let gram = Gram::of(&views, 0..self.data.len());
-        let solution = solve(&gram, self.priors, 1.0)?;
-        let mut innovations = all[self.columns.len()].clone();
-        for (column, c) in all.iter().zip(&solution.coefficients) {
-            for (i, v) in innovations.iter_mut().zip(column) {
-                *i -= c * v;
-            }
-        }
+        let solution = solve(&Gram::of(&views, 0..data.len()), &self.priors, 1.0)?;
+        let mut innovations = all.pop()?;
+        all.iter().zip(&solution.coefficients).for_each(|(column, c)| add_scaled(&mut innovations, column, -c));
         Some(Judged { evidence: solution.evidence - whitener.log_scale(), innovations, whitener })
     }
 }

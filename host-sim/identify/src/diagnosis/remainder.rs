@@ -9,8 +9,8 @@ use super::candidate::{Acting, Law, Per, together};
 use super::model::{Problem, Scaffold, Term};
 use super::noise::{Noise, Whitener};
 use super::report::Unexplained;
-use super::rows::Rows;
-use super::select::Selected;
+use super::rows::{Rows, add_scaled};
+use super::select::{self, Selected, less};
 use super::thresholds::remainder::*;
 use crate::measurement::least_and_most;
 
@@ -30,19 +30,14 @@ pub struct Line {
 pub(crate) fn explained(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<f64> {
     let on = problem.on;
     let mut sum = vec![0.0; on.rows.len()];
-    let mut take = |column: &[f64], c: f64| {
-        for (l, v) in sum.iter_mut().zip(column) {
-            *l += c * v;
-        }
-    };
     for (floating, c) in on.base.floating.iter().zip(selected.fit.base()) {
-        take(&floating.values, *c);
+        add_scaled(&mut sum, &floating.values, *c);
     }
     let causes: Vec<Acting<'_>> =
         selected.terms.iter().enumerate().map(|(k, term)| term.acting(selected.fit.of(k))).collect();
     for (k, columns) in together(on, &causes).into_iter().enumerate() {
         for (column, c) in columns.iter().zip(selected.fit.of(k)) {
-            take(&column.values, *c);
+            add_scaled(&mut sum, &column.values, *c);
         }
     }
     sum
@@ -159,10 +154,10 @@ pub(crate) fn of_maps(problem: &Problem<'_>, selected: &Selected<'_>, maps: &[La
             }
             let mut terms = selected.terms.clone();
             terms.push(term);
-            let standing = super::select::standing(problem, &Selected { terms, fit }, selected.terms.len());
+            let standing = select::standing(problem, &Selected { terms, fit }, selected.terms.len());
             let there = standing.evidence > LEAST_EVIDENCE
                 && standing.left_out > LEAST_EVIDENCE
-                && standing.size > super::select::least_size(white);
+                && standing.size > select::least_size(white);
             there.then(|| Unexplained { looks_like: law.label.to_string(), size_arcsec: standing.size })
         })
         .collect();
@@ -225,9 +220,7 @@ pub(crate) fn line_limit(rows: usize) -> f64 {
 /// Data less everything explained, averaged, arcsec.
 #[must_use]
 pub fn left(problem: &Problem<'_>, selected: &Selected<'_>) -> Vec<f64> {
-    let terms: Vec<&Term<'_>> = selected.terms.iter().collect();
-    let predicted = super::select::predicted(problem, &terms, &selected.fit);
-    problem.data.iter().zip(&predicted).map(|(d, p)| d - p).collect()
+    less(&problem.data, &selected.predicted(problem))
 }
 
 #[cfg(test)]

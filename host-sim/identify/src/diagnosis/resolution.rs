@@ -5,7 +5,7 @@
 use super::candidate::{Excitation, Law, Tolerance};
 use super::linear::{Gram, Prior, solve};
 use super::noise::Whitener;
-use super::rows::{Rows, rms, robust_std};
+use super::rows::{Rows, combined, rms, robust_std};
 use crate::causes::CauseName;
 
 /// Rows whose mean is taken from each of them, to see what is fast.
@@ -135,9 +135,5 @@ fn explained_in_detail(rows: &Rows, columns: &[Vec<f64>], left: &[f64], uncertai
     if evidence < LEAST_EVIDENCE {
         return None;
     }
-    let mut explained = vec![0.0; left.len()];
-    for (column, c) in columns.iter().zip(&solution.coefficients) {
-        explained.iter_mut().zip(column).for_each(|(sum, v)| *sum += c * v);
-    }
-    Some(explained)
+    Some(combined(left.len(), columns.iter().map(Vec::as_slice), &solution.coefficients))
 }

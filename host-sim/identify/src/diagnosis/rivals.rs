@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::candidate::Law;
 use super::model::{Fit, Problem, Scaffold, Term, among_each_other};
-use super::select::{Bests, Selected, Standing, begun, fit, less, predicted, settle, size_of, sound};
+use super::select::{Bests, Selected, Standing, begun, less, misfit_as, predicted, settle, size_of, sound};
 use super::thresholds::rivals::*;
 use super::trace::{Gate, Judged};
 use crate::causes::CauseName;
@@ -78,7 +78,7 @@ pub(crate) fn rivals(
     let of_sample = sample.and_then(|(sample, share)| {
         let terms = selected.terms.iter().map(|t| Term::new(sample, t.law, t.places.clone())).collect();
         let terms = among_each_other(sample, terms);
-        let there = Selected { fit: fit(sample, &terms)?, terms };
+        let there = Selected::of(sample, terms)?;
         Some((refitted(sample, &open, &there, standings, begin, k), share))
     });
     let mut rivals: Vec<Rival> = match of_sample {
@@ -125,8 +125,8 @@ fn refitted<'l>(
     let left = selected.fit.solution.misfit / (problem.worth * problem.data.len().max(1) as f64);
     let lacking = scaffold.fit(None).map(|fit| predicted(problem, &others, &fit));
     let others_may_err = |law: &Law| {
-        let of = |j: usize| standings[j].size * selected.terms[j].law.misfit_as(law);
-        (0..selected.terms.len()).filter(|j| *j != k).map(of).fold(0.0, f64::max)
+        let others = selected.terms.iter().zip(standings).enumerate().filter(|(j, _)| *j != k);
+        misfit_as(law, others.map(|(_, other)| other))
     };
     open.par_iter()
         .with_max_len(1)
@@ -145,8 +145,7 @@ fn refitted<'l>(
                 .into_iter()
                 .filter_map(|places| scaffold.refine(scaffold.term(law, places)))
                 .min_by(|a, b| a.1.solution.misfit.total_cmp(&b.1.solution.misfit))?;
-            let c = fit.of(fit.starts.len() - 1);
-            if !sound(&term, c) {
+            if !sound(&term, fit.last()) {
                 return None;
             }
             let rise = |fit: &Fit| (fit.solution.misfit - selected.fit.solution.misfit) / left.max(1.0);

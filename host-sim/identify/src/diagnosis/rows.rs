@@ -7,6 +7,7 @@ pub(crate) use crate::measurement::rms;
 use crate::measurement::{Session, neighbours, quantile_of, rates};
 use crate::nominal::{Fixed, Nominal};
 use crate::residual::sampled_twice;
+pub(super) use flexspline_base::statistics::mean;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// Four rows around one say where it was as long as they span no more than this many times what the inner two do.
@@ -275,18 +276,16 @@ pub(super) fn parts(session: &Range<usize>, stride: usize) -> impl Iterator<Item
     session.clone().step_by(stride).map(move |from| from..(from + stride).min(end))
 }
 
-/// Mean.
-pub(super) fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
-}
-
 /// Sum of columns of this length, each times its coefficient.
 pub(super) fn combined<'c>(len: usize, columns: impl IntoIterator<Item = &'c [f64]>, coefficients: &[f64]) -> Vec<f64> {
     let mut sum = vec![0.0; len];
-    for (column, c) in columns.into_iter().zip(coefficients) {
-        sum.iter_mut().zip(column).for_each(|(s, v)| *s += c * v);
-    }
+    columns.into_iter().zip(coefficients).for_each(|(column, c)| add_scaled(&mut sum, column, *c));
     sum
+}
+
+/// Adds a column times a coefficient.
+pub(super) fn add_scaled(sum: &mut [f64], column: &[f64], coefficient: f64) {
+    sum.iter_mut().zip(column).for_each(|(sum, value)| *sum += coefficient * value);
 }
 
 /// Quantile of those numbers that are finite; 0 of none.

@@ -40,6 +40,18 @@ pub(crate) struct Selected<'l> {
 }
 
 impl<'l> Selected<'l> {
+    /// These terms, fitted.
+    #[must_use]
+    pub fn of(problem: &Problem<'_>, terms: Vec<Term<'l>>) -> Option<Selected<'l>> {
+        let fit = Scaffold::new(problem, terms.iter().collect()).fit(None)?;
+        Some(Selected { terms, fit })
+    }
+
+    /// Evidence, less what the freedom of the term that came last costs.
+    fn evidence(&self) -> f64 {
+        self.fit.solution.evidence + self.newest().occam
+    }
+
     /// The term that came last.
     fn newest(&self) -> &Term<'l> {
         &self.terms[self.terms.len() - 1]
@@ -125,11 +137,6 @@ fn sense(term: &Term<'_>, coefficients: &[f64]) -> [Judged; 2] {
     ]
 }
 
-/// Whether the last term of a fit makes sense.
-fn sense_of_last(term: &Term<'_>, fit: &Fit) -> [Judged; 2] {
-    sense(term, fit.of(fit.starts.len() - 1))
-}
-
 /// Root mean squares of what a term adds by its main columns, by nuisance, and beside them, arcsec.
 pub(super) fn parts(term: &Term<'_>, coefficients: &[f64]) -> [f64; 3] {
     let part = |of: fn(&Tolerance) -> bool| -> f64 {
@@ -142,12 +149,6 @@ pub(super) fn parts(term: &Term<'_>, coefficients: &[f64]) -> [f64; 3] {
         part(|t| matches!(t, Tolerance::Nuisance(_) | Tolerance::History(_))),
         part(|t| matches!(t, Tolerance::Beside(_))),
     ]
-}
-
-/// Fits a set of terms.
-#[must_use]
-pub fn fit(problem: &Problem<'_>, terms: &[Term<'_>]) -> Option<Fit> {
-    Scaffold::new(problem, terms.iter().collect()).fit(None)
 }
 
 /// Sizes this far apart on the scale of a shape parameter, from least to largest, are begun with both.
@@ -268,7 +269,7 @@ fn tried(
 /// gates that they came to.
 struct Screened<'l> {
     terms: Vec<Term<'l>>,
-    refused: Vec<(&'l Law, Vec<f64>, Vec<Judged>)>,
+    refused: Vec<Dropped<'l>>,
 }
 
 /// The strongest laws (`most` of them) at the best of the places tried, law by law; not refined.
@@ -309,7 +310,7 @@ fn best_tried<'l>(
         let open = law.search.lead.is_some() || scaffold.acted_on_by(law);
         let fit = if open { None } else { Some(scaffold.fit(Some(&term))) };
         let refused_for = fit.map_or_else(Vec::new, |fit| match fit {
-            Some(fit) => sense_of_last(&term, &fit).to_vec(),
+            Some(fit) => sense(&term, fit.last()).to_vec(),
             None => vec![Judged::plain(Gate::Refined, false)],
         });
         if passed(&refused_for) {
@@ -355,7 +356,7 @@ pub(super) fn standing(problem: &Problem<'_>, selected: &Selected<'_>, k: usize)
     let mut left_out = left_out_gain(problem, &selected.terms.iter().collect::<Vec<_>>(), &others);
     if left_out <= 0.0 {
         // Its deviations may not reach to other sessions, where the law itself does.
-        let bare = selected.terms[k].clone().main_only();
+        let bare = selected.terms[k].main_only(problem);
         let with_bare: Vec<&Term<'_>> = others.iter().copied().chain([&bare]).collect();
         left_out = left_out.max(left_out_gain(problem, &with_bare, &others));
     }
@@ -445,45 +446,29 @@ fn tolerance(problem: &Problem<'_>, fit: &Fit, law: &Law) -> Option<Judged> {
     Some(Judged::number(Gate::Tolerance, if physical { z.abs() } else { -z.abs() }, OUT_OF_TOLERANCE, out))
 }
 
-/// Whether a law may be tried beside this fit: it is no base parameter, or one that has left its tolerance.
-fn may_be_tried(problem: &Problem<'_>, fit: &Fit, law: &Law) -> bool {
-    tolerance(problem, fit, law).is_none_or(|judged| judged.passed)
-}
-
 /// Least size of anything that counts, arcsec, at this white noise.
 #[must_use]
 pub(crate) fn least_size(white: f64) -> f64 {
     LEAST_ARCSEC.max(LEAST_OF_NOISE * white)
 }
 
-/// Limits of what counts at this noise.
-pub(super) struct Limits {
-    least: f64,
-}
-
-impl Limits {
-    pub(super) fn of(white: f64) -> Limits {
-        Limits { least: least_size(white) }
+/// The gates that a law comes to, whatever the ones before say. `least` is the least size that counts, `misfit` what the
+/// laws of the other terms may be wrong by, `strongest` the largest size, all arcsec.
+fn gates(law: &Law, standing: &Standing, least: f64, misfit: f64, strongest: f64) -> Vec<Judged> {
+    let share = if law.named() { LEAST_OF_MISFIT } else { LEAST_UNNAMED_OF_MISFIT };
+    let evidence = if law.acts.tolerance_of.is_some() { LEAST_GAIN } else { LEAST_EVIDENCE };
+    let mut size = Judged::above(Gate::Size, standing.size, least);
+    if !size.passed && law.named() {
+        let least = (LEAST_IF_CLEAR * least).max(LEAST_OF_STRONGEST * strongest);
+        size = Judged::above(Gate::SizeIfClear, standing.size, least);
     }
-
-    /// The gates that a law comes to, whatever the ones before say. `misfit` is what the laws of the other terms may be
-    /// wrong by, arcsec, `strongest` the largest size, arcsec.
-    fn gates(&self, law: &Law, standing: &Standing, misfit: f64, strongest: f64) -> Vec<Judged> {
-        let share = if law.named() { LEAST_OF_MISFIT } else { LEAST_UNNAMED_OF_MISFIT };
-        let evidence = if law.acts.tolerance_of.is_some() { LEAST_GAIN } else { LEAST_EVIDENCE };
-        let mut gates = vec![Judged::above(Gate::Evidence, standing.evidence, evidence)];
-        let size = Judged::above(Gate::Size, standing.size, self.least);
-        if size.passed || !law.named() {
-            gates.push(size);
-        } else {
-            let least = (LEAST_IF_CLEAR * self.least).max(LEAST_OF_STRONGEST * strongest);
-            gates.push(Judged::above(Gate::SizeIfClear, standing.size, least));
-        }
-        gates.push(Judged::above(Gate::Alone, standing.alone, share * misfit));
-        let left_out = standing.left_out > 0.0 || !law.wrong.foretells;
-        gates.push(Judged::number(Gate::LeftOut, standing.left_out, 0.0, left_out));
-        gates
-    }
+    let left_out = standing.left_out > 0.0 || !law.wrong.foretells;
+    vec![
+        Judged::above(Gate::Evidence, standing.evidence, evidence),
+        size,
+        Judged::above(Gate::Alone, standing.alone, share * misfit),
+        Judged::number(Gate::LeftOut, standing.left_out, 0.0, left_out),
+    ]
 }
 
 /// The largest size of those that may be wrong at all: a jump of teeth is counted.
@@ -491,56 +476,12 @@ fn strongest(terms: &[Term<'_>], standings: &[Standing]) -> f64 {
     terms.iter().zip(standings).filter(|(t, _)| t.law.wrong.misfit > 0.0).map(|(_, s)| s.size).fold(0.0, f64::max)
 }
 
-/// Chooses causes among `laws`.
-#[must_use]
-#[allow(clippy::too_many_arguments, reason = "all that a search remembers")]
-pub(crate) fn select<'l>(
-    problem: &Problem<'_>,
-    laws: &'l [Law],
-    white: f64,
-    start: Vec<Term<'l>>,
-    bests: &mut Bests,
-    scope: Scope,
-    trace: &mut Trace,
-) -> Option<Selected<'l>> {
-    let limits = Limits::of(white);
-    let mut selected = Selected { fit: fit(problem, &start)?, terms: start };
-    if !selected.terms.is_empty() {
-        // They were found in other noise, and in rows that some of them have put in doubt since.
-        selected = settle_all(problem, selected)?;
-        selected = backward(problem, selected, &limits, trace)?;
-    }
-    // What has given way once and come back does not give way to the same again: so rounds end.
-    let (mut seen, mut given) = (HashSet::new(), HashSet::new());
-    if scope == Scope::CameClose {
-        // A sample may have chosen the wrong one of two that are close.
-        selected = exchange(problem, laws, selected, &limits, usize::MAX, &mut given, bests, scope, trace)?;
-        selected = backward(problem, selected, &limits, trace)?;
-    }
-    for round in 0..MOST_ROUNDS {
-        let next = forward(problem, laws, &selected, &limits, bests, scope, trace)
-            .or_else(|| two_for_unnamed(problem, laws, &selected, &limits, &mut given, bests, scope, trace));
-        let Some(next) = next else { break };
-        let taken = next.terms.len();
-        selected = settle(problem, next)?;
-        selected = backward(problem, selected, &limits, trace)?;
-        if round > 0 || selected.terms.len() > 1 {
-            // What was taken just now was held against all others beside the same terms, unless one of them has gone
-            // since.
-            let compared = if selected.terms.len() == taken { taken - 1 } else { usize::MAX };
-            selected = exchange(problem, laws, selected, &limits, compared, &mut given, bests, scope, trace)?;
-            selected = backward(problem, selected, &limits, trace)?;
-        }
-        let mut causes: Vec<String> = selected.terms.iter().map(|t| t.law.label.to_string()).collect();
-        causes.sort_unstable();
-        if !seen.insert((causes.join("+"), given.len())) {
-            break;
-        }
-    }
-    Some(selected)
+/// By how much the laws of terms may be wrong as something that `law` describes, arcsec.
+pub(super) fn misfit_as<'t, 'l: 't>(law: &Law, terms: impl IntoIterator<Item = (&'t Term<'l>, &'t Standing)>) -> f64 {
+    terms.into_iter().map(|(term, standing)| standing.size * term.law.misfit_as(law)).fold(0.0, f64::max)
 }
 
-/// The given causes, each by the law of it that tells the data best beside the others.
+/// The given causes, each by the law of it that explains the data best with the others.
 #[must_use]
 pub fn fixed<'l>(problem: &Problem<'_>, laws: &'l [Law], causes: &[CauseName]) -> Vec<Term<'l>> {
     let mut terms: Vec<Term<'l>> = Vec::new();
@@ -561,144 +502,422 @@ pub fn fixed<'l>(problem: &Problem<'_>, laws: &'l [Law], causes: &[CauseName]) -
             .with_max_len(1)
             .filter_map(|term| {
                 let (term, fit) = scaffold.refine(term)?;
-                Some((sound(&term, fit.of(fit.starts.len() - 1)), fit.solution.evidence, term))
+                Some((sound(&term, fit.last()), fit.solution.evidence, term))
             })
             .max_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         let Some((_, _, term)) = best else { break };
         terms.push(term);
         for _ in 0..2 {
-            let Some(fit) = fit(problem, &terms) else { return terms };
-            let Some(settled) = settle(problem, Selected { fit, terms: terms.clone() }) else { break };
+            let Some(selected) = Selected::of(problem, terms.clone()) else { return terms };
+            let Some(settled) = settle(problem, selected) else { break };
             terms = settled.terms;
         }
     }
     terms
 }
 
+/// Refines each term with the others held.
+pub(super) fn settle<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> Option<Selected<'l>> {
+    if selected.terms.len() < 2 { Some(selected) } else { settle_all(problem, selected) }
+}
+
+/// Settles every term of a model with the others held, a single term too.
+pub(super) fn settle_all<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> Option<Selected<'l>> {
+    settle_from(problem, selected, |_, term| vec![term.clone()])
+}
+
+/// Settles every term where one has gone that the others were refined with: those with a lead begin where it points
+/// now, too.
+fn settle_anew<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> Option<Selected<'l>> {
+    settle_from(problem, selected, |scaffold, term| {
+        let anew = if term.law.search.lead.is_some() { scaffold.begin(term.law) } else { Vec::new() };
+        [term.clone()].into_iter().chain(anew.into_iter().map(|places| scaffold.term(term.law, places))).collect()
+    })
+}
+
+/// Refines each term with the others held, from the places that `beginnings` gives, and keeps the best.
+fn settle_from<'l>(
+    problem: &Problem<'_>,
+    mut selected: Selected<'l>,
+    beginnings: impl Fn(&Scaffold<'_, '_, '_, 'l>, &Term<'l>) -> Vec<Term<'l>>,
+) -> Option<Selected<'l>> {
+    selected.terms = among_each_other(problem, selected.terms);
+    for k in 0..selected.terms.len() {
+        if selected.terms[k].places.is_empty() {
+            continue;
+        }
+        let scaffold = Scaffold::new(problem, selected.others(k)).ahead(k);
+        let refined = beginnings(&scaffold, &selected.terms[k]).into_iter().filter_map(|term| scaffold.refine(term));
+        if let Some((term, _)) = refined.max_by(|a, b| evidence_of(a).total_cmp(&evidence_of(b))) {
+            selected.terms[k] = term;
+        }
+    }
+    Selected::of(problem, among_each_other(problem, selected.terms))
+}
+
+/// Evidence of a model of which this term came last, less what its freedom costs.
+fn evidence_of((term, fit): &(Term<'_>, Fit)) -> f64 {
+    fit.solution.evidence + term.occam
+}
+
+/// Whether terms make no sense in a fit without another, for which they only stand in.
+fn stood_in_for(others: &[&Term<'_>], without: Option<&Fit>) -> bool {
+    without.is_some_and(|fit| others.iter().enumerate().any(|(j, other)| !sound(other, fit.of(j))))
+}
+
+/// The gates that a term has to pass to keep its place; `least` is the least size that counts, arcsec.
+pub(super) fn earns(
+    problem: &Problem<'_>,
+    selected: &Selected<'_>,
+    standings: &[Standing],
+    k: usize,
+    least: f64,
+) -> Vec<Judged> {
+    let law = selected.terms[k].law;
+    let mut all = sense(&selected.terms[k], selected.fit.of(k)).to_vec();
+    if law.acts.tolerance_of.is_some() {
+        let apart = selected.without(problem, k);
+        let others: Vec<&Term<'_>> = apart.iter().map(AsRef::as_ref).collect();
+        let without = Scaffold::new(problem, others.clone()).fit(None);
+        if passed(&all) && stood_in_for(&others, without.as_ref()) {
+            // Without it others would have to make up for it, and make no sense then.
+            return all;
+        }
+        let out = without.and_then(|fit| tolerance(problem, &fit, law));
+        all.push(out.unwrap_or(Judged::plain(Gate::Tolerance, false)));
+    }
+    let others = selected.terms.iter().zip(standings).enumerate().filter(|(j, _)| *j != k).map(|(_, other)| other);
+    let misfit = misfit_as(law, others);
+    all.extend(gates(law, &standings[k], least, misfit, strongest(&selected.terms, standings)));
+    all
+}
+
 /// A law that was dropped before it was compared: its places, and what it was asked.
 type Dropped<'l> = (&'l Law, Vec<f64>, Vec<Judged>);
+/// A selection that has grown by a term, and the evidence that it gains.
+type Grown<'l> = (f64, Selected<'l>);
 
-fn forward<'l>(
-    problem: &Problem<'_>,
-    laws: &'l [Law],
-    selected: &Selected<'l>,
-    limits: &Limits,
-    bests: &mut Bests,
-    scope: Scope,
-    trace: &mut Trace,
-) -> Option<Selected<'l>> {
-    trace.next_round();
-    let named = selected.terms.iter().filter(|t| t.law.named()).count();
-    let unnamed = selected.terms.len() - named;
-    let mut open: Vec<&Law> = Vec::new();
-    let in_scope = |law: &&Law| scope == Scope::Everything || bests.is_close(law);
-    for law in laws.iter().filter(in_scope).filter(|law| selected.terms.iter().all(|t| t.law.label != law.label)) {
-        let (chosen, most) = if law.named() { (named, MOST_CAUSES) } else { (unnamed, MOST_UNNAMED) };
-        let room = Judged::number(Gate::Room, chosen as f64, most as f64, chosen < most);
-        let gates: Vec<Judged> = [room].into_iter().chain(tolerance(problem, &selected.fit, law)).collect();
-        if passed(&gates) {
-            open.push(law);
-        } else {
-            trace.judged(Stage::Tried, law, &[], gates);
+/// The search for causes among laws.
+pub(crate) struct Chooser<'c, 'a, 'l> {
+    /// Data and nominal model.
+    pub problem: &'c Problem<'a>,
+    /// What may be chosen.
+    pub laws: &'l [Law],
+    /// Least size that counts, arcsec.
+    pub least: f64,
+    /// Where laws were at their best.
+    pub bests: &'c mut Bests,
+    /// Which laws are tried, and where.
+    pub scope: Scope,
+    /// Every decision.
+    pub trace: &'c mut Trace,
+    /// What has given way, and to what: once come back it does not give way to the same again, so rounds end.
+    pub given: HashSet<(u64, u64)>,
+}
+
+impl<'l> Chooser<'_, '_, 'l> {
+    /// Chooses causes, beginning with some terms.
+    #[must_use]
+    pub fn select(mut self, start: Vec<Term<'l>>) -> Option<Selected<'l>> {
+        let problem = self.problem;
+        let mut selected = Selected::of(problem, start)?;
+        if !selected.terms.is_empty() {
+            // They were found in other noise, and in rows that some of them have put in doubt since.
+            selected = self.backward(settle_all(problem, selected)?)?;
         }
-    }
-    let scaffold = Scaffold::new(problem, selected.terms.iter().collect());
-    let (tried, most) = match scope {
-        Scope::Everything => {
-            let tried = tried(&scaffold, &open, |law| scaffold.begin(law));
-            open.iter().zip(&tried).for_each(|(law, tried)| bests.note(law, tried));
-            (tried, REFINED)
+        let mut seen = HashSet::new();
+        if self.scope == Scope::CameClose {
+            // A sample may have chosen the wrong one of two that are close.
+            selected = self.exchange(selected, usize::MAX)?;
         }
-        Scope::CameClose => (tried(&scaffold, &open, |law| bests.begin_close(law)), REFINED_AGAIN),
-    };
-    let Screened { terms: found, refused } = best_tried(&scaffold, &open, tried, most);
-    for (law, places, gates) in refused {
-        trace.judged(Stage::Tried, law, &law.values(&places), gates);
-    }
-    let before = selected.fit.solution.evidence;
-    let refine = |term: Term<'l>| -> Result<(f64, Selected<'l>), Dropped<'l>> {
-        let (law, places) = (term.law, term.places.clone());
-        let Some((refined, fit)) = scaffold.refine_towards(term, before) else {
-            return Err((law, places, vec![Judged::plain(Gate::Gain, false)]));
-        };
-        let (sense, places) = (sense_of_last(&refined, &fit), refined.places.clone());
-        if !passed(&sense) && !scaffold.acted_on_by(law) {
-            return Err((law, places, sense.to_vec()));
-        }
-        let mut next = Selected { terms: [&selected.terms[..], &[refined]].concat(), fit };
-        if !passed(&sense) {
-            // What changes others was refined beside what they do without it.
-            let settled = settle(problem, next).filter(Selected::is_sound);
-            next = settled.ok_or_else(|| (law, places, sense.to_vec()))?;
-        }
-        Ok((next.fit.solution.evidence + next.newest().occam - before, next))
-    };
-    let refined: Vec<_> = found.into_par_iter().with_max_len(1).map(refine).collect();
-    let mut grown: Vec<(f64, Selected<'l>)> = Vec::new();
-    for outcome in refined {
-        match outcome {
-            Ok(next) => grown.push(next),
-            Err((law, places, gates)) => trace.judged(Stage::Forward, law, &law.values(&places), gates),
-        }
-    }
-    if scope == Scope::Everything {
-        for (_, next) in grown.iter().filter(|(gain, _)| *gain > CLOSE_GAIN) {
-            bests.came_close(next.newest());
-        }
-    }
-    contenders_settled(problem, &mut grown, before);
-    // Something with a name goes before something without unless that is clearly better.
-    let best_named = grown.iter().filter(|(_, next)| next.newest().law.named()).max_by(|a, b| a.0.total_cmp(&b.0));
-    let best_named = best_named.map(|(_, next)| next.newest().law);
-    let ahead = |(gain, next): &(f64, Selected<'l>)| {
-        gain - if next.newest().law.named() { 0.0 } else { unnamed_ahead(best_named, *gain) }
-    };
-    grown.sort_by(|a, b| ahead(b).total_cmp(&ahead(a)));
-    let standing_now = standings(problem, selected);
-    let misfit_as = |law: &Law| {
-        standing_now.iter().zip(&selected.terms).map(|(s, t)| s.size * t.law.misfit_as(law)).fold(0.0, f64::max)
-    };
-    simplest_first(problem, selected, &mut grown);
-    let mut grown = grown.into_iter();
-    while let Some((gain, next)) = grown.next() {
-        let term = next.newest();
-        let values = term.values();
-        if gain < LEAST_GAIN {
-            trace.judged(Stage::Forward, term.law, &values, vec![Judged::number(Gate::Gain, gain, LEAST_GAIN, false)]);
-            break;
-        }
-        let standing = standing(problem, &next, next.terms.len() - 1);
-        let strongest = strongest(&selected.terms, &standing_now);
-        let gates = limits.gates(term.law, &standing, misfit_as(term.law), strongest);
-        let passes = passed(&gates);
-        trace.judged(Stage::Forward, term.law, &values, gates);
-        if passes {
-            let taken = Some(term.law.label);
-            for (less, other) in grown {
-                if scope == Scope::Everything && less > gain - CLOSE_BEHIND {
-                    bests.came_close_to(term.law, other.newest());
-                }
-                let (law, values) = (other.newest().law, other.newest().values());
-                let gates = vec![Judged::number(Gate::First, less, gain, false)];
-                trace.judged_against(Stage::Forward, law, &values, taken, gates);
+        for round in 0..MOST_ROUNDS {
+            let Some(next) = self.forward(&selected).or_else(|| self.two_for_unnamed(&selected)) else { break };
+            let taken = next.terms.len();
+            selected = self.backward(settle(problem, next)?)?;
+            if round > 0 || selected.terms.len() > 1 {
+                // What was taken just now was held against all others with the same terms, unless one of them has gone
+                // since.
+                let compared = if selected.terms.len() == taken { taken - 1 } else { usize::MAX };
+                selected = self.exchange(selected, compared)?;
             }
-            return Some(next);
+            let mut causes: Vec<String> = selected.terms.iter().map(|t| t.law.label.to_string()).collect();
+            causes.sort_unstable();
+            if !seen.insert((causes.join("+"), self.given.len())) {
+                break;
+            }
         }
+        Some(selected)
     }
-    for (gain, next) in grown {
-        let (law, values) = (next.newest().law, next.newest().values());
-        let gates = vec![Judged::number(Gate::Gain, gain, LEAST_GAIN, gain >= LEAST_GAIN)];
-        trace.judged(Stage::Forward, law, &values, gates);
+
+    /// Takes in one more term, if one earns its place.
+    fn forward(&mut self, selected: &Selected<'l>) -> Option<Selected<'l>> {
+        let (problem, everything) = (self.problem, self.scope == Scope::Everything);
+        self.trace.next_round();
+        let named = selected.terms.iter().filter(|t| t.law.named()).count();
+        let unnamed = selected.terms.len() - named;
+        let mut open: Vec<&Law> = Vec::new();
+        for law in self.laws.iter().filter(|law| everything || self.bests.is_close(law)) {
+            if selected.terms.iter().any(|t| t.law.label == law.label) {
+                continue;
+            }
+            let (chosen, most) = if law.named() { (named, MOST_CAUSES) } else { (unnamed, MOST_UNNAMED) };
+            let room = Judged::number(Gate::Room, chosen as f64, most as f64, chosen < most);
+            let gates: Vec<Judged> = [room].into_iter().chain(tolerance(problem, &selected.fit, law)).collect();
+            if passed(&gates) {
+                open.push(law);
+            } else {
+                self.trace.judged(Stage::Tried, law, &[], None, gates);
+            }
+        }
+        let scaffold = Scaffold::new(problem, selected.terms.iter().collect());
+        let (tried, most) = if everything {
+            let tried = tried(&scaffold, &open, |law| scaffold.begin(law));
+            open.iter().zip(&tried).for_each(|(law, tried)| self.bests.note(law, tried));
+            (tried, REFINED)
+        } else {
+            (tried(&scaffold, &open, |law| self.bests.begin_close(law)), REFINED_AGAIN)
+        };
+        let Screened { terms: found, refused } = best_tried(&scaffold, &open, tried, most);
+        for (law, places, gates) in refused {
+            self.trace.judged(Stage::Tried, law, &places, None, gates);
+        }
+        let before = selected.fit.solution.evidence;
+        let refine = |term: Term<'l>| -> Result<Grown<'l>, Dropped<'l>> {
+            let (law, places) = (term.law, term.places.clone());
+            let Some((refined, fit)) = scaffold.refine_towards(term, before) else {
+                return Err((law, places, vec![Judged::plain(Gate::Gain, false)]));
+            };
+            let (sense, places) = (sense(&refined, fit.last()), refined.places.clone());
+            if !passed(&sense) && !scaffold.acted_on_by(law) {
+                return Err((law, places, sense.to_vec()));
+            }
+            let mut next = Selected { terms: [&selected.terms[..], &[refined]].concat(), fit };
+            if !passed(&sense) {
+                // What changes others was refined with what they do without it.
+                let settled = settle(problem, next).filter(Selected::is_sound);
+                next = settled.ok_or_else(|| (law, places, sense.to_vec()))?;
+            }
+            Ok((next.evidence() - before, next))
+        };
+        let refined: Vec<_> = found.into_par_iter().with_max_len(1).map(refine).collect();
+        let mut grown: Vec<Grown<'l>> = Vec::new();
+        for outcome in refined {
+            match outcome {
+                Ok(next) => grown.push(next),
+                Err((law, places, gates)) => self.trace.judged(Stage::Forward, law, &places, None, gates),
+            }
+        }
+        for (_, next) in grown.iter().filter(|(gain, _)| everything && *gain > CLOSE_GAIN) {
+            self.bests.came_close(next.newest());
+        }
+        contenders_settled(problem, &mut grown, before);
+        // Something with a name goes before something without unless that is clearly better.
+        let best_named = grown.iter().filter(|(_, next)| next.newest().law.named()).max_by(|a, b| a.0.total_cmp(&b.0));
+        let best_named = best_named.map(|(_, next)| next.newest().law);
+        let ahead = |(gain, next): &Grown<'l>| {
+            gain - if next.newest().law.named() { 0.0 } else { unnamed_ahead(best_named, *gain) }
+        };
+        grown.sort_by(|a, b| ahead(b).total_cmp(&ahead(a)));
+        let standings = standings(problem, selected);
+        let strongest = strongest(&selected.terms, &standings);
+        simplest_first(problem, selected, &mut grown);
+        let mut grown = grown.into_iter();
+        while let Some((gain, next)) = grown.next() {
+            let term = next.newest();
+            if gain < LEAST_GAIN {
+                let short = Judged::number(Gate::Gain, gain, LEAST_GAIN, false);
+                self.trace.judged(Stage::Forward, term.law, &term.places, None, vec![short]);
+                break;
+            }
+            let standing = standing(problem, &next, next.terms.len() - 1);
+            let misfit = misfit_as(term.law, selected.terms.iter().zip(&standings));
+            let gates = gates(term.law, &standing, self.least, misfit, strongest);
+            let passes = passed(&gates);
+            self.trace.judged(Stage::Forward, term.law, &term.places, None, gates);
+            if passes {
+                for (less, other) in grown {
+                    let other = other.newest();
+                    if everything && less > gain - CLOSE_BEHIND {
+                        self.bests.came_close_to(term.law, other);
+                    }
+                    let behind = Judged::number(Gate::First, less, gain, false);
+                    self.trace.judged(Stage::Forward, other.law, &other.places, Some(term.law.label), vec![behind]);
+                }
+                return Some(next);
+            }
+        }
+        for (gain, next) in grown {
+            let gates = vec![Judged::number(Gate::Gain, gain, LEAST_GAIN, gain >= LEAST_GAIN)];
+            self.trace.judged(Stage::Forward, next.newest().law, &next.newest().places, None, gates);
+        }
+        None
     }
-    None
+
+    /// Drops what no longer earns its place, weakest first.
+    fn backward(&mut self, mut selected: Selected<'l>) -> Option<Selected<'l>> {
+        let problem = self.problem;
+        while !selected.terms.is_empty() {
+            let standings = standings(problem, &selected);
+            let weakest = (0..selected.terms.len())
+                .map(|k| (k, earns(problem, &selected, &standings, k, self.least)))
+                .filter(|(_, gates)| !passed(gates))
+                .min_by(|(a, _), (b, _)| standings[*a].evidence.total_cmp(&standings[*b].evidence));
+            let Some((k, gates)) = weakest else { break };
+            let gone = selected.terms.remove(k);
+            self.trace.judged(Stage::Backward, gone.law, &gone.places, None, gates);
+            selected = settle_anew(problem, Selected::of(problem, selected.terms)?)?;
+        }
+        Some(selected)
+    }
+
+    /// The strongest laws of `open` added to terms, refined, that make sense there.
+    fn refined_with(&self, others: &[Term<'l>], open: &[&'l Law]) -> Vec<(Term<'l>, Fit)> {
+        let (bests, scope) = (&*self.bests, self.scope);
+        let scaffold = Scaffold::new(self.problem, others.iter().collect());
+        let tried = tried(&scaffold, open, |law| match scope {
+            Scope::Everything => bests.begin(&scaffold, law),
+            Scope::CameClose => bests.begin_close(law),
+        });
+        let rivals = best_tried(&scaffold, open, tried, EXCHANGED).terms;
+        let refined = rivals.into_par_iter().with_max_len(1).filter_map(|term| scaffold.refine(term));
+        refined.filter(|(term, fit)| sound(term, fit.last())).collect()
+    }
+
+    /// The cause of `open` that explains the data best with the terms, taken in with them and settled.
+    fn with_best_cause(&self, open: &[&'l Law], others: Vec<Term<'l>>) -> Option<Selected<'l>> {
+        let is_new = |law: &&Law| law.named() && others.iter().all(|t| t.law.label != law.label);
+        let open: Vec<&Law> = open.iter().copied().filter(is_new).collect();
+        let refined = self.refined_with(&others, &open).into_iter();
+        let (term, fit) = refined.max_by(|a, b| evidence_of(a).total_cmp(&evidence_of(b)))?;
+        settle(self.problem, Selected { fit, terms: others.into_iter().chain([term]).collect() })
+    }
+
+    /// The selection without term `k`, its fit, and the laws of `some` that may be tried in the place of the term.
+    fn in_place_of(
+        &self,
+        selected: &Selected<'l>,
+        k: usize,
+        some: impl Fn(&&'l Law) -> bool,
+    ) -> Option<(Selected<'l>, Vec<&'l Law>)> {
+        let held = selected.terms[k].law;
+        let others = selected.without(self.problem, k).into_iter().map(Cow::into_owned).collect();
+        let without = Selected::of(self.problem, others)?;
+        let may = |law: &&'l Law| {
+            tolerance(self.problem, &without.fit, law).is_none_or(|judged| judged.passed)
+                && !self.given.contains(&(held.id(), law.id()))
+        };
+        let open = self.laws.iter().filter(some).filter(may).collect();
+        Some((without, open))
+    }
+
+    /// Replaces a deviation without a name by two causes that explain the data no worse and earn it: with it in the
+    /// model each of them is held against all that it may be wrong by, so that none comes in.
+    fn two_for_unnamed(&mut self, selected: &Selected<'l>) -> Option<Selected<'l>> {
+        if selected.terms.iter().filter(|t| t.law.named()).count() + 2 > MOST_CAUSES {
+            return None;
+        }
+        let problem = self.problem;
+        for (k, held) in selected.terms.iter().enumerate().filter(|(_, t)| !t.law.named()) {
+            let in_scope = |law: &&Law| self.scope == Scope::Everything || self.bests.is_close(law);
+            let (without, open) = self.in_place_of(selected, k, in_scope)?;
+            let Some(one) = self.with_best_cause(&open, without.terms) else { continue };
+            let Some(two) = self.with_best_cause(&open, one.terms) else { continue };
+            let both = two.terms.len() - 2..two.terms.len();
+            let occam: f64 = two.terms[both.clone()].iter().map(|t| t.occam).sum();
+            let ahead_by = two.fit.solution.evidence + occam - selected.fit.solution.evidence - held.occam;
+            let standings = standings(problem, &two);
+            // They have names: it is enough not to be behind.
+            let ahead = Judged::above(Gate::Ahead, ahead_by, 0.0);
+            let gates = |j| [vec![ahead], earns(problem, &two, &standings, j, self.least)].concat();
+            let gates: Vec<Vec<Judged>> = both.clone().map(gates).collect();
+            let taken = gates.iter().all(|gates| passed(gates));
+            for (term, gates) in two.terms[both].iter().zip(gates) {
+                self.trace.judged(Stage::Exchange, term.law, &term.places, Some(held.law.label), gates);
+                if taken {
+                    self.given.insert((held.law.id(), term.law.id()));
+                }
+            }
+            if taken {
+                let gates = vec![Judged::number(Gate::First, 0.0, ahead_by, false)];
+                self.trace.judged(Stage::Exchange, held.law, &held.places, None, gates);
+                return Some(two);
+            }
+        }
+        None
+    }
+
+    /// Replaces a term, but for the one at `compared`, by another law where that explains the data better; drops what no
+    /// longer earns its place then.
+    fn exchange(&mut self, selected: Selected<'l>, compared: usize) -> Option<Selected<'l>> {
+        let (problem, everything) = (self.problem, self.scope == Scope::Everything);
+        for k in (0..selected.terms.len()).filter(|k| *k != compared) {
+            let held = &selected.terms[k];
+            let in_scope = |law: &&Law| everything || self.bests.close_to.contains(&(held.law.id(), law.id()));
+            if !self.laws.iter().any(|law| in_scope(&law)) {
+                continue;
+            }
+            let is_new = |law: &&'l Law| in_scope(law) && selected.terms.iter().all(|t| t.law.label != law.label);
+            let (without, open) = self.in_place_of(&selected, k, is_new)?;
+            let refined = self.refined_with(&without.terms, &open);
+            let now = selected.predicted(problem);
+            let size = size_of(problem, &less(&now, &without.predicted(problem)));
+            let evidence = selected.fit.solution.evidence + held.occam;
+            for of in refined.iter().filter(|of| everything && evidence_of(of) > evidence - CLOSE_BEHIND) {
+                self.bests.came_close_to(held.law, &of.0);
+            }
+            let judge = |of: &(Term<'l>, Fit)| -> Vec<Judged> {
+                let (term, fit) = of;
+                let then = predicted(problem, &without.terms.iter().chain([term]).collect::<Vec<_>>(), fit);
+                let apart = size_of(problem, &less(&then, &now));
+                let gain = evidence - without.fit.solution.evidence;
+                let unnamed = || unnamed_ahead(Some(held.law).filter(|held| held.named()), gain);
+                let needed = if term.law.named() { AHEAD } else { unnamed() };
+                // What follows more does not take the place of what predicts the same.
+                let no_simpler = !(same(apart, size) && simpler(held, term));
+                let ahead =
+                    evidence_of(of) > evidence + needed && no_simpler || same(apart, size) && simpler(term, held);
+                vec![
+                    Judged::number(Gate::SamePlace, apart / size, IN_PLACE, apart < IN_PLACE * size),
+                    Judged::number(Gate::Ahead, evidence_of(of) - evidence, needed, ahead),
+                ]
+            };
+            let mut contenders = Vec::new();
+            for of in refined {
+                let gates = judge(&of);
+                if passed(&gates) {
+                    contenders.push((of, gates));
+                } else {
+                    self.trace.judged(Stage::Exchange, of.0.law, &of.0.places, Some(held.law.label), gates);
+                }
+            }
+            let best = contenders.into_iter().max_by(|a, b| evidence_of(&a.0).total_cmp(&evidence_of(&b.0)));
+            let Some((best, mut gates)) = best else { continue };
+            let ahead_by = evidence_of(&best) - evidence;
+            let (term, fit) = best;
+            let (law, places) = (term.law, term.places.clone());
+            let terms = without.terms.into_iter().chain([term]).collect();
+            let exchanged = settle(problem, Selected { fit, terms })?;
+            // It has to earn the place that it takes.
+            let last = exchanged.terms.len() - 1;
+            gates.extend(earns(problem, &exchanged, &standings(problem, &exchanged), last, self.least));
+            let taken = passed(&gates);
+            self.trace.judged(Stage::Exchange, law, &places, Some(held.law.label), gates);
+            if taken {
+                let gates = vec![Judged::number(Gate::First, 0.0, ahead_by, false)];
+                self.trace.judged(Stage::Exchange, held.law, &held.places, Some(law.label), gates);
+                self.given.insert((held.law.id(), law.id()));
+                return self.backward(exchanged);
+            }
+        }
+        self.backward(selected)
+    }
 }
 
 /// The best by name of selections that have grown by a term, and those close to it, settle before they are compared:
-/// what they were refined beside has taken some of what is there, which is not the same share of each. Gains are over
+/// what they were refined with has taken some of what is there, which is not the same share of each. Gains are over
 /// `before`.
-fn contenders_settled<'l>(problem: &Problem<'_>, grown: &mut [(f64, Selected<'l>)], before: f64) {
-    let mut named: Vec<&mut (f64, Selected<'l>)> =
-        grown.iter_mut().filter(|(_, next)| next.newest().law.named()).collect();
+fn contenders_settled<'l>(problem: &Problem<'_>, grown: &mut [Grown<'l>], before: f64) {
+    let mut named: Vec<&mut Grown<'l>> = grown.iter_mut().filter(|(_, next)| next.newest().law.named()).collect();
     named.sort_by(|a, b| b.0.total_cmp(&a.0));
     let least = named.first().map_or(f64::INFINITY, |(best, _)| (CONTENDS * best).max(LEAST_EVIDENCE));
     named.truncate(CONTENDERS);
@@ -708,17 +927,16 @@ fn contenders_settled<'l>(problem: &Problem<'_>, grown: &mut [(f64, Selected<'l>
     if named.len() < 2 {
         return;
     }
-    named.into_par_iter().with_max_len(1).for_each(|(gain, next)| {
-        if let Some(settled) = settle(problem, next.clone()) {
-            *gain = settled.fit.solution.evidence + settled.newest().occam - before;
-            *next = settled;
+    named.into_par_iter().with_max_len(1).for_each(|grown| {
+        if let Some(settled) = settle(problem, grown.1.clone()) {
+            *grown = (settled.evidence() - before, settled);
         }
     });
 }
 
 /// Of selections that have grown by a term, best first, the simplest that predicts the same as the best, or is as
 /// likely, goes first.
-fn simplest_first<'l>(problem: &Problem<'_>, selected: &Selected<'l>, grown: &mut [(f64, Selected<'l>)]) {
+fn simplest_first<'l>(problem: &Problem<'_>, selected: &Selected<'l>, grown: &mut [Grown<'l>]) {
     let Some((best_gain, best)) = grown.first() else { return };
     let there = best.predicted(problem);
     let size = size_of(problem, &less(&there, &selected.predicted(problem)));
@@ -733,289 +951,4 @@ fn simplest_first<'l>(problem: &Problem<'_>, selected: &Selected<'l>, grown: &mu
     if let Some(k) = simplest {
         grown[..=k].rotate_right(1);
     }
-}
-
-/// Refines each term beside the others.
-pub(super) fn settle<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> Option<Selected<'l>> {
-    if selected.terms.len() < 2 {
-        return Some(selected);
-    }
-    settle_all(problem, selected)
-}
-
-/// Settles every term of a model beside the others, a single term too.
-pub(super) fn settle_all<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> Option<Selected<'l>> {
-    settle_from(problem, selected, |_, term| vec![term.clone()])
-}
-
-/// Settles every term where one has gone that the others were refined beside: those with a lead begin where it points
-/// now, too.
-fn settle_anew<'l>(problem: &Problem<'_>, selected: Selected<'l>) -> Option<Selected<'l>> {
-    settle_from(problem, selected, |scaffold, term| {
-        let anew = if term.law.search.lead.is_some() { scaffold.begin(term.law) } else { Vec::new() };
-        [term.clone()].into_iter().chain(anew.into_iter().map(|places| scaffold.term(term.law, places))).collect()
-    })
-}
-
-/// Refines each term beside the others from the places that `beginnings` gives, and keeps the best.
-fn settle_from<'l>(
-    problem: &Problem<'_>,
-    mut selected: Selected<'l>,
-    beginnings: impl Fn(&Scaffold<'_, '_, '_, 'l>, &Term<'l>) -> Vec<Term<'l>>,
-) -> Option<Selected<'l>> {
-    selected.terms = among_each_other(problem, selected.terms);
-    for k in 0..selected.terms.len() {
-        if selected.terms[k].places.is_empty() {
-            continue;
-        }
-        let scaffold = Scaffold::new(problem, selected.others(k)).ahead(k);
-        let refined = beginnings(&scaffold, &selected.terms[k]).into_iter().filter_map(|term| scaffold.refine(term));
-        let best = refined.max_by(|(a, at_a), (b, at_b)| {
-            (at_a.solution.evidence + a.occam).total_cmp(&(at_b.solution.evidence + b.occam))
-        });
-        if let Some((term, _)) = best {
-            selected.terms[k] = term;
-        }
-    }
-    selected.terms = among_each_other(problem, selected.terms);
-    selected.fit = fit(problem, &selected.terms)?;
-    Some(selected)
-}
-
-/// Whether terms make no sense in a fit without another, for which they only stand in.
-fn stood_in_for(others: &[&Term<'_>], without: Option<&Fit>) -> bool {
-    without.is_some_and(|fit| others.iter().enumerate().any(|(j, other)| !sound(other, fit.of(j))))
-}
-
-/// The gates that a term has to pass to keep its place.
-pub(super) fn earns(
-    problem: &Problem<'_>,
-    selected: &Selected<'_>,
-    standings: &[Standing],
-    k: usize,
-    limits: &Limits,
-) -> Vec<Judged> {
-    let law = selected.terms[k].law;
-    let mut gates = sense(&selected.terms[k], selected.fit.of(k)).to_vec();
-    if law.acts.tolerance_of.is_some() {
-        let apart = selected.without(problem, k);
-        let others: Vec<&Term<'_>> = apart.iter().map(AsRef::as_ref).collect();
-        let without = Scaffold::new(problem, others.clone()).fit(None);
-        if passed(&gates) && stood_in_for(&others, without.as_ref()) {
-            // Without it others would have to make up for it, and make no sense then.
-            return gates;
-        }
-        let out = without.and_then(|fit| tolerance(problem, &fit, law));
-        gates.push(out.unwrap_or(Judged::plain(Gate::Tolerance, false)));
-    }
-    let misfit = (0..selected.terms.len())
-        .filter(|j| *j != k)
-        .map(|j| standings[j].size * selected.terms[j].law.misfit_as(law))
-        .fold(0.0, f64::max);
-    gates.extend(limits.gates(law, &standings[k], misfit, strongest(&selected.terms, standings)));
-    gates
-}
-
-/// Drops what no longer earns its place, weakest first.
-fn backward<'l>(
-    problem: &Problem<'_>,
-    mut selected: Selected<'l>,
-    limits: &Limits,
-    trace: &mut Trace,
-) -> Option<Selected<'l>> {
-    while !selected.terms.is_empty() {
-        let standings = standings(problem, &selected);
-        let weakest = (0..selected.terms.len())
-            .map(|k| (k, earns(problem, &selected, &standings, k, limits)))
-            .filter(|(_, gates)| !passed(gates))
-            .min_by(|(a, _), (b, _)| standings[*a].evidence.total_cmp(&standings[*b].evidence));
-        let Some((k, gates)) = weakest else { break };
-        let gone = selected.terms.remove(k);
-        trace.judged(Stage::Backward, gone.law, &gone.values(), gates);
-        selected.fit = fit(problem, &selected.terms)?;
-        selected = settle_anew(problem, selected)?;
-    }
-    Some(selected)
-}
-
-/// The strongest laws of `open` beside terms, refined, that make sense there.
-fn refined_beside<'l>(
-    problem: &Problem<'_>,
-    others: &[Term<'l>],
-    open: &[&'l Law],
-    bests: &Bests,
-    scope: Scope,
-) -> Vec<(Term<'l>, Fit)> {
-    let scaffold = Scaffold::new(problem, others.iter().collect());
-    let tried = match scope {
-        Scope::Everything => tried(&scaffold, open, |law| bests.begin(&scaffold, law)),
-        Scope::CameClose => tried(&scaffold, open, |law| bests.begin_close(law)),
-    };
-    let rivals = best_tried(&scaffold, open, tried, EXCHANGED).terms;
-    rivals
-        .into_par_iter()
-        .with_max_len(1)
-        .filter_map(|term| {
-            let (term, fit) = scaffold.refine(term)?;
-            sound(&term, fit.of(fit.starts.len() - 1)).then_some((term, fit))
-        })
-        .collect()
-}
-
-/// The cause of `open` that tells the data best beside terms, taken in with them and settled.
-fn with_best_cause<'l>(
-    problem: &Problem<'_>,
-    open: &[&'l Law],
-    others: Vec<Term<'l>>,
-    bests: &Bests,
-    scope: Scope,
-) -> Option<Selected<'l>> {
-    let beside = |law: &&Law| law.named() && others.iter().all(|t| t.law.label != law.label);
-    let open: Vec<&Law> = open.iter().copied().filter(beside).collect();
-    let refined = refined_beside(problem, &others, &open, bests, scope);
-    let evidence = |(term, fit): &(Term<'l>, Fit)| fit.solution.evidence + term.occam;
-    let (term, fit) = refined.into_iter().max_by(|a, b| evidence(a).total_cmp(&evidence(b)))?;
-    settle(problem, Selected { fit, terms: others.into_iter().chain([term]).collect() })
-}
-
-/// Replaces a deviation without a name by two causes that tell the data no worse and earn it: beside it each of them is
-/// held against all that it may be wrong by, so that none comes in.
-#[allow(clippy::too_many_arguments, reason = "all that a search remembers")]
-fn two_for_unnamed<'l>(
-    problem: &Problem<'_>,
-    laws: &'l [Law],
-    selected: &Selected<'l>,
-    limits: &Limits,
-    given: &mut HashSet<(u64, u64)>,
-    bests: &Bests,
-    scope: Scope,
-    trace: &mut Trace,
-) -> Option<Selected<'l>> {
-    if selected.terms.iter().filter(|t| t.law.named()).count() + 2 > MOST_CAUSES {
-        return None;
-    }
-    for (k, held) in selected.terms.iter().enumerate().filter(|(_, t)| !t.law.named()) {
-        let others: Vec<Term<'l>> = selected.without(problem, k).into_iter().map(Cow::into_owned).collect();
-        let without = fit(problem, &others)?;
-        let open: Vec<&Law> = laws
-            .iter()
-            .filter(|law| scope == Scope::Everything || bests.is_close(law))
-            .filter(|law| may_be_tried(problem, &without, law))
-            .filter(|law| !given.contains(&(held.law.id(), law.id())))
-            .collect();
-        let Some(one) = with_best_cause(problem, &open, others, bests, scope) else { continue };
-        let Some(two) = with_best_cause(problem, &open, one.terms, bests, scope) else { continue };
-        let both = two.terms.len() - 2..two.terms.len();
-        let occam: f64 = two.terms[both.clone()].iter().map(|t| t.occam).sum();
-        let ahead_by = two.fit.solution.evidence + occam - selected.fit.solution.evidence - held.occam;
-        let standings = standings(problem, &two);
-        let gates: Vec<Vec<Judged>> = both
-            .clone()
-            .map(|j| {
-                // They have names: it is enough not to be behind.
-                let mut gates = vec![Judged::above(Gate::Ahead, ahead_by, 0.0)];
-                gates.extend(earns(problem, &two, &standings, j, limits));
-                gates
-            })
-            .collect();
-        let taken = gates.iter().all(|gates| passed(gates));
-        for (term, gates) in two.terms[both].iter().zip(gates) {
-            trace.judged_against(Stage::Exchange, term.law, &term.values(), Some(held.law.label), gates);
-            if taken {
-                given.insert((held.law.id(), term.law.id()));
-            }
-        }
-        if taken {
-            let gates = vec![Judged::number(Gate::First, 0.0, ahead_by, false)];
-            trace.judged(Stage::Exchange, held.law, &held.values(), gates);
-            return Some(two);
-        }
-    }
-    None
-}
-
-/// Replaces a term, but for the one at `compared`, by another law where that tells the data better.
-#[allow(clippy::too_many_arguments, reason = "all that a search remembers")]
-fn exchange<'l>(
-    problem: &Problem<'_>,
-    laws: &'l [Law],
-    selected: Selected<'l>,
-    limits: &Limits,
-    compared: usize,
-    given: &mut HashSet<(u64, u64)>,
-    bests: &mut Bests,
-    scope: Scope,
-    trace: &mut Trace,
-) -> Option<Selected<'l>> {
-    for k in (0..selected.terms.len()).filter(|k| *k != compared) {
-        let held = selected.terms[k].law;
-        let in_scope = |law: &&Law| scope == Scope::Everything || bests.close_to.contains(&(held.id(), law.id()));
-        if !laws.iter().any(|law| in_scope(&law)) {
-            continue;
-        }
-        let others: Vec<Term<'l>> = selected.without(problem, k).into_iter().map(Cow::into_owned).collect();
-        let without = fit(problem, &others)?;
-        let open: Vec<&Law> = laws
-            .iter()
-            .filter(in_scope)
-            .filter(|law| selected.terms.iter().all(|t| t.law.label != law.label))
-            .filter(|law| may_be_tried(problem, &without, law))
-            .filter(|law| !given.contains(&(held.id(), law.id())))
-            .collect();
-        let refined = refined_beside(problem, &others, &open, bests, scope);
-        let now = selected.predicted(problem);
-        let size = size_of(problem, &less(&now, &predicted(problem, &others.iter().collect::<Vec<_>>(), &without)));
-        let evidence = selected.fit.solution.evidence + selected.terms[k].occam;
-        if scope == Scope::Everything {
-            let close = |(term, fit): &&(Term<'l>, Fit)| fit.solution.evidence + term.occam > evidence - CLOSE_BEHIND;
-            refined.iter().filter(close).for_each(|(term, _)| bests.came_close_to(held, term));
-        }
-        let judge = |term: &Term<'l>, fit: &Fit| -> Vec<Judged> {
-            let then = predicted(problem, &others.iter().chain([term]).collect::<Vec<_>>(), fit);
-            let apart = size_of(problem, &less(&then, &now));
-            let gain = evidence - without.solution.evidence;
-            let needed =
-                if term.law.named() { AHEAD } else { unnamed_ahead(Some(held).filter(|held| held.named()), gain) };
-            let better = fit.solution.evidence + term.occam > evidence + needed;
-            // What follows more does not take the place of what predicts the same.
-            let no_simpler = !(same(apart, size) && simpler(&selected.terms[k], term));
-            let ahead = better && no_simpler || same(apart, size) && simpler(term, &selected.terms[k]);
-            vec![
-                Judged::number(Gate::SamePlace, apart / size, IN_PLACE, apart < IN_PLACE * size),
-                Judged::number(Gate::Ahead, fit.solution.evidence + term.occam - evidence, needed, ahead),
-            ]
-        };
-        let mut contenders = Vec::new();
-        for (term, fit) in refined {
-            let gates = judge(&term, &fit);
-            if passed(&gates) {
-                contenders.push((term, fit, gates));
-            } else {
-                let values = term.values();
-                trace.judged_against(Stage::Exchange, term.law, &values, Some(held.label), gates);
-            }
-        }
-        let best = contenders
-            .into_iter()
-            .max_by(|a, b| (a.1.solution.evidence + a.0.occam).total_cmp(&(b.1.solution.evidence + b.0.occam)));
-        if let Some((term, fit, mut gates)) = best {
-            let (law, values) = (term.law, term.values());
-            let ahead_by = fit.solution.evidence + term.occam - evidence;
-            let terms = others.into_iter().chain([term]).collect();
-            let exchanged = settle(problem, Selected { fit, terms })?;
-            // It has to earn the place that it takes.
-            let last = exchanged.terms.len() - 1;
-            gates.extend(earns(problem, &exchanged, &standings(problem, &exchanged), last, limits));
-            let taken = passed(&gates);
-            trace.judged_against(Stage::Exchange, law, &values, Some(held.label), gates);
-            if taken {
-                let values = held.values(&selected.terms[k].places);
-                let gates = vec![Judged::number(Gate::First, 0.0, ahead_by, false)];
-                trace.judged_against(Stage::Exchange, held, &values, Some(law.label), gates);
-                given.insert((held.id(), law.id()));
-                return Some(exchanged);
-            }
-        }
-    }
-    Some(selected)
 }

@@ -418,9 +418,9 @@ fn a_search_on_a_sample_comes_to_what_one_on_all_rows_comes_to() {
         let (mut bests, mut trace) = (super::Bests::default(), super::Trace::new(false));
         let everything = super::Scope::Everything;
         let on_all =
-            super::select(problem, &search.laws, noise.white, Vec::new(), &mut bests, everything, &mut trace).unwrap();
+            super::choose(problem, &search.laws, noise, Vec::new(), (&mut bests, everything, &mut trace)).unwrap();
         let on_sample = super::terms_at(problem, &search.laws, &search.start);
-        let on_sample = super::Selected { fit: super::fit(problem, &on_sample).unwrap(), terms: on_sample };
+        let on_sample = super::Selected::of(problem, on_sample).unwrap();
         let (all, sample) = (on_all.terms.len(), on_sample.terms.len());
         assert_eq!((all, sample), (3, 3));
         for (k, term) in on_all.terms.iter().enumerate() {
@@ -475,7 +475,7 @@ fn of_two_causes_that_hide_each_other_one_is_set_aside_and_leaves_nothing() {
         let mut terms = super::terms_at(problem, &search.laws, &search.start);
         assert_eq!(terms.len(), 1);
         terms.push(terms[0].clone());
-        let both = super::Selected { fit: super::fit(problem, &terms).unwrap(), terms };
+        let both = super::Selected::of(problem, terms).unwrap();
         let mut trace = super::Trace::new(false);
         let (apart, aside) = super::verdict::told_apart(problem, both, noise, &mut trace);
         assert_eq!(apart.terms.len(), 1);

@@ -10,8 +10,7 @@
 use flexspline::Table;
 
 use super::base::{PlayLaw, predicted_by_table};
-use super::channels::{FreeSpan, fault_throughout, sample};
-use super::linear::dot;
+use super::channels::{FreeSpan, fault_throughout, jackknife, sample};
 use super::rows::{Rows, mean, rms};
 use crate::measurement::{FaultName, Measures, Recording, Session, Treatment};
 use crate::nominal::Nominal;
@@ -135,18 +134,10 @@ impl<'a> Held<'a> {
         };
         let left = self.places.iter().zip(&predicted).map(|(k, predicted)| rows.error[*k] - predicted).collect();
         // Stiffness and backlash float as well.
-        let mut left = self.free.freed(left);
-        let mut before: Vec<Vec<f64>> = Vec::new();
         let by_sign = self.by_sign.then(|| wind_up.iter().map(|arcsec| arcsec.abs()).collect());
-        for column in [wind_up, flank].into_iter().chain(by_sign) {
-            let mut column = self.free.freed(column);
-            before.iter().for_each(|before| take_away(&mut column, before));
-            take_away(&mut left, &column);
-            before.push(column);
-        }
-        left
+        let floats = self.free.beyond([wind_up, flank].into_iter().chain(by_sign));
+        floats.freed(self.free.freed(left))
     }
-
     /// What is left, block by block, under a torque less `zero` where the spring may be stiffer one way than the other.
     fn by_sign(&mut self, zero: f64) -> Vec<f64> {
         self.by_sign = true;
@@ -193,15 +184,6 @@ const ROUND_OFF_ARCSEC: f64 = 1e-6;
 
 /// A round of steps that leaves more than this share of what the one before did leads nowhere.
 const WORTH_A_ROUND: f64 = 0.999;
-
-/// Takes from `column` what it holds of `other`.
-fn take_away(column: &mut [f64], other: &[f64]) {
-    let power = dot(other, other);
-    if power > 0.0 {
-        let share = dot(column, other) / power;
-        column.iter_mut().zip(other).for_each(|(left, v)| *left -= share * v);
-    }
-}
 
 /// How much is left in each block of rows: the sum of the magnitudes, which the rows of a flank turned over too early
 /// do not rule.
@@ -262,18 +244,15 @@ fn find(sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> O
     let zero = least(&tries, None);
     let of = |zero: f64| tries.iter().find(|of| of.0 == zero).map_or(&[][..], |of| &of.1);
     let (none, there) = (of(0.0), of(zero));
-    let blocks = none.len() as f64;
     let gain = sum(none) - sum(there);
     let gains = gain >= LEAST_GAIN * sum(none) && sum(there) <= (1.0 - LEAST_GAIN) * without_any;
     let tried = LEAST_SHARE * load..LARGEST_SHARE * load;
     if !tried.contains(&zero.abs()) || !gains || !is_certain(none, there, CERTAIN) {
         return None;
     }
-    // Jackknife; no finer than the steps.
+    // No finer than the steps.
     let without: Vec<f64> = (0..none.len()).map(|block| least(&tries, Some(block))).collect();
-    let middle = mean(&without);
-    let variance = (blocks - 1.0) / blocks * without.iter().map(|zero| (zero - middle).powi(2)).sum::<f64>();
-    let std = variance.sqrt().max(step);
+    let std = jackknife(&without).max(step);
     if zero.abs() < TOLD_FROM_NONE * std {
         return None;
     }

@@ -11,7 +11,6 @@ use std::io::Write as _;
 use serde::ser::{Serialize, SerializeMap, SerializeSeq, Serializer};
 
 use super::candidate::{Label, Law};
-use super::noise::Noise;
 use crate::causes::{CauseName, Need, ParameterName};
 
 /// Where in the search a decision fell.
@@ -321,39 +320,6 @@ impl fmt::Display for Step {
     }
 }
 
-/// What else a search comes upon, for who listens.
-#[derive(Clone, Debug)]
-pub(crate) enum Found<'a> {
-    /// Noise, and the information weight of the rows under it.
-    Noise(Noise, f64),
-    /// A line that no law had yet, of this size, arcsec.
-    Line(Label, f64),
-    /// A line too fast for averages.
-    FastLine(Label, f64),
-    /// A law chosen in the end: sizes of its main columns, its deviations, and what is beside it, arcsec.
-    Parts(Label, [f64; 3]),
-    /// Something left over.
-    Left(&'a str, f64),
-}
-
-impl fmt::Display for Found<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Found::Noise(noise, weight) => write!(
-                f,
-                "noise: white {:.3}, drift {:.3} arcsec over {:.1} s; information weight {weight:.2}",
-                noise.white, noise.wander, noise.correlation_s
-            ),
-            Found::Line(label, size) => write!(f, "{label}: {size:.2} arcsec"),
-            Found::FastLine(label, size) => write!(f, "{label}: {size:.2} arcsec, too fast for averages"),
-            Found::Parts(label, [main, nuisance, beside]) => {
-                write!(f, "{label}: law {main:.2}, deviations {nuisance:.2}, beside {beside:.2} arcsec")
-            }
-            Found::Left(looks_like, size) => write!(f, "left: {looks_like}, {size:.2} arcsec"),
-        }
-    }
-}
-
 /// All decisions in their order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {
@@ -381,21 +347,16 @@ impl Trace {
         self.round += 1;
     }
 
-    /// A decision on a law at values of its shape parameters.
-    pub(super) fn judged(&mut self, stage: Stage, law: &Law, values: &[f64], gates: Vec<Judged>) {
-        self.judged_against(stage, law, values, None, gates);
-    }
-
-    /// A decision on a law that was held against another.
-    pub(super) fn judged_against(
+    /// A decision on a law at places of its shape parameters, held against another where there is one.
+    pub(super) fn judged(
         &mut self,
         stage: Stage,
         law: &Law,
-        values: &[f64],
+        places: &[f64],
         against: Option<Label>,
         gates: Vec<Judged>,
     ) {
-        let shape = law.shapes.iter().map(|shape| shape.name).zip(values.iter().copied()).collect();
+        let shape = law.shapes.iter().map(|shape| shape.name).zip(law.values(places)).collect();
         self.push(Step { label: law.label, shape, stage, round: self.round, against, gates });
     }
 

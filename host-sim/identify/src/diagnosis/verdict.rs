@@ -6,10 +6,10 @@ use rayon::prelude::*;
 
 use super::candidate::{Deviation, Label, Law, Per, standing_pitch_error};
 use super::channels::{RatioProposal, proposed_ratio};
-use super::model::{Fit, Problem, Term};
+use super::model::{Problem, Term};
 use super::noise::Noise;
 use super::report::{Cause, Compensation, Diagnosis, Finding, HeldOut, Parameter, Residual, Unexplained, Verdict};
-use super::select::{self, Selected, Standing, fit, predicted, standings};
+use super::select::{self, Selected, Standing, standings};
 use super::thresholds::verdict::*;
 use super::trace::{Gate, Judged, Stage, Trace, passed};
 use super::uncertainty::{self, Known};
@@ -33,10 +33,9 @@ pub(super) fn conclude(
     mut trace: Trace,
 ) -> Diagnosis {
     let standings = standings(problem, &selected);
-    let limits = select::Limits::of(noise.white);
     for (k, term) in selected.terms.iter().enumerate() {
-        let gates = select::earns(problem, &selected, &standings, k, &limits);
-        trace.judged(Stage::Settled, term.law, &term.values(), gates);
+        let gates = select::earns(problem, &selected, &standings, k, select::least_size(noise.white));
+        trace.judged(Stage::Settled, term.law, &term.places, None, gates);
     }
     let all: Vec<&Term<'_>> = selected.terms.iter().collect();
     // A zero that the bench sets in each session is told of the data: it is no discrepancy of the drive, with or
@@ -44,12 +43,8 @@ pub(super) fn conclude(
     let zeros = zeros_of_sessions(problem, &selected);
     let of_the_bench = |term: &Term<'_>| term.law.is_zero_of_sessions() && !zeros.is_empty();
     let given: Vec<Term<'_>> = selected.terms.iter().filter(|term| of_the_bench(term)).cloned().collect();
-    let none = fit(problem, &given);
-    let left = |terms: &[&Term<'_>], fit: &Fit| -> Vec<f64> {
-        problem.data.iter().zip(predicted(problem, terms, fit)).map(|(d, p)| d - p).collect()
-    };
-    let before = none.as_ref().map_or(Vec::new(), |fit| left(&given.iter().collect::<Vec<_>>(), fit));
-    let after = left(&all, &selected.fit);
+    let before = Selected::of(problem, given).map_or(Vec::new(), |given| remainder::left(problem, &given));
+    let after = remainder::left(problem, &selected);
     let floor = floor(problem, noise);
     let (rms_before, rms_after) = (problem.certain_rms(&before), problem.certain_rms(&after));
     let explainable = (rms_before * rms_before - floor * floor).max(0.0);
@@ -399,7 +394,7 @@ pub(super) fn told_apart<'l>(
         let without = |k: usize| -> Option<Selected<'l>> {
             let mut terms = selected.terms.clone();
             terms.remove(k);
-            let less = select::settle(problem, Selected { fit: fit(problem, &terms)?, terms })?;
+            let less = select::settle(problem, Selected::of(problem, terms)?)?;
             let then = told(&less);
             let is_told = |j: usize| then[j - usize::from(j > k)] >= TOLD_FROM_ZERO;
             let larger = doubtful.iter().skip_while(|j| **j != k).skip(1);
@@ -408,7 +403,7 @@ pub(super) fn told_apart<'l>(
         let Some((k, less)) = doubtful.iter().find_map(|k| Some((*k, without(*k)?))) else { break };
         let gone = &selected.terms[k];
         let gates = vec![Judged::above(Gate::ToldFromZero, now[k], TOLD_FROM_ZERO)];
-        trace.judged(Stage::Understood, gone.law, &gone.values(), gates);
+        trace.judged(Stage::Understood, gone.law, &gone.places, None, gates);
         let size_arcsec = not_taken_over(problem, &selected, &less);
         if size_arcsec > select::least_size(noise.white) {
             aside.push(Unexplained { looks_like: gone.law.label.to_string(), size_arcsec });

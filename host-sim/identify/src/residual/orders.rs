@@ -58,15 +58,12 @@ pub struct Line {
 /// A constant and sines of these orders that fit `y` over `angle` (rad) best, all together.
 /// `None` if the data cannot tell the orders apart, or are too few.
 pub fn harmonics(angle: &[f64], y: &[f64], orders: &[f64]) -> Option<(f64, Vec<Line>)> {
-    let width = 1 + 2 * orders.len();
     let n = angle.len().min(y.len());
-    let fit = Normal::of(&angle[..n], y, orders)?;
-    let Normal { inverse, right, yy, .. } = &fit;
-    let value: Vec<f64> = (0..width).map(|a| (0..width).map(|b| inverse[(a, b)] * right[b]).sum()).collect();
-    let said: f64 = value.iter().zip(right).map(|(value, right)| value * right).sum();
+    let fit = of_sines(&angle[..n], y, orders)?;
+    let value = fit.values();
     // Variance of the noise in a row.
-    let variance = (yy - said).max(0.0) / (n - width) as f64;
-    let unit = fit.amplitude_stds();
+    let variance = fit.misfit() / (n - value.len()) as f64;
+    let unit = amplitude_stds(&fit);
     let lines = orders
         .iter()
         .enumerate()
@@ -82,55 +79,73 @@ pub fn harmonics(angle: &[f64], y: &[f64], orders: &[f64]) -> Option<(f64, Vec<L
 /// Standard deviation of each amplitude for white noise of one, over that of a sine that stands alone in evenly spread
 /// rows: how much the orders and the places of the rows confuse each other. `None` as for [`harmonics`].
 pub(super) fn confusion(angle: &[f64], orders: &[f64]) -> Option<Vec<f64>> {
-    let fit = Normal::of(angle, &[], orders)?;
-    Some(fit.amplitude_stds().into_iter().map(|std| std * (angle.len() as f64 / 2.0).sqrt()).collect())
+    let fit = of_sines(angle, &[], orders)?;
+    Some(amplitude_stds(&fit).into_iter().map(|std| std * (angle.len() as f64 / 2.0).sqrt()).collect())
 }
 
-/// Normal equations of a constant and sines.
-struct Normal {
-    inverse: Mat,
-    right: Vec<f64>,
-    yy: f64,
+/// Normal equations of least squares, with their inverse.
+pub(crate) struct Normal {
+    /// Inverse of the products of the columns.
+    pub inverse: Mat,
+    /// Products of the columns with the values, and of the values with themselves.
+    pub right: Vec<f64>,
+    pub square: f64,
 }
 
 impl Normal {
-    /// No values stand for zeros.
-    fn of(angle: &[f64], y: &[f64], orders: &[f64]) -> Option<Normal> {
-        let (width, n) = (1 + 2 * orders.len(), angle.len());
-        if n <= width {
-            return None;
-        }
-        let mut normal = vec![0.0; width * width];
-        let mut right = vec![0.0; width];
-        let mut row = vec![1.0; width];
-        let mut yy = 0.0;
-        for k in 0..n {
-            let y = y.get(k).copied().unwrap_or(0.0);
-            for (place, order) in orders.iter().enumerate() {
-                (row[1 + 2 * place], row[2 + 2 * place]) = (order * angle[k]).sin_cos();
-            }
+    /// Of `rows` rows of as many columns as `width` says; `put` puts the columns of a row in their places, and gives its
+    /// value and its weight.
+    pub fn of(width: usize, rows: usize, mut put: impl FnMut(usize, &mut [f64]) -> (f64, f64)) -> Option<Normal> {
+        let mut products = vec![0.0; width * width];
+        let (mut right, mut square, mut row) = (vec![0.0; width], 0.0, vec![1.0; width]);
+        for k in 0..rows {
+            let (value, weight) = put(k, &mut row);
             for a in 0..width {
-                right[a] += row[a] * y;
+                right[a] += weight * row[a] * value;
                 for b in 0..=a {
-                    normal[a * width + b] += row[a] * row[b];
+                    products[a * width + b] += weight * row[a] * row[b];
                 }
             }
-            yy += y * y;
+            square += weight * value * value;
         }
-        let matrix = Mat::from_fn(width, width, |a, b| normal[a.max(b) * width + a.min(b)]);
-        let inverse = cholesky(matrix.as_ref()).ok()?.inverse();
-        // A variance grown a million times by the other columns is no answer.
-        let sound = |a: usize| inverse[(a, a)].is_finite() && inverse[(a, a)] * (n as f64) < 1e6;
-        (0..width).all(sound).then_some(Normal { inverse, right, yy })
+        let matrix = Mat::from_fn(width, width, |a, b| products[a.max(b) * width + a.min(b)]);
+        Some(Normal { inverse: cholesky(matrix.as_ref()).ok()?.inverse(), right, square })
     }
 
-    /// Standard deviation of each amplitude for a noise of one in each row.
-    fn amplitude_stds(&self) -> Vec<f64> {
-        let waves = (self.right.len() - 1) / 2;
-        (0..waves)
-            .map(|k| (0.5 * (self.inverse[(1 + 2 * k, 1 + 2 * k)] + self.inverse[(2 + 2 * k, 2 + 2 * k)])).sqrt())
-            .collect()
+    /// Unless a variance has grown a million times by the other columns, which is no answer.
+    pub fn sound(self, rows: usize) -> Option<Normal> {
+        let sound = |a: usize| self.inverse[(a, a)].is_finite() && self.inverse[(a, a)] * (rows as f64) < 1e6;
+        (0..self.right.len()).all(sound).then_some(self)
     }
+
+    /// Coefficients of the columns.
+    pub fn values(&self) -> Vec<f64> {
+        let of = |a: usize| self.right.iter().enumerate().map(|(b, right)| self.inverse[(a, b)] * right).sum();
+        (0..self.right.len()).map(of).collect()
+    }
+
+    /// Sum of squares that the columns leave.
+    pub fn misfit(&self) -> f64 {
+        (self.square - self.values().iter().zip(&self.right).map(|(value, right)| value * right).sum::<f64>()).max(0.0)
+    }
+}
+
+/// A constant and sines; no values stand for zeros.
+fn of_sines(angle: &[f64], y: &[f64], orders: &[f64]) -> Option<Normal> {
+    let (width, rows) = (1 + 2 * orders.len(), angle.len());
+    let put = |k: usize, row: &mut [f64]| {
+        for (place, order) in orders.iter().enumerate() {
+            (row[1 + 2 * place], row[2 + 2 * place]) = (order * angle[k]).sin_cos();
+        }
+        (y.get(k).copied().unwrap_or(0.0), 1.0)
+    };
+    (rows > width).then(|| Normal::of(width, rows, put)).flatten()?.sound(rows)
+}
+
+/// Standard deviation of each amplitude of sines for a noise of one in each row.
+fn amplitude_stds(fit: &Normal) -> Vec<f64> {
+    let of = |k: usize| 0.5 * (fit.inverse[(k, k)] + fit.inverse[(k + 1, k + 1)]);
+    (1..fit.right.len()).step_by(2).map(|k| of(k).sqrt()).collect()
 }
 
 impl Line {

@@ -2,9 +2,9 @@
 
 use std::f64::consts::{PI, TAU};
 
-use flexspline_algebra::{Mat, cholesky};
 use serde::Serialize;
 
+use super::orders::Normal;
 use super::rows::{Axis, Rows};
 use crate::measurement::{least_and_most, median_and_std};
 
@@ -106,43 +106,25 @@ fn best(bins: &[(f64, f64)]) -> Option<Found> {
 fn fit(bins: &[(f64, f64)], at: f64, width: f64, per_turn: u32) -> Option<(f64, f64)> {
     const COLUMNS: usize = 2 + 2 * WAVES;
     let period = TAU / f64::from(per_turn);
-    let mut normal = [[0.0; COLUMNS]; COLUMNS];
-    let mut right = [0.0; COLUMNS];
-    let mut yy = 0.0;
-    let mut used = 0.0;
     let most = bins.iter().map(|bin| bin.1).fold(0.0, f64::max);
-    for (place, (median, count)) in bins.iter().enumerate() {
-        if *count < 1.0 {
-            continue;
-        }
+    let used = bins.iter().filter(|bin| bin.1 >= 1.0).count() as f64;
+    if used < 0.9 * BINS as f64 {
+        return None;
+    }
+    let fit = Normal::of(COLUMNS, bins.len(), |place, row| {
+        let (median, count) = bins[place];
         let angle = (place as f64 + 0.5) / BINS as f64 * TAU;
         let off = angle - at;
         let off = off - period * (off / period).round();
-        let mut row = [1.0; COLUMNS];
         for wave in 0..WAVES {
             (row[1 + 2 * wave], row[2 + 2 * wave]) = ((wave + 1) as f64 * angle).sin_cos();
         }
         row[COLUMNS - 1] = (-0.5 * (off / width).powi(2)).exp();
         // Beyond some rows in a bin, it is no longer their noise that matters.
-        let weight = (count / most).sqrt();
-        for a in 0..COLUMNS {
-            right[a] += weight * row[a] * median;
-            for b in 0..COLUMNS {
-                normal[a][b] += weight * row[a] * row[b];
-            }
-        }
-        yy += weight * median * median;
-        used += 1.0;
-    }
-    if used < 0.9 * BINS as f64 {
-        return None;
-    }
-    let matrix = Mat::from_fn(COLUMNS, COLUMNS, |a, b| normal[a][b]);
-    let inverse = cholesky(matrix.as_ref()).ok()?.inverse();
-    let value: Vec<f64> = (0..COLUMNS).map(|a| (0..COLUMNS).map(|b| inverse[(a, b)] * right[b]).sum()).collect();
-    let said: f64 = value.iter().zip(&right).map(|(value, right)| value * right).sum();
+        (median, if count < 1.0 { 0.0 } else { (count / most).sqrt() })
+    })?;
     // Neighbouring bins share what is left over; a bell covers several of them.
     let shared = (2.0 * width / (TAU / BINS as f64)).max(1.0) * PI.sqrt() / 2.0;
-    let variance = (yy - said).max(0.0) / (used - COLUMNS as f64) * shared.min(3.0);
-    Some((value[COLUMNS - 1], (variance * inverse[(COLUMNS - 1, COLUMNS - 1)]).sqrt().max(1e-12)))
+    let variance = fit.misfit() / (used - COLUMNS as f64) * shared.min(3.0);
+    Some((fit.values()[COLUMNS - 1], (variance * fit.inverse[(COLUMNS - 1, COLUMNS - 1)]).sqrt().max(1e-12)))
 }

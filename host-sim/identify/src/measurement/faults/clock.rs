@@ -85,7 +85,7 @@ pub(in crate::measurement) fn check(log: &mut Log, findings: &mut Findings) {
 }
 
 /// Median of the positive steps of time, s.
-fn period(log: &Log) -> Option<f64> {
+pub(super) fn period(log: &Log) -> Option<f64> {
     let time = log.get(Quantity::Time)?;
     let steps: Vec<f64> = time.windows(2).map(|t| t[1] - t[0]).filter(|dt| *dt > 0.0).collect();
     (!steps.is_empty()).then(|| median_of(&mut sampled(&steps)))
@@ -219,14 +219,11 @@ fn gaps(log: &mut Log, period: f64, strays: &[u64], findings: &mut Findings) {
             parts.push(row);
         }
     }
-    lost.retain(|(row, rows)| {
-        let near = strays.iter().any(|line| line.abs_diff(log.line[*row]) <= 2);
-        *rows > 0 && !near
-    });
+    let near_stray = |row: usize| strays.iter().any(|line| line.abs_diff(log.line[row]) <= 2);
+    lost.retain(|(row, rows)| *rows > 0 && !near_stray(*row));
     // Stamps that jitter make single steps long; rows are missing only where the stamps of a whole session count more
     // periods than rows.
     let counts: Vec<Counted> = counted(log, period).collect();
-    let near_stray = |row: usize| strays.iter().any(|line| line.abs_diff(log.line[row]) <= 2);
     let holes: Vec<(usize, u64)> = holes(log, &parts, period).into_iter().filter(|hole| !near_stray(hole.0)).collect();
     // The median step may be shorter than the period that a clock keeps on the mean: no more are missing than its time
     // over that says, as well as the median is known.

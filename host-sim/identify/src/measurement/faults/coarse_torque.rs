@@ -7,6 +7,7 @@
 
 use std::collections::HashSet;
 
+use super::held::{Change, changes_of, runs};
 use super::lattice::lattice;
 use super::steps::largest_torque;
 use super::{Findings, throughout};
@@ -90,7 +91,7 @@ fn coarse(sessions: &[Session]) -> Option<Fault> {
 /// Names steps of a sensor between which nothing shows where the load is.
 fn kept(sessions: &[Session], step: f64) -> Option<Fault> {
     let torques = || sessions.iter().filter_map(|session| session.torque_n_m.as_deref());
-    let runs: Vec<usize> = torques().flat_map(runs).map(|run| run.len()).collect();
+    let runs: Vec<usize> = torques().flat_map(|torque| runs(torque, 0.0)).map(|run| run.len()).collect();
     let torn = runs.iter().filter(|rows| **rows < LEAST_ROWS).count();
     let steps: HashSet<i64> = torques().flatten().map(|torque| (torque / step).round() as i64).collect();
     if steps.len() < MANY_STEPS || (torn as f64) < TORN * runs.len() as f64 {
@@ -104,30 +105,20 @@ fn kept(sessions: &[Session], step: f64) -> Option<Fault> {
     Some(fault)
 }
 
-/// Runs of rows with one value.
-fn runs(values: &[f64]) -> Vec<std::ops::Range<usize>> {
-    let mut from = 0;
-    let ends = (1..=values.len()).filter(|row| *row == values.len() || values[*row] != values[*row - 1]);
-    ends.map(|end| std::mem::replace(&mut from, end)..end).collect()
-}
-
 /// Whether the error goes on from step to step, instead of changing with the torque within a row. Around no load the
 /// flank changes: those steps do not count.
 fn goes_on_between(sessions: &[Session], step: f64) -> bool {
     let mut changes: Vec<[f64; 2]> = Vec::new();
     for session in sessions {
         let Some(torque) = session.torque_n_m.as_deref() else { continue };
-        let level =
-            |rows: &std::ops::Range<usize>| session.error_rad[rows.clone()].iter().sum::<f64>() / rows.len() as f64;
-        for pair in runs(torque).windows(2) {
-            let (before, after) = (&pair[0], &pair[1]);
-            let (low, high) = (torque[before.start], torque[after.start]);
+        for Change { rows: [before, after], load: [low, high], within, in_all } in
+            changes_of(session, &runs(torque, 0.0))
+        {
             let on_one_flank = low.abs().min(high.abs()) > 0.5 * step && low * high > 0.0;
             let by_one = (high - low).abs() < MORE_THAN_ONE * step;
-            if before.len().min(after.len()) >= LEAST_ROWS && on_one_flank && by_one {
+            if before.min(after) >= LEAST_ROWS && on_one_flank && by_one {
                 let sign = (high - low).signum();
-                let within = session.error_rad[after.start] - session.error_rad[after.start - 1];
-                changes.push([sign * within, sign * (level(after) - level(before))]);
+                changes.push([sign * within, sign * in_all]);
             }
         }
     }

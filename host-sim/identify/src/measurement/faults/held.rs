@@ -77,7 +77,7 @@ fn check_angle(
     findings: &mut Findings,
 ) {
     let angles: Vec<Vec<f64>> = sessions.iter().map(angle).collect();
-    let of: Vec<Vec<Range<usize>>> = angles.iter().map(|angle| runs(angle)).collect();
+    let of: Vec<Vec<Range<usize>>> = angles.iter().map(|angle| runs(angle, SAME)).collect();
     let Some(every) = rhythm(&of) else { return };
     let of_counts = angles.iter().zip(&of).max_by_key(|(angle, _)| angle.len()).is_some_and(|(angle, runs)| {
         let mut steps: Vec<f64> =
@@ -106,8 +106,10 @@ fn check_angle(
 }
 
 fn check_torque(sessions: &mut [Session], findings: &mut Findings) {
-    let of: Vec<Vec<Range<usize>>> =
-        sessions.iter().map(|session| session.torque_n_m.as_deref().map_or_else(Vec::new, runs)).collect();
+    let of: Vec<Vec<Range<usize>>> = sessions
+        .iter()
+        .map(|session| session.torque_n_m.as_deref().map_or_else(Vec::new, |torque| runs(torque, SAME)))
+        .collect();
     let Some(every) = rhythm(&of) else { return };
     if every >= NO_STEPS_OF_A_BENCH && !goes_on_between(sessions, &of) {
         return;
@@ -131,30 +133,48 @@ fn check_torque(sessions: &mut [Session], findings: &mut Findings) {
     }
 }
 
-/// Runs of rows with one value.
-fn runs(values: &[f64]) -> Vec<Range<usize>> {
+/// Runs of rows with one value; values are one that differ by this share of the largest or less.
+pub(super) fn runs(values: &[f64], share: f64) -> Vec<Range<usize>> {
     let mut from = 0;
-    let same = SAME * values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+    let same = share * values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
     let goes_on = |row: usize| (values[row] - values[row - 1]).abs() <= same;
     let ends = (1..=values.len()).filter(|row| *row == values.len() || !goes_on(*row));
     ends.map(|end| std::mem::replace(&mut from, end)..end).collect()
+}
+
+/// A change of the torque from one run of rows to the next.
+pub(super) struct Change {
+    /// Number of rows before and after it.
+    pub rows: [usize; 2],
+    /// Torque before and after, N·m.
+    pub load: [f64; 2],
+    /// Change of the error in the row of the change, and from the mean of the one run to that of the other, rad.
+    pub within: f64,
+    pub in_all: f64,
+}
+
+/// What changes from run to run of a session with torque.
+pub(super) fn changes_of(session: &Session, runs: &[Range<usize>]) -> impl Iterator<Item = Change> {
+    let torque = session.torque_n_m.as_deref().unwrap_or_default();
+    let level = |rows: &Range<usize>| session.error_rad[rows.clone()].iter().sum::<f64>() / rows.len() as f64;
+    runs.windows(2).map(move |pair| Change {
+        rows: [pair[0].len(), pair[1].len()],
+        load: [torque[pair[0].start], torque[pair[1].start]],
+        within: session.error_rad[pair[1].start] - session.error_rad[pair[1].start - 1],
+        in_all: level(&pair[1]) - level(&pair[0]),
+    })
 }
 
 /// Whether the error goes on from run to run, instead of changing with the torque within a row. Where the torque
 /// changes its sign the flank does, and those do not count.
 fn goes_on_between(sessions: &[Session], of: &[Vec<Range<usize>>]) -> bool {
     let (mut within, mut in_all) = (0.0, 0.0);
-    for (session, runs) in sessions.iter().zip(of) {
-        let Some(torque) = session.torque_n_m.as_deref() else { continue };
-        let level = |rows: &Range<usize>| session.error_rad[rows.clone()].iter().sum::<f64>() / rows.len() as f64;
-        for pair in runs.windows(2) {
-            let (before, after) = (&pair[0], &pair[1]);
-            let (low, high) = (torque[before.start], torque[after.start]);
-            if low * high > 0.0 {
-                // Large changes say more than small ones.
-                within += (high - low) * (session.error_rad[after.start] - session.error_rad[after.start - 1]);
-                in_all += (high - low) * (level(after) - level(before));
-            }
+    for change in sessions.iter().zip(of).flat_map(|(session, runs)| changes_of(session, runs)) {
+        let [low, high] = change.load;
+        if low * high > 0.0 {
+            // Large changes say more than small ones.
+            within += (high - low) * change.within;
+            in_all += (high - low) * change.in_all;
         }
     }
     in_all > 0.0 && within < WITHIN_THE_ROW * in_all

@@ -1,7 +1,7 @@
 //! A logger that stands still now and then while its time counts on: the angles leap over several rows' worth of
 //! motion, both of them, and the column of time does not show it.
 
-use super::{Findings, span};
+use super::{Findings, clock, span};
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Measures, Treatment};
 use crate::measurement::gear::Gear;
@@ -69,8 +69,7 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
 fn leaps(log: &Log, gear: &Gear) -> Option<(Vec<Leap>, usize, f64)> {
     let (time, generator, output) =
         (log.get(Quantity::Time)?, log.get(Quantity::Generator)?, log.get(Quantity::Output)?);
-    let steps: Vec<f64> = time.windows(2).map(|t| t[1] - t[0]).filter(|dt| *dt > 0.0).collect();
-    let period_s = median_of(&mut sampled(&steps));
+    let period_s = clock::period(log)?;
     // Scatter of the motion at the generator, from third differences that few leaps do not move.
     let scatter = |values: &[f64]| {
         let third = values.windows(4).map(|v| (v[3] - 3.0 * v[2] + 3.0 * v[1] - v[0]).abs()).collect::<Vec<f64>>();

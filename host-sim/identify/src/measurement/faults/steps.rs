@@ -184,29 +184,37 @@ struct Found {
 
 /// Steps that stay for good or to the end of their session, whichever leaves less.
 fn likelier(sessions: &[Session], gear: &Gear) -> Option<Found> {
-    let noise = white_noise(sessions.iter().map(|session| session.error_rad.as_slice()));
-    let state = State::new(sessions, gear);
-    let for_good = find(sessions, gear, noise, &state, Stays::ForGood)?;
+    let seen = Seen::of(sessions, gear);
+    let for_good = seen.find(Stays::ForGood)?;
     if sessions.len() == 1 || !for_good.suspected {
         return Some(for_good);
     }
-    let to_the_end = find(sessions, gear, noise, &state, Stays::ToTheEnd);
+    let to_the_end = seen.find(Stays::ToTheEnd);
     let mut better = to_the_end.filter(|found| found.misfit < TELLS * for_good.misfit);
     if let Some(found) = &mut better {
         let steps = [found.sure.as_slice(), &found.doubtful].concat();
-        let (told, doubtful): (Vec<Step>, Vec<Step>) = found
-            .doubtful
-            .iter()
-            .copied()
-            .partition(|(place, ..)| beyond_a_change_of_flank(sessions, &state, &steps, *place));
+        let (told, doubtful): (Vec<Step>, Vec<Step>) =
+            found.doubtful.iter().copied().partition(|(place, ..)| seen.beyond_a_change_of_flank(&steps, *place));
         // A flank that friction lets go stays to the end of a session, too, where the load is small.
-        let largest = largest_torque(sessions);
         let (loose, sure): (Vec<Step>, Vec<Step>) = (found.sure.iter().copied())
-            .partition(|(place, ..)| may_let_go(&sessions[place.session], place.row, largest));
+            .partition(|(place, ..)| may_let_go(&sessions[place.session], place.row, seen.largest));
         (found.sure, found.doubtful) = ([sure, told].concat(), [doubtful, loose].concat());
         found.sure.sort_by_key(|(place, ..)| (place.session, place.row));
     }
     Some(better.filter(|found| !found.sure.is_empty()).unwrap_or(for_good))
+}
+
+/// A recording with what is known of it.
+struct Seen<'a> {
+    sessions: &'a [Session],
+    gear: &'a Gear,
+    /// White noise of the error, rad.
+    noise: f64,
+    state: State<'a>,
+    /// Rows at which clearance is taken up, by session.
+    settled: Vec<Vec<bool>>,
+    /// Largest torque, N·m.
+    largest: f64,
 }
 
 /// Whether the load at a row holds no flank, so that friction may have let go of one.
@@ -214,25 +222,275 @@ fn may_let_go(session: &Session, row: usize, largest: f64) -> bool {
     session.torque_n_m.as_ref().is_some_and(|torque| torque[row].abs() < least_that_holds(torque, largest))
 }
 
-/// The fit of `columns` in the place of a step, beside the other steps.
-fn beside_others(state: &State, steps: &[Step], place: Place, columns: &[Extra]) -> Option<Fit> {
-    let others: Vec<_> = steps.iter().map(|(other, ..)| *other).filter(|other| *other != place).map(column).collect();
-    let extras: Vec<Extra> = others.iter().map(|column| column as Extra).chain(columns.iter().copied()).collect();
-    state.fit(&extras)
-}
-
-/// Whether a step leaves far less than a change of flank would that comes in its place, whatever the other steps are:
-/// the model without the step, to which the flank that the load holds is given instead.
-fn beyond_a_change_of_flank(sessions: &[Session], state: &State, steps: &[Step], place: Place) -> bool {
-    let largest = largest_torque(sessions);
-    if may_let_go(&sessions[place.session], place.row, largest) {
-        return false;
+impl<'a> Seen<'a> {
+    fn of(sessions: &'a [Session], gear: &'a Gear) -> Seen<'a> {
+        let noise = white_noise(sessions.iter().map(|session| session.error_rad.as_slice()));
+        let state = State::new(sessions, gear);
+        let settled = state.settled();
+        Seen { sessions, gear, noise, state, settled, largest: largest_torque(sessions) }
     }
-    let held_by: Vec<Vec<f64>> = sessions.iter().map(|session| held_flanks(session, largest)).collect();
-    let flank = |session: usize, row: usize| held_by[session][row];
-    let with = |this: Extra| beside_others(state, steps, place, &[this]);
-    let (Some(step), Some(flank)) = (with(&column(place)), with(&flank)) else { return false };
-    step.misfit < DECIDES * flank.misfit
+
+    /// The fit of `columns` in the place of a step, beside the other steps.
+    fn beside_others(&self, steps: &[Step], place: Place, columns: &[Extra]) -> Option<Fit> {
+        let others: Vec<_> =
+            steps.iter().map(|(other, ..)| *other).filter(|other| *other != place).map(column).collect();
+        let extras: Vec<Extra> = others.iter().map(|column| column as Extra).chain(columns.iter().copied()).collect();
+        self.state.fit(&extras)
+    }
+
+    /// Whether a step leaves far less than a change of flank would that comes in its place, whatever the other steps are:
+    /// the model without the step, to which the flank that the load holds is given instead.
+    fn beyond_a_change_of_flank(&self, steps: &[Step], place: Place) -> bool {
+        if may_let_go(&self.sessions[place.session], place.row, self.largest) {
+            return false;
+        }
+        let held_by: Vec<Vec<f64>> = self.sessions.iter().map(|session| held_flanks(session, self.largest)).collect();
+        let flank = |session: usize, row: usize| held_by[session][row];
+        let with = |this: Extra| self.beside_others(steps, place, &[this]);
+        let (Some(step), Some(flank)) = (with(&column(place)), with(&flank)) else { return false };
+        step.misfit < DECIDES * flank.misfit
+    }
+
+    /// Steps that stay so long.
+    fn find(&self, stays: Stays) -> Option<Found> {
+        let most = if stays == Stays::ForGood { AT_ONCE } else { AT_ONCE_IN_ALL };
+        let mut places = self.sudden(most);
+        places.iter_mut().for_each(|place| place.stays = stays);
+        let mut suspected = !places.is_empty();
+        let mut rejected: Vec<Place> = Vec::new();
+        let (mut steps, mut misfit): (Vec<Step>, f64) = (Vec::new(), f64::INFINITY);
+        for round in 0..ROUNDS {
+            // Drop one by one what does not last, the weakest first.
+            let fit = loop {
+                let columns: Vec<_> = places.iter().copied().map(column).collect();
+                let extras: Vec<Extra> = columns.iter().map(|column| column as Extra).collect();
+                let fit = self.state.fit(&extras)?;
+                let first = fit.value.len() - places.len();
+                let strength = |k: usize| self.strength(places[k], fit.value[first + k], fit.std[first + k]);
+                let weakest = (0..places.len()).min_by(|a, b| strength(*a).total_cmp(&strength(*b)));
+                match weakest {
+                    Some(k) if strength(k) < 1.0 => {
+                        rejected.push(places.remove(k));
+                    }
+                    _ => break fit,
+                }
+            };
+            let first = fit.value.len() - places.len();
+            steps = places.iter().enumerate().map(|(k, p)| (*p, fit.value[first + k], fit.std[first + k])).collect();
+            misfit = fit.misfit;
+            if round + 1 == ROUNDS {
+                break;
+            }
+            let known: Vec<Place> = places.iter().chain(&rejected).copied().collect();
+            let more = self.standing_out(&fit, &places, &known);
+            if more.is_empty() {
+                break;
+            }
+            suspected = true;
+            places.extend(more.into_iter().map(|place| Place { stays, ..place }));
+            places.sort_by_key(|place| (place.session, place.row));
+        }
+        steps = match stays {
+            Stays::ForGood => lasting(steps),
+            // What is set right between sessions takes nothing back.
+            Stays::ToTheEnd => {
+                steps.chunk_by(|a, b| a.0.session == b.0.session).flat_map(|of| lasting(of.to_vec())).collect()
+            }
+        };
+        let unsaid = !steps.is_empty() && !says_flank(self.sessions);
+        let turned_over = |place: Place, size: f64| unsaid && self.comes_elsewhere(place, size);
+        let (sure, doubtful): (Vec<Step>, Vec<Step>) = steps.iter().copied().partition(|(place, size, _)| {
+            !turned_over(*place, *size) && self.no_flank_was_changed(&steps, *place, *size)
+        });
+        // Where one step may be a change of flank, one of the other sign may be its way back.
+        let way_back = |(_, size, _): &Step| {
+            size.abs() <= WIDER_THAN_CLEARANCE_RAD && doubtful.iter().any(|(_, other, _)| size * other < 0.0)
+        };
+        let (back, sure): (Vec<Step>, Vec<Step>) = sure.into_iter().partition(way_back);
+        Some(Found { sure, doubtful: [doubtful, back].concat(), stays, misfit, suspected })
+    }
+
+    /// The change of the error into a row beyond what a dwell could give, 0 if less. An output dwells after the generator
+    /// turned back.
+    fn beyond_dwell(&self, number: usize, row: usize) -> f64 {
+        let session = &self.sessions[number];
+        let change = session.error_rad[row] - session.error_rad[row - 1];
+        if self.settled[number][row] {
+            return change;
+        }
+        let motion =
+            FASTER_THAN_DWELL * ((session.generator_rad[row] - session.generator_rad[row - 1]) / self.gear.ratio).abs();
+        change.signum() * (change.abs() - motion).max(0.0)
+    }
+
+    /// Rows into which the error changes more than anything smooth explains, the largest changes first.
+    fn sudden(&self, most: usize) -> Vec<Place> {
+        let changes: Vec<f64> = self
+            .sessions
+            .iter()
+            .flat_map(|session| session.error_rad.windows(2).map(|error| error[1] - error[0]))
+            .collect();
+        let usual = median_and_std(&mut sampled(&changes)).1;
+        let least = (SUDDEN * usual.max(self.noise)).max(LEAST_RAD);
+        let mut found: Vec<(Place, f64)> = Vec::new();
+        for (number, session) in self.sessions.iter().enumerate() {
+            for row in 1..session.len() {
+                let by = self.beyond_dwell(number, row).abs();
+                if by > least {
+                    found.push((Place { session: number, row, stays: Stays::ForGood }, by));
+                }
+            }
+        }
+        largest(found, &[], most)
+    }
+
+    /// Rows where means before and after differ more than they do elsewhere, in what state and known steps leave.
+    fn standing_out(&self, fit: &Fit, places: &[Place], known: &[Place]) -> Vec<Place> {
+        let columns: Vec<_> = places.iter().copied().map(column).collect();
+        let extras: Vec<Extra> = columns.iter().map(|column| column as Extra).collect();
+        let differences: Vec<Vec<f64>> = (0..self.sessions.len())
+            .map(|number| {
+                let left = self.state.left(fit, number, &extras);
+                let mut sums = vec![0.0; left.len() + 1];
+                for row in 0..left.len() {
+                    sums[row + 1] = sums[row] + left[row];
+                }
+                let mean = |from: usize, to: usize| (sums[to] - sums[from]) / (to - from) as f64;
+                (0..left.len())
+                    .map(|row| {
+                        if is_inside(&self.sessions[number], row) {
+                            mean(row, row + WINDOW) - mean(row - WINDOW, row)
+                        } else {
+                            0.0
+                        }
+                    })
+                    .collect()
+            })
+            .collect();
+        let usual = median_and_std(&mut differences.iter().flat_map(|d| sampled(d)).collect::<Vec<_>>()).1;
+        let least = (STANDS_OUT * usual).max(LEAST_RAD);
+        let mut found = Vec::new();
+        for (number, (session, differences)) in self.sessions.iter().zip(&differences).enumerate() {
+            for row in 1..session.len() {
+                let size = differences[row];
+                if size.abs() > least {
+                    // Of the rows around, the one where it happens.
+                    let sharp = self.beyond_dwell(number, row) * size.signum();
+                    if sharp > (1.0 - AGREES) * size.abs() - 4.0 * self.noise {
+                        found.push((Place { session: number, row, stays: Stays::ForGood }, size.abs()));
+                    }
+                }
+            }
+        }
+        largest(found, known, AT_ONCE)
+    }
+
+    /// At least 1 for a step that lasts, is sudden, and is the same in both views.
+    fn strength(&self, place: Place, size: f64, std: f64) -> f64 {
+        let (session, noise) = (&self.sessions[place.session], self.noise);
+        let wide = size.abs() > LONGEST_TRAVERSE_RAD;
+        if (!self.settled[place.session][place.row] && !wide) || others_change_as_much(session, place.row, size) {
+            return 0.0;
+        }
+        let change = session.error_rad[place.row] - session.error_rad[place.row - 1];
+        let motion =
+            ((session.generator_rad[place.row] - session.generator_rad[place.row - 1]) / self.gear.ratio).abs();
+        let agrees = (change - size).abs() < AGREES * size.abs() + 6.0 * noise + 0.5 * motion;
+        let loaded = load_changes(session, place.row, self.largest) && !whole_pitches(size, self.gear, WHOLE_PITCH);
+        if !agrees || loaded || size.abs() < LEAST_RAD.max(SEEN * noise) {
+            return 0.0;
+        }
+        // Seen close by, so that a slow change is no step: medians of a few rows.
+        let beside = 6.min(place.row).min(session.len() - place.row);
+        let mut before = session.error_rad[place.row - beside..place.row].to_vec();
+        let mut after = session.error_rad[place.row..place.row + beside].to_vec();
+        let local = median_of(&mut after) - median_of(&mut before);
+        let mut paces: Vec<f64> = session.error_rad[place.row - beside..place.row + beside]
+            .windows(2)
+            .map(|error| (error[1] - error[0]).abs())
+            .collect();
+        let moves = beside as f64 * median_of(&mut paces);
+        if (local - size).abs() > AGREES * size.abs() + LOCAL_NOISE * noise + moves {
+            return 0.0;
+        }
+        size.abs() / (LASTS * std).max(1e-300)
+    }
+
+    /// Whether the error changes by as much, within a row, at other places that no reversal is near to: under a load that
+    /// nobody recorded.
+    fn comes_elsewhere(&self, place: Place, size: f64) -> bool {
+        if size.abs() > WIDER_THAN_CLEARANCE_RAD {
+            return false;
+        }
+        let mut elsewhere = 0;
+        for (number, session) in self.sessions.iter().enumerate() {
+            for row in 1..session.len() {
+                let near = number == place.session && row.abs_diff(place.row) < WINDOW;
+                let change = session.error_rad[row] - session.error_rad[row - 1];
+                let as_much = (change.abs() - size.abs()).abs() < TAKEN_BACK * size.abs();
+                elsewhere += usize::from(!near && self.settled[number][row] && as_much);
+            }
+        }
+        elsewhere >= ELSEWHERE
+    }
+
+    /// Whether a step that happens under light load, where friction alone holds a flank, is seen under loads that hold one:
+    /// a change of flank is not.
+    fn lasts_under_load(&self, steps: &[Step], place: Place, size: f64) -> bool {
+        let (sessions, held) = (self.sessions, HELD * self.largest);
+        let loaded = |s: usize, r: usize| sessions[s].torque_n_m.as_ref().is_some_and(|torque| torque[r].abs() >= held);
+        if held == 0.0 || loaded(place.session, place.row) {
+            return true;
+        }
+        let lasting = column(place);
+        let under_load = |s: usize, r: usize| if loaded(s, r) { lasting(s, r) } else { 0.0 };
+        let under_none = |s: usize, r: usize| if loaded(s, r) { 0.0 } else { lasting(s, r) };
+        let Some(fit) = self.beside_others(steps, place, &[&under_none, &under_load]) else { return false };
+        let seen = |k: usize| {
+            let (value, std) = (fit.value[fit.value.len() - k], fit.std[fit.std.len() - k]);
+            (value - size).abs() < AGREES * size.abs() && value.abs() > LASTS * std
+        };
+        seen(1) && seen(2)
+    }
+
+    /// Whether a step cannot be a change of flank: the output came back to where it happened and the step did not, or load
+    /// held the flank, or no clearance is so wide.
+    fn no_flank_was_changed(&self, steps: &[Step], place: Place, size: f64) -> bool {
+        let sessions = self.sessions;
+        if size.abs() > WIDER_THAN_CLEARANCE_RAD {
+            return true;
+        }
+        if load_turns_over(&sessions[place.session], place.row, self.largest)
+            || !self.lasts_under_load(steps, place, size)
+        {
+            return false;
+        }
+        let here = sessions[place.session].generator_rad[place.row];
+        let mut crossings = 0;
+        for session in sessions {
+            let mut side = 0.0;
+            for psi in &session.generator_rad {
+                let away = psi - here;
+                if away.abs() > 0.5 {
+                    if side * away < 0.0 {
+                        crossings += 1;
+                    }
+                    side = away.signum();
+                }
+            }
+        }
+        if crossings >= 2 {
+            let in_time = |s: usize, r: usize| place.reached(s, r);
+            let in_angle = |s: usize, r: usize| f64::from(u8::from(sessions[s].generator_rad[r] >= here));
+            let with = |this: Extra| self.beside_others(steps, place, &[this]);
+            let (Some(time), Some(angle)) = (with(&in_time), with(&in_angle)) else { return false };
+            return time.misfit < TELLS * angle.misfit;
+        }
+        let session = &sessions[place.session];
+        let held = session.torque_n_m.as_ref().is_some_and(|torque| torque[place.row].abs() > HELD * self.largest);
+        // The same direction before and after, and a load that says which flank.
+        held && self.state.flank(place.session, place.row) == self.state.flank(place.session, place.row - 1)
+    }
 }
 
 /// The flank, ±1, that the last load held which was large enough to hold one; 0 before there was one, and without
@@ -253,67 +511,6 @@ fn held_flanks(session: &Session, largest: f64) -> Vec<f64> {
 /// The least load that holds a flank, N·m, noise considered.
 fn least_that_holds(torque: &[f64], largest: f64) -> f64 {
     (HELD * largest).max(LOAD_NOISE * white_noise([torque]))
-}
-
-fn find(sessions: &[Session], gear: &Gear, noise: f64, state: &State, stays: Stays) -> Option<Found> {
-    let settled = state.settled();
-    let most = if stays == Stays::ForGood { AT_ONCE } else { AT_ONCE_IN_ALL };
-    let mut places = sudden(sessions, gear, noise, &settled, most);
-    places.iter_mut().for_each(|place| place.stays = stays);
-    let mut suspected = !places.is_empty();
-    let mut rejected: Vec<Place> = Vec::new();
-    let (mut steps, mut misfit): (Vec<Step>, f64) = (Vec::new(), f64::INFINITY);
-    for round in 0..ROUNDS {
-        // Drop one by one what does not last, the weakest first.
-        let fit = loop {
-            let columns: Vec<_> = places.iter().copied().map(column).collect();
-            let extras: Vec<Extra> = columns.iter().map(|column| column as Extra).collect();
-            let fit = state.fit(&extras)?;
-            let first = fit.value.len() - places.len();
-            let strength = |k: usize| {
-                strength(sessions, gear, noise, &settled, places[k], fit.value[first + k], fit.std[first + k])
-            };
-            let weakest = (0..places.len()).min_by(|a, b| strength(*a).total_cmp(&strength(*b)));
-            match weakest {
-                Some(k) if strength(k) < 1.0 => {
-                    rejected.push(places.remove(k));
-                }
-                _ => break fit,
-            }
-        };
-        let first = fit.value.len() - places.len();
-        steps = places.iter().enumerate().map(|(k, p)| (*p, fit.value[first + k], fit.std[first + k])).collect();
-        misfit = fit.misfit;
-        if round + 1 == ROUNDS {
-            break;
-        }
-        let known: Vec<Place> = places.iter().chain(&rejected).copied().collect();
-        let more = standing_out(sessions, gear, noise, state, &settled, &fit, &places, &known);
-        if more.is_empty() {
-            break;
-        }
-        suspected = true;
-        places.extend(more.into_iter().map(|place| Place { stays, ..place }));
-        places.sort_by_key(|place| (place.session, place.row));
-    }
-    steps = match stays {
-        Stays::ForGood => lasting(steps),
-        // What is set right between sessions takes nothing back.
-        Stays::ToTheEnd => {
-            steps.chunk_by(|a, b| a.0.session == b.0.session).flat_map(|of| lasting(of.to_vec())).collect()
-        }
-    };
-    let unsaid = !steps.is_empty() && !says_flank(sessions);
-    let turned_over = |place: Place, size: f64| unsaid && comes_elsewhere(sessions, &settled, place, size);
-    let (sure, doubtful): (Vec<Step>, Vec<Step>) = steps.iter().copied().partition(|(place, size, _)| {
-        !turned_over(*place, *size) && no_flank_was_changed(sessions, state, &steps, *place, *size)
-    });
-    // Where one step may be a change of flank, one of the other sign may be its way back.
-    let way_back = |(_, size, _): &Step| {
-        size.abs() <= WIDER_THAN_CLEARANCE_RAD && doubtful.iter().any(|(_, other, _)| size * other < 0.0)
-    };
-    let (back, sure): (Vec<Step>, Vec<Step>) = sure.into_iter().partition(way_back);
-    Some(Found { sure, doubtful: [doubtful, back].concat(), stays, misfit, suspected })
 }
 
 /// The steps without those that come and go by the same amount, which do not last: teeth and clearance that fast motion
@@ -341,35 +538,6 @@ fn lasting(mut steps: Vec<Step>) -> Vec<Step> {
     steps
 }
 
-/// The change of the error into a row beyond what a dwell could give, 0 if less. An output dwells after the generator
-/// turned back.
-fn beyond_dwell(session: &Session, row: usize, settled: &[bool], gear: &Gear) -> f64 {
-    let change = session.error_rad[row] - session.error_rad[row - 1];
-    if settled[row] {
-        return change;
-    }
-    let motion = FASTER_THAN_DWELL * ((session.generator_rad[row] - session.generator_rad[row - 1]) / gear.ratio).abs();
-    change.signum() * (change.abs() - motion).max(0.0)
-}
-
-/// Rows into which the error changes more than anything smooth explains, the largest changes first.
-fn sudden(sessions: &[Session], gear: &Gear, noise: f64, settled: &[Vec<bool>], most: usize) -> Vec<Place> {
-    let changes: Vec<f64> =
-        sessions.iter().flat_map(|session| session.error_rad.windows(2).map(|error| error[1] - error[0])).collect();
-    let usual = median_and_std(&mut sampled(&changes)).1;
-    let least = (SUDDEN * usual.max(noise)).max(LEAST_RAD);
-    let mut found: Vec<(Place, f64)> = Vec::new();
-    for (number, session) in sessions.iter().enumerate() {
-        for row in 1..session.len() {
-            let by = beyond_dwell(session, row, &settled[number], gear).abs();
-            if by > least {
-                found.push((Place { session: number, row, stays: Stays::ForGood }, by));
-            }
-        }
-    }
-    largest(found, &[], most)
-}
-
 /// The places of the largest values, apart from each other and from those known.
 fn largest(mut found: Vec<(Place, f64)>, known: &[Place], most: usize) -> Vec<Place> {
     found.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -387,95 +555,6 @@ fn largest(mut found: Vec<(Place, f64)>, known: &[Place], most: usize) -> Vec<Pl
     places
 }
 
-/// Rows where means before and after differ more than they do elsewhere, in what state and known steps leave.
-#[allow(clippy::too_many_arguments, reason = "all that is known of the recording")]
-fn standing_out(
-    sessions: &[Session],
-    gear: &Gear,
-    noise: f64,
-    state: &State,
-    settled: &[Vec<bool>],
-    fit: &Fit,
-    places: &[Place],
-    known: &[Place],
-) -> Vec<Place> {
-    let columns: Vec<_> = places.iter().copied().map(column).collect();
-    let extras: Vec<Extra> = columns.iter().map(|column| column as Extra).collect();
-    let differences: Vec<Vec<f64>> = (0..sessions.len())
-        .map(|number| {
-            let left = state.left(fit, number, &extras);
-            let mut sums = vec![0.0; left.len() + 1];
-            for row in 0..left.len() {
-                sums[row + 1] = sums[row] + left[row];
-            }
-            let mean = |from: usize, to: usize| (sums[to] - sums[from]) / (to - from) as f64;
-            (0..left.len())
-                .map(|row| {
-                    if is_inside(&sessions[number], row) {
-                        mean(row, row + WINDOW) - mean(row - WINDOW, row)
-                    } else {
-                        0.0
-                    }
-                })
-                .collect()
-        })
-        .collect();
-    let usual = median_and_std(&mut differences.iter().flat_map(|d| sampled(d)).collect::<Vec<_>>()).1;
-    let least = (STANDS_OUT * usual).max(LEAST_RAD);
-    let mut found = Vec::new();
-    for (number, (session, differences)) in sessions.iter().zip(&differences).enumerate() {
-        for row in 1..session.len() {
-            let size = differences[row];
-            if size.abs() > least {
-                // Of the rows around, the one where it happens.
-                let sharp = beyond_dwell(session, row, &settled[number], gear) * size.signum();
-                if sharp > (1.0 - AGREES) * size.abs() - 4.0 * noise {
-                    found.push((Place { session: number, row, stays: Stays::ForGood }, size.abs()));
-                }
-            }
-        }
-    }
-    largest(found, known, AT_ONCE)
-}
-
-/// At least 1 for a step that lasts, is sudden, and is the same in both views.
-fn strength(
-    sessions: &[Session],
-    gear: &Gear,
-    noise: f64,
-    settled: &[Vec<bool>],
-    place: Place,
-    size: f64,
-    std: f64,
-) -> f64 {
-    let session = &sessions[place.session];
-    let wide = size.abs() > LONGEST_TRAVERSE_RAD;
-    if (!settled[place.session][place.row] && !wide) || others_change_as_much(session, place.row, size) {
-        return 0.0;
-    }
-    let change = session.error_rad[place.row] - session.error_rad[place.row - 1];
-    let motion = ((session.generator_rad[place.row] - session.generator_rad[place.row - 1]) / gear.ratio).abs();
-    let agrees = (change - size).abs() < AGREES * size.abs() + 6.0 * noise + 0.5 * motion;
-    let loaded = load_changes(session, place.row, largest_torque(sessions)) && !whole_pitches(size, gear, WHOLE_PITCH);
-    if !agrees || loaded || size.abs() < LEAST_RAD.max(SEEN * noise) {
-        return 0.0;
-    }
-    // Seen close by, so that a slow change is no step: medians of a few rows.
-    let beside = 6.min(place.row).min(session.len() - place.row);
-    let mut before = session.error_rad[place.row - beside..place.row].to_vec();
-    let mut after = session.error_rad[place.row..place.row + beside].to_vec();
-    let local = median_of(&mut after) - median_of(&mut before);
-    let mut paces: Vec<f64> = session.error_rad[place.row - beside..place.row + beside]
-        .windows(2)
-        .map(|error| (error[1] - error[0]).abs())
-        .collect();
-    let moves = beside as f64 * median_of(&mut paces);
-    if (local - size).abs() > AGREES * size.abs() + LOCAL_NOISE * noise + moves {
-        return 0.0;
-    }
-    size.abs() / (LASTS * std).max(1e-300)
-}
-
 /// Largest torque of either sign, N·m; 0 where none was recorded.
 pub(super) fn largest_torque(sessions: &[Session]) -> f64 {
     sessions
@@ -489,24 +568,6 @@ pub(super) fn largest_torque(sessions: &[Session]) -> f64 {
 fn says_flank(sessions: &[Session]) -> bool {
     let noise = white_noise(sessions.iter().filter_map(|session| session.torque_n_m.as_deref()));
     largest_torque(sessions) > LOAD_NOISE * noise
-}
-
-/// Whether the error changes by as much, within a row, at other places that no reversal is near to: under a load that
-/// nobody recorded.
-fn comes_elsewhere(sessions: &[Session], settled: &[Vec<bool>], place: Place, size: f64) -> bool {
-    if size.abs() > WIDER_THAN_CLEARANCE_RAD {
-        return false;
-    }
-    let mut elsewhere = 0;
-    for (number, session) in sessions.iter().enumerate() {
-        for row in 1..session.len() {
-            let near = number == place.session && row.abs_diff(place.row) < WINDOW;
-            let change = session.error_rad[row] - session.error_rad[row - 1];
-            let as_much = (change.abs() - size.abs()).abs() < TAKEN_BACK * size.abs();
-            elsewhere += usize::from(!near && settled[number][row] && as_much);
-        }
-    }
-    elsewhere >= ELSEWHERE
 }
 
 /// Whether load changes at once, by more than its noise and its usual pace, near a row.
@@ -536,64 +597,6 @@ fn load_turns_over(session: &Session, row: usize, largest: f64) -> bool {
     let before = torque[..row].iter().rev().find(holds);
     let after = torque[row..].iter().find(holds);
     may_let_go(session, row, largest) && before.zip(after).is_some_and(|(before, after)| before * after < 0.0)
-}
-
-/// Whether a step that happens under light load, where friction alone holds a flank, is seen under loads that hold one:
-/// a change of flank is not.
-fn lasts_under_load(sessions: &[Session], state: &State, steps: &[Step], place: Place, size: f64) -> bool {
-    let held = HELD * largest_torque(sessions);
-    let loaded = |s: usize, r: usize| sessions[s].torque_n_m.as_ref().is_some_and(|torque| torque[r].abs() >= held);
-    if held == 0.0 || loaded(place.session, place.row) {
-        return true;
-    }
-    let lasting = column(place);
-    let under_load = |s: usize, r: usize| if loaded(s, r) { lasting(s, r) } else { 0.0 };
-    let under_none = |s: usize, r: usize| if loaded(s, r) { 0.0 } else { lasting(s, r) };
-    let Some(fit) = beside_others(state, steps, place, &[&under_none, &under_load]) else { return false };
-    let seen = |k: usize| {
-        let (value, std) = (fit.value[fit.value.len() - k], fit.std[fit.std.len() - k]);
-        (value - size).abs() < AGREES * size.abs() && value.abs() > LASTS * std
-    };
-    seen(1) && seen(2)
-}
-
-/// Whether a step cannot be a change of flank: the output came back to where it happened and the step did not, or load
-/// held the flank, or no clearance is so wide.
-fn no_flank_was_changed(sessions: &[Session], state: &State, steps: &[Step], place: Place, size: f64) -> bool {
-    if size.abs() > WIDER_THAN_CLEARANCE_RAD {
-        return true;
-    }
-    if load_turns_over(&sessions[place.session], place.row, largest_torque(sessions))
-        || !lasts_under_load(sessions, state, steps, place, size)
-    {
-        return false;
-    }
-    let here = sessions[place.session].generator_rad[place.row];
-    let mut crossings = 0;
-    for session in sessions {
-        let mut side = 0.0;
-        for psi in &session.generator_rad {
-            let away = psi - here;
-            if away.abs() > 0.5 {
-                if side * away < 0.0 {
-                    crossings += 1;
-                }
-                side = away.signum();
-            }
-        }
-    }
-    if crossings >= 2 {
-        let in_time = |s: usize, r: usize| place.reached(s, r);
-        let in_angle = |s: usize, r: usize| f64::from(u8::from(sessions[s].generator_rad[r] >= here));
-        let with = |this: Extra| beside_others(state, steps, place, &[this]);
-        let (Some(time), Some(angle)) = (with(&in_time), with(&in_angle)) else { return false };
-        return time.misfit < TELLS * angle.misfit;
-    }
-    let session = &sessions[place.session];
-    let held =
-        session.torque_n_m.as_ref().is_some_and(|torque| torque[place.row].abs() > HELD * largest_torque(sessions));
-    // The same direction before and after, and a load that says which flank.
-    held && state.flank(place.session, place.row) == state.flank(place.session, place.row - 1)
 }
 
 #[cfg(test)]
@@ -685,10 +688,10 @@ mod tests {
             let change = (1..2000).find(|row| sessions[1].torque_n_m.as_ref().unwrap()[*row] > 0.9).unwrap();
             let at = |session: usize, row: usize| Place { session, row, stays: Stays::ToTheEnd };
             let gear = Gear::of_ratio(100.0);
-            let state = State::new(&sessions, &gear);
+            let seen = Seen::of(&sessions, &gear);
             let steps = [(at(0, 700), slip_arcsec * ARCSEC, ARCSEC), (at(1, change), 80.0 * ARCSEC, ARCSEC)];
-            assert!(beyond_a_change_of_flank(&sessions, &state, &steps, at(0, 700)));
-            assert!(!beyond_a_change_of_flank(&sessions, &state, &steps, at(1, change)));
+            assert!(seen.beyond_a_change_of_flank(&steps, at(0, 700)));
+            assert!(!seen.beyond_a_change_of_flank(&steps, at(1, change)));
             let mut findings = Findings::default();
             check(&mut sessions.clone(), &gear, &mut findings);
             let told: Vec<u64> = findings.faults.iter().map(|fault| fault.first_line).collect();
@@ -721,8 +724,11 @@ mod tests {
         error[400..].iter_mut().for_each(|e| *e -= step);
         let settled = vec![vec![true; 900]];
         let place = Place { session: 0, row: 600, stays: Stays::ForGood };
-        let elsewhere =
-            |error: &[f64]| comes_elsewhere(&[session(error.to_vec(), vec![0.0; 900])], &settled, place, step);
+        let gear = Gear::of_ratio(100.0);
+        let elsewhere = |error: &[f64]| {
+            let sessions = [session(error.to_vec(), vec![0.0; 900])];
+            Seen { settled: settled.clone(), ..Seen::of(&sessions, &gear) }.comes_elsewhere(place, step)
+        };
         error[600..].iter_mut().for_each(|e| *e += step);
         assert!(elsewhere(&error));
         error[400..600].iter_mut().for_each(|e| *e += step);
