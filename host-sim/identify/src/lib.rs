@@ -11,6 +11,7 @@ pub mod causes;
 pub mod diagnosis;
 pub mod extension;
 pub mod known_rows;
+mod least_squares;
 pub mod look;
 pub mod measurement;
 pub mod nominal;

@@ -185,7 +185,7 @@ impl Calibrate {
     /// Says what to record.
     fn write_plan(&self, context: &Context, prior: &Prior<'_>) -> Result<(), Failure> {
         let bench = self.bench.bench(MINUTES[0], self.columns.rate_hz(), prior.nominal.temperature_c)?;
-        let mut planned = plan(prior, &bench, None).map_err(Failure::BadInput)?;
+        let mut planned = plan(prior, &bench, None).map_err(bad_input)?;
         planned.command.clone_from(&context.command);
         let out = context.out()?;
         let mut outputs = Outputs::new();
@@ -199,7 +199,7 @@ impl Calibrate {
         let temperature =
             f64::midpoint(f64::from(made.calibration.temperature_c[0]), f64::from(made.calibration.temperature_c[1]));
         let bench = self.bench.bench(MINUTES[1], self.columns.rate_hz(), temperature)?;
-        let mut planned = plan(prior, &bench, Some(made)).map_err(Failure::BadInput)?;
+        let mut planned = plan(prior, &bench, Some(made)).map_err(bad_input)?;
         planned.command.clone_from(&context.command);
         Ok(planned)
     }

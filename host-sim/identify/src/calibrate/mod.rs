@@ -443,7 +443,7 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
     } else {
         files
     };
-    prior.core_drive().map_err(CalibrationError::Known)?;
+    prior.core_drive()?;
     let said: Vec<String> = check_ratio(files, prior.nominal.ratio)?.into_iter().collect();
     let mut recorded = Recorded::of(files, prior);
     let play_rad = prior.nominal.backlash_arcsec / ARCSEC_PER_RAD;
@@ -537,7 +537,7 @@ fn with_dead_zone(
         together::generators_turned(agreement, &fitted.rows, (&fitted.open, &fitted.model), prior, files)
     });
     let unlike = together::loads_unlike(&fitted.rows, &fitted.model, prior, files);
-    let Fitted { rows, folds, model, held_out, mut parts, .. } = fitted;
+    let Fitted { rows, folds, model, held_out, parts, .. } = fitted;
     let image = Table::check(&made.image).map_err(|error| TableError::Project(error.into()))?;
     let core = ByCore::of(files, &image, &recorded);
     let reading_delay = logs.delays.as_ref().and_then(|delays| delays.shown(logs.measured, &image, &recorded));
@@ -549,7 +549,6 @@ fn with_dead_zone(
     // What is known by its angle needs no guess.
     notes.extend(turned.or_else(|| agreement?.note(files)).into_iter().chain(unlike));
     notes.extend(remarks(prior, &recorded, &model, play_of_a_millisecond_arcsec));
-    sizes(&rows, &model, &mut parts);
     let zero = |row: &folds::Row| row.left_arcsec - model.adds_arcsec(&row.at);
     let mean = rows.rows.iter().map(zero).sum::<f64>() / rows.rows.len() as f64;
     let shown = rows.rows.iter().map(|row| [row.at.output_rad, row.measured_arcsec, zero(row) - mean]).collect();
@@ -776,13 +775,19 @@ fn fit(rows: Rows, prior: &Prior<'_>, recorded: &Recorded, without: &[Without]) 
             rms_prior_arcsec: rms(folds.left_out(&all, &[])),
             rms_after_arcsec: rms(left[most]),
         };
-        let parts = judged(&folds, &model, recorded, prior, &without);
+        let parts = judged(&rows, &folds, &model, (recorded, prior), &without);
         return Ok(Fitted { rows, folds: all.len(), open, model, held_out, parts });
     }
 }
 
 /// What is said of each part.
-fn judged(folds: &Folds, model: &Model, recorded: &Recorded, prior: &Prior<'_>, without: &[Without]) -> Vec<PartSays> {
+fn judged(
+    rows: &Rows,
+    folds: &Folds,
+    model: &Model,
+    (recorded, prior): (&Recorded, &Prior<'_>),
+    without: &[Without],
+) -> Vec<PartSays> {
     let all = folds.all();
     let before = folds.left_out(&all, &[]);
     let with = folds.left_out(&all, &model.chosen);
@@ -809,7 +814,7 @@ fn judged(folds: &Folds, model: &Model, recorded: &Recorded, prior: &Prior<'_>, 
                 kept: true,
                 held_out_gain: Some((without - with) / before),
                 penalty: Some(chosen.penalty),
-                size_arcsec: None,
+                size_arcsec: Some(size(rows, model, *chosen)),
                 why: format!(
                     "it takes {:.1} % of the squares that the others leave ({:.0} % are asked for); without it the \
                      error where nothing was fitted is {:.2} times as large",
@@ -836,19 +841,12 @@ fn judged(folds: &Folds, model: &Model, recorded: &Recorded, prior: &Prior<'_>, 
     PartName::ALL.into_iter().map(says).collect()
 }
 
-/// Half of peak to peak of each part over the rows.
-fn sizes(rows: &Rows, model: &Model, parts: &mut [PartSays]) {
-    for chosen in &model.chosen {
-        let alone = Model {
-            chosen: vec![*chosen],
-            coefficients: model.of(chosen.part).map_or_else(Vec::new, |of| model.coefficients[of].to_vec()),
-            scales: model.scales,
-        };
-        let (least, most) = least_and_most(rows.rows.iter().map(|row| alone.adds_arcsec(&row.at)));
-        if let Some(part) = parts.iter_mut().find(|part| part.name == chosen.part.as_str()) {
-            part.size_arcsec = Some(0.5 * (most - least));
-        }
-    }
+/// Half of peak to peak of a part over the rows, arcsec.
+fn size(rows: &Rows, model: &Model, chosen: Chosen) -> f64 {
+    let coefficients = model.of(chosen.part).map_or_else(Vec::new, |of| model.coefficients[of].to_vec());
+    let alone = Model { chosen: vec![chosen], coefficients, scales: model.scales };
+    let (least, most) = least_and_most(rows.rows.iter().map(|row| alone.adds_arcsec(&row.at)));
+    0.5 * (most - least)
 }
 
 /// What is said of logs at one pace.

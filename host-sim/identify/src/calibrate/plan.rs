@@ -15,7 +15,9 @@ use super::folds::Sums;
 use super::interval::{Node, Noise, OF_95, planned_covariance, row, spread, width_of, widths};
 use super::parts::{PartName, Scales, State, weights};
 use super::rows::{MOST_ROWS, late_s};
-use super::{Calibrated, GOLDEN, LEAST_FRICTION, ONE_TEMPERATURE_K, OTHER_PACE, Prior, ROWS_OF_A_PITCH};
+use super::{
+    Calibrated, CalibrationError, GOLDEN, LEAST_FRICTION, ONE_TEMPERATURE_K, OTHER_PACE, Prior, ROWS_OF_A_PITCH,
+};
 use crate::measurement::least_and_most;
 
 /// Beyond what any bench or catalogue of these drives has, so a slip of the pen: generator, load and temperature.
@@ -220,10 +222,10 @@ struct Candidate {
 ///
 /// # Errors
 /// A bench with numbers out of range, or with no time for a single pass.
-pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Result<Planned, String> {
+pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Result<Planned, CalibrationError> {
     prior.core_drive()?;
     if let Some(problem) = bench.problem() {
-        return Err(problem);
+        return Err(CalibrationError::Known(problem));
     }
     let wide = |[a, b]: [f64; 2], other: Option<[f64; 2]>| other.map_or([a, b], |[c, d]| [a.min(c), b.max(d)]);
     let torque = wide(bench.torque_n_m, first.map(|first| first.recorded.scales.torque_n_m));
@@ -253,7 +255,7 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
     let asked = Asked::of(&scales, ratio, travel, &chosen);
     let of = |known: &[Sums]| {
         let covariance = planned_covariance(known, &chosen, &scales, noise.of_a_row());
-        covariance.ok_or("the information matrix is singular".to_owned())
+        covariance.ok_or(CalibrationError::Known("the information matrix is singular".to_owned()))
     };
 
     let mut now = of(&known)?;
@@ -291,18 +293,18 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
     }
     if taken.len() == MOST_PASSES {
         let hours = bench.minutes / 60.0;
-        return Err(format!(
+        return Err(CalibrationError::Known(format!(
             "--minutes: found {}: in {hours:.0} hours there is time for {MOST_PASSES} passes and more; allowed: less \
              time",
             bench.minutes
-        ));
+        )));
     }
     if taken.is_empty() {
         let shortest = candidates.iter().map(|c| c.pass.duration_s).fold(f64::INFINITY, f64::min) / 60.0;
-        return Err(format!(
+        return Err(CalibrationError::Known(format!(
             "--minutes: found {}, allowed: {shortest:.1} or more, the time of one pass there and back at {} rpm",
             bench.minutes, bench.speed_rpm
-        ));
+        )));
     }
     let nodes = widths(&chosen, &scales, &now, None);
     let rms = |covariance: &Mat| asked.mean_variance(covariance).sqrt();

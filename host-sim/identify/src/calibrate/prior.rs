@@ -2,6 +2,7 @@
 
 use flexspline::Table;
 
+use super::CalibrationError;
 use super::parts::State;
 use super::zero::steady;
 use crate::nominal::{Nominal, Spread};
@@ -74,18 +75,18 @@ impl<'a> Prior<'a> {
     ///
     /// # Errors
     /// No pair of wheels has this ratio.
-    pub(crate) fn core_drive(&self) -> Result<flexspline::Drive, String> {
+    pub(crate) fn core_drive(&self) -> Result<flexspline::Drive, CalibrationError> {
         if let Some(table) = self.table {
             return Ok(*table.drive());
         }
         let drive = self.nominal.teeth_or_of_two_waves().core_drive();
-        let drive = drive.map_err(|error| format!("ratio {}: {error}", self.nominal.ratio))?;
+        let drive = drive.map_err(|error| CalibrationError::Known(format!("ratio {}: {error}", self.nominal.ratio)))?;
         if (drive.exact_ratio() / self.nominal.ratio - 1.0).abs() > 1e-9 {
-            return Err(format!(
+            return Err(CalibrationError::Known(format!(
                 "ratio: found {}, allowed: a ratio that wheels with two teeth of difference have, a whole number or a \
                  half; or a model with the teeth, --model nominal.toml",
                 self.nominal.ratio
-            ));
+            )));
         }
         Ok(drive)
     }

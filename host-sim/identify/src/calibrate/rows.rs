@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use super::folds::{Folds, Row};
 use super::parts::{PartName, Scales, State};
 use super::prior::Prior;
+use crate::least_squares::Normal;
 use crate::measurement::{Recording, Session, least_and_most, quantile_of, sampled, white_noise};
-use crate::residual::Normal;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// Folds that records are cut into: blocks of a tenth of each or so, which say what a table does beyond what it saw.

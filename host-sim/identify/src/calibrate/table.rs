@@ -41,7 +41,7 @@ const ORDERS: [u16; 8] = [1, 2, 3, 4, 5, 6, 7, 8];
 
 /// Makes the table.
 pub(super) fn make(prior: &Prior<'_>, model: &Model, recorded: &Recorded) -> Result<MadeTable, CalibrationError> {
-    let drive = prior.core_drive().map_err(CalibrationError::Known)?;
+    let drive = prior.core_drive()?;
     let temperatures = temperature_nodes(prior, recorded);
     let has = |part| model.chosen.iter().any(|chosen| chosen.part == part);
     let curve = |there: bool, orders: &'static [u16]| {

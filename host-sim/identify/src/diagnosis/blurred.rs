@@ -12,7 +12,7 @@ use std::borrow::Cow;
 use flexspline::Table;
 
 use super::base::PlayLaw;
-use super::channels::{FreeSpan, fault_throughout, sample, waves};
+use super::channels::{FreeSpan, report, sample, waves};
 use super::flank_lag::behind;
 use super::linear::{Gram, Prior, solve};
 use super::rows::{Rows, combined, rms};
@@ -270,10 +270,10 @@ pub(super) fn check(recording: &mut Recording, nominal: &Nominal, table: Option<
          takes of what the model says was put back, and a load that swings is not looked for",
         1e3 * s
     );
-    let mut fault = fault_throughout(recording, FaultName::AveragedRows, Treatment::Repaired, rms(&taken), what);
-    fault.channel = None;
-    fault.measures = Measures { size_ms: Some(1e3 * s), ..Measures::default() };
-    recording.faults.push(fault);
+    if let Some(fault) = report(recording, FaultName::AveragedRows, Treatment::Repaired, rms(&taken), what) {
+        fault.channel = None;
+        fault.measures = Measures { size_ms: Some(1e3 * s), ..Measures::default() };
+    }
 }
 
 #[cfg(test)]

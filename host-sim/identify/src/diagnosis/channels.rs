@@ -11,7 +11,7 @@ use super::base::{PlayLaw, predicted_by_table};
 use super::linear;
 use super::noise::white_level;
 use super::rows::{Rows, mean, quantile, rms, robust_std};
-use crate::measurement::{Fault, FaultName, Quantity, Recording, Session, Treatment};
+use crate::measurement::{Fault, FaultName, Quantity, Recording, Session, Treatment, throughout};
 use crate::nominal::{Harmonic, Nominal};
 use flexspline_base::robust::dot;
 
@@ -279,17 +279,12 @@ pub(super) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: 
     let turned = told(-1.0);
     if seen(&turned) && of_this_drive(&turned) && turned.left < EXPLAINS_TURNED * recorded.left.min(none) {
         scale(recording, -1.0);
-        recording.faults.push(fault_throughout(
-            recording,
-            FaultName::TorqueSign,
-            Treatment::Repaired,
-            none,
-            format!(
-                "the error follows the torque with {:.2} (± {:.2}) of the nominal wind-up and clearance: it counts \
+        let what = format!(
+            "the error follows the torque with {:.2} (± {:.2}) of the nominal wind-up and clearance: it counts \
                  the other way, and was turned round",
-                recorded.share, recorded.std
-            ),
-        ));
+            recorded.share, recorded.std
+        );
+        report(recording, FaultName::TorqueSign, Treatment::Repaired, none, what);
         return None;
     }
     let best = factors(nominal.ratio)
@@ -307,28 +302,17 @@ pub(super) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: 
             recorded.left, told.left
         );
         recording.sessions.iter_mut().for_each(|session| session.torque_n_m = None);
-        recording.faults.push(fault_throughout(
-            recording,
-            FaultName::UnitMismatch,
-            Treatment::Masked,
-            recorded.size,
-            what.clone(),
-        ));
+        report(recording, FaultName::UnitMismatch, Treatment::Masked, recorded.size, what.clone());
         return Some(what);
     }
     if let Some((factor, told)) = best {
         scale(recording, factor);
-        recording.faults.push(fault_throughout(
-            recording,
-            FaultName::TorqueScale,
-            Treatment::Repaired,
-            none,
-            format!(
-                "the torque times {factor:.4} gives the wind-up and clearance that the error shows ({:.2} ± {:.2} of \
+        let what = format!(
+            "the torque times {factor:.4} gives the wind-up and clearance that the error shows ({:.2} ± {:.2} of \
                  the nominal ones); as it stands it leaves {:.0} arcsec, so {:.0}: it was converted",
-                told.share, told.std, recorded.left, told.left
-            ),
-        ));
+            told.share, told.std, recorded.left, told.left
+        );
+        report(recording, FaultName::TorqueScale, Treatment::Repaired, none, what);
         return None;
     }
     let nothing = seen(&recorded) && 1.0 - recorded.share > CERTAIN * recorded.std && recorded.left > none;
@@ -341,13 +325,7 @@ pub(super) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: 
          torque at this output, and is not used; what the load does cannot be told from what the drive does",
         recorded.size, recorded.share, recorded.std
     );
-    recording.faults.push(fault_throughout(
-        recording,
-        FaultName::TorqueScale,
-        Treatment::Masked,
-        recorded.size,
-        what.clone(),
-    ));
+    report(recording, FaultName::TorqueScale, Treatment::Masked, recorded.size, what.clone());
     Some(what)
 }
 
@@ -367,31 +345,18 @@ fn scale(recording: &mut Recording, factor: f64) {
         .for_each(|torque| *torque *= factor);
 }
 
-/// A fault of the torque in all rows.
-pub(super) fn fault_throughout(
-    recording: &Recording,
+/// Reports a fault of the torque in all rows.
+pub(super) fn report(
+    recording: &mut Recording,
     name: FaultName,
     treatment: Treatment,
     size_arcsec: f64,
     what: String,
-) -> Fault {
-    let (first, last) = (recording.sessions.first(), recording.sessions.last());
-    let line = |session: Option<&Session>, last: bool| {
-        session.and_then(|s| if last { s.line.last() } else { s.line.first() }).copied().unwrap_or(0)
-    };
-    let time = |session: Option<&Session>, last: bool| {
-        session.and_then(|s| s.time_s.as_ref()).and_then(|t| if last { t.last() } else { t.first() }).copied()
-    };
-    let rows = recording.sessions.iter().map(|session| session.len() as u64).sum();
-    Fault {
-        channel: Some(Quantity::Torque),
-        time_s: time(first, false),
-        until_s: time(last, true),
-        size_arcsec: Some(size_arcsec),
-        treatment,
-        what,
-        ..Fault::new(name, [line(first, false), line(last, true)], rows)
-    }
+) -> Option<&mut Fault> {
+    let (channel, size_arcsec) = (Some(Quantity::Torque), Some(size_arcsec));
+    let all = throughout(&recording.sessions, name)?;
+    recording.faults.push(Fault { channel, size_arcsec, treatment, what, ..all });
+    recording.faults.last_mut()
 }
 
 /// Whether both angles may be in degrees where radians are said: with zeros and ratio free, the nominal model leaves

@@ -228,8 +228,35 @@ impl Extended {
             }
             None => super::remembered(&laws, &fixed(&problem, &laws, causes)),
         };
-        let found = Found::of(&problem, &laws, &start).ok_or(DiagnosisError::NotFinite)?;
-        Ok(found.extended(laws, &base, &scales, Fineness { stride, noise, worth }))
+        Extended::of(&problem, laws, &start, Fineness { stride, noise, worth }).ok_or(DiagnosisError::NotFinite)
+    }
+
+    /// Fits the laws at `start` (index and places), and the nominal model alone.
+    pub(super) fn of(
+        problem: &Problem<'_>,
+        laws: Vec<Law>,
+        start: &[(usize, Vec<f64>)],
+        fineness: Fineness,
+    ) -> Option<Extended> {
+        let alone = Scaffold::new(problem, Vec::new()).fit(None)?;
+        let selected = Selected::of(problem, terms_at(problem, &laws, start))?;
+        let known = uncertainty::known(problem, &selected, 1.0);
+        let base = selected.fit.base().to_vec();
+        let fitted = selected.terms.iter().enumerate().map(|(k, term)| {
+            let Acting { roles, coefficients, .. } = term.acting(selected.fit.of(k));
+            (roles, coefficients)
+        });
+        let fitted: Vec<(Vec<Role>, Vec<f64>)> = fitted.collect();
+        drop(selected);
+        let mut laws: Vec<Option<Law>> = laws.into_iter().map(Some).collect();
+        let cause = |(((law, places), (roles, coefficients)), known): (((usize, Vec<f64>), _), uncertainty::Known)| {
+            let law = laws[law].take()?;
+            let (name, parameters) = (law.cause()?, known.parameters);
+            Some(FittedCause { name, law, places, roles, coefficients, parameters })
+        };
+        let causes = start.iter().cloned().zip(fitted).zip(known).filter_map(cause).collect();
+        let (play, scales) = (problem.on.base.law, problem.on.scales.clone());
+        Some(Extended { play, scales, recalibrated: alone.solution.coefficients, base, causes, fineness })
     }
 
     /// Causes of the model.
@@ -302,65 +329,5 @@ impl Extended {
             parts.push(part);
         }
         (recalibrated, extended, parts)
-    }
-}
-
-/// A law (index) as it was fitted.
-struct FoundTerm {
-    law: usize,
-    places: Vec<f64>,
-    roles: Vec<Role>,
-    coefficients: Vec<f64>,
-    parameters: BTreeMap<&'static str, Parameter>,
-}
-
-/// What a fit leaves behind when its columns are gone.
-pub(super) struct Found {
-    recalibrated: Vec<f64>,
-    base: Vec<f64>,
-    terms: Vec<FoundTerm>,
-}
-
-impl Found {
-    /// Fits the laws at `start` (index and places), and the nominal model alone.
-    pub(super) fn of(problem: &Problem<'_>, laws: &[Law], start: &[(usize, Vec<f64>)]) -> Option<Found> {
-        let terms = terms_at(problem, laws, start);
-        let alone = Scaffold::new(problem, Vec::new()).fit(None)?;
-        let selected = Selected::of(problem, terms)?;
-        let known = uncertainty::known(problem, &selected, 1.0);
-        Some(Found {
-            recalibrated: alone.solution.coefficients,
-            base: selected.fit.base().to_vec(),
-            terms: start
-                .iter()
-                .enumerate()
-                .zip(known)
-                .map(|((k, (law, places)), known)| {
-                    let Acting { roles, coefficients, .. } = selected.terms[k].acting(selected.fit.of(k));
-                    FoundTerm { law: *law, places: places.clone(), roles, coefficients, parameters: known.parameters }
-                })
-                .collect(),
-        })
-    }
-
-    /// Keeps the laws that were fitted.
-    pub(super) fn extended(self, laws: Vec<Law>, base: &Base, scales: &Scales, fineness: Fineness) -> Extended {
-        let mut laws: Vec<Option<Law>> = laws.into_iter().map(Some).collect();
-        let causes = self
-            .terms
-            .into_iter()
-            .filter_map(|FoundTerm { law, places, roles, coefficients, parameters }| {
-                let law = laws[law].take()?;
-                Some(FittedCause { name: law.cause()?, law, places, roles, coefficients, parameters })
-            })
-            .collect();
-        Extended {
-            play: base.law,
-            scales: scales.clone(),
-            recalibrated: self.recalibrated,
-            base: self.base,
-            causes,
-            fineness,
-        }
     }
 }

@@ -2,7 +2,7 @@
 //! its own unless the bench sets its zero anew in each. Which causes are fitted was chosen on all sessions.
 
 use super::model::{Fit, Problem, Scaffold, Term};
-use super::products::{RowsMet, Set};
+use super::products::Set;
 use super::report::{HeldOut, Unexplained};
 use super::rows::mean;
 use super::select::{self, Selected};
@@ -19,7 +19,7 @@ pub(crate) struct Evaluated {
 /// Leaves out one session after another.
 #[must_use]
 pub fn evaluate(problem: &Problem<'_>, terms: &[&Term<'_>]) -> Evaluated {
-    let zero = Zero::of(problem, terms);
+    let zero = own_zero(problem, terms);
     let square = |terms: &[&Term<'_>], linearised: bool| left_out(problem, terms, linearised, zero).unwrap_or(f64::NAN);
     let before = square(&[], false);
     let after = if terms.is_empty() { before } else { square(terms, true) };
@@ -41,7 +41,7 @@ pub(crate) fn proved<'l>(
     mut selected: Selected<'l>,
     trace: &mut Trace,
 ) -> (Selected<'l>, Vec<Unexplained>) {
-    let zero = Zero::of(problem, &selected.terms.iter().collect::<Vec<_>>());
+    let zero = own_zero(problem, &selected.terms.iter().collect::<Vec<_>>());
     let square = |terms: &[&Term<'l>]| left_out(problem, terms, true, zero).unwrap_or(f64::INFINITY);
     let none = square(&[]);
     let mut aside = Vec::new();
@@ -69,34 +69,22 @@ pub(crate) fn proved<'l>(
     (selected, aside)
 }
 
-/// Where the zero of a session left out comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Zero {
-    /// It is that of the others.
-    Shared,
-    /// The bench sets it in each session: it is found in the session itself.
-    Own,
-}
-
-impl Zero {
-    /// Of a model with these terms; where sessions are known to have a zero of their own, it is in any case.
-    #[must_use]
-    pub fn of(problem: &Problem<'_>, terms: &[&Term<'_>]) -> Zero {
-        let own = !problem.on.rows.zeros.is_empty() || terms.iter().any(|term| term.law.is_zero_of_sessions());
-        if own { Zero::Own } else { Zero::Shared }
-    }
+/// Whether the bench sets the zero of a session, which is then found in the session itself: a model with these terms
+/// says so, or sessions are known to have their own.
+pub(super) fn own_zero(problem: &Problem<'_>, terms: &[&Term<'_>]) -> bool {
+    !problem.on.rows.zeros.is_empty() || terms.iter().any(|term| term.law.is_zero_of_sessions())
 }
 
 /// Mean squared error of prediction, arcsec², over averages without uncertain rows. With `anew` the shape parameters
 /// are found without the session as well, by a step of Gauss-Newton where that tells the others better.
-fn left_out(problem: &Problem<'_>, terms: &[&Term<'_>], anew: bool, zero: Zero) -> Option<f64> {
+fn left_out(problem: &Problem<'_>, terms: &[&Term<'_>], anew: bool, own_zero: bool) -> Option<f64> {
     let scaffold = Scaffold::new(problem, terms.to_vec());
     let fit = scaffold.fit(None)?;
     let free = if anew && terms.iter().any(|t| !t.places.is_empty()) { Some(scaffold.linearised()?) } else { None };
     let (mut sum, mut count) = (0.0, 0usize);
     for (k, block) in problem.blocks().iter().enumerate() {
         let without = |fit: &Fit, terms: &[&Term<'_>], moves: Option<&Set>| {
-            fit.without(&problem.gram(terms, moves, RowsMet::Block(k)), problem.worth)
+            fit.without(&problem.gram(terms, moves, Some(k)), problem.worth)
         };
         let solution = without(&fit, terms, None)?;
         let mut best = (solution, None);
@@ -120,7 +108,7 @@ fn left_out(problem: &Problem<'_>, terms: &[&Term<'_>], anew: bool, zero: Zero) 
                 problem.data[g] - predicted
             })
             .collect();
-        let own = if zero == Zero::Own { mean(&left) } else { 0.0 };
+        let own = if own_zero { mean(&left) } else { 0.0 };
         sum += left.iter().map(|left| (left - own).powi(2)).sum::<f64>();
         count += left.len();
     }

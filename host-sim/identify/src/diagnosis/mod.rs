@@ -61,7 +61,6 @@ use crate::nominal::Nominal;
 use averaged::Averaged;
 use candidate::{Deviation, Excitation, Label, Law, Scales, library, line, unnamed};
 pub use explain::Explanation;
-use extended::Found;
 pub use extended::{Extended, FittedCause, FittedLaw, Series, added_by};
 use model::{Problem, Term, terms_at};
 use noise::{Noise, Whitener};
@@ -221,9 +220,8 @@ pub(crate) fn diagnose_extended(
     let mut diagnosis =
         verdict::conclude(&problem, on_sample, &laws, selected, &bests, left, &hidden_lines, noise, settings, trace);
     diagnosis.set_aside = prepare::too_few_left(&problem, diagnosis.finding);
-    let found = Found::of(&problem, &laws, &start).ok_or(DiagnosisError::NotFinite)?;
-    drop((problem, sample));
-    Ok((diagnosis, found.extended(laws, &base, &scales, fineness)))
+    let extended = Extended::of(&problem, laws, &start, fineness).ok_or(DiagnosisError::NotFinite)?;
+    Ok((diagnosis, extended))
 }
 
 /// Whether rows can be diagnosed at all.

@@ -13,7 +13,7 @@ use super::averaged::{Averaged, Grain};
 use super::candidate::{Acting, Among, Coefficients, Column, Excitation, Law, Role, Tolerance, left_by};
 use super::linear::{Gram, Prior, Solution, products, solve};
 use super::noise::Whitener;
-use super::products::{Products, RowsMet, Set};
+use super::products::{Products, Set};
 use super::rows::{combined, rms};
 
 /// Data and nominal model, averaged and white.
@@ -96,8 +96,8 @@ impl<'a> Problem<'a> {
 
     /// Products of base, terms, further columns and data.
     #[must_use]
-    pub(crate) fn gram(&self, terms: &[&Term<'_>], further: Option<&Set>, part: RowsMet) -> Gram {
-        self.products.gram(&self.sets(terms, further), part)
+    pub(crate) fn gram(&self, terms: &[&Term<'_>], further: Option<&Set>, block: Option<usize>) -> Gram {
+        self.products.gram(&self.sets(terms, further), block)
     }
 
     /// Sets of white columns of a model, the data last.
@@ -471,7 +471,7 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
     /// Products of the base and some terms.
     #[must_use]
     pub fn new(problem: &'p Problem<'a>, terms: Vec<&'t Term<'l>>) -> Self {
-        let gram = problem.gram(&terms, None, RowsMet::All);
+        let gram = problem.gram(&terms, None, None);
         let ahead = terms.len();
         Scaffold { problem, terms, gram, ahead, left: Default::default() }
     }

@@ -43,24 +43,6 @@ struct Met {
     blocks: Vec<Vec<f64>>,
 }
 
-impl Met {
-    fn over(&self, part: RowsMet) -> &[f64] {
-        match part {
-            RowsMet::All => &self.all,
-            RowsMet::Block(k) => &self.blocks[k],
-        }
-    }
-}
-
-/// Which rows products are over.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum RowsMet {
-    /// All of them.
-    All,
-    /// Those of one block.
-    Block(usize),
-}
-
 /// Products that are kept at most: 256 MiB. *Guess*.
 const MOST_KEPT: usize = 32 << 20;
 
@@ -115,26 +97,27 @@ impl Products {
         met
     }
 
-    /// Puts the products of two sets where `put(i, j)` wants those of column `i` of the first and `j` of the second.
-    fn meet(&self, first: &Set, second: &Set, part: RowsMet, mut put: impl FnMut(usize, usize, f64)) {
+    /// Puts the products of two sets, over a block or all rows, where `put(i, j)` wants those of column `i` of the
+    /// first and `j` of the second.
+    fn meet(&self, first: &Set, second: &Set, block: Option<usize>, mut put: impl FnMut(usize, usize, f64)) {
         let swapped = first.id > second.id;
         let (older, newer) = if swapped { (second, first) } else { (first, second) };
         let met = self.between(older, newer);
-        for (at, product) in met.over(part).iter().enumerate() {
+        for (at, product) in block.map_or(&met.all, |k| &met.blocks[k]).iter().enumerate() {
             let (i, j) = (at / newer.len(), at % newer.len());
             if swapped { put(j, i, *product) } else { put(i, j, *product) }
         }
     }
 
-    /// Products of all columns of `sets`, set after set; the last one is the data.
-    pub(crate) fn gram(&self, sets: &[&Set], part: RowsMet) -> Gram {
+    /// Products of all columns of `sets`, set after set, over a block or all rows; the last one is the data.
+    pub(crate) fn gram(&self, sets: &[&Set], block: Option<usize>) -> Gram {
         let size = sets.iter().map(|set| set.len()).sum();
         let mut products = vec![0.0; size * size];
         let mut row = 0;
         for (k, first) in sets.iter().enumerate() {
             let mut column = 0;
             for second in &sets[..=k] {
-                self.meet(first, second, part, |i, j, product| {
+                self.meet(first, second, block, |i, j, product| {
                     products[(row + i) * size + column + j] = product;
                     products[(column + j) * size + row + i] = product;
                 });
@@ -151,7 +134,7 @@ impl Products {
         let mut meeting = vec![vec![0.0; width + new.len()]; new.len()];
         let mut column = 0;
         for set in sets.iter().chain([&new]) {
-            self.meet(new, set, RowsMet::All, |i, j, product| meeting[i][column + j] = product);
+            self.meet(new, set, None, |i, j, product| meeting[i][column + j] = product);
             column += set.len();
         }
         meeting
@@ -173,11 +156,11 @@ mod tests {
         let term = Set::new((3..6).map(column).collect());
         let sets = [&base, &term, &data];
         let columns: Vec<&[f64]> = sets.iter().flat_map(|set| set.iter()).map(Vec::as_slice).collect();
-        for (part, rows) in [(RowsMet::All, 0..900), (RowsMet::Block(1), 100..640)] {
+        for (part, rows) in [(None, 0..900), (Some(1), 100..640)] {
             assert_eq!(products.gram(&sets, part).products, Gram::of(&columns, rows).products);
         }
-        let alone = products.gram(&[&base, &data], RowsMet::All);
+        let alone = products.gram(&[&base, &data], None);
         let with = alone.with(&products.meeting(&term, &[&base, &data]));
-        assert_eq!(with.products, products.gram(&sets, RowsMet::All).products);
+        assert_eq!(with.products, products.gram(&sets, None).products);
     }
 }

@@ -10,8 +10,8 @@ use super::trace::{Gate, Judged};
 use crate::causes::CauseName;
 
 /// A rival in the place of a cause.
-#[derive(Clone, Debug)]
-pub(crate) struct Rival {
+#[derive(Clone)]
+pub(crate) struct Rival<'l> {
     /// Its name.
     pub cause: CauseName,
     /// Rise of the misfit, in units in which 25 is five standard deviations.
@@ -20,9 +20,12 @@ pub(crate) struct Rival {
     pub apart_arcsec: f64,
     /// What it adds to the others is no more than what their laws may be wrong by.
     pub mops_up: bool,
+    /// The law that it is, and where.
+    law: &'l Law,
+    places: Vec<f64>,
 }
 
-impl Rival {
+impl Rival<'_> {
     /// Whether a cause of this size holds against it: it is not told better by it, and is told apart from it.
     #[must_use]
     pub(crate) fn judge(&self, size_arcsec: f64, out_of_tolerance: bool) -> Vec<Judged> {
@@ -63,15 +66,15 @@ pub(crate) type OnSample<'p, 'a> = Option<(&'p Problem<'a>, f64)>;
 
 /// Rivals of term `k`, closest first. With a sample only those that are near there are refitted to all rows.
 #[must_use]
-pub(crate) fn rivals(
+pub(crate) fn rivals<'l>(
     problem: &Problem<'_>,
     sample: OnSample<'_, '_>,
-    laws: &[Law],
+    laws: &'l [Law],
     selected: &Selected<'_>,
     standings: &[Standing],
     bests: &Bests,
     k: usize,
-) -> Vec<Rival> {
+) -> Vec<Rival<'l>> {
     let open: Vec<&Law> =
         laws.iter().filter(|law| law.named() && selected.terms.iter().all(|t| t.law.label != law.label)).collect();
     let begin = |scaffold: &Scaffold<'_, '_, '_, '_>, law: &Law| bests.begin(scaffold, law);
@@ -81,31 +84,24 @@ pub(crate) fn rivals(
         let there = Selected::of(sample, terms)?;
         Some((refitted(sample, &open, &there, standings, begin, k), share))
     });
-    let mut rivals: Vec<Rival> = match of_sample {
-        None => refitted(problem, &open, selected, standings, begin, k).into_iter().map(|found| found.rival).collect(),
+    let mut rivals: Vec<Rival<'l>> = match of_sample {
+        None => refitted(problem, &open, selected, standings, begin, k),
         Some((mut found, share)) => {
-            found.iter_mut().for_each(|found| found.rival.misfit /= share);
-            let (near, far): (Vec<Refitted<'_>>, Vec<Refitted<'_>>) =
-                found.into_iter().partition(|found| found.rival.misfit < NEAR);
+            found.iter_mut().for_each(|found| found.misfit /= share);
+            let (near, far): (Vec<Rival<'l>>, Vec<Rival<'l>>) =
+                found.into_iter().partition(|found| found.misfit < NEAR);
             let near_laws: Vec<&Law> = near.iter().map(|found| found.law).collect();
             let from_there = |_: &Scaffold<'_, '_, '_, '_>, law: &Law| -> Vec<Vec<f64>> {
                 near.iter().filter(|found| found.law.id() == law.id()).map(|found| found.places.clone()).collect()
             };
             let near = refitted(problem, &near_laws, selected, standings, from_there, k);
-            near.into_iter().chain(far).map(|found| found.rival).collect()
+            near.into_iter().chain(far).collect()
         }
     };
     rivals.sort_by(|a, b| a.misfit.total_cmp(&b.misfit));
     let mut seen = std::collections::HashSet::new();
     rivals.retain(|r| seen.insert(r.cause));
     rivals
-}
-
-/// A rival with the law that it is, and where.
-struct Refitted<'l> {
-    rival: Rival,
-    law: &'l Law,
-    places: Vec<f64>,
 }
 
 /// Laws refitted in the place of term `k`, from where `begin` says.
@@ -116,7 +112,7 @@ fn refitted<'l>(
     standings: &[Standing],
     begin: impl Fn(&Scaffold<'_, '_, '_, '_>, &Law) -> Vec<Vec<f64>> + Sync,
     k: usize,
-) -> Vec<Refitted<'l>> {
+) -> Vec<Rival<'l>> {
     let apart = selected.without(problem, k);
     let others: Vec<&Term<'_>> = apart.iter().map(AsRef::as_ref).collect();
     let scaffold = Scaffold::new(problem, others.clone());
@@ -160,13 +156,14 @@ fn refitted<'l>(
                 None => (rise(&fit), predicted(problem, &with, &fit)),
             };
             let differs = |from: &[f64]| size_of(problem, &less(from, &then));
-            let rival = Rival {
+            Some(Rival {
                 cause: law.cause()?,
                 misfit,
                 apart_arcsec: differs(&now),
                 mops_up: lacking.as_ref().is_some_and(|lacking| differs(lacking) < others_may_err(law)),
-            };
-            Some(Refitted { rival, law, places: term.places.clone() })
+                law,
+                places: term.places.clone(),
+            })
         })
         .collect()
 }

@@ -8,9 +8,8 @@ use std::collections::{HashMap, HashSet};
 use rayon::prelude::*;
 
 use super::candidate::{Coefficients, Law, Role, Tolerance};
-use super::held_out::Zero;
+use super::held_out::own_zero;
 use super::model::{Fit, Problem, Scaffold, Term, among_each_other};
-use super::products::RowsMet;
 use super::thresholds::selection::*;
 use super::trace::{Gate, Judged, Stage, Trace, passed};
 use crate::causes::CauseName;
@@ -368,7 +367,7 @@ pub(super) fn standing(problem: &Problem<'_>, selected: &Selected<'_>, k: usize)
 }
 
 /// Less the mean: the zero of the encoder takes it.
-fn about_mean(problem: &Problem<'_>, mut values: Vec<f64>) -> Vec<f64> {
+pub(super) fn about_mean(problem: &Problem<'_>, mut values: Vec<f64>) -> Vec<f64> {
     let certain = || problem.certain.iter().filter(|c| **c).count().max(1) as f64;
     let mean = values.iter().zip(&problem.certain).filter(|(_, c)| **c).map(|(v, _)| v).sum::<f64>() / certain();
     values.iter_mut().for_each(|v| *v -= mean);
@@ -399,12 +398,12 @@ pub fn predicted(problem: &Problem<'_>, terms: &[&Term<'_>], fit: &Fit) -> Vec<f
 fn left_out_gain(problem: &Problem<'_>, terms: &[&Term<'_>], fewer: &[&Term<'_>]) -> f64 {
     // Nobody foretells a zero that the bench sets in each session: there it is found in the block itself. The first
     // column is the zero.
-    let own_zero = Zero::of(problem, terms) == Zero::Own;
+    let own = own_zero(problem, terms);
     let misfit = |terms: &[&Term<'_>]| -> Option<f64> {
         let fit = Scaffold::new(problem, terms.to_vec()).fit(None)?;
         let mut all = 0.0;
         for block in 0..problem.blocks().len() {
-            let inside = problem.gram(terms, None, RowsMet::Block(block));
+            let inside = problem.gram(terms, None, Some(block));
             let solution = fit.without(&inside, problem.worth)?;
             let n = fit.priors.len();
             let c = &solution.coefficients;
@@ -415,7 +414,7 @@ fn left_out_gain(problem: &Problem<'_>, terms: &[&Term<'_>], fewer: &[&Term<'_>]
                     left += c[i] * c[j] * inside.at(i, j);
                 }
             }
-            if own_zero {
+            if own {
                 let along: f64 = inside.at(0, n) - (0..n).map(|j| c[j] * inside.at(0, j)).sum::<f64>();
                 left -= along * along / inside.at(0, 0).max(f64::MIN_POSITIVE);
             }
@@ -452,8 +451,8 @@ pub(crate) fn least_size(white: f64) -> f64 {
     LEAST_ARCSEC.max(LEAST_OF_NOISE * white)
 }
 
-/// The gates that a law comes to, whatever the ones before say. `least` is the least size that counts, `misfit` what the
-/// laws of the other terms may be wrong by, `strongest` the largest size, all arcsec.
+/// The gates that a law comes to, whatever the ones before say. `least` is the least size that counts, `misfit` what
+/// the laws of the other terms may be wrong by, `strongest` the largest size, all arcsec.
 fn gates(law: &Law, standing: &Standing, least: f64, misfit: f64, strongest: f64) -> Vec<Judged> {
     let share = if law.named() { LEAST_OF_MISFIT } else { LEAST_UNNAMED_OF_MISFIT };
     let evidence = if law.acts.tolerance_of.is_some() { LEAST_GAIN } else { LEAST_EVIDENCE };
@@ -846,8 +845,8 @@ impl<'l> Chooser<'_, '_, 'l> {
         None
     }
 
-    /// Replaces a term, but for the one at `compared`, by another law where that explains the data better; drops what no
-    /// longer earns its place then.
+    /// Replaces a term, but for the one at `compared`, by another law where that explains the data better; drops what
+    /// no longer earns its place then.
     fn exchange(&mut self, selected: Selected<'l>, compared: usize) -> Option<Selected<'l>> {
         let (problem, everything) = (self.problem, self.scope == Scope::Everything);
         for k in (0..selected.terms.len()).filter(|k| *k != compared) {

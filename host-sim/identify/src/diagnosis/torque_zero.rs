@@ -10,7 +10,7 @@
 use flexspline::Table;
 
 use super::base::{PlayLaw, predicted_by_table};
-use super::channels::{FreeSpan, fault_throughout, jackknife, sample};
+use super::channels::{FreeSpan, jackknife, report, sample};
 use super::rows::{Rows, mean, rms};
 use crate::measurement::{FaultName, Measures, Recording, Session, Treatment};
 use crate::nominal::Nominal;
@@ -69,8 +69,6 @@ struct Held<'a> {
     harmonics: Vec<f64>,
     /// The smooth part of the error of any drive.
     free: FreeSpan,
-    /// Whether the spring may be stiffer one way than the other.
-    by_sign: bool,
 }
 
 /// A load beside that of the torque column: a constant, an unbalanced load (sine and cosine), a drag. N·m.
@@ -83,7 +81,7 @@ impl<'a> Held<'a> {
             rows.output.iter().zip(&rows.orientation).map(|(out, housing)| (out + housing).sin_cos()).collect();
         let harmonics = places.iter().map(|k| nominal.harmonics_arcsec(rows.generator[*k])).collect();
         let free = FreeSpan::of(&rows, nominal, &places, Vec::new());
-        Held { rows, nominal, table, law: PlayLaw::Held, turned, places, harmonics, free, by_sign: false }
+        Held { rows, nominal, table, law: PlayLaw::Held, turned, places, harmonics, free }
     }
 
     /// Takes the law of the play that leaves least at any of some zeros, and gives what each of them leaves by it,
@@ -91,7 +89,7 @@ impl<'a> Held<'a> {
     /// by itself looks like a play that goes over slowly.
     fn with_zeros(&mut self, zeros: &[f64]) -> (Vec<Try>, f64) {
         let of_law = |law: PlayLaw| -> (PlayLaw, Vec<Try>) {
-            let left = |zero: &f64| (*zero, by_block(&self.of_law(law, [-zero, 0.0, 0.0, 0.0])));
+            let left = |zero: &f64| (*zero, by_block(&self.of_law(law, [-zero, 0.0, 0.0, 0.0], false)));
             (law, zeros.iter().map(left).collect())
         };
         let all: Vec<(PlayLaw, Vec<Try>)> = PlayLaw::ALL.into_iter().map(of_law).collect();
@@ -110,10 +108,11 @@ impl<'a> Held<'a> {
 
     /// What is left of the error at the places with a load beside the torque, arcsec.
     fn left(&self, beside: Beside) -> Vec<f64> {
-        self.of_law(self.law, beside)
+        self.of_law(self.law, beside, false)
     }
 
-    fn of_law(&self, law: PlayLaw, [constant, sine, cosine, drag]: Beside) -> Vec<f64> {
+    /// By a law of the play; the spring may be stiffer one way than the other where it is `by_sign`.
+    fn of_law(&self, law: PlayLaw, [constant, sine, cosine, drag]: Beside, by_sign: bool) -> Vec<f64> {
         let rows = &self.rows;
         let torque: Vec<f64> = (0..rows.len())
             .map(|k| {
@@ -134,16 +133,13 @@ impl<'a> Held<'a> {
         };
         let left = self.places.iter().zip(&predicted).map(|(k, predicted)| rows.error[*k] - predicted).collect();
         // Stiffness and backlash float as well.
-        let by_sign = self.by_sign.then(|| wind_up.iter().map(|arcsec| arcsec.abs()).collect());
+        let by_sign = by_sign.then(|| wind_up.iter().map(|arcsec| arcsec.abs()).collect());
         let floats = self.free.beyond([wind_up, flank].into_iter().chain(by_sign));
         floats.freed(self.free.freed(left))
     }
     /// What is left, block by block, under a torque less `zero` where the spring may be stiffer one way than the other.
-    fn by_sign(&mut self, zero: f64) -> Vec<f64> {
-        self.by_sign = true;
-        let left = by_block(&self.left([-zero, 0.0, 0.0, 0.0]));
-        self.by_sign = false;
-        left
+    fn by_sign(&self, zero: f64) -> Vec<f64> {
+        by_block(&self.of_law(self.law, [-zero, 0.0, 0.0, 0.0], true))
     }
 
     /// What is left at least, block by block, with an unbalanced load and a drag beside `from`, and a constant where it
@@ -306,9 +302,9 @@ pub(super) fn check(recording: &mut Recording, nominal: &Nominal, table: Option<
         "the torque reads {n_m:+.2} N·m (± {std:.2}) where there is none: the output changes its flank at that \
          reading, wherever it stands and whichever way it turns; it was taken off{alike}"
     );
-    let mut fault = fault_throughout(recording, FaultName::TorqueZero, Treatment::Repaired, size_arcsec, what);
-    fault.measures = Measures { zero_n_m: Some(n_m), zero_std_n_m: Some(std), ..Measures::default() };
-    recording.faults.push(fault);
+    if let Some(fault) = report(recording, FaultName::TorqueZero, Treatment::Repaired, size_arcsec, what) {
+        fault.measures = Measures { zero_n_m: Some(n_m), zero_std_n_m: Some(std), ..Measures::default() };
+    }
 }
 
 #[cfg(test)]

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 
 use super::linear::dot;
 use super::model::{Fit, Problem, Scaffold, Term};
-use super::products::RowsMet;
 use super::report::Parameter;
 use super::rows::combined;
 use super::select::Selected;
@@ -194,7 +193,7 @@ pub fn known(problem: &Problem<'_>, selected: &Selected<'_>, beyond: f64) -> Vec
     let n = fit.priors.len();
     let left_out: Vec<(Vec<f64>, Vec<f64>)> = (0..problem.blocks().len())
         .filter_map(|block| {
-            let solved = fit.without(&problem.gram(&terms, Some(&moves), RowsMet::Block(block)), problem.worth)?;
+            let solved = fit.without(&problem.gram(&terms, Some(&moves), Some(block)), problem.worth)?;
             let moved = solved.coefficients.iter().zip(&fit.solution.coefficients).map(|(a, b)| a - b).collect();
             Some((moved, solved.covariance()))
         })

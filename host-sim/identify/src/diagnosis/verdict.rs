@@ -80,7 +80,7 @@ pub(super) fn conclude(
     let mut next_experiment = None;
     let mut told_better = Vec::new();
     if verdict != Verdict::Unknown {
-        let of_all: Vec<Vec<rivals::Rival>> = named
+        let of_all: Vec<Vec<rivals::Rival<'_>>> = named
             .par_iter()
             .with_max_len(1)
             .map(|k| rivals::rivals(problem, sample, laws, &selected, &standings, bests, *k))
@@ -489,11 +489,7 @@ fn confidence(alike: &[f64], double_outside: bool, closest: f64, size_told: f64)
 }
 
 fn compensation(problem: &Problem<'_>, rms_extended: f64) -> Compensation {
-    let about_mean = |values: Vec<f64>| {
-        let certain = values.iter().zip(&problem.certain).filter(|(_, c)| **c);
-        let mean = certain.clone().map(|(v, _)| v).sum::<f64>() / certain.count().max(1) as f64;
-        problem.certain_rms(&values.iter().map(|v| v - mean).collect::<Vec<f64>>())
-    };
+    let about_mean = |values: Vec<f64>| problem.certain_rms(&select::about_mean(problem, values));
     Compensation {
         rms_uncompensated_arcsec: about_mean(problem.whitener.average(&problem.on.rows.error)),
         rms_nominal_tables_arcsec: about_mean(problem.data.clone()),

@@ -19,7 +19,6 @@ mod time;
 pub(crate) use groups::Grouping;
 pub use map::{AngleMap, Bin};
 pub use noise::Noise;
-pub(crate) use orders::Normal;
 pub use orders::{Line, NamedOrder, Wheel, harmonics, named_orders};
 pub(crate) use pulses::Pulse;
 pub use rows::{Axis, Direction, SizeMismatch};

@@ -4,8 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use serde::Serialize;
 
-use super::orders::Normal;
 use super::rows::{Axis, Rows};
+use crate::least_squares::Normal;
 use crate::measurement::{least_and_most, median_and_std};
 
 /// Bins of a turn: 2 degrees.

@@ -9,10 +9,11 @@ use crate::measurement::{Session, directions, median_of, sampled};
 use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// An angle that something may be tied to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Axis {
     /// ψ: what is tied to the flexspline and the generator.
+    #[default]
     Generator,
     /// ψ−δ: what is tied to the circular spline.
     GeneratorLessOutput,

@@ -76,7 +76,7 @@ impl Peak {
 }
 
 /// Orders of a residual along one angle.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct OrderSpectrum {
     /// The angle.
     pub axis: Axis,
@@ -105,19 +105,6 @@ impl OrderSpectrum {
         };
         self.peaks.iter().map(line).collect()
     }
-
-    fn empty(axis: Axis, turns: f64) -> OrderSpectrum {
-        let resolution = if turns > 0.0 { 1.0 / turns } else { 0.0 };
-        OrderSpectrum {
-            axis,
-            turns,
-            resolution,
-            orders: Vec::new(),
-            amplitude_arcsec: Vec::new(),
-            level_arcsec: Vec::new(),
-            peaks: Vec::new(),
-        }
-    }
 }
 
 /// Highest order per turn of which a share of the steps (rad, which are reordered) sees each wave twice or more; no
@@ -142,7 +129,8 @@ pub fn order_spectrum(axis: Axis, angle: &[f64], value: &[f64], ratio: f64) -> O
         highest *= LARGEST as f64 / transform(highest);
     }
     if angle.len() < 16 || !turns.is_finite() || highest < 2.0 * resolution {
-        return OrderSpectrum::empty(axis, turns);
+        let resolution = if turns > 0.0 { resolution } else { 0.0 };
+        return OrderSpectrum { axis, turns, resolution, ..OrderSpectrum::default() };
     }
     let grid = Grid::new(angle, low, turns, highest, resolution);
     let mut left = value.to_vec();

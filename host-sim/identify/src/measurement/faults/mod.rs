@@ -87,7 +87,7 @@ fn of_rows(session: &Session, name: FaultName, rows: Range<usize>) -> Fault {
 }
 
 /// A fault of all rows, to be completed; nothing without rows.
-fn throughout(sessions: &[Session], name: FaultName) -> Option<Fault> {
+pub(crate) fn throughout(sessions: &[Session], name: FaultName) -> Option<Fault> {
     let (first, last) = (sessions.first()?, sessions.last()?);
     let whole = of_rows(last, name, 0..last.len());
     let rows = sessions.iter().map(|session| session.len() as u64).sum();

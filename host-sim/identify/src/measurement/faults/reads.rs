@@ -17,6 +17,7 @@ use super::outliers::repeat_with_position;
 use super::resolution::seen;
 use super::state::State;
 use super::{ARCSEC, Findings, throughout};
+use crate::least_squares::Normal;
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Measures, Treatment};
@@ -271,33 +272,13 @@ fn fit(classes: &[Class], tooth_speed: f64) -> (f64, f64, f64) {
     };
     let solve = |kept: [bool; 3]| -> Option<([f64; 3], f64)> {
         let of: Vec<usize> = (0..3).filter(|k| kept[*k]).collect();
-        let mut table = vec![vec![0.0; of.len() + 1]; of.len()];
-        for class in classes {
-            let (x, w) = (columns(class), weight(class));
-            for (i, a) in of.iter().enumerate() {
-                for (j, b) in of.iter().enumerate() {
-                    table[i][j] += w * x[*a] * x[*b];
-                }
-                table[i][of.len()] += w * x[*a] * class.variance;
-            }
-        }
-        for i in 0..of.len() {
-            let pivot = table[i][i];
-            if pivot <= 0.0 {
-                return None;
-            }
-            for row in 0..of.len() {
-                if row != i {
-                    let by = table[row][i] / pivot;
-                    let from = table[i].clone();
-                    table[row].iter_mut().zip(&from).for_each(|(a, b)| *a -= by * b);
-                }
-            }
-        }
+        let fit = Normal::of(of.len(), classes.len(), |k, row| {
+            let x = columns(&classes[k]);
+            row.iter_mut().zip(&of).for_each(|(to, k)| *to = x[*k]);
+            (classes[k].variance, weight(&classes[k]))
+        });
         let mut values = [0.0; 3];
-        for (i, k) in of.iter().enumerate() {
-            values[*k] = table[i][of.len()] / table[i][i];
-        }
+        of.iter().zip(fit?.values()).for_each(|(k, value)| values[*k] = value);
         let misfit = classes.iter().map(|class| {
             let said: f64 = columns(class).iter().zip(values).map(|(x, c)| x * c).sum();
             weight(class) * (class.variance - said).powi(2)

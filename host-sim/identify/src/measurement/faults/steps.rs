@@ -238,8 +238,8 @@ impl<'a> Seen<'a> {
         self.state.fit(&extras)
     }
 
-    /// Whether a step leaves far less than a change of flank would that comes in its place, whatever the other steps are:
-    /// the model without the step, to which the flank that the load holds is given instead.
+    /// Whether a step leaves far less than a change of flank would that comes in its place, whatever the other steps
+    /// are: the model without the step, to which the flank that the load holds is given instead.
     fn beyond_a_change_of_flank(&self, steps: &[Step], place: Place) -> bool {
         if may_let_go(&self.sessions[place.session], place.row, self.largest) {
             return false;
@@ -310,8 +310,8 @@ impl<'a> Seen<'a> {
         Some(Found { sure, doubtful: [doubtful, back].concat(), stays, misfit, suspected })
     }
 
-    /// The change of the error into a row beyond what a dwell could give, 0 if less. An output dwells after the generator
-    /// turned back.
+    /// The change of the error into a row beyond what a dwell could give, 0 if less. An output dwells after the
+    /// generator turned back.
     fn beyond_dwell(&self, number: usize, row: usize) -> f64 {
         let session = &self.sessions[number];
         let change = session.error_rad[row] - session.error_rad[row - 1];
@@ -416,8 +416,8 @@ impl<'a> Seen<'a> {
         size.abs() / (LASTS * std).max(1e-300)
     }
 
-    /// Whether the error changes by as much, within a row, at other places that no reversal is near to: under a load that
-    /// nobody recorded.
+    /// Whether the error changes by as much, within a row, at other places that no reversal is near to: under a load
+    /// that nobody recorded.
     fn comes_elsewhere(&self, place: Place, size: f64) -> bool {
         if size.abs() > WIDER_THAN_CLEARANCE_RAD {
             return false;
@@ -434,8 +434,8 @@ impl<'a> Seen<'a> {
         elsewhere >= ELSEWHERE
     }
 
-    /// Whether a step that happens under light load, where friction alone holds a flank, is seen under loads that hold one:
-    /// a change of flank is not.
+    /// Whether a step that happens under light load, where friction alone holds a flank, is seen under loads that hold
+    /// one: a change of flank is not.
     fn lasts_under_load(&self, steps: &[Step], place: Place, size: f64) -> bool {
         let (sessions, held) = (self.sessions, HELD * self.largest);
         let loaded = |s: usize, r: usize| sessions[s].torque_n_m.as_ref().is_some_and(|torque| torque[r].abs() >= held);
@@ -453,8 +453,8 @@ impl<'a> Seen<'a> {
         seen(1) && seen(2)
     }
 
-    /// Whether a step cannot be a change of flank: the output came back to where it happened and the step did not, or load
-    /// held the flank, or no clearance is so wide.
+    /// Whether a step cannot be a change of flank: the output came back to where it happened and the step did not, or
+    /// load held the flank, or no clearance is so wide.
     fn no_flank_was_changed(&self, steps: &[Step], place: Place, size: f64) -> bool {
         let sessions = self.sessions;
         if size.abs() > WIDER_THAN_CLEARANCE_RAD {
