@@ -1,9 +1,9 @@
 //! Plane, cup and hermetic, with all four generators: `third_dimension [TORQUE_N_M [LEVEL]]`
 //!
-//! The figures of each drive as a catalogue would print them ([`flexspline_design::data_sheet`]), one row for each drive
-//! and generator, with the load even along the face and with the face in slices, as a Markdown table. Torque 50 N·m and
-//! coarse mesh by default; a LEVEL is coarse, standard or fine. Where a drive finds no equilibrium its row has the
-//! figures until there, and it ends with 1.
+//! The figures of each drive as a catalogue would print them ([`flexspline_design::data_sheet`]), one row for each
+//! drive and generator, with the load even along the face and with the face in slices, as a Markdown table. Torque 50
+//! N·m and coarse mesh by default; a LEVEL is coarse, standard or fine. Where a drive finds no equilibrium its row has
+//! the figures until there, and it ends with 1.
 
 use std::process::ExitCode;
 use std::time::Instant;

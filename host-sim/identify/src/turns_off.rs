@@ -22,7 +22,7 @@ const AS_LIKELY: f64 = 1.05;
 /// Whole turns of the motor between the generator zero of the rows and that of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TurnsOff {
-    /// The generator angle of the rows reads so many turns more than that of the table.
+    /// The generator angle of the rows reads n turns more than that of the table.
     pub turns: i64,
     /// The fewest and the most turns that leave about as little.
     pub likely: [i64; 2],

@@ -59,11 +59,11 @@ const HELD_OF_DRAG: f64 = 0.2;
 /// across the play has to die away. With none a load 0.1 N·m below the drag of four rollers changed the flank over and
 /// over, 52″ for 32 without compensation; with ten 18.
 const SETTLES: f64 = 10.0;
-/// Range of the torque sensor: so many times the largest load that is to be expected, and so many N·m for what inertia
+/// Range of the torque sensor: this multiple of the largest load that is to be expected, and these N·m for what inertia
 /// and servo add. *Guess*.
 const SENSOR_RANGE: [f64; 2] = [3.0, 10.0];
-/// And no less than so many times the range of the table, so that no load in it is refused as a reading, and one beyond
-/// is reported as such. *Guess*.
+/// And no less than this multiple of the range of the table, so that no load in it is refused as a reading, and one
+/// beyond is reported as such. *Guess*.
 const SENSOR_BEYOND_TABLE: f64 = 1.5;
 /// After a change of the target's rate the motor's current gives no torque for this time, s: friction builds up anew.
 const SETTLES_S: f64 = 0.3;
@@ -167,7 +167,7 @@ pub struct Flown {
     pub mesh: Score,
     /// Ticks in which the motor gave all it has, the limiter held back, nothing was corrected.
     pub limits: [u32; 3],
-    /// Every so many ticks: time, error (arcsec), mesh torque (N·m).
+    /// Every n ticks: time, error (arcsec), mesh torque (N·m).
     pub rows: Vec<[f64; 3]>,
     /// Errors of every tick, arcsec, for a spectrum.
     pub errors: Vec<f32>,
@@ -290,8 +290,8 @@ pub fn fly(scenario: &Scenario, unit: &JointUnit) -> Result<Flight, FlightError>
     fly_watched(scenario, unit, None, &|| {})
 }
 
-/// Flies a scenario, with the image of a table that was made before, or one made for it; `each_second` is called by each
-/// controller's joint for each second that it flew.
+/// Flies a scenario, with the image of a table that was made before, or one made for it; `each_second` is called by
+/// each controller's joint for each second that it flew.
 ///
 /// # Errors
 /// [`FlightError`].
@@ -775,8 +775,8 @@ impl Sensing {
         *shared *= less.sqrt();
     }
 
-    /// Part of the load that the motor has to hold, N·m at the output: of a torque known on the load, less the drag of the
-    /// last motion. Its inertia is fed forward as the target's acceleration.
+    /// Part of the load that the motor has to hold, N·m at the output: of a torque known on the load, less the drag of
+    /// the last motion. Its inertia is fed forward as the target's acceleration.
     fn held_n_m(&self, scenario: &Scenario, way: f64) -> f64 {
         if self.fed_n_m.is_finite() { self.fed_n_m - way * scenario.drag_n_m } else { 0.0 }
     }
@@ -949,8 +949,8 @@ fn left_of_a_knock(made: &LaneParts, kind: usize) -> Result<f64, FlightError> {
         let mean = sum / f64::from(left.count().max(1));
         (left.rms() * left.rms() - mean * mean).max(0.0).sqrt()
     };
-    // Until a slow low-pass follows, the motor creeps after the torque that it reports, and sticks and slips: that is no
-    // ringing.
+    // Until a slow low-pass follows, the motor creeps after the torque that it reports, and sticks and slips: that is
+    // no ringing.
     fly(&mut lane, ticks(1.0 + TIME_CONSTANTS / (TAU * made.bandwidth_hz)));
     let mut rates = lane.plant.rate_rad_s;
     rates[1] += 1e-3;

@@ -19,8 +19,8 @@ use super::servo::{Servo, ServoCommand, ServoSettings};
 pub const PARTS: usize = 2;
 /// Most repetitions in a step; four are usual.
 const REPETITIONS: usize = 40;
-/// Repetitions after which the spring is no longer taken along: where flanks touch and part in one step the plain repetition ends
-/// surely.
+/// Repetitions after which the spring is no longer taken along: where flanks touch and part in one step the plain
+/// repetition ends surely.
 const TAKEN_ALONG: usize = 8;
 /// Two speeds are the same if they differ by no more than this part of themselves, and this much, rad/s.
 const SAME: [f64; 2] = [1e-11, 1e-16];

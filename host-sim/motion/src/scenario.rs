@@ -129,8 +129,8 @@ impl Scenario {
             + self.load_kg_m2 * self.acceleration_rad_s2
     }
 
-    /// Corner of the low-pass with which a torque known on the load is best fed forward, Hz: between what is late behind it
-    /// and the noise that passes it.
+    /// Corner of the low-pass with which a torque known on the load is best fed forward, Hz: between what is late
+    /// behind it and the noise that passes it.
     ///
     /// Gusts, and steps for which chance is taken, wander: their mean square change in a tick against the noise gives
     /// the gain of a stationary Kalman filter (R. E. Kalman, "A new approach to linear filtering and prediction

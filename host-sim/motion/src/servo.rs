@@ -1,5 +1,5 @@
 //! The servo as drives have it: a position loop around a speed loop around the current, sampled, late, with an encoder
-//! of so many counts.
+//! of a number of counts.
 
 use core::f64::consts::TAU;
 

@@ -494,7 +494,7 @@ mod tests {
         let series = drawn(&turns);
         assert_eq!((series[1].name.as_str(), series[1].mark), ("back, 0 N·m", Mark::Dashed));
         assert_eq!(series[1].points.iter().map(|p| p[0] as f32).collect::<Vec<_>>(), [0.0, 0.01, 0.02], "ascending");
-        // So many that lines would hide one another are dots, each of which keeps its place in a table.
+        // Rows whose lines would hide one another are dots, each of which keeps its place in a table.
         let many = drawn(&[turns.as_slice(); 4].concat());
         assert_eq!(many.iter().map(|s| (s.mark, s.points.len())).collect::<Vec<_>>(), [(Mark::Dots, 12); 2]);
         assert!(many[0].points.windows(2).all(|pair| pair[0][0] < pair[1][0]));

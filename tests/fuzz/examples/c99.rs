@@ -3,8 +3,8 @@
 //! ```sh
 //! c99 OUT TICKS IMAGES TABLE.fxt...
 //! ```
-//! So many ticks in all, spread over the tables named and those of [`tables::BASES`]; then so many hostile images, and
-//! some ticks with each that is accepted. Little-endian records, told in [`Vectors`].
+//! The number of ticks in all, spread over the tables named and those of [`tables::BASES`]; then the number of hostile
+//! images, and some ticks with each that is accepted. Little-endian records, told in [`Vectors`].
 
 use flexspline::{
     Adjustment, Approach, Command, Direction, Encoder, EncoderSettings, EncoderState, EncoderWrap, Field, Flags,

@@ -9,9 +9,9 @@ use super::parts::{PartName, Scales, State, columns, weights};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Row {
     pub at: State,
-    /// What was measured, the mean of its log taken out, arcsec.
+    /// Measured error, the mean of its log taken out, arcsec.
     pub measured_arcsec: f64,
-    /// What the prior leaves of that, arcsec.
+    /// Residual of that with the prior, arcsec.
     pub left_arcsec: f64,
     /// Which fold it belongs to.
     pub fold: usize,
@@ -99,7 +99,7 @@ pub(super) struct Folds {
     sums: Vec<Sums>,
 }
 
-/// What keeps a matrix definite where a column says nothing, of a row.
+/// Diagonal that keeps a matrix definite where a column says nothing, of a row.
 pub(super) const FLOOR: f64 = 1e-9;
 
 impl Folds {
@@ -215,12 +215,12 @@ impl Folds {
         left.max(0.0)
     }
 
-    /// What a fit to `folds` leaves in another fold, arcsec².
+    /// Residual of a fit to `folds` in another fold, arcsec².
     pub(crate) fn left_in(&self, fold: usize, folds: &[usize], chosen: &[Chosen]) -> f64 {
         self.fit(folds, chosen, &[]).map_or(f64::INFINITY, |coefficients| self.left(fold, chosen, &coefficients))
     }
 
-    /// What fits to all of `folds` but one leave in that one, summed over all, arcsec².
+    /// Residual of fits to all of `folds` but one in that one, summed over all, arcsec².
     pub fn left_out(&self, folds: &[usize], chosen: &[Chosen]) -> f64 {
         let others = |fold: usize| -> Vec<usize> { folds.iter().copied().filter(|other| *other != fold).collect() };
         folds.iter().map(|fold| self.left_in(*fold, &others(*fold), chosen)).sum()

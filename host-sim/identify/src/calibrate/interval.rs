@@ -80,10 +80,10 @@ pub(super) fn row(parts: &[PartName], at: &State, scales: &Scales) -> Vec<f64> {
     x
 }
 
-/// What the rows show of noise.
+/// Noise of the rows.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Noise {
-    /// What the model leaves of the rows that it was fitted to, arcsec rms.
+    /// Residual of the rows that it was fitted to, arcsec rms.
     pub rms_arcsec: f64,
     /// Of that the noise of single rows; 0 where rows are so far apart that what no part has changes from row to row as
     /// well.
@@ -129,7 +129,7 @@ impl Noise {
         self.rms_arcsec * self.rms_arcsec * self.hangs_together
     }
 
-    /// What is not from row to row and stays at each place, arcsec: drift, and what no part has.
+    /// Noise that stays at each place, arcsec: drift, and errors of no part.
     pub fn beside_white_arcsec(&self) -> f64 {
         (self.rms_arcsec.powi(2) - self.white_arcsec.powi(2)).max(0.0).sqrt()
     }
@@ -224,7 +224,7 @@ pub struct Known {
     parts: Vec<PartName>,
     /// Of what the fit misses in their coefficients, arcsec².
     covariance: Mat,
-    /// What the rows show of noise.
+    /// Noise of the rows.
     pub noise: Noise,
 }
 

@@ -52,7 +52,7 @@ const FEWEST_ROWS: usize = 64;
 /// Load that decides the flank where no model says a friction, of the largest recorded: a guess, small beside any load
 /// of interest.
 const LEAST_FRICTION: f64 = 0.02;
-/// Rows between two dead zones tell them apart if their load is clear of both by so many times the torque's noise…
+/// Rows between two dead zones tell them apart if their load is clear of both by this multiple of the torque's noise…
 const CLEAR_OF_NOISE: f64 = 6.0;
 /// …and if the other leaves less than this share of their squares: where it is right, half of them lie on the wrong
 /// flank.
@@ -77,7 +77,7 @@ const OTHER_RATIO: f64 = 0.25;
 const ROUNDING_ARCSEC: f64 = 1e-6;
 /// Coefficients of the play, and so the times that one of them is put on its bound and the others fitted anew.
 const PLAY_COEFFICIENTS: usize = 3;
-/// Paces that tell a delay from play: the fastest is so many times the slowest. *Guess*.
+/// Paces that tell a delay from play: the fastest is this multiple of the slowest. *Guess*.
 const OTHER_PACE: f64 = 1.25;
 /// Correlation of the load with waves of the output from which on they cannot be told apart well: half of the load's
 /// squares. *Guess*.
@@ -91,7 +91,7 @@ pub enum CalibrationError {
     /// The logs cannot be read.
     #[error(transparent)]
     Measured(#[from] MeasuredError),
-    /// What is known of the drive makes no table.
+    /// The knowledge of the drive makes no table.
     #[error("{0}")]
     Known(String),
     /// The rows turn by another ratio.
@@ -130,7 +130,7 @@ impl CalibrationError {
     }
 }
 
-/// What was fitted beside the prior.
+/// Model fitted in addition to the prior.
 #[derive(Debug, Clone)]
 struct Model {
     chosen: Vec<Chosen>,
@@ -139,14 +139,14 @@ struct Model {
 }
 
 impl Model {
-    /// What the parts add, arcsec.
+    /// Sum of the parts, arcsec.
     fn adds_arcsec(&self, at: &State) -> f64 {
         let mut columns = Vec::with_capacity(self.coefficients.len());
         self.chosen.iter().for_each(|chosen| parts::columns(chosen.part, at, &self.scales, &mut columns));
         columns.iter().zip(&self.coefficients).map(|(column, coefficient)| column * coefficient).sum()
     }
 
-    /// What the prior and the parts say, arcsec.
+    /// Sum of the prior and the parts, arcsec.
     fn says_arcsec(&self, at: &State, prior: &Prior<'_>) -> f64 {
         prior.steady_arcsec(at) + self.adds_arcsec(at)
     }
@@ -212,7 +212,7 @@ impl Model {
     }
 }
 
-/// What is said of a part.
+/// Report on a part.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PartSays {
     /// Its name.
@@ -241,7 +241,7 @@ pub struct HeldOut {
     pub rms_after_arcsec: f64,
 }
 
-/// What a table has where the load changes its sign, arcsec, prior and all parts together.
+/// Play of a table where the load changes its sign, arcsec, prior and all parts together.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PlayWidth {
     /// Without load, from motion one way to motion the other.
@@ -303,7 +303,7 @@ pub struct Calibration {
     pub rows_fitted: usize,
     /// See above.
     pub rows_unsettled: usize,
-    /// What was left out in turn: `files`, `sessions` or `blocks`.
+    /// Folds left out in turn: `files`, `sessions` or `blocks`.
     pub left_out: &'static str,
     /// How many of them.
     pub folds: usize,
@@ -314,7 +314,7 @@ pub struct Calibration {
     /// The delay between the readings, if these logs tell one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reading_delay: Option<ReadingDelay>,
-    /// What a delay of a millisecond would pass for, arcsec of play, where the logs keep to one pace and cannot tell
+    /// Play that a delay of a millisecond would look like, arcsec, where the logs keep to one pace and cannot tell
     /// the two apart.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub play_of_a_millisecond_arcsec: Option<f64>,
@@ -324,7 +324,7 @@ pub struct Calibration {
     pub parts: Vec<PartSays>,
     /// Every node of every part, with an interval.
     pub nodes: Vec<Node>,
-    /// What the rows show of noise.
+    /// Noise of the rows.
     pub noise: Noise,
     /// Half width of the interval that holds the table's error in a state with 95 %, mean square root over all loads,
     /// angles and temperatures between the least and the largest recorded, evenly, at the paces recorded; arcsec.
@@ -340,7 +340,7 @@ pub struct Calibration {
     pub alignment: Option<Alignment>,
     /// Zero of the output in each file. Generator angle zero of the table is where the logs read zero.
     pub output_zeros: Vec<OutputZero>,
-    /// What an error in the zeros of the table costs.
+    /// Cost of an error in the zeros of the table.
     pub zero_cost: ZeroCost,
     /// Generator turns for one of the output.
     pub ratio: f64,
@@ -348,7 +348,7 @@ pub struct Calibration {
     pub table_id: String,
     /// Its size, bytes.
     pub image_bytes: usize,
-    /// What the table misses of the model, arcsec rms.
+    /// Difference of the table from the model, arcsec rms.
     pub projection_rms_arcsec: f64,
     /// Torques that it holds for, N·m.
     pub torque_n_m: [f32; 2],
@@ -356,7 +356,7 @@ pub struct Calibration {
     pub temperature_c: [f32; 2],
     /// Faults of the logs.
     pub data_faults: Vec<Fault>,
-    /// What was noticed.
+    /// Notes.
     pub notes: Vec<String>,
     /// Command line, once known.
     pub command: String,
@@ -364,7 +364,7 @@ pub struct Calibration {
 
 /// A table with what is said of it.
 pub struct Calibrated {
-    /// What is said.
+    /// The report.
     pub calibration: Calibration,
     /// The table.
     pub table: MadeTable,
@@ -681,7 +681,7 @@ struct Fitted {
     rows: Rows,
     /// How many.
     folds: usize,
-    /// What could be chosen of.
+    /// Parts that could be chosen.
     open: Vec<PartName>,
     model: Model,
     held_out: HeldOut,
@@ -780,7 +780,7 @@ fn fit(rows: Rows, prior: &Prior<'_>, recorded: &Recorded, without: &[Without]) 
     }
 }
 
-/// What is said of each part.
+/// Report on each part.
 fn judged(
     rows: &Rows,
     folds: &Folds,
@@ -849,7 +849,7 @@ fn size(rows: &Rows, model: &Model, chosen: Chosen) -> f64 {
     0.5 * (most - least)
 }
 
-/// What is said of logs at one pace.
+/// Note on logs at one pace.
 fn note_of_one_pace(play_of_a_millisecond_arcsec: f64) -> String {
     format!(
         "the generator keeps to one pace: an output a millisecond older than the generator looks like \
@@ -858,7 +858,7 @@ fn note_of_one_pace(play_of_a_millisecond_arcsec: f64) -> String {
     )
 }
 
-/// What whoever uses the table has to know.
+/// Notes for the user of the table.
 fn remarks(
     prior: &Prior<'_>,
     recorded: &Recorded,

@@ -24,7 +24,7 @@ pub enum PartName {
     ToothPitch,
     /// Periodic in the output angle.
     OutputAngle,
-    /// What temperature changes: zero, wind-up and play.
+    /// Effects of temperature: zero, wind-up and play.
     Temperature,
     /// One angle is read after the other in this log: what goes with the speed. It is the logger's, and no table holds
     /// it.
@@ -107,7 +107,7 @@ pub struct State {
     pub log: usize,
 }
 
-/// What the columns are made with.
+/// Scales of the columns.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scales {
     /// Least and largest torque recorded, N·m.

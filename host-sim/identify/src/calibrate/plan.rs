@@ -1,5 +1,5 @@
-//! What to record: the motion that tells most of the parts in the time there is, found from the same columns that the
-//! fit uses.
+//! Plan of a recording: the motion that informs most about the parts in the time there is, found from the same columns
+//! that the fit uses.
 //!
 //! Passes that a bench can make (over the whole travel there and back at one load; a few slow generator turns) are
 //! added one after the other, each time the one that lowers the expected variance of the table, over all that it is to
@@ -52,7 +52,7 @@ const WIDEST: usize = 8;
 /// Half widths beyond this, arcsec, are those of what was not recorded at all.
 pub(super) const NOT_RECORDED_ARCSEC: f64 = 2e3;
 
-/// What the bench can do, and what the table is to hold.
+/// Limits of the bench, and the range that the table is to hold.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Bench {
     /// Time, minutes.
@@ -92,7 +92,7 @@ impl Default for Bench {
 }
 
 impl Bench {
-    /// What is wrong with it, if anything.
+    /// Its fault, if any.
     #[must_use]
     pub fn problem(&self) -> Option<String> {
         let within = |name: &str, value: f64, low: f64, high: f64| {
@@ -159,7 +159,7 @@ pub struct Pass {
     pub torque_n_m: f64,
     /// Temperature, °C.
     pub temperature_c: f64,
-    /// What it tells most of.
+    /// The part that it informs most about.
     pub tells: PartName,
 }
 
@@ -172,11 +172,11 @@ pub struct Planned {
     pub drive: String,
     /// Generator turns for one of the output.
     pub ratio: f64,
-    /// What the bench can do.
+    /// Limits of the bench.
     pub bench: Bench,
     /// The noise that the accuracy holds for.
     pub noise: Noise,
-    /// What to record.
+    /// The recordings.
     pub passes: Vec<Pass>,
     /// Time that they take, minutes.
     pub minutes: f64,
@@ -394,7 +394,7 @@ fn column_of_zero(chosen: &[PartName]) -> Option<usize> {
     Some(width_of(&chosen[..at]))
 }
 
-/// What the table is asked for: the mean of `x xᵀ` over all that it is to hold.
+/// Target of the plan: the mean of `x xᵀ` over all that it is to hold.
 struct Asked {
     width: usize,
     moment: Vec<f64>,

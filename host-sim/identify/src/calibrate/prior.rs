@@ -1,4 +1,4 @@
-//! What is known of a unit before it is measured: a nominal model, a table, or the ratio alone.
+//! Knowledge of a unit before it is measured: a nominal model, a table, or the ratio alone.
 
 use flexspline::Table;
 
@@ -11,7 +11,7 @@ use flexspline_mechanics::drive::GeneratorKind;
 /// Temperature of a drive that is known by its ratio alone, °C.
 const USUAL_TEMPERATURE_C: f64 = 20.0;
 
-/// What is known before.
+/// Knowledge before a measurement.
 #[derive(Clone)]
 pub struct Prior<'a> {
     /// The nominal model; beside a table its ratio, teeth and temperature are used.
@@ -24,7 +24,7 @@ pub struct Prior<'a> {
     pub hash: [u8; 32],
     /// Generator that the table is marked with.
     pub kind: GeneratorKind,
-    /// What the generator angle of the logs reads where that of `table` is zero, rad.
+    /// Generator angle of the logs where that of `table` is zero, rad.
     pub zero_rad: f64,
     /// Least load that is believed to decide the flank, N·m: a smaller one is lost in the noise of the logs' torque.
     pub least_friction_n_m: f64,

@@ -1,4 +1,4 @@
-//! What belongs to the reading and not to the drive: the delay between the two angles, and the zero of each log.
+//! Effects of the reading, not of the drive: the delay between the two angles, and the zero of each log.
 
 use serde::Serialize;
 
@@ -41,7 +41,7 @@ pub struct ReadingDelay {
     pub half_width_s: f64,
     /// Error of all rows as measured, the delays among it, arcsec rms.
     pub rms_before_arcsec: f64,
-    /// What the core leaves of the rows as measured: it does not know the delays. Arcsec rms.
+    /// Residual of the core in the rows as measured: it does not know the delays. Arcsec rms.
     pub rms_after_arcsec: f64,
 }
 
@@ -168,7 +168,7 @@ impl Delays {
         files.iter().zip(&self.0).filter_map(reading).collect()
     }
 
-    /// What they do to the rows of these logs, in which they are, beside this table.
+    /// Their effect on the rows of these logs, in which they are, beside this table.
     pub(crate) fn shown(&self, files: &[Recording], table: &Table<'_>, recorded: &Recorded) -> Option<ReadingDelay> {
         let ByCore { rms_before_arcsec, rms_after_arcsec, .. } = ByCore::of(files, table, recorded);
         let largest = self.readings(files).into_iter().max_by(|a, b| a.value.abs().total_cmp(&b.value.abs()))?;
@@ -183,7 +183,7 @@ impl Delays {
 }
 
 impl ReadingDelay {
-    /// What is said of the delays of logs, of which this is the largest.
+    /// Note on the delays of logs, of which this is the largest.
     pub(super) fn note(&self, readings: &[Reading], logs: usize) -> String {
         let of_log = |reading: &Reading| {
             let (old, new) = if reading.value > 0.0 { ("output", "generator") } else { ("generator", "output") };
@@ -221,7 +221,7 @@ pub(super) fn play_of_a_millisecond(rows: &[Row], recorded: &Recorded, prior: &P
 pub struct ByCore {
     /// Each file's zero taken out, and a delay between the readings.
     pub rms_before_arcsec: f64,
-    /// What the core leaves.
+    /// Residual with the core.
     pub rms_after_arcsec: f64,
     /// Rows.
     pub rows: usize,

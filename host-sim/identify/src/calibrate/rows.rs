@@ -16,19 +16,19 @@ const ROUNDS: usize = 4;
 /// What a fold was recorded at is within what the others were by this share of all loads: beyond it no table is asked.
 /// A guess.
 const BEYOND_OTHERS: f64 = 0.1;
-/// With so many files, or sessions, each is a fold.
+/// With this number of files, or sessions, each is a fold.
 const ENOUGH_SESSIONS: usize = 3;
 /// Left-out sessions are folds if none of them holds more than this share of the rows: without a larger one the rest is
 /// another record. A guess.
 const LARGEST_SESSION: f64 = 0.4;
-/// Rows that are fitted, at most; of longer records every so many-th.
+/// Rows that are fitted, at most; of longer records every n-th.
 pub(super) const MOST_ROWS: usize = 40_000;
 /// A reversal is one if the generator goes back by this share of its usual step.
 const TURNED_ROUND: f64 = 0.5;
-/// The output has settled on a flank when the generator has turned by so many times the play.
+/// The output has settled on a flank when the generator has turned by this multiple of the play.
 const SETTLED: f64 = 1.5;
 
-/// A load decides the flank if it is so many standard deviations of its noise beyond what decides it.
+/// A load decides the flank if it is this number of standard deviations of its noise beyond what decides it.
 const SURE: f64 = 3.0;
 
 /// How the folds were made.
@@ -43,7 +43,7 @@ pub(super) enum FoldKind {
 #[derive(Clone)]
 pub(super) struct Rows {
     pub rows: Vec<Row>,
-    /// What was taken off what was measured and off what is left of each file, arcsec.
+    /// Means taken off the measured error and off the residual of each file, arcsec.
     measured_means_arcsec: Vec<f64>,
     pub means_arcsec: Vec<f64>,
     pub folds: FoldKind,
@@ -52,7 +52,7 @@ pub(super) struct Rows {
     pub unsettled: usize,
 }
 
-/// What the files have recorded.
+/// States that the files have recorded.
 #[derive(Clone)]
 pub(super) struct Recorded {
     pub scales: Scales,
@@ -296,7 +296,8 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
 }
 
 impl Rows {
-    /// Makes folds: of files, of sessions, or of the blocks that each file is cut into, which go round so many times.
+    /// Makes folds: of files, of sessions, or of the blocks that each file is cut into, which go round a number of
+    /// times.
     fn fold(&mut self, kind: FoldKind, rounds: usize, session_of: &[usize]) {
         self.folds = kind;
         let mut of_file = vec![0; self.measured_means_arcsec.len()];

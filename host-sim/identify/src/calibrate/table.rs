@@ -109,7 +109,7 @@ fn misses(trial: Option<&MadeTable>, prior: &Prior<'_>, model: &Model, torque: f
     worst
 }
 
-/// What the prior and the parts say in steady motion, arcsec.
+/// Sum of the prior and the parts in steady motion, arcsec.
 fn error_arcsec(
     prior: &Prior<'_>,
     model: &Model,

@@ -11,7 +11,7 @@ use crate::measurement::{Recording, least_and_most};
 /// Logs do not agree if fits to each alone leave less than this share of what one fit to all leaves, rms. A guess.
 const ALONE: f64 = 0.3;
 
-/// What fits of all parts leave in several logs, arcsec rms, the zero of the output free in each.
+/// Residual of fits of all parts in several logs, arcsec rms, the zero of the output free in each.
 pub(super) struct Agreement {
     /// Each log with a fit of its own.
     alone_arcsec: f64,
@@ -51,7 +51,7 @@ impl Agreement {
         self.alone_arcsec >= ALONE * self.together_arcsec
     }
 
-    /// What is said where they do not.
+    /// Note where they do not.
     pub(crate) fn note(&self, files: &[Recording]) -> Option<String> {
         let odd = self.odd.and_then(|odd| files.get(odd));
         let odd = odd.map_or_else(String::new, |odd| format!(" in {}, without which the others agree", odd.file));
@@ -66,7 +66,7 @@ impl Agreement {
     }
 }
 
-/// The straight wind-up of one log is so many times that of another: beyond what a spring of teeth stiffens by from
+/// The straight wind-up of one log is this multiple of that of another: beyond what a spring of teeth stiffens by from
 /// light loads to heavy ones, 1.8 times in the catalogue (K1 to K3 of CSF-25-100). A guess.
 const OTHER_SLOPE: f64 = 3.0;
 

@@ -37,14 +37,14 @@ const OF_95_OF_BLOCKS: f64 = 2.36;
 /// Phase of a table against logs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Alignment {
-    /// What the generator angle of the logs reads where the table's is zero, deg, within half of `repeats_deg` of zero.
+    /// Generator angle of the logs where the table's is zero, deg, within half of `repeats_deg` of zero.
     pub generator_zero_deg: f64,
     /// Half width of the interval that holds it with 95 %, deg.
     pub generator_half_width_deg: f64,
-    /// The table's error is the same after so many degrees of the generator: a tooth pitch of an ideal drive, turns of
-    /// one as built.
+    /// The table's error is the same after this angle, degrees of the generator: a tooth pitch of an ideal drive, turns
+    /// of one as built.
     pub repeats_deg: f64,
-    /// What the table leaves with the zeros of the logs taken for its own, arcsec rms.
+    /// Residual of the table with the zeros of the logs taken for its own, arcsec rms.
     pub left_before_arcsec: f64,
     /// With the phase found.
     pub left_after_arcsec: f64,
@@ -54,7 +54,7 @@ pub struct Alignment {
     pub why: String,
 }
 
-/// What an error in the zeros of a table costs.
+/// Cost of an error in the zeros of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ZeroCost {
     /// For a degree of the generator, arcsec rms and at most: the slope of the error. The nominal output angle moves by
@@ -66,7 +66,7 @@ pub struct ZeroCost {
     pub rms_arcsec_per_output_deg: f64,
 }
 
-/// What is read of the output where nothing but its zero is left, of a file.
+/// Zero of the output of a file.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OutputZero {
     /// Which file.
@@ -98,7 +98,7 @@ fn loaded(table: &Table<'_>, share: f32) -> State {
     }
 }
 
-/// What an error in the zeros costs, at half the largest load.
+/// Cost of an error in the zeros, at half the largest load.
 #[must_use]
 pub fn cost(table: &Table<'_>) -> ZeroCost {
     const STEP_DEG: f64 = 0.02;
@@ -171,7 +171,7 @@ impl<'a> Projected<'a> {
         Projected { table, at, measured, basis }
     }
 
-    /// What is left with a phase, arcsec.
+    /// Residual with a phase, arcsec.
     fn left(&self, zero_rad: f64) -> Vec<f64> {
         let left = |(at, measured): (&State, &f64)| measured - steady(self.table, at, zero_rad);
         self.basis.freed(self.at.iter().zip(&self.measured).map(left).collect())

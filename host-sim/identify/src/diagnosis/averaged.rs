@@ -16,7 +16,7 @@ const MOST_TURNED_RAD: f64 = 0.7;
 /// Share of the averages in which the generator may turn farther.
 const SLOW_SHARE: f64 = 0.98;
 
-/// Averages of so many neighbouring rows, with the nominal model over them.
+/// Averages of n neighbouring rows, with the nominal model over them.
 #[derive(Clone, Debug)]
 pub(crate) struct Averaged {
     rows: Rows,

@@ -130,8 +130,8 @@ pub(crate) fn anyhow(on: &Excitation<'_>, not_understood: bool) -> String {
     asked.join("; ")
 }
 
-/// What tells so many waves of the generator's encoder in a turn from those of a wheel or of the motor: half a period
-/// turns them over.
+/// Recording that separates n waves of the generator's encoder in a turn from those of a wheel or of the motor: half a
+/// period turns them over.
 #[must_use]
 pub(crate) fn turn_the_encoder(waves: f64) -> String {
     format!(

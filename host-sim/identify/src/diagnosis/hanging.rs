@@ -16,7 +16,7 @@ const HANGS_S: f64 = 3.0;
 /// The output is this share of half the clearance short of the flank, at least, where it hangs. *Chosen*: those joints
 /// hung at 0.9 to 2 times, by what was explained when other causes still stood in for it.
 const SHORT: f64 = 0.6;
-/// A clearance shows where that is at least so many times the noise of a row. *Guess*.
+/// A clearance shows where that is at least this multiple of the noise of a row. *Guess*.
 const BEYOND_NOISE: f64 = 3.0;
 
 /// Rows in which the output hangs in the clearance, as it stays far short of what causes and base explain beside the

@@ -92,7 +92,7 @@ impl Gram {
     }
 }
 
-/// From so many columns on their products are a product of matrices.
+/// From this number of columns on their products are a product of matrices.
 const MANY: usize = 24;
 
 /// Sum of products, in eight sums side by side.
@@ -261,7 +261,7 @@ fn backward(l: &[f64], x: &mut [f64]) {
     }
 }
 
-/// From so many columns on a factor is that of a library for large matrices.
+/// From this number of columns on a factor is that of a library for large matrices.
 const LARGE: usize = 96;
 
 /// Cholesky factor, row by row; none if the matrix is not positive definite or not finite.

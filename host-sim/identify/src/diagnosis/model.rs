@@ -375,7 +375,7 @@ const DIRECTIONS: usize = 8;
 const SMALLER: [f64; 2] = [0.05, 0.2];
 /// Sizes at which one is tried under an eccentric generator, arcsec.
 const BESIDE_ARCSEC: [f64; 2] = [5.0, 20.0];
-/// All steps together gain no more than so many times what the linear model of the first one promises, and this much
+/// All steps together gain no more than this multiple of what the linear model of the first one promises, and this much
 /// evidence.
 const FARTHER_THAN_LINEAR: f64 = 3.0;
 const BEYOND_LINEAR: f64 = 10.0;

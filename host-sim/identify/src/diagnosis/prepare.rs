@@ -221,7 +221,7 @@ fn pace_to(rows: &Rows, k: usize) -> f64 {
     if passed > 0.0 { (rows.generator[k] - rows.generator[k - 1]) / passed } else { f64::NAN }
 }
 
-/// A pace is kept where so many steps one after another are it, … *Guess*.
+/// A pace is kept where this number of steps one after another are it, … *Guess*.
 const KEPT: usize = 4;
 /// … each within this share of what it leaps by, … *Guess*.
 const EVEN: f64 = 0.1;
@@ -257,7 +257,7 @@ pub(crate) fn too_few_left(problem: &Problem<'_>, finding: Finding) -> Option<St
     Some(format!("{left} of {used} rows are left to judge by: {why}"))
 }
 
-/// A jump is over after this time, s, and after so many rows.
+/// A jump is over after this time, s, and after this number of rows.
 const JUMPING_S: f64 = 0.15;
 const MOST_ROWS_OF_A_JUMP: usize = 2000;
 /// A load rings about its new level for so long that its median is that level, s.
@@ -276,14 +276,14 @@ const FASTEST_S: f64 = 2.5;
 /// Evidence (natural logarithm of the ratio) within which one wander is as likely as another.
 const AS_LIKELY: f64 = 0.5;
 
-/// Innovations beyond so many of their robust standard deviations are no noise, whatever it is…
+/// Innovations beyond this number of their robust standard deviations are no noise, whatever it is…
 const NO_NOISE: f64 = 8.0;
 /// …as long as they are rare: at most this share.
 const RARE: f64 = 0.1;
 
 /// Everything that laws could explain, as free columns; of laws and rows alone, whatever is known of the noise.
 pub(crate) struct FreeColumns {
-    /// Averages of so many rows.
+    /// Averages of this number of rows.
     stride: usize,
     /// Laws that they are of.
     laws: usize,

@@ -9,12 +9,12 @@ use crate::nominal::Nominal;
 use flexspline_base::robust::white_noise;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
-/// The noise of the torque, wound up, is so many times that of the output: a real load would wind it up. *Guess*.
+/// The noise of the torque, wound up, is this multiple of that of the output: a real load would wind it up. *Guess*.
 const LOUDER: f64 = 1.5;
 /// Rows on either side of which the mean is taken, …
 const BESIDE: usize = 8;
-/// … as far as they are no farther from the row than so many standard deviations of the noise: a step of the load stays
-/// one (Lee 1983).
+/// … as far as they are no farther from the row than this number of standard deviations of the noise: a step of the
+/// load stays one (Lee 1983).
 const NEAR: f64 = 4.0;
 
 /// Takes the noise out of the torque where it is not the load's, and gives a note that says so.

@@ -129,7 +129,7 @@ fn explained_in_detail(rows: &Rows, columns: &[Vec<f64>], left: &[f64], uncertai
     let free: Vec<Prior> = columns.iter().map(|c| Prior { mean: 0.0, std: 1e3 * spread / rms(c).max(1e-12) }).collect();
     let solution = solve(&gram, &free, 1.0)?;
     let before = gram.at(columns.len(), columns.len());
-    // Schwarz: what the fit gains in likelihood, less what so many free columns gain of noise.
+    // Schwarz: what the fit gains in likelihood, less the gain of that number of free columns from noise.
     let n = used as f64;
     let evidence = 0.5 * n * (before / solution.residual.max(1e-300)).ln() - 0.5 * columns.len() as f64 * n.ln();
     if evidence < LEAST_EVIDENCE {

@@ -16,7 +16,7 @@ use crate::causes::CauseName;
 
 /// Rounds at most.
 const MOST_ROUNDS: usize = 10;
-/// Of the laws refined, so many of the best settle with all other terms where they gain this share of what the best
+/// Refit the best N candidates jointly, those whose gain is at least this share of what the best
 /// gains.
 const CONTENDERS: usize = 3;
 const CONTENDS: f64 = 0.6;

@@ -21,7 +21,7 @@ fn data(effects: &[Effect], richness: Richness, law: u8, seed: u64) -> Vec<Sessi
     measure(&catalogue_drive(), effects, &plan, &sensors, law, &mut fastrand::Rng::with_seed(seed))
 }
 
-/// Sessions of so many rows at a rate, under rich excitation and white noise (arcsec).
+/// Sessions of n rows at a rate, under rich excitation and white noise (arcsec).
 fn recorded(effects: &[Effect], sessions: usize, rows: usize, rate_hz: f64, white: f64, seed: u64) -> Vec<Session> {
     let plan = Plan { sessions, rows, rate_hz, speed_rad_s: 6.0, torque_n_m: 40.0, richness: Richness::Rich };
     let sensors = Sensors { white_arcsec: white, wander_arcsec: 0.4 * white, wander_s: 12.0 };

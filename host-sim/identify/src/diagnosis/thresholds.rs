@@ -100,7 +100,7 @@ pub mod verdict {
     pub(crate) const NO_WORSE: f64 = 1.001;
     /// What is left as a free function counts if it is larger than this against the strongest cause. *Chosen*.
     pub(crate) const LEAST_LEFT_OF_STRONGEST: f64 = 0.25;
-    /// What is left of an explained error is no more than so many times the noise, wander with it. *Source*: where
+    /// The residual of an explained error is no more than this multiple of the noise, wander with it. *Source*: where
     /// abstention begins in the method that `docs/explanation/theory.md` describes.
     pub(crate) const NEAR_NOISE: f64 = 1.6;
     /// Something without a name is large beside a cause from this share of its size on: what is not understood may
@@ -114,15 +114,15 @@ pub mod verdict {
     pub(crate) const BESIDE_PITCHES: f64 = 0.02;
     /// Standard deviations from a value to the ends of its interval of 95 %. *Source*.
     pub(crate) const INTERVAL: f64 = 1.96;
-    /// What a cause adds is known well from so many times the uncertainty of that on: beside what has no name and is
-    /// large, and where its columns trade its size among one another. *Chosen*.
+    /// The contribution of a cause is known well from this multiple of its uncertainty on: beside what has no name and
+    /// is large, and where its columns trade its size among one another. *Chosen*.
     pub(crate) const KNOWN_BESIDE: f64 = 5.0;
-    /// The size of a cause is told from zero from so many of its standard deviations on. *Chosen*: of 6 causes named
-    /// below it at 99 % one was there.
+    /// The size of a cause differs from zero from this number of its standard deviations on. *Chosen*: of 6 causes
+    /// named below it at 99 % one was there.
     pub(crate) const TOLD_FROM_ZERO: f64 = 3.0;
     /// Noise is known to this factor: what is left within it is noise. *Guess*.
     pub(crate) const NOISE_KNOWN_TO: f64 = 1.25;
-    /// The size of a cause is well known from so many on …
+    /// The size of a cause is well known from this number on …
     pub(crate) const SIZE_KNOWN: f64 = 5.0;
     /// … and below, a name is stated with no more than this. *Chosen*: of 21 between the two 16 were there, of 183
     /// beyond 177.

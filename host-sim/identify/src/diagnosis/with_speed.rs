@@ -16,14 +16,14 @@ const SLOW: f64 = 0.35;
 const FAST: f64 = 0.65;
 /// … which is above this share of the speed that a twentieth of the rows exceed; …
 const IN_MOTION: f64 = 0.05;
-/// … and these have to turn so many times as fast as those, on the median. *Guess*.
+/// … and these have to turn this multiple as fast as those, on the median. *Guess*.
 const APART: f64 = 1.5;
 /// Blocks of neighbouring rows whose misfits are taken as independent. *Guess*: as many as where shares of a torque are
 /// looked for.
 const BLOCKS: usize = 24;
 /// Fewest rows of either.
 const FEWEST: usize = 200;
-/// Amplitudes are told apart from so many of their standard deviations on, five as between rivals, … *Source*.
+/// Amplitudes differ from this number of their standard deviations on, five as between rivals, … *Source*.
 const CERTAIN: f64 = 5.0;
 /// … and by this factor: laws of wheels and encoders hold to a few tenths. *Guess*.
 const CLEARLY: f64 = 1.4;

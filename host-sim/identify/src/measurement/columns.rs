@@ -217,7 +217,9 @@ impl ColumnMap {
             let reading = match given.and_then(|given| given.reading) {
                 Some(reading) => reading,
                 None => unit_below(quantity, place, layout)
-                    .map_err(|what| problem(format!("column {name}: {what}")))?
+                    .map_err(|(WrongReading::Unit(what) | WrongReading::Text(what))| {
+                        problem(format!("column {name}: {what}"))
+                    })?
                     .unwrap_or(Reading::of(default.1)),
             };
             columns.push(MappedColumn { quantity, name: name.to_owned(), place, unit: reading.plain_unit(), reading });
@@ -304,15 +306,12 @@ fn by_number(name: &str, columns: usize) -> Option<usize> {
 }
 
 /// What a line of units below the names says of a column, if it says something that the quantity may be in.
-fn unit_below(quantity: Quantity, place: usize, layout: Option<&Layout>) -> Result<Option<Reading>, String> {
+fn unit_below(quantity: Quantity, place: usize, layout: Option<&Layout>) -> Result<Option<Reading>, WrongReading> {
     let Some(word) = layout.and_then(|layout| layout.units.get(place)).map(|unit| unit_word(unit)) else {
         return Ok(None);
     };
     let unit = Unit::written(word).filter(|unit| unit.family() == quantity.family());
-    let reading = unit.map(|unit| Reading::parse(unit.name(), quantity.family(), None)).transpose();
-    reading.map_err(|wrong| match wrong {
-        WrongReading::Unit(unit) | WrongReading::Text(unit) => unit,
-    })
+    unit.map(|unit| Reading::parse(unit.name(), quantity.family(), None)).transpose()
 }
 
 /// The column that may be meant by `wanted`, if there is one.

@@ -403,7 +403,7 @@ fn enough(log: &Log, recorded: String, fewest: usize) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// What to say where the stamps part the rows into so many sessions that these are hardly any.
+/// Note where the stamps part the rows into sessions of hardly any rows.
 fn many_sessions(sessions: &[Session]) -> Option<String> {
     let rows: usize = sessions.iter().map(Session::len).sum();
     (sessions.len() > MANY_SESSIONS && rows < FEWEST_ROWS * sessions.len()).then(|| {

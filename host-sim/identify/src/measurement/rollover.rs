@@ -10,7 +10,7 @@ use super::columns::{MappedColumn, Quantity, Unit};
 use super::log::Log;
 use flexspline_base::robust::{least_and_most, median_of};
 
-/// Registers have so many bits.
+/// Bits of registers.
 const BITS: std::ops::RangeInclusive<i32> = 8..=32;
 /// A column that begins anew covers at least this share of its span. *Guess*: a step over the border leaves out two
 /// steps of the span at most.
@@ -26,16 +26,16 @@ const NEARLY: f64 = 0.005;
 const ROWS_BESIDE: usize = 8;
 /// Standard deviation of a value that is rounded to whole counts: 1/√12.
 const ROUNDED: f64 = 0.288_675;
-/// A span is excluded beyond so many standard deviations. *Source*: by convention.
+/// A span is excluded beyond this number of standard deviations. *Source*: by convention.
 const EXCLUDED: f64 = 3.0;
 /// Whole counts are distinguishable if the standard deviation of the span is below this: half a count is two of them.
 const TELLS_COUNTS: f64 = 0.25;
 /// One count is said to be in doubt if the standard deviation of the span is below this, counts; above it, nothing is
 /// known of single counts.
 const IN_DOUBT: f64 = 1.0;
-/// So many of the leaps must have one size. *Guess*: the others are gaps and counts that were lost.
+/// This share of the leaps must have one size. *Guess*: the others are gaps and counts that were lost.
 const AGREE: f64 = 0.8;
-/// A span that no register has is believed from so many leaps on: one leap may be anything.
+/// A span that no register has is believed from this number of leaps on: one leap may be anything.
 const FEWEST_LEAPS: usize = 2;
 
 /// How a column begins anew.
@@ -60,7 +60,7 @@ impl Anew {
     }
 }
 
-/// Spans of the registers of so many bits, counts.
+/// Spans of the registers of n bits, counts.
 pub(crate) fn registers() -> impl Iterator<Item = f64> {
     BITS.map(|bits| 2f64.powi(bits))
 }

@@ -128,7 +128,7 @@ const FAULTS: [Definition; 16] = [
         FaultName::Stalls,
         "the logger stands still now and then, and its time counts on",
         &[
-            number(Name::EveryRows, "after so many rows", 2.0, 1e5, Value(50.0)),
+            number(Name::EveryRows, "after this number of rows", 2.0, 1e5, Value(50.0)),
             number(Name::DurationS, "for so long", 0.0, 1e3, Value(0.05)),
         ],
     ),

@@ -186,7 +186,7 @@ fn pitch_parameters(on: &Excitation<'_>, _: Shaped<'_>, c: Coefficients<'_>) -> 
     wave_parameters(on, c, 2.0)
 }
 
-/// Of a wave of so many periods in a turn of the wheel.
+/// Of a wave of n periods in a turn of the wheel.
 fn wave_parameters(on: &Excitation<'_>, c: Coefficients<'_>, harmonic: f64) -> Vec<Named> {
     let (amplitude, phase) = of_wave(c, WAVE);
     vec![
@@ -197,7 +197,7 @@ fn wave_parameters(on: &Excitation<'_>, c: Coefficients<'_>, harmonic: f64) -> V
     ]
 }
 
-/// Further harmonics that both lobes see alike, as jaws, screws or an indexing head with so many places leave them; odd
+/// Further harmonics that both lobes see alike, as jaws, screws or an indexing head with n places leave them; odd
 /// ones cancel.
 const HIGHER_HARMONICS: [f64; 5] = [4.0, 6.0, 8.0, 10.0, 12.0];
 
@@ -320,7 +320,7 @@ fn cam_form_error() -> Law {
     })
 }
 
-/// A pulse is nothing beyond so many of its widths.
+/// A pulse is nothing beyond this number of its widths.
 const PULSE_ENDS: f64 = 8.0;
 
 /// Widest pulse of a tooth that is looked for, rad, and the share of it beyond which one is on that bound. *Guess*:

@@ -8,12 +8,13 @@ use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::log::Log;
 use flexspline_base::robust::{least_and_most, median_and_std, median_of, quantile_of, sampled};
 
-/// A gap longer than so many sample periods starts a new session.
+/// A gap longer than this number of sample periods starts a new session.
 pub(crate) const SESSION_GAP_PERIODS: f64 = 10.0;
-/// A step of time above so many periods, jitter aside, has a row missing in it: half way between one lost row and none.
+/// A step of time above this number of periods, jitter aside, has a row missing in it: half way between one lost row
+/// and none.
 const LOST_ROW_PERIODS: f64 = 1.5;
-/// A gap of up to so many periods that begins a session may be one of rows that were lost: where the motion goes on
-/// over it. *Guess*.
+/// A gap of up to this number of periods that begins a session may be one of rows that were lost: where the motion goes
+/// on over it. *Guess*.
 const LONGEST_HOLE_PERIODS: f64 = 100.0;
 /// The motion goes on where the generator turns over the gap as it does on either side, within this share of the faster
 /// pace, and this, rad. *Guess*.
@@ -26,8 +27,8 @@ const WRAPS_RAD: f64 = 1.5;
 /// stands, starts or turns round.
 /// *Guess*.
 const HOLES_IN_MOTION: f64 = 0.5;
-/// The median of many steps scatters by so many times what their mean does (√(π/2) of normal ones, *Source*), and is
-/// known to so many of that.
+/// The median of many steps scatters by this multiple of what their mean does (√(π/2) of normal ones, *Source*), and is
+/// known to this number of those.
 const MEDIAN_TO_MEAN_STD: f64 = 1.253;
 const MEDIAN_STDS: f64 = 2.0;
 /// Where more steps than this are that long, rows are not evenly spaced by intent, and none is missing.
@@ -36,7 +37,7 @@ const UNEVEN_SHARE: f64 = 0.05;
 const COARSE_SHARE: f64 = 0.1;
 /// A clock jitters if its steps scatter by more than this share of a period…
 const JITTER_SHARE: f64 = 0.1;
-/// …and by so many times more than the motion from row to row.
+/// …and by this multiple of the motion from row to row.
 const JITTER_OVER_MOTION: f64 = 5.0;
 /// Sample periods that exist, s.
 const PERIODS_S: [f64; 2] = [1e-7, 3600.0];
@@ -47,7 +48,7 @@ const FASTEST_RAD_S: f64 = 2100.0;
 const CREEPS: (f64, f64, f64) = (1.0, 43_200.0, 0.1);
 /// The same of a motor that goes to and fro: a telescope creeps for nights, but one way. *Guess*.
 const CREEPS_TO_AND_FRO: (f64, f64, f64) = (0.9, 3600.0, 0.15);
-/// It goes to and fro where each direction has this share of the way, of so many radians at least.
+/// It goes to and fro where each direction has this share of the way, of this number of radians at least.
 const EACH_WAY: (f64, f64) = (0.1, 6.0);
 /// And never changes its pace by more than this share of its fastest one from row to row. *Guess*.
 const SMOOTHLY: f64 = 0.35;

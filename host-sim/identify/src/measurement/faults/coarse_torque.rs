@@ -18,8 +18,8 @@ use flexspline_base::robust::median_of;
 
 /// Steps of less than this share of the largest load are no matter: those of eight bits are. *Guess*.
 const LEAST_STEP: f64 = 0.004;
-/// Steps are a sensor's, and not weights that somebody put on and wrote down, where there are so many of them, and this
-/// share of the runs of one value is shorter than [`LEAST_ROWS`]: noise and changes tear them. *Guess*.
+/// Steps are a sensor's, and not weights that somebody put on and wrote down, where there are this many of them, and
+/// this share of the runs of one value is shorter than [`LEAST_ROWS`]: noise and changes tear them. *Guess*.
 const MANY_STEPS: usize = 12;
 const TORN: f64 = 0.2;
 /// Rows to a step at least on either side of a change that is looked at, and changes that say something.

@@ -25,8 +25,8 @@ const STRETCH_ROWS: usize = 8;
 /// line, as a share of all the drift. *Guess*: two gaps agree to a twentieth by chance in one recording of twenty.
 const FEWEST_GAPS: usize = 2;
 const OFF_THE_LINE: f64 = 0.05;
-/// Within sessions the zero moves as over all of them: the slope there is off by this share at most, but for so many of
-/// its standard deviations. *Guess*.
+/// Within sessions the zero moves as over all of them: the slope there is off by this share at most, but for this
+/// number of its standard deviations. *Guess*.
 const WITHIN: f64 = 0.5;
 const WITHIN_STDS: f64 = 3.0;
 /// Sessions whose zeros are free at once, at most.
@@ -39,8 +39,8 @@ const ALIKE: f64 = 0.35;
 /// A trend whose standard deviation grows by more than this when position, load and temperature are considered may be
 /// one of them.
 const CONFUSED: f64 = 4.0;
-/// And is none of them where it is so many standard deviations, and the temperature does not go with time: correlation,
-/// from a span in K on.
+/// And is none of them where it is this number of standard deviations, and the temperature does not go with time:
+/// correlation, from a span in K on.
 /// *Guess*.
 const BEYOND_CONFUSION: f64 = 50.0;
 const WITH_TIME: f64 = 0.8;

@@ -1,4 +1,4 @@
-//! A channel that is read more slowly than the log is written, and repeated in between: one value for so many rows, all
+//! A channel that is read more slowly than the log is written, and repeated in between: one value for several rows, all
 //! along.
 //!
 //! What the load does between two readings moves the drive, and the column does not say it. A load that is put on in
@@ -29,8 +29,8 @@ const NO_STEPS_OF_A_BENCH: usize = 5;
 /// *Guess*.
 const WITHIN_THE_ROW: f64 = 0.5;
 
-/// Readings go on by so many counts from one to the next, at the median, where it is not the counts that make an angle
-/// stand. *Guess*.
+/// Readings go on by this number of counts from one to the next, at the median, where it is not the counts that make an
+/// angle stand. *Guess*.
 const COUNTS: f64 = 4.0;
 /// They are whole counts within this: an even motion goes by even steps, and not by the same to the last digit.
 /// *Guess*.

@@ -9,9 +9,9 @@ use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
 use flexspline_base::robust::{least_and_most, median_of, quantile_of, sampled, white_noise};
 
-/// A row is out by so many standard deviations of the white noise…
+/// A row is out by this number of standard deviations of the white noise…
 const OUT: f64 = 10.0;
-/// …and by so many times what all rows around it but one are out by: ripple that rows follow too slowly stands out
+/// …and by this multiple of what all rows around it but one are out by: ripple that rows follow too slowly stands out
 /// everywhere.
 const OUT_OF_AROUND: f64 = 3.0;
 /// And by this at least, rad at the output, and by two steps of the resolution.
@@ -29,7 +29,7 @@ const TOOTH_RAD: f64 = 0.05;
 const FEW: usize = 4;
 /// Large, rad at the output: more than a tooth or a usual clearance gives.
 const LARGE_RAD: f64 = 120.0 * ARCSEC;
-/// Load changes at once if it does by so many times its usual pace.
+/// Load changes at once if it does by this multiple of its usual pace.
 const LOAD_PACE: f64 = 10.0;
 /// Load that changes by this share of its largest within the rows beside moves the drive: play is thrown over, wind-up
 /// follows.
@@ -42,8 +42,8 @@ const BESIDE: usize = 3;
 const AROUND: usize = 15;
 /// If more rows than this are out, they are not outliers but the noise.
 const SHARE: f64 = 0.1;
-/// Where more rows than this are out, others are out around most of them: then so many of the rows around do not count
-/// for what is usual there, which 5 % of 30 rows exceed in one case of fifty (Poisson).
+/// Where more rows than this are out, others are out around most of them: then this number of the rows around do not
+/// count for what is usual there, which 5 % of 30 rows exceed in one case of fifty (Poisson).
 const MANY: f64 = 0.003;
 const OTHERS_OUT: usize = 4;
 /// Mean resultant length above which four or more outliers repeat with position: a damaged tooth, which is the drive.
@@ -144,7 +144,7 @@ fn in_sessions(sessions: &[Session], least: f64, values: fn(&Session) -> &[f64])
     if many { beyond(OTHERS_OUT) } else { found }
 }
 
-/// Rows that are out by more than `least`, and by far more than all around them but so many `others`.
+/// Rows that are out by more than `least`, and by far more than all around them but `others` of them.
 fn rows_out(values: &[f64], least: f64, others: usize) -> Vec<Out> {
     let mut found = Vec::new();
     for row in BESIDE..values.len().saturating_sub(BESIDE) {
@@ -251,9 +251,9 @@ fn of_error(sessions: &mut [Session], gear: &Gear, error_recorded: bool, finding
 /// Rows before and after whose medians bear a row out where many are out: two of them may be out as well.
 const WIDELY_BESIDE: usize = 5;
 /// Where many rows are far out, others are out by less: the tail of the same fault, mostly to one side, which would
-/// move means. What is off by more than so many standard deviations of the white noise is left out as well, of sound
-/// rows one in thousands. *Source*: Hampel's identifier rejects from 3 on (Davies and Gather 1993); medians of five
-/// rows have a noise of their own.
+/// move means. What is off by more than this number of standard deviations of the white noise is left out as well, of
+/// sound rows one in thousands. *Source*: Hampel's identifier rejects from 3 on (Davies and Gather 1993); medians of
+/// five rows have a noise of their own.
 const TAIL: f64 = 4.0;
 /// So often, as rows that are out hide others.
 const TAIL_ROUNDS: usize = 3;

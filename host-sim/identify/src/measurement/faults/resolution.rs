@@ -24,7 +24,7 @@ const UNEVEN: f64 = 0.1;
 /// the error, which differs by 0.4 steps on the mean from one reading to another: where half of them differ by less
 /// than this share, nothing is. *Guess*.
 const ROUNDED: f64 = 0.1;
-/// So many rows are from one reading to another. At a speed that is nearly a whole number of steps to a row the next
+/// Rows from one reading to another. At a speed that is nearly a whole number of steps to a row the next
 /// one is rounded by just about as much, and a later one is not.
 const APART: [usize; 4] = [1, 2, 4, 8];
 

@@ -18,7 +18,7 @@ const EXTRA_ROWS: f64 = 0.8;
 const TOGETHER: f64 = 0.3;
 /// In one row the generator moves by this many times its own scatter, and in a leap both angles do.
 const OVER_NOISE: f64 = 8.0;
-/// So many leaps are stalls, at least…
+/// This number of leaps are stalls, at least…
 const FEWEST: usize = 8;
 /// …and no more than this share of the rows that tell.
 const MOST_SHARE: f64 = 0.2;

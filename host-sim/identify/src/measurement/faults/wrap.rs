@@ -18,7 +18,7 @@ const COVERED_BY_ANOTHER: f64 = 0.98;
 /// A step that differs from the one before by less than this share of a turn goes on as it did; where files are joined
 /// without a time between them, it does not.
 const GOES_ON: f64 = 0.25;
-/// Teeth do not skip by more than so many turns of the motor in a row: two pitches are one.
+/// Teeth do not skip by more than this number of turns of the motor in a row: two pitches are one.
 const MOST_SKIPPED: f64 = 3.5;
 
 /// Finds wrapped angles (also in a unit other than the one given, which is a fault) and unwraps them.

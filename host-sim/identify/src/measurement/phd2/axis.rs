@@ -29,7 +29,7 @@ pub(super) struct Pointing {
     pub west: bool,
 }
 
-/// A target: axis less clock, turns, as the mean of so many sections, known to `within`.
+/// A target: axis less clock, turns, as the mean of n sections, known to `within`.
 struct Target {
     offset: f64,
     sections: f64,

@@ -10,7 +10,7 @@ const SCALE: f64 = 1.5;
 const AMPLITUDE: f64 = 12.0;
 const HOURS_A_S: f64 = 24.0 / SIDEREAL_DAY_S;
 
-/// Error of the axis where it stands at so many turns, arcsec: a wave twice a generator turn.
+/// Error of the axis where it stands at n turns, arcsec: a wave twice a generator turn.
 fn wave(axis: f64) -> f64 {
     AMPLITUDE * (2.0 * RATIO * TAU * axis + 0.4).sin()
 }

@@ -1,5 +1,5 @@
-//! How a text file of numbers is laid out: the separator of its fields, how decimals are written, the lines of the names
-//! and units of its columns.
+//! How a text file of numbers is laid out: the separator of its fields, how decimals are written, the lines of the
+//! names and units of its columns.
 //!
 //! One idea serves all: most lines of the file have one width and columns of one kind (number, time, word). That
 //! majority shows the separator; a line that begins with a word where the majority has a number is no row.
@@ -373,8 +373,9 @@ impl Layout {
             let names: BTreeSet<&str> = rows.iter().filter_map(|row| row.fields.get(k)).map(String::as_str).collect();
             if NAMES_OF_VALUES.contains(&names.len()) && ROWS_OF_A_NAME * names.len() <= rows.len() {
                 let what = format!(
-                    "each line has the value of one channel, named in column {} ({}); allowed: a column for each, in \
-                     pandas: df.pivot_table(index=TIME, columns=NAME, values=VALUE).interpolate(\"index\").to_csv(FILE)",
+                    "each line has the value of one channel, named in column {} ({}); allowed: a column for each, \
+                     in pandas: df.pivot_table(index=TIME, columns=NAME, \
+                     values=VALUE).interpolate(\"index\").to_csv(FILE)",
                     k + 1,
                     shortened(&names.into_iter().collect::<Vec<_>>().join(", "))
                 );

@@ -1,8 +1,8 @@
 //! The one reader of other people's files: bytes to text, text to rows of one layout, cells to numbers.
 //!
 //! [`Sheet::of`] finds the layout; `Sheet::columns` reads the columns that are asked for. Whatever is left out or
-//! converted is said in notes with its line. `look` asks for all columns, `calibrate`, `diagnose` and `replay` for those
-//! of the mapping.
+//! converted is said in notes with its line. `look` asks for all columns, `calibrate`, `diagnose` and `replay` for
+//! those of the mapping.
 
 pub(super) mod clock;
 mod layout;
@@ -115,7 +115,7 @@ impl Sheet {
     /// The file is no text, or has another form than a row for each instant.
     pub fn of(bytes: Vec<u8>, known: &[&str]) -> Result<Sheet, TableProblem> {
         let mut notes = Vec::new();
-        let text = text::of(bytes, &mut notes).map_err(|what| TableProblem { line: 1, what })?;
+        let text = text::of(bytes, &mut notes)?;
         let layout = Layout::of(&text, known, &mut notes)?;
         let text = if layout.separator == Separator::Blanks { with_tabs(&text) } else { text };
         Ok(Sheet { layout, notes, text })

@@ -15,8 +15,8 @@ pub(super) enum CellValue {
 
 /// Marks of a value that was not recorded, besides those of no number (`NaN`, `1.#QNAN`).
 const MISSING: [&str; 12] = ["na", "n/a", "#n/a", "null", "<null>", "none", "nil", "\\n", "-", "--", "---", "?"];
-/// Marks of a value beyond the range as voltmeters, loggers (Keyence, Keysight, NI) and spreadsheets write them, besides
-/// words that begin with one of [`OVER_BEGINS`].
+/// Marks of a value beyond the range as voltmeters, loggers (Keyence, Keysight, NI) and spreadsheets write them,
+/// besides words that begin with one of [`OVER_BEGINS`].
 const OVER: [&str; 6] = ["ol", "o.l", "ol.", "burnout", "out of range", "#num!"];
 const OVER_BEGINS: [&str; 3] = ["ov", "under", "1.#inf"];
 /// SCPI-99, volume 1, 7.2.1.4: 9.9E37 is infinity, 9.91E37 no number; some instruments write 9.9E36. The largest single

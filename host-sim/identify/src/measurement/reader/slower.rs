@@ -1,4 +1,4 @@
-//! Channels that were recorded more slowly than the angles: one value in so many rows, nothing between.
+//! Channels that were recorded more slowly than the angles: one value in several rows, nothing between.
 
 use super::super::columns::Quantity;
 use super::super::log::Log;

@@ -41,7 +41,7 @@ pub fn order(time: &[f64]) -> Option<(Vec<usize>, String)> {
     })
 }
 
-/// Which rows repeat the one before in all of these columns, where so many do that rows are written twice.
+/// Which rows repeat the one before in all of these columns, where enough do that rows are written twice.
 pub(crate) fn twice(columns: &[&[f64]]) -> Option<(Vec<bool>, String)> {
     let rows = columns.first()?.len();
     let same = |a: f64, b: f64| a == b || (a.is_nan() && b.is_nan());

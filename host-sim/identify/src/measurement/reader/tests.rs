@@ -97,7 +97,7 @@ fn half_day(from_s: f64, k: usize) -> String {
 
 /// What a file must end in.
 enum Ends {
-    /// Read by the mapping proposed: at least so many rows, and a note or a fault that says this.
+    /// Read by the mapping proposed: at least this number of rows, and a note or a fault that says this.
     Read(usize, &'static str),
     /// Nothing is proposed, and a note says this; the reader refuses the file with the same words.
     Blocked(&'static str),

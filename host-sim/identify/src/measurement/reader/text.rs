@@ -1,7 +1,7 @@
 //! Bytes of a file to text: encodings, line ends, and files that are no text.
 
 use encoding_rs::{Encoding, WINDOWS_1252};
-use flexspline_base::csv_rows::known_format;
+use flexspline_base::csv_rows::{TableProblem, known_format};
 
 /// Bytes that a file is judged by.
 const LOOKED_AT: usize = 4096;
@@ -15,9 +15,10 @@ const ZEROS: f64 = 0.25;
 ///
 /// # Errors
 /// What the file is, if it is no text.
-pub(super) fn of(bytes: Vec<u8>, notes: &mut Vec<String>) -> Result<Vec<u8>, String> {
+pub(super) fn of(bytes: Vec<u8>, notes: &mut Vec<String>) -> Result<Vec<u8>, TableProblem> {
+    let refused = |what: &str| Err(TableProblem { line: 1, what: what.to_owned() });
     if let Some(kind) = known_format(&bytes) {
-        return Err(kind.to_owned());
+        return refused(kind);
     }
     let mut text = match Encoding::for_bom(&bytes) {
         Some((encoding, mark)) if encoding != encoding_rs::UTF_8 => {
@@ -33,7 +34,7 @@ pub(super) fn of(bytes: Vec<u8>, notes: &mut Vec<String>) -> Result<Vec<u8>, Str
         text = WINDOWS_1252.decode_without_bom_handling(&text).0.into_owned().into_bytes();
     }
     if is_binary(&text) {
-        return Err("a binary file; allowed: CSV text".to_owned());
+        return refused("a binary file; allowed: CSV text");
     }
     if text.contains(&b'\r') {
         if text.contains(&b'\n') {
@@ -94,7 +95,7 @@ mod tests {
             (binary.as_slice(), "binary"),
             (unmarked.as_slice(), "binary"),
         ] {
-            assert!(of(bytes.to_vec(), &mut Vec::new()).unwrap_err().contains(said));
+            assert!(of(bytes.to_vec(), &mut Vec::new()).unwrap_err().what.contains(said));
         }
     }
 }
