@@ -236,11 +236,10 @@ impl Sheet {
             // Words are seldom: a row begins with a digit, a sign or a quote.
             let first = record.get(0).map_or(&b""[..], plain).first().copied().unwrap_or(b'0');
             let begins = first.is_ascii_alphabetic() || matches!(first, b'[' | b'%' | b'_' | 0x80..);
+            part.read.cells.iter_mut().for_each(|cells| cells.values.push(f64::NAN));
             if begins && (begins_with_a_word(&texts(&record), &self.layout.kinds) || self.has_the_names(&record)) {
-                part.read.cells.iter_mut().for_each(|cells| cells.values.push(f64::NAN));
                 part.wordy.push((row, line, record.clone()));
             } else {
-                part.read.cells.iter_mut().for_each(|cells| cells.values.push(f64::NAN));
                 self.read_row(places, &record, line, row, &mut part.read);
             }
         }
