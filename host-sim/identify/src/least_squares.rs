@@ -1,6 +1,8 @@
-//! Least squares of few columns by their normal equations.
+//! Least squares of few columns by their normal equations, projections off free columns, the jackknife.
 
 use flexspline_algebra::{Mat, cholesky};
+use flexspline_base::robust::rms;
+use flexspline_base::statistics::mean;
 
 /// Normal equations of least squares, with their inverse.
 pub(crate) struct Normal {
@@ -47,4 +49,52 @@ impl Normal {
     pub fn misfit(&self) -> f64 {
         (self.square - self.values().iter().zip(&self.right).map(|(value, right)| value * right).sum::<f64>()).max(0.0)
     }
+}
+
+/// An orthonormal basis of columns: what a fit leaves free.
+#[derive(Default)]
+pub(crate) struct FreeSpan(Vec<Vec<f64>>);
+
+impl FreeSpan {
+    /// An orthonormal basis of what columns have beyond this one.
+    pub(crate) fn beyond(&self, columns: impl IntoIterator<Item = Vec<f64>>) -> FreeSpan {
+        let mut span = FreeSpan::default();
+        for column in columns {
+            let free = span.freed(self.freed(column.clone()));
+            let norm = free.iter().map(|v| v * v).sum::<f64>().sqrt();
+            // Else it is round-off of the column.
+            if norm > 1e-6 * rms(&column) * (column.len() as f64).sqrt() {
+                span.0.push(free.into_iter().map(|v| v / norm).collect());
+            }
+        }
+        span
+    }
+
+    /// The part of a column that is orthogonal to the basis.
+    pub(crate) fn freed(&self, mut column: Vec<f64>) -> Vec<f64> {
+        for free in &self.0 {
+            let share = dot(&column, free);
+            column.iter_mut().zip(free).for_each(|(left, v)| *left -= share * v);
+        }
+        column
+    }
+}
+
+/// Standard deviation of a value, from the values without one block of the rows at a time (jackknife).
+pub(crate) fn jackknife(without: &[f64]) -> f64 {
+    let (blocks, middle) = (without.len() as f64, mean(without));
+    ((blocks - 1.0) / blocks * without.iter().map(|value| (value - middle).powi(2)).sum::<f64>()).sqrt()
+}
+
+/// Sum of products, in eight sums side by side.
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let (a_eights, a_rest) = a.as_chunks::<8>();
+    let (b_eights, b_rest) = b.as_chunks::<8>();
+    let mut sums = [0.0; 8];
+    for (x, y) in a_eights.iter().zip(b_eights) {
+        for j in 0..8 {
+            sums[j] += x[j] * y[j];
+        }
+    }
+    sums.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(x, y)| x * y).sum::<f64>()
 }

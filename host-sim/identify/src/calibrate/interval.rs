@@ -13,13 +13,13 @@
 use std::f64::consts::{PI, TAU};
 
 use flexspline_algebra::{Mat, cholesky};
+use flexspline_base::robust::dot;
 use serde::Serialize;
 
 use super::Model;
 use super::folds::{FLOOR, Row, Sums};
 use super::parts::{GENERATOR_ORDERS, PartName, Scales, State, columns, expected_arcsec, usual_arcsec, weights};
 use crate::measurement::{median_of, white_noise};
-use flexspline_base::robust::dot;
 
 /// Standard deviations of an interval that holds 95 %.
 pub(super) const OF_95: f64 = 1.96;

@@ -12,7 +12,7 @@ use serde::Serialize;
 use super::GOLDEN;
 use super::parts::State;
 use super::rows::Rows;
-use crate::diagnosis::channels::{FreeSpan, jackknife};
+use crate::least_squares::{FreeSpan, jackknife};
 use flexspline_base::robust::dot;
 use flexspline_base::units::ARCSEC_PER_RAD;
 

@@ -12,11 +12,12 @@ use std::borrow::Cow;
 use flexspline::Table;
 
 use super::base::PlayLaw;
-use super::channels::{FreeSpan, report, sample, waves};
+use super::channels::{report, sample, smooth_span, waves};
 use super::flank_lag::behind;
 use super::linear::{Gram, Prior, solve};
 use super::rows::{Rows, combined, rms};
 use super::torque_zero::{by_block, is_certain, sum};
+use crate::least_squares::FreeSpan;
 use crate::measurement::{FaultName, Measures, Recording, Treatment};
 use crate::nominal::Nominal;
 use flexspline_base::units::ARCSEC_PER_RAD;
@@ -90,7 +91,7 @@ impl<'a> Held<'a> {
             mesh_by_side.extend(mesh);
         }
         let smooth = Nominal { harmonics: Vec::new(), ..nominal.clone() };
-        let free = FreeSpan::of(rows, &smooth, &places, mesh_by_side);
+        let free = smooth_span(rows, &smooth, &places, mesh_by_side);
         let error = free.freed(places.iter().map(|k| rows.error[*k]).collect());
         Held { rows, nominal, places, free, error, waves: waves_at_places }
     }

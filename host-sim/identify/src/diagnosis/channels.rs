@@ -8,9 +8,9 @@
 use flexspline::Table;
 
 use super::base::{PlayLaw, predicted_by_table};
-use super::linear;
 use super::noise::white_level;
-use super::rows::{Rows, mean, quantile, rms, robust_std};
+use super::rows::{Rows, quantile, rms, robust_std};
+use crate::least_squares::{FreeSpan, jackknife};
 use crate::measurement::{Fault, FaultName, Quantity, Recording, Session, Treatment, throughout};
 use crate::nominal::{Harmonic, Nominal};
 use flexspline_base::robust::dot;
@@ -84,44 +84,16 @@ pub(super) fn floating(rows: &Rows, nominal: &Nominal, places: &[usize]) -> Vec<
     columns
 }
 
-/// An orthonormal basis of the smooth part of an error at some places, and of what else may take part in it.
-#[derive(Default)]
-pub(crate) struct FreeSpan(Vec<Vec<f64>>);
-
-impl FreeSpan {
-    /// Of the columns of [`floating`], the first two orders of both wheels, and `further` columns.
-    pub(super) fn of(rows: &Rows, nominal: &Nominal, places: &[usize], further: Vec<Vec<f64>>) -> FreeSpan {
-        let mut columns = floating(rows, nominal, places);
-        for order in [1.0, 2.0] {
-            columns.extend(waves(order, &rows.on_flexspline, places));
-            columns.extend(waves(order, &rows.on_circular_spline, places));
-        }
-        columns.extend(further);
-        FreeSpan::default().beyond(columns)
+/// An orthonormal basis of the smooth part of an error at some places: of the columns of [`floating`], of the first two
+/// orders of both wheels, and of `further` columns.
+pub(super) fn smooth_span(rows: &Rows, nominal: &Nominal, places: &[usize], further: Vec<Vec<f64>>) -> FreeSpan {
+    let mut columns = floating(rows, nominal, places);
+    for order in [1.0, 2.0] {
+        columns.extend(waves(order, &rows.on_flexspline, places));
+        columns.extend(waves(order, &rows.on_circular_spline, places));
     }
-
-    /// An orthonormal basis of what columns have beyond this one.
-    pub(crate) fn beyond(&self, columns: impl IntoIterator<Item = Vec<f64>>) -> FreeSpan {
-        let mut span = FreeSpan::default();
-        for column in columns {
-            let free = span.freed(self.freed(column.clone()));
-            let norm = free.iter().map(|v| v * v).sum::<f64>().sqrt();
-            // Else it is round-off of the column.
-            if norm > 1e-6 * rms(&column) * (column.len() as f64).sqrt() {
-                span.0.push(free.into_iter().map(|v| v / norm).collect());
-            }
-        }
-        span
-    }
-
-    /// The part of a column at the places that is orthogonal to the basis.
-    pub(crate) fn freed(&self, mut column: Vec<f64>) -> Vec<f64> {
-        for free in &self.0 {
-            let share = linear::dot(&column, free);
-            column.iter_mut().zip(free).for_each(|(left, v)| *left -= share * v);
-        }
-        column
-    }
+    columns.extend(further);
+    FreeSpan::default().beyond(columns)
 }
 
 /// A sample of the rows with what floats freely taken out of their error.
@@ -224,12 +196,6 @@ impl Told {
     fn is_certain(&self) -> bool {
         self.share.abs() > CERTAIN * self.std
     }
-}
-
-/// Standard deviation of a value, from the values without one block of the rows at a time (jackknife).
-pub(crate) fn jackknife(without: &[f64]) -> f64 {
-    let (blocks, middle) = (without.len() as f64, mean(without));
-    ((blocks - 1.0) / blocks * without.iter().map(|value| (value - middle).powi(2)).sum::<f64>()).sqrt()
 }
 
 /// How much of `column` is in `of`, with `other` free.

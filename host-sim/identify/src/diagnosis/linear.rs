@@ -9,6 +9,8 @@ use std::sync::LazyLock;
 use flexspline_algebra::{Mat, cholesky, lower_of_product};
 use pulp::{Arch, Simd, WithSimd};
 
+use crate::least_squares::dot;
+
 /// Symmetric products of columns, the data last.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Gram {
@@ -94,19 +96,6 @@ impl Gram {
 
 /// From this number of columns on their products are a product of matrices.
 const MANY: usize = 24;
-
-/// Sum of products, in eight sums side by side.
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let (a_eights, a_rest) = a.as_chunks::<8>();
-    let (b_eights, b_rest) = b.as_chunks::<8>();
-    let mut sums = [0.0; 8];
-    for (x, y) in a_eights.iter().zip(b_eights) {
-        for j in 0..8 {
-            sums[j] += x[j] * y[j];
-        }
-    }
-    sums.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(x, y)| x * y).sum::<f64>()
-}
 
 /// Products of each column of `a` with each of `b` over a range of rows, row by row of the result; with `lower`, only
 /// as many of `b` as the place of the column of `a` says, for products that are symmetric.

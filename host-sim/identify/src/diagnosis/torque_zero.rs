@@ -10,8 +10,9 @@
 use flexspline::Table;
 
 use super::base::{PlayLaw, predicted_by_table};
-use super::channels::{FreeSpan, jackknife, report, sample};
+use super::channels::{report, sample, smooth_span};
 use super::rows::{Rows, mean, rms};
+use crate::least_squares::{FreeSpan, jackknife};
 use crate::measurement::{FaultName, Measures, Recording, Session, Treatment};
 use crate::nominal::Nominal;
 
@@ -80,7 +81,7 @@ impl<'a> Held<'a> {
         let turned =
             rows.output.iter().zip(&rows.orientation).map(|(out, housing)| (out + housing).sin_cos()).collect();
         let harmonics = places.iter().map(|k| nominal.harmonics_arcsec(rows.generator[*k])).collect();
-        let free = FreeSpan::of(&rows, nominal, &places, Vec::new());
+        let free = smooth_span(&rows, nominal, &places, Vec::new());
         Held { rows, nominal, table, law: PlayLaw::Held, turned, places, harmonics, free }
     }
 

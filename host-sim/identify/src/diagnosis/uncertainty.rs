@@ -3,13 +3,13 @@
 
 use std::collections::BTreeMap;
 
-use super::linear::dot;
 use super::model::{Fit, Problem, Scaffold, Term};
 use super::report::Parameter;
 use super::rows::combined;
 use super::select::Selected;
 use super::thresholds::verdict::{INTERVAL, KNOWN_BESIDE};
 use crate::causes::{Kind, ParameterName};
+use crate::least_squares::dot;
 use flexspline_base::robust;
 
 /// Step of numerical derivatives, standard deviations.
