@@ -457,14 +457,15 @@ fn a_bit_of_a_mark_refuses_nothing() {
     assert_eq!(flexspline_store_activate(&mut *o.store, &o.joint, &table, 20.0), Done);
     let mut out = FlexsplineOutput::default();
     for bit in 0..32 {
-        let pointers: [*mut u32; 3] =
-            [(&raw mut *o.store).cast(), (&raw mut o.joint).cast(), (&raw mut o.state).cast()];
+        let marks = |o: &mut super::tests::Objects| -> [*mut u32; 3] {
+            [(&raw mut *o.store).cast(), (&raw mut o.joint).cast(), (&raw mut o.state).cast()]
+        };
         // SAFETY: the first word of each is its mark.
-        pointers.iter().for_each(|mark| unsafe { **mark ^= 1 << bit });
+        marks(&mut o).iter().for_each(|mark| unsafe { **mark ^= 1 << bit });
         assert_eq!(flexspline_tick(&o.joint, &table, &mut *o.store, &mut o.state, &INPUT, &mut out), Done, "{bit}");
         assert_eq!(flexspline_joint_mend(&mut o.joint), Done);
         // SAFETY: as above.
-        let found = pointers.map(|mark| unsafe { *mark });
+        let found = marks(&mut o).map(|mark| unsafe { *mark });
         assert_eq!(found, [STORE_MARK, JOINT_MARK, STATE_MARK].map(spread), "{bit}");
     }
     // SAFETY: as above.

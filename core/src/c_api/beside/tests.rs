@@ -105,6 +105,7 @@ fn events_and_records_are_those_of_rust() {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "finds the gains of a predictor: takes too long")]
 fn what_lies_ahead_is_what_rust_says() {
     use crate::{Inertias, Noise, PlayState};
     let image = fixture::image(false);
