@@ -359,14 +359,14 @@ fn put<O, T>(object: *mut O, mark: u32, value: T) -> Result<(), FlexsplineStatus
 /// The value in an opaque object, to read.
 fn get<'a, O, T>(object: *const O, mark: u32) -> Result<&'a T, FlexsplineStatus> {
     usable(object)?;
-    // SAFETY: not null and aligned; all bytes of the mark are a number whatever they are. The value is only used if the
-    // mark says that `put` wrote it. The reference does not outlive the call it is made in.
-    let marked = unsafe { &*object.cast::<Marked<MaybeUninit<T>>>() };
-    if !is_marked(marked.mark, mark) {
+    let marked = object.cast::<Marked<T>>();
+    // SAFETY: not null and aligned, and all bytes of the mark are a number whatever they are. Nothing else is looked at
+    // before the mark says whose it is: another object may be smaller.
+    if !is_marked(unsafe { (&raw const (*marked).mark).read() }, mark) {
         return Err(FlexsplineStatus::NotInitialised);
     }
-    // SAFETY: marked, so written by `put`.
-    Ok(unsafe { marked.value.assume_init_ref() })
+    // SAFETY: marked, so written by `put`. The reference does not outlive the call it is made in.
+    Ok(unsafe { &(*marked).value })
 }
 
 /// The object behind a pointer, to write.
