@@ -15,7 +15,6 @@ use serde::{Serialize, Serializer};
 use thiserror::Error;
 
 use flexspline_base::suggest::did_you_mean;
-use flexspline_mechanics::drive::Wheel;
 pub use parameter::{Factor, Kind, Parameter, ParameterName, TIME, Usual, number};
 pub(crate) use spec::OF_THE_OUTPUT_ENCODER;
 use spec::{CauseSpec, SPECS};
@@ -250,31 +249,6 @@ pub(crate) enum InTable {
     AtOneOrientation,
     /// It cannot, and why.
     No(&'static str),
-}
-
-/// The field of a drive file that holds a cause.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum DriveField {
-    /// Eccentricity of the circular spline.
-    CircularSplineEccentricity,
-    /// Runout of the flexspline.
-    FlexsplineRunout,
-    /// Offset of the circular spline in a fixed direction; only of a drive that stays at one angle against gravity.
-    CircularSplineOffset,
-    /// Oval of the circular spline.
-    CircularSplineOvality,
-    /// Harmonics of the pitch of a wheel.
-    PitchHarmonics(Wheel),
-    /// A damaged tooth.
-    DamagedTooth,
-    /// Wear of the flanks of both wheels.
-    FlankWear,
-    /// Expansion of circular spline and housing.
-    Expansion,
-    /// Stiffness: of the sleeve where the drive is softer, of the material where it is stiffer.
-    Stiffness,
-    /// Change of Young's modulus with temperature.
-    StiffnessPerKelvin,
 }
 
 /// No cause has this name.

@@ -63,7 +63,6 @@ impl Teeth {
     }
 
     /// Of the wheel that is the output.
-    #[cfg(test)]
     pub(crate) const fn of_output(self) -> u32 {
         match self.fixed {
             Fixed::Flexspline => self.circular_spline,

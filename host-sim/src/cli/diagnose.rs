@@ -93,7 +93,7 @@ impl Diagnose {
             report::before(context, out, "diagnose", None);
         }
         let by_fem = |drive: &Drive, kind, mesh| match fresh_table(context, drive, kind, mesh) {
-            Err(Failure::BadInput(what) | Failure::Failed(what)) => Err(what),
+            Err(Failure::BadInput(what) | Failure::Failed(what)) => Err(what.into()),
             Ok(made) => Ok(made),
         };
         let remake: Option<&MakeTable<'_>> = if self.remake_tables { Some(&by_fem) } else { None };

@@ -13,10 +13,10 @@ use super::{Failure, bad_input, names, say};
 use flexspline_base::output::Outputs;
 use flexspline_identify::causes::{Parameter, Usual};
 use flexspline_identify::extension::{self, CauseEntry};
-use flexspline_identify::measurement::{ColumnMap, read};
+use flexspline_identify::measurement::{ColumnMap, Session, read};
 use flexspline_identify::nominal::Nominal;
 use flexspline_identify::synthesize::{
-    Chosen, Definition, Excitation, Plan, Plant, Richness, Sensors, Sizes, Unit, effects, parse, synthesize, to_csv,
+    Definition, Effect, Plan, Sensors, Sizes, Unit, completed, effects, parse, synthesize, to_csv, within_temperatures,
 };
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
@@ -154,8 +154,8 @@ struct Truth {
     schema_version: u32,
     command: String,
     seed: u64,
-    effects: Vec<Chosen>,
-    data_faults: Vec<Chosen>,
+    effects: Vec<Effect>,
+    data_faults: Vec<Effect>,
     nominal: NominalSource,
     unit: UnitTruth,
     noise_arcsec: f64,
@@ -172,7 +172,7 @@ impl Synthesize {
             return context.print_data(&all, list);
         }
         let chosen = self.effects.iter().map(|text| parse(text)).collect::<Result<Vec<_>, _>>();
-        let chosen = chosen.map_err(|what| Failure::BadInput(format!("--effect: {what}")))?;
+        let chosen = chosen.map_err(|error| Failure::BadInput(format!("--effect: {error}")))?;
         let (sensors, temperatures) = self.check()?;
         let seed = self.seed.unwrap_or_else(|| fastrand::u64(..1 << 32));
         let mut random = fastrand::Rng::with_seed(seed);
@@ -189,19 +189,19 @@ impl Synthesize {
             .as_deref()
             .map(|image| Table::check(image).map_err(|error| Failure::Failed(error.to_string())))
             .transpose()?;
-        let chosen: Vec<Chosen> = known.iter().filter_map(CauseEntry::effect).chain(chosen).collect();
-        let mut on = self.excitation(&nominal, &mut random)?;
+        let chosen: Vec<Effect> = known.iter().filter_map(CauseEntry::effect).chain(chosen).collect();
+        let mut motion = self.motion(&nominal, &mut random)?;
         if self.like.is_none() {
-            on.within_temperatures(temperatures);
+            within_temperatures(&mut motion, temperatures);
         }
         let unit = if self.no_spread { Unit::nominal(&nominal) } else { Unit::draw(&nominal, &mut random) };
         let sizes = Sizes {
             pitch_radius_mm: drive.circular_spline.pitch_radius_mm(),
             base_radius_mm: drive.circular_spline.base_radius_mm(),
         };
-        let plant = Plant { nominal: &nominal, table: table.as_ref() };
-        let made = synthesize(&plant, sizes, &chosen, &on, (&sensors, ENCODER_BITS), unit, &mut random)
-            .map_err(|what| Failure::BadInput(format!("--effect: {what}")))?;
+        let drive = (&nominal, table.as_ref());
+        let made = synthesize(drive, sizes, &chosen, motion, &sensors, &unit, &mut random)
+            .map_err(|error| Failure::BadInput(format!("--effect: {error}")))?;
         let csv = to_csv(&made.sessions, nominal.ratio, &made.effects, &mut random);
         let (data_faults, effects) = made.effects.into_iter().partition(|effect| effect.definition.is_fault());
         let truth = Truth {
@@ -212,15 +212,15 @@ impl Synthesize {
             data_faults,
             nominal: source,
             unit: UnitTruth {
-                wind_up_over_nominal: made.unit.wind_up,
-                clearance_over_nominal: made.unit.clearance,
-                zero_arcsec: made.unit.zero_arcsec,
+                wind_up_over_nominal: unit.wind_up,
+                clearance_over_nominal: unit.clearance,
+                zero_arcsec: unit.zero_arcsec,
             },
             noise_arcsec: self.noise_arcsec,
             wander_arcsec: self.wander_arcsec,
             encoder_bits: ENCODER_BITS,
             sessions: made.sessions.len(),
-            rows: made.sessions.iter().map(flexspline_identify::measurement::Session::len).sum(),
+            rows: made.sessions.iter().map(Session::len).sum(),
         };
         let out = context.out()?;
         let mut outputs = Outputs::new();
@@ -261,12 +261,14 @@ impl Synthesize {
                 white_arcsec: within("--noise-arcsec", self.noise_arcsec, 0.0, 1e5)?,
                 wander_arcsec: within("--wander-arcsec", self.wander_arcsec, 0.0, 1e5)?,
                 wander_s: WANDER_S,
+                encoder_bits: ENCODER_BITS,
             },
             temperatures,
         ))
     }
 
-    fn excitation(&self, nominal: &Nominal, random: &mut fastrand::Rng) -> Result<Excitation, Failure> {
+    /// Motion, load and surroundings: sessions without an error.
+    fn motion(&self, nominal: &Nominal, random: &mut fastrand::Rng) -> Result<Vec<Session>, Failure> {
         let Some(path) = &self.like else {
             let plan = Plan {
                 sessions: usize::from(self.sessions),
@@ -274,7 +276,6 @@ impl Synthesize {
                 rate_hz: RATE_HZ,
                 speed_rad_s: self.speed,
                 torque_n_m: self.torque,
-                richness: Richness::Rich,
             };
             return Ok(plan.excite(random));
         };
@@ -282,7 +283,7 @@ impl Synthesize {
         let map = map.map_err(|error| Failure::BadInput(format!("--columns: {error}")))?;
         let gear = nominal.gear();
         let recording = read(path, &map, &gear).map_err(bad_input)?;
-        Ok(Excitation::of_sessions(&recording.sessions, RATE_HZ, nominal.temperature_c))
+        Ok(completed(&recording.sessions, RATE_HZ, nominal.temperature_c))
     }
 
     /// How to diagnose what was made.

@@ -4,10 +4,12 @@ use std::f64::consts::TAU;
 
 use super::ParameterName as Name;
 use super::parameter::{ARCSECONDS, ENCODERS, HALF_LOAD, HARMONIC, WHEELS, microns, phase};
-use super::{CauseName, DriveField, Factor, InTable, Kin, Multiple, Need, Parameter, TIME, Turn, Usual, number};
+use super::{CauseName, Factor, InTable, Kin, Multiple, Need, Parameter, TIME, Turn, Usual, number};
+use crate::diagnosis::candidate::geometry::{self, Angle};
+use crate::diagnosis::candidate::{Excitation, Simulated, Values, dynamic, lobes, sensor, stiffness, thermal};
+use crate::extension::DriveField;
 use Multiple::{Fixed, Harmonic, ToothMesh};
 use Usual::{Follows, OfLoad, ToothPitch, Value};
-use flexspline_mechanics::drive::Wheel;
 
 /// The properties of a cause.
 pub(crate) struct CauseSpec {
@@ -39,6 +41,8 @@ pub(crate) struct CauseSpec {
     /// Whether something outside the library makes the same error, whatever is recorded: a shaft that is bent or
     /// misaligned before the output's encoder makes two waves in a turn, as a tilted encoder does.
     pub double_outside: bool,
+    /// The cause with known parameters, as its law makes it.
+    pub simulated: fn(&Excitation<'_>, Values<'_>) -> Simulated,
 }
 
 /// A cause without texts and parameters, like no other law, which a table can hold and no field of a drive.
@@ -57,6 +61,7 @@ const fn plain(of: CauseName) -> CauseSpec {
         twins: &[],
         made_by_loads: false,
         double_outside: false,
+        simulated: |_, _| unreachable!("each cause has its own"),
     }
 }
 
@@ -73,9 +78,12 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
         kin: Kin::Shape,
         needs: &[Need::Teeth],
         orders: &[(Turn::CircularSpline, Fixed(2.0)), (Turn::CircularSpline, Fixed(4.0))],
-        drive_field: Some(DriveField::CircularSplineEccentricity),
+        drive_field: DriveField::CIRCULAR_SPLINE_ECCENTRICITY,
         parameters: &[microns("how far", 10.0), ARCSECONDS, phase("whereto, on the circular spline"), HALF_LOAD],
         twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::AlongNormal)],
+        simulated: |on, p| {
+            geometry::simulated_displacement(CauseName::CircularSplineEccentricity, Angle::CircularSpline, on, p)
+        },
         ..plain(CauseName::CircularSplineEccentricity)
     },
     CauseSpec {
@@ -85,9 +93,10 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
         kin: Kin::Shape,
         needs: &[Need::Teeth],
         orders: &[(Turn::Flexspline, Fixed(2.0)), (Turn::Flexspline, Fixed(4.0))],
-        drive_field: Some(DriveField::FlexsplineRunout),
+        drive_field: DriveField::FLEXSPLINE_RUNOUT,
         parameters: &[microns("how far", 10.0), ARCSECONDS, phase("whereto, on the flexspline"), HALF_LOAD],
         twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::AlongNormal)],
+        simulated: |on, p| geometry::simulated_displacement(CauseName::FlexsplineRunout, Angle::Flexspline, on, p),
         ..plain(CauseName::FlexsplineRunout)
     },
     CauseSpec {
@@ -97,13 +106,14 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
         kin: Kin::Shape,
         needs: &[Need::Teeth],
         orders: &[(Turn::CircularSpline, Fixed(2.0))],
-        drive_field: Some(DriveField::CircularSplineOvality),
+        drive_field: DriveField::CIRCULAR_SPLINE_OVALITY,
         parameters: &[
             microns("of the radius", 8.0),
             ARCSECONDS,
             phase("angle of a crest of what both flanks have alike"),
         ],
         twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::Oval)],
+        simulated: |_, p| geometry::simulated_ovality(p),
         ..plain(CauseName::CircularSplineOvality)
     },
     CauseSpec {
@@ -113,9 +123,10 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
         kin: Kin::Shape,
         needs: &[Need::Teeth],
         orders: &[(Turn::Flexspline, Harmonic)],
-        drive_field: Some(DriveField::PitchHarmonics(Wheel::Flexspline)),
+        drive_field: DriveField::FLEXSPLINE_PITCH,
         parameters: &[microns("along the pitch", 5.0), ARCSECONDS, HARMONIC, phase("angle of a crest of the error")],
         twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::AlongPitch)],
+        simulated: |_, p| geometry::simulated_pitch(CauseName::FlexsplinePitchError, Angle::Flexspline, p),
         ..plain(CauseName::FlexsplinePitchError)
     },
     CauseSpec {
@@ -125,9 +136,10 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
         kin: Kin::Shape,
         needs: &[Need::Teeth],
         orders: &[(Turn::CircularSpline, Harmonic)],
-        drive_field: Some(DriveField::PitchHarmonics(Wheel::CircularSpline)),
+        drive_field: DriveField::CIRCULAR_SPLINE_PITCH,
         parameters: &[microns("along the pitch", 5.0), ARCSECONDS, HARMONIC, phase("angle of a crest of the error")],
         twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::AlongPitch)],
+        simulated: |_, p| geometry::simulated_pitch(CauseName::CircularSplinePitchError, Angle::CircularSpline, p),
         ..plain(CauseName::CircularSplinePitchError)
     },
     CauseSpec {
@@ -151,6 +163,7 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
             HALF_LOAD,
         ],
         twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::AlongPitch)],
+        simulated: lobes::simulated_generator_eccentricity,
         ..plain(CauseName::GeneratorEccentricity)
     },
     CauseSpec {
@@ -161,6 +174,7 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
         orders: &[(Turn::Generator, Fixed(4.0)), (Turn::Generator, Fixed(6.0)), (Turn::Generator, ToothMesh)],
         parameters: &[microns("of the error it makes", 3.0), ARCSECONDS, phase("of the form")],
         twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::AlongPitch)],
+        simulated: |_, p| geometry::simulated_cam_form_error(p),
         ..plain(CauseName::CamFormError)
     },
     CauseSpec {
@@ -170,7 +184,7 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
         kin: Kin::Pulse,
         needs: &[Need::Teeth, Need::Turns],
         orders: &[(Turn::OfWheel, Fixed(2.0)), (Turn::OfWheel, Fixed(4.0)), (Turn::OfWheel, Fixed(6.0))],
-        drive_field: Some(DriveField::DamagedTooth),
+        drive_field: DriveField::DAMAGED_TOOTH,
         parameters: &[
             number(Name::DepthUm, "depth that lacks, along the normal", 0.0, 500.0, Value(10.0)),
             number(Name::AmplitudeArcsec, "the same at the output, under the largest load", 0.0, 3000.0, Follows),
@@ -183,6 +197,7 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
             (Name::DepthUm, Name::AmplitudeArcsec, Factor::AlongNormal),
             (Name::Tooth, Name::AngleRad, Factor::Tooth),
         ],
+        simulated: |_, p| geometry::simulated_damaged_tooth(p),
         ..plain(CauseName::DamagedTooth)
     },
     CauseSpec {
@@ -208,6 +223,7 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
             ),
             number(Name::WidthRad, "half the arc over which it is felt", 0.02, 0.6, Value(0.15)),
         ],
+        simulated: stiffness::simulated_crack,
         ..plain(CauseName::CrackedToothRoot)
     },
     CauseSpec {
@@ -215,9 +231,10 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
         does: "more clearance than nominal throughout the data",
         meaning: "a wider clearance throughout",
         kin: Kin::Clearance,
-        drive_field: Some(DriveField::FlankWear),
+        drive_field: DriveField::FLANK_WEAR,
         made_by_loads: true,
         parameters: &[number(Name::GrowthArcsec, "whole width over nominal", 0.0, 10_000.0, Value(40.0))],
+        simulated: stiffness::simulated_backlash_growth,
         ..plain(CauseName::BacklashGrowth)
     },
     CauseSpec {
@@ -227,8 +244,9 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
         kin: Kin::Clearance,
         needs: &[Need::Use],
         in_table: InTable::No("it grows with use, and a table stays"),
-        drive_field: Some(DriveField::FlankWear),
+        drive_field: DriveField::FLANK_WEAR,
         parameters: &[number(Name::GrowthArcsec, "whole width, first row to last", 0.0, 10_000.0, Value(40.0))],
+        simulated: |_, p| stiffness::simulated_wear(p),
         ..plain(CauseName::Wear)
     },
     CauseSpec {
@@ -248,6 +266,7 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
             number(Name::HardeningExponent, "of the torque", 1.2, 8.0, Value(3.0)),
             number(Name::FullLoadNM, "the torque at which it is stated", 1e-3, 1e6, OfLoad(1.0)),
         ],
+        simulated: stiffness::simulated_hardening,
         ..plain(CauseName::StiffnessHardening)
     },
     CauseSpec {
@@ -256,8 +275,9 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
         meaning: "another stiffness than nominal",
         kin: Kin::Torque,
         needs: &[Need::Load],
-        drive_field: Some(DriveField::Stiffness),
+        drive_field: DriveField::STIFFNESS,
         parameters: &[number(Name::StiffnessRatio, "true over nominal", 0.05, 20.0, Value(0.8))],
+        simulated: |_, p| stiffness::simulated_stiffness_error(p),
         ..plain(CauseName::StiffnessError)
     },
     CauseSpec {
@@ -278,6 +298,7 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
             ),
             number(Name::SlipTorqueNM, "at which the middle spring slips", 1e-3, 1e6, OfLoad(0.2)),
         ],
+        simulated: stiffness::simulated_hysteresis,
         ..plain(CauseName::TorsionalHysteresis)
     },
     CauseSpec {
@@ -286,11 +307,12 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
         meaning: "a clearance that follows the temperature",
         kin: Kin::Clearance,
         needs: &[Need::Temperature, Need::TemperatureSpan],
-        drive_field: Some(DriveField::Expansion),
+        drive_field: DriveField::EXPANSION,
         parameters: &[
             number(Name::ClearanceArcsecPerK, "whole width, wider when warm", -50.0, 50.0, Value(-1.0)),
             number(Name::LagS, "with which it follows", 0.0, 1e5, Value(0.0)),
         ],
+        simulated: thermal::simulated_clearance,
         ..plain(CauseName::ThermalClearance)
     },
     CauseSpec {
@@ -299,8 +321,9 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
         meaning: "a stiffness that follows the temperature",
         kin: Kin::Torque,
         needs: &[Need::Temperature, Need::TemperatureSpan, Need::Load],
-        drive_field: Some(DriveField::StiffnessPerKelvin),
+        drive_field: DriveField::STIFFNESS_PER_KELVIN,
         parameters: &[number(Name::StiffnessRelativePerK, "of the stiffness", -0.02, 0.02, Value(-0.004))],
+        simulated: |_, p| thermal::simulated_stiffness(p),
         ..plain(CauseName::ThermalStiffness)
     },
     CauseSpec {
@@ -316,6 +339,7 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
             number(Name::SpeedExponent, "of the speed", 0.2, 1.2, Value(2.0 / 3.0)),
             number(Name::RelativeDragPerK, "of the drag", -0.15, 0.0, Value(-0.035)),
         ],
+        simulated: thermal::simulated_drag,
         ..plain(CauseName::LubricantViscosity)
     },
     CauseSpec {
@@ -331,6 +355,7 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
             number(Name::TorqueNM, "m g l", 0.0, 1e5, OfLoad(0.2)),
             phase("of sin(output + orientation + phase)"),
         ],
+        simulated: dynamic::simulated_gravity_torque,
         ..plain(CauseName::GravityTorque)
     },
     CauseSpec {
@@ -341,9 +366,10 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
         needs: &[Need::Teeth],
         orders: &[(Turn::Generator, Fixed(2.0)), (Turn::Generator, Fixed(4.0))],
         in_table: InTable::AtOneOrientation,
-        drive_field: Some(DriveField::CircularSplineOffset),
+        drive_field: DriveField::CIRCULAR_SPLINE_OFFSET,
         parameters: &[microns("how far", 10.0), ARCSECONDS, phase("whereto, against gravity"), HALF_LOAD],
         twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::AlongNormal)],
+        simulated: |on, p| geometry::simulated_displacement(CauseName::GravitySideLoad, Angle::Gravity(1.0), on, p),
         ..plain(CauseName::GravitySideLoad)
     },
     CauseSpec {
@@ -357,6 +383,7 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
             number(Name::FrequencyHz, "of the free oscillation", 0.1, 1000.0, Value(8.0)),
             number(Name::DampingRatio, "of critical damping", 0.001, 0.9, Value(0.03)),
         ],
+        simulated: dynamic::simulated_resonance,
         ..plain(CauseName::TorsionalResonance)
     },
     CauseSpec {
@@ -370,6 +397,7 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
             number(Name::AmplitudeArcsec, "at the output", 0.0, 10_000.0, Value(20.0)),
             phase("of sin(output + phase)"),
         ],
+        simulated: |_, p| sensor::simulated_encoder(CauseName::OutputEncoderEccentricity, true, 1.0, p),
         ..plain(CauseName::OutputEncoderEccentricity)
     },
     CauseSpec {
@@ -383,6 +411,7 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
             phase("of sin(generator + phase)"),
         ],
         twins: &[(Name::AmplitudeArcsec, Name::GeneratorAmplitudeArcsec, Factor::Ratio)],
+        simulated: |_, p| sensor::simulated_encoder(CauseName::GeneratorEncoderEccentricity, false, 1.0, p),
         ..plain(CauseName::GeneratorEncoderEccentricity)
     },
     CauseSpec {
@@ -397,6 +426,7 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
             phase("of sin(2 output + phase)"),
         ],
         double_outside: true,
+        simulated: |_, p| sensor::simulated_encoder(CauseName::OutputEncoderTilt, true, 2.0, p),
         ..plain(CauseName::OutputEncoderTilt)
     },
     CauseSpec {
@@ -411,6 +441,7 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
             phase("of sin(2 generator + phase)"),
         ],
         twins: &[(Name::AmplitudeArcsec, Name::GeneratorAmplitudeArcsec, Factor::Ratio)],
+        simulated: |_, p| sensor::simulated_encoder(CauseName::GeneratorEncoderTilt, false, 2.0, p),
         ..plain(CauseName::GeneratorEncoderTilt)
     },
     CauseSpec {
@@ -426,6 +457,9 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
             phase("of sin(harmonic angle + phase)"),
         ],
         twins: &[(Name::AmplitudeArcsec, Name::GeneratorAmplitudeArcsec, Factor::Ratio)],
+        simulated: |_, p| {
+            sensor::simulated_encoder(CauseName::EncoderSubdivision, p(Name::Encoder) > 0.5, p(Name::Harmonic), p)
+        },
         ..plain(CauseName::EncoderSubdivision)
     },
     CauseSpec {
@@ -437,6 +471,7 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
         in_table: InTable::No("it follows the speed, and a table knows none"),
         made_by_loads: true,
         parameters: &[number(Name::DelayS, "positive: the output's is older", -0.1, 0.1, Value(0.002))],
+        simulated: |_, p| sensor::simulated_latency(p),
         ..plain(CauseName::SensorLatency)
     },
     CauseSpec {
@@ -446,6 +481,7 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
         in_table: InTable::No("it grows from turn to turn, and a table repeats"),
         made_by_loads: true,
         parameters: &[number(Name::RatioRelativeError, "of the output angle", -0.01, 0.01, Value(1e-4))],
+        simulated: |_, p| sensor::simulated_ratio_error(p),
         ..plain(CauseName::RatioError)
     },
     CauseSpec {
@@ -455,6 +491,7 @@ pub(super) static SPECS: [CauseSpec; CauseName::ALL.len()] = [
         needs: &[Need::Teeth, Need::Jump],
         in_table: InTable::No("it happens at an instant"),
         parameters: &[number(Name::JumpArcsec, "of the output, whole teeth", -1e5, 1e5, ToothPitch), TIME],
+        simulated: |_, p| stiffness::simulated_ratcheting(p),
         ..plain(CauseName::Ratcheting)
     },
 ];

@@ -9,6 +9,7 @@
 //! [`Subject`] is what the rows are held against. [`read_rows`] and [`diagnose_rows`] come to the verdict;
 //! [`Diagnosed::extend`] makes the extended drive and its tables. Nothing is printed or written here.
 
+use std::error::Error;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -22,15 +23,15 @@ use super::{CauseSet, DiagnosisError, Extended, Settings, diagnose_extended};
 use super::{blurred, channels, quieted, torque_zero, zeros};
 use crate::causes::CauseName;
 use crate::extension::{
-    Agreement, CauseEntry, Evaluation, EvaluationError, ExtendedTables, FoundGeometry, Model, Remake, TableSubject,
-    causes_to_toml, check_by_fem, evaluate, found_geometry,
+    Agreement, CauseEntry, Evaluation, EvaluationError, ExtendedTables, FoundGeometry, Model, Remake, RemakeError,
+    TableSubject, causes_to_toml, check_by_fem, evaluate, found_geometry,
 };
 use crate::measurement::{
     ColumnMap, Fault, FaultName, IN_DEGREES, MeasuredError, Quantity, Recording, Session, Treatment, bytes_of, parse,
     parse_as,
 };
 use crate::nominal::Nominal;
-use crate::synthesize::Sizes;
+use crate::synthesize::{EffectError, Sizes};
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::kernels::Kernels;
 use flexspline_design::tables::MadeTable;
@@ -87,8 +88,8 @@ pub enum PipelineError {
     #[error(transparent)]
     Read(#[from] MeasuredError),
     /// What the model knows already does not fit the rows.
-    #[error("{0}")]
-    Known(String),
+    #[error(transparent)]
+    Known(EffectError),
     /// The rows cannot be diagnosed.
     #[error(transparent)]
     Diagnosis(#[from] DiagnosisError),
@@ -99,8 +100,8 @@ pub enum PipelineError {
     #[error("the FEM of the extended drive: {0}")]
     Fem(#[from] SolveError),
     /// No table was made by FEM.
-    #[error("{0}")]
-    Remake(String),
+    #[error(transparent)]
+    Remake(RemakeError),
 }
 
 impl PipelineError {
@@ -209,7 +210,8 @@ impl<'a> Subject<'a> {
 }
 
 /// Makes a table of a drive by FEM; the caller knows how to show that it goes on.
-pub type MakeTable<'a> = dyn Fn(&Drive, GeneratorKind, MeshLevel) -> Result<MadeTable, String> + 'a;
+pub type MakeTable<'a> =
+    dyn Fn(&Drive, GeneratorKind, MeshLevel) -> Result<MadeTable, Box<dyn Error + Send + Sync>> + 'a;
 
 /// How a file is diagnosed.
 #[derive(Clone, Copy, Default)]
@@ -329,11 +331,10 @@ pub fn diagnose_rows(
     let table_subject = subject.table_subject();
     let tables = tables_of(subject, &table_subject, &recording.sessions);
     let causes: Vec<CauseName> = diagnosis.causes.iter().map(|cause| cause.name).collect();
-    let remake = |fitted: &Extended| -> Result<Option<Vec<u8>>, String> {
+    let remake = |fitted: &Extended| -> Result<Option<Vec<u8>>, RemakeError> {
         let Some(make) = options.remake else { return Ok(None) };
         let entries: Vec<CauseEntry> = fitted.causes().iter().map(CauseEntry::of_fitted).collect();
-        let found = found_geometry(&subject.drive, fitted, &entries, (nominal, table), tables.orientation_rad)
-            .map_err(|error| error.to_string())?;
+        let found = found_geometry(&subject.drive, fitted, &entries, (nominal, table), tables.orientation_rad)?;
         Ok(remade(make, subject, &found, options.mesh)?.map(|made| made.image))
     };
     let remake: Option<&Remake<'_>> = if options.remake.is_some() { Some(&remake) } else { None };
@@ -421,7 +422,7 @@ impl Diagnosed {
     ) -> Result<Made, PipelineError> {
         let mut extension = Extension {
             tables_not_written: match &self.evaluation {
-                Ok(evaluation) => evaluation.worth_writing().err(),
+                Ok(evaluation) => evaluation.worth_writing().err().map(|why| why.to_string()),
                 Err(error) => Some(error.to_string()),
             },
             compensation: self.evaluation.as_ref().ok().cloned(),
@@ -501,12 +502,12 @@ fn remade(
     subject: &Subject<'_>,
     found: &FoundGeometry,
     mesh: Option<MeshLevel>,
-) -> Result<Option<MadeTable>, String> {
+) -> Result<Option<MadeTable>, RemakeError> {
     // What is in no field of the drive would be missing in a table by FEM.
     if found.rest.iter().any(|cause| cause.name.no_place_in_a_table().is_none()) {
         return Ok(None);
     }
-    make(&found.drive, subject.kind, subject.mesh(mesh)).map(Some)
+    Ok(Some(make(&found.drive, subject.kind, subject.mesh(mesh))?))
 }
 
 /// Tables of the extended model over what the rows hold: their largest torque, their temperatures, the angle against

@@ -14,6 +14,7 @@ use crate::diagnosis::{DiagnosisError, Extended, Settings};
 use crate::measurement::{Session, rms};
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::TableError;
+use flexspline_mechanics::drive::DriveError;
 
 /// Extended tables are written if they improve on the nominal ones in at least this share of the sessions held out.
 pub const LEAST_SHARE_IMPROVED: f64 = 2.0 / 3.0;
@@ -68,20 +69,32 @@ impl Evaluation {
     ///
     /// # Errors
     /// The reason.
-    pub(crate) fn worth_writing(&self) -> Result<(), String> {
+    pub(crate) fn worth_writing(&self) -> Result<(), NotWorthWriting> {
         if self.applied.is_empty() {
-            return Err("no cause found has a place in a table".to_owned());
+            return Err(NotWorthWriting::NoCause);
         }
-        let share = self.improved as f64 / self.sessions.len().max(1) as f64;
-        if share + 1e-9 < LEAST_SHARE_IMPROVED {
-            return Err(format!(
-                "they are better in {} of {} sessions held out; two of three are asked for",
-                self.improved,
-                self.sessions.len()
-            ));
+        let (improved, sessions) = (self.improved, self.sessions.len());
+        if improved as f64 / sessions.max(1) as f64 + 1e-9 < LEAST_SHARE_IMPROVED {
+            return Err(NotWorthWriting::TooFewImproved { improved, sessions });
         }
         Ok(())
     }
+}
+
+/// Why extended tables are not written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum NotWorthWriting {
+    /// They would be the nominal ones.
+    #[error("no cause found has a place in a table")]
+    NoCause,
+    /// They are no better than the nominal ones.
+    #[error("they are better in {improved} of {sessions} sessions held out; two of three are asked for")]
+    TooFewImproved {
+        /// Sessions in which they are better.
+        improved: usize,
+        /// Sessions held out.
+        sessions: usize,
+    },
 }
 
 /// Cuts sessions into those to learn from (true) and those held out: every second one; with fewer than three sessions
@@ -128,12 +141,23 @@ pub enum EvaluationError {
     #[error(transparent)]
     Table(#[from] TableError),
     /// No table was made otherwise.
-    #[error("{0}")]
-    Remake(String),
+    #[error(transparent)]
+    Remake(RemakeError),
+}
+
+/// Why no table of the extended drive was made by FEM.
+#[derive(Debug, thiserror::Error)]
+pub enum RemakeError {
+    /// The causes make no drive.
+    #[error(transparent)]
+    Drive(#[from] DriveError),
+    /// The caller, who makes the table, failed or was stopped.
+    #[error(transparent)]
+    Make(#[from] Box<dyn std::error::Error + Send + Sync>),
 }
 
 /// Makes the image of a table of an extended model by other means than sampling it, if it can.
-pub type Remake<'a> = dyn Fn(&Extended) -> Result<Option<Vec<u8>>, String> + 'a;
+pub type Remake<'a> = dyn Fn(&Extended) -> Result<Option<Vec<u8>>, RemakeError> + 'a;
 
 /// Fits the causes to the sessions to learn from, makes tables of what was found, and runs the core over the others.
 ///
@@ -281,7 +305,7 @@ mod tests {
         };
         let cause = [CauseName::BacklashGrowth];
         assert!(with(&[true, true, false], &cause).worth_writing().is_ok());
-        assert!(with(&[true, false], &cause).worth_writing().unwrap_err().contains("better in 1 of 2"));
-        assert!(with(&[true, true], &[]).worth_writing().unwrap_err().contains("no cause"));
+        assert!(with(&[true, false], &cause).worth_writing().unwrap_err().to_string().contains("better in 1 of 2"));
+        assert!(with(&[true, true], &[]).worth_writing() == Err(NotWorthWriting::NoCause));
     }
 }

@@ -19,7 +19,7 @@ use std::f64::consts::{PI, TAU};
 use flexspline::Table;
 
 use super::model::CauseEntry;
-use crate::causes::{CauseName, DriveField, ParameterName as Name};
+use crate::causes::{CauseName, ParameterName as Name};
 use crate::diagnosis::Extended;
 use crate::measurement::Session;
 use crate::nominal::Nominal;
@@ -93,7 +93,7 @@ impl Wave {
 }
 
 /// What a cause adds under the probing load on either flank, over a turn of the output.
-struct Probe {
+pub(crate) struct Probe {
     generator: Vec<f64>,
     ratio: f64,
     /// Under the positive and the negative load; per cause.
@@ -152,6 +152,230 @@ fn degrees(phase: f64) -> f64 {
     phase.to_degrees().rem_euclid(360.0)
 }
 
+/// How a drive file holds a cause.
+pub(crate) struct DriveField {
+    /// Whether it depends on where the drive stands in its turns: its place is read from what the cause adds.
+    pub by_angle: bool,
+    /// Sets the fields; none where the drive holds nothing of it.
+    pub set: fn(&mut Placing<'_>),
+}
+
+/// A cause on its way into a drive.
+pub(crate) struct Placing<'a> {
+    drive: &'a Drive,
+    found: &'a mut Drive,
+    nominal: &'a Nominal,
+    cause: &'a CauseEntry,
+    probe: &'a Probe,
+    /// Which of the causes of the probe it is.
+    at: usize,
+    /// Whether the drive stays at one angle against gravity.
+    at_one_orientation: bool,
+    /// The fields that were set, `path = value`.
+    fields: Vec<String>,
+}
+
+/// Rounded to four digits behind the point.
+fn rounded(value: f64) -> f64 {
+    (value * 1e4).round() / 1e4
+}
+
+/// Arc-seconds at a radius (mm), µm.
+fn um(arcsec: f64, radius_mm: f64) -> f64 {
+    1e3 * arcsec / ARCSEC_PER_RAD * radius_mm
+}
+
+impl Placing<'_> {
+    fn value(&self, name: Name) -> Option<f64> {
+        self.cause.parameters.get(name.as_str()).copied()
+    }
+
+    /// Changes a number of the file, and says what it is then.
+    fn set(&mut self, path: &str, change: impl FnOnce(f64) -> f64) {
+        if let Some(number) = self.found.number_mut(path) {
+            *number = change(*number);
+            self.fields.push(format!("{path} = {number}"));
+        }
+    }
+
+    /// Adds to a coefficient, which is written as a power of ten.
+    fn add(&mut self, path: &str, more: f64) {
+        if let Some(number) = self.found.number_mut(path) {
+            *number += more;
+            self.fields.push(format!("{path} = {number:e}"));
+        }
+    }
+
+    /// Size and place of the second order of what the cause adds, at a radius (mm).
+    fn set_second_order(
+        &mut self,
+        on_circular_spline: bool,
+        read: fn([Wave; 2], f64) -> Wave,
+        radius_mm: f64,
+        [size, phase]: [&str; 2],
+    ) {
+        let flank_angle_rad = self.drive.circular_spline.bearing_flank_angle_rad();
+        let wave = read(self.probe.wave(self.at, on_circular_spline, 2.0), flank_angle_rad);
+        self.set(size, |_| rounded(um(wave.size(), radius_mm)));
+        self.set(phase, |_| rounded(degrees(0.5 * wave.phase())));
+    }
+
+    /// A displacement: along the normal of the flanks.
+    fn set_displacement(&mut self, on_circular_spline: bool, paths: [&str; 2]) {
+        let base_mm = self.drive.circular_spline.base_radius_mm();
+        self.set_second_order(on_circular_spline, displaced, base_mm, paths);
+    }
+
+    /// Harmonics of the pitch of a wheel.
+    fn set_pitch_harmonics(&mut self, wheel: Wheel) {
+        let on_circular_spline = wheel == Wheel::CircularSpline;
+        let (f, c, built) = (&self.drive.flexspline, &self.drive.circular_spline, &mut self.found.as_built);
+        let (field, list, radius, sign) = if on_circular_spline {
+            let radius = 0.5 * (c.root_radius_mm + c.tip_radius_mm);
+            ("circular_spline_pitch_harmonics", &mut built.circular_spline_pitch_harmonics, radius, -1.0)
+        } else {
+            let radius = 0.5 * (f.root_radius_mm + f.tip_radius_mm);
+            ("flexspline_pitch_harmonics", &mut built.flexspline_pitch_harmonics, radius, 1.0)
+        };
+        // Two lobes that share the load alike cancel odd orders; their size says nothing of the wheel.
+        for order in [2_u32, 4, 6] {
+            let [plus, minus] = self.probe.wave(self.at, on_circular_spline, f64::from(order));
+            let wave = plus.plus(minus).times(0.5 * sign);
+            let amplitude_um = rounded(um(wave.size(), radius));
+            if amplitude_um >= 0.1 {
+                let phase_deg = rounded(degrees(wave.phase() / f64::from(order)));
+                self.fields.push(format!(
+                    "as_built.{field}: order = {order}, amplitude_um = {amplitude_um}, phase_deg = {phase_deg}"
+                ));
+                list.push(Harmonic { order, amplitude_um, phase_deg });
+            }
+        }
+    }
+
+    fn set_damaged_tooth(&mut self) {
+        let [tooth, wheel, depth] = [Name::Tooth, Name::Wheel, Name::DepthUm].map(|name| self.value(name));
+        let (Some(tooth), Some(wheel), Some(depth)) = (tooth, wheel, depth) else { return };
+        let (wheel, teeth) = match wheel < 0.5 {
+            true => (Wheel::Flexspline, self.drive.flexspline.teeth),
+            false => (Wheel::CircularSpline, self.drive.circular_spline.teeth),
+        };
+        // Under a positive load the clockwise flanks of the flexspline bear, and the others of the circular spline.
+        let felt = [0, 1].map(|flank: usize| {
+            self.probe.error[flank][self.at].iter().fold(0.0, |most: f64, error| most.max(error.abs()))
+        });
+        let flank = match (felt[0] > felt[1]) == (wheel == Wheel::Flexspline) {
+            _ if felt[0].min(felt[1]) > 0.5 * felt[0].max(felt[1]) => DamagedFlank::Both,
+            true => DamagedFlank::Minus,
+            false => DamagedFlank::Plus,
+        };
+        let damaged = DamagedTooth {
+            wheel,
+            tooth: (tooth.rem_euclid(f64::from(teeth))) as u32 % teeth,
+            flank,
+            depth_um: (depth.clamp(0.0, 500.0) * 100.0).round() / 100.0,
+        };
+        self.fields.push(format!(
+            "as_built.damaged_teeth: wheel = {}, tooth = {}, flank = {}, depth_um = {}",
+            wheel.name(),
+            damaged.tooth,
+            flank.name(),
+            damaged.depth_um
+        ));
+        self.found.as_built.damaged_teeth.push(damaged);
+    }
+
+    fn set_wear(&mut self) {
+        let Some(growth) = self.value(Name::GrowthArcsec).filter(|growth| *growth > 0.0) else { return };
+        // Half of it from the flanks of either wheel.
+        let depth = 0.25 * um(growth, self.drive.circular_spline.base_radius_mm());
+        for path in ["as_built.flexspline_wear_um", "as_built.circular_spline_wear_um"] {
+            self.set(path, |before| rounded(before + depth));
+        }
+    }
+
+    fn set_expansion(&mut self) {
+        let Some(per_k) = self.value(Name::ClearanceArcsecPerK) else { return };
+        // A ring that grows by dr opens its spaces by 2 dr tan a / r.
+        let more = per_k / ARCSEC_PER_RAD / (2.0 * self.drive.circular_spline.bearing_flank_angle_rad().tan());
+        for path in ["temperature.circular_spline_expansion_per_k", "temperature.housing_expansion_per_k"] {
+            self.add(path, more);
+        }
+    }
+
+    /// The sleeve where the drive is softer, the material where it is stiffer.
+    fn set_stiffness(&mut self) {
+        let Some(ratio) = self.value(Name::StiffnessRatio).filter(|ratio| *ratio > 0.0) else { return };
+        if ratio >= 1.0 {
+            return self.set("material.youngs_modulus_mpa", |modulus| rounded(modulus * ratio));
+        }
+        // What gives more is put in series: the sleeve.
+        let nominal_k = self.nominal.stiffness.last().map_or(f64::INFINITY, |[_, k]| *k);
+        let before = self.drive.sleeve.torsion_stiffness_n_m_per_rad.map_or(0.0, |k| 1.0 / k);
+        let k = (1.0 / (before + (1.0 / ratio - 1.0) / nominal_k)).round();
+        self.found.sleeve.torsion_stiffness_n_m_per_rad = Some(k);
+        if self.found.sleeve.kind == SleeveKind::None {
+            self.found.sleeve.kind = SleeveKind::Springs;
+            self.fields.push("sleeve.kind = \"springs\"".to_owned());
+        }
+        self.fields.push(format!("sleeve.torsion_stiffness_n_m_per_rad = {k}"));
+    }
+
+    fn set_stiffness_per_k(&mut self) {
+        let Some(per_k) = self.value(Name::StiffnessRelativePerK) else { return };
+        if (self.found.temperature.youngs_modulus_per_k + per_k).abs() <= 1e-3 {
+            self.add("temperature.youngs_modulus_per_k", per_k);
+        }
+    }
+}
+
+impl DriveField {
+    const fn by_angle(set: fn(&mut Placing<'_>)) -> Option<DriveField> {
+        Some(DriveField { by_angle: true, set })
+    }
+
+    const fn throughout(set: fn(&mut Placing<'_>)) -> Option<DriveField> {
+        Some(DriveField { by_angle: false, set })
+    }
+
+    /// Eccentricity of the circular spline.
+    pub(crate) const CIRCULAR_SPLINE_ECCENTRICITY: Option<DriveField> = DriveField::by_angle(|placing| {
+        let paths = ["as_built.circular_spline_eccentricity_um", "as_built.circular_spline_eccentricity_phase_deg"];
+        placing.set_displacement(true, paths);
+    });
+    /// Runout of the flexspline.
+    pub(crate) const FLEXSPLINE_RUNOUT: Option<DriveField> = DriveField::by_angle(|placing| {
+        placing.set_displacement(false, ["as_built.flexspline_runout_um", "as_built.flexspline_runout_phase_deg"]);
+    });
+    /// Offset of the circular spline in a fixed direction; only of a drive that stays at one angle against gravity.
+    pub(crate) const CIRCULAR_SPLINE_OFFSET: Option<DriveField> = DriveField::by_angle(|placing| {
+        if placing.at_one_orientation {
+            let paths = ["as_built.circular_spline_offset_um", "as_built.circular_spline_offset_direction_deg"];
+            placing.set_displacement(false, paths);
+        }
+    });
+    /// Oval of the circular spline.
+    pub(crate) const CIRCULAR_SPLINE_OVALITY: Option<DriveField> = DriveField::by_angle(|placing| {
+        let paths = ["as_built.circular_spline_ovality_um", "as_built.circular_spline_ovality_phase_deg"];
+        placing.set_second_order(true, oval, placing.drive.circular_spline.pitch_radius_mm(), paths);
+    });
+    /// Harmonics of the pitch of a wheel.
+    pub(crate) const FLEXSPLINE_PITCH: Option<DriveField> =
+        DriveField::by_angle(|placing| placing.set_pitch_harmonics(Wheel::Flexspline));
+    pub(crate) const CIRCULAR_SPLINE_PITCH: Option<DriveField> =
+        DriveField::by_angle(|placing| placing.set_pitch_harmonics(Wheel::CircularSpline));
+    /// A damaged tooth.
+    pub(crate) const DAMAGED_TOOTH: Option<DriveField> = DriveField::by_angle(|placing| placing.set_damaged_tooth());
+    /// Wear of the flanks of both wheels.
+    pub(crate) const FLANK_WEAR: Option<DriveField> = DriveField::throughout(|placing| placing.set_wear());
+    /// Expansion of circular spline and housing.
+    pub(crate) const EXPANSION: Option<DriveField> = DriveField::throughout(|placing| placing.set_expansion());
+    /// Stiffness.
+    pub(crate) const STIFFNESS: Option<DriveField> = DriveField::throughout(|placing| placing.set_stiffness());
+    /// Change of Young's modulus with temperature.
+    pub(crate) const STIFFNESS_PER_KELVIN: Option<DriveField> =
+        DriveField::throughout(|placing| placing.set_stiffness_per_k());
+}
+
 /// Puts the causes that are geometry into a drive.
 ///
 /// # Errors
@@ -166,179 +390,27 @@ pub(crate) fn found_geometry(
     let step = TAU * nominal.ratio.abs() / POSITIONS as f64;
     let generator: Vec<f64> = (0..POSITIONS).map(|k| k as f64 * step).collect();
     let probe = Probe::new(extended, nominal, table, generator, orientation_rad.unwrap_or(0.0));
-    let um = |arcsec: f64, radius_mm: f64| 1e3 * arcsec / ARCSEC_PER_RAD * radius_mm;
-    let base_mm = drive.circular_spline.base_radius_mm();
-    let pitch_mm = drive.circular_spline.pitch_radius_mm();
-    let flank_angle_rad = drive.circular_spline.bearing_flank_angle_rad();
     let mut found = drive.clone();
     let (mut mapped, mut rest) = (Vec::new(), Vec::new());
     for cause in causes {
-        let value = |name: Name| cause.parameters.get(name.as_str()).copied();
-        let mut fields: Vec<String> = Vec::new();
-        let mut by_angle = true;
-        let built = &mut found.as_built;
-        let place = extended.causes().iter().position(|fitted| fitted.name() == cause.name);
-        let mut set = |field: &str, slot: &mut f64, value: f64| {
-            *slot = (value * 1e4).round() / 1e4;
-            fields.push(format!("{field} = {slot}"));
-        };
-        let middle = |root: f64, tip: f64| 0.5 * (root + tip);
-        match (cause.name.spec().drive_field, place) {
-            (Some(DriveField::CircularSplineEccentricity), Some(k)) => {
-                let wave = displaced(probe.wave(k, true, 2.0), flank_angle_rad);
-                let (size, phase) =
-                    (&mut built.circular_spline_eccentricity_um, &mut built.circular_spline_eccentricity_phase_deg);
-                set("as_built.circular_spline_eccentricity_um", size, um(wave.size(), base_mm));
-                set("as_built.circular_spline_eccentricity_phase_deg", phase, degrees(0.5 * wave.phase()));
-            }
-            (Some(DriveField::FlexsplineRunout), Some(k)) => {
-                let wave = displaced(probe.wave(k, false, 2.0), flank_angle_rad);
-                let (size, phase) = (&mut built.flexspline_runout_um, &mut built.flexspline_runout_phase_deg);
-                set("as_built.flexspline_runout_um", size, um(wave.size(), base_mm));
-                set("as_built.flexspline_runout_phase_deg", phase, degrees(0.5 * wave.phase()));
-            }
-            (Some(DriveField::CircularSplineOffset), Some(k)) if orientation_rad.is_some() => {
-                let wave = displaced(probe.wave(k, false, 2.0), flank_angle_rad);
-                let (size, phase) =
-                    (&mut built.circular_spline_offset_um, &mut built.circular_spline_offset_direction_deg);
-                set("as_built.circular_spline_offset_um", size, um(wave.size(), base_mm));
-                set("as_built.circular_spline_offset_direction_deg", phase, degrees(0.5 * wave.phase()));
-            }
-            (Some(DriveField::CircularSplineOvality), Some(k)) => {
-                let wave = oval(probe.wave(k, true, 2.0), flank_angle_rad);
-                let (size, phase) =
-                    (&mut built.circular_spline_ovality_um, &mut built.circular_spline_ovality_phase_deg);
-                set("as_built.circular_spline_ovality_um", size, um(wave.size(), pitch_mm));
-                set("as_built.circular_spline_ovality_phase_deg", phase, degrees(0.5 * wave.phase()));
-            }
-            (Some(DriveField::PitchHarmonics(wheel)), Some(k)) => {
-                let on_circular_spline = wheel == Wheel::CircularSpline;
-                let (f, c) = (&drive.flexspline, &drive.circular_spline);
-                let (field, list, radius, sign) = if on_circular_spline {
-                    let radius = middle(c.root_radius_mm, c.tip_radius_mm);
-                    ("circular_spline_pitch_harmonics", &mut built.circular_spline_pitch_harmonics, radius, -1.0)
-                } else {
-                    let radius = middle(f.root_radius_mm, f.tip_radius_mm);
-                    ("flexspline_pitch_harmonics", &mut built.flexspline_pitch_harmonics, radius, 1.0)
-                };
-                // Two lobes that share the load alike cancel odd orders; their size says nothing of the wheel.
-                for order in [2_u32, 4, 6] {
-                    let [plus, minus] = probe.wave(k, on_circular_spline, f64::from(order));
-                    let wave = plus.plus(minus).times(0.5 * sign);
-                    let amplitude_um = (um(wave.size(), radius) * 1e4).round() / 1e4;
-                    if amplitude_um >= 0.1 {
-                        let phase_deg = (degrees(wave.phase() / f64::from(order)) * 1e4).round() / 1e4;
-                        fields.push(format!(
-                            "as_built.{field}: order = {order}, amplitude_um = {amplitude_um}, phase_deg = {phase_deg}"
-                        ));
-                        list.push(Harmonic { order, amplitude_um, phase_deg });
-                    }
-                }
-            }
-            (Some(DriveField::DamagedTooth), Some(k)) => {
-                if let (Some(tooth), Some(wheel), Some(depth)) =
-                    (value(Name::Tooth), value(Name::Wheel), value(Name::DepthUm))
-                {
-                    let wheel = if wheel < 0.5 { Wheel::Flexspline } else { Wheel::CircularSpline };
-                    let teeth =
-                        if wheel == Wheel::Flexspline { drive.flexspline.teeth } else { drive.circular_spline.teeth };
-                    // Under a positive load the clockwise flanks of the flexspline bear, and the others of the circular
-                    // spline.
-                    let felt =
-                        [0, 1].map(|flank: usize| probe.error[flank][k].iter().fold(0.0, |m: f64, e| m.max(e.abs())));
-                    let minus = (felt[0] > felt[1]) == (wheel == Wheel::Flexspline);
-                    let flank = match felt[0].min(felt[1]) > 0.5 * felt[0].max(felt[1]) {
-                        true => DamagedFlank::Both,
-                        false if minus => DamagedFlank::Minus,
-                        false => DamagedFlank::Plus,
-                    };
-                    let damaged = DamagedTooth {
-                        wheel,
-                        tooth: (tooth.rem_euclid(f64::from(teeth))) as u32 % teeth,
-                        flank,
-                        depth_um: (depth.clamp(0.0, 500.0) * 100.0).round() / 100.0,
-                    };
-                    fields.push(format!(
-                        "as_built.damaged_teeth: wheel = {}, tooth = {}, flank = {}, depth_um = {}",
-                        wheel.name(),
-                        damaged.tooth,
-                        flank.name(),
-                        damaged.depth_um
-                    ));
-                    built.damaged_teeth.push(damaged);
-                }
-            }
-            (Some(DriveField::FlankWear), _) => {
-                by_angle = false;
-                if let Some(growth) = value(Name::GrowthArcsec).filter(|growth| *growth > 0.0) {
-                    // Half of it from the flanks of either wheel.
-                    let depth = 0.25 * um(growth, base_mm);
-                    let (f, c) = (built.flexspline_wear_um + depth, built.circular_spline_wear_um + depth);
-                    set("as_built.flexspline_wear_um", &mut built.flexspline_wear_um, f);
-                    set("as_built.circular_spline_wear_um", &mut built.circular_spline_wear_um, c);
-                }
-            }
-            (Some(DriveField::Expansion), _) => {
-                by_angle = false;
-                if let Some(per_k) = value(Name::ClearanceArcsecPerK) {
-                    // A ring that grows by dr opens its spaces by 2 dr tan a / r.
-                    let more = per_k / ARCSEC_PER_RAD / (2.0 * flank_angle_rad.tan());
-                    let t = &mut found.temperature;
-                    for (field, slot) in [
-                        ("temperature.circular_spline_expansion_per_k", &mut t.circular_spline_expansion_per_k),
-                        ("temperature.housing_expansion_per_k", &mut t.housing_expansion_per_k),
-                    ] {
-                        *slot += more;
-                        fields.push(format!("{field} = {slot:e}"));
-                    }
-                }
-            }
-            (Some(DriveField::Stiffness), _) => {
-                by_angle = false;
-                if let Some(ratio) = value(Name::StiffnessRatio).filter(|ratio| *ratio > 0.0) {
-                    if ratio < 1.0 {
-                        // What gives more is put in series: the sleeve.
-                        let nominal_k = nominal.stiffness.last().map_or(f64::INFINITY, |[_, k]| *k);
-                        let before = drive.sleeve.torsion_stiffness_n_m_per_rad.map_or(0.0, |k| 1.0 / k);
-                        let k = 1.0 / (before + (1.0 / ratio - 1.0) / nominal_k);
-                        found.sleeve.torsion_stiffness_n_m_per_rad = Some(k.round());
-                        if found.sleeve.kind == SleeveKind::None {
-                            found.sleeve.kind = SleeveKind::Springs;
-                            fields.push("sleeve.kind = \"springs\"".to_owned());
-                        }
-                        fields.push(format!("sleeve.torsion_stiffness_n_m_per_rad = {}", k.round()));
-                    } else {
-                        let e = found.material.youngs_modulus_mpa * ratio;
-                        set("material.youngs_modulus_mpa", &mut found.material.youngs_modulus_mpa, e);
-                    }
-                }
-            }
-            (Some(DriveField::StiffnessPerKelvin), _) => {
-                by_angle = false;
-                if let Some(per_k) = value(Name::StiffnessRelativePerK) {
-                    let all = found.temperature.youngs_modulus_per_k + per_k;
-                    if all.abs() <= 1e-3 {
-                        found.temperature.youngs_modulus_per_k = all;
-                        fields.push(format!("temperature.youngs_modulus_per_k = {all:e}"));
-                    }
-                }
-            }
-            // No field holds it, the data do not show it, or it is no fixed direction.
-            _ => {}
+        let at = extended.causes().iter().position(|fitted| fitted.name() == cause.name);
+        let mut fields = Vec::new();
+        let field = cause.name.spec().drive_field.as_ref();
+        // What depends on the angle is read from what the data show.
+        if let Some(field) = field.filter(|field| at.is_some() || !field.by_angle) {
+            let (at, at_one_orientation) = (at.unwrap_or(0), orientation_rad.is_some());
+            let (probe, found) = (&probe, &mut found);
+            let mut placing = Placing { drive, found, nominal, cause, probe, at, at_one_orientation, fields };
+            (field.set)(&mut placing);
+            fields = placing.fields;
         }
         let b = &found.as_built;
-        let largest = [
-            b.circular_spline_eccentricity_um,
-            b.flexspline_runout_um,
-            b.circular_spline_offset_um,
-            b.circular_spline_ovality_um,
-        ]
-        .into_iter()
-        .fold(0.0, f64::max);
+        let displaced = [b.circular_spline_eccentricity_um, b.flexspline_runout_um, b.circular_spline_offset_um];
+        let largest = displaced.into_iter().fold(b.circular_spline_ovality_um, f64::max);
         if fields.is_empty() || largest > LARGEST_UM {
             rest.push(cause.clone());
         } else {
-            mapped.push(Mapped { cause: cause.name, fields, by_angle });
+            mapped.push(Mapped { cause: cause.name, fields, by_angle: field.is_some_and(|field| field.by_angle) });
         }
     }
     if !mapped.is_empty() {

@@ -14,8 +14,9 @@ mod model;
 mod sampled;
 
 pub use compensation::{
-    Compensated, Evaluation, EvaluationError, LEAST_SHARE_IMPROVED, NotApplied, Remake, evaluate, left_by_core, split,
+    Compensated, Evaluation, EvaluationError, LEAST_SHARE_IMPROVED, NotApplied, Remake, RemakeError, evaluate,
+    left_by_core, split,
 };
-pub(crate) use geometry::{Agreement, FoundGeometry, check_by_fem, found_geometry};
+pub(crate) use geometry::{Agreement, DriveField, FoundGeometry, check_by_fem, found_geometry};
 pub use model::{CauseEntry, Model, causes_in, causes_to_toml};
 pub(crate) use sampled::{ExtendedTables, TableSubject};

@@ -28,7 +28,7 @@ use crate::diagnosis::report::{Cause, Diagnosis, Parameter};
 use crate::diagnosis::{Extended, FittedCause, FittedLaw, added_by};
 use crate::measurement::Session;
 use crate::nominal::{Fixed, Nominal};
-use crate::synthesize::{Chosen, Excitation, Plant, Sizes, added_arcsec, parse};
+use crate::synthesize::{Effect, EffectError, Sizes, added_arcsec, completed};
 use flexspline_base::toml_file::{Entries, Refused, TomlFile, any, each_of, entries_of, one_of, text as text_of};
 use flexspline_mechanics::drive::{DriveError, Problem};
 
@@ -100,7 +100,7 @@ impl Model {
 
     /// The causes as effects that can be simulated.
     #[must_use]
-    pub fn effects(&self) -> Vec<Chosen> {
+    pub fn effects(&self) -> Vec<Effect> {
         self.causes.iter().filter_map(CauseEntry::effect).collect()
     }
 
@@ -109,22 +109,19 @@ impl Model {
     ///
     /// # Errors
     /// A parameter that does not fit the sessions.
-    pub(crate) fn added_arcsec(&self, sessions: &[Session], sizes: Sizes) -> Result<Vec<Vec<f64>>, String> {
+    pub(crate) fn added_arcsec(&self, sessions: &[Session], sizes: Sizes) -> Result<Vec<Vec<f64>>, EffectError> {
         let fitted: Vec<(CauseName, &FittedLaw)> =
             self.causes.iter().filter_map(|cause| Some((cause.name, cause.fit.as_ref()?))).collect();
         let by_fit = added_by(&fitted, sessions, &self.nominal);
         let simulated = |cause: &&CauseEntry| by_fit.is_none() || cause.fit.is_none();
-        let effects: Vec<Chosen> = self.causes.iter().filter(simulated).filter_map(CauseEntry::effect).collect();
+        let effects: Vec<Effect> = self.causes.iter().filter(simulated).filter_map(CauseEntry::effect).collect();
         let mut added = by_fit.unwrap_or_else(|| sessions.iter().map(|session| vec![0.0; session.len()]).collect());
         if !effects.is_empty() {
-            let on = Excitation::of_sessions(sessions, 100.0, self.nominal.temperature_c);
-            let plant = Plant { nominal: &self.nominal, table: None };
-            let more = added_arcsec(&plant, sizes, &effects, &on)?;
+            let motion = completed(sessions, 100.0, self.nominal.temperature_c);
+            let more = added_arcsec(&self.nominal, sizes, &effects, &motion)?;
             // A session of one row has no motion to simulate.
-            let moving = added.iter_mut().filter(|session| session.len() > 1);
-            for (sum, rows) in moving.zip(&on.sessions) {
-                sum.iter_mut().zip(&more[rows.clone()]).for_each(|(sum, more)| *sum += more);
-            }
+            let rows = added.iter_mut().filter(|session| session.len() > 1).flatten();
+            rows.zip(more).for_each(|(sum, more)| *sum += more);
         }
         Ok(added)
     }
@@ -199,7 +196,7 @@ fn causes_of(file: &mut TomlFile<'_>, table: &DeTable<'_>) -> Vec<CauseEntry> {
         let parameters: BTreeMap<String, f64> = cause.given("parameters", |v| entries_of(v, any))?.unwrap_or_default();
         let fit = cause.given("fit", fit_of)?.filter(|(of, _)| *of == fingerprint(&parameters)).map(|(_, fit)| fit);
         let cause = CauseEntry { name, parameters, fit };
-        cause.checked_effect().map_err(|what| Refused::because(entry, what))?;
+        cause.checked_effect().map_err(|error| Refused::because(entry, error.to_string()))?;
         Ok(cause)
     });
     causes.unwrap_or_default()
@@ -353,29 +350,21 @@ impl CauseEntry {
 
     /// The effect that simulates it, if there is one.
     #[must_use]
-    pub fn effect(&self) -> Option<Chosen> {
+    pub fn effect(&self) -> Option<Effect> {
         self.checked_effect().ok()
     }
 
-    fn checked_effect(&self) -> Result<Chosen, String> {
-        let mut text = String::new();
+    fn checked_effect(&self) -> Result<Effect, EffectError> {
         let twice = [Name::AmplitudeUm, Name::DepthUm, Name::Tooth, Name::GeneratorAmplitudeArcsec];
-        let has = |name: Name| self.parameters.contains_key(name.as_str());
-        for parameter in self.name.spec().parameters {
-            let Some(&value) = self.parameters.get(parameter.name.as_str()) else { continue };
+        let given = |name: Name| self.parameters.get(name.as_str()).copied();
+        let known = given(Name::AmplitudeArcsec).or(given(Name::AngleRad)).is_some();
+        Effect::of_cause(self.name, |name| match name {
             // Of two forms of the same, the one in arc-seconds and radians.
-            if twice.contains(&parameter.name) && (has(Name::AmplitudeArcsec) || has(Name::AngleRad)) {
-                continue;
-            }
-            let value = match parameter.name {
-                Name::PhaseRad => value.rem_euclid(TAU),
-                Name::Wheel | Name::Harmonic => value.round(),
-                _ => value,
-            };
-            let [low, high] = parameter.range;
-            let _ = write!(text, "{}={:?},", parameter.name, value.clamp(low, high));
-        }
-        parse(&format!("{}:{text}", self.name))
+            name if known && twice.contains(&name) => None,
+            Name::PhaseRad => Some(given(name)?.rem_euclid(TAU)),
+            Name::Wheel | Name::Harmonic => Some(given(name)?.round()),
+            _ => given(name),
+        })
     }
 }
 

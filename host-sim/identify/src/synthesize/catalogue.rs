@@ -8,17 +8,17 @@ use std::f64::consts::TAU;
 
 use serde::Serialize;
 use serde::ser::{SerializeMap, Serializer};
+use thiserror::Error;
 
 use super::Sizes;
-use super::excitation::Excitation;
-use super::law::OVAL_FLANK_RAD;
 use crate::causes::{
     CauseName, Factor, Parameter, ParameterName, ParameterName as Name, TIME, Usual, Usual::Value, number,
 };
+use crate::diagnosis::rows::Rows;
 use crate::measurement::FaultName;
-use crate::nominal::{Fixed, Nominal};
+use crate::nominal::Nominal;
 use flexspline_base::suggest::did_you_mean;
-use flexspline_base::units::ARCSEC_PER_RAD;
+use flexspline_base::units::{ARCSEC_PER_RAD, ARCSEC_PER_TURN};
 
 /// An effect that can be hidden in data.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,6 +27,16 @@ pub enum Hidden {
     Cause(CauseName),
     /// A fault of the data, not of the drive or its sensors.
     Fault(FaultName),
+}
+
+impl Hidden {
+    /// The cause, if it is one.
+    pub(super) fn cause(self) -> Option<CauseName> {
+        match self {
+            Hidden::Cause(cause) => Some(cause),
+            Hidden::Fault(_) => None,
+        }
+    }
 }
 
 /// An effect that can be asked for.
@@ -173,16 +183,16 @@ pub fn effects() -> Vec<Definition> {
 
 /// An effect with the values of its parameters: those given, and once completed all.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Chosen {
+pub struct Effect {
     /// Its description.
     pub definition: Definition,
     /// Value of each parameter.
     pub values: Vec<Option<f64>>,
 }
 
-impl Serialize for Chosen {
+impl Serialize for Effect {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        struct Values<'a>(&'a Chosen);
+        struct Values<'a>(&'a Effect);
         impl Serialize for Values<'_> {
             fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
                 serializer.collect_map(
@@ -202,67 +212,156 @@ impl Serialize for Chosen {
     }
 }
 
+/// An effect that cannot be asked for, or not with this parameter.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum EffectError {
+    /// No effect has this name.
+    #[error("found \"{found}\"{}; allowed: {}", did_you_mean("; ", found, allowed.iter().copied()), allowed.join(", "))]
+    Name {
+        /// The name found.
+        found: String,
+        /// Those that there are.
+        allowed: Vec<&'static str>,
+    },
+    /// The effect has no such parameter.
+    #[error(
+        "{effect}: found parameter \"{found}\"{}; allowed: {}",
+        did_you_mean("; ", found, allowed.iter().copied()),
+        if allowed.is_empty() { "no parameter".to_owned() } else { allowed.join(", ") }
+    )]
+    Parameter {
+        /// The effect.
+        effect: &'static str,
+        /// The parameter found.
+        found: String,
+        /// Those that it has.
+        allowed: Vec<&'static str>,
+    },
+    /// No parameter with a value.
+    #[error("{effect}: found \"{found}\"; allowed: parameter=value")]
+    NoValue {
+        /// The effect.
+        effect: &'static str,
+        /// The text found.
+        found: String,
+    },
+    /// A parameter that stands there twice.
+    #[error("{effect}: {parameter} is given twice")]
+    Twice {
+        /// The effect.
+        effect: &'static str,
+        /// Its parameter.
+        parameter: ParameterName,
+    },
+    /// Two forms of the same parameter.
+    #[error("{effect}: {} and {} say the same; give one of them", both[0], both[1])]
+    BothForms {
+        /// The effect.
+        effect: &'static str,
+        /// Its parameters.
+        both: [ParameterName; 2],
+    },
+    /// A value out of range, or that does not fit the data.
+    #[error("{effect}: {parameter}: found {found}, allowed: {allowed}")]
+    Value {
+        /// The effect.
+        effect: &'static str,
+        /// Its parameter.
+        parameter: ParameterName,
+        /// The value found.
+        found: String,
+        /// The values that are allowed.
+        allowed: String,
+    },
+    /// The effect is one of teeth.
+    #[error("the model gives a ratio and no teeth; this effect needs them")]
+    NoTeeth,
+}
+
 /// Reads `NAME` or `NAME:param=value,...`.
 ///
 /// # Errors
 /// What was found and what is allowed, with a suggestion for a name that is nearly one.
-pub fn parse(text: &str) -> Result<Chosen, String> {
+pub fn parse(text: &str) -> Result<Effect, EffectError> {
     let (name, rest) = text.split_once(':').unwrap_or((text, ""));
     let all = effects();
     let Some(definition) = all.iter().find(|effect| effect.name() == name) else {
-        let names: Vec<&str> = all.iter().map(Definition::name).collect();
-        return Err(format!(
-            "found \"{name}\"{}; allowed: {}",
-            did_you_mean("; ", name, names.iter().copied()),
-            names.join(", ")
-        ));
+        return Err(EffectError::Name { found: name.to_owned(), allowed: all.iter().map(Definition::name).collect() });
     };
-    let mut chosen = Chosen { definition: *definition, values: vec![None; definition.parameters.len()] };
+    let mut effect = Effect::of(*definition);
     for part in rest.split(',').filter(|part| !part.trim().is_empty()) {
-        let (key, value) =
-            part.split_once('=').ok_or_else(|| format!("{name}: found \"{part}\"; allowed: parameter=value"))?;
-        chosen.set(key.trim(), value.trim())?;
+        let found = || EffectError::NoValue { effect: definition.name(), found: part.to_owned() };
+        let (key, value) = part.split_once('=').ok_or_else(found)?;
+        effect.set(key.trim(), value.trim())?;
     }
-    for (a, b, _) in definition.twins {
-        if chosen.given(*a).is_some() && chosen.given(*b).is_some() {
-            return Err(format!("{name}: {a} and {b} say the same; give one of them"));
-        }
+    match definition.twins.iter().find(|(a, b, _)| effect.given(*a).is_some() && effect.given(*b).is_some()) {
+        Some((a, b, _)) => Err(EffectError::BothForms { effect: definition.name(), both: [*a, *b] }),
+        None => Ok(effect),
     }
-    Ok(chosen)
 }
 
-impl Chosen {
-    fn set(&mut self, key: &str, text: &str) -> Result<(), String> {
-        let name = self.definition.name();
-        let Some(place) = self.definition.parameters.iter().position(|parameter| parameter.name.as_str() == key) else {
-            let names: Vec<&str> = self.definition.parameters.iter().map(|parameter| parameter.name.as_str()).collect();
-            let allowed = if names.is_empty() { "no parameter".to_owned() } else { names.join(", ") };
-            let hint = did_you_mean("; ", key, names);
-            return Err(format!("{name}: found parameter \"{key}\"{hint}; allowed: {allowed}"));
+impl Effect {
+    /// The effect with no parameter given.
+    fn of(definition: Definition) -> Effect {
+        Effect { definition, values: vec![None; definition.parameters.len()] }
+    }
+
+    /// A cause with the values of some of its parameters, each brought into its range.
+    ///
+    /// # Errors
+    /// A value that is no number, or none of a count.
+    pub(crate) fn of_cause(
+        cause: CauseName,
+        value: impl Fn(ParameterName) -> Option<f64>,
+    ) -> Result<Effect, EffectError> {
+        let mut effect = Effect::of(Definition::of_cause(cause));
+        for (k, parameter) in effect.definition.parameters.iter().enumerate() {
+            let [low, high] = parameter.range;
+            if let Some(value) = value(parameter.name).map(|value| value.clamp(low, high)) {
+                effect.put(k, Some(value), &format!("{value:?}"))?;
+            }
+        }
+        Ok(effect)
+    }
+
+    fn place(&self, name: ParameterName) -> Option<usize> {
+        self.definition.parameters.iter().position(|parameter| parameter.name == name)
+    }
+
+    fn set(&mut self, key: &str, text: &str) -> Result<(), EffectError> {
+        let (effect, parameters) = (self.definition.name(), self.definition.parameters);
+        let Some(place) = parameters.iter().position(|parameter| parameter.name.as_str() == key) else {
+            let allowed = parameters.iter().map(|parameter| parameter.name.as_str()).collect();
+            return Err(EffectError::Parameter { effect, found: key.to_owned(), allowed });
         };
-        let parameter = self.definition.parameters[place];
+        let parameter = &parameters[place];
         if self.values[place].is_some() {
-            return Err(format!("{name}: {key} is given twice"));
+            return Err(EffectError::Twice { effect, parameter: parameter.name });
         }
         let word = parameter.words.iter().position(|word| *word == text).map(|k| k as f64);
-        let value = word.or_else(|| text.parse().ok());
+        self.put(place, word.or_else(|| text.parse().ok()), text)
+    }
+
+    /// Sets a parameter to what was `found`, if that is allowed.
+    fn put(&mut self, place: usize, value: Option<f64>, found: &str) -> Result<(), EffectError> {
+        let parameter = &self.definition.parameters[place];
         let [low, high] = parameter.range;
-        let whole =
-            !parameter.words.is_empty() || [ParameterName::Harmonic, ParameterName::Tooth].contains(&parameter.name);
-        match value {
-            Some(value) if value >= low && value <= high && (!whole || value.fract() == 0.0) => {
-                self.values[place] = Some(value);
-                Ok(())
-            }
-            _ => Err(format!("{name}: {key}: found {text}, allowed: {}", parameter.allowed())),
-        }
+        let whole = !parameter.words.is_empty() || [Name::Harmonic, Name::Tooth].contains(&parameter.name);
+        let allowed = |value: &f64| *value >= low && *value <= high && (!whole || value.fract() == 0.0);
+        let refuse = || EffectError::Value {
+            effect: self.definition.name(),
+            parameter: parameter.name,
+            found: found.to_owned(),
+            allowed: parameter.allowed(),
+        };
+        self.values[place] = Some(value.filter(allowed).ok_or_else(refuse)?);
+        Ok(())
     }
 
     /// The value of a parameter, if it has one.
     #[must_use]
     pub fn given(&self, name: ParameterName) -> Option<f64> {
-        let place = self.definition.parameters.iter().position(|parameter| parameter.name == name)?;
-        self.values[place]
+        self.values[self.place(name)?]
     }
 
     /// The value of a parameter of a completed effect.
@@ -271,21 +370,14 @@ impl Chosen {
     }
 
     /// The effect with every parameter.
-    pub(super) fn completed(&self, setting: &Setting<'_>, random: &mut fastrand::Rng) -> Result<Chosen, String> {
+    pub(super) fn completed(&self, setting: &Setting<'_>, random: &mut fastrand::Rng) -> Result<Effect, EffectError> {
         let mut complete = self.clone();
-        let definition = self.definition;
-        let place = |name: ParameterName| {
-            definition.parameters.iter().position(|p| p.name == name).expect("twins are parameters")
-        };
-        for (k, parameter) in definition.parameters.iter().enumerate() {
+        let Definition { parameters, twins, .. } = self.definition;
+        for (k, parameter) in parameters.iter().enumerate() {
             let drawn = if CAME_LATER.contains(&parameter.name) { 0.0 } else { random.f64() };
-            if complete.values[k].is_some() {
-                continue;
-            }
             // Which of two forms was given decides; the other follows below.
-            let is_first_of_given =
-                definition.twins.iter().any(|(a, b, _)| *a == parameter.name && self.given(*b).is_some());
-            if is_first_of_given {
+            let is_first_of_given = twins.iter().any(|(a, b, _)| *a == parameter.name && self.given(*b).is_some());
+            if complete.values[k].is_some() || is_first_of_given {
                 continue;
             }
             complete.values[k] = match parameter.usual {
@@ -297,77 +389,80 @@ impl Chosen {
                 Usual::Follows => None,
             };
         }
-        for (a, b, factor) in definition.twins {
+        for (a, b, factor) in twins {
             let factor = setting.factor(*factor, &complete)?;
-            let (a, b) = (place(*a), place(*b));
-            match (complete.values[a], complete.values[b]) {
-                (Some(first), None) => complete.values[b] = Some(first * factor),
-                (None, Some(second)) => complete.values[a] = Some(second / factor),
-                _ => {}
+            let (first, second) = (complete.given(*a), complete.given(*b));
+            let follows = match (first, second) {
+                (Some(first), None) => complete.place(*b).map(|at| (at, first * factor)),
+                (None, Some(second)) => complete.place(*a).map(|at| (at, second / factor)),
+                _ => None,
+            };
+            if let Some((at, value)) = follows {
+                complete.values[at] = Some(value);
             }
         }
-        if let Some(time) = complete.given(ParameterName::TimeS) {
-            let (first, last) = setting.span();
-            if !(time > first && time < last) {
-                let name = definition.name();
-                return Err(format!("{name}: time_s: found {time}, allowed: within the data, {first:.2} to {last:.2}"));
-            }
+        let refuse = |parameter, found: f64, allowed| {
+            Err(EffectError::Value { effect: self.definition.name(), parameter, found: found.to_string(), allowed })
+        };
+        let [first, last] = setting.span();
+        if let Some(time) = complete.given(Name::TimeS).filter(|time| !(*time > first && *time < last)) {
+            return refuse(Name::TimeS, time, format!("within the data, {first:.2} to {last:.2}"));
         }
-        if let (Some(tooth), Some(wheel)) = (self.given(ParameterName::Tooth), complete.given(ParameterName::Wheel)) {
+        if let (Some(tooth), Some(wheel)) = (self.given(Name::Tooth), complete.given(Name::Wheel)) {
             let teeth = setting.teeth(wheel)?;
             if tooth >= teeth {
-                return Err(format!("damaged_tooth: tooth: found {tooth}, allowed: 0 to {}", teeth - 1.0));
+                return refuse(Name::Tooth, tooth, format!("0 to {}", teeth - 1.0));
             }
         }
         Ok(complete)
     }
 }
 
+/// Flank angle by which the radius of an oval opens its spaces, rad: where teeth of HHD-95 bear.
+const OVAL_FLANK_RAD: f64 = 0.4;
+
 /// Sources that complete parameters.
 pub(super) struct Setting<'a> {
-    pub nominal: &'a Nominal,
-    pub sizes: Sizes,
-    pub on: &'a Excitation,
+    nominal: &'a Nominal,
+    sizes: Sizes,
+    time_s: &'a [f64],
     /// Largest torque, N·m.
     pub load_n_m: f64,
 }
 
-impl Setting<'_> {
-    fn span(&self) -> (f64, f64) {
-        let time = &self.on.time;
-        (time.first().copied().unwrap_or(0.0), time.last().copied().unwrap_or(0.0))
+impl<'a> Setting<'a> {
+    /// A drive over rows.
+    pub(super) fn new(nominal: &'a Nominal, sizes: Sizes, rows: &'a Rows) -> Setting<'a> {
+        let load_n_m = rows.torque.iter().fold(1e-9, |most: f64, torque| most.max(torque.abs()));
+        Setting { nominal, sizes, time_s: &rows.time, load_n_m }
+    }
+
+    fn span(&self) -> [f64; 2] {
+        [self.time_s.first(), self.time_s.last()].map(|time| time.copied().unwrap_or(0.0))
     }
 
     /// The time at a share of the rows: between sessions nothing happens.
     fn instant(&self, share: f64) -> f64 {
-        let time = &self.on.time;
-        time.get((share * time.len() as f64) as usize).copied().unwrap_or(0.0)
+        self.time_s.get((share * self.time_s.len() as f64) as usize).copied().unwrap_or(0.0)
     }
 
-    pub(crate) fn mean_speed_rad_s(&self) -> f64 {
-        let speeds = self.on.speeds();
-        (speeds.iter().map(|w| w.abs()).sum::<f64>() / speeds.len().max(1) as f64).max(1e-9)
-    }
-
-    fn teeth(&self, wheel: f64) -> Result<f64, String> {
-        let teeth = self.nominal.teeth.ok_or("the model gives a ratio and no teeth; this effect needs them")?;
+    fn teeth(&self, wheel: f64) -> Result<f64, EffectError> {
+        let teeth = self.nominal.teeth.ok_or(EffectError::NoTeeth)?;
         Ok(f64::from(if wheel == 0.0 { teeth.flexspline } else { teeth.circular_spline }))
     }
 
-    fn tooth_pitch_arcsec(&self) -> Result<f64, String> {
-        let fixed = self.nominal.teeth.map(|teeth| teeth.fixed);
-        Ok(flexspline_base::units::ARCSEC_PER_TURN
-            / self.teeth(if fixed == Some(Fixed::CircularSpline) { 0.0 } else { 1.0 })?)
+    fn tooth_pitch_arcsec(&self) -> Result<f64, EffectError> {
+        Ok(ARCSEC_PER_TURN / f64::from(self.nominal.teeth.ok_or(EffectError::NoTeeth)?.of_output()))
     }
 
-    fn factor(&self, factor: Factor, effect: &Chosen) -> Result<f64, String> {
+    fn factor(&self, factor: Factor, effect: &Effect) -> Result<f64, EffectError> {
         let along = |radius_mm: f64| 1e-3 / radius_mm * ARCSEC_PER_RAD;
         Ok(match factor {
             Factor::AlongNormal => along(self.sizes.base_radius_mm),
             Factor::AlongPitch => along(self.sizes.pitch_radius_mm),
             // Half of it moves the teeth along the ring, and its radius opens them by the tangent of the flank angle.
             Factor::Oval => 0.5f64.hypot(OVAL_FLANK_RAD.tan()) * along(self.sizes.pitch_radius_mm),
-            Factor::Tooth => TAU / self.teeth(effect.given(ParameterName::Wheel).unwrap_or(0.0))?,
+            Factor::Tooth => TAU / self.teeth(effect.given(Name::Wheel).unwrap_or(0.0))?,
             Factor::Ratio => self.nominal.ratio.abs(),
         })
     }
@@ -406,7 +501,7 @@ mod tests {
             ("damaged_tooth:wheel=cam", "wheel: found cam, allowed: flexspline, circular_spline (or 0 to 1)"),
             ("unit_mismatch:x=1", "allowed: no parameter"),
         ] {
-            let error = parse(text).unwrap_err();
+            let error = parse(text).unwrap_err().to_string();
             assert!(error.contains(message), "{text}: {error}");
         }
         assert_eq!(parse("damaged_tooth:wheel=circular_spline").unwrap().given(ParameterName::Wheel), Some(1.0));

@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
-use super::catalogue::{Chosen, Hidden};
-use super::plant::gauss;
+use super::catalogue::{Effect, Hidden};
+use super::gauss;
 use crate::causes::ParameterName;
 use crate::measurement::{FaultName, Session};
 use flexspline_base::units::ARCSEC_PER_RAD;
@@ -18,7 +18,7 @@ const TORQUE: usize = 3;
 
 /// The rows as CSV text, with the faults among `effects` in them. `ratio` makes output angles of errors.
 #[must_use]
-pub fn to_csv(sessions: &[Session], ratio: f64, effects: &[Chosen], random: &mut fastrand::Rng) -> String {
+pub fn to_csv(sessions: &[Session], ratio: f64, effects: &[Effect], random: &mut fastrand::Rng) -> String {
     let mut rows: Vec<[f64; 6]> = Vec::new();
     for session in sessions {
         let output = session.output_rad(ratio);
@@ -57,7 +57,7 @@ pub fn to_csv(sessions: &[Session], ratio: f64, effects: &[Chosen], random: &mut
     text
 }
 
-fn spoil(rows: &mut Vec<[f64; 6]>, fault: FaultName, effect: &Chosen, random: &mut fastrand::Rng) {
+fn spoil(rows: &mut Vec<[f64; 6]>, fault: FaultName, effect: &Effect, random: &mut fastrand::Rng) {
     use ParameterName as Name;
     let v = |name: Name| effect.value(name);
     let first = rows.first().map_or(0.0, |row| row[TIME]);
@@ -168,28 +168,20 @@ fn average(rows: &mut [[f64; 6]], half_s: f64) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Excitation, Plan, Plant, Richness, Sensors, Sizes, Unit, catalogue_drive, parse, synthesize};
+    use super::super::{Plan, Sensors, Sizes, Unit, catalogue_drive, parse, synthesize};
     use super::*;
     use crate::measurement::{ColumnMap, Gear, parse as read};
 
     fn recording(effect: &str) -> crate::measurement::Recording {
         let nominal = catalogue_drive();
-        let plan = Plan {
-            sessions: 8,
-            rows: 1500,
-            rate_hz: 100.0,
-            speed_rad_s: 6.0,
-            torque_n_m: 40.0,
-            richness: Richness::Rich,
-        };
+        let plan = Plan { sessions: 8, rows: 1500, rate_hz: 100.0, speed_rad_s: 6.0, torque_n_m: 40.0 };
         let mut random = fastrand::Rng::with_seed(5);
-        let on: Excitation = plan.excite(&mut random);
+        let motion = plan.excite(&mut random);
         let unit = Unit::draw(&nominal, &mut random);
-        let sensors = Sensors { white_arcsec: 2.0, wander_arcsec: 0.5, wander_s: 12.0 };
-        let plant = Plant { nominal: &nominal, table: None };
+        let sensors = Sensors { white_arcsec: 2.0, wander_arcsec: 0.5, wander_s: 12.0, encoder_bits: 22 };
         let sizes = Sizes { pitch_radius_mm: 48.7, base_radius_mm: 44.6 };
-        let chosen = [parse(effect).unwrap()];
-        let made = synthesize(&plant, sizes, &chosen, &on, (&sensors, 22), unit, &mut random).unwrap();
+        let hidden = [parse(effect).unwrap()];
+        let made = synthesize((&nominal, None), sizes, &hidden, motion, &sensors, &unit, &mut random).unwrap();
         let text = to_csv(&made.sessions, nominal.ratio, &made.effects, &mut random);
         read("data.csv", text.as_bytes(), &ColumnMap::default(), &Gear::of_teeth(188, 190, true)).unwrap()
     }

@@ -1,37 +1,32 @@
-//! Made-up measurements of a drive with known effects: for tests of the diagnosis and for the command `synthesize`.
+//! Made-up measurements of a drive with known effects: for the command `synthesize` and for tests.
 //!
-//! The plant here shares no law with the candidates of the diagnosis: each effect comes in two forms of its own (the
-//! second with a changed law, for tests), at a finer step where it has a state, under sensors with white noise and a
-//! wander of another kind than the one the diagnosis assumes.
+//! A cause is hidden by the law that the diagnosis fits: what is found may be held against what was hidden, parameter
+//! by parameter. Data whose laws are others are those of the examination (`tests/exam`).
 //!
 //! * [`effects`]: the effects by name, their parameters with units, ranges and defaults; [`parse`] reads
 //!   `NAME:param=value,...`.
-//! * [`Plant`]: nominal drive (a table made by FEM, or a catalogue's model) and the [`Unit`] measured.
-//! * [`Excitation`]: how it is driven, made up by a [`Plan`] or taken from measured sessions.
+//! * [`Plan`]: how the drive is driven, made up; [`completed`] takes it from measured sessions.
+//! * [`Unit`]: what one drive has that its drawing has not.
 //! * [`synthesize`]: all of it to sessions, and what is true of them.
 
 mod catalogue;
 mod data_fault;
-#[cfg(test)]
-mod effect;
 mod excitation;
-mod law;
-mod plant;
 
-pub use catalogue::{Chosen, Definition, Hidden, effects, parse};
+pub use catalogue::{Definition, Effect, EffectError, Hidden, effects, parse};
 pub use data_fault::to_csv;
-#[cfg(test)]
-pub(crate) use effect::{Effect, Strange, What, measure};
-pub use excitation::{Excitation, Plan, Richness};
-pub use plant::{Plant, Unit};
+pub use excitation::{Plan, completed, within_temperatures};
+
+use flexspline::Table;
 
 use catalogue::Setting;
-use law::Law;
 
+use crate::diagnosis::base::{Base, PlayLaw};
+use crate::diagnosis::candidate::{Excitation, Scales, Simulated, added};
+use crate::diagnosis::rows::Rows;
 use crate::measurement::Session;
 use crate::nominal::Nominal;
-use flexspline_base::units::ARCSEC_PER_RAD;
-use plant::gauss;
+use flexspline_base::units::{ARCSEC_PER_RAD, ARCSEC_PER_TURN};
 
 /// How noisy the sensors are.
 #[derive(Clone, Copy, Debug)]
@@ -42,11 +37,17 @@ pub struct Sensors {
     pub wander_arcsec: f64,
     /// Time scale of the wander, s.
     pub wander_s: f64,
+    /// Resolution of the output encoder, bits to a turn.
+    pub encoder_bits: u32,
 }
 
 /// White noise of the torque sensor, of the largest torque, and of the thermometer, K.
 const TORQUE_NOISE: f64 = 5e-4;
 const TEMPERATURE_NOISE_K: f64 = 0.02;
+/// How the flank of a made-up drive changes below friction.
+const PLAY: PlayLaw = PlayLaw::Pushed;
+/// Units beyond this many standard deviations are not sold.
+const WORST_UNIT: f64 = 2.5;
 
 /// A catalogue drive to hide effects in.
 #[must_use]
@@ -61,36 +62,6 @@ pub fn catalogue_drive() -> Nominal {
     .expect("the built-in text is valid")
 }
 
-/// Adds white noise and wander: slow sines of random phase.
-fn add_noise(on: &Excitation, sensors: &Sensors, error: &mut [f64], random: &mut fastrand::Rng) {
-    for session in &on.sessions {
-        let waves: Vec<(f64, f64)> = (0..4)
-            .map(|_| (std::f64::consts::TAU / (sensors.wander_s * (1.0 + 5.0 * random.f64())), 6.3 * random.f64()))
-            .collect();
-        for k in session.clone() {
-            let slow: f64 = waves.iter().map(|(w, p)| (w * on.time[k] + p).sin()).sum::<f64>() / 2f64.sqrt();
-            error[k] += sensors.white_arcsec * gauss(random) + sensors.wander_arcsec * slow;
-        }
-    }
-}
-
-/// Sessions of an excitation with the error, arcsec.
-fn into_sessions(on: &Excitation, error: &[f64]) -> Vec<Session> {
-    on.sessions
-        .iter()
-        .map(|s| Session {
-            line: s.clone().map(|k| k as u64 + 2).collect(),
-            time_s: Some(on.time[s.clone()].to_vec()),
-            generator_rad: on.generator[s.clone()].to_vec(),
-            error_rad: error[s.clone()].iter().map(|e| e / ARCSEC_PER_RAD).collect(),
-            torque_n_m: Some(on.torque[s.clone()].to_vec()),
-            temperature_c: Some(on.temperature[s.clone()].to_vec()),
-            orientation_rad: Some(on.orientation[s.clone()].to_vec()),
-            ..Session::default()
-        })
-        .collect()
-}
-
 /// Size of the drive, where amplitudes are given in micrometres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sizes {
@@ -100,85 +71,142 @@ pub struct Sizes {
     pub base_radius_mm: f64,
 }
 
+/// What one unit has that the drawing has not.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Unit {
+    /// Wind-up over nominal.
+    pub wind_up: f64,
+    /// Clearance over nominal.
+    pub clearance: f64,
+    /// The drive with these factors, and harmonics of its own.
+    drive: Nominal,
+    /// Zero of the output encoder, arcsec.
+    pub zero_arcsec: f64,
+}
+
+impl Unit {
+    /// The drawing.
+    #[must_use]
+    pub fn nominal(nominal: &Nominal) -> Unit {
+        Unit { wind_up: 1.0, clearance: 1.0, drive: nominal.clone(), zero_arcsec: 0.0 }
+    }
+
+    /// Draws a unit.
+    #[must_use]
+    pub fn draw(nominal: &Nominal, random: &mut fastrand::Rng) -> Unit {
+        let spread = nominal.spread;
+        let mut limited = || gauss(random).clamp(-WORST_UNIT, WORST_UNIT);
+        let wind_up = 1.0 + spread.stiffness * limited();
+        let clearance = 1.0 + spread.backlash * limited();
+        let mut drive = nominal.clone();
+        drive.stiffness.iter_mut().for_each(|[_, k]| *k /= wind_up);
+        drive.backlash_arcsec *= clearance;
+        for harmonic in &mut drive.harmonics {
+            harmonic.amplitude_arcsec *= 1.0 + spread.harmonic * limited();
+            harmonic.phase_rad += spread.harmonic_phase_rad * 0.5 * limited();
+        }
+        Unit { wind_up, clearance, drive, zero_arcsec: 200.0 * (random.f64() - 0.5) }
+    }
+}
+
+/// A number of the normal distribution.
+fn gauss(random: &mut fastrand::Rng) -> f64 {
+    let (u, v) = (random.f64().max(1e-12), random.f64());
+    (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+}
+
 /// A made-up measurement.
 #[derive(Clone, Debug)]
 pub struct Synthesized {
     /// Rows, as the sensors read them, data faults not yet in them.
     pub sessions: Vec<Session>,
-    /// The unit that was measured.
-    pub unit: Unit,
     /// The effects with the value of every parameter, in the order given.
-    pub effects: Vec<Chosen>,
+    pub effects: Vec<Effect>,
 }
 
-/// The law of a completed effect; a fault of the data has none.
-fn law_of(effect: &Chosen, setting: &Setting<'_>) -> Option<Law> {
-    match effect.definition.what {
-        Hidden::Cause(cause) => Some(Law::of(cause, effect, setting)),
-        Hidden::Fault(_) => None,
-    }
+/// The causes among completed effects, on these rows.
+fn simulated(effects: &[Effect], on: &Excitation<'_>) -> Vec<Simulated> {
+    let causes = effects.iter().filter_map(|effect| Some((effect, effect.definition.what.cause()?)));
+    causes.map(|(effect, cause)| (cause.spec().simulated)(on, &|name| effect.value(name))).collect()
 }
 
-/// What `chosen` effects add to the error of a nominal drive under an excitation, without sensors, row by row, arcsec.
-/// Parameters that are not given take their default; nothing is drawn.
+/// What `chosen` effects add to the error of a drive in motion like that of `sessions`, row by row, arcsec. Parameters
+/// that are not given take their default; nothing is drawn.
 ///
 /// # Errors
 /// As [`synthesize`].
 pub(crate) fn added_arcsec(
-    plant: &Plant<'_>,
+    nominal: &Nominal,
     sizes: Sizes,
-    chosen: &[Chosen],
-    on: &Excitation,
-) -> Result<Vec<f64>, String> {
-    let setting = Setting { nominal: plant.nominal, sizes, on, load_n_m: law::largest(&on.torque) };
+    chosen: &[Effect],
+    sessions: &[Session],
+) -> Result<Vec<f64>, EffectError> {
+    let rows = Rows::new(sessions, nominal);
+    let setting = Setting::new(nominal, sizes, &rows);
     let mut same = fastrand::Rng::with_seed(0);
     let effects = chosen.iter().map(|effect| effect.completed(&setting, &mut same)).collect::<Result<Vec<_>, _>>()?;
-    let mut laws: Vec<Law> = effects.iter().filter_map(|effect| law_of(effect, &setting)).collect();
-    laws.sort_by_key(Law::stage);
-    let unit = Unit::nominal(plant.nominal);
-    let error = |laws: &[Law]| {
-        let torque = plant.flank_torque(on, laws);
-        let mut error = plant.error(on, &torque, laws, &unit, (false, true));
-        plant.add_laws(on, &torque, laws, false, &mut error);
-        error
-    };
-    Ok(error(&laws).iter().zip(error(&[])).map(|(with, without)| with - without).collect())
+    let base = Base::with_play(&rows, nominal, None, PLAY);
+    let scales = Scales::new(&rows, sizes.pitch_radius_mm, Vec::new());
+    let on = Excitation::new(&rows, nominal, &base, &scales);
+    Ok(added(&on, &simulated(&effects, &on)))
 }
 
-/// Measures a drive with `chosen` effects: the output encoder as `sensors` say, and a torque sensor and a thermometer
-/// with a little noise. `encoder_bits` is the resolution of the output encoder, bits to a turn.
+/// Measures a drive with `chosen` effects, in motion like that of `sessions`, which have all columns: the output encoder
+/// as `sensors` say, and a torque sensor and a thermometer with a little noise. A `table` made by FEM takes the place of
+/// the nominal prediction.
 ///
 /// # Errors
-/// A parameter that does not fit the excitation, such as a time outside it.
+/// A parameter that does not fit the motion, such as a time outside it.
 pub fn synthesize(
-    plant: &Plant<'_>,
+    (nominal, table): (&Nominal, Option<&Table<'_>>),
     sizes: Sizes,
-    chosen: &[Chosen],
-    on: &Excitation,
-    (sensors, encoder_bits): (&Sensors, u32),
-    unit: Unit,
+    chosen: &[Effect],
+    mut sessions: Vec<Session>,
+    sensors: &Sensors,
+    unit: &Unit,
     random: &mut fastrand::Rng,
-) -> Result<Synthesized, String> {
-    let setting = Setting { nominal: plant.nominal, sizes, on, load_n_m: law::largest(&on.torque) };
+) -> Result<Synthesized, EffectError> {
+    let rows = Rows::new(&sessions, nominal);
+    let setting = Setting::new(nominal, sizes, &rows);
+    let load_n_m = setting.load_n_m;
     let effects = chosen.iter().map(|effect| effect.completed(&setting, random)).collect::<Result<Vec<_>, _>>()?;
-    let mut laws: Vec<Law> = effects.iter().filter_map(|effect| law_of(effect, &setting)).collect();
-    laws.sort_by_key(Law::stage);
-    let torque = plant.flank_torque(on, &laws);
-    let mut error = plant.error(on, &torque, &laws, &unit, (false, true));
-    plant.add_laws(on, &torque, &laws, false, &mut error);
-    add_noise(on, sensors, &mut error, random);
-    // The encoder counts the output angle, not the error.
-    let step = flexspline_base::units::ARCSEC_PER_TURN / 2f64.powi(encoder_bits as i32);
-    for (error, generator) in error.iter_mut().zip(&on.generator) {
-        let nominal = generator / plant.nominal.ratio * ARCSEC_PER_RAD;
-        *error = ((nominal + *error) / step).round() * step - nominal;
+    let mut base = Base::with_play(&rows, &unit.drive, None, PLAY);
+    if table.is_some() {
+        // The table has the nominal play and wind-up; those of the unit add to it what they are more.
+        let [by_table, by_model] = [table, None].map(|table| Base::with_play(&rows, nominal, table, PLAY).prediction);
+        let more = by_table.iter().zip(&by_model).map(|(table, model)| table - model);
+        base.prediction.iter_mut().zip(more).for_each(|(unit, more)| *unit += more);
     }
-    let mut sessions = into_sessions(on, &error);
+    let scales = Scales::new(&rows, sizes.pitch_radius_mm, Vec::new());
+    let on = Excitation::new(&rows, &unit.drive, &base, &scales);
+    let added = added(&on, &simulated(&effects, &on));
+    let mut error = base.prediction.iter().zip(added).map(|(nominal, added)| nominal + added + unit.zero_arcsec);
+    let step_rad = ARCSEC_PER_TURN / 2f64.powi(sensors.encoder_bits as i32) / ARCSEC_PER_RAD;
+    for session in &mut sessions {
+        let noise = noise(session.time_s.as_deref().unwrap_or(&[]), sensors, random);
+        let read = session.generator_rad.iter().zip(error.by_ref().zip(noise)).map(|(generator, (error, noise))| {
+            // The encoder counts the output angle, not the error.
+            let nominal = generator / nominal.ratio;
+            ((nominal + (error + noise) / ARCSEC_PER_RAD) / step_rad).round() * step_rad - nominal
+        });
+        session.error_rad = read.collect();
+    }
     // No sensor repeats a value to the last digit, even while what it measures stands.
     for session in &mut sessions {
-        let load = TORQUE_NOISE * setting.load_n_m;
-        session.torque_n_m.iter_mut().flatten().for_each(|t| *t += load * gauss(random));
+        session.torque_n_m.iter_mut().flatten().for_each(|t| *t += TORQUE_NOISE * load_n_m * gauss(random));
         session.temperature_c.iter_mut().flatten().for_each(|t| *t += TEMPERATURE_NOISE_K * gauss(random));
     }
-    Ok(Synthesized { sessions, unit, effects })
+    Ok(Synthesized { sessions, effects })
+}
+
+/// White noise and wander at these times, arcsec: slow sines of random phase.
+fn noise(time_s: &[f64], sensors: &Sensors, random: &mut fastrand::Rng) -> Vec<f64> {
+    let waves: Vec<(f64, f64)> = (0..4)
+        .map(|_| (std::f64::consts::TAU / (sensors.wander_s * (1.0 + 5.0 * random.f64())), 6.3 * random.f64()))
+        .collect();
+    let at = |time: &f64| {
+        let slow: f64 = waves.iter().map(|(w, p)| (w * time + p).sin()).sum::<f64>() / 2f64.sqrt();
+        sensors.white_arcsec * gauss(random) + sensors.wander_arcsec * slow
+    };
+    time_s.iter().map(at).collect()
 }

@@ -270,6 +270,16 @@ impl Field {
     }
 }
 
+impl Drive {
+    /// A number of the file by its path, `section.key`; none of another kind than a number.
+    pub fn number_mut(&mut self, path: &str) -> Option<&mut f64> {
+        match ALL.iter().find(|field| field.path == path)?.slot(self) {
+            Slot::Real(number) => Some(number),
+            _ => None,
+        }
+    }
+}
+
 /// Calls `visit` with every field and its value.
 pub(super) fn for_each(drive: &Drive, mut visit: impl FnMut(&Field, &Value)) {
     let mut drive = drive.clone();

@@ -3,7 +3,9 @@
 use std::f64::consts::PI;
 
 use super::geometry::TURNED_BACK;
-use super::{Coefficients, Column, Excitation, Law, Role, Shape, Shaped, by_row, main, main_about, of_both};
+use super::{
+    Coefficients, Column, Excitation, Law, Role, Shape, Shaped, Simulated, Values, by_row, main, main_about, of_both,
+};
 use crate::causes::{CauseName, ParameterName as Name};
 use crate::diagnosis::base::PlayLaw;
 use crate::diagnosis::rows::quantile;
@@ -286,6 +288,18 @@ fn torsional_resonance(on: &Excitation<'_>) -> Law {
     // Rows are joined by straight lines.
     law.wrong.doubt = 0.006;
     law
+}
+
+/// A moment of known size and place.
+pub(crate) fn simulated_gravity_torque(on: &Excitation<'_>, p: Values<'_>) -> Simulated {
+    let shape = [Name::TorqueNM, Name::PhaseRad].map(|name| (name, p(name)));
+    gravity_torque(1.0, on.base.law, on, on).with(&shape, [])
+}
+
+/// A load that swings about all that moves it.
+pub(crate) fn simulated_resonance(on: &Excitation<'_>, p: Values<'_>) -> Simulated {
+    let shape = [Name::FrequencyHz, Name::DampingRatio].map(|name| (name, p(name)));
+    torsional_resonance(on).with(&shape, [WIND_UP, KINEMATIC, TURNING].map(|role| (role, 1.0)))
 }
 
 pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {

@@ -13,8 +13,8 @@ use crate::nominal::{Fixed, Nominal};
 use super::displaced::displaced;
 use super::lobes::generator_eccentricity;
 use super::{
-    Coefficients, Column, Excitation, Law, Named, Role, Shape, Shaped, beside, by_row, main, nuisance, of_both,
-    of_wave, polar, times,
+    Coefficients, Column, Excitation, Law, Named, Role, Shape, Shaped, Simulated, Values, beside, by_row, main,
+    nuisance, of_both, of_wave, polar, times,
 };
 use crate::causes::{CauseName, ParameterName as Name};
 
@@ -45,7 +45,7 @@ pub(super) const TURNED_BACK: &str = "orientation counted back";
 
 /// Which angle an error is locked to.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum Angle {
+pub(crate) enum Angle {
     Generator,
     Output,
     Flexspline,
@@ -376,6 +376,42 @@ fn damaged_tooth(of: Angle) -> Law {
             (Name::Wheel, f64::from(u8::from(of == Angle::CircularSpline))),
         ]
     })
+}
+
+/// A wave of this amplitude whose crest is at a phase.
+fn crest_at(amplitude: f64, phase: f64) -> [f64; 2] {
+    [amplitude * phase.cos(), amplitude * phase.sin()]
+}
+
+/// A wheel beside its place, of known size.
+pub(crate) fn simulated_displacement(cause: CauseName, of: Angle, on: &Excitation<'_>, p: Values<'_>) -> Simulated {
+    let shape = [Name::PhaseRad, Name::HalfLoadNM].map(|name| (name, p(name)));
+    displaced(cause, of, on).with(&[shape[0], shape[1], (Name::SizeArcsec, p(Name::AmplitudeArcsec))], [])
+}
+
+/// A pitch error of one known wave.
+pub(crate) fn simulated_pitch(cause: CauseName, of: Angle, p: Values<'_>) -> Simulated {
+    let harmonic = p(Name::Harmonic);
+    let wave = crest_at(p(Name::AmplitudeArcsec), harmonic * p(Name::PhaseRad));
+    higher_harmonic(cause, of, harmonic).with(&[], wave.map(|c| (WAVE, c)))
+}
+
+/// An oval of known size.
+pub(crate) fn simulated_ovality(p: Values<'_>) -> Simulated {
+    let [sine, cosine] = crest_at(p(Name::AmplitudeArcsec), 2.0 * p(Name::PhaseRad));
+    ovality().with(&[], [(WAVE, sine), (WAVE, -cosine)])
+}
+
+/// A form error of known size.
+pub(crate) fn simulated_cam_form_error(p: Values<'_>) -> Simulated {
+    cam_form_error().with(&[], crest_at(p(Name::AmplitudeArcsec), p(Name::PhaseRad)).map(|c| (WAVE, c)))
+}
+
+/// A tooth that lacks a known depth: what the load on it gives way by.
+pub(crate) fn simulated_damaged_tooth(p: Values<'_>) -> Simulated {
+    let of = if p(Name::Wheel) == 0.0 { Angle::Flexspline } else { Angle::CircularSpline };
+    let shape = [Name::AngleRad, Name::WidthRad].map(|name| (name, p(name)));
+    damaged_tooth(of).with(&shape, [0.0, -p(Name::AmplitudeArcsec), 0.0, 0.0].map(|c| (PULSE, c)))
 }
 
 pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {

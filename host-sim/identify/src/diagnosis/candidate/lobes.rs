@@ -8,8 +8,8 @@
 use super::displaced::{PRESSED_ARCSEC, ZONES_MISFIT, stopped};
 use super::geometry::{Angle, USUAL_ARCSEC, kept, waves, weighted_waves};
 use super::{
-    Column, Excitation, Law, Named, Role, Shape, Shaped, Zones, beside, by_row, main, main_about, nuisance, of_wave,
-    times,
+    Column, Excitation, Law, Named, Role, Shape, Shaped, Simulated, Values, Zones, beside, by_row, main, main_about,
+    nuisance, of_wave, times,
 };
 use crate::causes::{CauseName, ParameterName as Name};
 
@@ -131,3 +131,18 @@ pub(super) fn generator_eccentricity(on: &Excitation<'_>) -> Law {
     law.wrong.misfit = ZONES_MISFIT;
     law
 }
+
+/// An eccentric generator of known size; the ring's first order is a part of the flexspline's, at twice its phase.
+pub(crate) fn simulated_generator_eccentricity(on: &Excitation<'_>, p: Values<'_>) -> Simulated {
+    let (amplitude, phase, deeper) = (p(Name::AmplitudeArcsec), p(Name::PhaseRad), p(Name::DeeperArcsec));
+    let [flexspline, ring] = [(amplitude, phase), (RING_OF_FLEXSPLINE * amplitude, 2.0 * phase)]
+        .map(|(amplitude, phase)| [amplitude * phase.cos(), amplitude * phase.sin()]);
+    let teeth = TEETH.iter().zip([flexspline, ring]).flat_map(|((_, role), wave)| wave.map(|c| (*role, c)));
+    // Where a lobe is pressed in by what it is deeper, half of it shows.
+    let pressed = deeper * on.scales.load / p(Name::HalfLoadNM);
+    generator_eccentricity(on)
+        .with(&[(Name::DeeperArcsec, deeper), (Name::PressedArcsec, pressed)], teeth.chain([(TAKEN_UNLOADED, -deeper)]))
+}
+
+/// First order of the circular spline over that of the flexspline in simulated data. *Guess*.
+const RING_OF_FLEXSPLINE: f64 = 0.7;

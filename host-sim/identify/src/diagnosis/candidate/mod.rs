@@ -8,16 +8,17 @@
 
 mod among;
 mod displaced;
-mod dynamic;
+pub(crate) mod dynamic;
 mod generic;
-mod geometry;
+pub(crate) mod geometry;
 mod kernel;
 mod label;
-mod lobes;
+pub(crate) mod lobes;
 mod named;
-mod sensor;
-mod stiffness;
-mod thermal;
+pub(crate) mod sensor;
+mod simulated;
+pub(crate) mod stiffness;
+pub(crate) mod thermal;
 
 use std::borrow::Cow;
 use std::f64::consts::PI;
@@ -37,6 +38,7 @@ pub(crate) use generic::{line, maps, unnamed};
 pub(crate) use geometry::standing_pitch_error;
 pub(crate) use label::{Deviation, Label, Per};
 pub use named::{Coefficients, Role, Shaped};
+pub(crate) use simulated::{Simulated, Values, added};
 
 /// What laws are evaluated on.
 #[derive(Clone, Copy)]

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::geometry::{Angle, waves};
-use super::{Column, Excitation, Law, Named, Role, by_row, main, nuisance, polar};
+use super::{Column, Excitation, Law, Named, Role, Simulated, Values, by_row, main, nuisance, polar};
 use crate::causes::{CauseName, ParameterName as Name};
 use crate::measurement::rates;
 
@@ -124,6 +124,26 @@ fn ratio_error() -> Law {
         vec![main(by_row(on, |k| on.rows.output[k] * flexspline_base::units::ARCSEC_PER_RAD), 3e-4).called(Role::SIZE)]
     })
     .parameters_by(|_, _, c| vec![(Name::RatioRelativeError, c.of(Role::SIZE))])
+}
+
+/// A wave of known size in a turn of an encoder.
+pub(crate) fn simulated_encoder(cause: CauseName, of_output: bool, order: f64, p: Values<'_>) -> Simulated {
+    let (sin, cos) = p(Name::PhaseRad).sin_cos();
+    let law = match cause {
+        CauseName::EncoderSubdivision => encoder_subdivision(of_output, order),
+        _ => encoder(cause, of_output, (order, 1.0), false, Vec::new),
+    };
+    law.with(&[], [sin, cos].map(|part| (WAVE, part * p(Name::AmplitudeArcsec))))
+}
+
+/// A known delay.
+pub(crate) fn simulated_latency(p: Values<'_>) -> Simulated {
+    sensor_latency().with(&[], [(Role::SIZE, p(Name::DelayS))])
+}
+
+/// A known error of the ratio.
+pub(crate) fn simulated_ratio_error(p: Values<'_>) -> Simulated {
+    ratio_error().with(&[], [(Role::SIZE, p(Name::RatioRelativeError))])
 }
 
 /// Periods of a subdivision that the output has to turn through: fewer are a curve that anything may make.

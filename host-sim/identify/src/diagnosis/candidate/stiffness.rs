@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::super::prepare::Jump;
 use super::super::rows::rms;
 use super::geometry::{Angle, angle, pulse, weighted_waves};
-use super::{Coefficients, Excitation, Law, Role, Shape, Shaped, by_row, history, main, nuisance};
+use super::{Coefficients, Excitation, Law, Role, Shape, Shaped, Simulated, Values, by_row, history, main, nuisance};
 use crate::causes::{CauseName, ParameterName as Name};
 use flexspline_base::units::ARCSEC_PER_TURN;
 
@@ -78,9 +78,13 @@ const JUMP: Role = Role("jump");
 /// what it can when the torque passes zero.
 fn half_width(full: f64, shape: Shaped<'_>, c: Coefficients<'_>) -> f64 {
     let slips = shape.of(Name::SlipTorqueNM);
-    let held = |slip: f64| ((full - slip) / slip).clamp(0.0, 1.0);
     let springs = [(1.0, SPRING), (EARLIER, EARLIER_SPRING), (LATER, LATER_SPRING)];
-    springs.iter().map(|(factor, role)| c.of(*role) * held(factor * slips)).sum()
+    springs.iter().map(|(factor, role)| c.of(*role) * held(full, factor * slips)).sum()
+}
+
+/// What an element that slips at this torque holds when the torque passes zero, of what it can.
+fn held(full: f64, slip: f64) -> f64 {
+    ((full - slip) / slip).clamp(0.0, 1.0)
 }
 
 /// Springs that slip one after the other (Maxwell slip, Prandtl-Ishlinskii): the output lags the torque by what they
@@ -317,7 +321,12 @@ fn wear_between_sessions(on: &Excitation<'_>) -> Option<Law> {
 fn ratcheting(on: &Excitation<'_>) -> Option<Law> {
     let pitch = ARCSEC_PER_TURN / f64::from(on.nominal.teeth?.circular_spline);
     let jumps = on.scales.jumps.clone();
-    let first_s = jumps.first()?.time_s[1];
+    (!jumps.is_empty()).then(|| skipped_teeth(jumps, pitch))
+}
+
+/// These jumps, each with a coefficient in arcsec around nothing, a pitch at 1.
+fn skipped_teeth(jumps: Vec<Jump>, pitch: f64) -> Law {
+    let first_s = jumps.first().map_or(0.0, |jump| jump.time_s[1]);
     let columns = jumps.clone();
     let mut law = Law::new(CauseName::Ratcheting, move |on, _| {
         let reached = |jump: &Jump| by_row(on, |k| jump.reached(on.rows.time[k]) / pitch);
@@ -331,7 +340,52 @@ fn ratcheting(on: &Excitation<'_>) -> Option<Law> {
     // The jump is measured, not modelled: nothing of its height is left over.
     law.wrong.misfit = 0.0;
     law.wrong.doubt = 1e-5;
-    Some(law)
+    law
+}
+
+/// A loop of one spring, of known width and slip.
+pub(crate) fn simulated_hysteresis(on: &Excitation<'_>, p: Values<'_>) -> Simulated {
+    let slip = p(Name::SlipTorqueNM);
+    let held = held(on.scales.load, slip);
+    // A spring that slips beyond half the load has no large loop: its width is what it can hold.
+    let width = p(Name::HalfWidthArcsec) / if held > 0.0 { held } else { 1.0 };
+    torsional_hysteresis(on).with(&[(Name::SlipTorqueNM, slip)], [(SPRING, width)])
+}
+
+/// A hardening stated at any full load.
+pub(crate) fn simulated_hardening(on: &Excitation<'_>, p: Values<'_>) -> Simulated {
+    let exponent = p(Name::HardeningExponent);
+    let size = p(Name::HardeningArcsec) * (on.scales.load / p(Name::FullLoadNM)).powf(exponent);
+    stiffness_hardening().with(&[(Name::Exponent, exponent)], [(Role::SIZE, size)])
+}
+
+/// A spring of another stiffness, true over nominal.
+pub(crate) fn simulated_stiffness_error(p: Values<'_>) -> Simulated {
+    stiffness_error().with(&[], [(Role::SIZE, 1.0 / p(Name::StiffnessRatio) - 1.0)])
+}
+
+/// A crack stated at any full load.
+pub(crate) fn simulated_crack(on: &Excitation<'_>, p: Values<'_>) -> Simulated {
+    let size = p(Name::AmplitudeArcsec) * on.scales.load / p(Name::FullLoadNM);
+    let shape = [Name::AngleRad, Name::WidthRad].map(|name| (name, p(name)));
+    cracked_tooth_root().with(&shape, [(Role::SIZE, size)])
+}
+
+/// A clearance wider by a known width.
+pub(crate) fn simulated_backlash_growth(on: &Excitation<'_>, p: Values<'_>) -> Simulated {
+    let half = on.base.half_backlash.max(1.0);
+    backlash_growth().with(&[], [(Role::SIZE, 0.5 * p(Name::GrowthArcsec) / half)])
+}
+
+/// A clearance that widens evenly with travel.
+pub(crate) fn simulated_wear(p: Values<'_>) -> Simulated {
+    wear(Progress::Travel).with(&[(Name::Exponent, 1.0)], [(Role::SIZE, 0.5 * p(Name::GrowthArcsec))])
+}
+
+/// One jump at a time.
+pub(crate) fn simulated_ratcheting(p: Values<'_>) -> Simulated {
+    let jump = Jump { time_s: [p(Name::TimeS); 3], height_arcsec: p(Name::JumpArcsec) };
+    skipped_teeth(vec![jump], 1.0).with(&[], [(JUMP, 1.0)])
 }
 
 pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {

@@ -1,7 +1,9 @@
 //! What the temperature does.
 
 use super::dynamic::columns_of_load;
-use super::{Excitation, Law, Named, Role, Shape, Shaped, by_row, lagged_through, main, main_about, nuisance};
+use super::{
+    Excitation, Law, Named, Role, Shape, Shaped, Simulated, Values, by_row, lagged_through, main, main_about, nuisance,
+};
 use crate::causes::{CauseName, ParameterName as Name};
 
 /// Temperature above nominal, felt with a lag of `lag_s`, K. Metal does not know when it is recorded: what was felt
@@ -31,8 +33,11 @@ fn thermal_clearance(on: &Excitation<'_>) -> Law {
 
 /// Lag with which the clearance follows the sensor, s; next to nothing where no time was recorded.
 fn lag_of(shape: Shaped<'_>) -> f64 {
-    shape.get(Name::LagS).unwrap_or(1e-3)
+    shape.get(Name::LagS).unwrap_or(LEAST_LAG_S)
 }
+
+/// As good as no lag, s.
+const LEAST_LAG_S: f64 = 1e-3;
 
 /// A clearance by name: its change, and its lag where there is a time.
 fn named_clearance(arcsec_per_k: f64, shape: Shaped<'_>) -> Vec<Named> {
@@ -202,6 +207,23 @@ fn lubricant_load(on: &Excitation<'_>) -> Law {
             .led_under_load_alone();
     law.acts.in_crossings = true;
     law
+}
+
+/// A clearance of known change.
+pub(crate) fn simulated_clearance(on: &Excitation<'_>, p: Values<'_>) -> Simulated {
+    let lag_s = p(Name::LagS).max(LEAST_LAG_S);
+    thermal_clearance(on).with(&[(Name::LagS, lag_s)], [(Role::SIZE, 0.5 * p(Name::ClearanceArcsecPerK))])
+}
+
+/// A stiffness of known change.
+pub(crate) fn simulated_stiffness(p: Values<'_>) -> Simulated {
+    thermal_stiffness().with(&[], [(Role::SIZE, -100.0 * p(Name::StiffnessRelativePerK))])
+}
+
+/// A drag of known size, as the load that it is.
+pub(crate) fn simulated_drag(on: &Excitation<'_>, p: Values<'_>) -> Simulated {
+    let shape = [Name::DragNM, Name::SpeedExponent].map(|name| (name, p(name)));
+    lubricant_load(on).with(&[shape[0], shape[1], (Name::PerK, -p(Name::RelativeDragPerK))], [])
 }
 
 pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {

@@ -1,0 +1,51 @@
+//! A cause of known parameters: the way back from the parameters of a report to its law.
+
+use super::{Acting, Excitation, Law, Named, Role, Tolerance, together};
+use crate::causes::ParameterName;
+use crate::diagnosis::rows::combined;
+
+/// The values of the parameters of a cause, by their names.
+pub(crate) type Values<'v> = &'v dyn Fn(ParameterName) -> f64;
+
+/// A law with numbers: values of its shape parameters, and coefficients that are not the usual ones.
+pub(crate) struct Simulated {
+    law: Law,
+    shape: Vec<f64>,
+    coefficients: Vec<(Role, f64)>,
+}
+
+impl Law {
+    /// The law with these numbers. A shape parameter that is not among them has its least value, a column its usual
+    /// coefficient: 0 for a deviation. Coefficients of one role are those of its columns in their order.
+    pub(super) fn with(self, shape: &[Named], coefficients: impl IntoIterator<Item = (Role, f64)>) -> Simulated {
+        let given = |name: ParameterName| shape.iter().find(|(of, _)| *of == name).map(|(_, value)| *value);
+        let shape = self.shapes.iter().map(|shape| given(shape.name).unwrap_or(shape.low)).collect();
+        Simulated { law: self, shape, coefficients: coefficients.into_iter().collect() }
+    }
+}
+
+impl Simulated {
+    /// The cause as if it had been fitted to these rows.
+    pub(crate) fn acting(&self, on: &Excitation<'_>) -> Acting<'_> {
+        let mut given = self.coefficients.clone();
+        let columns = self.law.columns(on, &self.shape);
+        let coefficient = |column: &super::Column| match given.iter().position(|(role, _)| *role == column.role) {
+            Some(at) => given.remove(at).1,
+            None => match column.tolerance {
+                Tolerance::Main(prior) => prior.mean,
+                Tolerance::Nuisance(_) | Tolerance::Beside(_) | Tolerance::History(_) => 0.0,
+            },
+        };
+        let coefficients = columns.iter().map(coefficient).collect();
+        let roles = columns.iter().map(|column| column.role).collect();
+        Acting { law: &self.law, values: self.shape.clone(), roles, coefficients }
+    }
+}
+
+/// What causes add to the error together, arcsec, row by row.
+pub(crate) fn added(on: &Excitation<'_>, causes: &[Simulated]) -> Vec<f64> {
+    let acting: Vec<Acting<'_>> = causes.iter().map(|cause| cause.acting(on)).collect();
+    let columns = together(on, &acting);
+    let coefficients: Vec<f64> = acting.iter().flat_map(|cause| cause.coefficients.iter().copied()).collect();
+    combined(on.rows.len(), columns.iter().flatten().map(|column| column.values.as_slice()), &coefficients)
+}
