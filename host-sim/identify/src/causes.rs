@@ -1,12 +1,11 @@
-//! The causes of the library, and everything that belongs to a cause but its laws.
+//! The causes of the library.
 //!
-//! A [`CauseName`] is the name of a cause; its other properties (words, orders, needs, kin, parameters, place in a
-//! table and in a drive) are one entry of the table in `spec`. The laws are elsewhere: the diagnosis fits its own
-//! (`crate::diagnosis::candidate`), and [`crate::synthesize`] hides others, so that a mistake in one does not hide in
-//! the other.
+//! A [`CauseName`] is the name of a cause. All else that there is of it is one value, its `CauseSpec`, beside its law in
+//! a file of `crate::diagnosis::candidate`: words, needs, orders, parameters, place in a table and in a drive, the laws
+//! that the diagnosis fits, and the one that [`crate::synthesize`] hides. The list below has a line for each.
 
 mod parameter;
-mod spec;
+pub(crate) mod spec;
 
 use std::fmt;
 use std::str::FromStr;
@@ -14,91 +13,59 @@ use std::str::FromStr;
 use serde::{Serialize, Serializer};
 use thiserror::Error;
 
+use crate::diagnosis::candidate::{dynamic, geometry, lobes, sensor, stiffness, thermal};
 use flexspline_base::suggest::did_you_mean;
 pub use parameter::{Factor, Kind, Parameter, ParameterName, TIME, Usual, number};
+use spec::CauseSpec;
 pub(crate) use spec::OF_THE_OUTPUT_ENCODER;
-use spec::{CauseSpec, SPECS};
 
 macro_rules! causes {
-    ($($(#[$doc:meta])* $cause:ident = $name:literal,)*) => {
+    ($($cause:ident = $spec:expr,)*) => {
         /// A physical cause of the library.
+        #[allow(missing_docs, reason = "the properties of each say what it is")]
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
         pub enum CauseName {
-            $($(#[$doc])* $cause,)*
+            $($cause,)*
         }
 
         impl CauseName {
             /// Every cause.
             pub const ALL: &[CauseName] = &[$(CauseName::$cause,)*];
-
-            /// Its name in files, snake case.
-            #[must_use]
-            pub const fn as_str(self) -> &'static str {
-                match self {
-                    $(CauseName::$cause => $name,)*
-                }
-            }
         }
+
+        static SPECS: [CauseSpec; CauseName::ALL.len()] = [$($spec,)*];
     };
 }
 
 causes! {
-    /// The axis of the circular spline stands beside that of the generator.
-    CircularSplineEccentricity = "circular_spline_eccentricity",
-    /// The axis of the flexspline's toothing stands beside that of its bore.
-    FlexsplineRunout = "flexspline_runout",
-    /// The circular spline is pressed to an oval.
-    CircularSplineOvality = "circular_spline_ovality",
-    /// The teeth of the flexspline are out of place along the pitch.
-    FlexsplinePitchError = "flexspline_pitch_error",
-    /// The teeth of the circular spline are out of place along the pitch.
-    CircularSplinePitchError = "circular_spline_pitch_error",
-    /// The generator stands beside its axis.
-    GeneratorEccentricity = "generator_eccentricity",
-    /// The generator has another shape than the drawn one.
-    CamFormError = "cam_form_error",
-    /// A tooth lacks material.
-    DamagedTooth = "damaged_tooth",
-    /// A tooth of the circular spline is cracked at its root.
-    CrackedToothRoot = "cracked_tooth_root",
-    /// The clearance is wider throughout the data.
-    BacklashGrowth = "backlash_growth",
-    /// The clearance widens during the data.
-    Wear = "wear",
-    /// The drive is stiffer the higher the load.
-    StiffnessHardening = "stiffness_hardening",
-    /// The drive has another stiffness than the nominal one.
-    StiffnessError = "stiffness_error",
-    /// Contacts slip inside the drive: the output lags the torque.
-    TorsionalHysteresis = "torsional_hysteresis",
-    /// The clearance follows the temperature.
-    ThermalClearance = "thermal_clearance",
-    /// The stiffness follows the temperature.
-    ThermalStiffness = "thermal_stiffness",
-    /// The lubricant drags the output.
-    LubricantViscosity = "lubricant_viscosity",
-    /// Gravity turns an unbalanced load, which the torque column does not hold.
-    GravityTorque = "gravity_torque",
-    /// A weight pushes the circular spline aside.
-    GravitySideLoad = "gravity_side_load",
-    /// The inertia of the load swings on the spring of the drive.
-    TorsionalResonance = "torsional_resonance",
-    /// The disc of the output encoder stands off its axis.
-    OutputEncoderEccentricity = "output_encoder_eccentricity",
-    /// The disc of the generator's encoder stands off its axis.
-    GeneratorEncoderEccentricity = "generator_encoder_eccentricity",
-    /// The output encoder reads twice around wrong: a tilted disc, a magnet that is not square.
-    OutputEncoderTilt = "output_encoder_tilt",
-    /// The generator's encoder reads twice around wrong.
-    GeneratorEncoderTilt = "generator_encoder_tilt",
-    /// An encoder divides its periods unevenly: four and more waves around it.
-    EncoderSubdivision = "encoder_subdivision",
-    /// The output of a row is older than its generator.
-    SensorLatency = "sensor_latency",
-    /// The ratio is another one.
-    RatioError = "ratio_error",
-    /// Teeth have skipped.
-    Ratcheting = "ratcheting",
+    CircularSplineEccentricity = geometry::CIRCULAR_SPLINE_ECCENTRICITY,
+    FlexsplineRunout = geometry::FLEXSPLINE_RUNOUT,
+    CircularSplineOvality = geometry::CIRCULAR_SPLINE_OVALITY,
+    FlexsplinePitchError = geometry::FLEXSPLINE_PITCH_ERROR,
+    CircularSplinePitchError = geometry::CIRCULAR_SPLINE_PITCH_ERROR,
+    GeneratorEccentricity = lobes::GENERATOR_ECCENTRICITY,
+    CamFormError = geometry::CAM_FORM_ERROR,
+    DamagedTooth = geometry::DAMAGED_TOOTH,
+    CrackedToothRoot = stiffness::CRACKED_TOOTH_ROOT,
+    BacklashGrowth = stiffness::BACKLASH_GROWTH,
+    Wear = stiffness::WEAR,
+    StiffnessHardening = stiffness::STIFFNESS_HARDENING,
+    StiffnessError = stiffness::STIFFNESS_ERROR,
+    TorsionalHysteresis = stiffness::TORSIONAL_HYSTERESIS,
+    ThermalClearance = thermal::THERMAL_CLEARANCE,
+    ThermalStiffness = thermal::THERMAL_STIFFNESS,
+    LubricantViscosity = thermal::LUBRICANT_VISCOSITY,
+    GravityTorque = dynamic::GRAVITY_TORQUE,
+    GravitySideLoad = geometry::GRAVITY_SIDE_LOAD,
+    TorsionalResonance = dynamic::TORSIONAL_RESONANCE,
+    OutputEncoderEccentricity = sensor::OUTPUT_ENCODER_ECCENTRICITY,
+    GeneratorEncoderEccentricity = sensor::GENERATOR_ENCODER_ECCENTRICITY,
+    OutputEncoderTilt = sensor::OUTPUT_ENCODER_TILT,
+    GeneratorEncoderTilt = sensor::GENERATOR_ENCODER_TILT,
+    EncoderSubdivision = sensor::ENCODER_SUBDIVISION,
+    SensorLatency = sensor::SENSOR_LATENCY,
+    RatioError = sensor::RATIO_ERROR,
+    Ratcheting = stiffness::RATCHETING,
 }
 
 /// What the misfit of a law may be taken for: most of all another law of its kin.
@@ -288,6 +255,12 @@ impl CauseName {
     #[must_use]
     pub(crate) fn spec(self) -> &'static CauseSpec {
         &SPECS[self as usize]
+    }
+
+    /// Its name in files, snake case.
+    #[must_use]
+    pub fn as_str(self) -> &'static str {
+        self.spec().name
     }
 
     /// Its name in a sentence.

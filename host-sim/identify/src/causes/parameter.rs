@@ -187,22 +187,22 @@ pub const fn number(name: ParameterName, meaning: &'static str, low: f64, high: 
     Parameter { name, meaning, range: [low, high], usual, words: &[] }
 }
 
-pub(super) const fn phase(meaning: &'static str) -> Parameter {
+pub(crate) const fn phase(meaning: &'static str) -> Parameter {
     number(ParameterName::PhaseRad, meaning, -TAU, TAU, Usual::Drawn(0.0, TAU))
 }
 
-pub(super) const fn microns(meaning: &'static str, usual: f64) -> Parameter {
+pub(crate) const fn microns(meaning: &'static str, usual: f64) -> Parameter {
     number(ParameterName::AmplitudeUm, meaning, 0.0, 100.0, Usual::Value(usual))
 }
 
-pub(super) const ARCSECONDS: Parameter =
+pub(crate) const ARCSECONDS: Parameter =
     number(ParameterName::AmplitudeArcsec, "the same at the output", 0.0, 1000.0, Usual::Follows);
-pub(super) const HALF_LOAD: Parameter =
+pub(crate) const HALF_LOAD: Parameter =
     number(ParameterName::HalfLoadNM, "load at which more teeth have halved it", 0.01, 1e6, Usual::OfLoad(0.35));
-pub(super) const HARMONIC: Parameter =
+pub(crate) const HARMONIC: Parameter =
     number(ParameterName::Harmonic, "waves around the wheel", 1.0, 12.0, Usual::Value(2.0));
 /// The instant of an event.
 pub const TIME: Parameter = number(ParameterName::TimeS, "when", -1e9, 1e12, Usual::Instant(0.3, 0.7));
-pub(super) const WHEELS: &[&str] = &["flexspline", "circular_spline"];
+pub(crate) const WHEELS: &[&str] = &["flexspline", "circular_spline"];
 /// Words for the parameter `encoder`.
-pub(super) const ENCODERS: &[&str] = &["generator", "output"];
+pub(crate) const ENCODERS: &[&str] = &["generator", "output"];

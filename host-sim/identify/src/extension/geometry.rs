@@ -220,14 +220,28 @@ impl Placing<'_> {
         self.set(phase, |_| rounded(degrees(0.5 * wave.phase())));
     }
 
+    /// An offset of the circular spline in a fixed direction, if the drive stays at one angle against gravity.
+    pub(crate) fn set_offset(&mut self) {
+        if self.at_one_orientation {
+            let paths = ["as_built.circular_spline_offset_um", "as_built.circular_spline_offset_direction_deg"];
+            self.set_displacement(false, paths);
+        }
+    }
+
+    /// An oval: along the pitch circle.
+    pub(crate) fn set_ovality(&mut self) {
+        let paths = ["as_built.circular_spline_ovality_um", "as_built.circular_spline_ovality_phase_deg"];
+        self.set_second_order(true, oval, self.drive.circular_spline.pitch_radius_mm(), paths);
+    }
+
     /// A displacement: along the normal of the flanks.
-    fn set_displacement(&mut self, on_circular_spline: bool, paths: [&str; 2]) {
+    pub(crate) fn set_displacement(&mut self, on_circular_spline: bool, paths: [&str; 2]) {
         let base_mm = self.drive.circular_spline.base_radius_mm();
         self.set_second_order(on_circular_spline, displaced, base_mm, paths);
     }
 
     /// Harmonics of the pitch of a wheel.
-    fn set_pitch_harmonics(&mut self, wheel: Wheel) {
+    pub(crate) fn set_pitch_harmonics(&mut self, wheel: Wheel) {
         let on_circular_spline = wheel == Wheel::CircularSpline;
         let (f, c, built) = (&self.drive.flexspline, &self.drive.circular_spline, &mut self.found.as_built);
         let (field, list, radius, sign) = if on_circular_spline {
@@ -252,7 +266,8 @@ impl Placing<'_> {
         }
     }
 
-    fn set_damaged_tooth(&mut self) {
+    /// A damaged tooth, on the flanks on which the data show it.
+    pub(crate) fn set_damaged_tooth(&mut self) {
         let [tooth, wheel, depth] = [Name::Tooth, Name::Wheel, Name::DepthUm].map(|name| self.value(name));
         let (Some(tooth), Some(wheel), Some(depth)) = (tooth, wheel, depth) else { return };
         let (wheel, teeth) = match wheel < 0.5 {
@@ -284,7 +299,8 @@ impl Placing<'_> {
         self.found.as_built.damaged_teeth.push(damaged);
     }
 
-    fn set_wear(&mut self) {
+    /// A wider clearance: wear of the flanks of both wheels.
+    pub(crate) fn set_wear(&mut self) {
         let Some(growth) = self.value(Name::GrowthArcsec).filter(|growth| *growth > 0.0) else { return };
         // Half of it from the flanks of either wheel.
         let depth = 0.25 * um(growth, self.drive.circular_spline.base_radius_mm());
@@ -293,7 +309,8 @@ impl Placing<'_> {
         }
     }
 
-    fn set_expansion(&mut self) {
+    /// A clearance that follows the temperature: expansion of circular spline and housing.
+    pub(crate) fn set_expansion(&mut self) {
         let Some(per_k) = self.value(Name::ClearanceArcsecPerK) else { return };
         // A ring that grows by dr opens its spaces by 2 dr tan a / r.
         let more = per_k / ARCSEC_PER_RAD / (2.0 * self.drive.circular_spline.bearing_flank_angle_rad().tan());
@@ -302,8 +319,8 @@ impl Placing<'_> {
         }
     }
 
-    /// The sleeve where the drive is softer, the material where it is stiffer.
-    fn set_stiffness(&mut self) {
+    /// Another stiffness: of the sleeve where the drive is softer, of the material where it is stiffer.
+    pub(crate) fn set_stiffness(&mut self) {
         let Some(ratio) = self.value(Name::StiffnessRatio).filter(|ratio| *ratio > 0.0) else { return };
         if ratio >= 1.0 {
             return self.set("material.youngs_modulus_mpa", |modulus| rounded(modulus * ratio));
@@ -320,7 +337,8 @@ impl Placing<'_> {
         self.fields.push(format!("sleeve.torsion_stiffness_n_m_per_rad = {k}"));
     }
 
-    fn set_stiffness_per_k(&mut self) {
+    /// A stiffness that follows the temperature: Young's modulus.
+    pub(crate) fn set_stiffness_per_k(&mut self) {
         let Some(per_k) = self.value(Name::StiffnessRelativePerK) else { return };
         if (self.found.temperature.youngs_modulus_per_k + per_k).abs() <= 1e-3 {
             self.add("temperature.youngs_modulus_per_k", per_k);
@@ -329,51 +347,15 @@ impl Placing<'_> {
 }
 
 impl DriveField {
-    const fn by_angle(set: fn(&mut Placing<'_>)) -> Option<DriveField> {
+    /// Of what depends on where the drive stands.
+    pub(crate) const fn by_angle(set: fn(&mut Placing<'_>)) -> Option<DriveField> {
         Some(DriveField { by_angle: true, set })
     }
 
-    const fn throughout(set: fn(&mut Placing<'_>)) -> Option<DriveField> {
+    /// Of what is the same everywhere.
+    pub(crate) const fn throughout(set: fn(&mut Placing<'_>)) -> Option<DriveField> {
         Some(DriveField { by_angle: false, set })
     }
-
-    /// Eccentricity of the circular spline.
-    pub(crate) const CIRCULAR_SPLINE_ECCENTRICITY: Option<DriveField> = DriveField::by_angle(|placing| {
-        let paths = ["as_built.circular_spline_eccentricity_um", "as_built.circular_spline_eccentricity_phase_deg"];
-        placing.set_displacement(true, paths);
-    });
-    /// Runout of the flexspline.
-    pub(crate) const FLEXSPLINE_RUNOUT: Option<DriveField> = DriveField::by_angle(|placing| {
-        placing.set_displacement(false, ["as_built.flexspline_runout_um", "as_built.flexspline_runout_phase_deg"]);
-    });
-    /// Offset of the circular spline in a fixed direction; only of a drive that stays at one angle against gravity.
-    pub(crate) const CIRCULAR_SPLINE_OFFSET: Option<DriveField> = DriveField::by_angle(|placing| {
-        if placing.at_one_orientation {
-            let paths = ["as_built.circular_spline_offset_um", "as_built.circular_spline_offset_direction_deg"];
-            placing.set_displacement(false, paths);
-        }
-    });
-    /// Oval of the circular spline.
-    pub(crate) const CIRCULAR_SPLINE_OVALITY: Option<DriveField> = DriveField::by_angle(|placing| {
-        let paths = ["as_built.circular_spline_ovality_um", "as_built.circular_spline_ovality_phase_deg"];
-        placing.set_second_order(true, oval, placing.drive.circular_spline.pitch_radius_mm(), paths);
-    });
-    /// Harmonics of the pitch of a wheel.
-    pub(crate) const FLEXSPLINE_PITCH: Option<DriveField> =
-        DriveField::by_angle(|placing| placing.set_pitch_harmonics(Wheel::Flexspline));
-    pub(crate) const CIRCULAR_SPLINE_PITCH: Option<DriveField> =
-        DriveField::by_angle(|placing| placing.set_pitch_harmonics(Wheel::CircularSpline));
-    /// A damaged tooth.
-    pub(crate) const DAMAGED_TOOTH: Option<DriveField> = DriveField::by_angle(|placing| placing.set_damaged_tooth());
-    /// Wear of the flanks of both wheels.
-    pub(crate) const FLANK_WEAR: Option<DriveField> = DriveField::throughout(|placing| placing.set_wear());
-    /// Expansion of circular spline and housing.
-    pub(crate) const EXPANSION: Option<DriveField> = DriveField::throughout(|placing| placing.set_expansion());
-    /// Stiffness.
-    pub(crate) const STIFFNESS: Option<DriveField> = DriveField::throughout(|placing| placing.set_stiffness());
-    /// Change of Young's modulus with temperature.
-    pub(crate) const STIFFNESS_PER_KELVIN: Option<DriveField> =
-        DriveField::throughout(|placing| placing.set_stiffness_per_k());
 }
 
 /// Puts the causes that are geometry into a drive.

@@ -55,7 +55,7 @@ pub struct Definition {
 impl Definition {
     /// Its name, snake case.
     #[must_use]
-    pub const fn name(&self) -> &'static str {
+    pub fn name(&self) -> &'static str {
         match self.what {
             Hidden::Cause(cause) => cause.as_str(),
             Hidden::Fault(fault) => fault.as_str(),

@@ -3,10 +3,15 @@
 use std::f64::consts::PI;
 
 use super::geometry::TURNED_BACK;
-use super::{
-    Coefficients, Column, Excitation, Law, Role, Shape, Shaped, Simulated, Values, by_row, main, main_about, of_both,
+use super::{Coefficients, Column, Excitation, Law, Role, Shape, Shaped, by_row, main, main_about, of_both};
+use crate::causes::ParameterName as Name;
+use crate::causes::spec::{
+    CauseName, CauseSpec, InTable, Kin,
+    Multiple::Fixed,
+    Need, Turn,
+    Usual::{OfLoad, Value},
+    number, phase, plain,
 };
-use crate::causes::{CauseName, ParameterName as Name};
 use crate::diagnosis::base::PlayLaw;
 use crate::diagnosis::rows::quantile;
 use crate::diagnosis::thinned::Thinned;
@@ -290,18 +295,6 @@ fn torsional_resonance(on: &Excitation<'_>) -> Law {
     law
 }
 
-/// A moment of known size and place.
-pub(crate) fn simulated_gravity_torque(on: &Excitation<'_>, p: Values<'_>) -> Simulated {
-    let shape = [Name::TorqueNM, Name::PhaseRad].map(|name| (name, p(name)));
-    gravity_torque(1.0, on.base.law, on, on).with(&shape, [])
-}
-
-/// A load that swings about all that moves it.
-pub(crate) fn simulated_resonance(on: &Excitation<'_>, p: Values<'_>) -> Simulated {
-    let shape = [Name::FrequencyHz, Name::DampingRatio].map(|name| (name, p(name)));
-    torsional_resonance(on).with(&shape, [WIND_UP, KINEMATIC, TURNING].map(|role| (role, 1.0)))
-}
-
 pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     let mut laws = Vec::new();
     if on.speaks_of(CauseName::GravityTorque) {
@@ -324,6 +317,48 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     laws.push(torsional_resonance(on));
     laws
 }
+
+/// Gravity turns an unbalanced load, which the torque column does not hold.
+pub(crate) const GRAVITY_TORQUE: CauseSpec = CauseSpec {
+    name: "gravity_torque",
+    words: "unbalanced load",
+    does: "gravity on the load, which the torque column does not hold",
+    meaning: "an unbalanced load that the torque column does not hold",
+    kin: Kin::Torque,
+    needs: &[Need::Spring],
+    orders: &[(Turn::Output, Fixed(1.0))],
+    in_table: InTable::AtOneOrientation,
+    made_by_loads: true,
+    parameters: &[
+        number(Name::TorqueNM, "m g l", 0.0, 1e5, OfLoad(0.2)),
+        phase("of sin(output + orientation + phase)"),
+    ],
+    simulated: |on, p| {
+        let shape = [Name::TorqueNM, Name::PhaseRad].map(|name| (name, p(name)));
+        gravity_torque(1.0, on.base.law, on, on).with(&shape, [])
+    },
+    ..plain()
+};
+
+/// The inertia of the load swings on the spring of the drive.
+pub(crate) const TORSIONAL_RESONANCE: CauseSpec = CauseSpec {
+    name: "torsional_resonance",
+    words: "torsional resonance",
+    does: "the inertia of the load on the spring of the drive",
+    meaning: "the load's inertia on the drive's spring",
+    needs: &[Need::Time, Need::Swings],
+    in_table: InTable::No("it follows the motion in time, and a table knows steady motion alone"),
+    made_by_loads: true,
+    parameters: &[
+        number(Name::FrequencyHz, "of the free oscillation", 0.1, 1000.0, Value(8.0)),
+        number(Name::DampingRatio, "of critical damping", 0.001, 0.9, Value(0.03)),
+    ],
+    simulated: |on, p| {
+        let shape = [Name::FrequencyHz, Name::DampingRatio].map(|name| (name, p(name)));
+        torsional_resonance(on).with(&shape, [WIND_UP, KINEMATIC, TURNING].map(|role| (role, 1.0)))
+    },
+    ..plain()
+};
 
 #[cfg(test)]
 mod tests {

@@ -6,6 +6,8 @@
 //! clearance, `|sin|` on the flank that carries: orders 2, 4, 6 as 1 : 1/5 : 3/35, phase turned by twice the flank
 //! angle between flanks, a mean that eats backlash, and less the more teeth share the load.
 
+use std::f64::consts::TAU;
+
 use std::f64::consts::PI;
 
 use crate::nominal::{Fixed, Nominal};
@@ -16,10 +18,16 @@ use super::{
     Coefficients, Column, Excitation, Law, Named, Role, Shape, Shaped, Simulated, Values, beside, by_row, main,
     nuisance, of_both, of_wave, polar, times,
 };
-use crate::causes::{CauseName, ParameterName as Name};
-
-/// Share by which a law of shape may be wrong: signatures depend on generator and load.
-const SHAPE_MISFIT: f64 = 0.2;
+use crate::causes::ParameterName as Name;
+use crate::causes::spec::{
+    ARCSECONDS, CauseName, CauseSpec, Factor, HALF_LOAD, HARMONIC, InTable, Kin,
+    Multiple::{self, Harmonic, ToothMesh},
+    Need, Parameter, Turn,
+    Usual::{Follows, Value},
+    WHEELS, microns, number, phase, plain,
+};
+use crate::extension::DriveField;
+use flexspline_mechanics::drive::Wheel;
 
 /// Largest plausible amplitude, arcsec, one standard deviation.
 pub(super) const USUAL_ARCSEC: f64 = 20.0;
@@ -159,7 +167,7 @@ fn pitch(cause: CauseName, of: Angle) -> Law {
         taken.abs().max((taken + light).abs()) < MOST_CLEARANCE_TAKEN * of_wave(c, WAVE).0
     });
     law.search.whole_beside_noise = true;
-    law
+    law.of_shape()
 }
 
 /// Pitch error of a wheel whose error is one smooth wave, as of a cutter or a clamping that is off: order 2 with a
@@ -180,6 +188,7 @@ fn smooth_pitch(cause: CauseName, of: Angle) -> Law {
     })
     .parameters_by(pitch_parameters)
     .variant("smooth")
+    .of_shape()
 }
 
 fn pitch_parameters(on: &Excitation<'_>, _: Shaped<'_>, c: Coefficients<'_>) -> Vec<Named> {
@@ -226,6 +235,7 @@ fn higher_harmonic(cause: CauseName, of: Angle, harmonic: f64) -> Law {
     .parameters_by(move |on, _, c| wave_parameters(on, c, harmonic))
     .variant(format!("order {harmonic}"))
     .after_wheels()
+    .of_shape()
 }
 
 /// Whether a wheel does not turn: what is cut into it comes back once in each turn of the generator.
@@ -283,6 +293,7 @@ fn ovality() -> Law {
         ]
     })
     .well_known()
+    .of_shape()
 }
 
 /// Radial over tangential part of an oval ring as a flank sees them: twice the tangent of the pressure angle.
@@ -318,6 +329,7 @@ fn cam_form_error() -> Law {
             (Name::PhaseRad, phase),
         ]
     })
+    .of_shape()
 }
 
 /// A pulse is nothing beyond this number of its widths.
@@ -376,6 +388,7 @@ fn damaged_tooth(of: Angle) -> Law {
             (Name::Wheel, f64::from(u8::from(of == Angle::CircularSpline))),
         ]
     })
+    .of_shape()
 }
 
 /// A wave of this amplitude whose crest is at a phase.
@@ -384,34 +397,16 @@ fn crest_at(amplitude: f64, phase: f64) -> [f64; 2] {
 }
 
 /// A wheel beside its place, of known size.
-pub(crate) fn simulated_displacement(cause: CauseName, of: Angle, on: &Excitation<'_>, p: Values<'_>) -> Simulated {
+fn simulated_displacement(cause: CauseName, of: Angle, on: &Excitation<'_>, p: Values<'_>) -> Simulated {
     let shape = [Name::PhaseRad, Name::HalfLoadNM].map(|name| (name, p(name)));
     displaced(cause, of, on).with(&[shape[0], shape[1], (Name::SizeArcsec, p(Name::AmplitudeArcsec))], [])
 }
 
 /// A pitch error of one known wave.
-pub(crate) fn simulated_pitch(cause: CauseName, of: Angle, p: Values<'_>) -> Simulated {
+fn simulated_pitch(cause: CauseName, of: Angle, p: Values<'_>) -> Simulated {
     let harmonic = p(Name::Harmonic);
     let wave = crest_at(p(Name::AmplitudeArcsec), harmonic * p(Name::PhaseRad));
     higher_harmonic(cause, of, harmonic).with(&[], wave.map(|c| (WAVE, c)))
-}
-
-/// An oval of known size.
-pub(crate) fn simulated_ovality(p: Values<'_>) -> Simulated {
-    let [sine, cosine] = crest_at(p(Name::AmplitudeArcsec), 2.0 * p(Name::PhaseRad));
-    ovality().with(&[], [(WAVE, sine), (WAVE, -cosine)])
-}
-
-/// A form error of known size.
-pub(crate) fn simulated_cam_form_error(p: Values<'_>) -> Simulated {
-    cam_form_error().with(&[], crest_at(p(Name::AmplitudeArcsec), p(Name::PhaseRad)).map(|c| (WAVE, c)))
-}
-
-/// A tooth that lacks a known depth: what the load on it gives way by.
-pub(crate) fn simulated_damaged_tooth(p: Values<'_>) -> Simulated {
-    let of = if p(Name::Wheel) == 0.0 { Angle::Flexspline } else { Angle::CircularSpline };
-    let shape = [Name::AngleRad, Name::WidthRad].map(|name| (name, p(name)));
-    damaged_tooth(of).with(&shape, [0.0, -p(Name::AmplitudeArcsec), 0.0, 0.0].map(|c| (PULSE, c)))
 }
 
 pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
@@ -434,10 +429,165 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     if on.is_turned_about() {
         laws.push(displaced(CauseName::GravitySideLoad, Angle::Gravity(-1.0), on).variant(TURNED_BACK));
     }
-    for law in &mut laws {
-        if !law.is_in_zones() {
-            law.wrong.misfit = SHAPE_MISFIT;
-        }
-    }
     laws
 }
+
+/// The axis of the circular spline stands beside that of the generator.
+pub(crate) const CIRCULAR_SPLINE_ECCENTRICITY: CauseSpec = CauseSpec {
+    name: "circular_spline_eccentricity",
+    words: "eccentricity of the circular spline",
+    does: "its axis beside the axis of the generator: two waves in a turn of the generator against the circular \
+             spline",
+    meaning: "toothing of the circular spline beside the axis it turns about",
+    kin: Kin::Shape,
+    needs: &[Need::Teeth],
+    orders: &[(Turn::CircularSpline, Multiple::Fixed(2.0)), (Turn::CircularSpline, Multiple::Fixed(4.0))],
+    drive_field: DriveField::by_angle(|placing| {
+        placing.set_displacement(
+            true,
+            ["as_built.circular_spline_eccentricity_um", "as_built.circular_spline_eccentricity_phase_deg"],
+        )
+    }),
+    parameters: &[microns("how far", 10.0), ARCSECONDS, phase("whereto, on the circular spline"), HALF_LOAD],
+    twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::AlongNormal)],
+    simulated: |on, p| simulated_displacement(CauseName::CircularSplineEccentricity, Angle::CircularSpline, on, p),
+    ..plain()
+};
+
+/// The axis of the flexspline's toothing stands beside that of its bore.
+pub(crate) const FLEXSPLINE_RUNOUT: CauseSpec = CauseSpec {
+    name: "flexspline_runout",
+    words: "runout of the flexspline",
+    does: "its axis beside the axis of the generator: two waves in a generator turn",
+    meaning: "toothing of the flexspline beside the axis of its bore",
+    kin: Kin::Shape,
+    needs: &[Need::Teeth],
+    orders: &[(Turn::Flexspline, Multiple::Fixed(2.0)), (Turn::Flexspline, Multiple::Fixed(4.0))],
+    drive_field: DriveField::by_angle(|placing| {
+        placing.set_displacement(false, ["as_built.flexspline_runout_um", "as_built.flexspline_runout_phase_deg"])
+    }),
+    parameters: &[microns("how far", 10.0), ARCSECONDS, phase("whereto, on the flexspline"), HALF_LOAD],
+    twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::AlongNormal)],
+    simulated: |on, p| simulated_displacement(CauseName::FlexsplineRunout, Angle::Flexspline, on, p),
+    ..plain()
+};
+
+/// The circular spline is pressed to an oval.
+pub(crate) const CIRCULAR_SPLINE_OVALITY: CauseSpec = CauseSpec {
+    name: "circular_spline_ovality",
+    words: "oval circular spline",
+    does: "pressed out of round: two waves in a turn against the circular spline",
+    meaning: "circular spline pressed to an oval that keeps its length",
+    kin: Kin::Shape,
+    needs: &[Need::Teeth],
+    orders: &[(Turn::CircularSpline, Multiple::Fixed(2.0))],
+    drive_field: DriveField::by_angle(|placing| placing.set_ovality()),
+    parameters: &[microns("of the radius", 8.0), ARCSECONDS, phase("angle of a crest of the radius")],
+    twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::Oval)],
+    simulated: |_, p| {
+        let [sine, cosine] = crest_at(p(Name::AmplitudeArcsec), 2.0 * p(Name::PhaseRad));
+        ovality().with(&[], [(WAVE, sine), (WAVE, -cosine)])
+    },
+    ..plain()
+};
+
+/// The teeth of the flexspline are out of place along the pitch.
+pub(crate) const FLEXSPLINE_PITCH_ERROR: CauseSpec = CauseSpec {
+    name: "flexspline_pitch_error",
+    words: "pitch error of the flexspline",
+    does: "teeth out of place: whole orders of the generator turn",
+    meaning: "cumulative pitch error of the flexspline",
+    kin: Kin::Shape,
+    needs: &[Need::Teeth],
+    orders: &[(Turn::Flexspline, Harmonic)],
+    drive_field: DriveField::by_angle(|placing| placing.set_pitch_harmonics(Wheel::Flexspline)),
+    parameters: &[microns("along the pitch", 5.0), ARCSECONDS, HARMONIC, phase("angle of a crest of the error")],
+    twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::AlongPitch)],
+    simulated: |_, p| simulated_pitch(CauseName::FlexsplinePitchError, Angle::Flexspline, p),
+    ..plain()
+};
+
+/// The teeth of the circular spline are out of place along the pitch.
+pub(crate) const CIRCULAR_SPLINE_PITCH_ERROR: CauseSpec = CauseSpec {
+    name: "circular_spline_pitch_error",
+    words: "pitch error of the circular spline",
+    does: "teeth out of place: whole orders of a turn against the circular spline",
+    meaning: "cumulative pitch error of the circular spline",
+    kin: Kin::Shape,
+    needs: &[Need::Teeth],
+    orders: &[(Turn::CircularSpline, Harmonic)],
+    drive_field: DriveField::by_angle(|placing| placing.set_pitch_harmonics(Wheel::CircularSpline)),
+    parameters: &[microns("along the pitch", 5.0), ARCSECONDS, HARMONIC, phase("angle of a crest of the error")],
+    twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::AlongPitch)],
+    simulated: |_, p| simulated_pitch(CauseName::CircularSplinePitchError, Angle::CircularSpline, p),
+    ..plain()
+};
+
+/// The generator has another shape than the drawn one.
+pub(crate) const CAM_FORM_ERROR: CauseSpec = CauseSpec {
+    name: "cam_form_error",
+    words: "form error of the generator",
+    does: "a shape that is not the drawn one: tooth mesh and even orders of the generator turn",
+    meaning: "form error of the generator",
+    needs: &[Need::Teeth],
+    orders: &[
+        (Turn::Generator, Multiple::Fixed(4.0)),
+        (Turn::Generator, Multiple::Fixed(6.0)),
+        (Turn::Generator, ToothMesh),
+    ],
+    parameters: &[microns("of the error it makes", 3.0), ARCSECONDS, phase("of the form")],
+    twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::AlongPitch)],
+    simulated: |_, p| {
+        cam_form_error().with(&[], crest_at(p(Name::AmplitudeArcsec), p(Name::PhaseRad)).map(|c| (WAVE, c)))
+    },
+    ..plain()
+};
+
+/// A tooth lacks material.
+pub(crate) const DAMAGED_TOOTH: CauseSpec = CauseSpec {
+    name: "damaged_tooth",
+    words: "damaged tooth",
+    does: "a pulse each time a lobe passes one place",
+    meaning: "a tooth that lacks material",
+    kin: Kin::Pulse,
+    needs: &[Need::Teeth, Need::Turns],
+    orders: &[
+        (Turn::OfWheel, Multiple::Fixed(2.0)),
+        (Turn::OfWheel, Multiple::Fixed(4.0)),
+        (Turn::OfWheel, Multiple::Fixed(6.0)),
+    ],
+    drive_field: DriveField::by_angle(|placing| placing.set_damaged_tooth()),
+    parameters: &[
+        number(Name::DepthUm, "depth that lacks, along the normal", 0.0, 500.0, Value(10.0)),
+        number(Name::AmplitudeArcsec, "the same at the output, under the largest load", 0.0, 3000.0, Follows),
+        Parameter { words: WHEELS, ..number(Name::Wheel, "0 flexspline, 1 circular spline", 0.0, 1.0, Value(0.0)) },
+        number(Name::Tooth, "which one, from 0", 0.0, 2000.0, Value(40.0)),
+        number(Name::AngleRad, "the same as an angle on the wheel", -TAU, TAU, Follows),
+        number(Name::WidthRad, "half the arc over which it is felt", 0.02, 0.6, Value(0.15)),
+    ],
+    twins: &[(Name::DepthUm, Name::AmplitudeArcsec, Factor::AlongNormal), (Name::Tooth, Name::AngleRad, Factor::Tooth)],
+    simulated: |_, p| {
+        let of = if p(Name::Wheel) == 0.0 { Angle::Flexspline } else { Angle::CircularSpline };
+        let shape = [Name::AngleRad, Name::WidthRad].map(|name| (name, p(name)));
+        // What the load on it gives way by.
+        damaged_tooth(of).with(&shape, [0.0, -p(Name::AmplitudeArcsec), 0.0, 0.0].map(|c| (PULSE, c)))
+    },
+    ..plain()
+};
+
+/// A weight pushes the circular spline aside.
+pub(crate) const GRAVITY_SIDE_LOAD: CauseSpec = CauseSpec {
+    name: "gravity_side_load",
+    words: "side load by gravity",
+    does: "a weight that pushes the wheels out of centre",
+    meaning: "weight that pushes the circular spline aside",
+    kin: Kin::Shape,
+    needs: &[Need::Teeth],
+    orders: &[(Turn::Generator, Multiple::Fixed(2.0)), (Turn::Generator, Multiple::Fixed(4.0))],
+    in_table: InTable::AtOneOrientation,
+    drive_field: DriveField::by_angle(|placing| placing.set_offset()),
+    parameters: &[microns("how far", 10.0), ARCSECONDS, phase("whereto, against gravity"), HALF_LOAD],
+    twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::AlongNormal)],
+    simulated: |on, p| simulated_displacement(CauseName::GravitySideLoad, Angle::Gravity(1.0), on, p),
+    ..plain()
+};

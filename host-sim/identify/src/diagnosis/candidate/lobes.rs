@@ -11,7 +11,11 @@ use super::{
     Column, Excitation, Law, Named, Role, Shape, Shaped, Simulated, Values, Zones, beside, by_row, main, main_about,
     nuisance, of_wave, times,
 };
-use crate::causes::{CauseName, ParameterName as Name};
+use crate::causes::ParameterName as Name;
+use crate::causes::spec::{
+    ARCSECONDS, CauseName, CauseSpec, Factor, HALF_LOAD, Kin, Multiple::Fixed, Need, Turn, Usual::Value, microns,
+    number, phase, plain,
+};
 
 /// Plausible differences between the lobes, arcsec at the output.
 const DEEPER_ARCSEC: [f64; 2] = [2.0, 200.0];
@@ -133,7 +137,7 @@ pub(super) fn generator_eccentricity(on: &Excitation<'_>) -> Law {
 }
 
 /// An eccentric generator of known size; the ring's first order is a part of the flexspline's, at twice its phase.
-pub(crate) fn simulated_generator_eccentricity(on: &Excitation<'_>, p: Values<'_>) -> Simulated {
+fn simulated_generator_eccentricity(on: &Excitation<'_>, p: Values<'_>) -> Simulated {
     let (amplitude, phase, deeper) = (p(Name::AmplitudeArcsec), p(Name::PhaseRad), p(Name::DeeperArcsec));
     let [flexspline, ring] = [(amplitude, phase), (RING_OF_FLEXSPLINE * amplitude, 2.0 * phase)]
         .map(|(amplitude, phase)| [amplitude * phase.cos(), amplitude * phase.sin()]);
@@ -146,3 +150,30 @@ pub(crate) fn simulated_generator_eccentricity(on: &Excitation<'_>, p: Values<'_
 
 /// First order of the circular spline over that of the flexspline in simulated data. *Guess*.
 const RING_OF_FLEXSPLINE: f64 = 0.7;
+
+/// The generator stands beside its axis.
+pub(crate) const GENERATOR_ECCENTRICITY: CauseSpec = CauseSpec {
+    name: "generator_eccentricity",
+    words: "eccentricity of the generator",
+    does: "one lobe carries more: odd orders, once in a turn above all",
+    meaning: "generator beside its axis: one lobe carries more",
+    kin: Kin::Shape,
+    needs: &[Need::Teeth],
+    orders: &[(Turn::Flexspline, Fixed(1.0)), (Turn::CircularSpline, Fixed(1.0))],
+    parameters: &[
+        microns("once around each wheel: what the deeper lobe shows of the teeth", 2.0),
+        ARCSECONDS,
+        phase("whereto, on the generator"),
+        number(
+            Name::DeeperArcsec,
+            "how much deeper one lobe is: what it takes of the clearance at either flank",
+            0.0,
+            1000.0,
+            Value(20.0),
+        ),
+        HALF_LOAD,
+    ],
+    twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::AlongPitch)],
+    simulated: simulated_generator_eccentricity,
+    ..plain()
+};

@@ -429,6 +429,8 @@ const MOST_NUISANCE_OF_KNOWN: f64 = 0.6;
 const USUAL_MISFIT: f64 = 0.10;
 /// Share by which a law of pure geometry and counting may be wrong: sensors, ratio, skipped teeth.
 const EXACT_MISFIT: f64 = 0.02;
+/// Share by which a law of shape may be wrong: signatures depend on generator and load.
+const SHAPE_MISFIT: f64 = 0.2;
 /// Relative uncertainty of parameters of such laws, and of exact ones.
 const USUAL_DOUBT: f64 = 0.03;
 const EXACT_DOUBT: f64 = 0.005;
@@ -490,6 +492,10 @@ impl Law {
     }
     fn variant(mut self, variant: impl Into<Cow<'static, str>>) -> Law {
         self.variant = variant.into();
+        self
+    }
+    fn of_shape(mut self) -> Law {
+        self.wrong.misfit = SHAPE_MISFIT;
         self
     }
     fn exact(mut self) -> Law {
@@ -703,10 +709,9 @@ pub(crate) fn whole_library(on: &Excitation<'_>) -> Vec<Law> {
         laws.retain(|law| known.iter().all(|k| k.label != law.label));
         laws.extend(known);
     }
-    laws.extend(stiffness::laws(on));
-    laws.extend(thermal::laws(on));
-    laws.extend(dynamic::laws(on));
-    laws.extend(sensor::laws(on));
+    for further in [stiffness::laws, thermal::laws, dynamic::laws, sensor::laws] {
+        laws.extend(further(on));
+    }
     laws
 }
 

@@ -4,7 +4,14 @@ use std::f64::consts::TAU;
 
 use super::geometry::{Angle, waves};
 use super::{Column, Excitation, Law, Named, Role, Simulated, Values, by_row, main, nuisance, polar};
-use crate::causes::{CauseName, ParameterName as Name};
+use crate::causes::ParameterName as Name;
+use crate::causes::spec::{
+    CauseName, CauseSpec, ENCODERS, Factor, InTable, Kin,
+    Multiple::{Fixed, Harmonic},
+    Need, OF_THE_OUTPUT_ENCODER, Parameter, Turn,
+    Usual::{Follows, Value},
+    number, phase, plain,
+};
 use crate::measurement::rates;
 
 /// The line of an encoder.
@@ -42,20 +49,25 @@ fn encoder(
         named.extend(further());
         named
     })
+    .exact()
 }
 
 /// The first order of an encoder: a disc off its axis.
-fn encoder_eccentricity() -> [Law; 2] {
-    [(CauseName::OutputEncoderEccentricity, true), (CauseName::GeneratorEncoderEccentricity, false)]
-        .map(|(cause, of_output)| encoder(cause, of_output, (1.0, 30.0), true, Vec::new))
+fn encoder_eccentricity(of_output: bool) -> Law {
+    let cause = match of_output {
+        true => CauseName::OutputEncoderEccentricity,
+        false => CauseName::GeneratorEncoderEccentricity,
+    };
+    encoder(cause, of_output, (1.0, 30.0), true, Vec::new)
 }
 
 /// The second order of an encoder: a disc or a magnet that is tilted, a ring that is not flat, two signals of unlike
 /// size in a magnetic one. That of the generator has no overtone: overtones distinguish a wheel.
-fn encoder_tilt() -> [Law; 2] {
-    let of_output = encoder(CauseName::OutputEncoderTilt, true, (2.0, 15.0), true, Vec::new);
-    let of_generator = encoder(CauseName::GeneratorEncoderTilt, false, (2.0, 15.0), false, Vec::new);
-    [of_output.kin_of_shapes(), of_generator.after_wheels()]
+fn encoder_tilt(of_output: bool) -> Law {
+    match of_output {
+        true => encoder(CauseName::OutputEncoderTilt, true, (2.0, 15.0), true, Vec::new).kin_of_shapes(),
+        false => encoder(CauseName::GeneratorEncoderTilt, false, (2.0, 15.0), false, Vec::new).after_wheels(),
+    }
 }
 
 /// Waves in a turn that interpolation leaves: four of a magnet with two poles, and so on for 4, 8, ... signal periods
@@ -112,7 +124,8 @@ fn sensor_latency() -> Law {
             nuisance(rate(on, &on.rows.speed).into_iter().map(|by| 0.5 * by * per_s).collect(), DELAY_S),
         ]
     })
-    .parameters_by(|_, _, c| vec![(Name::DelayS, c.of(Role::SIZE))]);
+    .parameters_by(|_, _, c| vec![(Name::DelayS, c.of(Role::SIZE))])
+    .exact();
     // Of a long delay in fast motion what comes with it is more than noise.
     law.search.whole_beside_noise = true;
     law
@@ -124,30 +137,17 @@ fn ratio_error() -> Law {
         vec![main(by_row(on, |k| on.rows.output[k] * flexspline_base::units::ARCSEC_PER_RAD), 3e-4).called(Role::SIZE)]
     })
     .parameters_by(|_, _, c| vec![(Name::RatioRelativeError, c.of(Role::SIZE))])
-}
-
-/// A wave of known size in a turn of an encoder.
-pub(crate) fn simulated_encoder(cause: CauseName, of_output: bool, order: f64, p: Values<'_>) -> Simulated {
-    let (sin, cos) = p(Name::PhaseRad).sin_cos();
-    let law = match cause {
-        CauseName::EncoderSubdivision => encoder_subdivision(of_output, order),
-        _ => encoder(cause, of_output, (order, 1.0), false, Vec::new),
-    };
-    law.with(&[], [sin, cos].map(|part| (WAVE, part * p(Name::AmplitudeArcsec))))
-}
-
-/// A known delay.
-pub(crate) fn simulated_latency(p: Values<'_>) -> Simulated {
-    sensor_latency().with(&[], [(Role::SIZE, p(Name::DelayS))])
-}
-
-/// A known error of the ratio.
-pub(crate) fn simulated_ratio_error(p: Values<'_>) -> Simulated {
-    ratio_error().with(&[], [(Role::SIZE, p(Name::RatioRelativeError))])
+    .exact()
 }
 
 /// Periods of a subdivision that the output has to turn through: fewer are a curve that anything may make.
 const FEWEST_PERIODS: f64 = 1.5;
+
+/// A wave of known size in a turn of an encoder.
+fn simulated_encoder(law: Law, p: Values<'_>) -> Simulated {
+    let (sin, cos) = p(Name::PhaseRad).sin_cos();
+    law.with(&[], [sin, cos].map(|part| (WAVE, part * p(Name::AmplitudeArcsec))))
+}
 
 pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     let turned = on.output_span_rad() / TAU;
@@ -159,11 +159,128 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
             .map(move |order| encoder_subdivision(of_output, order))
     });
     // The order of the library: eccentric encoders, ratio, latency, then the further lines of encoders.
-    encoder_eccentricity()
+    let each = [true, false];
+    each.map(encoder_eccentricity)
         .into_iter()
         .chain([ratio_error(), sensor_latency()])
-        .chain(encoder_tilt())
+        .chain(each.map(encoder_tilt))
         .chain(subdivisions)
-        .map(Law::exact)
         .collect()
 }
+
+/// The disc of the output encoder stands off its axis.
+pub(crate) const OUTPUT_ENCODER_ECCENTRICITY: CauseSpec = CauseSpec {
+    name: "output_encoder_eccentricity",
+    words: "eccentricity of the output encoder",
+    does: "one wave in an output turn, whatever the load",
+    meaning: "disc of the output encoder off its axis",
+    orders: &[(Turn::Output, Fixed(1.0))],
+    in_table: InTable::No(OF_THE_OUTPUT_ENCODER),
+    made_by_loads: true,
+    parameters: &[
+        number(Name::AmplitudeArcsec, "at the output", 0.0, 10_000.0, Value(20.0)),
+        phase("of sin(output + phase)"),
+    ],
+    simulated: |_, p| simulated_encoder(encoder_eccentricity(true), p),
+    ..plain()
+};
+
+/// The disc of the generator's encoder stands off its axis.
+pub(crate) const GENERATOR_ENCODER_ECCENTRICITY: CauseSpec = CauseSpec {
+    name: "generator_encoder_eccentricity",
+    words: "eccentricity of the generator encoder",
+    does: "one wave in a generator turn, whatever the load",
+    meaning: "disc of the generator's encoder off its axis",
+    orders: &[(Turn::Generator, Fixed(1.0))],
+    parameters: &[
+        number(Name::AmplitudeArcsec, "at the output", 0.0, 1000.0, Value(10.0)),
+        number(Name::GeneratorAmplitudeArcsec, "the same at the generator", 0.0, 1e5, Follows),
+        phase("of sin(generator + phase)"),
+    ],
+    twins: &[(Name::AmplitudeArcsec, Name::GeneratorAmplitudeArcsec, Factor::Ratio)],
+    simulated: |_, p| simulated_encoder(encoder_eccentricity(false), p),
+    ..plain()
+};
+
+/// The output encoder reads twice around wrong: a tilted disc, a magnet that is not square.
+pub(crate) const OUTPUT_ENCODER_TILT: CauseSpec = CauseSpec {
+    name: "output_encoder_tilt",
+    words: "tilt of the output encoder",
+    does: "two waves in an output turn, whatever the load",
+    meaning: "output encoder that is tilted, or whose magnet is not square on its axis",
+    needs: &[Need::HalfOutputTurn],
+    orders: &[(Turn::Output, Fixed(2.0))],
+    in_table: InTable::No(OF_THE_OUTPUT_ENCODER),
+    parameters: &[
+        number(Name::AmplitudeArcsec, "at the output", 0.0, 10_000.0, Value(15.0)),
+        phase("of sin(2 output + phase)"),
+    ],
+    double_outside: true,
+    simulated: |_, p| simulated_encoder(encoder_tilt(true), p),
+    ..plain()
+};
+
+/// The generator's encoder reads twice around wrong.
+pub(crate) const GENERATOR_ENCODER_TILT: CauseSpec = CauseSpec {
+    name: "generator_encoder_tilt",
+    words: "tilt of the generator encoder",
+    does: "two waves in a generator turn, the same on both flanks and under any load",
+    meaning: "generator's encoder that is tilted, or whose magnet is not square on its axis",
+    kin: Kin::Shape,
+    orders: &[(Turn::Generator, Fixed(2.0))],
+    parameters: &[
+        number(Name::AmplitudeArcsec, "at the output", 0.0, 1000.0, Value(8.0)),
+        number(Name::GeneratorAmplitudeArcsec, "the same at the generator", 0.0, 1e5, Follows),
+        phase("of sin(2 generator + phase)"),
+    ],
+    twins: &[(Name::AmplitudeArcsec, Name::GeneratorAmplitudeArcsec, Factor::Ratio)],
+    simulated: |_, p| simulated_encoder(encoder_tilt(false), p),
+    ..plain()
+};
+
+/// An encoder divides its periods unevenly: four and more waves around it.
+pub(crate) const ENCODER_SUBDIVISION: CauseSpec = CauseSpec {
+    name: "encoder_subdivision",
+    words: "subdivision error of an encoder",
+    does: "four waves or a multiple in a turn of an encoder, whatever the load and the speed",
+    meaning: "an encoder that divides its periods unevenly",
+    orders: &[(Turn::OfEncoder, Harmonic)],
+    parameters: &[
+        number(Name::AmplitudeArcsec, "at the output", 0.0, 1000.0, Value(6.0)),
+        number(Name::GeneratorAmplitudeArcsec, "the same at the generator", 0.0, 1e5, Follows),
+        number(Name::Harmonic, "waves in a turn of the encoder", 3.0, 65_536.0, Value(4.0)),
+        Parameter { words: ENCODERS, ..number(Name::Encoder, "0 generator, 1 output", 0.0, 1.0, Value(0.0)) },
+        phase("of sin(harmonic angle + phase)"),
+    ],
+    twins: &[(Name::AmplitudeArcsec, Name::GeneratorAmplitudeArcsec, Factor::Ratio)],
+    simulated: |_, p| simulated_encoder(encoder_subdivision(p(Name::Encoder) > 0.5, p(Name::Harmonic)), p),
+    ..plain()
+};
+
+/// The output of a row is older than its generator.
+pub(crate) const SENSOR_LATENCY: CauseSpec = CauseSpec {
+    name: "sensor_latency",
+    words: "time between the sensors",
+    does: "output and generator are read at different instants: an error in proportion to speed",
+    meaning: "the output's reading is older than the generator's",
+    kin: Kin::Motion,
+    needs: &[Need::Time],
+    in_table: InTable::No("it follows the speed, and a table knows none"),
+    made_by_loads: true,
+    parameters: &[number(Name::DelayS, "positive: the output's is older", -0.1, 0.1, Value(0.002))],
+    simulated: |_, p| sensor_latency().with(&[], [(Role::SIZE, p(Name::DelayS))]),
+    ..plain()
+};
+
+/// The ratio is another one.
+pub(crate) const RATIO_ERROR: CauseSpec = CauseSpec {
+    name: "ratio_error",
+    words: "another ratio",
+    does: "the error grows with the angle",
+    meaning: "an error in proportion to the output angle",
+    in_table: InTable::No("it grows from turn to turn, and a table repeats"),
+    made_by_loads: true,
+    parameters: &[number(Name::RatioRelativeError, "of the output angle", -0.01, 0.01, Value(1e-4))],
+    simulated: |_, p| ratio_error().with(&[], [(Role::SIZE, p(Name::RatioRelativeError))]),
+    ..plain()
+};

@@ -1,13 +1,23 @@
 //! What the torque does beyond the nominal wind-up and play.
 
+use std::f64::consts::TAU;
+
 use std::f64::consts::PI;
 use std::ops::Range;
 
 use super::super::prepare::Jump;
 use super::super::rows::rms;
 use super::geometry::{Angle, angle, pulse, weighted_waves};
-use super::{Coefficients, Excitation, Law, Role, Shape, Shaped, Simulated, Values, by_row, history, main, nuisance};
-use crate::causes::{CauseName, ParameterName as Name};
+use super::{Coefficients, Excitation, Law, Role, Shape, Shaped, by_row, history, main, nuisance};
+use crate::causes::ParameterName as Name;
+use crate::causes::spec::{
+    CauseName, CauseSpec, InTable, Kin,
+    Multiple::Fixed,
+    Need, TIME, Turn,
+    Usual::{OfLoad, ToothPitch, Value},
+    number, plain,
+};
+use crate::extension::DriveField;
 use flexspline_base::units::ARCSEC_PER_TURN;
 
 /// Torque in units of the load scale.
@@ -343,51 +353,6 @@ fn skipped_teeth(jumps: Vec<Jump>, pitch: f64) -> Law {
     law
 }
 
-/// A loop of one spring, of known width and slip.
-pub(crate) fn simulated_hysteresis(on: &Excitation<'_>, p: Values<'_>) -> Simulated {
-    let slip = p(Name::SlipTorqueNM);
-    let held = held(on.scales.load, slip);
-    // A spring that slips beyond half the load has no large loop: its width is what it can hold.
-    let width = p(Name::HalfWidthArcsec) / if held > 0.0 { held } else { 1.0 };
-    torsional_hysteresis(on).with(&[(Name::SlipTorqueNM, slip)], [(SPRING, width)])
-}
-
-/// A hardening stated at any full load.
-pub(crate) fn simulated_hardening(on: &Excitation<'_>, p: Values<'_>) -> Simulated {
-    let exponent = p(Name::HardeningExponent);
-    let size = p(Name::HardeningArcsec) * (on.scales.load / p(Name::FullLoadNM)).powf(exponent);
-    stiffness_hardening().with(&[(Name::Exponent, exponent)], [(Role::SIZE, size)])
-}
-
-/// A spring of another stiffness, true over nominal.
-pub(crate) fn simulated_stiffness_error(p: Values<'_>) -> Simulated {
-    stiffness_error().with(&[], [(Role::SIZE, 1.0 / p(Name::StiffnessRatio) - 1.0)])
-}
-
-/// A crack stated at any full load.
-pub(crate) fn simulated_crack(on: &Excitation<'_>, p: Values<'_>) -> Simulated {
-    let size = p(Name::AmplitudeArcsec) * on.scales.load / p(Name::FullLoadNM);
-    let shape = [Name::AngleRad, Name::WidthRad].map(|name| (name, p(name)));
-    cracked_tooth_root().with(&shape, [(Role::SIZE, size)])
-}
-
-/// A clearance wider by a known width.
-pub(crate) fn simulated_backlash_growth(on: &Excitation<'_>, p: Values<'_>) -> Simulated {
-    let half = on.base.half_backlash.max(1.0);
-    backlash_growth().with(&[], [(Role::SIZE, 0.5 * p(Name::GrowthArcsec) / half)])
-}
-
-/// A clearance that widens evenly with travel.
-pub(crate) fn simulated_wear(p: Values<'_>) -> Simulated {
-    wear(Progress::Travel).with(&[(Name::Exponent, 1.0)], [(Role::SIZE, 0.5 * p(Name::GrowthArcsec))])
-}
-
-/// One jump at a time.
-pub(crate) fn simulated_ratcheting(p: Values<'_>) -> Simulated {
-    let jump = Jump { time_s: [p(Name::TimeS); 3], height_arcsec: p(Name::JumpArcsec) };
-    skipped_teeth(vec![jump], 1.0).with(&[], [(JUMP, 1.0)])
-}
-
 pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     let mut laws = Vec::new();
     if on.speaks_of(CauseName::TorsionalHysteresis) {
@@ -410,3 +375,145 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     laws.extend(ratcheting(on));
     laws
 }
+
+/// A tooth of the circular spline is cracked at its root.
+pub(crate) const CRACKED_TOOTH_ROOT: CauseSpec = CauseSpec {
+    name: "cracked_tooth_root",
+    words: "cracked tooth root",
+    does: "softer each time a lobe passes one tooth of the circular spline: nothing there without load",
+    meaning: "a tooth of the circular spline that bends more than its neighbours",
+    kin: Kin::Pulse,
+    needs: &[Need::Teeth, Need::Turns, Need::Load],
+    orders: &[
+        (Turn::CircularSpline, Fixed(2.0)),
+        (Turn::CircularSpline, Fixed(4.0)),
+        (Turn::CircularSpline, Fixed(6.0)),
+    ],
+    parameters: &[
+        number(Name::AmplitudeArcsec, "by which it winds up more at the full load", 0.0, 1000.0, Value(30.0)),
+        number(Name::FullLoadNM, "the torque at which it is stated", 1e-3, 1e6, OfLoad(1.0)),
+        number(
+            Name::AngleRad,
+            "where the tooth, or the one opposite, is on the circular spline",
+            -TAU,
+            TAU,
+            Value(1.2),
+        ),
+        number(Name::WidthRad, "half the arc over which it is felt", 0.02, 0.6, Value(0.15)),
+    ],
+    simulated: |on, p| {
+        let size = p(Name::AmplitudeArcsec) * on.scales.load / p(Name::FullLoadNM);
+        let shape = [Name::AngleRad, Name::WidthRad].map(|name| (name, p(name)));
+        cracked_tooth_root().with(&shape, [(Role::SIZE, size)])
+    },
+    ..plain()
+};
+
+/// The clearance is wider throughout the data.
+pub(crate) const BACKLASH_GROWTH: CauseSpec = CauseSpec {
+    name: "backlash_growth",
+    words: "wider backlash",
+    does: "more clearance than nominal throughout the data",
+    meaning: "a wider clearance throughout",
+    kin: Kin::Clearance,
+    drive_field: DriveField::throughout(|placing| placing.set_wear()),
+    made_by_loads: true,
+    parameters: &[number(Name::GrowthArcsec, "whole width over nominal", 0.0, 10_000.0, Value(40.0))],
+    simulated: |on, p| {
+        let half = on.base.half_backlash.max(1.0);
+        backlash_growth().with(&[], [(Role::SIZE, 0.5 * p(Name::GrowthArcsec) / half)])
+    },
+    ..plain()
+};
+
+/// The clearance widens during the data.
+pub(crate) const WEAR: CauseSpec = CauseSpec {
+    name: "wear",
+    words: "wear",
+    does: "a clearance that widens from the first row to the last",
+    meaning: "a clearance that widens with travel",
+    kin: Kin::Clearance,
+    needs: &[Need::Use],
+    in_table: InTable::No("it grows with use, and a table stays"),
+    drive_field: DriveField::throughout(|placing| placing.set_wear()),
+    parameters: &[number(Name::GrowthArcsec, "whole width, first row to last", 0.0, 10_000.0, Value(40.0))],
+    simulated: |_, p| {
+        wear(Progress::Travel).with(&[(Name::Exponent, 1.0)], [(Role::SIZE, 0.5 * p(Name::GrowthArcsec))])
+    },
+    ..plain()
+};
+
+/// The drive is stiffer the higher the load.
+pub(crate) const STIFFNESS_HARDENING: CauseSpec = CauseSpec {
+    name: "stiffness_hardening",
+    words: "hardening stiffness",
+    does: "stiffer the higher the load",
+    meaning: "stiffer the higher the load",
+    kin: Kin::Torque,
+    needs: &[Need::Load],
+    parameters: &[
+        number(Name::HardeningArcsec, "by which the wind-up falls short at the full load", 0.0, 1000.0, Value(20.0)),
+        number(Name::HardeningExponent, "of the torque", 1.2, 8.0, Value(3.0)),
+        number(Name::FullLoadNM, "the torque at which it is stated", 1e-3, 1e6, OfLoad(1.0)),
+    ],
+    simulated: |on, p| {
+        let exponent = p(Name::HardeningExponent);
+        let size = p(Name::HardeningArcsec) * (on.scales.load / p(Name::FullLoadNM)).powf(exponent);
+        stiffness_hardening().with(&[(Name::Exponent, exponent)], [(Role::SIZE, size)])
+    },
+    ..plain()
+};
+
+/// The drive has another stiffness than the nominal one.
+pub(crate) const STIFFNESS_ERROR: CauseSpec = CauseSpec {
+    name: "stiffness_error",
+    words: "other stiffness",
+    does: "wind-up in proportion to nominal, of another size",
+    meaning: "another stiffness than nominal",
+    kin: Kin::Torque,
+    needs: &[Need::Load],
+    drive_field: DriveField::throughout(|placing| placing.set_stiffness()),
+    parameters: &[number(Name::StiffnessRatio, "true over nominal", 0.05, 20.0, Value(0.8))],
+    simulated: |_, p| stiffness_error().with(&[], [(Role::SIZE, 1.0 / p(Name::StiffnessRatio) - 1.0)]),
+    ..plain()
+};
+
+/// Contacts slip inside the drive: the output lags the torque.
+pub(crate) const TORSIONAL_HYSTERESIS: CauseSpec = CauseSpec {
+    name: "torsional_hysteresis",
+    words: "torsional hysteresis",
+    does: "the output lags the torque by what slipping contacts hold",
+    meaning: "springs that slip: the output lags the torque",
+    kin: Kin::Friction,
+    needs: &[Need::Load],
+    in_table: InTable::No("it depends on the torques before, and a table knows the present one alone"),
+    made_by_loads: true,
+    parameters: &[
+        number(Name::HalfWidthArcsec, "half the opening of the large loop at zero torque", 0.0, 1000.0, Value(15.0)),
+        number(Name::SlipTorqueNM, "at which the middle spring slips", 1e-3, 1e6, OfLoad(0.2)),
+    ],
+    simulated: |on, p| {
+        let slip = p(Name::SlipTorqueNM);
+        let held = held(on.scales.load, slip);
+        // A spring that slips beyond the load opens no loop: its width is what it can hold.
+        let width = p(Name::HalfWidthArcsec) / if held > 0.0 { held } else { 1.0 };
+        torsional_hysteresis(on).with(&[(Name::SlipTorqueNM, slip)], [(SPRING, width)])
+    },
+    ..plain()
+};
+
+/// Teeth have skipped.
+pub(crate) const RATCHETING: CauseSpec = CauseSpec {
+    name: "ratcheting",
+    words: "ratcheting",
+    does: "teeth that skipped",
+    meaning: "teeth that skip",
+    needs: &[Need::Teeth, Need::Jump],
+    in_table: InTable::No("it happens at an instant"),
+    parameters: &[number(Name::JumpArcsec, "of the output, whole teeth", -1e5, 1e5, ToothPitch), TIME],
+    simulated: |_, p| {
+        let jump = Jump { time_s: [p(Name::TimeS); 3], height_arcsec: p(Name::JumpArcsec) };
+        skipped_teeth(vec![jump], 1.0).with(&[], [(JUMP, 1.0)])
+    },
+    ..plain()
+};

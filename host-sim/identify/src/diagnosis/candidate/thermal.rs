@@ -1,10 +1,14 @@
 //! What the temperature does.
 
 use super::dynamic::columns_of_load;
-use super::{
-    Excitation, Law, Named, Role, Shape, Shaped, Simulated, Values, by_row, lagged_through, main, main_about, nuisance,
+use super::{Excitation, Law, Named, Role, Shape, Shaped, by_row, lagged_through, main, main_about, nuisance};
+use crate::causes::ParameterName as Name;
+use crate::causes::spec::{
+    CauseName, CauseSpec, InTable, Kin, Need,
+    Usual::{OfLoad, Value},
+    number, plain,
 };
-use crate::causes::{CauseName, ParameterName as Name};
+use crate::extension::DriveField;
 
 /// Temperature above nominal, felt with a lag of `lag_s`, K. Metal does not know when it is recorded: what was felt
 /// when a session ended nears the temperature at which the next one begins.
@@ -209,23 +213,6 @@ fn lubricant_load(on: &Excitation<'_>) -> Law {
     law
 }
 
-/// A clearance of known change.
-pub(crate) fn simulated_clearance(on: &Excitation<'_>, p: Values<'_>) -> Simulated {
-    let lag_s = p(Name::LagS).max(LEAST_LAG_S);
-    thermal_clearance(on).with(&[(Name::LagS, lag_s)], [(Role::SIZE, 0.5 * p(Name::ClearanceArcsecPerK))])
-}
-
-/// A stiffness of known change.
-pub(crate) fn simulated_stiffness(p: Values<'_>) -> Simulated {
-    thermal_stiffness().with(&[], [(Role::SIZE, -100.0 * p(Name::StiffnessRelativePerK))])
-}
-
-/// A drag of known size, as the load that it is.
-pub(crate) fn simulated_drag(on: &Excitation<'_>, p: Values<'_>) -> Simulated {
-    let shape = [Name::DragNM, Name::SpeedExponent].map(|name| (name, p(name)));
-    lubricant_load(on).with(&[shape[0], shape[1], (Name::PerK, -p(Name::RelativeDragPerK))], [])
-}
-
 pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     let mut laws = vec![thermal_clearance(on)];
     if on.base.half_backlash > 0.0 {
@@ -237,3 +224,59 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
     }
     laws
 }
+
+/// The clearance follows the temperature.
+pub(crate) const THERMAL_CLEARANCE: CauseSpec = CauseSpec {
+    name: "thermal_clearance",
+    words: "clearance with temperature",
+    does: "backlash that follows the temperature",
+    meaning: "a clearance that follows the temperature",
+    kin: Kin::Clearance,
+    needs: &[Need::Temperature, Need::TemperatureSpan],
+    drive_field: DriveField::throughout(|placing| placing.set_expansion()),
+    parameters: &[
+        number(Name::ClearanceArcsecPerK, "whole width, wider when warm", -50.0, 50.0, Value(-1.0)),
+        number(Name::LagS, "with which it follows", 0.0, 1e5, Value(0.0)),
+    ],
+    simulated: |on, p| {
+        let lag = (Name::LagS, p(Name::LagS).max(LEAST_LAG_S));
+        thermal_clearance(on).with(&[lag], [(Role::SIZE, 0.5 * p(Name::ClearanceArcsecPerK))])
+    },
+    ..plain()
+};
+
+/// The stiffness follows the temperature.
+pub(crate) const THERMAL_STIFFNESS: CauseSpec = CauseSpec {
+    name: "thermal_stiffness",
+    words: "stiffness with temperature",
+    does: "wind-up that follows the temperature",
+    meaning: "a stiffness that follows the temperature",
+    kin: Kin::Torque,
+    needs: &[Need::Temperature, Need::TemperatureSpan, Need::Load],
+    drive_field: DriveField::throughout(|placing| placing.set_stiffness_per_k()),
+    parameters: &[number(Name::StiffnessRelativePerK, "of the stiffness", -0.02, 0.02, Value(-0.004))],
+    simulated: |_, p| thermal_stiffness().with(&[], [(Role::SIZE, -100.0 * p(Name::StiffnessRelativePerK))]),
+    ..plain()
+};
+
+/// The lubricant drags the output.
+pub(crate) const LUBRICANT_VISCOSITY: CauseSpec = CauseSpec {
+    name: "lubricant_viscosity",
+    words: "drag of the lubricant",
+    does: "a load against the motion that grows with speed and cold",
+    meaning: "drag of the lubricant on the output, that the torque column does not hold",
+    kin: Kin::Drag,
+    needs: &[Need::Time, Need::Motion],
+    in_table: InTable::No("it follows the speed, and a table knows none"),
+    made_by_loads: true,
+    parameters: &[
+        number(Name::DragNM, "at the mean speed and the nominal temperature", 0.0, 1e5, OfLoad(0.1)),
+        number(Name::SpeedExponent, "of the speed", 0.2, 1.2, Value(2.0 / 3.0)),
+        number(Name::RelativeDragPerK, "of the drag", -0.15, 0.0, Value(-0.035)),
+    ],
+    simulated: |on, p| {
+        let [drag, power] = [Name::DragNM, Name::SpeedExponent].map(|name| (name, p(name)));
+        lubricant_load(on).with(&[drag, power, (Name::PerK, -p(Name::RelativeDragPerK))], [])
+    },
+    ..plain()
+};
