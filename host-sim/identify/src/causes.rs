@@ -1,8 +1,8 @@
 //! The causes of the library.
 //!
-//! A [`CauseName`] is the name of a cause. All else that there is of it is one value, its `CauseSpec`, beside its law in
-//! a file of `crate::diagnosis::candidate`: words, needs, orders, parameters, place in a table and in a drive, the laws
-//! that the diagnosis fits, and the one that [`crate::synthesize`] hides. The list below has a line for each.
+//! A [`CauseName`] is the name of a cause. All else that there is of it is one value, its `CauseSpec`, next to its law
+//! in a file of `crate::diagnosis::candidate`: words, needs, orders, parameters, place in a table and in a drive, the
+//! laws that the diagnosis fits, and the one that [`crate::synthesize`] hides. The list below has a line for each.
 
 mod parameter;
 pub(crate) mod spec;

@@ -16,7 +16,8 @@ use flexspline_identify::extension::{self, CauseEntry};
 use flexspline_identify::measurement::{ColumnMap, Session, read};
 use flexspline_identify::nominal::Nominal;
 use flexspline_identify::synthesize::{
-    Definition, Effect, Plan, Sensors, Sizes, Unit, completed, effects, parse, synthesize, to_csv, within_temperatures,
+    Definition, DrawnUnit, Effect, MotionPlan, Sensors, Sizes, completed, effects, parse, synthesize, to_csv,
+    within_temperatures,
 };
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
@@ -194,7 +195,7 @@ impl Synthesize {
         if self.like.is_none() {
             within_temperatures(&mut motion, temperatures);
         }
-        let unit = if self.no_spread { Unit::nominal(&nominal) } else { Unit::draw(&nominal, &mut random) };
+        let unit = if self.no_spread { DrawnUnit::nominal(&nominal) } else { DrawnUnit::draw(&nominal, &mut random) };
         let sizes = Sizes {
             pitch_radius_mm: drive.circular_spline.pitch_radius_mm(),
             base_radius_mm: drive.circular_spline.base_radius_mm(),
@@ -270,7 +271,7 @@ impl Synthesize {
     /// Motion, load and surroundings: sessions without an error.
     fn motion(&self, nominal: &Nominal, random: &mut fastrand::Rng) -> Result<Vec<Session>, Failure> {
         let Some(path) = &self.like else {
-            let plan = Plan {
+            let plan = MotionPlan {
                 sessions: usize::from(self.sessions),
                 rows: self.rows as usize,
                 rate_hz: RATE_HZ,

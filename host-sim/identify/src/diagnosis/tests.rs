@@ -7,7 +7,7 @@ use std::f64::consts::FRAC_PI_2;
 use crate::causes::{CauseName, Kind, ParameterName};
 use crate::measurement::Session;
 use crate::nominal::{Harmonic, Nominal};
-use crate::synthesize::{Plan, Sensors, Sizes, Unit, catalogue_drive, parse, synthesize};
+use crate::synthesize::{DrawnUnit, MotionPlan, Sensors, Sizes, catalogue_drive, parse, synthesize};
 use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// A flank meets the tooth behind a zone's centre by this angle, rad.
@@ -22,16 +22,16 @@ const SOFTER: &str = "stiffness_error:stiffness_ratio=0.625";
 const LOOP: &str = "torsional_hysteresis:half_width_arcsec=18,slip_torque_n_m=8";
 
 /// Sessions of a unit of this drive with `effects`, as `synthesize` names them.
-fn measure(drive: &Nominal, effects: &[&str], plan: &Plan, sensors: &Sensors, seed: u64) -> Vec<Session> {
+fn measure(drive: &Nominal, effects: &[&str], plan: &MotionPlan, sensors: &Sensors, seed: u64) -> Vec<Session> {
     let mut random = fastrand::Rng::with_seed(seed);
     let motion = plan.excite(&mut random);
-    let unit = Unit::draw(drive, &mut random);
+    let unit = DrawnUnit::draw(drive, &mut random);
     let sizes = Sizes { pitch_radius_mm: 48.7, base_radius_mm: 44.6 };
     let effects: Vec<_> = effects.iter().map(|effect| parse(effect).unwrap()).collect();
     synthesize((drive, None), sizes, &effects, motion, sensors, &unit, &mut random).unwrap().sessions
 }
 
-const PLAN: Plan = Plan { sessions: 5, rows: 3000, rate_hz: 100.0, speed_rad_s: 6.0, torque_n_m: 40.0 };
+const PLAN: MotionPlan = MotionPlan { sessions: 5, rows: 3000, rate_hz: 100.0, speed_rad_s: 6.0, torque_n_m: 40.0 };
 const SENSORS: Sensors = Sensors { white_arcsec: 2.0, wander_arcsec: 0.8, wander_s: 12.0, encoder_bits: 22 };
 
 fn data(effects: &[&str], seed: u64) -> Vec<Session> {
@@ -40,7 +40,7 @@ fn data(effects: &[&str], seed: u64) -> Vec<Session> {
 
 /// Sessions of n rows at a rate, under white noise (arcsec).
 fn recorded(effects: &[&str], sessions: usize, rows: usize, rate_hz: f64, white: f64, seed: u64) -> Vec<Session> {
-    let plan = Plan { sessions, rows, rate_hz, ..PLAN };
+    let plan = MotionPlan { sessions, rows, rate_hz, ..PLAN };
     let sensors = Sensors { white_arcsec: white, wander_arcsec: 0.4 * white, ..SENSORS };
     measure(&catalogue_drive(), effects, &plan, &sensors, seed)
 }
@@ -477,7 +477,7 @@ fn what_no_cause_explains_is_not_named() {
 
 #[test]
 fn at_one_orientation_a_side_load_and_a_runout_are_look_alikes() {
-    let plan = Plan { speed_rad_s: 0.9, ..PLAN };
+    let plan = MotionPlan { speed_rad_s: 0.9, ..PLAN };
     let mut sessions = measure(&catalogue_drive(), &[RUNOUT], &plan, &SENSORS, 5);
     sessions.iter_mut().for_each(|session| session.orientation_rad = None);
     let diagnosis = diagnose(&sessions, &catalogue_drive(), None, &Settings::default(), |_, _, _| {}).unwrap();
@@ -795,7 +795,7 @@ fn a_line_of_the_mains_close_to_half_the_rate_of_rows_is_seen() {
 
 /// Sessions of a drive that nothing loads.
 fn unloaded(effects: &[&str], seed: u64) -> Vec<Session> {
-    let plan = Plan { rows: 5000, torque_n_m: 0.0, ..PLAN };
+    let plan = MotionPlan { rows: 5000, torque_n_m: 0.0, ..PLAN };
     measure(&catalogue_drive(), effects, &plan, &SENSORS, seed)
 }
 
@@ -908,7 +908,7 @@ fn rows_thrown_out_make_no_fast_wander_of_the_noise() {
 fn a_recording_too_short_to_tell_a_wander_from_none_is_taken_to_have_one() {
     let still = |rows: usize| {
         let sensors = Sensors { white_arcsec: 4.0, wander_arcsec: 0.0, ..SENSORS };
-        noise_of(&measure(&catalogue_drive(), &[], &Plan { sessions: 1, rows, ..PLAN }, &sensors, 3))
+        noise_of(&measure(&catalogue_drive(), &[], &MotionPlan { sessions: 1, rows, ..PLAN }, &sensors, 3))
     };
     let (short, long) = (still(2000), still(40000));
     assert!(short.wander > 0.2 * short.white, "{short:?}");

@@ -418,7 +418,7 @@ impl Effect {
     }
 }
 
-/// Flank angle by which the radius of an oval opens its spaces, rad: where teeth of HHD-95 bear.
+/// Flank angle by which the radius of an oval opens its spaces, rad: about that where teeth of HHD-95 bear. *Guess*.
 const OVAL_FLANK_RAD: f64 = 0.4;
 
 /// Sources that complete parameters.

@@ -168,16 +168,16 @@ fn average(rows: &mut [[f64; 6]], half_s: f64) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Plan, Sensors, Sizes, Unit, catalogue_drive, parse, synthesize};
+    use super::super::{DrawnUnit, MotionPlan, Sensors, Sizes, catalogue_drive, parse, synthesize};
     use super::*;
     use crate::measurement::{ColumnMap, Gear, parse as read};
 
     fn recording(effect: &str) -> crate::measurement::Recording {
         let nominal = catalogue_drive();
-        let plan = Plan { sessions: 8, rows: 1500, rate_hz: 100.0, speed_rad_s: 6.0, torque_n_m: 40.0 };
+        let plan = MotionPlan { sessions: 8, rows: 1500, rate_hz: 100.0, speed_rad_s: 6.0, torque_n_m: 40.0 };
         let mut random = fastrand::Rng::with_seed(5);
         let motion = plan.excite(&mut random);
-        let unit = Unit::draw(&nominal, &mut random);
+        let unit = DrawnUnit::draw(&nominal, &mut random);
         let sensors = Sensors { white_arcsec: 2.0, wander_arcsec: 0.5, wander_s: 12.0, encoder_bits: 22 };
         let sizes = Sizes { pitch_radius_mm: 48.7, base_radius_mm: 44.6 };
         let hidden = [parse(effect).unwrap()];

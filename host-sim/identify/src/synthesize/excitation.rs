@@ -4,9 +4,9 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use crate::measurement::Session;
 
-/// Plan of a measurement at several temperatures, under torques of all shapes, both ways, in several orientations.
+/// Motion of a measurement at several temperatures, under torques of all shapes, both ways, in several orientations.
 #[derive(Clone, Copy, Debug)]
-pub struct Plan {
+pub struct MotionPlan {
     /// Sessions.
     pub sessions: usize,
     /// Rows of each.
@@ -58,7 +58,7 @@ pub fn within_temperatures(sessions: &mut [Session], [low, high]: [f64; 2]) {
 /// Temperatures of a made-up run, °C.
 const MADE_UP_C: [f64; 2] = [-43.0, 63.0];
 
-impl Plan {
+impl MotionPlan {
     /// Makes up a run.
     #[must_use]
     pub fn excite(&self, random: &mut fastrand::Rng) -> Vec<Session> {

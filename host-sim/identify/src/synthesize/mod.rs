@@ -5,8 +5,8 @@
 //!
 //! * [`effects`]: the effects by name, their parameters with units, ranges and defaults; [`parse`] reads
 //!   `NAME:param=value,...`.
-//! * [`Plan`]: how the drive is driven, made up; [`completed`] takes it from measured sessions.
-//! * [`Unit`]: what one drive has that its drawing has not.
+//! * [`MotionPlan`]: how the drive is driven, made up; [`completed`] takes it from measured sessions.
+//! * [`DrawnUnit`]: what one drive has that its drawing has not.
 //! * [`synthesize`]: all of it to sessions, and what is true of them.
 
 mod catalogue;
@@ -15,7 +15,7 @@ mod excitation;
 
 pub use catalogue::{Definition, Effect, EffectError, Hidden, effects, parse};
 pub use data_fault::to_csv;
-pub use excitation::{Plan, completed, within_temperatures};
+pub use excitation::{MotionPlan, completed, within_temperatures};
 
 use flexspline::Table;
 
@@ -41,12 +41,13 @@ pub struct Sensors {
     pub encoder_bits: u32,
 }
 
-/// White noise of the torque sensor, of the largest torque, and of the thermometer, K.
+/// White noise of the torque sensor, of the largest torque. *Guess*.
 const TORQUE_NOISE: f64 = 5e-4;
+/// White noise of the thermometer, K. *Guess*.
 const TEMPERATURE_NOISE_K: f64 = 0.02;
 /// How the flank of a made-up drive changes below friction.
 const PLAY: PlayLaw = PlayLaw::Pushed;
-/// Units beyond this many standard deviations are not sold.
+/// Units beyond this many standard deviations are not sold. *Guess*.
 const WORST_UNIT: f64 = 2.5;
 
 /// A catalogue drive to hide effects in.
@@ -73,7 +74,7 @@ pub struct Sizes {
 
 /// What one unit has that the drawing has not.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Unit {
+pub struct DrawnUnit {
     /// Wind-up over nominal.
     pub wind_up: f64,
     /// Clearance over nominal.
@@ -84,16 +85,16 @@ pub struct Unit {
     pub zero_arcsec: f64,
 }
 
-impl Unit {
+impl DrawnUnit {
     /// The drawing.
     #[must_use]
-    pub fn nominal(nominal: &Nominal) -> Unit {
-        Unit { wind_up: 1.0, clearance: 1.0, drive: nominal.clone(), zero_arcsec: 0.0 }
+    pub fn nominal(nominal: &Nominal) -> DrawnUnit {
+        DrawnUnit { wind_up: 1.0, clearance: 1.0, drive: nominal.clone(), zero_arcsec: 0.0 }
     }
 
     /// Draws a unit.
     #[must_use]
-    pub fn draw(nominal: &Nominal, random: &mut fastrand::Rng) -> Unit {
+    pub fn draw(nominal: &Nominal, random: &mut fastrand::Rng) -> DrawnUnit {
         let spread = nominal.spread;
         let mut limited = || gauss(random).clamp(-WORST_UNIT, WORST_UNIT);
         let wind_up = 1.0 + spread.stiffness * limited();
@@ -105,7 +106,7 @@ impl Unit {
             harmonic.amplitude_arcsec *= 1.0 + spread.harmonic * limited();
             harmonic.phase_rad += spread.harmonic_phase_rad * 0.5 * limited();
         }
-        Unit { wind_up, clearance, drive, zero_arcsec: 200.0 * (random.f64() - 0.5) }
+        DrawnUnit { wind_up, clearance, drive, zero_arcsec: 200.0 * (random.f64() - 0.5) }
     }
 }
 
@@ -151,9 +152,9 @@ pub(crate) fn added_arcsec(
     Ok(added(&on, &simulated(&effects, &on)))
 }
 
-/// Measures a drive with `chosen` effects, in motion like that of `sessions`, which have all columns: the output encoder
-/// as `sensors` say, and a torque sensor and a thermometer with a little noise. A `table` made by FEM takes the place of
-/// the nominal prediction.
+/// Measures a drive with `chosen` effects, in motion like that of `sessions`, which have all columns: the output
+/// encoder as `sensors` say, and a torque sensor and a thermometer with a little noise. A `table` made by FEM takes the
+/// place of the nominal prediction.
 ///
 /// # Errors
 /// A parameter that does not fit the motion, such as a time outside it.
@@ -163,7 +164,7 @@ pub fn synthesize(
     chosen: &[Effect],
     mut sessions: Vec<Session>,
     sensors: &Sensors,
-    unit: &Unit,
+    unit: &DrawnUnit,
     random: &mut fastrand::Rng,
 ) -> Result<Synthesized, EffectError> {
     let rows = Rows::new(&sessions, nominal);

@@ -33,7 +33,7 @@ const ROUNDED: f64 = 0.5;
 pub(super) const ZONES_MISFIT: f64 = 0.12;
 /// The size is a shape parameter: what is left for the factor.
 const SCALE_MISFIT: f64 = 0.02;
-/// Order-2 amplitude of a rectified sine on one flank over its amplitude: 4 / 3 pi.
+/// Order-2 amplitude of a rectified sine on one flank over its amplitude: 4 / 3 pi, exact.
 const SECOND_ORDER: f64 = 0.424;
 /// Share of the pattern's second order that deviations have to leave of an eccentricity.
 const LEAST_OF_PATTERN: f64 = 0.15;

@@ -174,11 +174,13 @@ fn stiffness_error() -> Law {
 }
 
 /// Shares by which the law of a cracked root may be wrong: a crack that opens bends more than one that is pressed shut,
-/// the two loaded zones may carry unequally, and the arc in which the tooth carries has another shape. Guesses.
+/// the two loaded zones may carry unequally, and the arc in which the tooth carries has another shape. *Guess*.
 const OPENING: f64 = 0.3;
+/// See above. *Guess*.
 const UNEQUAL_LOBES: f64 = 0.3;
+/// See above. *Guess*.
 const OTHER_ARC: f64 = 0.3;
-/// The arc of another shape, over that of the law.
+/// The arc of another shape, over that of the law. *Guess*.
 const BROADER: f64 = 1.7;
 const BROADER_ARC: Role = Role("broader arc");
 

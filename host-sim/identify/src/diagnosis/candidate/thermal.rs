@@ -40,7 +40,7 @@ fn lag_of(shape: Shaped<'_>) -> f64 {
     shape.get(Name::LagS).unwrap_or(LEAST_LAG_S)
 }
 
-/// As good as no lag, s.
+/// As good as no lag, s: below the step between rows of any log here. *Guess*.
 const LEAST_LAG_S: f64 = 1e-3;
 
 /// A clearance by name: its change, and its lag where there is a time.
