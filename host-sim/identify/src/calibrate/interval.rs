@@ -224,14 +224,23 @@ pub struct Known {
     parts: Vec<PartName>,
     /// Of what the fit misses in their coefficients, arcsec².
     covariance: Mat,
+    /// What stays at each place, arcsec: drift, and errors of no part, as large as where rows took no part in the fit.
+    of_no_part_arcsec: f64,
     /// Noise of the rows.
     pub noise: Noise,
 }
 
 impl Known {
     /// From the rows of the fit, of logs with these delays as numbers of their columns, which `rows` are without unless
-    /// the model has them; `coarse_rad` is the step of the resolution at the output.
-    pub(super) fn of(rows: &[Row], model: &Model, delays: &[f64], coarse_rad: f64) -> Option<Known> {
+    /// the model has them; `coarse_rad` is the step of the resolution at the output, and `left_out_arcsec` what fits
+    /// leave in rows that were left out of them.
+    pub(super) fn of(
+        rows: &[Row],
+        model: &Model,
+        delays: &[f64],
+        coarse_rad: f64,
+        left_out_arcsec: f64,
+    ) -> Option<Known> {
         let (scales, logs) = (&model.scales, delays.len());
         let mut left = vec![Vec::new(); logs];
         rows.iter().for_each(|at| left[at.at.log].push(at.left_arcsec - model.adds_arcsec(&at.at)));
@@ -279,7 +288,9 @@ impl Known {
         for i in 0..width {
             (0..width).for_each(|j| covariance[(i, j)] = of_a_row * covariance[(i, j)] + off[i] * off[j]);
         }
-        Some(Known { model: model.clone(), parts, covariance, noise })
+        let everywhere = Noise { rms_arcsec: noise.rms_arcsec.max(left_out_arcsec), ..noise };
+        let of_no_part_arcsec = everywhere.beside_white_arcsec();
+        Some(Known { model: model.clone(), parts, covariance, of_no_part_arcsec, noise })
     }
 
     /// Half width of the interval that holds, with 95 %, what the table has at a state against the true error there,
@@ -288,7 +299,7 @@ impl Known {
     #[must_use]
     pub fn half_width_arcsec(&self, at: &State) -> f64 {
         let x = row(&self.parts, at, &self.model.scales);
-        OF_95 * (variance(&self.covariance, &x) + self.noise.beside_white_arcsec().powi(2)).sqrt()
+        OF_95 * (variance(&self.covariance, &x) + self.of_no_part_arcsec.powi(2)).sqrt()
     }
 
     /// Mean square root of the half widths at some states, arcsec.

@@ -554,7 +554,8 @@ fn with_dead_zone(
     let shown = rows.rows.iter().map(|row| [row.at.output_rad, row.measured_arcsec, zero(row) - mean]).collect();
     let none = || vec![0.0; files.len()];
     let delays = logs.delays.as_ref().map_or_else(none, |delays| delays.of_columns(&recorded.scales));
-    let known = Known::of(&rows.rows, &model, &delays, recorded.coarse_rad)
+    let left_out_arcsec = held_out.rms_after_arcsec;
+    let known = Known::of(&rows.rows, &model, &delays, recorded.coarse_rad, left_out_arcsec)
         .ok_or_else(|| CalibrationError::Known("the information matrix of these rows is singular".to_owned()))?;
     // Where delays were found the table is fitted to both angles at one instant, as at rest; where none was, to the
     // paces that were recorded.

@@ -98,7 +98,7 @@ impl Delays {
             Some(Model { coefficients: folds.coefficients(chosen, &[])?, chosen: chosen.to_vec(), scales })
         };
         let none = vec![0.0; logs];
-        let known = |model: &Model| Known::of(&rows.rows, model, &none, recorded.coarse_rad);
+        let known = |model: &Model| Known::of(&rows.rows, model, &none, recorded.coarse_rad, 0.0);
         // Of noise as large as the delays make it they would be held back.
         let of_a_row = known(&model(&chosen)?)?.noise.of_a_row() / rows.rows.len() as f64;
         for chosen in &mut chosen {
