@@ -10,7 +10,8 @@
     (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0)
 #error "flexspline_table.c: compile it without -ffast-math and its parts"
 #endif
-#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0
+/* 16: as 0 for float; _Float16, of which there is none here, is computed as it is (ISO/IEC TS 18661-3). */
+#if defined(FLT_EVAL_METHOD) && FLT_EVAL_METHOD != 0 && FLT_EVAL_METHOD != 16
 #error "flexspline_table.c: float is computed in another precision (x87?); use -msse2 -mfpmath=sse, or the compiler's like"
 #endif
 #if defined(__clang__)
