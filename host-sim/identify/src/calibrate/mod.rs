@@ -397,18 +397,20 @@ pub(crate) fn check_ratio(files: &[Recording], ratio: f64) -> Result<Option<Stri
         let slope = ratio / other - 1.0;
         (ee - 2.0 * slope * xe + slope * slope * xx) / ee
     };
-    let whole = found.round();
-    if (whole - ratio).abs() >= 1.0 && whole.abs() >= 2.0 && left(whole) < OTHER_RATIO {
+    // Wheels whose teeth differ by two have whole ratios and halves.
+    let near = (2.0 * found).round() / 2.0;
+    if near == ratio || near.abs() < 2.0 || left(near) >= OTHER_RATIO {
+        return Ok(None);
+    }
+    if (near - ratio).abs() >= 1.0 {
         return Err(CalibrationError::Ratio(format!(
             "ratio: found {ratio}, but the generator turns {found:.2} times for one turn of the output in these rows; \
-             allowed: {whole}, or other units or signs of the columns"
+             allowed: {near}, or other units or signs of the columns"
         )));
     }
-    let half = found.floor() + 0.5;
-    let doubt = half != ratio && left(half) < OTHER_RATIO;
-    Ok(doubt.then(|| {
-        format!("the generator turns {found:.2} times for one turn of the output in these rows: is the ratio {half}?")
-    }))
+    Ok(Some(format!(
+        "the generator turns {found:.2} times for one turn of the output in these rows: is the ratio {near}?"
+    )))
 }
 
 /// Generator turns that tell two waves in a turn from two in a turn against the output: half a turn of the output, in
