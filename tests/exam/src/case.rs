@@ -19,7 +19,6 @@ use crate::noise::{Sensors, csv};
 use crate::oracle::{Oracle, residual};
 use crate::record::Record;
 use crate::truth::{Hidden, Truth, rounded};
-use crate::variants::{self, Variant};
 
 /// Contents of a case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -47,31 +46,18 @@ pub enum Family {
     G,
     /// An arm at work: servo, payloads, sensor of the joint's torque; models near the textbook and far from it.
     H,
-    /// Variants: forms of each cause as real units have them. For learning, never counted as an examination.
-    V,
 }
 
 impl Family {
-    /// The fourth number of a model is its distance from the textbook.
-    fn has_distance(self) -> bool {
-        matches!(self, Self::G | Self::H)
-    }
-
-    /// Marches as [`crate::train`] does.
+    /// Marches as [`crate::train`] does; the fourth number of a model is its distance from the textbook.
     fn marches(self) -> bool {
-        matches!(self, Self::G | Self::H | Self::V)
-    }
-
-    /// Times the limit of detection at which an effect is aimed, at least and at most; below the third it is drawn
-    /// anew. Large causes show best how far a variant is from the textbook.
-    fn aim(self) -> (f64, f64, f64) {
-        if self == Self::V { (4.0, 30.0, 2.6) } else { (2.0, 15.0, 1.3) }
+        matches!(self, Self::G | Self::H)
     }
 
     /// Causes and strangers that such a bench can show.
     fn things(self) -> (&'static [Cause], &'static [Stranger]) {
         match self {
-            Self::D | Self::V => (Cause::ALL, Stranger::OF_JOINTS),
+            Self::D => (Cause::ALL, Stranger::OF_JOINTS),
             Self::E => (hides::OF_BENCHES, Stranger::OF_BENCHES),
             Self::G => (Cause::ALL, gimbal::STRANGERS),
             Self::H => (Cause::ALL, arm::STRANGERS),
@@ -86,7 +72,7 @@ pub struct Draw {
     #[arg(long, value_enum, ignore_case = true)]
     pub family: Option<Family>,
     /// Cases of one kind alone [default: of 10 cases of D and E 2 nulls, 5 singles, 1 compound, 2 outside the library;
-    /// of G and H 2, 4, 2 and 2; of V 1 null and 9 singles]
+    /// of G and H 2, 4, 2 and 2]
     #[arg(long, value_enum)]
     pub kind: Option<Kind>,
     /// Singles of one cause alone
@@ -98,17 +84,6 @@ pub struct Draw {
 }
 
 impl Draw {
-    /// # Errors
-    /// Kinds that the family does not have.
-    pub fn check(&self) -> Result<(), String> {
-        match (self.family, self.kind) {
-            (Some(Family::V), Some(kind @ (Kind::Outside | Kind::Logger))) => {
-                Err(format!("--kind {} with --family v: variants have null, single and compound", name_of(kind)))
-            }
-            _ => Ok(()),
-        }
-    }
-
     /// As they would be typed.
     pub fn options(&self) -> String {
         let options = [
@@ -141,7 +116,6 @@ enum Stand {
     Bench(Metrology),
     Gimbal(Gimbal),
     Arm(Arm),
-    Variant(Variant),
 }
 
 impl Stand {
@@ -151,7 +125,6 @@ impl Stand {
             Self::Bench(bench) => bench.run(drive, unit, hidden),
             Self::Gimbal(gimbal) => gimbal.run(drive, unit, hidden),
             Self::Arm(arm) => arm.run(drive, unit, hidden),
-            Self::Variant(variant) => variant.run(drive, unit, hidden),
         }
     }
 
@@ -159,9 +132,7 @@ impl Stand {
     fn jitter_s(&self) -> Option<f64> {
         match self {
             Self::Joint(joint) => Some(joint.poll.jitter_s),
-            Self::Gimbal(Gimbal { pace, .. }) | Self::Arm(Arm { pace, .. }) | Self::Variant(Variant { pace, .. }) => {
-                Some(pace.jitter_s)
-            }
+            Self::Gimbal(Gimbal { pace, .. }) | Self::Arm(Arm { pace, .. }) => Some(pace.jitter_s),
             Self::Bench(_) => None,
         }
     }
@@ -187,6 +158,10 @@ pub struct Case {
     floor_arcsec: f64,
 }
 
+/// Times the limit of detection at which an effect is aimed, at least and at most.
+const AIM: (f64, f64) = (2.0, 15.0);
+/// Times the limit of detection below which a case is drawn anew.
+const LEAST: f64 = 1.3;
 /// Draws of a case before one that is too small is taken as it is; it then counts as below the limit.
 const DRAWS: u64 = 12;
 const BLOCK: u64 = 10;
@@ -194,10 +169,9 @@ const BLOCK: u64 = 10;
 impl Case {
     /// Draws the case of this seed and index.
     pub fn draw(seed: u64, index: u64, draw: &Draw) -> Self {
-        let least = draw.family_of(index).aim().2;
         for attempt in 0.. {
             let case = Self::attempt(seed, index, attempt, draw);
-            if attempt + 1 == DRAWS || case.weighed.iter().all(|one| one.over_limit >= least) {
+            if attempt + 1 == DRAWS || case.weighed.iter().all(|one| one.over_limit >= LEAST) {
                 return case;
             }
         }
@@ -235,11 +209,6 @@ impl Case {
                 sensors.white_arcsec *= 0.6;
                 sensors.wander_arcsec *= 0.6;
                 Stand::Arm(Arm::draw(&drive, &mut chance))
-            }
-            Family::V => {
-                sensors.white_arcsec *= 0.7;
-                sensors.wander_arcsec *= 0.7;
-                Stand::Variant(Variant::draw(&mut chance))
             }
         };
         let mut case = Self {
@@ -280,15 +249,11 @@ impl Case {
         let mut far = chance.one_in(0.5);
         for thing in things {
             let mut one = Hides::draw(thing, &self.drive, chance);
-            if self.family.has_distance() {
+            if self.family.marches() {
                 one.shape[3] = if far { chance.uniform(0.7, 1.0) } else { chance.uniform(0.0, 0.3) };
                 far = !far;
             }
-            if let (Family::V, Thing::Cause(cause)) = (self.family, thing) {
-                one.shape[3] = chance.below(variants::forms(cause).len()) as f64;
-            }
-            let aim = self.family.aim();
-            let target = chance.log_uniform(aim.0, aim.1);
+            let target = chance.log_uniform(AIM.0, AIM.1);
             // A whole tooth, or nothing.
             let whole = self.family.marches() && thing == Thing::Cause(Cause::Ratcheting);
             for _ in 0..if whole { 0 } else { 4 } {
@@ -338,19 +303,11 @@ impl Case {
 
     /// Size and shape by name.
     fn numbers(&self, one: &Hides) -> BTreeMap<String, f64> {
-        let last = match self.family {
-            Family::G | Family::H => "distance",
-            Family::V => "form",
-            Family::D | Family::E => "shape_4",
-        };
+        let last = if self.family.marches() { "distance" } else { "shape_4" };
         let names = ["shape_1", "shape_2", "shape_3", last];
         let mut numbers: BTreeMap<_, _> =
             names.iter().zip(one.shape).map(|(name, value)| ((*name).to_owned(), value)).collect();
         numbers.insert(one.unit().to_owned(), one.size);
-        if let Stand::Variant(variant) = &self.stand {
-            let drawn = variant.numbers(&self.drive, one).into_iter();
-            numbers.extend(drawn.map(|(name, value)| (name.to_owned(), value)));
-        }
         numbers
     }
 
@@ -358,8 +315,7 @@ impl Case {
     fn parameters(&self, one: &Hides) -> BTreeMap<String, f64> {
         let Thing::Cause(cause) = one.thing else { return BTreeMap::new() };
         // Far from the textbook a size has more than one reading.
-        let far = self.family.has_distance() && (one.shape[3] > 0.5 || cause == Cause::RatioError);
-        if far || self.family == Family::V {
+        if self.family.marches() && (one.shape[3] > 0.5 || cause == Cause::RatioError) {
             return BTreeMap::new();
         }
         let moves = self.family != Family::E;
@@ -426,15 +382,6 @@ impl Case {
             let does = [(stand.zeroed, "zeroed"), (stand.restarted, "counter_restarted"), (stand.chamber, "chamber")];
             bench.extend(does.into_iter().filter(|(there, _)| *there).map(|(_, name)| name.to_owned()));
         }
-        if let Stand::Variant(variant) = &self.stand {
-            bench.extend(self.hidden.iter().filter_map(|one| match one.thing {
-                Thing::Cause(cause) => Some(format!("{}/{}", cause.name(), variants::name_of(cause, one))),
-                Thing::Stranger(_) => None,
-            }));
-            if !self.hidden.is_empty() {
-                bench.push(format!("zones/{}", variant.sharing()));
-            }
-        }
         let family = if self.kind == Kind::Logger { "logger".to_owned() } else { format!("{:?}", self.family) };
         Truth {
             name: self.name(),
@@ -483,7 +430,6 @@ fn plan(
     let (causes, strangers) = family.things();
     use Kind::{Compound, Null, Outside, Single};
     let mut kinds = match family {
-        Family::V => [Null, Single, Single, Single, Single, Single, Single, Single, Single, Single],
         Family::D | Family::E => [Null, Null, Outside, Outside, Compound, Single, Single, Single, Single, Single],
         Family::G | Family::H => [Null, Null, Outside, Outside, Compound, Compound, Single, Single, Single, Single],
     };

@@ -28,7 +28,6 @@ mod score;
 mod tests;
 mod train;
 mod truth;
-mod variants;
 
 use clap::{Args, Parser, Subcommand};
 use std::fs;
@@ -154,7 +153,6 @@ fn main() -> ExitCode {
 
 fn run(options: &Run) -> io::Result<bool> {
     let settings = &options.settings;
-    settings.draw.check().map_err(io::Error::other)?;
     let examination = exam::run(settings)?;
     println!("\n{}", examination.scores.table());
     println!(
@@ -194,7 +192,6 @@ fn gather(options: &Gather) -> io::Result<bool> {
 }
 
 fn one(options: &One) -> io::Result<()> {
-    options.draw.check().map_err(io::Error::other)?;
     fs::create_dir_all(&options.out)?;
     let case = Case::draw(options.seed, options.index, &options.draw);
     let truth = case.truth().json();

@@ -20,18 +20,6 @@ impl Profile {
         Self((0..points).map(at).collect())
     }
 
-    /// Sum of sines at 1440 points.
-    pub fn of(lines: &[(f64, f64, f64)]) -> Self {
-        Self::sines(lines, 1440)
-    }
-
-    /// The same, as large as a sine of amplitude 1 in the mean square.
-    pub fn scaled(self) -> Self {
-        let square = self.0.iter().map(|x| x * x).sum::<f64>() / self.0.len() as f64;
-        let scale = (0.5 / square.max(1e-12)).sqrt();
-        Self(self.0.into_iter().map(|x| scale * x).collect())
-    }
-
     /// At an angle.
     pub fn at(&self, angle_rad: f64) -> f64 {
         let points = self.0.len();

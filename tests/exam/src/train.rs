@@ -1,6 +1,6 @@
-//! The march in time that families G, H and V share: a generator, teeth with clearance, a hub that the friction of the
+//! The march in time that families G and H share: a generator, teeth with clearance, a hub that the friction of the
 //! housing holds, a spring, a flange, a torque sensor and a load with inertia. The models of hidden effects, the
-//! generator's motor, the run and the load are each family's own (`gimbal.rs`, `arm.rs`, `variants.rs`).
+//! generator's motor, the run and the load are each family's own (`gimbal.rs`, `arm.rs`).
 //!
 //! Angles at the output are arcsec here. A torque is positive where it turns the output forward.
 

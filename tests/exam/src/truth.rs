@@ -43,11 +43,11 @@ pub struct Truth {
     pub index: u64,
     /// null, single, compound, outside, logger.
     pub kind: String,
-    /// D, E, G, H, V or logger.
+    /// D, E, G, H or logger.
     pub family: String,
     /// No case lacks excitation any more; files keep the field.
     pub poor: [(); 0],
-    /// Habits of the bench of family E; form of each cause of family V.
+    /// Habits of the bench of family E.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub bench: Vec<String>,
     pub hidden: Vec<Hidden>,
