@@ -492,6 +492,7 @@ int run(void)
     for (uint32_t kind = 0; kind < 8; kind++) {
         if (names[kind] == NULL)
             continue;
+        print("c99-");
         print(names[kind]);
         print(": ");
         print_number(most[kind]);
