@@ -12,6 +12,8 @@
 //! - A [`FigureBody::Drive`] shows the [`Animation`]s of the page. Charts whose x axis is marked [`ChartAxis::linked`]
 //!   turn its generator, and are turned by it.
 
+use std::fmt;
+
 use askama::Template;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
@@ -122,6 +124,16 @@ impl RichText {
     pub fn error(mut self, arcsec: f64, digits: usize) -> RichText {
         self.0.push(Span::Error { arcsec, digits });
         self
+    }
+}
+
+/// As a terminal shows it.
+impl fmt::Display for RichText {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.iter().try_for_each(|span| match span {
+            Span::Plain(words) | Span::Strong(words) => f.write_str(words),
+            Span::Error { arcsec, digits } => write!(f, "{} arcsec", significant(*arcsec, *digits)),
+        })
     }
 }
 

@@ -1,6 +1,5 @@
 //! `flexspline sweep`: variants of a drive, and drives drawn from tolerances.
 
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::{ArgGroup, Args, Subcommand, ValueHint};
@@ -11,19 +10,13 @@ use super::names::{self, GeneratorNames};
 use super::{Context, Failure, report, say};
 use flexspline_base::output::Outputs;
 use flexspline_design::data_sheet::{FIGURES, FigureOf};
-use flexspline_design::stated::short;
 use flexspline_design::sweep::{
     Constraint, EXAMPLE, Judge, OfGenerator, PlanError, PlanSettings, Ran, ReducedSweep, RunStatus, Sense, Shard,
-    Tolerances, VariantPlan, VariantRow, Vary, is_error_of_making, reduce, run,
+    Tolerances, VariantPlan, Vary, is_error_of_making, reduce, run,
 };
 use flexspline_mechanics::mesh::MeshLevel;
-use flexspline_report::page::Page;
+use flexspline_report::page::{Headline, Page};
 use flexspline_report::sweep_report::{self, SweepSources};
-
-/// Variants of the Pareto front that are printed.
-const SHOWN: usize = 5;
-/// Figures of drives drawn from tolerances that are printed.
-const PRINTED: [&str; 3] = ["error_pp_arcsec", "error_rms_arcsec", "lost_motion_arcsec"];
 
 /// Compute many variants of a drive, or drives drawn from tolerances
 ///
@@ -38,6 +31,8 @@ const PRINTED: [&str; 3] = ["error_pp_arcsec", "error_rms_arcsec", "lost_motion_
 /// all three are done in --out.
 #[derive(Debug, Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+// Nobody chooses among drives drawn from tolerances.
+#[command(mut_arg("least", |arg| arg.conflicts_with("tolerances")), mut_arg("most", |arg| arg.conflicts_with("tolerances")))]
 #[command(after_help = format!("\
 Examples:
   flexspline sweep -g cam --vary flexspline.rim_thickness_mm=1.2..2.6:8
@@ -63,8 +58,26 @@ pub(super) struct SweepCommand {
 #[derive(Debug, Subcommand)]
 enum SweepStep {
     Plan(PlanCommand),
-    Run(RunCommand),
-    Reduce(ReduceCommand),
+    /// Compute a shard of the variants of a plan
+    Run {
+        /// Folder of the sweep
+        #[arg(value_name = "DIR", value_hint = ValueHint::DirPath)]
+        folder: PathBuf,
+        /// The shard I of N shards, I from 1 [default: all variants]
+        #[arg(long, value_name = "I/N")]
+        shard: Option<Shard>,
+    },
+    /// Reduce the results to sweep.csv, sweep.json and report.html
+    Reduce {
+        /// Folder of the sweep
+        #[arg(value_name = "DIR", value_hint = ValueHint::DirPath)]
+        folder: PathBuf,
+        /// Accept missing results
+        #[arg(long)]
+        partial: bool,
+        #[command(flatten)]
+        judged: JudgeOptions,
+    },
 }
 
 /// Write plan.csv, one variant a line, and plan.json
@@ -105,30 +118,6 @@ struct PlanCommand {
     mesh: MeshLevel,
 }
 
-/// Compute a shard of the variants of a plan
-#[derive(Debug, Args)]
-struct RunCommand {
-    /// Folder of the sweep
-    #[arg(value_name = "DIR", value_hint = ValueHint::DirPath)]
-    folder: PathBuf,
-    /// The shard I of N shards, I from 1 [default: all variants]
-    #[arg(long, value_name = "I/N")]
-    shard: Option<Shard>,
-}
-
-/// Reduce the results to sweep.csv, sweep.json and report.html
-#[derive(Debug, Args)]
-struct ReduceCommand {
-    /// Folder of the sweep
-    #[arg(value_name = "DIR", value_hint = ValueHint::DirPath)]
-    folder: PathBuf,
-    /// Accept missing results
-    #[arg(long)]
-    partial: bool,
-    #[command(flatten)]
-    judged: JudgeOptions,
-}
-
 #[derive(Debug, Args)]
 struct JudgeOptions {
     /// A constraint, FIGURE=LEAST..MOST, either end may be left out [default: teeth that clear one another]
@@ -148,46 +137,59 @@ fn figures() -> String {
     FIGURES.chunks(3).map(|names| line(names).trim_end().to_owned()).collect::<Vec<_>>().join("\n")
 }
 
-fn failure(error: PlanError) -> Failure {
-    match error {
-        PlanError::Failed(what) => Failure::Failed(what),
-        PlanError::Output(error) => error.into(),
-        refused => Failure::BadInput(refused.to_string()),
+impl From<PlanError> for Failure {
+    fn from(error: PlanError) -> Failure {
+        match error {
+            PlanError::Failed(what) => Failure::Failed(what),
+            PlanError::Output(error) => error.into(),
+            PlanError::BadInput(what) => Failure::BadInput(what),
+        }
     }
 }
 
 impl SweepCommand {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
-        match &self.step {
-            Some(SweepStep::Plan(plan)) if !plan.example => plan.run(context),
-            Some(SweepStep::Run(step)) => step.run(context),
-            Some(SweepStep::Reduce(step)) => {
-                let plan = opened(context, &step.folder)?;
-                let judge = step.judged.judge(&plan)?;
-                reduced(context, &plan, &step.folder, &judge, Some(step.partial))
+        let plan = match &self.step {
+            Some(SweepStep::Run { folder, shard }) => {
+                let plan = opened(context, folder)?;
+                let Ran { there, computed } = computed(context, &plan, folder, shard.unwrap_or(Shard::WHOLE))?;
+                let hash = &plan.hash;
+                let report = json!({ "schema_version": 1, "plan": hash, "there": there, "computed": computed });
+                return context.print(&report, || {
+                    let spent = context.spent().in_words();
+                    format!("plan {hash}: {computed} runs computed, {there} there already, in {spent}")
+                });
             }
-            None if !self.plan.example => {
-                let plan = self.plan.made(context, Some(&self.judged))?;
-                let judge = self.judged.judge(&plan)?;
-                let out = context.out()?;
-                report::before(context, out, "sweep", Some(&plan.drive));
-                let plan = plan.write(out).map_err(failure)?;
-                computed(context, &plan, out, Shard::WHOLE)?;
-                reduced(context, &plan, out, &judge, None)
+            Some(SweepStep::Reduce { folder, partial, judged }) => {
+                let plan = opened(context, folder)?;
+                let judge = judged.judge(&plan)?;
+                return reduced(context, &plan, folder, &judge, Some(*partial));
             }
-            _ => {
-                let example = json!({ "schema_version": 1, "tolerances": EXAMPLE });
-                context.print_data(&example, || EXAMPLE.trim_end().to_owned())
-            }
+            Some(SweepStep::Plan(plan)) => plan,
+            None => &self.plan,
+        };
+        if plan.example {
+            let example = json!({ "schema_version": 1, "tolerances": EXAMPLE });
+            return context.print_data(&example, || EXAMPLE.trim_end().to_owned());
         }
+        if self.step.is_some() {
+            return plan.run(context);
+        }
+        let plan = plan.made(context)?;
+        let judge = self.judged.judge(&plan)?;
+        let out = context.out()?;
+        report::before(context, out, "sweep", Some(&plan.drive));
+        let plan = plan.write(out)?;
+        computed(context, &plan, out, Shard::WHOLE)?;
+        reduced(context, &plan, out, &judge, None)
     }
 }
 
 impl PlanCommand {
     fn run(&self, context: &Context) -> Result<(), Failure> {
-        let plan = self.made(context, None)?;
+        let plan = self.made(context)?;
         let out = context.out()?;
-        let plan = plan.write(out).map_err(failure)?;
+        let plan = plan.write(out)?;
         let (variants, drive) = (plan.variants.len(), plan.drive.name.as_str());
         let planned = json!({
             "schema_version": 1, "plan": &plan.hash, "drive": drive, "variants": variants, "columns": &plan.columns,
@@ -204,8 +206,7 @@ impl PlanCommand {
         })
     }
 
-    /// The plan; what `judged` asks for is checked before the FEM of a plan of tolerances.
-    fn made(&self, context: &Context, judged: Option<&JudgeOptions>) -> Result<VariantPlan, Failure> {
+    fn made(&self, context: &Context) -> Result<VariantPlan, Failure> {
         let settings = PlanSettings { draws: self.draws, seed: self.seed, mesh: self.mesh };
         let Some(file) = &self.tolerances else {
             let drive = context.drive()?;
@@ -218,16 +219,12 @@ impl PlanCommand {
                     field.path
                 )));
             }
-            let at = (self.torque_n_m, usize::from(self.positions));
-            let stated = context.stated()?;
-            return VariantPlan::of_fields(&drive, stated.as_ref(), &self.vary, &self.generator.0, at, settings)
-                .map_err(failure);
+            let (stated, at) = (context.stated()?, (self.torque_n_m, usize::from(self.positions)));
+            let kinds = &self.generator.0;
+            return Ok(VariantPlan::of_fields(&drive, stated.as_ref(), &self.vary, kinds, at, settings)?);
         };
         if context.has_drive() {
             return Err(Failure::BadInput("--drive: found it with a file of tolerances, which names the drive".into()));
-        }
-        if judged.is_some_and(|judged| !(judged.least.is_empty() && judged.most.is_empty())) {
-            return Err(Failure::BadInput("--least, --most: allowed with --vary alone".into()));
         }
         let name = file.display().to_string();
         let text = std::fs::read_to_string(file).map_err(|error| Failure::BadInput(format!("{name}: {error}")))?;
@@ -237,11 +234,10 @@ impl PlanCommand {
             context.drive_called("drive", &called).map_err(|failure| match failure {
                 Failure::BadInput(what) | Failure::Failed(what) => what.trim_start_matches("drive: ").to_owned(),
             })
-        })
-        .map_err(failure)?;
+        })?;
         let progress = context.progress("plan");
-        VariantPlan::of_tolerances(&tolerances, settings, &|done, of, what| progress.set(done, of, what))
-            .map_err(failure)
+        let progress = |done, of, what: &str| progress.set(done, of, what);
+        Ok(VariantPlan::of_tolerances(&tolerances, settings, &progress)?)
     }
 }
 
@@ -249,23 +245,7 @@ impl JudgeOptions {
     fn judge(&self, plan: &VariantPlan) -> Result<Judge, Failure> {
         let named = |names: &[String], sense| names.iter().map(|name| (name.clone(), sense)).collect::<Vec<_>>();
         let targets = [named(&self.least, Sense::Least), named(&self.most, Sense::Most)].concat();
-        Judge { constraints: self.keep.clone(), targets }.of(plan).map_err(failure)
-    }
-}
-
-impl RunCommand {
-    fn run(&self, context: &Context) -> Result<(), Failure> {
-        let plan = opened(context, &self.folder)?;
-        let ran = computed(context, &plan, &self.folder, self.shard.unwrap_or(Shard::WHOLE))?;
-        let Ran { there, computed } = ran;
-        let report = json!({ "schema_version": 1, "plan": &plan.hash, "there": there, "computed": computed });
-        context.print(&report, || {
-            format!(
-                "plan {}: {computed} runs computed, {there} there already, in {}",
-                plan.hash,
-                context.spent().in_words()
-            )
-        })
+        Ok(Judge { constraints: self.keep.clone(), targets }.of(plan)?)
     }
 }
 
@@ -274,19 +254,19 @@ fn opened(context: &Context, folder: &Path) -> Result<VariantPlan, Failure> {
     if let Some(option) = context.changes_the_drive().or(context.has_out().then_some("--out")) {
         return Err(Failure::BadInput(format!("{option}: found it with a plan, which has its own; plan anew")));
     }
-    VariantPlan::read(folder).map_err(failure)
+    Ok(VariantPlan::read(folder)?)
 }
 
 fn computed(context: &Context, plan: &VariantPlan, folder: &Path, shard: Shard) -> Result<Ran, Failure> {
     let progress = context.progress("sweep");
-    run(plan, folder, shard, &|done, of, row| {
+    let ran = run(plan, folder, shard, &|done, of, row| {
         let name = format!("variant {} {}", row.variant + 1, row.generator);
         if context.verbose() {
             progress.line(&format!("{name} [{}]: {}", plan.variants[row.variant].join(", "), row.status.name()));
         }
         progress.set(done, of, &name);
-    })
-    .map_err(failure)
+    })?;
+    Ok(ran)
 }
 
 /// Writes sweep.csv, sweep.json and report.html; `partial` of a plan that was read, which has a drive of its own.
@@ -297,77 +277,43 @@ fn reduced(
     judge: &Judge,
     partial: Option<bool>,
 ) -> Result<(), Failure> {
-    let sweep = reduce(plan, folder, judge, partial.unwrap_or(false)).map_err(failure)?;
+    let sweep = reduce(plan, folder, judge, partial.unwrap_or(false))?;
     let remarks = remarks(plan, &sweep);
     let sources = SweepSources { plan, command: &context.command, judge, sweep: &sweep, remarks: &remarks };
     let page = sweep_report::page(&sources);
     let page = Page { title: context.titled(&page.title), ..page };
-    let csv = sweep.csv(plan).map_err(|error| Failure::Failed(format!("sweep.csv: {error}")))?;
+    let csv = sweep.csv(plan)?;
     let mut outputs = Outputs::new();
     outputs.file(&folder.join("sweep.csv"), |file| file.write_all(&csv))?;
     outputs.json(&folder.join("sweep.json"), &sweep)?;
     report::write(&page, folder, &mut outputs)?;
     outputs.finish()?;
     context.print(&sweep, || {
+        let ReducedSweep { drive, converged, failed, refused, meet, rows, generators, .. } = &sweep;
+        let runs = rows.len();
         let mut text = format!(
-            "{}: {} runs; {} converged, {} failed, {} refused; {} meet the constraints\n",
-            sweep.drive,
-            sweep.rows.len(),
-            sweep.converged,
-            sweep.failed,
-            sweep.refused,
-            sweep.meet
+            "{drive}: {runs} runs; {converged} converged, {failed} failed, {refused} refused; {meet} meet the \
+             constraints\n"
         );
         text.extend(remarks.iter().map(|remark| format!("remark: {remark}\n")));
-        text.extend(sweep.generators.iter().map(|of| lines(plan, &sweep, judge, of)));
-        let _ = write!(
-            text,
-            "wrote sweep.csv, sweep.json and report.html to {}/ in {}",
-            folder.display(),
-            context.spent().in_words()
-        );
-        let best = sweep.generators.iter().find_map(|of| Some((of.generator, *of.front.first()?)));
-        let next = best.map(|(kind, number)| {
+        for Headline { choice, answer, .. } in &page.headlines {
+            text += &format!("{}: {answer}\n", choice.as_deref().unwrap_or_default());
+        }
+        let (folder, spent) = (folder.display(), context.spent().in_words());
+        text += &format!("wrote sweep.csv, sweep.json and report.html to {folder}/ in {spent}");
+        let best = generators.iter().find_map(|of| Some((of.generator, *of.front.first()?)));
+        let next = best.filter(|_| partial.is_none()).map(|(kind, number)| {
             let choices = plan.sets(number - 1).into_iter().filter(|set| !is_error_of_making(set));
             let sets: String = choices.map(|set| format!(" --set {}", quoted(&set))).collect();
             context.next(&format!("tables --generator {kind}{sets}"))
         });
-        text + &say::next(&next.filter(|_| partial.is_none()).into_iter().collect::<Vec<_>>())
+        text + &say::next(next.as_slice())
     })?;
     if sweep.converged == 0 {
-        let why = sweep.rows.iter().map(|(row, ..)| row.why.as_str()).find(|why| !why.is_empty()).unwrap_or_default();
+        let why = sweep.rows.iter().map(|row| row.why.as_str()).find(|why| !why.is_empty()).unwrap_or_default();
         return Err(Failure::Failed(format!("no variant converged; the first: {why}")));
     }
     Ok(())
-}
-
-/// Results of one generator in words.
-fn lines(plan: &VariantPlan, sweep: &ReducedSweep, judge: &Judge, of: &OfGenerator) -> String {
-    let mut text = format!("{}\n", of.generator);
-    let names = plan.figures();
-    for number in of.front.iter().take(SHOWN) {
-        let found = |(row, ..): &&(VariantRow, bool, bool)| (row.variant + 1, row.generator) == (*number, of.generator);
-        let Some((row, ..)) = sweep.rows.iter().find(found) else { continue };
-        let targets = judge.targets.iter().filter_map(|(name, _)| {
-            let k = names.iter().position(|known| known == name)?;
-            Some(format!("{name} {}", short(row.figures[k])))
-        });
-        let (sets, targets) = (plan.sets(row.variant).join(" "), targets.collect::<Vec<_>>().join(", "));
-        let caution = if row.cautions.is_empty() { "" } else { " (caution)" };
-        let _ = writeln!(text, "  {number:>4}  {sets}: {targets}{caution}");
-    }
-    if of.front.len() > SHOWN {
-        let _ = writeln!(text, "  and {} more of the Pareto front in sweep.csv", of.front.len() - SHOWN);
-    }
-    for spread in of.figures.iter().filter(|spread| PRINTED.contains(&spread.figure) && plan.is_of_tolerances()) {
-        let at = |share: f64| spread.quantiles.iter().find(|q| q.share == share).map_or(f64::NAN, |q| q.value);
-        let first = of.ranks.iter().find(|rank| rank.figure == spread.figure);
-        let follows = first.map_or_else(String::new, |first| {
-            format!("; follows {} most (rank correlation {:.2})", first.input, first.correlation)
-        });
-        let _ = writeln!(text, "  {:<26} median {:.3}, 95 % below {:.3}{follows}", spread.figure, at(0.5), at(0.95));
-    }
-    text
 }
 
 /// Remarks on the results.
@@ -376,11 +322,11 @@ fn remarks(plan: &VariantPlan, sweep: &ReducedSweep) -> Vec<String> {
     if sweep.missing > 0 {
         remarks.push(format!("PARTIAL: {} of {} runs are missing", sweep.missing, sweep.missing + sweep.rows.len()));
     }
-    for (status, what) in [(RunStatus::Failed, "did not converge"), (RunStatus::Refused, "make no drive")] {
-        let mut of_status = sweep.rows.iter().filter(|(row, ..)| row.status == status);
-        if let Some((first, ..)) = of_status.next() {
-            let (count, number) = (of_status.count() + 1, first.variant + 1);
-            remarks.push(format!("{count} runs {what}; the first, variant {number}: {}", first.why));
+    for (status, count, what) in
+        [(RunStatus::Failed, sweep.failed, "did not converge"), (RunStatus::Refused, sweep.refused, "make no drive")]
+    {
+        if let Some(first) = sweep.rows.iter().find(|row| row.status == status) {
+            remarks.push(format!("{count} runs {what}; the first, variant {}: {}", first.variant + 1, first.why));
         }
     }
     let errors: Vec<&str> = plan.columns.iter().map(String::as_str).filter(|path| is_error_of_making(path)).collect();
@@ -391,20 +337,17 @@ fn remarks(plan: &VariantPlan, sweep: &ReducedSweep) -> Vec<String> {
             errors.join(", ")
         ));
     }
-    for of in &sweep.generators {
-        let kind = of.generator;
-        let mut count = |count: usize, what: &str| {
+    for OfGenerator { generator, beyond_kernels, play_closed, .. } in &sweep.generators {
+        let meet = sweep.rows.iter().filter(|row| row.meets && row.generator == *generator);
+        for (count, what) in [
+            (meet.filter(|row| !row.cautions.is_empty()).count(), "that meet the constraints have a caution"),
+            (*beyond_kernels, "drives have axes further apart than the kernels reach; their errors are extrapolated"),
+            (*play_closed, "drives have no play at some place; lost motion there is the wind-up alone"),
+        ] {
             if count > 0 {
-                remarks.push(format!("{kind}: {count} {what}"));
+                remarks.push(format!("{generator}: {count} {what}"));
             }
-        };
-        let meet = sweep.rows.iter().filter(|(row, meets, _)| *meets && row.generator == kind);
-        count(meet.filter(|(row, ..)| !row.cautions.is_empty()).count(), "that meet the constraints have a caution");
-        count(
-            of.beyond_kernels,
-            "drives have axes further apart than the kernels reach; their errors are extrapolated",
-        );
-        count(of.play_closed, "drives have no play at some place; lost motion there is the wind-up alone");
+        }
     }
     remarks
 }

@@ -1,13 +1,10 @@
 //! Random drives within tolerances, as assignments of fields of the drive.
 
-use std::fmt::Write as _;
-
 use fastrand::Rng;
 
-use super::tolerance::{DistributionForm, FieldTolerance, TeethError, ToleranceActs, teeth};
+use super::tolerance::{FieldTolerance, TeethError, ToleranceActs};
 use super::vary::latin;
 use flexspline_base::statistics::mean;
-use flexspline_mechanics::drive::Drive;
 
 /// One tolerance of one drive, as drawn.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -23,58 +20,48 @@ pub(super) struct Drawn {
 impl Drawn {
     /// The middle of every tolerance: 0 for a size or an error of teeth.
     pub(super) fn middle(tolerances: &[FieldTolerance]) -> Vec<Drawn> {
-        let of = |tolerance: &FieldTolerance| match (tolerance.acts, tolerance.distribution.law) {
-            (ToleranceActs::Alike, DistributionForm::Normal { mean, .. }) => mean,
-            (ToleranceActs::Alike, _) => tolerance.distribution.quantile(0.5),
-            _ => 0.0,
+        let of = |FieldTolerance { acts, distribution, .. }: &FieldTolerance| Drawn {
+            value: if *acts == ToleranceActs::Alike { distribution.middle() } else { 0.0 },
+            ..Drawn::default()
         };
-        tolerances.iter().map(|tolerance| Drawn { value: of(tolerance), ..Drawn::default() }).collect()
+        tolerances.iter().map(of).collect()
     }
 }
 
 /// `count` drives: sizes and phases are a Latin hypercube, errors of single teeth are independent.
-pub(super) fn draw(tolerances: &[FieldTolerance], drive: &Drive, count: usize, seed: u64) -> Vec<Vec<Drawn>> {
+pub(super) fn draw(tolerances: &[FieldTolerance], count: usize, seed: u64) -> Vec<Vec<Drawn>> {
     let mut random = Rng::with_seed(seed);
     let points = latin(count, 2 * tolerances.len(), &mut random);
     let mut one = |tolerance: &FieldTolerance, place: &[f64]| {
         let of = &tolerance.distribution;
-        let (mut value, mut phase_deg, mut teeth_um) = (of.quantile(place[0]), 0.0, Vec::new());
+        let phased = |waves: u32| Drawn {
+            value: of.quantile(place[0]),
+            phase_deg: 360.0 * place[1] / f64::from(waves),
+            ..Drawn::default()
+        };
         match tolerance.acts {
-            ToleranceActs::Alike => {}
-            ToleranceActs::Directed => phase_deg = 360.0 * place[1],
-            ToleranceActs::Harmonic { order, .. } => phase_deg = 360.0 * place[1] / f64::from(order),
-            ToleranceActs::Teeth { wheel, errors } => {
-                let mut error = || of.quantile(random.f64().max(f64::MIN_POSITIVE));
-                teeth_um = (0..teeth(drive, wheel)).map(|_| error()).collect();
-                if errors == TeethError::Pitch {
-                    teeth_um = added_up(&teeth_um);
-                }
-                value = 0.0;
+            ToleranceActs::Alike => Drawn { value: of.quantile(place[0]), ..Drawn::default() },
+            ToleranceActs::Directed => phased(1),
+            ToleranceActs::Harmonic { order } => phased(order),
+            ToleranceActs::Teeth { count, errors } => {
+                let error = |_| of.quantile(random.f64().max(f64::MIN_POSITIVE));
+                let teeth_um: Vec<f64> = (0..count).map(error).collect();
+                let teeth_um = if errors == TeethError::Pitch { added_up(&teeth_um) } else { teeth_um };
+                Drawn { teeth_um, ..Drawn::default() }
             }
         }
-        Drawn { value, phase_deg, teeth_um }
     };
-    points
-        .iter()
-        .map(|point| tolerances.iter().zip(point.chunks(2)).map(|(t, place)| one(t, place)).collect())
-        .collect()
+    let of = |point: &Vec<f64>| tolerances.iter().zip(point.chunks(2)).map(|(of, place)| one(of, place)).collect();
+    points.iter().map(of).collect()
 }
 
 /// Positions from single pitch errors: their sum, closed around the wheel, about its mean.
 fn added_up(pitches: &[f64]) -> Vec<f64> {
     let over = mean(pitches);
-    let mut sum = 0.0;
-    let mut positions: Vec<f64> = pitches
-        .iter()
-        .map(|pitch| {
-            let here = sum;
-            sum += pitch - over;
-            here
-        })
-        .collect();
-    let middle = mean(&positions);
-    positions.iter_mut().for_each(|x| *x -= middle);
-    positions
+    let up_to = |sum: &mut f64, pitch: &f64| Some(std::mem::replace(sum, *sum + (pitch - over)));
+    let sums: Vec<f64> = pitches.iter().scan(0.0, up_to).collect();
+    let middle = mean(&sums);
+    sums.iter().map(|sum| sum - middle).collect()
 }
 
 /// A drawn drive as assignments PATH=VALUE, each path once.
@@ -89,13 +76,10 @@ pub(super) fn sets(tolerances: &[FieldTolerance], drawn: &[Drawn]) -> Vec<String
                 let angle = if part.ends_with("_offset") { "direction" } else { "phase" };
                 sets.extend([format!("{field}={value}"), format!("{part}_{angle}_deg={phase_deg}")]);
             }
-            ToleranceActs::Harmonic { order, .. } => {
+            ToleranceActs::Harmonic { order } => {
                 let one = format!("{{order = {order}, amplitude_um = {value}, phase_deg = {phase_deg}}}]");
                 match sets.iter_mut().find(|set| set.starts_with(&format!("{field}="))) {
-                    Some(others) => {
-                        others.pop();
-                        let _ = write!(others, ", {one}");
-                    }
+                    Some(others) => *others = format!("{}, {one}", others.trim_end_matches(']')),
                     None => sets.push(format!("{field}=[{one}")),
                 }
             }

@@ -1,6 +1,6 @@
 //! Constraints and targets on figures, and the Pareto front.
 
-use std::fmt;
+use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 use thiserror::Error;
@@ -50,14 +50,6 @@ impl FromStr for Constraint {
     }
 }
 
-/// As `--keep` takes it.
-impl fmt::Display for Constraint {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let end = |value: f64| if value.is_finite() { value.to_string() } else { String::new() };
-        write!(f, "{}={}..{}", self.figure, end(self.least), end(self.most))
-    }
-}
-
 /// Whether less or more of a figure is better.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sense {
@@ -65,6 +57,14 @@ pub enum Sense {
     Least,
     /// More is better.
     Most,
+}
+
+impl Sense {
+    /// A figure, turned so that less is better; a missing one is worst.
+    pub(super) fn cost(self, value: f64) -> f64 {
+        let cost = if self == Sense::Least { value } else { -value };
+        if cost.is_nan() { f64::INFINITY } else { cost }
+    }
 }
 
 /// Constraints and targets.
@@ -82,27 +82,23 @@ impl Judge {
     /// # Errors
     /// A figure that variants of the plan do not have, a target given twice, or targets of drives within tolerances.
     pub fn of(mut self, plan: &VariantPlan) -> Result<Judge, PlanError> {
+        let wrong = |what: String| Err(PlanError::BadInput(what));
         let known = plan.figures();
         let targets = self.targets.iter().map(|(name, _)| ("--least, --most", name));
         for (option, name) in self.constraints.iter().map(|kept| ("--keep", &kept.figure)).chain(targets) {
             if !known.contains(&name.as_str()) {
-                return Err(PlanError::BadInput(format!(
-                    "{option}: figure {name:?} is not known; allowed: {}{}",
-                    known.join(", "),
-                    did_you_mean("; ", name, known.iter().copied())
-                )));
+                let (known, hint) = (known.join(", "), did_you_mean("; ", name, known.iter().copied()));
+                return wrong(format!("{option}: figure {name:?} is not known; allowed: {known}{hint}"));
             }
         }
         let is_twice = |k: &usize| self.targets[..*k].iter().any(|(name, _)| *name == self.targets[*k].0);
         if let Some(k) = (1..self.targets.len()).find(is_twice) {
-            return Err(PlanError::BadInput(format!(
-                "--least, --most: found {} twice, allowed: each figure once",
-                self.targets[k].0
-            )));
+            let name = &self.targets[k].0;
+            return wrong(format!("--least, --most: found {name} twice, allowed: each figure once"));
         }
         if plan.is_of_tolerances() && !self.targets.is_empty() {
-            let what = "--least, --most: allowed with --vary; nobody chooses among drives drawn from tolerances";
-            return Err(PlanError::BadInput(what.to_owned()));
+            let why = "nobody chooses among drives drawn from tolerances";
+            return wrong(format!("--least, --most: allowed with --vary; {why}"));
         }
         if !plan.is_of_tolerances() && self.targets.is_empty() {
             self.targets = USUAL.map(|(name, sense)| (name.to_owned(), sense)).to_vec();
@@ -110,44 +106,37 @@ impl Judge {
         Ok(self)
     }
 
-    /// Whether each row converged, has rigid teeth that clear one another, and meets every constraint.
-    pub(super) fn meet(&self, plan: &VariantPlan, rows: &[VariantRow]) -> Vec<bool> {
-        let kept: Vec<(Option<usize>, &Constraint)> =
-            self.constraints.iter().map(|kept| (plan.figure(&kept.figure), kept)).collect();
-        let keeps = |row: &VariantRow, (figure, kept): &(Option<usize>, &Constraint)| {
-            figure.is_some_and(|figure| (kept.least..=kept.most).contains(&row.figures[figure]))
-        };
-        let is_sound = |row: &VariantRow| row.status == RunStatus::Converged && clears(plan, row);
-        rows.iter().map(|row| is_sound(row) && kept.iter().all(|kept| keeps(row, kept))).collect()
+    /// Figures of the targets: their places in a row.
+    pub(super) fn targets_in(&self, plan: &VariantPlan) -> Vec<(usize, Sense)> {
+        self.targets.iter().filter_map(|(name, sense)| Some((plan.figure(name)?, *sense))).collect()
     }
 
-    /// The Pareto front of each generator: rows that meet, and that no other row that meets beats. Rows are compared
-    /// with those that have the same manufacturing errors, which nobody chooses.
-    pub(super) fn front(&self, plan: &VariantPlan, rows: &[VariantRow], meet: &[bool]) -> Vec<bool> {
+    /// Marks the rows that meet: they converged, their rigid teeth clear one another where that was looked at, and they
+    /// keep to every constraint. Of these it marks the Pareto front of each generator. Rows are compared with those
+    /// that have the same manufacturing errors, which nobody chooses.
+    pub(super) fn mark(&self, plan: &VariantPlan, rows: &mut [VariantRow]) {
+        let least_gap_um = -1e3 * RigidMesh::TOUCHES_MM;
+        let clears = plan.figure("rigid_gap_um").map(|gap| (gap, least_gap_um..=f64::INFINITY));
+        let kept =
+            self.constraints.iter().filter_map(|kept| Some((plan.figure(&kept.figure)?, kept.least..=kept.most)));
+        let kept: Vec<(usize, RangeInclusive<f64>)> = clears.into_iter().chain(kept).collect();
+        for row in rows.iter_mut() {
+            let keeps = |(figure, range): &(usize, RangeInclusive<f64>)| range.contains(&row.figures[*figure]);
+            row.meets = row.status == RunStatus::Converged && kept.iter().all(keeps);
+        }
+        let targets = self.targets_in(plan);
+        let cost = |row: &VariantRow, (figure, sense): (usize, Sense)| sense.cost(row.figures[figure]);
         let errors: Vec<usize> = (0..plan.columns.len()).filter(|k| is_error_of_making(&plan.columns[*k])).collect();
-        let made = |row: &VariantRow| errors.iter().map(|k| &plan.variants[row.variant][*k]).collect::<Vec<_>>();
-        let alike = |a: &VariantRow, b: &VariantRow| a.generator == b.generator && made(a) == made(b);
-        let targets: Vec<(usize, Sense)> =
-            self.targets.iter().filter_map(|(name, sense)| Some((plan.figure(name)?, *sense))).collect();
-        let costs = |row: &VariantRow| targets.iter().map(|(k, sense)| cost(row.figures[*k], *sense)).collect();
-        let costs: Vec<Vec<f64>> = rows.iter().map(costs).collect();
-        let beats = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| a <= b) && a.iter().zip(b).any(|(a, b)| a < b);
-        let beaten =
-            |k: usize| (0..rows.len()).any(|o| meet[o] && beats(&costs[o], &costs[k]) && alike(&rows[o], &rows[k]));
-        (0..rows.len()).map(|k| meet[k] && !targets.is_empty() && !beaten(k)).collect()
+        let beats = |a: &VariantRow, b: &VariantRow| {
+            let [made, other] = [a, b].map(|row| &plan.variants[row.variant]);
+            a.meets
+                && a.generator == b.generator
+                && targets.iter().all(|of| cost(a, *of) <= cost(b, *of))
+                && targets.iter().any(|of| cost(a, *of) < cost(b, *of))
+                && errors.iter().all(|k| made[*k] == other[*k])
+        };
+        let is_best = |row: &VariantRow| row.meets && !rows.iter().any(|other| beats(other, row));
+        let best: Vec<bool> = rows.iter().map(|row| !targets.is_empty() && is_best(row)).collect();
+        rows.iter_mut().zip(best).for_each(|(row, best)| row.is_front = best);
     }
-}
-
-/// A figure, turned so that less is better; a missing one is worst.
-pub(super) fn cost(value: f64, sense: Sense) -> f64 {
-    match sense {
-        _ if value.is_nan() => f64::INFINITY,
-        Sense::Least => value,
-        Sense::Most => -value,
-    }
-}
-
-/// Whether the rigid teeth clear one another, where that was looked at.
-fn clears(plan: &VariantPlan, row: &VariantRow) -> bool {
-    plan.figure("rigid_gap_um").is_none_or(|gap| row.figures[gap] >= -1e3 * RigidMesh::TOUCHES_MM)
 }

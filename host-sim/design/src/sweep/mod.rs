@@ -12,7 +12,6 @@
 //! may run them in any order, more than once, and kill them. Elementary functions of kernels are those of `libm`, so
 //! that their figures have the same bits on every machine; figures of the FEM are the same on one kind of processor.
 
-mod by_fem;
 mod draw;
 mod judge;
 mod model;
@@ -27,8 +26,8 @@ pub use judge::{Constraint, ConstraintError, Judge, Sense};
 pub use plan::{PlanError, PlanSettings, SweepProgress, VariantPlan};
 pub use reduce::{FigureSpread, OfGenerator, RankCorrelation, ReducedSweep, reduce};
 pub use run::{Ran, RunStatus, Shard, VariantRow, run};
-pub use tolerance::{Distribution, DistributionForm, EXAMPLE, FieldTolerance, TeethError, ToleranceActs, Tolerances};
-pub use vary::{VariedValues, Vary, VaryError, grid, is_error_of_making};
+pub use tolerance::{EXAMPLE, Tolerances};
+pub use vary::{Vary, VaryError, is_error_of_making};
 
 #[cfg(test)]
 mod tests;

@@ -93,20 +93,14 @@ impl Response {
     fn at(&self, values: &[f64]) -> Vec<f64> {
         let mut state = self.middle.clone();
         for (parabola, value) in self.parabolas.iter().zip(values) {
-            parabola.add(*value, &mut state);
+            let [a, m, b] = parabola.at;
+            let below = (value - m) * (value - b) / ((a - m) * (a - b));
+            let above = (value - a) * (value - m) / ((b - a) * (b - m));
+            for ((x, low), high) in state.iter_mut().zip(&parabola.below).zip(&parabola.above) {
+                *x += below * low + above * high;
+            }
         }
         state
-    }
-}
-
-impl Parabola {
-    fn add(&self, value: f64, state: &mut [f64]) {
-        let [a, m, b] = self.at;
-        let below = (value - m) * (value - b) / ((a - m) * (a - b));
-        let above = (value - a) * (value - m) / ((b - a) * (b - m));
-        for ((x, low), high) in state.iter_mut().zip(&self.below).zip(&self.above) {
-            *x += below * low + above * high;
-        }
     }
 }
 
@@ -133,15 +127,12 @@ impl WheelSums {
         WheelSums { wheel, teeth, period, weights: torques.iter().map(|torque| of(*torque)).collect() }
     }
 
-    /// Position errors of the teeth, µm; nothing where there are none.
-    fn positions(&self, built: &AsBuilt) -> Option<Vec<f64>> {
+    /// Position errors of the teeth, µm, summed over the teeth that bear alike.
+    fn positions(&self, built: &AsBuilt) -> Vec<f64> {
         let (list, harmonics) = match self.wheel {
             Wheel::Flexspline => (&built.flexspline_pitch_error_um, &built.flexspline_pitch_harmonics),
             Wheel::CircularSpline => (&built.circular_spline_pitch_error_um, &built.circular_spline_pitch_harmonics),
         };
-        if list.is_empty() && harmonics.is_empty() {
-            return None;
-        }
         let mut all = if list.is_empty() { vec![0.0; self.teeth] } else { list.clone() };
         for harmonic in harmonics {
             for (k, error) in all.iter_mut().enumerate() {
@@ -149,13 +140,12 @@ impl WheelSums {
                 *error += harmonic.amplitude_um * libm::cos(f64::from(harmonic.order) * angle);
             }
         }
-        // Teeth that bear alike are one to the sum.
         let (first, rest) = all.split_at_mut(self.period);
         for other in rest.chunks(self.period) {
             first.iter_mut().zip(other).for_each(|(sum, error)| *sum += error);
         }
         all.truncate(self.period);
-        Some(all)
+        all
     }
 
     /// Error by the angle of the wave on the wheel, `SAMPLES` to a pitch, over a period.
@@ -191,30 +181,19 @@ fn along(samples: &[f64], turns: f64) -> f64 {
     (1.0 - part) * samples[k] + part * samples[(k + 1) % n]
 }
 
-/// Where the drive stands: angles in turns.
+/// Where the drive stands: angles of the generator and of the wave on the circular spline.
 #[derive(Debug, Clone, Copy)]
 struct DriveAngles {
-    /// Of the generator, and on the circular spline.
-    generator: f64,
-    on_circular_spline: f64,
+    turns: [f64; 2],
     /// Cosine and sine of both.
-    flexspline_direction: [f64; 2],
-    circular_spline_direction: [f64; 2],
+    directions: [[f64; 2]; 2],
 }
 
 impl DriveAngles {
-    fn at(generator: f64, ratio: f64) -> DriveAngles {
-        let on_circular_spline = generator * (1.0 - 1.0 / ratio);
-        let direction = |turns: f64| {
-            let angle = TAU * (turns - turns.floor());
-            [libm::cos(angle), libm::sin(angle)]
-        };
-        DriveAngles {
-            generator,
-            on_circular_spline,
-            flexspline_direction: direction(generator),
-            circular_spline_direction: direction(on_circular_spline),
-        }
+    fn at(generator_turns: f64, ratio: f64) -> DriveAngles {
+        let turns = [generator_turns, generator_turns * (1.0 - 1.0 / ratio)];
+        let direction = |turns: f64| vector(1.0, TAU * (turns - turns.floor()));
+        DriveAngles { turns, directions: turns.map(direction) }
     }
 }
 
@@ -223,25 +202,24 @@ fn turned([x, y]: [f64; 2], [c, s]: [f64; 2]) -> [f64; 2] {
     [c * x + s * y, c * y - s * x]
 }
 
-fn vector(size: f64, phase_deg: f64) -> [f64; 2] {
-    let angle = phase_deg.to_radians();
+fn vector(size: f64, angle: f64) -> [f64; 2] {
     [size * libm::cos(angle), size * libm::sin(angle)]
 }
 
 /// The curves of one drive.
 struct Curves {
-    /// By load: of the flexspline's teeth, of the circular spline's.
-    wheels: [Option<Vec<Vec<f64>>>; 2],
-    oval: Option<Vec<f64>>,
+    /// Of the teeth of both wheels, by load.
+    wheels: [Vec<Vec<f64>>; 2],
+    oval: [f64; 2],
     /// Displacements: on the flexspline, on the circular spline, on the generator.
-    apart: Option<[[f64; 2]; 3]>,
+    apart: [[f64; 2]; 3],
     waves: [Vec<f64>; 2],
 }
 
 /// Evaluates drives with one generator.
 pub(super) struct KernelModel {
     teeth: [u32; 2],
-    response: Response,
+    pub response: Response,
     wheels: [WheelSums; 2],
     ovals: Vec<Gain>,
     apart: Vec<(f64, EccentricField)>,
@@ -257,16 +235,10 @@ const SIGNS: [(usize, bool); 4] = [(0, false), (0, true), (1, false), (1, true)]
 impl KernelModel {
     /// `torques_n_m`: the load, and the light load of lost motion.
     pub(super) fn new(kernels: &Kernels, response: Response, torques_n_m: [f64; 2]) -> KernelModel {
-        let signed: Vec<f64> = SIGNS
-            .iter()
-            .map(|(load, negative)| if *negative { -torques_n_m[*load] } else { torques_n_m[*load] })
-            .collect();
+        let signed = SIGNS.map(|(load, negative)| if negative { -torques_n_m[load] } else { torques_n_m[load] });
         let ratio = kernels.ratio;
-        let of_output = |waves: usize, per: f64| (1..=waves).map(move |k| k as f64 * per);
-        let orders: Vec<f64> = of_output(ORDERS[0], ratio)
-            .chain(of_output(ORDERS[1], ratio - 1.0))
-            .chain(of_output(ORDERS[2], 1.0))
-            .collect();
+        let kept_apart = ORDERS.into_iter().zip([ratio, ratio - 1.0, 1.0]);
+        let orders: Vec<f64> = kept_apart.flat_map(|(waves, of)| (1..=waves).map(move |k| k as f64 * of)).collect();
         let count = places_that_tell_apart(&orders, PLACES, APART);
         KernelModel {
             teeth: kernels.teeth,
@@ -281,71 +253,52 @@ impl KernelModel {
     }
 
     fn curves(&self, built: &AsBuilt, state: &[f64]) -> Curves {
-        let wheels = [0, 1].map(|w| {
-            let positions = self.wheels[w].positions(built)?;
-            Some((0..SIGNS.len()).map(|load| self.wheels[w].field(load, &positions)).collect())
-        });
-        let oval = (built.circular_spline_ovality_um != 0.0)
-            .then(|| vector(built.circular_spline_ovality_um, 2.0 * built.circular_spline_ovality_phase_deg).to_vec());
-        let sum = |a: [f64; 2], b: [f64; 2]| [a[0] + b[0], a[1] + b[1]];
-        let on_flexspline = sum(
-            vector(built.circular_spline_offset_um, built.circular_spline_offset_direction_deg),
-            vector(-built.flexspline_runout_um, built.flexspline_runout_phase_deg),
-        );
-        let on_circular_spline =
-            vector(built.circular_spline_eccentricity_um, built.circular_spline_eccentricity_phase_deg);
-        let on_generator = vector(-built.generator_eccentricity_um, built.generator_eccentricity_phase_deg);
-        let apart = [on_flexspline, on_circular_spline, on_generator];
+        let of_wheel = |wheel: &WheelSums| {
+            let positions = wheel.positions(built);
+            (0..SIGNS.len()).map(|load| wheel.field(load, &positions)).collect()
+        };
+        let part = |size_um: f64, phase_deg: f64| vector(size_um, phase_deg.to_radians());
+        let offset = part(built.circular_spline_offset_um, built.circular_spline_offset_direction_deg);
+        let runout = part(-built.flexspline_runout_um, built.flexspline_runout_phase_deg);
         Curves {
-            wheels,
-            oval,
-            apart: apart.iter().flatten().any(|x| *x != 0.0).then_some(apart),
+            wheels: self.wheels.each_ref().map(of_wheel),
+            oval: part(built.circular_spline_ovality_um, 2.0 * built.circular_spline_ovality_phase_deg),
+            apart: [
+                [offset[0] + runout[0], offset[1] + runout[1]],
+                part(built.circular_spline_eccentricity_um, built.circular_spline_eccentricity_phase_deg),
+                part(-built.generator_eccentricity_um, built.generator_eccentricity_phase_deg),
+            ],
             waves: [state[..WAVE].to_vec(), state[WAVE..2 * WAVE].to_vec()],
         }
     }
 
-    /// Displacement of the axis of the circular spline from that of the flexspline, seen from the major axis, µm.
-    fn apart_at(apart: &[[f64; 2]; 3], place: &DriveAngles) -> [f64; 2] {
-        let [x, y] = turned(apart[0], place.flexspline_direction);
-        let [u, v] = turned(apart[1], place.circular_spline_direction);
-        [x + u + apart[2][0], y + v + apart[2][1]]
-    }
-
-    /// Error of the drive without deviations, arcsec.
-    fn wave_error(&self, curves: &Curves, place: &DriveAngles, load: usize) -> f64 {
-        let (size, negative) = SIGNS[load];
-        let in_pitch = place.generator * f64::from(self.teeth[0]);
-        // Mirrored, the drive stands on the other side of its place and errs the other way.
-        if negative { -along(&curves.waves[size], -in_pitch) } else { along(&curves.waves[size], in_pitch) }
+    /// Displacement of the axis of the circular spline from that of the flexspline, µm, and its direction from the
+    /// major axis.
+    fn apart_at(apart: &[[f64; 2]; 3], place: &DriveAngles) -> (f64, f64) {
+        let [[x, y], [u, v]] = [0, 1].map(|part| turned(apart[part], place.directions[part]));
+        let [x, y] = [x + u + apart[2][0], y + v + apart[2][1]];
+        ((x * x + y * y).sqrt(), libm::atan2(y, x))
     }
 
     /// Errors at a place under each of the [`SIGNS`], arcsec.
     fn errors(&self, curves: &Curves, place: &DriveAngles) -> [f64; 4] {
-        let mut errors = std::array::from_fn(|load| self.wave_error(curves, place, load));
-        for (w, turns) in [place.generator, place.on_circular_spline].into_iter().enumerate() {
-            if let Some(fields) = &curves.wheels[w] {
-                let around = (self.wheels[w].teeth / self.wheels[w].period) as f64;
-                for (error, field) in errors.iter_mut().zip(fields) {
-                    *error += along(field, turns * around);
-                }
+        let in_pitch = place.turns[0] * f64::from(self.teeth[0]);
+        // cos 2(α − crest) and sin 2(α − crest), α the angle of the wave on the circular spline.
+        let ([c, s], oval) = (place.directions[1], curves.oval);
+        let (c2, s2) = (c * c - s * s, 2.0 * c * s);
+        let (distance, direction) = KernelModel::apart_at(&curves.apart, place);
+        std::array::from_fn(|load| {
+            let (size, negative) = SIGNS[load];
+            let wave = &curves.waves[size];
+            // Mirrored, the drive stands on the other side of its place and errs the other way.
+            let mut error = if negative { -along(wave, -in_pitch) } else { along(wave, in_pitch) };
+            for ((wheel, fields), turns) in self.wheels.iter().zip(&curves.wheels).zip(place.turns) {
+                error += along(&fields[load], turns * (wheel.teeth / wheel.period) as f64);
             }
-        }
-        if let Some(oval) = &curves.oval {
-            // cos 2(α − crest) and sin 2(α − crest), α the angle of the wave.
-            let [c, s] = place.circular_spline_direction;
-            let (c2, s2) = (c * c - s * s, 2.0 * c * s);
-            for (error, [g, h]) in errors.iter_mut().zip(&self.ovals) {
-                *error += g * (c2 * oval[0] + s2 * oval[1]) - h * (s2 * oval[0] - c2 * oval[1]);
-            }
-        }
-        if let Some(apart) = &curves.apart {
-            let [x, y] = KernelModel::apart_at(apart, place);
-            let (distance, direction) = ((x * x + y * y).sqrt(), libm::atan2(y, x));
-            for (error, (size, negative)) in errors.iter_mut().zip(SIGNS) {
-                *error += self.eccentric(distance, direction, negative, self.loads[size]);
-            }
-        }
-        errors
+            let [g, h] = self.ovals[load];
+            error += g * (c2 * oval[0] + s2 * oval[1]) - h * (s2 * oval[0] - c2 * oval[1]);
+            error + self.eccentric(distance, direction, negative, self.loads[size])
+        })
     }
 
     /// Between sizes linear, as [`Kernels::eccentric_field`].
@@ -354,13 +307,6 @@ impl KernelModel {
         let at = |k: usize| self.apart[k].1.at(direction, negative, load);
         let (low, below) = if above == 0 { (0.0, 0.0) } else { (self.apart[above - 1].0, at(above - 1)) };
         below + (at(above) - below) * (size_um - low) / (self.apart[above].0 - low)
-    }
-
-    /// Error of a drive without uniform changes under the load, at a place of the generator in turns, arcsec.
-    #[cfg(test)]
-    pub(super) fn error_at(&self, built: &AsBuilt, generator: f64, ratio: f64) -> f64 {
-        let curves = self.curves(built, &self.response.middle);
-        self.errors(&curves, &DriveAngles::at(generator, ratio))[0]
     }
 
     /// The figures of a drive, in the order of [`FIGURES`]; `values` are those of the fields of the parabolas.
@@ -375,13 +321,8 @@ impl KernelModel {
         let lost: Vec<f64> = by_kernels.map(|lost| lost.max(wind_up)).collect();
         let (pp, rms) = spread(&loaded);
         let most = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let apart = curves.apart.map_or(0.0, |apart| {
-            let distance = |place| {
-                let [x, y] = KernelModel::apart_at(&apart, place);
-                (x * x + y * y).sqrt()
-            };
-            most(&self.places.iter().map(distance).collect::<Vec<f64>>())
-        });
+        let apart = |place| KernelModel::apart_at(&curves.apart, place).0;
+        let apart = self.places.iter().map(apart).fold(0.0, f64::max);
         let mut all = vec![pp, rms, lost.iter().sum::<f64>() / lost.len() as f64, most(&lost)];
         all.extend_from_slice(&state[2 * WAVE..]);
         all.extend([apart, 100.0 * closed as f64 / lost.len() as f64]);
@@ -410,4 +351,13 @@ fn spread(values: &[f64]) -> (f64, f64) {
 /// Whether a tolerance needs kernels of displaced axes.
 pub(super) fn displaces(tolerance: &FieldTolerance) -> bool {
     tolerance.acts == ToleranceActs::Directed && tolerance.field != "as_built.circular_spline_ovality_um"
+}
+
+#[cfg(test)]
+impl KernelModel {
+    /// Error of a drive without uniform changes under the load, at a place of the generator in turns, arcsec.
+    pub(super) fn error_at(&self, built: &AsBuilt, generator: f64, ratio: f64) -> f64 {
+        let curves = self.curves(built, &self.response.middle);
+        self.errors(&curves, &DriveAngles::at(generator, ratio))[0]
+    }
 }

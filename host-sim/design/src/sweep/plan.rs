@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::draw::{draw, sets};
-use super::model::{self, Response};
+use super::model::{self, KernelModel, Response};
 use super::respond::{respond, torques_n_m};
 use super::tolerance::Tolerances;
 use super::vary::{Vary, filling, grid};
@@ -15,7 +15,6 @@ use crate::data_sheet::{self, Loads};
 use crate::kernels::Kernels;
 use crate::stated::Stated;
 use flexspline_base::output::{OutputError, Outputs};
-use flexspline_base::toml_file::{Problem, lines};
 use flexspline_mechanics::drive::{Drive, DriveError, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_mechanics::stepping::{Method, SolverSettings};
@@ -36,9 +35,6 @@ const LOADS: [&str; 3] = ["t1_n_m", "t2_n_m", "largest_n_m"];
 /// Why a sweep is not planned, run or reduced.
 #[derive(Debug, Error)]
 pub enum PlanError {
-    /// All mistakes in a file of tolerances.
-    #[error("{}", lines(.0))]
-    Tolerances(Vec<Problem>),
     /// The user has to change something.
     #[error("{0}")]
     BadInput(String),
@@ -67,14 +63,14 @@ pub struct PlanSettings {
 /// A plan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VariantPlan {
-    /// Everything but the variants.
-    recipe: Recipe,
     /// The drive whose fields vary.
     pub drive: Drive,
     /// `[data_sheet]` of the drive.
     stated: Option<Stated>,
     /// The generators.
     pub generators: Vec<GeneratorKind>,
+    mesh: MeshLevel,
+    pub(super) by: HowComputed,
     /// Fields that each variant sets.
     pub columns: Vec<String>,
     /// Values of the fields, by variant.
@@ -84,7 +80,7 @@ pub struct VariantPlan {
 }
 
 /// `plan.json`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Recipe {
     schema_version: u32,
@@ -92,8 +88,8 @@ struct Recipe {
     tool_version: String,
     /// The drive as a file, with its `[data_sheet]`.
     drive_toml: String,
-    generators: Vec<String>,
-    mesh: String,
+    generators: Vec<GeneratorKind>,
+    mesh: MeshLevel,
     by: HowComputed,
 }
 
@@ -153,7 +149,7 @@ impl VariantPlan {
                  with --set {path}={value}"
             ));
         }
-        let of_grid = || vary.iter().map(|field| field.grid().len()).fold(1, usize::saturating_mul);
+        let of_grid = || vary.iter().map(|field| field.values.len()).fold(1, usize::saturating_mul);
         let count = settings.draws.unwrap_or_else(of_grid);
         if !(1..=MOST_VARIANTS).contains(&count) {
             return wrong(format!(
@@ -164,8 +160,14 @@ impl VariantPlan {
         let by = HowComputed::Sheet { torque_n_m, positions };
         let columns = vary.iter().map(|field| field.path.clone()).collect();
         let plan = VariantPlan::new((drive, stated), generators, (columns, variants), by, settings.mesh);
-        plan.makes_drives()?;
-        Ok(plan)
+        // Refused before anything is computed.
+        let mut runs = (0..count).flat_map(|k| generators.iter().map(move |kind| (k, *kind)));
+        match plan.drive_of(0, generators[0]) {
+            Err(why) if runs.all(|(k, kind)| plan.drive_of(k, kind).is_err()) => {
+                wrong(format!("--vary: no variant makes a drive; the first: {why}"))
+            }
+            _ => Ok(plan),
+        }
     }
 
     /// A plan of drives drawn from tolerances: influence kernels and responses by FEM.
@@ -183,7 +185,7 @@ impl VariantPlan {
                 "--draws: found {draws}, allowed: {LEAST_DRAWS} to {MOST_VARIANTS}"
             )));
         }
-        let drawn = draw(&of.list, &of.drive, draws, settings.seed);
+        let drawn = draw(&of.list, draws, settings.seed);
         let split = |set: String| set.split_once('=').map(|(path, value)| (path.to_owned(), value.to_owned()));
         let lines = drawn.iter().map(|one| sets(&of.list, one).into_iter().filter_map(split).unzip());
         let (columns, variants): (Vec<Vec<String>>, Vec<Vec<String>>) = lines.unzip();
@@ -200,27 +202,8 @@ impl VariantPlan {
         by: HowComputed,
         mesh: MeshLevel,
     ) -> VariantPlan {
-        let recipe = Recipe {
-            schema_version: SCHEMA,
-            tool_version: env!("CARGO_PKG_VERSION").to_owned(),
-            drive_toml: drive.to_toml() + &stated.map_or_else(String::new, Stated::to_toml),
-            generators: generators.iter().map(ToString::to_string).collect(),
-            mesh: mesh.to_string(),
-            by,
-        };
         let (drive, stated, generators) = (drive.clone(), stated.cloned(), generators.to_vec());
-        VariantPlan { recipe, drive, stated, generators, columns, variants, hash: String::new() }
-    }
-
-    /// Refuses, before anything is computed, fields that make no drive with any of their values.
-    fn makes_drives(&self) -> Result<(), PlanError> {
-        let jobs = || (0..self.variants.len()).flat_map(|k| self.generators.iter().map(move |kind| (k, *kind)));
-        match self.drive_of(0, self.generators[0]) {
-            Err(why) if jobs().all(|(k, kind)| self.drive_of(k, kind).is_err()) => {
-                Err(PlanError::BadInput(format!("--vary: no variant makes a drive; the first: {why}")))
-            }
-            _ => Ok(()),
-        }
+        VariantPlan { drive, stated, generators, mesh, by, columns, variants, hash: String::new() }
     }
 
     /// The assignments PATH=VALUE of variant `k`, from 0.
@@ -238,7 +221,7 @@ impl VariantPlan {
 
     /// Names of the figures, in the order of the columns of results.
     pub fn figures(&self) -> Vec<&'static str> {
-        match self.recipe.by {
+        match self.by {
             HowComputed::Sheet { .. } => {
                 LOADS.into_iter().chain(data_sheet::FIGURES.iter().map(|(name, _)| *name)).collect()
             }
@@ -253,47 +236,50 @@ impl VariantPlan {
 
     /// Whether drives are drawn from tolerances.
     pub fn is_of_tolerances(&self) -> bool {
-        matches!(self.recipe.by, HowComputed::Kernels { .. })
+        matches!(self.by, HowComputed::Kernels { .. })
     }
 
-    /// The kernels with a generator; none of a plan of fields.
-    pub(super) fn kernels(&self, kind: GeneratorKind) -> Option<&Kernels> {
-        let HowComputed::Kernels { of, .. } = &self.recipe.by else { return None };
-        of.iter().map(|one| &one.kernels).find(|kernels| kernels.generator == kind)
+    /// What evaluates drives by kernels, by generator; none of a plan of fields.
+    pub(super) fn models(&self) -> Vec<KernelModel> {
+        let HowComputed::Kernels { torques_n_m, of } = &self.by else { return Vec::new() };
+        of.iter().map(|one| KernelModel::new(&one.kernels, one.response.clone(), *torques_n_m)).collect()
     }
 
-    pub(super) fn by(&self) -> &HowComputed {
-        &self.recipe.by
+    /// Distance of the axes that the kernels of a generator reach, µm.
+    pub(super) fn reach_um(&self, g: usize) -> f64 {
+        let HowComputed::Kernels { of, .. } = &self.by else { return f64::INFINITY };
+        of[g].kernels.eccentric.sizes_um.last().copied().unwrap_or(f64::INFINITY)
     }
 
     /// The loads of the data sheet of a variant.
     pub(super) fn loads(&self, drive: &Drive, kind: GeneratorKind, torque_n_m: Option<f64>) -> Loads {
-        let spanned_n_m = drive.rated_torque_n_m(kind);
-        match (torque_n_m, &self.stated) {
-            (Some(largest_n_m), _) => Loads::up_to(largest_n_m),
-            (None, Some(stated)) => stated.loads(spanned_n_m),
-            (None, None) => Loads::up_to(spanned_n_m),
+        let of_size_n_m = drive.rated_torque_n_m(kind);
+        match &self.stated {
+            Some(stated) if torque_n_m.is_none() => stated.loads(of_size_n_m),
+            _ => Loads::up_to(torque_n_m.unwrap_or(of_size_n_m)),
         }
     }
 
     /// Settings of all FEM.
     pub(super) fn solver(&self) -> SolverSettings {
-        solver(self.recipe.mesh.parse().unwrap_or(MeshLevel::Coarse))
+        solver(self.mesh)
     }
 
+    /// The contents of both files.
     fn texts(&self) -> Result<[Vec<u8>; 2], PlanError> {
-        let failed = |error: &dyn std::fmt::Display| PlanError::Failed(format!("plan: {error}"));
-        let mut json = serde_json::to_vec(&self.recipe).map_err(|error| failed(&error))?;
+        let recipe = Recipe {
+            schema_version: SCHEMA,
+            tool_version: env!("CARGO_PKG_VERSION").to_owned(),
+            drive_toml: self.drive.to_toml() + &self.stated.as_ref().map_or_else(String::new, Stated::to_toml),
+            generators: self.generators.clone(),
+            mesh: self.mesh,
+            by: self.by.clone(),
+        };
+        let mut json = serde_json::to_vec(&recipe).map_err(|error| PlanError::Failed(format!("plan: {error}")))?;
         json.push(b'\n');
-        let mut csv = csv::Writer::from_writer(Vec::new());
-        let header = || [NUMBER].into_iter().chain(self.columns.iter().map(String::as_str));
-        csv.write_record(header()).map_err(|error| failed(&error))?;
-        for (k, values) in self.variants.iter().enumerate() {
-            let number = (k + 1).to_string();
-            let line = [number.as_str()].into_iter().chain(values.iter().map(String::as_str));
-            csv.write_record(line).map_err(|error| failed(&error))?;
-        }
-        Ok([csv.into_inner().map_err(|error| failed(&error))?, json])
+        let line = |first: String, cells: &[String]| [&[first], cells].concat();
+        let lines = self.variants.iter().enumerate().map(|(k, values)| line((k + 1).to_string(), values));
+        Ok([csv_of([line(NUMBER.to_owned(), &self.columns)].into_iter().chain(lines))?, json])
     }
 
     /// Writes both files, and reads them as every shard will. A folder with results of another plan keeps them.
@@ -343,69 +329,56 @@ impl VariantPlan {
         }
         let drive = Drive::from_toml("drive_toml", &recipe.drive_toml).map_err(|error| wrong(error.to_string()))?;
         let stated = Stated::of_file("drive_toml", &recipe.drive_toml).map_err(|error| wrong(error.to_string()))?;
-        let kinds = recipe.generators.iter().map(|name| name.parse().map_err(|_| wrong(format!("generator {name:?}"))));
-        let generators = kinds.collect::<Result<Vec<GeneratorKind>, PlanError>>()?;
         if let HowComputed::Kernels { of, .. } = &recipe.by {
             for one in of {
                 one.kernels.check().map_err(|problem| wrong(problem.to_string()))?;
             }
-            if of.len() != generators.len() || !of.iter().all(|one| one.response.fits()) {
+            if of.len() != recipe.generators.len() || !of.iter().all(|one| one.response.fits()) {
                 return Err(wrong("kernels or responses are missing; plan anew".to_owned()));
             }
         }
-        let (columns, variants) =
-            variants_of(&csv_text).map_err(|error| PlanError::BadInput(format!("{}{error}", csv.display())))?;
+        let (columns, variants) = variants_of(&csv, &csv_text)?;
         let mut hasher = blake3::Hasher::new();
         hasher.update(json_text.as_bytes()).update(csv_text.as_bytes());
         let hash = hasher.finalize().to_hex().as_str()[..16].to_owned();
-        Ok(VariantPlan { recipe, drive, stated, generators, columns, variants, hash })
+        let Recipe { generators, mesh, by, .. } = recipe;
+        Ok(VariantPlan { drive, stated, generators, mesh, by, columns, variants, hash })
     }
-}
-
-/// The input of one harmonic of a field.
-pub(super) fn of_order(field: &str, order: impl std::fmt::Display) -> String {
-    format!("{field}, order {order}")
 }
 
 fn solver(mesh: MeshLevel) -> SolverSettings {
     SolverSettings { method: Method::Fast, mesh, ..SolverSettings::default() }
 }
 
-/// Columns and variants of `plan.csv`.
-type Variants = (Vec<String>, Vec<Vec<String>>);
-
-/// Why `plan.csv` is refused; begins with the line.
-#[derive(Debug, Error)]
-enum VariantsError {
-    #[error(": {0}")]
-    Csv(#[from] csv::Error),
-    #[error(":1: found {0:?}, allowed: {NUMBER}, then fields of the drive")]
-    Header(Vec<String>),
-    #[error(":{line}: {NUMBER}: found {found:?}, allowed: 1, 2, 3 and so on, up to {MOST_VARIANTS}")]
-    Number { line: u64, found: String },
-    #[error(": found no variant, allowed: one a line")]
-    Empty,
+/// Records as lines of CSV.
+pub(super) fn csv_of(records: impl IntoIterator<Item = Vec<String>>) -> Result<Vec<u8>, PlanError> {
+    let failed = |error: csv::Error| PlanError::Failed(format!("CSV: {error}"));
+    let mut to = csv::Writer::from_writer(Vec::new());
+    records.into_iter().try_for_each(|record| to.write_record(record)).map_err(failed)?;
+    to.into_inner().map_err(|error| failed(error.into_error().into()))
 }
 
-fn variants_of(text: &str) -> Result<Variants, VariantsError> {
-    let mut reader = csv::Reader::from_reader(text.as_bytes());
-    let header: Vec<String> = reader.headers()?.iter().map(str::to_owned).collect();
+/// Columns and variants of `plan.csv`.
+fn variants_of(file: &Path, text: &str) -> Result<(Vec<String>, Vec<Vec<String>>), PlanError> {
+    let wrong = |what: String| Err(PlanError::BadInput(format!("{}:{what}", file.display())));
+    let reader = csv::ReaderBuilder::new().has_headers(false).from_reader(text.as_bytes());
+    let records = match reader.into_records().collect::<Result<Vec<csv::StringRecord>, csv::Error>>() {
+        Ok(records) => records,
+        Err(error) => return wrong(format!(" {error}")),
+    };
+    let mut lines = records.iter().map(|line| line.iter().map(str::to_owned).collect::<Vec<String>>());
+    let header = lines.next().unwrap_or_default();
     if header.first().is_none_or(|first| first != NUMBER) || header.len() < 2 {
-        return Err(VariantsError::Header(header));
+        return wrong(format!("1: found {header:?}, allowed: {NUMBER}, then fields of the drive"));
     }
-    let mut variants = Vec::new();
-    for record in reader.records() {
-        let record = record?;
-        let number = variants.len() + 1;
-        let found = record.get(0).unwrap_or_default();
-        if found != number.to_string() || number > MOST_VARIANTS {
-            let line = record.position().map_or(0, csv::Position::line);
-            return Err(VariantsError::Number { line, found: found.to_owned() });
-        }
-        variants.push(record.iter().skip(1).map(str::to_owned).collect());
+    let variants: Vec<Vec<String>> = lines.collect();
+    let is_wrong = |k: &usize| *k >= MOST_VARIANTS || variants[*k][0] != (k + 1).to_string();
+    if let Some(k) = (0..variants.len()).find(is_wrong) {
+        let (line, found) = (records[k + 1].position().map_or(0, csv::Position::line), &variants[k][0]);
+        return wrong(format!("{line}: {NUMBER}: found {found:?}, allowed: 1, 2, 3 and so on, up to {MOST_VARIANTS}"));
     }
     if variants.is_empty() {
-        return Err(VariantsError::Empty);
+        return wrong(" found no variant, allowed: one a line".to_owned());
     }
-    Ok((header[1..].to_vec(), variants))
+    Ok((header[1..].to_vec(), variants.into_iter().map(|line| line[1..].to_vec()).collect()))
 }

@@ -1,14 +1,14 @@
 //! From results to answers: what meets the constraints, the Pareto front, scatter, and which input matters.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::judge::{Judge, cost};
+use super::judge::Judge;
 use super::model::CLOSED;
-use super::plan::{PlanError, VariantPlan, of_order};
+use super::plan::{PlanError, VariantPlan, csv_of};
 use super::run::{RunStatus, VariantRow, rows_of};
 use flexspline_base::statistics::{Quantile, correlation, mean, quantile, std_dev};
 use flexspline_mechanics::drive::GeneratorKind;
@@ -43,9 +43,9 @@ pub struct ReducedSweep {
     pub meet: usize,
     /// By generator.
     pub generators: Vec<OfGenerator>,
-    /// Every row, whether it meets, and whether it is Pareto-optimal.
+    /// Every row.
     #[serde(skip)]
-    pub rows: Vec<(VariantRow, bool, bool)>,
+    pub rows: Vec<VariantRow>,
 }
 
 /// Results with one generator.
@@ -94,27 +94,11 @@ pub struct RankCorrelation {
 /// # Errors
 /// Results are missing or damaged, or of another plan: the file, and the command that computes them.
 pub fn reduce(plan: &VariantPlan, folder: &Path, judge: &Judge, partial: bool) -> Result<ReducedSweep, PlanError> {
-    let (rows, missing) = gathered(plan, folder, partial)?;
-    let meet = judge.meet(plan, &rows);
-    let front = judge.front(plan, &rows, &meet);
+    let (mut rows, missing) = gathered(plan, folder, partial)?;
+    judge.mark(plan, &mut rows);
     let inputs = inputs(plan);
-    let generators = plan.generators.iter().map(|kind| {
-        let of_kind: Vec<usize> = (0..rows.len()).filter(|k| rows[*k].generator == *kind).collect();
-        let mut best: Vec<usize> = of_kind.iter().copied().filter(|k| front[*k]).collect();
-        if let Some((first, sense)) = judge.targets.first().and_then(|(name, sense)| Some((plan.figure(name)?, *sense)))
-        {
-            best.sort_by(|a, b| cost(rows[*a].figures[first], sense).total_cmp(&cost(rows[*b].figures[first], sense)));
-        }
-        let of_kind: Vec<&VariantRow> = of_kind.into_iter().map(|k| &rows[k]).collect();
-        let front = best.into_iter().map(|k| rows[k].variant + 1).collect();
-        of_generator(plan, *kind, &of_kind, front, &inputs)
-    });
-    let generators = generators.collect();
+    let generators = (0..plan.generators.len()).map(|g| of_generator(plan, g, judge, &rows, &inputs)).collect();
     let ended = |status| rows.iter().filter(|row| row.status == status).count();
-    let (converged, failed, refused) =
-        (ended(RunStatus::Converged), ended(RunStatus::Failed), ended(RunStatus::Refused));
-    let marked: Vec<(VariantRow, bool, bool)> =
-        rows.into_iter().zip(meet).zip(front).map(|((row, meets), front)| (row, meets, front)).collect();
     Ok(ReducedSweep {
         schema_version: 1,
         tool_version: env!("CARGO_PKG_VERSION"),
@@ -122,21 +106,20 @@ pub fn reduce(plan: &VariantPlan, folder: &Path, judge: &Judge, partial: bool) -
         drive: plan.drive.name.clone(),
         variants: plan.variants.len(),
         missing,
-        converged,
-        failed,
-        refused,
-        meet: marked.iter().filter(|(_, meets, _)| *meets).count(),
+        converged: ended(RunStatus::Converged),
+        failed: ended(RunStatus::Failed),
+        refused: ended(RunStatus::Refused),
+        meet: rows.iter().filter(|row| row.meets).count(),
         generators,
-        rows: marked,
+        rows,
     })
 }
 
 /// Rows of all files of results, by variant, then by generator, and how many are missing.
 fn gathered(plan: &VariantPlan, folder: &Path, partial: bool) -> Result<(Vec<VariantRow>, usize), PlanError> {
     let results = folder.join("results");
-    let entries = fs::read_dir(&results).map(|entries| entries.flatten().map(|entry| entry.path()).collect());
-    let mut paths: Vec<_> = entries.unwrap_or_else(|_| Vec::new());
-    paths.retain(|path| path.extension().is_some_and(|end| end == "csv"));
+    let entries = fs::read_dir(&results).into_iter().flatten().flatten().map(|entry| entry.path());
+    let mut paths: Vec<PathBuf> = entries.filter(|path| path.extension().is_some_and(|end| end == "csv")).collect();
     paths.sort();
     let mut found = BTreeMap::new();
     for path in &paths {
@@ -166,19 +149,23 @@ fn gathered(plan: &VariantPlan, folder: &Path, partial: bool) -> Result<(Vec<Var
 
 fn of_generator(
     plan: &VariantPlan,
-    generator: GeneratorKind,
-    rows: &[&VariantRow],
-    front: Vec<usize>,
+    g: usize,
+    judge: &Judge,
+    rows: &[VariantRow],
     inputs: &[(String, Vec<f64>)],
 ) -> OfGenerator {
-    let sound: Vec<&VariantRow> = rows.iter().copied().filter(|row| row.status == RunStatus::Converged).collect();
-    let column = |name: &str| -> Vec<f64> {
-        plan.figure(name).map_or_else(Vec::new, |k| sound.iter().map(|row| row.figures[k]).collect())
-    };
+    let generator = plan.generators[g];
+    let sound = rows.iter().filter(|row| row.generator == generator && row.status == RunStatus::Converged);
+    let sound: Vec<&VariantRow> = sound.collect();
+    let mut front: Vec<&VariantRow> = sound.iter().copied().filter(|row| row.is_front).collect();
+    if let Some((first, sense)) = judge.targets_in(plan).first() {
+        let cost = |row: &VariantRow| sense.cost(row.figures[*first]);
+        front.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
+    }
+    let column = |k: usize| sound.iter().map(move |row| row.figures[k]);
     let (mut figures, mut ranks) = (Vec::new(), Vec::new());
-    for figure in plan.figures() {
-        let values = column(figure);
-        let mut sorted: Vec<f64> = values.iter().copied().filter(|x| x.is_finite()).collect();
+    for (k, figure) in plan.figures().into_iter().enumerate() {
+        let mut sorted: Vec<f64> = column(k).filter(|x| x.is_finite()).collect();
         if sorted.is_empty() {
             continue;
         }
@@ -186,23 +173,22 @@ fn of_generator(
         let quantiles = SHARES.iter().map(|share| quantile(&sorted, *share)).collect();
         figures.push(FigureSpread { figure, mean: mean(&sorted), std: std_dev(&sorted), quantiles });
         let of_input = |(input, of): &(String, Vec<f64>)| {
-            let pairs = sound.iter().map(|row| of[row.variant]).zip(values.iter().copied());
-            let correlation = rank_correlation(pairs)?;
-            Some(RankCorrelation { figure, input: input.clone(), correlation })
+            let pairs = sound.iter().map(|row| of[row.variant]).zip(column(k));
+            Some(RankCorrelation { figure, input: input.clone(), correlation: rank_correlation(pairs)? })
         };
         let mut of_figure: Vec<RankCorrelation> = inputs.iter().filter_map(of_input).collect();
         of_figure.sort_by(|a, b| b.correlation.abs().total_cmp(&a.correlation.abs()));
         ranks.extend(of_figure);
     }
-    let of_kernels = plan.kernels(generator);
-    let reach = of_kernels.and_then(|kernels| kernels.eccentric.sizes_um.last()).copied().unwrap_or(f64::INFINITY);
+    let above =
+        |name: &str, limit: f64| plan.figure(name).map_or(0, |k| column(k).filter(|value| *value > limit).count());
     OfGenerator {
         generator,
-        front,
+        front: front.iter().map(|row| row.variant + 1).collect(),
         figures,
         ranks,
-        beyond_kernels: column("axes_apart_um").iter().filter(|size| **size > reach).count(),
-        play_closed: column(CLOSED).iter().filter(|share| **share > 0.0).count(),
+        beyond_kernels: above("axes_apart_um", plan.reach_um(g)),
+        play_closed: above(CLOSED, 0.0),
     }
 }
 
@@ -230,21 +216,18 @@ fn ranks(values: &[f64]) -> Vec<f64> {
 /// amplitude of each order. Directions, phases and words are none.
 fn inputs(plan: &VariantPlan) -> Vec<(String, Vec<f64>)> {
     let is_angle = |column: &String| column.ends_with("_phase_deg") || column.ends_with("_direction_deg");
-    let mut names: Vec<String> = Vec::new();
-    let mut found: HashMap<String, Vec<f64>> = HashMap::new();
-    for (k, column) in plan.columns.iter().enumerate().filter(|(_, column)| !is_angle(column)) {
+    let mut found: BTreeMap<(usize, Option<i64>), Vec<f64>> = BTreeMap::new();
+    for (k, _) in plan.columns.iter().enumerate().filter(|(_, column)| !is_angle(column)) {
         for (variant, values) in plan.variants.iter().enumerate() {
             for (order, value) in numbers(&values[k]) {
-                let name = order.map_or_else(|| column.clone(), |order| of_order(column, order));
-                let all = found.entry(name.clone()).or_insert_with(|| {
-                    names.push(name);
-                    vec![f64::NAN; plan.variants.len()]
-                });
-                all[variant] = value;
+                found.entry((k, order)).or_insert_with(|| vec![f64::NAN; plan.variants.len()])[variant] = value;
             }
         }
     }
-    names.into_iter().filter_map(|name| found.remove_entry(&name)).collect()
+    let name = |(k, order): (usize, Option<i64>)| {
+        plan.columns[k].clone() + &order.map_or_else(String::new, |order| format!(", order {order}"))
+    };
+    found.into_iter().map(|(of, values)| (name(of), values)).collect()
 }
 
 /// Numbers of a cell of `plan.csv`, each with its order if it is a harmonic.
@@ -266,21 +249,18 @@ impl ReducedSweep {
     ///
     /// # Errors
     /// None but of memory.
-    pub fn csv(&self, plan: &VariantPlan) -> Result<Vec<u8>, csv::Error> {
+    pub fn csv(&self, plan: &VariantPlan) -> Result<Vec<u8>, PlanError> {
         let is_short = |k: &usize| plan.variants.iter().all(|values| !values[*k].starts_with('['));
         let fields: Vec<usize> = (0..plan.columns.len()).filter(is_short).collect();
-        let mut to = csv::Writer::from_writer(Vec::new());
         let columns = fields.iter().map(|k| plan.columns[*k].as_str());
         let end = ["status", "meets", "front", "why", "cautions"];
-        to.write_record(["variant", "generator"].into_iter().chain(columns).chain(plan.figures()).chain(end))?;
-        for (row, meets, front) in &self.rows {
-            let mut line = vec![(row.variant + 1).to_string(), row.generator.to_string()];
-            line.extend(fields.iter().map(|k| plan.variants[row.variant][*k].clone()));
-            line.extend(row.figures.iter().map(|x| if x.is_finite() { x.to_string() } else { String::new() }));
-            line.extend([row.status.name().to_owned(), meets.to_string(), front.to_string()]);
-            line.extend([row.why.clone(), row.cautions.clone()]);
-            to.write_record(line)?;
-        }
-        to.into_inner().map_err(|error| csv::Error::from(error.into_error()))
+        let header = ["variant", "generator"].into_iter().chain(columns).chain(plan.figures()).chain(end);
+        let line = |row: &VariantRow| {
+            let head = [(row.variant + 1).to_string(), row.generator.to_string()];
+            let values: Vec<String> = fields.iter().map(|k| plan.variants[row.variant][*k].clone()).collect();
+            let marks = [row.status.name().to_owned(), row.meets.to_string(), row.is_front.to_string()];
+            [&head[..], &values, &row.cells(), &marks, &[row.why.clone(), row.cautions.clone()]].concat()
+        };
+        csv_of([header.map(str::to_owned).collect()].into_iter().chain(self.rows.iter().map(line)))
     }
 }

@@ -7,15 +7,15 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 
 use super::PlanError;
-use super::by_fem::{Conditions, wave};
-use super::draw::{Drawn, sets};
-use super::model::{Parabola, Response, SHEET, displaces};
+use super::draw::Drawn;
+use super::model::{Parabola, Response, SHEET, WAVE, displaces};
 use super::plan::{OfOne, SweepProgress};
-use super::tolerance::{ToleranceActs, Tolerances};
+use super::tolerance::{FieldTolerance, ToleranceActs, Tolerances};
 use crate::data_sheet::{FIGURES, Loads, data_sheet};
 use crate::kernels::{KernelError, KernelPlan, make};
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
-use flexspline_mechanics::stepping::{SolveError, SolverSettings};
+use flexspline_mechanics::motion::Motion;
+use flexspline_mechanics::stepping::{Problem, SolveError, SolverSettings};
 
 /// The parabola of a uniform change is taken at the value that this share of the drives lies below, and at its mirror.
 const OUTER_SHARE: f64 = 0.05;
@@ -45,12 +45,10 @@ pub(super) fn respond(
     solver: SolverSettings,
     progress: &SweepProgress<'_>,
 ) -> Result<Vec<OfOne>, PlanError> {
-    let middle = Drawn::middle(&of.list);
-    let drawn_as = uniform(of, &middle)?;
-    let torques_n_m = torques_n_m(of);
-    let alike = of.list.iter().filter(|tolerance| tolerance.acts == ToleranceActs::Alike).count();
-    let plans: Vec<KernelPlan> = of.generators.iter().map(|kind| kernel_plan(of, *kind, torques_n_m)).collect();
-    let steps: usize = plans.iter().map(|plan| plan.steps() + 1 + 2 * alike).sum();
+    let drawn_as = uniform(of, &Drawn::middle(&of.list))?;
+    let states = 1 + 2 * of.list.iter().filter(|tolerance| tolerance.acts == ToleranceActs::Alike).count();
+    let plans: Vec<KernelPlan> = of.generators.iter().map(|kind| kernel_plan(of, *kind)).collect();
+    let steps: usize = plans.iter().map(|plan| plan.steps() + states).sum();
     let mut before = 0;
     let mut generators = Vec::new();
     for (kind, kernel_plan) in of.generators.iter().zip(&plans) {
@@ -60,10 +58,9 @@ pub(super) fn respond(
         })
         .map_err(|error| kernels_failed(of, *kind, &error))?;
         before += kernel_plan.steps();
-        let at = Conditions { kind: *kind, temperature_c: of.temperature_c, torque_n_m: torques_n_m[0], solver };
         let step = |done| progress(before + done, steps, &format!("sheets, {kind}"));
-        let response = response(of, &middle, at, torques_n_m, &step)?;
-        before += 1 + 2 * alike;
+        let response = response(of, *kind, solver, &step)?;
+        before += states;
         generators.push(OfOne { kernels, response });
     }
     Ok(generators)
@@ -71,15 +68,14 @@ pub(super) fn respond(
 
 /// The drive with the uniform changes of `drawn` alone.
 fn uniform(of: &Tolerances, drawn: &[Drawn]) -> Result<Drive, PlanError> {
-    let sets = sets(&of.list, drawn);
-    let changed = of.drive.with_sets(sets.iter().map(String::as_str));
-    let mut drive = changed.map_err(|error| PlanError::BadInput(error.to_string()))?;
+    let mut drive = of.drive_with(drawn).map_err(|error| PlanError::BadInput(error.to_string()))?;
     drive.as_built = drive.as_built.uniform_part();
     Ok(drive)
 }
 
 /// Kernels at the loads of the tolerances, and displacements up to their limits.
-fn kernel_plan(of: &Tolerances, kind: GeneratorKind, [torque, light]: [f64; 2]) -> KernelPlan {
+fn kernel_plan(of: &Tolerances, kind: GeneratorKind) -> KernelPlan {
+    let [torque, light] = torques_n_m(of);
     let usual = KernelPlan::for_drive(&of.drive, kind);
     let displacing = || of.list.iter().filter(|t| displaces(t)).map(|t| t.distribution);
     let reach: f64 = displacing().map(|distribution| distribution.limits[1]).sum();
@@ -118,52 +114,67 @@ fn kernels_failed(of: &Tolerances, kind: GeneratorKind, error: &KernelError) -> 
 /// State of the middle drive, and a parabola for each field that changes the drive uniformly.
 fn response(
     of: &Tolerances,
-    middle: &[Drawn],
-    at: Conditions,
-    torques_n_m: [f64; 2],
+    kind: GeneratorKind,
+    solver: SolverSettings,
     step: &(dyn Fn(usize) + Sync),
 ) -> Result<Response, PlanError> {
+    let middle = Drawn::middle(&of.list);
     let alike = || of.list.iter().enumerate().filter(|(_, tolerance)| tolerance.acts == ToleranceActs::Alike);
-    let mut jobs: Vec<Option<(usize, f64)>> = vec![None];
-    for (t, tolerance) in alike() {
-        jobs.extend([OUTER_SHARE, 1.0 - OUTER_SHARE].map(|share| Some((t, tolerance.distribution.quantile(share)))));
-    }
+    let ends = |(t, tolerance): (usize, &FieldTolerance)| {
+        [OUTER_SHARE, 1.0 - OUTER_SHARE].map(|share| Some((t, tolerance.distribution.quantile(share))))
+    };
+    let jobs: Vec<Option<(usize, f64)>> = [None].into_iter().chain(alike().flat_map(ends)).collect();
     let done = AtomicUsize::new(0);
-    let states = jobs
-        .par_iter()
-        .with_max_len(1)
-        .map(|job| {
-            let mut drawn = middle.to_vec();
-            if let Some((t, value)) = job {
-                drawn[*t].value = *value;
-            }
-            let state = state(&uniform(of, &drawn)?, at, torques_n_m).map_err(|error| {
-                let which = job.map_or("the middle drive".to_owned(), |(t, v)| format!("{} = {v}", of.list[t].field));
-                PlanError::Failed(format!("{}, {which}: {error}", at.kind))
-            })?;
-            step(done.fetch_add(1, Ordering::Relaxed) + 1);
-            Ok(state)
-        })
-        .collect::<Result<Vec<Vec<f64>>, PlanError>>()?;
-    let value = |k: usize| jobs[k].map_or(f64::NAN, |(_, value)| value);
+    let state_of = |job: &Option<(usize, f64)>| {
+        let mut drawn = middle.clone();
+        if let Some((t, value)) = job {
+            drawn[*t].value = *value;
+        }
+        let state = state(of, &uniform(of, &drawn)?, kind, solver).map_err(|error| {
+            let which = job.map_or("the middle drive".to_owned(), |(t, v)| format!("{} = {v}", of.list[t].field));
+            PlanError::Failed(format!("{kind}, {which}: {error}"))
+        });
+        step(done.fetch_add(1, Ordering::Relaxed) + 1);
+        state
+    };
+    let states = jobs.par_iter().with_max_len(1).map(state_of).collect::<Result<Vec<Vec<f64>>, PlanError>>()?;
     let change = |k: usize| -> Vec<f64> { states[k].iter().zip(&states[0]).map(|(a, b)| a - b).collect() };
-    let parabolas = alike().enumerate().map(|(k, (t, tolerance))| {
-        let (low, high) = (1 + 2 * k, 2 + 2 * k);
-        let at = [value(low), middle[t].value, value(high)];
-        Parabola { field: tolerance.field.clone(), at, below: change(low), above: change(high) }
+    let parabolas = alike().enumerate().map(|(k, (t, FieldTolerance { field, distribution, .. }))| {
+        let [low, high] = [OUTER_SHARE, 1.0 - OUTER_SHARE].map(|share| distribution.quantile(share));
+        let at = [low, middle[t].value, high];
+        Parabola { field: field.clone(), at, below: change(1 + 2 * k), above: change(2 + 2 * k) }
     });
     Ok(Response { middle: states[0].clone(), parabolas: parabolas.collect() })
 }
 
-fn state(drive: &Drive, at: Conditions, torques_n_m: [f64; 2]) -> Result<Vec<f64>, SolveError> {
-    let mut state = wave(drive, at)?;
-    state.extend(wave(drive, Conditions { torque_n_m: torques_n_m[1], ..at })?);
-    let loads = Loads::up_to(drive.rated_torque_n_m(at.kind));
-    let (sheet, done) = data_sheet(drive, at.kind, at.temperature_c, loads, SHEET_POSITIONS, at.solver);
+/// State of a drive: settled errors under both loads, and the sheet.
+fn state(of: &Tolerances, drive: &Drive, kind: GeneratorKind, solver: SolverSettings) -> Result<Vec<f64>, SolveError> {
+    let problem = Problem::new(drive, kind, of.temperature_c, solver)?;
+    let mut state = Vec::new();
+    for torque_n_m in torques_n_m(of) {
+        state.extend(wave(&problem, torque_n_m)?);
+    }
+    let loads = Loads::up_to(drive.rated_torque_n_m(kind));
+    let (sheet, done) = data_sheet(drive, kind, of.temperature_c, loads, SHEET_POSITIONS, solver);
     done?;
     let figure = |name: &str| FIGURES.iter().find(|(known, _)| *known == name).and_then(|(_, of)| of(&sheet));
     state.extend(SHEET.iter().map(|name| figure(name).unwrap_or(f64::NAN)));
     Ok(state)
+}
+
+/// Error in settled motion at even places over a tooth pitch, from whole pitches on, arcsec.
+fn wave(problem: &Problem, torque_n_m: f64) -> Result<[f64; WAVE], SolveError> {
+    let step = problem.flexspline.pitch() / WAVE as f64;
+    let mut motion = Motion::deformed(problem, -step)?;
+    motion.load(torque_n_m)?;
+    motion.settle(step)?;
+    let settled = (motion.state().generator_rad / step).round() as usize;
+    let mut errors = [0.0; WAVE];
+    for position in settled + 1..=settled + WAVE {
+        motion.turn_to(position as f64 * step)?;
+        errors[position % WAVE] = motion.error_arcsec();
+    }
+    Ok(errors)
 }
 
 #[cfg(test)]

@@ -14,8 +14,8 @@ use std::sync::{Mutex, PoisonError};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::model::{KernelModel, Response};
-use super::plan::{HowComputed, PlanError, VariantPlan};
+use super::model::{KernelModel, Parabola};
+use super::plan::{HowComputed, PlanError, VariantPlan, csv_of};
 use crate::data_sheet::{FIGURES, data_sheet};
 use flexspline_base::output::OutputError;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
@@ -55,8 +55,7 @@ impl FromStr for Shard {
 }
 
 /// How the computation of a variant ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RunStatus {
     /// All figures are there.
     Converged,
@@ -71,11 +70,7 @@ impl RunStatus {
 
     /// Its name in files.
     pub fn name(self) -> &'static str {
-        match self {
-            RunStatus::Converged => "converged",
-            RunStatus::Failed => "failed",
-            RunStatus::Refused => "refused",
-        }
+        ["converged", "failed", "refused"][self as usize]
     }
 }
 
@@ -94,17 +89,37 @@ pub struct VariantRow {
     pub why: String,
     /// Warnings on the drive of a variant that converged.
     pub cautions: String,
+    /// Whether it meets the constraints; marked by the reduction.
+    pub meets: bool,
+    /// Whether it is Pareto-optimal; marked by the reduction.
+    pub is_front: bool,
 }
 
 impl VariantRow {
-    fn line(&self, plan: &VariantPlan) -> io::Result<Vec<u8>> {
-        let head = [plan.hash.clone(), (self.variant + 1).to_string(), self.generator.to_string()];
-        let figures = self.figures.iter().map(|x| if x.is_finite() { x.to_string() } else { String::new() });
+    /// A row without figures, of values that make no drive until it is computed.
+    pub(super) fn empty(plan: &VariantPlan, variant: usize, generator: GeneratorKind) -> VariantRow {
+        VariantRow {
+            variant,
+            generator,
+            status: RunStatus::Refused,
+            figures: vec![f64::NAN; plan.figures().len()],
+            why: String::new(),
+            cautions: String::new(),
+            meets: false,
+            is_front: false,
+        }
+    }
+
+    /// The figures as cells; a missing one is empty.
+    pub(super) fn cells(&self) -> Vec<String> {
+        self.figures.iter().map(|x| if x.is_finite() { x.to_string() } else { String::new() }).collect()
+    }
+
+    fn line(&self, plan: &VariantPlan) -> Result<Vec<u8>, PlanError> {
+        let (number, generator) = ((self.variant + 1).to_string(), self.generator.to_string());
+        let head = [plan.hash.clone(), number, generator, self.status.name().to_owned()];
         let tail = [&self.why, &self.cautions].map(|words| words.replace(['\n', '\r'], " "));
-        let status = [self.status.name().to_owned()];
-        let mut to = csv::Writer::from_writer(Vec::new());
-        to.write_record(head.into_iter().chain(status).chain(figures).chain(tail)).map_err(io::Error::other)?;
-        to.into_inner().map_err(|error| io::Error::other(error.to_string()))
+        csv_of([[&head[..], &self.cells(), &tail].concat()])
     }
 
     /// Reads a row; none where it is not whole.
@@ -113,12 +128,12 @@ impl VariantRow {
         let variant = cell(1)?.parse::<usize>().ok()?.checked_sub(1).filter(|k| *k < plan.variants.len())?;
         let generator = cell(2)?.parse().ok().filter(|kind| plan.generators.contains(kind))?;
         let status = RunStatus::ALL.into_iter().find(|status| Some(status.name()) == cell(3))?;
-        let count = record.len().checked_sub(BEFORE.len() + AFTER.len())?;
+        let end = record.len().checked_sub(AFTER.len())?;
         let number = |text: &str| if text.is_empty() { Some(f64::NAN) } else { text.parse().ok() };
-        let figures: Option<Vec<f64>> = record.iter().skip(BEFORE.len()).take(count).map(number).collect();
-        let [why, cautions] = [0, 1].map(|k| cell(BEFORE.len() + count + k).unwrap_or_default().to_owned());
+        let figures: Option<Vec<f64>> = (BEFORE.len()..end).map(|k| number(cell(k)?)).collect();
         let figures = figures.filter(|figures| figures.len() == plan.figures().len())?;
-        Some(VariantRow { variant, generator, status, figures, why, cautions })
+        let [why, cautions] = [0, 1].map(|k| cell(end + k).unwrap_or_default().to_owned());
+        Some(VariantRow { status, figures, why, cautions, ..VariantRow::empty(plan, variant, generator) })
     }
 }
 
@@ -157,96 +172,69 @@ fn header(plan: &VariantPlan) -> Vec<&'static str> {
     BEFORE.into_iter().chain(plan.figures()).chain(AFTER).collect()
 }
 
-/// Computes variants of a plan.
-struct Evaluator<'a> {
-    plan: &'a VariantPlan,
-    models: Vec<KernelModel>,
+/// Computes a variant; `model` is that of its generator, of a plan of tolerances.
+fn computed(plan: &VariantPlan, variant: usize, generator: GeneratorKind, model: Option<&KernelModel>) -> VariantRow {
+    let mut row = VariantRow::empty(plan, variant, generator);
+    match (plan.drive_of(variant, generator), model) {
+        (Err(error), _) => row.why = error.to_string(),
+        (Ok(drive), None) => by_sheet(plan, &drive, &mut row),
+        (Ok(drive), Some(model)) => by_kernels(plan, &drive, model, &mut row),
+    }
+    row
 }
 
-impl Evaluator<'_> {
-    fn new(plan: &VariantPlan) -> Evaluator<'_> {
-        let models = match plan.by() {
-            HowComputed::Sheet { .. } => Vec::new(),
-            HowComputed::Kernels { torques_n_m, of, .. } => {
-                of.iter().map(|one| KernelModel::new(&one.kernels, one.response.clone(), *torques_n_m)).collect()
-            }
+fn by_sheet(plan: &VariantPlan, drive: &Drive, row: &mut VariantRow) {
+    let HowComputed::Sheet { torque_n_m, positions } = plan.by else { return };
+    let loads = plan.loads(drive, row.generator, torque_n_m);
+    let temperature_c = drive.temperature.reference_c;
+    let (mut sheet, done) = data_sheet(drive, row.generator, temperature_c, loads, positions, plan.solver());
+    match done {
+        Ok(()) => {
+            row.status = RunStatus::Converged;
+            // The search for it ends at the largest load.
+            sheet.last_stable_n_m = Some(loads.largest_n_m);
+        }
+        Err(error) => {
+            row.status = if error.is_bad_input() { RunStatus::Refused } else { RunStatus::Failed };
+            row.why = error.to_string();
+        }
+    }
+    let cautions = sheet.looked().cautions();
+    row.cautions = cautions.iter().map(|caution| caution.words.as_str()).collect::<Vec<_>>().join("; ");
+    let figures = FIGURES.iter().map(|(_, of)| of(&sheet).unwrap_or(f64::NAN));
+    row.figures = [loads.t1_n_m, loads.t2_n_m, loads.largest_n_m].into_iter().chain(figures).collect();
+}
+
+fn by_kernels(plan: &VariantPlan, drive: &Drive, model: &KernelModel, row: &mut VariantRow) {
+    let mut values = Vec::new();
+    for Parabola { field, at, .. } in &model.response.parabolas {
+        let column = plan.columns.iter().position(|column| column == field);
+        // A field that the plan no longer sets is that of the middle drive.
+        let text = column.map_or_else(|| at[1].to_string(), |k| plan.variants[row.variant][k].clone());
+        let Ok(value) = text.parse() else {
+            row.why = format!("{field}: found {text:?}, allowed: a number");
+            return;
         };
-        Evaluator { plan, models }
+        values.push(value);
     }
-
-    fn row(&self, variant: usize, g: usize) -> VariantRow {
-        let generator = self.plan.generators[g];
-        let figures = vec![f64::NAN; self.plan.figures().len()];
-        let (why, cautions) = (String::new(), String::new());
-        let mut row = VariantRow { variant, generator, status: RunStatus::Refused, figures, why, cautions };
-        match self.plan.drive_of(variant, generator) {
-            Ok(drive) => match self.plan.by() {
-                HowComputed::Sheet { torque_n_m, positions } => self.sheet(&drive, *torque_n_m, *positions, &mut row),
-                HowComputed::Kernels { of, .. } => self.kernels(&drive, &of[g].response, &self.models[g], &mut row),
-            },
-            Err(error) => row.why = error.to_string(),
-        }
-        row
-    }
-
-    fn sheet(&self, drive: &Drive, torque_n_m: Option<f64>, positions: usize, row: &mut VariantRow) {
-        let loads = self.plan.loads(drive, row.generator, torque_n_m);
-        let temperature_c = drive.temperature.reference_c;
-        let (mut sheet, done) = data_sheet(drive, row.generator, temperature_c, loads, positions, self.plan.solver());
-        match done {
-            Ok(()) => {
-                row.status = RunStatus::Converged;
-                // The search for it ends at the largest load.
-                sheet.last_stable_n_m = Some(loads.largest_n_m);
-            }
-            Err(error) => {
-                row.status = if error.is_bad_input() { RunStatus::Refused } else { RunStatus::Failed };
-                row.why = error.to_string();
-            }
-        }
-        let cautions = sheet.looked().cautions();
-        row.cautions = cautions.iter().map(|caution| caution.words.as_str()).collect::<Vec<_>>().join("; ");
-        let figures = FIGURES.iter().map(|(_, of)| of(&sheet).unwrap_or(f64::NAN));
-        row.figures = [loads.t1_n_m, loads.t2_n_m, loads.largest_n_m].into_iter().chain(figures).collect();
-    }
-
-    fn kernels(&self, drive: &Drive, response: &Response, model: &KernelModel, row: &mut VariantRow) {
-        let column = |field: &str| self.plan.columns.iter().position(|column| column == field);
-        let mut values = Vec::new();
-        for parabola in &response.parabolas {
-            // A field that the plan no longer sets is that of the middle drive.
-            let Some(k) = column(&parabola.field) else {
-                values.push(parabola.at[1]);
-                continue;
-            };
-            let text = &self.plan.variants[row.variant][k];
-            match text.parse() {
-                Ok(value) => values.push(value),
-                Err(_) => {
-                    row.why = format!("{}: found {text:?}, allowed: a number", parabola.field);
-                    return;
-                }
-            }
-        }
-        row.status = RunStatus::Converged;
-        row.figures = model.figures(&drive.as_built, &values);
-    }
+    row.status = RunStatus::Converged;
+    row.figures = model.figures(&drive.as_built, &values);
 }
 
 /// A file of results that rows are appended to, in their order.
-struct Journal<'a> {
-    plan: &'a VariantPlan,
+struct Journal {
     file: File,
     next: usize,
-    waiting: BTreeMap<usize, VariantRow>,
+    /// Lines that were computed before the one that is next.
+    waiting: BTreeMap<usize, Vec<u8>>,
 }
 
-impl Journal<'_> {
-    /// Takes a row, and writes all that are next.
-    fn take(&mut self, place: usize, row: VariantRow) -> io::Result<()> {
-        self.waiting.insert(place, row);
-        while let Some(row) = self.waiting.remove(&self.next) {
-            self.file.write_all(&row.line(self.plan)?)?;
+impl Journal {
+    /// Takes a line, and writes all that are next.
+    fn take(&mut self, place: usize, line: Vec<u8>) -> io::Result<()> {
+        self.waiting.insert(place, line);
+        while let Some(line) = self.waiting.remove(&self.next) {
+            self.file.write_all(&line)?;
             self.next += 1;
         }
         Ok(())
@@ -288,32 +276,29 @@ pub fn run(
     file.lock().map_err(failed)?;
     let mut text = Vec::new();
     file.read_to_end(&mut text).map_err(failed)?;
-    let jobs: Vec<(usize, usize)> = (variants * (shard.number - 1) / shard.of..variants * shard.number / shard.of)
-        .flat_map(|variant| (0..generators).map(move |g| (variant, g)))
-        .collect();
-    let (rows, mut end) = rows_of(&path, &text, plan)?;
-    let expected =
-        |row: &VariantRow, (variant, g): (usize, usize)| (row.variant, row.generator) == (variant, plan.generators[g]);
-    let there = rows.len();
-    if there > jobs.len() || rows.iter().zip(&jobs).any(|(row, job)| !expected(row, *job)) {
+    // A run is a variant with a generator, by variant and then by generator.
+    let [from, to] = [shard.number - 1, shard.number].map(|number| variants * number / shard.of * generators);
+    let run_at = |place: usize| (place / generators, plan.generators[place % generators]);
+    let (rows, end) = rows_of(&path, &text, plan)?;
+    let next = from + rows.len();
+    if next > to || !rows.iter().zip(from..).all(|(row, place)| (row.variant, row.generator) == run_at(place)) {
         return Err(PlanError::BadInput(format!("{}: not the rows of this shard; remove it", path.display())));
     }
+    file.set_len(end).and_then(|()| file.seek(SeekFrom::End(0))).map_err(failed)?;
     if end == 0 {
-        let line = header(plan).join(",") + "\n";
-        file.rewind().and_then(|()| file.write_all(line.as_bytes())).map_err(failed)?;
-        end = line.len() as u64;
+        file.write_all((header(plan).join(",") + "\n").as_bytes()).map_err(failed)?;
     }
-    file.set_len(end).and_then(|()| file.seek(SeekFrom::Start(end))).map_err(failed)?;
-    let evaluator = Evaluator::new(plan);
-    let journal = Mutex::new(Journal { plan, file, next: there, waiting: BTreeMap::new() });
-    let missing = (there..jobs.len()).collect::<Vec<usize>>().into_iter();
-    missing.par_bridge().try_for_each(|place| {
-        let row = evaluator.row(jobs[place].0, jobs[place].1);
+    let models = plan.models();
+    let journal = Mutex::new(Journal { file, next, waiting: BTreeMap::new() });
+    (next..to).collect::<Vec<_>>().into_iter().par_bridge().try_for_each(|place| {
+        let (variant, generator) = run_at(place);
+        let row = computed(plan, variant, generator, models.get(place % generators));
+        let line = row.line(plan)?;
         let mut journal = journal.lock().unwrap_or_else(PoisonError::into_inner);
-        done(journal.next + journal.waiting.len() + 1, jobs.len(), &row);
-        journal.take(place, row).map_err(failed)
+        done(journal.next + journal.waiting.len() + 1 - from, to - from, &row);
+        journal.take(place, line).map_err(failed)
     })?;
     let journal = journal.into_inner().unwrap_or_else(PoisonError::into_inner);
     journal.file.sync_all().map_err(failed)?;
-    Ok(Ran { there, computed: jobs.len() - there })
+    Ok(Ran { there: rows.len(), computed: to - next })
 }

@@ -4,6 +4,7 @@ use std::fs;
 use super::draw::{Drawn, draw, sets};
 use super::model::{FIGURES, Parabola, Response, SHEET, STATE, WAVE};
 use super::plan::{HowComputed, OfOne};
+use super::tolerance::{Distribution, DistributionForm, ToleranceActs};
 use super::*;
 use crate::kernels::{Eccentric, KERNELS_SCHEMA, Kernels, LoadKernels, WheelKernels};
 use crate::stated::Stated;
@@ -88,10 +89,8 @@ fn plan_of(text: &str, draws: usize) -> VariantPlan {
 
 fn planned(of: &Tolerances, response: Response, draws: usize) -> VariantPlan {
     let split = |set: String| set.split_once('=').map(|(path, value)| (path.to_owned(), value.to_owned())).unwrap();
-    let lines: Vec<Vec<(String, String)>> = draw(&of.list, &of.drive, draws, 1)
-        .iter()
-        .map(|one| sets(&of.list, one).into_iter().map(split).collect())
-        .collect();
+    let lines: Vec<Vec<(String, String)>> =
+        draw(&of.list, draws, 1).iter().map(|one| sets(&of.list, one).into_iter().map(split).collect()).collect();
     let columns = lines[0].iter().map(|(path, _)| path.clone()).collect();
     let variants = lines.into_iter().map(|line| line.into_iter().map(|(_, value)| value).collect()).collect();
     let by = HowComputed::Kernels { torques_n_m: [10.0, 1.0], of: vec![OfOne { kernels: kernels(), response }] };
@@ -119,8 +118,8 @@ fn row(plan: &VariantPlan, variant: usize, figures: &[(&str, f64)]) -> VariantRo
     for (name, value) in [("rigid_gap_um", 1.0), ("largest_n_m", 200.0)].iter().chain(figures) {
         all[plan.figure(name).unwrap()] = *value;
     }
-    let (why, cautions) = (String::new(), String::new());
-    VariantRow { variant, generator: GeneratorKind::Cam, status: RunStatus::Converged, figures: all, why, cautions }
+    let empty = VariantRow::empty(plan, variant, GeneratorKind::Cam);
+    VariantRow { status: RunStatus::Converged, figures: all, ..empty }
 }
 
 #[test]
@@ -196,20 +195,20 @@ fn the_example_is_read_and_mistakes_are_named_by_line_field_value_and_what_is_al
 
 #[test]
 fn a_distribution_is_truncated_at_its_limits() {
-    let within = Distribution { law: DistributionForm::Normal { mean: 5.0, std: 1.0 }, limits: [5.0, 6.0] };
+    let within = Distribution { form: DistributionForm::Normal, mean: 5.0, std: 1.0, limits: [5.0, 6.0] };
     // Half of those between 0 and 1 standard deviation lie below 0.4419 (tables: 0.5 + 0.3413 / 2).
     assert!((within.quantile(0.5) - 5.4419).abs() < 1e-3);
     assert!((within.quantile(1e-9) - 5.0).abs() < 1e-6 && (within.quantile(1.0 - 1e-9) - 6.0).abs() < 1e-6);
-    let size = Distribution { law: DistributionForm::Rayleigh { std: 2.0 }, limits: [0.0, 11.0] };
+    let size = Distribution { form: DistributionForm::Rayleigh, mean: 0.0, std: 2.0, limits: [0.0, 11.0] };
     assert!((size.quantile(0.95) - 2.0 * (-2.0 * 0.05f64.ln()).sqrt()).abs() < 1e-4);
 }
 
 #[test]
 fn drawn_drives_fill_the_tolerances_and_differ() {
     let of = tolerances(&format!("{ECCENTRIC}{TEETH}{THICK}"));
-    let all = draw(&of.list, &of.drive, 64, 7);
-    assert_eq!(draw(&of.list, &of.drive, 64, 7), all);
-    assert_ne!(draw(&of.list, &of.drive, 64, 8), all);
+    let all = draw(&of.list, 64, 7);
+    assert_eq!(draw(&of.list, 64, 7), all);
+    assert_ne!(draw(&of.list, 64, 8), all);
     // One of 64 drives in each sixty-fourth of the sizes.
     let share = |drive: &Vec<Drawn>| 64.0 * (1.0 - (-0.5 * (drive[0].value / 1.5_f64).powi(2)).exp());
     let mut cells: Vec<usize> = all.iter().map(|drive| share(drive) as usize).collect();
@@ -236,7 +235,7 @@ fn harmonics_of_a_field_are_one_cell() {
         )
     };
     let of = tolerances(&format!("{}{}", one(2), one(3)));
-    let drawn = &draw(&of.list, &of.drive, 8, 1)[0];
+    let drawn = &draw(&of.list, 8, 1)[0];
     let built = Drive::hhd_95().with_sets(sets(&of.list, drawn).iter().map(String::as_str)).unwrap();
     let found: Vec<(u32, f64)> =
         built.as_built.flexspline_pitch_harmonics.iter().map(|h| (h.order, h.amplitude_um)).collect();
@@ -246,7 +245,7 @@ fn harmonics_of_a_field_are_one_cell() {
 #[test]
 fn errors_of_single_pitches_add_up_and_close() {
     let of = tolerances(&TEETH.replace("std", "errors = \"pitch\"\nstd"));
-    let teeth = &draw(&of.list, &of.drive, 8, 1)[0][0].teeth_um;
+    let teeth = &draw(&of.list, 8, 1)[0][0].teeth_um;
     let pitches: Vec<f64> = (0..188).map(|k| teeth[(k + 1) % 188] - teeth[k]).collect();
     assert!(mean(&pitches).abs() < 1e-12 && (std_dev(&pitches) / 2.0 - 1.0).abs() < 0.2);
     assert!(std_dev(teeth) > 3.0, "a random walk goes far");
@@ -283,7 +282,7 @@ fn kernels_agree_with_fem() {
     let of = tolerances(include_str!("../../../../examples/sweep/teeth.toml"));
     let settings = PlanSettings { draws: Some(8), seed: 1, mesh: MeshLevel::Coarse };
     let plan = VariantPlan::of_tolerances(&of, settings, &|_, _, _| ()).unwrap();
-    let HowComputed::Kernels { torques_n_m, of: kinds } = plan.by() else { panic!("no kernels") };
+    let HowComputed::Kernels { torques_n_m, of: kinds } = &plan.by else { panic!("no kernels") };
     let model = model::KernelModel::new(&kinds[0].kernels, kinds[0].response.clone(), *torques_n_m);
     let places: Vec<f64> = (0..5).map(|j| 95.0 * f64::from(j) / 5.0).collect();
     let by_fem = |drive: &Drive| -> Vec<f64> {
@@ -440,8 +439,8 @@ fn variants_have_the_data_sheets_of_their_drives() {
     let rims = of_fields(&["flexspline.rim_thickness_mm=-1,1.4,2.2"], &[GeneratorKind::TwoRoller]).unwrap();
     let sweep = swept(&rims, Judge::default());
     assert_eq!((sweep.converged, sweep.refused), (2, 1));
-    assert!(sweep.rows[0].0.why.contains("rim_thickness_mm") && sweep.rows[0].0.figures.iter().all(|x| x.is_nan()));
-    let of = |name: &str| [1, 2].map(|k| sweep.rows[k].0.figures[rims.figure(name).unwrap()]);
+    assert!(sweep.rows[0].why.contains("rim_thickness_mm") && sweep.rows[0].figures.iter().all(|x| x.is_nan()));
+    let of = |name: &str| [1, 2].map(|k| sweep.rows[k].figures[rims.figure(name).unwrap()]);
     let [thin, thick] = of("k1_n_m_per_rad");
     assert!(thick > 2.0 * thin);
     let [thin, thick] = of("wind_up_arcsec");
@@ -450,8 +449,8 @@ fn variants_have_the_data_sheets_of_their_drives() {
     assert!(thick > thin);
     let rollers = of_fields(&["generator.roller_diameter_mm=40"], &[GeneratorKind::Cam, GeneratorKind::FourRoller]);
     let sweep = swept(&rollers.unwrap(), Judge::default());
-    assert_eq!(sweep.rows.iter().map(|(row, ..)| row.status.name()).collect::<Vec<_>>(), ["converged", "refused"]);
-    assert!(sweep.rows[1].0.why.contains("too large for the four-roller generator"));
+    assert_eq!(sweep.rows.iter().map(|row| row.status.name()).collect::<Vec<_>>(), ["converged", "refused"]);
+    assert!(sweep.rows[1].why.contains("too large for the four-roller generator"));
 }
 
 #[test]
@@ -479,10 +478,10 @@ fn constraints_leave_out_and_the_front_is_pareto_optimal() {
     let constraints = vec!["max_von_mises_mpa=..400".parse().unwrap()];
     let judge = Judge { constraints, targets: vec![least("kinematic_error_pp_arcsec"), least("max_von_mises_mpa")] };
     let judge = judge.of(&plan).unwrap();
-    let meet = judge.meet(&plan, &rows);
+    judge.mark(&plan, &mut rows);
     // The second interferes, the third is beaten by the fifth, the fourth breaks the constraint.
-    assert_eq!(meet, [true, false, true, false, true]);
-    assert_eq!(judge.front(&plan, &rows, &meet), [true, false, false, false, true]);
+    assert_eq!(rows.iter().map(|row| row.meets).collect::<Vec<_>>(), [true, false, true, false, true]);
+    assert_eq!(rows.iter().map(|row| row.is_front).collect::<Vec<_>>(), [true, false, false, false, true]);
 }
 
 /// The variant made worse has the smaller error where it was looked at; it is compared with those made alike alone.
@@ -491,10 +490,11 @@ fn variants_are_compared_with_those_made_alike() {
     let vary = ["flexspline.rim_thickness_mm=1.0,1.2", "as_built.circular_spline_eccentricity_um=0,10"];
     let plan = of_fields(&vary, &[GeneratorKind::Cam]).unwrap();
     let errors = [0.380, 0.324, 0.5, 0.3].iter().enumerate();
-    let rows: Vec<VariantRow> = errors.map(|(k, e)| row(&plan, k, &[("kinematic_error_pp_arcsec", *e)])).collect();
+    let mut rows: Vec<VariantRow> = errors.map(|(k, e)| row(&plan, k, &[("kinematic_error_pp_arcsec", *e)])).collect();
     let targets = vec![("kinematic_error_pp_arcsec".to_owned(), Sense::Least)];
-    let judge = Judge { constraints: Vec::new(), targets };
-    assert_eq!(judge.front(&plan, &rows, &[true; 4]), [true, false, false, true]);
+    Judge { constraints: Vec::new(), targets }.mark(&plan, &mut rows);
+    assert!(rows.iter().all(|row| row.meets));
+    assert_eq!(rows.iter().map(|row| row.is_front).collect::<Vec<_>>(), [true, false, false, true]);
 }
 
 #[test]

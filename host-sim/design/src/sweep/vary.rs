@@ -15,24 +15,10 @@ const MOST_VALUES: usize = 1000;
 pub struct Vary {
     /// Path of the field, such as `flexspline.rim_thickness_mm`.
     pub path: String,
-    /// Its values.
-    pub values: VariedValues,
-}
-
-/// Values of a field.
-#[derive(Debug, Clone, PartialEq)]
-pub enum VariedValues {
-    /// From one end to the other.
-    Range {
-        /// First end.
-        from: f64,
-        /// Last end.
-        to: f64,
-        /// Values of a grid, both ends among them; 1 or more.
-        count: usize,
-    },
-    /// These, as they are written.
-    List(Vec<String>),
+    /// Its values on a grid, as a drive file would have them; both ends of a range are among them.
+    pub values: Vec<String>,
+    /// The ends of a range.
+    range: Option<[f64; 2]>,
 }
 
 /// A `PATH=VALUES` that cannot be read.
@@ -56,35 +42,24 @@ impl FromStr for Vary {
         if path.is_empty() {
             return Err(wrong("which names no field"));
         }
-        let values = match values.split_once("..") {
-            Some((from, rest)) => {
-                let (to, count) = match rest.split_once(':') {
-                    None => (rest, USUAL_VALUES),
-                    Some((to, count)) => {
-                        (to, count.trim().parse().map_err(|_| wrong("whose number of values is no whole number"))?)
-                    }
-                };
-                if rest.starts_with('.') {
-                    return Err(wrong("which has more than two points"));
-                }
-                let number = |end: &str| end.trim().parse::<f64>().ok().filter(|end| end.is_finite());
-                let (Some(from), Some(to)) = (number(from), number(to)) else {
-                    return Err(wrong("whose ends are not two numbers"));
-                };
-                if !(1..=MOST_VALUES).contains(&count) {
-                    return Err(wrong("which asks for that many values"));
-                }
-                VariedValues::Range { from, to, count }
+        let Some((from, rest)) = values.split_once("..") else {
+            let list = apart(values);
+            if list.iter().any(String::is_empty) {
+                return Err(wrong("which has an empty value"));
             }
-            None => {
-                let list = apart(values);
-                if list.iter().any(String::is_empty) {
-                    return Err(wrong("which has an empty value"));
-                }
-                VariedValues::List(list)
-            }
+            return Ok(Vary { path: path.to_owned(), values: list, range: None });
         };
-        Ok(Vary { path: path.to_owned(), values })
+        let (to, count) = rest.split_once(':').map_or((rest, Ok(USUAL_VALUES)), |(to, n)| (to, n.trim().parse()));
+        let number = |end: &str| end.trim().parse::<f64>().ok().filter(|end| end.is_finite());
+        // A third point would be one of the number.
+        let (Some(from), Some(to), false) = (number(from), number(to), rest.starts_with('.')) else {
+            return Err(wrong("whose ends are not two numbers"));
+        };
+        let count = count.ok().filter(|count| (1..=MOST_VALUES).contains(count));
+        let count = count.ok_or_else(|| wrong("whose number of values is not allowed"))?;
+        let at = |k: usize| from + (to - from) * k as f64 / (count - 1).max(1) as f64;
+        let values = (0..count).map(|k| written(at(k))).collect();
+        Ok(Vary { path: path.to_owned(), values, range: Some([from, to]) })
     }
 }
 
@@ -111,37 +86,21 @@ pub fn is_error_of_making(path: &str) -> bool {
 }
 
 impl Vary {
-    /// Its values on a grid, as a drive file would have them.
-    pub fn grid(&self) -> Vec<String> {
-        match &self.values {
-            VariedValues::Range { from, count: 1, .. } => vec![written(*from)],
-            VariedValues::Range { from, to, count } => {
-                let at = |k: usize| from + (to - from) * k as f64 / (count - 1) as f64;
-                (0..*count).map(|k| written(at(k))).collect()
-            }
-            VariedValues::List(list) => list.clone(),
-        }
-    }
-
     /// A value that it takes more than once; numbers are compared as numbers.
-    pub fn repeated(&self) -> Option<String> {
-        let values = match &self.values {
-            VariedValues::Range { from, to, count } if from == to && *count > 1 => return Some(written(*from)),
-            VariedValues::Range { .. } => return None,
-            VariedValues::List(list) => list,
-        };
+    pub(super) fn repeated(&self) -> Option<&String> {
         let same = |a: &String, b: &String| match (a.parse::<f64>(), b.parse::<f64>()) {
             (Ok(a), Ok(b)) => a == b,
             _ => a == b,
         };
-        (1..values.len()).find(|k| values[..*k].iter().any(|other| same(other, &values[*k]))).map(|k| values[k].clone())
+        let is_again = |k: &usize| self.values[..*k].iter().any(|other| same(other, &self.values[*k]));
+        (1..self.values.len()).find(is_again).map(|k| &self.values[k])
     }
 
     /// Its value at a place of 0 (first) to 1 (excluded).
     fn at(&self, place: f64) -> String {
-        match &self.values {
-            VariedValues::Range { from, to, .. } => written(from + (to - from) * place),
-            VariedValues::List(list) => list[((place * list.len() as f64) as usize).min(list.len() - 1)].clone(),
+        match self.range {
+            Some([from, to]) => written(from + (to - from) * place),
+            None => self.values[((place * self.values.len() as f64) as usize).min(self.values.len() - 1)].clone(),
         }
     }
 }
@@ -153,14 +112,13 @@ fn written(value: f64) -> String {
     format!("{rounded}")
 }
 
-/// Every combination of the grids of all fields; the last field changes fastest.
-pub fn grid(vary: &[Vary]) -> Vec<Vec<String>> {
+/// Every combination of the values of all fields; the last field changes fastest.
+pub(super) fn grid(vary: &[Vary]) -> Vec<Vec<String>> {
     vary.iter().fold(vec![Vec::new()], |variants, field| {
-        let values = field.grid();
-        variants
-            .iter()
-            .flat_map(|variant| values.iter().map(|value| variant.iter().cloned().chain([value.clone()]).collect()))
-            .collect()
+        let with = |variant: &Vec<String>| {
+            field.values.iter().map(|value| [variant.as_slice(), &[value.clone()]].concat()).collect::<Vec<_>>()
+        };
+        variants.iter().flat_map(with).collect()
     })
 }
 
@@ -193,12 +151,12 @@ mod tests {
 
     #[test]
     fn ranges_and_lists_are_read_as_they_are_written() {
-        assert_eq!(read("generator.w0_mm=0.4..0.5:3").grid(), ["0.4", "0.45", "0.5"]);
-        assert_eq!(read("flexspline.teeth=180..220:3").grid(), ["180", "200", "220"]);
-        assert_eq!(read("sleeve.kind=cup, hat").grid(), ["cup", "hat"]);
-        assert_eq!(read("a.b=1..2").grid().len(), USUAL_VALUES);
-        assert_eq!(read("a.b=-1..-2:1").grid(), ["-1"]);
-        assert_eq!(read("a.b=1e-3..2e-3:2").grid(), ["0.001", "0.002"]);
+        assert_eq!(read("generator.w0_mm=0.4..0.5:3").values, ["0.4", "0.45", "0.5"]);
+        assert_eq!(read("flexspline.teeth=180..220:3").values, ["180", "200", "220"]);
+        assert_eq!(read("sleeve.kind=cup, hat").values, ["cup", "hat"]);
+        assert_eq!(read("a.b=1..2").values.len(), USUAL_VALUES);
+        assert_eq!(read("a.b=-1..-2:1").values, ["-1"]);
+        assert_eq!(read("a.b=1e-3..2e-3:2").values, ["0.001", "0.002"]);
     }
 
     #[test]
@@ -222,7 +180,7 @@ mod tests {
 
     #[test]
     fn a_value_that_comes_twice_is_found_however_it_is_written() {
-        let repeated = |text: &str| read(text).repeated();
+        let repeated = |text: &str| read(text).repeated().cloned();
         assert_eq!(repeated("a=1..1").as_deref(), Some("1"));
         assert_eq!(repeated("a=1,2,1.0").as_deref(), Some("1.0"));
         assert_eq!(repeated("a=cup,hat,cup").as_deref(), Some("cup"));
