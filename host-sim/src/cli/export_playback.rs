@@ -10,7 +10,7 @@ use super::context::{Context, image_file, table_of};
 use super::export::Format;
 use super::logs::LogOptions;
 use super::replay::measured;
-use super::{Failure, bad_input};
+use super::{Failure, bad_input, within};
 use flexspline_base::output::Outputs;
 use flexspline_export::playback::{BOTH, Curve, MAX_TABLE_BYTES, PlaybackResidual, TableSection, cfs, fprime};
 use flexspline_identify::replay::{RowsRead, replay};
@@ -100,13 +100,11 @@ impl PlaybackOptions {
         let table = table_of(tables, &image)?;
         let section = section_of(&table, load)?;
         let mut curve = None;
-        let (files, mut notes) = match format {
+        let files = match format {
             Format::Cfs if image.len() > MAX_TABLE_BYTES && !self.force => {
-                return Err(Failure::BadInput(format!(
-                    "the image has {} bytes, more than the default of CFE_PLATFORM_TBL_MAX_SNGL_TABLE_SIZE, \
-                     {MAX_TABLE_BYTES}; --force writes it all the same",
-                    image.len()
-                )));
+                let what = "more than the default of CFE_PLATFORM_TBL_MAX_SNGL_TABLE_SIZE";
+                let what = format!("the image has {} bytes, {what}, {MAX_TABLE_BYTES}", image.len());
+                return Err(Failure::BadInput(format!("{what}; --force writes it all the same")));
             }
             Format::Cfs => {
                 let ids = [self.spacecraft_id, self.processor_id].map(Option::unwrap_or_default);
@@ -123,15 +121,24 @@ impl PlaybackOptions {
                     _ => &BOTH[..],
                 };
                 let made = Curve::new(section, self.points_per_turn.unwrap_or(32), directions);
-                (vec![curve.insert(made).csv(section)], Vec::new())
+                curve.insert(made).csv(section)
             }
         };
         let curve = curve.as_ref();
-        let playback = self.data.as_ref().map(|data| self.judge(data, section, curve, &mut notes)).transpose()?;
+        let judged = self.data.as_ref().map(|data| self.judge(data, section, curve)).transpose()?;
+        let (playback, notes) = judged.unzip();
         let out = context.out()?;
-        self.refuse_foreign(out, &files)?;
-        let mut outputs = Outputs::new();
         let written: Vec<PathBuf> = files.iter().map(|(name, _)| out.join(name)).collect();
+        let summary = out.join("playback.json");
+        let own = |old: Vec<u8>| old.windows(10).any(|word| word.eq_ignore_ascii_case(b"flexspline"));
+        let is_foreign = |path: &&PathBuf| !self.force && std::fs::read(path).is_ok_and(|old| !own(old));
+        if let Some(path) = written.iter().chain([&summary]).find(is_foreign) {
+            return Err(Failure::BadInput(format!(
+                "{}: exists, and is not of this program; choose another --out, or --force writes over it",
+                path.display()
+            )));
+        }
+        let mut outputs = Outputs::new();
         for (path, (_, bytes)) in written.iter().zip(&files) {
             outputs.file(path, |to| to.write_all(bytes))?;
         }
@@ -145,9 +152,9 @@ impl PlaybackOptions {
             temperature_c: section.temperature_c,
             model: curve.map(|curve| curve.on_model(section)),
             playback,
-            notes,
+            notes: notes.unwrap_or_default(),
         };
-        outputs.json(&out.join("playback.json"), &played)?;
+        outputs.json(&summary, &played)?;
         outputs.finish()?;
         context.print(&played, || text(&played))
     }
@@ -158,60 +165,43 @@ impl PlaybackOptions {
         data: &Path,
         section: TableSection<'_>,
         curve: Option<&Curve>,
-        notes: &mut Vec<String>,
-    ) -> Result<PlaybackResidual, Failure> {
-        let RowsRead { rows, faults, notes: noticed } =
-            measured(data, &self.logs, section.table, section.temperature_c)?;
+    ) -> Result<(PlaybackResidual, Vec<String>), Failure> {
+        let RowsRead { rows, faults, notes } = measured(data, &self.logs, section.table, section.temperature_c)?;
         let (replayed, summary) = replay(section.table, &rows);
-        notes.extend(faults.into_iter().map(|fault| fault.what).chain(noticed).chain(summary.remarks));
+        let faults = faults.into_iter().map(|fault| fault.what);
+        let mut notes: Vec<String> = faults.chain(notes).chain(summary.remarks).collect();
         let extrapolated = summary.rows_by_quality[2];
         if extrapolated > 0 {
             let all = rows.len();
             notes.push(format!("{extrapolated} of {all} rows lie beyond the loads or temperatures of the table"));
         }
         let residual = PlaybackResidual::on_data(section, &rows, &replayed, curve);
+        let PlaybackResidual { rms_uncorrected_arcsec: error, rms_played_arcsec: left, rms_core_arcsec: core, .. } =
+            residual;
         if residual.rows < FEWEST_ROWS {
             let what = format!("found {} rows in the directions of the curve", residual.rows);
             return Err(Failure::BadInput(format!("--data: {what}; allowed: at least {FEWEST_ROWS}")));
         }
-        let most = POINTLESS * residual.rms_uncorrected_arcsec;
-        if residual.rms_played_arcsec <= most {
-            return Ok(residual);
+        if left <= POINTLESS * error {
+            return Ok((residual, notes));
         }
-        let why = if residual.rms_core_arcsec <= most {
+        let why = if core <= POINTLESS * error {
             "so the data belong to it, and hold what this playback does not know: other loads, or play"
         } else {
             "so the data do not belong to this table: another unit, another zero or sign of the generator, the output \
              or the error (--columns error=NAME:-arcsec), another ratio"
         };
         let what = format!(
-            "the unit's data: of {:.2} arcsec rms this playback leaves {:.2}, more than {:.0} %; the core leaves {:.2} \
-             with the same table, {why}",
-            residual.rms_uncorrected_arcsec,
-            residual.rms_played_arcsec,
-            100.0 * POINTLESS,
-            residual.rms_core_arcsec
+            "the unit's data: of {error:.2} arcsec rms this playback leaves {left:.2}, more than {:.0} %; the core \
+             leaves {core:.2} with the same table, {why}",
+            100.0 * POINTLESS
         );
         if !self.force {
             let known: String = notes.iter().map(|note| format!("; {note}")).collect();
             return Err(Failure::BadInput(format!("{what}{known}; --force writes it all the same")));
         }
         notes.push(format!("written by --force: {what}"));
-        Ok(residual)
-    }
-
-    /// Refuses to write over files that do not name this program.
-    fn refuse_foreign(&self, out: &Path, files: &[(&'static str, Vec<u8>)]) -> Result<(), Failure> {
-        let own = |old: Vec<u8>| old.windows(10).any(|word| word.eq_ignore_ascii_case(b"flexspline"));
-        let mut names = files.iter().map(|(name, _)| *name).chain(["playback.json"]);
-        let foreign = |name: &&str| !self.force && std::fs::read(out.join(name)).is_ok_and(|old| !own(old));
-        match names.find(foreign) {
-            Some(name) => Err(Failure::BadInput(format!(
-                "{}: exists, and is not of this program; choose another --out, or --force writes over it",
-                out.join(name).display()
-            ))),
-            None => Ok(()),
-        }
+        Ok((residual, notes))
     }
 }
 
@@ -219,18 +209,11 @@ impl PlaybackOptions {
 fn section_of<'a>(table: &'a Table<'a>, load: [Option<f64>; 2]) -> Result<TableSection<'a>, Failure> {
     let within = |option: &str, value: Option<f64>, range: [f32; 2]| {
         let [least, most] = range.map(f64::from);
-        let value = value.unwrap_or(0.5 * (least + most));
-        if (least..=most).contains(&value) {
-            return Ok(value);
-        }
-        let range = format!("{least} to {most}, the range of the table");
-        Err(Failure::BadInput(format!("{option}: found {value}; allowed: {range}")))
+        within(option, value.unwrap_or(0.5 * (least + most)), least, most)
     };
-    Ok(TableSection {
-        table,
-        torque_n_m: within("--torque-n-m", load[0], table.torque_range_n_m())?,
-        temperature_c: within("--temperature-c", load[1], table.temperature_range_c())?,
-    })
+    let torque_n_m = within("--torque-n-m", load[0], table.torque_range_n_m())?;
+    let temperature_c = within("--temperature-c", load[1], table.temperature_range_c())?;
+    Ok(TableSection { table, torque_n_m, temperature_c })
 }
 
 fn text(played: &Played) -> String {

@@ -74,6 +74,14 @@ fn bad_input(error: impl std::fmt::Display) -> Failure {
     Failure::BadInput(error.to_string())
 }
 
+/// The number of an option, from the least to the largest that it may be.
+fn within(option: &str, found: f64, least: f64, most: f64) -> Result<f64, Failure> {
+    if (least..=most).contains(&found) {
+        return Ok(found);
+    }
+    Err(Failure::BadInput(format!("{option}: found {found}; allowed: {least} to {most}")))
+}
+
 impl From<OutputError> for Failure {
     fn from(error: OutputError) -> Failure {
         match error.source.kind() {
@@ -152,35 +160,32 @@ const USUAL_PATH: [(&str, &str); 3] = [
 /// The drive where none is named.
 const USUAL_DRIVE: &str = "HHD-95";
 
-/// Names that left, as typed, and what to type now.
-const RENAMED: [(&str, &str); 12] = [
+/// Commands that left, and what to type now.
+const RENAMED: [(&str, &str); 5] = [
     ("campaign", "flexspline sweep"),
     ("study", "flexspline sweep"),
     ("kernels", "flexspline tables --kernels"),
     ("man", "flexspline help COMMAND"),
     ("completions", "flexspline help COMMAND"),
-    ("--format beckhoff", "--format csv --tables FILE.fxt, then examples/playback/beckhoff.py"),
-    ("--format eqmod", "--format csv --tables FILE.fxt, then examples/playback/eqmod.py"),
-    ("--format linuxcnc", "--format csv --tables FILE.fxt, then examples/playback/linuxcnc.py"),
-    ("--format moteus", "--format csv --tables FILE.fxt, then examples/playback/moteus.py"),
-    ("--format odrive", "--format csv --tables FILE.fxt, then examples/playback/odrive.py"),
-    ("--format onstepx", "--format csv --tables FILE.fxt, then examples/playback/onstepx.py"),
-    ("--format ros2", "--format csv --tables FILE.fxt, then examples/playback/ros2.py"),
 ];
+/// Formats of `export` that left; each has a script in examples/playback.
+const SCRIPTED: [&str; 7] = ["beckhoff", "eqmod", "linuxcnc", "moteus", "odrive", "onstepx", "ros2"];
 
-/// One line for a name of [`RENAMED`] that the command line was refused for.
+/// One line for a command or a format that left and that the command line was refused for.
 fn renamed(error: &clap::Error) -> Option<String> {
     let text = |kind: ContextKind| match error.get(kind) {
         Some(ContextValue::String(text)) => Some(text.as_str()),
         _ => None,
     };
-    let typed = match text(ContextKind::InvalidSubcommand) {
-        Some(command) => command.to_owned(),
-        // The argument reads `--format <FORMAT>`.
-        None => format!("{} {}", text(ContextKind::InvalidArg)?.split(' ').next()?, text(ContextKind::InvalidValue)?),
-    };
-    let (old, new) = RENAMED.iter().find(|(old, _)| *old == typed)?;
-    Some(format!("{old} is no more; type {new}"))
+    if let Some(command) = text(ContextKind::InvalidSubcommand) {
+        let (old, new) = RENAMED.iter().find(|(old, _)| *old == command)?;
+        return Some(format!("{old} is no more; type {new}"));
+    }
+    // The argument reads `--format <FORMAT>`.
+    let format = text(ContextKind::InvalidValue).filter(|format| SCRIPTED.contains(format))?;
+    text(ContextKind::InvalidArg).filter(|argument| argument.starts_with("--format "))?;
+    let new = format!("--format csv --tables FILE.fxt, then examples/playback/{format}.py");
+    Some(format!("--format {format} is no more; type {new}"))
 }
 
 /// The definition of the command line.
@@ -233,35 +238,30 @@ enum CliCommand {
 
 /// Options of every command.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Common options")]
 struct Common {
     /// Drive file, or the name of a built-in drive: HHD-95 (ideal), HHD-95-typical (friction, compliances,
     /// tolerances), CUP-95 (a cup), HHD-95-hermetic (a closed sleeve), HHD-95-plane (no third dimension), S-95
     /// (S-shaped teeth)
-    #[arg(
-        long, global = true, value_name = "FILE|NAME", default_value = USUAL_DRIVE, value_hint = ValueHint::FilePath,
-        help_heading = "Common options"
-    )]
+    #[arg(long, global = true, value_name = "FILE|NAME", default_value = USUAL_DRIVE, value_hint = ValueHint::FilePath)]
     drive: String,
     /// Override fields of the drive, for instance flanks.friction_coefficient=0.08; several with commas, or repeated
-    #[arg(long = "set", global = true, value_name = "PATH=VALUE", help_heading = "Common options")]
+    #[arg(long = "set", global = true, value_name = "PATH=VALUE")]
     sets: Vec<String>,
     /// Folder for output files, made if it does not exist [default: out]
-    #[arg(long, global = true, value_name = "DIR", value_hint = ValueHint::DirPath, help_heading = "Common options")]
+    #[arg(long, global = true, value_name = "DIR", value_hint = ValueHint::DirPath)]
     out: Option<PathBuf>,
     /// Print the result as one JSON object, and nothing else, on stdout
-    #[arg(long, global = true, help_heading = "Common options")]
+    #[arg(long, global = true)]
     json: bool,
     /// Threads to use; default: one for each core
-    #[arg(
-        long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024),
-        help_heading = "Common options"
-    )]
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Print no progress and no summary
-    #[arg(short, long, global = true, conflicts_with = "verbose", help_heading = "Common options")]
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
     /// Print more: a line for every increment
-    #[arg(short, long, global = true, help_heading = "Common options")]
+    #[arg(short, long, global = true)]
     verbose: bool,
 }
 
@@ -361,11 +361,13 @@ mod tests {
 
     #[test]
     fn a_name_that_left_says_what_to_type() {
-        for (old, new) in RENAMED {
-            let line = if old.starts_with("--") { format!("export {old}") } else { old.to_owned() };
+        let scripts = SCRIPTED.map(|format| (format!("export --format {format}"), format!("playback/{format}.py")));
+        let commands = RENAMED.map(|(old, new)| (old.to_owned(), new.to_owned()));
+        for (line, new) in commands.into_iter().chain(scripts) {
             let error = parse(format!("flexspline {line}").split(' ')).unwrap_err();
-            let said = renamed(&error).unwrap_or_else(|| panic!("{old}: {error}"));
-            assert!(said.contains(old) && said.contains(new) && said.lines().count() == 1, "{said}");
+            let said = renamed(&error).unwrap_or_else(|| panic!("{line}: {error}"));
+            let old = line.trim_start_matches("export ");
+            assert!(said.contains(old) && said.contains(&new) && said.lines().count() == 1, "{said}");
         }
         for line in ["flexspline tabels", "flexspline export --format vtx", "flexspline export --formt odrive"] {
             assert_eq!(renamed(&parse(line.split(' ')).unwrap_err()), None, "{line}");

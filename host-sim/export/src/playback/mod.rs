@@ -11,11 +11,15 @@ use std::fmt::Write;
 
 use flexspline::{Direction, GeneratorAngle, Table};
 use serde::Serialize;
+use thiserror::Error;
 
-pub use cfs::{MAX_TABLE_BYTES, TableNameError, cfs};
-pub use fprime::{ComponentError, fprime};
+pub use cfs::{MAX_TABLE_BYTES, cfs};
+pub use fprime::fprime;
 
+use flexspline_base::robust::rms;
+use flexspline_base::statistics::mean;
 use flexspline_base::units::ARCSEC_PER_RAD;
+use flexspline_identify::measurement::directions;
 use flexspline_identify::replay::{MeasuredRow, ReplayedRow};
 
 /// Both directions of the output.
@@ -25,11 +29,17 @@ const JUDGE_POINTS: u32 = 32_749;
 /// Most rounds of a fixed-point iteration; the correction changes much less than the angle, so each gains a digit.
 const ROUNDS: usize = 60;
 
-/// Sign of the errors in files that hold the image.
-const SIGN: &str = "that of the core: actual less nominal";
+/// Names and contents of files.
+pub type Files = Vec<(&'static str, Vec<u8>)>;
 
-/// Names and contents of files, and notes for their user.
-pub type Made = (Vec<(&'static str, Vec<u8>)>, Vec<String>);
+/// A name that the other program does not take.
+#[derive(Debug, Error)]
+#[error("{option}: found {found}; allowed: {allowed}")]
+pub struct NameError {
+    option: &'static str,
+    found: String,
+    allowed: &'static str,
+}
 
 /// A table at one load and temperature.
 #[derive(Clone, Copy)]
@@ -42,22 +52,13 @@ pub struct TableSection<'a> {
     pub temperature_c: f64,
 }
 
-/// A point of a section in steady motion.
-struct SectionSample {
-    /// Output angle that the generator leads to through the ratio, rad.
-    led_rad: f64,
-    direction: Direction,
-    /// Output error, rad.
-    error_rad: f64,
-}
-
 impl TableSection<'_> {
-    fn sample(&self, led_rad: f64, direction: Direction) -> SectionSample {
-        let generator = led_rad * self.table.drive().exact_ratio();
-        let generator = GeneratorAngle::from_rad(generator).unwrap_or(GeneratorAngle::ZERO);
+    /// Output error in steady motion where the generator leads the output to `led_rad` through the ratio, rad.
+    fn error_rad(&self, led_rad: f64, direction: Direction) -> f64 {
+        let generator = GeneratorAngle::from_rad(led_rad * self.table.drive().exact_ratio());
         let [torque, temperature] = [self.torque_n_m, self.temperature_c].map(|value| value as f32);
-        let error = self.table.steady_error_rad(generator, torque, temperature, direction);
-        SectionSample { led_rad, direction, error_rad: f64::from(error.unwrap_or(0.0)) }
+        let generator = generator.unwrap_or(GeneratorAngle::ZERO);
+        f64::from(self.table.steady_error_rad(generator, torque, temperature, direction).unwrap_or(0.0))
     }
 
     /// Output turns after which the error repeats: those that take a whole number of generator turns.
@@ -67,25 +68,21 @@ impl TableSection<'_> {
         (1..waves).find(|turns| (drive.exact_ratio() * f64::from(*turns)).fract().abs() < 1e-9).unwrap_or(waves)
     }
 
-    /// Evenly spaced points over the whole period, in each of the directions.
-    fn samples(&self, directions: &[Direction]) -> Vec<SectionSample> {
+    /// Evenly spaced points over the whole period, in each of the directions: led angle, direction, error, rad.
+    fn samples(&self, directions: &[Direction]) -> Vec<(f64, Direction, f64)> {
         let step = TAU * f64::from(self.period_turns()) / f64::from(JUDGE_POINTS);
-        let of = |direction: &Direction| {
-            let direction = *direction;
-            (0..JUDGE_POINTS).map(move |k| self.sample(step * f64::from(k), direction))
+        let sample = |direction: Direction, k: u32| {
+            let led = step * f64::from(k);
+            (led, direction, self.error_rad(led, direction))
         };
-        directions.iter().flat_map(of).collect()
+        directions.iter().flat_map(|direction| (0..JUDGE_POINTS).map(|k| sample(*direction, k))).collect()
     }
 
-    /// Lines of a comment in a file made of this section, each after `prefix`: table, tool, load, sign.
-    fn comment(&self, prefix: &str, sign: &str) -> String {
-        format!(
-            "{prefix}flexspline {} table_id {}\n{prefix}load {} N.m, {} degrees C\n{prefix}sign: {sign}\n",
-            env!("CARGO_PKG_VERSION"),
-            self.table.id(),
-            self.torque_n_m,
-            self.temperature_c
-        )
+    /// Lines of a comment in a file made of this section: table, tool, load, sign.
+    fn comment(&self, sign: &str) -> String {
+        let TableSection { table, torque_n_m, temperature_c } = self;
+        let made = format!("# flexspline {} table_id {}\n", env!("CARGO_PKG_VERSION"), table.id());
+        made + &format!("# load {torque_n_m} N.m, {temperature_c} degrees C\n# sign: {sign}\n")
     }
 }
 
@@ -105,11 +102,10 @@ fn shifted_to(target: f64, shift: impl Fn(f64) -> f64) -> f64 {
 /// Corrections at evenly spaced outputs over the whole period, linear between them.
 #[derive(Debug, Clone)]
 pub struct Curve {
-    directions: Vec<Direction>,
     step_rad: f64,
     mean_arcsec: f64,
-    /// Arcsec, one list for each direction.
-    corrections: Vec<Vec<f64>>,
+    /// Arcsec, by direction.
+    corrections: Vec<(Direction, Vec<f64>)>,
 }
 
 impl Curve {
@@ -118,22 +114,22 @@ impl Curve {
         let turns = f64::from(section.period_turns());
         let points = (section.table.drive().exact_ratio().abs() * turns).round() as u32 * points_per_turn;
         let step_rad = TAU * turns / f64::from(points);
-        let mean_rad = mean(section.samples(directions).iter().map(|sample| sample.error_rad));
+        let errors: Vec<f64> = section.samples(directions).into_iter().map(|(.., error)| error).collect();
+        let mean_rad = mean(&errors);
         let correction = |k: u32, direction: Direction| {
             let asked = step_rad * f64::from(k);
-            let led = shifted_to(asked, |led| section.sample(led, direction).error_rad - mean_rad);
+            let led = shifted_to(asked, |led| section.error_rad(led, direction) - mean_rad);
             // As the file has it.
             ((led - asked) * ARCSEC_PER_RAD * 1e4).round() / 1e4
         };
-        let column = |direction: &Direction| (0..points).map(|k| correction(k, *direction)).collect();
-        let corrections = directions.iter().map(column).collect();
-        Curve { directions: directions.to_vec(), step_rad, mean_arcsec: mean_rad * ARCSEC_PER_RAD, corrections }
+        let column = |direction: &Direction| (*direction, (0..points).map(|k| correction(k, *direction)).collect());
+        Curve { step_rad, mean_arcsec: mean_rad * ARCSEC_PER_RAD, corrections: directions.iter().map(column).collect() }
     }
 
     /// Correction that is in force where the generator leads the output to `led_rad`, arcsec; `None` in a direction
     /// that the curve was not made for.
     fn played_arcsec(&self, led_rad: f64, direction: Direction) -> Option<f64> {
-        let values = &self.corrections[self.directions.iter().position(|known| *known == direction)?];
+        let (_, values) = self.corrections.iter().find(|(known, _)| *known == direction)?;
         let lookup = |asked: f64| {
             let at = (asked / self.step_rad).rem_euclid(values.len() as f64);
             let low = values[at as usize % values.len()];
@@ -145,30 +141,30 @@ impl Curve {
     /// Residual on the table's own model: steady motion at the section's load. The core's is the bound of its inverse.
     pub fn on_model(&self, section: TableSection<'_>) -> PlaybackResidual {
         let bound = f64::from(section.table.inverse_error_bound_rad()) * ARCSEC_PER_RAD;
-        let point = |sample: SectionSample| {
-            let error = sample.error_rad * ARCSEC_PER_RAD;
-            let played = self.played_arcsec(sample.led_rad, sample.direction).unwrap_or(0.0);
-            [error, error + played, 0.0]
+        let directions: Vec<Direction> = self.corrections.iter().map(|(direction, _)| *direction).collect();
+        let point = |(led, direction, error)| {
+            let error = error * ARCSEC_PER_RAD;
+            [error, error + self.played_arcsec(led, direction).unwrap_or(0.0), 0.0]
         };
-        let points: Vec<[f64; 3]> = section.samples(&self.directions).into_iter().map(point).collect();
+        let points: Vec<[f64; 3]> = section.samples(&directions).into_iter().map(point).collect();
         PlaybackResidual { rms_core_arcsec: bound, ..PlaybackResidual::new(&points) }
     }
 
     /// The CSV: output asked for, generator angle before the correction (rad), corrections to be added (arcsec).
-    pub fn csv(&self, section: TableSection<'_>) -> (&'static str, Vec<u8>) {
+    pub fn csv(&self, section: TableSection<'_>) -> Files {
         let ratio = section.table.drive().exact_ratio();
-        let mut text = section.comment("# ", "the correction is added to the output angle asked for");
+        let mut text = section.comment("the correction is added to the output angle asked for");
         let _ = writeln!(text, "# ratio {ratio}\n# mean_error_arcsec {:.4}", self.mean_arcsec);
         text += "output_rad,generator_rad";
-        for direction in &self.directions {
+        for (direction, _) in &self.corrections {
             text += if *direction == Direction::Forward { ",forward_arcsec" } else { ",backward_arcsec" };
         }
-        for k in 0..self.corrections[0].len() {
+        for k in 0..self.corrections[0].1.len() {
             let asked = self.step_rad * k as f64;
             let _ = write!(text, "\n{asked:.9},{:.9}", asked * ratio);
-            self.corrections.iter().for_each(|column| text += &format!(",{:.4}", column[k]));
+            self.corrections.iter().for_each(|(_, column)| text += &format!(",{:.4}", column[k]));
         }
-        ("playback.csv", (text + "\n").into_bytes())
+        vec![("playback.csv", (text + "\n").into_bytes())]
     }
 }
 
@@ -176,11 +172,6 @@ impl Curve {
 fn word(text: &str) -> bool {
     let plain = text.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
     plain && text.as_bytes().first().is_some_and(|byte| !byte.is_ascii_digit())
-}
-
-fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
-    let count = values.len().max(1) as f64;
-    values.sum::<f64>() / count
 }
 
 /// Errors with and without a playback, arcsec.
@@ -203,16 +194,18 @@ pub struct PlaybackResidual {
 impl PlaybackResidual {
     /// Of points with error, residual and residual of the core, arcsec.
     fn new(points: &[[f64; 3]]) -> PlaybackResidual {
-        let means: [f64; 3] = std::array::from_fn(|k| mean(points.iter().map(|point| point[k])));
-        let off = |k: usize| points.iter().map(move |point| point[k] - means[k]);
-        let rms = |k: usize| mean(off(k).map(|value| value * value)).sqrt();
+        let [(mean_left_out_arcsec, error), (_, played), (_, core)] = [0, 1, 2].map(|k| {
+            let values: Vec<f64> = points.iter().map(|point| point[k]).collect();
+            let middle = mean(&values);
+            (middle, values.iter().map(|value| value - middle).collect::<Vec<f64>>())
+        });
         PlaybackResidual {
             rows: points.len(),
-            mean_left_out_arcsec: means[0],
-            rms_uncorrected_arcsec: rms(0),
-            rms_played_arcsec: rms(1),
-            max_played_arcsec: off(1).fold(0.0, |most, value| most.max(value.abs())),
-            rms_core_arcsec: rms(2),
+            mean_left_out_arcsec,
+            rms_uncorrected_arcsec: rms(&error),
+            rms_played_arcsec: rms(&played),
+            max_played_arcsec: played.iter().fold(0.0, |most, value| most.max(value.abs())),
+            rms_core_arcsec: rms(&core),
         }
     }
 
@@ -237,19 +230,11 @@ impl PlaybackResidual {
     }
 }
 
-/// Direction of the output at each row: that of the step to it; at rest, the one before; at the start, the first there
-/// is.
+/// Direction of the output at each row.
 fn directions_of(rows: &[MeasuredRow], ratio: f64) -> Vec<Direction> {
-    let step = |k: usize| {
-        let moved = (rows[k].generator_rad - rows[k - 1].generator_rad) / ratio;
-        (moved != 0.0).then_some(if moved > 0.0 { Direction::Forward } else { Direction::Backward })
-    };
-    let first = (1..rows.len()).find_map(step).unwrap_or(Direction::Forward);
-    let of = |now: &mut Direction, k: usize| {
-        *now = (k > 0).then(|| step(k)).flatten().unwrap_or(*now);
-        Some(*now)
-    };
-    (0..rows.len()).scan(first, of).collect()
+    let generators: Vec<f64> = rows.iter().map(|row| row.generator_rad).collect();
+    let of = |way: f64| if way * ratio > 0.0 { Direction::Forward } else { Direction::Backward };
+    directions(&generators).into_iter().map(of).collect()
 }
 
 #[cfg(test)]

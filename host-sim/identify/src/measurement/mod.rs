@@ -169,7 +169,7 @@ impl Session {
 const TURNED_BACK_RAD: f64 = 0.02;
 
 /// +1 from where an angle last moved forward by more than its noise, -1 backward.
-pub(crate) fn directions(angle: &[f64]) -> Vec<f64> {
+pub fn directions(angle: &[f64]) -> Vec<f64> {
     let Some(&start) = angle.first() else { return Vec::new() };
     // The first clear motion also holds for what comes before it.
     let first = angle.iter().map(|a| a - start).find(|moved| moved.abs() > TURNED_BACK_RAD);
