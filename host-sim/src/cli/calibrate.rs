@@ -8,7 +8,7 @@ use flexspline::Table;
 
 use super::context::{Context, quoted, table_image, table_of};
 use super::logs::LogOptions;
-use super::{Failure, bad_input, names, report, say};
+use super::{Failure, bad_input, report, say};
 use flexspline_base::output::Outputs;
 use flexspline_design::tables::{c_header, rust_source};
 use flexspline_identify::calibrate::{
@@ -30,6 +30,7 @@ use flexspline_report::calibration_report;
 /// with the accuracy to expect. --more reports what to record in addition to the logs. Both write plan.csv and
 /// plan.json.
 #[derive(Debug, Args)]
+#[command(group = ArgGroup::new("planned").args(["plan", "more"]))]
 #[command(group = ArgGroup::new("known").required(true).args(["tables", "model", "ratio"]))]
 #[command(after_help = "\
 Examples:
@@ -45,7 +46,7 @@ pub(super) struct Calibrate {
     #[arg(long, conflicts_with = "logs")]
     plan: bool,
     /// Also report what to record next, after these logs
-    #[arg(long, conflicts_with = "plan")]
+    #[arg(long)]
     more: bool,
     /// Folder of tables made by `flexspline tables`; the one of --generator is the starting point
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
@@ -57,8 +58,7 @@ pub(super) struct Calibrate {
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     ratio: Option<f64>,
     /// Wave generator recorded in the table: two-roller, four-roller, double-disc or cam
-    #[arg(long, value_name = "G", default_value = "cam", value_parser = names::generator())]
-    #[arg(hide_possible_values = true)]
+    #[arg(long, value_name = "G", default_value = "cam")]
     generator: GeneratorKind,
     #[command(flatten)]
     columns: LogOptions,
@@ -73,25 +73,25 @@ pub(super) struct Calibrate {
 #[derive(Debug, Args)]
 struct BenchOptions {
     /// Time on the bench for --plan or --more, minutes [default: 60, with --more 10]
-    #[arg(long, value_name = "MIN")]
+    #[arg(long, value_name = "MIN", requires = "planned")]
     minutes: Option<f64>,
     /// Largest generator speed for --plan or --more, rpm [default: 60]
-    #[arg(long, value_name = "RPM")]
+    #[arg(long, value_name = "RPM", requires = "planned")]
     speed_rpm: Option<f64>,
     /// Least and largest load at the output for --plan or --more, N.m [default: none]
-    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', num_args = 1, allow_hyphen_values = true)]
+    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', allow_hyphen_values = true, requires = "planned")]
     load_n_m: Vec<f64>,
     /// Lowest and highest temperature for --plan or --more, degrees C [default: one, 20]
-    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', num_args = 1, allow_hyphen_values = true)]
+    #[arg(long, value_name = "LOW,HIGH", value_delimiter = ',', allow_hyphen_values = true, requires = "planned")]
     temperatures_c: Vec<f64>,
     /// Travel of the output for --plan or --more, deg [default: a turn, 0,360]
-    #[arg(long, value_name = "FROM,TO", value_delimiter = ',', num_args = 1, allow_hyphen_values = true)]
+    #[arg(long, value_name = "FROM,TO", value_delimiter = ',', allow_hyphen_values = true, requires = "planned")]
     travel_deg: Vec<f64>,
     /// White noise of the error (output minus generator over ratio) that --plan assumes, arcsec [default: 1]
-    #[arg(long, value_name = "ARCSEC")]
+    #[arg(long, value_name = "ARCSEC", requires = "planned")]
     noise_arcsec: Option<f64>,
     /// Drift of the sensors within a minute that --plan assumes, arcsec [default: 0.5]
-    #[arg(long, value_name = "ARCSEC")]
+    #[arg(long, value_name = "ARCSEC", requires = "planned")]
     wander_arcsec: Option<f64>,
 }
 
@@ -117,20 +117,6 @@ impl BenchOptions {
         };
         bench.problem().map_or(Ok(bench), |problem| Err(Failure::BadInput(problem)))
     }
-
-    /// An option that says something where nothing is planned.
-    fn said(&self) -> Option<&'static str> {
-        let said = [
-            ("--minutes", self.minutes.is_some()),
-            ("--speed-rpm", self.speed_rpm.is_some()),
-            ("--load-n-m", !self.load_n_m.is_empty()),
-            ("--temperatures-c", !self.temperatures_c.is_empty()),
-            ("--travel-deg", !self.travel_deg.is_empty()),
-            ("--noise-arcsec", self.noise_arcsec.is_some()),
-            ("--wander-arcsec", self.wander_arcsec.is_some()),
-        ];
-        said.into_iter().find_map(|(name, said)| said.then_some(name))
-    }
 }
 
 /// Minutes on the bench where nobody says how many: for the first log, and for what is added.
@@ -145,9 +131,6 @@ impl Calibrate {
         if self.plan {
             return self.write_plan(context, &prior);
         }
-        if let Some(option) = self.bench.said().filter(|_| !self.more) {
-            return Err(Failure::BadInput(format!("{option}: allowed with --plan or --more")));
-        }
         let files = self
             .logs
             .iter()
@@ -161,7 +144,7 @@ impl Calibrate {
         let mut made = calibrate(&files, &prior).map_err(|error| self.failed(&error))?;
         made.calibration.command.clone_from(&context.command);
         made.table.info.command.clone_from(&context.command);
-        let further = self.more.then(|| self.further(context, &prior, &made)).transpose()?;
+        let further = self.more.then(|| self.planned(context, &prior, Some(&made))).transpose()?;
         let mut outputs = Outputs::new();
         let mut put = |name: &str, content: &[u8]| outputs.file(&out.join(name), |file| file.write_all(content));
         put("calibrated.fxt", &made.table.image)?;
@@ -184,9 +167,7 @@ impl Calibrate {
 
     /// Says what to record.
     fn write_plan(&self, context: &Context, prior: &Prior<'_>) -> Result<(), Failure> {
-        let bench = self.bench.bench(MINUTES[0], self.columns.rate_hz(), prior.nominal.temperature_c)?;
-        let mut planned = plan(prior, &bench, None).map_err(bad_input)?;
-        planned.command.clone_from(&context.command);
+        let planned = self.planned(context, prior, None)?;
         let out = context.out()?;
         let mut outputs = Outputs::new();
         put_plan(&planned, out, &mut outputs)?;
@@ -194,12 +175,14 @@ impl Calibrate {
         context.print(&planned, || planned_text(&planned, out))
     }
 
-    /// Plan of further logs.
-    fn further(&self, context: &Context, prior: &Prior<'_>, made: &Calibrated) -> Result<Planned, Failure> {
-        let temperature =
-            f64::midpoint(f64::from(made.calibration.temperature_c[0]), f64::from(made.calibration.temperature_c[1]));
-        let bench = self.bench.bench(MINUTES[1], self.columns.rate_hz(), temperature)?;
-        let mut planned = plan(prior, &bench, Some(made)).map_err(bad_input)?;
+    /// Plan of the first log, or of further ones than those that made a table.
+    fn planned(&self, context: &Context, prior: &Prior<'_>, made: Option<&Calibrated>) -> Result<Planned, Failure> {
+        let (minutes, temperature_c) = made.map_or((MINUTES[0], prior.nominal.temperature_c), |made| {
+            let [low, high] = made.calibration.temperature_c.map(f64::from);
+            (MINUTES[1], f64::midpoint(low, high))
+        });
+        let bench = self.bench.bench(minutes, self.columns.rate_hz(), temperature_c)?;
+        let mut planned = plan(prior, &bench, made).map_err(bad_input)?;
         planned.command.clone_from(&context.command);
         Ok(planned)
     }

@@ -8,7 +8,7 @@ use clap::{Args, ValueHint};
 use super::context::{Context, quoted, table_image};
 use super::logs::LogOptions;
 use super::tables::fresh_table;
-use super::{Failure, bad_input, names, report, say};
+use super::{Failure, bad_input, report, say};
 use flexspline_base::output::Outputs;
 use flexspline_design::kernels::Kernels;
 use flexspline_design::tables::{c_header, rust_source};
@@ -49,14 +49,13 @@ pub(super) struct Diagnose {
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     tables: Option<PathBuf>,
     /// Wave generator whose table is used, and that names the extended one: two-roller, four-roller, double-disc or cam
-    #[arg(long, value_name = "G", default_value = "cam", value_parser = names::generator())]
-    #[arg(hide_possible_values = true)]
+    #[arg(long, value_name = "G", default_value = "cam")]
     generator: GeneratorKind,
     /// Make the extended tables by FEM from drive-extended.toml; without it they are sampled from the extended model
     #[arg(long, requires = "tables")]
     remake_tables: bool,
     /// Mesh of FEM runs: coarse, standard or fine [default: that of the table]
-    #[arg(long, value_name = "LEVEL", requires = "tables", value_parser = names::mesh(), hide_possible_values = true)]
+    #[arg(long, value_name = "LEVEL", requires = "tables")]
     mesh: Option<MeshLevel>,
     #[command(flatten)]
     logs: LogOptions,

@@ -7,11 +7,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use clap::Args;
 
 use super::context::{Context, image_file};
-use super::{Failure, report};
+use super::{Failure, bad_input, report};
 use flexspline_base::figures;
 use flexspline_base::output::Outputs;
 use flexspline_base::suggest::did_you_mean;
-use flexspline_fly::fly::{ByController, Flown, FlyError, Results, SCENARIOS, built_in, example, read, results};
+use flexspline_fly::fly::{ByController, Flown, Results, SCENARIOS, built_in, example, read, results};
 use flexspline_report::flight_report;
 
 /// Fly a joint with mass in closed loop: motor, servo, drive, friction, load and wind; with and without compensation
@@ -60,7 +60,11 @@ impl Fly {
             let file = example(base, flown);
             return context.print_data(&serde_json::json!({ "file": &file }), || file.clone());
         }
-        let flown = on_its_drive(scenario(&self.scenario)?, self.table()?.as_ref())?;
+        let mut flown = scenario(&self.scenario)?;
+        if let Some(file) = &self.tables {
+            let refused = |error| Failure::BadInput(format!("{}: {error}", file.display()));
+            flown = flown.with_table(&image_file(file)?).map_err(refused)?;
+        }
         flown.carries().map_err(|why| Failure::BadInput(format!("{}: {why}", self.scenario)))?;
         let out = context.out()?;
         if !self.no_report {
@@ -84,27 +88,11 @@ impl Fly {
         outputs.finish()?;
         context.print(&results, || text(&results, out, !self.no_report))
     }
-
-    /// The table that is given: its file, and its bytes.
-    fn table(&self) -> Result<Option<(&Path, Vec<u8>)>, Failure> {
-        let Some(file) = &self.tables else { return Ok(None) };
-        Ok(Some((file, image_file(file)?)))
-    }
-}
-
-/// With the drive of the table that is given.
-fn on_its_drive(flown: Flown, table: Option<&(&Path, Vec<u8>)>) -> Result<Flown, Failure> {
-    let Some((file, image)) = table else { return Ok(flown) };
-    flown.with_table(image).map_err(|error| Failure::BadInput(format!("{}: {error}", file.display())))
 }
 
 /// The scenario of a name, or of a file.
 pub(super) fn scenario(name: &str) -> Result<Flown, Failure> {
-    read(name, &text_of(name)?).map_err(refused)
-}
-
-fn refused(error: FlyError) -> Failure {
-    Failure::BadInput(error.to_string())
+    read(name, &text_of(name)?).map_err(bad_input)
 }
 
 /// A scenario's file: of a name, one that only starts from it.

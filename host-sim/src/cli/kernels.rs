@@ -18,12 +18,6 @@ struct KernelsReport {
     kernels: Vec<GeneratorReport>,
 }
 
-impl KernelsReport {
-    fn of(kernels: Vec<GeneratorReport>) -> KernelsReport {
-        KernelsReport { schema_version: 1, kernels }
-    }
-}
-
 /// Responses of one generator.
 #[derive(Serialize)]
 struct GeneratorReport {
@@ -79,7 +73,7 @@ pub(super) fn run(context: &Context, kinds: &[GeneratorKind], settings: SolverSe
     }
     drop(progress);
     outputs.finish()?;
-    let made = KernelsReport::of(made);
+    let made = KernelsReport { schema_version: 1, kernels: made };
     context.print(&made, || {
         let texts: Vec<String> = made.kernels.iter().map(text).collect();
         let next =
@@ -117,7 +111,7 @@ mod tests {
             eccentricity_um: 5.0,
             torque_n_m: [2.0, 100.0],
         };
-        let json = serde_json::to_value(KernelsReport::of(vec![made])).unwrap();
+        let json = serde_json::to_value(KernelsReport { schema_version: 1, kernels: vec![made] }).unwrap();
         assert!(json.is_object());
         assert_eq!((json["schema_version"].as_u64(), json["kernels"][0]["generator"].as_str()), (Some(1), Some("cam")));
     }

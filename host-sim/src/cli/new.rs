@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::context::quoted;
 use super::made::{Clearance, cup_and_balls, left_out, with_formulas, with_s_teeth};
-use super::{Context, Failure, bad_input, names, say};
+use super::{Context, Failure, bad_input, say};
 use flexspline_base::output::write_whole;
 use flexspline_design::catalogue;
 use flexspline_design::relief::relieve_tips;
@@ -57,8 +57,7 @@ pub(super) struct New {
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     bore: Option<f64>,
     /// Generator under which the rigid backlash is made one arc-minute
-    #[arg(long, value_name = "G", default_value = "cam", value_parser = names::generator())]
-    #[arg(hide_possible_values = true)]
+    #[arg(long, value_name = "G", default_value = "cam")]
     generator: GeneratorKind,
     /// Teeth and module as a catalogue's size has them: SERIES-SIZE-RATIO, with a pitch diameter of 2.54 mm a size
     /// (Harmonic Drive)

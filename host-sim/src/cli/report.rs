@@ -10,27 +10,43 @@ use rayon::prelude::*;
 
 use super::{Context, Failure, say};
 use flexspline_base::output::Outputs;
+use flexspline_design::tables::TableInfo;
+use flexspline_design::tables::validate::Validation;
 use flexspline_identify::diagnosis::Extended;
 use flexspline_identify::diagnosis::report::Diagnosis;
 use flexspline_identify::measurement::Recording;
 use flexspline_identify::nominal::Nominal;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
+use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_mechanics::stepping::{Method, SolverSettings};
 use flexspline_report::animation::{Animation, AnimationError, animate};
 use flexspline_report::diagnosis_report::{self, DiagnosisSources};
 use flexspline_report::page::{Page, WrittenPage};
-use flexspline_report::shown_torque_n_m;
+use flexspline_report::{DriveSources, DriveSubject, drive_report, shown_torque_n_m};
 
-/// The drives of tables in motion, each at half of what its table spans.
-pub(super) fn animations(
+/// The page of tables of a drive; with each table, its record if it was made just now, or how it did against fresh FEM.
+/// The drives are shown in motion at half of what their tables span.
+pub(super) fn of_tables(
     context: &Context,
-    drive: &Drive,
-    tables: &[(GeneratorKind, Table<'_>)],
-    settings: SolverSettings,
-) -> Vec<Result<Animation, AnimationError>> {
+    (drive, mesh): (&Drive, MeshLevel),
+    command_name: &'static str,
+    inputs: Vec<(String, String)>,
+    known: Vec<(GeneratorKind, Table<'_>, Option<&TableInfo>, Option<&Validation>)>,
+) -> Page {
     let shown: Vec<(GeneratorKind, f64)> =
-        tables.iter().map(|(kind, table)| (*kind, shown_torque_n_m(table))).collect();
-    in_motion(context, drive, &shown, settings)
+        known.iter().map(|(kind, table, ..)| (*kind, shown_torque_n_m(table))).collect();
+    let solver = SolverSettings { mesh, ..SolverSettings::default() };
+    let subjects = known.into_iter().zip(in_motion(context, drive, &shown, solver));
+    let subjects = subjects.map(|((kind, table, info, validation), animation)| DriveSubject {
+        kind,
+        table,
+        info,
+        validation,
+        animation,
+    });
+    let (command, subjects) = (context.command.as_str(), subjects.collect());
+    let page = drive_report(DriveSources { drive, command_name, command, inputs, subjects });
+    Page { title: context.titled(&page.title), ..page }
 }
 
 /// Drives in motion, each under its load (N·m), by the fast solver. One that cannot be shown is said on the page.

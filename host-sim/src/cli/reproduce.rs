@@ -3,7 +3,7 @@
 use clap::Args;
 
 use super::simulate::refused_or_failed;
-use super::{Context, Failure, names, report};
+use super::{Context, Failure, report};
 use flexspline_base::output::Outputs;
 use flexspline_mechanics::drive::GeneratorKind;
 use flexspline_mechanics::mesh::MeshLevel;
@@ -31,7 +31,7 @@ pub(super) struct Reproduce {
     #[arg(long, conflicts_with = "mesh")]
     quick: bool,
     /// Mesh of the standard runs: coarse, standard or fine [default: standard]
-    #[arg(long, value_name = "LEVEL", value_parser = names::mesh(), hide_possible_values = true)]
+    #[arg(long, value_name = "LEVEL")]
     mesh: Option<MeshLevel>,
 }
 

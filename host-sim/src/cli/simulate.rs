@@ -6,7 +6,7 @@ use std::path::Path as FilePath;
 
 use clap::{Args, ValueEnum, ValueHint};
 
-use super::{Context, Failure, bad_input, names, report, say};
+use super::{Context, Failure, bad_input, report, say};
 use flexspline_base::figures;
 use flexspline_base::output::{OutputError, Outputs, WholeFolder, write_whole};
 use flexspline_base::progress::Progress;
@@ -77,7 +77,7 @@ pub(super) struct Simulate {
 #[derive(Debug, Args)]
 pub(super) struct ModelOptions {
     /// Wave generator: two-roller, four-roller, double-disc or cam
-    #[arg(long, value_name = "G", value_parser = names::generator(), hide_possible_values = true)]
+    #[arg(long, value_name = "G")]
     pub(super) generator: GeneratorKind,
     /// Load torque on the output, N.m; positive turns it forward [default: 0]
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
@@ -86,17 +86,11 @@ pub(super) struct ModelOptions {
     #[arg(long, value_name = "C", allow_negative_numbers = true)]
     pub(super) temperature_c: Option<f64>,
     /// Mesh: coarse, standard or fine
-    #[arg(
-        long, value_name = "LEVEL", default_value = "standard", value_parser = names::mesh(),
-        hide_possible_values = true
-    )]
+    #[arg(long, value_name = "LEVEL", default_value = "standard")]
     pub(super) mesh: MeshLevel,
     /// Solver: fast condenses the teeth onto the nodes that touch something, reference keeps every node; they agree to
     /// 0.1 arcsec
-    #[arg(
-        long, value_name = "SOLVER", default_value = "fast", value_parser = names::solver(),
-        hide_possible_values = true
-    )]
+    #[arg(long, value_name = "SOLVER", default_value = "fast")]
     pub(super) solver: Method,
     /// Contact penalty on the flanks, N/mm^3; the pressure that is told is found from the forces and does not hang on
     /// it

@@ -6,7 +6,7 @@ use clap::{ArgGroup, Args, Subcommand, ValueHint};
 use serde_json::json;
 
 use super::context::quoted;
-use super::names::{self, GeneratorNames};
+use super::names::GeneratorNames;
 use super::{Context, Failure, report, say};
 use flexspline_base::output::Outputs;
 use flexspline_design::data_sheet::{FIGURES, FigureOf};
@@ -101,8 +101,7 @@ struct PlanCommand {
     #[arg(long, value_name = "N", default_value_t = 1, requires = "draws")]
     seed: u64,
     /// Wave generator of --vary: two-roller, four-roller, double-disc, cam, or all
-    #[arg(short, long, value_name = "G", default_value = "all", value_parser = names::generators())]
-    #[arg(hide_possible_values = true, conflicts_with = "tolerances")]
+    #[arg(short, long, value_name = "G", default_value = "all", conflicts_with = "tolerances")]
     generator: GeneratorNames,
     /// Largest load of --vary, N.m [default: the rated torque of the drive's [data_sheet]; else the largest torque of a
     /// table of that generator: 200; four-roller 100, two-roller 20; by the size of the drive]
@@ -113,8 +112,7 @@ struct PlanCommand {
     #[arg(conflicts_with = "tolerances")]
     positions: u8,
     /// Mesh: coarse, standard or fine
-    #[arg(long, value_name = "LEVEL", default_value = "coarse", value_parser = names::mesh())]
-    #[arg(hide_possible_values = true)]
+    #[arg(long, value_name = "LEVEL", default_value = "coarse")]
     mesh: MeshLevel,
 }
 

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::context::{Context, quoted, table_image, table_of};
 use super::tables::fresh_table;
-use super::{Failure, bad_input, names, say};
+use super::{Failure, bad_input, say, within};
 use flexspline_base::output::Outputs;
 use flexspline_identify::causes::{Parameter, Usual};
 use flexspline_identify::extension::{self, CauseEntry};
@@ -55,9 +55,7 @@ pub(super) struct Synthesize {
     #[arg(long, value_name = "DIR", conflicts_with = "model", value_hint = ValueHint::DirPath)]
     tables: Option<PathBuf>,
     /// Wave generator of the drive: two-roller, four-roller, double-disc or cam
-    #[arg(
-        long, value_name = "G", default_value = "cam", value_parser = names::generator(), hide_possible_values = true
-    )]
+    #[arg(long, value_name = "G", default_value = "cam")]
     generator: GeneratorKind,
     /// Nominal model from the catalogue, or one that `flexspline diagnose` has extended
     #[arg(long, value_name = "nominal.toml", value_hint = ValueHint::FilePath)]
@@ -71,61 +69,39 @@ pub(super) struct Synthesize {
     /// Slow drift of the output angle, arcsec rms
     #[arg(long, value_name = "ARCSEC", default_value_t = 0.8, allow_negative_numbers = true, help_heading = "Sensors")]
     wander_arcsec: f64,
-    /// Number of sessions
-    #[arg(
-        long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u16).range(1..=100),
-        help_heading = "Excitation"
-    )]
-    sessions: u16,
-    /// Rows per session
-    #[arg(
-        long, value_name = "N", default_value_t = 3000,
-        value_parser = clap::value_parser!(u32).range(50..=1_000_000), help_heading = "Excitation"
-    )]
-    rows: u32,
-    /// Largest speed of the generator, rad/s
-    #[arg(
-        long,
-        value_name = "RAD/S",
-        default_value_t = 6.0,
-        allow_negative_numbers = true,
-        help_heading = "Excitation"
-    )]
-    speed: f64,
-    /// Largest torque, N.m
-    #[arg(
-        long,
-        value_name = "N.M",
-        default_value_t = 40.0,
-        allow_negative_numbers = true,
-        help_heading = "Excitation"
-    )]
-    torque: f64,
-    /// Temperatures, degrees C
-    #[arg(
-        long,
-        value_name = "LOW,HIGH",
-        default_value = "-20,50",
-        allow_hyphen_values = true,
-        help_heading = "Excitation"
-    )]
-    temperature_c: String,
-    /// Take motion, load, temperature and time from this file
-    #[arg(long, value_name = "DATA.csv", value_hint = ValueHint::FilePath, help_heading = "Excitation")]
-    like: Option<PathBuf>,
-    /// Names and units of the columns of that file, as for `flexspline diagnose` [default: the usual names]
-    #[arg(
-        long,
-        value_name = "MAP",
-        default_value = "",
-        hide_default_value = true,
-        requires = "like",
-        help_heading = "Excitation"
-    )]
-    columns: String,
+    #[command(flatten)]
+    excitation: ExcitationOptions,
     /// Seed of all random draws [default: a random one, printed]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+}
+
+/// Motion, load and temperature.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Excitation")]
+struct ExcitationOptions {
+    /// Number of sessions
+    #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u16).range(1..=100))]
+    sessions: u16,
+    /// Rows per session
+    #[arg(long, value_name = "N", default_value_t = 3000)]
+    #[arg(value_parser = clap::value_parser!(u32).range(50..=1_000_000))]
+    rows: u32,
+    /// Largest speed of the generator, rad/s
+    #[arg(long, value_name = "RAD/S", default_value_t = 6.0, allow_negative_numbers = true)]
+    speed: f64,
+    /// Largest torque, N.m
+    #[arg(long, value_name = "N.M", default_value_t = 40.0, allow_negative_numbers = true)]
+    torque: f64,
+    /// Temperatures, degrees C
+    #[arg(long, value_name = "LOW,HIGH", default_value = "-20,50", allow_hyphen_values = true)]
+    temperature_c: String,
+    /// Take motion, load, temperature and time from this file
+    #[arg(long, value_name = "DATA.csv", value_hint = ValueHint::FilePath)]
+    like: Option<PathBuf>,
+    /// Names and units of the columns of that file, as for `flexspline diagnose` [default: the usual names]
+    #[arg(long, value_name = "MAP", default_value = "", hide_default_value = true, requires = "like")]
+    columns: String,
 }
 
 /// Source of the drive's prediction.
@@ -192,7 +168,7 @@ impl Synthesize {
             .transpose()?;
         let chosen: Vec<Effect> = known.iter().filter_map(CauseEntry::effect).chain(chosen).collect();
         let mut motion = self.motion(&nominal, &mut random)?;
-        if self.like.is_none() {
+        if self.excitation.like.is_none() {
             within_temperatures(&mut motion, temperatures);
         }
         let unit = if self.no_spread { DrawnUnit::nominal(&nominal) } else { DrawnUnit::draw(&nominal, &mut random) };
@@ -233,24 +209,17 @@ impl Synthesize {
 
     /// Sensors and temperatures, in range.
     fn check(&self) -> Result<(Sensors, [f64; 2]), Failure> {
-        let within = |option: &str, found: f64, low: f64, high: f64| {
-            if found >= low && found <= high {
-                Ok(found)
-            } else {
-                Err(Failure::BadInput(format!("{option}: found {found}; allowed: {low} to {high}")))
-            }
-        };
-        within("--speed", self.speed, 1e-3, 1e3)?;
-        within("--torque", self.torque, 1e-3, 1e5)?;
-        let range: Vec<f64> = self.temperature_c.split(',').filter_map(|t| t.trim().parse().ok()).collect();
+        within("--speed", self.excitation.speed, 1e-3, 1e3)?;
+        within("--torque", self.excitation.torque, 1e-3, 1e5)?;
+        let range: Vec<f64> = self.excitation.temperature_c.split(',').filter_map(|t| t.trim().parse().ok()).collect();
         let temperatures = match range[..] {
-            [one] if self.temperature_c.split(',').count() == 1 => [one, one],
+            [one] if self.excitation.temperature_c.split(',').count() == 1 => [one, one],
             [low, high] if low <= high => [low, high],
             _ => {
                 return Err(Failure::BadInput(format!(
                     "--temperature-c: found \"{}\"; allowed: LOW,HIGH in degrees C, for instance -20,50, or one \
                      temperature",
-                    self.temperature_c
+                    self.excitation.temperature_c
                 )));
             }
         };
@@ -270,17 +239,21 @@ impl Synthesize {
 
     /// Motion, load and surroundings: sessions without an error.
     fn motion(&self, nominal: &Nominal, random: &mut fastrand::Rng) -> Result<Vec<Session>, Failure> {
-        let Some(path) = &self.like else {
+        let Some(path) = &self.excitation.like else {
             let plan = MotionPlan {
-                sessions: usize::from(self.sessions),
-                rows: self.rows as usize,
+                sessions: usize::from(self.excitation.sessions),
+                rows: self.excitation.rows as usize,
                 rate_hz: RATE_HZ,
-                speed_rad_s: self.speed,
-                torque_n_m: self.torque,
+                speed_rad_s: self.excitation.speed,
+                torque_n_m: self.excitation.torque,
             };
             return Ok(plan.excite(random));
         };
-        let map = if self.columns.is_empty() { Ok(ColumnMap::default()) } else { ColumnMap::parse(&self.columns) };
+        let map = if self.excitation.columns.is_empty() {
+            Ok(ColumnMap::default())
+        } else {
+            ColumnMap::parse(&self.excitation.columns)
+        };
         let map = map.map_err(|error| Failure::BadInput(format!("--columns: {error}")))?;
         let gear = nominal.gear();
         let recording = read(path, &map, &gear).map_err(bad_input)?;

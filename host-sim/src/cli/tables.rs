@@ -11,10 +11,10 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::context::{Context, quoted};
-use super::names::{self, GeneratorNames};
+use super::names::GeneratorNames;
 use super::new::New;
 use super::simulate::{refused_or_failed, stress};
-use super::{Failure, bad_input, kernels, report, say};
+use super::{Failure, bad_input, kernels, report, say, within};
 use flexspline_base::output::Outputs;
 use flexspline_base::spent::Spent;
 use flexspline_base::units::ARCSEC_PER_RAD;
@@ -31,7 +31,6 @@ use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_mechanics::stepping::{Method, SolverSettings};
 use flexspline_report::page::Page;
-use flexspline_report::{DriveSources, DriveSubject, drive_report};
 
 /// Make compensation tables: from FEM sweeps of the drive, or from samples of another program or a bench
 ///
@@ -60,8 +59,7 @@ Sample files have the columns generator_rad, torque_n_m, temperature_c, directio
 output_rad.")]
 pub(super) struct Tables {
     /// Wave generator: two-roller, four-roller, double-disc, cam, or all
-    #[arg(short, long, value_name = "G", default_value = "all", value_parser = names::generators())]
-    #[arg(hide_possible_values = true)]
+    #[arg(short, long, value_name = "G", default_value = "all")]
     generator: GeneratorNames,
     /// Make the table from this file of samples instead of FEM; needs one --generator
     #[arg(long, value_name = "FILE.csv", value_hint = ValueHint::FilePath)]
@@ -96,11 +94,9 @@ pub(super) struct Tables {
     temperatures_c: Option<Vec<f64>>,
     /// Mesh: coarse, standard or fine
     #[arg(long, value_name = "LEVEL", default_value = "standard", conflicts_with = "from_samples")]
-    #[arg(value_parser = names::mesh(), hide_possible_values = true)]
     mesh: MeshLevel,
     /// Solver: fast or reference
     #[arg(long, value_name = "SOLVER", default_value = "fast", conflicts_with = "from_samples")]
-    #[arg(value_parser = names::solver(), hide_possible_values = true)]
     solver: Method,
     /// Stress in root fillet, on bore and flank under the largest load, over three meshes, with its interval; takes one
     /// more pitch and three meshes for each generator
@@ -272,27 +268,16 @@ impl Tables {
 
     /// The report.
     fn page(&self, context: &Context, drive: &Drive, made: &[MadeTable]) -> Result<Page, Failure> {
-        let tables = made
-            .iter()
-            .map(|table| Ok((table.kind, Table::check(&table.image).map_err(|e| Failure::Failed(e.to_string()))?)))
-            .collect::<Result<Vec<_>, Failure>>()?;
-        let settings = SolverSettings { mesh: self.mesh, ..SolverSettings::default() };
-        let animations = report::animations(context, drive, &tables, settings);
+        let known = made.iter().map(|made| {
+            let table = Table::check(&made.image).map_err(|error| Failure::Failed(error.to_string()))?;
+            Ok((made.kind, table, Some(&made.info), None))
+        });
         let inputs = made.iter().filter_map(|table| match &table.info.source {
             Source::File { name, blake3 } => Some((format!("BLAKE3 of {name}"), blake3.clone())),
             Source::Fem { .. } => None,
         });
-        let subjects = tables.into_iter().zip(made).zip(animations).map(|(((kind, table), made), animation)| {
-            DriveSubject { kind, table, info: Some(&made.info), validation: None, animation }
-        });
-        let page = drive_report(DriveSources {
-            drive,
-            command_name: "tables",
-            command: &context.command,
-            inputs: inputs.collect(),
-            subjects: subjects.collect(),
-        });
-        Ok(Page { title: context.titled(&page.title), ..page })
+        let known = known.collect::<Result<Vec<_>, Failure>>()?;
+        Ok(report::of_tables(context, (drive, self.mesh), "tables", inputs.collect(), known))
     }
 
     fn project(&self, drive: &Drive, generators: &[GeneratorKind], file: &PathBuf) -> Result<MadeTable, Failure> {
@@ -301,13 +286,9 @@ impl Tables {
                 "--from-samples: a sample file is of one generator; name it with --generator".into(),
             ));
         };
-        if let Some(half) = self.half_width_arcsec.filter(|half| !(0.0..=3600.0).contains(half)) {
-            return Err(Failure::BadInput(format!("--half-width-arcsec: found {half}; allowed: 0 to 3600 arcsec")));
-        }
-        let options = SampleOptions {
-            half_width_rad: self.half_width_arcsec.map(|half| half / ARCSEC_PER_RAD),
-            ..SampleOptions::default()
-        };
+        let half = self.half_width_arcsec.map(|half| within("--half-width-arcsec", half, 0.0, 3600.0)).transpose()?;
+        let options =
+            SampleOptions { half_width_rad: half.map(|half| half / ARCSEC_PER_RAD), ..SampleOptions::default() };
         let bad = |message: String| Failure::BadInput(message);
         let read = samples::read(file).map_err(|e| bad(e.to_string()))?;
         let bytes = std::fs::read(file).map_err(|e| bad(format!("{}: {e}", file.display())))?;

@@ -9,20 +9,17 @@ use flexspline::Table;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::context::{Context, image_file, quoted};
-use super::names::{self, GeneratorNames};
+use super::context::{Context, image_file, quoted, table_of};
+use super::names::GeneratorNames;
 use super::{Failure, report, say};
 use flexspline_base::output::Outputs;
 use flexspline_design::tables::MissingSpring;
 use flexspline_design::tables::validate::{
-    MAX_BOUND_ARCSEC, RMS_BOUND_ARCSEC, ValidateError, Validation, ValidationSettings, check_drive, generator_of,
-    validate,
+    MAX_BOUND_ARCSEC, RMS_BOUND_ARCSEC, ValidateError, Validation, ValidationSettings, check_drive, validate,
 };
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_mechanics::stepping::{Method, SolverSettings};
-use flexspline_report::page::Page;
-use flexspline_report::{DriveSources, DriveSubject, drive_report};
 
 /// Compare tables with new FEM runs at points that were not used to make them
 ///
@@ -41,8 +38,7 @@ pub(super) struct Validate {
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     tables: PathBuf,
     /// Wave generator: two-roller, four-roller, double-disc, cam, or all in the folder
-    #[arg(short, long, value_name = "G", default_value = "all", value_parser = names::generators())]
-    #[arg(hide_possible_values = true)]
+    #[arg(short, long, value_name = "G", default_value = "all")]
     generator: GeneratorNames,
     /// Number of torques per table, 2 to 1000
     #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u16).range(2..=1000))]
@@ -57,12 +53,10 @@ pub(super) struct Validate {
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Mesh of the new FEM runs: coarse, standard or fine
-    #[arg(long, value_name = "LEVEL", default_value = "standard", value_parser = names::mesh())]
-    #[arg(hide_possible_values = true)]
+    #[arg(long, value_name = "LEVEL", default_value = "standard")]
     mesh: MeshLevel,
     /// Solver of the new FEM runs: reference or fast
-    #[arg(long, value_name = "SOLVER", default_value = "reference", value_parser = names::solver())]
-    #[arg(hide_possible_values = true)]
+    #[arg(long, value_name = "SOLVER", default_value = "reference")]
     solver: Method,
     /// Do not write report.html (validation.html if the page of the tables is in the same folder), which takes a FEM
     /// run over one more tooth pitch for each generator
@@ -86,8 +80,10 @@ struct ValidationReport {
 }
 
 /// A data sheet's addition to a table, which the FEM does not have: stated in the JSON next to the image.
-fn added_spring(path: &Path, image: &[u8]) -> Result<Option<MissingSpring>, Failure> {
-    let Some(table) = Table::check(image).ok().filter(|table| table.sheet_scatter().is_some()) else { return Ok(None) };
+fn added_spring(path: &Path, table: &Table<'_>) -> Result<Option<MissingSpring>, Failure> {
+    if table.sheet_scatter().is_none() {
+        return Ok(None);
+    }
     let json = path.with_extension("json");
     let written = std::fs::read(&json).ok().and_then(|bytes| serde_json::from_slice::<serde_json::Value>(&bytes).ok());
     let written = written.filter(|written| written["table_id"] == table.id().to_string());
@@ -101,15 +97,31 @@ fn added_spring(path: &Path, image: &[u8]) -> Result<Option<MissingSpring>, Fail
     })
 }
 
+/// A table to be validated.
+struct CheckedTable<'a> {
+    path: &'a Path,
+    kind: GeneratorKind,
+    table: Table<'a>,
+    /// What a data sheet added.
+    spring: Option<MissingSpring>,
+}
+
+impl<'a> CheckedTable<'a> {
+    /// The table in an image, if it is one of the drive.
+    fn of(path: &'a Path, image: &'a [u8], drive: &Drive) -> Result<CheckedTable<'a>, Failure> {
+        let table = table_of(path, image)?;
+        let refused = |error| Failure::BadInput(format!("{}: {error}", path.display()));
+        let kind = check_drive(drive, &table).map_err(refused)?;
+        Ok(CheckedTable { path, kind, table, spring: added_spring(path, &table)? })
+    }
+}
+
 impl Validate {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         let drive = context.drive()?;
         let images = self.images()?;
-        for (path, image) in &images {
-            let refuse = |what: String| Failure::BadInput(format!("{}: {what}", path.display()));
-            let table = Table::check(image).map_err(|error| refuse(error.to_string()))?;
-            check_drive(&drive, &table).map_err(|error| refuse(error.to_string()))?;
-        }
+        let checked = images.iter().map(|(path, image)| CheckedTable::of(path, image, &drive));
+        let checked = checked.collect::<Result<Vec<_>, Failure>>()?;
         let out = context.out()?;
         if !self.no_report && page_path(out, &self.tables).ends_with("report.html") {
             report::before(context, out, "validate", Some(&drive));
@@ -122,28 +134,26 @@ impl Validate {
             solver: SolverSettings { method: self.solver, mesh: self.mesh, ..SolverSettings::default() },
             spring: None,
         };
-        let springs = images.iter().map(|(path, image)| added_spring(path, image)).collect::<Result<Vec<_>, _>>()?;
-        let progress = Mutex::new((context.progress("validate"), vec![(0, 0); images.len()]));
-        let tables = images
+        let progress = Mutex::new((context.progress("validate"), vec![(0, 0); checked.len()]));
+        let tables = checked
             .par_iter()
             .enumerate()
-            .map(|(k, (path, image))| {
-                let refuse = |what: String| Failure::BadInput(format!("{}: {what}", path.display()));
-                let table = Table::check(image).map_err(|error| refuse(error.to_string()))?;
-                let settings = ValidationSettings { spring: springs[k], ..settings };
-                validate(&drive, &table, &settings, &mut |done, total| {
+            .map(|(k, CheckedTable { path, kind, table, spring })| {
+                let settings = ValidationSettings { spring: *spring, ..settings };
+                validate(&drive, table, &settings, &mut |done, total| {
                     if let Ok(mut guard) = progress.lock() {
                         let (bar, counts) = &mut *guard;
                         counts[k] = (done, total);
                         let done = counts.iter().map(|c| c.0).sum();
                         let guess = counts.iter().map(|c| c.1.max(total)).sum();
-                        let generator = generator_of(&table).map_or_else(String::new, |kind| kind.to_string());
-                        bar.set(done, guess, &generator);
+                        bar.set(done, guess, kind.name());
                     }
                     ControlFlow::Continue(())
                 })
                 .map_err(|error| match error {
-                    ValidateError::OtherDrive { .. } | ValidateError::UnknownGenerator => refuse(error.to_string()),
+                    ValidateError::OtherDrive { .. } | ValidateError::UnknownGenerator => {
+                        Failure::BadInput(format!("{}: {error}", path.display()))
+                    }
                     ValidateError::Stopped => Failure::Failed("stopped; nothing was written".into()),
                     other => Failure::Failed(format!("{}: {other}", path.display())),
                 })
@@ -166,11 +176,14 @@ impl Validate {
         let mut outputs = Outputs::new();
         outputs.json(&out.join("validation.json"), &report)?;
         if !self.no_report {
-            report::write_to(
-                &self.page(context, &drive, &images, &report)?,
-                &page_path(out, &self.tables),
-                &mut outputs,
-            )?;
+            let hashed = |(path, image): &(PathBuf, Vec<u8>)| {
+                (format!("BLAKE3 of {}", path.display()), blake3::hash(image).to_hex().to_string())
+            };
+            let fresh = format!("{} solver, {} mesh, seed {}", self.solver, self.mesh, self.seed);
+            let inputs = images.iter().map(hashed).chain([("Fresh FEM".to_owned(), fresh)]).collect();
+            let known = checked.iter().zip(&report.tables).map(|(of, found)| (of.kind, of.table, None, Some(found)));
+            let page = report::of_tables(context, (&drive, self.mesh), "validate", inputs, known.collect());
+            report::write_to(&page, &page_path(out, &self.tables), &mut outputs)?;
         }
         outputs.finish()?;
         context.print(&report, || {
@@ -193,38 +206,6 @@ impl Validate {
                 rounded(max)
             )))
         }
-    }
-
-    /// The report.
-    fn page(
-        &self,
-        context: &Context,
-        drive: &Drive,
-        images: &[(PathBuf, Vec<u8>)],
-        report: &ValidationReport,
-    ) -> Result<Page, Failure> {
-        let failed = |error: &dyn std::fmt::Display| Failure::Failed(error.to_string());
-        let mut tables = Vec::new();
-        let mut inputs = Vec::new();
-        for (path, image) in images {
-            let table = Table::check(image).map_err(|error| failed(&error))?;
-            tables.push((check_drive(drive, &table).map_err(|error| failed(&error))?, table));
-            inputs.push((format!("BLAKE3 of {}", path.display()), blake3::hash(image).to_hex().to_string()));
-        }
-        inputs.push(("Fresh FEM".into(), format!("{} solver, {} mesh, seed {}", self.solver, self.mesh, self.seed)));
-        let settings = SolverSettings { mesh: self.mesh, ..SolverSettings::default() };
-        let animations = report::animations(context, drive, &tables, settings);
-        let subjects = tables.into_iter().zip(&report.tables).zip(animations).map(|(((kind, table), v), animation)| {
-            DriveSubject { kind, table, info: None, validation: Some(v), animation }
-        });
-        let page = drive_report(DriveSources {
-            drive,
-            command_name: "validate",
-            command: &context.command,
-            inputs,
-            subjects: subjects.collect(),
-        });
-        Ok(Page { title: context.titled(&page.title), ..page })
     }
 
     /// The images in the folder.
