@@ -3,7 +3,7 @@
 use serde_json::{Map, json};
 
 use super::page::{
-    ChartAxis, ChartSeries, Choice, Detail, Headline, Limit, Lines, Mark, Page, PageBlock, PageQuantity, PageSection,
+    ChartAxis, ChartSeries, Choice, Detail, Headline, Lines, Mark, Page, PageBlock, PageQuantity, PageSection,
     PageTable, RichText, Status, significant,
 };
 use flexspline_design::sweep::{
@@ -12,8 +12,10 @@ use flexspline_design::sweep::{
 
 /// Rows of the table of the Pareto front.
 const MOST_ROWS: usize = 25;
-/// Points of the curve of a distribution.
-const CURVE: usize = 200;
+/// Least rank correlation of the table: a guess at what matters.
+const LEAST_RANK: f64 = 0.1;
+/// Points of one kind in the picture, at most.
+const MOST_POINTS: usize = 5000;
 /// Share of the drives whose error is the headline of drives drawn from tolerances.
 const JUDGED: f64 = 0.95;
 /// Quantiles of the table of scatter.
@@ -38,13 +40,12 @@ pub struct SweepSources<'a> {
 /// The page.
 pub fn page(of: &SweepSources<'_>) -> Page {
     let SweepSources { plan, sweep, .. } = of;
-    let figure = if plan.is_of_tolerances() { distribution(of) } else { trade(of) };
     let tables = [
         ("best", "The Pareto front", Detail::Summary, tables(of, |one| front(of, one))),
         ("matters", "What matters", Detail::Summary, tables(of, ranks)),
         ("figures", "Figure by figure", Detail::Engineering, tables(of, figures)),
     ];
-    let mut sections = vec![figure];
+    let mut sections = vec![trade(of)];
     for (id, title, detail, blocks) in tables {
         if !blocks.is_empty() {
             sections.push(PageSection::new(id, title, detail, blocks));
@@ -137,55 +138,35 @@ fn tables(of: &SweepSources<'_>, make: impl Fn(&OfGenerator) -> PageTable) -> Ve
     all.map(|(choice, table)| PageBlock::Table { choice, table }).collect()
 }
 
-/// A chart for each generator.
-fn charts(of: &SweepSources<'_>, make: impl Fn(&OfGenerator) -> Lines) -> Vec<(String, Lines)> {
-    of.sweep.generators.iter().map(|one| (one.generator.to_string(), make(one))).collect()
-}
-
-/// A figure in a section of its own.
-fn picture(id: &str, title: &str, caption: &str, axes: [ChartAxis; 2], charts: Vec<(String, Lines)>) -> PageSection {
-    let figure = PageBlock::lines(id, title, caption, axes, charts);
-    PageSection::new(id, title, Detail::Summary, vec![figure])
-}
-
-/// Variants by two targets.
+/// Variants by two figures: by two targets, drives drawn from tolerances by their error and their lost motion.
 fn trade(of: &SweepSources<'_>) -> PageSection {
+    let usual = if of.plan.is_of_tolerances() {
+        [ERROR, "lost_motion_arcsec"]
+    } else {
+        ["kinematic_error_pp_arcsec", "k2_n_m_per_rad"]
+    };
     let target = |k: usize, other: &'static str| of.judge.targets.get(k).map_or(other, |(name, _)| name.as_str());
-    let first = target(0, "kinematic_error_pp_arcsec");
-    let second = target(1, if first == "k2_n_m_per_rad" { "kinematic_error_pp_arcsec" } else { "k2_n_m_per_rad" });
+    let first = target(0, usual[0]);
+    let second = target(1, if first == usual[1] { usual[0] } else { usual[1] });
     let [x, y] = [first, second].map(|name| of.plan.figure(name).unwrap_or_default());
-    let charts = charts(of, |one| {
+    let chart = |one: &OfGenerator| {
         let series = |name: &str, colour: usize, mark: Mark, which: &dyn Fn(&VariantRow) -> bool| {
             let points = rows(of, one).filter(|row| which(row)).map(|row| [row.figures[x], row.figures[y]]);
-            ChartSeries::sorted(name, mark, colour, points.filter(|[x, y]| x.is_finite() && y.is_finite()).collect())
+            let points = points.filter(|[x, y]| x.is_finite() && y.is_finite()).take(MOST_POINTS);
+            ChartSeries::sorted(name, mark, colour, points.collect())
         };
         let series = vec![
             series("does not meet", 5, Mark::Dots, &|row| !row.meets),
             series("meets", 0, Mark::Points, &|row| row.meets && !row.is_front),
             series("Pareto-optimal", 1, Mark::Points, &|row| row.is_front),
         ];
-        Lines { series, ..Lines::default() }
-    });
+        (one.generator.to_string(), Lines::of(series))
+    };
+    let (title, charts) = (format!("{second} against {first}"), of.sweep.generators.iter().map(chart).collect());
     let axes = [first, second].map(|name| ChartAxis::new(name, quantity(name)));
-    picture("trade", &format!("{second} against {first}"), "Each point is a variant.", axes, charts)
-}
-
-/// Drives drawn from tolerances: their share below an error.
-fn distribution(of: &SweepSources<'_>) -> PageSection {
-    let error = of.plan.figure(ERROR).unwrap_or_default();
-    let charts = charts(of, |one| {
-        let mut errors: Vec<f64> = rows(of, one).map(|row| row.figures[error]).filter(|x| x.is_finite()).collect();
-        errors.sort_by(f64::total_cmp);
-        let n = errors.len();
-        let ranks = (0..CURVE.min(n)).map(|k| k * (n - 1) / (CURVE.min(n) - 1).max(1));
-        let points = ranks.map(|rank| [errors[rank], 100.0 * (rank + 1) as f64 / n as f64]).collect();
-        let series = vec![ChartSeries::new("drives below", Mark::Line, 0, points)];
-        Lines { series, limits: vec![Limit { name: "95 %".to_owned(), y: 100.0 * JUDGED }], ..Lines::default() }
-    });
-    let (x, y) = (("error, peak to peak", PageQuantity::Error), ("drives below, %", PageQuantity::Count));
-    let axes = [x, y].map(|(label, quantity)| ChartAxis::new(label, quantity));
-    let caption = "Error under the load, peak to peak over a turn of the output.";
-    picture("distribution", "Drives that stay below an error", caption, axes, charts)
+    let caption = format!("Each point is a variant; of each kind at most {MOST_POINTS} are shown.");
+    let figure = PageBlock::lines("trade", title.as_str(), caption, axes, charts);
+    PageSection::new("trade", title, Detail::Summary, vec![figure])
 }
 
 /// The Pareto front, the targets first.
@@ -212,21 +193,17 @@ fn front(of: &SweepSources<'_>, one: &OfGenerator) -> PageTable {
     }
 }
 
-/// Rank correlations, an input to a column.
+/// Rank correlations of each figure, the strongest first.
 fn ranks(one: &OfGenerator) -> PageTable {
-    let mut header = vec!["Figure".to_owned()];
-    for rank in &one.ranks {
-        if !header.contains(&rank.input) {
-            header.push(rank.input.clone());
-        }
-    }
-    let row = |of_figure: &[RankCorrelation]| {
-        let of = |input: &String| of_figure.iter().find(|rank| rank.input == *input);
-        let cell = |input| significant(of(input).map_or(f64::NAN, |rank| rank.correlation), 2).into();
-        [of_figure[0].figure.into()].into_iter().chain(header[1..].iter().map(cell)).collect()
+    let shown = one.ranks.iter().filter(|rank| rank.correlation.abs() >= LEAST_RANK);
+    let row = |rank: &RankCorrelation| {
+        vec![rank.figure.into(), rank.input.clone().into(), significant(rank.correlation, 2).into()]
     };
-    let rows = one.ranks.chunk_by(|a, b| a.figure == b.figure).map(row).collect();
-    PageTable { caption: "Rank correlation of each figure with each input".to_owned(), header, rows }
+    PageTable {
+        caption: format!("Rank correlations from {LEAST_RANK} on; all are in sweep.json"),
+        header: ["Figure", "Input", "Rank correlation"].map(str::to_owned).to_vec(),
+        rows: shown.map(row).collect(),
+    }
 }
 
 /// Scatter of each figure.

@@ -8,7 +8,7 @@ use thiserror::Error;
 
 use super::draw::{draw, sets};
 use super::model::{self, KernelModel, Response};
-use super::respond::{respond, torques_n_m};
+use super::respond::respond;
 use super::tolerance::Tolerances;
 use super::vary::{Vary, filling, grid};
 use crate::data_sheet::{self, Loads};
@@ -108,17 +108,11 @@ pub(super) enum HowComputed {
     Kernels {
         /// The load, and the light load of lost motion, N·m.
         torques_n_m: [f64; 2],
-        /// By generator.
-        of: Vec<OfOne>,
+        /// Influence kernels of the drive as drawn.
+        kernels: Kernels,
+        /// Response to uniform changes.
+        response: Response,
     },
-}
-
-/// Kernels and response with one generator.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct OfOne {
-    pub kernels: Kernels,
-    pub response: Response,
 }
 
 impl VariantPlan {
@@ -190,9 +184,8 @@ impl VariantPlan {
         let lines = drawn.iter().map(|one| sets(&of.list, one).into_iter().filter_map(split).unzip());
         let (columns, variants): (Vec<Vec<String>>, Vec<Vec<String>>) = lines.unzip();
         let columns = columns.into_iter().next().unwrap_or_default();
-        let by =
-            HowComputed::Kernels { torques_n_m: torques_n_m(of), of: respond(of, solver(settings.mesh), progress)? };
-        Ok(VariantPlan::new((&of.drive, None), &of.generators, (columns, variants), by, settings.mesh))
+        let by = respond(of, solver(settings.mesh), progress)?;
+        Ok(VariantPlan::new((&of.drive, None), &[of.generator], (columns, variants), by, settings.mesh))
     }
 
     pub(super) fn new(
@@ -239,16 +232,16 @@ impl VariantPlan {
         matches!(self.by, HowComputed::Kernels { .. })
     }
 
-    /// What evaluates drives by kernels, by generator; none of a plan of fields.
-    pub(super) fn models(&self) -> Vec<KernelModel> {
-        let HowComputed::Kernels { torques_n_m, of } = &self.by else { return Vec::new() };
-        of.iter().map(|one| KernelModel::new(&one.kernels, one.response.clone(), *torques_n_m)).collect()
+    /// What evaluates drives by kernels; none of a plan of fields.
+    pub(super) fn model(&self) -> Option<KernelModel> {
+        let HowComputed::Kernels { torques_n_m, kernels, response } = &self.by else { return None };
+        Some(KernelModel::new(kernels, response.clone(), *torques_n_m))
     }
 
-    /// Distance of the axes that the kernels of a generator reach, µm.
-    pub(super) fn reach_um(&self, g: usize) -> f64 {
-        let HowComputed::Kernels { of, .. } = &self.by else { return f64::INFINITY };
-        of[g].kernels.eccentric.sizes_um.last().copied().unwrap_or(f64::INFINITY)
+    /// Distance of the axes that the kernels reach, µm.
+    pub(super) fn reach_um(&self) -> f64 {
+        let HowComputed::Kernels { kernels, .. } = &self.by else { return f64::INFINITY };
+        kernels.eccentric.sizes_um.last().copied().unwrap_or(f64::INFINITY)
     }
 
     /// The loads of the data sheet of a variant.
@@ -329,12 +322,10 @@ impl VariantPlan {
         }
         let drive = Drive::from_toml("drive_toml", &recipe.drive_toml).map_err(|error| wrong(error.to_string()))?;
         let stated = Stated::of_file("drive_toml", &recipe.drive_toml).map_err(|error| wrong(error.to_string()))?;
-        if let HowComputed::Kernels { of, .. } = &recipe.by {
-            for one in of {
-                one.kernels.check().map_err(|problem| wrong(problem.to_string()))?;
-            }
-            if of.len() != recipe.generators.len() || !of.iter().all(|one| one.response.fits()) {
-                return Err(wrong("kernels or responses are missing; plan anew".to_owned()));
+        if let HowComputed::Kernels { kernels, response, .. } = &recipe.by {
+            kernels.check().map_err(|problem| wrong(problem.to_string()))?;
+            if recipe.generators.len() != 1 || !response.fits() {
+                return Err(wrong("not one generator, or no response; plan anew".to_owned()));
             }
         }
         let (columns, variants) = variants_of(&csv, &csv_text)?;

@@ -97,7 +97,7 @@ pub fn reduce(plan: &VariantPlan, folder: &Path, judge: &Judge, partial: bool) -
     let (mut rows, missing) = gathered(plan, folder, partial)?;
     judge.mark(plan, &mut rows);
     let inputs = inputs(plan);
-    let generators = (0..plan.generators.len()).map(|g| of_generator(plan, g, judge, &rows, &inputs)).collect();
+    let generators = plan.generators.iter().map(|kind| of_generator(plan, *kind, judge, &rows, &inputs)).collect();
     let ended = |status| rows.iter().filter(|row| row.status == status).count();
     Ok(ReducedSweep {
         schema_version: 1,
@@ -149,12 +149,11 @@ fn gathered(plan: &VariantPlan, folder: &Path, partial: bool) -> Result<(Vec<Var
 
 fn of_generator(
     plan: &VariantPlan,
-    g: usize,
+    generator: GeneratorKind,
     judge: &Judge,
     rows: &[VariantRow],
     inputs: &[(String, Vec<f64>)],
 ) -> OfGenerator {
-    let generator = plan.generators[g];
     let sound = rows.iter().filter(|row| row.generator == generator && row.status == RunStatus::Converged);
     let sound: Vec<&VariantRow> = sound.collect();
     let mut front: Vec<&VariantRow> = sound.iter().copied().filter(|row| row.is_front).collect();
@@ -187,7 +186,7 @@ fn of_generator(
         front: front.iter().map(|row| row.variant + 1).collect(),
         figures,
         ranks,
-        beyond_kernels: above("axes_apart_um", plan.reach_um(g)),
+        beyond_kernels: above("axes_apart_um", plan.reach_um()),
         play_closed: above(CLOSED, 0.0),
     }
 }

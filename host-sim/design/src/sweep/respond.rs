@@ -9,11 +9,11 @@ use rayon::prelude::*;
 use super::PlanError;
 use super::draw::Drawn;
 use super::model::{Parabola, Response, SHEET, WAVE, displaces};
-use super::plan::{OfOne, SweepProgress};
+use super::plan::{HowComputed, SweepProgress};
 use super::tolerance::{FieldTolerance, ToleranceActs, Tolerances};
 use crate::data_sheet::{FIGURES, Loads, data_sheet};
 use crate::kernels::{KernelError, KernelPlan, make};
-use flexspline_mechanics::drive::{Drive, GeneratorKind};
+use flexspline_mechanics::drive::Drive;
 use flexspline_mechanics::motion::Motion;
 use flexspline_mechanics::stepping::{Problem, SolveError, SolverSettings};
 
@@ -31,12 +31,12 @@ const NEARLY_ALL: f64 = 0.99;
 const UNUSED: (f64, usize) = (20.0, 4);
 
 /// The load and the light load of lost motion, N·m.
-pub(super) fn torques_n_m(of: &Tolerances) -> [f64; 2] {
-    let rated = of.generators.iter().map(|kind| of.drive.rated_torque_n_m(*kind)).fold(f64::INFINITY, f64::min);
+fn torques_n_m(of: &Tolerances) -> [f64; 2] {
+    let rated = of.drive.rated_torque_n_m(of.generator);
     [of.torque_n_m, (LIGHT[0] * rated).min(LIGHT[1] * of.torque_n_m)]
 }
 
-/// Kernels and responses with each generator.
+/// Kernels and response.
 ///
 /// # Errors
 /// The middle of the tolerances makes no drive, or the FEM finds no equilibrium.
@@ -44,26 +44,19 @@ pub(super) fn respond(
     of: &Tolerances,
     solver: SolverSettings,
     progress: &SweepProgress<'_>,
-) -> Result<Vec<OfOne>, PlanError> {
+) -> Result<HowComputed, PlanError> {
     let drawn_as = uniform(of, &Drawn::middle(&of.list))?;
-    let states = 1 + 2 * of.list.iter().filter(|tolerance| tolerance.acts == ToleranceActs::Alike).count();
-    let plans: Vec<KernelPlan> = of.generators.iter().map(|kind| kernel_plan(of, *kind)).collect();
-    let steps: usize = plans.iter().map(|plan| plan.steps() + states).sum();
-    let mut before = 0;
-    let mut generators = Vec::new();
-    for (kind, kernel_plan) in of.generators.iter().zip(&plans) {
-        let kernels = make(&drawn_as, *kind, kernel_plan, solver, &|done| {
-            progress(before + done, steps, &format!("kernels, {kind}"));
-            ControlFlow::Continue(())
-        })
-        .map_err(|error| kernels_failed(of, *kind, &error))?;
-        before += kernel_plan.steps();
-        let step = |done| progress(before + done, steps, &format!("sheets, {kind}"));
-        let response = response(of, *kind, solver, &step)?;
-        before += states;
-        generators.push(OfOne { kernels, response });
-    }
-    Ok(generators)
+    let plan = kernel_plan(of);
+    let alike = of.list.iter().filter(|tolerance| tolerance.acts == ToleranceActs::Alike).count();
+    let steps = plan.steps() + 1 + 2 * alike;
+    let kernels = make(&drawn_as, of.generator, &plan, solver, &|done| {
+        progress(done, steps, &format!("kernels, {}", of.generator));
+        ControlFlow::Continue(())
+    })
+    .map_err(|error| kernels_failed(of, &error))?;
+    let step = |done| progress(plan.steps() + done, steps, &format!("sheets, {}", of.generator));
+    let response = response(of, solver, &step)?;
+    Ok(HowComputed::Kernels { torques_n_m: torques_n_m(of), kernels, response })
 }
 
 /// The drive with the uniform changes of `drawn` alone.
@@ -74,9 +67,9 @@ fn uniform(of: &Tolerances, drawn: &[Drawn]) -> Result<Drive, PlanError> {
 }
 
 /// Kernels at the loads of the tolerances, and displacements up to their limits.
-fn kernel_plan(of: &Tolerances, kind: GeneratorKind) -> KernelPlan {
+fn kernel_plan(of: &Tolerances) -> KernelPlan {
     let [torque, light] = torques_n_m(of);
-    let usual = KernelPlan::for_drive(&of.drive, kind);
+    let usual = KernelPlan::for_drive(&of.drive, of.generator);
     let displacing = || of.list.iter().filter(|t| displaces(t)).map(|t| t.distribution);
     let reach: f64 = displacing().map(|distribution| distribution.limits[1]).sum();
     let (sizes_um, directions) = if reach > 0.0 {
@@ -95,7 +88,8 @@ fn kernel_plan(of: &Tolerances, kind: GeneratorKind) -> KernelPlan {
 }
 
 /// Why kernels failed: which tolerances ask for the displacement, and the remedy.
-fn kernels_failed(of: &Tolerances, kind: GeneratorKind, error: &KernelError) -> PlanError {
+fn kernels_failed(of: &Tolerances, error: &KernelError) -> PlanError {
+    let kind = of.generator;
     let KernelError::Displaced { reached_um, .. } = error else {
         return PlanError::Failed(format!("{kind}: kernels of the drive as drawn: {error}"));
     };
@@ -112,12 +106,7 @@ fn kernels_failed(of: &Tolerances, kind: GeneratorKind, error: &KernelError) -> 
 }
 
 /// State of the middle drive, and a parabola for each field that changes the drive uniformly.
-fn response(
-    of: &Tolerances,
-    kind: GeneratorKind,
-    solver: SolverSettings,
-    step: &(dyn Fn(usize) + Sync),
-) -> Result<Response, PlanError> {
+fn response(of: &Tolerances, solver: SolverSettings, step: &(dyn Fn(usize) + Sync)) -> Result<Response, PlanError> {
     let middle = Drawn::middle(&of.list);
     let alike = || of.list.iter().enumerate().filter(|(_, tolerance)| tolerance.acts == ToleranceActs::Alike);
     let ends = |(t, tolerance): (usize, &FieldTolerance)| {
@@ -130,9 +119,9 @@ fn response(
         if let Some((t, value)) = job {
             drawn[*t].value = *value;
         }
-        let state = state(of, &uniform(of, &drawn)?, kind, solver).map_err(|error| {
+        let state = state(of, &uniform(of, &drawn)?, solver).map_err(|error| {
             let which = job.map_or("the middle drive".to_owned(), |(t, v)| format!("{} = {v}", of.list[t].field));
-            PlanError::Failed(format!("{kind}, {which}: {error}"))
+            PlanError::Failed(format!("{}, {which}: {error}", of.generator))
         });
         step(done.fetch_add(1, Ordering::Relaxed) + 1);
         state
@@ -148,7 +137,8 @@ fn response(
 }
 
 /// State of a drive: settled errors under both loads, and the sheet.
-fn state(of: &Tolerances, drive: &Drive, kind: GeneratorKind, solver: SolverSettings) -> Result<Vec<f64>, SolveError> {
+fn state(of: &Tolerances, drive: &Drive, solver: SolverSettings) -> Result<Vec<f64>, SolveError> {
+    let kind = of.generator;
     let problem = Problem::new(drive, kind, of.temperature_c, solver)?;
     let mut state = Vec::new();
     for torque_n_m in torques_n_m(of) {
@@ -196,7 +186,7 @@ mod tests {
             history: Vec::new(),
         };
         let error = KernelError::Displaced { size_um: 27.5, reached_um: 17.0, reason };
-        let said = kernels_failed(&of, GeneratorKind::Cam, &error).to_string();
+        let said = kernels_failed(&of, &error).to_string();
         for words in [
             "as_built.circular_spline_eccentricity_um (99 of 100 drives up to 15.2 um)",
             "limits = [0, 17",

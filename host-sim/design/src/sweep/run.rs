@@ -142,29 +142,23 @@ impl VariantRow {
 /// # Errors
 /// It holds rows of another plan, or is no file of results.
 pub(super) fn rows_of(path: &Path, text: &[u8], plan: &VariantPlan) -> Result<(Vec<VariantRow>, u64), PlanError> {
-    let foreign = |what: &str| {
+    let foreign = |what: String| {
         PlanError::BadInput(format!("{}: {what}; remove it, or run the sweep in another folder", path.display()))
     };
     // What follows the last end of a line was cut off.
-    let whole = text.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1);
-    let mut reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(&text[..whole]);
-    let (mut rows, mut end, header) = (Vec::new(), 0, header(plan));
-    let mut record = csv::StringRecord::new();
-    while matches!(reader.read_record(&mut record), Ok(true)) {
-        if end == 0 {
-            if record != header {
-                return Err(foreign("no results of this plan"));
-            }
-        } else if record.get(0) != Some(&plan.hash) && record.len() == header.len() {
-            let theirs = record.get(0).unwrap_or_default();
-            return Err(foreign(&format!("results of the plan {theirs:.16}, and this one is {}", plan.hash)));
-        } else {
-            let Some(row) = VariantRow::read(&record, plan) else { break };
-            rows.push(row);
-        }
-        end = reader.position().byte();
+    let end = text.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1);
+    let reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(&text[..end]);
+    let mut records = reader.into_records().map(|record| record.map_err(|error| foreign(error.to_string())));
+    if records.next().transpose()?.is_some_and(|first| first != header(plan)) {
+        return Err(foreign("no results of this plan".to_owned()));
     }
-    Ok((rows, end))
+    let read = |record: csv::StringRecord| match record.get(0) {
+        Some(hash) if hash != plan.hash => {
+            Err(foreign(format!("results of the plan {hash:.16}, and this one is {}", plan.hash)))
+        }
+        _ => VariantRow::read(&record, plan).ok_or_else(|| foreign("a row that is none of this plan".to_owned())),
+    };
+    Ok((records.map(|record| read(record?)).collect::<Result<Vec<VariantRow>, PlanError>>()?, end as u64))
 }
 
 /// Columns of a file of results.
@@ -288,11 +282,11 @@ pub fn run(
     if end == 0 {
         file.write_all((header(plan).join(",") + "\n").as_bytes()).map_err(failed)?;
     }
-    let models = plan.models();
+    let model = plan.model();
     let journal = Mutex::new(Journal { file, next, waiting: BTreeMap::new() });
     (next..to).collect::<Vec<_>>().into_iter().par_bridge().try_for_each(|place| {
         let (variant, generator) = run_at(place);
-        let row = computed(plan, variant, generator, models.get(place % generators));
+        let row = computed(plan, variant, generator, model.as_ref());
         let line = row.line(plan)?;
         let mut journal = journal.lock().unwrap_or_else(PoisonError::into_inner);
         done(journal.next + journal.waiting.len() + 1 - from, to - from, &row);

@@ -3,7 +3,7 @@ use std::fs;
 
 use super::draw::{Drawn, draw, sets};
 use super::model::{FIGURES, Parabola, Response, SHEET, STATE, WAVE};
-use super::plan::{HowComputed, OfOne};
+use super::plan::HowComputed;
 use super::tolerance::{Distribution, DistributionForm, ToleranceActs};
 use super::*;
 use crate::kernels::{Eccentric, KERNELS_SCHEMA, Kernels, LoadKernels, WheelKernels};
@@ -93,7 +93,7 @@ fn planned(of: &Tolerances, response: Response, draws: usize) -> VariantPlan {
         draw(&of.list, draws, 1).iter().map(|one| sets(&of.list, one).into_iter().map(split).collect()).collect();
     let columns = lines[0].iter().map(|(path, _)| path.clone()).collect();
     let variants = lines.into_iter().map(|line| line.into_iter().map(|(_, value)| value).collect()).collect();
-    let by = HowComputed::Kernels { torques_n_m: [10.0, 1.0], of: vec![OfOne { kernels: kernels(), response }] };
+    let by = HowComputed::Kernels { torques_n_m: [10.0, 1.0], kernels: kernels(), response };
     VariantPlan::new((&of.drive, None), &[GeneratorKind::Cam], (columns, variants), by, MeshLevel::Coarse)
 }
 
@@ -252,15 +252,15 @@ fn errors_of_single_pitches_add_up_and_close() {
 }
 
 /// Figures by test kernels of a drive with these fields.
-fn figures(of: &OfOne, sets: &[&str]) -> Vec<f64> {
+fn figures((kernels, response): &(Kernels, Response), sets: &[&str]) -> Vec<f64> {
     let built = Drive::hhd_95().with_sets(sets.iter().copied()).unwrap().as_built;
-    model::KernelModel::new(&of.kernels, of.response.clone(), [10.0, 1.0]).figures(&built, &[])
+    model::KernelModel::new(kernels, response.clone(), [10.0, 1.0]).figures(&built, &[])
 }
 
 /// A harmonic of the pitch and a displaced axis do what their kernels say, whichever way they are summed.
 #[test]
 fn the_model_is_that_of_the_kernels() {
-    let of = OfOne { kernels: kernels(), response: Response { middle: vec![0.0; STATE], parabolas: Vec::new() } };
+    let of = (kernels(), Response { middle: vec![0.0; STATE], parabolas: Vec::new() });
     let at = |name: &str| FIGURES.iter().position(|known| *known == name).unwrap();
     let harmonic = "as_built.flexspline_pitch_harmonics=[{order = 2, amplitude_um = 3.0, phase_deg = 12.0}]";
     let pitch = figures(&of, &[harmonic]);
@@ -282,8 +282,7 @@ fn kernels_agree_with_fem() {
     let of = tolerances(include_str!("../../../../examples/sweep/teeth.toml"));
     let settings = PlanSettings { draws: Some(8), seed: 1, mesh: MeshLevel::Coarse };
     let plan = VariantPlan::of_tolerances(&of, settings, &|_, _, _| ()).unwrap();
-    let HowComputed::Kernels { torques_n_m, of: kinds } = &plan.by else { panic!("no kernels") };
-    let model = model::KernelModel::new(&kinds[0].kernels, kinds[0].response.clone(), *torques_n_m);
+    let model = plan.model().unwrap();
     let places: Vec<f64> = (0..5).map(|j| 95.0 * f64::from(j) / 5.0).collect();
     let by_fem = |drive: &Drive| -> Vec<f64> {
         let problem = Problem::new(drive, GeneratorKind::Cam, of.temperature_c, plan.solver()).unwrap();
@@ -316,13 +315,13 @@ fn kernels_agree_with_fem() {
 /// A drive whose axis takes more of the play than there is has none: its lost motion is the wind-up of its stiffness.
 #[test]
 fn flanks_do_not_overlap() {
-    let mut of = OfOne { kernels: kernels(), response: Response { middle: vec![0.0; STATE], parabolas: Vec::new() } };
+    let mut of = (kernels(), Response { middle: vec![0.0; STATE], parabolas: Vec::new() });
     // Half the play under either light load, and stiffnesses of N·m/rad.
     let play = 6.0;
-    of.response.middle[WAVE..2 * WAVE].fill(0.5 * play);
-    of.response.middle[2 * WAVE + 1..2 * WAVE + 4].copy_from_slice(&[2e5, 3e5, 4e5]);
+    of.1.middle[WAVE..2 * WAVE].fill(0.5 * play);
+    of.1.middle[2 * WAVE + 1..2 * WAVE + 4].copy_from_slice(&[2e5, 3e5, 4e5]);
     // A displaced axis takes of it in every direction.
-    of.kernels.eccentric.deviation_arcsec[0][0].fill(-10.0 * PER_UM);
+    of.0.eccentric.deviation_arcsec[0][0].fill(-10.0 * PER_UM);
     let at = |name: &str| FIGURES.iter().position(|known| *known == name).unwrap();
     let wind_up = 2.0 / 4e5 * 206_264.8;
     for (size, expected, closed) in [(0.0, play, 0.0), (1.0, play - 2.0 * PER_UM, 0.0), (5.0, wind_up, 100.0)] {
@@ -332,7 +331,7 @@ fn flanks_do_not_overlap() {
         }
         assert_eq!(all[at("play_closed_percent")], closed);
     }
-    assert_eq!(of.response.middle.len(), 2 * WAVE + SHEET.len());
+    assert_eq!(of.1.middle.len(), 2 * WAVE + SHEET.len());
 }
 
 /// The eccentricity makes the error of these kernels; the rim changes it by a hundredth.

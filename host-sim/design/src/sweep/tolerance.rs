@@ -34,8 +34,8 @@ const FAR_OFF: (f64, f64) = (10.0, 0.1);
 pub struct Tolerances {
     /// The drive as drawn.
     pub drive: Drive,
-    /// The generators.
-    pub generators: Vec<GeneratorKind>,
+    /// The generator.
+    pub generator: GeneratorKind,
     /// Load, N·m.
     pub torque_n_m: f64,
     /// Temperature, °C.
@@ -231,12 +231,10 @@ impl Tolerances {
                 ),
             );
         }
-        let known = GeneratorKind::ALL.map(|kind| (kind.name(), Some(kind))).into_iter().chain([("all", None)]);
-        let known: Vec<(&str, Option<GeneratorKind>)> = known.collect();
-        let usual = Some(GeneratorKind::Cam);
-        let kind = value("generator").and_then(|value| file.take("generator", one_of(&known, value))).unwrap_or(usual);
-        let generators = kind.map_or(GeneratorKind::ALL.to_vec(), |kind| vec![kind]);
-        let rated = generators.iter().map(|kind| drive.rated_torque_n_m(*kind)).fold(f64::INFINITY, f64::min);
+        let known = GeneratorKind::ALL.map(|kind| (kind.name(), kind));
+        let generator = value("generator").and_then(|value| file.take("generator", one_of(&known, value)));
+        let generator = generator.unwrap_or(GeneratorKind::Cam);
+        let rated = drive.rated_torque_n_m(generator);
         let mut number = |key: &str, allowed: &Allowed, usual: f64| {
             value(key).and_then(|value| file.take(key, real(allowed, value))).unwrap_or(usual)
         };
@@ -259,7 +257,7 @@ impl Tolerances {
             let what = format!("found {:?} twice, allowed: once", list[k].field);
             file.refuse(value.span(), &format!("tolerance[{k}]"), what);
         }
-        Some(Tolerances { drive, generators, torque_n_m, temperature_c, list })
+        Some(Tolerances { drive, generator, torque_n_m, temperature_c, list })
     }
 
     /// The drive with these values of the tolerances.
