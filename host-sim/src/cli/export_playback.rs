@@ -2,9 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueHint};
-use flexspline::Table;
-use serde::Serialize;
+use clap::Args;
+use serde_json::json;
 
 use super::context::{Context, image_file, table_of};
 use super::export::Format;
@@ -25,7 +24,7 @@ const POINTLESS: f64 = 0.7;
 #[command(next_help_heading = "Playback of a table: csv, cfs, fprime")]
 pub(super) struct PlaybackOptions {
     /// Measured rows of the unit, on which the residual is computed too
-    #[arg(long, value_name = "LOG.csv", value_hint = ValueHint::FilePath, requires = "tables")]
+    #[arg(long, value_name = "LOG.csv", requires = "tables")]
     data: Option<PathBuf>,
     #[command(flatten)]
     logs: LogOptions,
@@ -51,23 +50,6 @@ pub(super) struct PlaybackOptions {
     /// Component instance that has the parameters: fprime [default: Ref.joint]
     #[arg(long, value_name = "NAME")]
     component: Option<String>,
-}
-
-/// Result with `--json`, and `playback.json`.
-#[derive(Serialize)]
-struct Played {
-    schema_version: u32,
-    format: Format,
-    table_id: String,
-    tool: &'static str,
-    written: Vec<PathBuf>,
-    torque_n_m: f64,
-    temperature_c: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    model: Option<PlaybackResidual>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    playback: Option<PlaybackResidual>,
-    notes: Vec<String>,
 }
 
 impl PlaybackOptions {
@@ -98,7 +80,14 @@ impl PlaybackOptions {
         let tables = tables.ok_or_else(missing)?;
         let image = image_file(tables)?;
         let table = table_of(tables, &image)?;
-        let section = section_of(&table, load)?;
+        // In the middle of the table's range where nothing is given.
+        let within = |option: &str, value: Option<f64>, range: [f32; 2]| {
+            let [least, most] = range.map(f64::from);
+            within(option, value.unwrap_or(0.5 * (least + most)), least, most)
+        };
+        let torque_n_m = within("--torque-n-m", load[0], table.torque_range_n_m())?;
+        let temperature_c = within("--temperature-c", load[1], table.temperature_range_c())?;
+        let section = TableSection { table: &table, torque_n_m, temperature_c };
         let mut curve = None;
         let files = match format {
             Format::Cfs if image.len() > MAX_TABLE_BYTES && !self.force => {
@@ -124,9 +113,9 @@ impl PlaybackOptions {
                 curve.insert(made).csv(section)
             }
         };
-        let curve = curve.as_ref();
-        let judged = self.data.as_ref().map(|data| self.judge(data, section, curve)).transpose()?;
-        let (playback, notes) = judged.unzip();
+        let judged = self.data.as_ref().map(|data| self.judge(data, section, curve.as_ref()));
+        let (playback, notes) = judged.transpose()?.unzip();
+        let notes = notes.unwrap_or_default();
         let out = context.out()?;
         let written: Vec<PathBuf> = files.iter().map(|(name, _)| out.join(name)).collect();
         let summary = out.join("playback.json");
@@ -142,21 +131,28 @@ impl PlaybackOptions {
         for (path, (_, bytes)) in written.iter().zip(&files) {
             outputs.file(path, |to| to.write_all(bytes))?;
         }
-        let played = Played {
-            schema_version: 1,
-            format,
-            table_id: table.id().to_string(),
-            tool: concat!("flexspline ", env!("CARGO_PKG_VERSION")),
-            written,
-            torque_n_m: section.torque_n_m,
-            temperature_c: section.temperature_c,
-            model: curve.map(|curve| curve.on_model(section)),
-            playback,
-            notes: notes.unwrap_or_default(),
-        };
+        let (id, model) = (table.id().to_string(), curve.map(|curve| curve.on_model(section)));
+        let mut played = json!({
+            "schema_version": 1, "format": format, "table_id": &id, "written": &written, "notes": &notes,
+            "tool": concat!("flexspline ", env!("CARGO_PKG_VERSION")),
+            "torque_n_m": torque_n_m, "temperature_c": temperature_c,
+        });
+        let mut text = format!("table {id}, {torque_n_m} N.m, {temperature_c} degrees C");
+        for (name, of, residual) in
+            [("model", "the table's own model", model), ("playback", "the unit's data", playback)]
+        {
+            let Some(residual) = residual else { continue };
+            text += &format!(
+                "\n  {of}, arcsec rms: {:.3} uncorrected, {:.3} with this playback, {:.3} with the core",
+                residual.rms_uncorrected_arcsec, residual.rms_played_arcsec, residual.rms_core_arcsec
+            );
+            played[name] = json!(residual);
+        }
         outputs.json(&summary, &played)?;
         outputs.finish()?;
-        context.print(&played, || text(&played))
+        text.extend(notes.iter().map(|note| format!("\nnote: {note}")));
+        let written: Vec<String> = written.iter().map(|file| file.display().to_string()).collect();
+        context.print(&played, || format!("{text}\nwrote {}", written.join(", ")))
     }
 
     /// The residual on the data of a unit; refuses a file that does not help it.
@@ -172,8 +168,8 @@ impl PlaybackOptions {
         let mut notes: Vec<String> = faults.chain(notes).chain(summary.remarks).collect();
         let extrapolated = summary.rows_by_quality[2];
         if extrapolated > 0 {
-            let all = rows.len();
-            notes.push(format!("{extrapolated} of {all} rows lie beyond the loads or temperatures of the table"));
+            let of = format!("{extrapolated} of {} rows", rows.len());
+            notes.push(format!("{of} lie beyond the loads or temperatures of the table"));
         }
         let residual = PlaybackResidual::on_data(section, &rows, &replayed, curve);
         let PlaybackResidual { rms_uncorrected_arcsec: error, rms_played_arcsec: left, rms_core_arcsec: core, .. } =
@@ -203,29 +199,4 @@ impl PlaybackOptions {
         notes.push(format!("written by --force: {what}"));
         Ok((residual, notes))
     }
-}
-
-/// The section at the load and temperature given, within the table's ranges, or in the middle of these.
-fn section_of<'a>(table: &'a Table<'a>, load: [Option<f64>; 2]) -> Result<TableSection<'a>, Failure> {
-    let within = |option: &str, value: Option<f64>, range: [f32; 2]| {
-        let [least, most] = range.map(f64::from);
-        within(option, value.unwrap_or(0.5 * (least + most)), least, most)
-    };
-    let torque_n_m = within("--torque-n-m", load[0], table.torque_range_n_m())?;
-    let temperature_c = within("--temperature-c", load[1], table.temperature_range_c())?;
-    Ok(TableSection { table, torque_n_m, temperature_c })
-}
-
-fn text(played: &Played) -> String {
-    let mut text = format!("table {}, {} N.m, {} degrees C", played.table_id, played.torque_n_m, played.temperature_c);
-    for (of, residual) in [("the table's own model", &played.model), ("the unit's data", &played.playback)] {
-        let Some(residual) = residual else { continue };
-        text += &format!(
-            "\n  {of}, arcsec rms: {:.3} uncorrected, {:.3} with this playback, {:.3} with the core",
-            residual.rms_uncorrected_arcsec, residual.rms_played_arcsec, residual.rms_core_arcsec
-        );
-    }
-    text += &played.notes.iter().map(|note| format!("\nnote: {note}")).collect::<String>();
-    let files: Vec<String> = played.written.iter().map(|file| file.display().to_string()).collect();
-    format!("{text}\nwrote {}", files.join(", "))
 }

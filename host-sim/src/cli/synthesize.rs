@@ -3,9 +3,10 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueHint};
+use clap::Args;
 use flexspline::Table;
 use serde::Serialize;
+use serde_json::{Value, json};
 
 use super::context::{Context, quoted, table_image, table_of};
 use super::tables::fresh_table;
@@ -52,13 +53,13 @@ pub(super) struct Synthesize {
     #[arg(long)]
     list: bool,
     /// Folder of tables made by `flexspline tables`
-    #[arg(long, value_name = "DIR", conflicts_with = "model", value_hint = ValueHint::DirPath)]
+    #[arg(long, value_name = "DIR", conflicts_with = "model")]
     tables: Option<PathBuf>,
     /// Wave generator of the drive: two-roller, four-roller, double-disc or cam
     #[arg(long, value_name = "G", default_value = "cam")]
     generator: GeneratorKind,
     /// Nominal model from the catalogue, or one that `flexspline diagnose` has extended
-    #[arg(long, value_name = "nominal.toml", value_hint = ValueHint::FilePath)]
+    #[arg(long, value_name = "nominal.toml")]
     model: Option<PathBuf>,
     /// The drive as drawn, not a unit drawn at random from the spread between units
     #[arg(long)]
@@ -97,7 +98,7 @@ struct ExcitationOptions {
     #[arg(long, value_name = "LOW,HIGH", default_value = "-20,50", allow_hyphen_values = true)]
     temperature_c: String,
     /// Take motion, load, temperature and time from this file
-    #[arg(long, value_name = "DATA.csv", value_hint = ValueHint::FilePath)]
+    #[arg(long, value_name = "DATA.csv")]
     like: Option<PathBuf>,
     /// Names and units of the columns of that file, as for `flexspline diagnose` [default: the usual names]
     #[arg(long, value_name = "MAP", default_value = "", hide_default_value = true, requires = "like")]
@@ -145,8 +146,8 @@ struct Truth {
 impl Synthesize {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
         if self.list {
-            let all = List { schema_version: 1, effects: effects().iter().map(Listed::of).collect() };
-            return context.print_data(&all, list);
+            let all: Vec<Value> = effects().iter().map(listed).collect();
+            return context.print_data(&json!({ "schema_version": 1, "effects": all }), list);
         }
         let chosen = self.effects.iter().map(|text| parse(text)).collect::<Result<Vec<_>, _>>();
         let chosen = chosen.map_err(|error| Failure::BadInput(format!("--effect: {error}")))?;
@@ -334,48 +335,18 @@ fn text(truth: &Truth, out: &std::path::Path) -> String {
     text
 }
 
-/// `--list` with `--json`.
-#[derive(Serialize)]
-struct List {
-    schema_version: u32,
-    effects: Vec<Listed>,
-}
-
-/// An effect of the list.
-#[derive(Serialize)]
-struct Listed {
-    name: &'static str,
-    meaning: &'static str,
-    data_fault: bool,
-    parameters: Vec<ListedParameter>,
-}
-
-/// A parameter of it.
-#[derive(Serialize)]
-struct ListedParameter {
-    name: &'static str,
-    meaning: &'static str,
-    range: [f64; 2],
-    allowed: String,
-    usual: String,
-}
-
-impl Listed {
-    fn of(effect: &Definition) -> Listed {
-        let parameters = effect.parameters.iter().map(|parameter| ListedParameter {
-            name: parameter.name.as_str(),
-            meaning: parameter.meaning,
-            range: parameter.range,
-            allowed: parameter.allowed(),
-            usual: usual(parameter),
-        });
-        Listed {
-            name: effect.name(),
-            meaning: effect.meaning,
-            data_fault: effect.is_fault(),
-            parameters: parameters.collect(),
-        }
-    }
+/// An effect of `--list` with `--json`.
+fn listed(effect: &Definition) -> Value {
+    let parameter = |of: &Parameter| {
+        json!({
+            "name": of.name.as_str(), "meaning": of.meaning, "range": of.range, "allowed": of.allowed(),
+            "usual": usual(of),
+        })
+    };
+    let parameters: Vec<Value> = effect.parameters.iter().map(parameter).collect();
+    json!({
+        "name": effect.name(), "meaning": effect.meaning, "data_fault": effect.is_fault(), "parameters": parameters,
+    })
 }
 
 /// Default of a parameter.

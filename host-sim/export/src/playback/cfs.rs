@@ -29,8 +29,7 @@ const FULL_NAME: &str = "APP.TABLE, letters, digits and _, at most 19 and 15 of 
 /// The name is another one.
 pub fn cfs(section: TableSection<'_>, image: &[u8], full_name: &str, ids: [u32; 2]) -> Result<Files, NameError> {
     let fits = |name: &str, field: usize| word(name) && name.len() < field;
-    let is_fit = full_name.split_once('.').is_some_and(|(app, table)| fits(app, APP_NAME) && fits(table, TABLE_NAME));
-    if !is_fit {
+    if full_name.split_once('.').is_none_or(|(app, table)| !fits(app, APP_NAME) || !fits(table, TABLE_NAME)) {
         return Err(NameError { option: "--table-name", found: full_name.to_owned(), allowed: FULL_NAME });
     }
     // Time is left at zero: the same table is the same file.

@@ -69,13 +69,13 @@ impl TableSection<'_> {
     }
 
     /// Evenly spaced points over the whole period, in each of the directions: led angle, direction, error, rad.
-    fn samples(&self, directions: &[Direction]) -> Vec<(f64, Direction, f64)> {
+    fn samples(&self, directions: impl IntoIterator<Item = Direction>) -> Vec<(f64, Direction, f64)> {
         let step = TAU * f64::from(self.period_turns()) / f64::from(JUDGE_POINTS);
         let sample = |direction: Direction, k: u32| {
             let led = step * f64::from(k);
             (led, direction, self.error_rad(led, direction))
         };
-        directions.iter().flat_map(|direction| (0..JUDGE_POINTS).map(|k| sample(*direction, k))).collect()
+        directions.into_iter().flat_map(|direction| (0..JUDGE_POINTS).map(move |k| sample(direction, k))).collect()
     }
 
     /// Lines of a comment in a file made of this section: table, tool, load, sign.
@@ -114,7 +114,8 @@ impl Curve {
         let turns = f64::from(section.period_turns());
         let points = (section.table.drive().exact_ratio().abs() * turns).round() as u32 * points_per_turn;
         let step_rad = TAU * turns / f64::from(points);
-        let errors: Vec<f64> = section.samples(directions).into_iter().map(|(.., error)| error).collect();
+        let errors: Vec<f64> =
+            section.samples(directions.iter().copied()).into_iter().map(|(.., error)| error).collect();
         let mean_rad = mean(&errors);
         let correction = |k: u32, direction: Direction| {
             let asked = step_rad * f64::from(k);
@@ -141,12 +142,12 @@ impl Curve {
     /// Residual on the table's own model: steady motion at the section's load. The core's is the bound of its inverse.
     pub fn on_model(&self, section: TableSection<'_>) -> PlaybackResidual {
         let bound = f64::from(section.table.inverse_error_bound_rad()) * ARCSEC_PER_RAD;
-        let directions: Vec<Direction> = self.corrections.iter().map(|(direction, _)| *direction).collect();
+        let directions = self.corrections.iter().map(|(direction, _)| *direction);
         let point = |(led, direction, error)| {
             let error = error * ARCSEC_PER_RAD;
             [error, error + self.played_arcsec(led, direction).unwrap_or(0.0), 0.0]
         };
-        let points: Vec<[f64; 3]> = section.samples(&directions).into_iter().map(point).collect();
+        let points: Vec<[f64; 3]> = section.samples(directions).into_iter().map(point).collect();
         PlaybackResidual { rms_core_arcsec: bound, ..PlaybackResidual::new(&points) }
     }
 
@@ -154,8 +155,7 @@ impl Curve {
     pub fn csv(&self, section: TableSection<'_>) -> Files {
         let ratio = section.table.drive().exact_ratio();
         let mut text = section.comment("the correction is added to the output angle asked for");
-        let _ = writeln!(text, "# ratio {ratio}\n# mean_error_arcsec {:.4}", self.mean_arcsec);
-        text += "output_rad,generator_rad";
+        let _ = write!(text, "# ratio {ratio}\n# mean_error_arcsec {:.4}\noutput_rad,generator_rad", self.mean_arcsec);
         for (direction, _) in &self.corrections {
             text += if *direction == Direction::Forward { ",forward_arcsec" } else { ",backward_arcsec" };
         }
