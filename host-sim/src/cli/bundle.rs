@@ -5,7 +5,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueHint};
+use clap::Args;
 use serde::Serialize;
 
 use super::Failure;
@@ -28,7 +28,7 @@ Examples:
   flexspline bundle --tables out --no-core --out bundle")]
 pub(super) struct BundleCommand {
     /// Folder with table images, or one image
-    #[arg(long, value_name = "DIR|FILE.fxt", value_hint = ValueHint::AnyPath)]
+    #[arg(long, value_name = "DIR|FILE.fxt")]
     tables: PathBuf,
     /// Targets of the static library, separated by commas or repeated; default: all that are available
     #[arg(long = "target", value_name = "TARGET", value_delimiter = ',')]
@@ -38,7 +38,7 @@ pub(super) struct BundleCommand {
     no_core: bool,
     /// Folder with TARGET/libflexspline.a; default: the one of the release next to this program, or a build of these
     /// sources
-    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    #[arg(long, value_name = "DIR")]
     libraries: Option<PathBuf>,
     /// Also write the folder as one file, DIR.tar.gz
     #[arg(long)]

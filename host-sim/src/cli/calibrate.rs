@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use clap::{ArgGroup, Args, ValueHint};
+use clap::{ArgGroup, Args};
 use flexspline::Table;
 
 use super::context::{Context, quoted, table_image, table_of};
@@ -40,7 +40,7 @@ Examples:
   flexspline calibrate measured.csv --tables out --generator cam")]
 pub(super) struct Calibrate {
     /// Logs of one unit; several files are sessions, each with its own offset
-    #[arg(value_name = "LOG", value_hint = ValueHint::FilePath, required_unless_present = "plan")]
+    #[arg(value_name = "LOG", required_unless_present = "plan")]
     logs: Vec<PathBuf>,
     /// Report what to record on a bench, instead of reading logs
     #[arg(long, conflicts_with = "logs")]
@@ -49,10 +49,10 @@ pub(super) struct Calibrate {
     #[arg(long)]
     more: bool,
     /// Folder of tables made by `flexspline tables`; the one of --generator is the starting point
-    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    #[arg(long, value_name = "DIR")]
     tables: Option<PathBuf>,
     /// Nominal model from the catalogue as the starting point
-    #[arg(long, value_name = "nominal.toml", value_hint = ValueHint::FilePath)]
+    #[arg(long, value_name = "nominal.toml")]
     model: Option<PathBuf>,
     /// Generator turns per output turn, negative if they turn in opposite directions, if nothing else is known
     #[arg(long, value_name = "N", allow_negative_numbers = true)]

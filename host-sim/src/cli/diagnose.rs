@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueHint};
+use clap::Args;
 
 use super::context::{Context, quoted, table_image};
 use super::logs::LogOptions;
@@ -39,14 +39,14 @@ Examples:
   flexspline diagnose measured.csv --tables out --generator cam --remake-tables --out diagnosed")]
 pub(super) struct Diagnose {
     /// Measured rows: CSV with a header; columns as --columns says
-    #[arg(value_name = "DATA.csv", value_hint = ValueHint::FilePath)]
+    #[arg(value_name = "DATA.csv")]
     data: PathBuf,
     /// Nominal model from the catalogue, or one that was extended before: then what is found is beyond it
-    #[arg(long, value_name = "nominal.toml", value_hint = ValueHint::FilePath, conflicts_with = "tables")]
+    #[arg(long, value_name = "nominal.toml", conflicts_with = "tables")]
     #[arg(required_unless_present = "tables")]
     model: Option<PathBuf>,
     /// Folder of tables made by `flexspline tables` from the drive of --drive
-    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    #[arg(long, value_name = "DIR")]
     tables: Option<PathBuf>,
     /// Wave generator whose table is used, and that names the extended one: two-roller, four-roller, double-disc or cam
     #[arg(long, value_name = "G", default_value = "cam")]

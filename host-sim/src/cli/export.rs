@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use clap::builder::ArgPredicate;
-use clap::{Arg, Args, ValueEnum, ValueHint};
+use clap::{Arg, Args, ValueEnum};
 use serde::Serialize;
 
 use super::context::quoted;
@@ -64,7 +64,7 @@ pub(super) struct Export {
     format: Format,
     /// Table image: fmu, cfs, fprime, and csv for a playback; --torque-n-m and --temperature-c select the section of
     /// the table [default: the middle of its range]
-    #[arg(long, value_name = "FILE.fxt", value_hint = ValueHint::FilePath)]
+    #[arg(long, value_name = "FILE.fxt")]
     tables: Option<PathBuf>,
     #[command(flatten)]
     playback: PlaybackOptions,

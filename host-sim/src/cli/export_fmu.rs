@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum, ValueHint};
+use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use super::context::image_file;
@@ -25,10 +25,10 @@ pub(super) struct FmuOptions {
     model: Option<FmuModel>,
     /// Masses, friction, servo and expected load of a joint: antenna, rover, camera, telescope, or a TOML file
     /// [default: antenna]
-    #[arg(long, value_name = "SCENARIO", help_heading = "FMU", value_hint = ValueHint::FilePath)]
+    #[arg(long, value_name = "SCENARIO", help_heading = "FMU")]
     scenario: Option<String>,
     /// Library of flexspline-fmu to pack, repeatable for several platforms [default: those next to this program]
-    #[arg(long, value_name = "FILE", help_heading = "FMU", value_hint = ValueHint::FilePath)]
+    #[arg(long, value_name = "FILE", help_heading = "FMU")]
     library: Vec<PathBuf>,
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueHint};
+use clap::Args;
 
 use super::context::{Context, quoted};
 use super::{Failure, bad_input, say};
@@ -20,7 +20,7 @@ Examples:
   flexspline look monday.csv tuesday.csv --json")]
 pub(super) struct Look {
     /// Log files
-    #[arg(value_name = "FILE", value_hint = ValueHint::FilePath, required = true)]
+    #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
 }
 

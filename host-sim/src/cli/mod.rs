@@ -38,7 +38,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::error::{ContextKind, ContextValue};
-use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueHint};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use context::Context;
 use flexspline_base::output::{OutputError, remove_empty_folders, replaces_none_kept};
@@ -243,13 +243,13 @@ struct Common {
     /// Drive file, or the name of a built-in drive: HHD-95 (ideal), HHD-95-typical (friction, compliances,
     /// tolerances), CUP-95 (a cup), HHD-95-hermetic (a closed sleeve), HHD-95-plane (no third dimension), S-95
     /// (S-shaped teeth)
-    #[arg(long, global = true, value_name = "FILE|NAME", default_value = USUAL_DRIVE, value_hint = ValueHint::FilePath)]
+    #[arg(long, global = true, value_name = "FILE|NAME", default_value = USUAL_DRIVE)]
     drive: String,
     /// Override fields of the drive, for instance flanks.friction_coefficient=0.08; several with commas, or repeated
     #[arg(long = "set", global = true, value_name = "PATH=VALUE")]
     sets: Vec<String>,
     /// Folder for output files, made if it does not exist [default: out]
-    #[arg(long, global = true, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    #[arg(long, global = true, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print the result as one JSON object, and nothing else, on stdout
     #[arg(long, global = true)]

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum, ValueHint};
+use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use super::context::quoted;
@@ -38,7 +38,7 @@ Examples:
   flexspline new nominal.toml")]
 pub(super) struct New {
     /// The file to write
-    #[arg(value_name = "FILE", value_hint = ValueHint::FilePath)]
+    #[arg(value_name = "FILE")]
     file: PathBuf,
     /// What to write [default: nominal if the file is called so, else drive]
     #[arg(long, value_enum)]

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueHint};
+use clap::Args;
 use flexspline::Table;
 
 use super::context::{Context, image_file, quoted, table_of};
@@ -27,11 +27,11 @@ Examples:
   flexspline replay --tables out/calibrated.fxt bench.log --columns generator=#2:turn,output=#3:deg")]
 pub(super) struct Replay {
     /// Table image, as `flexspline tables` writes it
-    #[arg(long, value_name = "FILE.fxt", value_hint = ValueHint::FilePath)]
+    #[arg(long, value_name = "FILE.fxt")]
     tables: PathBuf,
     /// Measured rows: CSV with generator_rad (rad), output_rad (rad) or error_arcsec, and if wanted torque_n_m,
     /// temperature_c
-    #[arg(value_name = "DATA.csv", value_hint = ValueHint::FilePath)]
+    #[arg(value_name = "DATA.csv")]
     data: PathBuf,
     /// Accept simulated rows of another drive or generator than the table's, for instance of a drive as built
     #[arg(long)]

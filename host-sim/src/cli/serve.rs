@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
-use clap::{Args, ValueHint};
+use clap::Args;
 use serde::Serialize;
 
 use super::{Context, Failure, say, stop};
@@ -35,7 +35,7 @@ The first page asks what there is:
 --drive, --set and --out are those of the commands that the bench runs; here they have no use.")]
 pub(super) struct Serve {
     /// The folder of the bench
-    #[arg(value_name = "FOLDER", default_value = ".", value_hint = ValueHint::DirPath)]
+    #[arg(value_name = "FOLDER", default_value = ".")]
     folder: PathBuf,
     /// Port of 127.0.0.1; 0 takes one that is free
     #[arg(long, value_name = "N", default_value_t = 0)]

@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::ops::ControlFlow;
 use std::path::Path as FilePath;
 
-use clap::{Args, ValueEnum, ValueHint};
+use clap::{Args, ValueEnum};
 
 use super::{Context, Failure, bad_input, report, say};
 use flexspline_base::figures;
@@ -54,7 +54,7 @@ pub(super) struct Simulate {
     model: ModelOptions,
     /// Where the generator goes: paper (+1 rad, then -2 rad), pitch (settled, then one flexspline tooth pitch), turn
     /// (settled, then one turn), or a CSV file
-    #[arg(long, value_name = "paper|pitch|turn|FILE", default_value = "paper", value_hint = ValueHint::FilePath)]
+    #[arg(long, value_name = "paper|pitch|turn|FILE", default_value = "paper")]
     path: String,
     /// Largest increment of the generator, rad [default: 0.01 on paper, 1/24 of a tooth pitch on pitch, 1/8 on turn]
     #[arg(long, value_name = "RAD", allow_negative_numbers = true)]

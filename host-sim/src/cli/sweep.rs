@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{ArgGroup, Args, Subcommand, ValueHint};
+use clap::{ArgGroup, Args, Subcommand};
 use serde_json::json;
 
 use super::context::quoted;
@@ -61,7 +61,7 @@ enum SweepStep {
     /// Compute a shard of the variants of a plan
     Run {
         /// Folder of the sweep
-        #[arg(value_name = "DIR", value_hint = ValueHint::DirPath)]
+        #[arg(value_name = "DIR")]
         folder: PathBuf,
         /// The shard I of N shards, I from 1 [default: all variants]
         #[arg(long, value_name = "I/N")]
@@ -70,7 +70,7 @@ enum SweepStep {
     /// Reduce the results to sweep.csv, sweep.json and report.html
     Reduce {
         /// Folder of the sweep
-        #[arg(value_name = "DIR", value_hint = ValueHint::DirPath)]
+        #[arg(value_name = "DIR")]
         folder: PathBuf,
         /// Accept missing results
         #[arg(long)]
@@ -89,7 +89,7 @@ struct PlanCommand {
     #[arg(long, value_name = "PATH=VALUES", allow_hyphen_values = true)]
     vary: Vec<Vary>,
     /// File of tolerances, which drives are drawn from
-    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath, requires = "draws")]
+    #[arg(long, value_name = "FILE", requires = "draws")]
     tolerances: Option<PathBuf>,
     /// Print a commented file of tolerances
     #[arg(long)]

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Mutex;
 
-use clap::{Args, ValueHint};
+use clap::Args;
 use flexspline::Table;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -62,7 +62,7 @@ pub(super) struct Tables {
     #[arg(short, long, value_name = "G", default_value = "all")]
     generator: GeneratorNames,
     /// Make the table from this file of samples instead of FEM; needs one --generator
-    #[arg(long, value_name = "FILE.csv", value_hint = ValueHint::FilePath)]
+    #[arg(long, value_name = "FILE.csv")]
     from_samples: Option<PathBuf>,
     /// Half-width of the play in arcsec where a sample file has one direction only
     #[arg(long, value_name = "ARCSEC", requires = "from_samples", allow_negative_numbers = true)]

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
-use clap::{Args, ValueHint};
+use clap::Args;
 use flexspline::Table;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -35,7 +35,7 @@ Examples:
   flexspline validate --tables out --generator cam --torques 24 --seed 7")]
 pub(super) struct Validate {
     /// Folder with <G>.fxt files written by `tables`
-    #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
+    #[arg(long, value_name = "DIR")]
     tables: PathBuf,
     /// Wave generator: two-roller, four-roller, double-disc, cam, or all in the folder
     #[arg(short, long, value_name = "G", default_value = "all")]
