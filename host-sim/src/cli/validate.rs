@@ -102,7 +102,7 @@ struct CheckedTable<'a> {
     path: &'a Path,
     kind: GeneratorKind,
     table: Table<'a>,
-    /// What a data sheet added.
+    /// The spring that a data sheet added.
     spring: Option<MissingSpring>,
 }
 

@@ -109,7 +109,7 @@ pub(super) enum HowComputed {
         /// The load, and the light load of lost motion, N·m.
         torques_n_m: [f64; 2],
         /// Influence kernels of the drive as drawn.
-        kernels: Kernels,
+        kernels: Box<Kernels>,
         /// Response to uniform changes.
         response: Response,
     },
@@ -232,7 +232,7 @@ impl VariantPlan {
         matches!(self.by, HowComputed::Kernels { .. })
     }
 
-    /// What evaluates drives by kernels; none of a plan of fields.
+    /// The model of a plan of tolerances; none of a plan of fields.
     pub(super) fn model(&self) -> Option<KernelModel> {
         let HowComputed::Kernels { torques_n_m, kernels, response } = &self.by else { return None };
         Some(KernelModel::new(kernels, response.clone(), *torques_n_m))

@@ -56,7 +56,7 @@ pub(super) fn respond(
     .map_err(|error| kernels_failed(of, &error))?;
     let step = |done| progress(plan.steps() + done, steps, &format!("sheets, {}", of.generator));
     let response = response(of, solver, &step)?;
-    Ok(HowComputed::Kernels { torques_n_m: torques_n_m(of), kernels, response })
+    Ok(HowComputed::Kernels { torques_n_m: torques_n_m(of), kernels: Box::new(kernels), response })
 }
 
 /// The drive with the uniform changes of `drawn` alone.

@@ -93,7 +93,7 @@ fn planned(of: &Tolerances, response: Response, draws: usize) -> VariantPlan {
         draw(&of.list, draws, 1).iter().map(|one| sets(&of.list, one).into_iter().map(split).collect()).collect();
     let columns = lines[0].iter().map(|(path, _)| path.clone()).collect();
     let variants = lines.into_iter().map(|line| line.into_iter().map(|(_, value)| value).collect()).collect();
-    let by = HowComputed::Kernels { torques_n_m: [10.0, 1.0], kernels: kernels(), response };
+    let by = HowComputed::Kernels { torques_n_m: [10.0, 1.0], kernels: Box::new(kernels()), response };
     VariantPlan::new((&of.drive, None), &[GeneratorKind::Cam], (columns, variants), by, MeshLevel::Coarse)
 }
 

@@ -116,7 +116,7 @@ fn written(value: f64) -> String {
 pub(super) fn grid(vary: &[Vary]) -> Vec<Vec<String>> {
     vary.iter().fold(vec![Vec::new()], |variants, field| {
         let with = |variant: &Vec<String>| {
-            field.values.iter().map(|value| [variant.as_slice(), &[value.clone()]].concat()).collect::<Vec<_>>()
+            field.values.iter().map(|value| variant.iter().chain([value]).cloned().collect()).collect::<Vec<_>>()
         };
         variants.iter().flat_map(with).collect()
     })

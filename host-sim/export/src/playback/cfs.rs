@@ -20,7 +20,7 @@ const TABLE_NAME: usize = 16;
 /// Default of `CFE_PLATFORM_TBL_MAX_SNGL_TABLE_SIZE`.
 pub const MAX_TABLE_BYTES: usize = 16_384;
 
-/// What `--table-name` may be.
+/// Names that `--table-name` takes.
 const FULL_NAME: &str = "APP.TABLE, letters, digits and _, at most 19 and 15 of them";
 
 /// The table file of an accepted image, under a name `APP.TABLE`, for a spacecraft and a processor.
