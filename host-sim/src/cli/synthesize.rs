@@ -70,11 +70,11 @@ pub(super) struct Synthesize {
     /// Slow drift of the output angle, arcsec rms
     #[arg(long, value_name = "ARCSEC", default_value_t = 0.8, allow_negative_numbers = true, help_heading = "Sensors")]
     wander_arcsec: f64,
-    #[command(flatten)]
-    excitation: ExcitationOptions,
     /// Seed of all random draws [default: a random one, printed]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+    #[command(flatten)]
+    excitation: ExcitationOptions,
 }
 
 /// Motion, load and temperature.
