@@ -9,11 +9,14 @@ use super::candidate::Excitation;
 use super::noise::Whitener;
 use super::rows::{Rows, mean, parts, quantile};
 
-/// Highest order per generator turn of a column that smooth laws have.
+/// Highest order per generator turn of a column that smooth laws have. *Guess*: eccentric wheels have columns up to the
+/// sixth order; what is higher is small.
 const HIGHEST_ORDER: f64 = 6.0;
-/// Turned by this much of its period (rad) within an average, a wave loses 2 % of its amplitude.
+/// A wave that turns by this much of its period (rad) within an average loses 2 % of its amplitude. *Source*: derived,
+/// sin(x/2) / (x/2); that 2 % do no harm is a guess.
 const MOST_TURNED_RAD: f64 = 0.7;
-/// Share of the averages in which the generator may turn farther.
+/// Share of the averages in which the generator turns no farther than that. *Guess*: one fast average in fifty moves no
+/// fit.
 const SLOW_SHARE: f64 = 0.98;
 
 /// Averages of n neighbouring rows, with the nominal model over them.

@@ -24,18 +24,21 @@ use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// Rows that are compared, about.
 const SAMPLE: usize = 8000;
-/// Fewest rows.
+/// Fewest rows. *Guess*: some forty to each of the blocks that are compared.
 const LEAST_ROWS: usize = 1000;
-/// Times that are tried, s: from the shortest to the longest, each this many times the one before. *Guess*.
+/// Times that are tried, s: the shortest and the longest. *Guess*: beyond, a mean shows nowhere, or everywhere.
 const TIMES_S: [f64; 2] = [5e-3, 0.2];
+/// Each time that is tried is this multiple of the one before. *Guess*: four to an octave (2^¼).
 const LONGER: f64 = 1.19;
-/// And no shorter than this many periods of the rows.
+/// No time that is shorter than this many periods of the rows is tried. *Guess*: a mean over less than a period is as
+/// good as one instant.
 const LEAST_PERIODS: f64 = 0.9;
-/// Steps to a row with which a mean over rows is taken.
+/// Steps to a row with which a mean over rows is taken. *Guess*: straight lines between rows need few.
 const STEPS: f64 = 4.0;
-/// Flanks that take a while, s, and torques that are read late or early by as much, s: what else may tell the
-/// rows. *Guess*.
+/// Times, s, that a change of flank may take instead. *Guess*: an octave apart, from the usual one on.
 const LAGS_S: [f64; 4] = [5e-3, 0.01, 0.02, 0.04];
+/// Times, s, by which the torque may be read late (positive) or early instead. *Guess*: as long as half of the longest
+/// mean.
 const LATE_S: [f64; 8] = [-0.1, -0.05, -0.02, -0.005, 0.005, 0.02, 0.05, 0.1];
 /// Means leave no more than this share of what is left by the best of these, … *Chosen* between perfect drives, 0.93
 /// and more, and those whose rows are means over 40 to 80 ms, mostly 0.91 and less, of a plant that somebody else

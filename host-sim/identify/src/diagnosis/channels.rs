@@ -15,15 +15,16 @@ use crate::measurement::{Fault, FaultName, Quantity, Recording, Session, Treatme
 use crate::nominal::{Harmonic, Nominal};
 use flexspline_base::robust::dot;
 
-/// Rows that are looked at, about, spread evenly.
+/// Rows that are looked at, about, spread evenly. *Guess*: some 250 to each of the [`BLOCKS`].
 const SAMPLE: usize = 6000;
-/// Zeros of sessions that float, at most.
+/// Session offsets that float, at most. *Guess*: it bounds the columns; recordings have few sessions.
 const MOST_ZEROS: usize = 24;
-/// Blocks of rows that are left out one at a time, to know how certain a share is: loads repeat, rows do not count one
-/// by one.
+/// Blocks of neighbouring rows that are left out one at a time, as loads repeat and rows are not independent. *Guess*:
+/// enough of them for a standard deviation, each long enough to hold several loads.
 const BLOCKS: usize = 24;
-/// What the torque should do is seen from this many times the white noise on, and from this many arcsec. *Guess*.
+/// The expected effect of the torque is visible from this many times the white noise on, … *Guess*.
 const SEEN_OF_NOISE: f64 = 3.0;
+/// … and from this many arcsec on. *Guess*: less is no more than the ripple of a drive.
 const SEEN_ARCSEC: f64 = 8.0;
 /// A share of it is certain from this many of its standard deviations on. *Source*: by convention.
 const CERTAIN: f64 = 5.0;
@@ -42,15 +43,16 @@ const NO_EFFECT: f64 = 0.3;
 const FAR_FROM_NOISE: f64 = 4.0;
 /// They are where degrees leave this at most. *Guess*.
 const TO_THE_NOISE: f64 = 4.0;
-/// And where wind-up and clearance are those of the model within this share, or, where nothing winds up, the harmonics
-/// within the factors.
-/// *Guess*: springs of drives of a type differ by some per cent, the factors of torques taken for others from 57 by
-/// more than that, except 1/60.
+/// And where wind-up and clearance are those of the model within this share. *Guess*: springs of drives of a type
+/// differ by some per cent, the factors of torques taken for others from 57 by more than that, except 1/60.
 const AS_NOMINAL: f64 = 0.35;
+/// Where nothing winds up, the harmonics are those of the model within these factors. *Guess*: their amplitudes vary
+/// much more from unit to unit than springs do.
 const HARMONICS_AS_NOMINAL: [f64; 2] = [0.25, 4.0];
 /// What is left is next to nothing below this share of what the load does. *Guess*.
 const NEXT_TO_NOTHING: f64 = 0.1;
-/// Residuals farther out than this many standard deviations are cut there.
+/// Residuals farther out than this many standard deviations are cut there. *Guess*: no normal row in a million lies so
+/// far out.
 const CUT: f64 = 5.0;
 /// The deviation is that of the block which this share of all does not exceed. *Guess*: two of [`BLOCKS`] may be full
 /// of bad rows.
@@ -388,9 +390,10 @@ pub struct RatioProposal {
     pub proposed: f64,
 }
 
-/// A whole ratio is proposed where the one found is this near…
+/// A whole ratio is proposed where the one found is this near… *Guess*: ratios of gears with whole teeth and two waves
+/// are whole or halves.
 const NEAR_WHOLE: f64 = 0.2;
-/// …and the one given is off by at least this share.
+/// …and the one given is off by at least this share. *Guess*: a fifth of a turn at a ratio of 100, as [`NEAR_WHOLE`].
 const OFF: f64 = 2e-3;
 
 /// What the ratio may be meant to be, where it is off by `relative_error` (of the nominal output angle).

@@ -27,10 +27,12 @@ struct State {
     orientation: f64,
 }
 
-/// Rows per imagined session, and its length in seconds.
+/// Rows of an imagined session. *Guess*: enough for the orders of the generator.
 const ROWS: usize = 1500;
+/// Length of an imagined session, s. *Guess*: what a bench records in one go.
 const SECONDS: f64 = 120.0;
-/// Runs that tell less apart than this, in standard deviations, are not worth recording.
+/// Runs that separate causes by less than this, in standard deviations, are not worth recording. *Source*: five, as
+/// between rivals.
 const WORTH_IT: f64 = 5.0;
 
 /// A generator that goes forward and comes back: share of the way.

@@ -151,7 +151,7 @@ impl<'a> Explanation<'a> {
     }
 }
 
-/// Steps on a screen.
+/// Steps on a screen. *Guess*: each takes a few of the 24 lines of a terminal.
 const MOST_STEPS: usize = 6;
 
 /// A rival that neither tells better nor looks alike says nothing on a screen.

@@ -7,13 +7,14 @@ use super::base::{FLANK_S, WIDER};
 use super::rows::Rows;
 use flexspline_base::robust::dot;
 
-/// Each lag that is tried is this many times the one before, from [`FLANK_S`] on.
+/// Each lag that is tried is this many times the one before, from [`FLANK_S`] on. *Guess*: two to an octave.
 const LONGER: f64 = std::f64::consts::SQRT_2;
 /// The longest lag that a change of flank has, s. *Guess*: a load behind a clearance takes some milliseconds, and what
 /// takes longer swings.
 const LONGEST_S: f64 = 0.06;
-/// Rows this long before a change of flank and after it tell of the lag, s. *Guess*: five of the longest lags.
+/// Rows this long before a change of flank count for the lag, s. *Guess*: they only have to show where the error was.
 const BEFORE_S: f64 = 0.05;
+/// Rows this long after a change of flank count for the lag, s. *Guess*: five of the longest lags.
 const AFTER_S: f64 = 0.3;
 /// A lag is another one where it lowers the misfit by this: five standard deviations, as between rivals. *Source*.
 const TOLD_APART: f64 = 25.0;

@@ -150,9 +150,10 @@ impl Default for Settings {
     }
 }
 
-/// Rows needed at least.
+/// Rows needed at least. *Guess*: several for each of some dozen columns.
 pub(crate) const LEAST_ROWS: usize = 200;
-/// Orders per generator turn up to which lines are looked for.
+/// Orders per generator turn up to which lines are looked for. *Guess*: above what bearings make, below the tooth mesh
+/// of ratios above 75, which has models of its own.
 const HIGHEST_ORDER: f64 = 150.0;
 /// Times that causes are chosen again, at most.
 const MOST_ROUNDS: usize = 2;

@@ -52,7 +52,7 @@ struct Tried {
     values: usize,
 }
 
-/// Values that are kept of what was tried: 768 MiB.
+/// Values that are kept of what was tried: 768 MiB. *Guess*: it bounds the memory, and changes no result.
 const MOST_KEPT: usize = 96 << 20;
 
 /// How much of a law is evaluated.
@@ -316,9 +316,10 @@ impl<'l> Term<'l> {
 }
 
 /// Parameters of the nominal model are held within this many standard deviations between units: what is beyond is a
-/// discrepancy, however well the nominal model could follow it.
+/// discrepancy, however well the nominal model could follow it. *Guess*: of normal units one in a thousand lies beyond.
 pub(crate) const TOLERANCE: f64 = 3.3;
-/// Spread of a parameter that is held at its limit, in units of its tolerance.
+/// Spread of a parameter that is held at its limit, in units of its tolerance. *Guess*: small enough to hold it, large
+/// enough for the matrix.
 const HELD: f64 = 1e-3;
 
 /// Solves with the nominal model's parameters within their tolerance, and deviations of laws (`deviations` tells which
@@ -354,35 +355,45 @@ pub(super) fn within_tolerance(
     Some((solve(gram, &priors, problem.worth)?, priors))
 }
 
-/// Times that parameters beyond their tolerance are held, at most.
+/// Times that parameters beyond their tolerance are held, at most. *Guess*: each time holds all that are beyond at
+/// once, so few are needed.
 const MOST_HOLDS: usize = 12;
-/// What a law is taken to explain before anything is known, arcsec.
+/// What a law is taken to explain before anything is known, arcsec. *Guess*: the order of magnitude of the errors of a
+/// drive.
 const FIRST_GUESS_ARCSEC: f64 = 10.0;
-/// Nuisance is scaled to at least this, arcsec.
+/// Nuisance is scaled to at least this, arcsec. *Guess*: smaller than what is named at all, 1.5 arcsec.
 const LEAST_ARCSEC: f64 = 1.0;
-/// Rounds of scaling the nuisance priors.
+/// Rounds of scaling the nuisance priors. *Guess*: from one to the next the scale hardly changes.
 const ROUNDS: usize = 3;
-/// Farthest step of a shape parameter, in places.
+/// Longest step of a normalised shape parameter. *Guess*: a fifth of its range, so that a linear model of the step
+/// still holds.
 const FARTHEST: f64 = 0.2;
-/// Step of numerical derivatives, in places.
+/// Step of numerical derivatives, normalised shape parameters. *Guess*: far above round-off, far below where models
+/// bend.
 const STEP: f64 = 0.01;
-/// Spread of a shape parameter about where it is, in places.
+/// Prior standard deviation of a normalised shape parameter about where it is. *Guess*: about that of an even
+/// distribution over the range, 1/√12.
 const PLACE_SPREAD: f64 = 0.3;
-/// Torques above this share of the load scale leave no doubt about the flank.
+/// Above this share of the load scale the torque leaves no doubt about the flank. *Guess*: friction is a few per cent
+/// of the load.
 const LOADED: f64 = 0.3;
-/// Directions and sizes (places below the other's) at which a second displacement is tried.
+/// Directions in which a second displacement is tried. *Guess*: refinement reaches half a step to either side.
 const DIRECTIONS: usize = 8;
+/// Sizes at which it is tried: how far its normalised parameter is below the other's. *Guess*: hardly smaller, and
+/// clearly.
 const SMALLER: [f64; 2] = [0.05, 0.2];
-/// Sizes at which one is tried under an eccentric generator, arcsec.
+/// Sizes at which one is tried under an eccentric generator, arcsec. *Guess*: a small and a usual one.
 const BESIDE_ARCSEC: [f64; 2] = [5.0, 20.0];
-/// All steps together gain no more than this multiple of what the linear model of the first one promises, and this much
-/// evidence.
+/// All steps together gain no more than this multiple of what the linear model of the first one promises, … *Guess*:
+/// models bend, but rarely as much as that.
 const FARTHER_THAN_LINEAR: f64 = 3.0;
+/// … and this much evidence. *Guess*: above the 6 from which a cause may be named.
 const BEYOND_LINEAR: f64 = 10.0;
-/// A step that promises less evidence than this is not tried; one that gains less than this is the last.
+/// A step that promises less evidence than this is not tried. *Guess*: far below what decides anything.
 const LEAST_PROMISED: f64 = 0.1;
+/// A step that gains less evidence than this is the last one. *Guess*: far below what decides anything.
 const LEAST_STEP: f64 = 0.3;
-/// Gauss-Newton steps at most.
+/// Gauss-Newton steps at most. *Guess*: three or four converge, if any do.
 const STEPS: usize = 6;
 
 /// How far a place may move.

@@ -52,11 +52,13 @@ struct Step {
     decay: f64,
 }
 
-/// Columns that are made white side by side.
+/// Columns that are whitened together. *Guess*: eight double values fill the widest vector registers (512 bits).
 const ABREAST: usize = 8;
-/// A column is hidden where averages hold less than this share of it.
+/// Averages hide a column if they hold less than this share of it. *Guess*: averages over a fifth of a period hold
+/// 0.94, over 0.36 of one 0.8.
 const HIDDEN: f64 = 0.8;
-/// Weight of a row whose flank is uncertain: its noise is this many times white.
+/// White noise of a row whose flank is uncertain, in units of that of other rows. *Guess*: such a row then weighs a
+/// millionth.
 const UNCERTAIN_NOISE: f64 = 1e3;
 
 impl Whitener {

@@ -39,7 +39,7 @@ use flexspline_mechanics::drive::{Drive, DriveError, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_mechanics::stepping::{Method, SolveError, SolverSettings};
 
-/// Rows that are diagnosed at most: 1.5 GB of memory.
+/// Rows that are diagnosed at most. *Chosen* for the memory that they take, 1.5 GB.
 const MOST_ROWS: usize = 1_000_000;
 
 /// What to look at where an error leaps so often that no row counts.
@@ -47,7 +47,7 @@ const IS_IT_THIS_DRIVE: &str = "see that ratio, units and zeros of both angles a
                                 this drive; record it under a load that keeps one flank";
 
 /// What the FEM of an extended drive may differ by from the causes found, as a share of them, for these to be taken for
-/// shapes of it.
+/// shapes of it. *Guess*: half of what was found then has another shape.
 const WORST_AGREEMENT: f64 = 0.5;
 
 /// Why a file was not diagnosed, or what was found not extended.

@@ -18,11 +18,14 @@ use super::rows::{Rows, add_scaled, quantile, rms, robust_std};
 use crate::nominal::Nominal;
 use flexspline_base::units::ARCSEC_PER_TURN;
 
-/// Averages used to find the wander, about.
+/// Averages from which the drift of the noise is found, about. *Guess*: enough for correlation times of seconds in
+/// recordings of minutes.
 const WANDER_AVERAGES: usize = 2500;
-/// Rows before and after a jump whose medians are compared.
+/// Rows before and after a jump of which the medians are compared. *Guess*: a median of twelve has a third of the noise
+/// of a row.
 const BESIDE: usize = 12;
-/// Least height of what is taken for a jump before anything else is known, arcsec.
+/// Least height of a jump, before anything else is known, arcsec. *Guess*: beyond clearance and wind-up, far below a
+/// tooth pitch (6480 arcsec with 200 teeth).
 const LEAST_JUMP: f64 = 1000.0;
 
 /// The nominal model over the rows, and the jumps: these are taken out before the law of the play is chosen.
@@ -257,28 +260,34 @@ pub(crate) fn too_few_left(problem: &Problem<'_>, finding: Finding) -> Option<St
     Some(format!("{left} of {used} rows are left to judge by: {why}"))
 }
 
-/// A jump is over after this time, s, and after this number of rows.
+/// A jump is over after this time, s. *Guess*: teeth slide into the next space within tens of ms.
 const JUMPING_S: f64 = 0.15;
+/// Nor does a jump take more than this number of rows. *Guess*: it bounds the search.
 const MOST_ROWS_OF_A_JUMP: usize = 2000;
-/// A load rings about its new level for so long that its median is that level, s.
+/// A load rings about its new level for so long that its median is that level, s. *Guess*: a load that rings at a few
+/// Hz has died down by then.
 const RINGING_S: f64 = 4.0;
-/// A jump is of whole pitches within this share, and this many arcsec that the rest of the error may move meanwhile.
+/// A jump is one of whole pitches within this share of its height, … *Guess*: pitches of a wheel are alike to far less.
 const PITCH_SHARE: f64 = 0.004;
+/// … and this many arcsec. *Guess*: so much the rest of the error may move meanwhile.
 const PITCH_ARCSEC: f64 = 100.0;
-/// A load that a cause adds is known to this share.
+/// A load that a cause adds is known to this share. *Guess*: as well as a load without a sensor is known.
 const LOAD_UNKNOWN: f64 = 0.2;
 
-/// Largest wander that is tried, in units of the white noise.
+/// Largest drift of the noise that is tried, in units of the white noise. *Guess*: a sensor that drifts farther is
+/// none.
 pub(super) const MOST_WANDER: f64 = 3.0;
-/// Shortest correlation time of a wander that is tried, s.
+/// Shortest correlation time of a drift that is tried, s. *Guess*: what is faster is a line, or a cause.
 const FASTEST_S: f64 = 2.5;
 
-/// Evidence (natural logarithm of the ratio) within which one wander is as likely as another.
+/// Difference in evidence (natural logarithm of the ratio) within which two drifts are equally likely. *Guess*: odds of
+/// 1.6 to 1 say nothing.
 const AS_LIKELY: f64 = 0.5;
 
-/// Innovations beyond this number of their robust standard deviations are no noise, whatever it is…
+/// Innovations beyond this number of their robust standard deviations are no noise, whatever it is… *Guess*: beyond any
+/// tail of a sensor's noise.
 const NO_NOISE: f64 = 8.0;
-/// …as long as they are rare: at most this share.
+/// …as long as they are rare: at most this share. *Guess*: more of them are what the data are about.
 const RARE: f64 = 0.1;
 
 /// Everything that laws could explain, as free columns; of laws and rows alone, whatever is known of the noise.
@@ -380,9 +389,10 @@ pub fn noise(
     (hypotheses[best], worth)
 }
 
-/// Wanders that are tried, in units of the white noise, and their correlation times, s. A wander is slow: what is
-/// faster is a line, or a cause.
+/// Standard deviations of the drift that are tried, in units of the white noise. *Guess*: mostly half as much again
+/// from one to the next.
 const WANDERS: [f64; 8] = [0.1, 0.2, 0.3, 0.45, 0.7, 1.0, 1.5, MOST_WANDER];
+/// Correlation times of the drift that are tried, s. *Guess*: two to a decade, from the fastest to minutes.
 const CORRELATIONS_S: [f64; 4] = [FASTEST_S, 8.0, 25.0, 80.0];
 
 /// White noise alone, and with each wander that is tried, wander by wander.
@@ -393,7 +403,8 @@ fn hypotheses(white: f64, unit: f64) -> Vec<Noise> {
     [Noise { white, wander: 0.0, correlation_s: 1.0 }].into_iter().chain(all).collect()
 }
 
-/// Hypotheses that are judged first: none, and the fastest and a slow one of three wanders.
+/// Hypotheses that are judged first: none, and the fastest and a slow one of three drifts. *Guess*: the best is reached
+/// from any of them.
 const FIRST: [usize; 7] = [0, 5, 7, 17, 19, 29, 31];
 
 /// A hypothesis and those beside it.

@@ -98,7 +98,8 @@ fn time_without_gaps(rows: &Rows) -> Vec<f64> {
     time
 }
 
-/// Frequencies tried between two of a spectrum.
+/// Frequencies tried between two of a spectrum. *Guess*: the nearest is a sixteenth of a place off at most, which costs
+/// 0.3 % of the power.
 const PARTS: i32 = 8;
 
 /// A line as it is in each row: between two places of the spectrum, in cells that it turns through, it is up to half as
@@ -182,7 +183,7 @@ pub(crate) fn beyond_noise(problem: &Problem<'_>, selected: &Selected<'_>, noise
     }
 }
 
-/// Cells of a grid at most: a power of two.
+/// Cells of a grid at most: a power of two. *Guess*: it bounds memory and time; 262 144 cells take 2 MiB.
 const MOST_CELLS: usize = 1 << 18;
 
 /// Frequency (per unit of `places`) and power of the strongest line from `lowest` to `highest`. Places that are even

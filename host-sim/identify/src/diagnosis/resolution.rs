@@ -8,13 +8,14 @@ use super::noise::Whitener;
 use super::rows::{Rows, combined, rms, robust_std};
 use crate::causes::CauseName;
 
-/// Rows whose mean is taken from each of them, to see what is fast.
+/// Rows whose mean is taken from each of them, to see what is fast. *Guess*: what passes within a few rows is fast.
 const TOGETHER: usize = 5;
-/// A column that the detail holds less than this share of says nothing in it.
+/// A column of which the detail holds less than this share is not fast. *Guess*: a tenth of its power.
 const IN_DETAIL: f64 = 0.3;
-/// Evidence for a fast law from which every row is kept.
+/// Evidence for a fast model from which every row is kept. *Guess*: above the 6 that name a cause, as it costs time.
 const LEAST_EVIDENCE: f64 = 10.0;
-/// What is farther out than this many standard deviations is no noise, and no wave.
+/// What is farther out than this many standard deviations is no noise, and no wave. *Guess*: no normal row in a
+/// million.
 const OUTLIER: f64 = 5.0;
 
 /// How finely the rows are looked at.

@@ -10,7 +10,8 @@ use crate::residual::sampled_twice;
 pub(super) use flexspline_base::statistics::mean;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
-/// Four rows around one say where it was as long as they span no more than this many times what the inner two do.
+/// Four rows around one give its angle as long as they span no more than this multiple of what the inner two do.
+/// *Guess*: even rows give 2, and one lost row 2.5 at most.
 const FAR_APART: f64 = 4.0;
 
 /// Which columns were recorded.

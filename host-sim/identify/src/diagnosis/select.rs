@@ -14,19 +14,22 @@ use super::thresholds::selection::*;
 use super::trace::{Gate, Judged, Stage, Trace, passed};
 use crate::causes::CauseName;
 
-/// Rounds at most.
+/// Rounds at most. *Guess*: three causes and three unnamed deviations are taken in one by one, and some are exchanged.
 const MOST_ROUNDS: usize = 10;
-/// Refit the best N candidates jointly, those whose gain is at least this share of what the best
-/// gains.
+/// Number of the best candidates that are refitted jointly, … *Guess*: it bounds the time.
 const CONTENDERS: usize = 3;
+/// … those whose gain is at least this share of what the best gains. *Guess*: what others have taken of a candidate is
+/// no more than that.
 const CONTENDS: f64 = 0.6;
-/// Laws that are refined in each round.
+/// Models that are refined in each round. *Guess*: it bounds the time; the right one is among the first few.
 const REFINED: usize = 9;
-/// Best places noted of each time that a law is tried at all.
+/// Best starting points that are kept each time that a model is tried. *Guess*: the second one for a wheel that has two
+/// sizes.
 const NOTED: usize = 2;
-/// Laws that are refined for the place of another.
+/// Models that are refined in place of another. *Guess*: it bounds the time.
 const EXCHANGED: usize = 4;
-/// Laws that are refined in each round of those that came close on a sample of the rows.
+/// Models that are refined in each round on all rows, of those that came close on a sample. *Guess*: it bounds the
+/// time.
 const REFINED_AGAIN: usize = 4;
 
 /// A selection and its fit.
@@ -150,7 +153,8 @@ pub(super) fn parts(term: &Term<'_>, coefficients: &[f64]) -> [f64; 3] {
     ]
 }
 
-/// Sizes this far apart on the scale of a shape parameter, from least to largest, are begun with both.
+/// Sizes this far apart on the scale of a shape parameter, from least to largest, are begun with both. *Guess*: a tenth
+/// of the range, on a logarithmic scale.
 const ANOTHER_SIZE: f64 = 0.1;
 
 /// The places of those tried, with what each is worth, that a law is refined from: the best, and for a wheel beside its

@@ -12,13 +12,14 @@ use super::model::Problem;
 use super::noise::{Noise, Whitener};
 use super::rows::{Rows, parts};
 
-/// Rows of a sample, about.
+/// Rows of a sample, about. *Guess*: enough for three causes with some dozen columns.
 const ROWS: usize = 10_000;
-/// Fewer rows than this many samples are not worth one.
+/// A sample is taken where rows over [`ROWS`], rounded up, come to this at least. *Guess*: fewer rows need no sample.
 const LEAST_RATIO: usize = 2;
-/// Rows of a stretch: about a turn of the generator where a thousand rows make ten.
+/// Rows of a stretch: about a turn of the generator where a thousand rows make ten. *Guess*.
 const STRETCH: usize = 96;
-/// The fractional part of the golden ratio: its multiples are spread evenly, whatever their number (Weyl).
+/// Fractional part of the golden ratio, (√5 − 1) / 2 by definition: its multiples are spread evenly, whatever their
+/// number (Weyl).
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// The sample, with the nominal model over it.

@@ -122,7 +122,8 @@ pub mod verdict {
     pub(crate) const TOLD_FROM_ZERO: f64 = 3.0;
     /// Noise is known to this factor: what is left within it is noise. *Guess*.
     pub(crate) const NOISE_KNOWN_TO: f64 = 1.25;
-    /// The size of a cause is well known from this number on …
+    /// The size of a cause is well known from this number of its standard deviations on … *Chosen*: of 183 causes named
+    /// beyond it 177 were there.
     pub(crate) const SIZE_KNOWN: f64 = 5.0;
     /// … and below, a name is stated with no more than this. *Chosen*: of 21 between the two 16 were there, of 183
     /// beyond 177.

@@ -16,9 +16,9 @@ use crate::least_squares::{FreeSpan, jackknife};
 use crate::measurement::{FaultName, Measures, Recording, Session, Treatment};
 use crate::nominal::Nominal;
 
-/// Rows that are followed, about: of longer recordings the beginnings of all sessions; and of these the rows that are
-/// compared.
+/// Rows that are followed, about: of longer recordings the beginnings of all sessions. *Guess*: it bounds the time.
 const FOLLOWED: usize = 200_000;
+/// Rows of these that are compared, about. *Guess*: some 330 to each of the blocks.
 const SAMPLE: usize = 8000;
 /// Blocks of rows that are left out one at a time.
 const BLOCKS: usize = 24;
@@ -29,22 +29,24 @@ const BLOCKS: usize = 24;
 const LARGEST_SHARE: f64 = 0.06;
 /// A smaller one is no matter. *Guess*.
 const LEAST_SHARE: f64 = 0.004;
-/// Step of the first look, as a share of the load, and how often it is halved then: what is left grows with the
-/// distance from the zero on either side, so that a coarse look leads there.
+/// Step of the first look, as a share of the load: the residual grows with the distance from the offset on either side,
+/// so that a coarse look leads there. *Guess*: six steps to the largest.
 const STEP_SHARE: f64 = 0.01;
+/// Times that the step is halved then. *Guess*: to 0.03 % of the load, less than a tenth of the least that counts.
 const HALVINGS: u32 = 5;
 
 // Chosen on healthy drives of the catalogue and of a table (zero of 0.3 to 2 N·m at 40 N·m: share 3 % to 65 %, 3.2 to
 // 6.1 standard deviations) against 24 unbalanced loads and drags of the examination (share below 6 %, below 1.9).
 /// A zero takes this share of what is left without it, …
 const LEAST_GAIN: f64 = 0.03;
-/// … by this many standard deviations of the blocks' means, …
+/// … by this many standard deviations of the blocks' means, … *Chosen* on the same, between 1.9 and 3.2.
 const CERTAIN: f64 = 2.5;
-/// … and is this many of its own from none.
+/// … and differs from zero by this many of its own standard deviations. *Guess*: it is one of many that were tried.
 const TOLD_FROM_NONE: f64 = 4.0;
-/// Unbalanced loads and drags leave no less than this share of what it leaves, …
+/// Unbalanced loads and drags leave no less than this share of what it leaves, … *Guess*: they have three numbers to
+/// its one, and a per cent is no difference.
 const RIVALS_LEAVE: f64 = 0.99;
-/// … and with it no less than this: else they are there.
+/// … and together with it no less than this: else they are there. *Guess*: with four numbers in all, more is needed.
 const BESIDE_IT_LEAVE: f64 = 0.95;
 /// In either case by this share of what the zero has taken away. *Chosen* between what they take of a zero in the tests
 /// below, at most 0.09, and of an unbalanced load there, 0.149; on healthy drives more is trifles.
@@ -53,7 +55,8 @@ const NO_TRIFLE: f64 = 0.12;
 /// leaves. *Guess*: these are sums of magnitudes, so that it asks for more than where squares decide between the laws;
 /// a load beside the torque looks like such a play.
 const FAR_LESS: f64 = 0.8;
-/// First and last step of the search for such loads, as shares of the load.
+/// First and last step of the search for such loads, as shares of the load. *Guess*: from the size of a usual offset to
+/// half the least that counts.
 const RIVAL_STEPS: [f64; 2] = [0.04, 0.002];
 
 /// What the model leaves of the error, row by row, under a torque that is not the one recorded.
@@ -174,12 +177,15 @@ impl<'a> Held<'a> {
     }
 }
 
-/// Rounds of that search at most. It takes 6 to 40 on healthy drives and those of the tests below.
+/// Rounds of that search at most. *Chosen*: ten times as many as the 6 to 40 that it takes on healthy drives and those
+/// of the tests below.
 const MOST_ROUNDS: usize = 500;
-/// A residual of this much in each row is round-off, arcsec: angles of 1000 rad are known to 2e-8 arcsec.
+/// A residual of this much in each row is round-off, arcsec. *Source*: double precision holds angles of 1000 rad to
+/// 2e-8 arcsec; the factor of 50 is a guess.
 const ROUND_OFF_ARCSEC: f64 = 1e-6;
 
-/// A round of steps that leaves more than this share of what the one before did leads nowhere.
+/// A round of steps that leaves more than this share of the residual of the one before leads nowhere. *Guess*: a tenth
+/// of a per cent decides nothing.
 const WORTH_A_ROUND: f64 = 0.999;
 
 /// How much is left in each block of rows: the sum of the magnitudes, which the rows of a flank turned over too early

@@ -11,17 +11,19 @@ use super::select::Selected;
 use super::uncertainty::Known;
 use crate::causes::{CauseName, ParameterName};
 
-/// The slow and the fast rows that are compared: these shares of those in motion, …
+/// Slow rows are this share of those in motion, … *Guess*: the slowest third.
 const SLOW: f64 = 0.35;
+/// … and fast rows those above this share of them; … *Guess*: the fastest third.
 const FAST: f64 = 0.65;
-/// … which is above this share of the speed that a twentieth of the rows exceed; …
+/// … in motion are those above this share of the speed that a twentieth of the rows exceed; … *Guess*: slower rows are
+/// starts and ends of a motion.
 const IN_MOTION: f64 = 0.05;
 /// … and these have to turn this multiple as fast as those, on the median. *Guess*.
 const APART: f64 = 1.5;
 /// Blocks of neighbouring rows whose misfits are taken as independent. *Guess*: as many as where shares of a torque are
 /// looked for.
 const BLOCKS: usize = 24;
-/// Fewest rows of either.
+/// Fewest rows of either. *Guess*: the least that a diagnosis needs as well.
 const FEWEST: usize = 200;
 /// Amplitudes differ from this number of their standard deviations on, five as between rivals, … *Source*.
 const CERTAIN: f64 = 5.0;

@@ -6,7 +6,7 @@ use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// The remedy where the zero is set anew.
 const ADVICE: &str = "home to one mark before each session, or log the offset that is set";
-/// Sessions whose zeros are said, at most.
+/// Sessions whose offsets are printed, at most. *Guess*: they fill a line.
 const SAID: usize = 12;
 
 /// Tells the `zeros` of sessions, each less that of the first, and has them count as zeros of their own from here on. A

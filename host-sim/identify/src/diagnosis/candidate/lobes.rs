@@ -17,7 +17,8 @@ use crate::causes::spec::{
     number, phase, plain,
 };
 
-/// Plausible differences between the lobes, arcsec at the output.
+/// Plausible differences between the lobes, arcsec at the output. *Guess*: from what noise hides to more than a usual
+/// clearance.
 const DEEPER_ARCSEC: [f64; 2] = [2.0, 200.0];
 /// Errors of the teeth over the difference of the lobes, at most. Well above one, the other lobe is the deeper one for
 /// part of a turn, which the law does not tell. *Chosen* on plants in which the teeth are out by 1.43 times that
