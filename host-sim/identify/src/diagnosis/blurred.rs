@@ -16,14 +16,12 @@ use super::channels::{report, sample, smooth_span, waves};
 use super::flank_lag::behind;
 use super::linear::{Gram, Prior, solve};
 use super::rows::{Rows, combined, rms};
-use super::torque_zero::{by_block, is_certain, sum};
+use super::torque_zero::{SAMPLE, by_block, is_certain, sum};
 use crate::least_squares::FreeSpan;
 use crate::measurement::{FaultName, Measures, Recording, Treatment};
 use crate::nominal::Nominal;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
-/// Rows that are compared, about.
-const SAMPLE: usize = 8000;
 /// Fewest rows. *Guess*: some forty to each of the blocks that are compared.
 const LEAST_ROWS: usize = 1000;
 /// Times that are tried, s: the shortest and the longest. *Guess*: beyond, a mean shows nowhere, or everywhere.

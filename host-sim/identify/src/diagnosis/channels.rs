@@ -21,7 +21,7 @@ const SAMPLE: usize = 6000;
 const MOST_ZEROS: usize = 24;
 /// Blocks of neighbouring rows that are left out one at a time, as loads repeat and rows are not independent. *Guess*:
 /// enough of them for a standard deviation, each long enough to hold several loads.
-const BLOCKS: usize = 24;
+pub(super) const BLOCKS: usize = 24;
 /// The expected effect of the torque is visible from this many times the white noise on, … *Guess*.
 const SEEN_OF_NOISE: f64 = 3.0;
 /// … and from this many arcsec on. *Guess*: less is no more than the ripple of a drive.

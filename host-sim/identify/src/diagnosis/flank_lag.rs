@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use super::base::{FLANK_S, WIDER};
 use super::rows::Rows;
+use super::thresholds::rivals::TOLD_APART;
 use flexspline_base::robust::dot;
 
 /// Each lag that is tried is this many times the one before, from [`FLANK_S`] on. *Guess*: two to an octave.
@@ -16,8 +17,6 @@ const LONGEST_S: f64 = 0.06;
 const BEFORE_S: f64 = 0.05;
 /// Rows this long after a change of flank count for the lag, s. *Guess*: five of the longest lags.
 const AFTER_S: f64 = 0.3;
-/// A lag is another one where it lowers the misfit by this: five standard deviations, as between rivals. *Source*.
-const TOLD_APART: f64 = 25.0;
 /// What the lag explains is the way through the clearance, as wide as drives have it, … *Guess*.
 const WAY: Range<f64> = 0.5..WIDER;
 /// … and this share of all that moves there beyond noise: a load that swings to and fro leaves most of it. *Guess*.

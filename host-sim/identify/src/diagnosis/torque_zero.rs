@@ -10,7 +10,7 @@
 use flexspline::Table;
 
 use super::base::{PlayLaw, predicted_by_table};
-use super::channels::{report, sample, smooth_span};
+use super::channels::{BLOCKS, report, sample, smooth_span};
 use super::rows::{Rows, mean, rms};
 use crate::least_squares::{FreeSpan, jackknife};
 use crate::measurement::{FaultName, Measures, Recording, Session, Treatment};
@@ -19,9 +19,7 @@ use crate::nominal::Nominal;
 /// Rows that are followed, about: of longer recordings the beginnings of all sessions. *Guess*: it bounds the time.
 const FOLLOWED: usize = 200_000;
 /// Rows of these that are compared, about. *Guess*: some 330 to each of the blocks.
-const SAMPLE: usize = 8000;
-/// Blocks of rows that are left out one at a time.
-const BLOCKS: usize = 24;
+pub(super) const SAMPLE: usize = 8000;
 
 /// The largest zero that is looked for, as a share of the load: sensors are good to some per cent of their range. One
 /// from there on is none that was found, but the end of what was tried: something else goes on as far as one lets

@@ -4,6 +4,7 @@
 //! averaged, or whose instant scatters, smears its lines.
 
 use super::candidate::{Deviation, Label, Per};
+use super::channels::BLOCKS;
 use super::model::Problem;
 use super::remainder::explained;
 use super::rows::{quantile, robust_std};
@@ -20,9 +21,6 @@ const FAST: f64 = 0.65;
 const IN_MOTION: f64 = 0.05;
 /// … and these have to turn this multiple as fast as those, on the median. *Guess*.
 const APART: f64 = 1.5;
-/// Blocks of neighbouring rows whose misfits are taken as independent. *Guess*: as many as where shares of a torque are
-/// looked for.
-const BLOCKS: usize = 24;
 /// Fewest rows of either. *Guess*: the least that a diagnosis needs as well.
 const FEWEST: usize = 200;
 /// Amplitudes differ from this number of their standard deviations on, five as between rivals, … *Source*.

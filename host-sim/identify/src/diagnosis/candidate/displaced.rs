@@ -37,7 +37,7 @@ const ROUNDED: f64 = 0.5;
 pub(super) const ZONES_MISFIT: f64 = 0.12;
 /// Share by which the scale of a pattern may be wrong: its size is a shape parameter, and no factor. *Guess*: little is
 /// left for the factor.
-const SCALE_MISFIT: f64 = 0.02;
+pub(super) const SCALE_MISFIT: f64 = 0.02;
 /// Amplitude of the second order of a rectified sine on one flank over its own: 4 / (3π) to three digits.
 /// *Source*: derived, the Fourier series of |sin x|.
 const SECOND_ORDER: f64 = 0.424;

@@ -7,6 +7,7 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use super::displaced::SCALE_MISFIT;
 use super::geometry::{Angle, COS_PRESSURE_ANGLE, TURNED_BACK, angle};
 use super::{Column, Excitation, Law, Role, Shape, beside, by_row, main, main_about, nuisance, of_wave};
 use crate::causes::{CauseName, Kin, ParameterName as Name};
@@ -16,9 +17,6 @@ use flexspline_mechanics::drive::Wheel;
 /// Share by which a kernel's signature may be wrong: friction, temperature, mesh. *Guess*: less than a model without a
 /// kernel may be wrong by.
 const KERNEL_MISFIT: f64 = 0.08;
-/// Share by which the scale of a signature may be wrong: the size itself is a parameter, and enters otherwise than as a
-/// factor.
-const SCALE_MISFIT: f64 = 0.02;
 /// Plausible size of an error of pitch, of an oval, µm: one standard deviation. *Guess*: the order of magnitude of fine
 /// gears.
 const USUAL_UM: f64 = 6.0;
