@@ -9,8 +9,8 @@ use super::candidate::Excitation;
 use super::noise::Whitener;
 use super::rows::{Rows, mean, parts, quantile};
 
-/// Highest order per generator turn of a column that smooth laws have. *Guess*: eccentric wheels have columns up to the
-/// sixth order; what is higher is small.
+/// Highest order per generator turn of a column that smooth models have. *Guess*: eccentric wheels have columns up to
+/// the sixth order; what is higher is small.
 const HIGHEST_ORDER: f64 = 6.0;
 /// A wave that turns by this much of its period (rad) within an average loses 2 % of its amplitude. *Source*: derived,
 /// sin(x/2) / (x/2); that 2 % do no harm is a guess.

@@ -358,8 +358,8 @@ pub(super) fn within_tolerance(
 /// Times that parameters beyond their tolerance are held, at most. *Guess*: each time holds all that are beyond at
 /// once, so few are needed.
 const MOST_HOLDS: usize = 12;
-/// What a law is taken to explain before anything is known, arcsec. *Guess*: the order of magnitude of the errors of a
-/// drive.
+/// A model is taken to explain this much before anything is known, arcsec. *Guess*: the order of magnitude of the
+/// errors of a drive.
 const FIRST_GUESS_ARCSEC: f64 = 10.0;
 /// Nuisance is scaled to at least this, arcsec. *Guess*: smaller than what is named at all, 1.5 arcsec.
 const LEAST_ARCSEC: f64 = 1.0;

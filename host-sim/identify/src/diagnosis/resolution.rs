@@ -14,7 +14,7 @@ const TOGETHER: usize = 5;
 const IN_DETAIL: f64 = 0.3;
 /// Evidence for a fast model from which every row is kept. *Guess*: above the 6 that name a cause, as it costs time.
 const LEAST_EVIDENCE: f64 = 10.0;
-/// What is farther out than this many standard deviations is no noise, and no wave. *Guess*: no normal row in a
+/// Values farther out than this many standard deviations are neither noise nor waves. *Guess*: no normal row in a
 /// million.
 const OUTLIER: f64 = 5.0;
 

@@ -16,7 +16,7 @@ pub struct Gear {
 
 impl Gear {
     /// Torque beyond which a unit is wrong where no drive says more, N·m: drives of common sizes do not take it even
-    /// for a moment.
+    /// for a moment. *Guess*.
     pub(crate) const LARGEST_TORQUE_N_M: f64 = 10_000.0;
 
     /// A gear of which the ratio is known.

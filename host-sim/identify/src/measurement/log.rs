@@ -9,7 +9,7 @@ use super::reader::{Cells, Columns, Layout, Sheet, clock, slower, stamps};
 use super::{phd2, rollover};
 use flexspline_base::csv_rows::TableProblem;
 
-/// Fewest rows that say anything about noise or an order.
+/// Fewest rows that say anything about noise or an order. *Guess*: fewer give no standard deviation to speak of.
 pub const FEWEST_ROWS: usize = 16;
 
 /// Measured data that cannot be used. Its text names file, line where there is one, what was found and what is allowed.

@@ -22,20 +22,22 @@ pub(super) const LEAPS: f64 = 0.6;
 /// A known span is that of the leaps within this share, or within their scatter. *Guess*: it is for motion that bends
 /// beside a leap.
 const NEARLY: f64 = 0.005;
-/// Rows on each side of a leap that show how the values go on.
+/// Rows on each side of a leap that show how the values go on. *Guess*: few, as motion bends.
 const ROWS_BESIDE: usize = 8;
-/// Standard deviation of a value that is rounded to whole counts: 1/√12.
+/// Standard deviation of a value that is rounded to whole counts. *Source*: derived, 1/√12, exact to its digits.
 const ROUNDED: f64 = 0.288_675;
 /// A span is excluded beyond this number of standard deviations. *Source*: by convention.
 const EXCLUDED: f64 = 3.0;
 /// Whole counts are distinguishable if the standard deviation of the span is below this: half a count is two of them.
+/// *Source*: derived.
 const TELLS_COUNTS: f64 = 0.25;
 /// One count is said to be in doubt if the standard deviation of the span is below this, counts; above it, nothing is
-/// known of single counts.
+/// known of single counts. *Guess*: then two or three numbers of counts are likely.
 const IN_DOUBT: f64 = 1.0;
 /// This share of the leaps must have one size. *Guess*: the others are gaps and counts that were lost.
 const AGREE: f64 = 0.8;
-/// A span that no register has is believed from this number of leaps on: one leap may be anything.
+/// A span that no register has is believed from this number of leaps on: one leap may be anything. *Guess*: two that
+/// agree are rarely chance.
 const FEWEST_LEAPS: usize = 2;
 
 /// How a column begins anew.

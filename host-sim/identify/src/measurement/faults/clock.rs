@@ -8,60 +8,69 @@ use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::log::Log;
 use flexspline_base::robust::{least_and_most, median_and_std, median_of, quantile_of, sampled};
 
-/// A gap longer than this number of sample periods starts a new session.
+/// A gap longer than this number of sample periods starts a new session. *Source*: by definition
+/// (`docs/how-to/diagnosis.md`).
 pub(crate) const SESSION_GAP_PERIODS: f64 = 10.0;
-/// A step of time above this number of periods, jitter aside, has a row missing in it: half way between one lost row
-/// and none.
+/// A step of time above this number of periods, jitter aside, has a row missing in it. *Source*: derived, half way
+/// between one lost row and none.
 const LOST_ROW_PERIODS: f64 = 1.5;
 /// A gap of up to this number of periods that begins a session may be one of rows that were lost: where the motion goes
 /// on over it. *Guess*.
 const LONGEST_HOLE_PERIODS: f64 = 100.0;
 /// The motion goes on where the generator turns over the gap as it does on either side, within this share of the faster
-/// pace, and this, rad. *Guess*.
+/// pace, and this angle, rad. *Guess*.
 const GOES_ON: (f64, f64) = (0.3, 0.05);
-/// Rows on either side that say the pace there.
+/// Rows on either side that give the pace there. *Guess*: few, so that the motion is the same in all of them.
 const PACE_ROWS: usize = 3;
-/// In a column that wraps an angle says nothing that may be off by more than this, rad.
+/// An angle of a column that wraps is of no use if it may be off by more than this, rad. *Guess*: at half a turn, π, it
+/// could be either way round; half of that is safe.
 const WRAPS_RAD: f64 = 1.5;
 /// Of the gaps that may be such holes this share is, with the generator in motion: then those are, too, in which it
 /// stands, starts or turns round.
 /// *Guess*.
 const HOLES_IN_MOTION: f64 = 0.5;
-/// The median of many steps scatters by this multiple of what their mean does (√(π/2) of normal ones, *Source*), and is
-/// known to this number of those.
+/// Standard deviation of the median of many values over that of their mean: √(π/2) for normal ones. *Source*: derived.
 const MEDIAN_TO_MEAN_STD: f64 = 1.253;
+/// The median step is known to this number of its standard deviations. *Guess*: two hold in 95 % of the cases.
 const MEDIAN_STDS: f64 = 2.0;
-/// Where more steps than this are that long, rows are not evenly spaced by intent, and none is missing.
+/// Where more steps than this are that long, rows are not evenly spaced by intent, and none is missing. *Guess*: a
+/// logger loses fewer than one row in twenty.
 const UNEVEN_SHARE: f64 = 0.05;
-/// Where more steps than this are zero, the clock is coarse; where fewer, rows are repeated.
+/// Where more steps than this are zero, the clock is coarse; where fewer, rows are repeated. *Guess*: a sound clock
+/// stands in no row, and one that is coarse in every other one or more.
 const COARSE_SHARE: f64 = 0.1;
-/// A clock jitters if its steps scatter by more than this share of a period…
+/// A clock jitters if the second differences of its stamps exceed this share of a period at the median… *Guess*: less
+/// does not matter to any model.
 const JITTER_SHARE: f64 = 0.1;
-/// …and by this multiple of the motion from row to row.
+/// …and, relative to the pace, exceed those of the motion by this factor. *Guess*: a motion that really is uneven
+/// scatters with the stamps.
 const JITTER_OVER_MOTION: f64 = 5.0;
-/// Sample periods that exist, s.
+/// Sample periods that exist, s. *Guess*: from 10 MHz to one row in an hour.
 const PERIODS_S: [f64; 2] = [1e-7, 3600.0];
-/// Generator speeds that exist, up to 20 000 turns a minute, rad/s.
+/// Generator speeds that exist, up to 20 000 turns a minute, rad/s. *Guess*: motors of such drives turn no faster.
 const FASTEST_RAD_S: f64 = 2100.0;
 /// Rows farther apart than this (s), for longer than this altogether (s), in which the motor stays slower than this
 /// (rad/s), are milliseconds read as seconds: a bench creeps for minutes, not for days. *Guess*.
 const CREEPS: (f64, f64, f64) = (1.0, 43_200.0, 0.1);
 /// The same of a motor that goes to and fro: a telescope creeps for nights, but one way. *Guess*.
 const CREEPS_TO_AND_FRO: (f64, f64, f64) = (0.9, 3600.0, 0.15);
-/// It goes to and fro where each direction has this share of the way, of this number of radians at least.
+/// It goes to and fro where each direction has this share of the way, and this way at least, rad. *Guess*: one motor
+/// turn.
 const EACH_WAY: (f64, f64) = (0.1, 6.0);
 /// And never changes its pace by more than this share of its fastest one from row to row. *Guess*.
 const SMOOTHLY: f64 = 0.35;
-/// What milliseconds read as seconds are divided by.
+/// Milliseconds in a second, by definition.
 const MILLI: f64 = 1e3;
-/// Of the distance of a stamp from where it is expected the phase takes this share, and the period this one: a loop
-/// that follows a clock and averages some forty stamps.
+/// A loop follows the clock: its phase takes this share of the distance of a stamp from where it is expected. *Guess*:
+/// it averages some forty stamps.
 const PHASE_GAIN: f64 = 0.05;
+/// The period of the loop takes this share of that distance. *Source*: derived, the loop is then damped by 1/√2 of
+/// critical.
 const PERIOD_GAIN: f64 = 0.5 * PHASE_GAIN * PHASE_GAIN;
-/// Rows on either side that say which period one is of.
+/// Rows on either side by which a row is assigned to its period. *Guess*: few, so that a lost row stays where it is.
 const AROUND_ROWS: usize = 5;
-/// Steps of time that scatter by more than this share of a period tell lost rows by the count along the session, not
-/// one by one.
+/// If steps of time scatter by more than this share of a period, lost rows are counted along the session, not one by
+/// one. *Guess*: half a period is then less than ten standard deviations.
 const SCATTERS: f64 = 0.05;
 
 /// Finds faults of the clock, repairs or leaves out what they touch, and parts the rows into sessions.

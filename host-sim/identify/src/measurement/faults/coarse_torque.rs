@@ -18,25 +18,30 @@ use flexspline_base::robust::median_of;
 
 /// Steps of less than this share of the largest load are no matter: those of eight bits are. *Guess*.
 const LEAST_STEP: f64 = 0.004;
-/// Steps are a sensor's, and not weights that somebody put on and wrote down, where there are this many of them, and
-/// this share of the runs of one value is shorter than [`LEAST_ROWS`]: noise and changes tear them. *Guess*.
+/// Steps are those of a sensor, and not weights that somebody put on and wrote down, if there are this many of them, …
+/// *Guess*: nobody writes down as many weights.
 const MANY_STEPS: usize = 12;
+/// … and this share of the runs of one value is shorter than [`LEAST_ROWS`]: noise and changes tear them. *Guess*:
+/// weights that are put on by hand are not torn.
 const TORN: f64 = 0.2;
-/// Rows to a step at least on either side of a change that is looked at, and changes that say something.
+/// Rows to a step at least on either side of a change that is looked at. *Guess*: fewer give no level.
 const LEAST_ROWS: usize = 3;
+/// Fewest changes that decide. *Guess*: enough for a mean and its standard deviation.
 const LEAST_CHANGES: usize = 12;
 /// Share of what the error changes by from step to step that it changes by in the very row where the load does so,
 /// too. *Guess*.
 const WITHIN_THE_ROW: f64 = 0.5;
-/// The error changes from step to step by this many standard deviations of the mean.
+/// The error changes from step to step by this many standard deviations of the mean. *Guess*: one normal mean in thirty
+/// thousand is farther out.
 const CERTAIN: f64 = 4.0;
-/// A change by more steps than this is by more than one.
+/// A change by more steps than this is by more than one. *Source*: derived, half way between one step and two.
 const MORE_THAN_ONE: f64 = 1.5;
 /// Changes to and fro between the same two steps within this many rows are one, which noise has torn. *Guess*.
 const TORN_ROWS: f64 = 12.0;
 /// A step that lasts this many times as long as most says little of the load: its rows are left out. *Guess*.
 const LONG: f64 = 8.0;
-/// As long as this share of the rows stays.
+/// Rows far from a change are left out as long as this share of the rows stays. *Guess*: fewer would leave little to
+/// diagnose.
 const STAYS: f64 = 0.5;
 
 /// Where the load is known: between two rows (in rows), and how large it is there, N·m.

@@ -12,50 +12,61 @@ use crate::measurement::gear::Gear;
 use flexspline_base::robust::{least_and_most, median_of};
 use flexspline_base::statistics::correlation;
 
-/// Drift of less than this over the whole recording is not looked for, rad.
+/// Drift of less than this over the whole recording is not looked for, rad. *Guess*: below what most causes do, and
+/// raised from 3 arcsec.
 const LEAST_RAD: f64 = 10.0 * ARCSEC;
-/// A trend is this many standard deviations, over stretches as long as the noise remembers.
+/// A trend is this many standard deviations, over stretches as long as the noise remembers. *Guess*: one more than the
+/// five by which causes are separated, as a repair changes the rows.
 const CERTAIN: f64 = 6.0;
-/// Stretches of the recording that a trend is judged by.
+/// Stretches of the recording that a trend is judged by. *Guess*: enough for a line and its scatter, each far longer
+/// than the noise remembers.
 const STRETCHES: usize = 24;
-/// Fewest stretches that show a trend, and rows of a stretch.
+/// Fewest stretches that show a trend. *Guess*: a third of [`STRETCHES`].
 const FEWEST_STRETCHES: usize = 8;
+/// Fewest rows of a stretch. *Guess*: enough for a median.
 const STRETCH_ROWS: usize = 8;
-/// Fewest gaps between sessions that tell a drift from zeros that are set anew, and how far a session may lie off the
-/// line, as a share of all the drift. *Guess*: two gaps agree to a twentieth by chance in one recording of twenty.
+/// Fewest gaps between sessions that separate a drift from offsets that are set anew. *Guess*: two gaps agree to a
+/// twentieth by chance in one recording of twenty.
 const FEWEST_GAPS: usize = 2;
+/// A session may lie off the line by this share of all the drift. *Guess*: that twentieth.
 const OFF_THE_LINE: f64 = 0.05;
-/// Within sessions the zero moves as over all of them: the slope there is off by this share at most, but for this
-/// number of its standard deviations. *Guess*.
+/// Within sessions the offset moves as it does over all of them: the slope there is off by this share at most, …
+/// *Guess*: a drift is not quite even.
 const WITHIN: f64 = 0.5;
+/// … and this number of its standard deviations. *Guess*: the usual three.
 const WITHIN_STDS: f64 = 3.0;
-/// Sessions whose zeros are free at once, at most.
+/// Session offsets that are free at once, at most. *Guess*: it bounds the columns of the fit.
 const MOST_ZEROS: usize = 64;
-/// Sessions in which a drift of this share would not show by this many standard deviations have to lie on its line, by
-/// [`OFF_THE_LINE`]. *Guess*.
+/// Sessions in which a drift of this share would not show by [`WITHIN_STDS`] have to lie on its line, by
+/// [`OFF_THE_LINE`]. *Guess*: as [`WITHIN`].
 const SHOWS: f64 = 0.5;
-/// What is the same on both flanks: the part that differs is below this share.
+/// A drift is the same on both flanks: the part that differs is below this share. *Guess*: wear and heat differ by all
+/// of it.
 const ALIKE: f64 = 0.35;
-/// A trend whose standard deviation grows by more than this when position, load and temperature are considered may be
-/// one of them.
+/// A trend may be one of position, load and temperature if considering them multiplies its standard deviation by more
+/// than this. *Guess*: then they hold 15/16 of the information.
 const CONFUSED: f64 = 4.0;
-/// And is none of them where it is this number of standard deviations, and the temperature does not go with time:
-/// correlation, from a span in K on.
-/// *Guess*.
+/// It is none of them from this number of standard deviations on, if the temperature does not go with time. *Guess*:
+/// ten times what separates causes.
 const BEYOND_CONFUSION: f64 = 50.0;
+/// The temperature goes with time from this correlation on… *Guess*: nearly two thirds of its variance.
 const WITH_TIME: f64 = 0.8;
+/// …if it spans this much, K. *Guess*: within it a bench is at one temperature.
 const COUNTS_K: f64 = 2.0;
-/// Share of rows that each flank must have.
+/// Share of rows that each flank must have. *Guess*: fewer rows do not say how it moves there.
 const BOTH_FLANKS: f64 = 0.1;
 
-/// What moves by this within this many seconds, and by this share of the drift, is none: beyond any wind-up and
-/// clearance.
+/// If the error moves by this and by [`LEAP_SHARE`] of the drift within [`LEAP_S`], it does not drift, rad. *Guess*:
+/// beyond any wind-up and clearance.
 const LEAST_LEAP_RAD: f64 = 1200.0 * ARCSEC;
+/// Time within which a leap happens, s. *Guess*: drift takes hours, teeth that skip a second.
 const LEAP_S: f64 = 2.0;
+/// Share of the drift that a leap has at least. *Guess*: no drift makes a third of its way in seconds.
 const LEAP_SHARE: f64 = 0.3;
-/// Nor what moves between two recordings by this many times what the drift gives in that time.
+/// Nor does it drift if it leaps between two recordings by more than this multiple of what the drift gives in that
+/// time. *Guess*: where a bench rests the drift is slower or faster, but rarely by more.
 const GAP_SHARE: f64 = 2.0;
-/// Rows whose median is a level.
+/// Rows of which the median is a level. *Guess*: it has a third of the noise of a row.
 const LEVEL_ROWS: usize = 12;
 
 /// How a recording is cut into stretches: evenly in time, or in rows, where long breaks would leave few of them.

@@ -13,25 +13,30 @@ use crate::measurement::gear::Gear;
 use crate::measurement::log::Log;
 use flexspline_base::robust::median_of;
 
-/// What is left beside whole turns, turns of the motor: clearance and wind-up are a tenth of that.
+/// A counter leaps by whole motor turns within this, turns. *Guess*: clearance and wind-up are a tenth of that.
 const BESIDE_TURNS: f64 = 0.2;
-/// The column that leaps does so this many times more than the other.
+/// The column that leaps does so this many times more than the other. *Guess*: what both do is a motion.
 const LEAPS_MORE: f64 = 3.0;
-/// Before a leap the generator and the ratio times the output move alike, within this (rad in a row) and this share.
+/// Before a leap the generator and the ratio times the output move alike, within this, rad in a row, … *Guess*: 41
+/// arcsec of the output at a ratio of 100.
 const TOGETHER_RAD: f64 = 0.02;
+/// … and this share of the larger. *Guess*: a column that is frozen moves by nothing.
 const TOGETHER: f64 = 0.3;
-/// Rows before and after, for what is usual there.
+/// Rows before and after, for what is usual there. *Guess*: few, so that the pace is the same.
 const AROUND: usize = 3;
-/// More leaps than this share of the rows are no leaps: something else is wrong with the column.
+/// More leaps than this share of the rows are no leaps: something else is wrong with the column. *Guess*: a counter
+/// restarts now and then.
 const SHARE: f64 = 0.02;
-/// Rows at the end of a session and at the beginning of the next whose medians are compared.
+/// Rows at the end of a session and at the beginning of the next whose medians are compared. *Guess*: a median of eight
+/// is not moved by two bad rows.
 const LEVEL_ROWS: usize = 8;
 /// A zero is another one if it is off by this, rad at the output: beyond any clearance and wind-up. *Guess*.
 const OTHER_ZERO_RAD: f64 = 1500.0 * ARCSEC;
-/// A jump of this share of a tooth pitch, or less, beside whole pitches is left to the diagnosis: teeth may have
-/// skipped.
+/// A jump that is off whole tooth pitches by this share of one, or less, is left to the diagnosis: teeth may have
+/// skipped. *Guess*: wind-up that changes meanwhile is smaller.
 const BESIDE_PITCHES: f64 = 0.05;
-/// An error that grows with the angle by more than this is a wrong ratio, and grows between sessions, too.
+/// A wrong ratio makes the error grow with the angle, between sessions too: by more than a tenth of this in a generator
+/// turn, rad. *Guess*: 21 arcsec a turn, more than drifts and encoders do.
 const SLOPE: f64 = 1e-3;
 
 /// Change of a column into a row.
@@ -222,10 +227,11 @@ pub(in crate::measurement) fn changes_with_the_gaps(log: &Log, gear: &Gear) -> O
     (gaps.len() >= FEWEST_GAPS && large && gaps.iter().all(alike)).then_some(per_s)
 }
 
-/// Gaps that have to agree; a jump over one is of its length within this share, and what wind-up and clearance may
-/// differ by, rad. *Guess*.
+/// Fewest gaps between sessions that have to agree. *Guess*: two may by chance.
 const FEWEST_GAPS: usize = 3;
+/// A jump over a gap is in proportion to its length within this share, … *Guess*: a drift is not quite even.
 const LIKE_THE_GAP: f64 = 0.1;
+/// … and this, by which wind-up and clearance may differ, rad. *Guess*: ten arc-minutes, a wide clearance.
 const STATE_RAD: f64 = 600.0 * ARCSEC;
 
 /// By how much the error grows with the angle within sessions, where that is beyond what a drive does; else 0.
@@ -248,6 +254,7 @@ mod tests {
     use super::*;
     use crate::measurement::fault::Fault;
 
+    /// Ratio of the made-up drive. *Guess*: a round one; any would do.
     const RATIO: f64 = 100.0;
 
     /// A drive that turns on and on; `change` moves generator and output from row 500 on.

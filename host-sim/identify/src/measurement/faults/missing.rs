@@ -5,7 +5,8 @@ use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::log::Log;
 
-/// Rows in a row that are filled by a straight line in a channel beside the angles.
+/// Missing rows one after another that are filled by a straight line, except in the angles. *Guess*: torque and
+/// temperature hardly bend within ten.
 const LONGEST_FILL: usize = 10;
 
 /// Fills short holes of time, torque, temperature and orientation, leaves out a channel of which more than half is

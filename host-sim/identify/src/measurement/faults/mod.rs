@@ -55,7 +55,7 @@ use super::fault::{Fault, FaultName, ToothStep};
 use super::gear::Gear;
 use super::log::Log;
 
-/// An arc-second, rad.
+/// An arcsecond, rad: 1/648 000 of half a turn, by definition.
 const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 
 /// What the checks have found so far.

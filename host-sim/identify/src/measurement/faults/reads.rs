@@ -24,12 +24,13 @@ use crate::measurement::fault::{FaultName, Measures, Treatment};
 use crate::measurement::gear::Gear;
 use flexspline_base::robust::{MAD_TO_STD, median_of, quantile_of};
 
-/// Classes of speed, of equally many rows.
+/// Classes of speed, of equally many rows. *Guess*: enough for a line over the square of the speed.
 const CLASSES: usize = 14;
-/// Fewest rows of a class.
+/// Fewest rows of a class. *Guess*: they give a standard deviation to 8 %.
 const CLASS_ROWS: usize = 80;
-/// Largest speed of a class against its least one, and the share of the largest of all that comes to it.
+/// Largest speed of a class over its least one, … *Guess*: the scatter within a class then grows by no more.
 const WIDEST: f64 = 1.3;
+/// … and the share of the largest speed of all that is added to it. *Guess*: classes about rest are of no ratio.
 const NARROWEST: f64 = 0.05;
 /// Scatter that grows with the speed is told from this on, rad at the output, at the speed that a twentieth of the rows
 /// exceed: below, encoders of common loops scatter by themselves. *Chosen* so that loops polled within 20 µs are not
@@ -44,20 +45,25 @@ const CLASS_DOUBT: f64 = 0.05;
 /// Ripple of the teeth is smooth in slow rows and scatter in fast ones: half of it where a tooth passes in this many
 /// rows. *Guess*.
 const TOOTH_ROWS: f64 = 6.0;
-/// A row is read late if it is off by this many times what its speed lets expect.
+/// A row is read late if it is off by this multiple of what its speed lets expect. *Guess*: lowered from 5, which
+/// normal rows exceed in one case of two million, to one of sixteen thousand.
 const LATE: f64 = 4.0;
-/// Late rows are told from this share of the rows that move on…
+/// Late rows are reported from this share of the rows in motion on… *Guess*: sixty times what normal rows beyond
+/// [`LATE`] make.
 const LATE_SHARE: f64 = 0.004;
-/// …and from this many on.
+/// …and from this number on. *Guess*: enough to see that they are off to one side.
 const LATE_ROWS: usize = 30;
-/// Of them this share is off to the same side, seen in the direction of motion.
+/// Of them this share is off to the same side, seen in the direction of motion. *Guess*: thirty rows at random are so
+/// in one case of seven hundred.
 const ONE_SIDED: f64 = 0.8;
-/// They are so much rarer at rest than in motion…
+/// They are rarer at rest than in motion, by this factor… *Guess*: at rest none shows but noise.
 const RARER_AT_REST: f64 = 0.3;
-/// …which is above and below these shares of the speed that a twentieth of the rows exceed.
+/// …and in motion is above this share of the speed that a twentieth of the rows exceed, … *Guess*: slower, a late row
+/// hardly shows.
 const IN_MOTION: f64 = 0.3;
+/// …at rest below this one. *Guess*: a tenth of what counts as motion.
 const AT_REST: f64 = 0.03;
-/// More late rows than this are no late rows.
+/// More late rows than this are no late rows. *Guess*: more than a third are no exceptions.
 const MOST_LATE: f64 = 0.35;
 /// Rows that are late and not told from others are up to this many times those that are. *Guess*.
 const UNTOLD: f64 = 2.0;
@@ -66,17 +72,18 @@ const FOLLOWED_RAD: f64 = 0.25;
 /// A step of the time by more than this many usual ones is a pause: rows on both sides of it, as of a bench that goes
 /// from stop to stop, tell nothing of how they are read. *Guess*: a missing row is a step of two.
 const PAUSE: f64 = 2.5;
-/// Scatter of readings is white: of the scatter of a row and of the next, -56/70 is common, within this. What swings
-/// has more or less.
+/// Readings that scatter independently: neighbouring values of the scatter of a row correlate by −56/70, within this. A
+/// swing has more or less. *Guess* for the width; −56/70 is derived from the weights 1, −4, 6, −4, 1.
 const WHITE: f64 = 0.08;
-/// Rows that are late one after another, at most.
+/// Rows that are late one after another, at most. *Guess*: a third one would be a stall.
 const LONGEST_RUN: usize = 2;
 /// Scatter of the error against that of the generator's angle over the ratio is −1 within this, where it is that angle
 /// that is misread: what other noise of the angle and motion that is real leave of it. *Guess*.
 const MISREAD: f64 = 0.15;
 /// Share of the rows that decide it: those that are farthest off are something else. *Guess*.
 const NEAR: f64 = 0.99;
-/// Quantile of absolute numbers that a third of them, being far off, move little; and what it is of normal ones.
+/// Quantile of absolute values that a third of them, being far off, hardly moves, and its value for the standard normal
+/// distribution. *Guess* for the quantile; the value is exact to its digits.
 const LOW: (f64, f64) = (0.15, 0.1891);
 
 /// Speeds (rad of the output in a row), and the scatter that they come with.
@@ -223,7 +230,8 @@ fn pauses(session: &Session) -> Vec<usize> {
     [0].into_iter().chain(after).take(time.len()).collect()
 }
 
-/// Variance of the scatter of a row against that of its error.
+/// Variance of the scatter of a row over that of its error. *Source*: derived, the sum of the squares of 1, −4, 6, −4,
+/// 1 over that of the middle one.
 const SCATTER_GAIN: f64 = 70.0 / 36.0;
 
 /// Scatter by speed, of classes with equally many rows. `spread` makes a standard deviation of numbers, which it may
@@ -580,6 +588,7 @@ fn weigh(sessions: &mut [Session], long: &[usize], speed: &[Vec<f64>], noise: f6
 mod tests {
     use super::*;
 
+    /// Ratio of the made-up drive. *Guess*: a round one; any would do.
     const RATIO: f64 = 100.0;
 
     /// Normal deviates of unit variance.

@@ -8,24 +8,27 @@ use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
 use flexspline_base::robust::{median_of, white_noise};
 
-/// Steps at the output below this are those of good encoders (19 bits a turn), and below what a drive repeats.
+/// Steps at the output below this are those of good encoders, and below what a drive repeats. *Source*: derived, 19
+/// bits a turn; that these are the good ones is a guess.
 const COARSE_RAD: f64 = 2.5 * ARCSEC;
 /// Noise of more than this share of a step blurs it, so that averages go below the step; a step alone leaves 0.29 of
-/// it.
+/// it. *Guess*: with half a step an average already shows next to nothing of it.
 const BLURRED: f64 = 0.7;
 
-/// A step is real if the output leaves this share of it as noise…
+/// A step is real if the output leaves this share of it as noise… *Guess*: half of the 0.29 that rounding leaves.
 const SEEN: f64 = 0.15;
-/// …or the channel stands in this share of the rows while the other one moves…
+/// …or the channel stands in this share of the rows while the other one moves… *Guess*: a motion without a lattice
+/// stands nowhere.
 const STANDS: f64 = 0.3;
-/// …or, in even motion, its changes from row to row are uneven by a step in this share.
+/// …or, in even motion, its changes from row to row are uneven by a step in this share. *Guess*: an exact one is uneven
+/// nowhere.
 const UNEVEN: f64 = 0.1;
 /// A generator that goes from stop to stop by the same angle lies on a lattice too, and is exact. What is rounded is in
 /// the error, which differs by 0.4 steps on the mean from one reading to another: where half of them differ by less
 /// than this share, nothing is. *Guess*.
 const ROUNDED: f64 = 0.1;
-/// Rows from one reading to another. At a speed that is nearly a whole number of steps to a row the next
-/// one is rounded by just about as much, and a later one is not.
+/// Rows from one reading to another. At a speed that is nearly a whole number of steps to a row the next one is rounded
+/// by just about as much, and a later one is not. *Guess*: octaves, of which one is not near a whole number.
 const APART: [usize; 4] = [1, 2, 4, 8];
 
 /// Resolutions that show in the data, in rad at the output.
@@ -113,6 +116,7 @@ pub(in crate::measurement) fn check(
 mod tests {
     use super::*;
 
+    /// Ratio of the made-up drive. *Guess*: a round one; any would do.
     const RATIO: f64 = 100.0;
 
     fn session(rows: u32, generator: impl Fn(f64) -> f64, read_as: impl Fn(f64) -> f64) -> Session {

@@ -8,21 +8,24 @@ use crate::measurement::gear::Gear;
 use crate::measurement::log::Log;
 use flexspline_base::robust::{least_and_most, median_of, sampled};
 
-/// Rows before and after that must agree on the pace.
+/// Rows before and after that must agree on the pace. *Guess*: few, so that the pace is the same.
 const BESIDE: usize = 3;
-/// They agree within this share.
+/// They agree within this share. *Guess*: a leap by a row more is four times that.
 const STEADY: f64 = 0.25;
-/// A leap is worth this many rows beyond what time says, at least…
+/// A leap exceeds what time gives by the motion of this many rows, at least… *Guess*: one, less what the pace may
+/// change by.
 const EXTRA_ROWS: f64 = 0.8;
-/// …and the output takes part in it, within this share.
+/// …and the output takes part in it, within this share. *Guess*: clearance and wind-up take a part of it.
 const TOGETHER: f64 = 0.3;
-/// In one row the generator moves by this many times its own scatter, and in a leap both angles do.
+/// In one row the generator moves by this many times its own scatter, and in a leap both angles do. *Guess*: then the
+/// pace of a row is known to an eighth.
 const OVER_NOISE: f64 = 8.0;
-/// This number of leaps are stalls, at least…
+/// From this number of leaps on they are stalls… *Guess*: a few may be something else.
 const FEWEST: usize = 8;
-/// …and no more than this share of the rows that tell.
+/// …up to this share of the rows that show them. *Guess*: more are an uneven motion.
 const MOST_SHARE: f64 = 0.2;
-/// They come after each block of this many rows if this share of them does.
+/// They come after each block of this many rows if this share of them does. *Guess*: others are missed where the motion
+/// is slow.
 const REGULAR: f64 = 0.7;
 
 /// A row, and the time that is missing before it, s.

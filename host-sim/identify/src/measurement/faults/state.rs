@@ -12,13 +12,15 @@ use crate::measurement::gear::Gear;
 use crate::measurement::{Session, directions};
 use flexspline_base::robust::median_and_std;
 
-/// Rows that a fit uses at most, spread evenly.
+/// Rows that a fit uses at most, spread evenly. *Guess*: it bounds the time.
 const FIT_ROWS: usize = 8000;
-/// No clearance is wider, rad at the output: 10 arc-minutes.
+/// Way after a reversal within which clearance is taken up, rad at the output. *Guess*: 10 arc-minutes, wider than most
+/// clearances.
 const CLEARANCE_RAD: f64 = 600.0 / 206_265.0;
-/// A reversal is noticed some rows late.
+/// Rows by which a reversal may be noticed late. *Guess*: as long as it takes to turn back by more than noise.
 const BEFORE: usize = 5;
-/// Weights fall from this many robust standard deviations on (Huber).
+/// Weights fall from this many robust standard deviations on (Huber 1964). *Guess*: he takes 1 to 2; with 2.5 nearly
+/// all normal rows keep their weight.
 const HUBER: f64 = 2.5;
 
 /// Columns that depend on the state.

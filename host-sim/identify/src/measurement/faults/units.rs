@@ -13,24 +13,24 @@ use crate::measurement::refusal::Refusal;
 use crate::measurement::unit::Family;
 use flexspline_base::robust::{least_and_most, median_of, quantile_of, sampled};
 
-/// The output must have turned by so much, by the generator or by itself, before the ratio is judged: twenty times two
-/// arc-minutes of clearance, so that clearance moves the ratio by less than 5 %.
+/// The output must have turned by so much, by the generator or by itself, before the ratio is judged, rad. *Source*:
+/// derived, twenty times two arc-minutes of clearance move the ratio by 5 % at most; the clearance is a guess.
 const ENOUGH_MOTION_RAD: f64 = 20.0 * 120.0 / 206_265.0;
-/// A ratio this near to one that a mistake gives is that mistake; degrees for arc-minutes (60) and radians for degrees
-/// (57.3) are 4.6 % apart.
+/// A ratio this near to one that a mistake gives is that mistake. *Source*: derived, less than half of the 4.6 %
+/// between degrees for arc-minutes (60) and radians for degrees (57.3).
 const SAME: f64 = 0.02;
 /// A ratio within these factors of the right one is left to the diagnosis, as an error of the ratio; beyond, it is
-/// another gear.
+/// another gear. *Guess*: ratios of a series of gears are 20 % apart or more.
 const RATIO_ERROR: [f64; 2] = [0.8, 1.25];
-/// The wheel that is fixed changes the ratio by one: it is seen where the output turned so far that clearance does not
-/// hide that, rad.
+/// The wheel that is fixed changes the ratio by one: it is judged once the output has turned this far, rad, as
+/// clearance does not hide it then. *Guess*: at a ratio of 100 the difference is 7 arc-minutes.
 const TELLS_WHEELS_APART_RAD: f64 = 0.2;
-/// A ratio is that of the other wheel if it is this near.
+/// A ratio is that of the other wheel within this share. *Guess*: a tenth of the difference at a ratio of 100.
 const OTHER_WHEEL: f64 = 1e-3;
-/// Errors that spread by more (robust, 10°) or less (a thousandth of an arc-second) are not errors of a drive in the
-/// unit given.
+/// Errors that spread (robust, rad) by more than the first or by less than the second are not errors of a drive in the
+/// unit given. *Guess*: ten degrees, and a thousandth of an arc-second.
 const SPREADS_RAD: [f64; 2] = [0.174_5, 1e-3 / 206_265.0];
-/// Temperatures at which a drive exists, °C.
+/// Temperatures at which a drive exists, °C. *Guess*: cryogenic benches stop at −180, lubricants before 180.
 const TEMPERATURES_C: [f64; 2] = [-180.0, 180.0];
 
 /// Finds and repairs units; an error says what cannot be decided.

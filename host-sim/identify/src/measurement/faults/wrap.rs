@@ -9,16 +9,20 @@ use crate::measurement::log::Log;
 use crate::measurement::rollover::{COVERED, LEAPS, UNAMBIGUOUS, stays_within};
 use flexspline_base::robust::{least_and_most, quantile_of};
 
-/// Share of what an exchange of the two columns gives that tells one.
+/// The columns are exchanged if this share of what an exchange gives is there. *Guess*: clearance takes the rest of a
+/// small motion.
 const EXCHANGED: f64 = 0.75;
-/// Times it must begin anew before a unit other than the one given is believed.
+/// Times that a column must begin anew before a unit other than the one given is believed. *Guess*: once may be a stray
+/// value.
 const OFTEN: usize = 3;
-/// A unit other than the one given is believed of a column that covers this share of its turn.
+/// A unit other than the one given is believed of a column that covers this share of its turn. *Guess*: a column that
+/// begins anew at another size leaves more out.
 const COVERED_BY_ANOTHER: f64 = 0.98;
 /// A step that differs from the one before by less than this share of a turn goes on as it did; where files are joined
-/// without a time between them, it does not.
+/// without a time between them, it does not. *Guess*: half of what leaves the turn open.
 const GOES_ON: f64 = 0.25;
-/// Teeth do not skip by more than this number of turns of the motor in a row: two pitches are one.
+/// Teeth do not skip by more than this number of motor turns in a row. *Guess*: two pitches are one turn, so that these
+/// are seven pitches.
 const MOST_SKIPPED: f64 = 3.5;
 
 /// Finds wrapped angles (also in a unit other than the one given, which is a fault) and unwraps them.

@@ -12,7 +12,7 @@
 use super::SIDEREAL_DAY_S;
 use super::text::WrittenNumber;
 
-/// Hours to a turn.
+/// Hours of a turn, by definition.
 const HOURS: f64 = 24.0;
 /// Two hour angles that are rounded differ by up to one step of what is written; and a clock by a second, which is 0.03
 /// of one. *Source*.

@@ -28,14 +28,16 @@ use flexspline_base::csv_rows::TableProblem;
 use flexspline_base::units::ARCSEC_PER_RAD;
 use text::{Header, WrittenNumber, number, said, word_of};
 
-/// A turn of the sky, s.
+/// One turn of the sky, s. *Source*: the mean sidereal day in seconds of UT1, 86 400 / 1.002 737 909 35.
 const SIDEREAL_DAY_S: f64 = 86_164.090_5;
-/// Beyond this declination a distance in the sky says too little of the axis, deg.
+/// Beyond this declination a distance in the sky says too little of the axis, deg. *Guess*: there an axis moves a star
+/// by a sixth of its own way.
 const HIGHEST_DECLINATION_DEG: f64 = 80.0;
 /// Columns of a row, by the names of its header.
 const COLUMNS: [&str; 6] = ["Time", "mount", "RARawDistance", "RADuration", "RADirection", "ErrorCode"];
 /// A clock that is set back is set by whole hours (summer time, a zone), unless by less than this, s. *Guess*.
 const SET_RIGHT_S: f64 = 60.0;
+/// Seconds of an hour, by definition.
 const HOUR_S: f64 = 3600.0;
 
 /// Whether a file that begins so is a guide log.

@@ -5,9 +5,13 @@ use super::*;
 
 const HEADER: &str = "Frame,Time,mount,dx,dy,RARawDistance,DECRawDistance,RAGuideDistance,DECGuideDistance,RADuration,\
                       RADirection,DECDuration,DECDirection,XStep,YStep,StarMass,SNR,ErrorCode\n";
+/// Ratio of the made-up mount. *Guess*: a round one; any would do.
 const RATIO: f64 = 100.0;
+/// Scale of the made-up camera, arcsec in a pixel. *Guess*: a usual one; any would do.
 const SCALE: f64 = 1.5;
+/// Amplitude of the made-up wave, arcsec. *Guess*: as mounts have it; any would do.
 const AMPLITUDE: f64 = 12.0;
+/// Hours of the right ascension that pass in a second, by definition.
 const HOURS_A_S: f64 = 24.0 / SIDEREAL_DAY_S;
 
 /// Error of the axis where it stands at n turns, arcsec: a wave twice a generator turn.

@@ -5,7 +5,7 @@ use jiff::Timestamp;
 use jiff::civil::{Date, DateTime, Time};
 use jiff::fmt::strtime;
 
-/// Seconds of a day.
+/// Seconds of a day, by definition.
 pub(in crate::measurement) const DAY_S: f64 = 86_400.0;
 /// Forms other than those of ISO 8601. Of two that read the same text the first is taken: with AM and PM the month
 /// stands first, else the day.

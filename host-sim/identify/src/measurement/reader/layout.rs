@@ -11,15 +11,16 @@ use super::clock::{self, TimeForm};
 use super::number::{self, CellValue};
 use flexspline_base::csv_rows::TableProblem;
 
-/// Bytes of a file that its layout is found from.
+/// Bytes of a file that its layout is found from. *Guess*: some hundreds of rows, behind the longest preambles.
 pub(super) const HEAD: usize = 1 << 16;
-/// Share of the rows looked at that have the same width, at least.
+/// Share of the rows looked at that have the same width, at least. *Guess*: remarks are fewer.
 const SAME_WIDTH: f64 = 0.8;
-/// Share of the fields that are numbers, times or empty, at least: a row may hold a word or two.
+/// Share of the fields that are numbers, times or empty, at least: a row may hold a word or two. *Guess*: with half of
+/// them words it is no log.
 const NUMBERS: f64 = 0.5;
-/// Names that a file with one value in a line may have, and rows of each in its head: a word that is seldom is a
-/// remark. *Guess*.
+/// Names that a file with one value in a line may have. *Guess*: a bench has no more channels.
 const NAMES_OF_VALUES: std::ops::RangeInclusive<usize> = 2..=64;
+/// Rows of each such name in the head of the file. *Guess*: a word that is seldom is a remark.
 const ROWS_OF_A_NAME: usize = 4;
 /// Seconds since 1970 of the years 2001 to 2065.
 const EPOCH_S: std::ops::RangeInclusive<f64> = 1e9..=3e9;

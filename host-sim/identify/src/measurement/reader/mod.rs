@@ -20,9 +20,10 @@ use layout::{Joined, begins_with_a_word, is_comment, looks_like_names, plain, sh
 pub use layout::{Layout, Separator};
 use number::CellValue;
 
-/// Bytes that one thread reads at a time, about.
+/// Bytes that one thread reads at a time, about. *Guess*: some ten thousand rows, enough to keep a thread busy.
 const CHUNK: usize = 1 << 20;
-/// Lines that a quoted field may spread over: a quote that nothing closes would take the rest of the file.
+/// Lines that a quoted field may spread over: a quote that nothing closes would take the rest of the file. *Guess*: a
+/// header of a spreadsheet has two or three.
 const MOST_LINES_OF_A_FIELD: usize = 20;
 
 /// A file as rows of text.

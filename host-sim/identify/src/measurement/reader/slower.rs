@@ -4,9 +4,9 @@ use super::super::columns::Quantity;
 use super::super::log::Log;
 
 /// Share of the distances between values that are the usual one (one row more or less), at least: a slower clock, not
-/// holes.
+/// holes. *Guess*: a clock that is slower loses a value now and then.
 const REGULAR: f64 = 0.9;
-/// Fewest values that show a rhythm.
+/// Fewest values that show a rhythm. *Guess*: fewer may be evenly spaced by chance.
 const FEWEST: usize = 8;
 
 /// Fills the rows between the values of slower channels by straight lines.

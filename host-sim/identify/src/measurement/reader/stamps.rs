@@ -13,7 +13,7 @@ const EVEN: f64 = 0.8;
 /// Share of rows that repeat the one before in a file in which rows are written twice; fewer are left to the check of
 /// the clock. *Guess*.
 const TWICE: f64 = 0.1;
-/// Fewest steps that show an order.
+/// Fewest steps that show an order. *Guess*: fewer may fall by chance.
 const FEWEST: usize = 8;
 
 /// The order of the rows by their stamps where they do not stand in it, and what is to be said of that.

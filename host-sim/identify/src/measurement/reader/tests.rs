@@ -8,9 +8,13 @@ use std::fmt::Write as _;
 use crate::look::{Looked, look, text};
 use crate::measurement::{ColumnMap, Gear, Recording, parse, raw};
 
+/// Ratio of the made-up joint. *Guess*: a round one; any would do.
 const RATIO: f64 = 100.0;
+/// Rows of the made-up log. *Guess*: at [`STEP_S`] they take the motor 7.5 turns forth and back.
 const ROWS: usize = 600;
+/// Time from row to row, s. *Guess*: an ordinary one; any would do.
 const STEP_S: f64 = 0.05;
+/// Arcseconds in a degree, by definition.
 const ARCSEC_PER_DEG: f64 = 3600.0;
 
 /// The motor's angle at a time, deg.
