@@ -141,7 +141,7 @@ pub(crate) struct Base {
     pub uncertain: Vec<bool>,
 }
 
-/// What floats where angles are read at other instants than is known, s.
+/// The parameter that floats where angles are read at other instants than is known, s.
 pub const BETWEEN_READINGS: &str = "time between the readings";
 /// What floats as the output takes a time to go to its other flank, s: that of a lag which does as much to the error as
 /// this time says. Beside the lag that the rows tell best (`flank_lag`) it is that lag to first order.

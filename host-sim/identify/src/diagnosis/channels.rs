@@ -49,7 +49,7 @@ const AS_NOMINAL: f64 = 0.35;
 /// Where nothing winds up, the harmonics are those of the model within these factors. *Guess*: their amplitudes vary
 /// much more from unit to unit than springs do.
 const HARMONICS_AS_NOMINAL: [f64; 2] = [0.25, 4.0];
-/// What is left is next to nothing below this share of what the load does. *Guess*.
+/// A residual below this share of the effect of the load is next to nothing. *Guess*.
 const NEXT_TO_NOTHING: f64 = 0.1;
 /// Residuals farther out than this many standard deviations are cut there. *Guess*: no normal row in a million lies so
 /// far out.

@@ -17,7 +17,7 @@ const LONGEST_S: f64 = 0.06;
 const BEFORE_S: f64 = 0.05;
 /// Rows this long after a change of flank count for the lag, s. *Guess*: five of the longest lags.
 const AFTER_S: f64 = 0.3;
-/// What the lag explains is the way through the clearance, as wide as drives have it, … *Guess*.
+/// The lag explains a way of this width, in units of the nominal clearance, … *Guess*: as drives have it.
 const WAY: Range<f64> = 0.5..WIDER;
 /// … and this share of all that moves there beyond noise: a load that swings to and fro leaves most of it. *Guess*.
 const LEAST_SHARE: f64 = 0.5;

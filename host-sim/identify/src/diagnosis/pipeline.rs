@@ -42,12 +42,12 @@ use flexspline_mechanics::stepping::{Method, SolveError, SolverSettings};
 /// Rows that are diagnosed at most. *Chosen* for the memory that they take, 1.5 GB.
 const MOST_ROWS: usize = 1_000_000;
 
-/// What to look at where an error leaps so often that no row counts.
+/// Advice where an error leaps so often that no row counts.
 const IS_IT_THIS_DRIVE: &str = "see that ratio, units and zeros of both angles are right and that the rows are of \
                                 this drive; record it under a load that keeps one flank";
 
-/// What the FEM of an extended drive may differ by from the causes found, as a share of them, for these to be taken for
-/// shapes of it. *Guess*: half of what was found then has another shape.
+/// The causes found are shapes of an extended drive if its FEM differs from them by less than this share of them.
+/// *Guess*: beyond, half of the cause has another shape.
 const WORST_AGREEMENT: f64 = 0.5;
 
 /// Why a file was not diagnosed, or what was found not extended.

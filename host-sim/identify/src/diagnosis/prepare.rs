@@ -230,7 +230,7 @@ const KEPT: usize = 4;
 const EVEN: f64 = 0.1;
 /// … and a leap is a change by at least this share of the faster of the two. *Guess*: a ramp that rows resolve is none.
 const LEAP: f64 = 0.2;
-/// What is read has got over a leap after this time, s. *Guess*: six time constants of a filter of 10 ms.
+/// A reading has settled after a leap within this time, s. *Guess*: six time constants of a filter of 10 ms.
 const SETTLES_S: f64 = 0.06;
 
 /// Where a drive is found sound, no more than this share of its rows may have been set aside. *Guess*: by definition

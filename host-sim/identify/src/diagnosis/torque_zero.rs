@@ -49,9 +49,9 @@ const BESIDE_IT_LEAVE: f64 = 0.95;
 /// In either case by this share of what the zero has taken away. *Chosen* between what they take of a zero in the tests
 /// below, at most 0.09, and of an unbalanced load there, 0.149; on healthy drives more is trifles.
 const NO_TRIFLE: f64 = 0.12;
-/// A play that goes over smoothly is taken where it leaves less than this of the least that another law
-/// leaves. *Guess*: these are sums of magnitudes, so that it asks for more than where squares decide between the laws;
-/// a load beside the torque looks like such a play.
+/// The smooth backlash model is taken where it leaves less than this of the least that another model leaves. *Guess*:
+/// these are sums of magnitudes, so that it asks for more than where squares decide between the models; a load that the
+/// torque column lacks looks like such a backlash.
 const FAR_LESS: f64 = 0.8;
 /// First and last step of the search for such loads, as shares of the load. *Guess*: from the size of a usual offset to
 /// half the least that counts.

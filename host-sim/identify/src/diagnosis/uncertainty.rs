@@ -15,8 +15,8 @@ use flexspline_base::robust;
 /// Step of numerical derivatives, standard deviations. *Guess*: models are straight within a tenth of it.
 const STEP: f64 = 0.1;
 
-/// A parameter is no longer determined where its standard deviation grows by this factor. *Guess*: what the rest of the
-/// data tells of it is then a ten-thousandth.
+/// A parameter is no longer determined where its standard deviation grows by this factor. *Guess*: the rest of the data
+/// then holds a ten-thousandth of the information on it.
 const UNDETERMINED: f64 = 100.0;
 
 /// A block has information on a parameter if leaving it out adds this share to the variance; a smaller one is

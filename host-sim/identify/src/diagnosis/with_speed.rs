@@ -25,7 +25,7 @@ const APART: f64 = 1.5;
 const FEWEST: usize = 200;
 /// Amplitudes differ from this number of their standard deviations on, five as between rivals, … *Source*.
 const CERTAIN: f64 = 5.0;
-/// … and by this factor: laws of wheels and encoders hold to a few tenths. *Guess*.
+/// … and by this factor: models of wheels and encoders hold to a few tenths. *Guess*.
 const CLEARLY: f64 = 1.4;
 
 /// Amplitudes of a line at two speeds.

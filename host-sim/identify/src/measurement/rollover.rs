@@ -20,7 +20,7 @@ pub(super) const UNAMBIGUOUS: f64 = 0.4;
 /// A step longer than this share of the span is a leap: 1 less what is unambiguous. *Guess*.
 pub(super) const LEAPS: f64 = 0.6;
 /// A known span is that of the leaps within this share, or within their scatter. *Guess*: it is for motion that bends
-/// beside a leap.
+/// near a leap.
 const NEARLY: f64 = 0.005;
 /// Rows on each side of a leap that show how the values go on. *Guess*: few, as motion bends.
 const ROWS_BESIDE: usize = 8;
@@ -128,7 +128,7 @@ struct MeasuredSpan {
 }
 
 impl MeasuredSpan {
-    /// The mean over the leaps of the step that makes the values beside it go on in one straight line.
+    /// The mean over the leaps of the step that makes the values around it go on in one straight line.
     fn of(values: &[f64], rows: &[usize], leaps: &[usize], whole: bool, along: Option<&[f64]>) -> Option<MeasuredSpan> {
         let rounded = if whole { ROUNDED } else { 0.0 };
         let mut seen: Vec<Leap> = Vec::new();
@@ -296,7 +296,7 @@ mod tests {
         let sweep =
             |step: i64| -> Vec<f64> { (0..2000i64).map(|k| ((k * step + 40_000) % 65_536 - 32_768) as f64).collect() };
         assert_eq!(counters(&sweep(1000)).map(|anew| (anew.span, anew.times, anew.or)), Some((65_536.0, 31, None)));
-        // Too fast to tell which way.
+        // Too fast to see which way.
         assert!(counters(&sweep(30_000)).is_none_or(|anew| anew.ambiguous));
         // A jump is no overflow, whatever its size.
         for size in [33_000.0, 50_000.0, 65_000.0] {

@@ -123,7 +123,7 @@ const FADING: Role = Role("second order that fades");
 const FADING_BY_FLANK: Role = Role("second order that fades, by flank");
 const STEADY: Role = Role("second order");
 const STEADY_BY_FLANK: Role = Role("second order, by flank");
-/// What changes where a flank is farther ahead.
+/// The change of the pattern where a flank is farther ahead.
 const FARTHER_AHEAD: Role = Role("flank farther ahead");
 /// In the lead: the second order along the cosine and the sine of twice the angle by which a flank is ahead.
 const ALONG: Role = Role("second order along the flanks");

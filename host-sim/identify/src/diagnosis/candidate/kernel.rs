@@ -31,7 +31,7 @@ fn by_flank(flank: f64, torque: f64, value: impl Fn(f64) -> f64) -> f64 {
     forward + backward
 }
 
-/// The wave that a law is.
+/// The wave of an error.
 const WAVE: Role = Role("wave");
 
 fn main_um(values: Vec<f64>) -> Column {

@@ -21,13 +21,13 @@ use crate::causes::spec::{
 /// clearance.
 const DEEPER_ARCSEC: [f64; 2] = [2.0, 200.0];
 /// Errors of the teeth over the difference of the lobes, at most. Well above one, the other lobe is the deeper one for
-/// part of a turn, which the law does not tell. *Chosen* on plants in which the teeth are out by 1.43 times that
+/// part of a turn, which the model does not have. *Chosen* on plants in which the teeth are out by 1.43 times that
 /// difference; at 2, waves of a wheel passed for a lobe.
 const MOST_TEETH: f64 = 1.5;
 /// Where the full load leaves less than this share of the teeth's errors, a lobe that is pressed in has been
 /// seen. *Guess*.
 const LEFT_BY_LOAD: f64 = 0.5;
-/// What the deeper lobe takes of the clearance, under a load and without one.
+/// The clearance that the deeper lobe takes, under a load and without one.
 const TAKEN: Role = Role("clearance taken");
 const TAKEN_UNLOADED: Role = Role("clearance taken without a load");
 /// First orders of the teeth that the deeper lobe shows.

@@ -357,7 +357,7 @@ struct Counted {
 }
 
 /// Counts the periods of each session along its stamps with a phase-locked loop, so that their scatter does not add up.
-/// A stamp that scatters into the period beside its own is counted with its neighbours.
+/// A stamp that scatters into a period next to its own is counted with its neighbours.
 fn counted(log: &Log, period_s: f64) -> impl Iterator<Item = Counted> + '_ {
     let time = log.get(Quantity::Time).unwrap_or_default();
     let mut begin = 0;

@@ -1,7 +1,7 @@
 //! A zero that moves with time, the same in every state of the drive.
 //!
 //! Wear, heat and a falling stiffness move the error too, but not on both flanks alike; a wrong ratio and an eccentric
-//! encoder move it with the angle. Drift is named only where the data can tell it from them.
+//! encoder move it with the angle. Drift is named only where the data distinguish it from them.
 
 use super::state::{Extra, State};
 use super::{ARCSEC, Findings, throughout};

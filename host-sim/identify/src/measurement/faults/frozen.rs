@@ -52,7 +52,7 @@ fn beyond_chance(rows: usize) -> usize {
     SHORTEST.max(length.ceil() as usize)
 }
 
-/// Whether an output beside a generator that stands leaves by whole tooth pitches and has done so within a part of the
+/// Whether an output, while the generator stands, moves by whole tooth pitches and has done so within a part of the
 /// stretch: teeth that skip move it, not a generator that is not read.
 fn slips_a_tooth(output: &[f64], stretch: &Range<usize>, gear: &Gear) -> bool {
     let angles = &output[stretch.clone()];

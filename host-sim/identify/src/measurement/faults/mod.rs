@@ -9,7 +9,7 @@
 //! | under 16 rows, nothing moves, more than half frozen, units that are ambiguous | error |
 //! | torque, temperature, orientation or time missing in up to 10 rows in a row | filled by a straight line |
 //! | an angle missing, a longer hole, a last line that breaks off | rows left out |
-//! | a channel beside the angles missing in over half of the rows | channel left out |
+//! | a channel other than the angles missing in over half of the rows | channel left out |
 //! | rows missing, by steps of time | named |
 //! | rows out of order or repeated | rows left out |
 //! | clock set back | new session |

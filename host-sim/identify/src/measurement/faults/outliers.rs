@@ -93,7 +93,7 @@ fn load_swings(session: &Session, row: usize, largest_n_m: f64) -> bool {
     })
 }
 
-/// Whether a torque that stands out for a row may be the drive's own. Where the load lets go of its flank beside the
+/// Whether a torque that stands out for a row may be the drive's own. Where the load lets go of its flank next to the
 /// row, the teeth cross the clearance and strike; where the generator gains or loses speed, masses push back. The row
 /// itself does not count, as it may be the one that is wrong.
 fn may_be_felt(session: &Session, row: usize, largest_n_m: f64, fastest_rad: f64) -> bool {
@@ -178,7 +178,7 @@ fn rows_out(values: &[f64], least: f64, others: usize) -> Vec<Out> {
     found
 }
 
-/// Finds outliers; rows with an outlying error are left out, other channels are mended from the rows beside.
+/// Finds outliers; rows with an outlying error are left out, other channels are mended from the neighbouring rows.
 pub(in crate::measurement) fn check(
     sessions: &mut [Session],
     gear: &Gear,
@@ -268,7 +268,7 @@ const TAIL: f64 = 4.0;
 /// Rounds of that search, as rows that are out hide others. *Guess*: each finds far fewer than the one before.
 const TAIL_ROUNDS: usize = 3;
 
-/// Where many rows are out, those are as well that stand beside others, or where the drive might have moved them, at
+/// Where many rows are out, those are as well that stand next to others, or where the drive might have moved them, at
 /// reversals and steps of the load; and nothing bears the first and last rows of a session out, `ends` of them. Gives
 /// how many are left out.
 fn leave_out_the_doubtful(sessions: &mut [Session], least: f64, ends: usize) -> u64 {
@@ -296,7 +296,7 @@ fn leave_out_the_doubtful(sessions: &mut [Session], least: f64, ends: usize) -> 
     more
 }
 
-/// Outliers of torque or temperature: mended from the rows beside.
+/// Outliers of torque or temperature: mended from the neighbouring rows.
 fn of_load(sessions: &mut [Session], channel: Quantity, findings: &mut Findings) {
     let series: Vec<&[f64]> = sessions.iter().filter_map(|session| session.beside(channel)).collect();
     let mut some: Vec<f64> = series.iter().flat_map(|values| sampled(values)).collect();

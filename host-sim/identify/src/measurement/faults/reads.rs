@@ -4,7 +4,7 @@
 //! τ scatters, the scatter of neighbouring rows grows with the speed, its square by (τ · speed)²; at rest nothing
 //! shows. Some loggers read single rows late, by far more than the others and always to the same side.
 //!
-//! The scatter of a row is what the rows beside it leave of it when a cubic goes through them. Rows then weigh what
+//! The scatter of a row is its residual when a cubic goes through the rows around it. Rows then weigh what
 //! noise and scatter together leave of them; rows that were read late are left out.
 //!
 //! Where it is the generator that is read at scattered instants, or in coarse counts, its angle shows it: what it is
@@ -32,9 +32,9 @@ const CLASS_ROWS: usize = 80;
 const WIDEST: f64 = 1.3;
 /// … and the share of the largest speed of all that is added to it. *Guess*: classes about rest are of no ratio.
 const NARROWEST: f64 = 0.05;
-/// Scatter that grows with the speed is told from this on, rad at the output, at the speed that a twentieth of the rows
-/// exceed: below, encoders of common loops scatter by themselves. *Chosen* so that loops polled within 20 µs are not
-/// named.
+/// Scatter that grows with the speed is reported from this on, rad at the output, at the speed that a twentieth of the
+/// rows exceed: below, encoders of common loops scatter by themselves. *Chosen* so that loops polled within 20 µs are
+/// not named.
 const LEAST_RAD: f64 = 1.0 * ARCSEC;
 /// And from this share of the noise at rest on. *Guess*.
 const LEAST_OF_NOISE: f64 = 0.3;
@@ -65,12 +65,12 @@ const IN_MOTION: f64 = 0.3;
 const AT_REST: f64 = 0.03;
 /// More late rows than this are no late rows. *Guess*: more than a third are no exceptions.
 const MOST_LATE: f64 = 0.35;
-/// Rows that are late and not told from others are up to this many times those that are. *Guess*.
+/// Late rows that cannot be distinguished from others are up to this many times those that can. *Guess*.
 const UNTOLD: f64 = 2.0;
 /// Rows in which the generator turns by more do not follow the waves of a drive, rad. *Guess*.
 const FOLLOWED_RAD: f64 = 0.25;
 /// A step of the time by more than this many usual ones is a pause: rows on both sides of it, as of a bench that goes
-/// from stop to stop, tell nothing of how they are read. *Guess*: a missing row is a step of two.
+/// from stop to stop, do not show how they are read. *Guess*: a missing row is a step of two.
 const PAUSE: f64 = 2.5;
 /// Readings that scatter independently: neighbouring values of the scatter of a row correlate by −56/70, within this. A
 /// swing has more or less. *Guess* for the width; −56/70 is derived from the weights 1, −4, 6, −4, 1.
@@ -101,7 +101,7 @@ struct Reads<'a> {
     turned: Vec<f64>,
     /// Change of the output from row to row, rad.
     speed: Vec<f64>,
-    /// Faster rows are too far apart to tell their scatter from waves of the drive.
+    /// Faster rows are too far apart to separate their scatter from waves of the drive.
     fastest: f64,
     /// Pauses before each row.
     pauses: Vec<usize>,
@@ -180,7 +180,7 @@ fn off_cubic(values: &[f64], rows: &[usize]) -> f64 {
 
 /// The generator's angle is misread.
 struct Misread {
-    /// Noise beside it, rad.
+    /// Noise in addition to it, rad.
     noise: f64,
     /// Scatter of the instants at which it is read, rows.
     jitter_rows: f64,
@@ -242,7 +242,7 @@ fn classes(reads: &[Reads<'_>], spread: impl Fn(&mut [f64]) -> f64) -> Vec<Class
     rows.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let size = rows.len().div_ceil(CLASSES).max(CLASS_ROWS);
     let fastest = rows.last().map_or(0.0, |(speed, _)| *speed);
-    // A bench that turns at one pace passes the others on its ramps alone: few rows, and they tell.
+    // A bench that turns at one pace passes the others on its ramps alone: few rows, and they count.
     let mut begun = (0, 0.0);
     rows.chunk_by(|_, (speed, _)| {
         begun.0 += 1;
@@ -381,7 +381,7 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
         sessions.iter_mut().for_each(|session| session.loudness = Some(vec![1.0; session.len()]));
         return;
     }
-    // Nothing else is told at a speed that rows do not follow.
+    // Nothing else shows at a speed that rows do not follow.
     let fast = if misread.is_some() { full } else { full.min(FOLLOWED_RAD / gear.ratio.abs()) };
     let pitch = gear.tooth_pitch_rad.unwrap_or(std::f64::consts::PI / gear.ratio.abs());
     // A tooth of either wheel passes in a turn of the generator over its number: in a pitch of the output over the
@@ -407,7 +407,7 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
     if !told_late && !told_jitter {
         return;
     }
-    // Rows that are late by less than can be told stay: as many again, and as late, on the mean.
+    // Rows that are late by less than can be detected stay: as many again, and as late, on the mean.
     let mut late_s: Vec<f64> = reads
         .iter()
         .zip(&late)
@@ -491,8 +491,8 @@ fn expected(known: &[Class], of: &Reads<'_>, row: usize) -> f64 {
     class.map_or(f64::INFINITY, |class| (class.variance * SCATTER_GAIN).sqrt())
 }
 
-/// Rows off by far more than their speed lets expect while those beside agree, `run` of them one after another: taken
-/// out of the good ones, and given with how far they are off.
+/// Rows off by far more than their speed lets expect while their neighbours agree, `run` of them one after another:
+/// taken out of the good ones, and given with how far they are off.
 fn read_late(of: &mut Reads<'_>, known: &[Class], run: usize) -> Vec<(usize, f64)> {
     let places = of.good.len().saturating_sub(run + 1);
     let off: Vec<Option<(Vec<f64>, f64)>> = (0..places).map(|from| of.off(from, run)).collect();

@@ -41,7 +41,7 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
     let size_s = median_of(&mut sizes);
     let every = rhythm(log, &leaps);
     let all: Vec<(usize, f64)> = match every {
-        // Where the motion does not tell, as long as elsewhere.
+        // Where the motion does not show it, as long as elsewhere.
         Some(every) => by_rhythm(log, &leaps, every, size_s),
         None => leaps.clone(),
     };
@@ -67,8 +67,8 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
     }
 }
 
-/// Rows into which both angles leap, with the time that is missing there (s); how many rows would tell; and the period,
-/// s.
+/// Rows into which both angles leap, with the time that is missing there (s); the number of rows that would show it;
+/// and the period, s.
 fn leaps(log: &Log, gear: &Gear) -> Option<(Vec<Leap>, usize, f64)> {
     let (time, generator, output) =
         (log.get(Quantity::Time)?, log.get(Quantity::Generator)?, log.get(Quantity::Output)?);
@@ -86,7 +86,7 @@ fn leaps(log: &Log, gear: &Gear) -> Option<(Vec<Leap>, usize, f64)> {
         if !near.clone().all(|k| log.continues(k)) {
             continue;
         }
-        // Motion of the generator for each second that the clock tells, the row itself aside.
+        // Motion of the generator for each second of the clock, the row itself aside.
         let pace =
             |values: &[f64], k: usize| (values[k] - values[k - 1]) / (time[k] - time[k - 1]).max(1e-9 * period_s);
         let middle = |values: &[f64]| {
@@ -121,7 +121,7 @@ fn rhythm(log: &Log, leaps: &[(usize, f64)]) -> Option<usize> {
 }
 
 /// The same leaps, and one of the usual size in each row where the rhythm of its session asks for it and the motion
-/// does not tell.
+/// does not show it.
 fn by_rhythm(log: &Log, leaps: &[(usize, f64)], every: usize, size_s: f64) -> Vec<(usize, f64)> {
     let mut known = leaps.iter().peekable();
     let mut all = Vec::new();

@@ -58,7 +58,7 @@ pub(super) struct Fit {
     pub misfit: f64,
 }
 
-/// A column beside those of the state.
+/// A column in addition to those of the state.
 pub(super) type Extra<'a> = &'a dyn Fn(usize, usize) -> f64;
 
 impl<'a> State<'a> {

@@ -245,7 +245,7 @@ impl<'a> Seen<'a> {
         Seen { sessions, gear, noise, state, settled, largest: largest_torque(sessions) }
     }
 
-    /// The fit of `columns` in the place of a step, beside the other steps.
+    /// The fit of `columns` in the place of a step, together with the other steps.
     fn beside_others(&self, steps: &[Step], place: Place, columns: &[Extra]) -> Option<Fit> {
         let others: Vec<_> =
             steps.iter().map(|(other, ..)| *other).filter(|other| *other != place).map(column).collect();

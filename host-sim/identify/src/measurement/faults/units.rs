@@ -376,7 +376,7 @@ mod tests {
         let found = read("", 1.0, 0.0, [deg, 1.0]).unwrap();
         assert!(matches!(unit_fault(&found), Some((Some(Quantity::Generator), Treatment::Repaired, _))));
         // Both are in degrees, one is said to be in radians; or both are in radians, and one is said to be in degrees:
-        // no ratio tells.
+        // no ratio decides which.
         for (angles, columns) in [
             ([deg; 2], "generator=generator_rad:rad,output=output_rad:deg"),
             ([1.0; 2], "generator=generator_rad:deg,output=output_rad:rad"),
