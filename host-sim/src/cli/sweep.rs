@@ -32,7 +32,8 @@ use flexspline_report::sweep_report::{self, SweepSources};
 #[derive(Debug, Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 // Nobody chooses among drives drawn from tolerances.
-#[command(mut_arg("least", |arg| arg.conflicts_with("tolerances")), mut_arg("most", |arg| arg.conflicts_with("tolerances")))]
+#[command(mut_arg("least", |arg| arg.conflicts_with("tolerances")))]
+#[command(mut_arg("most", |arg| arg.conflicts_with("tolerances")))]
 #[command(after_help = format!("\
 Examples:
   flexspline sweep -g cam --vary flexspline.rim_thickness_mm=1.2..2.6:8

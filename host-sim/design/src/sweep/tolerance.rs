@@ -25,8 +25,8 @@ const SIGMAS: f64 = 3.0;
 /// Default limits of a normal or Rayleigh distribution, standard deviations: one drive in millions lies outside.
 const FAR: f64 = 5.5;
 
-/// The middle of a tolerance of a number that is not 0, such as a wear, is refused if it is more standard deviations than
-/// the first number, and more than this share, away from the value of the drive: guesses beyond any drawing.
+/// The middle of a tolerance of a number that is not 0, such as a wear, is refused if it is more standard deviations
+/// than the first number, and more than this share, away from the value of the drive: guesses beyond any drawing.
 const FAR_OFF: (f64, f64) = (10.0, 0.1);
 
 /// The contents of a file of tolerances.

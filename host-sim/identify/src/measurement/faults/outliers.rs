@@ -9,13 +9,13 @@ use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
 use flexspline_base::robust::{least_and_most, median_of, quantile_of, sampled, white_noise};
 
-/// A row is out by this number of standard deviations of the white noise… *Chosen* for fewer false alarms (8 before) on
-/// the made-up drives of `tests/measured_data.rs`.
+/// A row is out by this number of standard deviations of the white noise… *Guess*, raised from 8 for fewer false
+/// alarms.
 const OUT: f64 = 10.0;
 /// …and by this multiple of what all rows around it but one are out by: ripple that rows sample too coarsely stands out
 /// everywhere. *Guess*: noise alone does not stand out so far.
 const OUT_OF_AROUND: f64 = 3.0;
-/// And by this at least, rad at the output. *Chosen* for fewer false alarms (0.1 arcsec before), as [`OUT`].
+/// And by this at least, rad at the output. *Guess*, raised from 0.1 arcsec likewise.
 const LEAST_RAD: f64 = 3.0 * ARCSEC;
 /// And by this number of steps of the resolution. *Guess*: rounding gives one.
 const STEPS: f64 = 2.0;

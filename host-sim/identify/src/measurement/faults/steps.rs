@@ -37,8 +37,7 @@ const TAKEN_BACK: f64 = 0.35;
 const TAKEN_BACK_TOGETHER: f64 = 0.15;
 /// If this number of other steps are as large, a step is a crossing of the backlash too. *Guess*: one may be chance.
 const ELSEWHERE: usize = 2;
-/// No step smaller than this is looked for, rad. *Chosen* for fewer false alarms (2 arcsec before) on the made-up
-/// drives of `tests/measured_data.rs`.
+/// No step smaller than this is looked for, rad. *Guess*, raised from 2 arcsec for fewer false alarms.
 const LEAST_RAD: f64 = 5.0 * ARCSEC;
 /// Nor one that is not seen from one row to the next: this many standard deviations of the white noise. *Guess*: one
 /// more than the five by which causes are separated.
@@ -59,8 +58,8 @@ const LONGEST_TRAVERSE_RAD: f64 = 1200.0 * ARCSEC;
 /// Wider than any clearance, rad: such a step needs no load to show that no flank was changed. *Guess*: three
 /// arc-minutes.
 const WIDER_THAN_CLEARANCE_RAD: f64 = 180.0 * ARCSEC;
-/// A change of load by this share of its largest, near the step, may be wind-up. *Chosen* for fewer false alarms (0.15
-/// before), as [`LEAST_RAD`].
+/// A change of load by this share of its largest, near the step, may be wind-up. *Guess*, lowered from 0.15
+/// likewise.
 const LOAD_STEP: f64 = 0.03;
 /// Its noise alone changes it by no more than this many of its standard deviations. *Guess*: beyond any tail of noise.
 const LOAD_NOISE: f64 = 8.0;
