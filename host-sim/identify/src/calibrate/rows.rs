@@ -64,7 +64,7 @@ pub(super) struct Recorded {
     pub generator_share: f64,
     pub output_share: f64,
     pub generator_turns: f64,
-    /// Of the rows that move.
+    /// Of the way of the generator, there and back.
     pub backward_share: f64,
     /// Noise of the torque from row to row, N·m.
     pub torque_noise_n_m: f64,
@@ -73,8 +73,8 @@ pub(super) struct Recorded {
     /// Generator turns in steps that are short beside a tooth pitch.
     pub fine_turns: f64,
     pub temperature_c: f64,
-    /// Speed of the output that a tenth of the rows that move stay below, rad/s.
-    pub slow_rad_s: f64,
+    /// Whether each direction was driven at one pace.
+    pub one_pace: bool,
     /// Step of the resolution of both angles at the output, rad; 0 where noise blurs it.
     pub coarse_rad: f64,
 }
@@ -102,23 +102,29 @@ impl Recorded {
             sessions().flat_map(|s| s.generator_rad.windows(2).map(|p| (p[1] - p[0]).abs())).collect();
         steps = sampled(&steps);
         let step_rad = quantile_of(&mut steps, 0.9);
+        // By the way and not by rows: one direction may be driven at another pace.
         let (mut moved, mut backward) = (0.0_f64, 0.0);
         for pair in sessions().flat_map(|s| s.generator_rad.windows(2)) {
             let step = (pair[1] - pair[0]) * prior.nominal.ratio.signum();
-            if step.abs() > TURNED_ROUND * step_rad {
-                moved += 1.0;
-                backward += f64::from(step < 0.0);
-            }
+            moved += step.abs();
+            backward += (-step).max(0.0);
         }
         let fine_rad = TAU / (super::ROWS_OF_A_PITCH * prior.tooth_pitches());
         let all_steps = sessions().flat_map(|s| s.generator_rad.windows(2).map(|p| (p[1] - p[0]).abs()));
         let fine_turns = all_steps.filter(|step| *step <= fine_rad * (1.0 + 1e-3)).sum::<f64>() / TAU;
         let most = torque.0.abs().max(torque.1.abs());
-        let speeds = sessions().flat_map(|session| {
-            (0..session.len()).map(|k| speed_rad_s(session, k, prior.nominal.ratio).abs()).collect::<Vec<f64>>()
-        });
-        let mut speeds = sampled(&speeds.filter(|speed| *speed > 0.0).collect::<Vec<f64>>());
-        let [slow, fast] = [0.1, 0.9].map(|share| quantile_of(&mut speeds, share));
+        let speeds: Vec<f64> = sessions()
+            .flat_map(|session| (0..session.len()).map(|k| speed_rad_s(session, k, prior.nominal.ratio)))
+            .collect();
+        let paces = |of: &dyn Fn(f64) -> f64| {
+            let some: Vec<f64> = speeds.iter().map(|speed| of(*speed)).filter(|pace| *pace > 0.0).collect();
+            let mut some = sampled(&some);
+            [0.1, 0.9].map(|share| quantile_of(&mut some, share))
+        };
+        let [_, fast] = paces(&f64::abs);
+        // What a delay does by the pace, play does by the direction: each has to be driven at several, or one.
+        let several = |[slow, fast]: [f64; 2]| fast > 0.0 && fast >= super::OTHER_PACE * slow;
+        let one_pace = ![paces(&|speed| speed), paces(&|speed| -speed)].into_iter().any(several);
         let mut periods: Vec<f64> =
             sessions().filter_map(|s| s.time_s.as_ref()).flat_map(|t| t.windows(2).map(|p| p[1] - p[0])).collect();
         periods = sampled(&periods);
@@ -140,14 +146,14 @@ impl Recorded {
                 late_s: late_s(period_s),
             },
             coarse_rad: sessions().map(|session| session.coarse_rad).fold(0.0, f64::max),
-            slow_rad_s: slow,
+            one_pace,
             has_torque,
             each_keeps_to_one_load: has_torque && files.len() > 1 && files.iter().all(keeps_to_one_load),
             has_temperature,
             generator_share: covered(angles(1.0), 24),
             output_share: covered(angles(1.0 / prior.nominal.ratio), 36),
             generator_turns: (generator.1 - generator.0) / TAU,
-            backward_share: backward / moved.max(1.0),
+            backward_share: if moved > 0.0 { backward / moved } else { 0.0 },
             step_rad,
             fine_turns,
             temperature_c: if has_temperature { f64::midpoint(temperature.0, temperature.1) } else { usual },
@@ -159,9 +165,9 @@ impl Recorded {
         parts.into_iter().filter(|part| self.lacks(*part, prior).is_none()).collect()
     }
 
-    /// Whether the generator kept to one pace, or there is no time: there a delay and play are one.
+    /// Whether the generator kept to one pace in each direction, or there is no time: there a delay and play are one.
     pub(crate) fn hides_a_delay(&self) -> bool {
-        self.scales.speed_rad_s <= 0.0 || self.scales.speed_rad_s < super::OTHER_PACE * self.slow_rad_s
+        self.scales.speed_rad_s <= 0.0 || self.one_pace
     }
 
     /// Why a part cannot be fitted to what was recorded, if it cannot.

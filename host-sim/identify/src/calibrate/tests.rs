@@ -182,6 +182,25 @@ fn one_pace_is_said_to_hide_a_delay_and_a_plan_has_others() {
     assert!(short.cannot.iter().any(|why| why.starts_with("reading_delay")), "{:?}", short.cannot);
 }
 
+/// Back at three times the pace of the way out: each direction has one pace, and a delay is play there, too.
+#[test]
+fn another_pace_back_is_no_second_pace_and_play_is_found() {
+    let mut log = recording(6, |psi, _, _, way| 18.0 * (2.0 * psi).sin() - 20.0 * way);
+    let all = std::mem::take(&mut log.sessions[0]);
+    let session = &mut log.sessions[0];
+    session.time_s = Some(Vec::new());
+    for k in (0..all.len()).filter(|k| *k < all.len() / 2 || k % 3 == 0) {
+        session.time_s.as_mut().unwrap().push(0.05 * session.line.len() as f64);
+        session.line.push(all.line[k]);
+        session.generator_rad.push(all.generator_rad[k]);
+        session.error_rad.push(all.error_rad[k]);
+    }
+    let c = calibrate(&[log], &Prior::of_ratio(RATIO, GeneratorKind::Cam)).unwrap().calibration;
+    assert!(kept(&c).contains(&"play") && c.reading_delay.is_none(), "{:?}", c.parts);
+    let whole = c.play_width_arcsec.between_directions_arcsec;
+    assert!((whole - 40.0).abs() < 1.0, "{whole}");
+}
+
 /// Logs at one load each, and each with a zero that is free, say nothing of the wind-up.
 #[test]
 fn logs_of_one_load_each_make_no_wind_up() {
