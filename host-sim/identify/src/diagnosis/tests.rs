@@ -1051,11 +1051,16 @@ fn a_wheel_is_told_from_the_other_whichever_of_them_stands() {
             ),
         )
         .unwrap();
-        for cause in [CauseName::FlexsplinePitchError, CauseName::CircularSplinePitchError] {
+        let wheels = [CauseName::FlexsplinePitchError, CauseName::CircularSplinePitchError];
+        for cause in wheels {
             let hidden = format!("{cause}:amplitude_arcsec=15,phase_rad=0.7");
             let measured = measure(&drive, &[&hidden], &PLAN, &SENSORS, 44);
             let diagnosis = diagnose(&measured, &drive, None, &Settings::default(), |_, _, _| {}).unwrap();
-            assert_eq!(names(&diagnosis), [cause], "{fixed} stands: {}", diagnosis.text());
+            // That of the wheel that stands is an encoder's wave, too: the odds are shared.
+            let [found] = diagnosis.causes.as_slice() else { panic!("{fixed} stands: {}", diagnosis.text()) };
+            let said: Vec<CauseName> = std::iter::once(found.name).chain(found.look_alikes.iter().copied()).collect();
+            let wheels = wheels.iter().filter(|wheel| said.contains(wheel));
+            assert!(wheels.eq([&cause]), "{fixed} stands: {}", diagnosis.text());
         }
     }
 }
