@@ -115,10 +115,11 @@ impl Recorded {
         let most = torque.0.abs().max(torque.1.abs());
         let speeds: Vec<f64> = sessions()
             .flat_map(|session| (0..session.len()).map(|k| speed_rad_s(session, k, prior.nominal.ratio)))
+            .filter(|speed| speed.abs() > 0.0)
             .collect();
+        let speeds = sampled(&speeds);
         let paces = |of: &dyn Fn(f64) -> f64| {
-            let some: Vec<f64> = speeds.iter().map(|speed| of(*speed)).filter(|pace| *pace > 0.0).collect();
-            let mut some = sampled(&some);
+            let mut some: Vec<f64> = speeds.iter().map(|speed| of(*speed)).filter(|pace| *pace > 0.0).collect();
             [0.1, 0.9].map(|share| quantile_of(&mut some, share))
         };
         let [_, fast] = paces(&f64::abs);
