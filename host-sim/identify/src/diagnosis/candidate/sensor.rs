@@ -185,6 +185,11 @@ pub(crate) const OUTPUT_ENCODER_ECCENTRICITY: CauseSpec = CauseSpec {
     ..plain()
 };
 
+/// The amplitude of a wave of the generator's encoder there.
+const AT_THE_GENERATOR: Parameter =
+    number(Name::GeneratorAmplitudeArcsec, "the same at the generator", 0.0, 1e5, Follows);
+const BY_THE_RATIO: (Name, Name, Factor) = (Name::AmplitudeArcsec, Name::GeneratorAmplitudeArcsec, Factor::Ratio);
+
 /// The disc of the generator's encoder stands off its axis.
 pub(crate) const GENERATOR_ENCODER_ECCENTRICITY: CauseSpec = CauseSpec {
     name: "generator_encoder_eccentricity",
@@ -194,10 +199,10 @@ pub(crate) const GENERATOR_ENCODER_ECCENTRICITY: CauseSpec = CauseSpec {
     orders: &[(Turn::Generator, Fixed(1.0))],
     parameters: &[
         number(Name::AmplitudeArcsec, "at the output", 0.0, 1000.0, Value(10.0)),
-        number(Name::GeneratorAmplitudeArcsec, "the same at the generator", 0.0, 1e5, Follows),
+        AT_THE_GENERATOR,
         phase("of sin(generator + phase)"),
     ],
-    twins: &[(Name::AmplitudeArcsec, Name::GeneratorAmplitudeArcsec, Factor::Ratio)],
+    twins: &[BY_THE_RATIO],
     simulated: |_, p| simulated_encoder(encoder_eccentricity(false), p),
     ..plain()
 };
@@ -230,10 +235,10 @@ pub(crate) const GENERATOR_ENCODER_TILT: CauseSpec = CauseSpec {
     orders: &[(Turn::Generator, Fixed(2.0))],
     parameters: &[
         number(Name::AmplitudeArcsec, "at the output", 0.0, 1000.0, Value(8.0)),
-        number(Name::GeneratorAmplitudeArcsec, "the same at the generator", 0.0, 1e5, Follows),
+        AT_THE_GENERATOR,
         phase("of sin(2 generator + phase)"),
     ],
-    twins: &[(Name::AmplitudeArcsec, Name::GeneratorAmplitudeArcsec, Factor::Ratio)],
+    twins: &[BY_THE_RATIO],
     simulated: |_, p| simulated_encoder(encoder_tilt(false), p),
     ..plain()
 };
@@ -247,12 +252,12 @@ pub(crate) const ENCODER_SUBDIVISION: CauseSpec = CauseSpec {
     orders: &[(Turn::OfEncoder, Harmonic)],
     parameters: &[
         number(Name::AmplitudeArcsec, "at the output", 0.0, 1000.0, Value(6.0)),
-        number(Name::GeneratorAmplitudeArcsec, "the same at the generator", 0.0, 1e5, Follows),
+        AT_THE_GENERATOR,
         number(Name::Harmonic, "waves in a turn of the encoder", 3.0, 65_536.0, Value(4.0)),
         Parameter { words: ENCODERS, ..number(Name::Encoder, "0 generator, 1 output", 0.0, 1.0, Value(0.0)) },
         phase("of sin(harmonic angle + phase)"),
     ],
-    twins: &[(Name::AmplitudeArcsec, Name::GeneratorAmplitudeArcsec, Factor::Ratio)],
+    twins: &[BY_THE_RATIO],
     simulated: |_, p| simulated_encoder(encoder_subdivision(p(Name::Encoder) > 0.5, p(Name::Harmonic)), p),
     ..plain()
 };
