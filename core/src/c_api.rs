@@ -933,8 +933,7 @@ mod tests {
     }
 
     /// Two images at two places.
-    pub(super) fn pair(image: &[u8]) -> FlexsplineImages {
-        let twin = Box::leak(image.to_vec().into_boxed_slice());
+    pub(super) fn pair(image: &[u8], twin: &[u8]) -> FlexsplineImages {
         FlexsplineImages {
             first: image.as_ptr(),
             first_bytes: image.len(),
@@ -956,7 +955,8 @@ mod tests {
     #[test]
     fn a_tick_through_c_is_a_tick() {
         let image = fixture::image(false);
-        let (mut o, table) = (made(), pair(&image));
+        let twin = image.clone();
+        let (mut o, table) = (made(), pair(&image, &twin));
         assert_eq!(flexspline_store_activate(&mut *o.store, &o.joint, &table, 20.0), FlexsplineStatus::Ok);
         assert_eq!(flexspline_state_request(&mut o.state, 1), FlexsplineStatus::Ok);
         let mut out = FlexsplineOutput::default();
@@ -1013,7 +1013,8 @@ mod tests {
     #[test]
     fn a_table_is_activated_in_steps() {
         let image = fixture::image(false);
-        let (mut o, table) = (made(), pair(&image));
+        let twin = image.clone();
+        let (mut o, table) = (made(), pair(&image, &twin));
         let mut activation = Box::new(FlexsplineActivation { opaque: [MaybeUninit::new(7); _] });
         let mut progress = 9;
         let step = |o: &mut Objects, activation: &mut FlexsplineActivation, progress: &mut u8| {
@@ -1135,7 +1136,8 @@ mod tests {
     fn every_argument_is_checked() {
         use FlexsplineStatus::{Argument, Image, Mode, NotInitialised, OtherDrive, Overlap, Pointer};
         let image = fixture::image(false);
-        let (mut o, mut raw, table) = (made(), blank(), pair(&image));
+        let twin = image.clone();
+        let (mut o, mut raw, table) = (made(), blank(), pair(&image, &twin));
         assert_eq!(flexspline_store_init(null_mut()), Pointer);
         assert_eq!(flexspline_state_init(null_mut()), Pointer);
         let odd = (&raw mut o.state).cast::<u8>().wrapping_add(1).cast::<FlexsplineState>();
@@ -1236,7 +1238,8 @@ mod tests {
     #[test]
     fn each_quality_and_a_missing_sample_are_told() {
         let image = fixture::image(false);
-        let (mut o, table) = (made(), pair(&image));
+        let twin = image.clone();
+        let (mut o, table) = (made(), pair(&image, &twin));
         assert_eq!(flexspline_store_activate(&mut *o.store, &o.joint, &table, 20.0), FlexsplineStatus::Ok);
         let mut tick = |input: FlexsplineInput| {
             let mut out = FlexsplineOutput::default();
@@ -1271,7 +1274,8 @@ mod tests {
     #[test]
     fn what_another_call_made_is_no_object() {
         let (mut o, image) = (made(), fixture::image(false));
-        let table = pair(&image);
+        let twin = image.clone();
+        let table = pair(&image, &twin);
         let state = (&raw const o.state).cast::<FlexsplineJoint>();
         assert_eq!(flexspline_store_activate(&mut *o.store, state, &table, 20.0), FlexsplineStatus::NotInitialised);
         let joint = (&raw mut o.joint).cast::<FlexsplineState>();

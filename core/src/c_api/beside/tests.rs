@@ -33,7 +33,8 @@ fn a_table_comes_in_chunks_and_is_activated() {
     assert_eq!(flexspline_upload_finish(&upload, buffer.as_ptr(), buffer.len(), &mut id), Ok);
     assert_eq!((id, &buffer), (crate::Table::check(&image).unwrap().id().0, &image));
     // The buffer is an image, for a store that had none.
-    let (mut o, table) = (made(), pair(&buffer));
+    let twin = buffer.clone();
+    let (mut o, table) = (made(), pair(&buffer, &twin));
     assert_eq!(flexspline_store_activate(&mut *o.store, &o.joint, &table, 20.0), Ok);
     // What came is no table; a buffer too small; what is read is what is written.
     buffer[300] ^= 1;
@@ -58,7 +59,8 @@ fn what_no_drive_does_has_a_status_of_its_own() {
         }
     }
     crate::table::reseal(&mut turned);
-    let (mut o, table) = (made(), pair(&turned));
+    let twin = turned.clone();
+    let (mut o, table) = (made(), pair(&turned, &twin));
     let found = flexspline_store_activate(&mut *o.store, &o.joint, &table, 20.0);
     assert_eq!(found, FlexsplineStatus::Implausible);
 }
@@ -66,7 +68,8 @@ fn what_no_drive_does_has_a_status_of_its_own() {
 #[test]
 fn events_and_records_are_those_of_rust() {
     let image = fixture::image(false);
-    let (mut o, table) = (made(), pair(&image));
+    let twin = image.clone();
+    let (mut o, table) = (made(), pair(&image, &twin));
     let mut watch = FlexsplineWatch { opaque: [MaybeUninit::zeroed(); FLEXSPLINE_WATCH_WORDS] };
     let (mut out, mut events) = (FlexsplineOutput::default(), FlexsplineEvents::default());
     let see = |watch: &mut FlexsplineWatch, o: &super::super::tests::Objects, out, events| {
@@ -109,7 +112,8 @@ fn events_and_records_are_those_of_rust() {
 fn what_lies_ahead_is_what_rust_says() {
     use crate::{Inertias, Noise, PlayState};
     let image = fixture::image(false);
-    let (mut o, table) = (made(), pair(&image));
+    let twin = image.clone();
+    let (mut o, table) = (made(), pair(&image, &twin));
     assert_eq!(flexspline_store_activate(&mut *o.store, &o.joint, &table, 20.0), FlexsplineStatus::Ok);
     let inertias =
         Inertias { motor_kg_m2: 1.0, load_kg_m2: 3.0, stiffness_n_m_per_rad: 3.0e4, damping_n_m_s_per_rad: 20.0 };
