@@ -12,20 +12,16 @@ mkdir -p "$out"
 trap 'echo "failed: ${BASH_SOURCE[0]}:$LINENO: $BASH_COMMAND" >&2' ERR
 
 refused() { ! "$@"; }
-is_there() { command -v "$1" > /dev/null || [[ -f $1 ]]; }
 need() { # PROGRAM-OR-FILE[:PACKAGE]...: present, or installed by apt where that is possible
     for of in "$@"; do
         # One at a time: parts run next to each other, and apt has one lock.
-        is_there "${of%:*}" || flock "$folder" sh -c "apt-get install -y ${of#*:} || { apt-get update && apt-get install -y ${of#*:}; }" \
+        command -v "${of%:*}" > /dev/null || [[ -f ${of%:*} ]] || flock "$folder" sh -c "apt-get install -y ${of#*:} || { apt-get update && apt-get install -y ${of#*:}; }" \
             > /dev/null 2>&1 || { echo "left out: ${of%:*} is missing; install the package ${of#*:}" && exit 77; }
     done
 }
-python_environment() { # FOLDER PACKAGE...: an environment with these packages of PyPI, made anew where it has others
-    if [[ -f $1/packages && $(< "$1/packages") == "${*:2}" ]]; then return; fi
-    rm -rf "$1"
-    python3 -m venv "$1"
+python_environment() { # FOLDER PACKAGE...: an environment with these packages of PyPI, or those of -r FILE
+    [[ -x $1/bin/pip ]] || python3 -m venv "$1"
     "$1/bin/pip" install -q --no-compile --disable-pip-version-check "${@:2}"
-    printf '%s\n' "${*:2}" > "$1/packages"
 }
 tables() { # FOLDER: those of the four generators, made of samples that contact FEM computed
     for of in cam double-disc four-roller two-roller; do
