@@ -168,6 +168,14 @@ impl Fault {
             measures: Measures::default(),
         }
     }
+
+    /// A fault of these rows, each a line and its time (s), in the order of the file; none without rows.
+    pub(super) fn of_rows(name: FaultName, rows: impl IntoIterator<Item = (u64, Option<f64>)>) -> Option<Fault> {
+        let mut rows = rows.into_iter();
+        let (first_line, time_s) = rows.next()?;
+        let (count, (last_line, until_s)) = rows.fold((1, (first_line, time_s)), |(count, _), row| (count + 1, row));
+        Some(Fault { time_s, until_s, ..Fault::new(name, [first_line, last_line], count) })
+    }
 }
 
 /// Numbers that only some faults have.

@@ -1,10 +1,12 @@
 //! A file as it stands: its columns in rad, s, N·m and °C, what is missing as NaN.
 
 use std::io::{Cursor, Read};
+use std::ops::Range;
 
 use thiserror::Error;
 
 use super::columns::{ColumnMap, MappedColumn, Quantity};
+use super::fault::{Fault, FaultName};
 use super::reader::{Cells, Columns, Layout, Sheet, clock, slower, stamps};
 use super::{phd2, rollover};
 use flexspline_base::csv_rows::TableProblem;
@@ -67,19 +69,34 @@ impl Log {
         if self.columns[Quantity::Output as usize].is_some() { Quantity::Output } else { Quantity::Error }
     }
 
-    /// Time of a row, s.
-    pub(crate) fn time_at(&self, row: usize) -> Option<f64> {
-        self.get(Quantity::Time).map(|time| time[row]).filter(|time| time.is_finite())
-    }
-
-    /// Session of a row.
-    pub(crate) fn session_at(&self, row: usize) -> u32 {
-        self.session.get(row).copied().unwrap_or(0)
+    /// A fault in these rows, in rising order, to be completed; none without rows.
+    pub(super) fn fault(&self, name: FaultName, rows: impl IntoIterator<Item = usize>) -> Option<Fault> {
+        let time = self.get(Quantity::Time);
+        let at = |row: usize| (self.line[row], time.map(|time| time[row]).filter(|time| time.is_finite()));
+        Fault::of_rows(name, rows.into_iter().map(at))
     }
 
     /// Whether a row goes on where the one before it ended.
     pub(crate) fn continues(&self, row: usize) -> bool {
-        row > 0 && self.session_at(row) == self.session_at(row - 1)
+        row > 0 && (self.session.is_empty() || self.session[row] == self.session[row - 1])
+    }
+
+    /// The rows of each session.
+    pub(crate) fn sessions(&self) -> impl Iterator<Item = Range<usize>> + '_ {
+        let mut begin = 0;
+        let ends = (1..=self.len()).filter(|row| *row == self.len() || !self.continues(*row));
+        ends.map(move |end| std::mem::replace(&mut begin, end)..end)
+    }
+
+    /// Begins a session at these rows, in rising order, in addition to those that begin already.
+    pub(super) fn begin_sessions(&mut self, at: &[usize]) {
+        let (mut next, mut number) = (at.iter().peekable(), 0);
+        let session = (0..self.len()).map(|row| {
+            let begins = next.next_if(|at| **at == row).is_some() || !self.continues(row);
+            number += u32::from(row > 0 && begins);
+            number
+        });
+        self.session = session.collect();
     }
 
     /// Leaves out the rows for which `drop` is true.
@@ -108,7 +125,9 @@ pub(crate) struct LogFindings {
     pub columns: Vec<MappedColumn>,
     /// The last line, if it broke off.
     pub broken_off: Option<u64>,
-    /// What is wrong with the order of the rows, which was mended.
+    /// A cell that is no number, or a row of another width: then these rows are not for use.
+    pub refused: Option<TableProblem>,
+    /// Faults of the order of the rows, which was mended.
     pub order: Vec<String>,
     /// What was converted, or left out though it may have been meant.
     pub notes: Vec<String>,
@@ -141,14 +160,19 @@ pub(super) fn read(
     notes.extend(sheet.notes.iter().chain(&read.notes).cloned());
     let made = of_columns(layout, read, columns, map.rate_hz(), fewest);
     let (log, mut found) = made.map_err(refuse)?;
+    if let Some(problem) = found.refused.take() {
+        return Err(refuse(problem));
+    }
     notes.append(&mut found.notes);
     Ok((log, LogFindings { notes, ..found }))
 }
 
 /// The log of `read`, which has the columns in use in their order; `rate_hz` if the file has no time.
 ///
+/// What is no number is missing in it, and said in the findings.
+///
 /// # Errors
-/// A cell is no number, a row is too short or too long, or there are fewer than `fewest`.
+/// A column holds times, or numbers beyond all limits, or there are fewer rows than `fewest`.
 pub(crate) fn of_columns(
     layout: &Layout,
     mut read: Columns,
@@ -158,15 +182,19 @@ pub(crate) fn of_columns(
 ) -> Result<(Log, LogFindings), TableProblem> {
     let last = columns.iter().map(|column| column.place).max().unwrap_or(0);
     let broken_off = read.without_broken_end(last);
-    check_rows(layout, &read, &columns)?;
+    let mut refused = check_rows(layout, &read, &columns).err();
     let mut notes = Vec::new();
     let mut log = Log::default();
     for (column, cells) in columns.iter().zip(std::mem::take(&mut read.cells)) {
-        check_cells(column, &cells)?;
+        let times = cells.times.count > 0;
+        match check_cells(column, &cells) {
+            Err(problem) if times && column.quantity != Quantity::Time => return Err(refused.unwrap_or(problem)),
+            odd => refused = refused.or(odd.err()),
+        }
         notes.extend(cells.over_note(&column.name));
         let mut values = cells.values;
-        if cells.times.count == 0 {
-            within_limits(column, &values, &read.lines)?;
+        if !times {
+            within_limits(column, &values, &read.lines).map_err(|problem| refused.clone().unwrap_or(problem))?;
             values.iter_mut().for_each(|value| *value = column.reading.value(*value));
         }
         if cells.time_of_day {
@@ -175,7 +203,7 @@ pub(crate) fn of_columns(
         log.put(column.quantity, values);
     }
     log.line = read.lines;
-    let refuse = |what: String| TableProblem { line: layout.header_line, what };
+    let refuse = |what: String| refused.clone().unwrap_or(TableProblem { line: layout.header_line, what });
     if log.len() < fewest {
         let are = if fewest == 1 { "is" } else { "are" };
         let rows = match log.len() {
@@ -196,7 +224,7 @@ pub(crate) fn of_columns(
     in_order(&mut log, &mut order);
     rollover::undo(&mut log, &columns, &mut notes);
     slower::fill(&mut log, &mut notes);
-    Ok((log, LogFindings { columns, broken_off, order, notes, own_zeros: false }))
+    Ok((log, LogFindings { columns, broken_off, refused, order, notes, own_zeros: false }))
 }
 
 fn guide_log(bytes: Vec<u8>, map: &ColumnMap, ratio: f64) -> Result<(Log, LogFindings), TableProblem> {
@@ -210,7 +238,8 @@ fn guide_log(bytes: Vec<u8>, map: &ColumnMap, ratio: f64) -> Result<(Log, LogFin
         let what = format!("{} guided frames with a star; at least {FEWEST_ROWS} are needed", log.len());
         return Err(TableProblem { line: 1, what });
     }
-    Ok((log, LogFindings { columns: phd2::columns(), broken_off: None, order: Vec::new(), notes, own_zeros: true }))
+    let (broken_off, refused, order) = (None, None, Vec::new());
+    Ok((log, LogFindings { columns: phd2::columns(), broken_off, refused, order, notes, own_zeros: true }))
 }
 
 /// Refuses rows that end before a column in use, or have more fields than names.

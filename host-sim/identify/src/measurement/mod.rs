@@ -39,7 +39,7 @@ pub(crate) use unit::Family;
 
 use faults::Findings;
 use faults::drift::Stretches;
-use faults::steps::Untold;
+use faults::steps::DoubtfulSteps;
 use log::{Log, LogFindings};
 use raw::RawFile;
 use refusal::Refusal;
@@ -101,32 +101,22 @@ impl Session {
         self.generator_rad.iter().zip(&self.error_rad).map(|(generator, error)| generator / ratio + error).collect()
     }
 
-    /// The column of torque, temperature or orientation; nothing for another channel.
-    fn column_mut(&mut self, channel: Quantity) -> Option<&mut Option<Vec<f64>>> {
+    /// The column of torque or temperature, else that of the orientation.
+    fn column_mut(&mut self, channel: Quantity) -> &mut Option<Vec<f64>> {
         match channel {
-            Quantity::Torque => Some(&mut self.torque_n_m),
-            Quantity::Temperature => Some(&mut self.temperature_c),
-            Quantity::Orientation => Some(&mut self.orientation_rad),
-            _ => None,
+            Quantity::Torque => &mut self.torque_n_m,
+            Quantity::Temperature => &mut self.temperature_c,
+            _ => &mut self.orientation_rad,
         }
     }
 
-    /// Torque, temperature or orientation, where recorded.
-    fn beside(&self, channel: Quantity) -> Option<&[f64]> {
+    /// Torque or temperature, else the orientation, where recorded.
+    fn column(&self, channel: Quantity) -> Option<&[f64]> {
         match channel {
             Quantity::Torque => self.torque_n_m.as_deref(),
             Quantity::Temperature => self.temperature_c.as_deref(),
-            Quantity::Orientation => self.orientation_rad.as_deref(),
-            _ => None,
+            _ => self.orientation_rad.as_deref(),
         }
-    }
-
-    fn beside_mut(&mut self, channel: Quantity) -> Option<&mut Vec<f64>> {
-        self.column_mut(channel)?.as_mut()
-    }
-
-    fn forget(&mut self, channel: Quantity) {
-        self.column_mut(channel).into_iter().for_each(|column| *column = None);
     }
 
     /// Its columns of numbers: both angles, and each other column that was recorded.
@@ -300,9 +290,9 @@ pub(crate) fn parse_as(
     faults::reads::check(&mut sessions, gear, &mut findings);
     faults::outliers::check(&mut sessions, gear, error_recorded, &mut findings);
     faults::resolution::check(&mut sessions, gear, error_recorded, &mut findings);
-    let untold = faults::steps::check(&mut sessions, gear, &mut findings);
+    let doubtful = faults::steps::check(&mut sessions, gear, &mut findings);
     // Steps that stay in the data look like drift; what may be one between two sessions may be drift as well.
-    if untold != Untold::Inside && findings.tooth_steps.is_empty() && !drifts {
+    if doubtful != DoubtfulSteps::Inside && findings.tooth_steps.is_empty() && !drifts {
         faults::drift::check(&mut sessions, gear, Stretches::OfTime, &mut findings);
     }
     let Findings { mut faults, tooth_steps, notes } = findings;
@@ -313,15 +303,14 @@ pub(crate) fn parse_as(
 /// Mends clock and holes of a log and leaves out the rows without an angle; how many had which angle.
 fn in_order(log: &mut Log, found: &LogFindings, findings: &mut Findings) -> String {
     findings.notes.extend(found.notes.iter().cloned());
-    if let Some(line) = found.broken_off {
-        let what = "the last line breaks off: it is left out".to_owned();
-        let fault = Fault::new(FaultName::MissingSamples, [line; 2], 1);
-        findings.faults.push(Fault { treatment: Treatment::Masked, what, ..fault });
-    }
+    let broken_off = found.broken_off.map(|line| Fault::new(FaultName::MissingSamples, [line; 2], 1));
+    findings.add(broken_off, None::<Quantity>, Treatment::Masked, |_| {
+        "the last line breaks off: it is left out".to_owned()
+    });
     for what in found.order.iter().cloned() {
         let lines = [log.line.iter().copied().min().unwrap_or(1), log.line.iter().copied().max().unwrap_or(1)];
         let fault = Fault::new(FaultName::ClockError, lines, log.len() as u64);
-        findings.faults.push(Fault { channel: Some(Quantity::Time), treatment: Treatment::Repaired, what, ..fault });
+        findings.add(Some(fault), Quantity::Time, Treatment::Repaired, |_| what);
     }
     faults::missing::fill(log, findings);
     faults::clock::check(log, findings);
@@ -347,36 +336,31 @@ impl ReadRows {
         columns: &[MappedColumn],
         ratio: Option<f64>,
     ) -> (ReadRows, Option<MeasuredError>) {
-        let made = |odd: bool| {
-            let cells = |column: &MappedColumn| file.columns.cells[column.place].clone();
-            let mut read = file.columns.with_cells(columns.iter().map(cells).collect());
-            if !odd {
-                read.forget_what_is_odd();
-            }
-            log::of_columns(&file.sheet.layout, read, columns.to_vec(), None, 0)
-        };
-        let (made, refused) = match made(true) {
-            Ok(made) => (Some(made), None),
-            Err(problem) => (made(false).ok(), Some(MeasuredError::at(&file.file, problem))),
-        };
+        let cells = |column: &MappedColumn| file.columns.cells[column.place].clone();
+        let read = file.columns.with_cells(columns.iter().map(cells).collect());
+        let made = log::of_columns(&file.sheet.layout, read, columns.to_vec(), None, 0);
         let mut rows = ReadRows { log: Log::default(), stamps_s: Vec::new(), notes: Vec::new() };
-        if let Some((mut log, found)) = made {
-            rows.stamps_s = log.get(Quantity::Time).map_or_else(Vec::new, <[f64]>::to_vec);
-            let mut findings = Findings::default();
-            in_order(&mut log, &found, &mut findings);
-            if log.len() > 1 {
-                faults::wrap::unwrap(&mut log, columns, ratio.unwrap_or(1.0), &mut findings);
+        let refused = match made {
+            Ok((mut log, found)) => {
+                rows.stamps_s = log.get(Quantity::Time).map_or_else(Vec::new, <[f64]>::to_vec);
+                let mut findings = Findings::default();
+                in_order(&mut log, &found, &mut findings);
+                if log.len() > 1 {
+                    faults::wrap::unwrap(&mut log, columns, ratio.unwrap_or(1.0), &mut findings);
+                }
+                rows.log = log;
+                rows.notes = findings.notes;
+                rows.notes.extend(findings.faults.into_iter().map(|fault| fault.what));
+                found.refused
             }
-            rows.log = log;
-            rows.notes = findings.notes;
-            rows.notes.extend(findings.faults.into_iter().map(|fault| fault.what));
-        }
-        (rows, refused)
+            Err(problem) => Some(problem),
+        };
+        (rows, refused.map(|problem| MeasuredError::at(&file.file, problem)))
     }
 
     /// Sessions, one at least.
     pub(crate) fn sessions(&self) -> usize {
-        (0..self.log.len()).filter(|row| !self.log.continues(*row)).count().max(1)
+        self.log.sessions().count().max(1)
     }
 }
 
@@ -419,6 +403,7 @@ fn many_sessions(sessions: &[Session]) -> Option<String> {
 
 /// The sessions of a log.
 fn into_sessions(mut log: Log, ratio: f64) -> Vec<Session> {
+    let sessions: Vec<Range<usize>> = log.sessions().collect();
     let generator = log.take(Quantity::Generator).unwrap_or_default();
     let error = match log.take(Quantity::Output) {
         Some(mut output) => {
@@ -437,9 +422,5 @@ fn into_sessions(mut log: Log, ratio: f64) -> Vec<Session> {
         line: std::mem::take(&mut log.line),
         ..Session::default()
     };
-    let starts: Vec<usize> = (0..=whole.len()).filter(|row| *row == whole.len() || !log.continues(*row)).collect();
-    if starts.len() <= 2 {
-        return vec![whole];
-    }
-    starts.windows(2).map(|ends| whole.part(ends[0]..ends[1])).collect()
+    if sessions.len() < 2 { vec![whole] } else { sessions.into_iter().map(|rows| whole.part(rows)).collect() }
 }

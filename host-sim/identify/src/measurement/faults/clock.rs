@@ -2,9 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use super::{Findings, span};
+use super::{Findings, marked};
 use crate::measurement::columns::Quantity;
-use crate::measurement::fault::{FaultName, Treatment};
+use crate::measurement::fault::{Fault, FaultName, Treatment};
 use crate::measurement::log::Log;
 use flexspline_base::robust::{least_and_most, median_and_std, median_of, quantile_of, sampled};
 
@@ -81,11 +81,9 @@ pub(in crate::measurement) fn check(log: &mut Log, findings: &mut Findings) {
     let strays = order(log, findings);
     standing(log, findings);
     let Some(period) = period(log) else {
-        let mut fault = span(log, FaultName::ClockError, 0, log.len() - 1);
-        (fault.channel, fault.treatment) = (Some(Quantity::Time), Treatment::Masked);
-        (fault.time_s, fault.until_s) = (None, None);
-        fault.what = "time stands still: it is not used".to_owned();
-        findings.faults.push(fault);
+        let all = log.fault(FaultName::ClockError, 0..log.len());
+        let all = all.map(|all| Fault { time_s: None, until_s: None, ..all });
+        findings.add(all, Quantity::Time, Treatment::Masked, |_| "time stands still: it is not used".to_owned());
         log.take(Quantity::Time);
         return;
     };
@@ -107,51 +105,33 @@ fn order(log: &mut Log, findings: &mut Findings) -> Vec<u64> {
     let Some(period) = period(log) else { return Vec::new() };
     let Some(time) = log.get(Quantity::Time) else { return Vec::new() };
     let far = SESSION_GAP_PERIODS * period;
-    let rows = time.len();
-    let mut drop = vec![false; rows];
-    let mut session = vec![0_u32; rows];
-    let (mut latest, mut number) = (f64::NEG_INFINITY, 0);
+    let (mut latest, mut back) = (f64::NEG_INFINITY, 0.0);
     let (mut strays, mut resets) = (Vec::new(), Vec::new());
-    for row in 0..rows {
-        let t = time[row];
-        number += u32::from(row > 0 && !log.continues(row));
-        if !t.is_finite() {
-            session[row] = number;
-            continue;
-        }
+    for (row, t) in time.iter().copied().enumerate().filter(|(_, t)| t.is_finite()) {
         // A stamp that is far from both its neighbours, which are close to each other, is wrong by itself.
         let next = time.get(row + 1).copied().unwrap_or(f64::NAN);
         let alone = next >= latest && next - latest <= far && !(latest..=next).contains(&t) && latest.is_finite();
         if alone || (t < latest && latest - t <= far) {
-            drop[row] = true;
             strays.push(row);
-        } else {
-            if t < latest {
-                number += 1;
-                resets.push((row, latest - t));
-            }
-            latest = t;
+            continue;
         }
-        session[row] = number;
+        if t < latest {
+            back = if resets.is_empty() { latest - t } else { back };
+            resets.push(row);
+        }
+        latest = t;
     }
-    if let (Some(&first), Some(&last)) = (strays.first(), strays.last()) {
-        let mut fault = span(log, FaultName::ClockError, first, last);
-        (fault.channel, fault.rows, fault.treatment) = (Some(Quantity::Time), strays.len() as u64, Treatment::Masked);
-        fault.what = format!("time runs back or is far off in {} rows: they are left out", strays.len());
-        findings.faults.push(fault);
-    }
-    if let (Some(&(first, back)), Some(&(last, _))) = (resets.first(), resets.last()) {
-        let mut fault = span(log, FaultName::ClockError, first, last);
-        (fault.channel, fault.rows, fault.treatment) = (Some(Quantity::Time), resets.len() as u64, Treatment::Kept);
-        fault.what =
-            format!("time is set back {} times, first by {back:.4} s: a new session is begun there", resets.len());
-        findings.faults.push(fault);
-    }
-    log.session = session;
+    let stray = log.fault(FaultName::ClockError, strays.iter().copied());
+    findings.add(stray, Quantity::Time, Treatment::Masked, |fault| {
+        format!("time runs back or is far off in {} rows: they are left out", fault.rows)
+    });
+    let reset = log.fault(FaultName::ClockError, resets.iter().copied());
+    findings.add(reset, Quantity::Time, Treatment::Kept, |fault| {
+        format!("time is set back {} times, first by {back:.4} s: a new session is begun there", fault.rows)
+    });
     let lines = strays.iter().map(|row| log.line[*row]).collect();
-    if !strays.is_empty() {
-        log.leave_out(&drop);
-    }
+    log.begin_sessions(&resets);
+    log.leave_out(&marked(log.len(), strays));
     lines
 }
 
@@ -161,40 +141,27 @@ fn standing(log: &mut Log, findings: &mut Findings) {
         return;
     }
     let Some(time) = log.get(Quantity::Time) else { return };
-    let stands: Vec<usize> =
-        (1..time.len()).filter(|row| time[*row] == time[*row - 1] && log.continues(*row)).collect();
-    let (Some(&first), Some(&last)) = (stands.first(), stands.last()) else { return };
-    let mut fault = span(log, FaultName::ClockError, first, last);
-    (fault.channel, fault.rows) = (Some(Quantity::Time), stands.len() as u64);
-    if stands.len() as f64 <= COARSE_SHARE * time.len() as f64 {
-        let mut drop = vec![false; time.len()];
-        stands.iter().for_each(|row| drop[*row] = true);
-        fault.treatment = Treatment::Masked;
-        fault.what = format!("{} rows repeat the time of the row before: they are left out", stands.len());
-        findings.faults.push(fault);
-        log.leave_out(&drop);
+    let (rows, mut spread) = (time.len(), time.to_vec());
+    let stands: Vec<usize> = (1..rows).filter(|row| time[*row] == time[*row - 1] && log.continues(*row)).collect();
+    let fault = log.fault(FaultName::ClockError, stands.iter().copied());
+    if stands.len() as f64 <= COARSE_SHARE * rows as f64 {
+        findings.add(fault, Quantity::Time, Treatment::Masked, |fault| {
+            format!("{} rows repeat the time of the row before: they are left out", fault.rows)
+        });
+        log.leave_out(&marked(rows, stands));
         return;
     }
-    fault.treatment = Treatment::Repaired;
-    fault.what =
-        format!("time stands in {} of {} rows: rows of the same time are spread evenly", stands.len(), time.len());
-    findings.faults.push(fault);
-    let mut spread = time.to_vec();
+    findings.add(fault, Quantity::Time, Treatment::Repaired, |fault| {
+        format!("time stands in {} of {rows} rows: rows of the same time are spread evenly", fault.rows)
+    });
+    // At the end of a session: as fast as on the whole.
+    let whole = (time[rows - 1] - time[0]).abs() / rows as f64;
     let mut begin = 0;
-    while begin < spread.len() {
-        let mut end = begin + 1;
-        while end < spread.len() && spread[end] == spread[begin] && log.continues(end) {
-            end += 1;
-        }
-        let next = spread.get(end).copied().filter(|next| *next > spread[begin] && log.continues(end));
-        // At the end of a session: as fast as on the whole.
-        let step = next.map_or_else(
-            || (time[time.len() - 1] - time[0]).abs() / time.len() as f64,
-            |next| (next - spread[begin]) / (end - begin) as f64,
-        );
-        for row in begin + 1..end {
-            spread[row] = spread[begin] + step * (row - begin) as f64;
-        }
+    while begin < rows {
+        let end = (begin + 1..rows).find(|row| time[*row] != time[begin] || !log.continues(*row)).unwrap_or(rows);
+        let next = time.get(end).filter(|next| **next > time[begin] && log.continues(end));
+        let step = next.map_or(whole, |next| (next - time[begin]) / (end - begin) as f64);
+        (begin + 1..end).for_each(|row| spread[row] = time[begin] + step * (row - begin) as f64);
         begin = end;
     }
     log.put(Quantity::Time, spread);
@@ -214,44 +181,39 @@ fn gaps(log: &mut Log, period: f64, strays: &[u64], findings: &mut Findings) {
     let mut steps = sampled(&time.windows(2).map(|t| t[1] - t[0]).filter(|dt| *dt > 0.0).collect::<Vec<_>>());
     let jitter = median_and_std(&mut steps).1;
     let lost_from = (LOST_ROW_PERIODS * period).max(period + 6.0 * jitter);
-    let (mut lost, mut long_steps, mut parts) = (Vec::new(), 0, Vec::new());
-    for row in 1..rows {
-        let dt = time[row] - time[row - 1];
-        if !log.continues(row) || dt.is_nan() || dt <= lost_from {
-            continue;
-        }
-        long_steps += 1;
-        if dt <= SESSION_GAP_PERIODS * period {
-            // Rows that are in the file, but were left out, are not lost.
-            let there = log.line[row] - log.line[row - 1];
-            lost.push((row, ((dt / period).round() as u64).saturating_sub(there)));
-        } else {
-            parts.push(row);
-        }
-    }
+    let long = (1..rows).filter(|row| log.continues(*row) && time[*row] - time[*row - 1] > lost_from);
+    let (within, parts): (Vec<usize>, Vec<usize>) =
+        long.partition(|row| time[*row] - time[*row - 1] <= SESSION_GAP_PERIODS * period);
+    let long_steps = within.len() + parts.len();
+    log.begin_sessions(&parts);
+    let Some(time) = log.get(Quantity::Time) else { return };
+    // Rows that are in the file, but were left out, are not lost.
+    let lacking_before = |row: &usize| {
+        let periods = ((time[*row] - time[*row - 1]) / period).round() as u64;
+        (*row, periods.saturating_sub(log.line[*row] - log.line[*row - 1]))
+    };
     let near_stray = |row: usize| strays.iter().any(|line| line.abs_diff(log.line[row]) <= 2);
+    let mut lost: Vec<(usize, u64)> = within.iter().map(lacking_before).collect();
     lost.retain(|(row, rows)| *rows > 0 && !near_stray(*row));
+    let mut holes: Vec<(usize, u64)> = holes(log, &parts, period).iter().map(lacking_before).collect();
+    holes.retain(|(row, rows)| *rows > 0 && !near_stray(*row));
     // Stamps that jitter make single steps long; rows are missing only where the stamps of a whole session count more
     // periods than rows.
     let counts: Vec<Counted> = counted(log, period).collect();
-    let holes: Vec<(usize, u64)> = holes(log, &parts, period).into_iter().filter(|hole| !near_stray(hole.0)).collect();
     // The median step may be shorter than the period that a clock keeps on the mean: no more are missing than its time
     // over that says, as well as the median is known.
     let unsure = MEDIAN_STDS * MEDIAN_TO_MEAN_STD * jitter / period / (rows as f64).sqrt();
-    let within = counts.iter().map(|Counted { rows, lacking, .. }| {
+    let lacking = counts.iter().map(|Counted { rows, lacking, .. }| {
         let beyond = (time[rows.end - 1] - time[rows.start]) / period - (rows.len() as f64 - 1.0);
         let is_borne_out = *lacking as f64 <= beyond + unsure * rows.len() as f64;
         if is_borne_out { *lacking } else { beyond.max(0.0).round() as u64 }
     });
-    let within = within.sum::<u64>();
-    let lacking = within.saturating_sub(strays.len() as u64);
+    let lacking = lacking.sum::<u64>().saturating_sub(strays.len() as u64);
     if jitter > SCATTERS * period {
         let beyond = |count: &Counted, k: usize| count.period[k] - count.period[k - 1] - 1;
         let of = |count: &Counted| -> Vec<(usize, u64)> {
-            (1..count.rows.len())
-                .map(|k| (count.rows.start + k, beyond(count, k)))
-                .filter(|(_, rows)| *rows > 0)
-                .collect()
+            let all = (1..count.rows.len()).map(|k| (count.rows.start + k, beyond(count, k)));
+            all.filter(|(_, rows)| *rows > 0).collect()
         };
         lost = counts.iter().flat_map(of).collect();
     }
@@ -262,68 +224,51 @@ fn gaps(log: &mut Log, period: f64, strays: &[u64], findings: &mut Findings) {
     lost.retain(|_| in_steps > 0);
     lost.extend(&holes);
     lost.sort_unstable();
-    if let (Some(&(first, _)), Some(&(last, _)), 1..) = (lost.first(), lost.last(), total) {
-        if long_steps as f64 <= UNEVEN_SHARE * rows as f64 {
-            let mut fault = span(log, FaultName::MissingSamples, first, last);
-            (fault.channel, fault.rows, fault.treatment) = (Some(Quantity::Time), total, Treatment::Kept);
-            let breaks = match holes.len() {
-                0 => String::new(),
-                1 => format!(
-                    "; one gap, of {in_holes} of them, is so long that a session begins behind it, though the motion \
-                     goes on"
-                ),
-                n => format!(
-                    "; {n} gaps, with {in_holes} of them, are so long that a session begins behind each, though the \
-                     motion goes on"
-                ),
-            };
-            fault.what = format!(
+    if total > 0 && long_steps as f64 > UNEVEN_SHARE * rows as f64 {
+        let uneven = format!("rows are not evenly spaced in time: {} steps exceed {lost_from:.6} s", lost.len());
+        findings.notes.push(uneven);
+    } else if total > 0 {
+        let breaks = match holes.len() {
+            0 => String::new(),
+            1 => format!(
+                "; one gap, of {in_holes} of them, is so long that a session begins behind it, though the motion goes \
+                 on"
+            ),
+            n => format!(
+                "; {n} gaps, with {in_holes} of them, are so long that a session begins behind each, though the motion \
+                 goes on"
+            ),
+        };
+        let fault = log.fault(FaultName::MissingSamples, lost.iter().map(|(row, _)| *row));
+        let fault = fault.map(|fault| Fault { rows: total, ..fault });
+        findings.add(fault, Quantity::Time, Treatment::Kept, |_| {
+            format!(
                 "{total} rows are missing, in up to {places} places: time goes on by more than {LOST_ROW_PERIODS} of \
                  the usual {period:.6} s{breaks}"
-            );
-            findings.faults.push(fault);
-        } else {
-            findings
-                .notes
-                .push(format!("rows are not evenly spaced in time: {} steps exceed {lost_from:.6} s", lost.len()));
-        }
-    }
-    if !parts.is_empty() {
-        let mut number = 0;
-        let mut session = vec![0; rows];
-        let mut next = parts.iter().peekable();
-        for row in 0..rows {
-            let parted = next.next_if(|part| **part == row).is_some();
-            if row > 0 && (parted || !log.continues(row)) {
-                number += 1;
-            }
-            session[row] = number;
-        }
-        log.session = session;
+            )
+        });
     }
 }
 
-/// Of gaps that begin a session those in which rows were lost, for the motion goes on over them, and how many: the row
+/// Of gaps that begin a session those over which the motion goes on, so that rows may have been lost in them: the row
 /// behind each.
-fn holes(log: &Log, parts: &[usize], period: f64) -> Vec<(usize, u64)> {
+fn holes(log: &Log, parts: &[usize], period: f64) -> Vec<usize> {
     let (Some(time), Some(generator)) = (log.get(Quantity::Time), log.get(Quantity::Generator)) else {
         return Vec::new();
     };
     let (low, high) = least_and_most(generator.iter().copied());
     let wraps = high - low <= TAU * (1.0 + 1e-6);
+    let moved = |row: usize| if wraps { turned(generator, row) } else { generator[row] - generator[row - 1] };
     // The pace over some rows without a gap, rad/s.
     let pace = |rows: std::ops::Range<usize>| {
         let (from, to) = (rows.start, rows.end - 1);
-        let gap =
-            (from + 1..=to).any(|row| !log.continues(row) || time[row] - time[row - 1] > SESSION_GAP_PERIODS * period);
-        let turned =
-            (from + 1..=to).map(|row| if wraps { turned(generator, row) } else { generator[row] - generator[row - 1] });
-        (to > from && !gap).then(|| turned.sum::<f64>() / (time[to] - time[from]))
+        let gap = (from + 1..=to).any(|row| !log.continues(row));
+        (to > from && !gap).then(|| (from + 1..=to).map(moved).sum::<f64>() / (time[to] - time[from]))
     };
     let short = parts.iter().copied().filter(|row| time[*row] - time[*row - 1] <= LONGEST_HOLE_PERIODS * period);
     let mut of_gaps = 0_usize;
     // Those over which the motion may go on, and whether it plainly does.
-    let mut found: Vec<(usize, u64, bool)> = Vec::new();
+    let mut found: Vec<(usize, bool)> = Vec::new();
     for row in short {
         of_gaps += 1;
         let before = pace(row.saturating_sub(PACE_ROWS)..row);
@@ -335,16 +280,12 @@ fn holes(log: &Log, parts: &[usize], period: f64) -> Vec<(usize, u64)> {
         let way = before.abs().max(after.abs()) * dt;
         let may_be_off = GOES_ON.0 * way + GOES_ON.1;
         if off.abs() <= way + GOES_ON.1 {
-            let there = log.line[row] - log.line[row - 1];
-            let rows = ((dt / period).round() as u64).saturating_sub(there);
-            let plainly = off.abs() <= may_be_off && way > 2.0 * GOES_ON.1 && !(wraps && may_be_off > WRAPS_RAD);
-            found.push((row, rows, plainly));
+            found.push((row, off.abs() <= may_be_off && way > 2.0 * GOES_ON.1 && !(wraps && may_be_off > WRAPS_RAD)));
         }
     }
-    let in_motion = found.iter().filter(|hole| hole.2).count();
+    let in_motion = found.iter().filter(|(_, plainly)| *plainly).count();
     let all = in_motion > 0 && in_motion as f64 >= HOLES_IN_MOTION * of_gaps as f64;
-    found.retain(|(_, rows, plainly)| *rows > 0 && (*plainly || all));
-    found.into_iter().map(|(row, rows, _)| (row, rows)).collect()
+    found.into_iter().filter(|(_, plainly)| *plainly || all).map(|(row, _)| row).collect()
 }
 
 /// The rows of a session by the periods that its stamps count.
@@ -360,11 +301,7 @@ struct Counted {
 /// A stamp that scatters into a period next to its own is counted with its neighbours.
 fn counted(log: &Log, period_s: f64) -> impl Iterator<Item = Counted> + '_ {
     let time = log.get(Quantity::Time).unwrap_or_default();
-    let mut begin = 0;
-    let parted = move |row: usize| !log.continues(row) || time[row] - time[row - 1] > SESSION_GAP_PERIODS * period_s;
-    let ends = (1..=time.len()).filter(move |row| *row == time.len() || parted(*row));
-    ends.map(move |end| {
-        let rows = std::mem::replace(&mut begin, end)..end;
+    log.sessions().map(move |rows| {
         let (mut expected, mut step_s, mut count) = (time[rows.start], period_s, 0.0);
         // Periods beyond those of the rows.
         let mut beyond = vec![0.0];
@@ -409,15 +346,14 @@ fn jitter(log: &mut Log, period: f64, findings: &mut Findings) {
     if time_scatter <= JITTER_SHARE || time_scatter <= JITTER_OVER_MOTION * motion_scatter {
         return;
     }
-    let mut fault = span(log, FaultName::ClockError, 0, log.len() - 1);
-    (fault.channel, fault.treatment) = (Some(Quantity::Time), Treatment::Repaired);
-    fault.what = format!(
-        "stamps scatter by {:.0} % of a period while the motion from row to row scatters by {:.1} %: rows are spaced \
-         evenly",
-        100.0 * time_scatter,
-        100.0 * motion_scatter
-    );
-    findings.faults.push(fault);
+    findings.add(log.fault(FaultName::ClockError, 0..log.len()), Quantity::Time, Treatment::Repaired, |_| {
+        format!(
+            "stamps scatter by {:.0} % of a period while the motion from row to row scatters by {:.1} %: rows are \
+             spaced evenly",
+            100.0 * time_scatter,
+            100.0 * motion_scatter
+        )
+    });
     let sessions: Vec<Counted> = counted(log, period).collect();
     let Some(time) = log.get_mut(Quantity::Time) else { return };
     for Counted { rows, period, .. } in sessions {
@@ -464,16 +400,16 @@ fn scale(log: &mut Log, period: f64, findings: &mut Findings) {
     } else {
         return;
     };
-    let mut fault = span(log, FaultName::ClockError, 0, log.len() - 1);
-    (fault.channel, fault.treatment) = (Some(Quantity::Time), Treatment::Kept);
-    if in_milliseconds {
-        fault.treatment = Treatment::Repaired;
-        fault.what = format!("{what}, as it takes its speed and turns round over many rows: time was divided by 1000");
-        log.get_mut(Quantity::Time).into_iter().flatten().for_each(|time| *time /= MILLI);
+    let (treatment, then) = if in_milliseconds {
+        (Treatment::Repaired, ", as it takes its speed and turns round over many rows: time was divided by 1000")
     } else {
-        fault.what = format!("{what}: is the unit of time right?");
+        (Treatment::Kept, ": is the unit of time right?")
+    };
+    let all = log.fault(FaultName::ClockError, 0..log.len());
+    findings.add(all, Quantity::Time, treatment, |_| what + then);
+    if in_milliseconds {
+        log.get_mut(Quantity::Time).into_iter().flatten().for_each(|time| *time /= MILLI);
     }
-    findings.faults.push(fault);
 }
 
 #[cfg(test)]

@@ -7,13 +7,13 @@
 
 use std::collections::HashSet;
 
-use super::held::{Change, changes_of, runs};
+use super::held::{Change, changes_of};
 use super::lattice::lattice;
 use super::steps::largest_torque;
-use super::{Findings, throughout};
+use super::{Findings, leave_out, rows_of, runs, throughout};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
-use crate::measurement::fault::{Fault, FaultName, Treatment};
+use crate::measurement::fault::{FaultName, Treatment};
 use flexspline_base::robust::median_of;
 
 /// Steps of less than this share of the largest load are no matter: those of eight bits are. *Guess*.
@@ -55,8 +55,15 @@ pub(in crate::measurement) fn check(sessions: &mut Vec<Session>, findings: &mut 
     if step < LEAST_STEP * largest_torque(sessions) {
         return;
     }
+    let fault = throughout(sessions, FaultName::Quantisation);
     if !goes_on_between(sessions, step) {
-        findings.faults.extend(kept(sessions, step));
+        let fault = fault.filter(|_| is_of_a_sensor(sessions, step));
+        findings.add(fault, Quantity::Torque, Treatment::Kept, |_| {
+            format!(
+                "the torque is written in steps of {step:.3} N·m: what the load does within a step is not seen, and \
+                 nothing in the rows tells it"
+            )
+        });
         return;
     }
     let of = |session: &Session| session.torque_n_m.as_deref().map_or_else(Vec::new, |torque| stretches(torque, step));
@@ -64,7 +71,7 @@ pub(in crate::measurement) fn check(sessions: &mut Vec<Session>, findings: &mut 
     let pairs = known.iter().flatten().flat_map(|known| known.windows(2));
     let mut lasting: Vec<f64> = pairs.map(|pair| pair[1].0 - pair[0].0).collect();
     let long = LONG * median_of(&mut lasting);
-    let Some(mut fault) = coarse(sessions) else { return };
+    let rows = rows_of(sessions);
     let mut drop: Vec<Vec<bool>> = sessions.iter().map(|s| vec![s.torque_n_m.is_some(); s.len()]).collect();
     for ((session, known), drop) in sessions.iter_mut().zip(&known).zip(&mut drop) {
         if let Some(torque) = &mut session.torque_n_m {
@@ -72,42 +79,28 @@ pub(in crate::measurement) fn check(sessions: &mut Vec<Session>, findings: &mut 
         }
     }
     let out = drop.iter().flatten().filter(|out| **out).count();
-    let leave_out = (out as f64) < (1.0 - STAYS) * fault.rows as f64;
-    if leave_out {
-        for (session, drop) in sessions.iter_mut().zip(&drop).filter(|(_, drop)| drop.contains(&true)) {
-            session.leave_out(drop);
-        }
+    let is_few = (out as f64) < (1.0 - STAYS) * rows as f64;
+    if is_few {
+        leave_out(sessions, &drop);
         sessions.retain(|session| !session.is_empty());
     }
-    fault.treatment = Treatment::Repaired;
-    fault.what = format!(
-        "the torque is written in steps of {step:.3} N·m, and the load goes on between them: where it goes from one \
-         to the next it is halfway, and a curve through these points stands in{}",
-        if leave_out && out > 0 { format!("; {out} rows far from any such point are left out") } else { String::new() }
-    );
-    findings.faults.push(fault);
+    let left_out =
+        if is_few && out > 0 { format!("; {out} rows far from any such point are left out") } else { String::new() };
+    findings.add(fault, Quantity::Torque, Treatment::Repaired, |_| {
+        format!(
+            "the torque is written in steps of {step:.3} N·m, and the load goes on between them: where it goes from \
+             one to the next it is halfway, and a curve through these points stands in{left_out}"
+        )
+    });
 }
 
-/// A coarse torque in all rows.
-fn coarse(sessions: &[Session]) -> Option<Fault> {
-    Some(Fault { channel: Some(Quantity::Torque), ..throughout(sessions, FaultName::Quantisation)? })
-}
-
-/// Names steps of a sensor between which nothing shows where the load is.
-fn kept(sessions: &[Session], step: f64) -> Option<Fault> {
+/// Whether steps are those of a sensor, between which nothing shows where the load is.
+fn is_of_a_sensor(sessions: &[Session], step: f64) -> bool {
     let torques = || sessions.iter().filter_map(|session| session.torque_n_m.as_deref());
-    let runs: Vec<usize> = torques().flat_map(|torque| runs(torque, 0.0)).map(|run| run.len()).collect();
+    let runs: Vec<usize> = torques().flat_map(|torque| runs(torque, |a, b| a == b)).map(|run| run.len()).collect();
     let torn = runs.iter().filter(|rows| **rows < LEAST_ROWS).count();
     let steps: HashSet<i64> = torques().flatten().map(|torque| (torque / step).round() as i64).collect();
-    if steps.len() < MANY_STEPS || (torn as f64) < TORN * runs.len() as f64 {
-        return None;
-    }
-    let mut fault = coarse(sessions)?;
-    fault.what = format!(
-        "the torque is written in steps of {step:.3} N·m: what the load does within a step is not seen, and nothing \
-         in the rows tells it"
-    );
-    Some(fault)
+    steps.len() >= MANY_STEPS && (torn as f64) >= TORN * runs.len() as f64
 }
 
 /// Whether the error goes on from step to step, instead of changing with the torque within a row. Around no load the
@@ -117,7 +110,7 @@ fn goes_on_between(sessions: &[Session], step: f64) -> bool {
     for session in sessions {
         let Some(torque) = session.torque_n_m.as_deref() else { continue };
         for Change { rows: [before, after], load: [low, high], within, in_all } in
-            changes_of(session, &runs(torque, 0.0))
+            changes_of(session, &runs(torque, |a, b| a == b))
         {
             let on_one_flank = low.abs().min(high.abs()) > 0.5 * step && low * high > 0.0;
             let by_one = (high - low).abs() < MORE_THAN_ONE * step;

@@ -3,11 +3,12 @@
 //! Wear, heat and a falling stiffness move the error too, but not on both flanks alike; a wrong ratio and an eccentric
 //! encoder move it with the angle. Drift is named only where the data distinguish it from them.
 
-use super::state::{Extra, State};
-use super::{ARCSEC, Findings, throughout};
+use super::state::{Extra, StateModel};
+use super::steps::largest_torque;
+use super::{ARCSEC, Findings, LineFit, level, rows_of, throughout};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
-use crate::measurement::fault::{FaultName, Treatment};
+use crate::measurement::fault::{Fault, FaultName, Measures, Treatment};
 use crate::measurement::gear::Gear;
 use flexspline_base::robust::{least_and_most, median_of};
 use flexspline_base::statistics::correlation;
@@ -82,18 +83,20 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, cut: 
     let Some(last) = sessions.last().and_then(|s| s.time_s.as_ref()?.last().copied()) else { return };
     let first = sessions[0].time_s.as_ref().map_or(from_s, |time| time[0]);
     let total = per_s * (last - first);
-    let Some(mut fault) = throughout(sessions, FaultName::Drift) else { return };
-    (fault.channel, fault.treatment) = (Some(Quantity::Error), Treatment::Repaired);
-    fault.size_arcsec = Some(total / ARCSEC);
     let per_hour = 3600.0 * per_s / ARCSEC;
-    fault.measures.arcsec_per_hour = Some(per_hour);
-    fault.what = format!(
-        "the zero of the error drifts by {:.2} arcsec in all, {per_hour:.1} an hour (standard deviation of all \
-         {:.2}), alike on both flanks, and not with temperature or position: a straight line in time is taken out",
-        total / ARCSEC,
-        std * (last - first) / ARCSEC
-    );
-    findings.faults.push(fault);
+    let fault = throughout(sessions, FaultName::Drift).map(|fault| Fault {
+        size_arcsec: Some(total / ARCSEC),
+        measures: Measures { arcsec_per_hour: Some(per_hour), ..Measures::default() },
+        ..fault
+    });
+    findings.add(fault, Quantity::Error, Treatment::Repaired, |_| {
+        format!(
+            "the zero of the error drifts by {:.2} arcsec in all, {per_hour:.1} an hour (standard deviation of all \
+             {:.2}), alike on both flanks, and not with temperature or position: a straight line in time is taken out",
+            total / ARCSEC,
+            std * (last - first) / ARCSEC
+        )
+    });
     for session in sessions.iter_mut() {
         if let Some(time) = &session.time_s {
             session.error_rad.iter_mut().zip(time).for_each(|(error, t)| *error -= per_s * (t - from_s));
@@ -122,31 +125,25 @@ fn slope(sessions: &[Session], gear: &Gear, cut: Stretches) -> Option<(f64, f64,
     if end <= begin || !ordered {
         return None;
     }
-    let state = State::new(sessions, gear);
-    let rows: usize = sessions.iter().map(Session::len).sum();
-    let forward = sessions
-        .iter()
-        .enumerate()
-        .map(|(s, session)| (0..session.len()).filter(|row| state.flank(s, *row) > 0.0).count());
-    let forward = forward.sum::<usize>() as f64 / rows as f64;
+    let state = StateModel::new(sessions, gear);
+    let forward = |s: usize| (0..sessions[s].len()).filter(|row| state.flank(s, *row) > 0.0).count();
+    let forward = (0..sessions.len()).map(forward).sum::<usize>() as f64 / rows_of(sessions) as f64;
     if !(BOTH_FLANKS..=1.0 - BOTH_FLANKS).contains(&forward) {
         return None;
     }
     let tau = |s: usize, r: usize| 2.0 * (time(s, r) - begin) / (end - begin) - 1.0;
     let by_flank = |s: usize, r: usize| tau(s, r) * state.flank(s, r);
-    let by_load = |s: usize, r: usize| {
-        let torque = sessions[s].torque_n_m.as_ref().map_or(0.0, |torque| torque[r]);
-        tau(s, r) * if torque == 0.0 { 0.0 } else { torque.signum() }
-    };
-    let by_load_size = |s: usize, r: usize| sessions[s].torque_n_m.as_ref().map_or(0.0, |torque| torque[r] * tau(s, r));
+    let load = |s: usize, r: usize| sessions[s].torque_n_m.as_ref().map_or(0.0, |torque| torque[r]);
+    let sign = |load: f64| if load == 0.0 { 0.0 } else { load.signum() };
+    let by_load = |s: usize, r: usize| tau(s, r) * sign(load(s, r));
+    let by_load_size = |s: usize, r: usize| load(s, r) * tau(s, r);
     let all: [Extra; 4] = [&tau, &by_flank, &by_load, &by_load_size];
     let fit = state.fit(&all)?;
     let place = fit.value.len() - 4;
     let value = |k: usize| fit.value[place + k];
     let (drift, formal) = (value(0), fit.std[place]);
     // The part that goes with the flank, at the largest torque for the last.
-    let torque = sessions.iter().filter_map(|s| s.torque_n_m.as_ref()).flatten().fold(0.0, |m: f64, t| m.max(t.abs()));
-    let unlike = value(1).abs().max(value(2).abs()).max(value(3).abs() * torque);
+    let unlike = value(1).abs().max(value(2).abs()).max(value(3).abs() * largest_torque(sessions));
     if drift.abs() * 2.0 < LEAST_RAD || unlike > ALIKE * drift.abs() {
         return None;
     }
@@ -157,13 +154,11 @@ fn slope(sessions: &[Session], gear: &Gear, cut: Stretches) -> Option<(f64, f64,
         return None;
     }
     // Sessions that all have load of one sign lie on one flank, whatever their direction.
-    let loaded = sessions.iter().filter_map(|s| s.torque_n_m.as_ref()).flatten();
-    let (mut plus, mut minus) = (0, 0);
-    for torque in loaded {
-        plus += usize::from(*torque > 0.0);
-        minus += usize::from(*torque < 0.0);
-    }
-    if plus + minus > 0 && (plus.min(minus) as f64) < BOTH_FLANKS * (plus + minus) as f64 {
+    let loaded = |sign: f64| {
+        sessions.iter().filter_map(|s| s.torque_n_m.as_ref()).flatten().filter(|torque| sign * **torque > 0.0).count()
+    };
+    let (plus, minus) = (loaded(1.0), loaded(-1.0));
+    if (plus.min(minus) as f64) < BOTH_FLANKS * (plus + minus) as f64 {
         return None;
     }
     // Time over the recording, alone, has the size 1/√3. Few sessions look like many a state of a drive: then it must
@@ -227,7 +222,7 @@ fn of_time(lefts: &[Vec<Point>]) -> Vec<Point> {
 
 /// Medians of stretches of rows, none over a break.
 fn of_rows_alone(lefts: &[Vec<Point>]) -> Vec<Point> {
-    let rows: usize = lefts.iter().map(Vec::len).sum();
+    let rows = lefts.iter().map(Vec::len).sum();
     let stretches = |left: &Vec<Point>| {
         let long = left.len().div_ceil((STRETCHES * left.len()).div_ceil(rows).max(1)).max(1);
         left.chunks(long).filter(|part| part.len() >= STRETCH_ROWS).map(middle_of).collect::<Vec<Point>>()
@@ -250,7 +245,7 @@ fn alike_in_sessions(lefts: &[Vec<Point>], drift: f64) -> bool {
 
 /// Whether the zero moves within sessions, a zero of each free, as it does over all of them; where that does not show,
 /// whether the sessions lie on one line. `place` is where the first of the columns of `drifts` stands.
-fn goes_on_within(state: &State, drifts: &[Extra], place: usize, drift: f64, lefts: &[Vec<Point>]) -> bool {
+fn goes_on_within(state: &StateModel, drifts: &[Extra], place: usize, drift: f64, lefts: &[Vec<Point>]) -> bool {
     let zeros: Vec<_> = (1..lefts.len()).map(|of| move |s: usize, _: usize| f64::from(u8::from(s == of))).collect();
     let mut columns: Vec<Extra> = drifts.to_vec();
     columns.extend(zeros.iter().map(|zero| zero as Extra));
@@ -289,9 +284,9 @@ fn within_sessions(lefts: &[Vec<Point>], drift: f64) -> (f64, f64) {
     (xy / xx.max(1e-300), variance.sqrt())
 }
 
-/// Median of a few rows from this one on, rad.
-fn level(session: &Session, row: usize) -> f64 {
-    median_of(&mut session.error_rad[row..(row + LEVEL_ROWS).min(session.len())].to_vec())
+/// The error from this row on, rad: a median of a few rows.
+fn error_from(session: &Session, row: usize) -> f64 {
+    level(&session.error_rad, row..(row + LEVEL_ROWS).min(session.len()))
 }
 
 /// The largest change within [`LEAP_S`], rad, between medians of a few rows.
@@ -299,13 +294,12 @@ fn largest_leap(sessions: &[Session]) -> f64 {
     let mut largest = 0.0f64;
     for session in sessions {
         let Some(time) = &session.time_s else { continue };
-        let level = |row: usize| level(session, row);
         let mut later = 0;
         for row in (0..session.len()).step_by(LEVEL_ROWS / 2) {
             while later + 1 < session.len() && time[later] < time[row] + LEAP_S {
                 later += 1;
             }
-            largest = largest.max((level(later) - level(row)).abs());
+            largest = largest.max((error_from(session, later) - error_from(session, row)).abs());
         }
     }
     largest
@@ -317,26 +311,22 @@ fn largest_leap_between(sessions: &[Session], per_s: f64) -> f64 {
         let [before, after] = pair else { return 0.0 };
         let (Some(then), Some(now)) = (&before.time_s, &after.time_s) else { return 0.0 };
         let passed = now.first().zip(then.last()).map_or(0.0, |(now, then)| now - then);
-        let last = level(before, before.len().saturating_sub(LEVEL_ROWS));
-        (level(after, 0) - last).abs() - GAP_SHARE * per_s * passed
+        let last = error_from(before, before.len().saturating_sub(LEVEL_ROWS));
+        (error_from(after, 0) - last).abs() - GAP_SHARE * per_s * passed
     };
     sessions.windows(2).map(leap).fold(0.0, f64::max)
 }
 
 /// Slope of a straight line and its standard deviation, neighbours being correlated as their residuals are.
 fn line(points: &[(f64, f64)]) -> Option<(f64, f64)> {
-    let n = points.len() as f64;
     if points.len() < FEWEST_STRETCHES {
         return None;
     }
-    let (mx, my) = points.iter().fold((0.0, 0.0), |m, p| (m.0 + p.0 / n, m.1 + p.1 / n));
-    let (xx, xy) = points.iter().fold((0.0, 0.0), |s, p| (s.0 + (p.0 - mx).powi(2), s.1 + (p.0 - mx) * (p.1 - my)));
-    let slope = xy / xx;
-    let left: Vec<f64> = points.iter().map(|p| p.1 - my - slope * (p.0 - mx)).collect();
-    let own: f64 = left.iter().map(|l| l * l).sum();
-    let next: f64 = left.windows(2).map(|l| l[0] * l[1]).sum();
+    let LineFit { slope, square, residual } = LineFit::of(points);
+    let own: f64 = residual.iter().map(|l| l * l).sum();
+    let next: f64 = residual.windows(2).map(|l| l[0] * l[1]).sum();
     let correlation = if own > 0.0 { (next / own).clamp(0.0, 0.9) } else { 0.0 };
-    let std = (own / (n - 2.0) / xx * (1.0 + correlation) / (1.0 - correlation)).sqrt();
+    let std = (own / (points.len() as f64 - 2.0) / square * (1.0 + correlation) / (1.0 - correlation)).sqrt();
     Some((slope, std.max(1e-12)))
 }
 

@@ -4,10 +4,10 @@ use std::ops::Range;
 
 use super::lattice::lattice;
 use super::steps::WHOLE_PITCH;
-use super::{ARCSEC, Findings, of_rows, whole_pitches};
+use super::{ARCSEC, Findings, leave_out, of_rows, rows_of, runs, straight, whole_pitches};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
-use crate::measurement::fault::{FaultName, Treatment};
+use crate::measurement::fault::{Fault, FaultName, Treatment};
 use crate::measurement::gear::Gear;
 use crate::measurement::refusal::Refusal;
 use flexspline_base::robust::{least_and_most, quantile_of, sampled, white_noise};
@@ -31,18 +31,8 @@ const LONG_DWELL_RAD: f64 = 1200.0 * ARCSEC;
 const CATCHES_UP: f64 = 10.0;
 
 /// Stretches of rows with one value, at least `shortest` rows long.
-fn stretches(values: &[f64], shortest: usize, same: impl Fn(f64, f64) -> bool) -> Vec<Range<usize>> {
-    let mut found = Vec::new();
-    let mut begin = 0;
-    for row in 1..=values.len() {
-        if row == values.len() || !same(values[row], values[begin]) {
-            if row - begin >= shortest {
-                found.push(begin..row);
-            }
-            begin = row;
-        }
-    }
-    found
+fn stretches(values: &[f64], shortest: usize, same: impl Fn(f64, f64) -> bool) -> impl Iterator<Item = Range<usize>> {
+    runs(values, same).into_iter().filter(move |run| run.len() >= shortest)
 }
 
 /// Length of a stretch that chance does not give in this many rows, of a channel that changes at every second row at
@@ -73,18 +63,22 @@ pub(in crate::measurement) fn check(
     error_recorded: bool,
     findings: &mut Findings,
 ) -> Result<(), Refusal> {
-    let rows: usize = sessions.iter().map(Session::len).sum();
+    let rows = rows_of(sessions);
     let outputs: Vec<Vec<f64>> = sessions.iter().map(|session| session.output_rad(gear.ratio)).collect();
-    let (noise, step) = noise_and_step(&outputs.iter().map(Vec::as_slice).collect::<Vec<_>>());
-    let noisy = noise > BLURRED * step && noise > NO_NOISE_RAD;
+    let noisy = |series: &[&[f64]]| {
+        let (noise, step) = noise_and_step(series);
+        noise > BLURRED * step && noise > NO_NOISE_RAD
+    };
+    let outputs_noisy = noisy(&outputs.iter().map(Vec::as_slice).collect::<Vec<_>>());
+    let longest = beyond_chance(rows);
+    // Digits of an error that was written down leave something of the angle.
+    let digits = if error_recorded { 1e-3 * ARCSEC } else { 0.0 };
+    let same = |a: f64, b: f64| (a - b).abs() <= digits + 1e-13 * (a.abs() + b.abs());
+    let follower = if error_recorded { Quantity::Error } else { Quantity::Output };
     let mut drop: Vec<Vec<bool>> = sessions.iter().map(|session| vec![false; session.len()]).collect();
     for (number, (session, output)) in sessions.iter().zip(&outputs).enumerate() {
         let generator = &session.generator_rad;
-        // Digits of an error that was written down leave something of the angle.
-        let digits = if error_recorded { 1e-3 * ARCSEC } else { 0.0 };
-        let same = |a: f64, b: f64| (a - b).abs() <= digits + 1e-13 * (a.abs() + b.abs());
         let mut frozen: Vec<(Quantity, Range<usize>, f64)> = Vec::new();
-        let follower = if error_recorded { Quantity::Error } else { Quantity::Output };
         for stretch in stretches(output, 3, same) {
             let missed = missed(generator, &stretch) / gear.ratio.abs();
             let catches_up = output.get(stretch.end).is_some_and(|next| {
@@ -93,42 +87,39 @@ pub(in crate::measurement) fn check(
                 made * due.signum() > 0.5 * due.abs() && due.abs() > 0.5 * missed
             });
             let by_dwell = missed > LONG_DWELL_RAD || (missed > DWELL_RAD && catches_up);
-            if by_dwell || (noisy && stretch.len() >= beyond_chance(rows)) {
+            if by_dwell || (outputs_noisy && stretch.len() >= longest) {
                 frozen.push((follower, stretch, missed));
             }
         }
         if error_recorded {
-            let (noise, step) = noise_and_step(&[&session.error_rad]);
-            let noisy = noise > BLURRED * step && noise > NO_NOISE_RAD;
-            for stretch in stretches(&session.error_rad, beyond_chance(rows), |a, b| a == b) {
-                if noisy || stretch.len() == session.len() {
-                    frozen.push((Quantity::Error, stretch, 0.0));
-                }
-            }
+            let noisy = noisy(&[&session.error_rad]);
+            let of_error = stretches(&session.error_rad, longest, |a, b| a == b);
+            let of_error = of_error.filter(|stretch| noisy || stretch.len() == session.len());
+            frozen.extend(of_error.map(|stretch| (Quantity::Error, stretch, 0.0)));
         }
-        for stretch in stretches(generator, 3, |a, b| a == b) {
-            let moved = missed_by(output, &stretch);
+        for stretch in stretches(generator, 3, |a, b| a == b).filter(|_| !error_recorded) {
+            let missed = missed(output, &stretch);
             let catches_up = generator.get(stretch.end).is_some_and(|next| {
                 let due = (output[stretch.end] - output[stretch.start]) * gear.ratio;
                 (next - generator[stretch.start]) * due.signum() > 0.5 * due.abs()
             });
-            let stands = moved > LONG_DWELL_RAD && slips_a_tooth(output, &stretch, gear);
-            if !error_recorded && !stands && (moved > LONG_DWELL_RAD || (moved > DWELL_RAD && catches_up)) {
-                frozen.push((Quantity::Generator, stretch, moved));
+            let stands = missed > LONG_DWELL_RAD && slips_a_tooth(output, &stretch, gear);
+            if !stands && (missed > LONG_DWELL_RAD || (missed > DWELL_RAD && catches_up)) {
+                frozen.push((Quantity::Generator, stretch, missed));
             }
         }
         for (channel, stretch, missed) in frozen {
-            let mut fault = of_rows(session, FaultName::FrozenChannel, stretch.clone());
-            (fault.channel, fault.treatment) = (Some(channel), Treatment::Masked);
-            fault.size_arcsec = Some(missed / ARCSEC);
-            fault.what = format!(
-                "the {channel} keeps one value over {} rows, in which it should have moved by {:.1} arcsec at the \
-                 output: they are left out",
-                stretch.len(),
-                missed / ARCSEC
-            );
-            findings.faults.push(fault);
-            drop[number][stretch].iter_mut().for_each(|row| *row = true);
+            let fault = of_rows(sessions, FaultName::FrozenChannel, stretch.clone().map(|row| (number, row)));
+            let fault = fault.map(|fault| Fault { size_arcsec: Some(missed / ARCSEC), ..fault });
+            findings.add(fault, channel, Treatment::Masked, |fault| {
+                format!(
+                    "the {channel} keeps one value over {} rows, in which it should have moved by {:.1} arcsec at the \
+                     output: they are left out",
+                    fault.rows,
+                    missed / ARCSEC
+                )
+            });
+            drop[number][stretch].fill(true);
         }
     }
     let left: usize = drop.iter().flatten().filter(|dropped| !**dropped).count();
@@ -140,11 +131,7 @@ pub(in crate::measurement) fn check(
     saturated(sessions, rows, &mut drop, findings);
     beside(sessions, Quantity::Torque, rows, &mut drop, findings);
     beside(sessions, Quantity::Temperature, rows, &mut drop, findings);
-    for (session, drop) in sessions.iter_mut().zip(&drop) {
-        if drop.contains(&true) {
-            session.leave_out(drop);
-        }
-    }
+    leave_out(sessions, &drop);
     sessions.retain(|session| !session.is_empty());
     Ok(())
 }
@@ -155,13 +142,9 @@ fn noise_and_step(series: &[&[f64]]) -> (f64, f64) {
     (white_noise(series.iter().copied()), lattice(longest).unwrap_or(0.0))
 }
 
-/// The farthest an angle goes from its first value in a stretch.
-fn missed_by(values: &[f64], stretch: &Range<usize>) -> f64 {
+/// The farthest an angle goes from its first value in a stretch in which the other one stands.
+fn missed(values: &[f64], stretch: &Range<usize>) -> f64 {
     values[stretch.clone()].iter().map(|value| (value - values[stretch.start]).abs()).fold(0.0, f64::max)
-}
-
-fn missed(generator: &[f64], stretch: &Range<usize>) -> f64 {
-    missed_by(generator, stretch)
 }
 
 /// A torque stands at a limit in stretches of this many rows or more, … *Guess*: two may be a peak.
@@ -177,7 +160,7 @@ const ROUND_OFF: f64 = 1e-6;
 /// Leaves out rows in which the torque stands at its largest or its least value, though it has noise elsewhere: the
 /// sensor or its amplifier is at its end, and nobody knows the load.
 fn saturated(sessions: &[Session], rows: usize, drop: &mut [Vec<bool>], findings: &mut Findings) {
-    let torques: Vec<&[f64]> = sessions.iter().filter_map(|session| session.beside(Quantity::Torque)).collect();
+    let torques: Vec<&[f64]> = sessions.iter().filter_map(|session| session.column(Quantity::Torque)).collect();
     if torques.len() < sessions.len() || torques.is_empty() {
         return;
     }
@@ -192,27 +175,26 @@ fn saturated(sessions: &[Session], rows: usize, drop: &mut [Vec<bool>], findings
     if few || most <= least || noise <= BLURRED * step || noise <= ROUND_OFF * (most - least) {
         return;
     }
-    for limit in [least, most] {
-        let at_limit = |values: &[f64]| stretches(values, AT_LIMIT_ROWS, |a, b| a == limit && b == limit);
-        let found: Vec<Vec<Range<usize>>> = torques.iter().map(|torque| at_limit(torque)).collect();
-        let count: usize = found.iter().flatten().map(Range::len).sum();
-        let places =
-            || found.iter().enumerate().flat_map(|(number, of)| of.iter().map(move |stretch| (number, stretch)));
-        let (Some((first, from)), Some((last, to))) = (places().next(), places().last()) else { continue };
-        if limit == 0.0 || (count as f64) < AT_LIMIT_SHARE * rows as f64 || count < SHORTEST {
+    for limit in [least, most].into_iter().filter(|limit| *limit != 0.0) {
+        let at_limit = |(number, torque): (usize, &&[f64])| {
+            let at_limit = stretches(torque, AT_LIMIT_ROWS, |a, b| a == b).filter(|run| torque[run.start] == limit);
+            at_limit.flatten().map(|row| (number, row)).collect::<Vec<_>>()
+        };
+        let found: Vec<(usize, usize)> = torques.iter().enumerate().flat_map(at_limit).collect();
+        if (found.len() as f64) < AT_LIMIT_SHARE * rows as f64 || found.len() < SHORTEST {
             continue;
         }
-        let mut fault = of_rows(&sessions[first], FaultName::FrozenChannel, from.clone());
-        let end = of_rows(&sessions[last], FaultName::FrozenChannel, to.clone());
-        (fault.last_line, fault.until_s, fault.rows) = (end.last_line, end.until_s, count as u64);
-        (fault.channel, fault.treatment) = (Some(Quantity::Torque), Treatment::Masked);
-        fault.advice = "take a torque sensor, or a gain of its amplifier, with room for the largest load";
-        fault.what = format!(
-            "the torque never passes {limit:.3} N·m, and stands there in {count} rows, though it has noise elsewhere: \
-             it saturates, and these rows are left out"
-        );
-        findings.faults.push(fault);
-        places().for_each(|(number, stretch)| drop[number][stretch.clone()].fill(true));
+        let advice = "take a torque sensor, or a gain of its amplifier, with room for the largest load";
+        let fault = of_rows(sessions, FaultName::FrozenChannel, found.iter().copied());
+        let fault = fault.map(|fault| Fault { advice, ..fault });
+        findings.add(fault, Quantity::Torque, Treatment::Masked, |fault| {
+            format!(
+                "the torque never passes {limit:.3} N·m, and stands there in {} rows, though it has noise elsewhere: it \
+                 saturates, and these rows are left out",
+                fault.rows
+            )
+        });
+        found.into_iter().for_each(|(number, row)| drop[number][row] = true);
     }
 }
 
@@ -222,7 +204,7 @@ fn saturated(sessions: &[Session], rows: usize, drop: &mut [Vec<bool>], findings
 /// A constant load, a load in steps and a soak at one temperature are not faults: only a channel with noise that lost
 /// it, or a channel that always changes, stands, and catches up at once, is frozen.
 fn beside(sessions: &mut [Session], channel: Quantity, rows: usize, drop: &mut [Vec<bool>], findings: &mut Findings) {
-    let series: Vec<&[f64]> = sessions.iter().filter_map(|session| session.beside(channel)).collect();
+    let series: Vec<&[f64]> = sessions.iter().filter_map(|session| session.column(channel)).collect();
     if series.is_empty() {
         return;
     }
@@ -232,7 +214,7 @@ fn beside(sessions: &mut [Session], channel: Quantity, rows: usize, drop: &mut [
     let usual = quantile_of(&mut sampled(&steps), 0.99);
     let longest = beyond_chance(rows);
     let mut frozen: Vec<(usize, Range<usize>)> = Vec::new();
-    for (number, values) in sessions.iter().enumerate().filter_map(|(k, session)| Some((k, session.beside(channel)?))) {
+    for (number, values) in sessions.iter().enumerate().filter_map(|(k, session)| Some((k, session.column(channel)?))) {
         for stretch in stretches(values, longest, |a, b| a == b) {
             // No load at all is a load, and may be written as exactly nothing; what saturates is known already.
             if values[stretch.start] == 0.0 || drop[number][stretch.start] {
@@ -250,31 +232,25 @@ fn beside(sessions: &mut [Session], channel: Quantity, rows: usize, drop: &mut [
     }
     let count: usize = frozen.iter().map(|(_, stretch)| stretch.len()).sum();
     let useless = 2 * count > rows;
+    let (treatment, done) = match channel {
+        _ if useless => (Treatment::Masked, "the channel is not used"),
+        Quantity::Torque => (Treatment::Masked, "they are left out"),
+        _ => (Treatment::Repaired, "a straight line is put in its place"),
+    };
     for (number, stretch) in frozen {
-        let mut fault = of_rows(&sessions[number], FaultName::FrozenChannel, stretch.clone());
-        fault.channel = Some(channel);
-        let (treatment, done) = match channel {
-            _ if useless => (Treatment::Masked, "the channel is not used"),
-            Quantity::Torque => (Treatment::Masked, "they are left out"),
-            _ => (Treatment::Repaired, "a straight line is put in its place"),
-        };
-        fault.treatment = treatment;
-        fault.what = format!("the {channel} keeps one value over {} rows: {done}", stretch.len());
-        findings.faults.push(fault);
+        let fault = of_rows(sessions, FaultName::FrozenChannel, stretch.clone().map(|row| (number, row)));
+        findings.add(fault, channel, treatment, |fault| {
+            format!("the {channel} keeps one value over {} rows: {done}", fault.rows)
+        });
+        let values = sessions[number].column_mut(channel).as_mut();
         if channel == Quantity::Torque && !useless {
             drop[number][stretch].fill(true);
-            continue;
-        }
-        if let Some(values) = sessions[number].beside_mut(channel) {
-            let from = values[stretch.start];
-            let to = values.get(stretch.end).copied().unwrap_or(from);
-            for row in stretch.clone() {
-                values[row] = from + (to - from) * (row - stretch.start) as f64 / stretch.len() as f64;
-            }
+        } else if let Some(values) = values.filter(|values| stretch.end < values.len()) {
+            straight(values, stretch.start, stretch.end);
         }
     }
     if useless {
-        sessions.iter_mut().for_each(|session| session.forget(channel));
+        sessions.iter_mut().for_each(|session| *session.column_mut(channel) = None);
     }
 }
 

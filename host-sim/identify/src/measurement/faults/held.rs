@@ -9,7 +9,7 @@
 use std::ops::Range;
 
 use super::lattice::lattice;
-use super::{Findings, throughout};
+use super::{Findings, leave_out, marked, runs, straight, throughout};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{Fault, FaultName, Measures, Treatment};
@@ -43,12 +43,22 @@ const SAME: f64 = 1e-13;
 /// and rows that repeat an angle are left out.
 pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) {
     check_torque(sessions, findings);
-    check_angle(sessions, Quantity::Generator, |session| session.generator_rad.clone(), findings);
-    check_angle(sessions, Quantity::Output, |session| session.output_rad(gear.ratio), findings);
+    for channel in [Quantity::Generator, Quantity::Output] {
+        check_angle(sessions, channel, gear, findings);
+    }
 }
 
-/// Rows from one new value to the next, if most runs of one value are as long.
-fn rhythm(of: &[Vec<Range<usize>>]) -> Option<usize> {
+/// Runs of one value of a channel in each session.
+type SessionRuns = Vec<Vec<Range<usize>>>;
+
+/// Runs of one value, but for round-off.
+fn runs_of(values: &[f64]) -> Vec<Range<usize>> {
+    let same = SAME * values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
+    runs(values, |a, b| (a - b).abs() <= same)
+}
+
+/// Rows from one new value to the next, if most runs of one value are as long; with the fault of it, to be completed.
+fn rhythm(sessions: &[Session], of: &SessionRuns) -> Option<(usize, Fault)> {
     // The first and the last of a session are cut.
     let inner = || of.iter().flat_map(|runs| runs.get(1..runs.len().saturating_sub(1)).unwrap_or_default());
     let mut lengths: Vec<f64> = inner().map(|run| run.len() as f64).collect();
@@ -57,28 +67,20 @@ fn rhythm(of: &[Vec<Range<usize>>]) -> Option<usize> {
     let is_one = lengths.len() >= FEWEST_RUNS
         && (2..=LONGEST).contains(&every)
         && (regular as f64) >= REGULAR * lengths.len() as f64;
-    is_one.then_some(every)
+    let rows = of.iter().flatten().map(|run| run.len() as u64 - 1).sum();
+    let measures = Measures { every_rows: Some(every as u64), ..Measures::default() };
+    let fault = throughout(sessions, FaultName::FrozenChannel).filter(|_| is_one);
+    fault.map(|fault| (every, Fault { rows, measures, ..fault }))
 }
 
-/// A fault of a channel with a new value in one of `every` rows, to be completed.
-fn fault(sessions: &[Session], of: &[Vec<Range<usize>>], channel: Quantity, every: usize) -> Option<Fault> {
-    Some(Fault {
-        rows: of.iter().flatten().map(|run| run.len() as u64 - 1).sum(),
-        channel: Some(channel),
-        measures: Measures { every_rows: Some(every as u64), ..Measures::default() },
-        ..throughout(sessions, FaultName::FrozenChannel)?
-    })
-}
-
-fn check_angle(
-    sessions: &mut [Session],
-    channel: Quantity,
-    angle: impl Fn(&Session) -> Vec<f64>,
-    findings: &mut Findings,
-) {
+fn check_angle(sessions: &mut [Session], channel: Quantity, gear: &Gear, findings: &mut Findings) {
+    let angle = |session: &Session| match channel {
+        Quantity::Generator => session.generator_rad.clone(),
+        _ => session.output_rad(gear.ratio),
+    };
     let angles: Vec<Vec<f64>> = sessions.iter().map(angle).collect();
-    let of: Vec<Vec<Range<usize>>> = angles.iter().map(|angle| runs(angle, SAME)).collect();
-    let Some(every) = rhythm(&of) else { return };
+    let of: SessionRuns = angles.iter().map(|angle| runs_of(angle)).collect();
+    let Some((every, fault)) = rhythm(sessions, &of) else { return };
     let of_counts = angles.iter().zip(&of).max_by_key(|(angle, _)| angle.len()).is_some_and(|(angle, runs)| {
         let mut steps: Vec<f64> =
             runs.windows(2).map(|pair| (angle[pair[1].start] - angle[pair[0].start]).abs()).collect();
@@ -88,58 +90,42 @@ fn check_angle(
             whole && median_of(&mut steps) < COUNTS * count
         })
     });
-    let Some(mut fault) = fault(sessions, &of, channel, every).filter(|_| !of_counts) else { return };
-    fault.treatment = Treatment::Masked;
-    fault.what = format!(
-        "the {channel} has a new value in one of {every} rows, and is repeated in the others while the drive moves on: \
-         rows that repeat one are left out"
-    );
-    findings.faults.push(fault);
-    for (session, runs) in sessions.iter_mut().zip(&of) {
-        let mut drop = vec![false; session.len()];
-        // Where it stands for longer, it is the drive that stands.
-        for run in runs.iter().filter(|run| run.len() <= 2 * every) {
-            drop[run.start + 1..run.end].fill(true);
-        }
-        session.leave_out(&drop);
+    if of_counts {
+        return;
     }
+    findings.add(Some(fault), channel, Treatment::Masked, |_| {
+        format!(
+            "the {channel} has a new value in one of {every} rows, and is repeated in the others while the drive moves \
+             on: rows that repeat one are left out"
+        )
+    });
+    // Where it stands for longer, it is the drive that stands.
+    let repeats = |runs: &Vec<Range<usize>>| {
+        let short = runs.iter().filter(|run| run.len() <= 2 * every);
+        short.flat_map(|run| run.start + 1..run.end).collect::<Vec<usize>>()
+    };
+    let drop: Vec<Vec<bool>> =
+        sessions.iter().zip(&of).map(|(session, runs)| marked(session.len(), repeats(runs))).collect();
+    leave_out(sessions, &drop);
 }
 
 fn check_torque(sessions: &mut [Session], findings: &mut Findings) {
-    let of: Vec<Vec<Range<usize>>> = sessions
-        .iter()
-        .map(|session| session.torque_n_m.as_deref().map_or_else(Vec::new, |torque| runs(torque, SAME)))
-        .collect();
-    let Some(every) = rhythm(&of) else { return };
+    let torques = sessions.iter().map(|session| session.torque_n_m.as_deref().unwrap_or_default());
+    let of: SessionRuns = torques.map(runs_of).collect();
+    let Some((every, fault)) = rhythm(sessions, &of) else { return };
     if every >= NO_STEPS_OF_A_BENCH && !goes_on_between(sessions, &of) {
         return;
     }
-    let Some(mut fault) = fault(sessions, &of, Quantity::Torque, every) else { return };
-    fault.treatment = Treatment::Repaired;
-    fault.what = format!(
-        "the torque has a new value in one of {every} rows, and is repeated in the others, while the load goes on: a \
-         straight line from one to the next stands in"
-    );
-    findings.faults.push(fault);
+    findings.add(Some(fault), Quantity::Torque, Treatment::Repaired, |_| {
+        format!(
+            "the torque has a new value in one of {every} rows, and is repeated in the others, while the load goes on: \
+             a straight line from one to the next stands in"
+        )
+    });
     for (session, runs) in sessions.iter_mut().zip(&of) {
         let Some(torque) = &mut session.torque_n_m else { continue };
-        for pair in runs.windows(2) {
-            let (from, to) = (pair[0].start, pair[1].start);
-            let (low, high) = (torque[from], torque[to]);
-            for row in from + 1..to {
-                torque[row] = low + (high - low) * (row - from) as f64 / (to - from) as f64;
-            }
-        }
+        runs.windows(2).for_each(|pair| straight(torque, pair[0].start, pair[1].start));
     }
-}
-
-/// Runs of rows with one value; values are one that differ by this share of the largest or less.
-pub(super) fn runs(values: &[f64], share: f64) -> Vec<Range<usize>> {
-    let mut from = 0;
-    let same = share * values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
-    let goes_on = |row: usize| (values[row] - values[row - 1]).abs() <= same;
-    let ends = (1..=values.len()).filter(|row| *row == values.len() || !goes_on(*row));
-    ends.map(|end| std::mem::replace(&mut from, end)..end).collect()
 }
 
 /// A change of the torque from one run of rows to the next.
@@ -167,7 +153,7 @@ pub(super) fn changes_of(session: &Session, runs: &[Range<usize>]) -> impl Itera
 
 /// Whether the error goes on from run to run, instead of changing with the torque within a row. Where the torque
 /// changes its sign the flank does, and those do not count.
-fn goes_on_between(sessions: &[Session], of: &[Vec<Range<usize>>]) -> bool {
+fn goes_on_between(sessions: &[Session], of: &SessionRuns) -> bool {
     let (mut within, mut in_all) = (0.0, 0.0);
     for change in sessions.iter().zip(of).flat_map(|(session, runs)| changes_of(session, runs)) {
         let [low, high] = change.load;

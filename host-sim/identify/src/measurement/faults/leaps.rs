@@ -6,9 +6,11 @@
 
 use std::f64::consts::TAU;
 
-use super::{ARCSEC, Findings, span, whole_pitches};
+use std::ops::Range;
+
+use super::{ARCSEC, Findings, add_steps, extent, farthest, level, whole_pitches};
 use crate::measurement::columns::Quantity;
-use crate::measurement::fault::{FaultName, Measures, Treatment};
+use crate::measurement::fault::{Fault, FaultName, Measures, Treatment};
 use crate::measurement::gear::Gear;
 use crate::measurement::log::Log;
 use flexspline_base::robust::median_of;
@@ -54,13 +56,10 @@ fn usual(log: &Log, values: &[f64], row: usize) -> f64 {
 /// Finds rows into which the generator's angle leaps by whole turns, and takes these out.
 pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut Findings) {
     let (Some(generator), Some(output)) = (log.get(Quantity::Generator), log.get(Quantity::Output)) else { return };
-    let leaps: Vec<(usize, f64)> = (1..log.len())
+    let leaps: Vec<Turns> = (1..log.len())
         .filter(|row| log.continues(*row))
         .filter_map(|row| {
-            let turns = (moved(generator, row) - moved(output, row) * gear.ratio) / TAU;
-            if turns.abs() < 1.0 - BESIDE_TURNS || (turns - turns.round()).abs() > BESIDE_TURNS {
-                return None;
-            }
+            let turns = whole_turns(moved(generator, row) - moved(output, row) * gear.ratio)?;
             let by_generator = (moved(generator, row) - usual(log, generator, row)).abs();
             let by_output = ((moved(output, row) - usual(log, output, row)) * gear.ratio).abs();
             // A generator that was frozen leaps to where it is: before a leap both go on together.
@@ -69,45 +68,68 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
                 median_of(&mut rows.map(|k| moved(values, k)).collect::<Vec<f64>>())
             };
             let (psi, delta) = (before(generator), before(output) * gear.ratio);
-            if (psi - delta).abs() > TOGETHER_RAD + TOGETHER * psi.abs().max(delta.abs()) {
-                return None;
-            }
-            let whole = (by_generator / TAU - turns.round().abs()).abs() < 2.0 * BESIDE_TURNS;
-            (whole && by_generator > LEAPS_MORE * by_output).then_some((row, turns.round()))
+            let together = (psi - delta).abs() <= TOGETHER_RAD + TOGETHER * psi.abs().max(delta.abs());
+            let whole = (by_generator / TAU - turns.abs()).abs() < 2.0 * BESIDE_TURNS;
+            (together && whole && by_generator > LEAPS_MORE * by_output).then_some((row, turns))
         })
         .collect();
-    let (Some(&(first, size)), Some(&(last, _))) = (leaps.first(), leaps.last()) else { return };
     if leaps.len() as f64 > SHARE * log.len() as f64 {
         return;
     }
-    let largest = leaps.iter().map(|(_, turns)| *turns).fold(size, |a, b| if b.abs() > a.abs() { b } else { a });
-    let wraps = leaps.len() > 1 && leaps.iter().all(|(_, turns)| turns.abs() == size.abs());
-    let mut fault = span(log, FaultName::PositionJump, first, last);
-    (fault.channel, fault.rows) = (Some(Quantity::Generator), leaps.len() as u64);
-    fault.treatment = Treatment::Repaired;
-    fault.size_arcsec = Some(-largest * TAU / gear.ratio / ARCSEC);
-    fault.measures = Measures { turns: Some(largest as i64), ..Measures::default() };
+    let wraps = leaps.len() > 1 && leaps.iter().all(|(_, turns)| turns.abs() == leaps[0].1.abs());
     let times = if leaps.len() == 1 { "once".to_owned() } else { format!("in {} rows", leaps.len()) };
-    fault.what = if wraps {
-        format!("the generator's count begins anew after {:.0} turns, {times}: it was made continuous", size.abs())
-    } else {
+    take_turns_out(log, &leaps, FaultName::PositionJump, gear, findings, |largest| {
+        if wraps {
+            let turns = largest.abs();
+            return format!(
+                "the generator's count begins anew after {turns:.0} turns, {times}: it was made continuous"
+            );
+        }
         format!(
             "the generator's angle leaps by whole turns ({largest:+.0} at most), {times}, while the output goes on: \
              the turns are taken out"
         )
-    };
-    findings.faults.push(fault);
-    take_turns_out(log, &leaps);
+    });
 }
 
-/// Takes turns out of the generator's angle, each from its row on.
-fn take_turns_out(log: &mut Log, leaps: &[(usize, f64)]) {
-    let Some(generator) = log.get_mut(Quantity::Generator) else { return };
-    let (mut next, mut turns) = (leaps.iter().peekable(), 0.0);
-    for (row, angle) in generator.iter_mut().enumerate() {
-        turns += next.next_if(|(at, _)| *at == row).map_or(0.0, |(_, turns)| *turns);
-        *angle -= turns * TAU;
-    }
+/// A row, and the turns by which the generator's angle is off from it on.
+type Turns = (usize, f64);
+
+/// The whole motor turns, at least one, that an angle is, rad.
+fn whole_turns(angle_rad: f64) -> Option<f64> {
+    let turns = angle_rad / TAU;
+    let whole = turns.abs() >= 1.0 - BESIDE_TURNS && (turns - turns.round()).abs() <= BESIDE_TURNS;
+    whole.then_some(turns.round())
+}
+
+/// Takes turns out of the generator's angle, and reports them; `what` is said of the largest of them.
+fn take_turns_out(
+    log: &mut Log,
+    leaps: &[Turns],
+    name: FaultName,
+    gear: &Gear,
+    findings: &mut Findings,
+    what: impl FnOnce(f64) -> String,
+) {
+    let largest = farthest(leaps.iter().map(|(_, turns)| *turns));
+    let fault = log.fault(name, leaps.iter().map(|(row, _)| *row)).map(|fault| Fault {
+        size_arcsec: Some(-largest * TAU / gear.ratio / ARCSEC),
+        measures: Measures { turns: Some(largest as i64), ..Measures::default() },
+        ..fault
+    });
+    findings.add(fault, Quantity::Generator, Treatment::Repaired, |_| what(largest));
+    log.get_mut(Quantity::Generator).into_iter().for_each(|generator| add_steps(generator, leaps, -TAU));
+}
+
+/// Two sessions one after the other, and by how much a series changes from the last rows of one to the first of the
+/// next.
+fn between(sessions: &[Range<usize>]) -> impl Iterator<Item = (usize, impl Fn(&[f64]) -> f64)> {
+    sessions.windows(2).map(|pair| {
+        let (before, after) = (&pair[0], &pair[1]);
+        let before = before.end.saturating_sub(LEVEL_ROWS).max(before.start)..before.end;
+        let after = after.start..(after.start + LEVEL_ROWS).min(after.end);
+        (after.start, move |values: &[f64]| level(values, after.clone()) - level(values, before.clone()))
+    })
 }
 
 /// Finds sessions before which the generator's counter began anew, and puts the turns back; gives those sessions whose
@@ -120,31 +142,24 @@ pub(in crate::measurement) fn between_sessions(
     let (Some(generator), Some(output)) = (log.get(Quantity::Generator), log.get(Quantity::Output)) else {
         return Vec::new();
     };
-    let starts: Vec<usize> = (1..log.len()).filter(|row| !log.continues(*row)).collect();
-    if starts.is_empty() {
+    let sessions: Vec<Range<usize>> = log.sessions().collect();
+    if sessions.len() < 2 {
         return Vec::new();
     }
     let error: Vec<f64> = output.iter().zip(generator).map(|(output, psi)| output - psi / gear.ratio).collect();
-    let bounds: Vec<usize> = [0].into_iter().chain(starts.iter().copied()).chain([log.len()]).collect();
-    let slope = slope(generator, &error, &bounds);
-    let mut restarts: Vec<(usize, f64)> = Vec::new();
-    let mut others: Vec<(usize, usize, f64)> = Vec::new();
-    for (session, at) in bounds.windows(3).enumerate() {
-        let (from, start, end) = (at[0], at[1], at[2]);
-        let level = |rows: std::ops::Range<usize>, of: &[f64]| median_of(&mut of[rows].to_vec());
-        let before = start.saturating_sub(LEVEL_ROWS).max(from)..start;
-        let after = start..(start + LEVEL_ROWS).min(end);
-        let apart = |of: &[f64]| level(after.clone(), of) - level(before.clone(), of);
-        let turns_without = |jump: f64| -jump * gear.ratio / TAU;
-        let near = |turns: f64| turns.abs() > 1.0 - BESIDE_TURNS && (turns - turns.round()).abs() <= BESIDE_TURNS;
-        let jump = apart(&error);
-        let jump_beside_slope = jump - slope * apart(generator);
-        let turns = turns_without(jump);
-        if near(turns) {
-            restarts.push((start, turns.round()));
-        } else if slope == 0.0 && jump_beside_slope.abs() > OTHER_ZERO_RAD && !whole_pitches(jump, gear, BESIDE_PITCHES)
-        {
-            others.push((session + 1, start, jump));
+    let slope = slope(generator, &error, &sessions);
+    let mut restarts: Vec<Turns> = Vec::new();
+    // The rows at which sessions of another zero begin, with its change, rad.
+    let mut others: Vec<(usize, f64)> = Vec::new();
+    let mut taken_off: Vec<(usize, f64)> = Vec::new();
+    for (session, (start, change)) in (1..).zip(between(&sessions)) {
+        let jump = change(&error);
+        let beside_slope = jump - slope * change(generator);
+        if let Some(turns) = whole_turns(-jump * gear.ratio) {
+            restarts.push((start, turns));
+        } else if slope == 0.0 && beside_slope.abs() > OTHER_ZERO_RAD && !whole_pitches(jump, gear, BESIDE_PITCHES) {
+            others.push((start, jump));
+            taken_off.push((session, taken_off.last().map_or(0.0, |(_, off)| *off) + jump));
         }
     }
     // One turn of the motor is two tooth pitches: alone it may be teeth that have skipped, and is left to the
@@ -158,52 +173,29 @@ pub(in crate::measurement) fn between_sessions(
             ));
         }
     }
-    if let (Some(&(first, size)), Some(&(last, _))) = (restarts.first(), restarts.last()) {
-        let largest = restarts.iter().map(|(_, turns)| *turns).fold(size, |a, b| if b.abs() > a.abs() { b } else { a });
-        let mut fault = span(log, FaultName::CounterRestart, first, last);
-        (fault.channel, fault.rows) = (Some(Quantity::Generator), restarts.len() as u64);
-        fault.treatment = Treatment::Repaired;
-        fault.size_arcsec = Some(-largest * TAU / gear.ratio / ARCSEC);
-        fault.measures = Measures { turns: Some(largest as i64), ..Measures::default() };
-        let list: Vec<String> = restarts.iter().take(6).map(|(_, turns)| format!("{turns:+.0}")).collect();
-        fault.what = format!(
+    let list: Vec<String> = restarts.iter().take(6).map(|(_, turns)| format!("{turns:+.0}")).collect();
+    take_turns_out(log, &restarts, FaultName::CounterRestart, gear, findings, |_| {
+        format!(
             "the generator's counter begins anew before {} of {} sessions, by {}{} turns of the motor: they are put \
              back",
             restarts.len(),
-            bounds.len() - 1,
+            sessions.len(),
             list.join(", "),
             if restarts.len() > list.len() { ", …" } else { "" }
-        );
-        findings.faults.push(fault);
-    }
-    if let (Some(&(_, first, size)), Some(&(_, last, _))) = (others.first(), others.last()) {
-        let largest = others.iter().map(|(.., jump)| *jump).fold(size, |a, b| if b.abs() > a.abs() { b } else { a });
-        let mut fault = span(log, FaultName::PositionJump, first, last);
-        (fault.rows, fault.treatment) = (others.len() as u64, Treatment::Repaired);
-        fault.size_arcsec = Some(largest / ARCSEC);
-        fault.what = format!(
-            "the zero of {} sessions is another one, by up to {:.0} arcsec, which is no whole number of motor turns \
-             or tooth pitches: the zero of each is fitted on its own",
-            others.len(),
-            largest / ARCSEC
-        );
-        findings.faults.push(fault);
-    }
-    let mut off = 0.0;
-    if let Some(output) = log.get_mut(Quantity::Output) {
-        let mut next = others.iter().peekable();
-        for (row, angle) in output.iter_mut().enumerate() {
-            off += next.next_if(|(_, at, _)| *at == row).map_or(0.0, |(.., jump)| *jump);
-            *angle -= off;
-        }
-    }
-    take_turns_out(log, &restarts);
-    let mut off = 0.0;
-    let taken_off = |(session, _, jump)| {
-        off += jump;
-        (session, off)
-    };
-    others.into_iter().map(taken_off).collect()
+        )
+    });
+    let largest_arcsec = farthest(others.iter().map(|(_, jump)| *jump)) / ARCSEC;
+    let fault = log.fault(FaultName::PositionJump, others.iter().map(|(row, _)| *row));
+    let fault = fault.map(|fault| Fault { size_arcsec: Some(largest_arcsec), ..fault });
+    findings.add(fault, None::<Quantity>, Treatment::Repaired, |fault| {
+        format!(
+            "the zero of {} sessions is another one, by up to {largest_arcsec:.0} arcsec, which is no whole number of \
+             motor turns or tooth pitches: the zero of each is fitted on its own",
+            fault.rows
+        )
+    });
+    log.get_mut(Quantity::Output).into_iter().for_each(|output| add_steps(output, &others, -1.0));
+    taken_off
 }
 
 /// The rate, rad/s, at which the error changes over all gaps between sessions alike, if it does: then no zero is
@@ -211,20 +203,18 @@ pub(in crate::measurement) fn between_sessions(
 pub(in crate::measurement) fn changes_with_the_gaps(log: &Log, gear: &Gear) -> Option<f64> {
     let (generator, output, time) =
         (log.get(Quantity::Generator)?, log.get(Quantity::Output)?, log.get(Quantity::Time)?);
-    let error = |row: usize| output[row] - generator[row] / gear.ratio;
-    let level = |rows: std::ops::Range<usize>| median_of(&mut rows.map(error).collect::<Vec<f64>>());
-    let gaps: Vec<(f64, f64)> = (1..log.len())
-        .filter(|row| !log.continues(*row))
-        .map(|row| {
-            let jump = level(row..(row + LEVEL_ROWS).min(log.len())) - level(row.saturating_sub(LEVEL_ROWS)..row);
-            (time[row] - time[row - 1], jump)
-        })
-        .collect();
+    let sessions: Vec<Range<usize>> = log.sessions().collect();
+    if sessions.len() <= FEWEST_GAPS {
+        return None;
+    }
+    let error: Vec<f64> = output.iter().zip(generator).map(|(output, psi)| output - psi / gear.ratio).collect();
+    let gaps: Vec<(f64, f64)> =
+        between(&sessions).map(|(row, change)| (time[row] - time[row - 1], change(&error))).collect();
     let (square, product) = gaps.iter().fold((0.0, 0.0), |sum, gap| (sum.0 + gap.0 * gap.0, sum.1 + gap.0 * gap.1));
     let per_s = product / square;
     let alike = |gap: &(f64, f64)| (gap.1 - per_s * gap.0).abs() < LIKE_THE_GAP * gap.1.abs() + STATE_RAD;
     let large = gaps.iter().any(|gap| gap.1.abs() > OTHER_ZERO_RAD);
-    (gaps.len() >= FEWEST_GAPS && large && gaps.iter().all(alike)).then_some(per_s)
+    (large && gaps.iter().all(alike)).then_some(per_s)
 }
 
 /// Fewest gaps between sessions that have to agree. *Guess*: two may by chance.
@@ -235,17 +225,10 @@ const LIKE_THE_GAP: f64 = 0.1;
 const STATE_RAD: f64 = 600.0 * ARCSEC;
 
 /// By how much the error grows with the angle within sessions, where that is beyond what a drive does; else 0.
-fn slope(generator: &[f64], error: &[f64], bounds: &[usize]) -> f64 {
-    let mut slopes: Vec<f64> = bounds
-        .windows(2)
-        .filter_map(|at| {
-            let by = |a: &usize, b: &usize| generator[*a].total_cmp(&generator[*b]);
-            let (low, high) = ((at[0]..at[1]).min_by(by)?, (at[0]..at[1]).max_by(by)?);
-            let turned = generator[high] - generator[low];
-            (turned > TAU).then(|| (error[high] - error[low]) / turned)
-        })
-        .collect();
-    let of_turns = generator.first().map_or(0.0, |_| median_of(&mut slopes));
+fn slope(generator: &[f64], error: &[f64], sessions: &[Range<usize>]) -> f64 {
+    let of = |(turned, changed): (f64, f64)| (turned > TAU).then_some(changed / turned);
+    let mut slopes: Vec<f64> = sessions.iter().filter_map(|rows| of(extent(generator, error, rows.clone())?)).collect();
+    let of_turns = median_of(&mut slopes);
     if of_turns.abs() > SLOPE / TAU / 10.0 { of_turns } else { 0.0 }
 }
 

@@ -1,4 +1,4 @@
-//! What is wrong with data, found before any physics is blamed. One file for each kind, its thresholds at its head.
+//! Faults of data, found before any physics is blamed. One file for each kind, its thresholds at its head.
 //!
 //! Two grades: what cannot go on is an error with one message; all else is a [`Fault`] that is named, and repaired or
 //! left out.
@@ -50,15 +50,16 @@ pub(super) mod wrap;
 
 use std::ops::Range;
 
-use super::Session;
-use super::fault::{Fault, FaultName, ToothStep};
+use super::fault::{Fault, FaultName, ToothStep, Treatment};
 use super::gear::Gear;
 use super::log::Log;
+use super::{Quantity, Session};
+use flexspline_base::robust::median_of;
 
 /// An arcsecond, rad: 1/648 000 of half a turn, by definition.
 const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
 
-/// What the checks have found so far.
+/// The findings of the checks so far.
 #[derive(Debug, Default)]
 pub(super) struct Findings {
     pub faults: Vec<Fault>,
@@ -66,32 +67,120 @@ pub(super) struct Findings {
     pub notes: Vec<String>,
 }
 
-/// A fault from row `first` to row `last` of a log, to be completed.
-fn span(log: &Log, name: FaultName, first: usize, last: usize) -> Fault {
-    Fault {
-        time_s: log.time_at(first),
-        until_s: log.time_at(last),
-        ..Fault::new(name, [log.line[first], log.line[last]], (last - first + 1) as u64)
+impl Findings {
+    /// Adds a fault, if there is one: its channel, the remedy, and a sentence on both.
+    pub(super) fn add(
+        &mut self,
+        fault: Option<Fault>,
+        channel: impl Into<Option<Quantity>>,
+        treatment: Treatment,
+        what: impl FnOnce(&Fault) -> String,
+    ) {
+        let channel = channel.into();
+        self.faults.extend(fault.map(|fault| Fault { channel, treatment, what: what(&fault), ..fault }));
     }
 }
 
-/// A fault in some rows (at least one) of a session, to be completed.
-fn of_rows(session: &Session, name: FaultName, rows: Range<usize>) -> Fault {
-    let last = rows.end - 1;
-    let time = |row: usize| session.time_s.as_ref().map(|time| time[row]);
-    Fault {
-        time_s: time(rows.start),
-        until_s: time(last),
-        ..Fault::new(name, [session.line[rows.start], session.line[last]], rows.len() as u64)
-    }
+/// A fault of some rows of sessions, each a session and a row of it, in order; none without rows.
+fn of_rows(sessions: &[Session], name: FaultName, rows: impl IntoIterator<Item = (usize, usize)>) -> Option<Fault> {
+    let at = |(session, row): (usize, usize)| {
+        let Session { line, time_s, .. } = &sessions[session];
+        (line[row], time_s.as_ref().map(|time| time[row]))
+    };
+    Fault::of_rows(name, rows.into_iter().map(at))
 }
 
 /// A fault of all rows, to be completed; nothing without rows.
 pub(crate) fn throughout(sessions: &[Session], name: FaultName) -> Option<Fault> {
-    let (first, last) = (sessions.first()?, sessions.last()?);
-    let whole = of_rows(last, name, 0..last.len());
-    let rows = sessions.iter().map(|session| session.len() as u64).sum();
-    Some(Fault { last_line: whole.last_line, until_s: whole.until_s, rows, ..of_rows(first, name, 0..first.len()) })
+    of_rows(
+        sessions,
+        name,
+        sessions.iter().enumerate().flat_map(|(k, session)| (0..session.len()).map(move |row| (k, row))),
+    )
+}
+
+/// Rows of all sessions.
+fn rows_of(sessions: &[Session]) -> usize {
+    sessions.iter().map(Session::len).sum()
+}
+
+/// Leaves out the rows of each session for which `drop` is true.
+fn leave_out(sessions: &mut [Session], drop: &[Vec<bool>]) {
+    let some = sessions.iter_mut().zip(drop).filter(|(_, drop)| drop.contains(&true));
+    some.for_each(|(session, drop)| session.leave_out(drop));
+}
+
+/// Rows of a series, as a flag for each.
+fn marked(count: usize, rows: impl IntoIterator<Item = usize>) -> Vec<bool> {
+    let mut marked = vec![false; count];
+    rows.into_iter().for_each(|row| marked[row] = true);
+    marked
+}
+
+/// Stretches of rows that are the same as the first of them.
+fn runs(values: &[f64], same: impl Fn(f64, f64) -> bool) -> Vec<Range<usize>> {
+    let (mut found, mut from) = (Vec::new(), 0);
+    for row in 1..=values.len() {
+        if row == values.len() || !same(values[row], values[from]) {
+            found.push(std::mem::replace(&mut from, row)..row);
+        }
+    }
+    found
+}
+
+/// Puts a straight line between the values of two rows.
+pub(super) fn straight(values: &mut [f64], from: usize, to: usize) {
+    let (low, high) = (values[from], values[to]);
+    for row in from + 1..to {
+        values[row] = low + (row - from) as f64 / (to - from) as f64 * (high - low);
+    }
+}
+
+/// Adds steps to a series, each from its row on, times `scale`.
+fn add_steps(values: &mut [f64], steps: &[(usize, f64)], scale: f64) {
+    let (mut next, mut sum) = (steps.iter().peekable(), 0.0);
+    for (row, value) in values.iter_mut().enumerate() {
+        sum += next.next_if(|(at, _)| *at == row).map_or(0.0, |(_, by)| *by);
+        *value += scale * sum;
+    }
+}
+
+/// The value that is farthest from zero; 0 of none.
+fn farthest(values: impl IntoIterator<Item = f64>) -> f64 {
+    values.into_iter().fold(0.0, |a, b| if b.abs() > a.abs() { b } else { a })
+}
+
+/// Median of some rows of a series.
+fn level(values: &[f64], rows: Range<usize>) -> f64 {
+    median_of(&mut values[rows].to_vec())
+}
+
+/// By how much an angle and what follows it change between the rows in which the angle is least and largest.
+fn extent(angle: &[f64], follower: &[f64], rows: Range<usize>) -> Option<(f64, f64)> {
+    let by = |a: &usize, b: &usize| angle[*a].total_cmp(&angle[*b]);
+    let (low, high) = (rows.clone().min_by(by)?, rows.max_by(by)?);
+    Some((angle[high] - angle[low], follower[high] - follower[low]))
+}
+
+/// A straight line through points.
+struct LineFit {
+    /// 0 where all points have one abscissa.
+    slope: f64,
+    /// Sum of the squares of the abscissas about their mean.
+    square: f64,
+    /// How far each point is off the line.
+    residual: Vec<f64>,
+}
+
+impl LineFit {
+    fn of(points: &[(f64, f64)]) -> LineFit {
+        let n = points.len() as f64;
+        let (mx, my) = points.iter().fold((0.0, 0.0), |m, p| (m.0 + p.0 / n, m.1 + p.1 / n));
+        let about = |p: &(f64, f64)| (p.0 - mx, p.1 - my);
+        let (square, product) = points.iter().map(about).fold((0.0, 0.0), |s, (x, y)| (s.0 + x * x, s.1 + x * y));
+        let slope = if square > 0.0 { product / square } else { 0.0 };
+        LineFit { slope, square, residual: points.iter().map(about).map(|(x, y)| y - slope * x).collect() }
+    }
 }
 
 /// Whether an angle at the output is a whole number of tooth pitches, but for this share of a pitch.

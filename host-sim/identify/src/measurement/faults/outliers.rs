@@ -2,10 +2,10 @@
 
 use super::resolution::seen;
 use super::steps::{HELD, largest_torque};
-use super::{ARCSEC, Findings, of_rows};
+use super::{ARCSEC, Findings, farthest, leave_out, level, of_rows, rows_of};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
-use crate::measurement::fault::{FaultName, Treatment};
+use crate::measurement::fault::{Fault, FaultName, Treatment};
 use crate::measurement::gear::Gear;
 use flexspline_base::robust::{least_and_most, median_of, quantile_of, sampled, white_noise};
 
@@ -141,16 +141,20 @@ fn steady(session: &Session, row: usize) -> bool {
 /// A row, and by how much it is out.
 type Out = (usize, f64);
 
-/// Rows that are out by more than `least`, in all sessions; looked for again with less regard for the rows around where
-/// there are many.
-fn in_sessions(sessions: &[Session], least: f64, values: fn(&Session) -> &[f64]) -> Vec<Vec<Out>> {
+/// Rows of the error that are out by more than `least`, in all sessions; looked for again with less regard for the rows
+/// around where there are many.
+fn in_sessions(sessions: &[Session], least: f64) -> Vec<Vec<Out>> {
     let beyond = |others: usize| -> Vec<Vec<Out>> {
-        sessions.iter().map(|session| rows_out(values(session), least, others)).collect()
+        sessions.iter().map(|session| rows_out(&session.error_rad, least, others)).collect()
     };
     let found = beyond(1);
-    let rows: usize = sessions.iter().map(Session::len).sum();
-    let many = found.iter().map(Vec::len).sum::<usize>() as f64 > MANY * rows as f64;
+    let many = count(&found) as f64 > MANY * rows_of(sessions) as f64;
     if many { beyond(OTHERS_OUT) } else { found }
+}
+
+/// Rows of all sessions.
+fn count(found: &[Vec<Out>]) -> usize {
+    found.iter().map(Vec::len).sum()
 }
 
 /// Rows that are out by more than `least`, and by far more than all around them but `others` of them.
@@ -169,8 +173,7 @@ fn rows_out(values: &[f64], least: f64, others: usize) -> Vec<Out> {
         let mut usual: Vec<f64> = around.filter(|k| *k != row).map(|k| out_by(values, k).abs()).collect();
         usual.sort_unstable_by(f64::total_cmp);
         let usual = usual.iter().rev().nth(others).copied().unwrap_or(0.0);
-        let (mut before, mut after) = (values[row - BESIDE..row].to_vec(), values[row + 1..=row + BESIDE].to_vec());
-        let step = (median_of(&mut before) - median_of(&mut after)).abs();
+        let step = (level(values, row - BESIDE..row) - level(values, row + 1..row + 1 + BESIDE)).abs();
         if by.abs() > OUT_OF_AROUND * usual && step < 0.5 * by.abs() {
             found.push((row, by));
         }
@@ -193,64 +196,59 @@ pub(in crate::measurement) fn check(
 
 /// Outliers of the error: left out, and named where they are the data's and not the drive's.
 fn of_error(sessions: &mut [Session], gear: &Gear, error_recorded: bool, findings: &mut Findings) {
-    let rows: usize = sessions.iter().map(Session::len).sum();
+    let rows = rows_of(sessions) as f64;
     let noise = white_noise(sessions.iter().map(|session| session.error_rad.as_slice()));
     let resolution = seen(sessions, gear, error_recorded).into_iter().map(|(_, step)| step).fold(0.0, f64::max);
     let least = (OUT * noise).max(LEAST_RAD).max(STEPS * resolution);
     let largest_n_m = largest_torque(sessions);
-    let out = in_sessions(sessions, least, |session| &session.error_rad);
-    let (moved, found): (Vec<Vec<Out>>, Vec<Vec<Out>>) = sessions
-        .iter()
-        .zip(out)
+    let out = sessions.iter().zip(in_sessions(sessions, least));
+    let (moved, found): (Vec<Vec<Out>>, Vec<Vec<Out>>) = out
         .map(|(session, out)| {
             let steady = out.into_iter().filter(|(row, _)| steady(session, *row));
             steady.partition(|(row, _)| load_swings(session, *row, largest_n_m))
         })
         .unzip();
-    let number = |found: &[Vec<Out>]| found.iter().map(Vec::len).sum::<usize>();
-    let some = |count: usize| count > 0 && count as f64 <= SHARE * rows as f64;
-    let mut leave_out: Vec<&Vec<Vec<Out>>> = Vec::new();
-    let mut many = false;
-    if some(number(&moved)) {
+    let some = |found: &[Vec<Out>]| (1.0..=SHARE * rows).contains(&(count(found) as f64));
+    let mut drop: Vec<Vec<bool>> = sessions.iter().map(|session| vec![false; session.len()]).collect();
+    let mut leave_out_all = |found: &[Vec<Out>]| {
+        let of = drop.iter_mut().zip(found);
+        of.for_each(|(drop, found)| found.iter().for_each(|(row, _)| drop[*row] = true));
+    };
+    if some(&moved) {
         findings.notes.push(format!(
             "{} single rows stand out where the load swings within a row, and the drive with it; they are left out",
-            number(&moved)
+            count(&moved)
         ));
-        leave_out.push(&moved);
+        leave_out_all(&moved);
     }
-    let count = number(&found);
-    if some(count) {
-        let fast = found.iter().zip(sessions.iter()).all(|(rows, session)| {
-            rows.iter().all(|(row, _)| {
-                (session.generator_rad[row + 1] - session.generator_rad[row - 1]).abs() > 2.0 * TOOTH_RAD
-            })
-        });
+    let number = count(&found);
+    let mut many = false;
+    if some(&found) {
+        let is_fast = |session: &Session, row: usize| {
+            (session.generator_rad[row + 1] - session.generator_rad[row - 1]).abs() > 2.0 * TOOTH_RAD
+        };
+        let mut of_sessions = found.iter().zip(sessions.iter());
+        let fast = of_sessions.all(|(rows, session)| rows.iter().all(|(row, _)| is_fast(session, *row)));
         let large = found.iter().flatten().any(|(_, by)| by.abs() > LARGE_RAD);
-        if (count < FEW || fast) && !large {
+        if (number < FEW || fast) && !large {
             findings.notes.push(format!(
-                "{count} single rows stand out: too few, or in too fast a motion, to tell drive from data"
+                "{number} single rows stand out: too few, or in too fast a motion, to tell drive from data"
             ));
         } else if repeat_with_position(sessions, &found, gear) {
             findings
                 .notes
-                .push(format!("{count} single rows stand out, always in the same position: the drive, not the data"));
+                .push(format!("{number} single rows stand out, always in the same position: the drive, not the data"));
         } else {
             report(sessions, &found, Quantity::Error, Treatment::Masked, "their rows are left out", findings);
-            leave_out.push(&found);
-            many = count as f64 > MANY * rows as f64;
+            leave_out_all(&found);
+            many = number as f64 > MANY * rows;
         }
     }
-    for (number, session) in sessions.iter_mut().enumerate() {
-        let mut drop = vec![false; session.len()];
-        leave_out.iter().flat_map(|found| &found[number]).for_each(|(row, _)| drop[*row] = true);
-        if drop.contains(&true) {
-            session.leave_out(&drop);
-        }
-    }
+    leave_out(sessions, &drop);
     if many {
         let tail = (TAIL * noise).max(STEPS * resolution);
-        let mut more = leave_out_the_doubtful(sessions, tail, BESIDE);
-        more += (1..TAIL_ROUNDS).map(|_| leave_out_the_doubtful(sessions, tail, 0)).sum::<u64>();
+        let rounds = (0..TAIL_ROUNDS).map(|round| if round == 0 { BESIDE } else { 0 });
+        let more: u64 = rounds.map(|ends| leave_out_the_doubtful(sessions, tail, ends)).sum();
         if let Some(fault) = findings.faults.iter_mut().rfind(|fault| fault.name == FaultName::Outliers) {
             fault.rows += more;
         }
@@ -283,8 +281,8 @@ fn leave_out_the_doubtful(sessions: &mut [Session], least: f64, ends: usize) -> 
                 if row < BESIDE || row + BESIDE >= error.len() {
                     return false;
                 }
-                let before = median_of(&mut error[row.saturating_sub(WIDELY_BESIDE)..row].to_vec());
-                let after = median_of(&mut error[row + 1..(row + 1 + WIDELY_BESIDE).min(error.len())].to_vec());
+                let before = level(error, row.saturating_sub(WIDELY_BESIDE)..row);
+                let after = level(error, row + 1..(row + 1 + WIDELY_BESIDE).min(error.len()));
                 let (from_before, from_after) = (error[row] - before, error[row] - after);
                 let by = from_before.abs().min(from_after.abs());
                 from_before * from_after > 0.0 && by > least && (after - before).abs() < 0.5 * by
@@ -298,37 +296,31 @@ fn leave_out_the_doubtful(sessions: &mut [Session], least: f64, ends: usize) -> 
 
 /// Outliers of torque or temperature: mended from the neighbouring rows.
 fn of_load(sessions: &mut [Session], channel: Quantity, findings: &mut Findings) {
-    let series: Vec<&[f64]> = sessions.iter().filter_map(|session| session.beside(channel)).collect();
+    let series: Vec<&[f64]> = sessions.iter().filter_map(|session| session.column(channel)).collect();
     let mut some: Vec<f64> = series.iter().flat_map(|values| sampled(values)).collect();
     let range = quantile_of(&mut some, 0.99) - quantile_of(&mut some, 0.01);
     let least = (OUT * white_noise(series)).max(LEAST_OF_RANGE * range);
     if least == 0.0 {
         return;
     }
-    let found: Vec<Vec<Out>> = sessions
-        .iter()
-        .map(|session| session.beside(channel).map_or_else(Vec::new, |values| rows_out(values, least, 1)))
-        .collect();
-    let rows: usize = sessions.iter().map(Session::len).sum();
-    let count: usize = found.iter().map(Vec::len).sum();
+    let of = |session: &Session| rows_out(session.column(channel).unwrap_or_default(), least, 1);
+    let found: Vec<Vec<Out>> = sessions.iter().map(of).collect();
     // What the drive may have felt is no sign of a fault; where there is one, it is mended with the rest.
     let (largest_n_m, fastest_rad) = (largest_torque(sessions), fastest(sessions));
-    let signs: Vec<f64> = sessions
-        .iter()
-        .zip(&found)
-        .flat_map(|(session, found)| found.iter().map(move |out| (session, out)))
-        .filter(|(session, (row, _))| {
-            channel != Quantity::Torque || !may_be_felt(session, *row, largest_n_m, fastest_rad)
-        })
-        .map(|(_, (_, by))| by.abs())
-        .collect();
+    let is_felt = |session: &Session, row: usize| {
+        channel == Quantity::Torque && may_be_felt(session, row, largest_n_m, fastest_rad)
+    };
+    let out = sessions.iter().zip(&found).flat_map(|(session, found)| found.iter().map(move |out| (session, out)));
+    let signs: Vec<f64> =
+        out.filter(|(session, (row, _))| !is_felt(session, *row)).map(|(_, (_, by))| by.abs()).collect();
     let large = signs.iter().any(|by| *by > LARGE_OF_RANGE * range);
-    if signs.is_empty() || count as f64 > SHARE * rows as f64 || (signs.len() < FEW && !large) {
+    let too_many = count(&found) as f64 > SHARE * rows_of(sessions) as f64;
+    if signs.is_empty() || too_many || (signs.len() < FEW && !large) {
         return;
     }
     report(sessions, &found, channel, Treatment::Repaired, "the rows beside stand in", findings);
     for (session, found) in sessions.iter_mut().zip(&found) {
-        if let Some(values) = session.beside_mut(channel) {
+        if let Some(values) = session.column_mut(channel) {
             found.iter().for_each(|(row, _)| values[*row] = 0.5 * (values[row - 1] + values[row + 1]));
         }
     }
@@ -340,6 +332,7 @@ fn fastest(sessions: &[Session]) -> f64 {
     moves.fold(0.0, f64::max)
 }
 
+/// Reports rows of a channel that are out, and what was done with them.
 fn report(
     sessions: &[Session],
     found: &[Vec<Out>],
@@ -348,31 +341,25 @@ fn report(
     done: &str,
     findings: &mut Findings,
 ) {
-    let all = || found.iter().enumerate().flat_map(|(k, rows)| rows.iter().map(move |(row, by)| (k, *row, *by)));
-    let (Some(first), Some(last)) = (all().next(), all().last()) else { return };
-    let largest = all().map(|(.., by)| by).fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
-    let mut fault = of_rows(&sessions[first.0], FaultName::Outliers, first.1..first.1 + 1);
-    let end = of_rows(&sessions[last.0], FaultName::Outliers, last.1..last.1 + 1);
-    (fault.until_s, fault.last_line) = (end.until_s, end.last_line);
-    fault.rows = all().count() as u64;
-    (fault.channel, fault.treatment) = (Some(channel), treatment);
-    if channel != Quantity::Error {
-        fault.advice = "check the cable and the amplifier of this sensor; log its raw values";
-    }
-    let size = if channel == Quantity::Error {
-        fault.size_arcsec = Some(largest / ARCSEC);
-        format!("{:.1} arcsec", largest / ARCSEC)
-    } else {
-        format!("{largest:.3}")
+    let rows = found.iter().enumerate().flat_map(|(k, rows)| rows.iter().map(move |(row, _)| (k, *row)));
+    let largest = farthest(found.iter().flatten().map(|(_, by)| *by));
+    let largest_arcsec = Some(largest / ARCSEC).filter(|_| channel == Quantity::Error);
+    let size = largest_arcsec.map_or(format!("{largest:.3}"), |arcsec| format!("{arcsec:.1} arcsec"));
+    let advice = match channel {
+        Quantity::Error => FaultName::Outliers.advice(),
+        _ => "check the cable and the amplifier of this sensor; log its raw values",
     };
-    fault.what = format!("{} single rows of the {channel} are out, the farthest by {size}: {done}", fault.rows);
-    findings.faults.push(fault);
+    let fault = of_rows(sessions, FaultName::Outliers, rows);
+    let fault = fault.map(|fault| Fault { size_arcsec: largest_arcsec, advice, ..fault });
+    findings.add(fault, channel, treatment, |fault| {
+        format!("{} single rows of the {channel} are out, the farthest by {size}: {done}", fault.rows)
+    });
 }
 
 /// Whether rows gather at the same angle of a wheel, more than all rows do.
 pub(super) fn repeat_with_position(sessions: &[Session], found: &[Vec<Out>], gear: &Gear) -> bool {
-    let count: usize = found.iter().map(Vec::len).sum();
-    if count < FEW {
+    let n = count(found) as f64;
+    if n < FEW as f64 {
         return false;
     }
     // Generator on the flexspline, once or twice a turn (two lobes); on the circular spline likewise; the output.
@@ -386,14 +373,11 @@ pub(super) fn repeat_with_position(sessions: &[Session], found: &[Vec<Out>], gea
             }
             f64::hypot(c, s) / f64::max(n, 1.0)
         };
-        let of_found = resultant(
-            &mut sessions
-                .iter()
-                .zip(found)
-                .flat_map(|(session, rows)| rows.iter().map(|(row, _)| session.generator_rad[*row])),
-        );
+        let of = |(session, rows): (&Session, &Vec<Out>)| -> Vec<f64> {
+            rows.iter().map(|(row, _)| session.generator_rad[*row]).collect()
+        };
+        let of_found = resultant(&mut sessions.iter().zip(found).flat_map(of));
         let of_all = resultant(&mut sessions.iter().flat_map(|session| session.generator_rad.iter().copied()));
-        let n = count as f64;
         of_found > of_all + 0.3 && (of_found > REPEATS || n * of_found.powi(2) > REPEATS_MANY)
     })
 }

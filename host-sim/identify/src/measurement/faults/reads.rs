@@ -15,13 +15,14 @@ use std::borrow::Cow;
 
 use super::outliers::repeat_with_position;
 use super::resolution::seen;
-use super::state::State;
-use super::{ARCSEC, Findings, throughout};
+use super::state::StateModel;
+use super::{ARCSEC, Findings, farthest, leave_out, marked, rows_of, throughout};
 use crate::least_squares::Normal;
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
-use crate::measurement::fault::{FaultName, Measures, Treatment};
+use crate::measurement::fault::{Fault, FaultName, Measures, Treatment};
 use crate::measurement::gear::Gear;
+use crate::measurement::log;
 use flexspline_base::robust::{MAD_TO_STD, median_of, quantile_of};
 
 /// Classes of speed, of equally many rows. *Guess*: enough for a line over the square of the speed.
@@ -94,7 +95,10 @@ struct Class {
     rows: f64,
 }
 
-/// The rows of a session that are not late, and how fast each row is.
+/// Shorter sessions show nothing. *Guess*: a scatter takes five rows, and the first and last rows have none.
+const SHORTEST: usize = 9;
+
+/// The rows of a session that are not late, and how fast each row is; none of a short session.
 struct Reads<'a> {
     error: Cow<'a, [f64]>,
     /// The generator's angle over the ratio, rad.
@@ -111,8 +115,8 @@ struct Reads<'a> {
 
 impl<'a> Reads<'a> {
     fn new(session: &'a Session, gear: &Gear) -> Self {
-        let psi = &session.generator_rad;
-        let rows = psi.len();
+        let rows = if session.len() < SHORTEST { 0 } else { session.len() };
+        let psi = &session.generator_rad[..rows];
         let speed = (0..rows)
             .map(|k| {
                 let (a, b) = (k.saturating_sub(2), (k + 2).min(rows - 1));
@@ -120,9 +124,9 @@ impl<'a> Reads<'a> {
             })
             .collect();
         let fastest = FOLLOWED_RAD / gear.ratio.abs();
-        let pauses = pauses(session);
         let turned = psi.iter().map(|psi| psi / gear.ratio).collect();
-        Reads { error: Cow::Borrowed(&session.error_rad), turned, speed, fastest, pauses, good: (0..rows).collect() }
+        let error = Cow::Borrowed(&session.error_rad[..rows]);
+        Reads { error, turned, speed, fastest, pauses: pauses(session), good: (0..rows).collect() }
     }
 
     /// Whether there is no pause from one row to another.
@@ -212,8 +216,8 @@ impl Misread {
         let scatter = jitter_rows * fast;
         // Neighbouring scatters share rows: they are worth about a third.
         let certain = count / 3.0 * (xy * xy / xx) / left.max(f64::MIN_POSITIVE) > CERTAIN;
-        let told = (slope + 1.0).abs() < MISREAD && certain && scatter > LEAST_RAD.max(LEAST_OF_NOISE * noise);
-        told.then_some(Misread { noise, jitter_rows, off: (xx / count / SCATTER_GAIN).sqrt() })
+        let is_misread = (slope + 1.0).abs() < MISREAD && certain && scatter > LEAST_RAD.max(LEAST_OF_NOISE * noise);
+        is_misread.then_some(Misread { noise, jitter_rows, off: (xx / count / SCATTER_GAIN).sqrt() })
     }
 }
 
@@ -304,21 +308,21 @@ fn fit(classes: &[Class], tooth_speed: f64) -> (f64, f64, f64) {
     (values[0].max(0.0).sqrt(), values[1].max(0.0).sqrt() / least_speed, without - misfit)
 }
 
-/// Properties of the rows that show how they are read.
-struct Found {
+/// How the rows are read.
+struct HowRead {
     /// Rows that are off by far, with how far, session by session.
     late: Vec<Vec<(usize, f64)>>,
     /// Whether these were read late.
-    told_late: bool,
+    some_are_late: bool,
     /// Whether the time between the readings scatters.
-    told_jitter: bool,
+    jitters: bool,
     /// Noise at rest, rad.
     noise: f64,
     /// Scatter of the time between the readings, rows.
     jitter_rows: f64,
 }
 
-impl Found {
+impl HowRead {
     /// Where the generator is known to be misread, that is the scatter.
     fn of(
         reads: &mut [Reads<'_>],
@@ -326,14 +330,15 @@ impl Found {
         (fast, tooth_speed): (f64, f64),
         sessions: &[Session],
         gear: &Gear,
-    ) -> Found {
+    ) -> HowRead {
         let mut late: Vec<Vec<(usize, f64)>> = vec![Vec::new(); reads.len()];
         // Few rows that stand out at all are no late rows: most logs end here.
         let low = |off: &mut [f64]| quantile_of(off, LOW.0) / LOW.1;
         let mut known = classes(reads, low);
         let stand_out =
             |of: &Reads<'_>| of.scatter().filter(|(row, off)| off.abs() > LATE * expected(&known, of, *row)).count();
-        let (standing_out, rows) = reads.iter().fold((0, 0), |sum, of| (sum.0 + stand_out(of), sum.1 + of.error.len()));
+        let standing_out = reads.iter().map(stand_out).sum::<usize>();
+        let rows: usize = reads.iter().map(|of| of.error.len()).sum();
         if standing_out >= LATE_ROWS && standing_out as f64 > LATE_SHARE * rows as f64 {
             for run in [1, 1, 1, LONGEST_RUN, 1] {
                 for (of, late) in reads.iter_mut().zip(&mut late) {
@@ -342,33 +347,29 @@ impl Found {
                 known = classes(reads, low);
             }
         }
-        for late in &mut late {
-            late.sort_unstable_by_key(|(row, _)| *row);
-        }
-        let told_late = is_told(reads, &late, fast.min(FOLLOWED_RAD / gear.ratio.abs()), sessions, gear);
-        let robust = |off: &mut [f64]| MAD_TO_STD * median_of(off);
-        if !told_late {
+        late.iter_mut().for_each(|late| late.sort_unstable_by_key(|(row, _)| *row));
+        let some_are_late = are_late(reads, &late, fast.min(FOLLOWED_RAD / gear.ratio.abs()), sessions, gear);
+        if !some_are_late {
             reads.iter_mut().for_each(|of| of.good = (0..of.error.len()).collect());
         }
-        if let Some(Misread { noise, jitter_rows, .. }) = misread {
-            return Found { late, told_late, told_jitter: true, noise: *noise, jitter_rows: *jitter_rows };
+        if let Some(&Misread { noise, jitter_rows, .. }) = misread {
+            return HowRead { late, some_are_late, jitters: true, noise, jitter_rows };
         }
-        let (noise, jitter_rows, certain) = fit(&classes(reads, robust), tooth_speed);
+        let (noise, jitter_rows, certain) = fit(&classes(reads, |off| MAD_TO_STD * median_of(off)), tooth_speed);
         let scatter = jitter_rows * fast;
-        let told_jitter = certain > CERTAIN && scatter > LEAST_RAD.max(LEAST_OF_NOISE * noise) && is_white(reads, fast);
-        Found { late, told_late, told_jitter, noise, jitter_rows }
+        let jitters = certain > CERTAIN && scatter > LEAST_RAD.max(LEAST_OF_NOISE * noise) && is_white(reads, fast);
+        HowRead { late, some_are_late, jitters, noise, jitter_rows }
     }
 }
 
 /// Finds angles that are not read at one instant: rows weigh what their speed leaves of them, and rows that were read
 /// late are left out.
 pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) {
-    let rows: usize = sessions.iter().map(Session::len).sum();
+    let rows = rows_of(sessions);
     if rows < CLASSES * CLASS_ROWS {
         return;
     }
-    let mut reads: Vec<Reads<'_>> =
-        sessions.iter().filter(|session| session.len() > 8).map(|session| Reads::new(session, gear)).collect();
+    let mut reads: Vec<Reads<'_>> = sessions.iter().map(|session| Reads::new(session, gear)).collect();
     let mut speeds: Vec<f64> = reads.iter().flat_map(|of| of.speed.iter().map(|speed| speed.abs())).collect();
     let full = quantile_of(&mut speeds, 0.95);
     if full == 0.0 {
@@ -386,27 +387,26 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
     let pitch = gear.tooth_pitch_rad.unwrap_or(std::f64::consts::PI / gear.ratio.abs());
     // A tooth of either wheel passes in a turn of the generator over its number: in a pitch of the output over the
     // ratio.
-    let tooth_speed = pitch / gear.ratio.abs() / TOOTH_ROWS;
-    let mut found = Found::of(&mut reads, misread.as_ref(), (fast, tooth_speed), sessions, gear);
-    if !found.told_late && !found.told_jitter {
+    let speeds = (fast, pitch / gear.ratio.abs() / TOOTH_ROWS);
+    let mut found = HowRead::of(&mut reads, misread.as_ref(), speeds, sessions, gear);
+    if !found.some_are_late && !found.jitters {
         return;
     }
     // Waves of the drive that fast rows are too far apart to follow scatter as well: once more without what its state
     // explains.
-    let state = State::new(sessions, gear);
+    let state = StateModel::new(sessions, gear);
     if let Some(fit) = state.fit(&[]) {
-        let long = (0..sessions.len()).filter(|k| sessions[*k].len() > 8);
-        for (of, session) in reads.iter_mut().zip(long) {
+        for (session, of) in reads.iter_mut().enumerate().filter(|(_, of)| !of.speed.is_empty()) {
             of.error = Cow::Owned(state.left(&fit, session, &[]));
             of.good = (0..of.speed.len()).collect();
         }
-        found = Found::of(&mut reads, misread.as_ref(), (fast, tooth_speed), sessions, gear);
+        found = HowRead::of(&mut reads, misread.as_ref(), speeds, sessions, gear);
     }
-    let Found { late, told_late, told_jitter, noise, jitter_rows } = found;
-    let scatter = jitter_rows * fast;
-    if !told_late && !told_jitter {
+    let HowRead { late, some_are_late, jitters, noise, jitter_rows } = found;
+    if !some_are_late && !jitters {
         return;
     }
+    let scatter = jitter_rows * fast;
     // Rows that are late by less than can be detected stay: as many again, and as late, on the mean.
     let mut late_s: Vec<f64> = reads
         .iter()
@@ -415,17 +415,12 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
         .collect();
     let late_rows_each = median_of(&mut late_s);
     let speed: Vec<Vec<f64>> = reads.into_iter().map(|of| of.speed).collect();
-    let long: Vec<usize> = (0..sessions.len()).filter(|k| sessions[*k].len() > 8).collect();
-    let Some(mut fault) = throughout(sessions, FaultName::ReadJitter) else { return };
-    fault.treatment = Treatment::Masked;
-    let late_rows: usize = if told_late { late.iter().map(Vec::len).sum() } else { 0 };
+    let late_rows: usize = if some_are_late { late.iter().map(Vec::len).sum() } else { 0 };
+    let late_share = late_rows as f64 / rows as f64;
     let period_s = period_s(sessions);
-    let jitter_ms = period_s.map(|period_s| 1e3 * period_s * jitter_rows).filter(|_| told_jitter);
-    fault.measures =
-        Measures { jitter_ms, late_rows: Some(late_rows as u64).filter(|_| told_late), ..Measures::default() };
+    let jitter_ms = period_s.map(|period_s| 1e3 * period_s * jitter_rows).filter(|_| jitters);
     let mut said = Vec::new();
-    if told_jitter {
-        fault.size_arcsec = Some(scatter / ARCSEC);
+    if jitters {
         let of_time = jitter_ms.map_or(format!("{jitter_rows:.4} rows"), |ms| format!("{ms:.3} ms"));
         said.push(format!(
             "the time between them scatters by {of_time}, {:.1} arcsec at full speed beside {:.1} of noise: fast rows \
@@ -435,29 +430,32 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
             noise * noise / (noise * noise + scatter * scatter)
         ));
     }
-    if told_late {
-        let largest =
-            late.iter().flatten().map(|(_, off)| *off).fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
-        fault.size_arcsec = fault.size_arcsec.or(Some(largest.abs() / ARCSEC));
+    let latest = farthest(late.iter().flatten().map(|(_, off)| *off)).abs();
+    if some_are_late {
         said.push(format!(
             "{late_rows} rows ({:.1} %) are read late, by up to {:.0} arcsec: they are left out",
-            100.0 * late_rows as f64 / rows as f64,
-            largest.abs() / ARCSEC
+            100.0 * late_share,
+            latest / ARCSEC
         ));
     }
-    fault.what = format!("the two angles are not read at one instant: {}", said.join("; "));
-    findings.faults.push(fault);
-    let late_share = late_rows as f64 / rows as f64;
-    let unsure_rows = if told_jitter { jitter_rows } else { 0.0 } + UNTOLD * late_share * late_rows_each;
-    let unsure_s = unsure_rows * period_s.unwrap_or(1.0);
+    let late_said = Some(late_rows as u64).filter(|_| some_are_late);
+    let fault = throughout(sessions, FaultName::ReadJitter).map(|fault| Fault {
+        measures: Measures { jitter_ms, late_rows: late_said, ..Measures::default() },
+        size_arcsec: Some(if jitters { scatter } else { latest } / ARCSEC),
+        ..fault
+    });
+    findings.add(fault, None::<Quantity>, Treatment::Masked, |_| {
+        format!("the two angles are not read at one instant: {}", said.join("; "))
+    });
+    let jitter_rows = if jitters { jitter_rows } else { 0.0 };
+    let unsure_s = (jitter_rows + UNTOLD * late_share * late_rows_each) * period_s.unwrap_or(1.0);
     sessions.iter_mut().for_each(|session| session.unsure_s = unsure_s);
-    weigh(sessions, &long, &speed, noise.max(1e-3 * scatter), if told_jitter { jitter_rows } else { 0.0 });
-    if told_late {
-        for (session, late) in long.iter().zip(&late) {
-            let mut drop = vec![false; sessions[*session].len()];
-            late.iter().for_each(|(row, _)| drop[*row] = true);
-            sessions[*session].leave_out(&drop);
-        }
+    weigh(sessions, &speed, noise.max(1e-3 * scatter), jitter_rows);
+    if some_are_late {
+        let of =
+            |(session, late): (&Session, &Vec<(usize, f64)>)| marked(session.len(), late.iter().map(|late| late.0));
+        let drop: Vec<Vec<bool>> = sessions.iter().zip(&late).map(of).collect();
+        leave_out(sessions, &drop);
     }
 }
 
@@ -519,46 +517,32 @@ fn read_late(of: &mut Reads<'_>, known: &[Class], run: usize) -> Vec<(usize, f64
             }
         }
     }
-    let mut place = 0;
-    of.good.retain(|_| {
-        place += 1;
-        !gone[place - 1]
-    });
+    log::leave_out(&mut of.good, &gone);
     taken
 }
 
 /// Whether rows that are off are rows that were read late: enough of them, in motion, to one side of it, at no one
 /// place of the drive.
-fn is_told(reads: &[Reads<'_>], late: &[Vec<(usize, f64)>], fast: f64, sessions: &[Session], gear: &Gear) -> bool {
-    let count: usize = late.iter().map(Vec::len).sum();
+fn are_late(reads: &[Reads<'_>], late: &[Vec<(usize, f64)>], fast: f64, sessions: &[Session], gear: &Gear) -> bool {
     let moves = |speed: f64| speed.abs() > IN_MOTION * fast;
     let rests = |speed: f64| speed.abs() < AT_REST * fast;
+    // Speed of each, and how far it is off.
+    let late_rows: Vec<[f64; 2]> =
+        (reads.iter().zip(late)).flat_map(|(of, late)| late.iter().map(|(row, off)| [of.speed[*row], *off])).collect();
     // Share of the rows of such a speed that are late.
     let share = |such: &dyn Fn(f64) -> bool| -> f64 {
-        let all: usize = reads.iter().map(|of| of.speed.iter().filter(|speed| such(**speed)).count()).sum();
-        let of =
-            |(of, late): (&Reads<'_>, &Vec<(usize, f64)>)| late.iter().filter(|(row, _)| such(of.speed[*row])).count();
-        reads.iter().zip(late).map(of).sum::<usize>() as f64 / all.max(1) as f64
+        let all = reads.iter().flat_map(|of| &of.speed).filter(|speed| such(**speed)).count();
+        late_rows.iter().filter(|[speed, _]| such(*speed)).count() as f64 / all.max(1) as f64
     };
     let (moving, at_rest) = (share(&moves), share(&rests));
-    if count < LATE_ROWS || !(LATE_SHARE..=MOST_LATE).contains(&moving) || at_rest > RARER_AT_REST * moving {
-        return false;
-    }
-    let ahead = |(of, late): (&Reads<'_>, &Vec<(usize, f64)>)| {
-        late.iter().filter(|(row, off)| moves(of.speed[*row]) && off * of.speed[*row] > 0.0).count()
-    };
-    let in_motion: usize =
-        reads.iter().zip(late).map(|(of, late)| late.iter().filter(|(row, _)| moves(of.speed[*row])).count()).sum();
-    let ahead = reads.iter().zip(late).map(ahead).sum::<usize>() as f64 / in_motion.max(1) as f64;
-    if ahead.max(1.0 - ahead) < ONE_SIDED {
-        return false;
-    }
-    let mut of_sessions = late.iter();
-    let found: Vec<Vec<(usize, f64)>> = sessions
-        .iter()
-        .map(|session| if session.len() > 8 { of_sessions.next().cloned().unwrap_or_default() } else { Vec::new() })
-        .collect();
-    !repeat_with_position(sessions, &found, gear)
+    let in_motion: Vec<&[f64; 2]> = late_rows.iter().filter(|[speed, _]| moves(*speed)).collect();
+    let ahead = in_motion.iter().filter(|[speed, off]| off * speed > 0.0).count() as f64;
+    let ahead = ahead / in_motion.len().max(1) as f64;
+    late_rows.len() >= LATE_ROWS
+        && (LATE_SHARE..=MOST_LATE).contains(&moving)
+        && at_rest <= RARER_AT_REST * moving
+        && ahead.max(1.0 - ahead) >= ONE_SIDED
+        && !repeat_with_position(sessions, late, gear)
 }
 
 /// Median period of the rows, s.
@@ -571,13 +555,13 @@ fn period_s(sessions: &[Session]) -> Option<f64> {
 }
 
 /// Gives each row its noise against that of a row of mean worth.
-fn weigh(sessions: &mut [Session], long: &[usize], speed: &[Vec<f64>], noise: f64, jitter_rows: f64) {
-    let mut all: Vec<Vec<f64>> = sessions.iter().map(|session| vec![noise; session.len()]).collect();
-    for (session, speed) in long.iter().zip(speed) {
-        all[*session] = speed.iter().map(|speed| noise.hypot(jitter_rows * speed)).collect();
-    }
-    let rows: usize = all.iter().map(Vec::len).sum();
-    let worth = all.iter().flatten().map(|loud| loud.powi(-2)).sum::<f64>() / rows as f64;
+fn weigh(sessions: &mut [Session], speed: &[Vec<f64>], noise: f64, jitter_rows: f64) {
+    let loud = |(session, speed): (&Session, &Vec<f64>)| -> Vec<f64> {
+        let of = |row: usize| noise.hypot(jitter_rows * speed.get(row).unwrap_or(&0.0));
+        (0..session.len()).map(of).collect()
+    };
+    let all: Vec<Vec<f64>> = sessions.iter().zip(speed).map(loud).collect();
+    let worth = all.iter().flatten().map(|loud| loud.powi(-2)).sum::<f64>() / rows_of(sessions) as f64;
     for (session, mut loud) in sessions.iter_mut().zip(all) {
         loud.iter_mut().for_each(|loud| *loud *= worth.sqrt());
         session.loudness = Some(loud);

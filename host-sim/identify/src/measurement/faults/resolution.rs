@@ -1,10 +1,10 @@
 //! A resolution so coarse that no noise blurs it.
 
 use super::lattice::lattice;
-use super::{ARCSEC, Findings, of_rows};
+use super::{ARCSEC, Findings, throughout};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
-use crate::measurement::fault::{FaultName, Treatment};
+use crate::measurement::fault::{Fault, FaultName, Treatment};
 use crate::measurement::gear::Gear;
 use flexspline_base::robust::{median_of, white_noise};
 
@@ -98,16 +98,16 @@ pub(in crate::measurement) fn check(
             continue;
         }
         coarsest = coarsest.max(step);
-        let mut fault = of_rows(session, FaultName::Quantisation, 0..session.len());
-        (fault.channel, fault.treatment) = (Some(channel), Treatment::Kept);
-        fault.size_arcsec = Some(step / ARCSEC);
-        fault.what = format!(
-            "the {channel} has a resolution of {:.2} arcsec at the output, and too little noise to blur it ({:.2} \
-             arcsec)",
-            step / ARCSEC,
-            noise / ARCSEC
-        );
-        findings.faults.push(fault);
+        let fault = throughout(std::slice::from_ref(session), FaultName::Quantisation);
+        let fault = fault.map(|fault| Fault { size_arcsec: Some(step / ARCSEC), ..fault });
+        findings.add(fault, channel, Treatment::Kept, |_| {
+            format!(
+                "the {channel} has a resolution of {:.2} arcsec at the output, and too little noise to blur it ({:.2} \
+                 arcsec)",
+                step / ARCSEC,
+                noise / ARCSEC
+            )
+        });
     }
     sessions.iter_mut().for_each(|session| session.coarse_rad = coarsest);
 }

@@ -1,9 +1,9 @@
 //! A logger that stands still now and then while its time counts on: the angles leap over several rows' worth of
 //! motion, both of them, and the column of time does not show it.
 
-use super::{Findings, clock, span};
+use super::{Findings, add_steps, clock};
 use crate::measurement::columns::Quantity;
-use crate::measurement::fault::{FaultName, Measures, Treatment};
+use crate::measurement::fault::{Fault, FaultName, Measures, Treatment};
 use crate::measurement::gear::Gear;
 use crate::measurement::log::Log;
 use flexspline_base::robust::{least_and_most, median_of, sampled};
@@ -37,34 +37,29 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
     if leaps.len() < FEWEST || leaps.len() as f64 > MOST_SHARE * telling as f64 {
         return;
     }
-    let mut sizes: Vec<f64> = leaps.iter().map(|(_, extra_s)| *extra_s).collect();
-    let size_s = median_of(&mut sizes);
+    let size_s = median_of(&mut leaps.iter().map(|(_, extra_s)| *extra_s).collect::<Vec<f64>>());
     let every = rhythm(log, &leaps);
-    let all: Vec<(usize, f64)> = match every {
+    let fault = log.fault(FaultName::Stalls, leaps.iter().map(|(row, _)| *row));
+    let all = match every {
         // Where the motion does not show it, as long as elsewhere.
         Some(every) => by_rhythm(log, &leaps, every, size_s),
-        None => leaps.clone(),
+        None => leaps,
     };
     let lost_s: f64 = all.iter().map(|(_, extra_s)| extra_s).sum();
-    let mut fault = span(log, FaultName::Stalls, leaps[0].0, leaps[leaps.len() - 1].0);
-    (fault.channel, fault.rows, fault.treatment) = (Some(Quantity::Time), all.len() as u64, Treatment::Repaired);
-    fault.measures =
-        Measures { every_rows: every.map(|every| every as u64), size_ms: Some(1e3 * size_s), ..Measures::default() };
-    fault.what = format!(
-        "the logger stands still for {:.0} ms {}, {} times, while its time counts {:.2} ms from row to row: both \
-         angles leap there; time is made anew from the motion ({lost_s:.1} s more)",
-        1e3 * size_s,
-        every.map_or("now and then".to_owned(), |every| format!("after every {every} rows")),
-        all.len(),
-        1e3 * period_s
-    );
-    findings.faults.push(fault);
-    let Some(time) = log.get_mut(Quantity::Time) else { return };
-    let (mut next, mut more) = (all.iter().peekable(), 0.0);
-    for (row, t) in time.iter_mut().enumerate() {
-        more += next.next_if(|(at, _)| *at == row).map_or(0.0, |(_, extra_s)| *extra_s);
-        *t += more;
-    }
+    let (every_rows, size_ms) = (every.map(|every| every as u64), Some(1e3 * size_s));
+    let measures = Measures { every_rows, size_ms, ..Measures::default() };
+    let fault = fault.map(|fault| Fault { rows: all.len() as u64, measures, ..fault });
+    findings.add(fault, Quantity::Time, Treatment::Repaired, |_| {
+        format!(
+            "the logger stands still for {:.0} ms {}, {} times, while its time counts {:.2} ms from row to row: both \
+             angles leap there; time is made anew from the motion ({lost_s:.1} s more)",
+            1e3 * size_s,
+            every.map_or("now and then".to_owned(), |every| format!("after every {every} rows")),
+            all.len(),
+            1e3 * period_s
+        )
+    });
+    log.get_mut(Quantity::Time).into_iter().for_each(|time| add_steps(time, &all, 1.0));
 }
 
 /// Rows into which both angles leap, with the time that is missing there (s); the number of rows that would show it;
@@ -111,7 +106,7 @@ fn leaps(log: &Log, gear: &Gear) -> Option<(Vec<Leap>, usize, f64)> {
 }
 
 /// Every how many lines stalls come, if they come regularly.
-fn rhythm(log: &Log, leaps: &[(usize, f64)]) -> Option<usize> {
+fn rhythm(log: &Log, leaps: &[Leap]) -> Option<usize> {
     let mut distances: Vec<f64> =
         leaps.windows(2).map(|pair| (log.line[pair[1].0] - log.line[pair[0].0]) as f64).collect();
     let every = median_of(&mut distances).round();
@@ -122,25 +117,18 @@ fn rhythm(log: &Log, leaps: &[(usize, f64)]) -> Option<usize> {
 
 /// The same leaps, and one of the usual size in each row where the rhythm of its session asks for it and the motion
 /// does not show it.
-fn by_rhythm(log: &Log, leaps: &[(usize, f64)], every: usize, size_s: f64) -> Vec<(usize, f64)> {
-    let mut known = leaps.iter().peekable();
+fn by_rhythm(log: &Log, leaps: &[Leap], every: usize, size_s: f64) -> Vec<Leap> {
     let mut all = Vec::new();
     // A session counts anew; before its first leap its rhythm is the one of that leap.
-    let starts: Vec<usize> = (0..log.len()).filter(|row| !log.continues(*row)).chain([log.len()]).collect();
-    for bounds in starts.windows(2) {
-        let of_session: Vec<(usize, f64)> =
-            std::iter::from_fn(|| known.next_if(|(row, _)| *row < bounds[1])).copied().collect();
-        let Some(&(first, _)) = of_session.first() else { continue };
+    for rows in log.sessions() {
+        let at = |row: usize| leaps.partition_point(|(leap, _)| *leap < row);
+        let of_session = &leaps[at(rows.start)..at(rows.end)];
         let mut phases = vec![0usize; every];
         of_session.iter().for_each(|(row, _)| phases[(log.line[*row] as usize) % every] += 1);
-        let phase = (0..every).max_by_key(|k| phases[*k]).unwrap_or(log.line[first] as usize % every);
-        for row in bounds[0] + 1..bounds[1] {
-            if let Ok(at) = of_session.binary_search_by_key(&row, |(row, _)| *row) {
-                all.push(of_session[at]);
-            } else if log.line[row] as usize % every == phase {
-                all.push((row, size_s));
-            }
-        }
+        let Some(phase) = (0..every).max_by_key(|k| phases[*k]).filter(|_| !of_session.is_empty()) else { continue };
+        let in_phase = |row: usize| (log.line[row] as usize % every == phase).then_some((row, size_s));
+        let seen = |row: usize| of_session.binary_search_by_key(&row, |(leap, _)| *leap).ok().map(|k| of_session[k]);
+        all.extend((rows.start + 1..rows.end).filter_map(|row| seen(row).or_else(|| in_phase(row))));
     }
     all
 }

@@ -24,7 +24,7 @@ const BEFORE: usize = 5;
 const HUBER: f64 = 2.5;
 
 /// Columns that depend on the state.
-pub(super) struct State<'a> {
+pub(super) struct StateModel<'a> {
     sessions: &'a [Session],
     ratio: f64,
     /// +1 after forward motion, -1 after backward.
@@ -33,12 +33,12 @@ pub(super) struct State<'a> {
     motion_scale: f64,
     temperature: (f64, f64),
     /// Rows that fits use, once there is one.
-    sampled: OnceLock<Sampled>,
+    sampled: OnceLock<SampledRows>,
 }
 
 /// Rows that a fit uses.
 #[derive(Default)]
-struct Sampled {
+struct SampledRows {
     /// Session and row.
     places: Vec<(usize, usize)>,
     error: Vec<f64>,
@@ -47,7 +47,7 @@ struct Sampled {
 }
 
 /// A fit of some columns.
-pub(super) struct Fit {
+pub(super) struct StateFit {
     /// Coefficients in the order of the columns.
     pub value: Vec<f64>,
     /// Their standard deviations, correlation of neighbouring rows considered.
@@ -61,7 +61,7 @@ pub(super) struct Fit {
 /// A column in addition to those of the state.
 pub(super) type Extra<'a> = &'a dyn Fn(usize, usize) -> f64;
 
-impl<'a> State<'a> {
+impl<'a> StateModel<'a> {
     pub fn new(sessions: &'a [Session], gear: &Gear) -> Self {
         let flank = sessions.iter().map(|session| directions(&session.generator_rad)).collect();
         let largest = |values: &dyn Fn(&Session) -> Option<&[f64]>| {
@@ -73,7 +73,7 @@ impl<'a> State<'a> {
         };
         let middle = mean(&|s| s.temperature_c.as_deref());
         let warmest = largest(&|s| s.temperature_c.as_deref()).max(1.0);
-        State {
+        StateModel {
             sessions,
             ratio: gear.ratio,
             flank,
@@ -152,7 +152,7 @@ impl<'a> State<'a> {
     }
 
     /// The error freed of what a fit without its last `extras` columns says, of all rows of a session.
-    pub fn left(&self, fit: &Fit, session: usize, extras: &[Extra]) -> Vec<f64> {
+    pub fn left(&self, fit: &StateFit, session: usize, extras: &[Extra]) -> Vec<f64> {
         let mut columns = Vec::new();
         (0..self.sessions[session].len())
             .map(|row| {
@@ -166,10 +166,10 @@ impl<'a> State<'a> {
     }
 
     /// Rows spread evenly, with the columns of the state.
-    fn sample(&self) -> Sampled {
+    fn sample(&self) -> SampledRows {
         let rows: usize = self.sessions.iter().map(Session::len).sum();
         let step = rows.div_ceil(FIT_ROWS).max(1);
-        let mut sampled = Sampled::default();
+        let mut sampled = SampledRows::default();
         let mut at_row = Vec::new();
         for (number, session) in self.sessions.iter().enumerate() {
             for row in (0..session.len()).step_by(step) {
@@ -185,8 +185,8 @@ impl<'a> State<'a> {
     }
 
     /// Fits state and extra columns to the error; coefficients of the extra ones come last.
-    pub fn fit(&self, extras: &[Extra]) -> Option<Fit> {
-        let Sampled { places, error, columns } = self.sampled.get_or_init(|| self.sample());
+    pub fn fit(&self, extras: &[Extra]) -> Option<StateFit> {
+        let SampledRows { places, error, columns } = self.sampled.get_or_init(|| self.sample());
         let n = error.len();
         let width = columns.len() + extras.len();
         if n < 2 * width {
@@ -248,6 +248,6 @@ impl<'a> State<'a> {
         let misfit = left.iter().zip(&weight).map(|(left, weight)| weight * left * left).sum();
         let std = (0..width).map(|a| sigma * (inflation * inverse[(a, a)]).sqrt() / size[a]).collect();
         value.iter_mut().zip(&size).for_each(|(value, size)| *value /= size);
-        Some(Fit { value, std, unit_std: sigma * (inflation / n as f64).sqrt(), misfit })
+        Some(StateFit { value, std, unit_std: sigma * (inflation / n as f64).sqrt(), misfit })
     }
 }

@@ -5,11 +5,11 @@
 //! thrown over, wind-up and damaged teeth do not: they come back with the state of the drive. A counter that loses
 //! counts may be set right before the next session: then its steps stay until their session ends.
 
-use super::state::{Extra, Fit, State};
-use super::{ARCSEC, Findings, of_rows, whole_pitches};
+use super::state::{Extra, StateFit, StateModel};
+use super::{ARCSEC, Findings, level, of_rows, whole_pitches};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
-use crate::measurement::fault::{FaultName, ToothStep, Treatment};
+use crate::measurement::fault::{Fault, FaultName, ToothStep, Treatment};
 use crate::measurement::gear::Gear;
 use flexspline_base::robust::{median_and_std, median_of, sampled, white_noise};
 
@@ -78,7 +78,7 @@ const LOCAL_NOISE: f64 = 2.2;
 const APART: usize = 12;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Place {
+struct StepPlace {
     session: usize,
     row: usize,
     stays: Stays,
@@ -92,7 +92,7 @@ enum Stays {
     ToTheEnd,
 }
 
-impl Place {
+impl StepPlace {
     fn reached(self, session: usize, row: usize) -> f64 {
         let stays = self.stays == Stays::ForGood || session == self.session;
         f64::from(u8::from(stays && (session, row) >= (self.session, self.row)))
@@ -100,13 +100,20 @@ impl Place {
 }
 
 /// A column that steps from 0 to 1.
-fn column(place: Place) -> impl Fn(usize, usize) -> f64 {
+fn column(place: StepPlace) -> impl Fn(usize, usize) -> f64 {
     move |session, row| place.reached(session, row)
 }
 
-/// Which steps stay in the data as nobody knows what they are.
+/// Does something with the columns of steps, and `more` behind them.
+fn with_columns<T>(steps: impl IntoIterator<Item = StepPlace>, more: &[Extra], then: impl FnOnce(&[Extra]) -> T) -> T {
+    let steps: Vec<_> = steps.into_iter().map(column).collect();
+    let all: Vec<Extra> = steps.iter().map(|step| step as Extra).chain(more.iter().copied()).collect();
+    then(&all)
+}
+
+/// Where steps stay in the data, which may be those of an encoder or changes of flank.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::measurement) enum Untold {
+pub(in crate::measurement) enum DoubtfulSteps {
     /// None.
     Nowhere,
     /// Only such as stand where a session begins or ends: they may as well be between two.
@@ -117,12 +124,16 @@ pub(in crate::measurement) enum Untold {
 
 /// Finds lasting steps: index jumps are named and taken out, ratcheting is handed on. Gives where steps are that are
 /// not distinguished.
-pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) -> Untold {
-    let Some(Found { sure, doubtful, stays, .. }) = likelier(sessions, gear) else { return Untold::Nowhere };
-    let untold = match doubtful.as_slice() {
-        [] => Untold::Nowhere,
-        steps if steps.iter().any(|(place, ..)| is_inside(&sessions[place.session], place.row)) => Untold::Inside,
-        _ => Untold::AtTheEnds,
+pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findings: &mut Findings) -> DoubtfulSteps {
+    let Some(FoundSteps { sure, doubtful, stays, .. }) = likelier(sessions, gear) else {
+        return DoubtfulSteps::Nowhere;
+    };
+    let where_doubtful = match doubtful.as_slice() {
+        [] => DoubtfulSteps::Nowhere,
+        steps if steps.iter().any(|(place, ..)| is_inside(&sessions[place.session], place.row)) => {
+            DoubtfulSteps::Inside
+        }
+        _ => DoubtfulSteps::AtTheEnds,
     };
     for (place, size, _) in &doubtful {
         let line = sessions[place.session].line[place.row];
@@ -133,46 +144,42 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
         ));
     }
     for (place, size, std) in sure {
-        let session = &sessions[place.session];
-        let fault = of_rows(session, FaultName::EncoderIndexJump, place.row..place.row + 1);
+        let (session, size_arcsec) = (&sessions[place.session], size / ARCSEC);
         if let Some(pitch) = gear.tooth_pitch_rad.filter(|_| stays == Stays::ForGood) {
             let pitches = (size / pitch).round();
             if pitches != 0.0 && (size - pitches * pitch).abs() < (5.0 * std).max(WHOLE_PITCH * pitch) {
                 findings.tooth_steps.push(ToothStep {
                     session: place.session,
                     row: place.row,
-                    line: fault.first_line,
-                    time_s: fault.time_s,
-                    size_arcsec: size / ARCSEC,
+                    line: session.line[place.row],
+                    time_s: session.time_s.as_ref().map(|time| time[place.row]),
+                    size_arcsec,
                     pitches: pitches as i32,
                 });
                 continue;
             }
         }
-        let mut fault = fault;
-        fault.channel = Some(Quantity::Error);
-        fault.size_arcsec = Some(size / ARCSEC);
-        fault.treatment = Treatment::Repaired;
         let lasting = match stays {
             Stays::ForGood => "there: an encoder has lost its index",
             Stays::ToTheEnd => {
                 "until the session ends: a counter has lost counts, and was set right before the next one"
             }
         };
-        fault.what = format!(
-            "the error steps by {:.1} arcsec (standard deviation {:.1}) within one row and stays {lasting}; the step \
-             is taken out",
-            size / ARCSEC,
-            std / ARCSEC
-        );
-        fault.until_s = None;
-        findings.faults.push(fault);
+        let fault = of_rows(sessions, FaultName::EncoderIndexJump, [(place.session, place.row)]);
+        let fault = fault.map(|fault| Fault { size_arcsec: Some(size_arcsec), until_s: None, ..fault });
+        findings.add(fault, Quantity::Error, Treatment::Repaired, |_| {
+            format!(
+                "the error steps by {size_arcsec:.1} arcsec (standard deviation {:.1}) within one row and stays \
+                 {lasting}; the step is taken out",
+                std / ARCSEC
+            )
+        });
         for (number, session) in sessions.iter_mut().enumerate() {
             let rows = session.error_rad.iter_mut().enumerate();
             rows.for_each(|(row, error)| *error -= size * place.reached(number, row));
         }
     }
-    untold
+    where_doubtful
 }
 
 /// Whether this many rows of its session are before and after a row that means over them are compared.
@@ -181,10 +188,10 @@ fn is_inside(session: &Session, row: usize) -> bool {
 }
 
 /// A step with its size and standard deviation.
-type Step = (Place, f64, f64);
+type Step = (StepPlace, f64, f64);
 
 /// Steps of a recording.
-struct Found {
+struct FoundSteps {
     /// Lasting ones.
     sure: Vec<Step>,
     /// Those that may be a change of flank.
@@ -197,7 +204,7 @@ struct Found {
 }
 
 /// Steps that stay for good or to the end of their session, whichever leaves less.
-fn likelier(sessions: &[Session], gear: &Gear) -> Option<Found> {
+fn likelier(sessions: &[Session], gear: &Gear) -> Option<FoundSteps> {
     let seen = Seen::of(sessions, gear);
     let for_good = seen.find(Stays::ForGood)?;
     if sessions.len() == 1 || !for_good.suspected {
@@ -224,7 +231,7 @@ struct Seen<'a> {
     gear: &'a Gear,
     /// White noise of the error, rad.
     noise: f64,
-    state: State<'a>,
+    state: StateModel<'a>,
     /// Rows at which clearance is taken up, by session.
     settled: Vec<Vec<bool>>,
     /// Largest torque, N·m.
@@ -239,22 +246,28 @@ fn may_let_go(session: &Session, row: usize, largest: f64) -> bool {
 impl<'a> Seen<'a> {
     fn of(sessions: &'a [Session], gear: &'a Gear) -> Seen<'a> {
         let noise = white_noise(sessions.iter().map(|session| session.error_rad.as_slice()));
-        let state = State::new(sessions, gear);
+        let state = StateModel::new(sessions, gear);
         let settled = state.settled();
         Seen { sessions, gear, noise, state, settled, largest: largest_torque(sessions) }
     }
 
     /// The fit of `columns` in the place of a step, together with the other steps.
-    fn beside_others(&self, steps: &[Step], place: Place, columns: &[Extra]) -> Option<Fit> {
-        let others: Vec<_> =
-            steps.iter().map(|(other, ..)| *other).filter(|other| *other != place).map(column).collect();
-        let extras: Vec<Extra> = others.iter().map(|column| column as Extra).chain(columns.iter().copied()).collect();
-        self.state.fit(&extras)
+    fn beside_others(&self, steps: &[Step], place: StepPlace, columns: &[Extra]) -> Option<StateFit> {
+        let others = steps.iter().map(|(other, ..)| *other).filter(|other| *other != place);
+        with_columns(others, columns, |columns| self.state.fit(columns))
+    }
+
+    /// All rows but the first of each session.
+    fn rows(&self) -> impl Iterator<Item = StepPlace> + '_ {
+        let of = |(session, of): (usize, &Session)| {
+            (1..of.len()).map(move |row| StepPlace { session, row, stays: Stays::ForGood })
+        };
+        self.sessions.iter().enumerate().flat_map(of)
     }
 
     /// Whether a step leaves far less than a change of flank would that comes in its place, whatever the other steps
     /// are: the model without the step, to which the flank that the load holds is given instead.
-    fn beyond_a_change_of_flank(&self, steps: &[Step], place: Place) -> bool {
+    fn beyond_a_change_of_flank(&self, steps: &[Step], place: StepPlace) -> bool {
         if may_let_go(&self.sessions[place.session], place.row, self.largest) {
             return false;
         }
@@ -266,19 +279,17 @@ impl<'a> Seen<'a> {
     }
 
     /// Steps that stay so long.
-    fn find(&self, stays: Stays) -> Option<Found> {
+    fn find(&self, stays: Stays) -> Option<FoundSteps> {
         let most = if stays == Stays::ForGood { AT_ONCE } else { AT_ONCE_IN_ALL };
         let mut places = self.sudden(most);
         places.iter_mut().for_each(|place| place.stays = stays);
         let mut suspected = !places.is_empty();
-        let mut rejected: Vec<Place> = Vec::new();
+        let mut rejected: Vec<StepPlace> = Vec::new();
         let (mut steps, mut misfit): (Vec<Step>, f64) = (Vec::new(), f64::INFINITY);
         for round in 0..ROUNDS {
             // Drop one by one what does not last, the weakest first.
             let fit = loop {
-                let columns: Vec<_> = places.iter().copied().map(column).collect();
-                let extras: Vec<Extra> = columns.iter().map(|column| column as Extra).collect();
-                let fit = self.state.fit(&extras)?;
+                let fit = with_columns(places.iter().copied(), &[], |columns| self.state.fit(columns))?;
                 let first = fit.value.len() - places.len();
                 let strength = |k: usize| self.strength(places[k], fit.value[first + k], fit.std[first + k]);
                 let weakest = (0..places.len()).min_by(|a, b| strength(*a).total_cmp(&strength(*b)));
@@ -295,13 +306,13 @@ impl<'a> Seen<'a> {
             if round + 1 == ROUNDS {
                 break;
             }
-            let known: Vec<Place> = places.iter().chain(&rejected).copied().collect();
+            let known: Vec<StepPlace> = places.iter().chain(&rejected).copied().collect();
             let more = self.standing_out(&fit, &places, &known);
             if more.is_empty() {
                 break;
             }
             suspected = true;
-            places.extend(more.into_iter().map(|place| Place { stays, ..place }));
+            places.extend(more.into_iter().map(|place| StepPlace { stays, ..place }));
             places.sort_by_key(|place| (place.session, place.row));
         }
         steps = match stays {
@@ -312,7 +323,7 @@ impl<'a> Seen<'a> {
             }
         };
         let unsaid = !steps.is_empty() && !says_flank(self.sessions);
-        let turned_over = |place: Place, size: f64| unsaid && self.comes_elsewhere(place, size);
+        let turned_over = |place: StepPlace, size: f64| unsaid && self.comes_elsewhere(place, size);
         let (sure, doubtful): (Vec<Step>, Vec<Step>) = steps.iter().copied().partition(|(place, size, _)| {
             !turned_over(*place, *size) && self.no_flank_was_changed(&steps, *place, *size)
         });
@@ -321,108 +332,84 @@ impl<'a> Seen<'a> {
             size.abs() <= WIDER_THAN_CLEARANCE_RAD && doubtful.iter().any(|(_, other, _)| size * other < 0.0)
         };
         let (back, sure): (Vec<Step>, Vec<Step>) = sure.into_iter().partition(way_back);
-        Some(Found { sure, doubtful: [doubtful, back].concat(), stays, misfit, suspected })
+        Some(FoundSteps { sure, doubtful: [doubtful, back].concat(), stays, misfit, suspected })
+    }
+
+    /// The change of the error into a row.
+    fn change(&self, StepPlace { session, row, .. }: StepPlace) -> f64 {
+        let error = &self.sessions[session].error_rad;
+        error[row] - error[row - 1]
+    }
+
+    /// The motion of the generator into a row, over the ratio.
+    fn motion(&self, StepPlace { session, row, .. }: StepPlace) -> f64 {
+        let generator = &self.sessions[session].generator_rad;
+        ((generator[row] - generator[row - 1]) / self.gear.ratio).abs()
     }
 
     /// The change of the error into a row beyond what a dwell could give, 0 if less. An output dwells after the
     /// generator turned back.
-    fn beyond_dwell(&self, number: usize, row: usize) -> f64 {
-        let session = &self.sessions[number];
-        let change = session.error_rad[row] - session.error_rad[row - 1];
-        if self.settled[number][row] {
+    fn beyond_dwell(&self, place: StepPlace) -> f64 {
+        let change = self.change(place);
+        if self.settled[place.session][place.row] {
             return change;
         }
-        let motion =
-            FASTER_THAN_DWELL * ((session.generator_rad[row] - session.generator_rad[row - 1]) / self.gear.ratio).abs();
-        change.signum() * (change.abs() - motion).max(0.0)
+        change.signum() * (change.abs() - FASTER_THAN_DWELL * self.motion(place)).max(0.0)
     }
 
     /// Rows into which the error changes more than anything smooth explains, the largest changes first.
-    fn sudden(&self, most: usize) -> Vec<Place> {
-        let changes: Vec<f64> = self
-            .sessions
-            .iter()
-            .flat_map(|session| session.error_rad.windows(2).map(|error| error[1] - error[0]))
-            .collect();
+    fn sudden(&self, most: usize) -> Vec<StepPlace> {
+        let changes: Vec<f64> = self.rows().map(|place| self.change(place)).collect();
         let usual = median_and_std(&mut sampled(&changes)).1;
         let least = (SUDDEN * usual.max(self.noise)).max(LEAST_RAD);
-        let mut found: Vec<(Place, f64)> = Vec::new();
-        for (number, session) in self.sessions.iter().enumerate() {
-            for row in 1..session.len() {
-                let by = self.beyond_dwell(number, row).abs();
-                if by > least {
-                    found.push((Place { session: number, row, stays: Stays::ForGood }, by));
-                }
-            }
-        }
-        largest(found, &[], most)
+        let by = self.rows().map(|place| (place, self.beyond_dwell(place).abs()));
+        largest(by.filter(|(_, by)| *by > least).collect(), &[], most)
     }
 
     /// Rows where means before and after differ more than they do elsewhere, in what state and known steps leave.
-    fn standing_out(&self, fit: &Fit, places: &[Place], known: &[Place]) -> Vec<Place> {
-        let columns: Vec<_> = places.iter().copied().map(column).collect();
-        let extras: Vec<Extra> = columns.iter().map(|column| column as Extra).collect();
-        let differences: Vec<Vec<f64>> = (0..self.sessions.len())
-            .map(|number| {
-                let left = self.state.left(fit, number, &extras);
-                let mut sums = vec![0.0; left.len() + 1];
-                for row in 0..left.len() {
-                    sums[row + 1] = sums[row] + left[row];
-                }
-                let mean = |from: usize, to: usize| (sums[to] - sums[from]) / (to - from) as f64;
-                (0..left.len())
-                    .map(|row| {
-                        if is_inside(&self.sessions[number], row) {
-                            mean(row, row + WINDOW) - mean(row - WINDOW, row)
-                        } else {
-                            0.0
-                        }
-                    })
-                    .collect()
-            })
-            .collect();
+    fn standing_out(&self, fit: &StateFit, places: &[StepPlace], known: &[StepPlace]) -> Vec<StepPlace> {
+        let differences = |number: usize| -> Vec<f64> {
+            let left = with_columns(places.iter().copied(), &[], |columns| self.state.left(fit, number, columns));
+            let mut sums = vec![0.0; left.len() + 1];
+            for row in 0..left.len() {
+                sums[row + 1] = sums[row] + left[row];
+            }
+            let mean = |from: usize, to: usize| (sums[to] - sums[from]) / (to - from) as f64;
+            let inside = |row: &usize| is_inside(&self.sessions[number], *row);
+            let difference = |row: usize| mean(row, row + WINDOW) - mean(row - WINDOW, row);
+            (0..left.len()).map(|row| Some(row).filter(inside).map_or(0.0, difference)).collect()
+        };
+        let differences: Vec<Vec<f64>> = (0..self.sessions.len()).map(differences).collect();
         let usual = median_and_std(&mut differences.iter().flat_map(|d| sampled(d)).collect::<Vec<_>>()).1;
         let least = (STANDS_OUT * usual).max(LEAST_RAD);
-        let mut found = Vec::new();
-        for (number, (session, differences)) in self.sessions.iter().zip(&differences).enumerate() {
-            for row in 1..session.len() {
-                let size = differences[row];
-                if size.abs() > least {
-                    // Of the rows around, the one where it happens.
-                    let sharp = self.beyond_dwell(number, row) * size.signum();
-                    if sharp > (1.0 - AGREES) * size.abs() - 4.0 * self.noise {
-                        found.push((Place { session: number, row, stays: Stays::ForGood }, size.abs()));
-                    }
-                }
-            }
-        }
-        largest(found, known, AT_ONCE)
+        let stands_out = |place: StepPlace| {
+            let size = differences[place.session][place.row];
+            // Of the rows around, the one where it happens.
+            let sharp = || self.beyond_dwell(place) * size.signum() > (1.0 - AGREES) * size.abs() - 4.0 * self.noise;
+            (size.abs() > least && sharp()).then_some((place, size.abs()))
+        };
+        largest(self.rows().filter_map(stands_out).collect(), known, AT_ONCE)
     }
 
     /// At least 1 for a step that lasts, is sudden, and is the same in both views.
-    fn strength(&self, place: Place, size: f64, std: f64) -> f64 {
+    fn strength(&self, place: StepPlace, size: f64, std: f64) -> f64 {
         let (session, noise) = (&self.sessions[place.session], self.noise);
         let wide = size.abs() > LONGEST_TRAVERSE_RAD;
         if (!self.settled[place.session][place.row] && !wide) || others_change_as_much(session, place.row, size) {
             return 0.0;
         }
-        let change = session.error_rad[place.row] - session.error_rad[place.row - 1];
-        let motion =
-            ((session.generator_rad[place.row] - session.generator_rad[place.row - 1]) / self.gear.ratio).abs();
-        let agrees = (change - size).abs() < AGREES * size.abs() + 6.0 * noise + 0.5 * motion;
+        let change = self.change(place);
+        let agrees = (change - size).abs() < AGREES * size.abs() + 6.0 * noise + 0.5 * self.motion(place);
         let loaded = load_changes(session, place.row, self.largest) && !whole_pitches(size, self.gear, WHOLE_PITCH);
         if !agrees || loaded || size.abs() < LEAST_RAD.max(SEEN * noise) {
             return 0.0;
         }
         // Seen close by, so that a slow change is no step: medians of a few rows.
         let beside = 6.min(place.row).min(session.len() - place.row);
-        let mut before = session.error_rad[place.row - beside..place.row].to_vec();
-        let mut after = session.error_rad[place.row..place.row + beside].to_vec();
-        let local = median_of(&mut after) - median_of(&mut before);
-        let mut paces: Vec<f64> = session.error_rad[place.row - beside..place.row + beside]
-            .windows(2)
-            .map(|error| (error[1] - error[0]).abs())
-            .collect();
+        let local = level(&session.error_rad, place.row..place.row + beside)
+            - level(&session.error_rad, place.row - beside..place.row);
+        let near = &session.error_rad[place.row - beside..place.row + beside];
+        let mut paces: Vec<f64> = near.windows(2).map(|error| (error[1] - error[0]).abs()).collect();
         let moves = beside as f64 * median_of(&mut paces);
         if (local - size).abs() > AGREES * size.abs() + LOCAL_NOISE * noise + moves {
             return 0.0;
@@ -432,25 +419,21 @@ impl<'a> Seen<'a> {
 
     /// Whether the error changes by as much, within a row, at other places that no reversal is near to: under a load
     /// that nobody recorded.
-    fn comes_elsewhere(&self, place: Place, size: f64) -> bool {
+    fn comes_elsewhere(&self, place: StepPlace, size: f64) -> bool {
         if size.abs() > WIDER_THAN_CLEARANCE_RAD {
             return false;
         }
-        let mut elsewhere = 0;
-        for (number, session) in self.sessions.iter().enumerate() {
-            for row in 1..session.len() {
-                let near = number == place.session && row.abs_diff(place.row) < WINDOW;
-                let change = session.error_rad[row] - session.error_rad[row - 1];
-                let as_much = (change.abs() - size.abs()).abs() < TAKEN_BACK * size.abs();
-                elsewhere += usize::from(!near && self.settled[number][row] && as_much);
-            }
-        }
-        elsewhere >= ELSEWHERE
+        let elsewhere = self.rows().filter(|other| {
+            let near = other.session == place.session && other.row.abs_diff(place.row) < WINDOW;
+            let as_much = (self.change(*other).abs() - size.abs()).abs() < TAKEN_BACK * size.abs();
+            !near && self.settled[other.session][other.row] && as_much
+        });
+        elsewhere.count() >= ELSEWHERE
     }
 
     /// Whether a step that happens under light load, where friction alone holds a flank, is seen under loads that hold
     /// one: a change of flank is not.
-    fn lasts_under_load(&self, steps: &[Step], place: Place, size: f64) -> bool {
+    fn lasts_under_load(&self, steps: &[Step], place: StepPlace, size: f64) -> bool {
         let (sessions, held) = (self.sessions, HELD * self.largest);
         let loaded = |s: usize, r: usize| sessions[s].torque_n_m.as_ref().is_some_and(|torque| torque[r].abs() >= held);
         if held == 0.0 || loaded(place.session, place.row) {
@@ -469,7 +452,7 @@ impl<'a> Seen<'a> {
 
     /// Whether a step cannot be a change of flank: the output came back to where it happened and the step did not, or
     /// load held the flank, or no clearance is so wide.
-    fn no_flank_was_changed(&self, steps: &[Step], place: Place, size: f64) -> bool {
+    fn no_flank_was_changed(&self, steps: &[Step], place: StepPlace, size: f64) -> bool {
         let sessions = self.sessions;
         if size.abs() > WIDER_THAN_CLEARANCE_RAD {
             return true;
@@ -536,7 +519,7 @@ fn lasting(mut steps: Vec<Step>) -> Vec<Step> {
         let sum: f64 = run.iter().map(|(_, size, _)| size).sum();
         sum.abs() < share * largest
     };
-    let apart = |a: Place, b: Place| (b.session - a.session, b.row.abs_diff(a.row));
+    let apart = |a: StepPlace, b: StepPlace| (b.session - a.session, b.row.abs_diff(a.row));
     loop {
         let pairs = (0..steps.len()).flat_map(|k| (0..k).map(move |j| (j, k)));
         let there_and_back = pairs.filter(|(j, k)| together(&[steps[*j], steps[*k]], TAKEN_BACK));
@@ -553,11 +536,11 @@ fn lasting(mut steps: Vec<Step>) -> Vec<Step> {
 }
 
 /// The places of the largest values, apart from each other and from those known.
-fn largest(mut found: Vec<(Place, f64)>, known: &[Place], most: usize) -> Vec<Place> {
+fn largest(mut found: Vec<(StepPlace, f64)>, known: &[StepPlace], most: usize) -> Vec<StepPlace> {
     found.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let mut places: Vec<Place> = Vec::new();
+    let mut places: Vec<StepPlace> = Vec::new();
     for (place, _) in found {
-        let near = |other: &Place| other.session == place.session && other.row.abs_diff(place.row) < WINDOW / 2;
+        let near = |other: &StepPlace| other.session == place.session && other.row.abs_diff(place.row) < WINDOW / 2;
         if !places.iter().chain(known).any(near) {
             places.push(place);
             if places.len() == most {
@@ -619,7 +602,8 @@ mod tests {
 
     /// What is left of steps in some rows.
     fn left(steps: &[(usize, f64)]) -> Vec<f64> {
-        let step = |(row, size): &(usize, f64)| (Place { session: 0, row: *row, stays: Stays::ForGood }, *size, 0.1);
+        let step =
+            |(row, size): &(usize, f64)| (StepPlace { session: 0, row: *row, stays: Stays::ForGood }, *size, 0.1);
         lasting(steps.iter().map(step).collect()).into_iter().map(|(_, size, _)| size).collect()
     }
 
@@ -700,7 +684,7 @@ mod tests {
         for slip_arcsec in [400.0, 3000.0] {
             let sessions = flanks_that_friction_holds(slip_arcsec);
             let change = (1..2000).find(|row| sessions[1].torque_n_m.as_ref().unwrap()[*row] > 0.9).unwrap();
-            let at = |session: usize, row: usize| Place { session, row, stays: Stays::ToTheEnd };
+            let at = |session: usize, row: usize| StepPlace { session, row, stays: Stays::ToTheEnd };
             let gear = Gear::of_ratio(100.0);
             let seen = Seen::of(&sessions, &gear);
             let steps = [(at(0, 700), slip_arcsec * ARCSEC, ARCSEC), (at(1, change), 80.0 * ARCSEC, ARCSEC)];
@@ -737,7 +721,7 @@ mod tests {
         error[200..].iter_mut().for_each(|e| *e += step);
         error[400..].iter_mut().for_each(|e| *e -= step);
         let settled = vec![vec![true; 900]];
-        let place = Place { session: 0, row: 600, stays: Stays::ForGood };
+        let place = StepPlace { session: 0, row: 600, stays: Stays::ForGood };
         let gear = Gear::of_ratio(100.0);
         let elsewhere = |error: &[f64]| {
             let sessions = [session(error.to_vec(), vec![0.0; 900])];

@@ -4,13 +4,12 @@
 //! a column begins anew. A torque or a temperature that cannot be in the unit given is in another one, but its size
 //! does not say in which: it is left out, with the units that it may have and how to say them.
 
-use super::{Findings, span};
+use super::{Findings, LineFit, extent};
 use crate::measurement::columns::{MappedColumn, Quantity, Reading, Unit};
-use crate::measurement::fault::{Fault, FaultName, Treatment};
+use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
 use crate::measurement::log::{FEWEST_ROWS, Log};
 use crate::measurement::refusal::Refusal;
-use crate::measurement::unit::Family;
 use flexspline_base::robust::{least_and_most, median_of, quantile_of, sampled};
 
 /// The output must have turned by so much, by the generator or by itself, before the ratio is judged, rad. *Source*:
@@ -52,36 +51,47 @@ pub(in crate::measurement) fn check(
 /// Converts both angles.
 pub(in crate::measurement) fn both_in_degrees(log: &mut Log, scale: f64, findings: &mut Findings) {
     for channel in [Quantity::Generator, Quantity::Output, Quantity::Error] {
-        log.get_mut(channel).into_iter().flatten().for_each(|angle| *angle *= scale);
+        rescale(log, channel, scale);
     }
-    let mut fault = span(log, FaultName::UnitMismatch, 0, log.len() - 1);
-    fault.treatment = Treatment::Repaired;
-    fault.what = "generator and output are both in degrees: so the nominal model explains the error to the noise, and \
-                  not in radians; they were converted"
-        .to_owned();
-    findings.faults.push(fault);
+    let what = "generator and output are both in degrees: so the nominal model explains the error to the noise, and \
+                not in radians; they were converted";
+    mismatch(log, None, Treatment::Repaired, what.to_owned(), findings);
 }
 
-fn name(columns: &[MappedColumn], quantity: Quantity) -> &str {
-    columns.iter().find(|column| column.quantity == quantity).map_or(quantity.name(), |column| &column.name)
+/// Multiplies a column, where there is one.
+fn rescale(log: &mut Log, channel: Quantity, scale: f64) {
+    log.get_mut(channel).into_iter().flatten().for_each(|value| *value *= scale);
 }
 
-fn unit(columns: &[MappedColumn], quantity: Quantity) -> Unit {
-    columns.iter().find(|column| column.quantity == quantity).map_or(quantity.default_column().1, |column| column.unit)
+/// Reports a unit, a sign or a column that was taken for another.
+fn mismatch(log: &Log, channel: Option<Quantity>, treatment: Treatment, what: String, findings: &mut Findings) {
+    findings.add(log.fault(FaultName::UnitMismatch, 0..log.len()), channel, treatment, |_| what);
 }
 
-/// Units that have no gain to be said, in which a value of `unit` lies within `allowed`, with the value there.
-fn may_be(value: f64, unit: Unit, family: Family, allowed: impl Fn(f64) -> bool) -> Vec<(Unit, f64)> {
+/// The name of a column and the unit given.
+fn column(columns: &[MappedColumn], quantity: Quantity) -> (&str, Unit) {
+    let column = columns.iter().find(|column| column.quantity == quantity);
+    column.map_or((quantity.name(), quantity.default_column().1), |column| (&column.name, column.unit))
+}
+
+/// Units that have no gain to be said, in which a value in the unit of `column` lies within `allowed`, with the value
+/// there; and how to say them.
+fn may_be(
+    value: f64,
+    quantity: Quantity,
+    (column, unit): (&str, Unit),
+    inside: &str,
+    allowed: impl Fn(f64) -> bool,
+) -> Option<String> {
     let number = (value - unit.zero()) / unit.factor();
-    let plain = family.units().filter(|other| !matches!(other, Unit::Ampere | Unit::Milliampere | Unit::Volt));
-    plain.map(|other| (other, Reading::of(other).value(number))).filter(|(_, value)| allowed(*value)).collect()
-}
-
-/// How to say a unit that a column may have.
-fn say_it(quantity: Quantity, column: &str, may_be: &[(Unit, f64)], inside: &str) -> String {
+    let plain =
+        quantity.family().units().filter(|other| !matches!(other, Unit::Ampere | Unit::Milliampere | Unit::Volt));
+    let may_be: Vec<(Unit, f64)> =
+        plain.map(|other| (other, Reading::of(other).value(number))).filter(|(_, value)| allowed(*value)).collect();
+    let (first, _) = may_be.first()?;
     let read: Vec<String> = may_be.iter().map(|(unit, value)| format!("{unit} ({value:.4} {inside})")).collect();
-    let first = may_be.first().map_or("UNIT", |(unit, _)| unit.name());
-    format!("its size does not say in which; it may be in {}: --columns {quantity}={column}:{first}", read.join(" or "))
+    let read = read.join(" or ");
+    Some(format!("; its size does not say in which; it may be in {read}: --columns {quantity}={column}:{first}"))
 }
 
 /// A torque beyond what a drive bears is in another unit, and is not used.
@@ -93,15 +103,13 @@ fn torque(log: &mut Log, columns: &[MappedColumn], gear: &Gear, findings: &mut F
     if size <= limit {
         return Ok(());
     }
-    let units = may_be(size, unit(columns, Quantity::Torque), Family::Torque, |torque| torque <= limit);
-    if units.is_empty() {
-        return Err(Refusal::Torque { size, limit });
-    }
-    let say_it = say_it(Quantity::Torque, name(columns, Quantity::Torque), &units, "N.m");
+    let units = may_be(size, Quantity::Torque, column(columns, Quantity::Torque), "N.m", |torque| torque <= limit);
+    let say_it = units.ok_or(Refusal::Torque { size, limit })?;
     let what = format!(
-        "torque of {size:.0} N.m, where {limit:.0} N.m is the most: it is in another unit, and is not used; {say_it}"
+        "torque of {size:.0} N.m, where {limit:.0} N.m is the most: it is in another unit, and is not used{say_it}"
     );
-    leave_out(log, Quantity::Torque, what, findings);
+    log.take(Quantity::Torque);
+    mismatch(log, Some(Quantity::Torque), Treatment::Masked, what, findings);
     Ok(())
 }
 
@@ -114,22 +122,11 @@ fn temperature(log: &mut Log, columns: &[MappedColumn], findings: &mut Findings)
     if exists(median) {
         return;
     }
-    let units = may_be(median, unit(columns, Quantity::Temperature), Family::Temperature, exists);
-    let say_it = if units.is_empty() {
-        String::new()
-    } else {
-        format!("; {}", say_it(Quantity::Temperature, name(columns, Quantity::Temperature), &units, "C"))
-    };
+    let units = may_be(median, Quantity::Temperature, column(columns, Quantity::Temperature), "C", exists);
+    let say_it = units.unwrap_or_default();
     let what = format!("a temperature of {median:.1} degrees C is not plausible: it is not used{say_it}");
-    leave_out(log, Quantity::Temperature, what, findings);
-}
-
-/// Leaves out a column that is in another unit than the one given.
-fn leave_out(log: &mut Log, quantity: Quantity, what: String, findings: &mut Findings) {
-    log.take(quantity);
-    let mut fault = span(log, FaultName::UnitMismatch, 0, log.len() - 1);
-    (fault.channel, fault.treatment, fault.what) = (Some(quantity), Treatment::Masked, what);
-    findings.faults.push(fault);
+    log.take(Quantity::Temperature);
+    mismatch(log, Some(Quantity::Temperature), Treatment::Masked, what, findings);
 }
 
 /// Turns of the output for each of the generator, and how far the output went.
@@ -138,23 +135,17 @@ fn leave_out(log: &mut Log, quantity: Quantity, what: String, findings: &mut Fin
 /// sessions stands in where a jump has moved one of the two.
 fn slope(log: &Log) -> Option<(f64, f64, f64)> {
     let (generator, output) = (log.get(Quantity::Generator)?, log.get(Quantity::Output)?);
-    let bounds: Vec<usize> = (0..=log.len()).filter(|row| *row == log.len() || !log.continues(*row)).collect();
     let mut whole: Option<(f64, f64)> = None;
     let mut pieces: Vec<(f64, f64)> = Vec::new();
-    let extent = |from: usize, to: usize| {
-        let by = |a: &usize, b: &usize| generator[*a].total_cmp(&generator[*b]);
-        let (low, high) = ((from..to).min_by(by)?, (from..to).max_by(by)?);
-        Some((generator[high] - generator[low], output[high] - output[low]))
-    };
-    for bound in bounds.windows(2) {
-        let (from, to) = (bound[0], bound[1]);
-        if let Some(found) = extent(from, to)
+    for rows in log.sessions() {
+        if let Some(found) = extent(generator, output, rows.clone())
             && whole.is_none_or(|(psi, _)| found.0 > psi)
         {
             whole = Some(found);
         }
-        let size = ((to - from) / 32).max(2);
-        pieces.extend((from..to).step_by(size).filter_map(|start| extent(start, (start + size).min(to))));
+        let size = (rows.len() / 32).max(2);
+        let ends = |start: usize| start..(start + size).min(rows.end);
+        pieces.extend(rows.clone().step_by(size).filter_map(|start| extent(generator, output, ends(start))));
     }
     let (psi, delta) = whole.filter(|(psi, _)| *psi > 0.0)?;
     // An output that stands still says nothing of the ratio, unless it always does.
@@ -196,18 +187,15 @@ fn ratio(log: &mut Log, columns: &[MappedColumn], gear: &Gear, findings: &mut Fi
         findings.notes.push("too little motion to judge units by the ratio".to_owned());
         return Ok(());
     }
-    let (generator, output) = (name(columns, Quantity::Generator), name(columns, Quantity::Output));
+    let [(generator, _), (output, _)] = [Quantity::Generator, Quantity::Output].map(|channel| column(columns, channel));
     let seen = format!(
         "{output} moves by {slope:.6} of {generator}, where the ratio {} asks for {:.6}",
         gear.ratio,
         1.0 / gear.ratio
     );
-    let near = |a: f64| (found / a - 1.0).abs() <= SAME;
-    let mut fault = span(log, FaultName::UnitMismatch, 0, log.len() - 1);
-    fault.treatment = Treatment::Repaired;
     let exchanged = found / gear.ratio.powi(2);
     if (exchanged - 1.0).abs() <= 2.5 * SAME {
-        exchange(log, fault, &seen, findings);
+        exchange(log, &seen, findings);
         return Ok(());
     }
     if let Some(other) = gear.other_wheel_ratio
@@ -217,38 +205,33 @@ fn ratio(log: &mut Log, columns: &[MappedColumn], gear: &Gear, findings: &mut Fi
         return Err(Refusal::OtherWheel { seen, ratio: other });
     }
     if (found + 1.0).abs() <= 0.1 {
-        fault.channel = Some(Quantity::Output);
-        fault.what = format!("{seen}: the output counts the other way, and was turned round");
-        findings.faults.push(fault);
-        if let Some(output) = log.get_mut(Quantity::Output) {
-            output.iter_mut().for_each(|angle| *angle = -*angle);
-        }
+        let what = format!("{seen}: the output counts the other way, and was turned round");
+        mismatch(log, Some(Quantity::Output), Treatment::Repaired, what, findings);
+        rescale(log, Quantity::Output, -1.0);
         return Ok(());
     }
     // One column in a unit other than the one given: proved by the ratio if one reading alone gives it.
     let mut fits: Vec<(Quantity, Unit, f64)> = Vec::new();
     for channel in [Quantity::Generator, Quantity::Output] {
-        let given = unit(columns, channel);
+        let (_, given) = column(columns, channel);
         for candidate in Unit::ANGLES.into_iter().filter(|candidate| *candidate != given) {
             let scale = candidate.factor() / given.factor();
-            if near(if channel == Quantity::Generator { scale } else { scale.recip() }) {
+            let ratio = if channel == Quantity::Generator { scale } else { scale.recip() };
+            if (found / ratio - 1.0).abs() <= SAME {
                 fits.push((channel, candidate, scale));
             }
         }
     }
     match fits[..] {
         [(channel, candidate, scale)] => {
-            fault.channel = Some(channel);
-            let (column, given) = (name(columns, channel), unit(columns, channel));
-            fault.what = format!("{seen}: {column} is in {candidate}, not in {given}, and was converted");
-            findings.faults.push(fault);
-            if let Some(values) = log.get_mut(channel) {
-                values.iter_mut().for_each(|angle| *angle *= scale);
-            }
+            let (column, given) = column(columns, channel);
+            let what = format!("{seen}: {column} is in {candidate}, not in {given}, and was converted");
+            mismatch(log, Some(channel), Treatment::Repaired, what, findings);
+            rescale(log, channel, scale);
             return Ok(());
         }
         [_, _, ..] => {
-            let say = fits.iter().map(|(channel, unit, _)| format!("{channel}={}:{unit}", name(columns, *channel)));
+            let say = fits.iter().map(|(channel, unit, _)| format!("{channel}={}:{unit}", column(columns, *channel).0));
             return Err(Refusal::OneOfTwoUnits { seen, readings: say.collect() });
         }
         [] => {}
@@ -256,7 +239,7 @@ fn ratio(log: &mut Log, columns: &[MappedColumn], gear: &Gear, findings: &mut Fi
     // Clearance and wind-up of a small motion change the ratio by more than units are apart; none of them is what was
     // found.
     if (RATIO_ERROR[0]..=RATIO_ERROR[1]).contains(&exchanged) {
-        exchange(log, fault, &seen, findings);
+        exchange(log, &seen, findings);
         return Ok(());
     }
     Err(if slope == 0.0 || (found.abs() < 0.05 && travel < ENOUGH_MOTION_RAD) {
@@ -268,9 +251,9 @@ fn ratio(log: &mut Log, columns: &[MappedColumn], gear: &Gear, findings: &mut Fi
 }
 
 /// Puts generator and output in each other's place.
-fn exchange(log: &mut Log, mut fault: Fault, seen: &str, findings: &mut Findings) {
-    fault.what = format!("{seen}: the two columns are exchanged, and were put right");
-    findings.faults.push(fault);
+fn exchange(log: &mut Log, seen: &str, findings: &mut Findings) {
+    let what = format!("{seen}: the two columns are exchanged, and were put right");
+    mismatch(log, None, Treatment::Repaired, what, findings);
     if let (Some(a), Some(b)) = (log.take(Quantity::Generator), log.take(Quantity::Output)) {
         log.put(Quantity::Generator, b);
         log.put(Quantity::Output, a);
@@ -287,19 +270,11 @@ fn error_size(log: &Log, columns: &[MappedColumn]) -> Result<(), Refusal> {
         return Ok(());
     }
     // Freed of a straight line in the generator angle, which a wrong ratio gives.
-    let pairs: Vec<(f64, f64)> = generator.iter().copied().zip(error.iter().copied()).collect();
-    let step = pairs.len().div_ceil(20_000);
-    let some: Vec<(f64, f64)> = pairs.into_iter().step_by(step).collect();
-    let n = some.len() as f64;
-    let mean = some.iter().fold((0.0, 0.0), |m, p| (m.0 + p.0 / n, m.1 + p.1 / n));
-    let (xx, xy) = some.iter().fold((0.0, 0.0), |s, p| {
-        let (x, y) = (p.0 - mean.0, p.1 - mean.1);
-        (s.0 + x * x, s.1 + x * y)
-    });
-    let slope = if xx > 0.0 { xy / xx } else { 0.0 };
-    let mut left: Vec<f64> = some.iter().map(|p| (p.1 - mean.1 - slope * (p.0 - mean.0)).abs()).collect();
+    let step = error.len().div_ceil(20_000);
+    let some: Vec<(f64, f64)> = generator.iter().copied().zip(error.iter().copied()).step_by(step).collect();
+    let mut left: Vec<f64> = LineFit::of(&some).residual.iter().map(|left| left.abs()).collect();
     let spread = quantile_of(&mut left, 0.75);
-    let (column, given) = (name(columns, Quantity::Error), unit(columns, Quantity::Error));
+    let (column, given) = column(columns, Quantity::Error);
     if spread > SPREADS_RAD[0] || (spread > 0.0 && spread < SPREADS_RAD[1]) {
         return Err(Refusal::SizeOfErrors { column: column.to_owned(), found: spread / given.factor(), unit: given });
     }

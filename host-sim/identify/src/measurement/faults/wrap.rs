@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{Findings, span};
+use super::Findings;
 use crate::measurement::columns::{MappedColumn, Quantity, Unit};
 use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::log::Log;
@@ -44,20 +44,19 @@ pub(in crate::measurement) fn unwrap(log: &mut Log, columns: &[MappedColumn], ra
         let Some(unit) = wrapped_at(values, column.unit, travel, log) else { continue };
         let scale = unit.factor() / column.unit.factor();
         if unit != column.unit {
-            let mut fault = span(log, FaultName::UnitMismatch, 0, log.len() - 1);
-            (fault.channel, fault.treatment) = (Some(channel), Treatment::Repaired);
-            fault.what = format!(
-                "{} begins anew after {:.6} {}, one turn in {unit}: it is read in {unit}",
-                column.name,
-                TAU / unit.factor(),
-                column.unit
-            );
-            findings.faults.push(fault);
+            let all = log.fault(FaultName::UnitMismatch, 0..log.len());
+            findings.add(all, channel, Treatment::Repaired, |_| {
+                let after = TAU / unit.factor();
+                format!(
+                    "{} begins anew after {after:.6} {}, one turn in {unit}: it is read in {unit}",
+                    column.name, column.unit
+                )
+            });
         }
         let Some(mut values) = log.take(channel) else { continue };
         values.iter_mut().for_each(|value| *value *= scale);
-        let helped = channel == Quantity::Generator && log.get(Quantity::Output).is_some();
-        let output = if helped { log.get(Quantity::Output) } else { None };
+        let output = log.get(Quantity::Output).filter(|_| channel == Quantity::Generator);
+        let helped = output.is_some();
         let ambiguous = along(&mut values, log, ratio, output);
         findings.notes.push(format!("{} is within one turn: it was made continuous", column.name));
         if ambiguous {
@@ -89,10 +88,8 @@ fn wrapped_at(values: &[f64], unit: Unit, travel_rad: f64, log: &Log) -> Option<
     if stays_within(range, turn_of(unit), COVERED) && (again(TAU) > 0 || travel_rad > 1.5 * TAU) {
         return Some(unit);
     }
-    let others = Unit::ANGLES.into_iter().filter(|candidate| *candidate != unit);
-    others
-        .into_iter()
-        .find(|other| stays_within(range, turn_of(*other), COVERED_BY_ANOTHER) && again(turn_of(*other)) >= OFTEN)
+    let mut others = Unit::ANGLES.into_iter().filter(|candidate| *candidate != unit);
+    others.find(|other| stays_within(range, turn_of(*other), COVERED_BY_ANOTHER) && again(turn_of(*other)) >= OFTEN)
 }
 
 /// Makes `values` continuous. `output`, if given, is continuous and turns `ratio` times slower; it counts turns where

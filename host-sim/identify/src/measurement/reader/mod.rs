@@ -367,12 +367,6 @@ impl Columns {
         Columns { cells, lines, short, wide, notes: Vec::new() }
     }
 
-    /// Takes cells that are no numbers for missing ones, and rows of another width for sound ones.
-    pub(super) fn forget_what_is_odd(&mut self) {
-        (self.short, self.wide) = (Vec::new(), Vec::new());
-        self.cells.iter_mut().for_each(|cells| cells.words = CellCount::default());
-    }
-
     /// Leaves out the last row if it breaks off before the field at `place`; its line.
     pub(super) fn without_broken_end(&mut self, place: usize) -> Option<u64> {
         let last = self.short.last().filter(|(line, fields)| *fields <= place && self.lines.last() == Some(line));

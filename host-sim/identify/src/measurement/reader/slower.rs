@@ -1,6 +1,7 @@
 //! Channels that were recorded more slowly than the angles: one value in several rows, nothing between.
 
 use super::super::columns::Quantity;
+use super::super::faults::straight;
 use super::super::log::Log;
 
 /// Share of the distances between values that are the usual one (one row more or less), at least: a slower clock, not
@@ -18,12 +19,8 @@ pub fn fill(log: &mut Log, notes: &mut Vec<String>) {
         for pair in there.windows(2) {
             let (a, b) = (pair[0], pair[1]);
             // Beyond two of its periods values are missing, as for any channel.
-            if b - a > 2 * every {
-                continue;
-            }
-            for row in a + 1..b {
-                let part = (row - a) as f64 / (b - a) as f64;
-                values[row] = values[a] + part * (values[b] - values[a]);
+            if b - a <= 2 * every {
+                straight(values, a, b);
             }
         }
         let (first, last) = (there[0], there[there.len() - 1]);
