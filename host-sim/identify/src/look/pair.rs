@@ -30,43 +30,36 @@ struct Pair {
     rank: PairRank,
 }
 
-/// What speaks for a pair, the first that differs decides.
+/// The reasons for a pair: of two pairs the first reason that differs decides.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct PairRank {
-    /// Neither is a command.
-    measured: bool,
-    /// What names say: 2 for a shaft, 1 for an angle.
-    names: u8,
-    /// 2 if both are of one joint, 1 if that is open, 0 if their numbers differ.
-    joint: u8,
-    /// The generator turns on.
-    turns_on: bool,
-    /// Neither is computed from the other.
-    two_sensors: bool,
-    same_unit: bool,
+    /// In the order of [`WHY`], but for the last.
+    reasons: [u8; WHY.len() - 1],
+    /// How straight a line they make.
     straight: f64,
 }
 
+/// Why a pair goes before another: neither is a command; names say a shaft (2) or an angle (1) of each; both are of one
+/// joint (2), that is open (1), or their numbers differ; the generator turns on; neither is computed from the other.
+const WHY: [&str; 7] = [
+    "they are measured, no command",
+    "their names say so",
+    "they are of one joint by their numbers",
+    "they turn on, and do not swing about zero",
+    "the others are one column times a number to the last digit, as what is computed is",
+    "they have one unit",
+    "they make the straighter line, which need not say much",
+];
+
 impl PairRank {
     fn cmp(&self, other: &PairRank) -> Ordering {
-        let key =
-            |rank: &PairRank| (rank.measured, rank.names, rank.joint, rank.turns_on, rank.two_sensors, rank.same_unit);
-        key(self).cmp(&key(other)).then(self.straight.total_cmp(&other.straight))
+        self.reasons.cmp(&other.reasons).then(self.straight.total_cmp(&other.straight))
     }
 
     /// Why this one goes before another.
     fn before(&self, other: &PairRank) -> &'static str {
-        match () {
-            () if self.measured != other.measured => "they are measured, no command",
-            () if self.names != other.names => "their names say so",
-            () if self.joint != other.joint => "they are of one joint by their numbers",
-            () if self.turns_on != other.turns_on => "they turn on, and do not swing about zero",
-            () if self.two_sensors != other.two_sensors => {
-                "the others are one column times a number to the last digit, as what is computed is"
-            }
-            () if self.same_unit != other.same_unit => "they have one unit",
-            () => "they make the straighter line, which need not say much",
-        }
+        let differs = self.reasons.iter().zip(&other.reasons).position(|(a, b)| a != b);
+        WHY[differs.unwrap_or(WHY.len() - 1)]
     }
 }
 
@@ -99,7 +92,7 @@ pub(super) fn pair(guesses: &mut [Guess], names: &[String], notes: &mut Vec<Stri
     }
     let counts = rivals.len();
     for other in others {
-        let level = (other.rank.measured, other.rank.names) == (best.rank.measured, best.rank.names);
+        let level = other.rank.reasons[..2] == best.rank.reasons[..2];
         let same = |a: usize, b: usize| a == b || one_shaft(&guesses[a], &guesses[b]);
         // What shows the same two shafts once more is no rival.
         if level && !(same(other.generator, g) && same(other.output, o)) {
@@ -191,12 +184,14 @@ fn pairs(guesses: &[Guess]) -> Vec<Pair> {
             }
             let named = |guess: &Guess| 2 * u8::from(shafts(guess)) + u8::from(guess.said.angle);
             let rank = PairRank {
-                measured: g.role != Role::Command,
-                names: named(g) + named(o),
-                joint: joints.map_or(1, |_| 2 * u8::from(!two_joints)),
-                turns_on: turns_on(g),
-                two_sensors: !is_computed(g, o, &line),
-                same_unit: g.unit == o.unit,
+                reasons: [
+                    u8::from(g.role != Role::Command),
+                    named(g) + named(o),
+                    joints.map_or(1, |_| 2 * u8::from(!two_joints)),
+                    u8::from(turns_on(g)),
+                    u8::from(!is_computed(g, o, &line)),
+                    u8::from(g.unit == o.unit),
+                ],
                 straight: -line.left,
             };
             pairs.push(Pair { generator, output, units, rank });
