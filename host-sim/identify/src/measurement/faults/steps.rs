@@ -67,7 +67,7 @@ const LOAD_NOISE: f64 = 8.0;
 const LOAD_PACE: f64 = 6.0;
 /// A step is separated from what it might be instead if it leaves less than this share of its misfit. *Guess*: with
 /// some thousand rows one per cent would do, were they independent.
-const TELLS: f64 = 0.95;
+const CLEARLY_LESS: f64 = 0.95;
 /// A step that leaves less than this share of the misfit of a change of flank in its place is none. *Guess*.
 const DECIDES: f64 = 0.05;
 /// Medians of six rows before and after differ by no more than this many standard deviations of the white noise.
@@ -197,7 +197,7 @@ struct FoundSteps {
     /// Those that may be a change of flank.
     doubtful: Vec<Step>,
     stays: Stays,
-    /// What is left with them: sum of squared, weighted residuals.
+    /// Sum of squared, weighted residuals.
     misfit: f64,
     /// Whether any row was suspected.
     suspected: bool,
@@ -211,15 +211,15 @@ fn likelier(sessions: &[Session], gear: &Gear) -> Option<FoundSteps> {
         return Some(for_good);
     }
     let to_the_end = seen.find(Stays::ToTheEnd);
-    let mut better = to_the_end.filter(|found| found.misfit < TELLS * for_good.misfit);
+    let mut better = to_the_end.filter(|found| found.misfit < CLEARLY_LESS * for_good.misfit);
     if let Some(found) = &mut better {
         let steps = [found.sure.as_slice(), &found.doubtful].concat();
-        let (told, doubtful): (Vec<Step>, Vec<Step>) =
+        let (clear, doubtful): (Vec<Step>, Vec<Step>) =
             found.doubtful.iter().copied().partition(|(place, ..)| seen.beyond_a_change_of_flank(&steps, *place));
         // A flank that friction lets go stays to the end of a session, too, where the load is small.
-        let (loose, sure): (Vec<Step>, Vec<Step>) = (found.sure.iter().copied())
-            .partition(|(place, ..)| may_let_go(&sessions[place.session], place.row, seen.largest));
-        (found.sure, found.doubtful) = ([sure, told].concat(), [doubtful, loose].concat());
+        let (loose, sure): (Vec<Step>, Vec<Step>) =
+            (found.sure.iter().copied()).partition(|(place, ..)| seen.may_let_go(*place));
+        (found.sure, found.doubtful) = ([sure, clear].concat(), [doubtful, loose].concat());
         found.sure.sort_by_key(|(place, ..)| (place.session, place.row));
     }
     Some(better.filter(|found| !found.sure.is_empty()).unwrap_or(for_good))
@@ -236,11 +236,8 @@ struct Seen<'a> {
     settled: Vec<Vec<bool>>,
     /// Largest torque, N·m.
     largest: f64,
-}
-
-/// Whether the load at a row holds no flank, so that friction may have let go of one.
-fn may_let_go(session: &Session, row: usize, largest: f64) -> bool {
-    session.torque_n_m.as_ref().is_some_and(|torque| torque[row].abs() < least_that_holds(torque, largest))
+    /// The flank, ±1, that the load of each row holds, 0 where it holds none, by session.
+    held: Vec<Option<Vec<f64>>>,
 }
 
 impl<'a> Seen<'a> {
@@ -248,7 +245,14 @@ impl<'a> Seen<'a> {
         let noise = white_noise(sessions.iter().map(|session| session.error_rad.as_slice()));
         let state = StateModel::new(sessions, gear);
         let settled = state.settled();
-        Seen { sessions, gear, noise, state, settled, largest: largest_torque(sessions) }
+        let largest = largest_torque(sessions);
+        let held = sessions.iter().map(|session| flanks_held(session, largest)).collect();
+        Seen { sessions, gear, noise, state, settled, largest, held }
+    }
+
+    /// Whether the load at a place holds no flank, so that friction may have let go of one.
+    fn may_let_go(&self, place: StepPlace) -> bool {
+        self.held[place.session].as_ref().is_some_and(|held| held[place.row] == 0.0)
     }
 
     /// The fit of `columns` in the place of a step, together with the other steps.
@@ -268,11 +272,19 @@ impl<'a> Seen<'a> {
     /// Whether a step leaves far less than a change of flank would that comes in its place, whatever the other steps
     /// are: the model without the step, to which the flank that the load holds is given instead.
     fn beyond_a_change_of_flank(&self, steps: &[Step], place: StepPlace) -> bool {
-        if may_let_go(&self.sessions[place.session], place.row, self.largest) {
+        if self.may_let_go(place) {
             return false;
         }
-        let held_by: Vec<Vec<f64>> = self.sessions.iter().map(|session| held_flanks(session, self.largest)).collect();
-        let flank = |session: usize, row: usize| held_by[session][row];
+        // The last flank that was held; 0 before there was one.
+        let lasting = |held: &Vec<f64>| -> Vec<f64> {
+            let last = |last: &mut f64, held: &f64| {
+                *last = if *held == 0.0 { *last } else { *held };
+                Some(*last)
+            };
+            held.iter().scan(0.0, last).collect()
+        };
+        let held: Vec<Option<Vec<f64>>> = self.held.iter().map(|held| held.as_ref().map(lasting)).collect();
+        let flank = |session: usize, row: usize| held[session].as_ref().map_or(0.0, |held| held[row]);
         let with = |this: Extra| self.beside_others(steps, place, &[this]);
         let (Some(step), Some(flank)) = (with(&column(place)), with(&flank)) else { return false };
         step.misfit < DECIDES * flank.misfit
@@ -405,12 +417,12 @@ impl<'a> Seen<'a> {
             return 0.0;
         }
         // Seen close by, so that a slow change is no step: medians of a few rows.
-        let beside = 6.min(place.row).min(session.len() - place.row);
-        let local = level(&session.error_rad, place.row..place.row + beside)
-            - level(&session.error_rad, place.row - beside..place.row);
-        let near = &session.error_rad[place.row - beside..place.row + beside];
+        let few = 6.min(place.row).min(session.len() - place.row);
+        let local = level(&session.error_rad, place.row..place.row + few)
+            - level(&session.error_rad, place.row - few..place.row);
+        let near = &session.error_rad[place.row - few..place.row + few];
         let mut paces: Vec<f64> = near.windows(2).map(|error| (error[1] - error[0]).abs()).collect();
-        let moves = beside as f64 * median_of(&mut paces);
+        let moves = few as f64 * median_of(&mut paces);
         if (local - size).abs() > AGREES * size.abs() + LOCAL_NOISE * noise + moves {
             return 0.0;
         }
@@ -457,7 +469,7 @@ impl<'a> Seen<'a> {
         if size.abs() > WIDER_THAN_CLEARANCE_RAD {
             return true;
         }
-        if load_turns_over(&sessions[place.session], place.row, self.largest)
+        if self.held[place.session].as_ref().is_some_and(|held| turns_over(held, place.row))
             || !self.lasts_under_load(steps, place, size)
         {
             return false;
@@ -481,7 +493,7 @@ impl<'a> Seen<'a> {
             let in_angle = |s: usize, r: usize| f64::from(u8::from(sessions[s].generator_rad[r] >= here));
             let with = |this: Extra| self.beside_others(steps, place, &[this]);
             let (Some(time), Some(angle)) = (with(&in_time), with(&in_angle)) else { return false };
-            return time.misfit < TELLS * angle.misfit;
+            return time.misfit < CLEARLY_LESS * angle.misfit;
         }
         let session = &sessions[place.session];
         let held = session.torque_n_m.as_ref().is_some_and(|torque| torque[place.row].abs() > HELD * self.largest);
@@ -490,24 +502,11 @@ impl<'a> Seen<'a> {
     }
 }
 
-/// The flank, ±1, that the last load held which was large enough to hold one; 0 before there was one, and without
-/// loads.
-fn held_flanks(session: &Session, largest: f64) -> Vec<f64> {
-    let Some(torque) = session.torque_n_m.as_ref().filter(|_| largest > 0.0) else { return vec![0.0; session.len()] };
-    let held = least_that_holds(torque, largest);
-    let mut flank = 0.0;
-    let of = |torque: &f64| {
-        if torque.abs() >= held {
-            flank = torque.signum();
-        }
-        flank
-    };
-    torque.iter().map(of).collect()
-}
-
-/// The least load that holds a flank, N·m, noise considered.
-fn least_that_holds(torque: &[f64], largest: f64) -> f64 {
-    (HELD * largest).max(LOAD_NOISE * white_noise([torque]))
+/// The flank, ±1, that the load of each row holds, its noise considered; 0 where it holds none. None without loads.
+fn flanks_held(session: &Session, largest: f64) -> Option<Vec<f64>> {
+    let torque = session.torque_n_m.as_ref().filter(|_| largest > 0.0)?;
+    let least = (HELD * largest).max(LOAD_NOISE * white_noise([torque.as_slice()]));
+    Some(torque.iter().map(|torque| if torque.abs() >= least { torque.signum() } else { 0.0 }).collect())
 }
 
 /// The steps without those that come and go by the same amount, which do not last: teeth and clearance that fast motion
@@ -586,21 +585,19 @@ fn others_change_as_much(session: &Session, row: usize, size: f64) -> bool {
     near.filter(|k| *k != row).any(|k| (session.error_rad[k] - session.error_rad[k - 1]).abs() > 0.5 * size.abs())
 }
 
-/// Whether a row lies between a load that holds one flank and one that holds the other: there a flank is changed.
-fn load_turns_over(session: &Session, row: usize, largest: f64) -> bool {
-    let Some(torque) = session.torque_n_m.as_ref().filter(|_| largest > 0.0) else { return false };
-    let held = least_that_holds(torque, largest);
-    let holds = |torque: &&f64| torque.abs() >= held;
-    let before = torque[..row].iter().rev().find(holds);
-    let after = torque[row..].iter().find(holds);
-    may_let_go(session, row, largest) && before.zip(after).is_some_and(|(before, after)| before * after < 0.0)
+/// Whether a row, at which none is held, lies between one at which one flank is held and one of the other flank: there
+/// a flank is changed.
+fn turns_over(held: &[f64], row: usize) -> bool {
+    let is_held = |flank: &&f64| **flank != 0.0;
+    let (before, after) = (held[..row].iter().rev().find(is_held), held[row..].iter().find(is_held));
+    held[row] == 0.0 && before.zip(after).is_some_and(|(before, after)| before * after < 0.0)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// What is left of steps in some rows.
+    /// Sizes of the steps that last, of steps in some rows.
     fn left(steps: &[(usize, f64)]) -> Vec<f64> {
         let step =
             |(row, size): &(usize, f64)| (StepPlace { session: 0, row: *row, stays: Stays::ForGood }, *size, 0.1);
@@ -647,8 +644,8 @@ mod tests {
         }
         let mut findings = Findings::default();
         check(&mut slipped, &Gear::of_ratio(100.0), &mut findings);
-        let told = findings.faults.iter().filter(|fault| fault.name == FaultName::EncoderIndexJump).count();
-        assert_eq!(told, 4, "{:?}", findings.faults);
+        let found = findings.faults.iter().filter(|fault| fault.name == FaultName::EncoderIndexJump).count();
+        assert_eq!(found, 4, "{:?}", findings.faults);
         let pairs = right.iter().zip(&slipped).flat_map(|(a, b)| a.error_rad.iter().zip(&b.error_rad));
         let off = pairs.map(|(a, b)| (a - b).abs() / ARCSEC).fold(0.0, f64::max);
         assert!(off < 5.0, "{off}");
@@ -692,8 +689,8 @@ mod tests {
             assert!(!seen.beyond_a_change_of_flank(&steps, at(1, change)));
             let mut findings = Findings::default();
             check(&mut sessions.clone(), &gear, &mut findings);
-            let told: Vec<u64> = findings.faults.iter().map(|fault| fault.first_line).collect();
-            assert_eq!(told, [700], "{:?} {:?}", findings.faults, findings.notes);
+            let found: Vec<u64> = findings.faults.iter().map(|fault| fault.first_line).collect();
+            assert_eq!(found, [700], "{:?} {:?}", findings.faults, findings.notes);
         }
     }
 
@@ -708,7 +705,9 @@ mod tests {
     fn between_loads_of_either_sign_a_flank_is_changed() {
         let ramp: Vec<f64> = (0..400).map(|k| 0.1 * f64::from(k) - 20.0).collect();
         let there_and_back: Vec<f64> = (0..400).map(|k| 20.0 - (0.2 * f64::from(k) - 40.0).abs()).collect();
-        let turns = |torque: Vec<f64>, row: usize| load_turns_over(&session(vec![0.0; 400], torque), row, 20.0);
+        let turns = |torque: Vec<f64>, row: usize| {
+            turns_over(&flanks_held(&session(vec![0.0; 400], torque), 20.0).unwrap(), row)
+        };
         assert!(turns(ramp.clone(), 210), "1 N·m, from -20 to 20");
         assert!(!turns(ramp, 300), "10 N·m hold the flank");
         assert!(!turns(there_and_back.iter().map(|t| t.abs()).collect(), 100), "never below nothing");
