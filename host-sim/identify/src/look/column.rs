@@ -9,7 +9,7 @@ use crate::measurement::{Anew, Unit, begins_anew, continued, least_and_most, med
 const LOOKED_AT: usize = 50_000;
 
 /// Properties of a column.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Facts {
     /// Numbers, without what is missing.
     pub finite: usize,

@@ -1,4 +1,4 @@
-//! What the rows of a log go through: turns, loads, temperatures, speeds, directions.
+//! The coverage of a log: its turns, loads, temperatures, speeds and directions.
 
 use std::f64::consts::TAU;
 
@@ -9,7 +9,7 @@ use crate::measurement::{Quantity, ReadRows, least_and_most, quantile_of, sample
 /// Parts of a turn of the output that are counted.
 const PARTS: usize = 36;
 
-/// What the rows go through.
+/// The turns, loads, temperatures and speeds of the rows.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Coverage {
     /// Turns of the generator, from its least to its largest angle.
@@ -30,7 +30,7 @@ pub struct Coverage {
     pub speed_rpm: Option<[f64; 2]>,
 }
 
-/// What the rows go through, if they have a generator angle.
+/// The coverage of the rows, if they have a generator angle.
 pub(super) fn of(read: &[ReadRows]) -> Option<Coverage> {
     let column = |quantity: Quantity| -> Vec<f64> {
         read.iter().filter_map(|rows| rows.log.get(quantity)).flatten().copied().collect()
@@ -41,36 +41,34 @@ pub(super) fn of(read: &[ReadRows]) -> Option<Coverage> {
     }
     let range = |values: &[f64]| least_and_most(values.iter().copied().filter(|value| value.is_finite()));
     let turns = |values: &[f64]| ((range(values).1 - range(values).0) / TAU).max(0.0);
-    let mut moved: Vec<(usize, f64)> = Vec::new();
+    // How far the generator moves into a row, and where the output is then.
+    let mut moved: Vec<(f64, Option<f64>)> = Vec::new();
     let mut speeds = Vec::new();
-    let mut before = 0;
-    for rows in read {
-        let (Some(generator), time) = (rows.log.get(Quantity::Generator), rows.log.get(Quantity::Time)) else {
-            continue;
-        };
-        for row in (1..generator.len()).filter(|row| rows.log.continues(*row)) {
+    for log in read.iter().map(|rows| &rows.log) {
+        let (generator, output) = (log.get(Quantity::Generator).unwrap_or_default(), log.get(Quantity::Output));
+        let time = log.get(Quantity::Time);
+        for row in (1..generator.len()).filter(|row| log.continues(*row)) {
             let step = generator[row] - generator[row - 1];
-            moved.push((before + row, step));
+            moved.push((step, output.map(|output| output[row])));
             let passed = time.map_or(0.0, |time| time[row] - time[row - 1]);
             if passed > 0.0 {
                 speeds.push(step.abs() / passed * 60.0 / TAU);
             }
         }
-        before += generator.len();
     }
     // What stands moves by less than a hundredth of what moves usually.
-    let mut steps: Vec<f64> = sampled(&moved.iter().map(|(_, step)| step.abs()).collect::<Vec<_>>());
+    let mut steps: Vec<f64> = sampled(&moved.iter().map(|(step, _)| step.abs()).collect::<Vec<_>>());
     let still = 0.01 * quantile_of(&mut steps, 0.9);
-    let (mut forward, mut backward) = (vec![0; PARTS], vec![0; PARTS]);
+    let mut rows_of_parts = [vec![0; PARTS], vec![0; PARTS]];
     let mut directions = [0.0; 3];
-    for (row, step) in &moved {
+    for (step, output) in &moved {
         let way = usize::from(*step < -still) + 2 * usize::from(step.abs() <= still);
         directions[way] += 1.0 / moved.len() as f64;
-        if let Some(output) = output.get(*row).filter(|_| way < 2) {
-            let part = ((output / TAU).rem_euclid(1.0) * PARTS as f64) as usize % PARTS;
-            if way == 0 { forward[part] += 1 } else { backward[part] += 1 }
+        if let (Some(output), Some(rows)) = (output, rows_of_parts.get_mut(way)) {
+            rows[((output / TAU).rem_euclid(1.0) * PARTS as f64) as usize % PARTS] += 1;
         }
     }
+    let [rows_forward, rows_backward] = rows_of_parts;
     let limits = |quantity: Quantity| {
         let values = column(quantity);
         (!values.is_empty()).then(|| range(&values)).map(|(least, most)| [least, most])
@@ -80,8 +78,8 @@ pub(super) fn of(read: &[ReadRows]) -> Option<Coverage> {
     Some(Coverage {
         generator_turns: turns(&generator),
         output_turns: turns(&output),
-        rows_forward: forward,
-        rows_backward: backward,
+        rows_forward,
+        rows_backward,
         directions,
         torque_n_m: limits(Quantity::Torque),
         temperature_c: limits(Quantity::Temperature),

@@ -1,5 +1,5 @@
-//! What is in log files of a gear on a bench: separators, columns with role and unit, ratio, counts of a turn, sign of
-//! a torque, time, coverage; and the mapping to read them with.
+//! The contents of log files of a gear on a bench: separators, columns with role and unit, ratio, counts of a turn,
+//! sign of a torque, time, coverage; and the mapping to read them with.
 //!
 //! Names, units and numbers are asked in this order. Whatever is guessed says why, and how sure it is; nothing is used
 //! silently: the mapping is proposed, and the reader takes it only when it is given.
@@ -31,8 +31,8 @@ use words::Said;
 /// Share of the error that a column without a name must explain to be offered as the torque: a guess.
 const NAMELESS: f64 = 0.3;
 
-/// What a column may hold, for all that can be decided.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+/// The contents of a column, as far as they can be decided.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
     /// Time.
@@ -53,9 +53,10 @@ pub enum Role {
     Orientation,
     /// A speed: not needed.
     Speed,
-    /// What was wanted, not measured.
+    /// A value that was commanded, not measured.
     Command,
     /// Not known.
+    #[default]
     Unknown,
 }
 
@@ -148,11 +149,11 @@ pub struct Looked {
     pub time: TimeKind,
     /// Median of the time from row to row, s, if a time was found.
     pub period_s: Option<f64>,
-    /// What the rows go through.
+    /// The turns, loads, temperatures and speeds of the rows.
     pub coverage: Option<Coverage>,
-    /// What to pass on with `--columns`; `None` if generator and output, or an error, cannot be decided.
+    /// The value for `--columns`; `None` if generator and output, or an error, cannot be decided.
     pub columns_option: Option<String>,
-    /// What has to be decided by whoever knows the bench.
+    /// Questions to whoever knows the bench.
     pub notes: Vec<String>,
 }
 
@@ -165,14 +166,14 @@ pub struct Rival {
     pub output: String,
     /// Turns of the generator for one of the output, signed.
     pub ratio: f64,
-    /// What to pass on with `--columns` if these are meant; `None` where a unit is open.
+    /// The value for `--columns` if these are meant; `None` where a unit is open.
     pub columns_option: Option<String>,
     /// Why the pair proposed goes before it.
     pub why: String,
 }
 
 /// A column at work.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 struct Guess {
     facts: Facts,
     said: Said,
@@ -198,10 +199,13 @@ impl Guess {
 
     /// One of its numbers, rad, if that can be decided.
     fn rad(&self) -> Option<f64> {
-        match self.unit? {
-            Unit::Count => self.counts.map(|counts| TAU / counts),
-            unit => Some(unit.factor()),
-        }
+        turns::rad(self.unit?, self.counts)
+    }
+
+    /// Its numbers, rad, if that can be decided.
+    fn in_rad(&self) -> Option<Vec<f64>> {
+        let rad = self.rad()?;
+        Some(self.values.iter().map(|value| rad * value).collect())
     }
 
     /// Whether a time is in days as spreadsheets count them: a date from 1954 to 2119, and rows at most a quarter of an
@@ -230,7 +234,7 @@ impl Guess {
         Some(MappedColumn { quantity, name: names[place].clone(), place, unit: reading.plain_unit(), reading })
     }
 
-    /// What is said of it.
+    /// The column as it is reported.
     fn column(self, name: &str) -> Column {
         Column {
             name: name.to_owned(),
@@ -249,13 +253,8 @@ impl Guess {
 
     /// The unit as a mapping takes it.
     fn written(&self) -> Option<String> {
-        let unit = self.unit?;
         let sign = if self.negative { "-" } else { "" };
-        match unit {
-            Unit::Count => self.counts.map(|counts| format!("{sign}count/{counts}")),
-            Unit::Ampere | Unit::Milliampere | Unit::Volt => Some(format!("{sign}{unit}*GAIN")),
-            _ => Some(format!("{sign}{unit}")),
-        }
+        turns::written(self.unit?, self.counts).map(|unit| sign.to_owned() + &unit)
     }
 }
 
@@ -332,7 +331,7 @@ pub fn look(files: &[RawFile]) -> Result<Looked, LookError> {
     Ok(Looked {
         files: files.iter().map(|file| file.file.clone()).collect(),
         rows: rows.len(),
-        odd_rows: files.iter().map(|file| file.columns.short.len() + file.columns.wide.len()).sum(),
+        odd_rows: files.iter().map(|file| file.columns.odd.len()).sum(),
         separator: layout.separator.name(),
         decimal_comma: layout.decimal_comma,
         header_line: layout.has_names.then_some(layout.header_line),
@@ -349,7 +348,7 @@ pub fn look(files: &[RawFile]) -> Result<Looked, LookError> {
     })
 }
 
-/// What a column says by its name and by its numbers alone.
+/// The contents of a column by its name and its numbers alone.
 fn guess(files: &[RawFile], place: usize, of_file: &Arc<[f64]>) -> Guess {
     let layout = &files[0].sheet.layout;
     let (name, unit) = (&layout.names[place], layout.units.get(place).filter(|unit| !unit.is_empty()));
@@ -358,19 +357,7 @@ fn guess(files: &[RawFile], place: usize, of_file: &Arc<[f64]>) -> Guess {
     let facts = Facts::of(&cells);
     let said = if layout.has_names { words::said(name, unit.map(String::as_str)) } else { Said::default() };
     let values = unwrapped(std::mem::take(&mut cells.values), facts.anew);
-    let mut guess = Guess {
-        facts,
-        said,
-        role: Role::Unknown,
-        unit: None,
-        counts: None,
-        negative: false,
-        confidence: 0.0,
-        why: Vec::new(),
-        used: false,
-        values,
-        of_file: of_file.clone(),
-    };
+    let mut guess = Guess { facts, said, values, of_file: of_file.clone(), ..Guess::default() };
     if cells.times.count > 0 && cells.times.count + cells.empty + cells.words.count >= guess.values.len() {
         (guess.role, guess.unit) = (Role::Time, Some(Unit::Iso));
         guess.because("times written as text", 0.95);
@@ -512,7 +499,7 @@ fn settle(guesses: &mut [Guess], notes: &mut Vec<String>) {
         let may = |guess: &Guess| guess.role == role && guess.moves();
         let of_these = |guess: &Guess| may(guess) && guess.of_joints(&joints);
         let place = guesses.iter().position(of_these).or_else(|| guesses.iter().position(may)).filter(|_| !used);
-        // An output that does not follow a generator is none, and an error is not needed beside an output.
+        // An output that does not follow a generator is none, and an error is not needed in addition to an output.
         let wanted = match role {
             Role::Output => false,
             Role::Error => !paired,
@@ -535,13 +522,11 @@ fn settle(guesses: &mut [Guess], notes: &mut Vec<String>) {
 /// The error (rad) as far as it can be computed.
 fn error_rad(guesses: &[Guess], ratio: Option<f64>) -> Option<Vec<f64>> {
     let used = |role: Role| guesses.iter().find(|guess| guess.used && guess.role == role);
-    if let (Some(g), Some(o), Some(ratio)) = (used(Role::Generator), used(Role::Output), ratio) {
-        let (a, b) = (g.rad()?, o.rad()?);
-        return Some(g.values.iter().zip(&o.values).map(|(g, o)| b * o - a * g / ratio).collect());
-    }
-    let error = used(Role::Error)?;
-    let rad = error.rad()?;
-    Some(error.values.iter().map(|value| rad * value).collect())
+    let (Some(generator), Some(output), Some(ratio)) = (used(Role::Generator), used(Role::Output), ratio) else {
+        return used(Role::Error)?.in_rad();
+    };
+    let (generator, output) = (generator.in_rad()?, output.in_rad()?);
+    Some(output.iter().zip(&generator).map(|(output, generator)| output - generator / ratio).collect())
 }
 
 /// Says which column without a role the error moves with, where none is called a torque.
@@ -567,11 +552,7 @@ fn listed<T: ToString>(numbers: &[T]) -> String {
 
 /// Which column may be the torque, and which way it counts.
 fn torque(guesses: &mut [Guess], error: Option<&[f64]>, notes: &mut Vec<String>) {
-    let output: Option<Vec<f64>> =
-        guesses.iter().find(|guess| guess.used && guess.role == Role::Output).and_then(|guess| {
-            let rad = guess.rad()?;
-            Some(guess.values.iter().map(|value| rad * value).collect())
-        });
+    let output = guesses.iter().find(|guess| guess.used && guess.role == Role::Output).and_then(Guess::in_rad);
     let of_role = |guess: &Guess| matches!(guess.role, Role::Torque | Role::Current);
     let all: Vec<usize> = (0..guesses.len()).filter(|k| of_role(&guesses[*k]) && guesses[*k].moves()).collect();
     let joints = pair::joints(guesses);
@@ -589,37 +570,26 @@ fn torque(guesses: &mut [Guess], error: Option<&[f64]>, notes: &mut Vec<String>)
             nameless_torque(guesses, error, output, notes);
         }
     }
-    let says: Vec<_> = candidates
-        .iter()
-        .map(|k| {
-            error
-                .zip(output.as_ref())
-                .and_then(|(error, output)| torque_says(error, output, &guesses[*k].values, &guesses[*k].of_file))
-        })
-        .collect();
+    let says = |k: &usize| torque_says(error?, output.as_deref()?, &guesses[*k].values, &guesses[*k].of_file);
+    let says: Vec<_> = candidates.iter().map(says).collect();
     for (k, says) in candidates.iter().zip(&says) {
         match says {
-            Some(says) if says.tells() => {
+            Some(says) if says.is_clear() => {
                 guesses[*k].negative = says.slope < 0.0;
                 let way = if says.slope < 0.0 { "against" } else { "with" };
                 let sure = if guesses[*k].role == Role::Torque { 0.8 } else { 0.5 };
-                guesses[*k].because(
-                    format!(
-                        "the error moves {way} it: it explains {:.0} % beside the turn of the output",
-                        100.0 * says.share
-                    ),
-                    sure,
-                );
+                let share = 100.0 * says.share;
+                let why = format!("the error moves {way} it: it explains {share:.0} % beside the turn of the output");
+                guesses[*k].because(why, sure);
             }
             _ => guesses[*k].because("its sign cannot be told here", 0.4),
         }
     }
     // A torque before a current, then what explains more.
     let share = |says: &Option<relation::TorqueSays>| says.map_or(0.0, |says| says.share);
-    let best = candidates.iter().zip(&says).max_by(|(a, x), (b, y)| {
-        let key = |k: &usize| guesses[*k].role == Role::Torque;
-        key(a).cmp(&key(b)).then(share(x).total_cmp(&share(y)))
-    });
+    let is_torque = |k: &usize| guesses[*k].role == Role::Torque;
+    let best = (candidates.iter().zip(&says))
+        .max_by(|(a, x), (b, y)| is_torque(a).cmp(&is_torque(b)).then(share(x).total_cmp(&share(y))));
     let Some((&best, _)) = best else { return };
     guesses[best].used = guesses[best].written().is_some_and(|unit| !unit.contains("GAIN"));
     if !guesses[best].used {
@@ -659,35 +629,36 @@ fn clock(read: &[ReadRows]) -> (TimeKind, Option<f64>) {
 
 /// The mapping, if generator and output or an error are known.
 fn option(guesses: &[Guess], names: &[String], notes: &mut Vec<String>) -> Option<String> {
-    let used = |role: Role| guesses.iter().any(|guess| guess.used && guess.role == role && guess.written().is_some());
-    if !(used(Role::Generator) && (used(Role::Output) || used(Role::Error))) {
-        let open = |guess: &&Guess| guess.used && guess.written().is_none() && guess.role.is_angle();
-        if let Some(count) = guesses.iter().filter(open).count().checked_sub(1) {
-            let angles = guesses.iter().zip(names).filter(|(guess, _)| guess.used && guess.role.is_angle());
-            let entries = angles.filter_map(|(guess, name)| {
-                let open = if guess.unit.is_some() { "count/COUNTS" } else { "UNIT" };
-                let unit = guess.written().unwrap_or_else(|| open.to_owned());
-                Some(format!("{}={name}:{unit}", guess.role.in_mapping()?))
-            });
-            let entries = entries.collect::<Vec<_>>().join(",");
-            let which = if count == 0 { "that column" } else { "these columns" };
-            let what = if entries.contains("UNIT") { "unit" } else { "counts of a turn" };
-            let word = if entries.contains("UNIT") { "UNIT" } else { "COUNTS" };
-            notes.push(format!("give the {what} of {which} in place of {word}: --columns {entries}"));
-            return None;
-        }
-        let what = match (used(Role::Generator), used(Role::Output) || used(Role::Error)) {
-            (true, false) => "which column is the output (or the error)",
-            (false, true) => "which column is the generator",
-            _ => "which columns are generator and output",
+    let used: Vec<(&Guess, &String)> = guesses.iter().zip(names).filter(|(guess, _)| guess.used).collect();
+    let has = |role: Role| used.iter().any(|(guess, _)| guess.role == role && guess.written().is_some());
+    let is_open = |guess: &Guess| guess.written().is_none() && guess.role.is_angle();
+    // Entries of a mapping, with a word in place of a unit that is open.
+    let entries = |with: &dyn Fn(&Guess) -> bool| {
+        let entry = |(guess, name): &(&Guess, &String)| {
+            let open = if guess.unit.is_some() { "count/COUNTS" } else { "UNIT" };
+            let unit = guess.written().unwrap_or_else(|| open.to_owned());
+            Some(format!("{}={name}:{unit}", guess.role.in_mapping()?))
         };
-        notes.push(format!("{what} cannot be told: name them, --columns generator=#1:UNIT,output=#2:UNIT"));
+        used.iter().filter(|(guess, _)| with(guess)).filter_map(entry).collect::<Vec<_>>().join(",")
+    };
+    if has(Role::Generator) && (has(Role::Output) || has(Role::Error)) {
+        return Some(entries(&|guess| guess.written().is_some()));
+    }
+    let open = used.iter().filter(|(guess, _)| is_open(guess)).count();
+    if open > 0 {
+        let entries = entries(&|guess| guess.role.is_angle());
+        let which = if open == 1 { "that column" } else { "these columns" };
+        let (what, word) = if entries.contains("UNIT") { ("unit", "UNIT") } else { ("counts of a turn", "COUNTS") };
+        notes.push(format!("give the {what} of {which} in place of {word}: --columns {entries}"));
         return None;
     }
-    let used = guesses.iter().zip(names).filter(|(guess, _)| guess.used);
-    let entries =
-        used.filter_map(|(guess, name)| Some(format!("{}={name}:{}", guess.role.in_mapping()?, guess.written()?)));
-    Some(entries.collect::<Vec<_>>().join(","))
+    let what = match (has(Role::Generator), has(Role::Output) || has(Role::Error)) {
+        (true, false) => "which column is the output (or the error)",
+        (false, true) => "which column is the generator",
+        _ => "which columns are generator and output",
+    };
+    notes.push(format!("{what} cannot be told: name them, --columns generator=#1:UNIT,output=#2:UNIT"));
+    None
 }
 
 /// A column as a mapping names it: names with signs of the mapping in them, and names that are there twice, go by

@@ -1,10 +1,9 @@
-//! What columns show of each other: a ratio, the counts of a turn, which way a torque counts.
+//! Relations between columns: a ratio, the counts of a turn, which way a torque counts.
 
 use std::f64::consts::TAU;
 
-use flexspline_algebra::{Mat, cholesky};
-
-use crate::measurement::least_and_most;
+use crate::least_squares::{Normal, dot};
+use crate::measurement::{LineFit, least_and_most, rms};
 
 /// Rows that a relation is found on, at most.
 const LOOKED_AT: usize = 4000;
@@ -18,15 +17,15 @@ const MOST_ROUND: f64 = 1e6;
 /// Ratios of strain wave gears, and a little more.
 pub(super) const RATIOS: [f64; 2] = [20.0, 400.0];
 /// A torque is believed to turn the error one way if it explains this share of what the turn of the output leaves.
-const TELLS: f64 = 0.05;
+const CLEAR: f64 = 0.05;
 
 /// Rows in which all columns have a number, thinned.
-fn rows(columns: &[&[f64]]) -> Vec<Vec<f64>> {
+fn rows<const N: usize>(columns: [&[f64]; N]) -> Vec<[f64; N]> {
     let count = columns.iter().map(|column| column.len()).min().unwrap_or(0);
-    let all = (0..count).filter(|k| columns.iter().all(|column| column[*k].is_finite()));
-    let all: Vec<usize> = all.collect();
-    let every = all.len().div_ceil(LOOKED_AT).max(1);
-    all.iter().step_by(every).map(|k| columns.iter().map(|column| column[*k]).collect()).collect()
+    let all =
+        (0..count).map(|k| columns.map(|column| column[k])).filter(|row| row.iter().all(|value| value.is_finite()));
+    let all: Vec<[f64; N]> = all.collect();
+    all.iter().copied().step_by(all.len().div_ceil(LOOKED_AT).max(1)).collect()
 }
 
 /// A straight line between two columns.
@@ -34,15 +33,14 @@ fn rows(columns: &[&[f64]]) -> Vec<Vec<f64>> {
 pub(super) struct Slope {
     /// Change of the first for one of the second.
     pub slope: f64,
-    /// What the line leaves of the first, over its range.
+    /// Root mean square of the residual of the first, over its range.
     pub left: f64,
 }
 
 /// How the first column follows the second, if it does; `of_file` says of which file each row is, as each has a zero of
 /// its own.
 pub(super) fn slope(first: &[f64], second: &[f64], of_file: &[f64]) -> Option<Slope> {
-    let mut rows = rows(&[first, second, of_file]);
-    let n = rows.len() as f64;
+    let mut rows = rows([first, second, of_file]);
     if rows.len() < 16 {
         return None;
     }
@@ -52,15 +50,10 @@ pub(super) fn slope(first: &[f64], second: &[f64], of_file: &[f64]) -> Option<Sl
             of_one.iter_mut().for_each(|row| row[at] -= mean);
         }
     }
-    let sum = |of: &dyn Fn(f64, f64) -> f64| rows.iter().map(|row| of(row[0], row[1])).sum::<f64>();
-    let (xx, xy, yy) = (sum(&|y, _| y * y), sum(&|y, x| x * y), sum(&|_, x| x * x));
-    if !(xx > 0.0 && yy > 0.0) {
-        return None;
-    }
-    let slope = xy / yy;
-    let left = ((xx - slope * xy).max(0.0) / n).sqrt();
     let range = least_and_most(rows.iter().map(|row| row[0]));
-    Some(Slope { slope, left: left / (range.1 - range.0) })
+    let LineFit { slope, square, residual } = LineFit::of(&rows.iter().map(|row| (row[1], row[0])).collect::<Vec<_>>());
+    let moves = square > 0.0 && range.1 > range.0;
+    moves.then(|| Slope { slope, left: rms(&residual) / (range.1 - range.0) })
 }
 
 impl Slope {
@@ -95,17 +88,17 @@ pub(super) struct TorqueSays {
 }
 
 impl TorqueSays {
-    /// Whether the sign can be told.
-    pub(crate) fn tells(&self) -> bool {
-        self.share > TELLS
+    /// Whether the sign is clear.
+    pub(crate) fn is_clear(&self) -> bool {
+        self.share > CLEAR
     }
 }
 
-/// How an error (rad) follows a torque beside what turns with the output (rad): an eccentric encoder and the weight of
-/// an arm look alike, so both may explain what one of them does.
+/// How an error (rad) follows a torque in addition to what turns with the output (rad): an eccentric encoder and the
+/// weight of an arm look alike, so both may explain what one of them does.
 pub(super) fn torque_says(error: &[f64], output: &[f64], torque: &[f64], of_file: &[f64]) -> Option<TorqueSays> {
-    let mut rows = rows(&[error, output, torque, of_file]);
-    // Where it should be: where it is has the error in it, which a load that goes with the angle would then tell.
+    let mut rows = rows([error, output, torque, of_file]);
+    // Where it should be: where it is has the error in it, which a load that goes with the angle would then explain.
     rows.iter_mut().for_each(|row| row[1] -= row[0]);
     let mut files: Vec<f64> = rows.iter().map(|row| row[3]).collect();
     files.dedup();
@@ -115,51 +108,32 @@ pub(super) fn torque_says(error: &[f64], output: &[f64], torque: &[f64], of_file
     if !(rows.len() > 40 && scale > 0.0) {
         return None;
     }
-    let columns = |with: bool| -> Vec<Vec<f64>> {
-        rows.iter()
-            .map(|row| {
-                let mut columns: Vec<f64> = files.iter().map(|file| f64::from(u8::from(row[3] == *file))).collect();
-                // Less than a third of a turn does not tell a sine from a straight line.
-                if turns > 0.33 {
-                    columns.extend([row[1].sin(), row[1].cos()]);
-                } else {
-                    columns.push(row[1]);
-                }
-                if with {
-                    columns.push(row[2] / scale);
-                }
-                columns
-            })
-            .collect()
-    };
-    let values: Vec<f64> = rows.iter().map(|row| row[0]).collect();
-    let (_, without) = least_squares(&columns(false), &values)?;
-    let (fitted, with) = least_squares(&columns(true), &values)?;
-    let slope = fitted.last()? / scale;
-    Some(TorqueSays { slope, share: 1.0 - with / without.max(f64::MIN_POSITIVE) })
-}
-
-/// Coefficients, and the sum of squares that they leave.
-fn least_squares(columns: &[Vec<f64>], values: &[f64]) -> Option<(Vec<f64>, f64)> {
-    let n = columns.first()?.len();
-    let mut gram = Mat::zeros(n, n);
-    let mut right = Mat::zeros(n, 1);
-    for (row, value) in columns.iter().zip(values) {
-        for (i, a) in row.iter().enumerate() {
-            right[(i, 0)] += a * value;
-            for (j, b) in row.iter().enumerate() {
-                gram[(i, j)] += a * b;
-            }
+    let columns = |row: &[f64; 4]| -> Vec<f64> {
+        let mut columns: Vec<f64> = files.iter().map(|file| f64::from(u8::from(row[3] == *file))).collect();
+        // Within less than a third of a turn a sine and a straight line look alike.
+        if turns > 0.33 {
+            columns.extend([row[1].sin(), row[1].cos()]);
+        } else {
+            columns.push(row[1]);
         }
-    }
-    let solved = cholesky(gram.as_ref()).ok()?.solve(right.as_ref());
-    let fitted: Vec<f64> = (0..n).map(|i| solved[(i, 0)]).collect();
-    let left = columns
-        .iter()
-        .zip(values)
-        .map(|(row, value)| (value - row.iter().zip(&fitted).map(|(a, b)| a * b).sum::<f64>()).powi(2))
-        .sum();
-    Some((fitted, left))
+        columns.push(row[2] / scale);
+        columns
+    };
+    let columns: Vec<Vec<f64>> = rows.iter().map(columns).collect();
+    // The last coefficient of the first columns, and the sum of squares that they leave.
+    let fitted = |width: usize| -> Option<(f64, f64)> {
+        let fit = Normal::of(width, rows.len(), |k, row| {
+            row.copy_from_slice(&columns[k][..width]);
+            (rows[k][0], 1.0)
+        });
+        let values = fit?.values();
+        let left = rows.iter().zip(&columns).map(|(row, columns)| (row[0] - dot(&columns[..width], &values)).powi(2));
+        Some((*values.last()?, left.sum()))
+    };
+    let width = columns[0].len();
+    let (_, without) = fitted(width - 1)?;
+    let (slope, with) = fitted(width)?;
+    Some(TorqueSays { slope: slope / scale, share: 1.0 - with / without.max(f64::MIN_POSITIVE) })
 }
 
 #[cfg(test)]
@@ -199,7 +173,7 @@ mod tests {
         for (error, of_file) in [(&error, &vec![0.0; 2000]), (&other_zero, &two)] {
             let reached: Vec<f64> = out.iter().zip(error).map(|(o, e)| o + e).collect();
             let says = torque_says(error, &reached, &torque, of_file).unwrap();
-            assert!(says.tells() && (says.slope * -3e4 - 1.0).abs() < 1e-6, "{says:?}");
+            assert!(says.is_clear() && (says.slope * -3e4 - 1.0).abs() < 1e-6, "{says:?}");
         }
         // A ramp of the load goes with the output: what the wheels do on the way is as well the torque's.
         let short: Vec<f64> = out[..300].to_vec();
@@ -207,6 +181,6 @@ mod tests {
         let error: Vec<f64> = short.iter().zip(&ramp).map(|(o, t)| t / 3e4 - 3e-4 * (9.0 * o).sin()).collect();
         let reached: Vec<f64> = short.iter().zip(&error).map(|(o, e)| o + e).collect();
         let says = torque_says(&error, &reached, &ramp, &vec![0.0; 300]).unwrap();
-        assert!(!says.tells(), "{says:?}");
+        assert!(!says.is_clear(), "{says:?}");
     }
 }

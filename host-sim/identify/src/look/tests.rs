@@ -415,6 +415,17 @@ fn right(recording: &Recording, with_torque: bool) -> Result<(), String> {
 }
 
 #[test]
+fn a_cell_that_is_no_number_does_not_hide_a_last_line_that_breaks_off() {
+    let high = |t: &Truth, k| if k == 20 { with(plain(t, k), 3, "high".to_owned()) } else { plain(t, k) };
+    let text = file("time_s,generator_rad,output_rad,torque_n_m\n", ",", high) + "6.000,1.0";
+    let looked = looked_at(text.as_bytes()).unwrap();
+    for said in ["found \"high\"", "the last line breaks off: it is left out"] {
+        assert!(looked.notes.iter().any(|note| note.contains(said)), "{said}: {:?}", looked.notes);
+    }
+    assert_eq!(looked.columns_option, None);
+}
+
+#[test]
 fn odd_files_are_read_right_or_end_in_one_clear_error() {
     let cases = cases();
     assert!(cases.len() >= 40, "{}", cases.len());

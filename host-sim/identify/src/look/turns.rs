@@ -79,7 +79,7 @@ pub(super) fn one_shaft(a: &Guess, b: &Guess) -> bool {
 pub(super) struct UnitReading {
     /// Unit.
     pub unit: Unit,
-    /// Counts of a turn, where it is counts and that can be told.
+    /// Counts of a turn, where it is counts and their number is known.
     pub counts: Option<f64>,
     /// Where it comes from.
     pub by: UnitFrom,
@@ -102,18 +102,26 @@ pub(super) enum UnitFrom {
 
 impl UnitReading {
     fn rad(&self) -> f64 {
-        match self.unit {
-            Unit::Count => TAU / self.counts.unwrap_or(1.0),
-            unit => unit.factor(),
-        }
+        rad(self.unit, self.counts).unwrap_or(TAU)
     }
 
     /// As a mapping takes it.
     pub fn written(&self) -> Option<String> {
-        match self.unit {
-            Unit::Count => self.counts.map(|counts| format!("count/{counts}")),
-            unit => Some(unit.to_string()),
-        }
+        written(self.unit, self.counts)
+    }
+}
+
+/// Size of one of a unit of angle, rad; nothing for counts of which none knows how many make a turn.
+pub(super) fn rad(unit: Unit, counts: Option<f64>) -> Option<f64> {
+    if unit == Unit::Count { counts.map(|counts| TAU / counts) } else { Some(unit.factor()) }
+}
+
+/// A unit as a mapping takes it.
+pub(super) fn written(unit: Unit, counts: Option<f64>) -> Option<String> {
+    match unit {
+        Unit::Count => counts.map(|counts| format!("count/{counts}")),
+        Unit::Ampere | Unit::Milliampere | Unit::Volt => Some(format!("{unit}*GAIN")),
+        _ => Some(unit.to_string()),
     }
 }
 
@@ -161,7 +169,7 @@ fn anew(guess: &Guess) -> Option<UnitReading> {
     registers().any(|register| register == span).then_some(reading)
 }
 
-/// The units that a column may have beside another one; the same as the other one, where nothing is known of either.
+/// The units that a column may have together with another one; the same unit, where nothing is known of either.
 fn readings(guess: &Guess, other: &Guess) -> Vec<UnitReading> {
     let open = |guess: &Guess| guess.rad().is_none() && anew(guess).is_none();
     let unit = guess.unit.unwrap_or(Unit::Radian);
@@ -170,10 +178,10 @@ fn readings(guess: &Guess, other: &Guess) -> Vec<UnitReading> {
             vec![UnitReading { unit, counts: None, by: UnitFrom::Nothing }]
         }
         (Some(Unit::Count), None) => {
-            let beside = other.counts.or_else(|| anew(other).and_then(|reading| reading.counts));
-            let beside = beside.map(|counts| UnitReading { unit, counts: Some(counts), by: UnitFrom::Other });
+            let same = other.counts.or_else(|| anew(other).and_then(|reading| reading.counts));
+            let same = same.map(|counts| UnitReading { unit, counts: Some(counts), by: UnitFrom::Other });
             let powers = POWERS.map(|bits| UnitReading { unit, counts: Some(2f64.powi(bits)), by: UnitFrom::Ratio });
-            anew(guess).into_iter().chain(beside).chain(powers).collect()
+            anew(guess).into_iter().chain(same).chain(powers).collect()
         }
         (None, _) if other.unit == Some(Unit::Count) && other.counts.is_none() => {
             vec![UnitReading { unit, counts: None, by: UnitFrom::Nothing }]

@@ -1,4 +1,4 @@
-//! What is wrong with data, as opposed to the drive.
+//! Faults of data, as opposed to those of the drive.
 
 use serde::Serialize;
 
@@ -66,7 +66,7 @@ impl FaultName {
         }
     }
 
-    /// What to change at the bench or in the logger, so that it does not come back.
+    /// The change at the bench or in the logger by which it does not come back.
     #[must_use]
     pub const fn advice(self) -> &'static str {
         match self {
@@ -143,7 +143,7 @@ pub struct Fault {
     pub treatment: Treatment,
     /// One sentence for a reader.
     pub what: String,
-    /// What to change at the bench or in the logger.
+    /// The change at the bench or in the logger by which it does not come back.
     pub advice: &'static str,
     /// Numbers of its own.
     #[serde(flatten)]
@@ -197,7 +197,7 @@ pub struct Measures {
     /// Turns of the motor, with the sign of what the generator's angle lacks; the largest of several.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub turns: Option<i64>,
-    /// What the torque reads without a load, N·m, …
+    /// Torque that is read without a load, N·m, …
     #[serde(skip_serializing_if = "Option::is_none")]
     pub zero_n_m: Option<f64>,
     /// … and its standard deviation, N·m.

@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use super::columns::{ColumnMap, MappedColumn, Quantity};
 use super::fault::{Fault, FaultName};
-use super::reader::{Cells, Columns, Layout, Sheet, clock, slower, stamps};
+use super::reader::{Cells, Columns, Layout, Sheet, clock, stamps};
 use super::{phd2, rollover};
 use flexspline_base::csv_rows::TableProblem;
 
@@ -129,7 +129,7 @@ pub(crate) struct LogFindings {
     pub refused: Option<TableProblem>,
     /// Faults of the order of the rows, which was mended.
     pub order: Vec<String>,
-    /// What was converted, or left out though it may have been meant.
+    /// Sentences on what was converted, or left out though it may have been meant.
     pub notes: Vec<String>,
     /// Whether each session has a zero of its own.
     pub own_zeros: bool,
@@ -169,7 +169,7 @@ pub(super) fn read(
 
 /// The log of `read`, which has the columns in use in their order; `rate_hz` if the file has no time.
 ///
-/// What is no number is missing in it, and said in the findings.
+/// A cell that is no number is missing in it, and reported in the findings.
 ///
 /// # Errors
 /// A column holds times, or numbers beyond all limits, or there are fewer rows than `fewest`.
@@ -205,13 +205,12 @@ pub(crate) fn of_columns(
     log.line = read.lines;
     let refuse = |what: String| refused.clone().unwrap_or(TableProblem { line: layout.header_line, what });
     if log.len() < fewest {
-        let are = if fewest == 1 { "is" } else { "are" };
         let rows = match log.len() {
             0 => "no rows".to_owned(),
             1 => "1 row".to_owned(),
             n => format!("{n} rows"),
         };
-        return Err(refuse(format!("{rows} after the header; at least {fewest} {are} needed")));
+        return Err(refuse(format!("{rows} after the header; at least {fewest} are needed")));
     }
     if let Some(rate_hz) = rate_hz {
         if log.get(Quantity::Time).is_some() {
@@ -223,7 +222,6 @@ pub(crate) fn of_columns(
     let mut order = Vec::new();
     in_order(&mut log, &mut order);
     rollover::undo(&mut log, &columns, &mut notes);
-    slower::fill(&mut log, &mut notes);
     Ok((log, LogFindings { columns, broken_off, refused, order, notes, own_zeros: false }))
 }
 
@@ -245,8 +243,8 @@ fn guide_log(bytes: Vec<u8>, map: &ColumnMap, ratio: f64) -> Result<(Log, LogFin
 /// Refuses rows that end before a column in use, or have more fields than names.
 fn check_rows(layout: &Layout, read: &Columns, columns: &[MappedColumn]) -> Result<(), TableProblem> {
     let beyond = |fields: usize| columns.iter().find(|column| column.place >= fields);
-    let short = read.short.iter().filter(|(_, fields)| beyond(*fields).is_some());
-    let Some((line, fields)) = short.chain(&read.wide).min().copied() else { return Ok(()) };
+    let is_odd = |(_, fields): &&(u64, usize)| *fields > layout.names.len() || beyond(*fields).is_some();
+    let Some((line, fields)) = read.odd.iter().filter(is_odd).min().copied() else { return Ok(()) };
     // A cell above it that is no number comes first.
     if read.cells.iter().filter_map(|cells| cells.words.first.as_ref()).any(|word| word.line <= line) {
         return Ok(());

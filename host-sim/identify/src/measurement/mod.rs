@@ -27,7 +27,7 @@ pub(crate) use columns::MappedColumn;
 pub use columns::{ColumnMap, MappingError, Quantity, Reading, Unit};
 pub use fault::{Fault, FaultName, Measures, ToothStep, Treatment};
 use faults::clock::SESSION_GAP_PERIODS;
-pub(crate) use faults::throughout;
+pub(crate) use faults::{LineFit, throughout};
 pub use flexspline_base::robust::{
     MAD_TO_STD, least_and_most, median_and_std, median_of, quantile_of, rms, sampled, white_noise,
 };
@@ -47,7 +47,7 @@ use refusal::Refusal;
 /// More sessions than a person makes. *Guess*.
 const MANY_SESSIONS: usize = 50;
 
-/// What to do with a file of which each channel has rows of its own.
+/// The remedy for a file of which each channel has rows of its own.
 pub(crate) const APART: &str = ": they are never recorded in one row; allowed: both in a row, in pandas: df[OUTPUT] = \
                                 df.set_index(TIME)[OUTPUT].interpolate(\"index\").values";
 
@@ -72,7 +72,7 @@ pub struct Session {
     pub loudness: Option<Vec<f64>>,
     /// Whether the zero of the error is not that of the session before.
     pub own_zero: bool,
-    /// What was taken off the error, as its zero is that much off the zero of the first session, rad.
+    /// Taken off the error, as its zero is that much off the zero of the first session, rad.
     pub zero_off_rad: f64,
     /// Time by which one angle may be read before the other on the mean, for all that is known of how they are read, s.
     pub unsure_s: f64,
@@ -324,7 +324,7 @@ pub(crate) struct ReadRows {
     pub(crate) log: Log,
     /// Times as they are written, s; none without a time.
     pub(crate) stamps_s: Vec<f64>,
-    /// What was converted, mended or left out.
+    /// Sentences on what was converted, mended or left out.
     pub(crate) notes: Vec<String>,
 }
 

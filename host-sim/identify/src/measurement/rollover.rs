@@ -7,6 +7,7 @@
 //! to the check of wrapped angles, which the other angle helps.
 
 use super::columns::{MappedColumn, Quantity, Unit};
+use super::faults::LineFit;
 use super::log::Log;
 use flexspline_base::robust::{least_and_most, median_of};
 
@@ -23,14 +24,14 @@ pub(super) const LEAPS: f64 = 0.6;
 /// near a leap.
 const NEARLY: f64 = 0.005;
 /// Rows on each side of a leap that show how the values go on. *Guess*: few, as motion bends.
-const ROWS_BESIDE: usize = 8;
+const ROWS_AROUND: usize = 8;
 /// Standard deviation of a value that is rounded to whole counts. *Source*: derived, 1/√12, exact to its digits.
 const ROUNDED: f64 = 0.288_675;
 /// A span is excluded beyond this number of standard deviations. *Source*: by convention.
 const EXCLUDED: f64 = 3.0;
 /// Whole counts are distinguishable if the standard deviation of the span is below this: half a count is two of them.
 /// *Source*: derived.
-const TELLS_COUNTS: f64 = 0.25;
+const RESOLVES_COUNTS: f64 = 0.25;
 /// One count is said to be in doubt if the standard deviation of the span is below this, counts; above it, nothing is
 /// known of single counts. *Guess*: then two or three numbers of counts are likely.
 const IN_DOUBT: f64 = 1.0;
@@ -54,7 +55,7 @@ pub(crate) struct Anew {
 }
 
 impl Anew {
-    /// What to say of it: "begins anew after 32767 (8 times)".
+    /// A sentence on it: "begins anew after 32767 (8 times)".
     pub fn text(&self, unit: &str) -> String {
         let or = self.or.map_or(String::new(), |or| format!("; one count is in doubt, it may be {or}"));
         // A turn in degrees is 360 to the last digit but one.
@@ -102,13 +103,13 @@ pub(crate) fn begins_anew(values: &[f64], spans: &[f64], counts: bool, along: Op
     let (nearest, off) = (seen.span.round(), known.map(|span| (seen.span - span).abs() / seen.std));
     match (known, off) {
         // The register that the values fill is believed until the leaps exclude it.
-        (Some(span), Some(off)) if off <= if seen.tells_counts() { EXCLUDED } else { 0.5 * EXCLUDED } => {
+        (Some(span), Some(off)) if off <= if seen.resolves_counts() { EXCLUDED } else { 0.5 * EXCLUDED } => {
             found(span, None)
         }
-        (Some(span), Some(_)) if !seen.tells_counts() => found(span, (seen.std < IN_DOUBT).then_some(nearest)),
+        (Some(span), Some(_)) if !seen.resolves_counts() => found(span, (seen.std < IN_DOUBT).then_some(nearest)),
         _ if seen.std < IN_DOUBT => {
             let next = nearest + if seen.span > nearest { 1.0 } else { -1.0 };
-            found(nearest, (!seen.tells_counts()).then_some(next))
+            found(nearest, (!seen.resolves_counts()).then_some(next))
         }
         _ => None,
     }
@@ -133,8 +134,8 @@ impl MeasuredSpan {
         let rounded = if whole { ROUNDED } else { 0.0 };
         let mut seen: Vec<Leap> = Vec::new();
         for (k, at) in leaps.iter().enumerate() {
-            let from = if k > 0 { leaps[k - 1] } else { 0 }.max(at.saturating_sub(ROWS_BESIDE));
-            let to = leaps.get(k + 1).copied().unwrap_or(rows.len()).min(at + ROWS_BESIDE);
+            let from = if k > 0 { leaps[k - 1] } else { 0 }.max(at.saturating_sub(ROWS_AROUND));
+            let to = leaps.get(k + 1).copied().unwrap_or(rows.len()).min(at + ROWS_AROUND);
             let y = |k: usize| values[rows[k]];
             let by_row = Leap::between(from..*at, *at..to, |k| k as f64, y, rounded);
             let by_other = along.and_then(|other| Leap::between(from..*at, *at..to, |k| other[rows[k]], y, rounded));
@@ -174,8 +175,8 @@ impl MeasuredSpan {
     }
 
     /// Whether it decides between two numbers of counts.
-    fn tells_counts(&self) -> bool {
-        self.std < TELLS_COUNTS
+    fn resolves_counts(&self) -> bool {
+        self.std < RESOLVES_COUNTS
     }
 }
 
@@ -202,26 +203,25 @@ impl Leap {
         y: impl Fn(usize) -> f64,
         rounded: f64,
     ) -> Option<Leap> {
-        let (n, m) = (before.len() as f64, after.len() as f64);
-        let mean = |of: &dyn Fn(usize) -> f64, rows: std::ops::Range<usize>| {
-            let count = rows.len() as f64;
-            rows.map(of).sum::<f64>() / count
-        };
         let sides = [before.clone(), after.clone()];
-        if before.is_empty() || after.is_empty() || n + m < 4.0 {
+        let [n, m] = sides.each_ref().map(|rows| rows.len() as f64);
+        if n.min(m) < 1.0 || n + m < 4.0 {
             return None;
         }
-        let (mx, my) = (sides.clone().map(|rows| mean(&x, rows)), sides.clone().map(|rows| mean(&y, rows)));
-        let sum = |of: &dyn Fn(f64, f64) -> f64| -> f64 {
-            let side = |side: usize| sides[side].clone().map(|k| of(x(k) - mx[side], y(k) - my[side])).sum::<f64>();
-            side(0) + side(1)
+        let mean = |of: &dyn Fn(usize) -> f64| {
+            sides.each_ref().map(|rows| rows.clone().map(of).sum::<f64>() / rows.len() as f64)
         };
-        let (xx, xy) = (sum(&|x, _| x * x), sum(&|x, y| x * y));
-        if !(xx > 0.0 && xx.is_finite() && xy.is_finite()) {
+        let (mx, my) = (mean(&x), mean(&y));
+        let about = |k: usize| {
+            let side = usize::from(k >= after.start);
+            (x(k) - mx[side], y(k) - my[side])
+        };
+        let about: Vec<(f64, f64)> = sides.into_iter().flatten().map(about).collect();
+        let LineFit { slope, square: xx, residual } = LineFit::of(&about);
+        if !(xx > 0.0 && xx.is_finite() && slope.is_finite()) {
             return None;
         }
-        let slope = xy / xx;
-        let squares = sum(&|x, y| (y - slope * x).powi(2));
+        let squares: f64 = residual.iter().map(|off| off * off).sum();
         let variance = (squares / (n + m - 3.0)).max(rounded * rounded);
         let step = (my[1] - my[0]) - slope * (mx[1] - mx[0]);
         let std = (variance * (1.0 / n + 1.0 / m + (mx[1] - mx[0]).powi(2) / xx)).sqrt();

@@ -7,7 +7,7 @@
 
 use std::collections::HashSet;
 
-use super::held::{Change, changes_of};
+use super::held::{Change, WITHIN_THE_ROW, changes_of};
 use super::lattice::lattice;
 use super::steps::largest_torque;
 use super::{Findings, leave_out, rows_of, runs, throughout};
@@ -28,9 +28,6 @@ const TORN: f64 = 0.2;
 const LEAST_ROWS: usize = 3;
 /// Fewest changes that decide. *Guess*: enough for a mean and its standard deviation.
 const LEAST_CHANGES: usize = 12;
-/// Share of what the error changes by from step to step that it changes by in the very row where the load does so,
-/// too. *Guess*.
-const WITHIN_THE_ROW: f64 = 0.5;
 /// The error changes from step to step by this many standard deviations of the mean. *Guess*: one normal mean in thirty
 /// thousand is farther out.
 const CERTAIN: f64 = 4.0;

@@ -270,18 +270,16 @@ fn on_the_line(lefts: &[Vec<Point>], drift: f64) -> bool {
 /// The slope within sessions, all together, from the medians of their stretches, and its standard deviation about
 /// `drift`.
 fn within_sessions(lefts: &[Vec<Point>], drift: f64) -> (f64, f64) {
-    let (mut xx, mut xy, mut left_over) = (0.0, 0.0, Vec::new());
-    for left in lefts {
+    let centred = |left: &Vec<Point>| -> Vec<Point> {
         let parts: Vec<Point> = left.chunks(left.len().div_ceil(STRETCHES).max(1)).map(middle_of).collect();
         let count = parts.len() as f64;
         let mean = parts.iter().fold((0.0, 0.0), |m, p| (m.0 + p.0 / count, m.1 + p.1 / count));
-        for (x, y) in parts.iter().map(|of| (of.0 - mean.0, of.1 - mean.1)) {
-            (xx, xy) = (xx + x * x, xy + x * y);
-            left_over.push((y - drift * x).powi(2));
-        }
-    }
-    let variance = left_over.iter().sum::<f64>() / left_over.len().max(1) as f64 / xx.max(1e-300);
-    (xy / xx.max(1e-300), variance.sqrt())
+        parts.into_iter().map(|of| (of.0 - mean.0, of.1 - mean.1)).collect()
+    };
+    let centred: Vec<Point> = lefts.iter().flat_map(centred).collect();
+    let LineFit { slope, square, .. } = LineFit::of(&centred);
+    let left_over = centred.iter().map(|(x, y)| (y - drift * x).powi(2)).sum::<f64>();
+    (slope, (left_over / centred.len().max(1) as f64 / square.max(1e-300)).sqrt())
 }
 
 /// The error from this row on, rad: a median of a few rows.

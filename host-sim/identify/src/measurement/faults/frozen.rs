@@ -65,11 +65,7 @@ pub(in crate::measurement) fn check(
 ) -> Result<(), Refusal> {
     let rows = rows_of(sessions);
     let outputs: Vec<Vec<f64>> = sessions.iter().map(|session| session.output_rad(gear.ratio)).collect();
-    let noisy = |series: &[&[f64]]| {
-        let (noise, step) = noise_and_step(series);
-        noise > BLURRED * step && noise > NO_NOISE_RAD
-    };
-    let outputs_noisy = noisy(&outputs.iter().map(Vec::as_slice).collect::<Vec<_>>());
+    let outputs_noisy = has_noise(&outputs.iter().map(Vec::as_slice).collect::<Vec<_>>(), NO_NOISE_RAD);
     let longest = beyond_chance(rows);
     // Digits of an error that was written down leave something of the angle.
     let digits = if error_recorded { 1e-3 * ARCSEC } else { 0.0 };
@@ -92,7 +88,7 @@ pub(in crate::measurement) fn check(
             }
         }
         if error_recorded {
-            let noisy = noisy(&[&session.error_rad]);
+            let noisy = has_noise(&[&session.error_rad], NO_NOISE_RAD);
             let of_error = stretches(&session.error_rad, longest, |a, b| a == b);
             let of_error = of_error.filter(|stretch| noisy || stretch.len() == session.len());
             frozen.extend(of_error.map(|stretch| (Quantity::Error, stretch, 0.0)));
@@ -129,17 +125,18 @@ pub(in crate::measurement) fn check(
         return Err(Refusal::Frozen { channel, frozen: rows - left, rows });
     }
     saturated(sessions, rows, &mut drop, findings);
-    beside(sessions, Quantity::Torque, rows, &mut drop, findings);
-    beside(sessions, Quantity::Temperature, rows, &mut drop, findings);
+    of_channel(sessions, Quantity::Torque, rows, &mut drop, findings);
+    of_channel(sessions, Quantity::Temperature, rows, &mut drop, findings);
     leave_out(sessions, &drop);
     sessions.retain(|session| !session.is_empty());
     Ok(())
 }
 
-/// White noise and resolution of a channel; no lattice is a step of zero.
-fn noise_and_step(series: &[&[f64]]) -> (f64, f64) {
+/// Whether a channel has white noise, more than `least` and enough to blur its resolution.
+fn has_noise(series: &[&[f64]], least: f64) -> bool {
     let longest = series.iter().max_by_key(|values| values.len()).copied().unwrap_or(&[]);
-    (white_noise(series.iter().copied()), lattice(longest).unwrap_or(0.0))
+    let (noise, step) = (white_noise(series.iter().copied()), lattice(longest).unwrap_or(0.0));
+    noise > BLURRED * step && noise > least
 }
 
 /// The farthest an angle goes from its first value in a stretch in which the other one stands.
@@ -168,11 +165,10 @@ fn saturated(sessions: &[Session], rows: usize, drop: &mut [Vec<bool>], findings
     let at_end = |torque: &f64| *torque == least || *torque == most;
     let between: Vec<&[f64]> =
         torques.iter().flat_map(|torque| torque.split(at_end)).filter(|part| part.len() > 8).collect();
-    let (noise, step) = noise_and_step(&between);
-    let tell: usize = between.iter().map(|part| part.len()).sum();
+    let unheld: usize = between.iter().map(|part| part.len()).sum();
     let held: usize = torques.iter().copied().flatten().filter(|torque| at_end(torque)).count();
-    let few = (tell as f64) < BETWEEN_LIMITS * held as f64;
-    if few || most <= least || noise <= BLURRED * step || noise <= ROUND_OFF * (most - least) {
+    let few = (unheld as f64) < BETWEEN_LIMITS * held as f64;
+    if few || most <= least || !has_noise(&between, ROUND_OFF * (most - least)) {
         return;
     }
     for limit in [least, most].into_iter().filter(|limit| *limit != 0.0) {
@@ -189,8 +185,8 @@ fn saturated(sessions: &[Session], rows: usize, drop: &mut [Vec<bool>], findings
         let fault = fault.map(|fault| Fault { advice, ..fault });
         findings.add(fault, Quantity::Torque, Treatment::Masked, |fault| {
             format!(
-                "the torque never passes {limit:.3} N·m, and stands there in {} rows, though it has noise elsewhere: it \
-                 saturates, and these rows are left out",
+                "the torque never passes {limit:.3} N·m, and stands there in {} rows, though it has noise elsewhere: \
+                 it saturates, and these rows are left out",
                 fault.rows
             )
         });
@@ -203,12 +199,18 @@ fn saturated(sessions: &[Session], rows: usize, drop: &mut [Vec<bool>], findings
 ///
 /// A constant load, a load in steps and a soak at one temperature are not faults: only a channel with noise that lost
 /// it, or a channel that always changes, stands, and catches up at once, is frozen.
-fn beside(sessions: &mut [Session], channel: Quantity, rows: usize, drop: &mut [Vec<bool>], findings: &mut Findings) {
+fn of_channel(
+    sessions: &mut [Session],
+    channel: Quantity,
+    rows: usize,
+    drop: &mut [Vec<bool>],
+    findings: &mut Findings,
+) {
     let series: Vec<&[f64]> = sessions.iter().filter_map(|session| session.column(channel)).collect();
     if series.is_empty() {
         return;
     }
-    let (noise, step) = noise_and_step(&series);
+    let has_noise = has_noise(&series, 0.0);
     let steps: Vec<f64> = series.iter().flat_map(|v| v.windows(2).map(|v| (v[1] - v[0]).abs())).collect();
     let standing = steps.iter().filter(|step| **step == 0.0).count();
     let usual = quantile_of(&mut sampled(&steps), 0.99);
@@ -222,7 +224,7 @@ fn beside(sessions: &mut [Session], channel: Quantity, rows: usize, drop: &mut [
             }
             // Without this stretch the channel stands in this many of its steps.
             let elsewhere = (standing + 1).saturating_sub(stretch.len()) as f64 / (rows - stretch.len()).max(1) as f64;
-            let noisy = noise > BLURRED * step && noise > 0.0 && elsewhere < 0.5;
+            let noisy = has_noise && elsewhere < 0.5;
             let back = values.get(stretch.end).map_or(0.0, |next| (next - values[stretch.start]).abs());
             let smooth = elsewhere < 0.02 && back > CATCHES_UP * usual && usual > 0.0;
             if noisy || smooth {

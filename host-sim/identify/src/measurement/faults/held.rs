@@ -1,9 +1,9 @@
 //! A channel that is read more slowly than the log is written, and repeated in between: one value for several rows, all
 //! along.
 //!
-//! What the load does between two readings moves the drive, and the column does not say it. A load that is put on in
+//! A change of the load between two readings moves the drive, and the column does not show it. A load that is put on in
 //! steps as long as these moves the error in the very row of a step, and is left alone. An angle that is repeated is
-//! as old as the row is late: only rows with a new one tell an error. One that stands because it is read in coarse
+//! as old as the row is late: only rows with a new one show an error. One that stands because it is read in coarse
 //! counts goes on by single counts.
 
 use std::ops::Range;
@@ -27,7 +27,7 @@ const NO_STEPS_OF_A_BENCH: usize = 5;
 /// Share of what the error changes by from run to run that it changes by in the very row where the load does: below,
 /// the load goes on between.
 /// *Guess*.
-const WITHIN_THE_ROW: f64 = 0.5;
+pub(super) const WITHIN_THE_ROW: f64 = 0.5;
 
 /// Readings go on by this number of counts from one to the next, at the median, where it is not the counts that make an
 /// angle stand. *Guess*.
@@ -139,7 +139,7 @@ pub(super) struct Change {
     pub in_all: f64,
 }
 
-/// What changes from run to run of a session with torque.
+/// The changes from run to run of a session with torque.
 pub(super) fn changes_of(session: &Session, runs: &[Range<usize>]) -> impl Iterator<Item = Change> {
     let torque = session.torque_n_m.as_deref().unwrap_or_default();
     let level = |rows: &Range<usize>| session.error_rad[rows.clone()].iter().sum::<f64>() / rows.len() as f64;
@@ -174,14 +174,14 @@ mod tests {
         25.0 * (0.9 * t).sin() + 6.0 * (2.3 * t).cos()
     }
 
-    /// Rows of a drive that a load moves by 30 µrad per N·m; `told` is what the column says of it in a row.
-    fn sessions(felt: impl Fn(usize) -> f64, told: impl Fn(usize) -> f64) -> Vec<Session> {
+    /// Rows of a drive that a load moves by 30 µrad per N·m; `read` is the column in a row.
+    fn sessions(felt: impl Fn(usize) -> f64, read: impl Fn(usize) -> f64) -> Vec<Session> {
         let mut random = fastrand::Rng::with_seed(6);
         vec![Session {
             line: (2..6002).collect(),
             generator_rad: (0..6000).map(|k| 0.04 * f64::from(k)).collect(),
             error_rad: (0..6000).map(|k| 3e-5 * felt(k) + 5e-6 * (random.f64() - 0.5)).collect(),
-            torque_n_m: Some((0..6000).map(told).collect()),
+            torque_n_m: Some((0..6000).map(read).collect()),
             ..Session::default()
         }]
     }

@@ -16,7 +16,7 @@ use crate::measurement::log::Log;
 use flexspline_base::robust::median_of;
 
 /// A counter leaps by whole motor turns within this, turns. *Guess*: clearance and wind-up are a tenth of that.
-const BESIDE_TURNS: f64 = 0.2;
+const NEAR_TURNS: f64 = 0.2;
 /// The column that leaps does so this many times more than the other. *Guess*: what both do is a motion.
 const LEAPS_MORE: f64 = 3.0;
 /// Before a leap the generator and the ratio times the output move alike, within this, rad in a row, … *Guess*: 41
@@ -36,7 +36,7 @@ const LEVEL_ROWS: usize = 8;
 const OTHER_ZERO_RAD: f64 = 1500.0 * ARCSEC;
 /// A jump that is off whole tooth pitches by this share of one, or less, is left to the diagnosis: teeth may have
 /// skipped. *Guess*: wind-up that changes meanwhile is smaller.
-const BESIDE_PITCHES: f64 = 0.05;
+const NEAR_PITCHES: f64 = 0.05;
 /// A wrong ratio makes the error grow with the angle, between sessions too: by more than a tenth of this in a generator
 /// turn, rad. *Guess*: 21 arcsec a turn, more than drifts and encoders do.
 const SLOPE: f64 = 1e-3;
@@ -46,7 +46,7 @@ fn moved(values: &[f64], row: usize) -> f64 {
     values[row] - values[row - 1]
 }
 
-/// What a column moves by in the rows around one, which is left out.
+/// Median move of a column in the rows around one, which is left out.
 fn usual(log: &Log, values: &[f64], row: usize) -> f64 {
     let near = row.saturating_sub(AROUND).max(1)..(row + AROUND + 1).min(values.len());
     let mut moves: Vec<f64> = near.filter(|k| *k != row && log.continues(*k)).map(|k| moved(values, k)).collect();
@@ -69,7 +69,7 @@ pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut F
             };
             let (psi, delta) = (before(generator), before(output) * gear.ratio);
             let together = (psi - delta).abs() <= TOGETHER_RAD + TOGETHER * psi.abs().max(delta.abs());
-            let whole = (by_generator / TAU - turns.abs()).abs() < 2.0 * BESIDE_TURNS;
+            let whole = (by_generator / TAU - turns.abs()).abs() < 2.0 * NEAR_TURNS;
             (together && whole && by_generator > LEAPS_MORE * by_output).then_some((row, turns))
         })
         .collect();
@@ -98,7 +98,7 @@ type Turns = (usize, f64);
 /// The whole motor turns, at least one, that an angle is, rad.
 fn whole_turns(angle_rad: f64) -> Option<f64> {
     let turns = angle_rad / TAU;
-    let whole = turns.abs() >= 1.0 - BESIDE_TURNS && (turns - turns.round()).abs() <= BESIDE_TURNS;
+    let whole = turns.abs() >= 1.0 - NEAR_TURNS && (turns - turns.round()).abs() <= NEAR_TURNS;
     whole.then_some(turns.round())
 }
 
@@ -154,10 +154,10 @@ pub(in crate::measurement) fn between_sessions(
     let mut taken_off: Vec<(usize, f64)> = Vec::new();
     for (session, (start, change)) in (1..).zip(between(&sessions)) {
         let jump = change(&error);
-        let beside_slope = jump - slope * change(generator);
+        let without_slope = jump - slope * change(generator);
         if let Some(turns) = whole_turns(-jump * gear.ratio) {
             restarts.push((start, turns));
-        } else if slope == 0.0 && beside_slope.abs() > OTHER_ZERO_RAD && !whole_pitches(jump, gear, BESIDE_PITCHES) {
+        } else if slope == 0.0 && without_slope.abs() > OTHER_ZERO_RAD && !whole_pitches(jump, gear, NEAR_PITCHES) {
             others.push((start, jump));
             taken_off.push((session, taken_off.last().map_or(0.0, |(_, off)| *off) + jump));
         }

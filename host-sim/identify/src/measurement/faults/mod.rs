@@ -129,7 +129,7 @@ fn runs(values: &[f64], same: impl Fn(f64, f64) -> bool) -> Vec<Range<usize>> {
 }
 
 /// Puts a straight line between the values of two rows.
-pub(super) fn straight(values: &mut [f64], from: usize, to: usize) {
+fn straight(values: &mut [f64], from: usize, to: usize) {
     let (low, high) = (values[from], values[to]);
     for row in from + 1..to {
         values[row] = low + (row - from) as f64 / (to - from) as f64 * (high - low);
@@ -163,17 +163,17 @@ fn extent(angle: &[f64], follower: &[f64], rows: Range<usize>) -> Option<(f64, f
 }
 
 /// A straight line through points.
-struct LineFit {
+pub(crate) struct LineFit {
     /// 0 where all points have one abscissa.
-    slope: f64,
+    pub(crate) slope: f64,
     /// Sum of the squares of the abscissas about their mean.
-    square: f64,
+    pub(crate) square: f64,
     /// How far each point is off the line.
-    residual: Vec<f64>,
+    pub(crate) residual: Vec<f64>,
 }
 
 impl LineFit {
-    fn of(points: &[(f64, f64)]) -> LineFit {
+    pub(crate) fn of(points: &[(f64, f64)]) -> LineFit {
         let n = points.len() as f64;
         let (mx, my) = points.iter().fold((0.0, 0.0), |m, p| (m.0 + p.0 / n, m.1 + p.1 / n));
         let about = |p: &(f64, f64)| (p.0 - mx, p.1 - my);

@@ -42,7 +42,7 @@ const SWINGS: f64 = 0.05;
 /// steady motion is evener.
 const GAINS: f64 = 0.1;
 /// Rows before and after that are looked at. *Guess*: the least number of which a median rejects one.
-const BESIDE: usize = 3;
+const AROUND_ONE: usize = 3;
 /// Rows around, for what is usual there. *Guess*: 30 rows in all, of which few are out.
 const AROUND: usize = 15;
 /// If more than this share of the rows is out, these are not outliers but the noise. *Guess*: of normal rows none is.
@@ -77,7 +77,7 @@ fn off_course(values: &[f64], row: usize) -> f64 {
 
 /// Where three rows go on to: their median slope (Theil and Sen) from the median of where it puts them, so that one of
 /// them may be out.
-fn carried_on([a, b, c]: [f64; BESIDE]) -> f64 {
+fn carried_on([a, b, c]: [f64; AROUND_ONE]) -> f64 {
     let slope = median_of(&mut [b - a, c - b, 0.5 * (c - a)]);
     median_of(&mut [a + 3.0 * slope, b + 2.0 * slope, c + slope])
 }
@@ -85,10 +85,10 @@ fn carried_on([a, b, c]: [f64; BESIDE]) -> f64 {
 /// Whether the load moves the drive for a row: it swings, and either holds no flank there or stands out itself.
 fn load_swings(session: &Session, row: usize, largest_n_m: f64) -> bool {
     session.torque_n_m.as_ref().is_some_and(|torque| {
-        let near = &torque[row.saturating_sub(BESIDE)..(row + BESIDE + 1).min(torque.len())];
+        let near = &torque[row.saturating_sub(AROUND_ONE)..(row + AROUND_ONE + 1).min(torque.len())];
         let (low, high) = least_and_most(near.iter().copied());
-        let beside = &torque[row.saturating_sub(1)..(row + 2).min(torque.len())];
-        let let_go = beside.iter().any(|torque| torque.abs() < HELD * largest_n_m);
+        let next = &torque[row.saturating_sub(1)..(row + 2).min(torque.len())];
+        let let_go = next.iter().any(|torque| torque.abs() < HELD * largest_n_m);
         high - low > SWINGS * largest_n_m && (let_go || out_by(torque, row).abs() > SWINGS * largest_n_m)
     })
 }
@@ -98,25 +98,25 @@ fn load_swings(session: &Session, row: usize, largest_n_m: f64) -> bool {
 /// itself does not count, as it may be the one that is wrong.
 fn may_be_felt(session: &Session, row: usize, largest_n_m: f64, fastest_rad: f64) -> bool {
     let Some(torque) = session.torque_n_m.as_deref() else { return false };
-    let beside = row.saturating_sub(BESIDE)..(row + BESIDE + 1).min(torque.len());
-    let others = || beside.clone().filter(|k| *k != row).map(|k| torque[k]);
+    let near = row.saturating_sub(AROUND_ONE)..(row + AROUND_ONE + 1).min(torque.len());
+    let others = || near.clone().filter(|k| *k != row).map(|k| torque[k]);
     let (low, high) = least_and_most(others());
     let strikes = high - low > SWINGS * largest_n_m && others().any(|torque| torque.abs() < HELD * largest_n_m);
-    let moves = beside.clone().skip(1).map(|k| session.generator_rad[k] - session.generator_rad[k - 1]);
+    let moves = near.clone().skip(1).map(|k| session.generator_rad[k] - session.generator_rad[k - 1]);
     let (slow, fast) = least_and_most(moves);
     strikes || fast - slow > GAINS * fastest_rad
 }
 
 /// How far row `row` is from the rows before and after, if both say so; 0 if one of them bears it out.
 fn out_by(values: &[f64], row: usize) -> f64 {
-    if row < BESIDE || row + BESIDE >= values.len() {
+    if row < AROUND_ONE || row + AROUND_ONE >= values.len() {
         return 0.0;
     }
     let middle = |from: usize| {
         let (a, b, c) = (values[from], values[from + 1], values[from + 2]);
         a.max(b).min(a.min(b).max(c))
     };
-    let (before, after) = (values[row] - middle(row - BESIDE), values[row] - middle(row + 1));
+    let (before, after) = (values[row] - middle(row - AROUND_ONE), values[row] - middle(row + 1));
     if before * after <= 0.0 { 0.0 } else { before.signum() * before.abs().min(after.abs()) }
 }
 
@@ -160,7 +160,7 @@ fn count(found: &[Vec<Out>]) -> usize {
 /// Rows that are out by more than `least`, and by far more than all around them but `others` of them.
 fn rows_out(values: &[f64], least: f64, others: usize) -> Vec<Out> {
     let mut found = Vec::new();
-    for row in BESIDE..values.len().saturating_sub(BESIDE) {
+    for row in AROUND_ONE..values.len().saturating_sub(AROUND_ONE) {
         // The cheaper bound first: it is the larger one.
         if out_by(values, row).abs() <= least {
             continue;
@@ -173,7 +173,7 @@ fn rows_out(values: &[f64], least: f64, others: usize) -> Vec<Out> {
         let mut usual: Vec<f64> = around.filter(|k| *k != row).map(|k| out_by(values, k).abs()).collect();
         usual.sort_unstable_by(f64::total_cmp);
         let usual = usual.iter().rev().nth(others).copied().unwrap_or(0.0);
-        let step = (level(values, row - BESIDE..row) - level(values, row + 1..row + 1 + BESIDE)).abs();
+        let step = (level(values, row - AROUND_ONE..row) - level(values, row + 1..row + 1 + AROUND_ONE)).abs();
         if by.abs() > OUT_OF_AROUND * usual && step < 0.5 * by.abs() {
             found.push((row, by));
         }
@@ -247,7 +247,7 @@ fn of_error(sessions: &mut [Session], gear: &Gear, error_recorded: bool, finding
     leave_out(sessions, &drop);
     if many {
         let tail = (TAIL * noise).max(STEPS * resolution);
-        let rounds = (0..TAIL_ROUNDS).map(|round| if round == 0 { BESIDE } else { 0 });
+        let rounds = (0..TAIL_ROUNDS).map(|round| if round == 0 { AROUND_ONE } else { 0 });
         let more: u64 = rounds.map(|ends| leave_out_the_doubtful(sessions, tail, ends)).sum();
         if let Some(fault) = findings.faults.iter_mut().rfind(|fault| fault.name == FaultName::Outliers) {
             fault.rows += more;
@@ -257,7 +257,7 @@ fn of_error(sessions: &mut [Session], gear: &Gear, error_recorded: bool, finding
 
 /// Rows before and after of which the medians confirm a row where many are out. *Source*: derived, of five two may be
 /// out as well.
-const WIDELY_BESIDE: usize = 5;
+const WIDELY_AROUND: usize = 5;
 /// Where many rows are far out, others are out by less: the tail of the same fault, mostly to one side, which would
 /// move means. What is off by more than this number of standard deviations of the white noise is left out as well, of
 /// sound rows one in thousands. *Source*: Hampel's identifier rejects from 3 on (Davies and Gather 1993); medians of
@@ -271,18 +271,18 @@ const TAIL_ROUNDS: usize = 3;
 /// how many are left out.
 fn leave_out_the_doubtful(sessions: &mut [Session], least: f64, ends: usize) -> u64 {
     let mut more = 0;
-    for session in sessions.iter_mut().filter(|session| session.len() > 4 * BESIDE) {
+    for session in sessions.iter_mut().filter(|session| session.len() > 4 * AROUND_ONE) {
         let (error, last) = (&session.error_rad, session.len() - ends);
         let drop: Vec<bool> = (0..error.len())
             .map(|row| {
                 if row < ends || row >= last {
                     return true;
                 }
-                if row < BESIDE || row + BESIDE >= error.len() {
+                if row < AROUND_ONE || row + AROUND_ONE >= error.len() {
                     return false;
                 }
-                let before = level(error, row.saturating_sub(WIDELY_BESIDE)..row);
-                let after = level(error, row + 1..(row + 1 + WIDELY_BESIDE).min(error.len()));
+                let before = level(error, row.saturating_sub(WIDELY_AROUND)..row);
+                let after = level(error, row + 1..(row + 1 + WIDELY_AROUND).min(error.len()));
                 let (from_before, from_after) = (error[row] - before, error[row] - after);
                 let by = from_before.abs().min(from_after.abs());
                 from_before * from_after > 0.0 && by > least && (after - before).abs() < 0.5 * by
@@ -326,7 +326,7 @@ fn of_load(sessions: &mut [Session], channel: Quantity, findings: &mut Findings)
     }
 }
 
-/// What the generator turns by in a row at most, rad.
+/// Largest move of the generator in a row, rad.
 fn fastest(sessions: &[Session]) -> f64 {
     let moves = sessions.iter().flat_map(|session| session.generator_rad.windows(2).map(|at| (at[1] - at[0]).abs()));
     moves.fold(0.0, f64::max)
@@ -415,8 +415,8 @@ mod tests {
             let left_out = 6000 - sessions[0].len();
             assert!(stay * 100 <= out.len(), "{stay} of {} stay", out.len());
             assert!(left_out < out.len() + 40, "{left_out} for {}", out.len());
-            let told = findings.faults.iter().find(|fault| fault.name == FaultName::Outliers).expect("outliers");
-            assert_eq!(told.rows as usize, left_out);
+            let found = findings.faults.iter().find(|fault| fault.name == FaultName::Outliers).expect("outliers");
+            assert_eq!(found.rows as usize, left_out);
         }
     }
 

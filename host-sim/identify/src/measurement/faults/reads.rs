@@ -67,7 +67,7 @@ const AT_REST: f64 = 0.03;
 /// More late rows than this are no late rows. *Guess*: more than a third are no exceptions.
 const MOST_LATE: f64 = 0.35;
 /// Late rows that cannot be distinguished from others are up to this many times those that can. *Guess*.
-const UNTOLD: f64 = 2.0;
+const UNSEEN: f64 = 2.0;
 /// Rows in which the generator turns by more do not follow the waves of a drive, rad. *Guess*.
 const FOLLOWED_RAD: f64 = 0.25;
 /// A step of the time by more than this many usual ones is a pause: rows on both sides of it, as of a bench that goes
@@ -138,45 +138,45 @@ impl<'a> Reads<'a> {
     /// before and after, and by how much these two pairs differ; nothing near the ends.
     fn off(&self, from: usize, run: usize) -> Option<(Vec<f64>, f64)> {
         let at = |place: usize| self.good.get(place).copied();
-        let beside = [at(from.checked_sub(2)?)?, at(from - 1)?, at(from + run)?, at(from + run + 1)?];
+        let around = [at(from.checked_sub(2)?)?, at(from - 1)?, at(from + run)?, at(from + run + 1)?];
         // Neighbours in time, not across what was left out.
-        if beside[3] - beside[0] > 2 * (run + 4) || !self.goes_on(beside[0], beside[3]) {
+        if around[3] - around[0] > 2 * (run + 4) || !self.goes_on(around[0], around[3]) {
             return None;
         }
-        let x: [f64; 4] = std::array::from_fn(|k| (beside[k] - beside[0]) as f64);
+        let x: [f64; 4] = std::array::from_fn(|k| (around[k] - around[0]) as f64);
         let cubic = |at: f64| -> f64 {
             (0..4)
                 .map(|j| {
                     let weight: f64 = (0..4).filter(|k| *k != j).map(|k| (at - x[k]) / (x[j] - x[k])).product();
-                    weight * self.error[beside[j]]
+                    weight * self.error[around[j]]
                 })
                 .sum()
         };
         let off =
-            (from..from + run).map(|place| self.error[self.good[place]] - cubic((self.good[place] - beside[0]) as f64));
+            (from..from + run).map(|place| self.error[self.good[place]] - cubic((self.good[place] - around[0]) as f64));
         let apart =
-            0.5 * (self.error[beside[2]] + self.error[beside[3]] - self.error[beside[1]] - self.error[beside[0]]);
+            0.5 * (self.error[around[2]] + self.error[around[3]] - self.error[around[1]] - self.error[around[0]]);
         Some((off.collect(), apart))
     }
 
     /// Row and scatter of each good row whose four neighbours are good, but for those that are too fast.
     fn scatter(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         let slow = |row: usize| self.speed[row].abs() <= self.fastest;
-        self.beside().filter(move |rows| slow(rows[2])).map(|rows| (rows[2], off_cubic(&self.error, rows)))
+        self.fives().filter(move |rows| slow(rows[2])).map(|rows| (rows[2], off_cubic(&self.error, rows)))
     }
 
     /// Scatter of the error and of the generator's angle over the ratio, and speed, of each row at any speed.
     fn both(&self) -> impl Iterator<Item = [f64; 3]> + '_ {
-        self.beside().map(|rows| [off_cubic(&self.error, rows), off_cubic(&self.turned, rows), self.speed[rows[2]]])
+        self.fives().map(|rows| [off_cubic(&self.error, rows), off_cubic(&self.turned, rows), self.speed[rows[2]]])
     }
 
     /// Five good rows one after another.
-    fn beside(&self) -> impl Iterator<Item = &[usize]> + '_ {
+    fn fives(&self) -> impl Iterator<Item = &[usize]> + '_ {
         self.good.windows(5).filter(|rows| rows[4] - rows[0] == 4 && self.goes_on(rows[0], rows[4]))
     }
 }
 
-/// What the middle one of five rows is off the cubic through the others: (-1, 4, -6, 4, -1) / 6 of the values.
+/// Distance of the middle one of five rows from the cubic through the others: (-1, 4, -6, 4, -1) / 6 of the values.
 fn off_cubic(values: &[f64], rows: &[usize]) -> f64 {
     let e = |k: usize| values[rows[k]];
     (6.0 * e(2) - 4.0 * (e(1) + e(3)) + e(0) + e(4)) / 6.0
@@ -188,12 +188,12 @@ struct Misread {
     noise: f64,
     /// Scatter of the instants at which it is read, rows.
     jitter_rows: f64,
-    /// What it is off by, rad at the output.
+    /// Standard deviation of what it is off by, rad at the output.
     off: f64,
 }
 
 impl Misread {
-    /// What the scatter of both angles shows. Few rows that are far off decide nothing.
+    /// By the scatter of both angles. Few rows that are far off decide nothing.
     fn of(reads: &[Reads<'_>], fast: f64) -> Option<Misread> {
         let rows: Vec<[f64; 3]> = reads.iter().flat_map(Reads::both).collect();
         let most = |of: usize| quantile_of(&mut rows.iter().map(|row| row[of].abs()).collect::<Vec<f64>>(), NEAR);
@@ -288,14 +288,10 @@ fn fit(classes: &[Class], tooth_speed: f64) -> (f64, f64, f64) {
             let x = columns(&classes[k]);
             row.iter_mut().zip(&of).for_each(|(to, k)| *to = x[*k]);
             (classes[k].variance, weight(&classes[k]))
-        });
+        })?;
         let mut values = [0.0; 3];
-        of.iter().zip(fit?.values()).for_each(|(k, value)| values[*k] = value);
-        let misfit = classes.iter().map(|class| {
-            let said: f64 = columns(class).iter().zip(values).map(|(x, c)| x * c).sum();
-            weight(class) * (class.variance - said).powi(2)
-        });
-        values.iter().all(|value| *value >= 0.0).then(|| (values, misfit.sum()))
+        of.iter().zip(fit.values()).for_each(|(k, value)| values[*k] = value);
+        values.iter().all(|value| *value >= 0.0).then(|| (values, fit.misfit()))
     };
     let best = |all: &[[bool; 3]]| {
         all.iter()
@@ -448,7 +444,7 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
         format!("the two angles are not read at one instant: {}", said.join("; "))
     });
     let jitter_rows = if jitters { jitter_rows } else { 0.0 };
-    let unsure_s = (jitter_rows + UNTOLD * late_share * late_rows_each) * period_s.unwrap_or(1.0);
+    let unsure_s = (jitter_rows + UNSEEN * late_share * late_rows_each) * period_s.unwrap_or(1.0);
     sessions.iter_mut().for_each(|session| session.unsure_s = unsure_s);
     weigh(sessions, &speed, noise.max(1e-3 * scatter), jitter_rows);
     if some_are_late {
@@ -504,8 +500,8 @@ fn read_late(of: &mut Reads<'_>, known: &[Class], run: usize) -> Vec<(usize, f64
     let mut taken: Vec<(usize, f64)> = Vec::new();
     let mut gone = vec![false; of.good.len()];
     for from in 2..places {
-        let beside = from.saturating_sub(2)..(from + 3).min(places);
-        let largest = beside.map(|other| sizes[other]).fold(0.0, f64::max);
+        let near = from.saturating_sub(2)..(from + 3).min(places);
+        let largest = near.map(|other| sizes[other]).fold(0.0, f64::max);
         let stands_out = sizes[from] > 0.0 && sizes[from] >= largest;
         if stands_out
             && sizes[from] > LATE * expected(known, of, of.good[from])
@@ -644,9 +640,9 @@ mod tests {
             }
             let mut findings = Findings::default();
             check(std::slice::from_mut(&mut session), &Gear::of_ratio(RATIO), &mut findings);
-            let told = findings.faults.first().and_then(|fault| fault.measures.jitter_ms);
-            assert_eq!(told.is_some(), misread > 0.0, "{step_rad} {misread} {real}: {told:?}");
-            if let Some(jitter_ms) = told {
+            let found = findings.faults.first().and_then(|fault| fault.measures.jitter_ms);
+            assert_eq!(found.is_some(), misread > 0.0, "{step_rad} {misread} {real}: {found:?}");
+            if let Some(jitter_ms) = found {
                 let was = misread / step_rad * 4.0;
                 assert!((jitter_ms / was - 1.0).abs() < 0.1, "{jitter_ms} of {was}");
             }

@@ -36,21 +36,16 @@ pub(super) fn seen(sessions: &[Session], gear: &Gear, error_recorded: bool) -> V
     let Some(session) = sessions.iter().max_by_key(|session| session.len()) else { return Vec::new() };
     let noise = white_noise(sessions.iter().map(|session| session.error_rad.as_slice()));
     let (generator, output) = (&session.generator_rad, session.output_rad(gear.ratio));
-    let share = |rows: &mut dyn Iterator<Item = (bool, bool)>| {
-        let (mut of, mut are) = (0_usize, 0_usize);
-        for (counts, is) in rows {
-            of += usize::from(counts);
-            are += usize::from(counts && is);
-        }
-        are as f64 / of.max(1) as f64
-    };
+    let share = |rows: &[bool]| rows.iter().filter(|is| **is).count() as f64 / rows.len().max(1) as f64;
     // Round-off of an output that is the sum of two columns is no motion.
     let stands = |values: &[f64], others: &[f64], least: f64| {
         let moved = |v: &[f64], row: usize| (v[row] - v[row - 1]).abs() > least;
-        share(&mut (1..values.len()).map(|row| (moved(others, row), !moved(values, row))))
+        let others_move = (1..values.len()).filter(|row| moved(others, *row));
+        share(&others_move.map(|row| !moved(values, row)).collect::<Vec<bool>>())
     };
     let uneven = |values: &[f64], step: f64| {
-        share(&mut values.windows(3).map(|v| (true, (v[2] - 2.0 * v[1] + v[0]).abs() > 0.5 * step)))
+        let bends = values.windows(3).map(|v| (v[2] - 2.0 * v[1] + v[0]).abs());
+        share(&bends.map(|bend| bend > 0.5 * step).collect::<Vec<bool>>())
     };
     let mut found = Vec::new();
     let (channel, measured) =

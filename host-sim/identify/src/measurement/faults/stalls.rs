@@ -9,7 +9,7 @@ use crate::measurement::log::Log;
 use flexspline_base::robust::{least_and_most, median_of, sampled};
 
 /// Rows before and after that must agree on the pace. *Guess*: few, so that the pace is the same.
-const BESIDE: usize = 3;
+const AROUND: usize = 3;
 /// They agree within this share. *Guess*: a leap by a row more is four times that.
 const STEADY: f64 = 0.25;
 /// A leap exceeds what time gives by the motion of this many rows, at least… *Guess*: one, less what the pace may
@@ -33,8 +33,8 @@ type Leap = (usize, f64);
 
 /// Finds stalls that the time does not show, and makes time anew where they are.
 pub(in crate::measurement) fn check(log: &mut Log, gear: &Gear, findings: &mut Findings) {
-    let Some((leaps, telling, period_s)) = leaps(log, gear) else { return };
-    if leaps.len() < FEWEST || leaps.len() as f64 > MOST_SHARE * telling as f64 {
+    let Some((leaps, tested, period_s)) = leaps(log, gear) else { return };
+    if leaps.len() < FEWEST || leaps.len() as f64 > MOST_SHARE * tested as f64 {
         return;
     }
     let size_s = median_of(&mut leaps.iter().map(|(_, extra_s)| *extra_s).collect::<Vec<f64>>());
@@ -75,9 +75,9 @@ fn leaps(log: &Log, gear: &Gear) -> Option<(Vec<Leap>, usize, f64)> {
     };
     let least = OVER_NOISE * scatter(generator);
     let least_leap = least.max(OVER_NOISE * gear.ratio.abs() * scatter(output));
-    let (mut found, mut telling) = (Vec::new(), 0);
-    for row in BESIDE + 1..log.len().saturating_sub(BESIDE) {
-        let near = row - BESIDE..=row + BESIDE;
+    let (mut found, mut tested) = (Vec::new(), 0);
+    for row in AROUND + 1..log.len().saturating_sub(AROUND) {
+        let near = row - AROUND..=row + AROUND;
         if !near.clone().all(|k| log.continues(k)) {
             continue;
         }
@@ -93,7 +93,7 @@ fn leaps(log: &Log, gear: &Gear) -> Option<(Vec<Leap>, usize, f64)> {
         if usual.abs() * period_s < least || spread > STEADY * usual.abs() {
             continue;
         }
-        telling += 1;
+        tested += 1;
         let dt = time[row] - time[row - 1];
         let extra_s = (generator[row] - generator[row - 1]) / usual - dt;
         let by_output = (output[row] - output[row - 1]) * gear.ratio / usual - dt;
@@ -102,7 +102,7 @@ fn leaps(log: &Log, gear: &Gear) -> Option<(Vec<Leap>, usize, f64)> {
             found.push((row, extra_s));
         }
     }
-    Some((found, telling, period_s))
+    Some((found, tested, period_s))
 }
 
 /// Every how many lines stalls come, if they come regularly.
@@ -142,17 +142,17 @@ mod tests {
     fn log(stall_s: f64, counted: bool, noise_rad: f64) -> Log {
         let mut log = Log::default();
         log.line = (2..3002).collect();
-        let (mut told, mut time, mut psi) = (Vec::new(), 0.0, 0.0);
+        let (mut stamps, mut time, mut psi) = (Vec::new(), 0.0, 0.0);
         let (mut generator, mut output) = (Vec::new(), Vec::new());
         for k in 0..3000 {
             let dt = if k % 50 == 0 { 0.01 + stall_s } else { 0.01 };
             time += dt;
             psi += dt * if (1000..1200).contains(&k) { 0.0 } else { 8.0 };
-            told.push(if counted { 0.01 * f64::from(k) } else { time });
+            stamps.push(if counted { 0.01 * f64::from(k) } else { time });
             generator.push(psi);
             output.push(psi / 100.0 + noise_rad * f64::from(k % 3));
         }
-        log.put(Quantity::Time, told);
+        log.put(Quantity::Time, stamps);
         log.put(Quantity::Generator, generator);
         log.put(Quantity::Output, output);
         log

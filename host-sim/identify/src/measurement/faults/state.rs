@@ -1,4 +1,4 @@
-//! What a drive's error may be by its state alone: a plain regression that soaks up flanks, load, position, speed and
+//! The error of a drive by its state alone: a plain regression that soaks up flanks, load, position, speed and
 //! temperature, so that what is left can be asked for steps and drift.
 //!
 //! It names no cause and is not the diagnosis; it only has to be rich enough that no cause is taken for a fault of the
@@ -8,6 +8,7 @@ use std::sync::OnceLock;
 
 use flexspline_algebra::{Mat, cholesky, lower_of_product, product};
 
+use super::steps::largest_torque;
 use crate::measurement::gear::Gear;
 use crate::measurement::{Session, directions};
 use flexspline_base::robust::median_and_std;
@@ -64,22 +65,17 @@ pub(super) type Extra<'a> = &'a dyn Fn(usize, usize) -> f64;
 impl<'a> StateModel<'a> {
     pub fn new(sessions: &'a [Session], gear: &Gear) -> Self {
         let flank = sessions.iter().map(|session| directions(&session.generator_rad)).collect();
-        let largest = |values: &dyn Fn(&Session) -> Option<&[f64]>| {
-            sessions.iter().filter_map(values).flatten().fold(0.0, |most: f64, value| most.max(value.abs()))
-        };
-        let mean = |values: &dyn Fn(&Session) -> Option<&[f64]>| {
-            let all = || sessions.iter().filter_map(values).flatten();
-            all().sum::<f64>() / (all().count().max(1) as f64)
-        };
-        let middle = mean(&|s| s.temperature_c.as_deref());
-        let warmest = largest(&|s| s.temperature_c.as_deref()).max(1.0);
+        let temperatures = || sessions.iter().filter_map(|session| session.temperature_c.as_ref()).flatten();
+        let mean = temperatures().sum::<f64>() / temperatures().count().max(1) as f64;
+        let warmest = temperatures().fold(1.0, |most: f64, value| most.max(value.abs()));
+        let turned = sessions.iter().flat_map(|session| &session.generator_rad);
         StateModel {
             sessions,
             ratio: gear.ratio,
             flank,
-            torque_scale: largest(&|s| s.torque_n_m.as_deref()),
-            motion_scale: largest(&|s| Some(&s.generator_rad)).max(1e-12),
-            temperature: (middle, warmest),
+            torque_scale: largest_torque(sessions),
+            motion_scale: turned.fold(1e-12, |most: f64, psi| most.max(psi.abs())),
+            temperature: (mean, warmest),
             sampled: OnceLock::new(),
         }
     }

@@ -23,7 +23,7 @@ const SAME: f64 = 0.02;
 const RATIO_ERROR: [f64; 2] = [0.8, 1.25];
 /// The wheel that is fixed changes the ratio by one: it is judged once the output has turned this far, rad, as
 /// clearance does not hide it then. *Guess*: at a ratio of 100 the difference is 7 arc-minutes.
-const TELLS_WHEELS_APART_RAD: f64 = 0.2;
+const SHOWS_THE_WHEEL_RAD: f64 = 0.2;
 /// A ratio is that of the other wheel within this share. *Guess*: a tenth of the difference at a ratio of 100.
 const OTHER_WHEEL: f64 = 1e-3;
 /// Errors that spread (robust, rad) by more than the first or by less than the second are not errors of a drive in the
@@ -74,20 +74,15 @@ fn column(columns: &[MappedColumn], quantity: Quantity) -> (&str, Unit) {
     column.map_or((quantity.name(), quantity.default_column().1), |column| (&column.name, column.unit))
 }
 
-/// Units that have no gain to be said, in which a value in the unit of `column` lies within `allowed`, with the value
-/// there; and how to say them.
-fn may_be(
-    value: f64,
-    quantity: Quantity,
-    (column, unit): (&str, Unit),
-    inside: &str,
-    allowed: impl Fn(f64) -> bool,
-) -> Option<String> {
+/// Units without a gain in which the values of a column lie within `allowed`, as `value` does in the unit given; and
+/// how to say them.
+fn may_be(value: f64, quantity: Quantity, columns: &[MappedColumn], allowed: impl Fn(f64) -> bool) -> Option<String> {
+    let (column, unit) = column(columns, quantity);
+    let (_, inside) = quantity.default_column();
     let number = (value - unit.zero()) / unit.factor();
-    let plain =
-        quantity.family().units().filter(|other| !matches!(other, Unit::Ampere | Unit::Milliampere | Unit::Volt));
-    let may_be: Vec<(Unit, f64)> =
-        plain.map(|other| (other, Reading::of(other).value(number))).filter(|(_, value)| allowed(*value)).collect();
+    let plain = |other: &Unit| !matches!(other, Unit::Ampere | Unit::Milliampere | Unit::Volt);
+    let all = quantity.family().units().filter(plain).map(|other| (other, Reading::of(other).value(number)));
+    let may_be: Vec<(Unit, f64)> = all.filter(|(_, value)| allowed(*value)).collect();
     let (first, _) = may_be.first()?;
     let read: Vec<String> = may_be.iter().map(|(unit, value)| format!("{unit} ({value:.4} {inside})")).collect();
     let read = read.join(" or ");
@@ -103,8 +98,8 @@ fn torque(log: &mut Log, columns: &[MappedColumn], gear: &Gear, findings: &mut F
     if size <= limit {
         return Ok(());
     }
-    let units = may_be(size, Quantity::Torque, column(columns, Quantity::Torque), "N.m", |torque| torque <= limit);
-    let say_it = units.ok_or(Refusal::Torque { size, limit })?;
+    let say_it = may_be(size, Quantity::Torque, columns, |torque| torque <= limit);
+    let say_it = say_it.ok_or(Refusal::Torque { size, limit })?;
     let what = format!(
         "torque of {size:.0} N.m, where {limit:.0} N.m is the most: it is in another unit, and is not used{say_it}"
     );
@@ -122,8 +117,7 @@ fn temperature(log: &mut Log, columns: &[MappedColumn], findings: &mut Findings)
     if exists(median) {
         return;
     }
-    let units = may_be(median, Quantity::Temperature, column(columns, Quantity::Temperature), "C", exists);
-    let say_it = units.unwrap_or_default();
+    let say_it = may_be(median, Quantity::Temperature, columns, exists).unwrap_or_default();
     let what = format!("a temperature of {median:.1} degrees C is not plausible: it is not used{say_it}");
     log.take(Quantity::Temperature);
     mismatch(log, Some(Quantity::Temperature), Treatment::Masked, what, findings);
@@ -199,7 +193,7 @@ fn ratio(log: &mut Log, columns: &[MappedColumn], gear: &Gear, findings: &mut Fi
         return Ok(());
     }
     if let Some(other) = gear.other_wheel_ratio
-        && travel > TELLS_WHEELS_APART_RAD
+        && travel > SHOWS_THE_WHEEL_RAD
         && (slope * other - 1.0).abs() <= OTHER_WHEEL
     {
         return Err(Refusal::OtherWheel { seen, ratio: other });

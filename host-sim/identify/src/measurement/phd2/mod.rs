@@ -20,7 +20,7 @@ mod text;
 use std::f64::consts::TAU;
 use std::io::{BufRead, BufReader, Read};
 
-use super::columns::{Quantity, Unit};
+use super::columns::{MappedColumn, Quantity, Reading, Unit};
 use super::log::Log;
 use super::reader::clock;
 use axis::Pointing;
@@ -61,7 +61,7 @@ struct GuideSection {
     guide_speed: Option<f64>,
     /// The columns of its table, and where those of [`COLUMNS`] stand.
     table: Option<(Header, [Option<usize>; COLUMNS.len()])>,
-    /// What pulses have set the axis forward by, arcsec.
+    /// Angle by which pulses have set the axis forward, arcsec.
     sent_arcsec: f64,
     frames: Vec<Frame>,
     pulses: u32,
@@ -270,18 +270,14 @@ fn of_sections(sections: &[GuideSection], stands: &[f64], ratio: f64, further: V
 }
 
 /// The columns of such a log as if they had been mapped.
-pub(super) fn columns() -> Vec<super::columns::MappedColumn> {
-    [(Quantity::Time, Unit::Second), (Quantity::Generator, Unit::Radian), (Quantity::Error, Unit::Radian)]
-        .into_iter()
-        .enumerate()
-        .map(|(place, (quantity, unit))| super::columns::MappedColumn {
-            quantity,
-            name: COLUMNS[[0, 0, 2][place]].to_owned(),
-            place,
-            unit,
-            reading: super::columns::Reading::of(unit),
-        })
-        .collect()
+pub(super) fn columns() -> Vec<MappedColumn> {
+    let column = |(place, (quantity, name, unit)): (usize, (Quantity, usize, Unit))| {
+        let name = COLUMNS[name].to_owned();
+        MappedColumn { quantity, name, place, unit, reading: Reading::of(unit) }
+    };
+    let columns =
+        [(Quantity::Time, 0, Unit::Second), (Quantity::Generator, 0, Unit::Radian), (Quantity::Error, 2, Unit::Radian)];
+    columns.into_iter().enumerate().map(column).collect()
 }
 
 #[cfg(test)]

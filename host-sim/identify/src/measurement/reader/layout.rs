@@ -26,9 +26,10 @@ const ROWS_OF_A_NAME: usize = 4;
 const EPOCH_S: std::ops::RangeInclusive<f64> = 1e9..=3e9;
 
 /// The separator of two fields.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Separator {
     /// `,`
+    #[default]
     Comma,
     /// `;`
     Semicolon,
@@ -109,7 +110,7 @@ pub(super) fn texts(record: &csv::ByteRecord) -> Vec<String> {
 }
 
 /// How a file is laid out.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Layout {
     /// Between fields.
     pub separator: Separator,
@@ -199,16 +200,12 @@ impl Layout {
         Ok(match guessed {
             Some(layout) if !own || layout.header_line == first.number => layout,
             _ => Layout {
-                separator: Separator::Comma,
-                decimal_comma: false,
                 has_names: true,
-                units: Vec::new(),
                 header_line: first.number,
                 first_row_line: first.number + 1,
                 kinds: vec![CellKind::Number; first.fields.len()],
-                forms: vec![None; first.fields.len()],
-                stamp: None,
                 names: first.fields,
+                ..Layout::default()
             },
         })
     }
@@ -225,13 +222,10 @@ impl Layout {
             separator,
             decimal_comma: comma,
             names: (1..=width).map(|k| format!("#{k}")).collect(),
-            has_names: false,
-            units: Vec::new(),
             header_line: begins,
             first_row_line: begins,
             kinds,
-            forms: Vec::new(),
-            stamp: None,
+            ..Layout::default()
         };
         let (above, rows) = lines.split_at(rows_from);
         if let Some((line, names)) = layout.find_names(above, width, known, notes)? {
@@ -284,14 +278,13 @@ impl Layout {
         let others: Vec<&HeadLine> =
             block.iter().filter(|line| line.number != names.number && line.number != units_line).collect();
         if let (Some(first), Some(last)) = (others.first(), others.last()) {
-            let which = if first.number == last.number {
-                format!("line {} above the rows is", first.number)
-            } else {
-                format!("lines {} to {} above the rows are", first.number, last.number)
-            };
+            let (lines, are) = lines_text(first.number, last.number);
             let words = others.iter().filter_map(|line| line.fields.iter().find(|field| !field.is_empty()));
             let words = words.map(String::as_str).collect::<Vec<_>>().join(", ");
-            notes.push(format!("{which} neither names nor units ({}): left out", shortened(&words)));
+            notes.push(format!(
+                "{lines} above the rows {are} neither names nor units ({}): left out",
+                shortened(&words)
+            ));
         }
         Ok(Some((names.number, names.fields.clone())))
     }
@@ -539,6 +532,11 @@ fn comment_with_names(head: &[u8], begins: u64, separator: Separator, width: usi
         (k as u64 + 1, names.into_iter().next().map_or_else(Vec::new, |line| line.fields))
     });
     names.into_iter().find(|(_, names)| names.len() == width && looks_like_names(names))
+}
+
+/// Lines of a file, and the verb that goes with them.
+pub(super) fn lines_text(first: u64, last: u64) -> (String, &'static str) {
+    if first == last { (format!("line {first}"), "is") } else { (format!("lines {first} to {last}"), "are") }
 }
 
 /// A text of at most 60 characters.

@@ -8,7 +8,6 @@ pub(super) mod clock;
 mod layout;
 mod number;
 pub mod raw;
-pub(super) mod slower;
 pub(super) mod stamps;
 mod text;
 
@@ -16,7 +15,9 @@ use rayon::prelude::*;
 
 use flexspline_base::csv_rows::TableProblem;
 pub(super) use layout::unit_word;
-use layout::{Joined, begins_with_a_word, is_comment, looks_like_names, plain, shortened, texts, with_tabs};
+use layout::{
+    Joined, begins_with_a_word, is_comment, lines_text, looks_like_names, plain, shortened, texts, with_tabs,
+};
 pub use layout::{Layout, Separator};
 use number::CellValue;
 
@@ -31,7 +32,7 @@ const MOST_LINES_OF_A_FIELD: usize = 20;
 pub struct Sheet {
     /// How it is laid out.
     pub layout: Layout,
-    /// What was converted or left out; one sentence each.
+    /// Sentences on what was converted or left out.
     pub notes: Vec<String>,
     text: Vec<u8>,
 }
@@ -91,11 +92,9 @@ pub(crate) struct Columns {
     pub cells: Vec<Cells>,
     /// Line of each row.
     pub lines: Vec<u64>,
-    /// Rows that have fewer fields than names: line, and fields it has.
-    pub short: Vec<(u64, usize)>,
-    /// Rows that have more fields than names, which are not blank: line, and fields it has.
-    pub wide: Vec<(u64, usize)>,
-    /// What was left out; one sentence each.
+    /// Rows that have fewer fields than names, or more which are not blank: line, and fields it has.
+    pub odd: Vec<(u64, usize)>,
+    /// Sentences on what was left out.
     pub notes: Vec<String>,
 }
 
@@ -183,16 +182,14 @@ impl Sheet {
                 all.append(cells);
             }
             all.lines.extend(part.read.lines);
-            all.short.extend(part.read.short);
-            all.wide.extend(part.read.wide);
+            all.odd.extend(part.read.odd);
         }
         if let Some(first) = holes.first() {
-            let count = holes.len();
+            let (lines, are) = if holes.len() == 1 { ("line", "it is") } else { ("lines", "they are") };
             all.notes.push(format!(
-                "zero bytes stand in {count} line{}, first in line {first}, as a card leaves them that lost its power: \
-                 {} left out",
-                if count == 1 { "" } else { "s" },
-                if count == 1 { "it is" } else { "they are" }
+                "zero bytes stand in {} {lines}, first in line {first}, as a card leaves them that lost its power: \
+                 {are} left out",
+                holes.len()
             ));
         }
         self.sort_out(places, wordy, &mut all)?;
@@ -253,11 +250,8 @@ impl Sheet {
     /// Reads the cells of a row.
     fn read_row(&self, places: &[usize], record: &csv::ByteRecord, line: u64, row: usize, read: &mut Columns) {
         let (count, width) = (record.len(), self.layout.names.len());
-        if count > width && record.iter().skip(width).any(|field| !plain(field).is_empty()) {
-            read.wide.push((line, count));
-        }
-        if count < width {
-            read.short.push((line, count));
+        if count < width || record.iter().skip(width).any(|field| !plain(field).is_empty()) {
+            read.odd.push((line, count));
         }
         for (cells, place) in read.cells.iter_mut().zip(places) {
             let field = record.get(*place).map_or(&b""[..], plain);
@@ -313,17 +307,11 @@ impl Sheet {
                 restarts.push(*line);
             } else if last.0 + 1 == rows && wordy.len() < rows {
                 // What begins with words at the end is a summary.
-                let lines = if first.1 == last.1 {
-                    format!("line {}", first.1)
-                } else {
-                    format!("lines {} to {}", first.1, last.1)
-                };
-                all.notes.push(format!(
-                    "{lines} at the end, from \"{}\" on, {} no row{}: left out",
-                    shortened(&texts(&first.2)[0]),
-                    if first.1 == last.1 { "is" } else { "are" },
-                    if first.1 == last.1 { "" } else { "s" }
-                ));
+                let (lines, are) = lines_text(first.1, last.1);
+                let rows = if first.1 == last.1 { "row" } else { "rows" };
+                let from = texts(&first.2).swap_remove(0);
+                let from = shortened(&from);
+                all.notes.push(format!("{lines} at the end, from \"{from}\" on, {are} no {rows}: left out"));
             } else {
                 for (row, line, record) in group {
                     let fields = texts(record);
@@ -362,16 +350,14 @@ impl Sheet {
 impl Columns {
     /// The same rows with other columns.
     pub(super) fn with_cells(&self, cells: Vec<Cells>) -> Columns {
-        let Columns { lines, short, wide, .. } = self;
-        let (lines, short, wide) = (lines.clone(), short.clone(), wide.clone());
-        Columns { cells, lines, short, wide, notes: Vec::new() }
+        Columns { cells, lines: self.lines.clone(), odd: self.odd.clone(), notes: Vec::new() }
     }
 
     /// Leaves out the last row if it breaks off before the field at `place`; its line.
     pub(super) fn without_broken_end(&mut self, place: usize) -> Option<u64> {
-        let last = self.short.last().filter(|(line, fields)| *fields <= place && self.lines.last() == Some(line));
+        let last = self.odd.last().filter(|(line, fields)| *fields <= place && self.lines.last() == Some(line));
         let (line, _) = *last?;
-        self.short.pop();
+        self.odd.pop();
         self.lines.pop();
         for cells in &mut self.cells {
             cells.values.pop();
