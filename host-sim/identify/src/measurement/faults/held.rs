@@ -48,17 +48,17 @@ pub(in crate::measurement) fn check(sessions: &mut [Session], gear: &Gear, findi
     }
 }
 
-/// Runs of one value of a channel in each session.
-type SessionRuns = Vec<Vec<Range<usize>>>;
+/// Runs of one value of a channel in a session.
+type Runs = Vec<Range<usize>>;
 
 /// Runs of one value, but for round-off.
-fn runs_of(values: &[f64]) -> Vec<Range<usize>> {
+fn runs_of(values: &[f64]) -> Runs {
     let same = SAME * values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
     runs(values, |a, b| (a - b).abs() <= same)
 }
 
 /// Rows from one new value to the next, if most runs of one value are as long; with the fault of it, to be completed.
-fn rhythm(sessions: &[Session], of: &SessionRuns) -> Option<(usize, Fault)> {
+fn rhythm(sessions: &[Session], of: &[Runs]) -> Option<(usize, Fault)> {
     // The first and the last of a session are cut.
     let inner = || of.iter().flat_map(|runs| runs.get(1..runs.len().saturating_sub(1)).unwrap_or_default());
     let mut lengths: Vec<f64> = inner().map(|run| run.len() as f64).collect();
@@ -79,7 +79,7 @@ fn check_angle(sessions: &mut [Session], channel: Quantity, gear: &Gear, finding
         _ => session.output_rad(gear.ratio),
     };
     let angles: Vec<Vec<f64>> = sessions.iter().map(angle).collect();
-    let of: SessionRuns = angles.iter().map(|angle| runs_of(angle)).collect();
+    let of: Vec<Runs> = angles.iter().map(|angle| runs_of(angle)).collect();
     let Some((every, fault)) = rhythm(sessions, &of) else { return };
     let of_counts = angles.iter().zip(&of).max_by_key(|(angle, _)| angle.len()).is_some_and(|(angle, runs)| {
         let mut steps: Vec<f64> =
@@ -100,7 +100,7 @@ fn check_angle(sessions: &mut [Session], channel: Quantity, gear: &Gear, finding
         )
     });
     // Where it stands for longer, it is the drive that stands.
-    let repeats = |runs: &Vec<Range<usize>>| {
+    let repeats = |runs: &Runs| {
         let short = runs.iter().filter(|run| run.len() <= 2 * every);
         short.flat_map(|run| run.start + 1..run.end).collect::<Vec<usize>>()
     };
@@ -111,7 +111,7 @@ fn check_angle(sessions: &mut [Session], channel: Quantity, gear: &Gear, finding
 
 fn check_torque(sessions: &mut [Session], findings: &mut Findings) {
     let torques = sessions.iter().map(|session| session.torque_n_m.as_deref().unwrap_or_default());
-    let of: SessionRuns = torques.map(runs_of).collect();
+    let of: Vec<Runs> = torques.map(runs_of).collect();
     let Some((every, fault)) = rhythm(sessions, &of) else { return };
     if every >= NO_STEPS_OF_A_BENCH && !goes_on_between(sessions, &of) {
         return;
@@ -153,7 +153,7 @@ pub(super) fn changes_of(session: &Session, runs: &[Range<usize>]) -> impl Itera
 
 /// Whether the error goes on from run to run, instead of changing with the torque within a row. Where the torque
 /// changes its sign the flank does, and those do not count.
-fn goes_on_between(sessions: &[Session], of: &SessionRuns) -> bool {
+fn goes_on_between(sessions: &[Session], of: &[Runs]) -> bool {
     let (mut within, mut in_all) = (0.0, 0.0);
     for change in sessions.iter().zip(of).flat_map(|(session, runs)| changes_of(session, runs)) {
         let [low, high] = change.load;

@@ -5,7 +5,6 @@
 //! columns moved.
 
 use std::f64::consts::TAU;
-
 use std::ops::Range;
 
 use super::{ARCSEC, Findings, add_steps, extent, farthest, level, whole_pitches};

@@ -52,7 +52,6 @@ use std::ops::Range;
 
 use super::fault::{Fault, FaultName, ToothStep, Treatment};
 use super::gear::Gear;
-use super::log::Log;
 use super::{Quantity, Session};
 use flexspline_base::robust::median_of;
 
