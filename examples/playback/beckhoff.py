@@ -6,18 +6,18 @@ comes from one side, export with --direction + or - and set TableParameter.Direc
 """
 
 import math
-import sys
 
-from curve import Curve, refuse
+from curve import arguments
 
 MOST = 20_000  # entries that a PLC program is still edited with: a guess
 
-curve = Curve(sys.argv[1])
+(curve,) = arguments()
 if curve.turns != 1:
-    refuse(f"the correction repeats after {curve.turns} output turns; a modulo axis has one")
+    curve.refuse(f"the correction repeats after {curve.turns} output turns; a modulo axis has one")
 points = len(curve.both)
 if points >= MOST:
-    refuse(f"{points + 1} entries; allowed: {MOST}; export with a smaller --points-per-turn")
+    most = MOST // round(abs(curve.ratio))
+    curve.refuse(f"{points + 1} entries; allowed: {MOST}; export with --points-per-turn {most} or less")
 print("(*", *(f"  {line}" for line in curve.comments), "*)", sep="\n")
 print("{attribute 'qualified_only'}\nVAR_GLOBAL")
 print(

@@ -6,15 +6,14 @@ Add kopf.achs_nr and kopf.log_achs_name of the axis; switch on by lr_param.ssfk 
 """
 
 import math
-import sys
 
-from curve import Curve, refuse
+from curve import arguments
 
 STEPS = 1440  # fewer than 1500 entries are read without kw.ssfk.max_points; 2500 units apart
 
-curve = Curve(sys.argv[1])
+(curve,) = arguments()
 if curve.turns != 1 or len(curve.columns) != 2:
-    refuse("a list has one output turn and both directions: export with --direction both")
+    curve.refuse("a list has one output turn and both directions: export with --direction both")
 print(*(f"# {line}" for line in curve.comments), sep="\n")
 print("# values: position error, actual less setpoint, in 0.0001 deg")
 header = {"unit": 1, "interval": 3_600_000 // STEPS, "kw_startpos": 0, "kw_nr_max": STEPS + 1}

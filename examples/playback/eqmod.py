@@ -8,20 +8,20 @@ generator's zero.
 """
 
 import math
-import sys
 
-from curve import ARCSEC, Curve, refuse
+from curve import ARCSEC, arguments, refuse
 
 SIDEREAL = 15.041067  # arcsec/s
 DAY_S = 86_164.0905
 
-curve = Curve(sys.argv[1])
-steps = float(sys.argv[2]) if len(sys.argv) > 2 else 9_024_000  # EQ6
-zero = int(sys.argv[3]) if len(sys.argv) > 3 else 0
+curve, *given = arguments(float, int, optional=2)
+steps, zero = (given + [9_024_000, 0][len(given) :])  # EQ6
+if steps <= 0:
+    refuse(f"found {steps} steps of a turn; allowed: above 0")
 worm = round(steps / abs(curve.ratio))
 period = int(DAY_S * worm / steps + 0.5)
 if not 30 <= period <= 32_000:
-    refuse(f"a generator turn takes {period} s; allowed: 30 to 32000")
+    curve.refuse(f"a generator turn takes {period} s; allowed: 30 to 32000")
 turns = round(abs(curve.ratio) * curve.turns)
 mean = lambda second: curve.sign * sum(  # of the correction this long after all zeros of the generator
     curve.at(curve.columns[0], curve.sign * (t + second / period) / abs(curve.ratio) * math.tau) for t in range(turns)

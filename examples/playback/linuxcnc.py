@@ -6,16 +6,14 @@ The joint's zero and positive direction are those of the table's output. `--dire
 """
 
 import math
-import sys
 
-from curve import Curve, refuse
+from curve import arguments, refuse
 
 MOST = 256  # EMCMOT_COMP_SIZE
 
-curve = Curve(sys.argv[1])
-first, last = (float(word) for word in sys.argv[2:4])
+curve, first, last = arguments(float, float)
 if len(curve.columns) != 2:
-    refuse("a triplet has both directions: export with --direction both")
+    curve.refuse("a triplet has both directions: export with --direction both")
 if not 0 < last - first <= 360:
     refuse(f"found {first} to {last} deg; allowed: up to 360, the second above the first")
 step = math.degrees(curve.step_rad)

@@ -7,20 +7,20 @@ the generator's. Every line is a command to the device, so there is no comment.
 """
 
 import math
-import sys
 
-from curve import Curve, refuse
+from curve import arguments, refuse
 
 SIZE = 256  # kCompensationSize; values hold at the left edge of their bin
-BETWEEN = 64  # samples to a point of the CSV: two or more to a bin
+SAMPLES = 4096  # of a generator turn, at least: 16 to a bin
 
-curve = Curve(sys.argv[1])
-source = sys.argv[2] if len(sys.argv) > 2 else "0"
-if source not in ("0", "1", "2"):
+curve, *given = arguments(int, optional=1)
+source = given[0] if given else 0
+if source not in (0, 1, 2):
     refuse(f"found source {source}; allowed: 0, 1, 2")
 sums, weights = [0.0] * SIZE, [0.0] * SIZE
-for k in range(len(curve.both) * BETWEEN):
-    output = k * curve.step_rad / BETWEEN
+between = math.ceil(SAMPLES * abs(curve.ratio) * curve.turns / len(curve.both))  # samples to a point
+for k in range(len(curve.both) * between):
+    output = k * curve.step_rad / between
     correction = curve.at(curve.both, output)
     # The generator stands at the corrected command, and there the output errs by minus the correction.
     generator = (output + correction) * curve.ratio / math.tau

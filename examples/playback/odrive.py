@@ -6,18 +6,15 @@ of the output. The correction is that of the direction of the motion.
 """
 
 import math
-import sys
 
-from curve import Curve, refuse
+from curve import arguments, refuse
 
-curve = Curve(sys.argv[1])
-axis = sys.argv[2]
-start, end, step = (float(word) for word in sys.argv[3:6])
-if axis not in ("0", "1") or step <= 0:
+curve, axis, start, end, step = arguments(int, float, float, float)
+if axis not in (0, 1) or step <= 0:
     refuse(f"found axis {axis}, step {step}; allowed: 0 or 1, more than 0 deg")
 sign = 1 if end >= start else -1
 if len(curve.columns) == 1 and sign != curve.sign:
-    refuse("the CSV is made for the other direction; export with --direction both")
+    curve.refuse("the CSV is made for the other direction; export with --direction both")
 column = curve.columns[-1 if sign < 0 else 0]
 for k in range(int(abs(end - start) / step + 1e-9) + 1):
     asked = math.radians(start + sign * k * step)

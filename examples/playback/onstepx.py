@@ -9,15 +9,17 @@ that are printed on standard error; `:$QZ+#` starts it.
 import math
 import sys
 
-from curve import Curve, refuse
+from curve import arguments, refuse
 
-curve = Curve(sys.argv[1])
-steps_per_turn = float(sys.argv[2]) * 360
+curve, steps_per_degree = arguments(float)
+if steps_per_degree <= 0:
+    refuse(f"found {steps_per_degree} steps; allowed: above 0")
+steps_per_turn = steps_per_degree * 360
 rate = steps_per_turn / 86_400  # motor steps in a sidereal second
 worm = round(steps_per_turn / abs(curve.ratio))
 entries = round(worm / rate)
 if not 61 <= entries <= 30_000:
-    refuse(f"a generator turn takes {entries} sidereal seconds; allowed: 61 to 30000")
+    curve.refuse(f"a generator turn takes {entries} sidereal seconds; allowed: 61 to 30000")
 left = worm / rate - entries  # this rest plays an entry that a whole second plays too: both are 0
 free, first = entries - (abs(left) > 1e-9), int(left > 1e-9)
 turns = round(abs(curve.ratio) * curve.turns)
@@ -30,7 +32,7 @@ buffer = [0] * entries
 for k in range(free):
     buffer[(first + k - 1) % entries] = nodes[(k + 1) % free] - nodes[k]
 if max(map(abs, buffer)) > min(127, round(rate)):
-    refuse(f"{max(map(abs, buffer))} steps in a second; allowed: {min(127, round(rate))}")
+    curve.refuse(f"{max(map(abs, buffer))} steps in a second; allowed: {min(127, round(rate))}")
 print(":$QZZ#", *(f":WR{k},{steps}#" for k, steps in enumerate(buffer)), ":$QZ!#", sep="\n")
 room = math.ceil(entries / 16) * 16
 print(f"PEC_STEPS_PER_WORM_ROTATION {worm}, PEC_BUFFER_SIZE_LIMIT {room} or more", file=sys.stderr)

@@ -5,11 +5,9 @@ holds no curve: the ratio and the mean error, all that changes with the angle st
 with a table is a plug-in of your own around the core.
 """
 
-import sys
+from curve import arguments
 
-from curve import Curve
-
-curve = Curve(sys.argv[1])
+(curve,) = arguments()
 print("<!--", *(f"  {line}" for line in curve.comments), "-->", sep="\n")
 print(f"""<transmission name="flexspline">
   <plugin>transmission_interface/SimpleTransmission</plugin>
