@@ -432,7 +432,7 @@ fn table_of(change: impl FnOnce(&mut Drive)) -> (MadeTable, Validation) {
     let made = make(&drive, GeneratorKind::Cam, &how, &|_| ControlFlow::Continue(())).unwrap();
     let table = Table::check(&made.image).unwrap();
     let settings = ValidationSettings { torques: 8, temperatures: 1, positions: 2, seed: 7, solver, spring: None };
-    let checked = validate(&drive, &table, &settings, &mut |_, _| ControlFlow::Continue(())).unwrap();
+    let checked = validate(&drive, &table, &settings, &mut |_, _| ()).unwrap();
     (made, checked)
 }
 

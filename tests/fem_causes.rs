@@ -14,7 +14,6 @@
 //! cause can imitate.
 
 use std::f64::consts::{PI, TAU};
-use std::ops::ControlFlow;
 use std::sync::{Arc, OnceLock};
 
 use flexspline::Table;
@@ -64,7 +63,7 @@ pub(crate) fn known() -> &'static (Vec<u8>, Arc<Kernels>) {
             directions: if long() { 19 } else { 10 },
             ..KernelPlan::for_generator(GeneratorKind::Cam)
         };
-        let kernels = make(&Drive::hhd_95(), GeneratorKind::Cam, &plan, coarse(), &|_| ControlFlow::Continue(()));
+        let kernels = make(&Drive::hhd_95(), GeneratorKind::Cam, &plan, coarse(), &|_| ());
         (std::fs::read(desk.path("made/cam.fxt")).unwrap(), Arc::new(kernels.unwrap()))
     })
 }

@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::Serialize;
 
-use super::Failure;
 use super::context::{Context, image_file};
+use super::{Failure, bad_file};
 use flexspline_base::output::{Outputs, WholeFolder, prepare_folder};
 use flexspline_base::suggest::{likeliest, question};
 use flexspline_export::bundle::libraries::{BundleLibrary, LibraryError, Places, TARGETS};
@@ -104,10 +104,9 @@ impl BundleCommand {
 
     fn read_tables(&self) -> Result<Vec<BundledTable>, Failure> {
         let place = &self.tables;
-        let unreadable = |path: &Path, error| Failure::BadInput(format!("{}: {error}", path.display()));
         let mut paths = vec![place.clone()];
         if place.is_dir() {
-            let entries = fs::read_dir(place).map_err(|error| unreadable(place, error))?;
+            let entries = fs::read_dir(place).map_err(bad_file(place))?;
             paths = entries.filter_map(Result::ok).map(|entry| entry.path()).collect();
             paths.retain(|path| path.extension().is_some_and(|kind| kind == "fxt"));
             paths.sort();

@@ -1,7 +1,5 @@
 //! `flexspline tables --kernels`: response of the output to a deviation of a tooth, of the generator or of an axis.
 
-use std::ops::ControlFlow;
-
 use serde::Serialize;
 
 use super::context::{Context, quoted};
@@ -44,11 +42,9 @@ pub(super) fn run(context: &Context, kinds: &[GeneratorKind], settings: SolverSe
     for (&kind, plan) in kinds.iter().zip(&plans) {
         let kernels = make(&drive, kind, plan, settings, &|done| {
             progress.set(before + done, steps, &kind.to_string());
-            ControlFlow::Continue(())
         })
         .map_err(|error| match error {
             KernelError::NotIdeal { .. } => Failure::BadInput(error.to_string()),
-            KernelError::Stopped => Failure::Failed("stopped; nothing was written".into()),
             KernelError::Solve(_) | KernelError::Displaced { .. } => Failure::Failed(format!("{kind}: {error}")),
         })?;
         let path = out.join(format!("{kind}.kernels.json"));

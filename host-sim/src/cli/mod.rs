@@ -74,6 +74,11 @@ fn bad_input(error: impl std::fmt::Display) -> Failure {
     Failure::BadInput(error.to_string())
 }
 
+/// Bad input in a file.
+fn bad_file<E: std::fmt::Display>(file: &std::path::Path) -> impl Fn(E) -> Failure + '_ {
+    move |error| Failure::BadInput(format!("{}: {error}", file.display()))
+}
+
 /// The number of an option, from the least to the largest that it may be.
 fn within(option: &str, found: f64, least: f64, most: f64) -> Result<f64, Failure> {
     if (least..=most).contains(&found) {

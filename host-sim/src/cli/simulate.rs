@@ -298,11 +298,7 @@ pub(super) fn stress(
 
 /// Bad input or failed run.
 pub(super) fn refused_or_failed(error: SimulateError) -> Failure {
-    match error {
-        SimulateError::Stopped { .. } => Failure::Failed(format!("{error}; nothing was written")),
-        _ if error.is_bad_input() => Failure::BadInput(error.to_string()),
-        _ => Failure::Failed(error.to_string()),
-    }
+    if error.is_bad_input() { bad_input(error) } else { Failure::Failed(error.to_string()) }
 }
 
 /// Moves the progress bar.

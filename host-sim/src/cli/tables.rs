@@ -388,11 +388,10 @@ fn by_fem(
                 }
                 ControlFlow::Continue(())
             };
-            make(drive, *kind, settings, &observe).map_err(|error| match error {
-                error if error.is_stopped() => Failure::Failed("stopped; nothing was written".into()),
-                error if error.is_bad_input() => Failure::BadInput(error.to_string()),
-                error => Failure::Failed(error.to_string()),
-            })
+            let made = make(drive, *kind, settings, &observe);
+            made.map_err(
+                |error| if error.is_bad_input() { bad_input(error) } else { Failure::Failed(error.to_string()) },
+            )
         })
         .collect()
 }

@@ -1,6 +1,5 @@
 //! `flexspline validate`: tables against fresh FEM, through the core.
 
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
@@ -11,7 +10,7 @@ use serde::Serialize;
 
 use super::context::{Context, image_file, quoted, table_of};
 use super::names::GeneratorNames;
-use super::{Failure, report, say};
+use super::{Failure, bad_file, report, say};
 use flexspline_base::output::Outputs;
 use flexspline_design::tables::MissingSpring;
 use flexspline_design::tables::validate::{
@@ -110,8 +109,7 @@ impl<'a> CheckedTable<'a> {
     /// The table in an image, if it is one of the drive.
     fn of(path: &'a Path, image: &'a [u8], drive: &Drive) -> Result<CheckedTable<'a>, Failure> {
         let table = table_of(path, image)?;
-        let refused = |error| Failure::BadInput(format!("{}: {error}", path.display()));
-        let kind = check_drive(drive, &table).map_err(refused)?;
+        let kind = check_drive(drive, &table).map_err(bad_file(path))?;
         Ok(CheckedTable { path, kind, table, spring: added_spring(path, &table)? })
     }
 }
@@ -148,13 +146,11 @@ impl Validate {
                         let guess = counts.iter().map(|c| c.1.max(total)).sum();
                         bar.set(done, guess, kind.name());
                     }
-                    ControlFlow::Continue(())
                 })
                 .map_err(|error| match error {
                     ValidateError::OtherDrive { .. } | ValidateError::UnknownGenerator => {
                         Failure::BadInput(format!("{}: {error}", path.display()))
                     }
-                    ValidateError::Stopped => Failure::Failed("stopped; nothing was written".into()),
                     other => Failure::Failed(format!("{}: {other}", path.display())),
                 })
             })

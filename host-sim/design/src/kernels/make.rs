@@ -1,7 +1,6 @@
 //! Kernels from the FEM: contact forces under neighbouring loads, and runs with the circular spline displaced.
 
 use std::f64::consts::TAU;
-use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
@@ -88,8 +87,8 @@ impl KernelPlan {
     }
 }
 
-/// Called after every run, from any thread; may ask to stop.
-pub type KernelProgress<'a> = dyn Fn(usize) -> ControlFlow<()> + Sync + 'a;
+/// Called after every run, from any thread, with the runs done.
+pub type KernelProgress<'a> = dyn Fn(usize) + Sync + 'a;
 
 /// Why there are no kernels.
 #[derive(Debug, Error)]
@@ -116,9 +115,6 @@ pub enum KernelError {
         /// Reason given by the solver.
         reason: SolveError,
     },
-    /// The observer asked for it.
-    #[error("stopped")]
-    Stopped,
 }
 
 /// Relative step of the load for the derivative: the patch of contact moves smoothly, and forces are known to 1e-6.
@@ -138,7 +134,7 @@ const DISPLACEMENT_HALVINGS: usize = 4;
 /// is left out.
 ///
 /// # Errors
-/// A deviation in the drive; a run that does not converge; stopped.
+/// A deviation in the drive; a run that does not converge.
 pub fn make(
     drive: &Drive,
     kind: GeneratorKind,
@@ -155,10 +151,7 @@ pub fn make(
     let temperature_c = plan.temperature_c.unwrap_or(drive.temperature.reference_c);
     let problem = Problem::new(&smooth, kind, temperature_c, settings)?;
     let done = AtomicUsize::new(0);
-    let report = || match progress(done.fetch_add(1, Ordering::Relaxed) + 1) {
-        ControlFlow::Continue(()) => Ok(()),
-        ControlFlow::Break(()) => Err(KernelError::Stopped),
-    };
+    let report = || progress(done.fetch_add(1, Ordering::Relaxed) + 1);
     let teeth = [problem.flexspline.teeth, problem.circular_spline.teeth];
     let repeats = if teeth.iter().all(|z| z.is_multiple_of(2)) { 2 } else { 1 };
 
@@ -170,7 +163,8 @@ pub fn make(
         .par_iter()
         .map(|torque| {
             let forces = Forces::under(&problem, *torque, plan.positions)?;
-            report().map(|()| forces)
+            report();
+            Ok(forces)
         })
         .collect::<Result<Vec<_>, KernelError>>()?;
     let loads = plan
@@ -322,7 +316,7 @@ fn eccentric(
     plan: &KernelPlan,
     repeats: usize,
     settings: SolverSettings,
-    report: &(dyn Fn() -> Result<(), KernelError> + Sync),
+    report: &(dyn Fn() + Sync),
 ) -> Result<Eccentric, KernelError> {
     // On the circular spline whole pitches of the generator are whole pitches of its own.
     let pitches = f64::from(drive.circular_spline.teeth) / repeats as f64;
@@ -342,7 +336,7 @@ fn eccentric(
     let problems = plan.sizes_um.iter().map(|size| problem(*size)).collect::<Result<Vec<_>, SolveError>>()?;
     // The ideal drive stands alike after whole pitches: once is enough.
     let ideal = loaded(Motion::deformed_or_turned_in(&problem(0.0)?, 0.0)?, &plan.torques_n_m)?;
-    report()?;
+    report();
     let enough = plan.sizes_um.iter().position(|size| plan.enough_um.is_some_and(|enough| *size >= enough));
     let least = enough.map_or(plan.sizes_um.len(), |k| k + 1);
     let towards = |direction: usize| {
@@ -387,7 +381,7 @@ struct Displaced<'a, P> {
     problem: &'a P,
     /// Number of sizes with an equilibrium in the directions looked at so far.
     stands: AtomicUsize,
-    report: &'a (dyn Fn() -> Result<(), KernelError> + Sync),
+    report: &'a (dyn Fn() + Sync),
 }
 
 /// Errors of each size under each load, arcsec, and why there are no more.
@@ -425,7 +419,7 @@ impl<P: Fn(f64) -> Result<Problem, SolveError>> Displaced<'_, P> {
                     return Ok((errors, Some(reason)));
                 }
             }
-            (self.report)()?;
+            (self.report)();
         }
         Ok((errors, None))
     }
@@ -502,7 +496,7 @@ mod tests {
                 directions: 19,
                 ..KernelPlan::for_generator(GeneratorKind::Cam)
             };
-            make(&Drive::hhd_95(), GeneratorKind::Cam, &plan, coarse(), &|_| ControlFlow::Continue(())).unwrap()
+            make(&Drive::hhd_95(), GeneratorKind::Cam, &plan, coarse(), &|_| ()).unwrap()
         })
     }
 
@@ -674,13 +668,8 @@ mod tests {
         let of = |motion: Motion<'_>| loaded(motion, &[5.0]).unwrap()[0];
         let from = Motion::deformed_or_turned_in(&small, 0.0).unwrap().state().clone();
         let directly = of(Motion::deformed_or_turned_in(&large, 0.0).unwrap());
-        let displaced = Displaced {
-            sizes_um: &[],
-            torques_n_m: &[],
-            problem: &at,
-            stands: AtomicUsize::new(0),
-            report: &|| Ok(()),
-        };
+        let displaced =
+            Displaced { sizes_um: &[], torques_n_m: &[], problem: &at, stands: AtomicUsize::new(0), report: &|| () };
         let grown = of(displaced.grown(&large, 8.0, &(5.0, from)).unwrap());
         assert!((grown - directly).abs() < 0.01, "{grown} {directly}");
     }
@@ -700,7 +689,7 @@ mod tests {
         let mut drive = Drive::hhd_95();
         drive.circular_spline.root_radius_mm = 49.38;
         let of = |plan: &KernelPlan| {
-            eccentric(&drive, GeneratorKind::Cam, plan, 2, coarse(), &|| Ok(())).map(|found| found.sizes_um)
+            eccentric(&drive, GeneratorKind::Cam, plan, 2, coarse(), &|| ()).map(|found| found.sizes_um)
         };
         assert_eq!(of(&plan(Some(4.0))).unwrap(), [5.0]);
         let refused = of(&plan(None)).unwrap_err();
@@ -717,7 +706,7 @@ mod tests {
         let mut drive = Drive::hhd_95();
         drive.as_built.circular_spline_offset_um = 1.0;
         let plan = KernelPlan::for_generator(GeneratorKind::Cam);
-        let refused = make(&drive, GeneratorKind::Cam, &plan, coarse(), &|_| ControlFlow::Continue(()));
+        let refused = make(&drive, GeneratorKind::Cam, &plan, coarse(), &|_| ());
         assert!(matches!(refused, Err(KernelError::NotIdeal { field: "as_built.circular_spline_offset_um" })));
     }
 }

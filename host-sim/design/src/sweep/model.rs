@@ -21,6 +21,8 @@ use serde::{Deserialize, Serialize};
 use super::tolerance::{FieldTolerance, ToleranceActs};
 use crate::kernels::{EccentricField, Gain, Kernels, PlaceOfLoad};
 use crate::tables::places_that_tell_apart;
+use flexspline_base::robust::{least_and_most, rms};
+use flexspline_base::statistics::mean;
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::drive::{AsBuilt, Wheel};
 
@@ -320,10 +322,9 @@ impl KernelModel {
         let closed = by_kernels.clone().filter(|lost| *lost < wind_up).count();
         let lost: Vec<f64> = by_kernels.map(|lost| lost.max(wind_up)).collect();
         let (pp, rms) = spread(&loaded);
-        let most = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let apart = |place| KernelModel::apart_at(&curves.apart, place).0;
         let apart = self.places.iter().map(apart).fold(0.0, f64::max);
-        let mut all = vec![pp, rms, lost.iter().sum::<f64>() / lost.len() as f64, most(&lost)];
+        let mut all = vec![pp, rms, mean(&lost), least_and_most(lost.iter().copied()).1];
         all.extend_from_slice(&state[2 * WAVE..]);
         all.extend([apart, 100.0 * closed as f64 / lost.len() as f64]);
         all
@@ -342,10 +343,8 @@ fn least_wind_up(state: &[f64], light_n_m: f64) -> f64 {
 
 /// Peak to peak, and root mean square about the mean.
 fn spread(values: &[f64]) -> (f64, f64) {
-    let mean = values.iter().sum::<f64>() / values.len() as f64;
-    let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), e| (l.min(*e), h.max(*e)));
-    let square = values.iter().map(|e| (e - mean) * (e - mean)).sum::<f64>() / values.len() as f64;
-    (high - low, square.sqrt())
+    let (middle, (low, high)) = (mean(values), least_and_most(values.iter().copied()));
+    (high - low, rms(&values.iter().map(|e| e - middle).collect::<Vec<f64>>()))
 }
 
 /// Whether a tolerance needs kernels of displaced axes.

@@ -1,7 +1,6 @@
 //! Response of a drive to its tolerances by contact FEM: kernels of what acts tooth by tooth and of displaced axes, and
 //! a parabola for each field that changes the drive uniformly.
 
-use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
@@ -51,7 +50,6 @@ pub(super) fn respond(
     let steps = plan.steps() + 1 + 2 * alike;
     let kernels = make(&drawn_as, of.generator, &plan, solver, &|done| {
         progress(done, steps, &format!("kernels, {}", of.generator));
-        ControlFlow::Continue(())
     })
     .map_err(|error| kernels_failed(of, &error))?;
     let step = |done| progress(plan.steps() + done, steps, &format!("sheets, {}", of.generator));

@@ -147,11 +147,6 @@ pub enum MakeError {
 }
 
 impl MakeError {
-    /// Whether the observer asked to stop.
-    pub fn is_stopped(&self) -> bool {
-        matches!(self, MakeError::Sweep(TorqueSweepError::Stopped))
-    }
-
     /// Whether the input is to blame, not the run.
     pub fn is_bad_input(&self) -> bool {
         matches!(

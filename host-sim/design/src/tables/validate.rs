@@ -9,7 +9,6 @@
 //! drive does: the bounds are wider by one and a half times that much.
 
 use std::f64::consts::TAU;
-use std::ops::ControlFlow;
 
 use flexspline::{Direction, GeneratorAngle, PlayState, Quality, Table};
 use serde::Serialize;
@@ -146,9 +145,6 @@ pub enum ValidateError {
         /// Temperature, °C.
         temperature_c: f64,
     },
-    /// The observer asked to stop.
-    #[error("stopped")]
-    Stopped,
 }
 
 /// The generator that a table is of.
@@ -174,7 +170,7 @@ pub fn validate(
     drive: &Drive,
     table: &Table<'_>,
     settings: &ValidationSettings,
-    observe: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
+    observe: &mut dyn FnMut(usize, usize),
 ) -> Result<Validation, ValidateError> {
     let kind = check_drive(drive, table)?;
     let repeats = drive.as_built.first_not_uniform().is_none();
@@ -242,26 +238,23 @@ struct FreshRun<'a> {
     drive: &'a Drive,
     table: &'a Table<'a>,
     spring: Option<MissingSpring>,
-    observe: &'a mut dyn FnMut(usize, usize) -> ControlFlow<()>,
+    observe: &'a mut dyn FnMut(usize, usize),
     increments: usize,
     total: usize,
     points: Vec<Point>,
 }
 
 impl FreshRun<'_> {
-    fn report(&mut self) -> Result<(), ValidateError> {
+    fn report(&mut self) {
         self.increments += 1;
-        match (self.observe)(self.increments, self.total.max(self.increments)) {
-            ControlFlow::Continue(()) => Ok(()),
-            ControlFlow::Break(()) => Err(ValidateError::Stopped),
-        }
+        (self.observe)(self.increments, self.total.max(self.increments));
     }
 
     /// Moves until the drive has settled.
     fn settle(&mut self, motion: &mut Motion<'_>, sign: f64) -> Result<(), ValidateError> {
         let step = sign * motion.pitch() / SETTLING_STEPS;
         while motion.settle_on(step)? {
-            self.report()?;
+            self.report();
         }
         Ok(())
     }
@@ -276,11 +269,11 @@ impl FreshRun<'_> {
     ) -> Result<(), ValidateError> {
         let sign = if random.bool() { 1.0 } else { -1.0 };
         motion.load(torque_n_m)?;
-        self.report()?;
+        self.report();
         self.settle(motion, sign)?;
         for _ in 0..positions {
             motion.turn(sign * motion.pitch() * (0.1 + 0.2 * random.f64()))?;
-            self.report()?;
+            self.report();
             let mut play = PlayState::after_motion(if sign > 0.0 { Direction::Forward } else { Direction::Backward });
             self.compare("steady", motion, temperature_c, sign, &mut play)?;
         }
@@ -305,7 +298,7 @@ impl FreshRun<'_> {
         let turn = -1.6 * backlash * self.drive.ratio() / REVERSAL_STEPS as f64;
         for _ in 0..REVERSAL_STEPS {
             motion.turn(turn)?;
-            self.report()?;
+            self.report();
             self.compare("reversal", motion, temperature_c, -1.0, &mut play)?;
         }
         Ok(())
