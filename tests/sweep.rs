@@ -6,9 +6,10 @@
 //! other, or a load of the kernels that is not that of the sweep.
 
 use std::fs;
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use flexspline_tests::command::Desk;
+use flexspline_tests::command::{Desk, Output};
 
 #[test]
 fn sweep_shards_killed_and_resumed_have_the_bytes_of_one_run() {
@@ -30,6 +31,18 @@ fn sweep_shards_killed_and_resumed_have_the_bytes_of_one_run() {
     }
     killed.kill().unwrap();
     assert!(!killed.wait().unwrap().success());
+    // Stopped once it has written a row more: it says that rows stand.
+    let lines = || fs::read_to_string(&rows).unwrap().lines().count();
+    let there = lines();
+    let mut stopped = desk.command(&["sweep", "run", "two", "--shard", "1/2", "--threads", "1", "-q"]);
+    let stopped = stopped.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    while lines() <= there {
+        assert!(begun.elapsed() < Duration::from_secs(60), "no row in a minute");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    assert!(Command::new("kill").args(["-INT", &stopped.id().to_string()]).status().unwrap().success());
+    let stopped = Output::of(stopped.wait_with_output().unwrap());
+    assert_eq!((stopped.code, stopped.stderr.as_str()), (1, "error: stopped; what was written is whole\n"));
     let left = fs::read_to_string(&rows).unwrap();
     assert!(left.ends_with('\n') && left.lines().count() < 501, "{} lines", left.lines().count());
     let again = desk.line("sweep run two --shard 1/2 --json").done().json();
@@ -43,6 +56,18 @@ fn sweep_shards_killed_and_resumed_have_the_bytes_of_one_run() {
     let second = desk.read("two/results/0002-of-0002.csv");
     let both = fs::read_to_string(&rows).unwrap() + second.split_once('\n').unwrap().1;
     assert_eq!(whole, both);
+    // Plans of two commands have files of one name.
+    desk.line("calibrate --plan --ratio 101 --minutes 5 --out bench").done();
+    let plans = ["one/plan.csv", "bench/plan.csv"].map(|file| desk.read(file));
+    for line in [
+        "calibrate --plan --ratio 101 --minutes 5 --out one",
+        "sweep plan --tolerances teeth.toml --draws 1000 --out bench",
+        "sweep --vary flexspline.rim_thickness_mm=1.4,1.5 --out bench",
+    ] {
+        let run = desk.line(line);
+        assert!(run.code == 2 && run.stderr.contains("plan.csv, a plan of another command"), "{line}: {}", run.stderr);
+    }
+    assert_eq!(["one/plan.csv", "bench/plan.csv"].map(|file| desk.read(file)), plans);
 }
 
 #[test]

@@ -93,6 +93,11 @@ impl Drop for HiddenPath {
     }
 }
 
+/// Notes that a file to which rows are appended, each of them whole, stands in its place.
+pub fn note_appended() {
+    unfinished().written = true;
+}
+
 /// Removes all that is unfinished, and lets nothing be begun or finished any more: for a process that is about to end.
 /// True if outputs of it stand in their place already.
 pub fn abandon() -> bool {

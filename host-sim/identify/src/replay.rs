@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use thiserror::Error;
 
-use crate::calibrate::check_ratio;
+use crate::calibrate::OtherRatio;
 use crate::known_rows::parse_known;
 use crate::measurement::{
     ColumnMap, FEW, Fault, FaultName, Gear, MeasuredError, Quantity, Recording, Treatment, parse_as,
@@ -241,13 +241,13 @@ fn rows_of(mut recording: Recording, ratio: f64, temperature_c: f64) -> Result<R
         return Err(refuse(Some(fault.first_line), fault.what.clone()));
     }
     let errors: Vec<f64> = recording.sessions.iter().flat_map(|session| session.error_rad.iter().copied()).collect();
-    let said = match check_ratio(std::slice::from_ref(&recording), ratio) {
-        Err(error) if about_mean(&errors) >= MOST_ERROR_RAD => return Err(refuse(None, error.to_string())),
+    if let Some(other) = OtherRatio::of(std::slice::from_ref(&recording), ratio) {
         // A load that grows over a few rows looks the same.
-        Err(error) => Some(error.to_string()),
-        Ok(said) => said,
-    };
-    recording.notes.extend(said);
+        if other.is_far() && about_mean(&errors) >= MOST_ERROR_RAD {
+            return Err(refuse(None, other.to_string()));
+        }
+        recording.notes.push(other.to_string());
+    }
     if recording.sessions.iter().all(|session| session.torque_n_m.is_none()) {
         recording.notes.push("no torque: the table is read at 0 N.m".to_owned());
     }

@@ -8,7 +8,7 @@ use flexspline::Table;
 
 use super::context::{Context, quoted, table_image, table_of};
 use super::logs::LogOptions;
-use super::{Failure, bad_input, report, say};
+use super::{Failure, bad_file, bad_input, report, say};
 use flexspline_base::output::Outputs;
 use flexspline_design::tables::{c_header, rust_source};
 use flexspline_identify::calibrate::{
@@ -119,11 +119,14 @@ impl BenchOptions {
     }
 }
 
+/// First column of plan.csv.
+const PLAN_BEGINS: &str = "log";
 /// Minutes on the bench where nobody says how many: for the first log, and for what is added.
 const MINUTES: [f64; 2] = [60.0, 10.0];
 
 impl Calibrate {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
+        context.refuse_drive("a calibration has the drive of --tables, --model or --ratio")?;
         let map = self.columns.map()?;
         let image = self.tables.as_ref().map(|folder| table_image(folder, self.generator)).transpose()?;
         let table = image.as_ref().map(|(file, bytes)| table_of(file, bytes)).transpose()?;
@@ -137,7 +140,7 @@ impl Calibrate {
             .map(|file| read_known(file, &map, &prior.nominal, prior.table))
             .collect::<Result<Vec<_>, _>>();
         let files = files.map_err(bad_input)?;
-        let out = context.out()?;
+        let out = if self.more { context.out_for_plan(PLAN_BEGINS)? } else { context.out()? };
         if !self.no_report {
             report::before(context, out, "calibrate", None);
         }
@@ -168,7 +171,7 @@ impl Calibrate {
     /// Says what to record.
     fn write_plan(&self, context: &Context, prior: &Prior<'_>) -> Result<(), Failure> {
         let planned = self.planned(context, prior, None)?;
-        let out = context.out()?;
+        let out = context.out_for_plan(PLAN_BEGINS)?;
         let mut outputs = Outputs::new();
         put_plan(&planned, out, &mut outputs)?;
         outputs.finish()?;
@@ -191,7 +194,9 @@ impl Calibrate {
     fn failed(&self, error: &CalibrationError) -> Failure {
         let files: Vec<String> = self.logs.iter().map(|file| file.display().to_string()).collect();
         let what = match error {
-            CalibrationError::Measured(_) | CalibrationError::Known(_) => error.to_string(),
+            CalibrationError::Measured(_) | CalibrationError::Known(_) | CalibrationError::Ratio { .. } => {
+                error.to_string()
+            }
             _ => format!("{}: {error}", files.join(", ")),
         };
         if error.is_bad_input() { Failure::BadInput(what) } else { Failure::Failed(what) }
@@ -206,10 +211,9 @@ impl Calibrate {
             if !model.causes.is_empty() {
                 let what = "found [[extension.cause]], allowed: a nominal model without causes; what they are is \
                             fitted here anew";
-                return Err(Failure::BadInput(format!("{}: {what}", path.display())));
+                return Err(bad_file(path)(what));
             }
-            let bytes =
-                std::fs::read(path).map_err(|error| Failure::BadInput(format!("{}: {error}", path.display())))?;
+            let bytes = std::fs::read(path).map_err(bad_file(path))?;
             let (drive, hash) = (path.display().to_string(), *blake3::hash(&bytes).as_bytes());
             let known = Prior::of_ratio(model.nominal.ratio, self.generator);
             return Ok(Prior { nominal: model.nominal, drive, hash, ..known });

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use flexspline::{Identity, IdentityCheck, Table};
 
-use super::{Common, Failure, bad_input, say};
+use super::{Common, Failure, bad_file, bad_input, say};
 pub(super) use flexspline_base::output::quoted;
 use flexspline_base::output::{keep, prepare_folder};
 use flexspline_base::progress::Progress;
@@ -100,6 +100,11 @@ impl Context {
         if self.has_drive() { Some("--drive") } else { by_set() }
     }
 
+    /// Refuses --drive and --set with a command that has no use for them; `why` says where the drive is.
+    pub(super) fn refuse_drive(&self, why: &str) -> Result<(), Failure> {
+        self.changes_the_drive().map_or(Ok(()), |option| Err(Failure::BadInput(format!("{option}: {why}"))))
+    }
+
     /// A title of the drive, and that it is not as its file or its name has it.
     pub(super) fn titled(&self, title: &str) -> String {
         match Drive::fields_set(self.common.sets.iter().map(String::as_str)) {
@@ -153,6 +158,17 @@ impl Context {
         let out = self.out_path();
         prepare_folder(out).map_err(|error| Failure::BadInput(format!("--out: {error}")))?;
         Ok(out)
+    }
+
+    /// The output folder for a plan whose plan.csv begins with the column `first`; refuses one with another plan.
+    pub(super) fn out_for_plan(&self, first: &str) -> Result<&Path, Failure> {
+        let plan = self.out_path().join("plan.csv");
+        if std::fs::read_to_string(&plan).is_ok_and(|text| text.split(',').next() != Some(first)) {
+            let what =
+                format!("found {}, a plan of another command; give another folder, or remove it", plan.display());
+            return Err(Failure::BadInput(format!("--out: {what}")));
+        }
+        self.out()
     }
 
     /// The output folder, whether it is there or not.
@@ -238,12 +254,11 @@ pub(super) fn table_image(folder: &Path, generator: GeneratorKind) -> Result<(Pa
 /// The bytes of an image, sound or not; one that is sound but not of its id, as the identity is found in flight, is
 /// refused here.
 pub(super) fn image_file(path: &Path) -> Result<Vec<u8>, Failure> {
-    let bad = |what: String| Failure::BadInput(format!("{}: {what}", path.display()));
     if path.is_dir() {
-        return Err(bad("found a folder; allowed: a table image, FILE.fxt".to_owned()));
+        return Err(bad_file(path)("found a folder; allowed: a table image, FILE.fxt"));
     }
     keep(path);
-    let bytes = std::fs::read(path).map_err(|error| bad(error.to_string()))?;
+    let bytes = std::fs::read(path).map_err(bad_file(path))?;
     if let Ok(table) = Table::check(&bytes) {
         let mut check = IdentityCheck::new();
         let found = loop {
@@ -253,7 +268,7 @@ pub(super) fn image_file(path: &Path) -> Result<Vec<u8>, Failure> {
             }
         };
         if found != table.id() {
-            return Err(bad(format!(
+            return Err(bad_file(path)(format!(
                 "its contents have the id {found}, and it says {}: it was changed after it was made; make it anew",
                 table.id()
             )));
@@ -264,7 +279,7 @@ pub(super) fn image_file(path: &Path) -> Result<Vec<u8>, Failure> {
 
 /// The table in the image of this file.
 pub(super) fn table_of<'a>(path: &Path, image: &'a [u8]) -> Result<Table<'a>, Failure> {
-    Table::check(image).map_err(|error| Failure::BadInput(format!("{}: {error}", path.display())))
+    Table::check(image).map_err(bad_file(path))
 }
 
 /// A drive file beside the one that is not there, with a name like it.

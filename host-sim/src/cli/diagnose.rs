@@ -8,7 +8,7 @@ use clap::Args;
 use super::context::{Context, quoted, table_image};
 use super::logs::LogOptions;
 use super::tables::fresh_table;
-use super::{Failure, bad_input, report, say};
+use super::{Failure, bad_file, bad_input, report, say};
 use flexspline_base::output::Outputs;
 use flexspline_design::kernels::Kernels;
 use flexspline_design::tables::{c_header, rust_source};
@@ -82,8 +82,8 @@ impl Diagnose {
         let map = self.logs.map()?;
         let explained = causes("--explain", &self.explain)?;
         let without = causes("--without", &self.without)?;
-        let image = self.image()?;
-        let subject = self.subject(context, image.as_deref())?;
+        let image = self.tables.as_ref().map(|folder| table_image(folder, self.generator)).transpose()?;
+        let subject = self.subject(context, image.as_ref())?;
         let failed = |error: PipelineError| self.failed(&error);
         let recording = read_rows(&self.data, &map, &subject).map_err(failed)?;
         // Before there is much work.
@@ -164,27 +164,19 @@ impl Diagnose {
         vec![format!("flexspline tables --generator {} --drive {drive} --out {folder}", self.generator)]
     }
 
-    /// The bytes of the table that was asked for.
-    fn image(&self) -> Result<Option<Vec<u8>>, Failure> {
-        let Some(folder) = &self.tables else { return Ok(None) };
-        table_image(folder, self.generator).map(|(_, bytes)| Some(bytes))
-    }
-
-    fn subject<'i>(&self, context: &Context, image: Option<&'i [u8]>) -> Result<Subject<'i>, Failure> {
+    /// The drive that the rows are of; `image` is the table that was asked for, with its file.
+    fn subject<'i>(&self, context: &Context, image: Option<&'i (PathBuf, Vec<u8>)>) -> Result<Subject<'i>, Failure> {
         let drive = context.drive()?;
-        let bad = |file: &Path, error: PipelineError| Failure::BadInput(format!("{}: {error}", file.display()));
         match (&self.model, image) {
             (Some(path), _) => {
                 let model = Model::read(path).map_err(bad_input)?;
                 Ok(Subject::of_model(model, drive, self.generator))
             }
-            (None, Some(image)) => {
-                let folder = self.tables.clone().unwrap_or_default();
-                let file = folder.join(format!("{}.fxt", self.generator));
-                let subject = Subject::of_table(image, drive, self.generator).map_err(|error| bad(&file, error))?;
-                let file = folder.join(format!("{}.kernels.json", self.generator));
+            (None, Some((file, image))) => {
+                let subject = Subject::of_table(image, drive, self.generator).map_err(bad_file(file))?;
+                let file = file.with_file_name(format!("{}.kernels.json", self.generator));
                 match kernels(&file)? {
-                    Some(kernels) => subject.with_kernels(kernels).map_err(|error| bad(&file, error)),
+                    Some(kernels) => subject.with_kernels(kernels).map_err(bad_file(&file)),
                     None => Ok(subject),
                 }
             }
@@ -217,12 +209,11 @@ impl Diagnose {
 
 /// The influence kernels of a file, if there is one.
 fn kernels(path: &Path) -> Result<Option<Kernels>, Failure> {
-    let bad = |what: String| Failure::BadInput(format!("{}: {what}", path.display()));
     if !path.exists() {
         return Ok(None);
     }
-    let text = std::fs::read_to_string(path).map_err(|error| bad(error.to_string()))?;
-    Kernels::from_json(&text).map_err(|problem| bad(problem.to_string())).map(Some)
+    let text = std::fs::read_to_string(path).map_err(bad_file(path))?;
+    Kernels::from_json(&text).map_err(bad_file(path)).map(Some)
 }
 
 /// The first lines of a file that was written here.

@@ -62,11 +62,7 @@ impl FmuOptions {
     }
 
     pub(super) fn run(&self, context: &Context, tables: Option<&Path>) -> Result<(), Failure> {
-        if let Some(option) = context.changes_the_drive() {
-            return Err(Failure::BadInput(format!(
-                "{option}: an FMU has the drive of its table; allowed: --tables FILE.fxt"
-            )));
-        }
+        context.refuse_drive("an FMU has the drive of its table; allowed: --tables FILE.fxt")?;
         let fmu = self.fmu(tables)?;
         let libraries = find_libraries(&self.library).map_err(bad_input)?;
         let resources = fmu.resources();

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use clap::Args;
 
 use super::context::{Context, image_file};
-use super::{Failure, bad_input, report};
+use super::{Failure, bad_file, bad_input, report};
 use flexspline_base::figures;
 use flexspline_base::output::Outputs;
 use flexspline_base::suggest::did_you_mean;
@@ -49,11 +49,9 @@ pub(super) struct Fly {
 
 impl Fly {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
-        if let Some(option) = context.changes_the_drive() {
-            let what = "a flight has the drive of a table; allowed: --tables FILE.fxt, which `flexspline tables` \
-                        makes of a drive";
-            return Err(Failure::BadInput(format!("{option}: {what}")));
-        }
+        context.refuse_drive(
+            "a flight has the drive of a table; allowed: --tables FILE.fxt, which `flexspline tables` makes of a drive",
+        )?;
         if self.example {
             let flown = scenario(&self.scenario)?;
             let base = built_in(&self.scenario).map_or(SCENARIOS[0], |_| &self.scenario);
@@ -62,8 +60,7 @@ impl Fly {
         }
         let mut flown = scenario(&self.scenario)?;
         if let Some(file) = &self.tables {
-            let refused = |error| Failure::BadInput(format!("{}: {error}", file.display()));
-            flown = flown.with_table(&image_file(file)?).map_err(refused)?;
+            flown = flown.with_table(&image_file(file)?).map_err(bad_file(file))?;
         }
         flown.carries().map_err(|why| Failure::BadInput(format!("{}: {why}", self.scenario)))?;
         let out = context.out()?;

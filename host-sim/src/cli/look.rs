@@ -26,6 +26,7 @@ pub(super) struct Look {
 
 impl Look {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
+        context.refuse_drive("logs say which drive they are of by their rows")?;
         let files = self.files.iter().map(|file| raw::read(file)).collect::<Result<Vec<_>, _>>();
         let files = files.map_err(bad_input)?;
         let looked = look(&files).map_err(bad_input)?;

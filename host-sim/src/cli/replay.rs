@@ -7,7 +7,7 @@ use flexspline::Table;
 
 use super::context::{Context, image_file, quoted, table_of};
 use super::logs::LogOptions;
-use super::{Failure, bad_input, say};
+use super::{Failure, bad_file, bad_input, say};
 use flexspline_base::output::Outputs;
 use flexspline_identify::replay::{ReplaySummary, RowsOf, RowsRead, read, replay};
 use flexspline_mechanics::drive::GeneratorKind;
@@ -45,10 +45,10 @@ pub(super) struct Replay {
 
 impl Replay {
     pub(super) fn run(&self, context: &Context) -> Result<(), Failure> {
+        context.refuse_drive("the drive is that of the table; allowed: --tables FILE.fxt")?;
         let image = image_file(&self.tables)?;
         let table = table_of(&self.tables, &image)?;
-        let bytes = std::fs::read(&self.data)
-            .map_err(|error| Failure::BadInput(format!("{}: {error}", self.data.display())))?;
+        let bytes = std::fs::read(&self.data).map_err(bad_file(&self.data))?;
         let rows_of = RowsOf::beside(&self.data, &bytes);
         self.check_rows(rows_of.as_ref(), &table)?;
         // Found out before the rows are read.
@@ -98,7 +98,7 @@ pub(super) fn measured(
     table: &Table<'_>,
     temperature_c: f64,
 ) -> Result<RowsRead, Failure> {
-    let bytes = std::fs::read(data).map_err(|error| Failure::BadInput(format!("{}: {error}", data.display())))?;
+    let bytes = std::fs::read(data).map_err(bad_file(data))?;
     read(&data.display().to_string(), &bytes, &logs.map()?, table, temperature_c).map_err(bad_input)
 }
 

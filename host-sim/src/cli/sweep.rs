@@ -11,8 +11,8 @@ use super::{Context, Failure, report, say};
 use flexspline_base::output::Outputs;
 use flexspline_design::data_sheet::{FIGURES, FigureOf};
 use flexspline_design::sweep::{
-    Constraint, EXAMPLE, Judge, OfGenerator, PlanError, PlanSettings, Ran, ReducedSweep, RunStatus, Sense, Shard,
-    Tolerances, VariantPlan, Vary, is_error_of_making, reduce, run,
+    Constraint, EXAMPLE, Judge, NUMBER, OfGenerator, PlanError, PlanSettings, Ran, ReducedSweep, RunStatus, Sense,
+    Shard, Tolerances, VariantPlan, Vary, is_error_of_making, reduce, run,
 };
 use flexspline_mechanics::mesh::MeshLevel;
 use flexspline_report::page::{Headline, Page};
@@ -174,9 +174,9 @@ impl SweepCommand {
         if self.step.is_some() {
             return plan.run(context);
         }
+        let out = context.out_for_plan(NUMBER)?;
         let plan = plan.made(context)?;
         let judge = self.judged.judge(&plan)?;
-        let out = context.out()?;
         report::before(context, out, "sweep", Some(&plan.drive));
         let plan = plan.write(out)?;
         computed(context, &plan, out, Shard::WHOLE)?;
@@ -186,9 +186,8 @@ impl SweepCommand {
 
 impl PlanCommand {
     fn run(&self, context: &Context) -> Result<(), Failure> {
-        let plan = self.made(context)?;
-        let out = context.out()?;
-        let plan = plan.write(out)?;
+        let out = context.out_for_plan(NUMBER)?;
+        let plan = self.made(context)?.write(out)?;
         let (variants, drive) = (plan.variants.len(), plan.drive.name.as_str());
         let planned = json!({
             "schema_version": 1, "plan": &plan.hash, "drive": drive, "variants": variants, "columns": &plan.columns,

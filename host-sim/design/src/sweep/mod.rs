@@ -23,7 +23,7 @@ mod tolerance;
 mod vary;
 
 pub use judge::{Constraint, ConstraintError, Judge, Sense};
-pub use plan::{PlanError, PlanSettings, SweepProgress, VariantPlan};
+pub use plan::{NUMBER, PlanError, PlanSettings, SweepProgress, VariantPlan};
 pub use reduce::{FigureSpread, OfGenerator, RankCorrelation, ReducedSweep, reduce};
 pub use run::{Ran, RunStatus, Shard, VariantRow, run};
 pub use tolerance::{EXAMPLE, Tolerances};

@@ -28,7 +28,7 @@ const MOST_VARIANTS: usize = 100_000;
 /// Drives drawn from tolerances, at least.
 const LEAST_DRAWS: usize = 8;
 /// First column of `plan.csv`.
-const NUMBER: &str = "variant";
+pub const NUMBER: &str = "variant";
 /// Loads of a data sheet, the first columns of its results.
 const LOADS: [&str; 3] = ["t1_n_m", "t2_n_m", "largest_n_m"];
 
@@ -153,14 +153,19 @@ impl VariantPlan {
         let variants = settings.draws.map_or_else(|| grid(vary), |count| filling(vary, count, settings.seed));
         let by = HowComputed::Sheet { torque_n_m, positions };
         let columns = vary.iter().map(|field| field.path.clone()).collect();
-        let plan = VariantPlan::new((drive, stated), generators, (columns, variants), by, settings.mesh);
-        // Refused before anything is computed.
-        let mut runs = (0..count).flat_map(|k| generators.iter().map(move |kind| (k, *kind)));
-        match plan.drive_of(0, generators[0]) {
-            Err(why) if runs.all(|(k, kind)| plan.drive_of(k, kind).is_err()) => {
-                wrong(format!("--vary: no variant makes a drive; the first: {why}"))
+        VariantPlan::new((drive, stated), generators, (columns, variants), by, settings.mesh).makes_drives("--vary")
+    }
+
+    /// Refuses a plan none of whose variants makes a drive, before anything is computed; `from` has its fields.
+    fn makes_drives(self, from: &str) -> Result<VariantPlan, PlanError> {
+        let plan = &self;
+        let of_variant = |k: usize| plan.generators.iter().map(move |kind| plan.drive_of(k, *kind));
+        let mut drives = (0..plan.variants.len()).flat_map(of_variant);
+        match drives.next() {
+            Some(Err(why)) if drives.all(|drive| drive.is_err()) => {
+                Err(PlanError::BadInput(format!("{from}: no variant makes a drive; the first: {why}")))
             }
-            _ => Ok(plan),
+            _ => Ok(self),
         }
     }
 
@@ -333,7 +338,8 @@ impl VariantPlan {
         hasher.update(json_text.as_bytes()).update(csv_text.as_bytes());
         let hash = hasher.finalize().to_hex().as_str()[..16].to_owned();
         let Recipe { generators, mesh, by, .. } = recipe;
-        Ok(VariantPlan { drive, stated, generators, mesh, by, columns, variants, hash })
+        let plan = VariantPlan { drive, stated, generators, mesh, by, columns, variants, hash };
+        plan.makes_drives(&csv.display().to_string())
     }
 }
 

@@ -1,15 +1,14 @@
 //! From results to answers: what meets the constraints, the Pareto front, scatter, and which input matters.
 
 use std::collections::BTreeMap;
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::Serialize;
 
 use super::judge::Judge;
 use super::model::CLOSED;
 use super::plan::{PlanError, VariantPlan, csv_of};
-use super::run::{RunStatus, VariantRow, rows_of};
+use super::run::{RunStatus, VariantRow, results_in};
 use flexspline_base::statistics::{Quantile, correlation, mean, quantile, std_dev};
 use flexspline_mechanics::drive::GeneratorKind;
 
@@ -118,17 +117,7 @@ pub fn reduce(plan: &VariantPlan, folder: &Path, judge: &Judge, partial: bool) -
 /// Rows of all files of results, by variant, then by generator, and how many are missing.
 fn gathered(plan: &VariantPlan, folder: &Path, partial: bool) -> Result<(Vec<VariantRow>, usize), PlanError> {
     let results = folder.join("results");
-    let entries = fs::read_dir(&results).into_iter().flatten().flatten().map(|entry| entry.path());
-    let mut paths: Vec<PathBuf> = entries.filter(|path| path.extension().is_some_and(|end| end == "csv")).collect();
-    paths.sort();
-    let mut found = BTreeMap::new();
-    for path in &paths {
-        let text = fs::read(path).map_err(|error| PlanError::Failed(format!("{}: {error}", path.display())))?;
-        for row in rows_of(path, &text, plan)?.0 {
-            let g = plan.generators.iter().position(|kind| *kind == row.generator).unwrap_or_default();
-            found.entry((row.variant, g)).or_insert(row);
-        }
-    }
+    let found = results_in(plan, folder)?;
     let all = (0..plan.variants.len()).flat_map(|k| (0..plan.generators.len()).map(move |g| (k, g)));
     let missing: Vec<usize> = all.filter(|of| !found.contains_key(of)).map(|(k, _)| k + 1).collect();
     if found.is_empty() || (!partial && !missing.is_empty()) {

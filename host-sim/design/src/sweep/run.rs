@@ -17,13 +17,16 @@ use serde::Serialize;
 use super::model::{KernelModel, Parabola};
 use super::plan::{HowComputed, PlanError, VariantPlan, csv_of};
 use crate::data_sheet::{FIGURES, data_sheet};
-use flexspline_base::output::OutputError;
+use flexspline_base::output::{OutputError, note_appended};
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 
 /// First columns of results.
 const BEFORE: [&str; 4] = ["plan", "variant", "generator", "status"];
 /// Last columns of results.
 const AFTER: [&str; 2] = ["why", "cautions"];
+
+/// Figures that differ by this share are one result: FEM on another kind of processor rounds otherwise. A guess.
+const SAME: f64 = 1e-6;
 
 /// One of several shards, `I/N`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -115,6 +118,12 @@ impl VariantRow {
         self.figures.iter().map(|x| if x.is_finite() { x.to_string() } else { String::new() }).collect()
     }
 
+    /// Whether both are one result, computed on one machine or on two.
+    fn agrees_with(&self, other: &VariantRow) -> bool {
+        let near = |(a, b): (&f64, &f64)| (a.is_nan() && b.is_nan()) || (a - b).abs() <= SAME * a.abs().max(b.abs());
+        self.status == other.status && self.figures.iter().zip(&other.figures).all(near)
+    }
+
     fn line(&self, plan: &VariantPlan) -> Result<Vec<u8>, PlanError> {
         let (number, generator) = ((self.variant + 1).to_string(), self.generator.to_string());
         let head = [plan.hash.clone(), number, generator, self.status.name().to_owned()];
@@ -142,23 +151,52 @@ impl VariantRow {
 /// # Errors
 /// It holds rows of another plan, or is no file of results.
 pub(super) fn rows_of(path: &Path, text: &[u8], plan: &VariantPlan) -> Result<(Vec<VariantRow>, u64), PlanError> {
-    let foreign = |what: String| {
-        PlanError::BadInput(format!("{}: {what}; remove it, or run the sweep in another folder", path.display()))
-    };
+    let foreign = |what: &str| foreign(path, what);
     // What follows the last end of a line was cut off.
     let end = text.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1);
     let reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(&text[..end]);
-    let mut records = reader.into_records().map(|record| record.map_err(|error| foreign(error.to_string())));
+    let mut records = reader.into_records().map(|record| record.map_err(|error| foreign(&error.to_string())));
     if records.next().transpose()?.is_some_and(|first| first != header(plan)) {
-        return Err(foreign("no results of this plan".to_owned()));
+        return Err(foreign("no results of this plan"));
     }
     let read = |record: csv::StringRecord| match record.get(0) {
         Some(hash) if hash != plan.hash => {
-            Err(foreign(format!("results of the plan {hash:.16}, and this one is {}", plan.hash)))
+            Err(foreign(&format!("results of the plan {hash:.16}, and this one is {}", plan.hash)))
         }
-        _ => VariantRow::read(&record, plan).ok_or_else(|| foreign("a row that is none of this plan".to_owned())),
+        _ => VariantRow::read(&record, plan).ok_or_else(|| foreign("a row that is none of this plan")),
     };
     Ok((records.map(|record| read(record?)).collect::<Result<Vec<VariantRow>, PlanError>>()?, end as u64))
+}
+
+/// Rows of all files of results, by variant, then by the place of the generator in the plan.
+///
+/// # Errors
+/// A file is not of this plan, cannot be read, or has another result of a run than a file before it.
+pub(super) fn results_in(plan: &VariantPlan, folder: &Path) -> Result<BTreeMap<(usize, usize), VariantRow>, PlanError> {
+    let entries = fs::read_dir(folder.join("results")).into_iter().flatten().flatten().map(|entry| entry.path());
+    let mut paths: Vec<PathBuf> = entries.filter(|path| path.extension().is_some_and(|end| end == "csv")).collect();
+    paths.sort();
+    let mut found: BTreeMap<(usize, usize), VariantRow> = BTreeMap::new();
+    for path in &paths {
+        let text = fs::read(path).map_err(|error| PlanError::Failed(format!("{}: {error}", path.display())))?;
+        for row in rows_of(path, &text, plan)?.0 {
+            let g = plan.generators.iter().position(|kind| *kind == row.generator).unwrap_or_default();
+            let first = found.entry((row.variant, g)).or_insert_with(|| row.clone());
+            if !first.agrees_with(&row) {
+                let (number, generator) = (row.variant + 1, row.generator);
+                return Err(foreign(
+                    path,
+                    &format!("another result of variant {number} with {generator} than a line or a file before it"),
+                ));
+            }
+        }
+    }
+    Ok(found)
+}
+
+/// A file of results that does not belong to the others.
+fn foreign(path: &Path, what: &str) -> PlanError {
+    PlanError::BadInput(format!("{}: {what}; remove it, or run the sweep in another folder", path.display()))
 }
 
 /// Columns of a file of results.
@@ -202,14 +240,15 @@ fn by_sheet(plan: &VariantPlan, drive: &Drive, row: &mut VariantRow) {
 fn by_kernels(plan: &VariantPlan, drive: &Drive, model: &KernelModel, row: &mut VariantRow) {
     let mut values = Vec::new();
     for Parabola { field, at, .. } in &model.response.parabolas {
-        let column = plan.columns.iter().position(|column| column == field);
+        let cell = plan.columns.iter().position(|column| column == field).map(|k| &plan.variants[row.variant][k]);
         // A field that the plan no longer sets is that of the middle drive.
-        let text = column.map_or_else(|| at[1].to_string(), |k| plan.variants[row.variant][k].clone());
-        let Ok(value) = text.parse() else {
-            row.why = format!("{field}: found {text:?}, allowed: a number");
-            return;
-        };
-        values.push(value);
+        match cell.map_or(Ok(at[1]), |text| text.parse()) {
+            Ok(value) => values.push(value),
+            Err(_) => {
+                row.why = format!("{field}: found {:?}, allowed: a number", cell.map_or("", String::as_str));
+                return;
+            }
+        }
     }
     row.status = RunStatus::Converged;
     row.figures = model.figures(&drive.as_built, &values);
@@ -247,7 +286,7 @@ pub struct Ran {
 /// Computes what is missing of a shard; `done` is called with the rows done, all rows, and the last row.
 ///
 /// # Errors
-/// There are fewer variants than shards, the file holds rows of another plan, or it cannot be written.
+/// There are fewer variants than shards, a file of results is of another plan, or the shard cannot be written.
 pub fn run(
     plan: &VariantPlan,
     folder: &Path,
@@ -261,6 +300,8 @@ pub fn run(
             shard.of
         )));
     }
+    // Of a plan that was changed since, before anything is computed.
+    results_in(plan, folder)?;
     let path = shard.path(folder);
     let failed = |source: io::Error| PlanError::Output(OutputError { path: path.clone(), source });
     fs::create_dir_all(folder.join("results")).map_err(failed)?;
@@ -282,6 +323,7 @@ pub fn run(
     if end == 0 {
         file.write_all((header(plan).join(",") + "\n").as_bytes()).map_err(failed)?;
     }
+    note_appended();
     let model = plan.model();
     let journal = Mutex::new(Journal { file, next, waiting: BTreeMap::new() });
     (next..to).collect::<Vec<_>>().into_iter().par_bridge().try_for_each(|place| {

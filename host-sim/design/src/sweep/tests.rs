@@ -396,10 +396,22 @@ fn missing_results_are_named_and_those_of_another_plan_refused() {
     fs::copy(second.path(folder.path()), second.path(elsewhere.path())).unwrap();
     let said = run(&other, elsewhere.path(), second, &|_, _, _| ()).unwrap_err().to_string();
     assert!(said.contains(&format!("results of the plan {}", plan.hash)), "{said}");
+    // Another shard says so before it computes.
+    let said = run(&other, elsewhere.path(), Shard { number: 1, of: 2 }, &|_, _, _| ()).unwrap_err().to_string();
+    assert!(said.contains("0002-of-0002.csv: results of the plan"), "{said}");
     assert!(reduce(&other, elsewhere.path(), &Judge::default(), true).is_err());
     fs::copy(second.path(folder.path()), Shard::WHOLE.path(folder.path())).unwrap();
     let said = run(&plan, folder.path(), Shard::WHOLE, &|_, _, _| ()).unwrap_err().to_string();
     assert!(said.contains("not the rows of this shard"), "{said}");
+    // One variant with two results, in two files; the same result twice is one.
+    assert_eq!(reduced(true).unwrap().rows.len(), 8);
+    let text = fs::read_to_string(second.path(folder.path())).unwrap();
+    let last = text.lines().last().unwrap();
+    let figure = last.split(',').nth(4).unwrap();
+    let text = text.replace(last, &last.replacen(figure, &format!("1{figure}"), 1));
+    fs::write(Shard::WHOLE.path(folder.path()), text).unwrap();
+    let said = reduced(true).unwrap_err().to_string();
+    assert!(said.contains("0002-of-0002.csv: another result of variant 16 with cam"), "{said}");
 }
 
 #[test]
@@ -418,6 +430,10 @@ fn a_plan_is_read_as_it_was_written_and_its_lines_may_be_edited() {
     for (wrong, due) in [
         (format!("{text}11,1,0,2\n"), "plan.csv:10: variant: found \"11\", allowed: 1, 2, 3"),
         ("a,b\n1,2\n".to_owned(), "allowed: variant, then fields"),
+        (
+            text.replace("rim_thickness_mm", "rim_thicknes_mm"),
+            "plan.csv: no variant makes a drive; the first: --set flexspline.rim_thicknes_mm",
+        ),
         ("variant,a\n".to_owned(), "found no variant"),
         ("variant,a\n1,2,3\n".to_owned(), "plan.csv: CSV error"),
     ] {

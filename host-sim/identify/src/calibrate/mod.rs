@@ -73,6 +73,9 @@ const FINE_TURNS: f64 = 1.0;
 /// A ratio is refused if another leaves less than this share of the squares. A guess: of what a wrong whole number
 /// does, nothing is left.
 const OTHER_RATIO: f64 = 0.25;
+/// Error by a wrong ratio in one of several logs, at least, rad rms: a load that grows over a short log looks the same.
+/// A guess: 15 arc-minutes, where wind-up and clearance are a few.
+const LEAST_OF_OTHER_RATIO_RAD: f64 = 0.0044;
 /// Arcsec that are taken for rounding.
 const ROUNDING_ARCSEC: f64 = 1e-6;
 /// Coefficients of the play, and so the times that one of them is put on its bound and the others fitted anew.
@@ -95,10 +98,18 @@ pub enum CalibrationError {
     #[error("{0}")]
     Known(String),
     /// The rows turn by another ratio.
-    #[error("{0}")]
-    Ratio(String),
+    #[error("{file}: {other}")]
+    Ratio {
+        /// The file, or all of them.
+        file: String,
+        /// Both ratios.
+        other: OtherRatio,
+    },
     /// Too few rows in steady motion.
-    #[error("{0} rows in steady motion; at least {FEWEST_ROWS} are needed")]
+    #[error(
+        "{0} rows in steady motion; at least {FEWEST_ROWS} are needed: record a longer way in one direction, as rows \
+         after a reversal count only when the play is crossed"
+    )]
     TooFew(usize),
     /// Nothing gains.
     #[error("{0}")]
@@ -124,7 +135,7 @@ impl CalibrationError {
             self,
             CalibrationError::Measured(_)
                 | CalibrationError::Known(_)
-                | CalibrationError::Ratio(_)
+                | CalibrationError::Ratio { .. }
                 | CalibrationError::TooFew(_)
         )
     }
@@ -376,41 +387,75 @@ pub struct Calibrated {
     pub shown: Vec<[f64; 3]>,
 }
 
-/// Refuses a ratio that the rows contradict; says where they doubt it.
-pub(crate) fn check_ratio(files: &[Recording], ratio: f64) -> Result<Option<String>, CalibrationError> {
-    let (mut xx, mut xe, mut ee) = (0.0, 0.0, 0.0);
-    for session in files.iter().flat_map(|file| &file.sessions) {
-        let count = session.len().max(1) as f64;
-        let output = || session.generator_rad.iter().map(|psi| psi / ratio);
-        let (x, e) = (output().sum::<f64>() / count, session.error_rad.iter().sum::<f64>() / count);
-        for (at, error) in output().zip(&session.error_rad) {
-            xx += (at - x) * (at - x);
-            xe += (at - x) * (error - e);
-            ee += (error - e) * (error - e);
+/// Another ratio by which rows turn than the one that is given.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error(
+    "ratio: found {given}, but the generator turns {found:.2} times for one turn of the output in these rows; allowed: \
+     {near}, or other units or signs of the columns"
+)]
+pub struct OtherRatio {
+    given: f64,
+    found: f64,
+    /// The ratio nearest to what was found, whole or a half.
+    near: f64,
+    /// Error by the given ratio, rms over the rows.
+    error_rad: f64,
+}
+
+/// Refuses a ratio that the rows contradict, all of them or those of one file; says where they doubt it.
+fn check_ratio(files: &[Recording], ratio: f64) -> Result<Option<String>, CalibrationError> {
+    let all = OtherRatio::of(files, ratio);
+    if let Some(other) = all.filter(OtherRatio::is_far) {
+        let names: Vec<&str> = files.iter().map(|file| file.file.as_str()).collect();
+        return Err(CalibrationError::Ratio { file: names.join(", "), other });
+    }
+    for file in files.iter().filter(|_| files.len() > 1 && all.is_none()) {
+        let other = OtherRatio::of(std::slice::from_ref(file), ratio);
+        if let Some(other) = other.filter(|other| other.error_rad >= LEAST_OF_OTHER_RATIO_RAD) {
+            return Err(CalibrationError::Ratio { file: file.file.clone(), other });
         }
     }
-    if xx <= 0.0 || ee <= 0.0 {
-        return Ok(None);
+    Ok(all.map(|other| other.to_string()))
+}
+
+impl OtherRatio {
+    /// The ratio that the rows turn by, if they contradict `ratio`.
+    pub(crate) fn of(files: &[Recording], ratio: f64) -> Option<OtherRatio> {
+        let (mut xx, mut xe, mut ee, mut rows) = (0.0, 0.0, 0.0, 0.0);
+        for session in files.iter().flat_map(|file| &file.sessions) {
+            let count = session.len().max(1) as f64;
+            rows += count;
+            let output = || session.generator_rad.iter().map(|psi| psi / ratio);
+            let (x, e) = (output().sum::<f64>() / count, session.error_rad.iter().sum::<f64>() / count);
+            for (at, error) in output().zip(&session.error_rad) {
+                xx += (at - x) * (at - x);
+                xe += (at - x) * (error - e);
+                ee += (error - e) * (error - e);
+            }
+        }
+        if xx <= 0.0 || ee <= 0.0 {
+            return None;
+        }
+        let found = ratio / (1.0 + xe / xx);
+        let left = |other: f64| {
+            let slope = ratio / other - 1.0;
+            (ee - 2.0 * slope * xe + slope * slope * xx) / ee
+        };
+        // Wheels whose teeth differ by two have whole ratios and halves.
+        let near = (2.0 * found).round() / 2.0;
+        let error_rad = (ee / rows).sqrt();
+        (near != ratio && near.abs() >= 2.0 && left(near) < OTHER_RATIO).then_some(OtherRatio {
+            given: ratio,
+            found,
+            near,
+            error_rad,
+        })
     }
-    let found = ratio / (1.0 + xe / xx);
-    let left = |other: f64| {
-        let slope = ratio / other - 1.0;
-        (ee - 2.0 * slope * xe + slope * slope * xx) / ee
-    };
-    // Wheels whose teeth differ by two have whole ratios and halves.
-    let near = (2.0 * found).round() / 2.0;
-    if near == ratio || near.abs() < 2.0 || left(near) >= OTHER_RATIO {
-        return Ok(None);
+
+    /// Whether it is a wrong number rather than a rounded one.
+    pub(crate) fn is_far(&self) -> bool {
+        (self.near - self.given).abs() >= 1.0
     }
-    if (near - ratio).abs() >= 1.0 {
-        return Err(CalibrationError::Ratio(format!(
-            "ratio: found {ratio}, but the generator turns {found:.2} times for one turn of the output in these rows; \
-             allowed: {near}, or other units or signs of the columns"
-        )));
-    }
-    Ok(Some(format!(
-        "the generator turns {found:.2} times for one turn of the output in these rows: is the ratio {near}?"
-    )))
 }
 
 /// Generator turns that tell two waves in a turn from two in a turn against the output: half a turn of the output, in
@@ -438,6 +483,8 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
     if let Some([one, other]) = given_twice(files) {
         return Err(CalibrationError::Known(format!("{one} and {other} hold the same rows: give each log once")));
     }
+    prior.core_drive()?;
+    let said: Vec<String> = check_ratio(files, prior.nominal.ratio)?.into_iter().collect();
     let parted: Vec<Recording>;
     let files = if files.iter().flat_map(|file| &file.sessions).any(|session| session.own_zero) {
         parted = files.iter().flat_map(by_zeros).collect();
@@ -445,8 +492,6 @@ pub fn calibrate(files: &[Recording], prior: &Prior<'_>) -> Result<Calibrated, C
     } else {
         files
     };
-    prior.core_drive()?;
-    let said: Vec<String> = check_ratio(files, prior.nominal.ratio)?.into_iter().collect();
     let mut recorded = Recorded::of(files, prior);
     let play_rad = prior.nominal.backlash_arcsec / ARCSEC_PER_RAD;
     let mut rows = settled(files, prior, &recorded, play_rad);

@@ -361,6 +361,8 @@ fn what_was_not_recorded_is_not_fitted() {
     assert!(says("generator_angle").kept);
     let table = Table::check(&made.table.image).unwrap();
     assert_eq!(table.torque_range_n_m(), [0.0, 0.0]);
+    // No thermometer keeps to the one number of a log without a temperature.
+    assert_eq!(table.temperature_range_c(), [15.0, 25.0]);
 }
 
 #[test]
@@ -529,8 +531,17 @@ fn a_ratio_that_the_rows_contradict_is_refused() {
     for (error, psi) in session.error_rad.iter_mut().zip(&session.generator_rad) {
         *error += psi / RATIO - psi / 100.0;
     }
-    let refused = calibrate(&[other], &Prior::of_ratio(100.0, GeneratorKind::Cam));
-    assert!(matches!(&refused, Err(CalibrationError::Ratio(what)) if what.contains("allowed: 101")));
+    let refused = calibrate(&[other.clone()], &Prior::of_ratio(100.0, GeneratorKind::Cam)).err().unwrap();
+    assert!(matches!(refused, CalibrationError::Ratio { .. }) && refused.to_string().contains("allowed: 101"));
+    // One of two logs, which together turn by no ratio, is named.
+    other.file = "other.csv".to_owned();
+    let session = &mut other.sessions[0];
+    for (error, psi) in session.error_rad.iter_mut().zip(&session.generator_rad) {
+        *error += psi / 100.0 - psi / RATIO + psi / 99.0 - psi / RATIO;
+    }
+    let said = calibrate(&[recording(1, law), other], &Prior::of_ratio(RATIO, GeneratorKind::Cam)).err();
+    let said = said.unwrap().to_string();
+    assert!(said.starts_with("other.csv: ratio: found 101,") && said.contains("allowed: 99,"), "{said}");
 }
 
 /// A table made of one log is laid against another log of the same unit whose generator reads otherwise.
