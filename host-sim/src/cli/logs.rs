@@ -10,9 +10,9 @@ use flexspline_identify::measurement::ColumnMap;
 pub(super) struct LogOptions {
     /// Names and units of columns that are not called time_s, generator_rad, output_rad, error_arcsec, torque_n_m,
     /// temperature_c, orientation_rad: generator=wave_gen_turns:turn,error=error_arcsec:arcsec; by number, with sign
-    /// and gain: generator=#1:count/16777216,torque=#4:-N.m. Units: rad, deg, turn, arcmin, arcsec, mrad, count/N, s,
-    /// ms, us, ns, min, h, iso, N.m, N.cm, mN.m, kN.m, lbf.in, lbf.ft, A*K, mA*K, V*K, C, K, F; `flexspline look FILE`
-    /// proposes the mapping [default: these names]
+    /// and gain: generator=#1:count/16777216,torque=#4:-N.m. Units: rad, deg, gon, turn, arcmin, arcsec, mrad, count/N,
+    /// s, ms, us, ns, min, h, iso, N.m, N.cm, N.mm, mN.m, kN.m, lbf.in, lbf.ft, A*K, mA*K, V*K, C, K, F;
+    /// `flexspline look FILE` proposes the mapping [default: these names]
     #[arg(long, value_name = "MAP", default_value = "", hide_default_value = true)]
     columns: String,
     /// Rows in a second, Hz, where a file has no time [default: no time]
@@ -31,17 +31,19 @@ impl LogOptions {
                 format!("--torque-constant: found {constant}, allowed: a number other than zero, N.m for an ampere");
             return Err(Failure::BadInput(what));
         }
-        let map = if self.columns.is_empty() {
-            Ok(ColumnMap::default())
-        } else {
-            ColumnMap::with_torque_constant(&self.columns, self.torque_constant)
-        };
-        let map = map.map_err(bad_input)?;
-        map.at_rate(self.rate).map_err(bad_input)
+        map_of(&self.columns, self.torque_constant)?.at_rate(self.rate).map_err(bad_input)
     }
 
     /// Rows in a second, if that is said.
     pub(super) fn rate_hz(&self) -> Option<f64> {
         self.rate
     }
+}
+
+/// The mapping of an option; the names of this project where it is empty.
+pub(super) fn map_of(columns: &str, torque_constant: Option<f64>) -> Result<ColumnMap, Failure> {
+    if columns.is_empty() {
+        return Ok(ColumnMap::default());
+    }
+    ColumnMap::with_torque_constant(columns, torque_constant).map_err(bad_input)
 }

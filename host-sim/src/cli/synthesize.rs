@@ -9,12 +9,13 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::context::{Context, quoted, table_image, table_of};
+use super::logs::map_of;
 use super::tables::fresh_table;
 use super::{Failure, bad_input, say, within};
 use flexspline_base::output::Outputs;
 use flexspline_identify::causes::{Parameter, Usual};
 use flexspline_identify::extension::{self, CauseEntry};
-use flexspline_identify::measurement::{ColumnMap, Session, read};
+use flexspline_identify::measurement::{Session, read};
 use flexspline_identify::nominal::Nominal;
 use flexspline_identify::synthesize::{
     Definition, DrawnUnit, Effect, MotionPlan, Sensors, Sizes, completed, effects, parse, synthesize, to_csv,
@@ -250,14 +251,7 @@ impl Synthesize {
             };
             return Ok(plan.excite(random));
         };
-        let map = if self.excitation.columns.is_empty() {
-            Ok(ColumnMap::default())
-        } else {
-            ColumnMap::parse(&self.excitation.columns)
-        };
-        let map = map.map_err(|error| Failure::BadInput(format!("--columns: {error}")))?;
-        let gear = nominal.gear();
-        let recording = read(path, &map, &gear).map_err(bad_input)?;
+        let recording = read(path, &map_of(&self.excitation.columns, None)?, &nominal.gear()).map_err(bad_input)?;
         Ok(completed(&recording.sessions, RATE_HZ, nominal.temperature_c))
     }
 
@@ -287,13 +281,8 @@ impl Synthesize {
     ) -> Result<(Option<Vec<u8>>, Nominal, Vec<CauseEntry>, NominalSource), Failure> {
         if let Some(file) = &self.model {
             let model = extension::Model::read(file).map_err(bad_input)?;
-            let source = NominalSource {
-                kind: "model",
-                file: Some(file.display().to_string()),
-                table_id: None,
-                generator: None,
-                drive: drive.name.clone(),
-            };
+            let (file, drive) = (Some(file.display().to_string()), drive.name.clone());
+            let source = NominalSource { kind: "model", file, table_id: None, generator: None, drive };
             return Ok((None, model.nominal, model.causes, source));
         }
         let (image, file) = match &self.tables {

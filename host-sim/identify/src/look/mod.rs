@@ -19,7 +19,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::measurement::raw::RawFile;
-use crate::measurement::{APART, MappedColumn, Quantity, ReadRows, Reading, Unit, median_of, sampled};
+use crate::measurement::{APART, MappedColumn, Quantity, ReadRows, Reading, Unit, WrongReading, median_of, sampled};
 use column::{Facts, unwrapped};
 pub(crate) use coverage::Coverage;
 use pair::pair;
@@ -179,6 +179,8 @@ struct Guess {
     said: Said,
     role: Role,
     unit: Option<Unit>,
+    /// A unit that is written and not known.
+    unknown_unit: Option<String>,
     /// Counts of a turn of counts.
     counts: Option<f64>,
     negative: bool,
@@ -311,6 +313,7 @@ pub fn look(files: &[RawFile]) -> Result<Looked, LookError> {
             "ratios are whole numbers but for wheels with an odd number of teeth: {half} is nearest to these rows"
         ));
     }
+    ask_for_units(&mut guesses, &mut notes);
     let mut columns_option = option(&guesses, &names, &mut notes);
     // From here on the rows are those that `calibrate` and `diagnose` have by this mapping.
     let columns: Vec<MappedColumn> =
@@ -396,6 +399,9 @@ fn guess(files: &[RawFile], place: usize, of_file: &Arc<[f64]>) -> Guess {
         guess.why.push(anew.text(""));
     }
     let by = if unit.is_some() { "line of units" } else { "name" };
+    let written = unit.map(String::as_str).or_else(|| Unit::bracketed(name));
+    guess.unknown_unit =
+        written.filter(|unit| !["-", "1"].contains(unit) && Unit::in_brackets(unit).is_none()).map(str::to_owned);
     let unit = unit.and_then(|unit| Unit::in_brackets(unit)).or_else(|| Unit::in_name(name));
     if let Some(unit) = unit.filter(|unit| fits(guess.role, *unit)) {
         guess.unit = Some(unit);
@@ -610,6 +616,16 @@ fn torque(guesses: &mut [Guess], error: Option<&[f64]>, notes: &mut Vec<String>)
     }
 }
 
+/// Asks for the units of columns in use that are written and not known.
+fn ask_for_units(guesses: &mut [Guess], notes: &mut Vec<String>) {
+    for (place, guess) in guesses.iter_mut().enumerate().filter(|(_, guess)| guess.used) {
+        let Some((unit, quantity)) = guess.unknown_unit.take().zip(guess.role.in_mapping()) else { continue };
+        let refusal = quantity.refusal(WrongReading::Unit(unit));
+        (guess.unit, guess.counts, guess.confidence) = (None, None, 0.0);
+        notes.push(format!("column {}, {quantity}: {refusal}", place + 1));
+    }
+}
+
 /// Kind of time and median step, s.
 fn clock(read: &[ReadRows]) -> (TimeKind, Option<f64>) {
     let steps = || read.iter().flat_map(|rows| rows.stamps_s.windows(2).map(|pair| pair[1] - pair[0]));
@@ -631,7 +647,7 @@ fn clock(read: &[ReadRows]) -> (TimeKind, Option<f64>) {
 fn option(guesses: &[Guess], names: &[String], notes: &mut Vec<String>) -> Option<String> {
     let used: Vec<(&Guess, &String)> = guesses.iter().zip(names).filter(|(guess, _)| guess.used).collect();
     let has = |role: Role| used.iter().any(|(guess, _)| guess.role == role && guess.written().is_some());
-    let is_open = |guess: &Guess| guess.written().is_none() && guess.role.is_angle();
+    let is_open = |guess: &Guess| guess.written().is_none();
     // Entries of a mapping, with a word in place of a unit that is open.
     let entries = |with: &dyn Fn(&Guess) -> bool| {
         let entry = |(guess, name): &(&Guess, &String)| {
@@ -641,16 +657,16 @@ fn option(guesses: &[Guess], names: &[String], notes: &mut Vec<String>) -> Optio
         };
         used.iter().filter(|(guess, _)| with(guess)).filter_map(entry).collect::<Vec<_>>().join(",")
     };
-    if has(Role::Generator) && (has(Role::Output) || has(Role::Error)) {
-        return Some(entries(&|guess| guess.written().is_some()));
-    }
     let open = used.iter().filter(|(guess, _)| is_open(guess)).count();
     if open > 0 {
-        let entries = entries(&|guess| guess.role.is_angle());
+        let entries = entries(&|guess| guess.role.is_angle() || is_open(guess));
         let which = if open == 1 { "that column" } else { "these columns" };
         let (what, word) = if entries.contains("UNIT") { ("unit", "UNIT") } else { ("counts of a turn", "COUNTS") };
         notes.push(format!("give the {what} of {which} in place of {word}: --columns {entries}"));
         return None;
+    }
+    if has(Role::Generator) && (has(Role::Output) || has(Role::Error)) {
+        return Some(entries(&|_| true));
     }
     let what = match (has(Role::Generator), has(Role::Output) || has(Role::Error)) {
         (true, false) => "which column is the output (or the error)",

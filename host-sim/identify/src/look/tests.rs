@@ -73,6 +73,14 @@ fn degrees(t: &Truth, k: usize) -> Vec<String> {
     fields
 }
 
+fn gon(t: &Truth, k: usize) -> Vec<String> {
+    let mut fields = plain(t, k);
+    fields[1] = format!("{:.5}", t.generator_rad[k] / TAU * 400.0);
+    fields[2] = format!("{:.7}", t.output_rad[k] / TAU * 400.0);
+    fields[3] = format!("{:.1}", 1000.0 * t.torque_n_m[k]);
+    fields
+}
+
 fn counts(angle: f64, of_a_turn: f64) -> String {
     format!("{:.0}", angle / TAU * of_a_turn)
 }
@@ -126,6 +134,16 @@ fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
     };
     vec![
         ("this project's", gear(file("time_s,generator_rad,output_rad,torque_n_m\n", ",", plain)), Proposed),
+        ("gon and N.mm in brackets", gear(file("time_s,motor [gon],load [gon],torque [Nmm]\n", ",", gon)), Proposed),
+        ("gon and N.mm below", gear(file("time,motor,load,torque\ns,gon,gon,N.mm\n", ",", gon)), Proposed),
+        (
+            "an unknown unit below",
+            gear(file("time,motor,load,torque\ns,rad,rad,rpm\n", ",", plain)),
+            Refused(
+                "generator=motor,output=load,torque=torque",
+                &["column torque: found the unit \"rpm\", allowed: N.m"],
+            ),
+        ),
         ("semicolons", gear(file("time;motor;load;torque\n", ";", plain)), Proposed),
         ("decimal commas", gear(file("Zeit;Motor;Abtrieb;Drehmoment\n", ";", |t, k| commas(plain(t, k)))), Proposed),
         ("tabs", gear(file("time\tmotor\tload\ttorque\n", "\t", plain)), Proposed),
@@ -722,4 +740,11 @@ fn counts_that_the_file_does_not_say_are_asked() {
         [(202.0, "generator=motor:count/2048,output=load:rad"), (101.0, "generator=motor:count/4096,output=load:rad")];
     assert_eq!(may_be, due);
     assert!(due.iter().all(|(_, columns)| text(&looked).contains(columns)), "{}", text(&looked));
+    // So are units that are written and not known, and no size is assumed.
+    let looked = looked_at(file("time_s,motor [foo],load [foo],torque [Nmx]\n", ",", plain).as_bytes()).unwrap();
+    assert!(looked.columns_option.is_none() && looked.columns[1..].iter().all(|column| column.unit.is_none()));
+    let due = "--columns generator=motor [foo]:UNIT,output=load [foo]:UNIT,torque=torque [Nmx]:UNIT";
+    assert!(looked.notes.iter().any(|note| note.ends_with(due)), "{}", text(&looked));
+    let due = "column 4, torque: found the unit \"Nmx\", allowed: N.m, N.cm, N.mm, ";
+    assert!(looked.notes.iter().any(|note| note.starts_with(due)), "{}", text(&looked));
 }

@@ -97,10 +97,7 @@ enum UnitKind {
 
 /// What the unit of a line of its own, in brackets, or at the end of a name is one of.
 fn kind_of_unit(name: &str, line: Option<&str>) -> Option<UnitKind> {
-    let bracketed = [('[', ']'), ('(', ')')].into_iter().find_map(|(open, close)| {
-        name.trim_end().strip_suffix(close).and_then(|rest| rest.rsplit_once(open)).map(|(_, unit)| unit)
-    });
-    let Some(text) = line.or(bracketed) else {
+    let Some(text) = line.or_else(|| Unit::bracketed(name)) else {
         // A single letter at the end of a name is a letter more often than a unit: phase_A, sensor_C.
         let unit = Unit::in_name(name).filter(|unit| matches!(unit.family(), Family::Angle | Family::Torque));
         return unit.and_then(kind).filter(|kind| *kind != UnitKind::Current || name.ends_with("_mA"));

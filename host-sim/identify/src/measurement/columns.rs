@@ -76,6 +76,18 @@ impl Quantity {
         }
     }
 
+    /// The refusal of a reading, in words.
+    pub(crate) fn refusal(self, wrong: WrongReading) -> String {
+        match wrong {
+            WrongReading::Text(what) => what,
+            WrongReading::Unit(unit) => {
+                let units: Vec<_> = self.family().units().map(Unit::name).collect();
+                let hint = did_you_mean("; ", &unit, units.iter().copied());
+                format!("found the unit \"{unit}\", allowed: {}{hint}", units.join(", "))
+            }
+        }
+    }
+
     /// The largest size a value may have, in the unit used inside (rad, s, N·m, °C): beyond it a double no longer
     /// resolves an arc-second, or nothing of the kind exists.
     pub(super) fn limit(self) -> f64 {
@@ -217,9 +229,7 @@ impl ColumnMap {
             let reading = match given.and_then(|given| given.reading) {
                 Some(reading) => reading,
                 None => unit_below(quantity, place, layout)
-                    .map_err(|(WrongReading::Unit(what) | WrongReading::Text(what))| {
-                        problem(format!("column {name}: {what}"))
-                    })?
+                    .map_err(|wrong| problem(format!("column {name}: {}", quantity.refusal(wrong))))?
                     .unwrap_or(Reading::of(default.1)),
             };
             columns.push(MappedColumn { quantity, name: name.to_owned(), place, unit: reading.plain_unit(), reading });
@@ -279,19 +289,12 @@ fn given(entry: &str, per_ampere: Option<f64>) -> Result<GivenColumn, MappingErr
     let (column, reading) = match column.rsplit_once(':') {
         None => {
             let ending = Unit::in_name(column.trim()).filter(|unit| unit.family() == quantity.family());
-            let reading = ending.map(|unit| Reading::parse(unit.name(), quantity.family(), per_ampere));
-            (column, reading.transpose())
+            let text = Unit::bracketed(column).or(ending.map(Unit::name));
+            (column, text.map(|text| Reading::parse(text, quantity.family(), per_ampere)).transpose())
         }
         Some((column, unit)) => (column, Reading::parse(unit, quantity.family(), per_ampere).map(Some)),
     };
-    let reading = reading.map_err(|wrong| match wrong {
-        WrongReading::Text(what) => MappingError(format!("{name}: {what}")),
-        WrongReading::Unit(unit) => {
-            let units: Vec<_> = quantity.family().units().map(Unit::name).collect();
-            let hint = did_you_mean("; ", &unit, units.iter().copied());
-            MappingError(format!("{name}: found the unit \"{unit}\", allowed: {}{hint}", units.join(", ")))
-        }
-    })?;
+    let reading = reading.map_err(|wrong| MappingError(format!("{name}: {}", quantity.refusal(wrong))))?;
     let column = column.trim().to_owned();
     if column.is_empty() {
         return Err(MappingError(format!("{name}: found no column, allowed: the name of a column of the file")));
@@ -305,13 +308,11 @@ fn by_number(name: &str, columns: usize) -> Option<usize> {
     (1..=columns).contains(&number).then(|| number - 1)
 }
 
-/// What a line of units below the names says of a column, if it says something that the quantity may be in.
+/// The reading by the line of units below the names; none where it has no word for the column, or a bare number.
 fn unit_below(quantity: Quantity, place: usize, layout: Option<&Layout>) -> Result<Option<Reading>, WrongReading> {
-    let Some(word) = layout.and_then(|layout| layout.units.get(place)).map(|unit| unit_word(unit)) else {
-        return Ok(None);
-    };
-    let unit = Unit::written(word).filter(|unit| unit.family() == quantity.family());
-    unit.map(|unit| Reading::parse(unit.name(), quantity.family(), None)).transpose()
+    let word = layout.and_then(|layout| layout.units.get(place)).map_or("", |unit| unit_word(unit));
+    let written = !["", "-", "1"].contains(&word);
+    written.then(|| Reading::parse(word, quantity.family(), None)).transpose()
 }
 
 /// The column that may be meant by `wanted`, if there is one.
@@ -368,6 +369,10 @@ mod tests {
         let map = ColumnMap::parse("generator=enc:1:deg,output=load_deg").unwrap();
         let columns = map.resolve(&names("enc:1,load_deg"), 1, None).unwrap();
         assert_eq!((columns[0].unit, columns[1].unit), (Unit::Degree, Unit::Degree));
+        // A place in a list is no unit.
+        let map = ColumnMap::parse("generator=position[1],output=out [gon]").unwrap();
+        let columns = map.resolve(&names("position[1],out [gon]"), 1, None).unwrap();
+        assert_eq!((columns[0].unit, columns[1].unit), (Unit::Radian, Unit::Gon));
     }
 
     #[test]
@@ -412,6 +417,8 @@ mod tests {
             ("output=a:deg*x", "found \"*x\" after the unit"),
             ("qwertz=a", "temperature, orientation; for instance"),
             ("error=a:parsec", "did you mean `arcsec`?"),
+            ("torque=torque [Nmx]", "torque: found the unit \"Nmx\", allowed: N.m, N.cm, N.mm"),
+            ("generator=motor (Gon)", "generator: found the unit \"Gon\", allowed: rad, deg, gon, turn"),
             ("error=a:mil", "arcmin, arcsec, mrad, count"),
         ] {
             let error = ColumnMap::parse(text).unwrap_err().to_string();

@@ -210,7 +210,9 @@ pub(crate) fn of_columns(
             1 => "1 row".to_owned(),
             n => format!("{n} rows"),
         };
-        return Err(refuse(format!("{rows} after the header; at least {fewest} are needed")));
+        return Err(refuse(format!(
+            "{rows} after the header; at least {fewest} are needed: a log has a line for each instant of a motion"
+        )));
     }
     if let Some(rate_hz) = rate_hz {
         if log.get(Quantity::Time).is_some() {

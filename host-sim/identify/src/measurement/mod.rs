@@ -35,7 +35,7 @@ pub use gear::Gear;
 pub use log::{FEWEST_ROWS, MeasuredError};
 pub use reader::{Layout, Separator, Sheet, raw};
 pub(crate) use rollover::{Anew, begins_anew, continued, registers};
-pub(crate) use unit::Family;
+pub(crate) use unit::{Family, WrongReading};
 
 use faults::Findings;
 use faults::drift::Stretches;

@@ -10,6 +10,8 @@ pub enum Unit {
     Radian,
     /// deg
     Degree,
+    /// gon: 400 make a turn
+    Gon,
     /// turn
     Turn,
     /// arcmin
@@ -40,6 +42,8 @@ pub enum Unit {
     NewtonMetre,
     /// N.cm
     NewtonCentimetre,
+    /// N.mm
+    NewtonMillimetre,
     /// mN.m
     MillinewtonMetre,
     /// kN.m
@@ -91,9 +95,10 @@ type Row = (Unit, Family, &'static [&'static str], f64);
 /// Each unit in the order of [`Unit`], with its family, how people write it (its name in a mapping first) and its size
 /// in the unit used inside (rad, s, N·m, °C). The size of a count, an ampere and a volt is that of the result of its
 /// gain: a turn, a N·m.
-const UNITS: [Row; 27] = [
+const UNITS: [Row; 29] = [
     (Unit::Radian, Family::Angle, &["rad"], 1.0),
     (Unit::Degree, Family::Angle, &["deg", "°"], TAU / 360.0),
+    (Unit::Gon, Family::Angle, &["gon"], TAU / 400.0),
     (Unit::Turn, Family::Angle, &["turn", "turns", "rev", "revs"], TAU),
     (Unit::Arcminute, Family::Angle, &["arcmin"], TAU / 21_600.0),
     (Unit::Arcsecond, Family::Angle, &["arcsec"], TAU / 1_296_000.0),
@@ -109,6 +114,7 @@ const UNITS: [Row; 27] = [
     (Unit::Iso, Family::Time, &["iso"], 1.0),
     (Unit::NewtonMetre, Family::Torque, &["N.m", "Nm", "N·m", "N*m", "N-m", "N m"], 1.0),
     (Unit::NewtonCentimetre, Family::Torque, &["N.cm", "Ncm", "N·cm"], 1e-2),
+    (Unit::NewtonMillimetre, Family::Torque, &["N.mm", "Nmm", "N·mm"], 1e-3),
     (Unit::MillinewtonMetre, Family::Torque, &["mN.m", "mNm", "mN·m"], 1e-3),
     (Unit::KilonewtonMetre, Family::Torque, &["kN.m", "kNm", "kN·m"], 1e3),
     (Unit::PoundInch, Family::Torque, &["lbf.in", "in.lbf", "in-lb", "lb-in", "lbf-in"], POUND_FORCE_N * 0.0254),
@@ -179,13 +185,19 @@ impl Unit {
         UNITS.iter().find(|row| row.2.contains(&text)).map(|row| row.0)
     }
 
+    /// The text in brackets at the end of a name, known as a unit or not: `deg` of `Winkel [deg]`. A place in a list is
+    /// none: `position[2]`.
+    pub(crate) fn bracketed(column: &str) -> Option<&str> {
+        let inside = |(open, close)| Some(column.trim_end().strip_suffix(close)?.rsplit_once(open)?.1.trim());
+        let text = [('[', ']'), ('(', ')')].into_iter().find_map(inside)?;
+        (!text.starts_with(|first: char| first.is_ascii_digit())).then_some(text).filter(|text| !text.is_empty())
+    }
+
     /// The unit that a column is in if its name says it: `wave_gen_turn`, `error_arcsec`, `Winkel [deg]`, `load (Nm)`.
     #[must_use]
     pub(crate) fn in_name(column: &str) -> Option<Unit> {
-        for (open, close) in [('[', ']'), ('(', ')')] {
-            if let Some(inside) = column.trim_end().strip_suffix(close).and_then(|rest| rest.rsplit_once(open)) {
-                return Unit::written(inside.1.trim());
-            }
+        if let Some(text) = Unit::bracketed(column) {
+            return Unit::written(text);
         }
         if let Some((_, unit)) = IN_NAMES.iter().find(|(end, _)| column.ends_with(end)) {
             return Some(*unit);
@@ -349,6 +361,8 @@ mod tests {
             (" - mrad * 1e1 ", Family::Angle, 100.0, -1.0),
             ("Nm", Family::Torque, 2.0, 2.0),
             ("N.cm", Family::Torque, 200.0, 2.0),
+            ("Nmm", Family::Torque, 2000.0, 2.0),
+            ("gon", Family::Angle, 100.0, TAU / 4.0),
             ("V*20-0.5", Family::Torque, 0.1, 1.5),
             ("mA*0.0035", Family::Torque, 1000.0, 3.5),
             ("N-m", Family::Torque, 2.0, 2.0),
