@@ -33,6 +33,11 @@ const HALF_WIDTH_NOISE_RAD: f64 = 5e-7;
 
 /// Places of a turn of the output over which a curve's mean is taken: no multiple of an order.
 const PLACES_OF_A_MEAN: u32 = 101;
+/// Samples of one temperature hold this far about it, K: a log without a temperature is of a room, and no thermometer
+/// keeps to one number. A guess.
+const ONE_TEMPERATURE_K: f32 = 5.0;
+/// Where the samples of a table come from, unless from a mesh.
+const SAMPLES: &str = "samples";
 
 /// Why no table was made.
 #[derive(Debug, Error)]
@@ -220,7 +225,7 @@ pub fn from_samples(
         deviation_limit_rad: options.deviation_limit_rad,
     };
     let source = Source::File { name: name.to_owned(), blake3: blake3::hash(bytes).to_hex().to_string() };
-    make((&drive.name, drive.hash()), kind, &plan, &snapped, source, "samples", 0.0)
+    make((&drive.name, drive.hash()), kind, &plan, &snapped, source, SAMPLES, 0.0)
 }
 
 /// The table of samples laid out by a plan, of a drive that is known by its name and hash alone.
@@ -232,7 +237,7 @@ pub fn from_plan(
     samples: &[Sample],
     source: Source,
 ) -> Result<MadeTable, TableError> {
-    make((name, hash), kind, plan, samples, source, "samples", 0.0)
+    make((name, hash), kind, plan, samples, source, SAMPLES, 0.0)
 }
 
 fn make(
@@ -259,7 +264,10 @@ fn make(
         mesh_level: mesh,
         solver_residual: residual as f32,
         torque_range_n_m: span(plan.torque_nodes_n_m),
-        temperature_range_c: span(plan.temperature_nodes_c),
+        temperature_range_c: match plan.temperature_nodes_c {
+            [one] if mesh == SAMPLES => [one - ONE_TEMPERATURE_K, one + ONE_TEMPERATURE_K],
+            nodes => span(nodes),
+        },
         error_limit_rad: (1.5 * largest + 1e-4).min(f64::from(flexspline::MAX_ERROR_RAD)) as f32,
     };
     let id = |contents: &[u8]| {
