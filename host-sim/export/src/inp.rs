@@ -411,12 +411,7 @@ impl Deck {
             }
         }
         for Equation { terms } in &self.equations {
-            writeln!(out, "*EQUATION\n{}", terms.len())?;
-            for line in terms.chunks(4) {
-                let words: Vec<String> =
-                    line.iter().map(|t| format!("{}, {}, {}", t.node, t.dof, short(t.coefficient))).collect();
-                writeln!(out, "{}", words.join(", "))?;
-            }
+            equation(out, terms.iter().copied())?;
         }
         Ok(())
     }
@@ -551,6 +546,13 @@ fn short(value: f64) -> String {
     }
     let digits = if value < 0.0 { 11 } else { 12 };
     format!("{value:.digits$e}")
+}
+
+/// A linear equation, four terms to a line.
+fn equation(out: &mut dyn Write, terms: impl Iterator<Item = EquationTerm>) -> io::Result<()> {
+    let words: Vec<String> = terms.map(|t| format!("{}, {}, {}", t.node, t.dof, short(t.coefficient))).collect();
+    writeln!(out, "*EQUATION\n{}", words.len())?;
+    words.chunks(4).try_for_each(|line| writeln!(out, "{}", line.join(", ")))
 }
 
 /// Numbers, sixteen to a line.

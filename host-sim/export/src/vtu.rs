@@ -41,64 +41,89 @@ pub fn write_vtu(out: &mut dyn Write, problem: &Problem, state: &State) -> io::R
         MovedWheel::new(&problem.flexspline, &state.u, 0.0),
         MovedWheel::new(&problem.circular_spline, &state.v, state.output_rad),
     ];
-    let points: usize = wheels.iter().map(|wheel| wheel.mesh.nodes.len()).sum();
-    let cells: usize = wheels.iter().map(|wheel| wheel.mesh.elements.len()).sum();
-    let both = |f: &dyn Fn(&MovedWheel) -> Vec<f32>| wheels.iter().flat_map(f).collect::<Vec<f32>>();
-
-    writeln!(out, r#"<?xml version="1.0"?>"#)?;
-    writeln!(out, r#"<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">"#)?;
-    writeln!(out, "<UnstructuredGrid>")?;
-    writeln!(out, "<FieldData>")?;
-    for (name, value) in
-        [("generator_rad", state.generator_rad), ("output_rad", state.output_rad), ("torque_n_m", state.torque_n_m)]
-    {
-        let attributes = format!(r#"type="Float64" Name="{name}" NumberOfTuples="1""#);
-        array(out, &attributes, value.to_le_bytes())?;
+    let whole =
+        [("generator_rad", state.generator_rad), ("output_rad", state.output_rad), ("torque_n_m", state.torque_n_m)];
+    let mut grid = CellGrid { whole: whole.to_vec(), part: "wheel", ..CellGrid::default() };
+    for (wheel, id) in wheels.iter().zip(0_u8..) {
+        let first = grid.points.len() / 3;
+        grid.points.extend(wheel.positions());
+        grid.displacements.extend(wheel.displacements());
+        let stress = nodal_von_mises(wheel.mesh, &problem.material, wheel.field);
+        grid.von_mises.extend(stress.into_iter().map(|s| s as f32));
+        for (e, element) in wheel.mesh.elements.iter().enumerate() {
+            grid.cell(&element.map(|n| first + n as usize), VTK_QUADRATIC_QUAD, id);
+            grid.sectors.push((e / wheel.mesh.elements_per_sector) as i32);
+        }
     }
-    writeln!(out, "</FieldData>")?;
-    writeln!(out, r#"<Piece NumberOfPoints="{points}" NumberOfCells="{cells}">"#)?;
+    grid.write(out)
+}
 
-    writeln!(out, "<Points>")?;
-    vectors(out, "Points", &both(&|wheel| wheel.positions()))?;
-    writeln!(out, "</Points>")?;
+/// A grid with its fields; those that it does not have are empty.
+#[derive(Default)]
+pub(super) struct CellGrid {
+    /// Numbers of the whole, by name.
+    pub whole: Vec<(&'static str, f64)>,
+    /// Deformed positions and displacements, three numbers to a point, mm.
+    pub points: Vec<f32>,
+    pub displacements: Vec<f32>,
+    /// By point, MPa.
+    pub von_mises: Vec<f32>,
+    pub connectivity: Vec<i32>,
+    pub offsets: Vec<i32>,
+    pub types: Vec<u8>,
+    /// The part of each cell, and the name of the field.
+    pub parts: Vec<u8>,
+    pub part: &'static str,
+    pub sectors: Vec<i32>,
+}
 
-    writeln!(out, r#"<PointData Scalars="von_mises" Vectors="displacement">"#)?;
-    vectors(out, "displacement", &both(&|wheel| wheel.displacements()))?;
-    let stress = both(&|wheel| {
-        let nodal = nodal_von_mises(wheel.mesh, &problem.material, wheel.field);
-        nodal.into_iter().map(|s| s as f32).collect()
-    });
-    let bytes = stress.iter().flat_map(|x| x.to_le_bytes());
-    array(out, r#"type="Float32" Name="von_mises""#, bytes)?;
-    writeln!(out, "</PointData>")?;
-
-    writeln!(out, "<Cells>")?;
-    let mut first = 0;
-    let mut connectivity = Vec::with_capacity(8 * cells);
-    for wheel in &wheels {
-        connectivity.extend(wheel.mesh.elements.iter().flatten().map(|n| (n + first) as i32));
-        first += wheel.mesh.nodes.len() as u32;
+impl CellGrid {
+    /// Adds a cell of a VTK type.
+    pub fn cell(&mut self, nodes: &[usize], kind: u8, part: u8) {
+        self.connectivity.extend(nodes.iter().map(|n| *n as i32));
+        self.offsets.push(self.connectivity.len() as i32);
+        self.types.push(kind);
+        self.parts.push(part);
     }
-    let bytes = connectivity.iter().flat_map(|n| n.to_le_bytes());
-    array(out, r#"type="Int32" Name="connectivity""#, bytes)?;
-    let offsets = (1..=cells).flat_map(|cell| (8 * cell as i32).to_le_bytes());
-    array(out, r#"type="Int32" Name="offsets""#, offsets)?;
-    let types = std::iter::repeat_n(VTK_QUADRATIC_QUAD, cells);
-    array(out, r#"type="UInt8" Name="types""#, types)?;
-    writeln!(out, "</Cells>")?;
 
-    writeln!(out, r#"<CellData Scalars="wheel">"#)?;
-    let wheel_ids =
-        wheels.iter().zip(0_u8..).flat_map(|(wheel, id)| std::iter::repeat_n(id, wheel.mesh.elements.len()));
-    array(out, r#"type="UInt8" Name="wheel""#, wheel_ids)?;
-    let sectors = wheels.iter().flat_map(|wheel| {
-        let per_sector = wheel.mesh.elements_per_sector;
-        (0..wheel.mesh.elements.len()).flat_map(move |e| ((e / per_sector) as i32).to_le_bytes())
-    });
-    array(out, r#"type="Int32" Name="sector""#, sectors)?;
-    writeln!(out, "</CellData>")?;
-
-    writeln!(out, "</Piece>\n</UnstructuredGrid>\n</VTKFile>")
+    pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
+        let (points, cells) = (self.points.len() / 3, self.types.len());
+        let whole = |numbers: &[i32]| numbers.iter().flat_map(|n| n.to_le_bytes()).collect::<Vec<u8>>();
+        writeln!(out, r#"<?xml version="1.0"?>"#)?;
+        writeln!(
+            out,
+            r#"<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">"#
+        )?;
+        writeln!(out, "<UnstructuredGrid>")?;
+        if !self.whole.is_empty() {
+            writeln!(out, "<FieldData>")?;
+            for (name, value) in &self.whole {
+                let attributes = format!(r#"type="Float64" Name="{name}" NumberOfTuples="1""#);
+                array(out, &attributes, value.to_le_bytes())?;
+            }
+            writeln!(out, "</FieldData>")?;
+        }
+        writeln!(out, r#"<Piece NumberOfPoints="{points}" NumberOfCells="{cells}">"#)?;
+        writeln!(out, "<Points>")?;
+        vectors(out, "Points", &self.points)?;
+        let shown = if self.von_mises.is_empty() { "" } else { r#"Scalars="von_mises" "# };
+        writeln!(out, "</Points>\n<PointData {shown}Vectors=\"displacement\">")?;
+        vectors(out, "displacement", &self.displacements)?;
+        if !self.von_mises.is_empty() {
+            let bytes = self.von_mises.iter().flat_map(|x| x.to_le_bytes());
+            array(out, r#"type="Float32" Name="von_mises""#, bytes)?;
+        }
+        writeln!(out, "</PointData>\n<Cells>")?;
+        array(out, r#"type="Int32" Name="connectivity""#, whole(&self.connectivity))?;
+        array(out, r#"type="Int32" Name="offsets""#, whole(&self.offsets))?;
+        array(out, r#"type="UInt8" Name="types""#, self.types.iter().copied())?;
+        writeln!(out, "</Cells>\n<CellData Scalars=\"{}\">", self.part)?;
+        array(out, &format!(r#"type="UInt8" Name="{}""#, self.part), self.parts.iter().copied())?;
+        if !self.sectors.is_empty() {
+            array(out, r#"type="Int32" Name="sector""#, whole(&self.sectors))?;
+        }
+        writeln!(out, "</CellData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>")
+    }
 }
 
 /// Writes the list of a series. Its time is the step: the generator angle of a reversing run comes back to where it
@@ -141,13 +166,13 @@ impl<'a> MovedWheel<'a> {
     }
 }
 
-pub(super) fn vectors(out: &mut dyn Write, name: &str, values: &[f32]) -> io::Result<()> {
+fn vectors(out: &mut dyn Write, name: &str, values: &[f32]) -> io::Result<()> {
     let attributes = format!(r#"type="Float32" Name="{name}" NumberOfComponents="3""#);
     array(out, &attributes, values.iter().flat_map(|x| x.to_le_bytes()))
 }
 
 /// A data array: its length in bytes, then the bytes, in base64.
-pub(super) fn array(out: &mut dyn Write, attributes: &str, bytes: impl IntoIterator<Item = u8>) -> io::Result<()> {
+fn array(out: &mut dyn Write, attributes: &str, bytes: impl IntoIterator<Item = u8>) -> io::Result<()> {
     let mut payload = vec![0; 8];
     payload.extend(bytes);
     let length = payload.len() as u64 - 8;

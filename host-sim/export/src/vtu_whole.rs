@@ -17,7 +17,7 @@
 use std::f64::consts::TAU;
 use std::io::{self, Write};
 
-use super::vtu::{array, vectors};
+use super::vtu::CellGrid;
 use flexspline_mechanics::mesh::MeshError;
 use flexspline_mechanics::sleeve::{Flexspline3d, Station};
 use flexspline_mechanics::stepping::{Problem, State};
@@ -46,28 +46,10 @@ impl RimWave {
     }
 }
 
-/// Points, displacements and cells as they come.
-#[derive(Default)]
-struct CellGrid {
-    points: Vec<f32>,
-    displacements: Vec<f32>,
-    connectivity: Vec<i32>,
-    offsets: Vec<i32>,
-    types: Vec<u8>,
-    parts: Vec<u8>,
-}
-
 impl CellGrid {
     fn point(&mut self, at: [f64; 3], moved: [f64; 3]) {
         self.points.extend((0..3).map(|k| (at[k] + moved[k]) as f32));
         self.displacements.extend(moved.map(|x| x as f32));
-    }
-
-    fn cell(&mut self, nodes: &[usize], kind: u8, part: u8) {
-        self.connectivity.extend(nodes.iter().map(|n| *n as i32));
-        self.offsets.push(self.connectivity.len() as i32);
-        self.types.push(kind);
-        self.parts.push(part);
     }
 }
 
@@ -82,10 +64,10 @@ pub fn write_whole_flexspline(out: &mut dyn Write, problem: &Problem, state: &St
         .into_iter()
         .map(|(n, amplitudes)| RimWave { n: f64::from(n), amplitudes, shape: shells.shape(n) })
         .collect();
-    let mut grid = CellGrid::default();
+    let mut grid = CellGrid { part: "part", ..CellGrid::default() };
     add_rim(&mut grid, problem, state, &waves);
     add_tubes(&mut grid, &shells, &waves);
-    write(out, &grid)
+    grid.write(out)
 }
 
 /// The plane mesh across the face: corners of its elements alone.
@@ -190,28 +172,6 @@ fn read(shape: &[Station], x_mm: f64) -> Station {
         outward: between(a.outward, b.outward),
         slope: between(a.slope, b.slope),
     }
-}
-
-fn write(out: &mut dyn Write, grid: &CellGrid) -> io::Result<()> {
-    let (points, cells) = (grid.points.len() / 3, grid.types.len());
-    writeln!(out, r#"<?xml version="1.0"?>"#)?;
-    writeln!(out, r#"<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">"#)?;
-    writeln!(out, "<UnstructuredGrid>")?;
-    writeln!(out, r#"<Piece NumberOfPoints="{points}" NumberOfCells="{cells}">"#)?;
-    writeln!(out, "<Points>")?;
-    vectors(out, "Points", &grid.points)?;
-    writeln!(out, "</Points>")?;
-    writeln!(out, r#"<PointData Vectors="displacement">"#)?;
-    vectors(out, "displacement", &grid.displacements)?;
-    writeln!(out, "</PointData>\n<Cells>")?;
-    let whole = |numbers: &[i32]| numbers.iter().flat_map(|n| n.to_le_bytes()).collect::<Vec<u8>>();
-    array(out, r#"type="Int32" Name="connectivity""#, whole(&grid.connectivity))?;
-    array(out, r#"type="Int32" Name="offsets""#, whole(&grid.offsets))?;
-    array(out, r#"type="UInt8" Name="types""#, grid.types.iter().copied())?;
-    writeln!(out, "</Cells>")?;
-    writeln!(out, r#"<CellData Scalars="part">"#)?;
-    array(out, r#"type="UInt8" Name="part""#, grid.parts.iter().copied())?;
-    writeln!(out, "</CellData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>")
 }
 
 #[cfg(test)]

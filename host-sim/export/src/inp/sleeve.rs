@@ -20,7 +20,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 use std::io::{self, Write};
 
-use super::{DeckError, list, short};
+use super::{DeckError, EquationTerm, equation, list, short};
 use flexspline_mechanics::drive::{Bottom, Drive, Flange};
 use flexspline_mechanics::sleeve::Flexspline3d;
 
@@ -156,10 +156,10 @@ impl SleeveDeck {
                     continue;
                 }
                 for i in 0..AROUND {
-                    let places = BRICK.map(|[a, b, c]| (2 * k + c, 2 * j + a, 2 * i + b));
-                    let element = places.map(|place| {
-                        let next = self.numbers.len() + 1;
-                        *self.numbers.entry(place).or_insert(next)
+                    let element = std::array::from_fn(|node| {
+                        let ((first, c), next) = (BRICK[node / 4], self.numbers.len() + 1);
+                        let [a, b] = FACE[first + node % 4];
+                        *self.numbers.entry((2 * k + c, 2 * j + a, 2 * i + b)).or_insert(next)
                     });
                     self.elements.push(element);
                 }
@@ -247,51 +247,28 @@ impl SleeveDeck {
                 let (sin, cos) = angle.sin_cos();
                 let shape = (2.0 * angle).cos();
                 // The larger of both is the dependent one; on a plane of symmetry the other is held.
-                let mut terms = if cos >= sin {
-                    vec![(*node, 1, cos), (*node, 2, sin)]
-                } else {
-                    vec![(*node, 2, sin), (*node, 1, cos)]
-                };
+                let mut terms = vec![(*node, 1, cos), (*node, 2, sin)];
+                terms.sort_by(|a, b| b.2.total_cmp(&a.2));
                 if i == 0 || i + 1 == self.around.len() {
                     terms.truncate(1);
                 }
-                terms.push((band, 1, -shape));
-                if z != 0.0 {
-                    terms.push((band, 2, -shape * z));
-                }
+                terms.extend([(band, 1, -shape), (band, 2, -shape * z)]);
                 terms.retain(|(_, _, factor)| factor.abs() > 1e-12);
-                let words: Vec<String> = terms.iter().map(|(n, dof, f)| format!("{n}, {dof}, {}", short(*f))).collect();
-                writeln!(out, "*EQUATION\n{}\n{}", terms.len(), words.join(", "))?;
+                equation(
+                    out,
+                    terms.into_iter().map(|(node, dof, coefficient)| EquationTerm { node, dof, coefficient }),
+                )?;
             }
         }
         Ok(())
     }
 }
 
-/// Nodes of a brick by halves through, around and along: corners of the near face and of the far, midsides of both, and
-/// between.
-const BRICK: [[usize; 3]; 20] = [
-    [0, 0, 0],
-    [2, 0, 0],
-    [2, 2, 0],
-    [0, 2, 0],
-    [0, 0, 2],
-    [2, 0, 2],
-    [2, 2, 2],
-    [0, 2, 2],
-    [1, 0, 0],
-    [2, 1, 0],
-    [1, 2, 0],
-    [0, 1, 0],
-    [1, 0, 2],
-    [2, 1, 2],
-    [1, 2, 2],
-    [0, 1, 2],
-    [0, 0, 1],
-    [2, 0, 1],
-    [2, 2, 1],
-    [0, 2, 1],
-];
+/// Corners of a face of a brick, then the middles of its edges, by halves through and around.
+const FACE: [[usize; 2]; 8] = [[0, 0], [2, 0], [2, 2], [0, 2], [1, 0], [2, 1], [1, 2], [0, 1]];
+/// Nodes of a brick, four at a time: where they begin in [`FACE`], and halves along. Corners of the near face and of the
+/// far, middles of both, and between.
+const BRICK: [(usize, usize); 5] = [(0, 0), (0, 2), (4, 0), (4, 2), (0, 1)];
 
 fn even(from: f64, to: f64, parts: usize) -> Vec<f64> {
     (0..=parts).map(|k| from + (to - from) * k as f64 / parts as f64).collect()

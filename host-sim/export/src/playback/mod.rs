@@ -9,6 +9,7 @@ mod fprime;
 use std::f64::consts::TAU;
 use std::fmt::Write;
 
+use flexspline::grid::MAX_PERIODIC_NODES;
 use flexspline::{Direction, GeneratorAngle, Table};
 use serde::Serialize;
 use thiserror::Error;
@@ -26,6 +27,8 @@ use flexspline_identify::replay::{MeasuredRow, ReplayedRow};
 pub const BOTH: [Direction; 2] = [Direction::Forward, Direction::Backward];
 /// Points in each direction at which the model is judged: prime, so that no order of the drive divides it.
 const JUDGE_POINTS: u32 = 32_749;
+/// Points to a generator turn of a curve, at most: a guess, some 20 to the pitch of a wheel of 200 teeth.
+pub const MOST_POINTS_PER_TURN: u32 = 4096;
 /// Most rounds of a fixed-point iteration; the correction changes much less than the angle, so each gains a digit.
 const ROUNDS: usize = 60;
 
@@ -66,6 +69,13 @@ impl TableSection<'_> {
         let drive = self.table.drive();
         let waves = u32::from(drive.circular_spline_teeth() - drive.flexspline_teeth());
         (1..waves).find(|turns| (drive.exact_ratio() * f64::from(*turns)).fract().abs() < 1e-9).unwrap_or(waves)
+    }
+
+    /// Points to a generator turn that show every order of the table: of the nodes of its curves, all over a tooth pitch
+    /// where there are some, twice the highest order (the sampling theorem).
+    pub fn points_per_turn(&self) -> u32 {
+        let ripple = self.table.ripple_axis().len() as u32 * u32::from(self.table.drive().ripple_order());
+        ripple.clamp(MAX_PERIODIC_NODES as u32, MOST_POINTS_PER_TURN)
     }
 
     /// Evenly spaced points over the whole period, in each of the directions: led angle, direction, error, rad.
