@@ -175,14 +175,16 @@ fn the_csv_leaves_what_is_said_in_each_direction() {
     let turn = [0.0, TAU];
     let said = export("csv", "both");
     let csv = Columns::read("both/playback.csv");
-    assert_eq!((csv.angles.len(), csv.names.join(",").as_str()), (32 * 95, "forward_arcsec,backward_arcsec"));
+    // As many to a generator turn as the table has nodes: 8 to each of 188 pitches.
+    let points = 8 * 188;
+    assert_eq!((csv.angles.len(), csv.names.join(",").as_str()), (points * 95, "forward_arcsec,backward_arcsec"));
     assert!(csv.angles.iter().all(|[output, generator]| (generator - RATIO * output).abs() < 1e-6));
     let left = |sign: f64, late: f64| {
         left_by_position(turn, &BOTH, |asked, direction| sign * csv.at(side(direction), asked + late))
     };
     same("both", &said, left(1.0, 0.0), 0.02);
     helps("both", &said, 1.0);
-    let (right, half) = (number(&said, "/model/rms_played_arcsec"), 0.5 * TAU / (32.0 * RATIO));
+    let (right, half) = (number(&said, "/model/rms_played_arcsec"), 0.5 * TAU / (points as f64 * RATIO));
     assert!(left(-1.0, 0.0) > 20.0 * right && left(1.0, half) > 2.0 * right, "{right}");
     for (option, name, direction) in
         [("+", "forward_arcsec", Direction::Forward), ("-", "backward_arcsec", Direction::Backward)]
@@ -196,6 +198,12 @@ fn the_csv_leaves_what_is_said_in_each_direction() {
         let rows = number(&said, "/playback/rows");
         assert!((3900.0..4000.0).contains(&rows), "those of one direction: {rows}");
     }
+    // Of a table of a tooth's ripple alone the points that are usual leave a part.
+    let fem = "export --format csv --tables cam.fxt --torque-n-m 12 --temperature-c 20 --out fem --json";
+    let fem = UNIT.desk.line(fem).done().json();
+    let [uncorrected, played] =
+        ["uncorrected", "played"].map(|name| number(&fem, &format!("/model/rms_{name}_arcsec")));
+    assert!(played < 0.1 * uncorrected && uncorrected > 0.1, "{played} of {uncorrected}");
     // The mean of the table at its load, as it is found here.
     let table = Table::check(&UNIT.image).unwrap();
     let led = |k: u32| TAU * f64::from(k) / f64::from(POINTS);
@@ -205,12 +213,16 @@ fn the_csv_leaves_what_is_said_in_each_direction() {
     assert!((left_out - mean).abs() < 0.01 * mean.abs() && mean.abs() > 1.0, "{left_out}, {mean}");
 }
 
-/// Output of a script of examples/playback.
-fn script(name: &str, arguments: &str) -> String {
+/// A script of examples/playback, run.
+fn ran(name: &str, arguments: &str) -> std::process::Output {
     let script = format!("{}/../examples/playback/{name}.py", env!("CARGO_MANIFEST_DIR"));
     let words = arguments.split(' ').filter(|word| !word.is_empty());
-    let run = Command::new("python3").arg("-B").arg(script).args(words).current_dir(UNIT.desk.path(".")).output();
-    let run = run.unwrap();
+    Command::new("python3").arg("-B").arg(script).args(words).current_dir(UNIT.desk.path(".")).output().unwrap()
+}
+
+/// Output of a script of examples/playback.
+fn script(name: &str, arguments: &str) -> String {
+    let run = ran(name, arguments);
     assert!(run.status.success(), "{name} {arguments}: {}", String::from_utf8_lossy(&run.stderr));
     String::from_utf8(run.stdout).unwrap()
 }
@@ -304,6 +316,30 @@ fn scripts_make_the_csv_what_controllers_play() {
 
     let xml = script("ros2", "csv/playback.csv");
     assert!(xml.contains("<mechanical_reduction>95</mechanical_reduction>") && xml.contains("<offset>"), "{xml}");
+
+    // A file that was cut, and a wrong argument, end in one line.
+    let whole = UNIT.desk.read("csv/playback.csv");
+    let lines: Vec<&str> = whole.split_inclusive('\n').collect();
+    UNIT.desk.write("cut.csv", &whole[..whole.len() / 2]);
+    UNIT.desk.write("half.csv", &lines[..3000].concat());
+    UNIT.desk.write("lost.csv", &[&lines[..99], &lines[100..]].concat().concat());
+    for (name, arguments, due) in [
+        ("ros2", "cut.csv", "the line was cut off"),
+        ("beckhoff_cnc", "half.csv", "half.csv:3000: the last angle is "),
+        ("moteus", "lost.csv", "lost.csv:100: found "),
+        ("ros2", "absent.csv", "absent.csv: "),
+        ("beckhoff", "", "found 0 arguments; allowed: python3 beckhoff.py playback.csv"),
+        ("linuxcnc", "csv/playback.csv a 2", "found 'a'; allowed: a number"),
+        ("linuxcnc", "plus/playback.csv 0 2", "plus/playback.csv:6: a triplet has both directions"),
+        ("onstepx", "plus/playback.csv", "found 1 arguments"),
+        ("eqmod", "plus/playback.csv 0", "found 0.0 steps"),
+        ("odrive", "csv/playback.csv 0 1 2 inf", "found 'inf'"),
+    ] {
+        let run = ran(name, arguments);
+        let said = String::from_utf8_lossy(&run.stderr).into_owned();
+        assert!(run.status.code() == Some(2) && said.contains(due), "{name} {arguments}: {said}");
+        assert!(said.starts_with("error: ") && said.lines().count() == 1 && run.stdout.is_empty(), "{said}");
+    }
 }
 
 /// 256 bytes over a turn of the encoder on the generator, at the left edges; what the loop believes is the reading with

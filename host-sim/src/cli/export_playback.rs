@@ -11,7 +11,9 @@ use super::logs::LogOptions;
 use super::replay::measured;
 use super::{Failure, bad_input, within};
 use flexspline_base::output::Outputs;
-use flexspline_export::playback::{BOTH, Curve, MAX_TABLE_BYTES, PlaybackResidual, TableSection, cfs, fprime};
+use flexspline_export::playback::{
+    BOTH, Curve, MAX_TABLE_BYTES, MOST_POINTS_PER_TURN, PlaybackResidual, TableSection, cfs, fprime,
+};
 use flexspline_identify::replay::{RowsRead, replay};
 
 /// Data with fewer rows are not judged: a guess, some rows to each half wave of order 2 over a few generator turns.
@@ -32,8 +34,8 @@ pub(super) struct PlaybackOptions {
     /// unrelated file would be overwritten
     #[arg(long)]
     force: bool,
-    /// Points of the csv to each generator turn, 8 to 4096 [default: 32]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(8..=4096))]
+    /// Points of the csv to each generator turn, 8 to 4096 [default: twice the highest order of the table]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(8..=MOST_POINTS_PER_TURN.into()))]
     points_per_turn: Option<u32>,
     /// Directions of the output in the csv, each a column: both, + or - [default: both]
     #[arg(long, value_parser = ["both", "+", "-"], value_name = "D", hide_possible_values = true)]
@@ -109,7 +111,7 @@ impl PlaybackOptions {
                     Some("-") => &BOTH[1..],
                     _ => &BOTH[..],
                 };
-                let made = Curve::new(section, self.points_per_turn.unwrap_or(32), directions);
+                let made = Curve::new(section, self.points_per_turn.unwrap_or(section.points_per_turn()), directions);
                 curve.insert(made).csv(section)
             }
         };
