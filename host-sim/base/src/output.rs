@@ -235,13 +235,6 @@ pub fn write_whole(path: &Path, content: impl FnOnce(&mut dyn Write) -> io::Resu
     outputs.finish()
 }
 
-/// Writes a value as indented JSON.
-pub fn write_json(path: &Path, value: &impl Serialize) -> Result<(), OutputError> {
-    let mut outputs = Outputs::new();
-    outputs.json(path, value)?;
-    outputs.finish()
-}
-
 /// Writes records as CSV; the header is the names of their fields.
 pub fn write_csv<R: Serialize>(path: &Path, records: impl IntoIterator<Item = R>) -> Result<(), OutputError> {
     let mut outputs = Outputs::new();

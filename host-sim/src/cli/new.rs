@@ -199,8 +199,7 @@ impl New {
         let shown = self.file.display().to_string();
         let file = quoted(&shown);
         let own = made.as_ref().filter(|_| kind == NewKind::Drive);
-        let teeth = own.map(|_| Clearance::of(&drive)).transpose();
-        let teeth = teeth.map_err(bad_input)?;
+        let teeth = own.map(|_| Clearance::of(&drive)).transpose().map_err(bad_input)?;
         if let Some(teeth) = teeth.as_ref().filter(|_| drive.flexspline.profile == Profile::S) {
             teeth.check_s_teeth()?;
         }
@@ -260,10 +259,7 @@ impl New {
         lines.extend(written.under_load.iter().map(UnderLoad::text));
         match (&self.like, &written.data_sheet) {
             (Some(_), Some(sheet)) => {
-                let missing: Vec<&str> = match sheet.rated_torque_n_m {
-                    Some(_) => Vec::new(),
-                    None => sheet.assumed(),
-                };
+                let missing = if sheet.rated_torque_n_m.is_some() { Vec::new() } else { sheet.assumed() };
                 let without = if missing.is_empty() {
                     String::new()
                 } else {
@@ -294,12 +290,9 @@ impl New {
     ) -> Result<Option<UnderLoad>, Failure> {
         let mut drive = context.with_sets(made.drive.clone())?;
         if self.like.is_some() && !drive.sleeve.is_shell() {
-            let guesses = cup_and_balls(&drive).into_iter().filter(|(path, _)| !context.sets_field(path));
-            let sets: Vec<String> = guesses.map(|(path, value)| format!("{path}={value}")).collect();
-            drive = drive.with_sets(sets.iter().map(String::as_str)).map_err(bad_input)?;
+            drive = drive.with_sets(guesses(context, &drive).iter().map(String::as_str)).map_err(bad_input)?;
         }
-        let binds = |error: DriveError| Failure::BadInput(error.to_string());
-        if !Clearance::of(&drive).map_err(binds)?.clear.contains(&self.generator) {
+        if !Clearance::of(&drive).map_err(bad_input)?.clear.contains(&self.generator) {
             return Ok(None);
         }
         let generator = self.generator;
@@ -311,7 +304,8 @@ impl New {
             runs += 1;
         };
         let relief = relieve_tips(&drive, generator, torque_n_m, !context.sets_field(TIP_RADIUS), &mut report);
-        Ok(Some(match relief {
+        let mut under = UnderLoad { torque_n_m, generator, tips_lowered_mm: 0.0, tip_contact: None, not_solved: None };
+        match relief {
             Ok(relief) => {
                 if relief.lowered_mm > 0.0 {
                     made.drive.flexspline.tip_radius_mm = relief.tip_radius_mm;
@@ -322,22 +316,11 @@ impl New {
                         );
                     }
                 }
-                UnderLoad {
-                    torque_n_m,
-                    generator,
-                    tips_lowered_mm: relief.lowered_mm,
-                    tip_contact: relief.left,
-                    not_solved: None,
-                }
+                (under.tips_lowered_mm, under.tip_contact) = (relief.lowered_mm, relief.left);
             }
-            Err(error) => UnderLoad {
-                torque_n_m,
-                generator,
-                tips_lowered_mm: 0.0,
-                tip_contact: None,
-                not_solved: Some(error.to_string()),
-            },
-        }))
+            Err(error) => under.not_solved = Some(error.to_string()),
+        }
+        Ok(Some(under))
     }
 
     /// The command that makes this drive with guesses of cup and balls, of what is not set.
@@ -351,9 +334,7 @@ impl New {
         if self.kind.is_some() {
             words += " --kind drive";
         }
-        let guesses = cup_and_balls(drive).into_iter().filter(|(path, _)| !context.sets_field(path));
-        let sets: Vec<String> = guesses.map(|(path, value)| format!("{path}={value}")).collect();
-        format!("{} --set {}", context.next(&words), sets.join(","))
+        format!("{} --set {}", context.next(&words), guesses(context, drive).join(","))
     }
 
     /// Whether S-shaped teeth are asked for, which are drawn for the cam.
@@ -452,6 +433,12 @@ const TIP_RADIUS: &str = "flexspline.tip_radius_mm";
 
 /// The field that says which teeth.
 const PROFILE: &str = "flexspline.profile";
+
+/// Guesses of cup and balls, of what is not set, as PATH=VALUE.
+fn guesses(context: &Context, drive: &Drive) -> Vec<String> {
+    let open = cup_and_balls(drive).into_iter().filter(|(path, _)| !context.sets_field(path));
+    open.map(|(path, value)| format!("{path}={value}")).collect()
+}
 
 /// Head of a file: how its teeth clear, and what it leaves out.
 fn head(teeth: Option<&Clearance>, left_out: &[&str]) -> String {

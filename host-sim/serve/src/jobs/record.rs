@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::folder::{Folder, JOBS};
-use flexspline_base::output::{OutputError, write_json};
+use flexspline_base::output::{OutputError, Outputs};
 
 /// The record in a job's folder.
 const FILE: &str = "job.json";
@@ -107,7 +107,9 @@ impl JobRecord {
 
 /// Writes the record of a job, whole.
 pub fn write(folder: &Folder, job: &JobRecord) -> Result<(), OutputError> {
-    write_json(&folder.path().join(&job.out).join(FILE), job)
+    let mut outputs = Outputs::new();
+    outputs.json(&folder.path().join(&job.out).join(FILE), job)?;
+    outputs.finish()
 }
 
 /// The jobs that a folder has records of.
