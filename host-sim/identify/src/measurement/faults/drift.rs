@@ -5,7 +5,7 @@
 
 use super::state::{Extra, StateModel};
 use super::steps::largest_torque;
-use super::{ARCSEC, Findings, LineFit, level, rows_of, throughout};
+use super::{ARCSEC, Findings, LineFit, WIDEST_CLEARANCE_RAD, level, rows_of, throughout};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{Fault, FaultName, Measures, Treatment};
@@ -58,8 +58,8 @@ const COUNTS_K: f64 = 2.0;
 const BOTH_FLANKS: f64 = 0.1;
 
 /// If the error moves by this and by [`LEAP_SHARE`] of the drift within [`LEAP_S`], it does not drift, rad. *Guess*:
-/// beyond any wind-up and clearance.
-const LEAST_LEAP_RAD: f64 = 1200.0 * ARCSEC;
+/// beyond the clearance and as much of wind-up.
+const LEAST_LEAP_RAD: f64 = 2.0 * WIDEST_CLEARANCE_RAD;
 /// Time within which a leap happens, s. *Guess*: drift takes hours, teeth that skip a second.
 const LEAP_S: f64 = 2.0;
 /// Share of the drift that a leap has at least. *Guess*: no drift makes a third of its way in seconds.

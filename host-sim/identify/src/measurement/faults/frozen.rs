@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::lattice::lattice;
 use super::steps::WHOLE_PITCH;
-use super::{ARCSEC, Findings, leave_out, of_rows, rows_of, runs, straight, whole_pitches};
+use super::{ARCSEC, Findings, WIDEST_CLEARANCE_RAD, leave_out, of_rows, rows_of, runs, straight, whole_pitches};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{Fault, FaultName, Treatment};
@@ -22,10 +22,11 @@ const SHORTEST: usize = 20;
 /// White noise below this is none at the output, rad: what a solver leaves. *Guess*: far below any encoder.
 const NO_NOISE_RAD: f64 = 0.02 * ARCSEC;
 /// An output that dwells for longer than this, rad, and catches up in one row, has been frozen; clearance is given back
-/// on the way. *Guess*: wider than most clearances.
-const DWELL_RAD: f64 = 600.0 * ARCSEC;
-/// An output that dwells for longer than this, rad, has been frozen. *Guess*: no clearance is as wide.
-const LONG_DWELL_RAD: f64 = 1200.0 * ARCSEC;
+/// on the way.
+const DWELL_RAD: f64 = WIDEST_CLEARANCE_RAD;
+/// An output that dwells for longer than this, rad, has been frozen: clearance and as much of wind-up are shorter.
+/// *Guess*.
+const LONG_DWELL_RAD: f64 = 2.0 * WIDEST_CLEARANCE_RAD;
 /// A channel without noise that is frozen catches up by this many of its usual largest steps. *Guess*: no smooth motion
 /// grows so much from row to row.
 const CATCHES_UP: f64 = 10.0;

@@ -57,6 +57,9 @@ use flexspline_base::robust::median_of;
 
 /// An arcsecond, rad: 1/648 000 of half a turn, by definition.
 const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;
+/// The widest clearance of a drive, worn ones included, rad at the output. *Guess*: ten arc-minutes, where drives of
+/// catalogues have one or two of lost motion.
+const WIDEST_CLEARANCE_RAD: f64 = 600.0 * ARCSEC;
 
 /// The findings of the checks so far.
 #[derive(Debug, Default)]

@@ -8,6 +8,7 @@ use std::sync::OnceLock;
 
 use flexspline_algebra::{Mat, cholesky, lower_of_product, product};
 
+use super::WIDEST_CLEARANCE_RAD;
 use super::steps::largest_torque;
 use crate::measurement::gear::Gear;
 use crate::measurement::{Session, directions};
@@ -15,9 +16,6 @@ use flexspline_base::robust::median_and_std;
 
 /// Rows that a fit uses at most, spread evenly. *Guess*: it bounds the time.
 const FIT_ROWS: usize = 8000;
-/// Way after a reversal within which clearance is taken up, rad at the output. *Guess*: 10 arc-minutes, wider than most
-/// clearances.
-const CLEARANCE_RAD: f64 = 600.0 / 206_265.0;
 /// Rows by which a reversal may be noticed late. *Guess*: as long as it takes to turn back by more than noise.
 const BEFORE: usize = 5;
 /// Weights fall from this many robust standard deviations on (Huber 1964). *Guess*: he takes 1 to 2; with 2.5 nearly
@@ -101,7 +99,7 @@ impl<'a> StateModel<'a> {
                     if row > 0 && flank[row] != flank[row - 1] {
                         turned = session.generator_rad[row];
                     }
-                    (session.generator_rad[row] - turned).abs() > CLEARANCE_RAD * self.ratio.abs()
+                    (session.generator_rad[row] - turned).abs() > WIDEST_CLEARANCE_RAD * self.ratio.abs()
                 })
                 .collect()
         };

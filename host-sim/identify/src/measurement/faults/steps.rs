@@ -6,7 +6,7 @@
 //! counts may be set right before the next session: then its steps stay until their session ends.
 
 use super::state::{Extra, StateFit, StateModel};
-use super::{ARCSEC, Findings, level, of_rows, whole_pitches};
+use super::{ARCSEC, Findings, WIDEST_CLEARANCE_RAD, level, of_rows, whole_pitches};
 use crate::measurement::Session;
 use crate::measurement::columns::Quantity;
 use crate::measurement::fault::{Fault, FaultName, ToothStep, Treatment};
@@ -53,10 +53,10 @@ const ROUNDS: usize = 4;
 pub(super) const WHOLE_PITCH: f64 = 0.01;
 /// Load of this share of its largest holds the drive on one flank. *Guess*: above the friction of most drives.
 pub(super) const HELD: f64 = 0.1;
-/// Wider than any traverse of the clearance, rad: such a step may follow a reversal. *Guess*: twenty arc-minutes.
-const LONGEST_TRAVERSE_RAD: f64 = 1200.0 * ARCSEC;
-/// Wider than any clearance, rad: such a step needs no load to show that no flank was changed. *Guess*: three
-/// arc-minutes.
+/// A step above this may follow a reversal, rad: the clearance, and as much of wind-up, are traversed in less. *Guess*.
+const LONGEST_TRAVERSE_RAD: f64 = 2.0 * WIDEST_CLEARANCE_RAD;
+/// A step above this needs no load to show that no flank was changed, rad. *Guess*: three arc-minutes, wider than the
+/// clearance of drives that are not worn.
 const WIDER_THAN_CLEARANCE_RAD: f64 = 180.0 * ARCSEC;
 /// A change of load by this share of its largest, near the step, may be wind-up. *Guess*, lowered from 0.15
 /// likewise.
