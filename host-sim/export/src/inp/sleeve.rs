@@ -266,8 +266,8 @@ impl SleeveDeck {
 
 /// Corners of a face of a brick, then the middles of its edges, by halves through and around.
 const FACE: [[usize; 2]; 8] = [[0, 0], [2, 0], [2, 2], [0, 2], [1, 0], [2, 1], [1, 2], [0, 1]];
-/// Nodes of a brick, four at a time: where they begin in [`FACE`], and halves along. Corners of the near face and of the
-/// far, middles of both, and between.
+/// Nodes of a brick, four at a time: where they begin in [`FACE`], and halves along. Corners of the near face and of
+/// the far, middles of both, and between.
 const BRICK: [(usize, usize); 5] = [(0, 0), (0, 2), (4, 0), (4, 2), (0, 1)];
 
 fn even(from: f64, to: f64, parts: usize) -> Vec<f64> {

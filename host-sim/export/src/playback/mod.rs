@@ -71,8 +71,8 @@ impl TableSection<'_> {
         (1..waves).find(|turns| (drive.exact_ratio() * f64::from(*turns)).fract().abs() < 1e-9).unwrap_or(waves)
     }
 
-    /// Points to a generator turn that show every order of the table: of the nodes of its curves, all over a tooth pitch
-    /// where there are some, twice the highest order (the sampling theorem).
+    /// Points to a generator turn that show every order of the table, at twice the highest (the sampling theorem): as
+    /// many as its finest curve has nodes, that over the tooth pitch, or at least those of a curve over the turn.
     pub fn points_per_turn(&self) -> u32 {
         let ripple = self.table.ripple_axis().len() as u32 * u32::from(self.table.drive().ripple_order());
         ripple.clamp(MAX_PERIODIC_NODES as u32, MOST_POINTS_PER_TURN)
