@@ -263,7 +263,7 @@ pub struct WholeFolder {
 }
 
 impl WholeFolder {
-    /// A folder that will stand at `target`, beside which it is filled.
+    /// A folder that will stand at `target`, next to which it is filled.
     pub fn new(target: &Path) -> Result<WholeFolder, OutputError> {
         replaces_none_kept(target)?;
         let mut unfinished = unfinished();

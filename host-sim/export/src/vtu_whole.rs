@@ -1,7 +1,7 @@
 //! The whole flexspline in three dimensions as a VTK unstructured grid: toothed rim and tubes, deformed.
 //!
 //! The rim is the plane mesh at places across its face (`VTK_HEXAHEDRON`, 12, between them): each node moves as its
-//! plane slice does, and beside the middle of the face by tilt and skew of the rim. The tubes are their middle surfaces
+//! plane slice does, and off the middle of the face by tilt and skew of the rim. The tubes are their middle surfaces
 //! (`VTK_QUAD`, 9). Both follow the waves of the rim, n of 2 and more, that the contact FEM found
 //! ([`flexspline_mechanics::sleeve`]); what turns or shifts the flexspline as a body (n = 0 and 1) is on the plane
 //! slice alone.

@@ -282,7 +282,7 @@ pub(super) fn table_of<'a>(path: &Path, image: &'a [u8]) -> Result<Table<'a>, Fa
     Table::check(image).map_err(bad_file(path))
 }
 
-/// A drive file beside the one that is not there, with a name like it.
+/// A drive file in the folder of the one that is not there, with a name like it.
 fn file_like(name: &str) -> Option<String> {
     let path = Path::new(name);
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());

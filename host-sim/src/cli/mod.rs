@@ -1,6 +1,6 @@
 //! The command line: arguments to settings, results to files and to the terminal. One file for each command.
 //!
-//! What a command computes is a library function that knows nothing of the command line. Here options are read and
+//! The work of a command is a library function that knows nothing of the command line. Here options are read and
 //! checked, the function is called, and its result is written and shown. Data goes to stdout, talk to stderr.
 
 mod bundle;

@@ -23,7 +23,7 @@ use flexspline_mechanics::drive::{Drive, DriveError, FewNumbers, GeneratorKind, 
 /// (or --like, the name of a catalogue's size) make a drive of one's own, whose teeth clear one another; what follows
 /// from them has its formula in the file. With --like its
 /// [data_sheet] is filled in where the catalogue's figures are at hand. What is left out because no catalogue prints it
-/// (cup, balls, friction, errors) is told in the file and here, with a command that adds guesses of cup and
+/// (cup, balls, friction, errors) is listed in the file and here, with a command that adds guesses of cup and
 /// balls. --set flexspline.profile=s makes S-shaped teeth for the cam. A catalogue model
 /// (a file with "nominal" in its name, or --kind nominal) has the few numbers that a catalogue gives, for
 /// `diagnose --model` and `synthesize --model`.
@@ -40,7 +40,7 @@ pub(super) struct New {
     /// The file to write
     #[arg(value_name = "FILE")]
     file: PathBuf,
-    /// What to write [default: nominal if the file is called so, else drive]
+    /// Kind of file [default: nominal if the file is called so, else drive]
     #[arg(long, value_enum)]
     kind: Option<NewKind>,
     /// Teeth of the flexspline, even; the circular spline has two more
@@ -66,7 +66,7 @@ pub(super) struct New {
     /// Replace the file if it is there
     #[arg(long)]
     force: bool,
-    /// Do not run a drive of one's own under its rated load: tips that clash there are then neither lowered nor told
+    /// Do not run a drive of one's own under its rated load: tips that clash there are then neither lowered nor reported
     #[arg(long)]
     no_run: bool,
 }

@@ -33,10 +33,10 @@ const PARTIAL: &str = "results.partial.csv";
 /// settles for a tooth pitch, the drive in motion, into the output folder, and frames/ with --frames. The drive is
 /// deformed, then loaded, then turned.
 ///
-/// Where no equilibrium is found the last one is told, with its load and wind-up, and the rows so far are in
+/// Where no equilibrium is found the last one is reported, with its load and wind-up, and the rows so far are in
 /// results.partial.csv: those of the path, or of the loads that came on. Finer steps have been tried then.
 ///
-/// Where the drive's file has a [data_sheet] its figures stand beside those computed, with their ratio
+/// Where the drive's file has a [data_sheet] its figures stand next to those computed, with their ratio
 /// (docs/how-to/design.md).
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -73,7 +73,7 @@ pub(super) struct Simulate {
     no_report: bool,
 }
 
-/// What is solved and how, for every command that solves.
+/// Problem and method of every command that solves.
 #[derive(Debug, Args)]
 pub(super) struct ModelOptions {
     /// Wave generator: two-roller, four-roller, double-disc or cam
@@ -92,7 +92,7 @@ pub(super) struct ModelOptions {
     /// 0.1 arcsec
     #[arg(long, value_name = "SOLVER", default_value = "fast")]
     pub(super) solver: Method,
-    /// Contact penalty on the flanks, N/mm^3; the pressure that is told is found from the forces and does not hang on
+    /// Contact penalty on the flanks, N/mm^3; the pressure reported is found from the forces and does not depend on
     /// it
     #[arg(
         long, value_name = "K", default_value_t = SolverSettings::default().flank_penalty,

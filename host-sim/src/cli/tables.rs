@@ -71,7 +71,7 @@ pub(super) struct Tables {
     /// of a cam with a [data_sheet] the rated torque]
     #[arg(long, value_name = "T", conflicts_with = "from_samples", allow_negative_numbers = true)]
     torque_n_m: Option<f64>,
-    /// Torque nodes on each side of zero, at most, beside the pair at the drag torque; 5 to 30
+    /// Torque nodes on each side of zero, at most, in addition to the pair at the drag torque; 5 to 30
     /// [default: 28; with imperfections 12]
     #[arg(long, value_name = "N", conflicts_with = "from_samples")]
     #[arg(value_parser = clap::value_parser!(u8).range(5..=30))]
@@ -103,7 +103,7 @@ pub(super) struct Tables {
     #[arg(long, conflicts_with = "from_samples")]
     stress: bool,
     /// Add to the FEM what it lacks of the stiffness in [data_sheet] (T1, T2, K1, K2, K3) as a spring in series, and of
-    /// the hysteresis loss as springs that slip; marked in all files, and drive-completed.toml written beside them
+    /// the hysteresis loss as springs that slip; marked in all files, and drive-completed.toml written next to them
     #[arg(long, conflicts_with = "from_samples")]
     complete_from_data_sheet: bool,
     /// Instead of --drive: a drive like a size of a catalogue, as `new --like` makes it, with its data sheet
@@ -121,7 +121,7 @@ pub(super) struct Tables {
     kernels: bool,
 }
 
-/// The drive's file beside tables that a data sheet completed.
+/// The drive's file next to tables that a data sheet completed.
 const COMPLETED_DRIVE: &str = "drive-completed.toml";
 
 /// Report that `--json` prints.
