@@ -51,7 +51,7 @@ const SHARE: f64 = 0.1;
 /// there. *Guess*: then another one is around every tenth of them.
 const MANY: f64 = 0.003;
 /// Rows around one that may be out as well. *Source*: derived, of 30 rows of which 5 % are out more are so in one case
-/// of fifty (Poisson).
+/// of fifty (Poisson). Where as many are out as [`SHARE`] allows, it is seven: *guess*, that few files have so many.
 const OTHERS_OUT: usize = 4;
 /// Mean resultant length above which four or more outliers repeat with position: a damaged tooth, which is the drive.
 /// *Guess*: four at random exceed it at one angle in one case of forty.
