@@ -531,7 +531,7 @@ fn a_ratio_that_the_rows_contradict_is_refused() {
     for (error, psi) in session.error_rad.iter_mut().zip(&session.generator_rad) {
         *error += psi / RATIO - psi / 100.0;
     }
-    let refused = calibrate(&[other.clone()], &Prior::of_ratio(100.0, GeneratorKind::Cam)).err().unwrap();
+    let refused = calibrate(std::slice::from_ref(&other), &Prior::of_ratio(100.0, GeneratorKind::Cam)).err().unwrap();
     assert!(matches!(refused, CalibrationError::Ratio { .. }) && refused.to_string().contains("allowed: 101"));
     // One of two logs, which together turn by no ratio, is named.
     other.file = "other.csv".to_owned();
