@@ -66,7 +66,7 @@ pub(super) struct New {
     /// Replace the file if it is there
     #[arg(long)]
     force: bool,
-    /// Do not run a drive of one's own under its rated load: tips that clash there are then neither lowered nor reported
+    /// Do not run a drive of one's own under its rated load: tips that clash there are then not lowered, nor reported
     #[arg(long)]
     no_run: bool,
 }
