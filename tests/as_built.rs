@@ -24,8 +24,7 @@ use std::ops::ControlFlow;
 
 use flexspline::Table;
 use flexspline_base::units::ARCSEC_PER_RAD;
-use flexspline_design::tables::symmetric_nodes;
-use flexspline_design::tables::{MadeTable, TableSettings, TorqueNodes, make};
+use flexspline_design::tables::{MadeTable, NodeChoice, TableSettings, make};
 use flexspline_design::tables::{Validation, ValidationSettings, validate};
 use flexspline_mechanics::drive::{DamagedFlank, DamagedTooth, Drive, GeneratorKind, Harmonic, Wheel};
 use flexspline_mechanics::mesh::MeshLevel;
@@ -424,7 +423,7 @@ fn table_of(change: impl FnOnce(&mut Drive)) -> (MadeTable, Validation) {
     change(&mut drive);
     let solver = on(MeshLevel::Coarse);
     let how = TableSettings {
-        torque_nodes: TorqueNodes::Given(symmetric_nodes(drive.output.drag_torque_n_m, 50.0, 5)),
+        torque_nodes: NodeChoice { largest_n_m: 50.0, most: 5, tolerance_arcsec: 2.0 },
         temperature_nodes_c: vec![drive.temperature.reference_c as f32],
         solver,
         ..TableSettings::for_generator(&drive, GeneratorKind::Cam)

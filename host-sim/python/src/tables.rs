@@ -5,7 +5,7 @@ use std::sync::Mutex;
 
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::{
-    MadeTable, MakeError, SampleOptions, TableSettings, TorqueNodes, c_header, from_samples, make, rust_source, samples,
+    MadeTable, MakeError, SampleOptions, TableSettings, c_header, from_samples, make, rust_source, samples,
 };
 use flexspline_mechanics::stepping::SolverSettings;
 use pyo3::prelude::*;
@@ -57,11 +57,10 @@ pub fn tables<'py>(
         let mut settings = TableSettings::for_generator(&drive, kind);
         settings.solver = SolverSettings { method, mesh, ..settings.solver };
         settings.positions = positions;
-        if let TorqueNodes::Chosen(choice) = &mut settings.torque_nodes {
-            choice.largest_n_m = torque_n_m.unwrap_or(choice.largest_n_m);
-            choice.most = most_nodes.unwrap_or(choice.most);
-            choice.tolerance_arcsec = node_tolerance_arcsec.unwrap_or(choice.tolerance_arcsec);
-        }
+        let choice = &mut settings.torque_nodes;
+        choice.largest_n_m = torque_n_m.unwrap_or(choice.largest_n_m);
+        choice.most = most_nodes.unwrap_or(choice.most);
+        choice.tolerance_arcsec = node_tolerance_arcsec.unwrap_or(choice.tolerance_arcsec);
         if let Some(temperatures) = &temperatures_c {
             settings.temperature_nodes_c = temperatures.iter().map(|t| *t as f32).collect();
             settings.temperature_nodes_c.sort_by(f32::total_cmp);

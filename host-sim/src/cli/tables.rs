@@ -25,7 +25,7 @@ use flexspline_design::stated::{Stated, TWO_SETS_OF_K, beside};
 use flexspline_design::tables::sweep::SweepProgress;
 use flexspline_design::tables::{
     CompletionError, MadeTable, MakeError, SampleOptions, SheetStiffness, Source, TableInfo, TableProgress,
-    TableSettings, TorqueNodes, c_header, from_samples, make, rust_source, samples,
+    TableSettings, c_header, from_samples, make, rust_source, samples,
 };
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::mesh::MeshLevel;
@@ -318,11 +318,10 @@ impl Tables {
         settings.sheet = sheet.cloned();
         settings.solver = SolverSettings { method: self.solver, mesh: self.mesh, ..settings.solver };
         settings.positions = usize::from(self.positions);
-        if let TorqueNodes::Chosen(choice) = &mut settings.torque_nodes {
-            choice.largest_n_m = self.torque_n_m.unwrap_or_else(|| Stated::rated_n_m(stated, drive, kind));
-            choice.most = self.most_nodes.map_or(choice.most, usize::from);
-            choice.tolerance_arcsec = self.node_tolerance_arcsec.unwrap_or(choice.tolerance_arcsec);
-        }
+        let choice = &mut settings.torque_nodes;
+        choice.largest_n_m = self.torque_n_m.unwrap_or_else(|| Stated::rated_n_m(stated, drive, kind));
+        choice.most = self.most_nodes.map_or(choice.most, usize::from);
+        choice.tolerance_arcsec = self.node_tolerance_arcsec.unwrap_or(choice.tolerance_arcsec);
         if let Some(temperatures) = &self.temperatures_c {
             settings.temperature_nodes_c = temperatures.iter().map(|t| *t as f32).collect();
             settings.temperature_nodes_c.sort_by(f32::total_cmp);

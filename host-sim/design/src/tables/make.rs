@@ -21,8 +21,8 @@ use flexspline_mechanics::stepping::{Method, SolveError, SolverSettings};
 /// How a table is made.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TableSettings {
-    /// Which torques it holds.
-    pub torque_nodes: TorqueNodes,
+    /// How its torque nodes are chosen.
+    pub torque_nodes: NodeChoice,
     /// Temperature nodes, ascending, °C.
     pub temperature_nodes_c: Vec<f32>,
     /// Samples over one tooth pitch.
@@ -33,15 +33,6 @@ pub struct TableSettings {
     pub sheet: Option<SheetStiffness>,
 }
 
-/// The torque nodes of a table.
-#[derive(Debug, Clone, PartialEq)]
-pub enum TorqueNodes {
-    /// Chosen by asking the FEM.
-    Chosen(NodeChoice),
-    /// These, ascending, symmetric about zero, N m.
-    Given(Vec<f32>),
-}
-
 /// Torque nodes on each side at most, and the miss (arcsec) at which one is added: for a drive that repeats from tooth
 /// to tooth, and for one whose imperfections are sampled at every node and leave more than nodes do.
 const CHOICES: [(usize, f64); 2] = [(28, 0.6), (12, 2.0)];
@@ -50,6 +41,8 @@ const CHOICES: [(usize, f64); 2] = [(28, 0.6), (12, 2.0)];
 const MOST_NODES: usize = 30;
 /// The largest torque must be this multiple of the drag of the output, or there is no wind-up to sample.
 const LEAST_OVER_DRAG: f64 = 20.0;
+/// Samples over one tooth pitch where nobody says how many. A guess.
+const POSITIONS: usize = 8;
 /// Largest torque, N m.
 const MOST_TORQUE_N_M: f64 = 1e4;
 /// Tolerances of the choice of nodes, arcsec.
@@ -57,18 +50,15 @@ const TOLERANCES_ARCSEC: [f64; 2] = [0.01, 60.0];
 
 impl TableSettings {
     /// Default settings of a table: nodes as the FEM asks for them up to the generator's rated
-    /// torque, the ends of the operating temperatures, eight positions, the fast solver on the standard mesh.
+    /// torque, the ends of the operating temperatures (wind-up is linear between them to 0.05″, as
+    /// Young's modulus is), eight positions, the fast solver on the standard mesh.
     pub fn for_generator(drive: &Drive, kind: GeneratorKind) -> TableSettings {
-        let plan = SweepPlan::for_generator(drive, kind);
         let (most, tolerance_arcsec) = CHOICES[usize::from(!repeats(drive))];
+        let temperature = &drive.temperature;
         TableSettings {
-            torque_nodes: TorqueNodes::Chosen(NodeChoice {
-                largest_n_m: drive.rated_torque_n_m(kind),
-                most,
-                tolerance_arcsec,
-            }),
-            temperature_nodes_c: plan.temperature_nodes_c,
-            positions: plan.positions,
+            torque_nodes: NodeChoice { largest_n_m: drive.rated_torque_n_m(kind), most, tolerance_arcsec },
+            temperature_nodes_c: [temperature.minimum_c, temperature.maximum_c].map(|t| t as f32).to_vec(),
+            positions: POSITIONS,
             solver: SolverSettings { method: Method::Fast, ..SolverSettings::default() },
             sheet: None,
         }
@@ -80,22 +70,16 @@ impl TableSettings {
     /// The setting that is out of its range.
     pub fn check(&self, drive: &Drive) -> Result<(), MakeError> {
         let refuse = |setting, found: String, allowed: String| Err(MakeError::Setting { setting, found, allowed });
-        if let TorqueNodes::Chosen(choice) = &self.torque_nodes {
-            let least = LEAST_OVER_DRAG * drive.output.drag_torque_n_m;
-            if !(choice.largest_n_m > least && choice.largest_n_m <= MOST_TORQUE_N_M) {
-                let allowed = format!(
-                    "more than {least} ({LEAST_OVER_DRAG} times the drag of the output), at most {MOST_TORQUE_N_M}"
-                );
-                return refuse("torque_n_m", choice.largest_n_m.to_string(), allowed);
-            }
-            let [low, high] = TOLERANCES_ARCSEC;
-            if !(low..=high).contains(&choice.tolerance_arcsec) {
-                return refuse(
-                    "node_tolerance_arcsec",
-                    choice.tolerance_arcsec.to_string(),
-                    format!("{low} to {high}"),
-                );
-            }
+        let NodeChoice { largest_n_m, tolerance_arcsec, .. } = self.torque_nodes;
+        let least = LEAST_OVER_DRAG * drive.output.drag_torque_n_m;
+        if !(largest_n_m > least && largest_n_m <= MOST_TORQUE_N_M) {
+            let allowed =
+                format!("more than {least} ({LEAST_OVER_DRAG} times the drag of the output), at most {MOST_TORQUE_N_M}");
+            return refuse("torque_n_m", largest_n_m.to_string(), allowed);
+        }
+        let [low, high] = TOLERANCES_ARCSEC;
+        if !(low..=high).contains(&tolerance_arcsec) {
+            return refuse("node_tolerance_arcsec", tolerance_arcsec.to_string(), format!("{low} to {high}"));
         }
         let range = &drive.temperature;
         let within = |t: &f32| (range.minimum_c as f32..=range.maximum_c as f32).contains(t);
@@ -107,18 +91,6 @@ impl TableSettings {
             return refuse("temperatures_c", "none".to_owned(), "at least one".to_owned());
         }
         Ok(())
-    }
-
-    /// The sweep at the torque nodes that were given; at none where they are still to be chosen.
-    fn plan(&self) -> SweepPlan {
-        SweepPlan {
-            torque_nodes_n_m: match &self.torque_nodes {
-                TorqueNodes::Chosen(_) => Vec::new(),
-                TorqueNodes::Given(nodes) => nodes.clone(),
-            },
-            temperature_nodes_c: self.temperature_nodes_c.clone(),
-            positions: self.positions,
-        }
     }
 }
 
@@ -161,8 +133,6 @@ impl MakeError {
 /// How far a table is.
 #[derive(Debug, Clone, Copy)]
 pub struct TableProgress {
-    /// Increments solved.
-    pub done: usize,
     /// Increments that it will take, about; before the torque nodes are chosen as many as with the most nodes.
     pub expected: usize,
     /// The last increment.
@@ -184,44 +154,35 @@ pub fn make(
 ) -> Result<MadeTable, MakeError> {
     settings.check(drive)?;
     let clock = Instant::now();
-    let mut plan = settings.plan();
+    let mut plan = SweepPlan {
+        torque_nodes_n_m: Vec::new(),
+        temperature_nodes_c: settings.temperature_nodes_c.clone(),
+        positions: settings.positions,
+    };
     let over_turns = if repeats(drive) { 0 } else { deviation_increments() };
     let done = AtomicUsize::new(0);
-    let expected = AtomicUsize::new(match &settings.torque_nodes {
-        // The middles of intervals are looked at too, about one for each node that is found.
-        TorqueNodes::Chosen(choice) => over_turns + planned_increments(drive, &plan, choice.most, 0) + choice.most,
-        TorqueNodes::Given(nodes) => over_turns + planned_increments(drive, &plan, nodes.len() / 2, 0),
-    });
+    let mut choice = settings.torque_nodes;
+    // The middles of intervals are looked at too, about one for each node that is found.
+    let expected = AtomicUsize::new(over_turns + planned_increments(drive, &plan, choice.most, 0) + choice.most);
     let report = |last: SweepProgress| {
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
         let expected = expected.load(Ordering::Relaxed).max(done);
-        observe(TableProgress { done, expected, last })
+        observe(TableProgress { expected, last })
     };
     let repeating = Drive { as_built: drive.as_built.uniform_part(), ..drive.clone() };
     let first = plan.temperature_nodes_c[0];
     let sampler = Sampler::new(&repeating, kind, plan.positions, first, settings.solver, &report)?;
-    let chosen = match &settings.torque_nodes {
-        TorqueNodes::Chosen(choice) => {
-            let mut choice = *choice;
-            if settings.sheet.is_some() {
-                // An axis has room for the most that can be asked for, not for more.
-                choice.most = choice.most.min(MOST_NODES - KNEE_NODES);
-            }
-            let chosen = choose_torque_nodes(&repeating, kind, &plan, choice, &sampler)?;
-            let nodes = &chosen.torque_nodes_n_m;
-            plan.torque_nodes_n_m = settings.sheet.as_ref().map_or(nodes.clone(), |sheet| sheet.with_knees(nodes));
-            let nodes = plan.torque_nodes_n_m.len() / 2;
-            let left = over_turns + planned_increments(drive, &plan, nodes, chosen.known.len());
-            expected.store(done.load(Ordering::Relaxed) + left, Ordering::Relaxed);
-            Some(chosen)
-        }
-        TorqueNodes::Given(_) => None,
-    };
-    let known = chosen.as_ref().map_or(&[][..], |chosen| &chosen.known);
-    let mut swept = sweep_turns(drive, kind, &plan, known, &sampler, settings.solver, &report)?;
-    if let Some(chosen) = &chosen {
-        swept.work.add(chosen.work);
+    if settings.sheet.is_some() {
+        // An axis has room for the most that can be asked for, not for more.
+        choice.most = choice.most.min(MOST_NODES - KNEE_NODES);
     }
+    let chosen = choose_torque_nodes(&repeating, kind, &plan, choice, &sampler)?;
+    let nodes = &chosen.torque_nodes_n_m;
+    plan.torque_nodes_n_m = settings.sheet.as_ref().map_or(nodes.clone(), |sheet| sheet.with_knees(nodes));
+    let left = over_turns + planned_increments(drive, &plan, plan.torque_nodes_n_m.len() / 2, chosen.known.len());
+    expected.store(done.load(Ordering::Relaxed) + left, Ordering::Relaxed);
+    let mut swept = sweep_turns(drive, kind, &plan, &chosen.known, &sampler, settings.solver, &report)?;
+    swept.work.add(chosen.work);
     let peak_flank_pressure_mpa = swept.work.peak_flank_pressure_mpa;
     let wall_s = || clock.elapsed().as_secs_f64();
     let mut made = match &settings.sheet {
@@ -237,7 +198,7 @@ pub fn make(
             made
         }
     };
-    made.info.torque_nodes_resolved = chosen.map(|chosen| chosen.resolved);
+    made.info.torque_nodes_resolved = Some(chosen.resolved);
     let largest_n_m = plan.torque_nodes_n_m.iter().copied().map(f64::from).fold(0.0, f64::max);
     made.info.cautions = LookedAt {
         rigid_gap_um: rigid_gap_um(drive, kind),

@@ -20,13 +20,13 @@ pub mod validate;
 
 pub use complete::{Completed, CompletionError, MissingSpring, SheetStiffness, SlipSpring};
 pub use info::{MadeTable, Source, TableInfo, TurnsAtTorque, TurnsInfo};
-pub use make::{MakeError, TableObserver, TableProgress, TableSettings, TorqueNodes, make};
+pub use make::{MakeError, TableObserver, TableProgress, TableSettings, make};
 pub use positions::places_that_tell_apart;
 pub use project::from_plan;
 pub use project::{SampleOptions, TableError, core_drive, core_kind, from_samples};
 pub use source_files::put_bytes;
 pub use source_files::{c_header, rust_source};
-pub use sweep::{SweepPlan, SweepProgress, TorqueSweepError, symmetric_nodes};
+pub use sweep::{SweepProgress, TorqueSweepError};
 pub use torque_nodes::NodeChoice;
 pub use torque_nodes::{Refined, accepted, refined};
 pub use validate::{ValidateError, Validation, ValidationSettings, generator_of, validate};

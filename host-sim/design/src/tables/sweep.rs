@@ -22,7 +22,7 @@ use flexspline_mechanics::stepping::{Increment, Problem, SolveError, SolverSetti
 
 /// Samples to compute.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SweepPlan {
+pub(crate) struct SweepPlan {
     /// Torque nodes, ascending, symmetric about zero, N m.
     pub torque_nodes_n_m: Vec<f32>,
     /// Temperature nodes, ascending, °C.
@@ -37,25 +37,11 @@ const JUMP_HALF_WIDTH: f64 = 0.05;
 /// Share of the drag from which on it is at its limit: what is left is rounding.
 const AT_ITS_LIMIT: f64 = 1.0 - 1e-6;
 
-impl SweepPlan {
-    /// The default: one pair of nodes at each end of the dead zone of the drag, from there nine steps to the rated
-    /// torque of the generator; eight positions; the ends of the operating temperatures, between which wind-up is
-    /// linear to 0.05″, because Young's modulus is.
-    pub fn for_generator(drive: &Drive, kind: GeneratorKind) -> SweepPlan {
-        let temperature = &drive.temperature;
-        SweepPlan {
-            torque_nodes_n_m: symmetric_nodes(drive.output.drag_torque_n_m, drive.rated_torque_n_m(kind), 9),
-            temperature_nodes_c: [temperature.minimum_c, temperature.maximum_c].map(|t| t as f32).to_vec(),
-            positions: 8,
-        }
-    }
-}
-
 /// Nodes symmetric about zero: a nearly coincident pair at ± the drag torque, where the loaded flank changes, and
 /// `steps` further nodes on each side up to `largest_n_m`, dense where wind-up is steep: node k of n at `(k/n)^3.2` of
 /// the way. (On nodes like these the cubic of the core leaves below 0.6″ of curves that rise by 870″ as a root or a
 /// tanh does.)
-pub fn symmetric_nodes(drag_n_m: f64, largest_n_m: f64, steps: usize) -> Vec<f32> {
+pub(super) fn symmetric_nodes(drag_n_m: f64, largest_n_m: f64, steps: usize) -> Vec<f32> {
     const CROWDING: f64 = 3.2;
     let half = JUMP_HALF_WIDTH * drag_n_m;
     let first = drag_n_m + half;
@@ -140,24 +126,9 @@ pub enum TorqueSweepError {
     /// The samples make no trial table.
     #[error(transparent)]
     Table(#[from] super::project::TableError),
-    /// One tooth pitch in one direction does not say all of the drive.
-    #[error(
-        "{field}: one tooth pitch in one direction does not say all of this drive; allowed: an ideal drive, uniform \
-         wear (flexspline_wear_um, circular_spline_wear_um) and temperature differences (generator_warmer_k, \
-         circular_spline_warmer_k); others are swept over whole turns (sweep_turns)"
-    )]
-    NotUniform {
-        /// The field of the drive.
-        field: &'static str,
-    },
     /// The observer asked to stop.
     #[error("stopped")]
     Stopped,
-}
-
-/// Refuses a drive of which a sweep would see a part.
-fn check_uniform(drive: &Drive) -> Result<(), TorqueSweepError> {
-    drive.as_built.first_not_uniform().map_or(Ok(()), |field| Err(TorqueSweepError::NotUniform { field }))
 }
 
 /// Samples torque nodes of a drive that repeats from tooth to tooth, at one temperature. Each node goes its way alone,
@@ -202,7 +173,6 @@ impl<'a> Sampler<'a> {
         settings: SolverSettings,
         observe: &'a Observer<'a>,
     ) -> Result<Sampler<'a>, TorqueSweepError> {
-        check_uniform(drive)?;
         let temperature_c = f64::from(temperature);
         let problem = Problem::new(drive, kind, temperature_c, settings)?;
         let unloaded = Loaded::of(&Motion::deformed(&problem, 0.0)?, 0.0);
@@ -432,17 +402,6 @@ mod tests {
     use super::*;
     use flexspline_mechanics::mesh::MeshLevel;
     use flexspline_mechanics::stepping::Method;
-
-    #[test]
-    fn a_drive_that_does_not_repeat_is_not_swept() {
-        let mut drive = Drive::hhd_95();
-        drive.as_built.circular_spline_eccentricity_um = 1.0;
-        let kind = GeneratorKind::Cam;
-        let settings = SolverSettings::default();
-        let sampler = Sampler::new(&drive, kind, 8, 20.0, settings, &|_| ControlFlow::Continue(()));
-        let message = sampler.err().unwrap().to_string();
-        assert!(message.starts_with("as_built.circular_spline_eccentricity_um: "), "{message}");
-    }
 
     fn coarse(drive: &Drive, kind: GeneratorKind, positions: usize) -> Sampler<'static> {
         let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
