@@ -1,7 +1,8 @@
 //! A run along a generator path.
 
+use flexspline::Direction;
 use flexspline_design::simulate::{
-    Direction, Path, PathPoint, SimulateError, SimulationSettings, Summary, read_path, simulate as run_along,
+    Path, PathPoint, SimulateError, SimulationSettings, Summary, read_path, simulate as run_along,
 };
 use flexspline_mechanics::stepping::SolverSettings;
 use numpy::PyReadonlyArray1;
@@ -12,6 +13,7 @@ use crate::columns::columns;
 use crate::drive::{Drive, generator, method};
 use crate::failure::{PythonFailure, bad};
 use crate::run::run;
+use crate::step::direction_of;
 
 /// Points of a path: generator angle, and where wanted torque and temperature.
 type Points<'py> = (PyReadonlyArray1<'py, f64>, Option<PyReadonlyArray1<'py, f64>>, Option<PyReadonlyArray1<'py, f64>>);
@@ -64,9 +66,7 @@ pub fn simulate<'py>(
         Some(_) if !matches!(path, Path::Pitch | Path::Turn) => {
             return Err(bad("direction: the path has its own; allowed with the paths pitch and turn"));
         }
-        Some(1) => Direction::Forward,
-        Some(-1) => Direction::Backward,
-        Some(other) => return Err(bad(format!("direction: found {other}, allowed: 1 or -1"))),
+        Some(sign) => direction_of(sign)?,
     };
     let settings = SimulationSettings {
         increment_rad,

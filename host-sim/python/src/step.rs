@@ -91,7 +91,7 @@ impl PlayState {
     }
 }
 
-fn direction_of(sign: i32) -> PyResult<Direction> {
+pub(crate) fn direction_of(sign: i32) -> PyResult<Direction> {
     match sign {
         1 => Ok(Direction::Forward),
         -1 => Ok(Direction::Backward),

@@ -17,7 +17,7 @@ use serde::Serialize;
 use super::pack::Packed;
 use super::sleeve_view::SleeveView;
 use flexspline_design::simulate::stress::nodal_von_mises;
-use flexspline_design::simulate::{Direction, Observation, Path, Row, SimulateError, SimulationSettings, simulate};
+use flexspline_design::simulate::{Observation, Path, Row, SimulateError, SimulationSettings, simulate};
 use flexspline_mechanics::contact::{BoreContact, BoreLaw, Configuration, FlankLaw, FlankPair};
 use flexspline_mechanics::drive::{Drive, GeneratorKind, Side};
 use flexspline_mechanics::mesh::{MeshError, WheelMesh, rotate};
@@ -124,7 +124,6 @@ pub fn animate(
     let settings = SimulationSettings {
         torque_n_m,
         solver,
-        direction: Direction::Forward,
         increment_rad: Some(std::f64::consts::TAU / f64::from(drive.flexspline.teeth) / FRAMES as f64),
         ..SimulationSettings::new(kind, Path::Pitch)
     };

@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 use std::path::Path as FilePath;
 
 use clap::{Args, ValueEnum};
+use flexspline::Direction;
 
 use super::{Context, Failure, bad_input, report, say};
 use flexspline_base::figures;
@@ -12,7 +13,7 @@ use flexspline_base::output::{OutputError, Outputs, WholeFolder, write_whole};
 use flexspline_base::progress::Progress;
 use flexspline_design::cautions::{Caution, add_stress};
 use flexspline_design::simulate::{
-    Direction, Observation, Path, PathPoint, Phase, PlaceStress, SimulateError, Simulation, SimulationSettings,
+    Observation, Path, PathPoint, Phase, PlaceStress, SimulateError, Simulation, SimulationSettings,
     Summary, read_path, simulate, stress_by_place,
 };
 use flexspline_design::stated::{SheetBeside, beside};

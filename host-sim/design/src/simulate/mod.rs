@@ -18,6 +18,7 @@ pub mod zones;
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
+use flexspline::Direction;
 use thiserror::Error;
 
 use crate::cautions::{LookedAt, rigid_gap_um, room_as_built_arcsec};
@@ -54,25 +55,6 @@ const TEMPERATURE_HALVINGS: usize = 5;
 /// Parts of what is tried again where the solver found no equilibrium on its own steps. A guess: steps that are eight
 /// times finer than the solver's own first ones, and a torsion curve of this many points where they do not help either.
 const SECOND_TRY_PARTS: u32 = 8;
-
-/// Which way a one-way path goes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Direction {
-    /// Generator angle grows.
-    #[default]
-    Forward,
-    /// Generator angle falls.
-    Backward,
-}
-
-impl Direction {
-    fn sign(self) -> f64 {
-        match self {
-            Direction::Forward => 1.0,
-            Direction::Backward => -1.0,
-        }
-    }
-}
 
 /// Settings of a simulation.
 #[derive(Debug, Clone, PartialEq)]
@@ -428,7 +410,7 @@ impl<'a> RunState<'a> {
 
     /// Paths of a settled drive: `travel_rad` in one direction, after start-up.
     fn settle_and_turn(&mut self, travel_rad: f64) -> Result<(), SimulateError> {
-        let sign = self.settings.direction.sign();
+        let sign = f64::from(self.settings.direction.sign());
         let eighth = self.pitch / INCREMENTS_PER_PITCH;
         let increment = match (&self.settings.path, self.settings.increment_rad) {
             (Path::Pitch, given) => given.map_or(self.pitch / ROWS_OF_A_PITCH, |given| given.min(eighth)),
