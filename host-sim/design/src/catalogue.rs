@@ -14,27 +14,17 @@ const SIZES: &str = include_str!("catalogue.csv");
 /// How far single units are off the printed stiffness, ± percent.
 pub(crate) const UNIT_SCATTER_PERCENT: f64 = 30.0;
 
-/// A series of cups.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum CupSeries {
-    Csf,
-    Csg,
-}
-
 /// Catalogue values of a size and ratio: none of a series, size or ratio that is not at hand.
 pub(crate) fn sheet(series: &str, size: f64, ratio: u32) -> Option<Stated> {
-    let which = match series.to_ascii_uppercase().as_str() {
-        "CSF" => CupSeries::Csf,
-        "CSG" => CupSeries::Csg,
+    let series = series.to_ascii_uppercase();
+    let line = rows().into_iter().find(|row| row.size == size && row.ratio == ratio)?;
+    let [rated_n_m, ratcheting_n_m] = match series.as_str() {
+        "CSF" => [None, line.ratcheting_csf_n_m],
+        "CSG" => [line.rated_csg_n_m, line.ratcheting_csg_n_m],
         _ => return None,
     };
-    let line = rows().into_iter().find(|row| row.size == size && row.ratio == ratio)?;
-    let [rated_n_m, ratcheting_n_m] = match which {
-        CupSeries::Csf => [None, line.ratcheting_csf_n_m],
-        CupSeries::Csg => [line.rated_csg_n_m, line.ratcheting_csg_n_m],
-    };
     Some(Stated {
-        source: Some(format!("Harmonic Drive {}-{size}-{ratio}", series.to_ascii_uppercase())),
+        source: Some(format!("Harmonic Drive {series}-{size}-{ratio}")),
         rated_torque_n_m: rated_n_m,
         t1_n_m: line.t1_n_m,
         t2_n_m: line.t2_n_m,

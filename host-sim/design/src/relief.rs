@@ -31,8 +31,6 @@ const MOST_MODULES: f64 = 0.6;
 /// Result of the relief of a drive's tips.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Relief {
-    /// The load, N·m.
-    pub torque_n_m: f64,
     /// Radius of the flexspline's tip circle with which they were looked at last, mm.
     pub tip_radius_mm: f64,
     /// Relief, mm; 0 where they passed freely as drawn.
@@ -80,7 +78,7 @@ pub fn relieve_tips(
         drive.flexspline.tip_radius_mm = to_mm;
     }
     let tip_radius_mm = drive.flexspline.tip_radius_mm;
-    Ok(Relief { torque_n_m, tip_radius_mm, lowered_mm: drawn_mm - tip_radius_mm, left })
+    Ok(Relief { tip_radius_mm, lowered_mm: drawn_mm - tip_radius_mm, left })
 }
 
 /// Contact of tips outside the teeth in mesh over a tooth pitch under a load, on a coarse mesh; the first place that

@@ -55,7 +55,6 @@ pub struct Kernels {
     /// Version of this form.
     pub schema_version: u32,
     /// Which generator.
-    #[serde(with = "kind_by_name")]
     pub generator: GeneratorKind,
     /// BLAKE3 of the drive, as tables of it carry it.
     pub drive_blake3: String,
@@ -396,18 +395,4 @@ impl Blend for Gain {
 
 fn conjugate([c, s]: Gain) -> Gain {
     [c, -s]
-}
-
-/// A generator by its name.
-mod kind_by_name {
-    use super::GeneratorKind;
-    use serde::{Deserialize, Deserializer, Serializer, de::Error};
-
-    pub(crate) fn serialize<S: Serializer>(kind: &GeneratorKind, to: S) -> Result<S::Ok, S::Error> {
-        to.collect_str(kind)
-    }
-
-    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<GeneratorKind, D::Error> {
-        String::deserialize(from)?.parse().map_err(D::Error::custom)
-    }
 }
