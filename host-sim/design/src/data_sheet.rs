@@ -13,6 +13,7 @@ use serde::Serialize;
 use crate::cautions::{LookedAt, rigid_gap_um, room_as_built_arcsec};
 use crate::pitch_wave::peak_to_peak;
 use crate::simulate::{TipContact, peak_stress};
+use flexspline_base::robust::least_and_most;
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::motion::Motion;
@@ -283,8 +284,7 @@ fn fill(sheet: &mut DataSheet, problem: &Problem, loads: Loads, positions: usize
     sheet.kinematic_error_pp_arcsec = Some(if drive.as_built.first_not_uniform().is_none() {
         peak_to_peak(&errors)
     } else {
-        let (low, high) =
-            errors.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)));
+        let (low, high) = least_and_most(errors);
         high - low
     });
     sheet.peak_flank_pressure_mpa = Some(most(|increment| increment.peak_pressure_mpa[0]));

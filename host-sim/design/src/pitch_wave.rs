@@ -3,6 +3,8 @@
 
 use std::f64::consts::TAU;
 
+use flexspline_base::robust::least_and_most;
+
 /// Places between two samples at which the wave is looked at. The highest wave that samples resolve goes up and down
 /// between two of them: its crest is then found to `1 - cos(pi / 64)`, a thousandth of it.
 const BETWEEN: usize = 32;
@@ -32,8 +34,7 @@ pub(crate) fn peak_to_peak(samples: &[f64]) -> f64 {
         // The mean is no part of a difference.
         waves.iter().enumerate().skip(1).map(wave).sum()
     };
-    let (low, high) =
-        (0..places).map(at).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+    let (low, high) = least_and_most((0..places).map(at));
     if count == 0 { 0.0 } else { high - low }
 }
 

@@ -14,6 +14,7 @@ use super::page::{
     ChartAxis, ChartSeries, Choice, Detail, Headline, Limit, Lines, Mark, Page, PageBlock, PageQuantity, PageSection,
     RichText, SIGNS, Status, made_of_drive, significant,
 };
+use flexspline_base::robust::{least_and_most, rms};
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::stated::TWO_SETS_OF_K;
 use flexspline_design::tables::validate::{MAX_BOUND_ARCSEC, Point, Validation};
@@ -152,8 +153,7 @@ impl<'a> DriveKnown<'a> {
                 table - row.error_arcsec - added_rad * ARCSEC_PER_RAD
             })
             .collect();
-        let rms = (misses.iter().map(|m| m * m).sum::<f64>() / misses.len() as f64).sqrt();
-        Some([rms, misses.iter().fold(0.0, |worst, m| f64::max(worst, m.abs()))])
+        Some([rms(&misses), misses.iter().fold(0.0, |worst, m| f64::max(worst, m.abs()))])
     }
 
     fn headline(&self) -> Headline {
@@ -263,8 +263,7 @@ impl<'a> DriveKnown<'a> {
         };
         let wind_up = middle(highest) - middle(self.shown_torques()[0]);
         let at = |k: usize| self.error(self.position(k), 0.5 * highest, self.temperature, Direction::Forward);
-        let (low, high) =
-            (0..POSITIONS).map(at).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), e| (a.min(e), b.max(e)));
+        let (low, high) = least_and_most((0..POSITIONS).map(at));
         // Unloaded, the clearance is crossed within the drag torque: the table's widest play.
         let plays = self.torques().into_iter().map(|t| self.play_at(t, self.temperature));
         let left = self.subject.validation.map(|v| [v.rms_arcsec, v.max_arcsec]).or(self.fresh);

@@ -14,6 +14,7 @@ use std::io::Write;
 use flate2::Compression;
 use flate2::write::DeflateEncoder;
 
+use flexspline_base::robust::least_and_most;
 use flexspline_export::base64;
 
 /// An array as it stands in the page.
@@ -83,7 +84,7 @@ impl Packed {
 }
 
 fn middle_and_reach(values: &[f64]) -> (f64, f64) {
-    let (least, most) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+    let (least, most) = least_and_most(values.iter().copied());
     if least > most { (0.0, 0.0) } else { (0.5 * (least + most), 0.5 * (most - least)) }
 }
 

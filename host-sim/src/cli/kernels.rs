@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::context::{Context, quoted};
 use super::{Failure, say};
 use flexspline_base::output::Outputs;
+use flexspline_base::robust::least_and_most;
 use flexspline_design::kernels::{KernelError, KernelPlan, make};
 use flexspline_mechanics::drive::{GeneratorKind, Wheel};
 use flexspline_mechanics::stepping::SolverSettings;
@@ -54,7 +55,7 @@ pub(super) fn run(context: &Context, kinds: &[GeneratorKind], settings: SolverSe
         let size = |g: [f64; 2]| g[0].hypot(g[1]);
         let swing = |torque: f64| {
             let around = (0..180).map(|d| kernels.eccentricity(plan.sizes_um[0], f64::from(d).to_radians(), torque));
-            let (low, high) = around.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), e| (l.min(e), h.max(e)));
+            let (low, high) = least_and_most(around);
             high - low
         };
         made.push(GeneratorReport {

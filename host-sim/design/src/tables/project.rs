@@ -10,6 +10,7 @@ use thiserror::Error;
 use super::info::{MadeTable, Source, TableInfo, TurnsAtTorque, TurnsInfo};
 use super::sweep::{KnownNode, SweepPlan, TorqueSweep, mirror};
 use crate::cautions::LookedAt;
+use flexspline_base::robust::{least_and_most, rms};
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::stepping::SolverSettings;
@@ -205,9 +206,7 @@ pub fn from_samples(
             ..*s
         })
         .collect();
-    let (least, most) = snapped
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), s| (a.min(s.generator_rad), b.max(s.generator_rad)));
+    let (least, most) = least_and_most(snapped.iter().map(|s| s.generator_rad));
     let long = (most - least) / std::f64::consts::TAU >= OUTPUT_TURNS_FOR_HARMONICS * drive.ratio().abs();
     let harmonics = |orders| if long { harmonics_of(orders) } else { Harmonics::default() };
     let plan = Plan {
@@ -345,16 +344,14 @@ fn turns_info(drive: &Drive, plan: &SweepPlan, sweep: &TorqueSweep, table: &Tabl
             let here: Vec<&Sample> = sweep.samples.iter().filter(|s| s.torque_n_m as f32 == torque_n_m).collect();
             // The places of one sample of the sweep follow one another.
             let range = |places: &[&Sample]| {
-                let (least, most) = places
-                    .iter()
-                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), s| (a.min(error(s)), b.max(error(s))));
+                let (least, most) = least_and_most(places.iter().map(|s| error(s)));
                 most - least
             };
             let left: Vec<f64> = here.iter().map(|s| left(s)).collect();
             TurnsAtTorque {
                 torque_n_m,
                 drive_peak_to_peak_arcsec: here.chunks(sweep.places).map(range).fold(0.0, f64::max),
-                left_rms_arcsec: (left.iter().map(|e| e * e).sum::<f64>() / left.len().max(1) as f64).sqrt(),
+                left_rms_arcsec: rms(&left),
                 left_worst_arcsec: left.iter().fold(0.0, |worst, e| e.abs().max(worst)),
             }
         })

@@ -16,6 +16,7 @@ use thiserror::Error;
 
 use super::complete::MissingSpring;
 use super::project::core_kind;
+use flexspline_base::robust::rms;
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
 use flexspline_mechanics::motion::Motion;
@@ -333,7 +334,6 @@ impl FreshRun<'_> {
     }
 
     fn conclude(self, kind: GeneratorKind) -> Validation {
-        let rms = |values: &[f64]| (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt();
         let largest = |values: &[f64]| values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         let all: Vec<f64> = self.points.iter().map(Point::difference).collect();
         let reversal: Vec<f64> = self.points.iter().filter(|p| p.kind == "reversal").map(Point::difference).collect();

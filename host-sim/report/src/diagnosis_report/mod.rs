@@ -19,6 +19,7 @@ use super::page::{
     ChartAxis, Choice, Detail, Headline, Lines, Page, PageBlock, PageQuantity, PageSection, RichText, SIGNS, Status,
     significant,
 };
+use flexspline_base::robust::least_and_most;
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_identify::causes::CauseName;
 use flexspline_identify::diagnosis::base::{BETWEEN_READINGS, CHANGE_OF_FLANK};
@@ -525,8 +526,7 @@ impl DiagnosisKnown<'_> {
         blocks.extend(recording.notes.iter().map(note));
         let range = |values: Option<&Vec<f64>>| {
             let Some(values) = values else { return RichText::new("–") };
-            let (low, high) =
-                values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+            let (low, high) = least_and_most(values.iter().copied());
             format!("{} to {}", significant(low, 3), significant(high, 3)).into()
         };
         let row = |(k, session): &(usize, &Session)| {

@@ -8,6 +8,7 @@ use crate::page::{
     ChartAxis, ChartSeries, Detail, FieldMap, Figure, FigureBody, Lines, Mark, PageBlock, PageQuantity, PageSection,
     RichText, Upright, significant,
 };
+use flexspline_base::robust::least_and_most;
 use flexspline_identify::nominal::Fixed;
 use flexspline_identify::residual::{Axis as Angle, Direction, Wheel};
 
@@ -326,7 +327,7 @@ const ANGLES: [(Angle, &str); 3] =
     [(Angle::Generator, "generator"), (Angle::GeneratorLessOutput, "generator-less-output"), (Angle::Output, "output")];
 
 fn varies(values: &[f64]) -> bool {
-    let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+    let (low, high) = least_and_most(values.iter().copied());
     high - low > CHANGES * high.abs().max(low.abs())
 }
 

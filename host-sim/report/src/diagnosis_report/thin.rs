@@ -2,8 +2,8 @@
 //! of all.
 
 use crate::page::{ChartSeries, Mark, Upright};
+use flexspline_base::robust::{least_and_most, median_of};
 use flexspline_identify::diagnosis::rows::Rows;
-use flexspline_identify::measurement::median_of;
 
 /// Stretches of a chart over time.
 const STRETCHES: usize = 500;
@@ -105,8 +105,7 @@ pub(super) fn dots(over: &[f64], values: &[f64], rows: &[usize], name: &str, col
 
 /// Medians of `count` bins of equal width over a quantity, ascending, where a bin has rows enough.
 pub(super) fn medians(over: &[f64], values: &[f64], rows: &[usize], count: usize) -> Vec<[f64; 2]> {
-    let finite = || rows.iter().map(|k| over[*k]).filter(|x| x.is_finite());
-    let (low, high) = finite().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+    let (low, high) = least_and_most(rows.iter().map(|k| over[*k]).filter(|x| x.is_finite()));
     let mut bins: Vec<(Vec<f64>, f64)> = vec![(Vec::new(), 0.0); count];
     if high > low {
         for k in rows {
