@@ -12,7 +12,6 @@ use flexspline_identify::diagnosis::{
 };
 use flexspline_identify::extension::Model;
 use flexspline_identify::measurement::{ColumnMap, Session, parse, read};
-use flexspline_mechanics::drive::GeneratorKind;
 use numpy::IntoPyArray;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
@@ -45,16 +44,7 @@ impl LogFrom {
 type Reading = (String, Option<f64>, Option<f64>);
 
 fn column_map((columns, rate_hz, torque_constant): &Reading) -> Result<ColumnMap, PythonFailure> {
-    if let Some(constant) = torque_constant.filter(|constant| !(constant.is_finite() && *constant != 0.0)) {
-        let what = format!("torque_constant: found {constant}, allowed: a number other than zero, N.m for an ampere");
-        return Err(PythonFailure::bad(what));
-    }
-    let map = if columns.is_empty() {
-        ColumnMap::default()
-    } else {
-        ColumnMap::with_torque_constant(columns, *torque_constant).map_err(PythonFailure::bad)?
-    };
-    map.at_rate(*rate_hz).map_err(PythonFailure::bad)
+    ColumnMap::of_options(columns, *rate_hz, *torque_constant).map_err(PythonFailure::bad)
 }
 
 /// The drive as it is known before.
@@ -92,8 +82,8 @@ pub fn calibrate<'py>(
         };
         let prior = match (&image, &known) {
             (Some(table), _) => Prior::of_table(table, kind),
-            (None, KnownFrom::Model(path)) => prior_of_model(path, kind)?,
-            (None, KnownFrom::Ratio(ratio)) => prior_of_ratio(*ratio, kind)?,
+            (None, KnownFrom::Model(path)) => Prior::of_model(path, kind).map_err(PythonFailure::bad)?,
+            (None, KnownFrom::Ratio(ratio)) => Prior::of_given_ratio(*ratio, kind).map_err(PythonFailure::bad)?,
             (None, KnownFrom::Image(_)) => return Err(PythonFailure::bad("table: no image")),
         };
         let gear = prior.nominal.gear();
@@ -118,26 +108,6 @@ pub fn calibrate<'py>(
     rows.set_item("measured_arcsec", column(1))?;
     rows.set_item("left_arcsec", column(2))?;
     Ok((serde_json::to_string(&calibration).map_err(bad)?, parts(py, &table)?, rows))
-}
-
-fn prior_of_model(path: &Path, kind: GeneratorKind) -> Result<Prior<'static>, PythonFailure> {
-    let model = Model::read(path).map_err(PythonFailure::bad)?;
-    if !model.causes.is_empty() {
-        let what =
-            "found [[extension.cause]], allowed: a nominal model without causes; what they are is fitted here anew";
-        return Err(PythonFailure::bad(format!("{}: {what}", path.display())));
-    }
-    let bytes = std::fs::read(path).map_err(|error| PythonFailure::bad(format!("{}: {error}", path.display())))?;
-    let (drive, hash) = (path.display().to_string(), *blake3::hash(&bytes).as_bytes());
-    let known = Prior::of_ratio(model.nominal.ratio, kind);
-    Ok(Prior { nominal: model.nominal, drive, hash, ..known })
-}
-
-fn prior_of_ratio(ratio: f64, kind: GeneratorKind) -> Result<Prior<'static>, PythonFailure> {
-    if !(ratio.is_finite() && ratio.abs() >= 2.0 && ratio.abs() <= 1e4) {
-        return Err(PythonFailure::bad(format!("ratio: found {ratio}, allowed: 2 to 10000, or negative")));
-    }
-    Ok(Prior::of_ratio(ratio, kind))
 }
 
 fn calibration_failure(error: &CalibrationError, logs: &[LogFrom]) -> PythonFailure {

@@ -8,13 +8,12 @@ use flexspline::Table;
 
 use super::context::{Context, quoted, table_image, table_of};
 use super::logs::LogOptions;
-use super::{Failure, bad_file, bad_input, report, say};
+use super::{Failure, bad_input, report, say};
 use flexspline_base::output::Outputs;
 use flexspline_design::tables::{c_header, rust_source};
 use flexspline_identify::calibrate::{
     Bench, Calibrated, Calibration, CalibrationError, Planned, Prior, calibrate, one_in, plan,
 };
-use flexspline_identify::extension::Model;
 use flexspline_identify::known_rows::read_known;
 use flexspline_mechanics::drive::GeneratorKind;
 use flexspline_report::calibration_report;
@@ -207,22 +206,9 @@ impl Calibrate {
             return Ok(Prior::of_table(table, self.generator));
         }
         if let Some(path) = &self.model {
-            let model = Model::read(path).map_err(bad_input)?;
-            if !model.causes.is_empty() {
-                let what = "found [[extension.cause]], allowed: a nominal model without causes; what they are is \
-                            fitted here anew";
-                return Err(bad_file(path)(what));
-            }
-            let bytes = std::fs::read(path).map_err(bad_file(path))?;
-            let (drive, hash) = (path.display().to_string(), *blake3::hash(&bytes).as_bytes());
-            let known = Prior::of_ratio(model.nominal.ratio, self.generator);
-            return Ok(Prior { nominal: model.nominal, drive, hash, ..known });
+            return Prior::of_model(path, self.generator).map_err(bad_input);
         }
-        let ratio = self.ratio.unwrap_or_default();
-        if !(ratio.is_finite() && ratio.abs() >= 2.0 && ratio.abs() <= 1e4) {
-            return Err(Failure::BadInput(format!("--ratio: found {ratio}, allowed: 2 to 10000, or negative")));
-        }
-        Ok(Prior::of_ratio(ratio, self.generator))
+        Prior::of_given_ratio(self.ratio.unwrap_or_default(), self.generator).map_err(bad_input)
     }
 
     /// How the table is tried on another log.

@@ -26,24 +26,11 @@ pub(super) struct LogOptions {
 impl LogOptions {
     /// The mapping that they say.
     pub(super) fn map(&self) -> Result<ColumnMap, Failure> {
-        if let Some(constant) = self.torque_constant.filter(|constant| !(constant.is_finite() && *constant != 0.0)) {
-            let what =
-                format!("--torque-constant: found {constant}, allowed: a number other than zero, N.m for an ampere");
-            return Err(Failure::BadInput(what));
-        }
-        map_of(&self.columns, self.torque_constant)?.at_rate(self.rate).map_err(bad_input)
+        ColumnMap::of_options(&self.columns, self.rate, self.torque_constant).map_err(bad_input)
     }
 
     /// Rows in a second, if that is said.
     pub(super) fn rate_hz(&self) -> Option<f64> {
         self.rate
     }
-}
-
-/// The mapping of an option; the names of this project where it is empty.
-pub(super) fn map_of(columns: &str, torque_constant: Option<f64>) -> Result<ColumnMap, Failure> {
-    if columns.is_empty() {
-        return Ok(ColumnMap::default());
-    }
-    ColumnMap::with_torque_constant(columns, torque_constant).map_err(bad_input)
 }

@@ -9,13 +9,12 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::context::{Context, quoted, table_image, table_of};
-use super::logs::map_of;
 use super::tables::fresh_table;
 use super::{Failure, bad_input, say, within};
 use flexspline_base::output::Outputs;
 use flexspline_identify::causes::{Parameter, Usual};
 use flexspline_identify::extension::{self, CauseEntry};
-use flexspline_identify::measurement::{Session, read};
+use flexspline_identify::measurement::{ColumnMap, Session, read};
 use flexspline_identify::nominal::Nominal;
 use flexspline_identify::synthesize::{
     Definition, DrawnUnit, Effect, MotionPlan, Sensors, Sizes, completed, effects, parse, synthesize, to_csv,
@@ -251,7 +250,8 @@ impl Synthesize {
             };
             return Ok(plan.excite(random));
         };
-        let recording = read(path, &map_of(&self.excitation.columns, None)?, &nominal.gear()).map_err(bad_input)?;
+        let map = ColumnMap::of_options(&self.excitation.columns, None, None).map_err(bad_input)?;
+        let recording = read(path, &map, &nominal.gear()).map_err(bad_input)?;
         Ok(completed(&recording.sessions, RATE_HZ, nominal.temperature_c))
     }
 

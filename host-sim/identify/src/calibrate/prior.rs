@@ -1,10 +1,13 @@
 //! Knowledge of a unit before it is measured: a nominal model, a table, or the ratio alone.
 
+use std::path::Path;
+
 use flexspline::Table;
 
 use super::CalibrationError;
 use super::parts::State;
 use super::zero::steady;
+use crate::extension::Model;
 use crate::nominal::{Nominal, Spread};
 use flexspline_mechanics::drive::GeneratorKind;
 
@@ -50,6 +53,35 @@ impl<'a> Prior<'a> {
         let drive = format!("ratio {ratio}");
         let hash = *blake3::hash(drive.as_bytes()).as_bytes();
         Prior { nominal, table: None, drive, hash, kind, zero_rad: 0.0, least_friction_n_m: 0.0 }
+    }
+
+    /// The same of a ratio that somebody gives.
+    ///
+    /// # Errors
+    /// No gear of this kind has it.
+    pub fn of_given_ratio(ratio: f64, kind: GeneratorKind) -> Result<Prior<'a>, CalibrationError> {
+        if (2.0..=1e4).contains(&ratio.abs()) {
+            return Ok(Prior::of_ratio(ratio, kind));
+        }
+        Err(CalibrationError::Known(format!("--ratio: found {ratio}, allowed: 2 to 10000, or negative")))
+    }
+
+    /// A drive known by the file of its nominal model.
+    ///
+    /// # Errors
+    /// It cannot be read, or holds causes.
+    pub fn of_model(path: &Path, kind: GeneratorKind) -> Result<Prior<'a>, CalibrationError> {
+        let model = Model::read(path).map_err(|error| CalibrationError::Known(error.to_string()))?;
+        let refused = |what: String| CalibrationError::Known(format!("{}: {what}", path.display()));
+        if !model.causes.is_empty() {
+            let what = "found [[extension.cause]], allowed: a nominal model without causes; what they are is fitted \
+                        here anew";
+            return Err(refused(what.to_owned()));
+        }
+        let bytes = std::fs::read(path).map_err(|error| refused(error.to_string()))?;
+        let (drive, hash) = (path.display().to_string(), *blake3::hash(&bytes).as_bytes());
+        let known = Prior::of_ratio(model.nominal.ratio, kind);
+        Ok(Prior { nominal: model.nominal, drive, hash, ..known })
     }
 
     /// A drive known by a table.

@@ -388,8 +388,7 @@ fn looked_at(bytes: &[u8]) -> Result<Looked, String> {
 }
 
 fn read(bytes: &[u8], columns: &str) -> Result<Recording, String> {
-    let map =
-        if columns.is_empty() { ColumnMap::default() } else { ColumnMap::parse(columns).map_err(|e| e.to_string())? };
+    let map = ColumnMap::of_options(columns, None, None).map_err(|error| error.to_string())?;
     parse("log.txt", bytes, &map, &Gear::of_ratio(RATIO)).map_err(|error| error.to_string())
 }
 
@@ -527,7 +526,7 @@ fn what_is_left_of_a_damaged_file_is_right() {
     }
     // Time that is counted where the file has none.
     let text = file("motor;load\n", ";", |t, k| plain(t, k)[1..3].to_vec());
-    let map = ColumnMap::parse("generator=motor:rad,output=load:rad").unwrap().at_rate(Some(250.0)).unwrap();
+    let map = ColumnMap::of_options("generator=motor:rad,output=load:rad", Some(250.0), None).unwrap();
     let counted = parse("log.txt", text.as_bytes(), &map, &Gear::of_ratio(RATIO)).unwrap();
     let time = counted.sessions[0].time_s.as_ref().unwrap();
     assert!((time[ROWS - 1] - time[0] - 0.004 * (ROWS - 1) as f64).abs() < 1e-9);
@@ -537,7 +536,7 @@ fn what_is_left_of_a_damaged_file_is_right() {
         with(plain(t, k), 3, format!("{:.2}", 1e3 * t.torque_n_m[k] / 3.5))
     });
     let map = "time=time:s,generator=motor:rad,output=load:rad,torque=current:mA";
-    let map = ColumnMap::with_torque_constant(map, Some(3.5)).unwrap();
+    let map = ColumnMap::of_options(map, None, Some(3.5)).unwrap();
     let with_torque = parse("log.txt", text.as_bytes(), &map, &Gear::of_ratio(RATIO)).unwrap();
     right(&with_torque, true).unwrap();
 }

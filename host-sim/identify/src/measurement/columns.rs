@@ -110,10 +110,19 @@ impl fmt::Display for Quantity {
 #[error("--columns: {0}; for instance --columns generator=wave_gen_turns:turn,error=error_arcsec:arcsec")]
 pub struct MappingError(String);
 
-/// A rate of rows that is none.
-#[derive(Debug, Clone, Copy, PartialEq, Error)]
-#[error("--rate: found {0}, allowed: a rate above zero, Hz")]
-pub struct RateError(f64);
+/// Options that say no mapping.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum OptionError {
+    /// The mapping.
+    #[error(transparent)]
+    Columns(#[from] MappingError),
+    /// The rate of rows.
+    #[error("--rate: found {0}, allowed: a rate above zero, Hz")]
+    Rate(f64),
+    /// The torque at the output for an ampere.
+    #[error("--torque-constant: found {0}, allowed: a number other than zero, N.m for an ampere")]
+    TorqueConstant(f64),
+}
 
 /// Names and units of columns where they differ from
 /// `time_s, generator_rad, output_rad, error_arcsec, torque_n_m, temperature_c, orientation_rad`.
@@ -155,8 +164,24 @@ impl ColumnMap {
         ColumnMap::with_torque_constant(text, None)
     }
 
-    /// Reads a mapping with the torque at the output for an ampere where the torque is given as a current, N·m.
-    pub fn with_torque_constant(text: &str, per_ampere: Option<f64>) -> Result<ColumnMap, MappingError> {
+    /// The mapping of options: of the columns, empty for the names of this project; the rate of rows, Hz, for files
+    /// that hold no time; the torque at the output for an ampere, N·m, where the torque is given as a current.
+    ///
+    /// # Errors
+    /// The first that says nothing that can be used.
+    pub fn of_options(columns: &str, rate_hz: Option<f64>, per_ampere: Option<f64>) -> Result<ColumnMap, OptionError> {
+        if let Some(constant) = per_ampere.filter(|constant| !(constant.is_finite() && *constant != 0.0)) {
+            return Err(OptionError::TorqueConstant(constant));
+        }
+        let default = columns.is_empty().then(ColumnMap::default);
+        let map = default.map_or_else(|| ColumnMap::with_torque_constant(columns, per_ampere), Ok)?;
+        match rate_hz {
+            Some(rate) if !(rate.is_finite() && rate > 0.0) => Err(OptionError::Rate(rate)),
+            _ => Ok(ColumnMap { rate_hz, ..map }),
+        }
+    }
+
+    fn with_torque_constant(text: &str, per_ampere: Option<f64>) -> Result<ColumnMap, MappingError> {
         let mut map = ColumnMap::default();
         for entry in text.split(',').map(str::trim) {
             let given = given(entry, per_ampere)?;
@@ -173,17 +198,6 @@ impl ColumnMap {
             map.given.push(given);
         }
         Ok(map)
-    }
-
-    /// With a rate of rows, Hz, for files that hold no time.
-    ///
-    /// # Errors
-    /// It is not above zero, or not finite.
-    pub fn at_rate(self, rate_hz: Option<f64>) -> Result<ColumnMap, RateError> {
-        match rate_hz {
-            Some(rate) if !(rate.is_finite() && rate > 0.0) => Err(RateError(rate)),
-            _ => Ok(ColumnMap { rate_hz, ..self }),
-        }
     }
 
     /// The rate of rows, Hz, if it was said.

@@ -293,7 +293,7 @@ mod tests {
                 [0.01 * x, angles[0] * psi, angles[1] * output, torque * load, 21.0 + 0.3 * (0.01 * x).sin() + celsius];
             text += &(fields.map(|field| format!("{field:.9}")).join(",") + "\n");
         }
-        let map = if columns.is_empty() { ColumnMap::default() } else { ColumnMap::parse(columns).unwrap() };
+        let map = ColumnMap::of_options(columns, None, None).unwrap();
         parse("m.csv", text.as_bytes(), &map, &Gear::of_ratio(50.0)).map_err(|error| error.to_string())
     }
 
