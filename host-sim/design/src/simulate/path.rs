@@ -5,6 +5,7 @@ use std::ops::RangeInclusive;
 
 use thiserror::Error;
 
+use flexspline_base::csv_rows::rows;
 use flexspline_base::suggest::{likeliest, question};
 
 /// Largest generator angle of a path, rad: 1600 turns, far beyond what a quasi-static run is for.
@@ -82,19 +83,15 @@ pub fn read_path(
     temperatures_c: RangeInclusive<f64>,
 ) -> Result<Vec<PathPoint>, PathError> {
     let allowed = [-LARGEST_ANGLE_RAD..=LARGEST_ANGLE_RAD, -LARGEST_TORQUE_N_M..=LARGEST_TORQUE_N_M, temperatures_c];
-    let mut lines = (1..)
-        .zip(text.trim_start_matches('\u{feff}').lines())
-        .filter(|(_, line)| !line.trim().is_empty() && !line.trim_start().starts_with('#'));
-    let (header_line, header) = lines.next().unwrap_or((1, ""));
-    let names = cells(header);
+    let mut lines = rows(text);
+    let (header_line, names) = lines.next().unwrap_or((1, vec![""]));
     let columns = find_columns(&names)
         .map_err(|what| PathError { problems: vec![format!("{file_name}:{header_line}: {what}")] })?;
 
     let mut points = Vec::new();
     let mut problems = Vec::new();
-    for (number, line) in lines {
+    for (number, row) in lines {
         let place = format!("{file_name}:{number}");
-        let row = cells(line);
         if row.len() != names.len() {
             let (found, allowed) = (row.len(), names.len());
             problems.push(format!("{place}: found {found} fields, allowed: {allowed}, as in the header"));
@@ -127,11 +124,6 @@ pub fn read_path(
         problems.push(format!("{file_name}: no rows after the header; a path needs at least one"));
     }
     if problems.is_empty() { Ok(points) } else { Err(PathError { problems }) }
-}
-
-/// Cells of a line of numbers and names, which need no quotes but may have them.
-fn cells(line: &str) -> Vec<&str> {
-    line.split(',').map(|cell| cell.trim().trim_matches('"')).collect()
 }
 
 /// Position of each column of [`COLUMNS`], or what is wrong with the header.

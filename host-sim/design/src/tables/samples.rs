@@ -9,7 +9,8 @@ use flexspline::Direction;
 use flexspline::make::Sample;
 use thiserror::Error;
 
-use flexspline_base::csv_rows::{CsvRows, NotANumber, Row, TableProblem};
+use flexspline_base::csv_rows::{self, TableProblem};
+use flexspline_base::suggest::did_you_mean;
 
 /// The columns, in the order in which they are written.
 pub const COLUMNS: [&str; 5] = ["generator_rad", "torque_n_m", "temperature_c", "direction", "output_rad"];
@@ -24,91 +25,70 @@ const LIMITS: [(&str, f64, &str); 4] = [
 
 /// A sample file that cannot be used.
 #[derive(Debug, Error)]
-pub enum SampleError {
-    /// The file cannot be read.
-    #[error("{file}: {source}")]
-    Unreadable {
-        /// Which file.
-        file: String,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// A column is missing or there twice.
-    #[error("{file}: line {line}: {what}; needed are {}", COLUMNS.join(", "))]
-    Header {
-        /// Which file.
-        file: String,
-        /// The line of the header, from 1.
-        line: u64,
-        /// Description of the fault.
-        what: String,
-    },
-    /// A row cannot be read.
-    #[error("{file}: line {line}: {what}")]
-    Row {
-        /// Which file.
-        file: String,
-        /// Line, from 1.
-        line: u64,
-        /// Field, value and what is allowed.
-        what: String,
-    },
-    /// No rows.
-    #[error("{file}: no samples after the header")]
-    Empty {
-        /// Which file.
-        file: String,
-    },
+#[error("{file}: {what}")]
+pub struct SampleError {
+    file: String,
+    what: String,
 }
 
 /// Reads a sample file.
 pub fn read(path: &Path) -> Result<Vec<Sample>, SampleError> {
     let file = path.display().to_string();
-    let text = std::fs::read(path).map_err(|source| SampleError::Unreadable { file: file.clone(), source })?;
+    let text = std::fs::read(path).map_err(|error| SampleError { file: file.clone(), what: error.to_string() })?;
     parse(&file, &text)
 }
 
 /// Reads samples from the bytes of a file called `file`.
 pub fn parse(file: &str, text: &[u8]) -> Result<Vec<Sample>, SampleError> {
-    let row = |TableProblem { line, what }| SampleError::Row { file: file.to_owned(), line, what };
-    let header = |TableProblem { line, what }| SampleError::Header { file: file.to_owned(), line, what };
-    let mut rows = CsvRows::new(text).map_err(row)?;
+    let refused = |what: String| SampleError { file: file.to_owned(), what };
+    let at = |line: u64, what: String| refused(format!("line {line}: {what}"));
+    let text = csv_rows::text(text).map_err(|TableProblem { line, what }| at(line, what))?;
+    let mut rows = csv_rows::rows(&text);
+    let (line, header) = rows.next().unwrap_or((1, Vec::new()));
     let mut places = [0; 5];
     for (place, name) in places.iter_mut().zip(COLUMNS) {
-        *place = rows.need(name).map_err(header)?;
+        let found = place_of(name, &header);
+        *place = found.map_err(|what| at(line, format!("{what}; needed are {}", COLUMNS.join(", "))))?;
     }
-    let mut samples = Vec::new();
-    while let Some(found) = rows.next_row().map_err(row)? {
-        samples.push(sample(&found, places).map_err(row)?);
-    }
+    let sample = |(line, row): (u64, Vec<&str>)| sample(&row, places).map_err(|what| at(line, what));
+    let samples = rows.map(sample).collect::<Result<Vec<Sample>, SampleError>>()?;
     if samples.is_empty() {
-        return Err(SampleError::Empty { file: file.to_owned() });
+        return Err(refused("no samples after the header".to_owned()));
     }
     Ok(samples)
 }
 
+/// Where a column stands.
+fn place_of(name: &str, header: &[&str]) -> Result<usize, String> {
+    let mut places = (0..header.len()).filter(|place| header[*place] == name);
+    match (places.next(), places.next()) {
+        (Some(place), None) => Ok(place),
+        (Some(_), Some(_)) => Err(format!("column {name} is there twice")),
+        (None, _) => Err(format!("column {name} is missing{}", did_you_mean("; ", name, header.iter().copied()))),
+    }
+}
+
 /// The sample in a row; the error says field, value and what is allowed.
-fn sample(row: &Row<'_>, places: [usize; 5]) -> Result<Sample, TableProblem> {
-    let refused = |what: String| TableProblem { line: row.line, what };
+fn sample(row: &[&str], places: [usize; 5]) -> Result<Sample, String> {
     let mut numbers = [0.0_f64; 5];
     for ((number, place), name) in numbers.iter_mut().zip(places).zip(COLUMNS) {
-        *number = row.number(place).map_err(|wrong| match wrong {
-            NotANumber::Absent(fields) => refused(format!("{fields} fields, but {name} is field {}", place + 1)),
-            NotANumber::Text(text) => refused(format!("{name} is \"{text}\", not a number")),
-        })?;
+        let Some(text) = row.get(place) else {
+            return Err(format!("{} fields, but {name} is field {}", row.len(), place + 1));
+        };
+        *number = text.parse().map_err(|_| format!("{name} is \"{text}\", not a number"))?;
         if !number.is_finite() {
-            return Err(refused(format!("{name} is {number}; a finite number is needed")));
+            return Err(format!("{name} is {number}; a finite number is needed"));
         }
     }
     let [generator_rad, torque_n_m, temperature_c, direction, output_rad] = numbers;
     let direction = match direction {
         1.0 => Direction::Forward,
         -1.0 => Direction::Backward,
-        other => return Err(refused(format!("direction is {other}; allowed are 1 and -1"))),
+        other => return Err(format!("direction is {other}; allowed are 1 and -1")),
     };
     for ((name, limit, unit), value) in LIMITS.iter().zip([generator_rad, torque_n_m, temperature_c, output_rad]) {
         if value.abs() > *limit {
-            return Err(refused(format!("{name} is {value} {unit}; at most {limit:e} {unit} is plausible")));
+            return Err(format!("{name} is {value} {unit}; at most {limit:e} {unit} is plausible"));
         }
     }
     Ok(Sample { generator_rad, torque_n_m, temperature_c, direction, output_rad })
@@ -119,10 +99,7 @@ pub fn to_csv(samples: &[Sample]) -> String {
     let mut text = COLUMNS.join(",");
     text.push('\n');
     for s in samples {
-        let direction = match s.direction {
-            Direction::Forward => 1,
-            Direction::Backward => -1,
-        };
+        let direction = s.direction.sign();
         text.push_str(&format!(
             "{},{},{},{direction},{}\n",
             s.generator_rad, s.torque_n_m, s.temperature_c, s.output_rad
