@@ -25,7 +25,7 @@ use tokio::time::{Instant, Sleep, sleep};
 use crate::Shared;
 use crate::drive::{self, ReadError};
 use crate::folder::{Folder, FolderEntry, FolderError, LARGEST_FILE};
-use crate::guard::{FILE_POLICY, NoEntry, PAGE_POLICY, RESULT_POLICY, harden, refusal};
+use crate::guard::{FILE_POLICY, NoEntry, PAGE_POLICY, RESULT_POLICY, harden};
 use crate::jobs::JobError;
 use crate::work::{DriveAsked, WorkAsked};
 use flexspline_mechanics::drive::{Drive, GeneratorKind};
@@ -90,12 +90,12 @@ async fn guarded(State(shared): Of, request: Request, next: Next) -> Answer {
     let place = shared.guard.check_place(request.method(), request.headers());
     let has_token = shared.guard.check_token(request.headers());
     let mut answer = match (place, has_token) {
-        (Err(why), _) => refusal(why),
+        (Err(why), _) => words(StatusCode::FORBIDDEN, why),
         // The address that was printed.
         (Ok(()), _) if request.uri().path() == "/" && request.uri().query().is_some() => {
             entered(&shared, request.uri().query().unwrap_or_default())
         }
-        (Ok(()), Err(why)) => refusal(why),
+        (Ok(()), Err(why)) => words(StatusCode::FORBIDDEN, why),
         (Ok(()), Ok(())) => next.run(request).await,
     };
     harden(answer.headers_mut());
@@ -105,7 +105,7 @@ async fn guarded(State(shared): Of, request: Request, next: Next) -> Answer {
 /// Takes the key of the address into a cookie, and the address without it.
 fn entered(shared: &Shared, query: &str) -> Answer {
     if !value(Some(query), "token").is_some_and(|token| shared.guard.is_token(token)) {
-        return refusal(NoEntry::Token);
+        return words(StatusCode::FORBIDDEN, NoEntry::Token);
     }
     let mut answer = words(StatusCode::SEE_OTHER, "");
     answer.headers_mut().insert(header::LOCATION, HeaderValue::from_static("/"));

@@ -9,9 +9,9 @@
 //! - Scripts in names, logs and reports: a content security policy, scripts of this server alone, nothing from
 //!   elsewhere.
 
-use axum::body::Body;
+use axum::http::Method;
 use axum::http::header::{self, HeaderMap, HeaderName, HeaderValue};
-use axum::http::{Method, Response, StatusCode};
+use thiserror::Error;
 
 /// Bytes of a token: 128 bits, which nobody guesses.
 const TOKEN_BYTES: usize = 16;
@@ -35,25 +35,17 @@ pub struct Guard {
 }
 
 /// Why somebody may not ask.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum NoEntry {
     /// `Host` is no address of this server.
+    #[error("this server answers as 127.0.0.1 and localhost alone")]
     Host,
     /// The request is of another page.
+    #[error("this request is of another page; allowed: pages of this server")]
     Origin,
     /// No token, or that of another run.
+    #[error("open the address that `flexspline serve` printed: it holds the key of this run")]
     Token,
-}
-
-impl NoEntry {
-    /// In words.
-    pub fn words(self) -> &'static str {
-        match self {
-            NoEntry::Host => "this server answers as 127.0.0.1 and localhost alone",
-            NoEntry::Origin => "this request is of another page; allowed: pages of this server",
-            NoEntry::Token => "open the address that `flexspline serve` printed: it holds the key of this run",
-        }
-    }
 }
 
 impl Guard {
@@ -136,14 +128,6 @@ impl Guard {
             .any(|(of, token)| of == name && self.is_token(token));
         if found { Ok(()) } else { Err(NoEntry::Token) }
     }
-}
-
-/// An answer in words.
-pub fn refusal(refusal: NoEntry) -> Response<Body> {
-    let mut answer = Response::new(Body::from(format!("{}\n", refusal.words())));
-    *answer.status_mut() = StatusCode::FORBIDDEN;
-    answer.headers_mut().insert(header::CONTENT_TYPE, HeaderValue::from_static("text/plain; charset=utf-8"));
-    answer
 }
 
 /// Puts on an answer what every answer has: nothing is kept, guessed, framed or passed to others.

@@ -66,19 +66,10 @@ enum JobLine {
 struct Inside {
     jobs: BTreeMap<u64, JobRecord>,
     next: u64,
-    short: VecDeque<u64>,
-    long: VecDeque<u64>,
+    /// By line.
+    waiting: [VecDeque<u64>; 2],
     running: BTreeMap<u64, Running>,
     over: bool,
-}
-
-impl Inside {
-    fn line(&mut self, line: JobLine) -> &mut VecDeque<u64> {
-        match line {
-            JobLine::Short => &mut self.short,
-            JobLine::Long => &mut self.long,
-        }
-    }
 }
 
 /// All jobs of a folder.
@@ -171,7 +162,7 @@ impl Jobs {
     pub fn add(&self, work: WorkAsked) -> Result<JobRecord, JobError> {
         let mut inside = self.lock();
         let line = if work.is_short() { JobLine::Short } else { JobLine::Long };
-        if inside.short.len() + inside.long.len() >= MOST_WAITING {
+        if inside.waiting.iter().map(VecDeque::len).sum::<usize>() >= MOST_WAITING {
             return Err(JobError::Full);
         }
         let id = inside.next;
@@ -201,7 +192,7 @@ impl Jobs {
         record::write(&self.folder, &job).map_err(|error| JobError::Folder(error.to_string()))?;
         inside.next += 1;
         inside.jobs.insert(id, job.clone());
-        inside.line(line).push_back(id);
+        inside.waiting[line as usize].push_back(id);
         self.forget_the_oldest(&mut inside);
         drop(inside);
         self.something.notify_all();
@@ -231,10 +222,9 @@ impl Jobs {
     pub fn cancel(&self, id: u64) -> bool {
         let mut inside = self.lock();
         let inside = &mut *inside;
-        let waits = inside.short.contains(&id) || inside.long.contains(&id);
+        let waits = inside.waiting.iter().any(|line| line.contains(&id));
         if waits {
-            inside.short.retain(|other| *other != id);
-            inside.long.retain(|other| *other != id);
+            inside.waiting.iter_mut().for_each(|line| line.retain(|other| *other != id));
             if let Some(job) = inside.jobs.get_mut(&id) {
                 (job.state, job.ended_s) = (JobStatus::Cancelled, Some(now_s()));
                 let _ = record::write(&self.folder, job);
@@ -276,7 +266,7 @@ impl Jobs {
             if inside.over {
                 return None;
             }
-            if let Some(id) = inside.line(line).pop_front() {
+            if let Some(id) = inside.waiting[line as usize].pop_front() {
                 return Some(id);
             }
             inside = self.something.wait(inside).unwrap_or_else(PoisonError::into_inner);

@@ -254,12 +254,10 @@ impl WorkAsked {
     /// A name is no plain one, a file is not there, or a number is none.
     pub fn words(&self, folder: &Folder, out: &str) -> Result<Words, WorkError> {
         let mut words = CommandLine { folder, arguments: vec![self.name().to_owned()] };
-        let mut printed_to = None;
         match self {
             WorkAsked::Look { files } => {
                 words.logs(files)?;
                 words.word("--json");
-                printed_to = Some("look.json");
             }
             WorkAsked::Calibrate { files, reading, known, generator } => {
                 words.logs(files)?;
@@ -329,7 +327,6 @@ impl WorkAsked {
                 words.word("--no-core");
                 words.word("--archive");
                 words.option("out", format!("{out}/flexspline"));
-                return Ok(Words { arguments: words.arguments, printed_to });
             }
             WorkAsked::New { file, of } => {
                 if !is_plain(file) || !file.ends_with(".toml") {
@@ -346,10 +343,10 @@ impl WorkAsked {
                         words.option("generator", generator);
                     }
                 }
-                return Ok(Words { arguments: words.arguments, printed_to });
             }
         }
-        if printed_to.is_none() {
+        let printed_to = matches!(self, WorkAsked::Look { .. }).then_some("look.json");
+        if !matches!(self, WorkAsked::Look { .. } | WorkAsked::Bundle { .. } | WorkAsked::New { .. }) {
             words.option("out", out);
         }
         Ok(Words { arguments: words.arguments, printed_to })
