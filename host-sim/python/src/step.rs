@@ -6,8 +6,9 @@ use flexspline::{
     Approach, Direction, GeneratorAngle, OutputAngle, PlayState as CoreState, SAVED_STATE_BYTES, Table as CoreTable,
 };
 use flexspline_base::units::ARCSEC_PER_RAD;
-use flexspline_design::tables::dead_zone_n_m;
+use flexspline_design::tables::{dead_zone_n_m, generator_of};
 use flexspline_identify::replay::{MeasuredRow, RowsOf, parse as parse_measured, replay};
+use flexspline_mechanics::drive::GeneratorKind;
 use numpy::{IntoPyArray, PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -191,7 +192,7 @@ impl Table {
         let drive = table.drive();
         let header = PyDict::new(py);
         header.set_item("table_id", table.id().to_string())?;
-        header.set_item("generator", generator_name(table.generator_kind()))?;
+        header.set_item("generator", generator_of(table).map_or("other", GeneratorKind::name))?;
         header.set_item("ratio", drive.exact_ratio())?;
         header.set_item("flexspline_teeth", drive.flexspline_teeth())?;
         header.set_item("circular_spline_teeth", drive.circular_spline_teeth())?;
@@ -386,14 +387,4 @@ impl Table {
 
 fn directions(signs: &[i8]) -> PyResult<Vec<Direction>> {
     signs.iter().map(|sign| direction_of(i32::from(*sign))).collect()
-}
-
-fn generator_name(kind: flexspline::GeneratorKind) -> &'static str {
-    match kind {
-        flexspline::GeneratorKind::TwoRoller => "two-roller",
-        flexspline::GeneratorKind::FourRoller => "four-roller",
-        flexspline::GeneratorKind::DoubleDisc => "double-disc",
-        flexspline::GeneratorKind::Cam => "cam",
-        flexspline::GeneratorKind::Other => "other",
-    }
 }

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 pub use archive::tar_gz;
-use flexspline_design::tables::put_bytes;
+use flexspline_design::tables::{generator_of, put_bytes};
 use flexspline_mechanics::drive::GeneratorKind;
 use libraries::BundleLibrary;
 
@@ -114,7 +114,7 @@ impl BundledTable {
         format!(
             "table {} of a {} generator, ratio {}, {torque_least} to {torque_most} N.m, {least} to {most} degrees C",
             table.id(),
-            kind(table.generator_kind()),
+            generator(&table),
             table.drive().exact_ratio()
         )
     }
@@ -153,16 +153,9 @@ impl BundledTable {
     }
 }
 
-/// A generator as the command line names it.
-fn kind(kind: flexspline::GeneratorKind) -> String {
-    let named = match kind {
-        flexspline::GeneratorKind::TwoRoller => GeneratorKind::TwoRoller,
-        flexspline::GeneratorKind::FourRoller => GeneratorKind::FourRoller,
-        flexspline::GeneratorKind::DoubleDisc => GeneratorKind::DoubleDisc,
-        flexspline::GeneratorKind::Cam => GeneratorKind::Cam,
-        flexspline::GeneratorKind::Other => return "other".to_owned(),
-    };
-    named.to_string()
+/// The generator of a table as the command line names it.
+fn generator(table: &flexspline::Table<'_>) -> &'static str {
+    generator_of(table).map_or("other", GeneratorKind::name)
 }
 
 /// `manifest.json`.
@@ -282,7 +275,7 @@ impl Bundle {
                 file: format!("tables/{}.fxt", table.stem),
                 array: table.array(),
                 table_id: checked.id().to_string(),
-                generator: kind(checked.generator_kind()),
+                generator: generator(&checked).to_owned(),
                 drive_blake3: blake3::Hash::from(checked.drive_hash()).to_hex().to_string(),
             }
         };
