@@ -115,10 +115,10 @@ pub(super) fn stress_lines(animation: &Animation) -> Lines {
 }
 
 /// Stress and pressures over a pitch, a chart to each choice.
-pub(super) fn stress_figure(charts: Vec<(String, Lines)>) -> Figure {
-    let (x, y) = (over_pitch(), ChartAxis::new("Stress, pressure", PageQuantity::Stress));
+pub(super) fn stress_figure(charts: Vec<(String, Lines)>) -> PageBlock {
+    let axes = [over_pitch(), ChartAxis::new("Stress, pressure", PageQuantity::Stress)];
     let caption = format!("At the load of figure 1. {STRESSES_ARE}");
-    Figure::of("stress", "Largest stress and pressures over a pitch", caption, FigureBody::Lines { x, y, charts })
+    PageBlock::lines("stress", "Largest stress and pressures over a pitch", caption, axes, charts)
 }
 
 /// Names of the forces on a tooth in a legend: either flank, the generator.
@@ -148,11 +148,10 @@ pub(super) fn sharing_axes() -> [ChartAxis; 2] {
 }
 
 /// How the load is shared among the teeth, a chart to each choice.
-pub(super) fn sharing_figure(charts: Vec<(String, Lines)>) -> Figure {
-    let [x, y] = sharing_axes();
+pub(super) fn sharing_figure(charts: Vec<(String, Lines)>) -> PageBlock {
     let caption = "Force on a flexspline tooth by its angle from the major axis, at the load of figure 1: of each \
                    flank, and of the generator on the piece of bore under the tooth. The other lobe carries the same.";
-    Figure::of("sharing", "How the teeth share the load", caption, FigureBody::Lines { x, y, charts })
+    PageBlock::lines("sharing", "How the teeth share the load", caption, sharing_axes(), charts)
 }
 
 /// The data sheets and what is computed of them, by choice; nothing where there is none.

@@ -625,7 +625,7 @@ fn table_section(known: &[DriveKnown<'_>]) -> PageSection {
 fn load_section(known: &[DriveKnown<'_>]) -> PageSection {
     let of = |lines: fn(&Animation) -> Lines| charts(known, |k| k.subject.animation.as_ref().ok().map(lines));
     let figures = [stress_figure(of(stress_lines)), sharing_figure(of(sharing_lines))];
-    PageSection::new("load", "Load and stress", Detail::Engineering, figures.map(PageBlock::Figure).into())
+    PageSection::new("load", "Load and stress", Detail::Engineering, figures.into())
 }
 
 fn reading_section() -> PageSection {

@@ -40,8 +40,6 @@ pub enum Status {
     FaultFound,
     /// The unit departs from what is nominal, and what does it has no name.
     NotUnderstood,
-    /// A value is used outside the range it was made for.
-    Extrapolates,
     /// A bound was missed.
     BoundMissed,
     /// Some run did not converge.
@@ -58,7 +56,6 @@ impl Status {
             Status::DataFaults => "data faults",
             Status::FaultFound => "fault found",
             Status::NotUnderstood => "not understood",
-            Status::Extrapolates => "extrapolates",
             Status::BoundMissed => "bound missed",
             Status::NotConverged => "not converged",
         }
@@ -839,7 +836,6 @@ mod tests {
             (Status::DataFaults, "data faults", false),
             (Status::FaultFound, "fault found", false),
             (Status::NotUnderstood, "not understood", false),
-            (Status::Extrapolates, "extrapolates", false),
             (Status::BoundMissed, "bound missed", true),
             (Status::NotConverged, "not converged", true),
         ] {

@@ -184,8 +184,8 @@ impl RunKnown<'_> {
         let mut blocks = vec![
             PageBlock::Figure(drive_figure(&format!("under {load} N·m, turning {way}"))),
             ripple,
-            PageBlock::Figure(stress_figure(self.chart(stress_lines(motion)))),
-            PageBlock::Figure(sharing_figure(self.chart(sharing_lines(motion)))),
+            stress_figure(self.chart(stress_lines(motion))),
+            sharing_figure(self.chart(sharing_lines(motion))),
         ];
         blocks.extend(motion.sleeve.as_ref().map(|_| PageBlock::Figure(sleeve_figure())));
         Some(PageSection::new("motion", "The drive at work", Detail::Summary, blocks))

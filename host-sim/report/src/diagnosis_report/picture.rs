@@ -8,7 +8,7 @@ use crate::page::{
     ChartAxis, ChartSeries, Detail, FieldMap, Figure, FigureBody, Lines, Mark, PageBlock, PageQuantity, PageSection,
     RichText, Upright, significant,
 };
-use flexspline_base::robust::least_and_most;
+use flexspline_base::robust::{least_and_most, median_of};
 use flexspline_identify::nominal::Fixed;
 use flexspline_identify::residual::{Axis as Angle, Direction, Wheel};
 
@@ -143,10 +143,8 @@ impl DiagnosisKnown<'_> {
             cells[place(self.rows.output[k], up) * across + place(self.rows.generator[k], across)].push(*value);
         }
         let middle = |k: usize, of: usize| (k as f64 + 0.5) / of as f64 * 360.0;
-        let z: Vec<f64> = cells
-            .iter_mut()
-            .map(|c| if c.len() < FEWEST_IN_CELL { f64::NAN } else { flexspline_identify::measurement::median_of(c) })
-            .collect();
+        let z: Vec<f64> =
+            cells.iter_mut().map(|c| if c.len() < FEWEST_IN_CELL { f64::NAN } else { median_of(c) }).collect();
         // Of an output that hardly turned there is no map.
         let visited = z.iter().filter(|value| value.is_finite()).count();
         (visited * 6 >= z.len()).then(|| FieldMap {
@@ -238,7 +236,7 @@ impl DiagnosisKnown<'_> {
             ));
         }
         blocks.extend(self.shown.iter().filter_map(|shown| self.peak_table(shown)));
-        blocks.extend(self.shown.iter().filter_map(pulse_table));
+        blocks.extend(self.shown.iter().filter_map(|shown| self.pulse_table(shown)));
         if blocks.is_empty() {
             blocks.push(PageBlock::paragraph("The drive turned too little for orders."));
         }
@@ -278,6 +276,24 @@ impl DiagnosisKnown<'_> {
         }
         let header = ["Order", "Amplitude", "Parts with such an order"];
         of_level(shown, "Lines above the noise, strongest first in each angle", &header, rows)
+    }
+
+    fn pulse_table(&self, shown: &Shown) -> Option<PageBlock> {
+        let pulses = shown.picture.as_ref()?.pulses.iter().map(|pulse| {
+            let (symbol, _) = self.angle_name(pulse.axis);
+            vec![
+                RichText::new(format!("{symbol} = {}°", significant(pulse.position_rad.to_degrees(), 3))),
+                plus_minus(pulse.height_arcsec, pulse.height_std_arcsec),
+                RichText::new(format!("{}°", significant(pulse.width_rad.to_degrees(), 2))),
+                RichText::new(pulse.per_turn.to_string()),
+            ]
+        });
+        of_level(
+            shown,
+            "Pulses that stay in one position",
+            &["Where", "Height", "Width", "In a turn"],
+            pulses.collect(),
+        )
     }
 
     fn drift(&self) -> PageSection {
@@ -332,27 +348,6 @@ fn varies(values: &[f64]) -> bool {
 }
 
 /// Pulses that stay in one position.
-fn pulse_table(shown: &Shown) -> Option<PageBlock> {
-    let pulses = &shown.picture.as_ref()?.pulses;
-    let rows: Vec<Vec<RichText>> = pulses
-        .iter()
-        .map(|pulse| {
-            let angle = match pulse.axis {
-                Angle::Generator => "ψ",
-                Angle::GeneratorLessOutput => "ψ − δ",
-                Angle::Output => "δ",
-            };
-            vec![
-                RichText::new(format!("{angle} = {}°", significant(pulse.position_rad.to_degrees(), 3))),
-                plus_minus(pulse.height_arcsec, pulse.height_std_arcsec),
-                RichText::new(format!("{}°", significant(pulse.width_rad.to_degrees(), 2))),
-                RichText::new(pulse.per_turn.to_string()),
-            ]
-        })
-        .collect();
-    of_level(shown, "Pulses that stay in one position", &["Where", "Height", "Width", "In a turn"], rows)
-}
-
 /// A value in arcsec with its standard deviation.
 fn plus_minus(value: f64, std: f64) -> RichText {
     RichText::arcsec(value, 3).plain("\u{a0}±\u{a0}").error(std, 2)
