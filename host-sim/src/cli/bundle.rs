@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::context::{Context, image_file};
 use super::{Failure, bad_file};
 use flexspline_base::output::{Outputs, WholeFolder, prepare_folder};
-use flexspline_base::suggest::{likeliest, question};
+use flexspline_base::suggest::did_you_mean;
 use flexspline_export::bundle::libraries::{BundleLibrary, LibraryError, Places, TARGETS};
 use flexspline_export::bundle::{Bundle, BundledTable, MANIFEST, Manifest, TableEntry, tar_gz};
 
@@ -127,7 +127,7 @@ impl BundleCommand {
         let known = TARGETS.map(|(target, _)| target);
         for asked in &self.targets {
             if !known.contains(&asked.as_str()) {
-                let hint = likeliest(asked, known).map_or_else(String::new, |meant| format!("; {}", question(meant)));
+                let hint = did_you_mean("; ", asked, known);
                 return Err(Failure::BadInput(format!(
                     "--target: found {asked:?}; allowed: {}{hint}",
                     known.join(", ")

@@ -51,18 +51,12 @@ impl DriveCommand {
         let Some(reports) = &result.mesh else {
             return context.print_data(&result, || drive.to_toml());
         };
-        let sound = reports.iter().all(|report| report.interferences.is_empty());
+        let binding = reports.iter().filter(|report| !report.interferences.is_empty());
+        let interfering: Vec<&str> = binding.map(|report| report.generator.name()).collect();
         context.print(&result, || {
-            let next = if sound { say::next(&[context.next("tables")]) } else { String::new() };
+            let next = if interfering.is_empty() { say::next(&[context.next("tables")]) } else { String::new() };
             table(&drive, reports).trim_end().to_owned() + &next
         })?;
-        let interfering: Vec<&str> = result
-            .mesh
-            .iter()
-            .flatten()
-            .filter(|report| !report.interferences.is_empty())
-            .map(|report| report.generator.name())
-            .collect();
         if interfering.is_empty() {
             Ok(())
         } else {

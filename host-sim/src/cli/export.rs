@@ -1,6 +1,5 @@
 //! `flexspline export`: the deformed mesh, the outlines or the whole problem, for other programs.
 
-use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use clap::builder::ArgPredicate;
@@ -10,10 +9,10 @@ use serde::Serialize;
 use super::context::quoted;
 use super::export_fmu::FmuOptions;
 use super::export_playback::PlaybackOptions;
-use super::simulate::{ModelOptions, refused_or_failed, show};
+use super::simulate::{ModelOptions, refused_or_failed, show, watched};
 use super::{Context, Failure, bad_input, say};
 use flexspline_base::output::{OutputError, write_csv, write_whole};
-use flexspline_design::simulate::{Observation, Path, PathPoint, simulate};
+use flexspline_design::simulate::{Observation, Path, PathPoint};
 use flexspline_export::{Deck, DeckSettings, SleeveDeck, outlines, write_vtu, write_whole_flexspline};
 use flexspline_mechanics::drive::Drive;
 use flexspline_mechanics::stepping::Problem;
@@ -222,20 +221,10 @@ impl Export {
             write_whole(whole, |out| write_whole_flexspline(out, now.problem, now.state))
         };
         let progress = context.progress(self.model.generator.name());
-        let mut lost: Option<OutputError> = None;
-        let run = simulate(&drive, &settings, &mut |now| {
+        let run = watched(&drive, &settings, |now| {
             show(&progress, now);
-            if now.row.is_some()
-                && let Err(error) = write(now)
-            {
-                lost = Some(error);
-                return ControlFlow::Break(());
-            }
-            ControlFlow::Continue(())
-        });
-        if let Some(error) = lost {
-            return Err(error.into());
-        }
+            if now.row.is_some() { write(now) } else { Ok(()) }
+        })?;
         run.map_err(refused_or_failed)?;
         Ok(std::iter::once(file.clone()).chain(whole.clone()).collect())
     }

@@ -13,8 +13,8 @@ use flexspline_base::output::{OutputError, Outputs, WholeFolder, write_whole};
 use flexspline_base::progress::Progress;
 use flexspline_design::cautions::{Caution, add_stress};
 use flexspline_design::simulate::{
-    Observation, Path, PathPoint, Phase, PlaceStress, SimulateError, Simulation, SimulationSettings,
-    Summary, read_path, simulate, stress_by_place,
+    Observation, Path, PathPoint, Phase, PlaceStress, SimulateError, Simulation, SimulationSettings, Summary,
+    read_path, simulate, stress_by_place,
 };
 use flexspline_design::stated::{SheetBeside, beside};
 use flexspline_export::{VtuFrame, write_pvd, write_vtu};
@@ -148,9 +148,8 @@ impl Simulate {
 
         let mut frames = if self.frames { Some(Frames::new(&out.join("frames"))?) } else { None };
         let progress = context.progress(settings.generator.name());
-        let mut lost: Option<OutputError> = None;
         let mut seen = (!self.no_report).then(|| MotionSeen::new(&drive));
-        let run = simulate(&drive, &settings, &mut |now| {
+        let run = watched(&drive, &settings, |now| {
             if context.verbose() {
                 progress.line(&line(now));
             }
@@ -158,18 +157,12 @@ impl Simulate {
             if let Some(seen) = &mut seen {
                 seen.add(now);
             }
-            if let (Some(frames), Some(row)) = (&mut frames, now.row)
-                && let Err(error) = frames.add(row.step, now)
-            {
-                lost = Some(error);
-                return ControlFlow::Break(());
+            match (&mut frames, now.row) {
+                (Some(frames), Some(row)) => frames.add(row.step, now),
+                _ => Ok(()),
             }
-            ControlFlow::Continue(())
-        });
+        })?;
         drop(progress);
-        if let Some(error) = lost {
-            return Err(error.into());
-        }
         let mut simulation = match run {
             Ok(simulation) => simulation,
             Err(error) => return Err(self.failed(context, out, error)),
@@ -282,6 +275,20 @@ impl Simulate {
         }
         Ok(points)
     }
+}
+
+/// A run, as far as `each` has written what it is to write on the way.
+pub(super) fn watched(
+    drive: &Drive,
+    settings: &SimulationSettings,
+    mut each: impl FnMut(&Observation) -> Result<(), OutputError>,
+) -> Result<Result<Simulation, SimulateError>, OutputError> {
+    let mut lost = Ok(());
+    let run = simulate(drive, settings, &mut |now| {
+        lost = each(now);
+        if lost.is_ok() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+    });
+    lost.map(|()| run)
 }
 
 /// Stress by place where and under what the nodal one of the run was largest.

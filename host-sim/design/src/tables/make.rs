@@ -73,8 +73,9 @@ impl TableSettings {
         let NodeChoice { largest_n_m, tolerance_arcsec, .. } = self.torque_nodes;
         let least = LEAST_OVER_DRAG * drive.output.drag_torque_n_m;
         if !(largest_n_m > least && largest_n_m <= MOST_TORQUE_N_M) {
-            let allowed =
-                format!("more than {least} ({LEAST_OVER_DRAG} times the drag of the output), at most {MOST_TORQUE_N_M}");
+            let allowed = format!(
+                "more than {least} ({LEAST_OVER_DRAG} times the drag of the output), at most {MOST_TORQUE_N_M}"
+            );
             return refuse("torque_n_m", largest_n_m.to_string(), allowed);
         }
         let [low, high] = TOLERANCES_ARCSEC;
