@@ -11,9 +11,8 @@ use serde::ser::{SerializeMap, Serializer};
 use thiserror::Error;
 
 use super::Sizes;
-use crate::causes::{
-    CauseName, Factor, Parameter, ParameterName, ParameterName as Name, TIME, Usual, Usual::Value, number,
-};
+use super::data_fault::{DataFault, FAULTS};
+use crate::causes::{CauseName, Factor, Parameter, ParameterName, ParameterName as Name, Usual};
 use crate::diagnosis::rows::Rows;
 use crate::measurement::FaultName;
 use crate::nominal::Nominal;
@@ -71,104 +70,17 @@ impl Definition {
     fn of_cause(cause: CauseName) -> Definition {
         Definition {
             what: Hidden::Cause(cause),
-            meaning: cause.spec().meaning,
+            meaning: cause.does(),
             parameters: cause.spec().parameters,
             twins: cause.spec().twins,
         }
     }
 
-    const fn of_fault(fault: FaultName, meaning: &'static str, parameters: &'static [Parameter]) -> Definition {
-        Definition { what: Hidden::Fault(fault), meaning, parameters, twins: &[] }
+    fn of_fault(fault: &DataFault) -> Definition {
+        let DataFault { name, meaning, parameters, .. } = *fault;
+        Definition { what: Hidden::Fault(name), meaning, parameters, twins: &[] }
     }
 }
-
-const CHANNELS: &[&str] = &["generator", "output", "torque", "temperature"];
-
-/// The faults of the data in the order of lists.
-const FAULTS: [Definition; 16] = [
-    Definition::of_fault(
-        FaultName::EncoderIndexJump,
-        "the count of the output encoder is off from an instant on",
-        &[number(Name::SizeArcsec, "of the jump", -1e5, 1e5, Value(60.0)), TIME],
-    ),
-    Definition::of_fault(
-        FaultName::FrozenChannel,
-        "a channel repeats one value",
-        &[
-            Parameter { words: CHANNELS, ..number(Name::Channel, "which one", 0.0, 3.0, Value(1.0)) },
-            TIME,
-            number(Name::DurationS, "how long", 0.0, 1e6, Value(3.0)),
-        ],
-    ),
-    Definition::of_fault(
-        FaultName::MissingSamples,
-        "rows without an output angle",
-        &[number(Name::Share, "of the rows", 0.0, 0.5, Value(0.02))],
-    ),
-    Definition::of_fault(
-        FaultName::ClockError,
-        "time runs back",
-        &[number(Name::StepS, "by which", 1e-4, 1e4, Value(0.5)), TIME],
-    ),
-    Definition::of_fault(
-        FaultName::Outliers,
-        "single rows far off",
-        &[
-            number(Name::Share, "of the rows", 0.0, 0.1, Value(0.002)),
-            number(Name::SizeArcsec, "of the largest", 0.0, 1e6, Value(600.0)),
-        ],
-    ),
-    Definition::of_fault(FaultName::UnitMismatch, "the output angle is in degrees and says radians", &[]),
-    Definition::of_fault(
-        FaultName::Quantisation,
-        "a coarse output encoder",
-        &[number(Name::StepArcsec, "its step", 0.0, 1e5, Value(30.0))],
-    ),
-    Definition::of_fault(
-        FaultName::Drift,
-        "a zero that moves with time",
-        &[number(Name::ArcsecPerHour, "how fast", -1e6, 1e6, Value(300.0))],
-    ),
-    Definition::of_fault(
-        FaultName::ReadJitter,
-        "the two angles are not read at one instant",
-        &[number(Name::JitterMs, "scatter of the time between them", 0.0, 100.0, Value(0.5))],
-    ),
-    Definition::of_fault(
-        FaultName::Stalls,
-        "the logger stands still now and then, and its time counts on",
-        &[
-            number(Name::EveryRows, "after this number of rows", 2.0, 1e5, Value(50.0)),
-            number(Name::DurationS, "for so long", 0.0, 1e3, Value(0.05)),
-        ],
-    ),
-    Definition::of_fault(
-        FaultName::CounterRestart,
-        "the count of the generator begins anew in the sessions after the first",
-        &[number(Name::Turns, "off by", -1e5, 1e5, Value(7.0))],
-    ),
-    Definition::of_fault(FaultName::TorqueSign, "the torque has the wrong sign", &[]),
-    Definition::of_fault(
-        FaultName::TorqueScale,
-        "the torque is in another unit, or of another shaft",
-        &[number(Name::Factor, "of all values", -1e6, 1e6, Value(0.01))],
-    ),
-    Definition::of_fault(
-        FaultName::TorqueZero,
-        "the torque reads a load where there is none",
-        &[number(Name::TorqueNM, "what it reads then", -1e6, 1e6, Value(0.8))],
-    ),
-    Definition::of_fault(
-        FaultName::PositionJump,
-        "the generator's angle leaps by whole turns",
-        &[number(Name::Turns, "by how many", -1e5, 1e5, Value(16.0)), TIME],
-    ),
-    Definition::of_fault(
-        FaultName::AveragedRows,
-        "each row is the mean of those about it",
-        &[number(Name::DurationS, "over so long", 0.0, 10.0, Value(0.06))],
-    ),
-];
 
 /// Parameters that came to effects later, none of which is drawn: they take no number, so that a seed goes on making
 /// the same noise.
@@ -178,7 +90,7 @@ const CAME_LATER: [ParameterName; 1] = [ParameterName::DeeperArcsec];
 #[must_use]
 pub fn effects() -> Vec<Definition> {
     let causes = CauseName::ALL.iter().map(|cause| Definition::of_cause(*cause));
-    causes.chain(FAULTS).collect()
+    causes.chain(FAULTS.iter().map(Definition::of_fault)).collect()
 }
 
 /// An effect with the values of its parameters: those given, and once completed all.

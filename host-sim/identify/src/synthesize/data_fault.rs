@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use super::catalogue::{Effect, Hidden};
 use super::gauss;
-use crate::causes::ParameterName;
+use crate::causes::{Parameter, ParameterName as Name, TIME as INSTANT, Usual::Value, number};
 use crate::measurement::{FaultName, Session};
 use flexspline_base::units::ARCSEC_PER_RAD;
 
@@ -13,13 +13,179 @@ use flexspline_base::units::ARCSEC_PER_RAD;
 const HEADER: &str = "time_s,generator_rad,output_rad,torque_n_m,temperature_c,orientation_rad\n";
 /// Places of them.
 const TIME: usize = 0;
+const GENERATOR: usize = 1;
 const OUTPUT: usize = 2;
-const TORQUE: usize = 3;
+
+/// The rows of a file, column by column as in its header.
+type Cells = Vec<[f64; 6]>;
+
+/// A fault that can be hidden in data.
+pub(super) struct DataFault {
+    /// Its name.
+    pub name: FaultName,
+    /// In words.
+    pub meaning: &'static str,
+    /// Its parameters.
+    pub parameters: &'static [Parameter],
+    /// Puts it into the rows.
+    spoil: fn(&mut Cells, &dyn Fn(Name) -> f64, &mut fastrand::Rng),
+}
+
+const CHANNELS: &[&str] = &["generator", "output", "torque", "temperature"];
+
+/// The faults of the data in the order of lists.
+pub(super) const FAULTS: [DataFault; 12] = [
+    DataFault {
+        name: FaultName::EncoderIndexJump,
+        meaning: "the count of the output encoder is off from an instant on",
+        parameters: &[number(Name::SizeArcsec, "of the jump", -1e5, 1e5, Value(60.0)), INSTANT],
+        spoil: |rows, v, _| from_an_instant(rows, v, OUTPUT, v(Name::SizeArcsec) / ARCSEC_PER_RAD),
+    },
+    DataFault {
+        name: FaultName::FrozenChannel,
+        meaning: "a channel repeats one value",
+        parameters: &[
+            Parameter { words: CHANNELS, ..number(Name::Channel, "which one", 0.0, 3.0, Value(1.0)) },
+            INSTANT,
+            number(Name::DurationS, "how long", 0.0, 1e6, Value(3.0)),
+        ],
+        spoil: |rows, v, _| {
+            let (from, until) = (v(Name::TimeS), v(Name::TimeS) + v(Name::DurationS));
+            let channel = 1 + v(Name::Channel) as usize;
+            let mut held = None;
+            for row in rows.iter_mut().filter(|row| (from..until).contains(&row[TIME])) {
+                row[channel] = *held.get_or_insert(row[channel]);
+            }
+        },
+    },
+    DataFault {
+        name: FaultName::MissingSamples,
+        meaning: "rows without an output angle",
+        parameters: &[number(Name::Share, "of the rows", 0.0, 0.5, Value(0.02))],
+        spoil: |rows, v, random| {
+            let share = v(Name::Share);
+            rows.iter_mut().filter(|_| random.f64() < share).for_each(|row| row[OUTPUT] = f64::NAN);
+        },
+    },
+    DataFault {
+        name: FaultName::ClockError,
+        meaning: "time runs back",
+        parameters: &[number(Name::StepS, "by which", 1e-4, 1e4, Value(0.5)), INSTANT],
+        spoil: |rows, v, _| from_an_instant(rows, v, TIME, -v(Name::StepS)),
+    },
+    DataFault {
+        name: FaultName::Outliers,
+        meaning: "single rows far off",
+        parameters: &[
+            number(Name::Share, "of the rows", 0.0, 0.1, Value(0.002)),
+            number(Name::SizeArcsec, "of the largest", 0.0, 1e6, Value(600.0)),
+        ],
+        spoil: |rows, v, random| {
+            let (share, size) = (v(Name::Share), v(Name::SizeArcsec) / ARCSEC_PER_RAD);
+            for row in rows.iter_mut() {
+                if random.f64() < share {
+                    row[OUTPUT] += size * (0.5 + 0.5 * random.f64()) * if random.bool() { 1.0 } else { -1.0 };
+                }
+            }
+        },
+    },
+    DataFault {
+        name: FaultName::UnitMismatch,
+        meaning: "the output angle is in degrees and says radians",
+        parameters: &[],
+        spoil: |rows, _, _| rows.iter_mut().for_each(|row| row[OUTPUT] = row[OUTPUT].to_degrees()),
+    },
+    DataFault {
+        name: FaultName::Quantisation,
+        meaning: "a coarse output encoder",
+        parameters: &[number(Name::StepArcsec, "its step", 0.0, 1e5, Value(30.0))],
+        spoil: |rows, v, _| {
+            let step = (v(Name::StepArcsec) / ARCSEC_PER_RAD).max(1e-12);
+            rows.iter_mut().for_each(|row| row[OUTPUT] = (row[OUTPUT] / step).round() * step);
+        },
+    },
+    DataFault {
+        name: FaultName::Drift,
+        meaning: "a zero that moves with time",
+        parameters: &[number(Name::ArcsecPerHour, "how fast", -1e6, 1e6, Value(300.0))],
+        spoil: |rows, v, _| {
+            let first = rows.first().map_or(0.0, |row| row[TIME]);
+            let rate = v(Name::ArcsecPerHour) / 3600.0 / ARCSEC_PER_RAD;
+            rows.iter_mut().for_each(|row| row[OUTPUT] += rate * (row[TIME] - first));
+        },
+    },
+    DataFault {
+        name: FaultName::ReadJitter,
+        meaning: "the two angles are not read at one instant",
+        parameters: &[number(Name::JitterMs, "scatter of the time between them", 0.0, 100.0, Value(0.5))],
+        spoil: |rows, v, random| {
+            let jitter_s = 1e-3 * v(Name::JitterMs);
+            let speed =
+                |pair: &[[f64; 6]]| (pair[1][OUTPUT] - pair[0][OUTPUT]) / (pair[1][TIME] - pair[0][TIME]).max(1e-9);
+            let speeds: Vec<f64> = rows.windows(2).map(speed).collect();
+            for (row, speed) in rows.iter_mut().zip(speeds) {
+                row[OUTPUT] += jitter_s * gauss(random) * speed;
+            }
+        },
+    },
+    DataFault {
+        name: FaultName::Stalls,
+        meaning: "the logger stands still now and then, and its time counts on",
+        parameters: &[
+            number(Name::EveryRows, "after this number of rows", 2.0, 1e5, Value(50.0)),
+            number(Name::DurationS, "for how long", 0.0, 1e3, Value(0.05)),
+        ],
+        // Rows that are not written while it stands still, and a time that counts those that are.
+        spoil: |rows, v, _| {
+            let (every, lasts_s) = (v(Name::EveryRows) as usize, v(Name::DurationS));
+            let first = rows.first().map_or(0.0, |row| row[TIME]);
+            let (mut lost_s, mut since, mut last_s, mut until_s) = (0.0, 0, first, f64::NEG_INFINITY);
+            rows.retain_mut(|row| {
+                let time = row[TIME];
+                let written = time >= until_s;
+                if written {
+                    row[TIME] -= lost_s;
+                    since += 1;
+                    if since == every {
+                        (since, until_s) = (0, time + lasts_s);
+                    }
+                } else {
+                    lost_s += time - last_s;
+                }
+                last_s = time;
+                written
+            });
+        },
+    },
+    DataFault {
+        name: FaultName::CounterRestart,
+        meaning: "the count of the generator begins anew in the sessions after the first",
+        parameters: &[number(Name::Turns, "off by", -1e5, 1e5, Value(7.0))],
+        spoil: |rows, v, _| {
+            let usual = rows.windows(2).map(|pair| pair[1][TIME] - pair[0][TIME]).fold(f64::INFINITY, f64::min);
+            let gap = rows.windows(2).position(|pair| pair[1][TIME] - pair[0][TIME] > 20.0 * usual);
+            let from = gap.map_or(rows.len(), |gap| gap + 1);
+            rows[from..].iter_mut().for_each(|row| row[GENERATOR] += TAU * v(Name::Turns).round());
+        },
+    },
+    DataFault {
+        name: FaultName::PositionJump,
+        meaning: "the generator's angle leaps by whole turns",
+        parameters: &[number(Name::Turns, "by how many", -1e5, 1e5, Value(16.0)), INSTANT],
+        spoil: |rows, v, _| from_an_instant(rows, v, GENERATOR, TAU * v(Name::Turns).round()),
+    },
+];
+
+/// Adds to a column from the instant `time_s` on.
+fn from_an_instant(rows: &mut Cells, v: &dyn Fn(Name) -> f64, column: usize, more: f64) {
+    let from = v(Name::TimeS);
+    rows.iter_mut().filter(|row| row[TIME] >= from).for_each(|row| row[column] += more);
+}
 
 /// The rows as CSV text, with the faults among `effects` in them. `ratio` makes output angles of errors.
 #[must_use]
 pub fn to_csv(sessions: &[Session], ratio: f64, effects: &[Effect], random: &mut fastrand::Rng) -> String {
-    let mut rows: Vec<[f64; 6]> = Vec::new();
+    let mut rows = Cells::new();
     for session in sessions {
         let output = session.output_rad(ratio);
         let at = |column: &Option<Vec<f64>>, k: usize| column.as_ref().map_or(0.0, |values| values[k]);
@@ -35,8 +201,9 @@ pub fn to_csv(sessions: &[Session], ratio: f64, effects: &[Effect], random: &mut
         }));
     }
     for effect in effects {
-        if let Hidden::Fault(fault) = effect.definition.what {
-            spoil(&mut rows, fault, effect, random);
+        let of = |fault: &&DataFault| effect.definition.what == Hidden::Fault(fault.name);
+        if let Some(fault) = FAULTS.iter().find(of) {
+            (fault.spoil)(&mut rows, &|name| effect.value(name), random);
         }
     }
     let mut text = String::with_capacity(80 * rows.len());
@@ -48,122 +215,13 @@ pub fn to_csv(sessions: &[Session], ratio: f64, effects: &[Effect], random: &mut
             let _ = match k {
                 _ if !value.is_finite() => write!(text, "{comma}"),
                 TIME => write!(text, "{comma}{value:.6}"),
-                1 | OUTPUT => write!(text, "{comma}{value:.9}"),
+                GENERATOR | OUTPUT => write!(text, "{comma}{value:.9}"),
                 _ => write!(text, "{comma}{value:.4}"),
             };
         }
         text.push('\n');
     }
     text
-}
-
-fn spoil(rows: &mut Vec<[f64; 6]>, fault: FaultName, effect: &Effect, random: &mut fastrand::Rng) {
-    use ParameterName as Name;
-    let v = |name: Name| effect.value(name);
-    let first = rows.first().map_or(0.0, |row| row[TIME]);
-    match fault {
-        FaultName::EncoderIndexJump => {
-            let (time, size) = (v(Name::TimeS), v(Name::SizeArcsec) / ARCSEC_PER_RAD);
-            rows.iter_mut().filter(|row| row[TIME] >= time).for_each(|row| row[OUTPUT] += size);
-        }
-        FaultName::FrozenChannel => {
-            let (from, until) = (v(Name::TimeS), v(Name::TimeS) + v(Name::DurationS));
-            let channel = 1 + v(Name::Channel) as usize;
-            let mut held = None;
-            for row in rows.iter_mut().filter(|row| (from..until).contains(&row[TIME])) {
-                row[channel] = *held.get_or_insert(row[channel]);
-            }
-        }
-        FaultName::MissingSamples => {
-            let share = v(Name::Share);
-            rows.iter_mut().filter(|_| random.f64() < share).for_each(|row| row[OUTPUT] = f64::NAN);
-        }
-        FaultName::ClockError => {
-            let (time, step) = (v(Name::TimeS), v(Name::StepS));
-            rows.iter_mut().filter(|row| row[TIME] >= time).for_each(|row| row[TIME] -= step);
-        }
-        FaultName::Outliers => {
-            let (share, size) = (v(Name::Share), v(Name::SizeArcsec) / ARCSEC_PER_RAD);
-            for row in rows.iter_mut() {
-                if random.f64() < share {
-                    row[OUTPUT] += size * (0.5 + 0.5 * random.f64()) * if random.bool() { 1.0 } else { -1.0 };
-                }
-            }
-        }
-        FaultName::UnitMismatch => rows.iter_mut().for_each(|row| row[OUTPUT] = row[OUTPUT].to_degrees()),
-        FaultName::Quantisation => {
-            let step = (v(Name::StepArcsec) / ARCSEC_PER_RAD).max(1e-12);
-            rows.iter_mut().for_each(|row| row[OUTPUT] = (row[OUTPUT] / step).round() * step);
-        }
-        FaultName::Drift => {
-            let rate = v(Name::ArcsecPerHour) / 3600.0 / ARCSEC_PER_RAD;
-            rows.iter_mut().for_each(|row| row[OUTPUT] += rate * (row[TIME] - first));
-        }
-        FaultName::ReadJitter => {
-            let jitter_s = 1e-3 * v(Name::JitterMs);
-            let speeds: Vec<f64> = rows
-                .windows(2)
-                .map(|pair| (pair[1][OUTPUT] - pair[0][OUTPUT]) / (pair[1][TIME] - pair[0][TIME]).max(1e-9))
-                .collect();
-            for (row, speed) in rows.iter_mut().zip(speeds) {
-                row[OUTPUT] += jitter_s * gauss(random) * speed;
-            }
-        }
-        FaultName::Stalls => {
-            // Rows that are not written while it stands still, and a time that counts those that are.
-            let (every, lasts_s) = (v(Name::EveryRows) as usize, v(Name::DurationS));
-            let (mut kept, mut lost_s): (Vec<[f64; 6]>, f64) = (Vec::new(), 0.0);
-            let (mut since, mut last_s, mut until_s) = (0, first, f64::NEG_INFINITY);
-            for row in rows.iter() {
-                if row[TIME] < until_s {
-                    lost_s += row[TIME] - last_s;
-                } else {
-                    kept.push(*row);
-                    if let Some(kept) = kept.last_mut() {
-                        kept[TIME] -= lost_s;
-                    }
-                    since += 1;
-                    if since == every {
-                        (since, until_s) = (0, row[TIME] + lasts_s);
-                    }
-                }
-                last_s = row[TIME];
-            }
-            *rows = kept;
-        }
-        FaultName::CounterRestart => {
-            let usual = rows.windows(2).map(|pair| pair[1][TIME] - pair[0][TIME]).fold(f64::INFINITY, f64::min);
-            let gap = rows.windows(2).position(|pair| pair[1][TIME] - pair[0][TIME] > 20.0 * usual);
-            let from = gap.map_or(rows.len(), |gap| gap + 1);
-            rows[from..].iter_mut().for_each(|row| row[1] += TAU * v(Name::Turns).round());
-        }
-        FaultName::TorqueSign => rows.iter_mut().for_each(|row| row[TORQUE] = -row[TORQUE]),
-        FaultName::TorqueScale => rows.iter_mut().for_each(|row| row[TORQUE] *= v(Name::Factor)),
-        FaultName::TorqueZero => rows.iter_mut().for_each(|row| row[TORQUE] += v(Name::TorqueNM)),
-        FaultName::PositionJump => {
-            let (time, off) = (v(Name::TimeS), TAU * v(Name::Turns).round());
-            rows.iter_mut().filter(|row| row[TIME] >= time).for_each(|row| row[1] += off);
-        }
-        FaultName::AveragedRows => average(rows, 0.5 * v(Name::DurationS)),
-    }
-}
-
-/// Makes angles and torque of each row the mean of those about it, no farther than so long: over a gap no row reaches.
-fn average(rows: &mut [[f64; 6]], half_s: f64) {
-    let read = rows.to_vec();
-    let (mut from, mut to) = (0, 0);
-    for row in rows.iter_mut() {
-        let time = row[TIME];
-        while read[from][TIME] < time - half_s - 1e-9 {
-            from += 1;
-        }
-        while to < read.len() && read[to][TIME] <= time + half_s + 1e-9 {
-            to += 1;
-        }
-        for column in 1..=TORQUE {
-            row[column] = read[from..to].iter().map(|row| row[column]).sum::<f64>() / (to - from) as f64;
-        }
-    }
 }
 
 #[cfg(test)]
