@@ -59,7 +59,7 @@ use crate::causes::CauseName;
 use crate::measurement::Session;
 use crate::nominal::Nominal;
 use averaged::Averaged;
-use candidate::{Deviation, Excitation, Label, Law, Scales, library, line, unnamed};
+use candidate::{Excitation, Label, Law, Scales, library, line, unnamed};
 pub use explain::Explanation;
 pub use extended::{Extended, FittedCause, FittedLaw, Series, added_by};
 use model::{Problem, Term, terms_at};
@@ -302,7 +302,7 @@ impl<'a> Search<'a> {
             let (slow, found): (Vec<_>, Vec<_>) =
                 lines.into_iter().partition(|(line, _)| !remainder::averaged_away(&problem, line));
             for (line, size) in found {
-                let label = Label::Deviation(Deviation::Line { per: line.per, order: line.order });
+                let label = Label::Line { per: line.per, order: line.order };
                 if fast.iter().all(|(known, _)| known.to_string() != label.to_string()) {
                     trace.say(&format_args!("{label}: {size:.2} arcsec, too fast for averages"));
                     fast.push((label, size));

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use super::candidate::{Deviation, Label, Law, Per, standing_pitch_error};
+use super::candidate::{Label, Law, Per, standing_pitch_error};
 use super::channels::{RatioProposal, proposed_ratio};
 use super::model::{Problem, Term};
 use super::noise::Noise;
@@ -292,7 +292,7 @@ impl Unnamed {
         let left = left_over.iter().map(|left| (hidden(&left.looks_like), left.size_arcsec));
         let all: Vec<(Option<Label>, f64)> = terms.chain(left).collect();
         let in_time = |label: Option<Label>| match label {
-            Some(Label::Deviation(Deviation::Line { per: Per::Second, order })) => Some(order),
+            Some(Label::Line { per: Per::Second, order }) => Some(order),
             _ => None,
         };
         Unnamed {

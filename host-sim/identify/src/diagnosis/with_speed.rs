@@ -3,7 +3,7 @@
 //! comes to that of the load on its spring. Less of it in fast motion speaks against no encoder: a reading that is
 //! averaged, or whose instant scatters, smears its lines.
 
-use super::candidate::{Deviation, Label, Per};
+use super::candidate::{Label, Per};
 use super::channels::BLOCKS;
 use super::model::Problem;
 use super::remainder::explained;
@@ -73,13 +73,13 @@ pub(super) const NO_GROWTH: f64 = CERTAIN;
 /// The order of the generator's angle that a term without a name, or a cause that is one line of it, stands for.
 pub(super) fn order_of(label: Label, known: Option<&Known>) -> Option<f64> {
     match label {
-        Label::Deviation(Deviation::Line { per: Per::GeneratorTurn, order }) if order >= 1.0 => Some(order),
+        Label::Line { per: Per::GeneratorTurn, order } if order >= 1.0 => Some(order),
         Label::Cause(CauseName::GeneratorEncoderTilt) => Some(2.0),
         Label::Cause(CauseName::EncoderSubdivision) => {
             let of = |name: ParameterName| known?.parameters.get(name.as_str()).map(|parameter| parameter.value);
             (of(ParameterName::Encoder) == Some(0.0)).then(|| of(ParameterName::Harmonic)).flatten()
         }
-        Label::Cause(_) | Label::Deviation(_) => None,
+        Label::Cause(_) | Label::Line { .. } | Label::Like(_) => None,
     }
 }
 

@@ -3,32 +3,24 @@
 
 use super::geometry::{Angle, waves};
 use super::stiffness::follow;
-use super::{Deviation, Excitation, Label, Law, Per, Role, Shape, by_row, lagged, main};
+use super::{Excitation, Label, Law, Per, Role, Shape, by_row, lagged, main};
 use crate::causes::ParameterName as Name;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
-/// Lost motion and the coupling, as they are called.
-const LASH_BEFORE_THE_GENERATOR: &str = "lost motion before the generator";
-const COUPLING_BEFORE_THE_GENERATOR: &str = "a coupling before the generator that gives way";
-/// Offsets that go with the speed or the direction alone.
-const WITH_SPEED_MAGNITUDE: &str = "offset with the magnitude of speed";
-const WITH_SPEED_SQUARED: &str = "offset with speed squared";
-const WITH_SPEED_SQUARED_BY_DIRECTION: &str = "offset with speed squared, by direction";
-const BY_DIRECTION: &str = "offset by direction";
-const OF_SPEED: &str = "a function of speed";
-
 fn law(name: &'static str, values: impl Fn(&Excitation<'_>, usize) -> f64 + Send + Sync + 'static) -> Law {
-    Law::new(name, move |on, _| {
-        let column = by_row(on, |k| values(on, k));
-        let size = super::super::rows::rms(&column).max(1e-12);
-        vec![main(column.into_iter().map(|v| v / size).collect(), 20.0)]
-    })
+    Law::new(name, move |on, _| vec![main(of_unit_size(by_row(on, |k| values(on, k))), 20.0)])
+}
+
+/// The column over its root mean square.
+fn of_unit_size(column: Vec<f64>) -> Vec<f64> {
+    let size = super::super::rows::rms(&column).max(1e-12);
+    column.into_iter().map(|v| v / size).collect()
 }
 
 /// Lost motion before the generator, as of an Oldham coupling: whatever the load, the output lags by half of it either
 /// way.
 fn lash_before_the_generator() -> Law {
-    Law::new(LASH_BEFORE_THE_GENERATOR, |on, shape| {
+    Law::new("lost motion before the generator", |on, shape| {
         let half_rad = shape.of(Name::HalfLashArcsec) * on.nominal.ratio.abs() / ARCSEC_PER_RAD;
         let mut held = vec![0.0; on.rows.len()];
         for session in &on.rows.sessions {
@@ -46,17 +38,13 @@ fn lash_before_the_generator() -> Law {
 fn coupling_before_the_generator() -> Law {
     const LOAD: Role = Role("load");
     const FRICTION: Role = Role("friction");
-    Law::new(COUPLING_BEFORE_THE_GENERATOR, |on, _| {
+    Law::new("a coupling before the generator that gives way", |on, _| {
         let forward = on.nominal.ratio.signum();
-        let unit = |column: Vec<f64>| -> Vec<f64> {
-            let size = super::super::rows::rms(&column).max(1e-12);
-            column.into_iter().map(|v| v / size).collect()
-        };
         // Of the generator, it holds back what the output is turned on by.
-        let held_back = |values: &dyn Fn(usize) -> f64| unit(by_row(on, |k| -forward * values(k)));
+        let held_back = |values: &dyn Fn(usize) -> f64| of_unit_size(by_row(on, |k| -forward * values(k)));
         let gathers = super::sensor::rate(on, &on.rows.speed);
         vec![
-            main(unit(by_row(on, |k| on.rows.torque[k])), 20.0).called(LOAD),
+            main(of_unit_size(by_row(on, |k| on.rows.torque[k])), 20.0).called(LOAD),
             main(held_back(&|k| on.rows.direction[k]), 10.0).called(FRICTION),
             main(held_back(&|k| on.rows.speed[k]), 10.0),
             main(held_back(&|k| gathers[k]), 5.0),
@@ -70,7 +58,7 @@ fn coupling_before_the_generator() -> Law {
 fn creep_under_load() -> Law {
     Law::new("creep under load", |on, _| {
         let late = |lasts_s: f64| {
-            let reached = lagged(on, &on.base.wind_up, lasts_s);
+            let reached = lagged(on, &on.base.wind_up, lasts_s, false);
             main(by_row(on, |k| reached[k] - on.base.wind_up[k]), 0.3)
         };
         [1.0, 10.0, 100.0, 1000.0].into_iter().map(late).collect()
@@ -92,7 +80,7 @@ fn zero_of_each_session() -> Law {
 /// A line at any order of an angle or of time: `per` is what it is counted against.
 #[must_use]
 pub fn line(per: Per, order: f64) -> Law {
-    let label = Label::Deviation(Deviation::Line { per, order });
+    let label = Label::Line { per, order };
     let of_angle = |of: Angle| Law::new(label, move |on, _| waves(on, of, order).map(|wave| main(wave, 15.0)).into());
     match per {
         Per::GeneratorTurn => return of_angle(Angle::Generator),
@@ -127,14 +115,16 @@ pub(crate) fn unnamed(on: &Excitation<'_>) -> Vec<Law> {
         laws.push(law("settling since the session began (exponential, 20 s)", |on, k| {
             (-on.rows.since[k] / 20.0).exp()
         }));
-        laws.push(law(WITH_SPEED_MAGNITUDE, |on, k| on.rows.speed[k].abs()));
-        laws.push(law(WITH_SPEED_SQUARED, |on, k| on.rows.speed[k].powi(2)));
-        laws.push(law(WITH_SPEED_SQUARED_BY_DIRECTION, |on, k| on.rows.speed[k].powi(2) * on.rows.direction[k]));
+        laws.push(law("offset with the magnitude of speed", |on, k| on.rows.speed[k].abs()));
+        laws.push(law("offset with speed squared", |on, k| on.rows.speed[k].powi(2)));
+        laws.push(law("offset with speed squared, by direction", |on, k| {
+            on.rows.speed[k].powi(2) * on.rows.direction[k]
+        }));
     }
     if rows.sessions_used().count() > 2 {
         laws.push(zero_of_each_session());
     }
-    laws.push(law(BY_DIRECTION, |on, k| on.rows.direction[k]));
+    laws.push(law("offset by direction", |on, k| on.rows.direction[k]));
     laws.push(lash_before_the_generator());
     if on.scales.load > 0.0 {
         laws.push(law("offset with the magnitude of torque", |on, k| on.rows.torque[k].abs()));
@@ -210,7 +200,7 @@ pub(crate) fn maps(on: &Excitation<'_>) -> Vec<Law> {
         }
     }
     if rows.recorded.time {
-        maps.push(map(OF_SPEED, vec![(rows.speed.clone(), 12)]));
+        maps.push(map("a function of speed", vec![(rows.speed.clone(), 12)]));
         if on.scales.load > 0.0 {
             let both = vec![(rows.torque.clone(), 6), (rows.time.clone(), 4)];
             maps.push(map("a function of torque and time", both));

@@ -5,25 +5,18 @@ use std::fmt;
 use crate::causes::{CauseName, Kin};
 
 /// The subject of a law.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub enum Label {
     /// A cause of the library.
     Cause(CauseName),
-    /// Something that has no cause in the library.
-    Deviation(Deviation),
-}
-
-/// A deviation without a cause.
-#[derive(Clone, Copy, Debug)]
-pub enum Deviation {
-    /// A line at any order.
+    /// A deviation without a cause: a line at any order.
     Line {
         /// What it is counted against.
         per: Per,
         /// Periods in that.
         order: f64,
     },
-    /// What it looks like.
+    /// A deviation without a cause, in the words of a report.
     Like(&'static str),
 }
 
@@ -38,44 +31,23 @@ pub enum Per {
     Second,
 }
 
-impl fmt::Display for Per {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Per::GeneratorTurn => "generator turn",
-            Per::OutputTurn => "output turn",
-            Per::Second => "second",
-        })
-    }
-}
-
-impl PartialEq for Deviation {
-    /// Lines whose orders read the same are the same line.
-    fn eq(&self, other: &Deviation) -> bool {
-        match (self, other) {
-            (Deviation::Line { per: a, .. }, Deviation::Line { per: b, .. }) => {
-                a == b && self.to_string() == other.to_string()
-            }
-            (Deviation::Like(a), Deviation::Like(b)) => a == b,
-            (Deviation::Line { .. }, Deviation::Like(_)) | (Deviation::Like(_), Deviation::Line { .. }) => false,
-        }
-    }
-}
-
-impl fmt::Display for Deviation {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Deviation::Line { per, order } => f.pad(&format!("line of {order:.4} per {per}")),
-            Deviation::Like(text) => f.pad(text),
-        }
-    }
-}
-
 impl fmt::Display for Label {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Label::Cause(cause) => cause.fmt(f),
-            Label::Deviation(deviation) => deviation.fmt(f),
-        }
+        let (order, per) = match self {
+            Label::Cause(cause) => return cause.fmt(f),
+            Label::Like(text) => return f.pad(text),
+            Label::Line { per: Per::GeneratorTurn, order } => (order, "generator turn"),
+            Label::Line { per: Per::OutputTurn, order } => (order, "output turn"),
+            Label::Line { per: Per::Second, order } => (order, "second"),
+        };
+        f.pad(&format!("line of {order:.4} per {per}"))
+    }
+}
+
+impl PartialEq for Label {
+    /// Those that read the same are the same: so lines of nearly the same order.
+    fn eq(&self, other: &Label) -> bool {
+        self.to_string() == other.to_string()
     }
 }
 
@@ -87,7 +59,7 @@ impl From<CauseName> for Label {
 
 impl From<&'static str> for Label {
     fn from(like: &'static str) -> Label {
-        Label::Deviation(Deviation::Like(like))
+        Label::Like(like)
     }
 }
 
@@ -97,15 +69,12 @@ impl Label {
     pub const fn cause(self) -> Option<CauseName> {
         match self {
             Label::Cause(cause) => Some(cause),
-            Label::Deviation(_) => None,
+            Label::Line { .. } | Label::Like(_) => None,
         }
     }
 
-    /// What its misfit may be taken for.
+    /// The laws that its misfit resembles.
     pub(super) fn kin(self) -> Kin {
-        match self {
-            Label::Cause(cause) => cause.spec().kin,
-            Label::Deviation(_) => Kin::Unlike,
-        }
+        self.cause().map_or(Kin::Unlike, |cause| cause.spec().kin)
     }
 }

@@ -36,7 +36,7 @@ use flexspline_base::robust::least_and_most;
 pub(crate) use among::{Acting, Among, Zones, left_by, together};
 pub(crate) use generic::{line, maps, unnamed};
 pub(crate) use geometry::standing_pitch_error;
-pub(crate) use label::{Deviation, Label, Per};
+pub(crate) use label::{Label, Per};
 pub use named::{Coefficients, Role, Shaped};
 pub(crate) use simulated::{Simulated, Values, added};
 
