@@ -4,8 +4,8 @@ pub(crate) use super::parameter::{ARCSECONDS, ENCODERS, HALF_LOAD, HARMONIC, WHE
 pub(crate) use super::{CauseName, Factor, InTable, Kin, Multiple, Need, Parameter, TIME, Turn, Usual, number};
 
 use super::ParameterName as Name;
-use crate::diagnosis::candidate::{Excitation, Simulated, Values};
-use crate::extension::DriveField;
+use crate::diagnosis::candidate::{Excitation, Law, Simulated, Values};
+use crate::extension::Placing;
 
 /// The properties of a cause.
 pub(crate) struct CauseSpec {
@@ -15,8 +15,6 @@ pub(crate) struct CauseSpec {
     pub words: &'static str,
     /// Its effect on the error, in a few words.
     pub does: &'static str,
-    /// The physical defect, as the list of effects to synthesize describes it.
-    pub meaning: &'static str,
     /// The laws that its misfit resembles.
     pub kin: Kin,
     /// The conditions that data have to meet before it is considered.
@@ -25,8 +23,8 @@ pub(crate) struct CauseSpec {
     pub orders: &'static [(Turn, Multiple)],
     /// Whether a table can hold it.
     pub in_table: InTable,
-    /// The field of a drive file that holds it, if one does.
-    pub drive_field: Option<DriveField>,
+    /// Sets the fields of a drive file that hold it; nothing where none does.
+    pub place: fn(&mut Placing<'_>),
     /// Its parameters as they may be given, under the names that the diagnosis reports.
     pub parameters: &'static [Parameter],
     /// Pairs of parameters of which one follows from the other, with the factor from the first to the second.
@@ -37,6 +35,8 @@ pub(crate) struct CauseSpec {
     /// Whether something outside the library makes the same error, whatever is recorded: a shaft that is bent or
     /// misaligned before the output's encoder makes two waves in a turn, as a tilted encoder does.
     pub double_outside: bool,
+    /// The models of it that are fitted to these rows.
+    pub laws: fn(&Excitation<'_>) -> Vec<Law>,
     /// The cause with known parameters, as its law makes it.
     pub simulated: fn(&Excitation<'_>, Values<'_>) -> Simulated,
 }
@@ -47,16 +47,16 @@ pub(crate) const fn plain() -> CauseSpec {
         name: "",
         words: "",
         does: "",
-        meaning: "",
         kin: Kin::Unlike,
         needs: &[],
         orders: &[],
         in_table: InTable::Yes,
-        drive_field: None,
+        place: |_| {},
         parameters: &[],
         twins: &[],
         made_by_loads: false,
         double_outside: false,
+        laws: |_| Vec::new(),
         simulated: |_, _| unreachable!("each cause has its own"),
     }
 }

@@ -10,7 +10,7 @@ use flexspline::Table;
 
 use super::averaged::Averaged;
 use super::base::{Base, PlayLaw};
-use super::candidate::{Acting, Column, Excitation, Law, Role, Scales, Tolerance, library, together, whole_library};
+use super::candidate::{Acting, Column, Excitation, Law, Role, Scales, Tolerance, library, together};
 use super::model::{Problem, Scaffold, terms_at};
 use super::noise::Whitener;
 use super::report::Parameter;
@@ -77,7 +77,7 @@ pub fn added_by(fitted: &[(CauseName, &FittedLaw)], sessions: &[Session], nomina
         let nominal = first.nominal(nominal);
         let base = Base::with_play(&rows, &nominal, None, first.play);
         let on = Excitation::new(&rows, &nominal, &base, &first.scales);
-        let laws = whole_library(&on);
+        let laws: Vec<Law> = causes.iter().flat_map(|(name, _)| (name.spec().laws)(&on)).collect();
         let acting = causes.iter().map(|(name, fit)| fit.acting(*name, &on, &laws)).collect::<Option<Vec<_>>>()?;
         for (cause, columns) in acting.iter().zip(together(&on, &acting)) {
             add_part(&mut added, &columns, &cause.coefficients);

@@ -629,14 +629,17 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
 
     fn begin_alone(&self, law: &Law) -> Vec<Vec<f64>> {
         let tried = law.tried();
-        let Some(lead) = &law.search.lead else { return tried };
+        if law.search.lead.is_none() {
+            return tried;
+        }
         let problem = self.problem;
         let least = LOADED * problem.on.scales.load;
         let mask: Vec<bool> = problem
             .whitener
             .average(&problem.on.rows.torque)
             .iter()
-            .map(|torque| !lead.loaded_only || torque.abs() > least)
+            // A load decides which flank carries: its lead holds where the recorded one leaves no doubt about that.
+            .map(|torque| !law.is_load() || torque.abs() > least)
             .collect();
         let some = mask.iter().filter(|m| **m).count() > mask.len() / 10;
         let masked = |column: &[f64]| -> Vec<f64> {

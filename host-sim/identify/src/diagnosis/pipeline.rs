@@ -18,8 +18,8 @@ use flexspline::{ImageError, Table};
 use serde::Serialize;
 use thiserror::Error;
 
-use super::report::{Compensation, Diagnosis};
-use super::{CauseSet, DiagnosisError, Extended, Settings, diagnose_extended};
+use super::report::{Cause, Compensation, Diagnosis};
+use super::{CauseSet, DiagnosisError, Extended, FittedCause, Settings, diagnose_extended};
 use super::{blurred, channels, quieted, torque_zero, zeros};
 use crate::causes::CauseName;
 use crate::extension::{
@@ -333,7 +333,8 @@ pub fn diagnose_rows(
     let causes: Vec<CauseName> = diagnosis.causes.iter().map(|cause| cause.name).collect();
     let remake = |fitted: &Extended| -> Result<Option<Vec<u8>>, RemakeError> {
         let Some(make) = options.remake else { return Ok(None) };
-        let entries: Vec<CauseEntry> = fitted.causes().iter().map(CauseEntry::of_fitted).collect();
+        let of = |cause: &FittedCause| CauseEntry::of(cause.name(), &cause.parameters);
+        let entries: Vec<CauseEntry> = fitted.causes().iter().map(of).collect();
         let found = found_geometry(&subject.drive, fitted, &entries, (nominal, table), tables.orientation_rad)?;
         Ok(remade(make, subject, &found, options.mesh)?.map(|made| made.image))
     };
@@ -472,7 +473,8 @@ impl Diagnosed {
         extension: &mut Extension,
     ) -> Result<FoundGeometry, PipelineError> {
         let of = subject.against();
-        let causes: Vec<CauseEntry> = self.diagnosis.causes.iter().map(CauseEntry::of).collect();
+        let entry = |cause: &Cause| CauseEntry::of(cause.name, &cause.parameters);
+        let causes: Vec<CauseEntry> = self.diagnosis.causes.iter().map(entry).collect();
         let found = found_geometry(&subject.drive, &self.extended, &causes, of, tables.orientation_rad)?;
         if !found.mapped.iter().any(|mapped| mapped.by_angle) {
             return Ok(found);

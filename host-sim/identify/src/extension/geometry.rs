@@ -17,6 +17,7 @@
 use std::f64::consts::{PI, TAU};
 
 use flexspline::Table;
+use num_complex::Complex;
 
 use super::model::CauseEntry;
 use crate::causes::{CauseName, ParameterName as Name};
@@ -59,37 +60,12 @@ pub(crate) struct FoundGeometry {
     pub rest: Vec<CauseEntry>,
 }
 
-/// A complex number, `z = 2 mean(e exp(i k x))`: `A cos(k x - p)` has `A exp(i p)`.
-#[derive(Clone, Copy, Debug, Default)]
-struct Wave {
-    re: f64,
-    im: f64,
-}
+/// A wave `A cos(k x - p)` as `z = 2 mean(e exp(i k x)) = A exp(i p)`.
+type Wave = Complex<f64>;
 
-impl Wave {
-    fn of(error: &[f64], angle: impl Fn(usize) -> f64, order: f64) -> Wave {
-        let n = error.len().max(1) as f64;
-        error.iter().enumerate().fold(Wave::default(), |sum, (k, e)| {
-            let (sin, cos) = (order * angle(k)).sin_cos();
-            Wave { re: sum.re + 2.0 / n * e * cos, im: sum.im + 2.0 / n * e * sin }
-        })
-    }
-    fn turned(self, angle: f64) -> Wave {
-        let (sin, cos) = angle.sin_cos();
-        Wave { re: self.re * cos - self.im * sin, im: self.re * sin + self.im * cos }
-    }
-    fn plus(self, other: Wave) -> Wave {
-        Wave { re: self.re + other.re, im: self.im + other.im }
-    }
-    fn times(self, factor: f64) -> Wave {
-        Wave { re: self.re * factor, im: self.im * factor }
-    }
-    fn size(self) -> f64 {
-        self.re.hypot(self.im)
-    }
-    fn phase(self) -> f64 {
-        self.im.atan2(self.re)
-    }
+fn wave_of(error: &[f64], angle: impl Fn(usize) -> f64, order: f64) -> Wave {
+    let n = error.len().max(1) as f64;
+    error.iter().enumerate().map(|(k, e)| Wave::cis(order * angle(k)) * (2.0 / n * e)).sum()
 }
 
 /// What a cause adds under the probing load on either flank, over a turn of the output.
@@ -130,34 +106,26 @@ impl Probe {
     /// Projection of a cause on an order of the angle on the flexspline or the circular spline.
     fn wave(&self, cause: usize, on_circular_spline: bool, order: f64) -> [Wave; 2] {
         let share = if on_circular_spline { 1.0 - 1.0 / self.ratio } else { 1.0 };
-        [0, 1].map(|flank| Wave::of(&self.error[flank][cause], |k| share * self.generator[k], order))
+        [0, 1].map(|flank| wave_of(&self.error[flank][cause], |k| share * self.generator[k], order))
     }
 }
 
 /// `A exp(2 i d)` of what is displaced towards `d`; `a` is the flank angle.
 fn displaced([plus, minus]: [Wave; 2], a: f64) -> Wave {
     let second = 4.0 / (3.0 * PI);
-    plus.turned(2.0 * a).plus(minus.turned(-2.0 * a).times(-1.0)).times(0.5 / second)
+    (plus * Wave::cis(2.0 * a) - minus * Wave::cis(-2.0 * a)) * (0.5 / second)
 }
 
 /// `A exp(2 i c)` of an oval with a crest at `c`; `a` is the flank angle.
 fn oval([plus, minus]: [Wave; 2], a: f64) -> Wave {
     let tan = a.tan();
     // Least squares of z = A exp(2 i c) (i/2 +- tan a) on both flanks.
-    let part = |z: Wave, sign: f64| z.turned(-PI / 2.0).times(0.5).plus(z.times(sign * tan));
-    part(plus, 1.0).plus(part(minus, -1.0)).times(0.5 / (0.25 + tan * tan))
+    let part = |z: Wave, sign: f64| z * Wave::cis(-PI / 2.0) * 0.5 + z * (sign * tan);
+    (part(plus, 1.0) + part(minus, -1.0)) * (0.5 / (0.25 + tan * tan))
 }
 
 fn degrees(phase: f64) -> f64 {
     phase.to_degrees().rem_euclid(360.0)
-}
-
-/// How a drive file holds a cause.
-pub(crate) struct DriveField {
-    /// Whether it depends on where the drive stands in its turns: its place is read from what the cause adds.
-    pub by_angle: bool,
-    /// Sets the fields; none where the drive holds nothing of it.
-    pub set: fn(&mut Placing<'_>),
 }
 
 /// A cause on its way into a drive.
@@ -167,8 +135,10 @@ pub(crate) struct Placing<'a> {
     nominal: &'a Nominal,
     cause: &'a CauseEntry,
     probe: &'a Probe,
-    /// Which of the causes of the probe it is.
-    at: usize,
+    /// Which of the causes of the probe it is, if it is one.
+    at: Option<usize>,
+    /// Whether its size and place are read from the probe: they depend on where the drive stands in its turns.
+    by_angle: bool,
     /// Whether the drive stays at one angle against gravity.
     at_one_orientation: bool,
     /// The fields that were set, `path = value`.
@@ -186,6 +156,12 @@ fn um(arcsec: f64, radius_mm: f64) -> f64 {
 }
 
 impl Placing<'_> {
+    /// Which of the causes of the probe it is, for what is read from it.
+    fn in_probe(&mut self) -> Option<usize> {
+        self.by_angle = true;
+        self.at
+    }
+
     fn value(&self, name: Name) -> Option<f64> {
         self.cause.parameters.get(name.as_str()).copied()
     }
@@ -214,10 +190,11 @@ impl Placing<'_> {
         radius_mm: f64,
         [size, phase]: [&str; 2],
     ) {
+        let Some(at) = self.in_probe() else { return };
         let flank_angle_rad = self.drive.circular_spline.bearing_flank_angle_rad();
-        let wave = read(self.probe.wave(self.at, on_circular_spline, 2.0), flank_angle_rad);
-        self.set(size, |_| rounded(um(wave.size(), radius_mm)));
-        self.set(phase, |_| rounded(degrees(0.5 * wave.phase())));
+        let wave = read(self.probe.wave(at, on_circular_spline, 2.0), flank_angle_rad);
+        self.set(size, |_| rounded(um(wave.norm(), radius_mm)));
+        self.set(phase, |_| rounded(degrees(0.5 * wave.arg())));
     }
 
     /// An offset of the circular spline in a fixed direction, if the drive stays at one angle against gravity.
@@ -242,6 +219,7 @@ impl Placing<'_> {
 
     /// Harmonics of the pitch of a wheel.
     pub(crate) fn set_pitch_harmonics(&mut self, wheel: Wheel) {
+        let Some(at) = self.in_probe() else { return };
         let on_circular_spline = wheel == Wheel::CircularSpline;
         let (f, c, built) = (&self.drive.flexspline, &self.drive.circular_spline, &mut self.found.as_built);
         let (field, list, radius, sign) = if on_circular_spline {
@@ -253,11 +231,11 @@ impl Placing<'_> {
         };
         // Two lobes that share the load alike cancel odd orders; their size says nothing of the wheel.
         for order in [2_u32, 4, 6] {
-            let [plus, minus] = self.probe.wave(self.at, on_circular_spline, f64::from(order));
-            let wave = plus.plus(minus).times(0.5 * sign);
-            let amplitude_um = rounded(um(wave.size(), radius));
+            let [plus, minus] = self.probe.wave(at, on_circular_spline, f64::from(order));
+            let wave = (plus + minus) * (0.5 * sign);
+            let amplitude_um = rounded(um(wave.norm(), radius));
             if amplitude_um >= 0.1 {
-                let phase_deg = rounded(degrees(wave.phase() / f64::from(order)));
+                let phase_deg = rounded(degrees(wave.arg() / f64::from(order)));
                 self.fields.push(format!(
                     "as_built.{field}: order = {order}, amplitude_um = {amplitude_um}, phase_deg = {phase_deg}"
                 ));
@@ -268,6 +246,7 @@ impl Placing<'_> {
 
     /// A damaged tooth, on the flanks on which the data show it.
     pub(crate) fn set_damaged_tooth(&mut self) {
+        let Some(at) = self.in_probe() else { return };
         let [tooth, wheel, depth] = [Name::Tooth, Name::Wheel, Name::DepthUm].map(|name| self.value(name));
         let (Some(tooth), Some(wheel), Some(depth)) = (tooth, wheel, depth) else { return };
         let (wheel, teeth) = match wheel < 0.5 {
@@ -275,9 +254,8 @@ impl Placing<'_> {
             false => (Wheel::CircularSpline, self.drive.circular_spline.teeth),
         };
         // Under a positive load the clockwise flanks of the flexspline bear, and the others of the circular spline.
-        let felt = [0, 1].map(|flank: usize| {
-            self.probe.error[flank][self.at].iter().fold(0.0, |most: f64, error| most.max(error.abs()))
-        });
+        let felt = [0, 1]
+            .map(|flank: usize| self.probe.error[flank][at].iter().fold(0.0, |most: f64, error| most.max(error.abs())));
         let flank = match (felt[0] > felt[1]) == (wheel == Wheel::Flexspline) {
             _ if felt[0].min(felt[1]) > 0.5 * felt[0].max(felt[1]) => DamagedFlank::Both,
             true => DamagedFlank::Minus,
@@ -346,18 +324,6 @@ impl Placing<'_> {
     }
 }
 
-impl DriveField {
-    /// Of what depends on where the drive stands.
-    pub(crate) const fn by_angle(set: fn(&mut Placing<'_>)) -> Option<DriveField> {
-        Some(DriveField { by_angle: true, set })
-    }
-
-    /// Of what is the same everywhere.
-    pub(crate) const fn throughout(set: fn(&mut Placing<'_>)) -> Option<DriveField> {
-        Some(DriveField { by_angle: false, set })
-    }
-}
-
 /// Puts the causes that are geometry into a drive.
 ///
 /// # Errors
@@ -376,23 +342,26 @@ pub(crate) fn found_geometry(
     let (mut mapped, mut rest) = (Vec::new(), Vec::new());
     for cause in causes {
         let at = extended.causes().iter().position(|fitted| fitted.name() == cause.name);
-        let mut fields = Vec::new();
-        let field = cause.name.spec().drive_field.as_ref();
-        // What depends on the angle is read from what the data show.
-        if let Some(field) = field.filter(|field| at.is_some() || !field.by_angle) {
-            let (at, at_one_orientation) = (at.unwrap_or(0), orientation_rad.is_some());
-            let (probe, found) = (&probe, &mut found);
-            let mut placing = Placing { drive, found, nominal, cause, probe, at, at_one_orientation, fields };
-            (field.set)(&mut placing);
-            fields = placing.fields;
-        }
+        let mut placing = Placing {
+            drive,
+            found: &mut found,
+            nominal,
+            cause,
+            probe: &probe,
+            at,
+            by_angle: false,
+            at_one_orientation: orientation_rad.is_some(),
+            fields: Vec::new(),
+        };
+        (cause.name.spec().place)(&mut placing);
+        let Placing { fields, by_angle, .. } = placing;
         let b = &found.as_built;
         let displaced = [b.circular_spline_eccentricity_um, b.flexspline_runout_um, b.circular_spline_offset_um];
         let largest = displaced.into_iter().fold(b.circular_spline_ovality_um, f64::max);
         if fields.is_empty() || largest > LARGEST_UM {
             rest.push(cause.clone());
         } else {
-            mapped.push(Mapped { cause: cause.name, fields, by_angle: field.is_some_and(|field| field.by_angle) });
+            mapped.push(Mapped { cause: cause.name, fields, by_angle });
         }
     }
     if !mapped.is_empty() {
@@ -486,17 +455,17 @@ mod tests {
     /// Errors by the closed forms above, over a turn of the output.
     fn waves(error: impl Fn(f64, f64) -> f64, order: f64) -> [Wave; 2] {
         let x = |k: usize| TAU * k as f64 / 720.0;
-        [1.0, -1.0].map(|flank| Wave::of(&(0..720).map(|k| error(x(k), flank)).collect::<Vec<f64>>(), x, order))
+        [1.0, -1.0].map(|flank| wave_of(&(0..720).map(|k| error(x(k), flank)).collect::<Vec<f64>>(), x, order))
     }
 
     #[test]
     fn size_and_place_come_back_from_the_closed_forms() {
         let a = 0.4;
         let wave = displaced(waves(|x, flank| -flank * 30.0 * (x - 0.7 + flank * a).sin().abs(), 2.0), a);
-        assert!((wave.size() - 30.0).abs() < 0.01 && (0.5 * wave.phase() - 0.7).abs() < 1e-3, "{wave:?}");
+        assert!((wave.norm() - 30.0).abs() < 0.01 && (0.5 * wave.arg() - 0.7).abs() < 1e-3, "{wave:?}");
         let two = |x: f64| 2.0 * (x - 0.4);
         let wave = oval(waves(|x, flank| 20.0 * (0.5 * two(x).sin() + flank * a.tan() * two(x).cos()), 2.0), a);
-        assert!((wave.size() - 20.0).abs() < 0.01 && (0.5 * wave.phase() - 0.4).abs() < 1e-3, "{wave:?}");
+        assert!((wave.norm() - 20.0).abs() < 0.01 && (0.5 * wave.arg() - 0.4).abs() < 1e-3, "{wave:?}");
     }
 
     /// The FEM of a drive that is known, read by the same formulas: signs and places of every field.
@@ -507,7 +476,7 @@ mod tests {
         type Read = fn([Wave; 2], f64) -> Wave;
         const PARTS: usize = 5;
         fn whole([plus, minus]: [Wave; 2], _: f64) -> Wave {
-            plus.plus(minus).times(0.5)
+            (plus + minus) * 0.5
         }
         let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
         // Half a turn of the wave on the part, in as few places as tell the second order from the fourth and sixth.
@@ -587,7 +556,7 @@ mod tests {
                     d.as_built.circular_spline_pitch_harmonics =
                         vec![Harmonic { order: 2, amplitude_um: 5.0, phase_deg: 50.0 }];
                 },
-                |waves, a| whole(waves, a).times(-1.0),
+                |waves, a| -whole(waves, a),
                 true,
                 49.05,
                 5.0,
@@ -602,11 +571,11 @@ mod tests {
             let found = [0, 1].map(|flank| {
                 let ideal = &ideal[usize::from(on_circular_spline)][flank];
                 let beyond: Vec<f64> = found[flank].iter().zip(ideal).map(|(built, ideal)| built - ideal).collect();
-                Wave::of(&beyond, |k| share * psi(k, share), 2.0)
+                wave_of(&beyond, |k| share * psi(k, share), 2.0)
             });
             let wave = read(found, drive.circular_spline.bearing_flank_angle_rad());
-            let size = 1e3 * wave.size() / ARCSEC_PER_RAD * radius;
-            let place = (0.5 * wave.phase()).to_degrees().rem_euclid(180.0);
+            let size = 1e3 * wave.norm() / ARCSEC_PER_RAD * radius;
+            let place = (0.5 * wave.arg()).to_degrees().rem_euclid(180.0);
             println!("{what}: {size:.3} um at {place:.2} degrees, made {size_um} at {place_deg}");
             assert!((size / size_um - 1.0).abs() < 0.15, "{what}: {size} um of {size_um}");
             assert!((place - place_deg).abs() < 7.0, "{what}: at {place} degrees of {place_deg}");

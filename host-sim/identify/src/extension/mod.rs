@@ -17,6 +17,6 @@ pub use compensation::{
     Compensated, Evaluation, EvaluationError, LEAST_SHARE_IMPROVED, NotApplied, Remake, RemakeError, evaluate,
     left_by_core, split,
 };
-pub(crate) use geometry::{Agreement, DriveField, FoundGeometry, check_by_fem, found_geometry};
+pub(crate) use geometry::{Agreement, FoundGeometry, Placing, check_by_fem, found_geometry};
 pub use model::{CauseEntry, Model, causes_in, causes_to_toml};
 pub(crate) use sampled::{ExtendedTables, TableSubject};

@@ -25,7 +25,7 @@ use crate::diagnosis::base::PlayLaw;
 use crate::diagnosis::candidate::Scales;
 use crate::diagnosis::prepare::Jump;
 use crate::diagnosis::report::{Cause, Diagnosis, Parameter};
-use crate::diagnosis::{Extended, FittedCause, FittedLaw, added_by};
+use crate::diagnosis::{Extended, FittedLaw, added_by};
 use crate::measurement::Session;
 use crate::nominal::{Fixed, Nominal};
 use crate::synthesize::{Effect, EffectError, Sizes, added_arcsec, completed};
@@ -79,7 +79,8 @@ impl Model {
     /// The nominal model recalibrated, with the causes of a diagnosis as they were fitted.
     #[must_use]
     pub(crate) fn of_diagnosis(nominal: &Nominal, diagnosis: &Diagnosis, fitted: &Extended) -> Model {
-        let causes = diagnosis.causes.iter().map(|cause| CauseEntry::of(cause).fitted_by(fitted, nominal)).collect();
+        let of = |cause: &Cause| CauseEntry::of(cause.name, &cause.parameters).fitted_by(fitted, nominal);
+        let causes = diagnosis.causes.iter().map(of).collect();
         let change = |name: &str| diagnosis.recalibrated.get(name).map_or(0.0, |p| p.value);
         let mut nominal = nominal.clone();
         // A relative change of the wind-up is the inverse one of the stiffness.
@@ -321,14 +322,11 @@ fn numbered(parameters: &BTreeMap<String, Parameter>, name: &str) -> Vec<f64> {
 }
 
 impl CauseEntry {
-    /// A cause of a diagnosis.
+    /// A cause with the parameters that were found.
     #[must_use]
-    pub fn of(cause: &Cause) -> CauseEntry {
-        CauseEntry {
-            name: cause.name,
-            parameters: cause.parameters.iter().map(|(name, p)| ((*name).to_owned(), p.value)).collect(),
-            fit: None,
-        }
+    pub(crate) fn of(name: CauseName, parameters: &BTreeMap<&'static str, Parameter>) -> CauseEntry {
+        let parameters = parameters.iter().map(|(name, found)| ((*name).to_owned(), found.value)).collect();
+        CauseEntry { name, parameters, fit: None }
     }
 
     /// The cause with the model that was fitted to it, beside a nominal model.
@@ -336,16 +334,6 @@ impl CauseEntry {
     pub(crate) fn fitted_by(self, extended: &Extended, nominal: &Nominal) -> CauseEntry {
         let at = extended.causes().iter().position(|cause| cause.name() == self.name);
         CauseEntry { fit: at.and_then(|at| extended.fitted_law(at, nominal)), ..self }
-    }
-
-    /// A cause as it was fitted.
-    #[must_use]
-    pub(crate) fn of_fitted(cause: &FittedCause) -> CauseEntry {
-        CauseEntry {
-            name: cause.name(),
-            parameters: cause.parameters.iter().map(|(name, p)| ((*name).to_owned(), p.value)).collect(),
-            fit: None,
-        }
     }
 
     /// The effect that simulates it, if there is one.

@@ -2,7 +2,6 @@
 
 use std::f64::consts::PI;
 
-use super::geometry::TURNED_BACK;
 use super::{Coefficients, Column, Excitation, Law, Role, Shape, Shaped, by_row, main, main_about, of_both};
 use crate::causes::ParameterName as Name;
 use crate::causes::spec::{
@@ -126,8 +125,7 @@ fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>, on_sample: &Exc
                     .map(|[moment, phase]| shape.with(&[(Name::TorqueNM, moment), (Name::PhaseRad, phase)]))
                     .collect()
             },
-        )
-        .led_under_load_alone();
+        );
     law.acts.in_crossings = true;
     law
 }
@@ -295,27 +293,21 @@ fn torsional_resonance(on: &Excitation<'_>) -> Law {
     law
 }
 
-pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
-    let mut laws = Vec::new();
-    if on.speaks_of(CauseName::GravityTorque) {
-        // The load that gravity adds moves the torque at which the play turns over: which law it follows there shows
-        // only now.
-        let mut plays = vec![PlayLaw::Held, PlayLaw::Pushed];
-        if !plays.contains(&on.base.law) {
-            plays.push(on.base.law);
-        }
-        let thinned = if on.unloaded() { Thinned::of(on, 1) } else { None };
-        let on_sample = thinned.as_ref().map_or(*on, |thinned| thinned.excitation(on));
-        for play in plays {
-            laws.push(gravity_torque(1.0, play, on, &on_sample).variant(play.as_str()));
-            if on.is_turned_about() {
-                let back = format!("{}, {TURNED_BACK}", play.as_str());
-                laws.push(gravity_torque(-1.0, play, on, &on_sample).variant(back));
-            }
-        }
+/// Models of an unbalanced load: the load that gravity adds moves the torque at which the play turns over, so that the
+/// law which the play follows there shows only now.
+fn gravity_torques(on: &Excitation<'_>) -> Vec<Law> {
+    if !on.speaks_of(CauseName::GravityTorque) {
+        return Vec::new();
     }
-    laws.push(torsional_resonance(on));
-    laws
+    let mut plays = vec![PlayLaw::Held, PlayLaw::Pushed];
+    if !plays.contains(&on.base.law) {
+        plays.push(on.base.law);
+    }
+    let thinned = if on.unloaded() { Thinned::of(on, 1) } else { None };
+    let on_sample = thinned.as_ref().map_or(*on, |thinned| thinned.excitation(on));
+    let of = |sign, play: PlayLaw| gravity_torque(sign, play, on, &on_sample).variant(play.as_str());
+    let both = |play| [Some(of(1.0, play)), on.is_turned_about().then(|| of(-1.0, play).counted_back())];
+    plays.into_iter().flat_map(both).flatten().collect()
 }
 
 /// Gravity turns an unbalanced load, which the torque column does not hold.
@@ -323,7 +315,6 @@ pub(crate) const GRAVITY_TORQUE: CauseSpec = CauseSpec {
     name: "gravity_torque",
     words: "unbalanced load",
     does: "gravity on the load, which the torque column does not hold",
-    meaning: "an unbalanced load that the torque column does not hold",
     kin: Kin::Torque,
     needs: &[Need::Spring],
     orders: &[(Turn::Output, Fixed(1.0))],
@@ -333,6 +324,7 @@ pub(crate) const GRAVITY_TORQUE: CauseSpec = CauseSpec {
         number(Name::TorqueNM, "m g l", 0.0, 1e5, OfLoad(0.2)),
         phase("of sin(output + orientation + phase)"),
     ],
+    laws: gravity_torques,
     simulated: |on, p| {
         let shape = [Name::TorqueNM, Name::PhaseRad].map(|name| (name, p(name)));
         gravity_torque(1.0, on.base.law, on, on).with(&shape, [])
@@ -345,7 +337,6 @@ pub(crate) const TORSIONAL_RESONANCE: CauseSpec = CauseSpec {
     name: "torsional_resonance",
     words: "torsional resonance",
     does: "the inertia of the load on the spring of the drive",
-    meaning: "the load's inertia on the drive's spring",
     needs: &[Need::Time, Need::Swings],
     in_table: InTable::No("it follows the motion in time, and a table knows steady motion alone"),
     made_by_loads: true,
@@ -353,6 +344,7 @@ pub(crate) const TORSIONAL_RESONANCE: CauseSpec = CauseSpec {
         number(Name::FrequencyHz, "of the free oscillation", 0.1, 1000.0, Value(8.0)),
         number(Name::DampingRatio, "of critical damping", 0.001, 0.9, Value(0.03)),
     ],
+    laws: |on| vec![torsional_resonance(on)],
     simulated: |on, p| {
         let shape = [Name::FrequencyHz, Name::DampingRatio].map(|name| (name, p(name)));
         torsional_resonance(on).with(&shape, [WIND_UP, KINEMATIC, TURNING].map(|role| (role, 1.0)))

@@ -13,9 +13,8 @@ use std::f64::consts::PI;
 use crate::nominal::{Fixed, Nominal};
 
 use super::displaced::displaced;
-use super::lobes::generator_eccentricity;
 use super::{
-    Coefficients, Column, Excitation, Law, Named, Role, Shape, Shaped, Simulated, Values, beside, by_row, main,
+    Coefficients, Column, Excitation, Law, Named, Role, Shape, Shaped, Simulated, Values, beside, by_row, kernel, main,
     nuisance, of_both, of_wave, polar, times,
 };
 use crate::causes::ParameterName as Name;
@@ -26,7 +25,6 @@ use crate::causes::spec::{
     Usual::{Follows, Value},
     WHEELS, microns, number, phase, plain,
 };
-use crate::extension::DriveField;
 use flexspline_mechanics::drive::Wheel;
 
 /// Largest plausible amplitude, arcsec, one standard deviation.
@@ -48,9 +46,6 @@ const TAKEN_UNDER_LIGHT_LOAD: Role = Role("clearance taken under light load");
 /// Pulses of a damaged tooth, by flank and load.
 const PULSE: Role = Role("pulse");
 
-/// The variant of a law of gravity whose orientation is counted against the output angle.
-pub(super) const TURNED_BACK: &str = "orientation counted back";
-
 /// Which angle an error is locked to.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Angle {
@@ -60,6 +55,15 @@ pub(crate) enum Angle {
     CircularSpline,
     /// Gravity as the wave sees it, orientation counted with this sign.
     Gravity(f64),
+}
+
+impl From<Wheel> for Angle {
+    fn from(wheel: Wheel) -> Angle {
+        match wheel {
+            Wheel::Flexspline => Angle::Flexspline,
+            Wheel::CircularSpline => Angle::CircularSpline,
+        }
+    }
 }
 
 pub(super) fn angle(on: &Excitation<'_>, of: Angle, k: usize) -> f64 {
@@ -210,17 +214,31 @@ fn wave_parameters(on: &Excitation<'_>, c: Coefficients<'_>, harmonic: f64) -> V
 /// ones cancel.
 const HIGHER_HARMONICS: [f64; 5] = [4.0, 6.0, 8.0, 10.0, 12.0];
 
-/// Pitch errors that are one wave of a higher harmonic, with little of the second: rarer than those that the second
-/// leads. At the wheel that stands a subdivision of the generator's encoder makes the very same wave, and is the rule:
-/// it has the name there.
-fn higher_pitch(cause: CauseName, of: Angle, nominal: &Nominal) -> impl Iterator<Item = Law> {
-    let of_encoder = is_standing(nominal, of);
-    HIGHER_HARMONICS
+/// The models of the pitch error of a wheel: the one by the kernels of the drive, where it has them.
+fn pitch_errors(cause: CauseName, wheel: Wheel, on: &Excitation<'_>) -> Vec<Law> {
+    if let Some(kernels) = on.kernels() {
+        return vec![kernel::pitch(cause, wheel, kernels)];
+    }
+    let of = Angle::from(wheel);
+    let of_encoder = |harmonic: f64| is_standing(on.nominal, of) && super::sensor::is_subdivision(harmonic);
+    let higher = HIGHER_HARMONICS.into_iter().filter(|harmonic| !of_encoder(*harmonic));
+    [pitch(cause, of), smooth_pitch(cause, of)]
         .into_iter()
-        .filter(move |harmonic| !(of_encoder && super::sensor::is_subdivision(*harmonic)))
-        .map(move |harmonic| higher_harmonic(cause, of, harmonic))
+        .chain(higher.map(|harmonic| higher_harmonic(cause, of, harmonic)))
+        .collect()
 }
 
+/// The model of a wheel that stands next to its place: the one by the kernels of the drive, where it has them.
+fn displacement(cause: CauseName, of: Angle, on: &Excitation<'_>) -> Law {
+    match on.kernels() {
+        Some(kernels) => kernel::eccentric(cause, of, kernels),
+        None => displaced(cause, of, on),
+    }
+}
+
+/// A pitch error that is one wave of a higher harmonic, with little of the second: rarer than those that the second
+/// leads. At the wheel that stands a subdivision of the generator's encoder makes the very same wave, and is the rule:
+/// it has the name there.
 fn higher_harmonic(cause: CauseName, of: Angle, harmonic: f64) -> Law {
     Law::new(cause, move |on, _| {
         let (flank, light) = (&on.base.flank, light(on));
@@ -409,28 +427,19 @@ fn simulated_pitch(cause: CauseName, of: Angle, p: Values<'_>) -> Simulated {
     higher_harmonic(cause, of, harmonic).with(&[], wave.map(|c| (WAVE, c)))
 }
 
-pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
-    let mut laws = vec![
-        displaced(CauseName::CircularSplineEccentricity, Angle::CircularSpline, on),
-        displaced(CauseName::FlexsplineRunout, Angle::Flexspline, on),
-        displaced(CauseName::GravitySideLoad, Angle::Gravity(1.0), on),
-        ovality(),
-        pitch(CauseName::FlexsplinePitchError, Angle::Flexspline),
-        pitch(CauseName::CircularSplinePitchError, Angle::CircularSpline),
-        smooth_pitch(CauseName::FlexsplinePitchError, Angle::Flexspline),
-        smooth_pitch(CauseName::CircularSplinePitchError, Angle::CircularSpline),
-        generator_eccentricity(on),
-        cam_form_error(),
-        damaged_tooth(Angle::Flexspline),
-        damaged_tooth(Angle::CircularSpline).variant("circular spline"),
-    ];
-    laws.extend(higher_pitch(CauseName::FlexsplinePitchError, Angle::Flexspline, on.nominal));
-    laws.extend(higher_pitch(CauseName::CircularSplinePitchError, Angle::CircularSpline, on.nominal));
-    if on.is_turned_about() {
-        laws.push(displaced(CauseName::GravitySideLoad, Angle::Gravity(-1.0), on).variant(TURNED_BACK));
-    }
-    laws
-}
+/// An error of shape or place of a toothed wheel.
+pub(super) const OF_WHEELS: CauseSpec = CauseSpec { kin: Kin::Shape, needs: &[Need::Teeth], ..plain() };
+
+/// A displacement.
+const DISPLACEMENT: CauseSpec =
+    CauseSpec { twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::AlongNormal)], ..OF_WHEELS };
+
+/// A pitch error.
+const PITCH_ERROR: CauseSpec = CauseSpec {
+    parameters: &[microns("along the pitch", 5.0), ARCSECONDS, HARMONIC, phase("angle of a crest of the error")],
+    twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::AlongPitch)],
+    ..OF_WHEELS
+};
 
 /// The axis of the circular spline stands beside that of the generator.
 pub(crate) const CIRCULAR_SPLINE_ECCENTRICITY: CauseSpec = CauseSpec {
@@ -438,20 +447,15 @@ pub(crate) const CIRCULAR_SPLINE_ECCENTRICITY: CauseSpec = CauseSpec {
     words: "eccentricity of the circular spline",
     does: "its axis beside the axis of the generator: two waves in a turn of the generator against the circular \
              spline",
-    meaning: "toothing of the circular spline beside the axis it turns about",
-    kin: Kin::Shape,
-    needs: &[Need::Teeth],
     orders: &[(Turn::CircularSpline, Multiple::Fixed(2.0)), (Turn::CircularSpline, Multiple::Fixed(4.0))],
-    drive_field: DriveField::by_angle(|placing| {
-        placing.set_displacement(
-            true,
-            ["as_built.circular_spline_eccentricity_um", "as_built.circular_spline_eccentricity_phase_deg"],
-        )
-    }),
+    place: |placing| {
+        let paths = ["as_built.circular_spline_eccentricity_um", "as_built.circular_spline_eccentricity_phase_deg"];
+        placing.set_displacement(true, paths);
+    },
     parameters: &[microns("how far", 10.0), ARCSECONDS, phase("whereto, on the circular spline"), HALF_LOAD],
-    twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::AlongNormal)],
+    laws: |on| vec![displacement(CauseName::CircularSplineEccentricity, Angle::CircularSpline, on)],
     simulated: |on, p| simulated_displacement(CauseName::CircularSplineEccentricity, Angle::CircularSpline, on, p),
-    ..plain()
+    ..DISPLACEMENT
 };
 
 /// The axis of the flexspline's toothing stands beside that of its bore.
@@ -459,17 +463,14 @@ pub(crate) const FLEXSPLINE_RUNOUT: CauseSpec = CauseSpec {
     name: "flexspline_runout",
     words: "runout of the flexspline",
     does: "its axis beside the axis of the generator: two waves in a generator turn",
-    meaning: "toothing of the flexspline beside the axis of its bore",
-    kin: Kin::Shape,
-    needs: &[Need::Teeth],
     orders: &[(Turn::Flexspline, Multiple::Fixed(2.0)), (Turn::Flexspline, Multiple::Fixed(4.0))],
-    drive_field: DriveField::by_angle(|placing| {
-        placing.set_displacement(false, ["as_built.flexspline_runout_um", "as_built.flexspline_runout_phase_deg"])
-    }),
+    place: |placing| {
+        placing.set_displacement(false, ["as_built.flexspline_runout_um", "as_built.flexspline_runout_phase_deg"]);
+    },
     parameters: &[microns("how far", 10.0), ARCSECONDS, phase("whereto, on the flexspline"), HALF_LOAD],
-    twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::AlongNormal)],
+    laws: |on| vec![displacement(CauseName::FlexsplineRunout, Angle::Flexspline, on)],
     simulated: |on, p| simulated_displacement(CauseName::FlexsplineRunout, Angle::Flexspline, on, p),
-    ..plain()
+    ..DISPLACEMENT
 };
 
 /// The circular spline is pressed to an oval.
@@ -477,18 +478,16 @@ pub(crate) const CIRCULAR_SPLINE_OVALITY: CauseSpec = CauseSpec {
     name: "circular_spline_ovality",
     words: "oval circular spline",
     does: "pressed out of round: two waves in a turn against the circular spline",
-    meaning: "circular spline pressed to an oval that keeps its length",
-    kin: Kin::Shape,
-    needs: &[Need::Teeth],
     orders: &[(Turn::CircularSpline, Multiple::Fixed(2.0))],
-    drive_field: DriveField::by_angle(|placing| placing.set_ovality()),
+    place: |placing| placing.set_ovality(),
     parameters: &[microns("of the radius", 8.0), ARCSECONDS, phase("angle of a crest of the radius")],
     twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::Oval)],
+    laws: |on| vec![on.kernels().map_or_else(ovality, kernel::ovality)],
     simulated: |_, p| {
         let [sine, cosine] = crest_at(p(Name::AmplitudeArcsec), 2.0 * p(Name::PhaseRad));
         ovality().with(&[], [(WAVE, sine), (WAVE, -cosine)])
     },
-    ..plain()
+    ..OF_WHEELS
 };
 
 /// The teeth of the flexspline are out of place along the pitch.
@@ -496,15 +495,11 @@ pub(crate) const FLEXSPLINE_PITCH_ERROR: CauseSpec = CauseSpec {
     name: "flexspline_pitch_error",
     words: "pitch error of the flexspline",
     does: "teeth out of place: whole orders of the generator turn",
-    meaning: "cumulative pitch error of the flexspline",
-    kin: Kin::Shape,
-    needs: &[Need::Teeth],
     orders: &[(Turn::Flexspline, Harmonic)],
-    drive_field: DriveField::by_angle(|placing| placing.set_pitch_harmonics(Wheel::Flexspline)),
-    parameters: &[microns("along the pitch", 5.0), ARCSECONDS, HARMONIC, phase("angle of a crest of the error")],
-    twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::AlongPitch)],
+    place: |placing| placing.set_pitch_harmonics(Wheel::Flexspline),
+    laws: |on| pitch_errors(CauseName::FlexsplinePitchError, Wheel::Flexspline, on),
     simulated: |_, p| simulated_pitch(CauseName::FlexsplinePitchError, Angle::Flexspline, p),
-    ..plain()
+    ..PITCH_ERROR
 };
 
 /// The teeth of the circular spline are out of place along the pitch.
@@ -512,15 +507,11 @@ pub(crate) const CIRCULAR_SPLINE_PITCH_ERROR: CauseSpec = CauseSpec {
     name: "circular_spline_pitch_error",
     words: "pitch error of the circular spline",
     does: "teeth out of place: whole orders of a turn against the circular spline",
-    meaning: "cumulative pitch error of the circular spline",
-    kin: Kin::Shape,
-    needs: &[Need::Teeth],
     orders: &[(Turn::CircularSpline, Harmonic)],
-    drive_field: DriveField::by_angle(|placing| placing.set_pitch_harmonics(Wheel::CircularSpline)),
-    parameters: &[microns("along the pitch", 5.0), ARCSECONDS, HARMONIC, phase("angle of a crest of the error")],
-    twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::AlongPitch)],
+    place: |placing| placing.set_pitch_harmonics(Wheel::CircularSpline),
+    laws: |on| pitch_errors(CauseName::CircularSplinePitchError, Wheel::CircularSpline, on),
     simulated: |_, p| simulated_pitch(CauseName::CircularSplinePitchError, Angle::CircularSpline, p),
-    ..plain()
+    ..PITCH_ERROR
 };
 
 /// The generator has another shape than the drawn one.
@@ -528,7 +519,6 @@ pub(crate) const CAM_FORM_ERROR: CauseSpec = CauseSpec {
     name: "cam_form_error",
     words: "form error of the generator",
     does: "a shape that is not the drawn one: tooth mesh and even orders of the generator turn",
-    meaning: "form error of the generator",
     needs: &[Need::Teeth],
     orders: &[
         (Turn::Generator, Multiple::Fixed(4.0)),
@@ -537,6 +527,7 @@ pub(crate) const CAM_FORM_ERROR: CauseSpec = CauseSpec {
     ],
     parameters: &[microns("of the error it makes", 3.0), ARCSECONDS, phase("of the form")],
     twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::AlongPitch)],
+    laws: |_| vec![cam_form_error()],
     simulated: |_, p| {
         cam_form_error().with(&[], crest_at(p(Name::AmplitudeArcsec), p(Name::PhaseRad)).map(|c| (WAVE, c)))
     },
@@ -548,7 +539,6 @@ pub(crate) const DAMAGED_TOOTH: CauseSpec = CauseSpec {
     name: "damaged_tooth",
     words: "damaged tooth",
     does: "a pulse each time a lobe passes one place",
-    meaning: "a tooth that lacks material",
     kin: Kin::Pulse,
     needs: &[Need::Teeth, Need::Turns],
     orders: &[
@@ -556,7 +546,7 @@ pub(crate) const DAMAGED_TOOTH: CauseSpec = CauseSpec {
         (Turn::OfWheel, Multiple::Fixed(4.0)),
         (Turn::OfWheel, Multiple::Fixed(6.0)),
     ],
-    drive_field: DriveField::by_angle(|placing| placing.set_damaged_tooth()),
+    place: |placing| placing.set_damaged_tooth(),
     parameters: &[
         number(Name::DepthUm, "depth that lacks, along the normal", 0.0, 500.0, Value(10.0)),
         number(Name::AmplitudeArcsec, "the same at the output, under the largest load", 0.0, 3000.0, Follows),
@@ -566,6 +556,7 @@ pub(crate) const DAMAGED_TOOTH: CauseSpec = CauseSpec {
         number(Name::WidthRad, "half the arc over which it is felt", 0.02, 0.6, Value(0.15)),
     ],
     twins: &[(Name::DepthUm, Name::AmplitudeArcsec, Factor::AlongNormal), (Name::Tooth, Name::AngleRad, Factor::Tooth)],
+    laws: |_| vec![damaged_tooth(Angle::Flexspline), damaged_tooth(Angle::CircularSpline).variant("circular spline")],
     simulated: |_, p| {
         let of = if p(Name::Wheel) == 0.0 { Angle::Flexspline } else { Angle::CircularSpline };
         let shape = [Name::AngleRad, Name::WidthRad].map(|name| (name, p(name)));
@@ -580,14 +571,15 @@ pub(crate) const GRAVITY_SIDE_LOAD: CauseSpec = CauseSpec {
     name: "gravity_side_load",
     words: "side load by gravity",
     does: "a weight that pushes the wheels out of centre",
-    meaning: "weight that pushes the circular spline aside",
-    kin: Kin::Shape,
-    needs: &[Need::Teeth],
     orders: &[(Turn::Generator, Multiple::Fixed(2.0)), (Turn::Generator, Multiple::Fixed(4.0))],
     in_table: InTable::AtOneOrientation,
-    drive_field: DriveField::by_angle(|placing| placing.set_offset()),
+    place: |placing| placing.set_offset(),
     parameters: &[microns("how far", 10.0), ARCSECONDS, phase("whereto, against gravity"), HALF_LOAD],
-    twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::AlongNormal)],
+    laws: |on| {
+        let counted = |sign: f64| displacement(CauseName::GravitySideLoad, Angle::Gravity(sign), on);
+        let back = on.is_turned_about().then(|| counted(-1.0).counted_back());
+        std::iter::once(counted(1.0)).chain(back).collect()
+    },
     simulated: |on, p| simulated_displacement(CauseName::GravitySideLoad, Angle::Gravity(1.0), on, p),
-    ..plain()
+    ..DISPLACEMENT
 };

@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use super::displaced::SCALE_MISFIT;
-use super::geometry::{Angle, COS_PRESSURE_ANGLE, TURNED_BACK, angle};
+use super::geometry::{Angle, COS_PRESSURE_ANGLE, angle, waves, weighted_waves};
 use super::{Column, Excitation, Law, Role, Shape, beside, by_row, main, main_about, nuisance, of_wave};
 use crate::causes::{CauseName, Kin, ParameterName as Name};
 use flexspline_design::kernels::{Gain, Kernels};
@@ -64,20 +64,15 @@ fn responses(on: &Excitation<'_>, of: Angle, order: f64, gain: impl Fn(f64) -> G
 
 /// Deviations that any law of shape may have from its kernel: the flanks' share and the clearance.
 fn left_open(on: &Excitation<'_>, of: Angle, order: f64) -> Vec<Column> {
-    let flank = |k: usize| on.base.flank[k];
-    let wave = |shift: f64, by_flank: bool| {
-        by_row(on, |k| (order * angle(on, of, k) - shift).cos() * if by_flank { flank(k) } else { 1.0 })
-    };
-    let mut columns: Vec<Column> = [(0.0, false), (0.5 * PI, false), (0.0, true), (0.5 * PI, true)]
-        .map(|(shift, by_flank)| nuisance(wave(shift, by_flank), 0.05))
-        .into();
-    columns.push(beside(by_row(on, flank), 0.1));
-    columns
+    let flank = &on.base.flank;
+    let both = waves(on, of, order).into_iter().chain(weighted_waves(on, of, order, flank));
+    both.map(|wave| nuisance(wave, 0.05)).chain([beside(flank.clone(), 0.1)]).collect()
 }
 
 /// An axis beside that of the generator: size and direction enter as the FEM of such drives has them.
-fn eccentric(cause: CauseName, of: Angle, kernels: Arc<Kernels>) -> Law {
-    Law::new(cause, move |on, shape| {
+pub(super) fn eccentric(cause: CauseName, of: Angle, kernels: &Arc<Kernels>) -> Law {
+    let kernels = Arc::clone(kernels);
+    let law = Law::new(cause, move |on, shape| {
         let (size, phase) = (shape.of(Name::SizeUm), shape.of(Name::PhaseRad));
         let field = kernels.eccentric_field(size);
         let pattern = by_row(on, |k| {
@@ -101,18 +96,16 @@ fn eccentric(cause: CauseName, of: Angle, kernels: Arc<Kernels>) -> Law {
             (Name::PhaseRad, shape.of(Name::PhaseRad)),
         ]
     })
-    .physical_if(|_, c| c.of(Role::SIZE) > 0.5)
+    .physical_if(|_, c| c.of(Role::SIZE) > 0.5);
+    by_kernels(law)
 }
 
 /// Harmonics of the pitch of a wheel that both lobes see alike; the odd ones cancel.
-fn pitch(cause: CauseName, wheel: Wheel, kernels: Arc<Kernels>) -> Law {
+pub(super) fn pitch(cause: CauseName, wheel: Wheel, kernels: &Arc<Kernels>) -> Law {
     /// Even orders of the pitch of a wheel. *Guess*: those beyond are small, as a zone of engaged teeth averages over
     /// them.
     const ORDERS: [u32; 8] = [2, 4, 6, 8, 10, 12, 14, 16];
-    let of = match wheel {
-        Wheel::Flexspline => Angle::Flexspline,
-        Wheel::CircularSpline => Angle::CircularSpline,
-    };
+    let (of, kernels) = (Angle::from(wheel), Arc::clone(kernels));
     let mut law = Law::new(cause, move |on, _| {
         let mut columns: Vec<Column> = Vec::new();
         for order in ORDERS {
@@ -123,8 +116,7 @@ fn pitch(cause: CauseName, wheel: Wheel, kernels: Arc<Kernels>) -> Law {
         }
         columns.extend(left_open(on, of, 2.0));
         for order in [1.0, 3.0] {
-            let wave = |shift: f64| by_row(on, |k| (order * angle(on, of, k) - shift).cos());
-            columns.extend([0.0, 0.5 * PI].map(|shift| nuisance(wave(shift), 0.1)));
+            columns.extend(waves(on, of, order).map(|wave| nuisance(wave, 0.1)));
         }
         columns
     })
@@ -138,12 +130,13 @@ fn pitch(cause: CauseName, wheel: Wheel, kernels: Arc<Kernels>) -> Law {
         ]
     });
     law.search.whole_beside_noise = true;
-    law
+    by_kernels(law)
 }
 
-fn ovality(kernels: Arc<Kernels>) -> Law {
-    let of = Angle::CircularSpline;
-    Law::new(CauseName::CircularSplineOvality, move |on, _| {
+/// A ring pressed to an oval.
+pub(super) fn ovality(kernels: &Arc<Kernels>) -> Law {
+    let (of, kernels) = (Angle::CircularSpline, Arc::clone(kernels));
+    let law = Law::new(CauseName::CircularSplineOvality, move |on, _| {
         let mut columns: Vec<Column> = responses(on, of, 2.0, |torque| kernels.ovality(torque)).map(main_um).into();
         columns.extend(left_open(on, of, 2.0));
         columns
@@ -155,29 +148,13 @@ fn ovality(kernels: Arc<Kernels>) -> Law {
             (Name::AmplitudeArcsec, amplitude * 0.67 * on.scales.arcsec_per_um),
             (Name::PhaseRad, 0.5 * phase),
         ]
-    })
+    });
+    by_kernels(law)
 }
 
-/// The laws that take the place of those without kernels.
-pub(super) fn laws(on: &Excitation<'_>, kernels: &Arc<Kernels>) -> Vec<Law> {
-    let of = |cause, angle| eccentric(cause, angle, Arc::clone(kernels));
-    let mut laws = vec![
-        of(CauseName::CircularSplineEccentricity, Angle::CircularSpline),
-        of(CauseName::FlexsplineRunout, Angle::Flexspline),
-        of(CauseName::GravitySideLoad, Angle::Gravity(1.0)),
-        ovality(Arc::clone(kernels)),
-        pitch(CauseName::FlexsplinePitchError, Wheel::Flexspline, Arc::clone(kernels)),
-        pitch(CauseName::CircularSplinePitchError, Wheel::CircularSpline, Arc::clone(kernels)),
-    ];
-    if on.is_turned_about() {
-        laws.push(of(CauseName::GravitySideLoad, Angle::Gravity(-1.0)).variant(format!("kernels, {TURNED_BACK}")));
-    }
-    for law in &mut laws {
-        law.wrong.misfit = KERNEL_MISFIT;
-        law.wrong.kin = Kin::Unlike;
-        if law.variant.is_empty() {
-            law.variant = "kernels".into();
-        }
-    }
-    laws
+/// What all these models are wrong by, and their name.
+fn by_kernels(mut law: Law) -> Law {
+    law.wrong.misfit = KERNEL_MISFIT;
+    law.wrong.kin = Kin::Unlike;
+    law.variant("kernels")
 }

@@ -6,15 +6,14 @@
 //! vanish.
 
 use super::displaced::{PRESSED_ARCSEC, ZONES_MISFIT, stopped};
-use super::geometry::{Angle, USUAL_ARCSEC, kept, waves, weighted_waves};
+use super::geometry::{Angle, OF_WHEELS, USUAL_ARCSEC, kept, waves, weighted_waves};
 use super::{
     Column, Excitation, Law, Named, Role, Shape, Shaped, Simulated, Values, Zones, beside, by_row, main, main_about,
     nuisance, of_wave, times,
 };
 use crate::causes::ParameterName as Name;
 use crate::causes::spec::{
-    ARCSECONDS, CauseName, CauseSpec, Factor, HALF_LOAD, Kin, Multiple::Fixed, Need, Turn, Usual::Value, microns,
-    number, phase, plain,
+    ARCSECONDS, CauseName, CauseSpec, Factor, HALF_LOAD, Multiple::Fixed, Turn, Usual::Value, microns, number, phase,
 };
 
 /// Plausible differences between the lobes, arcsec at the output. *Guess*: from what noise hides to more than a usual
@@ -65,7 +64,7 @@ fn still_shows(deeper: f64, pressed: f64) -> f64 {
 }
 
 /// The law.
-pub(super) fn generator_eccentricity(on: &Excitation<'_>) -> Law {
+fn generator_eccentricity(on: &Excitation<'_>) -> Law {
     let loaded = on.scales.load > 0.0;
     let mut law = Law::new(CauseName::GeneratorEccentricity, move |on, shape| {
         let lobe = Lobe::new(on, shape);
@@ -157,9 +156,6 @@ pub(crate) const GENERATOR_ECCENTRICITY: CauseSpec = CauseSpec {
     name: "generator_eccentricity",
     words: "eccentricity of the generator",
     does: "one lobe carries more: odd orders, once in a turn above all",
-    meaning: "generator beside its axis: one lobe carries more",
-    kin: Kin::Shape,
-    needs: &[Need::Teeth],
     orders: &[(Turn::Flexspline, Fixed(1.0)), (Turn::CircularSpline, Fixed(1.0))],
     parameters: &[
         microns("once around each wheel: what the deeper lobe shows of the teeth", 2.0),
@@ -175,6 +171,7 @@ pub(crate) const GENERATOR_ECCENTRICITY: CauseSpec = CauseSpec {
         HALF_LOAD,
     ],
     twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::AlongPitch)],
+    laws: |on| vec![generator_eccentricity(on)],
     simulated: simulated_generator_eccentricity,
-    ..plain()
+    ..OF_WHEELS
 };

@@ -22,6 +22,7 @@ pub(crate) mod thermal;
 
 use std::borrow::Cow;
 use std::f64::consts::PI;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::base::Base;
@@ -32,6 +33,7 @@ use super::thresholds::selection::AFTER_WHEELS;
 use crate::causes::{CauseName, Kin, Need, ParameterName};
 use crate::nominal::Nominal;
 use flexspline_base::robust::least_and_most;
+use flexspline_design::kernels::Kernels;
 
 pub(crate) use among::{Acting, Among, Zones, left_by, together};
 pub(crate) use generic::{line, maps, unnamed};
@@ -133,6 +135,11 @@ impl<'a> Excitation<'a> {
     pub(crate) fn output_span_rad(&self) -> f64 {
         let (low, high) = least_and_most(self.rows.output.iter().copied());
         (high - low).max(0.0)
+    }
+
+    /// The influence kernels of the drive, if it has them.
+    fn kernels(&self) -> Option<&'a Arc<Kernels>> {
+        self.nominal.kernels.as_ref().filter(|_| self.nominal.teeth.is_some())
     }
 
     /// Whether the drive is turned against gravity during the data.
@@ -335,8 +342,6 @@ type Beginnings = Box<dyn Fn(Shaped<'_>, Coefficients<'_>) -> Vec<Vec<f64>> + Se
 pub(crate) struct Lead {
     columns: MakeColumns,
     beginnings: Beginnings,
-    /// Only where the load leaves no doubt about the flank.
-    pub loaded_only: bool,
 }
 
 /// Laws made so far: each has a number of its own.
@@ -352,17 +357,6 @@ pub(crate) struct Law {
     pub variant: Cow<'static, str>,
     /// Shape parameters.
     pub shapes: Vec<Shape>,
-    evaluated: Evaluated,
-    /// How it may be wrong.
-    pub wrong: Wrong,
-    /// How it is looked for.
-    pub search: Search,
-    /// What it does to other causes, and they to it.
-    pub acts: Acts,
-}
-
-/// How a law is evaluated.
-struct Evaluated {
     /// Columns at given shape parameters.
     columns: MakeColumns,
     /// Parameters for the report from shape parameters and coefficients.
@@ -371,6 +365,12 @@ struct Evaluated {
     physical: IsPhysical,
     /// It changes little from one row to the next.
     smooth: bool,
+    /// How it may be wrong.
+    pub wrong: Wrong,
+    /// How it is looked for.
+    pub search: Search,
+    /// What it does to other causes, and they to it.
+    pub acts: Acts,
 }
 
 /// How a law may be wrong.
@@ -446,12 +446,10 @@ impl Law {
             label,
             variant: Cow::Borrowed(""),
             shapes: Vec::new(),
-            evaluated: Evaluated {
-                columns: Box::new(columns),
-                parameters: Box::new(|_, _, _| Vec::new()),
-                physical: Box::new(|_, _| true),
-                smooth: false,
-            },
+            columns: Box::new(columns),
+            parameters: Box::new(|_, _, _| Vec::new()),
+            physical: Box::new(|_, _| true),
+            smooth: false,
             wrong: Wrong {
                 misfit: USUAL_MISFIT,
                 misfit_unnamed: 0.0,
@@ -507,6 +505,12 @@ impl Law {
         self.wrong.most_nuisance = MOST_NUISANCE_OF_KNOWN;
         self
     }
+    /// A law of gravity whose orientation is counted against the output angle.
+    fn counted_back(mut self) -> Law {
+        let comma = if self.variant.is_empty() { "" } else { ", " };
+        self.variant = format!("{}{comma}orientation counted back", self.variant).into();
+        self
+    }
     /// An encoder that reads what a wheel may do as well: odds are on the wheel, and its misfit may look like this law.
     fn after_wheels(mut self) -> Law {
         self.search.odds_against = AFTER_WHEELS;
@@ -519,17 +523,13 @@ impl Law {
         self
     }
     fn evaluated_on_averages(mut self) -> Law {
-        self.evaluated.smooth = true;
+        self.smooth = true;
         self
     }
     /// Whether it changes little from one row to the next, so that averages of rows tell what it says of their average.
     #[must_use]
     pub(crate) fn smooth(&self) -> bool {
-        self.evaluated.smooth
-    }
-    fn whole(mut self) -> Law {
-        self.search.whole = true;
-        self
+        self.smooth
     }
     fn shapes(mut self, shapes: impl IntoIterator<Item = Shape>) -> Law {
         self.shapes = shapes.into_iter().collect();
@@ -539,11 +539,11 @@ impl Law {
         mut self,
         parameters: impl Fn(&Excitation<'_>, Shaped<'_>, Coefficients<'_>) -> Vec<Named> + Send + Sync + 'static,
     ) -> Law {
-        self.evaluated.parameters = Box::new(parameters);
+        self.parameters = Box::new(parameters);
         self
     }
     fn physical_if(mut self, physical: impl Fn(Shaped<'_>, Coefficients<'_>) -> bool + Send + Sync + 'static) -> Law {
-        self.evaluated.physical = Box::new(physical);
+        self.physical = Box::new(physical);
         self
     }
     fn adds_load(mut self, load: impl Fn(&Excitation<'_>, Shaped<'_>) -> Vec<f64> + Send + Sync + 'static) -> Law {
@@ -562,14 +562,7 @@ impl Law {
         columns: impl Fn(&Excitation<'_>, Shaped<'_>) -> Vec<Column> + Send + Sync + 'static,
         beginnings: impl Fn(Shaped<'_>, Coefficients<'_>) -> Vec<Vec<f64>> + Send + Sync + 'static,
     ) -> Law {
-        let (columns, beginnings) = (Box::new(columns), Box::new(beginnings));
-        self.search.lead = Some(Lead { columns, beginnings, loaded_only: false });
-        self
-    }
-    fn led_under_load_alone(mut self) -> Law {
-        if let Some(lead) = &mut self.search.lead {
-            lead.loaded_only = true;
-        }
+        self.search.lead = Some(Lead { columns: Box::new(columns), beginnings: Box::new(beginnings) });
         self
     }
 
@@ -580,7 +573,7 @@ impl Law {
     /// Columns at values of the shape parameters.
     #[must_use]
     pub(crate) fn columns(&self, on: &Excitation<'_>, values: &[f64]) -> Vec<Column> {
-        (self.evaluated.columns)(on, self.shaped(values))
+        (self.columns)(on, self.shaped(values))
     }
 
     /// Columns of the lead at values of the shape parameters; those of the law where it has no lead.
@@ -603,13 +596,13 @@ impl Law {
     /// Parameters for the report.
     #[must_use]
     pub(crate) fn parameters(&self, on: &Excitation<'_>, values: &[f64], coefficients: Coefficients<'_>) -> Vec<Named> {
-        (self.evaluated.parameters)(on, self.shaped(values), coefficients)
+        (self.parameters)(on, self.shaped(values), coefficients)
     }
 
     /// Whether shape parameters and coefficients make sense, signs above all.
     #[must_use]
     pub(crate) fn physical(&self, values: &[f64], coefficients: Coefficients<'_>) -> bool {
-        (self.evaluated.physical)(self.shaped(values), coefficients)
+        (self.physical)(self.shaped(values), coefficients)
     }
 
     /// Load (N·m, row by row) that the cause adds beside the torque that was recorded, if it adds any.
@@ -695,55 +688,23 @@ impl Law {
 /// Every law of every cause that the data can speak about.
 #[must_use]
 pub fn library(on: &Excitation<'_>) -> Vec<Law> {
-    let mut laws = whole_library(on);
-    laws.retain(|law| law.cause().is_none_or(|cause| on.speaks_of(cause)));
-    laws
+    CauseName::ALL.iter().filter(|cause| on.speaks_of(**cause)).flat_map(|cause| (cause.spec().laws)(on)).collect()
 }
 
-/// Every law of every cause, whether the data can speak about it or not: what was found in other data acts in these.
-#[must_use]
-pub(crate) fn whole_library(on: &Excitation<'_>) -> Vec<Law> {
-    let mut laws = geometry::laws(on);
-    if let Some(kernels) = on.nominal.kernels.as_ref().filter(|_| on.nominal.teeth.is_some()) {
-        let known = kernel::laws(on, kernels);
-        laws.retain(|law| known.iter().all(|k| k.label != law.label));
-        laws.extend(known);
-    }
-    for further in [stiffness::laws, thermal::laws, dynamic::laws, sensor::laws] {
-        laws.extend(further(on));
-    }
-    laws
-}
-
-/// What follows `values` with a lag of `lag_s`, each session from where it begins.
-fn lagged(on: &Excitation<'_>, values: &[f64], lag_s: f64) -> Vec<f64> {
-    lagged_from(on, values, lag_s, |_, first| first)
-}
-
-/// Values that lag where the lag goes on from one session to the next: between them it nears what the next one begins
-/// with.
-fn lagged_through(on: &Excitation<'_>, values: &[f64], lag_s: f64) -> Vec<f64> {
-    lagged_from(on, values, lag_s, |before, first| match before {
-        // Where clocks begin anew nobody knows how long it had.
-        Some((state, gap_s)) if gap_s >= 0.0 => first + (state - first) * (-gap_s / lag_s).exp(),
-        _ => first,
-    })
-}
-
-/// What follows `values` with a lag; `begin` gives the state at the first row of a session, of what it was at the last
-/// row of the session before and how many seconds ago that was, and of the value.
-fn lagged_from(
-    on: &Excitation<'_>,
-    values: &[f64],
-    lag_s: f64,
-    begin: impl Fn(Option<(f64, f64)>, f64) -> f64,
-) -> Vec<f64> {
+/// What follows `values` with a lag of `lag_s`. Each session begins with its first value; where the lag `goes_on`, with
+/// what the session before had reached, nearer to that value by the time between them.
+fn lagged(on: &Excitation<'_>, values: &[f64], lag_s: f64, goes_on: bool) -> Vec<f64> {
     let rows = on.rows;
     let mut reached = vec![0.0; rows.len()];
     let mut last: Option<usize> = None;
     for session in &rows.sessions {
-        let before = last.map(|last| (reached[last], rows.time[session.start] - rows.time[last]));
-        let mut state = begin(before, values[session.start]);
+        let first = values[session.start];
+        let gap_s = |last: usize| rows.time[session.start] - rows.time[last];
+        // Where clocks begin anew nobody knows how long it had.
+        let mut state = match last.filter(|last| goes_on && gap_s(*last) >= 0.0) {
+            Some(last) => first + (reached[last] - first) * (-gap_s(last) / lag_s).exp(),
+            None => first,
+        };
         for k in session.clone() {
             if k > session.start {
                 let dt = (rows.time[k] - rows.time[k - 1]).max(0.0);

@@ -149,23 +149,12 @@ fn simulated_encoder(law: Law, p: Values<'_>) -> Simulated {
     law.with(&[], [sin, cos].map(|part| (WAVE, part * p(Name::AmplitudeArcsec))))
 }
 
-pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
+/// Subdivisions of both encoders, of the output's those that come often enough.
+fn subdivisions(on: &Excitation<'_>) -> Vec<Law> {
     let turned = on.output_span_rad() / TAU;
-    let seen = |of_output: bool, order: f64| !of_output || turned * order >= FEWEST_PERIODS;
-    let subdivisions = [false, true].into_iter().flat_map(|of_output| {
-        SUBDIVISIONS
-            .into_iter()
-            .filter(move |order| seen(of_output, *order))
-            .map(move |order| encoder_subdivision(of_output, order))
-    });
-    // The order of the library: eccentric encoders, ratio, latency, then the further lines of encoders.
-    let each = [true, false];
-    each.map(encoder_eccentricity)
-        .into_iter()
-        .chain([ratio_error(), sensor_latency()])
-        .chain(each.map(encoder_tilt))
-        .chain(subdivisions)
-        .collect()
+    let of_output = SUBDIVISIONS.iter().filter(|order| turned * **order >= FEWEST_PERIODS);
+    let generators = SUBDIVISIONS.iter().map(|order| encoder_subdivision(false, *order));
+    generators.chain(of_output.map(|order| encoder_subdivision(true, *order))).collect()
 }
 
 /// The disc of the output encoder stands off its axis.
@@ -173,7 +162,6 @@ pub(crate) const OUTPUT_ENCODER_ECCENTRICITY: CauseSpec = CauseSpec {
     name: "output_encoder_eccentricity",
     words: "eccentricity of the output encoder",
     does: "one wave in an output turn, whatever the load",
-    meaning: "disc of the output encoder off its axis",
     orders: &[(Turn::Output, Fixed(1.0))],
     in_table: InTable::No(OF_THE_OUTPUT_ENCODER),
     made_by_loads: true,
@@ -181,6 +169,7 @@ pub(crate) const OUTPUT_ENCODER_ECCENTRICITY: CauseSpec = CauseSpec {
         number(Name::AmplitudeArcsec, "at the output", 0.0, 10_000.0, Value(20.0)),
         phase("of sin(output + phase)"),
     ],
+    laws: |_| vec![encoder_eccentricity(true)],
     simulated: |_, p| simulated_encoder(encoder_eccentricity(true), p),
     ..plain()
 };
@@ -195,7 +184,6 @@ pub(crate) const GENERATOR_ENCODER_ECCENTRICITY: CauseSpec = CauseSpec {
     name: "generator_encoder_eccentricity",
     words: "eccentricity of the generator encoder",
     does: "one wave in a generator turn, whatever the load",
-    meaning: "disc of the generator's encoder off its axis",
     orders: &[(Turn::Generator, Fixed(1.0))],
     parameters: &[
         number(Name::AmplitudeArcsec, "at the output", 0.0, 1000.0, Value(10.0)),
@@ -203,6 +191,7 @@ pub(crate) const GENERATOR_ENCODER_ECCENTRICITY: CauseSpec = CauseSpec {
         phase("of sin(generator + phase)"),
     ],
     twins: &[BY_THE_RATIO],
+    laws: |_| vec![encoder_eccentricity(false)],
     simulated: |_, p| simulated_encoder(encoder_eccentricity(false), p),
     ..plain()
 };
@@ -212,7 +201,6 @@ pub(crate) const OUTPUT_ENCODER_TILT: CauseSpec = CauseSpec {
     name: "output_encoder_tilt",
     words: "tilt of the output encoder",
     does: "two waves in an output turn, whatever the load",
-    meaning: "output encoder that is tilted, or whose magnet is not square on its axis",
     needs: &[Need::HalfOutputTurn],
     orders: &[(Turn::Output, Fixed(2.0))],
     in_table: InTable::No(OF_THE_OUTPUT_ENCODER),
@@ -221,6 +209,7 @@ pub(crate) const OUTPUT_ENCODER_TILT: CauseSpec = CauseSpec {
         phase("of sin(2 output + phase)"),
     ],
     double_outside: true,
+    laws: |_| vec![encoder_tilt(true)],
     simulated: |_, p| simulated_encoder(encoder_tilt(true), p),
     ..plain()
 };
@@ -230,7 +219,6 @@ pub(crate) const GENERATOR_ENCODER_TILT: CauseSpec = CauseSpec {
     name: "generator_encoder_tilt",
     words: "tilt of the generator encoder",
     does: "two waves in a generator turn, the same on both flanks and under any load",
-    meaning: "generator's encoder that is tilted, or whose magnet is not square on its axis",
     kin: Kin::Shape,
     orders: &[(Turn::Generator, Fixed(2.0))],
     parameters: &[
@@ -239,6 +227,7 @@ pub(crate) const GENERATOR_ENCODER_TILT: CauseSpec = CauseSpec {
         phase("of sin(2 generator + phase)"),
     ],
     twins: &[BY_THE_RATIO],
+    laws: |_| vec![encoder_tilt(false)],
     simulated: |_, p| simulated_encoder(encoder_tilt(false), p),
     ..plain()
 };
@@ -248,7 +237,6 @@ pub(crate) const ENCODER_SUBDIVISION: CauseSpec = CauseSpec {
     name: "encoder_subdivision",
     words: "subdivision error of an encoder",
     does: "four waves or a multiple in a turn of an encoder, whatever the load and the speed",
-    meaning: "an encoder that divides its periods unevenly",
     orders: &[(Turn::OfEncoder, Harmonic)],
     parameters: &[
         number(Name::AmplitudeArcsec, "at the output", 0.0, 1000.0, Value(6.0)),
@@ -258,6 +246,7 @@ pub(crate) const ENCODER_SUBDIVISION: CauseSpec = CauseSpec {
         phase("of sin(harmonic angle + phase)"),
     ],
     twins: &[BY_THE_RATIO],
+    laws: subdivisions,
     simulated: |_, p| simulated_encoder(encoder_subdivision(p(Name::Encoder) > 0.5, p(Name::Harmonic)), p),
     ..plain()
 };
@@ -267,12 +256,12 @@ pub(crate) const SENSOR_LATENCY: CauseSpec = CauseSpec {
     name: "sensor_latency",
     words: "time between the sensors",
     does: "output and generator are read at different instants: an error in proportion to speed",
-    meaning: "the output's reading is older than the generator's",
     kin: Kin::Motion,
     needs: &[Need::Time],
     in_table: InTable::No("it follows the speed, and a table knows none"),
     made_by_loads: true,
     parameters: &[number(Name::DelayS, "positive: the output's is older", -0.1, 0.1, Value(0.002))],
+    laws: |_| vec![sensor_latency()],
     simulated: |_, p| sensor_latency().with(&[], [(Role::SIZE, p(Name::DelayS))]),
     ..plain()
 };
@@ -282,10 +271,10 @@ pub(crate) const RATIO_ERROR: CauseSpec = CauseSpec {
     name: "ratio_error",
     words: "another ratio",
     does: "the error grows with the angle",
-    meaning: "an error in proportion to the output angle",
     in_table: InTable::No("it grows from turn to turn, and a table repeats"),
     made_by_loads: true,
     parameters: &[number(Name::RatioRelativeError, "of the output angle", -0.01, 0.01, Value(1e-4))],
+    laws: |_| vec![ratio_error()],
     simulated: |_, p| ratio_error().with(&[], [(Role::SIZE, p(Name::RatioRelativeError))]),
     ..plain()
 };

@@ -17,7 +17,6 @@ use crate::causes::spec::{
     Usual::{OfLoad, ToothPitch, Value},
     number, plain,
 };
-use crate::extension::DriveField;
 use flexspline_base::units::ARCSEC_PER_TURN;
 
 /// Torque in units of the load scale.
@@ -121,7 +120,6 @@ fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
         columns.extend(unknown_beginnings(on, slip).into_iter().map(|held| history(held, 1.0)));
         columns
     })
-    .whole()
     .evaluated_on_averages()
     .shapes([Shape::by_factors(Name::SlipTorqueNM, 0.03 * load, 1.0 * load, 6)])
     .parameters_by(move |_, shape, c| {
@@ -132,6 +130,7 @@ fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
     // Three elements stand for the many of a real drive: where the load passes zero they hold about, not exactly, as
     // much (a fifth to a quarter less than springs that give way smoothly, hidden in made-up data).
     law.wrong.doubt = 0.15;
+    law.search.whole = true;
     law.wrong.misfit_unnamed = LOOKS_LIKE_CREEP;
     // What springs hold goes with the load; the wind-up beside them takes that back, and the beginnings are nobody's.
     law.wrong.most_nuisance = 2.0;
@@ -252,29 +251,20 @@ enum Progress {
 fn wear(by: Progress) -> Law {
     Law::new(CauseName::Wear, move |on, shape| {
         let rows = on.rows;
-        let n = rows.len();
-        let mut done = vec![0.0; n];
-        for k in 0..n {
-            if let Progress::Time = by {
-                done[k] = (rows.time[k] - on.scales.begin_s).max(0.0);
-                continue;
-            }
-            if k == 0 {
-                continue;
-            }
-            let step = match by {
-                Progress::Time => 0.0,
-                Progress::Travel => rows.travel[k] - rows.travel[k - 1],
-                Progress::Work => (rows.travel[k] - rows.travel[k - 1]) * rows.torque[k].abs(),
+        let travelled = |k: usize| (rows.travel[k] - rows.travel[k.saturating_sub(1)]).max(0.0);
+        let sum_of = |step: &dyn Fn(usize) -> f64| {
+            let sum = |sum: &mut f64, k: usize| {
+                *sum += step(k);
+                Some(*sum)
             };
-            done[k] = done[k - 1] + step.max(0.0);
-        }
-        let all = match by {
-            Progress::Time => on.scales.duration_s,
-            Progress::Travel => on.scales.travel,
-            Progress::Work => on.scales.work,
-        }
-        .max(1e-12);
+            (0..rows.len()).scan(0.0, sum).collect::<Vec<f64>>()
+        };
+        let (done, all) = match by {
+            Progress::Time => (by_row(on, |k| (rows.time[k] - on.scales.begin_s).max(0.0)), on.scales.duration_s),
+            Progress::Travel => (sum_of(&travelled), on.scales.travel),
+            Progress::Work => (sum_of(&|k| travelled(k) * rows.torque[k].abs()), on.scales.work),
+        };
+        let all = all.max(1e-12);
         let exponent = shape.of(Name::Exponent);
         let widened = |k: usize| (done[k] / all).powf(exponent);
         vec![
@@ -355,35 +345,11 @@ fn skipped_teeth(jumps: Vec<Jump>, pitch: f64) -> Law {
     law
 }
 
-pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
-    let mut laws = Vec::new();
-    if on.speaks_of(CauseName::TorsionalHysteresis) {
-        laws.push(torsional_hysteresis(on));
-    }
-    laws.extend([
-        stiffness_hardening(),
-        stiffness_error(),
-        backlash_growth(),
-        wear(Progress::Travel).variant("travel"),
-        cracked_tooth_root(),
-    ]);
-    if on.rows.recorded.time {
-        laws.push(wear(Progress::Time).variant("time"));
-    }
-    if on.scales.load > 0.0 {
-        laws.push(wear(Progress::Work).variant("work"));
-    }
-    laws.extend(wear_between_sessions(on).filter(|_| on.rows.recorded.time));
-    laws.extend(ratcheting(on));
-    laws
-}
-
 /// A tooth of the circular spline is cracked at its root.
 pub(crate) const CRACKED_TOOTH_ROOT: CauseSpec = CauseSpec {
     name: "cracked_tooth_root",
     words: "cracked tooth root",
     does: "softer each time a lobe passes one tooth of the circular spline: nothing there without load",
-    meaning: "a tooth of the circular spline that bends more than its neighbours",
     kin: Kin::Pulse,
     needs: &[Need::Teeth, Need::Turns, Need::Load],
     orders: &[
@@ -403,6 +369,7 @@ pub(crate) const CRACKED_TOOTH_ROOT: CauseSpec = CauseSpec {
         ),
         number(Name::WidthRad, "half the arc over which it is felt", 0.02, 0.6, Value(0.15)),
     ],
+    laws: |_| vec![cracked_tooth_root()],
     simulated: |on, p| {
         let size = p(Name::AmplitudeArcsec) * on.scales.load / p(Name::FullLoadNM);
         let shape = [Name::AngleRad, Name::WidthRad].map(|name| (name, p(name)));
@@ -416,11 +383,11 @@ pub(crate) const BACKLASH_GROWTH: CauseSpec = CauseSpec {
     name: "backlash_growth",
     words: "wider backlash",
     does: "more clearance than nominal throughout the data",
-    meaning: "a wider clearance throughout",
     kin: Kin::Clearance,
-    drive_field: DriveField::throughout(|placing| placing.set_wear()),
+    place: |placing| placing.set_wear(),
     made_by_loads: true,
     parameters: &[number(Name::GrowthArcsec, "whole width over nominal", 0.0, 10_000.0, Value(40.0))],
+    laws: |_| vec![backlash_growth()],
     simulated: |on, p| {
         let half = on.base.half_backlash.max(1.0);
         backlash_growth().with(&[], [(Role::SIZE, 0.5 * p(Name::GrowthArcsec) / half)])
@@ -433,12 +400,19 @@ pub(crate) const WEAR: CauseSpec = CauseSpec {
     name: "wear",
     words: "wear",
     does: "a clearance that widens from the first row to the last",
-    meaning: "a clearance that widens with travel",
     kin: Kin::Clearance,
     needs: &[Need::Use],
     in_table: InTable::No("it grows with use, and a table stays"),
-    drive_field: DriveField::throughout(|placing| placing.set_wear()),
+    place: |placing| placing.set_wear(),
     parameters: &[number(Name::GrowthArcsec, "whole width, first row to last", 0.0, 10_000.0, Value(40.0))],
+    laws: |on| {
+        let timed = on.rows.recorded.time;
+        let mut laws = vec![wear(Progress::Travel).variant("travel")];
+        laws.extend(timed.then(|| wear(Progress::Time).variant("time")));
+        laws.extend((on.scales.load > 0.0).then(|| wear(Progress::Work).variant("work")));
+        laws.extend(wear_between_sessions(on).filter(|_| timed));
+        laws
+    },
     simulated: |_, p| {
         wear(Progress::Travel).with(&[(Name::Exponent, 1.0)], [(Role::SIZE, 0.5 * p(Name::GrowthArcsec))])
     },
@@ -450,7 +424,6 @@ pub(crate) const STIFFNESS_HARDENING: CauseSpec = CauseSpec {
     name: "stiffness_hardening",
     words: "hardening stiffness",
     does: "stiffer the higher the load",
-    meaning: "stiffer the higher the load",
     kin: Kin::Torque,
     needs: &[Need::Load],
     parameters: &[
@@ -458,6 +431,7 @@ pub(crate) const STIFFNESS_HARDENING: CauseSpec = CauseSpec {
         number(Name::HardeningExponent, "of the torque", 1.2, 8.0, Value(3.0)),
         number(Name::FullLoadNM, "the torque at which it is stated", 1e-3, 1e6, OfLoad(1.0)),
     ],
+    laws: |_| vec![stiffness_hardening()],
     simulated: |on, p| {
         let exponent = p(Name::HardeningExponent);
         let size = p(Name::HardeningArcsec) * (on.scales.load / p(Name::FullLoadNM)).powf(exponent);
@@ -471,11 +445,11 @@ pub(crate) const STIFFNESS_ERROR: CauseSpec = CauseSpec {
     name: "stiffness_error",
     words: "other stiffness",
     does: "wind-up in proportion to nominal, of another size",
-    meaning: "another stiffness than nominal",
     kin: Kin::Torque,
     needs: &[Need::Load],
-    drive_field: DriveField::throughout(|placing| placing.set_stiffness()),
+    place: |placing| placing.set_stiffness(),
     parameters: &[number(Name::StiffnessRatio, "true over nominal", 0.05, 20.0, Value(0.8))],
+    laws: |_| vec![stiffness_error()],
     simulated: |_, p| stiffness_error().with(&[], [(Role::SIZE, 1.0 / p(Name::StiffnessRatio) - 1.0)]),
     ..plain()
 };
@@ -485,7 +459,6 @@ pub(crate) const TORSIONAL_HYSTERESIS: CauseSpec = CauseSpec {
     name: "torsional_hysteresis",
     words: "torsional hysteresis",
     does: "the output lags the torque by what slipping contacts hold",
-    meaning: "springs that slip: the output lags the torque",
     kin: Kin::Friction,
     needs: &[Need::Load],
     in_table: InTable::No("it depends on the torques before, and a table knows the present one alone"),
@@ -494,6 +467,10 @@ pub(crate) const TORSIONAL_HYSTERESIS: CauseSpec = CauseSpec {
         number(Name::HalfWidthArcsec, "half the opening of the large loop at zero torque", 0.0, 1000.0, Value(15.0)),
         number(Name::SlipTorqueNM, "at which the middle spring slips", 1e-3, 1e6, OfLoad(0.2)),
     ],
+    laws: |on| {
+        let spoken_of = on.speaks_of(CauseName::TorsionalHysteresis);
+        spoken_of.then(|| torsional_hysteresis(on)).into_iter().collect()
+    },
     simulated: |on, p| {
         let slip = p(Name::SlipTorqueNM);
         let held = held(on.scales.load, slip);
@@ -509,10 +486,10 @@ pub(crate) const RATCHETING: CauseSpec = CauseSpec {
     name: "ratcheting",
     words: "ratcheting",
     does: "teeth that skipped",
-    meaning: "teeth that skip",
     needs: &[Need::Teeth, Need::Jump],
     in_table: InTable::No("it happens at an instant"),
     parameters: &[number(Name::JumpArcsec, "of the output, whole teeth", -1e5, 1e5, ToothPitch), TIME],
+    laws: |on| ratcheting(on).into_iter().collect(),
     simulated: |_, p| {
         let jump = Jump { time_s: [p(Name::TimeS); 3], height_arcsec: p(Name::JumpArcsec) };
         skipped_teeth(vec![jump], 1.0).with(&[], [(JUMP, 1.0)])

@@ -1,19 +1,18 @@
 //! What the temperature does.
 
 use super::dynamic::columns_of_load;
-use super::{Excitation, Law, Named, Role, Shape, Shaped, by_row, lagged_through, main, main_about, nuisance};
+use super::{Excitation, Law, Named, Role, Shape, Shaped, by_row, lagged, main, main_about, nuisance};
 use crate::causes::ParameterName as Name;
 use crate::causes::spec::{
     CauseName, CauseSpec, InTable, Kin, Need,
     Usual::{OfLoad, Value},
     number, plain,
 };
-use crate::extension::DriveField;
 
 /// Temperature above nominal, felt with a lag of `lag_s`, K. Metal does not know when it is recorded: what was felt
 /// when a session ended nears the temperature at which the next one begins.
 fn warmer_by(on: &Excitation<'_>, lag_s: f64) -> Vec<f64> {
-    let felt = lagged_through(on, &on.rows.temperature, lag_s);
+    let felt = lagged(on, &on.rows.temperature, lag_s, true);
     by_row(on, |k| felt[k] - on.nominal.temperature_c)
 }
 
@@ -207,22 +206,9 @@ fn lubricant_load(on: &Excitation<'_>) -> Law {
             .led_by(
                 |on, shape| vec![main(Drag::of(shape).wind_up(on), 10.0).called(Role::SIZE)],
                 |shape, c| vec![shape.with(&[(Name::DragNM, c.of(Role::SIZE).max(0.0))])],
-            )
-            .led_under_load_alone();
+            );
     law.acts.in_crossings = true;
     law
-}
-
-pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
-    let mut laws = vec![thermal_clearance(on)];
-    if on.base.half_backlash > 0.0 {
-        laws.push(thermal_clearance_shut(on).variant("shut"));
-    }
-    laws.extend([thermal_stiffness(), lubricant_viscosity()]);
-    if on.scales.load > 0.0 && on.nominal.wind_up_arcsec(1.0) > 0.0 {
-        laws.push(lubricant_load(on).variant("load"));
-    }
-    laws
 }
 
 /// The clearance follows the temperature.
@@ -230,14 +216,17 @@ pub(crate) const THERMAL_CLEARANCE: CauseSpec = CauseSpec {
     name: "thermal_clearance",
     words: "clearance with temperature",
     does: "backlash that follows the temperature",
-    meaning: "a clearance that follows the temperature",
     kin: Kin::Clearance,
     needs: &[Need::Temperature, Need::TemperatureSpan],
-    drive_field: DriveField::throughout(|placing| placing.set_expansion()),
+    place: |placing| placing.set_expansion(),
     parameters: &[
         number(Name::ClearanceArcsecPerK, "whole width, wider when warm", -50.0, 50.0, Value(-1.0)),
         number(Name::LagS, "with which it follows", 0.0, 1e5, Value(0.0)),
     ],
+    laws: |on| {
+        let shut = (on.base.half_backlash > 0.0).then(|| thermal_clearance_shut(on).variant("shut"));
+        std::iter::once(thermal_clearance(on)).chain(shut).collect()
+    },
     simulated: |on, p| {
         let lag = (Name::LagS, p(Name::LagS).max(LEAST_LAG_S));
         thermal_clearance(on).with(&[lag], [(Role::SIZE, 0.5 * p(Name::ClearanceArcsecPerK))])
@@ -250,11 +239,11 @@ pub(crate) const THERMAL_STIFFNESS: CauseSpec = CauseSpec {
     name: "thermal_stiffness",
     words: "stiffness with temperature",
     does: "wind-up that follows the temperature",
-    meaning: "a stiffness that follows the temperature",
     kin: Kin::Torque,
     needs: &[Need::Temperature, Need::TemperatureSpan, Need::Load],
-    drive_field: DriveField::throughout(|placing| placing.set_stiffness_per_k()),
+    place: |placing| placing.set_stiffness_per_k(),
     parameters: &[number(Name::StiffnessRelativePerK, "of the stiffness", -0.02, 0.02, Value(-0.004))],
+    laws: |_| vec![thermal_stiffness()],
     simulated: |_, p| thermal_stiffness().with(&[], [(Role::SIZE, -100.0 * p(Name::StiffnessRelativePerK))]),
     ..plain()
 };
@@ -264,7 +253,6 @@ pub(crate) const LUBRICANT_VISCOSITY: CauseSpec = CauseSpec {
     name: "lubricant_viscosity",
     words: "drag of the lubricant",
     does: "a load against the motion that grows with speed and cold",
-    meaning: "drag of the lubricant on the output, that the torque column does not hold",
     kin: Kin::Drag,
     needs: &[Need::Time, Need::Motion],
     in_table: InTable::No("it follows the speed, and a table knows none"),
@@ -274,6 +262,11 @@ pub(crate) const LUBRICANT_VISCOSITY: CauseSpec = CauseSpec {
         number(Name::SpeedExponent, "of the speed", 0.2, 1.2, Value(2.0 / 3.0)),
         number(Name::RelativeDragPerK, "of the drag", -0.15, 0.0, Value(-0.035)),
     ],
+    laws: |on| {
+        let winds_up = on.scales.load > 0.0 && on.nominal.wind_up_arcsec(1.0) > 0.0;
+        let load = winds_up.then(|| lubricant_load(on).variant("load"));
+        std::iter::once(lubricant_viscosity()).chain(load).collect()
+    },
     simulated: |on, p| {
         let [drag, power] = [Name::DragNM, Name::SpeedExponent].map(|name| (name, p(name)));
         lubricant_load(on).with(&[drag, power, (Name::PerK, -p(Name::RelativeDragPerK))], [])
