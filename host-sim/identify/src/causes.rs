@@ -15,7 +15,7 @@ use thiserror::Error;
 
 use crate::diagnosis::candidate::{dynamic, geometry, lobes, sensor, stiffness, thermal};
 use flexspline_base::suggest::did_you_mean;
-pub use parameter::{Factor, Kind, Parameter, ParameterName, TIME, Usual, number};
+pub use parameter::{Factor, Kind, ParameterName, ParameterSpec, TIME, Usual, number};
 use spec::CauseSpec;
 pub(crate) use spec::OF_THE_OUTPUT_ENCODER;
 
@@ -68,7 +68,7 @@ causes! {
     Ratcheting = stiffness::RATCHETING,
 }
 
-/// What the misfit of a law may be taken for: most of all another law of its kin.
+/// Laws whose misfit may be taken for each other: most of all within a kin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kin {
     /// Shape and place of wheels and generator: waves of the generator angle.
@@ -106,7 +106,7 @@ impl Kin {
     }
 }
 
-/// What data have to hold to speak of a cause.
+/// A condition that data have to meet before they say anything of a cause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Need {
     /// The numbers of teeth.
@@ -157,7 +157,7 @@ impl Need {
         }
     }
 
-    /// What would have to be recorded, or given; nothing that a new recording brings about at will.
+    /// The recording, or the number, that would meet it; none where no recording does at will.
     #[must_use]
     pub(crate) const fn remedy(self) -> Option<&'static str> {
         match self {
@@ -179,7 +179,7 @@ impl Need {
     }
 }
 
-/// What an order is counted against.
+/// The turn that an order is counted in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Turn {
     /// The wave on the flexspline.
@@ -199,7 +199,7 @@ pub enum Turn {
 /// How often a wave comes in a turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Multiple {
-    /// So often.
+    /// This number of times.
     Fixed(f64),
     /// As the parameter `harmonic` says; without it once and twice.
     Harmonic,

@@ -12,7 +12,7 @@ use super::context::{Context, quoted, table_image, table_of};
 use super::tables::fresh_table;
 use super::{Failure, bad_input, say, within};
 use flexspline_base::output::Outputs;
-use flexspline_identify::causes::{Parameter, Usual};
+use flexspline_identify::causes::{ParameterSpec, Usual};
 use flexspline_identify::extension::{self, CauseEntry};
 use flexspline_identify::measurement::{ColumnMap, Session, read};
 use flexspline_identify::nominal::Nominal;
@@ -326,7 +326,7 @@ fn text(truth: &Truth, out: &std::path::Path) -> String {
 
 /// An effect of `--list` with `--json`.
 fn listed(effect: &Definition) -> Value {
-    let parameter = |of: &Parameter| {
+    let parameter = |of: &ParameterSpec| {
         json!({
             "name": of.name.as_str(), "meaning": of.meaning, "range": of.range, "allowed": of.allowed(),
             "usual": usual(of),
@@ -339,7 +339,7 @@ fn listed(effect: &Definition) -> Value {
 }
 
 /// Default of a parameter.
-fn usual(parameter: &Parameter) -> String {
+fn usual(parameter: &ParameterSpec) -> String {
     match parameter.usual {
         Usual::Value(value) => match parameter.words.get(value as usize) {
             Some(word) => format!("default {word}"),

@@ -45,7 +45,6 @@ names! {
     Events = "events",
     EveryRows = "every_rows",
     Exponent = "exponent",
-    Factor = "factor",
     FrequencyHz = "frequency_hz",
     FullLoadNM = "full_load_n_m",
     Gain = "gain",
@@ -82,7 +81,7 @@ names! {
     WidthRad = "width_rad",
 }
 
-/// What kind of number a parameter is.
+/// Kinds of parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// A size: how wrong a law is, is a share of it.
@@ -94,7 +93,7 @@ pub enum Kind {
 }
 
 impl ParameterName {
-    /// What kind of number it is.
+    /// Its kind.
     #[must_use]
     pub const fn kind(self) -> Kind {
         match self {
@@ -143,7 +142,7 @@ pub enum Usual {
 
 /// A parameter of a cause or of a data fault, as it may be given.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Parameter {
+pub struct ParameterSpec {
     /// Name; the unit is its end.
     pub name: ParameterName,
     /// Its description.
@@ -156,7 +155,7 @@ pub struct Parameter {
     pub words: &'static [&'static str],
 }
 
-impl Parameter {
+impl ParameterSpec {
     /// Allowed values, in words.
     #[must_use]
     pub fn allowed(&self) -> String {
@@ -183,26 +182,26 @@ pub enum Factor {
 
 /// A parameter that is a number.
 #[must_use]
-pub const fn number(name: ParameterName, meaning: &'static str, low: f64, high: f64, usual: Usual) -> Parameter {
-    Parameter { name, meaning, range: [low, high], usual, words: &[] }
+pub const fn number(name: ParameterName, meaning: &'static str, low: f64, high: f64, usual: Usual) -> ParameterSpec {
+    ParameterSpec { name, meaning, range: [low, high], usual, words: &[] }
 }
 
-pub(crate) const fn phase(meaning: &'static str) -> Parameter {
+pub(crate) const fn phase(meaning: &'static str) -> ParameterSpec {
     number(ParameterName::PhaseRad, meaning, -TAU, TAU, Usual::Drawn(0.0, TAU))
 }
 
-pub(crate) const fn microns(meaning: &'static str, usual: f64) -> Parameter {
+pub(crate) const fn microns(meaning: &'static str, usual: f64) -> ParameterSpec {
     number(ParameterName::AmplitudeUm, meaning, 0.0, 100.0, Usual::Value(usual))
 }
 
-pub(crate) const ARCSECONDS: Parameter =
+pub(crate) const ARCSECONDS: ParameterSpec =
     number(ParameterName::AmplitudeArcsec, "the same at the output", 0.0, 1000.0, Usual::Follows);
-pub(crate) const HALF_LOAD: Parameter =
+pub(crate) const HALF_LOAD: ParameterSpec =
     number(ParameterName::HalfLoadNM, "load at which more teeth have halved it", 0.01, 1e6, Usual::OfLoad(0.35));
-pub(crate) const HARMONIC: Parameter =
+pub(crate) const HARMONIC: ParameterSpec =
     number(ParameterName::Harmonic, "waves around the wheel", 1.0, 12.0, Usual::Value(2.0));
 /// The instant of an event.
-pub const TIME: Parameter = number(ParameterName::TimeS, "when", -1e9, 1e12, Usual::Instant(0.3, 0.7));
+pub const TIME: ParameterSpec = number(ParameterName::TimeS, "when", -1e9, 1e12, Usual::Instant(0.3, 0.7));
 pub(crate) const WHEELS: &[&str] = &["flexspline", "circular_spline"];
 /// Words for the parameter `encoder`.
 pub(crate) const ENCODERS: &[&str] = &["generator", "output"];

@@ -1,7 +1,7 @@
 //! The properties of a cause. Each stands in one file with its law, and in one line of the list in [`super`].
 
 pub(crate) use super::parameter::{ARCSECONDS, ENCODERS, HALF_LOAD, HARMONIC, WHEELS, microns, phase};
-pub(crate) use super::{CauseName, Factor, InTable, Kin, Multiple, Need, Parameter, TIME, Turn, Usual, number};
+pub(crate) use super::{CauseName, Factor, InTable, Kin, Multiple, Need, ParameterSpec, TIME, Turn, Usual, number};
 
 use super::ParameterName as Name;
 use crate::diagnosis::candidate::{Excitation, Law, Simulated, Values};
@@ -26,7 +26,7 @@ pub(crate) struct CauseSpec {
     /// Sets the fields of a drive file that hold it; nothing where none does.
     pub place: fn(&mut Placing<'_>),
     /// Its parameters as they may be given, under the names that the diagnosis reports.
-    pub parameters: &'static [Parameter],
+    pub parameters: &'static [ParameterSpec],
     /// Pairs of parameters of which one follows from the other, with the factor from the first to the second.
     pub twins: &'static [(Name, Name, Factor)],
     /// Whether a load on the output makes much the same error, one that goes with the speed, the direction or the angle

@@ -10,7 +10,7 @@ use flexspline::Table;
 
 use super::averaged::Averaged;
 use super::base::{Base, PlayLaw};
-use super::candidate::{Acting, Column, Excitation, Law, Role, Scales, Tolerance, library, together};
+use super::candidate::{Acting, Excitation, Law, LawUnits, Regressor, Tag, Tolerance, library, together};
 use super::model::{Problem, Scaffold, terms_at};
 use super::noise::Whitener;
 use super::report::Parameter;
@@ -29,7 +29,7 @@ pub struct FittedCause {
     law: Law,
     places: Vec<f64>,
     /// What the columns are, and their coefficients.
-    roles: Vec<Role>,
+    roles: Vec<Tag>,
     coefficients: Vec<f64>,
     /// Parameters with their uncertainty, as in [`super::report::Cause`].
     pub parameters: BTreeMap<&'static str, Parameter>,
@@ -53,7 +53,7 @@ pub struct FittedLaw {
     /// Coefficients of its columns.
     pub(crate) coefficients: Vec<f64>,
     /// What the coefficients are counted in.
-    pub(crate) scales: Scales,
+    pub(crate) scales: LawUnits,
     /// How the flank was found to change below friction.
     pub(crate) play: PlayLaw,
     /// Stiffness at the least torque, N·m/rad, and backlash, arcsec, of the nominal model that it was fitted beside:
@@ -102,7 +102,7 @@ impl FittedLaw {
         if law.shapes.len() != self.shape.len() {
             return None;
         }
-        let roles: Vec<Role> = law.columns(on, &self.shape).iter().map(|column| column.role).collect();
+        let roles: Vec<Tag> = law.columns(on, &self.shape).iter().map(|column| column.role).collect();
         (roles.len() == self.coefficients.len()).then(|| Acting {
             law,
             values: self.shape.clone(),
@@ -113,8 +113,8 @@ impl FittedLaw {
 }
 
 /// Adds what the columns of a model predict: not what was before the rows that it was fitted to.
-fn add_part(sum: &mut [f64], columns: &[Column], coefficients: &[f64]) {
-    let predicts = |column: &Column| !matches!(column.tolerance, Tolerance::History(_));
+fn add_part(sum: &mut [f64], columns: &[Regressor], coefficients: &[f64]) {
+    let predicts = |column: &Regressor| !matches!(column.tolerance, Tolerance::History(_));
     for (column, c) in columns.iter().zip(coefficients).filter(|(column, _)| predicts(column)) {
         add_scaled(sum, &column.values, *c);
     }
@@ -123,7 +123,7 @@ fn add_part(sum: &mut [f64], columns: &[Column], coefficients: &[f64]) {
 /// The nominal model recalibrated, and with causes.
 pub struct Extended {
     play: PlayLaw,
-    scales: Scales,
+    scales: LawUnits,
     recalibrated: Vec<f64>,
     base: Vec<f64>,
     causes: Vec<FittedCause>,
@@ -207,7 +207,7 @@ impl Extended {
         let rows = Rows::new(sessions, nominal).learning_from(used);
         super::check(&rows)?;
         let (base, jumps) = prepare::base(&rows, nominal, table);
-        let scales = Scales::new(&rows, settings.pitch_radius_mm, jumps);
+        let scales = LawUnits::new(&rows, settings.pitch_radius_mm, jumps);
         let on = Excitation::new(&rows, nominal, &base, &scales);
         let laws = library(&on);
         let uncertain = prepare::uncertain(&on, &[], &[]);
@@ -246,7 +246,7 @@ impl Extended {
             let Acting { roles, coefficients, .. } = term.acting(selected.fit.of(k));
             (roles, coefficients)
         });
-        let fitted: Vec<(Vec<Role>, Vec<f64>)> = fitted.collect();
+        let fitted: Vec<(Vec<Tag>, Vec<f64>)> = fitted.collect();
         drop(selected);
         let mut laws: Vec<Option<Law>> = laws.into_iter().map(Some).collect();
         let cause = |(((law, places), (roles, coefficients)), known): (((usize, Vec<f64>), _), uncertainty::Known)| {

@@ -59,7 +59,7 @@ use crate::causes::CauseName;
 use crate::measurement::Session;
 use crate::nominal::Nominal;
 use averaged::Averaged;
-use candidate::{Excitation, Label, Law, Scales, library, line, unnamed};
+use candidate::{Excitation, Label, Law, LawUnits, library, line, unnamed};
 pub use explain::Explanation;
 pub use extended::{Extended, FittedCause, FittedLaw, Series, added_by};
 use model::{Problem, Term, terms_at};
@@ -188,7 +188,7 @@ pub(crate) fn diagnose_extended(
     check(&rows)?;
     progress(0, 4, "nominal model");
     let (base, jumps) = prepare::base(&rows, nominal, table);
-    let scales = Scales::new(&rows, settings.pitch_radius_mm, jumps);
+    let scales = LawUnits::new(&rows, settings.pitch_radius_mm, jumps);
     let on = Excitation::new(&rows, nominal, &base, &scales);
     progress(1, 4, "causes");
     let search = Search::new(&on, settings)?;

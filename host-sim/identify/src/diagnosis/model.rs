@@ -10,7 +10,7 @@ use std::ops::Range;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::averaged::{Averaged, Grain};
-use super::candidate::{Acting, Among, Coefficients, Column, Excitation, Law, Role, Tolerance, left_by};
+use super::candidate::{Acting, Among, Coefficients, Excitation, Law, Regressor, Tag, Tolerance, left_by};
 use super::linear::{Gram, Prior, Solution, products, solve};
 use super::noise::Whitener;
 use super::products::{Products, Set};
@@ -148,7 +148,7 @@ impl<'a> Problem<'a> {
 }
 
 /// Columns of a law as rows give them.
-fn columns(law: &Law, extent: Extent, on: &Excitation<'_>, places: &[f64]) -> Vec<Column> {
+fn columns(law: &Law, extent: Extent, on: &Excitation<'_>, places: &[f64]) -> Vec<Regressor> {
     let values = law.values(places);
     let mut columns = match extent {
         Extent::Lead => law.lead_columns(on, &values),
@@ -166,15 +166,15 @@ pub(crate) struct White {
     /// What coefficients may be.
     pub tolerances: Vec<Tolerance>,
     /// What the columns are.
-    roles: Vec<Role>,
+    roles: Vec<Tag>,
     /// Root mean square of each averaged column.
     size: Vec<f64>,
 }
 
 impl White {
     /// Averages columns and makes them white; returns the averages as well.
-    fn of(problem: &Problem<'_>, law: &Law, columns: Vec<Column>) -> (Vec<Vec<f64>>, White) {
-        let average = |c: &Column| problem.grain.average(law.smooth(), &problem.whitener, &c.values);
+    fn of(problem: &Problem<'_>, law: &Law, columns: Vec<Regressor>) -> (Vec<Vec<f64>>, White) {
+        let average = |c: &Regressor| problem.grain.average(law.smooth(), &problem.whitener, &c.values);
         let averaged: Vec<Vec<f64>> = columns.iter().map(average).collect();
         let columns_white = Set::new(problem.whitener.whiten_each(&averaged));
         let size = averaged.iter().map(|c| rms(c)).collect();

@@ -23,7 +23,7 @@ use super::{CauseSet, DiagnosisError, Extended, FittedCause, Settings, diagnose_
 use super::{blurred, channels, quieted, torque_zero, zeros};
 use crate::causes::CauseName;
 use crate::extension::{
-    Agreement, CauseEntry, Evaluation, EvaluationError, ExtendedTables, FoundGeometry, Model, Remake, RemakeError,
+    CauseEntry, Evaluation, EvaluationError, ExtendedTables, FemAgreement, FoundGeometry, Model, Remake, RemakeError,
     TableSubject, causes_to_toml, check_by_fem, evaluate, found_geometry,
 };
 use crate::measurement::{
@@ -372,7 +372,7 @@ pub struct Extension {
     pub drive_fields: Vec<String>,
     /// What the FEM of that drive says.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub fem_agreement: Option<Agreement>,
+    pub fem_agreement: Option<FemAgreement>,
     /// Causes that stand in `[extension]` of drive-extended.toml.
     pub named_causes: Vec<CauseName>,
     /// Compensation by session held out, and which causes are in the tables.

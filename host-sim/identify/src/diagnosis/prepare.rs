@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::LEAST_ROWS;
 use super::averaged::{Averaged, Grain};
 use super::base::{Base, Floating, NEAR_FRICTION, few};
-use super::candidate::{Column, Excitation, Law, Tolerance};
+use super::candidate::{Excitation, Law, Regressor, Tolerance};
 use super::linear::{Gram, Prior, solve};
 use super::model::{Problem, Term};
 use super::noise::{Noise, Whitener, white_level};
@@ -438,7 +438,8 @@ fn free_columns(on: &Excitation<'_>, laws: &[Law], plain: &Whitener, grain: &Gra
         let spread = if tried.len() > 8 { tried.len() / 2 } else { (tried.len() / 4).max(1) };
         let on = grain.excitation(law.smooth(), on);
         let all = tried.iter().step_by(spread).flat_map(|places| law.lead_columns(&on, &law.values(places)));
-        let counts = |column: &Column| law.search.whole_beside_noise || matches!(column.tolerance, Tolerance::Main(_));
+        let counts =
+            |column: &Regressor| law.search.whole_beside_noise || matches!(column.tolerance, Tolerance::Main(_));
         all.filter(counts)
             .map(|column| {
                 let averaged = grain.average(law.smooth(), plain, &column.values);

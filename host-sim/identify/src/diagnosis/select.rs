@@ -7,7 +7,7 @@ use std::collections::{HashMap, HashSet};
 
 use rayon::prelude::*;
 
-use super::candidate::{Coefficients, Law, Role, Tolerance};
+use super::candidate::{Coefficients, Law, Tag, Tolerance};
 use super::held_out::own_zero;
 use super::model::{Fit, Problem, Scaffold, Term, among_each_other};
 use super::thresholds::selection::*;
@@ -443,7 +443,7 @@ fn tolerance(problem: &Problem<'_>, fit: &Fit, law: &Law) -> Option<Judged> {
     };
     let change = fit.solution.coefficients[at];
     let z = change / floating[at].spread;
-    let physical = change >= -LARGEST_SHARE_LOST && law.physical(&[], Coefficients::new(&[Role::SIZE], &[z]));
+    let physical = change >= -LARGEST_SHARE_LOST && law.physical(&[], Coefficients::new(&[Tag::SIZE], &[z]));
     let out = physical && z.abs() > OUT_OF_TOLERANCE;
     // On the wrong side it counts as far below as it has gone there.
     Some(Judged::number(Gate::Tolerance, if physical { z.abs() } else { -z.abs() }, OUT_OF_TOLERANCE, out))

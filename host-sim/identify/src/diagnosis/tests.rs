@@ -569,7 +569,7 @@ fn a_form_error_of_the_cam_that_averages_would_hide_is_found_and_costs_nothing_w
         let rows = super::Rows::new(sessions, &drive);
         let (base, jumps) = super::prepare::base(&rows, &drive, None);
         let settings = Settings::default();
-        let scales = super::Scales::new(&rows, settings.pitch_radius_mm, jumps);
+        let scales = super::LawUnits::new(&rows, settings.pitch_radius_mm, jumps);
         let on = super::Excitation::new(&rows, &drive, &base, &scales);
         let uncertain = super::prepare::uncertain(&on, &[], &[]);
         super::resolution(&on, &super::library(&on), &uncertain, settings.averages, &[]).stride
@@ -944,7 +944,7 @@ fn excited(look: impl FnOnce(&super::Excitation<'_>, &[super::Law])) {
 fn excited_by(sessions: &[Session], drive: &Nominal, look: impl FnOnce(&super::Excitation<'_>)) {
     let rows = super::Rows::new(sessions, drive);
     let (base, jumps) = super::prepare::base(&rows, drive, None);
-    let scales = super::Scales::new(&rows, Settings::default().pitch_radius_mm, jumps);
+    let scales = super::LawUnits::new(&rows, Settings::default().pitch_radius_mm, jumps);
     look(&super::Excitation::new(&rows, drive, &base, &scales));
 }
 
@@ -970,7 +970,7 @@ fn a_clearance_shut_by_the_cold_is_never_less_than_nothing() {
 
 #[test]
 fn every_cause_has_a_law_that_knows_its_own_columns_and_shape_parameters() {
-    use super::candidate::{Coefficients, Role};
+    use super::candidate::{Coefficients, Tag};
     let sessions = data(&["ratcheting"], 9);
     excited_by(&sessions, &catalogue_drive(), |on| {
         let laws = super::library(on);
@@ -981,7 +981,7 @@ fn every_cause_has_a_law_that_knows_its_own_columns_and_shape_parameters() {
         for law in &laws {
             // Not in the middle, where a change per kelvin is none.
             let values = law.values(&vec![0.4; law.shapes.len()]);
-            let roles: Vec<Role> = law.columns(on, &values).iter().map(|column| column.role).collect();
+            let roles: Vec<Tag> = law.columns(on, &values).iter().map(|column| column.role).collect();
             let ones = vec![1.0; roles.len()];
             let named = law.parameters(on, &values, Coefficients::new(&roles, &ones));
             assert!(!named.is_empty() && named.iter().all(|(_, value)| value.is_finite()), "{}: {named:?}", law.label);
@@ -990,7 +990,7 @@ fn every_cause_has_a_law_that_knows_its_own_columns_and_shape_parameters() {
             assert!(none != named, "{}: its coefficients say nothing", law.label);
             let _ = law.physical(&values, Coefficients::new(&roles, &ones));
             let _ = law.zones(on, &values, Coefficients::new(&roles, &ones));
-            let roles: Vec<Role> = law.lead_columns(on, &values).iter().map(|column| column.role).collect();
+            let roles: Vec<Tag> = law.lead_columns(on, &values).iter().map(|column| column.role).collect();
             for begun in law.beginnings(&values, Coefficients::new(&roles, &vec![1.0; roles.len()])) {
                 assert_eq!(begun.len(), law.shapes.len(), "{}", law.label);
             }
@@ -1139,12 +1139,12 @@ fn a_wheel_so_far_off_that_no_clearance_is_left_is_begun_with_its_own_size() {
 
 #[test]
 fn two_displacements_together_are_the_same_in_either_order_and_not_the_sum_of_both() {
-    use super::candidate::{Acting, Role, together};
+    use super::candidate::{Acting, Tag, together};
     excited(|on, laws| {
         let acting = |cause: CauseName, phase: f64, size: f64| {
             let law = law(laws, cause);
             let values = vec![phase, size, 50.0, 10.0];
-            Acting { law, values, roles: vec![Role::SIZE], coefficients: vec![1.0] }
+            Acting { law, values, roles: vec![Tag::SIZE], coefficients: vec![1.0] }
         };
         let pair = || {
             [acting(CauseName::CircularSplineEccentricity, 0.4, 18.0), acting(CauseName::FlexsplineRunout, 2.1, 12.0)]
@@ -1167,18 +1167,18 @@ fn two_displacements_together_are_the_same_in_either_order_and_not_the_sum_of_bo
 
 #[test]
 fn a_load_that_gravity_adds_passes_through_the_springs_that_slip() {
-    use super::candidate::{Acting, Role, together};
+    use super::candidate::{Acting, Tag, together};
     excited(|on, laws| {
         let gravity = || Acting {
             law: law(laws, CauseName::GravityTorque),
             values: vec![15.0, 0.7],
-            roles: vec![Role::SIZE],
+            roles: vec![Tag::SIZE],
             coefficients: vec![1.0],
         };
         let slipping = || Acting {
             law: law(laws, CauseName::TorsionalHysteresis),
             values: vec![10.0],
-            roles: vec![Role::SIZE],
+            roles: vec![Tag::SIZE],
             coefficients: vec![20.0],
         };
         let beside = together(on, &[gravity(), slipping()]);
@@ -1192,12 +1192,12 @@ fn a_load_that_gravity_adds_passes_through_the_springs_that_slip() {
 
 #[test]
 fn a_softer_spring_gives_way_to_drag_and_gravity_as_well() {
-    use super::candidate::{Acting, Role, together};
+    use super::candidate::{Acting, Tag, together};
     excited(|on, laws| {
         let spring = || Acting {
             law: law(laws, CauseName::StiffnessError),
             values: vec![],
-            roles: vec![Role::SIZE],
+            roles: vec![Tag::SIZE],
             coefficients: vec![0.6],
         };
         let drags = |law: &&super::Law| law.is(CauseName::LubricantViscosity) && law.is_load();
@@ -1205,12 +1205,12 @@ fn a_softer_spring_gives_way_to_drag_and_gravity_as_well() {
         for (law, values) in
             [(drag, vec![3.0, 0.8, 0.03, 0.005]), (law(laws, CauseName::GravityTorque), vec![5.0, 0.7])]
         {
-            let load = || Acting { law, values: values.clone(), roles: vec![Role::SIZE], coefficients: vec![1.0] };
+            let load = || Acting { law, values: values.clone(), roles: vec![Tag::SIZE], coefficients: vec![1.0] };
             let (alone, beside) = (together(on, &[load()]), together(on, &[spring(), load()]));
             // Wind-up and play together, and play alone: what is left is wind-up.
             let [of_alone, of_beside] = [&alone[0], &beside[1]];
             for k in 0..on.rows.len() {
-                let wound = |columns: &[super::candidate::Column]| columns[0].values[k] - columns[1].values[k];
+                let wound = |columns: &[super::candidate::Regressor]| columns[0].values[k] - columns[1].values[k];
                 assert!((wound(of_beside) - 1.6 * wound(of_alone)).abs() < 1e-9, "{} row {k}", law.label);
             }
             assert_eq!(beside[0][0].values, on.base.wind_up, "the load is not counted twice");

@@ -101,7 +101,7 @@ impl<'a> Sample<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnosis::Scales;
+    use crate::diagnosis::LawUnits;
     use crate::measurement::Session;
     use crate::synthesize::catalogue_drive;
 
@@ -119,7 +119,7 @@ mod tests {
         let nominal = catalogue_drive();
         let rows = Rows::new(sessions, &nominal);
         let base = Base::new(&rows, &nominal, None);
-        let scales = Scales::new(&rows, 48.7, Vec::new());
+        let scales = LawUnits::new(&rows, 48.7, Vec::new());
         let on = Excitation::new(&rows, &nominal, &base, &scales);
         look(&rows, Thinned::of(&on, stride));
     }

@@ -1,6 +1,6 @@
 //! Causes that are geometry, as fields of a drive that the FEM runs.
 //!
-//! What is read is not the numbers of a cause but what it adds to the error under a light load on either flank: it is
+//! Not the numbers of a cause are read, but its part of the error under a light load on either flank: it is
 //! projected on the order that the imperfection has, and turned into size and place by the kinematics of rigid teeth.
 //! With `A` in arc-seconds, `x` the angle of the wave on the part, `a` the flank angle, `+-` the flank that carries
 //! under a positive and a negative load:
@@ -24,6 +24,7 @@ use crate::causes::{CauseName, ParameterName as Name};
 use crate::diagnosis::Extended;
 use crate::measurement::Session;
 use crate::nominal::Nominal;
+use flexspline_base::robust::rms;
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::drive::{
     DamagedFlank, DamagedTooth, Drive, DriveError, GeneratorKind, Harmonic, SleeveKind, Wheel,
@@ -68,7 +69,7 @@ fn wave_of(error: &[f64], angle: impl Fn(usize) -> f64, order: f64) -> Wave {
     error.iter().enumerate().map(|(k, e)| Wave::cis(order * angle(k)) * (2.0 / n * e)).sum()
 }
 
-/// What a cause adds under the probing load on either flank, over a turn of the output.
+/// The part of each cause under the probing load on either flank, over a turn of the output.
 pub(crate) struct Probe {
     generator: Vec<f64>,
     ratio: f64,
@@ -373,10 +374,10 @@ pub(crate) fn found_geometry(
 
 /// How well the FEM of a drive agrees with what was found.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Agreement {
-    /// What the causes add, rms over the places looked at, arcsec.
+pub struct FemAgreement {
+    /// The part of the causes, rms over the places looked at, arcsec.
     pub found_rms_arcsec: f64,
-    /// What the FEM of the drive adds, less that, rms, arcsec.
+    /// The change of the error by FEM, less that part, rms, arcsec.
     pub difference_rms_arcsec: f64,
 }
 
@@ -397,7 +398,7 @@ pub(crate) fn check_by_fem(
     extended: &Extended,
     (nominal, table): (&Nominal, Option<&Table<'_>>),
     orientation_rad: Option<f64>,
-) -> Result<Agreement, SolveError> {
+) -> Result<FemAgreement, SolveError> {
     let pitch = TAU / f64::from(before.flexspline.teeth);
     let places: Vec<f64> = (0..PLACES).map(|k| f64::from(k * PITCHES_APART) * pitch).collect();
     let probe = Probe::new(extended, nominal, table, places.clone(), orientation_rad.unwrap_or(0.0));
@@ -407,17 +408,19 @@ pub(crate) fn check_by_fem(
         .filter(|mapped| mapped.by_angle)
         .filter_map(|mapped| extended.causes().iter().position(|fitted| fitted.name() == mapped.cause))
         .collect();
-    let (mut found, mut difference, mut count) = (0.0, 0.0, 0);
+    let (mut found, mut difference) = (Vec::new(), Vec::new());
+    let centred = |values: Vec<f64>| {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        values.into_iter().map(move |value| value - mean)
+    };
     let smooth = |drive: &Drive| {
         let mut drive = drive.clone();
         drive.flanks.friction_coefficient = 0.0;
         drive
     };
     let temperature_c = before.temperature.reference_c;
-    let problems =
-        [&smooth(before), &smooth(&after.drive)].map(|drive| Problem::new(drive, kind, temperature_c, settings));
-    let [ideal, built] = problems;
-    let (ideal, built) = (ideal?, built?);
+    let of = |drive: &Drive| Problem::new(&smooth(drive), kind, temperature_c, settings);
+    let (ideal, built) = (of(before)?, of(&after.drive)?);
     for (flank, load) in [PROBE_N_M, -PROBE_N_M].into_iter().enumerate() {
         let reference = stands(&ideal, 0.0, load)?;
         let by_fem = places
@@ -426,17 +429,12 @@ pub(crate) fn check_by_fem(
             .collect::<Result<Vec<f64>, SolveError>>()?;
         let by_causes: Vec<f64> =
             (0..places.len()).map(|k| chosen.iter().map(|cause| probe.error[flank][*cause][k]).sum()).collect();
-        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-        let (mean_fem, mean_causes) = (mean(&by_fem), mean(&by_causes));
-        for (a, b) in by_fem.iter().zip(&by_causes) {
-            let (a, b) = (a - mean_fem, b - mean_causes);
-            found += b * b;
-            difference += (a - b).powi(2);
-            count += 1;
+        for (by_fem, by_causes) in centred(by_fem).zip(centred(by_causes)) {
+            found.push(by_causes);
+            difference.push(by_fem - by_causes);
         }
     }
-    let rms = |square: f64| (square / f64::from(count)).sqrt();
-    Ok(Agreement { found_rms_arcsec: rms(found), difference_rms_arcsec: rms(difference) })
+    Ok(FemAgreement { found_rms_arcsec: rms(&found), difference_rms_arcsec: rms(&difference) })
 }
 
 /// Error of the drive deformed at a generator angle, then loaded, arcsec.
@@ -449,6 +447,7 @@ fn stands(problem: &Problem, generator_rad: f64, torque_n_m: f64) -> Result<f64,
 #[cfg(test)]
 mod tests {
     use super::*;
+    use flexspline_mechanics::drive::AsBuilt;
     use flexspline_mechanics::mesh::MeshLevel;
     use flexspline_mechanics::stepping::Method;
 
@@ -472,14 +471,16 @@ mod tests {
     #[test]
     #[ignore = "long: tests/run slow"]
     fn the_fem_agrees_with_the_closed_forms_in_sign_place_and_size() {
-        type Change = fn(&mut Drive);
+        type Change = fn(&mut AsBuilt);
         type Read = fn([Wave; 2], f64) -> Wave;
         const PARTS: usize = 5;
+        /// Size, µm, and place, degrees.
+        const AT: (f64, f64) = (5.0, 50.0);
         fn whole([plus, minus]: [Wave; 2], _: f64) -> Wave {
             (plus + minus) * 0.5
         }
         let settings = SolverSettings { method: Method::Fast, mesh: MeshLevel::Coarse, ..SolverSettings::default() };
-        // Half a turn of the wave on the part, in as few places as tell the second order from the fourth and sixth.
+        // Half a turn of the wave on the part, in as few places as separate the second order from the fourth and sixth.
         let share = |on_circular_spline: bool| if on_circular_spline { 94.0 / 95.0 } else { 1.0 };
         let psi = |k: usize, share: f64| k as f64 * PI / PARTS as f64 / share;
         // At these places, with either flank.
@@ -489,83 +490,50 @@ mod tests {
             [1.0, -1.0].map(|flank| (0..PARTS).map(|k| at(k, flank)).collect::<Vec<f64>>())
         };
         let ideal = [false, true].map(|on_circular_spline| errors(&Drive::hhd_95(), share(on_circular_spline)));
-        let cases: [(&str, Change, Read, bool, f64, f64, f64); 6] = [
+        let cases: [(&str, Change, Read, bool, f64); 6] = [
             (
                 "circular-spline eccentricity",
-                |d| {
-                    d.as_built.circular_spline_eccentricity_um = 5.0;
-                    d.as_built.circular_spline_eccentricity_phase_deg = 50.0;
-                },
+                |b| (b.circular_spline_eccentricity_um, b.circular_spline_eccentricity_phase_deg) = AT,
                 displaced,
                 true,
                 44.635,
-                5.0,
-                50.0,
             ),
             (
                 "flexspline runout",
-                |d| {
-                    d.as_built.flexspline_runout_um = 5.0;
-                    d.as_built.flexspline_runout_phase_deg = 50.0;
-                },
+                |b| (b.flexspline_runout_um, b.flexspline_runout_phase_deg) = AT,
                 displaced,
                 false,
                 44.635,
-                5.0,
-                50.0,
             ),
             (
                 "axis displaced",
-                |d| {
-                    d.as_built.circular_spline_offset_um = 5.0;
-                    d.as_built.circular_spline_offset_direction_deg = 50.0;
-                },
+                |b| (b.circular_spline_offset_um, b.circular_spline_offset_direction_deg) = AT,
                 displaced,
                 false,
                 44.635,
-                5.0,
-                50.0,
             ),
-            (
-                "ovality",
-                |d| {
-                    d.as_built.circular_spline_ovality_um = 5.0;
-                    d.as_built.circular_spline_ovality_phase_deg = 50.0;
-                },
-                oval,
-                true,
-                48.7,
-                5.0,
-                50.0,
-            ),
+            ("ovality", |b| (b.circular_spline_ovality_um, b.circular_spline_ovality_phase_deg) = AT, oval, true, 48.7),
             (
                 "flexspline pitch",
-                |d| {
-                    d.as_built.flexspline_pitch_harmonics =
-                        vec![Harmonic { order: 2, amplitude_um: 5.0, phase_deg: 50.0 }];
-                },
+                |b| b.flexspline_pitch_harmonics = vec![Harmonic { order: 2, amplitude_um: AT.0, phase_deg: AT.1 }],
                 whole,
                 false,
                 48.35,
-                5.0,
-                50.0,
             ),
             (
                 "circular-spline pitch",
-                |d| {
-                    d.as_built.circular_spline_pitch_harmonics =
-                        vec![Harmonic { order: 2, amplitude_um: 5.0, phase_deg: 50.0 }];
+                |b| {
+                    b.circular_spline_pitch_harmonics = vec![Harmonic { order: 2, amplitude_um: AT.0, phase_deg: AT.1 }]
                 },
                 |waves, a| -whole(waves, a),
                 true,
                 49.05,
-                5.0,
-                50.0,
             ),
         ];
-        for (what, change, read, on_circular_spline, radius, size_um, place_deg) in cases {
+        let (size_um, place_deg) = AT;
+        for (what, change, read, on_circular_spline, radius) in cases {
             let mut drive = Drive::hhd_95();
-            change(&mut drive);
+            change(&mut drive.as_built);
             let share = share(on_circular_spline);
             let found = errors(&drive, share);
             let found = [0, 1].map(|flank| {

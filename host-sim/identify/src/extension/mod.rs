@@ -1,4 +1,4 @@
-//! What a diagnosis says, as a model that the simulator loads again, and as tables that the core compensates with.
+//! The findings of a diagnosis as a model that the simulator loads again, and as tables that the core compensates with.
 //!
 //! * [`Model`]: `drive-extended.toml` of a catalogue drive: the nominal model recalibrated, and `[[extension.cause]]`
 //!   entries.
@@ -17,6 +17,6 @@ pub use compensation::{
     Compensated, Evaluation, EvaluationError, LEAST_SHARE_IMPROVED, NotApplied, Remake, RemakeError, evaluate,
     left_by_core, split,
 };
-pub(crate) use geometry::{Agreement, FoundGeometry, Placing, check_by_fem, found_geometry};
+pub(crate) use geometry::{FemAgreement, FoundGeometry, Placing, check_by_fem, found_geometry};
 pub use model::{CauseEntry, Model, causes_in, causes_to_toml};
 pub(crate) use sampled::{ExtendedTables, TableSubject};

@@ -22,12 +22,12 @@ use toml::de::{DeTable, DeValue};
 
 use crate::causes::{CauseName, ParameterName as Name};
 use crate::diagnosis::base::PlayLaw;
-use crate::diagnosis::candidate::Scales;
+use crate::diagnosis::candidate::LawUnits;
 use crate::diagnosis::prepare::Jump;
 use crate::diagnosis::report::{Cause, Diagnosis, Parameter};
 use crate::diagnosis::{Extended, FittedLaw, added_by};
 use crate::measurement::Session;
-use crate::nominal::{Fixed, Nominal};
+use crate::nominal::{Fixed, Harmonic, Nominal, Teeth};
 use crate::synthesize::{Effect, EffectError, Sizes, added_arcsec, completed};
 use flexspline_base::toml_file::{Entries, Refused, TomlFile, any, each_of, entries_of, one_of, text as text_of};
 use flexspline_mechanics::drive::{DriveError, Problem};
@@ -48,7 +48,7 @@ pub struct CauseEntry {
 pub struct Model {
     /// The nominal model.
     pub nominal: Nominal,
-    /// Findings beside it.
+    /// Causes found in addition.
     pub causes: Vec<CauseEntry>,
 }
 
@@ -99,13 +99,7 @@ impl Model {
         Model { nominal, causes }
     }
 
-    /// The causes as effects that can be simulated.
-    #[must_use]
-    pub fn effects(&self) -> Vec<Effect> {
-        self.causes.iter().filter_map(CauseEntry::effect).collect()
-    }
-
-    /// What the causes add to the error of each session, arcsec: by the models that were fitted where the causes have
+    /// Sum of the causes in the error of each session, arcsec: by the models that were fitted where the causes have
     /// them, and by [`crate::synthesize`] where they have none.
     ///
     /// # Errors
@@ -131,44 +125,35 @@ impl Model {
     #[must_use]
     pub fn to_toml(&self) -> String {
         let n = &self.nominal;
-        let mut text = String::from("[drive]\n");
-        match n.teeth {
-            Some(teeth) => {
-                let fixed = if teeth.fixed == Fixed::Flexspline { "flexspline" } else { "circular_spline" };
-                let _ = writeln!(
-                    text,
-                    "flexspline_teeth = {}\ncircular_spline_teeth = {}\nfixed = \"{fixed}\"",
-                    teeth.flexspline, teeth.circular_spline
-                );
+        let drive = match n.teeth {
+            Some(Teeth { flexspline, circular_spline, fixed }) => {
+                let fixed = if fixed == Fixed::Flexspline { "flexspline" } else { "circular_spline" };
+                format!(
+                    "flexspline_teeth = {flexspline}\ncircular_spline_teeth = {circular_spline}\nfixed = \"{fixed}\""
+                )
             }
-            None => {
-                let _ = writeln!(text, "ratio = {:?}", n.ratio);
-            }
-        }
-        let steps: Vec<String> = n.stiffness.iter().map(|[torque, k]| format!("[{torque:?}, {k:?}]")).collect();
-        let _ = writeln!(
-            text,
-            "\n[nominal]\nstiffness_n_m_per_rad = [{}]\nbacklash_arcsec = {:?}\nfriction_torque_n_m = \
-             {:?}\ntemperature_c = {:?}",
-            steps.join(", "),
+            None => format!("ratio = {:?}", n.ratio),
+        };
+        let steps = n.stiffness.iter().map(|[torque, k]| format!("[{torque:?}, {k:?}]")).collect::<Vec<_>>().join(", ");
+        let harmonic = |h: &Harmonic| {
+            format!(
+                "\n[[nominal.harmonic]]\norder_per_generator_turn = {:?}\namplitude_arcsec = {:?}\nphase_rad = {:?}\n",
+                h.order_per_generator_turn, h.amplitude_arcsec, h.phase_rad
+            )
+        };
+        let (harmonics, s) = (n.harmonics.iter().map(harmonic).collect::<String>(), n.spread);
+        format!(
+            "[drive]\n{drive}\n\n[nominal]\nstiffness_n_m_per_rad = [{steps}]\nbacklash_arcsec = \
+             {:?}\nfriction_torque_n_m = {:?}\ntemperature_c = \
+             {:?}\n{harmonics}\n[nominal.unit_to_unit]\nstiffness = {:?}\nbacklash = {:?}\nharmonic = {:?}\n{}",
             n.backlash_arcsec,
             n.friction_torque_n_m,
-            n.temperature_c
-        );
-        for h in &n.harmonics {
-            let _ = writeln!(
-                text,
-                "\n[[nominal.harmonic]]\norder_per_generator_turn = {:?}\namplitude_arcsec = {:?}\nphase_rad = {:?}",
-                h.order_per_generator_turn, h.amplitude_arcsec, h.phase_rad
-            );
-        }
-        let s = n.spread;
-        let _ = writeln!(
-            text,
-            "\n[nominal.unit_to_unit]\nstiffness = {:?}\nbacklash = {:?}\nharmonic = {:?}",
-            s.stiffness, s.backlash, s.harmonic
-        );
-        text + &causes_to_toml(&self.causes)
+            n.temperature_c,
+            s.stiffness,
+            s.backlash,
+            s.harmonic,
+            causes_to_toml(&self.causes)
+        )
     }
 }
 
@@ -218,7 +203,7 @@ pub fn causes_to_toml(causes: &[CauseEntry]) -> String {
     text
 }
 
-/// What decides whether parameters are those of a fit.
+/// A hash of the parameters: those of a fit have that of the fit.
 fn fingerprint(parameters: &BTreeMap<String, f64>) -> String {
     let mut hash = blake3::Hasher::new();
     for (name, value) in parameters {
@@ -228,8 +213,8 @@ fn fingerprint(parameters: &BTreeMap<String, f64>) -> String {
     hash.finalize().to_hex()[..16].to_owned()
 }
 
-/// A number of [`Scales`] and its name in a file.
-type ScaleField = (&'static str, fn(&mut Scales) -> &mut f64);
+/// A number of [`LawUnits`] and its name in a file.
+type ScaleField = (&'static str, fn(&mut LawUnits) -> &mut f64);
 
 const SCALES: [ScaleField; 7] = [
     ("load_n_m", |s| &mut s.load),
@@ -283,7 +268,7 @@ const FIT: [&str; 9] =
 fn fit_of(value: &Spanned<DeValue<'_>>) -> Result<(String, FittedLaw), Refused> {
     let fit = Entries::of(value, &FIT)?;
     let numbers = |v: &Spanned<DeValue<'_>>| each_of(v, "[ numbers ]", any);
-    let mut scales = Scales::default();
+    let mut scales = LawUnits::default();
     let given = fit.needed("scales", |v| entries_of(v, any))?;
     for (name, of) in SCALES {
         *of(&mut scales) = *given
@@ -329,7 +314,7 @@ impl CauseEntry {
         CauseEntry { name, parameters, fit: None }
     }
 
-    /// The cause with the model that was fitted to it, beside a nominal model.
+    /// The cause with the model that was fitted, for a nominal model.
     #[must_use]
     pub(crate) fn fitted_by(self, extended: &Extended, nominal: &Nominal) -> CauseEntry {
         let at = extended.causes().iter().position(|cause| cause.name() == self.name);
@@ -383,7 +368,7 @@ mod tests {
     fn what_is_written_reads_back_the_same() {
         let model = model();
         assert_eq!(Model::from_toml("d.toml", &model.to_toml()).unwrap(), model);
-        let effects = model.effects();
+        let effects: Vec<Effect> = model.causes.iter().filter_map(CauseEntry::effect).collect();
         assert_eq!(effects.len(), 2);
         assert_eq!(effects[0].given(Name::DelayS), Some(0.0021));
         assert_eq!((effects[1].given(Name::AmplitudeArcsec), effects[1].given(Name::AmplitudeUm)), (Some(31.0), None));

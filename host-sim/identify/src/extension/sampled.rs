@@ -17,7 +17,7 @@ use flexspline_mechanics::drive::GeneratorKind;
 /// Positions over a whole turn of the output, at least and at most. Fitted are a few dozen numbers at each load.
 const LEAST_POSITIONS: usize = 151;
 const MOST_POSITIONS: usize = 1009;
-/// Orders that a model may have beside those fitted: of what is rectified by the clearance.
+/// Orders that a model may have in addition to those fitted: of errors that the clearance rectifies.
 const FURTHER_ORDERS: [u16; 3] = [8, 10, 12];
 /// Orders that are to be distinguished stay apart by so much where the positions fold them.
 const APART: f64 = 0.9;
@@ -79,7 +79,7 @@ pub struct TableSubject {
     pub hash: [u8; 32],
 }
 
-/// What tables of an extended model are made from.
+/// The inputs of tables of an extended model.
 #[derive(Clone, Copy)]
 pub struct ExtendedTables<'a> {
     /// The nominal model.

@@ -12,7 +12,7 @@ use thiserror::Error;
 
 use super::Sizes;
 use super::data_fault::{DataFault, FAULTS};
-use crate::causes::{CauseName, Factor, Parameter, ParameterName, ParameterName as Name, Usual};
+use crate::causes::{CauseName, Factor, ParameterName, ParameterName as Name, ParameterSpec, Usual};
 use crate::diagnosis::rows::Rows;
 use crate::measurement::FaultName;
 use crate::nominal::Nominal;
@@ -46,7 +46,7 @@ pub struct Definition {
     /// In words.
     pub meaning: &'static str,
     /// Its parameters.
-    pub parameters: &'static [Parameter],
+    pub parameters: &'static [ParameterSpec],
     /// Two forms of the same, and the factor from the first to the second.
     twins: &'static [(ParameterName, ParameterName, Factor)],
 }
@@ -193,7 +193,7 @@ pub enum EffectError {
 /// Reads `NAME` or `NAME:param=value,...`.
 ///
 /// # Errors
-/// What was found and what is allowed, with a suggestion for a name that is nearly one.
+/// The text found and what is allowed, with a suggestion for a name that is nearly one.
 pub fn parse(text: &str) -> Result<Effect, EffectError> {
     let (name, rest) = text.split_once(':').unwrap_or((text, ""));
     let all = effects();

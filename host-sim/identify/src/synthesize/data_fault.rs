@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use super::catalogue::{Effect, Hidden};
 use super::gauss;
-use crate::causes::{Parameter, ParameterName as Name, TIME as INSTANT, Usual::Value, number};
+use crate::causes::{ParameterName as Name, ParameterSpec, TIME as INSTANT, Usual::Value, number};
 use crate::measurement::{FaultName, Session};
 use flexspline_base::units::ARCSEC_PER_RAD;
 
@@ -26,7 +26,7 @@ pub(super) struct DataFault {
     /// In words.
     pub meaning: &'static str,
     /// Its parameters.
-    pub parameters: &'static [Parameter],
+    pub parameters: &'static [ParameterSpec],
     /// Puts it into the rows.
     spoil: fn(&mut Cells, &dyn Fn(Name) -> f64, &mut fastrand::Rng),
 }
@@ -45,7 +45,7 @@ pub(super) const FAULTS: [DataFault; 12] = [
         name: FaultName::FrozenChannel,
         meaning: "a channel repeats one value",
         parameters: &[
-            Parameter { words: CHANNELS, ..number(Name::Channel, "which one", 0.0, 3.0, Value(1.0)) },
+            ParameterSpec { words: CHANNELS, ..number(Name::Channel, "which one", 0.0, 3.0, Value(1.0)) },
             INSTANT,
             number(Name::DurationS, "how long", 0.0, 1e6, Value(3.0)),
         ],

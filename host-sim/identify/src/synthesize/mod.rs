@@ -21,8 +21,9 @@ use flexspline::Table;
 
 use catalogue::Setting;
 
+use crate::causes::CauseName;
 use crate::diagnosis::base::{Base, PlayLaw};
-use crate::diagnosis::candidate::{Excitation, Scales, Simulated, added};
+use crate::diagnosis::candidate::{Excitation, LawUnits, Simulated, added};
 use crate::diagnosis::rows::Rows;
 use crate::measurement::Session;
 use crate::nominal::Nominal;
@@ -72,7 +73,7 @@ pub struct Sizes {
     pub base_radius_mm: f64,
 }
 
-/// What one unit has that the drawing has not.
+/// One unit: its deviations from the drawing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DrawnUnit {
     /// Wind-up over nominal.
@@ -125,14 +126,17 @@ pub struct Synthesized {
     pub effects: Vec<Effect>,
 }
 
-/// The causes among completed effects, on these rows.
-fn simulated(effects: &[Effect], on: &Excitation<'_>) -> Vec<Simulated> {
+/// Sum of the causes among completed effects in the error of a drive on these rows, arcsec.
+fn added_by(effects: &[Effect], rows: &Rows, drive: &Nominal, base: &Base, sizes: Sizes) -> Vec<f64> {
+    let scales = LawUnits::new(rows, sizes.pitch_radius_mm, Vec::new());
+    let on = Excitation::new(rows, drive, base, &scales);
     let causes = effects.iter().filter_map(|effect| Some((effect, effect.definition.what.cause()?)));
-    causes.map(|(effect, cause)| (cause.spec().simulated)(on, &|name| effect.value(name))).collect()
+    let simulated = |(effect, cause): (&Effect, CauseName)| (cause.spec().simulated)(&on, &|name| effect.value(name));
+    added(&on, &causes.map(simulated).collect::<Vec<Simulated>>())
 }
 
-/// What `chosen` effects add to the error of a drive in motion like that of `sessions`, row by row, arcsec. Parameters
-/// that are not given take their default; nothing is drawn.
+/// Sum of the `chosen` effects in the error of a drive in motion like that of `sessions`, row by row, arcsec.
+/// Parameters that are not given take their default; nothing is drawn.
 ///
 /// # Errors
 /// As [`synthesize`].
@@ -147,9 +151,7 @@ pub(crate) fn added_arcsec(
     let mut same = fastrand::Rng::with_seed(0);
     let effects = chosen.iter().map(|effect| effect.completed(&setting, &mut same)).collect::<Result<Vec<_>, _>>()?;
     let base = Base::with_play(&rows, nominal, None, PLAY);
-    let scales = Scales::new(&rows, sizes.pitch_radius_mm, Vec::new());
-    let on = Excitation::new(&rows, nominal, &base, &scales);
-    Ok(added(&on, &simulated(&effects, &on)))
+    Ok(added_by(&effects, &rows, nominal, &base, sizes))
 }
 
 /// Measures a drive with `chosen` effects, in motion like that of `sessions`, which have all columns: the output
@@ -178,9 +180,7 @@ pub fn synthesize(
         let more = by_table.iter().zip(&by_model).map(|(table, model)| table - model);
         base.prediction.iter_mut().zip(more).for_each(|(unit, more)| *unit += more);
     }
-    let scales = Scales::new(&rows, sizes.pitch_radius_mm, Vec::new());
-    let on = Excitation::new(&rows, &unit.drive, &base, &scales);
-    let added = added(&on, &simulated(&effects, &on));
+    let added = added_by(&effects, &rows, &unit.drive, &base, sizes);
     let mut error = base.prediction.iter().zip(added).map(|(nominal, added)| nominal + added + unit.zero_arcsec);
     let step_rad = ARCSEC_PER_TURN / 2f64.powi(sensors.encoder_bits as i32) / ARCSEC_PER_RAD;
     for session in &mut sessions {

@@ -1,26 +1,21 @@
 //! Causes among each other. Most add up. Some do not: a load that gravity adds passes through the springs that slip,
 //! makes the load ring and turns the flank over like any other load; a clearance that has grown decides when an
-//! eccentric wheel binds; and two wheels beside their axis, or one under a generator that is, meet in the same two
+//! eccentric wheel binds; and two wheels off their axis, or one under a generator that is, meet in the same two
 //! zones of teeth, of which only the one ahead carries.
 //!
 //! A softer spring gives way to what is added to the load as well.
 //!
 //! So a law is evaluated on the excitation as the causes that act on it leave it. Of two that meet in the zones the
-//! later one is evaluated beside the earlier, and together they make what both do.
+//! later one is evaluated with the earlier in place, and together they make what both do.
 
-use super::{Coefficients, Excitation, Law, Role};
+use super::{Coefficients, Excitation, Law, Tag};
 use crate::causes::Kin;
 use crate::diagnosis::base::Base;
-use crate::diagnosis::rows::{Rows, combined};
+use crate::diagnosis::rows::{Rows, add_scaled, combined};
 
-/// How far causes bring one zone of teeth ahead of the other, row by row, arcsec.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Zones {
-    /// On the flank that turns the output forward.
-    pub upper: Vec<f64>,
-    /// On the other one.
-    pub lower: Vec<f64>,
-}
+/// How far causes bring one zone of teeth ahead of the other, row by row, arcsec: on the flank that turns the output
+/// forward, and on the other one.
+pub(crate) type Zones = [Vec<f64>; 2];
 
 /// A cause as it was fitted.
 #[derive(Clone)]
@@ -29,8 +24,8 @@ pub(crate) struct Acting<'l> {
     pub law: &'l Law,
     /// Shape parameters.
     pub values: Vec<f64>,
-    /// What its columns are.
-    pub roles: Vec<Role>,
+    /// The roles of its columns.
+    pub roles: Vec<Tag>,
     /// Coefficients of its columns.
     pub coefficients: Vec<f64>,
 }
@@ -42,11 +37,11 @@ impl Acting<'_> {
     }
 }
 
-/// What causes leave to another one.
+/// The excitation of a cause as others leave it.
 pub(crate) struct Among {
     /// Under the load with what they add.
     loaded: Option<(Rows, Base)>,
-    /// What they add to half the clearance, arcsec.
+    /// Change of half the clearance by them, arcsec.
     widened: Option<Vec<f64>>,
     zones: Option<Zones>,
     softer: f64,
@@ -79,19 +74,17 @@ impl Law {
 }
 
 impl Among {
-    /// What `acting` causes leave; nothing where none of them does anything to others.
+    /// The excitation that `acting` causes leave; nothing where none of them does anything to others.
     #[must_use]
     pub fn of(on: &Excitation<'_>, acting: &[Acting<'_>]) -> Option<Among> {
         let mut among = Among { loaded: None, widened: None, zones: None, softer: 1.0 };
         for cause in acting {
             if cause.law.is_spring() {
-                among.softer += cause.by_role().of(Role::SIZE);
+                among.softer += cause.by_role().of(Tag::SIZE);
             }
             if let Some(load) = cause.law.load(on, &cause.values) {
                 let (rows, _) = among.loaded.get_or_insert_with(|| (on.rows.clone(), on.base.without_floating()));
-                for (torque, added) in rows.torque.iter_mut().zip(load) {
-                    *torque += added;
-                }
+                add_scaled(&mut rows.torque, &load, 1.0);
             }
         }
         if let Some((rows, base)) = &mut among.loaded {
@@ -103,15 +96,11 @@ impl Among {
             for cause in acting {
                 if cause.law.wrong.kin == Kin::Clearance {
                     let sum = widened.get_or_insert_with(|| vec![0.0; on.rows.len()]);
-                    add(sum, &half_width(&on, cause));
+                    add_scaled(sum, &half_width(&on, cause), 1.0);
                 }
                 if let Some(more) = cause.law.zones(&on, &cause.values, cause.by_role()) {
-                    let sum = zones.get_or_insert_with(|| Zones {
-                        upper: vec![0.0; on.rows.len()],
-                        lower: vec![0.0; on.rows.len()],
-                    });
-                    add(&mut sum.upper, &more.upper);
-                    add(&mut sum.lower, &more.lower);
+                    let sum = zones.get_or_insert_with(|| [0; 2].map(|_| vec![0.0; on.rows.len()]));
+                    sum.iter_mut().zip(&more).for_each(|(sum, more)| add_scaled(sum, more, 1.0));
                 }
             }
         }
@@ -141,13 +130,7 @@ pub(crate) fn left_by<'a>(among: Option<&'a Among>, on: &Excitation<'a>) -> Exci
     among.map_or(*on, |among| among.excitation(on))
 }
 
-fn add(sum: &mut [f64], more: &[f64]) {
-    for (s, m) in sum.iter_mut().zip(more) {
-        *s += m;
-    }
-}
-
-/// What a cause that changes the clearance adds to half of it: what it does where the forward flank carries.
+/// Change of half the clearance by a cause: its effect where the forward flank carries.
 fn half_width(on: &Excitation<'_>, cause: &Acting<'_>) -> Vec<f64> {
     let mut forward = on.base.without_floating();
     forward.flank.fill(1.0);
@@ -158,7 +141,7 @@ fn half_width(on: &Excitation<'_>, cause: &Acting<'_>) -> Vec<f64> {
 
 /// Columns of causes that are there together, in their order.
 #[must_use]
-pub(crate) fn together(on: &Excitation<'_>, causes: &[Acting<'_>]) -> Vec<Vec<super::Column>> {
+pub(crate) fn together(on: &Excitation<'_>, causes: &[Acting<'_>]) -> Vec<Vec<super::Regressor>> {
     (0..causes.len())
         .map(|k| {
             let others = causes.iter().enumerate().filter(|(j, other)| {

@@ -1,4 +1,4 @@
-//! A wheel beside the axis of the generator: an eccentric circular spline, a flexspline that runs out of true, an axis
+//! A wheel off the axis of the generator: an eccentric circular spline, a flexspline that runs out of true, an axis
 //! that gravity pushes aside.
 //!
 //! Two zones of engaged teeth lie half a turn apart. A displacement `A = ε / (r cos a)` brings the teeth of one zone
@@ -11,7 +11,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::geometry::{Angle, COS_PRESSURE_ANGLE, USUAL_ARCSEC, faded, half_load, kept, sense, waves, weighted_waves};
 use super::{
-    Coefficients, Column, Excitation, Law, Named, Role, Shape, Shaped, Zones, by_row, main, main_about, nuisance,
+    Coefficients, Excitation, Law, Named, Regressor, Shape, Shaped, Tag, Zones, by_row, main, main_about, nuisance,
     of_both, polar, times,
 };
 use crate::causes::{CauseName, ParameterName as Name};
@@ -52,7 +52,7 @@ pub(super) fn stopped(ahead: f64, pressed: f64) -> f64 {
     0.5 * (left + (left * left + round * round).sqrt())
 }
 
-/// What the displacement adds to the error, row by row.
+/// A displacement, for the error that it makes row by row.
 struct Displacement {
     of: Angle,
     phase: f64,
@@ -78,62 +78,49 @@ impl Displacement {
     fn zones(&self, on: &Excitation<'_>, fade: &[f64]) -> Zones {
         let first = kept(on, self.of, 1.0);
         let by = self.flank_ahead * sense(on);
-        let ahead = |flank: f64| {
+        [1.0, -1.0].map(|flank| {
             let (sin, cos) = (flank * by - self.phase).sin_cos();
             let (along, across) = (self.size * cos, self.size * sin);
             let waves = first[1].iter().zip(&first[0]);
-            waves.zip(fade).map(|((s, c), fade)| fade * (along * s + across * c)).collect::<Vec<f64>>()
-        };
-        Zones { upper: ahead(1.0), lower: ahead(-1.0) }
+            waves.zip(fade).map(|((s, c), fade)| fade * (along * s + across * c)).collect()
+        })
     }
 
-    /// What it adds to what causes besides do in the zones.
+    /// Change of the error by it, with other causes acting in the zones.
     fn pattern(&self, on: &Excitation<'_>, fade: &[f64]) -> Vec<f64> {
         let own = self.zones(on, fade);
-        let half_backlash = on.base.half_backlash;
         // Where the output rests with zones this far ahead, half the clearance being `half`.
         let rests = |upper: f64, lower: f64, half: f64, flank: f64, pressed: f64| {
             let high = half - stopped(upper, pressed.max(0.0));
             let low = -half + stopped(lower, (-pressed).max(0.0));
             0.5 * (high + low) + flank * 0.5 * (high - low).max(0.0)
         };
-        if on.widened.is_none() && on.zones.is_none() {
-            let half = half_backlash.max(0.0);
-            let rows = on.base.flank.iter().zip(&on.rows.torque).zip(own.upper.iter().zip(&own.lower));
-            return rows
-                .map(|((flank, torque), (upper, lower))| {
-                    let pressed = self.pressed_per_n_m * torque;
-                    rests(*upper, *lower, half, *flank, pressed) - rests(0.0, 0.0, half, *flank, pressed)
-                })
-                .collect();
-        }
         by_row(on, |k| {
             let (flank, pressed) = (on.base.flank[k], self.pressed_per_n_m * on.rows.torque[k]);
-            let half = (half_backlash + on.widened.map_or(0.0, |w| w[k])).max(0.0);
-            let (high, low) = on.zones.map_or((0.0, 0.0), |z| (z.upper[k], z.lower[k]));
-            rests(high + own.upper[k], low + own.lower[k], half, flank, pressed)
-                - rests(high, low, half, flank, pressed)
+            let half = (on.base.half_backlash + on.widened.map_or(0.0, |w| w[k])).max(0.0);
+            let [high, low] = on.zones.map_or([0.0; 2], |[upper, lower]| [upper[k], lower[k]]);
+            rests(high + own[0][k], low + own[1][k], half, flank, pressed) - rests(high, low, half, flank, pressed)
         })
     }
 }
 
 /// Second orders that fade with the load, and those that do not: as waves of both flanks alike, and of opposite sign on
 /// each.
-const FADING: Role = Role("second order that fades");
-const FADING_BY_FLANK: Role = Role("second order that fades, by flank");
-const STEADY: Role = Role("second order");
-const STEADY_BY_FLANK: Role = Role("second order, by flank");
+const FADING: Tag = Tag("second order that fades");
+const FADING_BY_FLANK: Tag = Tag("second order that fades, by flank");
+const STEADY: Tag = Tag("second order");
+const STEADY_BY_FLANK: Tag = Tag("second order, by flank");
 /// The change of the pattern where a flank is farther ahead.
-const FARTHER_AHEAD: Role = Role("flank farther ahead");
+const FARTHER_AHEAD: Tag = Tag("flank farther ahead");
 /// In the lead: the second order along the cosine and the sine of twice the angle by which a flank is ahead.
-const ALONG: Role = Role("second order along the flanks");
+const ALONG: Tag = Tag("second order along the flanks");
 
 /// Load that halves a displacement, N·m; without a load nothing does.
 fn half_of(shape: Shaped<'_>) -> f64 {
     shape.get(Name::HalfLoadNM).unwrap_or(f64::INFINITY)
 }
 
-/// An axis beside its place.
+/// An axis off its place.
 pub(super) fn displaced(cause: CauseName, of: Angle, on: &Excitation<'_>) -> Law {
     let loaded = on.scales.load > 0.0;
     let by = FLANK_AHEAD * sense(on);
@@ -145,7 +132,7 @@ pub(super) fn displaced(cause: CauseName, of: Angle, on: &Excitation<'_>) -> Law
         let pattern = displacement.pattern(on, &fade);
         let steeper = Displacement { flank_ahead: FLANK_AHEAD + AHEAD_SPREAD, ..displacement }.pattern(on, &fade);
         let change = of_both(&steeper, &pattern, |steeper, pattern| steeper - pattern);
-        let mut columns: Vec<Column> = vec![main_about(1.0, pattern, SCALE_MISFIT).called(Role::SIZE)];
+        let mut columns: Vec<Regressor> = vec![main_about(1.0, pattern, SCALE_MISFIT).called(Tag::SIZE)];
         columns.push(nuisance(fade_by_flank.clone(), 0.08));
         columns.extend(weighted_waves(on, of, 2.0, &fade).map(|v| nuisance(v, 0.12).called(FADING)));
         columns.extend(weighted_waves(on, of, 2.0, &fade_by_flank).map(|v| nuisance(v, 0.12).called(FADING_BY_FLANK)));
@@ -180,7 +167,7 @@ pub(super) fn displaced(cause: CauseName, of: Angle, on: &Excitation<'_>) -> Law
     })
     // Where its deviations take back what the law says, it is another error of order 2.
     .physical_if(move |shape, c| {
-        let scale = c.of(Role::SIZE);
+        let scale = c.of(Tag::SIZE);
         let least = LEAST_OF_PATTERN * SECOND_ORDER * shape.of(Name::SizeArcsec) * scale;
         scale > 0.5 && second_order_unloaded(c, shape, by) > least
     })
@@ -192,7 +179,7 @@ pub(super) fn displaced(cause: CauseName, of: Angle, on: &Excitation<'_>) -> Law
             let (flank, fade) = (&on.base.flank, faded(on, half));
             let fade_by_flank = times(&fade, flank);
             let second = kept(on, of, 2.0);
-            let mut columns: Vec<Column> = Vec::new();
+            let mut columns: Vec<Regressor> = Vec::new();
             // Second order along cos 2 eps and sin 2 eps.
             for shift in [0.0, FRAC_PI_2] {
                 let along = |k: usize| {
@@ -227,8 +214,8 @@ pub(super) fn displaced(cause: CauseName, of: Angle, on: &Excitation<'_>) -> Law
 }
 
 /// Second order of a rectified eccentricity without load, all columns together: what fades and what does not share it
-/// in proportions that loads of a narrow range cannot tell. Each column of order 2 is projected on the pattern, flank
-/// by flank.
+/// in proportions that loads of a narrow range do not separate. Each column of order 2 is projected on the pattern,
+/// flank by flank.
 fn second_order_unloaded(c: Coefficients<'_>, shape: Shaped<'_>, ahead_by: f64) -> f64 {
     let loaded = shape.get(Name::HalfLoadNM).is_some();
     // Without a load the place of the steady wave is that of what a flank farther ahead changes.
@@ -240,5 +227,5 @@ fn second_order_unloaded(c: Coefficients<'_>, shape: Shaped<'_>, ahead_by: f64) 
         let along = |w: &[f64; 2]| w[0] * cos + w[1] * sin;
         both.iter().map(|w| flank * along(w)).chain(by_flank.iter().map(along)).sum::<f64>()
     };
-    SECOND_ORDER * shape.of(Name::SizeArcsec) * c.of(Role::SIZE) + 0.5 * (on_pattern(1.0) + on_pattern(-1.0))
+    SECOND_ORDER * shape.of(Name::SizeArcsec) * c.of(Tag::SIZE) + 0.5 * (on_pattern(1.0) + on_pattern(-1.0))
 }

@@ -1,8 +1,9 @@
-//! What moves the load: gravity that the torque column does not hold, and the load's inertia on the drive's spring.
+//! Causes that move the load: gravity that the torque column does not hold, and the load's inertia on the drive's
+//! spring.
 
 use std::f64::consts::PI;
 
-use super::{Coefficients, Column, Excitation, Law, Role, Shape, Shaped, by_row, main, main_about, of_both};
+use super::{Coefficients, Excitation, Law, Regressor, Shape, Shaped, Tag, by_row, main, main_about, of_both};
 use crate::causes::ParameterName as Name;
 use crate::causes::spec::{
     CauseName, CauseSpec, InTable, Kin,
@@ -55,10 +56,10 @@ fn moment_that_turns_flanks(
     for _ in 0..CLOSER {
         (turn, factor) = (0.5 * turn, factor.sqrt());
         let [moment, phase] = best;
-        let beside = [1.0 / factor, 1.0, factor]
+        let near = [1.0 / factor, 1.0, factor]
             .into_iter()
             .flat_map(|by| [-turn, 0.0, turn].map(|of| [by * moment, phase + of]));
-        let (better, spread) = least(beside.collect());
+        let (better, spread) = least(near.collect());
         if spread < spread_of_best {
             (best, spread_of_best) = (better, spread);
         }
@@ -67,12 +68,12 @@ fn moment_that_turns_flanks(
 }
 
 /// The columns of a load that the torque does not hold: its wind-up and the play that it moves by this law.
-pub(super) fn columns_of_load(on: &Excitation<'_>, added: &[f64], law: PlayLaw) -> Vec<Column> {
+pub(super) fn columns_of_load(on: &Excitation<'_>, added: &[f64], law: PlayLaw) -> Vec<Regressor> {
     let torque = of_both(&on.rows.torque, added, |torque, added| torque + added);
     let flank = law.flanks(on.rows, &torque, on.nominal);
     let play = by_row(on, |k| on.base.half_backlash * (flank[k] - on.base.flank[k]));
     let together = by_row(on, |k| on.wound_up(k, torque[k]) + play[k]);
-    vec![main_about(1.0, together, 0.02).called(Role::SIZE), main(play, 0.5)]
+    vec![main_about(1.0, together, 0.02).called(Tag::SIZE), main(play, 0.5)]
 }
 
 /// An unbalanced load, m g l sin of the output angle against gravity: adds to the torque, so it winds the drive up and
@@ -95,7 +96,7 @@ fn gravity_torque(sign: f64, play: PlayLaw, on: &Excitation<'_>, on_sample: &Exc
             Shape::angle(Name::PhaseRad, 2.0 * PI, 1),
         ])
         .parameters_by(|_, shape, c| {
-            let torque_n_m = shape.of(Name::TorqueNM) * c.of(Role::SIZE);
+            let torque_n_m = shape.of(Name::TorqueNM) * c.of(Tag::SIZE);
             vec![(Name::TorqueNM, torque_n_m), (Name::PhaseRad, shape.of(Name::PhaseRad))]
         })
         .physical_if(move |shape, _| shape.of(Name::TorqueNM) > least * scale)
@@ -137,12 +138,12 @@ const LEAST_MOMENT: f64 = 0.001;
 const LEAST_MOMENT_OF_ANOTHER_PLAY: f64 = 0.004;
 
 /// In the lead: parts of the moment.
-const SINE: Role = Role("sine");
-const COSINE: Role = Role("cosine");
-/// What the load swings about: wind-up, kinematic error, the turning itself.
-const WIND_UP: Role = Role("wind-up");
-const KINEMATIC: Role = Role("kinematic error");
-const TURNING: Role = Role("turning");
+const SINE: Tag = Tag("sine");
+const COSINE: Tag = Tag("cosine");
+/// Motions that make the load swing: wind-up, kinematic error, the turning itself.
+const WIND_UP: Tag = Tag("wind-up");
+const KINEMATIC: Tag = Tag("kinematic error");
+const TURNING: Tag = Tag("turning");
 
 /// A load that is damped more than this does not swing.
 const MOST_DAMPING: f64 = 0.5;
@@ -150,7 +151,7 @@ const MOST_DAMPING: f64 = 0.5;
 /// flank or a reading that takes some milliseconds looks like it.
 const ON_THE_BOUND: f64 = 0.8;
 
-/// Spread of the share of a jump that makes the load ring, beside that of a step of the torque.
+/// Spread of the share of a jump that makes the load ring, in addition to that of a step of the torque.
 const SLIDING: f64 = 0.3;
 
 /// Speeds that are apart by this share make the waves of the drive sweep over frequencies; a load that changes by this
@@ -175,23 +176,18 @@ pub(super) fn makes_a_load_swing(on: &Excitation<'_>) -> bool {
     }
     let apart = (STEP_S / rows.period.max(1e-9)).ceil().max(1.0) as usize;
     let steps_of = |values: &[f64], least: f64| -> usize {
-        let in_session = |session: &std::ops::Range<usize>| {
-            let within = &values[session.clone()];
-            within
-                .iter()
-                .step_by(apart)
-                .zip(within.iter().skip(apart).step_by(apart))
-                .filter(|(a, b)| (*a - *b).abs() > least)
-                .count()
+        let steps = |within: &[f64]| {
+            let later = within.iter().skip(apart).step_by(apart);
+            within.iter().step_by(apart).zip(later).filter(|(a, b)| (*a - *b).abs() > least).count()
         };
-        rows.sessions.iter().map(in_session).sum()
+        rows.sessions.iter().map(|session| steps(&values[session.clone()])).sum()
     };
     let of_speed = steps_of(&rows.speed, SPEEDS_APART * fast.max(1e-9));
     let of_load = if on.scales.load > 0.0 { steps_of(&rows.torque, STEP_SHARE * on.scales.load) } else { 0 };
     of_speed + of_load >= FEWEST_STEPS
 }
 
-/// What all jumps add, each from where it has half its height on, if there are any.
+/// Sum of all jumps, each from where it has half its height on, if there are any.
 fn skipped(on: &Excitation<'_>) -> Option<Vec<f64>> {
     let jumps = &on.scales.jumps;
     (!jumps.is_empty()).then(|| by_row(on, |k| jumps.iter().map(|jump| jump.reached(on.rows.time[k])).sum()))
@@ -265,7 +261,7 @@ fn torsional_resonance(on: &Excitation<'_>) -> Law {
             main(ringing(on, &moved_to, frequency, damping), 1.0).called(WIND_UP),
             main(ringing(on, &kinematic, frequency, damping), 1.0).called(KINEMATIC),
         ];
-        // The scatter of when an angle is read swings as a load would that the turning shakes: then the turning tells
+        // The scatter of when an angle is read swings as a load would that the turning shakes: then the turning says
         // nothing.
         if !on.rows.jitters {
             columns.push(main(moved, 0.5).called(TURNING));

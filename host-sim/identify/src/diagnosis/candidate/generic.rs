@@ -1,9 +1,11 @@
-//! Deviations without a cause in the library. They compete with the causes: where one of them tells the data better, no
+//! Deviations without a cause in the library. They compete with the causes: where one of them fits the data better, no
 //! cause is named for it.
+
+use std::f64::consts::TAU;
 
 use super::geometry::{Angle, waves};
 use super::stiffness::follow;
-use super::{Excitation, Label, Law, Per, Role, Shape, by_row, lagged, main};
+use super::{Excitation, Label, Law, Per, Shape, Tag, by_row, lagged, main, times};
 use crate::causes::ParameterName as Name;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
@@ -26,18 +28,18 @@ fn lash_before_the_generator() -> Law {
         for session in &on.rows.sessions {
             follow(&on.rows.generator, session.clone(), half_rad, 0.0, &mut held);
         }
-        vec![main(by_row(on, |k| -held[k] * on.nominal.ratio.signum()), 20.0).called(Role::SIZE)]
+        vec![main(by_row(on, |k| -held[k] * on.nominal.ratio.signum()), 20.0).called(Tag::SIZE)]
     })
     .shapes([Shape::by_factors(Name::HalfLashArcsec, 0.5, 60.0, 5)])
-    .physical_if(|_, c| c.of(Role::SIZE) > 0.0)
+    .physical_if(|_, c| c.of(Tag::SIZE) > 0.0)
 }
 
 /// A coupling between the motor's encoder and the generator that gives way: it is wound up by what the load, friction,
 /// oil and inertia of the generator ask of the motor, a ratio-th of which is seen at the output. Softer under load and
 /// late in motion, at once.
 fn coupling_before_the_generator() -> Law {
-    const LOAD: Role = Role("load");
-    const FRICTION: Role = Role("friction");
+    const LOAD: Tag = Tag("load");
+    const FRICTION: Tag = Tag("friction");
     Law::new("a coupling before the generator that gives way", |on, _| {
         let forward = on.nominal.ratio.signum();
         // Of the generator, it holds back what the output is turned on by.
@@ -65,7 +67,7 @@ fn creep_under_load() -> Law {
     })
 }
 
-/// Another zero in each session: a sensor that was taken off and put back. No session tells the next one's.
+/// Another zero in each session: a sensor that was taken off and put back. No session predicts the next one's.
 fn zero_of_each_session() -> Law {
     let mut law = Law::new("another zero in each session", |on, _| {
         let of = |session: &std::ops::Range<usize>| by_row(on, |k| f64::from(u8::from(session.contains(&k))));
@@ -89,7 +91,7 @@ pub fn line(per: Per, order: f64) -> Law {
     }
     // Nothing says that a line in time keeps its phase while nobody records.
     Law::new(label, move |on, _| {
-        let turned = |k: usize| order * (2.0 * std::f64::consts::PI * on.rows.time[k]);
+        let turned = |k: usize| order * (TAU * on.rows.time[k]);
         let of = |session: &std::ops::Range<usize>, shift: f64| {
             let inside = |k: usize| if session.contains(&k) { (turned(k) - shift).cos() } else { 0.0 };
             main(by_row(on, inside), 15.0)
@@ -101,46 +103,43 @@ pub fn line(per: Per, order: f64) -> Law {
 /// Everything without a name that is always tried.
 #[must_use]
 pub(crate) fn unnamed(on: &Excitation<'_>) -> Vec<Law> {
-    let rows = on.rows;
-    let mut laws = Vec::new();
-    if rows.recorded.temperature {
-        laws.push(law("offset with temperature", |on, k| on.rows.temperature[k] - on.nominal.temperature_c));
-        laws.push(law("offset with temperature squared", |on, k| {
-            (on.rows.temperature[k] - on.nominal.temperature_c).powi(2)
-        }));
-    }
-    if rows.recorded.time {
-        laws.push(law("offset with time", |on, k| on.rows.time[k] - on.rows.time[0]));
-        laws.push(law("creep since the session began (logarithm)", |on, k| (1.0 + on.rows.since[k]).ln()));
-        laws.push(law("settling since the session began (exponential, 20 s)", |on, k| {
-            (-on.rows.since[k] / 20.0).exp()
-        }));
-        laws.push(law("offset with the magnitude of speed", |on, k| on.rows.speed[k].abs()));
-        laws.push(law("offset with speed squared", |on, k| on.rows.speed[k].powi(2)));
-        laws.push(law("offset with speed squared, by direction", |on, k| {
-            on.rows.speed[k].powi(2) * on.rows.direction[k]
-        }));
-    }
-    if rows.sessions_used().count() > 2 {
+    let (warm, timed, loaded) = (on.rows.recorded.temperature, on.rows.recorded.time, on.scales.load > 0.0);
+    let offsets: [(bool, &'static str, fn(&Excitation<'_>, usize) -> f64); 13] = [
+        (warm, "offset with temperature", warmer),
+        (warm, "offset with temperature squared", |on, k| warmer(on, k).powi(2)),
+        (timed, "offset with time", since_begin),
+        (timed, "creep since the session began (logarithm)", |on, k| (1.0 + on.rows.since[k]).ln()),
+        (timed, "settling since the session began (exponential, 20 s)", |on, k| (-on.rows.since[k] / 20.0).exp()),
+        (timed, "offset with the magnitude of speed", |on, k| on.rows.speed[k].abs()),
+        (timed, "offset with speed squared", |on, k| on.rows.speed[k].powi(2)),
+        (timed, "offset with speed squared, by direction", |on, k| on.rows.speed[k].powi(2) * on.rows.direction[k]),
+        (true, "offset by direction", |on, k| on.rows.direction[k]),
+        (loaded, "offset with the magnitude of torque", |on, k| on.rows.torque[k].abs()),
+        (loaded, "offset with torque squared", |on, k| on.rows.torque[k].powi(2)),
+        (loaded, "torque by direction", |on, k| on.rows.torque[k].abs() * on.rows.direction[k]),
+        (loaded && timed, "wind-up with time", |on, k| on.base.wind_up[k] * since_begin(on, k)),
+    ];
+    let offsets = offsets.into_iter().filter(|(there, ..)| *there).map(|(_, name, values)| law(name, values));
+    let mut laws: Vec<Law> = offsets.chain([lash_before_the_generator()]).collect();
+    if on.rows.sessions_used().count() > 2 {
         laws.push(zero_of_each_session());
     }
-    laws.push(law("offset by direction", |on, k| on.rows.direction[k]));
-    laws.push(lash_before_the_generator());
-    if on.scales.load > 0.0 {
-        laws.push(law("offset with the magnitude of torque", |on, k| on.rows.torque[k].abs()));
-        laws.push(law("offset with torque squared", |on, k| on.rows.torque[k].powi(2)));
-        laws.push(law("torque by direction", |on, k| on.rows.torque[k].abs() * on.rows.direction[k]));
-        if rows.recorded.time {
-            laws.push(creep_under_load());
-            laws.push(coupling_before_the_generator());
-            laws.push(law("wind-up with time", |on, k| on.base.wind_up[k] * (on.rows.time[k] - on.rows.time[0])));
-        }
+    if loaded && timed {
+        laws.extend([creep_under_load(), coupling_before_the_generator()]);
     }
-    for order in [3.0, 5.0, 7.0, 10.0, 12.0] {
-        laws.push(line(Per::GeneratorTurn, order));
-    }
+    laws.extend([3.0, 5.0, 7.0, 10.0, 12.0].map(|order| line(Per::GeneratorTurn, order)));
     laws.push(line(Per::OutputTurn, 3.0));
     laws
+}
+
+/// Temperature above the nominal one, K.
+fn warmer(on: &Excitation<'_>, k: usize) -> f64 {
+    on.rows.temperature[k] - on.nominal.temperature_c
+}
+
+/// Time since the first row, s.
+fn since_begin(on: &Excitation<'_>, k: usize) -> f64 {
+    on.rows.time[k] - on.rows.time[0]
 }
 
 /// A function of one or two quantities, free but for its smoothness: hats on a grid.
@@ -163,48 +162,29 @@ fn map(name: &'static str, grids: Vec<(Vec<f64>, usize)>) -> Law {
                     values.iter().map(hat).collect()
                 })
                 .collect();
-            columns = columns
-                .iter()
-                .flat_map(|c| {
-                    hats.iter().map(|h| c.iter().zip(h).map(|(a, b)| a * b).collect::<Vec<f64>>()).collect::<Vec<_>>()
-                })
-                .collect();
+            columns = columns.iter().flat_map(|column| hats.iter().map(|hat| times(column, hat))).collect();
         }
         columns.into_iter().map(|values| main(values, 10.0)).collect()
     })
 }
 
-/// What is left as a free function of what was measured: tried only when the causes are in, to see whether anything is
-/// left.
+/// The residual as a free function of measured quantities: tried only when the causes are in, to see whether anything
+/// is left.
 #[must_use]
 pub(crate) fn maps(on: &Excitation<'_>) -> Vec<Law> {
     let rows = on.rows;
-    let turn = |angle: &[f64], of: f64| -> Vec<f64> { angle.iter().map(|a| a.rem_euclid(of)).collect() };
-    let full = std::f64::consts::TAU;
-    let mut maps = vec![
-        map("a function of the generator angle", vec![(turn(&rows.generator, full), 25)]),
-        map("a function of the angle on the circular spline", vec![(turn(&rows.on_circular_spline, full), 25)]),
-        map("a function of the output angle", vec![(turn(&rows.output, full), 13)]),
+    let (warm, timed, loaded) = (rows.recorded.temperature, rows.recorded.time, on.scales.load > 0.0);
+    let turn = |angle: &[f64]| angle.iter().map(|a| a.rem_euclid(TAU)).collect::<Vec<f64>>();
+    let (torque, temperature) = (&rows.torque, &rows.temperature);
+    let maps = [
+        (true, "a function of the generator angle", vec![(turn(&rows.generator), 25)]),
+        (true, "a function of the angle on the circular spline", vec![(turn(&rows.on_circular_spline), 25)]),
+        (true, "a function of the output angle", vec![(turn(&rows.output), 13)]),
+        (loaded, "a function of torque and direction", vec![(torque.clone(), 11), (rows.direction.clone(), 2)]),
+        (warm, "a function of temperature", vec![(temperature.clone(), 6)]),
+        (warm && loaded, "a function of torque and temperature", vec![(torque.clone(), 6), (temperature.clone(), 4)]),
+        (timed, "a function of speed", vec![(rows.speed.clone(), 12)]),
+        (timed && loaded, "a function of torque and time", vec![(torque.clone(), 6), (rows.time.clone(), 4)]),
     ];
-    if on.scales.load > 0.0 {
-        maps.push(map(
-            "a function of torque and direction",
-            vec![(rows.torque.clone(), 11), (rows.direction.clone(), 2)],
-        ));
-    }
-    if rows.recorded.temperature {
-        maps.push(map("a function of temperature", vec![(rows.temperature.clone(), 6)]));
-        if on.scales.load > 0.0 {
-            let both = vec![(rows.torque.clone(), 6), (rows.temperature.clone(), 4)];
-            maps.push(map("a function of torque and temperature", both));
-        }
-    }
-    if rows.recorded.time {
-        maps.push(map("a function of speed", vec![(rows.speed.clone(), 12)]));
-        if on.scales.load > 0.0 {
-            let both = vec![(rows.torque.clone(), 6), (rows.time.clone(), 4)];
-            maps.push(map("a function of torque and time", both));
-        }
-    }
-    maps
+    maps.into_iter().filter(|(there, ..)| *there).map(|(_, name, grids)| map(name, grids)).collect()
 }

@@ -14,14 +14,14 @@ use crate::nominal::{Fixed, Nominal};
 
 use super::displaced::displaced;
 use super::{
-    Coefficients, Column, Excitation, Law, Named, Role, Shape, Shaped, Simulated, Values, beside, by_row, kernel, main,
-    nuisance, of_both, of_wave, polar, times,
+    Coefficients, Excitation, Law, Named, Regressor, Shape, Shaped, Simulated, Tag, Values, beside, by_row, kernel,
+    main, nuisance, of_both, of_wave, polar, times,
 };
 use crate::causes::ParameterName as Name;
 use crate::causes::spec::{
     ARCSECONDS, CauseName, CauseSpec, Factor, HALF_LOAD, HARMONIC, InTable, Kin,
     Multiple::{self, Harmonic, ToothMesh},
-    Need, Parameter, Turn,
+    Need, ParameterSpec, Turn,
     Usual::{Follows, Value},
     WHEELS, microns, number, phase, plain,
 };
@@ -34,17 +34,17 @@ pub(super) const USUAL_ARCSEC: f64 = 20.0;
 pub(super) const COS_PRESSURE_ANGLE: f64 = 0.93;
 
 /// Clearance that odd orders of a pitch error take on a flank, over its second order: a first order as large as the
-/// second takes 2/π of it, and a wheel that takes more and shows little is one beside its place.
+/// second takes 2/π of it, and a wheel that takes more and shows little is off its place.
 const MOST_CLEARANCE_TAKEN: f64 = 0.85;
 
 /// The wave that a law is, in waves of both flanks alike and of opposite sign on each.
-const WAVE: Role = Role("wave");
-const WAVE_BY_FLANK: Role = Role("wave by flank");
+const WAVE: Tag = Tag("wave");
+const WAVE_BY_FLANK: Tag = Tag("wave by flank");
 /// Clearance that goes with a pitch error, under any load and under light ones.
-const TAKEN: Role = Role("clearance taken");
-const TAKEN_UNDER_LIGHT_LOAD: Role = Role("clearance taken under light load");
+const TAKEN: Tag = Tag("clearance taken");
+const TAKEN_UNDER_LIGHT_LOAD: Tag = Tag("clearance taken under light load");
 /// Pulses of a damaged tooth, by flank and load.
-const PULSE: Role = Role("pulse");
+const PULSE: Tag = Tag("pulse");
 
 /// Which angle an error is locked to.
 #[derive(Clone, Copy, PartialEq)]
@@ -126,10 +126,7 @@ fn load_shares(on: &Excitation<'_>) -> Vec<f64> {
 /// +1 where the circular spline is the output. Where the flexspline is, a load that turns it forward rests on the other
 /// flank of the circular spline, and what a flank is ahead by changes its sign.
 pub(super) fn sense(on: &Excitation<'_>) -> f64 {
-    match on.nominal.teeth.map(|teeth| teeth.fixed) {
-        Some(Fixed::CircularSpline) => -1.0,
-        _ => 1.0,
-    }
+    if is_standing(on.nominal, Angle::CircularSpline) { -1.0 } else { 1.0 }
 }
 
 /// Errors of position along the pitch: nearly the same on both flanks and under any load. Of the teeth in mesh the
@@ -138,9 +135,9 @@ fn pitch(cause: CauseName, of: Angle) -> Law {
     let mut law = Law::new(cause, move |on, _| {
         let (flank, light) = (&on.base.flank, light(on));
         let light_by_flank = times(flank, &light);
-        let mut columns: Vec<Column> = Vec::new();
+        let mut columns: Vec<Regressor> = Vec::new();
         columns.extend(waves(on, of, 2.0).map(|v| main(v, USUAL_ARCSEC).called(WAVE)));
-        // What odd orders take of the clearance, which nothing in the even ones tells.
+        // Clearance that odd orders take, of which the even ones say nothing.
         columns.push(beside(flank.clone(), 0.6).called(TAKEN));
         columns.push(beside(light_by_flank.clone(), 0.4).called(TAKEN_UNDER_LIGHT_LOAD));
         columns.extend(weighted_waves(on, of, 2.0, flank).map(|v| nuisance(v, 0.15)));
@@ -180,7 +177,7 @@ fn smooth_pitch(cause: CauseName, of: Angle) -> Law {
     Law::new(cause, move |on, _| {
         let (flank, light) = (&on.base.flank, light(on));
         let light_by_flank = times(flank, &light);
-        let mut columns: Vec<Column> = Vec::new();
+        let mut columns: Vec<Regressor> = Vec::new();
         columns.extend(waves(on, of, 2.0).map(|v| main(v, USUAL_ARCSEC).called(WAVE)));
         columns.extend(waves(on, of, 4.0).map(|v| nuisance(v, 0.25)));
         columns.extend(weighted_waves(on, of, 1.0, &light).map(|v| nuisance(v, 0.2)));
@@ -228,7 +225,7 @@ fn pitch_errors(cause: CauseName, wheel: Wheel, on: &Excitation<'_>) -> Vec<Law>
         .collect()
 }
 
-/// The model of a wheel that stands next to its place: the one by the kernels of the drive, where it has them.
+/// The model of a wheel off its place: the one by the kernels of the drive, where it has them.
 fn displacement(cause: CauseName, of: Angle, on: &Excitation<'_>) -> Law {
     match on.kernels() {
         Some(kernels) => kernel::eccentric(cause, of, kernels),
@@ -242,7 +239,7 @@ fn displacement(cause: CauseName, of: Angle, on: &Excitation<'_>) -> Law {
 fn higher_harmonic(cause: CauseName, of: Angle, harmonic: f64) -> Law {
     Law::new(cause, move |on, _| {
         let (flank, light) = (&on.base.flank, light(on));
-        let mut columns: Vec<Column> = Vec::new();
+        let mut columns: Vec<Regressor> = Vec::new();
         columns.extend(waves(on, of, harmonic).map(|v| main(v, USUAL_ARCSEC).called(WAVE)));
         columns.extend(weighted_waves(on, of, harmonic, flank).map(|v| nuisance(v, 0.15)));
         columns.extend(weighted_waves(on, of, harmonic, &light).map(|v| nuisance(v, 0.1)));
@@ -287,7 +284,7 @@ fn ovality() -> Law {
             let (root, radial) = (1.0f64.hypot(RADIAL_OF_TANGENTIAL), sign * sense(on) * RADIAL_OF_TANGENTIAL);
             by_row(on, |k| (a[k] + radial * flank[k] * b[k]) / root)
         };
-        let mut columns: Vec<Column> =
+        let mut columns: Vec<Regressor> =
             [together(&sin, &cos, 1.0), together(&cos, &sin, -1.0)].map(|v| main(v, USUAL_ARCSEC).called(WAVE)).into();
         columns.extend(weighted_waves(on, of, 2.0, flank).map(|v| nuisance(v, 0.15)));
         // Screws and seats leave further waves on the ring: of n per turn, 1/n of the radial part is tangential.
@@ -324,7 +321,7 @@ fn cam_form_error() -> Law {
         let teeth = on.nominal.teeth.map_or(188.0, |t| f64::from(t.flexspline));
         let of = Angle::Flexspline;
         let flank = &on.base.flank;
-        let mut columns: Vec<Column> = Vec::new();
+        let mut columns: Vec<Regressor> = Vec::new();
         columns.extend(waves(on, of, teeth).map(|v| main(v, 8.0).called(WAVE)));
         columns.extend(weighted_waves(on, of, teeth, flank).map(|v| main(v, 8.0).called(WAVE_BY_FLANK)));
         if on.scales.load > 0.0 {
@@ -358,7 +355,7 @@ const PULSE_ENDS: f64 = 8.0;
 const WIDEST_PULSE: f64 = 0.4;
 const ON_THE_BOUND: f64 = 0.9;
 
-/// What is felt of a tooth at an angle (rad) from where a lobe is on it: each half turn brings a lobe.
+/// Effect of a tooth, from 0 to 1, at an angle (rad) from where a lobe is on it: each half turn brings a lobe.
 pub(super) fn pulse(from_tooth: f64, width: f64) -> f64 {
     let turns = from_tooth / PI;
     let away = PI * (turns - turns.round()) / width;
@@ -414,7 +411,7 @@ fn crest_at(amplitude: f64, phase: f64) -> [f64; 2] {
     [amplitude * phase.cos(), amplitude * phase.sin()]
 }
 
-/// A wheel beside its place, of known size.
+/// A displacement of known size.
 fn simulated_displacement(cause: CauseName, of: Angle, on: &Excitation<'_>, p: Values<'_>) -> Simulated {
     let shape = [Name::PhaseRad, Name::HalfLoadNM].map(|name| (name, p(name)));
     displaced(cause, of, on).with(&[shape[0], shape[1], (Name::SizeArcsec, p(Name::AmplitudeArcsec))], [])
@@ -441,11 +438,11 @@ const PITCH_ERROR: CauseSpec = CauseSpec {
     ..OF_WHEELS
 };
 
-/// The axis of the circular spline stands beside that of the generator.
+/// The axis of the circular spline is off that of the generator.
 pub(crate) const CIRCULAR_SPLINE_ECCENTRICITY: CauseSpec = CauseSpec {
     name: "circular_spline_eccentricity",
     words: "eccentricity of the circular spline",
-    does: "its axis beside the axis of the generator: two waves in a turn of the generator against the circular \
+    does: "its axis off the axis of the generator: two waves in a turn of the generator against the circular \
              spline",
     orders: &[(Turn::CircularSpline, Multiple::Fixed(2.0)), (Turn::CircularSpline, Multiple::Fixed(4.0))],
     place: |placing| {
@@ -458,11 +455,11 @@ pub(crate) const CIRCULAR_SPLINE_ECCENTRICITY: CauseSpec = CauseSpec {
     ..DISPLACEMENT
 };
 
-/// The axis of the flexspline's toothing stands beside that of its bore.
+/// The axis of the flexspline's toothing is off that of its bore.
 pub(crate) const FLEXSPLINE_RUNOUT: CauseSpec = CauseSpec {
     name: "flexspline_runout",
     words: "runout of the flexspline",
-    does: "its axis beside the axis of the generator: two waves in a generator turn",
+    does: "its axis off the axis of the generator: two waves in a generator turn",
     orders: &[(Turn::Flexspline, Multiple::Fixed(2.0)), (Turn::Flexspline, Multiple::Fixed(4.0))],
     place: |placing| {
         placing.set_displacement(false, ["as_built.flexspline_runout_um", "as_built.flexspline_runout_phase_deg"]);
@@ -550,7 +547,7 @@ pub(crate) const DAMAGED_TOOTH: CauseSpec = CauseSpec {
     parameters: &[
         number(Name::DepthUm, "depth that lacks, along the normal", 0.0, 500.0, Value(10.0)),
         number(Name::AmplitudeArcsec, "the same at the output, under the largest load", 0.0, 3000.0, Follows),
-        Parameter { words: WHEELS, ..number(Name::Wheel, "0 flexspline, 1 circular spline", 0.0, 1.0, Value(0.0)) },
+        ParameterSpec { words: WHEELS, ..number(Name::Wheel, "0 flexspline, 1 circular spline", 0.0, 1.0, Value(0.0)) },
         number(Name::Tooth, "which one, from 0", 0.0, 2000.0, Value(40.0)),
         number(Name::AngleRad, "the same as an angle on the wheel", -TAU, TAU, Follows),
         number(Name::WidthRad, "half the arc over which it is felt", 0.02, 0.6, Value(0.15)),

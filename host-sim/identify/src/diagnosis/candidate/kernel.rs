@@ -1,7 +1,7 @@
 //! Signatures of geometric causes from the influence kernels of the contact FEM ([`flexspline_design::kernels`]), where
 //! the drive has them: what each load and each place in the wave makes of an error is then computed, not assumed.
 //!
-//! What the kernels leave open stays a nuisance: they are those of the frictionless drive at one temperature and on one
+//! The kernels leave open what stays a nuisance: they are those of the frictionless drive at one temperature and on one
 //! mesh.
 
 use std::f64::consts::PI;
@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use super::displaced::SCALE_MISFIT;
 use super::geometry::{Angle, COS_PRESSURE_ANGLE, angle, waves, weighted_waves};
-use super::{Column, Excitation, Law, Role, Shape, beside, by_row, main, main_about, nuisance, of_wave};
+use super::{Excitation, Law, Regressor, Shape, Tag, beside, by_row, main, main_about, nuisance, of_wave};
 use crate::causes::{CauseName, Kin, ParameterName as Name};
 use flexspline_design::kernels::{Gain, Kernels};
 use flexspline_mechanics::drive::Wheel;
@@ -32,9 +32,9 @@ fn by_flank(flank: f64, torque: f64, value: impl Fn(f64) -> f64) -> f64 {
 }
 
 /// The wave of an error.
-const WAVE: Role = Role("wave");
+const WAVE: Tag = Tag("wave");
 
-fn main_um(values: Vec<f64>) -> Column {
+fn main_um(values: Vec<f64>) -> Regressor {
     main(values, USUAL_UM).called(WAVE)
 }
 
@@ -63,13 +63,13 @@ fn responses(on: &Excitation<'_>, of: Angle, order: f64, gain: impl Fn(f64) -> G
 }
 
 /// Deviations that any law of shape may have from its kernel: the flanks' share and the clearance.
-fn left_open(on: &Excitation<'_>, of: Angle, order: f64) -> Vec<Column> {
+fn left_open(on: &Excitation<'_>, of: Angle, order: f64) -> Vec<Regressor> {
     let flank = &on.base.flank;
     let both = waves(on, of, order).into_iter().chain(weighted_waves(on, of, order, flank));
     both.map(|wave| nuisance(wave, 0.05)).chain([beside(flank.clone(), 0.1)]).collect()
 }
 
-/// An axis beside that of the generator: size and direction enter as the FEM of such drives has them.
+/// An axis off that of the generator: size and direction enter as the FEM of such drives has them.
 pub(super) fn eccentric(cause: CauseName, of: Angle, kernels: &Arc<Kernels>) -> Law {
     let kernels = Arc::clone(kernels);
     let law = Law::new(cause, move |on, shape| {
@@ -80,7 +80,7 @@ pub(super) fn eccentric(cause: CauseName, of: Angle, kernels: &Arc<Kernels>) -> 
             let direction = phase - angle(on, of, k);
             by_flank(on.base.flank[k], on.rows.torque[k], |torque| field.at(direction, torque < 0.0, place))
         });
-        let mut columns = vec![main_about(1.0, pattern, SCALE_MISFIT).called(Role::SIZE)];
+        let mut columns = vec![main_about(1.0, pattern, SCALE_MISFIT).called(Tag::SIZE)];
         columns.extend(left_open(on, of, 2.0));
         columns
     })
@@ -89,14 +89,14 @@ pub(super) fn eccentric(cause: CauseName, of: Angle, kernels: &Arc<Kernels>) -> 
         Shape::angle(Name::PhaseRad, PI, 8),
     ])
     .parameters_by(|on, shape, c| {
-        let size = shape.of(Name::SizeUm) * c.of(Role::SIZE);
+        let size = shape.of(Name::SizeUm) * c.of(Tag::SIZE);
         vec![
             (Name::AmplitudeUm, size),
             (Name::AmplitudeArcsec, size * on.scales.arcsec_per_um / COS_PRESSURE_ANGLE),
             (Name::PhaseRad, shape.of(Name::PhaseRad)),
         ]
     })
-    .physical_if(|_, c| c.of(Role::SIZE) > 0.5);
+    .physical_if(|_, c| c.of(Tag::SIZE) > 0.5);
     by_kernels(law)
 }
 
@@ -107,7 +107,7 @@ pub(super) fn pitch(cause: CauseName, wheel: Wheel, kernels: &Arc<Kernels>) -> L
     const ORDERS: [u32; 8] = [2, 4, 6, 8, 10, 12, 14, 16];
     let (of, kernels) = (Angle::from(wheel), Arc::clone(kernels));
     let mut law = Law::new(cause, move |on, _| {
-        let mut columns: Vec<Column> = Vec::new();
+        let mut columns: Vec<Regressor> = Vec::new();
         for order in ORDERS {
             let pair = responses(on, of, f64::from(order), |torque| kernels.pitch_error(wheel, order, torque));
             // Cumulative errors fall with their order (ISO 1328-1: the total is a few times the single pitch error).
@@ -137,7 +137,7 @@ pub(super) fn pitch(cause: CauseName, wheel: Wheel, kernels: &Arc<Kernels>) -> L
 pub(super) fn ovality(kernels: &Arc<Kernels>) -> Law {
     let (of, kernels) = (Angle::CircularSpline, Arc::clone(kernels));
     let law = Law::new(CauseName::CircularSplineOvality, move |on, _| {
-        let mut columns: Vec<Column> = responses(on, of, 2.0, |torque| kernels.ovality(torque)).map(main_um).into();
+        let mut columns: Vec<Regressor> = responses(on, of, 2.0, |torque| kernels.ovality(torque)).map(main_um).into();
         columns.extend(left_open(on, of, 2.0));
         columns
     })
@@ -152,7 +152,7 @@ pub(super) fn ovality(kernels: &Arc<Kernels>) -> Law {
     by_kernels(law)
 }
 
-/// What all these models are wrong by, and their name.
+/// The model with the misfit and the name of all models by kernels.
 fn by_kernels(mut law: Law) -> Law {
     law.wrong.misfit = KERNEL_MISFIT;
     law.wrong.kin = Kin::Unlike;

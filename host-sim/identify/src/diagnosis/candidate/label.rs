@@ -11,7 +11,7 @@ pub enum Label {
     Cause(CauseName),
     /// A deviation without a cause: a line at any order.
     Line {
-        /// What it is counted against.
+        /// The turn or the time that its order is counted in.
         per: Per,
         /// Periods in that.
         order: f64,
@@ -20,7 +20,7 @@ pub enum Label {
     Like(&'static str),
 }
 
-/// What a line is counted against.
+/// The turn or the time that the order of a line is counted in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Per {
     /// A turn of the generator.

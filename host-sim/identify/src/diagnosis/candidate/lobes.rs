@@ -8,7 +8,7 @@
 use super::displaced::{PRESSED_ARCSEC, ZONES_MISFIT, stopped};
 use super::geometry::{Angle, OF_WHEELS, USUAL_ARCSEC, kept, waves, weighted_waves};
 use super::{
-    Column, Excitation, Law, Named, Role, Shape, Shaped, Simulated, Values, Zones, beside, by_row, main, main_about,
+    Excitation, Law, Named, Regressor, Shape, Shaped, Simulated, Tag, Values, beside, by_row, main, main_about,
     nuisance, of_wave, times,
 };
 use crate::causes::ParameterName as Name;
@@ -27,15 +27,15 @@ const MOST_TEETH: f64 = 1.5;
 /// seen. *Guess*.
 const LEFT_BY_LOAD: f64 = 0.5;
 /// The clearance that the deeper lobe takes, under a load and without one.
-const TAKEN: Role = Role("clearance taken");
-const TAKEN_UNLOADED: Role = Role("clearance taken without a load");
+const TAKEN: Tag = Tag("clearance taken");
+const TAKEN_UNLOADED: Tag = Tag("clearance taken without a load");
 /// First orders of the teeth that the deeper lobe shows.
-const TEETH: [(Angle, Role); 2] = [
-    (Angle::Flexspline, Role("first order of the flexspline")),
-    (Angle::CircularSpline, Role("first order of the circular spline")),
+const TEETH: [(Angle, Tag); 2] = [
+    (Angle::Flexspline, Tag("first order of the flexspline")),
+    (Angle::CircularSpline, Tag("first order of the circular spline")),
 ];
 
-/// What a load does to a lobe that is this much deeper, row by row.
+/// A deeper lobe under load, row by row.
 struct Lobe {
     /// How far it still stops the output, arcsec.
     stops: Vec<f64>,
@@ -70,7 +70,7 @@ fn generator_eccentricity(on: &Excitation<'_>) -> Law {
         let lobe = Lobe::new(on, shape);
         let (flank, shows) = (&on.base.flank, &lobe.shows);
         let shows_by_flank = times(shows, flank);
-        let mut columns: Vec<Column> = Vec::new();
+        let mut columns: Vec<Regressor> = Vec::new();
         for (of, role) in TEETH {
             columns.extend(weighted_waves(on, of, 1.0, shows).map(|v| main(v, USUAL_ARCSEC).called(role)));
         }
@@ -130,7 +130,7 @@ fn generator_eccentricity(on: &Excitation<'_>) -> Law {
         let waves = TEETH.map(|(of, role)| (kept(on, of, 1.0), c.wave(role)));
         let teeth = by_row(on, |k| waves.iter().map(|(wave, c)| c[0] * wave[0][k] + c[1] * wave[1][k]).sum::<f64>());
         let deeper = shape.get(Name::DeeperArcsec).map_or_else(|| -c.of(TAKEN_UNLOADED), |deeper| deeper * c.of(TAKEN));
-        Zones { upper: by_row(on, |k| teeth[k] - deeper), lower: by_row(on, |k| teeth[k] + deeper) }
+        [-deeper, deeper].map(|by| teeth.iter().map(|teeth| teeth + by).collect())
     });
     law.wrong.misfit = ZONES_MISFIT;
     law
@@ -151,7 +151,7 @@ fn simulated_generator_eccentricity(on: &Excitation<'_>, p: Values<'_>) -> Simul
 /// First order of the circular spline over that of the flexspline in simulated data. *Guess*.
 const RING_OF_FLEXSPLINE: f64 = 0.7;
 
-/// The generator stands beside its axis.
+/// The generator is off its axis.
 pub(crate) const GENERATOR_ECCENTRICITY: CauseSpec = CauseSpec {
     name: "generator_eccentricity",
     words: "eccentricity of the generator",

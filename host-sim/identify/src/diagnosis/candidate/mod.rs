@@ -39,10 +39,10 @@ pub(crate) use among::{Acting, Among, Zones, left_by, together};
 pub(crate) use generic::{line, maps, unnamed};
 pub(crate) use geometry::standing_pitch_error;
 pub(crate) use label::{Label, Per};
-pub use named::{Coefficients, Role, Shaped};
+pub use named::{Coefficients, Shaped, Tag};
 pub(crate) use simulated::{Simulated, Values, added};
 
-/// What laws are evaluated on.
+/// The rows that laws are evaluated on, and what is known of them.
 #[derive(Clone, Copy)]
 pub struct Excitation<'a> {
     /// The rows.
@@ -51,9 +51,9 @@ pub struct Excitation<'a> {
     pub nominal: &'a Nominal,
     /// Nominal prediction and its parts.
     pub base: &'a Base,
-    /// What coefficients are counted in.
-    pub scales: &'a Scales,
-    /// What other causes add to half the clearance, row by row, arcsec.
+    /// Units of the coefficients.
+    pub scales: &'a LawUnits,
+    /// Change of half the clearance by other causes, row by row, arcsec.
     pub widened: Option<&'a [f64]>,
     /// How far other causes bring one zone of teeth ahead of the other.
     pub zones: Option<&'a Zones>,
@@ -61,7 +61,8 @@ pub struct Excitation<'a> {
     pub softer: f64,
 }
 
-/// Generator turns below which a pulse in one place is not told from a wave; as in the picture of a residual.
+/// Generator turns below which a pulse in one place is not distinguishable from a wave; as in the picture of a
+/// residual.
 const FEWEST_TURNS_OF_PULSES: f64 = 6.0;
 /// At temperatures closer to each other than this, and this close to the nominal one, K, nothing thermal can be seen
 /// from a changed constant.
@@ -82,7 +83,7 @@ const UNLOADED_ARCSEC: f64 = 20.0;
 impl<'a> Excitation<'a> {
     /// The recorded one.
     #[must_use]
-    pub fn new(rows: &'a Rows, nominal: &'a Nominal, base: &'a Base, scales: &'a Scales) -> Excitation<'a> {
+    pub fn new(rows: &'a Rows, nominal: &'a Nominal, base: &'a Base, scales: &'a LawUnits) -> Excitation<'a> {
         Excitation { rows, nominal, base, scales, widened: None, zones: None, softer: 1.0 }
     }
 
@@ -92,7 +93,7 @@ impl<'a> Excitation<'a> {
         self.scales.load < self.nominal.friction_torque_n_m
     }
 
-    /// What these data lack to speak of a cause: the first of its needs that they do not meet.
+    /// The first need of a cause that these data do not meet.
     #[must_use]
     pub(crate) fn lacks(&self, cause: CauseName) -> Option<Need> {
         cause.spec().needs.iter().copied().find(|need| !self.meets(*need))
@@ -161,16 +162,16 @@ impl<'a> Excitation<'a> {
         self.scales.load.max(UNLOADED_FRICTIONS * self.nominal.friction_torque_n_m).max(wound_up)
     }
 
-    /// What wind-up (arcsec) a load beside the torque that was recorded adds at row `k`, `torque` (N·m) being both.
+    /// Wind-up (arcsec) by a load in addition to the recorded torque at row `k`, `torque` (N·m) being both.
     fn wound_up(&self, k: usize, torque: f64) -> f64 {
         self.softer * (self.nominal.wind_up_arcsec(torque) - self.base.wind_up[k])
     }
 }
 
-/// What the coefficients of laws are counted in: taken from the rows that a model is fitted to, kept where it predicts
+/// Units of the coefficients of laws: taken from the rows that a model is fitted to, kept where it predicts
 /// others.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Scales {
+pub struct LawUnits {
     /// Scale of the load, N·m; 0 without torque.
     pub load: f64,
     /// Mean speed of the generator while it moves, rad/s.
@@ -189,10 +190,10 @@ pub struct Scales {
     pub jumps: Vec<Jump>,
 }
 
-impl Scales {
+impl LawUnits {
     /// Of these rows.
     #[must_use]
-    pub fn new(rows: &Rows, pitch_radius_mm: f64, jumps: Vec<Jump>) -> Scales {
+    pub fn new(rows: &Rows, pitch_radius_mm: f64, jumps: Vec<Jump>) -> LawUnits {
         let (mut moving, mut turned) = (0usize, 0.0);
         for speed in rows.speed.iter().filter(|speed| **speed != 0.0) {
             moving += 1;
@@ -200,7 +201,7 @@ impl Scales {
         }
         let work = (1..rows.len()).map(|k| (rows.travel[k] - rows.travel[k - 1]) * rows.torque[k].abs()).sum();
         let begin_s = rows.time.first().copied().unwrap_or(0.0);
-        Scales {
+        LawUnits {
             load: rows.load_scale(),
             mean_speed: turned / moving.max(1) as f64,
             begin_s,
@@ -266,7 +267,7 @@ impl Shape {
     }
 }
 
-/// What the coefficient of a column may be.
+/// The prior of the coefficient of a column.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Tolerance {
     /// A parameter of the law.
@@ -274,7 +275,7 @@ pub(crate) enum Tolerance {
     /// A deviation of the law: its size is of the order of this share of the main coefficients.
     Nuisance(f64),
     /// A deviation that comes with the cause by right, and may well be the larger part of it: clearance that a wheel
-    /// beside its place takes.
+    /// off its place takes.
     Beside(f64),
     /// A nuisance of these rows alone: what was before anybody recorded. It predicts nothing.
     History(f64),
@@ -282,56 +283,56 @@ pub(crate) enum Tolerance {
 
 /// A column of a law.
 #[derive(Clone, Debug)]
-pub(crate) struct Column {
-    /// What it is, for what asks for its coefficient.
-    pub role: Role,
+pub(crate) struct Regressor {
+    /// Its role, by which its coefficient is found.
+    pub role: Tag,
     /// Arcsec per unit of the coefficient, row by row.
     pub values: Vec<f64>,
-    /// What the coefficient may be.
+    /// The prior of the coefficient.
     pub tolerance: Tolerance,
 }
 
-impl Column {
-    fn new(values: Vec<f64>, tolerance: Tolerance) -> Column {
-        Column { role: Role::PLAIN, values, tolerance }
+impl Regressor {
+    fn new(values: Vec<f64>, tolerance: Tolerance) -> Regressor {
+        Regressor { role: Tag::PLAIN, values, tolerance }
     }
 
     /// The column with a role.
     #[must_use]
-    fn called(self, role: Role) -> Column {
-        Column { role, ..self }
+    fn called(self, role: Tag) -> Regressor {
+        Regressor { role, ..self }
     }
 }
 
 /// A main column with a coefficient around zero.
-fn main(values: Vec<f64>, std: f64) -> Column {
+fn main(values: Vec<f64>, std: f64) -> Regressor {
     main_about(0.0, values, std)
 }
 
 /// A main column with a coefficient around `mean`.
-fn main_about(mean: f64, values: Vec<f64>, std: f64) -> Column {
-    Column::new(values, Tolerance::Main(Prior { mean, std }))
+fn main_about(mean: f64, values: Vec<f64>, std: f64) -> Regressor {
+    Regressor::new(values, Tolerance::Main(Prior { mean, std }))
 }
 
 /// A nuisance column.
-fn nuisance(values: Vec<f64>, share: f64) -> Column {
-    Column::new(values, Tolerance::Nuisance(share))
+fn nuisance(values: Vec<f64>, share: f64) -> Regressor {
+    Regressor::new(values, Tolerance::Nuisance(share))
 }
 
 /// A column of what comes with a cause.
-fn beside(values: Vec<f64>, share: f64) -> Column {
-    Column::new(values, Tolerance::Beside(share))
+fn beside(values: Vec<f64>, share: f64) -> Regressor {
+    Regressor::new(values, Tolerance::Beside(share))
 }
 
 /// A column of what was before the first row of a session.
-fn history(values: Vec<f64>, share: f64) -> Column {
-    Column::new(values, Tolerance::History(share))
+fn history(values: Vec<f64>, share: f64) -> Regressor {
+    Regressor::new(values, Tolerance::History(share))
 }
 
 /// A parameter for the report: name and value.
 pub(crate) type Named = (ParameterName, f64);
 
-type MakeColumns = Box<dyn Fn(&Excitation<'_>, Shaped<'_>) -> Vec<Column> + Send + Sync>;
+type MakeColumns = Box<dyn Fn(&Excitation<'_>, Shaped<'_>) -> Vec<Regressor> + Send + Sync>;
 type MakeParameters = Box<dyn Fn(&Excitation<'_>, Shaped<'_>, Coefficients<'_>) -> Vec<Named> + Send + Sync>;
 type IsPhysical = Box<dyn Fn(Shaped<'_>, Coefficients<'_>) -> bool + Send + Sync>;
 type AddedLoad = Box<dyn Fn(&Excitation<'_>, Shaped<'_>) -> Vec<f64> + Send + Sync>;
@@ -369,22 +370,22 @@ pub(crate) struct Law {
     pub wrong: Wrong,
     /// How it is looked for.
     pub search: Search,
-    /// What it does to other causes, and they to it.
+    /// How it acts on other causes, and they on it.
     pub acts: Acts,
 }
 
 /// How a law may be wrong.
 #[derive(Clone, Copy, Debug)]
 pub struct Wrong {
-    /// Share of its size by which it may be wrong: what is smaller than that beside it may be its own misfit.
+    /// Share of its size by which it may be wrong: a finding smaller than that next to it may be its own misfit.
     pub misfit: f64,
     /// The same where it may look like a deviation without a name.
     pub misfit_unnamed: f64,
-    /// What that misfit may be taken for.
+    /// The laws that the misfit resembles.
     pub kin: Kin,
     /// Largest size of all nuisance over that of the main columns.
     pub most_nuisance: f64,
-    /// Relative uncertainty of its parameters beside that of the data: what the law itself is not sure of.
+    /// Relative uncertainty of its parameters in addition to that of the data: that of the law itself.
     pub doubt: f64,
     /// It says something about sessions that it was not fitted to.
     pub foretells: bool,
@@ -397,21 +398,21 @@ pub(crate) struct Search {
     pub lead: Option<Lead>,
     /// With its nuisance columns, as its main ones mean nothing without them.
     pub whole: bool,
-    /// Natural logarithm of the odds against it before any data, beside the other laws.
+    /// Natural logarithm of the odds against it before any data, among the other laws.
     pub odds_against: f64,
     /// All its columns are taken out before the noise is measured, those of its deviations too: a free profile has its
     /// finest detail in them, a long delay what comes with it.
     pub whole_beside_noise: bool,
 }
 
-/// What a law does to other causes, and they to it.
+/// How a law acts on other causes, and they on it.
 #[derive(Default)]
 pub(crate) struct Acts {
-    /// Load (N·m, row by row) that the cause adds beside the torque that was recorded.
+    /// Load (N·m, row by row) that the cause adds to the torque that was recorded.
     load: Option<AddedLoad>,
     /// How far it brings one zone of teeth ahead of the other.
     zones: Option<Apart>,
-    /// What other causes do to the zones of teeth and to the clearance enters the law.
+    /// The effect of other causes on the zones of teeth and on the clearance enters the law.
     pub meets_zones: bool,
     /// Much of it shows while the play is crossed, in rows that do not count for the sizes of others.
     pub in_crossings: bool,
@@ -438,7 +439,7 @@ const EXACT_DOUBT: f64 = 0.005;
 impl Law {
     fn new(
         label: impl Into<Label>,
-        columns: impl Fn(&Excitation<'_>, Shaped<'_>) -> Vec<Column> + Send + Sync + 'static,
+        columns: impl Fn(&Excitation<'_>, Shaped<'_>) -> Vec<Regressor> + Send + Sync + 'static,
     ) -> Law {
         let label = label.into();
         Law {
@@ -516,8 +517,8 @@ impl Law {
         self.search.odds_against = AFTER_WHEELS;
         self.kin_of_shapes()
     }
-    /// What a misfit of wheels may look like: of an eccentric spline whose flanks bind, a second order of the output of
-    /// a sixth of its size.
+    /// A law that the misfit of wheels may look like: of an eccentric spline whose flanks bind, a second order of the
+    /// output of a sixth of its size.
     fn kin_of_shapes(mut self) -> Law {
         self.wrong.kin = Kin::Shape;
         self
@@ -526,7 +527,7 @@ impl Law {
         self.smooth = true;
         self
     }
-    /// Whether it changes little from one row to the next, so that averages of rows tell what it says of their average.
+    /// Whether it changes little from one row to the next, so that it holds for averages of rows.
     #[must_use]
     pub(crate) fn smooth(&self) -> bool {
         self.smooth
@@ -559,7 +560,7 @@ impl Law {
     }
     fn led_by(
         mut self,
-        columns: impl Fn(&Excitation<'_>, Shaped<'_>) -> Vec<Column> + Send + Sync + 'static,
+        columns: impl Fn(&Excitation<'_>, Shaped<'_>) -> Vec<Regressor> + Send + Sync + 'static,
         beginnings: impl Fn(Shaped<'_>, Coefficients<'_>) -> Vec<Vec<f64>> + Send + Sync + 'static,
     ) -> Law {
         self.search.lead = Some(Lead { columns: Box::new(columns), beginnings: Box::new(beginnings) });
@@ -572,13 +573,13 @@ impl Law {
 
     /// Columns at values of the shape parameters.
     #[must_use]
-    pub(crate) fn columns(&self, on: &Excitation<'_>, values: &[f64]) -> Vec<Column> {
+    pub(crate) fn columns(&self, on: &Excitation<'_>, values: &[f64]) -> Vec<Regressor> {
         (self.columns)(on, self.shaped(values))
     }
 
     /// Columns of the lead at values of the shape parameters; those of the law where it has no lead.
     #[must_use]
-    pub(crate) fn lead_columns(&self, on: &Excitation<'_>, values: &[f64]) -> Vec<Column> {
+    pub(crate) fn lead_columns(&self, on: &Excitation<'_>, values: &[f64]) -> Vec<Regressor> {
         match &self.search.lead {
             Some(lead) => (lead.columns)(on, self.shaped(values)),
             None => self.columns(on, values),
@@ -605,7 +606,7 @@ impl Law {
         (self.physical)(self.shaped(values), coefficients)
     }
 
-    /// Load (N·m, row by row) that the cause adds beside the torque that was recorded, if it adds any.
+    /// Load (N·m, row by row) that the cause adds to the torque that was recorded, if it adds any.
     #[must_use]
     pub fn load(&self, on: &Excitation<'_>, values: &[f64]) -> Option<Vec<f64>> {
         self.acts.load.as_ref().map(|load| load(on, self.shaped(values)))
@@ -691,8 +692,8 @@ pub fn library(on: &Excitation<'_>) -> Vec<Law> {
     CauseName::ALL.iter().filter(|cause| on.speaks_of(**cause)).flat_map(|cause| (cause.spec().laws)(on)).collect()
 }
 
-/// What follows `values` with a lag of `lag_s`. Each session begins with its first value; where the lag `goes_on`, with
-/// what the session before had reached, nearer to that value by the time between them.
+/// The values after a first-order lag of `lag_s`. Each session begins with its first value; where the lag `goes_on`,
+/// with the state that the session before had reached, nearer to that value by the time between them.
 fn lagged(on: &Excitation<'_>, values: &[f64], lag_s: f64, goes_on: bool) -> Vec<f64> {
     let rows = on.rows;
     let mut reached = vec![0.0; rows.len()];
@@ -738,7 +739,7 @@ fn polar(c: f64, s: f64) -> (f64, f64) {
 }
 
 /// Amplitude and phase of a wave by its coefficients.
-fn of_wave(c: Coefficients<'_>, role: Role) -> (f64, f64) {
+fn of_wave(c: Coefficients<'_>, role: Tag) -> (f64, f64) {
     let [cos, sin] = c.wave(role);
     polar(cos, sin)
 }

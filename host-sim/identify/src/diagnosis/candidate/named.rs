@@ -4,21 +4,21 @@
 use super::Shape;
 use crate::causes::ParameterName;
 
-/// What a column of a law is, to find its coefficient again. A wave is two columns of one role, cosine and sine.
+/// The role of a column of a law, to find its coefficient again. A wave is two columns of one role, cosine and sine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Role(pub &'static str);
+pub struct Tag(pub &'static str);
 
-impl Role {
+impl Tag {
     /// A column whose coefficient nobody asks for.
-    pub(crate) const PLAIN: Role = Role("");
+    pub(crate) const PLAIN: Tag = Tag("");
     /// The law at its size: the only column that it has, or the one that all others are deviations of.
-    pub(crate) const SIZE: Role = Role("size");
+    pub(crate) const SIZE: Tag = Tag("size");
 }
 
 /// Coefficients with what their columns are.
 #[derive(Clone, Copy, Debug)]
 pub struct Coefficients<'c> {
-    roles: &'c [Role],
+    roles: &'c [Tag],
     values: &'c [f64],
     sizes: Option<&'c [f64]>,
 }
@@ -26,7 +26,7 @@ pub struct Coefficients<'c> {
 impl<'c> Coefficients<'c> {
     /// Coefficients of columns of these roles.
     #[must_use]
-    pub fn new(roles: &'c [Role], values: &'c [f64]) -> Coefficients<'c> {
+    pub fn new(roles: &'c [Tag], values: &'c [f64]) -> Coefficients<'c> {
         Coefficients { roles, values, sizes: None }
     }
 
@@ -37,26 +37,26 @@ impl<'c> Coefficients<'c> {
     }
 
     /// Those of all columns of a role, in their order.
-    pub fn all(self, role: Role) -> impl Iterator<Item = f64> {
+    pub fn all(self, role: Tag) -> impl Iterator<Item = f64> {
         self.roles.iter().zip(self.values).filter(move |(r, _)| **r == role).map(|(_, c)| *c)
     }
 
     /// That of the first column of a role; none where the law has no such column here.
     #[must_use]
-    pub fn get(self, role: Role) -> Option<f64> {
+    pub fn get(self, role: Tag) -> Option<f64> {
         self.all(role).next()
     }
 
     /// That of the first column of a role. What has no column adds nothing: 0.
     #[must_use]
-    pub fn of(self, role: Role) -> f64 {
+    pub fn of(self, role: Tag) -> f64 {
         self.get(role).unwrap_or(0.0)
     }
 
-    /// What the first column of a role adds, root mean square, without a sign: 0 where the law has no such column here.
-    /// Where the columns are not known all are taken to be alike.
+    /// Root mean square of the part of the first column of a role, without a sign: 0 where the law has no such column
+    /// here. Where the columns are not known all are taken to be alike.
     #[must_use]
-    pub(crate) fn adds(self, role: Role) -> f64 {
+    pub(crate) fn adds(self, role: Tag) -> f64 {
         let Some(at) = self.roles.iter().position(|of| *of == role) else { return 0.0 };
         let size = self.sizes.and_then(|sizes| sizes.get(at)).copied().unwrap_or(1.0);
         self.values.get(at).map_or(0.0, |coefficient| (coefficient * size).abs())
@@ -64,7 +64,7 @@ impl<'c> Coefficients<'c> {
 
     /// Those of the cosine and the sine of a wave; 0 where the law has no such wave here.
     #[must_use]
-    pub fn wave(self, role: Role) -> [f64; 2] {
+    pub fn wave(self, role: Tag) -> [f64; 2] {
         let mut both = self.all(role);
         [0, 1].map(|_| both.next().unwrap_or(0.0))
     }
@@ -114,13 +114,13 @@ mod tests {
 
     #[test]
     fn a_coefficient_is_found_wherever_its_column_stands() {
-        let wave = Role("wave");
+        let wave = Tag("wave");
         let values = [7.0, 1.0, 2.0, 3.0];
-        for roles in [[Role::PLAIN, wave, wave, Role::SIZE], [Role::SIZE, wave, wave, Role::PLAIN]] {
+        for roles in [[Tag::PLAIN, wave, wave, Tag::SIZE], [Tag::SIZE, wave, wave, Tag::PLAIN]] {
             let c = Coefficients::new(&roles, &values);
             assert_eq!(c.wave(wave), [1.0, 2.0]);
-            assert_eq!(c.of(Role::SIZE), if roles[0] == Role::SIZE { 7.0 } else { 3.0 });
-            assert_eq!((c.get(Role("none")), c.of(Role("none")), c.wave(Role("none"))), (None, 0.0, [0.0; 2]));
+            assert_eq!(c.of(Tag::SIZE), if roles[0] == Tag::SIZE { 7.0 } else { 3.0 });
+            assert_eq!((c.get(Tag("none")), c.of(Tag("none")), c.wave(Tag("none"))), (None, 0.0, [0.0; 2]));
         }
     }
 

@@ -1,21 +1,21 @@
-//! What the sensors do: geometry of the encoders, time between their readings, a wrong ratio. None knows of load.
+//! Causes of the sensors: geometry of the encoders, time between their readings, a wrong ratio. None knows of load.
 
 use std::f64::consts::TAU;
 
 use super::geometry::{Angle, waves};
-use super::{Column, Excitation, Law, Named, Role, Simulated, Values, by_row, main, nuisance, polar};
+use super::{Excitation, Law, Named, Regressor, Simulated, Tag, Values, by_row, main, nuisance, polar};
 use crate::causes::ParameterName as Name;
 use crate::causes::spec::{
     CauseName, CauseSpec, ENCODERS, Factor, InTable, Kin,
     Multiple::{Fixed, Harmonic},
-    Need, OF_THE_OUTPUT_ENCODER, Parameter, Turn,
+    Need, OF_THE_OUTPUT_ENCODER, ParameterSpec, Turn,
     Usual::{Follows, Value},
     number, phase, plain,
 };
 use crate::measurement::rates;
 
 /// The line of an encoder.
-const WAVE: Role = Role("wave");
+const WAVE: Tag = Tag("wave");
 
 /// Share of a second order that its own first overtone may have, and a subdivision of its own: signals of unlike size
 /// make little of it. Guess.
@@ -32,7 +32,7 @@ fn encoder(
 ) -> Law {
     let angle = if of_output { Angle::Output } else { Angle::Generator };
     Law::new(cause, move |on, _| {
-        let mut columns: Vec<Column> = waves(on, angle, order).map(|wave| main(wave, std).called(WAVE)).into();
+        let mut columns: Vec<Regressor> = waves(on, angle, order).map(|wave| main(wave, std).called(WAVE)).into();
         if has_overtone {
             columns.extend(waves(on, angle, 2.0 * order).map(|wave| nuisance(wave, OVERTONE)));
         }
@@ -112,7 +112,7 @@ fn sensor_latency() -> Law {
             on_its_flank(on).iter().zip(&on.base.wind_up).map(|(all, wind_up)| all - wind_up).collect();
         let since = |k: usize| 2.0 * (on.rows.time[k] - begun) / on.scales.duration_s.max(1e-9);
         vec![
-            main(by_row(on, |k| -on.rows.speed[k] * per_s), 5e-3).called(Role::SIZE),
+            main(by_row(on, |k| -on.rows.speed[k] * per_s), 5e-3).called(Tag::SIZE),
             // Two clocks seldom run at the same rate.
             nuisance(by_row(on, |k| -on.rows.speed[k] * per_s * since(k)), 0.3),
             // The error is that of the instant at which the output was read: its waves are where the generator was
@@ -124,7 +124,7 @@ fn sensor_latency() -> Law {
             nuisance(rate(on, &on.rows.speed).into_iter().map(|by| 0.5 * by * per_s).collect(), DELAY_S),
         ]
     })
-    .parameters_by(|_, _, c| vec![(Name::DelayS, c.of(Role::SIZE))])
+    .parameters_by(|_, _, c| vec![(Name::DelayS, c.of(Tag::SIZE))])
     .exact();
     // Of a long delay in fast motion what comes with it is more than noise.
     law.search.whole_beside_noise = true;
@@ -134,9 +134,9 @@ fn sensor_latency() -> Law {
 /// The error grows with the angle: the ratio is not what the nominal model says.
 fn ratio_error() -> Law {
     Law::new(CauseName::RatioError, |on, _| {
-        vec![main(by_row(on, |k| on.rows.output[k] * flexspline_base::units::ARCSEC_PER_RAD), 3e-4).called(Role::SIZE)]
+        vec![main(by_row(on, |k| on.rows.output[k] * flexspline_base::units::ARCSEC_PER_RAD), 3e-4).called(Tag::SIZE)]
     })
-    .parameters_by(|_, _, c| vec![(Name::RatioRelativeError, c.of(Role::SIZE))])
+    .parameters_by(|_, _, c| vec![(Name::RatioRelativeError, c.of(Tag::SIZE))])
     .exact()
 }
 
@@ -175,7 +175,7 @@ pub(crate) const OUTPUT_ENCODER_ECCENTRICITY: CauseSpec = CauseSpec {
 };
 
 /// The amplitude of a wave of the generator's encoder there.
-const AT_THE_GENERATOR: Parameter =
+const AT_THE_GENERATOR: ParameterSpec =
     number(Name::GeneratorAmplitudeArcsec, "the same at the generator", 0.0, 1e5, Follows);
 const BY_THE_RATIO: (Name, Name, Factor) = (Name::AmplitudeArcsec, Name::GeneratorAmplitudeArcsec, Factor::Ratio);
 
@@ -242,7 +242,7 @@ pub(crate) const ENCODER_SUBDIVISION: CauseSpec = CauseSpec {
         number(Name::AmplitudeArcsec, "at the output", 0.0, 1000.0, Value(6.0)),
         AT_THE_GENERATOR,
         number(Name::Harmonic, "waves in a turn of the encoder", 3.0, 65_536.0, Value(4.0)),
-        Parameter { words: ENCODERS, ..number(Name::Encoder, "0 generator, 1 output", 0.0, 1.0, Value(0.0)) },
+        ParameterSpec { words: ENCODERS, ..number(Name::Encoder, "0 generator, 1 output", 0.0, 1.0, Value(0.0)) },
         phase("of sin(harmonic angle + phase)"),
     ],
     twins: &[BY_THE_RATIO],
@@ -262,7 +262,7 @@ pub(crate) const SENSOR_LATENCY: CauseSpec = CauseSpec {
     made_by_loads: true,
     parameters: &[number(Name::DelayS, "positive: the output's is older", -0.1, 0.1, Value(0.002))],
     laws: |_| vec![sensor_latency()],
-    simulated: |_, p| sensor_latency().with(&[], [(Role::SIZE, p(Name::DelayS))]),
+    simulated: |_, p| sensor_latency().with(&[], [(Tag::SIZE, p(Name::DelayS))]),
     ..plain()
 };
 
@@ -275,6 +275,6 @@ pub(crate) const RATIO_ERROR: CauseSpec = CauseSpec {
     made_by_loads: true,
     parameters: &[number(Name::RatioRelativeError, "of the output angle", -0.01, 0.01, Value(1e-4))],
     laws: |_| vec![ratio_error()],
-    simulated: |_, p| ratio_error().with(&[], [(Role::SIZE, p(Name::RatioRelativeError))]),
+    simulated: |_, p| ratio_error().with(&[], [(Tag::SIZE, p(Name::RatioRelativeError))]),
     ..plain()
 };

@@ -1,6 +1,6 @@
 //! A cause of known parameters: the way back from the parameters of a report to its law.
 
-use super::{Acting, Excitation, Law, Named, Role, Tolerance, together};
+use super::{Acting, Excitation, Law, Named, Tag, Tolerance, together};
 use crate::causes::ParameterName;
 use crate::diagnosis::rows::combined;
 
@@ -11,13 +11,13 @@ pub(crate) type Values<'v> = &'v dyn Fn(ParameterName) -> f64;
 pub(crate) struct Simulated {
     law: Law,
     shape: Vec<f64>,
-    coefficients: Vec<(Role, f64)>,
+    coefficients: Vec<(Tag, f64)>,
 }
 
 impl Law {
     /// The law with these numbers. A shape parameter that is not among them has its least value, a column its usual
     /// coefficient: 0 for a deviation. Coefficients of one role are those of its columns in their order.
-    pub(super) fn with(self, shape: &[Named], coefficients: impl IntoIterator<Item = (Role, f64)>) -> Simulated {
+    pub(super) fn with(self, shape: &[Named], coefficients: impl IntoIterator<Item = (Tag, f64)>) -> Simulated {
         let given = |name: ParameterName| shape.iter().find(|(of, _)| *of == name).map(|(_, value)| *value);
         let shape = self.shapes.iter().map(|shape| given(shape.name).unwrap_or(shape.low)).collect();
         Simulated { law: self, shape, coefficients: coefficients.into_iter().collect() }
@@ -29,7 +29,7 @@ impl Simulated {
     pub(crate) fn acting(&self, on: &Excitation<'_>) -> Acting<'_> {
         let mut given = self.coefficients.clone();
         let columns = self.law.columns(on, &self.shape);
-        let coefficient = |column: &super::Column| match given.iter().position(|(role, _)| *role == column.role) {
+        let coefficient = |column: &super::Regressor| match given.iter().position(|(role, _)| *role == column.role) {
             Some(at) => given.remove(at).1,
             None => match column.tolerance {
                 Tolerance::Main(prior) => prior.mean,
@@ -42,7 +42,7 @@ impl Simulated {
     }
 }
 
-/// What causes add to the error together, arcsec, row by row.
+/// Sum of the causes in the error, arcsec, row by row.
 pub(crate) fn added(on: &Excitation<'_>, causes: &[Simulated]) -> Vec<f64> {
     let acting: Vec<Acting<'_>> = causes.iter().map(|cause| cause.acting(on)).collect();
     let columns = together(on, &acting);

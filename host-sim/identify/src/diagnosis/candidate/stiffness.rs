@@ -1,4 +1,4 @@
-//! What the torque does beyond the nominal wind-up and play.
+//! Causes that follow the torque, beyond the nominal wind-up and play.
 
 use std::f64::consts::TAU;
 
@@ -8,7 +8,7 @@ use std::ops::Range;
 use super::super::prepare::Jump;
 use super::super::rows::rms;
 use super::geometry::{Angle, angle, pulse, weighted_waves};
-use super::{Coefficients, Excitation, Law, Role, Shape, Shaped, by_row, history, main, nuisance};
+use super::{Coefficients, Excitation, Law, Shape, Shaped, Tag, by_row, history, main, nuisance};
 use crate::causes::ParameterName as Name;
 use crate::causes::spec::{
     CauseName, CauseSpec, InTable, Kin,
@@ -71,17 +71,17 @@ fn unknown_beginnings(on: &Excitation<'_>, slip: f64) -> Vec<Vec<f64>> {
 const MOST_BEGINNINGS: usize = 10;
 
 /// The spring that a hysteresis is stated by, and those that slip earlier and later: at these shares of its torque.
-const SPRING: Role = Role("spring");
-const EARLIER_SPRING: Role = Role("spring that slips earlier");
-const LATER_SPRING: Role = Role("spring that slips later");
+const SPRING: Tag = Tag("spring");
+const EARLIER_SPRING: Tag = Tag("spring that slips earlier");
+const LATER_SPRING: Tag = Tag("spring that slips later");
 const EARLIER: f64 = 0.35;
 const LATER: f64 = 2.5;
 /// Share by which a loop may be wider under load of one sign. Guess.
 const WIDER_ONE_WAY: f64 = 0.2;
 /// Wear that grows faster than the law says.
-const FASTER: Role = Role("faster");
+const FASTER: Tag = Tag("faster");
 /// A jump by whole teeth.
-const JUMP: Role = Role("jump");
+const JUMP: Tag = Tag("jump");
 
 /// Half the opening of a loop at no torque, arcsec: on the way back from the full load an element holds this share of
 /// what it can when the torque passes zero.
@@ -91,7 +91,7 @@ fn half_width(full: f64, shape: Shaped<'_>, c: Coefficients<'_>) -> f64 {
     springs.iter().map(|(factor, role)| c.of(*role) * held(full, factor * slips)).sum()
 }
 
-/// What an element that slips at this torque holds when the torque passes zero, of what it can.
+/// Share of its torque that an element which slips at `slip` holds when the torque passes zero.
 fn held(full: f64, slip: f64) -> f64 {
     ((full - slip) / slip).clamp(0.0, 1.0)
 }
@@ -132,7 +132,7 @@ fn torsional_hysteresis(on: &Excitation<'_>) -> Law {
     law.wrong.doubt = 0.15;
     law.search.whole = true;
     law.wrong.misfit_unnamed = LOOKS_LIKE_CREEP;
-    // What springs hold goes with the load; the wind-up beside them takes that back, and the beginnings are nobody's.
+    // What springs hold goes with the load; the wind-up in the law takes that back, and the beginnings are nobody's.
     law.wrong.most_nuisance = 2.0;
     law
 }
@@ -147,7 +147,7 @@ fn stiffness_hardening() -> Law {
         let power = |n: f64| by_row(on, |k| -load_share(on, k).signum() * load_share(on, k).abs().powf(n));
         let exponent = shape.of(Name::Exponent);
         vec![
-            main(power(exponent), 30.0).called(Role::SIZE),
+            main(power(exponent), 30.0).called(Tag::SIZE),
             nuisance(power(1.0), 0.4),
             nuisance(power(exponent + 1.5), 0.3),
         ]
@@ -156,18 +156,18 @@ fn stiffness_hardening() -> Law {
     .shapes([Shape::evenly(Name::Exponent, 1.6, 4.4, 3)])
     .parameters_by(|on, shape, c| {
         vec![
-            (Name::HardeningArcsec, c.of(Role::SIZE)),
+            (Name::HardeningArcsec, c.of(Tag::SIZE)),
             (Name::HardeningExponent, shape.of(Name::Exponent)),
             (Name::FullLoadNM, on.scales.load),
         ]
     })
-    .physical_if(|_, c| c.of(Role::SIZE) > 0.0)
+    .physical_if(|_, c| c.of(Tag::SIZE) > 0.0)
 }
 
 fn stiffness_error() -> Law {
     let mut law =
-        Law::new(CauseName::StiffnessError, |on, _| vec![main(on.base.wind_up.clone(), 0.5).called(Role::SIZE)])
-            .parameters_by(|_, _, c| vec![(Name::StiffnessRatio, 1.0 / (1.0 + c.of(Role::SIZE)))]);
+        Law::new(CauseName::StiffnessError, |on, _| vec![main(on.base.wind_up.clone(), 0.5).called(Tag::SIZE)])
+            .parameters_by(|_, _, c| vec![(Name::StiffnessRatio, 1.0 / (1.0 + c.of(Tag::SIZE)))]);
     law.acts.tolerance_of = Some(super::among::STIFFNESS);
     law
 }
@@ -181,7 +181,7 @@ const UNEQUAL_LOBES: f64 = 0.3;
 const OTHER_ARC: f64 = 0.3;
 /// The arc of another shape, over that of the law. *Guess*.
 const BROADER: f64 = 1.7;
-const BROADER_ARC: Role = Role("broader arc");
+const BROADER_ARC: Tag = Tag("broader arc");
 
 /// A tooth of the circular spline that is cracked at its root: the drive winds up more, both ways, while a loaded zone
 /// is on it, twice in a turn of the wave on that wheel. Without load it is where it was.
@@ -194,7 +194,7 @@ fn cracked_tooth_root() -> Law {
         let opening = size.iter().map(|v| v.abs()).collect();
         let lobe = by_row(on, |k| size[k] * (angle(on, WHEEL, k) - place).cos().signum());
         vec![
-            main(size, 30.0).called(Role::SIZE),
+            main(size, 30.0).called(Tag::SIZE),
             nuisance(opening, OPENING),
             nuisance(lobe, UNEQUAL_LOBES),
             nuisance(softer(BROADER * width), OTHER_ARC).called(BROADER_ARC),
@@ -204,7 +204,7 @@ fn cracked_tooth_root() -> Law {
     .parameters_by(|on, shape, c| {
         // Both arcs have their top where the tooth is. Together they are as wide as the bell curve of that height and
         // area.
-        let (narrow, broad) = (c.of(Role::SIZE), c.of(BROADER_ARC));
+        let (narrow, broad) = (c.of(Tag::SIZE), c.of(BROADER_ARC));
         let top = narrow + broad;
         let width = shape.of(Name::WidthRad) * (narrow + BROADER * broad) / top;
         vec![
@@ -214,7 +214,7 @@ fn cracked_tooth_root() -> Law {
             (Name::WidthRad, width),
         ]
     })
-    .physical_if(|_, c| c.of(Role::SIZE) > 0.0 && c.of(Role::SIZE) + BROADER * c.of(BROADER_ARC) > 0.0)
+    .physical_if(|_, c| c.of(Tag::SIZE) > 0.0 && c.of(Tag::SIZE) + BROADER * c.of(BROADER_ARC) > 0.0)
     .well_known()
 }
 
@@ -224,7 +224,7 @@ const UNEVEN_WEAR: f64 = 0.15;
 fn backlash_growth() -> Law {
     let mut law = Law::new(CauseName::BacklashGrowth, |on, _| {
         let half = on.base.half_backlash.max(1.0);
-        let mut columns = vec![main(by_row(on, |k| half * on.base.flank[k]), 1.0).called(Role::SIZE)];
+        let mut columns = vec![main(by_row(on, |k| half * on.base.flank[k]), 1.0).called(Tag::SIZE)];
         // Teeth that are used most wear most.
         if on.nominal.teeth.is_some() {
             for wheel in [Angle::Flexspline, Angle::CircularSpline] {
@@ -233,22 +233,22 @@ fn backlash_growth() -> Law {
         }
         columns
     })
-    .parameters_by(|on, _, c| vec![(Name::GrowthArcsec, 2.0 * c.of(Role::SIZE) * on.base.half_backlash.max(1.0))])
-    .physical_if(|_, c| c.of(Role::SIZE) > 0.0);
+    .parameters_by(|on, _, c| vec![(Name::GrowthArcsec, 2.0 * c.of(Tag::SIZE) * on.base.half_backlash.max(1.0))])
+    .physical_if(|_, c| c.of(Tag::SIZE) > 0.0);
     law.acts.tolerance_of = Some("backlash");
     law
 }
 
-/// Progress of wear from 0 at the first row to 1 at the last.
+/// WearsWith of wear from 0 at the first row to 1 at the last.
 #[derive(Clone, Copy)]
-enum Progress {
+enum WearsWith {
     Time,
     Travel,
     Work,
 }
 
 /// A clearance that widens during the data, with time, travel, or travel under load (Archard).
-fn wear(by: Progress) -> Law {
+fn wear(by: WearsWith) -> Law {
     Law::new(CauseName::Wear, move |on, shape| {
         let rows = on.rows;
         let travelled = |k: usize| (rows.travel[k] - rows.travel[k.saturating_sub(1)]).max(0.0);
@@ -260,31 +260,31 @@ fn wear(by: Progress) -> Law {
             (0..rows.len()).scan(0.0, sum).collect::<Vec<f64>>()
         };
         let (done, all) = match by {
-            Progress::Time => (by_row(on, |k| (rows.time[k] - on.scales.begin_s).max(0.0)), on.scales.duration_s),
-            Progress::Travel => (sum_of(&travelled), on.scales.travel),
-            Progress::Work => (sum_of(&|k| travelled(k) * rows.torque[k].abs()), on.scales.work),
+            WearsWith::Time => (by_row(on, |k| (rows.time[k] - on.scales.begin_s).max(0.0)), on.scales.duration_s),
+            WearsWith::Travel => (sum_of(&travelled), on.scales.travel),
+            WearsWith::Work => (sum_of(&|k| travelled(k) * rows.torque[k].abs()), on.scales.work),
         };
         let all = all.max(1e-12);
         let exponent = shape.of(Name::Exponent);
         let widened = |k: usize| (done[k] / all).powf(exponent);
         vec![
-            main(by_row(on, |k| on.base.flank[k] * widened(k)), 30.0).called(Role::SIZE),
+            main(by_row(on, |k| on.base.flank[k] * widened(k)), 30.0).called(Tag::SIZE),
             nuisance(by_row(on, |k| on.base.flank[k] * widened(k).powi(2)), 0.25).called(FASTER),
             nuisance(by_row(on, |k| on.base.flank[k]), 0.25),
         ]
     })
     .shapes([Shape::by_factors(Name::Exponent, 0.5, 2.0, 1)])
     .parameters_by(|_, shape, c| {
-        let growth_arcsec = 2.0 * (c.of(Role::SIZE) + c.of(FASTER));
+        let growth_arcsec = 2.0 * (c.of(Tag::SIZE) + c.of(FASTER));
         vec![(Name::GrowthArcsec, growth_arcsec), (Name::Exponent, shape.of(Name::Exponent))]
     })
-    .physical_if(|_, c| c.of(Role::SIZE) > 0.0)
+    .physical_if(|_, c| c.of(Tag::SIZE) > 0.0)
     .well_known()
     .evaluated_on_averages()
 }
 
-/// What the clearance has widened by between two sessions.
-const STEP: Role = Role("step between sessions");
+/// Growth of the clearance between two sessions.
+const STEP: Tag = Tag("step between sessions");
 /// A clearance that is narrower in a session than before does not wear; nor does one that is by less than this share of
 /// all its growth. *Guess*.
 const NOT_NARROWER: f64 = 0.1;
@@ -373,7 +373,7 @@ pub(crate) const CRACKED_TOOTH_ROOT: CauseSpec = CauseSpec {
     simulated: |on, p| {
         let size = p(Name::AmplitudeArcsec) * on.scales.load / p(Name::FullLoadNM);
         let shape = [Name::AngleRad, Name::WidthRad].map(|name| (name, p(name)));
-        cracked_tooth_root().with(&shape, [(Role::SIZE, size)])
+        cracked_tooth_root().with(&shape, [(Tag::SIZE, size)])
     },
     ..plain()
 };
@@ -390,7 +390,7 @@ pub(crate) const BACKLASH_GROWTH: CauseSpec = CauseSpec {
     laws: |_| vec![backlash_growth()],
     simulated: |on, p| {
         let half = on.base.half_backlash.max(1.0);
-        backlash_growth().with(&[], [(Role::SIZE, 0.5 * p(Name::GrowthArcsec) / half)])
+        backlash_growth().with(&[], [(Tag::SIZE, 0.5 * p(Name::GrowthArcsec) / half)])
     },
     ..plain()
 };
@@ -407,14 +407,14 @@ pub(crate) const WEAR: CauseSpec = CauseSpec {
     parameters: &[number(Name::GrowthArcsec, "whole width, first row to last", 0.0, 10_000.0, Value(40.0))],
     laws: |on| {
         let timed = on.rows.recorded.time;
-        let mut laws = vec![wear(Progress::Travel).variant("travel")];
-        laws.extend(timed.then(|| wear(Progress::Time).variant("time")));
-        laws.extend((on.scales.load > 0.0).then(|| wear(Progress::Work).variant("work")));
+        let mut laws = vec![wear(WearsWith::Travel).variant("travel")];
+        laws.extend(timed.then(|| wear(WearsWith::Time).variant("time")));
+        laws.extend((on.scales.load > 0.0).then(|| wear(WearsWith::Work).variant("work")));
         laws.extend(wear_between_sessions(on).filter(|_| timed));
         laws
     },
     simulated: |_, p| {
-        wear(Progress::Travel).with(&[(Name::Exponent, 1.0)], [(Role::SIZE, 0.5 * p(Name::GrowthArcsec))])
+        wear(WearsWith::Travel).with(&[(Name::Exponent, 1.0)], [(Tag::SIZE, 0.5 * p(Name::GrowthArcsec))])
     },
     ..plain()
 };
@@ -435,7 +435,7 @@ pub(crate) const STIFFNESS_HARDENING: CauseSpec = CauseSpec {
     simulated: |on, p| {
         let exponent = p(Name::HardeningExponent);
         let size = p(Name::HardeningArcsec) * (on.scales.load / p(Name::FullLoadNM)).powf(exponent);
-        stiffness_hardening().with(&[(Name::Exponent, exponent)], [(Role::SIZE, size)])
+        stiffness_hardening().with(&[(Name::Exponent, exponent)], [(Tag::SIZE, size)])
     },
     ..plain()
 };
@@ -450,7 +450,7 @@ pub(crate) const STIFFNESS_ERROR: CauseSpec = CauseSpec {
     place: |placing| placing.set_stiffness(),
     parameters: &[number(Name::StiffnessRatio, "true over nominal", 0.05, 20.0, Value(0.8))],
     laws: |_| vec![stiffness_error()],
-    simulated: |_, p| stiffness_error().with(&[], [(Role::SIZE, 1.0 / p(Name::StiffnessRatio) - 1.0)]),
+    simulated: |_, p| stiffness_error().with(&[], [(Tag::SIZE, 1.0 / p(Name::StiffnessRatio) - 1.0)]),
     ..plain()
 };
 

@@ -1,7 +1,7 @@
-//! What the temperature does.
+//! Causes that follow the temperature.
 
 use super::dynamic::columns_of_load;
-use super::{Excitation, Law, Named, Role, Shape, Shaped, by_row, lagged, main, main_about, nuisance};
+use super::{Excitation, Law, Named, Shape, Shaped, Tag, by_row, lagged, main, main_about, nuisance};
 use crate::causes::ParameterName as Name;
 use crate::causes::spec::{
     CauseName, CauseSpec, InTable, Kin, Need,
@@ -23,13 +23,13 @@ fn thermal_clearance(on: &Excitation<'_>) -> Law {
         let warmer = warmer_by(on, lag_of(shape));
         let flank = |k: usize| on.base.flank[k];
         vec![
-            main(by_row(on, |k| flank(k) * warmer[k]), 1.0).called(Role::SIZE),
+            main(by_row(on, |k| flank(k) * warmer[k]), 1.0).called(Tag::SIZE),
             nuisance(by_row(on, |k| flank(k) * warmer[k] * warmer[k].abs() / 30.0), 0.3),
             nuisance(by_row(on, |k| flank(k) * warmer[k] * warmer[k] / 30.0), 0.3),
         ]
     })
     .shapes(on.rows.recorded.time.then(|| Shape::by_factors(Name::LagS, 0.5, 600.0, 3)))
-    .parameters_by(|_, shape, c| named_clearance(2.0 * c.of(Role::SIZE), shape))
+    .parameters_by(|_, shape, c| named_clearance(2.0 * c.of(Tag::SIZE), shape))
     .well_known()
     .evaluated_on_averages()
 }
@@ -56,7 +56,7 @@ fn thermal_clearance_shut(on: &Excitation<'_>) -> Law {
         let width = 2.0 * on.base.half_backlash;
         let changed = by_row(on, |k| 0.5 * on.base.flank[k] * ((width + per_k * warmer[k]).max(0.0) - width));
         vec![
-            main_about(1.0, changed, 0.1).called(Role::SIZE),
+            main_about(1.0, changed, 0.1).called(Tag::SIZE),
             nuisance(by_row(on, |k| on.base.flank[k] * warmer[k]), 0.15),
         ]
     })
@@ -65,8 +65,8 @@ fn thermal_clearance_shut(on: &Excitation<'_>) -> Law {
             .into_iter()
             .chain(on.rows.recorded.time.then(|| Shape::by_factors(Name::LagS, 0.5, 600.0, 2))),
     )
-    .parameters_by(|_, shape, c| named_clearance(shape.of(Name::ClearanceArcsecPerK) * c.of(Role::SIZE), shape))
-    .physical_if(|_, c| c.of(Role::SIZE) > 0.5)
+    .parameters_by(|_, shape, c| named_clearance(shape.of(Name::ClearanceArcsecPerK) * c.of(Tag::SIZE), shape))
+    .physical_if(|_, c| c.of(Tag::SIZE) > 0.5)
     .well_known()
     .evaluated_on_averages()
 }
@@ -79,11 +79,11 @@ fn thermal_stiffness() -> Law {
     Law::new(CauseName::ThermalStiffness, |on, _| {
         let warmer = |k: usize| on.rows.temperature[k] - on.nominal.temperature_c;
         vec![
-            main(by_row(on, |k| on.base.wind_up[k] * warmer(k) / 100.0), 0.5).called(Role::SIZE),
+            main(by_row(on, |k| on.base.wind_up[k] * warmer(k) / 100.0), 0.5).called(Tag::SIZE),
             nuisance(by_row(on, |k| on.base.wind_up[k] * warmer(k).powi(2) / 3000.0), 0.4),
         ]
     })
-    .parameters_by(|_, _, c| vec![(Name::StiffnessRelativePerK, -0.01 * c.of(Role::SIZE))])
+    .parameters_by(|_, _, c| vec![(Name::StiffnessRelativePerK, -0.01 * c.of(Tag::SIZE))])
     .well_known()
     .evaluated_on_averages()
 }
@@ -112,7 +112,7 @@ impl Drag {
 
     /// Share of a drag of 1 at the mean speed and the nominal temperature, against the motion.
     fn share(self, on: &Excitation<'_>) -> Vec<f64> {
-        let (rows, usual) = (on.rows, usual_speed(on));
+        let (rows, usual) = (on.rows, on.scales.mean_speed.max(1e-9));
         by_row(on, |k| {
             let share = (rows.speed[k] / usual).abs().powf(self.power);
             let thicker = thicker(on.nominal.temperature_c - rows.temperature[k], self.per_k, self.bend);
@@ -120,9 +120,10 @@ impl Drag {
         })
     }
 
-    /// Arcsec for 1 N·m of it at the mean speed and the nominal temperature.
+    /// Arcsec for 1 N·m of it at the mean speed and the nominal temperature; counted in N·m for a drive that does not
+    /// give.
     fn wind_up(self, on: &Excitation<'_>) -> Vec<f64> {
-        let slope = wind_up_arcsec_per_n_m(on);
+        let slope = on.slope_at_rest().map_or(1.0, |slope| on.softer * slope);
         self.share(on).into_iter().map(|share| share * slope).collect()
     }
 
@@ -135,16 +136,6 @@ impl Drag {
             (Name::DragBendPerK, self.bend),
         ]
     }
-}
-
-/// Speed at which a drag is stated, rad/s.
-fn usual_speed(on: &Excitation<'_>) -> f64 {
-    on.scales.mean_speed.max(1e-9)
-}
-
-/// Slope of the wind-up at no load, arcsec/N·m; 1 for a drive that does not give.
-fn wind_up_arcsec_per_n_m(on: &Excitation<'_>) -> f64 {
-    on.slope_at_rest().map_or(1.0, |slope| on.softer * slope)
 }
 
 /// How much thicker a lubricant is that is `cold` K below the nominal temperature. Vogel's `ln ν = B / (T + C)` written
@@ -168,7 +159,7 @@ fn lubricant_viscosity() -> Law {
         let wind_up = drag.wind_up(on);
         let size = super::super::rows::rms(&wind_up).max(1e-12);
         vec![
-            main(wind_up, 15.0 / size).called(Role::SIZE),
+            main(wind_up, 15.0 / size).called(Tag::SIZE),
             nuisance(Drag { power: 0.5 * drag.power, ..drag }.wind_up(on), 0.15),
             nuisance(Drag { per_k: 0.5 * drag.per_k, ..drag }.wind_up(on), 0.15),
         ]
@@ -178,8 +169,8 @@ fn lubricant_viscosity() -> Law {
         Shape::by_factors(Name::PerK, 0.008, 0.12, 4),
         Shape::evenly(Name::BendPerK, 0.0, MOST_BEND, 1),
     ])
-    .parameters_by(|_, shape, c| Drag::of(shape).named(c.of(Role::SIZE)))
-    .physical_if(|shape, c| c.of(Role::SIZE) > 0.0 && Drag::of(shape).is_viscous())
+    .parameters_by(|_, shape, c| Drag::of(shape).named(c.of(Tag::SIZE)))
+    .physical_if(|shape, c| c.of(Tag::SIZE) > 0.0 && Drag::of(shape).is_viscous())
     .evaluated_on_averages()
 }
 
@@ -199,13 +190,13 @@ fn lubricant_load(on: &Excitation<'_>) -> Law {
                 Shape::by_factors(Name::PerK, 0.008, 0.12, 3),
                 Shape::evenly(Name::BendPerK, 0.0, MOST_BEND, 1),
             ])
-            .parameters_by(|_, shape, c| Drag::of(shape).named(shape.of(Name::DragNM) * c.of(Role::SIZE)))
-            .physical_if(|shape, c| c.of(Role::SIZE) > 0.0 && Drag::of(shape).is_viscous())
+            .parameters_by(|_, shape, c| Drag::of(shape).named(shape.of(Name::DragNM) * c.of(Tag::SIZE)))
+            .physical_if(|shape, c| c.of(Tag::SIZE) > 0.0 && Drag::of(shape).is_viscous())
             .evaluated_on_averages()
             .adds_load(load)
             .led_by(
-                |on, shape| vec![main(Drag::of(shape).wind_up(on), 10.0).called(Role::SIZE)],
-                |shape, c| vec![shape.with(&[(Name::DragNM, c.of(Role::SIZE).max(0.0))])],
+                |on, shape| vec![main(Drag::of(shape).wind_up(on), 10.0).called(Tag::SIZE)],
+                |shape, c| vec![shape.with(&[(Name::DragNM, c.of(Tag::SIZE).max(0.0))])],
             );
     law.acts.in_crossings = true;
     law
@@ -229,7 +220,7 @@ pub(crate) const THERMAL_CLEARANCE: CauseSpec = CauseSpec {
     },
     simulated: |on, p| {
         let lag = (Name::LagS, p(Name::LagS).max(LEAST_LAG_S));
-        thermal_clearance(on).with(&[lag], [(Role::SIZE, 0.5 * p(Name::ClearanceArcsecPerK))])
+        thermal_clearance(on).with(&[lag], [(Tag::SIZE, 0.5 * p(Name::ClearanceArcsecPerK))])
     },
     ..plain()
 };
@@ -244,7 +235,7 @@ pub(crate) const THERMAL_STIFFNESS: CauseSpec = CauseSpec {
     place: |placing| placing.set_stiffness_per_k(),
     parameters: &[number(Name::StiffnessRelativePerK, "of the stiffness", -0.02, 0.02, Value(-0.004))],
     laws: |_| vec![thermal_stiffness()],
-    simulated: |_, p| thermal_stiffness().with(&[], [(Role::SIZE, -100.0 * p(Name::StiffnessRelativePerK))]),
+    simulated: |_, p| thermal_stiffness().with(&[], [(Tag::SIZE, -100.0 * p(Name::StiffnessRelativePerK))]),
     ..plain()
 };
 
