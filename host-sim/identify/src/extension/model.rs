@@ -227,37 +227,31 @@ const SCALES: [ScaleField; 7] = [
 ];
 
 fn write_fit(text: &mut String, fit: &FittedLaw, parameters: &BTreeMap<String, f64>) {
-    let mut scales = fit.scales.clone();
-    let counted_in = SCALES.map(|(name, of)| format!("{name} = {:?}", of(&mut scales))).join(", ");
-    let jumps: Vec<String> = scales
-        .jumps
-        .iter()
-        .map(|Jump { time_s: [begin, half, over], height_arcsec }| {
-            format!("[{begin:?}, {half:?}, {over:?}, {height_arcsec:?}]")
-        })
-        .collect();
-    let _ = writeln!(
-        text,
+    let mut units = fit.scales.clone();
+    let counted_in = SCALES.map(|(name, of)| format!("{name} = {:?}", of(&mut units))).join(", ");
+    let jump = |jump: &Jump| {
+        let [begin, half, over] = jump.time_s;
+        format!("{:?}", [begin, half, over, jump.height_arcsec])
+    };
+    let jumps = fit.scales.jumps.iter().map(jump).collect::<Vec<String>>().join(", ");
+    text.push_str(
         "# The model of this cause as it was fitted. It counts as long as the parameters above are not changed.\n\
-         [extension.cause.fit]\n\
-         of = \"{}\"\n\
-         variant = \"{}\"\n\
-         play = \"{}\"\n\
-         stiffness_n_m_per_rad = {:?}\n\
-         backlash_arcsec = {:?}\n\
-         shape = {:?}\n\
-         coefficients = {:?}\n\
-         scales = {{ {counted_in} }}\n\
-         jumps = [{}]",
-        fingerprint(parameters),
-        fit.variant,
-        fit.play.as_str(),
-        fit.beside[0],
-        fit.beside[1],
-        fit.shape,
-        fit.coefficients,
-        jumps.join(", ")
+         [extension.cause.fit]\n",
     );
+    let values = [
+        format!("{:?}", fingerprint(parameters)),
+        format!("{:?}", fit.variant),
+        format!("{:?}", fit.play.as_str()),
+        format!("{:?}", fit.beside[0]),
+        format!("{:?}", fit.beside[1]),
+        format!("{:?}", fit.shape),
+        format!("{:?}", fit.coefficients),
+        format!("{{ {counted_in} }}"),
+        format!("[{jumps}]"),
+    ];
+    for (name, value) in FIT.iter().zip(values) {
+        let _ = writeln!(text, "{name} = {value}");
+    }
 }
 
 /// Fields of a fit.

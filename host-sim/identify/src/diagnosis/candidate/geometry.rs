@@ -37,8 +37,7 @@ pub(super) const COS_PRESSURE_ANGLE: f64 = 0.93;
 /// second takes 2/π of it, and a wheel that takes more and shows little is off its place.
 const MOST_CLEARANCE_TAKEN: f64 = 0.85;
 
-/// The wave that a law is, in waves of both flanks alike and of opposite sign on each.
-const WAVE: Tag = Tag("wave");
+/// The wave of a law by flank, of opposite sign on each.
 const WAVE_BY_FLANK: Tag = Tag("wave by flank");
 /// Clearance that goes with a pitch error, under any load and under light ones.
 const TAKEN: Tag = Tag("clearance taken");
@@ -136,7 +135,7 @@ fn pitch(cause: CauseName, of: Angle) -> Law {
         let (flank, light) = (&on.base.flank, light(on));
         let light_by_flank = times(flank, &light);
         let mut columns: Vec<Regressor> = Vec::new();
-        columns.extend(waves(on, of, 2.0).map(|v| main(v, USUAL_ARCSEC).called(WAVE)));
+        columns.extend(waves(on, of, 2.0).map(|v| main(v, USUAL_ARCSEC).called(Tag::WAVE)));
         // Clearance that odd orders take, of which the even ones say nothing.
         columns.push(beside(flank.clone(), 0.6).called(TAKEN));
         columns.push(beside(light_by_flank.clone(), 0.4).called(TAKEN_UNDER_LIGHT_LOAD));
@@ -165,7 +164,7 @@ fn pitch(cause: CauseName, of: Angle) -> Law {
     .parameters_by(pitch_parameters)
     .physical_if(|_, c| {
         let (taken, light) = (c.of(TAKEN), c.of(TAKEN_UNDER_LIGHT_LOAD));
-        taken.abs().max((taken + light).abs()) < MOST_CLEARANCE_TAKEN * of_wave(c, WAVE).0
+        taken.abs().max((taken + light).abs()) < MOST_CLEARANCE_TAKEN * of_wave(c, Tag::WAVE).0
     });
     law.search.whole_beside_noise = true;
     law.of_shape()
@@ -178,7 +177,7 @@ fn smooth_pitch(cause: CauseName, of: Angle) -> Law {
         let (flank, light) = (&on.base.flank, light(on));
         let light_by_flank = times(flank, &light);
         let mut columns: Vec<Regressor> = Vec::new();
-        columns.extend(waves(on, of, 2.0).map(|v| main(v, USUAL_ARCSEC).called(WAVE)));
+        columns.extend(waves(on, of, 2.0).map(|v| main(v, USUAL_ARCSEC).called(Tag::WAVE)));
         columns.extend(waves(on, of, 4.0).map(|v| nuisance(v, 0.25)));
         columns.extend(weighted_waves(on, of, 1.0, &light).map(|v| nuisance(v, 0.2)));
         // The clearance makes even orders of the first one, of other phase on each flank.
@@ -198,7 +197,7 @@ fn pitch_parameters(on: &Excitation<'_>, _: Shaped<'_>, c: Coefficients<'_>) -> 
 
 /// Of a wave of n periods in a turn of the wheel.
 fn wave_parameters(on: &Excitation<'_>, c: Coefficients<'_>, harmonic: f64) -> Vec<Named> {
-    let (amplitude, phase) = of_wave(c, WAVE);
+    let (amplitude, phase) = of_wave(c, Tag::WAVE);
     vec![
         (Name::AmplitudeUm, amplitude / on.scales.arcsec_per_um),
         (Name::AmplitudeArcsec, amplitude),
@@ -240,7 +239,7 @@ fn higher_harmonic(cause: CauseName, of: Angle, harmonic: f64) -> Law {
     Law::new(cause, move |on, _| {
         let (flank, light) = (&on.base.flank, light(on));
         let mut columns: Vec<Regressor> = Vec::new();
-        columns.extend(waves(on, of, harmonic).map(|v| main(v, USUAL_ARCSEC).called(WAVE)));
+        columns.extend(waves(on, of, harmonic).map(|v| main(v, USUAL_ARCSEC).called(Tag::WAVE)));
         columns.extend(weighted_waves(on, of, harmonic, flank).map(|v| nuisance(v, 0.15)));
         columns.extend(weighted_waves(on, of, harmonic, &light).map(|v| nuisance(v, 0.1)));
         columns.extend(waves(on, of, 2.0).map(|v| nuisance(v, 0.15)));
@@ -284,8 +283,9 @@ fn ovality() -> Law {
             let (root, radial) = (1.0f64.hypot(RADIAL_OF_TANGENTIAL), sign * sense(on) * RADIAL_OF_TANGENTIAL);
             by_row(on, |k| (a[k] + radial * flank[k] * b[k]) / root)
         };
-        let mut columns: Vec<Regressor> =
-            [together(&sin, &cos, 1.0), together(&cos, &sin, -1.0)].map(|v| main(v, USUAL_ARCSEC).called(WAVE)).into();
+        let mut columns: Vec<Regressor> = [together(&sin, &cos, 1.0), together(&cos, &sin, -1.0)]
+            .map(|v| main(v, USUAL_ARCSEC).called(Tag::WAVE))
+            .into();
         columns.extend(weighted_waves(on, of, 2.0, flank).map(|v| nuisance(v, 0.15)));
         // Screws and seats leave further waves on the ring: of n per turn, 1/n of the radial part is tangential.
         for order in [3.0, 4.0, 6.0] {
@@ -299,7 +299,7 @@ fn ovality() -> Law {
     })
     .parameters_by(|on, _, c| {
         // sin 2(x - c) = cos 2c sin 2x - sin 2c cos 2x.
-        let [of_sine, of_cosine] = c.wave(WAVE);
+        let [of_sine, of_cosine] = c.wave(Tag::WAVE);
         let (amplitude, phase) = polar(of_sine, -of_cosine);
         vec![
             (Name::AmplitudeUm, amplitude / (0.67 * on.scales.arcsec_per_um)),
@@ -322,7 +322,7 @@ fn cam_form_error() -> Law {
         let of = Angle::Flexspline;
         let flank = &on.base.flank;
         let mut columns: Vec<Regressor> = Vec::new();
-        columns.extend(waves(on, of, teeth).map(|v| main(v, 8.0).called(WAVE)));
+        columns.extend(waves(on, of, teeth).map(|v| main(v, 8.0).called(Tag::WAVE)));
         columns.extend(weighted_waves(on, of, teeth, flank).map(|v| main(v, 8.0).called(WAVE_BY_FLANK)));
         if on.scales.load > 0.0 {
             // More teeth carry, or other ones.
@@ -336,7 +336,7 @@ fn cam_form_error() -> Law {
         columns
     })
     .parameters_by(|on, _, c| {
-        let (both, phase) = of_wave(c, WAVE);
+        let (both, phase) = of_wave(c, Tag::WAVE);
         let mesh = both.hypot(of_wave(c, WAVE_BY_FLANK).0);
         vec![
             (Name::AmplitudeUm, mesh / on.scales.arcsec_per_um),
@@ -421,7 +421,7 @@ fn simulated_displacement(cause: CauseName, of: Angle, on: &Excitation<'_>, p: V
 fn simulated_pitch(cause: CauseName, of: Angle, p: Values<'_>) -> Simulated {
     let harmonic = p(Name::Harmonic);
     let wave = crest_at(p(Name::AmplitudeArcsec), harmonic * p(Name::PhaseRad));
-    higher_harmonic(cause, of, harmonic).with(&[], wave.map(|c| (WAVE, c)))
+    higher_harmonic(cause, of, harmonic).with(&[], wave.map(|c| (Tag::WAVE, c)))
 }
 
 /// An error of shape or place of a toothed wheel.
@@ -482,7 +482,7 @@ pub(crate) const CIRCULAR_SPLINE_OVALITY: CauseSpec = CauseSpec {
     laws: |on| vec![on.kernels().map_or_else(ovality, kernel::ovality)],
     simulated: |_, p| {
         let [sine, cosine] = crest_at(p(Name::AmplitudeArcsec), 2.0 * p(Name::PhaseRad));
-        ovality().with(&[], [(WAVE, sine), (WAVE, -cosine)])
+        ovality().with(&[], [(Tag::WAVE, sine), (Tag::WAVE, -cosine)])
     },
     ..OF_WHEELS
 };
@@ -526,7 +526,7 @@ pub(crate) const CAM_FORM_ERROR: CauseSpec = CauseSpec {
     twins: &[(Name::AmplitudeUm, Name::AmplitudeArcsec, Factor::AlongPitch)],
     laws: |_| vec![cam_form_error()],
     simulated: |_, p| {
-        cam_form_error().with(&[], crest_at(p(Name::AmplitudeArcsec), p(Name::PhaseRad)).map(|c| (WAVE, c)))
+        cam_form_error().with(&[], crest_at(p(Name::AmplitudeArcsec), p(Name::PhaseRad)).map(|c| (Tag::WAVE, c)))
     },
     ..plain()
 };

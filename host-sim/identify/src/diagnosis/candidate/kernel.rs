@@ -31,11 +31,8 @@ fn by_flank(flank: f64, torque: f64, value: impl Fn(f64) -> f64) -> f64 {
     forward + backward
 }
 
-/// The wave of an error.
-const WAVE: Tag = Tag("wave");
-
 fn main_um(values: Vec<f64>) -> Regressor {
-    main(values, USUAL_UM).called(WAVE)
+    main(values, USUAL_UM).called(Tag::WAVE)
 }
 
 /// Columns of the response to `cos(k α)` and to `sin(k α)` of an error on a wheel.
@@ -121,7 +118,7 @@ pub(super) fn pitch(cause: CauseName, wheel: Wheel, kernels: &Arc<Kernels>) -> L
         columns
     })
     .parameters_by(|on, _, c| {
-        let (amplitude, phase) = of_wave(c, WAVE);
+        let (amplitude, phase) = of_wave(c, Tag::WAVE);
         vec![
             (Name::AmplitudeUm, amplitude),
             (Name::AmplitudeArcsec, amplitude * on.scales.arcsec_per_um),
@@ -142,7 +139,7 @@ pub(super) fn ovality(kernels: &Arc<Kernels>) -> Law {
         columns
     })
     .parameters_by(|on, _, c| {
-        let (amplitude, phase) = of_wave(c, WAVE);
+        let (amplitude, phase) = of_wave(c, Tag::WAVE);
         vec![
             (Name::AmplitudeUm, amplitude),
             (Name::AmplitudeArcsec, amplitude * 0.67 * on.scales.arcsec_per_um),

@@ -13,6 +13,8 @@ impl Tag {
     pub(crate) const PLAIN: Tag = Tag("");
     /// The law at its size: the only column that it has, or the one that all others are deviations of.
     pub(crate) const SIZE: Tag = Tag("size");
+    /// The wave that a law is: two columns.
+    pub(crate) const WAVE: Tag = Tag("wave");
 }
 
 /// Coefficients with what their columns are.

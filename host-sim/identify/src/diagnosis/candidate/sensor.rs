@@ -14,9 +14,6 @@ use crate::causes::spec::{
 };
 use crate::measurement::rates;
 
-/// The line of an encoder.
-const WAVE: Tag = Tag("wave");
-
 /// Share of a second order that its own first overtone may have, and a subdivision of its own: signals of unlike size
 /// make little of it. Guess.
 const OVERTONE: f64 = 0.15;
@@ -32,7 +29,7 @@ fn encoder(
 ) -> Law {
     let angle = if of_output { Angle::Output } else { Angle::Generator };
     Law::new(cause, move |on, _| {
-        let mut columns: Vec<Regressor> = waves(on, angle, order).map(|wave| main(wave, std).called(WAVE)).into();
+        let mut columns: Vec<Regressor> = waves(on, angle, order).map(|wave| main(wave, std).called(Tag::WAVE)).into();
         if has_overtone {
             columns.extend(waves(on, angle, 2.0 * order).map(|wave| nuisance(wave, OVERTONE)));
         }
@@ -40,7 +37,7 @@ fn encoder(
     })
     .parameters_by(move |on, _, c| {
         // c cos(x) + s sin(x) = A sin(x + phase).
-        let [cos, sin] = c.wave(WAVE);
+        let [cos, sin] = c.wave(Tag::WAVE);
         let (amplitude, phase) = polar(sin, cos);
         let mut named = vec![(Name::AmplitudeArcsec, amplitude), (Name::PhaseRad, phase)];
         if !of_output {
@@ -146,7 +143,7 @@ const FEWEST_PERIODS: f64 = 1.5;
 /// A wave of known size in a turn of an encoder.
 fn simulated_encoder(law: Law, p: Values<'_>) -> Simulated {
     let (sin, cos) = p(Name::PhaseRad).sin_cos();
-    law.with(&[], [sin, cos].map(|part| (WAVE, part * p(Name::AmplitudeArcsec))))
+    law.with(&[], [sin, cos].map(|part| (Tag::WAVE, part * p(Name::AmplitudeArcsec))))
 }
 
 /// Subdivisions of both encoders, of the output's those that come often enough.

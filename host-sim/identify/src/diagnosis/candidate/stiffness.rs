@@ -1,8 +1,6 @@
 //! Causes that follow the torque, beyond the nominal wind-up and play.
 
-use std::f64::consts::TAU;
-
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
 use super::super::prepare::Jump;
@@ -172,13 +170,10 @@ fn stiffness_error() -> Law {
     law
 }
 
-/// Shares by which the law of a cracked root may be wrong: a crack that opens bends more than one that is pressed shut,
-/// the two loaded zones may carry unequally, and the arc in which the tooth carries has another shape. *Guess*.
-const OPENING: f64 = 0.3;
-/// See above. *Guess*.
-const UNEQUAL_LOBES: f64 = 0.3;
-/// See above. *Guess*.
-const OTHER_ARC: f64 = 0.3;
+/// Share by which the law of a cracked root may be wrong in each of three ways: a crack that opens bends more than one
+/// that is pressed shut, the two loaded zones may carry unequally, and the arc in which the tooth carries has another
+/// shape. *Guess*.
+const OTHER_CRACK: f64 = 0.3;
 /// The arc of another shape, over that of the law. *Guess*.
 const BROADER: f64 = 1.7;
 const BROADER_ARC: Tag = Tag("broader arc");
@@ -195,9 +190,9 @@ fn cracked_tooth_root() -> Law {
         let lobe = by_row(on, |k| size[k] * (angle(on, WHEEL, k) - place).cos().signum());
         vec![
             main(size, 30.0).called(Tag::SIZE),
-            nuisance(opening, OPENING),
-            nuisance(lobe, UNEQUAL_LOBES),
-            nuisance(softer(BROADER * width), OTHER_ARC).called(BROADER_ARC),
+            nuisance(opening, OTHER_CRACK),
+            nuisance(lobe, OTHER_CRACK),
+            nuisance(softer(BROADER * width), OTHER_CRACK).called(BROADER_ARC),
         ]
     })
     .shapes([Shape::angle(Name::AngleRad, PI, 30), Shape::by_factors(Name::WidthRad, 0.03, 0.4, 2)])
