@@ -214,7 +214,7 @@ fn damage_that_the_reader_alone_does_not_judge_is_refused_or_named_and_no_physic
                 scaled(&mut b.generator_rad, deg);
                 scaled(&mut b.output_rad, deg);
             }),
-            Faults(&["unit_mismatch"]),
+            Refused(&["angles in degrees", "--columns generator=generator_rad:deg,output=output_rad:deg"]),
         ),
         (
             "torque turned round",

@@ -466,21 +466,41 @@ fn every_damaged_file_ends_in_a_clear_error_or_a_named_fault() {
         ("time stands", changed(|b| b.time_s.fill(7.0)).into(), Faults(&[ClockError])),
         ("time in nanoseconds", changed(|b| scaled(&mut b.time_s, 1e9)).into(), Faults(&[ClockError])),
         // Units.
-        ("generator in degrees", changed(|b| scaled(&mut b.generator_rad, deg)).into(), Faults(&[UnitMismatch])),
-        ("generator in turns", changed(|b| scaled(&mut b.generator_rad, deg / 360.0)).into(), Faults(&[UnitMismatch])),
+        (
+            "generator in degrees",
+            changed(|b| scaled(&mut b.generator_rad, deg)).into(),
+            Error(&["asks for", "--columns generator=generator_rad:deg"]),
+        ),
+        (
+            "generator in turns",
+            changed(|b| scaled(&mut b.generator_rad, deg / 360.0)).into(),
+            Error(&["--columns generator=generator_rad:turn"]),
+        ),
         (
             "generator wrapped at 360",
             changed(|b| b.generator_rad.iter_mut().for_each(|a| *a = (*a * deg).rem_euclid(360.0))).into(),
-            Faults(&[UnitMismatch]),
+            Error(&["--columns generator=generator_rad:deg"]),
         ),
-        ("output in degrees", changed(|b| scaled(&mut b.output_rad, deg)).into(), Faults(&[UnitMismatch])),
-        ("output in arc-seconds", changed(|b| scaled(&mut b.output_rad, 1.0 / ARCSEC)).into(), Faults(&[UnitMismatch])),
+        (
+            "output in degrees",
+            changed(|b| scaled(&mut b.output_rad, deg)).into(),
+            Error(&["--columns output=output_rad:deg"]),
+        ),
+        (
+            "output in arc-seconds",
+            changed(|b| scaled(&mut b.output_rad, 1.0 / ARCSEC)).into(),
+            Error(&["--columns output=output_rad:arcsec"]),
+        ),
         (
             "columns exchanged",
             good.replacen("generator_rad,output_rad", "output_rad,generator_rad", 1).into(),
             Faults(&[UnitMismatch]),
         ),
-        ("output counts backwards", changed(|b| scaled(&mut b.output_rad, -1.0)).into(), Faults(&[UnitMismatch])),
+        (
+            "output counts backwards",
+            changed(|b| scaled(&mut b.output_rad, -1.0)).into(),
+            Error(&["the output counts the other way", "--columns output=output_rad:-rad, or the ratio -95"]),
+        ),
         ("torque in mN.m", changed(|b| scaled(b.torque_n_m.as_mut().unwrap(), 1e3)).into(), Faults(&[UnitMismatch])),
         (
             "temperature in kelvin",
@@ -628,7 +648,6 @@ fn what_is_repaired_is_as_it_was_and_its_place_is_said() {
     assert_eq!((json["name"].as_str(), json["time_s"].as_f64()), (Some("encoder_index_jump"), Some(17.0)));
     // Units: the same data as with the right ones.
     for (name, text) in [
-        ("degrees", changed(|b| scaled(&mut b.generator_rad, 180.0 / std::f64::consts::PI))),
         (
             "exchanged",
             Bench::plain(4000, 1.0, 5).csv().replacen("generator_rad,output_rad", "output_rad,generator_rad", 1),
@@ -637,7 +656,6 @@ fn what_is_repaired_is_as_it_was_and_its_place_is_said() {
     ] {
         let session = &read(text.as_bytes()).unwrap().sessions[0];
         for row in [0, 1234, 3999] {
-            // Digits of the file: 1e-9 rad of a generator angle in degrees.
             assert!((session.generator_rad[row] - clean.generator_rad[row]).abs() < 1e-6, "{name}");
             assert!((session.error_rad[row] - clean.error_rad[row]).abs() < 0.01 * ARCSEC, "{name}");
             let warm =

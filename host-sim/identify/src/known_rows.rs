@@ -1,17 +1,18 @@
-//! Rows of a drive of which a model or a table is known, read with what the diagnosis says of their units and signs,
-//! which no ratio shows.
+//! Rows of a drive of which a model or a table is known, with what the diagnosis says of the sign of their torque and
+//! of angles in degrees, which no ratio shows.
 
 use std::path::Path;
 
 use flexspline::Table;
 
-use crate::diagnosis::pipeline::{Subject, parse_rows};
+use crate::diagnosis::channels::{check_degrees, check_torque};
 use crate::measurement::{
-    ColumnMap, FEW, FEWEST_ROWS, FaultName, IN_DEGREES, MeasuredError, Quantity, Recording, Treatment, bytes_of,
-    parse_as,
+    ColumnMap, FEWEST_ROWS, FaultName, MeasuredError, Recording, Session, bytes_of, parse_at_least,
 };
 use crate::nominal::Nominal;
-use flexspline_mechanics::drive::{Drive, GeneratorKind};
+
+/// Fewest rows that a table is played over.
+pub(crate) const FEW: usize = 2;
 
 /// Reads a file of rows of a drive with this model, and the table that takes its place where there is one.
 ///
@@ -38,47 +39,38 @@ pub fn parse_known(
     nominal: &Nominal,
     table: Option<&Table<'_>>,
 ) -> Result<Recording, MeasuredError> {
-    let gear = nominal.gear();
-    let mut read = parse_as(file, bytes, columns, &gear, FEW)?;
+    let mut read = parse_at_least(FEW, file, bytes, columns, &nominal.gear())?;
     let says_something = !nominal.harmonics.is_empty() || nominal.wind_up_arcsec(1.0) != 0.0;
-    if !says_something || read.rows < FEWEST_ROWS {
+    if !says_something || read.sessions.iter().map(Session::len).sum::<usize>() < FEWEST_ROWS {
         return Ok(read);
     }
-    let (nominal, table) = (nominal.clone(), table.copied());
-    // Causes are asked of no drive here: any will do.
-    let (drive, kind) = (Drive::hhd_95(), GeneratorKind::Cam);
-    let subject = Subject { nominal, table, model: None, drive, kind };
-    // Too few rows may be in order for a diagnosis, which then says nothing of them.
-    let Ok(asked) = parse_rows(file, bytes, columns, &subject) else { return Ok(read) };
-    let told: Vec<_> = asked.faults.into_iter().filter(|fault| !read.faults.contains(fault)).collect();
-    let of = |name: FaultName, channel: Option<Quantity>| {
-        told.iter()
-            .find(|fault| fault.name == name && fault.channel == channel && fault.treatment == Treatment::Repaired)
-    };
-    if of(FaultName::UnitMismatch, None).is_some() {
-        read = parse_as(file, bytes, columns, &gear, IN_DEGREES)?;
+    check_degrees(&read, columns, nominal, table)?;
+    let mut asked = read.clone();
+    check_torque(&mut asked, nominal, table);
+    for fault in asked.faults.into_iter().skip(read.faults.len()) {
+        if fault.name == FaultName::TorqueSign {
+            read.sessions
+                .iter_mut()
+                .zip(&asked.sessions)
+                .for_each(|(to, from)| to.torque_n_m.clone_from(&from.torque_n_m));
+            read.faults.push(fault);
+        } else {
+            read.notes.push(format!("`diagnose` doubts the torque, which stays here: {}", fault.what));
+        }
     }
-    if let Some(turned) = of(FaultName::TorqueSign, Some(Quantity::Torque)) {
-        let torques = read.sessions.iter_mut().filter_map(|session| session.torque_n_m.as_mut()).flatten();
-        torques.for_each(|torque| *torque = -*torque);
-        read.faults.push(turned.clone());
-    }
-    let unit = |name: FaultName| [FaultName::UnitMismatch, FaultName::TorqueScale].contains(&name);
-    let doubts = told.iter().filter(|fault| fault.channel == Some(Quantity::Torque) && unit(fault.name));
-    read.notes.extend(doubts.map(|fault| format!("`diagnose` doubts the torque, which stays here: {}", fault.what)));
     Ok(read)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measurement::Session;
     use crate::synthesize::catalogue_drive;
     use flexspline_base::units::ARCSEC_PER_RAD;
 
-    /// Angles in degrees and a torque that counts the other way are put right and told by a model, and not without one.
+    /// A model shows that angles are in degrees, which is refused, and that a torque counts the other way, which is put
+    /// right; without one neither shows.
     #[test]
-    fn both_angles_in_degrees_and_a_turned_torque_are_put_right() {
+    fn angles_in_degrees_are_refused_and_a_turned_torque_is_put_right() {
         let nominal = catalogue_drive();
         let log = |angle: f64, torque: f64| {
             let mut random = fastrand::Rng::with_seed(3);
@@ -102,16 +94,17 @@ mod tests {
         let known = |log: String| parse_known("m.csv", log.as_bytes(), &map, &nominal, None).unwrap();
         let right = known(log(1.0, 1.0));
         assert_eq!(right.faults, []);
-        for (log, said) in [(log(1f64.to_degrees(), 1.0), "degrees"), (log(1.0, -1.0), "turned round")] {
-            let by_ratio = parse_as("m.csv", log.as_bytes(), &map, &nominal.gear(), FEW).unwrap();
-            assert_eq!(by_ratio.faults, []);
-            let read = known(log);
-            assert!(read.faults.len() == 1 && read.faults[0].what.contains(said), "{:?}", read.faults);
-            let (a, b) = (&read.sessions[0], &right.sessions[0]);
-            let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9);
-            assert!(near(&a.error_rad, &b.error_rad) && near(&a.generator_rad, &b.generator_rad));
-            assert_eq!(a.torque_n_m, b.torque_n_m);
-        }
+        let by_ratio = |log: &str| parse_at_least(FEW, "m.csv", log.as_bytes(), &map, &nominal.gear()).unwrap();
+        let degrees = log(1f64.to_degrees(), 1.0);
+        assert_eq!(by_ratio(&degrees).faults, []);
+        let refused = parse_known("m.csv", degrees.as_bytes(), &map, &nominal, None).unwrap_err().to_string();
+        assert!(refused.contains("angles in degrees"), "{refused}");
+        let turned = log(1.0, -1.0);
+        assert_eq!(by_ratio(&turned).faults, []);
+        let read = known(turned);
+        assert!(read.faults.len() == 1 && read.faults[0].what.contains("turned round"), "{:?}", read.faults);
+        let (a, b) = (&read.sessions[0], &right.sessions[0]);
+        assert!(a.error_rad == b.error_rad && a.torque_n_m == b.torque_n_m);
     }
 
     /// Of thirty rows six have a time of their own in their order.

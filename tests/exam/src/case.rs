@@ -152,7 +152,7 @@ pub struct Case {
     stand: Stand,
     sensors: Sensors,
     hidden: Vec<Hides>,
-    fault: Option<LoggerFault>,
+    pub fault: Option<LoggerFault>,
     weighed: Vec<Hidden>,
     removable_rms_arcsec: f64,
     floor_arcsec: f64,

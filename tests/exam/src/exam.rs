@@ -11,9 +11,10 @@ use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
-use crate::answer::Answer;
+use crate::answer::{Answer, DataFault};
 use crate::case::{Case, Draw};
 use crate::chance::Chance;
+use crate::logger::LoggerFault;
 use crate::score::{Gathered, Judged, judge};
 use crate::truth::commitment;
 
@@ -123,12 +124,25 @@ fn ask(settings: &Settings, case: &Case, name: &str) -> io::Result<(Result<Answe
     let start = Instant::now();
     let ended = wait(&mut command);
     let seconds = start.elapsed().as_secs_f64();
+    let said = fs::read_to_string(answered.join("stderr.txt")).unwrap_or_default();
+    if let Some(fault) = case.fault.filter(|fault| is_refused(*fault, &ended, &said)) {
+        let data_faults = vec![DataFault { name: fault.name().to_owned() }];
+        fs::remove_dir_all(&given)?;
+        let answer = Answer { verdict: "none".to_owned(), causes: Vec::new(), data_faults, held_out: None };
+        return Ok((Ok(answer), seconds));
+    }
     let answer = ended.and_then(|()| {
         let text = fs::read_to_string(answered.join("diagnosis.json")).map_err(|e| format!("diagnosis.json: {e}"))?;
         Answer::read(&text).map_err(|error| format!("diagnosis.json: {error}"))
     });
     fs::remove_dir_all(&given)?;
     Ok((answer, seconds))
+}
+
+/// Whether the file of a fault of the logger is refused as bad input with the mapping that mends it.
+pub fn is_refused(fault: LoggerFault, ended: &Result<(), String>, said: &str) -> bool {
+    let bad_input = ended.as_ref().is_err_and(|why| why.ends_with("exit status: 2"));
+    bad_input && fault.refused_with().iter().any(|mapping| said.contains(mapping))
 }
 
 fn wait(command: &mut Command) -> Result<(), String> {

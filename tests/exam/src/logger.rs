@@ -55,6 +55,16 @@ impl LoggerFault {
         !matches!(self, Self::CountedClock | Self::DroppedRows)
     }
 
+    /// Words of a refusal that names the fault and the mapping that mends it; none where a refusal is no answer.
+    pub fn refused_with(self) -> &'static [&'static str] {
+        match self {
+            Self::DegreesAsRad => &["--columns generator=generator_rad:deg", "--columns output=output_rad:deg"],
+            Self::OutputSign => &["--columns output=output_rad:-rad"],
+            Self::MillisecondsAsSeconds => &["--columns time=time_s:ms"],
+            _ => &[],
+        }
+    }
+
     /// The logger with the fault.
     pub fn poll(self, poll: Poll, chance: &mut Chance) -> Poll {
         match self {

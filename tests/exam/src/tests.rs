@@ -116,6 +116,23 @@ fn a_fault_by_another_name_misleads_nobody() {
     assert_eq!([asked("logger_named"), asked("logger_told"), asked("logger_misled")], [[true], [true], [false]]);
 }
 
+/// A refusal answers where it names the mapping that mends the file, and where no size may be changed unasked.
+#[test]
+fn a_refusal_that_mends_the_file_reports_the_fault() {
+    use crate::logger::LoggerFault::{DegreesAsRad, MillisecondsAsSeconds, OutputSign, Stalls};
+    let refused = Err("flexspline: exit status: 2".to_owned());
+    for (fault, said) in [
+        (DegreesAsRad, "error: data.csv: ...; allowed: --columns output=output_rad:deg"),
+        (OutputSign, "error: data.csv: ...; allowed: --columns output=output_rad:-rad, or the ratio -95"),
+        (MillisecondsAsSeconds, "error: data.csv: ...; allowed: --columns time=time_s:ms, or time=time_s:s"),
+    ] {
+        assert!(exam::is_refused(fault, &refused, said), "{said}");
+        assert!(!exam::is_refused(fault, &refused, "error: data.csv: units?"), "without the mapping");
+        assert!(!exam::is_refused(fault, &Err("flexspline: exit status: 1".to_owned()), said), "a failed run");
+        assert!(!exam::is_refused(Stalls, &refused, said), "a file that is to be read");
+    }
+}
+
 #[test]
 #[ignore = "long: tests/run slow"]
 fn one_that_crashes_fails_every_case() {

@@ -11,7 +11,9 @@ use super::base::{PlayLaw, predicted_by_table};
 use super::noise::white_level;
 use super::rows::{Rows, quantile, rms, robust_std};
 use crate::least_squares::{FreeSpan, jackknife};
-use crate::measurement::{Fault, FaultName, Quantity, Recording, Session, Treatment, throughout};
+use crate::measurement::{
+    ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Refusal, Treatment, throughout,
+};
 use crate::nominal::{Harmonic, Nominal};
 use flexspline_base::robust::dot;
 
@@ -39,18 +41,11 @@ const EXPLAINS: f64 = 0.5;
 const EXPLAINS_TURNED: f64 = 0.8;
 /// A torque of which the error shows no more than this is none of this output. *Guess*.
 const NO_EFFECT: f64 = 0.3;
-/// Both angles may be in degrees where radians leave this many times the white noise and more. *Guess*.
-const FAR_FROM_NOISE: f64 = 4.0;
-/// They are where degrees leave this at most. *Guess*.
-const TO_THE_NOISE: f64 = 4.0;
-/// And where wind-up and clearance are those of the model within this share. *Guess*: springs of drives of a type
-/// differ by some per cent, the factors of torques taken for others from 57 by more than that, except 1/60.
-const AS_NOMINAL: f64 = 0.35;
-/// Where nothing winds up, the harmonics are those of the model within these factors. *Guess*: their amplitudes vary
-/// much more from unit to unit than springs do.
-const HARMONICS_AS_NOMINAL: [f64; 2] = [0.25, 4.0];
-/// A residual below this share of the effect of the load is next to nothing. *Guess*.
-const NEXT_TO_NOTHING: f64 = 0.1;
+/// Degrees in a radian, by definition.
+const DEGREES: f64 = 180.0 / std::f64::consts::PI;
+/// Clearance and waves are those of the model within these factors. *Guess*: they vary much more from unit to unit than
+/// springs do.
+const AS_NOMINAL: [f64; 2] = [0.25, 4.0];
 /// Residuals farther out than this many standard deviations are cut there. *Guess*: no normal row in a million lies so
 /// far out.
 const CUT: f64 = 5.0;
@@ -113,14 +108,12 @@ fn spread(error: &[f64]) -> f64 {
 }
 
 impl Freed {
-    /// Without the wave of the generator of this order, if one is given, among what floats.
-    fn new(rows: &Rows, nominal: &Nominal, but: Option<f64>) -> Freed {
+    /// With `further` columns of all rows among what floats.
+    fn new(rows: &Rows, nominal: &Nominal, further: &[Vec<f64>]) -> Freed {
         let places = sample(rows, SAMPLE);
-        let floats = |harmonic: &&Harmonic| Some(harmonic.order_per_generator_turn) != but;
-        let others =
-            Nominal { harmonics: nominal.harmonics.iter().filter(floats).cloned().collect(), ..nominal.clone() };
-        let mut columns = floating(rows, &others, &places);
-        columns.extend(waves(1.0, &rows.generator, &places).into_iter().filter(|_| but != Some(1.0)));
+        let mut columns = floating(rows, nominal, &places);
+        columns.extend(waves(1.0, &rows.generator, &places));
+        columns.extend(further.iter().map(|column| places.iter().map(|k| column[*k]).collect()));
         let span = FreeSpan::default().beyond(columns);
         let mut freed = Freed { error: Vec::new(), span, places };
         freed.error = freed.freed(&rows.error);
@@ -133,15 +126,6 @@ impl Freed {
     fn freed(&self, column: &[f64]) -> Vec<f64> {
         self.span.freed(self.places.iter().map(|k| column[*k]).collect())
     }
-}
-
-/// Amplitude of the wave of this order of the generator in the error less what is `said` of the load, arcsec.
-fn amplitude(rows: &Rows, nominal: &Nominal, said: &[f64], order: f64) -> f64 {
-    let freed = Freed::new(rows, nominal, Some(order));
-    let unsaid: Vec<f64> = rows.error.iter().zip(said).map(|(error, said)| error - said).collect();
-    let [sine, cosine] = waves(order, &rows.generator, &freed.places).map(|wave| freed.span.freed(wave));
-    let unsaid = freed.freed(&unsaid);
-    share_beside(&unsaid, &sine, &cosine).hypot(share_beside(&unsaid, &cosine, &sine))
 }
 
 /// How the error stands to what a torque should do.
@@ -158,8 +142,6 @@ struct Told {
     wind_up: f64,
     /// Half the clearance alone, arcsec.
     clearance: f64,
-    /// What is left where wind-up and clearance have the shares that suit best, arcsec.
-    left_free: f64,
 }
 
 impl Told {
@@ -180,8 +162,6 @@ impl Told {
         let [wound, flank] = [wound, flank].map(|column| freed.freed(&column));
         let wind_up = share_beside(&error, &wound, &flank);
         let clearance = share_beside(&error, &flank, &wound);
-        let of_shares = wound.iter().zip(&flank).map(|(wound, flank)| wind_up * wound + clearance * flank);
-        let left_free = robust_std(error.iter().zip(of_shares).map(|(error, said)| error - said));
         let should = freed.freed(&should);
         let products: Vec<[f64; 2]> = should
             .chunks(should.len().div_ceil(BLOCKS).max(1))
@@ -192,7 +172,7 @@ impl Told {
         let share = all[1] / all[0].max(1e-12);
         let without: Vec<f64> = products.iter().map(|of| (all[1] - of[1]) / (all[0] - of[0]).max(1e-12)).collect();
         let left = robust_std(error.iter().zip(&should).map(|(error, should)| error - should));
-        Told { size: rms(&should), share, std: jackknife(&without), left, wind_up, clearance, left_free }
+        Told { size: rms(&should), share, std: jackknife(&without), left, wind_up, clearance }
     }
 
     fn is_certain(&self) -> bool {
@@ -227,12 +207,12 @@ fn unit_of(factor: f64) -> Option<String> {
 /// Holds the torque against what it should do; turned round, or taken to the other shaft, where that explains it; left
 /// out where it does nothing, or where it looks like another unit. Gives
 /// why the data are unusable, where they are.
-pub(super) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: Option<&Table<'_>>) -> Option<String> {
+pub(crate) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: Option<&Table<'_>>) -> Option<String> {
     let rows = Rows::new(&recording.sessions, nominal);
     if !rows.recorded.torque || rows.torque.iter().all(|torque| *torque == 0.0) || nominal.wind_up_arcsec(1.0) == 0.0 {
         return None;
     }
-    let freed = Freed::new(&rows, nominal, None);
+    let freed = Freed::new(&rows, nominal, &[]);
     let plain: Vec<f64> = (0..rows.len()).map(|k| rows.error[k] - nominal.wind_up_arcsec(rows.torque[k])).collect();
     let white = white_level(&rows, &rows.error).min(white_level(&rows, &plain));
     let seen = |told: &Told| told.size > SEEN_ARCSEC.max(SEEN_OF_NOISE * white);
@@ -327,58 +307,44 @@ pub(super) fn report(
     recording.faults.last_mut()
 }
 
-/// Whether both angles may be in degrees where radians are said: with zeros and ratio free, the nominal model leaves
-/// far more than noise, or winds up far too little. Division by 57 shrinks any misfit; so what is left counts against
-/// its own noise, and the ratio is free.
-pub(super) fn may_be_in_degrees(recording: &Recording, nominal: &Nominal, table: Option<&Table<'_>>) -> bool {
-    let predicts = !nominal.harmonics.is_empty() || nominal.wind_up_arcsec(1.0) != 0.0;
-    let rough = predicts.then(|| Rough::of(&recording.sessions, nominal, table));
-    rough.is_some_and(|rough| rough.left > FAR_FROM_NOISE || rough.told.wind_up > FAR_TOO_SOFT)
-}
-
-/// Whether the nominal model explains these rows to the noise, and what it explains has the size that it says.
-pub(super) fn is_explained(recording: &Recording, nominal: &Nominal, table: Option<&Table<'_>>) -> bool {
-    let rough = Rough::of(&recording.sessions, nominal, table);
-    let winds_up = rough.told.size > SEEN_OF_NOISE * rough.white;
-    let like_the_load = !winds_up || (rough.told.share - 1.0).abs() < AS_NOMINAL && rough.told.is_certain();
-    let within = |share: f64| (HARMONICS_AS_NOMINAL[0]..=HARMONICS_AS_NOMINAL[1]).contains(&share);
-    let like_the_harmonics = rough.harmonics.map_or(winds_up, within);
-    // Where a spring and the wheels both have their size, what is left may be a flank that friction holds otherwise
-    // than the model says.
-    let near_the_noise = rough.left < TO_THE_NOISE;
-    let next_to_nothing = rough.harmonics.is_some() && rough.left * rough.white < NEXT_TO_NOTHING * rough.told.size;
-    (near_the_noise || next_to_nothing) && like_the_load && like_the_harmonics
-}
-
-/// How the nominal model explains rows with zeros and ratio free.
-struct Rough {
-    told: Told,
-    /// What is left, in standard deviations of the white noise.
-    left: f64,
-    /// White noise, arcsec.
-    white: f64,
-    /// The largest nominal harmonic in the rows, over what it should be, where it should stand out of the noise.
-    harmonics: Option<f64>,
-}
-
-impl Rough {
-    fn of(sessions: &[Session], nominal: &Nominal, table: Option<&Table<'_>>) -> Rough {
-        let rows = Rows::new(sessions, nominal);
-        let freed = Freed::new(&rows, nominal, None);
-        let told = Told::by(&rows, (nominal, table), &freed, 1.0);
-        let white = white_level(&rows, &rows.error);
-        let by_size = |a: &&Harmonic, b: &&Harmonic| a.amplitude_arcsec.total_cmp(&b.amplitude_arcsec);
-        let largest = nominal.harmonics.iter().max_by(by_size).filter(|of| of.amplitude_arcsec > white);
-        let harmonics = largest.map(|of| {
-            // A load that is put on in steps while the generator turns a little looks like a wave: it goes first.
-            let flank = PlayLaw::Held.flanks(&rows, &rows.torque, nominal);
-            let said: Vec<f64> = (rows.torque.iter().zip(&flank))
-                .map(|(torque, flank)| told.wind_up * nominal.wind_up_arcsec(*torque) + told.clearance * flank)
-                .collect();
-            amplitude(&rows, nominal, &said, of.order_per_generator_turn) / of.amplitude_arcsec
-        });
-        Rough { told, left: told.left_free / white, white, harmonics }
+/// Refuses angles that are in degrees where radians are said: no ratio shows that, but wind-up, clearance and the
+/// largest wave of the model are then 180/π times what it says. A torque in another unit or of the other shaft moves
+/// the wind-up alone. A unit that the mapping says is believed.
+///
+/// # Errors
+/// The angles look like degrees.
+pub(crate) fn check_degrees(
+    recording: &Recording,
+    columns: &ColumnMap,
+    nominal: &Nominal,
+    table: Option<&Table<'_>>,
+) -> Result<(), MeasuredError> {
+    let (generator, said) = columns.column(Quantity::Generator);
+    let rows = Rows::new(&recording.sessions, nominal);
+    if said || !rows.recorded.torque || nominal.wind_up_arcsec(1.0) == 0.0 {
+        return Ok(());
     }
+    let told = Told::by(&rows, (nominal, table), &Freed::new(&rows, nominal, &[]), 1.0);
+    let by_size = |a: &&Harmonic, b: &&Harmonic| a.amplitude_arcsec.total_cmp(&b.amplitude_arcsec);
+    let wave = nominal.harmonics.iter().max_by(by_size).map(|wave| {
+        // A load that is put on in steps while the generator turns a little looks like a wave: it goes first.
+        let wound = rows.torque.iter().map(|torque| nominal.wind_up_arcsec(*torque)).collect();
+        let freed = Freed::new(&rows, nominal, &[wound, PlayLaw::Held.flanks(&rows, &rows.torque, nominal)]);
+        let [sine, cosine] = waves(wave.order_per_generator_turn / DEGREES, &rows.generator, &freed.places)
+            .map(|wave| freed.span.freed(wave));
+        let [sine, cosine] = [(&sine, &cosine), (&cosine, &sine)].map(|(a, b)| share_beside(&freed.error, a, b));
+        sine.hypot(cosine) / wave.amplitude_arcsec
+    });
+    let clearance = (nominal.backlash_arcsec > 0.0).then(|| 2.0 * told.clearance / nominal.backlash_arcsec);
+    let degrees = |share: f64, [low, high]: [f64; 2]| (low * DEGREES..=high * DEGREES).contains(&share);
+    let mut others = [wave, clearance].into_iter().flatten().peekable();
+    let Some(other) = others.peek().copied() else { return Ok(()) };
+    if !degrees(told.wind_up, OF_THIS_DRIVE) || !others.all(|share| degrees(share, AS_NOMINAL)) {
+        return Ok(());
+    }
+    let [generator, output] = [generator, columns.column(Quantity::Output).0].map(str::to_owned);
+    let why = Refusal::BothInDegrees { wind_up: told.wind_up, other, generator, output };
+    Err(MeasuredError::of_file(&recording.file, &why))
 }
 
 /// A ratio that the data turn by, and the whole one that it may be meant to be.
@@ -408,6 +374,7 @@ pub(crate) fn proposed_ratio(nominal_ratio: f64, relative_error: f64) -> Option<
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measurement::Session;
     use crate::synthesize::catalogue_drive;
 
     #[test]
@@ -510,32 +477,36 @@ mod tests {
     }
 
     #[test]
-    fn degrees_are_told_from_a_wrong_ratio() {
+    fn angles_in_degrees_are_refused_and_no_other_ratio_torque_or_unit_that_is_said() {
         let nominal = catalogue_drive();
-        let mut recording = recording(&nominal, |_, load| load);
-        assert!(!may_be_in_degrees(&recording, &nominal, None) && is_explained(&recording, &nominal, None));
-        let right = recording.clone();
-        for session in &mut recording.sessions {
-            session.generator_rad.iter_mut().for_each(|angle| *angle = angle.to_degrees());
-            session.error_rad.iter_mut().for_each(|angle| *angle = angle.to_degrees());
-        }
-        assert!(may_be_in_degrees(&recording, &nominal, None) && !is_explained(&recording, &nominal, None));
-        let mut other_ratio = right;
-        for session in &mut other_ratio.sessions {
-            let by = 1.0 / (nominal.ratio * 1.05) - 1.0 / nominal.ratio;
-            session.error_rad.iter_mut().zip(&session.generator_rad).for_each(|(error, psi)| *error += by * psi);
-        }
-        assert!(!may_be_in_degrees(&other_ratio, &nominal, None));
-    }
-
-    #[test]
-    fn a_load_in_steps_over_few_turns_is_no_wave_of_the_wheels() {
-        let nominal = catalogue_drive();
+        let map = ColumnMap::default();
+        let check = |recording: &Recording, map: &ColumnMap| check_degrees(recording, map, &nominal, None);
+        let in_degrees = |mut recording: Recording| {
+            for session in &mut recording.sessions {
+                session.generator_rad.iter_mut().for_each(|angle| *angle = angle.to_degrees());
+                session.error_rad.iter_mut().for_each(|angle| *angle = angle.to_degrees());
+            }
+            recording
+        };
         let levels = [21.0, -14.0, 30.0, 8.0, -25.0, 17.0, -9.0];
-        let steps = recording_under(&nominal, |t| levels[(t / 18.0) as usize % 7], 1e-3, |_, load| load);
-        let rough = Rough::of(&steps.sessions, &nominal, None);
-        assert!((0.8..1.25).contains(&rough.harmonics.unwrap()), "{:?}", rough.harmonics);
-        assert!(is_explained(&steps, &nominal, None));
+        let steps = recording_under(&nominal, |t| levels[(t / 18.0) as usize % 7], 5e-3, |_, load| load);
+        for right in [recording(&nominal, |_, load| load), steps] {
+            assert_eq!(check(&right, &map), Ok(()));
+            let refused = check(&in_degrees(right.clone()), &map).unwrap_err().to_string();
+            assert!(refused.contains("--columns generator=generator_rad:deg,output=output_rad:deg"), "{refused}");
+            let said = ColumnMap::parse("generator=generator_rad:rad").unwrap();
+            assert_eq!(check(&in_degrees(right.clone()), &said), Ok(()));
+            let mut other_ratio = right;
+            for session in &mut other_ratio.sessions {
+                let by = 1.0 / (nominal.ratio * 1.05) - 1.0 / nominal.ratio;
+                session.error_rad.iter_mut().zip(&session.generator_rad).for_each(|(error, psi)| *error += by * psi);
+            }
+            assert_eq!(check(&other_ratio, &map), Ok(()));
+        }
+        // The torque of a motor behind a ratio near 57 moves the wind-up alone.
+        for factor in [60.0, 95.0, 0.01] {
+            assert_eq!(check(&recording(&nominal, |_, load| load / factor), &map), Ok(()), "{factor}");
+        }
     }
 
     #[test]

@@ -27,8 +27,7 @@ use crate::extension::{
     TableSubject, causes_to_toml, check_by_fem, evaluate, found_geometry,
 };
 use crate::measurement::{
-    ColumnMap, Fault, FaultName, IN_DEGREES, MeasuredError, Quantity, Recording, Session, Treatment, bytes_of, parse,
-    parse_as,
+    ColumnMap, Fault, FaultName, MeasuredError, Quantity, Recording, Session, Treatment, bytes_of, parse,
 };
 use crate::nominal::Nominal;
 use crate::synthesize::{EffectError, Sizes};
@@ -259,19 +258,10 @@ pub fn parse_rows(
     columns: &ColumnMap,
     subject: &Subject<'_>,
 ) -> Result<Recording, PipelineError> {
-    let gear = subject.nominal.gear();
-    let mut recording = parse(file, bytes, columns, &gear)?;
+    let mut recording = parse(file, bytes, columns, &subject.nominal.gear())?;
     subject.take_away_known(&mut recording)?;
     let (nominal, table) = subject.against();
-    if channels::may_be_in_degrees(&recording, nominal, table) {
-        // Rows that cannot be read in degrees are in radians.
-        if let Ok(mut converted) = parse_as(file, bytes, columns, &gear, IN_DEGREES)
-            && subject.take_away_known(&mut converted).is_ok()
-            && channels::is_explained(&converted, nominal, table)
-        {
-            recording = converted;
-        }
-    }
+    channels::check_degrees(&recording, columns, nominal, table)?;
     recording.unusable = channels::check_torque(&mut recording, nominal, table);
     if recording.unusable.is_none() && nominal.wind_up_arcsec(1.0) != 0.0 {
         recording.unusable = without_torque(&recording);

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use crate::measurement::reader::Cells;
-use crate::measurement::{Anew, Unit, begins_anew, continued, least_and_most, median_of, registers, sampled};
+use crate::measurement::{Anew, Unit, begins_anew, least_and_most, registers};
 
 /// Values that are looked at for steps and resolution, at most.
 const LOOKED_AT: usize = 50_000;
@@ -23,8 +23,6 @@ pub(super) struct Facts {
     pub rises: bool,
     /// Share of the rows that repeat the one before.
     pub repeats: f64,
-    /// Median of the change from row to row over the range: small for what moves smoothly.
-    pub roughness: f64,
     /// One value in this many rows, where most are empty.
     pub every: usize,
     /// The number after which it begins anew, if it does.
@@ -37,7 +35,6 @@ impl Facts {
         let (least, most) = least_and_most(values.iter().copied());
         let some = &values[..values.len().min(LOOKED_AT)];
         let steps: Vec<f64> = some.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        let range = most - least;
         let moved: Vec<f64> = steps.iter().map(|step| step.abs()).filter(|step| *step > 0.0).collect();
         let count = steps.len().max(1) as f64;
         let whole = !column.decimals && !values.is_empty() && values.iter().all(|value| value.fract() == 0.0);
@@ -49,7 +46,6 @@ impl Facts {
             whole,
             rises: steps.iter().all(|step| *step >= 0.0),
             repeats: 1.0 - moved.len() as f64 / count,
-            roughness: if range > 0.0 && !moved.is_empty() { median_of(&mut sampled(&moved)) / range } else { 0.0 },
             every: if values.is_empty() {
                 0
             } else {
@@ -71,17 +67,10 @@ fn turns() -> impl Iterator<Item = f64> {
     Unit::ANGLES.into_iter().map(|unit| TAU / unit.factor()).chain(registers())
 }
 
-/// Values made continuous where they begin anew; what is missing stays so.
-pub(super) fn unwrapped(mut values: Vec<f64>, anew: Option<Anew>) -> Vec<f64> {
-    if let Some(anew) = anew {
-        continued(&mut values, anew.span);
-    }
-    values
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measurement::continued;
 
     fn facts(values: impl IntoIterator<Item = f64>) -> Facts {
         Facts::of(&Cells { values: values.into_iter().collect(), ..Cells::default() })
@@ -93,7 +82,8 @@ mod tests {
             let wrapped: Vec<f64> = (0..500).map(|k| (0.031 * turn * f64::from(k)).rem_euclid(turn)).collect();
             let anew = facts(wrapped.clone()).anew;
             assert!((anew.unwrap().span / turn - 1.0).abs() < 1e-12, "{anew:?}");
-            let whole = unwrapped(wrapped, anew);
+            let mut whole = wrapped;
+            continued(&mut whole, anew.unwrap().span);
             assert!((whole[499] - 0.031 * turn * 499.0).abs() < 1e-6 * turn);
         }
         assert_eq!(facts((0..500).map(f64::from)).anew, None);

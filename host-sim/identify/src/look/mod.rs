@@ -19,17 +19,16 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::measurement::raw::RawFile;
-use crate::measurement::{APART, MappedColumn, Quantity, ReadRows, Reading, Unit, WrongReading, median_of, sampled};
-use column::{Facts, unwrapped};
+use crate::measurement::{
+    APART, MappedColumn, Quantity, ReadRows, Reading, Unit, WrongReading, continued, median_of, sampled,
+};
+use column::Facts;
 pub(crate) use coverage::Coverage;
 use pair::pair;
 pub use picture::text;
 use relation::torque_says;
 use turns::{proposed_ratio, units_of_counts};
 use words::Said;
-
-/// Share of the error that a column without a name must explain to be offered as the torque: a guess.
-const NAMELESS: f64 = 0.3;
 
 /// The contents of a column, as far as they can be decided.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
@@ -233,7 +232,8 @@ impl Guess {
     fn mapped(&self, place: usize, names: &[String]) -> Option<MappedColumn> {
         let quantity = self.role.in_mapping().filter(|_| self.used)?;
         let reading = Reading::parse(&self.written()?, quantity.family(), None).ok()?;
-        Some(MappedColumn { quantity, name: names[place].clone(), place, unit: reading.plain_unit(), reading })
+        let name = names[place].clone();
+        Some(MappedColumn { quantity, name, place, unit: reading.plain_unit(), reading, said: false })
     }
 
     /// The column as it is reported.
@@ -359,7 +359,8 @@ fn guess(files: &[RawFile], place: usize, of_file: &Arc<[f64]>) -> Guess {
     files[1..].iter().for_each(|file| cells.values.extend_from_slice(&file.columns.cells[place].values));
     let facts = Facts::of(&cells);
     let said = if layout.has_names { words::said(name, unit.map(String::as_str)) } else { Said::default() };
-    let values = unwrapped(std::mem::take(&mut cells.values), facts.anew);
+    let mut values = std::mem::take(&mut cells.values);
+    facts.anew.into_iter().for_each(|anew| continued(&mut values, anew.span));
     let mut guess = Guess { facts, said, values, of_file: of_file.clone(), ..Guess::default() };
     if cells.times.count > 0 && cells.times.count + cells.empty + cells.words.count >= guess.values.len() {
         (guess.role, guess.unit) = (Role::Time, Some(Unit::Iso));
@@ -535,22 +536,6 @@ fn error_rad(guesses: &[Guess], ratio: Option<f64>) -> Option<Vec<f64>> {
     Some(output.iter().zip(&generator).map(|(output, generator)| output - generator / ratio).collect())
 }
 
-/// Says which column without a role the error moves with, where none is called a torque.
-fn nameless_torque(guesses: &[Guess], error: &[f64], output: &[f64], notes: &mut Vec<String>) {
-    let nameless = (0..guesses.len()).filter(|k| guesses[*k].role == Role::Unknown && guesses[*k].moves());
-    let says =
-        nameless.filter_map(|k| Some((k + 1, torque_says(error, output, &guesses[k].values, &guesses[k].of_file)?)));
-    let best = says.filter(|(_, says)| says.share > NAMELESS).max_by(|a, b| a.1.share.total_cmp(&b.1.share));
-    if let Some((place, says)) = best {
-        let sign = if says.slope < 0.0 { "-" } else { "" };
-        notes.push(format!(
-            "column {place} may be the torque: it explains {:.0} % of the error beside the turn of the output; name \
-             its unit, torque=#{place}:{sign}N.m",
-            100.0 * says.share
-        ));
-    }
-}
-
 /// Numbers, with commas.
 fn listed<T: ToString>(numbers: &[T]) -> String {
     numbers.iter().map(T::to_string).collect::<Vec<_>>().join(", ")
@@ -571,9 +556,6 @@ fn torque(guesses: &mut [Guess], error: Option<&[f64]>, notes: &mut Vec<String>)
         // A load that does not change is a load: without it the table would be one for none.
         if let Some(constant) = guesses.iter_mut().find(|guess| guess.role == Role::Torque && guess.facts.finite > 0) {
             constant.used = true;
-        }
-        if let (Some(error), Some(output)) = (error, output.as_deref()) {
-            nameless_torque(guesses, error, output, notes);
         }
     }
     let says = |k: &usize| torque_says(error?, output.as_deref()?, &guesses[*k].values, &guesses[*k].of_file);

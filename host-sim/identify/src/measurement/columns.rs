@@ -154,6 +154,8 @@ pub(crate) struct MappedColumn {
     pub unit: Unit,
     /// How its numbers are read.
     pub reading: Reading,
+    /// Whether the mapping says so: then it is believed.
+    pub said: bool,
 }
 
 impl ColumnMap {
@@ -200,6 +202,12 @@ impl ColumnMap {
         Ok(map)
     }
 
+    /// The column of a quantity, and whether its unit was said.
+    pub(crate) fn column(&self, quantity: Quantity) -> (&str, bool) {
+        let given = self.given.iter().find(|given| given.quantity == quantity);
+        given.map_or((quantity.default_column().0, false), |given| (&given.column, given.reading.is_some()))
+    }
+
     /// The rate of rows, Hz, if it was said.
     pub(super) fn rate_hz(&self) -> Option<f64> {
         self.rate_hz
@@ -240,13 +248,15 @@ impl ColumnMap {
                 what.push_str(&found(names, layout));
                 return Err(problem(what));
             };
-            let reading = match given.and_then(|given| given.reading) {
+            let said = given.and_then(|given| given.reading);
+            let reading = match said {
                 Some(reading) => reading,
                 None => unit_below(quantity, place, layout)
                     .map_err(|wrong| problem(format!("column {name}: {}", quantity.refusal(wrong))))?
                     .unwrap_or(Reading::of(default.1)),
             };
-            columns.push(MappedColumn { quantity, name: name.to_owned(), place, unit: reading.plain_unit(), reading });
+            let (name, said) = (name.to_owned(), said.is_some());
+            columns.push(MappedColumn { quantity, name, place, unit: reading.plain_unit(), reading, said });
         }
         let has = |columns: &[MappedColumn], quantity| columns.iter().any(|c| c.quantity == quantity);
         let mapped = |quantity| self.given.iter().any(|given| given.quantity == quantity);

@@ -1,5 +1,6 @@
 //! A file as it stands: its columns in rad, s, N·m and °C, what is missing as NaN.
 
+use std::fmt;
 use std::io::{Cursor, Read};
 use std::ops::Range;
 
@@ -7,8 +8,8 @@ use thiserror::Error;
 
 use super::columns::{ColumnMap, MappedColumn, Quantity};
 use super::fault::{Fault, FaultName};
+use super::phd2;
 use super::reader::{Cells, Columns, Layout, Sheet, clock, stamps};
-use super::{phd2, rollover};
 use flexspline_base::csv_rows::TableProblem;
 
 /// Fewest rows that say anything about noise or an order. *Guess*: fewer give no standard deviation to speak of.
@@ -30,6 +31,11 @@ impl MeasuredError {
     /// A problem in a line of a file.
     pub(crate) fn at(file: &str, problem: TableProblem) -> MeasuredError {
         MeasuredError { file: file.to_owned(), line: Some(problem.line), what: problem.what }
+    }
+
+    /// Why a file is refused as a whole.
+    pub(crate) fn of_file(file: &str, why: &dyn fmt::Display) -> MeasuredError {
+        MeasuredError { file: file.to_owned(), line: None, what: why.to_string() }
     }
 }
 
@@ -223,7 +229,6 @@ pub(crate) fn of_columns(
     }
     let mut order = Vec::new();
     in_order(&mut log, &mut order);
-    rollover::undo(&mut log, &columns, &mut notes);
     Ok((log, LogFindings { columns, broken_off, refused, order, notes, own_zeros: false }))
 }
 

@@ -23,6 +23,8 @@ use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
 
+use flexspline_base::csv_rows::TableProblem;
+
 pub(crate) use columns::MappedColumn;
 pub use columns::{ColumnMap, MappingError, Quantity, Reading, Unit};
 pub use fault::{Fault, FaultName, Measures, ToothStep, Treatment};
@@ -34,6 +36,7 @@ pub use flexspline_base::robust::{
 pub use gear::Gear;
 pub use log::{FEWEST_ROWS, MeasuredError};
 pub use reader::{Layout, Separator, Sheet, raw};
+pub(crate) use refusal::Refusal;
 pub(crate) use rollover::{Anew, begins_anew, continued, registers};
 pub(crate) use unit::{Family, WrongReading};
 
@@ -42,7 +45,6 @@ use faults::drift::Stretches;
 use faults::steps::DoubtfulSteps;
 use log::{Log, LogFindings};
 use raw::RawFile;
-use refusal::Refusal;
 
 /// More sessions than a person makes. *Guess*.
 const MANY_SESSIONS: usize = 50;
@@ -234,39 +236,27 @@ pub fn read(path: &Path, columns: &ColumnMap, gear: &Gear) -> Result<Recording, 
 
 /// Reads measured data from `source`, a file called `file`.
 pub fn parse(file: &str, source: impl Read, columns: &ColumnMap, gear: &Gear) -> Result<Recording, MeasuredError> {
-    parse_as(file, source, columns, gear, USUAL)
+    parse_at_least(FEWEST_ROWS, file, source, columns, gear)
 }
 
-/// Settings for reading rows: whether both angles are in degrees though the columns say radians, a fault that no ratio
-/// shows, and the fewest rows.
-type Form = (bool, usize);
-const USUAL: Form = (false, FEWEST_ROWS);
-/// Two rows and more, for a table that is replayed over them.
-pub(crate) const FEW: Form = (false, 2);
-/// Both angles converted from degrees.
-pub(crate) const IN_DEGREES: Form = (true, FEWEST_ROWS);
-
-/// [`parse`] of rows in another form.
-pub(crate) fn parse_as(
+/// [`parse`] of a file of at least `fewest` rows.
+pub(crate) fn parse_at_least(
+    fewest: usize,
     file: &str,
     source: impl Read,
     columns: &ColumnMap,
     gear: &Gear,
-    (in_degrees, fewest): Form,
 ) -> Result<Recording, MeasuredError> {
-    let refuse = |why: Refusal| MeasuredError { file: file.to_owned(), line: None, what: why.to_string() };
+    let refuse = |why: Refusal| MeasuredError::of_file(file, &why);
     if gear.ratio == 0.0 || !gear.ratio.is_finite() {
         return Err(refuse(Refusal::NoRatio(gear.ratio)));
     }
     let (mut log, found) = log::read(file, source, columns, gear.ratio, fewest)?;
     let rows = log.len();
     let mut findings = Findings::default();
-    if in_degrees {
-        faults::units::both_in_degrees(&mut log, Unit::Degree.factor(), &mut findings);
-    }
-    let recorded = in_order(&mut log, &found, &mut findings);
+    let recorded = in_order(&mut log, &found, &mut findings).map_err(refuse)?;
     enough(&log, recorded, fewest).map_err(refuse)?;
-    faults::wrap::unwrap(&mut log, &found.columns, gear.ratio, &mut findings);
+    rollover::unwrap(&mut log, &found.columns, gear.ratio, &mut findings.notes);
     faults::leaps::check(&mut log, gear, &mut findings);
     faults::units::check(&mut log, &found.columns, gear, &mut findings).map_err(refuse)?;
     let error_recorded = log.output_or_error() == Quantity::Error;
@@ -301,7 +291,10 @@ pub(crate) fn parse_as(
 }
 
 /// Mends clock and holes of a log and leaves out the rows without an angle; how many had which angle.
-fn in_order(log: &mut Log, found: &LogFindings, findings: &mut Findings) -> String {
+///
+/// # Errors
+/// The time looks as if it were in another unit.
+fn in_order(log: &mut Log, found: &LogFindings, findings: &mut Findings) -> Result<String, Refusal> {
     findings.notes.extend(found.notes.iter().cloned());
     let broken_off = found.broken_off.map(|line| Fault::new(FaultName::MissingSamples, [line; 2], 1));
     findings.add(broken_off, None::<Quantity>, Treatment::Masked, |_| {
@@ -313,10 +306,10 @@ fn in_order(log: &mut Log, found: &LogFindings, findings: &mut Findings) -> Stri
         findings.add(Some(fault), Quantity::Time, Treatment::Repaired, |_| what);
     }
     faults::missing::fill(log, findings);
-    faults::clock::check(log, findings);
+    faults::clock::check(log, &found.columns, findings)?;
     let recorded = recorded(log);
     faults::missing::leave_out(log, findings);
-    recorded
+    Ok(recorded)
 }
 
 /// The rows of a file as they are before anything is asked of the drive.
@@ -340,22 +333,21 @@ impl ReadRows {
         let read = file.columns.with_cells(columns.iter().map(cells).collect());
         let made = log::of_columns(&file.sheet.layout, read, columns.to_vec(), None, 0);
         let mut rows = ReadRows { log: Log::default(), stamps_s: Vec::new(), notes: Vec::new() };
-        let refused = match made {
-            Ok((mut log, found)) => {
-                rows.stamps_s = log.get(Quantity::Time).map_or_else(Vec::new, <[f64]>::to_vec);
-                let mut findings = Findings::default();
-                in_order(&mut log, &found, &mut findings);
-                if log.len() > 1 {
-                    faults::wrap::unwrap(&mut log, columns, ratio.unwrap_or(1.0), &mut findings);
-                }
-                rows.log = log;
-                rows.notes = findings.notes;
-                rows.notes.extend(findings.faults.into_iter().map(|fault| fault.what));
-                found.refused
-            }
-            Err(problem) => Some(problem),
+        let at = |problem: TableProblem| MeasuredError::at(&file.file, problem);
+        let (mut log, found) = match made {
+            Ok(made) => made,
+            Err(problem) => return (rows, Some(at(problem))),
         };
-        (rows, refused.map(|problem| MeasuredError::at(&file.file, problem)))
+        rows.stamps_s = log.get(Quantity::Time).map_or_else(Vec::new, <[f64]>::to_vec);
+        let mut findings = Findings::default();
+        let ordered = in_order(&mut log, &found, &mut findings);
+        if log.len() > 1 {
+            rollover::unwrap(&mut log, columns, ratio.unwrap_or(1.0), &mut findings.notes);
+        }
+        rows.log = log;
+        rows.notes = findings.notes;
+        rows.notes.extend(findings.faults.into_iter().map(|fault| fault.what));
+        (rows, found.refused.map(at).or(ordered.err().map(|why| MeasuredError::of_file(&file.file, &why))))
     }
 
     /// Sessions, one at least.

@@ -21,11 +21,20 @@ pub(crate) enum Refusal {
          fixed in the drive measured"
     )]
     OtherWheel { seen: String, ratio: f64 },
+    #[error("{seen}: {why}; allowed: {}", .readings.join(", or "))]
+    OtherReading { seen: String, why: &'static str, readings: Vec<String> },
     #[error(
-        "{seen}: one of the two is in another unit, and the ratio does not say which; allowed: --columns {}",
-        .readings.join(", or ")
+        "{column}: {rows} rows {period:.3} s apart, {hours:.1} hours in which the generator hardly exceeds {speed:.3} \
+         rad/s and turns round over many rows: milliseconds rather than seconds; allowed: --columns time={column}:ms, \
+         or time={column}:s if the motor creeps"
     )]
-    OneOfTwoUnits { seen: String, readings: Vec<String> },
+    Milliseconds { column: String, rows: usize, period: f64, hours: f64, speed: f64 },
+    #[error(
+        "the error follows the torque with {wind_up:.0} times the wind-up of the model, and clearance or waves are \
+         {other:.0} times the model's: angles in degrees (180/pi = 57.3) read as radians; allowed: --columns \
+         generator={generator}:deg,output={output}:deg, or generator={generator}:rad if they are not"
+    )]
+    BothInDegrees { wind_up: f64, other: f64, generator: String, output: String },
     #[error(
         "{output} does not follow: {generator} turns by {turned:.3} rad, {output} by {followed:.6} rad; allowed: an \
          output that turns"

@@ -3,23 +3,24 @@
 //! Such a column stays within a span, and from time to time leaps by nearly all of it, against its own motion. The span
 //! is the size that makes the values go on evenly over the leaps. A counter may have any span: 2^16 of a register of 16
 //! bits, 32 767 of one that a program sets back to zero at its largest value. Whoever reads a file finds columns that
-//! begin anew with [`begins_anew`]; [`undo`] makes the counters of a log continuous. A single turn in radians is left
-//! to the check of wrapped angles, which the other angle helps.
+//! begin anew with [`begins_anew`]; [`unwrap`] makes the angles of a log continuous.
+
+use std::f64::consts::TAU;
 
 use super::columns::{MappedColumn, Quantity, Unit};
 use super::faults::LineFit;
 use super::log::Log;
-use flexspline_base::robust::{least_and_most, median_of};
+use flexspline_base::robust::{least_and_most, median_of, quantile_of};
 
 /// Bits of registers.
 const BITS: std::ops::RangeInclusive<i32> = 8..=32;
 /// A column that begins anew covers at least this share of its span. *Guess*: a step over the border leaves out two
 /// steps of the span at most.
-pub(super) const COVERED: f64 = 0.75;
+const COVERED: f64 = 0.75;
 /// Steps up to this share of the span are distinguishable from a leap. *Guess*.
-pub(super) const UNAMBIGUOUS: f64 = 0.4;
+const UNAMBIGUOUS: f64 = 0.4;
 /// A step longer than this share of the span is a leap: 1 less what is unambiguous. *Guess*.
-pub(super) const LEAPS: f64 = 0.6;
+const LEAPS: f64 = 0.6;
 /// A known span is that of the leaps within this share, or within their scatter. *Guess*: it is for motion that bends
 /// near a leap.
 const NEARLY: f64 = 0.005;
@@ -40,6 +41,16 @@ const AGREE: f64 = 0.8;
 /// A span that no register has is believed from this number of leaps on: one leap may be anything. *Guess*: two that
 /// agree are rarely chance.
 const FEWEST_LEAPS: usize = 2;
+
+/// The columns are exchanged if this share of what an exchange gives is there. *Guess*: clearance takes the rest of a
+/// small motion.
+const EXCHANGED: f64 = 0.75;
+/// A step that differs from the one before by less than this share of a turn goes on as it did; where files are joined
+/// without a time between them, it does not. *Guess*: half of what leaves the turn open.
+const GOES_ON: f64 = 0.25;
+/// Teeth do not skip by more than this number of motor turns in a row. *Guess*: two pitches are one turn, so that these
+/// are seven pitches.
+const MOST_SKIPPED: f64 = 3.5;
 
 /// How a column begins anew.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,7 +80,7 @@ pub(crate) fn registers() -> impl Iterator<Item = f64> {
 }
 
 /// Whether values of this `range` stay within `span` and cover this share of it.
-pub(super) fn stays_within(range: f64, span: f64, covered: f64) -> bool {
+fn stays_within(range: f64, span: f64, covered: f64) -> bool {
     range <= span * (1.0 + 1e-6) && range >= covered * span
 }
 
@@ -242,30 +253,94 @@ pub(crate) fn continued(values: &mut [f64], span: f64) {
     }
 }
 
-/// Makes counters of angles continuous where they begin anew and the steps between leave no doubt.
-pub(super) fn undo(log: &mut Log, columns: &[MappedColumn], notes: &mut Vec<String>) {
-    let registers: Vec<f64> = registers().collect();
-    for column in columns {
-        let angle = matches!(column.quantity, Quantity::Generator | Quantity::Output | Quantity::Orientation);
-        if !angle || column.reading.unit != Unit::Count {
-            continue;
+/// Makes angles continuous that begin anew: counters where the steps between leave no doubt, and what stays within a
+/// turn.
+pub(super) fn unwrap(log: &mut Log, columns: &[MappedColumn], ratio: f64, notes: &mut Vec<String>) {
+    // The output first: it is slow, and shows how far a fast generator has turned.
+    for channel in [Quantity::Output, Quantity::Orientation, Quantity::Generator] {
+        let Some(column) = columns.iter().find(|column| column.quantity == channel) else { continue };
+        let Some(mut values) = log.take(channel) else { continue };
+        let follower = if channel == Quantity::Generator { log.output_or_error() } else { Quantity::Generator };
+        if let Some((span, what)) = counter(&values, column, log.get(follower)) {
+            continued(&mut values, span);
+            notes.push(format!("{} {what}: it was made continuous", column.name));
+        } else if within_a_turn(&values, channel, ratio, log) {
+            let output = log.get(Quantity::Output).filter(|_| channel == Quantity::Generator);
+            let helped = output.is_some();
+            let ambiguous = along(&mut values, log, ratio, output);
+            notes.push(format!("{} is within one turn: it was made continuous", column.name));
+            if ambiguous {
+                notes.push(format!(
+                    "{} moves by more than {UNAMBIGUOUS} turns from row to row: {}",
+                    column.name,
+                    if helped {
+                        "turns are counted by the output angle"
+                    } else {
+                        "the count of its turns is not certain"
+                    }
+                ));
+            }
         }
-        let count_rad = (column.reading.gain * column.unit.factor()).abs();
-        let Some(values) = log.get(column.quantity) else { continue };
-        let counts: Vec<f64> = values.iter().map(|value| value / count_rad).collect();
-        let other = match column.quantity {
-            Quantity::Generator => log.get(log.output_or_error()),
-            _ => log.get(Quantity::Generator),
-        };
-        let Some(anew) = begins_anew(&counts, &registers, true, other).filter(|anew| !anew.ambiguous) else { continue };
-        let range = anew.span * count_rad;
-        if (range / std::f64::consts::TAU - 1.0).abs() < 1e-9 {
-            continue;
-        }
-        let Some(values) = log.get_mut(column.quantity) else { continue };
-        continued(values, range);
-        notes.push(format!("{} {}: it was made continuous", column.name, anew.text(" counts")));
+        log.put(channel, values);
     }
+}
+
+/// The span after which a counter begins anew, rad, and a sentence on it; none for a single turn, which the other angle
+/// helps.
+fn counter(values: &[f64], column: &MappedColumn, other: Option<&[f64]>) -> Option<(f64, String)> {
+    let count_rad = (column.reading.gain * column.unit.factor()).abs();
+    let counts: Vec<f64> =
+        Some(values).filter(|_| column.reading.unit == Unit::Count)?.iter().map(|value| value / count_rad).collect();
+    let anew = begins_anew(&counts, &registers().collect::<Vec<_>>(), true, other).filter(|anew| !anew.ambiguous)?;
+    let span = anew.span * count_rad;
+    ((span / TAU - 1.0).abs() >= 1e-9).then(|| (span, anew.text(" counts")))
+}
+
+/// Whether an angle stays within one turn and begins anew, by its steps or as the output has travelled farther.
+fn within_a_turn(values: &[f64], channel: Quantity, ratio: f64, log: &Log) -> bool {
+    let span_of = |values: &[f64]| {
+        let (least, most) = least_and_most(values.iter().copied());
+        most - least
+    };
+    let output = log.get(Quantity::Output).filter(|_| channel == Quantity::Generator);
+    let travel = output.map_or(0.0, |output| span_of(output) * ratio.abs());
+    // An output that turns by the ratio times as much is the generator: columns taken for each other, and not an angle
+    // that began anew.
+    let leaps = values.windows(2).any(|pair| (pair[1] - pair[0]).abs() > 0.5 * TAU);
+    let exchanged = !leaps && travel > EXCHANGED * ratio.powi(2) * span_of(values);
+    let again = |row: usize| (values[row] - values[row - 1]).abs() > LEAPS * TAU && log.continues(row);
+    !exchanged && stays_within(span_of(values), TAU, COVERED) && (travel > 1.5 * TAU || (1..values.len()).any(again))
+}
+
+/// Makes `values` continuous. `output`, if given, is continuous and turns `ratio` times slower; it counts turns where
+/// one row is too far from the next, where a session begins, and at the very first row. Returns whether rows are too
+/// far apart.
+fn along(values: &mut [f64], log: &Log, ratio: f64, output: Option<&[f64]>) -> bool {
+    let nearest = |d: f64| d - TAU * (d / TAU).round();
+    let mut steps: Vec<f64> = match output {
+        Some(output) => output.windows(2).map(|o| ((o[1] - o[0]) * ratio).abs()).collect(),
+        None => values.windows(2).map(|v| nearest(v[1] - v[0]).abs()).collect(),
+    };
+    let fast = quantile_of(&mut steps, 0.99) > UNAMBIGUOUS * TAU;
+    if let Some(output) = output {
+        values[0] += TAU * ((output[0] * ratio - values[0]) / TAU).round();
+    }
+    let mut last = 0.0;
+    for row in 1..values.len() {
+        let plain = nearest(values[row] - values[row - 1]);
+        let expected = output.map_or(plain, |output| (output[row] - output[row - 1]) * ratio);
+        let far = (expected - plain).abs() > MOST_SKIPPED * TAU;
+        let step = match output {
+            // What goes on as it did needs no help: there it is the output that may skip, by some teeth.
+            Some(_) if fast || far || !log.continues(row) || (plain - last).abs() > GOES_ON * TAU => {
+                expected + nearest(values[row] - values[row - 1] - expected)
+            }
+            _ => plain,
+        };
+        values[row] = values[row - 1] + step;
+        last = step;
+    }
+    fast
 }
 
 #[cfg(test)]
@@ -364,5 +439,25 @@ mod tests {
         let helped = begins_anew(&values, &registers().collect::<Vec<_>>(), true, Some(&other)).unwrap();
         println!("{alone:?} {helped:?}");
         assert_eq!((helped.span, helped.or), (32_767.0, None));
+    }
+
+    #[test]
+    fn two_files_joined_without_a_time_are_made_continuous_without_a_jump_of_a_turn() {
+        let ratio = 100.0;
+        // The drive went on by 0.7 output turns between the two.
+        let psi: Vec<f64> = (0..2000).map(|k| 0.11 * f64::from(k) + if k < 1000 { 0.0 } else { 70.3 * TAU }).collect();
+        let output: Vec<f64> = psi.iter().map(|psi| psi / ratio).collect();
+        let mut log = Log::default();
+        log.line = (0..2000).collect();
+        let mut wrapped: Vec<f64> = psi.iter().map(|psi| psi.rem_euclid(TAU)).collect();
+        along(&mut wrapped, &log, ratio, Some(&output));
+        let apart = wrapped.iter().zip(&psi).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(apart < 1e-6, "{apart}");
+        // Teeth that skip by two pitches, which is a turn of the motor, stay where they are: in the output.
+        let skipped: Vec<f64> =
+            (0..2000).map(|k| 0.0011 * f64::from(k) + if k < 1000 { 0.0 } else { TAU / ratio }).collect();
+        let mut wrapped: Vec<f64> = (0..2000).map(|k| (0.11 * f64::from(k)).rem_euclid(TAU)).collect();
+        along(&mut wrapped, &log, ratio, Some(&skipped));
+        assert!((wrapped[1999] - wrapped[0] - 0.11 * 1999.0).abs() < 1e-6);
     }
 }

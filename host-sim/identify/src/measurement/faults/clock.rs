@@ -3,10 +3,11 @@
 use std::f64::consts::TAU;
 
 use super::{Findings, marked};
-use crate::measurement::columns::Quantity;
+use crate::measurement::columns::{MappedColumn, Quantity};
 use crate::measurement::fault::{Fault, FaultName, Treatment};
 use crate::measurement::log::Log;
-use flexspline_base::robust::{least_and_most, median_and_std, median_of, quantile_of, sampled};
+use crate::measurement::refusal::Refusal;
+use flexspline_base::robust::{median_and_std, median_of, quantile_of, sampled};
 
 /// A gap longer than this number of sample periods starts a new session. *Source*: by definition
 /// (`docs/how-to/diagnosis.md`).
@@ -14,21 +15,6 @@ pub(crate) const SESSION_GAP_PERIODS: f64 = 10.0;
 /// A step of time above this number of periods, jitter aside, has a row missing in it. *Source*: derived, half way
 /// between one lost row and none.
 const LOST_ROW_PERIODS: f64 = 1.5;
-/// A gap of up to this number of periods that begins a session may be one of rows that were lost: where the motion goes
-/// on over it. *Guess*.
-const LONGEST_HOLE_PERIODS: f64 = 100.0;
-/// The motion goes on where the generator turns over the gap as it does on either side, within this share of the faster
-/// pace, and this angle, rad. *Guess*.
-const GOES_ON: (f64, f64) = (0.3, 0.05);
-/// Rows on either side that give the pace there. *Guess*: few, so that the motion is the same in all of them.
-const PACE_ROWS: usize = 3;
-/// An angle of a column that wraps is of no use if it may be off by more than this, rad. *Guess*: at half a turn, π, it
-/// could be either way round; half of that is safe.
-const WRAPS_RAD: f64 = 1.5;
-/// Of the gaps that may be such holes this share is, with the generator in motion: then those are, too, in which it
-/// stands, starts or turns round.
-/// *Guess*.
-const HOLES_IN_MOTION: f64 = 0.5;
 /// Standard deviation of the median of many values over that of their mean: √(π/2) for normal ones. *Source*: derived.
 const MEDIAN_TO_MEAN_STD: f64 = 1.253;
 /// The median step is known to this number of its standard deviations. *Guess*: two hold in 95 % of the cases.
@@ -49,18 +35,15 @@ const JITTER_OVER_MOTION: f64 = 5.0;
 const PERIODS_S: [f64; 2] = [1e-7, 3600.0];
 /// Generator speeds that exist, up to 20 000 turns a minute, rad/s. *Guess*: motors of such drives turn no faster.
 const FASTEST_RAD_S: f64 = 2100.0;
-/// Rows farther apart than this (s), for longer than this altogether (s), in which the motor stays slower than this
-/// (rad/s), are milliseconds read as seconds: a bench creeps for minutes, not for days. *Guess*.
-const CREEPS: (f64, f64, f64) = (1.0, 43_200.0, 0.1);
-/// The same of a motor that goes to and fro: a telescope creeps for nights, but one way. *Guess*.
-const CREEPS_TO_AND_FRO: (f64, f64, f64) = (0.9, 3600.0, 0.15);
+/// Rows farther apart than this (s), for longer than this altogether (s), in which a motor that goes to and fro stays
+/// slower than this (rad/s), look like milliseconds read as seconds: a bench creeps for minutes, not for hours, and a
+/// telescope creeps for nights, but one way. *Guess*.
+const CREEPS: (f64, f64, f64) = (0.9, 3600.0, 0.15);
 /// It goes to and fro where each direction has this share of the way, and this way at least, rad. *Guess*: one motor
 /// turn.
 const EACH_WAY: (f64, f64) = (0.1, 6.0);
 /// And never changes its pace by more than this share of its fastest one from row to row. *Guess*.
 const SMOOTHLY: f64 = 0.35;
-/// Milliseconds in a second, by definition.
-const MILLI: f64 = 1e3;
 /// A loop follows the clock: its phase takes this share of the distance of a stamp from where it is expected. *Guess*:
 /// it averages some forty stamps.
 const PHASE_GAIN: f64 = 0.05;
@@ -69,14 +52,18 @@ const PHASE_GAIN: f64 = 0.05;
 const PERIOD_GAIN: f64 = 0.5 * PHASE_GAIN * PHASE_GAIN;
 /// Rows on either side by which a row is assigned to its period. *Guess*: few, so that a lost row stays where it is.
 const AROUND_ROWS: usize = 5;
-/// If steps of time scatter by more than this share of a period, lost rows are counted along the session, not one by
-/// one. *Guess*: half a period is then less than ten standard deviations.
-const SCATTERS: f64 = 0.05;
 
 /// Finds faults of the clock, repairs or leaves out what they touch, and parts the rows into sessions.
-pub(in crate::measurement) fn check(log: &mut Log, findings: &mut Findings) {
+///
+/// # Errors
+/// The time looks like milliseconds, and nobody said that it is in seconds.
+pub(in crate::measurement) fn check(
+    log: &mut Log,
+    columns: &[MappedColumn],
+    findings: &mut Findings,
+) -> Result<(), Refusal> {
     if log.get(Quantity::Time).is_none() {
-        return;
+        return Ok(());
     }
     let strays = order(log, findings);
     standing(log, findings);
@@ -85,11 +72,11 @@ pub(in crate::measurement) fn check(log: &mut Log, findings: &mut Findings) {
         let all = all.map(|all| Fault { time_s: None, until_s: None, ..all });
         findings.add(all, Quantity::Time, Treatment::Masked, |_| "time stands still: it is not used".to_owned());
         log.take(Quantity::Time);
-        return;
+        return Ok(());
     };
     gaps(log, period, &strays, findings);
     jitter(log, period, findings);
-    scale(log, period, findings);
+    scale(log, period, columns, findings)
 }
 
 /// Median of the positive steps of time, s.
@@ -181,111 +168,42 @@ fn gaps(log: &mut Log, period: f64, strays: &[u64], findings: &mut Findings) {
     let mut steps = sampled(&time.windows(2).map(|t| t[1] - t[0]).filter(|dt| *dt > 0.0).collect::<Vec<_>>());
     let jitter = median_and_std(&mut steps).1;
     let lost_from = (LOST_ROW_PERIODS * period).max(period + 6.0 * jitter);
-    let long = (1..rows).filter(|row| log.continues(*row) && time[*row] - time[*row - 1] > lost_from);
-    let (within, parts): (Vec<usize>, Vec<usize>) =
-        long.partition(|row| time[*row] - time[*row - 1] <= SESSION_GAP_PERIODS * period);
-    let long_steps = within.len() + parts.len();
+    let long: Vec<usize> =
+        (1..rows).filter(|row| log.continues(*row) && time[*row] - time[*row - 1] > lost_from).collect();
+    let parts: Vec<usize> =
+        long.iter().copied().filter(|row| time[*row] - time[*row - 1] > SESSION_GAP_PERIODS * period).collect();
     log.begin_sessions(&parts);
     let Some(time) = log.get(Quantity::Time) else { return };
-    // Rows that are in the file, but were left out, are not lost.
-    let lacking_before = |row: &usize| {
-        let periods = ((time[*row] - time[*row - 1]) / period).round() as u64;
-        (*row, periods.saturating_sub(log.line[*row] - log.line[*row - 1]))
-    };
-    let near_stray = |row: usize| strays.iter().any(|line| line.abs_diff(log.line[row]) <= 2);
-    let mut lost: Vec<(usize, u64)> = within.iter().map(lacking_before).collect();
-    lost.retain(|(row, rows)| *rows > 0 && !near_stray(*row));
-    let mut holes: Vec<(usize, u64)> = holes(log, &parts, period).iter().map(lacking_before).collect();
-    holes.retain(|(row, rows)| *rows > 0 && !near_stray(*row));
-    // Stamps that jitter make single steps long; rows are missing only where the stamps of a whole session count more
-    // periods than rows.
-    let counts: Vec<Counted> = counted(log, period).collect();
-    // The median step may be shorter than the period that a clock keeps on the mean: no more are missing than its time
-    // over that says, as well as the median is known.
+    // The median step may be shorter than the period that a clock keeps on the mean: no more rows are missing than the
+    // time of a session leaves room for, as well as the median is known.
     let unsure = MEDIAN_STDS * MEDIAN_TO_MEAN_STD * jitter / period / (rows as f64).sqrt();
-    let lacking = counts.iter().map(|Counted { rows, lacking, .. }| {
-        let beyond = (time[rows.end - 1] - time[rows.start]) / period - (rows.len() as f64 - 1.0);
-        let is_borne_out = *lacking as f64 <= beyond + unsure * rows.len() as f64;
-        if is_borne_out { *lacking } else { beyond.max(0.0).round() as u64 }
-    });
-    let lacking = lacking.sum::<u64>().saturating_sub(strays.len() as u64);
-    if jitter > SCATTERS * period {
-        let beyond = |count: &Counted, k: usize| count.period[k] - count.period[k - 1] - 1;
-        let of = |count: &Counted| -> Vec<(usize, u64)> {
-            let all = (1..count.rows.len()).map(|k| (count.rows.start + k, beyond(count, k)));
-            all.filter(|(_, rows)| *rows > 0).collect()
-        };
-        lost = counts.iter().flat_map(of).collect();
+    let mut room = 0.0;
+    let mut lost: Vec<(usize, u64)> = Vec::new();
+    for Counted { rows, period: periods } in counted(log, period) {
+        let n = rows.len() as f64;
+        room += ((time[rows.end - 1] - time[rows.start]) / period - (n - 1.0) + unsure * n).max(0.0).round();
+        for (k, row) in rows.enumerate().skip(1) {
+            // Rows that are in the file, but were left out, are not lost.
+            let beyond = (periods[k] - periods[k - 1]).saturating_sub(log.line[row] - log.line[row - 1]);
+            if beyond > 0 && !strays.iter().any(|line| line.abs_diff(log.line[row]) <= 2) {
+                lost.push((row, beyond));
+            }
+        }
     }
-    let in_steps = lost.iter().map(|(_, rows)| *rows).sum::<u64>().min(lacking);
-    let in_holes = holes.iter().map(|(_, rows)| *rows).sum::<u64>();
-    let total = in_steps + in_holes;
-    let places = lost.len().min(in_steps as usize) + holes.len();
-    lost.retain(|_| in_steps > 0);
-    lost.extend(&holes);
-    lost.sort_unstable();
-    if total > 0 && long_steps as f64 > UNEVEN_SHARE * rows as f64 {
-        let uneven = format!("rows are not evenly spaced in time: {} steps exceed {lost_from:.6} s", lost.len());
+    let total = lost.iter().map(|(_, rows)| *rows).sum::<u64>().min(room as u64);
+    let places = lost.len().min(total as usize);
+    if total > 0 && long.len() as f64 > UNEVEN_SHARE * rows as f64 {
+        let uneven = format!("rows are not evenly spaced in time: {} steps exceed {lost_from:.6} s", long.len());
         findings.notes.push(uneven);
     } else if total > 0 {
-        let breaks = match holes.len() {
-            0 => String::new(),
-            1 => format!(
-                "; one gap, of {in_holes} of them, is so long that a session begins behind it, though the motion goes \
-                 on"
-            ),
-            n => format!(
-                "; {n} gaps, with {in_holes} of them, are so long that a session begins behind each, though the motion \
-                 goes on"
-            ),
-        };
         let fault = log.fault(FaultName::MissingSamples, lost.iter().map(|(row, _)| *row));
         let fault = fault.map(|fault| Fault { rows: total, ..fault });
         findings.add(fault, Quantity::Time, Treatment::Kept, |_| {
             format!(
-                "{total} rows are missing, in up to {places} places: time goes on by more than {LOST_ROW_PERIODS} of \
-                 the usual {period:.6} s{breaks}"
+                "{total} rows are missing, in up to {places} places: time goes on by more than the usual {period:.6} s"
             )
         });
     }
-}
-
-/// Of gaps that begin a session those over which the motion goes on, so that rows may have been lost in them: the row
-/// behind each.
-fn holes(log: &Log, parts: &[usize], period: f64) -> Vec<usize> {
-    let (Some(time), Some(generator)) = (log.get(Quantity::Time), log.get(Quantity::Generator)) else {
-        return Vec::new();
-    };
-    let (low, high) = least_and_most(generator.iter().copied());
-    let wraps = high - low <= TAU * (1.0 + 1e-6);
-    let moved = |row: usize| if wraps { turned(generator, row) } else { generator[row] - generator[row - 1] };
-    // The pace over some rows without a gap, rad/s.
-    let pace = |rows: std::ops::Range<usize>| {
-        let (from, to) = (rows.start, rows.end - 1);
-        let gap = (from + 1..=to).any(|row| !log.continues(row));
-        (to > from && !gap).then(|| (from + 1..=to).map(moved).sum::<f64>() / (time[to] - time[from]))
-    };
-    let short = parts.iter().copied().filter(|row| time[*row] - time[*row - 1] <= LONGEST_HOLE_PERIODS * period);
-    let mut of_gaps = 0_usize;
-    // Those over which the motion may go on, and whether it plainly does.
-    let mut found: Vec<(usize, bool)> = Vec::new();
-    for row in short {
-        of_gaps += 1;
-        let before = pace(row.saturating_sub(PACE_ROWS)..row);
-        let after = pace(row..(row + PACE_ROWS).min(log.len()));
-        let Some((before, after)) = before.zip(after) else { continue };
-        let dt = time[row] - time[row - 1];
-        let off = generator[row] - generator[row - 1] - 0.5 * (before + after) * dt;
-        let off = if wraps { off - TAU * (off / TAU).round() } else { off };
-        let way = before.abs().max(after.abs()) * dt;
-        let may_be_off = GOES_ON.0 * way + GOES_ON.1;
-        if off.abs() <= way + GOES_ON.1 {
-            found.push((row, off.abs() <= may_be_off && way > 2.0 * GOES_ON.1 && !(wraps && may_be_off > WRAPS_RAD)));
-        }
-    }
-    let in_motion = found.iter().filter(|(_, plainly)| *plainly).count();
-    let all = in_motion > 0 && in_motion as f64 >= HOLES_IN_MOTION * of_gaps as f64;
-    found.into_iter().filter(|(_, plainly)| *plainly || all).map(|(row, _)| row).collect()
 }
 
 /// The rows of a session by the periods that its stamps count.
@@ -293,8 +211,6 @@ struct Counted {
     rows: std::ops::Range<usize>,
     /// Period that each row belongs to, from 0; each row has one of its own.
     period: Vec<u64>,
-    /// Periods without a row.
-    lacking: u64,
 }
 
 /// Counts the periods of each session along its stamps with a phase-locked loop, so that their scatter does not add up.
@@ -319,8 +235,7 @@ fn counted(log: &Log, period_s: f64) -> impl Iterator<Item = Counted> + '_ {
             most = most.max(median_of(&mut around(k)));
             k as u64 + most as u64
         });
-        let period: Vec<u64> = period.collect();
-        Counted { lacking: period[period.len() - 1] - (rows.len() as u64 - 1), rows, period }
+        Counted { period: period.collect(), rows }
     })
 }
 
@@ -356,7 +271,7 @@ fn jitter(log: &mut Log, period: f64, findings: &mut Findings) {
     });
     let sessions: Vec<Counted> = counted(log, period).collect();
     let Some(time) = log.get_mut(Quantity::Time) else { return };
-    for Counted { rows, period, .. } in sessions {
+    for Counted { rows, period } in sessions {
         let (from, to) = (time[rows.start], time[rows.end - 1]);
         let last = period[period.len() - 1].max(1) as f64;
         for (row, period) in rows.zip(period) {
@@ -366,8 +281,8 @@ fn jitter(log: &mut Log, period: f64, findings: &mut Findings) {
 }
 
 /// A period or a speed that does not exist: a unit of time taken for another.
-fn scale(log: &mut Log, period: f64, findings: &mut Findings) {
-    let (Some(time), Some(generator)) = (log.get(Quantity::Time), log.get(Quantity::Generator)) else { return };
+fn scale(log: &Log, period: f64, columns: &[MappedColumn], findings: &mut Findings) -> Result<(), Refusal> {
+    let (Some(time), Some(generator)) = (log.get(Quantity::Time), log.get(Quantity::Generator)) else { return Ok(()) };
     let mut speeds: Vec<f64> = (1..time.len())
         .filter(|row| log.continues(*row) && time[*row] > time[*row - 1])
         .map(|row| (turned(generator, row) / (time[row] - time[row - 1])).abs())
@@ -375,7 +290,8 @@ fn scale(log: &mut Log, period: f64, findings: &mut Findings) {
         .collect();
     let (speed, fastest) = (median_of(&mut speeds), quantile_of(&mut speeds, 0.95));
     let lasts_s = period * time.len() as f64;
-    let slower = |limits: (f64, f64, f64)| period > limits.0 && lasts_s > limits.1 && fastest < limits.2;
+    let column = columns.iter().find(|column| column.quantity == Quantity::Time && !column.said);
+    let creeps = column.filter(|_| period > CREEPS.0 && lasts_s > CREEPS.1 && fastest < CREEPS.2);
     let moves = || (1..time.len()).filter(|row| log.continues(*row)).map(|row| turned(generator, row));
     let way = |sign: f64| moves().map(|by| (sign * by).max(0.0)).sum::<f64>();
     let (there, back) = (way(1.0), way(-1.0));
@@ -384,37 +300,26 @@ fn scale(log: &mut Log, period: f64, findings: &mut Findings) {
     let changes = (2..time.len()).filter(|row| log.continues(*row) && log.continues(row - 1));
     let change = changes.map(|row| (turned(generator, row) - turned(generator, row - 1)).abs()).fold(0.0, f64::max);
     let smoothly = change < SMOOTHLY * fastest * period;
-    let in_milliseconds = to_and_fro && smoothly && slower(CREEPS_TO_AND_FRO);
-    let creeps = slower(CREEPS) || in_milliseconds;
+    if let Some(column) = creeps.filter(|_| to_and_fro && smoothly) {
+        let (column, rows, hours) = (column.name.clone(), time.len(), lasts_s / 3600.0);
+        return Err(Refusal::Milliseconds { column, rows, period, hours, speed: fastest });
+    }
     let what = if !(PERIODS_S[0]..=PERIODS_S[1]).contains(&period) {
         format!("a sample period of {period:e} s is not plausible")
     } else if speed > FASTEST_RAD_S {
         format!("a generator speed of {speed:.0} rad/s is not plausible")
-    } else if creeps {
-        format!(
-            "{} rows {period:.3} s apart, {:.1} hours in which the generator hardly exceeds {fastest:.3} rad/s, are \
-             milliseconds rather than seconds",
-            time.len(),
-            lasts_s / 3600.0
-        )
     } else {
-        return;
-    };
-    let (treatment, then) = if in_milliseconds {
-        (Treatment::Repaired, ", as it takes its speed and turns round over many rows: time was divided by 1000")
-    } else {
-        (Treatment::Kept, ": is the unit of time right?")
+        return Ok(());
     };
     let all = log.fault(FaultName::ClockError, 0..log.len());
-    findings.add(all, Quantity::Time, treatment, |_| what + then);
-    if in_milliseconds {
-        log.get_mut(Quantity::Time).into_iter().flatten().for_each(|time| *time /= MILLI);
-    }
+    findings.add(all, Quantity::Time, Treatment::Kept, |_| what + ": is the unit of time right?");
+    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measurement::columns::{Reading, Unit};
 
     /// A motor that goes to and fro, read every 2 ms; rows of `stamp(row)`, which gives none where the row is missing.
     fn log(rows: usize, mut stamp: impl FnMut(usize) -> Option<f64>) -> Log {
@@ -436,7 +341,7 @@ mod tests {
 
     fn missing(mut log: Log) -> u64 {
         let mut findings = Findings::default();
-        check(&mut log, &mut findings);
+        check(&mut log, &[], &mut findings).unwrap();
         findings.faults.iter().filter(|fault| fault.name == FaultName::MissingSamples).map(|fault| fault.rows).sum()
     }
 
@@ -457,18 +362,13 @@ mod tests {
     }
 
     #[test]
-    fn rows_lost_in_long_gaps_are_told_where_the_motion_goes_on_and_sessions_are_none() {
-        // Holes of 3, 25 and 40 rows, and a session that begins a minute later.
-        let mut found = log(12_000, |row| {
-            let lost =
-                [(1500, 3), (2500, 40), (4000, 40), (5200, 25)].iter().any(|(at, n)| (*at..at + n).contains(&row));
+    fn rows_lost_within_a_session_are_counted_and_sessions_are_none() {
+        // Holes of 3 and 8 rows; one of 40 begins a session, as a minute does.
+        let found = log(12_000, |row| {
+            let lost = [(1500, 3), (2500, 40), (4000, 8)].iter().any(|(at, n)| (*at..at + n).contains(&row));
             (!lost).then_some(0.002 * row as f64 + if row >= 7000 { 60.0 } else { 0.0 })
         });
-        assert_eq!(missing(found.clone()), 108);
-        // A bench that stands between its runs, and logs nothing then.
-        let rests = |row: usize| f64::from(u8::try_from(row / 3000).unwrap_or(9));
-        found = log(12_000, |row| Some(0.002 * row as f64 + 0.1 * rests(row)));
-        assert_eq!(missing(found), 0);
+        assert_eq!(missing(found), 11);
     }
 
     #[test]
@@ -494,7 +394,7 @@ mod tests {
             (row % 40 != 20).then_some(stamp)
         });
         let mut findings = Findings::default();
-        check(&mut log, &mut findings);
+        check(&mut log, &[], &mut findings).unwrap();
         assert!(findings.faults.iter().any(|fault| fault.name == FaultName::ClockError), "{:?}", findings.faults);
         let (time, generator) = (log.get(Quantity::Time).unwrap(), log.get(Quantity::Generator).unwrap());
         let off = |row: usize| (20.0 * (0.5 * time[row]).sin() - generator[row]).abs() / 10.0;
@@ -503,18 +403,23 @@ mod tests {
     }
 
     #[test]
-    fn milliseconds_read_as_seconds_are_told_by_a_motor_that_turns_round_slowly() {
-        let mut findings = Findings::default();
+    fn milliseconds_read_as_seconds_are_refused_where_a_motor_turns_round_slowly_and_nobody_says_seconds() {
+        let time = |said: bool| {
+            let (quantity, name, unit) = (Quantity::Time, "t".to_owned(), Unit::Second);
+            [MappedColumn { quantity, name, place: 0, unit, reading: Reading::of(unit), said }]
+        };
         let mut fast = log(9000, |row| Some(2.0 * row as f64));
-        check(&mut fast, &mut findings);
-        assert_eq!((findings.faults.len(), findings.faults[0].treatment), (1, Treatment::Repaired), "{findings:?}");
-        assert!((fast.get(Quantity::Time).unwrap()[500] - 1.0).abs() < 1e-9);
+        let refused = check(&mut fast, &time(false), &mut Findings::default()).unwrap_err().to_string();
+        assert!(refused.ends_with("--columns time=t:ms, or time=t:s if the motor creeps"), "{refused}");
+        let mut findings = Findings::default();
+        check(&mut fast, &time(true), &mut findings).unwrap();
+        assert!(findings.faults.is_empty() && fast.get(Quantity::Time).unwrap()[500] == 1000.0, "{findings:?}");
         // A bench that creeps turns round within a row, and is what it is.
         let mut slow = log(9000, |row| Some(2.0 * row as f64));
         let to_and_fro = |row: usize| 0.1 * if row % 4000 < 2000 { row % 4000 } else { 4000 - row % 4000 } as f64;
         slow.put(Quantity::Generator, (0..9000).map(to_and_fro).collect());
         let mut findings = Findings::default();
-        check(&mut slow, &mut findings);
+        check(&mut slow, &time(false), &mut findings).unwrap();
         assert!(findings.faults.is_empty(), "{findings:?}");
     }
 }

@@ -6,7 +6,7 @@
 //! | found | done |
 //! |---|---|
 //! | no table, no such column, text for a number, a row too short or too long | error |
-//! | under 16 rows, nothing moves, more than half frozen, units that are ambiguous | error |
+//! | under 16 rows, nothing moves, more than half frozen | error |
 //! | torque, temperature, orientation or time missing in up to 10 rows in a row | filled by a straight line |
 //! | an angle missing, a longer hole, a last line that breaks off | rows left out |
 //! | a channel other than the angles missing in over half of the rows | channel left out |
@@ -14,7 +14,8 @@
 //! | rows out of order or repeated | rows left out |
 //! | clock set back | new session |
 //! | clock too coarse, stamps that jitter while the motion does not | rows spaced evenly |
-//! | a unit, sign or exchange of the angles that the ratio or a turn proves | converted |
+//! | a unit or sign of the angles that the ratio contradicts | error |
+//! | generator and output exchanged | put right |
 //! | a torque or a temperature that cannot be in the unit given | left out, with the units that it may be in |
 //! | output or generator frozen | rows left out |
 //! | torque frozen | rows left out, or channel |
@@ -46,7 +47,6 @@ pub(super) mod stalls;
 mod state;
 pub(super) mod steps;
 pub(super) mod units;
-pub(super) mod wrap;
 
 use std::ops::Range;
 

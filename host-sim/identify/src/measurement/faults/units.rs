@@ -1,8 +1,10 @@
 //! Units, signs and columns taken for others.
 //!
-//! An angle is converted where something proves its unit: the ratio, which is the user's word, or the turn after which
-//! a column begins anew. A torque or a temperature that cannot be in the unit given is in another one, but its size
-//! does not say in which: it is left out, with the units that it may have and how to say them.
+//! No size is changed by how well it fits. Angles that contradict the ratio, which is the user's word, are refused with
+//! the mapping that mends them; columns that are exchanged are put right. A torque or a temperature that cannot be in
+//! the unit given is left out, with the units that it may have and how to say them.
+
+use std::f64::consts::TAU;
 
 use super::{Findings, LineFit, extent};
 use crate::measurement::columns::{MappedColumn, Quantity, Reading, Unit};
@@ -10,6 +12,7 @@ use crate::measurement::fault::{FaultName, Treatment};
 use crate::measurement::gear::Gear;
 use crate::measurement::log::{FEWEST_ROWS, Log};
 use crate::measurement::refusal::Refusal;
+use crate::measurement::rollover::begins_anew;
 use flexspline_base::robust::{least_and_most, median_of, quantile_of, sampled};
 
 /// The output must have turned by so much, by the generator or by itself, before the ratio is judged, rad. *Source*:
@@ -32,7 +35,7 @@ const SPREADS_RAD: [f64; 2] = [0.174_5, 1e-3 / 206_265.0];
 /// Temperatures at which a drive exists, °C. *Guess*: cryogenic benches stop at −180, lubricants before 180.
 const TEMPERATURES_C: [f64; 2] = [-180.0, 180.0];
 
-/// Finds and repairs units; an error says what cannot be decided.
+/// Finds units that cannot be those given; an error says what has to be decided.
 pub(in crate::measurement) fn check(
     log: &mut Log,
     columns: &[MappedColumn],
@@ -46,21 +49,6 @@ pub(in crate::measurement) fn check(
     } else {
         error_size(log, columns)
     }
-}
-
-/// Converts both angles.
-pub(in crate::measurement) fn both_in_degrees(log: &mut Log, scale: f64, findings: &mut Findings) {
-    for channel in [Quantity::Generator, Quantity::Output, Quantity::Error] {
-        rescale(log, channel, scale);
-    }
-    let what = "generator and output are both in degrees: so the nominal model explains the error to the noise, and \
-                not in radians; they were converted";
-    mismatch(log, None, Treatment::Repaired, what.to_owned(), findings);
-}
-
-/// Multiplies a column, where there is one.
-fn rescale(log: &mut Log, channel: Quantity, scale: f64) {
-    log.get_mut(channel).into_iter().flatten().for_each(|value| *value *= scale);
 }
 
 /// Reports a unit, a sign or a column that was taken for another.
@@ -181,7 +169,8 @@ fn ratio(log: &mut Log, columns: &[MappedColumn], gear: &Gear, findings: &mut Fi
         findings.notes.push("too little motion to judge units by the ratio".to_owned());
         return Ok(());
     }
-    let [(generator, _), (output, _)] = [Quantity::Generator, Quantity::Output].map(|channel| column(columns, channel));
+    let [(generator, _), (output, output_unit)] =
+        [Quantity::Generator, Quantity::Output].map(|channel| column(columns, channel));
     let seen = format!(
         "{output} moves by {slope:.6} of {generator}, where the ratio {} asks for {:.6}",
         gear.ratio,
@@ -199,36 +188,25 @@ fn ratio(log: &mut Log, columns: &[MappedColumn], gear: &Gear, findings: &mut Fi
         return Err(Refusal::OtherWheel { seen, ratio: other });
     }
     if (found + 1.0).abs() <= 0.1 {
-        let what = format!("{seen}: the output counts the other way, and was turned round");
-        mismatch(log, Some(Quantity::Output), Treatment::Repaired, what, findings);
-        rescale(log, Quantity::Output, -1.0);
-        return Ok(());
+        let readings = vec![format!("--columns output={output}:-{output_unit}"), format!("the ratio {}", -gear.ratio)];
+        return Err(Refusal::OtherReading { seen, why: "the output counts the other way", readings });
     }
-    // One column in a unit other than the one given: proved by the ratio if one reading alone gives it.
-    let mut fits: Vec<(Quantity, Unit, f64)> = Vec::new();
+    // A column in a unit other than the one given, by the ratio or by the turn after which it begins anew.
+    let mut readings = Vec::new();
     for channel in [Quantity::Generator, Quantity::Output] {
-        let (_, given) = column(columns, channel);
-        for candidate in Unit::ANGLES.into_iter().filter(|candidate| *candidate != given) {
-            let scale = candidate.factor() / given.factor();
+        let (name, given) = column(columns, channel);
+        for unit in Unit::ANGLES.into_iter().filter(|unit| *unit != given) {
+            let scale = unit.factor() / given.factor();
             let ratio = if channel == Quantity::Generator { scale } else { scale.recip() };
-            if (found / ratio - 1.0).abs() <= SAME {
-                fits.push((channel, candidate, scale));
+            let within = |values: &[f64]| begins_anew(values, &[TAU / scale], false, None).is_some();
+            if (found / ratio - 1.0).abs() <= SAME || log.get(channel).is_some_and(within) {
+                readings.push(format!("--columns {channel}={name}:{unit}"));
             }
         }
     }
-    match fits[..] {
-        [(channel, candidate, scale)] => {
-            let (column, given) = column(columns, channel);
-            let what = format!("{seen}: {column} is in {candidate}, not in {given}, and was converted");
-            mismatch(log, Some(channel), Treatment::Repaired, what, findings);
-            rescale(log, channel, scale);
-            return Ok(());
-        }
-        [_, _, ..] => {
-            let say = fits.iter().map(|(channel, unit, _)| format!("{channel}={}:{unit}", column(columns, *channel).0));
-            return Err(Refusal::OneOfTwoUnits { seen, readings: say.collect() });
-        }
-        [] => {}
+    if !readings.is_empty() {
+        let why = "one of the two is in another unit, and no size says which for certain";
+        return Err(Refusal::OtherReading { seen, why, readings });
     }
     // Clearance and wind-up of a small motion change the ratio by more than units are apart; none of them is what was
     // found.
@@ -340,10 +318,13 @@ mod tests {
     }
 
     #[test]
-    fn an_angle_is_converted_where_the_ratio_proves_its_unit_alone() {
+    fn an_angle_in_another_unit_is_refused_with_the_mapping_that_mends_it() {
         let deg = 1f64.to_degrees();
-        let found = read("", 1.0, 0.0, [deg, 1.0]).unwrap();
-        assert!(matches!(unit_fault(&found), Some((Some(Quantity::Generator), Treatment::Repaired, _))));
+        let said = read("", 1.0, 0.0, [deg, 1.0]).unwrap_err();
+        assert!(said.ends_with("for certain; allowed: --columns generator=generator_rad:deg"), "{said}");
+        assert_eq!(unit_fault(&read("generator=generator_rad:deg", 1.0, 0.0, [deg, 1.0]).unwrap()), None);
+        let said = read("", 1.0, 0.0, [1.0, -1.0]).unwrap_err();
+        assert!(said.ends_with("allowed: --columns output=output_rad:-rad, or the ratio -50"), "{said}");
         // Both are in degrees, one is said to be in radians; or both are in radians, and one is said to be in degrees:
         // no ratio decides which.
         for (angles, columns) in [
@@ -351,8 +332,8 @@ mod tests {
             ([1.0; 2], "generator=generator_rad:deg,output=output_rad:rad"),
         ] {
             let said = read(columns, 1.0, 0.0, angles).unwrap_err();
-            assert!(said.contains("does not say which") && said.contains("generator=generator_rad:"), "{said}");
-            assert!(said.contains("or output=output_rad:"), "{said}");
+            assert!(said.contains("no size says which") && said.contains("generator=generator_rad:"), "{said}");
+            assert!(said.contains("or --columns output=output_rad:"), "{said}");
         }
     }
 

@@ -107,10 +107,13 @@ impl GuideSection {
     /// Takes a row; says what of the section does not allow it.
     fn take(&mut self, line: &str, number_of_line: u64, session: u32) -> Result<(), TableProblem> {
         let Some((header, places)) = &self.table else { return Ok(()) };
-        let fields = header.fields(line);
-        if fields[0].parse::<u64>().is_err() {
+        if !line.trim_start_matches('"').starts_with(|first: char| first.is_ascii_digit()) {
             return Ok(());
         }
+        let problem = |what: String| TableProblem { line: number_of_line, what };
+        let fields = header.fields(line).ok_or_else(|| {
+            problem("more fields than names; allowed: decimals behind a point, or behind a comma in quotes".to_owned())
+        })?;
         let field = |k: usize| places[k].and_then(|place| fields.get(place)).map_or("", String::as_str);
         let number_of = |k: usize| number(field(k));
         let of_a_star = field(1).eq_ignore_ascii_case("mount") && number_of(5).is_none_or(|code| code == 0.0);
@@ -118,7 +121,6 @@ impl GuideSection {
             self.lost += 1;
             return Ok(());
         };
-        let problem = |what: String| TableProblem { line: number_of_line, what };
         let scale = self.scale.ok_or_else(|| {
             problem(
                 "no \"Pixel scale = ... arc-sec/px\" above; allowed: a guide log that says its pixel scale".to_owned(),
@@ -273,7 +275,7 @@ fn of_sections(sections: &[GuideSection], stands: &[f64], ratio: f64, further: V
 pub(super) fn columns() -> Vec<MappedColumn> {
     let column = |(place, (quantity, name, unit)): (usize, (Quantity, usize, Unit))| {
         let name = COLUMNS[name].to_owned();
-        MappedColumn { quantity, name, place, unit, reading: Reading::of(unit) }
+        MappedColumn { quantity, name, place, unit, reading: Reading::of(unit), said: true }
     };
     let columns =
         [(Quantity::Time, 0, Unit::Second), (Quantity::Generator, 0, Unit::Radian), (Quantity::Error, 2, Unit::Radian)];

@@ -270,7 +270,7 @@ fn with_commas(text: &str) -> String {
 }
 
 #[test]
-fn decimal_commas_are_read_as_points_however_fields_are_parted() {
+fn decimal_commas_are_read_as_points_unless_commas_part_the_fields() {
     for part in [
         PART,
         Part { guided: false, pointing: "Dec = -12.5 deg, Hour angle = 1.00 hr", declination_deg: -12.5, ..PART },
@@ -293,7 +293,9 @@ fn decimal_commas_are_read_as_points_however_fields_are_parted() {
             };
             line.split(',').map(field).collect::<Vec<_>>().join(",")
         });
-        for other in [commas, semicolons, quoted] {
+        let refused = try_night(&commas).unwrap_err().to_string();
+        assert!(refused.contains("more fields than names; allowed: decimals behind a point"), "{refused}");
+        for other in [semicolons, quoted] {
             let read = read_night(&other);
             assert_eq!((&read.sessions, &read.notes), (&due.sessions, &due.notes));
         }

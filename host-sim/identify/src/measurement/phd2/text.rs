@@ -1,11 +1,8 @@
 //! The text of a guide log: what a line says of a section, and the fields of its rows.
 //!
-//! PHD2 writes a point in its numbers, but has written the comma of the system's locale (its issue 453: unquoted,
-//! between fields that commas part), and a spreadsheet that saves a log again writes semicolons or quotes.
+//! PHD2 writes a point in its numbers; a spreadsheet that saves a log again may write commas, between semicolons or in
+//! quotes.
 
-/// Columns whose numbers have decimals.
-const DECIMAL: [&str; 8] =
-    ["Time", "dx", "dy", "RARawDistance", "DECRawDistance", "RAGuideDistance", "DECGuideDistance", "SNR"];
 /// What parts the fields of a row.
 const SEPARATORS: [char; 3] = [',', ';', '\t'];
 
@@ -74,43 +71,21 @@ impl Header {
         self.names.iter().position(|known| known == name)
     }
 
-    /// The fields of a row, each under its name.
-    pub fn fields(&self, line: &str) -> Vec<String> {
+    /// The fields of a row, each under its name; none where there are more than the names allow, as numbers with
+    /// decimal commas between commas make them.
+    pub fn fields(&self, line: &str) -> Option<Vec<String>> {
         let fields = split(line, self.separator);
         // One more than names says why a star was lost.
-        if self.separator != ',' || fields.len() <= self.names.len() + 1 {
-            return fields;
-        }
-        // Numbers with a comma of their own stand in two fields.
-        let mut joined: Vec<String> = Vec::new();
-        let mut parts = fields.into_iter().peekable();
-        while let Some(part) = parts.next() {
-            let decimal = self.names.get(joined.len()).is_some_and(|name| DECIMAL.contains(&name.as_str()));
-            let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
-            let whole = digits(part.trim_start_matches(['-', '+']));
-            match parts.next_if(|next| decimal && whole && digits(next)) {
-                Some(decimals) => joined.push(format!("{part}.{decimals}")),
-                None => joined.push(part),
-            }
-        }
-        joined
+        (fields.len() <= self.names.len() + 1).then_some(fields)
     }
 }
 
 /// The fields of a line, without quotes; what parts them may stand within quotes.
 fn split(line: &str, separator: char) -> Vec<String> {
-    let mut fields = vec![String::new()];
-    let mut quoted = false;
-    for c in line.chars() {
-        if c == '"' {
-            quoted = !quoted;
-        } else if c == separator && !quoted {
-            fields.push(String::new());
-        } else if let Some(field) = fields.last_mut() {
-            field.push(c);
-        }
-    }
-    fields.iter().map(|field| field.trim().to_owned()).collect()
+    let mut form = csv::ReaderBuilder::new();
+    let mut records = form.has_headers(false).delimiter(separator as u8).from_reader(line.as_bytes());
+    let record = records.records().next().and_then(Result::ok).unwrap_or_default();
+    record.iter().map(|field| field.trim().to_owned()).collect()
 }
 
 #[cfg(test)]
@@ -145,15 +120,16 @@ mod tests {
         let names = "Frame,Time,mount,dx,RARawDistance,RADuration,RADirection,StarMass,SNR,ErrorCode";
         let plain = ["7", "2.093", "Mount", "-0.5", "0.15", "108", "W", "1702", "28.36", "0"];
         let header = Header::of(names).unwrap();
-        assert_eq!(header.fields("7,2.093,\"Mount\",-0.5,0.15,108,W,1702,28.36,0"), plain);
-        assert_eq!(header.fields("7,2,093,\"Mount\",-0,5,0,15,108,W,1702,28,36,0"), plain);
-        let quoted = header.fields("7,\"2,093\",Mount,\"-0,5\",\"0,15\",108,W,1702,\"28,36\",0");
+        let fields = |line: &str| header.fields(line);
+        assert_eq!(fields("7,2.093,\"Mount\",-0.5,0.15,108,W,1702,28.36,0").unwrap(), plain);
+        assert_eq!(fields("7,2,093,\"Mount\",-0,5,0,15,108,W,1702,28,36,0"), None);
+        let quoted = fields("7,\"2,093\",Mount,\"-0,5\",\"0,15\",108,W,1702,\"28,36\",0").unwrap();
         assert_eq!(quoted.iter().filter_map(|field| number(field)).nth(1), Some(2.093));
-        let lost = header.fields("8,3,1,\"DROP\",,,,,0,0,00,3,\"Star lost, low mass\"");
-        assert_eq!(lost[1..3], ["3.1", "DROP"]);
+        let lost = fields("8,3.1,\"DROP\",,,,,0,0.00,3,\"Star lost, low mass\"").unwrap();
         assert_eq!(lost[9..], ["3", "Star lost, low mass"]);
         let header = Header::of(&names.replace(',', ";")).unwrap();
-        assert_eq!(number(&header.fields("7;2,093;Mount;-0,5;0,15;108;W;1702;28,36;0")[4]), Some(0.15));
+        let semicolons = header.fields("7;2,093;Mount;-0,5;0,15;108;W;1702;28,36;0").unwrap();
+        assert_eq!(number(&semicolons[4]), Some(0.15));
         assert!(Header::of("Frames lost").is_none());
     }
 }

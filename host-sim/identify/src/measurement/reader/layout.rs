@@ -130,18 +130,6 @@ pub struct Layout {
     pub(super) kinds: Vec<CellKind>,
     /// The form of the times of a column.
     pub(super) forms: Vec<Option<TimeForm>>,
-    /// How a time is put together of several columns.
-    pub(super) stamp: Option<Joined>,
-}
-
-/// A time that stands in several columns.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Joined {
-    /// Texts from a column of dates on: with the clock, and with AM or PM if there are `three`. The whole is in the
-    /// column of the clock.
-    Texts { date: usize, three: bool },
-    /// Whole seconds, and in the next column parts of one, which are added times `factor`.
-    Seconds { whole: usize, factor: f64 },
 }
 
 /// Kinds of field.
@@ -307,40 +295,25 @@ impl Layout {
         Err(TableProblem { line: *number, what })
     }
 
-    /// Finds the forms of times, and times that stand in several columns.
+    /// Finds the forms of times; a note says how to put together one that stands in two columns.
     fn find_times(&mut self, rows: &[HeadLine], notes: &mut Vec<String>) {
         let width = self.kinds.len();
         let column = |k: usize| rows.iter().filter_map(move |row| row.fields.get(k)).map(String::as_str);
-        let kind = |k: usize| self.kinds.get(k).copied().unwrap_or(CellKind::Nothing);
         let timed = |k: usize| column(k).filter(|text| CellKind::of(text, self.decimal_comma) == CellKind::Time);
-        self.forms = (0..width).map(|k| if kind(k) == CellKind::Time { clock::form(timed(k)) } else { None }).collect();
-        if let Some(date) = (0..width).find(|k| kind(*k) == CellKind::Date && kind(k + 1) == CellKind::Time) {
-            let half = |text: &str| text.eq_ignore_ascii_case("am") || text.eq_ignore_ascii_case("pm");
-            let joined = Joined::Texts { date, three: kind(date + 2) == CellKind::Text && column(date + 2).all(half) };
-            let whole: Vec<String> = rows
-                .iter()
-                .filter_map(|row| joined.text(date + 1, |k| row.fields.get(k).map(String::as_str)))
-                .collect();
-            self.forms[date + 1] = clock::form(whole.iter().map(String::as_str));
-            self.stamp = Some(joined);
-            notes.push(format!(
-                "date and time stand in columns {} and {}: they are read together, as column {}",
-                date + 1,
-                date + 2,
-                date + 2
-            ));
-            return;
-        }
+        let form = |k: usize| if self.kinds[k] == CellKind::Time { clock::form(timed(k)) } else { None };
+        self.forms = (0..width).map(form).collect();
         let numbers = |k: usize| column(k).filter_map(|text| text.parse::<f64>().ok()).collect::<Vec<f64>>();
-        let found = (0..width).find_map(|k| Some((k, parts_of_a_second(&numbers(k), &numbers(k + 1))?)));
-        if let Some((whole, (factor, unit))) = found {
-            self.stamp = Some(Joined::Seconds { whole, factor });
+        for k in 1..width {
+            let whole = if self.kinds[k - 1..=k] == [CellKind::Date, CellKind::Time] {
+                "pd.to_datetime(df[DATE] + \" \" + df[TIME])".to_owned()
+            } else if let Some(of_a_second) = parts_of_a_second(&numbers(k - 1), &numbers(k)) {
+                format!("df[SECONDS] + df[PARTS] / {of_a_second:e}")
+            } else {
+                continue;
+            };
             notes.push(format!(
-                "column {} has seconds since 1970, column {} what is to be added in {unit}: they are read together, as \
-                 column {}",
-                whole + 1,
-                whole + 2,
-                whole + 1
+                "the time stands in columns {k} and {}, which are not read together; one of both in pandas: {whole}",
+                k + 1
             ));
         }
     }
@@ -380,21 +353,8 @@ impl Layout {
     }
 }
 
-impl Joined {
-    /// The whole time of a row as a text, if it is that of the column at `place`.
-    pub(super) fn text<'a>(self, place: usize, field: impl Fn(usize) -> Option<&'a str>) -> Option<String> {
-        match self {
-            Joined::Texts { date, three } if place == date + 1 => {
-                let parts: Option<Vec<&str>> = (date..date + 2 + usize::from(three)).map(field).collect();
-                parts.map(|parts| parts.join(" "))
-            }
-            _ => None,
-        }
-    }
-}
-
-/// Whether a column has seconds since 1970 and the next one what is to be added: its size, s, and its unit.
-fn parts_of_a_second(seconds: &[f64], parts: &[f64]) -> Option<(f64, &'static str)> {
+/// Whether a column has seconds since 1970 and the next one parts of a second: how many of these make one.
+fn parts_of_a_second(seconds: &[f64], parts: &[f64]) -> Option<f64> {
     let is_whole = |values: &[f64]| values.iter().all(|value| value.fract() == 0.0);
     let sound = seconds.len() > 1
         && seconds.len() == parts.len()
@@ -405,9 +365,8 @@ fn parts_of_a_second(seconds: &[f64], parts: &[f64]) -> Option<(f64, &'static st
     let least = parts.iter().copied().fold(f64::INFINITY, f64::min);
     let begins_anew = seconds.windows(2).zip(parts.windows(2)).any(|(s, part)| s[1] > s[0] && part[1] < part[0]);
     // The smallest unit of which a second has more than the largest part, if a second is used up.
-    let units = [(1e3, "ms"), (1e6, "us"), (1e9, "ns")].into_iter().filter(|_| sound && begins_anew && least >= 0.0);
-    let mut fits = units.filter(|(parts, _)| most < *parts && most >= 0.5 * parts);
-    fits.next().map(|(parts, unit)| (1.0 / parts, unit))
+    let fits = |parts: &f64| sound && begins_anew && least >= 0.0 && most < *parts && most >= 0.5 * parts;
+    [1e3, 1e6, 1e9].into_iter().find(fits)
 }
 
 /// Channels with a time column each.

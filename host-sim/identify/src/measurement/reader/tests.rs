@@ -289,7 +289,7 @@ fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
                 [vec!["05/04/2025".to_owned(), half], plain(k)[1..].to_vec()].concat()
             })
             .into(),
-            Read(ROWS, "read together"),
+            Read(ROWS, "pd.to_datetime"),
         ),
         (
             "date and clock apart",
@@ -297,7 +297,7 @@ fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
                 [vec!["2025-05-04".to_owned(), clock(50_000.0, k)], plain(k)[1..].to_vec()].concat()
             })
             .into(),
-            Read(ROWS, "read together"),
+            Read(ROWS, "pd.to_datetime"),
         ),
         (
             "across midnight with a date apart",
@@ -306,7 +306,7 @@ fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
                 [vec![date.to_owned(), clock(86_390.0, k)], plain(k)[1..].to_vec()].concat()
             })
             .into(),
-            Read(ROWS, "read together"),
+            Read(ROWS, "pd.to_datetime"),
         ),
         (
             "names of months",
@@ -339,8 +339,8 @@ fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
             Read(ROWS, ""),
         ),
         (
-            "seconds and nanoseconds, no names",
-            file("", ",", |k| {
+            "seconds and nanoseconds",
+            file("stamp.sec,stamp.nsec,motor_deg,joint_deg,torque_Nm\n", ",", |k| {
                 let ns = 50_000_000 * k as u64;
                 [
                     vec![(1_700_000_000 + ns / 1_000_000_000).to_string(), (ns % 1_000_000_000).to_string()],
@@ -349,7 +349,7 @@ fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
                 .concat()
             })
             .into(),
-            Read(ROWS, "to be added in ns"),
+            Read(ROWS, "df[SECONDS] + df[PARTS] / 1e9"),
         ),
         (
             "seconds and microseconds",
@@ -362,7 +362,7 @@ fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
                 .concat()
             })
             .into(),
-            Read(ROWS, "to be added in us"),
+            Read(ROWS, "df[SECONDS] + df[PARTS] / 1e6"),
         ),
         (
             "newest first",
