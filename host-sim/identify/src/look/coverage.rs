@@ -6,9 +6,6 @@ use serde::Serialize;
 
 use crate::measurement::{Quantity, ReadRows, least_and_most, quantile_of, sampled};
 
-/// Parts of a turn of the output that are counted.
-const PARTS: usize = 36;
-
 /// The turns, loads, temperatures and speeds of the rows.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Coverage {
@@ -16,10 +13,6 @@ pub struct Coverage {
     pub generator_turns: f64,
     /// Turns of the output.
     pub output_turns: f64,
-    /// Rows in each tenth of a radian, more or less (a 36th) of the output's turn that move forward, and backward.
-    pub rows_forward: Vec<usize>,
-    /// Rows in each part of the output's turn that move backward.
-    pub rows_backward: Vec<usize>,
     /// Shares of the rows that move the generator forward, backward, and not.
     pub directions: [f64; 3],
     /// Least and largest torque as mapped, N·m.
@@ -41,15 +34,13 @@ pub(super) fn of(read: &[ReadRows]) -> Option<Coverage> {
     }
     let range = |values: &[f64]| least_and_most(values.iter().copied().filter(|value| value.is_finite()));
     let turns = |values: &[f64]| ((range(values).1 - range(values).0) / TAU).max(0.0);
-    // How far the generator moves into a row, and where the output is then.
-    let mut moved: Vec<(f64, Option<f64>)> = Vec::new();
-    let mut speeds = Vec::new();
+    // How far the generator moves into a row.
+    let (mut moved, mut speeds) = (Vec::new(), Vec::new());
     for log in read.iter().map(|rows| &rows.log) {
-        let (generator, output) = (log.get(Quantity::Generator).unwrap_or_default(), log.get(Quantity::Output));
-        let time = log.get(Quantity::Time);
+        let (generator, time) = (log.get(Quantity::Generator).unwrap_or_default(), log.get(Quantity::Time));
         for row in (1..generator.len()).filter(|row| log.continues(*row)) {
-            let step = generator[row] - generator[row - 1];
-            moved.push((step, output.map(|output| output[row])));
+            let step: f64 = generator[row] - generator[row - 1];
+            moved.push(step);
             let passed = time.map_or(0.0, |time| time[row] - time[row - 1]);
             if passed > 0.0 {
                 speeds.push(step.abs() / passed * 60.0 / TAU);
@@ -57,18 +48,12 @@ pub(super) fn of(read: &[ReadRows]) -> Option<Coverage> {
         }
     }
     // What stands moves by less than a hundredth of what moves usually.
-    let mut steps: Vec<f64> = sampled(&moved.iter().map(|(step, _)| step.abs()).collect::<Vec<_>>());
-    let still = 0.01 * quantile_of(&mut steps, 0.9);
-    let mut rows_of_parts = [vec![0; PARTS], vec![0; PARTS]];
+    let still = 0.01 * quantile_of(&mut sampled(&moved.iter().map(|step| step.abs()).collect::<Vec<_>>()), 0.9);
     let mut directions = [0.0; 3];
-    for (step, output) in &moved {
+    for step in &moved {
         let way = usize::from(*step < -still) + 2 * usize::from(step.abs() <= still);
         directions[way] += 1.0 / moved.len() as f64;
-        if let (Some(output), Some(rows)) = (output, rows_of_parts.get_mut(way)) {
-            rows[((output / TAU).rem_euclid(1.0) * PARTS as f64) as usize % PARTS] += 1;
-        }
     }
-    let [rows_forward, rows_backward] = rows_of_parts;
     let limits = |quantity: Quantity| {
         let values = column(quantity);
         (!values.is_empty()).then(|| range(&values)).map(|(least, most)| [least, most])
@@ -78,8 +63,6 @@ pub(super) fn of(read: &[ReadRows]) -> Option<Coverage> {
     Some(Coverage {
         generator_turns: turns(&generator),
         output_turns: turns(&output),
-        rows_forward,
-        rows_backward,
         directions,
         torque_n_m: limits(Quantity::Torque),
         temperature_c: limits(Quantity::Temperature),

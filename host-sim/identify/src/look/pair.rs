@@ -8,7 +8,7 @@ use std::cmp::Ordering;
 use std::f64::consts::TAU;
 
 use super::relation::{Slope, slope};
-use super::turns::{Units, one_shaft, settle, units_of_pair};
+use super::turns::{Units, on_one_shaft, settle, units_of_pair};
 use super::{Guess, Rival, Role};
 use crate::measurement::{Family, Unit, least_and_most};
 
@@ -91,7 +91,7 @@ pub(super) fn pair(guesses: &mut [Guess], names: &[String], notes: &mut Vec<Stri
     let counts = rivals.len();
     for other in others {
         let level = other.rank.reasons[..2] == best.rank.reasons[..2];
-        let same = |a: usize, b: usize| a == b || one_shaft(&guesses[a], &guesses[b]);
+        let same = |a: usize, b: usize| a == b || on_one_shaft(&guesses[a], &guesses[b]).is_some();
         // What shows the same two shafts once more is no rival.
         if level && !(same(other.generator, g) && same(other.output, o)) {
             rivals.push(rival(other, &other.units[0], names, best.rank.before(&other.rank).to_owned()));

@@ -1,13 +1,10 @@
-//! What was found, for a terminal.
+//! The result as text for a terminal.
 
 use std::fmt::Write as _;
 
 use super::{Looked, Role, TimeKind};
 
-/// Heights of a bar.
-const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
-
-/// What was found, as text.
+/// The result as text.
 #[must_use]
 pub fn text(looked: &Looked) -> String {
     let mut text = String::new();
@@ -70,11 +67,6 @@ pub fn text(looked: &Looked) -> String {
             100.0 * backward,
             100.0 * still
         );
-        for (name, rows) in [("forward ", &coverage.rows_forward), ("backward", &coverage.rows_backward)] {
-            if rows.iter().any(|rows| *rows > 0) {
-                let _ = writeln!(text, "  output turn, {name} 0° {} 360°", bars(rows));
-            }
-        }
         if let Some([low, high]) = coverage.torque_n_m {
             let _ = writeln!(text, "torque: {low:.3} to {high:.3} N.m, positive where it turns the output forward");
         }
@@ -89,10 +81,4 @@ pub fn text(looked: &Looked) -> String {
         let _ = writeln!(text, "note: {note}");
     }
     text
-}
-
-/// A bar for each number; nothing for zero.
-fn bars(rows: &[usize]) -> String {
-    let most = rows.iter().copied().max().unwrap_or(1).max(1);
-    rows.iter().map(|rows| if *rows == 0 { '·' } else { BARS[(rows * BARS.len() - 1) / most] }).collect()
 }

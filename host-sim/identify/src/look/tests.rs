@@ -561,7 +561,7 @@ fn what_is_found_is_said() {
     let coverage = looked.coverage.as_ref().unwrap();
     assert!(coverage.directions[0] > 0.6 && coverage.directions[1] > 0.3 && coverage.temperature_c.is_some());
     assert!((coverage.generator_turns - 0.62 * 1000.0 / TAU).abs() < 0.2, "{}", coverage.generator_turns);
-    assert!(text(&looked).contains("ratio: ") && text(&looked).contains("output turn, forward"));
+    assert!(text(&looked).contains("ratio: ") && text(&looked).contains("% backward"));
     // Time that is counted; files of one form are sessions.
     let counted =
         file("time,motor,load,torque\n", ",", |t, k| with(plain(t, k), 0, format!("{:.3}", 0.004 * k as f64)));

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::relation::{RATIOS, counts_of_a_turn, slope};
+use super::relation::{RATIOS, Slope, counts_of_a_turn, slope};
 use super::{Guess, Role};
 use crate::measurement::{Unit, registers};
 
@@ -23,33 +23,26 @@ pub(super) fn proposed_ratio(found: f64) -> f64 {
 
 /// Counts of a turn, where another column shows the same shaft in a unit of angle.
 pub(super) fn units_of_counts(guesses: &mut [Guess]) {
-    let counts: Vec<usize> = (0..guesses.len())
-        .filter(|k| guesses[*k].unit == Some(Unit::Count) && guesses[*k].counts.is_none() && guesses[*k].moves())
-        .collect();
-    for k in counts {
-        let others: Vec<usize> = (0..guesses.len())
-            .filter(|j| {
-                *j != k && guesses[*j].moves() && guesses[*j].unit != Some(Unit::Count) && !guesses[*j].facts.whole
-            })
-            .filter(|j| !matches!(guesses[*j].role, Role::Time | Role::Speed | Role::Torque | Role::Current))
-            .filter(|j| may_be_one_shaft(&guesses[k], &guesses[*j]))
-            .collect();
-        let mut best: Option<(bool, f64, usize, Unit, f64)> = None;
-        for j in others {
-            let Some(line) = slope(&guesses[k].values, &guesses[j].values, &guesses[k].of_file)
-                .filter(|line| line.left < SAME_SHAFT)
-            else {
-                continue;
-            };
-            let units = guesses[j].unit.map_or(vec![Unit::Radian, Unit::Degree, Unit::Turn], |unit| vec![unit]);
-            for (unit, round) in units.into_iter().flat_map(|unit| [(unit, false), (unit, true)]) {
-                let Some((counts, off)) = counts_of_a_turn(line.slope / unit.factor(), round) else { continue };
-                // A power of two before a round number, then what fits better.
-                if best.is_none_or(|(other, before, ..)| (round, off) < (other, before)) {
-                    best = Some((round, off, j, unit, counts));
-                }
-            }
+    for k in 0..guesses.len() {
+        let counted = &guesses[k];
+        if counted.unit != Some(Unit::Count) || counted.counts.is_some() || !counted.moves() {
+            continue;
         }
+        let readings = (0..guesses.len()).flat_map(|j| {
+            let other = &guesses[j];
+            let angle = !matches!(other.role, Role::Time | Role::Speed | Role::Torque | Role::Current)
+                && other.unit != Some(Unit::Count)
+                && !other.facts.whole;
+            let line = (j != k && angle && other.moves()).then(|| on_one_shaft(counted, other)).flatten();
+            let units = other.unit.map_or(vec![Unit::Radian, Unit::Degree, Unit::Turn], |unit| vec![unit]);
+            let forms = units.into_iter().flat_map(|unit| [(unit, false), (unit, true)]);
+            forms.filter_map(move |(unit, round)| {
+                let (counts, off) = counts_of_a_turn(line?.slope / unit.factor(), round)?;
+                Some((round, off, j, unit, counts))
+            })
+        });
+        // A power of two before a round number, then what fits better.
+        let best = readings.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         if let Some((_, _, j, unit, counts)) = best {
             guesses[k].counts = Some(counts);
             guesses[k]
@@ -61,17 +54,13 @@ pub(super) fn units_of_counts(guesses: &mut [Guess]) {
     }
 }
 
-/// Whether names let two columns show one shaft: not those of motor and output, or of two joints.
-fn may_be_one_shaft(a: &Guess, b: &Guess) -> bool {
+/// The line between two columns that show one shaft; names of motor and output, or of two joints, do not.
+pub(super) fn on_one_shaft(a: &Guess, b: &Guess) -> Option<Slope> {
     let shafts = [a.role, b.role];
     let two_shafts = shafts.contains(&Role::Generator) && shafts.contains(&Role::Output);
     let two_joints = a.said.joint.zip(b.said.joint).is_some_and(|(a, b)| a != b);
-    !two_shafts && !two_joints
-}
-
-/// Whether two columns show one shaft.
-pub(super) fn one_shaft(a: &Guess, b: &Guess) -> bool {
-    may_be_one_shaft(a, b) && slope(&a.values, &b.values, &a.of_file).is_some_and(|line| line.left < SAME_SHAFT)
+    let line = || slope(&a.values, &b.values, &a.of_file);
+    (!two_shafts && !two_joints).then(line).flatten().filter(|line| line.left < SAME_SHAFT)
 }
 
 /// The unit of an angle as it may be.
