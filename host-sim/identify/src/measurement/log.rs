@@ -7,7 +7,8 @@ use std::ops::Range;
 use thiserror::Error;
 
 use super::columns::{ColumnMap, MappedColumn, Quantity};
-use super::fault::{Fault, FaultName};
+use super::fault::{Fault, FaultName, Treatment};
+use super::faults::Findings;
 use super::phd2;
 use super::reader::{Cells, Columns, Layout, Sheet, clock, stamps};
 use flexspline_base::csv_rows::TableProblem;
@@ -124,19 +125,11 @@ pub(super) fn leave_out<T>(values: &mut Vec<T>, drop: &[bool]) {
     });
 }
 
-/// The findings of the reader besides the rows.
-#[derive(Debug)]
-pub(crate) struct LogFindings {
+/// A file as it was read.
+pub(super) struct LogFile {
+    pub log: Log,
     /// The columns in use.
     pub columns: Vec<MappedColumn>,
-    /// The last line, if it broke off.
-    pub broken_off: Option<u64>,
-    /// A cell that is no number, or a row of another width: then these rows are not for use.
-    pub refused: Option<TableProblem>,
-    /// Faults of the order of the rows, which was mended.
-    pub order: Vec<String>,
-    /// Sentences on what was converted, or left out though it may have been meant.
-    pub notes: Vec<String>,
     /// Whether each session has a zero of its own.
     pub own_zeros: bool,
 }
@@ -149,47 +142,55 @@ pub(super) fn read(
     map: &ColumnMap,
     ratio: f64,
     fewest: usize,
-) -> Result<(Log, LogFindings), MeasuredError> {
+    findings: &mut Findings,
+) -> Result<LogFile, MeasuredError> {
     let refuse = |problem: TableProblem| MeasuredError::at(file, problem);
     let mut bytes = Vec::new();
     let begun = source.read_to_end(&mut bytes);
     begun.map_err(|error| refuse(TableProblem { line: 1, what: error.to_string() }))?;
     if phd2::is_one(&bytes) {
-        return guide_log(bytes, map, ratio).map_err(refuse);
+        return guide_log(bytes, map, ratio, findings).map_err(refuse);
     }
     let sheet = Sheet::of(bytes, &map.known()).map_err(refuse)?;
     let layout = &sheet.layout;
     let columns = map.resolve(&layout.names, layout.header_line, Some(layout)).map_err(refuse)?;
     let places: Vec<usize> = columns.iter().map(|column| column.place).collect();
     let read = sheet.columns(&places).map_err(refuse)?;
-    let mut notes = map.misspelt(&layout.names, &columns);
-    notes.extend(sheet.notes.iter().chain(&read.notes).cloned());
-    let made = of_columns(layout, read, columns, map.rate_hz(), fewest);
-    let (log, mut found) = made.map_err(refuse)?;
-    if let Some(problem) = found.refused.take() {
-        return Err(refuse(problem));
+    findings.notes.extend(map.misspelt(&layout.names, &columns));
+    findings.notes.extend(sheet.notes.iter().chain(&read.notes).cloned());
+    match of_columns(layout, read, &columns, map.rate_hz(), fewest, findings).map_err(refuse)? {
+        (_, Some(problem)) => Err(refuse(problem)),
+        (log, None) => Ok(LogFile { log, columns, own_zeros: false }),
     }
-    notes.append(&mut found.notes);
-    Ok((log, LogFindings { notes, ..found }))
 }
 
 /// The log of `read`, which has the columns in use in their order; `rate_hz` if the file has no time.
 ///
-/// A cell that is no number is missing in it, and reported in the findings.
+/// A cell that is no number is missing in it; the first of them is given with the log, which is then not for use.
 ///
 /// # Errors
 /// A column holds times, or numbers beyond all limits, or there are fewer rows than `fewest`.
 pub(crate) fn of_columns(
     layout: &Layout,
     mut read: Columns,
-    columns: Vec<MappedColumn>,
+    columns: &[MappedColumn],
     rate_hz: Option<f64>,
     fewest: usize,
-) -> Result<(Log, LogFindings), TableProblem> {
+    findings: &mut Findings,
+) -> Result<(Log, Option<TableProblem>), TableProblem> {
     let last = columns.iter().map(|column| column.place).max().unwrap_or(0);
     let broken_off = read.without_broken_end(last);
-    let mut refused = check_rows(layout, &read, &columns).err();
-    let mut notes = Vec::new();
+    let broken_off = broken_off.map(|line| Fault::new(FaultName::MissingSamples, [line; 2], 1));
+    findings.add(broken_off, None::<Quantity>, Treatment::Masked, |_| {
+        "the last line breaks off: it is left out".to_owned()
+    });
+    let notes = &mut findings.notes;
+    let mut refused = check_rows(layout, &read, columns).err();
+    if let Some((place, what)) = &layout.whole_seconds
+        && columns.iter().any(|column| column.quantity == Quantity::Time && column.place == *place)
+    {
+        refused = refused.or(Some(TableProblem { line: layout.header_line, what: what.clone() }));
+    }
     let mut log = Log::default();
     for (column, cells) in columns.iter().zip(std::mem::take(&mut read.cells)) {
         let times = cells.times.count > 0;
@@ -204,7 +205,7 @@ pub(crate) fn of_columns(
             values.iter_mut().for_each(|value| *value = column.reading.value(*value));
         }
         if cells.time_of_day {
-            past_midnight(&mut values, &mut notes);
+            past_midnight(&mut values, notes);
         }
         log.put(column.quantity, values);
     }
@@ -227,12 +228,11 @@ pub(crate) fn of_columns(
         log.put(Quantity::Time, (0..log.len()).map(|row| row as f64 / rate_hz).collect());
         notes.push(format!("time is counted, {rate_hz} rows in a second: rows that are lost cannot be seen"));
     }
-    let mut order = Vec::new();
-    in_order(&mut log, &mut order);
-    Ok((log, LogFindings { columns, broken_off, refused, order, notes, own_zeros: false }))
+    in_order(&mut log, findings);
+    Ok((log, refused))
 }
 
-fn guide_log(bytes: Vec<u8>, map: &ColumnMap, ratio: f64) -> Result<(Log, LogFindings), TableProblem> {
+fn guide_log(bytes: Vec<u8>, map: &ColumnMap, ratio: f64, findings: &mut Findings) -> Result<LogFile, TableProblem> {
     if *map != ColumnMap::default() {
         let what = "a guide log of PHD2 has columns and times of its own, found --columns or --rate; allowed: neither"
             .to_owned();
@@ -243,8 +243,8 @@ fn guide_log(bytes: Vec<u8>, map: &ColumnMap, ratio: f64) -> Result<(Log, LogFin
         let what = format!("{} guided frames with a star; at least {FEWEST_ROWS} are needed", log.len());
         return Err(TableProblem { line: 1, what });
     }
-    let (broken_off, refused, order) = (None, None, Vec::new());
-    Ok((log, LogFindings { columns: phd2::columns(), broken_off, refused, order, notes, own_zeros: true }))
+    findings.notes.extend(notes);
+    Ok(LogFile { log, columns: phd2::columns(), own_zeros: true })
 }
 
 /// Refuses rows that end before a column in use, or have more fields than names.
@@ -291,13 +291,18 @@ fn within_limits(column: &MappedColumn, numbers: &[f64], lines: &[u64]) -> Resul
 }
 
 /// Rows in the order of their time, each once.
-fn in_order(log: &mut Log, said: &mut Vec<String>) {
+fn in_order(log: &mut Log, findings: &mut Findings) {
+    let mended = |log: &Log, findings: &mut Findings, what: String| {
+        let lines = [log.line.iter().copied().min().unwrap_or(1), log.line.iter().copied().max().unwrap_or(1)];
+        let fault = Fault::new(FaultName::ClockError, lines, log.len() as u64);
+        findings.add(Some(fault), Quantity::Time, Treatment::Repaired, |_| what);
+    };
     if let Some((order, note)) = log.get(Quantity::Time).and_then(stamps::order) {
         log.line = order.iter().map(|row| log.line[*row]).collect();
         for values in log.columns.iter_mut().flatten() {
             *values = order.iter().map(|row| values[*row]).collect();
         }
-        said.push(note);
+        mended(log, findings, note);
     }
     if log.get(Quantity::Time).is_none() {
         return;
@@ -305,7 +310,7 @@ fn in_order(log: &mut Log, said: &mut Vec<String>) {
     let columns: Vec<&[f64]> = log.columns.iter().flatten().map(Vec::as_slice).collect();
     if let Some((drop, note)) = stamps::twice(&columns) {
         log.leave_out(&drop);
-        said.push(note);
+        mended(log, findings, note);
     }
 }
 

@@ -43,7 +43,7 @@ pub(crate) use unit::{Family, WrongReading};
 use faults::Findings;
 use faults::drift::Stretches;
 use faults::steps::DoubtfulSteps;
-use log::{Log, LogFindings};
+use log::{Log, LogFile};
 use raw::RawFile;
 
 /// More sessions than a person makes. *Guess*.
@@ -251,14 +251,14 @@ pub(crate) fn parse_at_least(
     if gear.ratio == 0.0 || !gear.ratio.is_finite() {
         return Err(refuse(Refusal::NoRatio(gear.ratio)));
     }
-    let (mut log, found) = log::read(file, source, columns, gear.ratio, fewest)?;
-    let rows = log.len();
     let mut findings = Findings::default();
-    let recorded = in_order(&mut log, &found, &mut findings).map_err(refuse)?;
+    let LogFile { mut log, columns, own_zeros } = log::read(file, source, columns, gear.ratio, fewest, &mut findings)?;
+    let rows = log.len();
+    let recorded = in_order(&mut log, &columns, &mut findings).map_err(refuse)?;
     enough(&log, recorded, fewest).map_err(refuse)?;
-    rollover::unwrap(&mut log, &found.columns, gear.ratio, &mut findings.notes);
+    rollover::unwrap(&mut log, &columns, gear.ratio, &mut findings.notes);
     faults::leaps::check(&mut log, gear, &mut findings);
-    faults::units::check(&mut log, &found.columns, gear, &mut findings).map_err(refuse)?;
+    faults::units::check(&mut log, &columns, gear, &mut findings).map_err(refuse)?;
     let error_recorded = log.output_or_error() == Quantity::Error;
     let drifts = faults::leaps::changes_with_the_gaps(&log, gear)
         .is_some_and(|per_s| faults::drift::confirms(&into_sessions(log.clone(), gear.ratio), gear, per_s));
@@ -270,7 +270,7 @@ pub(crate) fn parse_at_least(
         sessions[session].own_zero = true;
         sessions[session..].iter_mut().for_each(|later| later.zero_off_rad = off_rad);
     }
-    sessions.iter_mut().skip(1).for_each(|session| session.own_zero |= found.own_zeros);
+    sessions.iter_mut().skip(1).for_each(|session| session.own_zero |= own_zeros);
     if drifts {
         faults::drift::check(&mut sessions, gear, Stretches::OfRows, &mut findings);
     }
@@ -294,19 +294,9 @@ pub(crate) fn parse_at_least(
 ///
 /// # Errors
 /// The time looks as if it were in another unit.
-fn in_order(log: &mut Log, found: &LogFindings, findings: &mut Findings) -> Result<String, Refusal> {
-    findings.notes.extend(found.notes.iter().cloned());
-    let broken_off = found.broken_off.map(|line| Fault::new(FaultName::MissingSamples, [line; 2], 1));
-    findings.add(broken_off, None::<Quantity>, Treatment::Masked, |_| {
-        "the last line breaks off: it is left out".to_owned()
-    });
-    for what in found.order.iter().cloned() {
-        let lines = [log.line.iter().copied().min().unwrap_or(1), log.line.iter().copied().max().unwrap_or(1)];
-        let fault = Fault::new(FaultName::ClockError, lines, log.len() as u64);
-        findings.add(Some(fault), Quantity::Time, Treatment::Repaired, |_| what);
-    }
+fn in_order(log: &mut Log, columns: &[MappedColumn], findings: &mut Findings) -> Result<String, Refusal> {
     faults::missing::fill(log, findings);
-    faults::clock::check(log, &found.columns, findings)?;
+    faults::clock::check(log, columns, findings)?;
     let recorded = recorded(log);
     faults::missing::leave_out(log, findings);
     Ok(recorded)
@@ -331,23 +321,23 @@ impl ReadRows {
     ) -> (ReadRows, Option<MeasuredError>) {
         let cells = |column: &MappedColumn| file.columns.cells[column.place].clone();
         let read = file.columns.with_cells(columns.iter().map(cells).collect());
-        let made = log::of_columns(&file.sheet.layout, read, columns.to_vec(), None, 0);
+        let mut findings = Findings::default();
         let mut rows = ReadRows { log: Log::default(), stamps_s: Vec::new(), notes: Vec::new() };
         let at = |problem: TableProblem| MeasuredError::at(&file.file, problem);
-        let (mut log, found) = match made {
+        let made = log::of_columns(&file.sheet.layout, read, columns, None, 0, &mut findings);
+        let (mut log, refused) = match made {
             Ok(made) => made,
             Err(problem) => return (rows, Some(at(problem))),
         };
         rows.stamps_s = log.get(Quantity::Time).map_or_else(Vec::new, <[f64]>::to_vec);
-        let mut findings = Findings::default();
-        let ordered = in_order(&mut log, &found, &mut findings);
+        let ordered = in_order(&mut log, columns, &mut findings);
         if log.len() > 1 {
             rollover::unwrap(&mut log, columns, ratio.unwrap_or(1.0), &mut findings.notes);
         }
         rows.log = log;
         rows.notes = findings.notes;
         rows.notes.extend(findings.faults.into_iter().map(|fault| fault.what));
-        (rows, found.refused.map(at).or(ordered.err().map(|why| MeasuredError::of_file(&file.file, &why))))
+        (rows, refused.map(at).or(ordered.err().map(|why| MeasuredError::of_file(&file.file, &why))))
     }
 
     /// Sessions, one at least.

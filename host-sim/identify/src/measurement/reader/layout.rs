@@ -130,6 +130,8 @@ pub struct Layout {
     pub(super) kinds: Vec<CellKind>,
     /// The form of the times of a column.
     pub(super) forms: Vec<Option<TimeForm>>,
+    /// A column of whole seconds whose parts stand in the next one, and what to do: it is no time by itself.
+    pub(in crate::measurement) whole_seconds: Option<(usize, String)>,
 }
 
 /// Kinds of field.
@@ -302,19 +304,18 @@ impl Layout {
         let timed = |k: usize| column(k).filter(|text| CellKind::of(text, self.decimal_comma) == CellKind::Time);
         let form = |k: usize| if self.kinds[k] == CellKind::Time { clock::form(timed(k)) } else { None };
         self.forms = (0..width).map(form).collect();
+        let apart = |k: usize, whole: &str| {
+            format!("the time stands in columns {k} and {}; allowed: one column, in pandas: {whole}", k + 1)
+        };
         let numbers = |k: usize| column(k).filter_map(|text| text.parse::<f64>().ok()).collect::<Vec<f64>>();
         for k in 1..width {
-            let whole = if self.kinds[k - 1..=k] == [CellKind::Date, CellKind::Time] {
-                "pd.to_datetime(df[DATE] + \" \" + df[TIME])".to_owned()
+            if self.kinds[k - 1..=k] == [CellKind::Date, CellKind::Time] {
+                notes.push(apart(k, "pd.to_datetime(df[DATE] + \" \" + df[TIME])") + "; the date is not read");
             } else if let Some(of_a_second) = parts_of_a_second(&numbers(k - 1), &numbers(k)) {
-                format!("df[SECONDS] + df[PARTS] / {of_a_second:e}")
-            } else {
-                continue;
-            };
-            notes.push(format!(
-                "the time stands in columns {k} and {}, which are not read together; one of both in pandas: {whole}",
-                k + 1
-            ));
+                let what = apart(k, &format!("df[SECONDS] + df[PARTS] / {of_a_second:e}"));
+                notes.push(what.clone());
+                self.whole_seconds = Some((k - 1, what));
+            }
         }
     }
 

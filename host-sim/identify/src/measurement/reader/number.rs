@@ -1,6 +1,6 @@
 //! A cell as a number: decimals behind a point or a comma, marks of what was not recorded or beyond a range.
 
-/// What a cell holds.
+/// Contents of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum CellValue {
     /// A number.
@@ -23,7 +23,7 @@ const OVER_BEGINS: [&str; 3] = ["ov", "under", "1.#inf"];
 /// float is another.
 const OVER_NUMBERS: [(f64, f64); 2] = [(9.89e36, 1.0e38), (3.402e38, 3.404e38)];
 
-/// What a cell holds; its decimals follow a comma if `comma`.
+/// Contents of a cell; its decimals follow a comma if `comma`.
 pub(super) fn cell(bytes: &[u8], comma: bool) -> CellValue {
     let Ok(text) = std::str::from_utf8(bytes) else { return CellValue::Word };
     if text.is_empty() {
@@ -58,7 +58,7 @@ fn mark(text: &str) -> CellValue {
     }
 }
 
-/// What a cell says of how decimals are written: `Some(true)` behind a comma, `Some(false)` behind a point, `None`
+/// The sign of decimals that a cell shows: `Some(true)` behind a comma, `Some(false)` behind a point, `None`
 /// nothing.
 pub(super) fn decimals(text: &str) -> Option<bool> {
     let number = |comma: bool| matches!(cell(text.as_bytes(), comma), CellValue::Number(_));

@@ -340,7 +340,7 @@ fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
         ),
         (
             "seconds and nanoseconds",
-            file("stamp.sec,stamp.nsec,motor_deg,joint_deg,torque_Nm\n", ",", |k| {
+            file("time_s,time_ns,motor_deg,joint_deg,torque_Nm\n", ",", |k| {
                 let ns = 50_000_000 * k as u64;
                 [
                     vec![(1_700_000_000 + ns / 1_000_000_000).to_string(), (ns % 1_000_000_000).to_string()],
@@ -349,11 +349,11 @@ fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
                 .concat()
             })
             .into(),
-            Read(ROWS, "df[SECONDS] + df[PARTS] / 1e9"),
+            Blocked("df[SECONDS] + df[PARTS] / 1e9"),
         ),
         (
             "seconds and microseconds",
-            file("stamp.sec,stamp.usec,motor_deg,joint_deg,torque_Nm\n", ",", |k| {
+            file("time_s,time_us,motor_deg,joint_deg,torque_Nm\n", ",", |k| {
                 let us = 50_000 * k as u64;
                 [
                     vec![(1_700_000_000 + us / 1_000_000).to_string(), (us % 1_000_000).to_string()],
@@ -362,7 +362,7 @@ fn cases() -> Vec<(&'static str, Vec<u8>, Ends)> {
                 .concat()
             })
             .into(),
-            Read(ROWS, "df[SECONDS] + df[PARTS] / 1e6"),
+            Blocked("df[SECONDS] + df[PARTS] / 1e6"),
         ),
         (
             "newest first",

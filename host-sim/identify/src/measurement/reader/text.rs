@@ -14,7 +14,7 @@ const ZEROS: f64 = 0.25;
 /// The text of a file as UTF-8 with lines ended by LF, the last one too; what was converted is added to `notes`.
 ///
 /// # Errors
-/// What the file is, if it is no text.
+/// The kind of the file, if it is no text.
 pub(super) fn of(bytes: Vec<u8>, notes: &mut Vec<String>) -> Result<Vec<u8>, TableProblem> {
     let refused = |what: &str| Err(TableProblem { line: 1, what: what.to_owned() });
     if let Some(kind) = known_format(&bytes) {
