@@ -1,7 +1,7 @@
 //! The core run over measured rows, open loop: what it would have predicted, row by row.
 //!
 //! The rows are read and checked as those of a calibration ([`crate::known_rows`]), and whatever was converted or left
-//! out is told. Without a torque the table is read at 0 N·m.
+//! out is reported. Without a torque the table is read at 0 N·m.
 
 use std::path::Path;
 
@@ -48,7 +48,7 @@ pub struct ReplayedRow {
     pub predicted_arcsec: f64,
     /// Measured less predicted, arcsec.
     pub residual_arcsec: f64,
-    /// What the core says it does not know, arcsec.
+    /// Uncertainty that the core states, arcsec.
     pub uncertainty_arcsec: f64,
     /// Quality of the prediction.
     pub quality: &'static str,
@@ -77,21 +77,21 @@ pub struct ReplaySummary {
     pub rows_by_quality: [usize; 4],
     /// Whole turns of the motor by which the generator zero of the rows is off the table's, where the rows show that.
     pub generator_zero_off: Option<TurnsOff>,
-    /// What the table leaves with the torque's sign turned, arcsec rms, where the rows show that it is.
+    /// Residual of the table with the torque's sign turned, arcsec rms, where the rows show that it is.
     pub torque_turned_rms_arcsec: Option<f64>,
     /// Whose rows they are, where that is known.
     pub rows_of: Option<RowsOf>,
-    /// What has to be known of them: that they are another drive's, or nobody's.
+    /// Remarks on them: that they are another drive's, or nobody's.
     pub remarks: Vec<String>,
     /// Faults of the log.
     pub data_faults: Vec<Fault>,
-    /// What was noticed in it.
+    /// Notes on it.
     pub notes: Vec<String>,
     /// Command line, once known.
     pub command: String,
 }
 
-/// File of results as `simulate` names it, and what lies beside it.
+/// File of results as `simulate` names it, and the summary in its folder.
 const RESULTS: [&str; 2] = ["results.csv", "summary.json"];
 
 /// Whose rows a file holds, as the run says that wrote them.
@@ -110,7 +110,7 @@ pub struct RowsOf {
 }
 
 impl RowsOf {
-    /// What `summary.json` beside the results of `simulate` says of them; nothing of any other file, or where there is
+    /// The owner by `summary.json` next to the results of `simulate`; nothing of any other file, or where there is
     /// none.
     pub fn beside(data: &Path, bytes: &[u8]) -> Option<RowsOf> {
         let [results, summary] = RESULTS;
@@ -140,7 +140,7 @@ impl RowsOf {
     }
 }
 
-/// What is said of rows that nothing speaks for.
+/// Remark on rows whose owner is not stated.
 const OF_NOBODY: &str =
     "nothing beside the rows says of which drive and generator they are: that they are the table's was not checked";
 
@@ -155,7 +155,7 @@ impl ReplaySummary {
         self.rows_of = rows_of;
     }
 
-    /// What has to be said where the table gains less than it could, or nothing.
+    /// A remark where the table gains less than it could, or nothing.
     fn of_gain(&self) -> Option<String> {
         let (measured, left) = (self.rms_measured_arcsec, self.rms_residual_arcsec);
         if let Some(turned) = self.torque_turned_rms_arcsec {

@@ -567,10 +567,11 @@ fn torque(guesses: &mut [Guess], error: Option<&[f64]>, notes: &mut Vec<String>)
                 let way = if says.slope < 0.0 { "against" } else { "with" };
                 let sure = if guesses[*k].role == Role::Torque { 0.8 } else { 0.5 };
                 let share = 100.0 * says.share;
-                let why = format!("the error moves {way} it: it explains {share:.0} % beside the turn of the output");
+                let why =
+                    format!("the error moves {way} it: it explains {share:.0} % in addition to the turn of the output");
                 guesses[*k].because(why, sure);
             }
-            _ => guesses[*k].because("its sign cannot be told here", 0.4),
+            _ => guesses[*k].because("its sign does not show here", 0.4),
         }
     }
     // A torque before a current, then what explains more.
@@ -655,7 +656,7 @@ fn option(guesses: &[Guess], names: &[String], notes: &mut Vec<String>) -> Optio
         (false, true) => "which column is the generator",
         _ => "which columns are generator and output",
     };
-    notes.push(format!("{what} cannot be told: name them, --columns generator=#1:UNIT,output=#2:UNIT"));
+    notes.push(format!("{what} does not show: name them, --columns generator=#1:UNIT,output=#2:UNIT"));
     None
 }
 

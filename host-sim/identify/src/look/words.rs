@@ -51,7 +51,7 @@ pub(super) struct Said {
     pub joint: Option<u32>,
 }
 
-/// What a name says, and the unit that stands in a line of its own if there is one. Units count before words: a load in
+/// The meaning of a name, and of the unit that stands in a line of its own if there is one. Units count before words: a load in
 /// N·m is a torque, whatever it is called.
 pub(super) fn said(name: &str, unit: Option<&str>) -> Said {
     let words = words(name);
@@ -84,7 +84,7 @@ pub(super) fn said(name: &str, unit: Option<&str>) -> Said {
     Said { role, commanded: any(&COMMANDED), angle, aside: false, joint }
 }
 
-/// What a unit is one of, as far as a role follows from it.
+/// The quantity of a unit, as far as a role follows from it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum UnitKind {
     Angle,
@@ -95,7 +95,7 @@ enum UnitKind {
     Time,
 }
 
-/// What the unit of a line of its own, in brackets, or at the end of a name is one of.
+/// The quantity of the unit in a line of its own, in brackets, or at the end of a name.
 fn kind_of_unit(name: &str, line: Option<&str>) -> Option<UnitKind> {
     let Some(text) = line.or_else(|| Unit::bracketed(name)) else {
         // A single letter at the end of a name is a letter more often than a unit: phase_A, sensor_C.

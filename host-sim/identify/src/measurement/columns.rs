@@ -278,7 +278,7 @@ impl ColumnMap {
         Ok(columns)
     }
 
-    /// What to say of columns that are not among the `used` ones, though they are nearly called as one that is missing.
+    /// Notes on columns that are not among the `used` ones, though they are nearly called as one that is missing.
     pub(super) fn misspelt(&self, names: &[String], used: &[MappedColumn]) -> Vec<String> {
         let spare: Vec<&str> =
             names.iter().map(String::as_str).filter(|name| used.iter().all(|column| column.name != *name)).collect();

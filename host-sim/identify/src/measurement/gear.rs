@@ -1,4 +1,4 @@
-//! What the reader has to know of a drive.
+//! Properties of a drive that the reader needs.
 
 /// Ratio, tooth pitch and largest torque of a drive.
 #[derive(Debug, Clone, Copy, PartialEq)]

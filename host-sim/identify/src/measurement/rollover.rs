@@ -55,7 +55,7 @@ const MOST_SKIPPED: f64 = 3.5;
 /// How a column begins anew.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Anew {
-    /// After so much, in the unit of the values.
+    /// The span after which it begins anew, in the unit of the values.
     pub span: f64,
     /// Times.
     pub times: usize,

@@ -218,9 +218,9 @@ impl fmt::Display for Unit {
 pub struct Reading {
     /// Unit of the result; a count is then a turn.
     pub unit: Unit,
-    /// What a number is multiplied with first.
+    /// Factor of a number.
     pub gain: f64,
-    /// What is added then, in the unit.
+    /// Added to the product, in the unit.
     pub offset: f64,
 }
 
@@ -246,7 +246,7 @@ impl Reading {
     /// `torque_per_ampere` stands in where a current has no gain.
     ///
     /// # Errors
-    /// What was found and what is allowed; the unit itself if it is not known or not one of `allowed`.
+    /// The text found and what is allowed; the unit itself if it is not known or not one of `allowed`.
     pub(crate) fn parse(text: &str, allowed: Family, torque_per_ampere: Option<f64>) -> Result<Reading, WrongReading> {
         let text = text.trim();
         if let Some(unit) = Unit::written(text).filter(|unit| unit.family() == allowed) {
@@ -281,7 +281,7 @@ impl Reading {
         Reading { unit, gain, offset }.complete(scaled, torque_per_ampere)
     }
 
-    /// With the gain that a current has without being told, or the error that one is missing.
+    /// With the gain that a current has by `torque_per_ampere`, or the error that one is missing.
     fn complete(mut self, scaled: bool, torque_per_ampere: Option<f64>) -> Result<Reading, WrongReading> {
         let Some(needs) = self.unit.needs_gain().filter(|_| !scaled) else { return Ok(self) };
         let ampere = match self.unit {

@@ -15,7 +15,7 @@ use crate::measurement::refusal::Refusal;
 use crate::measurement::rollover::begins_anew;
 use flexspline_base::robust::{least_and_most, median_of, quantile_of, sampled};
 
-/// The output must have turned by so much, by the generator or by itself, before the ratio is judged, rad. *Source*:
+/// The output must have turned by this angle, by the generator or by itself, before the ratio is judged, rad. *Source*:
 /// derived, twenty times two arc-minutes of clearance move the ratio by 5 % at most; the clearance is a guess.
 const ENOUGH_MOTION_RAD: f64 = 20.0 * 120.0 / 206_265.0;
 /// A ratio this near to one that a mistake gives is that mistake. *Source*: derived, less than half of the 4.6 %

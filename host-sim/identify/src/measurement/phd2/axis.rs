@@ -18,7 +18,7 @@ const HOURS: f64 = 24.0;
 /// of one. *Source*.
 const STEPS_APART: f64 = 1.1;
 
-/// What a section says of where the mount points.
+/// Where the mount points, as a section says it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Pointing {
     /// When it begins, s.

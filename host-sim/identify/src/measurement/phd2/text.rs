@@ -3,7 +3,7 @@
 //! PHD2 writes a point in its numbers; a spreadsheet that saves a log again may write commas, between semicolons or in
 //! quotes.
 
-/// What parts the fields of a row.
+/// Separators of the fields of a row.
 const SEPARATORS: [char; 3] = [',', ';', '\t'];
 
 /// A number, with how many decimals it is written.
