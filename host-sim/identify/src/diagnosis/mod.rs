@@ -16,7 +16,6 @@
 
 mod averaged;
 pub mod base;
-mod blurred;
 pub(crate) mod candidate;
 pub(crate) mod channels;
 mod experiment;

@@ -115,7 +115,7 @@ impl<'a> Excitation<'a> {
             }
             Need::Time => rows.recorded.time,
             Need::Motion => rows.speed.iter().any(|w| *w != 0.0),
-            Need::Swings => !rows.means && dynamic::makes_a_load_swing(self),
+            Need::Swings => dynamic::makes_a_load_swing(self),
             Need::HalfOutputTurn => self.output_span_rad() >= PI,
             Need::Use => {
                 let turned = rows.travel.last().is_some_and(|travel| *travel >= USED_TURNS * 2.0 * PI);
