@@ -196,8 +196,6 @@ pub(crate) fn diagnose_extended(
     let terms = terms_at(&problem, &laws, &start);
     let selected = Selected::of(&problem, terms).ok_or(DiagnosisError::NotFinite)?;
     let (selected, mut unproved) = held_out::proved(&problem, selected, &mut trace);
-    let (selected, hides) = verdict::told_apart(&problem, selected, noise, &mut trace);
-    unproved.extend(hides);
     let start = remembered(&laws, &selected.terms);
     let maps = candidate::maps(&on);
     let mut left = remainder::of_maps(&problem, &selected, &maps, noise.white);

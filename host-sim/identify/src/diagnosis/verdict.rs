@@ -370,55 +370,6 @@ fn known(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Vec<Kn
     uncertainty::known(problem, selected, beyond_noise(left, floor(problem, noise)))
 }
 
-/// The terms without those that hide others: where two causes do so nearly the same that the size of neither is known
-/// from zero, and that of one is where the other is left out, the smaller is set aside. As often as not the smaller is
-/// what the law of the larger leaves; what else may stand in the place of the larger, rivals and look-alikes say. Also
-/// what was set aside, with as much of it as the others do not take over.
-#[must_use]
-pub(super) fn told_apart<'l>(
-    problem: &Problem<'_>,
-    mut selected: Selected<'l>,
-    noise: Noise,
-    trace: &mut Trace,
-) -> (Selected<'l>, Vec<Unexplained>) {
-    let told = |selected: &Selected<'l>| -> Vec<f64> {
-        known(problem, selected, noise).iter().map(|known| known.told_from_zero).collect()
-    };
-    let mut aside = Vec::new();
-    while selected.terms.iter().filter(|term| term.law.named()).count() > 1 {
-        let now = told(&selected);
-        let standings = standings(problem, &selected);
-        let mut doubtful: Vec<usize> =
-            (0..selected.terms.len()).filter(|k| selected.terms[*k].law.named() && now[*k] < TOLD_FROM_ZERO).collect();
-        doubtful.sort_by(|a, b| standings[*a].size.total_cmp(&standings[*b].size));
-        let without = |k: usize| -> Option<Selected<'l>> {
-            let mut terms = selected.terms.clone();
-            terms.remove(k);
-            let less = select::settle(problem, Selected::of(problem, terms)?)?;
-            let then = told(&less);
-            let is_told = |j: usize| then[j - usize::from(j > k)] >= TOLD_FROM_ZERO;
-            let larger = doubtful.iter().skip_while(|j| **j != k).skip(1);
-            larger.copied().any(is_told).then_some(less)
-        };
-        let Some((k, less)) = doubtful.iter().find_map(|k| Some((*k, without(*k)?))) else { break };
-        let gone = &selected.terms[k];
-        let gates = vec![Judged::above(Gate::ToldFromZero, now[k], TOLD_FROM_ZERO)];
-        trace.judged(Stage::Understood, gone.law, &gone.places, None, gates);
-        let size_arcsec = not_taken_over(problem, &selected, &less);
-        if size_arcsec > select::least_size(noise.white) {
-            aside.push(Unexplained { looks_like: gone.law.label.to_string(), size_arcsec });
-        }
-        selected = less;
-    }
-    (selected, aside)
-}
-
-/// What the terms explain and fewer of them, fitted anew, do not, arcsec: what is left without the others.
-fn not_taken_over(problem: &Problem<'_>, all: &Selected<'_>, fewer: &Selected<'_>) -> f64 {
-    let (left, then) = (remainder::left(problem, all), remainder::left(problem, fewer));
-    problem.certain_rms(&select::less(&then, &left))
-}
-
 /// By what noise counts more where more is left than that (Birge 1932): the laws are not right to the noise then.
 fn beyond_noise(rms_after: f64, floor: f64) -> f64 {
     let ratio = rms_after / floor.max(1e-30);
