@@ -86,11 +86,6 @@ pub(crate) mod rivals {
     pub(crate) const SAME_ARCSEC: f64 = 0.5;
     /// Nor are those closer than this share of the cause's size. *Guess*.
     pub(crate) const SAME_SHARE: f64 = 0.12;
-    /// A rival tells the data better that lowers the misfit by this: five standard deviations, and a share of what was
-    /// there for one that has more columns to do it with. *Chosen*.
-    pub(crate) const TOLD_BETTER: f64 = -100.0;
-    /// A rival whose prediction differs by more than this share of a cause's size tells something else. *Chosen*.
-    pub(crate) const IN_ITS_PLACE: f64 = 0.9;
 }
 
 /// Which of the causes found may be named.

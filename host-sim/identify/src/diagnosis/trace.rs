@@ -113,8 +113,6 @@ pub enum Gate {
     KnownWell,
     /// The best known of its sizes is this many times its standard deviation.
     ToldFromZero,
-    /// No rival lowers the misfit by this much.
-    ToldBetter,
     /// Rivals raise the misfit by this much.
     ToldApart,
     /// As a rival it would lower the misfit against the cause that was named.
@@ -160,7 +158,6 @@ impl Gate {
             Gate::NoLineBeside => "no_line_beside",
             Gate::KnownWell => "known_well",
             Gate::ToldFromZero => "told_from_zero",
-            Gate::ToldBetter => "told_better",
             Gate::ToldApart => "told_apart",
             Gate::AsRival => "as_rival",
             Gate::NoWorse => "no_worse",
@@ -201,7 +198,6 @@ impl Gate {
             }
             Gate::KnownWell => "is known well beside what has no name (times its own uncertainty)",
             Gate::ToldFromZero => "has a size that is told from zero (times its standard deviation)",
-            Gate::ToldBetter => "is not told better by a rival (rise of the misfit with the rival in its place)",
             Gate::ToldApart => "is told apart from a rival (rise of the misfit with the rival in its place)",
             Gate::AsRival => "tells the data better in the place of a cause that was named (rise of the misfit)",
             Gate::NoWorse => "predicts sessions left out, with the others named (arcsec rms)",
@@ -389,10 +385,7 @@ impl Trace {
         let search = |step: &&Step| !matches!(step.stage, Stage::Exchange | Stage::Rival);
         let last = self.of(cause).rev().find(search)?;
         if last.passed() {
-            // It was let through by all but a rival that explains the data better.
-            return self.of(cause).find(|step| {
-                step.stage == Stage::Rival && step.gates.iter().any(|j| j.gate == Gate::ToldBetter && !j.passed)
-            });
+            return None;
         }
         let gained = |step: &Step| {
             [Gate::Evidence, Gate::Gain, Gate::First, Gate::Refined]

@@ -78,12 +78,11 @@ pub(super) fn conclude(
     }
     let mut causes = Vec::new();
     let mut next_experiment = None;
-    let mut told_better = Vec::new();
     if verdict != Verdict::Unknown {
         let of_all: Vec<Vec<rivals::Rival<'_>>> = named
             .par_iter()
             .with_max_len(1)
-            .map(|k| rivals::rivals(problem, sample, laws, &selected, &standings, bests, *k))
+            .map(|k| rivals::rivals(problem, sample, laws, &selected, bests, *k))
             .collect();
         for (k, rivals) in named.iter().copied().zip(of_all) {
             let Some(name) = selected.terms[k].law.cause() else { continue };
@@ -92,12 +91,7 @@ pub(super) fn conclude(
             for rival in &rivals {
                 let against = |label: CauseName| Some(label.into());
                 trace.decided(Stage::Rival, name.into(), against(rival.cause), rival.judge(size, base));
-                trace.decided(Stage::Rival, rival.cause.into(), against(name), rival.in_its_place(size));
-            }
-            if rivals.iter().any(|r| r.tells_better(size)) {
-                // A rival that no other test lets through explains it better: neither is known.
-                told_better.push(k);
-                continue;
+                trace.decided(Stage::Rival, rival.cause.into(), against(name), rival.in_its_place());
             }
             let (alike, misfits): (Vec<CauseName>, Vec<f64>) =
                 rivals.iter().filter(|r| r.looks_alike(size, base)).map(|r| (r.cause, r.misfit)).take(3).unzip();
@@ -143,7 +137,7 @@ pub(super) fn conclude(
     });
     let verdict = match verdict {
         Verdict::Explained | Verdict::PartlyExplained if causes.is_empty() => Verdict::Unknown,
-        Verdict::Explained if !told_better.is_empty() || !is_explained(problem, rms_after, floor, held.total) => {
+        Verdict::Explained if !is_explained(problem, rms_after, floor, held.total) => {
             Verdict::PartlyExplained
         }
         other => other,
@@ -164,7 +158,7 @@ pub(super) fn conclude(
         held_out.rms_after_arcsec = held_out.rms_before_arcsec;
     }
     let mut unexplained_list: Vec<Unexplained> = (0..selected.terms.len())
-        .filter(|k| !named.contains(k) || told_better.contains(k) || verdict == Verdict::Unknown)
+        .filter(|k| !named.contains(k) || verdict == Verdict::Unknown)
         .filter(|k| !of_the_bench(&selected.terms[*k]))
         .map(|k| Unexplained { looks_like: selected.terms[k].law.label.to_string(), size_arcsec: standings[k].size })
         .collect();
