@@ -634,7 +634,7 @@ impl<'l> Chooser<'_, '_, 'l> {
             selected = self.exchange(selected, usize::MAX)?;
         }
         for round in 0..MOST_ROUNDS {
-            let Some(next) = self.forward(&selected).or_else(|| self.two_for_unnamed(&selected)) else { break };
+            let Some(next) = self.forward(&selected) else { break };
             let taken = next.terms.len();
             selected = self.backward(settle(problem, next)?)?;
             if round > 0 || selected.terms.len() > 1 {
@@ -786,15 +786,6 @@ impl<'l> Chooser<'_, '_, 'l> {
         refined.filter(|(term, fit)| sound(term, fit.last())).collect()
     }
 
-    /// The cause of `open` that explains the data best with the terms, taken in with them and settled.
-    fn with_best_cause(&self, open: &[&'l Law], others: Vec<Term<'l>>) -> Option<Selected<'l>> {
-        let is_new = |law: &&Law| law.named() && others.iter().all(|t| t.law.label != law.label);
-        let open: Vec<&Law> = open.iter().copied().filter(is_new).collect();
-        let refined = self.refined_with(&others, &open).into_iter();
-        let (term, fit) = refined.max_by(|a, b| evidence_of(a).total_cmp(&evidence_of(b)))?;
-        settle(self.problem, Selected { fit, terms: others.into_iter().chain([term]).collect() })
-    }
-
     /// The selection without term `k`, its fit, and the laws of `some` that may be tried in the place of the term.
     fn in_place_of(
         &self,
@@ -811,42 +802,6 @@ impl<'l> Chooser<'_, '_, 'l> {
         };
         let open = self.laws.iter().filter(some).filter(may).collect();
         Some((without, open))
-    }
-
-    /// Replaces a deviation without a name by two causes that explain the data no worse and earn it: with it in the
-    /// model each of them is held against all that it may be wrong by, so that none comes in.
-    fn two_for_unnamed(&mut self, selected: &Selected<'l>) -> Option<Selected<'l>> {
-        if selected.terms.iter().filter(|t| t.law.named()).count() + 2 > MOST_CAUSES {
-            return None;
-        }
-        let problem = self.problem;
-        for (k, held) in selected.terms.iter().enumerate().filter(|(_, t)| !t.law.named()) {
-            let in_scope = |law: &&Law| self.scope == Scope::Everything || self.bests.is_close(law);
-            let (without, open) = self.in_place_of(selected, k, in_scope)?;
-            let Some(one) = self.with_best_cause(&open, without.terms) else { continue };
-            let Some(two) = self.with_best_cause(&open, one.terms) else { continue };
-            let both = two.terms.len() - 2..two.terms.len();
-            let occam: f64 = two.terms[both.clone()].iter().map(|t| t.occam).sum();
-            let ahead_by = two.fit.solution.evidence + occam - selected.fit.solution.evidence - held.occam;
-            let standings = standings(problem, &two);
-            // They have names: it is enough not to be behind.
-            let ahead = Judged::above(Gate::Ahead, ahead_by, 0.0);
-            let gates = |j| [vec![ahead], earns(problem, &two, &standings, j, self.least)].concat();
-            let gates: Vec<Vec<Judged>> = both.clone().map(gates).collect();
-            let taken = gates.iter().all(|gates| passed(gates));
-            for (term, gates) in two.terms[both].iter().zip(gates) {
-                self.trace.judged(Stage::Exchange, term.law, &term.places, Some(held.law.label), gates);
-                if taken {
-                    self.given.insert((held.law.id(), term.law.id()));
-                }
-            }
-            if taken {
-                let gates = vec![Judged::number(Gate::First, 0.0, ahead_by, false)];
-                self.trace.judged(Stage::Exchange, held.law, &held.places, None, gates);
-                return Some(two);
-            }
-        }
-        None
     }
 
     /// Replaces a term, but for the one at `compared`, by another law where that explains the data better; drops what
