@@ -563,11 +563,6 @@ fn evidence_of((term, fit): &(Term<'_>, Fit)) -> f64 {
     fit.solution.evidence + term.occam
 }
 
-/// Whether terms make no sense in a fit without another, for which they only stand in.
-fn stood_in_for(others: &[&Term<'_>], without: Option<&Fit>) -> bool {
-    without.is_some_and(|fit| others.iter().enumerate().any(|(j, other)| !sound(other, fit.of(j))))
-}
-
 /// The gates that a term has to pass to keep its place; `least` is the least size that counts, arcsec.
 pub(super) fn earns(
     problem: &Problem<'_>,
@@ -582,10 +577,6 @@ pub(super) fn earns(
         let apart = selected.without(problem, k);
         let others: Vec<&Term<'_>> = apart.iter().map(AsRef::as_ref).collect();
         let without = Scaffold::new(problem, others.clone()).fit(None);
-        if passed(&all) && stood_in_for(&others, without.as_ref()) {
-            // Without it others would have to make up for it, and make no sense then.
-            return all;
-        }
         let out = without.and_then(|fit| tolerance(problem, &fit, law));
         all.push(out.unwrap_or(Judged::plain(Gate::Tolerance, false)));
     }
