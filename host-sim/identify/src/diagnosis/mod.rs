@@ -195,7 +195,6 @@ pub(crate) fn diagnose_extended(
     let Search { laws, problem, noise, stride, thinned, start, bests, fast, mut trace } = search;
     let terms = terms_at(&problem, &laws, &start);
     let selected = Selected::of(&problem, terms).ok_or(DiagnosisError::NotFinite)?;
-    let (selected, mut unproved) = held_out::proved(&problem, selected, &mut trace);
     let start = remembered(&laws, &selected.terms);
     let maps = candidate::maps(&on);
     let mut left = remainder::of_maps(&problem, &selected, &maps, noise.white);
@@ -210,7 +209,6 @@ pub(crate) fn diagnose_extended(
     for something in &left {
         trace.say(&format_args!("left: {}, {:.2} arcsec", something.looks_like, something.size_arcsec));
     }
-    left.append(&mut unproved);
     let fineness = Fineness { stride, noise, worth: problem.worth };
     let sample = thinned.as_ref().map(|thinned| Sample::new(&on, thinned, &problem.uncertain, stride));
     let on_sample = sample.as_ref().map(|sample| sample.problem(noise, problem.worth));

@@ -28,8 +28,6 @@ pub enum Stage {
     Exchange,
     /// How a law that was chosen stands when the search is over.
     Settled,
-    /// Laws have to predict sessions that they were not fitted to.
-    HeldOut,
     /// What has no name beside a cause must not be too large.
     Understood,
     /// Every rival is refitted in the place of a cause.
@@ -48,7 +46,6 @@ impl Stage {
             Stage::Backward => ("backward", "held against what was chosen after it"),
             Stage::Exchange => ("exchange", "tried in the place of another cause"),
             Stage::Settled => ("settled", "at the end of the search"),
-            Stage::HeldOut => ("held_out", "in sessions left out of the fit"),
             Stage::Understood => ("understood", "beside what has no name"),
             Stage::Rival => ("rival", "against its rivals"),
             Stage::Verdict => ("verdict", "the verdict"),
@@ -101,8 +98,6 @@ pub enum Gate {
     Ahead,
     /// It explains the same as what it takes the place of: they differ by less than this share of that.
     SamePlace,
-    /// With it sessions left out are predicted no worse than with no cause at all, arcsec rms.
-    Predicts,
     /// A line of the generator's angle does not grow with the speed.
     NoGrowthWithSpeed,
     /// A load that was not recorded may make it: no more is left than this many times the noise.
@@ -152,7 +147,6 @@ impl Gate {
             Gate::LeftOut => "left_out",
             Gate::Ahead => "ahead",
             Gate::SamePlace => "same_place",
-            Gate::Predicts => "predicts",
             Gate::NoGrowthWithSpeed => "no_growth_with_speed",
             Gate::LoadKnown => "load_known",
             Gate::NoLineBeside => "no_line_beside",
@@ -185,7 +179,6 @@ impl Gate {
             Gate::LeftOut => "predicts sessions that it was not fitted to (gain)",
             Gate::Ahead => "tells the data better than the cause in whose place it is tried (evidence)",
             Gate::SamePlace => "tells the same as the cause in whose place it is tried (difference as a share of that)",
-            Gate::Predicts => "keeps the causes together better than none in sessions left out (arcsec rms)",
             Gate::NoGrowthWithSpeed => {
                 "does not grow with the speed (growth of its amplitude, standard deviations; negative where it fades)"
             }
@@ -212,7 +205,6 @@ impl Gate {
             Gate::Deviations
                 | Gate::Room
                 | Gate::SamePlace
-                | Gate::Predicts
                 | Gate::LoadKnown
                 | Gate::NoLineBeside
                 | Gate::NoGrowthWithSpeed
