@@ -192,8 +192,6 @@ pub(crate) struct Bests {
     tried: HashMap<u64, Vec<Vec<f64>>>,
     /// Where those came to that were refined and came close, the latest first.
     close: HashMap<u64, Vec<Vec<f64>>>,
-    /// Those that came close to one that was chosen: that one first.
-    close_to: HashSet<(u64, u64)>,
 }
 
 impl Bests {
@@ -215,12 +213,6 @@ impl Bests {
         known.retain(|places| *places != term.places);
         known.insert(0, term.places.clone());
         known.truncate(NOTED);
-    }
-
-    /// Notes a refined term that came close to one that was chosen.
-    fn came_close_to(&mut self, chosen: &Law, term: &Term<'_>) {
-        self.came_close(term);
-        self.close_to.insert((chosen.id(), term.law.id()));
     }
 
     /// Whether a law came close.
@@ -620,15 +612,11 @@ impl<'l> Chooser<'_, '_, 'l> {
             selected = self.backward(settle_all(problem, selected)?)?;
         }
         let mut seen = HashSet::new();
-        if self.scope == Scope::CameClose {
-            // A sample may have chosen the wrong one of two that are close.
-            selected = self.exchange(selected, usize::MAX)?;
-        }
         for round in 0..MOST_ROUNDS {
             let Some(next) = self.forward(&selected) else { break };
             let taken = next.terms.len();
             selected = self.backward(settle(problem, next)?)?;
-            if round > 0 || selected.terms.len() > 1 {
+            if self.scope == Scope::Everything && (round > 0 || selected.terms.len() > 1) {
                 // What was taken just now was held against all others with the same terms, unless one of them has gone
                 // since.
                 let compared = if selected.terms.len() == taken { taken - 1 } else { usize::MAX };
@@ -732,7 +720,7 @@ impl<'l> Chooser<'_, '_, 'l> {
                 for (less, other) in grown {
                     let other = other.newest();
                     if everything && less > gain - CLOSE_BEHIND {
-                        self.bests.came_close_to(term.law, other);
+                        self.bests.came_close(other);
                     }
                     let behind = Judged::number(Gate::First, less, gain, false);
                     self.trace.judged(Stage::Forward, other.law, &other.places, Some(term.law.label), vec![behind]);
@@ -766,12 +754,9 @@ impl<'l> Chooser<'_, '_, 'l> {
 
     /// The strongest laws of `open` added to terms, refined, that make sense there.
     fn refined_with(&self, others: &[Term<'l>], open: &[&'l Law]) -> Vec<(Term<'l>, Fit)> {
-        let (bests, scope) = (&*self.bests, self.scope);
+        let bests = &*self.bests;
         let scaffold = Scaffold::new(self.problem, others.iter().collect());
-        let tried = tried(&scaffold, open, |law| match scope {
-            Scope::Everything => bests.begin(&scaffold, law),
-            Scope::CameClose => bests.begin_close(law),
-        });
+        let tried = tried(&scaffold, open, |law| bests.begin(&scaffold, law));
         let rivals = best_tried(&scaffold, open, tried, EXCHANGED).terms;
         let refined = rivals.into_par_iter().with_max_len(1).filter_map(|term| scaffold.refine(term));
         refined.filter(|(term, fit)| sound(term, fit.last())).collect()
@@ -798,21 +783,17 @@ impl<'l> Chooser<'_, '_, 'l> {
     /// Replaces a term, but for the one at `compared`, by another law where that explains the data better; drops what
     /// no longer earns its place then.
     fn exchange(&mut self, selected: Selected<'l>, compared: usize) -> Option<Selected<'l>> {
-        let (problem, everything) = (self.problem, self.scope == Scope::Everything);
+        let problem = self.problem;
         for k in (0..selected.terms.len()).filter(|k| *k != compared) {
             let held = &selected.terms[k];
-            let in_scope = |law: &&Law| everything || self.bests.close_to.contains(&(held.law.id(), law.id()));
-            if !self.laws.iter().any(|law| in_scope(&law)) {
-                continue;
-            }
-            let is_new = |law: &&'l Law| in_scope(law) && selected.terms.iter().all(|t| t.law.label != law.label);
+            let is_new = |law: &&'l Law| selected.terms.iter().all(|t| t.law.label != law.label);
             let (without, open) = self.in_place_of(&selected, k, is_new)?;
             let refined = self.refined_with(&without.terms, &open);
             let now = selected.predicted(problem);
             let size = size_of(problem, &less(&now, &without.predicted(problem)));
             let evidence = selected.fit.solution.evidence + held.occam;
-            for of in refined.iter().filter(|of| everything && evidence_of(of) > evidence - CLOSE_BEHIND) {
-                self.bests.came_close_to(held.law, &of.0);
+            for of in refined.iter().filter(|of| evidence_of(of) > evidence - CLOSE_BEHIND) {
+                self.bests.came_close(&of.0);
             }
             let judge = |of: &(Term<'l>, Fit)| -> Vec<Judged> {
                 let (term, fit) = of;
