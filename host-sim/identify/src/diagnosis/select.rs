@@ -702,7 +702,6 @@ impl<'l> Chooser<'_, '_, 'l> {
         grown.sort_by(|a, b| ahead(b).total_cmp(&ahead(a)));
         let standings = standings(problem, selected);
         let strongest = strongest(&selected.terms, &standings);
-        simplest_first(problem, selected, &mut grown);
         let mut grown = grown.into_iter();
         while let Some((gain, next)) = grown.next() {
             let term = next.newest();
@@ -864,21 +863,3 @@ fn contenders_settled<'l>(problem: &Problem<'_>, grown: &mut [Grown<'l>], before
     });
 }
 
-/// Of selections that have grown by a term, best first, the simplest that predicts the same as the best, or is as
-/// likely, goes first.
-fn simplest_first<'l>(problem: &Problem<'_>, selected: &Selected<'l>, grown: &mut [Grown<'l>]) {
-    let Some((best_gain, best)) = grown.first() else { return };
-    let there = best.predicted(problem);
-    let size = size_of(problem, &less(&there, &selected.predicted(problem)));
-    let simplest = (1..grown.len())
-        .filter(|k| {
-            let (gain, next) = &grown[*k];
-            simpler(next.newest(), best.newest())
-                && (best_gain - gain < AS_LIKELY
-                    || same(size_of(problem, &less(&next.predicted(problem), &there)), size))
-        })
-        .min_by_key(|k| follows(grown[*k].1.newest()));
-    if let Some(k) = simplest {
-        grown[..=k].rotate_right(1);
-    }
-}

@@ -41,9 +41,6 @@ pub(crate) mod selection {
     pub(crate) const SAME_ARCSEC: f64 = 0.75;
     /// … and than this share of what they explain. *Guess*.
     pub(crate) const SAME_SHARE: f64 = 0.04;
-    /// Evidence within which what is simpler is taken: "not worth more than a bare mention" and "positive" by Kass &
-    /// Raftery (1995). *Source*.
-    pub(crate) const AS_LIKELY: f64 = 3.0;
     /// A law takes the place of another only where what it explains differs from it by less than this share. *Chosen*.
     pub(crate) const IN_PLACE: f64 = 0.7;
     /// Causes at most. *Source*: by definition.
