@@ -14,7 +14,6 @@
 //!
 //! Every decision on the way is in the `trace`; `explain` says from it why a cause was named or not.
 
-mod averaged;
 pub mod base;
 pub(crate) mod candidate;
 pub(crate) mod channels;
@@ -49,7 +48,6 @@ mod with_speed;
 mod zeros;
 
 use std::collections::HashSet;
-use std::sync::Arc;
 
 use flexspline::Table;
 use thiserror::Error;
@@ -57,7 +55,6 @@ use thiserror::Error;
 use crate::causes::CauseName;
 use crate::measurement::Session;
 use crate::nominal::Nominal;
-use averaged::Averaged;
 use candidate::{Deviation, Excitation, Label, Law, Scales, library, line, unnamed};
 pub use explain::Explanation;
 pub use extended::{Extended, FittedCause, FittedLaw, Series, added_by};
@@ -192,7 +189,7 @@ pub(crate) fn diagnose_extended(
     progress(1, 4, "causes");
     let search = Search::new(&on, settings)?;
     progress(2, 4, "rivals");
-    let Search { laws, problem, noise, stride, thinned, start, bests, fast, mut trace } = search;
+    let Search { laws, problem, noise, stride, thinned, start, bests, fast, trace } = search;
     let terms = terms_at(&problem, &laws, &start);
     let selected = Selected::of(&problem, terms).ok_or(DiagnosisError::NotFinite)?;
     let start = remembered(&laws, &selected.terms);
@@ -266,11 +263,10 @@ impl<'a> Search<'a> {
         let mut uncertain = prepare::uncertain(on, &[], &hung);
         let Resolution { mut stride, fast: at_first } = resolution(on, &laws, &uncertain, settings.averages, &[]);
         let whiten = |noise, uncertain: &[bool], stride| Whitener::new(on.rows, uncertain, stride, noise);
-        let mut averaged = Averaged::of(on, stride).map(Arc::new);
-        let mut free = FreeColumns::of(on, &laws, averaged.clone());
+        let mut free = FreeColumns::of(on, &laws);
         let (mut noise, mut worth) = prepare::noise(on, &free, &at_first, &uncertain, None);
         say_noise(&trace, noise, worth);
-        let mut problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth, averaged.clone());
+        let mut problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth);
         let mut fast: Vec<(Label, f64)> = Vec::new();
         let mut start: Vec<(usize, Vec<f64>)> = Vec::new();
         let mut bests = Bests::default();
@@ -329,11 +325,10 @@ impl<'a> Search<'a> {
             let closer_look = finer.stride < stride;
             stride = stride.min(finer.stride);
             if closer_look {
-                averaged = Averaged::of(on, stride).map(Arc::new);
                 thinned = Thinned::of(on, stride);
             }
-            if closer_look || !free.are_of(&laws) {
-                free = FreeColumns::of(on, &laws, averaged.clone());
+            if !free.are_of(&laws) {
+                free = FreeColumns::of(on, &laws);
             }
             explained.iter_mut().zip(&finer.fast).for_each(|(sum, fast)| *sum += fast);
             let (again, worth_again) = {
@@ -349,7 +344,7 @@ impl<'a> Search<'a> {
             }
             (noise, worth) = (again, worth_again);
             say_noise(&trace, noise, worth);
-            problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth, averaged.clone());
+            problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth);
         }
         Ok(Search { laws, problem, noise, stride, thinned, start, bests, fast, trace })
     }

@@ -862,4 +862,3 @@ fn contenders_settled<'l>(problem: &Problem<'_>, grown: &mut [Grown<'l>], before
         }
     });
 }
-

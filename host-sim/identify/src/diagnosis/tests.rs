@@ -857,7 +857,7 @@ fn noise_of(sessions: &[Session]) -> super::Noise {
         found = Some(
             super::prepare::noise(
                 on,
-                &super::FreeColumns::of(on, &laws, None),
+                &super::FreeColumns::of(on, &laws),
                 &[],
                 &super::prepare::uncertain(on, &[], &[]),
                 None,

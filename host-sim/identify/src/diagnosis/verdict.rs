@@ -137,9 +137,7 @@ pub(super) fn conclude(
     });
     let verdict = match verdict {
         Verdict::Explained | Verdict::PartlyExplained if causes.is_empty() => Verdict::Unknown,
-        Verdict::Explained if !is_explained(problem, rms_after, floor, held.total) => {
-            Verdict::PartlyExplained
-        }
+        Verdict::Explained if !is_explained(problem, rms_after, floor, held.total) => Verdict::PartlyExplained,
         other => other,
     };
     let once_in_a_turn = |cause: &Cause| {

@@ -369,8 +369,6 @@ struct Evaluated {
     parameters: MakeParameters,
     /// Whether shape parameters and coefficients make sense, signs above all.
     physical: IsPhysical,
-    /// It changes little from one row to the next.
-    smooth: bool,
 }
 
 /// How a law may be wrong.
@@ -450,7 +448,6 @@ impl Law {
                 columns: Box::new(columns),
                 parameters: Box::new(|_, _, _| Vec::new()),
                 physical: Box::new(|_, _| true),
-                smooth: false,
             },
             wrong: Wrong {
                 misfit: USUAL_MISFIT,
@@ -517,15 +514,6 @@ impl Law {
     fn kin_of_shapes(mut self) -> Law {
         self.wrong.kin = Kin::Shape;
         self
-    }
-    fn evaluated_on_averages(mut self) -> Law {
-        self.evaluated.smooth = true;
-        self
-    }
-    /// Whether it changes little from one row to the next, so that averages of rows tell what it says of their average.
-    #[must_use]
-    pub(crate) fn smooth(&self) -> bool {
-        self.evaluated.smooth
     }
     fn whole(mut self) -> Law {
         self.search.whole = true;
