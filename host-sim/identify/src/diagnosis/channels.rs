@@ -81,15 +81,14 @@ pub(super) fn floating(rows: &Rows, nominal: &Nominal, places: &[usize]) -> Vec<
     columns
 }
 
-/// An orthonormal basis of the smooth part of an error at some places: of the columns of [`floating`], of the first two
-/// orders of both wheels, and of `further` columns.
-pub(super) fn smooth_span(rows: &Rows, nominal: &Nominal, places: &[usize], further: Vec<Vec<f64>>) -> FreeSpan {
+/// An orthonormal basis of the smooth part of an error at some places: of the columns of [`floating`] and of the first
+/// two orders of both wheels.
+pub(super) fn smooth_span(rows: &Rows, nominal: &Nominal, places: &[usize]) -> FreeSpan {
     let mut columns = floating(rows, nominal, places);
     for order in [1.0, 2.0] {
         columns.extend(waves(order, &rows.on_flexspline, places));
         columns.extend(waves(order, &rows.on_circular_spline, places));
     }
-    columns.extend(further);
     FreeSpan::default().beyond(columns)
 }
 

@@ -4,11 +4,9 @@
 //! [`Extended::fit_to`] learns from some of the sessions alone, so that what it says of the others was not seen by it.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 use flexspline::Table;
 
-use super::averaged::Averaged;
 use super::base::{Base, PlayLaw};
 use super::candidate::{Acting, Excitation, Law, LawUnits, Regressor, Tag, Tolerance, library, together};
 use super::model::{Problem, Scaffold, terms_at};
@@ -171,7 +169,7 @@ impl Series {
 /// How finely rows are to be looked at, and the noise in them.
 fn fineness(on: &Excitation<'_>, laws: &[Law], uncertain: &[bool], averages: usize) -> Fineness {
     let Resolution { stride, fast } = resolution(on, laws, uncertain, averages, &[]);
-    let free = prepare::FreeColumns::of(on, laws, Averaged::of(on, stride).map(Arc::new));
+    let free = prepare::FreeColumns::of(on, laws);
     let (noise, worth) = prepare::noise(on, &free, &fast, uncertain, None);
     Fineness { stride, noise, worth }
 }
@@ -216,8 +214,7 @@ impl Extended {
         if averages_hide(&on, &laws, causes, &uncertain, stride) {
             stride = 1;
         }
-        let averaged = Averaged::of(&on, stride).map(Arc::new);
-        let problem = Problem::new(&on, &uncertain, Whitener::new(&rows, &uncertain, stride, noise), worth, averaged);
+        let problem = Problem::new(&on, &uncertain, Whitener::new(&rows, &uncertain, stride, noise), worth);
         let start = match Thinned::of(&on, stride) {
             Some(thinned) => {
                 let sample = Sample::new(&on, &thinned, &uncertain, stride);

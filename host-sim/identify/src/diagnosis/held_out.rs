@@ -3,10 +3,8 @@
 
 use super::model::{Fit, Problem, Scaffold, Term};
 use super::products::Set;
-use super::report::{HeldOut, Unexplained};
+use super::report::HeldOut;
 use super::rows::mean;
-use super::select::{self, Selected};
-use super::trace::{Gate, Judged, Stage, Trace};
 
 /// Errors of prediction in blocks left out.
 pub(crate) struct Evaluated {
@@ -31,42 +29,6 @@ pub fn evaluate(problem: &Problem<'_>, terms: &[&Term<'_>]) -> Evaluated {
         .collect();
     let rms = |square: f64| if square.is_finite() { square.sqrt() } else { 0.0 };
     Evaluated { total: HeldOut { rms_before_arcsec: rms(before), rms_after_arcsec: rms(after) }, gains }
-}
-
-/// The terms that predict sessions they were not fitted to: while all together predict them worse than none, the one
-/// that harms most is set aside, as long as that helps and another is left. Also what was set aside.
-#[must_use]
-pub(crate) fn proved<'l>(
-    problem: &Problem<'_>,
-    mut selected: Selected<'l>,
-    trace: &mut Trace,
-) -> (Selected<'l>, Vec<Unexplained>) {
-    let zero = own_zero(problem, &selected.terms.iter().collect::<Vec<_>>());
-    let square = |terms: &[&Term<'l>]| left_out(problem, terms, true, zero).unwrap_or(f64::INFINITY);
-    let none = square(&[]);
-    let mut aside = Vec::new();
-    while selected.terms.len() > 1 {
-        let all = square(&selected.terms.iter().collect::<Vec<_>>());
-        if all <= none {
-            break;
-        }
-        let best = (0..selected.terms.len())
-            .filter(|k| !selected.terms[*k].law.is_zero_of_sessions())
-            .map(|k| (square(&selected.others(k)), k))
-            .min_by(|a, b| a.0.total_cmp(&b.0))
-            .filter(|(without, _)| *without < all);
-        let Some((_, k)) = best else { break };
-        let size_arcsec = select::standing(problem, &selected, k).size;
-        let mut terms = selected.terms.clone();
-        let gone = terms.remove(k);
-        let looks_like = gone.law.label.to_string();
-        let Some(fewer) = Selected::of(problem, terms) else { break };
-        let predicts = Judged::number(Gate::Predicts, all.sqrt(), none.sqrt(), false);
-        trace.judged(Stage::HeldOut, gone.law, &gone.places, None, vec![predicts]);
-        aside.push(Unexplained { looks_like, size_arcsec });
-        selected = fewer;
-    }
-    (selected, aside)
 }
 
 /// Whether the bench sets the zero of a session, which is then found in the session itself: a model with these terms

@@ -14,9 +14,7 @@
 //!
 //! Every decision on the way is in the `trace`; `explain` says from it why a cause was named or not.
 
-mod averaged;
 pub mod base;
-mod blurred;
 pub(crate) mod candidate;
 pub(crate) mod channels;
 mod experiment;
@@ -50,7 +48,6 @@ mod with_speed;
 mod zeros;
 
 use std::collections::HashSet;
-use std::sync::Arc;
 
 use flexspline::Table;
 use thiserror::Error;
@@ -58,7 +55,6 @@ use thiserror::Error;
 use crate::causes::CauseName;
 use crate::measurement::Session;
 use crate::nominal::Nominal;
-use averaged::Averaged;
 use candidate::{Excitation, Label, Law, LawUnits, library, line, unnamed};
 pub use explain::Explanation;
 pub use extended::{Extended, FittedCause, FittedLaw, Series, added_by};
@@ -193,12 +189,9 @@ pub(crate) fn diagnose_extended(
     progress(1, 4, "causes");
     let search = Search::new(&on, settings)?;
     progress(2, 4, "rivals");
-    let Search { laws, problem, noise, stride, thinned, start, bests, fast, mut trace } = search;
+    let Search { laws, problem, noise, stride, thinned, start, bests, fast, trace } = search;
     let terms = terms_at(&problem, &laws, &start);
     let selected = Selected::of(&problem, terms).ok_or(DiagnosisError::NotFinite)?;
-    let (selected, mut unproved) = held_out::proved(&problem, selected, &mut trace);
-    let (selected, hides) = verdict::told_apart(&problem, selected, noise, &mut trace);
-    unproved.extend(hides);
     let start = remembered(&laws, &selected.terms);
     let maps = candidate::maps(&on);
     let mut left = remainder::of_maps(&problem, &selected, &maps, noise.white);
@@ -213,7 +206,6 @@ pub(crate) fn diagnose_extended(
     for something in &left {
         trace.say(&format_args!("left: {}, {:.2} arcsec", something.looks_like, something.size_arcsec));
     }
-    left.append(&mut unproved);
     let fineness = Fineness { stride, noise, worth: problem.worth };
     let sample = thinned.as_ref().map(|thinned| Sample::new(&on, thinned, &problem.uncertain, stride));
     let on_sample = sample.as_ref().map(|sample| sample.problem(noise, problem.worth));
@@ -271,11 +263,10 @@ impl<'a> Search<'a> {
         let mut uncertain = prepare::uncertain(on, &[], &hung);
         let Resolution { mut stride, fast: at_first } = resolution(on, &laws, &uncertain, settings.averages, &[]);
         let whiten = |noise, uncertain: &[bool], stride| Whitener::new(on.rows, uncertain, stride, noise);
-        let mut averaged = Averaged::of(on, stride).map(Arc::new);
-        let mut free = FreeColumns::of(on, &laws, averaged.clone());
+        let mut free = FreeColumns::of(on, &laws);
         let (mut noise, mut worth) = prepare::noise(on, &free, &at_first, &uncertain, None);
         say_noise(&trace, noise, worth);
-        let mut problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth, averaged.clone());
+        let mut problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth);
         let mut fast: Vec<(Label, f64)> = Vec::new();
         let mut start: Vec<(usize, Vec<f64>)> = Vec::new();
         let mut bests = Bests::default();
@@ -334,11 +325,10 @@ impl<'a> Search<'a> {
             let closer_look = finer.stride < stride;
             stride = stride.min(finer.stride);
             if closer_look {
-                averaged = Averaged::of(on, stride).map(Arc::new);
                 thinned = Thinned::of(on, stride);
             }
-            if closer_look || !free.are_of(&laws) {
-                free = FreeColumns::of(on, &laws, averaged.clone());
+            if !free.are_of(&laws) {
+                free = FreeColumns::of(on, &laws);
             }
             explained.iter_mut().zip(&finer.fast).for_each(|(sum, fast)| *sum += fast);
             let (again, worth_again) = {
@@ -354,7 +344,7 @@ impl<'a> Search<'a> {
             }
             (noise, worth) = (again, worth_again);
             say_noise(&trace, noise, worth);
-            problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth, averaged.clone());
+            problem = Problem::new(on, &uncertain, whiten(noise, &uncertain, stride), worth);
         }
         Ok(Search { laws, problem, noise, stride, thinned, start, bests, fast, trace })
     }

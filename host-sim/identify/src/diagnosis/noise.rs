@@ -126,12 +126,6 @@ impl Whitener {
             .collect()
     }
 
-    /// Rows of each average.
-    #[must_use]
-    pub(crate) fn groups(&self) -> &[std::ops::Range<usize>] {
-        &self.groups
-    }
-
     /// Averages of a column.
     #[must_use]
     pub(crate) fn average(&self, column: &[f64]) -> Vec<f64> {

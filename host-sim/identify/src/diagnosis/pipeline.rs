@@ -20,7 +20,7 @@ use thiserror::Error;
 
 use super::report::{Cause, Compensation, Diagnosis};
 use super::{CauseSet, DiagnosisError, Extended, FittedCause, Settings, diagnose_extended};
-use super::{blurred, channels, quieted, torque_zero, zeros};
+use super::{channels, quieted, torque_zero, zeros};
 use crate::causes::CauseName;
 use crate::extension::{
     CauseEntry, Evaluation, EvaluationError, ExtendedTables, FemAgreement, FoundGeometry, Model, Remake, RemakeError,
@@ -268,7 +268,6 @@ pub fn parse_rows(
     }
     recording.notes.extend(quieted::torque(&mut recording.sessions, &subject.nominal));
     if recording.unusable.is_none() {
-        blurred::check(&mut recording, &subject.nominal, subject.table.as_ref());
         torque_zero::check(&mut recording, &subject.nominal, subject.table.as_ref());
     }
     recording.average_to(MOST_ROWS);

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::candidate::Law;
 use super::model::{Fit, Problem, Scaffold, Term, among_each_other};
-use super::select::{Bests, Selected, Standing, begun, less, misfit_as, predicted, settle, size_of, sound};
+use super::select::{Bests, Selected, begun, less, predicted, settle, size_of, sound};
 use super::thresholds::rivals::*;
 use super::trace::{Gate, Judged};
 use crate::causes::CauseName;
@@ -18,38 +18,23 @@ pub(crate) struct Rival<'l> {
     pub misfit: f64,
     /// Difference of the predictions, rms arcsec.
     pub apart_arcsec: f64,
-    /// What it adds to the others is no more than what their laws may be wrong by.
-    pub mops_up: bool,
     /// The law that it is, and where.
     law: &'l Law,
     places: Vec<f64>,
 }
 
 impl Rival<'_> {
-    /// Whether a cause of this size holds against it: it is not told better by it, and is told apart from it.
+    /// Whether the data distinguish a cause of this size from it.
     #[must_use]
     pub(crate) fn judge(&self, size_arcsec: f64, out_of_tolerance: bool) -> Vec<Judged> {
         let least = if out_of_tolerance { OUT_OF_TOLERANCE_APART } else { TOLD_APART };
-        vec![
-            Judged::number(Gate::ToldBetter, self.misfit, TOLD_BETTER, !self.tells_better(size_arcsec)),
-            Judged::number(Gate::ToldApart, self.misfit, least, !self.looks_alike(size_arcsec, out_of_tolerance)),
-        ]
+        vec![Judged::number(Gate::ToldApart, self.misfit, least, !self.looks_alike(size_arcsec, out_of_tolerance))]
     }
 
-    /// What it comes to in the place of a cause of this size.
+    /// Whether it explains the data better in the place of a cause.
     #[must_use]
-    pub(crate) fn in_its_place(&self, size_arcsec: f64) -> Vec<Judged> {
-        vec![Judged::number(Gate::AsRival, self.misfit, TOLD_BETTER, self.tells_better(size_arcsec))]
-    }
-
-    /// Whether it tells the data better than a cause of this size, and otherwise: not by telling what the laws of the
-    /// other causes leave.
-    #[must_use]
-    pub(crate) fn tells_better(&self, size_arcsec: f64) -> bool {
-        !self.mops_up
-            && self.misfit < TOLD_BETTER
-            && self.apart_arcsec > SAME_ARCSEC.max(2.0 * SAME_SHARE * size_arcsec)
-            && self.apart_arcsec < IN_ITS_PLACE * size_arcsec
+    pub(crate) fn in_its_place(&self) -> Vec<Judged> {
+        vec![Judged::number(Gate::AsRival, self.misfit, -TOLD_APART, self.misfit < -TOLD_APART)]
     }
 
     /// Whether the data cannot tell it from a cause of this size. With a base parameter `out_of_tolerance` any rival
@@ -71,7 +56,6 @@ pub(crate) fn rivals<'l>(
     sample: OnSample<'_, '_>,
     laws: &'l [Law],
     selected: &Selected<'_>,
-    standings: &[Standing],
     bests: &Bests,
     k: usize,
 ) -> Vec<Rival<'l>> {
@@ -82,10 +66,10 @@ pub(crate) fn rivals<'l>(
         let terms = selected.terms.iter().map(|t| Term::new(sample, t.law, t.places.clone())).collect();
         let terms = among_each_other(sample, terms);
         let there = Selected::of(sample, terms)?;
-        Some((refitted(sample, &open, &there, standings, begin, k), share))
+        Some((refitted(sample, &open, &there, begin, k), share))
     });
     let mut rivals: Vec<Rival<'l>> = match of_sample {
-        None => refitted(problem, &open, selected, standings, begin, k),
+        None => refitted(problem, &open, selected, begin, k),
         Some((mut found, share)) => {
             found.iter_mut().for_each(|found| found.misfit /= share);
             let (near, far): (Vec<Rival<'l>>, Vec<Rival<'l>>) =
@@ -94,7 +78,7 @@ pub(crate) fn rivals<'l>(
             let from_there = |_: &Scaffold<'_, '_, '_, '_>, law: &Law| -> Vec<Vec<f64>> {
                 near.iter().filter(|found| found.law.id() == law.id()).map(|found| found.places.clone()).collect()
             };
-            let near = refitted(problem, &near_laws, selected, standings, from_there, k);
+            let near = refitted(problem, &near_laws, selected, from_there, k);
             near.into_iter().chain(far).collect()
         }
     };
@@ -109,7 +93,6 @@ fn refitted<'l>(
     problem: &Problem<'_>,
     open: &[&'l Law],
     selected: &Selected<'_>,
-    standings: &[Standing],
     begin: impl Fn(&Scaffold<'_, '_, '_, '_>, &Law) -> Vec<Vec<f64>> + Sync,
     k: usize,
 ) -> Vec<Rival<'l>> {
@@ -119,11 +102,6 @@ fn refitted<'l>(
     let now = selected.predicted(problem);
     // Where more is left than noise, as much may hide in any rival: rises count against what is left.
     let left = selected.fit.solution.misfit / (problem.worth * problem.data.len().max(1) as f64);
-    let lacking = scaffold.fit(None).map(|fit| predicted(problem, &others, &fit));
-    let others_may_err = |law: &Law| {
-        let others = selected.terms.iter().zip(standings).enumerate().filter(|(j, _)| *j != k);
-        misfit_as(law, others.map(|(_, other)| other))
-    };
     open.par_iter()
         .with_max_len(1)
         .filter_map(|law| {
@@ -155,12 +133,10 @@ fn refitted<'l>(
                 Some(settled) => (rise(&settled.fit), settled.predicted(problem)),
                 None => (rise(&fit), predicted(problem, &with, &fit)),
             };
-            let differs = |from: &[f64]| size_of(problem, &less(from, &then));
             Some(Rival {
                 cause: law.cause()?,
                 misfit,
-                apart_arcsec: differs(&now),
-                mops_up: lacking.as_ref().is_some_and(|lacking| differs(lacking) < others_may_err(law)),
+                apart_arcsec: size_of(problem, &less(&now, &then)),
                 law,
                 places: term.places.clone(),
             })

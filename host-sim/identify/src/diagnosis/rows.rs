@@ -70,8 +70,6 @@ pub struct Rows {
     pub unsure_s: f64,
     /// What rounding to a coarse resolution leaves in a row, one standard deviation, arcsec; 0 where noise blurs it.
     pub rounding: f64,
-    /// Whether a row is a mean over some time: what swings in that time is not in it.
-    pub means: bool,
     /// Sessions from which on the zero of the error is another one.
     pub zeros: Vec<usize>,
     /// Median sample period, s.
@@ -116,7 +114,6 @@ impl Rows {
             }
             rows.unsure_s = rows.unsure_s.max(session.unsure_s);
             rows.rounding = rows.rounding.max(session.coarse_rad * ARCSEC_PER_RAD / 12f64.sqrt());
-            rows.means |= session.mean_over_s > 0.0;
             if session.own_zero {
                 rows.zeros.push(rows.sessions.len());
             }
@@ -184,7 +181,6 @@ impl Rows {
             on_circular_spline: of(&self.on_circular_spline),
             loudness: of(&self.loudness),
             jitters: self.jitters,
-            means: self.means,
             zeros: self.zeros.clone(),
             unsure_s: self.unsure_s,
             rounding: self.rounding,

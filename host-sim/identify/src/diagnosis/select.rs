@@ -192,8 +192,6 @@ pub(crate) struct Bests {
     tried: HashMap<u64, Vec<Vec<f64>>>,
     /// Where those came to that were refined and came close, the latest first.
     close: HashMap<u64, Vec<Vec<f64>>>,
-    /// Those that came close to one that was chosen: that one first.
-    close_to: HashSet<(u64, u64)>,
 }
 
 impl Bests {
@@ -215,12 +213,6 @@ impl Bests {
         known.retain(|places| *places != term.places);
         known.insert(0, term.places.clone());
         known.truncate(NOTED);
-    }
-
-    /// Notes a refined term that came close to one that was chosen.
-    fn came_close_to(&mut self, chosen: &Law, term: &Term<'_>) {
-        self.came_close(term);
-        self.close_to.insert((chosen.id(), term.law.id()));
     }
 
     /// Whether a law came close.
@@ -563,11 +555,6 @@ fn evidence_of((term, fit): &(Term<'_>, Fit)) -> f64 {
     fit.solution.evidence + term.occam
 }
 
-/// Whether terms make no sense in a fit without another, for which they only stand in.
-fn stood_in_for(others: &[&Term<'_>], without: Option<&Fit>) -> bool {
-    without.is_some_and(|fit| others.iter().enumerate().any(|(j, other)| !sound(other, fit.of(j))))
-}
-
 /// The gates that a term has to pass to keep its place; `least` is the least size that counts, arcsec.
 pub(super) fn earns(
     problem: &Problem<'_>,
@@ -582,10 +569,6 @@ pub(super) fn earns(
         let apart = selected.without(problem, k);
         let others: Vec<&Term<'_>> = apart.iter().map(AsRef::as_ref).collect();
         let without = Scaffold::new(problem, others.clone()).fit(None);
-        if passed(&all) && stood_in_for(&others, without.as_ref()) {
-            // Without it others would have to make up for it, and make no sense then.
-            return all;
-        }
         let out = without.and_then(|fit| tolerance(problem, &fit, law));
         all.push(out.unwrap_or(Judged::plain(Gate::Tolerance, false)));
     }
@@ -629,15 +612,11 @@ impl<'l> Chooser<'_, '_, 'l> {
             selected = self.backward(settle_all(problem, selected)?)?;
         }
         let mut seen = HashSet::new();
-        if self.scope == Scope::CameClose {
-            // A sample may have chosen the wrong one of two that are close.
-            selected = self.exchange(selected, usize::MAX)?;
-        }
         for round in 0..MOST_ROUNDS {
-            let Some(next) = self.forward(&selected).or_else(|| self.two_for_unnamed(&selected)) else { break };
+            let Some(next) = self.forward(&selected) else { break };
             let taken = next.terms.len();
             selected = self.backward(settle(problem, next)?)?;
-            if round > 0 || selected.terms.len() > 1 {
+            if self.scope == Scope::Everything && (round > 0 || selected.terms.len() > 1) {
                 // What was taken just now was held against all others with the same terms, unless one of them has gone
                 // since.
                 let compared = if selected.terms.len() == taken { taken - 1 } else { usize::MAX };
@@ -723,7 +702,6 @@ impl<'l> Chooser<'_, '_, 'l> {
         grown.sort_by(|a, b| ahead(b).total_cmp(&ahead(a)));
         let standings = standings(problem, selected);
         let strongest = strongest(&selected.terms, &standings);
-        simplest_first(problem, selected, &mut grown);
         let mut grown = grown.into_iter();
         while let Some((gain, next)) = grown.next() {
             let term = next.newest();
@@ -741,7 +719,7 @@ impl<'l> Chooser<'_, '_, 'l> {
                 for (less, other) in grown {
                     let other = other.newest();
                     if everything && less > gain - CLOSE_BEHIND {
-                        self.bests.came_close_to(term.law, other);
+                        self.bests.came_close(other);
                     }
                     let behind = Judged::number(Gate::First, less, gain, false);
                     self.trace.judged(Stage::Forward, other.law, &other.places, Some(term.law.label), vec![behind]);
@@ -775,24 +753,12 @@ impl<'l> Chooser<'_, '_, 'l> {
 
     /// The strongest laws of `open` added to terms, refined, that make sense there.
     fn refined_with(&self, others: &[Term<'l>], open: &[&'l Law]) -> Vec<(Term<'l>, Fit)> {
-        let (bests, scope) = (&*self.bests, self.scope);
+        let bests = &*self.bests;
         let scaffold = Scaffold::new(self.problem, others.iter().collect());
-        let tried = tried(&scaffold, open, |law| match scope {
-            Scope::Everything => bests.begin(&scaffold, law),
-            Scope::CameClose => bests.begin_close(law),
-        });
+        let tried = tried(&scaffold, open, |law| bests.begin(&scaffold, law));
         let rivals = best_tried(&scaffold, open, tried, EXCHANGED).terms;
         let refined = rivals.into_par_iter().with_max_len(1).filter_map(|term| scaffold.refine(term));
         refined.filter(|(term, fit)| sound(term, fit.last())).collect()
-    }
-
-    /// The cause of `open` that explains the data best with the terms, taken in with them and settled.
-    fn with_best_cause(&self, open: &[&'l Law], others: Vec<Term<'l>>) -> Option<Selected<'l>> {
-        let is_new = |law: &&Law| law.named() && others.iter().all(|t| t.law.label != law.label);
-        let open: Vec<&Law> = open.iter().copied().filter(is_new).collect();
-        let refined = self.refined_with(&others, &open).into_iter();
-        let (term, fit) = refined.max_by(|a, b| evidence_of(a).total_cmp(&evidence_of(b)))?;
-        settle(self.problem, Selected { fit, terms: others.into_iter().chain([term]).collect() })
     }
 
     /// The selection without term `k`, its fit, and the laws of `some` that may be tried in the place of the term.
@@ -813,60 +779,20 @@ impl<'l> Chooser<'_, '_, 'l> {
         Some((without, open))
     }
 
-    /// Replaces a deviation without a name by two causes that explain the data no worse and earn it: with it in the
-    /// model each of them is held against all that it may be wrong by, so that none comes in.
-    fn two_for_unnamed(&mut self, selected: &Selected<'l>) -> Option<Selected<'l>> {
-        if selected.terms.iter().filter(|t| t.law.named()).count() + 2 > MOST_CAUSES {
-            return None;
-        }
-        let problem = self.problem;
-        for (k, held) in selected.terms.iter().enumerate().filter(|(_, t)| !t.law.named()) {
-            let in_scope = |law: &&Law| self.scope == Scope::Everything || self.bests.is_close(law);
-            let (without, open) = self.in_place_of(selected, k, in_scope)?;
-            let Some(one) = self.with_best_cause(&open, without.terms) else { continue };
-            let Some(two) = self.with_best_cause(&open, one.terms) else { continue };
-            let both = two.terms.len() - 2..two.terms.len();
-            let occam: f64 = two.terms[both.clone()].iter().map(|t| t.occam).sum();
-            let ahead_by = two.fit.solution.evidence + occam - selected.fit.solution.evidence - held.occam;
-            let standings = standings(problem, &two);
-            // They have names: it is enough not to be behind.
-            let ahead = Judged::above(Gate::Ahead, ahead_by, 0.0);
-            let gates = |j| [vec![ahead], earns(problem, &two, &standings, j, self.least)].concat();
-            let gates: Vec<Vec<Judged>> = both.clone().map(gates).collect();
-            let taken = gates.iter().all(|gates| passed(gates));
-            for (term, gates) in two.terms[both].iter().zip(gates) {
-                self.trace.judged(Stage::Exchange, term.law, &term.places, Some(held.law.label), gates);
-                if taken {
-                    self.given.insert((held.law.id(), term.law.id()));
-                }
-            }
-            if taken {
-                let gates = vec![Judged::number(Gate::First, 0.0, ahead_by, false)];
-                self.trace.judged(Stage::Exchange, held.law, &held.places, None, gates);
-                return Some(two);
-            }
-        }
-        None
-    }
-
     /// Replaces a term, but for the one at `compared`, by another law where that explains the data better; drops what
     /// no longer earns its place then.
     fn exchange(&mut self, selected: Selected<'l>, compared: usize) -> Option<Selected<'l>> {
-        let (problem, everything) = (self.problem, self.scope == Scope::Everything);
+        let problem = self.problem;
         for k in (0..selected.terms.len()).filter(|k| *k != compared) {
             let held = &selected.terms[k];
-            let in_scope = |law: &&Law| everything || self.bests.close_to.contains(&(held.law.id(), law.id()));
-            if !self.laws.iter().any(|law| in_scope(&law)) {
-                continue;
-            }
-            let is_new = |law: &&'l Law| in_scope(law) && selected.terms.iter().all(|t| t.law.label != law.label);
+            let is_new = |law: &&'l Law| selected.terms.iter().all(|t| t.law.label != law.label);
             let (without, open) = self.in_place_of(&selected, k, is_new)?;
             let refined = self.refined_with(&without.terms, &open);
             let now = selected.predicted(problem);
             let size = size_of(problem, &less(&now, &without.predicted(problem)));
             let evidence = selected.fit.solution.evidence + held.occam;
-            for of in refined.iter().filter(|of| everything && evidence_of(of) > evidence - CLOSE_BEHIND) {
-                self.bests.came_close_to(held.law, &of.0);
+            for of in refined.iter().filter(|of| evidence_of(of) > evidence - CLOSE_BEHIND) {
+                self.bests.came_close(&of.0);
             }
             let judge = |of: &(Term<'l>, Fit)| -> Vec<Judged> {
                 let (term, fit) = of;
@@ -935,23 +861,4 @@ fn contenders_settled<'l>(problem: &Problem<'_>, grown: &mut [Grown<'l>], before
             *grown = (settled.evidence() - before, settled);
         }
     });
-}
-
-/// Of selections that have grown by a term, best first, the simplest that predicts the same as the best, or is as
-/// likely, goes first.
-fn simplest_first<'l>(problem: &Problem<'_>, selected: &Selected<'l>, grown: &mut [Grown<'l>]) {
-    let Some((best_gain, best)) = grown.first() else { return };
-    let there = best.predicted(problem);
-    let size = size_of(problem, &less(&there, &selected.predicted(problem)));
-    let simplest = (1..grown.len())
-        .filter(|k| {
-            let (gain, next) = &grown[*k];
-            simpler(next.newest(), best.newest())
-                && (best_gain - gain < AS_LIKELY
-                    || same(size_of(problem, &less(&next.predicted(problem), &there)), size))
-        })
-        .min_by_key(|k| follows(grown[*k].1.newest()));
-    if let Some(k) = simplest {
-        grown[..=k].rotate_right(1);
-    }
 }

@@ -489,28 +489,6 @@ fn at_one_orientation_a_side_load_and_a_runout_are_look_alikes() {
     assert!(diagnosis.next_experiment.is_some());
 }
 
-/// A cause beside itself: of the two nothing is known, and of either alone all.
-#[test]
-fn of_two_causes_that_hide_each_other_one_is_set_aside_and_leaves_nothing() {
-    let sessions = data(&[RUNOUT], 5);
-    excited_by(&sessions, &catalogue_drive(), |on| {
-        let search = super::Search::new(on, &Settings::default()).unwrap();
-        let (problem, noise) = (&search.problem, search.noise);
-        let mut terms = super::terms_at(problem, &search.laws, &search.start);
-        assert_eq!(terms.len(), 1);
-        terms.push(terms[0].clone());
-        let both = super::Selected::of(problem, terms).unwrap();
-        let mut trace = super::Trace::new(false);
-        let (apart, aside) = super::verdict::told_apart(problem, both, noise, &mut trace);
-        assert_eq!(apart.terms.len(), 1);
-        assert!(apart.terms[0].law.is(CauseName::FlexsplineRunout));
-        assert!(aside.is_empty(), "the other takes all of it over: {aside:?}");
-        // One alone hides nothing.
-        let (alone, aside) = super::verdict::told_apart(problem, apart, noise, &mut trace);
-        assert!(alone.terms.len() == 1 && aside.is_empty());
-    });
-}
-
 #[test]
 fn data_that_say_nothing_are_refused() {
     let nominal = catalogue_drive();
@@ -879,7 +857,7 @@ fn noise_of(sessions: &[Session]) -> super::Noise {
         found = Some(
             super::prepare::noise(
                 on,
-                &super::FreeColumns::of(on, &laws, None),
+                &super::FreeColumns::of(on, &laws),
                 &[],
                 &super::prepare::uncertain(on, &[], &[]),
                 None,

@@ -41,9 +41,6 @@ pub(crate) mod selection {
     pub(crate) const SAME_ARCSEC: f64 = 0.75;
     /// … and than this share of what they explain. *Guess*.
     pub(crate) const SAME_SHARE: f64 = 0.04;
-    /// Evidence within which what is simpler is taken: "not worth more than a bare mention" and "positive" by Kass &
-    /// Raftery (1995). *Source*.
-    pub(crate) const AS_LIKELY: f64 = 3.0;
     /// A law takes the place of another only where what it explains differs from it by less than this share. *Chosen*.
     pub(crate) const IN_PLACE: f64 = 0.7;
     /// Causes at most. *Source*: by definition.
@@ -86,11 +83,6 @@ pub(crate) mod rivals {
     pub(crate) const SAME_ARCSEC: f64 = 0.5;
     /// Nor are those closer than this share of the cause's size. *Guess*.
     pub(crate) const SAME_SHARE: f64 = 0.12;
-    /// A rival tells the data better that lowers the misfit by this: five standard deviations, and a share of what was
-    /// there for one that has more columns to do it with. *Chosen*.
-    pub(crate) const TOLD_BETTER: f64 = -100.0;
-    /// A rival whose prediction differs by more than this share of a cause's size tells something else. *Chosen*.
-    pub(crate) const IN_ITS_PLACE: f64 = 0.9;
 }
 
 /// Which of the causes found may be named.

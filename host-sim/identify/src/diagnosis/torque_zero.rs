@@ -19,7 +19,7 @@ use crate::nominal::Nominal;
 /// Rows that are followed, about: of longer recordings the beginnings of all sessions. *Guess*: it bounds the time.
 const FOLLOWED: usize = 200_000;
 /// Rows of these that are compared, about. *Guess*: some 330 to each of the blocks.
-pub(super) const SAMPLE: usize = 8000;
+const SAMPLE: usize = 8000;
 
 /// The largest zero that is looked for, as a share of the load: sensors are good to some per cent of their range. One
 /// from there on is none that was found, but the end of what was tried: something else goes on as far as one lets
@@ -82,7 +82,7 @@ impl<'a> Held<'a> {
         let turned =
             rows.output.iter().zip(&rows.orientation).map(|(out, housing)| (out + housing).sin_cos()).collect();
         let harmonics = places.iter().map(|k| nominal.harmonics_arcsec(rows.generator[*k])).collect();
-        let free = smooth_span(&rows, nominal, &places, Vec::new());
+        let free = smooth_span(&rows, nominal, &places);
         Held { rows, nominal, table, law: PlayLaw::Held, turned, places, harmonics, free }
     }
 
@@ -188,16 +188,16 @@ const WORTH_A_ROUND: f64 = 0.999;
 
 /// How much is left in each block of rows: the sum of the magnitudes, which the rows of a flank turned over too early
 /// do not rule.
-pub(super) fn by_block(left: &[f64]) -> Vec<f64> {
+fn by_block(left: &[f64]) -> Vec<f64> {
     left.chunks(left.len().div_ceil(BLOCKS).max(1)).map(|block| block.iter().map(|v| v.abs()).sum()).collect()
 }
 
-pub(super) fn sum(values: &[f64]) -> f64 {
+fn sum(values: &[f64]) -> f64 {
     values.iter().sum()
 }
 
 /// Whether less is left in the second than in the first, by this many standard deviations of the blocks' mean.
-pub(super) fn is_certain(first: &[f64], second: &[f64], stds: f64) -> bool {
+fn is_certain(first: &[f64], second: &[f64], stds: f64) -> bool {
     let gains: Vec<f64> = first.iter().zip(second).map(|(first, second)| first - second).collect();
     let (gain, blocks) = (mean(&gains), gains.len() as f64);
     let spread = (gains.iter().map(|of| (of - gain).powi(2)).sum::<f64>() / (blocks - 1.0) / blocks).sqrt();

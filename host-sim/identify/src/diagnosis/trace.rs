@@ -28,8 +28,6 @@ pub enum Stage {
     Exchange,
     /// How a law that was chosen stands when the search is over.
     Settled,
-    /// Laws have to predict sessions that they were not fitted to.
-    HeldOut,
     /// What has no name beside a cause must not be too large.
     Understood,
     /// Every rival is refitted in the place of a cause.
@@ -48,7 +46,6 @@ impl Stage {
             Stage::Backward => ("backward", "held against what was chosen after it"),
             Stage::Exchange => ("exchange", "tried in the place of another cause"),
             Stage::Settled => ("settled", "at the end of the search"),
-            Stage::HeldOut => ("held_out", "in sessions left out of the fit"),
             Stage::Understood => ("understood", "beside what has no name"),
             Stage::Rival => ("rival", "against its rivals"),
             Stage::Verdict => ("verdict", "the verdict"),
@@ -101,8 +98,6 @@ pub enum Gate {
     Ahead,
     /// It explains the same as what it takes the place of: they differ by less than this share of that.
     SamePlace,
-    /// With it sessions left out are predicted no worse than with no cause at all, arcsec rms.
-    Predicts,
     /// A line of the generator's angle does not grow with the speed.
     NoGrowthWithSpeed,
     /// A load that was not recorded may make it: no more is left than this many times the noise.
@@ -113,8 +108,6 @@ pub enum Gate {
     KnownWell,
     /// The best known of its sizes is this many times its standard deviation.
     ToldFromZero,
-    /// No rival lowers the misfit by this much.
-    ToldBetter,
     /// Rivals raise the misfit by this much.
     ToldApart,
     /// As a rival it would lower the misfit against the cause that was named.
@@ -154,13 +147,11 @@ impl Gate {
             Gate::LeftOut => "left_out",
             Gate::Ahead => "ahead",
             Gate::SamePlace => "same_place",
-            Gate::Predicts => "predicts",
             Gate::NoGrowthWithSpeed => "no_growth_with_speed",
             Gate::LoadKnown => "load_known",
             Gate::NoLineBeside => "no_line_beside",
             Gate::KnownWell => "known_well",
             Gate::ToldFromZero => "told_from_zero",
-            Gate::ToldBetter => "told_better",
             Gate::ToldApart => "told_apart",
             Gate::AsRival => "as_rival",
             Gate::NoWorse => "no_worse",
@@ -188,7 +179,6 @@ impl Gate {
             Gate::LeftOut => "predicts sessions that it was not fitted to (gain)",
             Gate::Ahead => "tells the data better than the cause in whose place it is tried (evidence)",
             Gate::SamePlace => "tells the same as the cause in whose place it is tried (difference as a share of that)",
-            Gate::Predicts => "keeps the causes together better than none in sessions left out (arcsec rms)",
             Gate::NoGrowthWithSpeed => {
                 "does not grow with the speed (growth of its amplitude, standard deviations; negative where it fades)"
             }
@@ -201,7 +191,6 @@ impl Gate {
             }
             Gate::KnownWell => "is known well beside what has no name (times its own uncertainty)",
             Gate::ToldFromZero => "has a size that is told from zero (times its standard deviation)",
-            Gate::ToldBetter => "is not told better by a rival (rise of the misfit with the rival in its place)",
             Gate::ToldApart => "is told apart from a rival (rise of the misfit with the rival in its place)",
             Gate::AsRival => "tells the data better in the place of a cause that was named (rise of the misfit)",
             Gate::NoWorse => "predicts sessions left out, with the others named (arcsec rms)",
@@ -216,7 +205,6 @@ impl Gate {
             Gate::Deviations
                 | Gate::Room
                 | Gate::SamePlace
-                | Gate::Predicts
                 | Gate::LoadKnown
                 | Gate::NoLineBeside
                 | Gate::NoGrowthWithSpeed
@@ -389,10 +377,7 @@ impl Trace {
         let search = |step: &&Step| !matches!(step.stage, Stage::Exchange | Stage::Rival);
         let last = self.of(cause).rev().find(search)?;
         if last.passed() {
-            // It was let through by all but a rival that explains the data better.
-            return self.of(cause).find(|step| {
-                step.stage == Stage::Rival && step.gates.iter().any(|j| j.gate == Gate::ToldBetter && !j.passed)
-            });
+            return None;
         }
         let gained = |step: &Step| {
             [Gate::Evidence, Gate::Gain, Gate::First, Gate::Refined]

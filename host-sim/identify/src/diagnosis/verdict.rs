@@ -78,12 +78,11 @@ pub(super) fn conclude(
     }
     let mut causes = Vec::new();
     let mut next_experiment = None;
-    let mut told_better = Vec::new();
     if verdict != Verdict::Unknown {
         let of_all: Vec<Vec<rivals::Rival<'_>>> = named
             .par_iter()
             .with_max_len(1)
-            .map(|k| rivals::rivals(problem, sample, laws, &selected, &standings, bests, *k))
+            .map(|k| rivals::rivals(problem, sample, laws, &selected, bests, *k))
             .collect();
         for (k, rivals) in named.iter().copied().zip(of_all) {
             let Some(name) = selected.terms[k].law.cause() else { continue };
@@ -92,12 +91,7 @@ pub(super) fn conclude(
             for rival in &rivals {
                 let against = |label: CauseName| Some(label.into());
                 trace.decided(Stage::Rival, name.into(), against(rival.cause), rival.judge(size, base));
-                trace.decided(Stage::Rival, rival.cause.into(), against(name), rival.in_its_place(size));
-            }
-            if rivals.iter().any(|r| r.tells_better(size)) {
-                // A rival that no other test lets through explains it better: neither is known.
-                told_better.push(k);
-                continue;
+                trace.decided(Stage::Rival, rival.cause.into(), against(name), rival.in_its_place());
             }
             let (alike, misfits): (Vec<CauseName>, Vec<f64>) =
                 rivals.iter().filter(|r| r.looks_alike(size, base)).map(|r| (r.cause, r.misfit)).take(3).unzip();
@@ -143,9 +137,7 @@ pub(super) fn conclude(
     });
     let verdict = match verdict {
         Verdict::Explained | Verdict::PartlyExplained if causes.is_empty() => Verdict::Unknown,
-        Verdict::Explained if !told_better.is_empty() || !is_explained(problem, rms_after, floor, held.total) => {
-            Verdict::PartlyExplained
-        }
+        Verdict::Explained if !is_explained(problem, rms_after, floor, held.total) => Verdict::PartlyExplained,
         other => other,
     };
     let once_in_a_turn = |cause: &Cause| {
@@ -164,7 +156,7 @@ pub(super) fn conclude(
         held_out.rms_after_arcsec = held_out.rms_before_arcsec;
     }
     let mut unexplained_list: Vec<Unexplained> = (0..selected.terms.len())
-        .filter(|k| !named.contains(k) || told_better.contains(k) || verdict == Verdict::Unknown)
+        .filter(|k| !named.contains(k) || verdict == Verdict::Unknown)
         .filter(|k| !of_the_bench(&selected.terms[*k]))
         .map(|k| Unexplained { looks_like: selected.terms[k].law.label.to_string(), size_arcsec: standings[k].size })
         .collect();
@@ -368,55 +360,6 @@ fn floor(problem: &Problem<'_>, noise: Noise) -> f64 {
 fn known(problem: &Problem<'_>, selected: &Selected<'_>, noise: Noise) -> Vec<Known> {
     let left = problem.certain_rms(&remainder::left(problem, selected));
     uncertainty::known(problem, selected, beyond_noise(left, floor(problem, noise)))
-}
-
-/// The terms without those that hide others: where two causes do so nearly the same that the size of neither is known
-/// from zero, and that of one is where the other is left out, the smaller is set aside. As often as not the smaller is
-/// what the law of the larger leaves; what else may stand in the place of the larger, rivals and look-alikes say. Also
-/// what was set aside, with as much of it as the others do not take over.
-#[must_use]
-pub(super) fn told_apart<'l>(
-    problem: &Problem<'_>,
-    mut selected: Selected<'l>,
-    noise: Noise,
-    trace: &mut Trace,
-) -> (Selected<'l>, Vec<Unexplained>) {
-    let told = |selected: &Selected<'l>| -> Vec<f64> {
-        known(problem, selected, noise).iter().map(|known| known.told_from_zero).collect()
-    };
-    let mut aside = Vec::new();
-    while selected.terms.iter().filter(|term| term.law.named()).count() > 1 {
-        let now = told(&selected);
-        let standings = standings(problem, &selected);
-        let mut doubtful: Vec<usize> =
-            (0..selected.terms.len()).filter(|k| selected.terms[*k].law.named() && now[*k] < TOLD_FROM_ZERO).collect();
-        doubtful.sort_by(|a, b| standings[*a].size.total_cmp(&standings[*b].size));
-        let without = |k: usize| -> Option<Selected<'l>> {
-            let mut terms = selected.terms.clone();
-            terms.remove(k);
-            let less = select::settle(problem, Selected::of(problem, terms)?)?;
-            let then = told(&less);
-            let is_told = |j: usize| then[j - usize::from(j > k)] >= TOLD_FROM_ZERO;
-            let larger = doubtful.iter().skip_while(|j| **j != k).skip(1);
-            larger.copied().any(is_told).then_some(less)
-        };
-        let Some((k, less)) = doubtful.iter().find_map(|k| Some((*k, without(*k)?))) else { break };
-        let gone = &selected.terms[k];
-        let gates = vec![Judged::above(Gate::ToldFromZero, now[k], TOLD_FROM_ZERO)];
-        trace.judged(Stage::Understood, gone.law, &gone.places, None, gates);
-        let size_arcsec = not_taken_over(problem, &selected, &less);
-        if size_arcsec > select::least_size(noise.white) {
-            aside.push(Unexplained { looks_like: gone.law.label.to_string(), size_arcsec });
-        }
-        selected = less;
-    }
-    (selected, aside)
-}
-
-/// What the terms explain and fewer of them, fitted anew, do not, arcsec: what is left without the others.
-fn not_taken_over(problem: &Problem<'_>, all: &Selected<'_>, fewer: &Selected<'_>) -> f64 {
-    let (left, then) = (remainder::left(problem, all), remainder::left(problem, fewer));
-    problem.certain_rms(&select::less(&then, &left))
 }
 
 /// By what noise counts more where more is left than that (Birge 1932): the laws are not right to the noise then.

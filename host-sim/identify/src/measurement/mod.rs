@@ -80,8 +80,6 @@ pub struct Session {
     pub unsure_s: f64,
     /// Step of the resolution at the output where no noise blurs it, rad; else 0.
     pub coarse_rad: f64,
-    /// Time over which a row is a mean, s; 0 where it is read at one instant.
-    pub mean_over_s: f64,
 }
 
 impl Session {

@@ -118,7 +118,7 @@ impl<'a> Excitation<'a> {
             }
             Need::Time => rows.recorded.time,
             Need::Motion => rows.speed.iter().any(|w| *w != 0.0),
-            Need::Swings => !rows.means && dynamic::makes_a_load_swing(self),
+            Need::Swings => dynamic::makes_a_load_swing(self),
             Need::HalfOutputTurn => self.output_span_rad() >= PI,
             Need::Use => {
                 let turned = rows.travel.last().is_some_and(|travel| *travel >= USED_TURNS * 2.0 * PI);
@@ -364,8 +364,6 @@ pub(crate) struct Law {
     parameters: MakeParameters,
     /// Whether shape parameters and coefficients make sense, signs above all.
     physical: IsPhysical,
-    /// It changes little from one row to the next.
-    smooth: bool,
     /// How it may be wrong.
     pub wrong: Wrong,
     /// How it is looked for.
@@ -450,7 +448,6 @@ impl Law {
             columns: Box::new(columns),
             parameters: Box::new(|_, _, _| Vec::new()),
             physical: Box::new(|_, _| true),
-            smooth: false,
             wrong: Wrong {
                 misfit: USUAL_MISFIT,
                 misfit_unnamed: 0.0,
@@ -522,15 +519,6 @@ impl Law {
     fn kin_of_shapes(mut self) -> Law {
         self.wrong.kin = Kin::Shape;
         self
-    }
-    fn evaluated_on_averages(mut self) -> Law {
-        self.smooth = true;
-        self
-    }
-    /// Whether it changes little from one row to the next, so that it holds for averages of rows.
-    #[must_use]
-    pub(crate) fn smooth(&self) -> bool {
-        self.smooth
     }
     fn shapes(mut self, shapes: impl IntoIterator<Item = Shape>) -> Law {
         self.shapes = shapes.into_iter().collect();
