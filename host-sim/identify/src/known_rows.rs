@@ -5,13 +5,12 @@ use std::path::Path;
 
 use flexspline::Table;
 
-use crate::diagnosis::pipeline::{Subject, parse_rows};
+use crate::diagnosis::channels::check_torque;
+use crate::diagnosis::pipeline::in_radians;
 use crate::measurement::{
-    ColumnMap, FEW, FEWEST_ROWS, FaultName, IN_DEGREES, MeasuredError, Quantity, Recording, Treatment, bytes_of,
-    parse_as,
+    ColumnMap, FEW, FEWEST_ROWS, FaultName, MeasuredError, Recording, Session, bytes_of, parse_as,
 };
 use crate::nominal::Nominal;
-use flexspline_mechanics::drive::{Drive, GeneratorKind};
 
 /// Reads a file of rows of a drive with this model, and the table that takes its place where there is one.
 ///
@@ -38,41 +37,28 @@ pub fn parse_known(
     nominal: &Nominal,
     table: Option<&Table<'_>>,
 ) -> Result<Recording, MeasuredError> {
-    let gear = nominal.gear();
-    let mut read = parse_as(file, bytes, columns, &gear, FEW)?;
+    let read = parse_as(file, bytes, columns, &nominal.gear(), FEW)?;
     let says_something = !nominal.harmonics.is_empty() || nominal.wind_up_arcsec(1.0) != 0.0;
-    if !says_something || read.rows < FEWEST_ROWS {
+    if !says_something || read.sessions.iter().map(Session::len).sum::<usize>() < FEWEST_ROWS {
         return Ok(read);
     }
-    let (nominal, table) = (nominal.clone(), table.copied());
-    // Causes are asked of no drive here: any will do.
-    let (drive, kind) = (Drive::hhd_95(), GeneratorKind::Cam);
-    let subject = Subject { nominal, table, model: None, drive, kind };
-    // Too few rows may be in order for a diagnosis, which then says nothing of them.
-    let Ok(asked) = parse_rows(file, bytes, columns, &subject) else { return Ok(read) };
-    let told: Vec<_> = asked.faults.into_iter().filter(|fault| !read.faults.contains(fault)).collect();
-    let of = |name: FaultName, channel: Option<Quantity>| {
-        told.iter()
-            .find(|fault| fault.name == name && fault.channel == channel && fault.treatment == Treatment::Repaired)
-    };
-    if of(FaultName::UnitMismatch, None).is_some() {
-        read = parse_as(file, bytes, columns, &gear, IN_DEGREES)?;
+    let mut read = in_radians((file, bytes, columns), (nominal, table), read, |_| true);
+    let mut asked = read.with_sessions(read.sessions.clone());
+    check_torque(&mut asked, nominal, table);
+    for fault in asked.faults {
+        if fault.name == FaultName::TorqueSign {
+            read.sessions.clone_from(&asked.sessions);
+            read.faults.push(fault);
+        } else {
+            read.notes.push(format!("`diagnose` doubts the torque, which stays here: {}", fault.what));
+        }
     }
-    if let Some(turned) = of(FaultName::TorqueSign, Some(Quantity::Torque)) {
-        let torques = read.sessions.iter_mut().filter_map(|session| session.torque_n_m.as_mut()).flatten();
-        torques.for_each(|torque| *torque = -*torque);
-        read.faults.push(turned.clone());
-    }
-    let unit = |name: FaultName| [FaultName::UnitMismatch, FaultName::TorqueScale].contains(&name);
-    let doubts = told.iter().filter(|fault| fault.channel == Some(Quantity::Torque) && unit(fault.name));
-    read.notes.extend(doubts.map(|fault| format!("`diagnose` doubts the torque, which stays here: {}", fault.what)));
     Ok(read)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measurement::Session;
     use crate::synthesize::catalogue_drive;
     use flexspline_base::units::ARCSEC_PER_RAD;
 

@@ -10,12 +10,14 @@ use super::context::{Context, quoted, table_image, table_of};
 use super::logs::LogOptions;
 use super::{Failure, bad_file, bad_input, report, say};
 use flexspline_base::output::Outputs;
-use flexspline_design::tables::{c_header, rust_source};
+use flexspline_design::tables::{MadeTable, c_header, rust_source};
 use flexspline_identify::calibrate::{
     Bench, Calibrated, Calibration, CalibrationError, Planned, Prior, calibrate, one_in, plan,
 };
+use flexspline_identify::diagnosis::Subject;
 use flexspline_identify::extension::Model;
 use flexspline_identify::known_rows::read_known;
+use flexspline_identify::measurement::Recording;
 use flexspline_mechanics::drive::GeneratorKind;
 use flexspline_report::calibration_report;
 
@@ -51,7 +53,7 @@ pub(super) struct Calibrate {
     /// Folder of tables made by `flexspline tables`; the one of --generator is the starting point
     #[arg(long, value_name = "DIR")]
     tables: Option<PathBuf>,
-    /// Nominal model from the catalogue as the starting point
+    /// Nominal model from the catalogue as the starting point, or one extended with causes by `flexspline diagnose`
     #[arg(long, value_name = "nominal.toml")]
     model: Option<PathBuf>,
     /// Generator turns per output turn, negative if they turn in opposite directions, if nothing else is known
@@ -140,6 +142,9 @@ impl Calibrate {
             .map(|file| read_known(file, &map, &prior.nominal, prior.table))
             .collect::<Result<Vec<_>, _>>();
         let files = files.map_err(bad_input)?;
+        let known = self.known_table(context, &files)?;
+        let known = known.as_ref().map(|made| table_of(Path::new("drive-extended"), &made.image)).transpose()?;
+        let prior = known.as_ref().map_or(prior, |known| Prior::of_table(known, self.generator));
         let out = if self.more { context.out_for_plan(PLAN_BEGINS)? } else { context.out()? };
         if !self.no_report {
             report::before(context, out, "calibrate", None);
@@ -207,22 +212,21 @@ impl Calibrate {
             return Ok(Prior::of_table(table, self.generator));
         }
         if let Some(path) = &self.model {
-            let model = Model::read(path).map_err(bad_input)?;
-            if !model.causes.is_empty() {
-                let what = "found [[extension.cause]], allowed: a nominal model without causes; what they are is \
-                            fitted here anew";
-                return Err(bad_file(path)(what));
-            }
-            let bytes = std::fs::read(path).map_err(bad_file(path))?;
-            let (drive, hash) = (path.display().to_string(), *blake3::hash(&bytes).as_bytes());
-            let known = Prior::of_ratio(model.nominal.ratio, self.generator);
-            return Ok(Prior { nominal: model.nominal, drive, hash, ..known });
+            return Prior::of_file(path, self.generator).map(|(prior, _)| prior).map_err(bad_input);
         }
         let ratio = self.ratio.unwrap_or_default();
         if !(ratio.is_finite() && ratio.abs() >= 2.0 && ratio.abs() <= 1e4) {
             return Err(Failure::BadInput(format!("--ratio: found {ratio}, allowed: 2 to 10000, or negative")));
         }
         Ok(Prior::of_ratio(ratio, self.generator))
+    }
+
+    /// The table of a model that holds causes, over what the logs hold: the starting point in its place.
+    fn known_table(&self, context: &Context, files: &[Recording]) -> Result<Option<MadeTable>, Failure> {
+        let Some(path) = &self.model else { return Ok(None) };
+        let model = Model::read(path).map_err(bad_input)?;
+        let made = Subject::of_model(model, context.drive()?, self.generator).known_table(files);
+        made.map_err(bad_file(path))
     }
 
     /// How the table is tried on another log.

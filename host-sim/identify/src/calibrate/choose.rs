@@ -8,7 +8,7 @@ use super::folds::{Chosen, Folds};
 pub(super) const PENALTIES: [f64; 4] = [1e-4, 1e-3, 1e-2, 1e-1];
 /// A part is kept if it takes at least this share of the squares left without it: one per cent of the error. Chosen on
 /// the two records of `examples/`.
-pub(super) const LEAST_GAIN: f64 = 0.02;
+pub(crate) const LEAST_GAIN: f64 = 0.02;
 
 /// Parts chosen one after another, the best first, as long as each gains: none, the first, the first two, and so on.
 pub(super) fn path(folds: &Folds, of: &[usize]) -> Vec<Vec<Chosen>> {

@@ -29,7 +29,8 @@ use flexspline::{ImageError, Table, WriteError};
 use serde::Serialize;
 
 use crate::measurement::{Fault, FaultName, MeasuredError, Recording, least_and_most};
-use choose::{LEAST_GAIN, best_penalty, nested, path, pruned};
+pub(crate) use choose::LEAST_GAIN;
+use choose::{best_penalty, nested, path, pruned};
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_design::tables::{MadeTable, TableError, dead_zone_n_m};
 use folds::{Chosen, Folds};
@@ -61,9 +62,10 @@ const OTHER_DEAD_ZONE: f64 = 0.8;
 const SAME_TORQUE: f64 = 1e-3;
 /// Share of the motion that the rarer direction must have for the play to be seen.
 const BOTH_WAYS: f64 = 0.1;
-/// Shares of a turn that must have been recorded for a curve over it: of the generator, and of the output.
+/// Shares of a turn that must have been recorded for a curve over it: of the generator, and of the output, whose curve
+/// is smooth over a period of its highest wave.
 const MOST_OF_A_TURN: f64 = 0.75;
-const HALF_A_TURN: f64 = 0.5;
+const PERIOD_OF_THE_OUTPUT: f64 = 1.0 / parts::OUTPUT_ORDERS as f64;
 /// Rows that a tooth pitch needs for its curve.
 const ROWS_OF_A_PITCH: f64 = 6.0;
 /// Rows that the usual half width is taken of.
@@ -521,20 +523,14 @@ fn by_zeros(file: &Recording) -> Vec<Recording> {
     let mut pieces: Vec<Recording> = Vec::new();
     for session in &file.sessions {
         if pieces.is_empty() || session.own_zero {
-            let whole = if pieces.is_empty() { Some(file) } else { None };
-            pieces.push(Recording {
-                file: file.file.clone(),
-                rows: file.rows,
-                sessions: Vec::new(),
-                faults: whole.map_or_else(Vec::new, |file| file.faults.clone()),
-                tooth_steps: whole.map_or_else(Vec::new, |file| file.tooth_steps.clone()),
-                notes: whole.map_or_else(Vec::new, |file| file.notes.clone()),
-                unusable: file.unusable.clone(),
-            });
+            pieces.push(file.with_sessions(Vec::new()));
         }
         if let Some(piece) = pieces.last_mut() {
             piece.sessions.push(session.clone());
         }
+    }
+    if let Some(first) = pieces.first_mut() {
+        (first.faults, first.notes) = (file.faults.clone(), file.notes.clone());
     }
     pieces
 }

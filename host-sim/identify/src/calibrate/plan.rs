@@ -466,7 +466,9 @@ fn open_parts(prior: &Prior<'_>, bench: &Bench, scales: &Scales) -> (Vec<PartNam
         PartName::ToothPitch if prior.nominal.teeth.is_none() && prior.table.is_none() => {
             Some("the teeth are not known, the ratio alone is".to_owned())
         }
-        PartName::OutputAngle if turns < super::HALF_A_TURN => Some(format!("the travel is {turns:.2} output turns")),
+        PartName::OutputAngle if turns < super::PERIOD_OF_THE_OUTPUT => {
+            Some(format!("the travel is {turns:.2} output turns"))
+        }
         PartName::Temperature if scales.temperature_c[1] - scales.temperature_c[0] < ONE_TEMPERATURE_K => {
             Some("one temperature: give the range, --temperatures-c LOW,HIGH".to_owned())
         }

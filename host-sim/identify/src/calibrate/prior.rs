@@ -1,12 +1,15 @@
 //! Knowledge of a unit before it is measured: a nominal model, a table, or the ratio alone.
 
+use std::path::Path;
+
 use flexspline::Table;
 
 use super::CalibrationError;
 use super::parts::State;
 use super::zero::steady;
+use crate::extension::Model;
 use crate::nominal::{Nominal, Spread};
-use flexspline_mechanics::drive::GeneratorKind;
+use flexspline_mechanics::drive::{DriveError, GeneratorKind};
 
 /// Temperature of a drive that is known by its ratio alone, °C.
 const USUAL_TEMPERATURE_C: f64 = 20.0;
@@ -31,6 +34,25 @@ pub struct Prior<'a> {
 }
 
 impl<'a> Prior<'a> {
+    /// A drive known by a nominal model, called `drive`; the hash is that of the name.
+    #[must_use]
+    pub fn of_nominal(nominal: Nominal, drive: &str, kind: GeneratorKind) -> Prior<'a> {
+        let hash = *blake3::hash(drive.as_bytes()).as_bytes();
+        let drive = drive.to_owned();
+        Prior { nominal, table: None, drive, hash, kind, zero_rad: 0.0, least_friction_n_m: 0.0 }
+    }
+
+    /// A drive known by a file, `nominal.toml` or `drive-extended.toml`, with the model that stands there.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn of_file(path: &Path, kind: GeneratorKind) -> Result<(Prior<'a>, Model), DriveError> {
+        let model = Model::read(path)?;
+        let hash = *blake3::hash(&std::fs::read(path).unwrap_or_default()).as_bytes();
+        let known = Prior::of_nominal(model.nominal.clone(), &path.display().to_string(), kind);
+        Ok((Prior { hash, ..known }, model))
+    }
+
     /// A drive known by its ratio alone: no wind-up, no play, no waves.
     #[must_use]
     pub fn of_ratio(ratio: f64, kind: GeneratorKind) -> Prior<'a> {
@@ -47,9 +69,7 @@ impl<'a> Prior<'a> {
             spread: none,
             kernels: None,
         };
-        let drive = format!("ratio {ratio}");
-        let hash = *blake3::hash(drive.as_bytes()).as_bytes();
-        Prior { nominal, table: None, drive, hash, kind, zero_rad: 0.0, least_friction_n_m: 0.0 }
+        Prior::of_nominal(nominal, &format!("ratio {ratio}"), kind)
     }
 
     /// A drive known by a table.
@@ -57,8 +77,7 @@ impl<'a> Prior<'a> {
     pub fn of_table(table: &'a Table<'a>, kind: GeneratorKind) -> Prior<'a> {
         let hash = *blake3::hash(table.image()).as_bytes();
         let drive = format!("table {}", table.id());
-        let nominal = Nominal::of_table(table);
-        Prior { nominal, table: Some(table), drive, hash, kind, zero_rad: 0.0, least_friction_n_m: 0.0 }
+        Prior { table: Some(table), hash, ..Prior::of_nominal(Nominal::of_table(table), &drive, kind) }
     }
 
     /// Whether nothing but the ratio is known.
@@ -79,16 +98,7 @@ impl<'a> Prior<'a> {
         if let Some(table) = self.table {
             return Ok(*table.drive());
         }
-        let drive = self.nominal.teeth_or_of_two_waves().core_drive();
-        let drive = drive.map_err(|error| CalibrationError::Known(format!("ratio {}: {error}", self.nominal.ratio)))?;
-        if (drive.exact_ratio() / self.nominal.ratio - 1.0).abs() > 1e-9 {
-            return Err(CalibrationError::Known(format!(
-                "ratio: found {}, allowed: a ratio that wheels with two teeth of difference have, a whole number or a \
-                 half; or a model with the teeth, --model nominal.toml",
-                self.nominal.ratio
-            )));
-        }
-        Ok(drive)
+        self.nominal.core_drive().map_err(|error| CalibrationError::Known(error.to_string()))
     }
 
     /// Tooth pitches of the fixed wheel in a turn of the generator.

@@ -6,7 +6,7 @@ use super::choose::{LEAST_GAIN, PENALTIES, path, pruned};
 use super::folds::{Chosen, Row};
 use super::interval::{Known, OF_95};
 use super::parts::{PartName, Scales, expected_arcsec};
-use super::rows::{Recorded, Rows, settled, speed_rad_s};
+use super::rows::{Recorded, Rows, settled, speeds_rad_s};
 use super::{Model, Prior};
 use crate::extension::left_by_core;
 use crate::measurement::Recording;
@@ -145,7 +145,7 @@ impl Delays {
         for (file, delay) in files.iter_mut().zip(&self.0) {
             let by_s = delay.map_or(0.0, |[by_s, _]| by_s);
             for session in &mut file.sessions {
-                let speeds: Vec<f64> = (0..session.len()).map(|k| speed_rad_s(session, k, ratio)).collect();
+                let speeds = speeds_rad_s(session, ratio);
                 session.error_rad.iter_mut().zip(speeds).for_each(|(error, speed)| *error += by_s * speed);
             }
         }

@@ -6,7 +6,7 @@ use super::folds::{Folds, Row};
 use super::parts::{PartName, Scales, State};
 use super::prior::Prior;
 use crate::least_squares::Normal;
-use crate::measurement::{Recording, Session, least_and_most, quantile_of, sampled, white_noise};
+use crate::measurement::{Recording, Session, least_and_most, quantile_of, rates, sampled, white_noise};
 use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// Folds that records are cut into: blocks of a tenth of each or so, which say what a table does beyond what it saw.
@@ -114,8 +114,8 @@ impl Recorded {
         let fine_turns = all_steps.filter(|step| *step <= fine_rad * (1.0 + 1e-3)).sum::<f64>() / TAU;
         let most = torque.0.abs().max(torque.1.abs());
         let speeds: Vec<f64> = sessions()
-            .flat_map(|session| (0..session.len()).map(|k| speed_rad_s(session, k, prior.nominal.ratio)))
-            .filter(|speed| speed.abs() > 0.0)
+            .flat_map(|session| speeds_rad_s(session, prior.nominal.ratio))
+            .filter(|s| s.abs() > 0.0)
             .collect();
         let speeds = sampled(&speeds);
         let paces = |of: &dyn Fn(f64) -> f64| {
@@ -203,7 +203,7 @@ impl Recorded {
             PartName::ToothPitch if self.fine_turns < super::FINE_TURNS => {
                 Some(format!("rows are {:.2} tooth pitches apart", self.step_rad * self.scales.teeth / TAU))
             }
-            PartName::OutputAngle if self.output_share < super::HALF_A_TURN => {
+            PartName::OutputAngle if self.output_share < super::PERIOD_OF_THE_OUTPUT => {
                 Some(format!("{:.0} % of an output turn was recorded", 100.0 * self.output_share))
             }
             PartName::Temperature if !self.has_temperature => Some("no temperature was recorded".to_owned()),
@@ -215,12 +215,12 @@ impl Recorded {
     }
 }
 
-/// Speed of the output at a row, rad/s; 0 where no time says it.
-pub(super) fn speed_rad_s(session: &Session, row: usize, ratio: f64) -> f64 {
-    let (from, to) = (row.saturating_sub(1), (row + 1).min(session.len() - 1));
-    let Some(time) = &session.time_s else { return 0.0 };
-    let span = time[to] - time[from];
-    if span > 0.0 { (session.generator_rad[to] - session.generator_rad[from]) / span / ratio } else { 0.0 }
+/// Speed of the output in each row, rad/s; 0 where no time says it.
+pub(super) fn speeds_rad_s(session: &Session, ratio: f64) -> Vec<f64> {
+    let Some(time) = &session.time_s else { return vec![0.0; session.len()] };
+    let mut speeds = rates(&[0..session.len()], time, &session.generator_rad);
+    speeds.iter_mut().for_each(|speed| *speed /= ratio);
+    speeds
 }
 
 /// Share of a turn with angles in it.
@@ -262,6 +262,7 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
                 recorded.step_rad,
                 SETTLED * play_rad * prior.nominal.ratio.abs(),
             );
+            let speeds = speeds_rad_s(session, prior.nominal.ratio);
             let thinned = (0..).map(|k| (f64::from(k) * every) as usize).take_while(|k| *k < session.len());
             for k in thinned {
                 let Some(way) = ways[k] else {
@@ -276,7 +277,7 @@ pub(super) fn settled(files: &[Recording], prior: &Prior<'_>, recorded: &Recorde
                     torque_n_m: if recorded.has_torque { at(&session.torque_n_m, 0.0) } else { 0.0 },
                     temperature_c: at(&session.temperature_c, recorded.temperature_c),
                     way,
-                    speed_rad_s: speed_rad_s(session, k, prior.nominal.ratio),
+                    speed_rad_s: speeds[k],
                     log: zero,
                 };
                 let measured_arcsec = session.error_rad[k] * ARCSEC_PER_RAD;

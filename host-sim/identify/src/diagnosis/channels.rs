@@ -227,7 +227,7 @@ fn unit_of(factor: f64) -> Option<String> {
 /// Holds the torque against what it should do; turned round, or taken to the other shaft, where that explains it; left
 /// out where it does nothing, or where it looks like another unit. Gives
 /// why the data are unusable, where they are.
-pub(super) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: Option<&Table<'_>>) -> Option<String> {
+pub(crate) fn check_torque(recording: &mut Recording, nominal: &Nominal, table: Option<&Table<'_>>) -> Option<String> {
     let rows = Rows::new(&recording.sessions, nominal);
     if !rows.recorded.torque || rows.torque.iter().all(|torque| *torque == 0.0) || nominal.wind_up_arcsec(1.0) == 0.0 {
         return None;

@@ -8,7 +8,9 @@ use super::candidate::{Deviation, Label, Law, Per, standing_pitch_error};
 use super::channels::{RatioProposal, proposed_ratio};
 use super::model::{Problem, Term};
 use super::noise::Noise;
-use super::report::{Cause, Compensation, Diagnosis, Finding, HeldOut, Parameter, Residual, Unexplained, Verdict};
+use super::report::{
+    Cause, Compensation, Diagnosis, Finding, HeldOut, Hint, Parameter, Residual, Unexplained, Verdict,
+};
 use super::select::{self, Selected, Standing, standings};
 use super::thresholds::verdict::*;
 use super::trace::{Gate, Judged, Stage, Trace, passed};
@@ -54,17 +56,29 @@ pub(super) fn conclude(
     let unnamed = Unnamed::beside(&selected, &standings, &left_over, hidden_lines);
     let left_of_noise = rms_after / floor.max(1e-30);
     let named = understood(problem, &selected, &standings, &known, &unnamed, [noise.white, left_of_noise], &mut trace);
+    let held = held_out::evaluate(problem, &all);
+    // What predicts sessions left out hardly better than the others do is a hint: it says nothing of the drive.
+    let mut hints = Vec::new();
+    let (named, too_little): (Vec<usize>, Vec<usize>) =
+        named.into_iter().partition(|k| !(held.gains_beside[*k] < LEAST_GAIN_OF_A_NAME));
+    for k in &too_little {
+        let (label, gain) = (selected.terms[*k].law.label, held.gains_beside[*k]);
+        let gates = vec![Judged::above(Gate::LeftOut, gain, LEAST_GAIN_OF_A_NAME)];
+        trace.decided(Stage::Verdict, label, None, gates);
+        hints.extend(selected.terms[*k].law.cause().map(|name| Hint::of(name, gain)));
+    }
+    let only_hints = |k: usize| too_little.contains(&k) && held.gains_beside[k] >= 0.0;
     // A zero of each session hides nothing of what goes on within one. One that may be teeth that have skipped is not
     // understood with nothing else found.
     let zeros_alone = named.is_empty() && all.iter().any(|term| term.law.is_zero_of_sessions() && !of_the_bench(term));
     let strongest = named.iter().map(|k| standings[*k].size).fold(0.0, f64::max);
     left_over.retain(|l| l.size_arcsec > LEAST_LEFT_OF_STRONGEST * strongest);
-    let without_name = |k: usize| !named.contains(&k) && !selected.terms[k].law.is_zero_of_sessions();
+    let without_name = |k: usize| !named.contains(&k) && !only_hints(k) && !selected.terms[k].law.is_zero_of_sessions();
     let significant_left = !left_over.is_empty() || (0..selected.terms.len()).any(without_name) || zeros_alone;
-    let held = held_out::evaluate(problem, &all);
-    // What does not predict sessions it was not fitted to is no explanation.
+    // What does not predict sessions it was not fitted to, better than the adapted model and than none, is no
+    // explanation.
     let (before_out, after_out) = (held.total.rms_before_arcsec, held.total.rms_after_arcsec);
-    let most = NO_WORSE * before_out;
+    let most = NO_WORSE * before_out.min(compensation(problem, after_out).rms_uncompensated_arcsec);
     let no_worse = Judged::number(Gate::NoWorse, after_out, most, after_out <= most);
     let verdict = match (named.is_empty(), significant_left) {
         (true, false) => Verdict::None,
@@ -165,6 +179,7 @@ pub(super) fn conclude(
     }
     let mut unexplained_list: Vec<Unexplained> = (0..selected.terms.len())
         .filter(|k| !named.contains(k) || told_better.contains(k) || verdict == Verdict::Unknown)
+        .filter(|k| !too_little.contains(k))
         .filter(|k| !of_the_bench(&selected.terms[*k]))
         .map(|k| Unexplained { looks_like: selected.terms[k].law.label.to_string(), size_arcsec: standings[k].size })
         .collect();
@@ -178,6 +193,7 @@ pub(super) fn conclude(
         finding: Finding::of(verdict),
         ratio_proposed: ratio_proposed(&causes, problem.on.nominal.ratio),
         causes,
+        hints,
         residual: Residual {
             rms_before_arcsec: rms_before,
             rms_after_arcsec: rms_after,
@@ -258,7 +274,7 @@ fn is_whole_pitches(jump_arcsec: f64, std_arcsec: f64, pitch_arcsec: f64) -> boo
 /// the nominal one and none at all.
 fn is_explained(problem: &Problem<'_>, rms_after: f64, floor: f64, held_out: HeldOut) -> bool {
     let compared = compensation(problem, held_out.rms_after_arcsec);
-    let best_without = compared.rms_uncompensated_arcsec.min(held_out.rms_before_arcsec);
+    let best_without = compared.without_causes_arcsec().min(held_out.rms_before_arcsec);
     rms_after <= NEAR_NOISE * floor && compared.rms_extended_tables_arcsec < best_without
 }
 
@@ -493,6 +509,7 @@ fn compensation(problem: &Problem<'_>, rms_extended: f64) -> Compensation {
     Compensation {
         rms_uncompensated_arcsec: about_mean(problem.whitener.average(&problem.on.rows.error)),
         rms_nominal_tables_arcsec: about_mean(problem.data.clone()),
+        rms_calibrated_table_arcsec: None,
         rms_extended_tables_arcsec: rms_extended,
     }
 }

@@ -132,7 +132,7 @@ impl Session {
     }
 
     /// Leaves out the rows for which `drop` is true.
-    fn leave_out(&mut self, drop: &[bool]) {
+    pub(crate) fn leave_out(&mut self, drop: &[bool]) {
         self.columns_mut().for_each(|values| log::leave_out(values, drop));
         log::leave_out(&mut self.line, drop);
     }
@@ -215,6 +215,22 @@ pub struct Recording {
     pub notes: Vec<String>,
     /// Why nothing can be said of the drive from these rows, if so.
     pub unusable: Option<String>,
+}
+
+impl Recording {
+    /// The same file with these sessions, none of its faults told again.
+    #[must_use]
+    pub(crate) fn with_sessions(&self, sessions: Vec<Session>) -> Recording {
+        Recording {
+            file: self.file.clone(),
+            rows: self.rows,
+            sessions,
+            faults: Vec::new(),
+            tooth_steps: Vec::new(),
+            notes: Vec::new(),
+            unusable: self.unusable.clone(),
+        }
+    }
 }
 
 /// The name of a file in messages, and its bytes.
