@@ -358,9 +358,9 @@ fn a_table_that_loses_to_none_is_not_made() {
 fn what_was_not_recorded_is_not_fitted() {
     let mut short = recording(3, |psi, _, _, _| 20.0 * (2.0 * psi).sin());
     let session = &mut short.sessions[0];
-    session.line.truncate(250);
-    session.generator_rad.truncate(250);
-    session.error_rad.truncate(250);
+    session.line.truncate(200);
+    session.generator_rad.truncate(200);
+    session.error_rad.truncate(200);
     session.torque_n_m = None;
     let made = calibrate(&[short], &Prior::of_ratio(RATIO, GeneratorKind::Cam)).unwrap();
     let says = |name: &str| made.calibration.parts.iter().find(|part| part.name == name).unwrap().clone();
