@@ -927,8 +927,8 @@ fn remarks(
     }
     if recorded.output_share < 1.0 && has(PartName::OutputAngle) {
         remarks.push(format!(
-            "{:.0} % of an output turn was recorded: in the rest the curve over the output angle is the smoothest \
-             that joins its ends, and not measured",
+            "{:.0} % of an output turn was recorded: in the rest the curve over the output angle goes straight \
+             from one end to the other, and is not measured",
             100.0 * recorded.output_share
         ));
     }

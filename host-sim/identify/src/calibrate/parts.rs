@@ -122,6 +122,9 @@ pub struct Scales {
     pub speed_rad_s: f64,
     /// Standard deviation of the delay between the two angles before anything says how large it is, s.
     pub late_s: f64,
+    /// Where the widest part of the output's turn without rows begins, and how wide it is, rad; 0 wide where rows are all
+    /// over the turn.
+    pub output_gap_rad: [f64; 2],
 }
 
 impl Scales {
@@ -165,7 +168,19 @@ pub(super) fn columns(part: PartName, at: &State, scales: &Scales, to: &mut Vec<
         PartName::GeneratorAngle => waves(at.generator_rad, GENERATOR_ORDERS, to),
         PartName::MaterialAngle => waves(at.generator_rad - at.output_rad, GENERATOR_ORDERS, to),
         PartName::ToothPitch => waves(scales.teeth * at.generator_rad, TOOTH_ORDERS, to),
-        PartName::OutputAngle => waves(at.output_rad, OUTPUT_ORDERS, to),
+        PartName::OutputAngle => {
+            // Straight from one end of what was recorded to the other: waves of their own would swing there.
+            let [begin, width] = scales.output_gap_rad;
+            let into = (at.output_rad - begin).rem_euclid(TAU);
+            if into >= width {
+                return waves(at.output_rad, OUTPUT_ORDERS, to);
+            }
+            let first = to.len();
+            waves(begin, OUTPUT_ORDERS, to);
+            let mut end = Vec::new();
+            waves(begin + width, OUTPUT_ORDERS, &mut end);
+            to[first..].iter_mut().zip(end).for_each(|(value, end)| *value += into / width * (end - *value));
+        }
         PartName::Temperature => {
             let warm = scales.temperature_share(at.temperature_c);
             to.extend([warm, warm * load, warm * lag]);
@@ -263,6 +278,7 @@ mod tests {
             teeth: 200.0,
             speed_rad_s: 0.2,
             late_s: 1e-3,
+            output_gap_rad: [0.0; 2],
         };
         let at = State {
             generator_rad: 1.3,

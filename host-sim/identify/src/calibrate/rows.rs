@@ -135,6 +135,7 @@ impl Recorded {
             let (low, high) = least_and_most(loads);
             high - low < super::LEAST_FRICTION * most
         };
+        let (output_share, output_gap_rad) = covered(angles(1.0 / prior.nominal.ratio), 36);
         let torque_noise_n_m = white_noise(sessions().filter_map(|session| session.torque_n_m.as_deref()));
         Recorded {
             torque_noise_n_m,
@@ -145,14 +146,15 @@ impl Recorded {
                 teeth: prior.tooth_pitches(),
                 speed_rad_s: fast,
                 late_s: late_s(period_s),
+                output_gap_rad,
             },
             coarse_rad: sessions().map(|session| session.coarse_rad).fold(0.0, f64::max),
             one_pace,
             has_torque,
             each_keeps_to_one_load: has_torque && files.len() > 1 && files.iter().all(keeps_to_one_load),
             has_temperature,
-            generator_share: covered(angles(1.0), 24),
-            output_share: covered(angles(1.0 / prior.nominal.ratio), 36),
+            generator_share: covered(angles(1.0), 24).0,
+            output_share,
             generator_turns: (generator.1 - generator.0) / TAU,
             backward_share: if moved > 0.0 { backward / moved } else { 0.0 },
             step_rad,
@@ -223,11 +225,22 @@ pub(super) fn speeds_rad_s(session: &Session, ratio: f64) -> Vec<f64> {
     speeds
 }
 
-/// Share of a turn with angles in it.
-fn covered(angles: impl Iterator<Item = f64>, parts: usize) -> f64 {
-    let mut there = vec![false; parts];
-    angles.for_each(|angle| there[((angle / TAU).rem_euclid(1.0) * parts as f64) as usize % parts] = true);
-    there.iter().filter(|there| **there).count() as f64 / parts as f64
+/// Share of the `parts` of a turn with angles in them, and the widest stretch without any where a part has none: where
+/// it begins and its width, rad.
+fn covered(angles: impl Iterator<Item = f64>, parts: usize) -> (f64, [f64; 2]) {
+    let mut there = vec![[f64::INFINITY, f64::NEG_INFINITY]; parts];
+    angles.map(|angle| angle.rem_euclid(TAU)).for_each(|angle| {
+        let [least, most] = &mut there[(angle / TAU * parts as f64) as usize % parts];
+        (*least, *most) = (least.min(angle), most.max(angle));
+    });
+    there.retain(|[least, most]| least <= most);
+    if there.len() == parts {
+        return (1.0, [0.0; 2]);
+    }
+    let ends = there.iter().zip(there.iter().cycle().skip(1));
+    let gaps = ends.map(|([_, from], [to, _])| [*from, (to - from).rem_euclid(TAU)]);
+    let widest = gaps.max_by(|a, b| a[1].total_cmp(&b[1])).unwrap_or([0.0; 2]);
+    (there.len() as f64 / parts as f64, widest)
 }
 
 /// Of how many rows one is fitted, of a record of `total`. No whole number: such rows may all lie at the same few

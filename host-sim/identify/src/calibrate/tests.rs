@@ -67,6 +67,41 @@ fn a_part_of_a_turn_has_a_curve_over_the_output() {
     assert!(c.notes.iter().any(|note| note.contains("of an output turn was recorded")), "{:?}", c.notes);
 }
 
+/// Recorded over a fifth of a turn, an encoder with two waves: there the table takes them out, and over the rest of the
+/// turn it leaves no more than there is without it.
+#[test]
+fn where_nothing_was_recorded_a_table_adds_no_error() {
+    const RECORDED_RAD: f64 = 1.25;
+    let square = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64;
+    for phase in 0..6 {
+        let law = |psi: f64, out: f64, _: f64, _: f64| {
+            4.0 * (2.0 * psi).sin() + 100.0 * (out + f64::from(phase)).cos() + 40.0 * (2.0 * out + 1.7).cos()
+        };
+        let mut whole = recording(1, law);
+        let session = &mut whole.sessions[0];
+        session.torque_n_m = None;
+        let beyond: Vec<bool> = session.generator_rad.iter().map(|psi| psi / RATIO > RECORDED_RAD).collect();
+        let mut log = whole.clone();
+        log.sessions[0].leave_out(&beyond);
+        let made = calibrate(&[log], &Prior::of_ratio(RATIO, GeneratorKind::Cam)).unwrap();
+        assert!(kept(&made.calibration).contains(&"output_angle"), "{:#?}", made.calibration.parts);
+        // By the core, less the zero of what was recorded: there, and in the rest.
+        let parts = |all: Vec<f64>| -> [f64; 2] {
+            let of = |rest: bool| -> Vec<f64> {
+                all.iter().zip(&beyond).filter(|(_, beyond)| **beyond == rest).map(|(value, _)| *value).collect()
+            };
+            let zero = of(false).iter().sum::<f64>() / of(false).len() as f64;
+            [false, true].map(|rest| square(&of(rest).iter().map(|value| value - zero).collect::<Vec<_>>()).sqrt())
+        };
+        let table = Table::check(&made.table.image).unwrap();
+        let left = parts(left_by_core(&table, &whole.sessions[0], 20.0));
+        let measured = parts(whole.sessions[0].error_rad.iter().map(|rad| rad * ARCSEC_PER_RAD).collect());
+        println!("{phase}: {measured:.1?} arcsec as measured, recorded and beyond; {left:.1?} with the table");
+        assert!(left[0] < 0.3 * measured[0], "{phase}: {measured:?}, {left:?}");
+        assert!(left[1] < measured[1], "{phase}: {measured:?}, {left:?}");
+    }
+}
+
 #[test]
 fn parts_that_a_unit_has_are_found_and_the_core_takes_them_out() {
     let law = |psi: f64, out: f64, torque: f64, way: f64| {
@@ -391,6 +426,7 @@ fn a_sum_over_folds_is_the_fit_to_the_rows() {
         teeth: 200.0,
         speed_rad_s: 0.0,
         late_s: 1e-3,
+        output_gap_rad: [0.0; 2],
     };
     let rows: Vec<Row> = (0..200)
         .map(|k| {
