@@ -377,17 +377,18 @@ fn text(made: &Calibrated, out: &Path, with_page: bool) -> String {
         );
     }
     let as_measured = if c.reading_delay.is_some() { "as measured less the delay" } else { "as measured" };
-    let removed = 100.0 * (1.0 - held_out.rms_after_arcsec / held_out.rms_before_arcsec);
+    let removed = 100.0 * (1.0 - core.rms_after_arcsec / core.rms_before_arcsec);
     let _ = writeln!(
         text,
-        "where nothing was fitted, arcsec rms: {:.2} {as_measured}, {:.2} with what was known, {:.2} with the table \
+        "the core over all rows, reversals among them, arcsec rms: {:.2} {as_measured}, {:.2} with the table {} \
          ({removed:.1} % less)",
-        held_out.rms_before_arcsec, held_out.rms_prior_arcsec, held_out.rms_after_arcsec
+        core.rms_before_arcsec, core.rms_after_arcsec, c.table_id
     );
     let _ = writeln!(
         text,
-        "the core over all rows, reversals among them: {:.2} {as_measured}, {:.2} with the table {}",
-        core.rms_before_arcsec, core.rms_after_arcsec, c.table_id
+        "rows in steady motion, each left out of the fit, arcsec rms: {:.2} {as_measured}, {:.2} with what was known, \
+         {:.2} with the parts",
+        held_out.rms_before_arcsec, held_out.rms_prior_arcsec, held_out.rms_after_arcsec
     );
     let width = c.play_width_arcsec;
     let _ = writeln!(

@@ -29,6 +29,7 @@ use flexspline::{ImageError, Table, WriteError};
 use serde::Serialize;
 
 use crate::measurement::{Fault, FaultName, MeasuredError, Recording, least_and_most};
+use crate::turns_off::about_mean;
 pub(crate) use choose::LEAST_GAIN;
 use choose::{best_penalty, nested, path, pruned};
 use flexspline_base::units::ARCSEC_PER_RAD;
@@ -78,6 +79,8 @@ const OTHER_RATIO: f64 = 0.25;
 /// Error by a wrong ratio in one of several logs, at least, rad rms: a load that grows over a short log looks the same.
 /// A guess: 15 arc-minutes, where wind-up and clearance are a few.
 const LEAST_OF_OTHER_RATIO_RAD: f64 = 0.0044;
+/// An error about its mean that is none of a gear, rad rms. A guess: one degree, where drives err by arc-minutes.
+const MOST_ERROR_RAD: f64 = 0.0175;
 /// Arcsec that are taken for rounding.
 const ROUNDING_ARCSEC: f64 = 1e-6;
 /// Coefficients of the play, and so the times that one of them is put on its bound and the others fitted anew.
@@ -458,6 +461,13 @@ impl OtherRatio {
     pub(crate) fn is_far(&self) -> bool {
         (self.near - self.given).abs() >= 1.0
     }
+}
+
+/// The same of one log: said and not refused where the output moves little and errs as one of a gear may.
+pub(crate) fn check_ratio_of(log: &Recording, ratio: f64) -> Result<Option<String>, OtherRatio> {
+    let Some(other) = OtherRatio::of(std::slice::from_ref(log), ratio) else { return Ok(None) };
+    // A load that grows over a few rows looks the same.
+    if other.is_far() && other.error_rad >= MOST_ERROR_RAD { Err(other) } else { Ok(Some(other.to_string())) }
 }
 
 /// Generator turns that tell two waves in a turn from two in a turn against the output: half a turn of the output, in
@@ -927,8 +937,8 @@ fn remarks(
     }
     if recorded.output_share < 1.0 && has(PartName::OutputAngle) {
         remarks.push(format!(
-            "{:.0} % of an output turn was recorded: in the rest the curve over the output angle goes straight \
-             from one end to the other, and is not measured",
+            "{:.0} % of an output turn was recorded: in the rest the curve over the output angle goes \
+             nearly straight from one end to the other, and is not measured",
             100.0 * recorded.output_share
         ));
     }

@@ -168,19 +168,7 @@ pub(super) fn columns(part: PartName, at: &State, scales: &Scales, to: &mut Vec<
         PartName::GeneratorAngle => waves(at.generator_rad, GENERATOR_ORDERS, to),
         PartName::MaterialAngle => waves(at.generator_rad - at.output_rad, GENERATOR_ORDERS, to),
         PartName::ToothPitch => waves(scales.teeth * at.generator_rad, TOOTH_ORDERS, to),
-        PartName::OutputAngle => {
-            // Straight from one end of what was recorded to the other: waves of their own would swing there.
-            let [begin, width] = scales.output_gap_rad;
-            let into = (at.output_rad - begin).rem_euclid(TAU);
-            if into >= width {
-                return waves(at.output_rad, OUTPUT_ORDERS, to);
-            }
-            let first = to.len();
-            waves(begin, OUTPUT_ORDERS, to);
-            let mut end = Vec::new();
-            waves(begin + width, OUTPUT_ORDERS, &mut end);
-            to[first..].iter_mut().zip(end).for_each(|(value, end)| *value += into / width * (end - *value));
-        }
+        PartName::OutputAngle => waves(at.output_rad, OUTPUT_ORDERS, to),
         PartName::Temperature => {
             let warm = scales.temperature_share(at.temperature_c);
             to.extend([warm, warm * load, warm * lag]);
@@ -253,6 +241,12 @@ fn waves(angle: f64, orders: u16, to: &mut Vec<f64>) {
         let (sine, cosine) = (f64::from(order) * angle).sin_cos();
         to.extend([sine, cosine]);
     }
+}
+
+/// Slopes of the curve's columns over the output's angle, per rad.
+pub(super) fn output_slopes(output_rad: f64) -> Vec<f64> {
+    let order = |k: u16| (f64::from(k), (f64::from(k) * output_rad).sin_cos());
+    (1..=OUTPUT_ORDERS).map(order).flat_map(|(k, (sine, cosine))| [k * cosine, -k * sine]).collect()
 }
 
 /// Chebyshev's polynomials from the first degree on.

@@ -8,16 +8,15 @@
 
 use std::f64::consts::TAU;
 
-use flexspline_algebra::Mat;
 use serde::Serialize;
 
-use super::folds::Sums;
-use super::interval::{Node, Noise, OF_95, planned_covariance, row, spread, width_of, widths};
+use super::interval::{Node, Noise, OF_95, planned_covariance, row, row_of_group, spread, width_of, widths};
 use super::parts::{PartName, Scales, State, weights};
 use super::rows::{MOST_ROWS, late_s};
 use super::{
     Calibrated, CalibrationError, GOLDEN, LEAST_FRICTION, ONE_TEMPERATURE_K, OTHER_PACE, Prior, ROWS_OF_A_PITCH,
 };
+use crate::linear::Gram;
 use crate::measurement::least_and_most;
 
 /// Beyond what any bench or catalogue of these drives has, so a slip of the pen: generator, load and temperature.
@@ -215,7 +214,7 @@ pub struct Wide {
 struct Candidate {
     pass: Pass,
     warmth: usize,
-    tells: Sums,
+    tells: Gram,
 }
 
 /// Plans what to record of a drive, after a first log if there is one.
@@ -247,14 +246,14 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
     let noise = first.map_or_else(|| bench.noise(), |first| first.known.noise);
 
     let width = width_of(&chosen);
-    let mut known = vec![Sums::new(width); warmths + files];
+    let mut known = vec![Gram::none(width + 2); warmths + files];
     for at in first.iter().flat_map(|first| &first.rows.rows) {
         let at_log = State { log: warmths + at.at.log, ..at.at };
-        known[warmths + at.at.log].add(&row(&chosen, &at_log, &scales), 0.0, 1.0);
+        known[warmths + at.at.log].add_row(&row_of_group(&chosen, &at_log, &scales, 0.0), 1.0);
     }
     let travel = bench.output_deg.map(f64::to_radians);
     let asked = Asked::of(&scales, ratio, travel, &chosen);
-    let of = |known: &[Sums]| {
+    let of = |known: &[Gram]| {
         let covariance = planned_covariance(known, &chosen, &scales, noise.of_a_row());
         covariance.ok_or(CalibrationError::Known("the information matrix is singular".to_owned()))
     };
@@ -264,7 +263,7 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
     let (mut left_s, mut taken) = (60.0 * bench.minutes, Vec::new());
     while taken.len() < MOST_PASSES {
         let uncertain = asked.mean_variance(&now);
-        let mut best: Option<(f64, usize, Mat)> = None;
+        let mut best: Option<(f64, usize, Vec<f64>)> = None;
         // The ends of the loads first, as a table ends where they do; then each load and temperature once before one is
         // repeated: the parts do not know all that they do.
         let is_new =
@@ -278,7 +277,7 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
         let most = candidates.iter().filter(|c| fits(c)).map(news).max();
         for (k, candidate) in candidates.iter().enumerate().filter(|(_, c)| fits(c) && Some(news(c)) == most) {
             let mut with = known.clone();
-            with[candidate.warmth].join(&candidate.tells);
+            with[candidate.warmth].add(&candidate.tells, 1.0);
             let then = of(&with)?;
             let gain = (uncertain - asked.mean_variance(&then)) / candidate.pass.duration_s;
             if best.as_ref().is_none_or(|(most, ..)| gain > *most) {
@@ -287,7 +286,7 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
         }
         let Some((_, k, then)) = best else { break };
         let tells = asked.tells_most(&chosen, &now, &then);
-        known[candidates[k].warmth].join(&candidates[k].tells);
+        known[candidates[k].warmth].add(&candidates[k].tells, 1.0);
         left_s -= candidates[k].pass.duration_s;
         taken.push((candidates[k].warmth, Pass { tells, ..candidates[k].pass }));
         now = then;
@@ -308,7 +307,7 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
         )));
     }
     let nodes = widths(&chosen, &scales, &now, None);
-    let rms = |covariance: &Mat| asked.mean_variance(covariance).sqrt();
+    let rms = |covariance: &[f64]| asked.mean_variance(covariance).sqrt();
     let mut widest = Vec::new();
     if let Some(first) = first {
         let mut then = widths(&chosen, &scales, &at_first, None);
@@ -424,17 +423,17 @@ impl Asked {
     }
 
     /// Mean variance of some of the columns.
-    fn variance_of(&self, covariance: &Mat, columns: std::ops::Range<usize>) -> f64 {
+    fn variance_of(&self, covariance: &[f64], columns: std::ops::Range<usize>) -> f64 {
         let pairs = columns.clone().flat_map(|i| columns.clone().map(move |j| (i, j)));
-        pairs.map(|(i, j)| self.moment[i * self.width + j] * covariance[(i, j)]).sum::<f64>().max(0.0)
+        pairs.map(|(i, j)| self.moment[i * self.width + j] * covariance[i * self.width + j]).sum::<f64>().max(0.0)
     }
 
-    fn mean_variance(&self, covariance: &Mat) -> f64 {
+    fn mean_variance(&self, covariance: &[f64]) -> f64 {
         self.variance_of(covariance, 0..self.width)
     }
 
     /// The part whose variance falls most.
-    fn tells_most(&self, chosen: &[PartName], before: &Mat, after: &Mat) -> PartName {
+    fn tells_most(&self, chosen: &[PartName], before: &[f64], after: &[f64]) -> PartName {
         let mut begin = 0;
         let mut best = (f64::NEG_INFINITY, PartName::OutputAngle);
         for one in chosen {
@@ -553,7 +552,7 @@ fn candidates(prior: &Prior<'_>, bench: &Bench, scales: &Scales, chosen: &[PartN
                 let duration_s = moving_s + 2.0 * REST_S;
                 let speed_rad_s = speed_rpm / 60.0 * TAU / ratio.abs();
                 let weight = moving_s * bench.rate_fitted_hz() / ROWS_OF_A_PASS as f64;
-                let mut tells = Sums::new(width_of(chosen));
+                let mut tells = Gram::none(width_of(chosen) + 2);
                 for k in 0..ROWS_OF_A_PASS {
                     let way = if k % 2 == 0 { 1.0 } else { -1.0 };
                     let share = (k as f64 + 0.5) / ROWS_OF_A_PASS as f64;
@@ -570,7 +569,7 @@ fn candidates(prior: &Prior<'_>, bench: &Bench, scales: &Scales, chosen: &[PartN
                         speed_rad_s: way * speed_rad_s,
                         log: warmth,
                     };
-                    tells.add(&row(chosen, &at, scales), 0.0, weight);
+                    tells.add_row(&row_of_group(chosen, &at, scales, 0.0), weight);
                 }
                 let pass = Pass {
                     log: warmth + 1,

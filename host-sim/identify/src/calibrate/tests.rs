@@ -63,7 +63,7 @@ fn a_part_of_a_turn_has_a_curve_over_the_output() {
     let c = &made.calibration;
     assert!(kept(c).contains(&"output_angle"), "{:#?}", c.parts);
     assert!(c.held_out.rms_after_arcsec < 0.3 * c.held_out.rms_before_arcsec, "{:?}", c.held_out);
-    assert!(c.core.rms_after_arcsec < 0.05 * c.core.rms_before_arcsec, "{:?}", c.core);
+    assert!(c.core.rms_after_arcsec < 0.1 * c.core.rms_before_arcsec, "{:?}", c.core);
     assert!(c.notes.iter().any(|note| note.contains("of an output turn was recorded")), "{:?}", c.notes);
 }
 

@@ -25,7 +25,6 @@ mod extended;
 mod flank_lag;
 mod hanging;
 mod held_out;
-pub(crate) mod linear;
 pub(crate) mod model;
 pub(crate) mod noise;
 pub mod pipeline;

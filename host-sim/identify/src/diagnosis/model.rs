@@ -11,10 +11,10 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::averaged::{Averaged, Grain};
 use super::candidate::{Acting, Among, Coefficients, Column, Excitation, Law, Role, Tolerance, left_by};
-use super::linear::{Gram, Prior, Solution, products, solve};
 use super::noise::Whitener;
 use super::products::{Products, Set};
 use super::rows::{combined, rms};
+use crate::linear::{Gram, Prior, Solution, products, solve};
 
 /// Data and nominal model, averaged and white.
 pub(crate) struct Problem<'a> {

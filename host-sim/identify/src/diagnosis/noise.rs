@@ -138,14 +138,7 @@ impl Whitener {
         let mut means = Vec::with_capacity(self.groups.len());
         for session in self.sessions.iter().filter(|session| !session.is_empty()) {
             let rows = &column[self.groups[session.start].start..self.groups[session.end - 1].end];
-            // The usual strides with a length that the compiler knows.
-            match self.stride {
-                1 => means.extend_from_slice(rows),
-                2 => means_of::<2>(rows, &mut means),
-                3 => means_of::<3>(rows, &mut means),
-                4 => means_of::<4>(rows, &mut means),
-                stride => means.extend(rows.chunks(stride).map(mean)),
-            }
+            means.extend(rows.chunks(self.stride).map(mean));
         }
         means
     }
@@ -236,15 +229,6 @@ impl Whitener {
     #[must_use]
     pub(crate) fn log_scale(&self) -> f64 {
         self.filter.iter().map(|step| step.scale.ln()).sum()
-    }
-}
-
-/// Means of `N` values each; the last ones may be fewer.
-fn means_of<const N: usize>(values: &[f64], means: &mut Vec<f64>) {
-    let (whole, rest) = values.as_chunks::<N>();
-    means.extend(whole.iter().map(|part| mean(part)));
-    if !rest.is_empty() {
-        means.push(mean(rest));
     }
 }
 

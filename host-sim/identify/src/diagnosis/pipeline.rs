@@ -21,7 +21,7 @@ use thiserror::Error;
 use super::report::Diagnosis;
 use super::{CauseSet, DiagnosisError, Extended, Settings, diagnose_extended};
 use super::{blurred, channels, quieted, torque_zero, zeros};
-use crate::calibrate::{CalibrationError, Prior, calibrate};
+use crate::calibrate::{CalibrationError, Prior, calibrate, check_ratio_of};
 use crate::causes::{CauseName, OF_THE_OUTPUT_ENCODER};
 use crate::extension::{
     Agreement, CauseEntry, Evaluation, ExtendedTables, FoundGeometry, Model, Remake, RemakeError, TableKind,
@@ -108,7 +108,7 @@ pub enum PipelineError {
     /// No table can be of the ratio.
     #[error(transparent)]
     Wheels(#[from] NoSuchWheels),
-    /// A calibration of the rows makes no table.
+    /// A calibration of the rows makes no table, or they turn by another ratio.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
 }
@@ -116,20 +116,15 @@ pub enum PipelineError {
 impl PipelineError {
     /// Whether the input is to blame, and not the run.
     #[must_use]
-    pub const fn is_bad_input(&self) -> bool {
+    pub fn is_bad_input(&self) -> bool {
         match self {
-            PipelineError::Image(_)
-            | PipelineError::OtherDrive { .. }
-            | PipelineError::OtherKernels { .. }
-            | PipelineError::Read(_)
-            | PipelineError::Known(_)
-            | PipelineError::Diagnosis(_) => true,
+            PipelineError::Calibration(error) => error.is_bad_input(),
             PipelineError::NoDrive(_)
             | PipelineError::Fem(_)
             | PipelineError::Remake(_)
             | PipelineError::Table(_)
-            | PipelineError::Wheels(_)
-            | PipelineError::Calibration(_) => false,
+            | PipelineError::Wheels(_) => false,
+            _ => true,
         }
     }
 }
@@ -312,6 +307,13 @@ pub fn parse_rows(
     subject: &Subject<'_>,
 ) -> Result<Recording, PipelineError> {
     let mut recording = parse(file, bytes, columns, &subject.nominal.gear())?;
+    // Teeth that skip look like another ratio.
+    if recording.tooth_steps.is_empty() {
+        let said = check_ratio_of(&recording, subject.nominal.ratio);
+        let refused = |other| CalibrationError::Ratio { file: recording.file.clone(), other };
+        let said = said.map_err(refused)?;
+        recording.notes.extend(said);
+    }
     subject.take_away_known(&mut recording)?;
     let (nominal, table) = subject.against();
     let known = |converted: &mut Recording| subject.take_away_known(converted).is_ok();

@@ -6,7 +6,7 @@
 //! those that share it, or in the session held out itself. What a cause of the output's encoder adds is taken off first:
 //! the joint stands right where its encoder reads wrong.
 
-use flexspline::{GeneratorAngle, PlayState, Table};
+use flexspline::{Prediction, Table};
 use serde::Serialize;
 
 use super::sampled::ExtendedTables;
@@ -14,6 +14,7 @@ use crate::calibrate::{LEAST_GAIN, Prior, calibrate};
 use crate::causes::{CauseName, OF_THE_OUTPUT_ENCODER};
 use crate::diagnosis::{Compensation, Extended, PipelineError, Series, Settings};
 use crate::measurement::{Recording, Session, rms};
+use crate::replay::by_core;
 use flexspline_base::units::ARCSEC_PER_RAD;
 use flexspline_mechanics::drive::DriveError;
 
@@ -135,16 +136,9 @@ pub fn split(sessions: &[Session]) -> (Vec<Session>, Vec<bool>) {
 /// Measured less predicted by the core, arcsec, row by row.
 #[must_use]
 pub fn left_by_core(table: &Table<'_>, session: &Session, temperature_c: f64) -> Vec<f64> {
-    let mut play = PlayState::unknown();
-    let at = |column: &Option<Vec<f64>>, k: usize, usual: f64| column.as_ref().map_or(usual, |values| values[k]);
-    (0..session.len())
-        .map(|k| {
-            let generator = GeneratorAngle::from_rad(session.generator_rad[k]).unwrap_or(GeneratorAngle::ZERO);
-            let torque = at(&session.torque_n_m, k, 0.0) as f32;
-            let said = table.forward(&mut play, generator, torque, at(&session.temperature_c, k, temperature_c) as f32);
-            (session.error_rad[k] - f64::from(said.transmission_error_rad)) * ARCSEC_PER_RAD
-        })
-        .collect()
+    let said = by_core(table, session.states(temperature_c));
+    let left = |(error, said): (&f64, Prediction)| (error - f64::from(said.transmission_error_rad)) * ARCSEC_PER_RAD;
+    session.error_rad.iter().zip(said).map(left).collect()
 }
 
 /// Why no table of the extended drive was made by FEM.

@@ -101,6 +101,15 @@ impl Session {
         self.generator_rad.iter().zip(&self.error_rad).map(|(generator, error)| generator / ratio + error).collect()
     }
 
+    /// Generator angle (rad), torque (N·m; 0 if not recorded) and temperature (°C; `temperature_c` if not) row by row.
+    pub(crate) fn states(&self, temperature_c: f64) -> impl Iterator<Item = [f64; 3]> {
+        let at = |column: &Option<Vec<f64>>, k: usize, usual: f64| column.as_ref().map_or(usual, |values| values[k]);
+        let state = move |(k, generator): (usize, &f64)| {
+            [*generator, at(&self.torque_n_m, k, 0.0), at(&self.temperature_c, k, temperature_c)]
+        };
+        self.generator_rad.iter().enumerate().map(state)
+    }
+
     /// The column of torque or temperature, else that of the orientation.
     fn column_mut(&mut self, channel: Quantity) -> &mut Option<Vec<f64>> {
         match channel {

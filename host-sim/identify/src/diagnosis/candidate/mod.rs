@@ -25,11 +25,11 @@ use std::f64::consts::PI;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::base::Base;
-use super::linear::Prior;
 use super::prepare::{Jump, whole_pitches};
 use super::rows::Rows;
 use super::thresholds::selection::AFTER_WHEELS;
 use crate::causes::{CauseName, Kin, Need, ParameterName};
+use crate::linear::Prior;
 use crate::nominal::Nominal;
 use flexspline_base::robust::least_and_most;
 

@@ -21,6 +21,45 @@ pub(crate) struct Gram {
 }
 
 impl Gram {
+    /// Of no rows.
+    #[must_use]
+    pub fn none(size: usize) -> Gram {
+        Gram { size, products: vec![0.0; size * size] }
+    }
+
+    /// Adds a row, the value last, that counts `weight` times.
+    pub fn add_row(&mut self, row: &[f64], weight: f64) {
+        for (products, a) in self.products.chunks_exact_mut(self.size).zip(row) {
+            products.iter_mut().zip(row).for_each(|(sum, b)| *sum += weight * a * b);
+        }
+    }
+
+    /// Of some of the columns.
+    #[must_use]
+    pub fn among(&self, places: &[usize]) -> Gram {
+        let products = places.iter().flat_map(|i| places.iter().map(|j| self.at(*i, *j))).collect();
+        Gram { size: places.len(), products }
+    }
+
+    /// Without the first column, whose coefficient is free in these rows.
+    #[must_use]
+    pub fn first_free(&self) -> Gram {
+        let mut others = self.among(&(1..self.size).collect::<Vec<usize>>());
+        if self.at(0, 0) > 0.0 {
+            let first = &self.products[1..self.size];
+            others.add_row(first, -1.0 / self.at(0, 0));
+        }
+        others
+    }
+
+    /// Sum of squares that the columns leave with these coefficients.
+    #[must_use]
+    pub fn left_by(&self, coefficients: &[f64]) -> f64 {
+        let all: Vec<f64> = coefficients.iter().copied().chain([-1.0]).collect();
+        let rows = self.products.chunks_exact(self.size);
+        rows.zip(&all).map(|(products, c)| c * dot(products, &all)).sum::<f64>().max(0.0)
+    }
+
     /// Products of `columns`, whose last is the data, over a range of rows.
     #[must_use]
     pub fn of(columns: &[&[f64]], range: Range<usize>) -> Gram {
