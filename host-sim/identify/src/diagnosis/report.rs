@@ -5,7 +5,6 @@ use std::fmt::Write as _;
 
 use serde::Serialize;
 
-use super::channels::RatioProposal;
 use super::thresholds::verdict::LEAST_GAIN_OF_A_NAME;
 use super::trace::Trace;
 use crate::causes::{CauseName, ParameterName};
@@ -206,9 +205,6 @@ pub struct Diagnosis {
     pub wander_correlation_s: f64,
     /// What to record to tell look-alikes apart.
     pub next_experiment: Option<String>,
-    /// The whole ratio that the nominal one may be meant to be, where the data turn by another.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub ratio_proposed: Option<RatioProposal>,
     /// Of the cause that was asked about, if it is not named: what to record to tell it from those that are.
     #[serde(skip)]
     pub experiment_for_asked: Option<String>,
@@ -270,7 +266,6 @@ impl Diagnosis {
         self.hints.clear();
         (self.verdict, self.finding) = (Verdict::Unknown, Finding::DataUnusable);
         self.held_out.rms_after_arcsec = self.held_out.rms_before_arcsec;
-        self.ratio_proposed = None;
         self.next_experiment = Some(format!("{advice}; then the same run again"));
     }
 
@@ -327,13 +322,6 @@ impl Diagnosis {
             r.rms_after_arcsec,
             r.noise_floor_arcsec
         );
-        if let Some(ratio) = self.ratio_proposed {
-            let _ = writeln!(
-                text,
-                "ratio: the data turn by {:.3}; if it is a drive of {}, say so in the model, and diagnose again",
-                ratio.found, ratio.proposed
-            );
-        }
         if let Some(next) = &self.next_experiment {
             let _ = writeln!(text, "next: {next}");
         }

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use super::candidate::{Deviation, Label, Law, Per, standing_pitch_error};
-use super::channels::{RatioProposal, proposed_ratio};
 use super::model::{Problem, Term};
 use super::noise::Noise;
 use super::report::{
@@ -191,7 +190,6 @@ pub(super) fn conclude(
         schema_version: 1,
         verdict,
         finding: Finding::of(verdict),
-        ratio_proposed: ratio_proposed(&causes, problem.on.nominal.ratio),
         causes,
         hints,
         residual: Residual {
@@ -201,7 +199,7 @@ pub(super) fn conclude(
             // left.
             noise_floor_arcsec: floor.min(rms_after),
             unexplained_fraction: if explainable > 0.0 { (unexplained / explainable).min(1.0) } else { 0.0 },
-            rows_averaged: problem.whitener.stride(),
+            rows_averaged: problem.whitener.stride,
         },
         held_out,
         compensation: compensation(problem, held_out.rms_after_arcsec),
@@ -276,13 +274,6 @@ fn is_explained(problem: &Problem<'_>, rms_after: f64, floor: f64, held_out: Hel
     let compared = compensation(problem, held_out.rms_after_arcsec);
     let best_without = compared.without_causes_arcsec().min(held_out.rms_before_arcsec);
     rms_after <= NEAR_NOISE * floor && compared.rms_extended_tables_arcsec < best_without
-}
-
-/// The ratio that may be meant, where it is wrong.
-fn ratio_proposed(causes: &[Cause], nominal_ratio: f64) -> Option<RatioProposal> {
-    let wrong = causes.iter().find(|cause| cause.name == CauseName::RatioError)?;
-    let error = wrong.parameters.get(ParameterName::RatioRelativeError.as_str())?;
-    proposed_ratio(nominal_ratio, error.value)
 }
 
 /// Sizes of what has no name, arcsec: the largest, all together, and lines in time with their frequencies, Hz. A zero
