@@ -38,8 +38,7 @@ pub fn parse_known(
     table: Option<&Table<'_>>,
 ) -> Result<Recording, MeasuredError> {
     let read = parse_as(file, bytes, columns, &nominal.gear(), FEW)?;
-    let says_something = !nominal.harmonics.is_empty() || nominal.wind_up_arcsec(1.0) != 0.0;
-    if !says_something || read.sessions.iter().map(Session::len).sum::<usize>() < FEWEST_ROWS {
+    if read.sessions.iter().map(Session::len).sum::<usize>() < FEWEST_ROWS {
         return Ok(read);
     }
     let mut read = in_radians((file, bytes, columns), (nominal, table), read, |_| true);

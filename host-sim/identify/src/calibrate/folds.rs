@@ -27,7 +27,7 @@ pub(super) struct Chosen {
 
 /// All folds.
 pub(super) struct Folds {
-    parts: Vec<PartName>,
+    pub parts: Vec<PartName>,
     /// First column of each part, and the end.
     begins: Vec<usize>,
     weights: Vec<f64>,
@@ -42,8 +42,9 @@ pub(super) struct Folds {
 pub(super) const FLOOR: f64 = 1e-9;
 
 /// Penalty of the square of a slope, per rad², where nothing was recorded: the curve over the output then goes nearly
-/// straight from one end of what was recorded to the other, where free waves swing. Chosen on made encoders of two
-/// waves, a fifth to 44 % of a turn recorded: a tenth swings as free waves do, ten times as much bends the ends.
+/// straight from one end of what was recorded to the other, where free waves swing. Chosen on made encoders of one and
+/// two waves, a fifth to 41 % of a turn recorded: a tenth of it swings as free waves do, ten times as much bends the
+/// ends.
 const STRAIGHT: f64 = 1e-3;
 /// Places at which the slope is asked for.
 const PLACES: usize = 72;
@@ -84,10 +85,6 @@ impl Folds {
             slopes.add_row(&x, STRAIGHT * width / TAU / PLACES as f64);
         }
         Folds { parts: parts.to_vec(), begins, weights: all, rows, sums, slopes }
-    }
-
-    pub fn parts(&self) -> &[PartName] {
-        &self.parts
     }
 
     /// Folds that hold rows.

@@ -82,10 +82,7 @@ pub(super) fn row(parts: &[PartName], at: &State, scales: &Scales) -> Vec<f64> {
 
 /// The same as a row of a group: one for its zero first, the value last.
 pub(super) fn row_of_group(parts: &[PartName], at: &State, scales: &Scales, value: f64) -> Vec<f64> {
-    let mut x = vec![1.0];
-    parts.iter().for_each(|part| columns(*part, at, scales, &mut x));
-    x.push(value);
-    x
+    [vec![1.0], row(parts, at, scales), vec![value]].concat()
 }
 
 /// Noise of the rows.

@@ -44,6 +44,7 @@ pub use reading::{ByCore, Reading, ReadingDelay};
 use reading::{Delays, play_of_a_millisecond};
 pub use rows::one_in;
 use rows::{FoldKind, Recorded, Rows, settled};
+
 use together::Agreement;
 pub(crate) use zero::{Alignment, OutputZero, ZeroCost, cost};
 
@@ -136,13 +137,7 @@ impl CalibrationError {
     /// Whether the input is to blame.
     #[must_use]
     pub fn is_bad_input(&self) -> bool {
-        matches!(
-            self,
-            CalibrationError::Measured(_)
-                | CalibrationError::Known(_)
-                | CalibrationError::Ratio { .. }
-                | CalibrationError::TooFew(_)
-        )
+        !matches!(self, CalibrationError::NothingGained(_) | CalibrationError::Table(_))
     }
 }
 
@@ -169,15 +164,10 @@ impl Model {
 
     /// Where the coefficients of a part stand.
     fn of(&self, part: PartName) -> Option<std::ops::Range<usize>> {
-        let mut begin = 0;
-        for chosen in &self.chosen {
-            let width = parts::weights(chosen.part).len();
-            if chosen.part == part {
-                return Some(begin..begin + width);
-            }
-            begin += width;
-        }
-        None
+        let width = |part: PartName| parts::weights(part).len();
+        let at = self.chosen.iter().position(|chosen| chosen.part == part)?;
+        let begin = self.chosen[..at].iter().map(|chosen| width(chosen.part)).sum();
+        Some(begin..begin + width(part))
     }
 
     /// The whole play that it has at most beside the prior's, arcsec.

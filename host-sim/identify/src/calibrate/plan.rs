@@ -213,7 +213,6 @@ pub struct Wide {
 /// A pass that may be made.
 struct Candidate {
     pass: Pass,
-    warmth: usize,
     tells: Gram,
 }
 
@@ -266,8 +265,7 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
         let mut best: Option<(f64, usize, Vec<f64>)> = None;
         // The ends of the loads first, as a table ends where they do; then each load and temperature once before one is
         // repeated: the parts do not know all that they do.
-        let is_new =
-            |c: &Candidate, of: fn(&Pass) -> f64| taken.iter().all(|(_, pass): &(usize, Pass)| of(pass) != of(&c.pass));
+        let is_new = |c: &Candidate, of: fn(&Pass) -> f64| taken.iter().all(|pass: &Pass| of(pass) != of(&c.pass));
         let news = |c: &Candidate| {
             let new_load = is_new(c, |pass| pass.torque_n_m);
             let new = usize::from(new_load) + usize::from(is_new(c, |pass| pass.temperature_c));
@@ -277,7 +275,7 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
         let most = candidates.iter().filter(|c| fits(c)).map(news).max();
         for (k, candidate) in candidates.iter().enumerate().filter(|(_, c)| fits(c) && Some(news(c)) == most) {
             let mut with = known.clone();
-            with[candidate.warmth].add(&candidate.tells, 1.0);
+            with[candidate.pass.log - 1].add(&candidate.tells, 1.0);
             let then = of(&with)?;
             let gain = (uncertain - asked.mean_variance(&then)) / candidate.pass.duration_s;
             if best.as_ref().is_none_or(|(most, ..)| gain > *most) {
@@ -286,9 +284,9 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
         }
         let Some((_, k, then)) = best else { break };
         let tells = asked.tells_most(&chosen, &now, &then);
-        known[candidates[k].warmth].add(&candidates[k].tells, 1.0);
+        known[candidates[k].pass.log - 1].add(&candidates[k].tells, 1.0);
         left_s -= candidates[k].pass.duration_s;
-        taken.push((candidates[k].warmth, Pass { tells, ..candidates[k].pass }));
+        taken.push(Pass { tells, ..candidates[k].pass });
         now = then;
     }
     if taken.len() == MOST_PASSES {
@@ -374,24 +372,15 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
 
 /// Cold first; at each temperature in the order in which they tell most, so that a log that is broken off is worth
 /// most.
-fn in_order(taken: Vec<(usize, Pass)>) -> Vec<Pass> {
-    let warmths = taken.iter().map(|(warmth, _)| warmth + 1).max().unwrap_or(0);
-    let mut passes = Vec::new();
-    for warmth in 0..warmths {
-        let mut begin_s = 0.0;
-        for (_, pass) in taken.iter().filter(|(of, _)| *of == warmth) {
-            passes.push(Pass { begin_s, ..*pass });
-            begin_s += pass.duration_s;
-        }
+fn in_order(mut passes: Vec<Pass>) -> Vec<Pass> {
+    passes.sort_by_key(|pass| pass.log);
+    let (mut log, mut begin_s) = (0, 0.0);
+    for pass in &mut passes {
+        begin_s = if pass.log == log { begin_s } else { 0.0 };
+        (log, pass.begin_s) = (pass.log, begin_s);
+        begin_s += pass.duration_s;
     }
     passes
-}
-
-/// The column of the temperature that moves the zero alone, which logs of one temperature each cannot tell from the
-/// encoder's.
-fn column_of_zero(chosen: &[PartName]) -> Option<usize> {
-    let at = chosen.iter().position(|part| *part == PartName::Temperature)?;
-    Some(width_of(&chosen[..at]))
 }
 
 /// Target of the plan: the mean of `x xᵀ` over all that it is to hold.
@@ -404,7 +393,9 @@ impl Asked {
     fn of(scales: &Scales, ratio: f64, travel: [f64; 2], chosen: &[PartName]) -> Asked {
         let mut rows: Vec<Vec<f64>> =
             spread(scales, ratio, travel, ASKED).iter().map(|at| row(chosen, at, scales)).collect();
-        if let Some(zero) = column_of_zero(chosen) {
+        // The zero by temperature: logs of one temperature each cannot tell it from the encoder's.
+        if let Some(at) = chosen.iter().position(|part| *part == PartName::Temperature) {
+            let zero = width_of(&chosen[..at]);
             rows.iter_mut().for_each(|row| row[zero] = 0.0);
         }
         // What is the same everywhere is the encoder's zero, and nobody's error.
@@ -474,11 +465,13 @@ fn open_parts(prior: &Prior<'_>, bench: &Bench, scales: &Scales) -> (Vec<PartNam
         }
         _ => None,
     };
-    let open = PartName::ALL.into_iter().filter(|part| lacks(*part).is_none()).collect();
-    let cannot = PartName::ALL
-        .into_iter()
-        .filter_map(|part| lacks(part).map(|why| format!("{}: {why}", part.as_str())))
-        .collect();
+    let (mut open, mut cannot) = (Vec::new(), Vec::new());
+    for part in PartName::ALL {
+        match lacks(part) {
+            Some(why) => cannot.push(format!("{}: {why}", part.as_str())),
+            None => open.push(part),
+        }
+    }
     (open, cannot)
 }
 
@@ -584,7 +577,7 @@ fn candidates(prior: &Prior<'_>, bench: &Bench, scales: &Scales, chosen: &[PartN
                     temperature_c,
                     tells: PartName::OutputAngle,
                 };
-                all.push(Candidate { pass, warmth, tells });
+                all.push(Candidate { pass, tells });
             }
         }
     }

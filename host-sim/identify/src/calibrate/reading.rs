@@ -9,7 +9,8 @@ use super::parts::{PartName, Scales, expected_arcsec};
 use super::rows::{Recorded, Rows, settled, speeds_rad_s};
 use super::{Model, Prior};
 use crate::extension::left_by_core;
-use crate::measurement::Recording;
+use crate::measurement::{Recording, Session};
+use crate::turns_off::about_mean;
 use flexspline::Table;
 use flexspline_base::units::ARCSEC_PER_RAD;
 
@@ -230,20 +231,13 @@ pub struct ByCore {
 impl ByCore {
     pub(super) fn of(files: &[Recording], table: &Table<'_>, recorded: &Recorded) -> ByCore {
         let (mut before, mut after, mut rows) = (0.0, 0.0, 0);
+        let squares = |values: Vec<f64>| about_mean(&values).powi(2) * values.len() as f64;
         for file in files {
-            let about = |values: Vec<f64>| {
-                let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
-                values.iter().map(|value| (value - mean).powi(2)).sum::<f64>()
-            };
-            let measured: Vec<f64> = file
-                .sessions
-                .iter()
-                .flat_map(|session| session.error_rad.iter().map(|rad| rad * ARCSEC_PER_RAD))
-                .collect();
+            let errors = file.sessions.iter().flat_map(|session| &session.error_rad);
             let left = file.sessions.iter().flat_map(|session| left_by_core(table, session, recorded.temperature_c));
-            rows += measured.len();
-            before += about(measured);
-            after += about(left.collect());
+            rows += file.sessions.iter().map(Session::len).sum::<usize>();
+            before += squares(errors.map(|rad| rad * ARCSEC_PER_RAD).collect());
+            after += squares(left.collect());
         }
         let rms = |squares: f64| (squares / rows.max(1) as f64).sqrt();
         ByCore { rms_before_arcsec: rms(before), rms_after_arcsec: rms(after), rows }

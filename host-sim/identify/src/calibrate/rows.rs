@@ -6,7 +6,7 @@ use super::folds::{Folds, Row};
 use super::parts::{PartName, Scales, State};
 use super::prior::Prior;
 use crate::least_squares::Normal;
-use crate::measurement::{Recording, Session, least_and_most, quantile_of, rates, sampled, white_noise};
+use crate::measurement::{Recording, Session, least_and_most, quantile_of, rates, sampled, turns, white_noise};
 use flexspline_base::units::ARCSEC_PER_RAD;
 
 /// Folds that records are cut into: blocks of a tenth of each or so, which say what a table does beyond what it saw.
@@ -98,20 +98,16 @@ impl Recorded {
         let usual = prior.nominal.temperature_c;
         let angles = |scale: f64| sessions().flat_map(move |s| s.generator_rad.iter().map(move |psi| psi * scale));
         let generator = least_and_most(angles(1.0));
-        let mut steps: Vec<f64> =
-            sessions().flat_map(|s| s.generator_rad.windows(2).map(|p| (p[1] - p[0]).abs())).collect();
-        steps = sampled(&steps);
-        let step_rad = quantile_of(&mut steps, 0.9);
+        let steps = sessions().flat_map(|s| s.generator_rad.windows(2).map(|p| p[1] - p[0]));
+        let steps: Vec<f64> = steps.map(|step| step * prior.nominal.ratio.signum()).collect();
+        let mut sizes = sampled(&steps);
+        sizes.iter_mut().for_each(|step| *step = step.abs());
+        let step_rad = quantile_of(&mut sizes, 0.9);
         // By the way and not by rows: one direction may be driven at another pace.
-        let (mut moved, mut backward) = (0.0_f64, 0.0);
-        for pair in sessions().flat_map(|s| s.generator_rad.windows(2)) {
-            let step = (pair[1] - pair[0]) * prior.nominal.ratio.signum();
-            moved += step.abs();
-            backward += (-step).max(0.0);
-        }
+        let way = |of: &dyn Fn(&f64) -> bool| steps.iter().filter(|step| of(step)).map(|step| step.abs()).sum::<f64>();
+        let (moved, backward) = (way(&|_| true), way(&|step| *step < 0.0));
         let fine_rad = TAU / (super::ROWS_OF_A_PITCH * prior.tooth_pitches());
-        let all_steps = sessions().flat_map(|s| s.generator_rad.windows(2).map(|p| (p[1] - p[0]).abs()));
-        let fine_turns = all_steps.filter(|step| *step <= fine_rad * (1.0 + 1e-3)).sum::<f64>() / TAU;
+        let fine_turns = way(&|step| step.abs() <= fine_rad * (1.0 + 1e-3)) / TAU;
         let most = torque.0.abs().max(torque.1.abs());
         let speeds: Vec<f64> = sessions()
             .flat_map(|session| speeds_rad_s(session, prior.nominal.ratio))
@@ -407,28 +403,11 @@ impl Rows {
 
 /// Direction of the output in each row; `None` before the first motion and until the play is through after a reversal.
 fn directions(session: &Session, ratio: f64, step_rad: f64, settle_rad: f64) -> Vec<Option<f64>> {
-    let back = TURNED_ROUND * step_rad;
-    let Some(first) = session.generator_rad.first() else { return Vec::new() };
-    let (mut way, mut extreme, mut turned_at) = (0.0_f64, *first, *first);
-    session
-        .generator_rad
-        .iter()
-        .map(|psi| {
-            let beyond = (psi - extreme) * if way == 0.0 { 1.0 } else { way };
-            if way == 0.0 {
-                if beyond.abs() > back {
-                    way = beyond.signum();
-                    extreme = *psi;
-                }
-            } else if beyond > 0.0 {
-                extreme = *psi;
-            } else if -beyond > back {
-                (way, turned_at, extreme) = (-way, extreme, *psi);
-            }
-            let through = way != 0.0 && (psi - turned_at).abs() >= settle_rad;
-            through.then_some(way * ratio.signum())
-        })
-        .collect()
+    let turns = turns(&session.generator_rad, TURNED_ROUND * step_rad);
+    let settled = |(psi, (way, turned_at)): (&f64, (f64, f64))| {
+        (way != 0.0 && (psi - turned_at).abs() >= settle_rad).then_some(way * ratio.signum())
+    };
+    session.generator_rad.iter().zip(turns).map(settled).collect()
 }
 
 #[cfg(test)]

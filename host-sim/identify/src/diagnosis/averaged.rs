@@ -24,7 +24,8 @@ const SLOW_SHARE: f64 = 0.98;
 pub(crate) struct Averaged {
     rows: Rows,
     base: Base,
-    stride: usize,
+    /// Rows to an average.
+    pub stride: usize,
     /// Rows in each average.
     counts: Vec<f64>,
     /// First row and first average of each session.
@@ -56,18 +57,6 @@ impl Averaged {
         let base = on.base.each(mean);
         let counts = groups.iter().map(|group| group.len() as f64).collect();
         Some(Averaged { rows, base, stride, counts, firsts })
-    }
-
-    /// The excitation of the averages, with nothing that other causes change.
-    #[must_use]
-    pub(crate) fn excitation<'a>(&'a self, on: &Excitation<'a>) -> Excitation<'a> {
-        Excitation { rows: &self.rows, base: &self.base, ..*on }
-    }
-
-    /// Rows to an average.
-    #[must_use]
-    pub(crate) fn stride(&self) -> usize {
-        self.stride
     }
 
     /// The averages that each group of rows consists of. Groups hold whole averages.
@@ -106,14 +95,14 @@ impl Grain {
     /// Smooth laws are evaluated on `averaged`, if there is any.
     #[must_use]
     pub fn new(averaged: Option<Arc<Averaged>>, whitener: &Whitener) -> Grain {
-        Grain { averaged: averaged.map(|averaged| (averaged.clone(), averaged.in_groups(whitener.groups()))) }
+        Grain { averaged: averaged.map(|averaged| (averaged.clone(), averaged.in_groups(&whitener.groups))) }
     }
 
     /// What a law is evaluated on.
     #[must_use]
     pub(crate) fn excitation<'a>(&'a self, smooth: bool, on: &Excitation<'a>) -> Excitation<'a> {
         match &self.averaged {
-            Some((averaged, _)) if smooth => averaged.excitation(on),
+            Some((averaged, _)) if smooth => on.over(&averaged.rows, &averaged.base),
             _ => *on,
         }
     }

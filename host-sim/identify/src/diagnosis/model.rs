@@ -243,12 +243,6 @@ impl<'l> Term<'l> {
         Term::among(problem, law, places, None, Extent::Whole)
     }
 
-    /// Evaluates the main columns of a law by itself.
-    #[must_use]
-    pub(crate) fn bare(problem: &Problem<'_>, law: &'l Law, places: Vec<f64>) -> Term<'l> {
-        Term::among(problem, law, places, None, Extent::Bare)
-    }
-
     /// Only its main columns.
     #[must_use]
     pub(crate) fn main_only(&self, problem: &Problem<'_>) -> Term<'l> {
@@ -512,18 +506,11 @@ impl<'p, 'a, 't, 'l> Scaffold<'p, 'a, 't, 'l> {
         }
     }
 
-    /// The solution with a law tried at some places: with its main columns alone, or where they mean nothing by
-    /// themselves all of them.
+    /// The solution with a law tried at some places: with all its columns where it is `whole`, else with the main ones.
     #[must_use]
-    pub(crate) fn trial(&self, law: &Law, places: &[f64]) -> Option<Solution> {
-        let extent = if law.search.whole { Extent::Whole } else { Extent::Bare };
+    pub(crate) fn trial(&self, law: &Law, places: &[f64], whole: bool) -> Option<Solution> {
+        let extent = if whole { Extent::Whole } else { Extent::Bare };
         Some(self.fit_with(Some(&self.white(law, extent, places)), None)?.solution)
-    }
-
-    /// The solution with all columns of a law at some places.
-    #[must_use]
-    pub(crate) fn whole_trial(&self, law: &Law, places: &[f64]) -> Option<Solution> {
-        Some(self.fit_with(Some(&self.white(law, Extent::Whole, places)), None)?.solution)
     }
 
     /// Whether a law changes what some of the terms do, and they do not change it.

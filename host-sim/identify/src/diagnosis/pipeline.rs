@@ -28,8 +28,8 @@ use crate::extension::{
     TableSubject, causes_to_toml, check_by_fem, evaluate, found_geometry, less,
 };
 use crate::measurement::{
-    ColumnMap, Fault, FaultName, IN_DEGREES, MeasuredError, Quantity, Recording, Session, Treatment, bytes_of, parse,
-    parse_as,
+    ColumnMap, Fault, FaultName, IN_DEGREES, MeasuredError, Quantity, Recording, Session, Treatment, bytes_of,
+    least_and_most, parse, parse_as,
 };
 use crate::nominal::{NoSuchWheels, Nominal};
 use crate::synthesize::{EffectError, Sizes};
@@ -644,12 +644,9 @@ fn remade(
 /// gravity if it stays.
 fn tables_of<'a>(subject: &'a Subject<'_>, of: &'a TableSubject, files: &[Recording]) -> ExtendedTables<'a> {
     let all = |column: fn(&Session) -> Option<&Vec<f64>>| {
-        files.iter().flat_map(|file| &file.sessions).filter_map(column).flatten().copied().fold(
-            None,
-            |range: Option<[f64; 2]>, value| {
-                Some(range.map_or([value; 2], |[low, high]| [low.min(value), high.max(value)]))
-            },
-        )
+        let values = files.iter().flat_map(|file| &file.sessions).filter_map(column).flatten().copied();
+        let (low, high) = least_and_most(values);
+        (low <= high).then_some([low, high])
     };
     let torque = all(|s| s.torque_n_m.as_ref()).unwrap_or([0.0; 2]);
     let temperature = all(|s| s.temperature_c.as_ref()).unwrap_or([subject.nominal.temperature_c; 2]);

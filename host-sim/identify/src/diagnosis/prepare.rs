@@ -305,7 +305,7 @@ impl FreeColumns {
     /// there is any.
     #[must_use]
     pub fn of(on: &Excitation<'_>, laws: &[Law], averaged: Option<Arc<Averaged>>) -> FreeColumns {
-        let finest = averaged.as_ref().map_or(1, |averaged| averaged.stride());
+        let finest = averaged.as_ref().map_or(1, |averaged| averaged.stride);
         let stride = finest * on.rows.count_used().div_ceil(WANDER_AVERAGES * finest).max(1);
         let plain = Whitener::plain(on.rows, &vec![false; on.rows.len()], stride, 1.0);
         let grain = Grain::new(averaged, &plain);

@@ -258,7 +258,7 @@ fn tried(
     let tried: Vec<(usize, f64, Vec<f64>)> = trials
         .into_par_iter()
         .with_max_len(4)
-        .filter_map(|(k, places)| Some((k, scaffold.trial(laws[k], &places)?.evidence, places)))
+        .filter_map(|(k, places)| Some((k, scaffold.trial(laws[k], &places, laws[k].search.whole)?.evidence, places)))
         .filter(|(_, evidence, _)| evidence.is_finite())
         .collect();
     let mut by_law: Vec<Vec<(f64, Vec<f64>)>> = vec![Vec::new(); laws.len()];
@@ -291,7 +291,7 @@ fn best_tried<'l>(
         .into_par_iter()
         .with_max_len(1)
         .filter_map(|(law, places)| {
-            let evidence = scaffold.whole_trial(law, &places)?.evidence;
+            let evidence = scaffold.trial(law, &places, true)?.evidence;
             evidence.is_finite().then_some((evidence, law, places))
         })
         .collect();

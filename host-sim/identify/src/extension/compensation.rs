@@ -194,14 +194,14 @@ pub fn evaluate(
             }
         }
     }
-    let by_image = |image: Vec<u8>| -> Option<Vec<Vec<f64>>> {
-        let table = Table::check(&image).ok()?;
-        Some(sessions.iter().map(|session| left_by_core(&table, session, nominal.temperature_c)).collect())
+    let by_table = |table: &Table<'_>| -> Vec<Vec<f64>> {
+        sessions.iter().map(|session| left_by_core(table, session, nominal.temperature_c)).collect()
     };
-    let none = || sessions.iter().map(|session| session.error_rad.iter().map(|e| e * ARCSEC_PER_RAD).collect());
-    let none: Vec<Vec<f64>> = none().collect();
+    let by_image = |image: Vec<u8>| Table::check(&image).ok().map(|table| by_table(&table));
+    let none = sessions.iter().map(|session| session.error_rad.iter().map(|e| e * ARCSEC_PER_RAD).collect());
+    let none: Vec<Vec<f64>> = none.collect();
     let by_nominal = match tables.table {
-        Some(table) => Some(sessions.iter().map(|s| left_by_core(table, s, nominal.temperature_c)).collect()),
+        Some(table) => Some(by_table(table)),
         None => tables.nominal(fitted.or(Some(found))).ok().and_then(|made| by_image(made.image)),
     };
     // A model that makes no table predicts all the same.

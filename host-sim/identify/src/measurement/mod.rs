@@ -168,25 +168,30 @@ impl Session {
 /// *Guess*: 1.1°, of which an output behind a ratio of 100 sees 41 arcsec.
 const TURNED_BACK_RAD: f64 = 0.02;
 
+/// Which way an angle last moved by more than `back`, 0 before it first did, and where it turned that way; row by row.
+pub(crate) fn turns(angle: &[f64], back: f64) -> Vec<(f64, f64)> {
+    let Some(&first) = angle.first() else { return Vec::new() };
+    let (mut way, mut farthest, mut turned_at) = (0.0_f64, first, first);
+    let turn = |angle: &f64| {
+        let beyond = (angle - farthest) * if way == 0.0 { 1.0 } else { way };
+        if way == 0.0 && beyond.abs() > back {
+            (way, farthest) = (beyond.signum(), *angle);
+        } else if way != 0.0 && beyond > 0.0 {
+            farthest = *angle;
+        } else if way != 0.0 && -beyond > back {
+            (way, turned_at, farthest) = (-way, farthest, *angle);
+        }
+        (way, turned_at)
+    };
+    angle.iter().map(turn).collect()
+}
+
 /// +1 from where an angle last moved forward by more than its noise, -1 backward.
 pub fn directions(angle: &[f64]) -> Vec<f64> {
-    let Some(&start) = angle.first() else { return Vec::new() };
+    let turns = turns(angle, TURNED_BACK_RAD);
     // The first clear motion also holds for what comes before it.
-    let first = angle.iter().map(|a| a - start).find(|moved| moved.abs() > TURNED_BACK_RAD);
-    let mut now = first.map_or(1.0, f64::signum);
-    let mut farthest = start;
-    angle
-        .iter()
-        .map(|a| {
-            if (a - farthest) * now > 0.0 {
-                farthest = *a;
-            } else if (farthest - a) * now > TURNED_BACK_RAD {
-                now = -now;
-                farthest = *a;
-            }
-            now
-        })
-        .collect()
+    let first = turns.iter().map(|(way, _)| *way).find(|way| *way != 0.0).unwrap_or(1.0);
+    turns.into_iter().map(|(way, _)| if way == 0.0 { first } else { way }).collect()
 }
 
 /// The rows before and after row `k` of a session, or that row at its ends.

@@ -305,7 +305,7 @@ pub(super) fn laws(on: &Excitation<'_>) -> Vec<Law> {
             plays.push(on.base.law);
         }
         let thinned = if on.unloaded() { Thinned::of(on, 1) } else { None };
-        let on_sample = thinned.as_ref().map_or(*on, |thinned| thinned.excitation(on));
+        let on_sample = thinned.as_ref().map_or(*on, |thinned| on.over(&thinned.rows, &thinned.base));
         for play in plays {
             laws.push(gravity_torque(1.0, play, on, &on_sample).variant(play.as_str()));
             if on.is_turned_about() {

@@ -84,6 +84,12 @@ impl<'a> Excitation<'a> {
         Excitation { rows, nominal, base, scales, widened: None, zones: None, softer: 1.0 }
     }
 
+    /// Other rows, with the nominal model over them, and nothing that other causes change.
+    #[must_use]
+    pub(crate) fn over(&self, rows: &'a Rows, base: &'a Base) -> Excitation<'a> {
+        Excitation { rows, base, ..*self }
+    }
+
     /// Whether the output is not loaded beyond friction, which then says nothing of the flank that carries.
     #[must_use]
     pub(crate) fn unloaded(&self) -> bool {
