@@ -456,8 +456,11 @@ impl OtherRatio {
 /// The same of one log: said and not refused where the output moves little and errs as one of a gear may.
 pub(crate) fn check_ratio_of(log: &Recording, ratio: f64) -> Result<Option<String>, OtherRatio> {
     let Some(other) = OtherRatio::of(std::slice::from_ref(log), ratio) else { return Ok(None) };
+    let (from, to) = least_and_most(log.sessions.iter().flat_map(|session| session.generator_rad.iter().copied()));
+    let moves_little = (to - from) / ratio.abs() < PERIOD_OF_THE_OUTPUT * std::f64::consts::TAU;
     // A load that grows over a few rows looks the same.
-    if other.is_far() && other.error_rad >= MOST_ERROR_RAD { Err(other) } else { Ok(Some(other.to_string())) }
+    let may_be_load = moves_little && other.error_rad < MOST_ERROR_RAD;
+    if other.is_far() && !may_be_load { Err(other) } else { Ok(Some(other.to_string())) }
 }
 
 /// Generator turns that tell two waves in a turn from two in a turn against the output: half a turn of the output, in
