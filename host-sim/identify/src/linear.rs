@@ -27,29 +27,37 @@ impl Gram {
         Gram { size, products: vec![0.0; size * size] }
     }
 
-    /// Adds a row, the value last, that counts `weight` times.
+    /// Adds a row, the value last, that counts `weight` times: to the lower triangle.
     pub fn add_row(&mut self, row: &[f64], weight: f64) {
-        for (products, a) in self.products.chunks_exact_mut(self.size).zip(row) {
-            products.iter_mut().zip(row).for_each(|(sum, b)| *sum += weight * a * b);
+        for (i, (products, a)) in self.products.chunks_exact_mut(self.size).zip(row).enumerate() {
+            products.iter_mut().zip(&row[..=i]).for_each(|(sum, b)| *sum += weight * a * b);
         }
     }
 
-    /// Of some of the columns.
+    /// Adds some of the columns of another one, of which the lower triangle is read.
+    pub fn add_among(&mut self, other: &Gram, places: &[usize]) {
+        for (products, i) in self.products.chunks_exact_mut(self.size).zip(places) {
+            products.iter_mut().zip(places).for_each(|(sum, j)| *sum += other.at(*i.max(j), *i.min(j)));
+        }
+    }
+
+    /// Of some of the columns; the lower triangle is read.
     #[must_use]
     pub fn among(&self, places: &[usize]) -> Gram {
-        let products = places.iter().flat_map(|i| places.iter().map(|j| self.at(*i, *j))).collect();
-        Gram { size: places.len(), products }
+        let mut some = Gram::none(places.len());
+        some.add_among(self, places);
+        some
     }
 
-    /// Without the first column, whose coefficient is free in these rows.
+    /// Without the first column, whose coefficient is free in these rows; the lower triangle is read.
     #[must_use]
     pub fn first_free(&self) -> Gram {
-        let mut others = self.among(&(1..self.size).collect::<Vec<usize>>());
+        let mut own = self.clone();
         if self.at(0, 0) > 0.0 {
-            let first = &self.products[1..self.size];
-            others.add_row(first, -1.0 / self.at(0, 0));
+            let first: Vec<f64> = (0..self.size).map(|k| self.at(k, 0)).collect();
+            own.add_row(&first, -1.0 / self.at(0, 0));
         }
-        others
+        own.among(&(1..self.size).collect::<Vec<usize>>())
     }
 
     /// Sum of squares that the columns leave with these coefficients.

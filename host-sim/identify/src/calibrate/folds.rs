@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use super::parts::{PartName, Scales, State, columns, output_slopes, weights};
+use super::parts::{OUTPUT_ORDERS, PartName, Scales, State, columns, output_slopes, weights};
 use crate::linear::{Gram, Prior, solve};
 
 /// A row to fit.
@@ -46,6 +46,8 @@ pub(super) const FLOOR: f64 = 1e-9;
 /// two waves, a fifth to 41 % of a turn recorded: a tenth of it swings as free waves do, ten times as much bends the
 /// ends.
 const STRAIGHT: f64 = 1e-3;
+/// Two periods of the highest wave: over a narrower gap the values and slopes at its ends hold the waves. Derived.
+const HELD_GAP_RAD: f64 = 2.0 * TAU / OUTPUT_ORDERS as f64;
 /// Places at which the slope is asked for.
 const PLACES: usize = 72;
 
@@ -77,7 +79,7 @@ impl Folds {
         sums.iter_mut().for_each(|sum| *sum = if own_zero { sum.first_free() } else { sum.among(&columns) });
         let mut slopes = Gram::none(all.len() + 1);
         let [begin, width] = scales.output_gap_rad;
-        let curve = parts.iter().position(|part| *part == PartName::OutputAngle).filter(|_| width > 0.0);
+        let curve = parts.iter().position(|part| *part == PartName::OutputAngle).filter(|_| width > HELD_GAP_RAD);
         for (at, k) in curve.into_iter().flat_map(|at| (0..PLACES).map(move |k| (at, k))) {
             let mut x = vec![0.0; all.len() + 1];
             let place = begin + width * (k as f64 + 0.5) / PLACES as f64;
@@ -115,7 +117,7 @@ impl Folds {
     pub fn fit(&self, folds: &[usize], chosen: &[Chosen], held: &[(usize, f64)]) -> Option<Vec<f64>> {
         let ((places, penalties), rows) = (self.places(chosen), self.rows(folds));
         let mut gram = Gram::none(places.len());
-        folds.iter().for_each(|fold| gram.add(&self.sums[*fold].among(&places), 1.0));
+        folds.iter().for_each(|fold| gram.add_among(&self.sums[*fold], &places));
         gram.add(&self.slopes.among(&places), rows);
         let prior = |penalty: &f64| Prior { mean: 0.0, std: ((penalty + FLOOR) * rows).sqrt().recip() };
         let mut priors: Vec<Prior> = penalties.iter().map(prior).collect();

@@ -930,8 +930,8 @@ fn remarks(
     }
     if recorded.output_share < 1.0 && has(PartName::OutputAngle) {
         remarks.push(format!(
-            "{:.0} % of an output turn was recorded: in the rest the curve over the output angle goes \
-             nearly straight from one end to the other, and is not measured",
+            "{:.0} % of an output turn was recorded: in the rest the curve over the output angle joins \
+             its ends, and is not measured",
             100.0 * recorded.output_share
         ));
     }

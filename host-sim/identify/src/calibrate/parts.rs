@@ -234,12 +234,13 @@ pub(super) fn usual_arcsec(part: PartName, scales: &Scales) -> f64 {
 /// Half of an arc-minute, which the lost motion of the catalogue's drives stays below.
 const HALF_A_LOST_MOTION_ARCSEC: f64 = 30.0;
 
-/// Sine and cosine of each order.
+/// Sine and cosine of each order, each turned on from the one before.
 fn waves(angle: f64, orders: u16, to: &mut Vec<f64>) {
-    let angle = angle.rem_euclid(TAU);
-    for order in 1..=orders {
-        let (sine, cosine) = (f64::from(order) * angle).sin_cos();
-        to.extend([sine, cosine]);
+    let (sine, cosine) = angle.sin_cos();
+    let (mut s, mut c) = (sine, cosine);
+    for _ in 0..orders {
+        to.extend([s, c]);
+        (s, c) = (s * cosine + c * sine, c * cosine - s * sine);
     }
 }
 
