@@ -154,9 +154,9 @@ fn where_nothing_is_hidden_nothing_is_extended() {
     println!("nothing hidden: no table {none:.2}\", nominal {nominal:.2}\", extended {extended:.2}\"");
     assert_eq!(nominal, extended);
     assert!(nominal < none);
-    // The table is that of this unit; nothing else is.
+    // The unit is off its nominal model within the spread of units: the table takes that out, and nothing is extended.
     assert_eq!(diagnosis["table"]["kind"], "calibrated", "{}", diagnosis["table"]);
-    assert!(number(&diagnosis, &["table", "rms_left_out_arcsec"]) < 1.02 * nominal);
+    assert!(number(&diagnosis, &["table", "rms_left_out_arcsec"]) < 0.7 * nominal, "{}", diagnosis["table"]);
     let files = [&CALIBRATED[..], &["diagnosis.json", "report.html"]].concat();
     assert_eq!(names(&desk.path("found")), files);
 }
@@ -174,8 +174,7 @@ fn what_no_table_can_hold_is_said_and_left_alone() {
     let left = &diagnosis["extension"]["compensation"]["not_applied"][0];
     assert_eq!(left["cause"], "sensor_latency");
     assert!(left["reason"].as_str().unwrap().contains("speed"));
-    let files = [&CALIBRATED[..], &["diagnosis.json", "drive-extended.toml", "report.html"]].concat();
-    assert_eq!(names(&desk.path("found")), files);
+    assert_eq!(names(&desk.path("found")), ["diagnosis.json", "drive-extended.toml", "report.html"]);
     assert!(desk.read("found/drive-extended.toml").contains("delay_s"));
 }
 
@@ -196,12 +195,7 @@ fn an_error_of_the_output_encoder_is_not_put_into_tables() {
         let left = &diagnosis["extension"]["compensation"]["not_applied"][0];
         assert_eq!(left["cause"], name);
         assert!(left["reason"].as_str().unwrap().contains("not the joint"));
-        assert!(!names(&desk.path("found")).iter().any(|file| file.ends_with("-extended.fxt")));
-        // What is left of the reading is the encoder's error, and the table of the unit does not follow it.
-        let replayed = "replay --tables found/calibrated.fxt made/data.csv --out replayed --json";
-        let left = number(&desk.line(replayed).done().json(), &["rms_residual_arcsec"]);
-        let amplitude = number(&diagnosis["causes"][0], &["parameters", "amplitude_arcsec", "value"]);
-        assert!(left > 0.6 * amplitude, "{name} of {amplitude}\": {left}\" left");
+        assert!(!names(&desk.path("found")).iter().any(|file| file.ends_with(".fxt")));
     }
 }
 
