@@ -661,7 +661,6 @@ mod tests {
             noise_arcsec: [5.0, 0.0],
             wander_correlation_s: 1.0,
             next_experiment: None,
-            ratio_proposed: None,
             experiment_for_asked: None,
             zeros: Vec::new(),
             set_aside: None,
