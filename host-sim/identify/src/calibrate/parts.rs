@@ -4,8 +4,6 @@
 //! Every column is of the order of one, so that a penalty means the same in all parts. The weight of a column within
 //! its part rises with its order: smooth curves cost little, wrinkles much.
 
-use std::f64::consts::TAU;
-
 use flexspline_base::units::ARCSEC_PER_RAD;
 use serde::Serialize;
 
@@ -262,6 +260,8 @@ fn chebyshev(x: f64) -> [f64; WIND_UP_DEGREE] {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
+
     use super::*;
 
     #[test]
