@@ -58,4 +58,15 @@ impl Answer {
         }
         Ok(answer)
     }
+
+    /// What an error that names another ratio says: the fault `ratio_mismatch`, and nothing of the unit.
+    pub fn of_refusal(text: &str) -> Option<Self> {
+        let names_both = text.contains("ratio: found ") && text.contains(", but the generator turns ");
+        names_both.then(|| Self {
+            verdict: "unknown".into(),
+            causes: Vec::new(),
+            data_faults: vec![DataFault { name: "ratio_mismatch".into() }],
+            held_out: None,
+        })
+    }
 }

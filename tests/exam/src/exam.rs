@@ -15,7 +15,7 @@ use crate::answer::Answer;
 use crate::case::{Case, Draw};
 use crate::chance::Chance;
 use crate::score::{Gathered, Judged, judge};
-use crate::truth::commitment;
+use crate::truth::{Truth, commitment};
 
 /// Longest diagnosis, s.
 const LIMIT_S: f64 = 300.0;
@@ -74,7 +74,7 @@ pub fn run(settings: &Settings) -> io::Result<Examination> {
     let mut order: Vec<usize> = (0..truths.len()).collect();
     order.sort_by(|a, b| truths[*a].name.cmp(&truths[*b].name));
     let judged = in_parallel(settings.jobs, order, |at| {
-        let (answer, seconds) = ask(settings, &cases[at], &truths[at].name)?;
+        let (answer, seconds) = ask(settings, &cases[at], &truths[at])?;
         Ok(judge(&truths[at], &answer, seconds))
     });
     let cases = judged.into_iter().collect::<io::Result<Vec<Judged>>>()?;
@@ -102,9 +102,9 @@ pub fn cases(path: &Path) -> io::Result<Vec<Judged>> {
 }
 
 /// Writes the data of a case, has it diagnosed, and takes the data away.
-fn ask(settings: &Settings, case: &Case, name: &str) -> io::Result<(Result<Answer, String>, f64)> {
-    let given = settings.out.join("cases").join(name);
-    let answered = settings.out.join("answers").join(name);
+fn ask(settings: &Settings, case: &Case, truth: &Truth) -> io::Result<(Result<Answer, String>, f64)> {
+    let given = settings.out.join("cases").join(&truth.name);
+    let answered = settings.out.join("answers").join(&truth.name);
     fs::create_dir_all(&given)?;
     fs::create_dir_all(&answered)?;
     fs::write(given.join("data.csv"), case.data())?;
@@ -123,10 +123,16 @@ fn ask(settings: &Settings, case: &Case, name: &str) -> io::Result<(Result<Answe
     let start = Instant::now();
     let ended = wait(&mut command);
     let seconds = start.elapsed().as_secs_f64();
-    let answer = ended.and_then(|()| {
-        let text = fs::read_to_string(answered.join("diagnosis.json")).map_err(|e| format!("diagnosis.json: {e}"))?;
-        Answer::read(&text).map_err(|error| format!("diagnosis.json: {error}"))
-    });
+    let read = |file: &str| fs::read_to_string(answered.join(file)).map_err(|error| format!("{file}: {error}"));
+    let answer = match ended {
+        Ok(()) => read("diagnosis.json")
+            .and_then(|text| Answer::read(&text).map_err(|error| format!("diagnosis.json: {error}"))),
+        // A run that ends at the ratio has no diagnosis.json: right where the ratio is what is wrong.
+        Err(error) => {
+            let of_refusal = Answer::of_refusal(&read("stderr.txt").unwrap_or_default());
+            of_refusal.filter(|answer| truth.accepts(answer)).ok_or(error)
+        }
+    };
     fs::remove_dir_all(&given)?;
     Ok((answer, seconds))
 }
