@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use super::parts::{OUTPUT_ORDERS, PartName, Scales, State, columns, output_slopes, weights};
+use super::parts::{PARTS_OF_A_TURN, PartName, Scales, State, columns, weights};
 use crate::linear::{Gram, Prior, solve};
 
 /// A row to fit.
@@ -34,22 +34,12 @@ pub(super) struct Folds {
     /// Rows in each fold, and the products of its columns.
     rows: Vec<f64>,
     sums: Vec<Gram>,
-    /// Of a row: the slopes of the curve over the output where nothing was recorded.
-    slopes: Gram,
+    /// Of a row: the curve over the output where nothing was recorded, as good as zero.
+    unrecorded: Gram,
 }
 
 /// Precision that keeps a matrix definite where a column says nothing, of a row.
 pub(super) const FLOOR: f64 = 1e-9;
-
-/// Penalty of the square of a slope, per rad², where nothing was recorded: the curve over the output then goes nearly
-/// straight from one end of what was recorded to the other, where free waves swing. Chosen on made encoders of one and
-/// two waves, a fifth to 41 % of a turn recorded: a tenth of it swings as free waves do, ten times as much bends the
-/// ends.
-const STRAIGHT: f64 = 1e-3;
-/// Two periods of the highest wave: over a narrower gap the values and slopes at its ends hold the waves. Derived.
-const HELD_GAP_RAD: f64 = 2.0 * TAU / OUTPUT_ORDERS as f64;
-/// Places at which the slope is asked for.
-const PLACES: usize = 72;
 
 impl Folds {
     /// Sums of all parts that may be fitted. With `own_zero` each fold has a zero of its own, found in it; else `zeros`
@@ -77,16 +67,8 @@ impl Folds {
         let rows = sums.iter().map(|sum| sum.at(0, 0)).collect();
         let columns: Vec<usize> = (1..all.len() + 2).collect();
         sums.iter_mut().for_each(|sum| *sum = if own_zero { sum.first_free() } else { sum.among(&columns) });
-        let mut slopes = Gram::none(all.len() + 1);
-        let [begin, width] = scales.output_gap_rad;
-        let curve = parts.iter().position(|part| *part == PartName::OutputAngle).filter(|_| width > HELD_GAP_RAD);
-        for (at, k) in curve.into_iter().flat_map(|at| (0..PLACES).map(move |k| (at, k))) {
-            let mut x = vec![0.0; all.len() + 1];
-            let place = begin + width * (k as f64 + 0.5) / PLACES as f64;
-            x[begins[at]..begins[at + 1]].copy_from_slice(&output_slopes(place));
-            slopes.add_row(&x, STRAIGHT * width / TAU / PLACES as f64);
-        }
-        Folds { parts: parts.to_vec(), begins, weights: all, rows, sums, slopes }
+        let unrecorded = unrecorded(parts, scales, &begins);
+        Folds { parts: parts.to_vec(), begins, weights: all, rows, sums, unrecorded }
     }
 
     /// Folds that hold rows.
@@ -118,7 +100,7 @@ impl Folds {
         let ((places, penalties), rows) = (self.places(chosen), self.rows(folds));
         let mut gram = Gram::none(places.len());
         folds.iter().for_each(|fold| gram.add_among(&self.sums[*fold], &places));
-        gram.add(&self.slopes.among(&places), rows);
+        gram.add(&self.unrecorded.among(&places), rows);
         let prior = |penalty: &f64| Prior { mean: 0.0, std: ((penalty + FLOOR) * rows).sqrt().recip() };
         let mut priors: Vec<Prior> = penalties.iter().map(prior).collect();
         for &(coefficient, mean) in held {
@@ -143,4 +125,24 @@ impl Folds {
         let others = |fold: usize| -> Vec<usize> { folds.iter().copied().filter(|other| *other != fold).collect() };
         folds.iter().map(|fold| self.left_in(*fold, &others(*fold), chosen)).sum()
     }
+}
+
+/// Products of the curve over the output in parts of its turn without rows, for each row there is: they count as if
+/// zero had been recorded there, as often as rows were recorded elsewhere. Waves that are fitted to a part of the turn
+/// swing in the rest of it.
+fn unrecorded(parts: &[PartName], scales: &Scales, begins: &[usize]) -> Gram {
+    let width = begins.last().copied().unwrap_or(0);
+    let mut gram = Gram::none(width + 1);
+    let Some(curve) = parts.iter().position(|part| *part == PartName::OutputAngle) else { return gram };
+    let weight = 1.0 / (PARTS_OF_A_TURN - scales.unrecorded.count_ones() as usize).max(1) as f64;
+    let mut x = Vec::with_capacity(width + 1);
+    for part in (0..PARTS_OF_A_TURN).filter(|part| scales.unrecorded >> part & 1 == 1) {
+        let output_rad = TAU * (part as f64 + 0.5) / PARTS_OF_A_TURN as f64;
+        x.clear();
+        x.resize(begins[curve], 0.0);
+        columns(PartName::OutputAngle, &State { output_rad, ..State::default() }, scales, &mut x);
+        x.resize(width + 1, 0.0);
+        gram.add_row(&x, weight);
+    }
+    gram
 }

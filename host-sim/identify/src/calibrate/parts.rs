@@ -71,6 +71,8 @@ pub(super) const GENERATOR_ORDERS: u16 = 8;
 pub(super) const OUTPUT_ORDERS: u16 = 6;
 /// Waves of the curve over a tooth pitch: eight nodes of a table hold them.
 pub(super) const TOOTH_ORDERS: u16 = 3;
+/// Parts of the output's turn, each with rows or without.
+pub(super) const PARTS_OF_A_TURN: usize = 36;
 /// Degree of the wind-up over the torques recorded.
 const WIND_UP_DEGREE: usize = 6;
 /// Load, of the largest recorded, at which half of what light loads do is done: clearance that closes, teeth that come
@@ -120,9 +122,8 @@ pub struct Scales {
     pub speed_rad_s: f64,
     /// Standard deviation of the delay between the two angles before anything says how large it is, s.
     pub late_s: f64,
-    /// Where the widest part of the output's turn without rows begins, and how wide it is, rad; 0 wide where rows are all
-    /// over the turn.
-    pub output_gap_rad: [f64; 2],
+    /// Parts of the output's turn without rows, of [`PARTS_OF_A_TURN`], a bit each; none where half of it has rows.
+    pub unrecorded: u64,
 }
 
 impl Scales {
@@ -242,12 +243,6 @@ fn waves(angle: f64, orders: u16, to: &mut Vec<f64>) {
     }
 }
 
-/// Slopes of the curve's columns over the output's angle, per rad.
-pub(super) fn output_slopes(output_rad: f64) -> Vec<f64> {
-    let order = |k: u16| (f64::from(k), (f64::from(k) * output_rad).sin_cos());
-    (1..=OUTPUT_ORDERS).map(order).flat_map(|(k, (sine, cosine))| [k * cosine, -k * sine]).collect()
-}
-
 /// Chebyshev's polynomials from the first degree on.
 fn chebyshev(x: f64) -> [f64; WIND_UP_DEGREE] {
     let (mut before, mut now) = (1.0, x);
@@ -273,7 +268,7 @@ mod tests {
             teeth: 200.0,
             speed_rad_s: 0.2,
             late_s: 1e-3,
-            output_gap_rad: [0.0; 2],
+            unrecorded: 0,
         };
         let at = State {
             generator_rad: 1.3,

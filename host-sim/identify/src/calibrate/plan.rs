@@ -234,7 +234,7 @@ pub fn plan(prior: &Prior<'_>, bench: &Bench, first: Option<&Calibrated>) -> Res
         teeth: prior.tooth_pitches(),
         speed_rad_s: bench.speed_rpm / 60.0 * TAU / prior.nominal.ratio.abs(),
         late_s: late_s(1.0 / bench.rate_hz),
-        output_gap_rad: [0.0; 2],
+        unrecorded: 0,
     };
     let ratio = prior.nominal.ratio;
     let (mut chosen, mut cannot) = open_parts(prior, bench, &scales);

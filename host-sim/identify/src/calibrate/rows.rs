@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::folds::{Folds, Row};
-use super::parts::{PartName, Scales, State};
+use super::parts::{PARTS_OF_A_TURN, PartName, Scales, State};
 use super::prior::Prior;
 use crate::least_squares::Normal;
 use crate::measurement::{Recording, Session, least_and_most, quantile_of, rates, sampled, turns, white_noise};
@@ -131,7 +131,8 @@ impl Recorded {
             let (low, high) = least_and_most(loads);
             high - low < super::LEAST_FRICTION * most
         };
-        let (output_share, output_gap_rad) = covered(angles(1.0 / prior.nominal.ratio), 36);
+        let unrecorded = without_rows(angles(1.0 / prior.nominal.ratio), PARTS_OF_A_TURN);
+        let output_share = share_with_rows(unrecorded, PARTS_OF_A_TURN);
         let torque_noise_n_m = white_noise(sessions().filter_map(|session| session.torque_n_m.as_deref()));
         Recorded {
             torque_noise_n_m,
@@ -142,14 +143,14 @@ impl Recorded {
                 teeth: prior.tooth_pitches(),
                 speed_rad_s: fast,
                 late_s: late_s(period_s),
-                output_gap_rad,
+                unrecorded: if output_share < super::HALF_A_TURN { unrecorded } else { 0 },
             },
             coarse_rad: sessions().map(|session| session.coarse_rad).fold(0.0, f64::max),
             one_pace,
             has_torque,
             each_keeps_to_one_load: has_torque && files.len() > 1 && files.iter().all(keeps_to_one_load),
             has_temperature,
-            generator_share: covered(angles(1.0), 24).0,
+            generator_share: share_with_rows(without_rows(angles(1.0), 24), 24),
             output_share,
             generator_turns: (generator.1 - generator.0) / TAU,
             backward_share: if moved > 0.0 { backward / moved } else { 0.0 },
@@ -221,22 +222,15 @@ pub(super) fn speeds_rad_s(session: &Session, ratio: f64) -> Vec<f64> {
     speeds
 }
 
-/// Share of the `parts` of a turn with angles in them, and the widest stretch without any where a part has none: where
-/// it begins and its width, rad.
-fn covered(angles: impl Iterator<Item = f64>, parts: usize) -> (f64, [f64; 2]) {
-    let mut there = vec![[f64::INFINITY, f64::NEG_INFINITY]; parts];
-    angles.map(|angle| angle.rem_euclid(TAU)).for_each(|angle| {
-        let [least, most] = &mut there[(angle / TAU * parts as f64) as usize % parts];
-        (*least, *most) = (least.min(angle), most.max(angle));
-    });
-    there.retain(|[least, most]| least <= most);
-    if there.len() == parts {
-        return (1.0, [0.0; 2]);
-    }
-    let ends = there.iter().zip(there.iter().cycle().skip(1));
-    let gaps = ends.map(|([_, from], [to, _])| [*from, (to - from).rem_euclid(TAU)]);
-    let widest = gaps.max_by(|a, b| a[1].total_cmp(&b[1])).unwrap_or([0.0; 2]);
-    (there.len() as f64 / parts as f64, widest)
+/// Which of the `parts` of a turn have no angles in them, a bit each.
+fn without_rows(angles: impl Iterator<Item = f64>, parts: usize) -> u64 {
+    let part = |angle: f64| (angle.rem_euclid(TAU) / TAU * parts as f64) as usize % parts;
+    angles.fold((1 << parts) - 1, |without, angle| without & !(1 << part(angle)))
+}
+
+/// Share of the `parts` of a turn that have rows.
+fn share_with_rows(without: u64, parts: usize) -> f64 {
+    (parts - without.count_ones() as usize) as f64 / parts as f64
 }
 
 /// Of how many rows one is fitted, of a record of `total`. No whole number: such rows may all lie at the same few

@@ -63,17 +63,22 @@ fn a_part_of_a_turn_has_a_curve_over_the_output() {
     let c = &made.calibration;
     assert!(kept(c).contains(&"output_angle"), "{:#?}", c.parts);
     assert!(c.held_out.rms_after_arcsec < 0.3 * c.held_out.rms_before_arcsec, "{:?}", c.held_out);
-    assert!(c.core.rms_after_arcsec < 0.1 * c.core.rms_before_arcsec, "{:?}", c.core);
-    assert!(c.notes.iter().any(|note| note.contains("of an output turn was recorded")), "{:?}", c.notes);
+    // Up to 450 arcsec at either end, and none beyond: waves of 60 degrees take that in 30 degrees.
+    assert!(c.core.rms_after_arcsec < 0.5 * c.core.rms_before_arcsec, "{:?}", c.core);
+    assert!(
+        c.notes.iter().any(|note| note.contains("the curve over the output angle is held at zero")),
+        "{:?}",
+        c.notes
+    );
 }
 
 /// Recorded over a quarter of a turn, an eccentric encoder and an oval one at six places of the turn: there the table
-/// takes their waves out, and over the rest it leaves no more on the mean than there is without it.
+/// takes most of their waves out; over the rest it says little, and leaves no more than there is without it.
 #[test]
 fn where_nothing_was_recorded_a_table_adds_no_error() {
     const RECORDED_RAD: f64 = 1.6;
     for [first, second] in [[100.0, 40.0], [0.0, 60.0]] {
-        let mut all = [[0.0; 2]; 2];
+        let mut all = [[0.0; 2]; 3];
         for phase in 0..6 {
             let law = |psi: f64, out: f64, _: f64, _: f64| {
                 let [once, twice] = [(out + f64::from(phase)).cos(), (2.0 * out + f64::from(phase)).cos()];
@@ -88,23 +93,30 @@ fn where_nothing_was_recorded_a_table_adds_no_error() {
             let made = calibrate(&[log], &Prior::of_ratio(RATIO, GeneratorKind::Cam)).unwrap();
             assert!(kept(&made.calibration).contains(&"output_angle"), "{:#?}", made.calibration.parts);
             // Mean squares by the core, less the zero of what was recorded: there, and in the rest.
-            let squares = |values: Vec<f64>| -> [f64; 2] {
-                let of = |rest: bool| values.iter().zip(&beyond).filter(move |of| *of.1 == rest).map(|of| *of.0);
+            let once = |psi: &f64| psi / RATIO < std::f64::consts::TAU;
+            let once: Vec<bool> = whole.sessions[0].generator_rad.iter().map(once).collect();
+            let squares = |values: &[f64]| -> [f64; 2] {
+                let in_turn = values.iter().zip(&beyond).zip(&once).filter(|of| *of.1).map(|of| of.0);
+                let of = |rest: bool| in_turn.clone().filter(move |of| *of.1 == rest).map(|of| *of.0);
                 let count = |rest: bool| of(rest).count() as f64;
                 let zero = of(false).sum::<f64>() / count(false);
                 [false, true].map(|rest| of(rest).map(|value| (value - zero).powi(2)).sum::<f64>() / count(rest))
             };
             let table = Table::check(&made.table.image).unwrap();
-            let left = squares(left_by_core(&table, &whole.sessions[0], 20.0));
-            let measured = squares(whole.sessions[0].error_rad.iter().map(|rad| rad * ARCSEC_PER_RAD).collect());
-            for (sum, of) in all.iter_mut().flatten().zip([measured, left].into_iter().flatten()) {
+            let left = left_by_core(&table, &whole.sessions[0], 20.0);
+            let measured: Vec<f64> = whole.sessions[0].error_rad.iter().map(|rad| rad * ARCSEC_PER_RAD).collect();
+            let said: Vec<f64> = measured.iter().zip(&left).map(|(measured, left)| measured - left).collect();
+            for (sum, of) in
+                all.iter_mut().flatten().zip([&measured, &left, &said].into_iter().flat_map(|of| squares(of)))
+            {
                 *sum += of / 6.0;
             }
         }
-        let [measured, left] = all.map(|squares| squares.map(f64::sqrt));
+        let [measured, left, said] = all.map(|squares| squares.map(f64::sqrt));
         println!("{first} {second}: {measured:.1?} arcsec as measured, recorded and beyond; {left:.1?} with the table");
-        assert!(left[0] < 0.1 * measured[0], "{measured:?}, {left:?}");
+        assert!(left[0] < 0.3 * measured[0], "{measured:?}, {left:?}");
         assert!(left[1] < measured[1], "{measured:?}, {left:?}");
+        assert!(said[1] < 0.4 * said[0], "{said:?}");
     }
 }
 
@@ -432,7 +444,7 @@ fn a_sum_over_folds_is_the_fit_to_the_rows() {
         teeth: 200.0,
         speed_rad_s: 0.0,
         late_s: 1e-3,
-        output_gap_rad: [0.0; 2],
+        unrecorded: 0,
     };
     let rows: Vec<Row> = (0..200)
         .map(|k| {

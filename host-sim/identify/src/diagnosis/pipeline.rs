@@ -21,7 +21,7 @@ use thiserror::Error;
 use super::report::Diagnosis;
 use super::{CauseSet, DiagnosisError, Extended, Settings, diagnose_extended};
 use super::{blurred, channels, quieted, torque_zero, zeros};
-use crate::calibrate::{CalibrationError, Prior, calibrate, check_ratio_of};
+use crate::calibrate::{CalibrationError, Prior, check_ratio_of, table_of};
 use crate::causes::{CauseName, OF_THE_OUTPUT_ENCODER};
 use crate::extension::{
     Agreement, CauseEntry, Evaluation, ExtendedTables, FoundGeometry, Model, Remake, RemakeError, TableKind,
@@ -589,7 +589,7 @@ impl Diagnosed {
         }
         let known = self.known_table.as_ref().map(|made| Table::check(&made.image)).transpose();
         let known = known.map_err(PipelineError::Image)?;
-        Ok(calibrate(&[recording], &subject.prior(known.as_ref()))?.table)
+        Ok(table_of(&[recording], &subject.prior(known.as_ref()))?)
     }
 
     /// The drive with the causes that are geometry, as far as the FEM bears them out.
