@@ -34,19 +34,14 @@ impl Gram {
         }
     }
 
-    /// Adds some of the columns of another one, of which the lower triangle is read.
-    pub fn add_among(&mut self, other: &Gram, places: &[usize]) {
-        for (products, i) in self.products.chunks_exact_mut(self.size).zip(places) {
-            products.iter_mut().zip(places).for_each(|(sum, j)| *sum += other.at(*i.max(j), *i.min(j)));
-        }
-    }
-
     /// Of some of the columns; the lower triangle is read.
     #[must_use]
     pub fn among(&self, places: &[usize]) -> Gram {
-        let mut some = Gram::none(places.len());
-        some.add_among(self, places);
-        some
+        let mut products = Vec::with_capacity(places.len() * places.len());
+        for i in places {
+            products.extend(places.iter().map(|j| self.at(*i.max(j), *i.min(j))));
+        }
+        Gram { size: places.len(), products }
     }
 
     /// Without the first column, whose coefficient is free in these rows; the lower triangle is read.

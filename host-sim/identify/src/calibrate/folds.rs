@@ -1,7 +1,10 @@
 //! Least squares with a penalty by sums over folds: what a fit to all folds but one leaves in that one costs no pass
 //! over the rows.
 
+use std::cell::RefCell;
+use std::collections::HashMap;
 use std::f64::consts::TAU;
+use std::rc::Rc;
 
 use super::parts::{PARTS_OF_A_TURN, PartName, Scales, State, columns, weights};
 use crate::linear::{Gram, Prior, solve};
@@ -36,6 +39,8 @@ pub(super) struct Folds {
     sums: Vec<Gram>,
     /// Of a row: the curve over the output where nothing was recorded, as good as zero.
     unrecorded: Gram,
+    /// Sums of the products over folds, of each set of folds that was fitted to.
+    joined: RefCell<HashMap<Vec<usize>, Rc<Gram>>>,
 }
 
 /// Precision that keeps a matrix definite where a column says nothing, of a row.
@@ -68,7 +73,8 @@ impl Folds {
         let columns: Vec<usize> = (1..all.len() + 2).collect();
         sums.iter_mut().for_each(|sum| *sum = if own_zero { sum.first_free() } else { sum.among(&columns) });
         let unrecorded = unrecorded(parts, scales, &begins);
-        Folds { parts: parts.to_vec(), begins, weights: all, rows, sums, unrecorded }
+        let joined = RefCell::default();
+        Folds { parts: parts.to_vec(), begins, weights: all, rows, sums, unrecorded, joined }
     }
 
     /// Folds that hold rows.
@@ -94,13 +100,22 @@ impl Folds {
         (places, penalties)
     }
 
+    /// Products over some folds, with those where nothing was recorded.
+    fn joined(&self, folds: &[usize]) -> Rc<Gram> {
+        let join = || {
+            let mut gram = Gram::none(self.unrecorded.size);
+            gram.add(&self.unrecorded, self.rows(folds));
+            folds.iter().for_each(|fold| gram.add(&self.sums[*fold], 1.0));
+            Rc::new(gram)
+        };
+        Rc::clone(self.joined.borrow_mut().entry(folds.to_vec()).or_insert_with(join))
+    }
+
     /// Coefficients of the zeros, then of each part chosen, fitted to some folds; those in `held`, counted without the
     /// zeros, keep the value given there, and the others are the best with them.
     pub fn fit(&self, folds: &[usize], chosen: &[Chosen], held: &[(usize, f64)]) -> Option<Vec<f64>> {
         let ((places, penalties), rows) = (self.places(chosen), self.rows(folds));
-        let mut gram = Gram::none(places.len());
-        folds.iter().for_each(|fold| gram.add_among(&self.sums[*fold], &places));
-        gram.add(&self.unrecorded.among(&places), rows);
+        let gram = self.joined(folds).among(&places);
         let prior = |penalty: &f64| Prior { mean: 0.0, std: ((penalty + FLOOR) * rows).sqrt().recip() };
         let mut priors: Vec<Prior> = penalties.iter().map(prior).collect();
         for &(coefficient, mean) in held {
