@@ -28,6 +28,9 @@ pub(super) struct Chosen {
     pub penalty: f64,
 }
 
+/// Folds, and places of parts with the bits of their penalties.
+type Asked = (Vec<usize>, Vec<(Option<usize>, u64)>);
+
 /// All folds.
 pub(super) struct Folds {
     pub parts: Vec<PartName>,
@@ -41,6 +44,8 @@ pub(super) struct Folds {
     unrecorded: Gram,
     /// Sums of the products over folds, of each set of folds that was fitted to.
     joined: RefCell<HashMap<Vec<usize>, Rc<Gram>>>,
+    /// What [`Folds::left_out`] found for folds, and parts with their penalties.
+    found: RefCell<HashMap<Asked, f64>>,
 }
 
 /// Precision that keeps a matrix definite where a column says nothing, of a row.
@@ -73,8 +78,8 @@ impl Folds {
         let columns: Vec<usize> = (1..all.len() + 2).collect();
         sums.iter_mut().for_each(|sum| *sum = if own_zero { sum.first_free() } else { sum.among(&columns) });
         let unrecorded = unrecorded(parts, scales, &begins);
-        let joined = RefCell::default();
-        Folds { parts: parts.to_vec(), begins, weights: all, rows, sums, unrecorded, joined }
+        let (joined, found) = (RefCell::default(), RefCell::default());
+        Folds { parts: parts.to_vec(), begins, weights: all, rows, sums, unrecorded, joined, found }
     }
 
     /// Folds that hold rows.
@@ -137,8 +142,15 @@ impl Folds {
 
     /// Residual of fits to all of `folds` but one in that one, summed over all, arcsec².
     pub fn left_out(&self, folds: &[usize], chosen: &[Chosen]) -> f64 {
-        let others = |fold: usize| -> Vec<usize> { folds.iter().copied().filter(|other| *other != fold).collect() };
-        folds.iter().map(|fold| self.left_in(*fold, &others(*fold), chosen)).sum()
+        let of = |chosen: &Chosen| (self.parts.iter().position(|part| *part == chosen.part), chosen.penalty.to_bits());
+        let mut parts: Vec<_> = chosen.iter().map(of).collect();
+        parts.sort_unstable();
+        // The choice asks again for what it has tried.
+        let mut found = self.found.borrow_mut();
+        *found.entry((folds.to_vec(), parts)).or_insert_with(|| {
+            let others = |fold: usize| -> Vec<usize> { folds.iter().copied().filter(|other| *other != fold).collect() };
+            folds.iter().map(|fold| self.left_in(*fold, &others(*fold), chosen)).sum()
+        })
     }
 }
 

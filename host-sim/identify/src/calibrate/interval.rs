@@ -221,6 +221,21 @@ fn usual_step(rows: &[Row], angle: fn(&State) -> f64) -> f64 {
     if steps.is_empty() { 0.0 } else { median_of(&mut steps) }
 }
 
+/// What a model leaves of the rows of each log about its mean, arcsec, and the noise in that.
+pub(super) fn left_by(rows: &[Row], model: &Model, logs: usize, coarse_rad: f64) -> (Vec<Vec<f64>>, Noise) {
+    let mut left = vec![Vec::new(); logs];
+    rows.iter().for_each(|at| left[at.at.log].push(at.left_arcsec - model.adds_arcsec(&at.at)));
+    for file in &mut left {
+        let mean = file.iter().sum::<f64>() / file.len().max(1) as f64;
+        file.iter_mut().for_each(|value| *value -= mean);
+    }
+    let step_rad = usual_step(rows, |at| at.output_rad);
+    let rows_of_a_step = if step_rad > 0.0 { coarse_rad / step_rad } else { 0.0 };
+    let fitted = model.coefficients.len() + logs;
+    let noise = Noise::of(&left, fitted, usual_step(rows, |at| at.generator_rad), rows_of_a_step);
+    (left, noise)
+}
+
 /// How well a fitted model is known.
 #[derive(Debug, Clone)]
 pub struct Known {
@@ -247,17 +262,7 @@ impl Known {
         left_out_arcsec: f64,
     ) -> Option<Known> {
         let (scales, logs) = (&model.scales, delays.len());
-        let mut left = vec![Vec::new(); logs];
-        rows.iter().for_each(|at| left[at.at.log].push(at.left_arcsec - model.adds_arcsec(&at.at)));
-        for file in &mut left {
-            let mean = file.iter().sum::<f64>() / file.len().max(1) as f64;
-            file.iter_mut().for_each(|value| *value -= mean);
-        }
-        let step_rad = usual_step(rows, |at| at.output_rad);
-        let rows_of_a_step = if step_rad > 0.0 { coarse_rad / step_rad } else { 0.0 };
-        let noise =
-            Noise::of(&left, model.coefficients.len() + logs, usual_step(rows, |at| at.generator_rad), rows_of_a_step);
-
+        let (left, noise) = left_by(rows, model, logs, coarse_rad);
         let in_table = model.chosen.iter().filter(|chosen| !matches!(chosen.part, PartName::ReadingDelay(_)));
         let mut parts: Vec<PartName> = in_table.map(|chosen| chosen.part).collect();
         let of_a_row = noise.of_a_row();

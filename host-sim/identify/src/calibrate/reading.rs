@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::choose::{LEAST_GAIN, PENALTIES, path, pruned};
 use super::folds::{Chosen, Row};
-use super::interval::{Known, OF_95};
+use super::interval::{Known, OF_95, left_by};
 use super::parts::{PartName, Scales, expected_arcsec};
 use super::rows::{Recorded, Rows, settled, speeds_rad_s};
 use super::{Model, Prior};
@@ -101,7 +101,8 @@ impl Delays {
         let none = vec![0.0; logs];
         let known = |model: &Model| Known::of(&rows.rows, model, &none, recorded.coarse_rad, 0.0);
         // Of noise as large as the delays make it they would be held back.
-        let of_a_row = known(&model(&chosen)?)?.noise.of_a_row() / rows.rows.len() as f64;
+        let (_, noise) = left_by(&rows.rows, &model(&chosen)?, logs, recorded.coarse_rad);
+        let of_a_row = noise.of_a_row() / rows.rows.len() as f64;
         for chosen in &mut chosen {
             if matches!(chosen.part, PartName::Play | PartName::ReadingDelay(_)) {
                 chosen.penalty = of_a_row / expected_arcsec(chosen.part, &scales, &[]).powi(2);
