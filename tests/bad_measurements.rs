@@ -492,7 +492,8 @@ fn a_gear_that_the_data_are_not_of_is_refused_or_named_as_its_ratio() {
     assert!(!desk.path("out").exists());
     // A neighbour in the catalogue is a drive of this kind: the run ends with both ratios all the same.
     let neighbour = measured(100.0);
-    let named = neighbour.stderr.contains("data.csv: ratio: found 95") && neighbour.stderr.contains("allowed: 100");
+    let named =
+        neighbour.stderr.contains("error: data.csv: ratio: found 95") && neighbour.stderr.contains("allowed: 100");
     assert!(neighbour.code == 2 && named, "{} {}", neighbour.code, neighbour.stderr);
     assert!(!desk.path("out").exists());
     // An error of the ratio that no other whole one explains is a cause.

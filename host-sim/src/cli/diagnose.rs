@@ -143,9 +143,7 @@ impl Diagnose {
     /// The failure, with the file where the error does not name it.
     fn failed(&self, error: &PipelineError) -> Failure {
         let what = match error {
-            PipelineError::Known(_) | PipelineError::Diagnosis(_) | PipelineError::Calibration(_) => {
-                format!("{}: {error}", self.data.display())
-            }
+            PipelineError::Known(_) | PipelineError::Diagnosis(_) => format!("{}: {error}", self.data.display()),
             _ => error.to_string(),
         };
         if error.is_bad_input() { Failure::BadInput(what) } else { Failure::Failed(what) }
