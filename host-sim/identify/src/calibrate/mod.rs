@@ -594,12 +594,12 @@ impl<'a> FittedTable<'a> {
                 const FALLS: &str = "it would fall with the load somewhere, which no spring does";
                 const LARGE: &str = "it is too large for a table with a part of the turn";
                 let (wind_up, play) = ((PartName::WindUp, FALLS), (PartName::Play, FALLS));
-                let mut tried = vec![vec![(PartName::OutputAngle, LARGE)]];
-                if error.is_of_a_fall() {
-                    if fitted.model.of(PartName::WindUp).is_some() {
-                        fitted.model.gives_way_with_the_load(prior)?;
-                    }
-                    tried = vec![vec![wind_up], vec![play], vec![wind_up, play]];
+                let mut tried = vec![vec![wind_up], vec![play], vec![wind_up, play]];
+                if !error.is_of_a_fall() {
+                    tried.push(Vec::new());
+                    tried.iter_mut().for_each(|without| without.push((PartName::OutputAngle, LARGE)));
+                } else if fitted.model.of(PartName::WindUp).is_some() {
+                    fitted.model.gives_way_with_the_load(prior)?;
                 }
                 let tried = tried.into_iter().filter_map(|without| {
                     let fitted = fitted_without(&without).ok()?;
