@@ -38,8 +38,8 @@ pub fn page(made: &Calibrated) -> Page {
 fn headline(c: &Calibration) -> Headline {
     let kept = c.parts.iter().filter(|part| part.kept).count();
     let words = format!(
-        "The table of this unit has {kept} part{} in addition to the prior; the core with it leaves {{}} rms of {{}} over all \
-         rows{}.",
+        "The table of this unit has {kept} part{} in addition to the prior; the core with it leaves {{}} rms of \
+         {{}} over all rows{}.",
         if kept == 1 { "" } else { "s" },
         if c.reading_delay.is_some() { ", the delay between the readings taken out" } else { "" }
     );

@@ -588,8 +588,8 @@ impl<'a> FittedTable<'a> {
         };
         let fitted = fitted_without(&[])?;
         let (fitted, table) = match table::make(prior, &fitted.model, &recorded) {
-            // A table has no wind-up that falls with the load, none that the lag outruns, and no error beyond its limit,
-            // which a curve that has to come to zero may pass.
+            // A table has no wind-up that falls with the load, none that the lag outruns, and no error beyond its
+            // limit, which a curve that has to come to zero may pass.
             Err(error) if error.is_of_a_fall() || recorded.scales.unrecorded != 0 => {
                 const FALLS: &str = "it would fall with the load somewhere, which no spring does";
                 const LARGE: &str = "it is too large for a table with a part of the turn";

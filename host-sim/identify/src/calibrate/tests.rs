@@ -49,8 +49,8 @@ fn kept(calibration: &Calibration) -> Vec<&'static str> {
     calibration.parts.iter().filter(|part| part.kept).map(|part| part.name).collect()
 }
 
-/// A joint that swings through a quarter of a turn: its table has a curve over the output, which nothing periodic in the
-/// generator makes.
+/// A joint that swings through a quarter of a turn: its table has a curve over the output, which nothing periodic in
+/// the generator makes.
 #[test]
 fn a_part_of_a_turn_has_a_curve_over_the_output() {
     let law = |psi: f64, out: f64, _: f64, _: f64| 4.0 * (2.0 * psi).sin() + 900.0 * (out - 0.8).powi(3);
@@ -62,7 +62,8 @@ fn a_part_of_a_turn_has_a_curve_over_the_output() {
     let made = calibrate(&[log], &Prior::of_ratio(RATIO, GeneratorKind::Cam)).unwrap();
     let c = &made.calibration;
     assert!(kept(c).contains(&"output_angle"), "{:#?}", c.parts);
-    // Up to 450 arcsec at either end, and none beyond: the waves of a table take that in 30 degrees, a third of the way.
+    // Up to 450 arcsec at either end, and none beyond: the waves of a table take that in 30 degrees, a third of the
+    // way.
     assert!(c.held_out.rms_after_arcsec < 0.9 * c.held_out.rms_before_arcsec, "{:?}", c.held_out);
     assert!(c.core.rms_after_arcsec < 0.6 * c.core.rms_before_arcsec, "{:?}", c.core);
     assert!(

@@ -516,8 +516,8 @@ impl Diagnosed {
         DiagnosisFile { diagnosis: &self.diagnosis, table, extension, data_faults: faults, notes, command }
     }
 
-    /// Makes the extended drive where causes were found, and the table that leaves least in rows left out, if one gains.
-    /// `by_fem` is called before the FEM of the drive begins.
+    /// Makes the extended drive where causes were found, and the table that leaves least in rows left out, if one
+    /// gains. `by_fem` is called before the FEM of the drive begins.
     ///
     /// # Errors
     /// The causes make no drive; the FEM of it does not converge.

@@ -1,10 +1,10 @@
-//! What the core leaves of the pointing error in rows that took no part in a fit: without a table, with the nominal one,
-//! with the one that a calibration makes of the other rows, and with the one of the causes found in them.
+//! What the core leaves of the pointing error in rows that took no part in a fit: without a table, with the nominal
+//! one, with the one that a calibration makes of the other rows, and with the one of the causes found in them.
 //!
 //! The core itself predicts each row from generator angle, torque and temperature, as it does on board. The zero of the
 //! encoder is found over the sessions of the fit, once, and taken from the others; where the bench sets it anew, over
-//! those that share it, or in the session held out itself. What a cause of the output's encoder adds is taken off first:
-//! the joint stands right where its encoder reads wrong.
+//! those that share it, or in the session held out itself. What a cause of the output's encoder adds is taken off
+//! first: the joint stands right where its encoder reads wrong.
 
 use flexspline::{Prediction, Table};
 use serde::Serialize;
